@@ -1,0 +1,1 @@
+"""sonic_bullet: PyBullet scenes that sound."""
