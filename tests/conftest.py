@@ -1,0 +1,32 @@
+"""Where tests find data that stands beside the project, and a cache of their own."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+REPO = Path(__file__).resolve().parents[1]
+
+
+def find_shared() -> Path | None:
+    """The folder of shared data: SONIC_BULLET_SHARED, or ``shared`` beside the project."""
+    for place in (os.environ.get("SONIC_BULLET_SHARED"), REPO.parent / "shared"):
+        if place and (Path(place) / "practice").is_dir():
+            return Path(place)
+    return None
+
+
+@pytest.fixture(scope="session")
+def shared_path() -> Path:
+    place = find_shared()
+    if place is None:
+        pytest.skip("shared data not found: set SONIC_BULLET_SHARED")
+    return place
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Say how many tests did not happen for want of shared data: a comparison that silently did not run is a defect."""
+    skipped = [r for r in terminalreporter.stats.get("skipped", []) if "shared data not found" in str(r.longrepr)]
+    terminalreporter.write_line(f"{len(skipped)} tests skipped for want of shared data")
