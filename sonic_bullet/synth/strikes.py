@@ -1,0 +1,140 @@
+"""Loads of touching pairs, split into what is silent, what strikes and what rubs.
+
+    impulses of each step -> load F (pairs, steps) -> support N = opening of F -> strike = top-hat F - N over a rising edge
+
+A physics step tells only a force averaged over it. Fed to a mode as it is, a resting weight would be a comb at the step
+rate [van den Doel, Kry, Pai 2001, sec. 5 discuss the same of recorded forces]. The split is a morphological opening of the
+load over `SPAN` steps [Serra 1982, ch. II]: what lasts that long carries weight and is silent (it loads the surface
+model instead), what is shorter is a blow. Blows of up to SPAN - 1 steps become one strike: simulators spread one impact over 2-3 steps.
+
+A blow needs a cause. A solver's flicker between the corners of a resting box looks like a blow but nothing approached:
+a pair's strike is bounded by 2·m*·v (an elastic impact at the approach speed v before the step), or by what a struck neighbour
+hands on (`accepted_impulse`). For a pair that carried load within the last SPAN steps, v counts above the speed that gravity
+gives in one step: below it, leaving and landing cannot be told from resting.
+
+p pairs; column `NOW` of the load history is the step being rendered, later columns are the look-ahead.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sonic_bullet.contacts import Contacts
+from sonic_bullet.records import Array
+
+SPAN = 4
+NOW = SPAN - 1
+LOOKAHEAD = SPAN - 1
+STANDARD_GRAVITY_M_S2 = 9.80665
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LoadHistory:
+    """key (p,) sorted pair keys; force_n (p, 2·SPAN-1) their normal loads; busy (p,) steps that belong to a strike already made."""
+
+    key: Array
+    force_n: Array
+    busy: Array
+
+    @classmethod
+    def empty(cls) -> LoadHistory:
+        return cls(np.zeros(0, np.int64), np.zeros((0, 2 * SPAN - 1)), np.zeros(0, np.int64))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Split:
+    """The loads of one step, told apart.
+
+    key (p,). support_n (p, 2): silent load at the step's start and end. strike (q,): rows of the pairs that are struck in this step.
+    share (q, SPAN-1): part of the normal impulse of this and the next steps that belongs to each strike.
+    recent (p,): the pair carried load within the last SPAN - 1 steps.
+    """
+
+    key: Array
+    support_n: Array
+    strike: Array
+    share: Array
+    recent: Array
+
+
+def pair_key(contacts: Contacts) -> Array:
+    """(k,) one number per pair of bodies, the same in either order."""
+    low, high = np.minimum(contacts.a, contacts.b).astype(np.int64), np.maximum(contacts.a, contacts.b).astype(np.int64)
+    return (low << 32) | high
+
+
+def key_bodies(key: Array) -> tuple[Array, Array]:
+    """The two body indices (p,), (p,) of pair keys, lower first."""
+    return (key >> 32).astype(np.int64), (key & 0xFFFFFFFF).astype(np.int64)
+
+
+def normal_load_n(contacts: Contacts, dt_s: float) -> tuple[Array, Array]:
+    """Pair keys (p,) of one step, sorted, and their normal loads (p,) in newton."""
+    key, row = np.unique(pair_key(contacts), return_inverse=True)
+    impulse = np.einsum("ki,ki->k", contacts.impulse_n_s, contacts.normal)
+    return key, np.bincount(row, np.maximum(impulse, 0.0), minlength=len(key)) / dt_s
+
+
+def push(history: LoadHistory, contacts: Contacts, dt_s: float) -> LoadHistory:
+    """The history one step later: the newest loads enter the last column, pairs long without load leave."""
+    key, load = normal_load_n(contacts, dt_s)
+    alive = history.force_n[:, 1:].any(axis=1) | (history.busy > 1)
+    union = np.union1d(history.key[alive], key)
+    force = np.zeros((len(union), 2 * SPAN - 1))
+    busy = np.zeros(len(union), np.int64)
+    old = np.searchsorted(union, history.key[alive])
+    force[old, :-1] = history.force_n[alive, 1:]
+    busy[old] = np.maximum(history.busy[alive] - 1, 0)
+    force[np.searchsorted(union, key), -1] = load
+    return LoadHistory(union, force, busy)
+
+
+def _opening(force: Array, column: int) -> Array:
+    """Opening of the load at a column: the best of the windows of SPAN steps around it, cut where the future is not known."""
+    last = force.shape[1]
+    windows = [force[:, i : min(i + SPAN, last)].min(axis=1) for i in range(max(column - SPAN + 1, 0), column + 1)]
+    return np.max(windows, axis=0) if len(force) else np.zeros(0)
+
+
+def split(history: LoadHistory) -> tuple[Split, LoadHistory]:
+    """Support and strikes of the step in column NOW, and the history with the struck steps marked as used."""
+    force = history.force_n
+    support = np.stack([_opening(force, NOW + i) for i in range(SPAN - 1)], axis=1).reshape(len(force), SPAN - 1)
+    excess = np.maximum(force[:, NOW : NOW + SPAN - 1] - support, 0.0)
+    excess[excess <= 1e-9 * force[:, NOW : NOW + SPAN - 1]] = 0.0  # rounding of the sums is no blow
+    starts = (excess[:, 0] > 0) & (force[:, NOW] > force[:, NOW - 1]) & (history.busy == 0)
+    connected = np.cumprod(excess > 0, axis=1).astype(bool)
+    strike = np.flatnonzero(starts)
+    load = np.where(force[:, NOW : NOW + SPAN - 1] > 0, force[:, NOW : NOW + SPAN - 1], 1.0)
+    share = np.where(connected, excess / load, 0.0)[strike]
+    busy = history.busy.copy()
+    busy[strike] = connected[strike].sum(axis=1)
+    recent = (force[:, :NOW] > 0).any(axis=1)
+    return Split(history.key, support[:, :2], strike, share, recent), LoadHistory(history.key, force, busy)
+
+
+def effective_approach_m_s(approach_m_s: Array, recent: Array, dt_s: float) -> Array:
+    """Approach speed (q,) that can cause a blow: above g·dt where the pair was loaded a moment ago."""
+    return np.maximum(approach_m_s - np.where(recent, STANDARD_GRAVITY_M_S2 * dt_s, 0.0), 0.0)
+
+
+def accepted_impulse(raw_n_s: Array, budget_n_s: Array, a: Array, b: Array, mobile: Array, rounds: int = 8) -> Array:
+    """Strike impulses (q,) that a cause explains: the own budget, or that of a neighbour struck in the same step.
+
+    raw_n_s, budget_n_s (q,): wanted and self-caused. a, b (q,): body indices. mobile (bodies,): False for what never moves:
+    a floor hands nothing on. The largest neighbour counts, not the sum: solver noise of a pile must not add up to a blow.
+    A blow travels at most ``rounds`` bodies far in one physics step.
+    """
+    accepted = np.minimum(raw_n_s, budget_n_s)
+    for _ in range(rounds):
+        through = np.zeros(len(mobile))
+        np.maximum.at(through, a, accepted)
+        np.maximum.at(through, b, accepted)
+        handed = np.maximum(np.where(mobile[a], through[a], 0.0), np.where(mobile[b], through[b], 0.0))
+        grown = np.minimum(raw_n_s, np.maximum(budget_n_s, handed))
+        if np.array_equal(grown, accepted):
+            break
+        accepted = grown
+    return accepted
