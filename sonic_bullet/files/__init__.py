@@ -1,0 +1,27 @@
+"""Audio and npz in and out: what reaches a disk is whole, finite and said.
+
+    samples (channels, n) Pa -> scale -> check -> clip and count -> NAME.partial.EXT -> fsync -> NAME.EXT
+    ContactLog | ModalModel  -> arrays + one JSON entry, no pickle -> NAME.EXT.*.partial -> fsync -> NAME.EXT
+
+`audio` writes sound, `logs` writes contact logs and modal models (their format is described there), `container` is the npz
+beneath them, `atomic` the replacing.
+"""
+
+from sonic_bullet.files.atomic import check_output, replacing
+from sonic_bullet.files.audio import AudioReport, AudioWriter, check_audio_output, check_sr, read_audio, write_audio
+from sonic_bullet.files.logs import read_log, read_model, write_log, write_model
+
+__all__ = [
+    "AudioReport",
+    "AudioWriter",
+    "check_audio_output",
+    "check_output",
+    "check_sr",
+    "read_audio",
+    "read_log",
+    "read_model",
+    "replacing",
+    "write_audio",
+    "write_log",
+    "write_model",
+]

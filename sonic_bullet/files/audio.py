@@ -1,0 +1,300 @@
+"""Samples in pascals to an audio file and back.
+
+    y = g·x,  g = 1/full_scale_pa                      calibrated (the default: 1.0 in the file = 1 Pa)
+              10^(peak_dbfs/20)/max|x|                 --peak-dbfs
+              10^((lufs - L(x))/20)                    --lufs, L: programme loudness [ITU-R BS.1770-4, eq. 2 and 7, by pyloudnorm]
+
+Float files hold y as it is, above full scale too. Every other format holds |y| ≤ 1: what is beyond is clipped and counted in
+`AudioReport.clipped`. float32 subnormals are flushed to zero (decaying tails are full of them, and they slow every player), NaN and
+infinities are refused. The same samples give the same bytes, except in OGG, whose streams carry a random serial number.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+
+from sonic_bullet.errors import AudioError, FileError, SonicBulletError
+from sonic_bullet.files.atomic import cannot, check_output, sync
+from sonic_bullet.records import Array
+
+FORMATS = {
+    ".wav": ("WAV", "FLOAT"),
+    ".rf64": ("RF64", "FLOAT"),
+    ".w64": ("W64", "FLOAT"),
+    ".flac": ("FLAC", "PCM_24"),
+    ".ogg": ("OGG", "VORBIS"),
+    ".aif": ("AIFF", "FLOAT"),
+    ".aiff": ("AIFF", "FLOAT"),
+    ".caf": ("CAF", "FLOAT"),
+}
+"""Extension -> container and default sample format, in libsndfile's names."""
+
+SAMPLE_BYTES = {"FLOAT": 4, "DOUBLE": 8, "PCM_32": 4, "PCM_24": 3, "PCM_16": 2, "PCM_S8": 1, "PCM_U8": 1}
+CHUNK_LIMIT_BYTES = 2**32 - 2**16  # what the 32-bit sizes of WAV and AIFF can count, less room for headers
+BLOCK_FRAMES = 1 << 18
+SMALLEST_NORMAL = 2.0**-126  # of float32
+
+SR_MIN_HZ, SR_MAX_HZ = 8000, 384_000
+
+
+@dataclass(frozen=True, slots=True)
+class AudioReport:
+    """What was written: where, how much, how loud.
+
+    gain_per_pa: file units for one pascal. peak_pa, rms_pa: before the gain, over all channels. clipped: samples that were cut
+    at full scale. over: samples beyond full scale in all (equal to clipped except in float files, where it is the player that clips).
+    """
+
+    path: str
+    format: str
+    subtype: str
+    sr: int
+    channels: int
+    frames: int
+    gain_per_pa: float
+    peak_pa: float
+    rms_pa: float
+    clipped: int
+    over: int
+
+    @property
+    def seconds(self) -> float:
+        return self.frames / self.sr
+
+
+def check_sr(sr: object) -> int:
+    """``sr`` as a whole number of Hz between 8000 and 384 000. Raises AudioError on anything else."""
+    if isinstance(sr, bool) or not hasattr(sr, "__float__"):
+        raise AudioError(f"sample rate {sr!r} is not a number", "give it in Hz, 48000 say")
+    rate = float(sr)
+    if not math.isfinite(rate) or not SR_MIN_HZ <= rate <= SR_MAX_HZ:
+        raise AudioError(f"sample rate {rate:g} Hz is out of range", f"give one between {SR_MIN_HZ} and {SR_MAX_HZ} Hz, 48000 say")
+    if rate != int(rate):
+        raise AudioError(f"sample rate {rate!r} Hz is not whole", "give a whole number of Hz, 48000 say")
+    return int(rate)
+
+
+def check_audio_output(path: str | os.PathLike[str], subtype: str | None = None) -> tuple[Path, str, str]:
+    """Real path, container and sample format that ``path`` asks for, before any sample is rendered.
+
+    Raises FileError where the place cannot be written or the extension or subtype is unknown.
+    """
+    extension = Path(path).suffix.lower()
+    if extension not in FORMATS:
+        raise FileError(f"cannot write {path}: '{extension}' is no audio format known here", f"end the name with one of {' '.join(FORMATS)}")
+    target = check_output(path)
+    container, default = FORMATS[extension]
+    wanted = default if subtype is None else subtype.upper()
+    if wanted != default:
+        import soundfile
+
+        if not soundfile.check_format(container, wanted):
+            known = " ".join(soundfile.available_subtypes(container))
+            raise FileError(f"cannot write {path}: {container} holds no {wanted} samples", f"one of {known}")
+    return target, container, wanted
+
+
+class AudioWriter:
+    """An audio file that grows block by block; a context manager.
+
+    `write` takes (channels, n) pascals. Leaving the block renames NAME.partial.EXT to NAME.EXT. Leaving it with an error, or with
+    Ctrl-C, closes what was written as a valid file under the partial name and says so in the error; the final name is untouched.
+    gain_per_pa: file units for one pascal. expected_frames: chooses RF64 over WAV where the file will pass 4 GiB.
+    """
+
+    def __init__(
+        self,
+        path: str | os.PathLike[str],
+        sr: int,
+        channels: int,
+        *,
+        gain_per_pa: float = 1.0,
+        subtype: str | None = None,
+        expected_frames: int = 0,
+    ) -> None:
+        """Opens the partial file. Raises FileError (place, extension, subtype) and AudioError (rate, channels, gain, size)."""
+        import soundfile
+
+        self.path = os.fspath(path)
+        self.target, self.format, self.subtype = check_audio_output(path, subtype)
+        self.partial = self.target.with_name(f"{self.target.stem}.partial{self.target.suffix}")
+        self.sr, self.channels, self.gain_per_pa = check_sr(sr), channels, float(gain_per_pa)
+        if not (math.isfinite(self.gain_per_pa) and self.gain_per_pa > 0):
+            raise AudioError(f"a gain of {gain_per_pa} per Pa", "give a full scale above zero")
+        self.frame_bytes = channels * SAMPLE_BYTES.get(self.subtype, 0)
+        if self.format == "WAV" and expected_frames * self.frame_bytes > CHUNK_LIMIT_BYTES:
+            self.format = "RF64"
+        self.frames = self.clipped = self.over = 0
+        self.peak_pa = self.energy_pa2 = 0.0
+        try:
+            self.file: Any = soundfile.SoundFile(self.partial, "w", self.sr, channels, self.subtype, format=self.format)
+        except soundfile.LibsndfileError as error:
+            self.partial.unlink(missing_ok=True)
+            raise AudioError(f"cannot write {channels} channels at {self.sr} Hz to {path}: {error.error_string}", "write .wav, or fewer channels") from error
+
+    @property
+    def is_float(self) -> bool:
+        return self.subtype in ("FLOAT", "DOUBLE")
+
+    def write(self, samples: Array) -> None:
+        """Append (channels, n) samples in Pa. Raises AudioError (not finite, shape, over 4 GiB) and FileError (disk)."""
+        import soundfile
+
+        block = np.asarray(samples, float)
+        if block.ndim != 2 or block.shape[0] != self.channels:
+            raise AudioError(f"samples of shape {block.shape} for {self.channels} channels", "pass (channels, n)")
+        if self.format in ("WAV", "AIFF") and (self.frames + block.shape[1]) * self.frame_bytes > CHUNK_LIMIT_BYTES:
+            raise AudioError(f"{self.path} would pass 4 GiB, which {self.format} cannot hold", "write .w64, .rf64 or .flac")
+        scaled = block * self.gain_per_pa
+        if not (np.abs(scaled) < 3.4e38).all():  # False for NaN too
+            channel, frame = (int(i[0]) for i in np.nonzero(~(np.abs(scaled) < 3.4e38)))
+            raise AudioError(
+                f"sample {self.frames + frame} of channel {channel} is {block[channel, frame]}",
+                "sound must be finite: examine the scene with 'sonic-bullet doctor'",
+            )
+        beyond = int(np.count_nonzero(np.abs(scaled) > 1))
+        self.over += beyond
+        if not self.is_float:
+            self.clipped += beyond
+            scaled = np.clip(scaled, -1, 1)
+        if self.subtype != "DOUBLE":
+            scaled[np.abs(scaled) < SMALLEST_NORMAL] = 0
+            scaled = scaled.astype(np.float32) if self.subtype == "FLOAT" else scaled
+        else:
+            scaled[np.abs(scaled) < np.finfo(float).tiny] = 0
+        try:
+            self.file.write(scaled.T)
+        except soundfile.LibsndfileError as error:
+            raise FileError(f"cannot write {self.path}: {error.error_string}", "free space or choose another place") from error
+        self.frames += block.shape[1]
+        if block.size:
+            self.peak_pa = max(self.peak_pa, float(np.abs(block).max()))
+            self.energy_pa2 += float(np.sum(block**2))
+
+    def report(self) -> AudioReport:
+        """What has been written so far."""
+        rms = math.sqrt(self.energy_pa2 / (self.frames * self.channels)) if self.frames else 0.0
+        return AudioReport(
+            self.path, self.format, self.subtype, self.sr, self.channels, self.frames, self.gain_per_pa, self.peak_pa, rms, self.clipped, self.over
+        )
+
+    def __enter__(self) -> AudioWriter:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        try:
+            self.file.close()
+            if error is None:
+                _forget_time(self.partial)
+                sync(self.partial)
+                os.replace(self.partial, self.target)
+                return
+        except OSError as failure:
+            raise cannot("write", self.path, failure) from failure
+        if self.frames == 0:
+            self.partial.unlink(missing_ok=True)
+            return
+        saved = f"the first {self.frames / self.sr:.3f} s are in {self.partial}"
+        if isinstance(error, SonicBulletError):
+            raise type(error)(error.what, f"{error.remedy}; {saved}" if error.remedy else saved) from error
+        if isinstance(error, KeyboardInterrupt):
+            raise KeyboardInterrupt(f"stopped; {saved}") from error
+        if error is not None:
+            error.add_note(saved)
+
+
+def _forget_time(path: Path) -> None:
+    """Zero the time of day that libsndfile puts into the PEAK chunk (id, size, version, time) of float files: equal sound, equal bytes."""
+    with path.open("rb+") as file:
+        head = file.read(512)
+        found = head.split(b"data")[0].split(b"SSND")[0].find(b"PEAK")
+        if found >= 0:
+            file.seek(found + 12)
+            file.write(bytes(4))
+
+
+def write_audio(
+    path: str | os.PathLike[str],
+    samples: Array,
+    sr: int,
+    *,
+    peak_dbfs: float | None = None,
+    lufs: float | None = None,
+    full_scale_pa: float = 1.0,
+    subtype: str | None = None,
+) -> AudioReport:
+    """Write ``samples`` (channels, n) or (n,), float64 pascals, whole or not at all.
+
+    The extension chooses the format (`FORMATS`), ``subtype`` the sample format in libsndfile's names. At most one of ``peak_dbfs``
+    (dB re full scale) and ``lufs`` scales; else full_scale_pa is 1.0 in the file. Over 4 GiB a .wav is written as RF64.
+    Raises AudioError (rate, NaN, silence or under 0.4 s where loudness is asked, both levels given) and FileError (place, format).
+    """
+    rate = check_sr(sr)
+    check_audio_output(path, subtype)
+    sound = np.asarray(samples, float)
+    sound = sound[None, :] if sound.ndim == 1 else sound
+    if sound.ndim != 2 or sound.shape[0] == 0:
+        raise AudioError(f"samples of shape {np.shape(samples)}", "pass (channels, n)")
+    gain = _gain_per_pa(sound, rate, peak_dbfs, lufs, full_scale_pa)
+    with AudioWriter(path, rate, sound.shape[0], gain_per_pa=gain, subtype=subtype, expected_frames=sound.shape[1]) as writer:
+        for start in range(0, sound.shape[1], BLOCK_FRAMES):
+            writer.write(sound[:, start : start + BLOCK_FRAMES])
+    return writer.report()
+
+
+def _gain_per_pa(sound: Array, sr: int, peak_dbfs: float | None, lufs: float | None, full_scale_pa: float) -> float:
+    """The factor g of the module's head; peak and loudness are of the whole sound."""
+    if peak_dbfs is None and lufs is None:
+        if not (math.isfinite(full_scale_pa) and full_scale_pa > 0):
+            raise AudioError(f"a full scale of {full_scale_pa} Pa", "give one above zero")
+        return 1 / full_scale_pa
+    if peak_dbfs is not None and lufs is not None:
+        raise AudioError("both a peak and a loudness are asked for", "give one of --peak-dbfs and --lufs")
+    level = peak_dbfs if peak_dbfs is not None else lufs
+    if level is None or not -200 <= level <= 200:
+        raise AudioError(f"a level of {level} dB", "give one between -200 and 200 dB")
+    peak = float(np.abs(sound).max()) if sound.size else 0.0
+    if not math.isfinite(peak):
+        raise AudioError("the samples hold NaN or infinite numbers", "sound must be finite: examine the scene with 'sonic-bullet doctor'")
+    if peak < 1e-300:
+        raise AudioError("the sound is silent, so no level can be given to it", "leave out --peak-dbfs and --lufs, or make something collide")
+    if lufs is None:
+        return float(10 ** (level / 20)) / peak
+    return float(10 ** ((level - _loudness_lufs(sound / peak, sr)) / 20)) / peak
+
+
+def _loudness_lufs(sound: Array, sr: int) -> float:
+    """Gated programme loudness of (channels, n) [ITU-R BS.1770-4]."""
+    import pyloudnorm
+
+    if sound.shape[0] > 5:
+        raise AudioError(f"loudness is defined for up to 5 channels, not {sound.shape[0]}", "use --peak-dbfs")
+    if sound.shape[1] < math.ceil(0.4 * sr):
+        raise AudioError(f"loudness needs 0.4 s of sound, here are {sound.shape[1] / sr:.3f} s", "use --peak-dbfs, or render longer")
+    loudness = float(pyloudnorm.Meter(sr).integrated_loudness(sound.T))
+    if not math.isfinite(loudness):
+        raise AudioError("the sound has no measurable loudness (a click under the gate of BS.1770)", "use --peak-dbfs")
+    return loudness
+
+
+def read_audio(path: str | os.PathLike[str]) -> tuple[Array, int]:
+    """Samples (channels, n) float64 in file units (pascals where written with full scale 1 Pa) and the rate in Hz.
+
+    Raises FileError where the file is missing, cut or no audio.
+    """
+    import soundfile
+
+    if not Path(path).is_file():
+        raise FileError(f"cannot read {path}: no such file", "check the path")
+    try:
+        samples, sr = soundfile.read(os.fspath(path), dtype="float64", always_2d=True)
+    except (soundfile.LibsndfileError, OSError) as error:
+        raise FileError(f"cannot read {path}: {getattr(error, 'error_string', error)}", "give an unbroken audio file") from error
+    return np.ascontiguousarray(samples.T), int(sr)

@@ -1,0 +1,300 @@
+"""Contact logs and modal models on disk: every number bit for bit, no pickle.
+
+The container is `container`'s npz. Scalars, names and references are JSON (`header.npy`), all arrays are entries of their own:
+
+    format "sonic-bullet-contacts/1"; b bodies, s steps, p = Σ bodies known at each step, k = Σ contacts of each step
+      step_dt_s (s,) f8                     length of each step
+      step_body_count, step_contact_count (s,) i8   how many of the p and k rows are each step's, in order
+      pose_position_m (p, 3) f8, pose_quaternion_xyzw (p, 4) f8, pose_teleported (p,) bool
+      contact_<field> (k, …)                the fields of `Contacts`: a, b i4; point_a_m, point_b_m, normal, impulse_n_s, slip_m_s,
+                                            sweep_m_s, approach_m_s, gap_m f8
+      body_inertia_kg_m2 (b, 3, 3) f8, body_curvature_per_m (b,) f8 (NaN: by the model's surface)
+      material_stiffness_pa (n, 6, 6) f8    materials and models are stored once each, however many bodies share them
+      model<i>_freq_hz, _decay_per_s (m,) f8, _shape (v, 3, m) f4, _vertex_m (v, 3) f8, _face (f, 3) i4, _curvature_per_m (f,) f8
+    format "sonic-bullet-model/1"           one model: model0_… as above
+
+A reader checks sizes before it allocates and records check their invariants, so a cut, foreign or forged file is one line of LogError.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Mapping
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from sonic_bullet.contacts import ROW_FIELDS, ContactLog, Contacts, Step
+from sonic_bullet.errors import LogError, RecordError
+from sonic_bullet.files.container import REMEDY, read_container, take, write_container
+from sonic_bullet.records import Air, Array, Body, Material, Microphone, ModalModel, ModalSum, Sensor, Vibrometer
+
+LOG_FORMAT = "sonic-bullet-contacts/1"
+MODEL_FORMAT = "sonic-bullet-model/1"
+MODEL_ARRAYS: dict[str, tuple[type, tuple[int | None, ...]]] = {
+    "freq_hz": (float, (None,)),
+    "decay_per_s": (float, (None,)),
+    "shape": (np.float32, (None, 3, None)),
+    "vertex_m": (float, (None, 3)),
+    "face": (np.int32, (None, 3)),
+    "curvature_per_m": (float, (None,)),
+}
+Vector = tuple[float, float, float]
+
+
+class _Model(msgspec.Struct):
+    volume_m3: float
+    mass_kg: float
+    dropped: int
+    note: str
+
+
+class _Material(msgspec.Struct):
+    name: str
+    density_kg_m3: float
+    alpha_per_s: float | None
+    beta_s: float | None
+    roughness_m: float
+    hurst: float
+    restitution: float
+    source: str
+
+
+class _Body(msgspec.Struct):
+    body_id: int
+    link: int
+    epoch: int
+    name: str
+    mass_kg: float
+    volume_m3: float
+    since_step: int
+    until_step: int
+    material: int | None
+    model: int | None
+
+
+class _Microphone(msgspec.Struct, tag="microphone"):
+    position_m: Vector
+
+
+class _Vibrometer(msgspec.Struct, tag="vibrometer"):
+    body_id: int
+    link: int
+    point_m: Vector
+    direction: Vector
+
+
+class _ModalSum(msgspec.Struct, tag="modal-sum"):
+    scale: float
+
+
+class _LogHeader(msgspec.Struct):
+    format: str
+    sr: int
+    seed: int
+    air_density_kg_m3: float
+    air_sound_speed_m_s: float
+    sensors: list[_Microphone | _Vibrometer | _ModalSum]
+    materials: list[_Material]
+    models: list[_Model]
+    bodies: list[_Body]
+
+
+class _ModelHeader(msgspec.Struct):
+    format: str
+    model: _Model
+
+
+def write_log(path: str | os.PathLike[str], log: ContactLog) -> None:
+    """Write a contact log, whole or not at all; equal logs give equal bytes. Raises FileError."""
+    materials, material_of = _distinct([body.material for body in log.bodies], _material_key)
+    models, model_of = _distinct([body.model for body in log.bodies], _model_key)
+    header = _LogHeader(
+        format=LOG_FORMAT,
+        sr=int(log.sr),
+        seed=int(log.seed),
+        air_density_kg_m3=float(log.air.density_kg_m3),
+        air_sound_speed_m_s=float(log.air.sound_speed_m_s),
+        sensors=[_pack_sensor(sensor) for sensor in log.sensors],
+        materials=[_pack_material(material) for material in materials],
+        models=[_pack_model(model) for model in models],
+        bodies=[_pack_body(body, m, n) for body, m, n in zip(log.bodies, material_of, model_of, strict=True)],
+    )
+    steps = log.steps
+    rows = Contacts.joined([step.contacts for step in steps])
+    arrays: dict[str, Array] = {
+        "step_dt_s": np.array([step.dt_s for step in steps], float),
+        "step_body_count": np.array([len(step.position_m) for step in steps], np.int64),
+        "step_contact_count": np.array([len(step.contacts) for step in steps], np.int64),
+        "pose_position_m": np.concatenate([np.zeros((0, 3)), *(step.position_m for step in steps)]),
+        "pose_quaternion_xyzw": np.concatenate([np.zeros((0, 4)), *(step.quaternion_xyzw for step in steps)]),
+        "pose_teleported": np.concatenate([np.zeros(0, bool), *(step.teleported for step in steps)]),
+        "body_inertia_kg_m2": np.reshape([body.inertia_kg_m2 for body in log.bodies], (-1, 3, 3)).astype(float),
+        "body_curvature_per_m": np.array([body.curvature_per_m for body in log.bodies], float),
+        "material_stiffness_pa": np.reshape([material.stiffness_pa for material in materials], (-1, 6, 6)).astype(float),
+    }
+    arrays |= {f"contact_{name}": getattr(rows, name) for name in ROW_FIELDS}
+    for i, model in enumerate(models):
+        arrays |= _model_arrays(model, i)
+    write_container(path, header, arrays)
+
+
+def read_log(path: str | os.PathLike[str]) -> ContactLog:
+    """The contact log that `write_log` wrote. Raises FileError (no such file) and LogError (cut, foreign, forged, inconsistent)."""
+    header, arrays = read_container(path, _LogHeader, LOG_FORMAT, "contact log")
+    try:
+        return _unpack_log(header, arrays, path)
+    except (RecordError, LogError) as error:
+        if str(path) in error.what:
+            raise
+        raise LogError(f"{path}: {error.what}", REMEDY) from error
+
+
+def write_model(path: str | os.PathLike[str], model: ModalModel) -> None:
+    """Write one modal model, whole or not at all. Raises FileError."""
+    write_container(path, _ModelHeader(MODEL_FORMAT, _pack_model(model)), _model_arrays(model, 0))
+
+
+def read_model(path: str | os.PathLike[str]) -> ModalModel:
+    """The modal model that `write_model` wrote. Raises FileError (no such file) and LogError (cut, foreign, forged, inconsistent)."""
+    header, arrays = read_container(path, _ModelHeader, MODEL_FORMAT, "modal model")
+    try:
+        return _unpack_model(header.model, arrays, 0, path)
+    except RecordError as error:
+        raise LogError(f"{path}: {error.what}", REMEDY) from error
+
+
+def _distinct(things: list[Any], key: Any) -> tuple[list[Any], list[int | None]]:
+    """The different things by content, in order of appearance, and the index of each; None stays None."""
+    kept: dict[bytes, int] = {}
+    by_identity = {id(thing): key(thing) for thing in things if thing is not None}
+    index = [None if thing is None else kept.setdefault(by_identity[id(thing)], len(kept)) for thing in things]
+    firsts = [next(thing for thing, i in zip(things, index, strict=True) if i == number) for number in range(len(kept))]
+    return firsts, index
+
+
+def _material_key(material: Material) -> bytes:
+    return msgspec.json.encode(_pack_material(material)) + material.stiffness_pa.tobytes()
+
+
+def _model_key(model: ModalModel) -> bytes:
+    digest = hashlib.sha256(msgspec.json.encode(_pack_model(model)))
+    for name in MODEL_ARRAYS:
+        array = getattr(model, name)
+        digest.update(repr(array.shape).encode() + array.tobytes())
+    return digest.digest()
+
+
+def _pack_material(x: Material) -> _Material:
+    return _Material(
+        name=_text(x.name),
+        density_kg_m3=float(x.density_kg_m3),
+        alpha_per_s=None if x.alpha_per_s is None else float(x.alpha_per_s),
+        beta_s=None if x.beta_s is None else float(x.beta_s),
+        roughness_m=float(x.roughness_m),
+        hurst=float(x.hurst),
+        restitution=float(x.restitution),
+        source=_text(x.source),
+    )
+
+
+def _pack_model(x: ModalModel) -> _Model:
+    return _Model(float(x.volume_m3), float(x.mass_kg), int(x.dropped), _text(x.note))
+
+
+def _pack_body(x: Body, material: int | None, model: int | None) -> _Body:
+    numbers = (int(x.body_id), int(x.link), int(x.epoch))
+    return _Body(*numbers, _text(x.name), float(x.mass_kg), float(x.volume_m3), int(x.since_step), int(x.until_step), material, model)
+
+
+def _pack_sensor(sensor: Sensor) -> _Microphone | _Vibrometer | _ModalSum:
+    if isinstance(sensor, Microphone):
+        return _Microphone(_vector(sensor.position_m))
+    if isinstance(sensor, Vibrometer):
+        return _Vibrometer(int(sensor.body_id), int(sensor.link), _vector(sensor.point_m), _vector(sensor.direction))
+    return _ModalSum(float(sensor.scale))
+
+
+def _vector(array: Array) -> Vector:
+    x, y, z = (float(value) for value in array)
+    return x, y, z
+
+
+def _text(text: str) -> str:
+    """``text`` as JSON can hold it: lone surrogates, as undecodable names carry them, become question marks."""
+    return text.encode("utf-8", "replace").decode()
+
+
+def _model_arrays(model: ModalModel, index: int) -> dict[str, Array]:
+    return {f"model{index}_{name}": getattr(model, name) for name in MODEL_ARRAYS}
+
+
+def _unpack_model(header: _Model, arrays: Mapping[str, Array], index: int, path: object) -> ModalModel:
+    parts = {name: take(arrays, f"model{index}_{name}", dtype, shape, path) for name, (dtype, shape) in MODEL_ARRAYS.items()}
+    return ModalModel(**parts, volume_m3=header.volume_m3, mass_kg=header.mass_kg, dropped=header.dropped, note=header.note)
+
+
+def _unpack_sensor(sensor: _Microphone | _Vibrometer | _ModalSum) -> Sensor:
+    if isinstance(sensor, _Microphone):
+        return Microphone(np.array(sensor.position_m))
+    if isinstance(sensor, _Vibrometer):
+        made = Vibrometer(sensor.body_id, np.array(sensor.point_m), np.array(sensor.direction), sensor.link)
+        object.__setattr__(made, "direction", np.array(sensor.direction))  # already of unit length: dividing again would move its last bit
+        made.direction.setflags(write=False)
+        return made
+    return ModalSum(sensor.scale)
+
+
+def _unpack_log(header: _LogHeader, arrays: Mapping[str, Array], path: object) -> ContactLog:
+    b, n = len(header.bodies), len(header.materials)
+    inertia = take(arrays, "body_inertia_kg_m2", float, (b, 3, 3), path)
+    curvature = take(arrays, "body_curvature_per_m", float, (b,), path)
+    stiffness = take(arrays, "material_stiffness_pa", float, (n, 6, 6), path)
+    materials = [Material(stiffness_pa=stiffness[i], **msgspec.structs.asdict(x)) for i, x in enumerate(header.materials)]
+    models = [_unpack_model(x, arrays, i, path) for i, x in enumerate(header.models)]
+    bodies = [
+        Body(
+            **{**msgspec.structs.asdict(x), "material": _pick(materials, x.material, path), "model": _pick(models, x.model, path)},
+            inertia_kg_m2=inertia[i],
+            curvature_per_m=float(curvature[i]),
+        )
+        for i, x in enumerate(header.bodies)
+    ]
+    return ContactLog(
+        bodies=tuple(bodies),
+        steps=_unpack_steps(arrays, path),
+        sensors=tuple(_unpack_sensor(sensor) for sensor in header.sensors),
+        sr=header.sr,
+        seed=header.seed,
+        air=Air(header.air_density_kg_m3, header.air_sound_speed_m_s),
+    )
+
+
+def _pick(things: list[Any], index: int | None, path: object) -> Any:
+    if index is not None and not 0 <= index < len(things):
+        raise LogError(f"{path}: a body refers to a part that is not there", REMEDY)
+    return None if index is None else things[index]
+
+
+def _unpack_steps(arrays: Mapping[str, Array], path: object) -> tuple[Step, ...]:
+    dt = take(arrays, "step_dt_s", float, (None,), path)
+    ends = []
+    for name in ("step_body_count", "step_contact_count"):
+        count = take(arrays, name, np.int64, (len(dt),), path)
+        if (count < 0).any() or (count > 2**40).any():
+            raise LogError(f"{path}: {name} is negative or absurd", REMEDY)
+        ends.append(np.concatenate([[0], np.cumsum(count)]))
+    poses, contacts = ends
+    p, k = int(poses[-1]), int(contacts[-1])
+    position = take(arrays, "pose_position_m", float, (p, 3), path)
+    quaternion = take(arrays, "pose_quaternion_xyzw", float, (p, 4), path)
+    teleported = take(arrays, "pose_teleported", bool, (p,), path)
+    rows = Contacts(**{name: take(arrays, f"contact_{name}", dtype, (k, *tail), path) for name, (dtype, tail) in ROW_FIELDS.items()})
+    if k and min(rows.a.min(), rows.b.min()) < 0:
+        raise LogError(f"{path}: a contact names a body below zero", REMEDY)
+    return tuple(
+        Step(float(dt[i]), position[p0:p1], quaternion[p0:p1], teleported[p0:p1], rows.rows(k0, k1))
+        for i, (p0, p1, k0, k1) in enumerate(zip(poses[:-1], poses[1:], contacts[:-1], contacts[1:], strict=True))
+    )
