@@ -1,0 +1,8 @@
+"""The modal room: shapes and a material in, a body's vibration modes out.
+
+Shape -> solid.Solid (structured.py, tetrahedra.py) -> K, M (fem.py) -> λ, U (eigen.py) -> ModalModel (model.py), kept by cache.py
+"""
+
+from sonic_bullet.modal.model import analyse
+
+__all__ = ["analyse"]
