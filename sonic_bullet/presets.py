@@ -1,0 +1,184 @@
+"""Materials from and to typed preset files: what a body is made of, each number with its source.
+
+    NAME.json -> Preset (typed, every field checked) -> Material
+
+A file is UTF-8 JSON, format "sonic-bullet-preset/1": name, density_kg_m3, elasticity (youngs_pa and poisson, or stiffness_pa 6×6),
+damping, surface, impact, each group with the `source` of its numbers and an optional `note`. `effects`, `residual` and `provenance`
+are places kept for what an estimator will find; this version plays none and refuses a file that has any.
+
+Damping is Rayleigh's, d = ½(α + βλ) [Ren, Yeh, Lin 2013, eq. 6]: alpha_per_s and beta_s, or a loss factor η of the handbooks. η = 2d/ω
+independent of frequency is no Rayleigh damping; α and β are the pair that meets it at the two frequencies of `equal_at_hz`
+[Chopra, Dynamics of Structures, 4th ed. 2012, eq. 11.4.9 and 11.4.10 with ζ = η/2]:
+
+    α = η ω₁ω₂/(ω₁+ω₂),  β = η/(ω₁+ω₂)
+
+Between them the loss is smaller (at √(ω₁ω₂) by 2√(ω₁ω₂)/(ω₁+ω₂)), outside larger.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+import os
+from functools import cache
+from pathlib import Path
+from typing import Annotated, Any
+
+import msgspec
+import numpy as np
+
+from sonic_bullet.errors import MaterialError, RecordError
+from sonic_bullet.files import replacing
+from sonic_bullet.records import Material
+
+FORMAT = "sonic-bullet-preset/1"
+FOLDER = Path(__file__).parent / "materials"
+BYTES_MAX = 1 << 20
+
+Positive = Annotated[float, msgspec.Meta(gt=0)]
+NotNegative = Annotated[float, msgspec.Meta(ge=0)]
+Fraction = Annotated[float, msgspec.Meta(ge=0, le=1)]
+Row = tuple[float, float, float, float, float, float]
+
+
+class _Part(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, omit_defaults=True):
+    source: Annotated[str, msgspec.Meta(min_length=1)]
+    note: str = ""
+
+
+class Elasticity(_Part, frozen=True):
+    """Isotropic (youngs_pa, poisson) or any (stiffness_pa, Voigt order xx yy zz yz xz xy, body axes)."""
+
+    youngs_pa: Positive | None = None
+    poisson: Annotated[float, msgspec.Meta(gt=-1, lt=0.5)] | None = None
+    stiffness_pa: tuple[Row, Row, Row, Row, Row, Row] | None = None
+
+
+class Damping(_Part, frozen=True):
+    """Rayleigh's alpha_per_s and beta_s, or a loss_factor and the two frequencies at which it is met."""
+
+    alpha_per_s: NotNegative | None = None
+    beta_s: NotNegative | None = None
+    loss_factor: NotNegative | None = None
+    equal_at_hz: tuple[Positive, Positive] | None = None
+
+
+class Surface(_Part, frozen=True):
+    """roughness_m: rms height of the profile; hurst: exponent of its spectrum."""
+
+    roughness_m: NotNegative
+    hurst: Annotated[float, msgspec.Meta(gt=0, lt=1)]
+
+
+class Impact(_Part, frozen=True):
+    """restitution of an impact against a rigid wall."""
+
+    restitution: Fraction
+
+
+class Preset(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, omit_defaults=True):
+    """One preset file; see the module's head."""
+
+    format: str
+    name: Annotated[str, msgspec.Meta(min_length=1, max_length=100)]
+    density_kg_m3: Positive
+    elasticity: Elasticity
+    damping: Damping
+    surface: Surface
+    impact: Impact
+    note: str = ""
+    effects: tuple[msgspec.Raw, ...] = ()
+    residual: msgspec.Raw | None = None
+    provenance: msgspec.Raw | None = None
+
+
+def load_material(name: str | os.PathLike[str]) -> Material:
+    """The material of that name (`list_materials`), or of a preset file where ``name`` is a path or ends in .json.
+
+    Raises MaterialError: unknown name (listing the near ones), unreadable file, a wrong field (named), unphysical numbers.
+    """
+    text = os.fspath(name)
+    if not text.endswith(".json") and os.sep not in text:
+        known = material_names()
+        if text.lower() in known:
+            return material_of(read_preset(FOLDER / f"{text.lower()}.json"))
+        near = difflib.get_close_matches(text.lower(), known, n=3, cutoff=0.5)
+        remedy = f"did you mean {' or '.join(near)}?" if near else f"one of {', '.join(known)}, or the path of a preset file"
+        raise MaterialError(f"there is no material '{text}'", f"{remedy}; 'sonic-bullet materials' lists all")
+    return material_of(read_preset(name), text)
+
+
+def list_materials() -> tuple[Material, ...]:
+    """All materials that come with the package, by name."""
+    return tuple(load_material(name) for name in material_names())
+
+
+@cache
+def material_names() -> tuple[str, ...]:
+    """The names `load_material` knows, sorted."""
+    return tuple(sorted(path.stem for path in FOLDER.glob("*.json")))
+
+
+def read_preset(path: str | os.PathLike[str]) -> Preset:
+    """The typed content of a preset file. Raises MaterialError naming file and field."""
+    try:
+        with open(path, "rb") as file:
+            content = file.read(BYTES_MAX + 1)
+    except (OSError, ValueError) as error:
+        raise MaterialError(f"cannot read preset {path}: {getattr(error, 'strerror', None) or error}", "check the path") from error
+    if len(content) > BYTES_MAX:
+        raise MaterialError(f"preset {path} is over 1 MiB", "give a preset file")
+    try:
+        preset = msgspec.json.decode(content, type=Preset)
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise MaterialError(f"preset {path}: {error}", "mend that field; docs/materials.md describes the file") from error
+    if preset.format != FORMAT:
+        raise MaterialError(f"preset {path} has format '{preset.format}', wanted '{FORMAT}'", "use a sonic_bullet that knows that format")
+    for name in ("effects", "residual", "provenance"):
+        if getattr(preset, name):
+            raise MaterialError(f"preset {path} holds {name}, which sonic_bullet 0.1 cannot play", f"use version 0.2 or later, or take {name} out of the file")
+    return preset
+
+
+def write_preset(path: str | os.PathLike[str], preset: Preset) -> None:
+    """Write a preset file, whole or not at all. Raises FileError."""
+    with replacing(path) as file:
+        file.write(msgspec.json.format(msgspec.json.encode(preset), indent=2) + b"\n")
+
+
+def material_of(preset: Preset, where: str = "") -> Material:
+    """The material a preset describes. Raises MaterialError naming preset and field where its numbers contradict each other."""
+    label = where or preset.name
+    alpha, beta = _rayleigh(preset.damping, label)
+    elastic = preset.elasticity
+    rest: dict[str, Any] = {
+        "alpha_per_s": alpha,
+        "beta_s": beta,
+        "roughness_m": preset.surface.roughness_m,
+        "hurst": preset.surface.hurst,
+        "restitution": preset.impact.restitution,
+        "source": f"elasticity: {elastic.source} | damping: {preset.damping.source} | surface: {preset.surface.source} | impact: {preset.impact.source}",
+    }
+    try:
+        if elastic.stiffness_pa is not None and elastic.youngs_pa is None and elastic.poisson is None:
+            return Material(preset.name, preset.density_kg_m3, np.array(elastic.stiffness_pa), **rest)
+        if elastic.stiffness_pa is None and elastic.youngs_pa is not None and elastic.poisson is not None:
+            return Material.isotropic(preset.name, youngs_pa=elastic.youngs_pa, poisson=elastic.poisson, density_kg_m3=preset.density_kg_m3, **rest)
+    except RecordError as error:
+        raise MaterialError(f"preset {label}: {error.what}", error.remedy) from error
+    raise MaterialError(f"preset {label}: elasticity is neither isotropic nor a tensor", "give youngs_pa and poisson, or stiffness_pa alone")
+
+
+def rayleigh_of_loss_factor(eta: float, low_hz: float, high_hz: float) -> tuple[float, float]:
+    """(alpha_per_s, beta_s) whose loss is ``eta`` at both frequencies; the module's head has the equations."""
+    w1, w2 = 2 * math.pi * low_hz, 2 * math.pi * high_hz
+    return eta * w1 * w2 / (w1 + w2), eta / (w1 + w2)
+
+
+def _rayleigh(damping: Damping, label: str) -> tuple[float, float]:
+    match damping:
+        case Damping(alpha_per_s=float() as alpha, beta_s=float() as beta, loss_factor=None, equal_at_hz=None):
+            return alpha, beta
+        case Damping(alpha_per_s=None, beta_s=None, loss_factor=float() as eta, equal_at_hz=(float() as low_hz, float() as high_hz)):
+            return rayleigh_of_loss_factor(eta, low_hz, high_hz)
+    raise MaterialError(f"preset {label}: damping is neither Rayleigh's pair nor a loss factor", "give alpha_per_s and beta_s, or loss_factor and equal_at_hz")
