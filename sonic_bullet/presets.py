@@ -87,9 +87,9 @@ class Preset(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     surface: Surface
     impact: Impact
     note: str = ""
-    effects: tuple[msgspec.Raw, ...] = ()
-    residual: msgspec.Raw | None = None
-    provenance: msgspec.Raw | None = None
+    effects: tuple[Any, ...] = ()
+    residual: Any = None
+    provenance: Any = None
 
 
 def load_material(name: str | os.PathLike[str]) -> Material:
