@@ -3,6 +3,7 @@
 Shape -> solid.Solid (structured.py, tetrahedra.py) -> K, M (fem.py) -> λ, U (eigen.py) -> ModalModel (model.py), kept by cache.py
 """
 
+from sonic_bullet.modal.mesh_files import read_mesh
 from sonic_bullet.modal.model import analyse
 
-__all__ = ["analyse"]
+__all__ = ["analyse", "read_mesh"]
