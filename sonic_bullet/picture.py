@@ -193,7 +193,7 @@ def _draw_events(axis: Any, log: ContactLog, events: Events, lanes: list[int]) -
     from matplotlib import colormaps
     from matplotlib.lines import Line2D
 
-    colours, looks = colormaps["tab10"].colors, {"rests": (0.8, 0.25), "rolls": (3.0, 0.6), "slides": (6.0, 0.9)}
+    colours, looks = colormaps["tab10"](np.arange(10)), {"rests": (0.8, 0.25), "rolls": (3.0, 0.6), "slides": (6.0, 0.9)}
     largest = float(events.strike_n_s.max(initial=0))
     for lane, body in enumerate(lanes):
         colour = colours[lane % len(colours)]

@@ -1,0 +1,193 @@
+"""The command line: parses, calls, exits.
+
+    render SCENE.py | LOG.npz -> RenderResult -> WAV, contact log, picture, JSON
+    modes MESH                -> ModalModel   -> table, JSON, npz
+    materials, doctor SCENE   -> table, JSON
+
+Exit 0: done. 2: one line on stderr says what is wrong and how to mend it, and no file stands under its final name half-written.
+130 (Ctrl-C), 143 (terminated): what was rendered so far is closed as a valid file and named. With --json and no path only JSON goes to
+stdout, whatever a scene prints. SONIC_BULLET_DEBUG=1 shows tracebacks. Everything heavy is imported by the command that needs it.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+import signal
+import sys
+from typing import Any
+
+import click
+
+from sonic_bullet.errors import SonicBulletError
+
+DEFAULT_SR = 48_000
+DEFAULT_MODES_MATERIAL = "steel"
+
+RENDER_EPILOG = """\b
+Examples:
+  sonic-bullet render scenes/tabletop.py -o tabletop.wav --picture tabletop.png
+  sonic-bullet render my_sim.py -o out.flac --material wood --peak-dbfs -1
+  sonic-bullet render scenes/drop.py -o out.wav --contacts drop.npz --json
+  sonic-bullet render drop.npz -o again.wav      (the same bits, without PyBullet)
+  sonic-bullet render drop.npz -o stereo.wav --microphone 0,-1,0.5 --microphone 0,1,0.5"""
+
+MODES_EPILOG = """\b
+Examples:
+  sonic-bullet modes mug.obj --material porcelain --scale 0.001
+  sonic-bullet modes bar.stl --young 2.1e11 --poisson 0.3 --density 7850 --count 10
+  sonic-bullet modes tray.obj --material metal --thickness 0.002 --to-hz 5000 --json tray.json -o tray.npz
+  sonic-bullet modes fork.obj --material steel --fix 0,0,-0.1,0.01"""
+
+GROUP_EPILOG = """\b
+Examples:
+  sonic-bullet render scenes/tabletop.py -o tabletop.wav
+  sonic-bullet modes mug.obj --material porcelain
+  sonic-bullet doctor my_sim.py
+'sonic-bullet COMMAND --help' shows each command's options and examples."""
+
+
+class Numbers(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # generic since click 8.3
+    """``count`` finite numbers, separated by commas."""
+
+    def __init__(self, metavar: str) -> None:
+        self.name, self.count = metavar, metavar.count(",") + 1
+
+    def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:
+        return self.name
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, ...]:
+        if isinstance(value, tuple):
+            return value
+        try:
+            numbers = tuple(float(part) for part in str(value).split(","))
+        except ValueError:
+            numbers = ()
+        if len(numbers) != self.count or not all(abs(number) < float("inf") for number in numbers):
+            self.fail(f"{value!r} is not {self.name}: {self.count} finite numbers with commas between", param, ctx)
+        return numbers
+
+
+json_option = click.option("--json", "json_to", is_flag=False, flag_value="-", metavar="[PATH]", help="Write the result as JSON to PATH, or alone to stdout.")
+
+
+@click.group(epilog=GROUP_EPILOG, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
+@click.version_option(package_name="sonic_bullet", prog_name="sonic-bullet")
+def cli() -> None:
+    """PyBullet scenes that sound: impacts, rolling and sliding from physics alone, in pascals."""
+
+
+@cli.command(epilog=RENDER_EPILOG)
+@click.argument("scene", metavar="SCENE.py|LOG.npz")
+@click.option("-o", "--output", required=True, metavar="NAME.wav", help="Sound file: .wav .flac .ogg .aiff .caf .w64 .rf64; float formats hold 1.0 = 1 Pa.")
+@click.option("--seconds", type=float, metavar="S", help="How long to simulate; of a log, how much of it. [default: the scene's own, else 4]")
+@click.option("--sr", type=float, metavar="HZ", help=f"Sample rate, 8000 … 384000. [default: {DEFAULT_SR}; a log's own]")
+@click.option("--contacts", metavar="NAME.npz", help="Also write the contact log, which renders again without PyBullet.")
+@click.option("--picture", metavar="NAME.png", help="Also draw pressure, spectrogram and events.")
+@json_option
+@click.option("--peak-dbfs", type=float, metavar="DB", help="Scale so that the peak is DB below full scale (say -1).")
+@click.option("--lufs", type=float, metavar="L", help="Scale to this programme loudness (say -23).")
+@click.option(
+    "--microphone",
+    "microphones",
+    type=Numbers("X,Y,Z"),
+    multiple=True,
+    help="A microphone in the world, in m; repeat for more channels. [default: the scene's own]",
+)
+@click.option("--seed", type=click.IntRange(0), help="Seed of the surfaces' roughness. [default: 0; a log's own]")
+@click.option("--material", metavar="M", help="Material of the bodies of a script that names none (a name or a preset file).")
+def render(**options: Any) -> None:
+    """Run a PyBullet scene, or replay a contact log, to a sound file."""
+    from sonic_bullet.cli.scenes import run_render
+
+    run_render(**options)
+
+
+@cli.command(epilog=MODES_EPILOG)
+@click.argument("mesh", metavar="MESH")
+@click.option(
+    "--material", metavar="M", help=f"A name ('sonic-bullet materials') or a preset file. [default: {DEFAULT_MODES_MATERIAL}, if no constants are given]"
+)
+@click.option("--young", "youngs_pa", type=float, metavar="E", help="Young's modulus in Pa, in place of the material's.")
+@click.option("--poisson", type=float, metavar="N", help="Poisson's ratio, in place of the material's.")
+@click.option("--density", "density_kg_m3", type=float, metavar="R", help="Density in kg/m³, in place of the material's.")
+@click.option("--count", type=click.IntRange(1, 1000), metavar="K", help="The lowest K elastic modes.")
+@click.option("--to-hz", type=click.FloatRange(0, min_open=True), metavar="F", help="All elastic modes up to F. [default: 20000]")
+@click.option("--fix", "fixed", type=Numbers("X,Y,Z,R"), multiple=True, help="Clamp all within R of a point, in m, mesh frame; repeatable.")
+@click.option("--thickness", "thickness_m", type=float, metavar="T", help="Wall thickness in m of an open surface.")
+@click.option("--scale", type=float, default=1.0, show_default=True, metavar="S", help="Metres per mesh unit: 0.001 for a mesh in millimetres.")
+@json_option
+@click.option("-o", "--output", metavar="MODEL.npz", help="Also write the modal model: frequencies, decays, shapes on the surface.")
+def modes(**options: Any) -> None:
+    """Vibration modes of a mesh: the elastic ones, ascending."""
+    from sonic_bullet.cli.solids import run_modes
+
+    run_modes(**options)
+
+
+@cli.command()
+@json_option
+def materials(json_to: str | None) -> None:
+    """List the materials that come with the package, with their sources."""
+    from sonic_bullet.cli.solids import run_materials
+
+    run_materials(json_to)
+
+
+@cli.command()
+@click.argument("scene", metavar="SCENE.py")
+@click.option("--seconds", type=click.FloatRange(0, min_open=True), default=1.0, show_default=True, metavar="S", help="How long to watch the scene run.")
+@json_option
+def doctor(scene: str, seconds: float, json_to: str | None) -> None:
+    """Name the settings of a scene that would ruin its sound, and how to mend them."""
+    from sonic_bullet.cli.scenes import run_doctor
+
+    run_doctor(scene, seconds, json_to)
+
+
+def main() -> None:
+    """The console script: run a command, turn every error into one line on stderr, and exit."""
+    import warnings
+
+    debug = bool(os.environ.get("SONIC_BULLET_DEBUG"))
+    if not debug:
+        warnings.simplefilter("ignore")  # a library's warning is no line of ours
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")  # a terminal without Greek letters still gets its table
+    signal.signal(signal.SIGTERM, _terminated)
+    try:
+        code = cli.main(prog_name="sonic-bullet", standalone_mode=False)
+        sys.stdout.flush()
+        sys.exit(code if isinstance(code, int) else 0)
+    except (click.exceptions.Abort, KeyboardInterrupt) as error:
+        code = 143 if str(error).startswith("terminated") else 130
+        _say(str(error) or "stopped")
+    except click.ClickException as error:
+        context = getattr(error, "ctx", None)
+        code, hint = 2, f"; see '{context.command_path} --help'" if context is not None else ""
+        _say(error.format_message().rstrip(".") + hint)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # the reader left; flushing at exit must not complain
+        code = 141
+    except SonicBulletError as error:
+        if debug:
+            raise
+        code = 2
+        _say(str(error))
+    except Exception as error:
+        if debug:
+            raise
+        code = 2
+        notes = "; ".join(getattr(error, "__notes__", []))
+        _say(f"{type(error).__name__}: {error}" + (f"; {notes}" if notes else "") + "; set SONIC_BULLET_DEBUG=1 to see where")
+    sys.exit(code)
+
+
+def _terminated(*_: object) -> None:
+    raise KeyboardInterrupt("terminated")
+
+
+def _say(text: str) -> None:
+    """One line on stderr."""
+    print("sonic-bullet: " + " ".join(text.split()), file=sys.stderr)

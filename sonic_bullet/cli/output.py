@@ -1,0 +1,86 @@
+"""What the commands say: JSON, tables and progress, each where it belongs.
+
+result -> JSON  -> PATH, or stdout and nothing else there
+       -> text  -> stdout
+progress        -> stderr, on a terminal only
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+
+@contextmanager
+def clean_stdout(json_to: str | None) -> Iterator[Callable[[str], None]]:
+    """A printer to stdout; with JSON to stdout, what anything else prints meanwhile (a scene, a C library) goes to stderr."""
+    if json_to != "-":
+        yield print
+        return
+    sys.stdout.flush()
+    kept = os.dup(1)
+    os.dup2(2, 1)
+    try:
+        yield lambda text: None
+    finally:
+        sys.stdout.flush()
+        os.dup2(kept, 1)
+        os.close(kept)
+
+
+def write_json(json_to: str | None, value: Any) -> None:
+    """``value`` as JSON (no NaN) to a path, to stdout for "-", nowhere for None. Raises FileError."""
+    if json_to is None:
+        return
+    text = json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    if json_to == "-":
+        sys.stdout.write(text)
+        sys.stdout.flush()
+        return
+    from sonic_bullet.files import replacing
+
+    with replacing(json_to) as file:
+        file.write(text.encode())
+
+
+@contextmanager
+def progress_bar(label: str) -> Iterator[Callable[[float], None]]:
+    """A function of the share done, drawn on a terminal's stderr; in a pipe it does nothing."""
+    if not sys.stderr.isatty():
+        yield lambda share: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        task = progress.add_task(label, total=1.0)
+        yield lambda share: progress.update(task, completed=share)
+
+
+@contextmanager
+def status(label: str) -> Iterator[Callable[[str], None]]:
+    """A function of the present activity, drawn as a spinner on a terminal's stderr; in a pipe it does nothing."""
+    if not sys.stderr.isatty():
+        yield lambda text: None
+        return
+    from rich.console import Console
+
+    with Console(stderr=True).status(label) as line:
+        yield lambda text: line.update(f"{label}: {text}")
+
+
+def table(head: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> str:
+    """Columns padded with spaces; all but the first column right-aligned, the last left as it is."""
+    widths = [max(len(row[i]) for row in [head, *rows]) for i in range(len(head))]
+    last = len(head) - 1
+
+    def line(row: tuple[str, ...]) -> str:
+        cells = [cell if i == last and i > 0 else cell.ljust(widths[i]) if i == 0 else cell.rjust(widths[i]) for i, cell in enumerate(row)]
+        return "  ".join(cells).rstrip()
+
+    return "\n".join(line(row) for row in [head, *rows])
