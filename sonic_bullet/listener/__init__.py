@@ -1,0 +1,33 @@
+"""listener: the room that hears PyBullet, and the only one that imports it. Everything is imported when first used.
+
+world = open_world(client)          BulletClient, the pybullet module, or a client id
+world.hook(before, after)           or, with the raw module, world.after_step() after each stepSimulation
+step = world.after_step()           -> contacts.Step
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from sonic_bullet.listener.doctor import Finding, diagnose_world, keep_restitution
+    from sonic_bullet.listener.script import run_script
+    from sonic_bullet.listener.world import World, open_world
+
+__all__ = ["Finding", "World", "diagnose_world", "keep_restitution", "open_world", "run_script"]
+
+_HOME = {
+    "Finding": "doctor",
+    "World": "world",
+    "diagnose_world": "doctor",
+    "keep_restitution": "doctor",
+    "open_world": "world",
+    "run_script": "script",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name in _HOME:
+        return getattr(importlib.import_module(f"sonic_bullet.listener.{_HOME[name]}"), name)
+    raise AttributeError(f"module 'sonic_bullet.listener' has no attribute '{name}'")

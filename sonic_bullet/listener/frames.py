@@ -1,0 +1,184 @@
+"""Where every link of every body is, and how fast: PyBullet's centre-of-mass frames as arrays.
+
+    getBasePositionAndOrientation, getBaseVelocity            base (link -1)
+    getLinkStates(computeLinkVelocity=1, computeForwardKinematics=1)[0, 1, 6, 7]   links
+
+Both give the inertial frame (origin at the centre of mass, axes along the principal inertia), the frame of `Body`.
+Bullet integrates semi-implicitly, x(n+1) = x(n) + v(n+1)·dt, so a pose that jumps farther than its speeds allow was
+moved by hand. n rows: one for each link of each body, ordered by (body id, link).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import chain
+
+import numpy as np
+import pybullet
+
+from sonic_bullet.errors import SceneError
+from sonic_bullet.records import Array
+
+LINK_SPAN = 1 << 20
+JUMP_FLOOR_M = 1e-3
+DRIVEN_SPEED_M_S = 10.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Roster:
+    """Who is in the world. code (n,) = body · LINK_SPAN + link + 1, ascending; static (n,): mass 0."""
+
+    bodies: tuple[tuple[int, int, bool], ...]
+    code: Array
+    static: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Motion:
+    """Poses and twists of a roster at one instant.
+
+    position_m (n, 3), quaternion_xyzw (n, 4), velocity_m_s (n, 3) of the centre of mass, spin_rad_s (n, 3): world frame.
+    """
+
+    roster: Roster
+    position_m: Array
+    quaternion_xyzw: Array
+    velocity_m_s: Array
+    spin_rad_s: Array
+
+    @property
+    def table(self) -> tuple[Array, Array, Array, Array]:
+        return self.position_m, self.quaternion_xyzw, self.velocity_m_s, self.spin_rad_s
+
+
+def encode(body: Array | int, link: Array | int) -> Array:
+    """Row codes of (body, link) pairs."""
+    return np.asarray(body, np.int64) * LINK_SPAN + np.asarray(link, np.int64) + 1
+
+
+def decode(code: int) -> tuple[int, int]:
+    """(body, link) of a row code."""
+    return int(code) // LINK_SPAN, int(code) % LINK_SPAN - 1
+
+
+def check_connected(client_id: int) -> None:
+    """Raise SceneError unless a physics server answers under this client id."""
+    if client_id < 0 or not pybullet.getConnectionInfo(physicsClientId=client_id)["isConnected"]:
+        raise SceneError(f"PyBullet client {client_id} is not connected", "connect first, e.g. BulletClient(pybullet.DIRECT), and attach before disconnecting")
+
+
+def body_ids(client_id: int) -> list[int]:
+    """Ids of all bodies in the world, ascending."""
+    return sorted(pybullet.getBodyUniqueId(i, physicsClientId=client_id) for i in range(pybullet.getNumBodies(physicsClientId=client_id)))
+
+
+def read_roster(client_id: int) -> Roster:
+    """List bodies, their links and which of them cannot move."""
+    bodies, codes, static = [], [], []
+    for body in body_ids(client_id):
+        joints = pybullet.getNumJoints(body, physicsClientId=client_id)
+        fixed = pybullet.getDynamicsInfo(body, -1, physicsClientId=client_id)[0] == 0
+        bodies.append((body, joints, fixed))
+        codes.extend(encode(body, link) for link in range(-1, joints))
+        static.extend([fixed] + [False] * joints)
+    return Roster(tuple(bodies), np.array(codes, np.int64), np.array(static, bool))
+
+
+def read_motion(client_id: int, roster: Roster) -> Motion:
+    """Poses and twists now. Raises pybullet.error where a body of the roster is gone, SceneError on a number that is not finite."""
+    still = (0.0, 0.0, 0.0)
+    pose, twist, links = pybullet.getBasePositionAndOrientation, pybullet.getBaseVelocity, pybullet.getLinkStates
+    flat: list[tuple[float, ...]] = []
+    for body, joints, fixed in roster.bodies:
+        flat.extend(pose(body, client_id))
+        if fixed:
+            flat.append(still)
+            flat.append(still)
+        else:
+            flat.extend(twist(body, client_id))
+        if joints:
+            for state in links(body, range(joints), computeLinkVelocity=1, computeForwardKinematics=1, physicsClientId=client_id):
+                flat.extend((state[0], state[1], state[6], state[7]))
+    table = np.fromiter(chain.from_iterable(flat), float, 13 * len(roster.code)).reshape(-1, 13)
+    if not np.isfinite(table).all():
+        body, link = decode(roster.code[np.flatnonzero(~np.isfinite(table).all(axis=1))[0]])
+        raise SceneError(
+            f"body {body}{link_words(link)} has a pose or speed that is not a number",
+            "check its mass, inertia and what touches it; remove it or reset the scene",
+        )
+    return Motion(roster, table[:, 0:3], table[:, 3:7], table[:, 7:10], table[:, 10:13])
+
+
+def link_words(link: int) -> str:
+    """How a link is called in a message; nothing for the base."""
+    return "" if link < 0 else f" link {link}"
+
+
+def rows_of(roster: Roster, code: Array) -> Array:
+    """Row numbers of codes (k,); -1 where the roster does not hold them."""
+    if not len(roster.code):
+        return np.full(len(code), -1)
+    row = np.minimum(np.searchsorted(roster.code, code), len(roster.code) - 1)
+    return np.where(roster.code[row] == code, row, -1)
+
+
+def jumped(earlier: Motion, later: Motion, dt_s: float) -> Array:
+    """(n,) of `later`: moved farther in one step than both speeds together explain, so by hand.
+
+    What has mass 0 may be driven by resetting its pose each step: up to DRIVEN_SPEED_M_S that is motion, beyond it a jump.
+    """
+    if not len(earlier.roster.code):
+        return np.zeros(len(later.roster.code), bool)
+    if earlier.roster is later.roster:
+        old = np.arange(len(later.roster.code))
+    else:
+        old = rows_of(earlier.roster, later.roster.code)
+    moved = np.linalg.norm(later.position_m - earlier.position_m[old], axis=1)
+    speed = np.linalg.norm(later.velocity_m_s, axis=1) + np.linalg.norm(earlier.velocity_m_s[old], axis=1)
+    reach = np.where(later.roster.static, DRIVEN_SPEED_M_S, 1.5 * speed) * dt_s + JUMP_FLOOR_M
+    return np.asarray((moved > reach) & (old >= 0))
+
+
+def with_driven_twists(earlier: Motion, later: Motion, dt_s: float) -> Motion:
+    """`later`, where bodies of mass 0 whose pose was reset since `earlier` carry the velocity of that move."""
+    if earlier.roster is not later.roster or not later.roster.static.any():
+        return later
+    driven = later.roster.static & ((later.position_m != earlier.position_m).any(axis=1) | (later.quaternion_xyzw != earlier.quaternion_xyzw).any(axis=1))
+    if not driven.any():
+        return later
+    velocity, spin = later.velocity_m_s.copy(), later.spin_rad_s.copy()
+    velocity[driven] = (later.position_m - earlier.position_m)[driven] / dt_s
+    spin[driven] = rotation_between(earlier.quaternion_xyzw[driven], later.quaternion_xyzw[driven]) / dt_s
+    return Motion(later.roster, later.position_m, later.quaternion_xyzw, velocity, spin)
+
+
+def rotation_between(first_xyzw: Array, second_xyzw: Array) -> Array:
+    """Rotation vectors (k, 3) in rad that turn the first orientations (k, 4) into the second ones, world frame."""
+    x, w = first_xyzw[:, :3], first_xyzw[:, 3:]
+    y, v = second_xyzw[:, :3], second_xyzw[:, 3:]
+    vector = w * y - v * x - np.cross(y, x)
+    scalar = (w * v)[:, 0] + (x * y).sum(axis=1)
+    vector, scalar = np.where(scalar[:, None] < 0, -vector, vector), np.abs(scalar)
+    length = np.linalg.norm(vector, axis=1)
+    angle = 2 * np.arctan2(length, scalar)
+    return np.asarray(vector * (angle / np.maximum(length, 1e-300))[:, None])
+
+
+def turned(quaternion_xyzw: Array, rotation_rad: Array) -> Array:
+    """Orientations (k, 4) turned by world-frame rotation vectors (k, 3)."""
+    angle = np.linalg.norm(rotation_rad, axis=1, keepdims=True)
+    y, v = rotation_rad * np.sinc(angle / (2 * np.pi)) / 2, np.cos(angle / 2)
+    x, w = quaternion_xyzw[:, :3], quaternion_xyzw[:, 3:]
+    result = np.concatenate([v * x + w * y + np.cross(y, x), v * w - (x * y).sum(axis=1, keepdims=True)], axis=1)
+    return np.asarray(result / np.linalg.norm(result, axis=1, keepdims=True))
+
+
+def advanced(motion: Motion, duration_s: float) -> Motion:
+    """The motion carried on by its own twists; a negative duration undoes Bullet's last semi-implicit step."""
+    return Motion(
+        motion.roster,
+        motion.position_m + duration_s * motion.velocity_m_s,
+        turned(motion.quaternion_xyzw, duration_s * motion.spin_rad_s),
+        motion.velocity_m_s,
+        motion.spin_rad_s,
+    )

@@ -1,0 +1,75 @@
+"""From PyBullet's contact tuples to arrays of loaded contacts.
+
+    J = dt · (N n + f1 t1 + f2 t2)      on body A, world frame; -J on body B
+
+with dt the time step set at the moment of the query: that product, and no other, balances m·Δv - m·g·dt (measured to 1e-13).
+Only the unfiltered getContactPoints() is right: with a body filter that swaps the pair, normal and positions are turned round
+and the friction fields are not (bullet3 issues 2765, 3026). k rows.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import chain
+from typing import Any
+
+import numpy as np
+
+from sonic_bullet.errors import SceneError
+from sonic_bullet.listener.frames import encode
+from sonic_bullet.records import Array
+
+RawContact = tuple[Any, ...]
+FORCE, FRICTION_1, FRICTION_2 = 9, 10, 12
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Touches:
+    """Loaded contacts as PyBullet tells them: code_a, code_b (k,) of frames.encode; points, normal (k, 3) world frame; gap_m (k,);
+    impulse_n_s (k, 3) on a; elapsed_s (k,): from the start of the step to the start of the sub-step that loaded it."""
+
+    code_a: Array
+    code_b: Array
+    point_a_m: Array
+    point_b_m: Array
+    normal: Array
+    gap_m: Array
+    impulse_n_s: Array
+    elapsed_s: Array
+
+    def __len__(self) -> int:
+        return len(self.code_a)
+
+    def kept(self, mask: Array) -> Touches:
+        """Only the rows where mask (k,) is True."""
+        return Touches(*(getattr(self, name)[mask] for name in self.__slots__))
+
+
+def is_loaded(raw: RawContact) -> bool:
+    """Bullet lists neighbours up to 2 cm apart; only those that carry force are contacts. NaN counts as force, to be caught."""
+    return not (raw[FORCE] == 0 and raw[FRICTION_1] == 0 and raw[FRICTION_2] == 0)
+
+
+def gather(contacts: list[RawContact], dt_s: float) -> Touches:
+    """Arrays of loaded contacts. Raises SceneError naming the pair where a number is not finite."""
+    k = len(contacts)
+    if k == 0:
+        none, none3 = np.zeros(0), np.zeros((0, 3))
+        return Touches(np.zeros(0, np.int64), np.zeros(0, np.int64), none3, none3, none3, none, none3, none)
+    _, body_a, body_b, link_a, link_b, point_a, point_b, normal, gap, force, f1, t1, f2, t2 = zip(*contacts, strict=True)
+
+    def vectors(column: tuple[tuple[float, ...], ...]) -> Array:
+        return np.fromiter(chain.from_iterable(column), float, 3 * k).reshape(k, 3)
+
+    ids = np.array((body_a, body_b, link_a, link_b), np.int64)
+    scalar = np.array((gap, force, f1, f2))
+    n = vectors(normal)
+    impulse = dt_s * (scalar[1][:, None] * n + scalar[2][:, None] * vectors(t1) + scalar[3][:, None] * vectors(t2))
+    touches = Touches(encode(ids[0], ids[2]), encode(ids[1], ids[3]), vectors(point_a), vectors(point_b), n, scalar[0], impulse, np.zeros(k))
+    finite = np.isfinite(impulse).all(axis=1) & np.isfinite(touches.point_a_m).all(axis=1) & np.isfinite(scalar[0])
+    if not finite.all():
+        bad = int(np.flatnonzero(~finite)[0])
+        raise SceneError(
+            f"the contact of bodies {body_a[bad]} and {body_b[bad]} holds a force or place that is not a number", "check the masses and inertias of both"
+        )
+    return touches
