@@ -1,0 +1,331 @@
+"""A bank of damped sinusoids with explicit state: forces on modes in, velocities weighted for sensors out.
+
+    mass-normalised mode  q̈ + 2d q̇ + (ω² + d²) q = f(t) = φᵀF(t)          [physics of any vibration text, e.g. Meirovitch 2001, eq. 7.113]
+    pole s = -d + iω, state z, velocity q̇ = Re z;   an impulse j at u:   z += (1 + i d/ω) φᵀĵ j e^{s(t-u)}
+    output of weight set w and body b:   y[w, b, n] = Σ_modes Re(weight[w] z[n])
+
+(that is q̇ = e^{-dt}(cos ωt - (d/ω) sin ωt): the continuous-time response, sampled; strikes are exact at any sub-sample time, and nothing aliases.)
+
+Modes of all bodies lie in one flat array, a body's in whole groups of 8 (spare lanes are zero). A body below the floor costs nothing.
+Time is counted in absolute samples; blocks of 256 lie on that grid, so any way of cutting the calls gives the same bits
+(`bank_kernel`). `advance` works in place: `copy()` a state first to look ahead and come back.
+b bodies, m modes of one body, W weight sets, n samples.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+
+from sonic_bullet.errors import AudioError
+from sonic_bullet.records import Array
+from sonic_bullet.synth import bank_kernel
+from sonic_bullet.synth.tile import BLOCK, LANES
+
+FLOOR = 1e-15
+"""Modes with |z| below this (in √J·√2) are set to zero: ½|z|² = 5e-31 J is 1e-10 of the mode's thermal energy kT at 300 K."""
+
+LONGEST_SPACING = 16.0
+FASTEST_DECAY_PER_SAMPLE = 2.0
+SLOWEST_TURN = 1e-3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ModeSet:
+    """One body's modes for the bank: omega_rad_s (m,) of the damped modes, decay_per_s (m,), weight (W, m) complex. All `audible`."""
+
+    omega_rad_s: Array
+    decay_per_s: Array
+    weight: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Strike:
+    """A finite force pulse on one body: impulses at equidistant times, one participation vector.
+
+    start: absolute time of the first node in samples (any fraction). spacing: of the nodes, in samples (0 … 16).
+    impulse_n_s (k,): impulse of each node. gain (m,): φᵀf̂ of the body's modes in 1/√kg.
+    """
+
+    body: int
+    start: float
+    spacing: float
+    impulse_n_s: Array
+    gain: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Force:
+    """A force signal on one body over one call: force_n (n,) in newton, each sample acting as the impulse force·period.
+
+    gain0, gain1 (m,): participation in 1/√kg where progress is 0 and 1, linear in between.
+    """
+
+    body: int
+    force_n: Array
+    gain0: Array
+    gain1: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Bank:
+    """The instrument. offset (b+1,): segments of the flat arrays (whole groups of 8 lanes); count (b,): modes in each.
+
+    log_pole (2·modes,): s/sr, real parts first; pole = e^{s/sr}; block = e^{256 s/sr}; quadrature (modes,) = d/ω; weight (W, 2·modes);
+    heard (W, b): whether any weight of the body is not zero.
+    """
+
+    sr: int
+    offset: Array
+    count: Array
+    log_pole: Array
+    pole: Array
+    block: Array
+    quadrature: Array
+    weight: Array
+    heard: Array
+
+    @property
+    def body_count(self) -> int:
+        return len(self.count)
+
+    @property
+    def mode_count(self) -> int:
+        return int(self.count.sum())
+
+
+@dataclass(slots=True, eq=False)
+class Pending:
+    """Strikes under way, sorted by body and start: scalars of each, and flat rows (8, m) of its phasors (`bank_kernel.strike_rows`)."""
+
+    body: Array
+    start: Array
+    count: Array
+    whole: Array
+    delta: Array
+    phase: Array
+    upcoming: Array
+    first: Array
+    impulse: Array
+    impulse_at: Array
+    rows: Array
+    rows_at: Array
+
+    @classmethod
+    def none(cls) -> Pending:
+        floats, ints = np.zeros(0), np.zeros(0, np.int64)
+        empty = {"start": floats, "delta": floats, "phase": floats, "impulse": floats, "rows": floats}
+        return cls(**{field.name: empty.get(field.name, ints).copy() for field in fields(cls)})
+
+
+@dataclass(slots=True, eq=False)
+class BankState:
+    """What the bank remembers. at: the next sample. z, driven (2·modes,): free state at the next block's start, and what was driven since
+    this block's. sound (W, b, 256): the block's free ringing. ringing, is_driven, tiled (b,): what of it is in use. pending: strikes under way.
+    """
+
+    at: int
+    z: Array
+    driven: Array
+    sound: Array
+    ringing: Array
+    is_driven: Array
+    tiled: Array
+    pending: Pending
+
+    def copy(self) -> BankState:
+        """A state of its own: advancing one leaves the other."""
+        pending = Pending(*(getattr(self.pending, field.name).copy() for field in fields(Pending)))
+        arrays = {name: getattr(self, name).copy() for name in ("z", "driven", "sound", "ringing", "is_driven", "tiled")}
+        return BankState(at=self.at, pending=pending, **arrays)
+
+
+def audible(omega_rad_s: Array, decay_per_s: Array, sr: int) -> Array:
+    """(m,) bool: modes the bank can play at the rate ``sr``; count the others with ``~``.
+
+    Dropped: at or above sr/2, overdamped or all but critically so (ω ≤ d/1000), or gone within a sample (d ≥ 2 sr), or not finite.
+    """
+    omega, decay = np.asarray(omega_rad_s, float), np.asarray(decay_per_s, float)
+    with np.errstate(invalid="ignore"):
+        return np.asarray((omega < np.pi * sr) & (omega > SLOWEST_TURN * decay) & (omega > 0) & (decay >= 0) & (decay < FASTEST_DECAY_PER_SAMPLE * sr))
+
+
+def empty_bank(sr: int, weight_sets: int = 1, at: int = 0) -> tuple[Bank, BankState]:
+    """A bank without bodies and its state at absolute sample ``at``. Raises AudioError on a rate outside 1 … 10 MHz."""
+    if not (isinstance(sr, int | np.integer) and 0 < sr <= 10_000_000):
+        raise AudioError(f"sample rate {sr}", "give a whole number of Hz, 44100 or 48000 say")
+    none, flags = np.zeros(0), np.zeros(0, bool)
+    bank = Bank(int(sr), np.zeros(1, np.int64), np.zeros(0, np.int64), none, none, none, none, np.zeros((weight_sets, 0)), np.zeros((weight_sets, 0), bool))
+    return bank, BankState(int(at), none.copy(), none.copy(), np.zeros((weight_sets, 0, BLOCK)), flags.copy(), flags.copy(), flags.copy(), Pending.none())
+
+
+def append(bank: Bank, state: BankState, bodies: Sequence[ModeSet]) -> tuple[Bank, BankState]:
+    """Bank and state with further bodies, silent at first; those already there go on unchanged, bit by bit. The old pair stays usable.
+
+    Raises AudioError where a mode is not `audible`, or shapes or numbers are wrong.
+    """
+    sets = bank.weight.shape[0]
+    sizes = []
+    for body in bodies:
+        m = len(body.omega_rad_s)
+        if body.decay_per_s.shape != (m,) or body.weight.shape != (sets, m) or not np.isfinite(body.weight).all():
+            raise AudioError(f"modes of shape {body.omega_rad_s.shape}, {body.decay_per_s.shape}, weights {body.weight.shape} for {sets} weight sets", "give finite (m,), (m,), (W, m)")
+        if not audible(body.omega_rad_s, body.decay_per_s, bank.sr).all():
+            raise AudioError("a mode beyond half the sample rate, overdamped or not finite", "keep the modes that `audible` names")
+        sizes.append(m)
+    padded = [-(-m // LANES) * LANES for m in sizes]
+    starts = np.concatenate([[0], np.cumsum(padded)]).astype(np.int64)
+    total = int(starts[-1])
+    place = np.concatenate([np.arange(m) + starts[i] for i, m in enumerate(sizes)]) if sizes else np.zeros(0, np.int64)
+    place = place.astype(np.int64)
+    s = np.zeros(total, complex)
+    pole, block = np.zeros(total, complex), np.zeros(total, complex)
+    quadrature, weight = np.zeros(total), np.zeros((sets, total), complex)
+    if len(place):
+        omega, decay = np.concatenate([x.omega_rad_s for x in bodies]), np.concatenate([x.decay_per_s for x in bodies])
+        step = (-decay + 1j * omega) / bank.sr
+        s[place], pole[place], block[place], quadrature[place] = step, np.exp(step), np.exp(BLOCK * step), decay / omega
+        weight[:, place] = _flushed(np.concatenate([x.weight for x in bodies], axis=1))
+    heard = np.array([[bool(np.any(x.weight[w])) for x in bodies] for w in range(sets)], bool).reshape(sets, len(bodies))
+    grown = Bank(
+        bank.sr,
+        np.concatenate([bank.offset, bank.offset[-1] + starts[1:]]),
+        np.concatenate([bank.count, np.array(sizes, np.int64)]),
+        _joined(bank.log_pole, s),
+        _joined(bank.pole, pole),
+        _joined(bank.block, block),
+        np.concatenate([bank.quadrature, quadrature]),
+        np.stack([_joined(bank.weight[w], weight[w]) for w in range(sets)]).reshape(sets, -1),
+        np.concatenate([bank.heard, heard], axis=1),
+    )
+    state = state.copy()
+    silent, flags = np.zeros(total, complex), np.zeros(len(bodies), bool)
+    return grown, replace(
+        state,
+        z=_joined(state.z, silent),
+        driven=_joined(state.driven, silent),
+        sound=np.concatenate([state.sound, np.zeros((sets, len(bodies), BLOCK))], axis=1),
+        **{name: np.concatenate([getattr(state, name), flags]) for name in ("ringing", "is_driven", "tiled")},
+    )
+
+
+def silence(state: BankState) -> BankState:
+    """The state at the same sample with nothing ringing and no strike under way."""
+    state = state.copy()
+    for name in ("z", "driven", "sound", "ringing", "is_driven", "tiled"):
+        getattr(state, name)[...] = 0
+    return replace(state, pending=Pending.none())
+
+
+def advance(bank: Bank, state: BankState, n: int, strikes: Sequence[Strike] = (), forces: Sequence[Force] = (), progress: Array | None = None) -> Array:
+    """The next n samples: y (W, b, n). Changes ``state`` in place.
+
+    strikes: those that become known now; each starts after the previous call's last sample, in any call before or at which it sounds.
+    forces: for exactly these n samples; progress (n,): where between gain0 and gain1 each sample lies. Strikes and forces of a
+    body are added in order of start and of the list. Samples below 1e-30 are 0. Raises AudioError on wrong shapes, NaN, or a strike in the past.
+    """
+    if n < 0 or len(state.ringing) != bank.body_count or len(state.z) != 2 * len(bank.quadrature):
+        raise AudioError(f"{n} samples for a state of {len(state.ringing)} bodies and a bank of {bank.body_count}", "advance the state that `append` returned")
+    pending = _with_strikes(bank, state, strikes)
+    force_of, force, gain0, gain1, gain_at = _flat_forces(bank, n, forces)
+    along = np.zeros(n) if progress is None else np.ascontiguousarray(progress, float)
+    if along.shape != (n,) or not np.isfinite(along).all():
+        raise AudioError(f"progress of shape {along.shape} for {n} samples", "give a finite number for each sample")
+    out = np.zeros((bank.weight.shape[0], bank.body_count, n))
+    done = np.zeros(len(pending.body), bool)
+    bank_kernel.advance(
+        state.at, out, bank.offset, bank.pole, bank.block, bank.quadrature, bank.weight, bank.heard,
+        state.z, state.driven, state.sound, state.ringing, state.is_driven, state.tiled, FLOOR**2,
+        np.searchsorted(pending.body, np.arange(bank.body_count + 1)), pending.count, pending.whole, pending.delta, pending.phase,
+        pending.upcoming, pending.first, pending.impulse, pending.impulse_at, pending.rows, pending.rows_at, done,
+        force_of, force, gain0, gain1, gain_at, along, 1.0 / bank.sr,
+    )  # fmt: skip
+    state.at += n
+    state.pending = _selected(pending, np.flatnonzero(~done), bank) if done.any() else pending
+    return out
+
+
+def _flushed(values: Array) -> Array:
+    """Values with what lies below 1e-30 set to zero: no product of theirs becomes subnormal."""
+    return np.asarray(np.where(np.abs(values) < bank_kernel.FLUSH, 0, values))
+
+
+def _joined(flat: Array, more: Array) -> Array:
+    """A flat array, real parts first, with the complex values ``more`` behind it."""
+    half = len(flat) // 2
+    return np.concatenate([flat[:half], more.real, flat[half:], more.imag])
+
+
+def _padded_gain(bank: Bank, body: int, gain: Array, what: str) -> Array:
+    if not 0 <= body < bank.body_count:
+        raise AudioError(f"a {what} on body {body} of {bank.body_count}", "append the body first")
+    m = int(bank.count[body])
+    if np.shape(gain) != (m,) or not np.isfinite(gain).all():
+        raise AudioError(f"a {what} on body {body}: gain of shape {np.shape(gain)}", f"give {m} finite numbers")
+    out = np.zeros(int(bank.offset[body + 1] - bank.offset[body]))
+    out[:m] = _flushed(gain)
+    return out
+
+
+def _with_strikes(bank: Bank, state: BankState, strikes: Sequence[Strike]) -> Pending:
+    """The strikes under way and the new ones, sorted by body and start."""
+    if not strikes:
+        return state.pending
+    old = state.pending
+    parts: dict[str, list[Array]] = {field.name: [getattr(old, field.name)] for field in fields(Pending)}
+    impulse_at, rows_at = len(old.impulse), len(old.rows)
+    modes = len(bank.quadrature)
+    for strike in strikes:
+        gain = _padded_gain(bank, strike.body, strike.gain, "strike")
+        impulse = _flushed(np.asarray(strike.impulse_n_s, float))
+        count = len(impulse)
+        delta = float(strike.spacing) if count > 1 else 1.0
+        if impulse.ndim != 1 or count == 0 or not (np.isfinite(impulse).all() and np.isfinite(strike.start) and 0 < delta <= LONGEST_SPACING):
+            raise AudioError(f"a strike on body {strike.body} of {count} nodes, {strike.spacing} samples apart, at {strike.start}", "give finite impulses less than 16 samples apart")
+        first = int(np.ceil(strike.start))
+        if first < state.at:
+            raise AudioError(f"a strike at sample {strike.start:.2f}, but {state.at} samples have sounded", "pass strikes before their time has sounded")
+        within = int(np.floor((first - strike.start) / delta))
+        phase, whole = max((first - strike.start) - within * delta, 0.0), int(np.floor(1.0 / delta))
+        rows = np.empty((8, len(gain)))
+        bank_kernel.strike_rows(bank.log_pole, bank.quadrature, gain, modes, int(bank.offset[strike.body]), delta, phase, whole, rows)
+        new = dict(body=strike.body, start=strike.start, count=count, whole=whole, delta=delta, phase=phase, upcoming=within + 1, first=first, impulse_at=impulse_at, rows_at=rows_at)
+        for name, value in new.items():
+            parts[name].append(np.array([value]))
+        parts["impulse"].append(impulse)
+        parts["rows"].append(rows.ravel())
+        impulse_at += count
+        rows_at += rows.size
+    joined = Pending(**{name: np.concatenate(values) for name, values in parts.items()})
+    return _selected(joined, np.lexsort((joined.start, joined.body)), bank)
+
+
+def _selected(pending: Pending, order: Array, bank: Bank) -> Pending:
+    """The strikes ``order``, in that order, without the flat parts of the others."""
+    out = Pending(**{field.name: getattr(pending, field.name) for field in fields(Pending)})
+    for name in ("body", "start", "count", "whole", "delta", "phase", "upcoming", "first"):
+        setattr(out, name, getattr(pending, name)[order])
+    for flat, at, sizes in (("impulse", "impulse_at", out.count), ("rows", "rows_at", 8 * np.diff(bank.offset)[out.body])):
+        starts = getattr(pending, at)[order]
+        values = getattr(pending, flat)
+        setattr(out, flat, np.concatenate([values[a : a + size] for a, size in zip(starts, sizes, strict=True)]) if len(order) else np.zeros(0))
+        setattr(out, at, np.concatenate([[0], np.cumsum(sizes)])[: len(order)].astype(np.int64))
+    return out
+
+
+def _flat_forces(bank: Bank, n: int, forces: Sequence[Force]) -> tuple[Array, Array, Array, Array, Array]:
+    """Forces sorted by body (stable): segments (b+1,), signals (p, n), flat gains at both ends, and where each begins (p,)."""
+    ordered = sorted(forces, key=lambda force: force.body)
+    signals = np.zeros((len(ordered), n))
+    gain0, gain1 = [np.zeros(0)], [np.zeros(0)]
+    for i, force in enumerate(ordered):
+        if np.shape(force.force_n) != (n,) or not np.isfinite(force.force_n).all():
+            raise AudioError(f"a force on body {force.body} of shape {np.shape(force.force_n)}", f"give {n} finite samples")
+        signals[i] = force.force_n
+        gain0.append(_padded_gain(bank, force.body, force.gain0, "force"))
+        gain1.append(_padded_gain(bank, force.body, force.gain1, "force"))
+    body = np.array([force.body for force in ordered], np.int64)
+    at = np.concatenate([[0], np.cumsum([len(x) for x in gain0[1:]])])[: len(ordered)].astype(np.int64)
+    return np.searchsorted(body, np.arange(bank.body_count + 1)), signals, np.concatenate(gain0), np.concatenate(gain1), at
