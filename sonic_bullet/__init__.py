@@ -1,1 +1,81 @@
-"""sonic_bullet: PyBullet scenes that sound."""
+"""sonic_bullet: PyBullet scenes that sound, from physics alone.
+
+    import sonic_bullet as sb
+    listener = sb.attach(client)
+    listener.add(body, material="porcelain")
+
+Heavy rooms are imported when first used.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from sonic_bullet.contacts import ContactLog, Contacts, Step
+    from sonic_bullet.errors import SonicBulletError
+    from sonic_bullet.files import read_audio, read_log, write_audio
+    from sonic_bullet.listener import keep_restitution
+    from sonic_bullet.presets import list_materials, load_material
+    from sonic_bullet.records import Air, Material, Microphone, ModalModel, ModalSum, Shape, Vibrometer
+    from sonic_bullet.render import render_log
+    from sonic_bullet.session import Listener, attach
+
+__version__ = "0.1.0"
+
+_HOME = {
+    "Air": "records",
+    "ContactLog": "contacts",
+    "Contacts": "contacts",
+    "Listener": "session",
+    "Material": "records",
+    "Microphone": "records",
+    "ModalModel": "records",
+    "ModalSum": "records",
+    "Shape": "records",
+    "SonicBulletError": "errors",
+    "Step": "contacts",
+    "Vibrometer": "records",
+    "attach": "session",
+    "keep_restitution": "listener",
+    "list_materials": "presets",
+    "load_material": "presets",
+    "read_audio": "files",
+    "read_log": "files",
+    "render_log": "render",
+    "write_audio": "files",
+}
+
+__all__ = [  # noqa: RUF022 — kept in the order of _HOME, which ruff cannot read
+    "Air",
+    "ContactLog",
+    "Contacts",
+    "Listener",
+    "Material",
+    "Microphone",
+    "ModalModel",
+    "ModalSum",
+    "Shape",
+    "SonicBulletError",
+    "Step",
+    "Vibrometer",
+    "attach",
+    "keep_restitution",
+    "list_materials",
+    "load_material",
+    "read_audio",
+    "read_log",
+    "render_log",
+    "write_audio",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name in _HOME:
+        return getattr(importlib.import_module(f"sonic_bullet.{_HOME[name]}"), name)
+    raise AttributeError(f"module 'sonic_bullet' has no attribute '{name}'")
+
+
+def __dir__() -> list[str]:
+    return sorted(_HOME)

@@ -1,0 +1,41 @@
+"""A table-top with porcelain, metal, glass and wood that collide, roll and slide (after Figure 14 of Ren, Yeh and Lin 2013)."""
+
+import math
+from pathlib import Path
+
+SECONDS = 5.0
+MICROPHONE = [(-0.15, -0.7, 0.5), (0.15, -0.7, 0.5)]
+ASSETS = Path(__file__).resolve().parent.parent / "assets"
+DENSITY_KG_M3 = {"porcelain": 2400, "steel": 7850, "glass": 2500, "wood": 700}
+VOLUME_M3 = {"plate": 207.6e-6, "bowl": 51.7e-6, "tumbler": 66.1e-6}
+
+
+def build(client):
+    client.setGravity(0, 0, -9.81)
+    table = client.createMultiBody(0, client.createCollisionShape(client.GEOM_BOX, halfExtents=[0.45, 0.3, 0.012]), basePosition=[0, 0, -0.012])
+    cast = {table: "wood"}
+
+    def place(material, volume, shape, position, euler=(0, 0, 0), velocity=(0, 0, 0), spin=(0, 0, 0)):
+        mass = DENSITY_KG_M3[material] * volume
+        body = client.createMultiBody(mass, shape, basePosition=position, baseOrientation=client.getQuaternionFromEuler(euler))
+        client.resetBaseVelocity(body, velocity, spin)
+        cast[body] = material
+        return body
+
+    def mesh(name):
+        return client.createCollisionShape(client.GEOM_MESH, fileName=str(ASSETS / f"{name}.obj"))
+
+    ball, marble, block, rod = 0.014, 0.009, [0.04, 0.025, 0.02], (0.006, 0.16)
+    sphere = client.createCollisionShape(client.GEOM_SPHERE, radius=ball)
+    place("porcelain", VOLUME_M3["plate"], mesh("plate"), [-0.18, 0.08, 0.16], (0.25, 0.1, 0))
+    place("steel", VOLUME_M3["bowl"], mesh("bowl"), [0.2, 0.1, 0.22], (0.5, 0.2, 0))
+    place("glass", VOLUME_M3["tumbler"], mesh("tumbler"), [0.02, 0.05, 0.052])
+    place("steel", 4 / 3 * math.pi * ball**3, sphere, [-0.4, -0.12, ball], velocity=(0.8, 0, 0), spin=(0, 0.8 / ball, 0))
+    place("wood", 8 * math.prod(block), client.createCollisionShape(client.GEOM_BOX, halfExtents=block), [0.38, 0.05, 0.02], velocity=(-1.6, 0, 0))
+    place("steel", math.pi * rod[0] ** 2 * rod[1], client.createCollisionShape(client.GEOM_CYLINDER, radius=rod[0], height=rod[1]), [-0.05, -0.2, 0.3], (0, 1.2, 0.3))
+    for i in range(3):
+        shape = client.createCollisionShape(client.GEOM_SPHERE, radius=marble)
+        place("glass", 4 / 3 * math.pi * marble**3, shape, [0.1 + 0.05 * i, -0.1, 0.35 + 0.12 * i], velocity=(0.1, 0.05, 0))
+    for body in cast:
+        client.changeDynamics(body, -1, restitution=0.75, lateralFriction=0.5, rollingFriction=2e-5, spinningFriction=2e-5, contactProcessingThreshold=0)
+    return cast

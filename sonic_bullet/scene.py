@@ -1,0 +1,219 @@
+"""Scenes from files: run one with ears, or look at what would spoil its sound.
+
+    scenes/NAME.py -> (build(client) -> cast | plain script) -> Listener -> RenderResult
+
+A scene is an ordinary Python file of one of two kinds; nothing is inherited from.
+`build(client)` sets a world up and returns its cast, a dictionary from a body (or (body, link), or (body, "all")) to its material, or to
+the keywords of `Listener.add`. Beside it there may be `SECONDS`, `MICROPHONE` and `act(client, time_s)`, called before every step.
+A plain script connects, loads and steps as any PyBullet script does; windows become DIRECT, sleeps are skipped. Where it attaches a
+listener of its own (kept in a top-level name), that one is heard; otherwise every body that it loads sounds as ``material``.
+"""
+
+from __future__ import annotations
+
+import ast
+import importlib.util
+import traceback
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from sonic_bullet.contacts import ContactLog
+from sonic_bullet.errors import SceneError, SonicBulletError
+from sonic_bullet.listener import Finding, diagnose_world, direct_client, disconnect, links_with_shapes, run_script
+from sonic_bullet.records import Array
+from sonic_bullet.render import render_log
+from sonic_bullet.session import Listener, as_sensors, attach
+
+DEFAULT_SECONDS = 4.0
+DEFAULT_MATERIAL = "plastic"
+Progress = Callable[[float], None]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RenderResult:
+    """samples (channels, n) in pascals, the log they come from, and notes a user should read."""
+
+    samples: Array
+    log: ContactLog
+    sr: int
+    notes: tuple[str, ...] = ()
+
+
+def render_scene(
+    path: str | Path,
+    *,
+    seconds: float | None = None,
+    sr: int = 48_000,
+    seed: int = 0,
+    microphones: Sequence[Sequence[float]] | None = None,
+    material: str | None = None,
+    progress: Progress | None = None,
+) -> RenderResult:
+    """Run a scene for ``seconds`` of physics time and return its sound.
+
+    seconds None: the scene's own SECONDS, or 4. microphones None: the scene's own, or (0, -1, 0.5). material: of the bodies of a
+    plain script. progress is told the share done. Raises SonicBulletError; where the scene broke or was interrupted under way,
+    the exception carries what was rendered so far as ``partial``.
+    """
+    with _stage(path, sr=sr, seed=seed, microphones=microphones, material=material) as stage:
+        try:
+            notes = stage.run(seconds, progress)
+        except (SonicBulletError, KeyboardInterrupt) as error:
+            error.partial = stage.result(()) if stage.listener is not None else None  # type: ignore[union-attr]
+            raise
+        return stage.result(notes)
+
+
+def examine_scene(path: str | Path, seconds: float = 1.0) -> tuple[Finding, ...]:
+    """What in a scene would spoil its sound, and how to mend it. Runs it for ``seconds`` of physics time. Raises SonicBulletError."""
+    with _stage(path, sr=8_000, seed=0, microphones=None, material=None) as stage:
+        stage.run(seconds, None)
+        listener = stage.need_listener()
+        return (*diagnose_world(listener.world), *_mute_bodies(listener))
+
+
+def _mute_bodies(listener: Listener) -> tuple[Finding, ...]:
+    return tuple(
+        Finding("no-audible-mode", "info", f"body {body.body_id} link {body.link} ({body.name}) has no mode below 20 kHz: it clicks but does not ring", "nothing to mend; a larger or thinner body rings")
+        for body in listener.contacts.bodies
+        if body.model is not None and body.model.mode_count == 0 and len(body.model.face)
+    )
+
+
+@dataclass(slots=True)
+class _Stage:
+    """A scene being run: its file, and the listener once there is one."""
+
+    path: Path
+    sr: int
+    seed: int
+    microphones: Sequence[Sequence[float]] | None
+    material: str | None
+    listener: Listener | None = None
+    client: Any = None
+
+    def __enter__(self) -> _Stage:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self.listener is not None:
+            self.listener.detach()
+        if self.client is not None:
+            disconnect(self.client)
+
+    def run(self, seconds: float | None, progress: Progress | None) -> tuple[str, ...]:
+        return _run_built(self, seconds, progress) if _defines_build(self.path) else _run_plain(self, seconds, progress)
+
+    def need_listener(self) -> Listener:
+        if self.listener is None:
+            raise SceneError(f"scene '{self.path.name}' made no physics step", "call stepSimulation in it")
+        return self.listener
+
+    def result(self, notes: tuple[str, ...]) -> RenderResult:
+        listener = self.need_listener()
+        log = listener.contacts
+        if listener.sr == self.sr and self.microphones is None:
+            return RenderResult(listener.sound(), log, self.sr, notes)
+        log = replace(log, sr=self.sr, sensors=log.sensors if self.microphones is None else as_sensors(self.microphones))
+        return RenderResult(render_log(log), log, self.sr, notes)
+
+
+def _stage(path: str | Path, **options: Any) -> _Stage:
+    place = Path(path)
+    if not place.is_file():
+        raise SceneError(f"no scene file '{path}'", "give the path of a Python scene or of a contact log")
+    return _Stage(place, **options)
+
+
+def _defines_build(path: Path) -> bool:
+    try:
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+    except (SyntaxError, ValueError) as error:
+        raise SceneError(f"scene '{path.name}' is not Python: {error}", "mend the file") from None
+    return any(isinstance(node, ast.FunctionDef) and node.name == "build" for node in tree.body)
+
+
+def _uses_sonic_bullet(path: Path) -> bool:
+    return any(
+        (isinstance(node, ast.Import) and any(name.name.split(".")[0] == "sonic_bullet" for name in node.names)) or (isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == "sonic_bullet")
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+    )
+
+
+def _user_code(path: Path, call: Callable[..., Any], *arguments: Any) -> Any:
+    """Call the scene's own code; its exceptions become one line that names the line they came from."""
+    try:
+        return call(*arguments)
+    except (SonicBulletError, KeyboardInterrupt):
+        raise
+    except BaseException as error:
+        lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if Path(frame.filename) == path]
+        where = f" line {lines[-1]}" if lines else ""
+        raise SceneError(f"scene '{path.name}'{where}: {type(error).__name__}: {error}", "mend the scene") from error
+
+
+def _module(path: Path) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(f"sonic_bullet_scene_{path.stem}", path)
+    if spec is None or spec.loader is None:
+        raise SceneError(f"'{path}' is not a Python file", "give a scene whose name ends in .py")
+    module = importlib.util.module_from_spec(spec)
+    _user_code(path, spec.loader.exec_module, module)
+    return module
+
+
+def _run_built(stage: _Stage, seconds: float | None, progress: Progress | None) -> tuple[str, ...]:
+    module = _module(stage.path)
+    stage.client = client = direct_client()
+    cast = _user_code(stage.path, module.build, client)
+    if not isinstance(cast, dict):
+        raise SceneError(f"scene '{stage.path.name}': build(client) returned {type(cast).__name__}", "return a dictionary from bodies to materials")
+    places = stage.microphones if stage.microphones is not None else getattr(module, "MICROPHONE", (0.0, -1.0, 0.5))
+    stage.listener = listener = attach(client, sr=stage.sr, microphone=places, seed=stage.seed)
+    stage.microphones = None
+    for who, how in cast.items():
+        body, link = who if isinstance(who, tuple) else (who, -1)
+        listener.add(body, link, **(how if isinstance(how, dict) else {"material": how}))
+    act = getattr(module, "act", None)
+    total = seconds if seconds is not None else float(getattr(module, "SECONDS", DEFAULT_SECONDS))
+    while listener.time_s < total - 1e-9:
+        if act is not None:
+            _user_code(stage.path, act, client, listener.time_s)
+        client.stepSimulation()
+        if progress is not None:
+            progress(min(listener.time_s / total, 1.0))
+    return ()
+
+
+def _run_plain(stage: _Stage, seconds: float | None, progress: Progress | None) -> tuple[str, ...]:
+    total = seconds if seconds is not None else DEFAULT_SECONDS
+    notes: tuple[str, ...] = ()
+    if _uses_sonic_bullet(stage.path):
+        names = run_script(stage.path, None, total)
+        stage.listener = next((value for value in names.values() if isinstance(value, Listener)), None)
+        if stage.listener is None:
+            raise SceneError(f"scene '{stage.path.name}' imports sonic_bullet but keeps no listener in a top-level name", "write listener = sonic_bullet.attach(...)")
+        return notes
+    material = stage.material or DEFAULT_MATERIAL
+    places = stage.microphones if stage.microphones is not None else (0.0, -1.0, 0.5)
+    stage.microphones = None
+    known: set[tuple[int, int]] = set()
+
+    def before(client: int) -> None:
+        if stage.listener is None:
+            stage.listener = attach(client, sr=stage.sr, microphone=places, seed=stage.seed)
+        for body, link in links_with_shapes(stage.listener.world):
+            if (body, link) not in known:
+                known.add((body, link))
+                stage.listener.add(body, link, material=material)
+
+    def after(_: int) -> None:
+        listener = stage.need_listener()
+        listener.step()
+        if progress is not None:
+            progress(min(listener.time_s / total, 1.0))
+
+    run_script(stage.path, (before, after), total)
+    return (f"every body sounds as {material}: the script names no materials",)
