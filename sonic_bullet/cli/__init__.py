@@ -157,15 +157,18 @@ def main() -> None:
             stream.reconfigure(errors="replace")  # a terminal without Greek letters still gets its table
     signal.signal(signal.SIGTERM, _terminated)
     try:
-        code = cli.main(prog_name="sonic-bullet", standalone_mode=False)
+        with cli.make_context("sonic-bullet", sys.argv[1:] or ["--help"]) as context:  # cli.main() would swallow what an interrupt says
+            cli.invoke(context)
         sys.stdout.flush()
-        sys.exit(code if isinstance(code, int) else 0)
-    except (click.exceptions.Abort, KeyboardInterrupt) as error:
+        sys.exit(0)
+    except click.exceptions.Exit as done:
+        code = done.exit_code
+    except KeyboardInterrupt as error:
         code = 143 if str(error).startswith("terminated") else 130
         _say(str(error) or "stopped")
     except click.ClickException as error:
-        context = getattr(error, "ctx", None)
-        code, hint = 2, f"; see '{context.command_path} --help'" if context is not None else ""
+        where = getattr(error, "ctx", None)
+        code, hint = 2, f"; see '{where.command_path} --help'" if where is not None else ""
         _say(error.format_message().rstrip(".") + hint)
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # the reader left; flushing at exit must not complain

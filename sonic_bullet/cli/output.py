@@ -11,7 +11,7 @@ import json
 import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
 from typing import Any
 
 
@@ -25,9 +25,9 @@ def clean_stdout(json_to: str | None) -> Iterator[Callable[[str], None]]:
     kept = os.dup(1)
     os.dup2(2, 1)
     try:
-        yield lambda text: None
+        with redirect_stdout(sys.stderr):
+            yield lambda text: None
     finally:
-        sys.stdout.flush()
         os.dup2(kept, 1)
         os.close(kept)
 

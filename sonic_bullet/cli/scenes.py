@@ -14,6 +14,7 @@ from sonic_bullet.files import AudioReport, check_audio_output, check_output, ch
 
 if TYPE_CHECKING:
     from sonic_bullet.contacts import ContactLog
+    from sonic_bullet.records import Array
     from sonic_bullet.scene import RenderResult
 
 DEFAULT_SR = 48_000
@@ -42,7 +43,7 @@ def run_render(
         try:
             with progress_bar(Path(scene).name) as progress:
                 wish = _Wish(seconds, rate, microphones, seed, material, progress)
-                result = _replayed(scene, wish) if _is_log(scene) else _simulated(scene, wish)
+                result: RenderResult | _Replay = _replayed(scene, wish) if _is_log(scene) else _simulated(scene, wish)
         except (SonicBulletError, KeyboardInterrupt) as error:
             raise _with_partial(error, output, peak_dbfs, lufs) from error
         if contacts:
@@ -134,13 +135,22 @@ def _simulated(scene: str, wish: _Wish) -> RenderResult:
     return render_scene(scene, seconds=wish.seconds, sr=sr, seed=wish.seed or 0, microphones=places, material=wish.material, progress=wish.progress)
 
 
-def _replayed(path: str, wish: _Wish) -> RenderResult:
+@dataclass(frozen=True, slots=True, eq=False)
+class _Replay:
+    """A `RenderResult` of a log; that class lives beside PyBullet, which a replay does without."""
+
+    samples: Array
+    log: ContactLog
+    sr: int
+    notes: tuple[str, ...] = ()
+
+
+def _replayed(path: str, wish: _Wish) -> _Replay:
     """A log's sound: bit for bit the render it came from, where no option changes it."""
     import numpy as np
 
     from sonic_bullet.records import Microphone
     from sonic_bullet.render import render_log
-    from sonic_bullet.scene import RenderResult
 
     log = read_log(path)
     if wish.microphones:
@@ -152,7 +162,7 @@ def _replayed(path: str, wish: _Wish) -> RenderResult:
             raise AudioError(f"{path} lasts {log.duration_s:.3f} s, shorter than {seconds} s", "give fewer seconds, or simulate the scene for longer")
         log = replace(log, steps=tuple(step for step, start in zip(log.steps, log.start_s, strict=True) if start < seconds - 1e-9))
     samples = render_log(log, sr=wish.rate, progress=wish.progress)
-    return RenderResult(samples, log, wish.rate or log.sr)
+    return _Replay(samples, log, wish.rate or log.sr)
 
 
 def _with_partial(
@@ -190,7 +200,7 @@ def _summary(report: AudioReport) -> str:
     return f"{report.path}: {report.seconds:.3f} s, {channels}, {report.sr} Hz, peak {report.peak_pa:.4g} Pa, rms {report.rms_pa:.4g} Pa{scale}"
 
 
-def _described(result: RenderResult, report: AudioReport, notes: tuple[str, ...]) -> dict[str, Any]:
+def _described(result: RenderResult | _Replay, report: AudioReport, notes: tuple[str, ...]) -> dict[str, Any]:
     return {
         "output": report.path,
         "format": report.format,

@@ -1,0 +1,396 @@
+"""The command line around the run time: what it passes on, writes, says, and how it ends. The run time itself is replaced by a stub."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import soundfile
+
+import sonic_bullet.render
+import sonic_bullet.scene
+from sonic_bullet import modal
+from sonic_bullet.cli import main
+from sonic_bullet.contacts import ContactLog, Contacts, Step
+from sonic_bullet.errors import SceneError
+from sonic_bullet.files import read_log, read_model, write_log
+from sonic_bullet.records import Body, Microphone, ModalModel
+from sonic_bullet.scene import RenderResult
+
+SR = 8000
+
+
+def model() -> ModalModel:
+    return ModalModel([100.0, 200.0], [1.0, np.nan], np.zeros((3, 3, 2)), np.eye(3), [[0, 1, 2]], [0.0], 1e-3, 0.5, dropped=4, note="stub")
+
+
+def log(steps: int = 10) -> ContactLog:
+    bodies = (Body(3, 1, 0, "cup", 0.1, np.eye(3), model=model()), Body(0, -1, 0, "floor", 0.0, np.zeros((3, 3))))
+    one = Contacts([0], [1], *[np.zeros((1, 3))] * 2, [[0, 0, 1]], [[0, 0, 0.1]], np.zeros((1, 3)), np.zeros((1, 2)), [1.0], [0.0])
+    still = (np.zeros((2, 3)), np.tile([0, 0, 0, 1.0], (2, 1)), np.zeros(2, bool))
+    return ContactLog(bodies, tuple(Step(0.1, *still, one if i == 2 else Contacts.none()) for i in range(steps)), (Microphone([0, 0, 1]),), SR, 5)
+
+
+def sound(seconds: float = 1.0, sr: int = SR) -> np.ndarray:
+    return 0.1 * np.sin(np.arange(round(seconds * sr)) * [[0.3]])
+
+
+@pytest.fixture
+def scene(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "scene.py").write_text("")
+    return tmp_path / "scene.py"
+
+
+@pytest.fixture
+def asked(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
+    """What the stubs of the run time were asked for."""
+    kept: dict[str, Any] = {}
+
+    def render_scene(path: object, **options: Any) -> RenderResult:
+        kept.update(options, path=str(path))
+        print("the scene prints")
+        os.write(1, b"a C library prints\n")
+        return RenderResult(sound(sr=options["sr"]), log(), options["sr"], ("a note",))
+
+    def render_log(given: ContactLog, *, sr: int | None = None, progress: Any = None) -> np.ndarray:
+        kept.update(log=given, sr=sr)
+        return sound(given.duration_s, sr or given.sr)
+
+    monkeypatch.setattr(sonic_bullet.scene, "render_scene", render_scene)
+    monkeypatch.setattr(sonic_bullet.render, "render_log", render_log)
+    return kept
+
+
+@pytest.fixture(autouse=True)
+def restored() -> Iterator[None]:
+    before = signal.getsignal(signal.SIGTERM)
+    with warnings.catch_warnings():
+        yield
+    signal.signal(signal.SIGTERM, before)
+
+
+def run(*words: object) -> int:
+    """The exit code of the command line, run in this process."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "argv", ["sonic-bullet", *map(str, words)])
+        with pytest.raises(SystemExit) as caught:
+            main()
+    return int(caught.value.code or 0)
+
+
+def error_of(capfd: pytest.CaptureFixture[str], *words: object) -> str:
+    """The one line that a failing command says."""
+    assert run(*words) == 2
+    said = capfd.readouterr()
+    assert "Traceback" not in said.err
+    lines = said.err.splitlines()
+    assert len(lines) == 1, lines
+    assert lines[0].startswith("sonic-bullet: ")
+    assert said.out in ("", "the scene prints\na C library prints\n")
+    return lines[0]
+
+
+# ---- render
+
+
+def test_render_writes_all_it_was_asked_for(scene: Path, asked: dict[str, Any], capfd: pytest.CaptureFixture[str]) -> None:
+    code = run("render", "scene.py", "-o", "a.wav", "--contacts", "a.npz", "--picture", "a.png", "--json", "a.json", "--seconds", 2, "--sr", 16000, "--seed", 7)
+    said = capfd.readouterr()
+    assert code == 0
+    assert sorted(p.name for p in scene.parent.iterdir()) == ["a.json", "a.npz", "a.png", "a.wav", "scene.py"]
+    assert (asked["seconds"], asked["sr"], asked["seed"], asked["microphones"], asked["material"]) == (2.0, 16000, 7, None, None)
+    assert "a.wav: 1.000 s, 1 channel, 16000 Hz" in said.out
+    assert said.err == "sonic-bullet: note: a note\n"  # no progress in a pipe
+    described = json.loads((scene.parent / "a.json").read_text())
+    assert (described["output"], described["sr"], described["channels"], described["frames"], described["contacts"]) == ("a.wav", 16000, 1, 16000, 1)
+    assert described["bodies"][0] == {"body": 3, "link": 1, "name": "cup", "material": None, "modes": 2, "dropped": 4}
+    assert described["notes"] == ["a note"]
+    assert described["peak_pa"] == pytest.approx(0.1, rel=1e-3)
+    assert len(read_log("a.npz")) == 1
+
+
+def test_json_alone_on_stdout_whatever_the_scene_prints(scene: Path, asked: dict[str, Any], capfd: pytest.CaptureFixture[str]) -> None:
+    assert run("render", "scene.py", "-o", "a.wav", "--json") == 0
+    said = capfd.readouterr()
+    assert json.loads(said.out)["output"] == "a.wav"
+    assert "the scene prints" in said.err
+    assert "a C library prints" in said.err
+
+
+def test_defaults_and_microphones(scene: Path, asked: dict[str, Any]) -> None:
+    assert run("render", "scene.py", "-o", "a.wav", "--microphone", "0,-1,0.5", "--microphone", "1e-1,2,-3", "--material", "wood") == 0
+    assert (asked["sr"], asked["seed"], asked["seconds"]) == (48_000, 0, None)
+    assert asked["microphones"] == ((0, -1, 0.5), (0.1, 2, -3))
+    assert asked["material"] == "wood"
+
+
+@pytest.mark.parametrize(("options", "level"), [(["--peak-dbfs", "-6"], -6.0), (["--peak-dbfs", "-0.5"], -0.5)])
+def test_peak_is_scaled(scene: Path, asked: dict[str, Any], options: list[str], level: float) -> None:
+    assert run("render", "scene.py", "-o", "a.wav", *options) == 0
+    assert 20 * np.log10(np.abs(soundfile.read("a.wav")[0]).max()) == pytest.approx(level, abs=0.01)
+
+
+def test_clipping_is_reported(scene: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setattr(sonic_bullet.scene, "render_scene", lambda path, **options: RenderResult(sound() * 30, log(), SR))
+    assert run("render", "scene.py", "-o", "a.flac", "--json", "a.json") == 0
+    clipped = json.loads(Path("a.json").read_text())["clipped"]
+    assert clipped > 1000
+    assert f"{clipped} samples were clipped" in capfd.readouterr().err
+    assert run("render", "scene.py", "-o", "a.wav", "--json", "a.json") == 0
+    assert json.loads(Path("a.json").read_text())["clipped"] == 0
+    assert "the file is exact" in capfd.readouterr().err
+
+
+def test_a_log_renders_again_with_its_own_rate_and_seed(scene: Path, asked: dict[str, Any]) -> None:
+    write_log("a.npz", log())
+    assert run("render", "a.npz", "-o", "a.wav", "--contacts", "b.npz") == 0
+    assert asked["sr"] is None
+    assert soundfile.info("a.wav").samplerate == SR
+    assert Path("a.npz").read_bytes() == Path("b.npz").read_bytes()
+
+
+def test_a_log_with_wishes(scene: Path, asked: dict[str, Any]) -> None:
+    write_log("a.npz", log())
+    assert run("render", "a.npz", "-o", "a.wav", "--sr", 16000, "--seed", 9, "--seconds", 0.5, "--microphone", "1,2,3") == 0
+    assert (asked["sr"], asked["log"].seed, len(asked["log"].steps), len(asked["log"].sensors)) == (16000, 9, 5, 1)
+    np.testing.assert_array_equal(asked["log"].sensors[0].position_m, [1, 2, 3])
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["none.py", "-o", "a.wav"], "no such file"),
+        (["scene.txt", "-o", "a.wav"], "no such file"),
+        (["folder", "-o", "a.wav"], "no such file"),
+        (["scene.py", "-o", "a.xyz"], "no audio format"),
+        (["scene.py", "-o", "folder"], "audio format"),
+        (["scene.py", "-o", "none/a.wav"], "mkdir -p"),
+        (["scene.py", "-o", "folder.wav"], "folder"),
+        (["scene.py", "-o", "a.wav", "--sr", "0"], "sample rate 0 Hz"),
+        (["scene.py", "-o", "a.wav", "--sr", "1e9"], "sample rate 1e+09 Hz"),
+        (["scene.py", "-o", "a.wav", "--sr", "nan"], "sample rate nan"),
+        (["scene.py", "-o", "a.wav", "--sr", "many"], "--sr"),
+        (["scene.py", "-o", "a.wav", "--seconds", "0"], "seconds"),
+        (["scene.py", "-o", "a.wav", "--seconds", "nan"], "seconds"),
+        (["scene.py", "-o", "a.wav", "--material", "woood"], "did you mean wood"),
+        (["scene.py", "-o", "a.wav", "--peak-dbfs", "-1", "--lufs", "-23"], "both"),
+        (["scene.py", "-o", "a.wav", "--lufs", "nan"], "level"),
+        (["scene.py", "-o", "a.wav", "--microphone", "1,2"], "X,Y,Z"),
+        (["scene.py", "-o", "a.wav", "--microphone", "1,2,nan"], "X,Y,Z"),
+        (["scene.py", "-o", "a.wav", "--seed", "-1"], "--seed"),
+        (["scene.py", "-o", "a.wav", "--contacts", "a.txt"], ".npz"),
+        (["scene.py", "-o", "a.wav", "--picture", "a.wav"], "picture format"),
+        (["scene.py", "-o", "a.wav", "--json", "./a.wav"], "one name"),
+        (["scene.py", "-o", "a.wav", "--colour"], "--colour"),
+        (["scene.py"], "--output"),
+        ([], "Missing argument"),
+        (["cut.npz", "-o", "a.wav"], "cut.npz is cut"),
+        (["good.npz", "-o", "a.wav", "--material", "wood"], "--material"),
+        (["good.npz", "-o", "a.wav", "--seconds", "5"], "lasts 1.000 s"),
+    ],
+)
+def test_what_is_wrong_is_one_line_and_nothing_is_written(
+    scene: Path, asked: dict[str, Any], capfd: pytest.CaptureFixture[str], words: list[str], said: str
+) -> None:
+    (scene.parent / "folder").mkdir()
+    (scene.parent / "folder.wav").mkdir()
+    write_log("good.npz", log())
+    Path("cut.npz").write_bytes(Path("good.npz").read_bytes()[:500])
+    before = sorted(scene.parent.iterdir())
+    assert said in error_of(capfd, "render", *words)
+    assert sorted(scene.parent.iterdir()) == before
+
+
+@pytest.mark.parametrize("error", [SceneError("body 3 has mass nan", "mend it"), KeyboardInterrupt()])
+@pytest.mark.parametrize("level", [[], ["--peak-dbfs", "-1"], ["--lufs", "-20"]])
+def test_what_was_rendered_before_an_error_is_a_valid_named_file(
+    scene: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], error: BaseException, level: list[str]
+) -> None:
+    def render_scene(path: object, **options: Any) -> RenderResult:
+        error.partial = RenderResult(sound(0.25), log(), SR)  # type: ignore[attr-defined]
+        raise error
+
+    monkeypatch.setattr(sonic_bullet.scene, "render_scene", render_scene)
+    Path("a.wav").write_bytes(b"old")
+    assert run("render", "scene.py", "-o", "a.wav", "--contacts", "a.npz", *level) == (130 if isinstance(error, KeyboardInterrupt) else 2)
+    lines = capfd.readouterr().err.splitlines()
+    assert len(lines) == 1
+    assert "the first 0.250 s are in a.partial.wav" in lines[0]
+    assert "mend it" in lines[0] or isinstance(error, KeyboardInterrupt)
+    assert soundfile.info("a.partial.wav").frames == SR // 4
+    assert Path("a.wav").read_bytes() == b"old"
+    assert not Path("a.npz").exists()
+
+
+@pytest.mark.parametrize("partial", [None, RenderResult(np.zeros((1, 0)), log(), SR)])
+def test_an_error_before_any_sound_leaves_nothing(
+    scene: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], partial: RenderResult | None
+) -> None:
+    def render_scene(path: object, **options: Any) -> RenderResult:
+        error = SceneError("what", "remedy")
+        error.partial = partial  # type: ignore[attr-defined]
+        raise error
+
+    monkeypatch.setattr(sonic_bullet.scene, "render_scene", render_scene)
+    assert error_of(capfd, "render", "scene.py", "-o", "a.wav") == "sonic-bullet: what; remedy"
+    assert list(scene.parent.iterdir()) == [scene]
+
+
+@pytest.mark.parametrize("error", [OSError(28, "No space left on device"), MemoryError(), ZeroDivisionError("x\ny")])
+def test_the_unexpected_is_one_line_too(scene: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], error: Exception) -> None:
+    def render_scene(path: object, **options: Any) -> RenderResult:
+        raise error
+
+    monkeypatch.setattr(sonic_bullet.scene, "render_scene", render_scene)
+    assert type(error).__name__ in error_of(capfd, "render", "scene.py", "-o", "a.wav")
+
+
+# ---- modes, materials, doctor
+
+
+@pytest.fixture
+def solved(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
+    kept: dict[str, Any] = {}
+
+    def analyse(shapes: Any, material: Any, **options: Any) -> ModalModel:
+        kept.update(options, shapes=shapes, material=material)
+        return model()
+
+    monkeypatch.setattr(modal, "analyse", analyse)
+    return kept
+
+
+@pytest.fixture
+def mesh(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "t.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n")
+    return tmp_path / "t.obj"
+
+
+def test_modes_writes_json_and_model(mesh: Path, solved: dict[str, Any], capfd: pytest.CaptureFixture[str]) -> None:
+    assert run("modes", "t.obj", "--material", "glass", "--count", 2, "--fix", "0,0,0,0.1", "--thickness", 0.01, "--scale", 0.1, "-o", "m.npz", "--json") == 0
+    found = json.loads(capfd.readouterr().out)
+    assert found["modes"] == [{"freq_hz": 100.0, "decay_per_s": 1.0}, {"freq_hz": 200.0, "decay_per_s": None}]
+    assert (found["mesh"], found["material"], found["volume_m3"], found["mass_kg"], found["dropped"], found["note"]) == ("t.obj", "glass", 1e-3, 0.5, 4, "stub")
+    assert (solved["count"], solved["fixed"], solved["thickness_m"], solved["material"].name) == (2, ((0, 0, 0, 0.1),), 0.01, "glass")
+    assert solved["shapes"][0].vertex_m.max() == 0.1
+    assert read_model("m.npz").mode_count == 2
+
+
+def test_modes_for_people(mesh: Path, solved: dict[str, Any], capfd: pytest.CaptureFixture[str]) -> None:
+    assert run("modes", "t.obj") == 0
+    said = capfd.readouterr()
+    assert said.err == ""
+    assert "steel" in said.out
+    assert "4 overdamped" in said.out
+    assert said.out.splitlines()[-1].split() == ["2", "200.00", "-"]
+
+
+def test_constants_make_an_undamped_material_and_override_a_named_one(mesh: Path, solved: dict[str, Any]) -> None:
+    assert run("modes", "t.obj", "--young", 7e10, "--poisson", 0.3, "--density", 2700) == 0
+    bare = solved["material"]
+    assert (bare.alpha_per_s, bare.density_kg_m3) == (None, 2700)
+    assert (bare.youngs_pa, bare.poisson) == pytest.approx((7e10, 0.3))
+    assert run("modes", "t.obj", "--material", "wood", "--young", 9e9) == 0
+    assert (solved["material"].youngs_pa, solved["material"].poisson, solved["material"].alpha_per_s) == pytest.approx((9e9, 0.35, 2.1364))
+    assert run("modes", "t.obj", "--material", "spruce", "--density", 500) == 0
+    assert solved["material"].density_kg_m3 == 500
+    assert solved["material"].stiffness_pa[0, 0] > 5 * solved["material"].stiffness_pa[1, 1]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["none.obj"], "none.obj"),
+        (["t.obj", "--young", "1e9"], "--poisson and --density missing"),
+        (["t.obj", "--material", "wood", "--poisson", "0.5"], "poisson"),
+        (["t.obj", "--material", "wood", "--young", "nan"], "youngs_pa"),
+        (["t.obj", "--material", "wood", "--density", "-1"], "density"),
+        (["t.obj", "--material", "wodo"], "did you mean"),
+        (["t.obj", "--count", "0"], "--count"),
+        (["t.obj", "--to-hz", "-5"], "--to-hz"),
+        (["t.obj", "--count", "3", "--to-hz", "500"], "both"),
+        (["t.obj", "--fix", "1,2,3"], "X,Y,Z,R"),
+        (["t.obj", "--scale", "0"], "scale"),
+        (["t.obj", "-o", "m.txt"], ".npz"),
+        (["t.obj", "-o", "none/m.npz"], "mkdir"),
+        (["t.obj", "--json", "none/m.json"], "mkdir"),
+        (["bad.obj"], "bad.obj"),
+    ],
+)
+def test_modes_says_what_is_wrong(mesh: Path, solved: dict[str, Any], capfd: pytest.CaptureFixture[str], words: list[str], said: str) -> None:
+    Path("bad.obj").write_text("no mesh at all")
+    before = sorted(mesh.parent.iterdir())
+    assert said in error_of(capfd, "modes", *words)
+    assert sorted(mesh.parent.iterdir()) == before
+
+
+def test_materials_in_both_forms(capfd: pytest.CaptureFixture[str]) -> None:
+    assert run("materials") == 0
+    table = capfd.readouterr().out
+    assert run("materials", "--json") == 0
+    found = json.loads(capfd.readouterr().out)["materials"]
+    assert [m["name"] for m in found] == [line.split()[0] for line in table.split("\n\n")[0].splitlines()[1:]]
+    assert all(m["source"] and m["density_kg_m3"] > 0 for m in found)
+
+
+def test_doctor_prints_findings_with_remedies(scene: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
+    finding = sonic_bullet.scene.Finding("sub-steps", "error", "numSubSteps is 4", "set it to 1")
+    monkeypatch.setattr(sonic_bullet.scene, "examine_scene", lambda path, seconds: (finding,))
+    assert run("doctor", "scene.py") == 0
+    said = capfd.readouterr().out
+    assert "error: sub-steps: numSubSteps is 4" in said
+    assert "set it to 1" in said
+    assert run("doctor", "scene.py", "--json") == 0
+    assert json.loads(capfd.readouterr().out)["findings"] == [{"id": "sub-steps", "severity": "error", "what": "numSubSteps is 4", "remedy": "set it to 1"}]
+    assert "contact log" in error_of(capfd, "doctor", "a.npz")
+
+
+# ---- the process itself
+
+
+def sonic_bullet_process(*words: str, **options: Any) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-c", "from sonic_bullet.cli import main; main()", *words], check=False, capture_output=True, text=True, timeout=120, **options
+    )
+
+
+@pytest.mark.parametrize("words", [["--help"], ["render", "--help"], ["modes", "-h"], ["doctor", "--help"], ["materials", "--help"]])
+def test_help_teaches_by_example(words: list[str]) -> None:
+    done = sonic_bullet_process(*words)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "Usage: sonic-bullet" in done.stdout
+    assert "sonic-bullet " + words[0] in done.stdout if len(words) > 1 else "Examples" in done.stdout
+
+
+def test_version() -> None:
+    assert sonic_bullet_process("--version").stdout == "sonic-bullet, version 0.1.0\n"
+
+
+def test_a_terminal_without_greek_and_a_reader_that_leaves() -> None:
+    plain = sonic_bullet_process("materials", env={**os.environ, "PYTHONIOENCODING": "ascii"})
+    assert (plain.returncode, plain.stderr) == (0, "")
+    piped = subprocess.run(
+        f"{sys.executable} -c 'from sonic_bullet.cli import main; main()' materials --json | head -c 1",
+        shell=True,
+        check=False,
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert (piped.stdout, piped.stderr) == ("{", "")
+
+
+def test_debug_shows_where(tmp_path: Path) -> None:
+    done = sonic_bullet_process("render", "none.py", "-o", "a.wav", cwd=tmp_path, env={**os.environ, "SONIC_BULLET_DEBUG": "1"})
+    assert "Traceback" in done.stderr
