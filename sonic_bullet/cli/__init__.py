@@ -54,9 +54,11 @@ class Numbers(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # gener
         self.name, self.count = metavar, metavar.count(",") + 1
 
     def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:
+        """What help calls the value."""
         return self.name
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, ...]:
+        """The numbers in ``value``; click's usage error where there are not ``count`` finite ones."""
         if isinstance(value, tuple):
             return value
         try:
