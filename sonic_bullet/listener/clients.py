@@ -7,12 +7,18 @@ from typing import Any
 import pybullet
 from pybullet_utils.bullet_client import BulletClient
 
+from sonic_bullet.errors import SceneError
+from sonic_bullet.listener.quiet import quiet_stdout
 from sonic_bullet.listener.world import World
 
 
 def direct_client() -> BulletClient:
-    """A fresh PyBullet world without a window."""
-    return BulletClient(pybullet.DIRECT)
+    """A fresh PyBullet world without a window, connected without a word on stdout. Raises SceneError where PyBullet gives no more."""
+    with quiet_stdout():
+        client = BulletClient(pybullet.DIRECT)
+    if client._client < 0:
+        raise SceneError("PyBullet gives no further client", "disconnect those no longer needed")
+    return client
 
 
 def disconnect(client: BulletClient) -> None:

@@ -50,6 +50,16 @@ class Motion:
     def table(self) -> tuple[Array, Array, Array, Array]:
         return self.position_m, self.quaternion_xyzw, self.velocity_m_s, self.spin_rad_s
 
+    @property
+    def moves(self) -> bool:
+        """Whether anything at all has a speed."""
+        return bool(self.velocity_m_s.any() or self.spin_rad_s.any())
+
+
+def same_motion(first: Motion, second: Motion) -> bool:
+    """Whether every number is the same, bit for bit."""
+    return first.roster.bodies == second.roster.bodies and all(np.array_equal(a, b) for a, b in zip(first.table, second.table, strict=True))
+
 
 def encode(body: Array | int, link: Array | int) -> Array:
     """Row codes of (body, link) pairs."""
@@ -74,12 +84,14 @@ def body_ids(client_id: int) -> list[int]:
 
 def read_roster(client_id: int) -> Roster:
     """List bodies, their links and which of them cannot move."""
-    bodies, codes, static = [], [], []
+    bodies: list[tuple[int, int, bool]] = []
+    codes: list[int] = []
+    static: list[bool] = []
     for body in body_ids(client_id):
         joints = pybullet.getNumJoints(body, physicsClientId=client_id)
         fixed = pybullet.getDynamicsInfo(body, -1, physicsClientId=client_id)[0] == 0
         bodies.append((body, joints, fixed))
-        codes.extend(encode(body, link) for link in range(-1, joints))
+        codes.extend(int(encode(body, link)) for link in range(-1, joints))
         static.extend([fixed] + [False] * joints)
     return Roster(tuple(bodies), np.array(codes, np.int64), np.array(static, bool))
 
@@ -129,10 +141,7 @@ def jumped(earlier: Motion, later: Motion, dt_s: float) -> Array:
     """
     if not len(earlier.roster.code):
         return np.zeros(len(later.roster.code), bool)
-    if earlier.roster is later.roster:
-        old = np.arange(len(later.roster.code))
-    else:
-        old = rows_of(earlier.roster, later.roster.code)
+    old = np.arange(len(later.roster.code)) if earlier.roster is later.roster else rows_of(earlier.roster, later.roster.code)
     moved = np.linalg.norm(later.position_m - earlier.position_m[old], axis=1)
     speed = np.linalg.norm(later.velocity_m_s, axis=1) + np.linalg.norm(earlier.velocity_m_s[old], axis=1)
     reach = np.where(later.roster.static, DRIVEN_SPEED_M_S, 1.5 * speed) * dt_s + JUMP_FLOOR_M

@@ -36,10 +36,10 @@ def body_argument(args: tuple[Any, ...], kwargs: dict[str, Any]) -> int:
     return int(next(kwargs[name] for name in BODY_KEYWORDS if name in kwargs))
 
 
-def install(world: Watcher, before: Callable[[], None], after: Callable[[], None]) -> Callable[[], None]:
-    """Hook the world's client; a function that restores it. Raises SceneError where the client is no BulletClient instance."""
+def install(world: Watcher, before: Callable[[], object], after: Callable[[], object]) -> Callable[[], None]:
+    """Hook the world's client; a function that restores it. Raises SceneError where the client is no instance of a wrapper."""
     client, client_id = world.client, world.client_id
-    if not hasattr(client, "__dict__") or isinstance(client, type(pybullet)):
+    if isinstance(client, (int, type(pybullet))):
         raise SceneError(
             "the pybullet module itself cannot be hooked", "call listener.step() after each stepSimulation, or use pybullet_utils.bullet_client.BulletClient"
         )

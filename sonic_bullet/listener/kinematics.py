@@ -17,7 +17,7 @@ from sonic_bullet.records import Array
 
 
 @njit(cache=True, fastmath=False, nogil=True, inline="always")  # type: ignore[untyped-decorator]
-def turn(qx: float, qy: float, qz: float, qw: float, x: float, y: float, z: float) -> tuple[float, float, float]:
+def turn(qx: float, qy: float, qz: float, qw: float, x: float, y: float, z: float) -> tuple[float, float, float]:  # noqa: PLR0917
     """Rotate (x, y, z) by a unit quaternion: v + 2 w (q × v) + 2 q × (q × v)."""
     cx, cy, cz = 2 * (qy * z - qz * y), 2 * (qz * x - qx * z), 2 * (qx * y - qy * x)
     return x + qw * cx + qy * cz - qz * cy, y + qw * cy + qz * cx - qx * cz, z + qw * cz + qx * cy - qy * cx
@@ -34,7 +34,7 @@ def into_frame(point: Array, position: Array, quaternion: Array) -> Array:
 
 
 @njit(cache=True, fastmath=False, nogil=True)  # type: ignore[untyped-decorator]
-def relative_motion(
+def relative_motion(  # noqa: PLR0917
     point_a: Array, point_b: Array, normal: Array, position: Array, velocity: Array, spin: Array, row_a: Array, row_b: Array
 ) -> tuple[Array, Array]:
     """slip (k, 3) and approach (k,) in m/s at points (k, 3); bodies' position, velocity, spin (n, 3) are looked up by row (k,)."""

@@ -44,6 +44,10 @@ class Touches:
         """Only the rows where mask (k,) is True."""
         return Touches(*(getattr(self, name)[mask] for name in self.__slots__))
 
+    def equals(self, other: Touches) -> bool:
+        """Whether every number is the same, bit for bit."""
+        return len(self) == len(other) and all(np.array_equal(getattr(self, name), getattr(other, name)) for name in self.__slots__)
+
 
 def is_loaded(raw: RawContact) -> bool:
     """Bullet lists neighbours up to 2 cm apart; only those that carry force are contacts. NaN counts as force, to be caught."""

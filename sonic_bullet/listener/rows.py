@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from sonic_bullet.contacts import Contacts
@@ -20,11 +22,12 @@ def awake(touches: Touches, past: Touches | None, motion: Motion) -> Array:
     result = np.ones(len(touches), bool)
     if past is None or not len(touches):
         return result
-    still = ~(motion.velocity_m_s.any(axis=1) | motion.spin_rad_s.any(axis=1))
-    quiet = np.flatnonzero(still[rows_of(motion.roster, touches.code_a)] & still[rows_of(motion.roster, touches.code_b)])
+    still = np.asarray(~(motion.velocity_m_s.any(axis=1) | motion.spin_rad_s.any(axis=1)))
+    still_a, still_b = still[rows_of(motion.roster, touches.code_a)], still[rows_of(motion.roster, touches.code_b)]
+    quiet = np.flatnonzero(still_a & still_b)
     if len(quiet):
         before = set(_fingerprints(past, np.arange(len(past))))
-        result[quiet] = [mark not in before for mark in _fingerprints(touches, quiet)]
+        result[quiet] = np.array([mark not in before for mark in _fingerprints(touches, quiet)])
     return result
 
 
@@ -49,10 +52,20 @@ def slips(touches: Touches, motion: Motion) -> tuple[Array, Array]:
     return slip, approach
 
 
-def contact_rows(
-    touches: Touches, a: Array, b: Array, motion: Motion, slip: Array, approach: Array, time_s: float, traces: tuple[Trace, ...]
-) -> tuple[Contacts, tuple[Trace, ...]]:
-    """Contacts between bodies a, b (k,), and the traces that the next step will look for them in."""
+@dataclass(frozen=True, slots=True, eq=False)
+class Meeting:
+    """Touches (k rows) with who meets, a, b (k,) indices of bodies, and slip (k, 3), approach (k,) in m/s before the step."""
+
+    touches: Touches
+    a: Array
+    b: Array
+    slip_m_s: Array
+    approach_m_s: Array
+
+
+def contact_rows(meeting: Meeting, motion: Motion, time_s: float, traces: tuple[Trace, ...]) -> tuple[Contacts, tuple[Trace, ...]]:
+    """Contacts of a meeting, and the traces that the next step will look for them in."""
+    touches, a, b, slip, approach = meeting.touches, meeting.a, meeting.b, meeting.slip_m_s, meeting.approach_m_s
     if not len(touches):
         none = Contacts.none()
         return none, remembered(traces, Trace(np.zeros(0, np.int64), np.zeros(0), none.point_a_m, none.point_a_m, none.point_a_m))

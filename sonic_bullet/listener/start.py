@@ -37,7 +37,7 @@ def hooked_start(past: Motion | None, now: Motion, by_hand: Iterable[int], dt_s:
     return Start(with_driven_twists(past, now, dt_s), moved, born)
 
 
-def polled_start(past: Motion, now: Motion, touches: Touches, dt_s: float, client_id: int, first: bool) -> Start:
+def polled_start(past: Motion, now: Motion, touches: Touches, dt_s: float, *, client_id: int, first: bool) -> Start:
     """From the motions read after the last step and after this one. What stands still by mass 0 stands where it stands now."""
     roster = now.roster
     old = rows_of(past.roster, roster.code)

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import os
 import tempfile
+from contextlib import suppress
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -27,8 +28,10 @@ from sonic_bullet.records import Array
 
 REMEDY = "set numSubSteps to 0 and a smaller time step instead"
 RECORD = np.dtype(
-    [("mark", "<u2"), ("step", "<u4"), ("time", "<f4"), ("flag", "<i4"), ("body", "<i4", 2), ("link", "<i4", 2)]
-    + [("point_a", "<f4", 3), ("point_b", "<f4", 3), ("normal", "<f4", 3), ("gap", "<f4"), ("force", "<f4")]
+    {
+        "names": ["mark", "step", "time", "flag", "body", "link", "point_a", "point_b", "normal", "gap", "force"],
+        "formats": ["<u2", "<u4", "<f4", "<i4", ("<i4", 2), ("<i4", 2), ("<f4", 3), ("<f4", 3), ("<f4", 3), "<f4", "<f4"],
+    }
 )
 MARK = 0xBBAA
 LETTERS = b"IfIiiiifffffffffff"
@@ -64,10 +67,8 @@ class SubstepLog:
     def close(self) -> None:
         """Stop logging and remove the file; harmless when nothing is open."""
         if self.handle >= 0:
-            try:
+            with suppress(pybullet.error):  # the client may have gone and taken the log with it
                 pybullet.stopStateLogging(self.handle, physicsClientId=self.client_id)
-            except pybullet.error:
-                pass  # the client has gone and took the log with it
         self.abandon()
 
     def abandon(self) -> None:

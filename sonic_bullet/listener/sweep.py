@@ -38,7 +38,7 @@ class Trace:
 
 
 @njit(cache=True, fastmath=False, nogil=True)  # type: ignore[untyped-decorator]
-def match(
+def match(  # noqa: PLR0912, PLR0917
     traces: tuple[Array, Array, Array, Array, Array],
     starts: Array,
     pair: Array,

@@ -12,20 +12,20 @@ inside another, for then the position correction leaks into the impulse.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pybullet
 
-from sonic_bullet.contacts import Step
+from sonic_bullet.contacts import Contacts, Step
 from sonic_bullet.errors import SceneError
 from sonic_bullet.listener import bodies as facts
 from sonic_bullet.listener import hooks, shapes
-from sonic_bullet.listener.frames import LINK_SPAN, Motion, Roster, check_connected, decode, encode, jumped, read_motion, read_roster, rows_of
+from sonic_bullet.listener.frames import LINK_SPAN, Motion, Roster, check_connected, decode, encode, jumped, read_motion, read_roster, rows_of, same_motion
 from sonic_bullet.listener.polling import Touches, gather, is_loaded
-from sonic_bullet.listener.rows import awake, contact_rows, counted, slips
+from sonic_bullet.listener.rows import Meeting, awake, contact_rows, counted, slips
 from sonic_bullet.listener.start import Start, hooked_start, polled_start, taken
 from sonic_bullet.listener.substeps import SubstepLog, gather_substeps
 from sonic_bullet.listener.sweep import Trace
@@ -40,6 +40,7 @@ class World:
         self.client_id = client_id
         self.epoch = 0
         self.step_count = 0
+        self.stepped = False
         self._bodies: list[Body] = []
         self._live: dict[int, int] = {}
         self._live_table: tuple[Array, Array] | None = None
@@ -52,7 +53,7 @@ class World:
         self._moved: set[int] = set()
         self._traces: tuple[Trace, ...] = ()
         self._log = SubstepLog(client_id)
-        self._unhook: Callable[[], None] | None = None
+        self._uninstall: Callable[[], None] | None = None
         if self._step_length()[1] > 1:
             self._log.open()
         self._past: Motion = self._read()
@@ -70,15 +71,18 @@ class World:
         self,
         body: int,
         link: int = -1,
+        *,
         material: Material | None = None,
         model: ModalModel | None = None,
         volume_m3: float | None = None,
+        shapes: Sequence[Shape] = (),
         name: str | None = None,
     ) -> Body:
         """Make a link known, with what it is made of; its record, which `bodies` holds from now on.
 
         A record that exists already (a silent partner, or an earlier add) ends with this step and a new one begins.
-        volume_m3 None: the model's volume, or 0. Raises SceneError for an unknown body or link, or a mass that is not one.
+        volume_m3 None: the model's volume, or 0. shapes: its true geometry where that is not its collision shape; a lone sphere
+        tells its curvature. Raises SceneError for an unknown body or link, or a mass that is not one.
         """
         check_connected(self.client_id)
         facts.check_exists(self.client_id, body, link)
@@ -86,6 +90,9 @@ class World:
         record = facts.describe(self.client_id, body, link, self.epoch)
         volume = volume_m3 if volume_m3 is not None else (model.volume_m3 if model else 0.0)
         record = replace(record, material=material, model=model, volume_m3=volume, since_step=self.step_count, name=name or record.name)
+        if shapes:
+            alone = shapes[0] if len(shapes) == 1 and shapes[0].kind == "sphere" else None
+            record = replace(record, curvature_per_m=1 / float(alone.size_m[0]) if alone is not None else float("nan"))
         self._close([int(encode(body, link))])
         self._append(int(encode(body, link)), record)
         return record
@@ -119,16 +126,20 @@ class World:
         """Note that masses may have changed: who is static is read again."""
         self._roster = None
 
-    def hook(self, before: Callable[[], None], after: Callable[[], None]) -> None:
-        """Call `before` and `after` round every stepSimulation of a BulletClient. Raises SceneError for what has no instance to hook."""
+    def hook(self, before: Callable[[], object], after: Callable[[], object]) -> None:
+        """Call `before` and `after` round every stepSimulation of a BulletClient; `before` is, or calls, `before_step`.
+
+        Raises SceneError for the pybullet module or a client id: they have no instance to hook.
+        """
         self.unhook()
-        self._unhook = hooks.install(self, before, after)
+        self._uninstall = hooks.install(self, before, after)
 
     def unhook(self) -> None:
         """Leave the client as it was and end the sub-step log; harmless when not hooked."""
-        if self._unhook is not None:
-            self._unhook()
-            self._unhook = None
+        if self._uninstall is not None:
+            self._uninstall()
+            self._uninstall = None
+        self._before = None
         self._log.close()
 
     def before_step(self) -> None:
@@ -140,37 +151,46 @@ class World:
     def after_step(self) -> Step:
         """This step's record. Call once after each stepSimulation; a second call without a step between finds no contacts.
 
-        Raises SceneError: lost connection, numbers that are none, sub-steps that cannot be heard.
+        `stepped` tells whether there was a step. Without a hook, a missing one is known by a world in motion that stands where it
+        stood, to the bit. Raises SceneError: lost connection, numbers that are none, sub-steps that cannot be heard.
         """
         dt, substeps = self._step_length()
+        self.stepped = self._uninstall is None or self._before is not None
+        if not self.stepped:
+            return self._again(dt)
         touches = self._touches(dt, substeps)
-        hooked = self._before is not None
-        now = self._before if self._before is not None else self._read()
-        first = self.step_count == 0
-        if hooked:
+        first, past_touches = self.step_count == 0, self._past_touches
+        if self._before is not None:
+            now = self._before
             start = hooked_start(None if first else self._past, now, self._moved, dt)
         else:
+            now = self._read()
+            frozen = not first and same_motion(self._past, now)
+            if frozen and now.moves and past_touches is not None and touches.equals(past_touches):
+                self.stepped = False
+                return self._again(dt)
             self._expose_impostors(now, dt)
-            start = polled_start(self._past, now, touches, dt, self.client_id, first)
-        past_touches, self._past_touches = self._past_touches, touches
-        if not hooked and not first and _same(self._past, now) and past_touches is not None and _same_touches(past_touches, touches):
-            touches = touches.kept(np.zeros(len(touches), bool))
+            start = polled_start(self._past, now, touches, dt, client_id=self.client_id, first=first)
+        self._past_touches, self._past, self._before = touches, now, None
         if (rows_of(now.roster, touches.code_a) < 0).any() or (rows_of(now.roster, touches.code_b) < 0).any():
             raise SceneError("a contact names a body that is not in the world", "step the simulation once before listening on")
         touches = touches.kept(awake(touches, past_touches, start.motion))
         slip, approach = slips(touches, start.motion)
         keep = counted(touches, start, approach, dt)
         touches = touches.kept(keep)
-        a, b = self._indices(touches.code_a), self._indices(touches.code_b)
-        contacts, self._traces = contact_rows(touches, a, b, start.motion, slip[keep], approach[keep], self._time_s, self._traces)
+        meeting = Meeting(touches, self._indices(touches.code_a), self._indices(touches.code_b), slip[keep], approach[keep])
+        contacts, self._traces = contact_rows(meeting, start.motion, self._time_s, self._traces)
         step = self._step(dt, start, contacts)
-        self._past, self._before = now, None
         self._moved.clear()
         self._time_s += dt
         self.step_count += 1
         return step
 
-    def _step(self, dt: float, start: Start, contacts: Any) -> Step:
+    def _again(self, dt: float) -> Step:
+        """A step in which nothing happens."""
+        return Step(dt, self._position_m, self._quaternion_xyzw, np.zeros(len(self._bodies), bool), Contacts.none())
+
+    def _step(self, dt: float, start: Start, contacts: Contacts) -> Step:
         codes, indices = self._table()
         row = rows_of(start.motion.roster, codes)
         here = row >= 0
@@ -204,18 +224,21 @@ class World:
         settings = self._ask(pybullet.getPhysicsEngineParameters)
         return settings["fixedTimeStep"], max(1, settings["numSubSteps"])
 
-    def _read(self) -> Motion:
-        """Poses now; who is in the world is read anew where bodies have come or gone."""
+    def _known_roster(self) -> Roster:
         if self._roster is None or len(self._roster.bodies) != self._ask(pybullet.getNumBodies):
             self._roster = read_roster(self.client_id)
             self._bury()
+        return self._roster
+
+    def _read(self) -> Motion:
+        """Poses now; who is in the world is read anew where bodies have come or gone."""
+        roster = self._known_roster()
         try:
-            return read_motion(self.client_id, self._roster)
+            return read_motion(self.client_id, roster)
         except pybullet.error:
             check_connected(self.client_id)
-            self._roster = read_roster(self.client_id)
-            self._bury()
-            return read_motion(self.client_id, self._roster)
+            self._roster = None
+            return read_motion(self.client_id, self._known_roster())
 
     def _bury(self) -> None:
         """Close the records of bodies that have gone without a hook seeing it."""
@@ -273,16 +296,8 @@ class World:
         self._live_table = None
 
 
-def _same(first: Motion, second: Motion) -> bool:
-    return first.roster.bodies == second.roster.bodies and all(np.array_equal(a, b) for a, b in zip(first.table, second.table, strict=True))
-
-
-def _same_touches(first: Touches, second: Touches) -> bool:
-    return len(first) == len(second) and all(np.array_equal(getattr(first, name), getattr(second, name)) for name in Touches.__slots__)
-
-
-def open_world(client: Any) -> World:
-    """Listen to a BulletClient, the pybullet module (its client 0) or a client id. Raises SceneError where nothing is connected there."""
+def client_id_of(client: Any) -> int:
+    """The client id of a BulletClient, the pybullet module (its default client 0) or an id. Raises SceneError where nothing is connected."""
     if client is pybullet:
         client_id = 0
     elif isinstance(client, int) and not isinstance(client, bool):
@@ -292,4 +307,9 @@ def open_world(client: Any) -> World:
     else:
         raise SceneError(f"{type(client).__name__} is no PyBullet client", "pass a BulletClient, the pybullet module or a client id")
     check_connected(client_id)
-    return World(client, client_id)
+    return client_id
+
+
+def open_world(client: Any) -> World:
+    """Listen to a BulletClient, the pybullet module (its client 0) or a client id. Raises SceneError where nothing is connected there."""
+    return World(client, client_id_of(client))

@@ -1,0 +1,89 @@
+"""The mesh file behind a collision shape, in its own frame and unit. OBJ is read here, the way Bullet cuts it into objects."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from sonic_bullet.errors import MeshError
+from sonic_bullet.geometry import welded
+from sonic_bullet.records import Array
+
+Surface = tuple[Array, Array]
+
+
+def read_surfaces(path: Path) -> list[Surface]:
+    """Objects of a mesh file: (vertices (v, 3), faces (f, 3)) each, identical vertices made one. Raises MeshError."""
+    try:
+        surfaces = _read_obj(path) if path.suffix.lower() == ".obj" else _read_other(path)
+    except MeshError:
+        raise
+    except Exception as error:  # a parser meets anything in a foreign file, and throws anything
+        raise MeshError(f"mesh file '{path.name}' cannot be read: {type(error).__name__} {error}"[:300], "repair it, or convert it to OBJ or STL") from error
+    whole = [welded(vertex, face) for vertex, face in surfaces if len(face)]
+    whole = [(vertex, face) for vertex, face in whole if len(face) and np.isfinite(vertex).all()]
+    if not whole:
+        raise MeshError(f"mesh file '{path.name}' holds no triangle", "export it again")
+    return whole
+
+
+def _read_obj(path: Path) -> list[Surface]:
+    """Wavefront OBJ: v, f, and o or g as the start of an object; polygons become fans, texture and normals are skipped."""
+    vertex: list[tuple[float, float, float]] = []
+    objects: list[list[tuple[int, int, int]]] = [[]]
+    with path.open(encoding="utf-8", errors="replace") as file:
+        for line in file:
+            words = line.split()
+            if not words:
+                continue
+            if words[0] == "v":
+                vertex.append((float(words[1]), float(words[2]), float(words[3])))
+            elif words[0] == "f":
+                corner = [int(word.split("/", 1)[0]) for word in words[1:]]
+                corner = [c - 1 if c > 0 else len(vertex) + c for c in corner]
+                objects[-1].extend((corner[0], corner[i], corner[i + 1]) for i in range(1, len(corner) - 1))
+            elif words[0] in ("o", "g") and objects[-1]:
+                objects.append([])
+    points = np.array(vertex, float).reshape(-1, 3)
+    return [(points[np.unique(faces)], np.searchsorted(np.unique(faces), faces)) for faces in map(np.array, objects) if len(faces)]
+
+
+def _read_other(path: Path) -> list[Surface]:
+    import trimesh
+
+    scene = trimesh.load_scene(path, process=False, skip_materials=True)
+    return [(np.asarray(part.vertices, float), np.asarray(part.faces)) for part in scene.dump() if isinstance(part, trimesh.Trimesh)]
+
+
+def joined(surfaces: list[Surface]) -> Surface:
+    """All surfaces as one: (v, 3), (f, 3)."""
+    offset = np.cumsum([0] + [len(vertex) for vertex, _ in surfaces])
+    return np.concatenate([v for v, _ in surfaces]), np.concatenate([f + o for (_, f), o in zip(surfaces, offset, strict=False)])
+
+
+def hull(vertex_m: Array) -> Surface:
+    """Convex hull of points (v, 3), faces outward. Raises MeshError where they lie in a plane."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    try:
+        shell = ConvexHull(vertex_m)
+    except (QhullError, ValueError) as error:
+        raise MeshError("a collision mesh is flat or empty", "give it thickness, or pass mesh=") from error
+    face = shell.simplices.copy()
+    a, b, c = (vertex_m[face[:, k]] for k in range(3))
+    inward = (np.cross(b - a, c - a) * shell.equations[:, :3]).sum(axis=1) < 0
+    face[inward] = face[inward][:, ::-1]
+    used = np.unique(face)
+    return vertex_m[used], np.searchsorted(used, face)
+
+
+def hull_depth_m(vertex_m: Array) -> float:
+    """How far the surface's innermost vertex lies below its convex hull: 0 for a convex surface."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    try:
+        plane = ConvexHull(vertex_m).equations
+    except (QhullError, ValueError):
+        return 0.0
+    return max(float(-(plane[:, :3] @ block.T + plane[:, 3:]).max(axis=0).min()) for block in np.array_split(vertex_m, 1 + len(vertex_m) // 4096))
