@@ -116,10 +116,10 @@ def sweep(swept, speed, x, key, height0, height1, sr, rate):  # type: ignore[no-
         curve[i, 0], curve[i, 1], curve[i, 2] = 0.5 * (c - a), a - 2.0 * b + c, 0.5 * (d - 3.0 * c + 3.0 * b - a)
         a, b, c, d = now1[i] - a, now1[i + 1] - b, now1[i + 2] - c, now1[i + 3] - d
         curve[i, 3], curve[i, 4], curve[i, 5] = 0.5 * (c - a), a - 2.0 * b + c, 0.5 * (d - 3.0 * c + 3.0 * b - a)
-    begin = np.float64(first[finest] + 1)
+    begin = first[finest] + 1
     for i in range(n):
         u = where[i] * inverse
-        cell = np.floor(u)
+        cell = np.int64(u)  # places are never negative
         t, share, at = u - cell, x[i], np.uint64(cell - begin)
         slope = curve[at, 0] + curve[at, 3] * share + t * (curve[at, 1] + curve[at, 4] * share + t * (curve[at, 2] + curve[at, 5] * share))
         rate[i] += slope * inverse * pace[i]

@@ -20,7 +20,7 @@ p pairs, sides 0 = a and 1 = b, n samples.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import Field, dataclass, field, fields
 
 import numba
 import numpy as np
@@ -40,6 +40,7 @@ class SurfacePairs:
 
     mass_kg: m*. modulus_pa: E*, finite. radius_m: R*, finite (`contact_radius_m`). damping_ratio: ζ (`damping_ratio`).
     roughness_m, hurst (p, 2): of either surface, see profile.py. seed (p, 2): of either surface's profile.
+    height_m (p, 2, octaves): follows from roughness and Hurst exponent.
     """
 
     mass_kg: Array
@@ -49,23 +50,29 @@ class SurfacePairs:
     roughness_m: Array
     hurst: Array
     seed: Array
+    height_m: Array = field(init=False)
 
     def __post_init__(self) -> None:
         p = len(np.atleast_1d(self.mass_kg))
-        for x in fields(self):
+        for x in _given(self):
             shape = (p, 2) if x.name in ("roughness_m", "hurst", "seed") else (p,)
             object.__setattr__(self, x.name, frozen_array(getattr(self, x.name), np.int64 if x.name == "seed" else float, shape, f"surface {x.name}"))
+        object.__setattr__(self, "height_m", octave_heights(self.roughness_m, self.hurst))
 
     def __len__(self) -> int:
         return len(self.mass_kg)
 
     def take(self, rows: Array) -> SurfacePairs:
         """The pairs ``rows``, in that order."""
-        return SurfacePairs(**{x.name: getattr(self, x.name)[rows] for x in fields(self)})
+        return SurfacePairs(**{x.name: getattr(self, x.name)[rows] for x in _given(self)})
 
     def append(self, other: SurfacePairs) -> SurfacePairs:
         """These pairs, then the other's."""
-        return SurfacePairs(**{x.name: np.concatenate([getattr(self, x.name), getattr(other, x.name)]) for x in fields(self)})
+        return SurfacePairs(**{x.name: np.concatenate([getattr(self, x.name), getattr(other, x.name)]) for x in _given(self)})
+
+
+def _given(pairs: SurfacePairs) -> list[Field[Array]]:
+    return [x for x in fields(pairs) if x.init]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -119,7 +126,7 @@ def damping_ratio(restitution: Array) -> Array:
     """ζ (p,) of the linear oscillator that rebounds with this coefficient of restitution: -ln e/√(π² + ln² e), within 0.25 … 1.
 
     The floor is a model's choice: a rolling contact also sends waves into both bodies, which restitution of whole-body impacts
-    (e = 0.95 would ring ten times) does not tell. Below it the level laws of rough, stiff, fast pairs bend (see benchmarks/surface_law.py).
+    (e = 0.95 would ring ten times) does not tell. Below it the level laws of rough, stiff, fast pairs bend (benchmarks/surface_law.py).
     """
     log = np.log(np.clip(np.asarray(restitution, float), 1e-9, 1))
     return np.asarray(np.clip(-log / np.sqrt(np.pi**2 + log**2), 0.25, 1))
@@ -157,7 +164,7 @@ def advance(pairs: SurfacePairs, state: SurfaceState, start: SurfaceLoads, end: 
         steps[rows] = substeps
         damping = 2 * pairs.damping_ratio[rows] * np.sqrt(mass * 1.5 * k ** (2 / 3)) * np.maximum(load, 1e-3 * 9.81 * mass) ** (-5 / 6)
         radius = np.cbrt(0.75 * load * pairs.radius_m[rows] / pairs.modulus_pa[rows])
-        height = octave_heights(pairs.roughness_m[rows], pairs.hurst[rows]) * octave_gains(speed, radius[..., None], sr)
+        height = pairs.height_m[rows] * octave_gains(speed, radius[..., None], sr)
         rate = _rates(swept, rows, speed, x, pairs.seed, height, float(sr))
         fresh = change == 0  # a new contact already moves with what it rolls over
         lift[rows[fresh]] = rate[fresh, 0] * (h / limit)[fresh]
@@ -212,10 +219,8 @@ def _oscillate(depth, lift, rows, g, rate, rate_unit, force_unit, rest, damping,
         z[r], u[r] = depth[rows[r]], lift[rows[r]]
     for i in range(len(x)):
         for r in range(pairs):
-            dh[r], total[r] = rate[g[r], i] * rate_unit[g[r]], 0.0
-            d0[r], c[r] = rest[0, r] + rest[1, r] * x[i], damping[0, r] + damping[1, r] * x[i]
-            low = min(d0[r], 1.0)
-            load[r] = low * np.sqrt(low) + 1.5 * (d0[r] - low)
+            dh[r] = rate[g[r], i] * rate_unit[g[r]]
+        _rest(d0, c, load, total, rest, damping, x[i])
         for _ in range(substeps):
             _substep(z, u, dh, d0, c, load, total)
         for r in range(pairs):
@@ -224,6 +229,16 @@ def _oscillate(depth, lift, rows, g, rate, rate_unit, force_unit, rest, damping,
             out[rows[r], i] = total[r] * share * force_unit[g[r]]
     for r in range(pairs):
         depth[rows[r]], lift[rows[r]] = z[r], u[r]
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _rest(d0, c, load, total, rest, damping, share):  # type: ignore[no-untyped-def]
+    """Resting penetration, damping and load of all pairs (r,) at this share of the step."""
+    for r in range(len(d0)):
+        d0[r], c[r], total[r] = rest[0, r] + rest[1, r] * share, damping[0, r] + damping[1, r] * share, 0.0
+    for r in range(len(d0)):
+        low = min(d0[r], 1.0)
+        load[r] = low * np.sqrt(low) + 1.5 * (d0[r] - low)
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -64,7 +66,7 @@ def test_hertz_pulse_solves_its_equation() -> None:
     assert np.abs(q + q[::-1] - 1).max() < 1e-12
     assert (np.diff(q) >= 0).all()
     # F = dQ/ds must satisfy energy: with δ' = 1 - 2Q, δ = ∫δ', F ∝ δ^1.5
-    depth = np.cumsum((1 - 2 * (q[1:] + q[:-1]) / 2)) * (s[1] - s[0])
+    depth = np.cumsum(1 - 2 * (q[1:] + q[:-1]) / 2) * (s[1] - s[0])
     force = np.gradient(q, s)[1:]
     middle = slice(100, 400)
     ratio = force[middle] / depth[middle] ** 1.5
@@ -99,7 +101,7 @@ def test_jerk_misses_no_pulse_and_any_split_gives_the_same_bits() -> None:
     whole = np.zeros((3, 3, n))
     pulse.add_jerk(whole, *strikes, sr, 0)
     parts, cut = [], [0, 1, 2, 17, 500, 501, 1300, n]
-    for start, stop in zip(cut[:-1], cut[1:], strict=True):
+    for start, stop in itertools.pairwise(cut):
         part = np.zeros((3, 3, stop - start))
         pulse.add_jerk(part, *strikes, sr, start)
         parts.append(part)
