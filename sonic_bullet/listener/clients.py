@@ -22,9 +22,10 @@ def direct_client() -> BulletClient:
 
 
 def disconnect(client: BulletClient) -> None:
-    """End a client made by `direct_client`; one that has ended already is left alone."""
-    if pybullet.isConnected(client._client):
-        pybullet.disconnect(client._client)
+    """End a client; one that has ended already is left alone. Its id is cleared, for BulletClient's finaliser would end whoever has it next."""
+    client_id, client._client = client._client, -1
+    if client_id >= 0 and pybullet.isConnected(client_id):
+        pybullet.disconnect(client_id)
 
 
 def links_with_shapes(world: World, body: int | None = None) -> tuple[tuple[int, int], ...]:

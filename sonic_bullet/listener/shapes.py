@@ -139,10 +139,10 @@ def _as_cylinder(piece: tuple[Any, ...], vertices: Array) -> Shape | None:
         return None
     local = (vertices - piece[5]) @ turn_matrix(piece[6])
     radius, half = np.hypot(local[:, 0], local[:, 1]), np.abs(local[:, 2])
-    tolerance = 1e-4 * (radius.max() + half.max())
+    tolerance = 1e-3 * (radius.max() + half.max())
     if np.ptp(radius) > tolerance or np.ptp(half) > tolerance or not half.min() > tolerance:
         return None
-    return Shape("cylinder", np.array([radius.mean(), 2 * half.mean(), 0]), piece[5], piece[6])
+    return Shape("cylinder", np.array([radius.max(), 2 * half.max(), 0]), piece[5], piece[6])
 
 
 def visual_surface(client_id: int, body: int, link: int) -> Surface | None:
