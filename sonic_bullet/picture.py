@@ -31,6 +31,7 @@ WINDOW_S = 0.010
 COLUMNS_MAX = 1600
 DYNAMICS_DB = 90.0
 LANES_MAX = 24
+STRIKES_MAX = 400  # of a lane, the strongest
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -200,10 +201,11 @@ def _draw_events(axis: Any, log: ContactLog, events: Events, lanes: list[int]) -
         for kind, (width, alpha) in looks.items():
             spans = [span for span, owner, which in zip(events.bar_s, events.bar_body, events.bar_kind, strict=True) if owner == body and which == kind]
             axis.hlines([lane] * len(spans), [s[0] for s in spans], [s[1] for s in spans], colors=[colour], linewidth=width, alpha=alpha)
-        mine = events.strike_body == body
+        mine = np.flatnonzero(events.strike_body == body)
+        mine = mine[np.argsort(-events.strike_n_s[mine], kind="stable")[:STRIKES_MAX]]
         axis.scatter(
             events.strike_s[mine],
-            np.full(mine.sum(), lane),
+            np.full(len(mine), lane),
             s=4 + 140 * events.strike_n_s[mine] / max(largest, 1e-300),
             color=[colour],
             marker="|",
@@ -212,7 +214,7 @@ def _draw_events(axis: Any, log: ContactLog, events: Events, lanes: list[int]) -
         )
         axis.scatter(
             events.strike_s[mine],
-            np.full(mine.sum(), lane),
+            np.full(len(mine), lane),
             s=140 * events.strike_n_s[mine] / max(largest, 1e-300),
             facecolors="none",
             edgecolors=[colour],

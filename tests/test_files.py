@@ -5,6 +5,8 @@ from __future__ import annotations
 import io
 import os
 import struct
+import subprocess
+import sys
 import time
 import zipfile
 from pathlib import Path
@@ -161,6 +163,41 @@ def test_an_interrupted_write_leaves_a_valid_partial_file_and_names_it(tmp_path:
     assert "0.010 s" in said
     np.testing.assert_array_equal(files.read_audio(tmp_path / "a.partial.wav")[0], np.full((1, 480), 0.5))
     assert (tmp_path / "a.wav").read_bytes() == b"old"
+
+
+FULL_DISK = """
+import resource, sys, numpy as np
+from sonic_bullet import errors, files
+from sonic_bullet.contacts import ContactLog, Contacts, Step
+sound = np.random.default_rng(0).normal(0, 0.1, (1, 200_000))
+step = Step(0.01, np.zeros((9999, 3)), np.zeros((9999, 4)), np.zeros(9999, bool), Contacts.none())
+log = object.__new__(ContactLog)
+for name, value in {"bodies": (), "steps": (step,), "sensors": (), "sr": 8000, "seed": 0, "air": files.logs.Air()}.items():
+    object.__setattr__(log, name, value)
+resource.setrlimit(resource.RLIMIT_FSIZE, (300_000, 300_000))
+for call in (lambda: files.write_audio("a.wav", sound, 48000), lambda: files.write_audio("b.flac", sound, 48000), lambda: files.write_log("c.npz", log)):
+    try:
+        call()
+    except errors.FileError as error:
+        print(error)
+"""
+
+
+def test_a_full_disk_is_one_error_each_and_no_file_under_its_name(tmp_path: Path) -> None:
+    done = subprocess.run([sys.executable, "-c", FULL_DISK], cwd=tmp_path, check=False, capture_output=True, text=True, timeout=120)
+    assert [line[:18] for line in done.stdout.splitlines()] == ["cannot write a.wav", "cannot write b.fla", "cannot write c.npz"], done.stderr
+    assert set(listing(tmp_path)) <= {"a.partial.wav", "b.partial.flac"}
+
+
+def test_two_writers_of_one_name_do_not_mix(tmp_path: Path) -> None:
+    sounds = [noise(seed) for seed in (1, 2)]
+    first, second = (files.AudioWriter(tmp_path / "a.wav", SR, 2) for _ in sounds)
+    with first, second:
+        for start in range(0, SR, 1000):
+            first.write(sounds[0][:, start : start + 1000])
+            second.write(sounds[1][:, start : start + 1000])
+    assert listing(tmp_path) == ["a.wav"]
+    np.testing.assert_array_equal(files.read_audio(tmp_path / "a.wav")[0], sounds[0].astype(np.float32).astype(float))  # closed last
 
 
 def test_over_four_gibibytes_wav_becomes_rf64_and_a_stream_stops_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

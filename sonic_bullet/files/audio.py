@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 import os
+import secrets
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -104,8 +105,8 @@ def check_audio_output(path: str | os.PathLike[str], subtype: str | None = None)
 class AudioWriter:
     """An audio file that grows block by block; a context manager.
 
-    `write` takes (channels, n) pascals. Leaving the block renames NAME.partial.EXT to NAME.EXT. Leaving it with an error, or with
-    Ctrl-C, closes what was written as a valid file under the partial name and says so in the error; the final name is untouched.
+    `write` takes (channels, n) pascals, into NAME.<random>.partial.EXT; leaving the block renames that to NAME.EXT. Leaving it with an
+    error, or with Ctrl-C, closes what was written as a valid file NAME.partial.EXT and says so in the error; NAME.EXT is untouched.
     gain_per_pa: file units for one pascal. expected_frames: chooses RF64 over WAV where the file will pass 4 GiB.
     """
 
@@ -124,6 +125,7 @@ class AudioWriter:
 
         self.path = os.fspath(path)
         self.target, self.format, self.subtype = check_audio_output(path, subtype)
+        self.temporary = self.target.with_name(f"{self.target.stem}.{secrets.token_hex(4)}.partial{self.target.suffix}")
         self.partial = self.target.with_name(f"{self.target.stem}.partial{self.target.suffix}")
         self.sr, self.channels, self.gain_per_pa = check_sr(sr), channels, float(gain_per_pa)
         if not (math.isfinite(self.gain_per_pa) and self.gain_per_pa > 0):
@@ -134,9 +136,9 @@ class AudioWriter:
         self.frames = self.clipped = self.over = 0
         self.peak_pa = self.energy_pa2 = 0.0
         try:
-            self.file: Any = soundfile.SoundFile(self.partial, "w", self.sr, channels, self.subtype, format=self.format)
+            self.file: Any = soundfile.SoundFile(self.temporary, "w", self.sr, channels, self.subtype, format=self.format)
         except soundfile.LibsndfileError as error:
-            self.partial.unlink(missing_ok=True)
+            self.temporary.unlink(missing_ok=True)
             raise AudioError(f"cannot write {channels} channels at {self.sr} Hz to {path}: {error.error_string}", "write .wav, or fewer channels") from error
 
     @property
@@ -171,8 +173,9 @@ class AudioWriter:
             scaled[np.abs(scaled) < np.finfo(float).tiny] = 0
         try:
             self.file.write(scaled.T)
-        except soundfile.LibsndfileError as error:
-            raise FileError(f"cannot write {self.path}: {error.error_string}", "free space or choose another place") from error
+        except (soundfile.LibsndfileError, AssertionError) as error:  # soundfile asserts that all was written: a full disk
+            reason = getattr(error, "error_string", "the disk took only a part of it")
+            raise FileError(f"cannot write {self.path}: {reason}", "free space or choose another place") from error
         self.frames += block.shape[1]
         if block.size:
             self.peak_pa = max(self.peak_pa, float(np.abs(block).max()))
@@ -189,25 +192,29 @@ class AudioWriter:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        import soundfile
+
         try:
             self.file.close()
             if error is None:
-                _forget_time(self.partial)
-                sync(self.partial)
-                os.replace(self.partial, self.target)
-                return
-        except OSError as failure:
-            raise cannot("write", self.path, failure) from failure
-        if self.frames == 0:
-            self.partial.unlink(missing_ok=True)
+                _forget_time(self.temporary)
+                sync(self.temporary)
+                os.replace(self.temporary, self.target)
+            elif self.frames:
+                os.replace(self.temporary, self.partial)
+        except (OSError, soundfile.LibsndfileError) as failure:
+            reason = failure if isinstance(failure, OSError) else OSError(str(failure))
+            raise cannot("write", self.path, reason) from error or failure
+        finally:
+            self.temporary.unlink(missing_ok=True)
+        if error is None or self.frames == 0:
             return
         saved = f"the first {self.frames / self.sr:.3f} s are in {self.partial}"
         if isinstance(error, SonicBulletError):
             raise type(error)(error.what, f"{error.remedy}; {saved}" if error.remedy else saved) from error
         if isinstance(error, KeyboardInterrupt):
             raise KeyboardInterrupt(f"stopped; {saved}") from error
-        if error is not None:
-            error.add_note(saved)
+        error.add_note(saved)
 
 
 def _forget_time(path: Path) -> None:
