@@ -15,19 +15,20 @@ b bodies, m modes of one body, W weight sets, n samples.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from sonic_bullet.errors import AudioError
 from sonic_bullet.records import Array
 from sonic_bullet.synth import bank_kernel
-from sonic_bullet.synth.tile import BLOCK, LANES
+from sonic_bullet.synth.pending import Pending, Strike, flushed, padded_gain, with_strikes, without
+from sonic_bullet.synth.tile import BLOCK
+from sonic_bullet.synth.vector import LANES
 
 FLOOR = 1e-15
 """Modes with |z| below this (in √J·√2) are set to zero: ½|z|² = 5e-31 J is 1e-10 of the mode's thermal energy kT at 300 K."""
 
-LONGEST_SPACING = 16.0
 FASTEST_DECAY_PER_SAMPLE = 2.0
 SLOWEST_TURN = 1e-3
 
@@ -39,21 +40,6 @@ class ModeSet:
     omega_rad_s: Array
     decay_per_s: Array
     weight: Array
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Strike:
-    """A finite force pulse on one body: impulses at equidistant times, one participation vector.
-
-    start: absolute time of the first node in samples (any fraction). spacing: of the nodes, in samples (0 … 16).
-    impulse_n_s (k,): impulse of each node. gain (m,): φᵀf̂ of the body's modes in 1/√kg.
-    """
-
-    body: int
-    start: float
-    spacing: float
-    impulse_n_s: Array
-    gain: Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -97,30 +83,6 @@ class Bank:
 
 
 @dataclass(slots=True, eq=False)
-class Pending:
-    """Strikes under way, sorted by body and start: scalars of each, and flat rows (8, m) of its phasors (`bank_kernel.strike_rows`)."""
-
-    body: Array
-    start: Array
-    count: Array
-    whole: Array
-    delta: Array
-    phase: Array
-    upcoming: Array
-    first: Array
-    impulse: Array
-    impulse_at: Array
-    rows: Array
-    rows_at: Array
-
-    @classmethod
-    def none(cls) -> Pending:
-        floats, ints = np.zeros(0), np.zeros(0, np.int64)
-        empty = {"start": floats, "delta": floats, "phase": floats, "impulse": floats, "rows": floats}
-        return cls(**{field.name: empty.get(field.name, ints).copy() for field in fields(cls)})
-
-
-@dataclass(slots=True, eq=False)
 class BankState:
     """What the bank remembers. at: the next sample. z, driven (2·modes,): free state at the next block's start, and what was driven since
     this block's. sound (W, b, 256): the block's free ringing. ringing, is_driven, tiled (b,): what of it is in use. pending: strikes under way.
@@ -137,9 +99,8 @@ class BankState:
 
     def copy(self) -> BankState:
         """A state of its own: advancing one leaves the other."""
-        pending = Pending(*(getattr(self.pending, field.name).copy() for field in fields(Pending)))
         arrays = {name: getattr(self, name).copy() for name in ("z", "driven", "sound", "ringing", "is_driven", "tiled")}
-        return BankState(at=self.at, pending=pending, **arrays)
+        return BankState(at=self.at, pending=self.pending.copy(), **arrays)
 
 
 def audible(omega_rad_s: Array, decay_per_s: Array, sr: int) -> Array:
@@ -187,7 +148,7 @@ def append(bank: Bank, state: BankState, bodies: Sequence[ModeSet]) -> tuple[Ban
         omega, decay = np.concatenate([x.omega_rad_s for x in bodies]), np.concatenate([x.decay_per_s for x in bodies])
         step = (-decay + 1j * omega) / bank.sr
         s[place], pole[place], block[place], quadrature[place] = step, np.exp(step), np.exp(BLOCK * step), decay / omega
-        weight[:, place] = _flushed(np.concatenate([x.weight for x in bodies], axis=1))
+        weight[:, place] = flushed(np.concatenate([x.weight for x in bodies], axis=1))
     heard = np.array([[bool(np.any(x.weight[w])) for x in bodies] for w in range(sets)], bool).reshape(sets, len(bodies))
     grown = Bank(
         bank.sr,
@@ -228,7 +189,7 @@ def advance(bank: Bank, state: BankState, n: int, strikes: Sequence[Strike] = ()
     """
     if n < 0 or len(state.ringing) != bank.body_count or len(state.z) != 2 * len(bank.quadrature):
         raise AudioError(f"{n} samples for a state of {len(state.ringing)} bodies and a bank of {bank.body_count}", "advance the state that `append` returned")
-    pending = _with_strikes(bank, state, strikes)
+    pending = with_strikes(state.pending, strikes, state.at, bank.offset, bank.count, bank.log_pole, bank.quadrature)
     force_of, force, gain0, gain1, gain_at = _flat_forces(bank, n, forces)
     along = np.zeros(n) if progress is None else np.ascontiguousarray(progress, float)
     if along.shape != (n,) or not np.isfinite(along).all():
@@ -239,80 +200,18 @@ def advance(bank: Bank, state: BankState, n: int, strikes: Sequence[Strike] = ()
         state.at, out, bank.offset, bank.pole, bank.block, bank.quadrature, bank.weight, bank.heard,
         state.z, state.driven, state.sound, state.ringing, state.is_driven, state.tiled, FLOOR**2,
         np.searchsorted(pending.body, np.arange(bank.body_count + 1)), pending.count, pending.whole, pending.delta, pending.phase,
-        pending.upcoming, pending.first, pending.impulse, pending.impulse_at, pending.rows, pending.rows_at, done,
+        pending.upcoming, pending.first, pending.impulse, pending.impulse_at, pending.rows.reshape(-1), pending.rows_at, done,
         force_of, force, gain0, gain1, gain_at, along, 1.0 / bank.sr,
     )  # fmt: skip
     state.at += n
-    state.pending = _selected(pending, np.flatnonzero(~done), bank) if done.any() else pending
+    state.pending = without(pending, done, bank.offset)
     return out
-
-
-def _flushed(values: Array) -> Array:
-    """Values with what lies below 1e-30 set to zero: no product of theirs becomes subnormal."""
-    return np.asarray(np.where(np.abs(values) < bank_kernel.FLUSH, 0, values))
 
 
 def _joined(flat: Array, more: Array) -> Array:
     """A flat array, real parts first, with the complex values ``more`` behind it."""
     half = len(flat) // 2
     return np.concatenate([flat[:half], more.real, flat[half:], more.imag])
-
-
-def _padded_gain(bank: Bank, body: int, gain: Array, what: str) -> Array:
-    if not 0 <= body < bank.body_count:
-        raise AudioError(f"a {what} on body {body} of {bank.body_count}", "append the body first")
-    m = int(bank.count[body])
-    if np.shape(gain) != (m,) or not np.isfinite(gain).all():
-        raise AudioError(f"a {what} on body {body}: gain of shape {np.shape(gain)}", f"give {m} finite numbers")
-    out = np.zeros(int(bank.offset[body + 1] - bank.offset[body]))
-    out[:m] = _flushed(gain)
-    return out
-
-
-def _with_strikes(bank: Bank, state: BankState, strikes: Sequence[Strike]) -> Pending:
-    """The strikes under way and the new ones, sorted by body and start."""
-    if not strikes:
-        return state.pending
-    old = state.pending
-    parts: dict[str, list[Array]] = {field.name: [getattr(old, field.name)] for field in fields(Pending)}
-    impulse_at, rows_at = len(old.impulse), len(old.rows)
-    modes = len(bank.quadrature)
-    for strike in strikes:
-        gain = _padded_gain(bank, strike.body, strike.gain, "strike")
-        impulse = _flushed(np.asarray(strike.impulse_n_s, float))
-        count = len(impulse)
-        delta = float(strike.spacing) if count > 1 else 1.0
-        if impulse.ndim != 1 or count == 0 or not (np.isfinite(impulse).all() and np.isfinite(strike.start) and 0 < delta <= LONGEST_SPACING):
-            raise AudioError(f"a strike on body {strike.body} of {count} nodes, {strike.spacing} samples apart, at {strike.start}", "give finite impulses less than 16 samples apart")
-        first = int(np.ceil(strike.start))
-        if first < state.at:
-            raise AudioError(f"a strike at sample {strike.start:.2f}, but {state.at} samples have sounded", "pass strikes before their time has sounded")
-        within = int(np.floor((first - strike.start) / delta))
-        phase, whole = max((first - strike.start) - within * delta, 0.0), int(np.floor(1.0 / delta))
-        rows = np.empty((8, len(gain)))
-        bank_kernel.strike_rows(bank.log_pole, bank.quadrature, gain, modes, int(bank.offset[strike.body]), delta, phase, whole, rows)
-        new = dict(body=strike.body, start=strike.start, count=count, whole=whole, delta=delta, phase=phase, upcoming=within + 1, first=first, impulse_at=impulse_at, rows_at=rows_at)
-        for name, value in new.items():
-            parts[name].append(np.array([value]))
-        parts["impulse"].append(impulse)
-        parts["rows"].append(rows.ravel())
-        impulse_at += count
-        rows_at += rows.size
-    joined = Pending(**{name: np.concatenate(values) for name, values in parts.items()})
-    return _selected(joined, np.lexsort((joined.start, joined.body)), bank)
-
-
-def _selected(pending: Pending, order: Array, bank: Bank) -> Pending:
-    """The strikes ``order``, in that order, without the flat parts of the others."""
-    out = Pending(**{field.name: getattr(pending, field.name) for field in fields(Pending)})
-    for name in ("body", "start", "count", "whole", "delta", "phase", "upcoming", "first"):
-        setattr(out, name, getattr(pending, name)[order])
-    for flat, at, sizes in (("impulse", "impulse_at", out.count), ("rows", "rows_at", 8 * np.diff(bank.offset)[out.body])):
-        starts = getattr(pending, at)[order]
-        values = getattr(pending, flat)
-        setattr(out, flat, np.concatenate([values[a : a + size] for a, size in zip(starts, sizes, strict=True)]) if len(order) else np.zeros(0))
-        setattr(out, at, np.concatenate([[0], np.cumsum(sizes)])[: len(order)].astype(np.int64))
-    return out
 
 
 def _flat_forces(bank: Bank, n: int, forces: Sequence[Force]) -> tuple[Array, Array, Array, Array, Array]:
@@ -324,8 +223,8 @@ def _flat_forces(bank: Bank, n: int, forces: Sequence[Force]) -> tuple[Array, Ar
         if np.shape(force.force_n) != (n,) or not np.isfinite(force.force_n).all():
             raise AudioError(f"a force on body {force.body} of shape {np.shape(force.force_n)}", f"give {n} finite samples")
         signals[i] = force.force_n
-        gain0.append(_padded_gain(bank, force.body, force.gain0, "force"))
-        gain1.append(_padded_gain(bank, force.body, force.gain1, "force"))
+        gain0.append(padded_gain(bank.offset, bank.count, force.body, force.gain0, "force"))
+        gain1.append(padded_gain(bank.offset, bank.count, force.body, force.gain1, "force"))
     body = np.array([force.body for force in ordered], np.int64)
     at = np.concatenate([[0], np.cumsum([len(x) for x in gain0[1:]])])[: len(ordered)].astype(np.int64)
     return np.searchsorted(body, np.arange(bank.body_count + 1)), signals, np.concatenate(gain0), np.concatenate(gain1), at

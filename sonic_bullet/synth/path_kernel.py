@@ -1,0 +1,148 @@
+"""The sound path's compiled loop: what each body emits, delayed by r/c and divided by r, read off by a moving fractional delay.
+
+    emitted at sample m:   a[m] = (s[m] + K n̂·j[m])/r[m],  arriving at m + D[m], D = r sr/c
+    heard at sample n:     a(u), where u + D(u) = n, D linear between samples     (retarded time: Doppler shift is exact)
+    a(u) = Σ_k a[k] h(u - k),  h: 16 taps of a Kaiser-windowed sinc               [Laakso et al. 1996, IEEE SPM 13(1), sec. 3.2]
+
+A line is one body, one place and one microphone. It sleeps until something is emitted and again when the last of it has
+arrived; that is decided sample by sample, so frames do not matter. Taps as polynomials in the fraction [Farrow 1988].
+"""
+
+# mypy: disable-error-code="no-untyped-def"
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numba import njit, types
+from numba.extending import intrinsic
+
+from sonic_bullet.records import Array
+from sonic_bullet.synth.vector import LANES, Emit, constant
+
+TAPS = 16
+AHEAD = TAPS // 2
+LEAST_DELAY = float(AHEAD)
+DEGREE = 9
+KAISER_BETA = 6.0
+FLUSH = 1e-30
+LEAST_ADVANCE = 1.0 / 16.0
+"""Sound emitted one sample later arrives at least this much later: a source at or above the speed of sound is not overtaken by its own sound."""
+
+_HISTORY = 3 * AHEAD
+
+
+@lru_cache(maxsize=1)
+def tap_polynomials() -> Array:
+    """(DEGREE + 1, TAPS): taps as polynomials in t = fraction - ½, lowest power first; tap k weighs sample floor(u) - 7 + k. Fitted to 1e-8."""
+    t = 0.5 * np.cos(np.pi * (np.arange(64) + 0.5) / 64)
+    distance = np.arange(TAPS) - (AHEAD - 1) - (t[:, None] + 0.5)
+    window = np.i0(KAISER_BETA * np.sqrt(np.maximum(0, 1 - (distance / AHEAD) ** 2))) / np.i0(KAISER_BETA)
+    taps = np.sinc(distance) * window
+    taps /= taps.sum(axis=1, keepdims=True)
+    fit = np.linalg.lstsq(np.vander(t, DEGREE + 1, increasing=True), taps, rcond=None)[0]
+    fit.setflags(write=False)
+    return np.asarray(fit)
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def _interpolate(typingctx, ring, at, taps, t):
+    """Σ_k ring[at + k] h_k(t) over the 16 taps."""
+
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        e = Emit(context, builder, signature, args)
+        ring, at, taps, t = e.args
+        fraction = e.spread(t)
+        total = constant(0)
+        for half in range(TAPS // LANES):
+            value = e.load(taps, e.index(DEGREE * TAPS + half * LANES))
+            for power in range(DEGREE - 1, -1, -1):
+                value = e.fma(value, fraction, e.load(taps, e.index(power * TAPS + half * LANES)))
+            total = e.fma(value, e.load(ring, e.shifted(at, half * LANES)), total)
+        return e.total(total)
+
+    return types.float64(ring, at, taps, t), codegen
+
+
+@njit(cache=True, nogil=True)
+def _write(value, delay, sample, ring, base, delays, base_delay, mask):  # pragma: no cover - compiled
+    place = sample & mask
+    ring[base + place] = value
+    if place < TAPS:
+        ring[base + place + mask + 1] = value  # mirrored, so that 16 taps are always contiguous
+    delays[base_delay + place] = delay
+
+
+@njit(cache=True, nogil=True)
+def _listen(line, at, emitted, delay, heard, ring, base, delays, base_delay, mask, awake, cursor, last, taps):  # pragma: no cover - compiled
+    """Run one line over the samples of emitted (n,), adding to heard (n,)."""
+    for i in range(len(emitted)):
+        n = at + i
+        value = emitted[i]
+        new = delay[i]
+        if not awake[line]:
+            if value == 0.0:
+                continue
+            awake[line] = True
+            for k in range(n - _HISTORY, n):
+                _write(0.0, new, k, ring, base, delays, base_delay, mask)
+            cursor[line] = n - AHEAD - 1
+        else:
+            new = max(new, delays[base_delay + ((n - 1) & mask)] - (1.0 - LEAST_ADVANCE))
+        _write(value, new, n, ring, base, delays, base_delay, mask)
+        if value != 0.0:
+            last[line] = n
+        m = cursor[line]
+        if (m - n) + delays[base_delay + (m & mask)] > 0.0:
+            continue
+        while (m + 1 - n) + delays[base_delay + ((m + 1) & mask)] <= 0.0:
+            m += 1
+        cursor[line] = m
+        if m - (AHEAD - 1) > last[line]:
+            awake[line] = False
+            continue
+        here, there = delays[base_delay + (m & mask)], delays[base_delay + ((m + 1) & mask)]
+        fraction = ((n - m) - here) / (1.0 + there - here)
+        heard[i] += _interpolate(ring, base + ((m - (AHEAD - 1)) & mask), taps, fraction - 0.5)
+
+
+@njit(cache=True, nogil=True)
+def _emit(source, jerk, coefficient, radius, from_m, to_m, fade, progress, microphone, samples_per_m, emitted, delay):  # pragma: no cover - compiled
+    """a and D of the module's equations for one body, place and microphone. fade: 0 none, 1 in, -1 out, 2 nothing any more."""
+    for i in range(len(progress)):
+        x = progress[i]
+        d0 = microphone[0] - (from_m[0] + (to_m[0] - from_m[0]) * x)
+        d1 = microphone[1] - (from_m[1] + (to_m[1] - from_m[1]) * x)
+        d2 = microphone[2] - (from_m[2] + (to_m[2] - from_m[2]) * x)
+        r = np.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
+        value = source[i] + coefficient * ((d0 * jerk[0, i] + d1 * jerk[1, i] + d2 * jerk[2, i]) / max(r, 1e-12))
+        if fade == 1:
+            value *= x
+        elif fade == -1:
+            value *= 1.0 - x
+        elif fade == 2:
+            value = 0.0
+        value /= max(r, radius)
+        emitted[i] = value if abs(value) >= FLUSH else 0.0
+        delay[i] = max(r * samples_per_m, LEAST_DELAY)
+
+
+@njit(cache=True, nogil=True)
+def propagate(at, out, source, jerk, coefficient, radius, order, body, from_m, to_m, fade, progress, microphone, samples_per_m,
+              ring, ring_at, delays, delays_at, mask, awake, cursor, last, taps, loud):  # fmt: skip  # pragma: no cover - compiled
+    """Samples at … at + n - 1 into out (c, n), the places summed in ``order``; see path.py for the arrays."""
+    channels, n = out.shape
+    emitted, delay = np.empty(n), np.empty(n)
+    for place in order:
+        b = body[place]
+        for c in range(channels):
+            line = place * channels + c
+            if not awake[line] and (fade[place] == 2 or not loud[b]):
+                continue
+            _emit(source[b], jerk[b], coefficient[b], radius[b], from_m[place], to_m[place], fade[place], progress, microphone[c], samples_per_m, emitted, delay)
+            _listen(line, at, emitted, delay, out[c], ring, ring_at[line], delays, delays_at[line], mask[line], awake, cursor, last, taps)
+    for c in range(channels):
+        for i in range(n):
+            if abs(out[c, i]) < FLUSH:
+                out[c, i] = 0.0

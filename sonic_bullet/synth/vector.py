@@ -1,0 +1,105 @@
+"""Vector instructions for numba kernels, which have no vector type of their own: a thin writer of LLVM's language.
+
+Every multiply-add is stated and every sum has a fixed order: the bits are the same on each call, whatever the caller's loops.
+Vectors are eight doubles (two registers where the machine has narrower ones).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+
+LANES = 8
+
+F64, I64, I32 = ir.DoubleType(), ir.IntType(64), ir.IntType(32)
+VEC = ir.VectorType(F64, LANES)
+BITS = ir.VectorType(ir.IntType(1), LANES)
+
+Value = Any
+Pair = tuple[Value, Value]
+
+
+class Emit:
+    """Writes vector instructions; arguments arrive as data pointers (arrays) or values (scalars)."""
+
+    def __init__(self, context: Any, builder: Any, signature: Any, args: Any) -> None:
+        self.builder = builder
+        self.args = [
+            cgutils.create_struct_proxy(kind)(context, builder, value=arg).data if isinstance(kind, types.Array) else arg
+            for kind, arg in zip(signature.args, args, strict=True)
+        ]
+        self._fma = cgutils.get_or_insert_function(builder.module, ir.FunctionType(VEC, [VEC] * 3), "llvm.fma.v8f64")
+
+    def index(self, value: int) -> Value:
+        return ir.Constant(I64, value)
+
+    def shifted(self, base: Value, offset: int) -> Value:
+        return self.builder.add(base, self.index(offset)) if offset else base
+
+    def _place(self, array: Value, offset: Value) -> Value:
+        return self.builder.bitcast(self.builder.gep(array, [offset]), VEC.as_pointer())
+
+    def load(self, array: Value, offset: Value) -> Value:
+        return self.builder.load(self._place(array, offset), align=8)
+
+    def store(self, value: Value, array: Value, offset: Value) -> None:
+        self.builder.store(value, self._place(array, offset), align=8)
+
+    def spread(self, scalar: Value) -> Value:
+        """The scalar in all lanes."""
+        none = ir.Constant(VEC, ir.Undefined)
+        first = self.builder.insert_element(none, scalar, ir.Constant(I32, 0))
+        return self.builder.shuffle_vector(first, none, ir.Constant(ir.VectorType(I32, LANES), [0] * LANES))
+
+    def broadcast(self, array: Value, offset: Value) -> Value:
+        return self.spread(self.builder.load(self.builder.gep(array, [offset])))
+
+    def fma(self, a: Value, b: Value, c: Value) -> Value:
+        return self.builder.call(self._fma, [a, b, c])
+
+    def product(self, a: Pair, b: Pair) -> Pair:
+        """Complex a·b."""
+        real = self.fma(a[0], b[0], self.builder.fneg(self.builder.fmul(a[1], b[1])))
+        return real, self.fma(a[0], b[1], self.builder.fmul(a[1], b[0]))
+
+    def loop(self, count: Value, step: int, carried: list[Value], body: Any) -> list[Value]:
+        """``for k in range(0, count, step): carried = body(k, carried)``; the last values."""
+        b = self.builder
+        before, inside, after = b.block, b.append_basic_block("each"), b.append_basic_block("after")
+        b.cbranch(b.icmp_signed(">", count, self.index(0)), inside, after)
+        b.position_at_end(inside)
+        k = b.phi(I64)
+        k.add_incoming(self.index(0), before)
+        phis = []
+        for value in carried:
+            phis.append(b.phi(value.type))
+            phis[-1].add_incoming(value, before)
+        new = body(k, phis)
+        following = b.add(k, self.index(step))
+        ends = b.block  # a loop within the body ends in a block of its own
+        k.add_incoming(following, ends)
+        for phi, value in zip(phis, new, strict=True):
+            phi.add_incoming(value, ends)
+        b.cbranch(b.icmp_signed("<", following, count), inside, after)
+        b.position_at_end(after)
+        last = []
+        for first, value in zip(carried, new, strict=True):
+            last.append(b.phi(value.type))
+            last[-1].add_incoming(first, before)
+            last[-1].add_incoming(value, ends)
+        return last
+
+    def total(self, vector: Value) -> Value:
+        """Sum across the lanes, in pairs."""
+        lanes = [self.builder.extract_element(vector, ir.Constant(I32, lane)) for lane in range(LANES)]
+        while len(lanes) > 1:
+            lanes = [self.builder.fadd(lanes[i], lanes[i + 1]) for i in range(0, len(lanes), 2)]
+        return lanes[0]
+
+
+def constant(value: float) -> Value:
+    """The number in all lanes."""
+    return ir.Constant(VEC, [float(value)] * LANES)
