@@ -22,7 +22,7 @@ import numpy as np
 from sonic_bullet.errors import AudioError
 from sonic_bullet.records import Array
 from sonic_bullet.synth import bank_kernel
-from sonic_bullet.synth.pending import Pending, Strike, flushed, padded_gain, with_strikes, without
+from sonic_bullet.synth.pending import Pending, Strike, flushed, padded_gains, with_strikes, without
 from sonic_bullet.synth.tile import BLOCK
 from sonic_bullet.synth.vector import LANES
 
@@ -217,14 +217,13 @@ def _joined(flat: Array, more: Array) -> Array:
 def _flat_forces(bank: Bank, n: int, forces: Sequence[Force]) -> tuple[Array, Array, Array, Array, Array]:
     """Forces sorted by body (stable): segments (b+1,), signals (p, n), flat gains at both ends, and where each begins (p,)."""
     ordered = sorted(forces, key=lambda force: force.body)
-    signals = np.zeros((len(ordered), n))
-    gain0, gain1 = [np.zeros(0)], [np.zeros(0)]
-    for i, force in enumerate(ordered):
-        if np.shape(force.force_n) != (n,) or not np.isfinite(force.force_n).all():
-            raise AudioError(f"a force on body {force.body} of shape {np.shape(force.force_n)}", f"give {n} finite samples")
-        signals[i] = force.force_n
-        gain0.append(padded_gain(bank.offset, bank.count, force.body, force.gain0, "force"))
-        gain1.append(padded_gain(bank.offset, bank.count, force.body, force.gain1, "force"))
-    body = np.array([force.body for force in ordered], np.int64)
-    at = np.concatenate([[0], np.cumsum([len(x) for x in gain0[1:]])])[: len(ordered)].astype(np.int64)
-    return np.searchsorted(body, np.arange(bank.body_count + 1)), signals, np.concatenate(gain0), np.concatenate(gain1), at
+    bodies = [force.body for force in ordered]
+    for force in ordered:
+        if np.shape(force.force_n) != (n,):
+            raise AudioError(f"a force on body {force.body} of shape {np.shape(force.force_n)}", f"give {n} samples")
+    signals = np.stack([force.force_n for force in ordered]).astype(float) if ordered else np.zeros((0, n))
+    if not np.isfinite(signals).all():
+        raise AudioError("a force that is not finite", "look at the surface model's input: loads, speeds, profile")
+    gain0, at = padded_gains(bank.offset, bank.count, bodies, [force.gain0 for force in ordered], "force")
+    gain1, _ = padded_gains(bank.offset, bank.count, bodies, [force.gain1 for force in ordered], "force")
+    return np.searchsorted(np.array(bodies, np.int64), np.arange(bank.body_count + 1)), signals, gain0, gain1, at

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 
 from sonic_bullet.errors import AudioError
 from sonic_bullet.records import Array
@@ -72,16 +73,24 @@ def flushed(values: Array) -> Array:
     return np.asarray(np.where(np.abs(values) < FLUSH, 0, values))
 
 
-def padded_gain(offset: Array, count: Array, body: int, gain: Array, what: str) -> Array:
-    """Gain (m,) on the body's lanes, zero behind. Raises AudioError on an unknown body, a wrong shape, or NaN."""
-    if not 0 <= body < len(count):
-        raise AudioError(f"a {what} on body {body} of {len(count)}", "append the body first")
-    m = int(count[body])
-    if np.shape(gain) != (m,) or not np.isfinite(gain).all():
-        raise AudioError(f"a {what} on body {body}: gain of shape {np.shape(gain)}", f"give {m} finite numbers")
-    out = np.zeros(int(offset[body + 1] - offset[body]))
-    out[:m] = flushed(gain)
-    return out
+def padded_gains(offset: Array, count: Array, bodies: Sequence[int], gains: Sequence[Array], what: str) -> tuple[Array, Array]:
+    """All gains (m,) on their bodies' lanes, zeros behind, in one flat array, and where each begins.
+
+    Raises AudioError on an unknown body, a wrong shape, or NaN.
+    """
+    for body, gain in zip(bodies, gains, strict=True):
+        if not 0 <= body < len(count):
+            raise AudioError(f"a {what} on body {body} of {len(count)}", "append the body first")
+        if np.shape(gain) != (count[body],):
+            raise AudioError(f"a {what} on body {body}: gain of shape {np.shape(gain)}", f"give {count[body]} numbers")
+    index = np.asarray(bodies, np.int64)
+    starts = _starts(offset[index + 1] - offset[index])
+    flat = np.zeros(int((offset[index + 1] - offset[index]).sum()))
+    for start, gain in zip(starts, gains, strict=True):
+        flat[start : start + len(gain)] = gain
+    if not np.isfinite(flat).all():
+        raise AudioError(f"a {what} whose gain is not finite", "look at the mode shapes and the contact's direction")
+    return flushed(flat), starts
 
 
 def with_strikes(pending: Pending, strikes: Sequence[Strike], at: int, offset: Array, count: Array, log_pole: Array, quadrature: Array) -> Pending:
@@ -91,11 +100,10 @@ def with_strikes(pending: Pending, strikes: Sequence[Strike], at: int, offset: A
     """
     if not strikes:
         return pending
-    modes = len(quadrature)
     scalars: dict[str, list[float]] = {name: [] for name in _SCALARS}
-    impulses, gains, lanes = [pending.impulse], [], []
+    gain, rows_at = padded_gains(offset, count, [strike.body for strike in strikes], [strike.gain for strike in strikes], "strike")
+    impulses = [pending.impulse]
     for strike in strikes:
-        gains.append(padded_gain(offset, count, strike.body, strike.gain, "strike"))
         impulse = flushed(np.asarray(strike.impulse_n_s, float))
         k = impulse.size
         delta = float(strike.spacing) if k > 1 else 1.0
@@ -108,25 +116,16 @@ def with_strikes(pending: Pending, strikes: Sequence[Strike], at: int, offset: A
         phase = max((first - strike.start) - within * delta, 0.0)
         for name, value in zip(_SCALARS, (strike.body, strike.start, k, whole, delta, phase, within + 1, first), strict=True):
             scalars[name].append(value)
-        impulses += [impulse, np.zeros(max(whole, within) + 2)]
-        lanes.append(np.arange(offset[strike.body], offset[strike.body + 1]))
+        impulses.append(np.concatenate([impulse, np.zeros(whole + 2)]))
     new = {name: np.array(values, _SCALARS[name]) for name, values in scalars.items()}
-    size = np.array([len(x) for x in lanes])
-    lane = np.concatenate(lanes)
-    gain = np.concatenate(gains)
-    re, im = log_pole[lane], log_pole[modes + lane]
-    delta, whole = new["delta"].repeat(size), new["whole"].repeat(size)
-    r = _turned(re, im, new["phase"].repeat(size))
-    rows = [gain * (r[0] - quadrature[lane] * r[1]), gain * (r[1] + quadrature[lane] * r[0])]
-    for time in (delta, 1.0 - whole * delta, 1.0 - (whole + 1) * delta):
-        rows += _turned(re, im, time)
-    impulse_size = [len(a) + len(b) for a, b in zip(impulses[1::2], impulses[2::2], strict=True)]
+    rows = np.empty((8, len(gain)))
+    _fill_rows(rows, rows_at, new["body"], offset, log_pole, quadrature, gain, new["phase"], new["delta"], new["whole"])
     joined = Pending(
         **{name: np.concatenate([getattr(pending, name), values]) for name, values in new.items()},
         impulse=np.concatenate(impulses),
-        impulse_at=np.concatenate([pending.impulse_at, len(pending.impulse) + _starts(impulse_size)]),
-        rows=np.concatenate([pending.rows, np.stack(rows)], axis=1),
-        rows_at=np.concatenate([pending.rows_at, pending.rows.shape[1] + _starts(size)]),
+        impulse_at=np.concatenate([pending.impulse_at, len(pending.impulse) + _starts(new["count"] + new["whole"] + 2)]),
+        rows=np.concatenate([pending.rows, rows], axis=1),
+        rows_at=np.concatenate([pending.rows_at, pending.rows.shape[1] + rows_at]),
     )
     return _chosen(joined, np.lexsort((joined.start, joined.body)))
 
@@ -138,18 +137,27 @@ def without(pending: Pending, done: Array, offset: Array) -> Pending:
     kept = _chosen(pending, np.flatnonzero(~done))
     if not len(kept.body):
         return Pending.none()
-    impulse_size, size = kept.count + np.maximum(kept.whole, 0) + 2, np.diff(offset)[kept.body]
-    impulse_size = np.minimum(impulse_size, len(kept.impulse) - kept.impulse_at)
+    impulse_size, size = kept.count + kept.whole + 2, np.diff(offset)[kept.body]
     kept.impulse = np.concatenate([pending.impulse[a : a + k] for a, k in zip(kept.impulse_at, impulse_size, strict=True)])
     kept.rows = np.concatenate([pending.rows[:, a : a + k] for a, k in zip(kept.rows_at, size, strict=True)], axis=1)
     kept.impulse_at, kept.rows_at = _starts(impulse_size), _starts(size)
     return kept
 
 
-def _turned(re: Array, im: Array, time: Array) -> list[Array]:
-    """Real and imaginary part of e^{(re + i im) time}."""
-    size = np.exp(re * time)
-    return [size * np.cos(im * time), size * np.sin(im * time)]
+@njit(cache=True, nogil=True)
+def _fill_rows(rows, rows_at, body, offset, log_pole, quadrature, gain, phase, delta, whole):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+    """The phasors r, D, E0 = e^{s(1 - whole δ)}, E1 = E0/D of each strike, real and imaginary rows in turn."""
+    modes = len(quadrature)
+    for j in range(len(body)):
+        for k in range(offset[body[j] + 1] - offset[body[j]]):
+            lane, at = offset[body[j]] + k, rows_at[j] + k
+            s = complex(log_pole[lane], log_pole[modes + lane])
+            r = gain[at] * complex(1.0, quadrature[lane]) * np.exp(s * phase[j])
+            turn = np.exp(s * delta[j])
+            stay = np.exp(s * (1.0 - whole[j] * delta[j]))
+            less = stay / turn
+            rows[0, at], rows[1, at], rows[2, at], rows[3, at] = r.real, r.imag, turn.real, turn.imag
+            rows[4, at], rows[5, at], rows[6, at], rows[7, at] = stay.real, stay.imag, less.real, less.imag
 
 
 def _starts(sizes: Sequence[int] | Array) -> Array:
