@@ -73,7 +73,7 @@ class Material:
     alpha_per_s: float | None = None
     beta_s: float | None = None
     roughness_m: float = 1e-6
-    hurst: float = 0.75
+    hurst: float = 0.7
     restitution: float = 0.5
     source: str = ""
 

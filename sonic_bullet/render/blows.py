@@ -26,7 +26,7 @@ LEAST_FLAT_RADIUS_SHARE = 0.02
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Blow:
-    """One strike. low, high: body indices. start_s: after the step's start. length_s: of the pulse. flat: half-sine, not Hertz'. impulse_n_s (3,): world, on low.
+    """One strike. low, high: body indices. start_s: after its step's start, or before it. length_s: of the pulse. flat: half-sine, not Hertz'. impulse_n_s (3,): world, on low.
     modes_low, modes_high (m,): Uᵀj of the whole impulse in N·s/√kg.
     """
 
@@ -101,8 +101,10 @@ def _per_strike(rows: _Rows, values: Array, count: int) -> Array:
     return total
 
 
-def find_blows(split: Split, window: tuple[Step, ...], sounders: tuple[Sounder, ...]) -> tuple[Blow, ...]:
-    """The strikes that begin in window[0]; window holds the step and the known ones after it.
+def find_blows(split: Split, window: tuple[Step, ...], sounders: tuple[Sounder, ...], earliest_s: float) -> tuple[Blow, ...]:
+    """The strikes that the rows of window[0] begin; window holds the step and the known ones after it.
+
+    earliest_s: not after 0; a strike is dated back that far at most, where the bodies overlap as the step starts.
 
     Pairs of which nothing can sound (no modes, no moving volume) are passed over.
     """
@@ -125,7 +127,7 @@ def find_blows(split: Split, window: tuple[Step, ...], sounders: tuple[Sounder, 
     caused = effective_approach_m_s(approach, split.recent[split.strike], step.dt_s)
     mobile = np.array([body.mass_kg > 0 for body in bodies])
     accepted = accepted_impulse(raw, 2.0 * mass * caused, low, high, mobile)
-    start = _start_s(rows, count, step.dt_s)
+    start = _start_s(rows, count, earliest_s, step.dt_s)
     blows = []
     for q in np.flatnonzero(accepted > 0):
         pair = sounders[low[q]], sounders[high[q]]
@@ -185,12 +187,12 @@ def effective_mass(bodies: Sequence[Body], low: Array, high: Array, step: Step, 
     return np.asarray(effective_mass_kg(*sides, normal))
 
 
-def _start_s(rows: _Rows, count: int, dt_s: float) -> Array:
-    """(q,) when within the step the surfaces meet: gap / approach of the first step's rows, 0 … dt."""
+def _start_s(rows: _Rows, count: int, earliest_s: float, dt_s: float) -> Array:
+    """(q,) when the surfaces meet: gap / approach of the first step's rows, negative where they overlap already."""
     first = (rows.delay == 0) & (rows.approach > 0)
     meet = np.full(count, np.inf)
-    np.minimum.at(meet, rows.strike[first], np.maximum(rows.gap[first], 0.0) / rows.approach[first])
-    return np.clip(np.where(np.isfinite(meet), meet, 0.0), 0.0, dt_s)
+    np.minimum.at(meet, rows.strike[first], rows.gap[first] / rows.approach[first])
+    return np.clip(np.where(np.isfinite(meet), meet, 0.0), earliest_s, dt_s)
 
 
 def flat_area_m2(point_m: Array, share: Array, pair: tuple[Sounder, Sounder]) -> float:

@@ -1,6 +1,6 @@
 """Rolling and sliding of one physics step: from support loads and sweep speeds to forces on modes at audio rate.
 
-    Split.support, rows of the next step -> SurfaceLoads at both ends -> synth.surface -> f - N per pair -> Drive (Uᵀ per newton) and jerk
+    Split.support, rows of the next step -> SurfaceLoads at both ends -> synth.surface -> f - N per pair -> Drive (Uᵀ and direction per newton)
 
 What a step starts with is what the step before ended with (loads, speeds, gains, direction are carried), so nothing jumps at the
 step rate. A manifold's points flicker from step to step; the gains follow them with a time constant of `FOLLOW_S`.
@@ -29,7 +29,7 @@ SWEEP_FLOOR_M_S = 2e-4
 @dataclass(frozen=True, slots=True, eq=False)
 class Rubbing:
     """The touching pairs between two steps. key (p,) sorted; load_n (p,), sweep_m_s (p, 2) lower body first; direction (p, 3): force on
-    the lower body per newton of normal load, world; gain: per pair Uᵀ of that force on either body's modes; force_n (p, 3): of the last sample.
+    the lower body per newton of normal load, world; gain: per pair Uᵀ of that force on either body's modes, None until it moves.
     """
 
     key: Array
@@ -38,14 +38,13 @@ class Rubbing:
     load_n: Array
     sweep_m_s: Array
     direction: Array
-    gain: tuple[tuple[Array, Array], ...]
-    force_n: Array
+    gain: tuple[tuple[Array, Array] | None, ...]
 
     @classmethod
     def none(cls) -> Rubbing:
         """No pair touches."""
         pairs = SurfacePairs(*(np.zeros(0),) * 4, *(np.zeros((0, 2)),) * 3)
-        return cls(np.zeros(0, np.int64), pairs, SurfaceState.at_rest(0), np.zeros(0), np.zeros((0, 2)), np.zeros((0, 3)), (), np.zeros((0, 3)))
+        return cls(np.zeros(0, np.int64), pairs, SurfaceState.at_rest(0), np.zeros(0), np.zeros((0, 2)), np.zeros((0, 3)), ())
 
     def take(self, rows: Array) -> Rubbing:
         """The pairs ``rows`` alone."""
@@ -57,18 +56,19 @@ class Rubbing:
             self.sweep_m_s[rows],
             self.direction[rows],
             tuple(self.gain[r] for r in rows),
-            self.force_n[rows],
         )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Drive:
-    """A force signal on one body's modes: force_n (n,), gain0 and gain1 (m,) at the step's ends, linear between."""
+    """A force signal on one body: force_n (n,); gain0, gain1 (m,) on its modes and push0, push1 (3,) in the world at the step's ends, linear between."""
 
     body: int
     force_n: Array
     gain0: Array
     gain1: Array
+    push0: Array
+    push1: Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -107,8 +107,8 @@ def _targets(key: Array, split: Split, step: Step) -> _Target:
 
 def advance_rubbing(
     rubbing: Rubbing, split: Split, window: tuple[Step, ...], sounders: tuple[Sounder, ...], x: Array, sr: int, seed: int
-) -> tuple[tuple[Drive, ...], Array, Rubbing]:
-    """Drives of the step window[0], the jerk (b, 3, n) in N/s that rubbing gives the bodies, and the state after it.
+) -> tuple[tuple[Drive, ...], Rubbing]:
+    """Drives of the step window[0], and the state after it.
 
     x (n,): share of the step of each sample. window: the step and the known ones after it, two at least.
     """
@@ -117,7 +117,7 @@ def advance_rubbing(
     key = key[[_audible_pair(sounders, k) for k in key]] if len(key) else key
     target = _targets(key, split, follower)
     rubbing = _joined(rubbing.take(np.flatnonzero(np.isin(rubbing.key, key))), key, target, follower, sounders, seed)
-    moving = (rubbing.sweep_m_s > 0).any(axis=1) | (target.sweep_m_s > 0).any(axis=1) | (rubbing.state.depth_m != 0) | (rubbing.state.lift_m_s != 0)
+    moving = (rubbing.sweep_m_s > 0).any(axis=1) | (target.sweep_m_s > 0).any(axis=1) | (rubbing.state.depth != 0) | (rubbing.state.lift != 0)
     follow = -np.expm1(-window[0].dt_s / FOLLOW_S)
     touching = np.array([len(rows) > 0 for rows in target.rows], bool)
     fresh = ~rubbing.direction.any(axis=1)
@@ -132,14 +132,14 @@ def advance_rubbing(
         old = gains[p]
         if len(target.rows[p]):
             new = _gain_at(target.rows[p], follower, sounders[low[p]], sounders[high[p]])
-            old = old if len(old[0]) or len(old[1]) else new
+            old = new if old is None else old
             gains[p] = (old[0] + follow * (new[0] - old[0]), old[1] + follow * (new[1] - old[1]))
-        if force[p].any():
-            drives += [Drive(int(body[p]), force[p], old[side], gains[p][side]) for side, body in enumerate((low, high)) if len(old[side])]
-    jerk, last = _jerk(rubbing.force_n, force, direction, turned, x, sr, low, high, len(sounders))
-    after = Rubbing(key, rubbing.pairs, state, target.load_n, target.sweep_m_s, turned, tuple(gains), last)
-    gone = (target.load_n <= 0) & ~last.any(axis=1)
-    return tuple(drives), jerk, after.take(np.flatnonzero(~gone))
+        now = gains[p]
+        if force[p].any() and old is not None and now is not None:
+            pushes = (direction[p], turned[p]), (-direction[p], -turned[p])
+            drives += [Drive(int(body[p]), force[p], old[side], now[side], *pushes[side]) for side, body in enumerate((low, high))]
+    after = Rubbing(key, rubbing.pairs, state, target.load_n, target.sweep_m_s, turned, tuple(gains))
+    return tuple(drives), after.take(np.flatnonzero(target.load_n > 0))
 
 
 def _audible_pair(sounders: tuple[Sounder, ...], key: int) -> bool:
@@ -162,8 +162,7 @@ def _joined(rubbing: Rubbing, key: Array, target: _Target, step: Step, sounders:
         np.concatenate([rubbing.load_n, np.zeros(count)]),
         np.concatenate([rubbing.sweep_m_s, target.sweep_m_s[new]]),
         np.concatenate([rubbing.direction, np.zeros((count, 3))]),
-        (*rubbing.gain, *((np.zeros(0), np.zeros(0)),) * count),
-        np.concatenate([rubbing.force_n, np.zeros((count, 3))]),
+        (*rubbing.gain, *(None,) * count),
     )
     return grown.take(order)
 
@@ -235,17 +234,3 @@ def _gain_at(rows: Array, step: Step, low: Sounder, high: Sounder) -> tuple[Arra
         where = touch(sounder, point[side], facing * to_body(turn[side], normal))
         out.append(force_on_modes(sounder, where, -facing * to_body(turn[side], force)))
     return out[0], out[1]
-
-
-def _jerk(last: Array, force: Array, start: Array, end: Array, x: Array, sr: int, low: Array, high: Array, count: int) -> tuple[Array, Array]:
-    """Rate of change (b, 3, n) in N/s of the forces on the bodies, and the last sample's forces (p, 3)."""
-    jerk = np.zeros((count, 3, len(x)))
-    after = last.copy()
-    for p in np.flatnonzero(force.any(axis=1) | last.any(axis=1)):
-        vector = force[p] * (start[p][:, None] + (end[p] - start[p])[:, None] * x)
-        rate = np.diff(vector, axis=1, prepend=last[p][:, None]) * sr
-        jerk[low[p]] += rate
-        jerk[high[p]] -= rate
-        if len(x):
-            after[p] = vector[:, -1]
-    return jerk, after

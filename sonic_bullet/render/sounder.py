@@ -1,6 +1,12 @@
 """A body as the synthesizer plays it: its audible modes, their weights at each sensor, and where on its surface a contact lies.
 
     Body (records) + sensors + rate + air -> Sounder;  contact points -> Touch -> Uᵀf (participation)
+
+A rigid body that is pushed sounds too: acceleration noise. A sphere of radius a whose velocity jumps by U is heard as
+p = ρ₀c U (a/r) cosθ e^{-wt}(cos wt - sin wt), w = c/a [Kirchhoff 1876; Koss, Alfredson 1973, eq. 9]. That is the impulse response of a
+mode with decay w and frequency w, to the letter (synth.bank), so the three translations of a body are three more modes of the
+bank: strikes are exact there too. At low frequency it is the compact law p = 3ρ₀V cosθ/(8πcr)·da/dt [Chadwick, Zheng, James 2012],
+whose coefficient K makes ρ₀ca = 2Kw²; unlike it, it does not grow without bound where the body is no longer small.
 """
 
 from __future__ import annotations
@@ -12,12 +18,14 @@ from numba import njit
 
 from sonic_bullet.records import Air, Array, Body, Microphone, ModalModel, ModalSum, Sensor, Vibrometer
 from sonic_bullet.surface_index import SurfaceIndex, nearest, surface_index
-from sonic_bullet.synth.bank import audible
+from sonic_bullet.synth.bank import ModeSet, audible
 from sonic_bullet.synth.radiation import jerk_coefficient, radiation
 
 CREASE_COS = np.cos(np.radians(20.0))
 EDGE_RADIUS_SHARE = 0.005
 EDGE_RADIUS_LEAST_M = 2e-4
+FASTEST_RIGID = 0.6
+"""Share of sr/2 at which a small body's w is cut: below, its click is the compact law's, which no longer hangs on w."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -35,7 +43,7 @@ class Sounder:
     normal: Array
     size_m: float
     radius_m: float
-    jerk_coefficient: float
+    rigid: ModeSet | None
     dropped: int
 
     @property
@@ -67,7 +75,7 @@ def build_sounder(body: Body, sensors: tuple[Sensor, ...], sr: int, air: Air) ->
     readers = weight_sets(sensors)
     if model is None:
         none = np.zeros(0)
-        return Sounder(body, none, none, np.zeros((1 + len(readers), 0), complex), np.zeros((0, 3, 0), np.float32), None, np.zeros((0, 3)), _size(body), 0.0, jerk_coefficient(body.volume_m3, air), 0)
+        return Sounder(body, none, none, np.zeros((1 + len(readers), 0), complex), np.zeros((0, 3, 0), np.float32), None, np.zeros((0, 3)), _size(body), 0.0, None, 0)
     pressure, extra = radiation(model, air)
     omega0_squared = model.omega0_squared_per_s2
     decay = np.nan_to_num(model.decay_per_s) + extra
@@ -89,7 +97,18 @@ def build_sounder(body: Body, sensors: tuple[Sensor, ...], sr: int, air: Air) ->
     normal = normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
     radius = float(np.linalg.norm(model.vertex_m, axis=1).max(initial=0.0))
     dropped = model.dropped + int(np.sum(~keep))
-    return Sounder(body, omega, decay, weight, shape, index, normal, _size(body), radius, jerk_coefficient(body.volume_m3, air), dropped)
+    return Sounder(body, omega, decay, weight, shape, index, normal, _size(body), radius, _rigid(body, 1 + len(readers), sr, air), dropped)
+
+
+def _rigid(body: Body, sets: int, sr: int, air: Air) -> ModeSet | None:
+    """The mode that each translation of a moving body is; its gain is the force along it, its weight Pa·m per N·s."""
+    if body.mass_kg <= 0 or body.volume_m3 <= 0 or body.material is None:
+        return None
+    radius = (3 * body.volume_m3 / (4 * np.pi)) ** (1 / 3)
+    rate = min(air.sound_speed_m_s / radius, FASTEST_RIGID * np.pi * sr)
+    weight = np.zeros((sets, 1), complex)
+    weight[0] = 2 * jerk_coefficient(body.volume_m3, air) * rate**2 / body.mass_kg
+    return ModeSet(np.array([rate]), np.array([rate]), weight)
 
 
 def _size(body: Body) -> float:

@@ -1,6 +1,8 @@
 """The run time: physics steps in, frames of sound out, with one explicit state between.
 
-    Step -> loads (synth.strikes) -> blows, rubbing -> bank of modes (synth.bank) + jerk of the bodies -> sound path (synth.path) -> frame
+    Step -> loads (synth.strikes) -> blows, rubbing -> bank of modes and of rigid motions (synth.bank) -> sound path (synth.path) -> frame
+
+Each body has four places in the bank: its modes, and its three translations (see sounder.py).
 
 A step's sound is made when the `LOOKAHEAD` steps after it are known. Live listening, `sound` (which drains a copy of the state)
 and the replay of a log run the same code on the same numbers in the same order: the same bits.
@@ -21,7 +23,7 @@ from sonic_bullet.render.clock import Clock, exact_step
 from sonic_bullet.render.rubbing import Drive, Rubbing, advance_rubbing
 from sonic_bullet.render.sounder import Sounder, build_sounder, weight_sets
 from sonic_bullet.synth import bank, path
-from sonic_bullet.synth.pulse import add_jerk, pulse_nodes
+from sonic_bullet.synth.pulse import pulse_nodes
 from sonic_bullet.synth.strikes import LOOKAHEAD, LoadHistory, push, split
 
 LATENCY_STEPS = LOOKAHEAD
@@ -43,32 +45,26 @@ class Setup:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Pulse:
-    """A blow under way: its absolute start in s. Kept until its last sample has sounded."""
-
-    start_s: float
-    blow: Blow
-
-
-@dataclass(frozen=True, slots=True, eq=False)
 class State:
-    """All that the next frame hangs on. window: the step to be rendered next and those known after it."""
+    """All that the next frame hangs on. number: of the step to be rendered next; window: that step and those known after it."""
 
+    number: int
     clock: Clock
     window: tuple[Step, ...]
     loads: LoadHistory
     sounders: tuple[Sounder, ...]
     bank: bank.Bank
     ringing: bank.BankState
-    path: path.PathState
+    path: path.Path
+    travelling: path.PathState
     rubbing: Rubbing
-    pulses: tuple[Pulse, ...]
 
 
 def start(setup: Setup) -> State:
     """Silence at time 0, nobody there."""
     instrument, ringing = bank.empty_bank(setup.sr, 1 + len(weight_sets(setup.sensors)))
-    return State(Clock(), (), LoadHistory.empty(), (), instrument, ringing, path.start(setup.microphone_m, setup.sr, setup.air), Rubbing.none(), ())
+    air, travelling = path.empty_path(setup.sr, setup.air, setup.microphone_m)
+    return State(0, Clock(), (), LoadHistory.empty(), (), instrument, ringing, air, travelling, Rubbing.none())
 
 
 def with_bodies(setup: Setup, state: State, bodies: Sequence[Body]) -> State:
@@ -76,9 +72,19 @@ def with_bodies(setup: Setup, state: State, bodies: Sequence[Body]) -> State:
     if not bodies:
         return state
     new = tuple(build_sounder(body, setup.sensors, setup.sr, setup.air) for body in bodies)
-    modes = [bank.ModeSet(s.omega_rad_s, s.decay_per_s, s.weight) for s in new]
+    modes = [part for s in new for part in (bank.ModeSet(s.omega_rad_s, s.decay_per_s, s.weight), *((s.rigid or _nothing(setup),) * 3))]
     instrument, ringing = bank.append(state.bank, state.ringing, modes)
-    return replace(state, sounders=state.sounders + new, bank=instrument, ringing=ringing)
+    air, travelling = path.append_bodies(state.path, state.travelling, *_places(new))
+    return replace(state, sounders=state.sounders + new, bank=instrument, ringing=ringing, path=air, travelling=travelling)
+
+
+def _places(sounders: tuple[Sounder, ...]) -> tuple[Array, Array]:
+    """Radius and jerk coefficient for the path: the bank has turned pushes into Pa·m already."""
+    return np.array([s.radius_m for s in sounders]), np.ones(len(sounders))
+
+
+def _nothing(setup: Setup) -> bank.ModeSet:
+    return bank.ModeSet(np.zeros(0), np.zeros(0), np.zeros((1 + len(weight_sets(setup.sensors)), 0), complex))
 
 
 def take_step(setup: Setup, state: State, step: Step) -> tuple[Array | None, State]:
@@ -95,7 +101,7 @@ def take_step(setup: Setup, state: State, step: Step) -> tuple[Array | None, Sta
 
 def copied(state: State) -> State:
     """A state of its own: advancing one leaves the other."""
-    return replace(state, ringing=state.ringing.copy(), path=state.path.copy())
+    return replace(state, ringing=state.ringing.copy(), travelling=state.travelling.copy())
 
 
 def drained(setup: Setup, state: State) -> Array:
@@ -103,20 +109,19 @@ def drained(setup: Setup, state: State) -> Array:
     state = copied(state)
     frames = [np.zeros((len(setup.sensors), 0))]
     missing = len(state.window)
-    while len(state.window) < LOOKAHEAD and state.window:
+    for _ in range(LOOKAHEAD if missing else 0):
         last = state.window[-1]
-        _, state = take_step(setup, state, replace(last, contacts=Contacts.none()))
-    for _ in range(missing):
-        last = state.window[-1]
-        frame, state = take_step(setup, state, replace(last, contacts=Contacts.none()))
-        if frame is not None:
+        frame, state = take_step(setup, state, replace(last, contacts=Contacts.none(), teleported=np.zeros(len(last.teleported), bool)))
+        if frame is not None and len(frames) <= missing:
             frames.append(frame)
     return np.concatenate(frames, axis=1)
 
 
 def quenched(state: State) -> State:
-    """Nothing rings and no pulse is under way; the sound still travelling to the microphones is gone too."""
-    return replace(state, ringing=bank.silence(state.ringing), path=path.silence(state.path), pulses=())
+    """Nothing rings; the sound still travelling to the microphones is gone too."""
+    air, travelling = path.empty_path(state.path.sr, state.path.air, state.path.microphone_m, state.travelling.at)
+    air, travelling = path.append_bodies(air, travelling, *_places(state.sounders))
+    return replace(state, ringing=bank.silence(state.ringing), path=air, travelling=travelling)
 
 
 def _render(setup: Setup, state: State) -> tuple[Array, State]:
@@ -124,69 +129,56 @@ def _render(setup: Setup, state: State) -> tuple[Array, State]:
     window, sounders, clock, sr = state.window, state.sounders, state.clock, setup.sr
     step = window[0]
     after = clock.after(step.dt_s)
-    first, count = clock.sample(sr), after.sample(sr) - clock.sample(sr)
+    count = after.sample(sr) - clock.sample(sr)
     x = clock.progress(step.dt_s, sr, count)
-    parts, loads = split(state.loads)
-    pulses = state.pulses + tuple(Pulse(float(clock.time_s) + blow.start_s, blow) for blow in find_blows(parts, window, sounders))
-    new = pulses[len(state.pulses) :]
-    drives, rate_n_s, rubbing = advance_rubbing(state.rubbing, parts, window, sounders, x, sr, setup.seed)
-    strikes = [strike for pulse in new for strike in _strikes(pulse, sounders, sr)]
-    modal = bank.advance(state.bank, state.ringing, count, strikes, _forces(drives, sounders), x)
-    _add_pulses(rate_n_s, pulses, sounders, sr, first)
-    frame = _at_sensors(setup, state, modal, rate_n_s, window, x)
-    end_s = float(after.time_s)
-    pulses = tuple(pulse for pulse in pulses if pulse.start_s + pulse.blow.length_s + 3.0 / sr > end_s)
-    return frame, replace(state, clock=after, loads=loads, rubbing=rubbing, pulses=pulses)
+    blows: list[tuple[float, Blow]] = []
+    loads = state.loads
+    if state.number == 0:  # nothing was looked for ahead of the first step
+        parts, loads = split(loads, ahead=0)
+        blows += [(float(clock.time_s), blow) for blow in find_blows(parts, window, sounders, 0.0)]
+    parts, loads = split(loads)
+    blows += [(float(after.time_s), blow) for blow in find_blows(parts, window[1:], sounders, -step.dt_s)]
+    drives, rubbing = advance_rubbing(state.rubbing, parts, window, sounders, x, sr, setup.seed)
+    strikes = [strike for begin_s, blow in blows for strike in _strikes(blow, begin_s, sounders, sr, clock.sample(sr))]
+    forces = [force for drive in drives for force in _forces(drive, sounders)]
+    sound = bank.advance(state.bank, state.ringing, count, strikes, forces, x)
+    frame = _at_sensors(setup, state, sound, x)
+    return frame, replace(state, number=state.number + 1, clock=after, loads=loads, rubbing=rubbing)
 
 
-def _strikes(pulse: Pulse, sounders: tuple[Sounder, ...], sr: int) -> list[bank.Strike]:
-    """The pulse on the modes of both bodies. Never before the frame's first sample: a time is a product of roundings."""
-    blow = pulse.blow
+def _strikes(blow: Blow, step_start_s: float, sounders: tuple[Sounder, ...], sr: int, earliest: int) -> list[bank.Strike]:
+    """The pulse on the modes and translations of both bodies."""
     offset_s, spacing_s, weight = pulse_nodes(blow.length_s, sr, flat=blow.flat)
-    begin = pulse.start_s * sr + offset_s * sr
-    sides = ((blow.low, blow.modes_low), (blow.high, blow.modes_high))
-    return [bank.Strike(body, begin, spacing_s * sr, weight, gain) for body, gain in sides if gain.any()]
+    begin = max((step_start_s + blow.start_s + offset_s) * sr, float(earliest))
+    sides = (blow.low, blow.modes_low, blow.impulse_n_s), (blow.high, blow.modes_high, -blow.impulse_n_s)
+    gains = [(4 * body + part, gain) for body, modes, push in sides for part, gain in enumerate((modes, *_along(sounders[body], push)))]
+    return [bank.Strike(place, begin, spacing_s * sr, weight, gain) for place, gain in gains if gain.any()]
 
 
-def _forces(drives: Sequence[Drive], sounders: tuple[Sounder, ...]) -> list[bank.Force]:
-    return [bank.Force(drive.body, drive.force_n, drive.gain0, drive.gain1) for drive in drives if sounders[drive.body].mode_count]
+def _forces(drive: Drive, sounders: tuple[Sounder, ...]) -> list[bank.Force]:
+    """A drive on the modes and translations of its body."""
+    sounder = sounders[drive.body]
+    ends = zip((drive.gain0, *_along(sounder, drive.push0)), (drive.gain1, *_along(sounder, drive.push1)), strict=True)
+    return [bank.Force(4 * drive.body + part, drive.force_n, gain0, gain1) for part, (gain0, gain1) in enumerate(ends) if len(gain0)]
 
 
-def _add_pulses(rate_n_s: Array, pulses: tuple[Pulse, ...], sounders: tuple[Sounder, ...], sr: int, first: int) -> None:
-    """dF/dt of the pulses under way onto the bodies (b, 3, n). One sample late, so that a pulse that begins with the frame is whole in it."""
-    sides = [(side, pulse, sign) for pulse in pulses for side, sign in ((pulse.blow.low, 1.0), (pulse.blow.high, -1.0)) if sounders[side].jerk_coefficient > 0]
-    if not sides:
-        return
-    add_jerk(
-        rate_n_s,
-        np.array([side for side, _, _ in sides]),
-        np.array([pulse.start_s for _, pulse, _ in sides]) + 1.0 / sr,
-        np.array([pulse.blow.length_s for _, pulse, _ in sides]),
-        np.array([pulse.blow.flat for _, pulse, _ in sides]),
-        np.array([sign * pulse.blow.impulse_n_s for _, pulse, sign in sides]),
-        sr,
-        first,
-    )
+def _along(sounder: Sounder, push: Array) -> tuple[Array, Array, Array]:
+    """A world vector as the gains of the three translations, empty where they cannot be heard."""
+    x, y, z = push.reshape(3, 1) if sounder.rigid is not None else np.zeros((3, 0))
+    return x, y, z
 
 
-def _at_sensors(setup: Setup, state: State, modal: Array, rate_n_s: Array, window: tuple[Step, ...], x: Array) -> Array:
-    """(channels, n): microphones hear through the air, the other sensors sum their weight set over the bodies."""
-    sounders = state.sounders
-    here, there = window[0].position_m, window[1].position_m
-    known = len(here)
-    position0 = np.zeros((len(sounders), 3))
-    position1 = np.zeros((len(sounders), 3))
-    position0[:known] = here
-    position1[: len(there)] = there
-    position0[known:] = position1[known:]
-    position1[len(there) :] = position0[len(there) :]
-    jumped = np.zeros(len(sounders), bool)
-    jumped[: len(there)] = window[1].teleported
-    inverse_mass = np.array([1.0 / s.body.mass_kg if s.body.mass_kg > 0 else 0.0 for s in sounders])
-    jerk = rate_n_s * inverse_mass[:, None, None]
-    coefficient = np.array([s.jerk_coefficient if s.body.mass_kg > 0 else 0.0 for s in sounders])
-    radius = np.array([s.radius_m for s in sounders])
-    heard = path.advance(state.path, modal[0], jerk, coefficient, radius, position0, position1, jumped, x)
+def _at_sensors(setup: Setup, state: State, sound: Array, x: Array) -> Array:
+    """(channels, n) of the bank's sound (W, 4·b, n): microphones hear through the air, the others sum their weight set over the bodies."""
+    modal, pushed = sound[:, 0::4], np.stack([sound[0, part::4] for part in (1, 2, 3)], axis=1)
+    here, there, newest = state.window[0], state.window[1], state.window[-1]
+    end = newest.position_m.copy()  # of bodies that came later than this step: where they came
+    end[: len(there.position_m)] = there.position_m
+    begin = end.copy()
+    begin[: len(here.position_m)] = here.position_m
+    teleported = np.zeros(len(end), bool)
+    teleported[: len(there.teleported)] = there.teleported
+    heard = path.propagate(state.path, state.travelling, state.number, modal[0], pushed, begin, end, teleported, x)
     frame = np.zeros((len(setup.sensors), modal.shape[2]))
     microphones, readers = iter(heard), iter(modal[1:])
     for channel, sensor in enumerate(setup.sensors):

@@ -12,6 +12,9 @@ a pair's strike is bounded by 2·m*·v (an elastic impact at the approach speed 
 hands on (`accepted_impulse`). For a pair that carried load within the last SPAN steps, v counts above the speed that gravity
 gives in one step: below it, leaving and landing cannot be told from resting.
 
+Surfaces that overlap when a step starts have met in the step before (with `contactProcessingThreshold=0`, Bullet sees a contact only
+then): strikes are looked for one step ahead of the step being rendered, so that they can be dated back.
+
 p pairs; column `NOW` of the load history is the step being rendered, later columns are the look-ahead.
 """
 
@@ -47,9 +50,9 @@ class LoadHistory:
 class Split:
     """The loads of one step, told apart.
 
-    key (p,). support_n (p, 2): silent load at the step's start and end. strike (q,): rows of the pairs that are struck in this step.
-    share (q, SPAN-1): part of the normal impulse of this and the next steps that belongs to each strike.
-    recent (p,): the pair carried load within the last SPAN - 1 steps.
+    key (p,). support_n (p, 2): silent load at the step's start and end. strike (q,): rows of the pairs that are struck in the step that was
+    asked for. share (q, j): part of the normal impulse of that and the next known steps, SPAN - 1 at most, that belongs to each strike.
+    recent (p,): the pair carried load within the SPAN - 1 steps before.
     """
 
     key: Array
@@ -98,21 +101,25 @@ def _opening(force: Array, column: int) -> Array:
     return np.max(windows, axis=0) if len(force) else np.zeros(0)
 
 
-def split(history: LoadHistory) -> tuple[Split, LoadHistory]:
-    """Support and strikes of the step in column NOW, and the history with the struck steps marked as used."""
-    force = history.force_n
-    support = np.stack([_opening(force, NOW + i) for i in range(SPAN - 1)], axis=1).reshape(len(force), SPAN - 1)
-    excess = np.maximum(force[:, NOW : NOW + SPAN - 1] - support, 0.0)
-    excess[excess <= 1e-9 * force[:, NOW : NOW + SPAN - 1]] = 0.0  # rounding of the sums is no blow
-    starts = (excess[:, 0] > 0) & (force[:, NOW] > force[:, NOW - 1]) & (history.busy == 0)
+def split(history: LoadHistory, ahead: int = 1) -> tuple[Split, LoadHistory]:
+    """Support of the step in column NOW and strikes of the one ``ahead`` steps after it, and the history with those marked as used.
+
+    A strike of SPAN - 1 steps whose end is not known yet loses of its impulse what the last known step still carries.
+    """
+    force, column = history.force_n, NOW + ahead
+    stop = min(column + SPAN - 1, force.shape[1])
+    opening = np.stack([_opening(force, i) for i in range(NOW, stop)], axis=1).reshape(len(force), stop - NOW)
+    load = force[:, column:stop]
+    excess = np.maximum(load - opening[:, ahead:], 0.0)
+    excess[excess <= 1e-9 * load] = 0.0  # rounding of the sums is no blow
+    starts = (excess[:, 0] > 0) & (force[:, column] > force[:, column - 1]) & (history.busy == 0)
     connected = np.cumprod(excess > 0, axis=1).astype(bool)
     strike = np.flatnonzero(starts)
-    load = np.where(force[:, NOW : NOW + SPAN - 1] > 0, force[:, NOW : NOW + SPAN - 1], 1.0)
-    share = np.where(connected, excess / load, 0.0)[strike]
+    share = np.where(connected, excess / np.where(load > 0, load, 1.0), 0.0)[strike]
     busy = history.busy.copy()
     busy[strike] = connected[strike].sum(axis=1)
-    recent = (force[:, :NOW] > 0).any(axis=1)
-    return Split(history.key, support[:, :2], strike, share, recent), LoadHistory(history.key, force, busy)
+    recent = (force[:, column - SPAN + 1 : column] > 0).any(axis=1)
+    return Split(history.key, opening[:, :2], strike, share, recent), LoadHistory(history.key, force, busy)
 
 
 def effective_approach_m_s(approach_m_s: Array, recent: Array, dt_s: float) -> Array:
