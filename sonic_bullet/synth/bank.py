@@ -216,12 +216,15 @@ def _joined(flat: Array, more: Array) -> Array:
 
 def _flat_forces(bank: Bank, n: int, forces: Sequence[Force]) -> tuple[Array, Array, Array, Array, Array]:
     """Forces sorted by body (stable): segments (b+1,), signals (p, n), flat gains at both ends, and where each begins (p,)."""
+    if not forces:
+        none = np.zeros(0)
+        return np.zeros(bank.body_count + 1, np.int64), np.zeros((0, n)), none, none, np.zeros(0, np.int64)
     ordered = sorted(forces, key=lambda force: force.body)
     bodies = [force.body for force in ordered]
     for force in ordered:
         if np.shape(force.force_n) != (n,):
             raise AudioError(f"a force on body {force.body} of shape {np.shape(force.force_n)}", f"give {n} samples")
-    signals = np.stack([force.force_n for force in ordered]).astype(float) if ordered else np.zeros((0, n))
+    signals = np.stack([force.force_n for force in ordered]).astype(float)
     if not np.isfinite(signals).all():
         raise AudioError("a force that is not finite", "look at the surface model's input: loads, speeds, profile")
     gain0, at = padded_gains(bank.offset, bank.count, bodies, [force.gain0 for force in ordered], "force")

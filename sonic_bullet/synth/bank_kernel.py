@@ -88,6 +88,7 @@ def advance(at, out, offset, pole, block, quadrature, weight, heard, z, driven, 
     modes = len(quadrature)
     now, powers, table, column = _aligned(2 * CHUNK), _aligned(10 * CHUNK), _aligned(2 * ROW * CHUNK), _aligned(2 * ROWS * CHUNK)
     width = len(rows) // 8
+    weight_flat = weight.reshape(-1)
     for b in range(len(offset) - 1):
         start, stop = offset[b], offset[b + 1]
         s0, s1 = strike_of[b], strike_of[b + 1]
@@ -135,7 +136,7 @@ def advance(at, out, offset, pole, block, quadrature, weight, heard, z, driven, 
                     if heard[w, b]:
                         value = sound[w, b, place + k - i] if tiled[b] else 0.0
                         if is_driven[b]:
-                            value += drive.heard(driven, weight[w], modes, start, stop - start)
+                            value += drive.heard(driven, start, weight_flat, 2 * w * modes + start, modes, stop - start)
                         out[w, b, k] = value if abs(value) >= FLUSH else 0.0
             if place + end - i == BLOCK:
                 _close_block(b, z, driven, pole, modes, start, stop, ringing, is_driven, tiled)

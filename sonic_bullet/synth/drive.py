@@ -105,20 +105,19 @@ def strike_nodes(typingctx, state, modes, start, count, rows, at, width, multipl
 
 
 @intrinsic  # type: ignore[untyped-decorator]
-def heard(typingctx, state, weight, modes, start, count):
-    """Σ Re(weight·state): lane by lane, then across lanes in pairs."""
+def heard(typingctx, state, start, weight, at, modes, count):
+    """Σ Re(weight·state), the body's weights from ``at`` on: lane by lane, then across lanes in pairs."""
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         e = Emit(context, builder, signature, args)
-        state, weight, modes, start, count = e.args
+        state, start, weight, at, modes, count = e.args
 
         def body(k: Value, total: list[Value]) -> list[Value]:
-            re = builder.add(start, k)
-            im = builder.add(re, modes)
-            real = e.fma(e.load(state, re), e.load(weight, re), total[0])
-            return [real, e.fma(e.load(state, im), e.load(weight, im), total[1])]
+            re, here = builder.add(start, k), builder.add(at, k)
+            real = e.fma(e.load(state, re), e.load(weight, here), total[0])
+            return [real, e.fma(e.load(state, builder.add(re, modes)), e.load(weight, builder.add(here, modes)), total[1])]
 
         real, imag = e.loop(count, LANES, [constant(0), constant(0)], body)
         return e.total(builder.fsub(real, imag))
 
-    return types.float64(state, weight, modes, start, count), codegen
+    return types.float64(state, start, weight, at, modes, count), codegen

@@ -113,9 +113,11 @@ def propagate(
     arrays = {}
     for name, (value, shape) in wanted.items():
         arrays[name] = np.ascontiguousarray(value, float)
-        if arrays[name].shape != shape or not np.isfinite(arrays[name]).all():
+        if arrays[name].shape != shape or (name not in ("source", "jerk") and not np.isfinite(arrays[name]).all()):
             raise AudioError(f"{name} of shape {arrays[name].shape}", f"give finite numbers of shape {shape}")
-    loud = arrays["source"].any(axis=1) | (arrays["jerk"].any(axis=(1, 2)) & (path.jerk_coefficient != 0))
+    loud = np.zeros(count, bool)
+    if not path_kernel.survey(arrays["source"], arrays["jerk"], path.jerk_coefficient, loud):
+        raise AudioError("a source or jerk that is not finite", "look for the step whose contacts or loads produced it")
     _begin_fades(state, step, np.asarray(teleported, bool), loud, channels)
     from_m, to_m, fade = _places(state, step, arrays["position0_m"], arrays["position1_m"])
     _make_room(path, state, from_m, to_m, loud, n)

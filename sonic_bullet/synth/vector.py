@@ -57,6 +57,10 @@ class Emit:
     def broadcast(self, array: Value, offset: Value) -> Value:
         return self.spread(self.builder.load(self.builder.gep(array, [offset])))
 
+    def reversed(self, vector: Value) -> Value:
+        """The lanes in opposite order."""
+        return self.builder.shuffle_vector(vector, ir.Constant(VEC, ir.Undefined), ir.Constant(ir.VectorType(I32, LANES), list(range(LANES))[::-1]))
+
     def fma(self, a: Value, b: Value, c: Value) -> Value:
         return self.builder.call(self._fma, [a, b, c])
 
@@ -93,11 +97,14 @@ class Emit:
         return last
 
     def total(self, vector: Value) -> Value:
-        """Sum across the lanes, in pairs."""
-        lanes = [self.builder.extract_element(vector, ir.Constant(I32, lane)) for lane in range(LANES)]
-        while len(lanes) > 1:
-            lanes = [self.builder.fadd(lanes[i], lanes[i + 1]) for i in range(0, len(lanes), 2)]
-        return lanes[0]
+        """Sum across the lanes: halves added until one is left."""
+        width = LANES
+        while width > 1:
+            width //= 2
+            none = ir.Constant(vector.type, ir.Undefined)
+            low, high = (ir.Constant(ir.VectorType(I32, width), list(range(first, first + width))) for first in (0, width))
+            vector = self.builder.fadd(self.builder.shuffle_vector(vector, none, low), self.builder.shuffle_vector(vector, none, high))
+        return self.builder.extract_element(vector, ir.Constant(I32, 0))
 
 
 def constant(value: float) -> Value:
