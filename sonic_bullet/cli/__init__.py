@@ -70,7 +70,9 @@ class Numbers(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # gener
         return numbers
 
 
-json_option = click.option("--json", "json_to", is_flag=False, flag_value="-", metavar="[PATH]", help="Write the result as JSON to PATH, or alone to stdout.")
+json_option = click.option(
+    "--json", "json_to", is_flag=False, flag_value="-", metavar="[PATH.json]", help="Write the result as JSON to PATH.json, or alone to stdout."
+)
 
 
 @click.group(epilog=GROUP_EPILOG, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
@@ -159,7 +161,7 @@ def main() -> None:
             stream.reconfigure(errors="replace")  # a terminal without Greek letters still gets its table
     signal.signal(signal.SIGTERM, _terminated)
     try:
-        with cli.make_context("sonic-bullet", sys.argv[1:] or ["--help"]) as context:  # cli.main() would swallow what an interrupt says
+        with cli.make_context("sonic-bullet", _settled(sys.argv[1:]) or ["--help"]) as context:  # cli.main() would swallow what an interrupt says
             cli.invoke(context)
         sys.stdout.flush()
         sys.exit(0)
@@ -187,6 +189,12 @@ def main() -> None:
         notes = "; ".join(getattr(error, "__notes__", []))
         _say(f"{type(error).__name__}: {error}" + (f"; {notes}" if notes else "") + "; set SONIC_BULLET_DEBUG=1 to see where")
     sys.exit(code)
+
+
+def _settled(words: list[str]) -> list[str]:
+    """The command line with every --json that no name ending in .json follows as --json=-: what follows is another argument then."""
+    follows = [*words[1:], ""]
+    return ["--json=-" if word == "--json" and not after.lower().endswith(".json") else word for word, after in zip(words, follows, strict=True)]
 
 
 def _terminated(*_: object) -> None:

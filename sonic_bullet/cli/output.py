@@ -32,6 +32,20 @@ def clean_stdout(json_to: str | None) -> Iterator[Callable[[str], None]]:
         os.close(kept)
 
 
+@contextmanager
+def quiet_stderr() -> Iterator[None]:
+    """Nothing reaches stderr meanwhile, from C neither: PyBullet says when it was built as soon as it is imported."""
+    sys.stderr.flush()
+    kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, 2)
+    try:
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
+        os.close(nowhere)
+
+
 def write_json(json_to: str | None, value: Any) -> None:
     """``value`` as JSON (no NaN) to a path, to stdout for "-", nowhere for None. Raises FileError."""
     if json_to is None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sonic_bullet.cli.output import clean_stdout, progress_bar, write_json
+from sonic_bullet.cli.output import clean_stdout, progress_bar, quiet_stderr, write_json
 from sonic_bullet.errors import AudioError, FileError, SceneError, SonicBulletError
 from sonic_bullet.files import AudioReport, check_audio_output, check_output, check_sr, read_log, write_audio, write_log
 
@@ -67,7 +67,8 @@ def run_doctor(scene: str, seconds: float, json_to: str | None) -> None:
     if _is_log(scene):
         raise SceneError(f"{scene} is a contact log, which has no settings", "give the scene it came from")
     with clean_stdout(json_to) as say:
-        from sonic_bullet.scene import examine_scene
+        with quiet_stderr():
+            from sonic_bullet.scene import examine_scene
 
         findings = examine_scene(scene, seconds)
         if findings:
@@ -129,7 +130,8 @@ class _Wish:
 
 
 def _simulated(scene: str, wish: _Wish) -> RenderResult:
-    from sonic_bullet.scene import render_scene
+    with quiet_stderr():
+        from sonic_bullet.scene import render_scene
 
     sr, places = wish.rate or DEFAULT_SR, wish.microphones or None
     return render_scene(scene, seconds=wish.seconds, sr=sr, seed=wish.seed or 0, microphones=places, material=wish.material, progress=wish.progress)

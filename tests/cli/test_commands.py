@@ -127,6 +127,13 @@ def test_json_alone_on_stdout_whatever_the_scene_prints(scene: Path, asked: dict
     assert "a C library prints" in said.err
 
 
+@pytest.mark.parametrize("words", [["--json", "scene.py", "-o", "a.wav"], ["scene.py", "--json", "-o", "a.wav"], ["scene.py", "-o", "a.wav", "--json=-"]])
+def test_json_takes_a_path_only_where_one_stands(scene: Path, asked: dict[str, Any], capfd: pytest.CaptureFixture[str], words: list[str]) -> None:
+    assert run("render", *words) == 0
+    assert json.loads(capfd.readouterr().out)["output"] == "a.wav"
+    assert scene.read_text() == ""
+
+
 def test_defaults_and_microphones(scene: Path, asked: dict[str, Any]) -> None:
     assert run("render", "scene.py", "-o", "a.wav", "--microphone", "0,-1,0.5", "--microphone", "1e-1,2,-3", "--material", "wood") == 0
     assert (asked["sr"], asked["seed"], asked["seconds"]) == (48_000, 0, None)
