@@ -197,7 +197,7 @@ def test_a_log_with_wishes(scene: Path, asked: dict[str, Any]) -> None:
         (["scene.py", "-o", "a.wav", "--seed", "-1"], "--seed"),
         (["scene.py", "-o", "a.wav", "--contacts", "a.txt"], ".npz"),
         (["scene.py", "-o", "a.wav", "--picture", "a.wav"], "picture format"),
-        (["scene.py", "-o", "a.wav", "--json", "./a.wav"], "one name"),
+        (["scene.py", "-o", "a.wav", "--json=./a.wav"], "one name"),
         (["scene.py", "-o", "a.wav", "--colour"], "--colour"),
         (["scene.py"], "--output"),
         ([], "Missing argument"),
