@@ -10,10 +10,10 @@ import pybullet
 
 from sonic_bullet.errors import SceneError
 from sonic_bullet.listener.frames import body_ids, link_words
+from sonic_bullet.listener.pieces import collision_pieces
 from sonic_bullet.records import Body
 
 HEAVIEST_KG = 1e12
-SPHERE = pybullet.GEOM_SPHERE
 
 
 def check_exists(client_id: int, body: int, link: int) -> None:
@@ -48,6 +48,6 @@ def describe(client_id: int, body: int, link: int, epoch: int) -> Body:
     (measured: R·diag·Rᵀ·ω stays constant in free spin, whatever localInertialOrn). Raises SceneError on absurd mass or inertia."""
     info = pybullet.getDynamicsInfo(body, link, physicsClientId=client_id)
     mass = checked_mass_kg(info, body, link)
-    pieces = pybullet.getCollisionShapeData(body, link, physicsClientId=client_id)
-    curvature = 1 / pieces[0][3][0] if len(pieces) == 1 and pieces[0][2] == SPHERE and pieces[0][3][0] > 0 else math.nan
+    pieces = collision_pieces(client_id, body, link)
+    curvature = 1 / pieces[0].size[0] if len(pieces) == 1 and pieces[0].kind == pybullet.GEOM_SPHERE and pieces[0].size[0] > 0 else math.nan
     return Body(body, link, epoch, link_name(client_id, body, link), mass, np.diag(info[2]), curvature_per_m=curvature)

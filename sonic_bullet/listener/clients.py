@@ -8,6 +8,7 @@ import pybullet
 from pybullet_utils.bullet_client import BulletClient
 
 from sonic_bullet.errors import SceneError
+from sonic_bullet.listener.pieces import collision_pieces
 from sonic_bullet.listener.quiet import quiet_stdout
 from sonic_bullet.listener.world import World
 
@@ -33,9 +34,4 @@ def links_with_shapes(world: World, body: int | None = None) -> tuple[tuple[int,
     ask: Any = pybullet
     cid = world.client_id
     bodies = [ask.getBodyUniqueId(i, physicsClientId=cid) for i in range(ask.getNumBodies(physicsClientId=cid))] if body is None else [body]
-    return tuple(
-        (one, link)
-        for one in bodies
-        for link in range(-1, ask.getNumJoints(one, physicsClientId=cid))
-        if ask.getCollisionShapeData(one, link, physicsClientId=cid)
-    )
+    return tuple((one, link) for one in bodies for link in range(-1, ask.getNumJoints(one, physicsClientId=cid)) if collision_pieces(cid, one, link))

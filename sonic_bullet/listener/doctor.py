@@ -19,6 +19,7 @@ from sonic_bullet.listener import shapes
 from sonic_bullet.listener.bodies import checked_mass_kg, link_name
 from sonic_bullet.listener.frames import read_motion, read_roster
 from sonic_bullet.listener.mesh_files import hull_depth_m, read_surfaces
+from sonic_bullet.listener.pieces import collision_pieces
 from sonic_bullet.listener.polling import FORCE
 from sonic_bullet.listener.world import World, client_id_of
 
@@ -124,8 +125,8 @@ def _restitution(client_id: int) -> list[Finding]:
     links = _links(client_id)
     bouncy = {entry: pybullet.getDynamicsInfo(*entry, physicsClientId=client_id)[5] for entry in links}
     movable = [(body, link) for body, link in links if pybullet.getDynamicsInfo(body, link, physicsClientId=client_id)[0] > 0]
-    others = max(bouncy.values(), default=0.0)
-    lost = [e for e in movable if bouncy[e] * others > 0 and pybullet.getUserDataId(e[0], KEPT, e[1], physicsClientId=client_id) < 0]
+    springy = {body for (body, _), value in bouncy.items() if value > 0}
+    lost = [e for e in movable if bouncy[e] > 0 and springy - {e[0]} and pybullet.getUserDataId(e[0], KEPT, e[1], physicsClientId=client_id) < 0]
     if not lost:
         return []
     dt = pybullet.getPhysicsEngineParameters(physicsClientId=client_id)["fixedTimeStep"]
@@ -168,10 +169,10 @@ def _lids(client_id: int) -> list[Finding]:
 
 
 def _hulled(client_id: int, body: int, link: int) -> list[Any]:
-    pieces = [piece for piece in pybullet.getCollisionShapeData(body, link, physicsClientId=client_id) if piece[2] == pybullet.GEOM_MESH]
+    pieces = [piece for piece in collision_pieces(client_id, body, link) if piece.kind == pybullet.GEOM_MESH]
     vertices = []
-    for name, scale in {(piece[4].decode(errors="replace"), piece[3]) for piece in pieces}:
-        if name != "unknown_file":
+    for name, scale in {(piece.file, piece.size) for piece in pieces}:
+        if name:
             try:
                 vertices += [vertex * scale for vertex, _ in read_surfaces(Path(name))]
             except MeshError:
@@ -186,7 +187,7 @@ def _hulled(client_id: int, body: int, link: int) -> list[Any]:
 def _scale(client_id: int) -> list[Finding]:
     found = []
     for body, link in _links(client_id):
-        if pybullet.getDynamicsInfo(body, link, physicsClientId=client_id)[0] == 0 or not pybullet.getCollisionShapeData(body, link, physicsClientId=client_id):
+        if pybullet.getDynamicsInfo(body, link, physicsClientId=client_id)[0] == 0 or not collision_pieces(client_id, body, link):
             continue
         low, high = np.array(pybullet.getAABB(body, link, physicsClientId=client_id))
         size = float((high - low).max())

@@ -50,10 +50,10 @@ class Motion:
     def table(self) -> tuple[Array, Array, Array, Array]:
         return self.position_m, self.quaternion_xyzw, self.velocity_m_s, self.spin_rad_s
 
-    @property
-    def moves(self) -> bool:
-        """Whether anything at all has a speed."""
-        return bool(self.velocity_m_s.any() or self.spin_rad_s.any())
+    def would_move(self, dt_s: float) -> bool:
+        """Whether a step must change some number: a body may rest on a fixed point of Bullet's arithmetic and keep every bit."""
+        steps = self.position_m + dt_s * self.velocity_m_s != self.position_m
+        return bool(steps.any() or (np.abs(self.spin_rad_s) * dt_s > 1e-12).any())
 
 
 def same_motion(first: Motion, second: Motion) -> bool:

@@ -1,7 +1,6 @@
 """Geometry of a link in its body frame (centre of mass, axes of getBasePositionAndOrientation).
 
     getCollisionShapeData[5, 6]   placement of a shape, body frame (measured: also through an inertial frame that is turned)
-    getVisualShapeData[5, 6]      placement in the link frame: body = inertial⁻¹ ∘ visual
     getMeshData                   vertices in the body frame, of a hull only; "?" and nothing for a triangle mesh
 
 Bullet collides with the convex hull of a mesh; the sound wants the surface itself. So for a mesh: the file named by the shape; or the
@@ -12,7 +11,6 @@ URDF cylinders collide as hulls of 32-gons without a name: they are recognised a
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pybullet
@@ -21,45 +19,39 @@ from sonic_bullet.errors import MeshError
 from sonic_bullet.geometry import volume_m3
 from sonic_bullet.listener.frames import link_words
 from sonic_bullet.listener.mesh_files import Surface, hull, joined, read_surfaces
+from sonic_bullet.listener.pieces import Piece, collision_pieces, turn_matrix, visual_pieces
 from sonic_bullet.listener.quiet import quiet_stdout
 from sonic_bullet.records import Array, Shape
 
 SAME_SPACE = 0.1
-IDENTITY = (0.0, 0.0, 0.0, 1.0)
-
-
-def turn_matrix(quaternion_xyzw: Any) -> Array:
-    """Rotation matrix (3, 3) of a quaternion."""
-    return np.array(pybullet.getMatrixFromQuaternion(quaternion_xyzw)).reshape(3, 3)
 
 
 def shapes_of(client_id: int, body: int, link: int) -> tuple[Shape, ...]:
     """All pieces of a link's collision geometry. The link must exist. Raises MeshError where there are none or PyBullet keeps them to itself."""
-    pieces = pybullet.getCollisionShapeData(body, link, physicsClientId=client_id)
+    pieces = collision_pieces(client_id, body, link)
     if not pieces:
         raise MeshError(f"body {body}{link_words(link)} has no collision shape, or one that PyBullet does not describe", "add another link, or pass mesh=")
     shapes: list[Shape] = []
-    filed: dict[tuple[Any, ...], None] = {}
-    hulls: list[tuple[tuple[Any, ...], Array]] = []
+    filed: set[Piece] = set()
+    hulls: list[tuple[Piece, Array]] = []
     for i, piece in enumerate(pieces):
-        if piece[2] != pybullet.GEOM_MESH:
+        if piece.kind != pybullet.GEOM_MESH:
             shapes.append(primitive(piece, f"body {body}{link_words(link)}"))
         elif _file(piece) is None:
             hulls.append((piece, hull_vertices(client_id, body, link, i)))
-        elif piece[2:] not in filed:  # Bullet lists a file of several hulls once for each
-            filed[piece[2:]] = None
+        elif piece not in filed:  # Bullet may list a file of several hulls once for each
+            filed.add(piece)
             shapes.append(_from_file(client_id, body, link, i, piece))
     return (*shapes, *_unfiled(client_id, body, link, hulls))
 
 
-def _file(piece: tuple[Any, ...]) -> Path | None:
-    name = piece[4].decode(errors="replace")
-    return Path(name) if name and name != "unknown_file" and Path(name).is_file() else None
+def _file(piece: Piece) -> Path | None:
+    return Path(piece.file) if piece.file and Path(piece.file).is_file() else None
 
 
-def primitive(piece: tuple[Any, ...], where: str) -> Shape:
+def primitive(piece: Piece, where: str) -> Shape:
     """A sphere, box, capsule, cylinder or plane as getCollisionShapeData tells it. Raises MeshError for another kind."""
-    kind, size, position, quaternion = piece[2], piece[3], piece[5], piece[6]
+    kind, size, _, position, quaternion = piece
     if kind == pybullet.GEOM_SPHERE:
         return Shape("sphere", np.array([size[0], 0, 0]), position, quaternion)
     if kind == pybullet.GEOM_BOX:
@@ -84,7 +76,7 @@ def outward(vertex_m: Array, face: Array) -> Shape:
     return Shape("mesh", vertex_m=vertex_m, face=face if volume_m3(vertex_m, face) >= 0 else face[:, ::-1])
 
 
-def _from_file(client_id: int, body: int, link: int, index: int, piece: tuple[Any, ...]) -> Shape:
+def _from_file(client_id: int, body: int, link: int, index: int, piece: Piece) -> Shape:
     path = _file(piece)
     assert path is not None
     try:
@@ -94,7 +86,7 @@ def _from_file(client_id: int, body: int, link: int, index: int, piece: tuple[An
         if not len(vertices):
             raise
         return outward(*hull(vertices))
-    return outward((vertex * piece[3]) @ turn_matrix(piece[6]).T + piece[5], face)
+    return outward((vertex * piece.size) @ turn_matrix(piece.quaternion).T + piece.position, face)
 
 
 def hull_vertices(client_id: int, body: int, link: int, index: int) -> Array:
@@ -107,7 +99,7 @@ def hull_vertices(client_id: int, body: int, link: int, index: int) -> Array:
     return np.array(vertices, float).reshape(-1, 3)
 
 
-def _unfiled(client_id: int, body: int, link: int, hulls: list[tuple[tuple[Any, ...], Array]]) -> tuple[Shape, ...]:
+def _unfiled(client_id: int, body: int, link: int, hulls: list[tuple[Piece, Array]]) -> tuple[Shape, ...]:
     """Meshes whose file PyBullet forgot: cylinders by their vertices, else the visual mesh of the same extent, else hulls."""
     if not hulls:
         return ()
@@ -133,33 +125,28 @@ def _same_space(one: Array, other: Array) -> bool:
     return bool(np.abs(one.min(0) - other.min(0)).max() < SAME_SPACE * size and np.abs(one.max(0) - other.max(0)).max() < SAME_SPACE * size)
 
 
-def _as_cylinder(piece: tuple[Any, ...], vertices: Array) -> Shape | None:
+def _as_cylinder(piece: Piece, vertices: Array) -> Shape | None:
     """The cylinder along z whose two rims the vertices are, or None."""
     if len(vertices) < 24 or len(vertices) % 2:
         return None
-    local = (vertices - piece[5]) @ turn_matrix(piece[6])
+    local = (vertices - piece.position) @ turn_matrix(piece.quaternion)
     radius, half = np.hypot(local[:, 0], local[:, 1]), np.abs(local[:, 2])
     tolerance = 1e-3 * (radius.max() + half.max())
     if np.ptp(radius) > tolerance or np.ptp(half) > tolerance or not half.min() > tolerance:
         return None
-    return Shape("cylinder", np.array([radius.max(), 2 * half.max(), 0]), piece[5], piece[6])
+    return Shape("cylinder", np.array([radius.max(), 2 * half.max(), 0]), piece.position, piece.quaternion)
 
 
 def visual_surface(client_id: int, body: int, link: int) -> Surface | None:
     """The link's visual mesh files together in the body frame, or None where there are none or they cannot be read."""
-    info = pybullet.getDynamicsInfo(body, link, physicsClientId=client_id)
-    origin, inertial = np.array(info[3]), turn_matrix(info[4])
     surfaces: list[Surface] = []
-    for entry in pybullet.getVisualShapeData(body, physicsClientId=client_id):
-        if entry[1] != link:
-            continue
-        path = _file((*entry[:4], entry[4]))
-        if entry[2] != pybullet.GEOM_MESH or path is None:
+    for piece in visual_pieces(client_id, body, link):
+        path = _file(piece)
+        if piece.kind != pybullet.GEOM_MESH or path is None:
             return None
         try:
             vertex, face = joined(read_surfaces(path))
         except MeshError:
             return None
-        in_link = (vertex * entry[3]) @ turn_matrix(entry[6]).T + entry[5]
-        surfaces.append(((in_link - origin) @ inertial, face))
+        surfaces.append(((vertex * piece.size) @ turn_matrix(piece.quaternion).T + piece.position, face))
     return joined(surfaces) if surfaces else None

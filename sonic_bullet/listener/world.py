@@ -152,7 +152,7 @@ class World:
         """This step's record. Call once after each stepSimulation; a second call without a step between finds no contacts.
 
         `stepped` tells whether there was a step. Without a hook, a missing one is known by a world in motion that stands where it
-        stood, to the bit. Raises SceneError: lost connection, numbers that are none, sub-steps that cannot be heard.
+        stood, to the bit; where nothing moves at all, a second call passes for a step. Raises SceneError: lost connection, numbers that are none, sub-steps that cannot be heard.
         """
         dt, substeps = self._step_length()
         self.stepped = self._uninstall is None or self._before is not None
@@ -166,7 +166,7 @@ class World:
         else:
             now = self._read()
             frozen = not first and same_motion(self._past, now)
-            if frozen and now.moves and past_touches is not None and touches.equals(past_touches):
+            if frozen and now.would_move(dt) and past_touches is not None and touches.equals(past_touches):
                 self.stepped = False
                 return self._again(dt)
             self._expose_impostors(now, dt)

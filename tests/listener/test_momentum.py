@@ -8,8 +8,8 @@ import numpy as np
 import pybullet as p
 import pybullet_data
 import pytest
-from scenes import GRAVITY, MASS_KG, floor, impulse_on, listen, thing, turned
 
+from scenes import GRAVITY, MASS_KG, floor, impulse_on, listen, thing, turned
 from sonic_bullet.listener import open_world
 
 SHAPES = ("sphere", "box", "capsule", "cylinder", "mesh", "compound")

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scenes import GRAVITY, MASS_KG, floor, impulse_on, listen, thing, turned
 
+from scenes import GRAVITY, MASS_KG, floor, impulse_on, listen, thing, turned
 from sonic_bullet.errors import SceneError
 from sonic_bullet.listener import open_world
 
