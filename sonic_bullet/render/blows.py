@@ -21,7 +21,10 @@ from sonic_bullet.render.sounder import Sounder, Touch, force_on_modes, touch
 from sonic_bullet.synth.pulse import contact_modulus_pa, contact_time_s, effective_mass_kg
 from sonic_bullet.synth.strikes import Split, accepted_impulse, effective_approach_m_s, key_bodies, pair_key
 
-LEAST_FLAT_RADIUS_SHARE = 0.02
+STRUCK_FLAT = 0.02
+"""Radius, as a share of the smaller body's size, of the least area that a nearly flat blow touches."""
+FLAT_CURVATURE = 0.1
+"""Curvature times size below which a contact is flat: a cap of ten times the body's size."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -140,11 +143,12 @@ def find_blows(split: Split, window: tuple[Step, ...], sounders: tuple[Sounder, 
         strongest = int(np.argmax(weight[mine]))
         speed = approach[q] if approach[q] > 0 else accepted[q] / (1.5 * mass[q])
         share = weight[mine] / weight[mine].sum()
+        curvature = float(sum(t.curvature_per_m[strongest] for t in touches))
         length, flat = contact_time_s(
             mass[q],
             contact_modulus_pa(np.array(modulus_pa(pair[0].body)), np.array(modulus_pa(pair[1].body))),
-            np.array(sum(t.curvature_per_m[strongest] for t in touches)),
-            np.array(flat_area_m2(rows.point[0][mine], share, pair)),
+            np.array(curvature),
+            np.array(flat_area_m2(rows.point[0][mine], share, pair, curvature, STRUCK_FLAT)),
             np.array(max(speed, 1e-6)),
         )
         blows.append(
@@ -195,8 +199,13 @@ def _start_s(rows: _Rows, count: int, earliest_s: float, dt_s: float) -> Array:
     return np.clip(np.where(np.isfinite(meet), meet, 0.0), earliest_s, dt_s)
 
 
-def flat_area_m2(point_m: Array, share: Array, pair: tuple[Sounder, Sounder]) -> float:
-    """Area of a flat contact: the disc with the spread of the manifold's points (r, 3), at least 2 % of the smaller body in radius."""
+def flat_area_m2(point_m: Array, share: Array, pair: tuple[Sounder, Sounder], curvature_per_m: float, least_share: float) -> float:
+    """Area of a flat contact, 0 where it is curved: the disc with the spread of the manifold's points (r, 3), shares (r,).
+
+    least_share: of the smaller body's size, below which no flat contact's radius is taken to be.
+    """
+    size = min((s.size_m for s in pair if s.body.volume_m3 > 0), default=0.1)
+    if curvature_per_m * size > FLAT_CURVATURE:
+        return 0.0
     spread = float(np.sqrt(np.sum(share[:, None] * (point_m - share @ point_m) ** 2)))
-    sizes = [s.size_m for s in pair if s.body.volume_m3 > 0]
-    return float(np.pi * max(spread, LEAST_FLAT_RADIUS_SHARE * min(sizes, default=0.1)) ** 2)
+    return float(np.pi * max(spread, least_share * size) ** 2)

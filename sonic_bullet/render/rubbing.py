@@ -22,6 +22,10 @@ from sonic_bullet.synth.strikes import Split, key_bodies, pair_key
 from sonic_bullet.synth.surface import SurfaceLoads, SurfacePairs, SurfaceState, advance, contact_radius_m, damping_ratio
 
 FOLLOW_S = 0.02
+RUBBING_FLAT = 0.25
+"""Radius, as a share of the smaller body's size, of the least area on which a flat face rubs."""
+STEEPEST = 10.0
+"""Most friction per normal force that a manifold which carries load may show."""
 SWEEP_FLOOR_M_S = 2e-4
 """Slower sweeps make nothing audible: even waves of 10 µm pass at 20 Hz. Solvers let bodies at rest creep about as fast."""
 
@@ -91,7 +95,10 @@ def _targets(key: Array, split: Split, step: Step) -> _Target:
     swap = rows.a[inside] > rows.b[inside]
     impulse = np.where(swap, -1.0, 1.0)[:, None] * rows.impulse_n_s[inside]
     weight = np.maximum(np.einsum("ri,ri->r", rows.impulse_n_s[inside], rows.normal[inside]), 0.0)
-    total = np.maximum(np.bincount(at, weight, len(key)), 1e-300)
+    total = np.bincount(at, weight, len(key))
+    # a contact that Bullet drops within the step keeps friction without a normal force: it carries nothing
+    carries = total * STEEPEST >= np.sqrt(sum(np.bincount(at, impulse[:, axis], len(key)) ** 2 for axis in range(3)))
+    total = np.where(carries & (total > 0), total, np.inf)
     sweep = np.where(swap[:, None], rows.sweep_m_s[inside][:, ::-1], rows.sweep_m_s[inside])
     mean = np.stack([np.bincount(at, weight * sweep[:, side], len(key)) for side in (0, 1)], axis=1) / total[:, None]
     direction = np.stack([np.bincount(at, impulse[:, axis], len(key)) for axis in range(3)], axis=1) / total[:, None]
@@ -101,7 +108,7 @@ def _targets(key: Array, split: Split, step: Step) -> _Target:
     load[found] = split.support_n[known[found], 1]
     order = np.argsort(at, kind="stable")
     bounds = np.searchsorted(at[order], np.arange(len(key) + 1))
-    members = tuple(inside[order[bounds[p] : bounds[p + 1]]] for p in range(len(key)))
+    members = tuple(inside[order[bounds[p] : bounds[p + 1] if np.isfinite(total[p]) else bounds[p]]] for p in range(len(key)))
     return _Target(load, np.where(mean < SWEEP_FLOOR_M_S, 0.0, mean), direction, members)
 
 
@@ -195,7 +202,7 @@ def _contact(rows: Array, step: Step, sides: tuple[Sounder, Sounder]) -> tuple[f
     bodies = [s.body for s in sides]
     if not len(rows):
         masses = [b.mass_kg for b in bodies if b.mass_kg > 0]
-        return (1 / sum(1 / m for m in masses) if masses else 1.0), 0.0, flat_area_m2(np.zeros((1, 3)), np.ones(1), sides)
+        return (1 / sum(1 / m for m in masses) if masses else 1.0), 0.0, flat_area_m2(np.zeros((1, 3)), np.ones(1), sides, 0.0, RUBBING_FLAT)
     turn, point, normal, load = _manifold(rows, step)
     index = [np.where(step.contacts.a[rows] < step.contacts.b[rows], step.contacts.a[rows], step.contacts.b[rows])[:1]]
     index.append((step.contacts.a[rows] + step.contacts.b[rows])[:1] - index[0])
@@ -209,7 +216,7 @@ def _contact(rows: Array, step: Step, sides: tuple[Sounder, Sounder]) -> tuple[f
     for side in (0, 1):
         outward = (-1.0, 1.0)[side] * to_body(turn[side], normal)
         curvature += float(touch(sides[side], point[side], outward).curvature_per_m[strongest])
-    return mass, curvature, flat_area_m2(point[0], share, sides)
+    return mass, curvature, flat_area_m2(point[0], share, sides, curvature, RUBBING_FLAT)
 
 
 def _manifold(rows: Array, step: Step) -> tuple[tuple[Array, Array], tuple[Array, Array], Array, Array]:
