@@ -20,7 +20,7 @@ import numpy as np
 from sonic_bullet.contacts import ContactLog
 from sonic_bullet.errors import AudioError, FileError
 from sonic_bullet.files import check_output, check_sr, replacing
-from sonic_bullet.records import Array
+from sonic_bullet.records import Array, Microphone, Sensor, Vibrometer
 from sonic_bullet.units import REFERENCE_PRESSURE_PA
 
 EXTENSIONS = (".png", ".pdf", ".svg")
@@ -99,6 +99,11 @@ def spectrogram_db(samples: Array, sr: int) -> tuple[Array, Array, Array]:
     return transform.f, transform.t(len(padded)), level
 
 
+def quantity(sensor: Sensor) -> tuple[str, str]:
+    """What a sensor's samples are, and their unit."""
+    return {Microphone: ("pressure", "Pa"), Vibrometer: ("velocity", "m/s")}.get(type(sensor), ("modal sum", "1"))
+
+
 def check_picture_output(path: str | os.PathLike[str]) -> Path:
     """The real path of a picture. Raises FileError where the extension is not .png, .pdf or .svg or the place cannot be written."""
     if Path(path).suffix.lower() not in EXTENSIONS:
@@ -125,10 +130,11 @@ def render_picture(path: str | os.PathLike[str], samples: Array, sr: int, log: C
     figure = Figure(figsize=(12, sum(heights) + 1.2), dpi=120, layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.subplots(len(heights), 1, sharex=True, height_ratios=heights)
-    _draw_pressure(axes[0], sound[0], rate)
+    what, unit = quantity(log.sensors[0]) if log is not None and log.sensors else ("pressure", "Pa")
+    _draw_samples(axes[0], sound[0], rate, what, unit)
     image = _draw_spectrogram(axes[1], sound[0], rate)
     if image is not None:
-        figure.colorbar(image, ax=axes[1], label="dB re 20 µPa", pad=0.01, fraction=0.03)
+        figure.colorbar(image, ax=axes[1], label="dB re 20 µPa" if unit == "Pa" else f"dB re 20·10⁻⁶ {unit}", pad=0.01, fraction=0.03)
     if log is not None and events is not None:
         _draw_events(axes[2], log, events, lanes)
     axes[-1].set_xlabel("time in s")
@@ -141,7 +147,7 @@ def render_picture(path: str | os.PathLike[str], samples: Array, sr: int, log: C
         figure.savefig(file, format=extension, metadata=timeless)
 
 
-def _draw_pressure(axis: Any, sound: Array, sr: int) -> None:
+def _draw_samples(axis: Any, sound: Array, sr: int, what: str, unit: str) -> None:
     """p(t), as the band between least and greatest value of each of at most 4000 stretches: no peak falls between pixels."""
     stretch = max(1, len(sound) // 4000)
     whole = sound[: len(sound) // stretch * stretch].reshape(-1, stretch)
@@ -151,11 +157,11 @@ def _draw_pressure(axis: Any, sound: Array, sr: int) -> None:
     peak = float(np.abs(sound).max(initial=0))
     if peak > 0:
         rms = float(np.sqrt(np.mean(sound**2)))
-        levels = [20 * np.log10(max(x, 1e-300) / REFERENCE_PRESSURE_PA) for x in (peak / np.sqrt(2), rms)]
-        axis.set_title(f"peak {peak:.3g} Pa, mean level {levels[1]:.0f} dB", loc="right", fontsize=8)
+        level = f", mean level {20 * np.log10(max(rms, 1e-300) / REFERENCE_PRESSURE_PA):.0f} dB" if unit == "Pa" else ""
+        axis.set_title(f"peak {peak:.3g} {unit}{level}", loc="right", fontsize=8)
     else:
         axis.set_title("silence", loc="right", fontsize=8)
-    axis.set_ylabel("pressure in Pa")
+    axis.set_ylabel(f"{what} in {unit}")
     axis.grid(alpha=0.25)
 
 

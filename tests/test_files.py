@@ -435,7 +435,13 @@ def test_forged_logs_are_refused_by_name(tmp_path: Path, entry: str, value: byte
 
 @pytest.mark.parametrize(
     ("old", "new", "words"),
-    [(b'"model":0', b'"model":9', "refers"), (b'"model":0', b'"model":-1', "refers"), (b'"sr":44100', b'"sr":"x"', "sr"), (b'"microphone"', b'"ear"', "ear")],
+    [
+        (b'"model":0', b'"model":9', "refers"),
+        (b'"model":0', b'"model":-1', "refers"),
+        (b'"sr":44100', b'"sr":"x"', "sr"),
+        (b'"sr":44100', b'"sr":0', "sample rate"),
+        (b'"microphone"', b'"ear"', "ear"),
+    ],
 )
 def test_forged_headers_are_refused_by_name(tmp_path: Path, old: bytes, new: bytes, words: str) -> None:
     with pytest.raises(LogError, match=words):

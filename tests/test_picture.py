@@ -10,7 +10,7 @@ import pytest
 from sonic_bullet import picture
 from sonic_bullet.contacts import ContactLog, Contacts, Step
 from sonic_bullet.errors import AudioError, FileError
-from sonic_bullet.records import Body, Material, Microphone, ModalModel
+from sonic_bullet.records import Body, Material, Microphone, ModalModel, ModalSum, Vibrometer
 
 SR = 48_000
 DT = 1 / 240
@@ -104,6 +104,12 @@ def test_pictures_are_pictures_and_equal_input_gives_equal_bytes(tmp_path: Path)
 def test_silence_and_the_shortest_sounds_can_be_drawn(tmp_path: Path, frames: int) -> None:
     assert drawn(tmp_path / "a.png", np.zeros((1, frames)), log_of([]))
     assert drawn(tmp_path / "b.png", np.ones((1, frames)))
+
+
+def test_samples_carry_their_sensor_s_unit() -> None:
+    assert picture.quantity(Microphone([0, 0, 1])) == ("pressure", "Pa")
+    assert picture.quantity(Vibrometer(0, [0, 0, 0], [0, 0, 1])) == ("velocity", "m/s")
+    assert picture.quantity(ModalSum()) == ("modal sum", "1")
 
 
 def test_more_bodies_than_lanes(tmp_path: Path) -> None:

@@ -54,7 +54,7 @@ def run_render(
 
             render_picture(picture, result.samples, result.sr, result.log, Path(scene).name)
         notes = (*result.notes, *_warnings(report))
-        say(_summary(report))
+        say(_summary(report, result.log))
         for note in notes:
             print(f"sonic-bullet: note: {note}", file=sys.stderr)
     write_json(json_to, _described(result, report, notes))
@@ -196,10 +196,14 @@ def _warnings(report: AudioReport) -> tuple[str, ...]:
     return ()
 
 
-def _summary(report: AudioReport) -> str:
+def _summary(report: AudioReport, log: ContactLog) -> str:
+    from sonic_bullet.picture import quantity
+
     channels = "1 channel" if report.channels == 1 else f"{report.channels} channels"
     scale = "" if report.gain_per_pa == 1 else f", scaled by {report.gain_per_pa:.4g}"
-    return f"{report.path}: {report.seconds:.3f} s, {channels}, {report.sr} Hz, peak {report.peak_pa:.4g} Pa, rms {report.rms_pa:.4g} Pa{scale}"
+    units = {quantity(sensor)[1] for sensor in log.sensors}
+    unit = units.pop() if len(units) == 1 else "(mixed units)"
+    return f"{report.path}: {report.seconds:.3f} s, {channels}, {report.sr} Hz, peak {report.peak_pa:.4g} {unit}, rms {report.rms_pa:.4g} {unit}{scale}"
 
 
 def _described(result: RenderResult | _Replay, report: AudioReport, notes: tuple[str, ...]) -> dict[str, Any]:

@@ -27,7 +27,8 @@ import msgspec
 import numpy as np
 
 from sonic_bullet.contacts import ROW_FIELDS, ContactLog, Contacts, Step
-from sonic_bullet.errors import LogError, RecordError
+from sonic_bullet.errors import AudioError, LogError, RecordError
+from sonic_bullet.files.audio import check_sr
 from sonic_bullet.files.container import REMEDY, read_container, take, write_container
 from sonic_bullet.records import Air, Array, Body, Material, Microphone, ModalModel, ModalSum, Sensor, Vibrometer
 
@@ -145,8 +146,9 @@ def read_log(path: str | os.PathLike[str]) -> ContactLog:
     """The contact log that `write_log` wrote. Raises FileError (no such file) and LogError (cut, foreign, forged, inconsistent)."""
     header, arrays = read_container(path, _LogHeader, LOG_FORMAT, "contact log")
     try:
+        check_sr(header.sr)
         return _unpack_log(header, arrays, path)
-    except (RecordError, LogError) as error:
+    except (RecordError, LogError, AudioError) as error:
         if str(path) in error.what:
             raise
         raise LogError(f"{path}: {error.what}", REMEDY) from error
