@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -25,6 +26,8 @@ from sonic_bullet.synth import bank_kernel
 from sonic_bullet.synth.pending import Pending, Strike, flushed, padded_gains, with_strikes, without
 from sonic_bullet.synth.tile import BLOCK
 from sonic_bullet.synth.vector import LANES
+
+__all__ = ["Bank", "BankState", "Force", "ModeSet", "Strike", "advance", "append", "audible", "empty_bank", "silence"]
 
 FLOOR = 1e-15
 """Modes with |z| below this (in √J·√2) are set to zero: ½|z|² = 5e-31 J is 1e-10 of the mode's thermal energy kT at 300 K."""
@@ -99,7 +102,7 @@ class BankState:
 
     def copy(self) -> BankState:
         """A state of its own: advancing one leaves the other."""
-        arrays = {name: getattr(self, name).copy() for name in ("z", "driven", "sound", "ringing", "is_driven", "tiled")}
+        arrays: dict[str, Any] = {name: getattr(self, name).copy() for name in ("z", "driven", "sound", "ringing", "is_driven", "tiled")}
         return BankState(at=self.at, pending=self.pending.copy(), **arrays)
 
 
@@ -132,7 +135,10 @@ def append(bank: Bank, state: BankState, bodies: Sequence[ModeSet]) -> tuple[Ban
     for body in bodies:
         m = len(body.omega_rad_s)
         if body.decay_per_s.shape != (m,) or body.weight.shape != (sets, m) or not np.isfinite(body.weight).all():
-            raise AudioError(f"modes of shape {body.omega_rad_s.shape}, {body.decay_per_s.shape}, weights {body.weight.shape} for {sets} weight sets", "give finite (m,), (m,), (W, m)")
+            raise AudioError(
+                f"modes of shape {body.omega_rad_s.shape}, {body.decay_per_s.shape}, weights {body.weight.shape} for {sets} weight sets",
+                "give finite (m,), (m,), (W, m)",
+            )
         if not audible(body.omega_rad_s, body.decay_per_s, bank.sr).all():
             raise AudioError("a mode beyond half the sample rate, overdamped or not finite", "keep the modes that `audible` names")
         sizes.append(m)
@@ -168,7 +174,9 @@ def append(bank: Bank, state: BankState, bodies: Sequence[ModeSet]) -> tuple[Ban
         z=_joined(state.z, silent),
         driven=_joined(state.driven, silent),
         sound=np.concatenate([state.sound, np.zeros((sets, len(bodies), BLOCK))], axis=1),
-        **{name: np.concatenate([getattr(state, name), flags]) for name in ("ringing", "is_driven", "tiled")},
+        ringing=np.concatenate([state.ringing, flags]),
+        is_driven=np.concatenate([state.is_driven, flags]),
+        tiled=np.concatenate([state.tiled, flags]),
     )
 
 

@@ -50,7 +50,9 @@ def _ring(b, z, pole, block, weight, modes, start, stop, heard, floor, sound, no
 
 
 @njit(cache=True, nogil=True)
-def _strike(j, n, state, modes, start, lanes, count, whole, delta, phase, upcoming, first, impulse, impulse_at, rows, rows_at, width):  # pragma: no cover - compiled
+def _strike(
+    j, n, state, modes, start, lanes, count, whole, delta, phase, upcoming, first, impulse, impulse_at, rows, rows_at, width
+):  # pragma: no cover - compiled
     """Add strike j's nodes in (n-1, n] to the driven state. True when it was the last of them."""
     multiplier = -1
     if n == first[j]:
@@ -60,8 +62,19 @@ def _strike(j, n, state, modes, start, lanes, count, whole, delta, phase, upcomi
         nodes = min(max(int(np.floor((phase[j] + 1.0) / delta[j])), whole[j]), whole[j] + 1)
         phase[j] += 1.0 - nodes * delta[j]
         multiplier = nodes - whole[j]
-    upcoming[j] = drive.strike_nodes(state, modes, start, lanes, rows, rows_at[j], width, multiplier, impulse, impulse_at[j] + upcoming[j], nodes) - impulse_at[j]
+    upcoming[j] = (
+        drive.strike_nodes(state, modes, start, lanes, rows, rows_at[j], width, multiplier, impulse, impulse_at[j] + upcoming[j], nodes) - impulse_at[j]
+    )
     return upcoming[j] >= count[j]
+
+
+@njit(cache=True, nogil=True)
+def _begins(first, done, s0, s1, end):  # pragma: no cover - compiled
+    """Whether one of the strikes s0 … s1 - 1 has nodes before sample ``end``."""
+    for j in range(s0, s1):
+        if not done[j] and first[j] < end:
+            return True
+    return False
 
 
 @njit(cache=True, nogil=True)
@@ -80,6 +93,50 @@ def _close_block(b, z, driven, pole, modes, start, stop, ringing, is_driven, til
 
 
 @njit(cache=True, nogil=True)
+def _drive(at, i, end, place, b, out, driven, is_driven, tiled, pole, modes, start, stop, quadrature, weight_flat, heard, sound, s0, s1,
+           count, whole, delta, phase, upcoming, first, impulse, impulse_at, rows, rows_at, done, f0, f1, force, gain0, gain1, gain_at, progress, period):  # fmt: skip  # pragma: no cover - compiled
+    """Samples i … end - 1 of body b, sample by sample: strikes and forces enter, free and driven part are heard together."""
+    width = len(rows) // 8
+    for k in range(i, end):
+        sample = at + k
+        if is_driven[b]:
+            drive.turn_driven(driven, pole, modes, start, stop - start)
+        for j in range(s0, s1):
+            if not done[j] and sample >= first[j]:
+                done[j] = _strike(
+                    j,
+                    sample,
+                    driven,
+                    modes,
+                    start,
+                    stop - start,
+                    count,
+                    whole,
+                    delta,
+                    phase,
+                    upcoming,
+                    first,
+                    impulse,
+                    impulse_at,
+                    rows,
+                    rows_at,
+                    width,
+                )
+                is_driven[b] = True
+        for f in range(f0, f1):
+            push = force[f, k] * period
+            if abs(push) >= FLUSH:
+                drive.push(driven, quadrature, modes, start, stop - start, gain0, gain1, gain_at[f], push * (1.0 - progress[k]), push * progress[k])
+                is_driven[b] = True
+        for w in range(len(heard)):
+            if heard[w, b]:
+                value = sound[w, b, place + k - i] if tiled[b] else 0.0
+                if is_driven[b]:
+                    value += drive.heard(driven, start, weight_flat, 2 * w * modes + start, modes, stop - start)
+                out[w, b, k] = value if abs(value) >= FLUSH else 0.0
+
+
+@njit(cache=True, nogil=True)
 def advance(at, out, offset, pole, block, quadrature, weight, heard, z, driven, sound, ringing, is_driven, tiled, floor,
             strike_of, count, whole, delta, phase, upcoming, first, impulse, impulse_at, rows, rows_at, done,
             force_of, force, gain0, gain1, gain_at, progress, period):  # fmt: skip  # pragma: no cover - compiled
@@ -87,7 +144,6 @@ def advance(at, out, offset, pole, block, quadrature, weight, heard, z, driven, 
     n = out.shape[2]
     modes = len(quadrature)
     now, powers, table, column = _aligned(2 * CHUNK), _aligned(10 * CHUNK), _aligned(2 * ROW * CHUNK), _aligned(2 * ROWS * CHUNK)
-    width = len(rows) // 8
     weight_flat = weight.reshape(-1)
     for b in range(len(offset) - 1):
         start, stop = offset[b], offset[b + 1]
@@ -106,10 +162,7 @@ def advance(at, out, offset, pole, block, quadrature, weight, heard, z, driven, 
             if place == 0:
                 tiled[b] = ringing[b] and _ring(b, z, pole, block, weight, modes, start, stop, heard, floor, sound, now, powers, table, column)
                 ringing[b] = tiled[b]
-            busy = is_driven[b] or f1 > f0
-            for j in range(s0, s1):
-                busy = busy or (not done[j] and first[j] < at + end)
-            if not busy:
+            if not (is_driven[b] or f1 > f0 or _begins(first, done, s0, s1, at + end)):
                 if tiled[b]:
                     for w in range(len(heard)):
                         if heard[w, b]:
@@ -119,25 +172,8 @@ def advance(at, out, offset, pole, block, quadrature, weight, heard, z, driven, 
                     tiled[b] = place + end - i < BLOCK
                 i = end
                 continue
-            for k in range(i, end):
-                sample = at + k
-                if is_driven[b]:
-                    drive.turn_driven(driven, pole, modes, start, stop - start)
-                for j in range(s0, s1):
-                    if not done[j] and sample >= first[j]:
-                        done[j] = _strike(j, sample, driven, modes, start, stop - start, count, whole, delta, phase, upcoming, first, impulse, impulse_at, rows, rows_at, width)
-                        is_driven[b] = True
-                for f in range(f0, f1):
-                    push = force[f, k] * period
-                    if abs(push) >= FLUSH:
-                        drive.push(driven, quadrature, modes, start, stop - start, gain0, gain1, gain_at[f], push * (1.0 - progress[k]), push * progress[k])
-                        is_driven[b] = True
-                for w in range(len(heard)):
-                    if heard[w, b]:
-                        value = sound[w, b, place + k - i] if tiled[b] else 0.0
-                        if is_driven[b]:
-                            value += drive.heard(driven, start, weight_flat, 2 * w * modes + start, modes, stop - start)
-                        out[w, b, k] = value if abs(value) >= FLUSH else 0.0
+            _drive(at, i, end, place, b, out, driven, is_driven, tiled, pole, modes, start, stop, quadrature, weight_flat, heard, sound, s0, s1,
+                   count, whole, delta, phase, upcoming, first, impulse, impulse_at, rows, rows_at, done, f0, f1, force, gain0, gain1, gain_at, progress, period)  # fmt: skip
             if place + end - i == BLOCK:
                 _close_block(b, z, driven, pole, modes, start, stop, ringing, is_driven, tiled)
             i = end

@@ -16,7 +16,7 @@ from numba.extending import intrinsic
 from sonic_bullet.synth.vector import LANES, Emit, Value, constant
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@intrinsic
 def turn_driven(typingctx, state, pole, modes, start, count):
     """State one sample on: state <- state·pole."""
 
@@ -38,7 +38,7 @@ def turn_driven(typingctx, state, pole, modes, start, count):
     return types.void(state, pole, modes, start, count), codegen
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@intrinsic
 def push(typingctx, state, quadrature, modes, start, count, gain0, gain1, at, a0, a1):
     """A force's impulse at the sample: a0·gain0 + a1·gain1 (from ``at`` on) onto the real part, times d/ω onto the imaginary."""
 
@@ -61,7 +61,7 @@ def push(typingctx, state, quadrature, modes, start, count, gain0, gain1, at, a0
     return types.void(state, quadrature, modes, start, count, gain0, gain1, at, a0, a1), codegen
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@intrinsic
 def strike_nodes(typingctx, state, modes, start, count, rows, at, width, multiplier, impulse, node, nodes):
     """A strike's ``nodes`` impulses since the last sample: r <- r·E, state += r·Horner(impulse, D).
 
@@ -104,7 +104,7 @@ def strike_nodes(typingctx, state, modes, start, count, rows, at, width, multipl
     return types.int64(state, modes, start, count, rows, at, width, multiplier, impulse, node, nodes), codegen
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@intrinsic
 def heard(typingctx, state, start, weight, at, modes, count):
     """Σ Re(weight·state), the body's weights from ``at`` on: lane by lane, then across lanes in pairs."""
 

@@ -12,7 +12,8 @@ A body moved by hand emits from its old place and its new one, fading over the s
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 
@@ -60,7 +61,8 @@ class PathState:
 
     def copy(self) -> PathState:
         """A state of its own: propagating one leaves the other."""
-        return PathState(**{name: value.copy() if isinstance(value, np.ndarray) else value for name, value in ((n, getattr(self, n)) for n in self.__slots__)})
+        arrays: dict[str, Any] = {field.name: getattr(self, field.name).copy() for field in fields(self) if field.name != "at"}
+        return PathState(at=self.at, **arrays)
 
 
 def empty_path(sr: int, air: Air, microphone_m: Array, at: int = 0) -> tuple[Path, PathState]:
@@ -109,7 +111,13 @@ def propagate(
     """
     count, channels = len(path.radius_m), len(path.microphone_m)
     n = len(progress)
-    wanted = {"source": (source, (count, n)), "jerk": (jerk, (count, 3, n)), "position0_m": (position0_m, (count, 3)), "position1_m": (position1_m, (count, 3)), "progress": (progress, (n,))}
+    wanted = {
+        "source": (source, (count, n)),
+        "jerk": (jerk, (count, 3, n)),
+        "position0_m": (position0_m, (count, 3)),
+        "position1_m": (position1_m, (count, 3)),
+        "progress": (progress, (n,)),
+    }
     arrays = {}
     for name, (value, shape) in wanted.items():
         arrays[name] = np.ascontiguousarray(value, float)
@@ -136,6 +144,11 @@ def _starts(sizes: Array) -> Array:
     return np.concatenate([[0], np.cumsum(sizes)])[: len(sizes)].astype(np.int64)
 
 
+def _awake(state: PathState, channels: int) -> Array:
+    """(t,) whether sound of the place is under way to any microphone."""
+    return np.asarray(state.awake.reshape(len(state.body), channels).any(axis=1))
+
+
 def _add_places(state: PathState, body: Array, channels: int) -> None:
     """Further places for the bodies, asleep."""
     count = len(body)
@@ -152,7 +165,7 @@ def _add_places(state: PathState, body: Array, channels: int) -> None:
 
 def _begin_fades(state: PathState, step: int, teleported: Array, loud: Array, channels: int) -> None:
     """Give each body moved in this step a new place, once, and only if anything of it is heard: silence needs no fade."""
-    awake = state.awake.reshape(-1, channels).any(axis=1) if channels else np.zeros(len(state.body), bool)
+    awake = _awake(state, channels)
     moved = np.flatnonzero(teleported & (state.left != step) & (loud | awake[state.main]))
     if not len(moved):
         return
@@ -199,11 +212,13 @@ def _make_room(path: Path, state: PathState, from_m: Array, to_m: Array, loud: A
     channels = len(path.microphone_m)
     if not channels or not len(state.body):
         return
-    heard = loud[state.body] | state.awake.reshape(-1, channels).any(axis=1)
+    heard = loud[state.body] | _awake(state, channels)
     away = np.maximum(*(np.linalg.norm(path.microphone_m[None] - end[:, None], axis=2).max(axis=1) for end in (from_m, to_m)))
     far = np.flatnonzero(heard & (away > FARTHEST_M))
     if len(far):
-        raise AudioError(f"body {state.body[far[0]]} sounds {away[far[0]]:.0f} m from a microphone", f"keep what sounds within {FARTHEST_M:.0f} m, or remove it")
+        raise AudioError(
+            f"body {state.body[far[0]]} sounds {away[far[0]]:.0f} m from a microphone", f"keep what sounds within {FARTHEST_M:.0f} m, or remove it"
+        )
     need = np.where(heard, away * path.sr / path.air.sound_speed_m_s + _MARGIN, 0)
     size = np.maximum(state.size, 2 ** np.ceil(np.log2(np.maximum(need, 1))).astype(np.int64))
     if (size == state.size).all():

@@ -19,7 +19,7 @@ from numba import njit, types
 from numba.extending import intrinsic
 
 from sonic_bullet.records import Array
-from sonic_bullet.synth.vector import LANES, Emit, constant
+from sonic_bullet.synth.vector import LANES, Emit
 
 TAPS = 16
 AHEAD = TAPS // 2
@@ -53,7 +53,7 @@ def tap_polynomials() -> Array:
     return fit
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@intrinsic
 def _interpolate(typingctx, ring, at, taps, t):
     """Σ_k ring[at + k] h_k(t) over the 16 taps: even·(a_k + a_{15-k}) + t·odd·(a_k - a_{15-k}) over eight."""
 
@@ -170,7 +170,9 @@ def propagate(at, out, source, jerk, coefficient, radius, order, body, from_m, t
             line = place * channels + c
             if not awake[line] and (fade[place] == 2 or not loud[b]):
                 continue
-            _emit(source[b], jerk[b], coefficient[b], radius[b], from_m[place], to_m[place], fade[place], progress, microphone[c], samples_per_m, emitted, delay)
+            _emit(
+                source[b], jerk[b], coefficient[b], radius[b], from_m[place], to_m[place], fade[place], progress, microphone[c], samples_per_m, emitted, delay
+            )
             _listen(line, at, emitted, delay, out[c], ring, ring_at[line], delays, delays_at[line], mask[line], awake, cursor, last, taps)
     for c in range(channels):
         for i in range(n):

@@ -108,7 +108,10 @@ def with_strikes(pending: Pending, strikes: Sequence[Strike], at: int, offset: A
         k = impulse.size
         delta = float(strike.spacing) if k > 1 else 1.0
         if impulse.ndim != 1 or k == 0 or not (np.isfinite(impulse).all() and np.isfinite(strike.start) and 0 < delta <= LONGEST_SPACING):
-            raise AudioError(f"a strike on body {strike.body} of {k} nodes, {strike.spacing} samples apart, at {strike.start}", "give finite impulses less than 16 samples apart")
+            raise AudioError(
+                f"a strike on body {strike.body} of {k} nodes, {strike.spacing} samples apart, at {strike.start}",
+                "give finite impulses less than 16 samples apart",
+            )
         first = int(np.ceil(strike.start))
         if first < at:
             raise AudioError(f"a strike at sample {strike.start:.2f}, but {at} samples have sounded", "pass strikes before their time has sounded")

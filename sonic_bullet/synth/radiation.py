@@ -10,7 +10,7 @@
 
 σ_l = 1/(x² |h_l'(x)|²) are those of a sphere that moves as the harmonic l [Junger & Feit 1986, sec. 2.11; Williams 1999, eq. 6.122],
 so spheres are exact to l = 2. Q radiates ρ₀ck²Q²/4π for any compact body: σ0·Q²/S is exact at small ka whatever the form. The dipole
-takes the body's added mass for a sphere's (a flat disc gets 3 dB too much). What is beyond l = 2 radiates less at small ka than A2 says.
+takes the body's added mass for a sphere's (a flat disc gets 3.2 dB too much). What is beyond l = 2 radiates less at small ka than A2 says.
 
 The weight is complex. Its phase is that of the sphere's law for the part that leads (monopole: ix/(1+ix), so that the pressure follows
 acceleration at small ka), its sign follows the mode's: a shape and its negative sound the same.

@@ -26,7 +26,7 @@ CHUNK = 32
 _TILE_ROWS = 8 if binding.get_host_cpu_features().get("avx512f", False) else 2  # accumulators that fit the registers
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@intrinsic
 def turn(typingctx, z, pole, block, modes, start, count, floor, now, powers):  # type: ignore[no-untyped-def]
     """Take the state at a block's start: now = z (0 where |z|² < floor), z <- now·p^256, powers = p, p², p⁴, p⁸, p¹⁶. Returns lanes alive.
 
@@ -62,7 +62,7 @@ def turn(typingctx, z, pole, block, modes, start, count, floor, now, powers):  #
     return types.int64(z, pole, block, modes, start, count, floor, now, powers), codegen
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@intrinsic
 def rows(typingctx, powers, count, table):  # type: ignore[no-untyped-def]
     """table (CHUNK, 2·ROW): Re p^r, then Im p^r, r = 0 … 15, of each mode: p^r as the product of p, p², p⁴, p⁸ where r has that bit."""
 
@@ -90,7 +90,7 @@ def rows(typingctx, powers, count, table):  # type: ignore[no-untyped-def]
     return types.void(powers, count, table), codegen
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@intrinsic
 def columns(typingctx, now, weight, modes, start, powers, count, column):  # type: ignore[no-untyped-def]
     """column (2·ROWS, CHUNK): Re u s^q, then -Im u s^q, q = 0 … 15, with u = weight·now. weight: flat (2·modes)."""
 
@@ -120,7 +120,7 @@ def columns(typingctx, now, weight, modes, start, powers, count, column):  # typ
     return types.void(now, weight, modes, start, powers, count, column), codegen
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@intrinsic
 def outer(typingctx, column, table, count, sound):  # type: ignore[no-untyped-def]
     """sound (BLOCK,) += Σ over the chunk's modes of column ⊗ table, mode after mode."""
 

@@ -1,0 +1,73 @@
+"""However the calls are cut, the bank's bits are the same."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from sonic_bullet.records import Array
+from sonic_bullet.synth.bank import Bank, BankState, Force, ModeSet, Strike, advance, append, empty_bank
+
+SR = 48_000
+SIZES = (5, 0, 33, 1, 70, 8, 16)
+FIRST = 1000
+
+
+def scene(seed: int, length: int) -> tuple[Bank, BankState, list[Strike], dict[int, tuple[Array, Array, Array]], Array]:
+    """Bodies of unequal size, strikes short and long, several on one body at once, and forces on two of them for a while."""
+    rng = np.random.default_rng(seed)
+    bank, state = empty_bank(SR, 2, at=FIRST)
+    bodies = [
+        ModeSet(2 * np.pi * np.sort(rng.uniform(30, 23_000, m)), 10.0 ** rng.uniform(-1, 4.5, m), rng.normal(size=(2, m)) + 1j * rng.normal(size=(2, m)))
+        for m in SIZES
+    ]
+    bodies[4] = ModeSet(bodies[4].omega_rad_s, bodies[4].decay_per_s, bodies[4].weight * np.array([[1.0], [0.0]]))
+    bank, state = append(bank, state, bodies)
+    strikes = []
+    for _ in range(int(rng.integers(1, 25))):
+        body, nodes = int(rng.integers(len(SIZES))), int(rng.choice([1, 2, 24, 300]))
+        start = FIRST + rng.choice([rng.uniform(0, length - 1), float(rng.integers(length)), 0.0])
+        strikes.append(Strike(body, start, float(rng.choice([0.04, 0.1, 0.5, 1.0, 1.37, 3.0])), rng.normal(size=nodes), rng.normal(size=SIZES[body])))
+    strikes.append(strikes[0])
+    forces = {}
+    for body in (2, 4, 4 if seed % 2 else 3):
+        signal = rng.normal(size=length) * (rng.uniform() < 0.7)
+        signal[: int(rng.integers(length))] = 0.0
+        forces[len(forces)] = (np.array([body]), signal, rng.normal(size=(2, SIZES[body])))
+    return bank, state, strikes, forces, rng.uniform(size=length)
+
+
+def render(seed: int, length: int, cuts: list[int]) -> bytes:
+    bank, state, strikes, forces, progress = scene(seed, length)
+    parts = []
+    for lo, hi in zip([0, *cuts], [*cuts, length], strict=True):
+        now = [s for s in strikes if lo <= np.ceil(s.start) - FIRST < hi or (lo == 0 and np.ceil(s.start) < FIRST)]
+        pushes = [Force(int(body[0]), signal[lo:hi], gains[0], gains[1]) for body, signal, gains in forces.values()]
+        parts.append(advance(bank, state, hi - lo, now, pushes, progress[lo:hi]))
+    whole = np.concatenate(parts, axis=2)
+    assert np.isfinite(whole).all()
+    return whole.tobytes()
+
+
+@settings(max_examples=60, deadline=None, derandomize=True)
+@given(st.integers(0, 10_000), st.integers(300, 3000), st.data())
+def test_any_cuts_give_the_same_bits(seed: int, length: int, data: st.DataObject) -> None:
+    cuts = sorted(data.draw(st.lists(st.integers(0, length), max_size=40)))
+    assert render(seed, length, cuts) == render(seed, length, [])
+
+
+@pytest.mark.parametrize("size", [1, 2, 3, 7, 63, 64, 200, 255, 256, 257, 1024, 8192])
+def test_every_frame_size_gives_the_same_bits(size: int) -> None:
+    length = 9000
+    assert render(42, length, list(range(size, length, size))) == render(42, length, [])
+
+
+def test_strikes_known_early_or_late_give_the_same_bits() -> None:
+    bank, state, strikes, _, _ = scene(7, 2000)
+    early = advance(bank, state.copy(), 2000, strikes)
+    parts = [advance(bank, state, 500, [s for s in strikes if s.start <= FIRST + 900])]
+    parts.append(advance(bank, state, 400))
+    parts.append(advance(bank, state, 1100, [s for s in strikes if s.start > FIRST + 900]))
+    assert np.concatenate(parts, axis=2).tobytes() == early.tobytes()
