@@ -17,6 +17,7 @@ import numpy as np
 import pybullet
 
 from sonic_bullet.errors import SceneError
+from sonic_bullet.listener.kinematics import jumps
 from sonic_bullet.records import Array
 
 LINK_SPAN = 1 << 20
@@ -118,7 +119,7 @@ def read_motion(client_id: int, roster: Roster) -> Motion:
             f"body {body}{link_words(link)} has a pose or speed that is not a number",
             "check its mass, inertia and what touches it; remove it or reset the scene",
         )
-    return Motion(roster, table[:, 0:3], table[:, 3:7], table[:, 7:10], table[:, 10:13])
+    return Motion(roster, *(np.ascontiguousarray(part) for part in (table[:, 0:3], table[:, 3:7], table[:, 7:10], table[:, 10:13])))
 
 
 def link_words(link: int) -> str:
@@ -139,24 +140,22 @@ def jumped(earlier: Motion, later: Motion, dt_s: float) -> Array:
 
     What has mass 0 may be driven by resetting its pose each step: up to DRIVEN_SPEED_M_S that is motion, beyond it a jump.
     """
-    if not len(earlier.roster.code):
-        return np.zeros(len(later.roster.code), bool)
     old = np.arange(len(later.roster.code)) if earlier.roster is later.roster else rows_of(earlier.roster, later.roster.code)
-    moved = np.linalg.norm(later.position_m - earlier.position_m[old], axis=1)
-    speed = np.linalg.norm(later.velocity_m_s, axis=1) + np.linalg.norm(earlier.velocity_m_s[old], axis=1)
-    reach = np.where(later.roster.static, DRIVEN_SPEED_M_S, 1.5 * speed) * dt_s + JUMP_FLOOR_M
-    return np.asarray((moved > reach) & (old >= 0))
+    return np.asarray(jumps(earlier.table, later.table, old, later.roster.static, dt_s, DRIVEN_SPEED_M_S, JUMP_FLOOR_M))
 
 
 def with_driven_twists(earlier: Motion, later: Motion, dt_s: float) -> Motion:
     """`later`, where bodies of mass 0 whose pose was reset since `earlier` carry the velocity of that move."""
-    if earlier.roster is not later.roster or not later.roster.static.any():
+    if earlier.roster is not later.roster:
         return later
-    driven = later.roster.static & ((later.position_m != earlier.position_m).any(axis=1) | (later.quaternion_xyzw != earlier.quaternion_xyzw).any(axis=1))
-    if not driven.any():
+    static = np.flatnonzero(later.roster.static)
+    driven = static[
+        (later.position_m[static] != earlier.position_m[static]).any(axis=1) | (later.quaternion_xyzw[static] != earlier.quaternion_xyzw[static]).any(axis=1)
+    ]
+    if not len(driven):
         return later
     velocity, spin = later.velocity_m_s.copy(), later.spin_rad_s.copy()
-    velocity[driven] = (later.position_m - earlier.position_m)[driven] / dt_s
+    velocity[driven] = (later.position_m[driven] - earlier.position_m[driven]) / dt_s
     spin[driven] = rotation_between(earlier.quaternion_xyzw[driven], later.quaternion_xyzw[driven]) / dt_s
     return Motion(later.roster, later.position_m, later.quaternion_xyzw, velocity, spin)
 

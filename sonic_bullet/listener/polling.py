@@ -9,6 +9,7 @@ and the friction fields are not (bullet3 issues 2765, 3026). k rows.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import chain
 from typing import Any
@@ -17,6 +18,7 @@ import numpy as np
 
 from sonic_bullet.errors import SceneError
 from sonic_bullet.listener.frames import encode
+from sonic_bullet.listener.kinematics import impulses
 from sonic_bullet.records import Array
 
 RawContact = tuple[Any, ...]
@@ -49,9 +51,9 @@ class Touches:
         return len(self) == len(other) and all(np.array_equal(getattr(self, name), getattr(other, name)) for name in self.__slots__)
 
 
-def is_loaded(raw: RawContact) -> bool:
-    """Bullet lists neighbours up to 2 cm apart; only those that carry force are contacts. NaN counts as force, to be caught."""
-    return not (raw[FORCE] == 0 and raw[FRICTION_1] == 0 and raw[FRICTION_2] == 0)
+def loaded(contacts: Iterable[RawContact]) -> list[RawContact]:
+    """Those that carry force: Bullet lists neighbours up to 2 cm apart too. NaN counts as force, to be caught."""
+    return [raw for raw in contacts if raw[FORCE] != 0 or raw[FRICTION_1] != 0 or raw[FRICTION_2] != 0]
 
 
 def gather(contacts: list[RawContact], dt_s: float) -> Touches:
@@ -68,10 +70,10 @@ def gather(contacts: list[RawContact], dt_s: float) -> Touches:
     ids = np.array((body_a, body_b, link_a, link_b), np.int64)
     scalar = np.array((gap, force, f1, f2))
     n = vectors(normal)
-    impulse = dt_s * (scalar[1][:, None] * n + scalar[2][:, None] * vectors(t1) + scalar[3][:, None] * vectors(t2))
+    impulse = impulses(dt_s, n, vectors(t1), vectors(t2), scalar[1:])
     touches = Touches(encode(ids[0], ids[2]), encode(ids[1], ids[3]), vectors(point_a), vectors(point_b), n, scalar[0], impulse, np.zeros(k))
-    finite = np.isfinite(impulse).all(axis=1) & np.isfinite(touches.point_a_m).all(axis=1) & np.isfinite(scalar[0])
-    if not finite.all():
+    if not (np.isfinite(impulse).all() and np.isfinite(touches.point_a_m).all() and np.isfinite(touches.point_b_m).all() and np.isfinite(scalar[0]).all()):
+        finite = np.isfinite(np.concatenate([impulse, touches.point_a_m, touches.point_b_m, scalar[:1].T], axis=1)).all(axis=1)
         bad = int(np.flatnonzero(~finite)[0])
         raise SceneError(
             f"the contact of bodies {body_a[bad]} and {body_b[bad]} holds a force or place that is not a number", "check the masses and inertias of both"

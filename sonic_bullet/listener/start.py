@@ -8,7 +8,7 @@ moved since: there Bullet's semi-implicit step is undone from what it left,
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,12 +28,14 @@ class Start:
     born: Array
 
 
-def hooked_start(past: Motion | None, now: Motion, by_hand: Iterable[int], dt_s: float) -> Start:
+def hooked_start(past: Motion | None, now: Motion, by_hand: Collection[int], dt_s: float) -> Start:
     """From the motion read before this step and the one read before the last (None: no step yet); by_hand: bodies known to be moved."""
     if past is None:
         return Start(now, np.zeros(len(now.roster.code), bool), np.ones(len(now.roster.code), bool))
-    born = rows_of(past.roster, now.roster.code) < 0
-    moved = jumped(past, now, dt_s) | (np.isin(now.roster.code // LINK_SPAN, list(by_hand)) & ~born & ~now.roster.static)
+    born = np.zeros(len(now.roster.code), bool) if past.roster is now.roster else rows_of(past.roster, now.roster.code) < 0
+    moved = jumped(past, now, dt_s)
+    if by_hand:
+        moved |= np.isin(now.roster.code // LINK_SPAN, list(by_hand)) & ~born & ~now.roster.static
     return Start(with_driven_twists(past, now, dt_s), moved, born)
 
 

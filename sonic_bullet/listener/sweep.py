@@ -13,119 +13,122 @@ pair keeps its last velocity; a new pair's contact stays on the smaller body.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numba import njit
 
-from sonic_bullet.listener.kinematics import turn
+from sonic_bullet.listener.kinematics import Table, pose_after, turn
 from sonic_bullet.records import Array
 
 MEMORY_STEPS = 8
 ROLL_MARGIN = 2.0
 SLIP_MARGIN = 0.05
 
+Trace = tuple[Array, Array]
+"""Contacts of one step, ordered by pair: pair (k,) int64; (k, 10) of time_s, point_a_m (3), point_b_m (3), u_a (3) in the world's axes."""
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Trace:
-    """Contacts of one step, ordered by pair: pair (k,) int64, time_s (k,), point_a_m, point_b_m (k, 3), over_a_m_s (k, 3) = u_a, world frame."""
-
-    pair: Array
-    time_s: Array
-    point_a_m: Array
-    point_b_m: Array
-    over_a_m_s: Array
-
-
-@njit(cache=True, fastmath=False, nogil=True)  # type: ignore[untyped-decorator]
-def match(  # noqa: PLR0912, PLR0917
-    traces: tuple[Array, Array, Array, Array, Array],
-    starts: Array,
-    pair: Array,
-    time: Array,
-    point_a: Array,
-    point_b: Array,
-    quat_a: Array,
-    quat_b: Array,
-    normal: Array,
-    slip: Array,
-    roll: Array,
-    settle_a: Array,
-) -> Array:
-    """u_a (k, 3) in m/s. traces: columns of Trace, newest step first, step s in rows starts[s] … starts[s+1]-1.
-
-    roll (k,) = |ω_rel|·R in m/s. settle_a (k,): where nothing is known, a's point stays and b is swept (else the other way).
-    """
-    old_pair, old_time, old_a, old_b, old_u = traces
-    result = np.zeros((len(pair), 3))
-    for i in range(len(pair)):
-        slipping = np.sqrt(slip[i, 0] ** 2 + slip[i, 1] ** 2 + slip[i, 2] ** 2)
-        limit = ROLL_MARGIN * roll[i] + SLIP_MARGIN * slipping
-        found, held = False, False
-        for s in range(len(starts) - 1):
-            first = starts[s] + np.searchsorted(old_pair[starts[s] : starts[s + 1]], pair[i])
-            best = np.inf
-            for j in range(first, starts[s + 1]):
-                if old_pair[j] != pair[i]:
-                    break
-                if not held:
-                    result[i] = old_u[j]
-                    held = True
-                age = time[i] - old_time[j]
-                if age <= 0:
-                    continue
-                a = surface_velocity(point_a[i], old_a[j], quat_a[i], normal[i], age)
-                b = surface_velocity(point_b[i], old_b[j], quat_b[i], normal[i], age)
-                over_a = np.empty(3)
-                fast_a, fast_b = 0.0, 0.0
-                for x in range(3):
-                    over_a[x] = 0.5 * (a[x] + b[x] - slip[i, x])
-                    fast_a += over_a[x] ** 2
-                    fast_b += (over_a[x] + slip[i, x]) ** 2
-                slower = np.sqrt(min(fast_a, fast_b))
-                if slower <= limit and slower < best:
-                    best = slower
-                    result[i] = over_a
-                    found = True
-            if found:
-                break
-        if not found:
-            fast_a, fast_b = 0.0, 0.0
-            for x in range(3):
-                fast_a += result[i, x] ** 2
-                fast_b += (result[i, x] + slip[i, x]) ** 2
-            if not held or np.sqrt(min(fast_a, fast_b)) > limit:
-                for x in range(3):
-                    result[i, x] = 0.0 if settle_a[i] else -slip[i, x]
-    return result
+NO_TRACE: Trace = (np.zeros(0, np.int64), np.zeros((0, 10)))
+NO_TRACES = (NO_TRACE,) * MEMORY_STEPS
 
 
 @njit(cache=True, fastmath=False, nogil=True, inline="always")  # type: ignore[untyped-decorator]
-def surface_velocity(now: Array, before: Array, quaternion: Array, normal: Array, age: float) -> tuple[float, float, float]:
-    """Displacement in a body's frame over time, in the world's axes, laid into the tangent plane at full length.
+def surface_velocity(rows: Array, i: int, old: Array, j: int, first: int, quaternion: Array, normal: Array) -> tuple[float, float, float]:
+    """Velocity of a contact over a surface, world axes: from row j of `old` to row i of `rows`, point in columns first … first + 2.
 
-    The chord of a rolling step leaves the tangent plane by half the angle rolled; its length, not its projection, is the path.
+    Laid into the tangent plane at full length: the chord of a rolling step leaves the plane by half the angle rolled; its length,
+    not its projection, is the path.
     """
     q = quaternion
-    dx, dy, dz = turn(q[0], q[1], q[2], q[3], now[0] - before[0], now[1] - before[1], now[2] - before[2])
+    dx, dy, dz = turn(q[0], q[1], q[2], q[3], rows[i, first] - old[j, first], rows[i, first + 1] - old[j, first + 1], rows[i, first + 2] - old[j, first + 2])
     length2 = dx * dx + dy * dy + dz * dz
-    along = dx * normal[0] + dy * normal[1] + dz * normal[2]
-    dx, dy, dz = dx - along * normal[0], dy - along * normal[1], dz - along * normal[2]
+    along = dx * normal[i, 0] + dy * normal[i, 1] + dz * normal[i, 2]
+    dx, dy, dz = dx - along * normal[i, 0], dy - along * normal[i, 1], dz - along * normal[i, 2]
     flat2 = dx * dx + dy * dy + dz * dz
+    age = rows[i, 0] - old[j, 0]
     scale = np.sqrt(length2 / flat2) / age if flat2 > 0.25 * length2 else 1.0 / age
     return dx * scale, dy * scale, dz * scale
 
 
-def stacked(traces: tuple[Trace, ...]) -> tuple[tuple[Array, Array, Array, Array, Array], Array]:
-    """The columns of all traces one after the other, and where each begins (s + 1,)."""
-    starts = np.concatenate([[0], np.cumsum([len(trace.pair) for trace in traces])]).astype(np.int64)
-    if not traces:
-        return (np.zeros(0, np.int64), np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 3))), starts
-    pair, time, a, b, u = (np.concatenate([getattr(trace, name) for trace in traces]) for name in Trace.__slots__)
-    return (pair, time, a, b, u), starts
+@njit(cache=True, fastmath=False, nogil=True, inline="always")  # type: ignore[untyped-decorator]
+def slower(x: float, y: float, z: float, slip: Array, i: int) -> float:
+    """The smaller of |u_a| and |u_b|, u_a = (x, y, z)."""
+    a = x * x + y * y + z * z
+    b = (x + slip[i, 0]) ** 2 + (y + slip[i, 1]) ** 2 + (z + slip[i, 2]) ** 2
+    return float(np.sqrt(min(a, b)))
 
 
-def remembered(traces: tuple[Trace, ...], trace: Trace) -> tuple[Trace, ...]:
-    """Traces with the newest step in front, rows ordered by pair, and what is too old forgotten."""
-    order = np.argsort(trace.pair, kind="stable")
-    return (Trace(*(getattr(trace, name)[order] for name in Trace.__slots__)), *traces[: MEMORY_STEPS - 1])
+@njit(cache=True, fastmath=False, nogil=True)  # type: ignore[untyped-decorator]
+def recognise(rows: Array, i: int, pair: int, traces: tuple[Trace, ...], quat_a: Array, quat_b: Array, normal: Array, slip: Array, limit: float) -> bool:
+    """Fill u_a (columns 7-9) of row i, whose time and points stand already; False where nothing of the pair is known that fits.
+
+    limit: how slow the slower sweep must be, m/s.
+    """
+    best, held = np.inf, False
+    for old_pair, old in traces:
+        for j in range(np.searchsorted(old_pair, pair), len(old_pair)):
+            if old_pair[j] != pair:
+                break
+            if not held:
+                rows[i, 7], rows[i, 8], rows[i, 9] = old[j, 7], old[j, 8], old[j, 9]
+                held = True
+            if rows[i, 0] <= old[j, 0]:
+                continue
+            ax, ay, az = surface_velocity(rows, i, old, j, 1, quat_a, normal)
+            bx, by, bz = surface_velocity(rows, i, old, j, 4, quat_b, normal)
+            ux, uy, uz = 0.5 * (ax + bx - slip[i, 0]), 0.5 * (ay + by - slip[i, 1]), 0.5 * (az + bz - slip[i, 2])
+            speed = slower(ux, uy, uz, slip, i)
+            if speed <= limit and speed < best:
+                best = speed
+                rows[i, 7], rows[i, 8], rows[i, 9] = ux, uy, uz
+        if best < np.inf:
+            return True
+    return held and slower(rows[i, 7], rows[i, 8], rows[i, 9], slip, i) <= limit
+
+
+@njit(cache=True, fastmath=False, nogil=True)  # type: ignore[untyped-decorator]
+def place_and_match(
+    traces: tuple[Trace, ...],
+    pair: Array,
+    time: Array,
+    elapsed: Array,
+    point_a: Array,
+    point_b: Array,
+    normal: Array,
+    slip: Array,
+    table: Table,
+    static: Array,
+    row_a: Array,
+    row_b: Array,
+) -> tuple[Array, Array]:
+    """New trace rows (k, 10) in the order given, and sweep speeds (k, 2) in m/s.
+
+    pair, time, elapsed (k,): elapsed since the start of the step, at which `table` and the rows row_a, row_b (k,) of it hold.
+    point_a, point_b, normal, slip (k, 3): world frame. static (n,): bodies that cannot move, whose far-off centres say nothing of size.
+    """
+    rows, speed = np.empty((len(pair), 10)), np.empty((len(pair), 2))
+    xa, xb, qa, qb, spin = np.empty(3), np.empty(3), np.empty(4), np.empty(4), table[3]
+    for i in range(len(pair)):
+        a, b = row_a[i], row_b[i]
+        pose_after(table, a, elapsed[i], xa, qa)
+        pose_after(table, b, elapsed[i], xb, qb)
+        rows[i, 0] = time[i]
+        rows[i, 1], rows[i, 2], rows[i, 3] = turn(-qa[0], -qa[1], -qa[2], qa[3], point_a[i, 0] - xa[0], point_a[i, 1] - xa[1], point_a[i, 2] - xa[2])
+        rows[i, 4], rows[i, 5], rows[i, 6] = turn(-qb[0], -qb[1], -qb[2], qb[3], point_b[i, 0] - xb[0], point_b[i, 1] - xb[1], point_b[i, 2] - xb[2])
+        far_a = np.sqrt(rows[i, 1] ** 2 + rows[i, 2] ** 2 + rows[i, 3] ** 2)
+        far_b = np.sqrt(rows[i, 4] ** 2 + rows[i, 5] ** 2 + rows[i, 6] ** 2)
+        rolled = np.sqrt((spin[a, 0] - spin[b, 0]) ** 2 + (spin[a, 1] - spin[b, 1]) ** 2 + (spin[a, 2] - spin[b, 2]) ** 2)
+        sx, sy, sz = slip[i, 0], slip[i, 1], slip[i, 2]
+        reach = max(0.0 if static[a] else far_a, 0.0 if static[b] else far_b)
+        limit = ROLL_MARGIN * rolled * reach + SLIP_MARGIN * np.sqrt(sx * sx + sy * sy + sz * sz)
+        if not recognise(rows, i, pair[i], traces, qa, qb, normal, slip, limit):
+            share = 0.0 if not static[a] and (static[b] or far_a <= far_b) else -1.0
+            rows[i, 7], rows[i, 8], rows[i, 9] = share * sx, share * sy, share * sz
+        ux, uy, uz = rows[i, 7], rows[i, 8], rows[i, 9]
+        speed[i, 0] = np.sqrt(ux * ux + uy * uy + uz * uz)
+        speed[i, 1] = np.sqrt((ux + sx) ** 2 + (uy + sy) ** 2 + (uz + sz) ** 2)
+    return rows, speed
+
+
+def remembered(traces: tuple[Trace, ...], pair: Array, rows: Array) -> tuple[Trace, ...]:
+    """MEMORY_STEPS traces with the newest step in front, rows ordered by pair, and the oldest forgotten."""
+    order = np.argsort(pair, kind="stable")
+    return ((pair[order], rows[order]), *traces[: MEMORY_STEPS - 1])

@@ -24,11 +24,11 @@ from sonic_bullet.errors import SceneError
 from sonic_bullet.listener import bodies as facts
 from sonic_bullet.listener import hooks, shapes
 from sonic_bullet.listener.frames import LINK_SPAN, Motion, Roster, check_connected, decode, encode, jumped, read_motion, read_roster, rows_of, same_motion
-from sonic_bullet.listener.polling import Touches, gather, is_loaded
-from sonic_bullet.listener.rows import Meeting, awake, contact_rows, counted, slips
+from sonic_bullet.listener.polling import Touches, gather, loaded
+from sonic_bullet.listener.rows import Meetings, contact_rows, meetings
 from sonic_bullet.listener.start import Start, hooked_start, polled_start, taken
 from sonic_bullet.listener.substeps import SubstepLog, gather_substeps
-from sonic_bullet.listener.sweep import Trace
+from sonic_bullet.listener.sweep import NO_TRACES, Trace
 from sonic_bullet.records import Array, Body, Material, ModalModel, Shape
 
 
@@ -43,7 +43,7 @@ class World:
         self.stepped = False
         self._bodies: list[Body] = []
         self._live: dict[int, int] = {}
-        self._live_table: tuple[Array, Array] | None = None
+        self._rows_known: tuple[Roster, Array] | None = None
         self._position_m = np.zeros((0, 3))
         self._quaternion_xyzw = np.zeros((0, 4))
         self._time_s = 0.0
@@ -51,7 +51,7 @@ class World:
         self._before: Motion | None = None
         self._past_touches: Touches | None = None
         self._moved: set[int] = set()
-        self._traces: tuple[Trace, ...] = ()
+        self._traces: tuple[Trace, ...] = NO_TRACES
         self._log = SubstepLog(client_id)
         self._uninstall: Callable[[], None] | None = None
         if self._step_length()[1] > 1:
@@ -109,7 +109,7 @@ class World:
         self._close([code for code in self._live if body is None or code // LINK_SPAN == body])
         if body is None:
             self._log.abandon()
-            self._traces, self._past_touches = (), None
+            self._traces, self._past_touches = NO_TRACES, None
         past = self._past.roster
         keep = np.flatnonzero(past.code // LINK_SPAN != body) if body is not None else np.zeros(0, int)
         self._past = taken(
@@ -152,7 +152,8 @@ class World:
         """This step's record. Call once after each stepSimulation; a second call without a step between finds no contacts.
 
         `stepped` tells whether there was a step. Without a hook, a missing one is known by a world in motion that stands where it
-        stood, to the bit; where nothing moves at all, a second call passes for a step. Raises SceneError: lost connection, numbers that are none, sub-steps that cannot be heard.
+        stood, to the bit; where nothing moves at all, a second call passes for a step.
+        Raises SceneError: lost connection, numbers that are none, sub-steps that cannot be heard.
         """
         dt, substeps = self._step_length()
         self.stepped = self._uninstall is None or self._before is not None
@@ -172,15 +173,10 @@ class World:
             self._expose_impostors(now, dt)
             start = polled_start(self._past, now, touches, dt, client_id=self.client_id, first=first)
         self._past_touches, self._past, self._before = touches, now, None
-        if (rows_of(now.roster, touches.code_a) < 0).any() or (rows_of(now.roster, touches.code_b) < 0).any():
-            raise SceneError("a contact names a body that is not in the world", "step the simulation once before listening on")
-        touches = touches.kept(awake(touches, past_touches, start.motion))
-        slip, approach = slips(touches, start.motion)
-        keep = counted(touches, start, approach, dt)
-        touches = touches.kept(keep)
-        meeting = Meeting(touches, self._indices(touches.code_a), self._indices(touches.code_b), slip[keep], approach[keep])
-        contacts, self._traces = contact_rows(meeting, start.motion, self._time_s, self._traces)
-        step = self._step(dt, start, contacts)
+        meeting = meetings(touches, past_touches, start, dt)
+        of_row = self._of_row(now.roster, meeting)
+        contacts, self._traces = contact_rows(meeting, of_row[meeting.row_a], of_row[meeting.row_b], start.motion, self._time_s, self._traces)
+        step = self._step(dt, start, of_row, contacts)
         self._moved.clear()
         self._time_s += dt
         self.step_count += 1
@@ -190,14 +186,13 @@ class World:
         """A step in which nothing happens."""
         return Step(dt, self._position_m, self._quaternion_xyzw, np.zeros(len(self._bodies), bool), Contacts.none())
 
-    def _step(self, dt: float, start: Start, contacts: Contacts) -> Step:
-        codes, indices = self._table()
-        row = rows_of(start.motion.roster, codes)
-        here = row >= 0
+    def _step(self, dt: float, start: Start, of_row: Array, contacts: Contacts) -> Step:
+        row = np.flatnonzero(of_row >= 0)
+        index = of_row[row]
         teleported = np.zeros(len(self._bodies), bool)
-        self._position_m[indices[here]] = start.motion.position_m[row[here]]
-        self._quaternion_xyzw[indices[here]] = start.motion.quaternion_xyzw[row[here]]
-        teleported[indices[here]] = start.moved[row[here]]
+        self._position_m[index] = start.motion.position_m[row]
+        self._quaternion_xyzw[index] = start.motion.quaternion_xyzw[row]
+        teleported[index] = start.moved[row]
         return Step(dt, self._position_m, self._quaternion_xyzw, teleported, contacts)
 
     def _touches(self, dt: float, substeps: int) -> Touches:
@@ -205,7 +200,7 @@ class World:
         if substeps == 1:
             if self._log.is_open:
                 self._log.close()
-            return gather([raw for raw in last if is_loaded(raw)], dt)
+            return gather(loaded(last), dt)
         if not self._log.is_open:
             self._log.open()
             raise SceneError(
@@ -243,7 +238,7 @@ class World:
     def _bury(self) -> None:
         """Close the records of bodies that have gone without a hook seeing it."""
         assert self._roster is not None
-        codes, _ = self._table()
+        codes = np.array(list(self._live), np.int64)
         gone = codes[rows_of(self._roster, codes) < 0]
         if len(gone):
             self.epoch += 1
@@ -260,28 +255,24 @@ class World:
                     self.epoch += 1
                     self._close([int(code)])
 
-    def _table(self) -> tuple[Array, Array]:
-        """Codes of the living, ascending, and their indices into `bodies`."""
-        if self._live_table is None:
-            codes = np.array(sorted(self._live), np.int64)
-            self._live_table = codes, np.array([self._live[int(code)] for code in codes], np.int64)
-        return self._live_table
+    def _of_row(self, roster: Roster, meeting: Meetings) -> Array:
+        """(n,) index into `bodies` of each row of the roster, -1 for who never met anybody; who meets the first time gets a silent record."""
+        of_row = self._index_of_row(roster)
+        met = np.unique(np.concatenate([meeting.row_a, meeting.row_b]))
+        strangers = met[of_row[met] < 0]
+        for code in roster.code[strangers]:
+            self._append(int(code), replace(facts.describe(self.client_id, *decode(code), self.epoch), since_step=self.step_count))
+        return self._index_of_row(roster) if len(strangers) else of_row
 
-    def _indices(self, code: Array) -> Array:
-        """Indices into `bodies` of codes (k,); whoever is met for the first time gets a silent record."""
-        for _ in range(2):
-            codes, indices = self._table()
-            place = np.minimum(np.searchsorted(codes, code), len(codes) - 1)
-            strangers = np.ones(len(code), bool) if not len(codes) else codes[place] != code
-            if not strangers.any():
-                break
-            for stranger in np.unique(code[strangers]):
-                self._append(int(stranger), replace(facts.describe(self.client_id, *decode(stranger), self.epoch), since_step=self.step_count))
-        return np.asarray(indices[place] if len(code) else np.zeros(0, np.int64))
+    def _index_of_row(self, roster: Roster) -> Array:
+        if self._rows_known is None or self._rows_known[0] is not roster:
+            of_row = np.array([self._live.get(int(code), -1) for code in roster.code], np.int64)
+            self._rows_known = roster, of_row
+        return self._rows_known[1]
 
     def _append(self, code: int, record: Body) -> None:
         self._live[code] = len(self._bodies)
-        self._live_table = None
+        self._rows_known = None
         self._bodies.append(record)
         row = rows_of(self._past.roster, np.array([code]))[0]
         pose = (self._past.position_m[row], self._past.quaternion_xyzw[row]) if row >= 0 else (np.zeros(3), np.array([0, 0, 0, 1.0]))
@@ -293,7 +284,7 @@ class World:
             if code in self._live:
                 index = self._live.pop(code)
                 self._bodies[index] = replace(self._bodies[index], until_step=self.step_count)
-        self._live_table = None
+        self._rows_known = None
 
 
 def client_id_of(client: Any) -> int:
