@@ -107,7 +107,7 @@ def _grow(low: Array, high: Array, centre: Array) -> tuple[Array, Array, Array, 
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _in_triangle(p: Array, abc: Array) -> tuple[float, float, float]:
+def _in_triangle(p: Array, abc: Array) -> tuple[float, float, float]:  # noqa: PLR0911 - one return a Voronoi region
     """Barycentric coordinates of the triangle's point nearest to p [Ericson 2005, p. 141]."""
     ab0, ab1, ab2 = abc[1, 0] - abc[0, 0], abc[1, 1] - abc[0, 1], abc[1, 2] - abc[0, 2]
     ac0, ac1, ac2 = abc[2, 0] - abc[0, 0], abc[2, 1] - abc[0, 1], abc[2, 2] - abc[0, 2]

@@ -1,7 +1,11 @@
-"""Modes of a free or clamped body: K u = λ M u by shift and invert.
+"""Modes of a free or clamped body: K u = λ M u by shift, invert and block Lanczos.
 
-(K − σM)⁻¹ M u = u / (λ − σ),  σ < 0, so that K − σM is positive definite and the rigid modes (λ = 0) do no harm
-                                                                    [Ericsson & Ruhe 1980, eq. 1.3]
+    A = (K − σM)⁻¹ M,  A u = θ u,  λ = σ + 1/θ,  σ < 0, so that K − σM is positive definite and the rigid modes (λ = 0) do no
+    harm                                                                          [Ericsson & Ruhe 1980, eq. 1.3-1.5]
+    A V_j = V_{j-1} B_jᵀ + V_j A_j + V_{j+1} B_{j+1},  VᵀMV = 1                   [Grimes, Lewis, Simon 1994, eq. 3.1]
+
+The basis is kept orthogonal in full, so that twins of a symmetric body are found as twins, and grows until the last mode asked for
+has converged: no restart. The factor is SuperLU's in symmetric mode; the start block is seeded: same body, same bits.
 """
 
 from __future__ import annotations
@@ -15,37 +19,91 @@ import numpy as np
 from sonic_bullet.errors import ModalError
 from sonic_bullet.records import Array
 
+BLOCK = 8
+TOLERANCE = 1e-7  # of the residual bound, relative to θ
+RIGID_TOLERANCE = 1e-6  # of the first elastic λ
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Modes:
-    """lambda_per_s2 (m,) ascending, elastic only; vector (dof, m) with UᵀMU = 1; rigid_per_s2 (r,) the eigenvalues of the rigid modes."""
+    """lambda_per_s2 (m,) ascending, elastic only; vector (dof, m) with UᵀMU = 1; rigid_per_s2 (r,) the rigid modes' own."""
 
     lambda_per_s2: Array
     vector: Array
     rigid_per_s2: Array
 
 
-def solve(stiffness: Any, mass: Any, shift: float, rigid: int, wanted: Callable[[Array], bool], most: int) -> Modes:
-    """Lowest modes until ``wanted(elastic eigenvalues)`` says enough, at most ``most`` of them.
+def factorised(matrix: Any) -> Any:
+    """SuperLU factor of a symmetric positive definite matrix in the order it comes in (ordering.py), pivots on the diagonal."""
+    from scipy.sparse.linalg import splu
+
+    try:
+        return splu(matrix.tocsc(), permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    except (RuntimeError, MemoryError) as error:
+        raise ModalError(f"stiffness of {matrix.shape[0]} unknowns cannot be factorised ({error})", "give a larger edge_m") from error
+
+
+def _orthonormal(block: Array, mass: Any) -> tuple[Array, Array, Array]:
+    """Block (n, b) = Q R with QᵀMQ = 1, by Cholesky twice over; also MQ. Columns without weight come back as zero."""
+    total = np.eye(block.shape[1])
+    for _ in range(2):
+        image = mass @ block
+        gram = block.T @ image
+        value, vector = np.linalg.eigh((gram + gram.T) / 2)
+        good = value > 1e-14 * max(value[-1], 1e-300)
+        root = np.sqrt(np.where(good, value, 1))
+        inverse = vector * np.where(good, 1 / root, 0)
+        block = block @ inverse
+        total = (vector * np.where(good, root, 0)).T @ total
+    return block, mass @ block, total
+
+
+def solve(
+    stiffness: Any, mass: Any, shift: float, *, rigid: int, enough: Callable[[Array], bool], most: int, say: Callable[[str], None] | None = None
+) -> Modes:
+    """Lowest elastic modes until ``enough(their eigenvalues)``, at most ``most`` of them; scipy sparse (n, n) both.
 
     shift < 0 in 1/s², about as large as the first elastic eigenvalue. rigid: how many rigid modes the body has.
-    Raises ModalError where the number of rigid modes is another.
+    Raises ModalError where it has another number, or where the iteration does not converge.
     """
-    from scipy.sparse.linalg import LinearOperator, eigsh, splu
-
     size = stiffness.shape[0]
-    factor = splu((stiffness - shift * mass).tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-    inverse = LinearOperator((size, size), factor.solve)
-    start = np.random.default_rng(0).standard_normal(size)
-    ask = min(24, most)
-    while True:
-        ask = min(ask, size - 2 - rigid)
-        value, vector = eigsh(stiffness, k=ask + rigid, M=mass, sigma=shift, OPinv=inverse, v0=start)
-        order = np.argsort(value)
-        value, vector = value[order], vector[:, order]
+    factor = factorised(stiffness - shift * mass)
+    block, image, _ = _orthonormal(np.random.default_rng(0).standard_normal((size, min(BLOCK, size))), mass)
+    width = block.shape[1]
+    longest = min(size // width * width, 4 * (most + rigid) + 64 * width)
+    basis, images = np.zeros((size, longest), order="F"), np.zeros((size, longest), order="F")
+    projected = np.zeros((longest, longest))
+    coupling = np.zeros((width, width))
+    used, check = 0, 4 * width
+    while used < longest:
+        here = slice(used, used + width)
+        basis[:, here], images[:, here] = block, image
+        used += width
+        step = factor.solve(np.ascontiguousarray(image))
+        for _ in range(2):  # twice is enough [Parlett 1980, ch. 6.9]
+            weight = images[:, :used].T @ step
+            step -= basis[:, :used] @ weight
+            projected[:used, here] += weight
+        block, image, coupling = _orthonormal(step, mass)
+        if used < check and used < longest:
+            continue
+        check = used + max(width, used // 4 // width * width)
+        theta, ritz = np.linalg.eigh(projected[:used, :used], UPLO="U")
+        theta, ritz = theta[::-1], ritz[:, ::-1]
+        residual = np.linalg.norm(coupling @ ritz[used - width :], axis=0)
+        converged = int(np.argmax(np.append(residual > TOLERANCE * np.abs(theta), True)))
+        value = shift + 1 / theta[:converged]
         elastic = value[rigid:]
-        if len(elastic) == 0 or elastic[0] <= 0 or (rigid and np.abs(value[:rigid]).max() > 1e-6 * elastic[0]):
-            raise ModalError(f"body has not {rigid} rigid modes: eigenvalues start {value[: rigid + 2]}", "its parts must hang together")
-        if wanted(elastic) or ask >= most or ask >= size - 2 - rigid:
-            return Modes(elastic, vector[:, rigid:], value[:rigid])
-        ask = min(2 * ask, most)
+        if say:
+            say(f"{max(0, len(elastic))} modes found")
+        if len(elastic) and (len(elastic) >= most or enough(elastic) or used >= size - width):
+            return _checked(value[: rigid + most], basis[:, :used] @ ritz[:, : min(converged, rigid + most)], rigid)
+    raise ModalError(f"only {max(0, converged - rigid)} of {most} modes converged", "give a smaller count or to_hz")
+
+
+def _checked(value: Array, vector: Array, rigid: int) -> Modes:
+    elastic = value[rigid:]
+    if elastic[0] <= 0 or (rigid and np.abs(value[:rigid]).max() > RIGID_TOLERANCE * elastic[0]):
+        shown = ", ".join(f"{v:.3g}" for v in value[: rigid + 2])
+        raise ModalError(f"body has not {rigid} rigid modes: eigenvalues start {shown}", "its parts must hang together: repair the mesh")
+    return Modes(np.array(elastic), vector[:, rigid:], np.array(value[:rigid]))

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet.errors import MeshError
-from sonic_bullet.modal.solid import Solid
+from sonic_bullet.modal.solid import Solid, corner_volume_m3
 from sonic_bullet.records import Array
 
 CHUNK = 2000  # elements at a time: keeps the (t, 30, 30) blocks of a large body out of memory
@@ -75,11 +75,11 @@ def assemble(solid: Solid, stiffness_pa: Array, density_kg_m3: float) -> tuple[A
         for q in range(len(weight)):
             b = strain[:, q]
             block += np.matmul(b.transpose(0, 2, 1), np.matmul(stiffness_pa * volume[:, q, None, None], b))
-        block = block.reshape(len(tet), 10, 3, 10, 3).transpose(2, 4, 0, 1, 3).reshape(9, -1)
+        parts = block.reshape(len(tet), 10, 3, 10, 3).transpose(2, 4, 0, 1, 3).reshape(9, -1)
         for k in range(9):
-            stiff[k] += np.bincount(where, block[k], len(pair))
+            stiff[k] += np.bincount(where, parts[k], len(pair))
         if solid.affine:
-            volume = np.abs(_volume(solid, tet))[:, None] * 6 * mass_weight
+            volume = np.abs(corner_volume_m3(solid.node_m, tet))[:, None] * 6 * mass_weight
         else:
             volume, _ = _geometry(solid, tet, mass_gradient, mass_weight)
         mass += np.bincount(where, np.einsum("tq,iq,jq->tij", volume, shape, shape, optimize=True).ravel(), len(pair))
@@ -94,16 +94,10 @@ def assemble(solid: Solid, stiffness_pa: Array, density_kg_m3: float) -> tuple[A
     return (k_csc + k_csc.T) / 2, csc_array(m_csr)
 
 
-def _volume(solid: Solid, tet: Array) -> Array:
-    from sonic_bullet.modal.solid import corner_volume_m3
-
-    return corner_volume_m3(solid.node_m, tet)
-
-
 def volume_m3(solid: Solid) -> float:
     """Volume of a solid, curved elements integrated."""
     if solid.affine:
-        return float(np.abs(_volume(solid, solid.tet)).sum())
+        return float(np.abs(corner_volume_m3(solid.node_m, solid.tet)).sum())
     _, gradient, weight = _element(6)
     return float(sum(_geometry(solid, solid.tet[s : s + CHUNK], gradient, weight)[0].sum() for s in range(0, len(solid.tet), CHUNK)))
 
@@ -117,3 +111,21 @@ def rigid_modes(node_m: Array) -> Array:
     for k, axis in enumerate(np.eye(3)):
         motion[:, :, 3 + k] = np.cross(axis, x)
     return motion.reshape(3 * n, 6)
+
+
+def clamped(solid: Solid, clamp: Array) -> Array:
+    """Which nodes (n,) the spheres clamp (k, 4) of (x, y, z, radius) in m hold; a sphere between nodes holds the nearest.
+
+    Raises MeshError where a sphere is farther from the body than an element.
+    """
+    fixed = np.zeros(len(solid.node_m), bool)
+    for x, y, z, radius in clamp:
+        distance = np.linalg.norm(solid.node_m - (x, y, z), axis=1)
+        inside = distance <= radius
+        if not inside.any():
+            edge = float(np.linalg.norm(solid.node_m[solid.tet[:, 0]] - solid.node_m[solid.tet[:, 1]], axis=1).max())
+            if distance.min() > radius + edge:
+                raise MeshError(f"clamp at ({x:g}, {y:g}, {z:g}) m, radius {radius:g} m, does not touch the body", "give its place in the body frame")
+            inside = distance == distance.min()
+        fixed |= inside
+    return fixed

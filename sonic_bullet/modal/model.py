@@ -3,21 +3,37 @@
     K u = λ M u,  UᵀMU = 1,   d = (α + βλ)/2,   f = √(λ − d²)/2π            [Ren, Yeh, Lin 2013, eq. 5-7]
 
 Solved without units: lengths by the body's diagonal L, stiffness by its largest entry C, density by itself; then
-λ = λ' C/(ρL²) and u = u'/√(ρL³). Another size, density or damping of the same body is therefore the same problem.
+λ = λ' C/(ρL²) and u = u'/√(ρL³). Damping comes last: another α and β costs nothing.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
-from sonic_bullet.errors import MeshError
+from sonic_bullet.errors import MeshError, ModalError
+from sonic_bullet.modal import cache as store
 from sonic_bullet.records import Array, Material, ModalModel, Shape
 
 MOST_MODES = 200
+SHIFT = 20.0  # × (2V/A)²/L²: a third of the first elastic λ' of plates and bars, less of chunky bodies
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Unit:
+    """A solved body without units: value (m,), vector (v, 3, m) float32 on its skin, volume; vertex_m, face, curvature with units."""
+
+    value: Array
+    vector: Array
+    volume: float
+    vertex_m: Array
+    face: Array
+    curvature_per_m: Array
+    note: str
 
 
 def analyse(
@@ -32,59 +48,153 @@ def analyse(
     cache: Path | Literal["default"] | None = "default",
     progress: Callable[[str], None] | None = None,
 ) -> ModalModel:
-    """Vibration modes of a body up to to_hz, or the lowest ``count``."""
-    from sonic_bullet.modal import eigen, fem
-    from sonic_bullet.modal.shapes import solid as fill
-    from sonic_bullet.modal.solid import Solid, surface
+    """Vibration modes of a body up to to_hz (at most `MOST_MODES`; the note says when that cut them), or its lowest ``count``.
 
+    shapes: together one solid, in the body frame. fixed: clamped where (x, y, z, radius) in m, body frame, reach; a clamp between
+    nodes takes the nearest. thickness_m: wall of open surfaces (see surfaces.py); it makes closed ones hollow. edge_m: element size,
+    by default from a budget of unknowns. cache: folder, "default" or None. progress: called with a line now and then.
+    A body all of whose modes lie above to_hz has none; so has a plane. Pieces that do not hang together: the largest is kept and noted.
+    Raises MeshError (broken, empty, flat, absurd or too slow mesh), ModalError (no usable modes).
+    """
     say = progress or (lambda _: None)
+    if not shapes:
+        raise MeshError("body has no shape", "give it a collision or visual shape, or pass mesh=")
     if any(shape.kind == "plane" for shape in shapes):
         none = np.zeros(0)
         return ModalModel(none, none, np.zeros((0, 3, 0)), np.zeros((0, 3)), np.zeros((0, 3)), none, 0.0, 0.0, note="plane: unbounded, no modes")
-    if not shapes:
-        raise MeshError("body has no shape", "give it a collision or visual shape, or pass mesh=")
-    body = fill(shapes, edge_m, thickness_m, say)
-    length_m = float(np.linalg.norm(np.ptp(body.node_m, axis=0)))
-    unit = Solid(body.node_m / length_m, body.tet, body.affine)
+    if not (np.isfinite(to_hz) and to_hz > 0):
+        raise ModalError(f"to_hz is {to_hz}", "give a frequency above zero")
+    if count is not None and not (int(count) == count and 0 < count <= 2000):
+        raise ModalError(f"count is {count}", "ask for 1 to 2000 modes")
+    geometry_parts = [part for s in shapes for part in (s.kind, s.size_m, s.position_m, s.quaternion_xyzw, s.vertex_m, s.face)]
+    solid_key = store.key("solid", *geometry_parts, thickness_m, edge_m)
+    length_m = _diagonal_m(shapes)
     pascal = float(np.abs(material.stiffness_pa).max())
     per_s2 = pascal / (material.density_kg_m3 * length_m**2)
-    volume = fem.volume_m3(unit)
-    skin = surface(unit)
-    say(f"assembling {3 * len(unit.node_m)} unknowns")
-    stiffness, mass = fem.assemble(unit, material.stiffness_pa / pascal, 1.0)
     limit = (2 * np.pi * to_hz) ** 2 / per_s2
-    area = 1.0
-    shift = -5 * (2 * volume / area) ** 2
-    if count is None:
-        modes = eigen.solve(stiffness, mass, shift, 6, lambda value: bool(value[-1] > limit), MOST_MODES)
-        keep = modes.lambda_per_s2 <= limit
-    else:
-        modes = eigen.solve(stiffness, mass, shift, 6, lambda value: len(value) >= count, count)
-        keep = np.arange(len(modes.lambda_per_s2)) < count
-    lam = modes.lambda_per_s2[keep] * per_s2
-    vector = modes.vector[:, keep].reshape(len(unit.node_m), 3, -1)[skin.node] / np.sqrt(material.density_kg_m3 * length_m**3)
+    clamp = np.array(fixed, float).reshape(-1, 4)
+    if not np.isfinite(clamp).all() or (clamp[:, 3] < 0).any():
+        raise ModalError(f"fixed is {fixed}", "give clamps as (x, y, z, radius) in metres")
+    unit_stiffness = material.stiffness_pa / pascal
+    name = store.key("modes", solid_key, unit_stiffness, clamp, count if count is not None else limit)
+    unit = _recall(store.load(cache, name))
+    if unit is None:
+        unit = _solve(shapes, (edge_m, thickness_m), (cache, solid_key), length_m, unit_stiffness, clamp, count, limit, say)
+        store.save(cache, name, _arrays(unit), unit.note)
+    lam = unit.value * per_s2
     freq, decay, alive = damped(lam, material)
+    note = unit.note
+    if count is None and len(lam) == MOST_MODES and lam[-1] * 1.01 < (2 * np.pi * to_hz) ** 2:
+        note += f"; cut at {MOST_MODES} modes, {np.sqrt(lam[-1]) / (2 * np.pi):.0f} Hz"
+    dropped = len(lam) - len(alive)
+    if dropped:
+        note += f"; {dropped} overdamped modes dropped"
+    volume = unit.volume * length_m**3
     return ModalModel(
         freq_hz=freq,
         decay_per_s=decay,
-        shape=vector[:, :, alive].astype(np.float32),
-        vertex_m=body.node_m[skin.node],
-        face=skin.face,
-        curvature_per_m=np.zeros(len(skin.face)),
-        volume_m3=volume * length_m**3,
-        mass_kg=volume * length_m**3 * material.density_kg_m3,
-        dropped=int((~alive).sum()),
-        note=body.note,
+        shape=unit.vector[:, :, alive] / np.float32(np.sqrt(material.density_kg_m3 * length_m**3)),
+        vertex_m=unit.vertex_m,
+        face=unit.face,
+        curvature_per_m=unit.curvature_per_m,
+        volume_m3=volume,
+        mass_kg=volume * material.density_kg_m3,
+        dropped=dropped,
+        note=note,
     )
 
 
+def _diagonal_m(shapes: tuple[Shape, ...]) -> float:
+    """A length that belongs to the shapes alone: what all is divided by. Raises MeshError where there is none."""
+    sizes = [np.linalg.norm(np.ptp(s.vertex_m[np.unique(s.face)], axis=0)) if s.kind == "mesh" else np.linalg.norm(s.size_m) for s in shapes]
+    length = float(max(sizes))
+    if not (np.isfinite(length) and length > 0):
+        raise MeshError("body has no extent", "give shapes with sizes above zero")
+    return length
+
+
 def damped(lambda_per_s2: Array, material: Material) -> tuple[Array, Array, Array]:
-    """Frequencies and decays of the modes that oscillate, and which (m,) do [Ren et al. 2013, eq. 7]."""
+    """Frequencies, ascending, and decays of the modes that oscillate, and their indices; decays NaN without alpha [Ren et al. 2013, eq. 7]."""
     if material.alpha_per_s is None or material.beta_s is None:
-        return np.sqrt(lambda_per_s2) / (2 * np.pi), np.full(len(lambda_per_s2), np.nan), np.ones(len(lambda_per_s2), bool)
+        return np.sqrt(lambda_per_s2) / (2 * np.pi), np.full(len(lambda_per_s2), np.nan), np.arange(len(lambda_per_s2))
     decay = (material.alpha_per_s + material.beta_s * lambda_per_s2) / 2
-    alive = decay**2 < lambda_per_s2
+    alive = np.flatnonzero(decay**2 < lambda_per_s2)
     freq = np.sqrt(lambda_per_s2[alive] - decay[alive] ** 2) / (2 * np.pi)
-    order = np.argsort(freq, kind="stable")
-    index = np.flatnonzero(alive)[order]
-    return freq[order], decay[index], alive
+    order = np.argsort(freq, kind="stable")  # strong stiffness damping bends f(λ) back down
+    return freq[order], decay[alive[order]], alive[order]
+
+
+def _solve(
+    shapes: tuple[Shape, ...],
+    sizes: tuple[float | None, float | None],
+    kept: tuple[store.Place, str],
+    length_m: float,
+    stiffness: Array,
+    clamp: Array,
+    count: int | None,
+    limit: float,
+    say: Callable[[str], None],
+) -> _Unit:
+    """Fill (or fetch the filled body), assemble, clamp and solve, all without units."""
+    from sonic_bullet.modal import eigen, fem
+    from sonic_bullet.modal.shapes import Filled, fill
+    from sonic_bullet.modal.solid import Solid, Surface
+
+    found = store.load(*kept)
+    if found is not None:
+        a, note = found
+        body = Filled(Solid(a["node"], a["tet"], bool(a["affine"][0]), note), Surface(a["skin"], a["face"]), a["curvature"])
+    else:
+        body = fill(shapes, *sizes, say)
+        solid, skin = body.solid, body.skin
+        arrays = {
+            "node": solid.node_m,
+            "tet": solid.tet,
+            "affine": np.array([solid.affine]),
+            "skin": skin.node,
+            "face": skin.face,
+            "curvature": body.curvature_per_m,
+        }
+        store.save(*kept, arrays, solid.note)
+    unit = Solid(body.solid.node_m / length_m, body.solid.tet, body.solid.affine)
+    skin_m = unit.node_m[body.skin.node]
+    corner = skin_m[body.skin.face]
+    area = float(np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1).sum() / 2)
+    volume = fem.volume_m3(unit)
+    say(f"assembling {3 * len(unit.node_m)} unknowns")
+    k_matrix, m_matrix = fem.assemble(unit, stiffness, 1.0)
+    fixed = fem.clamped(body.solid, clamp)
+    free = np.flatnonzero(np.repeat(~fixed, 3))
+    rigid = 6 - (int(np.linalg.matrix_rank(fem.rigid_modes(unit.node_m)[~np.isin(np.arange(3 * len(fixed)), free)], tol=1e-9)) if fixed.any() else 0)
+    if fixed.any():
+        k_matrix, m_matrix = k_matrix[free][:, free], m_matrix[free][:, free]
+    most = min(count or MOST_MODES, max(1, len(free) // 3 - rigid))
+    shift = -SHIFT * (2 * volume / area) ** 2
+    enough = (lambda value: len(value) >= count) if count is not None else (lambda value: bool(value[-1] > limit))
+    modes = eigen.solve(k_matrix, m_matrix, shift, rigid=rigid, enough=enough, most=most, say=say)
+    keep = np.arange(len(modes.lambda_per_s2)) < most if count is not None else (modes.lambda_per_s2 <= limit)
+    vector = np.zeros((3 * len(fixed), int(keep.sum())), np.float32)
+    vector[free] = modes.vector[:, keep]
+    note = body.solid.note + f"; {len(free)} unknowns" + (f"; {int(fixed.sum())} nodes clamped" if fixed.any() else "")
+    shape = np.ascontiguousarray(vector.reshape(len(fixed), 3, -1)[body.skin.node])
+    return _Unit(modes.lambda_per_s2[keep], shape, volume, body.solid.node_m[body.skin.node], body.skin.face, body.curvature_per_m, note)
+
+
+def _arrays(unit: _Unit) -> dict[str, Array]:
+    return {
+        "value": unit.value,
+        "vector": unit.vector,
+        "volume": np.array([unit.volume]),
+        "vertex": unit.vertex_m,
+        "face": unit.face,
+        "curvature": unit.curvature_per_m,
+    }
+
+
+def _recall(found: tuple[dict[str, Array], str] | None) -> _Unit | None:
+    if found is None:
+        return None
+    a, note = found
+    if set(a) != {"value", "vector", "volume", "vertex", "face", "curvature"} or a["vector"].shape != (len(a["vertex"]), 3, len(a["value"])):
+        return None
+    return _Unit(a["value"], a["vector"], float(a["volume"][0]), a["vertex"], a["face"], a["curvature"], note)

@@ -1,27 +1,58 @@
-"""Shapes -> one solid of quadratic tetrahedra in the body frame.
+"""Shapes -> one solid of quadratic tetrahedra in the body frame, with its surface and that surface's curvature.
 
-one box, sphere, cylinder or capsule -> laid out by rule (structured.py)
-a mesh, or several shapes            -> their surfaces together -> fTetWild -> tetrahedra
+one box, sphere, cylinder or capsule           -> laid out by rule (structured.py)
+a mesh that is a box or an extruded outline    -> likewise (prisms.py)
+any other mesh, or several shapes as one solid -> their surfaces together (surfaces.py) -> fTetWild (tetrahedra.py)
 """
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
+from sonic_bullet import geometry
 from sonic_bullet.errors import MeshError
-from sonic_bullet.modal import structured
-from sonic_bullet.modal.solid import Solid, largest_component, quadratic, surface
+from sonic_bullet.modal import prisms, structured
+from sonic_bullet.modal.ordering import dissection
+from sonic_bullet.modal.solid import Solid, Surface, largest_component, quadratic, surface
+from sonic_bullet.modal.surfaces import SIZE_M, Skin, prepared
 from sonic_bullet.records import Array, Shape
 
-DOF_BUDGET = 24_000
-TETS_BUDGET = DOF_BUDGET / 5.2  # measured: degrees of freedom per tetrahedron of a chunky body
+THIN_DOF, CHUNKY_DOF = 26_000, 12_000  # unknowns by default: a plate's factor stays sparse, a ball's does not
+DOF_PER_TET = 5.6  # measured on fTetWild's meshes of bars, slabs and bowls
+MOST_TETS = 10_000
+FILL_LIMIT_S = 45.0
+ENVELOPE = 0.04  # of the thickness: how far fTetWild may move the surface
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Filled:
+    """A body ready to be assembled: solid, its skin, curvature_per_m (f,) of the skin's faces."""
+
+    solid: Solid
+    skin: Surface
+    curvature_per_m: Array
+
+
+def dof_budget(thickness_m: float, diagonal_m: float) -> int:
+    """Unknowns spent by default on a body of thickness 2V/A: fewer the chunkier, more for very thin plates.
+
+    A quadratic element of edge e bends true while e² « thickness x wavelength, so the number of elements in a plate grows as 1/thickness.
+    """
+    thin = thickness_m / diagonal_m
+    chunky = np.clip((thin - 0.05) / 0.05, 0, 1)
+    return int((THIN_DOF + (CHUNKY_DOF - THIN_DOF) * chunky) * np.clip(0.007 / thin, 1, 3))
 
 
 def rotation(quaternion_xyzw: Array) -> Array:
     """Matrix (3, 3) of a quaternion [Shoemake 1985, eq. 10]."""
-    x, y, z, w = quaternion_xyzw / np.linalg.norm(quaternion_xyzw)
+    length = float(np.linalg.norm(quaternion_xyzw))
+    if not length > 0:
+        raise MeshError("a shape's quaternion is zero", "give a rotation, (0, 0, 0, 1) for none")
+    x, y, z, w = quaternion_xyzw / length
     return np.array(
         [
             [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
@@ -36,35 +67,48 @@ def _placed(shape: Shape, point: Array) -> Array:
 
 
 def box_cells(size_m: Array, edge_m: float | None) -> tuple[int, int, int]:
-    """Cells along x, y, z: of edge_m, or the finest even grid of at most `DOF_BUDGET` unknowns."""
+    """Cells along x, y, z: of edge_m, or the finest even grid within the budget of unknowns."""
     if edge_m is None:
+        budget = dof_budget(1 / float((1 / size_m).sum()), float(np.linalg.norm(size_m)))
         tries = size_m.max() / np.arange(4, 400)
-        counts = np.maximum(1, np.round(size_m / tries[:, None]))
-        fits = 3 * np.prod(2 * counts + 1, axis=1) <= DOF_BUDGET
+        fits = 3 * np.prod(2 * np.maximum(1, np.round(size_m / tries[:, None])) + 1, axis=1) <= budget
         edge_m = float(tries[np.flatnonzero(fits)[-1]]) if fits.any() else float(tries[0])
+        cells = np.maximum(1, np.round(size_m / edge_m)).astype(int)
+        long = int(np.argmax(size_m))
+        across = [k for k in range(3) if k != long]
+        if size_m[across].max() < size_m[long] / 4:  # a bar: its twist warps the section, which takes four cells either way
+            cells[across] = np.maximum(cells[across], 4)
+            cells[long] = max(8, int((budget / (3 * np.prod(2 * cells[across] + 1)) - 1) / 2))
+        return int(cells[0]), int(cells[1]), int(cells[2])
     nx, ny, nz = (max(1, round(float(s) / edge_m)) for s in size_m)
     return nx, ny, nz
+
+
+def _box(size_m: Array, edge_m: float | None) -> Solid:
+    if not (size_m > 0).all():
+        raise MeshError(f"box of size {size_m} m has no volume", "give edge lengths above zero")
+    return structured.box(size_m, box_cells(size_m, edge_m))
 
 
 def _named(shape: Shape, edge_m: float | None) -> Solid:
     """Structured solid of a named shape about its own origin."""
     if shape.kind == "box":
-        if not (shape.size_m > 0).all():
-            raise MeshError(f"box of size {shape.size_m} m has no volume", "give edge lengths above zero")
-        return structured.box(shape.size_m, box_cells(shape.size_m, edge_m))
+        return _box(shape.size_m, edge_m)
     radius, length = float(shape.size_m[0]), float(shape.size_m[1])
     if not radius > 0 or (shape.kind == "cylinder" and not length > 0):
         raise MeshError(f"{shape.kind} of radius {radius} m and length {length} m has no volume", "give sizes above zero")
-    if shape.kind == "sphere":
-        n = 5 if edge_m is None else max(2, round(radius / edge_m))
-        return structured.sphere(radius, n)
+    if shape.kind == "sphere" or (shape.kind == "capsule" and length <= 0):
+        return structured.sphere(radius, 5 if edge_m is None else max(2, round(radius / edge_m)))
     if edge_m is None:
-        # dof ≈ 3·(rings of a disc ≈ 12 n² P2 nodes)·(2 layers + 1): choose n with layers of the same height as a ring.
-        edge_m = max((12 * 3 * 2 * radius**2 * max(length, radius) / DOF_BUDGET) ** (1 / 3), radius / 8)
+        # A disc of n rings has 12 n² quadratic nodes on 2 l + 1 heights (the caps of a capsule count as one more radius).
+        whole = length + (radius if shape.kind == "capsule" else 0)
+        thickness = 2 / (2 / radius + 2 / whole)
+        budget = dof_budget(thickness, float(np.hypot(2 * radius, whole)))
+        tries = radius / np.arange(2, 60)
+        dof = 36 * np.round(radius / tries) ** 2 * (2 * np.maximum(1, np.round(whole / tries)) + 1)
+        edge_m = float(tries[max(0, int(np.searchsorted(dof, budget)) - 1)])
     n, layers = max(2, round(radius / edge_m)), max(1, round(length / edge_m))
-    if shape.kind == "capsule":
-        return structured.capsule(radius, length, n, layers) if length > 0 else structured.sphere(radius, n)
-    return structured.cylinder(radius, length, n, layers)
+    return (structured.capsule if shape.kind == "capsule" else structured.cylinder)(radius, length, n, layers)
 
 
 def _soup(shapes: tuple[Shape, ...]) -> tuple[Array, Array]:
@@ -74,37 +118,91 @@ def _soup(shapes: tuple[Shape, ...]) -> tuple[Array, Array]:
         if shape.kind == "mesh":
             vertex, face = shape.vertex_m, shape.face
         else:
-            solid = _named(shape, float(shape.size_m[shape.size_m > 0].min()) / 3)
+            solid = _named(shape, float(shape.size_m.max() if shape.kind == "box" else shape.size_m[0] / 4))
             skin = surface(solid)
             vertex, face = solid.node_m[skin.node], skin.face
         vertices.append(_placed(shape, vertex))
-        faces.append(face + offset)
+        faces.append(np.asarray(face, np.int64) + offset)
         offset += len(vertex)
     return np.concatenate(vertices), np.concatenate(faces)
 
 
-def _filled(vertex_m: Array, face: Array, edge_m: float | None) -> Solid:
+def _edge_m(volume_m3: float, thickness_m: float, budget: int) -> float:
+    """Edge that keeps fTetWild within the budget of unknowns: tetrahedra ≈ 9 V/e³ + 2 A/e² (fitted to its meshes), A = 2V/thickness."""
+    edges = thickness_m * np.geomspace(0.75, 20, 200)
+    tets = 9 * volume_m3 / edges**3 + 4 * volume_m3 / thickness_m / edges**2
+    return float(edges[min(199, int((tets * DOF_PER_TET > budget).sum()))])
+
+
+def _meshed(skin: Skin, edge_m: float | None, say: Callable[[str], None]) -> Solid:
+    """Solid of a prepared surface: by rule where a rule is known, else by fTetWild, coarser where that is too slow or too fine."""
     from sonic_bullet.modal.tetrahedra import tetrahedra
 
-    a, b, c = (vertex_m[face[:, k]] for k in range(3))
-    volume = abs(float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6))
-    area = float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
-    thickness = 2 * volume / area
-    if edge_m is None:
-        edge_m = max(0.75 * thickness, (volume / (0.112 * TETS_BUDGET)) ** (1 / 3))
-    node, tet = tetrahedra(vertex_m, face, edge_m, 0.04 * thickness)
-    tet, pieces = largest_component(node, tet)
-    note = f"fTetWild, edge {edge_m:.3g} m, envelope {0.04 * thickness:.2g} m"
-    if pieces > 1:
-        note += f"; largest of {pieces} separate pieces kept"
-    return quadratic(node, tet, note=note)
+    vertex, face, thickness = skin.vertex_m, skin.face, skin.thickness_m
+    diagonal = float(np.linalg.norm(np.ptp(vertex, axis=0)))
+    budget = dof_budget(thickness, diagonal)
+    if geometry.is_closed(face):
+        found = prisms.as_box(vertex, face)
+        if found is not None:
+            size, axes, centre = found
+            made = _box(size, edge_m)
+            return Solid(made.node_m @ axes.T + centre, made.tet, note=made.note + skin.note)
+        prism = prisms.as_prism(vertex, face, edge_m, budget)
+        if prism is not None:
+            return Solid(prism.node_m, prism.tet, note=prism.note + skin.note)
+    edge = edge_m if edge_m is not None else _edge_m(geometry.volume_m3(vertex, face), thickness, budget)
+    envelope = ENVELOPE * thickness
+    deadline = time.monotonic() + FILL_LIMIT_S
+    say(f"filling {len(face)} triangles with tetrahedra of {edge:.3g} m")
+    failure = MeshError(f"mesh needs more than {MOST_TETS} tetrahedra", "give a larger edge_m or a simpler mesh")
+    for share in (0.6, 0.6, 1.0):
+        try:
+            node, tet = tetrahedra(vertex, face, edge, envelope, time_limit_s=max(3.0, share * (deadline - time.monotonic())))
+        except MeshError as error:
+            failure = error
+        else:
+            tet, pieces = largest_component(node, tet)
+            if len(tet) <= MOST_TETS or edge_m is not None:
+                note = f"fTetWild, {len(tet)} tetrahedra, edge {edge:.3g} m, envelope {envelope:.2g} m{skin.note}"
+                return quadratic(node, tet, note=note + (f"; largest of {pieces} separate pieces kept" if pieces > 1 else ""))
+        if edge_m is not None:
+            break
+        edge, envelope = 1.6 * edge, 2.5 * envelope
+    raise failure
 
 
-def solid(shapes: tuple[Shape, ...], edge_m: float | None, thickness_m: float | None, say: Callable[[str], None]) -> Solid:
-    """One solid, the union of ``shapes``, in the body frame. Raises MeshError."""
-    if len(shapes) == 1 and shapes[0].kind != "mesh":
-        made = _named(shapes[0], edge_m)
-        return Solid(_placed(shapes[0], made.node_m), made.tet, made.affine, made.note)
-    vertex, face = _soup(shapes)
-    say(f"filling {len(face)} triangles with tetrahedra")
-    return _filled(vertex, face, edge_m)
+def fill(shapes: tuple[Shape, ...], edge_m: float | None, thickness_m: float | None, say: Callable[[str], None]) -> Filled:
+    """One solid, the union of ``shapes``, in the body frame, its nodes in elimination order. Raises MeshError."""
+    if edge_m is not None and not (np.isfinite(edge_m) and edge_m > 0):
+        raise MeshError(f"edge_m is {edge_m}", "give an element size above zero")
+    one = shapes[0] if len(shapes) == 1 and shapes[0].kind != "mesh" and thickness_m is None else None
+    vertex, face = np.zeros((0, 3)), np.zeros((0, 3), np.int32)
+    if one is not None:
+        if not SIZE_M[0] < one.size_m.max() < SIZE_M[1]:
+            raise MeshError(f"{one.kind} is {one.size_m.max():.3g} m across", "check its unit and scale: metres are expected")
+        made = _named(one, edge_m)
+        made = Solid(_placed(one, made.node_m), made.tet, made.affine, made.note)
+    else:
+        vertex, face = _soup(shapes)
+        prepared_skin = prepared(vertex, face, thickness_m)
+        vertex, face = prepared_skin.vertex_m, prepared_skin.face
+        made = _meshed(prepared_skin, edge_m, say)
+    order = dissection(made.node_m, made.tet)
+    place = np.empty(len(order), np.int64)
+    place[order] = np.arange(len(order))
+    solid = Solid(made.node_m[order], place[made.tet], made.affine, made.note)
+    skin = surface(solid)
+    return Filled(solid, skin, _curvature(one, vertex, face, solid.node_m[skin.node], skin.face))
+
+
+def _curvature(one: Shape | None, vertex_m: Array, face: Array, skin_m: Array, skin_face: Array) -> Array:
+    """Curvature of the skin's faces: known of a ball and a box, estimated of other named shapes, else the given mesh's own nearby."""
+    if one is not None and one.kind == "sphere":
+        return np.full(len(skin_face), 1 / float(one.size_m[0]))
+    if one is not None:
+        return geometry.face_curvature(skin_m, skin_face)
+    given = geometry.face_curvature(vertex_m, face)
+    if not given.any():
+        return np.zeros(len(skin_face))
+    nearest, _, _ = geometry.closest_point(vertex_m, face, skin_m[skin_face].mean(axis=1), geometry.outward_normals(skin_m, skin_face))
+    return np.asarray(given[nearest])

@@ -91,7 +91,7 @@ def _onto_disc(point: Array) -> Array:
     angle = (np.arange(6) + 0.5) * np.pi / 3
     normal = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1) / np.cos(np.pi / 6)
     flat = point * [1, 1, 0]
-    return _onto_ball(flat, normal) + point * [0, 0, 1]
+    return np.asarray(_onto_ball(flat, normal) + point * [0, 0, 1])
 
 
 def _prisms(triangle: Array, offset: int, layers: int) -> Array:
@@ -104,6 +104,12 @@ def _prisms(triangle: Array, offset: int, layers: int) -> Array:
     return np.concatenate([np.stack(t, axis=1) for t in tets])
 
 
+def stacked(flat: Array, triangle: Array, height: Array) -> tuple[Array, Array]:
+    """Corners (p·l, 3) and tetrahedra of triangles (t, 3) over points flat (p, 2) repeated at each of height (l,)."""
+    points = np.concatenate([np.column_stack([flat, np.full(len(flat), z)]) for z in height])
+    return points, _prisms(triangle, len(flat), len(height) - 1)
+
+
 def _disc(n: int) -> tuple[Array, Array]:
     corner = np.concatenate([np.zeros((1, 3)), _HEXAGON])
     return _refined(corner, np.array([[0, 1 + k, 1 + (k + 1) % 6] for k in range(6)]), n)
@@ -112,8 +118,7 @@ def _disc(n: int) -> tuple[Array, Array]:
 def cylinder(radius_m: float, length_m: float, n: int, layers: int) -> Solid:
     """Cylinder along z about the origin: a disc of 6·n² triangles in ``layers`` layers, three tetrahedra a prism."""
     disc, triangle = _disc(n)
-    points = np.concatenate([disc + [0, 0, z] for z in np.linspace(-0.5, 0.5, layers + 1)])
-    tet = _prisms(triangle, len(disc), layers)
+    points, tet = stacked(disc[:, :2], triangle, np.linspace(-0.5, 0.5, layers + 1))
     scale = np.array([radius_m, radius_m, length_m])
     return quadratic(points, tet, lambda p: _onto_disc(p) * scale, f"cylinder of {n} rings in {layers} layers, curved")
 
@@ -126,10 +131,10 @@ def capsule(radius_m: float, length_m: float, n: int, layers: int) -> Solid:
     ring = [[0, 1 + k, 1 + (k + 1) % 6, 7] for k in range(6)]
     cap, cap_tet = _refined(np.concatenate([np.zeros((1, 3)), _HEXAGON, apex[None]]), np.array(ring), n)
     normal = _face_normals(np.concatenate([_HEXAGON, apex[None], -apex[None]]), np.array([[k, (k + 1) % 6, e] for k in range(6) for e in (6, 7)]))
-    tube = np.concatenate([disc + [0, 0, z] for z in np.linspace(-half, half, layers + 1)])
+    tube, tube_tet = stacked(disc[:, :2], triangle, np.linspace(-half, half, layers + 1))
     shift = np.array([0, 0, half])
     points = np.concatenate([tube, cap + shift, cap * [1, 1, -1] - shift])
-    tet = np.concatenate([_prisms(triangle, len(disc), layers), cap_tet + len(tube), cap_tet + len(tube) + len(cap)])
+    tet = np.concatenate([tube_tet, cap_tet + len(tube), cap_tet + len(tube) + len(cap)])
     _, first, inverse = np.unique(np.round(points * 4 * 720720).astype(np.int64), axis=0, return_index=True, return_inverse=True)
 
     def place(p: Array) -> Array:

@@ -17,6 +17,7 @@ from sonic_bullet.records import Array
 
 TIME_LIMIT_S = 45.0
 MEMORY_LIMIT_BYTES = 2 * 1024**3
+CUT_OFF = (9, 24)  # SIGKILL, SIGXCPU: the child's own limit on processor time
 
 
 def tetrahedra(vertex_m: Array, face: Array, edge_m: float, envelope_m: float, *, time_limit_s: float = TIME_LIMIT_S) -> tuple[Array, Array]:
@@ -31,20 +32,16 @@ def tetrahedra(vertex_m: Array, face: Array, edge_m: float, envelope_m: float, *
     with tempfile.TemporaryDirectory(prefix="sonic_bullet-") as folder:
         source, target = Path(folder) / "in.npz", Path(folder) / "out.npz"
         # Unit size about the origin: fTetWild's own tolerances then see every body alike, in metres or micrometres.
-        np.savez(
-            source,
-            vertex=(vertex_m - centre) / diagonal_m,
-            face=face,
-            edge=edge_m / diagonal_m,
-            envelope=envelope_m / diagonal_m,
-            threads=1,
-            memory=MEMORY_LIMIT_BYTES,
-        )
+        size = {"edge": edge_m / diagonal_m, "envelope": envelope_m / diagonal_m}
+        limits = {"threads": 1, "memory": MEMORY_LIMIT_BYTES, "seconds": int(np.ceil(time_limit_s))}
+        np.savez(source, vertex=(vertex_m - centre) / diagonal_m, face=face, **size, **limits)
         command = [sys.executable, str(Path(__file__).with_name("_tetwild.py")), str(source), str(target)]
         try:
             ended = subprocess.run(command, timeout=time_limit_s, capture_output=True, text=True, check=False)
         except subprocess.TimeoutExpired:
-            raise MeshError(f"filling the mesh with tetrahedra took longer than {time_limit_s:g} s", "give a larger edge_m or a simpler mesh") from None
+            ended = None
+        if ended is None or -ended.returncode in CUT_OFF:
+            raise MeshError(f"filling the mesh with tetrahedra took longer than {time_limit_s:.0f} s", "give a larger edge_m or a simpler mesh")
         if ended.returncode != 0 or not target.exists():
             said = (ended.stderr.strip().splitlines() or ["no message"])[-1]
             raise MeshError(f"fTetWild failed on the mesh (exit {ended.returncode}: {said[:200]})", "repair the mesh, or give a larger edge_m")

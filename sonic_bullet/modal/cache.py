@@ -1,0 +1,96 @@
+"""What was computed once, kept on disk under the name of what it was computed from.
+
+    sha256(numbers, options, source text of this room) -> KEY.npz in SONIC_BULLET_CACHE, or the user's cache folder
+
+A file is written beside its name and moved there whole; a cut, foreign or unreadable file is a miss. Nothing is pickled.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from contextlib import suppress
+from functools import lru_cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Literal
+
+import msgspec
+import numpy as np
+
+from sonic_bullet.errors import FileError, LogError
+from sonic_bullet.records import Array
+
+Place = Path | Literal["default"] | None
+FORMAT = "sonic-bullet-cache/1"
+SOLVERS = ("numpy", "scipy", "scikit-fem", "pytetwild")
+
+
+class _Header(msgspec.Struct):
+    format: str
+    note: str
+
+
+def folder(place: Place) -> Path | None:
+    """The cache's folder: ``place``, or for "default" SONIC_BULLET_CACHE or the user's cache folder; None for no cache."""
+    if place is None:
+        return None
+    if place != "default":
+        return Path(place)
+    given = os.environ.get("SONIC_BULLET_CACHE")
+    if given:
+        return Path(given)
+    from platformdirs import user_cache_path
+
+    return user_cache_path("sonic_bullet") / "modal"
+
+
+@lru_cache(maxsize=1)
+def _code() -> bytes:
+    """Digest of all that turns a surface into modes: this room's source, the geometry below it, the solvers' versions."""
+    here = Path(__file__).resolve().parent
+    digest = hashlib.sha256()
+    for file in [*sorted(here.glob("*.py")), here.parent / "geometry.py", here.parent / "surface_index.py"]:
+        digest.update(file.read_bytes())
+    for name in SOLVERS:
+        with suppress(PackageNotFoundError):
+            digest.update(f"{name} {version(name)}".encode())
+    return digest.digest()
+
+
+def key(kind: str, *parts: Array | str | float | int | None) -> str:
+    """Name of a result: ``kind`` and a digest of the parts (arrays by dtype, shape and bytes) and of the code."""
+    digest = hashlib.sha256(_code())
+    for part in parts:
+        if isinstance(part, np.ndarray):
+            digest.update(f"{part.dtype.str}{part.shape}".encode() + np.ascontiguousarray(part).tobytes())
+        else:
+            digest.update(repr(part).encode())
+        digest.update(b"\0")
+    return f"{kind}-{digest.hexdigest()}"
+
+
+def load(place: Place, name: str) -> tuple[dict[str, Array], str] | None:
+    """Arrays and note kept under ``name``, or None."""
+    from sonic_bullet.files.container import read_container
+
+    where = folder(place)
+    if where is None:
+        return None
+    try:
+        header, arrays = read_container(where / f"{name}.npz", _Header, FORMAT, "cached model")
+    except (FileError, LogError):
+        return None
+    return arrays, header.note
+
+
+def save(place: Place, name: str, arrays: dict[str, Array], note: str) -> None:
+    """Keep arrays and note under ``name``; a full or read-only disk costs the next run time, not this one its result."""
+    from sonic_bullet.files.container import write_container
+
+    where = folder(place)
+    if where is None:
+        return
+    with suppress(OSError, FileError):
+        where.mkdir(parents=True, exist_ok=True)
+        write_container(where / f"{name}.npz", _Header(FORMAT, note), arrays)
