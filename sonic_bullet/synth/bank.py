@@ -205,7 +205,7 @@ def advance(bank: Bank, state: BankState, n: int, strikes: Sequence[Strike] = ()
     out = np.zeros((bank.weight.shape[0], bank.body_count, n))
     done = np.zeros(len(pending.body), bool)
     bank_kernel.advance(
-        state.at, out, bank.offset, bank.pole, bank.block, bank.quadrature, bank.weight, bank.heard,
+        state.at, out, bank.offset, bank.count, bank.pole, bank.block, bank.quadrature, bank.weight, bank.heard,
         state.z, state.driven, state.sound, state.ringing, state.is_driven, state.tiled, FLOOR**2,
         np.searchsorted(pending.body, np.arange(bank.body_count + 1)), pending.count, pending.whole, pending.delta, pending.phase,
         pending.upcoming, pending.first, pending.impulse, pending.impulse_at, pending.rows.reshape(-1), pending.rows_at, done,

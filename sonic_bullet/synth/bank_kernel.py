@@ -29,7 +29,7 @@ def _aligned(size):  # pragma: no cover - compiled
 
 
 @njit(cache=True, nogil=True)
-def _ring(b, z, pole, block, weight, modes, start, stop, heard, floor, sound, now, powers, table, column):  # pragma: no cover - compiled
+def _ring(b, z, pole, block, weight, modes, start, stop, size, heard, floor, sound, now, powers, table, column):  # pragma: no cover - compiled
     """Tile of body b for the block that starts: sound (W, b, BLOCK). Turns z to the next block. False where all modes are below the floor."""
     ringing = False
     for lo in range(start, stop, CHUNK):
@@ -41,11 +41,12 @@ def _ring(b, z, pole, block, weight, modes, start, stop, heard, floor, sound, no
             for w in range(len(heard)):
                 if heard[w, b]:
                     sound[w, b, :] = 0.0
-        tile.rows(powers, count, table)
+        real = min(count, start + size - lo)  # spare lanes need no table
+        tile.rows(powers, real, table)
         for w in range(len(heard)):
             if heard[w, b]:
                 tile.columns(now, weight[w], modes, lo, powers, count, column)
-                tile.outer(column, table, count, sound[w, b])
+                tile.outer(column, table, real, sound[w, b])
     return ringing
 
 
@@ -71,10 +72,17 @@ def _strike(
 @njit(cache=True, nogil=True)
 def _begins(first, done, s0, s1, end):  # pragma: no cover - compiled
     """Whether one of the strikes s0 … s1 - 1 has nodes before sample ``end``."""
+    begins = False  # numba knows no any()
     for j in range(s0, s1):
-        if not done[j] and first[j] < end:
-            return True
-    return False
+        begins = begins or (not done[j] and first[j] < end)
+    return begins
+
+
+@njit(cache=True, nogil=True)
+def _copy_flushed(values, out):  # pragma: no cover - compiled
+    for k in range(len(out)):
+        value = values[k]
+        out[k] = value if abs(value) >= FLUSH else 0.0
 
 
 @njit(cache=True, nogil=True)
@@ -137,7 +145,7 @@ def _drive(at, i, end, place, b, out, driven, is_driven, tiled, pole, modes, sta
 
 
 @njit(cache=True, nogil=True)
-def advance(at, out, offset, pole, block, quadrature, weight, heard, z, driven, sound, ringing, is_driven, tiled, floor,
+def advance(at, out, offset, size, pole, block, quadrature, weight, heard, z, driven, sound, ringing, is_driven, tiled, floor,
             strike_of, count, whole, delta, phase, upcoming, first, impulse, impulse_at, rows, rows_at, done,
             force_of, force, gain0, gain1, gain_at, progress, period):  # fmt: skip  # pragma: no cover - compiled
     """Samples at … at + n - 1 into out (W, b, n) (zeros). See bank.py for the arrays; all in place."""
@@ -160,15 +168,13 @@ def advance(at, out, offset, pole, block, quadrature, weight, heard, z, driven, 
             place = (at + i) % BLOCK
             end = min(n, i + BLOCK - place)
             if place == 0:
-                tiled[b] = ringing[b] and _ring(b, z, pole, block, weight, modes, start, stop, heard, floor, sound, now, powers, table, column)
+                tiled[b] = ringing[b] and _ring(b, z, pole, block, weight, modes, start, stop, size[b], heard, floor, sound, now, powers, table, column)
                 ringing[b] = tiled[b]
             if not (is_driven[b] or f1 > f0 or _begins(first, done, s0, s1, at + end)):
                 if tiled[b]:
                     for w in range(len(heard)):
                         if heard[w, b]:
-                            for k in range(end - i):
-                                value = sound[w, b, place + k]
-                                out[w, b, i + k] = value if abs(value) >= FLUSH else 0.0
+                            _copy_flushed(sound[w, b, place : place + end - i], out[w, b, i:end])
                     tiled[b] = place + end - i < BLOCK
                 i = end
                 continue
