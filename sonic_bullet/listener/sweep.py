@@ -19,7 +19,7 @@ from numba import njit
 from sonic_bullet.listener.kinematics import Table, pose_after, turn
 from sonic_bullet.records import Array
 
-MEMORY_STEPS = 8
+MEMORY_STEPS = 5
 ROLL_MARGIN = 2.0
 SLIP_MARGIN = 0.05
 
