@@ -111,8 +111,9 @@ def articulated_error(client: Any, urdf: str, position: Any) -> tuple[float, flo
 
 
 def test_articulated_bodies_keep_momentum_as_well_as_bullet_does(client: Any) -> None:
-    """Bullet's articulated step is not exactly momentum-preserving (moving joints); what is reached is stated in the note."""
+    """A tumbling r2d2 with free joints, in units of its weight times the step. (Measured 2.6e-10 and 4.9e-6; humanoids and dogs with
+    tight joint limits 1e-3 and 0.2: Bullet's articulated step does not conserve momentum exactly there.)"""
     median, largest, loaded = articulated_error(client, pybullet_data.getDataPath() + "/r2d2.urdf", [0, 0, 0.7])
     assert loaded > 100
-    assert median < 1e-2
-    assert largest < 5.0
+    assert median < 1e-6
+    assert largest < 1e-3
