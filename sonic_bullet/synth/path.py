@@ -128,13 +128,13 @@ def propagate(
         raise AudioError("a source or jerk that is not finite", "look for the step whose contacts or loads produced it")
     _begin_fades(state, step, np.asarray(teleported, bool), loud, channels)
     from_m, to_m, fade = _places(state, step, arrays["position0_m"], arrays["position1_m"])
-    _make_room(path, state, from_m, to_m, loud, n)
+    _make_room(path, state, from_m, to_m, loud)
     out = np.zeros((channels, n))
     lines = state.size.repeat(channels)
     path_kernel.propagate(
         state.at, out, arrays["source"], arrays["jerk"], path.jerk_coefficient, path.radius_m, np.argsort(state.body, kind="stable"), state.body, from_m, to_m, fade,
         arrays["progress"], path.microphone_m, path.sr / path.air.sound_speed_m_s, state.ring, _starts(lines + path_kernel.TAPS), state.delays, _starts(lines),
-        lines - 1, state.awake, state.cursor, state.last, path_kernel.tap_polynomials(), loud,
+        lines, state.awake, state.cursor, state.last, path_kernel.tap_polynomials(), loud,
     )  # fmt: skip
     state.at += n
     return out
@@ -207,22 +207,24 @@ def _places(state: PathState, step: int, position0_m: Array, position1_m: Array)
     return from_m, to_m, fade
 
 
-def _make_room(path: Path, state: PathState, from_m: Array, to_m: Array, loud: Array, n: int) -> None:
+def _make_room(path: Path, state: PathState, from_m: Array, to_m: Array, loud: Array) -> None:
     """Lengthen the histories of places from which sound needs more time than they remember."""
     channels = len(path.microphone_m)
     if not channels or not len(state.body):
         return
     heard = loud[state.body] | _awake(state, channels)
-    away = np.maximum(*(np.linalg.norm(path.microphone_m[None] - end[:, None], axis=2).max(axis=1) for end in (from_m, to_m)))
-    far = np.flatnonzero(heard & (away > FARTHEST_M))
+    away = np.zeros(len(state.body))
+    path_kernel.farthest(from_m, to_m, path.microphone_m, away)
+    away *= heard
+    need = away * (path.sr / path.air.sound_speed_m_s) + _MARGIN
+    if not ((need > state.size) | (away > FARTHEST_M)).any():
+        return
+    far = np.flatnonzero(away > FARTHEST_M)
     if len(far):
         raise AudioError(
             f"body {state.body[far[0]]} sounds {away[far[0]]:.0f} m from a microphone", f"keep what sounds within {FARTHEST_M:.0f} m, or remove it"
         )
-    need = np.where(heard, away * path.sr / path.air.sound_speed_m_s + _MARGIN, 0)
-    size = np.maximum(state.size, 2 ** np.ceil(np.log2(np.maximum(need, 1))).astype(np.int64))
-    if (size == state.size).all():
-        return
+    size = np.maximum(state.size, 2 ** np.ceil(np.log2(need)).astype(np.int64))
     lines, new_lines = state.size.repeat(channels), size.repeat(channels)
     ring, delays = np.zeros(int((new_lines + path_kernel.TAPS).sum())), np.zeros(int(new_lines.sum()))
     froms, tos = _starts(lines + path_kernel.TAPS), _starts(new_lines + path_kernel.TAPS)

@@ -76,10 +76,12 @@ def _interpolate(typingctx, ring, at, taps, t):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _listen(line, at, emitted, delay, heard, ring, base, delays, base_delay, mask, awake, cursor, last, taps):  # pragma: no cover - compiled
-    """Run one line over the samples of emitted (n,), adding to heard (n,)."""
+def _listen(line, at, emitted, delay, heard, ring, delays, awake, cursor, last, taps):  # pragma: no cover - compiled
+    """Run one line, its ring and delays (a power of two long, the ring TAPS longer), over emitted (n,), adding to heard (n,)."""
+    size = len(delays)
+    mask = np.uintp(size - 1)  # unsigned indices: numba checks no wrap-around
     running, m, newest = awake[line], cursor[line], last[line]
-    before = delays[base_delay + ((at - 1) & mask)]
+    before = delays[np.uintp(at - 1) & mask]
     for i in range(len(emitted)):
         n = at + i
         value, new = emitted[i], delay[i]
@@ -88,35 +90,35 @@ def _listen(line, at, emitted, delay, heard, ring, base, delays, base_delay, mas
                 continue
             running = True
             for k in range(n - _HISTORY, n):
-                place = k & mask
-                ring[base + place] = 0.0
-                delays[base_delay + place] = new
+                place = np.uintp(k) & mask
+                ring[place] = 0.0
+                delays[place] = new
                 if place < TAPS:
-                    ring[base + place + mask + 1] = 0.0
+                    ring[place + np.uintp(size)] = 0.0
             m = n - AHEAD - 1
         else:
             new = max(new, before - (1.0 - LEAST_ADVANCE))
         before = new
-        place = n & mask
-        ring[base + place] = value
-        delays[base_delay + place] = new
+        place = np.uintp(n) & mask
+        ring[place] = value
+        delays[place] = new
         if place < TAPS:
-            ring[base + place + mask + 1] = value  # mirrored, so that 16 taps are always contiguous
+            ring[place + np.uintp(size)] = value  # mirrored, so that 16 taps are always contiguous
         if value != 0.0:
             newest = n
-        here = delays[base_delay + (m & mask)]
+        here = delays[np.uintp(m) & mask]
         if (m - n) + here > 0.0:
             continue
-        there = delays[base_delay + ((m + 1) & mask)]
+        there = delays[np.uintp(m + 1) & mask]
         while (m + 1 - n) + there <= 0.0:
             m += 1
             here = there
-            there = delays[base_delay + ((m + 1) & mask)]
+            there = delays[np.uintp(m + 1) & mask]
         if m - (AHEAD - 1) > newest:
             running = False
             continue
         fraction = ((n - m) - here) / (1.0 + there - here)
-        heard[i] += _interpolate(ring, base + ((m - (AHEAD - 1)) & mask), taps, fraction - 0.5)
+        heard[i] += _interpolate(ring, np.int64(np.uintp(m - (AHEAD - 1)) & mask), taps, fraction - 0.5)
     awake[line], cursor[line], last[line] = running, m, newest
 
 
@@ -142,25 +144,47 @@ def _emit(source, jerk, coefficient, radius, from_m, to_m, fade, progress, micro
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def farthest(from_m, to_m, microphone, out):  # pragma: no cover - compiled
+    """Greatest distance (t,) of each place's ends from any microphone: on a straight way it lies at an end."""
+    for t in range(len(out)):
+        square = 0.0
+        for c in range(len(microphone)):
+            start, stop = 0.0, 0.0
+            for axis in range(3):
+                start += (from_m[t, axis] - microphone[c, axis]) ** 2
+                stop += (to_m[t, axis] - microphone[c, axis]) ** 2
+            square = max(square, start, stop)
+        out[t] = np.sqrt(square)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _judged(values):  # pragma: no cover - compiled
+    """Whether any of the values is not zero, and whether any is not finite."""
+    some, bad = 0, 0
+    for k in range(len(values)):
+        some |= 1 if values[k] != 0.0 else 0
+        bad |= 0 if abs(values[k]) < np.inf else 1
+    return some != 0, bad != 0
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def survey(source, jerk, coefficient, loud):  # pragma: no cover - compiled
     """Mark the bodies that emit anything (b,). False where a number is not finite."""
     for b in range(len(source)):
-        total = 0.0
-        for i in range(source.shape[1]):
-            total += abs(source[b, i])
-        push = 0.0
+        sounds, bad = _judged(source[b])
         for axis in range(3):
-            for i in range(source.shape[1]):
-                push += abs(jerk[b, axis, i])
-        loud[b] = total > 0.0 or (push > 0.0 and coefficient[b] != 0.0)
-        if not (np.isfinite(total) and np.isfinite(push)):
+            pushed, broken = _judged(jerk[b, axis])
+            sounds |= pushed and coefficient[b] != 0.0
+            bad |= broken
+        if bad:
             return False
+        loud[b] = sounds
     return True
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def propagate(at, out, source, jerk, coefficient, radius, order, body, from_m, to_m, fade, progress, microphone, samples_per_m,
-              ring, ring_at, delays, delays_at, mask, awake, cursor, last, taps, loud):  # fmt: skip  # pragma: no cover - compiled
+              ring, ring_at, delays, delays_at, size, awake, cursor, last, taps, loud):  # fmt: skip  # pragma: no cover - compiled
     """Samples at … at + n - 1 into out (c, n), the places summed in ``order``; see path.py for the arrays."""
     channels, n = out.shape
     emitted, delay = np.empty(n), np.empty(n)
@@ -173,7 +197,9 @@ def propagate(at, out, source, jerk, coefficient, radius, order, body, from_m, t
             _emit(
                 source[b], jerk[b], coefficient[b], radius[b], from_m[place], to_m[place], fade[place], progress, microphone[c], samples_per_m, emitted, delay
             )
-            _listen(line, at, emitted, delay, out[c], ring, ring_at[line], delays, delays_at[line], mask[line], awake, cursor, last, taps)
+            history = ring[ring_at[line] : ring_at[line] + size[line] + TAPS]
+            late = delays[delays_at[line] : delays_at[line] + size[line]]
+            _listen(line, at, emitted, delay, out[c], history, late, awake, cursor, last, taps)
     for c in range(channels):
         for i in range(n):
             if abs(out[c, i]) < FLUSH:

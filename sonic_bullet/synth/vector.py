@@ -1,7 +1,8 @@
 """Vector instructions for numba kernels, which have no vector type of their own: a thin writer of LLVM's language.
 
 Every multiply-add is stated and every sum has a fixed order: the bits are the same on each call, whatever the caller's loops.
-Vectors are eight doubles (two registers where the machine has narrower ones).
+Vectors are eight doubles (two or four registers where the machine has narrower ones; the bits are the same).
+numba's cache watches only the file of the compiled function: after a change here, in tile.py or in drive.py, remove synth/__pycache__.
 """
 
 from __future__ import annotations

@@ -207,3 +207,13 @@ def test_bad_forces_rates_and_states_are_named() -> None:
     for rate in (0, -1, 10**9, 44_100.5):
         with pytest.raises(AudioError, match="sample rate"):
             empty_bank(rate)  # type: ignore[arg-type]
+
+
+def test_nothing_to_play_is_legal() -> None:
+    bank, state = empty_bank(SR, 2)
+    assert advance(bank, state, 10).shape == (2, 0, 10)
+    bank, state = append(bank, state, [])
+    bank, state = append(bank, state, [ModeSet(np.zeros(0), np.zeros(0), np.zeros((2, 0), complex))])
+    assert advance(bank, state, 0).shape == (2, 1, 0)
+    assert not advance(bank, state, 10, [Strike(0, 20.0, 1.0, np.ones(3), np.zeros(0))], [Force(0, np.ones(10), np.zeros(0), np.zeros(0))]).any()
+    assert state.at == 20

@@ -248,3 +248,11 @@ def test_what_cannot_be_is_named() -> None:
         empty_path(0, AIR, np.zeros((1, 3)))
     with pytest.raises(AudioError, match="finite"):
         append_bodies(path, state, np.array([np.nan]), np.array([0.0]))
+
+
+def test_nobody_and_no_microphone_are_legal() -> None:
+    path, state = empty_path(SR, AIR, np.zeros((1, 3)))
+    none = np.zeros((0, 3))
+    assert not propagate(path, state, 0, np.zeros((0, 7)), np.zeros((0, 3, 7)), none, none, np.zeros(0, bool), np.zeros(7)).any()
+    path, state = path_of(2, np.zeros((0, 3)))
+    assert still(path, state, np.ones(7), np.zeros((2, 3))).shape == (0, 7)
