@@ -19,4 +19,8 @@ def build(client):
     for body in (smooth, rough, ball):
         client.changeDynamics(body, -1, contactProcessingThreshold=0, lateralFriction=0.6, linearDamping=0, angularDamping=0)
     client.resetBaseVelocity(ball, [SPEED_M_S, 0, 0], [0, SPEED_M_S / RADIUS_M, 0])
-    return {smooth: {"material": "wood", "roughness_m": 0.1e-6}, rough: {"material": "wood", "roughness_m": 4e-6}, ball: {"material": "steel", "roughness_m": 0.02e-6}}
+    return {
+        smooth: {"material": "wood", "roughness_m": 0.1e-6},
+        rough: {"material": "wood", "roughness_m": 4e-6},
+        ball: {"material": "steel", "roughness_m": 0.02e-6},
+    }

@@ -32,7 +32,13 @@ def build(client):
     place("glass", VOLUME_M3["tumbler"], mesh("tumbler"), [0.02, 0.05, 0.052])
     place("steel", 4 / 3 * math.pi * ball**3, sphere, [-0.4, -0.12, ball], velocity=(0.8, 0, 0), spin=(0, 0.8 / ball, 0))
     place("wood", 8 * math.prod(block), client.createCollisionShape(client.GEOM_BOX, halfExtents=block), [0.38, 0.05, 0.02], velocity=(-1.6, 0, 0))
-    place("steel", math.pi * rod[0] ** 2 * rod[1], client.createCollisionShape(client.GEOM_CYLINDER, radius=rod[0], height=rod[1]), [-0.05, -0.2, 0.3], (0, 1.2, 0.3))
+    place(
+        "steel",
+        math.pi * rod[0] ** 2 * rod[1],
+        client.createCollisionShape(client.GEOM_CYLINDER, radius=rod[0], height=rod[1]),
+        [-0.05, -0.2, 0.3],
+        (0, 1.2, 0.3),
+    )
     for i in range(3):
         shape = client.createCollisionShape(client.GEOM_SPHERE, radius=marble)
         place("glass", 4 / 3 * math.pi * marble**3, shape, [0.1 + 0.05 * i, -0.1, 0.35 + 0.12 * i], velocity=(0.1, 0.05, 0))

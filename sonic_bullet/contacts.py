@@ -9,7 +9,7 @@ k rows, s steps, b bodies. A row's a and b are indices into the log's `bodies`; 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -81,7 +81,8 @@ class Step:
     """One physics step: its length, the poses at its start of all bodies known by then, and its loaded contacts.
 
     position_m (b, 3), quaternion_xyzw (b, 4): body frames in the world; a removed body keeps its last pose.
-    teleported (b,): True where the body was moved by hand since the previous step.
+    teleported (b,): True where the body was moved by hand since the previous step. gravity_m_s2 (3,): world frame; what falls for one
+    step gains that speed, which is no blow (see synth.strikes).
     """
 
     dt_s: float
@@ -89,12 +90,14 @@ class Step:
     quaternion_xyzw: Array
     teleported: Array
     contacts: Contacts
+    gravity_m_s2: Array = field(default_factory=lambda: np.zeros(3))
 
     def __post_init__(self) -> None:
         b = len(self.position_m)
         object.__setattr__(self, "position_m", frozen_array(self.position_m, float, (b, 3), "body positions"))
         object.__setattr__(self, "quaternion_xyzw", frozen_array(self.quaternion_xyzw, float, (b, 4), "body orientations"))
         object.__setattr__(self, "teleported", frozen_array(self.teleported, bool, (b,), "teleported"))
+        object.__setattr__(self, "gravity_m_s2", frozen_array(self.gravity_m_s2, float, (3,), "gravity"))
         if not (np.isfinite(self.dt_s) and 0 < self.dt_s <= 1):
             raise LogError(f"a physics step of {self.dt_s} s", "set a time step between 0 and 1 s with setTimeStep")
         if len(self.contacts) and max(self.contacts.a.max(), self.contacts.b.max()) >= b:

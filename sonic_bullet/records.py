@@ -83,7 +83,11 @@ class Material:
         where = f"material '{self.name}'"
         _require(np.isfinite(self.density_kg_m3) and self.density_kg_m3 > 0, f"{where}: density_kg_m3 is {self.density_kg_m3}", "give a density above zero")
         _require(bool(np.allclose(stiffness, stiffness.T, rtol=1e-9)), f"{where}: stiffness_pa is not symmetric", "give a symmetric tensor")
-        _require(bool(np.linalg.eigvalsh(stiffness)[0] > 0), f"{where}: stiffness is not positive definite", "Young's modulus must be above 0 and Poisson's ratio within -1 … 0.5")
+        _require(
+            bool(np.linalg.eigvalsh(stiffness)[0] > 0),
+            f"{where}: stiffness is not positive definite",
+            "Young's modulus must be above 0 and Poisson's ratio within -1 … 0.5",
+        )
         for name in ("alpha_per_s", "beta_s"):
             value = getattr(self, name)
             _require(value is None or (np.isfinite(value) and value >= 0), f"{where}: {name} is {value}", "damping must be zero or above")
@@ -196,9 +200,13 @@ class ModalModel:
             shape=frozen_array(self.shape, np.float32, (len(vertex), 3, m), "mode shape"),
             curvature_per_m=frozen_array(self.curvature_per_m, float, (len(face),), "curvature_per_m"),
         )
-        _require(bool((freq > 0).all() and (np.diff(freq) >= 0).all()), "mode frequencies are not ascending and above zero", "build the model with modal.analyse")
+        _require(
+            bool((freq > 0).all() and (np.diff(freq) >= 0).all()), "mode frequencies are not ascending and above zero", "build the model with modal.analyse"
+        )
         _require(not np.isinf(decay).any() and not bool((decay < 0).any()), "mode decays are negative or infinite", "build the model with modal.analyse")
-        _require(len(face) == 0 or bool((face >= 0).all() and (face < len(vertex)).all()), "faces point at missing vertices", "build the model with modal.analyse")
+        _require(
+            len(face) == 0 or bool((face >= 0).all() and (face < len(vertex)).all()), "faces point at missing vertices", "build the model with modal.analyse"
+        )
         _require(self.volume_m3 >= 0 and self.mass_kg >= 0, "negative volume or mass", "orient the mesh outward")
 
     @property
@@ -237,7 +245,11 @@ class Body:
 
     def __post_init__(self) -> None:
         _store(self, inertia_kg_m2=frozen_array(self.inertia_kg_m2, float, (3, 3), f"body {self.body_id}: inertia"))
-        _require(np.isfinite(self.mass_kg) and 0 <= self.mass_kg < 1e12, f"body {self.body_id} link {self.link} has mass {self.mass_kg} kg", "give it a finite mass with changeDynamics")
+        _require(
+            np.isfinite(self.mass_kg) and 0 <= self.mass_kg < 1e12,
+            f"body {self.body_id} link {self.link} has mass {self.mass_kg} kg",
+            "give it a finite mass with changeDynamics",
+        )
         _require(np.isfinite(self.volume_m3) and self.volume_m3 >= 0, f"body {self.body_id}: volume {self.volume_m3} m³", "orient its mesh outward")
 
 
@@ -264,7 +276,11 @@ class Vibrometer:
         direction = np.array(self.direction, float)
         length = float(np.linalg.norm(direction))
         _require(length > 0, "vibrometer direction is zero", "give the direction in which it looks")
-        _store(self, point_m=frozen_array(self.point_m, float, (3,), "vibrometer point"), direction=frozen_array(direction / length, float, (3,), "vibrometer direction"))
+        _store(
+            self,
+            point_m=frozen_array(self.point_m, float, (3,), "vibrometer point"),
+            direction=frozen_array(direction / length, float, (3,), "vibrometer direction"),
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -285,4 +301,8 @@ class Air:
     sound_speed_m_s: float = 343.0
 
     def __post_init__(self) -> None:
-        _require(0 < self.density_kg_m3 < 1e4 and 0 < self.sound_speed_m_s < 1e5, f"air of {self.density_kg_m3} kg/m³ and {self.sound_speed_m_s} m/s", "give both above zero")
+        _require(
+            0 < self.density_kg_m3 < 1e4 and 0 < self.sound_speed_m_s < 1e5,
+            f"air of {self.density_kg_m3} kg/m³ and {self.sound_speed_m_s} m/s",
+            "give both above zero",
+        )

@@ -77,7 +77,12 @@ def examine_scene(path: str | Path, seconds: float = 1.0) -> tuple[Finding, ...]
 
 def _mute_bodies(listener: Listener) -> tuple[Finding, ...]:
     return tuple(
-        Finding("no-audible-mode", "info", f"body {body.body_id} link {body.link} ({body.name}) has no mode below 20 kHz: it clicks but does not ring", "nothing to mend; a larger or thinner body rings")
+        Finding(
+            "no-audible-mode",
+            "info",
+            f"body {body.body_id} link {body.link} ({body.name}) has no mode below 20 kHz: it clicks but does not ring",
+            "nothing to mend; a larger or thinner body rings",
+        )
         for body in listener.contacts.bodies
         if body.model is not None and body.model.mode_count == 0 and len(body.model.face)
     )
@@ -122,7 +127,7 @@ class _Stage:
 
 
 def _stage(path: str | Path, **options: Any) -> _Stage:
-    place = Path(path)
+    place = Path(path).resolve()
     if not place.is_file():
         raise SceneError(f"no scene file '{path}'", "give the path of a Python scene or of a contact log")
     return _Stage(place, **options)
@@ -138,7 +143,8 @@ def _defines_build(path: Path) -> bool:
 
 def _uses_sonic_bullet(path: Path) -> bool:
     return any(
-        (isinstance(node, ast.Import) and any(name.name.split(".")[0] == "sonic_bullet" for name in node.names)) or (isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == "sonic_bullet")
+        (isinstance(node, ast.Import) and any(name.name.split(".")[0] == "sonic_bullet" for name in node.names))
+        or (isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == "sonic_bullet")
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
     )
 
@@ -194,7 +200,9 @@ def _run_plain(stage: _Stage, seconds: float | None, progress: Progress | None) 
         names = run_script(stage.path, None, total)
         stage.listener = next((value for value in names.values() if isinstance(value, Listener)), None)
         if stage.listener is None:
-            raise SceneError(f"scene '{stage.path.name}' imports sonic_bullet but keeps no listener in a top-level name", "write listener = sonic_bullet.attach(...)")
+            raise SceneError(
+                f"scene '{stage.path.name}' imports sonic_bullet but keeps no listener in a top-level name", "write listener = sonic_bullet.attach(...)"
+            )
         return notes
     material = stage.material or DEFAULT_MATERIAL
     places = stage.microphones if stage.microphones is not None else (0.0, -1.0, 0.5)

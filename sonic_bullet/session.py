@@ -145,17 +145,20 @@ class Listener:
         if model is None:
             clamps = tuple((float(x), float(y), float(z), float(r)) for x, y, z, r in fixed)
             model = modal.analyse(shapes, material, to_hz=to_hz, count=count, fixed=clamps, thickness_m=thickness_m)
-        self.world.add(body, link, material=material, model=model)
+        self.world.add(body, link, material=material, model=model, shapes=shapes)
         return model
 
     def step(self) -> Array:
         """Take in the physics step just made; returns `frame`. Called by the hook of a `BulletClient`, by hand otherwise.
 
-        A second call without a physics step between finds no contacts: silence of a step's length. Raises SceneError for NaN or a lost connection.
+        A second call without a physics step between gives a frame of no length. Raises SceneError for NaN or a lost connection.
         """
         if not self._attached:
             raise SceneError("the listener is detached", "attach a new one")
         step = self.world.after_step()
+        if not self.world.stepped:
+            self.frame = np.zeros((len(self.sensors), 0))
+            return self.frame
         self._steps.append(step)
         self.frame = self._synth.feed(step, self.world.bodies)
         self._unread.append(self.frame)

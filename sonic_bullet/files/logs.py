@@ -4,6 +4,7 @@ The container is `container`'s npz. Scalars, names and references are JSON (`hea
 
     format "sonic-bullet-contacts/1"; b bodies, s steps, p = Σ bodies known at each step, k = Σ contacts of each step
       step_dt_s (s,) f8                     length of each step
+      step_gravity_m_s2 (s, 3) f8            gravity in the world
       step_body_count, step_contact_count (s,) i8   how many of the p and k rows are each step's, in order
       pose_position_m (p, 3) f8, pose_quaternion_xyzw (p, 4) f8, pose_teleported (p,) bool
       contact_<field> (k, …)                the fields of `Contacts`: a, b i4; point_a_m, point_b_m, normal, impulse_n_s, slip_m_s,
@@ -127,6 +128,7 @@ def write_log(path: str | os.PathLike[str], log: ContactLog) -> None:
     rows = Contacts.joined([step.contacts for step in steps])
     arrays: dict[str, Array] = {
         "step_dt_s": np.array([step.dt_s for step in steps], float),
+        "step_gravity_m_s2": np.reshape([step.gravity_m_s2 for step in steps], (-1, 3)).astype(float),
         "step_body_count": np.array([len(step.position_m) for step in steps], np.int64),
         "step_contact_count": np.array([len(step.contacts) for step in steps], np.int64),
         "pose_position_m": np.concatenate([np.zeros((0, 3)), *(step.position_m for step in steps)]),
@@ -292,11 +294,12 @@ def _unpack_steps(arrays: Mapping[str, Array], path: object) -> tuple[Step, ...]
     p, k = int(poses[-1]), int(contacts[-1])
     position = take(arrays, "pose_position_m", float, (p, 3), path)
     quaternion = take(arrays, "pose_quaternion_xyzw", float, (p, 4), path)
+    gravity = take(arrays, "step_gravity_m_s2", float, (len(dt), 3), path)
     teleported = take(arrays, "pose_teleported", bool, (p,), path)
     rows = Contacts(**{name: take(arrays, f"contact_{name}", dtype, (k, *tail), path) for name, (dtype, tail) in ROW_FIELDS.items()})
     if k and min(rows.a.min(), rows.b.min()) < 0:
         raise LogError(f"{path}: a contact names a body below zero", REMEDY)
     return tuple(
-        Step(float(dt[i]), position[p0:p1], quaternion[p0:p1], teleported[p0:p1], rows.rows(k0, k1))
+        Step(float(dt[i]), position[p0:p1], quaternion[p0:p1], teleported[p0:p1], rows.rows(k0, k1), gravity[i])
         for i, (p0, p1, k0, k1) in enumerate(zip(poses[:-1], poses[1:], contacts[:-1], contacts[1:], strict=True))
     )

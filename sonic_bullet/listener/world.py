@@ -47,6 +47,7 @@ class World:
         self._position_m = np.zeros((0, 3))
         self._quaternion_xyzw = np.zeros((0, 4))
         self._time_s = 0.0
+        self._gravity_m_s2 = np.zeros(3)
         self._roster: Roster | None = None
         self._before: Motion | None = None
         self._past_touches: Touches | None = None
@@ -184,7 +185,7 @@ class World:
 
     def _again(self, dt: float) -> Step:
         """A step in which nothing happens."""
-        return Step(dt, self._position_m, self._quaternion_xyzw, np.zeros(len(self._bodies), bool), Contacts.none())
+        return Step(dt, self._position_m, self._quaternion_xyzw, np.zeros(len(self._bodies), bool), Contacts.none(), self._gravity_m_s2)
 
     def _step(self, dt: float, start: Start, of_row: Array, contacts: Contacts) -> Step:
         row = np.flatnonzero(of_row >= 0)
@@ -193,7 +194,7 @@ class World:
         self._position_m[index] = start.motion.position_m[row]
         self._quaternion_xyzw[index] = start.motion.quaternion_xyzw[row]
         teleported[index] = start.moved[row]
-        return Step(dt, self._position_m, self._quaternion_xyzw, teleported, contacts)
+        return Step(dt, self._position_m, self._quaternion_xyzw, teleported, contacts, self._gravity_m_s2)
 
     def _touches(self, dt: float, substeps: int) -> Touches:
         last = self._ask(pybullet.getContactPoints)
@@ -217,6 +218,7 @@ class World:
 
     def _step_length(self) -> tuple[float, int]:
         settings = self._ask(pybullet.getPhysicsEngineParameters)
+        self._gravity_m_s2 = np.array([settings[f"gravityAcceleration{axis}"] for axis in "XYZ"])
         return settings["fixedTimeStep"], max(1, settings["numSubSteps"])
 
     def _known_roster(self) -> Roster:

@@ -21,11 +21,11 @@ from sonic_bullet.modal.solid import Solid, Surface, largest_component, quadrati
 from sonic_bullet.modal.surfaces import SIZE_M, Skin, prepared
 from sonic_bullet.records import Array, Shape
 
-THIN_DOF, CHUNKY_DOF = 26_000, 12_000  # unknowns by default: a plate's factor stays sparse, a ball's does not
+THIN_DOF, CHUNKY_DOF = 26_000, 10_000  # unknowns by default: a plate's factor stays sparse, a ball's does not
 DOF_PER_TET = 5.6  # measured on fTetWild's meshes of bars, slabs and bowls
-MOST_TETS = 10_000
+MOST_TETS = 8_000
 FILL_LIMIT_S = 45.0
-ENVELOPE = 0.04  # of the thickness: how far fTetWild may move the surface
+ENVELOPE = (0.04, 0.1)  # of the thickness, thin and chunky: how far fTetWild may move the surface; its time hangs on it
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,9 +42,13 @@ def dof_budget(thickness_m: float, diagonal_m: float) -> int:
 
     A quadratic element of edge e bends true while e² « thickness x wavelength, so the number of elements in a plate grows as 1/thickness.
     """
-    thin = thickness_m / diagonal_m
-    chunky = np.clip((thin - 0.05) / 0.05, 0, 1)
-    return int((THIN_DOF + (CHUNKY_DOF - THIN_DOF) * chunky) * np.clip(0.007 / thin, 1, 3))
+    more = np.clip(0.007 * diagonal_m / thickness_m, 1, 3)
+    return int((THIN_DOF + (CHUNKY_DOF - THIN_DOF) * chunkiness(thickness_m, diagonal_m)) * more)
+
+
+def chunkiness(thickness_m: float, diagonal_m: float) -> float:
+    """0 for slabs and bars (thickness 2V/A under 4 % of the diagonal) to 1 for lumps (over 7 %; a ball has 19 %)."""
+    return float(np.clip((thickness_m / diagonal_m - 0.04) / 0.03, 0, 1))
 
 
 def rotation(quaternion_xyzw: Array) -> Array:
@@ -151,7 +155,7 @@ def _meshed(skin: Skin, edge_m: float | None, say: Callable[[str], None]) -> Sol
         if prism is not None:
             return Solid(prism.node_m, prism.tet, note=prism.note + skin.note)
     edge = edge_m if edge_m is not None else _edge_m(geometry.volume_m3(vertex, face), thickness, budget)
-    envelope = ENVELOPE * thickness
+    envelope = thickness * (ENVELOPE[0] + (ENVELOPE[1] - ENVELOPE[0]) * chunkiness(thickness, diagonal))
     deadline = time.monotonic() + FILL_LIMIT_S
     say(f"filling {len(face)} triangles with tetrahedra of {edge:.3g} m")
     failure = MeshError(f"mesh needs more than {MOST_TETS} tetrahedra", "give a larger edge_m or a simpler mesh")

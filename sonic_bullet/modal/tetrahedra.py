@@ -32,9 +32,15 @@ def tetrahedra(vertex_m: Array, face: Array, edge_m: float, envelope_m: float, *
     with tempfile.TemporaryDirectory(prefix="sonic_bullet-") as folder:
         source, target = Path(folder) / "in.npz", Path(folder) / "out.npz"
         # Unit size about the origin: fTetWild's own tolerances then see every body alike, in metres or micrometres.
-        size = {"edge": edge_m / diagonal_m, "envelope": envelope_m / diagonal_m}
-        limits = {"threads": 1, "memory": MEMORY_LIMIT_BYTES, "seconds": int(np.ceil(time_limit_s))}
-        np.savez(source, vertex=(vertex_m - centre) / diagonal_m, face=face, **size, **limits)
+        numbers = {
+            "edge": np.array(edge_m / diagonal_m),
+            "envelope": np.array(envelope_m / diagonal_m),
+            "memory": np.array(MEMORY_LIMIT_BYTES),
+            "seconds": np.array(int(np.ceil(time_limit_s))),
+            "vertex": (vertex_m - centre) / diagonal_m,
+            "face": face,
+        }
+        np.savez(source, allow_pickle=False, **numbers)
         command = [sys.executable, str(Path(__file__).with_name("_tetwild.py")), str(source), str(target)]
         try:
             ended = subprocess.run(command, timeout=time_limit_s, capture_output=True, text=True, check=False)

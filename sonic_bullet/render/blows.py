@@ -19,8 +19,10 @@ from sonic_bullet.records import Array, Body
 from sonic_bullet.render.rotation import matrix, to_body, to_world
 from sonic_bullet.render.sounder import Sounder, Touch, force_on_modes, touch
 from sonic_bullet.synth.pulse import contact_modulus_pa, contact_time_s, effective_mass_kg
-from sonic_bullet.synth.strikes import Split, accepted_impulse, effective_approach_m_s, key_bodies, pair_key
+from sonic_bullet.synth.strikes import Split, accepted_impulse, causing_approach_m_s, key_bodies, pair_key, supported_bodies
 
+STEEPEST = 10.0
+"""Most friction per normal force that a manifold which carries load may show: a contact that Bullet drops within a step keeps its friction."""
 STRUCK_FLAT = 0.02
 """Radius, as a share of the smaller body's size, of the least area that a nearly flat blow touches."""
 FLAT_CURVATURE = 0.1
@@ -93,7 +95,9 @@ def _gather(split: Split, window: tuple[Step, ...]) -> _Rows:
                 rows.gap_m[mine],
             )
         )
-    strike, delay, impulse, normal, arm_low, arm_high, low, high, turn_low, turn_high, approach, gap = (np.concatenate(column) for column in zip(*parts, strict=True))
+    strike, delay, impulse, normal, arm_low, arm_high, low, high, turn_low, turn_high, approach, gap = (
+        np.concatenate(column) for column in zip(*parts, strict=True)
+    )
     return _Rows(strike, delay, impulse, normal, (arm_low, arm_high), (low, high), (turn_low, turn_high), approach, gap)
 
 
@@ -127,12 +131,13 @@ def find_blows(split: Split, window: tuple[Step, ...], sounders: tuple[Sounder, 
     mass = effective_mass(bodies, low, high, step, arm, normal)
     approach = np.full(count, 0.0)
     np.maximum.at(approach, rows.strike, rows.approach)
-    caused = effective_approach_m_s(approach, split.recent[split.strike], step.dt_s)
     mobile = np.array([body.mass_kg > 0 for body in bodies])
+    caused = causing_approach_m_s(approach, low, high, normal, supported_bodies(split, mobile), step.gravity_m_s2 * step.dt_s)
     accepted = accepted_impulse(raw, 2.0 * mass * caused, low, high, mobile)
     start = _start_s(rows, count, earliest_s, step.dt_s)
+    carries = raw * STEEPEST >= np.linalg.norm(_per_strike(rows, rows.impulse, count), axis=1)
     blows = []
-    for q in np.flatnonzero(accepted > 0):
+    for q in np.flatnonzero((accepted > 0) & carries):
         pair = sounders[low[q]], sounders[high[q]]
         if not any(_can_sound(sounder) for sounder in pair):
             continue
@@ -180,7 +185,9 @@ def _touch_side(rows: _Rows, mine: Array, side: int, sounder: Sounder) -> Touch:
     return touch(sounder, rows.point[side][mine], outward)
 
 
-def effective_mass(bodies: Sequence[Body], low: Array, high: Array, step: Step, arm: Sequence[Array], normal: Array, places: tuple[int, int] | None = None) -> Array:
+def effective_mass(
+    bodies: Sequence[Body], low: Array, high: Array, step: Step, arm: Sequence[Array], normal: Array, places: tuple[int, int] | None = None
+) -> Array:
     """m* (q,) in kg of pairs [synth.pulse], levers ``arm`` (q, 3) in the world; ``places``: where in ``bodies`` the pair stands, if not at low, high."""
     sides: list[Array] = []
     for side, (index, lever) in enumerate(((low, arm[0]), (high, arm[1]))):

@@ -14,7 +14,7 @@ import numpy as np
 
 from sonic_bullet.contacts import Step
 from sonic_bullet.records import Array
-from sonic_bullet.render.blows import effective_mass, flat_area_m2, modulus_pa
+from sonic_bullet.render.blows import STEEPEST, effective_mass, flat_area_m2, modulus_pa
 from sonic_bullet.render.rotation import to_body, to_world
 from sonic_bullet.render.sounder import Sounder, force_on_modes, touch
 from sonic_bullet.synth.pulse import contact_modulus_pa
@@ -24,8 +24,6 @@ from sonic_bullet.synth.surface import SurfaceLoads, SurfacePairs, SurfaceState,
 FOLLOW_S = 0.02
 RUBBING_FLAT = 0.25
 """Radius, as a share of the smaller body's size, of the least area on which a flat face rubs."""
-STEEPEST = 10.0
-"""Most friction per normal force that a manifold which carries load may show."""
 SWEEP_FLOOR_M_S = 2e-4
 """Slower sweeps make nothing audible: even waves of 10 µm pass at 20 Hz. Solvers let bodies at rest creep about as fast."""
 
@@ -96,7 +94,6 @@ def _targets(key: Array, split: Split, step: Step) -> _Target:
     impulse = np.where(swap, -1.0, 1.0)[:, None] * rows.impulse_n_s[inside]
     weight = np.maximum(np.einsum("ri,ri->r", rows.impulse_n_s[inside], rows.normal[inside]), 0.0)
     total = np.bincount(at, weight, len(key))
-    # a contact that Bullet drops within the step keeps friction without a normal force: it carries nothing
     carries = total * STEEPEST >= np.sqrt(sum(np.bincount(at, impulse[:, axis], len(key)) ** 2 for axis in range(3)))
     total = np.where(carries & (total > 0), total, np.inf)
     sweep = np.where(swap[:, None], rows.sweep_m_s[inside][:, ::-1], rows.sweep_m_s[inside])

@@ -75,7 +75,9 @@ def build_sounder(body: Body, sensors: tuple[Sensor, ...], sr: int, air: Air) ->
     readers = weight_sets(sensors)
     if model is None:
         none = np.zeros(0)
-        return Sounder(body, none, none, np.zeros((1 + len(readers), 0), complex), np.zeros((0, 3, 0), np.float32), None, np.zeros((0, 3)), _size(body), 0.0, None, 0)
+        return Sounder(
+            body, none, none, np.zeros((1 + len(readers), 0), complex), np.zeros((0, 3, 0), np.float32), None, np.zeros((0, 3)), _size(body), 0.0, None, 0
+        )
     pressure, extra = radiation(model, air)
     omega0_squared = model.omega0_squared_per_s2
     decay = np.nan_to_num(model.decay_per_s) + extra

@@ -9,8 +9,9 @@ model instead), what is shorter is a blow. Blows of up to SPAN - 1 steps become 
 
 A blow needs a cause. A solver's flicker between the corners of a resting box looks like a blow but nothing approached:
 a pair's strike is bounded by 2·m*·v (an elastic impact at the approach speed v before the step), or by what a struck neighbour
-hands on (`accepted_impulse`). For a pair that carried load within the last SPAN steps, v counts above the speed that gravity
-gives in one step: below it, leaving and landing cannot be told from resting.
+hands on (`accepted_impulse`). Where a mobile body of the pair carried load within the last SPAN - 1 steps, v counts above the
+speed that gravity gives along the normal in one step: below it, leaving and landing cannot be told from resting, nor a
+roll from one support on to the next from a fall.
 
 Surfaces that overlap when a step starts have met in the step before (with `contactProcessingThreshold=0`, Bullet sees a contact only
 then): strikes are looked for one step ahead of the step being rendered, so that they can be dated back.
@@ -30,7 +31,6 @@ from sonic_bullet.records import Array
 SPAN = 4
 NOW = SPAN - 1
 LOOKAHEAD = SPAN - 1
-STANDARD_GRAVITY_M_S2 = 9.80665
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,14 +52,14 @@ class Split:
 
     key (p,). support_n (p, 2): silent load at the step's start and end. strike (q,): rows of the pairs that are struck in the step that was
     asked for. share (q, j): part of the normal impulse of that and the next known steps, SPAN - 1 at most, that belongs to each strike.
-    recent (p,): the pair carried load within the SPAN - 1 steps before.
+    loaded (p,): whether each pair carried load within the SPAN - 1 steps before.
     """
 
     key: Array
     support_n: Array
     strike: Array
     share: Array
-    recent: Array
+    loaded: Array
 
 
 def pair_key(contacts: Contacts) -> Array:
@@ -118,13 +118,24 @@ def split(history: LoadHistory, ahead: int = 1) -> tuple[Split, LoadHistory]:
     share = np.where(connected, excess / np.where(load > 0, load, 1.0), 0.0)[strike]
     busy = history.busy.copy()
     busy[strike] = connected[strike].sum(axis=1)
-    recent = (force[:, column - SPAN + 1 : column] > 0).any(axis=1)
-    return Split(history.key, opening[:, :2], strike, share, recent), LoadHistory(history.key, force, busy)
+    loaded = (force[:, column - SPAN + 1 : column] > 0).any(axis=1)
+    return Split(history.key, opening[:, :2], strike, share, loaded), LoadHistory(history.key, force, busy)
 
 
-def effective_approach_m_s(approach_m_s: Array, recent: Array, dt_s: float) -> Array:
-    """Approach speed (q,) that can cause a blow: above g·dt where the pair was loaded a moment ago."""
-    return np.maximum(approach_m_s - np.where(recent, STANDARD_GRAVITY_M_S2 * dt_s, 0.0), 0.0)
+def causing_approach_m_s(approach_m_s: Array, a: Array, b: Array, normal: Array, supported: Array, fall_m_s: Array) -> Array:
+    """Approach speed (q,) that can cause a blow. normal (q, 3) of the pairs with bodies a, b (q,); supported (bodies,): mobile bodies that
+    carried load a moment ago; fall_m_s (3,): the velocity that gravity gives in one step. A tenth is added for what a solver leaves over.
+    """
+    resting = supported[a] | supported[b]
+    return np.maximum(approach_m_s - np.where(resting, 1.1 * np.abs(normal @ fall_m_s), 0.0), 0.0)
+
+
+def supported_bodies(split_: Split, mobile: Array) -> Array:
+    """(bodies,) whether each mobile body carried load on any pair within the last steps."""
+    low, high = key_bodies(split_.key[split_.loaded])
+    out = np.zeros(len(mobile), bool)
+    out[low] = out[high] = True
+    return out & mobile
 
 
 def accepted_impulse(raw_n_s: Array, budget_n_s: Array, a: Array, b: Array, mobile: Array, rounds: int = 8) -> Array:
