@@ -231,7 +231,7 @@ class Synthesizer:
         queue = np.concatenate([self._lag, fresh], axis=1)
         if frame is not None and queue.shape[1] < count:  # the step grew: the lag in samples grows with it
             queue = np.concatenate([np.zeros((channels, count - queue.shape[1])), queue], axis=1)
-        out, self._lag = (np.zeros((channels, count)), queue) if frame is None else (queue[:, :count], queue[:, count:])
+        out, self._lag = queue[:, :count], queue[:, count:]
         return np.ascontiguousarray(out)
 
     def sound(self) -> Array:
