@@ -47,7 +47,7 @@ _HOME = {
     "write_audio": "files",
 }
 
-__all__ = [  # noqa: RUF022 — kept in the order of _HOME, which ruff cannot read
+__all__ = [
     "Air",
     "ContactLog",
     "Contacts",

@@ -102,7 +102,6 @@ def main() -> None:
         float(arguments["envelope"]),
         10.0,
         False,
-        int(arguments["threads"]),
         80,
         6,
         True,

@@ -82,23 +82,23 @@ def sphere_multiplets_hz(radius_m: float, youngs_pa: float, poisson: float, dens
     shear = np.sqrt(youngs_pa / (2 * (1 + poisson)) / density_kg_m3)
     ratio = np.sqrt((1 - 2 * poisson) / (2 * (1 - poisson)))  # c_s / c_p
 
-    def torsional(eta: float, order: int) -> float:
-        return float((order - 1) * spherical_jn(order, eta) - eta * spherical_jn(order + 1, eta))
+    def torsional(eta: Array, order: int) -> Array:
+        return np.asarray((order - 1) * spherical_jn(order, eta) - eta * spherical_jn(order + 1, eta))
 
-    def spheroidal(eta: float, order: int) -> float:
+    def spheroidal(eta: Array, order: int) -> Array:
         xi = eta * ratio
         jp, jp1, js, js1 = spherical_jn(order, xi), spherical_jn(order + 1, xi), spherical_jn(order, eta), spherical_jn(order + 1, eta)
         n, n1 = order, order * (order + 1)
         # tractions σ_rr, σ_rθ times r²/2G at r = a
         rr_p, rr_s = (n * n - n - eta**2 / 2) * jp + 2 * xi * jp1, n1 * ((n - 1) * js - eta * js1)
         rt_p, rt_s = (n - 1) * jp - xi * jp1, (n * n - 1 - eta**2 / 2) * js + eta * js1
-        return float(rr_p if order == 0 else rr_p * rt_s - rr_s * rt_p)
+        return np.asarray(rr_p if order == 0 else rr_p * rt_s - rr_s * rt_p)
 
     grid = np.linspace(0.05, 5 + 1.5 * count, 400 * (5 + count))
     found: list[tuple[float, int, str]] = []
     for kind, function, lowest in (("T", torsional, 1), ("S", spheroidal, 0)):
         for order in range(lowest, count + 3):
-            value = np.array([function(float(x), order) for x in grid])
+            value = function(grid, order)
             for k in np.flatnonzero(np.sign(value[1:]) * np.sign(value[:-1]) < 0)[:count]:
                 eta = brentq(function, grid[k], grid[k + 1], args=(order,), xtol=1e-13)
                 found.append((float(eta * shear / (2 * np.pi * radius_m)), 2 * order + 1, f"{kind}{order}"))

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sonic_bullet.contacts import Contacts, Step
+from sonic_bullet.contacts import Step
 from sonic_bullet.records import Array, Body
 from sonic_bullet.render.rotation import matrix, to_body, to_world
 from sonic_bullet.render.sounder import Sounder, Touch, force_on_modes, touch

@@ -60,10 +60,10 @@ def test_ten_modes_of_a_thin_plate(steel: Material, ratio: float) -> None:
 def test_six_multiplets_of_a_ball(steel: Material) -> None:
     multiplets = exact.sphere_multiplets_hz(0.05, E, NU, RHO, 6)
     wanted = np.concatenate([[f] * n for f, n, _ in multiplets])
-    model = analyse((Shape("sphere", [0.05, 0, 0]),), steel, count=len(wanted), cache=None)
+    model = analyse((Shape("sphere", [0.05, 0, 0]),), steel, count=len(wanted), edge_m=0.05 / 4, cache=None)
     assert np.abs(model.freq_hz / wanted - 1).max() < 5e-3
     assert np.allclose(model.curvature_per_m, 20.0, rtol=1e-12)
-    assert model.volume_m3 == pytest.approx(4 / 3 * np.pi * 0.05**3, rel=1e-3)
+    assert model.volume_m3 == pytest.approx(4 / 3 * np.pi * 0.05**3, rel=2e-3)
 
 
 def test_first_multiplets_of_a_ball_from_a_mesh(steel: Material) -> None:

@@ -7,7 +7,7 @@ import pytest
 from scipy.special import spherical_jn, spherical_yn
 
 from sonic_bullet.records import Air, Array, ModalModel
-from sonic_bullet.synth.radiation import efficiency, jerk_coefficient, radiation, surface_motion
+from sonic_bullet.synth.radiation import jerk_coefficient, radiation
 
 AIR = Air()
 RHO_C = AIR.density_kg_m3 * AIR.sound_speed_m_s
