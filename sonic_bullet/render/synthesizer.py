@@ -20,9 +20,12 @@ from sonic_bullet.errors import AudioError
 from sonic_bullet.records import Air, Array, Body, Microphone, Sensor
 from sonic_bullet.render.blows import Blow, find_blows
 from sonic_bullet.render.clock import Clock, exact_step
+from sonic_bullet.render.manifold import Rows, orient
 from sonic_bullet.render.rubbing import Drive, Rubbing, advance_rubbing
 from sonic_bullet.render.sounder import Sounder, build_sounder, weight_sets
 from sonic_bullet.synth import bank, path
+from sonic_bullet.synth.bank import Bank, BankState
+from sonic_bullet.synth.path import Path, PathState
 from sonic_bullet.synth.pulse import pulse_nodes
 from sonic_bullet.synth.strikes import LOOKAHEAD, LoadHistory, push, split
 
@@ -46,17 +49,18 @@ class Setup:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class State:
-    """All that the next frame hangs on. number: of the step to be rendered next; window: that step and those known after it."""
+    """All that the next frame hangs on. number: of the step to be rendered next; window: that step and those known after it, rows: their contacts."""
 
     number: int
     clock: Clock
     window: tuple[Step, ...]
+    rows: tuple[Rows, ...]
     loads: LoadHistory
     sounders: tuple[Sounder, ...]
-    bank: bank.Bank
-    ringing: bank.BankState
-    path: path.Path
-    travelling: path.PathState
+    bank: Bank
+    ringing: BankState
+    path: Path
+    travelling: PathState
     rubbing: Rubbing
 
 
@@ -64,7 +68,7 @@ def start(setup: Setup) -> State:
     """Silence at time 0, nobody there."""
     instrument, ringing = bank.empty_bank(setup.sr, 1 + len(weight_sets(setup.sensors)))
     air, travelling = path.empty_path(setup.sr, setup.air, setup.microphone_m)
-    return State(0, Clock(), (), LoadHistory.empty(), (), instrument, ringing, air, travelling, Rubbing.none())
+    return State(0, Clock(), (), (), LoadHistory.empty(), (), instrument, ringing, air, travelling, Rubbing.none())
 
 
 def with_bodies(setup: Setup, state: State, bodies: Sequence[Body]) -> State:
@@ -92,11 +96,11 @@ def take_step(setup: Setup, state: State, step: Step) -> tuple[Array | None, Sta
 
     The bank's and the path's arrays change in place: `copied` a state first to come back to it.
     """
-    state = replace(state, window=(*state.window, step), loads=push(state.loads, step.contacts, step.dt_s))
+    state = replace(state, window=(*state.window, step), rows=(*state.rows, orient(step)), loads=push(state.loads, step.contacts, step.dt_s))
     if len(state.window) <= LOOKAHEAD:
         return None, state
     frame, state = _render(setup, state)
-    return frame, replace(state, window=state.window[1:])
+    return frame, replace(state, window=state.window[1:], rows=state.rows[1:])
 
 
 def copied(state: State) -> State:
@@ -126,7 +130,7 @@ def quenched(state: State) -> State:
 
 def _render(setup: Setup, state: State) -> tuple[Array, State]:
     """The frame of window[0]."""
-    window, sounders, clock, sr = state.window, state.sounders, state.clock, setup.sr
+    window, rows, sounders, clock, sr = state.window, state.rows, state.sounders, state.clock, setup.sr
     step = window[0]
     after = clock.after(step.dt_s)
     count = after.sample(sr) - clock.sample(sr)
@@ -135,13 +139,12 @@ def _render(setup: Setup, state: State) -> tuple[Array, State]:
     loads = state.loads
     if state.number == 0:  # nothing was looked for ahead of the first step
         parts, loads = split(loads, ahead=0)
-        blows += [(float(clock.time_s), blow) for blow in find_blows(parts, window, sounders, 0.0)]
+        blows += [(float(clock.time_s), blow) for blow in find_blows(parts, rows, step, sounders, 0.0)]
     parts, loads = split(loads)
-    blows += [(float(after.time_s), blow) for blow in find_blows(parts, window[1:], sounders, -step.dt_s)]
-    drives, rubbing = advance_rubbing(state.rubbing, parts, window, sounders, x, sr, setup.seed)
+    blows += [(float(after.time_s), blow) for blow in find_blows(parts, rows[1:], window[1], sounders, -step.dt_s)]
+    drives, rubbing = advance_rubbing(state.rubbing, parts, step, window[1], rows[1], sounders, x, sr, setup.seed)
     strikes = [strike for begin_s, blow in blows for strike in _strikes(blow, begin_s, sounders, sr, clock.sample(sr))]
-    forces = [force for drive in drives for force in _forces(drive, sounders)]
-    sound = bank.advance(state.bank, state.ringing, count, strikes, forces, x)
+    sound = bank.advance(state.bank, state.ringing, count, strikes, _forces(drives, sounders, x), x)
     frame = _at_sensors(setup, state, sound, x)
     return frame, replace(state, number=state.number + 1, clock=after, loads=loads, rubbing=rubbing)
 
@@ -155,11 +158,19 @@ def _strikes(blow: Blow, step_start_s: float, sounders: tuple[Sounder, ...], sr:
     return [bank.Strike(place, begin, spacing_s * sr, weight, gain) for place, gain in gains if gain.any()]
 
 
-def _forces(drive: Drive, sounders: tuple[Sounder, ...]) -> list[bank.Force]:
-    """A drive on the modes and translations of its body."""
-    sounder = sounders[drive.body]
-    ends = zip((drive.gain0, *_along(sounder, drive.push0)), (drive.gain1, *_along(sounder, drive.push1)), strict=True)
-    return [bank.Force(4 * drive.body + part, drive.force_n, gain0, gain1) for part, (gain0, gain1) in enumerate(ends) if len(gain0)]
+def _forces(drives: Sequence[Drive], sounders: tuple[Sounder, ...], x: Array) -> list[bank.Force]:
+    """Drives on modes, each with its own gains, and on translations, where all forces on a body act as one."""
+    forces = []
+    pushes: dict[int, Array] = {}
+    for drive in drives:
+        push = drive.force_n * (drive.direction0[:, None] + (drive.direction1 - drive.direction0)[:, None] * x)
+        for side, body in enumerate((drive.low, drive.high)):
+            if sounders[body].mode_count:
+                forces.append(bank.Force(4 * body, drive.force_n, drive.gain0[side], drive.gain1[side]))
+            if sounders[body].rigid is not None:
+                pushes[body] = pushes.get(body, 0.0) + (push if side == 0 else -push)
+    one = np.ones(1)
+    return forces + [bank.Force(4 * body + 1 + axis, push[axis], one, one) for body, push in pushes.items() for axis in range(3)]
 
 
 def _along(sounder: Sounder, push: Array) -> tuple[Array, Array, Array]:

@@ -14,7 +14,8 @@ speed that gravity gives along the normal in one step: below it, leaving and lan
 roll from one support on to the next from a fall.
 
 Surfaces that overlap when a step starts have met in the step before (with `contactProcessingThreshold=0`, Bullet sees a contact only
-then): strikes are looked for one step ahead of the step being rendered, so that they can be dated back.
+then): strikes are looked for one step ahead of the step being rendered, so that they can be dated back. What cannot be told from support
+that early (the last step of a blow of SPAN - 1 steps is the last one known) follows when the step itself is rendered.
 
 p pairs; column `NOW` of the load history is the step being rendered, later columns are the look-ahead.
 """
@@ -35,15 +36,15 @@ LOOKAHEAD = SPAN - 1
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LoadHistory:
-    """key (p,) sorted pair keys; force_n (p, 2·SPAN-1) their normal loads; busy (p,) steps that belong to a strike already made."""
+    """key (p,) sorted pair keys; force_n (p, 2·SPAN-1) their normal loads; struck_n (p, 2·SPAN-1) what of them strikes have used up."""
 
     key: Array
     force_n: Array
-    busy: Array
+    struck_n: Array
 
     @classmethod
     def empty(cls) -> LoadHistory:
-        return cls(np.zeros(0, np.int64), np.zeros((0, 2 * SPAN - 1)), np.zeros(0, np.int64))
+        return cls(np.zeros(0, np.int64), np.zeros((0, 2 * SPAN - 1)), np.zeros((0, 2 * SPAN - 1)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,15 +84,14 @@ def normal_load_n(contacts: Contacts, dt_s: float) -> tuple[Array, Array]:
 def push(history: LoadHistory, contacts: Contacts, dt_s: float) -> LoadHistory:
     """The history one step later: the newest loads enter the last column, pairs long without load leave."""
     key, load = normal_load_n(contacts, dt_s)
-    alive = history.force_n[:, 1:].any(axis=1) | (history.busy > 1)
+    alive = history.force_n[:, 1:].any(axis=1)
     union = np.union1d(history.key[alive], key)
-    force = np.zeros((len(union), 2 * SPAN - 1))
-    busy = np.zeros(len(union), np.int64)
+    force, struck = np.zeros((2, len(union), 2 * SPAN - 1))
     old = np.searchsorted(union, history.key[alive])
     force[old, :-1] = history.force_n[alive, 1:]
-    busy[old] = np.maximum(history.busy[alive] - 1, 0)
+    struck[old, :-1] = history.struck_n[alive, 1:]
     force[np.searchsorted(union, key), -1] = load
-    return LoadHistory(union, force, busy)
+    return LoadHistory(union, force, struck)
 
 
 def _opening(force: Array, column: int) -> Array:
@@ -104,22 +104,23 @@ def _opening(force: Array, column: int) -> Array:
 def split(history: LoadHistory, ahead: int = 1) -> tuple[Split, LoadHistory]:
     """Support of the step in column NOW and strikes of the one ``ahead`` steps after it, and the history with those marked as used.
 
-    A strike of SPAN - 1 steps whose end is not known yet loses of its impulse what the last known step still carries.
+    Ask with ahead = 0 first. An opening that the future could still lower is taken as high as it may be, so nothing is struck that may be
+    support; asked again when more is known, a strike gives what it lacked.
     """
     force, column = history.force_n, NOW + ahead
     stop = min(column + SPAN - 1, force.shape[1])
     opening = np.stack([_opening(force, i) for i in range(NOW, stop)], axis=1).reshape(len(force), stop - NOW)
     load = force[:, column:stop]
-    excess = np.maximum(load - opening[:, ahead:], 0.0)
+    excess = np.maximum(load - opening[:, ahead:] - history.struck_n[:, column:stop], 0.0)
     excess[excess <= 1e-9 * load] = 0.0  # rounding of the sums is no blow
-    starts = (excess[:, 0] > 0) & (force[:, column] > force[:, column - 1]) & (history.busy == 0)
-    connected = np.cumprod(excess > 0, axis=1).astype(bool)
-    strike = np.flatnonzero(starts)
-    share = np.where(connected, excess / np.where(load > 0, load, 1.0), 0.0)[strike]
-    busy = history.busy.copy()
-    busy[strike] = connected[strike].sum(axis=1)
-    loaded = (force[:, column - SPAN + 1 : column] > 0).any(axis=1)
-    return Split(history.key, opening[:, :2], strike, share, loaded), LoadHistory(history.key, force, busy)
+    strike = np.flatnonzero((excess[:, 0] > 0) & (force[:, column] > force[:, column - 1]))
+    connected = np.cumprod(excess[strike] > 0, axis=1).astype(bool)
+    used = np.where(connected, excess[strike], 0.0)
+    struck = history.struck_n.copy()
+    struck[strike, column:stop] += used
+    loaded = np.asarray((force[:, column - SPAN + 1 : column] > 0).any(axis=1))
+    share = used / np.where(load[strike] > 0, load[strike], 1.0)
+    return Split(history.key, opening[:, :2], strike, share, loaded), LoadHistory(history.key, force, struck)
 
 
 def causing_approach_m_s(approach_m_s: Array, a: Array, b: Array, normal: Array, supported: Array, fall_m_s: Array) -> Array:
@@ -127,7 +128,7 @@ def causing_approach_m_s(approach_m_s: Array, a: Array, b: Array, normal: Array,
     carried load a moment ago; fall_m_s (3,): the velocity that gravity gives in one step. A tenth is added for what a solver leaves over.
     """
     resting = supported[a] | supported[b]
-    return np.maximum(approach_m_s - np.where(resting, 1.1 * np.abs(normal @ fall_m_s), 0.0), 0.0)
+    return np.asarray(np.maximum(approach_m_s - np.where(resting, 1.1 * np.abs(normal @ fall_m_s), 0.0), 0.0))
 
 
 def supported_bodies(split_: Split, mobile: Array) -> Array:

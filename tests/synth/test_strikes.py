@@ -35,7 +35,8 @@ def contacts(load_n: dict[tuple[int, int], float], *, points: int = 1) -> Contac
 
 def told_apart(loads: dict[tuple[int, int], list[float]], **how: int) -> tuple[list[tuple[int, int, float]], dict[int, list[float]]]:
     """Strikes (step, key, impulse) in the order that the synthesizer asks for them, and each pair's support at the end of each step."""
-    steps = [contacts({pair: column[i] for pair, column in loads.items()}, **how) for i in range(max(map(len, loads.values())))]
+    long = max(map(len, loads.values()))
+    steps = [contacts({pair: column[i] if i < len(column) else 0.0 for pair, column in loads.items()}, **how) for i in range(long)]
     steps += [Contacts.none()] * LOOKAHEAD
     history = LoadHistory.empty()
     found: list[tuple[int, int, float]] = []
@@ -52,9 +53,8 @@ def told_apart(loads: dict[tuple[int, int], list[float]], **how: int) -> tuple[l
         now = newest - LOOKAHEAD
         if now < 0:
             continue
-        if now == 0:
-            parts, history = split(history, ahead=0)
-            keep(parts, 0)
+        parts, history = split(history, ahead=0)
+        keep(parts, now)
         parts, history = split(history)
         keep(parts, now + 1)
         for key, column in support.items():
