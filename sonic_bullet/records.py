@@ -216,7 +216,7 @@ class ModalModel:
     @property
     def omega0_squared_per_s2(self) -> Array:
         """Eigenvalues λ = ω² + d² (m,), of the undamped body [Ren et al. 2013, eq. 7]; NaN decays count as zero."""
-        return (2 * np.pi * self.freq_hz) ** 2 + np.nan_to_num(self.decay_per_s) ** 2
+        return np.asarray((2 * np.pi * self.freq_hz) ** 2 + np.nan_to_num(self.decay_per_s) ** 2)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

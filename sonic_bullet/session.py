@@ -35,7 +35,7 @@ def as_sensors(microphone: MicrophoneLike) -> tuple[Sensor, ...]:
         return (microphone,)
     items = list(microphone)
     if items and all(isinstance(item, (Microphone, Vibrometer, ModalSum)) for item in items):
-        return tuple(items)  # type: ignore[arg-type]
+        return tuple(items)
     return tuple(Microphone(point) for point in np.atleast_2d(np.asarray(microphone, dtype=float)))
 
 

@@ -102,6 +102,7 @@ def main() -> None:
         float(arguments["envelope"]),
         10.0,
         False,
+        1,
         80,
         6,
         True,

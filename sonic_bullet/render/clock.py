@@ -28,7 +28,7 @@ class Clock:
     def progress(self, dt_s: float, sr: int, count: int) -> Array:
         """(count,) where in the step, 0 … 1, each of its samples lies."""
         position = np.arange(count) + float(self.sample(sr) - self.time_s * sr)
-        return np.clip(position / (dt_s * sr), 0.0, 1.0)
+        return np.asarray(np.clip(position / (dt_s * sr), 0.0, 1.0))
 
 
 def exact_step(dt_s: float) -> Fraction:

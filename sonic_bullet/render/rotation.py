@@ -1,4 +1,4 @@
-"""Rotations by quaternions (x, y, z, w), vectorised over rows [Kuipers, Quaternions and Rotation Sequences, 1999, sec. 5.15]."""
+"""Rotation matrices of quaternions (x, y, z, w), vectorised over rows [Kuipers, Quaternions and Rotation Sequences, 1999, sec. 5.15]."""
 
 from __future__ import annotations
 
@@ -17,13 +17,3 @@ def matrix(quaternion_xyzw: Array) -> Array:
         [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
     ]
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
-
-
-def to_world(quaternion_xyzw: Array, vector: Array) -> Array:
-    """Vectors (k, 3) given in body axes, in world axes."""
-    return np.einsum("kij,kj->ki", matrix(quaternion_xyzw), vector)
-
-
-def to_body(quaternion_xyzw: Array, vector: Array) -> Array:
-    """Vectors (k, 3) given in world axes, in body axes."""
-    return np.einsum("kji,kj->ki", matrix(quaternion_xyzw), vector)

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from sonic_bullet.records import Air, Array, Body, Microphone, ModalModel, ModalSum, Sensor, Vibrometer
+from sonic_bullet.records import Air, Array, Body, Microphone, ModalSum, Sensor, Vibrometer
 from sonic_bullet.surface_index import SurfaceIndex, nearest, surface_index
 from sonic_bullet.synth.bank import ModeSet, audible
 from sonic_bullet.synth.radiation import jerk_coefficient, radiation
@@ -117,31 +117,30 @@ def _size(body: Body) -> float:
     return float(max(body.volume_m3, 1e-9) ** (1 / 3))
 
 
-def touch(sounder: Sounder, point_m: Array, outward: Array) -> Touch:
-    """Where contacts (k, 3) in the body frame with outward normals (k, 3) lie on the true surface, and how curved it is there.
+def touch_one(sounder: Sounder, point_m: Array, outward: Array) -> tuple[Array, Array, Array]:
+    """Face (k,), barycentric (k, 3) and curvature (k,) where contacts (k, 3) in the body frame, outward normals (k, 3), lie on the true surface.
 
     Where the contact's normal leans more than 20° from the face's, an edge or corner is touched: its radius is taken as
     0.5 % of the body's size, at least 0.2 mm (a broken edge, as made things have).
     """
     count = len(point_m)
     body = sounder.body
+    everywhere = body.curvature_per_m if np.isfinite(body.curvature_per_m) else 0.0
     if sounder.index is None or body.model is None:
-        curvature = body.curvature_per_m if np.isfinite(body.curvature_per_m) else 0.0
-        return Touch(np.zeros(count, np.int64), np.zeros((count, 3)), np.full(count, curvature))
+        return np.zeros(count, np.int64), np.zeros((count, 3)), np.full(count, everywhere)
     face, barycentric, _ = nearest(sounder.index, point_m, outward)
     if np.isfinite(body.curvature_per_m):
-        return Touch(face, barycentric, np.full(count, body.curvature_per_m))
+        return face, barycentric, np.full(count, everywhere)
     edge = 1.0 / max(EDGE_RADIUS_SHARE * sounder.size_m, EDGE_RADIUS_LEAST_M)
     leaning = np.einsum("ki,ki->k", sounder.normal[face], outward) < CREASE_COS
-    return Touch(face, barycentric, np.where(leaning, edge, body.model.curvature_per_m[face]))
+    return face, barycentric, np.where(leaning, edge, body.model.curvature_per_m[face])
 
 
-def force_on_modes(sounder: Sounder, where: Touch, force: Array) -> Array:
+def uplift(sounder: Sounder, face: Array, barycentric: Array, force: Array) -> Array:
     """Uᵀf (m,): forces (k, 3) in the body frame at contacts, onto the body's audible modes, summed."""
-    model: ModalModel | None = sounder.body.model
-    if model is None or sounder.mode_count == 0:
+    if sounder.body.model is None or sounder.mode_count == 0:
         return np.zeros(sounder.mode_count)
-    return np.asarray(participation(sounder.shape, model.face, where.face, where.barycentric, np.ascontiguousarray(force)))
+    return np.asarray(participation(sounder.shape, sounder.body.model.face, face, barycentric, np.ascontiguousarray(force)))
 
 
 @njit(cache=True, nogil=True)
