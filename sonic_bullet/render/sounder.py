@@ -143,7 +143,7 @@ def uplift(sounder: Sounder, face: Array, barycentric: Array, force: Array) -> A
     return np.asarray(participation(sounder.shape, sounder.body.model.face, face, barycentric, np.ascontiguousarray(force)))
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def participation(shape: Array, face: Array, at_face: Array, barycentric: Array, force: Array) -> Array:  # pragma: no cover - compiled
     """Σ over contacts of the shapes, linear in the triangle, times the force: (v, 3, m), (f, 3), (k,), (k, 3), (k, 3) -> (m,)."""
     modes = shape.shape[2]

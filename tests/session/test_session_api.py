@@ -64,7 +64,7 @@ def test_a_step_before_it_sounds_is_not_lost_in_the_lag(client: Any) -> None:
         frames.append(listener.frame)
     first = next(i for i, step in enumerate(listener.contacts.steps) if len(step.contacts))
     loud = next(i for i, frame in enumerate(frames) if frame.any())
-    assert loud == first + 3
+    assert first + 2 <= loud <= first + 3  # a strike may be dated back into the step before
 
 
 def test_read_gathers_what_frames_gave(client: Any) -> None:
@@ -85,34 +85,24 @@ def test_write_removes_the_lag_and_keeps_pascals(client: Any, tmp_path: Path) ->
     assert list(tmp_path.iterdir()) == [tmp_path / "a.wav"]
 
 
-def test_the_module_a_client_id_and_the_hook_hear_the_same(client: Any) -> None:
-    hooked, _ = heard(client, 80)
-    sounds = [hooked.sound()]
-    for by_id in (True, False):
-        number = p.connect(p.DIRECT)
-        try:
-            if not by_id and number != 0:
-                pytest.skip("the module's default client is in use")
-            p.setGravity(0, 0, -9.81, physicsClientId=number)
-            from pybullet_utils.bullet_client import BulletClient
+def test_a_client_id_and_the_hook_hear_the_same(client: Any) -> None:
+    """Without a hook the pose before the step is computed back from velocities, to rounding: so is the sound."""
+    from pybullet_utils.bullet_client import BulletClient
 
-            raw = BulletClient.__new__(BulletClient)
-            raw._client = number
-            floor(raw)
-            listener = sb.attach(number if by_id else p)
-            sounding_box(raw, listener)
-            frames = []
-            for _ in range(80):
-                p.stepSimulation(physicsClientId=number)
-                frames.append(listener.step())
-                assert frames[-1] is listener.frame
-            sounds.append(listener.sound())
-        finally:
-            p.disconnect(number)
-    assert np.abs(sounds[0]).max() > 0.01
-    for sound in sounds[1:]:
-        assert sound.shape == sounds[0].shape
-        assert np.abs(sound - sounds[0]).max() < 0.05 * np.abs(sounds[0]).max()  # poses before the step are read, not computed back
+    hooked, _ = heard(client, 60)
+    raw = BulletClient(p.DIRECT)
+    raw.setGravity(0, 0, -9.81)
+    floor(raw)
+    listener = sb.attach(raw._client)
+    sounding_box(raw, listener)
+    assert "stepSimulation" not in vars(raw)
+    for _ in range(60):
+        raw.stepSimulation()
+        assert listener.step() is listener.frame
+    error = np.abs(listener.sound() - hooked.sound()).max() / np.abs(hooked.sound()).max()
+    print(f"client id against hook: {error:.1e} of the peak")
+    assert error < 1e-6
+    listener.detach()
 
 
 def test_the_raw_module_is_stepped_by_hand() -> None:
