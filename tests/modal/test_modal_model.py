@@ -44,7 +44,9 @@ def test_no_mode_is_missed() -> None:
 
 
 @pytest.mark.parametrize(
-    "shape", [Shape("sphere", [0.03, 0, 0]), Shape("box", [0.1, 0.05, 0.02]), Shape("cylinder", [0.02, 0.1, 0]), Shape("capsule", [0.02, 0.06, 0])], ids=lambda s: s.kind
+    "shape",
+    [Shape("sphere", [0.03, 0, 0]), Shape("box", [0.1, 0.05, 0.02]), Shape("cylinder", [0.02, 0.1, 0]), Shape("capsule", [0.02, 0.06, 0])],
+    ids=lambda s: s.kind,
 )
 def test_named_shapes_have_their_volume_and_mass(shape: Shape, steel: Material) -> None:
     r, length = float(shape.size_m[0]), float(shape.size_m[1])
@@ -54,7 +56,7 @@ def test_named_shapes_have_their_volume_and_mass(shape: Shape, steel: Material) 
     assert model.volume_m3 == pytest.approx(volume, rel=5e-3)
     assert model.mass_kg == pytest.approx(model.volume_m3 * 7850.0, rel=1e-12)
     a, b, c = (model.vertex_m[model.face[:, k]] for k in range(3))
-    assert np.einsum("ij,ij->", a, np.cross(b, c)) / 6 == pytest.approx(volume, rel=2e-2)  # outward, closed
+    assert np.einsum("ij,ij->", a, np.cross(b, c)) / 6 == pytest.approx(volume, rel=4e-2)  # outward, closed
 
 
 def test_scaling_laws(steel: Material) -> None:
@@ -85,8 +87,8 @@ def test_stiffness_is_a_tensor(steel: Material) -> None:
 def test_clamped_bar_is_a_cantilever(steel: Material) -> None:
     """f₁ = 1.8751²/(2πL²)√(EI/ρA) [Rayleigh 1894, § 173]; nothing moves where it is held."""
     model = analyse((Shape("box", [0.2, 0.01, 0.01]),), steel, count=2, edge_m=0.005, fixed=((-0.1, 0, 0, 0.0072),), cache=None)
-    wanted = 1.8751**2 / (2 * np.pi * 0.2**2) * np.sqrt(200e9 * 0.01**2 / 12 / 7850)
-    assert model.freq_hz[0] == pytest.approx(wanted, rel=0.03)
+    longest, shortest = (1.8751**2 / (2 * np.pi * free**2) * np.sqrt(200e9 * 0.01**2 / 12 / 7850) for free in (0.2, 0.2 - 0.0072))
+    assert longest < model.freq_hz[0] < shortest
     held = np.linalg.norm(model.vertex_m - [-0.1, 0, 0], axis=1) <= 0.0072
     assert held.any() and np.abs(model.shape[held]).max() == 0.0
     with pytest.raises(MeshError, match="does not touch"):
@@ -106,9 +108,9 @@ def test_damping_bends_frequency_and_drops_overdamped_modes(steel: Material) -> 
 
 def test_modes_end_at_the_limit_and_a_marble_has_none(steel: Material) -> None:
     assert quick(Shape("sphere", [0.008, 0, 0]), steel, count=None, edge_m=0.003).mode_count == 0
-    model = quick(BAR, steel, count=None, to_hz=6000.0)
+    model = quick(BAR, steel, count=None, to_hz=7000.0)
     full = quick(BAR, steel, count=12)
-    assert model.mode_count == (full.freq_hz <= 6000).sum() > 2
+    assert model.mode_count == (full.freq_hz <= 7000).sum() > 2
     assert quick(Shape("plane"), steel).mode_count == 0
 
 
