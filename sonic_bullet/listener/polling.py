@@ -52,9 +52,18 @@ class Touches:
         return len(self) == len(other) and all(np.array_equal(getattr(self, name), getattr(other, name)) for name in self.__slots__)
 
 
-def loaded(contacts: Iterable[RawContact]) -> list[RawContact]:
-    """Those that carry force: Bullet lists neighbours up to 2 cm apart too. NaN counts as force, to be caught."""
-    return [raw for raw in contacts if raw[FORCE] != 0 or raw[FRICTION_1] != 0 or raw[FRICTION_2] != 0]
+def loaded(contacts: Iterable[RawContact], before: Iterable[RawContact] = ()) -> list[RawContact]:
+    """Those that carry force: Bullet lists neighbours up to 2 cm apart too. NaN counts as force, to be caught.
+
+    before: what was told after the step before. A contact farther off than its contactProcessingThreshold is not solved and keeps the friction
+    of the step in which it last was, to the bit, beside no normal force: that acts on nobody. (Friction without normal force that is
+    new does act: the solver ended between the two, and without it momentum does not balance.)
+    """
+    rows = [raw for raw in contacts if raw[FORCE] != 0 or raw[FRICTION_1] != 0 or raw[FRICTION_2] != 0]
+    if all(raw[FORCE] != 0 for raw in rows):
+        return rows
+    known = {(raw[1:5], raw[FRICTION_1], raw[FRICTION_2]) for raw in before}
+    return [raw for raw in rows if raw[FORCE] != 0 or (raw[1:5], raw[FRICTION_1], raw[FRICTION_2]) not in known]
 
 
 def gather(contacts: list[RawContact], dt_s: float) -> Touches:
