@@ -4,7 +4,8 @@
     depth-first search of a binary tree of bounding boxes, nearer child first          [ibid., ch. 6.3]
 
 PyBullet collides a mesh as its convex hull, and a thin wall has two sides a hair apart: of the faces nearly as near as the
-nearest, one that looks the same way as the contact's normal is preferred.
+nearest, one that looks the same way as the contact's normal is preferred. On an edge faces are equally near but for rounding: the one
+that looks most that way is taken, so that the answer does not hang on how the world is turned.
 """
 
 from __future__ import annotations
@@ -21,6 +22,10 @@ LEAF = 4
 # A face that looks the right way may be this much farther than the nearest: twice as far, plus a wall's thickness 2V/A, at
 # most this part of the surface's diagonal (a point on the lid of a bowl is far from both, one in a thin wall near both).
 WALL_PART = 0.03
+# Faces whose distances differ by less than this part of the surface's diagonal are equally near.
+TIE_PART = 1e-7
+# Least cosine at which a face looks along the normal: not one at right angles, but for rounding.
+LOOKS = 1e-6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -155,9 +160,11 @@ def _search(corner: Array, normal: Array, low: Array, high: Array, child: Array,
     count = len(points)
     face, barycentric, distance = np.empty(count, np.int64), np.empty((count, 3)), np.empty(count)
     stack, gaps = np.empty(128, np.int64), np.empty(128)
+    tie = TIE_PART * np.sqrt(((high[0] - low[0]) ** 2).sum())
     for k in range(count):
         p, n = points[k], wanted[k]
-        any_face, any2, same_face, same2 = 0, np.inf, -1, np.inf  # nearest of all, nearest of those that look along n
+        any_face, any2 = 0, np.inf  # nearest of all
+        same_face, same, along, least = -1, np.inf, 0.0, np.inf  # of those that look along n: the chosen one, its distance, n·normal; the least distance
         ask = n[0] != 0 or n[1] != 0 or n[2] != 0
         top = 1
         stack[0], gaps[0] = 0, 0.0
@@ -165,7 +172,7 @@ def _search(corner: Array, normal: Array, low: Array, high: Array, child: Array,
             top -= 1
             node, gap = stack[top], gaps[top]
             reach2 = (2 * np.sqrt(any2) + wall) ** 2
-            if gap >= any2 and not (ask and gap < min(same2, reach2)):
+            if gap >= any2 and not (ask and gap < min((least + tie) ** 2, reach2)):
                 continue
             if child[node, 0] >= 0:
                 left, right = child[node, 0], child[node, 1]
@@ -184,12 +191,16 @@ def _search(corner: Array, normal: Array, low: Array, high: Array, child: Array,
                     d2 += d * d
                 if d2 < any2:
                     any_face, any2 = i, d2
-                if ask and d2 < same2 and n[0] * normal[i, 0] + n[1] * normal[i, 1] + n[2] * normal[i, 2] > 0:
-                    same_face, same2 = i, d2
+                looks = n[0] * normal[i, 0] + n[1] * normal[i, 1] + n[2] * normal[i, 2]
+                if ask and looks > LOOKS:
+                    d = np.sqrt(d2)
+                    if d < least - tie or (d <= least + tie and looks > along + 1e-9):
+                        same_face, same, along = i, d, looks
+                    least = min(least, d)
         chosen = any_face
-        if ask and same_face >= 0 and same2 <= (2 * np.sqrt(any2) + wall) ** 2:
+        if ask and same_face >= 0 and same <= 2 * np.sqrt(any2) + wall:
             chosen = same_face
         u, v, w = _in_triangle(p, corner[chosen])
-        face[k], distance[k] = chosen, np.sqrt(same2 if chosen == same_face else any2)
+        face[k], distance[k] = chosen, same if chosen == same_face else np.sqrt(any2)
         barycentric[k, 0], barycentric[k, 1], barycentric[k, 2] = u, v, w
     return face, barycentric, distance

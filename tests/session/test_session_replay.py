@@ -147,19 +147,19 @@ def test_a_log_turned_as_a_whole_sounds_the_same(log_and_sound: tuple[Path, np.n
     turn, shift = Rotation.from_rotvec([0.7, -1.1, 2.0]), np.array([3.0, -2.0, 5.0])
 
     def turned(vectors: np.ndarray) -> np.ndarray:
-        return turn.apply(vectors) if vectors.size else vectors
+        return vectors @ turn.as_matrix().T
 
     steps = tuple(
         replace(
             step,
             position_m=turned(step.position_m) + shift,
-            quaternion_xyzw=(turn * Rotation.from_quat(step.quaternion_xyzw)).as_quat() if len(step.quaternion_xyzw) else step.quaternion_xyzw,
-            gravity_m_s2=turn.apply(step.gravity_m_s2),
+            quaternion_xyzw=(turn * Rotation.from_quat(step.quaternion_xyzw.copy())).as_quat() if len(step.quaternion_xyzw) else step.quaternion_xyzw,
+            gravity_m_s2=turned(step.gravity_m_s2),
             contacts=replace(step.contacts, **{name: turned(getattr(step.contacts, name)) for name in ("normal", "impulse_n_s", "slip_m_s")}),
         )
         for step in log.steps
     )
-    sensors = tuple(sb.Microphone(turn.apply(s.position_m) + shift) if isinstance(s, sb.Microphone) else s for s in log.sensors)
+    sensors = tuple(sb.Microphone(turned(s.position_m) + shift) if isinstance(s, sb.Microphone) else s for s in log.sensors)
     other = sb.render_log(replace(log, steps=steps, sensors=sensors))
     error = np.abs(other - sound).max(axis=1) / np.abs(sound).max(axis=1)
     print("turned:", error)
