@@ -7,7 +7,7 @@ SECONDS = 5.0
 MICROPHONE = [(-0.15, -0.7, 0.5), (0.15, -0.7, 0.5)]
 ASSETS = Path(__file__).resolve().parent.parent / "assets"
 DENSITY_KG_M3 = {"porcelain": 2400, "steel": 7850, "glass": 2500, "wood": 700}
-VOLUME_M3 = {"plate": 207.6e-6, "bowl": 51.7e-6, "tumbler": 66.1e-6}
+VOLUME_M3 = {"plate": 206.8e-6, "bowl": 75.1e-6, "tumbler": 67.4e-6}
 
 
 def build(client):
