@@ -135,11 +135,8 @@ def _render(setup: Setup, state: State) -> tuple[Array, State]:
     after = clock.after(step.dt_s)
     count = after.sample(sr) - clock.sample(sr)
     x = clock.progress(step.dt_s, sr, count)
-    blows: list[tuple[float, Blow]] = []
-    loads = state.loads
-    if state.number == 0:  # nothing was looked for ahead of the first step
-        parts, loads = split(loads, ahead=0)
-        blows += [(float(clock.time_s), blow) for blow in find_blows(parts, rows, step, sounders, 0.0)]
+    parts, loads = split(state.loads, ahead=0)  # of the first step, and what was not sure a step ago
+    blows = [(float(clock.time_s), blow) for blow in find_blows(parts, rows, step, sounders, 0.0)]
     parts, loads = split(loads)
     blows += [(float(after.time_s), blow) for blow in find_blows(parts, rows[1:], window[1], sounders, -step.dt_s)]
     drives, rubbing = advance_rubbing(state.rubbing, parts, step, window[1], rows[1], sounders, x, sr, setup.seed)
