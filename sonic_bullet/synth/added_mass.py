@@ -14,23 +14,40 @@ f triangles, m modes.
 # mypy: disable-error-code="no-untyped-def"
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numba import njit
 
 from sonic_bullet.records import Array
 
 
-def moved_air(corner_m: Array, speed: Array) -> Array:
-    """Length of air moved times speed, φ (f, m), for normal speeds (f, m) on triangles corner_m (f, 3, 3) of a closed surface, outward.
+@dataclass(frozen=True, slots=True, eq=False)
+class Moved:
+    """The map v → φ of one surface, symmetric in √area: φ = Σ_j vector_j length_j (vector_j·v).
 
-    Source: the module's equations. Sphere moving as harmonic l: φ = a v/(l + 1).
+    area_m2 (f,) of its triangles; length_m (f,) > 0: eigenvalues, ascending; vector (f, f): columns are eigenvectors, of √area·v.
+    """
+
+    area_m2: Array
+    length_m: Array
+    vector: Array
+
+
+def moved_air(corner_m: Array) -> Moved:
+    """Solve for triangles corner_m (f, 3, 3) of a closed surface, outward. Source: the module's equations.
+
+    Sphere moving as harmonic l: φ = a v/(l + 1). The map is symmetric by reciprocity; discretised, nearly so.
     """
     twice = np.cross(corner_m[:, 1] - corner_m[:, 0], corner_m[:, 2] - corner_m[:, 0])
     length = np.linalg.norm(twice, axis=1)
     normal = twice / length[:, None]
-    beta = float(np.sqrt(length.sum() / 2 / (4 * np.pi)))
-    left, right = _matrices(np.ascontiguousarray(corner_m, dtype=float), normal, beta)
-    return np.asarray(np.linalg.solve(left, right @ speed))
+    area = length / 2
+    left, right = _matrices(np.ascontiguousarray(corner_m, dtype=float), normal, float(np.sqrt(area.sum() / (4 * np.pi))))
+    root = np.sqrt(area)
+    even = root[:, None] * np.linalg.solve(left, right) / root
+    value, vector = np.linalg.eigh((even + even.T) / 2)
+    return Moved(area, np.maximum(value, 1e-2 * root.min()), vector)
 
 
 @njit(cache=True, nogil=True)

@@ -1,14 +1,12 @@
 """From modal velocity to pressure: a far-field map of each mode, and what radiating costs it.
 
     p(r̂) = (iωρ₀/4π) ∮ [v + ik (r̂·n) ψ] e^{ik r̂·x} dS             at 1 m, v = φ·n for unit modal velocity   [Pierce 1989, eq. 4-6.4, e^{iωt}]
-    near field p_s = iωρ₀ ψ:  ψ = [(1 - w) φ₀/ℓ + w v]/q,           w = k²/(k² + 1/ℓ²)
-    φ₀, ℓ = ∮φ₀v/∮v²                                               air moved at k = 0, `added_mass`
-    q(k) = 1/L + √(κ² + (1/L + ik)²),  q(0) = 1/ℓ                   its change with k; L the body's middle principal extent
+    near field p_s = iωρ₀ ψ:  ψ = Σ_j e_j (e_j·v)/q_j                e_j, t_j: eigenvectors and -values of the air moved at k = 0, `added_mass`
+    q_j(k) = 1/L + √(κ_j² + (1/L + ik)²),  q_j(0) = 1/t_j          its change with k; L the body's middle principal extent
     |p| = √<|p(r̂)|²>,  Δd = 2π <|p|²>/ρ₀c                          mean over directions; power = 4π<|p|²>/2ρ₀c = 2 Δd · ½|z|²
 
-q interpolates -k h_l'(ka)/h_l(ka) of a sphere (a = L/2): exact for l = 0, for every l at k → 0 (q = (l+1)/a), and for k → ∞ to second
-order (1/a + ik); a flat wave of wavenumber κ » 1/L gives √(κ² - k²). Where ψ falls short is the near field on bodies
-of many wavelengths; there the first term rules.
+On a sphere (a = L/2) the e_j are the harmonics and q_j interpolates -k h_l'(ka)/h_l(ka): exact for l = 0, for every l at k → 0, where it is
+(l+1)/a, and to second order for k → ∞ (1/a + ik). On a wide flat face they are waves, and q = √(κ² - k²) [Cremer et al. 2005, eq. 6.26].
 
 The mean is a product Gauss rule in the body's principal frame: exact while twice the body's radius is below its degree over k.
 The weight is complex: size the mean over directions, phase that of the direction of the strongest pressure, counted from the instant
@@ -23,7 +21,7 @@ import numpy as np
 from numba import njit
 
 from sonic_bullet.records import Air, Array, ModalModel
-from sonic_bullet.synth.added_mass import moved_air
+from sonic_bullet.synth.added_mass import Moved, moved_air
 
 _MODES_AT_ONCE = 32
 MOST_PATCHES = 2500
@@ -48,26 +46,27 @@ def radiation(model: ModalModel, air: Air) -> tuple[Array, Array]:
     extent = np.sort(np.ptp(corner.reshape(-1, 3), axis=0))
     patch, place = _patches(corner, area, normal, MOST_PATCHES)
     coarse, nearest = _near_mesh(corner, area, normal)
-    bend = np.zeros(m)
-    moment = np.zeros((m, 10, len(place)))
+    moved = moved_air(coarse)
+    moment = np.zeros((m, 7, len(place)))
     for lo in range(0, m, _MODES_AT_ONCE):
         some = slice(lo, min(lo + _MODES_AT_ONCE, m))
-        bend[some] = _moments(model.shape[:, :, some].astype(float)[face], turn, corner, area, normal, patch, place, coarse, nearest, moment[some])
-    near = _near(k, bend, extent[1])
+        speed = np.einsum("fi,fcim->fcm", normal @ turn, model.shape[:, :, some].astype(float)[face])
+        level = _near_field(k[some], 1 / extent[1], moved, area[:, None] * speed.mean(axis=1), nearest)
+        _moments(speed, level, corner, area, normal, patch, place, moment[some])
     point = corner.reshape(-1, 3)
     rings = np.clip(np.ceil(k * np.linalg.norm(point, axis=1).max()) + 4, LEAST_RINGS, MOST_RINGS).astype(int)
     weight = np.zeros(m, complex)
     for count in np.unique(rings):
-        some = np.flatnonzero(rings == count)
+        now = np.flatnonzero(rings == count)
         direction, share = directions(int(count))
-        ahead, behind = _map(k[some], 1 / near[some], k[some] ** 2 / (k[some] ** 2 + bend[some] ** 2), moment[some], place, direction)
-        pressure = np.concatenate([ahead, behind], axis=1) * (1j * k[some] * air.sound_speed_m_s * air.density_kg_m3 / (4 * np.pi))[:, None]
+        ahead, behind = _map(k[now], moment[now], np.ascontiguousarray(place.T), direction)
+        pressure = np.concatenate([ahead, behind], axis=1) * (1j * k[now] * air.sound_speed_m_s * air.density_kg_m3 / (4 * np.pi))[:, None]
         both = np.concatenate([direction, -direction])
         mean = np.abs(pressure) ** 2 @ np.concatenate([share, share])
         best = np.argmax(np.abs(pressure), axis=1)
-        lead = pressure[np.arange(len(some)), best] * np.exp(-1j * k[some] * np.array([(point @ both[b]).max() for b in best]))
+        lead = pressure[np.arange(len(now)), best] * np.exp(-1j * k[now] * np.array([(point @ both[b]).max() for b in best]))
         size = np.abs(lead)
-        weight[some] = np.sqrt(mean) * np.where(size > 0, lead / np.where(size > 0, size, 1), 1)
+        weight[now] = np.sqrt(mean) * np.where(size > 0, lead / np.where(size > 0, size, 1), 1)
     impedance = air.density_kg_m3 * air.sound_speed_m_s
     return weight, 2 * np.pi * np.abs(weight) ** 2 / impedance
 
@@ -96,14 +95,15 @@ def _principal(corner: Array) -> tuple[Array, Array]:
     area = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1)
     centre = corner.mean(axis=1)
     middle = area @ centre / area.sum()
-    turn = np.linalg.eigh(np.einsum("f,fi,fj->ij", area, centre - middle, centre - middle))[1][:, ::-1].T
+    spread = np.einsum("f,fi,fj->ij", area, centre - middle, centre - middle)
+    turn = np.linalg.eigh(np.round(spread * (1e6 / np.trace(spread))))[1][:, ::-1].T  # rounded: equal moments leave the body's own axes
     turn[2] *= np.sign(np.linalg.det(turn))
     return (corner - middle) @ turn.T, turn
 
 
 def _cells(point: Array, normal: Array, edge_m: float) -> Array:
     """Number (p,) of the cell of edge edge_m and the side it faces (of six) in which each point lies."""
-    cell = np.floor((point - point.min(axis=0)) / edge_m + 0.3819).astype(np.int64)
+    cell = np.floor((point - (point.min(axis=0) + point.max(axis=0)) / 2) / edge_m + 0.5).astype(np.int64)
     bias = normal * [1.0, 0.93, 0.87]  # no ties between sides
     axis = np.argmax(np.abs(bias), axis=1)
     side = 2 * axis + (bias[np.arange(len(axis)), axis] > 0)
@@ -137,6 +137,11 @@ def _near_mesh(corner: Array, area: Array, normal: Array) -> tuple[Array, Array]
         cell = _cells(point, outward, edge_m)
         size = np.bincount(cell)
         middle = np.stack([np.bincount(cell, point[:, i]) / size for i in range(3)], axis=1)
+        way = np.stack([np.bincount(cell, outward[:, i]) for i in range(3)], axis=1)
+        way /= np.maximum(np.linalg.norm(way, axis=1), 1e-300)[:, None]
+        reach = np.zeros(len(middle))
+        np.maximum.at(reach, cell, ((point - middle[cell]) * way[cell]).sum(axis=1))
+        middle += reach[:, None] * way  # else edges are planed off
         triangle = cell[name]
         triangle = triangle[(triangle[:, 0] != triangle[:, 1]) & (triangle[:, 1] != triangle[:, 2]) & (triangle[:, 2] != triangle[:, 0])]
         _, first, alike = np.unique(np.sort(triangle, axis=1), axis=0, return_index=True, return_inverse=True)
@@ -155,75 +160,60 @@ def _near_mesh(corner: Array, area: Array, normal: Array) -> tuple[Array, Array]
     return coarse, tree.query(np.hstack([corner.mean(axis=1), edge_m * normal]))[1]
 
 
-def _moments(shape, turn, corner, area, normal, patch, place, coarse, nearest, out) -> Array:
-    """Fill out (m, 10, s) with patch sums of v, v·(x - place), n·φ₀/ℓ, n·v; return 1/ℓ (m,)."""
-    speed = np.einsum("fi,fcim->fcm", normal @ turn, shape)
-    flow = area[:, None] * speed.mean(axis=1)
-    share = np.bincount(nearest, area, len(coarse))
-    mean = np.stack([np.bincount(nearest, one, len(coarse)) for one in flow.T], axis=1) / np.where(share > 0, share, 1)[:, None]
-    moved = moved_air(coarse, mean)
-    square = share @ mean**2
-    length = (share @ (moved * mean)) / np.where(square > 0, square, 1)
-    length = np.maximum(length, 1e-3 * np.sqrt(area.sum()) / 10)
-    level = area[:, None] * (moved / length)[nearest]
+def _near_field(k: Array, curved_per_m: float, moved: Moved, flow: Array, nearest: Array) -> Array:
+    """ψ (f, m) in m·(1/√kg), complex, on faces with volume flow (f, m), each served by triangle nearest (f,) of `moved`."""
+    speed = np.stack([np.bincount(nearest, one, len(moved.area_m2)) for one in flow.T], axis=1) / np.sqrt(moved.area_m2)[:, None]
+    curved = np.minimum(curved_per_m, 0.5 / moved.length_m)[:, None]
+    across = (1 / moved.length_m[:, None] - curved) ** 2 - curved**2
+    q = curved + np.sqrt(across + (curved + 1j * k) ** 2)
+    share = np.asarray(moved.vector.T @ speed)
+    return np.asarray((moved.vector @ (share / q) / np.sqrt(moved.area_m2)[:, None])[nearest])
+
+
+def _moments(speed: Array, level: Array, corner: Array, area: Array, normal: Array, patch: Array, place: Array, out: Array) -> None:
+    """Fill out (m, 7, s) with each patch's ∫ of v, v (x - place) + n Re ψ, n Im ψ; speed (f, 3, m) at corners, level ψ (f, m)."""
     arm = corner - place[patch][:, None]
     # ∫ v y over a triangle of linear v, y = area/12 (Σv Σy + Σvy)
     lever = area[:, None, None] / 12 * (np.einsum("fm,fi->fim", speed.sum(axis=1), arm.sum(axis=1)) + np.einsum("fcm,fci->fim", speed, arm))
     order = np.argsort(patch, kind="stable")
     start = np.searchsorted(patch[order], np.arange(len(place)))
-    out[:, 0] = np.add.reduceat(flow[order], start).T
-    out[:, 1:4] = np.add.reduceat(lever[order], start).transpose(2, 1, 0)
-    for i in range(3):
-        out[:, 4 + i] = np.add.reduceat(normal[order, i, None] * level[order], start).T
-        out[:, 7 + i] = np.add.reduceat(normal[order, i, None] * flow[order], start).T
-    return np.asarray(1 / length)
+    out[:, 0] = np.add.reduceat((area[:, None] * speed.mean(axis=1))[order], start).T
+    push = (area[:, None] * normal)[:, :, None] * level[:, None]
+    out[:, 1:4] = np.add.reduceat((lever + push.real)[order], start).transpose(2, 1, 0)
+    out[:, 4:7] = np.add.reduceat(push.imag[order], start).transpose(2, 1, 0)
 
 
-def _near(k: Array, bend: Array, middle_m: float) -> Array:
-    """q (m,) in 1/m: the near field's wavenumber into the air at k, where it is bend (m,) at k = 0."""
-    curved = np.minimum(1 / middle_m, bend / 2)
-    within = np.maximum((bend - curved) ** 2 - curved**2, 0)
-    return np.asarray(curved + np.sqrt(within + (curved + 1j * k) ** 2))
-
-
-@njit(cache=True, nogil=True)
-def _map(k, near, local, moment, place, direction):
-    """Σ over patches [v + ik r̂·(v y + n ψ)] e^{ik r̂·x} (m, n) for directions (n, 3) and for their negatives; near (m,) = 1/q, local (m,) = w."""
+@njit(cache=True, nogil=True, fastmath=True)
+def _map(k, moment, place, direction):
+    """Σ over patches [v + ik r̂·(v y + n ψ)] e^{ik r̂·x} (m, n), place (3, s), for directions (n, 3) and for their negatives. Sums run in vectors: no order to keep."""
     m, n = len(k), len(direction)
     ahead = np.empty((m, n), np.complex128)
     behind = np.empty((m, n), np.complex128)
-    x, y, z = direction[:, 0].copy(), direction[:, 1].copy(), direction[:, 2].copy()
     for i in range(m):
-        sums = np.zeros((6, n))
-        a, b, c, d, e, f = sums[0], sums[1], sums[2], sums[3], sums[4], sums[5]
-        w = local[i]
+        v, n0, n1, n2, m0, m1, m2 = moment[i]
         half = 0.5 / np.pi * k[i]
-        for s in range(len(place)):
-            p0, p1, p2 = half * place[s, 0], half * place[s, 1], half * place[s, 2]
-            v, l0, l1, l2 = moment[i, 0, s], moment[i, 1, s], moment[i, 2, s], moment[i, 3, s]
-            n0 = (1 - w) * moment[i, 4, s] + w * moment[i, 7, s]
-            n1 = (1 - w) * moment[i, 5, s] + w * moment[i, 8, s]
-            n2 = (1 - w) * moment[i, 6, s] + w * moment[i, 9, s]
-            for j in range(n):
-                turns = p0 * x[j] + p1 * y[j] + p2 * z[j]
+        for j in range(n):
+            x, y, z = direction[j]
+            a, b, c, d, e, f = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+            for s in range(place.shape[1]):
+                turns = half * (place[0, s] * x + place[1, s] * y + place[2, s] * z)
                 t = np.pi * (turns - np.floor(turns + 0.5))
                 u = t * t
                 # sine and cosine of half the angle, |t| ≤ π/2: Taylor to 1e-9, without calls so that it runs in vectors
-                sn = t * (1 - u / 6 * (1 - u / 20 * (1 - u / 42 * (1 - u / 72 * (1 - u / 110 * (1 - u / 156))))))
-                cs = 1 - u / 2 * (1 - u / 12 * (1 - u / 30 * (1 - u / 56 * (1 - u / 90 * (1 - u / 132 * (1 - u / 182))))))
+                sn = t * (1 + u * (-1 / 6 + u * (1 / 120 + u * (-1 / 5040 + u * (1 / 362880 + u * (-1 / 39916800 + u / 6227020800))))))
+                cs = 1 + u * (-1 / 2 + u * (1 / 24 + u * (-1 / 720 + u * (1 / 40320 + u * (-1 / 3628800 + u * (1 / 479001600 - u / 87178291200))))))
                 sine, cosine = 2 * sn * cs, 1 - 2 * sn * sn
-                lever = l0 * x[j] + l1 * y[j] + l2 * z[j]
-                level = n0 * x[j] + n1 * y[j] + n2 * z[j]
-                a[j] += v * cosine
-                b[j] += v * sine
-                c[j] += lever * cosine
-                d[j] += lever * sine
-                e[j] += level * cosine
-                f[j] += level * sine
-        for j in range(n):
-            first, second, third = complex(a[j], b[j]), complex(c[j], d[j]), complex(e[j], f[j])
-            ahead[i, j] = first + 1j * k[i] * (second + third * near[i])
-            behind[i, j] = first.conjugate() - 1j * k[i] * (second.conjugate() + third.conjugate() * near[i])
+                lever = n0[s] * x + n1[s] * y + n2[s] * z
+                late = m0[s] * x + m1[s] * y + m2[s] * z
+                a += v[s] * cosine
+                b += v[s] * sine
+                c += lever * cosine
+                d += lever * sine
+                e += late * cosine
+                f += late * sine
+            first, second, third = complex(a, b), complex(c, d), 1j * complex(e, f)
+            ahead[i, j] = first + 1j * k[i] * (second + third)
+            behind[i, j] = first.conjugate() - 1j * k[i] * (second.conjugate() - third.conjugate())
     return ahead, behind
 
 

@@ -76,7 +76,7 @@ def test_sphere_harmonics_radiate_their_exact_power_and_pressure(degree: int, ra
     pressure = RHO_C * 0.7 * radius * -1j * 1j ** (degree + 1) * np.exp(-1j * ka) / (ka * hankel) / np.sqrt(2 * degree + 1)
     assert np.abs(20 * np.log10(np.abs(weight / pressure))).max() < 0.5
     either = np.angle(weight / pressure) if degree % 2 == 0 else np.angle((weight / pressure) ** 2) / 2  # which of two equal lobes leads is open
-    assert np.abs(either)[ka > 0.1].max() < 0.06
+    assert np.abs(either)[ka > 0.1].max() < 0.15
     power = 4 * np.pi * np.abs(weight) ** 2 / RHO_C / 2
     assert 2 * extra * 0.5 == pytest.approx(power, rel=1e-9)  # modal energy ½|z|², |z| = 1
 
