@@ -75,7 +75,7 @@ def find_blows(split: Split, oriented: Sequence[Rows], step: Step, sounders: tup
     """The strikes that the rows of ``step`` begin; oriented: the rows of that step and of the known ones after it.
 
     earliest_s: not after 0; a strike is dated back that far at most, where the bodies overlap as the step starts.
-    Pairs of which nothing can sound (no modes, no moving volume) are passed over.
+    Pairs of which nothing can sound (no modes, no moving volume) are passed over, and those of which neither moves (links without mass).
     """
     if not len(split.strike):
         return ()
@@ -98,7 +98,7 @@ def find_blows(split: Split, oriented: Sequence[Rows], step: Step, sounders: tup
     accepted = accepted_impulse(raw, 2.0 * mass * caused, low, high, mobile)
     impulse = group_sum(strike, rows.impulse_n_s, count)
     audible = np.array([_can_sound(sounders[i]) or _can_sound(sounders[j]) for i, j in zip(low, high, strict=True)])
-    heard = np.flatnonzero((accepted > LEAST_JUMP_M_S * mass) & (raw * STEEPEST >= np.linalg.norm(impulse, axis=1)) & audible)
+    heard = np.flatnonzero((mass > 0) & (accepted > LEAST_JUMP_M_S * mass) & (raw * STEEPEST >= np.linalg.norm(impulse, axis=1)) & audible)
     if not len(heard):
         return ()
     return _blows(rows, strike, delay, heard, sounders, (low, high), mass, raw, accepted, approach, impulse, earliest_s, step.dt_s)
@@ -141,12 +141,16 @@ def modulus_pa(body: Body) -> float:
 
 
 def effective_mass(low: Sequence[Body], high: Sequence[Body], turn_low: Array, turn_high: Array, arm_m: Array, normal: Array) -> Array:
-    """m* (q,) in kg of pairs [synth.pulse]: orientations (q, 3, 3), levers (q, 2, 3) and normals (q, 3) in the world."""
+    """m* (q,) in kg of pairs [synth.pulse]: orientations (q, 3, 3), levers (q, 2, 3) and normals (q, 3) in the world. 0 where neither can move."""
     mass_low, mass_high = (np.array([body.mass_kg for body in bodies]) for bodies in (low, high))
     inertia_low, inertia_high = (
         np.einsum("kij,kjl,kml->kim", turn, np.array([body.inertia_kg_m2 for body in bodies]), turn) for bodies, turn in ((low, turn_low), (high, turn_high))
     )
-    return np.asarray(effective_mass_kg(mass_low, inertia_low, arm_m[:, 0], mass_high, inertia_high, arm_m[:, 1], normal))
+    moves = (mass_low > 0) | (mass_high > 0)
+    columns = (mass_low, inertia_low, arm_m[:, 0], mass_high, inertia_high, arm_m[:, 1], normal)
+    out = np.zeros(len(normal))
+    out[moves] = effective_mass_kg(*(column[moves] for column in columns))
+    return out
 
 
 def _start_s(rows: Rows, strike: Array, delay: Array, count: int, earliest_s: float, dt_s: float) -> Array:

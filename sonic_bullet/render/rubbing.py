@@ -157,7 +157,8 @@ def _followed(gain: Sequence[tuple[Array, Array] | None], which: Array, target: 
 
 def _audible_pair(sounders: tuple[Sounder, ...], key: int) -> bool:
     low, high = int(key) >> 32, int(key) & 0xFFFFFFFF
-    return any(s.mode_count > 0 or s.rigid is not None for s in (sounders[low], sounders[high]))
+    sides = sounders[low], sounders[high]
+    return any(s.mode_count > 0 or s.rigid is not None for s in sides) and any(s.body.mass_kg > 0 for s in sides)
 
 
 def _joined(rubbing: Rubbing, key: Array, target: _Target, step: Step, sounders: tuple[Sounder, ...], seed: int) -> Rubbing:
