@@ -25,7 +25,7 @@ THIN_DOF, CHUNKY_DOF = 26_000, 10_000  # unknowns by default: a plate's factor s
 DOF_PER_TET = 5.6  # measured on fTetWild's meshes of bars, slabs and bowls
 MOST_TETS = 8_000
 FILL_LIMIT_S = 45.0
-ENVELOPE = (0.04, 0.1)  # of the thickness, thin and chunky: how far fTetWild may move the surface; its time hangs on it
+ENVELOPE = (0.04, 0.006)  # of the thickness and of the diagonal: how far fTetWild may move the surface, the lesser counts
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -133,7 +133,7 @@ def _soup(shapes: tuple[Shape, ...]) -> tuple[Array, Array]:
 
 def _edge_m(volume_m3: float, thickness_m: float, budget: int) -> float:
     """Edge that keeps fTetWild within the budget of unknowns: tetrahedra ≈ 9 V/e³ + 2 A/e² (fitted to its meshes), A = 2V/thickness."""
-    edges = thickness_m * np.geomspace(0.75, 20, 200)
+    edges = thickness_m * np.geomspace(0.4, 20, 200)
     tets = 9 * volume_m3 / edges**3 + 4 * volume_m3 / thickness_m / edges**2
     return float(edges[min(199, int((tets * DOF_PER_TET > budget).sum()))])
 
@@ -155,7 +155,7 @@ def _meshed(skin: Skin, edge_m: float | None, say: Callable[[str], None]) -> Sol
         if prism is not None:
             return Solid(prism.node_m, prism.tet, note=prism.note + skin.note)
     edge = edge_m if edge_m is not None else _edge_m(geometry.volume_m3(vertex, face), thickness, budget)
-    envelope = thickness * (ENVELOPE[0] + (ENVELOPE[1] - ENVELOPE[0]) * chunkiness(thickness, diagonal))
+    envelope = min(ENVELOPE[0] * thickness, ENVELOPE[1] * diagonal)
     deadline = time.monotonic() + FILL_LIMIT_S
     say(f"filling {len(face)} triangles with tetrahedra of {edge:.3g} m")
     failure = MeshError(f"mesh needs more than {MOST_TETS} tetrahedra", "give a larger edge_m or a simpler mesh")

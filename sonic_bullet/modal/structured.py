@@ -1,6 +1,6 @@
 """Tetrahedra laid out by rule for the shapes that have a name: the same numbers give the same mesh, bit for bit.
 
-    box: a grid of cells, each cut into Kuhn's six tetrahedra
+    box: a grid of cells, each cut into Kuhn's six tetrahedra, neighbours mirrored
     sphere: the icosahedron's twenty cones, cut n³-fold [Freudenthal 1942], pushed radially onto shells
     cylinder: a hexagonal disc pushed onto circles, times layers;   capsule: that cylinder between two hexagonal half balls
 
@@ -23,9 +23,11 @@ def box(size_m: Array, cells: tuple[int, int, int]) -> Solid:
     axes = [np.linspace(-s / 2, s / 2, n + 1) for s, n in zip(size_m, cells, strict=True)]
     corner = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     stride = np.array([(ny + 1) * (nz + 1), nz + 1, 1])
-    first = (np.stack(np.meshgrid(np.arange(nx), np.arange(ny), np.arange(nz), indexing="ij"), axis=-1).reshape(-1, 3)) @ stride
-    paths = np.array([np.concatenate([[0], np.cumsum(stride[list(p)])]) for p in permutations(range(3))])
-    tet = (first[:, None, None] + paths).reshape(-1, 4)
+    cell = np.stack(np.meshgrid(np.arange(nx), np.arange(ny), np.arange(nz), indexing="ij"), axis=-1).reshape(-1, 3)
+    path = np.array([np.concatenate([np.zeros((1, 3), int), np.cumsum(np.eye(3, dtype=int)[list(p)], axis=0)]) for p in permutations(range(3))])
+    # Every other cell is its neighbour's mirror image: faces still match, and no diagonal of the box is stiffer than another.
+    step = path[None] ^ (cell % 2)[:, None, None, :]
+    tet = ((cell[:, None, None, :] + step) @ stride).reshape(-1, 4)
     return quadratic(corner, tet, note=f"box of {nx} x {ny} x {nz} cells, 6 tetrahedra each")
 
 

@@ -43,7 +43,9 @@ def tetrahedra(vertex_m: Array, face: Array, edge_m: float, envelope_m: float, *
         np.savez(source, allow_pickle=False, **numbers)
         command = [sys.executable, str(Path(__file__).with_name("_tetwild.py")), str(source), str(target)]
         try:
-            ended = subprocess.run(command, timeout=time_limit_s, capture_output=True, text=True, check=False)
+            ended = subprocess.run(
+                command, timeout=time_limit_s, capture_output=True, text=True, check=False, cwd=folder
+            )  # fTetWild leaves a file where it runs
         except subprocess.TimeoutExpired:
             ended = None
         if ended is None or -ended.returncode in CUT_OFF:
