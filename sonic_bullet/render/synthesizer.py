@@ -26,10 +26,12 @@ from sonic_bullet.render.sounder import Sounder, build_sounder, weight_sets
 from sonic_bullet.synth import bank, path
 from sonic_bullet.synth.bank import Bank, BankState
 from sonic_bullet.synth.path import Path, PathState
-from sonic_bullet.synth.pulse import pulse_nodes
+from sonic_bullet.synth.pulse import pulse_cells, pulse_nodes
 from sonic_bullet.synth.strikes import LOOKAHEAD, LoadHistory, push, split
 
 LATENCY_STEPS = LOOKAHEAD
+CELLS_PER_RADIAN = 4.0
+"""Cells of a pulse per 1/w of a rigid body: a third of (w·cell)³ = 0.5 % is what its level may err."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -149,10 +151,16 @@ def _render(setup: Setup, state: State) -> tuple[Array, State]:
 def _strikes(blow: Blow, step_start_s: float, sounders: tuple[Sounder, ...], sr: int, earliest: int) -> list[bank.Strike]:
     """The pulse on the modes and translations of both bodies."""
     offset_s, spacing_s, weight = pulse_nodes(blow.length_s, sr, flat=blow.flat)
-    begin = max((step_start_s + blow.start_s + offset_s) * sr, float(earliest))
-    sides = (blow.low, blow.modes_low, blow.impulse_n_s), (blow.high, blow.modes_high, -blow.impulse_n_s)
-    gains = [(4 * body + part, gain) for body, modes, push in sides for part, gain in enumerate((modes, *_along(sounders[body], push)))]
-    return [bank.Strike(place, begin, spacing_s * sr, weight, gain) for place, gain in gains if gain.any()]
+    start = max((step_start_s + blow.start_s) * sr, float(earliest))
+    strikes = []
+    for body, modes, push in ((blow.low, blow.modes_low, blow.impulse_n_s), (blow.high, blow.modes_high, -blow.impulse_n_s)):
+        if modes.any():
+            strikes.append(bank.Strike(4 * body, start + offset_s * sr, spacing_s * sr, weight, modes))
+        rigid = sounders[body].rigid
+        if rigid is not None:
+            cells = pulse_cells(start, blow.length_s, sr, int(np.ceil(CELLS_PER_RADIAN * rigid.decay_per_s[0] / sr)), flat=blow.flat)
+            strikes += [bank.Strike(4 * body + 1 + axis, *cells, push[axis : axis + 1], even=True) for axis in np.flatnonzero(push)]
+    return strikes
 
 
 def _forces(drives: Sequence[Drive], sounders: tuple[Sounder, ...], x: Array) -> list[bank.Force]:
@@ -168,12 +176,6 @@ def _forces(drives: Sequence[Drive], sounders: tuple[Sounder, ...], x: Array) ->
                 pushes[body] = pushes.get(body, 0.0) + (push if side == 0 else -push)
     one = np.ones(1)
     return forces + [bank.Force(4 * body + 1 + axis, push[axis], one, one) for body, push in pushes.items() for axis in range(3)]
-
-
-def _along(sounder: Sounder, push: Array) -> tuple[Array, Array, Array]:
-    """A world vector as the gains of the three translations, empty where they cannot be heard."""
-    x, y, z = push.reshape(3, 1) if sounder.rigid is not None else np.zeros((3, 0))
-    return x, y, z
 
 
 def _at_sensors(setup: Setup, state: State, sound: Array, x: Array) -> Array:

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-
 from made_models import STEEL, ball_body, box_body, row, step, wall_body
+
 from sonic_bullet.contacts import ContactLog, Contacts, Step
 from sonic_bullet.records import Air, Microphone, ModalSum, Vibrometer
 from sonic_bullet.render import render_log, synthesizer
@@ -42,8 +42,9 @@ def onset(signal: np.ndarray, share: float = 0.02) -> int:
 def test_pressure_falls_with_distance_and_comes_later() -> None:
     """Same direction, 1 m and 3 m: a third of the pressure, 2 m / c later, and a channel each."""
     near, far = struck_box((Microphone([0, 0, 1.0]), Microphone([0, 0, 3.0])))
-    assert np.abs(near).max() / np.abs(far).max() == pytest.approx(3.0, rel=0.01)
     delay = 2.0 / C * SR
+    later = round(delay)
+    assert np.sqrt((near[:-later] ** 2).sum() / (far[later:] ** 2).sum()) == pytest.approx(3.0, rel=0.01)
     assert abs((onset(far) - onset(near)) - delay) <= 1
     spectra = np.fft.rfft(near), np.fft.rfft(far)
     f = np.fft.rfftfreq(near.size, 1 / SR)
@@ -106,7 +107,9 @@ def test_the_plain_sum_is_the_seeds_sum() -> None:
     time = np.arange(signal.size) / SR - 2 / 240 - blow.start_s - blow.length_s / 2
     expected = np.zeros(signal.size)
     for omega, decay, gain in zip(sounder.omega_rad_s, sounder.decay_per_s, blow.modes_low, strict=True):
-        expected += 2.0 * gain * pulse_spectrum(np.array([omega / (2 * np.pi) * blow.length_s]), flat=blow.flat)[0] * np.exp(-decay * time) * np.sin(omega * time)
+        expected += (
+            2.0 * gain * pulse_spectrum(np.array([omega / (2 * np.pi) * blow.length_s]), flat=blow.flat)[0] * np.exp(-decay * time) * np.sin(omega * time)
+        )
     late = slice(700, 4000)
     assert np.abs(signal[late] - expected[late]).max() < 5e-3 * np.abs(expected[late]).max()
 
@@ -155,6 +158,7 @@ def test_a_rigid_click_has_a_dipoles_direction() -> None:
 def test_a_slow_compact_click_is_the_jerk_law() -> None:
     """p = K cosθ · da/dt(t - r/c) / r [Chadwick, Zheng, James 2012], where the blow is long against a/c: a soft 4 mm ball."""
     from made_models import Material
+
     from sonic_bullet.synth.pulse import add_jerk
 
     rubber = Material.isotropic("rubber", youngs_pa=3e6, poisson=0.45, density_kg_m3=1100, alpha_per_s=50.0, beta_s=1e-6)
@@ -177,9 +181,10 @@ def test_a_slow_compact_click_is_the_jerk_law() -> None:
     )
     expected = jerk_coefficient(ball.volume_m3, Air()) * jerk[0, 2] / ball.mass_kg
     assert blow.impulse_n_s[2] == pytest.approx(impulse)
-    assert np.abs(sound).max() == pytest.approx(np.abs(expected).max(), rel=0.05)
-    delay = (np.argmax(sound) / SR) - np.argmax(expected) / (SR * rate)
-    assert delay == pytest.approx(1.0 / C, abs=2 / SR)
+    assert np.abs(sound).max() == pytest.approx(np.abs(expected).max(), rel=0.02)
+    late = np.argmin(sound) / SR - np.argmin(expected) / (SR * rate)
+    print(f"peak {np.abs(sound).max() / np.abs(expected).max():.4f} of the law, {(late - 1.0 / C) * SR:.2f} samples late")
+    assert late == pytest.approx(1.0 / C, abs=2 / SR)
 
 
 def test_a_fast_click_is_kirchhoffs_sphere() -> None:

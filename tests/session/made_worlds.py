@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import Any
 
 import pybullet as p
-
 from made_models import GLASS, STEEL, WOOD, box_model
+
 from sonic_bullet.records import Material, ModalModel
 from sonic_bullet.session import Listener
 

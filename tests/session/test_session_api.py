@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 import pybullet as p
 import pytest
-
-import sonic_bullet as sb
 from made_models import STEEL
 from made_worlds import floor, plate_model, sounding_box
+
+import sonic_bullet as sb
 from sonic_bullet.errors import SceneError
 from sonic_bullet.render.clock import exact_step
 

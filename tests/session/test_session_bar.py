@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pybullet as p
 import pytest
+from made_models import STEEL, ball_body
 
 import sonic_bullet as sb
-from made_models import STEEL, ball_body
 from sonic_bullet.records import ModalModel
 
 LENGTH_M, SIDE_M = 0.24, 0.01

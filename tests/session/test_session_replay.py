@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-
-import sonic_bullet as sb
 from made_models import GLASS, WOOD, ball_body, box_model
 from made_worlds import EDGES_M, ball, box, floor, plate_model, sounding_box
+
+import sonic_bullet as sb
 from sonic_bullet.listener import direct_client, disconnect
 
 SENSORS = (sb.Microphone([0, -1, 0.5]), sb.Microphone([0.7, 0.2, 0.4]), sb.Vibrometer(1, [0.09, 0.04, 0.005], [0, 0, 1]), sb.ModalSum(0.5))
