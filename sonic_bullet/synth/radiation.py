@@ -8,7 +8,7 @@
 On a sphere (a = L/2) the e_j are the harmonics and q_j interpolates -k h_l'(ka)/h_l(ka): exact for l = 0, for every l at k → 0, where it is
 (l+1)/a, and to second order for k → ∞ (1/a + ik). On a wide flat face they are waves, and q = √(κ² - k²) [Cremer et al. 2005, eq. 6.26].
 
-The mean is a product Gauss rule in the body's principal frame: exact while twice the body's radius is below its degree over k.
+The mean is a product Gauss rule in the body's principal frame, exact for bodies small by the wavelength; for large ones 512 directions spread evenly.
 The weight is complex: size the mean over directions, phase that of the direction of the strongest pressure, counted from the instant
 sound leaves the surface on that side. A shape and its negative sound the same.
 v vertices, f faces, m modes, s patches, n directions in pairs ±r̂.
@@ -24,9 +24,10 @@ from sonic_bullet.records import Air, Array, ModalModel
 from sonic_bullet.synth.added_mass import Moved, moved_air
 
 _MODES_AT_ONCE = 32
-MOST_PATCHES = 2500
+MOST_PATCHES = 1800
 MOST_TRIANGLES = 700  # of the near field's mesh
-LEAST_RINGS, MOST_RINGS = 6, 16  # of directions between the poles
+LEAST_RINGS, MOST_RINGS = 6, 12  # of directions between the poles
+SPREAD = 256  # directions, and their negatives, where even the most rings are too few
 
 
 def radiation(model: ModalModel, air: Air) -> tuple[Array, Array]:
@@ -39,7 +40,7 @@ def radiation(model: ModalModel, air: Air) -> tuple[Array, Array]:
     if m == 0 or len(face) == 0:
         return np.zeros(m, complex), np.zeros(m)
     k = 2 * np.pi * model.freq_hz / air.sound_speed_m_s
-    corner, turn = _principal(corner)
+    corner, turn = _principal(corner, (model.shape**2).sum(axis=(1, 2), dtype=float)[face].mean(axis=1))
     twice = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     area = np.linalg.norm(twice, axis=1) / 2
     normal = twice / (2 * area[:, None])
@@ -54,11 +55,11 @@ def radiation(model: ModalModel, air: Air) -> tuple[Array, Array]:
         level = _near_field(k[some], 1 / extent[1], moved, area[:, None] * speed.mean(axis=1), nearest)
         _moments(speed, level, corner, area, normal, patch, place, moment[some])
     point = corner.reshape(-1, 3)
-    rings = np.clip(np.ceil(k * np.linalg.norm(point, axis=1).max()) + 4, LEAST_RINGS, MOST_RINGS).astype(int)
+    rings = np.clip(np.ceil(k * np.linalg.norm(point, axis=1).max()) + 4, LEAST_RINGS, MOST_RINGS + 1).astype(int)
     weight = np.zeros(m, complex)
     for count in np.unique(rings):
         now = np.flatnonzero(rings == count)
-        direction, share = directions(int(count))
+        direction, share = directions(int(count)) if count <= MOST_RINGS else spread_directions(SPREAD)
         ahead, behind = _map(k[now], moment[now], np.ascontiguousarray(place.T), direction)
         pressure = np.concatenate([ahead, behind], axis=1) * (1j * k[now] * air.sound_speed_m_s * air.density_kg_m3 / (4 * np.pi))[:, None]
         both = np.concatenate([direction, -direction])
@@ -82,6 +83,14 @@ def directions(rings: int) -> tuple[Array, Array]:
     return np.ascontiguousarray(vector.reshape(-1, 3)), np.repeat(share / (2 * turns), turns)
 
 
+def spread_directions(count: int) -> tuple[Array, Array]:
+    """As `directions`, spread evenly along a spiral [Swinbank & Purser 2006, eq. 1-3]: no symmetry of a body makes any of them superfluous."""
+    height = (np.arange(count) + 0.5) / count
+    angle = np.pi * (np.sqrt(5) - 1) * np.arange(count)
+    radius = np.sqrt(1 - height**2)
+    return np.stack([radius * np.cos(angle), radius * np.sin(angle), height], axis=1), np.full(count, 0.5 / count)
+
+
 def _sound_faces(model: ModalModel) -> tuple[Array, Array]:
     """Corners (f, 3, 3) and faces (f, 3) that have an area."""
     corner = model.vertex_m[model.face]
@@ -90,13 +99,18 @@ def _sound_faces(model: ModalModel) -> tuple[Array, Array]:
     return corner[keep], model.face[keep]
 
 
-def _principal(corner: Array) -> tuple[Array, Array]:
-    """Corners about the surface's centroid along its principal axes, longest first, and the rows of that frame (3, 3)."""
+def _principal(corner: Array, motion: Array) -> tuple[Array, Array]:
+    """Corners about the surface's centroid along its principal axes, longest first, and the rows of that frame (3, 3).
+
+    Axes point to where there is more motion (f,), summed over modes; where there is as much on both sides their sense does not matter.
+    """
     area = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1)
     centre = corner.mean(axis=1)
     middle = area @ centre / area.sum()
     spread = np.einsum("f,fi,fj->ij", area, centre - middle, centre - middle)
     turn = np.linalg.eigh(np.round(spread * (1e6 / np.trace(spread))))[1][:, ::-1].T  # rounded: equal moments leave the body's own axes
+    skew = (area * motion) @ (centre - middle) @ turn.T
+    turn[skew < 0] *= -1
     turn[2] *= np.sign(np.linalg.det(turn))
     return (corner - middle) @ turn.T, turn
 
@@ -138,7 +152,7 @@ def _near_mesh(corner: Array, area: Array, normal: Array) -> tuple[Array, Array]
         size = np.bincount(cell)
         middle = np.stack([np.bincount(cell, point[:, i]) / size for i in range(3)], axis=1)
         way = np.stack([np.bincount(cell, outward[:, i]) for i in range(3)], axis=1)
-        way /= np.maximum(np.linalg.norm(way, axis=1), 1e-300)[:, None]
+        way = way / np.maximum(np.linalg.norm(way, axis=1), 1e-300)[:, None]
         reach = np.zeros(len(middle))
         np.maximum.at(reach, cell, ((point - middle[cell]) * way[cell]).sum(axis=1))
         middle += reach[:, None] * way  # else edges are planed off
@@ -166,8 +180,8 @@ def _near_field(k: Array, curved_per_m: float, moved: Moved, flow: Array, neares
     curved = np.minimum(curved_per_m, 0.5 / moved.length_m)[:, None]
     across = (1 / moved.length_m[:, None] - curved) ** 2 - curved**2
     q = curved + np.sqrt(across + (curved + 1j * k) ** 2)
-    share = np.asarray(moved.vector.T @ speed)
-    return np.asarray((moved.vector @ (share / q) / np.sqrt(moved.area_m2)[:, None])[nearest])
+    share: Array = moved.vector.T @ speed
+    return np.asarray((moved.vector @ np.divide(share, q) / np.sqrt(moved.area_m2)[:, None])[nearest])
 
 
 def _moments(speed: Array, level: Array, corner: Array, area: Array, normal: Array, patch: Array, place: Array, out: Array) -> None:
@@ -197,7 +211,7 @@ def _map(k, moment, place, direction):
             a, b, c, d, e, f = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
             for s in range(place.shape[1]):
                 turns = half * (place[0, s] * x + place[1, s] * y + place[2, s] * z)
-                t = np.pi * (turns - np.floor(turns + 0.5))
+                t = np.pi * (turns - (np.int32(turns + 1048576.5) - 1048576.0))
                 u = t * t
                 # sine and cosine of half the angle, |t| ≤ π/2: Taylor to 1e-9, without calls so that it runs in vectors
                 sn = t * (1 + u * (-1 / 6 + u * (1 / 120 + u * (-1 / 5040 + u * (1 / 362880 + u * (-1 / 39916800 + u / 6227020800))))))

@@ -7,7 +7,8 @@ import pytest
 from scipy.special import spherical_jn, spherical_yn
 
 from sonic_bullet.records import Air, Array, ModalModel
-from sonic_bullet.synth.radiation import jerk_coefficient, radiation
+from sonic_bullet.synth.added_mass import moved_air
+from sonic_bullet.synth.radiation import directions, jerk_coefficient, radiation, spread_directions
 
 AIR = Air()
 RHO_C = AIR.density_kg_m3 * AIR.sound_speed_m_s
@@ -105,10 +106,10 @@ def test_orders_at_low_frequency_are_two_four_and_six(motion: str, order: int) -
 
 
 def test_high_above_all_waves_of_the_body_it_radiates_as_a_plane_wave() -> None:
-    vertex, face = box((0.4, 0.4, 0.01))
+    vertex, face = box((0.4, 0.4, 0.01), (16, 16, 1))
     shape = np.zeros((len(vertex), 3, 1))
     shape[:, 2, 0] = np.cos(np.pi * vertex[:, 0] / 0.4)
-    assert efficiency(shape, vertex, face, np.array([20.0])) == pytest.approx([1.0], rel=0.15)
+    assert efficiency(shape, vertex, face, np.array([8.0])) == pytest.approx([1.0], rel=0.2)
 
 
 def test_a_disc_that_shifts_has_the_air_of_lamb() -> None:
@@ -159,7 +160,7 @@ def test_turning_the_body_changes_nothing_and_a_negative_shape_sounds_the_same()
     turned = ModalModel(
         case.freq_hz, case.decay_per_s, np.einsum("ij,vjm->vim", turn, case.shape), case.vertex_m @ turn.T, case.face, case.curvature_per_m, 1.0, 1.0
     )
-    assert radiation(turned, AIR)[0] == pytest.approx(radiation(case, AIR)[0], rel=1e-5)  # shapes are stored in single precision
+    assert radiation(turned, AIR)[0] == pytest.approx(radiation(case, AIR)[0], rel=1e-4)  # shapes are stored in single precision
     negative = ModalModel(case.freq_hz, case.decay_per_s, -case.shape, case.vertex_m, case.face, case.curvature_per_m, 1.0, 1.0)
     assert radiation(negative, AIR)[0] == pytest.approx(-radiation(case, AIR)[0], rel=1e-12)
 
@@ -170,6 +171,59 @@ def test_a_body_twice_as_large_radiates_as_scaling_says() -> None:
     large = ModalModel(case.freq_hz / 2, case.decay_per_s, case.shape * 2**-1.5, case.vertex_m * 2, case.face, case.curvature_per_m, 1.0, 1.0)
     for got, was, power in zip(radiation(large, AIR), radiation(case, AIR), (-0.5, -1.0), strict=True):
         assert got == pytest.approx(was * 2.0**power, rel=1e-5)
+
+
+def test_denser_and_faster_air() -> None:
+    """At the same k all pressures per velocity go as ρ₀c: the same body in air twice as dense, and with frequencies and c doubled."""
+    case = random_case(3)
+    dense = Air(2.4, AIR.sound_speed_m_s)
+    assert radiation(case, dense)[0] == pytest.approx(2 * radiation(case, AIR)[0], rel=1e-9)
+    assert radiation(case, dense)[1] == pytest.approx(2 * radiation(case, AIR)[1], rel=1e-9)
+    quick = model(case.vertex_m, case.face, case.shape, 2 * case.freq_hz)
+    assert radiation(quick, Air(1.2, 2 * AIR.sound_speed_m_s))[0] == pytest.approx(2 * radiation(case, AIR)[0], rel=1e-9)
+
+
+def test_moved_air_of_a_sphere_and_of_a_thin_disc() -> None:
+    """Eigenvalues a/(l+1), 2l + 1 times each; a disc's added mass 8/3 ρa³ [Lamb 1932, art. 102]."""
+    vertex, face = icosphere(2)
+    moved = moved_air(0.5 * vertex[face])
+    assert moved.length_m[::-1][:9] == pytest.approx(np.repeat([0.5, 0.25, 0.5 / 3], [1, 3, 5]), rel=0.08)
+    ring = np.linspace(0, 1, 9)[1:]
+    angle = 2 * np.pi * np.arange(24) / 24
+    flat = np.concatenate([[[0, 0]], (ring[:, None, None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)).reshape(-1, 2)])
+    fan = [(0, 1 + i, 1 + (i + 1) % 24) for i in range(24)]
+    band = [(1 + 24 * r + i, 25 + 24 * r + i, 25 + 24 * r + (i + 1) % 24) for r in range(7) for i in range(24)]
+    band += [(1 + 24 * r + i, 25 + 24 * r + (i + 1) % 24, 1 + 24 * r + (i + 1) % 24) for r in range(7) for i in range(24)]
+    top = np.array(fan + band)
+    n = len(flat)
+    rim = [t for i in range(169, 193) for j in [169 + (i - 168) % 24] for t in ((n + i, n + j, j), (n + i, j, i))]
+    vertex = np.concatenate([np.column_stack([flat, np.full(n, 0.005)]), np.column_stack([flat, np.full(n, -0.005)])])
+    face = np.concatenate([top, n + top[:, ::-1], rim])
+    moved = moved_air(vertex[face])
+    normal = np.cross(vertex[face][:, 1] - vertex[face][:, 0], vertex[face][:, 2] - vertex[face][:, 0])
+    speed = normal[:, 2] / np.linalg.norm(normal, axis=1) * np.sqrt(moved.area_m2)
+    assert moved.length_m @ (moved.vector.T @ speed) ** 2 == pytest.approx(8 / 3, rel=0.12)
+
+
+def test_directions_integrate_polynomials() -> None:
+    """<x⁴> = 1/5, <x²y²z²> = 1/105, <1> = 1, over the directions and their negatives."""
+    for vector, share, tolerance in ((*directions(6), 1e-12), (*directions(11), 1e-12), (*spread_directions(256), 1e-2)):
+        assert np.linalg.norm(vector, axis=1) == pytest.approx(np.ones(len(vector)))
+        assert 2 * share.sum() == pytest.approx(1)
+        assert 2 * share @ vector**4 == pytest.approx(np.full(3, 0.2), rel=tolerance)
+        assert 2 * share @ np.prod(vector**2, axis=1) == pytest.approx(1 / 105, rel=tolerance)
+
+
+def test_a_fine_mesh_is_gathered_without_changing_what_is_heard() -> None:
+    """A bent plate of 480 triangles, nothing gathered, and of 5168: the same within 2 dB."""
+    level = []
+    for cells in ((10, 10, 1), (34, 34, 2)):
+        vertex, face = box((0.2, 0.2, 0.004), cells)
+        shape = np.zeros((len(vertex), 3, 2))
+        shape[:, 2, 0] = vertex[:, 0] ** 2 - vertex[:, 1] ** 2
+        shape[:, 2, 1] = np.cos(np.pi * vertex[:, 0] / 0.1) + np.cos(np.pi * vertex[:, 1] / 0.1)
+        level.append(20 * np.log10(np.abs(radiation(model(vertex, face, shape, np.array([480.0, 1500.0])), AIR)[0])))
+    assert level[1] == pytest.approx(level[0], abs=2)
 
 
 def test_power_radiated_is_what_the_damping_takes() -> None:
