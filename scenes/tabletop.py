@@ -35,7 +35,7 @@ def build(client):
     place("porcelain", VOLUME_M3["plate"], mesh("plate"), [-0.18, 0.08, 0.16], (0.25, 0.1, 0))
     place("steel", VOLUME_M3["bowl"], mesh("bowl"), [0.2, 0.1, 0.22], (0.5, 0.2, 0))
     place("glass", VOLUME_M3["tumbler"], mesh("tumbler"), [0.02, 0.05, 0.052])
-    place("steel", 4 / 3 * math.pi * ball**3, sphere, [-0.4, -0.12, ball], velocity=(0.8, 0, 0), spin=(0, 0.8 / ball, 0))
+    place("steel", 4 / 3 * math.pi * ball**3, sphere, [-0.4, -0.12, ball], velocity=(0.5, 0, 0), spin=(0, 0.5 / ball, 0))
     place("wood", 8 * math.prod(block), client.createCollisionShape(client.GEOM_BOX, halfExtents=block), [0.38, 0.05, 0.02], velocity=(-1.6, 0, 0))
     place(
         "steel",
@@ -53,5 +53,5 @@ def build(client):
     client.changeDynamics(toy, -1, mass=700 * 86.9e-6, localInertiaDiagonal=[6e-5, 4e-5, 8e-5])  # the file says 1 kg·m²
     cast[toy] = "wood"
     for body in cast:
-        client.changeDynamics(body, -1, restitution=0.75, lateralFriction=0.5, rollingFriction=2e-5, spinningFriction=2e-5, contactProcessingThreshold=0)
+        client.changeDynamics(body, -1, restitution=0.75, lateralFriction=0.5, rollingFriction=1e-4, spinningFriction=2e-5, contactProcessingThreshold=0)
     return cast
