@@ -144,9 +144,19 @@ class Listener:
             shapes = tuple(mesh)
         if model is None:
             clamps = tuple((float(x), float(y), float(z), float(r)) for x, y, z, r in fixed)
-            model = modal.analyse(shapes, material, to_hz=to_hz, count=count, fixed=clamps, thickness_m=thickness_m)
+            model = self._shared(modal.analyse(shapes, material, to_hz=to_hz, count=count, fixed=clamps, thickness_m=thickness_m))
         self.world.add(body, link, material=material, model=model, shapes=shapes)
         return model
+
+    def _shared(self, model: ModalModel) -> ModalModel:
+        """The model itself, or the same one that a body has already: equal bodies then share memory and what is derived from it."""
+        same = (
+            body.model
+            for body in self.world.bodies
+            if body.model is not None
+            and all(np.array_equal(getattr(body.model, name), getattr(model, name)) for name in ("freq_hz", "decay_per_s", "vertex_m", "face", "shape"))
+        )
+        return next(same, model)
 
     def step(self) -> Array:
         """Take in the physics step just made; returns `frame`. Called by the hook of a `BulletClient`, by hand otherwise.

@@ -12,6 +12,7 @@ whose coefficient K makes ρ₀ca = 2Kw²; unlike it, it does not grow without b
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numba import njit
@@ -68,7 +69,7 @@ def weight_sets(sensors: tuple[Sensor, ...]) -> tuple[Sensor, ...]:
 def build_sounder(body: Body, sensors: tuple[Sensor, ...], sr: int, air: Air) -> Sounder:
     """Prepare one body. Modes at or above sr/2 and overdamped ones are dropped and counted.
 
-    The pressure weight of mode and microphone is the compact law of `synth.radiation`; a vibrometer reads (φ(q)·n); the
+    The pressure weight of mode and microphone is the far-field map of `synth.radiation`; a vibrometer reads (φ(q)·n); the
     seed's plain sum reads a·sin(ωt) for each mode [Ren et al. 2013, eq. 13], hence the turn by -i/(1 + i d/ω).
     """
     model = body.model
@@ -78,7 +79,7 @@ def build_sounder(body: Body, sensors: tuple[Sensor, ...], sr: int, air: Air) ->
         return Sounder(
             body, none, none, np.zeros((1 + len(readers), 0), complex), np.zeros((0, 3, 0), np.float32), None, np.zeros((0, 3)), _size(body), 0.0, None, 0
         )
-    pressure, extra = radiation(model, air)
+    pressure, extra = _radiation(model, air)
     omega0_squared = model.omega0_squared_per_s2
     decay = np.nan_to_num(model.decay_per_s) + extra
     omega = np.sqrt(np.maximum(omega0_squared - decay**2, 0.0))
@@ -100,6 +101,12 @@ def build_sounder(body: Body, sensors: tuple[Sensor, ...], sr: int, air: Air) ->
     radius = float(np.linalg.norm(model.vertex_m, axis=1).max(initial=0.0))
     dropped = model.dropped + int(np.sum(~keep))
     return Sounder(body, omega, decay, weight, shape, index, normal, _size(body), radius, _rigid(body, 1 + len(readers), sr, air), dropped)
+
+
+@lru_cache(maxsize=64)
+def _radiation(model: ModalModel, air: Air) -> tuple[Array, Array]:
+    """`synth.radiation`, once for bodies that share a model (models are compared by identity): it takes a second or two."""
+    return radiation(model, air)
 
 
 def _rigid(body: Body, sets: int, sr: int, air: Air) -> ModeSet | None:
