@@ -66,7 +66,8 @@ def square_bar_torsion_hz(length_m: float, side_m: float, youngs_pa: float, pois
 def free_square_plate_hz(side_m: float, thickness_m: float, youngs_pa: float, density_kg_m3: float) -> Array:
     """First ten frequencies (10,) of a thin free square plate of Poisson's ratio 0.3."""
     bending = youngs_pa * thickness_m**3 / (12 * (1 - 0.3**2))
-    return np.asarray(FREE_SQUARE_PLATE, float) / (2 * np.pi * side_m**2) * np.sqrt(bending / (density_kg_m3 * thickness_m))
+    hz: Array = np.array(FREE_SQUARE_PLATE) / (2 * np.pi * side_m**2) * np.sqrt(bending / (density_kg_m3 * thickness_m))
+    return hz
 
 
 def sphere_multiplets_hz(radius_m: float, youngs_pa: float, poisson: float, density_kg_m3: float, count: int) -> list[tuple[float, int, str]]:

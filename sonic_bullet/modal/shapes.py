@@ -25,6 +25,7 @@ THIN_DOF, CHUNKY_DOF = 26_000, 10_000  # unknowns by default: a plate's factor s
 DOF_PER_TET = 5.6  # measured on fTetWild's meshes of bars, slabs and bowls
 MOST_TETS = 8_000
 FILL_LIMIT_S = 45.0
+ENVELOPE_OF_EDGE = 0.05  # a finer surface than its elements costs time and tells nothing
 ENVELOPE = (0.04, 0.006)  # of the thickness and of the diagonal: how far fTetWild may move the surface, the lesser counts
 
 
@@ -155,7 +156,7 @@ def _meshed(skin: Skin, edge_m: float | None, say: Callable[[str], None]) -> Sol
         if prism is not None:
             return Solid(prism.node_m, prism.tet, note=prism.note + skin.note)
     edge = edge_m if edge_m is not None else _edge_m(geometry.volume_m3(vertex, face), thickness, budget)
-    envelope = min(ENVELOPE[0] * thickness, ENVELOPE[1] * diagonal)
+    envelope = max(min(ENVELOPE[0] * thickness, ENVELOPE[1] * diagonal), ENVELOPE_OF_EDGE * edge)
     deadline = time.monotonic() + FILL_LIMIT_S
     say(f"filling {len(face)} triangles with tetrahedra of {edge:.3g} m")
     failure = MeshError(f"mesh needs more than {MOST_TETS} tetrahedra", "give a larger edge_m or a simpler mesh")

@@ -17,7 +17,7 @@ from functools import lru_cache
 import numpy as np
 from numba import njit
 
-from sonic_bullet.records import Air, Array, Body, Microphone, ModalSum, Sensor, Vibrometer
+from sonic_bullet.records import Air, Array, Body, Microphone, ModalModel, ModalSum, Sensor, Vibrometer
 from sonic_bullet.surface_index import SurfaceIndex, nearest, surface_index
 from sonic_bullet.synth.bank import ModeSet, audible
 from sonic_bullet.synth.radiation import jerk_coefficient, radiation

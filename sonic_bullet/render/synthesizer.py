@@ -153,13 +153,13 @@ def _strikes(blow: Blow, step_start_s: float, sounders: tuple[Sounder, ...], sr:
     offset_s, spacing_s, weight = pulse_nodes(blow.length_s, sr, flat=blow.flat)
     start = max((step_start_s + blow.start_s) * sr, float(earliest))
     strikes = []
-    for body, modes, push in ((blow.low, blow.modes_low, blow.impulse_n_s), (blow.high, blow.modes_high, -blow.impulse_n_s)):
+    for body, modes, shove in ((blow.low, blow.modes_low, blow.impulse_n_s), (blow.high, blow.modes_high, -blow.impulse_n_s)):
         if modes.any():
             strikes.append(bank.Strike(4 * body, start + offset_s * sr, spacing_s * sr, weight, modes))
         rigid = sounders[body].rigid
         if rigid is not None:
             cells = pulse_cells(start, blow.length_s, sr, int(np.ceil(CELLS_PER_RADIAN * rigid.decay_per_s[0] / sr)), flat=blow.flat)
-            strikes += [bank.Strike(4 * body + 1 + axis, *cells, push[axis : axis + 1], even=True) for axis in np.flatnonzero(push)]
+            strikes += [bank.Strike(4 * body + 1 + axis, *cells, shove[axis : axis + 1], even=True) for axis in np.flatnonzero(shove)]
     return strikes
 
 
