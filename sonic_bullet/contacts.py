@@ -113,7 +113,7 @@ class ContactLog:
     sensors: tuple[Sensor, ...]
     sr: int
     seed: int
-    air: Air = Air()
+    air: Air = field(default_factory=Air)
 
     def __post_init__(self) -> None:
         for step in self.steps:
