@@ -23,7 +23,7 @@ from sonic_bullet.records import Array, Shape
 
 THIN_DOF, CHUNKY_DOF = 26_000, 10_000  # unknowns by default: a plate's factor stays sparse, a ball's does not
 DOF_PER_TET = 5.6  # measured on fTetWild's meshes of bars, slabs and bowls
-MOST_TETS = 8_000
+MOST_TETS = 7_000
 FILL_LIMIT_S = 45.0
 ENVELOPE_OF_EDGE = 0.05  # a finer surface than its elements costs time and tells nothing
 ENVELOPE = (0.04, 0.006)  # of the thickness and of the diagonal: how far fTetWild may move the surface, the lesser counts
@@ -133,7 +133,10 @@ def _soup(shapes: tuple[Shape, ...]) -> tuple[Array, Array]:
 
 
 def _edge_m(volume_m3: float, thickness_m: float, budget: int) -> float:
-    """Edge that keeps fTetWild within the budget of unknowns: tetrahedra ≈ 9 V/e³ + 2 A/e² (fitted to its meshes), A = 2V/thickness."""
+    """Edge that keeps fTetWild within the budget of unknowns: tetrahedra ≈ 9 V/e³ + 2 A/e², A = 2V/thickness.
+
+    Fitted to its meshes of slabs and bowls; lumps come out twice as fine, so they are asked for less.
+    """
     edges = thickness_m * np.geomspace(0.4, 20, 200)
     tets = 9 * volume_m3 / edges**3 + 4 * volume_m3 / thickness_m / edges**2
     return float(edges[min(199, int((tets * DOF_PER_TET > budget).sum()))])
@@ -155,7 +158,7 @@ def _meshed(skin: Skin, edge_m: float | None, say: Callable[[str], None]) -> Sol
         prism = prisms.as_prism(vertex, face, edge_m, budget)
         if prism is not None:
             return Solid(prism.node_m, prism.tet, note=prism.note + skin.note)
-    edge = edge_m if edge_m is not None else _edge_m(geometry.volume_m3(vertex, face), thickness, budget)
+    edge = edge_m if edge_m is not None else _edge_m(geometry.volume_m3(vertex, face), thickness, int(budget * (1 - 0.6 * chunkiness(thickness, diagonal))))
     envelope = max(min(ENVELOPE[0] * thickness, ENVELOPE[1] * diagonal), ENVELOPE_OF_EDGE * edge)
     deadline = time.monotonic() + FILL_LIMIT_S
     say(f"filling {len(face)} triangles with tetrahedra of {edge:.3g} m")
