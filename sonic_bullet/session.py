@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet.contacts import ContactLog, Step
-from sonic_bullet.errors import MaterialError, SceneError
+from sonic_bullet.errors import MaterialError, RecordError, SceneError
 from sonic_bullet.files import AudioReport, check_sr, write_audio
 from sonic_bullet.records import Air, Array, Material, Microphone, ModalModel, ModalSum, Sensor, Shape, Vibrometer
 from sonic_bullet.render import LATENCY_STEPS, Synthesizer
@@ -33,10 +33,14 @@ def as_sensors(microphone: MicrophoneLike) -> tuple[Sensor, ...]:
     """
     if isinstance(microphone, (Microphone, Vibrometer, ModalSum)):
         return (microphone,)
-    items = list(microphone)
+    items = list(microphone) if isinstance(microphone, (Sequence, np.ndarray)) else [microphone]
     if items and all(isinstance(item, (Microphone, Vibrometer, ModalSum)) for item in items):
         return tuple(items)
-    return tuple(Microphone(point) for point in np.atleast_2d(np.asarray(microphone, dtype=float)))
+    try:
+        points = np.atleast_2d(np.asarray(microphone, dtype=float))
+    except (TypeError, ValueError):
+        raise RecordError(f"microphone {microphone!r} is no place", "give x, y, z in m, several such points, or sensors") from None
+    return tuple(Microphone(point) for point in points)
 
 
 def as_material(material: str | Path | Material) -> Material:

@@ -21,7 +21,7 @@ from sonic_bullet.render.manifold import STEEPEST, Rows, group_sum, modal_pushes
 from sonic_bullet.render.rotation import matrix
 from sonic_bullet.render.sounder import Sounder
 from sonic_bullet.synth.pulse import contact_modulus_pa, contact_time_s, effective_mass_kg
-from sonic_bullet.synth.strikes import Split, accepted_impulse, causing_approach_m_s, key_bodies, supported_bodies
+from sonic_bullet.synth.strikes import Split, accepted_impulse, causing_approach_m_s, key_bodies, unheld_steps
 
 STRUCK_FLAT = 0.02
 """Radius, as a share of the smaller body's size, of the least area that a nearly flat blow touches."""
@@ -71,8 +71,8 @@ def _gather(split: Split, oriented: Sequence[Rows]) -> tuple[Rows, Array, Array]
     return Rows.joined(parts).take(order), strike[order], np.concatenate(delays)[order]
 
 
-def find_blows(split: Split, oriented: Sequence[Rows], step: Step, sounders: tuple[Sounder, ...], earliest_s: float) -> tuple[Blow, ...]:
-    """The strikes that the rows of ``step`` begin; oriented: the rows of that step and of the known ones after it.
+def find_blows(split: Split, oriented: Sequence[Rows], step: Step, sounders: tuple[Sounder, ...], placed: Array, earliest_s: float) -> tuple[Blow, ...]:
+    """The strikes that the rows of ``step`` begin; oriented: the rows of that step and of the known ones after it. placed (bodies,): just put there.
 
     earliest_s: not after 0; a strike is dated back that far at most, where the bodies overlap as the step starts.
     Pairs of which nothing can sound (no modes, no moving volume) are passed over, and those of which neither moves (links without mass).
@@ -94,7 +94,7 @@ def find_blows(split: Split, oriented: Sequence[Rows], step: Step, sounders: tup
     approach = np.zeros(count)
     np.maximum.at(approach, strike, rows.approach_m_s)
     mobile = np.array([body.mass_kg > 0 for body in bodies])
-    caused = causing_approach_m_s(approach, low, high, normal, supported_bodies(split, mobile), step.gravity_m_s2 * step.dt_s)
+    caused = causing_approach_m_s(approach, low, high, normal, unheld_steps(split, mobile, placed), step.gravity_m_s2 * step.dt_s)
     accepted = accepted_impulse(raw, 2.0 * mass * caused, low, high, mobile)
     impulse = group_sum(strike, rows.impulse_n_s, count)
     audible = np.array([_can_sound(sounders[i]) or _can_sound(sounders[j]) for i, j in zip(low, high, strict=True)])

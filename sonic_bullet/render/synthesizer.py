@@ -27,7 +27,7 @@ from sonic_bullet.synth import bank, path
 from sonic_bullet.synth.bank import Bank, BankState
 from sonic_bullet.synth.path import Path, PathState
 from sonic_bullet.synth.pulse import pulse_cells, pulse_nodes
-from sonic_bullet.synth.strikes import LOOKAHEAD, LoadHistory, push, split
+from sonic_bullet.synth.strikes import LOOKAHEAD, SPAN, LoadHistory, push, split
 
 LATENCY_STEPS = LOOKAHEAD
 CELLS_PER_RADIAN = 4.0
@@ -51,7 +51,9 @@ class Setup:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class State:
-    """All that the next frame hangs on. number: of the step to be rendered next; window: that step and those known after it, rows: their contacts."""
+    """All that the next frame hangs on. number: of the step to be rendered next; window: that step and those known after it, rows: their contacts.
+    placed (b,): step in which each body began or was last moved by hand.
+    """
 
     number: int
     clock: Clock
@@ -64,13 +66,14 @@ class State:
     path: Path
     travelling: PathState
     rubbing: Rubbing
+    placed: Array
 
 
 def start(setup: Setup) -> State:
     """Silence at time 0, nobody there."""
     instrument, ringing = bank.empty_bank(setup.sr, 1 + len(weight_sets(setup.sensors)))
     air, travelling = path.empty_path(setup.sr, setup.air, setup.microphone_m)
-    return State(0, Clock(), (), (), LoadHistory.empty(), (), instrument, ringing, air, travelling, Rubbing.none())
+    return State(0, Clock(), (), (), LoadHistory.empty(), (), instrument, ringing, air, travelling, Rubbing.none(), np.zeros(0, np.int64))
 
 
 def with_bodies(setup: Setup, state: State, bodies: Sequence[Body]) -> State:
@@ -81,7 +84,9 @@ def with_bodies(setup: Setup, state: State, bodies: Sequence[Body]) -> State:
     modes = [part for s in new for part in (bank.ModeSet(s.omega_rad_s, s.decay_per_s, s.weight), *((s.rigid or _nothing(setup),) * 3))]
     instrument, ringing = bank.append(state.bank, state.ringing, modes)
     air, travelling = path.append_bodies(state.path, state.travelling, *_places(new))
-    return replace(state, sounders=state.sounders + new, bank=instrument, ringing=ringing, path=air, travelling=travelling)
+    # a silent partner's record begins where it first touches, not where it was put
+    placed = np.concatenate([state.placed, [body.since_step if body.material is not None else -SPAN for body in bodies]]).astype(np.int64)
+    return replace(state, placed=placed, sounders=state.sounders + new, bank=instrument, ringing=ringing, path=air, travelling=travelling)
 
 
 def _places(sounders: tuple[Sounder, ...]) -> tuple[Array, Array]:
@@ -137,15 +142,18 @@ def _render(setup: Setup, state: State) -> tuple[Array, State]:
     after = clock.after(step.dt_s)
     count = after.sample(sr) - clock.sample(sr)
     x = clock.progress(step.dt_s, sr, count)
+    placed = state.placed.copy()
+    moved = np.flatnonzero(window[1].teleported)
+    placed[moved] = state.number + 1
     parts, loads = split(state.loads, ahead=0)  # of the first step, and what was not sure a step ago
-    blows = [(float(clock.time_s), blow) for blow in find_blows(parts, rows, step, sounders, 0.0)]
+    blows = [(float(clock.time_s), blow) for blow in find_blows(parts, rows, step, sounders, state.number - placed < SPAN, 0.0)]
     parts, loads = split(loads)
-    blows += [(float(after.time_s), blow) for blow in find_blows(parts, rows[1:], window[1], sounders, -step.dt_s)]
+    blows += [(float(after.time_s), blow) for blow in find_blows(parts, rows[1:], window[1], sounders, state.number + 1 - placed < SPAN, -step.dt_s)]
     drives, rubbing = advance_rubbing(state.rubbing, parts, step, window[1], rows[1], sounders, x, sr, setup.seed)
     strikes = [strike for begin_s, blow in blows for strike in _strikes(blow, begin_s, sounders, sr, clock.sample(sr))]
     sound = bank.advance(state.bank, state.ringing, count, strikes, _forces(drives, sounders, x), x)
     frame = _at_sensors(setup, state, sound, x)
-    return frame, replace(state, number=state.number + 1, clock=after, loads=loads, rubbing=rubbing)
+    return frame, replace(state, number=state.number + 1, clock=after, loads=loads, rubbing=rubbing, placed=placed)
 
 
 def _strikes(blow: Blow, step_start_s: float, sounders: tuple[Sounder, ...], sr: int, earliest: int) -> list[bank.Strike]:

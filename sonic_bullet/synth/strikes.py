@@ -123,21 +123,23 @@ def split(history: LoadHistory, ahead: int = 1) -> tuple[Split, LoadHistory]:
     return Split(history.key, opening[:, :2], strike, share, loaded), LoadHistory(history.key, force, struck)
 
 
-def causing_approach_m_s(approach_m_s: Array, a: Array, b: Array, normal: Array, supported: Array, fall_m_s: Array) -> Array:
-    """Approach speed (q,) that can cause a blow. normal (q, 3) of the pairs with bodies a, b (q,); supported (bodies,): mobile bodies that
-    carried load a moment ago; fall_m_s (3,): the velocity that gravity gives in one step. A tenth is added for what a solver leaves over, and a
+def causing_approach_m_s(approach_m_s: Array, a: Array, b: Array, normal: Array, steps: Array, fall_m_s: Array) -> Array:
+    """Approach speed (q,) that can cause a blow. normal (q, 3) of the pairs with bodies a, b (q,); steps (bodies,): for how many steps
+    gravity may have moved each without its falling (`unheld_steps`); fall_m_s (3,): the velocity that it gives in one. A tenth is added for what a solver leaves over, and a
     hundredth of the whole in every direction: wedged bodies turn a little of it sideways (a settled pile creeps at 0.1 mm/s, 0.003 g·dt).
     """
-    resting = supported[a] | supported[b]
-    return np.asarray(np.maximum(approach_m_s - np.where(resting, 1.1 * np.abs(normal @ fall_m_s) + 0.01 * np.linalg.norm(fall_m_s), 0.0), 0.0))
+    fall = 1.1 * np.abs(normal @ fall_m_s) + 0.01 * np.linalg.norm(fall_m_s)
+    return np.asarray(np.maximum(approach_m_s - np.maximum(steps[a], steps[b]) * fall, 0.0))
 
 
-def supported_bodies(split_: Split, mobile: Array) -> Array:
-    """(bodies,) whether each mobile body carried load on any pair within the last steps."""
+def unheld_steps(split_: Split, mobile: Array, placed: Array) -> Array:
+    """(bodies,) steps for which gravity may have moved each mobile body although it rests: 1 where it carried load on any pair within the last
+    steps, SPAN where it was just put where it is (placed): Bullet finds the corners on which a box stands one a step, and it tilts meanwhile.
+    """
     low, high = key_bodies(split_.key[split_.loaded])
-    out = np.zeros(len(mobile), bool)
-    out[low] = out[high] = True
-    return out & mobile
+    out = np.zeros(len(mobile))
+    out[low] = out[high] = 1.0
+    return np.asarray(np.where(placed, float(SPAN), out) * mobile)
 
 
 def accepted_impulse(raw_n_s: Array, budget_n_s: Array, a: Array, b: Array, mobile: Array, rounds: int = 8) -> Array:

@@ -74,8 +74,8 @@ def pile() -> Any:
     begun: list[tuple[int, int, float]] = []
     real = synthesizer.find_blows
 
-    def listening(split: Any, rows: Any, step: Any, sounders: Any, earliest: float) -> Any:
-        blows = real(split, rows, step, sounders, earliest)
+    def listening(split: Any, rows: Any, step: Any, sounders: Any, placed: Any, earliest: float) -> Any:
+        blows = real(split, rows, step, sounders, placed, earliest)
         number = len(listener.contacts.steps) - 4 + (earliest < 0)
         begun.extend((number, (blow.low << 16) | blow.high, float(np.linalg.norm(blow.impulse_n_s))) for blow in blows)
         return blows

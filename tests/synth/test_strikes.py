@@ -16,7 +16,7 @@ from sonic_bullet.synth.strikes import (
     pair_key,
     push,
     split,
-    supported_bodies,
+    unheld_steps,
 )
 
 DT = 1 / 240
@@ -186,11 +186,13 @@ def test_the_largest_neighbour_counts_and_not_the_sum() -> None:
 
 def test_what_gravity_gives_in_one_step_is_no_cause_for_what_rests() -> None:
     up, fall = np.array([[0.0, 0.0, 1.0]]), np.array([0, 0, -9.81]) * DT
-    resting, free = np.array([True, False]), np.array([False, False])
+    resting, free, placed = np.array([1.0, 0]), np.array([0.0, 0]), np.array([4.0, 0])
     low, high = np.array([0]), np.array([1])
     speed = 9.81 * DT
     assert causing_approach_m_s(np.array([speed]), low, high, up, resting, fall)[0] == 0
     assert causing_approach_m_s(np.array([speed]), low, high, up, free, fall)[0] == pytest.approx(speed)
+    assert causing_approach_m_s(np.array([3.9 * speed]), low, high, up, placed, fall)[0] == 0
+    assert causing_approach_m_s(np.array([1.0]), low, high, up, placed, fall)[0] > 0.8
     sideways = np.array([[1.0, 0.0, 0.0]])  # a wall: gravity approaches nothing there
     assert causing_approach_m_s(np.array([speed]), low, high, sideways, resting, fall)[0] == pytest.approx(speed, rel=0.011)
     assert causing_approach_m_s(np.array([1e-4]), low, high, up, resting, np.zeros(3))[0] == pytest.approx(1e-4)
@@ -203,4 +205,6 @@ def test_supported_are_mobile_bodies_that_carried_load() -> None:
     for _ in range(LOOKAHEAD):
         history = push(history, contacts({(1, 2): 2.0}), DT)
     parts, _ = split(history)
-    assert supported_bodies(parts, np.array([False, True, True])).tolist() == [False, True, False]
+    mobile = np.array([False, True, True])
+    assert unheld_steps(parts, mobile, np.zeros(3, bool)).tolist() == [0, 1, 0]
+    assert unheld_steps(parts, mobile, np.ones(3, bool)).tolist() == [0, SPAN, SPAN]
