@@ -117,7 +117,7 @@ def _rigid(body: Body, sets: int, sr: int, air: Air) -> ModeSet | None:
     rate = min(air.sound_speed_m_s / radius, FASTEST_RIGID * np.pi * sr)
     weight = np.zeros((sets, 1), complex)
     weight[0] = 2 * jerk_coefficient(body.volume_m3, air) * rate**2 / body.mass_kg
-    return ModeSet(np.array([rate]), np.array([rate]), weight)
+    return ModeSet(np.array([rate]), np.array([rate]), weight, held=True)
 
 
 def _size(body: Body) -> float:

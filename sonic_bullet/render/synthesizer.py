@@ -167,7 +167,7 @@ def _strikes(blow: Blow, step_start_s: float, sounders: tuple[Sounder, ...], sr:
         rigid = sounders[body].rigid
         if rigid is not None:
             cells = pulse_cells(start, blow.length_s, sr, int(np.ceil(CELLS_PER_RADIAN * rigid.decay_per_s[0] / sr)), flat=blow.flat)
-            strikes += [bank.Strike(4 * body + 1 + axis, *cells, shove[axis : axis + 1], even=True) for axis in np.flatnonzero(shove)]
+            strikes += [bank.Strike(4 * body + 1 + int(axis), *cells, shove[axis : axis + 1]) for axis in np.flatnonzero(shove)]
     return strikes
 
 

@@ -38,11 +38,16 @@ SLOWEST_TURN = 1e-3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ModeSet:
-    """One body's modes for the bank: omega_rad_s (m,) of the damped modes, decay_per_s (m,), weight (W, m) complex. All `audible`."""
+    """One body's modes for the bank: omega_rad_s (m,) of the damped modes, decay_per_s (m,), weight (W, m) complex. All `audible`.
+
+    held: forces act evenly over the sample before each instant, (e^s - 1)/s, and strikes' impulses over their spacing, not at once: for modes
+    that are gone within a few samples, of which a slow force must leave its slope alone.
+    """
 
     omega_rad_s: Array
     decay_per_s: Array
     weight: Array
+    held: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,7 +68,8 @@ class Bank:
     """The instrument. offset (b+1,): segments of the flat arrays (whole groups of 8 lanes); count (b,): modes in each.
 
     log_pole (2·modes,): s/sr, real parts first; pole = e^{s/sr}; block = e^{256 s/sr}; quadrature (modes,) = d/ω; weight (W, 2·modes);
-    heard (W, b): whether any weight of the body is not zero.
+    heard (W, b): whether any weight of the body is not zero. held (modes,): of `ModeSet`; there 1 + i·quadrature is what (1 + i d/ω)(e^s - 1)/s
+    is to its real part, which is in the weight.
     """
 
     sr: int
@@ -75,6 +81,7 @@ class Bank:
     quadrature: Array
     weight: Array
     heard: Array
+    held: Array
 
     @property
     def body_count(self) -> int:
@@ -121,7 +128,9 @@ def empty_bank(sr: int, weight_sets: int = 1, at: int = 0) -> tuple[Bank, BankSt
     if not (isinstance(sr, int | np.integer) and 0 < sr <= 10_000_000):
         raise AudioError(f"sample rate {sr}", "give a whole number of Hz, 44100 or 48000 say")
     none, flags = np.zeros(0), np.zeros(0, bool)
-    bank = Bank(int(sr), np.zeros(1, np.int64), np.zeros(0, np.int64), none, none, none, none, np.zeros((weight_sets, 0)), np.zeros((weight_sets, 0), bool))
+    bank = Bank(
+        int(sr), np.zeros(1, np.int64), np.zeros(0, np.int64), none, none, none, none, np.zeros((weight_sets, 0)), np.zeros((weight_sets, 0), bool), flags
+    )
     return bank, BankState(int(at), none.copy(), none.copy(), np.zeros((weight_sets, 0, BLOCK)), flags.copy(), flags.copy(), flags.copy(), Pending.none())
 
 
@@ -149,12 +158,15 @@ def append(bank: Bank, state: BankState, bodies: Sequence[ModeSet]) -> tuple[Ban
     place = place.astype(np.int64)
     s = np.zeros(total, complex)
     pole, block = np.zeros(total, complex), np.zeros(total, complex)
-    quadrature, weight = np.zeros(total), np.zeros((sets, total), complex)
+    quadrature, weight, held = np.zeros(total), np.zeros((sets, total), complex), np.zeros(total, bool)
     if len(place):
         omega, decay = np.concatenate([x.omega_rad_s for x in bodies]), np.concatenate([x.decay_per_s for x in bodies])
         step = (-decay + 1j * omega) / bank.sr
-        s[place], pole[place], block[place], quadrature[place] = step, np.exp(step), np.exp(BLOCK * step), decay / omega
-        weight[:, place] = flushed(np.concatenate([x.weight for x in bodies], axis=1))
+        s[place], pole[place], block[place] = step, np.exp(step), np.exp(BLOCK * step)
+        held[place] = np.repeat([x.held for x in bodies], sizes)
+        onset = (1 + 1j * decay / omega) * np.where(held[place], np.expm1(step) / step, 1.0)
+        quadrature[place] = np.where(held[place], onset.imag / onset.real, decay / omega)
+        weight[:, place] = flushed(np.concatenate([x.weight for x in bodies], axis=1) * np.where(held[place], onset.real, 1.0))
     heard = np.array([[bool(np.any(x.weight[w])) for x in bodies] for w in range(sets)], bool).reshape(sets, len(bodies))
     grown = Bank(
         bank.sr,
@@ -166,6 +178,7 @@ def append(bank: Bank, state: BankState, bodies: Sequence[ModeSet]) -> tuple[Ban
         np.concatenate([bank.quadrature, quadrature]),
         np.stack([_joined(bank.weight[w], weight[w]) for w in range(sets)]).reshape(sets, -1),
         np.concatenate([bank.heard, heard], axis=1),
+        np.concatenate([bank.held, held]),
     )
     state = state.copy()
     silent, flags = np.zeros(total, complex), np.zeros(len(bodies), bool)
@@ -197,7 +210,7 @@ def advance(bank: Bank, state: BankState, n: int, strikes: Sequence[Strike] = ()
     """
     if n < 0 or len(state.ringing) != bank.body_count or len(state.z) != 2 * len(bank.quadrature):
         raise AudioError(f"{n} samples for a state of {len(state.ringing)} bodies and a bank of {bank.body_count}", "advance the state that `append` returned")
-    pending = with_strikes(state.pending, strikes, state.at, bank.offset, bank.count, bank.log_pole, bank.quadrature)
+    pending = with_strikes(state.pending, strikes, state.at, bank.offset, bank.count, bank.log_pole, bank.quadrature, bank.held)
     force_of, force, gain0, gain1, gain_at = _flat_forces(bank, n, forces)
     along = np.zeros(n) if progress is None else np.ascontiguousarray(progress, float)
     if along.shape != (n,) or not np.isfinite(along).all():

@@ -29,8 +29,8 @@ class Strike:
     """A finite force pulse on one body: impulses at equidistant times, one participation vector.
 
     start: absolute time of the first node in samples (any fraction). spacing: of the nodes, in samples (0 … 16).
-    impulse_n_s (k,): impulse of each node. gain (m,): φᵀf̂ of the body's modes in 1/√kg. even: each node's impulse acts evenly over the
-    spacing round it (a factor sinh(sδ/2)/(sδ/2), exact for samples where no node is under way), not at once.
+    impulse_n_s (k,): impulse of each node. gain (m,): φᵀf̂ of the body's modes in 1/√kg. On `held` modes
+    each node's impulse acts evenly over the spacing round it (a factor sinh(sδ/2)/(sδ/2), exact for samples where no node is under way), not at once.
     """
 
     body: int
@@ -38,7 +38,6 @@ class Strike:
     spacing: float
     impulse_n_s: Array
     gain: Array
-    even: bool = False
 
 
 @dataclass(slots=True, eq=False)
@@ -95,8 +94,8 @@ def padded_gains(offset: Array, count: Array, bodies: Sequence[int], gains: Sequ
     return flushed(flat), starts
 
 
-def with_strikes(pending: Pending, strikes: Sequence[Strike], at: int, offset: Array, count: Array, log_pole: Array, quadrature: Array) -> Pending:
-    """The strikes under way and new ones, none before sample ``at``. offset, count, log_pole, quadrature: the bank's.
+def with_strikes(pending: Pending, strikes: Sequence[Strike], at: int, offset: Array, count: Array, log_pole: Array, quadrature: Array, held: Array) -> Pending:
+    """The strikes under way and new ones, none before sample ``at``. offset, count, log_pole, quadrature, held: the bank's.
 
     Raises AudioError on wrong shapes, NaN, a spacing beyond 16 samples, or a strike whose time has passed.
     """
@@ -124,7 +123,7 @@ def with_strikes(pending: Pending, strikes: Sequence[Strike], at: int, offset: A
         impulses.append(np.concatenate([impulse, np.zeros(whole + 2)]))
     new = {name: np.array(values, _SCALARS[name]) for name, values in scalars.items()}
     rows = np.empty((8, len(gain)))
-    _fill_rows(rows, rows_at, new["body"], offset, log_pole, quadrature, gain, new["phase"], new["delta"], new["whole"], np.array([s.even for s in strikes]))
+    _fill_rows(rows, rows_at, new["body"], offset, log_pole, quadrature, gain, new["phase"], new["delta"], new["whole"], held)
     joined = Pending(
         **{name: np.concatenate([getattr(pending, name), values]) for name, values in new.items()},
         impulse=np.concatenate(impulses),
@@ -150,7 +149,7 @@ def without(pending: Pending, done: Array, offset: Array) -> Pending:
 
 
 @njit(cache=True, nogil=True)
-def _fill_rows(rows, rows_at, body, offset, log_pole, quadrature, gain, phase, delta, whole, even):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+def _fill_rows(rows, rows_at, body, offset, log_pole, quadrature, gain, phase, delta, whole, held):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
     """The phasors r, D, E0 = e^{s(1 - whole δ)}, E1 = E0/D of each strike, real and imaginary rows in turn."""
     modes = len(quadrature)
     for j in range(len(body)):
@@ -158,9 +157,9 @@ def _fill_rows(rows, rows_at, body, offset, log_pole, quadrature, gain, phase, d
             lane, at = offset[body[j]] + k, rows_at[j] + k
             s = complex(log_pole[lane], log_pole[modes + lane])
             r = gain[at] * complex(1.0, quadrature[lane]) * np.exp(s * phase[j])
-            if even[j] and s != 0:
+            if held[lane]:  # spread over the spacing; quadrature and weight hold what a force spread over a sample needs
                 half = 0.5 * delta[j] * s
-                r *= (np.exp(half) - np.exp(-half)) / (2 * half)
+                r *= (np.exp(half) - np.exp(-half)) / (2 * half) * s / (np.exp(s) - 1.0)
             turn = np.exp(s * delta[j])
             stay = np.exp(s * (1.0 - whole[j] * delta[j]))
             less = stay / turn

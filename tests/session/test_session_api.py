@@ -13,6 +13,7 @@ import pybullet as p
 import pytest
 from made_models import STEEL
 from made_worlds import floor, plate_model, sounding_box
+from pybullet_utils.bullet_client import BulletClient
 
 import sonic_bullet as sb
 from sonic_bullet.errors import SceneError
@@ -87,8 +88,6 @@ def test_write_removes_the_lag_and_keeps_pascals(client: Any, tmp_path: Path) ->
 
 def test_a_client_id_and_the_hook_hear_the_same(client: Any) -> None:
     """Without a hook the pose before the step is computed back from velocities, to rounding: so is the sound."""
-    from pybullet_utils.bullet_client import BulletClient
-
     hooked, _ = heard(client, 60)
     raw = BulletClient(p.DIRECT)
     raw.setGravity(0, 0, -9.81)
@@ -213,3 +212,26 @@ def test_gym_environments_that_hide_their_steps_are_heard() -> None:
         listener.detach()
     finally:
         environment.close()
+
+
+def test_how_the_sound_is_read_out_does_not_matter(client: Any) -> None:
+    """Looking at `sound`, `contacts` and `read` under way, in any rhythm, leaves every bit as it is."""
+    quiet, frames = heard(client, 90)
+    other = BulletClient(p.DIRECT)
+    other.setGravity(0, 0, -9.81)
+    floor(other)
+    listener = sb.attach(other)
+    sounding_box(other, listener)
+    rng = np.random.default_rng(0)
+    pieces = []
+    for number in range(90):
+        other.stepSimulation()
+        if rng.random() < 0.4:
+            pieces.append(listener.read())
+        if number % 13 == 0:
+            np.testing.assert_array_equal(listener.sound()[:, : max(number - 2, 0) * 200], quiet.sound()[:, : max(number - 2, 0) * 200])
+            assert len(listener.contacts.steps) == number + 1
+    pieces.append(listener.read())
+    np.testing.assert_array_equal(np.concatenate(pieces, axis=1), np.concatenate(frames, axis=1))
+    np.testing.assert_array_equal(listener.sound(), quiet.sound())
+    listener.detach()
