@@ -1,0 +1,40 @@
+"""A rolling ball keeps the measured laws through the whole chain; `benchmarks/rolling_laws.py` prints the full tables.
+
+Held here: 0.2 … 0.8 m/s, a board of 60 modes. Known to fail and not tested: at 0.1 … 0.4 m/s with the lowest 25 modes alone n is 0.962 … 0.967,
+above the band; a sliding box has n = 1.0 … 1.1 where Bullet slides it calmly, and from 0.28 m/s on Bullet's chatter drowns the rubbing.
+"""
+
+from __future__ import annotations
+
+import runpy
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+BENCH: dict[str, Any] = runpy.run_path(str(Path(__file__).parents[1] / "benchmarks" / "rolling_laws.py"))
+SPEEDS, ROUGHNESS = np.geomspace(0.2, 0.8, 5), np.geomspace(0.3e-6, 5e-6, 5)
+M, N = (0.63, 1.16), (0.5, 0.96)
+"""Bands of the exponents of level against roughness and speed that were measured on real pairs."""
+
+
+def test_level_follows_speed_and_roughness_and_neither_law_hangs_on_the_other() -> None:
+    logs = [BENCH["run"]("ball", v, 1.1, count=60) for v in SPEEDS]
+    rms = np.full((5, 5), np.nan)
+    for i in range(5):
+        for j in range(5):
+            if {i, j} & {0, 4}:  # all speeds at the extreme roughnesses, all roughnesses at the extreme speeds
+                rms[i, j] = BENCH["heard"](logs[i], ROUGHNESS[j]).std()
+    speed, rough = BENCH["law"](SPEEDS, rms.T[[0, 4]]), BENCH["law"](ROUGHNESS, rms[[0, 4]])
+    for law, (low, high) in ((speed, N), (rough, M)):
+        assert law.least_r2 > 0.9
+        assert low <= law.exponent.min() <= law.exponent.max() <= high, law
+        assert np.ptp(law.exponent) <= 0.15, law
+
+
+def test_a_rolling_ball_has_no_line_at_the_step_rate() -> None:
+    log = BENCH["run"]("ball", 0.15, 4.0, floor=None)  # the floor's modes would be lines of their own: what the steel ball radiates is smooth
+    rough = BENCH["heard"](log, 2e-6)
+    own_noise = BENCH["heard"](log, 0.0)
+    assert rough.std() > 100 * own_noise.std()  # 40 dB
+    assert BENCH["excess_db"](rough, log.sr).max() <= 3.0
