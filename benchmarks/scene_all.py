@@ -49,8 +49,9 @@ def rms_db(samples: Array, sr: int, begin_s: float, end_s: float) -> float:
 
 
 def places(log: ContactLog) -> Array:
-    """(steps, bodies, 3) of all bodies; all are known from the start in these scenes."""
-    return np.array([step.position_m for step in log.steps])
+    """(steps, bodies, 3) of the bodies known from the start: all that were added are."""
+    count = len(log.steps[0].position_m)
+    return np.array([step.position_m[:count] for step in log.steps])
 
 
 def untouched(log: ContactLog) -> int:
@@ -80,7 +81,7 @@ def claims(result: RenderResult, told: dict[str, Any]) -> Iterator[Claim]:
         if name in told:
             yield name, measure(), *told[name]
     for body, span in told.get("moves_m", {}).items():
-        index = next(i for i, b in enumerate(log.bodies) if b.body_id == int(body))
+        index = next(i for i, b in enumerate(log.bodies) if b.body_id == int(body) and b.model is not None)
         path = places(log)[:, index]
         yield f"moves_m {body}", float(np.linalg.norm(path - path[0], axis=1).max()), *span
     for hz, span in told.get("line_below_db", {}).items():
