@@ -20,7 +20,7 @@ from sonic_bullet.records import Array, Body
 from sonic_bullet.render.manifold import STEEPEST, Rows, group_sum, modal_pushes, touches
 from sonic_bullet.render.rotation import matrix
 from sonic_bullet.render.sounder import Sounder
-from sonic_bullet.synth.pulse import contact_modulus_pa, contact_time_s, effective_mass_kg
+from sonic_bullet.synth.pulse import compliant_share, contact_modulus_pa, contact_time_s, effective_mass_kg
 from sonic_bullet.synth.strikes import Split, accepted_impulse, causing_approach_m_s, key_bodies, unheld_steps
 
 STRUCK_FLAT = 0.02
@@ -36,6 +36,7 @@ class Blow:
     """One strike. low, high: body indices. start_s: after its step's start, or before it. length_s: of the pulse. flat: half-sine, not Hertz'.
 
     impulse_n_s (3,): world, on low. modes_low, modes_high (m,): Uᵀj of the whole impulse in N·s/√kg.
+    share: of all these, what the pulse hands over (`compliant_share`).
     """
 
     low: int
@@ -46,6 +47,7 @@ class Blow:
     impulse_n_s: Array
     modes_low: Array
     modes_high: Array
+    share: float
 
 
 def _gather(split: Split, oriented: Sequence[Rows]) -> tuple[Rows, Array, Array]:
@@ -126,9 +128,12 @@ def _blows(
     ]
     modulus = contact_modulus_pa(*(np.array([modulus_pa(side[i].body) for side in sides]) for i in (0, 1)))
     length, flat = contact_time_s(mass[heard], modulus, bent[strongest], np.array(area), np.maximum(speed, 1e-6))
-    return tuple(
-        Blow(int(pair[0][q]), int(pair[1][q]), float(start[q]), float(length[i]), bool(flat[i]), scale[i] * impulse[q], *pushes[i]) for i, q in enumerate(heard)
-    )
+    blows = []
+    for i, q in enumerate(heard):
+        pushed = [(side.omega_rad_s / (2 * np.pi), push) for side, push in zip(sides[i], pushes[i], strict=True)]
+        share = compliant_share(float(mass[q]), float(accepted[q]), pushed, float(length[i]), bool(flat[i]))
+        blows.append(Blow(int(pair[0][q]), int(pair[1][q]), float(start[q]), float(length[i]), bool(flat[i]), scale[i] * impulse[q], *pushes[i], share))
+    return tuple(blows)
 
 
 def _can_sound(sounder: Sounder) -> bool:

@@ -161,7 +161,8 @@ def _strikes(blow: Blow, step_start_s: float, sounders: tuple[Sounder, ...], sr:
     offset_s, spacing_s, weight = pulse_nodes(blow.length_s, sr, flat=blow.flat)
     start = max((step_start_s + blow.start_s) * sr, float(earliest))
     strikes = []
-    for body, modes, shove in ((blow.low, blow.modes_low, blow.impulse_n_s), (blow.high, blow.modes_high, -blow.impulse_n_s)):
+    sides = (blow.low, blow.share * blow.modes_low, blow.share * blow.impulse_n_s), (blow.high, blow.share * blow.modes_high, -blow.share * blow.impulse_n_s)
+    for body, modes, shove in sides:
         if modes.any():
             strikes.append(bank.Strike(4 * body, start + offset_s * sr, spacing_s * sr, weight, modes))
         rigid = sounders[body].rigid

@@ -13,6 +13,7 @@ k strikes, b bodies, n samples.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
 from math import gamma, pi, sqrt
 
@@ -110,6 +111,25 @@ def pulse_spectrum(f_tau: Array, *, flat: bool = False) -> Array:
     s = (np.arange(4096) + 0.5) / 4096
     force = _force(s, flat)
     return np.asarray(np.abs(np.exp(-2j * np.pi * np.multiply.outer(np.asarray(f_tau, float), s)) @ force) / force.sum())
+
+
+@lru_cache(maxsize=2)
+def _spectrum_table(flat: bool) -> tuple[Array, Array]:
+    f_tau = np.linspace(0.0, 16.0, 1025)
+    return f_tau, pulse_spectrum(f_tau, flat=flat)
+
+
+def compliant_share(mass_kg: float, impulse_n_s: float, pushed: Sequence[tuple[Array, Array]], tau_s: float, flat: bool) -> float:
+    """Which share of a rigid body's impulse a first contact can hand over where the bodies give way: 1/(1 + m*·Σ g²|F̂(fτ)|²).
+
+    pushed: per body the frequencies (m,) in Hz and Uᵀj (m,) of the whole impulse, so that g = Uᵀj/impulse_n_s. What a mode moves within the
+    pulse it takes from the approach, as if its 1/g² were one more mass in series with m* [1/m = 1/m* + Σ g²: the module's first equation, with
+    the modes as further motions of the bodies, e.g. Stronge 2000, Impact Mechanics, sec. 7.1]. The modes' energy is then at most
+    m*v²/2·((1+e)/2)², and not without bound. The rest of the simulator's impulse comes later, softly: it is heard as support.
+    """
+    f_tau, power = _spectrum_table(flat)
+    given = sum(float(np.sum((push * np.interp(freq_hz * tau_s, f_tau, power, right=0.0)) ** 2)) for freq_hz, push in pushed)
+    return 1.0 / (1.0 + mass_kg * given / impulse_n_s**2)
 
 
 def cumulated_force(s: Array, *, flat: bool = False) -> Array:

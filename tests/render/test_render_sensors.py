@@ -74,7 +74,7 @@ def test_the_level_is_the_radiation_law() -> None:
     start = 3000
     decay = float(sounder.decay_per_s[0])
     age = (start - 400) / SR - 2.0 / C
-    expected = abs(weight[0]) * abs(blow.modes_low[0]) * spectrum / 2.0 * np.exp(-decay * age)
+    expected = abs(weight[0]) * blow.share * abs(blow.modes_low[0]) * spectrum / 2.0 * np.exp(-decay * age)
     measured = np.sqrt(2) * np.sqrt(np.mean(signal[start : start + 3200] ** 2)) / np.sqrt((1 - np.exp(-2 * decay * 3200 / SR)) / (2 * decay * 3200 / SR))
     assert measured == pytest.approx(expected, rel=0.01)
     assert extra[0] > 0
@@ -109,7 +109,12 @@ def test_the_plain_sum_is_the_seeds_sum() -> None:
     expected = np.zeros(signal.size)
     for omega, decay, gain in zip(sounder.omega_rad_s, sounder.decay_per_s, blow.modes_low, strict=True):
         expected += (
-            2.0 * gain * pulse_spectrum(np.array([omega / (2 * np.pi) * blow.length_s]), flat=blow.flat)[0] * np.exp(-decay * time) * np.sin(omega * time)
+            2.0
+            * blow.share
+            * gain
+            * pulse_spectrum(np.array([omega / (2 * np.pi) * blow.length_s]), flat=blow.flat)[0]
+            * np.exp(-decay * time)
+            * np.sin(omega * time)
         )
     late = slice(700, 4000)
     assert np.abs(signal[late] - expected[late]).max() < 5e-3 * np.abs(expected[late]).max()
@@ -125,7 +130,7 @@ def test_a_vibrometer_reads_the_surfaces_velocity() -> None:
     assert blow.modes_low[0] == pytest.approx(-0.01 * phi, rel=1e-6)
     sounder = build_sounder(body, (), SR, Air())
     time = np.arange(signal.size) / SR - 2 / 240 - blow.start_s - blow.length_s / 2
-    expected = 0.01 * phi**2 * np.exp(-sounder.decay_per_s[0] * time) * np.cos(sounder.omega_rad_s[0] * time)
+    expected = blow.share * 0.01 * phi**2 * np.exp(-sounder.decay_per_s[0] * time) * np.cos(sounder.omega_rad_s[0] * time)
     late = slice(600, 4000)
     assert np.abs(signal[late] - expected[late]).max() < 0.01 * np.abs(expected).max()
     other = struck_box((Vibrometer(5, [0.1, 0.05, 0.005], [0, 0, -1]),))

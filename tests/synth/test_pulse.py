@@ -111,3 +111,23 @@ def test_jerk_misses_no_pulse_and_any_split_gives_the_same_bits() -> None:
     impulse = np.zeros((3, 3))
     np.add.at(impulse, strikes[0], strikes[4])
     assert np.cumsum(np.cumsum(whole, 2), 2)[..., -1] / sr**2 == pytest.approx(impulse, abs=1e-9)
+
+
+@pytest.mark.parametrize("flat", [False, True])
+def test_a_blow_gives_modes_no_more_energy_than_it_has(flat: bool) -> None:
+    """E = Σ (g s j |F̂|)²/2 stays below m*v²/2·((1+e)/2)² however many and light the modes are; without modes the whole impulse acts."""
+    rng = np.random.default_rng(3)
+    mass, speed, bounce, tau = 0.2, 1.5, 0.6, 4e-4
+    impulse = (1 + bounce) * mass * speed
+    checked = 0
+    for count in (0, 1, 10, 300):
+        for scale in (0.01, 1.0, 30.0):
+            freq = np.sort(rng.uniform(50, 20_000, count))
+            gain = scale * rng.normal(size=count)
+            share = pulse.compliant_share(mass, impulse, [(freq, gain * impulse)], tau, flat)
+            energy = 0.5 * np.sum((share * impulse * gain * pulse.pulse_spectrum(freq * tau, flat=flat)) ** 2)
+            assert energy <= 0.5 * mass * speed**2 * ((1 + bounce) / 2) ** 2 * (1 + 1e-6)
+            assert 0 < share <= 1
+            assert count or share == 1
+            checked += 1
+    assert checked == 12
