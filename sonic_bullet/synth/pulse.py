@@ -115,7 +115,7 @@ def pulse_spectrum(f_tau: Array, *, flat: bool = False) -> Array:
 
 @lru_cache(maxsize=2)
 def _spectrum_table(flat: bool) -> tuple[Array, Array]:
-    f_tau = np.linspace(0.0, 16.0, 1025)
+    f_tau = np.linspace(0.0, 8.0, 321)
     return f_tau, pulse_spectrum(f_tau, flat=flat)
 
 
