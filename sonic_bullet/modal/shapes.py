@@ -7,7 +7,6 @@ any other mesh, or several shapes as one solid -> their surfaces together (surfa
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -24,7 +23,8 @@ from sonic_bullet.records import Array, Shape
 THIN_DOF, CHUNKY_DOF = 26_000, 10_000  # unknowns by default: a plate's factor stays sparse, a ball's does not
 DOF_PER_TET = 5.6  # measured on fTetWild's meshes of bars, slabs and bowls
 MOST_TETS = 7_000
-FILL_LIMIT_S = 45.0
+FILL_LIMITS_S = (27.0, 12.0, 10.0)
+"""Processor seconds of each attempt, the next coarser than the last: what is tried must not hang on how busy the machine is."""
 ENVELOPE_OF_EDGE = 0.05  # a finer surface than its elements costs time and tells nothing
 ENVELOPE = (0.04, 0.006)  # of the thickness and of the diagonal: how far fTetWild may move the surface, the lesser counts
 
@@ -158,14 +158,15 @@ def _meshed(skin: Skin, edge_m: float | None, say: Callable[[str], None]) -> Sol
         prism = prisms.as_prism(vertex, face, edge_m, budget)
         if prism is not None:
             return Solid(prism.node_m, prism.tet, note=prism.note + skin.note)
-    edge = edge_m if edge_m is not None else _edge_m(geometry.volume_m3(vertex, face), thickness, int(budget * (1 - 0.6 * chunkiness(thickness, diagonal))))
+    # a curved shell takes a third more than a slab laid out by rule, a lump less than half
+    spent = int(budget * (1.35 - 0.95 * chunkiness(thickness, diagonal)))
+    edge = edge_m if edge_m is not None else _edge_m(geometry.volume_m3(vertex, face), thickness, spent)
     envelope = max(min(ENVELOPE[0] * thickness, ENVELOPE[1] * diagonal), ENVELOPE_OF_EDGE * edge)
-    deadline = time.monotonic() + FILL_LIMIT_S
     say(f"filling {len(face)} triangles with tetrahedra of {edge:.3g} m")
     failure = MeshError(f"mesh needs more than {MOST_TETS} tetrahedra", "give a larger edge_m or a simpler mesh")
-    for share in (0.6, 0.6, 1.0):
+    for limit_s in FILL_LIMITS_S:
         try:
-            node, tet = tetrahedra(vertex, face, edge, envelope, time_limit_s=max(3.0, share * (deadline - time.monotonic())))
+            node, tet = tetrahedra(vertex, face, edge, envelope, time_limit_s=limit_s)
         except MeshError as error:
             failure = error
         else:

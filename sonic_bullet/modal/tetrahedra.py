@@ -16,6 +16,8 @@ from sonic_bullet.errors import MeshError
 from sonic_bullet.records import Array
 
 TIME_LIMIT_S = 45.0
+BUSY = 4.0
+"""Wall time per processor time that a child may take on a busy machine before it counts as hung."""
 MEMORY_LIMIT_BYTES = 2 * 1024**3
 CUT_OFF = (9, 24)  # SIGKILL, SIGXCPU: the child's own limit on processor time
 
@@ -24,7 +26,7 @@ def tetrahedra(vertex_m: Array, face: Array, edge_m: float, envelope_m: float, *
     """Corners (n, 3) and tetrahedra (t, 4) filling a surface vertex_m (v, 3), face (f, 3).
 
     edge_m: wanted edge; envelope_m: how far the surface may move. Raises MeshError where fTetWild fails, fills nothing,
-    or takes longer than time_limit_s or more than 2 GiB.
+    or takes more than time_limit_s of processor time or 2 GiB.
     """
     low, high = vertex_m[face].reshape(-1, 3).min(axis=0), vertex_m[face].reshape(-1, 3).max(axis=0)
     diagonal_m = float(np.linalg.norm(high - low))
@@ -44,12 +46,12 @@ def tetrahedra(vertex_m: Array, face: Array, edge_m: float, envelope_m: float, *
         command = [sys.executable, str(Path(__file__).with_name("_tetwild.py")), str(source), str(target)]
         try:
             ended = subprocess.run(
-                command, timeout=time_limit_s, capture_output=True, text=True, check=False, cwd=folder
+                command, timeout=BUSY * time_limit_s, capture_output=True, text=True, check=False, cwd=folder
             )  # fTetWild leaves a file where it runs
         except subprocess.TimeoutExpired:
             ended = None
         if ended is None or -ended.returncode in CUT_OFF:
-            raise MeshError(f"filling the mesh with tetrahedra took longer than {time_limit_s:.0f} s", "give a larger edge_m or a simpler mesh")
+            raise MeshError(f"filling the mesh with tetrahedra took more than {time_limit_s:.0f} s of processor time", "give a larger edge_m or a simpler mesh")
         if ended.returncode != 0 or not target.exists():
             said = (ended.stderr.strip().splitlines() or ["no message"])[-1]
             raise MeshError(f"fTetWild failed on the mesh (exit {ended.returncode}: {said[:200]})", "repair the mesh, or give a larger edge_m")
