@@ -1,0 +1,72 @@
+"""The values that travel inside the estimator: what was heard, and what it says of the material.
+
+    x(t) = Σ a e^{−d(t−t₀)} sin(2πf(t−t₀) + φ)   for t ≥ t₀                            [Ren, Yeh, Lin 2013, eq. 4, 8]
+    d = ½(α + βλ),  λ = γ λ̂(ν),  a = σ â                                               [eq. 6-8, section 5]
+
+f here is the damped frequency a recording shows, d the decay rate of the amplitude in 1/s, k features.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sonic_bullet.errors import RecordError
+from sonic_bullet.records import Array, frozen_array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Features:
+    """Damped sinusoids of one recording, strongest first; amplitude in units of the recording (full scale 1) at the onset.
+
+    Spreads are standard errors; a feature without one has NaN there. noise_dbfs: level of what is no feature, rms, per sample.
+    """
+
+    freq_hz: Array  # (k,) > 0
+    decay_per_s: Array  # (k,) >= 0
+    amplitude: Array  # (k,) > 0
+    phase_rad: Array  # (k,)
+    freq_sd_hz: Array  # (k,)
+    decay_sd_per_s: Array  # (k,)
+    amplitude_sd: Array  # (k,)
+    onset_s: float
+    noise_dbfs: float
+    sr: int
+    note: str = ""
+
+    def __post_init__(self) -> None:
+        count = len(np.atleast_1d(self.freq_hz))
+        for name in ("freq_hz", "decay_per_s", "amplitude", "phase_rad"):
+            object.__setattr__(self, name, frozen_array(getattr(self, name), np.float64, (count,), name))
+        for name in ("freq_sd_hz", "decay_sd_per_s", "amplitude_sd"):
+            object.__setattr__(self, name, frozen_array(getattr(self, name), np.float64, (count,), name, finite=False))
+        if (self.freq_hz <= 0).any() or (self.decay_per_s < 0).any() or (self.amplitude <= 0).any():
+            raise RecordError("features hold a frequency or amplitude of zero, or a negative decay", "keep only what was heard")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MaterialFit:
+    """What recordings say of a material. parameters: (α 1/s, β s, γ m²/s², σ, ν), γ = E/ρ; covariance (5, 5) of ln α, ln β, ln γ, ln σ, ν.
+
+    A row and column of NaN: that parameter is not identifiable, and the verdict says so. verdict: "fitted", or why not, one line.
+    metric: the distance reached. modes: per mode freq_hz, decay_per_s, amplitude (m,) of the fitted model at the first strike.
+    """
+
+    alpha_per_s: float
+    beta_s: float
+    gamma_m2_s2: float
+    sigma: float
+    poisson_ratio: float
+    covariance: Array  # (5, 5)
+    verdict: str
+    metric: float
+    freq_hz: Array  # (m,)
+    decay_per_s: Array  # (m,)
+    amplitude: Array  # (m,)
+
+    def __post_init__(self) -> None:
+        count = len(np.atleast_1d(self.freq_hz))
+        for name in ("freq_hz", "decay_per_s", "amplitude"):
+            object.__setattr__(self, name, frozen_array(getattr(self, name), np.float64, (count,), name))
+        object.__setattr__(self, "covariance", frozen_array(self.covariance, np.float64, (5, 5), "covariance", finite=False))
