@@ -17,13 +17,13 @@ from sonic_bullet.errors import MeshError
 from sonic_bullet.modal import prisms, structured
 from sonic_bullet.modal.ordering import dissection
 from sonic_bullet.modal.solid import Solid, Surface, largest_component, quadratic, surface
-from sonic_bullet.modal.surfaces import SIZE_M, Skin, prepared
+from sonic_bullet.modal.surfaces import SIZE_M, Skin, pieces_of_faces, prepared
 from sonic_bullet.records import Array, Shape
 
 THIN_DOF, CHUNKY_DOF = 26_000, 10_000  # unknowns by default: a plate's factor stays sparse, a ball's does not
 DOF_PER_TET = 5.6  # measured on fTetWild's meshes of bars, slabs and bowls
 MOST_TETS = 7_000
-FILL_LIMITS_S = (27.0, 12.0, 10.0)
+FILL_LIMITS_S = (20.0, 9.0, 7.0)
 """Processor seconds of each attempt, the next coarser than the last: what is tried must not hang on how busy the machine is."""
 ENVELOPE_OF_EDGE = 0.05  # a finer surface than its elements costs time and tells nothing
 ENVELOPE = (0.04, 0.006)  # of the thickness and of the diagonal: how far fTetWild may move the surface, the lesser counts
@@ -142,6 +142,20 @@ def _edge_m(volume_m3: float, thickness_m: float, budget: int) -> float:
     return float(edges[min(199, int((tets * DOF_PER_TET > budget).sum()))])
 
 
+def _united(skin: Skin) -> Skin:
+    """The skin with its closed pieces made one, where there are several."""
+    piece = pieces_of_faces(skin.face)
+    if piece.max() == 0 or not geometry.is_closed(skin.face):
+        return skin
+    from sonic_bullet.modal.unions import joined
+
+    vertex, face, done = joined(skin.vertex_m, skin.face, piece)
+    if not done:
+        return skin
+    area = float(geometry.face_areas_m2(vertex, face).sum())
+    return Skin(vertex, face, 2 * geometry.volume_m3(vertex, face) / area, skin.note + done)
+
+
 def _meshed(skin: Skin, edge_m: float | None, say: Callable[[str], None]) -> Solid:
     """Solid of a prepared surface: by rule where a rule is known, else by fTetWild, coarser where that is too slow or too fine."""
     from sonic_bullet.modal.tetrahedra import tetrahedra
@@ -193,9 +207,9 @@ def fill(shapes: tuple[Shape, ...], edge_m: float | None, thickness_m: float | N
         made = Solid(_placed(one, made.node_m), made.tet, made.affine, made.note)
     else:
         vertex, face = _soup(shapes)
-        prepared_skin = prepared(vertex, face, thickness_m)
-        vertex, face = prepared_skin.vertex_m, prepared_skin.face
-        made = _meshed(prepared_skin, edge_m, say)
+        skin_given = prepared(vertex, face, thickness_m)
+        vertex, face = skin_given.vertex_m, skin_given.face
+        made = _meshed(_united(skin_given), edge_m, say)
     order = dissection(made.node_m, made.tet)
     place = np.empty(len(order), np.int64)
     place[order] = np.arange(len(order))

@@ -58,7 +58,7 @@ def _flips(face: Array) -> Array:
     return flip
 
 
-def _piece_of_face(face: Array) -> Array:
+def pieces_of_faces(face: Array) -> Array:
     """Label (f,) of the piece each face belongs to: faces that share a vertex hang together."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -116,7 +116,7 @@ def _oriented(vertex_m: Array, face: Array) -> tuple[Array, str]:
         if flip.any():
             face = np.where(flip[:, None], face[:, ::-1], face)
             note = f"; {int(flip.sum())} faces turned to agree with their neighbours"
-            label = _piece_of_face(face)
+            label = pieces_of_faces(face)
             for piece in range(int(label.max()) + 1):
                 mine = label == piece
                 if geometry.volume_m3(vertex_m, face[mine]) < 0:
