@@ -23,7 +23,7 @@ from sonic_bullet.records import Array
 
 Place = Path | Literal["default"] | None
 FORMAT = "sonic-bullet-cache/1"
-SOLVERS = ("numpy", "scipy", "scikit-fem", "pytetwild")
+SOLVERS = ("numpy", "scipy", "scikit-fem", "pytetwild", "manifold3d")
 
 
 class _Header(msgspec.Struct):
