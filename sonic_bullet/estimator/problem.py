@@ -46,7 +46,7 @@ class Problem:
             raise RecordError("an eigenvalue of the body is not above zero", "leave its rigid modes out")
         if not self.amplitude_hat.any():
             raise RecordError("no mode of the body sounds at this strike", "strike where the shapes move")
-        if not (0 < self.lower).all() or not (self.lower < self.upper).all():
+        if not (self.lower > 0).all() or not (self.lower < self.upper).all():
             raise RecordError("bounds of α, β, γ, σ cross or are not above zero", "give 0 < lower < upper")
         if not len(self.features.freq_hz):
             raise RecordError("the recording has no features", "a fit needs at least one damped sinusoid")
