@@ -65,4 +65,4 @@ def seed_starts(problem: Problem, dominant: int = DOMINANT) -> Array:
         for first, second in pairs
         for j in modes
     ]
-    return np.clip(np.array(rows), problem.lower, problem.upper)
+    return np.asarray(np.clip(np.array(rows), problem.lower, problem.upper))
