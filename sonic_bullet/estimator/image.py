@@ -27,6 +27,7 @@ WINDOW = (0.355768, 0.487396, 0.144232, 0.012604)
 BARK_LAST = 24.0
 FLOOR_DB_SPL = -20.0
 NODES = 8  # of the loudness table, an octave of power
+OUTSIDE = -2  # in Level.band: a bin that feeds no triangle
 TABLE_FROM, TABLE_TO = -13, 54  # its powers of two: −39 to 162 dB SPL
 
 
@@ -36,7 +37,7 @@ class Level:
 
     window: int
     hop: int
-    band: Array  # (k,) int64: the lower of the two triangles a bin feeds, −1 for neither
+    band: Array  # (k,) int64: the lower of the two triangles a bin feeds (−1: only the first), or OUTSIDE
     share: Array  # (k,) part that goes to the upper one
     scale: float  # |bin|² times this is mean square
     loud: Array  # (m, b) sone of the recording
@@ -66,13 +67,13 @@ def _bins(length: int, sr: int, bark_step: float, bands: int) -> tuple[Array, Ar
     place = bark(np.arange(length // 2 + 1) * sr / length) / bark_step - 1
     below = np.floor(place).astype(np.int64)
     inside = (below >= -1) & (below < bands)
-    return np.where(inside, below, -2), np.where(inside, place - below, 0.0)
+    return np.where(inside, below, OUTSIDE), np.where(inside, place - below, 0.0)
 
 
 def _pool(power: Array, band: Array, share: Array, bands: int) -> Array:
     """(m, k) powers of bins -> (m, bands)."""
     pooled = np.zeros((len(power), bands + 2))
-    used = band > -2
+    used = band != OUTSIDE
     np.add.at(pooled.T, band[used] + 1, (power[:, used] * (1 - share[used])).T)
     np.add.at(pooled.T, band[used] + 2, (power[:, used] * share[used]).T)
     return pooled[:, 1:-1]
@@ -177,7 +178,7 @@ def _reach(freq_hz, decay_per_s, amplitude, sr, length, floor):  # type: ignore[
         reach[j, 2] = room
         if 0 < freq_hz[j] < sr / 2 and abs(amplitude[j]) > floor:
             centre = int(freq_hz[j] / sr * length)
-            radius = 5 + int(8 * decay_per_s[j] * length / (2 * np.pi * sr))
+            radius = 5 + int(3 * decay_per_s[j] * length / (2 * np.pi * sr))
             reach[j, 0], reach[j, 1] = max(1, centre - radius), min(length // 2 + 1, centre + 2 + radius)
             room += max(reach[j, 1] - reach[j, 0], 0)
     return reach
@@ -235,35 +236,30 @@ def _frame(freq_hz, decay_per_s, amplitude, reach, sr, late_s, length, hop):  # 
     return shapes, state, turn
 
 
-@njit(cache=True, nogil=True, fastmath={"reassoc", "contract"})
-def _pooled(sum_re, sum_im, used, band, share, power):  # type: ignore[no-untyped-def]
-    """Powers of the used bins into the triangles; bins of one triangle lie side by side, so sums stay in registers."""
-    power[:] = 0.0
-    s, count = 0, len(used)
-    while s < count:
-        here = band[used[s]]
-        end = s
-        while end < count and band[used[end]] == here:
-            end += 1
-        whole, upper = 0.0, 0.0
-        for i in range(s, end):
-            value = sum_re[i] * sum_re[i] + sum_im[i] * sum_im[i]
-            whole += value
-            upper += value * share[i]
-        if here > -2:
-            power[here + 1] += whole - upper
-            power[here + 2] += upper
-        s = end
+@njit(cache=True, nogil=True)
+def _runs(used, band):  # type: ignore[no-untyped-def]
+    """(r, 3) runs of used bins that feed one triangle: first slot, slot after the last, the lower triangle; those outside are left out."""
+    runs = np.zeros((len(used), 3), np.int64)
+    count = 0
+    for i in range(len(used)):
+        here = band[used[i]]
+        if here == OUTSIDE:
+            continue
+        if count and runs[count - 1, 2] == here:
+            runs[count - 1, 1] = i + 1
+        else:
+            runs[count] = i, i + 1, here
+            count += 1
+    return runs[:count]
 
 
 @njit(cache=True, nogil=True, fastmath={"reassoc", "contract"}, error_model="numpy")
 def _compare(reach, slot, used, shapes, state, turn, floor, band, share, scale, loud, table, out, weight):  # type: ignore[no-untyped-def]
     """Σ weight·ΔT² of one level; state is used up."""
     frames, bands = loud.shape
-    slots = len(used)
-    sum_re, sum_im, power = np.zeros(slots), np.zeros(slots), np.zeros(bands + 2)
+    sum_re, sum_im, power = np.zeros(len(used)), np.zeros(len(used)), np.zeros(bands + 2)
     bits = power.view(np.int64)
-    used_share = share[used]
+    runs, upper_share = _runs(used, band), share[used]
     alive = np.nonzero(reach[:, 1] > reach[:, 0])[0]
     living = len(alive)
     root = np.sqrt(weight)
@@ -288,9 +284,16 @@ def _compare(reach, slot, used, shapes, state, turn, floor, band, share, scale, 
                 into_im[k] += real * shape_im[k] + imag * shape_re[k]
             state[j] *= turn[j]
         living = kept
-        _pooled(sum_re, sum_im, used, band, used_share, power)
-        for b in range(bands + 2):
-            power[b] *= scale
+        power[:] = 0.0
+        if living:
+            for r in range(len(runs)):
+                whole, upper = 0.0, 0.0
+                for i in range(runs[r, 0], runs[r, 1]):
+                    value = sum_re[i] * sum_re[i] + sum_im[i] * sum_im[i]
+                    whole += value
+                    upper += value * upper_share[i]
+                power[runs[r, 2] + 1] += (whole - upper) * scale
+                power[runs[r, 2] + 2] += upper * scale
         for b in range(bands):
             heard = 0.0
             cell = (bits[b + 1] >> 49) - ((1023 + TABLE_FROM) << 3)
