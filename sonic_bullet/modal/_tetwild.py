@@ -1,6 +1,6 @@
 """The child process that runs fTetWild: it can hang, grow or abort, and must not take the parent with it.
 
-    python _tetwild.py IN.npz OUT.npz     IN: vertex, face, edge, envelope, memory (bytes), seconds
+    python _tetwild.py IN.npz OUT.npz     IN: vertex, face, edge, envelope, passes, memory (bytes), seconds
 
 fTetWild shuffles with a seed from `std::random_device`, so two runs differ by 0.1 % in the modes. On ELF systems the slot of
 the extension's procedure table that points at `random_device::_M_getval` is turned to a counter of our own: same surface,
@@ -103,7 +103,7 @@ def main() -> None:
         10.0,
         False,
         1,
-        80,
+        int(arguments["passes"]),
         6,
         True,
         False,

@@ -23,9 +23,11 @@ from sonic_bullet.records import Array, Shape
 THIN_DOF, CHUNKY_DOF = 26_000, 10_000  # unknowns by default: a plate's factor stays sparse, a ball's does not
 DOF_PER_TET = 5.6  # measured on fTetWild's meshes of bars, slabs and bowls
 MOST_TETS = 7_000
+LUMP_PASSES, MOST_PASSES = 2, 80
+"""Of fTetWild's optimisation. It makes elements finer until the worst is good; two passes and a lesser edge give lumps the same modes in half the time."""
 FILL_LIMITS_S = (20.0, 9.0, 7.0)
 """Processor seconds of each attempt, the next coarser than the last: what is tried must not hang on how busy the machine is."""
-ENVELOPE_OF_EDGE = 0.05  # a finer surface than its elements costs time and tells nothing
+ENVELOPE_OF_EDGE = 0.035  # a finer surface than its elements costs time and tells nothing
 ENVELOPE = (0.04, 0.006)  # of the thickness and of the diagonal: how far fTetWild may move the surface, the lesser counts
 
 
@@ -172,15 +174,17 @@ def _meshed(skin: Skin, edge_m: float | None, say: Callable[[str], None]) -> Sol
         prism = prisms.as_prism(vertex, face, edge_m, budget)
         if prism is not None:
             return Solid(prism.node_m, prism.tet, note=prism.note + skin.note)
-    # a curved shell takes a third more than a slab laid out by rule, a lump less than half
-    spent = int(budget * (1.35 - 0.95 * chunkiness(thickness, diagonal)))
+    # a curved shell takes a third more than a slab laid out by rule, a lump little more than half, for fTetWild makes it finer than asked
+    lump = chunkiness(thickness, diagonal)
+    spent = int(budget * (1.35 - 0.77 * lump))
+    passes = LUMP_PASSES if lump > 0.5 else MOST_PASSES
     edge = edge_m if edge_m is not None else _edge_m(geometry.volume_m3(vertex, face), thickness, spent)
     envelope = max(min(ENVELOPE[0] * thickness, ENVELOPE[1] * diagonal), ENVELOPE_OF_EDGE * edge)
     say(f"filling {len(face)} triangles with tetrahedra of {edge:.3g} m")
     failure = MeshError(f"mesh needs more than {MOST_TETS} tetrahedra", "give a larger edge_m or a simpler mesh")
     for limit_s in FILL_LIMITS_S:
         try:
-            node, tet = tetrahedra(vertex, face, edge, envelope, time_limit_s=limit_s)
+            node, tet = tetrahedra(vertex, face, edge, envelope, passes=passes, time_limit_s=limit_s)
         except MeshError as error:
             failure = error
         else:
@@ -190,7 +194,7 @@ def _meshed(skin: Skin, edge_m: float | None, say: Callable[[str], None]) -> Sol
                 return quadratic(node, tet, note=note + (f"; largest of {pieces} separate pieces kept" if pieces > 1 else ""))
         if edge_m is not None:
             break
-        edge, envelope = 1.6 * edge, 2.5 * envelope
+        edge, envelope, passes = 1.6 * edge, 2.5 * envelope, LUMP_PASSES
     raise failure
 
 

@@ -22,10 +22,10 @@ MEMORY_LIMIT_BYTES = 2 * 1024**3
 CUT_OFF = (9, 24)  # SIGKILL, SIGXCPU: the child's own limit on processor time
 
 
-def tetrahedra(vertex_m: Array, face: Array, edge_m: float, envelope_m: float, *, time_limit_s: float = TIME_LIMIT_S) -> tuple[Array, Array]:
+def tetrahedra(vertex_m: Array, face: Array, edge_m: float, envelope_m: float, *, passes: int = 80, time_limit_s: float = TIME_LIMIT_S) -> tuple[Array, Array]:
     """Corners (n, 3) and tetrahedra (t, 4) filling a surface vertex_m (v, 3), face (f, 3).
 
-    edge_m: wanted edge; envelope_m: how far the surface may move. Raises MeshError where fTetWild fails, fills nothing,
+    edge_m: wanted edge; envelope_m: how far the surface may move; passes: of optimisation, at most. Raises MeshError where fTetWild fails, fills nothing,
     or takes more than time_limit_s of processor time or 2 GiB.
     """
     low, high = vertex_m[face].reshape(-1, 3).min(axis=0), vertex_m[face].reshape(-1, 3).max(axis=0)
@@ -37,6 +37,7 @@ def tetrahedra(vertex_m: Array, face: Array, edge_m: float, envelope_m: float, *
         numbers = {
             "edge": np.array(edge_m / diagonal_m),
             "envelope": np.array(envelope_m / diagonal_m),
+            "passes": np.array(passes),
             "memory": np.array(MEMORY_LIMIT_BYTES),
             "seconds": np.array(int(np.ceil(time_limit_s))),
             "vertex": (vertex_m - centre) / diagonal_m,
