@@ -71,11 +71,13 @@ def _bins(length: int, sr: int, bark_step: float, bands: int) -> tuple[Array, Ar
 
 
 def _pool(power: Array, band: Array, share: Array, bands: int) -> Array:
-    """(m, k) powers of bins -> (m, bands)."""
+    """(m, k) powers of bins -> (m, bands). Bins of one triangle lie side by side."""
+    inside = np.flatnonzero(band != OUTSIDE)
+    power, place, share = power[:, inside], band[inside], share[inside]
+    first = np.flatnonzero(np.diff(place, prepend=OUTSIDE))
     pooled = np.zeros((len(power), bands + 2))
-    used = band != OUTSIDE
-    np.add.at(pooled.T, band[used] + 1, (power[:, used] * (1 - share[used])).T)
-    np.add.at(pooled.T, band[used] + 2, (power[:, used] * share[used]).T)
+    pooled[:, place[first] + 1] += np.add.reduceat(power * (1 - share), first, axis=1)
+    pooled[:, place[first] + 2] += np.add.reduceat(power * share, first, axis=1)
     return pooled[:, 1:-1]
 
 

@@ -10,6 +10,7 @@ square [Huber 1964]. Where everything fits, the answer is exact to rounding, wha
 from __future__ import annotations
 
 import numpy as np
+from numba import njit
 
 from sonic_bullet.estimator.matching import energy, match_ratio_product
 from sonic_bullet.estimator.metric import Target
@@ -21,6 +22,7 @@ from sonic_bullet.records import Array
 STRONGEST = 12  # features that are laid on modes to guess γ
 APART = 3e-3  # of ln γ: guesses closer than this are one guess
 ROUNDS = 12
+REWEIGHTED = 12
 HUBER = 1.345
 
 
@@ -29,50 +31,45 @@ def _relative(spread: Array, value: Array) -> Array:
     return np.where(sound, spread / value, np.median((spread / value)[sound]) if sound.any() else 1e-9)
 
 
-def _mean(value: Array, spread: Array, trust: Array) -> tuple[float, float]:
+@njit(cache=True, nogil=True, error_model="numpy")
+def _mean(value, spread, trust):  # type: ignore[no-untyped-def]
     """Robust mean of (k,) values and the misfit beyond their spreads."""
-    middle = float(np.median(value))
-    misfit = 1.4826 * float(np.median(np.abs(value - middle)))
-    for _ in range(ROUNDS):
-        scale = np.hypot(spread, misfit)
-        off = np.abs(value - middle) / np.maximum(scale, 1e-300)
-        weight = trust * np.minimum(1.0, HUBER / np.maximum(off, 1e-300)) / np.maximum(scale, 1e-15) ** 2
-        middle = float((weight * value).sum() / weight.sum())
+    middle = np.median(value)
+    misfit = 1.4826 * np.median(np.abs(value - middle))
+    scale = np.maximum(np.hypot(spread, misfit), 1e-15)
+    for _ in range(REWEIGHTED):
+        weight = trust * np.minimum(1.0, HUBER * scale / np.maximum(np.abs(value - middle), 1e-300)) / scale**2
+        middle = (weight * value).sum() / weight.sum()
     return middle, misfit
 
 
 def rayleigh(features: Features, trust: Array, lower: Array, upper: Array) -> tuple[float, float]:
     """α, β of d = ½(α + βλ) through all features (k,), trust (k,) a weight each, within bounds."""
-    eigen, decay = feature_eigenvalues(features), features.decay_per_s
-    spread = _relative(features.decay_sd_per_s, np.maximum(decay, 1e-6)) * decay
-    relative = np.zeros(len(decay))
-    alpha, beta = 2 * float(np.median(decay)), 0.0
-    unit = float(np.median(eigen))
-    misfit = 1.0
-    for _ in range(ROUNDS):
-        fitted = np.maximum(0.5 * (alpha + beta * eigen), 1e-9)
-        scale = np.maximum(np.hypot(spread, misfit * fitted), 1e-12 * fitted)
-        off = np.abs(decay - fitted) / scale
-        weight = trust * np.minimum(1.0, HUBER / np.maximum(off, 1e-300)) / scale**2
-        alpha, beta = _line(0.5 * np.ones(len(eigen)), 0.5 * eigen / unit, decay, weight)
-        beta /= unit
-        alpha, beta = float(np.clip(alpha, lower[0], upper[0])), float(np.clip(beta, lower[1], upper[1]))
-        relative = decay / np.maximum(0.5 * (alpha + beta * eigen), 1e-9) - 1
-        misfit = max(1.4826 * float(np.median(np.abs(relative))), 1e-9)
-    return alpha, beta
+    decay = np.maximum(features.decay_per_s, 1e-6)
+    alpha, beta = _rayleigh(feature_eigenvalues(features), decay, _relative(features.decay_sd_per_s, decay), trust)
+    return float(np.clip(alpha, lower[0], upper[0])), float(np.clip(beta, lower[1], upper[1]))
 
 
-def _line(first: Array, second: Array, value: Array, weight: Array) -> tuple[float, float]:
-    """Non-negative x, y that minimise Σ weight (x·first + y·second − value)²."""
-    a, b, c = (weight * first**2).sum(), (weight * first * second).sum(), (weight * second**2).sum()
-    p, q = (weight * first * value).sum(), (weight * second * value).sum()
-    determinant = a * c - b * b
-    if determinant > 1e-14 * a * c:
-        x, y = (c * p - b * q) / determinant, (a * q - b * p) / determinant
-        if x >= 0 and y >= 0:
-            return float(x), float(y)
-    alone_x, alone_y = max(p / a, 0.0), max(q / c, 0.0)
-    return (float(alone_x), 0.0) if alone_x * p > alone_y * q else (0.0, float(alone_y))
+@njit(cache=True, nogil=True, error_model="numpy")
+def _rayleigh(eigen, decay, spread, trust):  # type: ignore[no-untyped-def]
+    """Robust non-negative α, β; spread (k,) relative. The misfit shared by all starts at all of it and shrinks to what is left."""
+    unit = np.median(eigen)
+    alpha, beta, misfit = 2 * np.median(decay), 0.0, 1.0
+    for _ in range(REWEIGHTED):
+        fitted = np.maximum(0.5 * (alpha + beta * eigen / unit), 1e-9)
+        off = decay - fitted
+        scale = np.maximum(np.hypot(spread, misfit) * fitted, 1e-12 * fitted)
+        weight = trust * np.minimum(1.0, HUBER * scale / np.maximum(np.abs(off), 1e-300)) / scale**2
+        first, second = 0.5, 0.5 * eigen / unit
+        a, b, c = (weight * first**2).sum(), (weight * first * second).sum(), (weight * second**2).sum()
+        p, q = (weight * first * decay).sum(), (weight * second * decay).sum()
+        determinant = a * c - b * b
+        alpha, beta = (c * p - b * q) / determinant, (a * q - b * p) / determinant
+        if not (determinant > 1e-14 * a * c and alpha >= 0 and beta >= 0):
+            alone_alpha, alone_beta = p / a, q / c
+            alpha, beta = (alone_alpha, 0.0) if alone_alpha * p > alone_beta * q else (0.0, alone_beta)
+        misfit = max(1.4826 * np.median(np.abs(decay / np.maximum(0.5 * (alpha + beta * eigen / unit), 1e-9) - 1)), 1e-9)
+    return alpha, beta / unit
 
 
 def partners(problem: Problem, parameters: Array, tolerance: float) -> tuple[Array, Array]:

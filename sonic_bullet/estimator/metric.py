@@ -66,8 +66,9 @@ def match(target: Target, parameters: Array) -> float:
     return match_ratio_product(target.points, *modes_of(parameters, target.problem.lambda_hat, target.problem.amplitude_hat))
 
 
-def image_differences(target: Target, parameters: Array) -> Array:
-    """(cells,) √hop·ΔT, whose squares sum to Π_psycho: what a least-squares method wants to see."""
+def residuals(target: Target, parameters: Array) -> Array:
+    """(cells,) √(hop/|Π_MRP|)·ΔT, whose squares sum to Π: what a least-squares method wants to see."""
+    modes = modes_of(parameters, target.problem.lambda_hat, target.problem.amplitude_hat)
     out = np.empty(sum(level.loud.size for level in target.image.levels))
-    distance(target.image, *modes_of(parameters, target.problem.lambda_hat, target.problem.amplitude_hat), differences=out)
-    return out
+    distance(target.image, *modes, differences=out)
+    return np.asarray(out / np.sqrt(max(-match_ratio_product(target.points, *modes), MATCH_FLOOR)))

@@ -3,7 +3,7 @@
 reference   every start of `seed_starts` walked down Π by Nelder and Mead in the logarithms, the best wins    [Ren, Yeh, Lin 2013, section 5.3]
 fast        1. Π_MRP alone (some tens of µs, blind to σ) sifts γ's from laying every feature on every mode; α, β from all features at once
             2. the best few are matched feature to mode and solved as least squares, each residual by its spread (laid.py); Π ranks them
-            3. the best is walked down Π_psycho by Gauss, Newton, Levenberg and Marquardt, then down Π by Nelder and Mead from a small simplex
+            3. the best is walked down Π, a sum of squares, by Levenberg and Marquardt, then by Nelder and Mead from a small simplex
 
 What the features say is kept where Π below it is no more than the image's own truth (EXACT): there they know better.
 """
@@ -16,7 +16,7 @@ from collections.abc import Callable
 import numpy as np
 
 from sonic_bullet.estimator.laid import candidates, laid
-from sonic_bullet.estimator.metric import Constants, Target, hybrid, image_differences, target
+from sonic_bullet.estimator.metric import Constants, Target, hybrid, residuals, target
 from sonic_bullet.estimator.problem import Found, Problem
 from sonic_bullet.estimator.starts import seed_starts
 from sonic_bullet.records import Array
@@ -27,8 +27,10 @@ METRIC_TOLERANCE = 1e-8
 EXACT = 1e-7
 MOST = 2000
 SIFTED = 6
-POLISH_ROUNDS = 6
-POLISH_MOST = 120
+POLISH_ROUNDS = 8
+POLISH_MOST = 150
+WIDTH = np.array([1e-2, 1e-2, 1e-4, 1e-2])  # of the differences that stand for slopes, in the logarithms
+SIMPLEX = 1e-4  # the first simplex's corners are this part of Π higher, were Π a parabola
 
 
 class _Counted:
@@ -81,41 +83,37 @@ def fast(problem: Problem, constants: Constants | None = None) -> Found:
         ends.append((count(solved), solved))
     metric, logs = min(ends, key=lambda end: end[0])
     if metric > EXACT:
-        metric, logs = _polish(aim, count, logs, metric)
+        metric, logs = min((metric, logs), _polish(aim, count, logs), key=lambda end: end[0])
     return _found(aim, logs, metric, count.calls, begun, len(starts))
 
 
-def _polish(aim: Target, count: _Counted, logs: Array, metric: float) -> tuple[float, Array]:
-    """Down Π_psycho by least squares on the image, then down Π."""
-    width = np.array([1e-2, 1e-2, 1e-4, 1e-2])
-    damping, best, best_at = 1e-3, np.inf, logs
-    reached = image_differences(aim, np.exp(logs))
-    count.calls += 1
-    best = float(reached @ reached)
-    step = np.full(4, STEP)
+def _polish(aim: Target, count: _Counted, start: Array) -> tuple[float, Array]:
+    """Π as the sum of squares it is, by Levenberg and Marquardt; then Nelder and Mead in axes along which Π rises alike."""
+
+    def look(logs: Array) -> tuple[float, Array]:
+        count.calls += 1
+        seen = residuals(aim, np.exp(logs))
+        return float(seen @ seen), seen
+
+    logs, damping = start, 1e-3
+    metric, seen = look(logs)
     for _ in range(POLISH_ROUNDS):
-        slope = np.stack([(image_differences(aim, np.exp(best_at + width * unit)) - reached) / width @ unit for unit in np.eye(4)])
-        count.calls += 4
+        slope = np.stack([(look(logs + WIDTH * unit)[1] - seen) / (WIDTH @ unit) for unit in np.eye(4)])
         normal = slope @ slope.T
-        downhill = slope @ reached
-        while True:
-            shift = np.linalg.solve(normal + damping * np.diag(np.diag(normal) + 1e-300), -downhill)
-            trial = np.clip(best_at + np.clip(shift, -0.5, 0.5), count.low, count.high)
-            tried = image_differences(aim, np.exp(trial))
-            count.calls += 1
-            square = float(tried @ tried)
-            if square < best or damping > 1e3:
+        normal += 1e-12 * np.trace(normal) * np.eye(4)
+        while damping < 1e4:
+            shift = np.linalg.solve(normal + damping * np.diag(np.diag(normal)), -slope @ seen)
+            trial = np.clip(logs + np.clip(shift, -0.5, 0.5), count.low, count.high)
+            tried, there = look(trial)
+            if tried < metric:
                 break
             damping *= 10
-        if square >= best:
+        else:
             break
-        gain, moved = 1 - square / best, trial - best_at
-        best, best_at, reached, damping = square, trial, tried, damping / 10
-        step = np.clip(np.abs(moved), 10 * STEP_TOLERANCE, STEP)
-        if gain < 1e-3:
+        gain = 1 - tried / metric
+        metric, logs, seen, damping = tried, trial, there, damping / 10
+        if gain < 1e-4:
             break
-    there = count(best_at)
-    if there < metric:
-        metric, logs = there, best_at
-    end, low = _walk(count, logs, step, POLISH_MOST)
-    return (low, end) if low < metric else (metric, logs)
+    axes = np.linalg.inv(np.linalg.cholesky(normal)).T * np.sqrt(SIMPLEX * metric)
+    end, low = _walk(lambda u: count(logs + axes @ u), np.zeros(4), np.ones(4), POLISH_MOST)
+    return (low, logs + axes @ end) if low < metric else (metric, logs)
