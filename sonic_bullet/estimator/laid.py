@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from sonic_bullet.estimator.matching import energy, match_ratio_product
+from sonic_bullet.estimator.matching import energy, sift
 from sonic_bullet.estimator.metric import Target
 from sonic_bullet.estimator.problem import Problem, modes_of
 from sonic_bullet.estimator.starts import by_energy, feature_eigenvalues
@@ -146,9 +146,7 @@ def candidates(aim: Target, most: int) -> Array:
         guess = np.log(np.clip(eigen[strong[:1]] / problem.lambda_hat[audible[:1]], problem.lower[2], problem.upper[2]))
     group = np.concatenate([[0], np.cumsum(np.diff(guess) > APART)])
     guess = np.bincount(group, guess) / np.bincount(group)
-    score = np.array(
-        [match_ratio_product(aim.points, *modes_of(np.array([alpha, beta, np.exp(g), 1.0]), problem.lambda_hat, problem.amplitude_hat)) for g in guess]
-    )
+    score = sift(aim.points, problem.lambda_hat, problem.amplitude_hat, alpha, beta, np.exp(guess))
     kept = np.exp(guess[np.argsort(score, kind="stable")[:most]])
     rows = []
     for gamma in kept:

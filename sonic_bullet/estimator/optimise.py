@@ -28,7 +28,7 @@ EXACT = 1e-7
 MOST = 2000
 SIFTED = 6
 POLISH_ROUNDS = 8
-POLISH_MOST = 150
+POLISH_MOST = 100
 WIDTH = np.array([1e-2, 1e-2, 1e-4, 1e-2])  # of the differences that stand for slopes, in the logarithms
 SIMPLEX = 1e-4  # the first simplex's corners are this part of Π higher, were Π a parabola
 
@@ -46,11 +46,11 @@ class _Counted:
         return hybrid(self.aim, np.exp(inside)) + float(((logs - inside) ** 2).sum())
 
 
-def _walk(function: Callable[[Array], float], start: Array, step: Array, most: int) -> tuple[Array, float]:
+def _walk(function: Callable[[Array], float], start: Array, step: Array, most: int, tolerance: float = STEP_TOLERANCE) -> tuple[Array, float]:
     from scipy.optimize import minimize
 
     simplex = np.vstack([start, start + np.diag(step)])
-    options = {"xatol": STEP_TOLERANCE, "fatol": METRIC_TOLERANCE, "maxfev": most, "initial_simplex": simplex}
+    options = {"xatol": tolerance, "fatol": METRIC_TOLERANCE, "maxfev": most, "initial_simplex": simplex}
     result = minimize(function, start, method="Nelder-Mead", options=options)
     return np.asarray(result.x), float(result.fun)
 
@@ -76,12 +76,10 @@ def fast(problem: Problem, constants: Constants | None = None) -> Found:
     begun = time.perf_counter()
     aim = target(problem, constants)
     count = _Counted(aim)
-    starts = candidates(aim, SIFTED)
-    ends = []
-    for start in starts:
-        solved = np.log(laid(problem, start))
-        ends.append((count(solved), solved))
-    metric, logs = min(ends, key=lambda end: end[0])
+    rough = candidates(aim, SIFTED)
+    solved = np.array([laid(problem, start) for start in rough])
+    starts = np.unique(np.vstack([solved, rough]), axis=0)
+    metric, logs = min(((count(start), start) for start in np.log(starts)), key=lambda end: end[0])
     if metric > EXACT:
         metric, logs = min((metric, logs), _polish(aim, count, logs), key=lambda end: end[0])
     return _found(aim, logs, metric, count.calls, begun, len(starts))
@@ -115,5 +113,5 @@ def _polish(aim: Target, count: _Counted, start: Array) -> tuple[float, Array]:
         if gain < 1e-4:
             break
     axes = np.linalg.inv(np.linalg.cholesky(normal)).T * np.sqrt(SIMPLEX * metric)
-    end, low = _walk(lambda u: count(logs + axes @ u), np.zeros(4), np.ones(4), POLISH_MOST)
+    end, low = _walk(lambda u: count(logs + axes @ u), np.zeros(4), np.ones(4), POLISH_MOST, np.inf)
     return (low, logs + axes @ end) if low < metric else (metric, logs)
