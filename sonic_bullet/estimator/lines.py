@@ -1,0 +1,294 @@
+"""Several recordings of one object -> the damped sinusoids they share: frequencies and decays common, amplitudes their own.
+
+    x_s(t) = Re Σ_k A_sk e^{(−d_k + iω_k) t} + noise
+    start:   bands, decimated; poles = eigenvalues of the shift between the rows of the signal subspace of all recordings at once
+                                                                             (ESPRIT)       [Roy & Kailath 1989, eq. 3.12-3.17]
+    refine:  maximum likelihood in white noise, A_sk linear and projected out              [Golub & Pereyra 1973; Kaufman 1975]
+    spread:  inverse of the information matrix at the end, so the Cramér-Rao bound          [Kay 1993, ch. 3.9]
+
+All inner products of damped sinusoids over N samples are geometric sums, closed in w = z_j z_k*: Σ wⁿ, Σ n wⁿ, Σ n² wⁿ.
+"""
+
+# mypy: disable-error-code="no-untyped-def"
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from sonic_bullet.errors import AudioError
+from sonic_bullet.records import Array
+
+FASTEST_PER_S = 2500.0
+SIGNIFICANT = 60.0  # energy of a line over the noise's density, all recordings: a²·sr/(4dσ²) summed
+MOST_LINES = 160
+MOST_WINDOW, MOST_COLUMNS = 300, 1200  # of the data matrix of one recording
+SECONDS_MAX = 8.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Lines:
+    """k lines of s recordings of one object, by frequency. amplitude (s, k) complex at the onset; covariance (2k, 2k) of ω then d, in 1/s.
+
+    noise (s,): rms of what is no line. energy (k,): of a line over the noise's density. signed: phases are true, the onset being known.
+    """
+
+    freq_hz: Array
+    decay_per_s: Array
+    amplitude: Array
+    freq_sd_hz: Array
+    decay_sd_per_s: Array
+    amplitude_sd: Array
+    noise: Array
+    energy: Array
+    signed: bool
+
+
+def joint_lines(signals: Array, sr: int, *, band_hz: tuple[float, float] = (20.0, 20_000.0), signed: bool = True) -> Lines:
+    """Lines of signals (s, n), all starting at the onset of their strike. Raises AudioError where there is too little signal."""
+    signals = np.asarray(signals, float)[:, : int(SECONDS_MAX * sr)]
+    if signals.shape[1] < 256 or not np.isfinite(signals).all():
+        raise AudioError(f"recordings of {signals.shape[1]} samples after the onset", "a fit needs at least 256 finite samples")
+    level = np.sqrt((signals**2).mean(axis=1))
+    if not (level > 1e-9).all():
+        raise AudioError("a recording is silent", "leave it out of the case")
+    low, high = max(band_hz[0], 5.0), min(band_hz[1], 0.485 * sr)
+    noise = noise_rms(signals, sr)
+    pole = _start(signals / noise[:, None], sr, low, high)
+    for _ in range(3):
+        before = len(pole)
+        pole = _polished(signals, noise, pole, sr, low, high)
+        _, _, energy, _ = _solved(signals, noise, pole, sr)
+        pole = pole[energy > SIGNIFICANT]
+        if len(pole) == before or not len(pole):
+            break
+    return _lines(signals, noise, pole, sr, signed)
+
+
+def noise_rms(signals: Array, sr: int) -> Array:
+    """Rms (s,) of the stationary floor, white: from the lower quarter of the spectrum of each recording's last third."""
+    tail = signals[:, -signals.shape[1] // 3 :]
+    power = np.abs(np.fft.rfft(tail * np.hanning(tail.shape[1]), axis=1)) ** 2
+    density = np.quantile(power, 0.25, axis=1) / np.log(4 / 3)  # exponential law: its lower quartile is ln(4/3) of the mean
+    return np.asarray(np.maximum(np.sqrt(density / (np.hanning(tail.shape[1]) ** 2).sum()), 1e-9))
+
+
+def _start(signals: Array, sr: int, low: float, high: float) -> Array:
+    """Poles −d + iω (k,) band by band; signals in units of their noise."""
+    from scipy.signal import firwin, oaconvolve
+
+    poles = []
+    edge = low
+    while edge < high:
+        width = max(350.0, 0.09 * edge)
+        centre = edge + width / 2
+        rate = min(2.2 * width, float(sr))
+        step = max(1, int(sr / rate))
+        taps = firwin(2 * int(1.9 * sr / width) + 1, 0.85 * width, fs=sr) if step > 1 else np.ones(1)
+        turn = np.exp(-2j * np.pi * centre / sr * np.arange(signals.shape[1]))
+        band = oaconvolve(signals * turn, taps[None, :], mode="valid", axes=1)[:, ::step]
+        band /= np.sqrt((taps**2).sum())
+        found = _subspace(band, step / sr)
+        freq = centre + found.imag / (2 * np.pi)
+        keep = (freq >= edge) & (freq < min(edge + width, high)) & (found.real < 0) & (found.real > -FASTEST_PER_S)
+        poles.append(found[keep].real + 2j * np.pi * freq[keep])
+        edge += width
+    return np.concatenate(poles) if poles else np.zeros(0, complex)
+
+
+def _subspace(band: Array, dt: float) -> Array:
+    """Poles of complex series band (s, n) of unit noise at step dt: signal subspace of all of them at once, then the shift."""
+    s, n = band.shape
+    window = min(MOST_WINDOW, n // 3)
+    if window < 8:
+        return np.zeros(0, complex)
+    first = np.arange(0, n - window + 1, 1 + (n - window) // MOST_COLUMNS)  # any columns will do: the shift is between rows
+    gram = np.zeros((window, window), complex)
+    for row in band:
+        data = row[first[:, None] + np.arange(window)]
+        gram += data.T @ data.conj()
+    value, vector = np.linalg.eigh(gram)
+    columns = s * len(first)
+    floor = max(float(np.median(value)) / columns, 0.3)
+    edge = floor * columns * (1 + np.sqrt(window / columns)) ** 2
+    order = min(int((value > 2.0 * edge).sum()), window // 3)
+    if order == 0:
+        return np.zeros(0, complex)
+    signal = vector[:, -order:]
+    shift = np.linalg.lstsq(signal[:-1], signal[1:], rcond=None)[0]
+    with np.errstate(divide="ignore"):
+        return np.asarray(np.log(np.linalg.eigvals(shift)) / dt)
+
+
+@njit(cache=True, nogil=True)
+def _moments(signal, pole):
+    """Σ x zⁿ and Σ n x zⁿ (k,), z = e^pole: Horner's rule from the end."""
+    first, second = np.zeros(len(pole), np.complex128), np.zeros(len(pole), np.complex128)
+    for k in range(len(pole)):
+        z = np.exp(pole[k])
+        power, a, b = 1.0 + 0.0j, 0.0 + 0.0j, 0.0 + 0.0j
+        for n in range(len(signal)):
+            if n % 4096 == 0:
+                power = np.exp(pole[k] * n)
+            term = signal[n] * power
+            a += term
+            b += n * term
+            power *= z
+        first[k], second[k] = a, b
+    return first, second
+
+
+def _sums(log_w: Array, count: int) -> tuple[Array, Array, Array]:
+    """Σ wⁿ, Σ n wⁿ, Σ n² wⁿ over n < count, w = e^log_w; near w = 1 by the integral's series is never needed: |log_w|·count stays above 1e-6."""
+    gap = -np.expm1(log_w)
+    gap = np.where(np.abs(gap) < 1e-12, 1e-12, gap)
+    w, last = np.exp(log_w), np.exp(log_w * count)
+    zeroth = (1 - last) / gap
+    first = (w * zeroth - count * last) / gap
+    second = (w * (zeroth + 2 * first) - count**2 * last) / gap
+    return zeroth, first, second
+
+
+def _products(pole: Array, count: int) -> tuple[list[Array], list[Array]]:
+    """Geometric sums of z_j z_k* and z_j z_k, poles per sample."""
+    return list(_sums(pole[:, None] + pole[None, :].conj(), count)), list(_sums(pole[:, None] + pole[None, :], count))
+
+
+def _inner(a: Array, b: Array, even: Array, odd: Array) -> Array:
+    """<Re(a_j z_jⁿ), Re(b_k z_kⁿ)> (j, k)."""
+    return np.asarray(np.real(a[:, None] * b[None, :].conj() * even + a[:, None] * b[None, :] * odd) / 2)
+
+
+def _basis(even: Array, odd: Array) -> Array:
+    """Gram matrix (2k, 2k) of Re zⁿ and Re i zⁿ."""
+    one, turn = np.ones(len(even), complex), np.full(len(even), 1j)
+    return np.block([[_inner(one, one, even, odd), _inner(one, turn, even, odd)], [_inner(turn, one, even, odd), _inner(turn, turn, even, odd)]])
+
+
+def _factor(gram: Array) -> tuple[Array, Array]:
+    """Cholesky factor of a Gram matrix scaled to unit diagonal, slightly lifted, and the scale."""
+    from scipy.linalg import cholesky
+
+    scale = 1 / np.sqrt(np.diag(gram))
+    return cholesky(gram * scale[:, None] * scale + 1e-10 * np.eye(len(gram)), lower=True), scale
+
+
+def _solve(factor: tuple[Array, Array], right: Array) -> Array:
+    from scipy.linalg import cho_solve
+
+    lower, scale = factor
+    return np.asarray((scale * cho_solve((lower, True), (scale * right.T).T.T if right.ndim == 1 else scale[:, None] * right).T).T)
+
+
+def _solved(signals: Array, noise: Array, pole: Array, sr: int) -> tuple[Array, float, Array, Array]:
+    """amplitude (s, k), half the sum of squares over the noise, energy (k,), residual rms (s,)."""
+    z = pole / sr
+    n = signals.shape[1]
+    even, odd = _products(z, n)
+    factor = _factor(_basis(even[0], odd[0]))
+    k = len(pole)
+    amplitude = np.zeros((len(signals), k), complex)
+    residual = np.zeros(len(signals))
+    for s, signal in enumerate(signals):
+        first, _ = _moments(signal, z)
+        right = np.concatenate([first.real, -first.imag])
+        a = _solve(factor, right)
+        amplitude[s] = a[:k] + 1j * a[k:]
+        residual[s] = max(float(signal @ signal - right @ a), 0.0)
+    power = np.real(np.diag(even[0])) / 2
+    energy = ((np.abs(amplitude) / noise[:, None]) ** 2).sum(axis=0) * power
+    return amplitude, float((residual / noise**2).sum() / 2), energy, np.sqrt(residual / n)
+
+
+def _normal(signals: Array, noise: Array, pole: Array, sr: int) -> tuple[Array, Array, float]:
+    """Gauss-Newton matrix (2k, 2k) and gradient (2k,) for (ω, d) with the amplitudes projected out, and half the sum of squares."""
+    z, n, k = pole / sr, signals.shape[1], len(pole)
+    even, odd = _products(z, n)
+    factor = _factor(_basis(even[0], odd[0]))
+    one, turn = np.ones(k, complex), np.full(k, 1j)
+    matrix, gradient, cost = np.zeros((2 * k, 2 * k)), np.zeros(2 * k), 0.0
+    for signal, sigma in zip(signals, noise, strict=True):
+        first, second = _moments(signal, z)
+        right = np.concatenate([first.real, -first.imag])
+        a = _solve(factor, right)
+        amplitude = a[:k] + 1j * a[k:]
+        move = np.concatenate([1j * amplitude, -amplitude]) / sr  # ∂/∂ω, ∂/∂d in seconds
+        cross = np.zeros((2 * k, 2 * k))
+        square = np.zeros((2 * k, 2 * k))
+        for i in range(2):
+            here = slice(i * k, i * k + k)
+            cross[:k, here] = _inner(one, move[here], even[1], odd[1])
+            cross[k:, here] = _inner(turn, move[here], even[1], odd[1])
+            for j in range(2):
+                there = slice(j * k, j * k + k)
+                square[here, there] = _inner(move[here], move[there], even[2], odd[2])
+        matrix += (square - cross.T @ _solve(factor, cross)) / sigma**2
+        seen = np.concatenate([np.real(move[:k] * second), np.real(move[k:] * second)])
+        gradient += (seen - cross.T @ a) / sigma**2
+        cost += max(float(signal @ signal - right @ a), 0.0) / sigma**2 / 2
+    return matrix, gradient, cost
+
+
+def _polished(signals: Array, noise: Array, pole: Array, sr: int, low: float, high: float) -> Array:
+    """Poles at the maximum of the likelihood, from the k nearest start."""
+    pole = _apart(pole)
+    if not len(pole):
+        return pole
+    if len(pole) > MOST_LINES:
+        _, _, energy, _ = _solved(signals, noise, pole, sr)
+        pole = pole[np.argsort(-energy)[:MOST_LINES]]
+    damping = 1e-4
+    matrix, gradient, cost = _normal(signals, noise, pole, sr)
+    for _ in range(12):
+        k = len(pole)
+        scale = 1 / np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+        step = scale * np.linalg.solve(matrix * scale[:, None] * scale + damping * np.eye(2 * k), gradient * scale)
+        reach = 0.3 * -pole.real + 1.0
+        move = np.clip(step[:k], -reach, reach) * 1j - np.clip(step[k:], -reach, reach)
+        trial = pole + move
+        trial = np.clip(trial.real, -FASTEST_PER_S, -0.02) + 1j * np.clip(trial.imag, 2 * np.pi * low, 2 * np.pi * high)
+        found = _normal(signals, noise, trial, sr)
+        if found[2] <= cost:
+            done = cost - found[2] < 1e-3
+            pole, (matrix, gradient, cost) = trial, found
+            damping = max(damping / 10, 1e-9)
+            if done:
+                break
+        else:
+            damping *= 30
+            if damping > 1e4:
+                break
+    return pole
+
+
+def _apart(pole: Array) -> Array:
+    """Poles sorted by frequency without near doubles, which no recording of finite length tells apart."""
+    pole = pole[np.argsort(pole.imag)]
+    keep = np.ones(len(pole), bool)
+    for i in range(1, len(pole)):
+        j = i - 1
+        while j >= 0 and not keep[j]:
+            j -= 1
+        if j >= 0 and abs(pole[i] - pole[j]) < 0.1 * min(-pole[i].real, -pole[j].real) + 0.2:
+            keep[i] = False
+    return np.asarray(pole[keep])
+
+
+def _lines(signals: Array, noise: Array, pole: Array, sr: int, signed: bool) -> Lines:
+    k, s = len(pole), len(signals)
+    if k == 0:
+        none = np.zeros(0)
+        return Lines(none, none, np.zeros((s, 0), complex), none, none, np.zeros((s, 0)), noise, none, signed)
+    amplitude, _, energy, residual = _solved(signals, noise, pole, sr)
+    level = np.maximum(noise, residual)  # what the lines leave is noise too, to whoever asks how sure they are
+    matrix, _, _ = _normal(signals, level, pole, sr)
+    scale = 1 / np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+    spread = np.sqrt(np.maximum(np.diag(np.linalg.pinv(matrix * scale[:, None] * scale)), 0)) * scale
+    even, odd = _products(pole / sr, signals.shape[1])
+    gram = _basis(even[0], odd[0])
+    width = 1 / np.sqrt(np.diag(gram))
+    root = np.sqrt(np.diag(np.linalg.pinv(gram * width[:, None] * width))) * width
+    return Lines(
+        pole.imag / (2 * np.pi), -pole.real, amplitude, spread[:k] / (2 * np.pi), spread[k:], level[:, None] * np.maximum(root[:k], root[k:]), residual, energy, signed
+    )

@@ -1,0 +1,90 @@
+"""Lines -> α and β: d = ½(α + βλ), λ = ω² + d² [Ren, Yeh, Lin 2013, eq. 6-8], by least squares that notices where the law does not hold.
+
+    Σ w (d − ½α − ½βλ)² → min,  w = c/(s² + (τd)²),  τ: the least relative scatter that makes the residuals as large as their spreads
+                                                                                        [Paule & Mandel 1982], c: Cauchy's weight of outliers
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sonic_bullet.records import Array
+
+SURE = 0.5  # a parameter whose logarithm is surer than this is told by the lines
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Damping:
+    """alpha_per_s, beta_s; covariance (2, 2) of their logarithms, NaN where the lines do not say; scatter: τ; said: what is not identifiable."""
+
+    alpha_per_s: float
+    beta_s: float
+    covariance: Array
+    scatter: float
+    said: tuple[str, ...]
+
+
+def rayleigh(lambda_per_s2: Array, decay_per_s: Array, decay_sd_per_s: Array, guess: tuple[float, float]) -> Damping:
+    """α and β of lines (k,). guess: (α, β) whose ratio stands in for what one line cannot tell."""
+    good = np.isfinite(decay_per_s) & (decay_per_s > 0)
+    lam, decay = lambda_per_s2[good], decay_per_s[good]
+    spread = np.where(np.isfinite(decay_sd_per_s[good]), decay_sd_per_s[good], 0.05 * decay)
+    unknown = np.full((2, 2), np.nan)
+    if len(lam) == 0:
+        return Damping(*guess, unknown, np.nan, ("alpha", "beta"))
+    if len(lam) == 1 or np.ptp(np.log(lam)) < 0.05:
+        weight = spread**-2
+        share = 0.5 * (guess[0] + guess[1] * lam)
+        scale = float((weight * decay * share).sum() / (weight * share**2).sum())
+        return Damping(scale * guess[0], scale * guess[1], unknown, np.nan, ("alpha", "beta"))
+    value, information, scatter = _scattered(lam, decay, np.maximum(spread, 1e-6 * decay))
+    said = []
+    with np.errstate(divide="ignore", invalid="ignore"):
+        covariance = np.linalg.inv(information) / np.outer(value, value)
+        for i, name in enumerate(("alpha", "beta")):
+            if not (value[i] > 0 and 0 <= covariance[i, i] < SURE**2):
+                said.append(name)
+                covariance[i, :] = covariance[:, i] = np.nan
+    return Damping(float(value[0]), float(value[1]), covariance, scatter, tuple(said))
+
+
+def _scattered(lam: Array, decay: Array, spread: Array) -> tuple[Array, Array, float]:
+    """Values, information, τ."""
+    freedom = max(len(lam) - 2, 1)
+
+    def at(tau: float) -> tuple[Array, Array, float]:
+        value, information, chi = _weighted(lam, decay, np.hypot(spread, tau * decay))
+        return value, information, chi - freedom
+
+    low, high = 0.0, 3.0
+    best = at(low)
+    if len(lam) == 2 or best[2] <= 2 * np.sqrt(2 * freedom):  # the law holds as far as can be told
+        return best[0], best[1] / max(1.0, best[2] / freedom + 1), 0.0
+    for _ in range(40):
+        middle = (low + high) / 2
+        best = at(middle)
+        low, high = (middle, high) if best[2] > 0 else (low, middle)
+    return best[0], best[1], high
+
+
+def _weighted(lam: Array, decay: Array, sd: Array) -> tuple[Array, Array, float]:
+    """Values (2,) >= 0, information (2, 2), Σ of squared residuals, each cut at 9."""
+    slope = np.stack([np.full(len(lam), 0.5), 0.5 * lam], axis=1) / sd[:, None]
+    scale = 1 / np.sqrt((slope**2).sum(axis=0))
+    weight = np.ones(len(lam))
+    value = np.zeros(2)
+    for _ in range(20):
+        a = slope * scale * np.sqrt(weight)[:, None]
+        value = _not_negative(a, decay / sd * np.sqrt(weight))
+        residual = decay / sd - slope @ (value * scale)
+        weight = 1 / (1 + (residual / 3.0) ** 2) if len(lam) > 3 else weight
+    value = value * scale
+    return value, (slope * weight[:, None]).T @ slope, float(np.minimum(residual**2, 9.0).sum())
+
+
+def _not_negative(a: Array, b: Array) -> Array:
+    from scipy.optimize import nnls
+
+    return np.asarray(nnls(a, b)[0])

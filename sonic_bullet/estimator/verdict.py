@@ -1,0 +1,172 @@
+"""What a fit may claim: covariance, what is not identifiable, where the model does not fit, and whether the mesh is fine enough.
+
+    fitted | not identifiable: WHICH and why | misfit: WHAT does not hold      parts joined by "; ", "fitted" alone where nothing is amiss
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from sonic_bullet.errors import SonicBulletError
+from sonic_bullet.estimator import fit as fits
+from sonic_bullet.estimator.distance import log_spectral_db, with_noise
+from sonic_bullet.estimator.evidence import Evidence
+from sonic_bullet.estimator.predict import predicted
+from sonic_bullet.estimator.rayleigh import Damping
+from sonic_bullet.estimator.values import MaterialFit
+from sonic_bullet.files.cases import Case
+from sonic_bullet.records import Array, Material
+
+DAMPING_MISFIT = 0.03  # relative scatter of decays about the law beyond their spreads
+AMPLITUDE_MISFIT = 0.25
+FREQUENCY_MISFIT = 0.01
+FOREIGN = 1e-3  # of the strongest line's energy
+PAIRED = 0.6  # share of strong lines that must be modes
+MESH_MOVES = 0.01
+HALVING = 8.0  # halving takes this part of what doubling did: order 3 at least, 4 where the surface is smooth [Strang & Fix 1973, ch. 6.3]
+
+
+def finished(
+    case: Case,
+    evidence: tuple[Evidence, ...],
+    objects: tuple[fits.ObjectFit, ...],
+    elastic: tuple[float, float, Array, float],
+    damping: Damping,
+    gain: tuple[float, float, float],
+    *,
+    check_mesh: bool,
+    progress: Callable[[str], None] | None,
+) -> fits.CaseFit:
+    """The CaseFit of all that was found."""
+    log_gamma, poisson, information, scatter = elastic
+    guess = evidence[0].guess
+    covariance = np.full((5, 5), np.nan)
+    unsaid: list[str] = []
+    for name in damping.said:
+        unsaid.append(f"{name} (the decays of {_decays_seen(evidence)} lines do not tell it)")
+    covariance[:2, :2] = damping.covariance
+    _elastic(covariance, information, scatter, unsaid, bool(objects))
+    if np.isfinite(gain[0]):
+        covariance[3, 3] = (gain[1] / gain[0]) ** 2
+        unsaid_gain = [e for e in evidence if e.seen is not None and not e.seen.level.all()]
+        if unsaid_gain:
+            unsaid.append("sigma (no impulse declared: it stands for gain times impulse)")
+    else:
+        unsaid.append("sigma (no strike of known place)")
+    foreign, share = _foreign(evidence, objects)
+    amiss = _amiss(objects, damping, scatter, gain[2], foreign, share)
+    amplitude = gain[0] if np.isfinite(gain[0]) else 1.0
+    metric = _metric(case, objects, amplitude)
+    verdict = "; ".join([f"misfit: {', '.join(amiss)}"] * bool(amiss) + [f"not identifiable: {', '.join(unsaid)}"] * bool(unsaid)) or "fitted"
+    freq, decay, size = _modes(evidence, objects, amplitude)
+    gamma = float(np.exp(log_gamma))
+    values = (damping.alpha_per_s, damping.beta_s, gamma, amplitude, poisson)
+    found = MaterialFit(*values, covariance, verdict, metric, freq, decay, size)
+    density = guess.density_kg_m3
+    assumed = ["density (from the guess: modes tell E/ρ alone, and the gain is unknown)"]
+    if np.isnan(covariance[4, 4]):
+        assumed.append("poisson_ratio (from the guess)")
+    if not objects:
+        assumed.append("gamma (from the guess: no mesh)")
+    warnings = [note for e in evidence for note in e.notes]
+    if check_mesh and objects and not np.isnan(covariance[2, 2]):
+        warnings += mesh_warning(objects[0], gamma * density, density, poisson, progress)
+    return fits.CaseFit(case, found, objects, gamma * density, density, gain[1], damping.scatter, scatter, gain[2], foreign, tuple(assumed), tuple(warnings))
+
+
+def _decays_seen(evidence: tuple[Evidence, ...]) -> int:
+    return int(sum(np.isfinite(e.lines.decay_per_s).sum() for e in evidence))
+
+
+def _elastic(covariance: Array, information: Array, scatter: float, unsaid: list[str], shaped: bool) -> None:
+    """Fill in ln γ and ν."""
+    if not shaped or information[0, 0] <= 0:
+        unsaid += ["gamma (no mode of a known shape)", "poisson_ratio"]
+        return
+    size = max((scatter / fits.MESH_SD) ** 2, 0.04) if np.isfinite(scatter) else 1.0
+    determinant = np.linalg.det(information)
+    own = np.linalg.inv(information) * size if determinant > 1e-12 * information[0, 0] * information[1, 1] else np.full((2, 2), np.inf)
+    if own[1, 1] < fits.POISSON_TOLD**2:
+        covariance[np.ix_([2, 4], [2, 4])] = own
+        return
+    unsaid.append("poisson_ratio (the lines change with it as with gamma)")
+    covariance[2, 2] = np.linalg.inv(information / size + np.diag([0, fits.POISSON_SD**-2]))[0, 0]
+
+
+def _foreign(evidence: tuple[Evidence, ...], objects: tuple[fits.ObjectFit, ...]) -> tuple[Array, float]:
+    """Frequencies of strong lines that are no mode, and the share of strong lines' worth that are modes."""
+    hz: list[float] = []
+    good = total = 0.0
+    for o in objects:
+        lines = o.evidence.lines
+        strong = lines.energy >= FOREIGN * lines.energy.max(initial=0)
+        taken = np.isin(np.arange(len(lines.freq_hz)), o.line[o.line >= 0])
+        hz += list(lines.freq_hz[strong & ~taken])
+        good, total = good + float((strong & taken).sum()), total + float(strong.sum())
+    return np.array(sorted(hz)), good / total if total else np.nan
+
+
+def _amiss(objects: tuple[fits.ObjectFit, ...], damping: Damping, scatter: float, amplitude: float, foreign: Array, share: float) -> list[str]:
+    amiss = []
+    if objects and len(foreign):
+        shown = ", ".join(f"{f:.0f}" for f in foreign[:6]) + (" …" if len(foreign) > 6 else "")
+        amiss.append(f"{len(foreign)} strong lines belong to no mode ({shown} Hz)")
+    if np.isfinite(share) and share < PAIRED:
+        amiss.append(f"only {share:.0%} of the strong lines are modes of this mesh")
+    if np.isfinite(scatter) and scatter > FREQUENCY_MISFIT:
+        amiss.append(f"frequencies scatter by {scatter:.1%} about an isotropic body's")
+    if np.isfinite(damping.scatter) and damping.scatter > DAMPING_MISFIT:
+        amiss.append(f"decays scatter by {damping.scatter:.0%} about Rayleigh's law")
+    if np.isfinite(amplitude) and amplitude > AMPLITUDE_MISFIT:
+        amiss.append(f"amplitudes scatter by {amplitude:.0%} about the model's")
+    return amiss
+
+
+def _metric(case: Case, objects: tuple[fits.ObjectFit, ...], gain: float) -> float:
+    """Mean log-spectral distance in dB of recording and synthesis over the fitted strikes; -1 where there is nothing to compare."""
+    found = []
+    for o in objects:
+        e = o.evidence
+        if e.signals is None or e.seen is None:
+            continue
+        for i in np.flatnonzero(e.seen.known):
+            made = predicted(o, o.pattern[i], gain, e.signals.shape[1], e.sr)
+            noise = float(e.lines.noise[i])
+            found.append(log_spectral_db(e.signals[i], with_noise(made, noise, int(i)), noise))
+    found = [f for f in found if np.isfinite(f)]
+    return float(np.mean(found)) if found else -1.0
+
+
+def _modes(evidence: tuple[Evidence, ...], objects: tuple[fits.ObjectFit, ...], gain: float) -> tuple[Array, Array, Array]:
+    """Modes of the first object at its first strike; the lines themselves where there is no shape."""
+    if objects:
+        o = objects[0]
+        lines = o.evidence.lines
+        pattern = np.abs(o.pattern[0]) * gain
+        measured = np.abs(lines.amplitude[0][o.line]) if len(lines.freq_hz) else np.zeros(len(o.line))
+        return o.freq_hz, o.decay_per_s, np.nan_to_num(np.where(np.isfinite(pattern), pattern, np.where(o.line >= 0, measured, 0.0)))
+    lines = evidence[0].lines
+    return lines.freq_hz, np.nan_to_num(lines.decay_per_s), np.nan_to_num(np.abs(lines.amplitude[0]))
+
+
+def mesh_warning(o: fits.ObjectFit, youngs_pa: float, density: float, poisson: float, progress: Callable[[str], None] | None) -> list[str]:
+    """A warning where halving the elements would move γ by over 1 %, judged by doubling them."""
+    from sonic_bullet.geometry import face_areas_m2
+    from sonic_bullet.modal import analyse, read_mesh
+
+    e = o.evidence
+    if e.family is None or e.thing.mesh is None:
+        return []
+    area = float(np.median(face_areas_m2(e.family.vertex_m, e.family.face))) * 4
+    edge = float(np.sqrt(area * 4 / np.sqrt(3)))
+    value = np.sqrt(e.family.modes(youngs_pa / density, poisson)[0]) / (2 * np.pi)
+    count = int(min(12, len(value)))
+    try:
+        material = Material.isotropic("fit", youngs_pa=youngs_pa, poisson=poisson, density_kg_m3=density)
+        coarse = analyse((read_mesh(e.thing.mesh, e.thing.scale),), material, count=count, fixed=e.thing.fixed, edge_m=2 * edge, cache=None, progress=progress)
+    except SonicBulletError as error:
+        return [f"mesh error not known: a mesh of twice the size fails ({error.what})"]
+    moved = float(np.median(2 * np.log(coarse.freq_hz[:count] / value[: len(coarse.freq_hz[:count])]))) / HALVING
+    return [f"halving the mesh size would move gamma by about {moved:.1%}"] if abs(moved) > MESH_MOVES else []

@@ -1,0 +1,270 @@
+"""Cases: recorded strikes of known objects, and what whoever recorded them declares.
+
+    FOLDER/case.json ("sonic-bullet-case/1") -> typed, every path inside the folder -> Case
+
+A case may lack a mesh, positions, impulses, a sensor, or give measured `features` in place of a file; what it does not declare is None and is
+found by the fit, or said to be unknown. Fields that this version does not know are left alone. Nothing in a case is ever executed.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from sonic_bullet.errors import FileError
+
+FORMAT = "sonic-bullet-case/1"
+BYTES_MAX = 1 << 24
+UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
+SPLITS = ("fit", "holdout", "transfer")
+Vector = tuple[float, float, float]
+
+
+class _Elastic(msgspec.Struct, frozen=True):
+    youngs_modulus: float | None = None
+    density: float | None = None
+    poisson_ratio: float | None = None
+
+
+class _Object(msgspec.Struct, frozen=True):
+    mesh: str | None = None
+    units: str = "m"
+    material: str | None = None
+    elastic_guess: _Elastic = _Elastic()
+
+
+class _Fixed(msgspec.Struct, frozen=True):
+    position: Vector
+    radius: float = 0.0
+    object: str | None = None
+
+
+class _Support(msgspec.Struct, frozen=True):
+    fixed: tuple[_Fixed, ...] = ()
+
+
+class _Sensor(msgspec.Struct, frozen=True):
+    type: str = ""
+    response: str = ""
+    position: dict[str, Vector] | Vector | None = None
+    direction: dict[str, Vector] | Vector | None = None
+
+
+class _Force(msgspec.Struct, frozen=True):
+    file: str
+    channel: int = 0
+    newton_per_unit: float | None = None
+
+
+class _Strike(msgspec.Struct, frozen=True):
+    position: Vector | None = None
+    direction: Vector | None = None
+    impulse: float | None = None
+    force: _Force | None = None
+
+
+class Line(msgspec.Struct, frozen=True):
+    """A measured resonance: freq_hz, and what else was measured of it."""
+
+    freq_hz: float
+    decay_per_s: float | None = None
+    freq_sd_hz: float | None = None
+    decay_sd_per_s: float | None = None
+    amplitude: float | None = None
+
+
+class _Recording(msgspec.Struct, frozen=True):
+    file: str | None = None
+    features: tuple[Line, ...] | None = None
+    object: str | None = None
+    split: str = "fit"
+    strike: _Strike = _Strike()
+    channel: int = 0
+
+
+class _Raw(msgspec.Struct, frozen=True):
+    format: str
+    recordings: tuple[_Recording, ...]
+    objects: dict[str, _Object] = {}
+    case: str = ""
+    support: _Support | str | None = None
+    sensor: _Sensor | None = None
+    band_hz: tuple[float, float] | None = None
+    onset: str | float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class CaseObject:
+    """One object: its mesh file and metres per unit, the name of the guessed material, and guessed constants in SI units."""
+
+    name: str
+    mesh: Path | None
+    scale: float
+    material: str | None
+    youngs_pa: float | None = None
+    density_kg_m3: float | None = None
+    poisson: float | None = None
+    fixed: tuple[tuple[float, float, float, float], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class CaseRecording:
+    """One strike: an audio file or measured lines, on which object, for what use, and where and how hard; None where not declared."""
+
+    file: Path | None
+    lines: tuple[Line, ...] | None
+    object: str
+    split: str
+    position_m: Vector | None = None
+    direction: Vector | None = None
+    impulse_n_s: float | None = None
+    channel: int = 0
+    force: tuple[Path, int, float | None] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """A case. sensor: "velocity" (of the surface at sensor_m along sensor_direction, by object), "pressure" (a microphone), "sum" (of modes) or "unknown".
+
+    onset_s: when the impulse arrives in every file, or None. support: as declared, in words; clamps stand with the objects.
+    """
+
+    name: str
+    folder: Path
+    objects: dict[str, CaseObject]
+    recordings: tuple[CaseRecording, ...]
+    sensor: str = "unknown"
+    sensor_m: dict[str, Vector] | None = None
+    sensor_direction: dict[str, Vector] | None = None
+    band_hz: tuple[float, float] = (20.0, 20_000.0)
+    onset_s: float | None = None
+    support: str = ""
+
+
+def read_case(folder: str | os.PathLike[str]) -> Case:
+    """The case in a folder (or of a case.json). Raises FileError naming the file and what is wrong with it; audio may be missing."""
+    path = Path(folder)
+    if path.is_dir():
+        path = path / "case.json"
+    try:
+        with path.open("rb") as file:
+            content = file.read(BYTES_MAX + 1)
+    except (OSError, ValueError) as error:
+        raise FileError(f"cannot read case {path}: {getattr(error, 'strerror', None) or error}", "give a folder with a case.json") from error
+    if len(content) > BYTES_MAX:
+        raise FileError(f"case {path} is over 16 MiB", "give a case.json")
+    try:
+        raw = msgspec.json.decode(content, type=_Raw)
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise FileError(f"case {path}: {error}", "mend that field; docs/measurements-fit.md describes the file") from error
+    if raw.format != FORMAT:
+        raise FileError(f"case {path} has format '{raw.format}', wanted '{FORMAT}'", "use a sonic_bullet that knows that format")
+    if not raw.recordings:
+        raise FileError(f"case {path} has no recordings", "list at least one strike")
+    return _case(raw, path)
+
+
+def _case(raw: _Raw, path: Path) -> Case:
+    folder = path.parent
+    clamps = raw.support.fixed if isinstance(raw.support, _Support) else ()
+    for clamp in clamps:
+        if clamp.radius < 0 or (clamp.object is not None and clamp.object not in raw.objects):
+            raise FileError(f"case {path}: a clamp has radius {clamp.radius:g} m on object '{clamp.object}'", "give a radius of at least 0, and a listed object")
+    objects = {name: _object(name, thing, folder, clamps) for name, thing in raw.objects.items()}
+    only = next(iter(objects)) if len(objects) == 1 else None
+    recordings = tuple(_recording(entry, i, objects, only, path) for i, entry in enumerate(raw.recordings))
+    sensor = raw.sensor or _Sensor()
+    low, high = raw.band_hz or (20.0, 20_000.0)
+    if not 0 <= low < high:
+        raise FileError(f"case {path}: band_hz is {low:g} to {high:g}", "give a low and a high frequency")
+    places, directions = (_by_object(value, objects) for value in (sensor.position, sensor.direction))
+    return Case(raw.case or folder.name, folder, objects, recordings, _response(sensor), places, directions, (low, high), _onset(raw.onset), _said(raw.support))
+
+
+def _object(name: str, thing: _Object, folder: Path, clamps: tuple[_Fixed, ...]) -> CaseObject:
+    if thing.units not in UNITS:
+        raise FileError(f"object '{name}': unit '{thing.units}' is not known", f"use one of {', '.join(UNITS)}")
+    guess = thing.elastic_guess
+    for key, value in (("youngs_modulus", guess.youngs_modulus), ("density", guess.density)):
+        if value is not None and not 0 < value < 1e16:
+            raise FileError(f"object '{name}': {key} is {value:g}", "give SI units, above zero")
+    if guess.poisson_ratio is not None and not -0.99 < guess.poisson_ratio < 0.5:
+        raise FileError(f"object '{name}': poisson_ratio is {guess.poisson_ratio:g}", "Poisson's ratio lies between -1 and 0.5")
+    fixed = tuple((*clamp.position, clamp.radius) for clamp in clamps if clamp.object in (None, name))
+    mesh = inside(folder, thing.mesh) if thing.mesh is not None else None
+    return CaseObject(name, mesh, UNITS[thing.units], thing.material, guess.youngs_modulus, guess.density, guess.poisson_ratio, fixed)
+
+
+def _recording(entry: _Recording, number: int, objects: dict[str, CaseObject], only: str | None, path: Path) -> CaseRecording:
+    where = f"case {path}: recording {number + 1}"
+    name = entry.object or only or ("" if not objects else None)
+    if name is None or (objects and name not in objects):
+        raise FileError(f"{where} is of object '{entry.object}', which is not listed", f"use one of {', '.join(objects)}")
+    if entry.split not in SPLITS:
+        raise FileError(f"{where} has split '{entry.split}'", f"use one of {', '.join(SPLITS)}")
+    if entry.file is None and entry.features is None:
+        raise FileError(f"{where} has neither file nor features", "give one of them")
+    for line in entry.features or ():
+        if not line.freq_hz > 0 or (line.decay_per_s or 0) < 0:
+            raise FileError(f"{where}: a feature of {line.freq_hz:g} Hz and decay {line.decay_per_s}", "give frequencies above zero and decays of at least zero")
+    strike = entry.strike
+    direction = strike.direction
+    if direction is not None:
+        length = math.sqrt(sum(x * x for x in direction))
+        if not length > 0:
+            raise FileError(f"{where}: the strike's direction is zero", "give the direction of the impulse")
+        direction = (direction[0] / length, direction[1] / length, direction[2] / length)
+    if strike.impulse is not None and not strike.impulse > 0:
+        raise FileError(f"{where}: impulse is {strike.impulse:g} N·s", "give it above zero, or leave it out")
+    force = strike.force
+    kept = (inside(path.parent, force.file), force.channel, force.newton_per_unit) if force is not None else None
+    file = inside(path.parent, entry.file) if entry.file is not None else None
+    return CaseRecording(file, entry.features, name, entry.split, strike.position, direction, strike.impulse, entry.channel, kept)
+
+
+def inside(folder: Path, name: str) -> Path:
+    """The path of a file a case names. Raises FileError where it leads out of the folder, by name or by link."""
+    if not name or "\0" in name or os.path.isabs(name) or "\\" in name:
+        raise FileError(f"case names the file {name!r}", "name files inside the case's folder")
+    whole = os.path.realpath(folder / name)
+    if not whole.startswith(os.path.join(os.path.realpath(folder), "")):
+        raise FileError(f"case names the file '{name}', which lies outside its folder", "name files inside the case's folder")
+    return folder / name
+
+
+def _by_object(value: dict[str, Vector] | Vector | None, objects: dict[str, CaseObject]) -> dict[str, Vector] | None:
+    if value is None or isinstance(value, dict):
+        return value
+    return dict.fromkeys(objects or [""], value)
+
+
+def _response(sensor: _Sensor) -> str:
+    """What is recorded: the declared response decides, then the sensor's type."""
+    for text in (sensor.response.lower(), sensor.type.lower()):
+        if "velocity" in text or "vibromet" in text:
+            return "velocity"
+        if "pressure" in text or "microphone" in text:
+            return "pressure"
+        if "sum" in text and "mode" in text or "modal" in text:
+            return "sum"
+    return "unknown"
+
+
+def _onset(value: Any) -> float | None:
+    """A number of seconds, or "sample K" in words; None where it is not said."""
+    if isinstance(value, (int, float)):
+        return float(value)
+    if isinstance(value, str) and "sample 0" in value.lower():
+        return 0.0
+    return None
+
+
+def _said(support: _Support | str | None) -> str:
+    if isinstance(support, _Support):
+        return f"clamped at {len(support.fixed)} places" if support.fixed else "free"
+    return support or "not declared"

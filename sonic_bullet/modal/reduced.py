@@ -1,0 +1,161 @@
+"""All isotropic materials of one body at once: its modes at two Poisson's ratios span those between, and a little beyond.
+
+    K(E, ν) = E [ l(ν) K_l + s(ν) K_s ],   l = ν/((1+ν)(1−2ν)),  s = 1/(2(1+ν))                    [Hughes 1987, ch. 2.7]
+    V: modes at ν₁ and ν₂ together, VᵀMV = 1;   (l VᵀK_lV + s VᵀK_sV) q = θ q,  λ = γ θ/L²,  γ = E/ρ     [Rayleigh-Ritz]
+
+The error of λ is of the fourth order in the distances from ν₁ and ν₂. Lengths by the body's diagonal L, as in model.py.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from sonic_bullet.errors import MeshError, ModalError
+from sonic_bullet.modal import cache as store
+from sonic_bullet.modal.model import MOST_MODES, SHIFT, _diagonal_m
+from sonic_bullet.records import Array, Shape
+from sonic_bullet.surface_index import closest_point
+
+APART = 0.05  # of ν₁ and ν₂ from the guess
+POISSON = (-0.5, 0.485)
+KEPT = ("lame", "shear", "skin", "vertex", "face", "numbers")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Family:
+    """A body's modes for every γ = E/ρ and ν. lame, shear (b, b): reduced stiffness. skin (v, 3, b) float32: the basis on the surface at ρL³ = 1 kg.
+
+    vertex_m (v, 3), face (4t, 3): the surface, each element's face cut in four. count: how many of the lowest modes are true.
+    """
+
+    lame: Array
+    shear: Array
+    skin: Array
+    vertex_m: Array
+    face: Array
+    length_m: float
+    volume_m3: float
+    count: int
+    note: str
+
+    def modes(self, gamma_m2_s2: float, poisson: float) -> tuple[Array, Array]:
+        """λ (m,) in 1/s² ascending, and the modes (b, m) in the basis: `points` turns them into shapes."""
+        value, vector = np.linalg.eigh(_stiffness(self, poisson))
+        return value[: self.count] * gamma_m2_s2 / self.length_m**2, vector[:, : self.count]
+
+    def slope(self, poisson: float, vector: Array) -> Array:
+        """∂ ln λ/∂ν (m,) of modes (b, m) at ν. Source: Hellmann-Feynman, λ' = qᵀK'q."""
+        lame = (1 + 2 * poisson**2) / ((1 + poisson) ** 2 * (1 - 2 * poisson) ** 2)
+        shear = -1 / (2 * (1 + poisson) ** 2)
+        bent = np.einsum("bm,bc,cm->m", vector, lame * self.lame + shear * self.shear, vector)
+        return np.asarray(bent / np.einsum("bm,bc,cm->m", vector, _stiffness(self, poisson), vector))
+
+    def points(self, position_m: Array, direction: Array) -> tuple[Array, Array]:
+        """Basis (k, b) at the surface points nearest to position_m (k, 3), along direction (k, 3), and how far off (k,) in m they lie.
+
+        Divide by √(ρL³) for shapes per √kg. Quadratic over each element's face, as the elements themselves are.
+        """
+        face, weight, distance = closest_point(self.vertex_m, self.face, np.asarray(position_m, float))
+        rows = np.empty((len(face), self.skin.shape[2]))
+        for i, (f, w) in enumerate(zip(face, weight, strict=True)):
+            node, share = _quadratic(self.face[f // 4 * 4 : f // 4 * 4 + 4], int(f % 4), w)
+            rows[i] = np.einsum("n,nxb,x->b", share, self.skin[node].astype(float), direction[i])
+        return rows, distance
+
+
+def _stiffness(family: Family, poisson: float) -> Array:
+    return np.asarray(poisson / ((1 + poisson) * (1 - 2 * poisson)) * family.lame + family.shear / (2 * (1 + poisson)))
+
+
+def _quadratic(quarters: Array, which: int, weight: Array) -> tuple[Array, Array]:
+    """The six nodes of an element's face and their shape functions at barycentric ``weight`` of one of its quarters (see solid.QUARTERS)."""
+    middle = quarters[3]
+    node = np.array([quarters[0, 0], quarters[1, 1], quarters[2, 2], *middle])
+    corner = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [0.5, 0.5, 0], [0, 0.5, 0.5], [0.5, 0, 0.5]])  # of nodes 0-2, then edges 01, 12, 20
+    place = {int(n): corner[k] for k, n in enumerate(node)}
+    a, b, c = weight @ np.array([place[int(n)] for n in quarters[which]])
+    return node, np.array([a * (2 * a - 1), b * (2 * b - 1), c * (2 * c - 1), 4 * a * b, 4 * b * c, 4 * c * a])
+
+
+def family(
+    shape: Shape,
+    *,
+    gamma_m2_s2: float,
+    poisson: float,
+    to_hz: float,
+    fixed: tuple[tuple[float, float, float, float], ...] = (),
+    edge_m: float | None = None,
+    cache: store.Place = "default",
+    progress: Callable[[str], None] | None = None,
+) -> Family:
+    """The family of one body about a guess, its modes true up to to_hz at the guessed γ. fixed, edge_m, cache, progress: as in `analyse`.
+
+    Raises MeshError, ModalError.
+    """
+    say = progress or (lambda _: None)
+    length = _diagonal_m((shape,))
+    limit = (2 * np.pi * to_hz) ** 2 * length**2 / gamma_m2_s2
+    clamp = np.array(fixed, float).reshape(-1, 4)
+    name = store.key("family", shape.vertex_m, shape.face, edge_m, clamp, poisson, limit)
+    found = store.load(cache, name)
+    if found is not None and set(found[0]) == set(KEPT):
+        a, note = found
+        return Family(a["lame"], a["shear"], a["skin"], a["vertex"], a["face"], length, float(a["numbers"][0]), int(a["numbers"][1]), note)
+    made = _family(shape, length, limit, poisson, clamp, edge_m, say)
+    numbers = np.array([made.volume_m3, made.count])
+    arrays = {"lame": made.lame, "shear": made.shear, "skin": made.skin, "vertex": made.vertex_m, "face": made.face, "numbers": numbers}
+    store.save(cache, name, arrays, made.note)
+    return made
+
+
+def _family(shape: Shape, length: float, limit: float, poisson: float, clamp: Array, edge_m: float | None, say: Callable[[str], None]) -> Family:
+    from sonic_bullet.modal import eigen, fem
+    from sonic_bullet.modal.shapes import fill
+    from sonic_bullet.modal.solid import Solid
+
+    body = fill((shape,), edge_m, None, say)
+    unit = Solid(body.solid.node_m / length, body.solid.tet, body.solid.affine)
+    corner = unit.node_m[body.skin.node][body.skin.face]
+    area = float(np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1).sum() / 2)
+    volume = fem.volume_m3(unit)
+    lame, shear = np.zeros((6, 6)), np.diag([2.0, 2, 2, 1, 1, 1])
+    lame[:3, :3] = 1
+    say(f"assembling {3 * len(unit.node_m)} unknowns")
+    k_lame, mass = fem.assemble(unit, lame, 1.0)
+    k_shear, _ = fem.assemble(unit, shear, 1.0)
+    held = fem.clamped(body.solid, clamp)
+    free = np.flatnonzero(np.repeat(~held, 3))
+    rigid = 6
+    if held.any():
+        rigid -= int(np.linalg.matrix_rank(fem.rigid_modes(unit.node_m)[np.repeat(held, 3)], tol=1e-9))
+        k_lame, k_shear, mass = (matrix[free][:, free] for matrix in (k_lame, k_shear, mass))
+    most = min(MOST_MODES, max(1, len(free) // 3 - rigid))
+    shift = -SHIFT * (2 * volume / area) ** 2 / 3
+    vectors, counts = [], []
+    low = float(np.clip(poisson - APART, *POISSON))
+    high = float(np.clip(poisson + APART, *POISSON))
+    if high - low < APART / 2:
+        raise ModalError(f"Poisson's ratio {poisson} is no isotropic solid's", "guess one between -0.5 and 0.48")
+    for nu in (low, high):
+        stiffness = nu / ((1 + nu) * (1 - 2 * nu)) * k_lame + k_shear / (2 * (1 + nu))
+        modes = eigen.solve(stiffness, mass, shift, rigid=rigid, enough=lambda value: bool(value[-1] > limit), most=most, say=say)
+        vectors.append(modes.vector)
+        counts.append(len(modes.lambda_per_s2))
+    first, second = vectors
+    rest = second - first @ (first.T @ (mass @ second))
+    rest -= first @ (first.T @ (mass @ rest))
+    value, turn = np.linalg.eigh(rest.T @ (mass @ rest))
+    good = value > 1e-12
+    basis = np.concatenate([first, rest @ (turn[:, good] / np.sqrt(value[good]))], axis=1)
+    vector = np.zeros((3 * len(held), basis.shape[1]), np.float32)
+    vector[free] = basis
+    if not len(basis):
+        raise MeshError("body has no unknowns", "clamp less of it")
+    reduced = [basis.T @ (matrix @ basis) for matrix in (k_lame, k_shear)]
+    note = f"{body.solid.note}; {len(free)} unknowns; nu {low:g} and {high:g}" + (f"; {int(held.sum())} nodes clamped" if held.any() else "")
+    skin = np.ascontiguousarray(vector.reshape(len(held), 3, -1)[body.skin.node])
+    lame_r, shear_r = ((matrix + matrix.T) / 2 for matrix in reduced)
+    return Family(lame_r, shear_r, skin, body.solid.node_m[body.skin.node], body.skin.face, length, volume * length**3, min(counts), note)
