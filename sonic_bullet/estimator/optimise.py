@@ -18,7 +18,7 @@ import numpy as np
 from sonic_bullet.estimator.laid import candidates, laid
 from sonic_bullet.estimator.metric import Constants, Target, hybrid, residuals, target
 from sonic_bullet.estimator.problem import Found, Problem
-from sonic_bullet.estimator.starts import seed_starts
+from sonic_bullet.estimator.starts import feature_eigenvalues, seed_starts
 from sonic_bullet.records import Array
 
 STEP = 0.05  # first simplex, in the logarithms: what the paper's source of the method does [Lagarias et al. 1999; MATLAB's fminsearch]
@@ -28,7 +28,8 @@ EXACT = 1e-7
 MOST = 2000
 SIFTED = 6
 POLISH_ROUNDS = 8
-POLISH_MOST = 100
+POLISH_MOST = 140
+POLISH_TOLERANCE = 1e-10
 WIDTH = np.array([1e-2, 1e-2, 1e-4, 1e-2])  # of the differences that stand for slopes, in the logarithms
 SIMPLEX = 1e-4  # the first simplex's corners are this part of Π higher, were Π a parabola
 
@@ -46,11 +47,13 @@ class _Counted:
         return hybrid(self.aim, np.exp(inside)) + float(((logs - inside) ** 2).sum())
 
 
-def _walk(function: Callable[[Array], float], start: Array, step: Array, most: int, tolerance: float = STEP_TOLERANCE) -> tuple[Array, float]:
+def _walk(
+    function: Callable[[Array], float], start: Array, step: Array, most: int, step_end: float = STEP_TOLERANCE, end: float = METRIC_TOLERANCE
+) -> tuple[Array, float]:
     from scipy.optimize import minimize
 
     simplex = np.vstack([start, start + np.diag(step)])
-    options = {"xatol": tolerance, "fatol": METRIC_TOLERANCE, "maxfev": most, "initial_simplex": simplex}
+    options = {"xatol": step_end, "fatol": end, "maxfev": most, "initial_simplex": simplex}
     result = minimize(function, start, method="Nelder-Mead", options=options)
     return np.asarray(result.x), float(result.fun)
 
@@ -86,22 +89,32 @@ def fast(problem: Problem, constants: Constants | None = None) -> Found:
 
 
 def _polish(aim: Target, count: _Counted, start: Array) -> tuple[float, Array]:
-    """Π as the sum of squares it is, by Levenberg and Marquardt; then Nelder and Mead in axes along which Π rises alike."""
+    """Π as the sum of squares it is, by Levenberg and Marquardt; then Nelder and Mead in axes along which Π rises alike.
 
-    def look(logs: Array) -> tuple[float, Array]:
+    α and β enter the logarithm with a tenth of the typical decay added, so that one too small to be heard is no long flat valley.
+    """
+    problem = aim.problem
+    decay = 0.1 * float(np.median(problem.features.decay_per_s))
+    shift = np.array([decay, decay / float(np.median(feature_eigenvalues(problem.features))), 0.0, 0.0])
+    low, high = np.log(problem.lower + shift), np.log(problem.upper + shift)
+
+    def values(at: Array) -> Array:
+        return np.asarray(np.clip(np.exp(np.clip(at, low, high)) - shift, problem.lower, problem.upper))
+
+    def look(at: Array) -> tuple[float, Array]:
         count.calls += 1
-        seen = residuals(aim, np.exp(logs))
+        seen = residuals(aim, values(at))
         return float(seen @ seen), seen
 
-    logs, damping = start, 1e-3
-    metric, seen = look(logs)
+    place, damping = np.log(np.exp(start) + shift), 1e-3
+    metric, seen = look(place)
     for _ in range(POLISH_ROUNDS):
-        slope = np.stack([(look(logs + WIDTH * unit)[1] - seen) / (WIDTH @ unit) for unit in np.eye(4)])
+        slope = np.stack([(look(place + WIDTH * unit)[1] - seen) / (WIDTH @ unit) for unit in np.eye(4)])
         normal = slope @ slope.T
-        normal += 1e-12 * np.trace(normal) * np.eye(4)
+        normal += 1e-9 * np.trace(normal) * np.eye(4)
         while damping < 1e4:
-            shift = np.linalg.solve(normal + damping * np.diag(np.diag(normal)), -slope @ seen)
-            trial = np.clip(logs + np.clip(shift, -0.5, 0.5), count.low, count.high)
+            step = np.linalg.solve(normal + damping * np.diag(np.diag(normal)), -slope @ seen)
+            trial = np.clip(place + np.clip(step, -0.5, 0.5), low, high)
             tried, there = look(trial)
             if tried < metric:
                 break
@@ -109,9 +122,9 @@ def _polish(aim: Target, count: _Counted, start: Array) -> tuple[float, Array]:
         else:
             break
         gain = 1 - tried / metric
-        metric, logs, seen, damping = tried, trial, there, damping / 10
+        metric, place, seen, damping = tried, trial, there, damping / 10
         if gain < 1e-4:
             break
     axes = np.linalg.inv(np.linalg.cholesky(normal)).T * np.sqrt(SIMPLEX * metric)
-    end, low = _walk(lambda u: count(logs + axes @ u), np.zeros(4), np.ones(4), POLISH_MOST, np.inf)
-    return (low, logs + axes @ end) if low < metric else (metric, logs)
+    end, reached = _walk(lambda u: count(np.log(values(place + axes @ u))), np.zeros(4), np.ones(4), POLISH_MOST, np.inf, POLISH_TOLERANCE)
+    return (reached, np.log(values(place + axes @ end))) if reached < metric else (metric, np.log(values(place)))
