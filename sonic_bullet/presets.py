@@ -3,8 +3,9 @@
     NAME.json -> Preset (typed, every field checked) -> Material
 
 A file is UTF-8 JSON, format "sonic-bullet-preset/1": name, density_kg_m3, elasticity (youngs_pa and poisson, or stiffness_pa 6×6),
-damping, surface, impact, each group with the `source` of its numbers and an optional `note`. `effects`, `residual` and `provenance`
-are places kept for what an estimator will find; this version plays none and refuses a file that has any.
+damping, surface, impact, each group with the `source` of its numbers and an optional `note`. `provenance` says what a fitted preset was
+fitted from, and how sure it is; it changes no sound. `effects` and `residual` are places kept for what an estimator will find; this version
+plays none and refuses a file that has any.
 
 Damping is Rayleigh's, d = ½(α + βλ) [Ren, Yeh, Lin 2013, eq. 6]: alpha_per_s and beta_s, or a loss factor η of the handbooks. η = 2d/ω
 independent of frequency is no Rayleigh damping; α and β are the pair that meets it at the two frequencies of `equal_at_hz`
@@ -76,6 +77,21 @@ class Impact(_Part, frozen=True):
     restitution: Fraction
 
 
+class Provenance(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, omit_defaults=True):
+    """Where a fitted preset comes from. parameters: α 1/s, β s, γ m²/s², σ, ν by name; spreads: standard errors in the same units, where known.
+
+    assumed: what was taken from the guess. verdict: the fit's own. correction: relative, of each mode's frequency against the mesh's.
+    """
+
+    method: str
+    recordings: tuple[str, ...] = ()
+    parameters: dict[str, float] = {}
+    spreads: dict[str, float | None] = {}
+    assumed: tuple[str, ...] = ()
+    verdict: str = ""
+    correction: dict[str, tuple[float, ...]] = {}
+
+
 class Preset(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, omit_defaults=True):
     """One preset file; see the module's head."""
 
@@ -89,7 +105,7 @@ class Preset(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     note: str = ""
     effects: tuple[Any, ...] = ()
     residual: Any = None
-    provenance: Any = None
+    provenance: Provenance | None = None
 
 
 def load_material(name: str | os.PathLike[str]) -> Material:
@@ -134,7 +150,7 @@ def read_preset(path: str | os.PathLike[str]) -> Preset:
         raise MaterialError(f"preset {path}: {error}", "mend that field; docs/materials.md describes the file") from error
     if preset.format != FORMAT:
         raise MaterialError(f"preset {path} has format '{preset.format}', wanted '{FORMAT}'", "use a sonic_bullet that knows that format")
-    for name in ("effects", "residual", "provenance"):
+    for name in ("effects", "residual"):
         if getattr(preset, name):
             raise MaterialError(f"preset {path} holds {name}, which sonic_bullet 0.1 cannot play", f"use version 0.2 or later, or take {name} out of the file")
     return preset

@@ -39,6 +39,13 @@ Examples:
   sonic-bullet modes tray.obj --material metal --thickness 0.002 --to-hz 5000 --json tray.json -o tray.npz
   sonic-bullet modes fork.obj --material steel --fix 0,0,-0.1,0.01"""
 
+FIT_EPILOG = """\b
+Examples:
+  sonic-bullet fit tap.wav --mesh bar.obj --strike 0.05,0,0.003 --material steel -o bar.json --picture bar.png
+  sonic-bullet fit tap.wav --mesh mug.obj --scale 0.001 --strike 0,0.04,0 --sensor sum --material porcelain -o mug.json --json
+  sonic-bullet fit my_case/ -o preset.json       (several strikes, sizes, sensors: a folder with a case.json)
+The preset plays at once: listener.add(body, material="preset.json")."""
+
 GROUP_EPILOG = """\b
 Examples:
   sonic-bullet render scenes/tabletop.py -o tabletop.wav
@@ -147,6 +154,30 @@ def doctor(scene: str, seconds: float, json_to: str | None) -> None:
     from sonic_bullet.cli.scenes import run_doctor
 
     run_doctor(scene, seconds, json_to)
+
+
+@cli.command(epilog=FIT_EPILOG)
+@click.argument("source", metavar="RECORDING|CASE_DIR")
+@click.option("-o", "--output", required=True, metavar="PRESET.json", help="The fitted material as a preset file.")
+@click.option("--mesh", metavar="M", help="Mesh of what was struck.")
+@click.option("--strike", type=Numbers("X,Y,Z"), help="Where it was struck, in m, mesh frame.")
+@click.option("--direction", type=Numbers("X,Y,Z"), help="Direction of the impulse. [default: into the surface]")
+@click.option("--impulse", type=click.FloatRange(0, min_open=True), metavar="J", help="Impulse in N·s; without it sigma stands for gain times impulse.")
+@click.option("--material", metavar="GUESS", help="A name ('sonic-bullet materials') or a preset file: E and density good to 30 %.")
+@click.option("--scale", type=float, metavar="S", help="Metres per mesh unit: 0.001 for a mesh in millimetres. [default: 1]")
+@click.option(
+    "--sensor", type=click.Choice(["sum", "pressure", "velocity"]), help="What was recorded: plain sum of modes, a microphone, a surface. [default: pressure]"
+)
+@click.option("--sensor-at", type=Numbers("X,Y,Z"), help="Where the surface was heard, in m, for --sensor velocity.")
+@click.option("--onset", "onset_s", type=click.FloatRange(0), metavar="S", help="When the impulse arrives. [default: found]")
+@click.option("--fix", "fixed", type=Numbers("X,Y,Z,R"), multiple=True, help="Clamp all within R of a point, in m, mesh frame; repeatable.")
+@click.option("--picture", metavar="NAME.png", help="Also draw recording, synthesis, features and the fitted circle.")
+@json_option
+def fit(**options: Any) -> None:
+    """Fit a material to recorded strikes: E/density, Poisson's ratio, damping, gain, with spreads and a verdict."""
+    from sonic_bullet.cli.fit import run_fit
+
+    run_fit(**options)
 
 
 def main() -> None:

@@ -182,5 +182,3 @@ def _listed(case: Case, thing: CaseObject, guess: Material, entry: CaseRecording
     lines = Lines(freq, decay, amplitude.astype(complex), freq_sd, decay_sd, np.abs(amplitude) * 0.1, np.array([np.nan]), np.full(len(items), 1e3), False)
     seen = observed(case, thing, guess, (entry,), body) if body is not None else None
     return Evidence(thing, guess, (entry,), lines, body, seen, None, 0)
-
-

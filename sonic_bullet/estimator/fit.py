@@ -109,7 +109,14 @@ def fit_evidence(case: Case, evidence: tuple[Evidence, ...], *, check_mesh: bool
     objects = tuple(_object(e, p, log_gamma, poisson, damping, case.band_hz) for e, p in zip(shaped, pairs, strict=True))
     gain, gain_sd, amplitude_scatter = gain_of(objects)
     return finished(
-        case, evidence, objects, (log_gamma, poisson, information, scatter), damping, (gain, gain_sd, amplitude_scatter), check_mesh=check_mesh, progress=progress
+        case,
+        evidence,
+        objects,
+        (log_gamma, poisson, information, scatter),
+        damping,
+        (gain, gain_sd, amplitude_scatter),
+        check_mesh=check_mesh,
+        progress=progress,
     )
 
 
@@ -233,7 +240,9 @@ def gain_of(objects: tuple[ObjectFit, ...]) -> tuple[float, float, float]:
         strongest = np.abs(p).max(axis=0, keepdims=True)
         heard.append(size.ravel())
         told.append(p.ravel())
-        sd.append(np.hypot(e.lines.amplitude_sd[use][:, line] / max(float(np.nanmedian(size / np.where(p == 0, np.nan, p))), 1e-12), 0.02 * strongest + 0 * p).ravel())
+        sd.append(
+            np.hypot(e.lines.amplitude_sd[use][:, line] / max(float(np.nanmedian(size / np.where(p == 0, np.nan, p))), 1e-12), 0.02 * strongest + 0 * p).ravel()
+        )
     if not heard:
         return np.nan, np.nan, np.nan
     y, x, s = np.concatenate(heard), np.concatenate(told), np.concatenate(sd)

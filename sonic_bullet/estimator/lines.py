@@ -290,5 +290,13 @@ def _lines(signals: Array, noise: Array, pole: Array, sr: int, signed: bool) -> 
     width = 1 / np.sqrt(np.diag(gram))
     root = np.sqrt(np.diag(np.linalg.pinv(gram * width[:, None] * width))) * width
     return Lines(
-        pole.imag / (2 * np.pi), -pole.real, amplitude, spread[:k] / (2 * np.pi), spread[k:], level[:, None] * np.maximum(root[:k], root[k:]), residual, energy, signed
+        pole.imag / (2 * np.pi),
+        -pole.real,
+        amplitude,
+        spread[:k] / (2 * np.pi),
+        spread[k:],
+        level[:, None] * np.maximum(root[:k], root[k:]),
+        residual,
+        energy,
+        signed,
     )

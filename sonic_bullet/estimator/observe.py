@@ -93,7 +93,9 @@ def _row(family: Family, position: tuple[float, float, float], direction: Array,
     rows, distance = family.points(np.array([position]), direction[None, :])
     if not distance[0] <= OFF * family.length_m:
         place = ", ".join(f"{x:g}" for x in position)
-        raise MeshError(f"{what} at ({place}) m lies {distance[0]:.3g} m off the surface", "give its place in the mesh's frame, in metres; check the mesh's unit")
+        raise MeshError(
+            f"{what} at ({place}) m lies {distance[0]:.3g} m off the surface", "give its place in the mesh's frame, in metres; check the mesh's unit"
+        )
     return rows[0]
 
 

@@ -93,7 +93,9 @@ def _overlap(a: Array, b: Array, width: float) -> Array:
     return np.asarray(np.exp(-(((a[:, None] - b[None, :]) / width) ** 2) / 2))
 
 
-def sift(family: Family, lines: Lines, seen: Observation, log_gamma: float, poisson: float, band_hz: tuple[float, float], reach: float) -> list[tuple[float, float]]:
+def sift(
+    family: Family, lines: Lines, seen: Observation, log_gamma: float, poisson: float, band_hz: tuple[float, float], reach: float
+) -> list[tuple[float, float]]:
     """The best few (ln γ, ν) of the grid, best first."""
     width = 0.006
     grid = log_gamma + np.arange(-reach, reach + 1e-9, 0.004)

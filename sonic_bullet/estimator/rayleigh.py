@@ -1,7 +1,7 @@
 """Lines -> α and β: d = ½(α + βλ), λ = ω² + d² [Ren, Yeh, Lin 2013, eq. 6-8], by least squares that notices where the law does not hold.
 
-    Σ w (d − ½α − ½βλ)² → min,  w = c/(s² + (τd)²),  τ: the least relative scatter that makes the residuals as large as their spreads
-                                                                                        [Paule & Mandel 1982], c: Cauchy's weight of outliers
+Σ w (d − ½α − ½βλ)² → min,  w = c/(s² + (τd)²),  τ: the least relative scatter that makes the residuals as large as their spreads
+                                                                                    [Paule & Mandel 1982], c: Cauchy's weight of outliers
 """
 
 from __future__ import annotations

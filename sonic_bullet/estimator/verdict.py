@@ -1,6 +1,6 @@
 """What a fit may claim: covariance, what is not identifiable, where the model does not fit, and whether the mesh is fine enough.
 
-    fitted | not identifiable: WHICH and why | misfit: WHAT does not hold      parts joined by "; ", "fitted" alone where nothing is amiss
+fitted | not identifiable: WHICH and why | misfit: WHAT does not hold      parts joined by "; ", "fitted" alone where nothing is amiss
 """
 
 from __future__ import annotations
@@ -55,6 +55,8 @@ def finished(
             unsaid.append("sigma (no impulse declared: it stands for gain times impulse)")
     else:
         unsaid.append("sigma (no strike of known place)")
+    told = np.isfinite(np.diag(covariance))
+    covariance[np.outer(told, told) & np.isnan(covariance)] = 0.0  # frequencies, decays and amplitudes are found apart
     foreign, share = _foreign(evidence, objects)
     amiss = _amiss(objects, damping, scatter, gain[2], foreign, share)
     amplitude = gain[0] if np.isfinite(gain[0]) else 1.0

@@ -174,7 +174,9 @@ def _case(raw: _Raw, path: Path) -> Case:
     clamps = raw.support.fixed if isinstance(raw.support, _Support) else ()
     for clamp in clamps:
         if clamp.radius < 0 or (clamp.object is not None and clamp.object not in raw.objects):
-            raise FileError(f"case {path}: a clamp has radius {clamp.radius:g} m on object '{clamp.object}'", "give a radius of at least 0, and a listed object")
+            raise FileError(
+                f"case {path}: a clamp has radius {clamp.radius:g} m on object '{clamp.object}'", "give a radius of at least 0, and a listed object"
+            )
     objects = {name: _object(name, thing, folder, clamps) for name, thing in raw.objects.items()}
     only = next(iter(objects)) if len(objects) == 1 else None
     recordings = tuple(_recording(entry, i, objects, only, path) for i, entry in enumerate(raw.recordings))
@@ -211,7 +213,9 @@ def _recording(entry: _Recording, number: int, objects: dict[str, CaseObject], o
         raise FileError(f"{where} has neither file nor features", "give one of them")
     for line in entry.features or ():
         if not line.freq_hz > 0 or (line.decay_per_s or 0) < 0:
-            raise FileError(f"{where}: a feature of {line.freq_hz:g} Hz and decay {line.decay_per_s}", "give frequencies above zero and decays of at least zero")
+            raise FileError(
+                f"{where}: a feature of {line.freq_hz:g} Hz and decay {line.decay_per_s}", "give frequencies above zero and decays of at least zero"
+            )
     strike = entry.strike
     direction = strike.direction
     if direction is not None:
