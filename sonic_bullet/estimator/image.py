@@ -7,8 +7,8 @@
 
 w is Nuttall's window of four cosines with a continuous first derivative [Nuttall 1981, table II], side lobes below −93 dB, so a mode lives in
 few bins; modes that share a bin add as waves do, beats and all. Powers of bins go to triangles every `bark_step` on the Bark axis and each
-triangle to sone at its middle. A mode's image at −f, bins where its skirt is below about 1e-5 of its peak, and what has sunk under −30 dB SPL
-are neglected.
+triangle to sone at its middle. Each sine counts at f and −f. Neglected are bins beyond
+a mode's main lobe and three of its half widths (skirts fall as (d/offset)³) and what has sunk under −30 dB SPL: about 1e-9 of Π's scale.
 Every level doubles the window; a level weighs its hop, so that all levels count alike.
 """
 
@@ -152,6 +152,8 @@ def distance(target: Image, freq_hz: Array, decay_per_s: Array, amplitude: Array
 
     differences, where given, takes every √hop·ΔT, level after level, frame after frame, so that their squares sum to the answer.
     """
+    # a sine is two spirals, and the one at −f reaches low bins: the same sine with both signs turned
+    freq_hz, decay_per_s, amplitude = np.concatenate([freq_hz, -freq_hz]), np.concatenate([decay_per_s, decay_per_s]), np.concatenate([amplitude, -amplitude])
     total, at = 0.0, 0
     unit = 10 ** (target.full_scale_db_spl / 20)
     floor = 10 ** ((FLOOR_DB_SPL - target.full_scale_db_spl) / 20)

@@ -27,8 +27,8 @@ def reach(freq_hz, decay_per_s, amplitude, sr, length, floor):  # type: ignore[n
     for j in range(len(freq_hz)):
         reach[j, 2] = room
         short = decay_per_s[j] * length / sr
-        if 0 < freq_hz[j] < sr / 2 and abs(amplitude[j]) * min(1.0, 3 / short**3) > floor:
-            centre = int(freq_hz[j] / sr * length)
+        if 0 < abs(freq_hz[j]) < sr / 2 and abs(amplitude[j]) * min(1.0, 3 / short**3) > floor:
+            centre = int(np.floor(freq_hz[j] / sr * length))
             radius = 5 + int(3 * decay_per_s[j] * length / (2 * np.pi * sr))
             reach[j, 0], reach[j, 1] = max(1, centre - radius), min(length // 2 + 1, centre + 2 + radius)
             room += max(reach[j, 1] - reach[j, 0], 0)
