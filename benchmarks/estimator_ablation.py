@@ -1,0 +1,86 @@
+"""Do the recovered α, β, γ, σ hang on the metric's free constants, or on what full scale stands for?
+
+    python benchmarks/estimator_ablation.py [MATERIAL ...]
+
+The problems are those of estimator_speed.py: no parameters fit them exactly. Each row changes one constant and prints by how many percent the fast
+search's answer moves from that of the constants as shipped; "truth" says how far the shipped answer itself is from what was planted. The last rows
+repeat it on a recording that the model can make exactly.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import sys
+
+import numpy as np
+from estimator_speed import problem
+
+from sonic_bullet.estimator.metric import Constants
+from sonic_bullet.estimator.optimise import fast
+from sonic_bullet.estimator.problem import Problem, modes_of
+from sonic_bullet.estimator.values import Features
+from sonic_bullet.records import Array
+
+ROWS: tuple[tuple[str, float | int], ...] = (
+    ("bark_step", 0.25),
+    ("bark_step", 1.0),
+    ("levels", 3),
+    ("levels", 6),
+    ("shortest_s", 0.0053),
+    ("shortest_s", 0.0214),
+    ("seconds", 0.5),
+    ("per_bark", 2.0),
+    ("per_bark", 8.0),
+    ("per_duration", 0.5),
+    ("per_duration", 2.0),
+    ("near", 0.05),
+    ("near", 0.2),
+    ("power", 0.15),
+    ("power", 0.6),
+)
+
+
+def at_level(asked: Problem, full_scale_db_spl: float) -> Problem:
+    return dataclasses.replace(asked, full_scale_db_spl=full_scale_db_spl)
+
+
+def exact(asked: Problem, truth: Array) -> Problem:
+    """The same body and strike, recorded without noise and without anything the model does not know."""
+    freq_hz, decay, amplitude = modes_of(truth, asked.lambda_hat, asked.amplitude_hat)
+    sr = asked.features.sr
+    there = (freq_hz > 20) & (freq_hz < 0.45 * sr)
+    time = np.arange(int(1.2 * sr)) / sr
+    parts = zip(freq_hz[there], decay[there], amplitude[there], strict=True)
+    signal = np.asarray(sum(a * np.exp(-d * time) * np.sin(2 * np.pi * f * time) for f, d, a in parts))
+    heard = there & (np.abs(amplitude) > 1e-5 * np.abs(amplitude[there]).max())
+    none = np.full(int(heard.sum()), np.nan)
+    phase = np.where(amplitude[heard] < 0, np.pi, 0.0)
+    features = Features(freq_hz[heard], decay[heard], np.abs(amplitude[heard]), phase, none, none, none, 0.0, -240.0, sr)
+    return dataclasses.replace(asked, features=features, signal=signal)
+
+
+def line(label: str, values: Array) -> None:
+    print(f"  {label:20}" + "".join(f"{100 * value:+10.3f} %" for value in values), flush=True)
+
+
+def main(names: tuple[str, ...]) -> int:
+    worst = 0.0
+    for name in names:
+        asked, truth = problem(name)
+        base = fast(asked).parameters
+        print(f"{name:22}{'α':>10}  {'β':>10}  {'γ':>10}  {'σ':>10}")
+        line("truth", base / truth - 1)
+        for db in (-20.0, 20.0):
+            line(f"full scale {db:+.0f} dB", fast(at_level(asked, 94.0 + db)).parameters / base - 1)
+        for field, value in ROWS:
+            line(f"{field} {value:g}", fast(asked, dataclasses.replace(Constants(), **{field: value})).parameters / base - 1)
+        clean = exact(asked, truth)
+        errors = [np.abs(fast(at_level(clean, 94.0 + db)).parameters / truth - 1).max() for db in (-20.0, 0.0, 20.0)]
+        errors += [np.abs(fast(clean, dataclasses.replace(Constants(), **{field: value})).parameters / truth - 1).max() for field, value in ROWS]
+        worst = max(worst, *errors)
+        print(f"  exact recording, all {len(errors)} of them: largest error of any parameter {max(errors):.1e}\n", flush=True)
+    return 0 if worst < 1e-6 else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main(tuple(sys.argv[1:]) or ("metal", "glass", "wood")))
