@@ -3,7 +3,7 @@
 reference   every start of `seed_starts` walked down Π by Nelder and Mead in the logarithms, the best wins    [Ren, Yeh, Lin 2013, section 5.3]
 fast        1. Π_MRP alone (some tens of µs, blind to σ) sifts γ's from laying every feature on every mode; α, β from all features at once
             2. the best few are matched feature to mode and solved as least squares, each residual by its spread (laid.py); Π ranks them
-            3. the best is walked down Π, a sum of squares, by Levenberg and Marquardt, then by Nelder and Mead from a small simplex
+            3. the best is walked down Π, a sum of squares, by Levenberg and Marquardt, then by Newton's method
 
 What the features say is kept where Π below it is no more than the image's own truth (EXACT): there they know better.
 """
@@ -27,11 +27,12 @@ METRIC_TOLERANCE = 1e-8
 EXACT = 1e-7
 MOST = 2000
 SIFTED = 6
-POLISH_ROUNDS = 8
-POLISH_MOST = 140
-POLISH_TOLERANCE = 1e-10
+POLISH_ROUNDS = 3
+GAIN = 1e-4  # of Π: least squares stop where a step brings less
+SETTLE = 1e-4  # one unit of the last search raises Π by this part of it
+SETTLE_ROUNDS = 6
+POLISH_TOLERANCE = 1e-9
 WIDTH = np.array([1e-2, 1e-2, 1e-4, 1e-2])  # of the differences that stand for slopes, in the logarithms
-SIMPLEX = 1e-4  # the first simplex's corners are this part of Π higher, were Π a parabola
 
 
 class _Counted:
@@ -47,13 +48,11 @@ class _Counted:
         return hybrid(self.aim, np.exp(inside)) + float(((logs - inside) ** 2).sum())
 
 
-def _walk(
-    function: Callable[[Array], float], start: Array, step: Array, most: int, step_end: float = STEP_TOLERANCE, end: float = METRIC_TOLERANCE
-) -> tuple[Array, float]:
+def _walk(function: Callable[[Array], float], start: Array, step: Array) -> tuple[Array, float]:
     from scipy.optimize import minimize
 
     simplex = np.vstack([start, start + np.diag(step)])
-    options = {"xatol": step_end, "fatol": end, "maxfev": most, "initial_simplex": simplex}
+    options = {"xatol": STEP_TOLERANCE, "fatol": METRIC_TOLERANCE, "maxfev": MOST, "initial_simplex": simplex}
     result = minimize(function, start, method="Nelder-Mead", options=options)
     return np.asarray(result.x), float(result.fun)
 
@@ -69,7 +68,7 @@ def reference(problem: Problem, constants: Constants | None = None) -> Found:
     aim = target(problem, constants)
     count = _Counted(aim)
     starts = np.log(seed_starts(problem))
-    ends = [_walk(count, start, np.full(4, STEP), MOST) for start in starts]
+    ends = [_walk(count, start, np.full(4, STEP)) for start in starts]
     logs, metric = min(ends, key=lambda end: end[1])
     return _found(aim, logs, metric, count.calls, begun, len(starts))
 
@@ -89,7 +88,7 @@ def fast(problem: Problem, constants: Constants | None = None) -> Found:
 
 
 def _polish(aim: Target, count: _Counted, start: Array) -> tuple[float, Array]:
-    """Π as the sum of squares it is, by Levenberg and Marquardt; then Nelder and Mead in axes along which Π rises alike.
+    """Π as the sum of squares it is, by Levenberg and Marquardt with Broyden's slopes; then by Newton in axes along which Π rises alike.
 
     α and β enter the logarithm with a tenth of the typical decay added, so that one too small to be heard is no long flat valley.
     """
@@ -110,21 +109,61 @@ def _polish(aim: Target, count: _Counted, start: Array) -> tuple[float, Array]:
     metric, seen = look(place)
     for _ in range(POLISH_ROUNDS):
         slope = np.stack([(look(place + WIDTH * unit)[1] - seen) / (WIDTH @ unit) for unit in np.eye(4)])
-        normal = slope @ slope.T
-        normal += 1e-9 * np.trace(normal) * np.eye(4)
+        before = metric
         while damping < 1e4:
+            normal = slope @ slope.T
+            normal += 1e-9 * np.trace(normal) * np.eye(4)
             step = np.linalg.solve(normal + damping * np.diag(np.diag(normal)), -slope @ seen)
             trial = np.clip(place + np.clip(step, -0.5, 0.5), low, high)
             tried, there = look(trial)
+            went = trial - place
+            if went @ went > 0:  # Broyden's secant: the next step needs no new slopes
+                slope += np.outer(went / (went @ went), there - seen - went @ slope)
             if tried < metric:
+                gain = 1 - tried / metric
+                metric, place, seen, damping = tried, trial, there, damping / 10
+                if gain < GAIN:
+                    break
+            else:
+                damping *= 30
+        if 1 - metric / before < 10 * GAIN:
+            break
+        damping = 1e-3
+    normal = slope @ slope.T + 1e-9 * float((slope**2).sum()) * np.eye(4)
+    axes = np.linalg.inv(np.linalg.cholesky(normal)).T * np.sqrt(SETTLE * metric)
+    metric, end = _settle(lambda u: count(np.log(values(place + axes @ u))), metric)
+    return metric, np.log(values(place + axes @ end))
+
+
+def _settle(function: Callable[[Array], float], here: float) -> tuple[float, Array]:
+    """Newton's method from 0 on a function of four numbers that is about here + Σu² near it, by differences: value and place."""
+    place, reach = np.zeros(4), 1.0
+    unit = np.eye(4)
+    cross: Array = np.zeros((4, 4))
+    for turn in range(SETTLE_ROUNDS):
+        ahead, behind = (np.array([function(place + sign * reach * e) for e in unit]) for sign in (1, -1))
+        bend = (ahead + behind - 2 * here) / reach**2
+        if turn == 0:
+            for i in range(4):
+                for j in range(i):
+                    both = function(place + reach * (unit[i] + unit[j]))
+                    cross[i, j] = cross[j, i] = (both - ahead[i] - ahead[j] + here) / reach**2
+        size, axis = np.linalg.eigh(cross + np.diag(bend))
+        slope = (ahead - behind) / (2 * reach)
+        step = -axis @ ((axis.T @ slope) / np.maximum(np.abs(size), 0.05 * np.abs(size).max()))
+        tries = [place + step * min(1.0, 50 / max(float(np.linalg.norm(step)), 1e-12))]
+        found = min(
+            [(function(tries[0]), tries[0])]
+            + [(float(value), place + sign * reach * e) for sign, values in ((1, ahead), (-1, behind)) for value, e in zip(values, unit, strict=True)],
+            key=lambda end: end[0],
+        )
+        if found[0] >= here:
+            if reach < 0.05:
                 break
-            damping *= 10
-        else:
+            reach /= 5
+            continue
+        gain, here, place = here - found[0], *found
+        if gain < POLISH_TOLERANCE:
             break
-        gain = 1 - tried / metric
-        metric, place, seen, damping = tried, trial, there, damping / 10
-        if gain < 1e-4:
-            break
-    axes = np.linalg.inv(np.linalg.cholesky(normal)).T * np.sqrt(SIMPLEX * metric)
-    end, reached = _walk(lambda u: count(np.log(values(place + axes @ u))), np.zeros(4), np.ones(4), POLISH_MOST, np.inf, POLISH_TOLERANCE)
-    return (reached, np.log(values(place + axes @ end))) if reached < metric else (metric, np.log(values(place)))
+        reach = max(reach / 2, 0.1)
+    return here, place
