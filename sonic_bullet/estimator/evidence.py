@@ -60,7 +60,7 @@ def guess_of(thing: CaseObject) -> Material:
         poisson=base.poisson if thing.poisson is None else thing.poisson,
         density_kg_m3=thing.density_kg_m3 or base.density_kg_m3,
         source=base.source,
-        **rest,  # type: ignore[arg-type]
+        **rest,
     )
 
 

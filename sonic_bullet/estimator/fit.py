@@ -20,7 +20,7 @@ from sonic_bullet.errors import AudioError, FileError
 from sonic_bullet.estimator.evidence import Evidence, gather
 from sonic_bullet.estimator.lines import Lines
 from sonic_bullet.estimator.observe import Observation, pressure_weight
-from sonic_bullet.estimator.pairing import GAMMA_REACH, MESH_SD, Group, Pairs, assign, grouped, paired, sift, solve
+from sonic_bullet.estimator.pairing import GAMMA_REACH, MESH_SD, Group, Pairs, assign, grouped, paired, phased, sift, solve
 from sonic_bullet.estimator.rayleigh import Damping, rayleigh
 from sonic_bullet.estimator.values import MaterialFit
 from sonic_bullet.files.cases import Case, CaseObject
@@ -144,7 +144,8 @@ def _placed(shaped: tuple[Evidence, ...], band_hz: tuple[float, float]) -> tuple
 def _together(shaped: tuple[Evidence, ...], start: tuple[float, float], guess_poisson: float) -> tuple[tuple[Pairs, ...], Array, float]:
     """Assign and solve for all objects at once until nothing moves."""
     log_gamma, poisson = start
-    information, scatter, pairs = np.zeros((2, 2)), np.nan, []
+    information, scatter = np.zeros((2, 2)), np.nan
+    pairs: list[Pairs] = []
     for _ in range(4):
         pairs, total, pull, squares, count = [], np.zeros((2, 2)), np.zeros(2), 0.0, 0
         for e in shaped:
@@ -185,7 +186,8 @@ def _decays(evidence: tuple[Evidence, ...], pairs: tuple[Pairs, ...]) -> tuple[A
             at += 1
         d = e.lines.decay_per_s[which]
         found.append(np.stack([(2 * np.pi * e.lines.freq_hz[which]) ** 2 + np.nan_to_num(d) ** 2, d, e.lines.decay_sd_per_s[which]]))
-    return tuple(np.concatenate(found, axis=1))  # type: ignore[return-value]
+    lam, decay, decay_sd = np.concatenate(found, axis=1)
+    return lam, decay, decay_sd
 
 
 def _object(e: Evidence, pairs: Pairs, log_gamma: float, poisson: float, damping: Damping, band_hz: tuple[float, float]) -> ObjectFit:
@@ -222,39 +224,39 @@ def _weight(e: Evidence, group: Group, log_gamma: float, poisson: float, freq: A
 
 
 def gain_of(objects: tuple[ObjectFit, ...]) -> tuple[float, float, float]:
-    """σ, its spread and the relative scatter of amplitudes about σψ, over all strikes whose place is known; NaN where none is."""
-    heard, told, sd = [], [], []
+    """σ, its spread and the relative scatter of amplitudes about σψ, over all strikes whose place is known; NaN where none is.
+
+    Least squares with Cauchy's weights; an amplitude counts as known to its spread and to 2 % of the mode's strongest ψ, the shapes' own error.
+    """
+    heard, told, loose = [], [], []
     for o in objects:
         e, mode = o.evidence, np.flatnonzero(o.line >= 0)
-        if e.seen is None or not len(mode):
-            continue
         line = o.line[mode]
-        use = e.seen.known & np.isfinite(e.lines.amplitude[:, line]).all(axis=1)
-        if not use.any():
+        use = e.seen.known & np.isfinite(e.lines.amplitude[:, line]).all(axis=1) if e.seen is not None else np.zeros(1, bool)
+        if e.seen is None or not len(mode) or not use.any():
             continue
-        turn = e.seen.start(e.lines.freq_hz[line], np.nan_to_num(e.lines.decay_per_s[line]))
-        signed = e.lines.signed and e.seen.kind in ("velocity", "sum")
-        a = e.lines.amplitude[use][:, line]
-        size = (np.real(a * turn.conj()) / np.abs(turn) ** 2) if signed else np.abs(a)
-        p = o.pattern[use][:, mode] if signed else np.abs(o.pattern[use][:, mode])
-        strongest = np.abs(p).max(axis=0, keepdims=True)
-        heard.append(size.ravel())
+        a, p = e.lines.amplitude[use][:, line], o.pattern[use][:, mode]
+        if phased(e.lines, e.seen):
+            a = a / e.seen.start(e.lines.freq_hz[line], np.nan_to_num(e.lines.decay_per_s[line]))
+        else:
+            a, p = np.abs(a), np.abs(p)
+        gain = np.linalg.norm(a) / max(float(np.linalg.norm(p)), 1e-300)
+        heard.append(a.ravel())
         told.append(p.ravel())
-        sd.append(
-            np.hypot(e.lines.amplitude_sd[use][:, line] / max(float(np.nanmedian(size / np.where(p == 0, np.nan, p))), 1e-12), 0.02 * strongest + 0 * p).ravel()
-        )
+        loose.append(np.hypot(e.lines.amplitude_sd[use][:, line] / gain, 0.02 * np.abs(p).max(axis=0, keepdims=True) + 1e-300).ravel())
     if not heard:
         return np.nan, np.nan, np.nan
-    y, x, s = np.concatenate(heard), np.concatenate(told), np.concatenate(sd)
-    weight, gain = np.ones(len(y)), 0.0
-    for _ in range(20):
-        gain = float((weight * x * y / s**2).sum() / max(float((weight * x**2 / s**2).sum()), 1e-300))
-        off = (y / gain - x) / s if gain > 0 else y * 0
+    y, x, s = np.concatenate(heard), np.concatenate(told), np.concatenate(loose)
+    weight = np.ones(len(y))
+    for _ in range(30):
+        gain = float((weight * x * np.real(y) / s**2).sum() / max(float((weight * x**2 / s**2).sum()), 1e-300))
+        if not gain > 0:
+            return np.nan, np.nan, np.nan
+        off = np.abs(y / gain - x) / s
         weight = 1 / (1 + (off / 2.5) ** 2)
-    strength = float((x**2 / s**2).sum())
-    scatter = float(np.sqrt(((y / gain - x) ** 2 / s**2 * weight).sum() / max(strength, 1e-300))) if gain > 0 else np.nan
-    spread = gain * float(np.sqrt(max((off**2 * weight).sum(), len(y) * 1e-4) / max(len(y) - 1, 1) / max((weight * x**2 / s**2).sum(), 1e-300)))
-    return (gain, spread, scatter) if gain > 0 else (np.nan, np.nan, np.nan)
+    scatter = float(np.sqrt((np.abs(y / gain - x) ** 2).sum() / (x**2).sum()))
+    spread = gain * float(np.sqrt((weight * off**2).sum() / max(len(y) - 1, 1) / (weight * x**2 / s**2).sum()))
+    return gain, max(spread, 1e-6 * gain), scatter
 
 
 def object_of(found: CaseFit, thing: CaseObject, guess: Material, body: Family, seen: Observation, known: ObjectFit | None) -> ObjectFit:

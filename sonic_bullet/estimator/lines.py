@@ -12,6 +12,7 @@ All inner products of damped sinusoids over N samples are geometric sums, closed
 # mypy: disable-error-code="no-untyped-def"
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -55,12 +56,13 @@ def joint_lines(signals: Array, sr: int, *, band_hz: tuple[float, float] = (20.0
         raise AudioError("a recording is silent", "leave it out of the case")
     low, high = max(band_hz[0], 5.0), min(band_hz[1], 0.485 * sr)
     noise = noise_rms(signals, sr)
+    colour = _colour(signals, noise, sr)
     pole = _start(signals / noise[:, None], sr, low, high)
     for _ in range(3):
         before = len(pole)
         pole = _polished(signals, noise, pole, sr, low, high)
         _, _, energy, _ = _solved(signals, noise, pole, sr)
-        pole = pole[energy > SIGNIFICANT]
+        pole = pole[energy / colour(pole.imag / (2 * np.pi)) > SIGNIFICANT]
         if len(pole) == before or not len(pole):
             break
     return _lines(signals, noise, pole, sr, signed)
@@ -74,20 +76,32 @@ def noise_rms(signals: Array, sr: int) -> Array:
     return np.asarray(np.maximum(np.sqrt(density / (np.hanning(tail.shape[1]) ** 2).sum()), 1e-9))
 
 
+def _colour(signals: Array, noise: Array, sr: int) -> Callable[[Array], Array]:
+    """Power of the floor at a frequency over the white noise's: lower quartile of neighbouring bins in the last half, mean over recordings."""
+    tail = signals[:, signals.shape[1] // 2 :] / noise[:, None]
+    window = min(4096, tail.shape[1])
+    frames = np.lib.stride_tricks.sliding_window_view(tail, window, axis=1)[:, :: window // 2]
+    shape = np.hanning(window)
+    power = (np.abs(np.fft.rfft(frames * shape, axis=2)) ** 2).mean(axis=(0, 1)) / (shape**2).sum()
+    side = np.pad(power, 12, mode="edge")
+    level = np.maximum(np.quantile(np.lib.stride_tricks.sliding_window_view(side, 25), 0.25, axis=1), 1.0)
+    return lambda freq: np.asarray(np.interp(freq, np.fft.rfftfreq(window, 1 / sr), level))
+
+
 def _start(signals: Array, sr: int, low: float, high: float) -> Array:
     """Poles −d + iω (k,) band by band; signals in units of their noise."""
-    from scipy.signal import firwin, oaconvolve
-
+    n = signals.shape[1]
+    whole = 1 << int(np.ceil(np.log2(2 * n)))
+    spectrum = np.fft.fft(signals, whole, axis=1)
     poles = []
     edge = low
     while edge < high:
         width = max(350.0, 0.09 * edge)
-        centre = edge + width / 2
-        rate = min(2.2 * width, float(sr))
-        step = max(1, int(sr / rate))
-        taps = firwin(2 * int(1.9 * sr / width) + 1, 0.85 * width, fs=sr) if step > 1 else np.ones(1)
-        turn = np.exp(-2j * np.pi * centre / sr * np.arange(signals.shape[1]))
-        band = oaconvolve(signals * turn, taps[None, :], mode="valid", axes=1)[:, ::step]
+        bin_number = round((edge + width / 2) / sr * whole)
+        centre = bin_number * sr / whole
+        step = max(1, int(sr / (2.2 * width)))
+        taps = _low_pass(min(2 * int(1.9 * sr / width) + 1, n // 3), 0.85 * width / sr) if step > 1 else np.ones(1)
+        band = np.fft.ifft(np.roll(spectrum, -bin_number, axis=1) * np.fft.fft(taps, whole), axis=1)[:, len(taps) - 1 : n : step]
         band /= np.sqrt((taps**2).sum())
         found = _subspace(band, step / sr)
         freq = centre + found.imag / (2 * np.pi)
@@ -95,6 +109,13 @@ def _start(signals: Array, sr: int, low: float, high: float) -> Array:
         poles.append(found[keep].real + 2j * np.pi * freq[keep])
         edge += width
     return np.concatenate(poles) if poles else np.zeros(0, complex)
+
+
+def _low_pass(taps: int, cutoff: float) -> Array:
+    """Hamming-windowed sinc (taps,), cutoff in cycles a sample [Oppenheim & Schafer 2010, ch. 7.5]."""
+    at = np.arange(taps) - (taps - 1) / 2
+    kernel = np.sinc(2 * cutoff * at) * np.hamming(taps)
+    return np.asarray(kernel / kernel.sum())
 
 
 def _subspace(band: Array, dt: float) -> Array:

@@ -96,7 +96,7 @@ def _row(family: Family, position: tuple[float, float, float], direction: Array,
         raise MeshError(
             f"{what} at ({place}) m lies {distance[0]:.3g} m off the surface", "give its place in the mesh's frame, in metres; check the mesh's unit"
         )
-    return rows[0]
+    return np.asarray(rows[0])
 
 
 def _normal(family: Family, position: tuple[float, float, float]) -> Array:
@@ -104,4 +104,4 @@ def _normal(family: Family, position: tuple[float, float, float]) -> Array:
     from sonic_bullet.surface_index import closest_point
 
     face, _, _ = closest_point(family.vertex_m, family.face, np.array([position]))
-    return outward_normals(family.vertex_m, family.face[face])[0]
+    return np.asarray(outward_normals(family.vertex_m, family.face[face])[0])

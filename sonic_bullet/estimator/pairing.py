@@ -63,11 +63,13 @@ def grouped(family: Family, seen: Observation, log_gamma: float, poisson: float)
 
 
 def _heard(lines: Lines, seen: Observation) -> Array:
-    """Line patterns (s, k): real and signed where phases are true, else magnitudes."""
-    if lines.signed and seen.kind in ("velocity", "sum"):
-        turn = seen.start(lines.freq_hz, lines.decay_per_s)
-        return np.asarray(np.real(lines.amplitude * turn.conj()))
-    return np.abs(lines.amplitude)
+    """Line patterns (s, k): complex where phases are true, but for one common phase a mode, which a finite contact turns; else magnitudes."""
+    return lines.amplitude if phased(lines, seen) else np.abs(lines.amplitude)
+
+
+def phased(lines: Lines, seen: Observation) -> bool:
+    """Whether the lines' phases can be held against the model's."""
+    return lines.signed and seen.kind in ("velocity", "sum")
 
 
 def _usable(lines: Lines, seen: Observation) -> Array:
@@ -82,10 +84,10 @@ def _patterns(lines: Lines, seen: Observation, modes: Array) -> tuple[Array, Arr
     if not use.any():
         return np.ones(k), np.ones(m), np.ones((k, m))
     a, p = _heard(lines, seen)[use], modes[use]
-    if not (lines.signed and seen.kind in ("velocity", "sum")):
+    if not phased(lines, seen):
         p = np.abs(p)
     size, strength = np.linalg.norm(a, axis=0), np.linalg.norm(p, axis=0)
-    alike = np.maximum((a.T @ p) / np.maximum(size[:, None] * strength[None, :], 1e-300), 0) if use.sum() > 1 else np.ones((k, m))
+    alike = np.abs(a.T @ p) / np.maximum(size[:, None] * strength[None, :], 1e-300) if use.sum() > 1 else np.ones((k, m))
     return size / size.max(initial=1e-300), strength / strength.max(initial=1e-300), alike
 
 

@@ -13,6 +13,7 @@ from sonic_bullet.records import Array
 
 if TYPE_CHECKING:
     from sonic_bullet.estimator.fit import CaseFit, ObjectFit
+    from sonic_bullet.estimator.lines import Lines
     from sonic_bullet.files.cases import CaseRecording
 
 MOST_NEPERS = 40.0
@@ -27,6 +28,11 @@ def damped_sum(freq_hz: Array, decay_per_s: Array, amplitude: Array, n: int, sr:
         length = n if d <= 0 else min(n, int(MOST_NEPERS / d * sr) + 1)
         sound[:length] += np.real(a * np.exp((-d + 2j * np.pi * f) / sr * np.arange(length)))
     return sound
+
+
+def lines_sound(lines: Lines, i: int, n: int, sr: int) -> Array:
+    """What the lines of recording i add up to (n,): the recording less this is what no damped sinusoid explains."""
+    return damped_sum(lines.freq_hz, lines.decay_per_s, lines.amplitude[i], n, sr)
 
 
 def predicted(o: ObjectFit, pattern: Array, gain: float, n: int, sr: int) -> Array:

@@ -11,9 +11,10 @@ import numpy as np
 
 from sonic_bullet.errors import SonicBulletError
 from sonic_bullet.estimator import fit as fits
-from sonic_bullet.estimator.distance import log_spectral_db, with_noise
+from sonic_bullet.estimator.distance import floor_of, log_spectral_db, with_noise
 from sonic_bullet.estimator.evidence import Evidence
-from sonic_bullet.estimator.predict import predicted
+from sonic_bullet.estimator.pairing import MESH_SD
+from sonic_bullet.estimator.predict import lines_sound, predicted
 from sonic_bullet.estimator.rayleigh import Damping
 from sonic_bullet.estimator.values import MaterialFit
 from sonic_bullet.files.cases import Case
@@ -87,7 +88,7 @@ def _elastic(covariance: Array, information: Array, scatter: float, unsaid: list
     if not shaped or information[0, 0] <= 0:
         unsaid += ["gamma (no mode of a known shape)", "poisson_ratio"]
         return
-    size = max((scatter / fits.MESH_SD) ** 2, 0.04) if np.isfinite(scatter) else 1.0
+    size = max((scatter / MESH_SD) ** 2, 0.04) if np.isfinite(scatter) else 1.0
     determinant = np.linalg.det(information)
     own = np.linalg.inv(information) * size if determinant > 1e-12 * information[0, 0] * information[1, 1] else np.full((2, 2), np.inf)
     if own[1, 1] < fits.POISSON_TOLD**2:
@@ -135,8 +136,8 @@ def _metric(case: Case, objects: tuple[fits.ObjectFit, ...], gain: float) -> flo
             continue
         for i in np.flatnonzero(e.seen.known):
             made = predicted(o, o.pattern[i], gain, e.signals.shape[1], e.sr)
-            noise = float(e.lines.noise[i])
-            found.append(log_spectral_db(e.signals[i], with_noise(made, noise, int(i)), noise))
+            floor = floor_of(e.signals[i] - lines_sound(e.lines, int(i), len(made), e.sr))
+            found.append(log_spectral_db(e.signals[i], with_noise(made, floor, int(i)), floor))
     found = [f for f in found if np.isfinite(f)]
     return float(np.mean(found)) if found else -1.0
 

@@ -254,7 +254,7 @@ def _response(sensor: _Sensor) -> str:
             return "velocity"
         if "pressure" in text or "microphone" in text:
             return "pressure"
-        if "sum" in text and "mode" in text or "modal" in text:
+        if ("sum" in text and "mode" in text) or "modal" in text:
             return "sum"
     return "unknown"
 
