@@ -3,8 +3,9 @@
     python benchmarks/estimator_ablation.py [MATERIAL ...]
 
 The problems are those of estimator_speed.py: no parameters fit them exactly. Each row changes one constant and prints by how many percent the fast
-search's answer moves from that of the constants as shipped; "truth" says how far the shipped answer itself is from what was planted. The last rows
-repeat it on a recording that the model can make exactly.
+search's answer moves from that of the constants as shipped; "truth" says how far the shipped answer itself is from what was planted. The last row of each
+go down Π from a start off in all four, on a recording that the model can make exactly, features playing no part but in Π_MRP: its minimum is where the
+truth is, whatever the constants.
 """
 
 from __future__ import annotations
@@ -16,11 +17,12 @@ import numpy as np
 from estimator_speed import problem
 
 from sonic_bullet.estimator.metric import Constants
-from sonic_bullet.estimator.optimise import fast
+from sonic_bullet.estimator.optimise import fast, polish
 from sonic_bullet.estimator.problem import Problem, modes_of
 from sonic_bullet.estimator.values import Features
 from sonic_bullet.records import Array
 
+AWAY = np.array([1.1, 0.93, 1.01, 1.1])
 ROWS: tuple[tuple[str, float | int], ...] = (
     ("bark_step", 0.25),
     ("bark_step", 1.0),
@@ -75,11 +77,16 @@ def main(names: tuple[str, ...]) -> int:
         for field, value in ROWS:
             line(f"{field} {value:g}", fast(asked, dataclasses.replace(Constants(), **{field: value})).parameters / base - 1)
         clean = exact(asked, truth)
-        errors = [np.abs(fast(at_level(clean, 94.0 + db)).parameters / truth - 1).max() for db in (-20.0, 0.0, 20.0)]
-        errors += [np.abs(fast(clean, dataclasses.replace(Constants(), **{field: value})).parameters / truth - 1).max() for field, value in ROWS]
-        worst = max(worst, *errors)
-        print(f"  exact recording, all {len(errors)} of them: largest error of any parameter {max(errors):.1e}\n", flush=True)
-    return 0 if worst < 1e-6 else 1
+        away = truth * AWAY
+        clean_errors = [np.abs(polish(at_level(clean, 94.0 + db), away).parameters / truth - 1) for db in (-20.0, 0.0, 20.0)]
+        clean_errors += [np.abs(polish(clean, away, dataclasses.replace(Constants(), **{field: value})).parameters / truth - 1) for field, value in ROWS]
+        errors = np.max(clean_errors, axis=0)
+        worst = max(worst, float(errors.max()))
+        print(
+            f"  exact recording, Π alone from a start up to 10 % off, largest errors of {len(clean_errors)}: {' '.join(f'{error:.1e}' for error in errors)}\n",
+            flush=True,
+        )
+    return 0 if worst < 1e-4 else 1
 
 
 if __name__ == "__main__":

@@ -9,7 +9,7 @@ import pytest
 
 from sonic_bullet.errors import RecordError
 from sonic_bullet.estimator.metric import Constants, hybrid, target
-from sonic_bullet.estimator.optimise import METRIC_TOLERANCE, fast, reference
+from sonic_bullet.estimator.optimise import METRIC_TOLERANCE, fast, polish, reference
 from sonic_bullet.estimator.problem import Problem, modes_of
 from sonic_bullet.estimator.starts import circle, feature_eigenvalues, seed_starts, undominated
 from sonic_bullet.estimator.values import Features
@@ -70,6 +70,16 @@ def test_planted_material_under_noise() -> None:
     found = fast(recorded(truth, lambda_hat, amplitude_hat, seconds=0.6, noise=3e-4))
     assert np.abs(found.parameters / truth - 1) == pytest.approx(0, abs=0.02)
     assert found.gamma_m2_s2 == pytest.approx(truth[2], rel=2e-4)
+
+
+@pytest.mark.parametrize("constants", [Constants(), Constants(bark_step=1.0, levels=3), Constants(per_bark=1.0, power=0.6)])
+def test_the_metric_alone_leads_to_the_planted_material(constants: Constants) -> None:
+    """The minimum of Π is the truth whatever its constants: a start off in all four numbers, features only in Π_MRP."""
+    lambda_hat, amplitude_hat = plate()
+    truth = np.array([31.425, 7.0658e-8, GAMMA_0, 0.1])
+    asked = recorded(truth, lambda_hat, amplitude_hat, seconds=0.6)
+    found = polish(asked, truth * np.array([1.1, 0.93, 1.01, 1.1]), constants)
+    assert np.abs(found.parameters / truth - 1).max() < 1e-5
 
 
 def test_fast_reaches_the_reference_on_a_fiftieth() -> None:
