@@ -15,12 +15,14 @@ from numba import njit
 from sonic_bullet.estimator.matching import energy, sift
 from sonic_bullet.estimator.metric import Target
 from sonic_bullet.estimator.problem import Problem, modes_of
-from sonic_bullet.estimator.starts import by_energy, feature_eigenvalues
+from sonic_bullet.estimator.starts import by_energy, feature_eigenvalues, undominated
 from sonic_bullet.estimator.values import Features
 from sonic_bullet.records import Array
 
 STRONGEST = 12  # features that are laid on modes to guess γ
 APART = 3e-3  # of ln γ: guesses closer than this are one guess
+DISTINCT = 0.01  # of ln γ: starts closer than this end in one minimum
+UNDOMINATED = 12
 ROUNDS = 12
 REWEIGHTED = 12
 HUBER = 1.345
@@ -133,7 +135,10 @@ def _only(features: Features, which: Array) -> Features:
 
 
 def candidates(aim: Target, most: int) -> Array:
-    """(s, 4) starts: every strong feature on every audible mode gives a γ; alike ones are one; Π_MRP keeps the best ``most``."""
+    """(s, 4) starts: every strong feature on every audible mode gives a γ; alike ones are one; Π_MRP keeps the best ``most``.
+
+    The paper's own γ's, each undominated mode on the most dominant feature, come with them: one of those is always near [section 5.3].
+    """
     problem, features = aim.problem, aim.problem.features
     strong = by_energy(features)[:STRONGEST]
     size = np.abs(problem.amplitude_hat)
@@ -147,9 +152,14 @@ def candidates(aim: Target, most: int) -> Array:
     group = np.concatenate([[0], np.cumsum(np.diff(guess) > APART)])
     guess = np.bincount(group, guess) / np.bincount(group)
     score = sift(aim.points, problem.lambda_hat, problem.amplitude_hat, alpha, beta, np.exp(guess))
-    kept = np.exp(guess[np.argsort(score, kind="stable")[:most]])
+    surest = np.log(eigen[strong[0]] / problem.lambda_hat[undominated(problem.lambda_hat, problem.amplitude_hat)[-UNDOMINATED:]])
+    kept: list[float] = []
+    for log_gamma in (*guess[np.argsort(score, kind="stable")], *np.clip(surest, *np.log([problem.lower[2], problem.upper[2]]))):
+        # the last ones come whatever Π_MRP says of them: where few of many modes were heard it likes a γ that hides the rest under those
+        if (len(kept) < most or log_gamma in surest) and all(abs(log_gamma - other) > DISTINCT for other in kept):
+            kept.append(float(log_gamma))
     rows = []
-    for gamma in kept:
+    for gamma in np.exp(kept):
         freq_hz, decay, amplitude = modes_of(np.array([alpha, beta, gamma, 1.0]), problem.lambda_hat, problem.amplitude_hat)
         heard = (freq_hz > 0) & (freq_hz < features.sr / 2)
         total = energy(decay, amplitude)[heard].sum()

@@ -82,6 +82,18 @@ def test_the_metric_alone_leads_to_the_planted_material(constants: Constants) ->
     assert np.abs(found.parameters / truth - 1).max() < 1e-5
 
 
+def test_few_features_of_many_modes() -> None:
+    """The lowest ten of thirty modes were extracted: a γ that hides the others under those must not win."""
+    lambda_hat, amplitude_hat = plate()
+    truth = np.array([20.0, 3e-8, GAMMA_0, 0.1])
+    asked = recorded(truth, lambda_hat, amplitude_hat, seconds=0.6, noise=1e-4)
+    low = np.argsort(asked.features.freq_hz)[:10]
+    names = ("freq_hz", "decay_per_s", "amplitude", "phase_rad", "freq_sd_hz", "decay_sd_per_s", "amplitude_sd")
+    few = Features(**{name: getattr(asked.features, name)[low] for name in names}, onset_s=0.0, noise_dbfs=-80.0, sr=SR)
+    found = fast(Problem(few, asked.signal, lambda_hat, amplitude_hat))
+    assert found.gamma_m2_s2 == pytest.approx(truth[2], rel=1e-3)
+
+
 def test_fast_reaches_the_reference_on_a_fiftieth() -> None:
     """A plate that no parameters fit: decays 10 %, frequencies 0.3 % off the model. Both searches share one metric."""
     lambda_hat, amplitude_hat = plate()
