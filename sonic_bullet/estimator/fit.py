@@ -142,12 +142,12 @@ def _placed(shaped: tuple[Evidence, ...], band_hz: tuple[float, float]) -> tuple
 
 
 def _together(shaped: tuple[Evidence, ...], start: tuple[float, float], guess_poisson: float) -> tuple[tuple[Pairs, ...], Array, float]:
-    """Assign and solve for all objects at once until nothing moves."""
+    """Assign and solve for all objects at once until nothing moves; what the modes scatter is then learnt, in place of `MESH_SD`."""
     log_gamma, poisson = start
-    information, scatter = np.zeros((2, 2)), np.nan
+    information, scatter, mesh_sd = np.zeros((2, 2)), np.nan, MESH_SD
     pairs: list[Pairs] = []
-    for _ in range(4):
-        pairs, total, pull, squares, count = [], np.zeros((2, 2)), np.zeros(2), 0.0, 0
+    for turn in range(12):
+        pairs, information, pull, offs = [], np.zeros((2, 2)), np.zeros(2), []
         for e in shaped:
             if e.family is None or e.seen is None:
                 continue
@@ -156,24 +156,29 @@ def _together(shaped: tuple[Evidence, ...], start: tuple[float, float], guess_po
             pairs.append(Pairs(log_gamma, poisson, line, mode, cost))
             if len(line) == 0:
                 continue
-            step, own, weight = solve(e.lines, group, line, mode, 0.0, 1e6)
-            total += own
+            step, own, weight = solve(e.lines, group, line, mode, 0.0, 1e6, mesh_sd)
+            information += own
             pull += own @ step
-            off = np.log(e.lines.freq_hz[line] / group.freq_hz[mode])
-            squares += float((weight * off**2).sum())
-            count += len(line)
-        information = total
-        if count == 0:
+            offs.append(np.stack([weight, np.log(_undamped_hz(e, line) / group.freq_hz[mode])]))
+        if not offs:
             break
-        prior = np.diag([1e-12, POISSON_SD**-2])
-        step = np.linalg.solve(total + prior, pull - np.array([0.0, (poisson - guess_poisson) / POISSON_SD**2]))
-        scatter = float(np.sqrt(squares / max(count - 2, 1)))
-        if np.abs(step).max() < 1e-7:
-            break
+        weight, off = np.concatenate(offs, axis=1)
+        scatter = float(np.sqrt((weight * off**2).sum() / max(weight.sum() - 2, 1)))
+        told = np.linalg.det(information) > 0 and np.linalg.inv(information)[1, 1] < POISSON_TOLD**2
+        prior = np.diag([1e-12, 0.0 if told else POISSON_SD**-2])
+        step = np.linalg.solve(information + prior, pull - prior @ (0.0, poisson - guess_poisson))
         log_gamma += float(np.clip(step[0], -0.05, 0.05))
         poisson = float(np.clip(poisson + np.clip(step[1], -0.02, 0.02), -0.45, 0.48))
         pairs = [replace(p, log_gamma=log_gamma, poisson=poisson) for p in pairs]
+        if turn >= 3:
+            mesh_sd = float(np.clip(scatter, 1e-7, 4 * MESH_SD)) if len(off) > 3 else MESH_SD
+            if np.abs(step).max() < 1e-9:
+                break
     return tuple(pairs), information, scatter
+
+
+def _undamped_hz(e: Evidence, line: Array) -> Array:
+    return np.asarray(np.hypot(2 * np.pi * e.lines.freq_hz[line], np.nan_to_num(e.lines.decay_per_s[line])) / (2 * np.pi))
 
 
 def _decays(evidence: tuple[Evidence, ...], pairs: tuple[Pairs, ...]) -> tuple[Array, Array, Array]:
@@ -228,7 +233,7 @@ def gain_of(objects: tuple[ObjectFit, ...]) -> tuple[float, float, float]:
 
     Least squares with Cauchy's weights; an amplitude counts as known to its spread and to 2 % of the mode's strongest ψ, the shapes' own error.
     """
-    heard, told, loose = [], [], []
+    heard, turned, told, loose = [], [], [], []
     for o in objects:
         e, mode = o.evidence, np.flatnonzero(o.line >= 0)
         line = o.line[mode]
@@ -236,23 +241,26 @@ def gain_of(objects: tuple[ObjectFit, ...]) -> tuple[float, float, float]:
         if e.seen is None or not len(mode) or not use.any():
             continue
         a, p = e.lines.amplitude[use][:, line], o.pattern[use][:, mode]
+        own = np.zeros(len(line))
         if phased(e.lines, e.seen):
             a = a / e.seen.start(e.lines.freq_hz[line], np.nan_to_num(e.lines.decay_per_s[line]))
+            own = np.angle((p * a).sum(axis=0))  # a finite contact turns all strikes of a mode alike: that is amiss, but no matter of gain
         else:
             a, p = np.abs(a), np.abs(p)
-        gain = np.linalg.norm(a) / max(float(np.linalg.norm(p)), 1e-300)
+        rough = float(np.linalg.norm(a)) / max(float(np.linalg.norm(p)), 1e-300)
         heard.append(a.ravel())
+        turned.append(np.real(a * np.exp(-1j * own)).ravel())
         told.append(p.ravel())
-        loose.append(np.hypot(e.lines.amplitude_sd[use][:, line] / gain, 0.02 * np.abs(p).max(axis=0, keepdims=True) + 1e-300).ravel())
+        loose.append(np.hypot(e.lines.amplitude_sd[use][:, line] / rough, 0.02 * np.abs(p).max(axis=0, keepdims=True) + 1e-300).ravel())
     if not heard:
         return np.nan, np.nan, np.nan
-    y, x, s = np.concatenate(heard), np.concatenate(told), np.concatenate(loose)
-    weight = np.ones(len(y))
+    y, z, x, s = (np.concatenate(part) for part in (heard, turned, told, loose))
+    weight, gain = np.ones(len(y)), 0.0
     for _ in range(30):
-        gain = float((weight * x * np.real(y) / s**2).sum() / max(float((weight * x**2 / s**2).sum()), 1e-300))
+        gain = float((weight * x * z / s**2).sum() / max(float((weight * x**2 / s**2).sum()), 1e-300))
         if not gain > 0:
             return np.nan, np.nan, np.nan
-        off = np.abs(y / gain - x) / s
+        off = (z / gain - x) / s
         weight = 1 / (1 + (off / 2.5) ** 2)
     scatter = float(np.sqrt((np.abs(y / gain - x) ** 2).sum() / (x**2).sum()))
     spread = gain * float(np.sqrt((weight * off**2).sum() / max(len(y) - 1, 1) / (weight * x**2 / s**2).sum()))

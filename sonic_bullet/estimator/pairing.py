@@ -159,11 +159,11 @@ def paired(family: Family, lines: Lines, seen: Observation, start: tuple[float, 
     return best
 
 
-def solve(lines: Lines, group: Group, line: Array, mode: Array, poisson_off: float, poisson_sd: float) -> tuple[Array, Array, Array]:
+def solve(lines: Lines, group: Group, line: Array, mode: Array, poisson_off: float, poisson_sd: float, mesh_sd: float = MESH_SD) -> tuple[Array, Array, Array]:
     """Step (2,) of ln γ and ν, information (2, 2) of the lines alone, and the weights (p,) left by outliers. poisson_sd: of the guess."""
     freq, decay = lines.freq_hz[line], lines.decay_per_s[line]
     off = np.log((2 * np.pi * freq) ** 2 + np.nan_to_num(decay) ** 2) - 2 * np.log(2 * np.pi * group.freq_hz[mode])
-    sd = 2 * np.hypot(np.nan_to_num(lines.freq_sd_hz[line]) / freq, MESH_SD)
+    sd = 2 * np.hypot(np.nan_to_num(lines.freq_sd_hz[line]) / freq, mesh_sd)
     slope = np.stack([np.ones(len(line)), group.slope[mode]], axis=1)
     weight = np.ones(len(line))
     prior = np.diag([1e-12, poisson_sd**-2])

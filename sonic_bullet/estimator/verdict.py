@@ -13,7 +13,6 @@ from sonic_bullet.errors import SonicBulletError
 from sonic_bullet.estimator import fit as fits
 from sonic_bullet.estimator.distance import floor_of, log_spectral_db, with_noise
 from sonic_bullet.estimator.evidence import Evidence
-from sonic_bullet.estimator.pairing import MESH_SD
 from sonic_bullet.estimator.predict import lines_sound, predicted
 from sonic_bullet.estimator.rayleigh import Damping
 from sonic_bullet.estimator.values import MaterialFit
@@ -48,7 +47,7 @@ def finished(
     for name in damping.said:
         unsaid.append(f"{name} (the decays of {_decays_seen(evidence)} lines do not tell it)")
     covariance[:2, :2] = damping.covariance
-    _elastic(covariance, information, scatter, unsaid, bool(objects))
+    _elastic(covariance, information, unsaid, bool(objects))
     if np.isfinite(gain[0]):
         covariance[3, 3] = (gain[1] / gain[0]) ** 2
         unsaid_gain = [e for e in evidence if e.seen is not None and not e.seen.level.all()]
@@ -83,19 +82,18 @@ def _decays_seen(evidence: tuple[Evidence, ...]) -> int:
     return int(sum(np.isfinite(e.lines.decay_per_s).sum() for e in evidence))
 
 
-def _elastic(covariance: Array, information: Array, scatter: float, unsaid: list[str], shaped: bool) -> None:
+def _elastic(covariance: Array, information: Array, unsaid: list[str], shaped: bool) -> None:
     """Fill in ln γ and ν."""
     if not shaped or information[0, 0] <= 0:
         unsaid += ["gamma (no mode of a known shape)", "poisson_ratio"]
         return
-    size = max((scatter / MESH_SD) ** 2, 0.04) if np.isfinite(scatter) else 1.0
     determinant = np.linalg.det(information)
-    own = np.linalg.inv(information) * size if determinant > 1e-12 * information[0, 0] * information[1, 1] else np.full((2, 2), np.inf)
+    own = np.linalg.inv(information) if determinant > 1e-12 * information[0, 0] * information[1, 1] else np.full((2, 2), np.inf)
     if own[1, 1] < fits.POISSON_TOLD**2:
         covariance[np.ix_([2, 4], [2, 4])] = own
         return
     unsaid.append("poisson_ratio (the lines change with it as with gamma)")
-    covariance[2, 2] = np.linalg.inv(information / size + np.diag([0, fits.POISSON_SD**-2]))[0, 0]
+    covariance[2, 2] = np.linalg.inv(information + np.diag([0, fits.POISSON_SD**-2]))[0, 0]
 
 
 def _foreign(evidence: tuple[Evidence, ...], objects: tuple[fits.ObjectFit, ...]) -> tuple[Array, float]:
