@@ -1,0 +1,70 @@
+"""Where an impact starts in a recording, where the next one interrupts it, and what in the recording is no honest signal.
+
+energy in blocks of 1 ms -> the loudest rise above what came before -> first sample above the noise in that block -> onset
+a later rise by `AGAIN_DB` above the level 10 ms before it, within `NEAR_DB` of the first: another hit; what follows it is left out
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sonic_bullet.records import Array
+
+BLOCK_S = 1e-3
+AGAIN_DB, NEAR_DB = 6.0, 20.0
+LEAST_GAP_S = 0.02
+CLIPPED_RUN = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """Samples from the onset to the end or the next hit; hits: how many onsets there are; before: samples that precede it."""
+
+    start: int
+    stop: int
+    hits: int
+
+
+def levels(signal: Array, sr: int) -> tuple[Array, int]:
+    """Mean square (b,) in blocks of 1 ms, and the block's length in samples."""
+    block = max(1, int(BLOCK_S * sr))
+    count = len(signal) // block
+    return (signal[: count * block].reshape(count, block) ** 2).mean(axis=1), block
+
+
+def span(signal: Array, sr: int) -> Span:
+    """The first impact of a recording (n,) that is not silent."""
+    power, block = levels(signal, sr)
+    if len(power) < 4:
+        return Span(0, len(signal), 1)
+    floor = max(float(np.quantile(power, 0.05)), 1e-20)
+    loud = int(np.argmax(power))
+    quiet = np.flatnonzero(power[:loud] < max(1e-3 * power[loud], 4 * floor))
+    first = int(quiet[-1]) if len(quiet) else 0
+    before = signal[: max(first, 0) * block]
+    sigma = float(np.sqrt((before[-50 * block :] ** 2).mean())) if len(before) > block else 0.0
+    edge = max(6 * sigma, 0.02 * float(np.abs(signal).max()))
+    over = np.flatnonzero(np.abs(signal[first * block :]) > edge)
+    start = first * block + (int(over[0]) if len(over) else 0)
+    if len(quiet) == 0:
+        start = 0
+    gap = max(1, int(LEAST_GAP_S / BLOCK_S))
+    smooth = np.convolve(power, np.ones(5) / 5, mode="same")
+    here = start // block
+    later = np.arange(here + gap, len(power) - 5)
+    rise = smooth[later + 3] / np.maximum(smooth[later - 7], 1e-20)
+    again = later[(rise > 10 ** (AGAIN_DB / 10)) & (smooth[later + 3] > power[loud] * 10 ** (-NEAR_DB / 10))]
+    if not len(again):
+        return Span(start, len(signal), 1)
+    hits = 2 + int((np.diff(again) > gap).sum())
+    return Span(start, int(again[0] - 7) * block, hits)
+
+
+def clipped_samples(signal: Array) -> int:
+    """How many samples stand in runs of `CLIPPED_RUN` and more at the largest magnitude: the recorder's ceiling."""
+    top = np.abs(signal) >= np.abs(signal).max() * (1 - 1e-6)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], top, [False]]).astype(np.int8)))
+    run = edges[1::2] - edges[::2]
+    return int(run[run >= CLIPPED_RUN].sum())
