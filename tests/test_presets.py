@@ -129,7 +129,7 @@ def test_a_preset_file_comes_back(tmp_path: Path) -> None:
         ({"format": "sonic-bullet-preset/9"}, "preset/9"),
         ({"effects": [{"id": "damping-law"}]}, "0.2"),
         ({"residual": {"a": 1}}, "0.2"),
-        ({"provenance": "fit"}, "0.2"),
+        ({"provenance": "fit"}, "provenance"),
     ],
 )
 def test_a_wrong_preset_file_is_named_with_its_field(tmp_path: Path, changes: dict[str, object], words: str) -> None:

@@ -13,6 +13,7 @@ from sonic_bullet.errors import SonicBulletError
 from sonic_bullet.estimator import fit as fits
 from sonic_bullet.estimator.distance import floor_of, log_spectral_db, with_noise
 from sonic_bullet.estimator.evidence import Evidence
+from sonic_bullet.estimator.pairing import TWINS
 from sonic_bullet.estimator.predict import lines_sound, predicted
 from sonic_bullet.estimator.rayleigh import Damping
 from sonic_bullet.estimator.values import MaterialFit
@@ -104,6 +105,9 @@ def _foreign(evidence: tuple[Evidence, ...], objects: tuple[fits.ObjectFit, ...]
         lines = o.evidence.lines
         strong = lines.energy >= FOREIGN * lines.energy.max(initial=0)
         taken = np.isin(np.arange(len(lines.freq_hz)), o.line[o.line >= 0])
+        double = np.array([f for f, who in zip(o.freq_hz, o.member, strict=True) if len(who) > 1])
+        if len(double):  # two lines of modes that count as one
+            taken |= np.abs(np.log(lines.freq_hz[:, None] / double)).min(axis=1) < 2 * TWINS
         hz += list(lines.freq_hz[strong & ~taken])
         good, total = good + float((strong & taken).sum()), total + float(strong.sum())
     return np.array(sorted(hz)), good / total if total else np.nan

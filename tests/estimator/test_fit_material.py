@@ -28,7 +28,7 @@ def planted(tmp_path_factory: pytest.TempPathFactory) -> tuple[Planted, CaseFit]
 
 
 def test_planted_material_comes_back(planted: tuple[Planted, CaseFit]) -> None:
-    made, found = planted
+    _, found = planted
     fit = found.fit
     assert fit.verdict == "fitted"
     gamma = BRASS.youngs_pa / BRASS.density_kg_m3

@@ -1,0 +1,114 @@
+"""`sonic-bullet fit`: from a file to a preset that plays, and one line where it cannot."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import soundfile
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "estimator"))
+from made_case import make
+
+from sonic_bullet.cli import main
+from sonic_bullet.presets import load_material, read_preset
+from sonic_bullet.records import Material
+
+KEYS = {"alpha_per_s", "beta_s", "gamma_m2_s2", "sigma", "poisson_ratio", "covariance", "verdict", "metric", "modes"}
+BRASS = Material.isotropic("made", youngs_pa=1.0e11, poisson=0.36, density_kg_m3=8400, alpha_per_s=8.0, beta_s=4e-8)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    made = make(tmp_path_factory.mktemp("bar"), BRASS, (0.12, 0.025, 0.006), guess=(1.1e11, 8400.0, 0.34), strikes=3)
+    return made.folder
+
+
+def run(*words: object) -> int:
+    sys.argv = ["sonic-bullet", *map(str, words)]
+    with pytest.raises(SystemExit) as ended:
+        main()
+    return int(ended.value.code or 0)
+
+
+def test_case_to_preset_json_and_picture(folder: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    assert run("fit", folder, "-o", tmp_path / "p.json", "--picture", tmp_path / "p.png", "--json") == 0
+    told: dict[str, Any] = json.loads(capfd.readouterr().out)
+    assert set(told) == KEYS
+    assert told["verdict"] == "fitted"
+    assert told["alpha_per_s"] == pytest.approx(8.0, rel=5e-3)
+    assert np.array(told["covariance"], float).shape == (5, 5)
+    assert set(told["modes"][0]) == {"freq_hz", "decay_per_s", "amplitude"}
+    assert (tmp_path / "p.png").read_bytes().startswith(b"\x89PNG")
+    preset = read_preset(tmp_path / "p.json")
+    assert preset.provenance is not None
+    assert preset.provenance.verdict == "fitted"
+    assert preset.provenance.parameters["alpha_per_s"] == told["alpha_per_s"]
+    assert load_material(tmp_path / "p.json").beta_s == told["beta_s"]
+
+
+def test_preset_plays_at_once(folder: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    assert run("fit", folder, "-o", tmp_path / "p.json") == 0
+    import pybullet
+    from pybullet_utils.bullet_client import BulletClient
+
+    import sonic_bullet
+
+    client = BulletClient(pybullet.DIRECT)
+    client.setGravity(0, 0, -9.81)
+    client.createMultiBody(0, client.createCollisionShape(pybullet.GEOM_PLANE))
+    box = client.createMultiBody(0.1, client.createCollisionShape(pybullet.GEOM_BOX, halfExtents=[0.06, 0.0125, 0.003]), basePosition=[0, 0, 0.05])
+    heard = []
+    with sonic_bullet.attach(client, microphone=(0, 0.3, 0.3)) as listener:
+        listener.add(box, material=tmp_path / "p.json")
+        for _ in range(60):
+            client.stepSimulation()
+            heard.append(listener.frame)
+    assert max(float(np.abs(f).max()) for f in heard) > 1e-4
+    client.disconnect()
+
+
+def test_one_recording_of_undeclared_onset(folder: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    heard, sr = soundfile.read(folder / "s0.wav")
+    late = np.concatenate([3e-5 * np.random.default_rng(1).standard_normal(3000), heard])
+    soundfile.write(tmp_path / "late.wav", late, sr, subtype="FLOAT")
+    case = json.loads((folder / "case.json").read_text())
+    strike = ",".join(map(str, case["recordings"][0]["strike"]["position"]))
+    at = ",".join(map(str, case["sensor"]["position"]["box"]))
+    words = ["--mesh", folder / "box.obj", "--strike", strike, "--sensor", "velocity", "--sensor-at", at, "--material", "brass"]
+    assert run("fit", tmp_path / "late.wav", *words, "-o", tmp_path / "p.json", "--json", tmp_path / "f.json") == 0
+    told = json.loads((tmp_path / "f.json").read_text())
+    assert told["alpha_per_s"] == pytest.approx(8.0, rel=0.02)
+    assert told["beta_s"] == pytest.approx(4e-8, rel=0.02)
+    assert told["gamma_m2_s2"] == pytest.approx(1.0e11 / 8400, rel=0.005)
+    assert "sigma" in told["verdict"]  # no impulse was given
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["none.wav", "--mesh", "box.obj", "--strike", "0,0,0", "--material", "brass"], "no such file"),
+        (["s0.wav"], "--mesh and --strike and --material missing"),
+        (["s0.wav", "--mesh", "none.obj", "--strike", "0,0,0", "--material", "brass"], "does not exist"),
+        (["s0.wav", "--mesh", "box.obj", "--strike", "0,0,0", "--material", "unobtainium"], "no material"),
+        (["s0.wav", "--mesh", "box.obj", "--strike", "0,0,9", "--material", "brass"], "off the surface"),
+        (["s0.wav", "--mesh", "box.obj", "--strike", "0,0,0.003", "--material", "brass", "--scale", "1000"], "across"),
+        (["box.obj", "--mesh", "box.obj", "--strike", "0,0,0.003", "--material", "brass"], "cannot read"),
+        (["s0.wav", "--mesh", "box.obj", "--strike", "0,nan,0", "--material", "brass"], "finite"),
+        (["."], "out.txt"),
+    ],
+)
+def test_bad_input_is_one_line_and_no_file(
+    folder: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, words: list[str], said: str
+) -> None:
+    monkeypatch.chdir(folder)
+    output = tmp_path / ("out.txt" if said == "out.txt" else "out.json")
+    assert run("fit", *words, "-o", output) == 2
+    error = capfd.readouterr().err
+    assert said in error
+    assert error.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
