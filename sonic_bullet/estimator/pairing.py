@@ -24,6 +24,7 @@ MESH_SD = 2.5e-3  # of a mode's frequency, the mesh's and the shape's own error
 GAMMA_REACH = 0.65  # of ln γ: E and ρ both wrong by 30 %
 POISSON_REACH = 0.05
 CANDIDATES = 8
+MISSED = 0.3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -140,7 +141,11 @@ def assign(group: Group, lines: Lines, seen: Observation, width: float) -> tuple
     row, column = linear_sum_assignment(worth * (price - 1.0))
     paired = price[row, column] < 1.0
     row, column = row[paired], column[paired]
-    return row, column, float(told.sum() + (worth * (price - 1.0))[row, column].sum())
+    missed = 0.0
+    if not _usable(lines, seen).any():  # where no pattern tells modes apart, those between the lines that nobody heard count against
+        between = (group.freq_hz > lines.freq_hz.min() * 0.98) & (group.freq_hz < lines.freq_hz.max() * 1.02)
+        missed = MISSED * float((between & ~np.isin(np.arange(len(between)), column)).sum())
+    return row, column, float(told.sum() + (worth * (price - 1.0))[row, column].sum()) + missed
 
 
 def paired(family: Family, lines: Lines, seen: Observation, start: tuple[float, float], guess_poisson: float, poisson_sd: float) -> Pairs:
