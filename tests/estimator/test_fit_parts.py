@@ -1,0 +1,64 @@
+"""The parts of a fit against closed forms: shared lines to their Cramér-Rao bound, Rayleigh's pair, the distance."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sonic_bullet.estimator.distance import log_spectral_db, white, with_noise
+from sonic_bullet.estimator.lines import joint_lines
+from sonic_bullet.estimator.picture import circle
+from sonic_bullet.estimator.predict import damped_sum
+from sonic_bullet.estimator.rayleigh import rayleigh
+
+
+def test_shared_lines_to_their_spreads() -> None:
+    rng = np.random.default_rng(5)
+    freq = np.array([210.0, 995.0, 1003.0, 2500.0, 4100.0, 6700.0, 9000.0, 9040.0])
+    decay = np.array([3.0, 5.0, 6.0, 12.0, 20.0, 45.0, 90.0, 70.0])
+    z = []
+    for _ in range(4):
+        amplitude = rng.normal(size=(3, 8)) + 1j * rng.normal(size=(3, 8))
+        signals = np.array([damped_sum(freq, decay, a, 22_050, 22_050) + 0.02 * rng.standard_normal(22_050) for a in amplitude])
+        found = joint_lines(signals, 22_050, band_hz=(20, 10_000))
+        assert len(found.freq_hz) == 8  # each found, none invented
+        z += [(found.freq_hz - freq) / found.freq_sd_hz, (found.decay_per_s - decay) / found.decay_sd_per_s]
+    assert 0.7 < np.concatenate(z).std() < 1.35
+
+
+def test_rayleigh_pair_is_exact_on_two_lines_and_unsaid_on_one() -> None:
+    lam = np.array([1e7, 4e8])
+    decay = (3.0 + 2e-7 * lam) / 2
+    found = rayleigh(lam, decay, 1e-4 * decay, (1.0, 1e-7))
+    assert (found.alpha_per_s, found.beta_s) == (pytest.approx(3.0, rel=1e-9), pytest.approx(2e-7, rel=1e-9))
+    assert found.said == ()
+    one = rayleigh(lam[:1], decay[:1], 1e-4 * decay[:1], (1.0, 1e-7))
+    assert one.said == ("alpha", "beta")
+    assert (one.alpha_per_s + one.beta_s * lam[0]) / 2 == pytest.approx(decay[0])  # what it does say is kept
+
+
+def test_scatter_is_told_from_spread() -> None:
+    lam = np.geomspace(1e7, 1e10, 40)
+    rng = np.random.default_rng(0)
+    decay = (3.0 + 1e-8 * lam) / 2
+    true = rayleigh(lam, decay * (1 + 0.001 * rng.standard_normal(40)), 0.001 * decay, (1.0, 1e-7))
+    loose = rayleigh(lam, decay * (1 + 0.2 * rng.standard_normal(40)), 0.001 * decay, (1.0, 1e-7))
+    assert true.scatter == 0
+    assert 0.1 < loose.scatter < 0.4
+    assert loose.covariance[0, 0] > 100 * true.covariance[0, 0]
+
+
+def test_distance_of_a_gain_and_of_nothing() -> None:
+    tone = damped_sum(np.array([1000.0]), np.array([5.0]), np.array([1.0 + 0j]), 20_000, 22_050)
+    floor = white(1e-4)
+    assert log_spectral_db(tone, tone, floor) == 0
+    assert log_spectral_db(2 * tone, tone, floor) == pytest.approx(6.02, abs=0.02)
+    assert np.isnan(log_spectral_db(np.zeros(20_000), np.zeros(20_000), floor))
+    assert with_noise(np.zeros(20_000), floor, 1).std() == pytest.approx(1e-4, rel=0.03)
+
+
+def test_circle_is_equation_8() -> None:
+    freq = np.array([100.0, 5000.0])
+    d = circle(freq, 4.0, 1e-6)
+    lam = (2 * np.pi * freq) ** 2 + d**2
+    assert d == pytest.approx((4.0 + 1e-6 * lam) / 2, rel=1e-12)
