@@ -46,6 +46,12 @@ Examples:
   sonic-bullet fit my_case/ -o preset.json       (several strikes, sizes, sensors: a folder with a case.json)
 The preset plays at once: listener.add(body, material="preset.json")."""
 
+FEATURES_EPILOG = """\b
+Examples:
+  sonic-bullet features tap.wav
+  sonic-bullet features tap.wav --json features.json --picture features.png
+  sonic-bullet features tap.flac --band 200,8000 --onset 0"""
+
 GROUP_EPILOG = """\b
 Examples:
   sonic-bullet render scenes/tabletop.py -o tabletop.wav
@@ -154,6 +160,19 @@ def doctor(scene: str, seconds: float, json_to: str | None) -> None:
     from sonic_bullet.cli.scenes import run_doctor
 
     run_doctor(scene, seconds, json_to)
+
+
+@cli.command(epilog=FEATURES_EPILOG)
+@click.argument("recording")
+@click.option("--onset", "onset_s", type=click.FloatRange(0), metavar="S", help="When the impact starts. [default: found]")
+@click.option("--band", type=Numbers("LO,HI"), help="Look between these frequencies in Hz. [default: 20,20000]")
+@click.option("--picture", metavar="NAME.png", help="Also draw the spectrogram with the features on it, and decay over frequency.")
+@json_option
+def features(**options: Any) -> None:
+    """The damped sinusoids of a recorded impact: frequency, decay, amplitude, each with its spread."""
+    from sonic_bullet.cli.features import run_features
+
+    run_features(**options)
 
 
 @cli.command(epilog=FIT_EPILOG)

@@ -24,14 +24,15 @@ from sonic_bullet.records import Array
 FASTEST_PER_S = 3000.0
 FALSE_ALARMS = 0.2
 BAND_HZ = 500.0
-ROUNDS = 10
-MOST_MODES = 220
+ROUNDS = 6
+QUICK, THOROUGH = (8, 1e-4), (40, 1e-6)  # steps and tolerance of a fit on the way, and of the last
+MOST_MODES = 140
 SECONDS_MAX = 8.0
 LEAST_SAMPLES = 512
 FLOOR = 1e-12  # of the recording's rms: rounding, where there is no noise
 NESTED = (1e-5, 1e-7, 1e-9, 1e-11, 0.0)
 EXPLAINED = 0.8
-STEADY = 0.5  # a decay of less than this over the whole recording, or within two of its spreads of none, is a tone
+STEADY = 0.02  # a decay of less than this over the whole recording, or within two of its spreads of none, is a tone
 
 
 def extract(signal: Array, sr: int, *, onset_s: float | None = None, band_hz: tuple[float, float] | None = None) -> Features:
@@ -128,9 +129,9 @@ def _energies(modes: Modes, density: Array, sr: int, count: int) -> Array:
     return np.asarray((amplitude * np.linalg.solve(block, amplitude[:, :, None])[:, :, 0]).sum(-1) / _at(density, modes.pole.imag / (2 * np.pi), sr) ** 2)
 
 
-def _fit(signal: Array, pole: Array, sr: int, band_hz: tuple[float, float]) -> Modes:
+def _fit(signal: Array, pole: Array, sr: int, band_hz: tuple[float, float], effort: tuple[int, float] = QUICK) -> Modes:
     band = (2 * np.pi * 0.5 * band_hz[0], 2 * np.pi * min(1.02 * band_hz[1], 0.4999 * sr))
-    return likelihood.fitted(signal, likelihood.amplitudes(signal, pole, sr), sr, band=band, fastest_per_s=FASTEST_PER_S, steps=40, tolerance=1e-5)
+    return likelihood.fitted(signal, likelihood.amplitudes(signal, pole, sr), sr, band=band, fastest_per_s=FASTEST_PER_S, steps=effort[0], tolerance=effort[1])
 
 
 def _modes(x: Array, sr: int, band_hz: tuple[float, float]) -> tuple[Modes, Array]:
@@ -151,7 +152,8 @@ def _modes(x: Array, sr: int, band_hz: tuple[float, float]) -> tuple[Modes, Arra
         if len(trial.pole) <= len(modes.pole):
             break
         modes, density = trial, np.maximum(noise_density(likelihood.residual(x, trial, sr)), floor)
-    return _pruned(x, sr, band_hz, modes, density, least), density
+    modes = _pruned(x, sr, band_hz, _fit(x, modes.pole, sr, band_hz, THOROUGH), density, least)
+    return modes, np.maximum(noise_density(likelihood.residual(x, modes, sr)), floor)
 
 
 def _nested(x: Array, sr: int, band_hz: tuple[float, float], candidate: Array, least: float, floor: float) -> tuple[Modes, Array]:
@@ -169,7 +171,7 @@ def _nested(x: Array, sr: int, band_hz: tuple[float, float], candidate: Array, l
         if keep.sum() in (0, last):
             continue
         last = int(keep.sum())
-        modes = _fit(x, candidate[keep], sr, band_hz)
+        modes = _fit(x, candidate[keep], sr, band_hz, THOROUGH)
         left = likelihood.residual(x, modes, sr)
         rms = max(float(np.sqrt((left**2).mean())), floor)
         score = 2 * len(x) * np.log(rms) + 4 * last * np.log(len(x))

@@ -1,6 +1,6 @@
 """Where an impact starts in a recording, where the next one interrupts it, and what in the recording is no honest signal.
 
-energy in blocks of 1 ms -> the loudest rise above what came before -> first sample above the noise in that block -> onset
+energy in blocks of 1 ms -> the first block within 20 dB of the loudest -> first sample above the noise in that block -> onset
 a later rise by `AGAIN_DB` above the level 10 ms before it, within `NEAR_DB` of the first: another hit; what follows it is left out
 """
 
@@ -40,7 +40,8 @@ def span(signal: Array, sr: int) -> Span:
     if len(power) < 4:
         return Span(0, len(signal), 1)
     floor = max(float(np.quantile(power, 0.05)), 1e-20)
-    loud = int(np.argmax(power))
+    early = int(np.argmax(power >= power.max() * 10 ** (-NEAR_DB / 10)))  # the first hit, be a later one louder
+    loud = early + int(np.argmax(power[early : early + 10]))
     quiet = np.flatnonzero(power[:loud] < max(1e-3 * power[loud], 4 * floor))
     first = int(quiet[-1]) if len(quiet) else 0
     before = signal[: max(first, 0) * block]
