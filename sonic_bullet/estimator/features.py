@@ -16,7 +16,7 @@ from __future__ import annotations
 import numpy as np
 
 from sonic_bullet.errors import AudioError
-from sonic_bullet.estimator import likelihood, onset, subspace
+from sonic_bullet.estimator import exact, likelihood, onset, subspace
 from sonic_bullet.estimator.likelihood import Modes
 from sonic_bullet.estimator.values import Features
 from sonic_bullet.records import Array
@@ -47,7 +47,7 @@ def extract(signal: Array, sr: int, *, onset_s: float | None = None, band_hz: tu
         raise AudioError("recording holds NaN or infinite samples", "repair the file")
     if len(signal) == 0 or np.abs(signal).max() < 1e-7:
         raise AudioError("recording is silent", "record an impact")
-    low, high = band_hz or (20.0, 20_000.0)
+    low, high = band_hz or (20.0, 22_000.0)
     high = min(high, 0.49 * sr)
     if not 0 < low < high:
         raise AudioError(f"band is {low:g} to {high:g} Hz", f"give a band inside 0 to {sr / 2:g} Hz")
@@ -62,7 +62,12 @@ def extract(signal: Array, sr: int, *, onset_s: float | None = None, band_hz: tu
     if clipped:
         notes.append(f"{clipped} samples are clipped: amplitudes and early decays are not to be trusted")
     modes, density = _modes(x, sr, (low, high))
-    return _features(x, sr, modes, density, (part.start, len(signal)), notes)
+    start = part.start
+    if onset_s is None and len(modes.pole):
+        start = onset.by_modes(signal, part.start, modes, sr, _rms(likelihood.residual(x, modes, sr)))
+        x = signal[start : start + len(x)]
+        modes, density = _moved(x, sr, modes, density, (low, high), start - part.start)
+    return _features(x, sr, modes, density, (low, high), start, notes)
 
 
 def noise_density(signal: Array, *, tail: bool = False) -> Array:
@@ -129,14 +134,21 @@ def _energies(modes: Modes, density: Array, sr: int, count: int) -> Array:
     return np.asarray((amplitude * np.linalg.solve(block, amplitude[:, :, None])[:, :, 0]).sum(-1) / _at(density, modes.pole.imag / (2 * np.pi), sr) ** 2)
 
 
+def _reach(band_hz: tuple[float, float], sr: int) -> tuple[float, float]:
+    return 2 * np.pi * 0.5 * band_hz[0], 2 * np.pi * min(1.02 * band_hz[1], 0.4999 * sr)
+
+
 def _fit(signal: Array, pole: Array, sr: int, band_hz: tuple[float, float], effort: tuple[int, float] = QUICK) -> Modes:
-    band = (2 * np.pi * 0.5 * band_hz[0], 2 * np.pi * min(1.02 * band_hz[1], 0.4999 * sr))
-    return likelihood.fitted(signal, likelihood.amplitudes(signal, pole, sr), sr, band=band, fastest_per_s=FASTEST_PER_S, steps=effort[0], tolerance=effort[1])
+    return likelihood.fitted(signal, likelihood.amplitudes(signal, pole, sr), sr, band=_reach(band_hz, sr), fastest_per_s=FASTEST_PER_S, steps=effort[0], tolerance=effort[1])
 
 
 def _modes(x: Array, sr: int, band_hz: tuple[float, float]) -> tuple[Modes, Array]:
     """The significant modes of a signal and the noise density they leave."""
-    floor = FLOOR * float(np.sqrt((x**2).mean()))
+    floor = FLOOR * _rms(x)
+    without_noise = exact.modes(x, sr)
+    if without_noise is not None:
+        left = _rms(likelihood.residual(x, without_noise, sr))
+        return without_noise, np.full(2, max(left, floor))
     least = 2 * np.log(1.5 * len(x) / FALSE_ALARMS)
     density = np.maximum(noise_density(x, tail=True), floor)
     candidate = subspace.poles(x, sr, density, band_hz, BAND_HZ, FASTEST_PER_S)
@@ -154,6 +166,21 @@ def _modes(x: Array, sr: int, band_hz: tuple[float, float]) -> tuple[Modes, Arra
         modes, density = trial, np.maximum(noise_density(likelihood.residual(x, trial, sr)), floor)
     modes = _pruned(x, sr, band_hz, _fit(x, modes.pole, sr, band_hz, THOROUGH), density, least)
     return modes, np.maximum(noise_density(likelihood.residual(x, modes, sr)), floor)
+
+
+def _moved(x: Array, sr: int, modes: Modes, density: Array, band_hz: tuple[float, float], later: int) -> tuple[Modes, Array]:
+    """The same modes for a signal that starts ``later`` samples after the one they were found in."""
+    if later == 0:
+        return modes, density
+    turned = Modes(modes.pole, modes.amplitude * np.exp(modes.pole / sr * later))
+    if len(density) == 2:
+        return turned, density
+    fitted = likelihood.fitted(x, turned, sr, band=_reach(band_hz, sr), fastest_per_s=FASTEST_PER_S, steps=QUICK[0], tolerance=THOROUGH[1])
+    return fitted, density
+
+
+def _rms(signal: Array) -> float:
+    return float(np.sqrt((signal**2).mean()))
 
 
 def _nested(x: Array, sr: int, band_hz: tuple[float, float], candidate: Array, least: float, floor: float) -> tuple[Modes, Array]:
@@ -195,7 +222,7 @@ def _pruned(x: Array, sr: int, band_hz: tuple[float, float], modes: Modes, densi
     return modes
 
 
-def _features(x: Array, sr: int, modes: Modes, density: Array, place: tuple[int, int], notes: list[str]) -> Features:
+def _features(x: Array, sr: int, modes: Modes, density: Array, band_hz: tuple[float, float], start: int, notes: list[str]) -> Features:
     k = len(modes.pole)
     left = likelihood.residual(x, modes, sr)
     energy = float(x @ x)
@@ -210,7 +237,7 @@ def _features(x: Array, sr: int, modes: Modes, density: Array, place: tuple[int,
     if explained < EXPLAINED:
         notes.append(f"not an impact, or not modal: damped sinusoids explain {100 * explained:.0f} % of the energy")
     amplitude = np.abs(modes.amplitude)
-    keep = np.flatnonzero(~tone)
+    keep = np.flatnonzero(~tone & (freq >= band_hz[0]) & (freq <= band_hz[1]))
     keep = keep[np.argsort(-amplitude[keep], kind="stable")]
     if not len(keep):
         notes.append("no mode stands above the noise")
@@ -223,7 +250,7 @@ def _features(x: Array, sr: int, modes: Modes, density: Array, place: tuple[int,
         freq_sd_hz=sd[0, keep] / (2 * np.pi),
         decay_sd_per_s=sd[1, keep],
         amplitude_sd=np.hypot(sd[2, keep] * np.cos(np.angle(modes.amplitude[keep])), sd[3, keep] * np.sin(np.angle(modes.amplitude[keep]))),
-        onset_s=place[0] / sr,
+        onset_s=start / sr,
         noise_dbfs=20 * np.log10(max(noise, 1e-15)),
         sr=sr,
         note="; ".join(notes),

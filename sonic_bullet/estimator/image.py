@@ -152,8 +152,8 @@ def distance(target: Image, freq_hz: Array, decay_per_s: Array, amplitude: Array
 
     differences, where given, takes every √hop·ΔT, level after level, frame after frame, so that their squares sum to the answer.
     """
-    # a sine is two spirals, and the one at −f reaches low bins: the same sine with both signs turned
-    freq_hz, decay_per_s, amplitude = np.concatenate([freq_hz, -freq_hz]), np.concatenate([decay_per_s, decay_per_s]), np.concatenate([amplitude, -amplitude])
+    # a sine is two spirals, and the one at −f reaches low bins: Im A e^{iωt} = Im(−A*) e^{−iωt}
+    freq_hz, decay_per_s, amplitude = np.concatenate([freq_hz, -freq_hz]), np.tile(decay_per_s, 2), np.concatenate([amplitude, -np.conj(amplitude)])
     total, at = 0.0, 0
     unit = 10 ** (target.full_scale_db_spl / 20)
     floor = 10 ** ((FLOOR_DB_SPL - target.full_scale_db_spl) / 20)

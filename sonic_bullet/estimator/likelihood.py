@@ -8,18 +8,18 @@
 Since r is the true residual, rounding in JᵀJ costs steps and no accuracy: noise-free modes come back to 1e-9 and better.
 """
 
-# mypy: disable-error-code="no-untyped-def"
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from sonic_bullet.records import Array
 
 GONE = 41.0  # e^-41: a mode is silent below the rounding of its own start
 STEPS_MOST = 60
+BLOCK = 256  # about the square root of a second's samples
+FINE = 16
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -34,57 +34,54 @@ class Modes:
         return Modes(self.pole[which], self.amplitude[which])
 
 
-@njit(cache=True, nogil=True)
-def _subtracted(signal, pole, amplitude):
-    """Signal less Re Σ A e^{pn}; pole per sample. Powers restart from the exponential every 1024 samples."""
-    left = signal.copy()
-    for k in range(len(pole)):
-        z = np.exp(pole[k])
-        end = min(len(left), int(GONE / max(-pole[k].real, 1e-12)) + 1)
-        power = amplitude[k]
-        for n in range(end):
-            if n % 1024 == 0:
-                power = amplitude[k] * np.exp(pole[k] * n)
-            left[n] -= power.real
-            power *= z
-    return left
+def _powers(pole: Array, step: int, count: int) -> Array:
+    """e^{pole·step·m} (count, k), zero once below e^-GONE: no subnormal numbers."""
+    outer = -(-count // FINE)
+    above, below = (np.exp(np.maximum(e.real, -GONE) + 1j * e.imag) for e in (pole * (step * m)[:, None] for m in (FINE * np.arange(outer), np.arange(FINE))))
+    power = (above[:, None] * below).reshape(outer * FINE, len(pole))[:count]
+    last = np.minimum(GONE / np.maximum(-pole.real * step, 1e-12), count).astype(int)
+    for k in np.flatnonzero(last < count):
+        power[last[k] :, k] = 0
+    return np.asarray(power)
 
 
-@njit(cache=True, nogil=True)
-def _moments(signal, pole):
-    """Σ x e^{pn} and Σ n x e^{pn}, both (k,)."""
-    first, second = np.zeros(len(pole), np.complex128), np.zeros(len(pole), np.complex128)
-    for k in range(len(pole)):
-        z = np.exp(pole[k])
-        end = min(len(signal), int(GONE / max(-pole[k].real, 1e-12)) + 1)
-        power, a, b = 1.0 + 0.0j, 0.0 + 0.0j, 0.0 + 0.0j
-        for n in range(end):
-            if n % 1024 == 0:
-                power = np.exp(pole[k] * n)
-            term = signal[n] * power
-            a += term
-            b += n * term
-            power *= z
-        first[k], second[k] = a, b
-    return first, second
+def _subtracted(signal: Array, pole: Array, amplitude: Array) -> Array:
+    """Signal less Re Σ A e^{pn}; pole per sample. n = BLOCK·b + j, so the sum over modes is a product of matrices."""
+    blocks = -(-len(signal) // BLOCK)
+    coarse, fine = _powers(pole, BLOCK, blocks) * amplitude, _powers(pole, 1, BLOCK)
+    sound = np.concatenate([coarse.real, -coarse.imag], axis=1) @ np.concatenate([fine.real, fine.imag], axis=1).T
+    return np.asarray(signal - sound.ravel()[: len(signal)])
 
 
-def geometric(log_w: Array, count: int) -> tuple[Array, Array, Array]:
-    """Σ wⁿ, Σ n wⁿ, Σ n² wⁿ over n < count, w = e^log_w [Graham, Knuth, Patashnik 1994, eq. 2.26]."""
-    gap = -np.expm1(log_w)
+def _moments(signal: Array, pole: Array) -> tuple[Array, Array]:
+    """Σ x e^{pn} and Σ n x e^{pn}, both (k,), by the same division of n."""
+    blocks, k = -(-len(signal) // BLOCK), len(pole)
+    padded = np.zeros((blocks, BLOCK))
+    padded.ravel()[: len(signal)] = signal
+    coarse, fine = _powers(pole, BLOCK, blocks), _powers(pole, 1, BLOCK)
+    slope = np.arange(BLOCK)[:, None] * fine
+    sums = padded @ np.concatenate([fine.real, fine.imag, slope.real, slope.imag], axis=1)
+    plain, sloped = coarse * (sums[:, :k] + 1j * sums[:, k : 2 * k]), coarse * (sums[:, 2 * k : 3 * k] + 1j * sums[:, 3 * k :])
+    return plain.sum(axis=0), (BLOCK * np.arange(blocks)) @ plain + sloped.sum(axis=0)
+
+
+def geometric(first: Array, second: Array, count: int) -> tuple[Array, Array, Array]:
+    """Σ wⁿ, Σ n wⁿ, Σ n² wⁿ over n < count, w (k, k) = e^{first + second} [Graham, Knuth, Patashnik 1994, eq. 2.26]."""
+    w, last = np.outer(np.exp(first), np.exp(second)), np.outer(np.exp(first * count), np.exp(second * count))
+    gap, log_w = 1 - w, first[:, None] + second
+    near = np.abs(gap) < 0.05  # where 1 − w has lost digits
+    gap[near] = -np.expm1(log_w[near])
     gap = np.where(np.abs(gap) < 1e-12, 1e-12, gap)
-    w, last = np.exp(log_w), np.exp(log_w * count)
     zeroth = (1 - last) / gap
-    first = (w * zeroth - count * last) / gap
-    second = (w * (zeroth + 2 * first) - float(count) ** 2 * last) / gap
-    return zeroth, first, second
+    first_moment = (w * zeroth - count * last) / gap
+    second_moment = (w * (zeroth + 2 * first_moment) - float(count) ** 2 * last) / gap
+    return zeroth, first_moment, second_moment
 
 
 def information(modes: Modes, sr: int, count: int) -> Array:
     """JᵀJ (4k, 4k) for (ω, d, Re A, Im A), blocks of k; ω and d in 1/s."""
     z, a, k = modes.pole / sr, modes.amplitude, len(modes.pole)
-    even = geometric(z[:, None] + z[None, :].conj(), count)
-    odd = geometric(z[:, None] + z[None, :], count)
+    even, odd = geometric(z, z.conj(), count), geometric(z, z, count)
     columns = ((1j * a / sr, 1), (-a / sr, 1), (np.ones(k, complex), 0), (np.full(k, 1j), 0))
     matrix = np.empty((4 * k, 4 * k))
     for i, (c, q) in enumerate(columns):

@@ -1,8 +1,7 @@
 """Several recordings of one object -> the damped sinusoids they share: frequencies and decays common, amplitudes their own.
 
     x_s(t) = Re Σ_k A_sk e^{(−d_k + iω_k) t} + noise
-    start:   bands, decimated; poles = eigenvalues of the shift between the rows of the signal subspace of all recordings at once
-                                                                             (ESPRIT)       [Roy & Kailath 1989, eq. 3.12-3.17]
+    start:   shared_poles.py
     refine:  maximum likelihood in white noise, A_sk linear and projected out              [Golub & Pereyra 1973; Kaufman 1975]
     spread:  inverse of the information matrix at the end, so the Cramér-Rao bound          [Kay 1993, ch. 3.9]
 
@@ -19,12 +18,11 @@ import numpy as np
 from numba import njit
 
 from sonic_bullet.errors import AudioError
+from sonic_bullet.estimator.shared_poles import FASTEST_PER_S, start_poles
 from sonic_bullet.records import Array
 
-FASTEST_PER_S = 2500.0
 SIGNIFICANT = 60.0  # energy of a line over the noise's density, all recordings: a²·sr/(4dσ²) summed
 MOST_LINES = 160
-MOST_WINDOW, MOST_COLUMNS = 300, 1200  # of the data matrix of one recording
 SECONDS_MAX = 8.0
 
 
@@ -57,7 +55,7 @@ def joint_lines(signals: Array, sr: int, *, band_hz: tuple[float, float] = (20.0
     low, high = max(band_hz[0], 5.0), min(band_hz[1], 0.485 * sr)
     noise = noise_rms(signals, sr)
     colour = _colour(signals, noise, sr)
-    pole = _start(signals / noise[:, None], sr, low, high)
+    pole = start_poles(signals / noise[:, None], sr, low, high)
     for _ in range(3):
         before = len(pole)
         pole = _polished(signals, noise, pole, sr, low, high)
@@ -86,60 +84,6 @@ def _colour(signals: Array, noise: Array, sr: int) -> Callable[[Array], Array]:
     side = np.pad(power, 12, mode="edge")
     level = np.maximum(np.quantile(np.lib.stride_tricks.sliding_window_view(side, 25), 0.25, axis=1), 1.0)
     return lambda freq: np.asarray(np.interp(freq, np.fft.rfftfreq(window, 1 / sr), level))
-
-
-def _start(signals: Array, sr: int, low: float, high: float) -> Array:
-    """Poles −d + iω (k,) band by band; signals in units of their noise."""
-    n = signals.shape[1]
-    whole = 1 << int(np.ceil(np.log2(2 * n)))
-    spectrum = np.fft.fft(signals, whole, axis=1)
-    poles = []
-    edge = low
-    while edge < high:
-        width = max(350.0, 0.09 * edge)
-        bin_number = round((edge + width / 2) / sr * whole)
-        centre = bin_number * sr / whole
-        step = max(1, int(sr / (2.2 * width)))
-        taps = _low_pass(min(2 * int(1.9 * sr / width) + 1, n // 3), 0.85 * width / sr) if step > 1 else np.ones(1)
-        band = np.fft.ifft(np.roll(spectrum, -bin_number, axis=1) * np.fft.fft(taps, whole), axis=1)[:, len(taps) - 1 : n : step]
-        band /= np.sqrt((taps**2).sum())
-        found = _subspace(band, step / sr)
-        freq = centre + found.imag / (2 * np.pi)
-        keep = (freq >= edge) & (freq < min(edge + width, high)) & (found.real < 0) & (found.real > -FASTEST_PER_S)
-        poles.append(found[keep].real + 2j * np.pi * freq[keep])
-        edge += width
-    return np.concatenate(poles) if poles else np.zeros(0, complex)
-
-
-def _low_pass(taps: int, cutoff: float) -> Array:
-    """Hamming-windowed sinc (taps,), cutoff in cycles a sample [Oppenheim & Schafer 2010, ch. 7.5]."""
-    at = np.arange(taps) - (taps - 1) / 2
-    kernel = np.sinc(2 * cutoff * at) * np.hamming(taps)
-    return np.asarray(kernel / kernel.sum())
-
-
-def _subspace(band: Array, dt: float) -> Array:
-    """Poles of complex series band (s, n) of unit noise at step dt: signal subspace of all of them at once, then the shift."""
-    s, n = band.shape
-    window = min(MOST_WINDOW, n // 3)
-    if window < 8:
-        return np.zeros(0, complex)
-    first = np.arange(0, n - window + 1, 1 + (n - window) // MOST_COLUMNS)  # any columns will do: the shift is between rows
-    gram = np.zeros((window, window), complex)
-    for row in band:
-        data = row[first[:, None] + np.arange(window)]
-        gram += data.T @ data.conj()
-    value, vector = np.linalg.eigh(gram)
-    columns = s * len(first)
-    floor = max(float(np.median(value)) / columns, 0.3)
-    edge = floor * columns * (1 + np.sqrt(window / columns)) ** 2
-    order = min(int((value > 2.0 * edge).sum()), window // 3)
-    if order == 0:
-        return np.zeros(0, complex)
-    signal = vector[:, -order:]
-    shift = np.linalg.lstsq(signal[:-1], signal[1:], rcond=None)[0]
-    with np.errstate(divide="ignore"):
-        return np.asarray(np.log(np.linalg.eigvals(shift)) / dt)
 
 
 @njit(cache=True, nogil=True)

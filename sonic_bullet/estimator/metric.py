@@ -55,8 +55,13 @@ def target(problem: Problem, constants: Constants | None = None) -> Target:
 
 def hybrid(target: Target, parameters: Array, *, plain: bool = False) -> float:
     """Π at α, β, γ, σ (4,). plain: the image by synthesis and Fourier transforms instead of in closed form."""
-    freq_hz, decay_per_s, amplitude = modes_of(parameters, target.problem.lambda_hat, target.problem.amplitude_hat)
-    match = match_ratio_product(target.points, freq_hz, decay_per_s, amplitude)
+    modes = modes_of(parameters, target.problem.lambda_hat, target.problem.amplitude_hat)
+    return hybrid_of_modes(target, *modes, plain=plain)
+
+
+def hybrid_of_modes(target: Target, freq_hz: Array, decay_per_s: Array, amplitude: Array, *, plain: bool = False) -> float:
+    """Π of damped sinusoids (m,) Im A e^{(−d + iω)t}, whatever made them. A real: sines; complex (not with ``plain``): of any phase."""
+    match = match_ratio_product(target.points, freq_hz, decay_per_s, np.abs(amplitude))
     measure = plain_distance if plain else distance
     return measure(target.image, freq_hz, decay_per_s, amplitude) / max(-match, MATCH_FLOOR)
 

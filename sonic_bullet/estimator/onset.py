@@ -1,6 +1,7 @@
 """Where an impact starts in a recording, where the next one interrupts it, and what in the recording is no honest signal.
 
-energy in blocks of 1 ms -> the first block within 20 dB of the loudest -> first sample above the noise in that block -> onset
+energy in blocks of 1 ms -> the first block within 20 dB of the loudest -> first sample above the noise in that block -> about the onset
+the modes heard after it, run backwards, against silence: the sample where the sound takes over from silence -> the onset
 a later rise by `AGAIN_DB` above the level 10 ms before it, within `NEAR_DB` of the first: another hit; what follows it is left out
 """
 
@@ -10,12 +11,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sonic_bullet.estimator.likelihood import Modes
 from sonic_bullet.records import Array
 
 BLOCK_S = 1e-3
 AGAIN_DB, NEAR_DB = 6.0, 20.0
 LEAST_GAP_S = 0.02
 CLIPPED_RUN = 3
+REACH = 64  # samples that the first guess may be off
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,8 +52,6 @@ def span(signal: Array, sr: int) -> Span:
     edge = max(6 * sigma, 0.02 * float(np.abs(signal).max()))
     over = np.flatnonzero(np.abs(signal[first * block :]) > edge)
     start = first * block + (int(over[0]) if len(over) else 0)
-    if len(quiet) == 0:
-        start = 0
     gap = max(1, int(LEAST_GAP_S / BLOCK_S))
     smooth = np.convolve(power, np.ones(5) / 5, mode="same")
     here = start // block
@@ -61,6 +62,22 @@ def span(signal: Array, sr: int) -> Span:
         return Span(start, len(signal), 1)
     hits = 2 + int((np.diff(again) > gap).sum())
     return Span(start, int(again[0] - 7) * block, hits)
+
+
+def by_modes(signal: Array, start: int, modes: Modes, sr: int, noise: float) -> int:
+    """The sample at which the modes, of amplitudes at sample ``start``, take over from silence: the earliest of the likeliest.
+
+    Σ_{n<t} x² + Σ_{n≥t} (x − m)² is least at the true t; a sine begins with a zero, which silence explains as well: hence the earliest
+    within (3 noise)² of the least. Nothing is assumed of the phases.
+    """
+    first, last = max(0, start - REACH), min(len(signal), start + REACH)
+    n = np.arange(first, last)
+    model = (modes.amplitude * np.exp(modes.pole / sr * (n - start)[:, None])).real.sum(axis=1)
+    x = signal[first:last]
+    gain = np.concatenate([[0.0], np.cumsum((x - model) ** 2 - x**2)])  # of calling n < t modes too
+    cost = gain[-1] - gain
+    zero = max(noise, 1e-6 * float(np.sqrt((x**2).mean())))
+    return first + int(np.flatnonzero(cost <= cost.min() + 9 * zero**2)[0])
 
 
 def clipped_samples(signal: Array) -> int:

@@ -10,7 +10,7 @@ import os
 import numpy as np
 
 from sonic_bullet.errors import FileError
-from sonic_bullet.estimator.fit import CaseFit
+from sonic_bullet.estimator.fitted import CaseFit
 from sonic_bullet.estimator.predict import predicted
 from sonic_bullet.files import replacing
 from sonic_bullet.records import Array

@@ -12,7 +12,7 @@ import numpy as np
 from sonic_bullet.records import Array
 
 if TYPE_CHECKING:
-    from sonic_bullet.estimator.fit import CaseFit, ObjectFit
+    from sonic_bullet.estimator.fitted import CaseFit, ObjectFit
     from sonic_bullet.estimator.lines import Lines
     from sonic_bullet.files.cases import CaseRecording
 
@@ -52,7 +52,7 @@ def strike_sound(found: CaseFit, recording: CaseRecording, n: int, sr: int, *, c
 
     from sonic_bullet.errors import FileError
     from sonic_bullet.estimator.evidence import body_family, guess_of, observed
-    from sonic_bullet.estimator.fit import object_of
+    from sonic_bullet.estimator.objects import object_of
 
     if recording.position_m is None:
         raise FileError("a strike without a place cannot be predicted", "give its position")

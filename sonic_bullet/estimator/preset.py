@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sonic_bullet.estimator.fit import CaseFit
+from sonic_bullet.estimator.fitted import CaseFit
 from sonic_bullet.presets import FORMAT, Damping, Elasticity, Impact, Preset, Provenance, Surface, load_material, material_names
 
 NAMES = ("alpha_per_s", "beta_s", "gamma_m2_s2", "sigma", "poisson_ratio")

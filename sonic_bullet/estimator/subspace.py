@@ -14,7 +14,8 @@ import numpy as np
 
 from sonic_bullet.records import Array
 
-STOP_DB = 230.0
+STOP_DB = 160.0
+ROUNDING = 1e-7  # of the largest singular value, by way of H Hᴴ: enough for what a converter writes; exact.py is for the rest
 OVERSAMPLED = 2.5
 WINDOW_MOST, COLUMNS_MOST = 140, 2000
 
@@ -52,8 +53,10 @@ def _shift_poles(band: Array, noise: float) -> Array:
     if window < 6:
         return np.zeros(0, complex)
     first = np.arange(0, n - window + 1, 1 + (n - window) // COLUMNS_MOST)  # the shift is between rows: any columns will do
-    left, size, _ = np.linalg.svd(band[first[None, :] + np.arange(window)[:, None]], full_matrices=False)
-    edge = max(1.05 * noise * (np.sqrt(len(first)) + np.sqrt(window)), 1e-12 * size[0])
+    hankel = band[first[None, :] + np.arange(window)[:, None]]
+    power, left = np.linalg.eigh(hankel @ hankel.conj().T)
+    size, left = np.sqrt(np.maximum(power[::-1], 0)), left[:, ::-1]
+    edge = max(1.05 * noise * (np.sqrt(len(first)) + np.sqrt(window)), ROUNDING * size[0])
     order = min(int((size > edge).sum()), window - 2)
     if order == 0:
         return np.zeros(0, complex)

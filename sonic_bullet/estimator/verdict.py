@@ -9,37 +9,34 @@ from collections.abc import Callable
 
 import numpy as np
 
-from sonic_bullet.errors import SonicBulletError
-from sonic_bullet.estimator import fit as fits
-from sonic_bullet.estimator.distance import floor_of, log_spectral_db, with_noise
+from sonic_bullet.estimator.compared import hybrid_of, log_spectral_of
 from sonic_bullet.estimator.evidence import Evidence
+from sonic_bullet.estimator.fitted import POISSON_SD, POISSON_TOLD, CaseFit, ObjectFit
+from sonic_bullet.estimator.mesh_error import mesh_warning
 from sonic_bullet.estimator.pairing import TWINS
-from sonic_bullet.estimator.predict import lines_sound, predicted
 from sonic_bullet.estimator.rayleigh import Damping
 from sonic_bullet.estimator.values import MaterialFit
 from sonic_bullet.files.cases import Case
-from sonic_bullet.records import Array, Material
+from sonic_bullet.records import Array
 
 DAMPING_MISFIT = 0.03  # relative scatter of decays about the law beyond their spreads
 AMPLITUDE_MISFIT = 0.25
 FREQUENCY_MISFIT = 0.01
 FOREIGN = 1e-3  # of the strongest line's energy
 PAIRED = 0.6  # share of strong lines that must be modes
-MESH_MOVES = 0.01
-HALVING = 8.0  # halving takes this part of what doubling did: order 3 at least, 4 where the surface is smooth [Strang & Fix 1973, ch. 6.3]
 
 
 def finished(
     case: Case,
     evidence: tuple[Evidence, ...],
-    objects: tuple[fits.ObjectFit, ...],
+    objects: tuple[ObjectFit, ...],
     elastic: tuple[float, float, Array, float],
     damping: Damping,
     gain: tuple[float, float, float],
     *,
     check_mesh: bool,
     progress: Callable[[str], None] | None,
-) -> fits.CaseFit:
+) -> CaseFit:
     """The CaseFit of all that was found."""
     log_gamma, poisson, information, scatter = elastic
     guess = evidence[0].guess
@@ -61,7 +58,7 @@ def finished(
     foreign, share = _foreign(evidence, objects)
     amiss = _amiss(objects, damping, scatter, gain[2], foreign, share)
     amplitude = gain[0] if np.isfinite(gain[0]) else 1.0
-    metric = _metric(case, objects, amplitude)
+    metric, decibels = hybrid_of(objects, amplitude), log_spectral_of(objects, amplitude)
     verdict = "; ".join([f"misfit: {', '.join(amiss)}"] * bool(amiss) + [f"not identifiable: {', '.join(unsaid)}"] * bool(unsaid)) or "fitted"
     freq, decay, size = _modes(evidence, objects, amplitude)
     gamma = float(np.exp(log_gamma))
@@ -76,7 +73,8 @@ def finished(
     warnings = [note for e in evidence for note in e.notes]
     if check_mesh and objects and not np.isnan(covariance[2, 2]):
         warnings += mesh_warning(objects[0], gamma * density, density, poisson, progress)
-    return fits.CaseFit(case, found, objects, gamma * density, density, gain[1], damping.scatter, scatter, gain[2], foreign, tuple(assumed), tuple(warnings))
+    scatters = (damping.scatter, scatter, gain[2])
+    return CaseFit(case, found, objects, gamma * density, density, gain[1], *scatters, foreign, tuple(assumed), tuple(warnings), decibels)
 
 
 def _decays_seen(evidence: tuple[Evidence, ...]) -> int:
@@ -90,14 +88,14 @@ def _elastic(covariance: Array, information: Array, unsaid: list[str], shaped: b
         return
     determinant = np.linalg.det(information)
     own = np.linalg.inv(information) if determinant > 1e-12 * information[0, 0] * information[1, 1] else np.full((2, 2), np.inf)
-    if own[1, 1] < fits.POISSON_TOLD**2:
+    if own[1, 1] < POISSON_TOLD**2:
         covariance[np.ix_([2, 4], [2, 4])] = own
         return
     unsaid.append("poisson_ratio (the lines change with it as with gamma)")
-    covariance[2, 2] = np.linalg.inv(information + np.diag([0, fits.POISSON_SD**-2]))[0, 0]
+    covariance[2, 2] = np.linalg.inv(information + np.diag([0, POISSON_SD**-2]))[0, 0]
 
 
-def _foreign(evidence: tuple[Evidence, ...], objects: tuple[fits.ObjectFit, ...]) -> tuple[Array, float]:
+def _foreign(evidence: tuple[Evidence, ...], objects: tuple[ObjectFit, ...]) -> tuple[Array, float]:
     """Frequencies of strong lines that are no mode, and the share of strong lines' worth that are modes."""
     hz: list[float] = []
     good = total = 0.0
@@ -113,7 +111,7 @@ def _foreign(evidence: tuple[Evidence, ...], objects: tuple[fits.ObjectFit, ...]
     return np.array(sorted(hz)), good / total if total else np.nan
 
 
-def _amiss(objects: tuple[fits.ObjectFit, ...], damping: Damping, scatter: float, amplitude: float, foreign: Array, share: float) -> list[str]:
+def _amiss(objects: tuple[ObjectFit, ...], damping: Damping, scatter: float, amplitude: float, foreign: Array, share: float) -> list[str]:
     amiss = []
     if objects and len(foreign):
         shown = ", ".join(f"{f:.0f}" for f in foreign[:6]) + (" …" if len(foreign) > 6 else "")
@@ -129,22 +127,7 @@ def _amiss(objects: tuple[fits.ObjectFit, ...], damping: Damping, scatter: float
     return amiss
 
 
-def _metric(case: Case, objects: tuple[fits.ObjectFit, ...], gain: float) -> float:
-    """Mean log-spectral distance in dB of recording and synthesis over the fitted strikes; -1 where there is nothing to compare."""
-    found = []
-    for o in objects:
-        e = o.evidence
-        if e.signals is None or e.seen is None:
-            continue
-        for i in np.flatnonzero(e.seen.known):
-            made = predicted(o, o.pattern[i], gain, e.signals.shape[1], e.sr)
-            floor = floor_of(e.signals[i] - lines_sound(e.lines, int(i), len(made), e.sr))
-            found.append(log_spectral_db(e.signals[i], with_noise(made, floor, int(i)), floor))
-    found = [f for f in found if np.isfinite(f)]
-    return float(np.mean(found)) if found else -1.0
-
-
-def _modes(evidence: tuple[Evidence, ...], objects: tuple[fits.ObjectFit, ...], gain: float) -> tuple[Array, Array, Array]:
+def _modes(evidence: tuple[Evidence, ...], objects: tuple[ObjectFit, ...], gain: float) -> tuple[Array, Array, Array]:
     """Modes of the first object at its first strike; the lines themselves where there is no shape."""
     if objects:
         o = objects[0]
@@ -154,24 +137,3 @@ def _modes(evidence: tuple[Evidence, ...], objects: tuple[fits.ObjectFit, ...], 
         return o.freq_hz, o.decay_per_s, np.nan_to_num(np.where(np.isfinite(pattern), pattern, np.where(o.line >= 0, measured, 0.0)))
     lines = evidence[0].lines
     return lines.freq_hz, np.nan_to_num(lines.decay_per_s), np.nan_to_num(np.abs(lines.amplitude[0]))
-
-
-def mesh_warning(o: fits.ObjectFit, youngs_pa: float, density: float, poisson: float, progress: Callable[[str], None] | None) -> list[str]:
-    """A warning where halving the elements would move γ by over 1 %, judged by doubling them."""
-    from sonic_bullet.geometry import face_areas_m2
-    from sonic_bullet.modal import analyse, read_mesh
-
-    e = o.evidence
-    if e.family is None or e.thing.mesh is None:
-        return []
-    area = float(np.median(face_areas_m2(e.family.vertex_m, e.family.face))) * 4
-    edge = float(np.sqrt(area * 4 / np.sqrt(3)))
-    value = np.sqrt(e.family.modes(youngs_pa / density, poisson)[0]) / (2 * np.pi)
-    count = int(min(12, len(value)))
-    try:
-        material = Material.isotropic("fit", youngs_pa=youngs_pa, poisson=poisson, density_kg_m3=density)
-        coarse = analyse((read_mesh(e.thing.mesh, e.thing.scale),), material, count=count, fixed=e.thing.fixed, edge_m=2 * edge, cache=None, progress=progress)
-    except SonicBulletError as error:
-        return [f"mesh error not known: a mesh of twice the size fails ({error.what})"]
-    moved = float(np.median(2 * np.log(coarse.freq_hz[:count] / value[: len(coarse.freq_hz[:count])]))) / HALVING
-    return [f"halving the mesh size would move gamma by about {moved:.1%}"] if abs(moved) > MESH_MOVES else []
