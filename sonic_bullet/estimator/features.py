@@ -139,7 +139,9 @@ def _reach(band_hz: tuple[float, float], sr: int) -> tuple[float, float]:
 
 
 def _fit(signal: Array, pole: Array, sr: int, band_hz: tuple[float, float], effort: tuple[int, float] = QUICK) -> Modes:
-    return likelihood.fitted(signal, likelihood.amplitudes(signal, pole, sr), sr, band=_reach(band_hz, sr), fastest_per_s=FASTEST_PER_S, steps=effort[0], tolerance=effort[1])
+    return likelihood.fitted(
+        signal, likelihood.amplitudes(signal, pole, sr), sr, band=_reach(band_hz, sr), fastest_per_s=FASTEST_PER_S, steps=effort[0], tolerance=effort[1]
+    )
 
 
 def _modes(x: Array, sr: int, band_hz: tuple[float, float]) -> tuple[Modes, Array]:
