@@ -30,6 +30,7 @@ from sonic_bullet.session import Listener, as_sensors, attach
 DEFAULT_SECONDS = 4.0
 DEFAULT_MATERIAL = "plastic"
 Progress = Callable[[float], None]
+Say = Callable[[str], None]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,26 +52,30 @@ def render_scene(
     microphones: Sequence[Sequence[float]] | None = None,
     material: str | None = None,
     progress: Progress | None = None,
+    say: Say | None = None,
 ) -> RenderResult:
     """Run a scene for ``seconds`` of physics time and return its sound.
 
     seconds None: the scene's own SECONDS, or 4. microphones None: the scene's own, or (0, -1, 0.5). material: of the bodies of a
-    plain script. progress is told the share done. Raises SonicBulletError; where the scene broke or was interrupted under way,
+    plain script. progress is told the share done, say what is being computed before the first step (modes: seconds a body). Raises SonicBulletError; where the scene broke or was interrupted under way,
     the exception carries what was rendered so far as ``partial``.
     """
     with _stage(path, sr=sr, seed=seed, microphones=microphones, material=material) as stage:
         try:
-            notes = stage.run(seconds, progress)
+            notes = stage.run(seconds, progress, say)
         except (SonicBulletError, KeyboardInterrupt) as error:
             error.partial = stage.result(()) if stage.listener is not None else None  # type: ignore[union-attr]
             raise
         return stage.result(notes)
 
 
-def examine_scene(path: str | Path, seconds: float = 1.0) -> tuple[Finding, ...]:
-    """What in a scene would spoil its sound, and how to mend it. Runs it for ``seconds`` of physics time. Raises SonicBulletError."""
+def examine_scene(path: str | Path, seconds: float = 1.0, say: Say | None = None) -> tuple[Finding, ...]:
+    """What in a scene would spoil its sound, and how to mend it. Runs it for ``seconds`` of physics time; say is told what is being computed.
+
+    Raises SonicBulletError.
+    """
     with _stage(path, sr=8_000, seed=0, microphones=None, material=None) as stage:
-        stage.run(seconds, None)
+        stage.run(seconds, None, say)
         listener = stage.need_listener()
         return (*diagnose_world(listener.world), *_mute_bodies(listener))
 
@@ -109,8 +114,8 @@ class _Stage:
         if self.client is not None:
             disconnect(self.client)
 
-    def run(self, seconds: float | None, progress: Progress | None) -> tuple[str, ...]:
-        return _run_built(self, seconds, progress) if _defines_build(self.path) else _run_plain(self, seconds, progress)
+    def run(self, seconds: float | None, progress: Progress | None, say: Say | None) -> tuple[str, ...]:
+        return (_run_built if _defines_build(self.path) else _run_plain)(self, seconds, progress, say)
 
     def need_listener(self) -> Listener:
         if self.listener is None:
@@ -170,7 +175,7 @@ def _module(path: Path) -> ModuleType:
     return module
 
 
-def _run_built(stage: _Stage, seconds: float | None, progress: Progress | None) -> tuple[str, ...]:
+def _run_built(stage: _Stage, seconds: float | None, progress: Progress | None, say: Say | None) -> tuple[str, ...]:
     module = _module(stage.path)
     stage.client = client = direct_client()
     cast = _user_code(stage.path, module.build, client)
@@ -179,11 +184,9 @@ def _run_built(stage: _Stage, seconds: float | None, progress: Progress | None) 
     places = stage.microphones if stage.microphones is not None else getattr(module, "MICROPHONE", (0.0, -1.0, 0.5))
     stage.listener = listener = attach(client, sr=stage.sr, microphone=places, seed=stage.seed)
     stage.microphones = None
-    for who, how in cast.items():
-        body, link = who if isinstance(who, tuple) else (who, -1)
-        listener.add(body, link, **(how if isinstance(how, dict) else {"material": how}))
+    _user_code(stage.path, _add_cast, listener, cast, say)
     act = getattr(module, "act", None)
-    total = seconds if seconds is not None else float(getattr(module, "SECONDS", DEFAULT_SECONDS))
+    total = seconds if seconds is not None else _user_code(stage.path, float, getattr(module, "SECONDS", DEFAULT_SECONDS))
     while listener.time_s < total - 1e-9:
         if act is not None:
             _user_code(stage.path, act, client, listener.time_s)
@@ -193,12 +196,21 @@ def _run_built(stage: _Stage, seconds: float | None, progress: Progress | None) 
     return ()
 
 
-def _run_plain(stage: _Stage, seconds: float | None, progress: Progress | None) -> tuple[str, ...]:
+def _add_cast(listener: Listener, cast: dict[Any, Any], say: Say | None) -> None:
+    for who, how in cast.items():
+        body, link = who if isinstance(who, tuple) else (who, -1)
+        listener.add(body, link, **{"progress": say, **(how if isinstance(how, dict) else {"material": how})})
+
+
+def _run_plain(stage: _Stage, seconds: float | None, progress: Progress | None, say: Say | None) -> tuple[str, ...]:
     total = seconds if seconds is not None else DEFAULT_SECONDS
     notes: tuple[str, ...] = ()
     if _uses_sonic_bullet(stage.path):
-        names = run_script(stage.path, None, total)
-        stage.listener = next((value for value in names.values() if isinstance(value, Listener)), None)
+        names: dict[str, Any] = {}
+        try:
+            run_script(stage.path, None, total, names=names, progress=progress)
+        finally:  # where it breaks, what was heard so far is kept too
+            stage.listener = next((value for value in names.values() if isinstance(value, Listener)), None)
         if stage.listener is None:
             raise SceneError(
                 f"scene '{stage.path.name}' imports sonic_bullet but keeps no listener in a top-level name", "write listener = sonic_bullet.attach(...)"
@@ -215,13 +227,10 @@ def _run_plain(stage: _Stage, seconds: float | None, progress: Progress | None) 
         for body, link in links_with_shapes(stage.listener.world):
             if (body, link) not in known:
                 known.add((body, link))
-                stage.listener.add(body, link, material=material)
+                stage.listener.add(body, link, material=material, progress=say)
 
     def after(_: int) -> None:
-        listener = stage.need_listener()
-        listener.step()
-        if progress is not None:
-            progress(min(listener.time_s / total, 1.0))
+        stage.need_listener().step()
 
-    run_script(stage.path, (before, after), total)
+    run_script(stage.path, (before, after), total, progress=progress)
     return (f"every body sounds as {material}: the script names no materials",)

@@ -9,7 +9,7 @@ A frame lags physics by `latency_steps`, because a strike spans steps and loads 
 from __future__ import annotations
 
 import inspect
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
@@ -66,8 +66,11 @@ def attach(
     client: a `BulletClient` (then `stepSimulation` is hooked and nothing else need be called), the `pybullet` module or a client id
     (then call `listener.step()` after each `p.stepSimulation()`). sr: sample rate in Hz, 8000 … 384000. microphone: a point in the
     world in m, several points (one channel each), or sensors (`Microphone`, `Vibrometer`, `ModalSum`). seed: of the surfaces' roughness.
-    air: the medium, 1.2 kg/m³ and 343 m/s by default. Raises SceneError for a client that is not connected, AudioError for a bad rate.
+    air: the medium, 1.2 kg/m³ and 343 m/s by default. Raises SceneError for a client that is not connected, AudioError for a bad rate,
+    RecordError for a microphone or a seed that is none.
     """
+    if not isinstance(seed, (int, np.integer)) or seed < 0:
+        raise RecordError(f"seed is {seed!r}", "give a whole number, 0 or more")
     return Listener(client, sr=check_sr(sr), sensors=as_sensors(microphone), seed=int(seed), air=air or Air())
 
 
@@ -106,13 +109,15 @@ class Listener:
         thickness_m: float | None = None,
         to_hz: float = 20_000.0,
         count: int | None = None,
+        progress: Callable[[str], None] | None = None,
     ) -> tuple[ModalModel, ...]:
         """Let a body sound; returns the modal models of its links.
 
         link: -1 is the base, "all" every link with a collision shape. material: a preset's name, a preset file or a `Material`.
         mesh: a file (in metres) or shapes in the body frame, where the body's own collision shapes should not be used.
         model: modes computed before. roughness_m: rms height of its surface in place of the material's. fixed: clamped spheres
-        (x, y, z, radius) in m, body frame. thickness_m: wall of an open surface. to_hz, count: how many modes.
+        (x, y, z, radius) in m, body frame. thickness_m: wall of an open surface. to_hz, count: how many modes. progress: told now and then
+        which body's modes are being computed, and how far that is (seconds a body the first time, then the cache has them).
         Raises SceneError (unknown body), MaterialError, MeshError, ModalError.
         """
         from sonic_bullet.listener import links_with_shapes
@@ -121,7 +126,7 @@ class Listener:
         if roughness_m is not None:
             made = replace(made, roughness_m=roughness_m)
         links = [one for _, one in links_with_shapes(self.world, body)] if link == "all" else [int(link)]
-        return tuple(self._add_link(body, one, made, mesh, model, fixed, thickness_m, to_hz, count) for one in links)
+        return tuple(self._add_link(body, one, made, mesh, model, fixed, thickness_m, to_hz, count, progress) for one in links)
 
     def _add_link(
         self,
@@ -134,8 +139,11 @@ class Listener:
         thickness_m: float | None,
         to_hz: float,
         count: int | None,
+        progress: Callable[[str], None] | None,
     ) -> ModalModel:
         from sonic_bullet import modal
+
+        name = self.world.name_of(body, link)
 
         shapes: tuple[Shape, ...]
         if mesh is None:
@@ -148,7 +156,8 @@ class Listener:
             shapes = tuple(mesh)
         if model is None:
             clamps = tuple((float(x), float(y), float(z), float(r)) for x, y, z, r in fixed)
-            model = self._shared(modal.analyse(shapes, material, to_hz=to_hz, count=count, fixed=clamps, thickness_m=thickness_m))
+            say = (lambda text: progress(f"modes of {name}: {text}")) if progress is not None else None
+            model = self._shared(modal.analyse(shapes, material, to_hz=to_hz, count=count, fixed=clamps, thickness_m=thickness_m, progress=say))
         self.world.add(body, link, material=material, model=model, shapes=shapes)
         return model
 

@@ -1,9 +1,11 @@
-"""Where tests find data that stands beside the project, and a cache of their own."""
+"""Where tests find data that stands beside the project, and a world to listen to."""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -24,6 +26,17 @@ def shared_path() -> Path:
     if place is None:
         pytest.skip("shared data not found: set SONIC_BULLET_SHARED")
     return place
+
+
+@pytest.fixture
+def client() -> Iterator[Any]:
+    """A PyBullet world of its own with gravity."""
+    from sonic_bullet.listener import direct_client, disconnect
+
+    made = direct_client()
+    made.setGravity(0, 0, -9.81)
+    yield made
+    disconnect(made)
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:

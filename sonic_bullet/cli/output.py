@@ -62,12 +62,13 @@ def write_json(json_to: str | None, value: Any) -> None:
 
 
 @contextmanager
-def progress_bar(label: str) -> Iterator[Callable[[float], None]]:
-    """A function of the share done, drawn on a terminal's stderr; in a pipe it does nothing."""
+def progress_bar(label: str) -> Iterator[tuple[Callable[[float], None], Callable[[str], None]]]:
+    """A function of the share done and one of what is being done before that, drawn on a terminal's stderr; in a pipe they do nothing."""
     if not sys.stderr.isatty():
-        yield lambda share: None
+        yield (lambda share: None), (lambda text: None)
         return
     from rich.console import Console
+    from rich.markup import escape
     from rich.progress import BarColumn, Progress, SpinnerColumn, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
     columns = (
@@ -81,7 +82,10 @@ def progress_bar(label: str) -> Iterator[Callable[[float], None]]:
     )
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
         task = progress.add_task(label, total=1.0)
-        yield lambda share: progress.update(task, completed=share)
+        yield (
+            lambda share: progress.update(task, description=label, completed=share),
+            lambda text: progress.update(task, description=escape(f"{label}: {text}")),
+        )
 
 
 @contextmanager

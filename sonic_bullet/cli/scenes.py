@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sonic_bullet.cli.output import clean_stdout, progress_bar, quiet_stderr, write_json
+from sonic_bullet.cli.output import clean_stdout, progress_bar, quiet_stderr, status, write_json
 from sonic_bullet.errors import AudioError, FileError, SceneError, SonicBulletError
 from sonic_bullet.files import AudioReport, check_audio_output, check_output, check_sr, read_log, write_audio, write_log
 
@@ -41,8 +41,8 @@ def run_render(
     _check_places(output, contacts, picture, json_to)
     with clean_stdout(json_to) as say:
         try:
-            with progress_bar(Path(scene).name) as progress:
-                wish = _Wish(seconds, rate, microphones, seed, material, progress)
+            with progress_bar(Path(scene).name) as (progress, tell):
+                wish = _Wish(seconds, rate, microphones, seed, material, progress, tell)
                 result: RenderResult | _Replay = _replayed(scene, wish) if _is_log(scene) else _simulated(scene, wish)
         except (SonicBulletError, KeyboardInterrupt) as error:
             raise _with_partial(error, output, peak_dbfs, lufs) from error
@@ -70,7 +70,8 @@ def run_doctor(scene: str, seconds: float, json_to: str | None) -> None:
         with quiet_stderr():
             from sonic_bullet.scene import examine_scene
 
-        findings = examine_scene(scene, seconds)
+        with status(Path(scene).name) as tell:
+            findings = examine_scene(scene, seconds, tell)
         if findings:
             for finding in findings:
                 say(f"{finding.severity}: {finding.id}: {finding.what}\n    {finding.remedy}")
@@ -127,6 +128,7 @@ class _Wish:
     seed: int | None
     material: str | None
     progress: Callable[[float], None]
+    say: Callable[[str], None]
 
 
 def _simulated(scene: str, wish: _Wish) -> RenderResult:
@@ -134,7 +136,8 @@ def _simulated(scene: str, wish: _Wish) -> RenderResult:
         from sonic_bullet.scene import render_scene
 
     sr, places = wish.rate or DEFAULT_SR, wish.microphones or None
-    return render_scene(scene, seconds=wish.seconds, sr=sr, seed=wish.seed or 0, microphones=places, material=wish.material, progress=wish.progress)
+    asked: dict[str, Any] = {"seconds": wish.seconds, "sr": sr, "seed": wish.seed or 0, "microphones": places, "material": wish.material}
+    return render_scene(scene, **asked, progress=wish.progress, say=wish.say)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -30,11 +30,19 @@ class _TimeIsUp(BaseException):
     """Unwinds the user's script; no `except Exception` of theirs catches it."""
 
 
-def run_script(path: str | Path, hooks: tuple[ClientHook, ClientHook] | ClientHook | None, seconds: float) -> dict[str, Any]:
+def run_script(
+    path: str | Path,
+    hooks: tuple[ClientHook, ClientHook] | ClientHook | None,
+    seconds: float,
+    *,
+    names: dict[str, Any] | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> dict[str, Any]:
     """Run a script for at most ``seconds`` of physics time; its top-level names.
 
     hooks: (before, after) each step, or after alone, called with the client id of the first client that steps. Clients that the
-    script opened stay connected, so that what it built can be looked at. Raises SceneError that names the line where the script
+    script opened stay connected, so that what it built can be looked at. names: a dictionary that its top-level names go into, there
+    also when it breaks. progress: told the share of ``seconds`` that is done. Raises SceneError that names the line where the script
     breaks, what the hooks raise, and SceneError where the file cannot be read.
     """
     path = Path(path)
@@ -45,8 +53,9 @@ def run_script(path: str | Path, hooks: tuple[ClientHook, ClientHook] | ClientHo
     except (SyntaxError, ValueError) as error:
         raise SceneError(f"scene '{path.name}' line {getattr(error, 'lineno', None) or 1}: {error}", "mend the scene") from None
     before, after = hooks if isinstance(hooks, tuple) else (None, hooks)
-    names: dict[str, Any] = {"__name__": "__main__", "__file__": str(path), "__builtins__": __builtins__}
-    with _stage(before, after, seconds), patch.object(sys, "argv", [str(path)]), patch.object(sys, "path", [str(path.resolve().parent), *sys.path]):
+    names = {} if names is None else names
+    names |= {"__name__": "__main__", "__file__": str(path), "__builtins__": __builtins__}
+    with _stage(before, after, seconds, progress), patch.object(sys, "argv", [str(path)]), patch.object(sys, "path", [str(path.resolve().parent), *sys.path]):
         try:
             exec(code, names)
         except (_TimeIsUp, SystemExit):
@@ -60,7 +69,7 @@ def run_script(path: str | Path, hooks: tuple[ClientHook, ClientHook] | ClientHo
 
 
 @contextmanager
-def _stage(before: ClientHook | None, after: ClientHook | None, seconds: float) -> Iterator[None]:
+def _stage(before: ClientHook | None, after: ClientHook | None, seconds: float, progress: Callable[[float], None] | None) -> Iterator[None]:
     real_connect, real_step = pybullet.connect, pybullet.stepSimulation
     heard: list[int] = []
     real_time: set[int] = set()
@@ -86,6 +95,8 @@ def _stage(before: ClientHook | None, after: ClientHook | None, seconds: float) 
         elapsed_s += dt
         if after is not None:
             after(physicsClientId)
+        if progress is not None:
+            progress(min(elapsed_s / seconds, 1.0))
         if elapsed_s >= seconds - 1e-9:
             raise _TimeIsUp
         return result

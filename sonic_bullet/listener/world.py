@@ -99,6 +99,13 @@ class World:
         self._append(int(encode(body, link)), record)
         return record
 
+    def name_of(self, body: int, link: int = -1) -> str:
+        """What people call a link: its name and its body's id. Raises SceneError for an unknown one."""
+        check_connected(self.client_id)
+        facts.check_exists(self.client_id, body, link)
+        name = facts.link_name(self.client_id, body, link)
+        return name if name == f"body {body}" else f"{name} (body {body})"
+
     def shapes_of(self, body: int, link: int = -1) -> tuple[Shape, ...]:
         """Geometry of a link in its body frame. Raises SceneError for an unknown one, MeshError where it has none."""
         check_connected(self.client_id)

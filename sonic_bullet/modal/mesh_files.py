@@ -32,6 +32,8 @@ def read_mesh(path: Path | str, scale: float = 1.0) -> Shape:
     try:
         scene = trimesh.load_scene(path, process=False, maintain_order=True, skip_materials=True)
         parts = [part for part in scene.dump() if isinstance(part, trimesh.Trimesh) and len(part.faces)]
+    except ImportError:  # a parser of text asks for a package to guess its encoding: the file is not of its kind
+        raise MeshError(f"'{path.name}' is no {kind} file", "export the mesh again") from None
     except Exception as error:  # a parser meets anything in a foreign file, and throws anything
         raise MeshError(f"'{path.name}' cannot be read as {kind}: {type(error).__name__} {error}"[:300], "repair or export the mesh again") from error
     if not parts:

@@ -164,6 +164,8 @@ def _solve(
     say(f"assembling {3 * len(unit.node_m)} unknowns")
     k_matrix, m_matrix = fem.assemble(unit, stiffness, 1.0)
     fixed = fem.clamped(body.solid, clamp)
+    if fixed.all():
+        raise ModalError("the clamps hold the whole body", "give a smaller radius")
     free = np.flatnonzero(np.repeat(~fixed, 3))
     rigid = 6 - (int(np.linalg.matrix_rank(fem.rigid_modes(unit.node_m)[~np.isin(np.arange(3 * len(fixed)), free)], tol=1e-9)) if fixed.any() else 0)
     if fixed.any():

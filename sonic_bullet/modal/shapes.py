@@ -16,7 +16,7 @@ from sonic_bullet import geometry
 from sonic_bullet.errors import MeshError
 from sonic_bullet.modal import prisms, structured
 from sonic_bullet.modal.ordering import dissection
-from sonic_bullet.modal.solid import Solid, Surface, largest_component, quadratic, surface
+from sonic_bullet.modal.solid import Solid, Surface, corner_volume_m3, largest_component, quadratic, surface
 from sonic_bullet.modal.surfaces import SIZE_M, Skin, pieces_of_faces, prepared
 from sonic_bullet.records import Array, Shape
 
@@ -27,6 +27,8 @@ LUMP_PASSES, MOST_PASSES = 2, 80
 """Of fTetWild's optimisation. It makes elements finer until the worst is good; two passes and a lesser edge give lumps the same modes in half the time."""
 FILL_LIMITS_S = (20.0, 9.0, 7.0)
 """Processor seconds of each attempt, the next coarser than the last: what is tried must not hang on how busy the machine is."""
+FILLED = (0.6, 1.7)
+"""Of the enclosed volume: what a fill may hold. Wide, for a surface that passes through itself encloses some of it twice."""
 ENVELOPE_OF_EDGE = 0.035  # a finer surface than its elements costs time and tells nothing
 ENVELOPE = (0.04, 0.006)  # of the thickness and of the diagonal: how far fTetWild may move the surface, the lesser counts
 
@@ -182,9 +184,11 @@ def _meshed(skin: Skin, edge_m: float | None, say: Callable[[str], None]) -> Sol
     envelope = max(min(ENVELOPE[0] * thickness, ENVELOPE[1] * diagonal), ENVELOPE_OF_EDGE * edge)
     say(f"filling {len(face)} triangles with tetrahedra of {edge:.3g} m")
     failure = MeshError(f"mesh needs more than {MOST_TETS} tetrahedra", "give a larger edge_m or a simpler mesh")
-    for limit_s in FILL_LIMITS_S:
+    limits_s = FILL_LIMITS_S if edge_m is None else FILL_LIMITS_S[:1]
+    for limit_s in limits_s:
         try:
             node, tet = tetrahedra(vertex, face, edge, envelope, passes=passes, time_limit_s=limit_s)
+            _check_filled(vertex, face, node, tet)
         except MeshError as error:
             failure = error
         else:
@@ -192,10 +196,19 @@ def _meshed(skin: Skin, edge_m: float | None, say: Callable[[str], None]) -> Sol
             if len(tet) <= MOST_TETS or edge_m is not None:
                 note = f"fTetWild, {len(tet)} tetrahedra, edge {edge:.3g} m, envelope {envelope:.2g} m{skin.note}"
                 return quadratic(node, tet, note=note + (f"; largest of {pieces} separate pieces kept" if pieces > 1 else ""))
-        if edge_m is not None:
-            break
         edge, envelope, passes = 1.6 * edge, 2.5 * envelope, LUMP_PASSES
+    if len(limits_s) > 1:
+        failure = MeshError(f"{failure.what}, the last of {len(limits_s)} attempts, each coarser, within {sum(limits_s):.0f} s in all", failure.remedy)
     raise failure
+
+
+def _check_filled(vertex: Array, face: Array, node: Array, tet: Array) -> None:
+    """Raise MeshError where tetrahedra do not hold what a closed surface of one piece encloses: its walls are thinner than the envelope."""
+    if not geometry.is_closed(face) or pieces_of_faces(face).max() > 0:
+        return
+    kept = float(np.abs(corner_volume_m3(node, tet)).sum()) / geometry.volume_m3(vertex, face)
+    if not FILLED[0] < kept < FILLED[1]:
+        raise MeshError(f"filling the mesh with tetrahedra turns its volume to {kept:.0%}", "give a smaller edge_m, or a mesh with thicker walls")
 
 
 def fill(shapes: tuple[Shape, ...], edge_m: float | None, thickness_m: float | None, say: Callable[[str], None]) -> Filled:

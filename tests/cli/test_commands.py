@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import signal
@@ -353,7 +354,7 @@ def test_materials_in_both_forms(capfd: pytest.CaptureFixture[str]) -> None:
 
 def test_doctor_prints_findings_with_remedies(scene: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
     finding = sonic_bullet.scene.Finding("sub-steps", "error", "numSubSteps is 4", "set it to 1")
-    monkeypatch.setattr(sonic_bullet.scene, "examine_scene", lambda path, seconds: (finding,))
+    monkeypatch.setattr(sonic_bullet.scene, "examine_scene", lambda path, seconds, say: (finding,))
     assert run("doctor", "scene.py") == 0
     said = capfd.readouterr().out
     assert "error: sub-steps: numSubSteps is 4" in said
@@ -361,6 +362,28 @@ def test_doctor_prints_findings_with_remedies(scene: Path, monkeypatch: pytest.M
     assert run("doctor", "scene.py", "--json") == 0
     assert json.loads(capfd.readouterr().out)["findings"] == [{"id": "sub-steps", "severity": "error", "what": "numSubSteps is 4", "remedy": "set it to 1"}]
     assert "contact log" in error_of(capfd, "doctor", "a.npz")
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+@pytest.mark.parametrize("stream", [Terminal, io.StringIO])
+def test_a_terminal_is_told_which_body_is_analysed_and_a_pipe_nothing(scene: Path, monkeypatch: pytest.MonkeyPatch, stream: type[io.StringIO]) -> None:
+    told = stream()
+
+    def render_scene(path: object, **options: Any) -> RenderResult:
+        options["say"]("modes of cup (body 3): assembling")
+        return RenderResult(sound(), log(), SR)
+
+    monkeypatch.setattr(sonic_bullet.scene, "render_scene", render_scene)
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setenv("COLUMNS", "200")
+    monkeypatch.setattr(sys, "stderr", told)
+    assert run("render", "scene.py", "-o", "a.wav") == 0
+    assert ("scene.py: modes of cup (body 3): assembling" in told.getvalue()) == (stream is Terminal)
+    assert told.getvalue() == "" or stream is Terminal
 
 
 # ---- the process itself

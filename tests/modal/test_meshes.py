@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from sonic_bullet.errors import FileError, MeshError
+from sonic_bullet.errors import FileError, MeshError, ModalError
 from sonic_bullet.modal import analyse, prisms, read_mesh, shapes, surfaces, tetrahedra
 from sonic_bullet.records import Material, Shape
 
@@ -136,3 +136,18 @@ def test_mesh_files(tmp_path: Path) -> None:
             read_mesh(tmp_path / name)
     with pytest.raises(FileError):
         read_mesh(tmp_path / "none.obj")
+
+
+def test_a_fill_that_loses_its_volume_is_refused_by_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A shell thinner than the envelope may fill as crumbs: no modes are better than theirs. The error tells of all attempts."""
+    crumb = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]]) * 0.02
+    monkeypatch.setattr(tetrahedra, "tetrahedra", lambda *_, **__: (crumb, np.array([[0, 1, 2, 3]])))
+    with pytest.raises(MeshError, match="volume to 0%, the last of 3 attempts, each coarser, within 36 s in all"):
+        analyse((as_mesh(trimesh.creation.icosphere(2, 0.05)),), Material.isotropic("x", youngs_pa=1e9, poisson=0.3, density_kg_m3=1e3), cache=None)
+
+
+def test_clamps_that_hold_everything_are_refused() -> None:
+    with pytest.raises(ModalError, match="hold the whole body"):
+        analyse(
+            (Shape("box", size_m=[0.1, 0.05, 0.02]),), Material.isotropic("x", youngs_pa=1e9, poisson=0.3, density_kg_m3=1e3), fixed=((0, 0, 0, 9),), cache=None
+        )

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from sonic_bullet.errors import MeshError, ModalError
-from sonic_bullet.modal import analyse, read_mesh
+from sonic_bullet.modal import analyse, read_mesh, shapes
 from sonic_bullet.records import Material
 
 # Poisson's ratio that the recorded object has, as far as its frequency ratios tell; the case's guess is off by up to 0.04.
@@ -30,8 +30,12 @@ def test_ratios_of_the_independent_solver(case: str, shared_path: Path) -> None:
     assert np.abs(found / found[0] / (truth / truth[0]) - 1).max() < 0.01
 
 
-def test_twenty_of_the_thousand_have_modes_or_a_name() -> None:
+def test_twenty_of_the_thousand_have_modes_or_a_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Coarse: a wide envelope and two passes, or the twenty would take two minutes (`benchmarks/modal_sweep.py` does it all with the defaults)."""
     import pybullet_data
+
+    monkeypatch.setattr(shapes, "MOST_PASSES", shapes.LUMP_PASSES)
+    monkeypatch.setattr(shapes, "ENVELOPE", (0.3, 0.02))
 
     plastic = Material.isotropic("plastic", youngs_pa=2.4e9, poisson=0.37, density_kg_m3=1050.0)
     root = Path(pybullet_data.getDataPath()) / "random_urdfs"
@@ -43,10 +47,10 @@ def test_twenty_of_the_thousand_have_modes_or_a_name() -> None:
         shape = read_mesh(urdf.with_suffix(".obj"), float(scale.group(1)) if scale else 1.0)
         size = float(np.linalg.norm(np.ptp(shape.vertex_m, axis=0)))
         try:
-            model = analyse((shape,), plastic, count=3, edge_m=size / 4, cache=None)
+            model = analyse((shape,), plastic, count=3, edge_m=size / 8, cache=None)
         except (MeshError, ModalError) as error:
             assert "\n" not in str(error) and error.remedy
         else:
             assert model.mode_count == 3 and model.mass_kg > 0
             done += 1
-    assert done >= 18
+    assert done >= 19

@@ -314,3 +314,60 @@ def test_a_body_put_down_at_rest_is_silent_and_a_silent_hammer_is_heard(client: 
     assert np.abs(listener.sound()).max() > 1e-3
     at = listener.contacts.rows_on(hammer)
     assert listener.contacts.rows.approach_m_s[at[0]] < 0.7
+
+
+@pytest.mark.parametrize("seed", ["x", -1, 1.5, None])
+def test_seeds_that_are_none(client: Any, seed: Any) -> None:
+    with pytest.raises(RecordError) as error:
+        sb.attach(client, seed=seed)
+    one_line(error)
+
+
+def test_adding_tells_which_body_is_analysed_and_an_unknown_body_before_any_work(client: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    from sonic_bullet import modal
+
+    def analyse(shapes: Any, material: Any, *, progress: Any, **_: Any) -> Any:
+        progress("assembling")
+        return plate_model()
+
+    monkeypatch.setattr(modal, "analyse", analyse)
+    body = box(client, (0, 0, 1))
+    listener = sb.attach(client)
+    told: list[str] = []
+    listener.add(body, material=STEEL, progress=told.append)
+    assert told == [f"modes of {listener.world.name_of(body)}: assembling"]
+    assert f"body {body}" in told[0]
+    monkeypatch.setattr(modal, "analyse", lambda *_, **__: pytest.fail("analysed for nobody"))
+    with pytest.raises(SceneError, match="no body 99"):
+        listener.add(99, material=STEEL, mesh=listener.world.shapes_of(body))
+
+
+def test_a_script_with_its_own_listener_that_breaks_keeps_what_was_heard(tmp_path: Path) -> None:
+    from sonic_bullet.scene import render_scene
+
+    scene = tmp_path / "own.py"
+    scene.write_text(
+        "import pybullet as p, sonic_bullet as sb\n"
+        "from pybullet_utils.bullet_client import BulletClient\n"
+        "client = BulletClient(p.DIRECT)\n"
+        "listener = sb.attach(client)\n"
+        "for _ in range(24):\n"
+        "    client.stepSimulation()\n"
+        "raise ValueError('x')\n"
+    )
+    shares: list[float] = []
+    with pytest.raises(SceneError, match="line 7: ValueError: x") as error:
+        render_scene(scene, seconds=1, progress=shares.append)
+    assert error.value.partial.samples.shape == (1, 4800)  # type: ignore[attr-defined]
+    assert shares[-1] == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize("cast", ['{0: {"material": "steel", "nonsense": 3}}', "{0: 3.0}", '{"x": "steel"}', '{(0, 1, 2): "steel"}'])
+def test_casts_that_make_no_sense_are_one_line(tmp_path: Path, cast: str) -> None:
+    from sonic_bullet.scene import render_scene
+
+    scene = tmp_path / "cast.py"
+    scene.write_text(f"def build(client):\n    client.createMultiBody(1, client.createCollisionShape(client.GEOM_SPHERE, radius=0.01))\n    return {cast}\n")
+    with pytest.raises(SonicBulletError) as error:
+        render_scene(scene, seconds=0.1)
+    one_line(error)
