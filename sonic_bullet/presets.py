@@ -4,8 +4,8 @@
 
 A file is UTF-8 JSON, format "sonic-bullet-preset/1": name, density_kg_m3, elasticity (youngs_pa and poisson, or stiffness_pa 6×6),
 damping, surface, impact, each group with the `source` of its numbers and an optional `note`. `provenance` says what a fitted preset was
-fitted from, and how sure it is; it changes no sound. `effects` and `residual` are places kept for what an estimator will find; this version
-plays none and refuses a file that has any.
+fitted from, and how sure it is; it changes no sound. `residual` is what the modes do not say (docs/residual.md), played with every contact. `effects` is a
+place kept for what an estimator will find; this version plays none and refuses a file that has any.
 
 Damping is Rayleigh's, d = ½(α + βλ) [Ren, Yeh, Lin 2013, eq. 6]: alpha_per_s and beta_s, or a loss factor η of the handbooks. η = 2d/ω
 independent of frequency is no Rayleigh damping; α and β are the pair that meets it at the two frequencies of `equal_at_hz`
@@ -31,6 +31,7 @@ import numpy as np
 from sonic_bullet.errors import MaterialError, RecordError
 from sonic_bullet.files import replacing
 from sonic_bullet.records import Material
+from sonic_bullet.residual.code import ResidualForm, residual_of
 
 FORMAT = "sonic-bullet-preset/1"
 FOLDER = Path(__file__).parent / "materials"
@@ -104,7 +105,7 @@ class Preset(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     impact: Impact
     note: str = ""
     effects: tuple[Any, ...] = ()
-    residual: Any = None
+    residual: ResidualForm | None = None
     provenance: Provenance | None = None
 
 
@@ -150,7 +151,7 @@ def read_preset(path: str | os.PathLike[str]) -> Preset:
         raise MaterialError(f"preset {path}: {error}", "mend that field; docs/materials.md describes the file") from error
     if preset.format != FORMAT:
         raise MaterialError(f"preset {path} has format '{preset.format}', wanted '{FORMAT}'", "use a sonic_bullet that knows that format")
-    for name in ("effects", "residual"):
+    for name in ("effects",):
         if getattr(preset, name):
             raise MaterialError(f"preset {path} holds {name}, which sonic_bullet 0.1 cannot play", f"use version 0.2 or later, or take {name} out of the file")
     return preset
@@ -173,6 +174,7 @@ def material_of(preset: Preset, where: str = "") -> Material:
         "roughness_m": preset.surface.roughness_m,
         "hurst": preset.surface.hurst,
         "restitution": preset.impact.restitution,
+        "residual": residual_of(preset.residual, f"preset {label}") if preset.residual is not None else None,
         "source": f"elasticity: {elastic.source} | damping: {preset.damping.source} | surface: {preset.surface.source} | impact: {preset.impact.source}",
     }
     try:

@@ -13,35 +13,28 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from sonic_bullet.errors import RecordError
+from sonic_bullet.arrays import Array, frozen_array
+from sonic_bullet.arrays import require as _require
+from sonic_bullet.arrays import store as _store
+from sonic_bullet.residual_record import Residual
 
-Array = NDArray[Any]
-
-
-def frozen_array(value: object, dtype: Any, shape: tuple[int | None, ...], name: str, *, finite: bool = True) -> Array:
-    """Read-only C-contiguous copy of ``value`` with ``dtype`` and ``shape`` (None: any length).
-
-    Raises RecordError where the shape differs or, with ``finite``, a number is NaN or infinite.
-    """
-    array = np.array(value, dtype=dtype, order="C")
-    if array.ndim != len(shape) or any(want is not None and have != want for have, want in zip(array.shape, shape, strict=True)):
-        raise RecordError(f"{name} has shape {array.shape}, wanted {shape}", "pass an array of that shape")
-    if finite and array.dtype.kind in "fc" and not np.isfinite(array).all():
-        raise RecordError(f"{name} holds NaN or infinite numbers", "look for the step or file that produced them")
-    array.setflags(write=False)
-    return array
-
-
-def _store(record: object, **values: object) -> None:
-    for name, value in values.items():
-        object.__setattr__(record, name, value)
-
-
-def _require(condition: bool, what: str, remedy: str) -> None:
-    if not condition:
-        raise RecordError(what, remedy)
+__all__ = [
+    "Air",
+    "Array",
+    "Body",
+    "Material",
+    "Microphone",
+    "ModalModel",
+    "ModalSum",
+    "Residual",
+    "Sensor",
+    "Shape",
+    "ShapeKind",
+    "Vibrometer",
+    "frozen_array",
+    "isotropic_stiffness_pa",
+]
 
 
 def isotropic_stiffness_pa(youngs_pa: float, poisson: float) -> Array:
@@ -65,6 +58,7 @@ class Material:
     stiffness_pa (6, 6): Voigt tensor, positive definite. alpha_per_s, beta_s: Rayleigh damping d = (alpha + beta·lambda)/2
     [Ren, Yeh, Lin 2013, eq. 6], None where unknown. roughness_m: rms height of the surface profile; hurst: its Hurst
     exponent (profile spectrum ∝ k^-(1+2·hurst)). restitution: of an impact against a rigid wall, for pulses only.
+    residual: what sounds beside the modes, None: nothing.
     """
 
     name: str
@@ -76,6 +70,7 @@ class Material:
     hurst: float = 0.7
     restitution: float = 0.5
     source: str = ""
+    residual: Residual | None = None
 
     def __post_init__(self) -> None:
         stiffness = frozen_array(self.stiffness_pa, float, (6, 6), f"material '{self.name}': stiffness_pa")

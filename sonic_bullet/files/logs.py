@@ -11,6 +11,7 @@ The container is `container`'s npz. Scalars, names and references are JSON (`hea
                                             sweep_m_s, approach_m_s, gap_m f8
       body_inertia_kg_m2 (b, 3, 3) f8, body_curvature_per_m (b,) f8 (NaN: by the model's surface)
       material_stiffness_pa (n, 6, 6) f8    materials and models are stored once each, however many bodies share them
+      residual<i>_<field> f8                 of material i, where it has one: the arrays of `Residual`
       model<i>_freq_hz, _decay_per_s (m,) f8, _shape (v, 3, m) f4, _vertex_m (v, 3) f8, _face (f, 3) i4, _curvature_per_m (f,) f8
     format "sonic-bullet-model/1"           one model: model0_… as above
 
@@ -31,7 +32,7 @@ from sonic_bullet.contacts import ROW_FIELDS, ContactLog, Contacts, Step
 from sonic_bullet.errors import AudioError, LogError, RecordError
 from sonic_bullet.files.audio import check_sr
 from sonic_bullet.files.container import REMEDY, read_container, take, write_container
-from sonic_bullet.records import Air, Array, Body, Material, Microphone, ModalModel, ModalSum, Sensor, Vibrometer
+from sonic_bullet.records import Air, Array, Body, Material, Microphone, ModalModel, ModalSum, Residual, Sensor, Vibrometer
 
 LOG_FORMAT = "sonic-bullet-contacts/1"
 MODEL_FORMAT = "sonic-bullet-model/1"
@@ -43,6 +44,12 @@ MODEL_ARRAYS: dict[str, tuple[type, tuple[int | None, ...]]] = {
     "face": (np.int32, (None, 3)),
     "curvature_per_m": (float, (None,)),
 }
+RESIDUAL_ARRAYS: dict[str, tuple[int | None, ...]] = {
+    **{f"{part}_{name}": (None,) for part in ("mode", "line") for name in ("freq_hz", "decay_per_s", "amplitude")},
+    "freq_hz": (None,),
+    "time_s": (None,),
+    "power_per_hz": (None, None),
+}
 Vector = tuple[float, float, float]
 
 
@@ -53,7 +60,12 @@ class _Model(msgspec.Struct):
     note: str
 
 
-class _Material(msgspec.Struct):
+class _Residual(msgspec.Struct):
+    clip_energy: float
+    source: str
+
+
+class _Material(msgspec.Struct, omit_defaults=True):
     name: str
     density_kg_m3: float
     alpha_per_s: float | None
@@ -62,6 +74,7 @@ class _Material(msgspec.Struct):
     hurst: float
     restitution: float
     source: str
+    residual: _Residual | None = None
 
 
 class _Body(msgspec.Struct):
@@ -141,6 +154,9 @@ def write_log(path: str | os.PathLike[str], log: ContactLog) -> None:
     arrays |= {f"contact_{name}": getattr(rows, name) for name in ROW_FIELDS}
     for i, model in enumerate(models):
         arrays |= _model_arrays(model, i)
+    for i, material in enumerate(materials):
+        if material.residual is not None:
+            arrays |= {f"residual{i}_{name}": getattr(material.residual, name) for name in RESIDUAL_ARRAYS}
     write_container(path, header, arrays)
 
 
@@ -180,7 +196,8 @@ def _distinct(things: list[Any], key: Any) -> tuple[list[Any], list[int | None]]
 
 
 def _material_key(material: Material) -> bytes:
-    return msgspec.json.encode(_pack_material(material)) + material.stiffness_pa.tobytes()
+    more = b"".join(getattr(material.residual, name).tobytes() for name in RESIDUAL_ARRAYS) if material.residual is not None else b""
+    return msgspec.json.encode(_pack_material(material)) + material.stiffness_pa.tobytes() + more
 
 
 def _model_key(model: ModalModel) -> bytes:
@@ -201,6 +218,7 @@ def _pack_material(x: Material) -> _Material:
         hurst=float(x.hurst),
         restitution=float(x.restitution),
         source=_text(x.source),
+        residual=None if x.residual is None else _Residual(float(x.residual.clip_energy), _text(x.residual.source)),
     )
 
 
@@ -240,6 +258,13 @@ def _unpack_model(header: _Model, arrays: Mapping[str, Array], index: int, path:
     return ModalModel(**parts, volume_m3=header.volume_m3, mass_kg=header.mass_kg, dropped=header.dropped, note=header.note)
 
 
+def _unpack_residual(header: _Residual | None, arrays: Mapping[str, Array], index: int, path: object) -> Residual | None:
+    if header is None:
+        return None
+    parts = {name: take(arrays, f"residual{index}_{name}", float, shape, path) for name, shape in RESIDUAL_ARRAYS.items()}
+    return Residual(**parts, clip_energy=header.clip_energy, source=header.source)
+
+
 def _unpack_sensor(sensor: _Microphone | _Vibrometer | _ModalSum) -> Sensor:
     if isinstance(sensor, _Microphone):
         return Microphone(np.array(sensor.position_m))
@@ -256,7 +281,10 @@ def _unpack_log(header: _LogHeader, arrays: Mapping[str, Array], path: object) -
     inertia = take(arrays, "body_inertia_kg_m2", float, (b, 3, 3), path)
     curvature = take(arrays, "body_curvature_per_m", float, (b,), path)
     stiffness = take(arrays, "material_stiffness_pa", float, (n, 6, 6), path)
-    materials = [Material(stiffness_pa=stiffness[i], **msgspec.structs.asdict(x)) for i, x in enumerate(header.materials)]
+    materials = [
+        Material(stiffness_pa=stiffness[i], **{**msgspec.structs.asdict(x), "residual": _unpack_residual(x.residual, arrays, i, path)})
+        for i, x in enumerate(header.materials)
+    ]
     models = [_unpack_model(x, arrays, i, path) for i, x in enumerate(header.models)]
     bodies = [
         Body(

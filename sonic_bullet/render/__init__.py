@@ -1,6 +1,6 @@
 """Forces become sound: the synthesizer of live steps, and the replay of a contact log.
 
-clock: which samples a step covers | sounder: a body as it is played | blows: strikes | rubbing: rolling and sliding | synthesizer: all together
+clock: which samples a step covers | sounder: a body as it is played | blows: strikes | rubbing: rolling and sliding | beside: residuals | synthesizer: all together
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ from sonic_bullet.render.synthesizer import LATENCY_STEPS, Synthesizer
 __all__ = ["LATENCY_STEPS", "Synthesizer", "render_log"]
 
 
-def render_log(log: ContactLog, *, sr: int | None = None, progress: Callable[[float], None] | None = None) -> Array:
+def render_log(log: ContactLog, *, sr: int | None = None, residual: bool = True, progress: Callable[[float], None] | None = None) -> Array:
     """The sound of a contact log, (channels, floor(sr·time)) in pascals; with the log's own rate the same bits as were heard live.
 
-    progress is told the share done. Raises AudioError for a rate that cannot be.
+    residual False: without what materials sound beside their modes. progress is told the share done. Raises AudioError for a rate that cannot be.
     """
     from sonic_bullet.files import check_sr
 
     log = replace(log, sr=check_sr(sr if sr is not None else log.sr))
-    synth = Synthesizer(sr=log.sr, sensors=log.sensors, seed=log.seed, air=log.air)
+    synth = Synthesizer(sr=log.sr, sensors=log.sensors, seed=log.seed, air=log.air, residual=residual)
     for number, step in enumerate(log.steps):
         synth.feed(step, log.bodies[: len(step.position_m)])
         if progress is not None and number % 16 == 0:

@@ -1,8 +1,8 @@
 """The run time: physics steps in, frames of sound out, with one explicit state between.
 
-    Step -> loads (synth.strikes) -> blows, rubbing -> bank of modes and of rigid motions (synth.bank) -> sound path (synth.path) -> frame
+    Step -> loads (synth.strikes) -> blows, rubbing -> bank of modes and of rigid motions (synth.bank) + residual -> sound path (synth.path) -> frame
 
-Each body has four places in the bank: its modes, and its three translations (see sounder.py).
+Each body has five places in the bank: its modes, its three translations (see sounder.py), and the lines of its residual (see beside.py).
 
 A step's sound is made when the `LOOKAHEAD` steps after it are known. Live listening, `sound` (which drains a copy of the state)
 and the replay of a log run the same code on the same numbers in the same order: the same bits.
@@ -11,18 +11,20 @@ and the replay of a log run the same code on the same numbers in the same order:
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from sonic_bullet.contacts import Contacts, Step
 from sonic_bullet.errors import AudioError
 from sonic_bullet.records import Air, Array, Body, Microphone, Sensor
+from sonic_bullet.render.beside import Beside, Rubs, blow_grains, build_beside, line_modes, rubbing_grains
 from sonic_bullet.render.blows import Blow, find_blows
 from sonic_bullet.render.clock import Clock, exact_step
 from sonic_bullet.render.manifold import Rows, orient
 from sonic_bullet.render.rubbing import Drive, Rubbing, advance_rubbing
 from sonic_bullet.render.sounder import Sounder, build_sounder, weight_sets
+from sonic_bullet.residual.player import Grain, add_grains
 from sonic_bullet.synth import bank, path
 from sonic_bullet.synth.bank import Bank, BankState
 from sonic_bullet.synth.path import Path, PathState
@@ -30,18 +32,20 @@ from sonic_bullet.synth.pulse import pulse_cells, pulse_nodes
 from sonic_bullet.synth.strikes import LOOKAHEAD, SPAN, LoadHistory, push, split
 
 LATENCY_STEPS = LOOKAHEAD
+PLACES = 5
 CELLS_PER_RADIAN = 4.0
 """Cells of a pulse per 1/w of a rigid body: a third of (w·cell)³ = 0.5 % is what its level may err."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Setup:
-    """What does not change while listening: rate in Hz, sensors (a channel each), seed and medium."""
+    """What does not change while listening: rate in Hz, sensors (a channel each), seed and medium; residual: whether those of materials are heard."""
 
     sr: int
     sensors: tuple[Sensor, ...]
     seed: int
     air: Air
+    residual: bool = True
 
     @property
     def microphone_m(self) -> Array:
@@ -52,7 +56,7 @@ class Setup:
 @dataclass(frozen=True, slots=True, eq=False)
 class State:
     """All that the next frame hangs on. number: of the step to be rendered next; window: that step and those known after it, rows: their contacts.
-    placed (b,): step in which each body began or was last moved by hand.
+    placed (b,): step in which each body began or was last moved by hand. beside (b): their residuals; grains, rubs: what of those is under way.
     """
 
     number: int
@@ -67,6 +71,9 @@ class State:
     travelling: PathState
     rubbing: Rubbing
     placed: Array
+    beside: tuple[Beside | None, ...] = ()
+    grains: tuple[Grain, ...] = ()
+    rubs: Rubs = field(default_factory=dict)
 
 
 def start(setup: Setup) -> State:
@@ -81,12 +88,18 @@ def with_bodies(setup: Setup, state: State, bodies: Sequence[Body]) -> State:
     if not bodies:
         return state
     new = tuple(build_sounder(body, setup.sensors, setup.sr, setup.air) for body in bodies)
-    modes = [part for s in new for part in (bank.ModeSet(s.omega_rad_s, s.decay_per_s, s.weight), *((s.rigid or _nothing(setup),) * 3))]
+    beside = tuple(build_beside(s, setup.sr, setup.air) if setup.residual else None for s in new)
+    modes = [
+        part
+        for s, more in zip(new, beside, strict=True)
+        for part in (bank.ModeSet(s.omega_rad_s, s.decay_per_s, s.weight), *((s.rigid or _nothing(setup),) * 3), line_modes(more, len(s.weight)))
+    ]
     instrument, ringing = bank.append(state.bank, state.ringing, modes)
     air, travelling = path.append_bodies(state.path, state.travelling, *_places(new))
     # a silent partner's record begins where it first touches, not where it was put
     placed = np.concatenate([state.placed, [body.since_step if body.material is not None else -SPAN for body in bodies]]).astype(np.int64)
-    return replace(state, placed=placed, sounders=state.sounders + new, bank=instrument, ringing=ringing, path=air, travelling=travelling)
+    sounders, both = state.sounders + new, state.beside + beside
+    return replace(state, placed=placed, sounders=sounders, beside=both, bank=instrument, ringing=ringing, path=air, travelling=travelling)
 
 
 def _places(sounders: tuple[Sounder, ...]) -> tuple[Array, Array]:
@@ -132,7 +145,7 @@ def quenched(state: State) -> State:
     """Nothing rings; the sound still travelling to the microphones is gone too."""
     air, travelling = path.empty_path(state.path.sr, state.path.air, state.path.microphone_m, state.travelling.at)
     air, travelling = path.append_bodies(air, travelling, *_places(state.sounders))
-    return replace(state, ringing=bank.silence(state.ringing), path=air, travelling=travelling)
+    return replace(state, ringing=bank.silence(state.ringing), path=air, travelling=travelling, grains=(), rubs={})
 
 
 def _render(setup: Setup, state: State) -> tuple[Array, State]:
@@ -150,46 +163,58 @@ def _render(setup: Setup, state: State) -> tuple[Array, State]:
     parts, loads = split(loads)
     blows += [(float(after.time_s), blow) for blow in find_blows(parts, rows[1:], window[1], sounders, state.number + 1 - placed < SPAN, -step.dt_s)]
     drives, rubbing = advance_rubbing(state.rubbing, parts, step, window[1], rows[1], sounders, x, sr, setup.seed)
-    strikes = [strike for begin_s, blow in blows for strike in _strikes(blow, begin_s, sounders, sr, clock.sample(sr))]
-    sound = bank.advance(state.bank, state.ringing, count, strikes, _forces(drives, sounders, x), x)
+    first, beside = clock.sample(sr), state.beside
+    strikes = [strike for begin_s, blow in blows for strike in _strikes(blow, begin_s, sounders, beside, sr, first)]
+    sound = bank.advance(state.bank, state.ringing, count, strikes, _forces(drives, sounders, beside, x), x)
+    more, rubs = rubbing_grains(state.rubs, drives, sounders, beside, first, count, setup.seed)
+    grains = (*state.grains, *(g for begin_s, blow in blows for g in blow_grains(blow, begin_s, sounders, beside, sr, first, setup.seed)), *more)
+    if any(more is not None for more in beside):
+        sound[:, 0::PLACES] += sound[:, 4::PLACES]
+    grains = add_grains(sound[:, 0::PLACES], grains, first)
     frame = _at_sensors(setup, state, sound, x)
-    return frame, replace(state, number=state.number + 1, clock=after, loads=loads, rubbing=rubbing, placed=placed)
+    return frame, replace(state, number=state.number + 1, clock=after, loads=loads, rubbing=rubbing, placed=placed, grains=grains, rubs=rubs)
 
 
-def _strikes(blow: Blow, step_start_s: float, sounders: tuple[Sounder, ...], sr: int, earliest: int) -> list[bank.Strike]:
-    """The pulse on the modes and translations of both bodies."""
+def _strikes(blow: Blow, step_start_s: float, sounders: tuple[Sounder, ...], beside: tuple[Beside | None, ...], sr: int, earliest: int) -> list[bank.Strike]:
+    """The pulse on the modes, translations and residual lines of both bodies."""
     offset_s, spacing_s, weight = pulse_nodes(blow.length_s, sr, flat=blow.flat)
     start = max((step_start_s + blow.start_s) * sr, float(earliest))
     strikes = []
     sides = (blow.low, blow.share * blow.modes_low, blow.share * blow.impulse_n_s), (blow.high, blow.share * blow.modes_high, -blow.share * blow.impulse_n_s)
     for body, modes, shove in sides:
         if modes.any():
-            strikes.append(bank.Strike(4 * body, start + offset_s * sr, spacing_s * sr, weight, modes))
+            strikes.append(bank.Strike(PLACES * body, start + offset_s * sr, spacing_s * sr, weight, modes))
+            more = beside[body]
+            if more is not None and len(more.follows):
+                strikes.append(bank.Strike(PLACES * body + 4, start + offset_s * sr, spacing_s * sr, weight, modes[more.follows]))
         rigid = sounders[body].rigid
         if rigid is not None:
             cells = pulse_cells(start, blow.length_s, sr, int(np.ceil(CELLS_PER_RADIAN * rigid.decay_per_s[0] / sr)), flat=blow.flat)
-            strikes += [bank.Strike(4 * body + 1 + int(axis), *cells, shove[axis : axis + 1]) for axis in np.flatnonzero(shove)]
+            strikes += [bank.Strike(PLACES * body + 1 + int(axis), *cells, shove[axis : axis + 1]) for axis in np.flatnonzero(shove)]
     return strikes
 
 
-def _forces(drives: Sequence[Drive], sounders: tuple[Sounder, ...], x: Array) -> list[bank.Force]:
-    """Drives on modes, each with its own gains, and on translations, where all forces on a body act as one."""
+def _forces(drives: Sequence[Drive], sounders: tuple[Sounder, ...], beside: tuple[Beside | None, ...], x: Array) -> list[bank.Force]:
+    """Drives on modes and residual lines, each with its own gains, and on translations, where all forces on a body act as one."""
     forces = []
     pushes: dict[int, Array] = {}
     for drive in drives:
         push = drive.force_n * (drive.direction0[:, None] + (drive.direction1 - drive.direction0)[:, None] * x)
         for side, body in enumerate((drive.low, drive.high)):
             if sounders[body].mode_count:
-                forces.append(bank.Force(4 * body, drive.force_n, drive.gain0[side], drive.gain1[side]))
+                forces.append(bank.Force(PLACES * body, drive.force_n, drive.gain0[side], drive.gain1[side]))
+                more = beside[body]
+                if more is not None and len(more.follows):
+                    forces.append(bank.Force(PLACES * body + 4, drive.force_n, drive.gain0[side][more.follows], drive.gain1[side][more.follows]))
             if sounders[body].rigid is not None:
                 pushes[body] = pushes.get(body, 0.0) + (push if side == 0 else -push)
     one = np.ones(1)
-    return forces + [bank.Force(4 * body + 1 + axis, push[axis], one, one) for body, push in pushes.items() for axis in range(3)]
+    return forces + [bank.Force(PLACES * body + 1 + axis, push[axis], one, one) for body, push in pushes.items() for axis in range(3)]
 
 
 def _at_sensors(setup: Setup, state: State, sound: Array, x: Array) -> Array:
-    """(channels, n) of the bank's sound (W, 4·b, n): microphones hear through the air, the others sum their weight set over the bodies."""
-    modal, pushed = sound[:, 0::4], np.stack([sound[0, part::4] for part in (1, 2, 3)], axis=1)
+    """(channels, n) of the bank's sound (W, PLACES·b, n): microphones hear through the air, the others sum their weight set over the bodies."""
+    modal, pushed = sound[:, 0::PLACES], np.stack([sound[0, part::PLACES] for part in (1, 2, 3)], axis=1)
     here, there, newest = state.window[0], state.window[1], state.window[-1]
     end = newest.position_m.copy()  # of bodies that came later than this step: where they came
     end[: len(there.position_m)] = there.position_m
@@ -218,8 +243,8 @@ def _summed(rows: Array) -> Array:
 class Synthesizer:
     """Steps in, lagging frames out: the live form of `take_step`, with the sound so far kept."""
 
-    def __init__(self, *, sr: int, sensors: tuple[Sensor, ...], seed: int, air: Air) -> None:
-        self._setup = Setup(sr, sensors, seed, air)
+    def __init__(self, *, sr: int, sensors: tuple[Sensor, ...], seed: int, air: Air, residual: bool = True) -> None:
+        self._setup = Setup(sr, sensors, seed, air, residual)
         self._state = start(self._setup)
         self._clock = Clock()
         self._frames: list[Array] = []

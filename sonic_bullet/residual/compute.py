@@ -1,0 +1,112 @@
+"""The residual of a recording: what is left of its power when what the modes represent is taken off [Ren, Yeh, Lin 2013, sec. 6.1].
+
+    represented(t) = Σ_i R_i φ_i(t)                 features φ_i, each with the share R_i that the modes have of it (its match ratio)
+    P_residual = max(P_recorded - P_represented, 0)                                             pixel by pixel
+
+For a preset it is told in two parts. What is left of the features, √(1 - R_i²) of each, is lines: their frequencies are known far better than a spectrogram
+shows them. What is left beside all features is noise, of which bands and times keep the mean, less the recording's own floor.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sonic_bullet.errors import AudioError
+from sonic_bullet.records import Array, Residual
+from sonic_bullet.residual.spectrogram import WINDOW, Power, checked, power, transform
+from sonic_bullet.residual.transfer import Modes
+
+LONGEST_S = 1.0
+LINES_MOST = 128
+LINE_FLOOR = 1e-4
+"""Lines with less than this share of the loudest line's energy (40 dB) and less than of the clip's are left out."""
+BAND_OCTAVES = 1 / 6
+GROWTH = 1.12
+ABOVE = 2.0
+"""Cells whose mean is less than this times the floor are the floor."""
+NEPERS = 40.0
+
+
+def damped(freq_hz: Array, decay_per_s: Array, amplitude: Array, n: int, sr: int) -> Array:
+    """Re Σ a e^{(-d + iω)t} (n,) of lines (l,), a complex."""
+    out = np.zeros(n)
+    for f, d, a in zip(freq_hz, decay_per_s, amplitude, strict=True):
+        if a != 0:
+            length = n if d <= 0 else min(n, int(NEPERS / d * sr) + 1)
+            out[:length] += np.real(a * np.exp((-d + 2j * np.pi * f) / sr * np.arange(length)))
+    return out
+
+
+def clip_residual(recorded: Array, represented: Array, sr: int, represented_sr: int | None = None, window: int = WINDOW) -> tuple[Power, Array]:
+    """P_residual of a recording (n,) and the complex transform of recorded - represented (m, k), whose phases its inversion starts from.
+
+    Raises AudioError: empty, NaN, other lengths, or another rate.
+    """
+    if represented_sr is not None and represented_sr != sr:
+        raise AudioError(f"a residual of {represented_sr} Hz beside a recording of {sr} Hz", "resample one of them")
+    recorded, represented = checked(recorded, sr), checked(represented, sr)
+    if recorded.shape != represented.shape:
+        raise AudioError(f"{len(represented)} samples represented of {len(recorded)}", "give clips of one length")
+    whole, taken = power(recorded, sr, window), power(represented, sr, window)
+    left = Power(whole.freq_hz, whole.time_s, np.maximum(whole.per_hz - taken.per_hz, 0.0))
+    return left, transform(recorded - represented, window)
+
+
+def noise_floor_per_hz(left: Power) -> Array:
+    """(b,) floor: the median over the last third of the frames; an exponential law's median is ln 2 of its mean."""
+    tail = left.per_hz[:, -max(len(left.time_s) // 3, 1) :]
+    return np.asarray(np.median(tail, axis=1) / np.log(2))
+
+
+def cells(left: Power, floor_per_hz: Array) -> tuple[Array, Array, Array]:
+    """Bands (b,) in Hz, times (n,) in s and mean power per Hz (b, n) less the floor: a sixth of an octave or a bin, frames of 1, 1, … then ever more."""
+    width = left.freq_hz[1]
+    edge = [0.0]
+    while edge[-1] < left.freq_hz[-1]:
+        edge.append(max(edge[-1] + width, edge[-1] * 2**BAND_OCTAVES))
+    band = np.searchsorted(edge[1:-1], left.freq_hz, "right")
+    last = int(np.searchsorted(left.time_s, min(LONGEST_S, left.time_s[-1]), "right"))
+    ends: list[int] = []
+    step = 1.0
+    while sum(ends) < last:
+        ends.append(int(step))
+        step = step * GROWTH if len(ends) > 8 else 1.0
+    frame = np.minimum(np.repeat(np.arange(len(ends)), ends), len(ends) - 1)[:last]
+    count = np.bincount(band)[:, None] * np.bincount(frame)[None]
+    kept = count[:, 0] > 0
+    total, quiet = np.zeros(count.shape), np.zeros(len(count))
+    np.add.at(total, (band[:, None], frame[None]), left.per_hz[:, :last])
+    np.add.at(quiet, band, floor_per_hz)
+    mean, quiet = total / np.maximum(count, 1), quiet / np.maximum(np.bincount(band), 1)
+    heard = mean > quiet[:, None] * (ABOVE + 3 / np.sqrt(count + 1e-9))
+    centre_hz = np.bincount(band, left.freq_hz) / np.maximum(np.bincount(band), 1)
+    centre_s = np.bincount(frame, left.time_s[:last]) / np.bincount(frame)
+    return centre_hz[kept], centre_s, np.where(heard, mean - quiet[:, None], 0.0)[kept]
+
+
+def residual_record(
+    recorded: Array, left: Array, sr: int, modes: Modes, line_freq_hz: Array, line_decay_per_s: Array, line_amplitude: Array, source: str
+) -> Residual:
+    """The residual of strikes (s, n) from the onset on: ``left`` (s, n) beside all features; lines (l,), mean square over the strikes, beside all modes.
+
+    Levels come out relative to the strongest mode. Raises AudioError on empty clips and NaN, RecordError where nothing can follow.
+    """
+    if not len(recorded) or recorded.shape != left.shape:
+        raise AudioError(f"recordings of shape {recorded.shape}, of which {left.shape} is left", "give strikes of one length")
+    parts = [power(x, sr) for x in left]
+    mean = Power(parts[0].freq_hz, parts[0].time_s, np.mean([p.per_hz for p in parts], axis=0))
+    freq, time, per_hz = cells(mean, noise_floor_per_hz(mean))
+    unit = float(modes.amplitude.max())
+    if not unit > 0:
+        raise AudioError("modes that the strikes do not excite", "strike where the body moves")
+    clip = float((recorded**2).sum(axis=1).mean() / sr)
+    energy = line_amplitude**2 / (4 * np.maximum(line_decay_per_s, 0.1))
+    order = np.argsort(-energy, kind="stable")[:LINES_MOST]
+    order = np.sort(order[energy[order] > LINE_FLOOR * min(float(energy.max(initial=0.0)), clip)])
+    if float(energy[order].sum()) + 2 * float(np.trapezoid(np.trapezoid(per_hz, time, axis=1), freq)) < 1e-6 * clip:
+        order, per_hz = order[:0], np.zeros_like(per_hz)  # 60 dB below the clip: rounding, no residual
+    clip = max(clip, float(energy[order].sum()))  # lines that outlast the clip
+    return Residual(
+        modes.freq_hz, modes.decay_per_s, modes.amplitude / unit, line_freq_hz[order], line_decay_per_s[order], line_amplitude[order] / unit,
+        freq, time, per_hz / unit**2, 1.5 * clip / unit**2, source,
+    )  # fmt: skip

@@ -1,0 +1,158 @@
+"""What a strike adds beside its modes: a grain of shaped noise, cut once a body and then filtered to each place.
+
+    once a body:     P(f, t) shifted and stretched onto its modes -> magnitudes -> invert -> base_v(t), v = 0, 1 from two seeds
+    once a place:    g_v = T⁻¹(T(base_v) √A(f) |F̂(fτ)|)        A: `transfer.scale` of the modes as they are struck there, F̂: the force pulse
+    each strike:     J-level · (cos θ g_0 + sin θ g_1), θ seeded: as loud, of the same spectrogram, and no two alike
+
+A does not hang on time, so the order (transfer, then invert) or (invert, then scale) is one up to the window's length. Places are told apart by A itself,
+in steps of 2 dB at each pair of modes, and pulses in eighths of an octave: whoever comes first, a cached grain has the same bits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numba import njit
+
+from sonic_bullet.records import Array, Residual
+from sonic_bullet.residual.invert import invert, magnitude_of, noise_phases
+from sonic_bullet.residual.spectrogram import WINDOW, axes
+from sonic_bullet.residual.transfer import Lines, Modes, Pairs, come_from, merged, moved, pair, scale, source_modes, source_power, transfer_lines
+
+LONGEST_S = 0.5
+FADE_IN_S = 1e-3
+FADE_OUT = 0.15
+STEP_DB = 2.0
+LEAST_DB = -60.0
+CACHED = 256
+SEEDS = (0x5EED, 0xF00D)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Voice:
+    """A body's residual. pairs; here_hz (k,): source frequency of each bin; source_power (p,) of the pairs' modes; base (2, F) complex64: spectra of the base
+    grains of ``length`` samples at FFT size ``size``; lines. silent: the noise is none. cache: of `placed`, by key; a pure function's, so it may be shared.
+    """
+
+    sr: int
+    pairs: Pairs
+    here_hz: Array
+    source_power: Array
+    base: Array
+    length: int
+    size: int
+    lines: Lines
+    silent: bool
+    cache: dict[bytes, Array] = field(default_factory=dict)
+
+
+def make_voice(residual: Residual, target: Modes, sr: int, longest_s: float = LONGEST_S) -> Voice:
+    """A body's voice: ``target`` are its modes at a typical strike, which decide the pairs."""
+    source = source_modes(residual)
+    pairs = pair(source, target)
+    joined, _ = merged(source)
+    n = duration(residual, pairs, sr, longest_s)
+    freq, time = axes(n, sr)
+    here, slope, rate = come_from(pairs, freq)
+    magnitude = magnitude_of(moved(source_power(residual), here, slope, rate, time), sr)
+    size = 1 << int(np.ceil(np.log2(n + 4 * WINDOW)))
+    shape = faded(n, sr)
+    base = [np.fft.rfft(shape * invert(magnitude, noise_phases(n, seed), n), size) for seed in SEEDS] if magnitude.any() else [np.zeros(size // 2 + 1)] * 2
+    return Voice(
+        sr, pairs, here, joined.amplitude[pairs.source] ** 2, np.array(base, np.complex64), n, size, transfer_lines(residual, pairs), not bool(magnitude.any())
+    )
+
+
+def duration(residual: Residual, pairs: Pairs, sr: int, longest_s: float) -> int:
+    """Samples until the last of a residual's noise has passed, when stretched onto the pairs; a window at least."""
+    sounding = np.flatnonzero(residual.power_per_hz.any(axis=0))
+    last = float(residual.time_s[min(int(sounding[-1]) + 1, len(residual.time_s) - 1)]) if len(sounding) else 0.0
+    return max(2 * WINDOW, round(sr * min(longest_s, last / float(pairs.rate.min()))))
+
+
+def faded(n: int, sr: int) -> Array:
+    """(n,) float32: rises within a millisecond, falls over the last 15 %, with no corner in either."""
+    shape = np.ones(n, np.float32)
+    rise, fall = max(2, round(FADE_IN_S * sr)), max(2, int(FADE_OUT * n))
+    shape[:rise] = np.sin(np.pi / 2 * (np.arange(rise) + 0.5) / rise) ** 2
+    shape[n - fall :] *= np.cos(np.pi / 2 * (np.arange(fall) + 0.5) / fall) ** 2
+    return shape
+
+
+def response(voice: Voice, struck_power: Array, pulse: Array | None = None) -> Array:
+    """(k,) by which the base grains' bins are multiplied: √A for modes struck to a² (p,), times a pulse's |F̂| (k,)."""
+    return np.asarray(np.sqrt(scale(voice.pairs, voice.source_power, struck_power, voice.here_hz)) * (1.0 if pulse is None else pulse))
+
+
+def filtered(voice: Voice, gain: Array) -> Array:
+    """(2, length) float32: the base grains through a response (k,)."""
+    spectrum = np.empty_like(voice.base)
+    _filter(voice.base, np.asarray(gain, np.float32), spectrum)
+    return np.asarray(np.fft.irfft(spectrum, voice.size, axis=1)[:, : voice.length] * faded(voice.length, voice.sr))
+
+
+Pulse = Callable[[Array, bool], Array]
+
+
+def placed(voice: Voice, struck_power: Array, tau_s: float, flat: bool, pulse: Pulse) -> tuple[Array, float]:
+    """The two grains (2, length) of a place and a pulse, and the level by which they are to be multiplied. struck_power (p,): a² of the pairs.
+
+    pulse: |F̂| (k,) of a force pulse at products fτ (k,), flat or not, relative to 0 Hz.
+    """
+    most = float(struck_power.max(initial=0.0))
+    if most <= 0 or voice.silent:
+        return np.zeros((2, 0), np.float32), 0.0
+    step = np.round(np.maximum(10 * np.log10(np.maximum(struck_power / most, 1e-30)), LEAST_DB) / STEP_DB).astype(np.int16)
+    octave = round(8 * np.log2(max(tau_s, 1e-6)))
+    key = step.tobytes() + bytes(str((octave, flat)), "ascii")
+    found = voice.cache.get(key)
+    if found is None:
+        gain = response(voice, 10 ** (step * STEP_DB / 10), pulse(axes(0, voice.sr)[0] * 2 ** (octave / 8), flat))
+        found = filtered(voice, gain)
+        while len(voice.cache) >= CACHED:
+            voice.cache.pop(next(iter(voice.cache)))
+        voice.cache[key] = found
+    return found, float(np.sqrt(most))
+
+
+def varied(grains: Array, level: float, number: int) -> Array:
+    """(length,) float32: a grain of its own for each ``number``, as loud as the others."""
+    angle = 2 * np.pi * fraction(number)
+    out = np.empty(grains.shape[1], np.float32)
+    _mix(grains, np.float32(level * np.cos(angle)), np.float32(level * np.sin(angle)), out)
+    return out
+
+
+def mixed_number(*parts: int) -> int:
+    """A number below 2⁶⁴ that any change of any part changes everywhere (splitmix64's finaliser, a part at a time)."""
+    state = 0x9E3779B97F4A7C15
+    for part in parts:
+        state = (state ^ (part & 0xFFFFFFFFFFFFFFFF)) * 0xBF58476D1CE4E5B9 & 0xFFFFFFFFFFFFFFFF
+        state = (state ^ (state >> 27)) * 0x94D049BB133111EB & 0xFFFFFFFFFFFFFFFF
+        state ^= state >> 31
+    return state
+
+
+def fraction(number: int) -> float:
+    """A number below 2⁶⁴ as a share of 1."""
+    return (number >> 11) / (1 << 53)
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _mix(grains: Array, first: np.float32, second: np.float32, out: Array) -> None:  # pragma: no cover - compiled
+    for n in range(len(out)):
+        out[n] = first * grains[0, n] + second * grains[1, n]
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _filter(base: Array, gain: Array, out: Array) -> None:  # pragma: no cover - compiled
+    """out (v, F) = base · gain, the gain (k,) linear between its bins."""
+    every = (base.shape[1] - 1) // (len(gain) - 1)
+    for k in range(base.shape[1]):
+        low = min(k // every, len(gain) - 2)
+        share = np.float32(k - low * every) / np.float32(every)
+        value = gain[low] + share * (gain[low + 1] - gain[low])
+        for v in range(base.shape[0]):
+            out[v, k] = base[v, k] * value

@@ -1,0 +1,249 @@
+"""A residual follows the modes: what turns the source's modal spectrogram into the target's is done to the residual [Ren, Yeh, Lin 2013, eq. 28-29, algorithm 1].
+
+    (1) shift     the pixel at f_s goes to f_t:  f_s^i -> f_t^j, and midpoints between modes -> midpoints, linear between
+    (2) stretch   P''(t) = P(t d_t/d_s)                                       within the neighbourhood of each pair
+    (3) scale     A(f) = Σ_k a_t,k² h_k(f) / Σ_k a_s,k² h_k(f),  h_k = 1/(1 + (f - f_s,k)²/b_k²)
+    P_t(f_t, t) = A(f_s) P_s(f_s, t d_t/d_s) |df_s/df_t|
+
+At a mode the shift is the paper's Δf. Towards the midpoints the paper shifts by the same Δf and cuts or doubles what does not fit; here a neighbourhood fills
+its new one, so bands of a body twice the size lie at half the frequencies, and |df_s/df_t| keeps their energy relative to the modes'. After (2) source and
+target mode decay alike, so the ratio of their spectrograms, pixel by pixel, no longer hangs on time. h_k is a mode's skirt, b_k a twentieth of its neighbourhood:
+a mode that is not struck takes its neighbourhood down by 20 dB or more, and its neighbours' skirts meet without a step.
+Below the lowest and above the highest pair frequencies keep their ratio to that pair's. m, p modes, pairs; b bands, n frames.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from sonic_bullet.errors import AudioError
+from sonic_bullet.records import Array, Residual, frozen_array
+from sonic_bullet.residual.spectrogram import Power
+
+DOMINANT = 24
+"""Most pairs where the shapes differ: the N_dominant of the paper's section 6.2.1."""
+ALIKE = 0.02
+"""Frequencies that agree so well after scaling are of the same mode of a scaled body."""
+ALIKE_COUNT = 12
+ONE_MODE = 1e-3
+"""Modes closer than this, relative, count as one: what hears them hears one line."""
+SKIRT = 0.05
+FAINT = 1e-6
+LEAST_DECAY_PER_S = 0.1
+FASTEST_TIME = 1e3
+TINY = 1e-300
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Modes:
+    """m modes as one strike starts them: freq_hz ascending, decay_per_s, amplitude ≥ 0 at the onset, in any one unit."""
+
+    freq_hz: Array
+    decay_per_s: Array
+    amplitude: Array
+
+    def __post_init__(self) -> None:
+        m = len(np.atleast_1d(self.freq_hz))
+        for name in ("freq_hz", "decay_per_s", "amplitude"):
+            object.__setattr__(self, name, frozen_array(getattr(self, name), np.float64, (m,), f"modes' {name}"))
+        if m == 0 or not (self.freq_hz > 0).all() or (np.diff(self.freq_hz) < 0).any() or (self.amplitude < 0).any() or (self.decay_per_s < 0).any():
+            raise AudioError(
+                "modes that are none, do not ascend or are below zero", "give frequencies in ascending order, decays and amplitudes of at least zero"
+            )
+
+    @property
+    def energy(self) -> Array:
+        """(m,) a²/4d, what each mode sends out in all."""
+        return np.asarray(self.amplitude**2 / (4 * np.maximum(self.decay_per_s, LEAST_DECAY_PER_S)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Pairs:
+    """p pairs of modes, ascending on both sides: source_hz, target_hz (p,); rate (p,) = d_t/d_s; source, target (p,): which mode each is.
+
+    natural: the bodies are one shape scaled, so the pairs are the same modes. group (m,): the target's pair each of its modes counts to, -1: none.
+    """
+
+    source_hz: Array
+    target_hz: Array
+    rate: Array
+    source: Array
+    target: Array
+    natural: bool
+    group: Array
+
+
+def source_modes(residual: Residual) -> Modes:
+    """The modes a residual was taken beside."""
+    return Modes(residual.mode_freq_hz, residual.mode_decay_per_s, residual.mode_amplitude)
+
+
+def source_power(residual: Residual) -> Power:
+    """A residual's noise."""
+    return Power(residual.freq_hz, residual.time_s, residual.power_per_hz)
+
+
+def merged(modes: Modes) -> tuple[Modes, Array]:
+    """Modes closer than `ONE_MODE` as one: powers add, frequency and decay are the mean by power. And (m,) which of them each is."""
+    group = np.concatenate([[0], np.cumsum(np.diff(modes.freq_hz) > ONE_MODE * modes.freq_hz[1:])]).astype(np.int64)
+    weight = modes.amplitude**2 + 1e-12 * float((modes.amplitude**2).max()) + TINY
+    total = np.bincount(group, weight)
+    freq, decay = (np.bincount(group, weight * value) / total for value in (modes.freq_hz, modes.decay_per_s))
+    return Modes(freq, decay, np.sqrt(np.bincount(group, modes.amplitude**2))), group
+
+
+def pair(source: Modes, target: Modes, dominant: int = DOMINANT) -> Pairs:
+    """Natural pairs where the target is the source's shape at some scale, else the ``dominant`` strongest of both sides, from low to high."""
+    a, _ = merged(source)
+    b, group = merged(target)
+    i, j = _natural(a, b)
+    natural = len(i) > 0
+    if not natural:
+        count = min(dominant, int((a.amplitude > 0).sum()), max(int((b.amplitude > 0).sum()), 1))
+        i, j = (np.sort(np.argsort(-x.energy, kind="stable")[: max(count, 1)]) for x in (a, b))
+    rate = np.clip(np.maximum(b.decay_per_s[j], LEAST_DECAY_PER_S) / np.maximum(a.decay_per_s[i], LEAST_DECAY_PER_S), 1 / FASTEST_TIME, FASTEST_TIME)
+    of_pair = np.full(len(b.freq_hz), -1)
+    of_pair[j] = np.arange(len(j))
+    return Pairs(a.freq_hz[i], b.freq_hz[j], rate, i, j, natural, of_pair[group])
+
+
+def _natural(a: Modes, b: Modes) -> tuple[Array, Array]:
+    """Modes of a and b that are the same of one scaled shape; none where the lowest do not agree. The scale is looked for among ratios of the lowest."""
+    count = min(ALIKE_COUNT, len(a.freq_hz), len(b.freq_hz))
+    none = np.zeros(0, np.int64)
+    if count < min(3, len(a.freq_hz)):
+        return none, none
+    best, scale = np.inf, 1.0
+    low = a.freq_hz[:count]
+    for j in range(min(4, len(b.freq_hz))):
+        for i in range(min(2, count)):
+            ratio = b.freq_hz[j] / low[i]
+            off = np.sort(np.abs(_nearest(b.freq_hz, ratio * low)[1] / (ratio * low) - 1))
+            far = float(off[: max(1, int(0.8 * count))].max()) + 1e-3 * abs(j - i)
+            if far < best:
+                best, scale = far, ratio
+    if best > ALIKE:
+        return none, none
+    near, there = _nearest(b.freq_hz, scale * a.freq_hz)
+    back, _ = _nearest(scale * a.freq_hz, b.freq_hz)
+    good = (np.abs(there / (scale * a.freq_hz) - 1) < 2 * ALIKE) & (back[near] == np.arange(len(near)))
+    return np.flatnonzero(good), near[good]
+
+
+def _nearest(values: Array, to: Array) -> tuple[Array, Array]:
+    """Index into ascending ``values``, and the value, nearest to each of ``to``."""
+    right = np.clip(np.searchsorted(values, to), 1, len(values) - 1) if len(values) > 1 else np.zeros(len(to), np.int64)
+    if len(values) > 1:
+        right = np.where(to - values[right - 1] < values[right] - to, right - 1, right)
+    return right, values[right]
+
+
+def neighbourhood(centre_hz: Array, freq_hz: Array) -> Array:
+    """(k,) in whose neighbourhood each frequency lies, between the midpoints of centres (p,)."""
+    return np.searchsorted((centre_hz[1:] + centre_hz[:-1]) / 2, freq_hz)
+
+
+def _knots(centre_hz: Array) -> Array:
+    middle = (centre_hz[1:] + centre_hz[:-1]) / 2
+    inner = np.empty(2 * len(centre_hz) - 1)
+    inner[0::2], inner[1::2] = centre_hz, middle
+    return np.concatenate([[0.0], inner, [1e3 * centre_hz[-1]]])
+
+
+def shifted_hz(pairs: Pairs, freq_hz: Array) -> Array:
+    """Where source frequencies (k,) go."""
+    return np.asarray(np.interp(freq_hz, _knots(pairs.source_hz), _knots(pairs.target_hz)))
+
+
+def come_from(pairs: Pairs, freq_hz: Array) -> tuple[Array, Array, Array]:
+    """Source frequency, |df_s/df_t| and d_t/d_s (k,) of target frequencies (k,)."""
+    there, here = _knots(pairs.target_hz), _knots(pairs.source_hz)
+    piece = np.clip(np.searchsorted(there, freq_hz, "right") - 1, 0, len(there) - 2)
+    slope = (np.diff(here) / np.diff(there))[piece]
+    return here[piece] + (freq_hz - there[piece]) * slope, slope, pairs.rate[neighbourhood(pairs.target_hz, freq_hz)]
+
+
+def scale(pairs: Pairs, source_power: Array, target_power: Array, freq_hz: Array) -> Array:
+    """A (k,) at source frequencies (k,), from a² (p,) of both sides of the pairs."""
+    edge = np.concatenate([[0.0], (pairs.source_hz[1:] + pairs.source_hz[:-1]) / 2])
+    width = np.append(np.diff(edge), 2 * max(float(pairs.source_hz[-1] - edge[-1]), 1.0))
+    out = np.empty(len(freq_hz))
+    _scale(np.asarray(freq_hz, float), pairs.source_hz, SKIRT * width, source_power + FAINT * float(source_power.max()), target_power, out)
+    return out
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _scale(freq: Array, centre: Array, half: Array, below: Array, above: Array, out: Array) -> None:  # pragma: no cover - compiled
+    for k in range(len(freq)):
+        up, down = 0.0, 0.0
+        for p in range(len(centre)):
+            skirt = 1.0 / (1.0 + ((freq[k] - centre[p]) / half[p]) ** 2)
+            up += above[p] * skirt
+            down += below[p] * skirt
+        out[k] = up / down
+
+
+def paired_power(pairs: Pairs, target: Modes) -> Array:
+    """a² (p,) of the target's modes, summed into its pairs."""
+    mine = pairs.group >= 0
+    return np.bincount(pairs.group[mine], target.amplitude[mine] ** 2, len(pairs.target_hz))
+
+
+def transfer(residual: Power, source: Modes, target: Modes, freq_hz: Array, time_s: Array, *, pairs: Pairs | None = None) -> Array:
+    """P_t (k, n) at target frequencies (k,) and times (n,) from the onset on, of a residual taken beside ``source`` and now beside ``target``."""
+    pairs = pairs or pair(source, target)
+    merged_source, _ = merged(source)
+    here, slope, rate = come_from(pairs, freq_hz)
+    level = slope * scale(pairs, merged_source.amplitude[pairs.source] ** 2, paired_power(pairs, target), here)
+    return moved(residual, here, level, rate, time_s)
+
+
+def moved(residual: Power, come_from_hz: Array, level: Array, rate: Array, time_s: Array) -> Array:
+    """level·P(come_from_hz, rate·t) (k, n)."""
+    out = np.zeros((len(come_from_hz), len(time_s)))
+    _moved(residual.freq_hz, residual.time_s, residual.per_hz, come_from_hz, level, rate, np.asarray(time_s, float), out)
+    return out
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _moved(freq: Array, time: Array, power: Array, come_from: Array, level: Array, rate: Array, at: Array, out: Array) -> None:  # pragma: no cover - compiled
+    row = np.empty(len(time))
+    for k in range(len(come_from)):
+        f = come_from[k]
+        if f > freq[-1] or level[k] <= 0.0:
+            continue
+        i = min(max(np.searchsorted(freq, f) - 1, 0), len(freq) - 2)
+        share = min(max((f - freq[i]) / (freq[i + 1] - freq[i]), 0.0), 1.0)
+        for n in range(len(time)):
+            row[n] = level[k] * ((1.0 - share) * power[i, n] + share * power[i + 1, n])
+        j = 0
+        for n in range(len(at)):
+            t = at[n] * rate[k]
+            if t > time[-1]:
+                break
+            while j < len(time) - 2 and time[j + 1] < t:
+                j += 1
+            part = min(max((t - time[j]) / (time[j + 1] - time[j]), 0.0), 1.0)
+            out[k, n] = (1.0 - part) * row[j] + part * row[j + 1]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Lines:
+    """l damped sinusoids of a transferred residual: freq_hz, decay_per_s, ratio (l,) of their amplitude to that of the mode they follow; follows (l,): its pair."""
+
+    freq_hz: Array
+    decay_per_s: Array
+    ratio: Array
+    follows: Array
+
+
+def transfer_lines(residual: Residual, pairs: Pairs) -> Lines:
+    """The residual's lines, moved, stretched and each struck as the mode is in whose neighbourhood it lies."""
+    source, _ = merged(source_modes(residual))
+    follows = neighbourhood(pairs.source_hz, residual.line_freq_hz)
+    below = scale(pairs, np.ones(len(pairs.source)), source.amplitude[pairs.source] ** 2 + FAINT * float((source.amplitude**2).max()), residual.line_freq_hz)
+    decay = residual.line_decay_per_s * pairs.rate[follows]
+    return Lines(shifted_hz(pairs, residual.line_freq_hz), decay, residual.line_amplitude / np.sqrt(below), follows)

@@ -1,0 +1,57 @@
+"""What the modal sound of recorded strikes lacks, as a value: the room `residual` makes it, moves it and plays it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sonic_bullet.arrays import Array, frozen_array, require, store
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Residual:
+    """What the modal sound of recorded strikes lacks, beside that sound [Ren, Yeh, Lin 2013, sec. 6]: all levels are relative to its modes.
+
+    mode_* (m,), ascending: the source's modes, amplitudes at the onset, mean square over the strikes. line_* (l,): what features add that modes do not.
+    freq_hz (b,), time_s (n,) ascending from the onset on: centres of the cells of power_per_hz (b, n), noise power per Hz (two-sided), bilinear between them.
+    clip_energy: of the recordings, in amplitude² · s: what is left cannot be louder. source: what it was taken from. No unit but Hz and s is left in it.
+    """
+
+    mode_freq_hz: Array
+    mode_decay_per_s: Array
+    mode_amplitude: Array
+    line_freq_hz: Array
+    line_decay_per_s: Array
+    line_amplitude: Array
+    freq_hz: Array
+    time_s: Array
+    power_per_hz: Array
+    clip_energy: float
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        m, count = len(np.atleast_1d(self.mode_freq_hz)), len(np.atleast_1d(self.line_freq_hz))
+        b, n = len(np.atleast_1d(self.freq_hz)), len(np.atleast_1d(self.time_s))
+        shapes: dict[str, tuple[int, ...]] = {"freq_hz": (b,), "time_s": (n,), "power_per_hz": (b, n)}
+        for part, size in (("mode", m), ("line", count)):
+            shapes |= {f"{part}_{name}": (size,) for name in ("freq_hz", "decay_per_s", "amplitude")}
+        store(self, **{name: frozen_array(getattr(self, name), float, shape, f"residual {name}") for name, shape in shapes.items()})
+        require(m > 0 and bool((self.mode_amplitude > 0).any()), "a residual without modes to follow", "take it from a recording that has some")
+        require(b > 1 and n > 1, "a residual whose spectrogram is empty", "take it from a recording that holds an impact")
+        for name in ("mode_freq_hz", "freq_hz", "time_s"):
+            value = getattr(self, name)
+            require(bool((value >= 0).all() and (np.diff(value) > 0).all() and value[-1] > 0), f"residual {name} does not ascend", "take the residual anew")
+        low = min(float(getattr(self, name).min(initial=0.0)) for name in shapes)
+        require(low >= 0 and bool((self.mode_freq_hz > 0).all() and (self.line_freq_hz > 0).all()), "a residual with numbers below zero", "take it anew")
+        require(
+            self.energy <= 1.05 * self.clip_energy < np.inf,
+            "a residual louder than the recordings it was taken from",
+            "take it anew: what is left of a sound is less",
+        )
+
+    @property
+    def energy(self) -> float:
+        """∫ p² dt of lines and noise of the source, in amplitude² · s: a²/4d a line, 2∬S df dt for the noise."""
+        noise = np.trapezoid(np.trapezoid(self.power_per_hz, self.time_s, axis=1), self.freq_hz)
+        return float(2 * noise + (self.line_amplitude**2 / (4 * np.maximum(self.line_decay_per_s, 0.1))).sum())
