@@ -18,7 +18,7 @@ from sonic_bullet.errors import MeshError, SceneError
 from sonic_bullet.listener import shapes
 from sonic_bullet.listener.bodies import checked_mass_kg, link_name
 from sonic_bullet.listener.frames import read_motion, read_roster
-from sonic_bullet.listener.mesh_files import hull_depth_m, read_surfaces
+from sonic_bullet.listener.mesh_files import Surface, lid_height_m, read_surfaces
 from sonic_bullet.listener.pieces import collision_pieces
 from sonic_bullet.listener.polling import FORCE
 from sonic_bullet.listener.world import World, client_id_of
@@ -26,7 +26,7 @@ from sonic_bullet.listener.world import World, client_id_of
 LONGEST_STEP_S = 1 / 120
 SMALLEST_M, LARGEST_M = 1e-3, 50.0
 DENSITY_RATIO = 3.0
-LID_SHARE = 0.1
+LID_SHARE = 0.15
 KEPT = "sonic_bullet.contactProcessingThreshold"
 Severity = Literal["error", "warning", "info"]
 
@@ -153,9 +153,9 @@ def _lids(client_id: int) -> list[Finding]:
         if pybullet.getDynamicsInfo(body, link, physicsClientId=client_id)[0] == 0:
             continue
         deep = 0.0
-        for surface in _hulled(client_id, body, link):
-            size = float(np.prod(np.maximum(np.ptp(surface, axis=0), 1e-9)) ** (1 / 3))
-            deep = max(deep, hull_depth_m(surface) / size)
+        for vertex, face in _hulled(client_id, body, link):
+            size = float(np.prod(np.maximum(np.ptp(vertex, axis=0), 1e-9)) ** (1 / 3))
+            deep = max(deep, lid_height_m(vertex, face) / size)
         if deep > LID_SHARE:
             found.append(
                 Finding(
@@ -168,20 +168,20 @@ def _lids(client_id: int) -> list[Finding]:
     return found
 
 
-def _hulled(client_id: int, body: int, link: int) -> list[Any]:
+def _hulled(client_id: int, body: int, link: int) -> list[Surface]:
     pieces = [piece for piece in collision_pieces(client_id, body, link) if piece.kind == pybullet.GEOM_MESH]
-    vertices = []
+    surfaces: list[Surface] = []
     for name, scale in {(piece.file, piece.size) for piece in pieces}:
         if name:
             try:
-                vertices += [vertex * scale for vertex, _ in read_surfaces(Path(name))]
+                surfaces += [(vertex * scale, face) for vertex, face in read_surfaces(Path(name))]
             except MeshError:
                 continue
-    if len(pieces) == 1 and not vertices:
+    if len(pieces) == 1 and not surfaces:
         visual = shapes.visual_surface(client_id, body, link)
         if visual is not None:
-            vertices.append(visual[0])
-    return vertices
+            surfaces.append(visual)
+    return surfaces
 
 
 def _scale(client_id: int) -> list[Finding]:

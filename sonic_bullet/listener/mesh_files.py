@@ -7,10 +7,11 @@ from pathlib import Path
 import numpy as np
 
 from sonic_bullet.errors import MeshError
-from sonic_bullet.geometry import welded
+from sonic_bullet.geometry import closest_point, welded
 from sonic_bullet.records import Array
 
 Surface = tuple[Array, Array]
+LID_GRID = 5
 
 
 def read_surfaces(path: Path) -> list[Surface]:
@@ -78,12 +79,17 @@ def hull(vertex_m: Array) -> Surface:
     return vertex_m[used], np.searchsorted(used, face)
 
 
-def hull_depth_m(vertex_m: Array) -> float:
-    """How far the surface's innermost vertex lies below its convex hull: 0 for a convex surface."""
-    from scipy.spatial import ConvexHull, QhullError
+def lid_height_m(vertex_m: Array, face: Array) -> float:
+    """How far the convex hull's surface stands at most from the true one: the depth below the lid over a bowl, 0 for a convex body.
 
+    Looked at on a grid of LID_GRID points a side on each of the hull's triangles.
+    """
     try:
-        plane = ConvexHull(vertex_m).equations
-    except (QhullError, ValueError):
+        shell_m, shell = hull(vertex_m)
+    except MeshError:
         return 0.0
-    return max(float(-(plane[:, :3] @ block.T + plane[:, 3:]).max(axis=0).min()) for block in np.array_split(vertex_m, 1 + len(vertex_m) // 4096))
+    i, j = (part.ravel() for part in np.meshgrid(np.arange(LID_GRID), np.arange(LID_GRID)))
+    inside = i + j < LID_GRID
+    share = np.stack([i, j, LID_GRID - 1 - i - j], axis=1)[inside] / (LID_GRID - 1)
+    point = np.unique(np.einsum("gc,fcx->fgx", share, shell_m[shell]).reshape(-1, 3), axis=0)
+    return float(closest_point(vertex_m, face, point)[2].max())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from sonic_bullet.errors import SceneError
 from sonic_bullet.listener import diagnose_world, keep_restitution, open_world
 from sonic_bullet.records import Material
 
+ASSETS = Path(__file__).parents[2] / "assets"
 WOOD = Material.isotropic("wood", youngs_pa=1e10, poisson=0.3, density_kg_m3=700, alpha_per_s=1.0, beta_s=1e-8)
 
 
@@ -80,9 +82,14 @@ def test_hull_lids_are_named(client: Any) -> None:
     floor(client)
     mug = client.loadURDF(pybullet_data.getDataPath() + "/objects/mug.urdf", [0, 0, 0.2])
     assert client.getDynamicsInfo(mug, -1)[0] > 0
-    bowl = client.createMultiBody(1, client.createCollisionShape(p.GEOM_MESH, fileName=DUCK, meshScale=[0.1] * 3), basePosition=[1, 0, 1])
+    duck = client.createMultiBody(1, client.createCollisionShape(p.GEOM_MESH, fileName=DUCK, meshScale=[0.1] * 3), basePosition=[1, 0, 1])
+    hollow = [
+        client.createMultiBody(1, client.createCollisionShape(p.GEOM_MESH, fileName=str(ASSETS / f"{name}.obj")), basePosition=[2, 0, k])
+        for k, name in enumerate(("bowl", "tumbler"))
+    ]
     found = [f for f in diagnose_world(client) if f.id == "hull-lid"]
-    assert any(f"body {bowl} " in f.what for f in found)
+    for body in (duck, *hollow):
+        assert any(f"body {body} " in f.what for f in found)
     fixed = [f for f in found if "body 0 " in f.what]
     assert not fixed
 

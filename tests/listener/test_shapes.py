@@ -14,7 +14,7 @@ from scenes import DUCK, collision, floor, thing, turned
 from sonic_bullet.errors import MeshError
 from sonic_bullet.geometry import is_closed, volume_m3
 from sonic_bullet.listener import links_with_shapes, open_world
-from sonic_bullet.listener.mesh_files import hull, hull_depth_m, read_surfaces
+from sonic_bullet.listener.mesh_files import hull, lid_height_m, read_surfaces
 from sonic_bullet.records import Shape
 
 DATA = Path(pybullet_data.getDataPath())
@@ -155,11 +155,18 @@ def test_obj_objects_are_kept_apart_and_bad_files_named(tmp_path: Path) -> None:
             read_surfaces(tmp_path / name)
 
 
-def test_hull_depth_tells_bowls_from_balls() -> None:
-    around, up = np.meshgrid(np.linspace(0, 2 * np.pi, 24), np.linspace(-np.pi / 2, 0, 8))
-    outer = np.stack([np.cos(around) * np.cos(up), np.sin(around) * np.cos(up), np.sin(up)], axis=-1).reshape(-1, 3)
-    assert hull_depth_m(outer) < 1e-9
-    assert hull_depth_m(np.concatenate([outer, 0.9 * outer])) == pytest.approx(0.1, rel=0.3)
+@pytest.mark.parametrize("wall", [0.3, 0.02])
+def test_the_lid_over_a_bowl_stands_as_high_as_the_bowl_is_deep(wall: float) -> None:
+    """Whatever its wall is; a ball has no lid, and no more has a brick."""
+    import trimesh
+
+    turned = np.concatenate(
+        [r * np.stack([np.cos(t), np.sin(t)], axis=1) for r, t in ((1, np.linspace(-np.pi / 2, 0, 9)), (1 - wall, np.linspace(0, -np.pi / 2, 9)))]
+    )
+    bowl = trimesh.creation.revolve(turned, sections=48)
+    assert lid_height_m(np.array(bowl.vertices), np.array(bowl.faces)) == pytest.approx(1 - wall, rel=0.03)
+    for convex in (trimesh.creation.icosphere(2), trimesh.creation.box((1, 2, 3))):
+        assert lid_height_m(np.array(convex.vertices), np.array(convex.faces)) < 1e-9
 
 
 def test_collision_shapes_are_small_enough_to_share(client: Any) -> None:
