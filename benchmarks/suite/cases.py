@@ -1,0 +1,236 @@
+"""A case folder in the practice cases' format, and its truth.
+
+    recipe + material (as it is, not as guessed) -> Body -> strikes -> effects -> files
+
+Guesses are wrong by up to 25 % in E and ρ (18 % together) and 0.03 in ν; strikes and sensors sit on vertices; one gain a case.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.suite import objects, physics
+from benchmarks.suite.effects import CARRIED, LISTED, UNLISTED, Effect, Scene
+from benchmarks.suite.objects import MATERIALS, RECIPES, Body, Material, Recipe
+from benchmarks.suite.physics import Strike
+
+PEAK = 0.5
+STEPS = (0.005, 0.01, 0.02, 0.04, 0.04, 0.02, 0.04, 0.008)  # impulses in N·s, as the practice cases spread them
+NU_OFF = (-0.03, 0.0, 0.03)
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """One case to be made: effects as (id, strength 0-2); transfer: with another object; noise_db: below the peak of 0.5; form: audio, features or no-mesh."""
+
+    name: str
+    recipe: str
+    effects: tuple[tuple[str, int], ...]
+    seed: int
+    transfer: bool = False
+    noise_db: float = -72.0
+    colour: str = "room"
+    rate: int = 44_100
+    seconds: float = 2.0
+    fineness: float = 1.0
+    form: str = "audio"
+
+
+def make_case(folder: Path, plan: Plan, cache: Path) -> dict[str, Any]:
+    """Writes folder/plan.name whole (case.json last, by rename) and gives its truth."""
+    rng = np.random.default_rng(plan.seed)
+    recipe = RECIPES[plan.recipe]
+    material = _as_it_is(MATERIALS[recipe.material], rng)
+    unit = objects.solved(recipe, material.poisson, cache, fineness=plan.fineness)
+    plain = objects.body(recipe.name, objects.as_made(unit, material))
+    sensor = _sensor(plain, rng)
+    strikes = _strikes(plain, rng, 8)
+    n = int(plan.seconds * plan.rate)
+    quiet = Scene(recipe, material, plain, strikes, sensor, 1.0, plan.rate, n, cache)
+    dry = [_strike_sound(quiet, plain, s, sensor, (), i) for i, s in enumerate(strikes)]
+    scene = replace(quiet, gain=PEAK / max(float(np.abs(x).max()) for x in dry))
+    effects = tuple({**LISTED, **UNLISTED}[name](strength, rng, scene) for name, strength in plan.effects)
+    unit_now = next((e.modes(recipe, material.poisson, cache) for e in effects if e.modes), unit)
+    body = objects.body(recipe.name, objects.as_made(unit_now, material))
+    bodies, sensors = [body], [sensor]
+    all_strikes, owner, split = list(strikes), [0] * 8, ["fit"] * 5 + ["holdout"] * 3
+    if plan.transfer:
+        other = _other(recipe, material, effects, rng, plan, cache)
+        bodies.append(other)
+        sensors.append(_sensor(other, rng))
+        more = _strikes(other, rng, 3)[1:]
+        all_strikes += more
+        owner += [1] * len(more)
+        split += ["transfer"] * len(more)
+    carried = tuple(e for e in effects if e.belongs in CARRIED)
+    clean = [_strike_sound(scene, bodies[o], s, sensors[o], effects if o == 0 else carried, i) for i, (s, o) in enumerate(zip(all_strikes, owner, strict=True))]
+    loudest = max(float(np.abs(x).max()) for x in clean)
+    too_loud = min(1.0, 0.95 / loudest)
+    sd = PEAK * 10 ** (plan.noise_db / 20)
+    heard = [too_loud * x + physics.noise(rng, n, sd, plan.colour) for x in clean]
+    for e in effects:
+        if e.last is not None:
+            heard = [e.last(x) for x in heard]
+    distance = _distances(dry, heard[5:8], scene.gain, sd, plan.colour, rng)
+    files = [f"strike-{i + 1:02d}.flac" for i in range(len(heard))]
+    where = folder / plan.name
+    where.mkdir(parents=True, exist_ok=True)
+    ringing = physics.ring(_paired(body, effects), _damping(body, material, effects), strikes[0], sensor)
+    truth = {
+        "effects": [{"id": e.id, "strength": s, **e.truth} for e, (_, s) in zip(effects, plan.effects, strict=True)],
+        "alpha": material.alpha,
+        "beta": material.beta,
+        "sigma": scene.gain * too_loud,
+        "modes_hz": np.round(np.abs(ringing.pole.imag) / (2 * np.pi), 3).tolist(),
+        "decay_per_s": np.round(-ringing.pole.real, 4).tolist(),
+        "youngs_modulus": material.youngs_pa,
+        "density": material.density,
+        "poisson_ratio": material.poisson,
+        "noise_sd": sd,
+        "distance_db": distance,
+        "plan": {"recipe": plan.recipe, "seed": plan.seed, "form": plan.form, "fineness": plan.fineness, "noise_db": plan.noise_db, "colour": plan.colour},
+    }
+    if plan.form == "features":
+        entries = _measured(ringing, recipe.name, rng)
+    else:
+        for name, x in zip(files, heard, strict=True):
+            _write(where / name, x, plan.rate)
+        entries = [_entry(f, bodies[o], s, p) for f, o, s, p in zip(files, owner, all_strikes, split, strict=True)]
+    if plan.form != "no-mesh":
+        for b in bodies:
+            objects.write_obj(where / f"{b.name}.obj", b)
+    (where / "truth.json").write_text(json.dumps(truth, indent=1, default=float))
+    partial = where / "case.json.partial"
+    partial.write_text(json.dumps(_declared(plan, bodies, recipe, sensors, entries), indent=1, default=float))
+    os.replace(partial, where / "case.json")
+    return truth
+
+
+def _as_it_is(guess: Material, rng: np.random.Generator) -> Material:
+    """What the object is made of, where ``guess`` is what it is taken for."""
+    ratio, both = rng.uniform(-0.18, 0.18), rng.uniform(-0.1, 0.1)
+    young, density = guess.youngs_pa * np.exp(both + ratio / 2), guess.density * np.exp(both - ratio / 2)
+    nu = round(guess.poisson + float(rng.choice(NU_OFF)), 4)
+    return Material(guess.name, young, density, nu, guess.alpha * np.exp(rng.uniform(-0.5, 0.5)), guess.beta * np.exp(rng.uniform(-0.5, 0.5)))
+
+
+def _sensor(body: Body, rng: np.random.Generator) -> tuple[int, np.ndarray]:
+    """Of forty vertices the one where the weaker modes move best, and the normal there."""
+    tries = rng.choice(np.flatnonzero(np.isfinite(body.normal[:, 0])), 40, replace=False)
+    seen = np.abs(np.einsum("kx,kxm->km", body.normal[tries], body.modes.shape[tries]))
+    best = tries[np.argmax(np.log(seen + 1e-9).mean(axis=1))]
+    return int(best), body.normal[best]
+
+
+def _strikes(body: Body, rng: np.random.Generator, count: int) -> tuple[Strike, ...]:
+    """Blows along the inward normal, tilted by a few degrees in half the cases, at other vertices each."""
+    vertices = rng.choice(np.flatnonzero(np.isfinite(body.normal[:, 0])), count, replace=False)
+    tilt = 0.1 * (rng.random() < 0.5)
+    out = []
+    for v, step in zip(vertices, STEPS[:count], strict=True):
+        way = -body.normal[v] + tilt * rng.standard_normal(3)
+        way = np.round(way / np.linalg.norm(way), 6)
+        out.append(Strike(int(v), (float(way[0]), float(way[1]), float(way[2])), round(float(step * np.exp(rng.uniform(-0.15, 0.15))), 6)))
+    return tuple(out)
+
+
+def _other(recipe: Recipe, material: Material, effects: tuple[Effect, ...], rng: np.random.Generator, plan: Plan, cache: Path) -> Body:
+    """Another body of the same material: another recipe, or a scaled copy. Effects of the material act on it too."""
+    second = RECIPES[recipe.other] if recipe.other else recipe
+    scale = 1.0 if recipe.other else float(rng.choice([0.75, 1.3]))
+    made = next((e.modes(second, material.poisson, cache) for e in effects if e.modes and e.belongs in CARRIED), None)
+    unit = made or objects.solved(second, material.poisson, cache, fineness=plan.fineness)
+    name = second.name if recipe.other else f"{recipe.name}_x{scale:g}"
+    return objects.body(name, objects.as_made(unit, material, scale))
+
+
+def _paired(body: Body, effects: tuple[Effect, ...]) -> Body:
+    modes = body.modes
+    for e in effects:
+        if e.pairs:
+            modes = e.pairs(modes)
+    return replace(body, modes=modes)
+
+
+def _damping(body: Body, material: Material, effects: tuple[Effect, ...]) -> np.ndarray:
+    modes = _paired(body, effects).modes
+    damping = physics.rayleigh(modes.value, material)
+    for e in sorted(effects, key=lambda e: e.id != "damping-law"):
+        if e.damping:
+            damping = e.damping(modes, damping)
+    return damping
+
+
+def _strike_sound(scene: Scene, body: Body, strike: Strike, sensor: tuple[int, np.ndarray], effects: tuple[Effect, ...], which: int) -> np.ndarray:
+    """What is recorded of one blow, without noise."""
+    ringing = physics.ring(_paired(body, effects), _damping(body, scene.material, effects), strike, sensor)
+    run = next((e.ring for e in effects if e.ring), None)
+    x = run(ringing, strike.impulse, scene.n, scene.rate) if run else physics.sounded(ringing, scene.n, scene.rate)
+    x = scene.gain * strike.impulse * x
+    for e in effects:
+        if e.pulse:
+            x = np.convolve(x, e.pulse(strike.impulse, scene.rate))[: scene.n]
+    order = ("object", "fixture", "striker", "room", "chain")
+    for e in sorted((e for e in effects if e.sound), key=lambda e: order.index(e.belongs)):
+        assert e.sound
+        x = e.sound(x, strike.impulse, scene.rate, which)
+    return np.asarray(x)
+
+
+def _distances(dry: list[np.ndarray], heard: list[np.ndarray], gain: float, sd: float, colour: str, rng: np.random.Generator) -> dict[str, float]:
+    """How far the effects move the holdout strikes from the plain body's (nothing fitted), and two takes of a plain strike from each other."""
+    plain = [[gain * x + physics.noise(rng, len(x), sd, colour) for x in dry[5:8]] for _ in range(2)]
+    pairs = zip(plain[0], plain[1], heard, strict=True)
+    both = [(physics.spectral_distance_db(a, h, sd), physics.spectral_distance_db(a, b, sd)) for a, b, h in pairs]
+    return {"effect": round(float(np.mean([a for a, _ in both])), 3), "floor": round(float(np.mean([b for _, b in both])), 3)}
+
+
+def _measured(ringing: physics.Ring, name: str, rng: np.random.Generator) -> list[dict[str, Any]]:
+    """Lines in place of audio: frequencies to 10⁻⁵, every second one for the fit."""
+    freq = np.sort(np.abs(ringing.pole.imag) / (2 * np.pi)) * (1 + 1e-5 * rng.standard_normal(len(ringing.pole)))
+    halves = (("fit", freq[::2]), ("holdout", freq[1::2]))
+    return [{"object": name, "split": split, "features": [{"freq_hz": round(float(f), 4)} for f in part]} for split, part in halves]
+
+
+def _entry(file: str, body: Body, strike: Strike, split: str) -> dict[str, Any]:
+    where = np.round(body.modes.vertex_m[strike.vertex], 6).tolist()
+    return {"file": file, "object": body.name, "split": split, "strike": {"position": where, "direction": list(strike.direction), "impulse": strike.impulse}}
+
+
+def _declared(plan: Plan, bodies: list[Body], recipe: Recipe, sensors: list[tuple[int, np.ndarray]], entries: list[dict[str, Any]]) -> dict[str, Any]:
+    guess = MATERIALS[recipe.material]
+    elastic = {"youngs_modulus": guess.youngs_pa, "density": guess.density, "poisson_ratio": guess.poisson}
+    things = {}
+    for b in bodies:
+        things[b.name] = {"mesh": f"{b.name}.obj", "units": "m", "material": guess.name, "elastic_guess": elastic}
+        if plan.form == "no-mesh":
+            del things[b.name]["mesh"]
+    return {
+        "format": "sonic-bullet-case/1",
+        "case": plan.name,
+        "objects": things,
+        "support": "free (soft foam)",
+        "sensor": {
+            "type": "near-field microphone",
+            "response": "gain * normal surface velocity at the position; gain common to the case, unknown",
+            "position": {b.name: np.round(b.modes.vertex_m[q], 6).tolist() for b, (q, _) in zip(bodies, sensors, strict=True)},
+            "direction": {b.name: np.round(way, 6).tolist() for b, (_, way) in zip(bodies, sensors, strict=True)},
+        },
+        "band_hz": [20, 20000],
+        "onset": "the impulse arrives at sample 0 of every file",
+        "recordings": entries,
+    }
+
+
+def _write(path: Path, x: np.ndarray, rate: int) -> None:
+    import soundfile
+
+    if not np.isfinite(x).all() or np.abs(x).max() >= 1:
+        raise ValueError(f"{path.name} would clip: peak {np.abs(x).max():.3f}")
+    soundfile.write(path, x, rate, subtype="PCM_24", format="FLAC")

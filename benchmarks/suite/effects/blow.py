@@ -1,0 +1,96 @@
+"""Effects of level and of the blow itself.
+
+amplitude-pitch    ω(a) = ω₀ (1 + κ a²),  a = a₀ e^{−dt}:  phase ω₀ (t + κ a₀² (1 − e^{−2dt})/2d)           [Duffing; Fletcher & Rossing, ch. 1.11]
+amplitude-damping  ȧ = −d a (1 + (a/a₁)^p):  a = a₀ e^{−dt} (1 + (a₀/a₁)^p (1 − e^{−pdt}))^{−1/p}           [Bernoulli's equation]
+contact-time       pulse of length τ = τ₀ (J/J₀)^{−1/5}: sin^{3/2} (Hertz), sin, or sin²                     [Johnson, Contact mechanics, ch. 11.4]
+rebound            the blow again after gaps that fall by r, weaker by r each
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from benchmarks.suite.effects.base import LOUD, Effect, Scene, jitter, pick
+from benchmarks.suite.physics import Ring, ring
+
+POWERS = {"half-sine": 1.0, "hertz": 1.5, "raised-cosine": 2.0}
+
+
+def _reference(rng: np.random.Generator, scene: Scene) -> tuple[float, float]:
+    """The strongest mode's level at a loud strike, and the power of ω by which levels are weighed: displacement (0) or velocity (1)."""
+    power = float(rng.integers(2))
+    damping = np.diag(0 * scene.body.modes.value + 1.0)
+    rings = [ring(scene.body, damping, s, scene.sensor) for s in scene.strikes]
+    return max(float((LOUD * r.level * np.abs(r.pole.imag) ** power).max()) for r in rings), power
+
+
+def _summed(r: Ring, envelope: np.ndarray, phase: np.ndarray) -> np.ndarray:
+    return np.asarray((r.residue * envelope * np.exp(1j * phase)).real.sum(axis=1))
+
+
+def amplitude_pitch(strength: int, rng: np.random.Generator, scene: Scene) -> Effect:
+    """A relative shift κ of 0.3, 1 or 3 % of the strongest mode of the loudest strikes, up (stiffening) or, once in four, down."""
+    top, power = _reference(rng, scene)
+    kappa = jitter(rng, pick(strength, 0.003, 0.01, 0.03)) * (1 if rng.random() < 0.75 else -1)
+
+    def run(r: Ring, impulse: float, n: int, rate: float) -> np.ndarray:
+        a = impulse * r.level * np.abs(r.pole.imag) ** power / top
+        t = np.arange(n)[:, None] / rate
+        d, omega = -r.pole.real, r.pole.imag
+        return _summed(r, np.exp(-d * t), omega * (t + kappa * a**2 * -np.expm1(-2 * d * t) / (2 * d)))
+
+    truth = {"kappa": kappa, "level": top, "of": "velocity" if power else "displacement"}
+    return Effect("amplitude-pitch", "object", truth, ring=run)
+
+
+def amplitude_damping(strength: int, rng: np.random.Generator, scene: Scene) -> Effect:
+    """The loudest modes lose 1.5, 4 or 12 times more than late ones."""
+    top, power = _reference(rng, scene)
+    p = float(rng.choice([1.0, 2.0]))
+    more = jitter(rng, pick(strength, 1.5, 4, 12))
+
+    def run(r: Ring, impulse: float, n: int, rate: float) -> np.ndarray:
+        a = impulse * r.level * np.abs(r.pole.imag) ** power / top
+        t = np.arange(n)[:, None] / rate
+        d, omega = -r.pole.real, r.pole.imag
+        envelope = np.exp(-d * t) * (1 + more * a**p * -np.expm1(-p * d * t)) ** (-1 / p)
+        return _summed(r, envelope, omega * t)
+
+    truth = {"more": more, "power": p, "level": top, "of": "velocity" if power else "displacement"}
+    return Effect("amplitude-damping", "object", truth, ring=run)
+
+
+def pulse(tau_s: float, rate: float, power: float) -> np.ndarray:
+    """Taps of a sin^power pulse of unit area and length tau_s from sample 0, each the mean over its sample."""
+    fine = 64
+    x = (np.arange(fine * int(np.ceil(tau_s * rate) + 1)) + 0.5) / (fine * tau_s * rate)
+    shape = np.where(x < 1, np.sin(np.pi * np.minimum(x, 1)), 0).clip(0) ** power
+    return np.asarray(shape.reshape(-1, fine).sum(axis=1) / shape.sum())
+
+
+def contact_time(strength: int, rng: np.random.Generator, scene: Scene) -> Effect:
+    """τ of 60, 130 or 320 µs at 0.02 N·s."""
+    tau = jitter(rng, pick(strength, 60e-6, 130e-6, 320e-6))
+    form = str(rng.choice(list(POWERS)))
+    exponent = -0.2 if form == "hertz" or rng.random() < 0.5 else 0.0
+    taps = lambda impulse, rate: pulse(tau * (impulse / 0.02) ** exponent, rate, POWERS[form])  # noqa: E731
+    return Effect("contact-time", "striker", {"tau": tau, "J0": 0.02, "form": form, "exponent": exponent}, pulse=taps)
+
+
+def rebound(strength: int, rng: np.random.Generator, scene: Scene) -> Effect:
+    """Two to five blows, restitution 0.25, 0.45 or 0.7, first gap 4-25 ms, longer for louder strikes in half the cases."""
+    r = jitter(rng, pick(strength, 0.25, 0.45, 0.7), 0.1)
+    gap = jitter(rng, 0.01, 0.9)
+    power = float(rng.choice([0.0, 1.0]))
+    hits = int(rng.integers(2, 6))
+
+    def taps(impulse: float, rate: float) -> np.ndarray:
+        first = gap * (impulse / 0.02) ** power
+        when = np.concatenate([[0], np.cumsum(first * r ** np.arange(hits - 1))]) * rate
+        out = np.zeros(int(when[-1]) + 2)
+        for k, w in enumerate(when):
+            out[int(w)] += r**k * (1 - w % 1)
+            out[int(w) + 1] += r**k * (w % 1)
+        return out
+
+    return Effect("rebound", "striker", {"restitution": r, "gap": gap, "J0": 0.02, "exponent": power, "hits": hits}, pulse=taps)
