@@ -1,0 +1,87 @@
+"""Recordings and what was found of them -> the residual: what the modes leave unsaid of the features, and what the features leave of the sound.
+
+    CaseFit -> Features and modes of each strike -> match ratios R_i -> lines √(1 - w_i²) φ_i, leftover -> Residual      [Ren, Yeh, Lin 2013, sec. 6.1]
+
+    R(φ_i, Φ̃) = Σ_j u_ij k_ij / Σ_j u_ij,   k = 1/(1 + D²),  u_ij = w_j/(D² + δ²)²                                      [eq. 23-25; matching.py]
+    w_i = min(R_i, √(Σ_j k_ij² a_j²)/a_i)
+
+D is stricter than in a search for the material, as frequencies have been corrected by then; a feature is not represented further than the modes are loud there.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sonic_bullet.errors import AudioError
+from sonic_bullet.estimator.fit import CaseFit
+from sonic_bullet.estimator.loudness import bark
+from sonic_bullet.estimator.matching import energy
+from sonic_bullet.estimator.predict import lines_sound
+from sonic_bullet.records import Array, Residual
+from sonic_bullet.residual.compute import residual_record
+from sonic_bullet.residual.transfer import Modes
+
+PER_BARK = 40.0
+PER_DURATION = 1.0
+NEAR = 0.02
+POWER = 0.3
+
+
+def match_ratios(freq_hz: Array, decay_per_s: Array, mode_hz: Array, mode_decay_per_s: Array, mode_amplitude: Array) -> tuple[Array, Array]:
+    """R (k,) of features (k,) beside modes (m,), and the amplitude √Σ k²a² (k,) that the modes have there."""
+    if not len(mode_hz) or not len(freq_hz):
+        return np.zeros(len(freq_hz)), np.zeros(len(freq_hz))
+    loud = energy(mode_decay_per_s, mode_amplitude)
+    per_s = PER_DURATION * float(np.average(mode_decay_per_s, weights=loud + 1e-300))
+    across = PER_BARK * (bark(freq_hz)[:, None] - bark(mode_hz)[None])
+    along = per_s / np.maximum(decay_per_s, 1e-3)[:, None] - per_s / np.maximum(mode_decay_per_s, 1e-3)[None]
+    apart = across**2 + along**2
+    score, near = 1 / (1 + apart), (loud**POWER) / (apart + NEAR**2) ** 2
+    ratio = (near * score).sum(axis=1) / np.maximum(near.sum(axis=1), 1e-300)
+    return ratio, np.sqrt(((score * mode_amplitude) ** 2).sum(axis=1))
+
+
+def unsaid(freq_hz: Array, decay_per_s: Array, amplitude: Array, mode_hz: Array, mode_decay_per_s: Array, mode_amplitude: Array) -> Array:
+    """Share w (s, k) of each feature's amplitude (s, k) that modes (m,) with amplitudes (s, m) represent."""
+    share = np.zeros(amplitude.shape)
+    for s in range(len(amplitude)):
+        ratio, there = match_ratios(freq_hz, decay_per_s, mode_hz, mode_decay_per_s, mode_amplitude[s])
+        share[s] = np.minimum(ratio, there / np.maximum(np.abs(amplitude[s]), 1e-300))
+    return np.clip(share, 0.0, 1.0)
+
+
+def residual_of_strikes(
+    signals: Array, left: Array, sr: int, lines: tuple[Array, Array, Array], modes: tuple[Array, Array, Array], source: str
+) -> Residual:
+    """The residual of strikes (s, n) from the onset on. lines: freq_hz, decay_per_s (k,), amplitude (s, k) of the features, without which ``left`` (s, n) remains.
+
+    modes: freq_hz, decay_per_s (m,), amplitude (s, m) of what the model plays. Raises AudioError, RecordError.
+    """
+    freq, decay, amplitude = lines
+    share = unsaid(freq, decay, amplitude, *modes)
+    loud = np.sqrt(((1 - share**2) * np.abs(amplitude) ** 2).mean(axis=0))
+    order = np.argsort(modes[0], kind="stable")
+    kept = order[np.append(True, np.diff(modes[0][order]) > 0)]
+    mean = np.sqrt((np.abs(modes[2]) ** 2).mean(axis=0))
+    return residual_record(signals, left, sr, Modes(modes[0][kept], modes[1][kept], mean[kept]), freq, decay, loud, source)
+
+
+def case_residual(found: CaseFit) -> Residual:
+    """The residual of a fitted case, of the object with the most strikes. Raises AudioError where no recording can be heard."""
+    heard = [o for o in found.objects if o.evidence.signals is not None and len(o.freq_hz)]
+    if not heard:
+        raise AudioError(f"case {found.case.name} has no recording of a body with a mesh", "a residual is what a recording has beside its modes")
+    o = max(heard, key=lambda x: len(x.evidence.recordings))
+    e = o.evidence
+    assert e.signals is not None and e.seen is not None
+    sr, n = e.sr, e.signals.shape[1]
+    left = np.stack([signal - lines_sound(e.lines, i, n, sr) for i, signal in enumerate(e.signals)])
+    heard_hz = o.freq_hz < sr / 2
+    start = np.abs(e.seen.start(o.freq_hz, o.decay_per_s))
+    measured = np.where(o.line >= 0, np.abs(e.lines.amplitude[:, o.line]), 0.0) if len(e.lines.freq_hz) else np.zeros((len(e.signals), len(o.line)))
+    told = np.abs(found.fit.sigma * o.pattern * start)
+    amplitude = np.where(np.isfinite(told), told, measured)
+    lines = e.lines.freq_hz, np.nan_to_num(e.lines.decay_per_s), np.nan_to_num(e.lines.amplitude)
+    names = ", ".join(r.file.name for r in e.recordings if r.file is not None)
+    modes = o.freq_hz[heard_hz], o.decay_per_s[heard_hz], amplitude[:, heard_hz]
+    return residual_of_strikes(e.signals, left, sr, lines, modes, f"{found.case.name}: {names}"[:400])
