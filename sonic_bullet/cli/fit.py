@@ -26,7 +26,7 @@ def run_fit(source: str, *, output: str, picture: str | None, json_to: str | Non
     for place in (output, picture, json_to if json_to != "-" else None):
         if place is not None:
             check_output(place)
-    case = _case(source, one)
+    case = as_case(source, one)
     with clean_stdout(json_to) as say:
         from sonic_bullet.estimator.fit import fit_case
         from sonic_bullet.estimator.preset import preset_of
@@ -43,7 +43,7 @@ def run_fit(source: str, *, output: str, picture: str | None, json_to: str | Non
     write_json(json_to, described(found))
 
 
-def _case(source: str, one: dict[str, Any]) -> Case:
+def as_case(source: str, one: dict[str, Any]) -> Case:
     """The case in a folder, or the one the options describe. Raises FileError."""
     path = Path(source)
     if path.is_dir() or path.name == "case.json":
@@ -88,6 +88,7 @@ def described(found: Any) -> dict[str, Any]:
         "covariance": [[float(x) if np.isfinite(x) else None for x in row] for row in fit.covariance],
         "verdict": fit.verdict,
         "metric": fit.metric if fit.metric >= 0 else None,
+        "log_spectral_db": found.log_spectral_db if found.log_spectral_db >= 0 else None,
         "modes": [
             {"freq_hz": float(f), "decay_per_s": float(d), "amplitude": float(a)} for f, d, a in zip(fit.freq_hz, fit.decay_per_s, fit.amplitude, strict=True)
         ],
@@ -117,5 +118,7 @@ def _told(found: Any) -> str:
     if len(correction):
         text.append(f"corrections of single modes' frequencies: rms {np.sqrt((correction**2).mean()):.2%}, largest {np.abs(correction).max():.2%}")
     if fit.metric >= 0:
-        text.append(f"log-spectral distance of recording and synthesis: {fit.metric:.2f} dB")
+        text.append(f"hybrid metric of recording and synthesis: {fit.metric:.3g} (0 the same, 1 and more as far as silence)")
+    if found.log_spectral_db >= 0:
+        text.append(f"log-spectral distance of recording and synthesis: {found.log_spectral_db:.2f} dB")
     return "\n".join([*text, *(f"warning: {w}" for w in found.warnings)])

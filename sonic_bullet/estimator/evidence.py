@@ -65,8 +65,13 @@ def guess_of(thing: CaseObject) -> Material:
     )
 
 
-def gather(case: Case, *, split: str = "fit", cache: Place = "default", progress: Callable[[str], None] | None = None) -> tuple[Evidence, ...]:
-    """Evidence of all objects that have strikes of ``split`` with audio or features. Raises SonicBulletError where there is none."""
+def gather(
+    case: Case, *, split: str = "fit", cache: Place = "default", clipped: bool = False, progress: Callable[[str], None] | None = None
+) -> tuple[Evidence, ...]:
+    """Evidence of all objects that have strikes of ``split`` with audio or features. clipped: let through what stands at its peak.
+
+    Raises SonicBulletError where there is none.
+    """
     say = progress or (lambda _: None)
     found: list[Evidence] = []
     for name in dict.fromkeys(r.object for r in case.recordings if r.split == split):
@@ -80,7 +85,7 @@ def gather(case: Case, *, split: str = "fit", cache: Place = "default", progress
             raise FileError(f"cannot read {gone[0]}: no such file", "a fit needs the audio of its 'fit' strikes")
         body = body_family(case, thing, guess, cache, say) if thing.mesh is not None else None
         if played:
-            found.append(_heard(case, thing, guess, played, body, tuple(f"{g} is missing" for g in gone), say))
+            found.append(_heard(case, thing, guess, played, body, tuple(f"{g} is missing" for g in gone), say, clipped))
         found += [_listed(case, thing, guess, entry, body) for entry in listed]
     if not found:
         raise FileError(f"case {case.name} has no '{split}' strike with audio or features", "mark at least one recording with split 'fit'")
@@ -98,11 +103,11 @@ def body_family(case: Case, thing: CaseObject, guess: Material, cache: Place, sa
     listed = [line.freq_hz for r in case.recordings if r.object == thing.name for line in r.lines or ()]
     if listed and not any(r.file for r in case.recordings):
         high = max(listed)
-    edge = _edge_m(shape)
+    edge = mesh_edge_m(shape)
     return family(shape, gamma_m2_s2=gamma, poisson=guess.poisson, to_hz=high * MARGIN, fixed=thing.fixed, edge_m=edge, cache=cache, progress=say)
 
 
-def _edge_m(shape: Shape) -> float | None:
+def mesh_edge_m(shape: Shape) -> float | None:
     """A finer mesh for a flat plate: with the usual one its higher modes are 1 to 2 % stiff, which γ and ν would be bent to. None: the usual one does."""
     from sonic_bullet.geometry import is_closed
     from sonic_bullet.modal.prisms import as_box
@@ -132,6 +137,7 @@ def _heard(
     body: Family | None,
     notes: tuple[str, ...],
     say: Callable[[str], None],
+    clipped: bool = False,
 ) -> Evidence:
     say(f"listening to {len(recordings)} recordings of {thing.name}")
     seen = observed(case, thing, guess, recordings, body) if body is not None else None
@@ -140,7 +146,7 @@ def _heard(
         sound, sr = read_audio(r.file or "")
         if r.channel >= len(sound):
             raise FileError(f"{r.file} has no channel {r.channel}", "name one it has")
-        sounds.append(_checked(sound[r.channel], str(r.file)))
+        sounds.append(_checked(sound[r.channel], str(r.file), clipped))
         rates.append(sr)
     if len(set(rates)) > 1:
         raise AudioError(f"recordings of {thing.name} have rates {sorted(set(rates))} Hz", "give files of one rate")
@@ -154,7 +160,7 @@ def _heard(
     return Evidence(thing, guess, recordings, lines, body, seen, signals, sr, notes)
 
 
-def _checked(sound: Array, name: str) -> Array:
+def _checked(sound: Array, name: str, clipped: bool = False) -> Array:
     """A channel that can be fitted: finite, not silent, not clipped. Raises AudioError."""
     if not np.isfinite(sound).all():
         raise AudioError(f"{name} holds NaN or infinite samples", "export it again")
@@ -162,7 +168,7 @@ def _checked(sound: Array, name: str) -> Array:
     if not peak > 1e-7:
         raise AudioError(f"{name} is silent", "leave it out")
     runs = np.convolve(np.abs(sound) >= 0.9999 * peak, np.ones(CLIPPED), "valid")
-    if len(runs) and runs.max() >= CLIPPED:
+    if not clipped and len(runs) and runs.max() >= CLIPPED:
         raise AudioError(f"{name} is clipped: {CLIPPED} samples in a row stand at its peak", "record at a lower level; a fit of it would be of the limiter")
     return sound
 

@@ -1,10 +1,12 @@
 """One recorded impact -> its damped sinusoids, each with its spread [Ren, Yeh, Lin 2013, section 4; and what has been learnt since].
 
     recording -> onset.py (which part is one impact)
-    -> noise density over frequency, from the quiet quarter of each neighbourhood of the tail's spectrum
+    -> exact.py   where there is no noise: the rank of the Hankel matrix tells all modes at once
+    -> noise.py   density over frequency, course over time
     -> subspace.py (poles, band by band)       every frequency resolution at once, where the paper goes from level to level
     -> likelihood.py (all modes jointly)       the paper's "everything found so far subtracted", to the optimum
-    -> the residual's poles are added while they are significant; what is not, goes
+    -> the residual's matched filter adds poles while they are significant; what is not, goes
+    -> onset.py   the modes, run backwards, tell the sample of the onset
     -> Features
 
 A mode is significant where its energy over the noise density exceeds what the strongest of as many noise cells as the recording holds
@@ -18,6 +20,7 @@ import numpy as np
 from sonic_bullet.errors import AudioError
 from sonic_bullet.estimator import exact, likelihood, onset, subspace
 from sonic_bullet.estimator.likelihood import Modes
+from sonic_bullet.estimator.noise import Noise, matched, measured, noise_density, white
 from sonic_bullet.estimator.values import Features
 from sonic_bullet.records import Array
 
@@ -30,8 +33,8 @@ MOST_MODES = 140
 SECONDS_MAX = 8.0
 LEAST_SAMPLES = 512
 FLOOR = 1e-12  # of the recording's rms: rounding, where there is no noise
-NESTED = (1e-5, 1e-7, 1e-9, 1e-11, 0.0)
 EXPLAINED = 0.8
+NEAR = 4.0  # decays within which one mode can do another's work
 STEADY = 0.02  # a decay of less than this over the whole recording, or within two of its spreads of none, is a tone
 
 
@@ -61,199 +64,128 @@ def extract(signal: Array, sr: int, *, onset_s: float | None = None, band_hz: tu
     clipped = onset.clipped_samples(signal)
     if clipped:
         notes.append(f"{clipped} samples are clipped: amplitudes and early decays are not to be trusted")
-    modes, density = _modes(x, sr, (low, high))
+    modes, noise = _modes(x, sr, (low, high))
     start = part.start
     if onset_s is None and len(modes.pole):
         start = onset.by_modes(signal, part.start, modes, sr, _rms(likelihood.residual(x, modes, sr)))
         x = signal[start : start + len(x)]
-        modes, density = _moved(x, sr, modes, density, (low, high), start - part.start)
-    return _features(x, sr, modes, density, (low, high), start, notes)
-
-
-def noise_density(signal: Array, *, tail: bool = False) -> Array:
-    """Rms per sample (n_f,) over frequency 0 … sr/2, as if white at that level; tail: from the last third, else from all.
-
-    The lower quartile of a neighbourhood knows nothing of the lines in it; for exponential noise power it is ln(4/3) of the mean.
-    """
-    from scipy.ndimage import percentile_filter
-
-    part = signal[-len(signal) // 3 :] if tail else signal
-    window = np.hanning(len(part)) if tail else np.ones(len(part))
-    power = np.abs(np.fft.rfft(part * window)) ** 2 / (window**2).sum()
-    power = np.concatenate([power, power[-1:]]) if len(power) < 64 else power
-    width = max(25, len(power) // 60)
-    coarse = max(1, width // 50)
-    trimmed = power[: len(power) // coarse * coarse].reshape(-1, coarse)
-    smooth = (
-        percentile_filter(trimmed.ravel(), 25, size=width, mode="nearest")
-        if coarse == 1
-        else percentile_filter(np.quantile(trimmed, 0.25, axis=1), 50, size=width // coarse, mode="nearest")
-    )
-    return np.asarray(np.sqrt(smooth / np.log(4 / 3)))
-
-
-def matched(left: Array, sr: int, density: Array, band_hz: tuple[float, float], least: float) -> Array:
-    """Poles (k,) whose matched filter on what is left (n,) answers with T > least, each the peak of its neighbourhood.
-
-    T(ω, d) = 2|Σ x e^{−(d+iω)t}|² / (σ² Σ e^{−2dt}) [Kay 1998, eq. 7.29 with an exponential envelope], d in octaves: every resolution.
-    """
-    n = len(left)
-    size = 1 << int(np.ceil(np.log2(2 * n)))
-    freq = np.arange(size // 2 + 1) * sr / size
-    sigma2 = _at(density, freq, sr) ** 2
-    time = np.arange(n) / sr
-    decay = np.geomspace(0.5 * sr / n, 0.5 * FASTEST_PER_S, 14)
-    score = np.empty((len(decay), len(freq)))
-    for i, d in enumerate(decay):
-        fade = np.exp(-d * time)
-        score[i] = 2 * np.abs(np.fft.rfft(left * fade, size)) ** 2 / (sigma2 * float(fade @ fade))
-    score[:, (freq < band_hz[0]) | (freq > band_hz[1])] = 0
-    best = score.max(axis=0)
-    peak = np.flatnonzero((best[1:-1] > least) & (best[1:-1] >= best[:-2]) & (best[1:-1] > best[2:])) + 1
-    chosen: list[complex] = []
-    for at in peak[np.argsort(-best[peak], kind="stable")]:
-        d, f = decay[int(np.argmax(score[:, at]))], freq[at]
-        if all(abs(2 * np.pi * f - p.imag) > 4 * max(d, -p.real) for p in chosen):
-            chosen.append(complex(-d, 2 * np.pi * f))
-    return np.array(chosen, complex)
-
-
-def _at(density: Array, freq_hz: Array, sr: int) -> Array:
-    return np.asarray(np.interp(freq_hz, np.linspace(0, sr / 2, len(density)), density))
-
-
-def _energies(modes: Modes, density: Array, sr: int, count: int) -> Array:
-    """T (k,): energy of each mode, given the others, over twice the noise density there [Kay 1998, eq. 7.36]."""
-    k = len(modes.pole)
-    gram = likelihood.information(modes, sr, count)[2 * k :, 2 * k :]
-    scale = 1 / np.sqrt(np.diag(gram))
-    inverse = np.linalg.pinv(gram * scale[:, None] * scale, rcond=1e-13, hermitian=True) * scale[:, None] * scale
-    pair = np.arange(k)
-    block = np.stack([np.stack([inverse[pair, pair], inverse[pair, pair + k]], -1), np.stack([inverse[pair + k, pair], inverse[pair + k, pair + k]], -1)], -2)
-    amplitude = np.stack([modes.amplitude.real, modes.amplitude.imag], -1)
-    return np.asarray((amplitude * np.linalg.solve(block, amplitude[:, :, None])[:, :, 0]).sum(-1) / _at(density, modes.pole.imag / (2 * np.pi), sr) ** 2)
-
-
-def _reach(band_hz: tuple[float, float], sr: int) -> tuple[float, float]:
-    return 2 * np.pi * 0.5 * band_hz[0], 2 * np.pi * min(1.02 * band_hz[1], 0.4999 * sr)
-
-
-def _fit(signal: Array, pole: Array, sr: int, band_hz: tuple[float, float], effort: tuple[int, float] = QUICK) -> Modes:
-    return likelihood.fitted(
-        signal, likelihood.amplitudes(signal, pole, sr), sr, band=_reach(band_hz, sr), fastest_per_s=FASTEST_PER_S, steps=effort[0], tolerance=effort[1]
-    )
-
-
-def _modes(x: Array, sr: int, band_hz: tuple[float, float]) -> tuple[Modes, Array]:
-    """The significant modes of a signal and the noise density they leave."""
-    floor = FLOOR * _rms(x)
-    without_noise = exact.modes(x, sr)
-    if without_noise is not None:
-        left = _rms(likelihood.residual(x, without_noise, sr))
-        return without_noise, np.full(2, max(left, floor))
-    least = 2 * np.log(1.5 * len(x) / FALSE_ALARMS)
-    density = np.maximum(noise_density(x, tail=True), floor)
-    candidate = subspace.poles(x, sr, density, band_hz, BAND_HZ, FASTEST_PER_S)
-    none = Modes(np.zeros(0, complex), np.zeros(0, complex))
-    if not len(candidate):
-        return none, np.maximum(noise_density(x), floor)
-    modes, density = _nested(x, sr, band_hz, candidate, least, floor)
-    for _ in range(ROUNDS):
-        more = matched(likelihood.residual(x, modes, sr), sr, density, band_hz, least)
-        if not len(more) or density.max() <= 2 * floor or len(more) + len(modes.pole) > MOST_MODES:
-            break
-        trial = _pruned(x, sr, band_hz, _fit(x, np.concatenate([modes.pole, more]), sr, band_hz), density, least)
-        if len(trial.pole) <= len(modes.pole):
-            break
-        modes, density = trial, np.maximum(noise_density(likelihood.residual(x, trial, sr)), floor)
-    modes = _pruned(x, sr, band_hz, _fit(x, modes.pole, sr, band_hz, THOROUGH), density, least)
-    return modes, np.maximum(noise_density(likelihood.residual(x, modes, sr)), floor)
-
-
-def _moved(x: Array, sr: int, modes: Modes, density: Array, band_hz: tuple[float, float], later: int) -> tuple[Modes, Array]:
-    """The same modes for a signal that starts ``later`` samples after the one they were found in."""
-    if later == 0:
-        return modes, density
-    turned = Modes(modes.pole, modes.amplitude * np.exp(modes.pole / sr * later))
-    if len(density) == 2:
-        return turned, density
-    fitted = likelihood.fitted(x, turned, sr, band=_reach(band_hz, sr), fastest_per_s=FASTEST_PER_S, steps=QUICK[0], tolerance=THOROUGH[1])
-    return fitted, density
+        modes = _moved(x, modes, noise, (low, high), start - part.start)
+    return _features(x, modes, noise, (low, high), start, notes)
 
 
 def _rms(signal: Array) -> float:
     return float(np.sqrt((signal**2).mean()))
 
 
-def _nested(x: Array, sr: int, band_hz: tuple[float, float], candidate: Array, least: float, floor: float) -> tuple[Modes, Array]:
-    """The best of nested sets of candidates, the strongest first, by Schwarz's criterion [Schwarz 1978]."""
-    start = likelihood.amplitudes(x, candidate, sr)
-    left = likelihood.residual(x, start, sr)
-    energy = _energies(start, np.full(2, max(float(np.sqrt((left**2).mean())), floor)), sr, len(x))
-    energy_true = _energies(start, np.maximum(noise_density(left), floor), sr, len(x))
-    best: tuple[float, Modes, Array] | None = None
-    last = -1
-    for ratio in NESTED:
-        keep = (energy_true > least) & (energy > ratio * energy.max())
-        if keep.sum() > MOST_MODES:
-            keep &= energy >= np.sort(energy)[-MOST_MODES]
-        if keep.sum() in (0, last):
-            continue
-        last = int(keep.sum())
-        modes = _fit(x, candidate[keep], sr, band_hz, THOROUGH)
-        left = likelihood.residual(x, modes, sr)
-        rms = max(float(np.sqrt((left**2).mean())), floor)
-        score = 2 * len(x) * np.log(rms) + 4 * last * np.log(len(x))
-        if best is None or score < best[0]:
-            best = (score, modes, np.maximum(noise_density(left), floor))
-        if rms <= 1.01 * floor:
+def _energies(modes: Modes, noise: Noise, count: int) -> Array:
+    """T (k,): energy of each mode, given the others, over twice the noise it meets [Kay 1998, eq. 7.36]."""
+    k = len(modes.pole)
+    gram = likelihood.information(modes, noise.sr, count)[2 * k :, 2 * k :]
+    scale = 1 / np.sqrt(np.diag(gram))
+    inverse = np.linalg.pinv(gram * scale[:, None] * scale, rcond=1e-13, hermitian=True) * scale[:, None] * scale
+    pair = np.arange(k)
+    block = np.stack([np.stack([inverse[pair, pair], inverse[pair, pair + k]], -1), np.stack([inverse[pair + k, pair], inverse[pair + k, pair + k]], -1)], -2)
+    amplitude = np.stack([modes.amplitude.real, modes.amplitude.imag], -1)
+    power = (amplitude * np.linalg.solve(block, amplitude[:, :, None])[:, :, 0]).sum(-1)
+    return np.asarray(power / noise.rms(modes.pole.imag / (2 * np.pi), -modes.pole.real) ** 2)
+
+
+def _reach(band_hz: tuple[float, float], sr: int) -> tuple[float, float]:
+    return 2 * np.pi * 0.5 * band_hz[0], 2 * np.pi * min(1.02 * band_hz[1], 0.4999 * sr)
+
+
+def _fit(signal: Array, start: Modes, sr: int, band_hz: tuple[float, float], effort: tuple[int, float] = QUICK) -> Modes:
+    return likelihood.fitted(signal, start, sr, band=_reach(band_hz, sr), fastest_per_s=FASTEST_PER_S, steps=effort[0], tolerance=effort[1])
+
+
+def _modes(x: Array, sr: int, band_hz: tuple[float, float]) -> tuple[Modes, Noise]:
+    """The significant modes of a signal and the noise they leave."""
+    floor = FLOOR * _rms(x)
+    without_noise = exact.modes(x, sr)
+    if without_noise is not None:
+        return without_noise, white(max(_rms(likelihood.residual(x, without_noise, sr)), floor), sr)
+    least = 2 * np.log(1.5 * len(x) / FALSE_ALARMS)
+    modes, noise = _first(x, sr, band_hz, least, floor)
+    for _ in range(ROUNDS):
+        more = matched(likelihood.residual(x, modes, sr), noise, band_hz, least, FASTEST_PER_S)[: MOST_MODES - len(modes.pole)]
+        if not len(more):
             break
-    if best is None:
-        return Modes(np.zeros(0, complex), np.zeros(0, complex)), np.maximum(noise_density(x), floor)
-    return best[1], best[2]
+        trial = _pruned(x, band_hz, _fit(x, likelihood.amplitudes(x, np.concatenate([modes.pole, more]), sr), sr, band_hz), noise, least)
+        if len(trial.pole) <= len(modes.pole):
+            break
+        modes, noise = trial, measured(likelihood.residual(x, trial, sr), sr, floor)
+    modes = _pruned(x, band_hz, _fit(x, modes, sr, band_hz, THOROUGH), noise, least)
+    return modes, measured(likelihood.residual(x, modes, sr), sr, floor)
 
 
-def _pruned(x: Array, sr: int, band_hz: tuple[float, float], modes: Modes, density: Array, least: float) -> Modes:
+def _first(x: Array, sr: int, band_hz: tuple[float, float], least: float, floor: float) -> tuple[Modes, Noise]:
+    """The significant ones of the bands' poles, fitted; the strongest alone where there are more than can be told."""
+    pole = subspace.poles(x, sr, np.maximum(noise_density(x, tail=True), floor), band_hz, BAND_HZ, FASTEST_PER_S)
+    if len(pole) > 2 * MOST_MODES:
+        pole = pole[np.argsort(-likelihood.alone(x, pole, sr), kind="stable")[: 2 * MOST_MODES]]
+    start = likelihood.amplitudes(x, pole, sr)
+    noise = measured(likelihood.residual(x, start, sr), sr, floor)
+    if not len(pole):
+        return start, noise
+    energy = _energies(start, noise, len(x))
+    kept = np.argsort(-energy, kind="stable")[:MOST_MODES]
+    kept = kept[energy[kept] > least]
+    modes = _fit(x, likelihood.amplitudes(x, pole[kept], sr), sr, band_hz)
+    noise = measured(likelihood.residual(x, modes, sr), sr, floor)
+    return _pruned(x, band_hz, modes, noise, least), noise
+
+
+def _pruned(x: Array, band_hz: tuple[float, float], modes: Modes, noise: Noise, least: float) -> Modes:
     """Without the modes that are not significant, the weakest first, the rest fitted again."""
     while len(modes.pole):
-        weak = _energies(modes, density, sr, len(x)) <= least
-        weak |= (modes.pole.real <= -0.999 * FASTEST_PER_S) | (modes.pole.imag < 2 * np.pi * band_hz[0]) | (modes.pole.imag > 2 * np.pi * band_hz[1])
-        if not weak.any():
+        energy = _energies(modes, noise, len(x))
+        energy[(modes.pole.real <= -0.999 * FASTEST_PER_S) | (modes.pole.imag < 2 * np.pi * band_hz[0]) | (modes.pole.imag > 2 * np.pi * band_hz[1])] = 0
+        weak = np.flatnonzero(energy <= least)
+        if not len(weak):
             break
-        modes = _fit(x, modes.pole[~weak], sr, band_hz)
+        far, fade = np.abs(modes.pole.imag[weak, None] - modes.pole.imag[weak]), -modes.pole.real[weak]
+        rival = (far < NEAR * np.maximum(fade[:, None], fade)) & (energy[weak] < energy[weak, None])  # two that share one line: one may stay
+        keep = np.setdiff1d(np.arange(len(energy)), weak[~rival.any(axis=1)])
+        modes = _fit(x, likelihood.amplitudes(x, modes.pole[keep], noise.sr), noise.sr, band_hz)
     return modes
 
 
-def _features(x: Array, sr: int, modes: Modes, density: Array, band_hz: tuple[float, float], start: int, notes: list[str]) -> Features:
-    k = len(modes.pole)
+def _moved(x: Array, modes: Modes, noise: Noise, band_hz: tuple[float, float], later: int) -> Modes:
+    """The same modes for a signal that starts ``later`` samples after the one they were found in."""
+    if later == 0:
+        return modes
+    turned = Modes(modes.pole, modes.amplitude * np.exp(modes.pole / noise.sr * later))
+    return turned if len(noise.density) == 2 else _fit(x, turned, noise.sr, band_hz, (QUICK[0], THOROUGH[1]))
+
+
+def _features(x: Array, modes: Modes, noise: Noise, band_hz: tuple[float, float], start: int, notes: list[str]) -> Features:
+    k, sr = len(modes.pole), noise.sr
     left = likelihood.residual(x, modes, sr)
-    energy = float(x @ x)
-    explained = 1 - float(left @ left) / energy
+    explained = 1 - float(left @ left) / float(x @ x)
     freq, decay = modes.pole.imag / (2 * np.pi), -modes.pole.real
-    here = _at(density, freq, sr) if k else np.zeros(0)
-    sd = likelihood.spreads(modes, sr, len(x)) * here if k else np.zeros((4, 0))
-    tone = (decay * len(x) / sr < STEADY) | (decay < 2 * sd[1])
-    if tone.any():
-        shown = ", ".join(f"{f:.1f}" for f in np.sort(freq[tone])[:8])
-        notes.append(f"{int(tone.sum())} lines do not decay and are left out: {shown} Hz")
+    sd = likelihood.spreads(modes, sr, len(x)) * noise.rms(freq, decay) if k else np.zeros((4, 0))
+    tone, vague = decay * len(x) / sr < STEADY, decay < 2 * sd[1]
+    for which, said in ((tone, "do not decay"), (vague & ~tone, "have no decay that can be told")):
+        if which.any():
+            shown = ", ".join(f"{f:.1f}" for f in np.sort(freq[which])[:8])
+            notes.append(f"{int(which.sum())} lines {said} and are left out: {shown} Hz")
     if explained < EXPLAINED:
         notes.append(f"not an impact, or not modal: damped sinusoids explain {100 * explained:.0f} % of the energy")
-    amplitude = np.abs(modes.amplitude)
-    keep = np.flatnonzero(~tone & (freq >= band_hz[0]) & (freq <= band_hz[1]))
+    amplitude, turn = np.abs(modes.amplitude), np.angle(modes.amplitude)
+    keep = np.flatnonzero(~(tone | vague) & (freq >= band_hz[0]) & (freq <= band_hz[1]))
     keep = keep[np.argsort(-amplitude[keep], kind="stable")]
     if not len(keep):
         notes.append("no mode stands above the noise")
-    noise = float(np.sqrt((left**2).mean()))
     return Features(
         freq_hz=freq[keep],
         decay_per_s=decay[keep],
         amplitude=amplitude[keep],
-        phase_rad=np.angle(modes.amplitude[keep]) + np.pi / 2,  # Re A e^{iωt} = |A| sin(ωt + arg A + π/2)
+        phase_rad=turn[keep] + np.pi / 2,  # Re A e^{iωt} = |A| sin(ωt + arg A + π/2)
         freq_sd_hz=sd[0, keep] / (2 * np.pi),
         decay_sd_per_s=sd[1, keep],
-        amplitude_sd=np.hypot(sd[2, keep] * np.cos(np.angle(modes.amplitude[keep])), sd[3, keep] * np.sin(np.angle(modes.amplitude[keep]))),
+        amplitude_sd=np.hypot(sd[2, keep] * np.cos(turn[keep]), sd[3, keep] * np.sin(turn[keep])),
         onset_s=start / sr,
-        noise_dbfs=20 * np.log10(max(noise, 1e-15)),
+        noise_dbfs=20 * np.log10(max(_rms(left), 1e-15)),
         sr=sr,
         note="; ".join(notes),
     )

@@ -96,8 +96,8 @@ def residual(signal: Array, modes: Modes, sr: int) -> Array:
     return np.asarray(_subtracted(signal, modes.pole / sr, modes.amplitude))
 
 
-def amplitudes(signal: Array, pole: Array, sr: int) -> Modes:
-    """Least-squares amplitudes of given poles, refined until the residual no longer sees them."""
+def amplitudes(signal: Array, pole: Array, sr: int, *, passes: int = 3) -> Modes:
+    """Least-squares amplitudes of given poles, refined ``passes`` times on what they leave."""
     modes = Modes(pole, np.zeros(len(pole), complex))
     k = len(pole)
     if not k:
@@ -105,11 +105,18 @@ def amplitudes(signal: Array, pole: Array, sr: int) -> Modes:
     matrix = information(modes, sr, len(signal))[2 * k :, 2 * k :]
     scale = 1 / np.sqrt(np.diag(matrix))
     matrix = matrix * scale[:, None] * scale + 1e-13 * np.eye(2 * k)
-    for _ in range(3):
+    for _ in range(passes):
         first, _ = _moments(residual(signal, modes, sr), pole / sr)
         step = scale * np.linalg.solve(matrix, scale * np.concatenate([first.real, -first.imag]))
         modes = Modes(pole, modes.amplitude + step[:k] + 1j * step[k:])
     return modes
+
+
+def alone(signal: Array, pole: Array, sr: int) -> Array:
+    """Energy (k,) that each pole would take from a signal (n,) by itself, others left out of account."""
+    first, _ = _moments(signal, pole / sr)
+    power = np.expm1(2 * pole.real / sr * len(signal)) / np.expm1(2 * pole.real / sr)
+    return np.asarray(2 * np.abs(first) ** 2 / power)
 
 
 def fitted(signal: Array, start: Modes, sr: int, *, band: tuple[float, float], fastest_per_s: float, steps: int = STEPS_MOST, tolerance: float = 1e-4) -> Modes:
@@ -133,7 +140,7 @@ def fitted(signal: Array, start: Modes, sr: int, *, band: tuple[float, float], f
             pole = np.clip(modes.pole.real - fade, -fastest_per_s, -1e-3) + 1j * np.clip(modes.pole.imag + turn, *band)
             whole = np.array_equal(fade, step[k : 2 * k]) and np.array_equal(turn, step[:k])
             moved = Modes(pole, modes.amplitude + step[2 * k : 3 * k] + 1j * step[3 * k :])
-            trial = moved if whole else amplitudes(signal, pole, sr)
+            trial = moved if whole else amplitudes(signal, pole, sr, passes=1)
             rest = residual(signal, trial, sr)
             found = float(rest @ rest)
             if found < cost:

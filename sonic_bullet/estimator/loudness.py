@@ -17,7 +17,8 @@ import numpy as np
 
 from sonic_bullet.records import Array
 
-# ISO 226:2003, table 1: f in Hz, α, L_U in dB, T in dB; the last two rows are ISO 389-7's
+# ISO 226:2003, table 1: f in Hz, α, L_U in dB, T in dB; the last two rows are ISO 389-7's. The standard is not free: all rows agree, digit by digit,
+# with public implementations that hold a copy (Tackett 2005, iso226.m; Callegari 2013, PyDSM; openMHA's MHAUtils::spl2hl for 14 and 16 kHz).
 _TABLE = np.array(
     [
         (20, 0.532, -31.6, 78.5),

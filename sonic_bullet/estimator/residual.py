@@ -50,9 +50,7 @@ def unsaid(freq_hz: Array, decay_per_s: Array, amplitude: Array, mode_hz: Array,
     return np.clip(share, 0.0, 1.0)
 
 
-def residual_of_strikes(
-    signals: Array, left: Array, sr: int, lines: tuple[Array, Array, Array], modes: tuple[Array, Array, Array], source: str
-) -> Residual:
+def residual_of_strikes(signals: Array, left: Array, sr: int, lines: tuple[Array, Array, Array], modes: tuple[Array, Array, Array], source: str) -> Residual:
     """The residual of strikes (s, n) from the onset on. lines: freq_hz, decay_per_s (k,), amplitude (s, k) of the features, without which ``left`` (s, n) remains.
 
     modes: freq_hz, decay_per_s (m,), amplitude (s, m) of what the model plays. Raises AudioError, RecordError.

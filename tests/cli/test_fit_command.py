@@ -18,7 +18,7 @@ from sonic_bullet.cli import main
 from sonic_bullet.presets import load_material, read_preset
 from sonic_bullet.records import Material
 
-KEYS = {"alpha_per_s", "beta_s", "gamma_m2_s2", "sigma", "poisson_ratio", "covariance", "verdict", "metric", "modes"}
+KEYS = {"alpha_per_s", "beta_s", "gamma_m2_s2", "sigma", "poisson_ratio", "covariance", "verdict", "metric", "log_spectral_db", "modes"}
 BRASS = Material.isotropic("made", youngs_pa=1.0e11, poisson=0.36, density_kg_m3=8400, alpha_per_s=8.0, beta_s=4e-8)
 
 
@@ -40,6 +40,8 @@ def test_case_to_preset_json_and_picture(folder: Path, tmp_path: Path, capfd: py
     told: dict[str, Any] = json.loads(capfd.readouterr().out)
     assert set(told) == KEYS
     assert told["verdict"] == "fitted"
+    assert 0 <= told["metric"] < 1e-3  # Π at the truth, but for noise
+    assert 0 < told["log_spectral_db"] < 3
     assert told["alpha_per_s"] == pytest.approx(8.0, rel=5e-3)
     assert np.array(told["covariance"], float).shape == (5, 5)
     assert set(told["modes"][0]) == {"freq_hz", "decay_per_s", "amplitude"}
