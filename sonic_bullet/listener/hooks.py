@@ -58,12 +58,16 @@ def install(world: Watcher, before: Callable[[], object], after: Callable[[], ob
 
         return forwarded
 
+    listening = True  # a later hook may call ours after we are gone
+
     step, remove, reset, restore, change = (original(name) for name in ("stepSimulation", "removeBody", "resetSimulation", "restoreState", "changeDynamics"))
 
     def stepped(*args: Any, **kwargs: Any) -> Any:
-        before()
+        if listening:
+            before()
         result = step(*args, **kwargs)
-        after()
+        if listening:
+            after()
         return result
 
     def removed(*args: Any, **kwargs: Any) -> Any:
@@ -107,6 +111,8 @@ def install(world: Watcher, before: Callable[[], object], after: Callable[[], ob
     vars(client).update(ours)
 
     def uninstall() -> None:
+        nonlocal listening
+        listening = False
         for name, function in ours.items():
             if vars(client).get(name) is function:
                 del vars(client)[name]
