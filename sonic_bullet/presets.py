@@ -115,14 +115,20 @@ def load_material(name: str | os.PathLike[str]) -> Material:
     Raises MaterialError: unknown name (listing the near ones), unreadable file, a wrong field (named), unphysical numbers.
     """
     text = os.fspath(name)
-    if not text.endswith(".json") and os.sep not in text:
-        known = material_names()
-        if text.lower() in known:
-            return material_of(read_preset(FOLDER / f"{text.lower()}.json"))
-        near = difflib.get_close_matches(text.lower(), known, n=3, cutoff=0.5)
-        remedy = f"did you mean {' or '.join(near)}?" if near else f"one of {', '.join(known)}, or the path of a preset file"
-        raise MaterialError(f"there is no material '{text}'", f"{remedy}; 'sonic-bullet materials' lists all")
-    return material_of(read_preset(name), text)
+    return material_of(named_preset(name), text if text.endswith(".json") or os.sep in text else "")
+
+
+def named_preset(name: str | os.PathLike[str]) -> Preset:
+    """The preset of that name, or of a file where ``name`` is a path or ends in .json. Raises MaterialError as `load_material` does."""
+    text = os.fspath(name)
+    if text.endswith(".json") or os.sep in text:
+        return read_preset(name)
+    known = material_names()
+    if text.lower() in known:
+        return read_preset(FOLDER / f"{text.lower()}.json")
+    near = difflib.get_close_matches(text.lower(), known, n=3, cutoff=0.5)
+    remedy = f"did you mean {' or '.join(near)}?" if near else f"one of {', '.join(known)}, or the path of a preset file"
+    raise MaterialError(f"there is no material '{text}'", f"{remedy}; 'sonic-bullet materials' lists all")
 
 
 def list_materials() -> tuple[Material, ...]:

@@ -15,7 +15,7 @@ class Residual:
 
     mode_* (m,), ascending: the source's modes, amplitudes at the onset, mean square over the strikes. line_* (l,): what features add that modes do not.
     freq_hz (b,), time_s (n,) ascending from the onset on: centres of the cells of power_per_hz (b, n), noise power per Hz (two-sided), bilinear between them.
-    clip_energy: of the recordings, in amplitude² · s: what is left cannot be louder. source: what it was taken from. No unit but Hz and s is left in it.
+    clip_energy: of the recordings, in amplitude² · s: what is left cannot be twice as much. source: what it was taken from. No unit but Hz and s is left in it.
     """
 
     mode_freq_hz: Array
@@ -45,10 +45,15 @@ class Residual:
         low = min(float(getattr(self, name).min(initial=0.0)) for name in shapes)
         require(low >= 0 and bool((self.mode_freq_hz > 0).all() and (self.line_freq_hz > 0).all()), "a residual with numbers below zero", "take it anew")
         require(
-            self.energy <= 1.05 * self.clip_energy < np.inf,
+            self.energy <= 2 * self.clip_energy < np.inf,
             "a residual louder than the recordings it was taken from",
             "take it anew: what is left of a sound is less",
         )
+
+    @property
+    def share_of_clip(self) -> float:
+        """Energy of the residual over that of the recordings."""
+        return self.energy / self.clip_energy if self.clip_energy > 0 else 0.0
 
     @property
     def energy(self) -> float:

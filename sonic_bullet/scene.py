@@ -51,16 +51,17 @@ def render_scene(
     seed: int = 0,
     microphones: Sequence[Sequence[float]] | None = None,
     material: str | None = None,
+    residual: bool = True,
     progress: Progress | None = None,
     say: Say | None = None,
 ) -> RenderResult:
     """Run a scene for ``seconds`` of physics time and return its sound.
 
     seconds None: the scene's own SECONDS, or 4. microphones None: the scene's own, or (0, -1, 0.5). material: of the bodies of a
-    plain script. progress is told the share done, say what is being computed before the first step (modes: seconds a body). Raises SonicBulletError; where the scene broke or was interrupted under way,
+    plain script. residual: whether what materials sound beside their modes is heard. progress is told the share done, say what is being computed before the first step (modes: seconds a body). Raises SonicBulletError; where the scene broke or was interrupted under way,
     the exception carries what was rendered so far as ``partial``.
     """
-    with _stage(path, sr=sr, seed=seed, microphones=microphones, material=material) as stage:
+    with _stage(path, sr=sr, seed=seed, microphones=microphones, material=material, residual=residual) as stage:
         try:
             notes = stage.run(seconds, progress, say)
         except (SonicBulletError, KeyboardInterrupt) as error:
@@ -102,6 +103,7 @@ class _Stage:
     seed: int
     microphones: Sequence[Sequence[float]] | None
     material: str | None
+    residual: bool = True
     listener: Listener | None = None
     client: Any = None
 
@@ -125,10 +127,10 @@ class _Stage:
     def result(self, notes: tuple[str, ...]) -> RenderResult:
         listener = self.need_listener()
         log = listener.contacts
-        if listener.sr == self.sr and self.microphones is None:
+        if listener.sr == self.sr and self.microphones is None and (self.residual or not any(b.material and b.material.residual for b in log.bodies)):
             return RenderResult(listener.sound(), log, self.sr, notes)
         log = replace(log, sr=self.sr, sensors=log.sensors if self.microphones is None else as_sensors(self.microphones))
-        return RenderResult(render_log(log), log, self.sr, notes)
+        return RenderResult(render_log(log, residual=self.residual), log, self.sr, notes)
 
 
 def _stage(path: str | Path, **options: Any) -> _Stage:

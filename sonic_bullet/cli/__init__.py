@@ -46,11 +46,25 @@ Examples:
   sonic-bullet fit my_case/ -o preset.json       (several strikes, sizes, sensors: a folder with a case.json)
 The preset plays at once: listener.add(body, material="preset.json")."""
 
+RESIDUAL_EPILOG = """\b
+Examples:
+  sonic-bullet residual my_case/ -o preset.json --picture preset.png
+  sonic-bullet residual tap.wav --mesh bar.obj --strike 0.05,0,0.003 --material steel -o bar.json
+  sonic-bullet residual tap.wav --material wood -o wood.json     (no shape known: the recording's features stand in for modes)
+Hear a scene without: sonic-bullet render scene.py -o out.wav --no-residual"""
+
 FEATURES_EPILOG = """\b
 Examples:
   sonic-bullet features tap.wav
   sonic-bullet features tap.wav --json features.json --picture features.png
   sonic-bullet features tap.flac --band 200,8000 --onset 0"""
+
+DIAGNOSE_EPILOG = """\b
+Examples:
+  sonic-bullet diagnose my_case/
+  sonic-bullet diagnose my_case/ --json verdict.json --predict predicted/ --report page.html
+  sonic-bullet diagnose my_case/ -o preset.json   (what belongs to material and object sounds in every scene)
+A verdict is none, explained or unexplained."""
 
 GROUP_EPILOG = """\b
 Examples:
@@ -113,6 +127,7 @@ def cli() -> None:
 )
 @click.option("--seed", type=click.IntRange(0), help="Seed of the surfaces' roughness. [default: 0; a log's own]")
 @click.option("--material", metavar="M", help="Material of the bodies of a script that names none (a name or a preset file).")
+@click.option("--residual/--no-residual", default=True, help="What presets sound beside their modes. [default: heard]")
 def render(**options: Any) -> None:
     """Run a PyBullet scene, or replay a contact log, to a sound file."""
     from sonic_bullet.cli.scenes import run_render
@@ -175,21 +190,36 @@ def features(**options: Any) -> None:
     run_features(**options)
 
 
+def strike_options(command: Any) -> Any:
+    """The options that say how one recording was struck and heard; a case says it itself."""
+    for option in reversed(
+        (
+            click.option("--mesh", metavar="M", help="Mesh of what was struck."),
+            click.option("--strike", type=Numbers("X,Y,Z"), help="Where it was struck, in m, mesh frame."),
+            click.option("--direction", type=Numbers("X,Y,Z"), help="Direction of the impulse. [default: into the surface]"),
+            click.option(
+                "--impulse", type=click.FloatRange(0, min_open=True), metavar="J", help="Impulse in N·s; without it sigma stands for gain times impulse."
+            ),
+            click.option("--material", metavar="GUESS", help="A name ('sonic-bullet materials') or a preset file: E and density good to 30 %."),
+            click.option("--scale", type=float, metavar="S", help="Metres per mesh unit: 0.001 for a mesh in millimetres. [default: 1]"),
+            click.option(
+                "--sensor",
+                type=click.Choice(["sum", "pressure", "velocity"]),
+                help="What was recorded: plain sum of modes, a microphone, a surface. [default: pressure]",
+            ),
+            click.option("--sensor-at", type=Numbers("X,Y,Z"), help="Where the surface was heard, in m, for --sensor velocity."),
+            click.option("--onset", "onset_s", type=click.FloatRange(0), metavar="S", help="When the impulse arrives. [default: found]"),
+            click.option("--fix", "fixed", type=Numbers("X,Y,Z,R"), multiple=True, help="Clamp all within R of a point, in m, mesh frame; repeatable."),
+        )
+    ):
+        command = option(command)
+    return command
+
+
 @cli.command(epilog=FIT_EPILOG)
 @click.argument("source", metavar="RECORDING|CASE_DIR")
 @click.option("-o", "--output", required=True, metavar="PRESET.json", help="The fitted material as a preset file.")
-@click.option("--mesh", metavar="M", help="Mesh of what was struck.")
-@click.option("--strike", type=Numbers("X,Y,Z"), help="Where it was struck, in m, mesh frame.")
-@click.option("--direction", type=Numbers("X,Y,Z"), help="Direction of the impulse. [default: into the surface]")
-@click.option("--impulse", type=click.FloatRange(0, min_open=True), metavar="J", help="Impulse in N·s; without it sigma stands for gain times impulse.")
-@click.option("--material", metavar="GUESS", help="A name ('sonic-bullet materials') or a preset file: E and density good to 30 %.")
-@click.option("--scale", type=float, metavar="S", help="Metres per mesh unit: 0.001 for a mesh in millimetres. [default: 1]")
-@click.option(
-    "--sensor", type=click.Choice(["sum", "pressure", "velocity"]), help="What was recorded: plain sum of modes, a microphone, a surface. [default: pressure]"
-)
-@click.option("--sensor-at", type=Numbers("X,Y,Z"), help="Where the surface was heard, in m, for --sensor velocity.")
-@click.option("--onset", "onset_s", type=click.FloatRange(0), metavar="S", help="When the impulse arrives. [default: found]")
-@click.option("--fix", "fixed", type=Numbers("X,Y,Z,R"), multiple=True, help="Clamp all within R of a point, in m, mesh frame; repeatable.")
+@strike_options
 @click.option("--picture", metavar="NAME.png", help="Also draw recording, synthesis, features and the fitted circle.")
 @json_option
 def fit(**options: Any) -> None:
@@ -197,6 +227,33 @@ def fit(**options: Any) -> None:
     from sonic_bullet.cli.fit import run_fit
 
     run_fit(**options)
+
+
+@cli.command(epilog=RESIDUAL_EPILOG)
+@click.argument("source", metavar="RECORDING|CASE_DIR")
+@click.option("-o", "--output", required=True, metavar="PRESET.json", help="The material, fitted where there is a shape, with its residual as a preset file.")
+@strike_options
+@click.option("--picture", metavar="NAME.png", help="Also draw what was recorded, features, what is synthesised, represented, and left.")
+@json_option
+def residual(**options: Any) -> None:
+    """What the modes of recorded strikes leave unsaid, into a preset that sounds it with every contact."""
+    from sonic_bullet.cli.residual import run_residual
+
+    run_residual(**options)
+
+
+@cli.command(epilog=DIAGNOSE_EPILOG)
+@click.argument("source", metavar="CASE_DIR")
+@click.option("-o", "--output", metavar="PRESET.json", help="The fitted material, with the effects that belong to it and its object, as a preset file.")
+@json_option
+@click.option("--predict", metavar="DIR", help="Also write every strike as it is predicted, to DIR/before and DIR/after, whether its audio is there or not.")
+@click.option("--report", metavar="OUT.html", help="Also write one page that opens offline: players, spectrograms, evidence, the verdict in words.")
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of what is left out in turn, and of the null effects.")
+def diagnose(**options: Any) -> None:
+    """Say which physical effect the fitted model lacks, judged on strikes it was not fitted to."""
+    from sonic_bullet.cli.diagnose import run_diagnose
+
+    run_diagnose(**options)
 
 
 def main() -> None:

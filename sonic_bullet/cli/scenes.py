@@ -34,6 +34,7 @@ def run_render(
     microphones: tuple[tuple[float, float, float], ...],
     seed: int | None,
     material: str | None,
+    residual: bool,
 ) -> None:
     """The `render` command. Raises SonicBulletError, and KeyboardInterrupt whose text names the file with what was rendered so far."""
     rate = None if sr is None else check_sr(sr)
@@ -42,7 +43,7 @@ def run_render(
     with clean_stdout(json_to) as say:
         try:
             with progress_bar(Path(scene).name) as (progress, tell):
-                wish = _Wish(seconds, rate, microphones, seed, material, progress, tell)
+                wish = _Wish(seconds, rate, microphones, seed, material, residual, progress, tell)
                 result: RenderResult | _Replay = _replayed(scene, wish) if _is_log(scene) else _simulated(scene, wish)
         except (SonicBulletError, KeyboardInterrupt) as error:
             raise _with_partial(error, output, peak_dbfs, lufs) from error
@@ -127,6 +128,7 @@ class _Wish:
     microphones: tuple[tuple[float, float, float], ...]
     seed: int | None
     material: str | None
+    residual: bool
     progress: Callable[[float], None]
     say: Callable[[str], None]
 
@@ -136,7 +138,14 @@ def _simulated(scene: str, wish: _Wish) -> RenderResult:
         from sonic_bullet.scene import render_scene
 
     sr, places = wish.rate or DEFAULT_SR, wish.microphones or None
-    asked: dict[str, Any] = {"seconds": wish.seconds, "sr": sr, "seed": wish.seed or 0, "microphones": places, "material": wish.material}
+    asked: dict[str, Any] = {
+        "seconds": wish.seconds,
+        "sr": sr,
+        "seed": wish.seed or 0,
+        "microphones": places,
+        "material": wish.material,
+        "residual": wish.residual,
+    }
     return render_scene(scene, **asked, progress=wish.progress, say=wish.say)
 
 
@@ -166,7 +175,7 @@ def _replayed(path: str, wish: _Wish) -> _Replay:
         if seconds > log.duration_s + 1e-9:
             raise AudioError(f"{path} lasts {log.duration_s:.3f} s, shorter than {seconds} s", "give fewer seconds, or simulate the scene for longer")
         log = replace(log, steps=tuple(step for step, start in zip(log.steps, log.start_s, strict=True) if start < seconds - 1e-9))
-    samples = render_log(log, sr=wish.rate, progress=wish.progress)
+    samples = render_log(log, sr=wish.rate, residual=wish.residual, progress=wish.progress)
     return _Replay(samples, log, wish.rate or log.sr)
 
 

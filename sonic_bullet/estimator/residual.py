@@ -10,6 +10,8 @@ D is stricter than in a search for the material, as frequencies have been correc
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from sonic_bullet.errors import AudioError
@@ -18,7 +20,7 @@ from sonic_bullet.estimator.loudness import bark
 from sonic_bullet.estimator.matching import energy
 from sonic_bullet.estimator.predict import lines_sound
 from sonic_bullet.records import Array, Residual
-from sonic_bullet.residual.compute import residual_record
+from sonic_bullet.residual.compute import damped, residual_record
 from sonic_bullet.residual.transfer import Modes
 
 PER_BARK = 40.0
@@ -50,21 +52,43 @@ def unsaid(freq_hz: Array, decay_per_s: Array, amplitude: Array, mode_hz: Array,
     return np.clip(share, 0.0, 1.0)
 
 
-def residual_of_strikes(signals: Array, left: Array, sr: int, lines: tuple[Array, Array, Array], modes: tuple[Array, Array, Array], source: str) -> Residual:
+@dataclass(frozen=True, slots=True, eq=False)
+class Strikes:
+    """s strikes of one body from the onset on, and what they leave. signals, left (s, n): recorded, beside all features.
+
+    freq_hz, decay_per_s (k,), amplitude (s, k) complex: features; share (s, k): what of each the modes represent. mode_* (m,), mode_amplitude (s, m) complex.
+    """
+
+    signals: Array
+    left: Array
+    sr: int
+    freq_hz: Array
+    decay_per_s: Array
+    amplitude: Array
+    share: Array
+    mode_hz: Array
+    mode_decay_per_s: Array
+    mode_amplitude: Array
+    residual: Residual
+
+
+def strikes_of(signals: Array, left: Array, sr: int, lines: tuple[Array, Array, Array], modes: tuple[Array, Array, Array], source: str) -> Strikes:
     """The residual of strikes (s, n) from the onset on. lines: freq_hz, decay_per_s (k,), amplitude (s, k) of the features, without which ``left`` (s, n) remains.
 
-    modes: freq_hz, decay_per_s (m,), amplitude (s, m) of what the model plays. Raises AudioError, RecordError.
+    modes: freq_hz, decay_per_s (m,), amplitude (s, m) complex of what the model plays. Raises AudioError, RecordError.
     """
     freq, decay, amplitude = lines
-    share = unsaid(freq, decay, amplitude, *modes)
-    loud = np.sqrt(((1 - share**2) * np.abs(amplitude) ** 2).mean(axis=0))
     order = np.argsort(modes[0], kind="stable")
-    kept = order[np.append(True, np.diff(modes[0][order]) > 0)]
-    mean = np.sqrt((np.abs(modes[2]) ** 2).mean(axis=0))
-    return residual_record(signals, left, sr, Modes(modes[0][kept], modes[1][kept], mean[kept]), freq, decay, loud, source)
+    order = order[np.append(True, np.diff(modes[0][order]) > 0)] if len(order) else order
+    hz, mode_decay, played = modes[0][order], modes[1][order], modes[2][:, order]
+    share = unsaid(freq, decay, amplitude, hz, mode_decay, np.abs(played))
+    loud = np.sqrt(((1 - share**2) * np.abs(amplitude) ** 2).mean(axis=0))
+    mean = np.sqrt((np.abs(played) ** 2).mean(axis=0))
+    residual = residual_record(signals, left, sr, Modes(hz, mode_decay, mean), freq, decay, loud, source)
+    return Strikes(signals, left, sr, freq, decay, amplitude, share, hz, mode_decay, played, residual)
 
 
-def case_residual(found: CaseFit) -> Residual:
+def case_strikes(found: CaseFit) -> Strikes:
     """The residual of a fitted case, of the object with the most strikes. Raises AudioError where no recording can be heard."""
     heard = [o for o in found.objects if o.evidence.signals is not None and len(o.freq_hz)]
     if not heard:
@@ -74,12 +98,24 @@ def case_residual(found: CaseFit) -> Residual:
     assert e.signals is not None and e.seen is not None
     sr, n = e.sr, e.signals.shape[1]
     left = np.stack([signal - lines_sound(e.lines, i, n, sr) for i, signal in enumerate(e.signals)])
-    heard_hz = o.freq_hz < sr / 2
-    start = np.abs(e.seen.start(o.freq_hz, o.decay_per_s))
-    measured = np.where(o.line >= 0, np.abs(e.lines.amplitude[:, o.line]), 0.0) if len(e.lines.freq_hz) else np.zeros((len(e.signals), len(o.line)))
-    told = np.abs(found.fit.sigma * o.pattern * start)
+    use = o.freq_hz < sr / 2
+    measured = np.where(o.line >= 0, e.lines.amplitude[:, o.line], 0.0) if len(e.lines.freq_hz) else np.zeros((len(e.signals), len(o.line)))
+    told = found.fit.sigma * o.pattern * e.seen.start(o.freq_hz, o.decay_per_s)
     amplitude = np.where(np.isfinite(told), told, measured)
     lines = e.lines.freq_hz, np.nan_to_num(e.lines.decay_per_s), np.nan_to_num(e.lines.amplitude)
     names = ", ".join(r.file.name for r in e.recordings if r.file is not None)
-    modes = o.freq_hz[heard_hz], o.decay_per_s[heard_hz], amplitude[:, heard_hz]
-    return residual_of_strikes(e.signals, left, sr, lines, modes, f"{found.case.name}: {names}"[:400])
+    return strikes_of(e.signals, left, sr, lines, (o.freq_hz[use], o.decay_per_s[use], amplitude[:, use]), f"{found.case.name}: {names}"[:400])
+
+
+def recording_strikes(sample: Array, sr: int, onset_s: float | None, name: str) -> Strikes:
+    """The residual of one recording (n,) whose shape is not known: its features stand in for modes. Raises AudioError."""
+    from sonic_bullet.estimator.features import extract
+
+    found = extract(sample, sr, onset_s=onset_s)
+    if not len(found.freq_hz):
+        raise AudioError(f"{name} has no damped sinusoid above its noise", "record a louder strike, nearer, in a quieter place")
+    signal = np.asarray(sample, float)[round(found.onset_s * sr) :]
+    amplitude = found.amplitude * np.exp(1j * (found.phase_rad - np.pi / 2))  # a sin(ωt + φ) = Re a e^{i(φ - π/2)} e^{iωt}
+    heard = damped(found.freq_hz, found.decay_per_s, amplitude, len(signal), sr)
+    modes = found.freq_hz, found.decay_per_s, amplitude[None]
+    return strikes_of(signal[None], (signal - heard)[None], sr, modes, modes, name)

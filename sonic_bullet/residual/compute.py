@@ -108,5 +108,5 @@ def residual_record(
     clip = max(clip, float(energy[order].sum()))  # lines that outlast the clip
     return Residual(
         modes.freq_hz, modes.decay_per_s, modes.amplitude / unit, line_freq_hz[order], line_decay_per_s[order], line_amplitude[order] / unit,
-        freq, time, per_hz / unit**2, 1.5 * clip / unit**2, source,
+        freq, time, per_hz / unit**2, clip / unit**2, source,
     )  # fmt: skip
