@@ -1,0 +1,198 @@
+"""`diagnose`: a case in, a Diagnosis out.
+
+    gather 'fit' strikes -> fit the baseline -> bodies, takes -> loop (loop.py) -> verdict, errors on all splits, predictions
+
+Nothing of 'holdout' and 'transfer' is opened before the loop has ended; where their audio is there, it is compared at the very end and changes nothing.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sonic_bullet.diagnosis.bodies import Struck, shapeless, struck_bodies
+from sonic_bullet.diagnosis.judge import Take, floor_between, least_db, mean_db
+from sonic_bullet.diagnosis.loop import Closed, closed
+from sonic_bullet.diagnosis.play import Hypothesis, play
+from sonic_bullet.diagnosis.sone import sone_distance
+from sonic_bullet.diagnosis.unexplained import remainder
+from sonic_bullet.effects import EFFECTS
+from sonic_bullet.effects.values import Effect
+from sonic_bullet.estimator.evidence import Evidence as Gathered
+from sonic_bullet.estimator.evidence import gather
+from sonic_bullet.estimator.fit import fit_evidence
+from sonic_bullet.estimator.fitted import CaseFit
+from sonic_bullet.files import read_audio
+from sonic_bullet.files.cases import Case, CaseRecording, read_case
+from sonic_bullet.modal.cache import Place
+from sonic_bullet.records import Array
+
+SPLITS = ("fit", "holdout", "transfer")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Diagnosis:
+    """What the model lacks. errors, errors_sone: {"before": {split: …}, "after": {split: …}, "floor": …}, None where there is no audio.
+
+    unexplained: what is left, in words and numbers; empty where nothing is. warnings: one line each, the fit's among them.
+    """
+
+    case: Case
+    found: CaseFit
+    bodies: tuple[Struck, ...]
+    takes: tuple[Take, ...]
+    closed: Closed
+    errors: dict[str, Any]
+    errors_sone: dict[str, Any]
+    unexplained: dict[str, Any]
+    warnings: tuple[str, ...]
+
+    @property
+    def verdict(self) -> str:
+        return self.closed.verdict
+
+
+def diagnose(
+    case: Case | str | os.PathLike[str],
+    *,
+    effects: Sequence[type[Effect]] = EFFECTS,
+    seed: int = 0,
+    cache: Place = "default",
+    progress: Callable[[str], None] | None = None,
+) -> Diagnosis:
+    """Say what the fitted model lacks, from the case's 'fit' strikes. effects: the suspects, your own beside the package's: ``EFFECTS + (Mine,)``.
+
+    Raises SonicBulletError where a file, mesh or number makes a fit impossible.
+    """
+    if not isinstance(case, Case):
+        case = read_case(case)
+    say = progress or (lambda _: None)
+    gathered = gather(case, cache=cache, progress=progress, clipped=True)
+    found = fit_evidence(case, gathered, check_mesh=False, progress=progress)
+    bodies = struck_bodies(found, cache=cache, progress=progress) if found.objects else tuple(shapeless(found, g) for g in gathered)
+    correction = {b.name: b.correction for b in bodies}
+    gain = found.fit.sigma if np.isfinite(found.fit.sigma) and found.fit.sigma > 0 else 1.0
+    base = Hypothesis(found.fit.alpha_per_s, found.fit.beta_s, gain, (), correction)
+    takes = _takes(bodies)
+    end = closed(base, bodies, takes, effects, case.band_hz, seed=seed, progress=progress)
+    say("comparing with what was not fitted")
+    every = {"fit": takes} | {split: _others(case, bodies, takes, split) for split in SPLITS[1:]}
+    errors: dict[str, Any] = {"before": {}, "after": {}, "floor": least_db(takes, end.after)}
+    sone: dict[str, Any] = {"before": {}, "after": {}, "floor": None}
+    for split, mine in every.items():
+        for name, h in (("before", end.before), ("after", end.after)):
+            errors[name][split] = mean_db(mine, h)
+            sone[name][split] = sone_distance(mine, h)
+    return Diagnosis(case, found, bodies, takes, end, errors, sone, remainder(end, takes), found.warnings)
+
+
+def _takes(bodies: tuple[Struck, ...]) -> tuple[Take, ...]:
+    takes: list[Take] = []
+    for body in bodies:
+        if body.gathered is None or body.gathered.signals is None:
+            continue
+        floor = floor_between(list(body.gathered.signals))
+        takes += [Take(body, i, sample, body.gathered.sr, floor) for i, sample in zip(fitted_strikes(body), body.gathered.signals, strict=True)]
+    return tuple(takes)
+
+
+def fitted_strikes(body: Struck) -> list[int]:
+    """Which of a body's strikes its signals belong to."""
+    heard = body.gathered.recordings if body.gathered is not None else ()
+    return [i for i, r in enumerate(body.recordings) if any(r is one or r == one for one in heard)]
+
+
+def _others(case: Case, bodies: tuple[Struck, ...], takes: tuple[Take, ...], split: str) -> tuple[Take, ...]:
+    """Strikes of another split whose audio is there."""
+    found = []
+    for body in bodies:
+        for i, r in enumerate(body.recordings):
+            if r.split != split or r.file is None or not r.file.is_file() or not takes:
+                continue
+            sample, sr = read_audio(r.file)
+            start = onset_of(case, bodies, sr)
+            found.append(Take(body, i, sample[r.channel][start:], sr, takes[0].floor))
+    return tuple(found)
+
+
+def onset_of(case: Case, bodies: tuple[Struck, ...], sr: int) -> int:
+    """The sample at which strikes arrive: as declared, or the median of where the fitted ones did."""
+    if case.onset_s is not None:
+        return round(case.onset_s * sr)
+    late = [
+        length_of(r)[0] - body.gathered.signals.shape[1]
+        for body in bodies
+        if body.gathered is not None and body.gathered.signals is not None
+        for r in body.gathered.recordings
+        if r.file
+    ]
+    return max(int(np.median(late)), 0) if late else 0
+
+
+def length_of(recording: CaseRecording) -> tuple[int, int]:
+    """Samples and rate of a recording's file."""
+    sample, sr = read_audio(recording.file or "")
+    return sample.shape[1], sr
+
+
+def predictions(d: Diagnosis) -> list[tuple[str, int, Array, Array]]:
+    """(stem, sr, before (n,), after (n,)) of every strike that has a place, of every split: as long as the fitted recordings, in their units."""
+    known = [r for b in d.bodies if b.gathered is not None for r in b.gathered.recordings if r.file is not None]
+    if not known:
+        return []
+    n, sr = length_of(known[0])
+    start = onset_of(d.case, d.bodies, sr)
+    made = []
+    for body in d.bodies:
+        for i, r in enumerate(body.recordings):
+            if r.file is None or (body.family is not None and r.position_m is None):
+                continue
+            pair = [np.concatenate([np.zeros(start), play(h, body, i, n - start, sr)]) for h in (d.closed.before, d.closed.after)]
+            made.append((Path(r.file).stem, sr, pair[0], pair[1]))
+    return made
+
+
+def gathered_of(d: Diagnosis) -> list[Gathered]:
+    """What was heard of every fitted object."""
+    return [b.gathered for b in d.bodies if b.gathered is not None]
+
+
+def described(d: Diagnosis) -> dict[str, Any]:
+    """The diagnosis as JSON holds it."""
+    from sonic_bullet.diagnosis.loop import described as tried
+
+    return {
+        "case": d.case.name,
+        "verdict": d.verdict,
+        "effects": [
+            {
+                "id": c.id,
+                "parameters": c.effect.parameters(),
+                "spread": c.spread,
+                "error_drop_db": c.mean_db,
+                "stage": c.effect.stage.value,
+                "owner": c.effect.owner.value,
+                "reference": c.effect.reference,
+            }
+            for c in d.closed.added
+        ],
+        "candidates": tried(d.closed.tried),
+        "errors": d.errors,
+        "errors_sone": d.errors_sone,
+        "unexplained": d.unexplained,
+        "baseline": {
+            "alpha_per_s": d.closed.before.alpha_per_s,
+            "beta_s": d.closed.before.beta_s,
+            "gamma_m2_s2": d.found.fit.gamma_m2_s2,
+            "poisson_ratio": d.found.fit.poisson_ratio,
+            "gain": d.closed.before.gain,
+            "correction_rms": {b.name: float(np.sqrt((b.correction**2).mean())) if len(b.correction) else 0.0 for b in d.bodies if b.gathered is not None},
+        },
+        "after": {"alpha_per_s": d.closed.after.alpha_per_s, "beta_s": d.closed.after.beta_s, "gain": d.closed.after.gain},
+        "warnings": list(d.warnings),
+    }

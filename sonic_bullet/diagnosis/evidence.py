@@ -1,0 +1,164 @@
+"""What effects are told: fitted lines beside the hypothesis' own modes, and the sounds beside what it plays.
+
+    Struck + Lines + Hypothesis -> which modes each line stands for -> Heard (effects.values), one per fitted object -> Evidence
+
+Strikes can be left out (their amplitudes and sounds), and lines: what an effect says must hold for those it was not told of.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from sonic_bullet.diagnosis.bodies import Struck
+from sonic_bullet.diagnosis.play import Hypothesis, blow_of, modes_of, pattern, play, start
+from sonic_bullet.effects.values import Evidence, Heard, Sound, Stage
+from sonic_bullet.estimator.lines import noise_rms
+from sonic_bullet.records import Array, ModalModel
+
+REACH = 0.012  # of a line from its mode where effects have moved it
+DIRECT_S = 0.008  # of the sound path: what comes later is an echo
+
+
+def evidence_of(h: Hypothesis, bodies: tuple[Struck, ...], band_hz: tuple[float, float], *, seed: int = 0) -> Evidence:
+    """All fitted objects' evidence under a hypothesis."""
+    heard = tuple(heard_of(h, body) for body in bodies if body.gathered is not None)
+    return Evidence(heard, h.alpha_per_s, h.beta_s, h.gain, tuple(e.id for e in h.effects), band_hz, seed)
+
+
+def heard_of(h: Hypothesis, body: Struck) -> Heard:
+    """One fitted object's."""
+    gathered = body.gathered
+    assert gathered is not None
+    lines, model = gathered.lines, None
+    model, order = modes_of(h, body)
+    line, mode = paired(h, body, model, order)
+    mine = [i for i, r in enumerate(body.recordings) if r.split == "fit" and (r.file is not None or r.lines)]
+    mine = mine[: len(lines.amplitude)]
+    rows = pattern(body, model)[mine]
+    push = rows * start(body.kind, model)
+    direct = path_response(h, body, model.freq_hz, gathered.sr) if gathered.signals is not None else np.ones(model.mode_count)
+    spectrum = np.stack([blow_of(h, body, i).spectrum(model.freq_hz) for i in mine]) * direct
+    expected = np.stack([(h.gain * push * spectrum)[:, m].sum(axis=1) for m in mode], axis=1) if mode else np.zeros((len(mine), 0), complex)
+    told = np.stack([rows[:, m].sum(axis=1) for m in mode], axis=1) if mode else np.zeros((len(mine), 0))
+    own = replace(h, correction=None)
+    plain, plain_order = modes_of(own, body)
+    rank = {int(k): i for i, k in enumerate(plain_order)}
+    model_hz = np.array([np.mean([plain.freq_hz[rank[int(order[k])]] if int(order[k]) in rank else model.freq_hz[k] for k in m]) for m in mode])
+    rest = np.setdiff1d(np.arange(len(lines.freq_hz)), line)
+    predicted = None
+    if gathered.signals is not None:
+        predicted = np.stack([play(h, body, i, gathered.signals.shape[1], gathered.sr) for i in mine])
+    count = body.surface_count()
+    return Heard(
+        impulse_n_s=body.impulse_n_s[mine],
+        freq_hz=lines.freq_hz[line],
+        decay_per_s=lines.decay_per_s[line],
+        freq_sd_hz=lines.freq_sd_hz[line],
+        decay_sd_per_s=lines.decay_sd_per_s[line],
+        amplitude=lines.amplitude[:, line],
+        amplitude_sd=lines.amplitude_sd[:, line],
+        mode=mode,
+        model_hz=model_hz,
+        expected_decay_per_s=np.array([model.decay_per_s[m].mean() for m in mode]),
+        expected=expected,
+        pattern=told,
+        foreign_hz=lines.freq_hz[rest],
+        foreign_decay_per_s=lines.decay_per_s[rest],
+        foreign_amplitude=lines.amplitude[:, rest],
+        foreign_sd=lines.amplitude_sd[:, rest],
+        model=model if body.family is not None else None,
+        strike_vertex=count + np.array(mine, int),
+        strike_way=body.way[mine],
+        sensor_vertex=len(model.vertex_m) - 1,
+        sensor_way=body.way[-1],
+        signal=gathered.signals,
+        predicted=predicted,
+        noise=noise_rms(gathered.signals, gathered.sr) if gathered.signals is not None else lines.noise,
+        sr=gathered.sr,
+        signed=lines.signed,
+        push=h.gain * push * spectrum,
+        all_hz=model.freq_hz,
+        strike=tuple(range(len(mine))),
+    )
+
+
+def paired(h: Hypothesis, body: Struck, model: ModalModel, order: Array) -> tuple[Array, tuple[Array, ...]]:
+    """Lines (p,) and the modes of ``model`` each stands for: as they were fitted, where no effect has moved the modes, else by nearness and pattern."""
+    moved = any(e.stage is Stage.MATERIAL or e.id in MOVES for e in h.effects)
+    place = {int(k): i for i, k in enumerate(order)}
+    if not moved:
+        line = np.unique(body.line[body.line >= 0])
+        mode = tuple(np.array(sorted(place[int(k)] for k in np.flatnonzero(body.line == one) if int(k) in place), int) for one in line)
+        good = [i for i, m in enumerate(mode) if len(m)]
+        return line[good], tuple(mode[i] for i in good)
+    return _nearest(body, model)
+
+
+MOVES = frozenset({"added-mass", "mode-splitting", "orthotropy"})
+
+
+def _nearest(body: Struck, model: ModalModel) -> tuple[Array, tuple[Array, ...]]:
+    from scipy.optimize import linear_sum_assignment
+
+    assert body.gathered is not None
+    lines = body.gathered.lines
+    if not len(lines.freq_hz):
+        return np.zeros(0, int), ()
+    gap = np.log(lines.freq_hz)[:, None] - np.log(model.freq_hz)[None, :]
+    mine = [i for i, r in enumerate(body.recordings) if r.split == "fit"][: len(lines.amplitude)]
+    told, heard = np.abs(pattern(body, model)[mine]), np.abs(lines.amplitude)
+    alike = (heard.T @ told) / np.maximum(np.linalg.norm(heard, axis=0)[:, None] * np.linalg.norm(told, axis=0)[None, :], 1e-300)
+    price = np.minimum((gap / REACH) ** 2 + 0.5 * (1 - np.nan_to_num(alike)), 1.0) - 1.0
+    row, column = linear_sum_assignment(price)
+    good = price[row, column] < 0
+    return row[good], tuple(np.array([c]) for c in column[good])
+
+
+def path_response(h: Hypothesis, body: Struck, freq_hz: Array, sr: int) -> Array:
+    """Complex response (f,) of the sound path's first milliseconds: its effects applied to a weak impulse less what they add to silence."""
+    effects = h.at(Stage.SOUND, fitted=body.gathered is not None)
+    if not effects:
+        return np.ones(len(freq_hz), complex)
+    n = round(DIRECT_S * sr)
+    weak, silent = Sound(1e-6 * np.eye(1, n)[0], sr, 1.0), Sound(np.zeros(n), sr, 1.0)
+    for effect in effects:
+        weak, silent = effect.apply(weak), effect.apply(silent)
+    tap = (weak.sample - silent.sample) / 1e-6
+    return np.asarray(np.exp(-2j * np.pi * np.outer(freq_hz, np.arange(n)) / sr) @ tap)
+
+
+def thinned(evidence: Evidence, strike: int | None, keep: float, rng: np.random.Generator) -> Evidence:
+    """The same without one strike and without a random part of the lines: ``keep`` of them stay."""
+    return replace(evidence, heard=tuple(_thin(h, strike, keep, rng) for h in evidence.heard))
+
+
+def _thin(h: Heard, strike: int | None, keep: float, rng: np.random.Generator) -> Heard:
+    s = np.array([i for i in range(len(h.impulse_n_s)) if i != strike])
+    k = np.sort(rng.permutation(len(h.freq_hz))[: max(3, round(keep * len(h.freq_hz)))]) if keep < 1 else np.arange(len(h.freq_hz))
+    k = k[k < len(h.freq_hz)]
+    return replace(
+        h,
+        impulse_n_s=h.impulse_n_s[s],
+        freq_hz=h.freq_hz[k],
+        decay_per_s=h.decay_per_s[k],
+        freq_sd_hz=h.freq_sd_hz[k],
+        decay_sd_per_s=h.decay_sd_per_s[k],
+        amplitude=h.amplitude[s][:, k],
+        amplitude_sd=h.amplitude_sd[s][:, k],
+        mode=tuple(h.mode[i] for i in k),
+        model_hz=h.model_hz[k],
+        expected_decay_per_s=h.expected_decay_per_s[k],
+        expected=h.expected[s][:, k],
+        pattern=h.pattern[s][:, k],
+        foreign_amplitude=h.foreign_amplitude[s],
+        foreign_sd=h.foreign_sd[s],
+        strike_vertex=h.strike_vertex[s],
+        strike_way=h.strike_way[s],
+        signal=h.signal[s] if h.signal is not None else None,
+        predicted=h.predicted[s] if h.predicted is not None else None,
+        push=h.push[s],
+        noise=h.noise[s] if len(h.noise) == len(h.impulse_n_s) else h.noise,
+        strike=tuple(h.strike[i] for i in s),
+    )

@@ -1,0 +1,98 @@
+"""The loop: try all suspects, add the best that earns its keep, look again; then say what is known and what is not.
+
+gap = before − floor on left-out strikes;  an effect earns its keep where its mean drop there
+  is over LEAST_DB and LEAST_SHARE of the gap, SURE standard errors above zero and above the null effect's by as much
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from sonic_bullet.diagnosis.bodies import Struck
+from sonic_bullet.diagnosis.evidence import evidence_of
+from sonic_bullet.diagnosis.judge import Take, least_db, mean_db
+from sonic_bullet.diagnosis.play import Hypothesis
+from sonic_bullet.diagnosis.refit import refitted
+from sonic_bullet.diagnosis.trial import Candidate, trials
+from sonic_bullet.effects.values import Effect
+
+ROUNDS = 4
+LEAST_DB = 0.25
+LEAST_SHARE = 0.08
+SURE = 2.0
+SUFFICES_DB = 1.5  # a gap below this is the mesh's and the shapes' own
+EXPLAINED = 0.5  # of the gap
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Closed:
+    """How the loop ended. steps: the candidate added in each round, with the mean distance before it. tried: the last look at every suspect."""
+
+    before: Hypothesis
+    after: Hypothesis
+    added: tuple[Candidate, ...]
+    tried: tuple[Candidate, ...]
+    verdict: str
+    before_db: float
+    after_db: float
+    floor_db: float
+
+
+def closed(
+    base: Hypothesis,
+    bodies: tuple[Struck, ...],
+    takes: tuple[Take, ...],
+    effects: Sequence[type[Effect]],
+    band_hz: tuple[float, float],
+    *,
+    seed: int = 0,
+    progress: Callable[[str], None] | None = None,
+) -> Closed:
+    """Run it on fitted strikes alone."""
+    say = progress or (lambda _: None)
+    h = refitted(base, bodies)
+    before = mean_db(takes, h) or 0.0
+    floor = least_db(takes, h) or 0.0
+    start, now = h, before
+    added: list[Candidate] = []
+    last: dict[str, Candidate] = {}
+    for turn in range(ROUNDS):
+        say(f"round {turn + 1}: {now:.2f} dB from the recordings, noise alone {floor:.2f} dB")
+        evidence = evidence_of(h, bodies, band_hz, seed=seed)
+        found = trials(h, bodies, takes, evidence, effects, seed=seed + turn, say=say)
+        for candidate in found:
+            last.setdefault(candidate.id, candidate)
+        best = next((c for c in found if earns(c, max(now - floor, 0.0))), None)
+        if best is None:
+            break
+        h, added = best.hypothesis, [*added, best]
+        now = mean_db(takes, h) or 0.0
+        floor = least_db(takes, h) or floor
+    gap, left = before - floor, now - floor
+    verdict = "explained" if added else "none"
+    if (not added and gap > SUFFICES_DB) or (added and left > max((1 - EXPLAINED) * gap, SUFFICES_DB)):
+        verdict = "unexplained"
+    return Closed(start, h, tuple(added), tuple(last.values()), verdict, before, now, floor)
+
+
+def earns(c: Candidate, gap_db: float) -> bool:
+    """Whether a suspect explains enough, surely enough, and more than chance."""
+    if len(c.drop_db) == 0:
+        return False
+    need = max(LEAST_DB, LEAST_SHARE * gap_db)
+    sure = c.sd_db if np.isfinite(c.sd_db) else 0.5 * abs(c.mean_db)
+    return c.mean_db > need and c.mean_db > SURE * sure and c.mean_db - max(c.null_db, 0.0) > max(SURE * sure, 0.5 * need)
+
+
+def strip(h: Hypothesis) -> Hypothesis:
+    """The same without effects."""
+    return replace(h, effects=())
+
+
+def described(candidates: Sequence[Candidate]) -> list[dict[str, Any]]:
+    """For JSON."""
+    return [{"id": c.id, "cv_error_drop_db": c.mean_db, "null_drop_db": c.null_db, "parameters": c.effect.parameters()} for c in candidates]

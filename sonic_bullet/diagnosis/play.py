@@ -1,0 +1,105 @@
+"""The model with its effects, played on any strike.
+
+    λ -> corrections -> d = ½(α + βλ) -> MODES -> A = g J (φ(p)·e)(φ(q)·n) · start -> Ring -> BANK -> hits and pulses -> SOUND -> samples
+
+Every stage hands a value to the next, and effects of a stage act in the order in which they were found.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sonic_bullet.diagnosis.bodies import Struck
+from sonic_bullet.effects.ringing import sounded
+from sonic_bullet.effects.values import CARRIES, Blow, Effect, Ring, Sound, Stage
+from sonic_bullet.records import Array, ModalModel
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Hypothesis:
+    """α, β and gain σ of the case, and the effects in it. correction: by object, (m,) relative; absent: the mesh's own frequencies."""
+
+    alpha_per_s: float
+    beta_s: float
+    gain: float
+    effects: tuple[Effect, ...] = ()
+    correction: dict[str, Array] | None = None
+
+    def at(self, stage: Stage, *, fitted: bool = True) -> tuple[Effect, ...]:
+        """The effects of a stage; on an object that was not fitted only those that carry over."""
+        return tuple(e for e in self.effects if e.stage is stage and (fitted or e.owner in CARRIES))
+
+
+def ordered(model: ModalModel, freq_hz: Array, decay_per_s: Array, shape: Array | None = None) -> tuple[ModalModel, Array]:
+    """The model with other modes, ascending, and which mode (m,) went where; overdamped ones are gone."""
+    good = np.flatnonzero((freq_hz > 0) & np.isfinite(freq_hz))
+    order = good[np.argsort(freq_hz[good], kind="stable")]
+    kept = model.shape if shape is None else shape
+    return replace(model, freq_hz=freq_hz[order], decay_per_s=np.maximum(decay_per_s[order], 0.0), shape=kept[:, :, order]), order
+
+
+def modes_of(h: Hypothesis, body: Struck, *, upto: int | None = None) -> tuple[ModalModel, Array]:
+    """The body's damped modes under the hypothesis (its first ``upto`` effects on them), and which uncorrected mode each was (m,)."""
+    correction = np.zeros(len(body.correction)) if h.correction is None else h.correction.get(body.name, np.zeros(len(body.correction)))
+    lam = (2 * np.pi * body.model.freq_hz * (1 + correction)) ** 2
+    decay = (h.alpha_per_s + h.beta_s * lam) / 2
+    model, order = ordered(body.model, np.sqrt(np.maximum(lam - decay**2, 0)) / (2 * np.pi), decay)
+    fitted = body.gathered is not None
+    for effect in h.at(Stage.MODES, fitted=fitted)[:upto]:
+        model = effect.apply(model)
+    return model, order
+
+
+def pattern(body: Struck, model: ModalModel) -> Array:
+    """J ψ (s, m), real, of the body's strikes at the sensor; J = 1 where it is not known."""
+    at = model.shape[body.surface_count() :].astype(float)
+    row = np.einsum("sxm,sx->sm", at, body.way)
+    level = np.where(np.isfinite(body.impulse_n_s), body.impulse_n_s, 1.0)
+    return np.asarray(level[:, None] * row[:-1] * row[-1])
+
+
+def start(kind: str, model: ModalModel) -> Array:
+    """Complex factor (m,) of the amplitude: the phase a mode starts with; see estimator.observe."""
+    if kind == "velocity":
+        return np.asarray(1 + 1j * model.decay_per_s / (2 * np.pi * model.freq_hz))
+    return np.full(model.mode_count, -1j if kind in ("sum", "lines") else 1.0 + 0j)
+
+
+def blow_of(h: Hypothesis, body: Struck, strike: int) -> Blow:
+    """What the strike is under the hypothesis."""
+    level = body.impulse_n_s[strike]
+    blow = Blow(float(level) if np.isfinite(level) else 1.0, np.zeros(1), np.ones(1))
+    for effect in h.at(Stage.FORCE, fitted=body.gathered is not None):
+        blow = effect.apply(blow)
+    return blow
+
+
+def ring_of(h: Hypothesis, body: Struck, strike: int) -> Ring:
+    """The modes as a strike starts them, before its pulse's spectrum."""
+    model, _ = modes_of(h, body)
+    row = pattern(body, model)[strike]
+    push = np.einsum("xm,x->m", model.shape[body.surface_count() + strike].astype(float), body.way[strike])
+    most = np.sqrt((model.shape[: body.surface_count()].astype(float) ** 2).sum(axis=1)).max(axis=0) if body.surface_count() else np.ones(len(row))
+    blow = blow_of(h, body, strike)
+    none = np.zeros(len(row))
+    ring = Ring(model.freq_hz, model.decay_per_s, h.gain * row * start(body.kind, model), np.abs(blow.impulse_n_s * push) * most, none, none, blow.impulse_n_s)
+    for effect in h.at(Stage.BANK, fitted=body.gathered is not None):
+        ring = effect.apply(ring)
+    return ring
+
+
+def play(h: Hypothesis, body: Struck, strike: int, n: int, sr: int) -> Array:
+    """The strike's sound (n,) from the onset on, in units of the file."""
+    blow = blow_of(h, body, strike)
+    sample = sounded(ring_of(h, body, strike), blow, n, sr)
+    index = -1
+    if body.gathered is not None:
+        mine = [r for r in body.recordings if r.split == "fit"]
+        recording = body.recordings[strike]
+        index = mine.index(recording) if recording in mine else -1
+    sound = Sound(sample, sr, blow.impulse_n_s, index)
+    for effect in h.at(Stage.SOUND, fitted=body.gathered is not None):
+        sound = effect.apply(sound)
+    return sound.sample

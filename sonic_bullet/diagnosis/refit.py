@@ -1,0 +1,126 @@
+"""What the baseline's own numbers become once an effect is there: α, β, σ and the corrections, from the same lines.
+
+    d − Δd(effects) = ½(α + βλ)         (estimator.rayleigh)
+    |A_sk| = σ |J ψ F̂|                  least squares with Cauchy's weights, 2 % of a mode's strongest for the shapes' own error
+
+A correction is the mesh's error alone: a mode that an effect moves keeps only what is left of it, within 1 %.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from sonic_bullet.diagnosis.bodies import Struck
+from sonic_bullet.diagnosis.evidence import MOVES, heard_of, paired
+from sonic_bullet.diagnosis.play import Hypothesis, modes_of
+from sonic_bullet.effects.values import Evidence, Heard, Stage
+from sonic_bullet.estimator.rayleigh import rayleigh
+from sonic_bullet.records import Array
+
+ROUGH = 0.02
+CORRECTION = 0.01
+
+
+def refitted(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...] | None = None, *, reference: Hypothesis | None = None) -> Hypothesis:
+    """The hypothesis with α, β and σ fitted again beside its effects; ``heard``: evidence to fit them to, thinned or whole, under ``reference``."""
+    moved = any(e.stage is Stage.MATERIAL or e.id in MOVES for e in h.effects)
+    if moved:
+        h = corrected(h, bodies)
+    if heard is None or moved:
+        heard = tuple(heard_of(replace(h, effects=tuple(e for e in h.effects if e.stage is not Stage.SOUND)), b) for b in bodies if b.gathered is not None)
+        return _gained(_damped(h, bodies, heard), bodies, heard)
+    return _gained(_damped(h, bodies, heard), bodies, heard)
+
+
+def corrected(h: Hypothesis, bodies: tuple[Struck, ...]) -> Hypothesis:
+    """The hypothesis with corrections learnt on its own modes."""
+    found = dict(h.correction or {})
+    for body in bodies:
+        if body.gathered is None:
+            continue
+        lines = body.gathered.lines
+        for _ in range(2):
+            trial = replace(h, correction=found)
+            model, order = modes_of(trial, body)
+            line, mode = paired(trial, body, model, order)
+            ratio = np.array(found.get(body.name, np.zeros(len(body.correction))), float)
+            off = np.zeros(len(ratio))
+            for one, who in zip(line, mode, strict=True):
+                off[order[who]] = lines.freq_hz[one] / model.freq_hz[who].mean() - 1
+            found[body.name] = np.clip((1 + ratio) * (1 + off) - 1, -CORRECTION, CORRECTION)
+    return replace(h, correction=found)
+
+
+def _damped(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...]) -> Hypothesis:
+    """α and β beside the effects' own decay."""
+    if any(e.id == "damping-law" for e in h.effects):
+        return h
+    told = [(e.alpha_per_s, e.beta_s) for e in h.effects if e.id == "room" and np.isfinite(e.alpha_per_s)]  # type: ignore[attr-defined]
+    if told:  # echoes hold lines up: the bands, seen beside the room, say better
+        return replace(h, alpha_per_s=told[-1][0], beta_s=told[-1][1])
+    bare = replace(h, alpha_per_s=0.0, beta_s=0.0)
+    lam, left, sd = [], [], []
+    for one, body in zip(heard, (b for b in bodies if b.gathered is not None), strict=True):
+        if not len(one.freq_hz):
+            continue
+        model, _ = modes_of(bare, body)
+        extra = np.array([np.interp(f, model.freq_hz, np.zeros(model.mode_count)) for f in one.freq_hz])
+        if h.at(Stage.MODES):
+            near = np.array([np.argmin(np.abs(model.freq_hz - one_f)) for one_f in _expected_hz(one)])
+            extra = np.array([model.decay_per_s[_members(model.freq_hz, i, len(who))].mean() for i, who in zip(near, one.mode, strict=True)])
+        lam.append(one.omega**2)
+        left.append(np.maximum(one.decay_per_s - extra, 1e-3 * one.decay_per_s))
+        sd.append(np.hypot(one.decay_sd_per_s, 0.02 * extra))
+    if not lam:
+        return h
+    found = rayleigh(np.concatenate(lam), np.concatenate(left), np.concatenate(sd), (max(h.alpha_per_s, 1e-3), max(h.beta_s, 1e-12)))
+    return replace(h, alpha_per_s=found.alpha_per_s, beta_s=found.beta_s)
+
+
+def _expected_hz(one: Heard) -> Array:
+    return one.freq_hz
+
+
+def _members(freq: Array, near: int, count: int) -> Array:
+    """The ``count`` modes nearest to one."""
+    return np.argsort(np.abs(freq - freq[near]), kind="stable")[:count]
+
+
+def _gained(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...]) -> Hypothesis:
+    """σ by the amplitudes."""
+    from sonic_bullet.diagnosis.evidence import path_response
+    from sonic_bullet.effects.values import Blow
+
+    told = [e.gain for e in h.effects if e.id == "room" and np.isfinite(e.gain)]  # type: ignore[attr-defined]
+    if told:
+        return replace(h, gain=told[-1])
+    told, seen, spread = [], [], []
+    for one, body in zip(heard, (b for b in bodies if b.gathered is not None), strict=True):
+        if not len(one.freq_hz) or one.signal is None:
+            continue
+        direct = np.abs(path_response(h, body, one.freq_hz, one.sr))
+        factor = np.empty(one.pattern.shape)
+        for i, level in enumerate(one.impulse_n_s):
+            blow = Blow(float(level) if np.isfinite(level) else 1.0, np.zeros(1), np.ones(1))
+            for effect in h.at(Stage.FORCE):
+                blow = effect.apply(blow)
+            hits = np.abs((blow.share[:, None] * np.exp((one.decay_per_s - 2j * np.pi * one.freq_hz) * blow.delay_s[:, None])).sum(axis=0))
+            factor[i] = np.abs(blow.spectrum(one.freq_hz)) * direct * hits
+        expected = np.abs(one.pattern) * factor
+        told.append(expected.ravel())
+        seen.append(np.abs(one.amplitude).ravel())
+        rough = np.broadcast_to(ROUGH * expected.max(axis=0, keepdims=True), expected.shape)
+        spread.append(np.stack([one.amplitude_sd.ravel(), rough.ravel()]))
+    if not told:
+        return h
+    x, y, s = np.concatenate(told), np.concatenate(seen), np.concatenate(spread, axis=1)
+    good = np.isfinite(x) & np.isfinite(y) & np.isfinite(s).all(axis=0)
+    x, y, s = x[good], y[good], s[:, good]
+    gain, weight = h.gain if np.isfinite(h.gain) and h.gain > 0 else 1.0, np.ones(len(x))
+    for _ in range(30):
+        sd2 = (s[0] ** 2 + (gain * s[1]) ** 2) + 1e-300
+        gain = float((weight * x * y / sd2).sum() / max(float((weight * x**2 / sd2).sum()), 1e-300))
+        weight = 1 / (1 + ((y - gain * x) ** 2 / sd2) / 6.25)
+    return replace(h, gain=gain) if gain > 0 and np.isfinite(gain) else h

@@ -1,0 +1,174 @@
+"""Suspects on trial: each fitted without one strike and a part of the lines, judged on that strike; null effects alike.
+
+    for every strike s:  evidence − s − some lines -> propose -> refit α, β, σ -> D(s)    against the same without the effect
+    null: as many numbers, spent on directions drawn at random in the modes' decays and levels, fitted to the same evidence
+
+Leaving out lines matters: decays and shapes belong to the body, so every strike shows them, and a pattern fitted to them by chance would pass.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from sonic_bullet.diagnosis.bodies import Struck
+from sonic_bullet.diagnosis.evidence import thinned
+from sonic_bullet.diagnosis.judge import Take
+from sonic_bullet.diagnosis.play import Hypothesis
+from sonic_bullet.diagnosis.refit import refitted
+from sonic_bullet.effects.values import Effect, Evidence, Owner, Stage
+from sonic_bullet.records import ModalModel
+
+KEPT = 0.75  # of the lines, in every fold
+DRAWS = 2  # of the null effect
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Candidate:
+    """A suspect after its trial. effect: fitted to all evidence. drop_db (s,): of each left-out strike's distance; null_db: mean over strikes and draws.
+
+    spread: of each number in its parameters over the folds (jackknife).
+    """
+
+    id: str
+    effect: Effect
+    hypothesis: Hypothesis
+    drop_db: np.ndarray[Any, Any]
+    null_db: float
+    spread: dict[str, Any]
+
+    @property
+    def mean_db(self) -> float:
+        return float(self.drop_db.mean()) if len(self.drop_db) else 0.0
+
+    @property
+    def sd_db(self) -> float:
+        """Standard error of the mean."""
+        return float(self.drop_db.std(ddof=1) / np.sqrt(len(self.drop_db))) if len(self.drop_db) > 1 else float("inf")
+
+
+@dataclass(frozen=True)
+class Null:
+    """A number per direction spent at random: ln d and ln level of every mode move along random vectors of the modes."""
+
+    id: ClassVar[str] = "null"
+    stage: ClassVar[Stage] = Stage.MODES
+    owner: ClassVar[Owner] = Owner.MATERIAL
+    reference: ClassVar[str] = "a control, not physics"
+
+    amount: tuple[float, ...]
+    seed: int
+
+    def apply(self, x: ModalModel) -> ModalModel:
+        way = directions(self.seed, len(self.amount), x.mode_count)
+        half = (len(self.amount) + 1) // 2
+        decay = x.decay_per_s * np.exp(np.clip(np.array(self.amount[:half]) @ way[:half], -3, 3))
+        shape = x.shape.copy()
+        shape[-1] *= np.exp(np.clip(np.array(self.amount[half:]) @ way[half:], -3, 3)).astype(np.float32) if len(way) > half else np.float32(1)
+        return replace(x, decay_per_s=decay, shape=shape)
+
+    def parameters(self) -> dict[str, Any]:
+        return {"amount": list(self.amount)}
+
+    def freedom(self) -> int:
+        return len(self.amount)
+
+    @classmethod
+    def propose(cls, evidence: Evidence) -> Self | None:
+        return cls.fitted(evidence, 2, 0)
+
+    @classmethod
+    def fitted(cls, evidence: Evidence, freedom: int, seed: int) -> Self | None:
+        """The random effect of so many numbers that the first object's lines suggest most."""
+        h = evidence.heard[0]
+        count = len(h.all_hz)
+        way = directions(seed, freedom, count)
+        half = (freedom + 1) // 2
+        if len(h.freq_hz) <= freedom:
+            return None
+        member = [int(np.argmin(np.abs(h.all_hz - f))) for f in h.freq_hz]
+        y = np.log(np.maximum(h.decay_per_s, 1e-3) / np.maximum(h.expected_decay_per_s, 1e-3))
+        size = np.log(np.maximum(np.abs(h.amplitude), 1e-12) / np.maximum(np.abs(h.expected), 1e-12))
+        z = np.nan_to_num(np.median(size, axis=0))
+        a = np.linalg.lstsq(way[:half, member].T, np.nan_to_num(y), rcond=None)[0]
+        b = np.linalg.lstsq(way[half:, member].T, z - np.median(z), rcond=None)[0] if freedom > half else np.zeros(0)
+        return cls(tuple(float(v) for v in np.concatenate([a, b])), seed)
+
+
+def directions(seed: int, count: int, modes: int) -> np.ndarray[Any, Any]:
+    """Random directions (count, modes): the same for the same seed, whatever the number of modes asked for."""
+    return np.random.default_rng([seed, 77]).standard_normal((modes, count)).T
+
+
+def trials(
+    h: Hypothesis, bodies: tuple[Struck, ...], takes: tuple[Take, ...], evidence: Evidence, effects: Sequence[type[Effect]], *, seed: int, say: Any
+) -> list[Candidate]:
+    """Every suspect that the whole evidence suggests, after its trial; best first."""
+    found = []
+    folds = _folds(h, bodies, takes, evidence, seed)
+    for kind in effects:
+        if kind.id in evidence.found and kind.stage is not Stage.SOUND:
+            continue
+        whole = kind.propose(evidence)
+        if whole is None or kind.id in evidence.found:
+            continue
+        say(f"trying {kind.id}")
+        found.append(_tried(kind, whole, h, bodies, takes, evidence, folds))
+    return sorted(found, key=lambda c: -c.mean_db)
+
+
+def _folds(h: Hypothesis, bodies: tuple[Struck, ...], takes: tuple[Take, ...], evidence: Evidence, seed: int) -> list[tuple[Evidence, Hypothesis, float]]:
+    """Per strike: what is left of the evidence, the hypothesis refitted to it, and its distance to the strike left out."""
+    rng = np.random.default_rng([seed, 1])
+    made = []
+    for i, take in enumerate(takes):
+        less = thinned(evidence, i, KEPT, rng)
+        base = refitted(h, bodies, less.heard)
+        made.append((less, base, take.distance(base)))
+    return made
+
+
+def _tried(
+    kind: type[Effect], whole: Effect, h: Hypothesis, bodies: tuple[Struck, ...], takes: tuple[Take, ...], evidence: Evidence, folds: list[Any]
+) -> Candidate:
+    drops, nulls, seen = [], [], []
+    for i, (less, base, before) in enumerate(folds):
+        effect = kind.propose(less)
+        if effect is None or not np.isfinite(before):
+            drops.append(0.0)
+            continue
+        seen.append(effect)
+        after = takes[i].distance(refitted(replace(base, effects=(*base.effects, effect)), bodies, less.heard))
+        drops.append(before - after)
+        for draw in range(DRAWS):
+            none = Null.fitted(less, min(effect.freedom(), 8), 10 * i + draw)
+            if none is not None:
+                nulls.append(before - takes[i].distance(refitted(replace(base, effects=(*base.effects, none)), bodies, less.heard)))
+    added = refitted(replace(h, effects=(*h.effects, whole)), bodies, evidence.heard)
+    return Candidate(kind.id, whole, added, np.array(drops), float(np.mean(nulls)) if nulls else 0.0, jackknife([e.parameters() for e in seen]))
+
+
+def jackknife(rows: list[dict[str, Any]]) -> dict[str, Any]:
+    """Standard errors of every number that all folds give [Efron & Tibshirani 1993, eq. 11.5]; numbers in lists of one length each their own."""
+    if len(rows) < 2:
+        return {}
+    found: dict[str, Any] = {}
+    for name in rows[0]:
+        values = [row.get(name) for row in rows]
+        if all(isinstance(v, (int, float)) and not isinstance(v, bool) for v in values):
+            found[name] = _spread(np.array(values, float))
+        elif all(isinstance(v, list) for v in values):
+            try:
+                table = np.array(values, float)
+            except (ValueError, TypeError):
+                continue
+            found[name] = np.apply_along_axis(_spread, 0, table).tolist()
+    return found
+
+
+def _spread(x: np.ndarray[Any, Any]) -> float:
+    n = len(x)
+    return float(np.sqrt((n - 1) / n * ((x - x.mean()) ** 2).sum()))

@@ -1,0 +1,32 @@
+"""The family of physical effects a model may lack, one short file each. A third party's is passed beside these: `EFFECTS + (Mine,)`."""
+
+from sonic_bullet.effects.added_mass import AddedMass
+from sonic_bullet.effects.amplitude_damping import AmplitudeDamping
+from sonic_bullet.effects.amplitude_pitch import AmplitudePitch
+from sonic_bullet.effects.contact_time import ContactTime
+from sonic_bullet.effects.damping_law import DampingLaw
+from sonic_bullet.effects.foreign_mode import ForeignMode
+from sonic_bullet.effects.measurement_chain import MeasurementChain
+from sonic_bullet.effects.mode_splitting import ModeSplitting
+from sonic_bullet.effects.radiation import Radiation
+from sonic_bullet.effects.rebound import Rebound
+from sonic_bullet.effects.room import Room
+from sonic_bullet.effects.support_damping import SupportDamping
+from sonic_bullet.effects.values import Blow, Effect, Evidence, Heard, Owner, Ring, Sound, Stage
+
+EFFECTS: tuple[type[Effect], ...] = (
+    DampingLaw,
+    SupportDamping,
+    ContactTime,
+    ModeSplitting,
+    AmplitudePitch,
+    AmplitudeDamping,
+    Room,
+    ForeignMode,
+    AddedMass,
+    Rebound,
+    Radiation,
+    MeasurementChain,
+)
+
+__all__ = ["EFFECTS", "Blow", "Effect", "Evidence", "Heard", "Owner", "Ring", "Sound", "Stage"]

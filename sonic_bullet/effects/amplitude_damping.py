@@ -1,0 +1,108 @@
+"""`amplitude-damping`: friction and plasticity take more of a loud mode than of a soft one.
+
+    ȧ = −d a (1 + c a)      ->      a₀/a(t) = (1 + c a₀) e^{dt} − c a₀         [Adhikari 2013, ch. 1; equivalent damping: Nayfeh & Mook 1979, § 3.3]
+
+Read off the envelopes of single modes: early decay faster than late, the more so the harder the strike; d is the mode's, c of all.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from sonic_bullet.effects.amplitude_pitch import _per_velocity
+from sonic_bullet.effects.envelope import Envelopes, envelopes, levels
+from sonic_bullet.effects.values import Evidence, Heard, Owner, Ring, Stage
+from sonic_bullet.records import Array
+
+BETTER = 0.4  # of the misfit of the envelopes' logarithms must go
+LEAST = 0.05  # of c a₀ at the loudest
+
+
+@dataclass(frozen=True)
+class AmplitudeDamping:
+    """choke: relative rise of the decay per level. measure: as in amplitude-pitch. low_decay: d of each fitted line at low level, by frequency."""
+
+    id: ClassVar[str] = "amplitude-damping"
+    stage: ClassVar[Stage] = Stage.BANK
+    owner: ClassVar[Owner] = Owner.OBJECT
+    reference: ClassVar[str] = "Nayfeh & Mook 1979, section 3.3"
+
+    choke: float
+    measure: str = "velocity"
+    scale: float = 1.0  # the decay at low level over the one that was fitted to all levels
+
+    def apply(self, x: Ring) -> Ring:
+        return replace(x, choke=x.choke + self.choke * _per_velocity(x, self.measure), decay_per_s=x.decay_per_s * self.scale)
+
+    def parameters(self) -> dict[str, Any]:
+        return {"choke": self.choke, "measure": self.measure, "scale": self.scale}
+
+    def freedom(self) -> int:
+        return 2
+
+    @classmethod
+    def propose(cls, evidence: Evidence) -> Self | None:
+        best: tuple[float, Self] | None = None
+        for h in evidence.heard:
+            e = envelopes(h)
+            if e is None:
+                continue
+            for name, level in levels(h).items():
+                found = _fitted(e, h, level[:, e.line])
+                if found is not None and found[2] > BETTER and (best is None or found[2] > best[0]):
+                    best = (found[2], cls(found[0], name, found[1]))
+        return best[1] if best is not None else None
+
+
+def _fitted(e: Envelopes, h: Heard, level: Array) -> tuple[float, float, float] | None:
+    """c, the low-level decay over the heard one, and the share of the misfit that goes."""
+    rows = [_rows(e, h, level, q) for q in range(len(e.line))]
+    rows = [r for r in rows if r is not None]
+    if len(rows) < 2:
+        return None
+    most = float(np.max([r[2].max() for r in rows]))
+    plain, _ = _misfit(rows, 0.0)
+    grid = np.geomspace(0.02, 30, 28) / most
+    costs = np.array([_misfit(rows, c)[0] for c in grid])
+    i = int(costs.argmin())
+    fine = np.geomspace(grid[max(i - 1, 0)], grid[min(i + 1, len(grid) - 1)], 13)
+    inner = np.array([_misfit(rows, c)[0] for c in fine])
+    choke = float(fine[int(inner.argmin())])
+    cost, ratio = _misfit(rows, choke)
+    if choke * most < LEAST or cost >= plain:
+        return None
+    return choke, ratio, 1 - cost / plain
+
+
+def _rows(e: Envelopes, h: Heard, level: Array, q: int) -> tuple[Array, Array, Array, Array, float] | None:
+    """Times, ln |z|, level, strike index of a line's clear frames, and the heard decay."""
+    t, y, a, who = [], [], [], []
+    for s in range(len(e.z)):
+        use = e.good[s, q]
+        if use.sum() < 8:
+            continue
+        t.append(e.time_s[use])
+        y.append(np.log(np.abs(e.z[s, q, use])))
+        a.append(np.full(int(use.sum()), level[s, q]))
+        who.append(np.full(int(use.sum()), s))
+    if not t:
+        return None
+    return np.concatenate(t), np.concatenate(y), np.concatenate(a), np.concatenate(who), max(float(h.decay_per_s[e.line[q]]), 1e-2)
+
+
+def _misfit(rows: list[tuple[Array, Array, Array, Array, float]], choke: float) -> tuple[float, float]:
+    """Mean over lines of ln of the variance left, as a plain number (geometric mean), and the median ratio of d to the heard one."""
+    found, ratio = [], []
+    scales = np.geomspace(0.25, 1.6, 25) if choke else np.geomspace(0.5, 1.6, 25)
+    for t, y, a, who, decay in rows:
+        u = np.exp(np.minimum(decay * scales[:, None] * t, 300))
+        left = y + np.log((1 + choke * a) * u - choke * a)
+        mine = (who == np.unique(who)[:, None]).astype(float)
+        left = left - (left @ mine.T / mine.sum(axis=1)) @ mine
+        spread = (left**2).mean(axis=1)
+        found.append(np.log(spread.min() + 1e-6))
+        ratio.append(float(scales[int(spread.argmin())]))
+    return float(np.exp(np.mean(found))), float(np.median(ratio))

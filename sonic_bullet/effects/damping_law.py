@@ -1,0 +1,119 @@
+"""`damping-law`: a material's loss that is not Rayleigh's.
+
+    constant-loss  d = ηω/2                                                   [Cremer, Heckl, Petersson 2005, ch. 3.2]
+    power          d = ½ η ω₁ (ω/ω₁)^p,  ω₁ = 2π·1000/s                        (a loss factor that goes as a power of frequency)
+    relaxation     d = ½ ω [η + Δ ωτ/(1 + (ωτ)²)]                              [Zener 1948, ch. 5; Nowick & Berry 1972, eq. 3.5-2]
+
+Read off the decays of all modes, of every object: smooth in frequency, the same for all strikes and sizes. The law with the least Bayes information
+criterion is proposed, where it beats Rayleigh's own.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from sonic_bullet.effects.values import Evidence, Owner, Stage
+from sonic_bullet.records import Array, ModalModel
+
+LAWS = {"constant-loss": 1, "power": 2, "relaxation": 3}
+OMEGA_1 = 2000 * np.pi
+SCATTER = 0.02  # of a decay about its law, relative, that no law is asked to explain
+BETTER = 6.0  # in BIC, than Rayleigh's law
+
+
+@dataclass(frozen=True)
+class DampingLaw:
+    """law: one of LAWS. eta: loss factor (at 1 kHz for a power). exponent: of d against ω. strength Δ and tau_s: of the relaxation."""
+
+    id: ClassVar[str] = "damping-law"
+    stage: ClassVar[Stage] = Stage.MODES
+    owner: ClassVar[Owner] = Owner.MATERIAL
+    reference: ClassVar[str] = "Cremer, Heckl, Petersson 2005, ch. 3; Nowick & Berry 1972, ch. 3"
+
+    law: str
+    eta: float
+    exponent: float = 1.0
+    strength: float = 0.0
+    tau_s: float = 0.0
+
+    def decay_per_s(self, omega_per_s: Array) -> Array:
+        """d (k,) at undamped ω (k,)."""
+        w = np.asarray(omega_per_s, float)
+        if self.law == "power":
+            return np.asarray(0.5 * self.eta * OMEGA_1 * (w / OMEGA_1) ** self.exponent)
+        return np.asarray(0.5 * w * (self.eta + self.strength * w * self.tau_s / (1 + (w * self.tau_s) ** 2)))
+
+    def apply(self, x: ModalModel) -> ModalModel:
+        omega = np.sqrt(x.omega0_squared_per_s2)
+        decay = np.minimum(self.decay_per_s(omega), 0.99 * omega)
+        freq = np.sqrt(omega**2 - decay**2) / (2 * np.pi)
+        order = np.argsort(freq, kind="stable")
+        return replace(x, freq_hz=freq[order], decay_per_s=decay[order], shape=x.shape[:, :, order])
+
+    def parameters(self) -> dict[str, Any]:
+        if self.law == "relaxation":
+            return {"law": self.law, "eta": self.eta, "strength": self.strength, "tau_s": self.tau_s}
+        return {"law": self.law, "eta": self.eta} | ({"exponent": self.exponent} if self.law == "power" else {})
+
+    def freedom(self) -> int:
+        return LAWS[self.law]
+
+    @classmethod
+    def propose(cls, evidence: Evidence) -> Self | None:
+        omega = np.concatenate([h.omega for h in evidence.heard])
+        decay = np.concatenate([h.decay_per_s for h in evidence.heard])
+        spread = np.concatenate([h.decay_sd_per_s for h in evidence.heard])
+        good = np.isfinite(decay) & (decay > 0)
+        if good.sum() < 5:
+            return None
+        omega, decay = omega[good], decay[good]
+        sd = np.hypot(np.nan_to_num(spread[good] / decay, nan=0.05), SCATTER)
+        y = np.log(decay)
+
+        def cost(model: Array) -> Array:
+            return np.asarray((np.log(np.maximum(model, 1e-9)) - y) / sd)
+
+        trials = [(bic, cls(*values)) for bic, values in _fits(omega, cost)]
+        bic, best = min(trials, key=lambda t: t[0])
+        return best if bic < _least(omega, cost, _rayleigh, [_start(omega, decay)], 2)[0] - BETTER else None
+
+
+def _rayleigh(p: Array, w: Array) -> Array:
+    return np.asarray(0.5 * (np.exp(p[0]) + np.exp(p[1]) * w**2))
+
+
+def _start(omega: Array, decay: Array) -> Array:
+    return np.array([np.log(2 * decay.min()), np.log(2 * np.median(decay / omega**2))])
+
+
+def _fits(omega: Array, cost: Any) -> list[tuple[float, tuple[str, float, float, float, float]]]:
+    """Each law at its best: (BIC, fields)."""
+    middle = np.log(np.median(omega))
+
+    def power(p: Array, w: Array) -> Array:
+        return np.asarray(0.5 * np.exp(p[0]) * OMEGA_1 * (w / OMEGA_1) ** p[1])
+
+    def relax(p: Array, w: Array) -> Array:
+        x = w * np.exp(p[2])
+        return np.asarray(0.5 * w * (np.exp(p[0]) + np.exp(p[1]) * x / (1 + x * x)))
+
+    loss, eta = _least(omega, cost, lambda p, w: 0.5 * np.exp(p[0]) * w, [np.array([-7.0])], 1)
+    bent, pair = _least(omega, cost, power, [np.array([eta[0], s]) for s in (0.5, 1.0, 1.6)], 2)
+    peak, three = _least(omega, cost, relax, [np.array([eta[0] - 1.5, eta[0] + 1, -middle + s]) for s in (-2.5, -1.0, 0.0, 1.0, 2.5)], 3)
+    return [
+        (loss, ("constant-loss", float(np.exp(eta[0])), 1.0, 0.0, 0.0)),
+        (bent, ("power", float(np.exp(pair[0])), float(pair[1]), 0.0, 0.0)),
+        (peak, ("relaxation", float(np.exp(three[0])), 1.0, float(np.exp(three[1])), float(np.exp(three[2])))),
+    ]
+
+
+def _least(omega: Array, cost: Any, law: Any, starts: list[Array], count: int) -> tuple[float, Array]:
+    """(BIC, parameters) of a law under Cauchy's loss."""
+    from scipy.optimize import least_squares
+
+    found = [least_squares(lambda p: cost(law(p, omega)), start, loss="cauchy", f_scale=2.0, bounds=(-40, 40)) for start in starts]
+    best = min(found, key=lambda f: f.cost)
+    return float(2 * best.cost + count * np.log(len(omega))), best.x

@@ -1,0 +1,93 @@
+"""`foreign-mode`: the striker, the stand or a neighbour rings along.
+
+    y(t) = J Σ_k a_k e^{−d_k t} cos(2πf_k t + φ_k)      the same f, d wherever the object is struck, a in units of the file per N·s
+
+Read off lines that belong to no mode and whose amplitude goes with the impulse, not with a mode shape.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from sonic_bullet.effects.ringing import sounded
+from sonic_bullet.effects.values import Blow, Evidence, Heard, Owner, Ring, Sound, Stage
+from sonic_bullet.records import Array
+
+STEADY = 0.12  # relative scatter of |A|/J over the strikes, rms
+LOUD = 0.02  # of the strongest line's amplitude
+MOST = 8
+APART = 0.004  # from a mode of the body
+
+
+@dataclass(frozen=True)
+class ForeignMode:
+    """freq_hz, decay_per_s, amplitude per N·s, phase_rad of each line that is not the body's."""
+
+    id: ClassVar[str] = "foreign-mode"
+    stage: ClassVar[Stage] = Stage.SOUND
+    owner: ClassVar[Owner] = Owner.STRIKER
+    reference: ClassVar[str] = "physics of a second resonator driven by the same blow: Morse & Ingard 1968, ch. 2"
+
+    freq_hz: tuple[float, ...]
+    decay_per_s: tuple[float, ...]
+    amplitude_per_n_s: tuple[float, ...]
+    phase_rad: tuple[float, ...]
+
+    def apply(self, x: Sound) -> Sound:
+        a = x.impulse_n_s * np.array(self.amplitude_per_n_s) * np.exp(1j * np.array(self.phase_rad))
+        none = np.zeros(len(a))
+        ring = Ring(np.array(self.freq_hz), np.array(self.decay_per_s), a, none, none, none)
+        return replace(x, sample=x.sample + sounded(ring, Blow(1.0, np.zeros(1), np.ones(1)), len(x.sample), x.sr))
+
+    def parameters(self) -> dict[str, Any]:
+        return {"modes": [list(row) for row in zip(self.freq_hz, self.decay_per_s, self.amplitude_per_n_s, strict=True)]}
+
+    def freedom(self) -> int:
+        return 3 * len(self.freq_hz)
+
+    @classmethod
+    def propose(cls, evidence: Evidence) -> Self | None:
+        rows = [row for h in evidence.heard for row in _steady(h)]
+        rows.sort(key=lambda r: -r[2])
+        if not rows:
+            return None
+        kept = sorted(rows[:MOST])
+        return cls(*(tuple(float(r[i]) for r in kept) for i in range(4)))
+
+
+def _steady(h: Heard) -> list[tuple[float, float, float, float]]:
+    """Lines (f, d, a, φ) that follow the impulse alone."""
+    if len(h.foreign_hz) == 0 or len(h.impulse_n_s) < 2 or h.signal is None:
+        return []
+    level = np.where(np.isfinite(h.impulse_n_s), h.impulse_n_s, 1.0)
+    per = h.foreign_amplitude / level[:, None]
+    size = np.abs(per)
+    weight = (level[:, None] / np.maximum(h.foreign_sd, 1e-12)) ** 2
+    mean = (weight * size).sum(axis=0) / weight.sum(axis=0)
+    sd = h.foreign_sd / level[:, None]
+    loose = np.sqrt((np.maximum((size - mean) ** 2 - 9 * sd**2, 0) * weight).sum(axis=0) / weight.sum(axis=0)) / np.maximum(mean, 1e-300)
+    lean = _against_level(size, sd, level)
+    strongest = max(float(np.abs(h.amplitude).max(initial=0.0)), 1e-300)
+    loud = (mean * level.max() > LOUD * strongest) & (mean * level.max() > 30 * np.median(h.foreign_sd))
+    coherent = np.abs((weight * per).sum(axis=0)) / np.maximum((weight * size).sum(axis=0), 1e-300) if h.signed else np.ones(len(mean))
+    apart = np.ones(len(mean), bool)
+    if h.model is not None and len(h.freq_hz):
+        apart = np.abs(np.log(h.foreign_hz[:, None] / h.freq_hz)).min(axis=1) > APART
+    good = loud & apart & (loose < STEADY) & (coherent > 0.9) & (np.abs(lean) < 0.25)
+    phase = np.angle((weight * per).sum(axis=0))
+    return [(h.foreign_hz[k], max(h.foreign_decay_per_s[k], 0.0), mean[k], phase[k]) for k in np.flatnonzero(good)]
+
+
+def _against_level(size: Array, sd: Array, level: Array) -> Array:
+    """Slope (k,) of ln |A|/J against ln J; 0 where the strikes are alike."""
+    x = np.log(level) - np.log(level).mean()
+    if np.ptp(x) < 0.3:
+        return np.zeros(size.shape[1])
+    y = np.log(np.maximum(size, 1e-300))
+    w = 1 / (np.maximum(sd / np.maximum(size, 1e-300), 0.01) ** 2)
+    xm = (w * x[:, None]).sum(axis=0) / w.sum(axis=0)
+    ym = (w * y).sum(axis=0) / w.sum(axis=0)
+    return np.asarray((w * (x[:, None] - xm) * (y - ym)).sum(axis=0) / np.maximum((w * (x[:, None] - xm) ** 2).sum(axis=0), 1e-300))

@@ -1,0 +1,181 @@
+"""`measurement-chain`: one filter, limit or tone common to everything recorded.
+
+    high-pass, low-pass: Butterworth of order 1 to 4, |H|² = 1/(1 + (f/f_c)^{±2n})            [Oppenheim & Schafer 2010, app. B]
+    limit: samples beyond ± L stand at it
+    hum: Σ_i a_i cos(2π i f₀ t + φ_i) that is there before, during and after, however hard the strike
+
+Read off the amplitudes (one factor a frequency for all strikes), the samples at the peak, and the last third of every recording.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from sonic_bullet.effects.values import Evidence, Heard, Owner, Sound, Stage
+from sonic_bullet.records import Array
+
+ROUGH = 0.03
+BETTER = 16.0
+MAINS = (50.0, 60.0)
+STUCK = 4  # samples in a row at the limit, in two recordings or more
+
+
+@dataclass(frozen=True)
+class MeasurementChain:
+    """high_pass_hz, low_pass_hz with their orders, 0 for none; limit in units of the file, 0 for none; hum_hz and its harmonics' amplitudes."""
+
+    id: ClassVar[str] = "measurement-chain"
+    stage: ClassVar[Stage] = Stage.SOUND
+    owner: ClassVar[Owner] = Owner.CHAIN
+    reference: ClassVar[str] = "Oppenheim & Schafer 2010, app. B"
+
+    high_pass_hz: float = 0.0
+    high_order: int = 1
+    low_pass_hz: float = 0.0
+    low_order: int = 1
+    limit: float = 0.0
+    hum_hz: float = 0.0
+    hum_amplitude: tuple[float, ...] = ()
+    hum_phase_rad: tuple[float, ...] = ()
+
+    def apply(self, x: Sound) -> Sound:
+        from scipy.signal import butter, sosfilt
+
+        y = x.sample
+        for kind, corner, order in (("highpass", self.high_pass_hz, self.high_order), ("lowpass", self.low_pass_hz, self.low_order)):
+            if 0 < corner < 0.5 * x.sr:
+                y = sosfilt(butter(order, corner, kind, fs=x.sr, output="sos"), y)
+        if self.hum_hz:
+            t = np.arange(len(y)) / x.sr
+            for i, (a, phase) in enumerate(zip(self.hum_amplitude, self.hum_phase_rad, strict=True), 1):
+                if a:
+                    y = y + a * np.cos(2 * np.pi * i * self.hum_hz * t + phase)
+        return replace(x, sample=np.clip(y, -self.limit, self.limit) if self.limit else y)
+
+    def parameters(self) -> dict[str, Any]:
+        found: dict[str, Any] = {}
+        if self.high_pass_hz:
+            found |= {"high_pass_hz": self.high_pass_hz, "high_order": self.high_order}
+        if self.low_pass_hz:
+            found |= {"low_pass_hz": self.low_pass_hz, "low_order": self.low_order}
+        if self.limit:
+            found |= {"limit": self.limit}
+        if self.hum_hz:
+            found |= {"hum_hz": self.hum_hz, "hum_amplitude": list(self.hum_amplitude)}
+        return found
+
+    def freedom(self) -> int:
+        return 2 * bool(self.high_pass_hz) + 2 * bool(self.low_pass_hz) + bool(self.limit) + (1 + len(self.hum_amplitude)) * bool(self.hum_hz)
+
+    @classmethod
+    def propose(cls, evidence: Evidence) -> Self | None:
+        heard = [h for h in evidence.heard if h.signal is not None and h.predicted is not None]
+        if not heard:
+            return None
+        parts: dict[str, Any] = {}
+        parts |= _limit(heard)
+        parts |= _hum(heard)
+        if "limit" not in parts:
+            parts |= _filter(heard)
+        return cls(**parts) if parts else None
+
+
+def butterworth(freq_hz: Array, corner_hz: float, order: int, high: bool) -> Array:
+    """|H| (f,)."""
+    x = np.asarray(freq_hz) / corner_hz
+    return np.asarray(1 / np.sqrt(1 + x ** (-2 * order if high else 2 * order)))
+
+
+def _limit(heard: list[Heard]) -> dict[str, float]:
+    """A level at which several samples in a row stand in two recordings or more, the same in all."""
+    levels = []
+    for h in heard:
+        assert h.signal is not None
+        for row in h.signal:
+            peak = float(np.abs(row).max())
+            stuck = np.abs(row) > 0.998 * peak
+            run = np.convolve(stuck, np.ones(STUCK), "valid")
+            if run.max(initial=0) >= STUCK or stuck.sum() > 12:
+                levels.append(peak)
+    if len(levels) >= 2 and max(levels) < 1.02 * min(levels):
+        return {"limit": float(np.median(levels))}
+    return {}
+
+
+def _hum(heard: list[Heard]) -> dict[str, Any]:
+    """A tone at the mains and its multiples in the last third, of one amplitude in all recordings."""
+    h = max(heard, key=lambda one: len(one.impulse_n_s))
+    assert h.signal is not None
+    tail = h.signal[:, -h.signal.shape[1] // 3 :]
+    n = tail.shape[1]
+    shape = np.hanning(n)
+    spectrum = np.fft.rfft(tail * shape, 4 * n, axis=1)
+    power, hz = np.abs(spectrum) ** 2, np.fft.rfftfreq(4 * n, 1 / h.sr)
+    floor = (shape**2).sum() * np.median(h.noise) ** 2
+    best: dict[str, Any] = {}
+    most = 0.0
+    for mains in MAINS:
+        near = np.flatnonzero(np.abs(hz - mains) < 1.2 * mains / 50)
+        if not len(near):
+            continue
+        tone = np.array([power[:, np.minimum(i * near, len(hz) - 1)].min(axis=0) for i in range(1, 9)])
+        score = np.log1p(tone / (30 * floor)).sum(axis=0)
+        i = int(score.argmax())
+        if score[i] > max(most, 1.0):
+            lines = near[i] * np.arange(1, 9)
+            size = 2 * np.sqrt(power[:, lines]) / shape.sum()
+            mean = np.exp(np.log(size).mean(axis=0))
+            steady = (size.max(axis=0) < 1.6 * size.min(axis=0)) & (power[:, lines].min(axis=0) > 30 * floor)
+            if steady.any():
+                last = int(np.flatnonzero(steady).max()) + 1
+                phase = np.angle(spectrum[:, lines]).mean(axis=0)
+                best = {
+                    "hum_hz": float(hz[near[i]]),
+                    "hum_amplitude": tuple(float(a) if s else 0.0 for a, s in zip(mean[:last], steady[:last], strict=True)),
+                    "hum_phase_rad": tuple(float(p) for p in phase[:last]),
+                }
+                most = float(score[i])
+    return best
+
+
+def _filter(heard: list[Heard]) -> dict[str, Any]:
+    """One high-pass or low-pass that all strikes share."""
+    rows = [_ratio(h) for h in heard if len(h.freq_hz) >= 5]
+    if not rows:
+        return {}
+    freq, ratio, sd = (np.concatenate([r[i] for r in rows]) for i in range(3))
+    plain = _misfit(ratio, sd)
+    best: tuple[float, dict[str, Any]] = (plain - BETTER - 2 * np.log(len(freq)), {})
+    for high in (True, False):
+        for order in (1, 2, 3, 4):
+            for corner in np.geomspace(0.3 * freq.min(), 3 * freq.max(), 160):
+                cost = _misfit(ratio - np.log(butterworth(freq, float(corner), order, high)), sd)
+                if cost < best[0]:
+                    name = "high" if high else "low"
+                    best = (cost, {f"{name}_pass_hz": float(corner), f"{name}_order": order})
+    return best[1]
+
+
+def _ratio(h: Heard) -> tuple[Array, Array, Array]:
+    """Per line: frequency, ln of heard over expected amplitude over the strikes, and its spread, which grows where the strikes disagree."""
+    told, seen = np.abs(h.expected), np.abs(h.amplitude)
+    width = np.hypot(h.amplitude_sd, ROUGH * told.max(axis=0, keepdims=True)) + 1e-300
+    gain = (told * seen / width**2).sum(axis=0) / np.maximum((told**2 / width**2).sum(axis=0), 1e-300)
+    left = np.sqrt((((seen - gain * told) / width) ** 2).mean(axis=0))
+    size = np.sqrt((told**2 / width**2).sum(axis=0))
+    good = (gain > 0) & (size > 3)
+    sd = np.hypot(np.maximum(left, 1.0)[good] / (size[good] * np.maximum(gain[good], 1e-300)), ROUGH)
+    return h.freq_hz[good], np.log(gain[good]), sd
+
+
+def _misfit(y: Array, sd: Array) -> float:
+    """Cauchy's loss about the best constant."""
+    weight, middle = sd**-2.0, 0.0
+    trust = np.ones(len(y))
+    for _ in range(8):
+        middle = float((trust * weight * y).sum() / (trust * weight).sum())
+        trust = 1 / (1 + ((y - middle) / sd / 2.5) ** 2)
+    return float(6.25 * np.log1p(((y - middle) / sd / 2.5) ** 2).sum())

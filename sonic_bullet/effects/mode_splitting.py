@@ -1,0 +1,118 @@
+"""`mode-splitting`: what is symmetric has modes in pairs of one frequency; an imperfection sets them apart and turns them to itself.
+
+    pair (a, b) at f  ->  cos ψ a + sin ψ b at f(1 − ε/2),  −sin ψ a + cos ψ b at f(1 + ε/2)          [Perrin & Charnley 1973; Rayleigh 1894, § 221]
+
+Read off two lines 0.1 to 1 % apart where the mesh has a pair: their amplitudes over the strikes give ψ, their distance ε.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from sonic_bullet.effects.values import Evidence, Heard, Owner, Stage
+from sonic_bullet.records import Array, ModalModel
+
+PAIR = 6e-3  # relative: modes of a mesh nearer than this may be a pair
+SPLIT = (4e-4, 1.3e-2)
+LOUD = 0.03
+ALIKE = 0.85
+
+
+@dataclass(frozen=True)
+class ModeSplitting:
+    """freq_hz (p,) of the pairs, split (p,) relative, turn_rad (p,) from the pair's first mode in the mesh as it is solved; place (p, 3): where the lower swings most."""
+
+    id: ClassVar[str] = "mode-splitting"
+    stage: ClassVar[Stage] = Stage.MODES
+    owner: ClassVar[Owner] = Owner.OBJECT
+    reference: ClassVar[str] = "Perrin & Charnley 1973"
+
+    freq_hz: tuple[float, ...]
+    split: tuple[float, ...]
+    turn_rad: tuple[float, ...]
+
+    def apply(self, x: ModalModel) -> ModalModel:
+        freq, shape = x.freq_hz.copy(), x.shape.copy()
+        for f, split, turn in zip(self.freq_hz, self.split, self.turn_rad, strict=True):
+            if split == 0:
+                continue
+            a, b = _pair(x.freq_hz, f)
+            if a < 0:
+                continue
+            middle = (x.freq_hz[a] + x.freq_hz[b]) / 2
+            freq[a], freq[b] = middle * (1 - split / 2), middle * (1 + split / 2)
+            c, s = np.float32(np.cos(turn)), np.float32(np.sin(turn))
+            shape[:, :, a], shape[:, :, b] = c * x.shape[:, :, a] + s * x.shape[:, :, b], -s * x.shape[:, :, a] + c * x.shape[:, :, b]
+        order = np.argsort(freq, kind="stable")
+        return replace(x, freq_hz=freq[order], decay_per_s=x.decay_per_s[order], shape=shape[:, :, order])
+
+    def parameters(self) -> dict[str, Any]:
+        return {"pairs": [{"freq_hz": f, "split": s, "turn_rad": t} for f, s, t in zip(self.freq_hz, self.split, self.turn_rad, strict=True)]}
+
+    def freedom(self) -> int:
+        return 2 * len(self.freq_hz)
+
+    @classmethod
+    def propose(cls, evidence: Evidence) -> Self | None:
+        rows = [row for h in evidence.heard if h.model is not None for row in _pairs(h)]
+        return cls(*(tuple(r[i] for r in rows) for i in range(3))) if rows else None
+
+
+def _pair(freq: Array, f: float) -> tuple[int, int]:
+    """The two modes of a pair about f; (-1, -1) where there is none."""
+    near = np.flatnonzero(np.abs(freq / f - 1) < 2 * PAIR)
+    if len(near) < 2:
+        return -1, -1
+    gaps = np.abs(freq[near[:-1]] + freq[near[1:]] - 2 * f) + 4 * np.diff(freq[near])
+    i = int(np.argmin(gaps))
+    return int(near[i]), int(near[i + 1])
+
+
+def _pairs(h: Heard) -> list[tuple[float, float, float]]:
+    """(f, ε, ψ) of every pair of modes that two lines stand for."""
+    assert h.model is not None
+    every = np.concatenate([h.freq_hz, h.foreign_hz])
+    amplitude = np.concatenate([h.amplitude, h.foreign_amplitude], axis=1)
+    spread = np.concatenate([h.amplitude_sd, h.foreign_sd], axis=1)
+    level = np.where(np.isfinite(h.impulse_n_s), h.impulse_n_s, 1.0)
+    strike = np.einsum("sxm,sx->sm", h.model.shape[h.strike_vertex].astype(float), h.strike_way) * level[:, None]
+    sensor = np.einsum("xm,x->m", h.model.shape[h.sensor_vertex].astype(float), h.sensor_way)
+    model_hz = h.model.freq_hz
+    strongest = np.abs(amplitude).max()
+    found = []
+    for a in np.flatnonzero(np.diff(model_hz) < PAIR * model_hz[:-1]):
+        b, middle = a + 1, (model_hz[a] + model_hz[a + 1]) / 2
+        near = np.flatnonzero((np.abs(every / middle - 1) < SPLIT[1]) & (np.abs(amplitude).max(axis=0) > LOUD * strongest))
+        near = near[np.argsort(-np.abs(amplitude[:, near]).max(axis=0))][:2]
+        if len(near) < 2:
+            continue
+        low, high = sorted(near, key=lambda i: every[i])
+        split = 2 * (every[high] - every[low]) / (every[high] + every[low])
+        if not SPLIT[0] < split < SPLIT[1]:
+            continue
+        turn, alike = _turn(strike[:, [a, b]], sensor[[a, b]], amplitude[:, [low, high]], spread[:, [low, high]], h.signed)
+        if alike > ALIKE:
+            found.append((float((every[low] + every[high]) / 2), float(split), turn))
+    return found
+
+
+def _turn(strike: Array, sensor: Array, amplitude: Array, spread: Array, signed: bool) -> tuple[float, float]:
+    """ψ by the two lines' patterns (s, 2), and how alike they then are."""
+    best = (0.0, 0.0)
+    heard = np.real(amplitude * np.exp(-1j * np.angle((amplitude**2).sum(axis=0)) / 2)) if signed else np.abs(amplitude)
+    for turn in np.linspace(0, np.pi, 181)[:-1]:
+        c, s = np.cos(turn), np.sin(turn)
+        told = np.stack([(strike @ (c, s)) * (sensor @ (c, s)), (strike @ (-s, c)) * (sensor @ (-s, c))], axis=1)
+        if not signed:
+            told = np.abs(told)
+        fit = 0.0
+        for i in range(2):
+            fit += abs(float(told[:, i] @ heard[:, i])) / max(float(np.linalg.norm(told[:, i]) * np.linalg.norm(heard[:, i])), 1e-300)
+        ratio = np.linalg.norm(told, axis=0) / max(np.linalg.norm(told), 1e-300) @ np.linalg.norm(heard, axis=0) / max(np.linalg.norm(heard), 1e-300)
+        score = 0.5 * fit * float(np.sqrt(max(ratio, 0.0)))
+        if score > best[1]:
+            best = (float(turn), score)
+    return best

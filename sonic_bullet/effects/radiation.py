@@ -1,0 +1,104 @@
+"""`radiation`: a mode loses energy to the air as it radiates, and is heard as it does.
+
+    Δd = s ½ ρ₀ c σ A,  A = ∮(φ·n)² dS,  σ = (ka)²/(1 + (ka)²)  [k = ω/c; Kinsler et al. 2000, ch. 7; Fahy & Gardonio 2007, ch. 3]
+    level tilts as √σ where the sensor hears the far field
+
+Read off the decays beside Rayleigh's: what is left grows with ka, then flattens, and goes with each mode's own area A.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from sonic_bullet.effects.values import Evidence, Heard, Owner, Stage
+from sonic_bullet.records import Array, ModalModel
+
+IMPEDANCE = 1.2 * 343.0  # ρ₀ c in kg/(m² s)
+SOUND = 343.0
+SCATTER = 0.03
+BETTER = 14.0
+
+
+@dataclass(frozen=True)
+class Radiation:
+    """Radius a of the equivalent source in m; strength s against the law's own 1; tilt: exponent of σ in the level at the sensor, 0 or ½."""
+
+    id: ClassVar[str] = "radiation"
+    stage: ClassVar[Stage] = Stage.MODES
+    owner: ClassVar[Owner] = Owner.OBJECT
+    reference: ClassVar[str] = "Fahy & Gardonio 2007, ch. 3"
+
+    radius_m: float
+    strength: float
+    tilt: float = 0.0
+
+    def efficiency(self, freq_hz: Array) -> Array:
+        """σ (k,)."""
+        ka2 = (2 * np.pi * np.asarray(freq_hz) * self.radius_m / SOUND) ** 2
+        return np.asarray(ka2 / (1 + ka2))
+
+    def apply(self, x: ModalModel) -> ModalModel:
+        sigma = self.efficiency(x.freq_hz)
+        omega = np.sqrt(x.omega0_squared_per_s2)
+        decay = np.minimum(x.decay_per_s + self.strength * 0.5 * IMPEDANCE * sigma * areas(x), 0.99 * omega)
+        freq = np.sqrt(omega**2 - decay**2) / (2 * np.pi)
+        order = np.argsort(freq, kind="stable")
+        shape = x.shape.copy()
+        if self.tilt:
+            shape[-1] *= (sigma**self.tilt).astype(np.float32)  # the last vertex is the sensor's
+        return replace(x, freq_hz=freq[order], decay_per_s=decay[order], shape=shape[:, :, order])
+
+    def parameters(self) -> dict[str, Any]:
+        return {"radius_m": self.radius_m, "strength": self.strength, "tilt": self.tilt}
+
+    def freedom(self) -> int:
+        return 2
+
+    @classmethod
+    def propose(cls, evidence: Evidence) -> Self | None:
+        heard = max(evidence.heard, key=lambda h: len(h.freq_hz) if h.model is not None else 0)
+        if heard.model is None or len(heard.freq_hz) < 6:
+            return None
+        area = areas(heard.model)
+        mine = np.array([area[m].mean() for m in heard.mode])
+        decay, w2 = heard.decay_per_s, heard.omega**2
+        sd = np.hypot(heard.decay_sd_per_s, SCATTER * decay) + 1e-3
+        across = float(np.linalg.norm(np.ptp(heard.model.vertex_m[np.unique(heard.model.face)], axis=0)))
+        plain = _left(decay, sd, np.stack([np.full(len(w2), 0.5), 0.5 * w2], axis=1))[1]
+        best: tuple[float, float, float] = (np.inf, 0.0, 0.0)
+        for radius in np.geomspace(0.02 * across, across, 40):
+            sigma = cls(float(radius), 1.0).efficiency(heard.freq_hz)
+            x, left = _left(decay, sd, np.stack([np.full(len(w2), 0.5), 0.5 * w2, 0.5 * IMPEDANCE * sigma * mine], axis=1))
+            if x[2] > 0 and left < best[0]:
+                best = (left, float(radius), float(x[2]))
+        if not plain - best[0] > BETTER + 2 * np.log(len(w2)) or best[0] > 0.5 * plain:
+            return None
+        made = cls(best[1], best[2])
+        return cls(best[1], best[2], _tilt(heard, made))
+
+
+def areas(x: ModalModel) -> Array:
+    """A = ∮(φ·n)² dS (m,) in 1/kg·m²."""
+    corner = x.vertex_m[x.face]
+    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]) / 2
+    size = np.linalg.norm(normal, axis=1)
+    mean = x.shape[x.face].astype(float).mean(axis=1)
+    along = np.einsum("fxm,fx->fm", mean, normal / np.maximum(size, 1e-300)[:, None])
+    return np.asarray((along**2 * size[:, None]).sum(axis=0))
+
+
+def _left(decay: Array, sd: Array, columns: Array) -> tuple[Array, float]:
+    from sonic_bullet.effects.points import _solve
+
+    return _solve(decay, 1 / sd, columns, True)
+
+
+def _tilt(heard: Heard, made: Radiation) -> float:
+    """0 or ½, whichever the amplitudes follow better."""
+    ratio = np.log(np.maximum(np.abs(heard.amplitude), 1e-300) / np.maximum(np.abs(heard.expected), 1e-300))
+    middle = np.median(ratio, axis=0)
+    tilt = 0.5 * np.log(made.efficiency(heard.freq_hz))
+    return 0.5 if np.abs(middle - tilt - np.median(middle - tilt)).mean() < 0.8 * np.abs(middle - np.median(middle)).mean() else 0.0

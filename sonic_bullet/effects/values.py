@@ -1,0 +1,181 @@
+"""What effects act on, what they are told, and what every effect is.
+
+    MATERIAL  Material   -> Material      stiffness, density: the host solves the modes again
+    MODES     ModalModel -> ModalModel    frequencies, decays, shapes
+    FORCE     Blow       -> Blow          when, how long, how often a strike presses
+    BANK      Ring       -> Ring          how a ringing mode depends on its own level
+    SOUND     Sound      -> Sound         what happens on the way to the file
+
+An effect is physics with few parameters. `propose` reads them off the evidence, or says None; it never scores itself: the diagnosis
+renders strikes that were not fitted, with and without it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any, ClassVar, Protocol, Self, runtime_checkable
+
+import numpy as np
+
+from sonic_bullet.records import Array, ModalModel
+
+
+class Stage(Enum):
+    """Where an effect acts, in the order in which sound is made."""
+
+    MATERIAL = "material"
+    MODES = "modes"
+    FORCE = "force"
+    BANK = "bank"
+    SOUND = "sound"
+
+
+class Owner(Enum):
+    """Whose an effect is. What belongs to material and object goes into a preset; to material, room and chain, to other objects too."""
+
+    MATERIAL = "material"
+    OBJECT = "object"
+    FIXTURE = "fixture"
+    STRIKER = "striker"
+    ROOM = "room"
+    CHAIN = "chain"
+
+
+CARRIES = frozenset({Owner.MATERIAL, Owner.STRIKER, Owner.ROOM, Owner.CHAIN})  # over to another object of the material
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Blow:
+    """A strike of impulse_n_s: h hits after delay_s (h,), each with share (h,) of it, each a pulse of the duration tau_s, 0 for none. pulse: see `pulses`."""
+
+    impulse_n_s: float
+    delay_s: Array
+    share: Array
+    tau_s: float = 0.0
+    pulse: str = "impulse"
+
+    def spectrum(self, freq_hz: Array) -> Array:
+        """Complex share (f,) of the impulse that a mode at freq_hz takes from one hit, the hit beginning at 0."""
+        from sonic_bullet.effects.pulses import spectrum
+
+        return spectrum(self.pulse, self.tau_s, freq_hz)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Ring:
+    """m modes as one strike starts them: freq_hz, decay_per_s (m,), amplitude (m,) complex at the sensor; level (m,): peak velocity at the surface in m/s.
+
+    bend, choke (m,): relative change of frequency per level², of decay per level; 0 in a linear body.
+    """
+
+    freq_hz: Array
+    decay_per_s: Array
+    amplitude: Array
+    level: Array
+    bend: Array
+    choke: Array
+    impulse_n_s: float = 1.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sound:
+    """A strike's sound (n,) in units of the file, from the onset on, and what made it. impulse_n_s: 1 where unknown. direct (n,): the first sound, untouched."""
+
+    sample: Array
+    sr: int
+    impulse_n_s: float
+    strike: int = -1  # of the fitted ones, where an effect was fitted to each of them; -1 else
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Heard:
+    """One object's strikes: k lines that are modes, beside what the model so far expects, and what it leaves.
+
+    freq_hz, decay_per_s and their spreads (k,); amplitude (s, k) complex at the onset and its spread. mode: the modes of `model` each line stands for.
+    model_hz (k,): the mesh's own, without corrections; expected_decay_per_s (k,), expected (s, k): of the model with the effects found so far.
+    pattern (s, k): J ψ, real. foreign_*: lines that are no mode, amplitudes (s, f). model: the body with its strikes and sensor as last vertices,
+    strike_vertex (s,), strike_way (s, 3), sensor_vertex, sensor_way (3,). signal, predicted (s, n) from the onset on, None for lists of features.
+    noise (s,): rms. signed: phases are true.
+    """
+
+    impulse_n_s: Array
+    freq_hz: Array
+    decay_per_s: Array
+    freq_sd_hz: Array
+    decay_sd_per_s: Array
+    amplitude: Array
+    amplitude_sd: Array
+    mode: tuple[Array, ...]
+    model_hz: Array
+    expected_decay_per_s: Array
+    expected: Array
+    pattern: Array
+    foreign_hz: Array
+    foreign_decay_per_s: Array
+    foreign_amplitude: Array
+    foreign_sd: Array
+    model: ModalModel | None
+    strike_vertex: Array
+    strike_way: Array
+    sensor_vertex: int
+    sensor_way: Array
+    signal: Array | None
+    predicted: Array | None
+    noise: Array
+    sr: int
+    signed: bool
+    push: Array  # (s, m) complex: every mode's amplitude at the sensor under the model so far, its pulse included
+    all_hz: Array  # (m,) their frequencies
+    strike: tuple[int, ...] = ()
+
+    @property
+    def residual(self) -> Array:
+        """signal - predicted (s, n)."""
+        assert self.signal is not None and self.predicted is not None
+        return np.asarray(self.signal - self.predicted)
+
+    @property
+    def omega(self) -> Array:
+        """Undamped angular frequency (k,) of the lines."""
+        return np.asarray(np.hypot(2 * np.pi * self.freq_hz, np.nan_to_num(self.decay_per_s)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Evidence:
+    """All that an effect is told: the objects' strikes, the material's α and β and the case's gain so far, effects found so far by id, band and density."""
+
+    heard: tuple[Heard, ...]
+    alpha_per_s: float
+    beta_s: float
+    gain: float
+    found: tuple[str, ...]
+    band_hz: tuple[float, float]
+    seed: int = 0
+
+
+@runtime_checkable
+class Effect(Protocol):
+    """One physical effect: a frozen dataclass of its parameters. Every member also has a docstring that gives its equation."""
+
+    id: ClassVar[str]
+    stage: ClassVar[Stage]
+    owner: ClassVar[Owner]
+    reference: ClassVar[str]
+
+    def apply(self, x: Any) -> Any:
+        """The stage's value with the effect in it; x is left as it is."""
+        ...
+
+    @classmethod
+    def propose(cls, evidence: Evidence) -> Self | None:
+        """The effect with the parameters that the evidence suggests, or None where it suggests none."""
+        ...
+
+    def parameters(self) -> dict[str, Any]:
+        """Numbers, by name with unit, that say what it is: what a report and a preset hold."""
+        ...
+
+    def freedom(self) -> int:
+        """How many numbers were free when it was proposed."""
+        ...
