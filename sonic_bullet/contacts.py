@@ -106,7 +106,10 @@ class Step:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ContactLog:
-    """Everything a later render needs, by value: bodies with their models, steps, sensors, rate and seed."""
+    """Everything a later render needs, by value: bodies with their models, steps, sensors, rate and seed.
+
+    untouched: ids of bodies that were in the world and touched nothing; known while listening, not kept in files.
+    """
 
     bodies: tuple[Body, ...]
     steps: tuple[Step, ...]
@@ -114,6 +117,7 @@ class ContactLog:
     sr: int
     seed: int
     air: Air = field(default_factory=Air)
+    untouched: frozenset[int] = frozenset()
 
     def __post_init__(self) -> None:
         for step in self.steps:
@@ -167,6 +171,8 @@ class ContactLog:
 
     def _side(self, rows: Contacts, body: int, link: int | None) -> tuple[Array, Array]:
         bearers = [i for i, x in enumerate(self.bodies) if x.body_id == body and (link is None or x.link == link)]
+        if not bearers and body in self.untouched:
+            return np.zeros(len(rows)), np.zeros(len(rows), bool)
         if not bearers:
             known = sorted({x.body_id for x in self.bodies})
             raise LogError(f"the log holds no body {body}" + ("" if link is None else f" link {link}"), f"known bodies: {known}")

@@ -199,7 +199,7 @@ class Listener:
     @property
     def contacts(self) -> ContactLog:
         """The contact log so far: all that a later render needs."""
-        return ContactLog(tuple(self.world.bodies), tuple(self._steps), self.sensors, self.sr, self.seed, self.air)
+        return ContactLog(tuple(self.world.bodies), tuple(self._steps), self.sensors, self.sr, self.seed, self.air, self.world.untouched)
 
     @property
     def time_s(self) -> float:

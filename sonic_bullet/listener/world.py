@@ -65,6 +65,11 @@ class World:
         """All bodies ever met, in the order that Contacts.a and Contacts.b count them."""
         return tuple(self._bodies)
 
+    @property
+    def untouched(self) -> frozenset[int]:
+        """Ids of the bodies that were in the world at the last step and have met nobody yet."""
+        return frozenset(body for body, _, _ in self._past.roster.bodies) - {code // LINK_SPAN for code in self._live}
+
     def index_of(self, body: int, link: int = -1) -> int:
         """Index into `bodies` of the living record of a link, or -1."""
         return self._live.get(int(encode(body, link)), -1)

@@ -371,3 +371,13 @@ def test_casts_that_make_no_sense_are_one_line(tmp_path: Path, cast: str) -> Non
     with pytest.raises(SonicBulletError) as error:
         render_scene(scene, seconds=0.1)
     one_line(error)
+
+
+def test_a_body_that_has_touched_nothing_has_no_impulses(client: Any) -> None:
+    body = box(client, (0, 0, 5))
+    listener = sb.attach(client)
+    steps(client, 3)
+    assert listener.contacts.impulse_on(body).shape == (0, 3)
+    assert listener.contacts.rows_on(body).shape == (0,)
+    with pytest.raises(LogError, match="no body 7"):
+        listener.contacts.impulse_on(7)
