@@ -50,7 +50,8 @@ class MaterialFit:
     """What recordings say of a material. parameters: (α 1/s, β s, γ m²/s², σ, ν), γ = E/ρ; covariance (5, 5) of ln α, ln β, ln γ, ln σ, ν.
 
     A row and column of NaN: that parameter is not identifiable, and the verdict says so. verdict: "fitted", or why not, one line.
-    metric: the hybrid metric Π there (metric.py), mean over the fitted strikes, -1 where there is nothing to compare. modes: per mode freq_hz, decay_per_s, amplitude (m,) of the fitted model at the first strike.
+    metric: the hybrid metric Π there (metric.py), mean over the fitted strikes, -1 where there is nothing to compare.
+    modes: per mode freq_hz, decay_per_s, amplitude (m,) of the fitted model at the first strike.
     """
 
     alpha_per_s: float
