@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import os
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -42,9 +42,43 @@ class Plan:
     form: str = "audio"
 
 
+LEAST = (1.0, 1.8, 3.0)  # dB beyond the floor, in squares, that a weak, medium, strong effect must move the holdout strikes
+TRIES = 6
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Take:
+    """A case made, not yet written: bodies and sensors, strikes with the body each is of, sounds, what rings, truth."""
+
+    bodies: list[Body]
+    sensors: list[tuple[int, np.ndarray]]
+    strikes: list[Strike]
+    owner: list[int]
+    heard: list[np.ndarray]
+    ringing: physics.Ring
+    truth: dict[str, Any]
+
+
 def make_case(folder: Path, plan: Plan, cache: Path) -> dict[str, Any]:
-    """Writes folder/plan.name whole (case.json last, by rename) and gives its truth."""
-    rng = np.random.default_rng(plan.seed)
+    """Writes folder/plan.name whole (case.json last, by rename) and gives its truth.
+
+    An effect that cannot be heard is drawn again, up to TRIES times; then the strongest draw is kept.
+    """
+    best, most = None, -1.0
+    for attempt in range(TRIES if plan.effects else 1):
+        take = _take(plan, np.random.default_rng([plan.seed, attempt]), cache)
+        moved, floor = (take.truth["distance_db"][k] for k in ("effect", "floor"))
+        beyond = float(np.sqrt(max(0.0, moved**2 - floor**2)))
+        if beyond > most:
+            best, most = take, beyond
+        if not plan.effects or beyond >= LEAST[min(s for _, s in plan.effects)]:
+            break
+    assert best is not None
+    _save(folder / plan.name, plan, best)
+    return best.truth
+
+
+def _take(plan: Plan, rng: np.random.Generator, cache: Path) -> Take:
     recipe = RECIPES[plan.recipe]
     material = _as_it_is(MATERIALS[recipe.material], rng)
     unit = objects.solved(recipe, material.poisson, cache, fineness=plan.fineness)
@@ -59,57 +93,55 @@ def make_case(folder: Path, plan: Plan, cache: Path) -> dict[str, Any]:
     unit_now = next((e.modes(recipe, material.poisson, cache) for e in effects if e.modes), unit)
     body = objects.body(recipe.name, objects.as_made(unit_now, material))
     bodies, sensors = [body], [sensor]
-    all_strikes, owner, split = list(strikes), [0] * 8, ["fit"] * 5 + ["holdout"] * 3
+    all_strikes, owner = list(strikes), [0] * 8
     if plan.transfer:
-        other = _other(recipe, material, effects, rng, plan, cache)
-        bodies.append(other)
-        sensors.append(_sensor(other, rng))
-        more = _strikes(other, rng, 3)[1:]
-        all_strikes += more
-        owner += [1] * len(more)
-        split += ["transfer"] * len(more)
-    carried = tuple(e for e in effects if e.belongs in CARRIED)
-    clean = [_strike_sound(scene, bodies[o], s, sensors[o], effects if o == 0 else carried, i) for i, (s, o) in enumerate(zip(all_strikes, owner, strict=True))]
-    loudest = max(float(np.abs(x).max()) for x in clean)
-    too_loud = min(1.0, 0.95 / loudest)
+        bodies.append(_other(recipe, material, effects, rng, plan, cache))
+        sensors.append(_sensor(bodies[1], rng))
+        all_strikes += _strikes(bodies[1], rng, 3)[1:]
+        owner += [1, 1]
+    acting = (effects, tuple(e for e in effects if e.belongs in CARRIED))
+    clean = [_strike_sound(scene, bodies[o], s, sensors[o], acting[o], i) for i, (s, o) in enumerate(zip(all_strikes, owner, strict=True))]
+    quieter = min(1.0, 0.95 / max(float(np.abs(x).max()) for x in clean))
     sd = PEAK * 10 ** (plan.noise_db / 20)
-    heard = [too_loud * x + physics.noise(rng, n, sd, plan.colour) for x in clean]
+    heard = [quieter * x + physics.noise(rng, n, sd, plan.colour) for x in clean]
     for e in effects:
         if e.last is not None:
             heard = [e.last(x) for x in heard]
-    distance = _distances(dry, heard[5:8], scene.gain, sd, plan.colour, rng)
-    files = [f"strike-{i + 1:02d}.flac" for i in range(len(heard))]
-    where = folder / plan.name
-    where.mkdir(parents=True, exist_ok=True)
     ringing = physics.ring(_paired(body, effects), _damping(body, material, effects), strikes[0], sensor)
     truth = {
         "effects": [{"id": e.id, "strength": s, **e.truth} for e, (_, s) in zip(effects, plan.effects, strict=True)],
         "alpha": material.alpha,
         "beta": material.beta,
-        "sigma": scene.gain * too_loud,
+        "sigma": scene.gain * quieter,
         "modes_hz": np.round(np.abs(ringing.pole.imag) / (2 * np.pi), 3).tolist(),
         "decay_per_s": np.round(-ringing.pole.real, 4).tolist(),
         "youngs_modulus": material.youngs_pa,
         "density": material.density,
         "poisson_ratio": material.poisson,
         "noise_sd": sd,
-        "distance_db": distance,
-        "plan": {"recipe": plan.recipe, "seed": plan.seed, "form": plan.form, "fineness": plan.fineness, "noise_db": plan.noise_db, "colour": plan.colour},
+        "distance_db": _distances(dry, heard[5:8], scene.gain, sd, plan.colour, rng),
+        "plan": asdict(plan),
     }
+    return Take(bodies, sensors, all_strikes, owner, heard, ringing, truth)
+
+
+def _save(where: Path, plan: Plan, take: Take) -> None:
+    where.mkdir(parents=True, exist_ok=True)
     if plan.form == "features":
-        entries = _measured(ringing, recipe.name, rng)
+        entries = _measured(take.ringing, plan.recipe, np.random.default_rng(plan.seed))
     else:
-        for name, x in zip(files, heard, strict=True):
+        files = [f"strike-{i + 1:02d}.flac" for i in range(len(take.heard))]
+        for name, x in zip(files, take.heard, strict=True):
             _write(where / name, x, plan.rate)
-        entries = [_entry(f, bodies[o], s, p) for f, o, s, p in zip(files, owner, all_strikes, split, strict=True)]
+        splits = ["fit"] * 5 + ["holdout"] * 3 + ["transfer"] * (len(files) - 8)
+        entries = [_entry(f, take.bodies[o], s, p) for f, o, s, p in zip(files, take.owner, take.strikes, splits, strict=True)]
     if plan.form != "no-mesh":
-        for b in bodies:
+        for b in take.bodies:
             objects.write_obj(where / f"{b.name}.obj", b)
-    (where / "truth.json").write_text(json.dumps(truth, indent=1, default=float))
+    (where / "truth.json").write_text(json.dumps(take.truth, indent=1, default=float))
     partial = where / "case.json.partial"
-    partial.write_text(json.dumps(_declared(plan, bodies, recipe, sensors, entries), indent=1, default=float))
+    partial.write_text(json.dumps(_declared(plan, take.bodies, RECIPES[plan.recipe], take.sensors, entries), indent=1, default=float))
     os.replace(partial, where / "case.json")
-    return truth
 
 
 def _as_it_is(guess: Material, rng: np.random.Generator) -> Material:

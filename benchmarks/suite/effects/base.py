@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.suite.bricks import Modes
 from benchmarks.suite.objects import Body, Material, Recipe
 from benchmarks.suite.physics import Ring, Strike
-from benchmarks.suite.bricks import Modes
 
 CARRIED = ("material", "striker", "room", "chain")  # what another object of the same material meets too
 LOUD = 0.04  # N·s: the impulse at which strengths hold

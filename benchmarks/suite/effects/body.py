@@ -25,7 +25,7 @@ def damping_law(strength: int, rng: np.random.Generator, scene: Scene) -> Effect
     value = scene.body.modes.value
     middle = float(np.median(value) ** 0.5)
     plain = scene.material.alpha + scene.material.beta * middle**2
-    eta = jitter(rng, pick(strength, 0.5, 1.5, 5) * plain / middle)
+    eta = jitter(rng, pick(strength, 0.5, 1, 2.5) * plain / middle)
     law = ("constant-loss", "power", "relaxation")[int(rng.integers(3))]
     truth: dict[str, object] = {"law": law}
     if law == "constant-loss":
@@ -54,11 +54,12 @@ def damping_law(strength: int, rng: np.random.Generator, scene: Scene) -> Effect
 def support_damping(strength: int, rng: np.random.Generator, scene: Scene) -> Effect:
     """Dashpots at one to three points of the surface, across it or in every direction."""
     body = scene.body
-    points = rng.choice(np.flatnonzero(np.isfinite(body.normal[:, 0])), int(rng.integers(1, 4)), replace=False)
+    moving = np.nan_to_num((np.einsum("vx,vxm->vm", body.normal, body.modes.shape) ** 2).mean(axis=1))
+    points = rng.choice(np.flatnonzero(moving > np.median(moving)), int(rng.integers(1, 4)), replace=False)
     plain = np.median(scene.material.alpha + scene.material.beta * body.modes.value)
     ways = [body.normal[[v]] if rng.random() < 0.6 else np.eye(3) for v in points]
     phi = np.concatenate([way @ body.modes.shape[v] for v, way in zip(points, ways, strict=True)])  # (k, m)
-    c = jitter(rng, pick(strength, 1.0, 4, 15) * plain / np.median((phi**2).sum(axis=0)))
+    c = jitter(rng, pick(strength, 0.2, 0.8, 3) * plain / (phi**2).sum(axis=0).mean())
     truth = {"vertices": [int(v) for v in points], "c": c}
 
     def damping(modes: Modes, d: np.ndarray) -> np.ndarray:
