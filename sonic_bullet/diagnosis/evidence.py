@@ -80,6 +80,7 @@ def heard_of(h: Hypothesis, body: Struck) -> Heard:
         signed=lines.signed,
         push=h.gain * push * spectrum,
         all_hz=model.freq_hz,
+        plain=plain if body.family is not None else None,
         strike=tuple(range(len(mine))),
     )
 

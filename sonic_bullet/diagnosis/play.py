@@ -19,13 +19,17 @@ from sonic_bullet.records import Array, ModalModel
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Hypothesis:
-    """α, β and gain σ of the case, and the effects in it. correction: by object, (m,) relative; absent: the mesh's own frequencies."""
+    """α, β and gain σ of the case, and the effects in it. correction: by object, (m,) relative; absent: the mesh's own frequencies.
+
+    stretch: ln of what all frequencies are multiplied with, as E/ρ is fitted again beside effects that move modes.
+    """
 
     alpha_per_s: float
     beta_s: float
     gain: float
     effects: tuple[Effect, ...] = ()
     correction: dict[str, Array] | None = None
+    stretch: float = 0.0
 
     def at(self, stage: Stage, *, fitted: bool = True) -> tuple[Effect, ...]:
         """The effects of a stage; on an object that was not fitted only those that carry over."""
@@ -43,7 +47,7 @@ def ordered(model: ModalModel, freq_hz: Array, decay_per_s: Array, shape: Array 
 def modes_of(h: Hypothesis, body: Struck, *, upto: int | None = None) -> tuple[ModalModel, Array]:
     """The body's damped modes under the hypothesis (its first ``upto`` effects on them), and which uncorrected mode each was (m,)."""
     correction = np.zeros(len(body.correction)) if h.correction is None else h.correction.get(body.name, np.zeros(len(body.correction)))
-    lam = (2 * np.pi * body.model.freq_hz * (1 + correction)) ** 2
+    lam = (2 * np.pi * body.model.freq_hz * (1 + correction) * np.exp(h.stretch)) ** 2
     decay = (h.alpha_per_s + h.beta_s * lam) / 2
     model, order = ordered(body.model, np.sqrt(np.maximum(lam - decay**2, 0)) / (2 * np.pi), decay)
     fitted = body.gathered is not None

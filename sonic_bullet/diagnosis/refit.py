@@ -15,7 +15,7 @@ import numpy as np
 from sonic_bullet.diagnosis.bodies import Struck
 from sonic_bullet.diagnosis.evidence import MOVES, heard_of, paired
 from sonic_bullet.diagnosis.play import Hypothesis, modes_of
-from sonic_bullet.effects.values import Evidence, Heard, Stage
+from sonic_bullet.effects.values import Heard, Stage
 from sonic_bullet.estimator.rayleigh import rayleigh
 from sonic_bullet.records import Array
 
@@ -35,22 +35,34 @@ def refitted(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...]
 
 
 def corrected(h: Hypothesis, bodies: tuple[Struck, ...]) -> Hypothesis:
-    """The hypothesis with corrections learnt on its own modes."""
+    """The hypothesis with E/ρ and corrections learnt on its own modes."""
+    h = replace(h, correction={name: np.zeros(len(c)) for name, c in (h.correction or {}).items()}, stretch=0.0)
+    for _ in range(3):
+        off = np.concatenate([_off(h, body)[1] for body in bodies if body.gathered is not None] or [np.zeros(0)])
+        if len(off):
+            h = replace(h, stretch=h.stretch + float(np.median(off)))
     found = dict(h.correction or {})
     for body in bodies:
         if body.gathered is None:
             continue
-        lines = body.gathered.lines
         for _ in range(2):
-            trial = replace(h, correction=found)
-            model, order = modes_of(trial, body)
-            line, mode = paired(trial, body, model, order)
+            place, off = _off(replace(h, correction=found), body)
             ratio = np.array(found.get(body.name, np.zeros(len(body.correction))), float)
-            off = np.zeros(len(ratio))
-            for one, who in zip(line, mode, strict=True):
-                off[order[who]] = lines.freq_hz[one] / model.freq_hz[who].mean() - 1
-            found[body.name] = np.clip((1 + ratio) * (1 + off) - 1, -CORRECTION, CORRECTION)
+            step = np.zeros(len(ratio))
+            step[place] = np.expm1(off)
+            found[body.name] = np.clip((1 + ratio) * (1 + step) - 1, -CORRECTION, CORRECTION)
     return replace(h, correction=found)
+
+
+def _off(h: Hypothesis, body: Struck) -> tuple[Array, Array]:
+    """Uncorrected modes (p,) of a body and ln f of their lines over their own (p,)."""
+    assert body.gathered is not None
+    model, order = modes_of(h, body)
+    line, mode = paired(h, body, model, order)
+    place = np.concatenate([order[who] for who in mode]) if mode else np.zeros(0, int)
+    lines = body.gathered.lines.freq_hz
+    off = np.concatenate([np.full(len(who), np.log(lines[one] / model.freq_hz[who].mean())) for one, who in zip(line, mode, strict=True)] or [np.zeros(0)])
+    return place, off
 
 
 def _damped(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...]) -> Hypothesis:

@@ -2,7 +2,8 @@
 
     (Λ − λ (1 + m ΦᵀΦ)) q = 0,  Φ = φ(p) (3, n)      to first order Δλ/λ = −m |φ(p)|²                [Rayleigh 1894, § 88-90; modal synthesis]
 
-Read off the frequencies: what is left beside a common factor and a little of ν goes as −φ² at one point.
+Read off frequencies and patterns together: for points all over the surface and masses up to a sixth of the body's, lines are paired with the loaded
+body's modes anew; the pairs that agree best stand, where they agree better than the bare body's.
 """
 
 from __future__ import annotations
@@ -12,14 +13,15 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from sonic_bullet.effects.points import best_spot, candidates
+from sonic_bullet.effects.pairs import agreed, every_line, patterns
 from sonic_bullet.effects.support_damping import nearest
-from sonic_bullet.effects.values import Evidence, Owner, Stage
-from sonic_bullet.records import ModalModel
+from sonic_bullet.effects.values import Evidence, Heard, Owner, Stage
+from sonic_bullet.records import Array, ModalModel
 
-MESH = 1.2e-3  # relative error of a mode's frequency, the mesh's
-BETTER = 20.0
-LEAST = 2e-3  # the largest shift, relative, that is worth a name
+POINTS = 140
+SHARES = (0.002, 0.006, 0.015, 0.035, 0.08, 0.16)  # of the body's mass
+TRIES = 4
+BETTER = 1.0  # in price: as much as one strong line, paired well
 
 
 @dataclass(frozen=True)
@@ -37,22 +39,7 @@ class AddedMass:
     def apply(self, x: ModalModel) -> ModalModel:
         if not x.mode_count or self.mass_kg == 0:
             return x
-        lam = x.omega0_squared_per_s2
-        phi = x.shape[nearest(x, self.position_m)].astype(float)
-        root = 1 / np.sqrt(lam)  # Λ^{-1/2}(1 + mΦᵀΦ)Λ^{-1/2} q' = q'/λ, so the lowest modes come out best
-        flex = (np.eye(len(lam)) + self.mass_kg * phi.T @ phi) * root[:, None] * root
-        value, vector = np.linalg.eigh(flex)
-        value, vector = value[::-1], vector[:, ::-1]
-        turn = root[:, None] * vector / np.sqrt(value)
-        new = 1 / value
-        share = turn**2 * 1.0
-        decay = (share * x.decay_per_s[:, None]).sum(axis=0)  # ΦᵀCΦ of modes that mix; mass-proportional parts fall with the mass added
-        omega = np.sqrt(new)
-        decay = np.minimum(decay, 0.99 * omega)
-        freq = np.sqrt(new - decay**2) / (2 * np.pi)
-        order = np.argsort(freq, kind="stable")
-        shape = np.einsum("vxm,mn->vxn", x.shape, turn.astype(np.float32))
-        return replace(x, freq_hz=freq[order], decay_per_s=decay[order], shape=shape[:, :, order])
+        return loaded(x, x.shape[nearest(x, self.position_m)].astype(float), self.mass_kg)
 
     def parameters(self) -> dict[str, Any]:
         return {"mass_kg": self.mass_kg, "position_m": list(self.position_m)}
@@ -62,19 +49,85 @@ class AddedMass:
 
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
-        heard = max(evidence.heard, key=lambda h: len(h.freq_hz) if h.model is not None else 0)
-        if heard.model is None or len(heard.freq_hz) < 8:
+        heard = max(evidence.heard, key=lambda h: len(h.freq_hz) if h.plain is not None else 0)
+        if heard.plain is None or len(heard.freq_hz) + len(heard.foreign_hz) < 8 or not heard.plain.mass_kg:
             return None
-        shift = 2 * np.log(heard.freq_hz / heard.model_hz)
-        sd = 2 * np.hypot(heard.freq_sd_hz / heard.freq_hz, MESH)
-        x = np.log(heard.freq_hz)
-        columns = np.stack([np.ones(len(x)), x - x.mean()], axis=1)
-        vertex, square = candidates(heard)
-        spot = best_spot(shift, sd, columns, vertex, -square, not_negative=False)
-        if spot is None or spot.strength <= 0 or spot.before - spot.left < BETTER + 4 * np.log(len(x)):
+        line, size, _, _ = every_line(heard)
+        small = _at_points(heard.plain, heard)
+        none = agreed(line, size, heard.plain.freq_hz, patterns(heard, heard.plain))
+        found = []
+        for vertex in spread_out(heard.plain, POINTS):
+            for share in SHARES:
+                mass = share * heard.plain.mass_kg
+                score = _score(small, heard, heard.plain.shape[vertex].astype(float), mass, line, size)[0]
+                found.append((score, vertex, mass))
+        found.sort()
+        score, vertex, mass = min(_refined(small, heard, start, line, size) for start in found[:TRIES])
+        if score > none[0] - BETTER:
             return None
-        i = int(np.searchsorted(vertex, spot.vertex))
-        if 0.5 * spot.strength * square[i].max() < LEAST or spot.left > 0.5 * spot.before:
-            return None
-        place = heard.model.vertex_m[spot.vertex]
-        return cls((float(place[0]), float(place[1]), float(place[2])), spot.strength)
+        place = heard.plain.vertex_m[vertex]
+        return cls((float(place[0]), float(place[1]), float(place[2])), float(mass))
+
+
+def spread_out(x: ModalModel, count: int) -> Array:
+    """About ``count`` surface vertices (p,), each the farthest from those before it [Gonzalez 1985]."""
+    body = np.unique(x.face)
+    at = x.vertex_m[body]
+    picked = [0]
+    gap = ((at - at[0]) ** 2).sum(axis=1)
+    for _ in range(min(count, len(body)) - 1):
+        picked.append(int(gap.argmax()))
+        gap = np.minimum(gap, ((at - at[picked[-1]]) ** 2).sum(axis=1))
+    return np.asarray(body[picked])
+
+
+def _at_points(x: ModalModel, heard: Heard) -> ModalModel:
+    """The model at its strikes and sensor alone: what a trial needs."""
+    rows = np.append(heard.strike_vertex, heard.sensor_vertex)
+    return replace(x, shape=x.shape[rows], vertex_m=x.vertex_m[rows], face=np.zeros((0, 3), np.int32), curvature_per_m=np.zeros(0))
+
+
+def loaded(x: ModalModel, phi: Array, mass_kg: float) -> ModalModel:
+    """The model with a mass where its modes are phi (3, m)."""
+    lam = x.omega0_squared_per_s2
+    root = 1 / np.sqrt(lam)  # Λ^{-1/2}(1 + mΦᵀΦ)Λ^{-1/2} q' = q'/λ, so the lowest modes come out best
+    value, vector = np.linalg.eigh((np.eye(len(lam)) + mass_kg * phi.T @ phi) * root[:, None] * root)
+    value, vector = value[::-1], vector[:, ::-1]
+    turn = root[:, None] * vector / np.sqrt(value)
+    omega = 1 / np.sqrt(value)
+    decay = np.minimum((turn**2 * x.decay_per_s[:, None]).sum(axis=0), 0.99 * omega)
+    freq = np.sqrt(omega**2 - decay**2) / (2 * np.pi)
+    order = np.argsort(freq, kind="stable")
+    shape = (x.shape.reshape(-1, x.mode_count) @ turn[:, order].astype(np.float32)).reshape(x.shape.shape)
+    return replace(x, freq_hz=freq[order], decay_per_s=decay[order], shape=shape)
+
+
+def _score(small: ModalModel, heard: Heard, phi: Array, mass: float, line: Array, size: Array) -> tuple[float, float]:
+    """Price of the best pairs, and the misfit of their frequencies."""
+    x = loaded(small, phi, mass)
+    s = len(heard.strike_vertex)
+    level = np.where(np.isfinite(heard.impulse_n_s), heard.impulse_n_s, 1.0)
+    push = np.einsum("sxm,sx->sm", x.shape[:s].astype(float), heard.strike_way) * level[:, None]
+    told = np.abs(push * np.einsum("xm,x->m", x.shape[s].astype(float), heard.sensor_way))
+    score, row, column, shift = agreed(line, size, x.freq_hz, told, turns=1)
+    off = np.log(line[row] / x.freq_hz[column]) - shift
+    return score, float(np.minimum(np.abs(off), 0.01).mean()) if len(off) else 0.01
+
+
+def _refined(small: ModalModel, heard: Heard, start: tuple[float, int, float], line: Array, size: Array) -> tuple[float, int, float]:
+    """The best of nearby vertices and masses, in turns."""
+    assert heard.plain is not None
+    x = heard.plain
+    body = np.unique(x.face)
+    score, vertex, mass = start
+    reach = np.linalg.norm(np.ptp(x.vertex_m[body], axis=0)) / np.sqrt(POINTS)
+    for _ in range(4):
+        near = body[((x.vertex_m[body] - x.vertex_m[vertex]) ** 2).sum(axis=1) < reach**2]
+        near = near[:: max(1, len(near) // 24)]
+        trials = [(_score(small, heard, x.shape[v].astype(float), mass, line, size)[0], int(v), mass) for v in near]
+        trials += [(_score(small, heard, x.shape[vertex].astype(float), mass * f, line, size)[0], int(vertex), mass * f) for f in (0.8, 0.9, 0.95, 0.98, 1.02, 1.05, 1.1, 1.25)]
+        best = min(trials)
+        reach *= 0.6
+        if best[0] < score:
+            score, vertex, mass = best
+    return score, vertex, mass

@@ -57,7 +57,7 @@ def vertex_normals(model: ModalModel) -> Array:
 def best_spot(y: Array, sd: Array, nuisance: Array, vertex: Array, square: Array, *, not_negative: bool = True) -> Spot | None:
     """The point whose φ² (p, k) explains y (k,) best beside nuisance (k, c) columns; None where none helps."""
     weight = 1 / sd
-    fixed, at, other = _robust(y, weight, nuisance, square)
+    fixed, at = _plain(y, weight, nuisance), weight
     b, a, v = at[:, None] * nuisance, at * y, at * square
     basis, _ = np.linalg.qr(b)
     r = a - basis @ (basis.T @ a)
@@ -76,9 +76,8 @@ def best_spot(y: Array, sd: Array, nuisance: Array, vertex: Array, square: Array
     return best
 
 
-def _robust(y: Array, weight: Array, nuisance: Array, square: Array) -> tuple[float, Array, Array]:
-    x, left = _solve(y, weight, nuisance, False)
-    return left, weight, x
+def _plain(y: Array, weight: Array, nuisance: Array) -> float:
+    return _solve(y, weight, nuisance, False)[1]
 
 
 def _solve(y: Array, weight: Array, columns: Array, not_negative: bool) -> tuple[Array, float]:

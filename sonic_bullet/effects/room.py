@@ -22,7 +22,7 @@ RT60 = float(np.log(1e3))
 MODEL_ERROR = 0.08  # of the direct sound's spectrum, relative
 TURNS = 40
 EARLY_S = 6e-3
-BETTER = 0.5  # of the bands' misfit without a tail must go
+ALIKE = 0.2  # of ln δ: how far the bands' late decays may lie from one another, by the middle
 SPECKLE, SHAPE = 0.8, 0.5  # of ln power: of a frame in a diffuse tail, of a mode's level
 
 
@@ -89,7 +89,7 @@ class Room:
 
 
 def late(h: Heard, evidence: Evidence) -> tuple[float, float] | None:
-    """δ, w by the power of the bands; None where they decay as well without a tail."""
+    """δ, w by the power of the bands; None where the bands' late decays are not one."""
     from scipy.optimize import least_squares
 
     bands = _bands(h)
@@ -119,10 +119,25 @@ def late(h: Heard, evidence: Evidence) -> tuple[float, float] | None:
         for rt60 in (0.2, 0.6, 2.0)
     ]
     best = min(tried, key=lambda f: f.cost)
-    dry = least_squares(lambda p: left(np.concatenate([damping, [0.0, -60.0], p])), np.zeros(1), loss="soft_l1", f_scale=2.0, max_nfev=30)
     delta, w2 = np.exp(best.x[:2])
     said = 2.5 / float(t[-1]) < delta < 400 and 1e-4 < w2 < 50
-    return (float(delta), float(np.sqrt(w2))) if said and best.cost < (1 - BETTER) * dry.cost else None
+    alike = _alike(t, log_power, weight, np.exp(damping), omega2, float(delta))
+    return (float(delta), float(np.sqrt(w2))) if said and alike else None
+
+
+def _alike(t: Array, y: Array, weight: Array, damping: Array, omega2: Array, delta: float) -> bool:
+    """Whether the bands' late decays are one, δ, and most modes of themselves decay faster: what no body does and every room."""
+    late_slope = []
+    for row, w in zip(y, weight, strict=True):
+        last = int(w.sum())
+        first = max(3, last // 4)
+        if last - first >= 6:
+            late_slope.append(-np.polyfit(t[first:last], row[first:last], 1)[0] / 2)
+    own = (damping[0] + damping[1] * omega2) / 2
+    if len(late_slope) < 4:
+        return False
+    off = np.abs(np.log(np.maximum(late_slope, 1e-3) / delta))
+    return bool(np.median(off) < ALIKE and (off < 2.5 * ALIKE).mean() > 0.7 and (own > 1.5 * delta).mean() > 0.5)
 
 
 def early(h: Heard, evidence: Evidence) -> tuple[float, float, float]:

@@ -62,7 +62,7 @@ class SupportDamping:
         sd = np.hypot(heard.decay_sd_per_s, SCATTER * decay) + 1e-3
         columns = np.stack([np.full(len(decay), 0.5), 0.5 * heard.omega**2], axis=1)
         found = [(_points(heard, decay, sd, columns, normal=along == "normal"), along) for along in ("normal", "every")]
-        (left, chosen, strength), along = min(found, key=lambda pair: pair[0][0])
+        (_, chosen, strength), along = min(found, key=lambda pair: pair[0][0])
         if not len(chosen):
             return None
         places = heard.model.vertex_m[chosen]

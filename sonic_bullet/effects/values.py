@@ -127,6 +127,7 @@ class Heard:
     signed: bool
     push: Array  # (s, m) complex: every mode's amplitude at the sensor under the model so far, its pulse included
     all_hz: Array  # (m,) their frequencies
+    plain: ModalModel | None  # `model` with the mesh's own frequencies
     strike: tuple[int, ...] = ()
 
     @property
