@@ -3,7 +3,8 @@
     NAME.json -> Preset (typed, every field checked) -> Material
 
 A file is UTF-8 JSON, format "sonic-bullet-preset/1": name, density_kg_m3, elasticity (youngs_pa and poisson, or stiffness_pa 6×6),
-damping, surface, impact, each group with the `source` of its numbers and an optional `note`. `provenance` says what a fitted preset was
+damping, surface, impact, each group with the `source` of its numbers, an optional `note`, and how far they differ between objects of that
+material: `range`, `range_source`, `spread`. `provenance` says what a fitted preset was
 fitted from, and how sure it is; it changes no sound. `residual` is what the modes do not say (docs/residual.md), played with every contact. `effects` is a
 place kept for what an estimator will find; this version plays none and refuses a file that has any.
 
@@ -44,8 +45,13 @@ Row = tuple[float, float, float, float, float, float]
 
 
 class _Part(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, omit_defaults=True):
+    """range: by field, the values that materials of that name have; spread: standard deviation of their logarithm. Neither changes a sound."""
+
     source: Annotated[str, msgspec.Meta(min_length=1)]
     note: str = ""
+    range: dict[str, tuple[float, float]] = {}
+    range_source: str = ""
+    spread: dict[str, NotNegative] = {}
 
 
 class Elasticity(_Part, frozen=True):

@@ -49,6 +49,35 @@ def test_every_material_rings_and_says_where_its_numbers_come_from() -> None:
         assert 0 < material.poisson < 0.5
 
 
+@pytest.mark.parametrize("name", presets.material_names())
+def test_every_shipped_number_has_a_range_that_holds_it_and_a_spread(name: str) -> None:
+    preset = presets.read_preset(presets.FOLDER / f"{name}.json")
+    density = {"density_kg_m3": preset.density_kg_m3}
+    for group, more in ((preset.elasticity, density), (preset.damping, {}), (preset.surface, {}), (preset.impact, {})):
+        numbers = {key: getattr(group, key) for key in group.__struct_fields__ if isinstance(getattr(group, key), float)} | more
+        if (tensor := getattr(group, "stiffness_pa", None)) is not None:
+            numbers["stiffness_pa"] = max(max(row) for row in tensor)
+        assert set(group.range) == set(group.spread) == set(numbers), name
+        assert len(group.range_source) > 10
+        for key, value in numbers.items():
+            low, high = group.range[key]
+            assert 0 <= low < high, (name, key)
+            assert low * 0.999 <= value <= high * 1.001, (name, key)
+            assert 0 < group.spread[key] < 3, (name, key)
+
+
+def test_range_and_spread_change_no_sound(tmp_path: Path) -> None:
+    bare = json.loads((presets.FOLDER / "wood.json").read_text())
+    for group in ("elasticity", "damping", "surface", "impact"):
+        for key in ("range", "range_source", "spread"):
+            del bare[group][key]
+    (tmp_path / "bare.json").write_text(json.dumps(bare))
+    bare_wood, wood = presets.load_material(tmp_path / "bare.json"), presets.load_material("wood")
+    assert (bare_wood.stiffness_pa == wood.stiffness_pa).all()
+    same = ("density_kg_m3", "alpha_per_s", "beta_s", "roughness_m", "hurst", "restitution")
+    assert all(getattr(bare_wood, key) == getattr(wood, key) for key in same)
+
+
 def test_a_loss_factor_is_met_at_its_two_frequencies_and_undercut_between() -> None:
     alpha, beta = presets.rayleigh_of_loss_factor(1e-3, 500, 8000)
 
