@@ -5,8 +5,8 @@
 A file is UTF-8 JSON, format "sonic-bullet-preset/1": name, density_kg_m3, elasticity (youngs_pa and poisson, or stiffness_pa 6×6),
 damping, surface, impact, each group with the `source` of its numbers, an optional `note`, and how far they differ between objects of that
 material: `range`, `range_source`, `spread`. `provenance` says what a fitted preset was
-fitted from, and how sure it is; it changes no sound. `residual` is what the modes do not say (docs/residual.md), played with every contact. `effects` is a
-place kept for what an estimator will find; this version plays none and refuses a file that has any.
+fitted from, and how sure it is; it changes no sound. `residual` is what the modes do not say (docs/residual.md), played with every contact. `effects` are what a
+diagnosis found to belong to material or object (sonic_bullet.effects.stored): they sound in every scene.
 
 Damping is Rayleigh's, d = ½(α + βλ) [Ren, Yeh, Lin 2013, eq. 6]: alpha_per_s and beta_s, or a loss factor η of the handbooks. η = 2d/ω
 independent of frequency is no Rayleigh damping; α and β are the pair that meets it at the two frequencies of `equal_at_hz`
@@ -29,6 +29,8 @@ from typing import Annotated, Any
 import msgspec
 import numpy as np
 
+from sonic_bullet.effects.stored import effect_of
+from sonic_bullet.effects.values import Effect
 from sonic_bullet.errors import MaterialError, RecordError
 from sonic_bullet.files import replacing
 from sonic_bullet.records import Material
@@ -110,7 +112,7 @@ class Preset(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     surface: Surface
     impact: Impact
     note: str = ""
-    effects: tuple[Any, ...] = ()
+    effects: tuple[dict[str, Any], ...] = ()
     residual: ResidualForm | None = None
     provenance: Provenance | None = None
 
@@ -163,9 +165,6 @@ def read_preset(path: str | os.PathLike[str]) -> Preset:
         raise MaterialError(f"preset {path}: {error}", "mend that field; docs/materials.md describes the file") from error
     if preset.format != FORMAT:
         raise MaterialError(f"preset {path} has format '{preset.format}', wanted '{FORMAT}'", "use a sonic_bullet that knows that format")
-    for name in ("effects",):
-        if getattr(preset, name):
-            raise MaterialError(f"preset {path} holds {name}, which sonic_bullet 0.1 cannot play", f"use version 0.2 or later, or take {name} out of the file")
     return preset
 
 
@@ -186,6 +185,7 @@ def material_of(preset: Preset, where: str = "") -> Material:
         "roughness_m": preset.surface.roughness_m,
         "hurst": preset.surface.hurst,
         "restitution": preset.impact.restitution,
+        "effects": _effects(preset, label),
         "residual": residual_of(preset.residual, f"preset {label}") if preset.residual is not None else None,
         "source": f"elasticity: {elastic.source} | damping: {preset.damping.source} | surface: {preset.surface.source} | impact: {preset.impact.source}",
     }
@@ -197,6 +197,13 @@ def material_of(preset: Preset, where: str = "") -> Material:
     except RecordError as error:
         raise MaterialError(f"preset {label}: {error.what}", error.remedy) from error
     raise MaterialError(f"preset {label}: elasticity is neither isotropic nor a tensor", "give youngs_pa and poisson, or stiffness_pa alone")
+
+
+def _effects(preset: Preset, label: str) -> tuple[Effect, ...]:
+    try:
+        return tuple(effect_of(data) for data in preset.effects)
+    except RecordError as error:
+        raise MaterialError(f"preset {label}: {error.what}", error.remedy) from error
 
 
 def rayleigh_of_loss_factor(eta: float, low_hz: float, high_hz: float) -> tuple[float, float]:

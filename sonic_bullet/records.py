@@ -58,7 +58,7 @@ class Material:
     stiffness_pa (6, 6): Voigt tensor, positive definite. alpha_per_s, beta_s: Rayleigh damping d = (alpha + beta·lambda)/2
     [Ren, Yeh, Lin 2013, eq. 6], None where unknown. roughness_m: rms height of the surface profile; hurst: its Hurst
     exponent (profile spectrum ∝ k^-(1+2·hurst)). restitution: of an impact against a rigid wall, for pulses only.
-    residual: what sounds beside the modes, None: nothing.
+    residual: what sounds beside the modes, None: nothing. effects: what else belongs to it (sonic_bullet.effects), in the order in which they act.
     """
 
     name: str
@@ -71,6 +71,7 @@ class Material:
     restitution: float = 0.5
     source: str = ""
     residual: Residual | None = None
+    effects: tuple[Any, ...] = ()
 
     def __post_init__(self) -> None:
         stiffness = frozen_array(self.stiffness_pa, float, (6, 6), f"material '{self.name}': stiffness_pa")

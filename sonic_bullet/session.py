@@ -142,8 +142,10 @@ class Listener:
         progress: Callable[[str], None] | None,
     ) -> ModalModel:
         from sonic_bullet import modal
+        from sonic_bullet.effects.stored import with_material, with_modes
 
         name = self.world.name_of(body, link)
+        material = with_material(material)
 
         shapes: tuple[Shape, ...]
         if mesh is None:
@@ -157,7 +159,8 @@ class Listener:
         if model is None:
             clamps = tuple((float(x), float(y), float(z), float(r)) for x, y, z, r in fixed)
             say = (lambda text: progress(f"modes of {name}: {text}")) if progress is not None else None
-            model = self._shared(modal.analyse(shapes, material, to_hz=to_hz, count=count, fixed=clamps, thickness_m=thickness_m, progress=say))
+            solved = modal.analyse(shapes, material, to_hz=to_hz, count=count, fixed=clamps, thickness_m=thickness_m, progress=say)
+            model = self._shared(with_modes(solved, material))
         self.world.add(body, link, material=material, model=model, shapes=shapes)
         return model
 

@@ -1,0 +1,62 @@
+"""Effects in presets, and in the run time: what belongs to a material or an object sounds in every scene.
+
+    {"id": …, fields} <-> Effect;   Material.effects -> MATERIAL before the modes are solved, MODES after, BANK as they ring
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import fields, replace
+from typing import Any
+
+import msgspec
+
+from sonic_bullet.effects.amplitude_damping import AmplitudeDamping
+from sonic_bullet.effects.amplitude_pitch import AmplitudePitch
+from sonic_bullet.effects.damping_law import DampingLaw
+from sonic_bullet.effects.mode_splitting import ModeSplitting
+from sonic_bullet.effects.values import Effect, Stage
+from sonic_bullet.errors import RecordError
+from sonic_bullet.records import Material, ModalModel
+
+KEPT: tuple[type[Effect], ...] = (DampingLaw, ModeSplitting, AmplitudePitch, AmplitudeDamping)
+"""Effects that a preset may hold. A stiffness that depends on direction is the preset's own elasticity; radiation is the run time's own."""
+
+
+def stored(effect: Effect) -> dict[str, Any]:
+    """What a preset file holds of an effect."""
+    values: dict[str, Any] = msgspec.to_builtins({f.name: getattr(effect, f.name) for f in fields(effect)})  # type: ignore[arg-type]
+    return {"id": effect.id} | values
+
+
+def effect_of(data: dict[str, Any]) -> Effect:
+    """The effect that `stored` made these of. Raises RecordError naming what is wrong."""
+    name = data.get("id")
+    kind = next((k for k in KEPT if k.id == name), None)
+    if kind is None:
+        raise RecordError(f"there is no effect '{name}' that a preset can hold", f"use one of {', '.join(k.id for k in KEPT)}")
+    try:
+        made: Effect = msgspec.convert({k: v for k, v in data.items() if k != "id"}, kind)
+    except msgspec.ValidationError as error:
+        raise RecordError(f"effect '{name}': {error}", "mend that field") from error
+    return made
+
+
+def with_material(material: Material) -> Material:
+    """The material with its effects on stiffness and density in it."""
+    for effect in of_stage(material, Stage.MATERIAL):
+        material = replace(effect.apply(material), effects=material.effects)
+    return material
+
+
+def with_modes(model: ModalModel, material: Material) -> ModalModel:
+    """A body's model with its material's effects on modes in it."""
+    for effect in of_stage(material, Stage.MODES):
+        if model.mode_count:
+            model = effect.apply(model)
+    return model
+
+
+def of_stage(material: Material, stage: Stage) -> Sequence[Effect]:
+    """A material's effects of a stage."""
+    return [e for e in material.effects if e.stage is stage]
