@@ -103,12 +103,12 @@ def body_family(case: Case, thing: CaseObject, guess: Material, cache: Place, sa
     listed = [line.freq_hz for r in case.recordings if r.object == thing.name for line in r.lines or ()]
     if listed and not any(r.file for r in case.recordings):
         high = max(listed)
-    edge = mesh_edge_m(shape)
+    edge = mesh_edge_m(shape) if thing.fixed else None  # a free box takes polynomials, not elements
     return family(shape, gamma_m2_s2=gamma, poisson=guess.poisson, to_hz=high * MARGIN, fixed=thing.fixed, edge_m=edge, cache=cache, progress=say)
 
 
 def mesh_edge_m(shape: Shape) -> float | None:
-    """A finer mesh for a flat plate: with the usual one its higher modes are 1 to 2 % stiff, which γ and ν would be bent to. None: the usual one does."""
+    """A finer mesh for a clamped flat plate: with the usual one its higher modes are 1 to 2 % stiff, which γ and ν would be bent to. None: the usual one does."""
     from sonic_bullet.geometry import is_closed
     from sonic_bullet.modal.prisms import as_box
 

@@ -4,12 +4,14 @@
     V: modes at ν₁ and ν₂ together, VᵀMV = 1;   (l VᵀK_lV + s VᵀK_sV) q = θ q,  λ = γ θ/L²,  γ = E/ρ     [Rayleigh-Ritz]
 
 The error of λ is of the fourth order in the distances from ν₁ and ν₂. Lengths by the body's diagonal L, as in model.py.
+A free box takes polynomials in place of elements (polynomials.py): its λ are good to 1e-4, where elements within the same time are 1e-2 too stiff.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -21,6 +23,7 @@ from sonic_bullet.surface_index import closest_point
 
 APART = 0.05  # of ν₁ and ν₂ from the guess
 POISSON = (-0.5, 0.485)
+BEYOND = 1.1  # of the limit on λ: modes that are none at one ν may be some at the other
 KEPT = ("lame", "shear", "skin", "vertex", "face", "numbers")
 
 
@@ -29,6 +32,7 @@ class Family:
     """A body's modes for every γ = E/ρ and ν. lame, shear (b, b): reduced stiffness. skin (v, 3, b) float32: the basis on the surface at ρL³ = 1 kg.
 
     vertex_m (v, 3), face (4t, 3): the surface, each element's face cut in four. count: how many of the lowest modes are true.
+    meshed: False where no element's error is in λ.
     """
 
     lame: Array
@@ -40,6 +44,7 @@ class Family:
     volume_m3: float
     count: int
     note: str
+    meshed: bool = True
 
     def modes(self, gamma_m2_s2: float, poisson: float) -> tuple[Array, Array]:
         """λ (m,) in 1/s² ascending, and the modes (b, m) in the basis: `points` turns them into shapes."""
@@ -67,7 +72,7 @@ class Family:
 
 
 def _stiffness(family: Family, poisson: float) -> Array:
-    return np.asarray(poisson / ((1 + poisson) * (1 - 2 * poisson)) * family.lame + family.shear / (2 * (1 + poisson)))
+    return np.asarray(_mixed(poisson, family.lame, family.shear))
 
 
 def _quadratic(quarters: Array, which: int, weight: Array) -> tuple[Array, Array]:
@@ -103,12 +108,82 @@ def family(
     found = store.load(cache, name)
     if found is not None and set(found[0]) == set(KEPT):
         a, note = found
-        return Family(a["lame"], a["shear"], a["skin"], a["vertex"], a["face"], length, float(a["numbers"][0]), int(a["numbers"][1]), note)
-    made = _family(shape, length, limit, poisson, clamp, edge_m, say)
-    numbers = np.array([made.volume_m3, made.count])
+        volume, count, meshed = a["numbers"]
+        return Family(a["lame"], a["shear"], a["skin"], a["vertex"], a["face"], length, float(volume), int(count), note, bool(meshed))
+    made = _of_box(shape, length, limit, poisson, say) if edge_m is None and not len(clamp) else None
+    if made is None:
+        made = _family(shape, length, limit, poisson, clamp, edge_m, say)
+    numbers = np.array([made.volume_m3, made.count, made.meshed])
     arrays = {"lame": made.lame, "shear": made.shear, "skin": made.skin, "vertex": made.vertex_m, "face": made.face, "numbers": numbers}
     store.save(cache, name, arrays, made.note)
     return made
+
+
+def _poissons(poisson: float) -> tuple[float, float]:
+    low, high = (float(np.clip(poisson + apart, *POISSON)) for apart in (-APART, APART))
+    if high - low < APART / 2:
+        raise ModalError(f"Poisson's ratio {poisson} is no isotropic solid's", "guess one between -0.5 and 0.48")
+    return low, high
+
+
+def _together(first: Array, second: Array, mass: Callable[[Array], Array]) -> Array:
+    """Columns (n, b) with VᵀMV = 1 that span those of both, first's first."""
+    rest = second - first @ (first.T @ mass(second))
+    rest -= first @ (first.T @ mass(rest))
+    value, turn = np.linalg.eigh(rest.T @ mass(rest))
+    good = value > 1e-12
+    return np.concatenate([first, rest @ (turn[:, good] / np.sqrt(value[good]))], axis=1)
+
+
+def _lame_shear() -> tuple[Array, Array]:
+    lame, shear = np.zeros((6, 6)), np.diag([2.0, 2, 2, 1, 1, 1])
+    lame[:3, :3] = 1
+    return lame, shear
+
+
+def _of_box(shape: Shape, length: float, limit: float, poisson: float, say: Callable[[str], None]) -> Family | None:
+    """The family of a free box, without elements; None where the shape is no box, or one of too many unknowns."""
+    from scipy.linalg import block_diag
+
+    from sonic_bullet.modal import polynomials, structured
+    from sonic_bullet.modal.solid import surface
+
+    box = polynomials.recognised(shape)
+    if box is None:
+        return None
+    low, high = _poissons(poisson)
+    size = box.size_m / length
+    thin = float(size.min())
+    tensors = _lame_shear()
+    soft = _mixed(max(low, high), *tensors)
+    wave = min(polynomials.wave_number(limit, thin, soft), polynomials.wave_number_of(MOST_MODES, size))
+    terms = polynomials.degrees(size, wave)
+    if polynomials.unknowns(terms) > polynomials.MOST_UNKNOWNS:
+        return None
+    say(f"solving {8 * polynomials.unknowns(terms)} unknowns of a box")
+    shell = structured.box(box.size_m, polynomials.skin_cells(size, wave))
+    skin = surface(shell)
+    point = shell.node_m[skin.node] / length
+    counts = np.zeros(2, int)
+    parts: list[tuple[Array, Array, Array]] = []
+    for parity in polynomials.parities(size, terms):
+        k_lame, k_shear = (parity.stiffness(tensor) for tensor in tensors)
+        found = [polynomials.lowest(_mixed(nu, k_lame, k_shear), BEYOND * limit, parity.rigid) for nu in (low, high)]
+        counts += [int((value <= limit).sum()) for value, _ in found]
+        basis = _together(found[0][1], found[1][1], lambda v: v)
+        moved = polynomials.shapes_at(point, size, parity, basis).transpose(0, 2, 1) @ box.axes.T
+        parts.append((basis.T @ k_lame @ basis, basis.T @ k_shear @ basis, moved.astype(np.float32)))
+    lame, shear = (block_diag(*(part[k] for part in parts)) for k in (0, 1))
+    basis_skin = np.ascontiguousarray(np.concatenate([moved for _, _, moved in parts], axis=1).transpose(0, 2, 1))
+    note = f"box of {' x '.join(str(n) for n in terms)} polynomials; nu {low:g} and {high:g}"
+    vertex_m = shell.node_m[skin.node] @ box.axes.T + box.centre_m
+    count = min(MOST_MODES, int(counts.min()))
+    return Family((lame + lame.T) / 2, (shear + shear.T) / 2, basis_skin, vertex_m, skin.face, length, float(np.prod(box.size_m)), count, note, meshed=False)
+
+
+def _mixed(poisson: float, lame: Any, shear: Any) -> Any:
+    """The stiffness at E = 1 of its two parts, dense or sparse."""
+    return poisson / ((1 + poisson) * (1 - 2 * poisson)) * lame + shear / (2 * (1 + poisson))
 
 
 def _family(shape: Shape, length: float, limit: float, poisson: float, clamp: Array, edge_m: float | None, say: Callable[[str], None]) -> Family:
@@ -121,8 +196,7 @@ def _family(shape: Shape, length: float, limit: float, poisson: float, clamp: Ar
     corner = unit.node_m[body.skin.node][body.skin.face]
     area = float(np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1).sum() / 2)
     volume = fem.volume_m3(unit)
-    lame, shear = np.zeros((6, 6)), np.diag([2.0, 2, 2, 1, 1, 1])
-    lame[:3, :3] = 1
+    lame, shear = _lame_shear()
     say(f"assembling {3 * len(unit.node_m)} unknowns")
     k_lame, mass = fem.assemble(unit, lame, 1.0)
     k_shear, _ = fem.assemble(unit, shear, 1.0)
@@ -135,21 +209,12 @@ def _family(shape: Shape, length: float, limit: float, poisson: float, clamp: Ar
     most = min(MOST_MODES, max(1, len(free) // 3 - rigid))
     shift = -SHIFT * (2 * volume / area) ** 2 / 3
     vectors, counts = [], []
-    low = float(np.clip(poisson - APART, *POISSON))
-    high = float(np.clip(poisson + APART, *POISSON))
-    if high - low < APART / 2:
-        raise ModalError(f"Poisson's ratio {poisson} is no isotropic solid's", "guess one between -0.5 and 0.48")
+    low, high = _poissons(poisson)
     for nu in (low, high):
-        stiffness = nu / ((1 + nu) * (1 - 2 * nu)) * k_lame + k_shear / (2 * (1 + nu))
-        modes = eigen.solve(stiffness, mass, shift, rigid=rigid, enough=lambda value: bool(value[-1] > limit), most=most, say=say)
+        modes = eigen.solve(_mixed(nu, k_lame, k_shear), mass, shift, rigid=rigid, enough=lambda value: bool(value[-1] > limit), most=most, say=say)
         vectors.append(modes.vector)
         counts.append(len(modes.lambda_per_s2))
-    first, second = vectors
-    rest = second - first @ (first.T @ (mass @ second))
-    rest -= first @ (first.T @ (mass @ rest))
-    value, turn = np.linalg.eigh(rest.T @ (mass @ rest))
-    good = value > 1e-12
-    basis = np.concatenate([first, rest @ (turn[:, good] / np.sqrt(value[good]))], axis=1)
+    basis = _together(vectors[0], vectors[1], lambda v: mass @ v)
     vector = np.zeros((3 * len(held), basis.shape[1]), np.float32)
     vector[free] = basis
     if not len(basis):
