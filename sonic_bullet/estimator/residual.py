@@ -5,7 +5,8 @@
     R(φ_i, Φ̃) = Σ_j u_ij k_ij / Σ_j u_ij,   k = 1/(1 + D²),  u_ij = w_j/(D² + δ²)²                                      [eq. 23-25; matching.py]
     w_i = min(R_i, √(Σ_j k_ij² a_j²)/a_i)
 
-D is stricter than in a search for the material, as frequencies have been corrected by then; a feature is not represented further than the modes are loud there.
+D is stricter than in a search for the material, as frequencies have been corrected by then. What is left is to be added, so it differs in two ways more: a mode
+that rings longer than the feature leaves nothing to add (D counts Y one way only), and a feature is not represented further than the modes are loud there.
 """
 
 from __future__ import annotations
@@ -14,11 +15,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sonic_bullet.errors import AudioError
+from sonic_bullet.errors import AudioError, FileError
 from sonic_bullet.estimator.fit import CaseFit
 from sonic_bullet.estimator.loudness import bark
 from sonic_bullet.estimator.matching import energy
 from sonic_bullet.estimator.predict import lines_sound
+from sonic_bullet.files.cases import CaseRecording
 from sonic_bullet.records import Array, Residual
 from sonic_bullet.residual.compute import damped, residual_record
 from sonic_bullet.residual.transfer import Modes
@@ -36,27 +38,28 @@ def match_ratios(freq_hz: Array, decay_per_s: Array, mode_hz: Array, mode_decay_
     loud = energy(mode_decay_per_s, mode_amplitude)
     per_s = PER_DURATION * float(np.average(mode_decay_per_s, weights=loud + 1e-300))
     across = PER_BARK * (bark(freq_hz)[:, None] - bark(mode_hz)[None])
-    along = per_s / np.maximum(decay_per_s, 1e-3)[:, None] - per_s / np.maximum(mode_decay_per_s, 1e-3)[None]
+    along = np.maximum(per_s / np.maximum(decay_per_s, 1e-3)[:, None] - per_s / np.maximum(mode_decay_per_s, 1e-3)[None], 0.0)
     apart = across**2 + along**2
     score, near = 1 / (1 + apart), (loud**POWER) / (apart + NEAR**2) ** 2
     ratio = (near * score).sum(axis=1) / np.maximum(near.sum(axis=1), 1e-300)
     return ratio, np.sqrt(((score * mode_amplitude) ** 2).sum(axis=1))
 
 
-def unsaid(freq_hz: Array, decay_per_s: Array, amplitude: Array, mode_hz: Array, mode_decay_per_s: Array, mode_amplitude: Array) -> Array:
-    """Share w (s, k) of each feature's amplitude (s, k) that modes (m,) with amplitudes (s, m) represent."""
-    share = np.zeros(amplitude.shape)
-    for s in range(len(amplitude)):
-        ratio, there = match_ratios(freq_hz, decay_per_s, mode_hz, mode_decay_per_s, mode_amplitude[s])
-        share[s] = np.minimum(ratio, there / np.maximum(np.abs(amplitude[s]), 1e-300))
-    return np.clip(share, 0.0, 1.0)
+def represented_share(freq_hz: Array, decay_per_s: Array, amplitude: Array, mode_hz: Array, mode_decay_per_s: Array, mode_amplitude: Array) -> Array:
+    """Share w (k,) of each feature's amplitude that modes (m,) represent. amplitude (s, k), mode_amplitude (s, m): at s strikes, taken together by power.
+
+    A strike louder than the model says and another softer are no residual: what is left is left on the average.
+    """
+    loud, played = (np.sqrt((np.abs(x) ** 2).mean(axis=0)) for x in (amplitude, mode_amplitude))
+    ratio, there = match_ratios(freq_hz, decay_per_s, mode_hz, mode_decay_per_s, played)
+    return np.asarray(np.clip(np.minimum(ratio, there / np.maximum(loud, 1e-300)), 0.0, 1.0))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Strikes:
     """s strikes of one body from the onset on, and what they leave. signals, left (s, n): recorded, beside all features.
 
-    freq_hz, decay_per_s (k,), amplitude (s, k) complex: features; share (s, k): what of each the modes represent. mode_* (m,), mode_amplitude (s, m) complex.
+    freq_hz, decay_per_s (k,), amplitude (s, k) complex: features; share (k,): what of each the modes represent. mode_* (m,), mode_amplitude (s, m) complex.
     """
 
     signals: Array
@@ -81,8 +84,8 @@ def strikes_of(signals: Array, left: Array, sr: int, lines: tuple[Array, Array, 
     order = np.argsort(modes[0], kind="stable")
     order = order[np.append(True, np.diff(modes[0][order]) > 0)] if len(order) else order
     hz, mode_decay, played = modes[0][order], modes[1][order], modes[2][:, order]
-    share = unsaid(freq, decay, amplitude, hz, mode_decay, np.abs(played))
-    loud = np.sqrt(((1 - share**2) * np.abs(amplitude) ** 2).mean(axis=0))
+    share = represented_share(freq, decay, amplitude, hz, mode_decay, played)
+    loud = np.sqrt((1 - share**2) * (np.abs(amplitude) ** 2).mean(axis=0))
     mean = np.sqrt((np.abs(played) ** 2).mean(axis=0))
     residual = residual_record(signals, left, sr, Modes(hz, mode_decay, mean), freq, decay, loud, source)
     return Strikes(signals, left, sr, freq, decay, amplitude, share, hz, mode_decay, played, residual)
@@ -119,3 +122,22 @@ def recording_strikes(sample: Array, sr: int, onset_s: float | None, name: str) 
     heard = damped(found.freq_hz, found.decay_per_s, amplitude, len(signal), sr)
     modes = found.freq_hz, found.decay_per_s, amplitude[None]
     return strikes_of(signal[None], (signal - heard)[None], sr, modes, modes, name)
+
+
+def strike_modes(found: CaseFit, recording: CaseRecording, sr: int) -> tuple[Array, Array, Array]:
+    """Frequency, decay (m,) and complex amplitude (m,) that a fit predicts of any strike of its case at rate ``sr``. Raises FileError, MeshError."""
+    from sonic_bullet.estimator.evidence import body_family, guess_of, observed
+    from sonic_bullet.estimator.objects import object_of
+
+    if recording.position_m is None:
+        raise FileError("a strike without a place cannot be predicted", "give its position")
+    thing = found.case.objects[recording.object]
+    same = next((o for o in found.objects if o.evidence.thing.name == recording.object), None)
+    guess = guess_of(thing)
+    body = same.evidence.family if same is not None else body_family(found.case, thing, guess, "default", lambda _: None)
+    if body is None:
+        raise FileError(f"object '{thing.name}' has no mesh", "a prediction needs its shape")
+    seen = observed(found.case, thing, guess, (recording,), body)
+    made = object_of(found, thing, guess, body, seen, same)
+    use = made.freq_hz < sr / 2
+    return made.freq_hz[use], made.decay_per_s[use], (found.fit.sigma * made.pattern[0] * seen.start(made.freq_hz, made.decay_per_s))[use]

@@ -30,7 +30,7 @@ def write_residual_picture(path: str | os.PathLike[str], strikes: Strikes) -> No
     if kind not in ("png", "pdf", "svg"):
         raise FileError(f"cannot write {path}: pictures are .png, .pdf or .svg", "end the name with one of them")
     sound, sr, n = strikes.signals[0], strikes.sr, strikes.signals.shape[1]
-    features, share = strikes.amplitude[0], strikes.share[0]
+    features, share = strikes.amplitude[0], strikes.share
     parts = {
         "features": damped(strikes.freq_hz, strikes.decay_per_s, features, n, sr),
         "synthesised": damped(strikes.mode_hz, strikes.mode_decay_per_s, strikes.mode_amplitude[0], n, sr),

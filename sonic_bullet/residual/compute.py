@@ -4,7 +4,8 @@
     P_residual = max(P_recorded - P_represented, 0)                                             pixel by pixel
 
 For a preset it is told in two parts. What is left of the features, √(1 - R_i²) of each, is lines: their frequencies are known far better than a spectrogram
-shows them. What is left beside all features is noise, of which bands and times keep the mean, less the recording's own floor.
+shows them. What is left beside all features is noise, of which bands and times keep the mean, less the recording's own floor, and less what is not noise: the foot of lines that
+are no pure damped sinusoids would else be spread over whole bands.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from sonic_bullet.residual.spectrogram import WINDOW, Power, checked, power, tra
 from sonic_bullet.residual.transfer import Modes
 
 LONGEST_S = 1.0
+FINE_WINDOW = 4096
 LINES_MOST = 128
 LINE_FLOOR = 1e-4
 """Lines with less than this share of the loudest line's energy (40 dB) and less than of the clip's are left out."""
@@ -84,6 +86,19 @@ def cells(left: Power, floor_per_hz: Array) -> tuple[Array, Array, Array]:
     return centre_hz[kept], centre_s, np.where(heard, mean - quiet[:, None], 0.0)[kept]
 
 
+def noisiness(fine: Power, freq_hz: Array, time_s: Array) -> Array:
+    """(b, n) share of the power in bands about freq_hz (b,) that is noise: median over mean across a band's fine bins, ln 2 for noise, little where lines remain."""
+    edge = np.concatenate([[0.0], (freq_hz[1:] + freq_hz[:-1]) / 2, [np.inf]])
+    bounds = np.searchsorted(fine.freq_hz, edge)
+    frame = np.clip(np.searchsorted(fine.time_s, time_s), 0, len(fine.time_s) - 1)
+    share = np.ones((len(freq_hz), len(time_s)))
+    for b, (low, high) in enumerate(zip(bounds[:-1], bounds[1:], strict=True)):
+        if high - low > 3:
+            band = fine.per_hz[low:high][:, frame]
+            share[b] = np.median(band, axis=0) / np.log(2) / np.maximum(band.mean(axis=0), 1e-300)
+    return np.minimum(share, 1.0)
+
+
 def residual_record(
     recorded: Array, left: Array, sr: int, modes: Modes, line_freq_hz: Array, line_decay_per_s: Array, line_amplitude: Array, source: str
 ) -> Residual:
@@ -96,6 +111,7 @@ def residual_record(
     parts = [power(x, sr) for x in left]
     mean = Power(parts[0].freq_hz, parts[0].time_s, np.mean([p.per_hz for p in parts], axis=0))
     freq, time, per_hz = cells(mean, noise_floor_per_hz(mean))
+    per_hz = per_hz * np.mean([noisiness(power(x, sr, FINE_WINDOW), freq, time) for x in left], axis=0)
     unit = float(modes.amplitude.max())
     if not unit > 0:
         raise AudioError("modes that the strikes do not excite", "strike where the body moves")
