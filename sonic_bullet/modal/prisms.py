@@ -57,7 +57,8 @@ def as_box(vertex_m: Array, face: Array) -> tuple[Array, Array, Array] | None:
     axes = axes * np.where(axes[range(3), range(3)] < 0, -1.0, 1.0)
     if np.linalg.det(axes) < 0:
         axes[:, 2] *= -1
-    if (np.abs(geometry.outward_normals(vertex_m, face) @ axes).max(axis=1) < 1 - RIGHT**2).any():
+    whole = face[geometry.face_areas_m2(vertex_m, face) > 0]  # fans of polygons with nodes along their edges hold triangles without area
+    if (np.abs(geometry.outward_normals(vertex_m, whole) @ axes).max(axis=1) < 1 - RIGHT**2).any():
         return None
     along = vertex_m[np.unique(face)] @ axes
     size, middle = np.ptp(along, axis=0), (along.max(axis=0) + along.min(axis=0)) / 2

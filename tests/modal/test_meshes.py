@@ -45,6 +45,15 @@ def test_a_box_is_recognised_however_it_lies() -> None:
     assert prisms.as_box(*(np.array(x) for x in (trimesh.creation.cylinder(1, 1).vertices, trimesh.creation.cylinder(1, 1).faces))) is None
 
 
+def test_a_box_of_polygons_with_nodes_along_their_edges_is_one() -> None:
+    corner = np.array([[x, y, z] for x in (0, 1) for y in (0, 2) for z in (0, 3)], float)
+    middle = np.array([[0, 0, 1.5]])
+    polygon = [[0, 8, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1, 8], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+    fan = np.array([[p[0], p[k], p[k + 1]] for p in polygon for k in range(1, len(p) - 1)])  # (0, 8, 1) lies on one edge
+    found = prisms.as_box(np.concatenate([corner, middle]), fan)
+    assert found is not None and sorted(found[0]) == pytest.approx([1, 2, 3])
+
+
 def test_extruded_outlines_with_holes_keep_their_volume() -> None:
     ring = trimesh.creation.annulus(0.02, 0.05, 0.004, sections=24)
     made = prisms.as_prism(np.array(ring.vertices), np.array(ring.faces), 0.006, 20_000)
