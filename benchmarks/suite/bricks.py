@@ -71,7 +71,7 @@ def grid(
     rings = []
     for axis in range(3):
         for side in (0, 2):
-            ring = [number[tuple(np.insert((a, b), axis, side))] for a, b in (_RING if (side == 2) == (axis != 1) else _RING[::-1])]
+            ring = [number[tuple(np.insert((a, b), axis, side))] for a, b in (_RING if (side == 2) == (axis != 1) else _RING[:1] + _RING[:0:-1])]
             rings.append(cell[:, ring])
     ring = np.concatenate(rings)
     key = np.sort(ring, axis=1)

@@ -157,10 +157,10 @@ def solved(
     """
     name = hashlib.sha256(f"1 {recipe.name} {recipe.cells} {poisson:.4f} {fineness} {tag}".encode()).hexdigest()[:16]
     path = folder / f"{recipe.name}-{name}.npz"
+    body = laid(recipe, fineness)
     if path.exists():
         with np.load(path) as kept:
-            return Modes(kept["value"], kept["shape"].astype(float), kept["rigid"], kept["vertex"], kept["face"], float(kept["mass"]))
-    body = laid(recipe, fineness)
+            return Modes(kept["value"], kept["shape"].astype(float), kept["rigid"], body.node_m[body.skin], body.face, float(kept["mass"]))
     made = MATERIALS[recipe.material]
     speed2 = made.youngs_pa / made.density
     stiffness = isotropic(1.0, poisson) if tensor is None else tensor
@@ -175,7 +175,7 @@ def solved(
     )
     folder.mkdir(parents=True, exist_ok=True)
     partial = path.with_suffix(f".{os.getpid()}.tmp.npz")
-    np.savez(partial, value=found.value, shape=found.shape.astype(np.float32), rigid=found.rigid, vertex=found.vertex_m, face=found.face, mass=found.mass_kg)
+    np.savez(partial, value=found.value, shape=found.shape.astype(np.float32), rigid=found.rigid, mass=found.mass_kg)
     os.replace(partial, path)
     return replace(found, shape=found.shape.astype(np.float32).astype(float))
 
