@@ -27,13 +27,17 @@ from sonic_bullet.records import Array
 FASTEST_PER_S = 3000.0
 FALSE_ALARMS = 0.2
 BAND_HZ = 500.0
+EARLY_PER_S = 150.0  # modes faster than this are largely over when a band's filter is full
 ROUNDS = 6
-QUICK, THOROUGH = (8, 1e-4), (40, 1e-6)  # steps and tolerance of a fit on the way, and of the last
+ROUGH, QUICK, THOROUGH = (3, 1e-2), (8, 1e-4), (40, 1e-6)  # steps and tolerance of a fit on the way, and of the last
+FEW, MANY = 3, 40
 MOST_MODES = 140
 SECONDS_MAX = 8.0
 LEAST_SAMPLES = 512
 FLOOR = 1e-12  # of the recording's rms: rounding, where there is no noise
 EXPLAINED = 0.8
+CANCELLING = 4.0  # of the recording's peak: modes that large cancel one another, and model what is no mode
+TOLD = 2.0  # spreads that a decay must be away from none
 NEAR = 4.0  # decays within which one mode can do another's work
 STEADY = 0.02  # a decay of less than this over the whole recording, or within two of its spreads of none, is a tone
 
@@ -77,19 +81,6 @@ def _rms(signal: Array) -> float:
     return float(np.sqrt((signal**2).mean()))
 
 
-def _energies(modes: Modes, noise: Noise, count: int) -> Array:
-    """T (k,): energy of each mode, given the others, over twice the noise it meets [Kay 1998, eq. 7.36]."""
-    k = len(modes.pole)
-    gram = likelihood.information(modes, noise.sr, count)[2 * k :, 2 * k :]
-    scale = 1 / np.sqrt(np.diag(gram))
-    inverse = np.linalg.pinv(gram * scale[:, None] * scale, rcond=1e-13, hermitian=True) * scale[:, None] * scale
-    pair = np.arange(k)
-    block = np.stack([np.stack([inverse[pair, pair], inverse[pair, pair + k]], -1), np.stack([inverse[pair + k, pair], inverse[pair + k, pair + k]], -1)], -2)
-    amplitude = np.stack([modes.amplitude.real, modes.amplitude.imag], -1)
-    power = (amplitude * np.linalg.solve(block, amplitude[:, :, None])[:, :, 0]).sum(-1)
-    return np.asarray(power / noise.rms(modes.pole.imag / (2 * np.pi), -modes.pole.real) ** 2)
-
-
 def _reach(band_hz: tuple[float, float], sr: int) -> tuple[float, float]:
     return 2 * np.pi * 0.5 * band_hz[0], 2 * np.pi * min(1.02 * band_hz[1], 0.4999 * sr)
 
@@ -107,7 +98,7 @@ def _modes(x: Array, sr: int, band_hz: tuple[float, float]) -> tuple[Modes, Nois
     least = 2 * np.log(1.5 * len(x) / FALSE_ALARMS)
     modes, noise = _first(x, sr, band_hz, least, floor)
     for _ in range(ROUNDS):
-        more = matched(likelihood.residual(x, modes, sr), noise, band_hz, least, FASTEST_PER_S)[: MOST_MODES - len(modes.pole)]
+        more = matched(likelihood.residual(x, modes, sr), noise, band_hz, least, FASTEST_PER_S)[: min(MANY, MOST_MODES - len(modes.pole))]
         if not len(more):
             break
         trial = _pruned(x, band_hz, _fit(x, likelihood.amplitudes(x, np.concatenate([modes.pole, more]), sr), sr, band_hz), noise, least)
@@ -120,14 +111,18 @@ def _modes(x: Array, sr: int, band_hz: tuple[float, float]) -> tuple[Modes, Nois
 
 def _first(x: Array, sr: int, band_hz: tuple[float, float], least: float, floor: float) -> tuple[Modes, Noise]:
     """The significant ones of the bands' poles, fitted; the strongest alone where there are more than can be told."""
-    pole = subspace.poles(x, sr, np.maximum(noise_density(x, tail=True), floor), band_hz, BAND_HZ, FASTEST_PER_S)
+    density = np.maximum(noise_density(x, tail=True), floor)
+    slow = subspace.poles(x, sr, density, band_hz, BAND_HZ, FASTEST_PER_S)
+    fast = subspace.early_poles(x, sr, density, band_hz, FASTEST_PER_S)
+    seen = (np.abs(fast[:, None] - slow) < 0.5 * np.abs(fast.real[:, None])).any(axis=1)
+    pole = np.concatenate([slow, fast[~seen & (fast.real < -EARLY_PER_S)]])
     if len(pole) > 2 * MOST_MODES:
         pole = pole[np.argsort(-likelihood.alone(x, pole, sr), kind="stable")[: 2 * MOST_MODES]]
     start = likelihood.amplitudes(x, pole, sr)
     noise = measured(likelihood.residual(x, start, sr), sr, floor)
     if not len(pole):
         return start, noise
-    energy = _energies(start, noise, len(x))
+    energy = likelihood.spreads(start, sr, len(x))[1] / noise.rms(pole.imag / (2 * np.pi), -pole.real) ** 2
     kept = np.argsort(-energy, kind="stable")[:MOST_MODES]
     kept = kept[energy[kept] > least]
     modes = _fit(x, likelihood.amplitudes(x, pole[kept], sr), sr, band_hz)
@@ -136,17 +131,23 @@ def _first(x: Array, sr: int, band_hz: tuple[float, float], least: float, floor:
 
 
 def _pruned(x: Array, band_hz: tuple[float, float], modes: Modes, noise: Noise, least: float) -> Modes:
-    """Without the modes that are not significant, the weakest first, the rest fitted again."""
+    """Without the modes that are not significant, or share a line with others so that no decay is told, the weakest first, the rest fitted again."""
     while len(modes.pole):
-        energy = _energies(modes, noise, len(x))
-        energy[(modes.pole.real <= -0.999 * FASTEST_PER_S) | (modes.pole.imag < 2 * np.pi * band_hz[0]) | (modes.pole.imag > 2 * np.pi * band_hz[1])] = 0
-        weak = np.flatnonzero(energy <= least)
+        met = noise.rms(modes.pole.imag / (2 * np.pi), -modes.pole.real)
+        spread, energy = likelihood.spreads(modes, noise.sr, len(x))
+        energy = energy / met**2
+        outside = (modes.pole.real <= -0.999 * FASTEST_PER_S) | (modes.pole.imag < 2 * np.pi * band_hz[0]) | (modes.pole.imag > 2 * np.pi * band_hz[1])
+        energy[outside | (np.abs(modes.amplitude) > CANCELLING * np.abs(x).max())] *= 1e-9
+        far, fade = np.abs(modes.pole.imag[:, None] - modes.pole.imag), -modes.pole.real
+        near = far < NEAR * np.maximum(fade[:, None], fade)
+        vague = (fade < TOLD * spread[1] * met) & (near.sum(axis=1) > 1)
+        weak = np.flatnonzero((energy <= least) | vague)
         if not len(weak):
             break
-        far, fade = np.abs(modes.pole.imag[weak, None] - modes.pole.imag[weak]), -modes.pole.real[weak]
-        rival = (far < NEAR * np.maximum(fade[:, None], fade)) & (energy[weak] < energy[weak, None])  # two that share one line: one may stay
-        keep = np.setdiff1d(np.arange(len(energy)), weak[~rival.any(axis=1)])
-        modes = _fit(x, likelihood.amplitudes(x, modes.pole[keep], noise.sr), noise.sr, band_hz)
+        rival = near[np.ix_(weak, weak)] & (energy[weak] < energy[weak, None])  # two that share one line: one may stay
+        gone = np.union1d(weak[~rival.any(axis=1)], weak[np.argsort(energy[weak], kind="stable")[: (len(weak) + 1) // 2]])
+        modes = likelihood.amplitudes(x, np.delete(modes.pole, gone), noise.sr)
+        modes = _fit(x, modes, noise.sr, band_hz, ROUGH if len(gone) > FEW else QUICK)
     return modes
 
 
@@ -163,8 +164,8 @@ def _features(x: Array, modes: Modes, noise: Noise, band_hz: tuple[float, float]
     left = likelihood.residual(x, modes, sr)
     explained = 1 - float(left @ left) / float(x @ x)
     freq, decay = modes.pole.imag / (2 * np.pi), -modes.pole.real
-    sd = likelihood.spreads(modes, sr, len(x)) * noise.rms(freq, decay) if k else np.zeros((4, 0))
-    tone, vague = decay * len(x) / sr < STEADY, decay < 2 * sd[1]
+    sd = likelihood.spreads(modes, sr, len(x))[0] * noise.rms(freq, decay) if k else np.zeros((4, 0))
+    tone, vague = decay * len(x) / sr < STEADY, decay < TOLD * sd[1]
     for which, said in ((tone, "do not decay"), (vague & ~tone, "have no decay that can be told")):
         if which.any():
             shown = ", ".join(f"{f:.1f}" for f in np.sort(freq[which])[:8])

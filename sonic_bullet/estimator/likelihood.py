@@ -152,9 +152,22 @@ def fitted(signal: Array, start: Modes, sr: int, *, band: tuple[float, float], f
     return modes
 
 
-def spreads(modes: Modes, sr: int, count: int) -> Array:
-    """Standard errors (4, k) of ω, d, Re A, Im A in white noise of unit rms."""
+def spreads(modes: Modes, sr: int, count: int) -> tuple[Array, Array]:
+    """Standard errors (4, k) of ω, d, Re A, Im A in white noise of unit rms, and energies (k,) of each mode given the others.
+
+    The energy is |A|² in the metric of A's own covariance at fixed poles [Kay 1998, eq. 7.36].
+    """
+    k = len(modes.pole)
     matrix = information(modes, sr, count)
+    variance = np.diag(_inverse(matrix))
+    inverse, pair = _inverse(matrix[2 * k :, 2 * k :]), np.arange(k)
+    a, b, c = inverse[pair, pair], inverse[pair, pair + k], inverse[pair + k, pair + k]
+    x, y = modes.amplitude.real, modes.amplitude.imag
+    energy = (c * x * x - 2 * b * x * y + a * y * y) / np.maximum(a * c - b * b, 1e-300)
+    return np.sqrt(np.maximum(variance, 0)).reshape(4, k), np.asarray(energy)
+
+
+def _inverse(matrix: Array) -> Array:
+    """Of a positive matrix, scaled to a diagonal of one and lifted by what rounding has taken."""
     scale = 1 / np.sqrt(np.maximum(np.diag(matrix), 1e-300))
-    inverse = np.linalg.pinv(matrix * scale[:, None] * scale, hermitian=True)
-    return np.asarray((np.sqrt(np.maximum(np.diag(inverse), 0)) * scale).reshape(4, -1))
+    return np.asarray(np.linalg.inv(matrix * scale[:, None] * scale + 1e-13 * np.eye(len(matrix))) * scale[:, None] * scale)

@@ -2,7 +2,8 @@
 
 energy in blocks of 1 ms -> the first block within 20 dB of the loudest -> first sample above the noise in that block -> about the onset
 the modes heard after it, run backwards, against silence: the sample where the sound takes over from silence -> the onset
-a later rise by `AGAIN_DB` above the level 10 ms before it, within `NEAR_DB` of the first: another hit; what follows it is left out
+a later rise of half of all bands by `AGAIN_DB` above what they held the 30 ms before: another hit; what follows it is left out. Beats are no hit:
+they swell in their own bands only
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from sonic_bullet.records import Array
 BLOCK_S = 1e-3
 AGAIN_DB, NEAR_DB = 6.0, 20.0
 LEAST_GAP_S = 0.02
+FRAME_S, BANDS = 5e-3, 24
 CLIPPED_RUN = 3
 REACH = 64  # samples that the first guess may be off
 
@@ -52,16 +54,33 @@ def span(signal: Array, sr: int) -> Span:
     edge = max(6 * sigma, 0.02 * float(np.abs(signal).max()))
     over = np.flatnonzero(np.abs(signal[first * block :]) > edge)
     start = first * block + (int(over[0]) if len(over) else 0)
-    gap = max(1, int(LEAST_GAP_S / BLOCK_S))
-    smooth = np.convolve(power, np.ones(5) / 5, mode="same")
-    here = start // block
-    later = np.arange(here + gap, len(power) - 5)
-    rise = smooth[later + 3] / np.maximum(smooth[later - 7], 1e-20)
-    again = later[(rise > 10 ** (AGAIN_DB / 10)) & (smooth[later + 3] > power[loud] * 10 ** (-NEAR_DB / 10))]
+    again = _hits(signal[start:], sr, float(power[loud]))
     if not len(again):
         return Span(start, len(signal), 1)
-    hits = 2 + int((np.diff(again) > gap).sum())
-    return Span(start, int(again[0] - 7) * block, hits)
+    return Span(start, start + int(again[0]), 1 + len(again))
+
+
+def _hits(signal: Array, sr: int, loudest: float) -> Array:
+    """Samples (h,) at which bands rise together again, at least `LEAST_GAP_S` after the start and after one another."""
+    frame = 1 << round(np.log2(FRAME_S * sr))
+    count = len(signal) // frame
+    if count < 12:
+        return np.zeros(0, int)
+    frames = signal[: count * frame].reshape(count, frame)
+    power = np.abs(np.fft.rfft(frames * np.hanning(frame + 2)[1:-1], axis=1)) ** 2
+    edge = np.unique(np.geomspace(2, frame // 2, BANDS + 1).astype(int))
+    level = 10 * np.log10(np.add.reduceat(power[:, : edge[-1]], edge[:-1], axis=1) + 1e-20)
+    reach = 6
+    before = np.lib.stride_tricks.sliding_window_view(level, reach, axis=0).max(axis=2)[:-1]
+    rise = np.median(np.maximum(level[reach:], np.roll(level, -1, axis=0)[reach:]) - before, axis=1)
+    near = (frames[reach:] ** 2).mean(axis=1) > loudest * 10 ** (-NEAR_DB / 10)
+    sample = (np.flatnonzero((rise > AGAIN_DB) & near) + reach) * frame
+    sample = sample[sample < len(signal) - LEAST_GAP_S * sr]
+    kept: list[int] = []
+    for at in sample[sample > LEAST_GAP_S * sr]:
+        if not kept or at - kept[-1] > 2 * LEAST_GAP_S * sr:
+            kept.append(int(at) - frame)
+    return np.array(kept, int)
 
 
 def by_modes(signal: Array, start: int, modes: Modes, sr: int, noise: float) -> int:

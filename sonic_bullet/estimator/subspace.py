@@ -17,7 +17,8 @@ from sonic_bullet.records import Array
 STOP_DB = 160.0
 ROUNDING = 1e-7  # of the largest singular value, by way of H Hᴴ: enough for what a converter writes; exact.py is for the rest
 OVERSAMPLED = 2.5
-WINDOW_MOST, COLUMNS_MOST, ORDER_MOST = 140, 1200, 40
+COLUMNS_MOST = 1200
+EARLY = 1500  # samples
 
 
 def poles(signal: Array, sr: int, noise: Array, band_hz: tuple[float, float], width_hz: float, fastest_per_s: float) -> Array:
@@ -53,10 +54,17 @@ def poles(signal: Array, sr: int, noise: Array, band_hz: tuple[float, float], wi
     return np.concatenate(found) if found else np.zeros(0, complex)
 
 
-def _shift_poles(band: Array, noise: float) -> Array:
-    """Poles per sample of a complex series (n,) in white noise of that rms."""
+def early_poles(signal: Array, sr: int, noise: Array, band_hz: tuple[float, float], fastest_per_s: float) -> Array:
+    """Poles (k,) of the first `EARLY` samples, no filter before them: the fast ones, which a band's filter would outlast."""
+    pole = _shift_poles(signal[:EARLY], float(np.median(noise)), EARLY // 3, EARLY // 9) * sr
+    freq = pole.imag / (2 * np.pi)
+    return np.asarray(pole[(freq >= band_hz[0]) & (freq < band_hz[1]) & (pole.real < 0) & (pole.real > -fastest_per_s)])
+
+
+def _shift_poles(band: Array, noise: float, widest: int = 140, most: int = 40) -> Array:
+    """Poles per sample of a series (n,) in white noise of that rms; widest: of the window; most: how many poles."""
     n = len(band)
-    window = min(WINDOW_MOST, n // 3)
+    window = min(widest, n // 3)
     if window < 6:
         return np.zeros(0, complex)
     first = np.arange(0, n - window + 1, 1 + (n - window) // COLUMNS_MOST)  # the shift is between rows: any columns will do
@@ -64,10 +72,10 @@ def _shift_poles(band: Array, noise: float) -> Array:
     power, left = np.linalg.eigh(hankel @ hankel.conj().T)
     size, left = np.sqrt(np.maximum(power[::-1], 0)), left[:, ::-1]
     edge = max(1.05 * noise * (np.sqrt(len(first)) + np.sqrt(window)), ROUNDING * size[0])
-    order = min(int((size > edge).sum()), window - 2, ORDER_MOST)
+    order = min(int((size > edge).sum()), window - 2, most)
     if order == 0:
         return np.zeros(0, complex)
     signal = left[:, :order]
     shift = np.linalg.lstsq(signal[:-1], signal[1:], rcond=None)[0]
     value = np.linalg.eigvals(shift)
-    return np.asarray(np.log(value[np.abs(value) > 1e-12]))
+    return np.asarray(np.log(value[np.abs(value) > 1e-12].astype(complex)))

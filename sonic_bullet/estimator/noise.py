@@ -1,0 +1,103 @@
+"""What in a recording is no mode: its density over frequency and its course over time, both blind to lines.
+
+    σ(f): rms per sample as if white at the level of f; lower quartile of |X|² over a neighbourhood, ln(4/3) of the mean of exponential power
+    e(t): power over time in frames, the median over frequency of |X_m(f)|²/σ²(f), ln 2 of the mean; 1 throughout where noise is steady
+    a mode of decay d meets σ²(f) Σ e(t) e^{−2dt} / Σ e^{−2dt}
+
+A struck thing's first milliseconds hold what no mode explains (the striker, slaps from near walls); without e(t) every one of them would be taken
+for many fast modes, and the spreads of the fast ones would be too small.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sonic_bullet.records import Array
+
+FRAME = 256
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Noise:
+    """density (n_f,) rms per sample over 0 … sr/2, course (m,) of the power in frames of FRAME samples, in units of its density."""
+
+    density: Array
+    course: Array
+    sr: int
+
+    def rms(self, freq_hz: Array, decay_per_s: Array) -> Array:
+        """Rms per sample (k,) that modes of these frequencies and decays meet."""
+        return self.at(freq_hz) * np.sqrt(self.share(decay_per_s))
+
+    def at(self, freq_hz: Array) -> Array:
+        """Density (k,) at a frequency, over all time."""
+        return np.asarray(np.interp(freq_hz, np.linspace(0, self.sr / 2, len(self.density)), self.density))
+
+    def share(self, decay_per_s: Array) -> Array:
+        """Noise power (k,) under modes of these decays, over the mean."""
+        fade = np.exp(np.maximum(-2 * np.asarray(decay_per_s)[:, None] * (FRAME / self.sr) * np.arange(len(self.course)), -80))
+        return np.asarray(fade @ self.course / fade.sum(axis=1))
+
+
+def white(rms: float, sr: int) -> Noise:
+    """Steady white noise."""
+    return Noise(np.full(2, rms), np.ones(1), sr)
+
+
+def measured(left: Array, sr: int, floor: float) -> Noise:
+    """Noise of what is left (n,) of a recording without its modes; floor: least density."""
+    density = np.maximum(noise_density(left), floor)
+    count = len(left) // FRAME
+    frames = left[: count * FRAME].reshape(count, FRAME) * np.hanning(FRAME + 2)[1:-1]
+    power = np.abs(np.fft.rfft(frames, axis=1))[:, 2:-2] ** 2 / (3 / 8 * FRAME)
+    here = np.interp(np.linspace(0, 1, FRAME // 2 + 1)[2:-2], np.linspace(0, 1, len(density)), density)
+    course = np.median(power / here**2, axis=1) / np.log(2)
+    return Noise(density, np.maximum(course, 1e-3) if count else np.ones(1), sr)
+
+
+def noise_density(signal: Array, *, tail: bool = False) -> Array:
+    """Rms per sample (n_f,) over frequency 0 … sr/2, as if white at that level; tail: from the last third, else from all."""
+    from scipy.ndimage import percentile_filter
+
+    part = signal[-len(signal) // 3 :] if tail else signal
+    window = np.hanning(len(part)) if tail else np.ones(len(part))
+    power = np.abs(np.fft.rfft(part * window)) ** 2 / (window**2).sum()
+    power = np.concatenate([power, power[-1:]]) if len(power) < 64 else power
+    width = max(25, len(power) // 60)
+    coarse = max(1, width // 50)
+    trimmed = power[: len(power) // coarse * coarse].reshape(-1, coarse)
+    smooth = (
+        percentile_filter(trimmed.ravel(), 25, size=width, mode="nearest")
+        if coarse == 1
+        else percentile_filter(np.quantile(trimmed, 0.25, axis=1), 50, size=width // coarse, mode="nearest")
+    )
+    return np.asarray(np.sqrt(smooth / np.log(4 / 3)))
+
+
+def matched(left: Array, noise: Noise, band_hz: tuple[float, float], least: float, fastest_per_s: float) -> Array:
+    """Poles (k,) whose matched filter on what is left (n,) answers with T > least, each the peak of its neighbourhood.
+
+    T(ω, d) = 2|Σ x e^{−(d+iω)t}|² / (σ² Σ e^{−2dt}) [Kay 1998, eq. 7.29 with an exponential envelope], d in octaves: every resolution.
+    """
+    n, sr = len(left), noise.sr
+    size = 1 << int(np.ceil(np.log2(2 * n)))
+    freq = np.arange(size // 2 + 1) * sr / size
+    sigma2 = noise.at(freq) ** 2
+    time = np.arange(n) / sr
+    decay = np.geomspace(0.5 * sr / n, 0.5 * fastest_per_s, 14)
+    share = noise.share(decay)
+    score = np.empty((len(decay), len(freq)))
+    for i, d in enumerate(decay):
+        fade = np.exp(-d * time)
+        score[i] = 2 * np.abs(np.fft.rfft(left * fade, size)) ** 2 / (sigma2 * (share[i] * float(fade @ fade)))
+    score[:, (freq < band_hz[0]) | (freq > band_hz[1])] = 0
+    best = score.max(axis=0)
+    peak = np.flatnonzero((best[1:-1] > least) & (best[1:-1] >= best[:-2]) & (best[1:-1] > best[2:])) + 1
+    chosen: list[complex] = []
+    for at in peak[np.argsort(-best[peak], kind="stable")]:
+        d, f = decay[int(np.argmax(score[:, at]))], freq[at]
+        if all(abs(2 * np.pi * f - p.imag) > 4 * max(d, -p.real) for p in chosen):
+            chosen.append(complex(-d, 2 * np.pi * f))
+    return np.array(chosen, complex)
