@@ -17,7 +17,8 @@ from sonic_bullet.effects.envelope import Envelopes, envelopes, levels
 from sonic_bullet.effects.values import Evidence, Heard, Owner, Ring, Stage
 from sonic_bullet.records import Array
 
-BETTER = 0.4  # of the misfit of the envelopes' logarithms must go
+BETTER = 3.0  # of ln variance of the envelopes' logarithms, all lines together
+TELL = 3  # lines at least whose variance halves
 LEAST = 0.05  # of c a₀ at the loudest
 
 
@@ -58,23 +59,23 @@ class AmplitudeDamping:
 
 
 def _fitted(e: Envelopes, h: Heard, level: Array) -> tuple[float, float, float] | None:
-    """c, the low-level decay over the heard one, and the share of the misfit that goes."""
-    rows = [_rows(e, h, level, q) for q in range(len(e.line))]
-    rows = [r for r in rows if r is not None]
+    """c, the low-level decay over the heard one, and how much of ln variance goes, all lines together."""
+    rows = [r for r in (_rows(e, h, level, q) for q in range(len(e.line))) if r is not None]
     if len(rows) < 2:
         return None
     most = float(np.max([r[2].max() for r in rows]))
     plain, _ = _misfit(rows, 0.0)
     grid = np.geomspace(0.02, 30, 28) / most
-    costs = np.array([_misfit(rows, c)[0] for c in grid])
+    costs = np.array([_misfit(rows, c)[0].sum() for c in grid])
     i = int(costs.argmin())
     fine = np.geomspace(grid[max(i - 1, 0)], grid[min(i + 1, len(grid) - 1)], 13)
-    inner = np.array([_misfit(rows, c)[0] for c in fine])
+    inner = np.array([_misfit(rows, c)[0].sum() for c in fine])
     choke = float(fine[int(inner.argmin())])
     cost, ratio = _misfit(rows, choke)
-    if choke * most < LEAST or cost >= plain:
+    gain = plain - cost
+    if choke * most < LEAST or (gain > np.log(2)).sum() < TELL or -gain[gain < 0].sum() > 0.3 * gain[gain > 0].sum():
         return None
-    return choke, ratio, 1 - cost / plain
+    return choke, ratio, float(gain.sum())
 
 
 def _rows(e: Envelopes, h: Heard, level: Array, q: int) -> tuple[Array, Array, Array, Array, float] | None:
@@ -84,7 +85,7 @@ def _rows(e: Envelopes, h: Heard, level: Array, q: int) -> tuple[Array, Array, A
         use = e.good[s, q]
         if use.sum() < 8:
             continue
-        t.append(e.time_s[use])
+        t.append(e.time_s[q, use])
         y.append(np.log(np.abs(e.z[s, q, use])))
         a.append(np.full(int(use.sum()), level[s, q]))
         who.append(np.full(int(use.sum()), s))
@@ -93,8 +94,8 @@ def _rows(e: Envelopes, h: Heard, level: Array, q: int) -> tuple[Array, Array, A
     return np.concatenate(t), np.concatenate(y), np.concatenate(a), np.concatenate(who), max(float(h.decay_per_s[e.line[q]]), 1e-2)
 
 
-def _misfit(rows: list[tuple[Array, Array, Array, Array, float]], choke: float) -> tuple[float, float]:
-    """Mean over lines of ln of the variance left, as a plain number (geometric mean), and the median ratio of d to the heard one."""
+def _misfit(rows: list[tuple[Array, Array, Array, Array, float]], choke: float) -> tuple[Array, float]:
+    """ln of the variance (r,) that each line leaves, and the median ratio of d to the heard one, by lines that tell."""
     found, ratio = [], []
     scales = np.geomspace(0.25, 1.6, 25) if choke else np.geomspace(0.5, 1.6, 25)
     for t, y, a, who, decay in rows:
@@ -103,6 +104,6 @@ def _misfit(rows: list[tuple[Array, Array, Array, Array, float]], choke: float) 
         mine = (who == np.unique(who)[:, None]).astype(float)
         left = left - (left @ mine.T / mine.sum(axis=1)) @ mine
         spread = (left**2).mean(axis=1)
-        found.append(np.log(spread.min() + 1e-6))
+        found.append(np.log(spread.min() + 2.5e-5))
         ratio.append(float(scales[int(spread.argmin())]))
-    return float(np.exp(np.mean(found))), float(np.median(ratio))
+    return np.array(found), float(np.median(ratio))

@@ -75,7 +75,7 @@ def _slope(e: Envelopes, h: Heard, level: Array) -> tuple[float, float, float]:
             use = e.good[s, q]
             if use.sum() < 8:
                 continue
-            t, phase = e.time_s[use], np.unwrap(np.angle(e.z[s, q, use]))
+            t, phase = e.time_s[q, use], np.unwrap(np.angle(e.z[s, q, use]))
             w = np.minimum((np.abs(e.z[s, q, use]) / max(e.noise[s, q], 1e-12)) ** 2, 1e4)
             curve = level[s, q] ** 2 * omega * -np.expm1(-2 * decay * t) / (2 * decay)
             rows.append(phase - np.average(phase, weights=w))

@@ -47,6 +47,8 @@ class DampingLaw:
         return np.asarray(0.5 * w * (self.eta + self.strength * w * self.tau_s / (1 + (w * self.tau_s) ** 2)))
 
     def apply(self, x: ModalModel) -> ModalModel:
+        if self.eta == 0 and self.strength == 0:  # no law at all: the material's own stays
+            return x
         omega = np.sqrt(x.omega0_squared_per_s2)
         decay = np.minimum(self.decay_per_s(omega), 0.99 * omega)
         freq = np.sqrt(omega**2 - decay**2) / (2 * np.pi)
