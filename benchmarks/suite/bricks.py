@@ -12,8 +12,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+
+from sonic_bullet.records import Array
 
 _CORNERS = [(i, j, k) for k in (0, 2) for j in (0, 2) for i in (0, 2)]
 _EDGES = [(i, j, k) for k in range(3) for j in range(3) for i in range(3) if (i, j, k).count(1) == 1]
@@ -26,32 +29,30 @@ _RING = [(0, 0), (1, 0), (2, 0), (2, 1), (2, 2), (1, 2), (0, 2), (0, 1)]
 class Bricks:
     """node_m (n, 3), cell (c, 20) of nodes, skin (v,) nodes on the surface, face (f, 3) into skin, outward. centre (c, 3): of the cells, in the grid's 0..1."""
 
-    node_m: np.ndarray
-    cell: np.ndarray
-    skin: np.ndarray
-    face: np.ndarray
-    centre: np.ndarray
+    node_m: Array
+    cell: Array
+    skin: Array
+    face: Array
+    centre: Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Modes:
     """A body's modes: value (m,) = ω² in 1/s², shape (v, 3, m) on its surface vertex_m (v, 3), face (f, 3); rigid (v, 3, 6); mass_kg. All mass-normalised."""
 
-    value: np.ndarray
-    shape: np.ndarray
-    rigid: np.ndarray
-    vertex_m: np.ndarray
-    face: np.ndarray
+    value: Array
+    shape: Array
+    rigid: Array
+    vertex_m: Array
+    face: Array
     mass_kg: float
 
     @property
-    def freq_hz(self) -> np.ndarray:
+    def freq_hz(self) -> Array:
         return np.asarray(np.sqrt(self.value) / (2 * np.pi))
 
 
-def grid(
-    cells: tuple[int, int, int], place: Callable[[np.ndarray], np.ndarray], *, closed: bool = False, keep: Callable[[np.ndarray], np.ndarray] | None = None
-) -> Bricks:
+def grid(cells: tuple[int, int, int], place: Callable[[Array], Array], *, closed: bool = False, keep: Callable[[Array], Array] | None = None) -> Bricks:
     """A grid of bricks, its points of 0..1 along each axis put where ``place`` says; closed: the first axis runs round; keep: which cells, by centre, stay."""
     n = np.array(cells)
     first = np.stack(np.meshgrid(*(np.arange(c) for c in n), indexing="ij"), axis=-1).reshape(-1, 3)
@@ -67,13 +68,13 @@ def grid(
     cell = cell.reshape(-1, 20)
     where = np.stack([used // (size[1] * size[2]), used // size[2] % size[1], used % size[2]], axis=1) / (2 * n)
     node = place(where)
-    number = {tuple(o): i for i, o in enumerate(OFFSET)}
-    rings = []
+    number = {(int(a), int(b), int(c)): i for i, (a, b, c) in enumerate(OFFSET)}
+    sides = []
     for axis in range(3):
         for side in (0, 2):
-            ring = [number[tuple(np.insert((a, b), axis, side))] for a, b in (_RING if (side == 2) == (axis != 1) else _RING[:1] + _RING[:0:-1])]
-            rings.append(cell[:, ring])
-    ring = np.concatenate(rings)
+            around = [number[_inserted(a, b, axis, side)] for a, b in (_RING if (side == 2) == (axis != 1) else _RING[:1] + _RING[:0:-1])]
+            sides.append(cell[:, around])
+    ring = np.concatenate(sides)
     key = np.sort(ring, axis=1)
     _, index, count = np.unique(key, axis=0, return_index=True, return_counts=True)
     outer = ring[np.sort(index[count == 1])]
@@ -87,13 +88,17 @@ def grid(
     return body
 
 
-def _mirrored(cell: np.ndarray) -> np.ndarray:
+def _inserted(a: int, b: int, axis: int, side: int) -> tuple[int, int, int]:
+    return ((side, a, b), (a, side, b), (a, b, side))[axis]
+
+
+def _mirrored(cell: Array) -> Array:
     """The same cells with their first axis turned round, for places that mirror."""
-    number = {tuple(o): i for i, o in enumerate(OFFSET)}
-    return cell[:, [number[(2 - o[0], o[1], o[2])] for o in OFFSET]]
+    number = {(int(a), int(b), int(c)): i for i, (a, b, c) in enumerate(OFFSET)}
+    return cell[:, [number[(2 - int(a), int(b), int(c))] for a, b, c in OFFSET]]
 
 
-def _functions(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _functions(points: Array) -> tuple[Array, Array]:
     """N (q, 20) and its gradient (q, 20, 3) at points (q, 3) of the cube ±1."""
     sign = OFFSET - 1.0
     value, slope = np.empty((len(points), 20)), np.empty((len(points), 20, 3))
@@ -113,7 +118,7 @@ def _functions(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return value, slope
 
 
-def matrices(body: Bricks, stiffness_pa: np.ndarray, density_kg_m3: float, softer: np.ndarray | None = None) -> tuple[object, object]:
+def matrices(body: Bricks, stiffness_pa: Array, density_kg_m3: float, softer: Array | None = None) -> tuple[Any, Any]:
     """K and M, scipy CSC, of a body of stiffness (6, 6); softer (c,) multiplies the stiffness of each cell."""
     from scipy.sparse import coo_array
 
@@ -149,7 +154,7 @@ def matrices(body: Bricks, stiffness_pa: np.ndarray, density_kg_m3: float, softe
     return (k_matrix + k_matrix.T) / 2, (entries[0] + entries[1] + entries[2]).tocsc()
 
 
-def isotropic(youngs_pa: float, poisson: float) -> np.ndarray:
+def isotropic(youngs_pa: float, poisson: float) -> Array:
     """Stiffness (6, 6) of an isotropic solid [Hughes 1987, ch. 2.7]."""
     shear = youngs_pa / (2 * (1 + poisson))
     lame = 2 * shear * poisson / (1 - 2 * poisson)
@@ -158,7 +163,7 @@ def isotropic(youngs_pa: float, poisson: float) -> np.ndarray:
     return tensor
 
 
-def orthotropic(youngs_pa: tuple[float, float, float], shear_pa: tuple[float, float, float], poisson: tuple[float, float, float]) -> np.ndarray:
+def orthotropic(youngs_pa: tuple[float, float, float], shear_pa: tuple[float, float, float], poisson: tuple[float, float, float]) -> Array:
     """Stiffness (6, 6) from E_x E_y E_z, G_yz G_xz G_xy and ν_yz ν_xz ν_xy: the compliance inverted [Bodig & Jayne 1982, ch. 3]."""
     ex, ey, ez = youngs_pa
     yz, xz, xy = poisson
@@ -171,11 +176,11 @@ def orthotropic(youngs_pa: tuple[float, float, float], shear_pa: tuple[float, fl
 
 def modes(
     body: Bricks,
-    stiffness_pa: np.ndarray,
+    stiffness_pa: Array,
     density_kg_m3: float,
     *,
     to_hz: float = 20_000.0,
-    softer: np.ndarray | None = None,
+    softer: Array | None = None,
     load_kg: dict[int, float] | None = None,
 ) -> Modes:
     """Modes up to to_hz of a free body; load_kg: point masses at vertices of its surface."""
@@ -193,7 +198,8 @@ def modes(
         m_matrix = m_matrix + coo_array((np.full(3, kilogram / density_kg_m3), (dof, dof)), shape=m_matrix.shape).tocsc()
     order = dissection(body.node_m, body.cell)
     dof = (3 * order[:, None] + np.arange(3)).ravel()
-    area = np.linalg.norm(np.cross(*(body.node_m[body.skin][body.face][:, k] - body.node_m[body.skin][body.face][:, 0] for k in (1, 2))), axis=1).sum() / 2
+    corner = body.node_m[body.skin][body.face]
+    area = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1).sum() / 2
     length = np.linalg.norm(np.ptp(body.node_m, axis=0))
     shift = -20 / length**2 * (2 * mass / density_kg_m3 / area / length) ** 2
     limit = (2 * np.pi * to_hz) ** 2 / rate

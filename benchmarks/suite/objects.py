@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.suite.bricks import Bricks, Modes, grid, isotropic, modes
+from sonic_bullet.records import Array
 
 SPARE = 1.2  # modes are kept up to 20 kHz × SPARE, for what is softer than guessed
 
@@ -54,35 +55,35 @@ class Recipe:
     name: str
     material: str
     cells: tuple[int, int, int]
-    place: Callable[[np.ndarray], np.ndarray]
+    place: Callable[[Array], Array]
     closed: bool = False
-    keep: Callable[[np.ndarray], np.ndarray] | None = None
+    keep: Callable[[Array], Array] | None = None
     other: str = ""  # another body of the same material; "" where a scaled copy serves
 
 
-def _box(length: float, width: float, height: float) -> Callable[[np.ndarray], np.ndarray]:
+def _box(length: float, width: float, height: float) -> Callable[[Array], Array]:
     return lambda u: (u - 0.5) * np.array([length, width, height])
 
 
-def _tapered(u: np.ndarray) -> np.ndarray:
+def _tapered(u: Array) -> Array:
     x = (u - 0.5) * np.array([0.16, 0.03, 0.008])
     return np.stack([x[:, 0], x[:, 1] * (1.2 - 0.6 * u[:, 0]), x[:, 2] * (1.4 - 0.8 * u[:, 0])], axis=1)
 
 
-def _slab(u: np.ndarray) -> np.ndarray:
+def _slab(u: Array) -> Array:
     x = (u - 0.5) * np.array([0.14, 0.1, 0.008])
     bump = 1 + 0.08 * np.sin(7 * u[:, 0] + 1) * np.cos(5 * u[:, 1])
     return np.stack([x[:, 0] + 0.15 * x[:, 1], x[:, 1] + 0.06 * x[:, 0], x[:, 2] * bump + 0.002 * (u[:, 0] - 0.5) ** 2], axis=1)
 
 
-def _revolved(profile: np.ndarray, thickness: float) -> Callable[[np.ndarray], np.ndarray]:
+def _revolved(profile: Array, thickness: float) -> Callable[[Array], Array]:
     """Round z: the first axis is azimuth, the second runs along profile (k, 2) of (r, z), the third across the wall."""
     step = np.linalg.norm(np.diff(profile, axis=0), axis=1)
     way = np.concatenate([[0], np.cumsum(step)]) / step.sum()
     tangent = np.gradient(profile, way, axis=0)
     normal = np.stack([tangent[:, 1], -tangent[:, 0]], axis=1) / np.linalg.norm(tangent, axis=1)[:, None]
 
-    def place(u: np.ndarray) -> np.ndarray:
+    def place(u: Array) -> Array:
         r, z, nr, nz = (np.interp(u[:, 1], way, c) for c in (*profile.T, *normal.T))
         off = (u[:, 2] - 0.5) * thickness
         r, z = r + nr * off, z + nz * off
@@ -92,12 +93,12 @@ def _revolved(profile: np.ndarray, thickness: float) -> Callable[[np.ndarray], n
     return place
 
 
-def _arc(radius: float, first: float, last: float, squash: float = 1.0) -> np.ndarray:
+def _arc(radius: float, first: float, last: float, squash: float = 1.0) -> Array:
     angle = np.linspace(first, last, 60)
     return np.stack([radius * np.sin(angle), -squash * radius * np.cos(angle)], axis=1)
 
 
-def _cup() -> np.ndarray:
+def _cup() -> Array:
     floor = np.stack([np.linspace(0.008, 0.024, 20), np.zeros(20)], axis=1)
     turn = np.linspace(-np.pi / 2, 0, 20)[1:]
     corner = np.stack([0.024 + 0.012 * np.cos(turn), 0.012 + 0.012 * np.sin(turn)], axis=1)
@@ -131,7 +132,7 @@ class Body:
 
     name: str
     modes: Modes
-    normal: np.ndarray  # (v, 3) outward, area-weighted
+    normal: Array  # (v, 3) outward, area-weighted
 
 
 def laid(recipe: Recipe, fineness: float = 1.0) -> Bricks:
@@ -146,8 +147,8 @@ def solved(
     folder: Path,
     *,
     fineness: float = 1.0,
-    tensor: np.ndarray | None = None,
-    softer: Callable[[np.ndarray], np.ndarray] | None = None,
+    tensor: Array | None = None,
+    softer: Callable[[Array], Array] | None = None,
     load: dict[int, float] | None = None,
     tag: str = "",
 ) -> Modes:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from benchmarks.suite.objects import Body, Material
+from sonic_bullet.records import Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,17 +28,17 @@ class Strike:
 class Ring:
     """What rings after a unit impulse: poles s (m,) in 1/s, residues r (m,): Re Σ r e^{st}. level (m,): the mode's displacement in m at its antinode."""
 
-    pole: np.ndarray
-    residue: np.ndarray
-    level: np.ndarray
+    pole: Array
+    residue: Array
+    level: Array
 
 
-def rayleigh(value: np.ndarray, material: Material) -> np.ndarray:
+def rayleigh(value: Array, material: Material) -> Array:
     """Modal damping matrix (m, m) of D = α + βΛ [Rayleigh 1877]."""
     return np.diag(material.alpha + material.beta * value)
 
 
-def ring(body: Body, damping: np.ndarray, strike: Strike, sensor: tuple[int, np.ndarray]) -> Ring:
+def ring(body: Body, damping: Array, strike: Strike, sensor: tuple[int, Array]) -> Ring:
     """Poles and residues of a strike at a sensor (vertex, direction), from the full damping matrix (m, m)."""
     modes = body.modes
     into = np.asarray(strike.direction) @ modes.shape[strike.vertex]
@@ -61,7 +62,7 @@ def ring(body: Body, damping: np.ndarray, strike: Strike, sensor: tuple[int, np.
     return Ring(pole[up], 2 * residue[up], level[near])
 
 
-def sounded(ring_: Ring, n: int, rate: float) -> np.ndarray:
+def sounded(ring_: Ring, n: int, rate: float) -> Array:
     """Re Σ r e^{st} at n samples, by recursion in blocks."""
     block = 512
     t = np.arange(block) / rate
@@ -70,7 +71,7 @@ def sounded(ring_: Ring, n: int, rate: float) -> np.ndarray:
     return np.asarray((starts @ inside).real.ravel()[:n])
 
 
-def noise(rng: np.random.Generator, n: int, sd: float, colour: str) -> np.ndarray:
+def noise(rng: np.random.Generator, n: int, sd: float, colour: str) -> Array:
     """A recorder's floor of standard deviation sd: "room" (white and rumble below 350 Hz), "white" or "pink"."""
     from scipy.signal import lfilter
 
@@ -85,7 +86,7 @@ def noise(rng: np.random.Generator, n: int, sd: float, colour: str) -> np.ndarra
     return np.asarray(sd * shaped / shaped.std())
 
 
-def spectral_distance_db(one: np.ndarray, two: np.ndarray, floor_sd: float) -> float:
+def spectral_distance_db(one: Array, two: Array, floor_sd: float) -> float:
     """Log-spectral distance, mean over three resolutions, of cells where either stands 10 dB above a white floor: this suite's own measure."""
     total = []
     for size in (512, 2048, 8192):

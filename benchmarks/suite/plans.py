@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import zlib
 from itertools import cycle
+from typing import Any
 
 from benchmarks.suite.cases import Plan
 from benchmarks.suite.effects import LISTED, UNLISTED
@@ -68,7 +69,7 @@ def singles() -> list[Plan]:
     return out
 
 
-def _recorded(seed: int) -> dict[str, object]:
+def _recorded(seed: int) -> dict[str, Any]:
     """How a case is recorded: rate, noise and its colour."""
     return {
         "rate": (44_100, 48_000)[seed // 2 % 2],
@@ -82,7 +83,7 @@ def nulls(count: int = 50) -> list[Plan]:
     out = []
     for k in range(count):
         seed = _seed("null", k)
-        how = {
+        how: dict[str, Any] = {
             "noise_db": (-72.0, -60.0, -84.0, -66.0, -54.0)[k % 5],
             "colour": ("room", "white", "pink")[k % 3],
             "rate": (44_100, 48_000)[k // 2 % 2],

@@ -15,12 +15,12 @@ from benchmarks.suite.effects import LISTED
 Row = dict[str, Any]
 
 
-def _of(rows: list[Row], kind: str) -> list[Row]:
+def _of(rows: list[Row], *kind: str) -> list[Row]:
     return [r for r in rows if r["case"].startswith(kind)]
 
 
 def _named(row: Row) -> bool:
-    return row["verdict"] == "explained" and row["found"] == row["true"]
+    return bool(row["verdict"] == "explained" and row["found"] == row["true"])
 
 
 def confusion(rows: list[Row]) -> str:
@@ -66,7 +66,7 @@ def _number(value: Any, split: str = "") -> float:
 
 def report(rows: list[Row], planned: int) -> str:
     """The whole report; counts are of cases that were judged, and those that were not are said."""
-    singles, nulls, pairs, unlisted, poor = (_of(rows, k) for k in ("single-", "null-", "pair-", "unlisted-", ("features-", "no-mesh-")))  # type: ignore[arg-type]
+    singles, nulls, pairs, unlisted, poor = (_of(rows, *k.split()) for k in ("single-", "null-", "pair-", "unlisted-", "features- no-mesh-"))
     failed = [r for r in rows if r["verdict"] == "failed"]
     alarms = [r for r in nulls if r["found"] or r["verdict"] != "none"]
     wrong = [r for r in singles + pairs if set(r["found"]) - set(r["true"])]

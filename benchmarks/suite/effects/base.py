@@ -12,6 +12,7 @@ import numpy as np
 from benchmarks.suite.bricks import Modes
 from benchmarks.suite.objects import Body, Material, Recipe
 from benchmarks.suite.physics import Ring, Strike
+from sonic_bullet.records import Array
 
 CARRIED = ("material", "striker", "room", "chain")  # what another object of the same material meets too
 LOUD = 0.04  # N·s: the impulse at which strengths hold
@@ -25,7 +26,7 @@ class Scene:
     material: Material
     body: Body
     strikes: tuple[Strike, ...]
-    sensor: tuple[int, np.ndarray]
+    sensor: tuple[int, Array]
     gain: float
     rate: int
     n: int
@@ -45,11 +46,11 @@ class Effect:
     truth: dict[str, Any] = field(default_factory=dict)
     modes: Callable[[Recipe, float, Path], Modes] | None = None
     pairs: Callable[[Modes], Modes] | None = None
-    damping: Callable[[Modes, np.ndarray], np.ndarray] | None = None
-    ring: Callable[[Ring, float, int, float], np.ndarray] | None = None
-    pulse: Callable[[float, float], np.ndarray] | None = None
-    sound: Callable[[np.ndarray, float, float, int], np.ndarray] | None = None
-    last: Callable[[np.ndarray], np.ndarray] | None = None
+    damping: Callable[[Modes, Array], Array] | None = None
+    ring: Callable[[Ring, float, int, float], Array] | None = None
+    pulse: Callable[[float, float], Array] | None = None
+    sound: Callable[[Array, float, float, int], Array] | None = None
+    last: Callable[[Array], Array] | None = None
 
 
 Maker = Callable[[int, np.random.Generator, Scene], Effect]

@@ -8,10 +8,13 @@ rebound            the blow again after gaps that fall by r, weaker by r each
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from benchmarks.suite.effects.base import LOUD, Effect, Scene, jitter, pick
 from benchmarks.suite.physics import Ring, ring
+from sonic_bullet.records import Array
 
 POWERS = {"half-sine": 1.0, "hertz": 1.5, "raised-cosine": 2.0}
 
@@ -24,8 +27,14 @@ def _reference(rng: np.random.Generator, scene: Scene) -> tuple[float, float]:
     return max(float((LOUD * r.level * np.abs(r.pole.imag) ** power).max()) for r in rings), power
 
 
-def _summed(r: Ring, envelope: np.ndarray, phase: np.ndarray) -> np.ndarray:
-    return np.asarray((r.residue * envelope * np.exp(1j * phase)).real.sum(axis=1))
+def _summed(r: Ring, n: int, rate: float, shape: Callable[[int, Array], tuple[Array, Array]]) -> Array:
+    """Σ Re r a(t) e^{iθ(t)}; shape(k, t) gives envelope and phase of mode k, which is followed until it has died away (140 dB)."""
+    out = np.zeros(n)
+    for k, d in enumerate(-r.pole.real):
+        last = min(n, int(16 * rate / max(d, 1e-3)) + 1)
+        envelope, phase = shape(k, np.arange(last) / rate)
+        out[:last] += envelope * (r.residue[k].real * np.cos(phase) - r.residue[k].imag * np.sin(phase))
+    return out
 
 
 def amplitude_pitch(strength: int, rng: np.random.Generator, scene: Scene) -> Effect:
@@ -33,11 +42,14 @@ def amplitude_pitch(strength: int, rng: np.random.Generator, scene: Scene) -> Ef
     top, power = _reference(rng, scene)
     kappa = jitter(rng, pick(strength, 0.003, 0.01, 0.03) * (2 - power)) * (1 if rng.random() < 0.75 else -1)
 
-    def run(r: Ring, impulse: float, n: int, rate: float) -> np.ndarray:
+    def run(r: Ring, impulse: float, n: int, rate: float) -> Array:
         a = impulse * r.level * np.abs(r.pole.imag) ** power / top
-        t = np.arange(n)[:, None] / rate
         d, omega = -r.pole.real, r.pole.imag
-        return _summed(r, np.exp(-d * t), omega * (t + kappa * a**2 * -np.expm1(-2 * d * t) / (2 * d)))
+
+        def shape(k: int, t: Array) -> tuple[Array, Array]:
+            return np.exp(-d[k] * t), omega[k] * (t + kappa * a[k] ** 2 * -np.expm1(-2 * d[k] * t) / (2 * d[k]))
+
+        return _summed(r, n, rate, shape)
 
     truth = {"kappa": kappa, "level": top, "of": "velocity" if power else "displacement"}
     return Effect("amplitude-pitch", "object", truth, ring=run)
@@ -49,18 +61,20 @@ def amplitude_damping(strength: int, rng: np.random.Generator, scene: Scene) -> 
     p = float(rng.choice([1.0, 2.0]))
     more = jitter(rng, pick(strength, 1.5, 4, 12))
 
-    def run(r: Ring, impulse: float, n: int, rate: float) -> np.ndarray:
+    def run(r: Ring, impulse: float, n: int, rate: float) -> Array:
         a = impulse * r.level * np.abs(r.pole.imag) ** power / top
-        t = np.arange(n)[:, None] / rate
         d, omega = -r.pole.real, r.pole.imag
-        envelope = np.exp(-d * t) * (1 + more * a**p * -np.expm1(-p * d * t)) ** (-1 / p)
-        return _summed(r, envelope, omega * t)
+
+        def shape(k: int, t: Array) -> tuple[Array, Array]:
+            return np.exp(-d[k] * t) * (1 + more * a[k] ** p * -np.expm1(-p * d[k] * t)) ** (-1 / p), omega[k] * t
+
+        return _summed(r, n, rate, shape)
 
     truth = {"more": more, "power": p, "level": top, "of": "velocity" if power else "displacement"}
     return Effect("amplitude-damping", "object", truth, ring=run)
 
 
-def pulse(tau_s: float, rate: float, power: float) -> np.ndarray:
+def pulse(tau_s: float, rate: float, power: float) -> Array:
     """Taps of a sin^power pulse of unit area and length tau_s from sample 0, each the mean over its sample."""
     fine = 64
     x = (np.arange(fine * int(np.ceil(tau_s * rate) + 1)) + 0.5) / (fine * tau_s * rate)
@@ -84,7 +98,7 @@ def rebound(strength: int, rng: np.random.Generator, scene: Scene) -> Effect:
     power = float(rng.choice([0.0, 1.0]))
     hits = int(rng.integers(2, 6))
 
-    def taps(impulse: float, rate: float) -> np.ndarray:
+    def taps(impulse: float, rate: float) -> Array:
         first = gap * (impulse / 0.02) ** power
         when = np.concatenate([[0], np.cumsum(first * r ** np.arange(hits - 1))]) * rate
         out = np.zeros(int(when[-1]) + 2)

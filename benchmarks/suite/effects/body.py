@@ -18,6 +18,7 @@ import numpy as np
 from benchmarks.suite.bricks import Modes, orthotropic
 from benchmarks.suite.effects.base import Effect, Scene, jitter, pick
 from benchmarks.suite.objects import Recipe, solved
+from sonic_bullet.records import Array
 
 
 def damping_law(strength: int, rng: np.random.Generator, scene: Scene) -> Effect:
@@ -31,20 +32,20 @@ def damping_law(strength: int, rng: np.random.Generator, scene: Scene) -> Effect
     if law == "constant-loss":
         truth["eta"] = eta
 
-        def loss(omega: np.ndarray) -> np.ndarray:
+        def loss(omega: Array) -> Array:
             return eta * omega
     elif law == "power":
         p = float(rng.choice([0.5, 0.7, 1.4]))
         at_1k = eta * middle / 2 * (2 * np.pi * 1000 / middle) ** p
         truth |= {"d_1khz": at_1k, "exponent": p}
 
-        def loss(omega: np.ndarray) -> np.ndarray:
-            return 2 * at_1k * (omega / (2 * np.pi * 1000)) ** p
+        def loss(omega: Array) -> Array:
+            return np.asarray(2 * at_1k * (omega / (2 * np.pi * 1000)) ** p)
     else:
         peak = float(rng.uniform(0.6, 1.4)) * middle
         truth |= {"delta": 2 * eta, "tau": 1 / peak, "eta_floor": 0.1 * eta}
 
-        def loss(omega: np.ndarray) -> np.ndarray:
+        def loss(omega: Array) -> Array:
             x = omega / peak
             return omega * (2 * eta * x / (1 + x**2) + 0.1 * eta)
 
@@ -62,9 +63,9 @@ def support_damping(strength: int, rng: np.random.Generator, scene: Scene) -> Ef
     c = jitter(rng, pick(strength, 0.2, 0.8, 3) * plain / (phi**2).sum(axis=0).mean())
     truth = {"vertices": [int(v) for v in points], "c": c}
 
-    def damping(modes: Modes, d: np.ndarray) -> np.ndarray:
+    def damping(modes: Modes, d: Array) -> Array:
         part = np.concatenate([way @ modes.shape[v] for v, way in zip(points, ways, strict=True)])
-        return d + c * part.T @ part
+        return np.asarray(d + c * part.T @ part)
 
     return Effect("support-damping", "fixture", truth, damping=damping)
 
@@ -76,11 +77,11 @@ def radiation(strength: int, rng: np.random.Generator, scene: Scene) -> Effect:
     times = jitter(rng, pick(strength, 1, 3, 10))
     tilted = bool(rng.random() < 0.5)
 
-    def sigma(modes: Modes) -> np.ndarray:
+    def sigma(modes: Modes) -> Array:
         ka = np.sqrt(modes.value) / 343 * size
         return np.asarray(ka**order / (1 + ka**order))
 
-    def damping(modes: Modes, d: np.ndarray) -> np.ndarray:
+    def damping(modes: Modes, d: Array) -> Array:
         return d + np.diag(times * 1.2 * 343 * sigma(modes) * _flow(modes))
 
     def pairs(modes: Modes) -> Modes:
@@ -95,7 +96,7 @@ def _area(modes: Modes) -> float:
     return float(np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1).sum() / 2)
 
 
-def _flow(modes: Modes) -> np.ndarray:
+def _flow(modes: Modes) -> Array:
     """∮(φ·n)² dS (m,), by the mean over each triangle's corners."""
     corner = modes.vertex_m[modes.face]
     area = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]) / 2
@@ -139,7 +140,7 @@ def mode_splitting(strength: int, rng: np.random.Generator, scene: Scene) -> Eff
     if rng.random() < 0.5:
         wave = rng.standard_normal(12)
 
-        def softer(centre: np.ndarray) -> np.ndarray:
+        def softer(centre: Array) -> Array:
             angle = 2 * np.pi * centre[:, 0] - azimuth
             bumps = sum(w * np.cos((k + 1) * angle + 3 * w) for k, w in enumerate(wave))
             return np.asarray(1 + 2.5 * split * bumps)

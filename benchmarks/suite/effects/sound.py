@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from benchmarks.suite.effects.base import Effect, Scene, jitter, pick
+from sonic_bullet.records import Array
 
 
 def foreign_mode(strength: int, rng: np.random.Generator, scene: Scene) -> Effect:
@@ -19,20 +20,20 @@ def foreign_mode(strength: int, rng: np.random.Generator, scene: Scene) -> Effec
     rings = [ring(scene.body, rayleigh(scene.body.modes.value, scene.material), s, scene.sensor) for s in scene.strikes]
     typical = float(np.median([np.sort(np.abs(r.residue))[-5:].mean() for r in rings]))
     own = scene.body.modes.freq_hz
-    lines = []
+    lines: list[list[float]] = []
     while len(lines) < int(rng.integers(1, 4)):
         freq = float(np.exp(rng.uniform(np.log(250), np.log(9000))))
         if np.abs(own / freq - 1).min() > 0.01:
             lines.append([freq, float(np.exp(rng.uniform(np.log(8), np.log(80)))), jitter(rng, pick(strength, 0.06, 0.3, 1.2) * typical)])
 
-    def add(x: np.ndarray, impulse: float, rate: float, which: int) -> np.ndarray:
+    def add(x: Array, impulse: float, rate: float, which: int) -> Array:
         t = np.arange(len(x)) / rate
         return x + scene.gain * impulse * sum(a * np.exp(-d * t) * np.sin(2 * np.pi * f * t) for f, d, a in lines)
 
     return Effect("foreign-mode", "striker", {"modes": lines}, sound=add)
 
 
-def impulse_response(rt60_s: float, wet: float, seed: int, rate: float, predelay_s: float, reflections: int, darker: float) -> np.ndarray:
+def impulse_response(rt60_s: float, wet: float, seed: int, rate: float, predelay_s: float, reflections: int, darker: float) -> Array:
     """What comes after the direct sound, of energy wet; darker: how much sooner the treble dies (0: together)."""
     rng = np.random.default_rng(seed)
     n = int(1.2 * rt60_s * rate)
@@ -58,7 +59,7 @@ def room(strength: int, rng: np.random.Generator, scene: Scene) -> Effect:
     how = {"predelay": float(rng.choice([0.0, 0.003, 0.007])), "reflections": int(rng.choice([0, 6, 12])), "darker": float(rng.choice([0.0, 1.0]))}
     h = impulse_response(rt60, wet, seed, scene.rate, how["predelay"], int(how["reflections"]), how["darker"])
 
-    def add(x: np.ndarray, impulse: float, rate: float, which: int) -> np.ndarray:
+    def add(x: Array, impulse: float, rate: float, which: int) -> Array:
         return np.asarray(x + fftconvolve(x, h)[: len(x)])
 
     return Effect("room", "room", {"rt60": rt60, "wet": wet, "seed": seed, **how}, sound=add)
@@ -79,10 +80,10 @@ def measurement_chain(strength: int, rng: np.random.Generator, scene: Scene) -> 
         parts = level * np.array([1, 0.5, 0.3, 0.15])
         truth |= {"freq": mains, "levels": parts.tolist()}
 
-        def hum(x: np.ndarray, impulse: float, rate: float, which: int) -> np.ndarray:
+        def hum(x: Array, impulse: float, rate: float, which: int) -> Array:
             t = np.arange(len(x)) / rate
             turn = 2.4 * which
-            return x + sum(a * np.sin(2 * np.pi * mains * (k + 1) * t + turn * (k + 1)) for k, a in enumerate(parts))
+            return np.asarray(x + sum(a * np.sin(2 * np.pi * mains * (k + 1) * t + turn * (k + 1)) for k, a in enumerate(parts)))
 
         return Effect("measurement-chain", "chain", truth, sound=hum)
     own = scene.body.modes.freq_hz

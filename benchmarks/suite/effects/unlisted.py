@@ -13,6 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from benchmarks.suite.effects.base import Effect, Scene, jitter, pick
+from sonic_bullet.records import Array
 
 
 def drift(strength: int, rng: np.random.Generator, scene: Scene) -> Effect:
@@ -20,14 +21,14 @@ def drift(strength: int, rng: np.random.Generator, scene: Scene) -> Effect:
     part = pick(strength, 0.003, 0.008, 0.02)
     offsets = rng.uniform(-part, part, 64)
 
-    def bend(x: np.ndarray, impulse: float, rate: float, which: int) -> np.ndarray:
+    def bend(x: Array, impulse: float, rate: float, which: int) -> Array:
         t = np.arange(len(x)) * (1 + offsets[which])
-        return np.interp(t, np.arange(4 * len(x)) / 4, _finer(x), right=0.0)
+        return np.asarray(np.interp(t, np.arange(4 * len(x)) / 4, _finer(x), right=0.0))
 
     return Effect("unlisted:drift", "object", {"part": part}, sound=bend)
 
 
-def _finer(x: np.ndarray) -> np.ndarray:
+def _finer(x: Array) -> Array:
     from scipy.signal import resample
 
     return np.asarray(resample(x, 4 * len(x)))
@@ -37,9 +38,9 @@ def doppler(strength: int, rng: np.random.Generator, scene: Scene) -> Effect:
     """An echo of 0.1, 0.3 or 0.8, 5-30 ms late, its reflector moving at 2-8 m/s."""
     level, late, speed = pick(strength, 0.1, 0.3, 0.8), float(rng.uniform(0.005, 0.03)), float(rng.uniform(2, 8))
 
-    def add(x: np.ndarray, impulse: float, rate: float, which: int) -> np.ndarray:
+    def add(x: Array, impulse: float, rate: float, which: int) -> Array:
         t = np.arange(len(x)) * (1 - 2 * speed / 343) - late * rate
-        return x + level * np.interp(t, np.arange(4 * len(x)) / 4, _finer(x), left=0.0)
+        return np.asarray(x + level * np.interp(t, np.arange(4 * len(x)) / 4, _finer(x), left=0.0))
 
     return Effect("unlisted:doppler", "room", {"level": level, "delay": late, "speed": speed}, sound=add)
 
@@ -49,7 +50,7 @@ def buzz(strength: int, rng: np.random.Generator, scene: Scene) -> Effect:
     level, seed = pick(strength, 0.05, 0.2, 0.6), int(rng.integers(2**31))
     gate = jitter(rng, 0.02)
 
-    def add(x: np.ndarray, impulse: float, rate: float, which: int) -> np.ndarray:
+    def add(x: Array, impulse: float, rate: float, which: int) -> Array:
         rattle = np.random.default_rng(seed + which).standard_normal(len(x))
         return x + level * np.maximum(x - gate, 0) * rattle
 
@@ -60,10 +61,10 @@ def octaves(strength: int, rng: np.random.Generator, scene: Scene) -> Effect:
     """x² of 0.1, 0.4 or 1.5 per unit of the loudest peak."""
     level = pick(strength, 0.2, 0.8, 3)
 
-    def add(x: np.ndarray, impulse: float, rate: float, which: int) -> np.ndarray:
+    def add(x: Array, impulse: float, rate: float, which: int) -> Array:
         from scipy.signal import butter, sosfilt
 
-        return x + level * sosfilt(butter(2, 200, "high", fs=rate, output="sos"), x**2)
+        return np.asarray(x + level * sosfilt(butter(2, 200, "high", fs=rate, output="sos"), x**2))
 
     return Effect("unlisted:octaves", "fixture", {"level": level}, sound=add)
 
@@ -74,7 +75,7 @@ def string(strength: int, rng: np.random.Generator, scene: Scene) -> Effect:
     k = np.arange(1, 13)
     lines = k * f1 * np.sqrt(1 + 4e-4 * k**2)
 
-    def add(x: np.ndarray, impulse: float, rate: float, which: int) -> np.ndarray:
+    def add(x: Array, impulse: float, rate: float, which: int) -> Array:
         from scipy.signal import lfilter
 
         out = np.zeros_like(x)
@@ -91,7 +92,7 @@ def tremolo(strength: int, rng: np.random.Generator, scene: Scene) -> Effect:
     depth, rate_hz = pick(strength, 0.15, 0.4, 0.8), float(rng.uniform(3, 9))
     turn = rng.uniform(0, 2 * np.pi, 64)
 
-    def swing(x: np.ndarray, impulse: float, rate: float, which: int) -> np.ndarray:
-        return x * (1 + depth * np.sin(2 * np.pi * rate_hz * np.arange(len(x)) / rate + turn[which]))
+    def swing(x: Array, impulse: float, rate: float, which: int) -> Array:
+        return np.asarray(x * (1 + depth * np.sin(2 * np.pi * rate_hz * np.arange(len(x)) / rate + turn[which])))
 
     return Effect("unlisted:tremolo", "room", {"depth": depth, "rate": rate_hz}, sound=swing)
