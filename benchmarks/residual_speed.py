@@ -13,8 +13,8 @@ from collections.abc import Callable
 import numpy as np
 
 from sonic_bullet.records import Array, Residual
-from sonic_bullet.residual.grains import faded, make_voice, placed, varied
-from sonic_bullet.residual.invert import ITERATIONS, invert, magnitude_of, noise_phases
+from sonic_bullet.residual.grains import SEEDS, faded, make_voice, placed, varied
+from sonic_bullet.residual.invert import ITERATIONS, OVERLAP, invert, magnitude_of, noise_phases
 from sonic_bullet.residual.player import SECTION, section_grain
 from sonic_bullet.residual.spectrogram import axes
 from sonic_bullet.residual.transfer import Modes, source_modes, source_power, transfer
@@ -30,15 +30,17 @@ def example(modes: int = 60, seed: int = 1) -> tuple[Residual, Modes]:
     hz = np.sort(random.uniform(200.0, 16_000.0, modes))
     noise = 1e-7 * np.exp(-8.0 * time_s)[None] * np.ones((50, 1))
     lines = np.sort(random.uniform(300.0, 9000.0, 20))
-    residual = Residual(hz, random.uniform(5.0, 60.0, modes), random.uniform(0.05, 1.0, modes), lines, np.full(20, 12.0), np.full(20, 0.05), freq, time_s, noise, 1.0)
+    residual = Residual(
+        hz, random.uniform(5.0, 60.0, modes), random.uniform(0.05, 1.0, modes), lines, np.full(20, 12.0), np.full(20, 0.05), freq, time_s, noise, 1.0
+    )
     return residual, Modes(np.sort(random.uniform(200.0, 16_000.0, modes)), random.uniform(5.0, 60.0, modes), random.uniform(0.05, 1.0, modes))
 
 
-def once(residual: Residual, target: Modes, seed: int, n: int = SR // 2) -> Array:
+def once(residual: Residual, target: Modes, n: int = SR // 2) -> Array:
     """The paper's algorithm 1 from end to end."""
-    freq, time_s = axes(n, SR)
+    freq, time_s = axes(n, SR, overlap=OVERLAP)
     power = transfer(source_power(residual), source_modes(residual), target, freq, time_s)
-    return faded(n, SR) * invert(magnitude_of(power, SR), noise_phases(n, seed), n)
+    return faded(n, SR) * invert(magnitude_of(power, SR), noise_phases(n, SEEDS[0]), n)
 
 
 def best(work: Callable[[int], object], turns: int) -> tuple[float, float]:
@@ -63,12 +65,12 @@ def main() -> int:
     def strike(k: int) -> Array:
         return varied(*placed(voice, power[0], 1e-4, False, flat), k)
 
-    once(residual, target, 0)
+    once(residual, target)
     strike(0)
     force = np.random.default_rng(2).normal(size=2 * SECTION)
     section_grain(voice, force, power[0], 0)
     rows = [
-        (f"from scratch: transfer and {ITERATIONS} turns of inversion", best(lambda k: once(residual, target, k), 60), SCRATCH_MS * 1e-3),
+        (f"from scratch: transfer and {ITERATIONS} turns of inversion", best(lambda _: once(residual, target), 60), SCRATCH_MS * 1e-3),
         ("a body's voice: two grains and their spectra", best(lambda _: make_voice(residual, target, SR), 20), np.inf),
         ("a new place on a known body", best(lambda k: placed(voice, power[k + 1], 1e-4, False, flat), 200), np.inf),
         ("from the cache: place, grain, fresh variation", best(strike, 2000), CACHE_US * 1e-6),

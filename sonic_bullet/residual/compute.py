@@ -10,6 +10,8 @@ are no pure damped sinusoids would else be spread over whole bands.
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 
 from sonic_bullet.errors import AudioError
@@ -92,7 +94,7 @@ def noisiness(fine: Power, freq_hz: Array, time_s: Array) -> Array:
     bounds = np.searchsorted(fine.freq_hz, edge)
     frame = np.clip(np.searchsorted(fine.time_s, time_s), 0, len(fine.time_s) - 1)
     share = np.ones((len(freq_hz), len(time_s)))
-    for b, (low, high) in enumerate(zip(bounds[:-1], bounds[1:], strict=True)):
+    for b, (low, high) in enumerate(itertools.pairwise(bounds)):
         if high - low > 3:
             band = fine.per_hz[low:high][:, frame]
             share[b] = np.median(band, axis=0) / np.log(2) / np.maximum(band.mean(axis=0), 1e-300)

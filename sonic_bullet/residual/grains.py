@@ -12,12 +12,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
 from numba import njit
 
 from sonic_bullet.records import Array, Residual
-from sonic_bullet.residual.invert import invert, magnitude_of, noise_phases
+from sonic_bullet.residual.invert import OVERLAP, invert, magnitude_of, noise_phases
 from sonic_bullet.residual.spectrogram import WINDOW, axes
 from sonic_bullet.residual.transfer import Lines, Modes, Pairs, come_from, merged, moved, pair, scale, source_modes, source_power, transfer_lines
 
@@ -54,7 +55,7 @@ def make_voice(residual: Residual, target: Modes, sr: int, longest_s: float = LO
     pairs = pair(source, target)
     joined, _ = merged(source)
     n = duration(residual, pairs, sr, longest_s)
-    freq, time = axes(n, sr)
+    freq, time = axes(n, sr, overlap=OVERLAP)
     here, slope, rate = come_from(pairs, freq)
     magnitude = magnitude_of(moved(source_power(residual), here, slope, rate, time), sr)
     size = 1 << int(np.ceil(np.log2(n + 4 * WINDOW)))
@@ -72,12 +73,14 @@ def duration(residual: Residual, pairs: Pairs, sr: int, longest_s: float) -> int
     return max(2 * WINDOW, round(sr * min(longest_s, last / float(pairs.rate.min()))))
 
 
+@lru_cache(maxsize=16)
 def faded(n: int, sr: int) -> Array:
     """(n,) float32: rises within a millisecond, falls over the last 15 %, with no corner in either."""
     shape = np.ones(n, np.float32)
     rise, fall = max(2, round(FADE_IN_S * sr)), max(2, int(FADE_OUT * n))
     shape[:rise] = np.sin(np.pi / 2 * (np.arange(rise) + 0.5) / rise) ** 2
     shape[n - fall :] *= np.cos(np.pi / 2 * (np.arange(fall) + 0.5) / fall) ** 2
+    shape.setflags(write=False)
     return shape
 
 
@@ -90,7 +93,9 @@ def filtered(voice: Voice, gain: Array) -> Array:
     """(2, length) float32: the base grains through a response (k,)."""
     spectrum = np.empty_like(voice.base)
     _filter(voice.base, np.asarray(gain, np.float32), spectrum)
-    return np.asarray(np.fft.irfft(spectrum, voice.size, axis=1)[:, : voice.length] * faded(voice.length, voice.sr))
+    from scipy.fft import irfft
+
+    return np.asarray(irfft(spectrum, voice.size, axis=1)[:, : voice.length] * faded(voice.length, voice.sr))
 
 
 Pulse = Callable[[Array, bool], Array]
@@ -156,3 +161,13 @@ def _filter(base: Array, gain: Array, out: Array) -> None:  # pragma: no cover -
         value = gain[low] + share * (gain[low + 1] - gain[low])
         for v in range(base.shape[0]):
             out[v, k] = base[v, k] * value
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def shape(spectrum: Array, base: Array, gain: Array, first: np.float32, second: np.float32) -> None:  # pragma: no cover - compiled
+    """spectrum (F,) ← spectrum·gain·(first·base_0 + second·base_1), the gain (k,) linear between its bins."""
+    every = (base.shape[1] - 1) // (len(gain) - 1)
+    for k in range(base.shape[1]):
+        low = min(k // every, len(gain) - 2)
+        share = np.float32(k - low * every) / np.float32(every)
+        spectrum[k] *= (gain[low] + share * (gain[low + 1] - gain[low])) * (first * base[0, k] + second * base[1, k])

@@ -8,35 +8,50 @@ A = √P. It starts from phases that are given: the source's, where there is a s
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numba import njit
 
 from sonic_bullet.records import Array
-from sonic_bullet.residual.spectrogram import WINDOW, hann, inverse, transform
+from sonic_bullet.residual.spectrogram import WINDOW, frame_count, hann, inverse, transform
 
-ITERATIONS = 8
+ITERATIONS = 4
 MOST_ITERATIONS = 10
-MOMENTUM = 0.5
+MOMENTUM = 0.99
+OVERLAP = 2
+"""With frames half a window apart four turns leave 10 % inconsistent, where a quarter apart ten leave 20 % (noise with a decay, momentum 0.99)."""
+LONGEST_NOISE = 1 << 18
 
 
-def invert(magnitude: Array, start: Array, n: int, *, iterations: int = ITERATIONS, momentum: float = MOMENTUM, window: int = WINDOW) -> Array:
+def invert(
+    magnitude: Array, start: Array, n: int, *, iterations: int = ITERATIONS, momentum: float = MOMENTUM, window: int = WINDOW, overlap: int = OVERLAP
+) -> Array:
     """Samples (n,) float32 of magnitudes |S| (m, k), from complex ``start`` (m, k) whose phases alone count. iterations: 0 … 10."""
     if not 0 <= iterations <= MOST_ITERATIONS:
         raise ValueError(f"{iterations} iterations: 0 to {MOST_ITERATIONS}")
-    magnitude = np.ascontiguousarray(magnitude, np.float32)
-    spectrum = np.ascontiguousarray(start, np.complex64).copy()
-    before = np.zeros_like(spectrum)
-    _phased(spectrum, before, magnitude, np.float32(0.0))
+    wanted = np.ascontiguousarray(magnitude, np.float32)
+    now = np.array(start, np.complex64, order="C")
+    before = np.zeros_like(now)
+    _phased(now.view(np.float32), before.view(np.float32), wanted, np.float32(0.0))
     for turn in range(iterations):
-        sample = inverse(spectrum, n, window)
-        spectrum = transform(sample, window)
-        _phased(spectrum, before, magnitude, np.float32(momentum if turn else 0.0))
-    return inverse(spectrum, n, window)
+        now = transform(inverse(now, n, window, overlap), window, overlap)
+        _phased(now.view(np.float32), before.view(np.float32), wanted, np.float32(momentum if turn else 0.0))
+    return inverse(now, n, window, overlap)
 
 
-def noise_phases(n: int, seed: int, window: int = WINDOW) -> Array:
-    """(m, k) complex64: the transform of white noise (n,), whose phases are consistent with each other."""
-    return transform(np.random.default_rng(seed).standard_normal(n, np.float32), window)
+def noise_phases(n: int, seed: int, window: int = WINDOW, overlap: int = OVERLAP) -> Array:
+    """(m, k) complex64: the transform of white noise, whose phases are consistent with each other; the same for a longer grain, as far as both go."""
+    frames = frame_count(n, window, overlap)
+    longest = max(LONGEST_NOISE, 1 << int(np.ceil(np.log2(n + window))))
+    return _noise(longest, seed, window, overlap)[:frames]
+
+
+@lru_cache(maxsize=4)
+def _noise(n: int, seed: int, window: int, overlap: int) -> Array:
+    phases = transform(np.random.default_rng(seed).standard_normal(n, np.float32), window, overlap)
+    phases.setflags(write=False)
+    return phases
 
 
 def magnitude_of(per_hz: Array, sr: int, window: int = WINDOW) -> Array:
@@ -44,20 +59,22 @@ def magnitude_of(per_hz: Array, sr: int, window: int = WINDOW) -> Array:
     return np.asarray(np.sqrt(per_hz.T * (sr * float((hann(window).astype(float) ** 2).sum()))), np.float32)
 
 
-def inconsistency(magnitude: Array, sample: Array, window: int = WINDOW) -> float:
+def inconsistency(magnitude: Array, sample: Array, window: int = WINDOW, overlap: int = OVERLAP) -> float:
     """‖|T(x)| - A‖/‖A‖: how far samples are from having the magnitudes asked for."""
-    return float(np.linalg.norm(np.abs(transform(sample, window)) - magnitude) / max(float(np.linalg.norm(magnitude)), 1e-300))
+    return float(np.linalg.norm(np.abs(transform(sample, window, overlap)) - magnitude) / max(float(np.linalg.norm(magnitude)), 1e-300))
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True, fastmath={"contract", "nnan", "ninf"})  # type: ignore[untyped-decorator]
 def _phased(spectrum: Array, before: Array, magnitude: Array, momentum: np.float32) -> None:  # pragma: no cover - compiled
-    """spectrum ← magnitude·Q/|Q|, Q = spectrum + momentum (spectrum - before); before ← spectrum as it came."""
-    for m in range(spectrum.shape[0]):
-        for k in range(spectrum.shape[1]):
-            now = spectrum[m, k]
-            re = now.real + momentum * (now.real - before[m, k].real)
-            im = now.imag + momentum * (now.imag - before[m, k].imag)
-            before[m, k] = now
-            size = np.sqrt(re * re + im * im)
-            scale = magnitude[m, k] / size if size > 1e-30 else np.float32(0.0)
-            spectrum[m, k] = complex(re * scale, im * scale)
+    """spectrum ← magnitude·Q/|Q|, Q = spectrum + momentum (spectrum - before); before ← spectrum as it came. Real and imaginary parts in turn."""
+    tiny, more = np.float32(1e-30), np.float32(1.0) + momentum
+    for m in range(magnitude.shape[0]):
+        for k in range(magnitude.shape[1]):
+            a, b = spectrum[m, 2 * k], spectrum[m, 2 * k + 1]
+            re = more * a - momentum * before[m, 2 * k]
+            im = more * b - momentum * before[m, 2 * k + 1]
+            before[m, 2 * k] = a
+            before[m, 2 * k + 1] = b
+            scale = magnitude[m, k] / np.sqrt(re * re + im * im + tiny)
+            spectrum[m, 2 * k] = re * scale
+            spectrum[m, 2 * k + 1] = im * scale

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sonic_bullet.records import Array
-from sonic_bullet.residual.grains import Voice, fraction, mixed_number, response
+from sonic_bullet.residual.grains import Voice, fraction, mixed_number, response, shape
 
 SECTION = 512
 LEAST_LEVEL = 2e-6
@@ -86,10 +86,9 @@ def section_grain(voice: Voice, force_n: Array, struck_power: Array, number: int
     level = float(np.sqrt(struck_power.max(initial=0.0))) * float(np.abs(force_n).sum()) / voice.sr
     if voice.silent or level < LEAST_LEVEL:
         return np.zeros(0, np.float32)
+    from scipy.fft import irfft, rfft
+
     angle = 2 * np.pi * fraction(mixed_number(number))
-    gain = response(voice, struck_power)
-    spectrum = np.fft.rfft((force_n / voice.sr).astype(np.float32), voice.size)
-    spectrum = spectrum * (np.float32(np.cos(angle)) * voice.base[0] + np.float32(np.sin(angle)) * voice.base[1])
-    bins = np.arange(len(spectrum)) * ((len(gain) - 1) / (len(spectrum) - 1))
-    spectrum *= np.interp(bins, np.arange(len(gain)), gain).astype(np.float32)
-    return np.asarray(np.fft.irfft(spectrum, voice.size)[: voice.length + 2 * SECTION])
+    spectrum = rfft((force_n / voice.sr).astype(np.float32), voice.size)
+    shape(spectrum, voice.base, response(voice, struck_power).astype(np.float32), np.float32(np.cos(angle)), np.float32(np.sin(angle)))
+    return np.asarray(irfft(spectrum, voice.size, overwrite_x=True)[: voice.length + 2 * SECTION])

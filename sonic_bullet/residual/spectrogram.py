@@ -1,8 +1,9 @@
 """Power spectrograms with their axes, and the short-time transform they come from.
 
     S[m, k] = Σ_n w[n] x[mH + n - N/2] e^{-2πikn/N},  P = |S|²/(sr Σw²)        two-sided power per Hz: white noise of variance σ² has P = σ²/sr
+    x[n] = Σ_m w[n - mH] x_m[n - mH] / Σ_m w²[n - mH]                         nearest in squares       [Griffin & Lim 1984, eq. 6]
 
-w: Hann, periodic; H = N/4, so that Σ w² over frames is the same at every sample [Griffin & Lim 1984, eq. 6]. m frames, k bins.
+w: Hann, periodic; H = N/4 for looking at a sound, N/2 for making one: phases then settle sooner. m frames, k bins.
 """
 
 from __future__ import annotations
@@ -44,31 +45,41 @@ def hann(length: int) -> Array:
     return window
 
 
-def frame_count(n: int, window: int = WINDOW) -> int:
-    """Frames that see any of n samples."""
-    return (n + window // 2) // (window // 4) + 1
+def frame_count(n: int, window: int = WINDOW, overlap: int = 4) -> int:
+    """Frames that see any of n samples, window/overlap apart."""
+    return (n + window // 2) // (window // overlap) + 1
 
 
-def axes(n: int, sr: int, window: int = WINDOW) -> tuple[Array, Array]:
+def axes(n: int, sr: int, window: int = WINDOW, overlap: int = 4) -> tuple[Array, Array]:
     """Frequencies (window/2 + 1,) in Hz and times (m,) in s of `transform`."""
-    return np.arange(window // 2 + 1) * sr / window, np.arange(frame_count(n, window)) * (window // 4) / sr
+    return np.arange(window // 2 + 1) * sr / window, np.arange(frame_count(n, window, overlap)) * (window // overlap) / sr
 
 
-def transform(sample: Array, window: int = WINDOW) -> Array:
-    """S (m, window/2 + 1) complex64 of samples (n,); frame m lies about sample m·window/4, zeros stand before and after."""
-    n, hop = len(sample), window // 4
-    frames = frame_count(n, window)
-    padded = np.zeros((frames - 1) * hop + window, np.float32)
-    padded[window // 2 : window // 2 + n] = sample
-    return np.asarray(np.fft.rfft(np.lib.stride_tricks.sliding_window_view(padded, window)[::hop] * hann(window), axis=1))
+def transform(sample: Array, window: int = WINDOW, overlap: int = 4) -> Array:
+    """S (m, window/2 + 1) complex64 of samples (n,); frame m lies about sample m·window/overlap, zeros stand before and after."""
+    from scipy.fft import rfft  # several frames at once in vector registers, which numpy's does not
+
+    frames = np.empty((frame_count(len(sample), window, overlap), window), np.float32)
+    _cut(np.ascontiguousarray(sample, np.float32), hann(window), window // overlap, frames)
+    return np.asarray(rfft(frames, axis=1, overwrite_x=True))
 
 
-def inverse(spectrum: Array, n: int, window: int = WINDOW) -> Array:
-    """Samples (n,) float32 whose transform is nearest to S in squares [Griffin & Lim 1984, eq. 6]."""
-    frames = np.fft.irfft(spectrum, window, axis=1)
-    out = np.zeros((len(spectrum) - 1) * (window // 4) + window, np.float32)
-    _overlap(frames.astype(np.float32, copy=False), hann(window) / np.float32(1.5), out)
-    return out[window // 2 : window // 2 + n]
+def inverse(spectrum: Array, n: int, window: int = WINDOW, overlap: int = 4) -> Array:
+    """Samples (n,) float32 whose transform is nearest to S in squares."""
+    from scipy.fft import irfft
+
+    out = np.zeros(n, np.float32)
+    _add(irfft(spectrum, window, axis=1), _synthesis(window, overlap), window // overlap, out)
+    return out
+
+
+@lru_cache(maxsize=8)
+def _synthesis(window: int, overlap: int) -> Array:
+    """(window,) w/Σ w² over frames, as it is in the middle of a sound."""
+    shape = hann(window).astype(float)
+    made = (shape / np.tile((shape**2).reshape(overlap, window // overlap).sum(axis=0), overlap)).astype(np.float32)
+    made.setflags(write=False)
+    return made
 
 
 def power(sample: Array, sr: int, window: int = WINDOW) -> Power:
@@ -91,8 +102,28 @@ def checked(sample: Array, sr: int) -> Array:
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _overlap(frames: Array, window: Array, out: Array) -> None:  # pragma: no cover - compiled
-    hop = len(window) // 4
+def _cut(sample: Array, window: Array, hop: int, frames: Array) -> None:  # pragma: no cover - compiled
+    """frames (m, N) of samples under the window, zeros outside."""
+    size = len(window)
     for m in range(len(frames)):
-        for k in range(len(window)):
-            out[m * hop + k] += frames[m, k] * window[k]
+        first = m * hop - size // 2
+        low, high = max(0, -first), min(size, len(sample) - first)
+        high = max(high, low)
+        frames[m, :low] = 0.0
+        frames[m, high:] = 0.0
+        out, part, shape = frames[m, low:high], sample[first + low : first + high], window[low:high]
+        for k in range(len(out)):
+            out[k] = part[k] * shape[k]
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _add(frames: Array, window: Array, hop: int, out: Array) -> None:  # pragma: no cover - compiled
+    """Add frames (m, N) under the window to out (n,), where they lie in it."""
+    size = len(window)
+    for m in range(len(frames)):
+        first = m * hop - size // 2
+        low, high = max(0, -first), min(size, len(out) - first)
+        high = max(high, low)
+        part, frame, shape = out[first + low : first + high], frames[m, low:high], window[low:high]
+        for k in range(len(part)):
+            part[k] += frame[k] * shape[k]

@@ -7,8 +7,8 @@
 
 At a mode the shift is the paper's Δf. Towards the midpoints the paper shifts by the same Δf and cuts or doubles what does not fit; here a neighbourhood fills
 its new one, so bands of a body twice the size lie at half the frequencies, and |df_s/df_t| keeps their energy relative to the modes'. After (2) source and
-target mode decay alike, so the ratio of their spectrograms, pixel by pixel, no longer hangs on time. h_k is a mode's skirt, b_k a twentieth of its neighbourhood:
-a mode that is not struck takes its neighbourhood down by 20 dB or more, and its neighbours' skirts meet without a step.
+target mode decay alike, so the ratio of their spectrograms, pixel by pixel, no longer hangs on time. h_k is a mode's skirt, b_k 7 % of its neighbourhood:
+a mode that is not struck takes its neighbourhood down by 20 dB, and its neighbours' skirts meet without a step.
 Below the lowest and above the highest pair frequencies keep their ratio to that pair's. m, p modes, pairs; b bands, n frames.
 """
 
@@ -30,7 +30,7 @@ ALIKE = 0.02
 ALIKE_COUNT = 12
 ONE_MODE = 1e-3
 """Modes closer than this, relative, count as one: what hears them hears one line."""
-SKIRT = 0.05
+SKIRT = 0.07
 FAINT = 1e-6
 LEAST_DECAY_PER_S = 0.1
 FASTEST_TIME = 1e3
@@ -116,17 +116,14 @@ def _natural(a: Modes, b: Modes) -> tuple[Array, Array]:
     none = np.zeros(0, np.int64)
     if count < min(3, len(a.freq_hz)):
         return none, none
-    best, scale = np.inf, 1.0
     low = a.freq_hz[:count]
-    for j in range(min(4, len(b.freq_hz))):
-        for i in range(min(2, count)):
-            ratio = b.freq_hz[j] / low[i]
-            off = np.sort(np.abs(_nearest(b.freq_hz, ratio * low)[1] / (ratio * low) - 1))
-            far = float(off[: max(1, int(0.8 * count))].max()) + 1e-3 * abs(j - i)
-            if far < best:
-                best, scale = far, ratio
-    if best > ALIKE:
+    ratio = (b.freq_hz[:4, None] / low[None, :2]).ravel()
+    wanted = ratio[:, None] * low
+    off = np.sort(np.abs(_nearest(b.freq_hz, wanted)[1] / wanted - 1), axis=1)[:, max(0, int(0.8 * count) - 1)]
+    at = int(np.argmin(off))
+    if off[at] > ALIKE:
         return none, none
+    scale = ratio[at]
     near, there = _nearest(b.freq_hz, scale * a.freq_hz)
     back, _ = _nearest(scale * a.freq_hz, b.freq_hz)
     good = (np.abs(there / (scale * a.freq_hz) - 1) < 2 * ALIKE) & (back[near] == np.arange(len(near)))
@@ -135,10 +132,8 @@ def _natural(a: Modes, b: Modes) -> tuple[Array, Array]:
 
 def _nearest(values: Array, to: Array) -> tuple[Array, Array]:
     """Index into ascending ``values``, and the value, nearest to each of ``to``."""
-    right = np.clip(np.searchsorted(values, to), 1, len(values) - 1) if len(values) > 1 else np.zeros(len(to), np.int64)
-    if len(values) > 1:
-        right = np.where(to - values[right - 1] < values[right] - to, right - 1, right)
-    return right, values[right]
+    at = np.searchsorted((values[1:] + values[:-1]) / 2, to)
+    return at, values[at]
 
 
 def neighbourhood(centre_hz: Array, freq_hz: Array) -> Array:
