@@ -4,7 +4,8 @@
     V: modes at ν₁ and ν₂ together, VᵀMV = 1;   (l VᵀK_lV + s VᵀK_sV) q = θ q,  λ = γ θ/L²,  γ = E/ρ     [Rayleigh-Ritz]
 
 The error of λ is of the fourth order in the distances from ν₁ and ν₂. Lengths by the body's diagonal L, as in model.py.
-A free box takes polynomials in place of elements (polynomials.py): its λ are good to 1e-4, where elements within the same time are 1e-2 too stiff.
+A free box takes polynomials in place of elements (polynomials.py), a free body of revolution a Fourier series around its axis (revolved.py): their λ are
+good to 2e-4, where elements within the same time are 1e-2 too stiff.
 """
 
 from __future__ import annotations
@@ -110,7 +111,9 @@ def family(
         a, note = found
         volume, count, meshed = a["numbers"]
         return Family(a["lame"], a["shear"], a["skin"], a["vertex"], a["face"], length, float(volume), int(count), note, bool(meshed))
-    made = _of_box(shape, length, limit, poisson, say) if edge_m is None and not len(clamp) else None
+    made = None
+    if edge_m is None and not len(clamp):
+        made = _of_box(shape, length, limit, poisson, say) or _of_revolution(shape, length, limit, poisson, say)
     if made is None:
         made = _family(shape, length, limit, poisson, clamp, edge_m, say)
     numbers = np.array([made.volume_m3, made.count, made.meshed])
@@ -124,6 +127,10 @@ def _poissons(poisson: float) -> tuple[float, float]:
     if high - low < APART / 2:
         raise ModalError(f"Poisson's ratio {poisson} is no isotropic solid's", "guess one between -0.5 and 0.48")
     return low, high
+
+
+SECTION_EDGE, SECTION_WAVE = 0.5, 0.25  # a section's cubic triangles: of the wall's thickness and of the shortest wave
+AROUND = 5  # cells around to a wave
 
 
 def _together(first: Array, second: Array, mass: Callable[[Array], Array]) -> Array:
@@ -179,6 +186,66 @@ def _of_box(shape: Shape, length: float, limit: float, poisson: float, say: Call
     vertex_m = shell.node_m[skin.node] @ box.axes.T + box.centre_m
     count = min(MOST_MODES, int(counts.min()))
     return Family((lame + lame.T) / 2, (shear + shear.T) / 2, basis_skin, vertex_m, skin.face, length, float(np.prod(box.size_m)), count, note, meshed=False)
+
+
+def _of_revolution(shape: Shape, length: float, limit: float, poisson: float, say: Callable[[str], None]) -> Family | None:
+    """The family of a free body of revolution; None where the shape is none."""
+    from scipy.linalg import block_diag
+    from scipy.sparse import block_diag as diagonal
+
+    from sonic_bullet.modal import eigen, polynomials, revolved
+
+    body = revolved.recognised(shape.vertex_m, shape.face) if shape.kind == "mesh" else None
+    if body is None:
+        return None
+    low, high = _poissons(poisson)
+    round_m = np.linalg.norm(np.roll(body.outline_m, -1, axis=0) - body.outline_m, axis=1)
+    thick = 2 * body.area_m2 / float(round_m.sum())
+    unit = revolved.Revolved(body.outline_m / length, body.axes, body.centre_m)
+    tensors = _lame_shear()
+    wave = polynomials.wave_number(limit, thick / length, _mixed(max(low, high), *tensors))
+    long = 2 * np.pi / wave
+    section = revolved.sectioned(unit, float(min(SECTION_EDGE * thick / length, SECTION_WAVE * long)), long / polynomials.PER_WAVE)
+    if section is None:
+        return None
+    n = len(section.order)
+    say(f"solving {3 * n} unknowns of a section for each wave around")
+    order = (section.order[:, None] + n * np.arange(3)).ravel()
+    plain = section.slopes[3].T @ section.slopes[3]
+    mass = diagonal([plain] * 3, format="csr")[order][:, order]
+    shift = -SHIFT * (2 * thick / length) ** 2 / 3
+    counts = np.zeros(2, int)
+    parts: list[tuple[int, Array, Array, Array]] = []
+    for m in range(MOST_MODES):
+        strain = section.strains(m)
+        k_lame, k_shear = (section.stiffness(strain, tensor)[order][:, order] for tensor in tensors)
+        kept = []
+        for k, nu in enumerate((low, high)):
+            modes = eigen.solve(
+                _mixed(nu, k_lame, k_shear), mass, shift, rigid=2 if m < 2 else 0, enough=lambda value: bool(value[-1] > BEYOND * limit), most=MOST_MODES
+            )
+            counts[k] += (1 if m == 0 else 2) * int((modes.lambda_per_s2 <= limit).sum())
+            kept.append(modes.vector[:, modes.lambda_per_s2 <= BEYOND * limit])
+        if kept[0].shape[1] + kept[1].shape[1] == 0:
+            if m > 1:
+                break
+            continue
+        basis = _together(kept[0], kept[1], lambda v: mass @ v)
+        vector = np.zeros_like(basis)
+        vector[order] = basis
+        parts.append((m, basis.T @ (k_lame @ basis), basis.T @ (k_shear @ basis), vector))
+    if not parts:
+        return None
+    cells = int(np.clip(AROUND * parts[-1][0], 24, 96))
+    point, face = revolved.skin(section, cells)
+    twins = [(part, twin) for part in parts for twin in ((False, True) if part[0] else (False,))]
+    lame, shear = (block_diag(*(part[k] for part, _ in twins)) for k in (1, 2))
+    moved = np.concatenate([revolved.shapes_at(section, part[3], part[0], twin, cells).astype(np.float32) for part, twin in twins], axis=2)
+    moved = np.ascontiguousarray(np.einsum("yx,vxb->vyb", body.axes.astype(np.float32), moved))
+    note = f"body of revolution, section of {n} nodes, up to {parts[-1][0]} waves around; nu {low:g} and {high:g}"
+    vertex_m = point * length @ body.axes.T + body.centre_m
+    count = min(MOST_MODES, int(counts.min()))
+    return Family((lame + lame.T) / 2, (shear + shear.T) / 2, moved, vertex_m, face, length, body.volume_m3, count, note, meshed=False)
 
 
 def _mixed(poisson: float, lame: Any, shear: Any) -> Any:

@@ -1,13 +1,15 @@
-"""Families: boxes by polynomials against closed forms and against elements, turned and scaled; slopes against differences."""
+"""Families of boxes and of bodies of revolution against closed forms and against elements, turned and shifted; slopes against differences."""
 
 from __future__ import annotations
+
+from itertools import pairwise
 
 import numpy as np
 import pytest
 import trimesh
 
 from sonic_bullet.modal import closed_forms as exact
-from sonic_bullet.modal import polynomials
+from sonic_bullet.modal import polynomials, reduced, revolved
 from sonic_bullet.modal.reduced import family
 from sonic_bullet.records import Array, Shape
 
@@ -89,3 +91,75 @@ def test_a_cube_has_its_triplets() -> None:
     whole = [len(g) for g in groups[:-1]]
     assert set(whole) <= {1, 2, 3} and whole.count(3) >= 3
     assert whole[0] == 2  # twist about an axis has the lowest [Demarest 1971]
+
+
+def ring_mesh(inner: float, outer: float, height: float, turn: Array | None = None, sections: int = 96) -> Shape:
+    mesh = trimesh.creation.annulus(inner, outer, height, sections=sections)
+    if turn is not None:
+        mesh.apply_transform(turn)
+    return Shape("mesh", vertex_m=mesh.vertices, face=mesh.faces)
+
+
+def test_a_thin_ring_bends_in_its_plane_as_love_says() -> None:
+    """ω² = E I m²(m²−1)²/(ρ A R⁴ (m²+1)), a twin each [Love 1927, art. 293]."""
+    radius, thick, tall = 0.1, 0.001, 0.001
+    found = family(ring_mesh(radius - thick / 2, radius + thick / 2, tall), gamma_m2_s2=GAMMA, poisson=NU, to_hz=1500, cache=None)
+    assert not found.meshed
+    near = hz(found.modes(GAMMA, NU)[0])
+    for m in (2, 3, 4, 5):
+        wanted = np.sqrt(GAMMA * thick**2 / 12 / radius**4 * m**2 * (m**2 - 1) ** 2 / (m**2 + 1)) / (2 * np.pi)
+        twins = near[np.argsort(np.abs(near / wanted - 1))[:2]]
+        assert twins == pytest.approx([wanted, wanted], rel=2e-3)
+
+
+def test_a_tube_twists_as_a_string_swings() -> None:
+    """Torsion of a tube with free ends: n/2L √(G/ρ), exactly, whatever its wall."""
+    length = 0.2
+    found = family(ring_mesh(0.01, 0.016, length), gamma_m2_s2=GAMMA, poisson=NU, to_hz=16_000, cache=None)
+    near = hz(found.modes(GAMMA, NU)[0])
+    for n in (1, 2):
+        wanted = n / (2 * length) * np.sqrt(GAMMA / (2 * (1 + NU)))
+        assert np.abs(near / wanted - 1).min() < 2e-6
+
+
+def test_a_turned_ring_moves_as_elements_do() -> None:
+    turn = trimesh.transformations.random_rotation_matrix(np.array([0.3, 0.7, 0.1]))
+    turn[:3, 3] = (0.1, 0.2, -0.3)
+    shape = ring_mesh(0.03, 0.05, 0.02, turn, sections=64)
+    ours = family(shape, gamma_m2_s2=GAMMA, poisson=NU, to_hz=21_000, cache=None)
+    theirs = family(shape, gamma_m2_s2=GAMMA, poisson=NU, to_hz=21_000, edge_m=0.01, cache=None)
+    assert theirs.meshed and not ours.meshed
+    value, vector = ours.modes(GAMMA, NU)
+    other, turned = (part[..., : ours.count] for part in theirs.modes(GAMMA, NU))
+    assert ours.count > 8 and hz(other) == pytest.approx(hz(value), rel=1.5e-2)
+    assert ours.volume_m3 == pytest.approx(theirs.volume_m3, rel=5e-3)
+    mesh = trimesh.Trimesh(shape.vertex_m, shape.face)
+    point, where = trimesh.sample.sample_surface(mesh, 30, seed=3)
+    a, b = (f.points(point, mesh.face_normals[where])[0] for f in (ours, theirs))
+    a, b = a @ vector, b @ turned
+    ends = [0, *(np.flatnonzero(np.diff(value) > 1e-4 * value[1:]) + 1), len(value)]
+    for start, stop in pairwise(ends):  # twins turn freely: what they do together is compared
+        one, two = (x[:, start:stop] @ x[:, start:stop].T for x in (a, b))
+        assert np.abs(one - two).max() < 0.04 * np.abs(one).max()
+
+
+def test_finer_triangles_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    shape = ring_mesh(0.03, 0.05, 0.02)
+    usual = family(shape, gamma_m2_s2=GAMMA, poisson=NU, to_hz=30_000, cache=None)
+    monkeypatch.setattr(reduced, "SECTION_EDGE", 0.5 * reduced.SECTION_EDGE)
+    finer = family(shape, gamma_m2_s2=GAMMA, poisson=NU, to_hz=30_000, cache=None)
+    assert usual.count == finer.count > 10
+    assert np.abs(np.log(usual.modes(GAMMA, NU)[0] / finer.modes(GAMMA, NU)[0])).max() < 4e-4
+
+
+def test_what_is_not_round_is_no_body_of_revolution() -> None:
+    assert revolved.recognised(*trimesh_parts(trimesh.creation.annulus(0.03, 0.05, 0.02, sections=64))) is not None
+    nut = trimesh.creation.annulus(0.03, 0.05, 0.02, sections=6)
+    dented = trimesh.creation.annulus(0.03, 0.05, 0.02, sections=64)
+    dented.vertices[5] *= 1.01
+    for mesh in (nut, dented, trimesh.creation.box((0.1, 0.1, 0.02))):
+        assert revolved.recognised(*trimesh_parts(mesh)) is None
+
+
+def trimesh_parts(mesh: trimesh.Trimesh) -> tuple[Array, Array]:
+    return np.asarray(mesh.vertices), np.asarray(mesh.faces)
