@@ -136,7 +136,7 @@ def _solve(
     say: Callable[[str], None],
 ) -> _Unit:
     """Fill (or fetch the filled body), assemble, clamp and solve, all without units."""
-    from sonic_bullet.modal import eigen, fem
+    from sonic_bullet.modal import eigen, fem, polynomials
     from sonic_bullet.modal.shapes import Filled, fill
     from sonic_bullet.modal.solid import Solid, Surface
 
@@ -161,6 +161,14 @@ def _solve(
     corner = skin_m[body.skin.face]
     area = float(np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1).sum() / 2)
     volume = fem.volume_m3(unit)
+    box = polynomials.recognised(shapes[0]) if len(shapes) == 1 and sizes == (None, None) and not len(clamp) else None
+    exact = polynomials.free(box, length_m, stiffness, body.solid.node_m[body.skin.node], limit, count, MOST_MODES) if box is not None else None
+    if exact is not None:
+        value, moved = exact
+        below = slice(None) if count is not None else value <= limit
+        said = f"{body.solid.note}, its modes by polynomials"
+        where = body.solid.node_m[body.skin.node]
+        return _Unit(value[below], np.ascontiguousarray(moved[:, :, below], np.float32), volume, where, body.skin.face, body.curvature_per_m, said)
     say(f"assembling {3 * len(unit.node_m)} unknowns")
     k_matrix, m_matrix = fem.assemble(unit, stiffness, 1.0)
     fixed = fem.clamped(body.solid, clamp)

@@ -157,6 +157,46 @@ def lowest(stiffness: Array, limit: float, rigid: int) -> tuple[Array, Array]:
     return value[order], vector[:, order]
 
 
+def free(box: Box, length: float, stiffness: Array, point_m: Array, limit: float, count: int | None, most: int) -> tuple[Array, Array] | None:
+    """λ (m,) of a free box, up to limit and at most ``most``, or its lowest ``count``; and its modes (v, 3, m) at point_m (v, 3), all in lengths of ``length``.
+
+    None where its material's axes are not its own, or where it takes too many unknowns.
+    """
+    isotropic = np.allclose(stiffness, _isotropic(stiffness), atol=1e-9 * np.abs(stiffness).max())
+    if not mirrored(stiffness) or not (isotropic or np.allclose(box.axes, np.eye(3), atol=1e-9)):
+        return None
+    size = box.size_m / length
+    thin = float(size.min())
+    high = limit
+    if count is not None:  # ω² at which the plate's waves are as short as ``count`` modes may take
+        tries = np.geomspace(1e-12, 1e12, 400)
+        high = float(tries[int(np.argmax([wave_number(w, thin, stiffness) > wave_number_of(count, size) for w in tries]))])
+    for _ in range(8):
+        wave = wave_number(high, thin, stiffness) if count is not None else min(wave_number(high, thin, stiffness), wave_number_of(most, size))
+        terms = degrees(size, wave)
+        if unknowns(terms) > MOST_UNKNOWNS:
+            return None
+        held = [(parity, *lowest(parity.stiffness(stiffness), high, parity.rigid)) for parity in parities(size, terms)]
+        value = np.concatenate([v for _, v, _ in held])
+        if count is None or len(value) >= count:
+            break
+        high *= 2
+    else:
+        return None
+    local = (point_m - box.centre_m) @ box.axes / length
+    shape = np.concatenate([shapes_at(local, size, parity, vector) for parity, _, vector in held], axis=2)
+    order = np.argsort(value, kind="stable")[: most if count is None else count]
+    return value[order], np.asarray(np.einsum("yx,vxm->vym", box.axes, shape[:, :, order]))
+
+
+def _isotropic(stiffness: Array) -> Array:
+    """The tensor (6, 6) with the same C_11 and C_44 that has no direction."""
+    made = np.zeros((6, 6))
+    made[:3, :3] = stiffness[0, 0] - 2 * stiffness[3, 3]
+    made[range(6), range(6)] = [stiffness[0, 0]] * 3 + [stiffness[3, 3]] * 3
+    return made
+
+
 def shapes_at(point: Array, size: Array, parity: Parity, vector: Array) -> Array:
     """Displacements (v, 3, b) at points (v, 3) of the box about its centre, of coefficients (columns, b), in the box's frame; ∫|u|² over the box is one."""
     top = [max(int(d[:, axis].max(initial=0)) for d in parity.degree) for axis in range(3)]

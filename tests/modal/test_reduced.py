@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 import trimesh
 
+from sonic_bullet.modal import analyse, polynomials, reduced, revolved
 from sonic_bullet.modal import closed_forms as exact
-from sonic_bullet.modal import polynomials, reduced, revolved
 from sonic_bullet.modal.reduced import family
-from sonic_bullet.records import Array, Shape
+from sonic_bullet.records import Array, Material, Shape
 
 GAMMA, NU = 2.5e7, 0.3
 
@@ -163,3 +163,22 @@ def test_what_is_not_round_is_no_body_of_revolution() -> None:
 
 def trimesh_parts(mesh: trimesh.Trimesh) -> tuple[Array, Array]:
     return np.asarray(mesh.vertices), np.asarray(mesh.faces)
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_analyse_and_family_tell_the_same_of_a_box(turned: bool) -> None:
+    turn = trimesh.transformations.random_rotation_matrix(np.array([0.3, 0.7, 0.1])) if turned else None
+    shape = box_mesh((0.1, 0.04, 0.01), turn)
+    steel = Material.isotropic("steel", youngs_pa=GAMMA * 7850, poisson=NU, density_kg_m3=7850.0)
+    model = analyse((shape,), steel, to_hz=16_000, cache=None)
+    other = family(shape, gamma_m2_s2=GAMMA, poisson=NU, to_hz=18_000, cache=None)
+    value, vector = other.modes(GAMMA, NU)
+    n = model.mode_count
+    assert "polynomials" in model.note and n > 4
+    assert model.freq_hz == pytest.approx(hz(value[:n]), rel=1e-4)
+    spots = model.vertex_m[::97]
+    rows = np.stack([other.points(spots, np.tile(axis, (len(spots), 1)))[0] for axis in np.eye(3)], axis=1)
+    theirs = rows @ vector[:, :n] / np.sqrt(7850 * other.length_m**3)
+    ours = model.shape[::97]
+    sign = np.sign((ours * theirs).sum(axis=(0, 1)))
+    assert np.abs(ours * sign - theirs).max() < 0.01 * np.abs(ours).max()
