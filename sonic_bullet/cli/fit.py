@@ -53,6 +53,9 @@ def as_case(source: str, one: dict[str, Any]) -> Case:
         return read_case(path)
     if not path.is_file():
         raise FileError(f"cannot read {source}: no such file or folder", "give a recording, or a folder with a case.json")
+    for name in ("impulse", "scale", "onset_s"):
+        if one[name] is not None and not np.isfinite(one[name]):
+            raise FileError(f"--{name.replace('_s', '')} is {one[name]}", "give a finite number")
     missing = [f"--{name}" for name in ("mesh", "strike", "material") if one[name] is None]
     if missing:
         raise FileError(f"{' and '.join(missing)} missing", "a recording alone has no shape; see 'sonic-bullet fit --help'")

@@ -15,6 +15,7 @@ import numpy as np
 from sonic_bullet.errors import AudioError, FileError, MeshError
 from sonic_bullet.estimator.lines import Lines, joint_lines
 from sonic_bullet.estimator.observe import Observation, observation
+from sonic_bullet.estimator.onset import span
 from sonic_bullet.files import read_audio
 from sonic_bullet.files.cases import Case, CaseObject, CaseRecording, Line
 from sonic_bullet.modal import read_mesh
@@ -26,6 +27,7 @@ MARGIN = 1.36  # √(1.3/0.7): how far the guess may put a mode too high
 MESH_M = (2e-4, 5.0)  # bodies smaller or larger than this are in another unit
 PLATE_DOF = 52_000  # unknowns: 36 ab/e² in one layer of cells
 CLIPPED = 8  # samples in a row at the file's peak
+CLIPPED_RUNS = 4  # or as many rows of three: a sound that decays has one highest peak
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -97,7 +99,7 @@ def body_family(case: Case, thing: CaseObject, guess: Material, cache: Place, sa
     shape = read_mesh(thing.mesh or "", thing.scale)
     across = float(np.linalg.norm(np.ptp(shape.vertex_m, axis=0)))
     if not MESH_M[0] < across < MESH_M[1]:
-        raise MeshError(f"object '{thing.name}' is {across:.3g} m across", "say units: mm, or give the mesh in metres")
+        raise MeshError(f"object '{thing.name}' is {across:.3g} m across", "give the mesh in metres, or say its unit (units: mm in a case, --scale 0.001)")
     gamma = guess.youngs_pa / guess.density_kg_m3
     high = case.band_hz[1]
     listed = [line.freq_hz for r in case.recordings if r.object == thing.name for line in r.lines or ()]
@@ -141,13 +143,18 @@ def _heard(
 ) -> Evidence:
     say(f"listening to {len(recordings)} recordings of {thing.name}")
     seen = observed(case, thing, guess, recordings, body) if body is not None else None
-    sounds, rates = [], []
+    sounds, rates, told = [], [], list(notes)
     for r in recordings:
         sound, sr = read_audio(r.file or "")
         if r.channel >= len(sound):
             raise FileError(f"{r.file} has no channel {r.channel}", "name one it has")
         sounds.append(_checked(sound[r.channel], str(r.file), clipped))
         rates.append(sr)
+        if len(sound) > 1 and r.channel == 0:
+            told.append(f"{r.file} has {len(sound)} channels: the first is used")
+        hits = span(sounds[-1], sr).hits if case.onset_s is None else 1
+        if hits > 1:
+            told.append(f"{r.file} holds {hits} hits: a fit takes it for one")
     if len(set(rates)) > 1:
         raise AudioError(f"recordings of {thing.name} have rates {sorted(set(rates))} Hz", "give files of one rate")
     sr = rates[0]
@@ -157,7 +164,7 @@ def _heard(
         raise AudioError(f"only {max(length, 0)} samples follow the onset in the shortest recording", "give recordings that hold the sound's decay")
     signals = np.stack([sound[start : start + length] for sound, start in zip(sounds, starts, strict=True)])
     lines = joint_lines(signals, sr, band_hz=case.band_hz, signed=case.onset_s is not None)
-    return Evidence(thing, guess, recordings, lines, body, seen, signals, sr, notes)
+    return Evidence(thing, guess, recordings, lines, body, seen, signals, sr, tuple(told))
 
 
 def _checked(sound: Array, name: str, clipped: bool = False) -> Array:
@@ -168,8 +175,10 @@ def _checked(sound: Array, name: str, clipped: bool = False) -> Array:
     if not peak > 1e-7:
         raise AudioError(f"{name} is silent", "leave it out")
     runs = np.convolve(np.abs(sound) >= 0.9999 * peak, np.ones(CLIPPED), "valid")
-    if not clipped and len(runs) and runs.max() >= CLIPPED:
-        raise AudioError(f"{name} is clipped: {CLIPPED} samples in a row stand at its peak", "record at a lower level; a fit of it would be of the limiter")
+    rows = np.convolve(np.abs(sound) >= (1 - 1e-6) * peak, np.ones(3), "valid") > 2.5
+    flat = int((np.diff(rows.astype(np.int8), prepend=0) > 0).sum())
+    if not clipped and ((len(runs) and runs.max() >= CLIPPED) or flat >= CLIPPED_RUNS):
+        raise AudioError(f"{name} is clipped: rows of samples stand at its peak", "record at a lower level; a fit of it would be of the limiter")
     return sound
 
 

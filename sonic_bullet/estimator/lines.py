@@ -56,14 +56,17 @@ def joint_lines(signals: Array, sr: int, *, band_hz: tuple[float, float] = (20.0
     noise = noise_rms(signals, sr)
     colour = _colour(signals, noise, sr)
     pole = start_poles(signals / noise[:, None], sr, low, high)
-    for _ in range(3):
-        before = len(pole)
-        pole = _polished(signals, noise, pole, sr, low, high)
-        _, _, energy, _ = _solved(signals, noise, pole, sr)
-        pole = pole[energy / colour(pole.imag / (2 * np.pi)) > SIGNIFICANT]
-        if len(pole) == before or not len(pole):
-            break
-    return _lines(signals, noise, pole, sr, signed)
+    try:
+        for _ in range(3):
+            before = len(pole)
+            pole = _polished(signals, noise, pole, sr, low, high)
+            _, _, energy, _ = _solved(signals, noise, pole, sr)
+            pole = pole[energy / colour(pole.imag / (2 * np.pi)) > SIGNIFICANT]
+            if len(pole) == before or not len(pole):
+                break
+        return _lines(signals, noise, pole, sr, signed)
+    except np.linalg.LinAlgError as error:
+        raise AudioError("lines of the recording cannot be told apart: no decaying sound", "give a recording of one impact") from error
 
 
 def noise_rms(signals: Array, sr: int) -> Array:
@@ -132,11 +135,17 @@ def _basis(even: Array, odd: Array) -> Array:
 
 
 def _factor(gram: Array) -> tuple[Array, Array]:
-    """Cholesky factor of a Gram matrix scaled to unit diagonal, slightly lifted, and the scale."""
-    from scipy.linalg import cholesky
+    """Cholesky factor of a Gram matrix scaled to unit diagonal, slightly lifted, and the scale. Poles that all but coincide take a larger lift."""
+    from scipy.linalg import LinAlgError, cholesky
 
     scale = 1 / np.sqrt(np.diag(gram))
-    return cholesky(gram * scale[:, None] * scale + 1e-10 * np.eye(len(gram)), lower=True), scale
+    unit = gram * scale[:, None] * scale
+    for lift in (1e-10, 1e-8, 1e-6):
+        try:
+            return cholesky(unit + lift * np.eye(len(gram)), lower=True), scale
+        except LinAlgError:
+            continue
+    return cholesky(unit + 1e-3 * np.eye(len(gram)), lower=True), scale
 
 
 def _solve(factor: tuple[Array, Array], right: Array) -> Array:

@@ -175,6 +175,7 @@ def solve(lines: Lines, group: Group, line: Array, mode: Array, poisson_off: flo
     step = np.zeros(2)
     for _ in range(8):
         information = (slope * (weight / sd**2)[:, None]).T @ slope
-        step = np.linalg.solve(information + prior, (slope * (weight / sd**2)[:, None]).T @ off - np.array([0, poisson_off / poisson_sd**2]))
+        held = information + prior + 1e-12 * np.diag(np.diag(information))  # one pair tells one of the two: the least step is taken
+        step = np.linalg.solve(held, (slope * (weight / sd**2)[:, None]).T @ off - np.array([0, poisson_off / poisson_sd**2]))
         weight = 1 / (1 + ((off - slope @ step) / sd / 2.5) ** 2)
     return step, information, weight

@@ -21,8 +21,16 @@ def preset_of(found: CaseFit) -> Preset:
     """The preset of a fit. Surface and impact are no part of what modes tell: they are the guess's, or steel's for a guess without a name."""
     fit = found.fit
     guess = found.case.objects[found.objects[0].evidence.thing.name].material if found.objects else None
+    sd = np.diag(fit.covariance)
+    youngs, poisson, assumed = found.youngs_pa, fit.poisson_ratio, found.assumed
+    if np.isnan(sd[2]) and found.objects:  # what the fit does not tell must not sound as if it did
+        own = found.objects[0].evidence.guess
+        youngs, poisson, assumed = own.youngs_pa, own.poisson, (*assumed, "youngs_pa and poisson (from the guess)")
     known = guess is not None and guess.lower() in material_names()
     base = load_material(guess.lower() if known and guess is not None else "steel")
+    alpha, beta = fit.alpha_per_s, fit.beta_s
+    if np.isnan(sd[:2]).all() and base.alpha_per_s is not None and base.beta_s is not None:
+        alpha, beta, assumed = base.alpha_per_s, base.beta_s, (*assumed, f"damping (from '{base.name}')")
     source = f"fitted: {found.case.name}"
     taken = f"taken from '{base.name}'"
     used = {o.evidence.thing.name: o for o in found.objects}
@@ -31,8 +39,8 @@ def preset_of(found: CaseFit) -> Preset:
         format=FORMAT,
         name=f"{guess or 'fitted'} ({found.case.name})"[:100],
         density_kg_m3=found.density_kg_m3,
-        elasticity=Elasticity(youngs_pa=found.youngs_pa, poisson=float(np.clip(fit.poisson_ratio, -0.99, 0.499)), source=source, note="; ".join(found.assumed)),
-        damping=Damping(alpha_per_s=fit.alpha_per_s, beta_s=fit.beta_s, source=source),
+        elasticity=Elasticity(youngs_pa=youngs, poisson=float(np.clip(poisson, -0.99, 0.499)), source=source, note="; ".join(assumed)),
+        damping=Damping(alpha_per_s=alpha, beta_s=beta, source=source),
         surface=Surface(roughness_m=base.roughness_m, hurst=base.hurst, source=taken),
         impact=Impact(restitution=base.restitution, source=taken),
         provenance=Provenance(
@@ -40,7 +48,7 @@ def preset_of(found: CaseFit) -> Preset:
             recordings=tuple(recordings),
             parameters=dict(zip(NAMES, (fit.alpha_per_s, fit.beta_s, fit.gamma_m2_s2, fit.sigma, fit.poisson_ratio), strict=True)),
             spreads=spreads(found),
-            assumed=found.assumed,
+            assumed=assumed,
             verdict=fit.verdict,
             correction={name: tuple(float(c) for c in np.round(o.correction, 7)) for name, o in used.items()},
         ),

@@ -24,6 +24,7 @@ AMPLITUDE_MISFIT = 0.25
 FREQUENCY_MISFIT = 0.01
 FOREIGN = 1e-3  # of the strongest line's energy
 PAIRED = 0.6  # share of strong lines that must be modes
+CHANCE = 0.35  # and below this share, they may be by chance: nothing is known of γ, ν and σ then
 
 
 def finished(
@@ -53,9 +54,12 @@ def finished(
             unsaid.append("sigma (no impulse declared: it stands for gain times impulse)")
     else:
         unsaid.append("sigma (no strike of known place)")
+    foreign, share = _foreign(evidence, objects)
+    if share < CHANCE:
+        covariance[2:, :] = covariance[:, 2:] = np.nan
+        unsaid = [u for u in unsaid if not u.startswith(("gamma", "poisson", "sigma"))] + ["gamma, poisson_ratio, sigma (few lines are modes, maybe by chance)"]
     told = np.isfinite(np.diag(covariance))
     covariance[np.outer(told, told) & np.isnan(covariance)] = 0.0  # frequencies, decays and amplitudes are found apart
-    foreign, share = _foreign(evidence, objects)
     amiss = _amiss(objects, damping, scatter, gain[2], foreign, share)
     amplitude = gain[0] if np.isfinite(gain[0]) else 1.0
     metric, decibels = hybrid_of(objects, amplitude), log_spectral_of(objects, amplitude)
