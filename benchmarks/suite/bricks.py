@@ -118,30 +118,45 @@ def _functions(points: Array) -> tuple[Array, Array]:
     return value, slope
 
 
+def _gauss(order: int) -> tuple[Array, Array]:
+    """Points (order³, 3) in the cube ±1 and their weights."""
+    point, weight = np.polynomial.legendre.leggauss(order)
+    points = np.stack(np.meshgrid(point, point, point, indexing="ij"), axis=-1).reshape(-1, 3)
+    return points, np.einsum("i,j,k->ijk", weight, weight, weight).ravel()
+
+
+def _strain(gradient: Array) -> Array:
+    """B (c, 6, 60) from gradients (c, 20, 3)."""
+    strain = np.zeros((len(gradient), 6, 20, 3))
+    for row, (a, b) in enumerate(((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))):
+        strain[:, row, :, a] += gradient[:, :, b]
+        if a != b:
+            strain[:, row, :, b] += gradient[:, :, a]
+    return strain.reshape(-1, 6, 60)
+
+
 def matrices(body: Bricks, stiffness_pa: Array, density_kg_m3: float, softer: Array | None = None) -> tuple[Any, Any]:
-    """K and M, scipy CSC, of a body of stiffness (6, 6); softer (c,) multiplies the stiffness of each cell."""
+    """K and M, scipy CSC, of a body of stiffness (6, 6); softer (c,) multiplies the stiffness of each cell.
+
+    K is integrated at 2³ points, M at 3³: five times nearer in thin plates than K at 3³ [Zienkiewicz, Taylor & Too 1971].
+    """
     from scipy.sparse import coo_array
 
-    point, weight = np.polynomial.legendre.leggauss(3)
-    points = np.stack(np.meshgrid(point, point, point, indexing="ij"), axis=-1).reshape(-1, 3)
-    weights = np.einsum("i,j,k->ijk", weight, weight, weight).ravel()
-    value, slope = _functions(points)
     c = len(body.cell)
     stiff, mass = np.zeros((c, 60, 60)), np.zeros((c, 20, 20))
-    for q in range(len(points)):
-        jacobian = np.einsum("cid,ik->cdk", body.node_m[body.cell], slope[q])
-        volume = np.linalg.det(jacobian) * weights[q]
-        if not (volume > 0).all():
-            raise ValueError("a brick is turned inside out")
-        gradient = np.einsum("ik,ckd->cid", slope[q], np.linalg.inv(jacobian))
-        strain = np.zeros((c, 6, 20, 3))
-        for row, (a, b) in enumerate(((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))):
-            strain[:, row, :, a] += gradient[:, :, b]
-            if a != b:
-                strain[:, row, :, b] += gradient[:, :, a]
-        b_matrix = strain.reshape(c, 6, 60)
-        stiff += np.matmul(b_matrix.transpose(0, 2, 1), np.matmul(stiffness_pa * volume[:, None, None], b_matrix))
-        mass += density_kg_m3 * volume[:, None, None] * np.outer(value[q], value[q])
+    for order in (2, 3):
+        points, weights = _gauss(order)
+        value, slope = _functions(points)
+        for q in range(len(points)):
+            jacobian = np.einsum("cid,ik->cdk", body.node_m[body.cell], slope[q])
+            volume = np.linalg.det(jacobian) * weights[q]
+            if not (volume > 0).all():
+                raise ValueError("a brick is turned inside out")
+            if order == 3:
+                mass += density_kg_m3 * volume[:, None, None] * np.outer(value[q], value[q])
+                continue
+            b_matrix = _strain(np.einsum("ik,ckd->cid", slope[q], np.linalg.inv(jacobian)))
+            stiff += np.matmul(b_matrix.transpose(0, 2, 1), np.matmul(stiffness_pa * volume[:, None, None], b_matrix))
     if softer is not None:
         stiff *= softer[:, None, None]
     dof = (3 * body.cell[:, :, None] + np.arange(3)).reshape(c, 60)

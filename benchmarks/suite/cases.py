@@ -23,7 +23,7 @@ from sonic_bullet.records import Array
 
 PEAK = 0.5
 STEPS = (0.005, 0.01, 0.02, 0.04, 0.04, 0.02, 0.04, 0.008)  # impulses in N·s, as the practice cases spread them
-NU_OFF = (-0.03, 0.0, 0.03)
+NU_OFF = (-0.03, 0.02)
 
 
 @dataclass(frozen=True, slots=True)
@@ -196,7 +196,7 @@ def _strikes(body: Body, rng: np.random.Generator, count: int) -> tuple[Strike, 
 def _other(recipe: Recipe, material: Material, effects: tuple[Effect, ...], rng: np.random.Generator, plan: Plan, cache: Path) -> Body:
     """Another body of the same material: another recipe, or a scaled copy. Effects of the material act on it too."""
     second = RECIPES[recipe.other] if recipe.other else recipe
-    scale = 1.0 if recipe.other else float(rng.choice([0.75, 1.3]))
+    scale = 1.0 if recipe.other else float(rng.choice([0.7, 0.85]))
     made = next((e.modes(second, material.poisson, cache) for e in effects if e.modes and e.belongs in CARRIED), None)
     unit = made or objects.solved(second, material.poisson, cache, fineness=plan.fineness)
     name = second.name if recipe.other else f"{recipe.name}_x{scale:g}"

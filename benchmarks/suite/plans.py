@@ -88,7 +88,7 @@ def nulls(count: int = 50) -> list[Plan]:
             "colour": ("room", "white", "pink")[k % 3],
             "rate": (44_100, 48_000)[k // 2 % 2],
             "seconds": (2.0, 1.0, 1.5)[k % 3],
-            "fineness": (1.0, 0.7, 1.0, 1.25)[k // 3 % 4],
+            "fineness": 0.85 if k % 24 < 12 else 1.0,
         }
         out.append(Plan(f"null-{k:02d}", ANY[k % len(ANY)], (), seed, transfer=k % 4 == 0, **how))
     return out
