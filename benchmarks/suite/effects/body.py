@@ -60,7 +60,7 @@ def support_damping(strength: int, rng: np.random.Generator, scene: Scene) -> Ef
     plain = np.median(scene.material.alpha + scene.material.beta * body.modes.value)
     ways = [body.normal[[v]] if rng.random() < 0.6 else np.eye(3) for v in points]
     phi = np.concatenate([way @ body.modes.shape[v] for v, way in zip(points, ways, strict=True)])  # (k, m)
-    c = jitter(rng, pick(strength, 0.2, 0.8, 3) * plain / (phi**2).sum(axis=0).mean())
+    c = jitter(rng, pick(strength, 0.08, 0.4, 2) * plain / (phi**2).sum(axis=0).mean())
     truth = {"vertices": [int(v) for v in points], "c": c}
 
     def damping(modes: Modes, d: Array) -> Array:
