@@ -140,6 +140,8 @@ def _factor(gram: Array) -> tuple[Array, Array]:
 
     scale = 1 / np.sqrt(np.diag(gram))
     unit = gram * scale[:, None] * scale
+    if not np.isfinite(unit).all():  # a tone without noise: poles that grow or stand
+        raise LinAlgError("poles out of range")
     for lift in (1e-10, 1e-8, 1e-6):
         try:
             return cholesky(unit + lift * np.eye(len(gram)), lower=True), scale

@@ -114,3 +114,64 @@ def test_bad_input_is_one_line_and_no_file(
     assert said in error
     assert error.count("\n") == 1
     assert list(tmp_path.iterdir()) == []
+
+
+def spoiled(folder: Path, place: Path, how: str) -> Path:
+    """The first strike of a case, spoiled in one way."""
+    heard, sr = soundfile.read(folder / "s0.wav")
+    t = np.arange(len(heard)) / sr
+    if how == "20 ms":
+        heard = heard[: int(0.02 * sr)]
+    elif how == "other rate":
+        sr //= 2
+    elif how == "tone":
+        heard = 0.3 * np.sin(2 * np.pi * 1000 * t)
+    elif how == "stereo":
+        heard = np.stack([heard, 0.5 * heard], axis=1)
+    elif how == "speech":  # pulses of a wavering pitch through three resonances, four syllables a second
+        from scipy.signal import lfilter
+
+        voice = np.diff(np.floor(np.cumsum(120 * (1 + 0.1 * np.sin(2 * np.pi * 3 * t))) / sr), prepend=0.0)
+        for f, width in ((700, 80), (1220, 90), (2600, 120)):
+            r = np.exp(-np.pi * width / sr)
+            voice = lfilter([1 - r], [1, -2 * r * np.cos(2 * np.pi * f / sr), r * r], voice)
+        voice *= (0.5 + 0.5 * np.sin(2 * np.pi * 4 * t)) ** 2
+        heard = 0.5 * voice / np.abs(voice).max() + 1e-4 * np.random.default_rng(0).standard_normal(len(t))
+    soundfile.write(place / "spoiled.wav", heard[: sr // 2], sr, subtype="FLOAT")
+    return place / "spoiled.wav"
+
+
+@pytest.mark.parametrize(("how", "surest"), [("20 ms", 0), ("other rate", 0), ("tone", 0), ("speech", 0), ("stereo", 2)])
+def test_what_a_recording_does_not_say_is_not_claimed(folder: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str], how: str, surest: int) -> None:
+    strike = ",".join(map(str, json.loads((folder / "case.json").read_text())["recordings"][0]["strike"]["position"]))
+    path = spoiled(folder, tmp_path, how)
+    code = run("fit", path, "--mesh", folder / "box.obj", "--strike", strike, "--material", "brass", "-o", tmp_path / "p.json", "--json", tmp_path / "f.json")
+    shown = capfd.readouterr()
+    if code == 2:
+        assert shown.err.count("\n") == 1
+        assert "DEBUG" not in shown.err  # a reason, not an accident
+        return
+    assert code == 0
+    told = json.loads((tmp_path / "f.json").read_text())
+    told_of = np.array([[x is not None for x in row] for row in told["covariance"]])
+    assert told_of.diagonal()[:3].sum() <= surest + 1
+    if not surest:
+        assert told["verdict"] != "fitted"
+        assert not told_of.diagonal()[:2].any()  # neither damping is claimed
+        assert not told_of[2, 2] or told["gamma_m2_s2"] == pytest.approx(1.0e11 / 8400, rel=0.02)
+
+
+def test_clipped_recording_is_refused(folder: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    heard, sr = soundfile.read(folder / "s0.wav")
+    soundfile.write(tmp_path / "c.wav", np.clip(8 * heard, -0.5, 0.5), sr)
+    assert run("fit", tmp_path / "c.wav", "--mesh", folder / "box.obj", "--strike", "0,0,0.003", "--material", "brass", "-o", tmp_path / "p.json") == 2
+    assert "is clipped" in capfd.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["--impulse", "--scale", "--onset"])
+def test_numbers_that_are_none_are_refused(folder: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str], name: str) -> None:
+    words = ["fit", folder / "s0.wav", "--mesh", folder / "box.obj", "--strike", "0,0,0.003", "--material", "brass", name, "nan", "-o", tmp_path / "p.json"]
+    assert run(*words) == 2
+    error = capfd.readouterr().err
+    assert error.count("\n") == 1
+    assert "DEBUG" not in error
