@@ -1,0 +1,73 @@
+"""Files of a set -> their damped sinusoids, found once and kept: the extraction is what costs.
+
+channel c of seconds s after t -> sonic_bullet.estimator.features.extract -> Features, in CACHE/<digest of samples and arguments>.npz
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import tempfile
+from dataclasses import fields
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sonic_bullet.estimator.features import extract
+from sonic_bullet.estimator.values import Features
+
+Array = np.ndarray[Any, Any]
+ARRAYS = tuple(f.name for f in fields(Features) if f.name not in ("onset_s", "noise_dbfs", "sr", "note"))
+
+
+def cache() -> Path:
+    """Where features are kept: SONIC_BULLET_MEASURED_CACHE, or a folder among the temporary ones."""
+    return Path(os.environ.get("SONIC_BULLET_MEASURED_CACHE", Path(tempfile.gettempdir()) / "sonic-bullet-measured"))
+
+
+@lru_cache(maxsize=4)
+def audio(path: Path) -> tuple[Array, int]:
+    """Samples (n, channels) and rate. Raises OSError (soundfile's own errors are RuntimeError)."""
+    import soundfile
+
+    found, sr = soundfile.read(path, always_2d=True)
+    return found, int(sr)
+
+
+def cut(path: Path, channel: int = 0, start_s: float = 0.0, seconds: float | None = None) -> tuple[Array, int]:
+    """Samples (n,) of one channel from start_s on, and the rate."""
+    whole, sr = audio(path)
+    first = max(round(start_s * sr), 0)
+    last = len(whole) if seconds is None else first + round(seconds * sr)
+    return np.ascontiguousarray(whole[first:last, channel]), sr
+
+
+def features(signal: Array, sr: int, *, onset_s: float | None = None, band_hz: tuple[float, float] | None = None) -> Features:
+    """`extract`, once. Raises AudioError."""
+    text = hashlib.sha256(np.ascontiguousarray(signal).tobytes() + repr((sr, onset_s, band_hz)).encode()).hexdigest()[:24]
+    place = cache() / f"{text}.npz"
+    if place.is_file():
+        with np.load(place, allow_pickle=False) as kept:
+            return Features(**{n: kept[n] for n in ARRAYS}, onset_s=float(kept["onset_s"]), noise_dbfs=float(kept["noise_dbfs"]), sr=sr, note=str(kept["note"]))
+    found = extract(signal, sr, onset_s=onset_s, band_hz=band_hz)
+    place.parent.mkdir(parents=True, exist_ok=True)
+    part = place.with_name(f"{text}-{os.getpid()}.npz")
+    np.savez(part, **{n: getattr(found, n) for n in ARRAYS}, onset_s=found.onset_s, noise_dbfs=found.noise_dbfs, note=np.array(found.note))
+    part.replace(place)
+    return found
+
+
+def lines(
+    path: Path,
+    *,
+    channel: int = 0,
+    start_s: float = 0.0,
+    seconds: float | None = None,
+    onset_s: float | None = None,
+    band_hz: tuple[float, float] | None = None,
+) -> Features:
+    """Features of a part of a file. Raises AudioError, OSError."""
+    signal, sr = cut(path, channel, start_s, seconds)
+    return features(signal, sr, onset_s=onset_s, band_hz=band_hz)

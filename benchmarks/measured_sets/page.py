@@ -1,0 +1,105 @@
+"""Outcomes -> a page of markdown and a figure a set."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from benchmarks.measured_sets.values import CHANCE, DRAWS, EARNS, Outcome, Row
+
+HEAD = f"""# Measured data: fitted on one part, judged on another
+
+Written by `python benchmarks/measured.py --data ../shared/measured`. Recordings and resonances by others, read where they lie; numbers and drawings here, no copy.
+Each set's source and licence stand under it.
+
+**Before** is the baseline, **after** the baseline with one effect of `sonic_bullet.effects`, each fitted on the one part and judged on the other, which it never saw.
+**Null** is the median error of {DRAWS} effects of as many numbers that mean nothing (each set says which); **chance** the share of them that do at least as well as the effect.
+An effect is *named* where it takes the error on the held-out part below {EARNS:.0%} of the baseline's and at most {CHANCE:.0%} of the null's draws do so; else the set's verdict
+is *unexplained*, and what is left is said. Errors of decays are in dB of d (20 lg d'/d: 6 dB are a factor of two), medians over the lines held out.
+"""
+
+
+@dataclass(frozen=True)
+class Page:
+    """One set: its README, its case.json, and what was found."""
+
+    name: str
+    readme: str
+    case: dict[str, Any]
+    found: Outcome
+
+    @property
+    def credit(self) -> str:
+        source = _after(self.readme, "Source") or str(self.case.get("source", "not told"))
+        licence = _after(self.readme, "Licence") or str(self.case.get("licence", "not told"))
+        return f"Source: {source.strip().rstrip('.')}. Licence: {licence.strip().rstrip('.')}."
+
+
+def _after(text: str, word: str) -> str:
+    found = re.search(rf"\*\*{word}\.\*\*\s*(.+)", text)
+    return found.group(1) if found else ""
+
+
+def verdict(rows: tuple[Row, ...]) -> str:
+    named = [f"`{r.effect}` ({r.what})" for r in rows if r.earned and "no effect" not in r.effect]
+    return f"named: {', '.join(named)}" if named else "unexplained"
+
+
+def written(out: Path, pages: list[Page], skipped: list[str]) -> None:
+    """The page at ``out``, figures in the folder beside it that is called as it is."""
+    place = out.with_suffix("")
+    place.mkdir(parents=True, exist_ok=True)
+    parts = [HEAD, summary(pages)]
+    for page in pages:
+        _figure(page, place / f"{page.name}.png")
+        parts.append(section(page, f"{place.name}/{page.name}.png"))
+    if skipped:
+        parts.append(f"## Skipped\n\n{len(skipped)} sets or files were not judged:\n\n" + "\n".join(f"- {line}" for line in skipped) + "\n")
+    out.write_text("\n".join(parts))
+
+
+def summary(pages: list[Page]) -> str:
+    rows = ["| set | verdict |", "|---|---|"] + [f"| [{p.name}](#{p.name}) | {verdict(p.found.rows)} |" for p in pages]
+    return "\n".join(rows) + "\n"
+
+
+def section(page: Page, figure: str) -> str:
+    head = "| held out | items | unit | before | after | null | chance | effect |\n|---|---|---|---|---|---|---|---|"
+    rows = [
+        f"| {r.what} | {r.count} | {r.unit} | {r.before:.3g} | {r.after:.3g} | {r.null:.3g} | {r.chance:.0%} | {r.effect or 'none proposed'}{' **earned**' if r.earned else ''} |"
+        for r in page.found.rows
+    ]
+    what = str(page.case.get("type") or page.case.get("object") or "")
+    return "\n".join(
+        [
+            f"## {page.name}",
+            "",
+            f"{what[:1].upper()}{what[1:]}. {page.credit}",
+            "",
+            f"![{page.name}]({figure})",
+            "",
+            head,
+            *rows,
+            "",
+            page.found.text,
+            "",
+            f"Verdict: {verdict(page.found.rows)}. Left: {page.found.unexplained}.",
+            "",
+        ]
+    )
+
+
+def _figure(page: Page, path: Path) -> None:
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(5.0, 2.8), dpi=100, layout="constrained")
+    FigureCanvasAgg(figure)
+    page.found.draw(figure)
+    for axes in figure.axes:
+        axes.tick_params(labelsize=7)
+        axes.xaxis.label.set_size(8)
+        axes.yaxis.label.set_size(8)
+    figure.savefig(path, metadata={"Software": None})
