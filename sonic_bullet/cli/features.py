@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from typing import Any
 
 import numpy as np
@@ -32,7 +33,9 @@ def run_features(recording: str, *, onset_s: float | None, band: tuple[float, ..
         notes = "; ".join(([f"channel {channel + 1} of {len(sound)}, the loudest, is used"] if len(sound) > 1 else []) + ([found.note] if found.note else []))
         if picture is not None:
             _draw(picture, sound[channel], sr, found)
-        say(_told(recording, found, notes))
+        say(_told(recording, found))
+    if notes:
+        print(f"sonic-bullet: warning: {recording}: {notes}", file=sys.stderr)
     write_json(json_to, described(found, notes))
 
 
@@ -41,14 +44,15 @@ def described(found: Features, notes: str) -> dict[str, Any]:
     names = ("freq_hz", "decay_per_s", "amplitude", "freq_sd_hz", "decay_sd_per_s", "amplitude_sd")
     columns = [getattr(found, name) for name in names]
     rows = [{name: _number(column[k]) for name, column in zip(names, columns, strict=True)} for k in range(len(found.freq_hz))]
-    return {"features": rows, "onset_s": found.onset_s, "noise_dbfs": found.noise_dbfs, "sr": found.sr, "note": notes}
+    verdict = "features" if rows and not notes else "doubtful" if rows else "no features"
+    return {"features": rows, "onset_s": found.onset_s, "noise_dbfs": found.noise_dbfs, "sr": found.sr, "verdict": verdict, "note": notes}
 
 
 def _number(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
 
 
-def _told(recording: str, found: Features, notes: str) -> str:
+def _told(recording: str, found: Features) -> str:
     order = np.argsort(found.freq_hz)
     rows = [
         (
@@ -61,7 +65,7 @@ def _told(recording: str, found: Features, notes: str) -> str:
         for k in order
     ]
     head = f"{recording}: {len(rows)} features, onset at {found.onset_s:.4f} s, noise {found.noise_dbfs:.1f} dBFS"
-    return "\n".join([head, *([notes] if notes else []), table(("Hz", "±", "decay 1/s", "±", "dBFS"), rows)])
+    return "\n".join([head, table(("Hz", "±", "decay 1/s", "±", "dBFS"), rows)])
 
 
 def _draw(path: str, sound: Array, sr: int, found: Features) -> None:

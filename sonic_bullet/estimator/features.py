@@ -34,8 +34,13 @@ FEW, MANY = 3, 40
 MOST_MODES = 140
 SECONDS_MAX = 8.0
 LEAST_SAMPLES = 512
+LEAST_SAMPLES_A_MODE = 24
 FLOOR = 1e-12  # of the recording's rms: rounding, where there is no noise
-EXPLAINED = 0.8
+EXPLAINED, TRUSTED = 0.8, 0.5  # shares of the energy: below the one it is said, below the other no feature of a sound that is not over soon
+FRONT, FRONT_SHARE = 0.3, 0.75
+SWELLS = 3.0  # times its first 50 ms: two modes that start against one another do not come to that
+SHORT_S, LOW_RATE, GROWS_S = 0.1, 30_000, 0.4
+PINNED = 0.999  # of the fastest decay looked for
 CANCELLING = 4.0  # of the recording's peak: modes that large cancel one another, and model what is no mode
 TOLD = 2.0  # spreads that a decay must be away from none
 NEAR = 4.0  # decays within which one mode can do another's work
@@ -62,19 +67,34 @@ def extract(signal: Array, sr: int, *, onset_s: float | None = None, band_hz: tu
     x = signal[part.start : min(part.stop, part.start + int(SECONDS_MAX * sr))]
     if len(x) < LEAST_SAMPLES:
         raise AudioError(f"{len(x)} samples follow the onset", f"an impact needs {LEAST_SAMPLES} at least")
-    notes = []
-    if part.hits > 1:
-        notes.append(f"{part.hits} hits: only what comes before the second, {len(x) / sr:.3g} s, is used")
-    clipped = onset.clipped_samples(signal)
-    if clipped:
-        notes.append(f"{clipped} samples are clipped: amplitudes and early decays are not to be trusted")
-    modes, noise = _modes(x, sr, (low, high))
+    notes, hopeless = _doubts(signal, x, part.hits, sr)
+    modes, noise = (Modes(np.zeros(0, complex), np.zeros(0, complex)), white(_rms(x), sr)) if hopeless else _modes(x, sr, (low, high))
     start = part.start
     if onset_s is None and len(modes.pole):
         start = onset.by_modes(signal, part.start, modes, sr, _rms(likelihood.residual(x, modes, sr)))
         x = signal[start : start + len(x)]
         modes = _moved(x, modes, noise, (low, high), start - part.start)
     return _features(x, modes, noise, (low, high), start, notes)
+
+
+def _doubts(signal: Array, x: Array, hits: int, sr: int) -> tuple[list[str], bool]:
+    """What can be said against a recording before any mode is looked for, and whether that is enough not to look."""
+    notes, hopeless = [], False
+    if hits > 1:
+        notes.append(f"{hits} hits: only what comes before the second, {len(x) / sr:.3g} s, is used")
+    clipped = onset.clipped_samples(signal)
+    if clipped:
+        notes.append(f"{clipped} samples are clipped: amplitudes and early decays are not to be trusted")
+    if len(x) < SHORT_S * sr:
+        notes.append(f"only {1000 * len(x) / sr:.0f} ms of sound: what lies closer than about {sr / len(x):.0f} Hz may pass for one line")
+    if sr < LOW_RATE:
+        notes.append(f"{sr} samples a second: nothing above {0.49 * sr:.0f} Hz is seen")
+    if len(x) > GROWS_S * sr:
+        level = np.sqrt((x[: len(x) // (sr // 20) * (sr // 20)].reshape(-1, sr // 20) ** 2).mean(axis=1))
+        if level[3:].max() > 1.5 * level[0]:
+            notes.append(f"the sound grows until {np.argmax(level) / 20:.2g} s after its onset: one impact alone does not")
+            hopeless = bool(level[3:].max() > SWELLS * level[0])
+    return notes, hopeless
 
 
 def _rms(signal: Array) -> float:
@@ -97,16 +117,17 @@ def _modes(x: Array, sr: int, band_hz: tuple[float, float]) -> tuple[Modes, Nois
         return without_noise, white(max(_rms(likelihood.residual(x, without_noise, sr)), floor), sr)
     least = 2 * np.log(1.5 * len(x) / FALSE_ALARMS)
     modes, noise = _first(x, sr, band_hz, least, floor)
+    most = min(MOST_MODES, len(x) // LEAST_SAMPLES_A_MODE)
     for _ in range(ROUNDS):
-        more = matched(likelihood.residual(x, modes, sr), noise, band_hz, least, FASTEST_PER_S)[: min(MANY, MOST_MODES - len(modes.pole))]
+        more = matched(likelihood.residual(x, modes, sr), noise, band_hz, least, FASTEST_PER_S)[: max(0, min(MANY, most - len(modes.pole)))]
         if not len(more):
             break
         trial = _pruned(x, band_hz, _fit(x, likelihood.amplitudes(x, np.concatenate([modes.pole, more]), sr), sr, band_hz), noise, least)
         if len(trial.pole) <= len(modes.pole):
             break
-        modes, noise = trial, measured(likelihood.residual(x, trial, sr), sr, floor)
+        modes, noise = trial, measured(likelihood.residual(x, trial, sr), sr, floor, len(trial.pole))
     modes = _pruned(x, band_hz, _fit(x, modes, sr, band_hz, THOROUGH), noise, least)
-    return modes, measured(likelihood.residual(x, modes, sr), sr, floor)
+    return modes, measured(likelihood.residual(x, modes, sr), sr, floor, len(modes.pole))
 
 
 def _first(x: Array, sr: int, band_hz: tuple[float, float], least: float, floor: float) -> tuple[Modes, Noise]:
@@ -116,17 +137,18 @@ def _first(x: Array, sr: int, band_hz: tuple[float, float], least: float, floor:
     fast = subspace.early_poles(x, sr, density, band_hz, FASTEST_PER_S)
     seen = (np.abs(fast[:, None] - slow) < 0.5 * np.abs(fast.real[:, None])).any(axis=1)
     pole = np.concatenate([slow, fast[~seen & (fast.real < -EARLY_PER_S)]])
-    if len(pole) > 2 * MOST_MODES:
-        pole = pole[np.argsort(-likelihood.alone(x, pole, sr), kind="stable")[: 2 * MOST_MODES]]
+    most = min(2 * MOST_MODES, len(x) // LEAST_SAMPLES_A_MODE)
+    if len(pole) > most:
+        pole = pole[np.argsort(-likelihood.alone(x, pole, sr), kind="stable")[:most]]
     start = likelihood.amplitudes(x, pole, sr)
-    noise = measured(likelihood.residual(x, start, sr), sr, floor)
+    noise = measured(likelihood.residual(x, start, sr), sr, floor, len(pole))
     if not len(pole):
         return start, noise
     energy = likelihood.spreads(start, sr, len(x))[1] / noise.rms(pole.imag / (2 * np.pi), -pole.real) ** 2
     kept = np.argsort(-energy, kind="stable")[:MOST_MODES]
     kept = kept[energy[kept] > least]
     modes = _fit(x, likelihood.amplitudes(x, pole[kept], sr), sr, band_hz)
-    noise = measured(likelihood.residual(x, modes, sr), sr, floor)
+    noise = measured(likelihood.residual(x, modes, sr), sr, floor, len(modes.pole))
     return _pruned(x, band_hz, modes, noise, least), noise
 
 
@@ -136,7 +158,7 @@ def _pruned(x: Array, band_hz: tuple[float, float], modes: Modes, noise: Noise, 
         met = noise.rms(modes.pole.imag / (2 * np.pi), -modes.pole.real)
         spread, energy = likelihood.spreads(modes, noise.sr, len(x))
         energy = energy / met**2
-        outside = (modes.pole.real <= -0.999 * FASTEST_PER_S) | (modes.pole.imag < 2 * np.pi * band_hz[0]) | (modes.pole.imag > 2 * np.pi * band_hz[1])
+        outside = (modes.pole.real <= -PINNED * FASTEST_PER_S) | (modes.pole.imag < 2 * np.pi * band_hz[0]) | (modes.pole.imag > 2 * np.pi * band_hz[1])
         energy[outside | (np.abs(modes.amplitude) > CANCELLING * np.abs(x).max())] *= 1e-9
         far, fade = np.abs(modes.pole.imag[:, None] - modes.pole.imag), -modes.pole.real
         near = far < NEAR * np.maximum(fade[:, None], fade)
@@ -170,12 +192,16 @@ def _features(x: Array, modes: Modes, noise: Noise, band_hz: tuple[float, float]
         if which.any():
             shown = ", ".join(f"{f:.1f}" for f in np.sort(freq[which])[:8])
             notes.append(f"{int(which.sum())} lines {said} and are left out: {shown} Hz")
+    front = x[: int(FRONT * len(x))]
+    modal = explained >= TRUSTED or float(front @ front) >= FRONT_SHARE * float(x @ x)  # a rattle starts with its most; speech, noise, music do not
     if explained < EXPLAINED:
-        notes.append(f"not an impact, or not modal: damped sinusoids explain {100 * explained:.0f} % of the energy")
+        given = "" if modal else "; no feature is given"
+        notes.append(f"not an impact, or not modal: damped sinusoids explain {100 * explained:.0f} % of the energy{given}")
     amplitude, turn = np.abs(modes.amplitude), np.angle(modes.amplitude)
-    keep = np.flatnonzero(~(tone | vague) & (freq >= band_hz[0]) & (freq <= band_hz[1]))
+    pinned = (sd[1] > 0) & (np.abs(decay / FASTEST_PER_S - PINNED) < 1.001 * (1 - PINNED)) & (len(noise.density) > 2)
+    keep = np.flatnonzero(~(tone | vague | pinned) & (freq >= band_hz[0]) & (freq <= band_hz[1]) & modal)
     keep = keep[np.argsort(-amplitude[keep], kind="stable")]
-    if not len(keep):
+    if not len(keep) and modal:
         notes.append("no mode stands above the noise")
     return Features(
         freq_hz=freq[keep],

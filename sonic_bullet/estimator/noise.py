@@ -46,9 +46,9 @@ def white(rms: float, sr: int) -> Noise:
     return Noise(np.full(2, rms), np.ones(1), sr)
 
 
-def measured(left: Array, sr: int, floor: float) -> Noise:
-    """Noise of what is left (n,) of a recording without its modes; floor: least density."""
-    density = np.maximum(noise_density(left), floor)
+def measured(left: Array, sr: int, floor: float, modes: int = 0) -> Noise:
+    """Noise of what is left (n,) of a recording without its modes, four numbers each; floor: least density."""
+    density = np.maximum(noise_density(left) * np.sqrt(len(left) / max(len(left) - 4 * modes, 0.1 * len(left))), floor)
     count = len(left) // FRAME
     frames = left[: count * FRAME].reshape(count, FRAME) * np.hanning(FRAME + 2)[1:-1]
     power = np.abs(np.fft.rfft(frames, axis=1))[:, 2:-2] ** 2 / (3 / 8 * FRAME)

@@ -25,7 +25,8 @@ def test_a_tap_in_stereo(tmp_path: Path) -> None:
     (one,) = said["features"]
     assert abs(one["freq_hz"] - 700) < 5 * one["freq_sd_hz"] and abs(one["decay_per_s"] - 12) < 5 * one["decay_sd_per_s"]
     assert abs(one["amplitude"] - 0.3) < 5 * one["amplitude_sd"]
-    assert "channel 2 of 2" in said["note"]
+    assert "channel 2 of 2" in said["note"] and "channel 2 of 2" in done.stderr
+    assert set(said) >= {"features", "onset_s", "noise_dbfs"} and {"freq_hz", "decay_per_s", "amplitude", "freq_sd_hz", "decay_sd_per_s"} <= set(one)
     assert (tmp_path / "tap.png").stat().st_size > 10_000
 
 
