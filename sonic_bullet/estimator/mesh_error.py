@@ -25,8 +25,8 @@ MOST_TIMES = 12.0
 
 
 def mesh_warning(o: ObjectFit, youngs_pa: float, density: float, poisson: float, progress: Callable[[str], None] | None) -> list[str]:
-    """A warning where halving the elements would move γ by over 1 %, or where that cannot be told; none for a body without elements (polynomials.py)."""
-    if o.evidence.family is not None and "polynomials" in o.evidence.family.note:
+    """A warning where halving the elements would move γ by over 1 %, or where that cannot be told; none for one solved without them (polynomials.py, revolved.py)."""
+    if o.evidence.family is not None and not o.evidence.family.meshed:
         return []
     try:
         moved = halving_moves(o, youngs_pa, density, poisson, progress)
