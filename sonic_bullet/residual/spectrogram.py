@@ -70,7 +70,19 @@ def inverse(spectrum: Array, n: int, window: int = WINDOW, overlap: int = 4) -> 
 
     out = np.zeros(n, np.float32)
     _add(irfft(spectrum, window, axis=1), _synthesis(window, overlap), window // overlap, out)
+    edge = _edge(window, overlap)[:n]
+    out[: len(edge)] *= edge
     return out
+
+
+@lru_cache(maxsize=8)
+def _edge(window: int, overlap: int) -> Array:
+    """(window/2,) what the first samples lack, as no frame lies about a time before them."""
+    hop, square = window // overlap, np.concatenate([np.zeros(window), hann(window).astype(float) ** 2])
+    at = window + window // 2 + np.arange(window // 2)
+    seen = np.sum([square[at - m * hop] for m in range(overlap)], axis=0)
+    whole = np.tile(square[window:].reshape(overlap, hop).sum(axis=0), overlap)[: window // 2]
+    return np.asarray((whole / seen).astype(np.float32))
 
 
 @lru_cache(maxsize=8)
@@ -79,7 +91,7 @@ def _synthesis(window: int, overlap: int) -> Array:
     shape = hann(window).astype(float)
     made = (shape / np.tile((shape**2).reshape(overlap, window // overlap).sum(axis=0), overlap)).astype(np.float32)
     made.setflags(write=False)
-    return made
+    return np.asarray(made)
 
 
 def power(sample: Array, sr: int, window: int = WINDOW) -> Power:
