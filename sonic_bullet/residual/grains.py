@@ -28,6 +28,7 @@ FADE_OUT = 0.15
 STEP_DB = 2.0
 LEAST_DB = -60.0
 CACHED = 256
+KNOTS = 33
 SEEDS = (0x5EED, 0xF00D)
 
 
@@ -163,11 +164,22 @@ def _filter(base: Array, gain: Array, out: Array) -> None:  # pragma: no cover -
             out[v, k] = base[v, k] * value
 
 
+def angles(number: int) -> Array:
+    """(k,) an angle for each bin, wandering at random over `KNOTS` bands: two numbers' grains have next to nothing in common."""
+    state = np.uint64(mixed_number(number)) + np.arange(KNOTS, dtype=np.uint64) * np.uint64(0x9E3779B97F4A7C15)
+    state = (state ^ (state >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    state = (state ^ (state >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    knot = (state ^ (state >> np.uint64(31))) / 2.0**64
+    return np.asarray(2 * np.pi * np.interp(np.arange(WINDOW // 2 + 1), np.linspace(0, WINDOW // 2, KNOTS), knot))
+
+
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def shape(spectrum: Array, base: Array, gain: Array, first: np.float32, second: np.float32) -> None:  # pragma: no cover - compiled
-    """spectrum (F,) ← spectrum·gain·(first·base_0 + second·base_1), the gain (k,) linear between its bins."""
-    every = (base.shape[1] - 1) // (len(gain) - 1)
+def shape(spectrum: Array, base: Array, first: Array, second: Array) -> None:  # pragma: no cover - compiled
+    """spectrum (F,) ← spectrum·(first·base_0 + second·base_1), first and second (k,) linear between their bins."""
+    every = (base.shape[1] - 1) // (len(first) - 1)
     for k in range(base.shape[1]):
-        low = min(k // every, len(gain) - 2)
+        low = min(k // every, len(first) - 2)
         share = np.float32(k - low * every) / np.float32(every)
-        spectrum[k] *= (gain[low] + share * (gain[low + 1] - gain[low])) * (first * base[0, k] + second * base[1, k])
+        one = first[low] + share * (first[low + 1] - first[low])
+        two = second[low] + share * (second[low + 1] - second[low])
+        spectrum[k] *= one * base[0, k] + two * base[1, k]

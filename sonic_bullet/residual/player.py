@@ -1,7 +1,7 @@
 """Grains under way, and rubbing as a row of micro-collisions: state in, samples and state out.
 
     strike:    grain from sample n_0 on
-    rubbing:   force f on the sections [jG, jG + 2G) of absolute time, under w² + w'² = 1:   grain_j = T⁻¹(T(f w) √A Σ_v u_v T(base_v)), u_j seeded
+    rubbing:   force f on the sections [jG, jG + 2G) of absolute time, under w² + w'² = 1:   grain_j = T⁻¹(T(f w) √A (cos θ_j T(base_0) + sin θ_j T(base_1))), θ_j(f) seeded
 
 A section's force is carried as it is, every micro-collision of it at its own time; sections overlap by half with windows whose squares add to one, and as no
 two have the same noise their powers add: steady rubbing is steady. A section is known when it is over, so its sound comes 2G samples late, 21 ms at 48 kHz.
@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sonic_bullet.records import Array
-from sonic_bullet.residual.grains import Voice, fraction, mixed_number, response, shape
+from sonic_bullet.residual.grains import Voice, angles, response, shape
 
 SECTION = 512
 LEAST_LEVEL = 2e-6
@@ -88,7 +88,7 @@ def section_grain(voice: Voice, force_n: Array, struck_power: Array, number: int
         return np.zeros(0, np.float32)
     from scipy.fft import irfft, rfft
 
-    angle = 2 * np.pi * fraction(mixed_number(number))
+    gain, angle = response(voice, struck_power), angles(number)
     spectrum = rfft((force_n / voice.sr).astype(np.float32), voice.size)
-    shape(spectrum, voice.base, response(voice, struck_power).astype(np.float32), np.float32(np.cos(angle)), np.float32(np.sin(angle)))
+    shape(spectrum, voice.base, (gain * np.cos(angle)).astype(np.float32), (gain * np.sin(angle)).astype(np.float32))
     return np.asarray(irfft(spectrum, voice.size, overwrite_x=True)[: voice.length + 2 * SECTION])

@@ -174,7 +174,7 @@ def test_a_plates_residual_on_a_bunny_follows_its_modes(bodies: tuple[Modes, Mod
         amplitude = np.where(pairs.group == j, 2.0, 1.0) * bunny.amplitude
         ratio = energy(transfer(left, plate, Modes(bunny.freq_hz, bunny.decay_per_s, amplitude), freq, time)) / np.maximum(before, 1e-300)
         away = np.delete(ratio, [k for k in (j - 1, j, j + 1) if 0 <= k < len(ratio)])
-        followed += 2.5 < ratio[j] < 4.01 and np.median(away) < 1.1
+        followed += 2.0 < ratio[j] < 4.01 and np.median(away) < 1.1
     assert followed == len(strong[:4]) >= 3
 
 
