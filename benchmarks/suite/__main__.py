@@ -10,6 +10,7 @@ Plan -> make_case -> DIR/cases/NAME -> `sonic-bullet diagnose` in a copy without
 from __future__ import annotations
 
 import argparse
+import shlex
 import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
@@ -29,7 +30,11 @@ def main() -> int:
     parser.add_argument("--only", default="", help="cases whose name holds this")
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--rows", type=Path, default=None, help="results, one JSON a line; DIR/rows.jsonl by default")
-    parser.add_argument("--command", default="sonic-bullet diagnose {case} --json", help="what is run; {case} is the folder")
+    parser.add_argument(
+        "--command",
+        default=f"{shlex.quote(str(Path(sys.executable).with_name('sonic-bullet')))} diagnose {{case}} --json",
+        help="what is run; {case} is the folder",
+    )
     args = parser.parse_args()
     chosen = [p for p in (plans.quick() if args.quick else plans.whole()) if args.only in p.name]
     file = args.rows or args.out / "rows.jsonl"

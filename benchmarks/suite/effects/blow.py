@@ -38,9 +38,9 @@ def _summed(r: Ring, n: int, rate: float, shape: Callable[[int, Array], tuple[Ar
 
 
 def amplitude_pitch(strength: int, rng: np.random.Generator, scene: Scene) -> Effect:
-    """The strongest mode of the loudest strikes shifts by 0.3, 1 or 3 % (twice that where only displacement, so few modes, counts); once in four down."""
+    """The strongest mode of the loudest strikes shifts by 0.4, 1.5 or 5 % (twice that where only displacement, so few modes, counts); once in four down."""
     top, power = _reference(rng, scene)
-    kappa = jitter(rng, pick(strength, 0.003, 0.01, 0.03) * (2 - power)) * (1 if rng.random() < 0.75 else -1)
+    kappa = jitter(rng, pick(strength, 0.004, 0.015, 0.05) * (2 - power)) * (1 if rng.random() < 0.75 else -1)
 
     def run(r: Ring, impulse: float, n: int, rate: float) -> Array:
         a = impulse * r.level * np.abs(r.pole.imag) ** power / top
