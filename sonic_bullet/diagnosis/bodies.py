@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from sonic_bullet.effects.values import Elastic
 from sonic_bullet.errors import FileError
 from sonic_bullet.estimator.evidence import Evidence as Gathered
 from sonic_bullet.estimator.evidence import body_family, guess_of
@@ -32,6 +33,7 @@ class Struck:
     way (s + 1, 3): directions there, zero for a strike of unknown place. impulse_n_s (s,): NaN where unknown. kind: `Case.sensor`.
     family: for another elasticity, None without a mesh. correction (m,): relative, of each mode's frequency, learnt on its fitted strikes, else 0.
     line (m,): the fitted line a mode was paired with, or -1. gathered: its fitted lines and sounds, None for an object nobody fitted.
+    elastic: for tensors, see elastic.py.
     """
 
     name: str
@@ -44,14 +46,15 @@ class Struck:
     correction: Array
     line: Array
     gathered: Gathered | None
+    elastic: Elastic | None = None
 
     @property
     def strikes(self) -> int:
         return len(self.recordings)
 
-    def surface_count(self) -> int:
-        """How many of the vertices are the body's."""
-        return len(self.model.vertex_m) - self.strikes - 1
+    def surface_count(self, model: ModalModel | None = None) -> int:
+        """How many of the vertices of its model, or of its model under another elasticity, are the body's."""
+        return len((model or self.model).vertex_m) - self.strikes - 1
 
 
 def struck_bodies(found: CaseFit, *, cache: Place = "default", progress: Callable[[str], None] | None = None) -> tuple[Struck, ...]:

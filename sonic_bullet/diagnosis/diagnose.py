@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet.diagnosis.bodies import Struck, shapeless, struck_bodies
+from sonic_bullet.diagnosis.elastic import with_elastic
 from sonic_bullet.diagnosis.judge import Take, floor_between, least_db, mean_db
 from sonic_bullet.diagnosis.loop import Closed, closed
 from sonic_bullet.diagnosis.play import Hypothesis, play
@@ -75,6 +76,7 @@ def diagnose(
     gathered = gather(case, cache=cache, progress=progress, clipped=True)
     found = fit_evidence(case, gathered, check_mesh=False, progress=progress)
     bodies = struck_bodies(found, cache=cache, progress=progress) if found.objects else tuple(shapeless(found, g) for g in gathered)
+    bodies = with_elastic(found, bodies, cache=cache, progress=progress)
     correction = {b.name: b.correction for b in bodies}
     gain = found.fit.sigma if np.isfinite(found.fit.sigma) and found.fit.sigma > 0 else 1.0
     base = Hypothesis(found.fit.alpha_per_s, found.fit.beta_s, gain, (), correction)

@@ -50,7 +50,7 @@ def heard_of(h: Hypothesis, body: Struck) -> Heard:
     predicted = None
     if gathered.signals is not None:
         predicted = np.stack([play(h, body, i, gathered.signals.shape[1], gathered.sr) for i in mine])
-    count = body.surface_count()
+    count = body.surface_count(model)
     return Heard(
         impulse_n_s=body.impulse_n_s[mine],
         freq_hz=lines.freq_hz[line],
@@ -82,6 +82,7 @@ def heard_of(h: Hypothesis, body: Struck) -> Heard:
         all_hz=model.freq_hz,
         plain=plain if body.family is not None else None,
         strike=tuple(range(len(mine))),
+        elastic=body.elastic,
     )
 
 

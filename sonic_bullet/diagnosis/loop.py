@@ -73,9 +73,9 @@ def closed(
         now = mean_db(takes, h) or 0.0
         floor = least_db(takes, h) or floor
     gap, left = before - floor, now - floor
-    verdict = "explained" if added else "none"
-    if (not added and gap > SUFFICES_DB) or (added and left > max((1 - EXPLAINED) * gap, SUFFICES_DB)):
-        verdict = "unexplained"
+    verdict = "explained" if added else "none" if gap < SUFFICES_DB else "unexplained"
+    if added and left > max((1 - EXPLAINED) * gap, SUFFICES_DB):  # a name for less than half of what is seen would be a guess
+        verdict, h, now, added = "unexplained", start, before, []
     return Closed(start, h, tuple(added), tuple(last.values()), verdict, before, now, floor)
 
 

@@ -44,12 +44,26 @@ def ordered(model: ModalModel, freq_hz: Array, decay_per_s: Array, shape: Array 
     return replace(model, freq_hz=freq_hz[order], decay_per_s=np.maximum(decay_per_s[order], 0.0), shape=kept[:, :, order]), order
 
 
+def undamped(h: Hypothesis, body: Struck) -> ModalModel:
+    """The body's model under the effects on its material, uncorrected."""
+    effects = h.at(Stage.MATERIAL, fitted=body.gathered is not None)
+    if not effects or body.elastic is None:
+        return body.model
+    material = body.elastic.material
+    for effect in effects:
+        material = effect.apply(material)
+    return body.elastic.solve(material.stiffness_pa / material.density_kg_m3)
+
+
 def modes_of(h: Hypothesis, body: Struck, *, upto: int | None = None) -> tuple[ModalModel, Array]:
     """The body's damped modes under the hypothesis (its first ``upto`` effects on them), and which uncorrected mode each was (m,)."""
-    correction = np.zeros(len(body.correction)) if h.correction is None else h.correction.get(body.name, np.zeros(len(body.correction)))
-    lam = (2 * np.pi * body.model.freq_hz * (1 + correction) * np.exp(h.stretch)) ** 2
+    base = undamped(h, body)
+    correction = (h.correction or {}).get(body.name, np.zeros(0))
+    if len(correction) != base.mode_count:  # learnt under another material, or not at all
+        correction = np.zeros(base.mode_count)
+    lam = (2 * np.pi * base.freq_hz * (1 + correction) * np.exp(h.stretch)) ** 2
     decay = (h.alpha_per_s + h.beta_s * lam) / 2
-    model, order = ordered(body.model, np.sqrt(np.maximum(lam - decay**2, 0)) / (2 * np.pi), decay)
+    model, order = ordered(base, np.sqrt(np.maximum(lam - decay**2, 0)) / (2 * np.pi), decay)
     fitted = body.gathered is not None
     for effect in h.at(Stage.MODES, fitted=fitted)[:upto]:
         model = effect.apply(model)
@@ -58,7 +72,7 @@ def modes_of(h: Hypothesis, body: Struck, *, upto: int | None = None) -> tuple[M
 
 def pattern(body: Struck, model: ModalModel) -> Array:
     """J ψ (s, m), real, of the body's strikes at the sensor; J = 1 where it is not known."""
-    at = model.shape[body.surface_count() :].astype(float)
+    at = model.shape[body.surface_count(model) :].astype(float)
     row = np.einsum("sxm,sx->sm", at, body.way)
     level = np.where(np.isfinite(body.impulse_n_s), body.impulse_n_s, 1.0)
     return np.asarray(level[:, None] * row[:-1] * row[-1])
@@ -84,8 +98,8 @@ def ring_of(h: Hypothesis, body: Struck, strike: int) -> Ring:
     """The modes as a strike starts them, before its pulse's spectrum."""
     model, _ = modes_of(h, body)
     row = pattern(body, model)[strike]
-    push = np.einsum("xm,x->m", model.shape[body.surface_count() + strike].astype(float), body.way[strike])
-    most = np.sqrt((model.shape[: body.surface_count()].astype(float) ** 2).sum(axis=1)).max(axis=0) if body.surface_count() else np.ones(len(row))
+    push = np.einsum("xm,x->m", model.shape[body.surface_count(model) + strike].astype(float), body.way[strike])
+    most = np.sqrt((model.shape[: body.surface_count(model)].astype(float) ** 2).sum(axis=1)).max(axis=0) if body.surface_count(model) else np.ones(len(row))
     blow = blow_of(h, body, strike)
     none = np.zeros(len(row))
     ring = Ring(model.freq_hz, model.decay_per_s, h.gain * row * start(body.kind, model), np.abs(blow.impulse_n_s * push) * most, none, none, blow.impulse_n_s)

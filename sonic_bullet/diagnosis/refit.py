@@ -14,13 +14,14 @@ import numpy as np
 
 from sonic_bullet.diagnosis.bodies import Struck
 from sonic_bullet.diagnosis.evidence import MOVES, heard_of, paired
-from sonic_bullet.diagnosis.play import Hypothesis, modes_of
+from sonic_bullet.diagnosis.play import Hypothesis, modes_of, undamped
 from sonic_bullet.effects.values import Heard, Stage
 from sonic_bullet.estimator.rayleigh import rayleigh
 from sonic_bullet.records import Array
 
 ROUGH = 0.02
 CORRECTION = 0.01
+NEAR = 5e-3  # relative: lines of one mode
 
 
 def refitted(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...] | None = None, *, reference: Hypothesis | None = None) -> Hypothesis:
@@ -36,18 +37,18 @@ def refitted(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...]
 
 def corrected(h: Hypothesis, bodies: tuple[Struck, ...]) -> Hypothesis:
     """The hypothesis with E/ρ and corrections learnt on its own modes."""
-    h = replace(h, correction={name: np.zeros(len(c)) for name, c in (h.correction or {}).items()}, stretch=0.0)
+    h = replace(h, correction=None, stretch=0.0)
     for _ in range(3):
         off = np.concatenate([_off(h, body)[1] for body in bodies if body.gathered is not None] or [np.zeros(0)])
         if len(off):
             h = replace(h, stretch=h.stretch + float(np.median(off)))
-    found = dict(h.correction or {})
+    found: dict[str, Array] = {}
     for body in bodies:
         if body.gathered is None:
             continue
         for _ in range(2):
             place, off = _off(replace(h, correction=found), body)
-            ratio = np.array(found.get(body.name, np.zeros(len(body.correction))), float)
+            ratio = np.array(found.get(body.name, np.zeros(undamped(h, body).mode_count)), float)
             step = np.zeros(len(ratio))
             step[place] = np.expm1(off)
             found[body.name] = np.clip((1 + ratio) * (1 + step) - 1, -CORRECTION, CORRECTION)
@@ -69,8 +70,8 @@ def _damped(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...])
     """α and β beside the effects' own decay."""
     if any(e.id == "damping-law" for e in h.effects):
         return h
-    told = [(e.alpha_per_s, e.beta_s) for e in h.effects if e.id == "room" and np.isfinite(e.alpha_per_s)]  # type: ignore[attr-defined]
-    if told:  # echoes hold lines up: the bands, seen beside the room, say better
+    told = [(e.alpha_per_s, e.beta_s) for e in h.effects if np.isfinite(getattr(e, "alpha_per_s", np.nan))]  # type: ignore[attr-defined]
+    if told:
         return replace(h, alpha_per_s=told[-1][0], beta_s=told[-1][1])
     bare = replace(h, alpha_per_s=0.0, beta_s=0.0)
     lam, left, sd = [], [], []
@@ -100,14 +101,23 @@ def _members(freq: Array, near: int, count: int) -> Array:
     return np.argsort(np.abs(freq - freq[near]), kind="stable")[:count]
 
 
+def whole(one: Heard) -> Array:
+    """Amplitudes (s, k) with those of lines so near that they may be the same mode, bent or split: at the onset they add up to what was struck."""
+    if not len(one.foreign_hz) or not len(one.freq_hz):
+        return one.amplitude
+    gap = np.abs(np.log(one.foreign_hz[:, None] / one.freq_hz[None, :]))
+    mine = (gap.argmin(axis=1)[:, None] == np.arange(len(one.freq_hz))) & (gap < NEAR)
+    return np.asarray(one.amplitude + one.foreign_amplitude @ mine)
+
+
 def _gained(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...]) -> Hypothesis:
     """σ by the amplitudes."""
     from sonic_bullet.diagnosis.evidence import path_response
     from sonic_bullet.effects.values import Blow
 
-    told = [e.gain for e in h.effects if e.id == "room" and np.isfinite(e.gain)]  # type: ignore[attr-defined]
-    if told:
-        return replace(h, gain=told[-1])
+    known = [e.gain for e in h.effects if np.isfinite(getattr(e, "gain", np.nan))]  # type: ignore[attr-defined]
+    if known:
+        return replace(h, gain=known[-1])
     told, seen, spread = [], [], []
     for one, body in zip(heard, (b for b in bodies if b.gathered is not None), strict=True):
         if not len(one.freq_hz) or one.signal is None:
@@ -122,7 +132,7 @@ def _gained(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...])
             factor[i] = np.abs(blow.spectrum(one.freq_hz)) * direct * hits
         expected = np.abs(one.pattern) * factor
         told.append(expected.ravel())
-        seen.append(np.abs(one.amplitude).ravel())
+        seen.append(np.abs(whole(one)).ravel())
         rough = np.broadcast_to(ROUGH * expected.max(axis=0, keepdims=True), expected.shape)
         spread.append(np.stack([one.amplitude_sd.ravel(), rough.ravel()]))
     if not told:

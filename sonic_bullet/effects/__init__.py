@@ -8,6 +8,7 @@ from sonic_bullet.effects.damping_law import DampingLaw
 from sonic_bullet.effects.foreign_mode import ForeignMode
 from sonic_bullet.effects.measurement_chain import MeasurementChain
 from sonic_bullet.effects.mode_splitting import ModeSplitting
+from sonic_bullet.effects.orthotropy import Orthotropy
 from sonic_bullet.effects.radiation import Radiation
 from sonic_bullet.effects.rebound import Rebound
 from sonic_bullet.effects.room import Room
@@ -23,6 +24,7 @@ EFFECTS: tuple[type[Effect], ...] = (
     AmplitudeDamping,
     Room,
     ForeignMode,
+    Orthotropy,
     AddedMass,
     Rebound,
     Radiation,

@@ -21,7 +21,7 @@ from sonic_bullet.records import Array, ModalModel
 POINTS = 140
 SHARES = (0.002, 0.006, 0.015, 0.035, 0.08, 0.16)  # of the body's mass
 TRIES = 4
-BETTER = 1.0  # in price: as much as one strong line, paired well
+BETTER = (1.5, 0.12)  # in price: as much as a strong line and a half, paired well; and of the bare body's own
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ class AddedMass:
                 found.append((score, vertex, mass))
         found.sort()
         score, vertex, mass = min(_refined(small, heard, start, line, size) for start in found[:TRIES])
-        if score > none[0] - BETTER:
+        if score > none[0] - max(BETTER[0], BETTER[1] * abs(none[0])):
             return None
         place = heard.plain.vertex_m[vertex]
         return cls((float(place[0]), float(place[1]), float(place[2])), float(mass))

@@ -24,7 +24,7 @@ LEAST = 0.05  # of c a₀ at the loudest
 
 @dataclass(frozen=True)
 class AmplitudeDamping:
-    """choke: relative rise of the decay per level. measure: as in amplitude-pitch. low_decay: d of each fitted line at low level, by frequency."""
+    """choke: relative rise of the decay per level. measure: as in amplitude-pitch. alpha_per_s, beta_s: the material's, as the decays at low level tell them."""
 
     id: ClassVar[str] = "amplitude-damping"
     stage: ClassVar[Stage] = Stage.BANK
@@ -33,13 +33,14 @@ class AmplitudeDamping:
 
     choke: float
     measure: str = "velocity"
-    scale: float = 1.0  # the decay at low level over the one that was fitted to all levels
+    alpha_per_s: float = float("nan")
+    beta_s: float = float("nan")
 
     def apply(self, x: Ring) -> Ring:
-        return replace(x, choke=x.choke + self.choke * _per_velocity(x, self.measure), decay_per_s=x.decay_per_s * self.scale)
+        return replace(x, choke=x.choke + self.choke * _per_velocity(x, self.measure))
 
     def parameters(self) -> dict[str, Any]:
-        return {"choke": self.choke, "measure": self.measure, "scale": self.scale}
+        return {"choke": self.choke, "measure": self.measure}
 
     def freedom(self) -> int:
         return 2
@@ -54,12 +55,12 @@ class AmplitudeDamping:
             for name, level in levels(h).items():
                 found = _fitted(e, h, level[:, e.line])
                 if found is not None and found[2] > BETTER and (best is None or found[2] > best[0]):
-                    best = (found[2], cls(found[0], name, found[1]))
+                    best = (found[2], cls(found[0], name, *found[1]))
         return best[1] if best is not None else None
 
 
-def _fitted(e: Envelopes, h: Heard, level: Array) -> tuple[float, float, float] | None:
-    """c, the low-level decay over the heard one, and how much of ln variance goes, all lines together."""
+def _fitted(e: Envelopes, h: Heard, level: Array) -> tuple[float, tuple[float, float], float] | None:
+    """c, (α, β) by the low-level decays, and how much of ln variance goes, all lines together."""
     rows = [r for r in (_rows(e, h, level, q) for q in range(len(e.line))) if r is not None]
     if len(rows) < 2:
         return None
@@ -75,7 +76,23 @@ def _fitted(e: Envelopes, h: Heard, level: Array) -> tuple[float, float, float] 
     gain = plain - cost
     if choke * most < LEAST or (gain > np.log(2)).sum() < TELL or -gain[gain < 0].sum() > 0.3 * gain[gain > 0].sum():
         return None
-    return choke, ratio, float(gain.sum())
+    omega2 = np.array([h.omega[k] ** 2 for k in e.line])[[i for i in range(len(e.line)) if _rows(e, h, level, i) is not None]]
+    low = ratio * np.array([r[4] for r in rows])
+    return choke, _rayleigh(omega2, low), float(gain.sum())
+
+
+def _rayleigh(omega2: Array, decay: Array) -> tuple[float, float]:
+    """α, β >= 0 by relative least squares with Huber's weights."""
+    from scipy.optimize import nnls
+
+    columns = np.stack([0.5 * np.ones(len(omega2)), 0.5 * omega2], axis=1) / decay[:, None]
+    scale = np.abs(columns).max(axis=0)
+    trust, x = np.ones(len(decay)), np.zeros(2)
+    for _ in range(10):
+        x = nnls(columns / scale * trust[:, None], trust)[0]
+        off = np.abs(columns / scale @ x - 1)
+        trust = np.sqrt(np.minimum(1, 0.1 / np.maximum(off, 1e-9)))
+    return float(x[0] / scale[0]), float(x[1] / scale[1])
 
 
 def _rows(e: Envelopes, h: Heard, level: Array, q: int) -> tuple[Array, Array, Array, Array, float] | None:
@@ -94,10 +111,10 @@ def _rows(e: Envelopes, h: Heard, level: Array, q: int) -> tuple[Array, Array, A
     return np.concatenate(t), np.concatenate(y), np.concatenate(a), np.concatenate(who), max(float(h.decay_per_s[e.line[q]]), 1e-2)
 
 
-def _misfit(rows: list[tuple[Array, Array, Array, Array, float]], choke: float) -> tuple[Array, float]:
-    """ln of the variance (r,) that each line leaves, and the median ratio of d to the heard one, by lines that tell."""
+def _misfit(rows: list[tuple[Array, Array, Array, Array, float]], choke: float) -> tuple[Array, Array]:
+    """ln of the variance (r,) that each line leaves, and the ratio (r,) of its d to the heard one."""
     found, ratio = [], []
-    scales = np.geomspace(0.25, 1.6, 25) if choke else np.geomspace(0.5, 1.6, 25)
+    scales = np.geomspace(0.2, 1.6, 41)
     for t, y, a, who, decay in rows:
         u = np.exp(np.minimum(decay * scales[:, None] * t, 300))
         left = y + np.log((1 + choke * a) * u - choke * a)
@@ -106,4 +123,4 @@ def _misfit(rows: list[tuple[Array, Array, Array, Array, float]], choke: float) 
         spread = (left**2).mean(axis=1)
         found.append(np.log(spread.min() + 2.5e-5))
         ratio.append(float(scales[int(spread.argmin())]))
-    return np.array(found), float(np.median(ratio))
+    return np.array(found), np.array(ratio)

@@ -20,7 +20,9 @@ from sonic_bullet.records import Array
 SPAN_S = (1.2e-3, 0.25)
 MOST_HITS = 8
 FAINT = 0.02
-CLEAR = 8.0  # of the correlation's own scatter
+LEAST = 0.06  # of the first hit's share
+GAIN = 0.02  # of what is left must go with another hit
+EXPONENTS = (0.0, 1.0, 0.5, -0.2)
 
 
 @dataclass(frozen=True)
@@ -64,103 +66,89 @@ class Rebound:
 
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
-        found = [(h, _gaps(h)) for h in evidence.heard if h.signal is not None]
-        found = [(h, g) for h, g in found if len(g) >= max(2, 0.6 * len(h.impulse_n_s))]
-        if not found:
+        h = max((h for h in evidence.heard if h.signal is not None), key=lambda h: len(h.freq_hz), default=None)
+        if h is None or len(h.freq_hz) < 3:
             return None
-        h, gaps = max(found, key=lambda pair: len(pair[1]))
-        strike = np.array(sorted(gaps))
-        level = np.where(np.isfinite(h.impulse_n_s), h.impulse_n_s, 1.0)[strike]
-        gap, ratio = (np.array([gaps[int(s)][i] for s in strike]) for i in range(2))
+        found = [(level, hits) for level, hits in zip(h.impulse_n_s, _hits(h), strict=True) if len(hits)]
+        if len(found) < max(2, 0.6 * len(h.impulse_n_s)):
+            return None
+        level = np.array([j if np.isfinite(j) else 1.0 for j, _ in found])
+        gap = np.array([hits[0][0] for _, hits in found])
+        share = np.array([hits[0][1] for _, hits in found])
         reference = float(np.exp(np.log(level).mean()))
-        exponent = min((0.0, 1.0, 0.5, -0.2), key=lambda p: _spread(np.log(gap) - p * np.log(level)))
-        if _spread(np.log(gap) - exponent * np.log(level)) > 0.1:
+        exponent = min(EXPONENTS, key=lambda p: _spread(np.log(gap) - p * np.log(level)))
+        if _spread(np.log(gap) - exponent * np.log(level)) > 0.1 or _spread(np.log(share)) > 0.5:
             return None
         first = float(np.exp(np.median(np.log(gap) - exponent * np.log(level / reference))))
-        return _best(cls, h, cls(first, reference, float(np.clip(np.median(ratio), 0.05, 0.95)), exponent))
+        ratio = [hits[1][0] / hits[0][0] - 1 for _, hits in found if len(hits) > 1 and hits[1][0] > hits[0][0]]
+        e = float(np.clip(np.median(share), 0.03, 0.97))
+        shrink = float(np.clip(np.median(ratio), 0.03, 1.0)) if len(ratio) >= 2 else None
+        count = 1 + int(round(float(np.median([len(hits) for _, hits in found]))))
+        return cls(first, reference, e, exponent, shrink, count if count <= 2 else MOST_HITS)
 
 
 def _spread(y: Array) -> float:
     return float(np.abs(y - np.median(y)).mean())
 
 
-def _system(h: Heard) -> tuple[Array, Array]:
-    """What makes the direct sounds the recorded ones: recorded over played, per strike (s, t), from −t/4; strongest at 0. And its scatter (s,)."""
+def _hits(h: Heard) -> list[list[tuple[float, float]]]:
+    """Per strike: delays in s and shares of the hits after the first, by their time.
+
+    Matching pursuit [Mallat & Zhang 1993]: the sound of one hit, as the lines and the model have it, is sought later in what is left; after every
+    find all shares are solved together.
+    """
     from sonic_bullet.effects.ringing import direct_as_expected
 
     assert h.signal is not None
     sound = direct_as_expected(h)
-    n = h.signal.shape[1]
-    size = 2 * n
-    x, y = np.fft.rfft(sound, size, axis=1), np.fft.rfft(h.signal, size, axis=1)
-    power = np.abs(x) ** 2
-    lift = 0.01 * power.max(axis=1, keepdims=True) + (np.median(h.noise) ** 2 * n)
-    tap = np.fft.irfft(np.conj(x) * y / (power + lift), size, axis=1)
     reach = int(SPAN_S[1] * h.sr)
-    return tap[:, :reach], np.median(np.abs(tap[:, reach : 2 * reach]), axis=1) / 0.67
-
-
-def _gaps(h: Heard) -> dict[int, tuple[float, float]]:
-    """Per strike: delay of the second hit in s, and its share of the first."""
-    tap, _ = _system(h)
-    own, _ = _own(h)
-    first = int(SPAN_S[0] * h.sr)
-    found = {}
-    for s in range(len(tap)):
-        rest = tap[s] / max(abs(tap[s, 0]), 1e-300) - own[s] / max(abs(own[s, 0]), 1e-300)  # less what a single hit would show
-        scatter = np.median(np.abs(rest[first:])) / 0.67
-        i = first + int(np.argmax(rest[first:]))
-        if rest[i] > CLEAR * scatter and rest[i] > 0.08:
-            found[s] = (i / h.sr, float(np.clip(rest[i], 0.05, 0.95)))
+    n = min(h.signal.shape[1], 3 * reach)
+    found = []
+    for x, y in zip(sound[:, :n], h.signal[:, :n], strict=True):
+        lags = [0.0]
+        share, left = _solved(x, y, lags, h.sr)
+        for _ in range(MOST_HITS - 1):
+            lag, strength = _sought(x, y - left, h.sr, reach)
+            if lag is None or strength < LEAST * max(share[0], 1e-300):
+                break
+            trial = [*lags, lag]
+            new, made = _solved(x, y, trial, h.sr)
+            before, after = ((y - left) ** 2).sum(), ((y - made) ** 2).sum()
+            if after > (1 - GAIN) * before or new[-1] < LEAST * new[0]:
+                break
+            lags, share, left = trial, new, made
+        rest = sorted((t, r / share[0]) for t, r in zip(lags[1:], share[1:], strict=True) if share[0] > 0 and LEAST < r / share[0] < 1.0)
+        found.append(rest)
     return found
 
 
-def _own(h: Heard) -> tuple[Array, Array]:
-    """The same of the played sounds themselves: what the method makes of a single hit."""
-    from dataclasses import replace as changed
+def _delayed(x: Array, lag_s: float, sr: int) -> Array:
+    """x (n,) later by lag_s, between samples too: a turn of the spectrum's phase."""
+    n = len(x)
+    size = 2 * n
+    turn = np.exp(-2j * np.pi * np.fft.rfftfreq(size, 1 / sr) * lag_s)
+    return np.asarray(np.fft.irfft(np.fft.rfft(x, size) * turn, size)[:n])
 
-    from sonic_bullet.effects.ringing import direct_as_expected
 
-    return _system(changed(h, signal=direct_as_expected(h)))
+def _solved(x: Array, y: Array, lags: list[float], sr: int) -> tuple[Array, Array]:
+    """Shares (h,) by least squares, and what they make (n,)."""
+    columns = np.stack([_delayed(x, lag, sr) for lag in lags], axis=1)
+    share = np.linalg.lstsq(columns, y, rcond=None)[0]
+    return share, columns @ share
 
 
-def _best(cls: type[Rebound], h: Heard, start: Rebound) -> Rebound:
-    """Gap, restitution and ratio of gaps by least squares on the power spectra of the strikes' first half second."""
-    from scipy.optimize import minimize
-
-    assert h.signal is not None
-    size = min(h.signal.shape[1], int(0.6 * h.sr))
-    target = np.log(np.abs(np.fft.rfft(h.signal[:, :size] * np.hanning(2 * size)[size:], axis=1)) + 1e-9)
-    f, d = h.freq_hz, h.decay_per_s
-    bins = np.clip(np.round(f * size / h.sr).astype(int), 0, target.shape[1] - 1)
-    del bins
-    seen = np.abs(h.amplitude) / np.maximum(np.abs(h.expected), 1e-300)
-    width = 0.05 + (h.amplitude_sd / np.maximum(np.abs(h.amplitude), 1e-300)) + 0.03 * np.abs(h.expected).max(axis=0) / np.maximum(np.abs(h.expected), 1e-300)
-
-    def cost(p: Array) -> float:
-        made = cls(float(np.exp(p[0])), start.impulse_n_s, float(1 / (1 + np.exp(-p[1]))), start.exponent, float(1 / (1 + np.exp(-p[2]))))
-        total = 0.0
-        for s, level in enumerate(h.impulse_n_s):
-            blow = made.apply(Blow(float(level) if np.isfinite(level) else 1.0, np.zeros(1), np.ones(1)))
-            comb = np.abs((blow.share[:, None] * np.exp((d - 2j * np.pi * f) * blow.delay_s[:, None])).sum(axis=0))
-            off = (np.log(np.maximum(seen[s], 1e-9)) - np.log(np.maximum(comb, 1e-9))) / width[s]
-            off -= np.median(off)
-            total += float(np.log1p((off / 2.5) ** 2).sum())
-        return total
-
-    e = float(np.clip(start.restitution, 0.06, 0.94))
-    best, least = start, np.inf
-    for shift in np.linspace(-0.02, 0.02, 21):
-        for share in (0.8 * e, e, min(1.2 * e, 0.94)):
-            p = np.array([np.log(start.gap_s) + shift, np.log(share / (1 - share)), np.log(e / (1 - e))])
-            if cost(p) < least:
-                least, at = cost(p), p
-    found = minimize(
-        cost,
-        at,
-        method="Nelder-Mead",
-        options={"xatol": 1e-5, "fatol": 1e-3, "maxfev": 250, "initial_simplex": at + np.vstack([np.zeros(3), np.diag([2e-3, 0.1, 0.1])])},
-    )
-    p = found.x
-    best = cls(float(np.exp(p[0])), start.impulse_n_s, float(1 / (1 + np.exp(-p[1]))), start.exponent, float(1 / (1 + np.exp(-p[2]))))
-    return best
+def _sought(x: Array, rest: Array, sr: int, reach: int) -> tuple[float | None, float]:
+    """The delay at which x explains most of what is left, to a sixteenth of a sample, and its strength."""
+    size = 2 * len(x)
+    cross = np.fft.irfft(np.conj(np.fft.rfft(x, size)) * np.fft.rfft(rest, size), size)[:reach]
+    energy = np.cumsum((x**2)[::-1])[::-1]  # of what of x is still inside, once delayed
+    inside = energy[0] - np.concatenate([[0.0], np.cumsum((x**2)[::-1])])[:reach]
+    strength = cross / np.maximum(inside, 1e-3 * energy[0])
+    first = int(SPAN_S[0] * sr)
+    gain = np.where(strength > 0, strength**2 * inside, 0.0)
+    gain[:first] = 0.0
+    i = int(gain.argmax())
+    if gain[i] <= 0:
+        return None, 0.0
+    best = max((float(_delayed(x, (i + f) / sr, sr) @ rest), f) for f in np.linspace(-1, 1, 33))
+    return (i + best[1]) / sr, best[0] / max(float(inside[i]), 1e-300)

@@ -7,18 +7,20 @@
     SOUND     Sound      -> Sound         what happens on the way to the file
 
 An effect is physics with few parameters. `propose` reads them off the evidence, or says None; it never scores itself: the diagnosis
-renders strikes that were not fitted, with and without it.
+renders strikes that were not fitted, with and without it. An effect that hides the modes' own decays or levels from the lines (a room, friction)
+carries alpha_per_s, beta_s and gain as it found them beside itself; the host takes those over.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 from typing import Any, ClassVar, Protocol, Self, runtime_checkable
 
 import numpy as np
 
-from sonic_bullet.records import Array, ModalModel
+from sonic_bullet.records import Array, Material, ModalModel
 
 
 class Stage(Enum):
@@ -89,6 +91,21 @@ class Sound:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Elastic:
+    """A body under any orthotropic elasticity, its axes the mesh's. material: isotropic, as the baseline has it, with the guessed density.
+    phased: whether the signs of lines' amplitudes can be held against J ψ.
+
+    look: C/ρ (6, 6) in m²/s² -> undamped freq_hz (m,), ∂ ln λ/∂(C_k/ρ) (9, m) of the constants C11 C22 C33 C23 C13 C12 C44 C55 C66, and J ψ (s, m) up to
+    a factor, NaN for strikes of unknown place. solve: the same tensor -> undamped ModalModel, strikes and sensor as last vertices.
+    """
+
+    material: Material
+    phased: bool
+    look: Callable[[Array], tuple[Array, Array, Array]]
+    solve: Callable[[Array], ModalModel]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Heard:
     """One object's strikes: k lines that are modes, beside what the model so far expects, and what it leaves.
 
@@ -129,6 +146,7 @@ class Heard:
     all_hz: Array  # (m,) their frequencies
     plain: ModalModel | None  # `model` with the mesh's own frequencies
     strike: tuple[int, ...] = ()
+    elastic: Elastic | None = None
 
     @property
     def residual(self) -> Array:

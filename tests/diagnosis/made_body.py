@@ -20,14 +20,14 @@ from sonic_bullet.files.cases import CaseObject, CaseRecording
 from sonic_bullet.modal.reduced import Family
 from sonic_bullet.records import Array, Material, ModalModel
 
-SR = 22_050
+SR = 16_000
 SIDE_M = (0.21, 0.13)
 MASS_KG = 0.4
-FIRST_HZ = 420.0
+FIRST_HZ = 330.0
 STRIKES = ((0.31, 0.42), (0.72, 0.23), (0.14, 0.81), (0.55, 0.66), (0.88, 0.52))
 SENSOR = (0.37, 0.29)
 IMPULSE = (0.005, 0.01, 0.02, 0.04, 0.03)
-ALPHA, BETA, GAIN = 6.0, 2.5e-8, 0.3
+ALPHA, BETA, GAIN = 30.0, 4e-8, 0.3
 
 
 def plate(modes: int = 18) -> ModalModel:
@@ -74,12 +74,12 @@ def truth(*effects: Effect) -> Hypothesis:
     return Hypothesis(ALPHA, BETA, GAIN, effects)
 
 
-def recorded(*effects: Effect, seconds: float = 1.0, noise: float = 2e-5, seed: int = 5, model: ModalModel | None = None) -> Struck:
+def recorded(*effects: Effect, seconds: float = 0.7, noise: float = 2e-5, seed: int = 5, model: ModalModel | None = None) -> Struck:
     """The body with the effects as a recording shows it: played, noise added, lines found."""
     plain = struck(model)
     n = int(seconds * SR)
     heard = replace(plain, gathered=cast(Gathered, Gathered(CaseObject("plate", None, 1.0, None), cast(Material, None), (), None, None, None, None, SR)))  # type: ignore[arg-type]
     rng = np.random.default_rng(seed)
     signals = np.stack([play(truth(*effects), heard, i, n, SR) + noise * rng.standard_normal(n) for i in range(len(STRIKES))])
-    lines = joint_lines(signals, SR, band_hz=(50.0, 10_000.0))
+    lines = joint_lines(signals, SR, band_hz=(50.0, 7_500.0))
     return struck(model, lines, signals)

@@ -1,0 +1,339 @@
+"""Which tensor do the lines tell? Search over elastic symmetries, starts, and pairs of lines and modes.
+
+    p = (ln E₁₂₃, n₂₃ n₁₃ n₁₂, ln G₂₃ G₁₃ G₁₂), per density;  n_ij = ν_ij √(E_j/E_i),  S = D^{-1/2} (n) D^{-1/2}       [Bodig & Jayne 1982, eq. 3.8]
+    pairs: Σ worth·(min((ln f_k − ln f_j)²/18w² + 1 − c_kj, 1) − 1) → min               [Kuhn 1955], c: likeness of patterns over the strikes
+    step:  least squares on ln f, ∂ ln λ/∂C by Hellmann-Feynman, Cauchy's weights, a weak prior about isotropy, w from 5 % down
+    BIC = n ln(mean min((ln f_k − ln f_j)², CAP²)) + q ln n                                                            [Schwarz 1978]
+
+q: 2 isotropic, 3 cubic, 5 hexagonal about x, y or z (transversely isotropic), 9 orthorhombic (orthotropic). Axes are the mesh's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from sonic_bullet.effects.values import Elastic, Evidence, Heard
+from sonic_bullet.records import Array
+
+SYMMETRIES = {"isotropic": 2, "cubic": 3, "hexagonal-x": 5, "hexagonal-y": 5, "hexagonal-z": 5, "orthorhombic": 9}
+PLACE = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1), (3, 3), (4, 4), (5, 5))
+NAMES = ("youngs_x", "youngs_y", "youngs_z", "n_yz", "n_xz", "n_xy", "shear_yz", "shear_xz", "shear_xy")
+CAP = 0.012  # of ln f: a line farther off is no such mode
+FLOOR = 3e-4  # of ln f: less is not told
+WIDTHS = (0.04, 0.025, 0.016, 0.01, 0.007, 0.005, 0.004, 0.004)
+PRIOR_N, PRIOR_G = 0.1, 0.7  # of n about the guess' ν, of ln G about √(E_i E_j)/2(1+n)
+STEP = np.array([0.3] * 3 + [0.08] * 3 + [0.3] * 3)
+LARGEST_N = 0.46
+STARTS = 5  # of those sifted, taken further
+RATIOS = (0.16, 0.4, 1.0, 2.5, 6.0)
+FIRST = 10  # lines that decide where no pattern does
+PEAKS = 2
+BLIND_STARTS = 12
+REACH, WIDE = 0.6, 0.014  # of ln E/ρ in the sieve; of ln f
+ZENER = (0.4, 0.5, 0.62, 0.77, 0.9, 1.0, 1.15, 1.35, 1.6, 2.0, 2.5)
+POISSON = (-0.1, 0.0, 0.1)  # beside the guess'
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Told:
+    """One body's lines: ln f and spread (k,), worth (k,), amplitude (s, k) or None where patterns say nothing, row (s,): which strikes of `Elastic.look`."""
+
+    log_hz: Array
+    sd: Array
+    worth: Array
+    amplitude: Array | None
+    row: Array
+    elastic: Elastic
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tensor:
+    """A fitted elasticity. p (9,); bic; scatter: rms of ln f of the lines that fit; matched: their share; held: names of `NAMES` that the prior holds."""
+
+    symmetry: str
+    p: Array
+    bic: float
+    scatter: float
+    matched: float
+    held: tuple[str, ...] = ()
+
+    @property
+    def stiffness_m2_s2(self) -> Array:
+        return stiffness(self.p)
+
+
+def stiffness(p: Array) -> Array:
+    """C/ρ (6, 6)."""
+    root = np.exp(-0.5 * p[:3])
+    normal = np.array([[1, -p[5], -p[4]], [-p[5], 1, -p[3]], [-p[4], -p[3], 1]])
+    found = np.zeros((6, 6))
+    found[:3, :3] = np.linalg.inv(normal * np.outer(root, root))
+    found[range(3, 6), range(3, 6)] = np.exp(p[6:])
+    return found
+
+
+def sound(p: Array) -> bool:
+    """Whether the tensor is positive definite."""
+    normal = np.array([[1, -p[5], -p[4]], [-p[5], 1, -p[3]], [-p[4], -p[3], 1]])
+    return bool(np.linalg.eigvalsh(normal)[0] > 0.02)
+
+
+def constants(p: Array) -> Array:
+    """The nine constants (9,) of C/ρ, as `Elastic.look` orders them."""
+    c = stiffness(p)
+    return np.array([c[i, j] for i, j in PLACE])
+
+
+def expanded(symmetry: str, q: Array) -> Array:
+    """p (9,) of a symmetry's own numbers: (ln E, n), (ln E, n, ln G), (ln E_along, ln E_across, n_along, n_across, ln G_along), or p itself."""
+    if symmetry == "isotropic":
+        return np.concatenate([np.full(3, q[0]), np.full(3, q[1]), np.full(3, q[0] - np.log(2 * (1 + q[1])))])
+    if symmetry == "cubic":
+        return np.repeat(q, 3)
+    if symmetry == "orthorhombic":
+        return np.array(q)
+    along = "xyz".index(symmetry[-1])
+    p = np.array([q[1]] * 3 + [q[2]] * 3 + [q[4]] * 3)
+    p[along], p[3 + along], p[6 + along] = q[0], q[3], q[1] - np.log(2 * (1 + q[3]))
+    return p
+
+
+def reduced(symmetry: str, p: Array) -> Array:
+    """The symmetry's own numbers nearest to p."""
+    if symmetry == "isotropic":
+        return np.array([p[:3].mean(), p[3:6].mean()])
+    if symmetry == "cubic":
+        return np.asarray(p.reshape(3, 3).mean(axis=1))
+    if symmetry == "orthorhombic":
+        return np.array(p)
+    along = "xyz".index(symmetry[-1])
+    rest = [k for k in range(3) if k != along]
+    return np.array([p[along], p[rest].mean(), p[3:6][rest].mean(), p[3 + along], p[6:][rest].mean()])
+
+
+def told_of(evidence: Evidence) -> list[Told]:
+    """All lines, whatever they were paired with, of the objects that can be of any elasticity."""
+    return [_told(h) for h in evidence.heard if h.elastic is not None and len(h.freq_hz) + len(h.foreign_hz) > 4]
+
+
+def _told(h: Heard) -> Told:
+    assert h.elastic is not None
+    freq, decay = np.concatenate([h.freq_hz, h.foreign_hz]), np.concatenate([h.decay_per_s, h.foreign_decay_per_s])
+    sd = np.concatenate([h.freq_sd_hz / np.maximum(h.freq_hz, 1e-9), np.full(len(h.foreign_hz), 1e-4)])
+    amplitude = np.concatenate([h.amplitude, h.foreign_amplitude], axis=1)
+    order = np.argsort(freq)
+    amplitude = amplitude[:, order]
+    size = np.linalg.norm(np.nan_to_num(amplitude), axis=0)
+    worth = np.clip(0.5 + 0.06 * np.log10(np.maximum(size / max(size.max(initial=0), 1e-300), 1e-12)), 0.05, 1) if size.any() else np.full(len(freq), 0.5)
+    log_hz = np.log(np.hypot(2 * np.pi * freq, np.nan_to_num(decay)) / (2 * np.pi))[order]
+    row = h.strike_vertex - h.sensor_vertex  # from the end: the sensor is the last
+    known = np.isfinite(amplitude).all() and len(row) > 1
+    return Told(log_hz, np.nan_to_num(sd, nan=1e-4)[order], worth, amplitude if known else None, row, h.elastic)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Seen:
+    """A tensor's modes beside one body's lines: log_hz (m,), slope (9, m) of ln λ, alike (k, m)."""
+
+    log_hz: Array
+    slope: Array
+    alike: Array
+
+
+def seen_by(told: Told, p: Array) -> Seen:
+    """The modes of p and how alike their patterns are to the lines'."""
+    freq, slope, psi = told.elastic.look(stiffness(p))
+    alike = np.ones((len(told.log_hz), len(freq)))
+    if told.amplitude is not None:
+        psi = psi[len(psi) + told.row]
+        if np.isfinite(psi).all():
+            a = told.amplitude if told.elastic.phased else np.abs(told.amplitude)
+            psi = psi if told.elastic.phased else np.abs(psi)
+            alike = np.abs(a.T @ psi) / np.maximum(np.linalg.norm(a, axis=0)[:, None] * np.linalg.norm(psi, axis=0), 1e-300)
+    return Seen(np.log(freq), slope, alike)
+
+
+def paired(told: Told, seen: Seen, width: float, lowest: int | None = None) -> tuple[Array, Array, float]:
+    """Lines and modes (k',) paired at the least price, and the price over the lines' worth. lowest: how many of the lines, all where None."""
+    from scipy.optimize import linear_sum_assignment
+
+    gap = (told.log_hz[:lowest, None] - seen.log_hz[None, :]) / width
+    price = told.worth[:lowest, None] * (np.minimum(gap**2 / 18 + 1 - seen.alike[:lowest], 1.0) - 1.0)
+    line, mode = linear_sum_assignment(price)
+    good = price[line, mode] < 0
+    line, mode = line[good], mode[good]
+    return line, mode, 1 + float(price[line, mode].sum() / told.worth.sum())
+
+
+def search(evidence: Evidence) -> tuple[Tensor, Tensor] | None:
+    """(isotropic, best) by BIC; None where there are too few lines. Costs seconds."""
+    told = told_of(evidence)
+    if not told:
+        return None
+    start = _isotropic_p(told[0].elastic)
+    plain = fitted(told, "isotropic", start, start)
+    ends = [fitted(told, "cubic", s, start) for s in _sifted(told, _cubes(start))]
+    ends += [fitted(told, "orthorhombic", s, start) for s in _sifted(told, _bricks(start))]
+    best = min((e for e in ends if e.symmetry == "orthorhombic"), key=lambda e: e.bic)
+    for symmetry in ("cubic", "hexagonal-x", "hexagonal-y", "hexagonal-z"):
+        ends.append(fitted(told, symmetry, best.p, start, WIDTHS[3:]))
+    cube = min((e for e in ends if e.symmetry == "cubic"), key=lambda e: e.bic)
+    ends += [fitted(told, symmetry, cube.p, start, WIDTHS[4:]) for symmetry in ("hexagonal-x", "hexagonal-y", "hexagonal-z", "orthorhombic")]
+    return plain, min(ends, key=lambda e: e.bic)
+
+
+def _isotropic_p(elastic: Elastic) -> Array:
+    m = elastic.material
+    return expanded("isotropic", np.array([np.log(m.youngs_pa / m.density_kg_m3), m.poisson]))
+
+
+def _cubes(start: Array) -> list[Array]:
+    found = []
+    for ratio in ZENER:
+        for more in POISSON:
+            p = np.array(start)
+            p[3:6] = np.clip(p[3:6] + more, 0.05, 0.42)
+            p[6:] = p[:3] - np.log(2 * (1 + p[3:6])) + np.log(ratio)
+            found.append(p)
+    return found
+
+
+def _bricks(start: Array) -> list[Array]:
+    """E along y and z over that along x, and G as goes with them or softer."""
+    found = []
+    for y in RATIOS:
+        for z in RATIOS:
+            for soft in (1.0, 0.6):
+                e = np.log(np.array([1.0, y, z]))
+                p = np.array(start)
+                p[:3] += e - e.mean()
+                p[6:] = 0.5 * np.array([p[1] + p[2], p[0] + p[2], p[0] + p[1]]) - np.log(2 * (1 + start[3:6])) + np.log(soft)
+                found.append(p)
+    return found
+
+
+def _sifted(told: Sequence[Told], starts: list[Array]) -> list[Array]:
+    """The best few, each with all its moduli scaled so that its modes agree best with the lines, as two spectra on a logarithmic axis (see pairing.py)."""
+    shift = np.arange(-REACH, REACH + 1e-9, WIDE / 2)
+    most = max(told, key=lambda t: float(t.worth.sum()))
+    blind = most.amplitude is None
+    first = 1 / (1 + (np.arange(len(most.log_hz)) / FIRST) ** 2) if blind else np.ones(len(most.log_hz))
+    scored = []
+    for p in starts:
+        seen = seen_by(most, p)
+        gap = most.log_hz[:, None] - seen.log_hz[None, :]
+        weight = most.worth[:, None] * first[:, None] * seen.alike**2
+        own = np.exp(-0.5 * ((seen.log_hz[:, None] - seen.log_hz[None, :]) / WIDE) ** 2)
+        score = np.zeros(len(shift))
+        for i, s in enumerate(shift):
+            place = seen.log_hz + s / 2
+            worth = np.interp(place, most.log_hz, first, 0.0, 0.0)
+            near = np.exp(-0.5 * ((gap - s / 2) / WIDE) ** 2)
+            score[i] = (weight * near * worth).sum() / np.sqrt(max(float(worth @ own @ worth), 1.0))
+        for best in _peaks(score)[: PEAKS if blind else 1]:
+            moved = np.array(p)
+            moved[:3] += shift[best]
+            moved[6:] += shift[best]
+            scored.append((float(score[best]), moved))
+    scored.sort(key=lambda s: -s[0])
+    return [p for _, p in scored[: BLIND_STARTS if blind else STARTS]]
+
+
+def _peaks(score: Array) -> list[int]:
+    """Where a curve has its peaks, the highest first."""
+    inner = np.flatnonzero((score[1:-1] >= score[:-2]) & (score[1:-1] > score[2:])) + 1
+    return [int(i) for i in inner[np.argsort(-score[inner])]] or [int(np.argmax(score))]
+
+
+def fitted(told: Sequence[Told], symmetry: str, start: Array, guess: Array, widths: Sequence[float] = WIDTHS) -> Tensor:
+    """The best tensor of a symmetry from a start; guess: isotropic, what the prior leans to."""
+    q = reduced(symmetry, start)
+    p = expanded(symmetry, q)
+    for width in widths:
+        pairs = [(t, s, *paired(t, s, width, _few(t, width))[:2]) for t in told for s in (seen_by(t, p),)]
+        step = _step(pairs, symmetry, q, guess, width)
+        for _ in range(6):
+            trial = expanded(symmetry, q + step)
+            if sound(trial) and np.abs(trial[3:6]).max() < LARGEST_N:
+                break
+            step = step / 2
+        else:
+            step = np.zeros(len(q))
+        q = q + step
+        p = expanded(symmetry, q)
+    return _judged(told, symmetry, q, guess)
+
+
+def _few(told: Told, width: float) -> int | None:
+    """How many of the lowest lines to begin with where no pattern tells modes apart: low modes lie farther apart than a start is wrong."""
+    return None if told.amplitude is not None or width <= WIDTHS[-1] else max(FIRST, round(len(told.log_hz) * WIDTHS[-1] / width * 2))
+
+
+def _jacobian(symmetry: str, q: Array, of: Callable[[Array], Array]) -> Array:
+    """∂ of(p(q))/∂q (n, q), by central differences."""
+    h = 1e-5
+    return np.stack([(of(expanded(symmetry, q + h * e)) - of(expanded(symmetry, q - h * e))) / (2 * h) for e in np.eye(len(q))], axis=1)
+
+
+def _prior(guess: Array) -> Callable[[Array], Array]:
+    """Six residuals of p that should lie about zero, in spreads."""
+
+    def of(p: Array) -> Array:
+        e = p[:3]
+        goes = 0.5 * np.array([e[1] + e[2], e[0] + e[2], e[0] + e[1]]) - np.log(2 * (1 + p[3:6]))
+        return np.concatenate([(p[3:6] - guess[3:6]) / PRIOR_N, (p[6:] - goes) / PRIOR_G])
+
+    return of
+
+
+def _step(pairs: list[tuple[Told, Seen, Array, Array]], symmetry: str, q: Array, guess: Array, width: float) -> Array:
+    prior = _prior(guess)
+    own, bent = prior(expanded(symmetry, q)), _jacobian(symmetry, q, prior)
+    turn = _jacobian(symmetry, q, constants)
+    off = np.concatenate([t.log_hz[line] - s.log_hz[mode] for t, s, line, mode in pairs])
+    slope = np.concatenate([0.5 * s.slope[:, mode].T @ turn for t, s, line, mode in pairs])
+    worth = np.concatenate([t.worth[line] / np.hypot(t.sd[line] / (width / 2), 1.0) for t, s, line, mode in pairs])
+    if len(off) < 2:
+        return np.zeros(len(q))
+    step, weight = np.zeros(len(q)), worth
+    for _ in range(4):
+        normal = slope.T @ (slope * weight[:, None]) / (width / 2) ** 2 + bent.T @ bent
+        step = np.linalg.solve(normal + 1e-9 * np.eye(len(q)) * np.trace(normal), slope.T @ (weight * off) / (width / 2) ** 2 - bent.T @ own)
+        weight = worth / (1 + ((off - slope @ step) / width) ** 2)
+    most = np.abs(expanded(symmetry, q + step) - expanded(symmetry, q)) / STEP
+    return np.asarray(step / max(1.0, float(most.max())))
+
+
+def _judged(told: Sequence[Told], symmetry: str, q: Array, guess: Array) -> Tensor:
+    """BIC and what the lines leave to the prior."""
+    p = expanded(symmetry, q)
+    off, good, slopes = [], [], []
+    turn = _jacobian(symmetry, q, constants)
+    for t in told:
+        s = seen_by(t, p)
+        line, mode, _ = paired(t, s, CAP / 3)
+        mine = np.full(len(t.log_hz), CAP)
+        mine[line] = np.clip(np.abs(t.log_hz[line] - s.log_hz[mode]), 0, CAP)
+        off.append(mine)
+        good.append(mine < CAP)
+        slopes.append(0.5 * s.slope[:, mode].T @ turn)
+    left, inside = np.concatenate(off), np.concatenate(good)
+    n = len(left)
+    bic = n * np.log(np.mean(np.maximum(left, FLOOR) ** 2)) + SYMMETRIES[symmetry] * np.log(n)
+    scatter = float(np.sqrt(np.mean(left[inside] ** 2))) if inside.any() else CAP
+    return Tensor(symmetry, p, float(bic), scatter, float(inside.mean()), _held(np.concatenate(slopes), symmetry, q, guess, max(scatter, FLOOR)))
+
+
+def _held(slope: Array, symmetry: str, q: Array, guess: Array, sd: float) -> tuple[str, ...]:
+    """Which of the nine the prior tells more of than the lines do: it halves their spread, or more."""
+    if symmetry == "isotropic":
+        return ()
+    bent = _jacobian(symmetry, q, _prior(guess))
+    lines, both = slope.T @ slope / sd**2, slope.T @ slope / sd**2 + bent.T @ bent
+    own = _jacobian(symmetry, q, lambda p: p)
+    loose = np.sqrt(np.einsum("pq,qr,pr->p", own, np.linalg.pinv(lines + 1e-9 * np.eye(len(q))), own))
+    tight = np.sqrt(np.einsum("pq,qr,pr->p", own, np.linalg.inv(both + 1e-9 * np.eye(len(q))), own))
+    return tuple(name for name, a, b in zip(NAMES, loose, tight, strict=True) if a > 2 * b)

@@ -1,0 +1,104 @@
+"""`orthotropy`: stiffness that depends on direction: crystals, wood, rolled and laid-up sheets. Axes are the mesh's.
+
+    σ = C ε with C cubic (3 constants), hexagonal about x, y or z (5) or orthorhombic (9)      [Nye 1957, ch. VIII; Migliori et al. 1993]
+
+Read off all lines, whatever isotropic modes they were paired with (elasticities.py); None where isotropy does as well. Density is the guess's:
+modes tell C/ρ alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from sonic_bullet.effects.elasticities import CAP, NAMES, PLACE, SYMMETRIES, Tensor, search, told_of
+from sonic_bullet.effects.values import Evidence, Heard, Owner, Stage
+from sonic_bullet.records import Array, Material
+
+BETTER = 10.0  # in BIC, than isotropy
+NEARER = 0.7  # of isotropy's rms of ln f, lines beyond the cap counted at the cap
+SUFFICES = 2.5e-3  # rms of ln f that leaves nothing to look for
+LEAST = 0.03  # of ln E_i/E_j or ln of Zener's ratio: less is the mesh's
+
+
+@dataclass(frozen=True)
+class Orthotropy:
+    """constants_pa (9,): C11 C22 C33 C23 C13 C12 C44 C55 C66. symmetry: one of "cubic", "hexagonal-x" to "-z", "orthorhombic". held: told by no mode."""
+
+    id: ClassVar[str] = "orthotropy"
+    stage: ClassVar[Stage] = Stage.MATERIAL
+    owner: ClassVar[Owner] = Owner.MATERIAL
+    reference: ClassVar[str] = "Nye 1957, ch. VIII; Migliori et al. 1993; Bodig & Jayne 1982, ch. 3"
+
+    constants_pa: tuple[float, ...]
+    symmetry: str = "orthorhombic"
+    held: tuple[str, ...] = ()
+
+    @property
+    def stiffness_pa(self) -> Array:
+        """(6, 6), Voigt."""
+        found = np.zeros((6, 6))
+        for (i, j), c in zip(PLACE, self.constants_pa, strict=True):
+            found[i, j] = found[j, i] = c
+        return found
+
+    def apply(self, x: Material) -> Material:
+        return replace(x, stiffness_pa=self.stiffness_pa)
+
+    def parameters(self) -> dict[str, Any]:
+        compliance = np.linalg.inv(self.stiffness_pa)
+        youngs = 1 / np.diag(compliance)
+        c = dict(zip(("c11", "c22", "c33", "c23", "c13", "c12", "c44", "c55", "c66"), self.constants_pa, strict=True))
+        names = {"cubic": ("c11", "c12", "c44")}.get(self.symmetry, tuple(c))
+        told: dict[str, Any] = {"symmetry": self.symmetry} | {f"{name}_pa": float(c[name]) for name in names}
+        told |= {"youngs_ratio": [1.0, float(youngs[1] / youngs[0]), float(youngs[2] / youngs[0])], "youngs_x_pa": float(youngs[0])}
+        if self.symmetry == "cubic":
+            told["zener_ratio"] = float(2 * c["c44"] / (c["c11"] - c["c12"]))
+        return told | ({"held_near_isotropy": list(self.held)} if self.held else {})
+
+    def freedom(self) -> int:
+        return SYMMETRIES[self.symmetry]
+
+    @classmethod
+    def of(cls, tensor: Tensor, density_kg_m3: float) -> Self:
+        """A fitted tensor's."""
+        stiff = tensor.stiffness_m2_s2 * density_kg_m3
+        return cls(tuple(float(stiff[i, j]) for i, j in PLACE), tensor.symmetry, tensor.held)
+
+    @classmethod
+    def propose(cls, evidence: Evidence) -> Self | None:
+        told = told_of(evidence)
+        if not told or sum(len(t.log_hz) for t in told) < 6 or all(_fits(h) for h in evidence.heard):
+            return None
+        found = search(evidence)
+        if found is None:
+            return None
+        plain, best = found
+        count = sum(len(t.log_hz) for t in told)
+        nearer = np.exp((best.bic - plain.bic + (SYMMETRIES["isotropic"] - SYMMETRIES[best.symmetry]) * np.log(count)) / (2 * count))
+        if best.bic > plain.bic - BETTER or nearer > NEARER or departure(best) < LEAST:
+            return None
+        return cls.of(best, told[0].elastic.material.density_kg_m3)
+
+
+def departure(tensor: Tensor) -> float:
+    """How far from isotropy: the largest of |ln E_i/E_j| and |ln G_ij/(√(E_i E_j)/2(1+n_ij))|."""
+    p = tensor.p
+    goes = 0.5 * np.array([p[1] + p[2], p[0] + p[2], p[0] + p[1]]) - np.log(2 * (1 + p[3:6]))
+    return float(max(np.ptp(p[:3]), np.abs(p[6:] - goes).max()))
+
+
+def _fits(h: Heard) -> bool:
+    """Whether the isotropic body's modes are where the lines are."""
+    if not len(h.freq_hz):
+        return False
+    off = np.clip(np.log(h.freq_hz / h.model_hz), -CAP, CAP)
+    left = np.concatenate([off - np.median(off), np.full(len(h.foreign_hz), CAP)])
+    size = np.concatenate([np.linalg.norm(np.nan_to_num(a), axis=0) for a in (h.amplitude, h.foreign_amplitude)])
+    worth = np.clip(0.5 + 0.06 * np.log10(np.maximum(size / max(size.max(initial=0), 1e-300), 1e-12)), 0.05, 1) if size.any() else np.ones(len(left))
+    return bool(np.sqrt((worth * left**2).sum() / worth.sum()) < SUFFICES)
+
+
+__all__ = ["NAMES", "Orthotropy", "departure"]

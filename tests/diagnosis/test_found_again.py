@@ -1,0 +1,103 @@
+"""Every effect, played into recordings with noise, is proposed again with its own parameters; a body that lacks nothing is left in peace.
+
+The recordings are the same forward code's (the independent ones are in benchmarks/suite); what is tested here is the way back.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from made_body import ALPHA, BETA, GAIN, plate, recorded
+
+from sonic_bullet.diagnosis.bodies import Struck
+from sonic_bullet.diagnosis.diagnose import _takes
+from sonic_bullet.diagnosis.evidence import evidence_of
+from sonic_bullet.diagnosis.loop import Closed, closed
+from sonic_bullet.diagnosis.play import Hypothesis
+from sonic_bullet.effects import EFFECTS, Effect
+from sonic_bullet.effects.added_mass import AddedMass
+from sonic_bullet.effects.amplitude_damping import AmplitudeDamping
+from sonic_bullet.effects.amplitude_pitch import AmplitudePitch
+from sonic_bullet.effects.contact_time import ContactTime
+from sonic_bullet.effects.damping_law import DampingLaw
+from sonic_bullet.effects.foreign_mode import ForeignMode
+from sonic_bullet.effects.measurement_chain import MeasurementChain
+from sonic_bullet.effects.rebound import Rebound
+from sonic_bullet.effects.room import Room
+from sonic_bullet.effects.support_damping import SupportDamping
+
+BAND = (50.0, 7_500.0)
+
+
+def fitted(body: Struck) -> Hypothesis:
+    """The baseline as lines give it: Rayleigh's law by least squares on the decays."""
+    assert body.gathered is not None
+    lines = body.gathered.lines
+    w2 = (2 * np.pi * lines.freq_hz) ** 2
+    a = np.stack([0.5 * np.ones(len(w2)), 0.5 * w2], axis=1)
+    weight = 1 / lines.decay_per_s
+    alpha, beta = np.linalg.lstsq(a * weight[:, None], lines.decay_per_s * weight, rcond=None)[0]
+    correction = np.zeros(body.model.mode_count)
+    good = body.line >= 0
+    correction[good] = lines.freq_hz[body.line[good]] / body.model.freq_hz[good] - 1
+    return Hypothesis(max(float(alpha), 1e-3), max(float(beta), 1e-12), GAIN, (), {"plate": np.clip(correction, -0.01, 0.01)})
+
+
+def ended(body: Struck) -> Closed:
+    """The loop on a recorded plate."""
+    return closed(fitted(body), (body,), _takes((body,)), EFFECTS, BAND)
+
+
+def test_nothing_is_added_where_nothing_lacks() -> None:
+    end = ended(recorded())
+    assert end.verdict == "none"
+    assert end.added == ()
+    assert end.before_db - end.floor_db < 0.2
+    assert end.before.alpha_per_s == pytest.approx(ALPHA, rel=0.02)
+    assert end.before.beta_s == pytest.approx(BETA, rel=0.02)
+    assert end.before.gain == pytest.approx(GAIN, rel=0.01)
+
+
+PLANTED: tuple[tuple[Effect, dict[str, float]], ...] = (
+    (DampingLaw("constant-loss", 6e-3), {"eta": 0.01}),
+    (SupportDamping(((0.0477, 0.0371, 0.0),), (9.0,)), {}),
+    (ContactTime(2.6e-4, 0.016, -0.2, "hertz"), {}),
+    (ForeignMode((1000.0, 2610.0), (11.0, 25.0), (1.2, 0.9), (0.3, -1.0)), {}),
+    (AddedMass((0.0477, 0.0371, 0.0), 0.02), {"mass_kg": 0.1}),
+    (MeasurementChain(high_pass_hz=1500.0, high_order=2), {}),
+    (Room(1.1, 0.7, 11), {"rt60_s": 0.1}),
+    (Rebound(0.013, 0.016, 0.45), {"gap_s": 0.02}),
+    (AmplitudePitch(0.35, "velocity"), {"bend": 0.15}),
+    (AmplitudeDamping(9.0, "velocity"), {"choke": 0.4}),
+)
+
+
+@pytest.mark.parametrize(("effect", "within"), PLANTED, ids=lambda e: getattr(e, "id", ""))
+def test_a_planted_effect_is_named(effect: Effect, within: dict[str, float]) -> None:
+    end = ended(recorded(effect))
+    assert [c.id for c in end.added][:1] == [effect.id]
+    assert end.verdict == "explained"
+    assert end.after_db - end.floor_db < 0.35 * (end.before_db - end.floor_db)
+    found, planted = end.added[0].effect.parameters(), effect.parameters()
+    for name, share in within.items():
+        assert found[name] == pytest.approx(planted[name], rel=share), name
+    assert end.added[0].mean_db > 2 * max(end.added[0].null_db, 0.0)
+
+
+def test_proposals_depend_on_the_evidence_alone() -> None:
+    """The same evidence, the same words; another object's impulse scale does not matter to a damping law."""
+    body = recorded(DampingLaw("constant-loss", 6e-3))
+    evidence = evidence_of(fitted(body), (body,), BAND)
+    once, again = DampingLaw.propose(evidence), DampingLaw.propose(evidence)
+    assert once == again
+    louder = replace(evidence, heard=tuple(replace(h, amplitude=7 * h.amplitude, signal=7 * h.signal) for h in evidence.heard if h.signal is not None))
+    assert DampingLaw.propose(louder) == once
+
+
+def test_the_plate_is_what_it_says() -> None:
+    model = plate()
+    body = model.shape[:345, 2].astype(float)
+    gram = body.T @ body * 0.4 / (22 * 14)  # grid sum of a product of sines over its interior: half a period a side
+    assert np.allclose(gram, np.eye(model.mode_count), atol=1e-5)
