@@ -43,7 +43,7 @@ def _after(text: str, word: str) -> str:
 
 
 def verdict(rows: tuple[Row, ...]) -> str:
-    named = [f"`{r.effect}` ({r.what})" for r in rows if r.earned and "no effect" not in r.effect]
+    named = [f"`{r.effect}` ({r.what})" for r in rows if r.earned]
     return f"named: {', '.join(named)}" if named else "unexplained"
 
 

@@ -35,7 +35,10 @@ def over_sizes(bodies: dict[str, Lines], skipped: list[str], label: str = "") ->
     bodies = {k: b for k, b in bodies.items() if len(b.freq_hz)}
     if len(bodies) < 3:
         raise ValueError(f"{len(bodies)} sizes with a clear line: two are needed to fit, a third to predict")
-    pitch = {name: float(np.median(b.freq_hz[np.argsort(-b.amplitude)[:2]])) for name, b in bodies.items()}
+    pitch = {}
+    for name, b in bodies.items():  # the lowest line within 20 dB of the strongest
+        energy = b.amplitude**2 / b.decay_per_s
+        pitch[name] = float(b.freq_hz[energy > 0.01 * energy.max()].min())
     order = sorted(bodies, key=pitch.__getitem__)
     made: list[tuple[Trial, list[Lines], list[Lines]]] = []
     for i, name in enumerate(order):

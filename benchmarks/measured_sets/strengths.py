@@ -114,7 +114,8 @@ def _power(what: str, unit: str, scale: float, y: Array, told: Array, soft: Arra
         return float(np.median(np.abs(scale * (told - slope * (top**power - level[0] ** power)))))
 
     before, after = float(np.median(np.abs(scale * told))), error(soft, loud)
-    nulls = np.array([error(*(lambda v: (v[:-1], float(v[-1])))(rng.uniform(0, 1, len(soft) + 1))) for _ in range(DRAWS)])
+    drawn = rng.uniform(0, 1, (DRAWS, len(soft) + 1))
+    nulls = np.array([error(v[:-1], float(v[-1])) for v in drawn])
     return Row(what, len(told), unit, before, after, float(np.median(nulls)), float((nulls <= after).mean()), effect)
 
 

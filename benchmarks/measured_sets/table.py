@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from benchmarks.measured_sets import bar, plain, sizes, strengths
+from benchmarks.measured_sets import bar, bell, fixtures, hammer, plain, repeats, sizes, strengths, tables
 from benchmarks.measured_sets.values import Judge
 
 PLAIN: Judge = plain.judge
@@ -12,4 +12,10 @@ JUDGES: dict[str, Judge] = {
     "xylophone-vcsl": sizes.judge,
     "agogo-forzee": strengths.judge,
     "ride-bja": strengths.judge,
+    "diffimpact-hammer": hammer.judge,
+    "diffimpact-robot": fixtures.judge,
+    "wood-iet-timbr": repeats.judge,
+    "bell-sonicpi": bell.judge,
+    "tdw-material-modes": tables.materials,
+    "tables-derived": tables.derived,
 }

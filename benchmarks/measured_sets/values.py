@@ -36,7 +36,7 @@ class Row:
 
     @property
     def earned(self) -> bool:
-        return bool(self.effect and self.after < EARNS * self.before and self.chance <= CHANCE)
+        return bool(self.effect and "no effect" not in self.effect and self.after < EARNS * self.before and self.chance <= CHANCE)
 
 
 @dataclass(frozen=True)
