@@ -88,10 +88,10 @@ def _placed(found: CaseFit, name: str, family: Family, density: float, o: Object
     value, vector = value[keep], vector[:, keep]
     correction, line = np.zeros(len(keep)), np.full(len(keep), -1)
     if o is not None:
-        for ratio, l, who in zip(o.correction, o.line, o.member, strict=True):
+        for ratio, at, who in zip(o.correction, o.line, o.member, strict=True):
             inside = who[who < len(keep)]
-            line[inside] = l
-            if l >= 0:  # modes that one line stands for are one frequency, whatever the mesh made of them
+            line[inside] = at
+            if at >= 0:  # modes that one line stands for are one frequency, whatever the mesh made of them
                 member = np.sqrt(value[inside])
                 correction[inside] = (1 + ratio) * np.exp(np.log(member).mean()) / member - 1
     model, way = modal_model(case, name, mine, family, density, value, vector)

@@ -90,4 +90,9 @@ def elastic_of(
         low = np.sqrt(value) / (2 * np.pi) < 1.02 * case.band_hz[1]
         return modal_model(case, name, recordings, family().body, material.density_kg_m3, value[low], vector[:, low])[0]
 
-    return Elastic(material, case.onset_s is not None and case.sensor in ("velocity", "sum"), look, lambda stiffness: solved(np.ascontiguousarray(stiffness, float).tobytes()))
+    return Elastic(
+        material,
+        case.onset_s is not None and case.sensor in ("velocity", "sum"),
+        look,
+        lambda stiffness: solved(np.ascontiguousarray(stiffness, float).tobytes()),
+    )

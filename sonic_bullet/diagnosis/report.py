@@ -91,7 +91,9 @@ def _players(d: Diagnosis) -> str:
         sounds = (("recorded", take.sample), ("before", before), ("after", after))
         row = "".join(f"<p>{label} <audio controls src='{_wav(x / peak * PEAK, take.sr)}'></audio></p>" for label, x in sounds)
         file = take.body.recordings[take.strike].file
-        parts.append(f"<h3>{html.escape(file.name if file else 'strike')}</h3>{row}{_figure(_spectrograms(sounds, take.sr), 'recorded, before, after; dB below the loudest')}")
+        parts.append(
+            f"<h3>{html.escape(file.name if file else 'strike')}</h3>{row}{_figure(_spectrograms(sounds, take.sr), 'recorded, before, after; dB below the loudest')}"
+        )
     return "<h2>Hear and see</h2>" + "".join(parts) if parts else ""
 
 

@@ -125,7 +125,10 @@ def _refined(small: ModalModel, heard: Heard, start: tuple[float, int, float], l
         near = body[((x.vertex_m[body] - x.vertex_m[vertex]) ** 2).sum(axis=1) < reach**2]
         near = near[:: max(1, len(near) // 24)]
         trials = [(_score(small, heard, x.shape[v].astype(float), mass, line, size)[0], int(v), mass) for v in near]
-        trials += [(_score(small, heard, x.shape[vertex].astype(float), mass * f, line, size)[0], int(vertex), mass * f) for f in (0.8, 0.9, 0.95, 0.98, 1.02, 1.05, 1.1, 1.25)]
+        trials += [
+            (_score(small, heard, x.shape[vertex].astype(float), mass * f, line, size)[0], int(vertex), mass * f)
+            for f in (0.8, 0.9, 0.95, 0.98, 1.02, 1.05, 1.1, 1.25)
+        ]
         best = min(trials)
         reach *= 0.6
         if best[0] < score:

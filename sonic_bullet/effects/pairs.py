@@ -31,10 +31,12 @@ def patterns(h: Heard, model: ModalModel) -> Array:
     """|J φ(p)·e φ(q)·n| (s, m) of the strikes."""
     level = np.where(np.isfinite(h.impulse_n_s), h.impulse_n_s, 1.0)
     push = np.einsum("sxm,sx->sm", model.shape[h.strike_vertex].astype(float), h.strike_way) * level[:, None]
-    return np.abs(push * np.einsum("xm,x->m", model.shape[h.sensor_vertex].astype(float), h.sensor_way))
+    return np.asarray(np.abs(push * np.einsum("xm,x->m", model.shape[h.sensor_vertex].astype(float), h.sensor_way)))
 
 
-def agreed(line_hz: Array, size: Array, mode_hz: Array, pattern: Array, *, shift: float = 0.0, turns: int = 2, width: float = WIDTH) -> tuple[float, Array, Array, float]:
+def agreed(
+    line_hz: Array, size: Array, mode_hz: Array, pattern: Array, *, shift: float = 0.0, turns: int = 2, width: float = WIDTH
+) -> tuple[float, Array, Array, float]:
     """(score, line (p,), mode (p,), shift): the least price, 0 where nothing pairs and −Σ worth where all do."""
     from scipy.optimize import linear_sum_assignment
 

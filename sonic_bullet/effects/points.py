@@ -51,7 +51,7 @@ def vertex_normals(model: ModalModel) -> Array:
     normal = np.zeros_like(v)
     for i in range(3):
         np.add.at(normal, f[:, i], cross)
-    return normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+    return np.asarray(normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300))
 
 
 def best_spot(y: Array, sd: Array, nuisance: Array, vertex: Array, square: Array, *, not_negative: bool = True) -> Spot | None:

@@ -83,7 +83,7 @@ class Rebound:
         ratio = [hits[1][0] / hits[0][0] - 1 for _, hits in found if len(hits) > 1 and hits[1][0] > hits[0][0]]
         e = float(np.clip(np.median(share), 0.03, 0.97))
         shrink = float(np.clip(np.median(ratio), 0.03, 1.0)) if len(ratio) >= 2 else None
-        count = 1 + int(round(float(np.median([len(hits) for _, hits in found]))))
+        count = 1 + round(float(np.median([len(hits) for _, hits in found])))
         return cls(first, reference, e, exponent, shrink, count if count <= 2 else MOST_HITS)
 
 

@@ -230,7 +230,7 @@ def identified(signal: Array, sound: Array, noise: Array, sr: int, delta: float,
         return np.asarray(rfft(root * g, size))
 
     def back(spectrum: Array) -> Array:
-        return np.asarray(irfft(spectrum, size)[:n] * size) * root
+        return np.asarray(irfft(spectrum, size)[:n] * size * root)
 
     right = back(trust * (np.conj(x) * y).sum(axis=0)) / 1.0
     g, r = np.zeros(n), right.copy()

@@ -1,6 +1,6 @@
 """Effects in presets, and in the run time: what belongs to a material or an object sounds in every scene.
 
-    {"id": …, fields} <-> Effect;   Material.effects -> MATERIAL before the modes are solved, MODES after, BANK as they ring
+{"id": …, fields} <-> Effect;   Material.effects -> MATERIAL before the modes are solved, MODES after, BANK as they ring
 """
 
 from __future__ import annotations

@@ -19,6 +19,7 @@ LEVELS = (512, 1024, 2048, 4096, 8192, 16_384)
 SIDE = 4  # bins each side of a peak
 ERROR = 0.05
 FLOOR_DB = 80.0
+TRIES = 4  # peaks tried for every mode asked for
 
 
 def greedy(signal: Array, sr: int, most: int, *, evaluations: int = 250) -> Array:
@@ -30,7 +31,7 @@ def greedy(signal: Array, sr: int, most: int, *, evaluations: int = 250) -> Arra
     tried: list[tuple[float, float]] = []
     time = np.arange(len(signal)) / sr
     for _, size, freq_hz in _peaks(signal, sr):
-        if len(kept) >= most:
+        if len(kept) >= most or len(tried) >= TRIES * most:
             break
         width = sr / size
         if any(abs(freq_hz - f) < max(width, d / np.pi) for f, d, _ in kept) or (freq_hz, width) in tried:

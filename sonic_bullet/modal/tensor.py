@@ -1,0 +1,266 @@
+"""All orthotropic materials of one body at once, axes along the mesh's: its modes at several anchors span those between.
+
+    K(C) = Σ_k C_k K_k over the nine constants of `PLACE`;  V: modes at the anchors together, VᵀMV = 1
+    (Σ_k (C_k/ρ) VᵀK_kV) q = λL² q,   ∂ ln λ/∂C_k = qᵀK_kq / qᵀKq,  qᵀq = 1                  [Rayleigh-Ritz; Hellmann-Feynman]
+
+C_k/ρ in m²/s². A box whose sides lie along the axes takes polynomials (polynomials.py) and keeps its three mirrors: eight small problems.
+The reduced modes lie above the true ones, the most by less than 1e-3 in f for ratios of 3:1 (tests/modal/test_tensor.py).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from sonic_bullet.errors import MeshError
+from sonic_bullet.modal import cache as store
+from sonic_bullet.modal.model import MOST_MODES, SHIFT, _diagonal_m
+from sonic_bullet.modal.reduced import Family
+from sonic_bullet.records import Array, Shape
+
+PLACE = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1), (3, 3), (4, 4), (5, 5))
+"""Of the constants C11 C22 C33 C23 C13 C12 C44 C55 C66 in the Voigt tensor."""
+ANCHORS: tuple[tuple[tuple[float, float, float], tuple[float, float, float]], ...] = (
+    ((1, 1, 1), (1, 1, 1)),
+    ((1, 0.1, 0.1), (1, 1, 1)),
+    ((0.1, 1, 0.1), (1, 1, 1)),
+    ((0.1, 0.1, 1), (1, 1, 1)),
+    ((1, 0.3, 0.3), (1, 1, 1)),
+    ((0.3, 1, 0.3), (1, 1, 1)),
+    ((0.3, 0.3, 1), (1, 1, 1)),
+    ((1, 1, 0.3), (1, 1, 1)),
+    ((1, 0.3, 1), (1, 1, 1)),
+    ((0.3, 1, 1), (1, 1, 1)),
+    ((1, 1, 1), (0.3, 0.3, 0.3)),
+    ((1, 1, 1), (0.3, 1, 1)),
+    ((1, 1, 1), (1, 0.3, 1)),
+    ((1, 1, 1), (1, 1, 0.3)),
+)
+"""E along x, y, z over the largest; G_yz, G_xz, G_xy over those that go with it, √(E_i E_j)/2(1+ν)."""
+SPARE = 1.3  # modes at each anchor over those wanted: one that lies above them at an anchor may be among them between
+SPANNED = 1e-4  # weight (λ of the Gram matrix of unit modes) below which a direction adds nothing
+SHORTER = 1.0  # waves than an isotropic body's of as many modes
+KEPT = ("part", "ends", "skin", "vertex", "face", "numbers")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TensorFamily:
+    """A body's modes for every orthotropic tensor. body: its surface and basis, as of `reduced.Family`, the isotropic family in this basis.
+
+    part (9, b, b): reduced stiffness of each constant of `PLACE`. ends (p + 1,): the basis falls into p pieces that no such tensor couples.
+    """
+
+    body: Family
+    part: Array
+    ends: Array
+
+    def modes(self, stiffness_m2_s2: Array) -> tuple[Array, Array]:
+        """λ (m,) in 1/s² ascending, and the modes (b, m) in the basis, of C/ρ (6, 6), of which only the constants of `PLACE` count."""
+        constant = constants_of(stiffness_m2_s2)
+        values, vectors = [], []
+        for a, b in pairwise(self.ends):
+            value, vector = np.linalg.eigh(np.tensordot(constant, self.part[:, a:b, a:b], 1))
+            whole = np.zeros((int(self.ends[-1]), min(b - a, self.body.count)))
+            whole[a:b] = vector[:, : self.body.count]
+            values.append(value[: self.body.count])
+            vectors.append(whole)
+        value = np.concatenate(values)
+        order = np.argsort(value, kind="stable")[: self.body.count]
+        return value[order] / self.body.length_m**2, np.concatenate(vectors, axis=1)[:, order]
+
+    def slopes(self, vector: Array, value: Array) -> Array:
+        """∂ ln λ/∂(C_k/ρ) (9, m) in s²/m² of modes (b, m) with λ (m,), as `modes` gives them."""
+        found = np.zeros((len(PLACE), vector.shape[1]))
+        for a, b in pairwise(self.ends):
+            mine = np.flatnonzero(vector[a:b].any(axis=0))
+            q = vector[a:b, mine]
+            found[:, mine] = np.einsum("bm,kbm->km", q, self.part[:, a:b, a:b] @ q)
+        return np.asarray(found / (value * self.body.length_m**2))
+
+
+def constants_of(stiffness: Array) -> Array:
+    """The nine constants (9,) of a tensor (6, 6)."""
+    return np.array([stiffness[i, j] for i, j in PLACE])
+
+
+def unit_tensors() -> Array:
+    """The tensor (9, 6, 6) that each constant multiplies."""
+    found = np.zeros((len(PLACE), 6, 6))
+    for k, (i, j) in enumerate(PLACE):
+        found[k, i, j] = found[k, j, i] = 1
+    return found
+
+
+def anchored(youngs: tuple[float, float, float], shear: tuple[float, float, float], poisson: float) -> Array:
+    """The tensor (6, 6) of an anchor; ν_ij √(E_j/E_i) = ν for all pairs. Source: compliance of orthotropic bodies [Bodig & Jayne 1982, eq. 3.8]."""
+    root = np.sqrt(np.array(youngs, float))
+    compliance = np.zeros((6, 6))
+    compliance[:3, :3] = ((1 + poisson) * np.eye(3) - poisson) / np.outer(root, root)
+    normal = np.array([root[1] * root[2], root[0] * root[2], root[0] * root[1]]) / (2 * (1 + poisson))
+    compliance[range(3, 6), range(3, 6)] = 1 / (normal * shear)
+    return np.asarray(np.linalg.inv(compliance))
+
+
+def tensor_family(
+    shape: Shape,
+    *,
+    poisson: float,
+    count: int,
+    fixed: tuple[tuple[float, float, float, float], ...] = (),
+    edge_m: float | None = None,
+    cache: store.Place = "default",
+    progress: Callable[[str], None] | None = None,
+) -> TensorFamily:
+    """The orthotropic family of one body: its lowest ``count`` modes. poisson: about that of the anchors. fixed, edge_m, cache, progress: as in `analyse`.
+
+    Raises MeshError, ModalError.
+    """
+    say = progress or (lambda _: None)
+    length = _diagonal_m((shape,))
+    count = min(count, MOST_MODES)
+    clamp = np.array(fixed, float).reshape(-1, 4)
+    name = store.key("tensor", shape.kind, shape.size_m, shape.vertex_m, shape.face, edge_m, clamp, poisson, count, repr(ANCHORS))
+    found = store.load(cache, name)
+    if found is not None and set(found[0]) == set(KEPT):
+        a, note = found
+        volume, meshed = a["numbers"]
+        return _joined(a["part"], a["ends"], a["skin"], a["vertex"], a["face"], (length, float(volume), count, bool(meshed)), note)
+    made = _of_box(shape, length, count, poisson, say) if edge_m is None and not len(clamp) else None
+    if made is None:
+        made = _of_elements(shape, length, count, poisson, clamp, edge_m, say)
+    body = made.body
+    numbers = np.array([body.volume_m3, body.meshed])
+    store.save(
+        cache, name, {"part": made.part, "ends": made.ends, "skin": body.skin, "vertex": body.vertex_m, "face": body.face, "numbers": numbers}, body.note
+    )
+    return made
+
+
+def _joined(part: Array, ends: Array, skin: Array, vertex_m: Array, face: Array, numbers: tuple[float, float, int, bool], note: str) -> TensorFamily:
+    length, volume, count, meshed = numbers
+    lame = part[0] + part[1] + part[2] + part[3] + part[4] + part[5]
+    shear = 2 * (part[0] + part[1] + part[2]) + part[6] + part[7] + part[8]
+    return TensorFamily(Family(lame, shear, skin, vertex_m, face, length, volume, count, note, meshed), part, ends)
+
+
+def _spanning(vector: Array, gram: Array) -> Array:
+    """Combinations (k, b) of k unit vectors with Gram matrix (k, k) that are orthonormal and span all that weighs."""
+    value, turn = np.linalg.eigh((gram + gram.T) / 2)
+    good = value > SPANNED
+    return np.asarray(vector @ (turn[:, good] / np.sqrt(value[good])))
+
+
+def _of_box(shape: Shape, length: float, count: int, poisson: float, say: Callable[[str], None]) -> TensorFamily | None:
+    """Of a free box along the axes, without elements; None where the shape is no such box, or one of too many unknowns."""
+    from sonic_bullet.modal import polynomials, structured
+    from sonic_bullet.modal.solid import surface
+
+    box = polynomials.recognised(shape)
+    if box is None or not np.allclose(np.abs(box.axes).max(axis=0), 1, atol=1e-6):
+        return None
+    turned = np.abs(box.axes).argmax(axis=0)
+    voigt = np.concatenate([turned, 3 + turned])  # of the box's own, in the mesh's order
+    size = box.size_m / length
+    tensors = unit_tensors()[:, voigt][:, :, voigt]
+    bulk = (3 * np.pi**2 * count / np.prod(size)) ** (1 / 3)  # shear waves in a volume [Weyl 1912]; bending ones are fewer where it is thick
+    wave = SHORTER * min(polynomials.wave_number_of(count, size), float(bulk))
+    x, y, z = np.ceil(wave * size / 2 + 3 + 2 * np.minimum(1, wave * size / 8)).astype(int)
+    terms = (int(x), int(y), int(z))
+    if polynomials.unknowns(terms) > polynomials.MOST_UNKNOWNS:
+        return None
+    say(f"solving {8 * polynomials.unknowns(terms)} unknowns of a box for {len(ANCHORS)} tensors")
+    shell = structured.box(box.size_m, polynomials.skin_cells(size, wave))
+    skin = surface(shell)
+    point = shell.node_m[skin.node] / length
+    parities = list(polynomials.parities(size, terms))
+    stiff = [np.array([parity.stiffness(tensor) for tensor in tensors]) for parity in parities]
+    found: list[list[Array]] = [[] for _ in parities]
+    for anchor in ANCHORS:
+        constant = constants_of(anchored(*anchor, poisson))
+        solved = [_lowest(np.tensordot(constant, k, 1), int(SPARE * count) // 3 + 6) for k in stiff]
+        limit = np.sort(np.concatenate([value for value, _ in solved]))[: int(SPARE * count)][-1]
+        for mine, (value, vector) in zip(found, solved, strict=True):
+            mine.append(vector[:, value <= limit])
+    parts, moved, ends = [], [], [0]
+    for parity, k, mine in zip(parities, stiff, found, strict=True):
+        every = np.concatenate(mine, axis=1)
+        if not every.shape[1]:
+            continue
+        basis = _spanning(every, every.T @ every)
+        parts.append(basis.T @ k @ basis)
+        moved.append((polynomials.shapes_at(point, size, parity, basis).transpose(0, 2, 1) @ box.axes.T).astype(np.float32))
+        ends.append(ends[-1] + basis.shape[1])
+    part = np.zeros((len(tensors), ends[-1], ends[-1]))
+    for piece, a in zip(parts, ends[:-1], strict=True):
+        part[:, a : a + piece.shape[1], a : a + piece.shape[1]] = (piece + piece.transpose(0, 2, 1)) / 2
+    note = f"box of {' x '.join(str(n) for n in terms)} polynomials; {len(ANCHORS)} tensors about nu {poisson:g}"
+    basis_skin = np.ascontiguousarray(np.concatenate(moved, axis=1).transpose(0, 2, 1))
+    vertex_m = shell.node_m[skin.node] @ box.axes.T + box.centre_m
+    return _joined(part, np.array(ends), basis_skin, vertex_m, skin.face, (length, float(np.prod(box.size_m)), count, False), note)
+
+
+def _lowest(stiffness: Array, count: int) -> tuple[Array, Array]:
+    """The lowest elastic λ (m,) and vectors (n, m), M = 1, of the first ``count`` modes of a dense K (n, n)."""
+    from scipy.linalg import cho_factor, cho_solve
+    from scipy.sparse.linalg import LinearOperator, eigsh
+
+    n = len(stiffness)
+    if count > n // 4:
+        value, vector = np.linalg.eigh(stiffness)
+        value, vector = value[:count], vector[:, :count]
+    else:
+        shift = -1e-5 * float(np.trace(stiffness)) / n
+        factor = cho_factor(stiffness - shift * np.eye(n), check_finite=False)
+        inverse = LinearOperator((n, n), matvec=lambda x: cho_solve(factor, x, check_finite=False), dtype=float)
+        value, vector = eigsh(stiffness, count, sigma=shift, OPinv=inverse, v0=np.random.default_rng(0).standard_normal(n), tol=1e-9)
+        order = np.argsort(value)
+        value, vector = value[order], vector[:, order]
+    elastic = value > 1e-9 * float(np.abs(stiffness).max())
+    return value[elastic], vector[:, elastic]
+
+
+def _of_elements(shape: Shape, length: float, count: int, poisson: float, clamp: Array, edge_m: float | None, say: Callable[[str], None]) -> TensorFamily:
+    from sonic_bullet.modal import eigen, fem
+    from sonic_bullet.modal.shapes import fill
+    from sonic_bullet.modal.solid import Solid
+
+    body = fill((shape,), edge_m, None, say)
+    unit = Solid(body.solid.node_m / length, body.solid.tet, body.solid.affine)
+    corner = unit.node_m[body.skin.node][body.skin.face]
+    area = float(np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1).sum() / 2)
+    volume = fem.volume_m3(unit)
+    held = fem.clamped(body.solid, clamp)
+    free = np.flatnonzero(np.repeat(~held, 3))
+    if not len(free):
+        raise MeshError("body has no unknowns", "clamp less of it")
+    rigid = 6 - (int(np.linalg.matrix_rank(fem.rigid_modes(unit.node_m)[np.repeat(held, 3)], tol=1e-9)) if held.any() else 0)
+    say(f"assembling {len(free)} unknowns for {len(PLACE)} constants")
+    stiff: list[Any] = []
+    mass: Any = None
+    for tensor in unit_tensors():
+        matrix, mass = fem.assemble(unit, tensor, 1.0)
+        stiff.append(matrix[free][:, free] if held.any() else matrix)
+    mass = mass[free][:, free] if held.any() else mass
+    most = min(MOST_MODES, max(1, len(free) // 3 - rigid))
+    shift = -SHIFT * (2 * volume / area) ** 2 / 10
+    vectors = []
+    wanted = min(int(SPARE * count), most)
+    for number, anchor in enumerate(ANCHORS):
+        say(f"tensor {number + 1} of {len(ANCHORS)}")
+        whole = sum(c * matrix for c, matrix in zip(constants_of(anchored(*anchor, poisson)), stiff, strict=True))
+        modes = eigen.solve(whole, mass, shift, rigid=rigid, enough=lambda value: len(value) >= wanted, most=wanted)
+        vectors.append(modes.vector)
+    every = np.concatenate(vectors, axis=1)
+    basis = _spanning(every, every.T @ (mass @ every))
+    part = np.array([basis.T @ (matrix @ basis) for matrix in stiff])
+    vector = np.zeros((3 * len(held), basis.shape[1]), np.float32)
+    vector[free] = basis
+    skin = np.ascontiguousarray(vector.reshape(len(held), 3, -1)[body.skin.node])
+    note = f"{body.solid.note}; {len(free)} unknowns; {len(ANCHORS)} tensors about nu {poisson:g}"
+    numbers = (length, volume * length**3, min(count, wanted), True)
+    ends = np.array([0, basis.shape[1]])
+    return _joined((part + part.transpose(0, 2, 1)) / 2, ends, skin, body.solid.node_m[body.skin.node], body.skin.face, numbers, note)

@@ -1,0 +1,152 @@
+"""A residual in a preset file: small, exact to a quarter of a decibel, refused in one line where it cannot be; and the command that makes it."""
+
+from __future__ import annotations
+
+import base64
+import json
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+from made_residuals import SR, modes, residual
+
+from sonic_bullet import presets
+from sonic_bullet.errors import AudioError, MaterialError, RecordError
+from sonic_bullet.estimator.residual import recording_strikes, strikes_of
+from sonic_bullet.files import write_audio
+from sonic_bullet.records import Residual
+from sonic_bullet.residual.code import form_of, residual_of
+from sonic_bullet.residual.compute import damped
+
+SOURCE = modes((400.0, 900.0, 1500.0, 2600.0), (8.0, 12.0, 20.0, 30.0), (1.0, 0.7, 0.5, 0.3))
+MADE = residual(SOURCE, lines=((1200.0, 8.0, 0.3),))
+
+
+def saved(folder: Path, **changes: object) -> str:
+    """Path of a wooden preset with the residual, its fields changed."""
+    preset = msgspec.structs.replace(presets.named_preset("wood"), residual=form_of(MADE))
+    content = json.loads(msgspec.json.encode(preset))
+    content["residual"] |= changes
+    path = folder / "mine.json"
+    path.write_text(json.dumps(content))
+    return str(path)
+
+
+def test_a_residual_comes_back_from_its_preset(tmp_path: Path) -> None:
+    material = presets.load_material(saved(tmp_path))
+    got = material.residual
+    assert got is not None
+    assert 10 * np.abs(np.log10(got.power_per_hz / MADE.power_per_hz)).max() <= 0.2501
+    for name in ("mode_freq_hz", "mode_decay_per_s", "mode_amplitude", "line_freq_hz", "line_amplitude", "freq_hz", "time_s"):
+        assert getattr(got, name) == pytest.approx(getattr(MADE, name), rel=1e-8)
+    assert presets.load_material("wood").residual is None
+    assert residual_of(form_of(got)).power_per_hz == pytest.approx(got.power_per_hz, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"levels": "###"}, "base64"),
+        ({"levels": ""}, "levels for"),
+        ({"levels": base64.b64encode(b"abc").decode()}, "3 levels for"),
+        ({"mode_freq_hz": [], "mode_decay_per_s": [], "mode_amplitude": []}, "without modes"),
+        ({"mode_amplitude": [0.0, 0.0, 0.0, 0.0]}, "without modes"),
+        ({"mode_freq_hz": [900.0, 400.0, 1500.0, 2600.0]}, "does not ascend"),
+        ({"mode_decay_per_s": [1.0, 2.0]}, "shape"),
+        ({"line_amplitude": [-1.0]}, "below zero"),
+        ({"freq_hz": [], "time_s": [], "levels": ""}, "empty"),
+        ({"loudest_per_hz": 1e9}, "louder than the recordings"),
+        ({"loudest_per_hz": -1.0}, "loudest_per_hz"),
+        ({"clip_energy": 1e-12}, "louder than the recordings"),
+        ({"colour": 1}, "colour"),
+        ({"time_s": "long"}, "time_s"),
+    ],
+)
+def test_a_wrong_residual_is_one_line_that_names_the_file(tmp_path: Path, changes: dict[str, object], words: str) -> None:
+    with pytest.raises(MaterialError, match=words) as caught:
+        presets.load_material(saved(tmp_path, **changes))
+    assert "mine.json" in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_records_of_a_residual_prove_themselves() -> None:
+    with pytest.raises(RecordError, match="NaN"):
+        Residual(*(getattr(MADE, name) for name in Residual.__slots__[:8]), MADE.power_per_hz * np.nan, 1.0)
+    with pytest.raises(ValueError, match="read-only"):
+        MADE.power_per_hz[0, 0] = 1.0
+
+
+def clip(seconds: float = 1.0) -> np.ndarray:
+    return damped(SOURCE.freq_hz, SOURCE.decay_per_s, 0.2 * SOURCE.amplitude, round(seconds * SR), SR)
+
+
+def test_a_purely_modal_clip_of_the_model_leaves_nothing() -> None:
+    """Residual energy at most -40 dB of the clip's, with noise 70 dB below the peak or without any; features found, not given."""
+    for noise in (0.0, 1e-4):
+        sound = clip() + noise * np.random.default_rng(3).normal(size=SR)
+        from sonic_bullet.estimator.lines import joint_lines
+        from sonic_bullet.estimator.predict import lines_sound
+
+        signals = np.stack([sound, 0.6 * sound])
+        lines = joint_lines(signals + 1e-7 * np.random.default_rng(4).normal(size=signals.shape), SR)
+        left = signals - np.stack([lines_sound(lines, i, SR, SR) for i in range(2)])
+        played = np.array([1.0, 0.6])[:, None] * 0.2 * SOURCE.amplitude
+        found = strikes_of(signals, left, SR, (lines.freq_hz, lines.decay_per_s, lines.amplitude), (SOURCE.freq_hz, SOURCE.decay_per_s, played), "made")
+        assert found.residual.share_of_clip <= 1e-4
+        assert len(lines.freq_hz) >= 4
+
+
+def test_what_modes_lack_is_left_and_what_they_have_is_not() -> None:
+    """A foreign line stays, at its level; a mode of half the level leaves √¾ of the feature; one of twice the level leaves nothing; a burst of noise is cells."""
+    random = np.random.default_rng(1)
+    n = SR
+    features = np.array([400.0, 900.0, 1500.0, 2000.0]), np.array([8.0, 12.0, 20.0, 15.0]), np.array([[1.0, 0.7, 0.5, 0.25]])
+    burst = 0.2 * random.normal(size=n) * np.exp(-100 * np.arange(n) / SR)
+    sound = damped(features[0], features[1], features[2][0], n, SR) + burst + 1e-4 * random.normal(size=n)
+    model = features[0][:3], features[1][:3], np.array([[0.5, 1.4, 0.5]])
+    found = strikes_of(sound[None], burst[None], SR, features, model, "made").residual
+    unit = model[2].max()
+    assert found.line_freq_hz == pytest.approx([400.0, 2000.0])
+    assert unit * found.line_amplitude == pytest.approx([np.sqrt(0.75), 0.25], rel=0.02)
+    noise = 2 * np.trapezoid(np.trapezoid(found.power_per_hz, found.time_s, axis=1), found.freq_hz) * unit**2
+    assert noise == pytest.approx(float((burst**2).sum() / SR), rel=0.5)
+
+
+def test_a_recording_without_shape_has_its_features_for_modes(tmp_path: Path) -> None:
+    sound = clip() + 0.05 * np.random.default_rng(2).normal(size=SR) * np.exp(-80 * np.arange(SR) / SR) + 1e-4 * np.random.default_rng(5).normal(size=SR)
+    strikes = recording_strikes(np.concatenate([np.zeros(2400), sound]), SR, 0.05, "tap.wav")
+    assert len(strikes.mode_hz) >= 4
+    assert (strikes.residual.power_per_hz > 0).sum() > 20
+    assert strikes.residual.share_of_clip < 0.1
+    with pytest.raises(AudioError, match="silent"):
+        recording_strikes(np.zeros(SR), SR, None, "silence.wav")
+    write_audio(str(tmp_path / "tap.wav"), sound[None], SR)
+
+
+def test_the_command_writes_a_preset_that_plays(tmp_path: Path) -> None:
+    from click.testing import CliRunner
+
+    from sonic_bullet.cli import cli
+
+    sound = clip(0.6) + 0.05 * np.random.default_rng(2).normal(size=round(0.6 * SR)) * np.exp(-80 * np.arange(round(0.6 * SR)) / SR)
+    write_audio(str(tmp_path / "tap.wav"), sound[None], SR)
+    preset, picture = tmp_path / "tap.json", tmp_path / "tap.png"
+    run = CliRunner()
+    done = run.invoke(
+        cli, ["residual", str(tmp_path / "tap.wav"), "--material", "wood", "--onset", "0", "-o", str(preset), "--picture", str(picture), "--json"]
+    )
+    assert done.exit_code == 0, done.output
+    assert presets.load_material(str(preset)).residual is not None
+    assert picture.stat().st_size > 10_000
+    assert preset.stat().st_size < 0.3 * (tmp_path / "tap.wav").stat().st_size
+    for words, message in (
+        (["residual", str(tmp_path / "tap.wav"), "-o", str(preset)], "--material missing"),
+        (["residual", str(tmp_path / "no.wav"), "--material", "wood", "-o", str(preset)], "no.wav"),
+        (["residual", str(tmp_path / "tap.wav"), "--material", "wood", "--strike", "0,0,0", "-o", str(preset)], "without a shape"),
+        (["residual", str(tmp_path / "tap.wav"), "--material", "wood", "-o", "preset.txt"], "json"),
+    ):
+        failed = run.invoke(cli, words)
+        assert failed.exit_code != 0
+        assert message in str(failed.exception)
+    assert "--no-residual" in run.invoke(cli, ["render", "--help"]).output
