@@ -58,8 +58,9 @@ def render_scene(
     """Run a scene for ``seconds`` of physics time and return its sound.
 
     seconds None: the scene's own SECONDS, or 4. microphones None: the scene's own, or (0, -1, 0.5). material: of the bodies of a
-    plain script. residual: whether what materials sound beside their modes is heard. progress is told the share done, say what is being computed before the first step (modes: seconds a body). Raises SonicBulletError; where the scene broke or was interrupted under way,
-    the exception carries what was rendered so far as ``partial``.
+    plain script. residual: whether what materials sound beside their modes is heard. progress is told the share done, say
+    what is being computed before the first step (modes: seconds a body). Raises SonicBulletError; where the scene broke or was interrupted
+    under way, the exception carries what was rendered so far as ``partial``.
     """
     with _stage(path, sr=sr, seed=seed, microphones=microphones, material=material, residual=residual) as stage:
         try:
@@ -75,7 +76,7 @@ def examine_scene(path: str | Path, seconds: float = 1.0, say: Say | None = None
 
     Raises SonicBulletError.
     """
-    with _stage(path, sr=8_000, seed=0, microphones=None, material=None) as stage:
+    with _stage(path, sr=8_000, seed=0, microphones=(), material=None) as stage:  # nobody hears it: contacts alone
         stage.run(seconds, None, say)
         listener = stage.need_listener()
         return (*diagnose_world(listener.world), *_mute_bodies(listener))

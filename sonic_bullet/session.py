@@ -22,6 +22,7 @@ from sonic_bullet.errors import MaterialError, RecordError, SceneError
 from sonic_bullet.files import AudioReport, check_sr, write_audio
 from sonic_bullet.records import Air, Array, Material, Microphone, ModalModel, ModalSum, Sensor, Shape, Vibrometer
 from sonic_bullet.render import LATENCY_STEPS, Synthesizer
+from sonic_bullet.render.radiated import radiation_of
 
 MicrophoneLike = Sequence[float] | Sequence[Sequence[float]] | Sensor | Sequence[Sensor] | Array
 
@@ -34,7 +35,9 @@ def as_sensors(microphone: MicrophoneLike) -> tuple[Sensor, ...]:
     if isinstance(microphone, (Microphone, Vibrometer, ModalSum)):
         return (microphone,)
     items = list(microphone) if isinstance(microphone, (Sequence, np.ndarray)) else [microphone]
-    if items and all(isinstance(item, (Microphone, Vibrometer, ModalSum)) for item in items):
+    if not items:
+        return ()
+    if all(isinstance(item, (Microphone, Vibrometer, ModalSum)) for item in items):
         return tuple(items)
     try:
         points = np.atleast_2d(np.asarray(microphone, dtype=float))
@@ -65,9 +68,9 @@ def attach(
 
     client: a `BulletClient` (then `stepSimulation` is hooked and nothing else need be called), the `pybullet` module or a client id
     (then call `listener.step()` after each `p.stepSimulation()`). sr: sample rate in Hz, 8000 … 384000. microphone: a point in the
-    world in m, several points (one channel each), or sensors (`Microphone`, `Vibrometer`, `ModalSum`). seed: of the surfaces' roughness.
-    air: the medium, 1.2 kg/m³ and 343 m/s by default. Raises SceneError for a client that is not connected, AudioError for a bad rate,
-    RecordError for a microphone or a seed that is none.
+    world in m, several points (one channel each), or sensors (`Microphone`, `Vibrometer`, `ModalSum`); none at all: contacts
+    alone, no sound. seed: of the surfaces' roughness. air: the medium, 1.2 kg/m³ and 343 m/s by default. Raises SceneError for a client
+    that is not connected, AudioError for a bad rate, RecordError for a microphone or a seed that is none.
     """
     if not isinstance(seed, (int, np.integer)) or seed < 0:
         raise RecordError(f"seed is {seed!r}", "give a whole number, 0 or more")
@@ -117,7 +120,8 @@ class Listener:
         mesh: a file (in metres) or shapes in the body frame, where the body's own collision shapes should not be used.
         model: modes computed before. roughness_m: rms height of its surface in place of the material's. fixed: clamped spheres
         (x, y, z, radius) in m, body frame. thickness_m: wall of an open surface. to_hz, count: how many modes. progress: told now and then
-        which body's modes are being computed, and how far that is (seconds a body the first time, then the cache has them).
+        which body's modes are being computed, how far that is, and that it is their radiation next (seconds a body the first time, then
+        the cache has both).
         Raises SceneError (unknown body), MaterialError, MeshError, ModalError.
         """
         from sonic_bullet.listener import links_with_shapes
@@ -161,6 +165,10 @@ class Listener:
             say = (lambda text: progress(f"modes of {name}: {text}")) if progress is not None else None
             solved = modal.analyse(shapes, material, to_hz=to_hz, count=count, fixed=clamps, thickness_m=thickness_m, progress=say)
             model = self._shared(with_modes(solved, material))
+        if self.sensors and model.mode_count:
+            if progress is not None:
+                progress(f"how {model.mode_count} modes of {name} radiate")
+            radiation_of(model, self.air)
         self.world.add(body, link, material=material, model=model, shapes=shapes)
         return model
 

@@ -54,7 +54,7 @@ def run_render(
             from sonic_bullet.picture import render_picture
 
             render_picture(picture, result.samples, result.sr, result.log, Path(scene).name)
-        notes = (*result.notes, *_warnings(report))
+        notes = (*result.notes, *_coarse(result.log), *_warnings(report))
         say(_summary(report, result.log))
         for note in notes:
             print(f"sonic-bullet: note: {note}", file=sys.stderr)
@@ -175,7 +175,7 @@ def _replayed(path: str, wish: _Wish) -> _Replay:
         if seconds > log.duration_s + 1e-9:
             raise AudioError(f"{path} lasts {log.duration_s:.3f} s, shorter than {seconds} s", "give fewer seconds, or simulate the scene for longer")
         log = replace(log, steps=tuple(step for step, start in zip(log.steps, log.start_s, strict=True) if start < seconds - 1e-9))
-    samples = render_log(log, sr=wish.rate, residual=wish.residual, progress=wish.progress)
+    samples = render_log(log, sr=wish.rate, residual=wish.residual, progress=wish.progress, say=wish.say)
     return _Replay(samples, log, wish.rate or log.sr)
 
 
@@ -196,6 +196,13 @@ def _with_partial(
     if isinstance(error, SonicBulletError):
         return type(error)(error.what, "; ".join(part for part in (error.remedy, said) if part))
     return KeyboardInterrupt("; ".join(part for part in (str(error) or "stopped", said) if part))
+
+
+def _coarse(log: ContactLog) -> tuple[str, ...]:
+    from sonic_bullet.modal import COARSER
+
+    names = sorted({body.name for body in log.bodies if body.model is not None and COARSER in body.model.note})
+    return (f"the mesh of {', '.join(names)} is {COARSER}: a faster machine may compute slightly other modes",) if names else ()
 
 
 def _warnings(report: AudioReport) -> tuple[str, ...]:

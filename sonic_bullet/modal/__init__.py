@@ -5,5 +5,6 @@ Shape -> solid.Solid (structured.py, tetrahedra.py) -> K, M (fem.py) -> λ, U (e
 
 from sonic_bullet.modal.mesh_files import read_mesh
 from sonic_bullet.modal.model import analyse
+from sonic_bullet.modal.solid import COARSER
 
-__all__ = ["analyse", "read_mesh"]
+__all__ = ["COARSER", "analyse", "read_mesh"]

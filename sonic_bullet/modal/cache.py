@@ -1,6 +1,6 @@
 """What was computed once, kept on disk under the name of what it was computed from.
 
-    sha256(numbers, options, source text of this room) -> KEY.npz in SONIC_BULLET_CACHE, or the user's cache folder
+    sha256(numbers, options, source text that computes it) -> KEY.npz in SONIC_BULLET_CACHE, or the user's cache folder
 
 A file is written beside its name and moved there whole; a cut, foreign or unreadable file is a miss. Nothing is pickled.
 """
@@ -45,22 +45,27 @@ def folder(place: Place) -> Path | None:
     return user_cache_path("sonic_bullet") / "modal"
 
 
-@lru_cache(maxsize=1)
-def _code() -> bytes:
-    """Digest of all that turns a surface into modes: this room's source, the geometry below it, the solvers' versions."""
-    here = Path(__file__).resolve().parent
+@lru_cache(maxsize=4)
+def code_digest(files: tuple[Path, ...], packages: tuple[str, ...]) -> bytes:
+    """Digest of what computes a result: source files and the versions of packages."""
     digest = hashlib.sha256()
-    for file in [*sorted(here.glob("*.py")), here.parent / "geometry.py", here.parent / "surface_index.py"]:
+    for file in files:
         digest.update(file.read_bytes())
-    for name in SOLVERS:
+    for name in packages:
         with suppress(PackageNotFoundError):
             digest.update(f"{name} {version(name)}".encode())
     return digest.digest()
 
 
-def key(kind: str, *parts: Array | str | float | int | None) -> str:
-    """Name of a result: ``kind`` and a digest of the parts (arrays by dtype, shape and bytes) and of the code."""
-    digest = hashlib.sha256(_code())
+def _code() -> bytes:
+    """Digest of all that turns a surface into modes: this room's source, the geometry below it, the solvers' versions."""
+    here = Path(__file__).resolve().parent
+    return code_digest((*sorted(here.glob("*.py")), here.parent / "geometry.py", here.parent / "surface_index.py"), SOLVERS)
+
+
+def key(kind: str, *parts: Array | str | float | int | None, code: bytes | None = None) -> str:
+    """Name of a result: ``kind`` and a digest of the parts (arrays by dtype, shape and bytes) and of the code, by default this room's."""
+    digest = hashlib.sha256(_code() if code is None else code)
     for part in parts:
         if isinstance(part, np.ndarray):
             digest.update(f"{part.dtype.str}{part.shape}".encode() + np.ascontiguousarray(part).tobytes())

@@ -16,7 +16,7 @@ from sonic_bullet import geometry
 from sonic_bullet.errors import MeshError
 from sonic_bullet.modal import prisms, structured
 from sonic_bullet.modal.ordering import dissection
-from sonic_bullet.modal.solid import Solid, Surface, corner_volume_m3, largest_component, quadratic, surface
+from sonic_bullet.modal.solid import COARSER, Solid, Surface, corner_volume_m3, largest_component, quadratic, surface
 from sonic_bullet.modal.surfaces import SIZE_M, Skin, pieces_of_faces, prepared
 from sonic_bullet.records import Array, Shape
 
@@ -26,7 +26,7 @@ MOST_TETS = 7_000
 LUMP_PASSES, MOST_PASSES = 2, 80
 """Of fTetWild's optimisation. It makes elements finer until the worst is good; two passes and a lesser edge give lumps the same modes in half the time."""
 FILL_LIMITS_S = (20.0, 9.0, 7.0)
-"""Processor seconds of each attempt, the next coarser than the last: what is tried must not hang on how busy the machine is."""
+"""Processor seconds of each attempt, the next coarser than the last. A slower machine may come to a coarser one: the note says so (`solid.COARSER`)."""
 FILLED = (0.6, 1.7)
 """Of the enclosed volume: what a fill may hold. Wide, for a surface that passes through itself encloses some of it twice."""
 ENVELOPE_OF_EDGE = 0.035  # a finer surface than its elements costs time and tells nothing
@@ -162,7 +162,7 @@ def _united(skin: Skin) -> Skin:
 
 def _meshed(skin: Skin, edge_m: float | None, say: Callable[[str], None]) -> Solid:
     """Solid of a prepared surface: by rule where a rule is known, else by fTetWild, coarser where that is too slow or too fine."""
-    from sonic_bullet.modal.tetrahedra import tetrahedra
+    from sonic_bullet.modal.tetrahedra import TooSlow, tetrahedra
 
     vertex, face, thickness = skin.vertex_m, skin.face, skin.thickness_m
     diagonal = float(np.linalg.norm(np.ptp(vertex, axis=0)))
@@ -183,19 +183,22 @@ def _meshed(skin: Skin, edge_m: float | None, say: Callable[[str], None]) -> Sol
     edge = edge_m if edge_m is not None else _edge_m(geometry.volume_m3(vertex, face), thickness, spent)
     envelope = max(min(ENVELOPE[0] * thickness, ENVELOPE[1] * diagonal), ENVELOPE_OF_EDGE * edge)
     say(f"filling {len(face)} triangles with tetrahedra of {edge:.3g} m")
-    failure = MeshError(f"mesh needs more than {MOST_TETS} tetrahedra", "give a larger edge_m or a simpler mesh")
+    too_fine = MeshError(f"mesh needs more than {MOST_TETS} tetrahedra", "give a larger edge_m or a simpler mesh")
+    failure, said = too_fine, ""
     limits_s = FILL_LIMITS_S if edge_m is None else FILL_LIMITS_S[:1]
     for limit_s in limits_s:
         try:
             node, tet = tetrahedra(vertex, face, edge, envelope, passes=passes, time_limit_s=limit_s)
             _check_filled(vertex, face, node, tet)
         except MeshError as error:
-            failure = error
+            failure, told = error, COARSER if isinstance(error, TooSlow) else "coarser"
         else:
             tet, pieces = largest_component(node, tet)
             if len(tet) <= MOST_TETS or edge_m is not None:
-                note = f"fTetWild, {len(tet)} tetrahedra, edge {edge:.3g} m, envelope {envelope:.2g} m{skin.note}"
+                note = f"fTetWild, {len(tet)} tetrahedra, edge {edge:.3g} m, envelope {envelope:.2g} m{skin.note}{said}"
                 return quadratic(node, tet, note=note + (f"; largest of {pieces} separate pieces kept" if pieces > 1 else ""))
+            failure, told = too_fine, "coarser"
+        said = said if COARSER in said else f"; {told}: {failure.what}"
         edge, envelope, passes = 1.6 * edge, 2.5 * envelope, LUMP_PASSES
     if len(limits_s) > 1:
         failure = MeshError(f"{failure.what}, the last of {len(limits_s)} attempts, each coarser, within {sum(limits_s):.0f} s in all", failure.remedy)

@@ -22,6 +22,10 @@ MEMORY_LIMIT_BYTES = 2 * 1024**3
 CUT_OFF = (9, 24)  # SIGKILL, SIGXCPU: the child's own limit on processor time
 
 
+class TooSlow(MeshError):
+    """Filling took longer than it may: on another machine it might not."""
+
+
 def tetrahedra(vertex_m: Array, face: Array, edge_m: float, envelope_m: float, *, passes: int = 80, time_limit_s: float = TIME_LIMIT_S) -> tuple[Array, Array]:
     """Corners (n, 3) and tetrahedra (t, 4) filling a surface vertex_m (v, 3), face (f, 3).
 
@@ -52,7 +56,7 @@ def tetrahedra(vertex_m: Array, face: Array, edge_m: float, envelope_m: float, *
         except subprocess.TimeoutExpired:
             ended = None
         if ended is None or -ended.returncode in CUT_OFF:
-            raise MeshError(f"filling the mesh with tetrahedra took more than {time_limit_s:.0f} s of processor time", "give a larger edge_m or a simpler mesh")
+            raise TooSlow(f"filling the mesh with tetrahedra took more than {time_limit_s:.0f} s of processor time", "give a larger edge_m or a simpler mesh")
         if ended.returncode != 0 or not target.exists():
             said = (ended.stderr.strip().splitlines() or ["no message"])[-1]
             raise MeshError(f"fTetWild failed on the mesh (exit {ended.returncode}: {said[:200]})", "repair the mesh, or give a larger edge_m")

@@ -12,19 +12,33 @@ import numpy as np
 
 from sonic_bullet.contacts import ContactLog
 from sonic_bullet.records import Array
+from sonic_bullet.render.radiated import radiation_of
 from sonic_bullet.render.synthesizer import LATENCY_STEPS, Synthesizer
 
 __all__ = ["LATENCY_STEPS", "Synthesizer", "render_log"]
 
 
-def render_log(log: ContactLog, *, sr: int | None = None, residual: bool = True, progress: Callable[[float], None] | None = None) -> Array:
+def render_log(
+    log: ContactLog,
+    *,
+    sr: int | None = None,
+    residual: bool = True,
+    progress: Callable[[float], None] | None = None,
+    say: Callable[[str], None] | None = None,
+) -> Array:
     """The sound of a contact log, (channels, floor(sr·time)) in pascals; with the log's own rate the same bits as were heard live.
 
-    residual False: without what materials sound beside their modes. progress is told the share done. Raises AudioError for a rate that cannot be.
+    residual False: without what materials sound beside their modes. progress is told the share done, say
+    what is being computed before the first step. Raises AudioError for a rate that cannot be.
     """
     from sonic_bullet.files import check_sr
 
     log = replace(log, sr=check_sr(sr if sr is not None else log.sr))
+    for body in log.bodies if log.sensors else ():
+        if body.model is not None and body.model.mode_count:
+            if say is not None:
+                say(f"how {body.model.mode_count} modes of {body.name} radiate")
+            radiation_of(body.model, log.air)
     synth = Synthesizer(sr=log.sr, sensors=log.sensors, seed=log.seed, air=log.air, residual=residual)
     for number, step in enumerate(log.steps):
         synth.feed(step, log.bodies[: len(step.position_m)])

@@ -12,15 +12,15 @@ whose coefficient K makes ρ₀ca = 2Kw²; unlike it, it does not grow without b
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 from numba import njit
 
-from sonic_bullet.records import Air, Array, Body, Microphone, ModalModel, ModalSum, Sensor, Vibrometer
+from sonic_bullet.records import Air, Array, Body, Microphone, ModalSum, Sensor, Vibrometer
+from sonic_bullet.render.radiated import radiation_of
 from sonic_bullet.surface_index import SurfaceIndex, nearest, surface_index
 from sonic_bullet.synth.bank import ModeSet, audible
-from sonic_bullet.synth.radiation import jerk_coefficient, radiation
+from sonic_bullet.synth.radiation import jerk_coefficient
 
 CREASE_COS = np.cos(np.radians(20.0))
 EDGE_RADIUS_SHARE = 0.005
@@ -79,7 +79,7 @@ def build_sounder(body: Body, sensors: tuple[Sensor, ...], sr: int, air: Air) ->
         return Sounder(
             body, none, none, np.zeros((1 + len(readers), 0), complex), np.zeros((0, 3, 0), np.float32), None, np.zeros((0, 3)), _size(body), 0.0, None, 0
         )
-    pressure, extra = _radiation(model, air)
+    pressure, extra = radiation_of(model, air)
     omega0_squared = model.omega0_squared_per_s2
     decay = np.nan_to_num(model.decay_per_s) + extra
     omega = np.sqrt(np.maximum(omega0_squared - decay**2, 0.0))
@@ -101,12 +101,6 @@ def build_sounder(body: Body, sensors: tuple[Sensor, ...], sr: int, air: Air) ->
     radius = float(np.linalg.norm(model.vertex_m, axis=1).max(initial=0.0))
     dropped = model.dropped + int(np.sum(~keep))
     return Sounder(body, omega, decay, weight, shape, index, normal, _size(body), radius, _rigid(body, 1 + len(readers), sr, air), dropped)
-
-
-@lru_cache(maxsize=64)
-def _radiation(model: ModalModel, air: Air) -> tuple[Array, Array]:
-    """`synth.radiation`, once for bodies that share a model (models are compared by identity): it takes a second or two."""
-    return radiation(model, air)
 
 
 def _rigid(body: Body, sets: int, sr: int, air: Air) -> ModeSet | None:

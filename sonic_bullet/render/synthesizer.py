@@ -257,14 +257,19 @@ class Synthesizer:
         return float(self._clock.time_s)
 
     def feed(self, step: Step, bodies: tuple[Body, ...]) -> Array:
-        """Take in a step; the frame (channels, n) as long as the step, LATENCY_STEPS late. bodies: all that are known by now."""
-        self._state = with_bodies(self._setup, self._state, bodies[len(self._state.sounders) : len(step.position_m)])
-        frame, self._state = take_step(self._setup, self._state, step)
+        """Take in a step; the frame (channels, n) as long as the step, LATENCY_STEPS late. bodies: all that are known by now.
+
+        Without a sensor nothing is computed but the time.
+        """
         after = self._clock.after(step.dt_s)
         count = after.sample(self._setup.sr) - self._clock.sample(self._setup.sr)
         self._clock = after
         self._steps += 1
         channels = len(self._setup.sensors)
+        if channels == 0:
+            return np.zeros((0, count))
+        self._state = with_bodies(self._setup, self._state, bodies[len(self._state.sounders) : len(step.position_m)])
+        frame, self._state = take_step(self._setup, self._state, step)
         if frame is None:
             # where a step is no whole number of samples (44.1 kHz at 240 Hz), one more, so that uneven frames never run dry
             uneven = (exact_step(step.dt_s) * self._setup.sr).denominator != 1
@@ -280,6 +285,8 @@ class Synthesizer:
 
     def sound(self) -> Array:
         """(channels, floor(sr·time)) all sound so far, without lag."""
+        if not self._setup.sensors:
+            return np.zeros((0, self._clock.sample(self._setup.sr)))
         return np.concatenate([np.zeros((len(self._setup.sensors), 0)), *self._frames, drained(self._setup, self._state)], axis=1)
 
     def quench(self) -> None:

@@ -235,3 +235,17 @@ def test_how_the_sound_is_read_out_does_not_matter(client: Any) -> None:
     np.testing.assert_array_equal(np.concatenate(pieces, axis=1), np.concatenate(frames, axis=1))
     np.testing.assert_array_equal(listener.sound(), quiet.sound())
     listener.detach()
+
+
+def test_without_a_microphone_contacts_are_kept_and_nothing_is_computed(client: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    from sonic_bullet.synth import radiation
+
+    monkeypatch.setattr(radiation, "radiation", lambda *_: pytest.fail("nobody hears it"))
+    floor(client)
+    listener = sb.attach(client, microphone=())
+    sounding_box(client, listener, (0, 0, 0.06))
+    for _ in range(30):
+        client.stepSimulation()
+        assert listener.frame.shape == (0, 200)
+    assert len(listener.contacts) > 0
+    assert listener.sound().shape == (0, 6000)

@@ -335,7 +335,8 @@ def test_adding_tells_which_body_is_analysed_and_an_unknown_body_before_any_work
     listener = sb.attach(client)
     told: list[str] = []
     listener.add(body, material=STEEL, progress=told.append)
-    assert told == [f"modes of {listener.world.name_of(body)}: assembling"]
+    name = listener.world.name_of(body)
+    assert told == [f"modes of {name}: assembling", f"how 4 modes of {name} radiate"]
     assert f"body {body}" in told[0]
     monkeypatch.setattr(modal, "analyse", lambda *_, **__: pytest.fail("analysed for nobody"))
     with pytest.raises(SceneError, match="no body 99"):

@@ -1,0 +1,48 @@
+"""How a body's modes radiate, computed once: the first scene with a model waits a second or two for it, the next ones do not.
+
+sha256(frequencies, shapes, surface, air, source text of synth.radiation) -> weight, Δd in the cache that keeps the models themselves
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from sonic_bullet.modal import cache as store
+from sonic_bullet.records import Air, Array, ModalModel
+from sonic_bullet.synth import added_mass, radiation
+
+SOURCES = tuple(Path(str(room.__file__)).resolve() for room in (radiation, added_mass))
+PACKAGES = ("numpy", "scipy", "numba")
+
+
+@lru_cache(maxsize=64)
+def radiation_of(model: ModalModel, air: Air, cache: store.Place = "default") -> tuple[Array, Array]:
+    """`synth.radiation.radiation` of a model: pressure weight (m,) complex and radiation damping (m,).
+
+    Bodies that share a model share it (models are compared by identity). cache: folder, "default" or None.
+    """
+    m = model.mode_count
+    if m == 0 or len(model.face) == 0:
+        return radiation.radiation(model, air)
+    code = store.code_digest(SOURCES, PACKAGES)
+    name = store.key("radiation", model.freq_hz, model.shape, model.vertex_m, model.face, air.density_kg_m3, air.sound_speed_m_s, code=code)
+    known = _recall(store.load(cache, name), m)
+    if known is None:
+        known = radiation.radiation(model, air)
+        store.save(cache, name, {"real": known[0].real, "imag": known[0].imag, "damping": known[1]}, "")
+    return known
+
+
+def _recall(found: tuple[dict[str, Array], str] | None, m: int) -> tuple[Array, Array] | None:
+    """What was kept, where it is what could have been kept."""
+    if found is None:
+        return None
+    a = found[0]
+    if set(a) != {"real", "imag", "damping"} or any(x.shape != (m,) or x.dtype != np.float64 or not np.isfinite(x).all() for x in a.values()):
+        return None
+    weight = np.empty(m, complex)
+    weight.real, weight.imag = a["real"], a["imag"]
+    return weight, np.array(a["damping"])
