@@ -167,6 +167,8 @@ class ModalModel:
     vertex_m (v, 3), face (f, 3): the surface, body frame, outward. curvature_per_m (f,): mean of the principal curvatures
     of the smooth surface (0 flat, 1/r sphere, negative inside a bowl). volume_m3, mass_kg: of the meshed solid at the
     material's density. dropped: modes left out as overdamped. note: how it was made (element size, order, choices).
+    bend_s2_m2, choke_s_m (m,): relative rise of a mode's frequency per square of its peak velocity at the surface, of its decay
+    per that velocity; None: a linear body.
     A body without audible modes has m = 0; a plane has v = f = 0 besides.
     """
 
@@ -180,6 +182,8 @@ class ModalModel:
     mass_kg: float
     dropped: int = 0
     note: str = ""
+    bend_s2_m2: Array | None = None
+    choke_s_m: Array | None = None
 
     def __post_init__(self) -> None:
         freq = frozen_array(self.freq_hz, float, (None,), "freq_hz")
@@ -204,6 +208,9 @@ class ModalModel:
             len(face) == 0 or bool((face >= 0).all() and (face < len(vertex)).all()), "faces point at missing vertices", "build the model with modal.analyse"
         )
         _require(self.volume_m3 >= 0 and self.mass_kg >= 0, "negative volume or mass", "orient the mesh outward")
+        for name in ("bend_s2_m2", "choke_s_m"):
+            if getattr(self, name) is not None:
+                _store(self, **{name: frozen_array(getattr(self, name), float, (m,), name)})
 
     @property
     def mode_count(self) -> int:

@@ -63,6 +63,7 @@ class Null:
     seed: int
 
     def apply(self, x: ModalModel) -> ModalModel:
+        """The modes with the effect in them."""
         way = directions(self.seed, len(self.amount), x.mode_count)
         half = (len(self.amount) + 1) // 2
         decay = x.decay_per_s * np.exp(np.clip(np.array(self.amount[:half]) @ way[:half], -3, 3))
@@ -71,6 +72,7 @@ class Null:
         return replace(x, decay_per_s=decay, shape=shape)
 
     def parameters(self) -> dict[str, Any]:
+        """What it says, for people and JSON, in SI units."""
         return {"amount": list(self.amount)}
 
     def freedom(self) -> int:

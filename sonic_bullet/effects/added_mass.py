@@ -37,11 +37,13 @@ class AddedMass:
     mass_kg: float
 
     def apply(self, x: ModalModel) -> ModalModel:
+        """The modes with the effect in them."""
         if not x.mode_count or self.mass_kg == 0:
             return x
         return loaded(x, x.shape[nearest(x, self.position_m)].astype(float), self.mass_kg)
 
     def parameters(self) -> dict[str, Any]:
+        """What it says, for people and JSON, in SI units."""
         return {"mass_kg": self.mass_kg, "position_m": list(self.position_m)}
 
     def freedom(self) -> int:

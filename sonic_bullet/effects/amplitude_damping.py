@@ -37,9 +37,11 @@ class AmplitudeDamping:
     beta_s: float = float("nan")
 
     def apply(self, x: Ring) -> Ring:
+        """The ringing with the effect in it."""
         return replace(x, choke=x.choke + self.choke * _per_velocity(x, self.measure))
 
     def parameters(self) -> dict[str, Any]:
+        """What it says, for people and JSON, in SI units."""
         return {"choke": self.choke, "measure": self.measure}
 
     def freedom(self) -> int:

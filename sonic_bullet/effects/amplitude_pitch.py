@@ -34,9 +34,11 @@ class AmplitudePitch:
     measure: str = "velocity"
 
     def apply(self, x: Ring) -> Ring:
+        """The ringing with the effect in it."""
         return replace(x, bend=x.bend + self.bend * _per_velocity(x, self.measure) ** 2)
 
     def parameters(self) -> dict[str, Any]:
+        """What it says, for people and JSON, in SI units."""
         return {"bend": self.bend, "measure": self.measure}
 
     def freedom(self) -> int:

@@ -38,9 +38,11 @@ class ContactTime:
         return float(self.tau_s * (impulse_n_s / self.impulse_n_s) ** self.exponent)
 
     def apply(self, x: Blow) -> Blow:
+        """The blow with the effect in it."""
         return replace(x, tau_s=self.duration_s(x.impulse_n_s), pulse=self.pulse)
 
     def parameters(self) -> dict[str, Any]:
+        """What it says, for people and JSON, in SI units."""
         return {"tau_s": self.tau_s, "J0_n_s": self.impulse_n_s, "exponent": self.exponent, "pulse": self.pulse}
 
     def freedom(self) -> int:

@@ -47,6 +47,7 @@ class DampingLaw:
         return np.asarray(0.5 * w * (self.eta + self.strength * w * self.tau_s / (1 + (w * self.tau_s) ** 2)))
 
     def apply(self, x: ModalModel) -> ModalModel:
+        """The modes with the effect in them."""
         if self.eta == 0 and self.strength == 0:  # no law at all: the material's own stays
             return x
         omega = np.sqrt(x.omega0_squared_per_s2)
@@ -56,6 +57,7 @@ class DampingLaw:
         return replace(x, freq_hz=freq[order], decay_per_s=decay[order], shape=x.shape[:, :, order])
 
     def parameters(self) -> dict[str, Any]:
+        """What it says, for people and JSON, in SI units."""
         if self.law == "relaxation":
             return {"law": self.law, "eta": self.eta, "strength": self.strength, "tau_s": self.tau_s}
         return {"law": self.law, "eta": self.eta} | ({"exponent": self.exponent} if self.law == "power" else {})

@@ -37,12 +37,14 @@ class ForeignMode:
     phase_rad: tuple[float, ...]
 
     def apply(self, x: Sound) -> Sound:
+        """The sound with the effect in it."""
         a = x.impulse_n_s * np.array(self.amplitude_per_n_s) * np.exp(1j * np.array(self.phase_rad))
         none = np.zeros(len(a))
         ring = Ring(np.array(self.freq_hz), np.array(self.decay_per_s), a, none, none, none)
         return replace(x, sample=x.sample + sounded(ring, Blow(1.0, np.zeros(1), np.ones(1)), len(x.sample), x.sr))
 
     def parameters(self) -> dict[str, Any]:
+        """What it says, for people and JSON, in SI units."""
         return {"modes": [list(row) for row in zip(self.freq_hz, self.decay_per_s, self.amplitude_per_n_s, strict=True)]}
 
     def freedom(self) -> int:

@@ -42,6 +42,7 @@ class MeasurementChain:
     hum_phase_rad: tuple[float, ...] = ()
 
     def apply(self, x: Sound) -> Sound:
+        """The sound with the effect in it."""
         from scipy.signal import butter, sosfilt
 
         y = x.sample
@@ -56,6 +57,7 @@ class MeasurementChain:
         return replace(x, sample=np.clip(y, -self.limit, self.limit) if self.limit else y)
 
     def parameters(self) -> dict[str, Any]:
+        """What it says, for people and JSON, in SI units."""
         found: dict[str, Any] = {}
         if self.high_pass_hz:
             found |= {"high_pass_hz": self.high_pass_hz, "high_order": self.high_order}

@@ -35,6 +35,7 @@ class ModeSplitting:
     turn_rad: tuple[float, ...]
 
     def apply(self, x: ModalModel) -> ModalModel:
+        """The modes with the effect in them."""
         freq, shape = x.freq_hz.copy(), x.shape.copy()
         for f, split, turn in zip(self.freq_hz, self.split, self.turn_rad, strict=True):
             if split == 0:
@@ -50,6 +51,7 @@ class ModeSplitting:
         return replace(x, freq_hz=freq[order], decay_per_s=x.decay_per_s[order], shape=shape[:, :, order])
 
     def parameters(self) -> dict[str, Any]:
+        """What it says, for people and JSON, in SI units."""
         return {"pairs": [{"freq_hz": f, "split": s, "turn_rad": t} for f, s, t in zip(self.freq_hz, self.split, self.turn_rad, strict=True)]}
 
     def freedom(self) -> int:

@@ -45,9 +45,11 @@ class Orthotropy:
         return found
 
     def apply(self, x: Material) -> Material:
+        """The material with the effect in it."""
         return replace(x, stiffness_pa=self.stiffness_pa)
 
     def parameters(self) -> dict[str, Any]:
+        """What it says, for people and JSON, in SI units."""
         compliance = np.linalg.inv(self.stiffness_pa)
         youngs = 1 / np.diag(compliance)
         c = dict(zip(("c11", "c22", "c33", "c23", "c13", "c12", "c44", "c55", "c66"), self.constants_pa, strict=True))

@@ -41,6 +41,7 @@ class Radiation:
         return np.asarray(ka2 / (1 + ka2))
 
     def apply(self, x: ModalModel) -> ModalModel:
+        """The modes with the effect in them."""
         sigma = self.efficiency(x.freq_hz)
         omega = np.sqrt(x.omega0_squared_per_s2)
         decay = np.minimum(x.decay_per_s + self.strength * 0.5 * IMPEDANCE * sigma * areas(x), 0.99 * omega)
@@ -52,6 +53,7 @@ class Radiation:
         return replace(x, freq_hz=freq[order], decay_per_s=decay[order], shape=shape[:, :, order])
 
     def parameters(self) -> dict[str, Any]:
+        """What it says, for people and JSON, in SI units."""
         return {"radius_m": self.radius_m, "strength": self.strength, "tilt": self.tilt}
 
     def freedom(self) -> int:

@@ -42,6 +42,7 @@ class Rebound:
     hits: int = MOST_HITS
 
     def apply(self, x: Blow) -> Blow:
+        """The blow with the effect in it."""
         gap = self.gap_s * (x.impulse_n_s / self.impulse_n_s) ** self.exponent
         ratio = self.restitution if self.shrink is None else self.shrink
         share = self.restitution ** np.arange(self.hits)
@@ -51,6 +52,7 @@ class Rebound:
         return replace(x, delay_s=delay, share=(x.share[:, None] * share).ravel())
 
     def parameters(self) -> dict[str, Any]:
+        """What it says, for people and JSON, in SI units."""
         shrink = self.restitution if self.shrink is None else self.shrink
         return {
             "gap_s": self.gap_s,

@@ -60,6 +60,7 @@ class Room:
         return np.asarray(self.wet * np.sqrt(2 * delta / sr) * np.exp(-delta * t) * np.random.default_rng(self.seed).standard_normal(n))
 
     def apply(self, x: Sound) -> Sound:
+        """The sound with the effect in it."""
         if self.wet == 0 or not len(x.sample):
             return x
         from scipy.signal import fftconvolve
@@ -68,6 +69,7 @@ class Room:
         return replace(x, sample=x.sample + tail)
 
     def parameters(self) -> dict[str, Any]:
+        """What it says, for people and JSON, in SI units."""
         return {"rt60_s": self.rt60_s, "wet": self.wet}
 
     def freedom(self) -> int:

@@ -10,12 +10,13 @@ from dataclasses import fields, replace
 from typing import Any
 
 import msgspec
+import numpy as np
 
 from sonic_bullet.effects.amplitude_damping import AmplitudeDamping
 from sonic_bullet.effects.amplitude_pitch import AmplitudePitch
 from sonic_bullet.effects.damping_law import DampingLaw
 from sonic_bullet.effects.mode_splitting import ModeSplitting
-from sonic_bullet.effects.values import Effect, Stage
+from sonic_bullet.effects.values import Effect, Ring, Stage
 from sonic_bullet.errors import RecordError
 from sonic_bullet.records import Material, ModalModel
 
@@ -50,11 +51,24 @@ def with_material(material: Material) -> Material:
 
 
 def with_modes(model: ModalModel, material: Material) -> ModalModel:
-    """A body's model with its material's effects on modes in it."""
+    """A body's model with its material's effects on modes in it, and on how they ring: bend and choke per peak velocity at the surface.
+
+    Where a level was measured as an impulse, the velocity is what that impulse brings about at a typical place (rms over the surface).
+    """
+    if not model.mode_count:
+        return model
     for effect in of_stage(material, Stage.MODES):
-        if model.mode_count:
-            model = effect.apply(model)
-    return model
+        model = effect.apply(model)
+    effects = of_stage(material, Stage.BANK)
+    if not effects:
+        return model
+    square = (model.shape.astype(float) ** 2).sum(axis=1)
+    level = np.sqrt(square.mean(axis=0) / 3 * square.max(axis=0))
+    none = np.zeros(model.mode_count)
+    ring = Ring(model.freq_hz, model.decay_per_s, none, level, none, none)
+    for effect in effects:
+        ring = effect.apply(ring)
+    return replace(model, bend_s2_m2=ring.bend, choke_s_m=ring.choke)
 
 
 def of_stage(material: Material, stage: Stage) -> Sequence[Effect]:

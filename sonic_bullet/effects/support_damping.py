@@ -35,6 +35,7 @@ class SupportDamping:
     along: str = "normal"
 
     def apply(self, x: ModalModel) -> ModalModel:
+        """The modes with the effect in them."""
         extra = np.zeros(x.mode_count)
         normal = vertex_normals(x) if self.along == "normal" else None
         for place, c in zip(self.position_m, self.strength_n_s_m, strict=True):
@@ -48,6 +49,7 @@ class SupportDamping:
         return replace(x, freq_hz=freq[order], decay_per_s=decay[order], shape=x.shape[:, :, order])
 
     def parameters(self) -> dict[str, Any]:
+        """What it says, for people and JSON, in SI units."""
         return {"position_m": [list(p) for p in self.position_m], "c_n_s_m": list(self.strength_n_s_m)}
 
     def freedom(self) -> int:

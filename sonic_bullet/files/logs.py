@@ -13,6 +13,7 @@ The container is `container`'s npz. Scalars, names and references are JSON (`hea
       material_stiffness_pa (n, 6, 6) f8    materials and models are stored once each, however many bodies share them
       residual<i>_<field> f8                 of material i, where it has one: the arrays of `Residual`
       model<i>_freq_hz, _decay_per_s (m,) f8, _shape (v, 3, m) f4, _vertex_m (v, 3) f8, _face (f, 3) i4, _curvature_per_m (f,) f8
+      model<i>_bend_s2_m2, _choke_s_m (m,) f8  only where its modes go with their level
     format "sonic-bullet-model/1"           one model: model0_… as above
 
 A reader checks sizes before it allocates and records check their invariants, so a cut, foreign or forged file is one line of LogError.
@@ -44,6 +45,8 @@ MODEL_ARRAYS: dict[str, tuple[type, tuple[int | None, ...]]] = {
     "face": (np.int32, (None, 3)),
     "curvature_per_m": (float, (None,)),
 }
+BENT_ARRAYS = ("bend_s2_m2", "choke_s_m")
+"""Of models whose modes go with their level; others have none."""
 RESIDUAL_ARRAYS: dict[str, tuple[int | None, ...]] = {
     **{f"{part}_{name}": (None,) for part in ("mode", "line") for name in ("freq_hz", "decay_per_s", "amplitude")},
     "freq_hz": (None,),
@@ -202,9 +205,8 @@ def _material_key(material: Material) -> bytes:
 
 def _model_key(model: ModalModel) -> bytes:
     digest = hashlib.sha256(msgspec.json.encode(_pack_model(model)))
-    for name in MODEL_ARRAYS:
-        array = getattr(model, name)
-        digest.update(repr(array.shape).encode() + array.tobytes())
+    for name, array in _model_arrays(model, 0).items():
+        digest.update(f"{name} {array.shape}".encode() + array.tobytes())
     return digest.digest()
 
 
@@ -250,11 +252,13 @@ def _text(text: str) -> str:
 
 
 def _model_arrays(model: ModalModel, index: int) -> dict[str, Array]:
-    return {f"model{index}_{name}": getattr(model, name) for name in MODEL_ARRAYS}
+    names = (*MODEL_ARRAYS, *(name for name in BENT_ARRAYS if getattr(model, name) is not None))
+    return {f"model{index}_{name}": getattr(model, name) for name in names}
 
 
 def _unpack_model(header: _Model, arrays: Mapping[str, Array], index: int, path: object) -> ModalModel:
     parts = {name: take(arrays, f"model{index}_{name}", dtype, shape, path) for name, (dtype, shape) in MODEL_ARRAYS.items()}
+    parts |= {name: take(arrays, f"model{index}_{name}", float, (None,), path) for name in BENT_ARRAYS if f"model{index}_{name}" in arrays}
     return ModalModel(**parts, volume_m3=header.volume_m3, mass_kg=header.mass_kg, dropped=header.dropped, note=header.note)
 
 

@@ -239,6 +239,7 @@ def skin(section: Section, cells: int) -> tuple[Array, Array]:
 
 
 def angles(cells: int) -> Array:
+    """Angles (2·cells,) in rad about the axis at which the skin has its points."""
     return np.arange(2 * cells) * np.pi / cells
 
 

@@ -92,7 +92,11 @@ def with_bodies(setup: Setup, state: State, bodies: Sequence[Body]) -> State:
     modes = [
         part
         for s, more in zip(new, beside, strict=True)
-        for part in (bank.ModeSet(s.omega_rad_s, s.decay_per_s, s.weight), *((s.rigid or _nothing(setup),) * 3), line_modes(more, len(s.weight)))
+        for part in (
+            bank.ModeSet(s.omega_rad_s, s.decay_per_s, s.weight, bend=s.bend, choke=s.choke),
+            *((s.rigid or _nothing(setup),) * 3),
+            line_modes(more, len(s.weight)),
+        )
     ]
     instrument, ringing = bank.append(state.bank, state.ringing, modes)
     air, travelling = path.append_bodies(state.path, state.travelling, *_places(new))

@@ -42,12 +42,15 @@ class ModeSet:
 
     held: forces act evenly over the sample before each instant, (e^s - 1)/s, and strikes' impulses over their spacing, not at once: for modes
     that are gone within a few samples, of which a slow force must leave its slope alone.
+    bend, choke (m,): of level-dependent modes, ω (1 + bend·|z|²) and d (1 + choke·|z|); None: linear. See `bank_kernel.bend_poles`.
     """
 
     omega_rad_s: Array
     decay_per_s: Array
     weight: Array
     held: bool = False
+    bend: Array | None = None
+    choke: Array | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,7 +72,7 @@ class Bank:
 
     log_pole (2·modes,): s/sr, real parts first; pole = e^{s/sr}; block = e^{256 s/sr}; quadrature (modes,) = d/ω; weight (W, 2·modes);
     heard (W, b): whether any weight of the body is not zero. held (modes,): of `ModeSet`; there 1 + i·quadrature is what (1 + i d/ω)(e^s - 1)/s
-    is to its real part, which is in the weight.
+    is to its real part, which is in the weight. bend, choke (modes,), bent (b,): of bodies whose poles go with their level.
     """
 
     sr: int
@@ -82,6 +85,9 @@ class Bank:
     weight: Array
     heard: Array
     held: Array
+    bend: Array
+    choke: Array
+    bent: Array
 
     @property
     def body_count(self) -> int:
@@ -96,6 +102,7 @@ class Bank:
 class BankState:
     """What the bank remembers. at: the next sample. z, driven (2·modes,): free state at the next block's start, and what was driven since
     this block's. sound (W, b, 256): the block's free ringing. ringing, is_driven, tiled (b,): what of it is in use. pending: strikes under way.
+    pole, block (2·modes,): the bank's own, bent by level where a body is.
     """
 
     at: int
@@ -106,10 +113,12 @@ class BankState:
     is_driven: Array
     tiled: Array
     pending: Pending
+    pole: Array
+    block: Array
 
     def copy(self) -> BankState:
         """A state of its own: advancing one leaves the other."""
-        arrays: dict[str, Any] = {name: getattr(self, name).copy() for name in ("z", "driven", "sound", "ringing", "is_driven", "tiled")}
+        arrays: dict[str, Any] = {name: getattr(self, name).copy() for name in ("z", "driven", "sound", "ringing", "is_driven", "tiled", "pole", "block")}
         return BankState(at=self.at, pending=self.pending.copy(), **arrays)
 
 
@@ -129,9 +138,11 @@ def empty_bank(sr: int, weight_sets: int = 1, at: int = 0) -> tuple[Bank, BankSt
         raise AudioError(f"sample rate {sr}", "give a whole number of Hz, 44100 or 48000 say")
     none, flags = np.zeros(0), np.zeros(0, bool)
     bank = Bank(
-        int(sr), np.zeros(1, np.int64), np.zeros(0, np.int64), none, none, none, none, np.zeros((weight_sets, 0)), np.zeros((weight_sets, 0), bool), flags
-    )
-    return bank, BankState(int(at), none.copy(), none.copy(), np.zeros((weight_sets, 0, BLOCK)), flags.copy(), flags.copy(), flags.copy(), Pending.none())
+        int(sr), np.zeros(1, np.int64), np.zeros(0, np.int64), none, none, none, none, np.zeros((weight_sets, 0)), np.zeros((weight_sets, 0), bool), flags,
+        none, none, flags,
+    )  # fmt: skip
+    silent = (np.zeros((weight_sets, 0, BLOCK)), flags.copy(), flags.copy(), flags.copy(), Pending.none())
+    return bank, BankState(int(at), none.copy(), none.copy(), *silent, none.copy(), none.copy())
 
 
 def append(bank: Bank, state: BankState, bodies: Sequence[ModeSet]) -> tuple[Bank, BankState]:
@@ -159,11 +170,13 @@ def append(bank: Bank, state: BankState, bodies: Sequence[ModeSet]) -> tuple[Ban
     s = np.zeros(total, complex)
     pole, block = np.zeros(total, complex), np.zeros(total, complex)
     quadrature, weight, held = np.zeros(total), np.zeros((sets, total), complex), np.zeros(total, bool)
+    bend, choke = np.zeros(total), np.zeros(total)
     if len(place):
         omega, decay = np.concatenate([x.omega_rad_s for x in bodies]), np.concatenate([x.decay_per_s for x in bodies])
         step = (-decay + 1j * omega) / bank.sr
         s[place], pole[place], block[place] = step, np.exp(step), np.exp(BLOCK * step)
         held[place] = np.repeat([x.held for x in bodies], sizes)
+        bend[place], choke[place] = (np.concatenate([_or_zero(getattr(x, name), m) for x, m in zip(bodies, sizes, strict=True)]) for name in ("bend", "choke"))
         onset = (1 + 1j * decay / omega) * np.where(held[place], np.expm1(step) / step, 1.0)
         quadrature[place] = np.where(held[place], onset.imag / onset.real, decay / omega)
         weight[:, place] = flushed(np.concatenate([x.weight for x in bodies], axis=1) * np.where(held[place], onset.real, 1.0))
@@ -179,6 +192,9 @@ def append(bank: Bank, state: BankState, bodies: Sequence[ModeSet]) -> tuple[Ban
         np.stack([_joined(bank.weight[w], weight[w]) for w in range(sets)]).reshape(sets, -1),
         np.concatenate([bank.heard, heard], axis=1),
         np.concatenate([bank.held, held]),
+        np.concatenate([bank.bend, bend]),
+        np.concatenate([bank.choke, choke]),
+        np.concatenate([bank.bent, np.array([x.bend is not None or x.choke is not None for x in bodies], bool)]),
     )
     state = state.copy()
     silent, flags = np.zeros(total, complex), np.zeros(len(bodies), bool)
@@ -190,6 +206,8 @@ def append(bank: Bank, state: BankState, bodies: Sequence[ModeSet]) -> tuple[Ban
         ringing=np.concatenate([state.ringing, flags]),
         is_driven=np.concatenate([state.is_driven, flags]),
         tiled=np.concatenate([state.tiled, flags]),
+        pole=_joined(state.pole, pole),
+        block=_joined(state.block, block),
     )
 
 
@@ -218,7 +236,7 @@ def advance(bank: Bank, state: BankState, n: int, strikes: Sequence[Strike] = ()
     out = np.zeros((bank.weight.shape[0], bank.body_count, n))
     done = np.zeros(len(pending.body), bool)
     bank_kernel.advance(
-        state.at, out, bank.offset, bank.count, bank.pole, bank.block, bank.quadrature, bank.weight, bank.heard,
+        state.at, out, bank.offset, bank.count, state.pole, state.block, bank.log_pole, bank.bend, bank.choke, bank.bent, bank.quadrature, bank.weight, bank.heard,
         state.z, state.driven, state.sound, state.ringing, state.is_driven, state.tiled, FLOOR**2,
         np.searchsorted(pending.body, np.arange(bank.body_count + 1)), pending.count, pending.whole, pending.delta, pending.phase,
         pending.upcoming, pending.first, pending.impulse, pending.impulse_at, pending.rows.reshape(-1), pending.rows_at, done,
@@ -227,6 +245,14 @@ def advance(bank: Bank, state: BankState, n: int, strikes: Sequence[Strike] = ()
     state.at += n
     state.pending = without(pending, done, bank.offset)
     return out
+
+
+def _or_zero(values: Array | None, m: int) -> Array:
+    if values is None:
+        return np.zeros(m)
+    if np.shape(values) != (m,) or not np.isfinite(values).all():
+        raise AudioError(f"bend or choke of shape {np.shape(values)} for {m} modes", "give a finite number for each mode")
+    return np.asarray(values, float)
 
 
 def _joined(flat: Array, more: Array) -> Array:
