@@ -2,6 +2,8 @@
 
 import pybullet_data
 
+import sonic_bullet as sb
+
 SECONDS = 2.5
 MICROPHONE = (0.0, -0.6, 0.4)
 
@@ -13,5 +15,6 @@ def build(client):
     mug = client.loadURDF("objects/mug.urdf", [0, 0, 0.25], client.getQuaternionFromEuler([0.5, 0.3, 0.0]))
     client.changeDynamics(mug, -1, mass=0.35, localInertiaDiagonal=[5e-4, 5e-4, 5e-4])  # the file says 1 kg and 1 kg·m²
     for body, restitution in ((board, 0.8), (mug, 0.6)):
-        client.changeDynamics(body, -1, restitution=restitution, contactProcessingThreshold=0)
+        client.changeDynamics(body, -1, restitution=restitution)
+    sb.keep_restitution(client)
     return {board: "wood", mug: "porcelain"}

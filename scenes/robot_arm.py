@@ -7,6 +7,8 @@ import math
 
 import pybullet_data
 
+import sonic_bullet as sb
+
 SECONDS = 4.0
 MICROPHONE = (0.6, -0.8, 0.5)
 WRIST = 5
@@ -34,7 +36,8 @@ def build(client):
     cast[duck] = "plastic"
     for body in range(client.getNumBodies()):
         for link in range(-1, client.getNumJoints(body)):
-            client.changeDynamics(body, link, restitution=0.5, lateralFriction=0.5, contactProcessingThreshold=0)
+            client.changeDynamics(body, link, restitution=0.5, lateralFriction=0.5)
+    sb.keep_restitution(client)
     return cast
 
 

@@ -2,6 +2,8 @@
 
 import math
 
+import sonic_bullet as sb
+
 SECONDS = 3.0
 MICROPHONE = (0.0, -0.5, 0.3)
 RADIUS_M = 0.015
@@ -17,8 +19,9 @@ def build(client):
     mass = 7850 * 4 / 3 * math.pi * RADIUS_M**3
     ball = client.createMultiBody(mass, client.createCollisionShape(client.GEOM_SPHERE, radius=RADIUS_M), basePosition=[-1.0, 0, RADIUS_M])
     for body in (smooth, rough, ball):
-        client.changeDynamics(body, -1, contactProcessingThreshold=0, lateralFriction=0.6, linearDamping=0, angularDamping=0)
+        client.changeDynamics(body, -1, lateralFriction=0.6, linearDamping=0, angularDamping=0)
     client.resetBaseVelocity(ball, [SPEED_M_S, 0, 0], [0, SPEED_M_S / RADIUS_M, 0])
+    sb.keep_restitution(client)
     return {
         smooth: {"material": "wood", "roughness_m": 0.1e-6},
         rough: {"material": "wood", "roughness_m": 4e-6},

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pybullet_data
 
+import sonic_bullet as sb
+
 SECONDS = 5.0
 MICROPHONE = [(-0.15, -0.7, 0.5), (0.15, -0.7, 0.5)]
 ASSETS = Path(__file__).resolve().parent.parent / "assets"
@@ -53,5 +55,6 @@ def build(client):
     client.changeDynamics(toy, -1, mass=700 * 86.9e-6, localInertiaDiagonal=[6e-5, 4e-5, 8e-5])  # the file says 1 kg·m²
     cast[toy] = "wood"
     for body in cast:
-        client.changeDynamics(body, -1, restitution=0.75, lateralFriction=0.5, rollingFriction=1e-4, spinningFriction=2e-5, contactProcessingThreshold=0)
+        client.changeDynamics(body, -1, restitution=0.75, lateralFriction=0.5, rollingFriction=1e-4, spinningFriction=2e-5)
+    sb.keep_restitution(client)
     return cast

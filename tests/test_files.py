@@ -212,7 +212,7 @@ def test_over_four_gibibytes_wav_becomes_rf64_and_a_stream_stops_whole(tmp_path:
     assert files.read_audio(tmp_path / "c.partial.wav")[0].shape == (1, 800)
 
 
-@pytest.mark.parametrize("name", ["a.txt", "a", "a.wav.exe", "no/such/folder/a.wav", "", "a\0.wav"])
+@pytest.mark.parametrize("name", ["a.txt", "a", "a.wav.exe", "no/such/folder/a.wav", "/proc/a.wav", "", "a\0.wav"])
 def test_a_place_that_cannot_be_written_is_one_line(tmp_path: Path, name: str) -> None:
     with pytest.raises(FileError) as caught:
         files.write_audio(str(tmp_path / name) if name else name, noise(), SR)

@@ -136,7 +136,10 @@ class AudioWriter:
         self.frames = self.clipped = self.over = 0
         self.peak_pa = self.energy_pa2 = 0.0
         try:
+            self.temporary.touch()  # libsndfile does not say why it could not
             self.file: Any = soundfile.SoundFile(self.temporary, "w", self.sr, channels, self.subtype, format=self.format)
+        except OSError as error:
+            raise cannot("write", path, error) from error
         except soundfile.LibsndfileError as error:
             self.temporary.unlink(missing_ok=True)
             raise AudioError(f"cannot write {channels} channels at {self.sr} Hz to {path}: {error.error_string}", "write .wav, or fewer channels") from error
