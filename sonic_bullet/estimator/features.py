@@ -10,10 +10,12 @@
     -> Features
 
 A mode is significant where its energy over the noise density exceeds what the strongest of as many noise cells as the recording holds
-reaches once in five recordings: T > 2 ln(1.5 n / 0.2) [Kay 1998, Detection Theory, ch. 7.6]. No number is tuned to a recording.
+reaches once in twenty recordings: T > 2 ln(1.5 n / 0.05) [Kay 1998, Detection Theory, ch. 7.6]. No number is tuned to a recording.
 """
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 import numpy as np
 
@@ -25,7 +27,7 @@ from sonic_bullet.estimator.values import Features
 from sonic_bullet.records import Array
 
 FASTEST_PER_S = 3000.0
-FALSE_ALARMS = 0.2
+FALSE_ALARMS = 0.05
 BAND_HZ = 500.0
 EARLY_PER_S = 150.0  # modes faster than this are largely over when a band's filter is full
 ROUNDS = 6
@@ -119,7 +121,8 @@ def _modes(x: Array, sr: int, band_hz: tuple[float, float]) -> tuple[Modes, Nois
     modes, noise = _first(x, sr, band_hz, least, floor)
     most = min(MOST_MODES, len(x) // LEAST_SAMPLES_A_MODE)
     for _ in range(ROUNDS):
-        more = matched(likelihood.residual(x, modes, sr), noise, band_hz, least, FASTEST_PER_S)[: max(0, min(MANY, most - len(modes.pole)))]
+        more = matched(likelihood.residual(x, modes, sr), noise, band_hz, _needed(modes.pole, least), FASTEST_PER_S)
+        more = more[: max(0, min(MANY, most - len(modes.pole)))]
         if not len(more):
             break
         trial = _pruned(x, band_hz, _fit(x, likelihood.amplitudes(x, np.concatenate([modes.pole, more]), sr), sr, band_hz), noise, least)
@@ -128,6 +131,24 @@ def _modes(x: Array, sr: int, band_hz: tuple[float, float]) -> tuple[Modes, Nois
         modes, noise = trial, measured(likelihood.residual(x, trial, sr), sr, floor, len(trial.pole))
     modes = _pruned(x, band_hz, _fit(x, modes, sr, band_hz, THOROUGH), noise, least)
     return modes, measured(likelihood.residual(x, modes, sr), sr, floor, len(modes.pole))
+
+
+def _beside(modes: int, least: float) -> float:
+    """Least energy of a second mode in a line: it has the few cells beside the lines to chance upon, not the whole recording."""
+    return min(least, 2 * np.log(1.5 * 2 * NEAR * max(modes, 1) / FALSE_ALARMS))
+
+
+def _needed(pole: Array, least: float) -> Callable[[Array], Array]:
+    """Least energy (n,) of a mode at frequencies (n,) in Hz, given those that are there."""
+    centre, reach = np.abs(pole.imag) / (2 * np.pi), NEAR * -pole.real / (2 * np.pi)
+
+    def at(freq_hz: Array) -> Array:
+        need = np.full(len(freq_hz), least)
+        for first, last in zip(np.searchsorted(freq_hz, centre - reach), np.searchsorted(freq_hz, centre + reach), strict=True):
+            need[first:last] = _beside(len(pole), least)
+        return need
+
+    return at
 
 
 def _first(x: Array, sr: int, band_hz: tuple[float, float], least: float, floor: float) -> tuple[Modes, Noise]:
@@ -163,7 +184,7 @@ def _pruned(x: Array, band_hz: tuple[float, float], modes: Modes, noise: Noise, 
         far, fade = np.abs(modes.pole.imag[:, None] - modes.pole.imag), -modes.pole.real
         near = far < NEAR * np.maximum(fade[:, None], fade)
         vague = (fade < TOLD * spread[1] * met) & (near.sum(axis=1) > 1)
-        weak = np.flatnonzero((energy <= least) | vague)
+        weak = np.flatnonzero((energy <= np.where(near.sum(axis=1) > 1, _beside(len(fade), least), least)) | vague)
         if not len(weak):
             break
         rival = near[np.ix_(weak, weak)] & (energy[weak] < energy[weak, None])  # two that share one line: one may stay

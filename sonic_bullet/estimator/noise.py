@@ -1,6 +1,7 @@
 """What in a recording is no mode: its density over frequency and its course over time, both blind to lines.
 
-    σ(f): rms per sample as if white at the level of f; lower quartile of |X|² over a neighbourhood, ln(4/3) of the mean of exponential power
+    σ(f): rms per sample as if white at the level of f, from a neighbourhood's |X|², whose law is exponential: its lower quartile is ln(4/3) of the
+          mean; once the modes are gone, the lower half, σ² = (Σ_{i≤r} x_(i) + (N − r) x_(r))/r, r = N/2, scatters less    [Epstein & Sobel 1953]
     e(t): power over time in frames, the median over frequency of |X_m(f)|²/σ²(f), ln 2 of the mean; 1 throughout where noise is steady
     a mode of decay d meets σ²(f) Σ e(t) e^{−2dt} / Σ e^{−2dt}
 
@@ -10,6 +11,7 @@ for many fast modes, and the spreads of the fast ones would be too small.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -48,13 +50,25 @@ def white(rms: float, sr: int) -> Noise:
 
 def measured(left: Array, sr: int, floor: float, modes: int = 0) -> Noise:
     """Noise of what is left (n,) of a recording without its modes, four numbers each; floor: least density."""
-    density = np.maximum(noise_density(left) * np.sqrt(len(left) / max(len(left) - 4 * modes, 0.1 * len(left))), floor)
+    density = np.maximum(_lower_half(left) * np.sqrt(len(left) / max(len(left) - 4 * modes, 0.1 * len(left))), floor)
     count = len(left) // FRAME
     frames = left[: count * FRAME].reshape(count, FRAME) * np.hanning(FRAME + 2)[1:-1]
     power = np.abs(np.fft.rfft(frames, axis=1))[:, 2:-2] ** 2 / (3 / 8 * FRAME)
     here = np.interp(np.linspace(0, 1, FRAME // 2 + 1)[2:-2], np.linspace(0, 1, len(density)), density)
     course = np.median(power / here**2, axis=1) / np.log(2)
     return Noise(density, np.maximum(course, 1e-3) if count else np.ones(1), sr)
+
+
+def _lower_half(left: Array) -> Array:
+    """Rms per sample (n_f,) over frequency 0 … sr/2, from the lower half of the power in neighbourhoods that overlap."""
+    power = np.abs(np.fft.rfft(left)) ** 2 / len(left)
+    width = min(max(26, len(power) // 60), len(power))
+    side = np.pad(power, width // 2, mode="reflect")
+    near = np.sort(np.lib.stride_tricks.sliding_window_view(side, width)[:: max(1, width // 8)], axis=1)
+    r = width // 2
+    mean = (near[:, :r].sum(axis=1) + (width - r) * near[:, r - 1]) / r
+    at = np.arange(0, len(side) - width + 1, max(1, width // 8))
+    return np.asarray(np.sqrt(np.interp(np.arange(len(power)), at, mean)))
 
 
 def noise_density(signal: Array, *, tail: bool = False) -> Array:
@@ -76,8 +90,8 @@ def noise_density(signal: Array, *, tail: bool = False) -> Array:
     return np.asarray(np.sqrt(smooth / np.log(4 / 3)))
 
 
-def matched(left: Array, noise: Noise, band_hz: tuple[float, float], least: float, fastest_per_s: float) -> Array:
-    """Poles (k,) whose matched filter on what is left (n,) answers with T > least, each the peak of its neighbourhood.
+def matched(left: Array, noise: Noise, band_hz: tuple[float, float], needed: Callable[[Array], Array], fastest_per_s: float) -> Array:
+    """Poles (k,) whose matched filter on what is left (n,) answers with T > needed(Hz), each the peak of its neighbourhood.
 
     T(ω, d) = 2|Σ x e^{−(d+iω)t}|² / (σ² Σ e^{−2dt}) [Kay 1998, eq. 7.29 with an exponential envelope], d in octaves: every resolution.
     """
@@ -94,7 +108,7 @@ def matched(left: Array, noise: Noise, band_hz: tuple[float, float], least: floa
         score[i] = 2 * np.abs(np.fft.rfft(left * fade, size)) ** 2 / (sigma2 * (share[i] * float(fade @ fade)))
     score[:, (freq < band_hz[0]) | (freq > band_hz[1])] = 0
     best = score.max(axis=0)
-    peak = np.flatnonzero((best[1:-1] > least) & (best[1:-1] >= best[:-2]) & (best[1:-1] > best[2:])) + 1
+    peak = np.flatnonzero((best[1:-1] > needed(freq)[1:-1]) & (best[1:-1] >= best[:-2]) & (best[1:-1] > best[2:])) + 1
     chosen: list[complex] = []
     for at in peak[np.argsort(-best[peak], kind="stable")]:
         d, f = decay[int(np.argmax(score[:, at]))], freq[at]
