@@ -32,7 +32,7 @@ FASTEST_RIGID = 0.6
 @dataclass(frozen=True, slots=True, eq=False)
 class Sounder:
     """omega_rad_s, decay_per_s (m,): with the air's damping. weight (w, m): complex, one row a weight set (row 0: pressure at 1 m).
-    shape (v, 3, m) float32: audible modes only. size_m: cube root of the volume. jerk_pa_s3: dipole coefficient [Chadwick 2012]. dropped: modes not played.
+    bend, choke (m,): of frequency per |z|², of decay per |z|, None in a linear body. shape (v, 3, m) float32: audible modes only. size_m: cube root of the volume. jerk_pa_s3: dipole coefficient [Chadwick 2012]. dropped: modes not played.
     """
 
     body: Body
@@ -46,6 +46,8 @@ class Sounder:
     radius_m: float
     rigid: ModeSet | None
     dropped: int
+    bend: Array | None = None
+    choke: Array | None = None
 
     @property
     def mode_count(self) -> int:
@@ -100,7 +102,11 @@ def build_sounder(body: Body, sensors: tuple[Sensor, ...], sr: int, air: Air) ->
     normal = normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
     radius = float(np.linalg.norm(model.vertex_m, axis=1).max(initial=0.0))
     dropped = model.dropped + int(np.sum(~keep))
-    return Sounder(body, omega, decay, weight, shape, index, normal, _size(body), radius, _rigid(body, 1 + len(readers), sr, air), dropped)
+    rigid = _rigid(body, 1 + len(readers), sr, air)
+    most = np.sqrt((shape.astype(float) ** 2).sum(axis=1)).max(axis=0, initial=0.0)  # velocity at the surface of a mode with |z| = 1
+    bend = None if model.bend_s2_m2 is None else model.bend_s2_m2[keep] * most**2
+    choke = None if model.choke_s_m is None else model.choke_s_m[keep] * most
+    return Sounder(body, omega, decay, weight, shape, index, normal, _size(body), radius, rigid, dropped, bend, choke)
 
 
 def _rigid(body: Body, sets: int, sr: int, air: Air) -> ModeSet | None:
