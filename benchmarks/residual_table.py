@@ -3,7 +3,8 @@
 Practice cases: fit and residual from the 'fit' strikes, judged on 'holdout' strikes, at the amplitudes that the fitted model predicts.
 Measured objects with two recordings or more have no mesh: their features stand in for modes. Modes are the damped sinusoids that the first half of the strikes
 share, with the mean of their amplitudes; a strike of the second half is predicted by them at the strike's own level (one gain a strike, the same with and without
-the residual). Distance: `estimator.distance.log_spectral_db` (dB, cells 10 dB above the recording's noise), each prediction given that noise.
+the residual). Distance: `estimator.distance.log_spectral_db` (dB, cells 10 dB above the recording's noise), each prediction given that noise; with the residual, the mean over
+three grains of its noise.
 """
 
 from __future__ import annotations
@@ -35,6 +36,7 @@ SECONDS = 1.0
 LEAST_S = 0.2
 MOST = 3  # strikes fitted, and strikes judged, of one object
 BEFORE_S = 0.02
+GRAINS = 3
 
 Row = tuple[str, float, float, float]
 
@@ -42,9 +44,9 @@ Row = tuple[str, float, float, float]
 def judged(name: str, sound: Array, sr: int, modes: tuple[Array, Array, Array], strikes: Strikes, floor: Floor) -> Row:
     """Distances without and with the residual, and of the noise alone."""
     plain = damped(*modes, len(sound), sr)
-    whole = plain + residual_sound(strikes.residual, *modes, len(sound), sr)
-    without, beside = (log_spectral_db(sound, with_noise(x, floor, 1), floor) for x in (plain, whole))
-    return name, without, beside, noise_floor_db(plain, floor)
+    grains = [residual_sound(strikes.residual, *modes, len(sound), sr, seed) for seed in range(GRAINS)]
+    without, *beside = (log_spectral_db(sound, with_noise(plain + x, floor, 1), floor) for x in (np.zeros(len(sound)), *grains))
+    return name, without, float(np.mean(beside)), noise_floor_db(plain, floor)
 
 
 def of_case(folder: Path) -> Iterator[Row]:

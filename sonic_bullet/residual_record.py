@@ -8,6 +8,13 @@ import numpy as np
 
 from sonic_bullet.arrays import Array, frozen_array, require, store
 
+MOST = {"freq_hz": 1e6, "decay_per_s": 1e6, "amplitude": 1e6, "time_s": 1e4, "power_per_hz": 1e9}
+"""Beyond these no number is of a sound, and products of them overflow."""
+SLOWEST_HZ = 0.01
+LOUDER = 1.1
+"""A preset's levels are kept to a quarter of a decibel."""
+FAINTEST = 1e-6
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Residual:
@@ -15,7 +22,8 @@ class Residual:
 
     mode_* (m,), ascending: the source's modes, amplitudes at the onset, mean square over the strikes. line_* (l,): what features add that modes do not.
     freq_hz (b,), time_s (n,) ascending from the onset on: centres of the cells of power_per_hz (b, n), noise power per Hz (two-sided), bilinear between them.
-    clip_energy: of the recordings, in amplitude² · s: what is left cannot be twice as much. source: what it was taken from. No unit but Hz and s is left in it.
+    clip_energy: of the recordings, in amplitude² · s: what is left of them is no more. source: what it was taken from. No unit but Hz and s is left in it.
+    Raises RecordError where that cannot be: arrays that do not fit, NaN, no modes, modes 60 dB below the recordings, more left than there was.
     """
 
     mode_freq_hz: Array
@@ -43,12 +51,19 @@ class Residual:
             value = getattr(self, name)
             require(bool((value >= 0).all() and (np.diff(value) > 0).all() and value[-1] > 0), f"residual {name} does not ascend", "take the residual anew")
         low = min(float(getattr(self, name).min(initial=0.0)) for name in shapes)
-        require(low >= 0 and bool((self.mode_freq_hz > 0).all() and (self.line_freq_hz > 0).all()), "a residual with numbers below zero", "take it anew")
+        slow = min(float(self.mode_freq_hz[0]), float(self.line_freq_hz.min(initial=1.0)))
+        require(low >= 0 and slow > 0, "a residual with numbers below zero", "take it anew")
+        require(slow >= SLOWEST_HZ, f"a residual's line at {slow:.3g} Hz", "take it anew: nothing rings there")
+        for name in shapes:
+            value, most = float(getattr(self, name).max(initial=0.0)), next(top for part, top in MOST.items() if name.endswith(part))
+            require(value <= most, f"residual {name} of {value:.3g}", f"take it anew: nothing of a sound is above {most:.0e}")
+        energy, modal = self.energy, float((self.mode_amplitude**2 / (4 * np.maximum(self.mode_decay_per_s, 0.1))).sum())
         require(
-            self.energy <= 2 * self.clip_energy < np.inf,
+            energy <= LOUDER * self.clip_energy < np.inf,
             "a residual louder than the recordings it was taken from",
             "take it anew: what is left of a sound is less",
         )
+        require(modal >= FAINTEST * energy and modal > FAINTEST**2, "a residual beside modes too faint to follow", "take it from a strike that excites them")
 
     @property
     def share_of_clip(self) -> float:

@@ -4,7 +4,8 @@
     Blow  -> a² of each pair of modes, at each sensor's weights -> Grain              level, place and pulse as the modes have them
     Drive -> sections of force -> Grain
 
-Lines weigh i·c/a times what their mode weighs: a quarter turn away, so that at one frequency powers add, as a residual of powers says.
+Lines weigh i·c/a times what their mode weighs: a quarter turn away, so that at one frequency powers add, as a residual of powers says. Where a mode's
+frequency or decay hangs on its level, so do those of the lines that follow it.
 All is in the bank's units (Pa·m, or what another sensor reads), before the sound path; no gain of its own.
 """
 
@@ -58,7 +59,8 @@ def build_beside(sounder: Sounder, sr: int, air: Air) -> Beside | None:
     keep = audible(omega, decay, sr)
     at, follows = at[keep], follows[keep]
     weight = 1j * voice.lines.ratio[at] * sounder.weight[:, follows]
-    return Beside(voice, ModeSet(omega[keep], decay[keep], weight), follows, group)
+    bend, choke = (None if x is None else x[follows] for x in (sounder.bend, sounder.choke))
+    return Beside(voice, ModeSet(omega[keep], decay[keep], weight, bend=bend, choke=choke), follows, group)
 
 
 @lru_cache(maxsize=64)

@@ -4,8 +4,8 @@
     P_residual = max(P_recorded - P_represented, 0)                                             pixel by pixel
 
 For a preset it is told in two parts. What is left of the features, √(1 - R_i²) of each, is lines: their frequencies are known far better than a spectrogram
-shows them. What is left beside all features is noise, of which bands and times keep the mean, less the recording's own floor, and less what is not noise: the foot of lines that
-are no pure damped sinusoids would else be spread over whole bands.
+shows them. What is left beside all features is noise, of which bands and times keep the mean, less the recording's own floor, less what most strikes do not have, and
+less what is not noise: the foot of lines that are no pure damped sinusoids would else be spread over whole bands.
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ BAND_OCTAVES = 1 / 6
 GROWTH = 1.12
 ABOVE = 2.0
 """Cells whose mean is less than this times the floor are the floor."""
+LOWEST_HZ = 20.0
 NEPERS = 40.0
 
 
@@ -88,6 +89,17 @@ def cells(left: Power, floor_per_hz: Array) -> tuple[Array, Array, Array]:
     return centre_hz[kept], centre_s, np.where(heard, mean - quiet[:, None], 0.0)[kept]
 
 
+def shared_cells(left: list[Power]) -> tuple[Array, Array, Array]:
+    """`cells` of the mean over strikes, where most strikes have some for themselves: what one of two has and the other has not is no property of the body.
+
+    Nothing below `LOWEST_HZ`: that is drift.
+    """
+    mean = Power(left[0].freq_hz, left[0].time_s, np.mean([p.per_hz for p in left], axis=0))
+    freq, time, per_hz = cells(mean, noise_floor_per_hz(mean))
+    most = np.mean([cells(p, noise_floor_per_hz(p))[2] > 0 for p in left], axis=0) > 0.5
+    return freq, time, np.where(most & (freq >= LOWEST_HZ)[:, None], per_hz, 0.0)
+
+
 def noisiness(fine: Power, freq_hz: Array, time_s: Array) -> Array:
     """(b, n) share of the power in bands about freq_hz (b,) that is noise: median over mean across a band's fine bins, ln 2 for noise, little where lines remain."""
     edge = np.concatenate([[0.0], (freq_hz[1:] + freq_hz[:-1]) / 2, [np.inf]])
@@ -110,9 +122,7 @@ def residual_record(
     """
     if not len(recorded) or recorded.shape != left.shape:
         raise AudioError(f"recordings of shape {recorded.shape}, of which {left.shape} is left", "give strikes of one length")
-    parts = [power(x, sr) for x in left]
-    mean = Power(parts[0].freq_hz, parts[0].time_s, np.mean([p.per_hz for p in parts], axis=0))
-    freq, time, per_hz = cells(mean, noise_floor_per_hz(mean))
+    freq, time, per_hz = shared_cells([power(x, sr) for x in left])
     per_hz = per_hz * np.mean([noisiness(power(x, sr, FINE_WINDOW), freq, time) for x in left], axis=0)
     unit = float(modes.amplitude.max())
     if not unit > 0:
@@ -121,9 +131,10 @@ def residual_record(
     energy = line_amplitude**2 / (4 * np.maximum(line_decay_per_s, 0.1))
     order = np.argsort(-energy, kind="stable")[:LINES_MOST]
     order = np.sort(order[energy[order] > LINE_FLOOR * min(float(energy.max(initial=0.0)), clip)])
-    if float(energy[order].sum()) + 2 * float(np.trapezoid(np.trapezoid(per_hz, time, axis=1), freq)) < 1e-6 * clip:
+    rest = float(energy[order].sum()) + 2 * float(np.trapezoid(np.trapezoid(per_hz, time, axis=1), freq))
+    if rest < 1e-6 * clip:
         order, per_hz = order[:0], np.zeros_like(per_hz)  # 60 dB below the clip: rounding, no residual
-    clip = max(clip, float(energy[order].sum()))  # lines that outlast the clip
+    clip = max(clip, rest)  # lines that outlast the clip
     return Residual(
         modes.freq_hz, modes.decay_per_s, modes.amplitude / unit, line_freq_hz[order], line_decay_per_s[order], line_amplitude[order] / unit,
         freq, time, per_hz / unit**2, clip / unit**2, source,

@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import lru_cache
+from math import log2
 
 import numpy as np
 from numba import njit
@@ -110,12 +111,14 @@ def placed(voice: Voice, struck_power: Array, tau_s: float, flat: bool, pulse: P
     most = float(struck_power.max(initial=0.0))
     if most <= 0 or voice.silent:
         return np.zeros((2, 0), np.float32), 0.0
-    step = np.round(np.maximum(10 * np.log10(np.maximum(struck_power / most, 1e-30)), LEAST_DB) / STEP_DB).astype(np.int16)
-    octave = round(8 * np.log2(max(tau_s, 1e-6)))
-    key = step.tobytes() + bytes(str((octave, flat)), "ascii")
+    step = np.empty(len(struck_power) + 2, np.int16)
+    octave = round(8 * log2(max(tau_s, 1e-6)))
+    step[-2:] = octave, flat
+    _steps(struck_power, most, step)
+    key = step.tobytes()
     found = voice.cache.get(key)
     if found is None:
-        gain = response(voice, 10 ** (step * STEP_DB / 10), pulse(axes(0, voice.sr)[0] * 2 ** (octave / 8), flat))
+        gain = response(voice, 10 ** (step[:-2] * STEP_DB / 10), pulse(axes(0, voice.sr)[0] * 2 ** (octave / 8), flat))
         found = filtered(voice, gain)
         while len(voice.cache) >= CACHED:
             voice.cache.pop(next(iter(voice.cache)))
@@ -144,6 +147,14 @@ def mixed_number(*parts: int) -> int:
 def fraction(number: int) -> float:
     """A number below 2⁶⁴ as a share of 1."""
     return (number >> 11) / (1 << 53)
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _steps(power: Array, most: float, step: Array) -> None:  # pragma: no cover - compiled
+    """step (p + 2,) ← levels of power (p,) below the most, in whole steps."""
+    least = most * 10.0 ** (LEAST_DB / 10.0)
+    for p in range(len(power)):
+        step[p] = round(10.0 * np.log10(max(power[p], least) / most) / STEP_DB)
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]

@@ -1,6 +1,10 @@
-"""A transferred residual as one clip, beside modes whose amplitudes are known: what the run time plays of one strike, without a scene.
+"""A transferred residual as one clip, without a scene.
 
-Residual + Modes (a complex) -> Voice -> lines, each a quarter turn from the mode it follows; a grain of noise -> samples
+recorded, represented + Modes of source and target -> transfer -> invert, from the source's phases -> samples             the paper's algorithm 1, on a recording
+Residual + Modes (a complex) -> Voice -> lines, each a quarter turn from the mode it follows; a grain of noise -> samples   what the run time plays of one strike
+
+Phases: a sinusoid of f_s seen at t_s stands at f_s t_s turns; carried to f_t and t_t it stands at f_t t_t. So each pixel takes the phase of the pixel it comes
+from, turned by f_t t_t - f_s t_s. A body carried onto itself turns nothing.
 """
 
 from __future__ import annotations
@@ -8,11 +12,33 @@ from __future__ import annotations
 import numpy as np
 
 from sonic_bullet.records import Array, Residual
-from sonic_bullet.residual.compute import damped
+from sonic_bullet.residual.compute import clip_residual, damped
 from sonic_bullet.residual.grains import filtered, make_voice, mixed_number, response, varied
-from sonic_bullet.residual.transfer import Modes, paired_power
+from sonic_bullet.residual.invert import MOST_ITERATIONS, invert, magnitude_of
+from sonic_bullet.residual.spectrogram import WINDOW, axes
+from sonic_bullet.residual.transfer import Modes, come_from, pair, paired_power, transfer
 
 LONGEST_S = 1.0
+LOOKING = 4
+"""Frames a quarter of a window apart, as `clip_residual` sees a recording."""
+
+
+def transferred_clip(recorded: Array, represented: Array, sr: int, source: Modes, target: Modes, *, seconds: float | None = None) -> Array:
+    """(n,) float32: the residual of a recording (k,), of which ``represented`` (k,) is said by modes ``source``, beside modes ``target``; as long as the recording
+    or ``seconds``. Raises AudioError as `clip_residual` and `Modes` do.
+    """
+    left, start = clip_residual(recorded, represented, sr)
+    pairs = pair(source, target)
+    n = len(recorded) if seconds is None else max(1, round(seconds * sr))
+    freq, time = axes(n, sr)
+    here, _, rate = come_from(pairs, freq)
+    there_s = np.minimum(rate * time[:, None], left.time_s[-1])
+    row = np.round(there_s * sr * LOOKING / WINDOW).astype(np.int64)
+    column = np.clip(np.round(here * WINDOW / sr).astype(np.int64), 0, WINDOW // 2)
+    flip = 1 - 2 * ((column + np.arange(len(freq))) % 2)  # phases are counted from a frame's beginning, half a window before its time
+    turned = np.exp(2j * np.pi * (freq * time[:, None] - here * there_s)) * flip
+    magnitude = magnitude_of(transfer(left, source, target, freq, time, pairs=pairs), sr)
+    return invert(magnitude, start[row, column] * turned, n, iterations=MOST_ITERATIONS, overlap=LOOKING)
 
 
 def residual_sound(residual: Residual, freq_hz: Array, decay_per_s: Array, amplitude: Array, n: int, sr: int, seed: int = 0) -> Array:

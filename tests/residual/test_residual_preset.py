@@ -4,18 +4,25 @@ from __future__ import annotations
 
 import base64
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import msgspec
 import numpy as np
 import pytest
+from made_models import box_body, row, step, wall_body
 from made_residuals import SR, modes, residual
 
 from sonic_bullet import presets
+from sonic_bullet.contacts import ContactLog
+from sonic_bullet.effects.stored import with_modes
 from sonic_bullet.errors import AudioError, MaterialError, RecordError
 from sonic_bullet.estimator.residual import recording_strikes, strikes_of
-from sonic_bullet.files import write_audio
-from sonic_bullet.records import Residual
+from sonic_bullet.files import read_log, write_audio
+from sonic_bullet.records import Air, Material, Microphone, Residual
+from sonic_bullet.render import render_log
+from sonic_bullet.render.beside import build_beside
+from sonic_bullet.render.sounder import build_sounder
 from sonic_bullet.residual.code import form_of, residual_of
 from sonic_bullet.residual.compute import damped
 
@@ -59,6 +66,12 @@ def test_a_residual_comes_back_from_its_preset(tmp_path: Path) -> None:
         ({"loudest_per_hz": 1e9}, "louder than the recordings"),
         ({"loudest_per_hz": -1.0}, "loudest_per_hz"),
         ({"clip_energy": 1e-12}, "louder than the recordings"),
+        ({"clip_energy": 0.9 * MADE.energy}, "louder than the recordings"),
+        ({"mode_amplitude": [1e-9, 0.0, 0.0, 0.0]}, "too faint"),
+        ({"mode_freq_hz": [400.0, 900.0, 1500.0, 1e300]}, "1e.300"),
+        ({"mode_decay_per_s": [8.0, 12.0, 20.0, 1e30]}, "1e.30"),
+        ({"line_freq_hz": [1e-9]}, "1e-09 Hz"),
+        ({"line_amplitude": [1e300]}, "1e.300"),
         ({"colour": 1}, "colour"),
         ({"time_s": "long"}, "time_s"),
     ],
@@ -68,6 +81,45 @@ def test_a_wrong_residual_is_one_line_that_names_the_file(tmp_path: Path, change
         presets.load_material(saved(tmp_path, **changes))
     assert "mine.json" in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+EFFECTS = [
+    {"id": "damping-law", "law": "constant-loss", "eta": 0.004},
+    {"id": "amplitude-pitch", "bend": 50.0, "measure": "velocity"},
+    {"id": "amplitude-damping", "choke": 30.0, "measure": "velocity", "alpha_per_s": 8.0, "beta_s": 1e-8},
+]
+
+
+def test_a_preset_with_effects_and_a_residual_plays_both(tmp_path: Path) -> None:
+    """Modes bend and choke by the effects, and the residual's lines do as the modes they follow; other than with either alone; the log keeps both."""
+    path = Path(saved(tmp_path))
+    content = json.loads(path.read_text())
+    path.write_text(json.dumps(content | {"effects": EFFECTS}))
+    both = presets.load_material(str(path))
+    assert both.residual is not None and len(both.effects) == len(EFFECTS)
+    body = box_body((0.2, 0.1, 0.01), (400.0, 900.0, 1500.0, 2600.0), both)
+    assert body.model is not None
+
+    def log(material: Material) -> ContactLog:
+        bodies = replace(body, material=material, model=with_modes(body.model, material)), wall_body()
+        hit = row(0, 1, (0, 0, -0.2), normal=(0, 0, -1), point_a=(0.03, 0.02, 0.005))
+        steps = tuple(step([(0, 0, 0), (0, 0, 0.01)], hit if i == 2 else None) for i in range(60))
+        return ContactLog(bodies, steps, (Microphone([0, 0, 1.0]),), SR, 0)
+
+    whole = log(both)
+    sound, plain = render_log(whole), render_log(whole, residual=False)
+    linear, straight = render_log(log(replace(both, effects=()))), render_log(log(replace(both, effects=())), residual=False)
+    assert np.isfinite(sound).all()
+    assert all(
+        np.abs(a - b).max() > 1e-3 * np.abs(a).max() for a, b in ((sound, plain), (sound, linear), (plain, straight), (sound - plain, linear - straight))
+    )
+    sounder = build_sounder(whole.bodies[0], (), SR, Air())
+    beside = build_beside(sounder, SR, Air())
+    assert beside is not None and beside.lines.bend is not None and beside.lines.choke is not None and sounder.bend is not None and sounder.choke is not None
+    assert (beside.lines.bend == sounder.bend[beside.follows]).all() and beside.lines.bend.all()
+    assert (beside.lines.choke == sounder.choke[beside.follows]).all() and beside.lines.choke.all()
+    whole.save(tmp_path / "both.npz")
+    assert (render_log(read_log(tmp_path / "both.npz")) == sound).all()
 
 
 def test_records_of_a_residual_prove_themselves() -> None:
