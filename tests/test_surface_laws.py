@@ -1,7 +1,10 @@
 """A rolling ball keeps the measured laws through the whole chain; `benchmarks/rolling_laws.py` prints the full tables.
 
-Held here: 0.2 … 0.8 m/s, a board of 60 modes. Known to fail and not tested: at 0.1 … 0.4 m/s with the lowest 25 modes alone n is 0.962 … 0.967,
-above the band; a sliding box has n = 1.0 … 1.1 where Bullet slides it calmly, and from 0.28 m/s on Bullet's chatter drowns the rubbing.
+Held here: 0.1 … 0.8 m/s, a board of 60 modes. n is not one number: the contact's patch takes what is shorter than itself, so where the
+heard modes lie above v/a (1 kHz at 0.1 m/s) the level grows faster, as v^(H + ½) at most, and where they lie below as v^H, H = 0.75. Six
+seeds: 0.93 … 0.99 over 0.1 … 0.4 m/s, at the band's edge, and 0.77 … 0.89 over 0.2 … 0.8 m/s. Known to fail and not tested: with the
+lowest 25 modes alone n is 1.00 over the slow half; a sliding box has n = 1.0 … 1.1 where Bullet slides it calmly, and from 0.28 m/s on
+Bullet's chatter drowns the rubbing.
 """
 
 from __future__ import annotations
@@ -13,7 +16,7 @@ from typing import Any
 import numpy as np
 
 BENCH: dict[str, Any] = runpy.run_path(str(Path(__file__).parents[1] / "benchmarks" / "rolling_laws.py"))
-SPEEDS, ROUGHNESS = np.geomspace(0.2, 0.8, 5), np.geomspace(0.3e-6, 5e-6, 5)
+SPEEDS, ROUGHNESS = np.geomspace(0.1, 0.8, 5), np.geomspace(0.3e-6, 5e-6, 5)
 M, N = (0.63, 1.16), (0.5, 0.96)
 """Bands of the exponents of level against roughness and speed that were measured on real pairs."""
 
