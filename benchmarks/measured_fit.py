@@ -6,7 +6,7 @@
                           decimated file's filter rings)
     pyrfda-main-lines     the six lines of that take that its README calls the main ones
     rus-crystals          50 resonances of a strontium titanate block of measured size and density, read as an isotropic body's
-    spruce-plates         three spruce plates with measured size, mass, frequencies and damping: all together without a shape (what the decays say),
+    spruce-plates         six spruce plates with measured size, mass, frequencies and damping: all together without a shape (what the decays say),
                           and the first with its shape, read as an isotropic body
     flax-laminate         two frequencies of a square plate
     glockenspiel-fluidr3  bars whose size nobody wrote down: decays of all four together, without a shape. From pitch, E/ρ and the length only come

@@ -85,9 +85,18 @@ def gather(
         gone = [str(r.file) for r in mine if r.file is not None and not r.file.is_file()]
         if gone and not played and not listed:
             raise FileError(f"cannot read {gone[0]}: no such file", "a fit needs the audio of its 'fit' strikes")
+        sounds = None
+        if played:  # before the modes, which take longer: a recording that will not do is told at once
+            say(f"reading {len(played)} recordings of {name or 'the object'}")
+            sounds = _sounds(case, thing, played, clipped)
         body = body_family(case, thing, guess, cache, say) if thing.mesh is not None else None
-        if played:
-            found.append(_heard(case, thing, guess, played, body, tuple(f"{g} is missing" for g in gone), say, clipped))
+        if sounds is not None:
+            signals, sr, told = sounds
+            seen = observed(case, thing, guess, played, body) if body is not None else None
+            say(f"listening to {len(played)} recordings of {name or 'the object'}")
+            lines = joint_lines(signals, sr, band_hz=case.band_hz, signed=case.onset_s is not None)
+            notes = (*(f"{g} is missing" for g in gone), *told)
+            found.append(Evidence(thing, guess, played, lines, body, seen, signals, sr, notes))
         found += [_listed(case, thing, guess, entry, body) for entry in listed]
     if not found:
         raise FileError(f"case {case.name} has no '{split}' strike with audio or features", "mark at least one recording with split 'fit'")
@@ -131,19 +140,9 @@ def observed(case: Case, thing: CaseObject, guess: Material, recordings: tuple[C
     return observation(body, guess.density_kg_m3, case.sensor, _strikes(recordings), at, along)
 
 
-def _heard(
-    case: Case,
-    thing: CaseObject,
-    guess: Material,
-    recordings: tuple[CaseRecording, ...],
-    body: Family | None,
-    notes: tuple[str, ...],
-    say: Callable[[str], None],
-    clipped: bool = False,
-) -> Evidence:
-    say(f"listening to {len(recordings)} recordings of {thing.name}")
-    seen = observed(case, thing, guess, recordings, body) if body is not None else None
-    sounds, rates, told = [], [], list(notes)
+def _sounds(case: Case, thing: CaseObject, recordings: tuple[CaseRecording, ...], clipped: bool) -> tuple[Array, int, list[str]]:
+    """Signals (s, n) of an object's strikes, each from its onset, their rate, and what is odd about them. Raises FileError, AudioError."""
+    sounds, rates, told = [], [], []
     for r in recordings:
         sound, sr = read_audio(r.file or "")
         if r.channel >= len(sound):
@@ -152,9 +151,9 @@ def _heard(
         rates.append(sr)
         if len(sound) > 1 and r.channel == 0:
             told.append(f"{r.file} has {len(sound)} channels: the first is used")
-        hits = span(sounds[-1], sr).hits if case.onset_s is None else 1
-        if hits > 1:
-            told.append(f"{r.file} holds {hits} hits: a fit takes it for one")
+        if case.onset_s is None and (heard := span(sounds[-1], sr)).hits > 1:
+            told.append(f"{r.file} holds {heard.hits} hits: only what comes before the second is used")
+            sounds[-1] = sounds[-1][: heard.stop]
     if len(set(rates)) > 1:
         raise AudioError(f"recordings of {thing.name} have rates {sorted(set(rates))} Hz", "give files of one rate")
     sr = rates[0]
@@ -162,9 +161,7 @@ def _heard(
     length = min(len(sound) - start for sound, start in zip(sounds, starts, strict=True))
     if length < 256:
         raise AudioError(f"only {max(length, 0)} samples follow the onset in the shortest recording", "give recordings that hold the sound's decay")
-    signals = np.stack([sound[start : start + length] for sound, start in zip(sounds, starts, strict=True)])
-    lines = joint_lines(signals, sr, band_hz=case.band_hz, signed=case.onset_s is not None)
-    return Evidence(thing, guess, recordings, lines, body, seen, signals, sr, tuple(told))
+    return np.stack([sound[start : start + length] for sound, start in zip(sounds, starts, strict=True)]), sr, told
 
 
 def _checked(sound: Array, name: str, clipped: bool = False) -> Array:

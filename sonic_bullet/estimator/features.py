@@ -135,7 +135,7 @@ def _modes(x: Array, sr: int, band_hz: tuple[float, float]) -> tuple[Modes, Nois
 
 def _beside(modes: int, least: float) -> float:
     """Least energy of a second mode in a line: it has the few cells beside the lines to chance upon, not the whole recording."""
-    return min(least, 2 * np.log(1.5 * 2 * NEAR * max(modes, 1) / FALSE_ALARMS))
+    return float(min(least, 2 * np.log(1.5 * 2 * NEAR * max(modes, 1) / FALSE_ALARMS)))
 
 
 def _needed(pole: Array, least: float) -> Callable[[Array], Array]:

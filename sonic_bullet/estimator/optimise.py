@@ -30,8 +30,8 @@ SIFTED = 6
 POLISH_ROUNDS = 3
 GAIN = 1e-4  # of Π: least squares stop where a step brings less
 SETTLE = 1e-4  # one unit of the last search raises Π by this part of it
-SETTLE_ROUNDS = 6
-POLISH_TOLERANCE = 1e-9
+SETTLE_ROUNDS = 30
+POLISH_TOLERANCE = 1e-13
 WIDTH = np.array([1e-2, 1e-2, 1e-4, 1e-2])  # of the differences that stand for slopes, in the logarithms
 
 
@@ -159,7 +159,7 @@ def _settle(function: Callable[[Array], float], here: float) -> tuple[float, Arr
                     cross[i, j] = cross[j, i] = (both - ahead[i] - ahead[j] + here) / reach**2
         size, axis = np.linalg.eigh(cross + np.diag(bend))
         slope = (ahead - behind) / (2 * reach)
-        step = -axis @ ((axis.T @ slope) / np.maximum(np.abs(size), 0.05 * np.abs(size).max()))
+        step = -axis @ ((axis.T @ slope) / np.maximum(np.abs(size), 1e-3 * np.abs(size).max()))
         tries = [place + step * min(1.0, 50 / max(float(np.linalg.norm(step)), 1e-12))]
         found = min(
             [(function(tries[0]), tries[0])]

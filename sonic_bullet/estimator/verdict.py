@@ -24,7 +24,7 @@ AMPLITUDE_MISFIT = 0.25
 FREQUENCY_MISFIT = 0.01
 FOREIGN = 1e-3  # of the strongest line's energy
 PAIRED = 0.6  # share of strong lines that must be modes
-CHANCE = 0.35  # and below this share, they may be by chance: nothing is known of γ, ν and σ then
+CHANCE = 0.35  # and below this share, they may be by chance: nothing is known then
 
 
 def finished(
@@ -55,9 +55,9 @@ def finished(
     else:
         unsaid.append("sigma (no strike of known place)")
     foreign, share = _foreign(evidence, objects)
-    if share < CHANCE:
-        covariance[2:, :] = covariance[:, 2:] = np.nan
-        unsaid = [u for u in unsaid if not u.startswith(("gamma", "poisson", "sigma"))] + ["gamma, poisson_ratio, sigma (few lines are modes, maybe by chance)"]
+    if share < CHANCE:  # another object, another rate, no impact: nothing that rests on the pairs is known, nor whose decays these are
+        covariance[:] = np.nan
+        unsaid = ["alpha, beta, gamma, poisson_ratio, sigma (few lines are modes, maybe by chance)"]
     told = np.isfinite(np.diag(covariance))
     covariance[np.outer(told, told) & np.isnan(covariance)] = 0.0  # frequencies, decays and amplitudes are found apart
     amiss = _amiss(objects, damping, scatter, gain[2], foreign, share)

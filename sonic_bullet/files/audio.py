@@ -306,5 +306,5 @@ def read_audio(path: str | os.PathLike[str]) -> tuple[Array, int]:
     try:
         samples, sr = soundfile.read(os.fspath(path), dtype="float64", always_2d=True)
     except (soundfile.LibsndfileError, OSError) as error:
-        raise FileError(f"cannot read {path}: {getattr(error, 'error_string', error)}", "give an unbroken audio file") from error
+        raise FileError(f"cannot read {path}: {str(getattr(error, 'error_string', error)).rstrip('.')}", "give an unbroken audio file") from error
     return np.ascontiguousarray(samples.T), int(sr)

