@@ -13,11 +13,12 @@ Array = NDArray[Any]
 
 
 def frozen_array(value: object, dtype: Any, shape: tuple[int | None, ...], name: str, *, finite: bool = True) -> Array:
-    """Read-only C-contiguous copy of ``value`` with ``dtype`` and ``shape`` (None: any length).
+    """Read-only C-contiguous copy of ``value`` with ``dtype`` and ``shape`` (None: any length); the same array where it is one already.
 
     Raises RecordError where the shape differs or, with ``finite``, a number is NaN or infinite.
     """
-    array = np.array(value, dtype=dtype, order="C")
+    kept = isinstance(value, np.ndarray) and not value.flags.writeable and value.base is None  # a record's own: read-only and nobody's view
+    array = np.asarray(value, dtype=dtype, order="C") if kept else np.array(value, dtype=dtype, order="C")
     if array.ndim != len(shape) or any(want is not None and have != want for have, want in zip(array.shape, shape, strict=True)):
         raise RecordError(f"{name} has shape {array.shape}, wanted {shape}", "pass an array of that shape")
     if finite and array.dtype.kind in "fc" and not np.isfinite(array).all():

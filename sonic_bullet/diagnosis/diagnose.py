@@ -18,6 +18,7 @@ import numpy as np
 from sonic_bullet.diagnosis.bodies import Struck, shapeless, struck_bodies
 from sonic_bullet.diagnosis.elastic import with_elastic
 from sonic_bullet.diagnosis.judge import Take, floor_between, least_db, mean_db
+from sonic_bullet.diagnosis.listed import CAP, listed, off_by
 from sonic_bullet.diagnosis.loop import Closed, closed
 from sonic_bullet.diagnosis.play import Hypothesis, play
 from sonic_bullet.diagnosis.sone import sone_distance
@@ -40,7 +41,7 @@ SPLITS = ("fit", "holdout", "transfer")
 class Diagnosis:
     """What the model lacks. errors, errors_sone: {"before": {split: …}, "after": {split: …}, "floor": …}, None where there is no audio.
 
-    unexplained: what is left, in words and numbers; empty where nothing is. warnings: one line each, the fit's among them.
+    errors_lines: likewise for measured lines in place of audio, of ln f and ln d. unexplained: what is left, in words and numbers; empty where nothing is. warnings: one line each, the fit's among them.
     """
 
     case: Case
@@ -50,6 +51,7 @@ class Diagnosis:
     closed: Closed
     errors: dict[str, Any]
     errors_sone: dict[str, Any]
+    errors_lines: dict[str, Any]
     unexplained: dict[str, Any]
     warnings: tuple[str, ...]
 
@@ -81,7 +83,7 @@ def diagnose(
     gain = found.fit.sigma if np.isfinite(found.fit.sigma) and found.fit.sigma > 0 else 1.0
     base = Hypothesis(found.fit.alpha_per_s, found.fit.beta_s, gain, (), correction)
     takes = _takes(bodies)
-    end = closed(base, bodies, takes, effects, case.band_hz, seed=seed, progress=progress)
+    end = closed(base, bodies, takes or listed(bodies), effects, case.band_hz, seed=seed, progress=progress)
     say("comparing with what was not fitted")
     every = {"fit": takes} | {split: _others(case, bodies, takes, split) for split in SPLITS[1:]}
     errors: dict[str, Any] = {"before": {}, "after": {}, "floor": least_db(takes, end.after)}
@@ -90,7 +92,25 @@ def diagnose(
         for name, h in (("before", end.before), ("after", end.after)):
             errors[name][split] = mean_db(mine, h)
             sone[name][split] = sone_distance(mine, h)
-    return Diagnosis(case, found, bodies, takes, end, errors, sone, remainder(end, takes), found.warnings)
+    return Diagnosis(case, found, bodies, takes, end, errors, sone, _of_lines(case, bodies, end), remainder(end, takes), found.warnings)
+
+
+def _of_lines(case: Case, bodies: tuple[Struck, ...], end: Closed) -> dict[str, Any]:
+    """Rms of ln f and of ln d of measured lines that came in place of audio, before and after, by split; empty where there are none."""
+    found: dict[str, Any] = {}
+    for body in bodies:
+        for split in SPLITS:
+            rows = [line for r in body.recordings if r.split == split and r.lines for line in r.lines]
+            if not rows:
+                continue
+            freq = np.array([line.freq_hz for line in rows])
+            decay = np.array([np.nan if line.decay_per_s is None else line.decay_per_s for line in rows])
+            for name, h in (("before", end.before), ("after", end.after)):
+                off, lost = off_by(h, body, freq, decay)
+                told = {"frequency_rms": float(np.sqrt((off**2).mean())), "lines": len(rows), "unpaired": int((off >= CAP).sum())}
+                told |= {"decay_rms": float(np.sqrt(np.nanmean(lost**2)))} if np.isfinite(lost).any() else {}
+                found.setdefault(name, {})[split] = told
+    return found
 
 
 def _takes(bodies: tuple[Struck, ...]) -> tuple[Take, ...]:
@@ -186,6 +206,7 @@ def described(d: Diagnosis) -> dict[str, Any]:
         "candidates": tried(d.closed.tried),
         "errors": d.errors,
         "errors_sone": d.errors_sone,
+        **({"errors_lines": d.errors_lines} if d.errors_lines else {}),
         "unexplained": d.unexplained,
         "baseline": {
             "alpha_per_s": d.closed.before.alpha_per_s,

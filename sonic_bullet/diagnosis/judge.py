@@ -6,7 +6,9 @@ noise: per bin the lower quartile over the last third of every recording, and ov
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -18,6 +20,18 @@ from sonic_bullet.records import Array
 WINDOW = 1024
 SIDE = 8  # bins to each side
 QUARTILE = float(np.log(4 / 3))  # of an exponential law over its mean
+
+
+class Judged(Protocol):
+    """Something measured that a hypothesis is held against, in dB."""
+
+    def distance(self, h: Hypothesis) -> float:
+        """How far the hypothesis is from it; NaN where it says nothing."""
+        ...
+
+    def least(self, h: Hypothesis) -> float:
+        """How far it would be from itself, measured again."""
+        ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,13 +70,13 @@ def floor_between(signals: list[Array]) -> Floor:
     return Floor(np.maximum(np.quantile(np.lib.stride_tricks.sliding_window_view(side, 2 * SIDE + 1), 0.4, axis=1), 1e-24))
 
 
-def mean_db(takes: tuple[Take, ...], h: Hypothesis) -> float | None:
+def mean_db(takes: Sequence[Judged], h: Hypothesis) -> float | None:
     """Mean distance over takes; None where there is none."""
     found = [d for d in (take.distance(h) for take in takes) if np.isfinite(d)]
     return float(np.mean(found)) if found else None
 
 
-def least_db(takes: tuple[Take, ...], h: Hypothesis) -> float | None:
+def least_db(takes: Sequence[Judged], h: Hypothesis) -> float | None:
     """Mean noise floor of the distance over takes; None where there is none."""
     found = [d for d in (take.least(h) for take in takes) if np.isfinite(d)]
     return float(np.mean(found)) if found else None

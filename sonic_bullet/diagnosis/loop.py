@@ -14,7 +14,7 @@ import numpy as np
 
 from sonic_bullet.diagnosis.bodies import Struck
 from sonic_bullet.diagnosis.evidence import evidence_of
-from sonic_bullet.diagnosis.judge import Take, least_db, mean_db
+from sonic_bullet.diagnosis.judge import Judged, least_db, mean_db
 from sonic_bullet.diagnosis.play import Hypothesis
 from sonic_bullet.diagnosis.refit import refitted
 from sonic_bullet.diagnosis.trial import Candidate, trials
@@ -45,7 +45,7 @@ class Closed:
 def closed(
     base: Hypothesis,
     bodies: tuple[Struck, ...],
-    takes: tuple[Take, ...],
+    takes: Sequence[Judged],
     effects: Sequence[type[Effect]],
     band_hz: tuple[float, float],
     *,
@@ -72,11 +72,24 @@ def closed(
         h, added = best.hypothesis, [*added, best]
         now = mean_db(takes, h) or 0.0
         floor = least_db(takes, h) or floor
+    if len(added) > 1:
+        h, added = _pruned(h, added, bodies, takes, before - floor)
+        now = mean_db(takes, h) or 0.0
     gap, left = before - floor, now - floor
     verdict = "explained" if added else "none" if gap < SUFFICES_DB else "unexplained"
     if added and left > max((1 - EXPLAINED) * gap, SUFFICES_DB):  # a name for less than half of what is seen would be a guess
         verdict, h, now, added = "unexplained", start, before, []
     return Closed(start, h, tuple(added), tuple(last.values()), verdict, before, now, floor)
+
+
+def _pruned(h: Hypothesis, added: list[Candidate], bodies: tuple[Struck, ...], takes: Sequence[Judged], gap_db: float) -> tuple[Hypothesis, list[Candidate]]:
+    """Without the effects that those found after them have made needless."""
+    for candidate in added[:-1]:
+        rest = [e for e in h.effects if e.id != candidate.id]
+        without = refitted(replace(h, effects=tuple(rest)), bodies)
+        if (mean_db(takes, without) or 0.0) - (mean_db(takes, h) or 0.0) < max(LEAST_DB, LEAST_SHARE * gap_db):
+            h, added = without, [c for c in added if c is not candidate]
+    return h, added
 
 
 def earns(c: Candidate, gap_db: float) -> bool:

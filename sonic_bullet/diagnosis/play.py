@@ -8,6 +8,7 @@ Every stage hands a value to the next, and effects of a stage act in the order i
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -15,6 +16,8 @@ from sonic_bullet.diagnosis.bodies import Struck
 from sonic_bullet.effects.ringing import sounded
 from sonic_bullet.effects.values import CARRIES, Blow, Effect, Ring, Sound, Stage
 from sonic_bullet.records import Array, ModalModel
+
+KEPT = 4  # hypotheses and bodies whose modes are remembered
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,7 +44,9 @@ def ordered(model: ModalModel, freq_hz: Array, decay_per_s: Array, shape: Array 
     good = np.flatnonzero((freq_hz > 0) & np.isfinite(freq_hz))
     order = good[np.argsort(freq_hz[good], kind="stable")]
     kept = model.shape if shape is None else shape
-    return replace(model, freq_hz=freq_hz[order], decay_per_s=np.maximum(decay_per_s[order], 0.0), shape=kept[:, :, order]), order
+    if len(order) < len(freq_hz) or (np.diff(order) < 0).any():
+        kept = kept[:, :, order]
+    return replace(model, freq_hz=freq_hz[order], decay_per_s=np.maximum(decay_per_s[order], 0.0), shape=kept), order
 
 
 def undamped(h: Hypothesis, body: Struck) -> ModalModel:
@@ -55,8 +60,9 @@ def undamped(h: Hypothesis, body: Struck) -> ModalModel:
     return body.elastic.solve(material.stiffness_pa / material.density_kg_m3)
 
 
-def modes_of(h: Hypothesis, body: Struck, *, upto: int | None = None) -> tuple[ModalModel, Array]:
-    """The body's damped modes under the hypothesis (its first ``upto`` effects on them), and which uncorrected mode each was (m,)."""
+@lru_cache(maxsize=KEPT)
+def modes_of(h: Hypothesis, body: Struck) -> tuple[ModalModel, Array]:
+    """The body's damped modes under the hypothesis, and which uncorrected mode each was (m,). Remembered: every strike of a body asks."""
     base = undamped(h, body)
     correction = (h.correction or {}).get(body.name, np.zeros(0))
     if len(correction) != base.mode_count:  # learnt under another material, or not at all
@@ -65,7 +71,7 @@ def modes_of(h: Hypothesis, body: Struck, *, upto: int | None = None) -> tuple[M
     decay = (h.alpha_per_s + h.beta_s * lam) / 2
     model, order = ordered(base, np.sqrt(np.maximum(lam - decay**2, 0)) / (2 * np.pi), decay)
     fitted = body.gathered is not None
-    for effect in h.at(Stage.MODES, fitted=fitted)[:upto]:
+    for effect in h.at(Stage.MODES, fitted=fitted):
         model = effect.apply(model)
     return model, order
 
@@ -99,7 +105,9 @@ def ring_of(h: Hypothesis, body: Struck, strike: int) -> Ring:
     model, _ = modes_of(h, body)
     row = pattern(body, model)[strike]
     push = np.einsum("xm,x->m", model.shape[body.surface_count(model) + strike].astype(float), body.way[strike])
-    most = np.sqrt((model.shape[: body.surface_count(model)].astype(float) ** 2).sum(axis=1)).max(axis=0) if body.surface_count(model) else np.ones(len(row))
+    most = np.ones(len(row))
+    if any(e.stage is Stage.BANK for e in h.effects) and body.surface_count(model):
+        most = np.sqrt((model.shape[: body.surface_count(model)].astype(float) ** 2).sum(axis=1)).max(axis=0)
     blow = blow_of(h, body, strike)
     none = np.zeros(len(row))
     ring = Ring(model.freq_hz, model.decay_per_s, h.gain * row * start(body.kind, model), np.abs(blow.impulse_n_s * push) * most, none, none, blow.impulse_n_s)

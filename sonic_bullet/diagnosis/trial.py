@@ -15,8 +15,9 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from sonic_bullet.diagnosis.bodies import Struck
-from sonic_bullet.diagnosis.evidence import thinned
-from sonic_bullet.diagnosis.judge import Take
+from sonic_bullet.diagnosis.evidence import evidence_of, thinned
+from sonic_bullet.diagnosis.judge import Judged
+from sonic_bullet.diagnosis.listed import Listed
 from sonic_bullet.diagnosis.play import Hypothesis
 from sonic_bullet.diagnosis.refit import refitted
 from sonic_bullet.effects.values import Effect, Evidence, Owner, Stage
@@ -24,6 +25,7 @@ from sonic_bullet.records import ModalModel
 
 KEPT = 0.75  # of the lines, in every fold
 DRAWS = 2  # of the null effect
+PLAIN = 0.6  # of the gap: where a cheap suspect says as much, costly ones wait
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -106,51 +108,74 @@ def directions(seed: int, count: int, modes: int) -> np.ndarray[Any, Any]:
 
 
 def trials(
-    h: Hypothesis, bodies: tuple[Struck, ...], takes: tuple[Take, ...], evidence: Evidence, effects: Sequence[type[Effect]], *, seed: int, say: Any
+    h: Hypothesis, bodies: tuple[Struck, ...], takes: Sequence[Judged], evidence: Evidence, effects: Sequence[type[Effect]], *, seed: int, say: Any
 ) -> list[Candidate]:
     """Every suspect that the whole evidence suggests, after its trial; best first."""
-    found = []
+    found: list[Candidate] = []
     folds = _folds(h, bodies, takes, evidence, seed)
-    for kind in effects:
-        if kind.id in evidence.found and kind.stage is not Stage.SOUND:
+    gap = float(np.mean([f.before for f in folds]) - np.mean([f.take.least(f.base) for f in folds])) if folds else 0.0
+    for kind in sorted(effects, key=lambda kind: bool(getattr(kind, "costly", False))):
+        if kind.id in evidence.found:
             continue
+        if getattr(kind, "costly", False) and any(c.mean_db > PLAIN * gap for c in found):
+            continue  # something cheap says most of it: what is left may ask for more in the next round
         whole = kind.propose(evidence)
-        if whole is None or kind.id in evidence.found:
+        if whole is None:
             continue
         say(f"trying {kind.id}")
-        found.append(_tried(kind, whole, h, bodies, takes, evidence, folds))
+        found.append(_tried(kind, whole, h, bodies, evidence, folds))
     return sorted(found, key=lambda c: -c.mean_db)
 
 
-def _folds(h: Hypothesis, bodies: tuple[Struck, ...], takes: tuple[Take, ...], evidence: Evidence, seed: int) -> list[tuple[Evidence, Hypothesis, float]]:
-    """Per strike: what is left of the evidence, the hypothesis refitted to it, and its distance to the strike left out."""
+@dataclass(frozen=True, slots=True, eq=False)
+class Fold:
+    """What is left to learn from once ``take`` is left out: bodies, evidence, the hypothesis refitted to it, and its distance to the take."""
+
+    take: Judged
+    bodies: tuple[Struck, ...]
+    evidence: Evidence
+    base: Hypothesis
+    before: float
+
+
+def _folds(h: Hypothesis, bodies: tuple[Struck, ...], takes: Sequence[Judged], evidence: Evidence, seed: int) -> list[Fold]:
     rng = np.random.default_rng([seed, 1])
     made = []
     for i, take in enumerate(takes):
-        less = thinned(evidence, i, KEPT, rng)
-        base = refitted(h, bodies, less.heard)
-        made.append((less, base, take.distance(base)))
+        if isinstance(take, Listed):
+            mine, start = take.rest(bodies, h)
+            less = evidence_of(start, mine, evidence.band_hz, seed=seed)
+            base = refitted(start, mine)
+        else:
+            mine, less = bodies, thinned(evidence, i, KEPT, rng)
+            base = refitted(h, bodies, less.heard)
+        before = take.distance(base)
+        if np.isfinite(before):
+            made.append(Fold(take, mine, less, base, before))
     return made
 
 
-def _tried(
-    kind: type[Effect], whole: Effect, h: Hypothesis, bodies: tuple[Struck, ...], takes: tuple[Take, ...], evidence: Evidence, folds: list[Any]
-) -> Candidate:
+def _tried(kind: type[Effect], whole: Effect, h: Hypothesis, bodies: tuple[Struck, ...], evidence: Evidence, folds: list[Fold]) -> Candidate:
     drops, nulls, seen = [], [], []
-    for i, (less, base, before) in enumerate(folds):
-        effect = kind.propose(less)
-        if effect is None or not np.isfinite(before):
+    for i, fold in enumerate(folds):
+        less = fold.evidence
+        effect = kind.propose(replace(less, known=whole))
+        if effect is None:
             drops.append(0.0)
             continue
         seen.append(effect)
-        after = takes[i].distance(refitted(replace(base, effects=(*base.effects, effect)), bodies, less.heard))
-        drops.append(before - after)
+        drops.append(fold.before - _after(fold, effect))
         for draw in range(DRAWS):
             none = Null.fitted(less, min(effect.freedom(), 8), 10 * i + draw)
             if none is not None:
-                nulls.append(before - takes[i].distance(refitted(replace(base, effects=(*base.effects, none)), bodies, less.heard)))
+                nulls.append(fold.before - _after(fold, none))
     added = refitted(replace(h, effects=(*h.effects, whole)), bodies, evidence.heard)
     return Candidate(kind.id, whole, added, np.array(drops), float(np.mean(nulls)) if nulls else 0.0, jackknife([e.parameters() for e in seen]))
+
+
+def _after(fold: Fold, effect: Effect) -> float:
+    h = replace(fold.base, effects=(*fold.base.effects, effect))
+    return fold.take.distance(refitted(h, fold.bodies, None if isinstance(fold.take, Listed) else fold.evidence.heard))
 
 
 def jackknife(rows: list[dict[str, Any]]) -> dict[str, Any]:

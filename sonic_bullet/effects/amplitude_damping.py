@@ -55,13 +55,13 @@ class AmplitudeDamping:
             if e is None:
                 continue
             for name, level in levels(h).items():
-                found = _fitted(e, h, level[:, e.line])
-                if found is not None and found[2] > BETTER and (best is None or found[2] > best[0]):
+                found = _fitted(e, h, level[:, e.line], sure=evidence.known is None)
+                if found is not None and found[2] > BETTER * (evidence.known is None) and (best is None or found[2] > best[0]):
                     best = (found[2], cls(found[0], name, *found[1]))
         return best[1] if best is not None else None
 
 
-def _fitted(e: Envelopes, h: Heard, level: Array) -> tuple[float, tuple[float, float], float] | None:
+def _fitted(e: Envelopes, h: Heard, level: Array, *, sure: bool = True) -> tuple[float, tuple[float, float], float] | None:
     """c, (α, β) by the low-level decays, and how much of ln variance goes, all lines together."""
     rows = [r for r in (_rows(e, h, level, q) for q in range(len(e.line))) if r is not None]
     if len(rows) < 2:
@@ -76,7 +76,9 @@ def _fitted(e: Envelopes, h: Heard, level: Array) -> tuple[float, tuple[float, f
     choke = float(fine[int(inner.argmin())])
     cost, ratio = _misfit(rows, choke)
     gain = plain - cost
-    if choke * most < LEAST or (gain > np.log(2)).sum() < TELL or -gain[gain < 0].sum() > 0.3 * gain[gain > 0].sum():
+    if choke * most < LEAST:
+        return None
+    if sure and ((gain > np.log(2)).sum() < TELL or -gain[gain < 0].sum() > 0.3 * gain[gain > 0].sum()):
         return None
     omega2 = np.array([h.omega[k] ** 2 for k in e.line])[[i for i in range(len(e.line)) if _rows(e, h, level, i) is not None]]
     low = ratio * np.array([r[4] for r in rows])

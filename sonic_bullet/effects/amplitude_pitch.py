@@ -47,13 +47,14 @@ class AmplitudePitch:
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
         best: tuple[float, float, str] | None = None
+        need = SURE if evidence.known is None else 1.0
         for h in evidence.heard:
             e = envelopes(h)
             if e is None:
                 continue
             for name, level in levels(h).items():
                 bend, sd, share = _slope(e, h, level[:, e.line])
-                if abs(bend) > SURE * sd and share > BETTER and (best is None or share > best[0]):
+                if abs(bend) > need * sd and share > BETTER * (evidence.known is None) and (best is None or share > best[0]):
                     best = (share, bend, name)
         return cls(best[1], best[2]) if best is not None else None
 

@@ -54,6 +54,8 @@ class ContactTime:
         if not tables:
             return None
         freq, level, told, heard, sd, most = (np.concatenate([t[i] for t in tables]) for i in range(6))
+        if len(freq) < 4:
+            return None
         reference = float(np.exp(np.log(level).mean()))
         grid = np.geomspace(0.15 / freq.max(), min(1.2 / freq.min(), 0.05), 90)
         plain = _cost(told, heard, sd, ROUGH * most)
@@ -73,7 +75,7 @@ class ContactTime:
                 if best is None or cost < best[0]:
                     best = (cost, cls(tau, reference, exponent, pulse))
         assert best is not None
-        return best[1] if best[0] < plain - 4 * np.log(len(freq)) else None
+        return best[1] if evidence.known is not None or best[0] < plain - 4 * np.log(len(freq)) else None
 
 
 def _table(h: Heard) -> tuple[Array, Array, Array, Array, Array, Array]:

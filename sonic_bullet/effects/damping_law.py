@@ -10,12 +10,12 @@ criterion is proposed, where it beats Rayleigh's own.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from sonic_bullet.effects.values import Evidence, Owner, Stage
+from sonic_bullet.effects.values import Evidence, Owner, Stage, ascending
 from sonic_bullet.records import Array, ModalModel
 
 LAWS = {"constant-loss": 1, "power": 2, "relaxation": 3}
@@ -53,8 +53,7 @@ class DampingLaw:
         omega = np.sqrt(x.omega0_squared_per_s2)
         decay = np.minimum(self.decay_per_s(omega), 0.99 * omega)
         freq = np.sqrt(omega**2 - decay**2) / (2 * np.pi)
-        order = np.argsort(freq, kind="stable")
-        return replace(x, freq_hz=freq[order], decay_per_s=decay[order], shape=x.shape[:, :, order])
+        return ascending(x, freq, decay)
 
     def parameters(self) -> dict[str, Any]:
         """What it says, for people and JSON, in SI units."""
@@ -82,7 +81,7 @@ class DampingLaw:
 
         trials = [(bic, cls(*values)) for bic, values in _fits(omega, cost)]
         bic, best = min(trials, key=lambda t: t[0])
-        return best if bic < _least(omega, cost, _rayleigh, [_start(omega, decay)], 2)[0] - BETTER else None
+        return best if evidence.known is not None or bic < _least(omega, cost, _rayleigh, [_start(omega, decay)], 2)[0] - BETTER else None
 
 
 def _rayleigh(p: Array, w: Array) -> Array:

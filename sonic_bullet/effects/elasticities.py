@@ -173,7 +173,7 @@ def search(evidence: Evidence) -> tuple[Tensor, Tensor] | None:
     told = told_of(evidence)
     if not told:
         return None
-    start = _isotropic_p(told[0].elastic)
+    start = isotropic_p(told[0].elastic)
     plain = fitted(told, "isotropic", start, start)
     ends = [fitted(told, "cubic", s, start) for s in _sifted(told, _cubes(start))]
     ends += [fitted(told, "orthorhombic", s, start) for s in _sifted(told, _bricks(start))]
@@ -185,7 +185,16 @@ def search(evidence: Evidence) -> tuple[Tensor, Tensor] | None:
     return plain, min(ends, key=lambda e: e.bic)
 
 
-def _isotropic_p(elastic: Elastic) -> Array:
+def p_of(stiffness_m2_s2: Array) -> Array:
+    """p (9,) of C/ρ (6, 6): `stiffness` turned round."""
+    compliance = np.linalg.inv(stiffness_m2_s2)
+    youngs = 1 / np.diag(compliance)[:3]
+    normal = [-compliance[i, j] * np.sqrt(youngs[i] * youngs[j]) for i, j in ((1, 2), (0, 2), (0, 1))]
+    return np.concatenate([np.log(youngs), normal, np.log(np.diag(stiffness_m2_s2)[3:])])
+
+
+def isotropic_p(elastic: Elastic) -> Array:
+    """p (9,) of the isotropic material a body has in the baseline."""
     m = elastic.material
     return expanded("isotropic", np.array([np.log(m.youngs_pa / m.density_kg_m3), m.poisson]))
 

@@ -8,6 +8,7 @@ Only lines that stand alone are worth it: no other of a twentieth of their stren
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -36,6 +37,7 @@ class Envelopes:
     noise: Array
 
 
+@lru_cache(maxsize=2)
 def envelopes(h: Heard) -> Envelopes | None:
     """Of lines that stand alone and clear, spread over the frequencies; None where there are none."""
     if h.signal is None or not len(h.freq_hz):

@@ -81,7 +81,7 @@ class MeasurementChain:
         parts |= _limit(heard)
         parts |= _hum(heard)
         if "limit" not in parts:
-            parts |= _filter(heard)
+            parts |= _filter(heard, BETTER if evidence.known is None else 0.0)
         return cls(**parts) if parts else None
 
 
@@ -143,14 +143,14 @@ def _hum(heard: list[Heard]) -> dict[str, Any]:
     return best
 
 
-def _filter(heard: list[Heard]) -> dict[str, Any]:
+def _filter(heard: list[Heard], better: float) -> dict[str, Any]:
     """One high-pass or low-pass that all strikes share."""
     rows = [_ratio(h) for h in heard if len(h.freq_hz) >= 5]
     if not rows:
         return {}
     freq, ratio, sd = (np.concatenate([r[i] for r in rows]) for i in range(3))
     plain = _misfit(ratio, sd)
-    best: tuple[float, dict[str, Any]] = (plain - BETTER - 2 * np.log(len(freq)), {})
+    best: tuple[float, dict[str, Any]] = (plain - better - 2 * np.log(len(freq)), {})
     for high in (True, False):
         for order in (1, 2, 3, 4):
             for corner in np.geomspace(0.3 * freq.min(), 3 * freq.max(), 160):

@@ -13,7 +13,7 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from sonic_bullet.effects.elasticities import CAP, NAMES, PLACE, SYMMETRIES, Tensor, search, told_of
+from sonic_bullet.effects.elasticities import CAP, NAMES, PLACE, SYMMETRIES, WIDTHS, Tensor, fitted, isotropic_p, p_of, search, told_of
 from sonic_bullet.effects.values import Evidence, Heard, Owner, Stage
 from sonic_bullet.records import Array, Material
 
@@ -30,6 +30,7 @@ class Orthotropy:
     id: ClassVar[str] = "orthotropy"
     stage: ClassVar[Stage] = Stage.MATERIAL
     owner: ClassVar[Owner] = Owner.MATERIAL
+    costly: ClassVar[bool] = True
     reference: ClassVar[str] = "Nye 1957, ch. VIII; Migliori et al. 1993; Bodig & Jayne 1982, ch. 3"
 
     constants_pa: tuple[float, ...]
@@ -72,6 +73,10 @@ class Orthotropy:
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
         told = told_of(evidence)
+        if isinstance(evidence.known, cls) and told:
+            density = told[0].elastic.material.density_kg_m3
+            start = p_of(evidence.known.stiffness_pa / density)
+            return cls.of(fitted(told, evidence.known.symmetry, start, isotropic_p(told[0].elastic), WIDTHS[4:]), density)
         if not told or sum(len(t.log_hz) for t in told) < 6 or all(_fits(h) for h in evidence.heard):
             return None
         found = search(evidence)

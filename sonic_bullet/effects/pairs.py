@@ -40,6 +40,8 @@ def agreed(
     """(score, line (p,), mode (p,), shift): the least price, 0 where nothing pairs and −Σ worth where all do."""
     from scipy.optimize import linear_sum_assignment
 
+    if not (np.isfinite(size).all() and size.any() and np.isfinite(pattern).all() and pattern.any()):  # lists of frequencies, or strikes of unknown place
+        size, pattern = np.ones((1, len(line_hz))), np.ones((1, len(mode_hz)))
     strength = size.max(axis=0)
     worth = np.clip(1 + 0.25 * np.log10(np.maximum(strength / strength.max(), 1e-6)), 0.1, 1)
     told = pattern.max(axis=0)

@@ -8,12 +8,12 @@ Read off the decays beside Rayleigh's: what is left grows with ka, then flattens
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from sonic_bullet.effects.values import Evidence, Heard, Owner, Stage
+from sonic_bullet.effects.values import Evidence, Heard, Owner, Stage, ascending
 from sonic_bullet.records import Array, ModalModel
 
 IMPEDANCE = 1.2 * 343.0  # ρ₀ c in kg/(m² s)
@@ -46,11 +46,10 @@ class Radiation:
         omega = np.sqrt(x.omega0_squared_per_s2)
         decay = np.minimum(x.decay_per_s + self.strength * 0.5 * IMPEDANCE * sigma * areas(x), 0.99 * omega)
         freq = np.sqrt(omega**2 - decay**2) / (2 * np.pi)
-        order = np.argsort(freq, kind="stable")
-        shape = x.shape.copy()
+        shape = x.shape.copy() if self.tilt else x.shape
         if self.tilt:
             shape[-1] *= (sigma**self.tilt).astype(np.float32)  # the last vertex is the sensor's
-        return replace(x, freq_hz=freq[order], decay_per_s=decay[order], shape=shape[:, :, order])
+        return ascending(x, freq, decay, shape)
 
     def parameters(self) -> dict[str, Any]:
         """What it says, for people and JSON, in SI units."""
@@ -62,7 +61,7 @@ class Radiation:
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
         heard = max(evidence.heard, key=lambda h: len(h.freq_hz) if h.model is not None else 0)
-        if heard.model is None or len(heard.freq_hz) < 6:
+        if heard.model is None or len(heard.freq_hz) < 6 or not np.isfinite(heard.decay_per_s).all():
             return None
         area = areas(heard.model)
         mine = np.array([area[m].mean() for m in heard.mode])
@@ -76,7 +75,7 @@ class Radiation:
             x, left = _left(decay, sd, np.stack([np.full(len(w2), 0.5), 0.5 * w2, 0.5 * IMPEDANCE * sigma * mine], axis=1))
             if x[2] > 0 and left < best[0]:
                 best = (left, float(radius), float(x[2]))
-        if not plain - best[0] > BETTER + 2 * np.log(len(w2)) or best[0] > 0.5 * plain:
+        if best[1] == 0 or (evidence.known is None and (not plain - best[0] > BETTER + 2 * np.log(len(w2)) or best[0] > 0.5 * plain)):
             return None
         made = cls(best[1], best[2])
         return cls(best[1], best[2], _tilt(heard, made))

@@ -7,13 +7,13 @@ Read off the decays: what Rayleigh's law, refitted beside it, leaves goes as Ï†Â
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
 import numpy as np
 
 from sonic_bullet.effects.points import best_spot, candidates, vertex_normals
-from sonic_bullet.effects.values import Evidence, Heard, Owner, Stage
+from sonic_bullet.effects.values import Evidence, Heard, Owner, Stage, ascending
 from sonic_bullet.records import Array, ModalModel
 
 SCATTER = 0.03
@@ -45,8 +45,7 @@ class SupportDamping:
         omega = np.sqrt(x.omega0_squared_per_s2)
         decay = np.minimum(x.decay_per_s + extra, 0.99 * omega)
         freq = np.sqrt(omega**2 - decay**2) / (2 * np.pi)
-        order = np.argsort(freq, kind="stable")
-        return replace(x, freq_hz=freq[order], decay_per_s=decay[order], shape=x.shape[:, :, order])
+        return ascending(x, freq, decay)
 
     def parameters(self) -> dict[str, Any]:
         """What it says, for people and JSON, in SI units."""
@@ -58,12 +57,12 @@ class SupportDamping:
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
         heard = max(evidence.heard, key=lambda h: len(h.freq_hz) if h.model is not None else 0)
-        if heard.model is None or len(heard.freq_hz) < 6:
+        if heard.model is None or len(heard.freq_hz) < 6 or not np.isfinite(heard.decay_per_s).all():
             return None
         decay = heard.decay_per_s
         sd = np.hypot(heard.decay_sd_per_s, SCATTER * decay) + 1e-3
         columns = np.stack([np.full(len(decay), 0.5), 0.5 * heard.omega**2], axis=1)
-        found = [(_points(heard, decay, sd, columns, normal=along == "normal"), along) for along in ("normal", "every")]
+        found = [(_points(heard, decay, sd, columns, normal=along == "normal", sure=evidence.known is None), along) for along in ("normal", "every")]
         (_, chosen, strength), along = min(found, key=lambda pair: pair[0][0])
         if not len(chosen):
             return None
@@ -71,14 +70,15 @@ class SupportDamping:
         return cls(tuple((float(a), float(b), float(c)) for a, b, c in places), tuple(float(c) for c in strength), along)
 
 
-def _points(heard: Heard, decay: Array, sd: Array, columns: Array, *, normal: bool) -> tuple[float, Array, Array]:
+def _points(heard: Heard, decay: Array, sd: Array, columns: Array, *, normal: bool, sure: bool = True) -> tuple[float, Array, Array]:
     """What is left, vertices (j,) and strengths (j,) of the dashpots that earn their place, one after another."""
     vertex, square = candidates(heard, normal=normal)
     chosen: list[int] = []
     strength, left = np.zeros(0), np.inf
+    need = (BETTER + 3 * np.log(len(decay)), 0.6) if sure else (0.5 * BETTER, 0.8)
     for _ in range(MOST):
         spot = best_spot(decay, sd, columns, vertex, 0.5 * square)
-        if spot is None or spot.before - spot.left < BETTER + 3 * np.log(len(decay)) or spot.left > 0.6 * spot.before:
+        if spot is None or spot.before - spot.left < need[0] or spot.left > need[1] * spot.before:
             break
         chosen.append(spot.vertex)
         columns = np.column_stack([columns, 0.5 * square[np.searchsorted(vertex, spot.vertex)]])

@@ -14,7 +14,7 @@ carries alpha_per_s, beta_s and gain as it found them beside itself; the host ta
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Any, ClassVar, Protocol, Self, runtime_checkable
 
@@ -162,7 +162,10 @@ class Heard:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Evidence:
-    """All that an effect is told: the objects' strikes, the material's α and β and the case's gain so far, effects found so far by id, band and density."""
+    """All that an effect is told: the objects' strikes, the material's α and β and the case's gain so far, effects found so far by id, band and seed.
+
+    known: what the effect said of the whole evidence, where this is a part of it: it is there to be fitted again, not to be looked for.
+    """
 
     heard: tuple[Heard, ...]
     alpha_per_s: float
@@ -171,6 +174,7 @@ class Evidence:
     found: tuple[str, ...]
     band_hz: tuple[float, float]
     seed: int = 0
+    known: Effect | None = None
 
 
 @runtime_checkable
@@ -198,3 +202,12 @@ class Effect(Protocol):
     def freedom(self) -> int:
         """How many numbers were free when it was proposed."""
         ...
+
+
+def ascending(x: ModalModel, freq_hz: Array, decay_per_s: Array, shape: Array | None = None) -> ModalModel:
+    """The model with other frequencies, decays (m,) and shapes (v, 3, m), its own where None, in ascending order."""
+    order = np.argsort(freq_hz, kind="stable")
+    shape = x.shape if shape is None else shape
+    if (np.diff(order) < 0).any():
+        shape = shape[:, :, order]
+    return replace(x, freq_hz=freq_hz[order], decay_per_s=decay_per_s[order], shape=shape)

@@ -16,6 +16,7 @@ import numpy as np
 
 from sonic_bullet.estimator.lines import Lines
 from sonic_bullet.estimator.observe import Observation
+from sonic_bullet.estimator.shared_poles import FASTEST_PER_S
 from sonic_bullet.modal.reduced import Family
 from sonic_bullet.records import Array
 
@@ -25,6 +26,8 @@ GAMMA_REACH = 0.65  # of ln γ: E and ρ both wrong by 30 %
 POISSON_REACH = 0.05
 CANDIDATES = 8
 MISSED = 0.3
+PINNED, NEVER = 0.98, 0.02
+BRIEF = 25.0  # times the decay that holds half of the energy: clicks, filters' and rooms' first milliseconds are made of such lines, bodies' modes seldom
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -84,12 +87,28 @@ def _patterns(lines: Lines, seen: Observation, modes: Array) -> tuple[Array, Arr
     k, m = len(lines.freq_hz), modes.shape[1]
     if not use.any():
         return np.ones(k), np.ones(m), np.ones((k, m))
-    a, p = _heard(lines, seen)[use], modes[use]
+    a, p = _heard(lines, seen)[use] * _rings(lines), modes[use]
     if not phased(lines, seen):
         p = np.abs(p)
     size, strength = np.linalg.norm(a, axis=0), np.linalg.norm(p, axis=0)
     alike = np.abs(a.T @ p) / np.maximum(size[:, None] * strength[None, :], 1e-300) if use.sum() > 1 else np.ones((k, m))
     return size / size.max(initial=1e-300), strength / strength.max(initial=1e-300), alike
+
+
+def _rings(lines: Lines) -> Array:
+    """How much each line (k,) may be a mode by its decay: 1, less where it is over far sooner than what holds the energy.
+
+    Lines at the fastest decay there is come in heaps that cancel one another, so their strengths say nothing.
+    """
+    decay, energy = np.nan_to_num(lines.decay_per_s), np.nan_to_num(lines.energy)
+    energy = np.where(decay > PINNED * FASTEST_PER_S, 0.0, energy)
+    if not (energy > 0).any() or not (decay > 0).any():
+        return np.ones(len(decay))
+    order = np.argsort(decay)
+    share = np.cumsum(energy[order])
+    typical = max(float(decay[order][np.searchsorted(share, share[-1] / 2)]), 1.0)
+    rings = np.clip(BRIEF * typical / np.maximum(decay, 1e-9), NEVER, 1.0)
+    return np.asarray(np.where(decay > PINNED * FASTEST_PER_S, np.minimum(rings, NEVER), rings))
 
 
 def _overlap(a: Array, b: Array, width: float) -> Array:
@@ -102,12 +121,12 @@ def sift(
     """The best few (ln γ, ν) of the grid, best first."""
     width = 0.006
     grid = log_gamma + np.arange(-reach, reach + 1e-9, 0.004)
-    heard = np.log(lines.freq_hz)
+    heard, rings = np.log(lines.freq_hz), _rings(lines)
     found: list[tuple[float, float, float]] = []
     for nu in np.clip(poisson + np.linspace(-POISSON_REACH, POISSON_REACH, 9), -0.4, 0.48):
         group = grouped(family, seen, 0.0, float(nu))
         size, strength, alike = _patterns(lines, seen, group.pattern)
-        root, force = np.sqrt(size), np.sqrt(strength)
+        root, force = np.sqrt(size) * rings, np.sqrt(strength)
         own = np.sqrt(root @ _overlap(heard, heard, width) @ root)
         place = np.log(group.freq_hz)
         both = force[:, None] * force * _overlap(place, place, width)
@@ -135,7 +154,7 @@ def assign(group: Group, lines: Lines, seen: Observation, width: float) -> tuple
 
     size, strength, alike = _patterns(lines, seen, group.pattern)
     gap = (np.log(lines.freq_hz)[:, None] - np.log(group.freq_hz)[None, :]) / width
-    told = np.clip(0.5 + 0.06 * np.log10(np.maximum(size, 1e-12)), 0.05, 1)  # what a line is worth
+    told = np.clip(0.5 + 0.06 * np.log10(np.maximum(size, 1e-12)), 0.05, 1) * _rings(lines)  # what a line is worth
     worth = told[:, None] * np.clip(0.6 + 0.1 * np.log10(np.maximum(strength, 1e-12)), 0.05, 1)
     price = np.minimum(gap**2 / 18 + 1.0 * (1 - alike), 1.0)  # 3 widths off, or another pattern: no pair
     row, column = linear_sum_assignment(worth * (price - 1.0))
