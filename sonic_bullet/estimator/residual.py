@@ -87,7 +87,8 @@ def strikes_of(signals: Array, left: Array, sr: int, lines: tuple[Array, Array, 
     share = represented_share(freq, decay, amplitude, hz, mode_decay, played)
     loud = np.sqrt((1 - share**2) * (np.abs(amplitude) ** 2).mean(axis=0))
     mean = np.sqrt((np.abs(played) ** 2).mean(axis=0))
-    residual = residual_record(signals, left, sr, Modes(hz, mode_decay, mean), freq, decay, loud, source)
+    rest = np.stack([x - damped(hz, mode_decay, a, signals.shape[1], sr) for x, a in zip(signals, played, strict=True)])
+    residual = residual_record(signals, left, rest, sr, Modes(hz, mode_decay, mean), (freq, decay, loud), source)
     return Strikes(signals, left, sr, freq, decay, amplitude, share, hz, mode_decay, played, residual)
 
 

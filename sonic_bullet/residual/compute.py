@@ -4,7 +4,8 @@
     P_residual = max(P_recorded - P_represented, 0)                                             pixel by pixel
 
 For a preset it is told in two parts. What is left of the features, √(1 - R_i²) of each, is lines: their frequencies are known far better than a spectrogram
-shows them. What is left beside all features is noise, of which bands and times keep the mean, less the recording's own floor, less what most strikes do not have, and
+shows them. In no band more is left than recordings have beyond what is played: modes too close to be told apart make one feature that matches none of them.
+What is left beside all features is noise, of which bands and times keep the mean, less the recording's own floor, less what most strikes do not have, and
 less what is not noise: the foot of lines that are no pure damped sinusoids would else be spread over whole bands.
 """
 
@@ -13,6 +14,7 @@ from __future__ import annotations
 import itertools
 
 import numpy as np
+from numba import njit
 
 from sonic_bullet.errors import AudioError
 from sonic_bullet.records import Array, Residual
@@ -28,18 +30,31 @@ BAND_OCTAVES = 1 / 6
 GROWTH = 1.12
 ABOVE = 2.0
 """Cells whose mean is less than this times the floor are the floor."""
-LOWEST_HZ = 20.0
+LOWEST_BINS = 1.5
+"""An offset or a drift fills the first two bins of a Hann window."""
+LINE_WIDTHS = 6.0
+ROOM = 1.25
+"""Six half widths hold nine tenths of a damped sinusoid's energy."""
 NEPERS = 40.0
 
 
 def damped(freq_hz: Array, decay_per_s: Array, amplitude: Array, n: int, sr: int) -> Array:
-    """Re Σ a e^{(-d + iω)t} (n,) of lines (l,), a complex."""
+    """Re Σ a e^{(-d + iω)t} (n,) of lines (l,), a complex; each until it has fallen by `NEPERS`."""
     out = np.zeros(n)
-    for f, d, a in zip(freq_hz, decay_per_s, amplitude, strict=True):
-        if a != 0:
-            length = n if d <= 0 else min(n, int(NEPERS / d * sr) + 1)
-            out[:length] += np.real(a * np.exp((-d + 2j * np.pi * f) / sr * np.arange(length)))
+    decay = np.asarray(decay_per_s, float)
+    length = np.where(decay > 0, np.minimum(n, NEPERS * sr / np.maximum(decay, 1e-9) + 1), n).astype(np.int64)
+    _damped(np.exp((-decay + 2j * np.pi * np.asarray(freq_hz)) / sr), np.asarray(amplitude, complex), length, out)
     return out
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _damped(pole: Array, amplitude: Array, length: Array, out: Array) -> None:  # pragma: no cover - compiled
+    for k in range(len(pole)):
+        p, z = pole[k], amplitude[k]
+        if z != 0:
+            for n in range(length[k]):
+                out[n] += z.real
+                z *= p
 
 
 def clip_residual(recorded: Array, represented: Array, sr: int, represented_sr: int | None = None, window: int = WINDOW) -> tuple[Power, Array]:
@@ -92,12 +107,12 @@ def cells(left: Power, floor_per_hz: Array) -> tuple[Array, Array, Array]:
 def shared_cells(left: list[Power]) -> tuple[Array, Array, Array]:
     """`cells` of the mean over strikes, where most strikes have some for themselves: what one of two has and the other has not is no property of the body.
 
-    Nothing below `LOWEST_HZ`: that is drift.
+    Nothing below `LOWEST_BINS`.
     """
     mean = Power(left[0].freq_hz, left[0].time_s, np.mean([p.per_hz for p in left], axis=0))
     freq, time, per_hz = cells(mean, noise_floor_per_hz(mean))
     most = np.mean([cells(p, noise_floor_per_hz(p))[2] > 0 for p in left], axis=0) > 0.5
-    return freq, time, np.where(most & (freq >= LOWEST_HZ)[:, None], per_hz, 0.0)
+    return freq, time, np.where(most & (freq > LOWEST_BINS * mean.freq_hz[1])[:, None], per_hz, 0.0)
 
 
 def noisiness(fine: Power, freq_hz: Array, time_s: Array) -> Array:
@@ -113,29 +128,56 @@ def noisiness(fine: Power, freq_hz: Array, time_s: Array) -> Array:
     return np.minimum(share, 1.0)
 
 
-def residual_record(
-    recorded: Array, left: Array, sr: int, modes: Modes, line_freq_hz: Array, line_decay_per_s: Array, line_amplitude: Array, source: str
-) -> Residual:
-    """The residual of strikes (s, n) from the onset on: ``left`` (s, n) beside all features; lines (l,), mean square over the strikes, beside all modes.
+def line_room(recorded: list[Power], rest: list[Power], played: list[Power], lines: tuple[Array, Array, Array], seconds: float) -> Array:
+    """Share (l,) of lines' energies for which there is room: all lines in a band together have no more than what recordings have there beyond what is played,
+    or what recorded - played has, if that is more (a line missing beside a mode that is played too loud). Energies are means over strikes.
 
-    Levels come out relative to the strongest mode. Raises AudioError on empty clips and NaN, RecordError where nothing can follow.
+    A line's band: `LINE_WIDTHS` of its half width either way, and three bins at least.
     """
-    if not len(recorded) or recorded.shape != left.shape:
+    freq_hz, decay_per_s, amplitude = lines
+    step = float(rest[0].freq_hz[1])
+    half = np.maximum(3 * step, LINE_WIDTHS * decay_per_s / (2 * np.pi))
+    edge = np.append(rest[0].freq_hz - step / 2, rest[0].freq_hz[-1] + step / 2)
+
+    def within(sounds: list[Power]) -> Array:
+        energy_per_hz = 2 * sounds[0].time_s[1] * np.mean([p.per_hz.sum(axis=1) for p in sounds], axis=0)
+        below = np.append(0.0, np.cumsum(energy_per_hz) * step)
+        return np.asarray(np.maximum(np.interp(freq_hz + half, edge, below) - np.interp(freq_hz - half, edge, below), 0.0))
+
+    room = np.maximum(within(recorded) - within(played), within(rest))
+    decay = np.maximum(decay_per_s, 1e-3)
+    energy = amplitude**2 / (4 * decay) * -np.expm1(-2 * decay * seconds)
+    wanted = (np.abs(freq_hz[:, None] - freq_hz[None]) <= half[:, None]) @ energy
+    return np.asarray(np.minimum(1.0, ROOM * room / np.maximum(wanted, 1e-300)))
+
+
+def residual_record(recorded: Array, left: Array, rest: Array, sr: int, modes: Modes, lines: tuple[Array, Array, Array], source: str) -> Residual:
+    """The residual of strikes (s, n) from the onset on: ``left`` (s, n) beside all features, ``rest`` (s, n) beside the modes as the model plays them.
+
+    lines: frequency, decay, amplitude (l,), mean square over the strikes, that the modes' share of the features leaves; neither they nor noise become more than
+    there is in ``rest``. Levels come out relative to the strongest mode. Raises AudioError on empty clips and NaN, RecordError where nothing can follow.
+    """
+    if not len(recorded) or recorded.shape != left.shape or recorded.shape != rest.shape:
         raise AudioError(f"recordings of shape {recorded.shape}, of which {left.shape} is left", "give strikes of one length")
     freq, time, per_hz = shared_cells([power(x, sr) for x in left])
+    per_hz = np.minimum(per_hz, shared_cells([power(x, sr) for x in rest])[2])
     per_hz = per_hz * np.mean([noisiness(power(x, sr, FINE_WINDOW), freq, time) for x in left], axis=0)
     unit = float(modes.amplitude.max())
     if not unit > 0:
         raise AudioError("modes that the strikes do not excite", "strike where the body moves")
     clip = float((recorded**2).sum(axis=1).mean() / sr)
-    energy = line_amplitude**2 / (4 * np.maximum(line_decay_per_s, 0.1))
+    line_hz, line_decay, line_amplitude = lines
+    if len(line_hz):
+        fine = [[power(x, sr, FINE_WINDOW) for x in sounds] for sounds in (recorded, rest, recorded - rest)]
+        line_amplitude = line_amplitude * np.sqrt(line_room(fine[0], fine[1], fine[2], lines, recorded.shape[1] / sr))
+    energy = line_amplitude**2 / (4 * np.maximum(line_decay, 0.1))
     order = np.argsort(-energy, kind="stable")[:LINES_MOST]
     order = np.sort(order[energy[order] > LINE_FLOOR * min(float(energy.max(initial=0.0)), clip)])
-    rest = float(energy[order].sum()) + 2 * float(np.trapezoid(np.trapezoid(per_hz, time, axis=1), freq))
-    if rest < 1e-6 * clip:
+    whole = float(energy[order].sum()) + 2 * float(np.trapezoid(np.trapezoid(per_hz, time, axis=1), freq))
+    if whole < 1e-6 * clip:
         order, per_hz = order[:0], np.zeros_like(per_hz)  # 60 dB below the clip: rounding, no residual
-    clip = max(clip, rest)  # lines that outlast the clip
+    clip = max(clip, whole)  # lines that outlast the clip
     return Residual(
-        modes.freq_hz, modes.decay_per_s, modes.amplitude / unit, line_freq_hz[order], line_decay_per_s[order], line_amplitude[order] / unit,
+        modes.freq_hz, modes.decay_per_s, modes.amplitude / unit, line_hz[order], line_decay[order], line_amplitude[order] / unit,
         freq, time, per_hz / unit**2, clip / unit**2, source,
     )  # fmt: skip
