@@ -26,7 +26,8 @@ MOST_TETS = 7_000
 LUMP_PASSES, MOST_PASSES = 2, 80
 """Of fTetWild's optimisation. It makes elements finer until the worst is good; two passes and a lesser edge give lumps the same modes in half the time."""
 FILL_LIMITS_S = (28.0, 8.0, 6.0)
-"""Processor seconds of each attempt, the next coarser than the last; a bowl of 14 400 triangles takes 15, on a busy machine 22. A slower machine may come to a coarser one: the note says so (`solid.COARSER`)."""
+"""Processor seconds of each attempt, the next coarser than the last; a bowl of 14 400 triangles takes 15, on a busy machine 22.
+A slower machine may come to a coarser one: the note says so (`solid.COARSER`)."""
 FILLED = (0.6, 1.7)
 """Of the enclosed volume: what a fill may hold. Wide, for a surface that passes through itself encloses some of it twice."""
 ENVELOPE_OF_EDGE = 0.035  # a finer surface than its elements costs time and tells nothing
