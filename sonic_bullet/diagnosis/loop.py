@@ -26,6 +26,7 @@ LEAST_SHARE = 0.08
 SURE = 2.0
 SUFFICES_DB = 1.5  # a gap below this is the mesh's and the shapes' own
 EXPLAINED = 0.5  # of the gap
+OPEN = 0.3  # of the first gap: with less left, no costly suspect is asked
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,7 +64,7 @@ def closed(
     for turn in range(ROUNDS):
         say(f"round {turn + 1}: {now:.2f} dB from the recordings, noise alone {floor:.2f} dB")
         evidence = evidence_of(h, bodies, band_hz, seed=seed)
-        found = trials(h, bodies, takes, evidence, effects, seed=seed + turn, say=say)
+        found = trials(h, bodies, takes, evidence, effects, seed=seed + turn, say=say, costly=now - floor > OPEN * (before - floor))
         for candidate in found:
             last.setdefault(candidate.id, candidate)
         best = next((c for c in found if earns(c, max(now - floor, 0.0))), None)

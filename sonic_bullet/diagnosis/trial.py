@@ -108,16 +108,24 @@ def directions(seed: int, count: int, modes: int) -> np.ndarray[Any, Any]:
 
 
 def trials(
-    h: Hypothesis, bodies: tuple[Struck, ...], takes: Sequence[Judged], evidence: Evidence, effects: Sequence[type[Effect]], *, seed: int, say: Any
+    h: Hypothesis,
+    bodies: tuple[Struck, ...],
+    takes: Sequence[Judged],
+    evidence: Evidence,
+    effects: Sequence[type[Effect]],
+    *,
+    seed: int,
+    say: Any,
+    costly: bool = True,
 ) -> list[Candidate]:
-    """Every suspect that the whole evidence suggests, after its trial; best first."""
+    """Every suspect that the whole evidence suggests, after its trial; best first. costly: whether those that take long are asked."""
     found: list[Candidate] = []
     folds = _folds(h, bodies, takes, evidence, seed)
     gap = float(np.mean([f.before for f in folds]) - np.mean([f.take.least(f.base) for f in folds])) if folds else 0.0
     for kind in sorted(effects, key=lambda kind: bool(getattr(kind, "costly", False))):
         if kind.id in evidence.found:
             continue
-        if getattr(kind, "costly", False) and any(c.mean_db > PLAIN * gap for c in found):
+        if getattr(kind, "costly", False) and (not costly or any(c.mean_db > PLAIN * gap for c in found)):
             continue  # something cheap says most of it: what is left may ask for more in the next round
         whole = kind.propose(evidence)
         if whole is None:

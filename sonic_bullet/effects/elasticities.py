@@ -22,6 +22,7 @@ SYMMETRIES = {"isotropic": 2, "cubic": 3, "hexagonal-x": 5, "hexagonal-y": 5, "h
 PLACE = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1), (3, 3), (4, 4), (5, 5))
 NAMES = ("youngs_x", "youngs_y", "youngs_z", "n_yz", "n_xz", "n_xy", "shear_yz", "shear_xz", "shear_xy")
 CAP = 0.012  # of ln f: a line farther off is no such mode
+BRIEF = 10.0  # times the modes' usual decay
 FLOOR = 3e-4  # of ln f: less is not told
 WIDTHS = (0.04, 0.025, 0.016, 0.01, 0.007, 0.005, 0.004, 0.004)
 PRIOR_N, PRIOR_G = 0.1, 0.7  # of n about the guess' ν, of ln G about √(E_i E_j)/2(1+n)
@@ -119,11 +120,19 @@ def told_of(evidence: Evidence) -> list[Told]:
     return [_told(h) for h in evidence.heard if h.elastic is not None and len(h.freq_hz) + len(h.foreign_hz) > 4]
 
 
+def ringing(h: Heard) -> Array:
+    """Which foreign lines (f,) may be modes by their decay; others are a click's, a filter's or a room's."""
+    if not np.isfinite(h.decay_per_s).any():
+        return np.ones(len(h.foreign_hz), bool)
+    return np.asarray(np.nan_to_num(h.foreign_decay_per_s) < BRIEF * max(float(np.nanmedian(h.decay_per_s)), 1.0))
+
+
 def _told(h: Heard) -> Told:
     assert h.elastic is not None
-    freq, decay = np.concatenate([h.freq_hz, h.foreign_hz]), np.concatenate([h.decay_per_s, h.foreign_decay_per_s])
-    sd = np.concatenate([h.freq_sd_hz / np.maximum(h.freq_hz, 1e-9), np.full(len(h.foreign_hz), 1e-4)])
-    amplitude = np.concatenate([h.amplitude, h.foreign_amplitude], axis=1)
+    own = ringing(h)
+    freq, decay = np.concatenate([h.freq_hz, h.foreign_hz[own]]), np.concatenate([h.decay_per_s, h.foreign_decay_per_s[own]])
+    sd = np.concatenate([h.freq_sd_hz / np.maximum(h.freq_hz, 1e-9), np.full(int(own.sum()), 1e-4)])
+    amplitude = np.concatenate([h.amplitude, h.foreign_amplitude[:, own]], axis=1)
     order = np.argsort(freq)
     amplitude = amplitude[:, order]
     size = np.linalg.norm(np.nan_to_num(amplitude), axis=0)

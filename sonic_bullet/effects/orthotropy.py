@@ -13,7 +13,7 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from sonic_bullet.effects.elasticities import CAP, NAMES, PLACE, SYMMETRIES, WIDTHS, Tensor, fitted, isotropic_p, p_of, search, told_of
+from sonic_bullet.effects.elasticities import CAP, NAMES, PLACE, SYMMETRIES, WIDTHS, Tensor, fitted, isotropic_p, p_of, ringing, search, told_of
 from sonic_bullet.effects.values import Evidence, Heard, Owner, Stage
 from sonic_bullet.records import Array, Material
 
@@ -102,8 +102,9 @@ def _fits(h: Heard) -> bool:
     if not len(h.freq_hz):
         return False
     off = np.clip(np.log(h.freq_hz / h.model_hz), -CAP, CAP)
-    left = np.concatenate([off - np.median(off), np.full(len(h.foreign_hz), CAP)])
-    size = np.concatenate([np.linalg.norm(np.nan_to_num(a), axis=0) for a in (h.amplitude, h.foreign_amplitude)])
+    own = ringing(h)
+    left = np.concatenate([off - np.median(off), np.full(int(own.sum()), CAP)])
+    size = np.concatenate([np.linalg.norm(np.nan_to_num(a), axis=0) for a in (h.amplitude, h.foreign_amplitude[:, own])])
     worth = np.clip(0.5 + 0.06 * np.log10(np.maximum(size / max(size.max(initial=0), 1e-300), 1e-12)), 0.05, 1) if size.any() else np.ones(len(left))
     return bool(np.sqrt((worth * left**2).sum() / worth.sum()) < SUFFICES)
 

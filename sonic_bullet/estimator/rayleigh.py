@@ -2,6 +2,8 @@
 
 Σ w (d − ½α − ½βλ)² → min,  w = c/(s² + (τd)²),  τ: the least relative scatter that makes the residuals as large as their spreads
                                                                                     [Paule & Mandel 1982], c: Cauchy's weight of outliers
+Where that τ is large, it may be a few lines that obey no law (clicks, other bodies' modes, fixtures): values then come with the τ of which half of
+the lines fall within their spreads, reached from above [least median of squares: Rousseeuw 1984].
 """
 
 from __future__ import annotations
@@ -12,12 +14,14 @@ import numpy as np
 
 from sonic_bullet.records import Array
 
+LEAST_MANY = 8  # lines of which a majority can be told
+HALF = 0.4549  # median of χ² with one degree of freedom
 SURE = 0.5  # a parameter whose logarithm is surer than this is told by the lines
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Damping:
-    """alpha_per_s, beta_s; covariance (2, 2) of their logarithms, NaN where the lines do not say; scatter: τ; said: what is not identifiable."""
+    """alpha_per_s, beta_s; covariance (2, 2) of their logarithms, NaN where the lines do not say; scatter: τ of all lines; said: what is not identifiable."""
 
     alpha_per_s: float
     beta_s: float
@@ -55,7 +59,7 @@ def _scattered(lam: Array, decay: Array, spread: Array) -> tuple[Array, Array, f
     freedom = max(len(lam) - 2, 1)
 
     def at(tau: float) -> tuple[Array, Array, float]:
-        value, information, chi = _weighted(lam, decay, np.hypot(spread, tau * decay))
+        value, information, chi, _, _ = _weighted(lam, decay, np.hypot(spread, tau * decay))
         return value, information, chi - freedom
 
     low, high = 0.0, 3.0
@@ -66,14 +70,29 @@ def _scattered(lam: Array, decay: Array, spread: Array) -> tuple[Array, Array, f
         middle = (low + high) / 2
         best = at(middle)
         low, high = (middle, high) if best[2] > 0 else (low, middle)
-    return best[0], best[1], high
+    if len(lam) < LEAST_MANY:
+        return best[0], best[1], high
+    return *_by_most(lam, decay, spread, freedom), high
 
 
-def _weighted(lam: Array, decay: Array, sd: Array) -> tuple[Array, Array, float]:
-    """Values (2,) >= 0, information (2, 2), Σ of squared residuals, each cut at 9."""
+def _by_most(lam: Array, decay: Array, spread: Array, freedom: int) -> tuple[Array, Array]:
+    """Values and information that most of the lines agree on."""
+    tau, weight = 1.0, np.ones(len(lam))
+    value, information, _, weight, square = _weighted(lam, decay, np.hypot(spread, tau * decay), weight)
+    while tau > 1e-5:
+        tau *= 0.8
+        trial = _weighted(lam, decay, np.hypot(spread, tau * decay), weight)
+        if np.median(trial[4]) > HALF * freedom / len(lam):
+            break
+        value, information, _, weight, square = trial
+    return value, information
+
+
+def _weighted(lam: Array, decay: Array, sd: Array, start: Array | None = None) -> tuple[Array, Array, float, Array, Array]:
+    """Values (2,) >= 0, information (2, 2), Σ of squared residuals, each cut at 9; the weights (k,) that outliers are left with, squares (k,)."""
     slope = np.stack([np.full(len(lam), 0.5), 0.5 * lam], axis=1) / sd[:, None]
     scale = 1 / np.sqrt((slope**2).sum(axis=0))
-    weight = np.ones(len(lam))
+    weight = np.ones(len(lam)) if start is None else start
     value = np.zeros(2)
     for _ in range(20):
         a = slope * scale * np.sqrt(weight)[:, None]
@@ -81,7 +100,7 @@ def _weighted(lam: Array, decay: Array, sd: Array) -> tuple[Array, Array, float]
         residual = decay / sd - slope @ (value * scale)
         weight = 1 / (1 + (residual / 3.0) ** 2) if len(lam) > 3 else weight
     value = value * scale
-    return value, (slope * weight[:, None]).T @ slope, float(np.minimum(residual**2, 9.0).sum())
+    return value, (slope * weight[:, None]).T @ slope, float(np.minimum(residual**2, 9.0).sum()), weight, residual**2
 
 
 def _not_negative(a: Array, b: Array) -> Array:
