@@ -16,10 +16,16 @@ TABLE_FROM, TABLE_TO = -13, 54  # its powers of two: −39 to 162 dB SPL
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def centre_and_radius(freq_hz, decay_per_s, sr, length):  # type: ignore[no-untyped-def]
+    """Of a mode's spectrum, in bins."""
+    return freq_hz / sr * length, 6 + 3 * decay_per_s * length / (2 * np.pi * sr)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def reach(freq_hz, decay_per_s, amplitude, sr, length, floor):  # type: ignore[no-untyped-def]
     """(m, 3) first bin, bin after the last, place of the first among all.
 
-    The main lobe is 8 bins wide, the skirt falls as (decay/offset)³. What decays within x⁻¹ of a window is over where the window, ∝ n² at its
+    The main lobe is 8 bins wide, the skirt falls as (decay/offset)³; the last bin each side fades, so that Π does not jump as a mode moves. What decays within x⁻¹ of a window is over where the window, ∝ n² at its
     edges, has hardly begun: its peak is below 3/x³ of an undamped mode's.
     """
     reach = np.zeros((len(freq_hz), 3), np.int64)
@@ -28,9 +34,8 @@ def reach(freq_hz, decay_per_s, amplitude, sr, length, floor):  # type: ignore[n
         reach[j, 2] = room
         short = decay_per_s[j] * length / sr
         if 0 < abs(freq_hz[j]) < sr / 2 and abs(amplitude[j]) * min(1.0, 3 / short**3) > floor:
-            centre = int(np.floor(freq_hz[j] / sr * length))
-            radius = 5 + int(3 * decay_per_s[j] * length / (2 * np.pi * sr))
-            reach[j, 0], reach[j, 1] = max(1, centre - radius), min(length // 2 + 1, centre + 2 + radius)
+            centre, radius = centre_and_radius(freq_hz[j], decay_per_s[j], sr, length)
+            reach[j, 0], reach[j, 1] = max(1, int(np.ceil(centre - radius))), min(length // 2 + 1, int(np.floor(centre + radius)) + 1)
             room += max(reach[j, 1] - reach[j, 0], 0)
     return reach
 
@@ -67,6 +72,7 @@ def frame(freq_hz, decay_per_s, amplitude, reach, sr, late_s, length, hop):  # t
         count, at = reach[j, 1] - reach[j, 0], reach[j, 2]
         if count <= 0:
             continue
+        centre, radius = centre_and_radius(freq_hz[j], decay_per_s[j], sr, length)
         rate = complex(-decay_per_s[j], 2 * np.pi * freq_hz[j])
         top = 1 - np.exp(rate / sr * length)
         state[j] = amplitude[j] * np.exp(rate * late_s) * complex(0.0, -0.5)
@@ -83,7 +89,8 @@ def frame(freq_hz, decay_per_s, amplitude, reach, sr, late_s, length, hop):  # t
                 + 0.5 * WINDOW[2] * (geometric[k + 1] + geometric[k + 5])
                 - 0.5 * WINDOW[3] * (geometric[k] + geometric[k + 6])
             )
-            shapes[0, at + k], shapes[1, at + k] = value.real, value.imag
+            fade = min(1.0, radius - abs(reach[j, 0] + k - centre))
+            shapes[0, at + k], shapes[1, at + k] = fade * value.real, fade * value.imag
     return shapes, state, turn
 
 

@@ -31,7 +31,7 @@ POLISH_ROUNDS = 3
 GAIN = 1e-4  # of Π: least squares stop where a step brings less
 SETTLE = 1e-4  # one unit of the last search raises Π by this part of it
 SETTLE_ROUNDS = 30
-POLISH_TOLERANCE = 1e-13
+POLISH_TOLERANCE = 1e-12
 WIDTH = np.array([1e-2, 1e-2, 1e-4, 1e-2])  # of the differences that stand for slopes, in the logarithms
 
 

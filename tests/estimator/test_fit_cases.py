@@ -85,6 +85,17 @@ def test_impulses_that_contradict_the_sounds_are_told(planted: Planted) -> None:
     assert "amplitudes scatter" in found.fit.verdict
 
 
+def test_only_what_precedes_a_second_hit_is_listened_to(planted: Planted, tmp_path: Path) -> None:
+    case = read_case(planted.folder)
+    sound, sr = soundfile.read(planted.folder / "s0.wav")
+    again = np.concatenate([np.zeros(500), sound, sound])
+    soundfile.write(tmp_path / "twice.wav", again, sr, subtype="FLOAT")
+    thing = replace(case.objects["box"], mesh=None)
+    (e,) = gather(replace(case, onset_s=None, objects={"box": thing}, recordings=(replace(case.recordings[0], file=tmp_path / "twice.wav"),)))
+    assert e.signals is not None and 0.9 * len(sound) < e.signals.shape[1] <= len(sound) + 20
+    assert any("2 hits" in note for note in e.notes)
+
+
 def _millimetres(case: dict[str, Any], folder: Path) -> None:
     write_box(folder / "box.obj", (140.0, 30.0, 5.0))
 
