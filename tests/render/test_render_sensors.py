@@ -91,7 +91,7 @@ def only_blow(body: Any, contacts: Contacts) -> Blow:
             return blows
 
         patch.setattr(synthesizer, "find_blows", listening)
-        rendered((body, wall_body()), one_strike((body, wall_body()), contacts, [(0, 0, 0), (0, 0, 0.01)], at=0, steps=5), ())
+        rendered((body, wall_body()), one_strike((body, wall_body()), contacts, [(0, 0, 0), (0, 0, 0.01)], at=0, steps=5), (ModalSum(),))
     (blow,) = found
     return blow
 
