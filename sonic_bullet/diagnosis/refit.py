@@ -21,7 +21,7 @@ from sonic_bullet.records import Array
 
 ROUGH = 0.02
 CORRECTION = 0.01
-NEAR = 5e-3  # relative: lines of one mode
+NEAR, ALIKE = 5e-3, 1.6  # of ln f and ln d: lines of one mode
 
 
 def refitted(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...] | None = None, *, reference: Hypothesis | None = None) -> Hypothesis:
@@ -106,8 +106,16 @@ def whole(one: Heard) -> Array:
     if not len(one.foreign_hz) or not len(one.freq_hz):
         return one.amplitude
     gap = np.abs(np.log(one.foreign_hz[:, None] / one.freq_hz[None, :]))
-    mine = (gap.argmin(axis=1)[:, None] == np.arange(len(one.freq_hz))) & (gap < NEAR)
+    alike = np.abs(np.log(np.maximum(one.foreign_decay_per_s[:, None], 1e-3) / np.maximum(one.decay_per_s, 1e-3))) < ALIKE  # clicks are no part of a mode
+    mine = (gap.argmin(axis=1)[:, None] == np.arange(len(one.freq_hz))) & (gap < NEAR) & alike
     return np.asarray(one.amplitude + one.foreign_amplitude @ mine)
+
+
+def _middle(ratio: Array, weight: Array) -> float:
+    """Weighted median, no heavier than 100 to 1: where weights that fall off with the misfit may start from."""
+    order = np.argsort(ratio)
+    total = np.cumsum(np.clip(weight[order], weight.max() / 100, None))
+    return float(ratio[order][np.searchsorted(total, total[-1] / 2)])
 
 
 def _gained(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...]) -> Hypothesis:
@@ -140,7 +148,9 @@ def _gained(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...])
     x, y, s = np.concatenate(told), np.concatenate(seen), np.concatenate(spread, axis=1)
     good = np.isfinite(x) & np.isfinite(y) & np.isfinite(s).all(axis=0)
     x, y, s = x[good], y[good], s[:, good]
-    gain, weight = h.gain if np.isfinite(h.gain) and h.gain > 0 else 1.0, np.ones(len(x))
+    if not (x > 0).any():
+        return h
+    gain, weight = _middle(y[x > 0] / x[x > 0], x[x > 0] / (s[0] + s[1])[x > 0]), np.ones(len(x))
     for _ in range(30):
         sd2 = (s[0] ** 2 + (gain * s[1]) ** 2) + 1e-300
         gain = float((weight * x * y / sd2).sum() / max(float((weight * x**2 / sd2).sum()), 1e-300))

@@ -149,6 +149,8 @@ def _filter(heard: list[Heard], better: float) -> dict[str, Any]:
     if not rows:
         return {}
     freq, ratio, sd = (np.concatenate([r[i] for r in rows]) for i in range(3))
+    if len(freq) < 5:
+        return {}
     plain = _misfit(ratio, sd)
     best: tuple[float, dict[str, Any]] = (plain - better - 2 * np.log(len(freq)), {})
     for high in (True, False):

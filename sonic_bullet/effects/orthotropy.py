@@ -19,7 +19,7 @@ from sonic_bullet.records import Array, Material
 
 BETTER = 10.0  # in BIC, than isotropy
 NEARER = 0.7  # of isotropy's rms of ln f, lines beyond the cap counted at the cap
-SUFFICES = 2.5e-3  # rms of ln f that leaves nothing to look for
+SUFFICES = 4e-3  # rms of ln f from the nearest isotropic mode that leaves nothing to look for: split pairs, corrected meshes
 LEAST = 0.03  # of ln E_i/E_j or ln of Zener's ratio: less is the mesh's
 
 
@@ -101,9 +101,14 @@ def _fits(h: Heard) -> bool:
     """Whether the isotropic body's modes are where the lines are."""
     if not len(h.freq_hz):
         return False
-    off = np.clip(np.log(h.freq_hz / h.model_hz), -CAP, CAP)
-    own = ringing(h)
-    left = np.concatenate([off - np.median(off), np.full(int(own.sum()), CAP)])
+    off, own = np.log(h.freq_hz / h.model_hz), ringing(h)
+    shift = float(np.median(off))
+    left = np.minimum(np.abs(off - shift), CAP)
+    if own.any():
+        model = h.plain or h.model
+        modes = model.freq_hz if model is not None else h.all_hz
+        strange = np.abs(np.log(h.foreign_hz[own][:, None] / modes[None, :]) - shift).min(axis=1)
+        left = np.concatenate([left, np.minimum(strange, CAP)])
     size = np.concatenate([np.linalg.norm(np.nan_to_num(a), axis=0) for a in (h.amplitude, h.foreign_amplitude[:, own])])
     worth = np.clip(0.5 + 0.06 * np.log10(np.maximum(size / max(size.max(initial=0), 1e-300), 1e-12)), 0.05, 1) if size.any() else np.ones(len(left))
     return bool(np.sqrt((worth * left**2).sum() / worth.sum()) < SUFFICES)

@@ -145,6 +145,8 @@ def _sought(x: Array, rest: Array, sr: int, reach: int) -> tuple[float | None, f
     cross = np.fft.irfft(np.conj(np.fft.rfft(x, size)) * np.fft.rfft(rest, size), size)[:reach]
     energy = np.cumsum((x**2)[::-1])[::-1]  # of what of x is still inside, once delayed
     inside = energy[0] - np.concatenate([[0.0], np.cumsum((x**2)[::-1])])[:reach]
+    if not energy[0] > 0:
+        return None, 0.0
     strength = cross / np.maximum(inside, 1e-3 * energy[0])
     first = int(SPAN_S[0] * sr)
     gain = np.where(strength > 0, strength**2 * inside, 0.0)

@@ -27,7 +27,7 @@ KEPT: tuple[type[Effect], ...] = (DampingLaw, ModeSplitting, AmplitudePitch, Amp
 def stored(effect: Effect) -> dict[str, Any]:
     """What a preset file holds of an effect: all but what it does not say (NaN)."""
     values: dict[str, Any] = msgspec.to_builtins({f.name: getattr(effect, f.name) for f in fields(effect)})  # type: ignore[arg-type]
-    return {"id": effect.id} | {name: value for name, value in values.items() if value == value}
+    return {"id": effect.id} | {name: value for name, value in values.items() if not (isinstance(value, float) and np.isnan(value))}
 
 
 def effect_of(data: dict[str, Any]) -> Effect:
