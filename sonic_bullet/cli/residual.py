@@ -68,6 +68,8 @@ def _unshaped(source: str, one: dict[str, Any], progress: Any) -> tuple[Any, Any
         raise FileError(f"{' and '.join(given)} given without a shape", "give --mesh too, or leave it out")
     if one["material"] is None:
         raise FileError("--material missing", "without --mesh the residual joins a material that is known: name it")
+    if one["onset_s"] is not None and not np.isfinite(one["onset_s"]):
+        raise FileError(f"--onset is {one['onset_s']}", "give a finite number")
     preset = named_preset(one["material"])
     if not Path(source).is_file():
         raise FileError(f"cannot read {source}: no such file or folder", "give a recording, or a folder with a case.json")

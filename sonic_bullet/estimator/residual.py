@@ -29,6 +29,8 @@ PER_BARK = 40.0
 PER_DURATION = 1.0
 NEAR = 0.02
 POWER = 0.3
+ALIKE = 0.02
+"""A feature whose power is represented but for less than this, a tenth of a decibel, leaves nothing."""
 
 
 def match_ratios(freq_hz: Array, decay_per_s: Array, mode_hz: Array, mode_decay_per_s: Array, mode_amplitude: Array) -> tuple[Array, Array]:
@@ -85,7 +87,7 @@ def strikes_of(signals: Array, left: Array, sr: int, lines: tuple[Array, Array, 
     order = order[np.append(True, np.diff(modes[0][order]) > 0)] if len(order) else order
     hz, mode_decay, played = modes[0][order], modes[1][order], modes[2][:, order]
     share = represented_share(freq, decay, amplitude, hz, mode_decay, played)
-    loud = np.sqrt((1 - share**2) * (np.abs(amplitude) ** 2).mean(axis=0))
+    loud = np.sqrt(np.where(1 - share**2 > ALIKE, 1 - share**2, 0.0) * (np.abs(amplitude) ** 2).mean(axis=0))
     mean = np.sqrt((np.abs(played) ** 2).mean(axis=0))
     rest = np.stack([x - damped(hz, mode_decay, a, signals.shape[1], sr) for x, a in zip(signals, played, strict=True)])
     residual = residual_record(signals, left, rest, sr, Modes(hz, mode_decay, mean), (freq, decay, loud), source)

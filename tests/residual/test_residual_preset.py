@@ -209,6 +209,7 @@ def test_the_command_writes_a_preset_that_plays(tmp_path: Path) -> None:
         (["residual", str(tmp_path / "no.wav"), "--material", "wood", "-o", str(preset)], "no.wav"),
         (["residual", str(tmp_path / "tap.wav"), "--material", "wood", "--strike", "0,0,0", "-o", str(preset)], "without a shape"),
         (["residual", str(tmp_path / "tap.wav"), "--material", "wood", "-o", "preset.txt"], "json"),
+        (["residual", str(tmp_path / "tap.wav"), "--material", "wood", "--onset", "nan", "-o", str(preset)], "--onset is nan"),
     ):
         failed = run.invoke(cli, words)
         assert failed.exit_code != 0

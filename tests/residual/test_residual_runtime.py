@@ -8,11 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from made_models import STEEL, box_body, row, step, wall_body
 from made_residuals import SR, modes, residual
 
+from sonic_bullet.cli import cli
 from sonic_bullet.contacts import ContactLog, Contacts
-from sonic_bullet.files import read_log
+from sonic_bullet.files import read_audio, read_log
 from sonic_bullet.records import Air, Material, Microphone, ModalSum
 from sonic_bullet.render import Synthesizer, render_log
 from sonic_bullet.render.beside import build_beside, struck_power
@@ -83,6 +85,10 @@ def test_live_frames_a_sound_in_between_and_a_replay_are_the_same_bits(tmp_path:
     assert kept is not None and kept.residual is not None
     assert (kept.residual.power_per_hz == NOISY.residual.power_per_hz).all()
     assert (render_log(again) == render_log(log)).all()
+    for name, words, wanted in (("with.wav", [], render_log(log)), ("without.wav", ["--no-residual"], render_log(log, residual=False))):
+        done = CliRunner().invoke(cli, ["render", str(tmp_path / "log.npz"), "-o", str(tmp_path / name), *words])
+        assert done.exit_code == 0, done.output
+        assert read_audio(str(tmp_path / name))[0] == pytest.approx(wanted, rel=1e-6, abs=1e-12)
 
 
 def test_level_follows_the_impulse() -> None:
