@@ -15,6 +15,7 @@ from sonic_bullet.diagnosis.bodies import Struck
 from sonic_bullet.diagnosis.play import Hypothesis, blow_of, modes_of, pattern, play, start
 from sonic_bullet.effects.values import Evidence, Heard, Sound, Stage
 from sonic_bullet.estimator.lines import noise_rms
+from sonic_bullet.estimator.pairing import TWINS
 from sonic_bullet.records import Array, ModalModel
 
 REACH = 0.012  # of a line from its mode where effects have moved it
@@ -115,7 +116,14 @@ def _nearest(body: Struck, model: ModalModel) -> tuple[Array, tuple[Array, ...]]
     price = np.minimum((gap / REACH) ** 2 + 0.5 * (1 - np.nan_to_num(alike)), 1.0) - 1.0
     row, column = linear_sum_assignment(price)
     good = price[row, column] < 0
-    return row[good], tuple(np.array([c]) for c in column[good])
+    row, column = row[good], column[good]
+    group = np.cumsum(np.diff(np.log(model.freq_hz), prepend=-np.inf) > TWINS)  # twins that nothing has set apart are one line
+    taken, mode = set(column.tolist()), []
+    for c in column:
+        others = [int(k) for k in np.flatnonzero(group == group[c]) if k == c or int(k) not in taken]
+        taken |= set(others)
+        mode.append(np.array(others))
+    return row, tuple(mode)
 
 
 def path_response(h: Hypothesis, body: Struck, freq_hz: Array, sr: int) -> Array:

@@ -25,7 +25,7 @@ LEAST_DB = 0.25
 LEAST_SHARE = 0.08
 SURE = 2.0
 SUFFICES_DB = 1.5  # a gap below this is the mesh's and the shapes' own
-EXPLAINED = 0.5  # of the gap
+EXPLAINED = 0.4  # of the gap; part of it is the mesh's and the shapes' own
 OPEN = 0.3  # of the first gap: with less left, no costly suspect is asked
 
 
@@ -78,7 +78,7 @@ def closed(
         now = mean_db(takes, h) or 0.0
     gap, left = before - floor, now - floor
     verdict = "explained" if added else "none" if gap < SUFFICES_DB else "unexplained"
-    if added and left > max((1 - EXPLAINED) * gap, SUFFICES_DB):  # a name for less than half of what is seen would be a guess
+    if added and left > max((1 - EXPLAINED) * gap, SUFFICES_DB):  # a name for less of what is seen would be a guess
         verdict, h, now, added = "unexplained", start, before, []
     return Closed(start, h, tuple(added), tuple(last.values()), verdict, before, now, floor)
 

@@ -8,6 +8,7 @@ Read off two lines 0.1 to 1 % apart where the mesh has a pair: their amplitudes 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import combinations
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -16,9 +17,12 @@ from sonic_bullet.effects.values import Evidence, Heard, Owner, Stage
 from sonic_bullet.records import Array, ModalModel
 
 PAIR = 6e-3  # relative: modes of a mesh nearer than this may be a pair
-SPLIT = (4e-4, 1.3e-2)
-LOUD = 0.03
-ALIKE = 0.85
+SPLIT = (1e-4, 3e-2)
+HEARD = 0.12  # of a line's own width: pairs nearer than that sound as one
+REACH = 1.5e-2  # of a line from its pair's middle
+LOUD, CLEAR = 1e-3, 30.0  # of the strongest line; of a line's own spread
+MOST = 7
+ALIKE = 0.9
 
 
 @dataclass(frozen=True)
@@ -74,47 +78,53 @@ def _pair(freq: Array, f: float) -> tuple[int, int]:
 
 
 def _pairs(h: Heard) -> list[tuple[float, float, float]]:
-    """(f, ε, ψ) of every pair of modes that two lines stand for."""
+    """(f, ε, ψ) of every pair of modes that two lines stand for; a line stands for one mode, the surest pairs choose first."""
     assert h.model is not None
     every = np.concatenate([h.freq_hz, h.foreign_hz])
+    decay = np.concatenate([h.decay_per_s, h.foreign_decay_per_s])
     amplitude = np.concatenate([h.amplitude, h.foreign_amplitude], axis=1)
-    spread = np.concatenate([h.amplitude_sd, h.foreign_sd], axis=1)
     level = np.where(np.isfinite(h.impulse_n_s), h.impulse_n_s, 1.0)
     strike = np.einsum("sxm,sx->sm", h.model.shape[h.strike_vertex].astype(float), h.strike_way) * level[:, None]
     sensor = np.einsum("xm,x->m", h.model.shape[h.sensor_vertex].astype(float), h.sensor_way)
     model_hz = h.model.freq_hz
-    strongest = np.abs(amplitude).max()
-    found = []
+    size = np.abs(amplitude).max(axis=0)
+    clear = size > np.maximum(LOUD * size.max(), CLEAR * np.concatenate([h.amplitude_sd, h.foreign_sd], axis=1).max(axis=0))
+    trials: list[tuple[float, int, int, int, float, float]] = []
     for a in np.flatnonzero(np.diff(model_hz) < PAIR * model_hz[:-1]):
-        b, middle = a + 1, (model_hz[a] + model_hz[a + 1]) / 2
-        near = np.flatnonzero((np.abs(every / middle - 1) < SPLIT[1]) & (np.abs(amplitude).max(axis=0) > LOUD * strongest))
-        near = near[np.argsort(-np.abs(amplitude[:, near]).max(axis=0))][:2]
-        if len(near) < 2:
+        middle = (model_hz[a] + model_hz[a + 1]) / 2
+        near = np.flatnonzero((np.abs(every / middle - 1) < REACH) & clear)
+        near = np.sort(near[np.argsort(-size[near])][:MOST])
+        for i, j in combinations(near.tolist(), 2):
+            low, high = (i, j) if every[i] < every[j] else (j, i)
+            split = float(2 * (every[high] - every[low]) / (every[high] + every[low]))
+            if not SPLIT[0] < split < SPLIT[1] or split * middle < HEARD * min(decay[low], decay[high]) / np.pi:
+                continue
+            turn, alike = _turn(strike[:, [a, a + 1]], sensor[[a, a + 1]], amplitude[:, [low, high]], h.signed)
+            off = abs((every[low] + every[high]) / (2 * middle) - 1)
+            if alike > ALIKE:
+                trials.append((float(alike - off / REACH * (1 - ALIKE)), int(a), int(low), int(high), split, turn))
+    found: list[tuple[float, float, float]] = []
+    taken: set[int] = set()
+    done: set[int] = set()
+    for _, a, low, high, split, turn in sorted(trials, reverse=True):
+        if {low, high} & taken or {a, a + 1} & done:
             continue
-        low, high = sorted(near, key=lambda i: every[i])
-        split = 2 * (every[high] - every[low]) / (every[high] + every[low])
-        if not SPLIT[0] < split < SPLIT[1]:
-            continue
-        turn, alike = _turn(strike[:, [a, b]], sensor[[a, b]], amplitude[:, [low, high]], spread[:, [low, high]], h.signed)
-        if alike > ALIKE:
-            found.append((float((every[low] + every[high]) / 2), float(split), turn))
-    return found
+        taken |= {low, high}
+        done |= {a, a + 1}
+        found.append((float((every[low] + every[high]) / 2), split, turn))
+    return sorted(found)
 
 
-def _turn(strike: Array, sensor: Array, amplitude: Array, spread: Array, signed: bool) -> tuple[float, float]:
+def _turn(strike: Array, sensor: Array, amplitude: Array, signed: bool) -> tuple[float, float]:
     """ψ by the two lines' patterns (s, 2), and how alike they then are."""
-    best = (0.0, 0.0)
     heard = np.real(amplitude * np.exp(-1j * np.angle((amplitude**2).sum(axis=0)) / 2)) if signed else np.abs(amplitude)
-    for turn in np.linspace(0, np.pi, 181)[:-1]:
-        c, s = np.cos(turn), np.sin(turn)
-        told = np.stack([(strike @ (c, s)) * (sensor @ (c, s)), (strike @ (-s, c)) * (sensor @ (-s, c))], axis=1)
-        if not signed:
-            told = np.abs(told)
-        fit = 0.0
-        for i in range(2):
-            fit += abs(float(told[:, i] @ heard[:, i])) / max(float(np.linalg.norm(told[:, i]) * np.linalg.norm(heard[:, i])), 1e-300)
-        ratio = np.linalg.norm(told, axis=0) / max(np.linalg.norm(told), 1e-300) @ np.linalg.norm(heard, axis=0) / max(np.linalg.norm(heard), 1e-300)
-        score = 0.5 * fit * float(np.sqrt(max(ratio, 0.0)))
-        if score > best[1]:
-            best = (float(turn), score)
-    return best
+    turn = np.linspace(0, np.pi, 181)[:-1]
+    way = np.stack([np.stack([np.cos(turn), np.sin(turn)]), np.stack([-np.sin(turn), np.cos(turn)])], axis=1)  # (2, line, turn)
+    told = np.einsum("sx,xlt->tsl", strike, way) * np.einsum("x,xlt->tl", sensor, way)[:, None, :]
+    told = told if signed else np.abs(told)
+    size, loud = np.linalg.norm(told, axis=1), np.linalg.norm(heard, axis=0)
+    fit = np.abs(np.einsum("tsl,sl->tl", told, heard)) / np.maximum(size * loud, 1e-300)
+    ratio = (size @ loud) / np.maximum(np.linalg.norm(size, axis=1) * np.linalg.norm(loud), 1e-300)
+    score = fit.mean(axis=1) * np.sqrt(np.maximum(ratio, 0.0))
+    best = int(score.argmax())
+    return float(turn[best]), float(score[best])
