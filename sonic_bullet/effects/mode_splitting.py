@@ -95,7 +95,7 @@ def _pairs(h: Heard) -> list[tuple[float, float, float]]:
         near = np.flatnonzero((np.abs(every / middle - 1) < REACH) & clear)
         near = np.sort(near[np.argsort(-size[near])][:MOST])
         for i, j in combinations(near.tolist(), 2):
-            low, high = (i, j) if every[i] < every[j] else (j, i)
+            low, high = (int(i), int(j)) if every[i] < every[j] else (int(j), int(i))
             split = float(2 * (every[high] - every[low]) / (every[high] + every[low]))
             if not SPLIT[0] < split < SPLIT[1] or split * middle < HEARD * min(decay[low], decay[high]) / np.pi:
                 continue
@@ -106,11 +106,11 @@ def _pairs(h: Heard) -> list[tuple[float, float, float]]:
     found: list[tuple[float, float, float]] = []
     taken: set[int] = set()
     done: set[int] = set()
-    for _, a, low, high, split, turn in sorted(trials, reverse=True):
-        if {low, high} & taken or {a, a + 1} & done:
+    for _, mode, low, high, split, turn in sorted(trials, reverse=True):
+        if low in taken or high in taken or mode in done or mode + 1 in done:
             continue
-        taken |= {low, high}
-        done |= {a, a + 1}
+        taken.update((low, high))
+        done.update((mode, mode + 1))
         found.append((float((every[low] + every[high]) / 2), split, turn))
     return sorted(found)
 

@@ -13,7 +13,8 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from sonic_bullet.effects.elasticities import CAP, NAMES, PLACE, SYMMETRIES, WIDTHS, Tensor, fitted, isotropic_p, p_of, ringing, search, told_of
+from sonic_bullet.effects.elasticities import CAP, WIDTHS, Tensor, fitted, isotropic_p, ringing, search, told_of
+from sonic_bullet.effects.tensors import NAMES, PLACE, SYMMETRIES, p_of
 from sonic_bullet.effects.values import Evidence, Heard, Owner, Stage
 from sonic_bullet.records import Array, Material
 

@@ -1,0 +1,73 @@
+"""A stiffness with axes along the mesh's, by numbers that a search can move: p (9,), and fewer under a symmetry.
+
+    p = (ln E₁₂₃, n₂₃ n₁₃ n₁₂, ln G₂₃ G₁₃ G₁₂), per density;  n_ij = ν_ij √(E_j/E_i),  S = D^{-1/2} (n) D^{-1/2}       [Bodig & Jayne 1982, eq. 3.8]
+
+Isotropic 2, cubic 3, hexagonal about x, y or z (transversely isotropic) 5, orthorhombic (orthotropic) 9                            [Nye 1957, ch. VIII]
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sonic_bullet.records import Array
+
+SYMMETRIES = {"isotropic": 2, "cubic": 3, "hexagonal-x": 5, "hexagonal-y": 5, "hexagonal-z": 5, "orthorhombic": 9}
+PLACE = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1), (3, 3), (4, 4), (5, 5))
+NAMES = ("youngs_x", "youngs_y", "youngs_z", "n_yz", "n_xz", "n_xy", "shear_yz", "shear_xz", "shear_xy")
+
+
+def stiffness(p: Array) -> Array:
+    """C/ρ (6, 6)."""
+    root = np.exp(-0.5 * p[:3])
+    normal = np.array([[1, -p[5], -p[4]], [-p[5], 1, -p[3]], [-p[4], -p[3], 1]])
+    found = np.zeros((6, 6))
+    found[:3, :3] = np.linalg.inv(normal * np.outer(root, root))
+    found[range(3, 6), range(3, 6)] = np.exp(p[6:])
+    return found
+
+
+def sound(p: Array) -> bool:
+    """Whether the tensor is positive definite."""
+    normal = np.array([[1, -p[5], -p[4]], [-p[5], 1, -p[3]], [-p[4], -p[3], 1]])
+    return bool(np.linalg.eigvalsh(normal)[0] > 0.02)
+
+
+def constants(p: Array) -> Array:
+    """The nine constants (9,) of C/ρ, as `Elastic.look` orders them."""
+    c = stiffness(p)
+    return np.array([c[i, j] for i, j in PLACE])
+
+
+def expanded(symmetry: str, q: Array) -> Array:
+    """p (9,) of a symmetry's own numbers: (ln E, n), (ln E, n, ln G), (ln E_along, ln E_across, n_along, n_across, ln G_along), or p itself."""
+    if symmetry == "isotropic":
+        return np.concatenate([np.full(3, q[0]), np.full(3, q[1]), np.full(3, q[0] - np.log(2 * (1 + q[1])))])
+    if symmetry == "cubic":
+        return np.repeat(q, 3)
+    if symmetry == "orthorhombic":
+        return np.array(q)
+    along = "xyz".index(symmetry[-1])
+    p = np.array([q[1]] * 3 + [q[2]] * 3 + [q[4]] * 3)
+    p[along], p[3 + along], p[6 + along] = q[0], q[3], q[1] - np.log(2 * (1 + q[3]))
+    return p
+
+
+def reduced(symmetry: str, p: Array) -> Array:
+    """The symmetry's own numbers nearest to p."""
+    if symmetry == "isotropic":
+        return np.array([p[:3].mean(), p[3:6].mean()])
+    if symmetry == "cubic":
+        return np.asarray(p.reshape(3, 3).mean(axis=1))
+    if symmetry == "orthorhombic":
+        return np.array(p)
+    along = "xyz".index(symmetry[-1])
+    rest = [k for k in range(3) if k != along]
+    return np.array([p[along], p[rest].mean(), p[3:6][rest].mean(), p[3 + along], p[6:][rest].mean()])
+
+
+def p_of(stiffness_m2_s2: Array) -> Array:
+    """p (9,) of C/ρ (6, 6): `stiffness` turned round."""
+    compliance = np.linalg.inv(stiffness_m2_s2)
+    youngs = 1 / np.diag(compliance)[:3]
+    normal = [-compliance[i, j] * np.sqrt(youngs[i] * youngs[j]) for i, j in ((1, 2), (0, 2), (0, 1))]
+    return np.concatenate([np.log(youngs), normal, np.log(np.diag(stiffness_m2_s2)[3:])])
