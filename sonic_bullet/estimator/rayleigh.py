@@ -78,13 +78,13 @@ def _scattered(lam: Array, decay: Array, spread: Array) -> tuple[Array, Array, f
 def _by_most(lam: Array, decay: Array, spread: Array, freedom: int) -> tuple[Array, Array]:
     """Values and information that most of the lines agree on."""
     tau, weight = 1.0, np.ones(len(lam))
-    value, information, _, weight, square = _weighted(lam, decay, np.hypot(spread, tau * decay), weight)
+    value, information, _, weight, _ = _weighted(lam, decay, np.hypot(spread, tau * decay), weight)
     while tau > 1e-5:
         tau *= 0.8
         trial = _weighted(lam, decay, np.hypot(spread, tau * decay), weight)
         if np.median(trial[4]) > HALF * freedom / len(lam):
             break
-        value, information, _, weight, square = trial
+        value, information, _, weight, _ = trial
     return value, information
 
 
