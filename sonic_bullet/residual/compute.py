@@ -174,8 +174,8 @@ def residual_record(recorded: Array, left: Array, rest: Array, sr: int, modes: M
     order = np.argsort(-energy, kind="stable")[:LINES_MOST]
     order = np.sort(order[energy[order] > LINE_FLOOR * min(float(energy.max(initial=0.0)), clip)])
     whole = float(energy[order].sum()) + 2 * float(np.trapezoid(np.trapezoid(per_hz, time, axis=1), freq))
-    if whole < 1e-6 * clip:
-        order, per_hz = order[:0], np.zeros_like(per_hz)  # 60 dB below the clip: rounding, no residual
+    if whole < 1e-8 * clip:
+        order, per_hz = order[:0], np.zeros_like(per_hz)  # 80 dB below the clip: rounding, no residual
     clip = max(clip, whole)  # lines that outlast the clip
     return Residual(
         modes.freq_hz, modes.decay_per_s, modes.amplitude / unit, line_hz[order], line_decay[order], line_amplitude[order] / unit,
