@@ -52,6 +52,12 @@ class Struck:
     def strikes(self) -> int:
         return len(self.recordings)
 
+    @property
+    def fitted(self) -> list[int]:
+        """Which of the recordings its lines and sounds belong to, in their order: those of the split 'fit' that could be read."""
+        heard = self.gathered.recordings if self.gathered is not None else ()
+        return [i for one in heard for i, r in enumerate(self.recordings) if r is one or r == one]
+
     def surface_count(self, model: ModalModel | None = None) -> int:
         """How many of the vertices of its model, or of its model under another elasticity, are the body's."""
         return len((model or self.model).vertex_m) - self.strikes - 1

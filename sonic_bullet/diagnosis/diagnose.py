@@ -92,7 +92,8 @@ def diagnose(
         for name, h in (("before", end.before), ("after", end.after)):
             errors[name][split] = mean_db(mine, h)
             sone[name][split] = sone_distance(mine, h)
-    return Diagnosis(case, found, bodies, takes, end, errors, sone, _of_lines(case, bodies, end), remainder(end, takes), found.warnings)
+    few = ("one strike alone: nothing can be left out, so no effect can be named; record more strikes",) if len(takes) == 1 else ()
+    return Diagnosis(case, found, bodies, takes, end, errors, sone, _of_lines(case, bodies, end), remainder(end, takes), (*found.warnings, *few))
 
 
 def _of_lines(case: Case, bodies: tuple[Struck, ...], end: Closed) -> dict[str, Any]:
@@ -119,14 +120,8 @@ def _takes(bodies: tuple[Struck, ...]) -> tuple[Take, ...]:
         if body.gathered is None or body.gathered.signals is None:
             continue
         floor = floor_between(list(body.gathered.signals))
-        takes += [Take(body, i, sample, body.gathered.sr, floor) for i, sample in zip(fitted_strikes(body), body.gathered.signals, strict=True)]
+        takes += [Take(body, i, sample, body.gathered.sr, floor) for i, sample in zip(body.fitted, body.gathered.signals, strict=True)]
     return tuple(takes)
-
-
-def fitted_strikes(body: Struck) -> list[int]:
-    """Which of a body's strikes its signals belong to."""
-    heard = body.gathered.recordings if body.gathered is not None else ()
-    return [i for i, r in enumerate(body.recordings) if any(r is one or r == one for one in heard)]
 
 
 def _others(case: Case, bodies: tuple[Struck, ...], takes: tuple[Take, ...], split: str) -> tuple[Take, ...]:

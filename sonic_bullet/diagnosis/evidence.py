@@ -35,8 +35,7 @@ def heard_of(h: Hypothesis, body: Struck) -> Heard:
     lines, model = gathered.lines, None
     model, order = modes_of(h, body)
     line, mode = paired(h, body, model, order)
-    mine = [i for i, r in enumerate(body.recordings) if r.split == "fit" and (r.file is not None or r.lines)]
-    mine = mine[: len(lines.amplitude)]
+    mine = body.fitted[: len(lines.amplitude)]
     rows = pattern(body, model)[mine]
     push = rows * start(body.kind, model)
     direct = path_response(h, body, model.freq_hz, gathered.sr) if gathered.signals is not None else np.ones(model.mode_count)
@@ -110,7 +109,7 @@ def _nearest(body: Struck, model: ModalModel) -> tuple[Array, tuple[Array, ...]]
     if not len(lines.freq_hz):
         return np.zeros(0, int), ()
     gap = np.log(lines.freq_hz)[:, None] - np.log(model.freq_hz)[None, :]
-    mine = [i for i, r in enumerate(body.recordings) if r.split == "fit"][: len(lines.amplitude)]
+    mine = body.fitted[: len(lines.amplitude)]
     told, heard = np.abs(pattern(body, model)[mine]), np.abs(lines.amplitude)
     alike = (heard.T @ told) / np.maximum(np.linalg.norm(heard, axis=0)[:, None] * np.linalg.norm(told, axis=0)[None, :], 1e-300)
     price = np.minimum((gap / REACH) ** 2 + 0.5 * (1 - np.nan_to_num(alike)), 1.0) - 1.0
@@ -145,7 +144,7 @@ def thinned(evidence: Evidence, strike: int | None, keep: float, rng: np.random.
 
 
 def _thin(h: Heard, strike: int | None, keep: float, rng: np.random.Generator) -> Heard:
-    s = np.array([i for i in range(len(h.impulse_n_s)) if i != strike])
+    s = np.array([i for i in range(len(h.impulse_n_s)) if i != strike], int)
     k = np.sort(rng.permutation(len(h.freq_hz))[: max(3, round(keep * len(h.freq_hz)))]) if keep < 1 else np.arange(len(h.freq_hz))
     k = k[k < len(h.freq_hz)]
     return replace(

@@ -21,9 +21,9 @@ from sonic_bullet.diagnosis.trial import Candidate, trials
 from sonic_bullet.effects.values import Effect
 
 ROUNDS = 4
-LEAST_DB = 0.25
+LEAST_DB = 0.4
 LEAST_SHARE = 0.08
-SURE = 2.0
+SURE, MANY = 2.0, 4  # standard errors; strikes of which none may lose
 SUFFICES_DB = 1.5  # a gap below this is the mesh's and the shapes' own
 EXPLAINED = 0.4  # of the gap; part of it is the mesh's and the shapes' own
 OPEN = 0.3  # of the first gap: with less left, no costly suspect is asked
@@ -98,8 +98,11 @@ def earns(c: Candidate, gap_db: float) -> bool:
     if len(c.drop_db) == 0:
         return False
     need = max(LEAST_DB, LEAST_SHARE * gap_db)
-    sure = c.sd_db if np.isfinite(c.sd_db) else 0.5 * abs(c.mean_db)
-    return c.mean_db > need and c.mean_db > SURE * sure and c.mean_db - max(c.null_db, 0.0) > max(SURE * sure, 0.5 * need)
+    if not (c.mean_db > need and np.isfinite(c.sd_db)):
+        return False
+    if len(c.drop_db) >= MANY and c.drop_db.min() > -0.1 * c.mean_db and float(np.median(c.drop_db)) > 0.5 * need:
+        return c.mean_db - max(c.null_db, 0.0) > 0.5 * need  # no strike speaks against it, though loud ones may gain far more than soft ones
+    return c.mean_db > SURE * c.sd_db and c.mean_db - max(c.null_db, 0.0) > max(SURE * c.sd_db, 0.5 * need)
 
 
 def strip(h: Hypothesis) -> Hypothesis:

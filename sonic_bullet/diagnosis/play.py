@@ -122,9 +122,7 @@ def play(h: Hypothesis, body: Struck, strike: int, n: int, sr: int) -> Array:
     sample = sounded(ring_of(h, body, strike), blow, n, sr)
     index = -1
     if body.gathered is not None:
-        mine = [r for r in body.recordings if r.split == "fit"]
-        recording = body.recordings[strike]
-        index = mine.index(recording) if recording in mine else -1
+        index = body.fitted.index(strike) if strike in body.fitted else -1
     sound = Sound(sample, sr, blow.impulse_n_s, index)
     for effect in h.at(Stage.SOUND, fitted=body.gathered is not None):
         sound = effect.apply(sound)

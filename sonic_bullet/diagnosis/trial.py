@@ -120,6 +120,8 @@ def trials(
 ) -> list[Candidate]:
     """Every suspect that the whole evidence suggests, after its trial; best first. costly: whether those that take long are asked."""
     found: list[Candidate] = []
+    if len(takes) < 2:
+        return found  # nothing can be left out
     folds = _folds(h, bodies, takes, evidence, seed)
     gap = float(np.mean([f.before for f in folds]) - np.mean([f.take.least(f.base) for f in folds])) if folds else 0.0
     for kind in sorted(effects, key=lambda kind: bool(getattr(kind, "costly", False))):

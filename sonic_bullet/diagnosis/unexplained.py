@@ -42,7 +42,8 @@ def remainder(end: Closed, takes: tuple[Take, ...]) -> dict[str, Any]:
             if slope < -0.3
             else "; its share does not depend on the strike's strength"
         )
-    words += "; it differs from place to place" if scatter > 0.5 else "; it is alike wherever the body is struck"
+    if len(total) > 1:
+        words += "; it differs from place to place" if scatter > 0.5 else "; it is alike wherever the body is struck"
     return {
         "left_db": end.after_db - end.floor_db,
         "words": words,

@@ -66,6 +66,7 @@ class ContactTime:
 
                 def at(tau: float, share: Array = share, pulse: str = pulse) -> float:
                     h = np.abs(magnitude(pulse, freq * tau * share))
+                    h = h / max(float(h.max()), 1e-300)  # the gain is free: a pulse so long that it leaves nothing must not pass for a small one
                     return _cost(told * h, heard, sd, ROUGH * most * np.maximum(h, 0.02))
 
                 costs = np.array([at(t) for t in grid])

@@ -20,7 +20,7 @@ from sonic_bullet.records import Array, Material
 
 BETTER = 10.0  # in BIC, than isotropy
 NEARER = 0.7  # of isotropy's rms of ln f, lines beyond the cap counted at the cap
-SUFFICES = 4e-3  # rms of ln f from the nearest isotropic mode that leaves nothing to look for: split pairs, corrected meshes
+SUFFICES = 5e-3  # rms of ln f from the nearest isotropic mode that leaves nothing to look for: split pairs, corrected meshes
 LEAST = 0.03  # of ln E_i/E_j or ln of Zener's ratio: less is the mesh's
 
 

@@ -22,6 +22,7 @@ from sonic_bullet.records import Array
 
 TWINS = 6e-4
 MESH_SD = 2.5e-3  # of a mode's frequency, the mesh's and the shape's own error
+LOWEST = 0.2  # of that, in the lowest modes
 GAMMA_REACH = 0.65  # of ln γ: E and ρ both wrong by 30 %
 POISSON_REACH = 0.05
 CANDIDATES = 8
@@ -187,7 +188,8 @@ def solve(lines: Lines, group: Group, line: Array, mode: Array, poisson_off: flo
     """Step (2,) of ln γ and ν, information (2, 2) of the lines alone, and the weights (p,) left by outliers. poisson_sd: of the guess."""
     freq, decay = lines.freq_hz[line], lines.decay_per_s[line]
     off = np.log((2 * np.pi * freq) ** 2 + np.nan_to_num(decay) ** 2) - 2 * np.log(2 * np.pi * group.freq_hz[mode])
-    sd = 2 * np.hypot(np.nan_to_num(lines.freq_sd_hz[line]) / freq, mesh_sd)
+    rough = np.hypot(LOWEST, freq / freq.max(initial=1e-9))  # a mesh's error grows with the modes: the low ones tell γ and ν best
+    sd = 2 * np.hypot(np.nan_to_num(lines.freq_sd_hz[line]) / freq, mesh_sd * rough)
     slope = np.stack([np.ones(len(line)), group.slope[mode]], axis=1)
     weight = np.ones(len(line))
     prior = np.diag([1e-12, poisson_sd**-2])
