@@ -64,7 +64,7 @@ def test_an_interrupted_render_is_a_valid_named_file(tmp_path: Path, word: signa
         while not (tmp_path / "stepping").exists() and running.poll() is None and time.monotonic() < end:
             time.sleep(0.05)
         os.kill(running.pid, word)
-        said = running.communicate(timeout=100)[1]
+        said = running.communicate(timeout=200)[1]
     finally:
         running.kill()
     assert running.returncode == code, said

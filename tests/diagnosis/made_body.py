@@ -78,7 +78,9 @@ def recorded(*effects: Effect, seconds: float = 0.7, noise: float = 2e-5, seed: 
     """The body with the effects as a recording shows it: played, noise added, lines found."""
     plain = struck(model)
     n = int(seconds * SR)
-    heard = replace(plain, gathered=cast(Gathered, Gathered(CaseObject("plate", None, 1.0, None), cast(Material, None), plain.recordings, None, None, None, None, SR)))  # type: ignore[arg-type]
+    heard = replace(
+        plain, gathered=cast(Gathered, Gathered(CaseObject("plate", None, 1.0, None), cast(Material, None), plain.recordings, None, None, None, None, SR))
+    )  # type: ignore[arg-type]
     rng = np.random.default_rng(seed)
     signals = np.stack([play(truth(*effects), heard, i, n, SR) + noise * rng.standard_normal(n) for i in range(len(STRIKES))])
     lines = joint_lines(signals, SR, band_hz=(50.0, 7_500.0))

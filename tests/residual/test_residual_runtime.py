@@ -23,6 +23,7 @@ from sonic_bullet.residual.grains import faded, filtered, make_voice, mixed_numb
 from sonic_bullet.residual.player import SECTION, Grain, Rubbed, add_grains, rubbed, section_grain, section_window
 
 FREQ = (400.0, 900.0, 1500.0, 2600.0, 4100.0, 6000.0)
+IDLE_S = 0.02  # of the work in `slower`, nothing else running
 EDGES_M = (0.2, 0.1, 0.01)
 SOURCE = modes(FREQ, 10.0)
 NOISY = replace(STEEL, residual=residual(SOURCE, lines=((1200.0, 8.0, 0.3), (2600.0, 3.0, 0.5))))
@@ -201,15 +202,26 @@ def test_a_thousand_strikes_stay_real_time() -> None:
         steps.append(step([(0, 0, 0), (0, 0, 0.01)], row(0, 1, (0, 0, -0.01), normal=(0, 0, -1), point_a=place) if i % 6 == 2 else None))
     log = ContactLog(bodies, tuple(steps), (Microphone([0, 0, 1.0]),), SR, 0)
     render_log(struck(NOISY, {2: 0.01}))
-    begun = time.thread_time()
-    render_log(log)
-    spent = time.thread_time() - begun
-    begun = time.thread_time()
-    render_log(replace(log, bodies=silent))
-    plain = time.thread_time() - begun
+
+    def spent(which: ContactLog) -> float:
+        begun = time.thread_time()
+        render_log(which)
+        return time.thread_time() - begun
+
     strikes = len(range(2, 1010, 6))
-    each = (spent - plain) / strikes
-    assert 1000 * each < 4.2
+    each = (spent(log) - spent(replace(log, bodies=silent))) / strikes
+    assert 1000 * each < 4.2 * slower()
+
+
+def slower() -> float:
+    """How much slower than an idle machine this one is now, 1 or more: tests run side by side share caches and cores."""
+    x, times = np.random.default_rng(0).standard_normal(2**18), []
+    for _ in range(5):
+        begun = time.thread_time()
+        np.fft.rfft(x)
+        sum(i * i for i in range(200_000))
+        times.append(time.thread_time() - begun)
+    return max(1.0, min(times) / IDLE_S)
 
 
 def test_a_body_without_modes_or_with_a_far_off_residual_plays_plain() -> None:
