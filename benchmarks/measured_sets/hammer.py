@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.measured_sets.heard import cut, lines
+from benchmarks.measured_sets.heard import cut, features, lines
 from benchmarks.measured_sets.values import DRAWS, Array, Lines, Outcome, Row, clear
 from sonic_bullet.effects.contact_time import ContactTime
 from sonic_bullet.effects.pulses import magnitude
@@ -66,7 +66,9 @@ def judge(folder: Path, case: dict[str, Any]) -> Outcome:
     objects, skipped = {}, []
     for entry in case["files"]:
         try:
-            objects[entry["object"].split(" (")[0]] = _hits(folder / entry["file"], entry["hits"])
+            path = folder / entry["file"]
+            name = entry.get("object", case.get("object", path.stem)).split(" (")[0]
+            objects[name] = _measured(path, float(entry["fs_hz"])) if path.suffix == ".npz" else _hits(path, entry["hits"])
         except Exception as error:  # one object less: the others are judged
             skipped.append(f"{entry['file']}: {error}")
     if not objects:
@@ -101,6 +103,21 @@ def _hits(path: Path, told: list[dict[str, Any]]) -> list[Hit]:
         sound, _ = cut(path, 0, h["t_hit_s"], seconds)
         mine = Lines(mine.freq_hz, mine.decay_per_s, mine.decay_sd_per_s, mine.amplitude * np.exp(mine.decay_per_s * AFTER_S), mine.freq_sd_hz)
         found.append(Hit(impulse, tau, shape, sr, mine, int((np.abs(sound) > FULL).sum())))
+    return found
+
+
+def _measured(path: Path, fs_hz: float) -> list[Hit]:
+    """Hits in an npz of force (s, n) and accel (s, n), a hit a row."""
+    with np.load(path, allow_pickle=False) as kept:
+        rows = list(zip(kept["force"], kept["accel"], strict=True))
+    found, sr = [], round(fs_hz)
+    for force, sound in rows:
+        at = float(np.argmax(force)) / fs_hz
+        impulse, tau, shape = pulse(np.asarray(force, float), sr, at)
+        first = round((at + AFTER_S) * fs_hz)
+        mine = clear(features(np.ascontiguousarray(sound[first : first + round(0.5 * fs_hz)], float), sr, onset_s=0.0, band_hz=(200.0, 0.45 * fs_hz)), sure=0.3)
+        mine = Lines(mine.freq_hz, mine.decay_per_s, mine.decay_sd_per_s, mine.amplitude * np.exp(mine.decay_per_s * AFTER_S), mine.freq_sd_hz)
+        found.append(Hit(impulse, tau, shape, sr, mine, 0))
     return found
 
 

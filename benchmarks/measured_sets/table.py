@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from benchmarks.measured_sets import bar, bell, fixtures, hammer, plain, repeats, sizes, strengths, tables
+from benchmarks.measured_sets import bar, bell, crystals, fixtures, hammer, plain, repeats, sizes, strengths, tables
 from benchmarks.measured_sets.values import Judge
 
 PLAIN: Judge = plain.judge
@@ -13,6 +13,8 @@ JUDGES: dict[str, Judge] = {
     "agogo-forzee": strengths.judge,
     "ride-bja": strengths.judge,
     "diffimpact-hammer": hammer.judge,
+    "hammer-frf-pyfrf": hammer.judge,
+    "rus-crystals": crystals.judge,
     "diffimpact-robot": fixtures.judge,
     "wood-iet-timbr": repeats.judge,
     "bell-sonicpi": bell.judge,
