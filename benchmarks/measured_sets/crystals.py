@@ -59,8 +59,9 @@ def diagnosed(folder: Path, entry: dict[str, Any]) -> Diagnosis:
     lines = sorted(float(f) for f in entry["f_hz"])
     with tempfile.TemporaryDirectory() as place:
         made = Path(place) / "case.json"
+        (Path(place) / "block.obj").write_bytes((folder / entry["mesh"]).read_bytes())
         thing = {
-            "mesh": str((folder / entry["mesh"]).resolve()),
+            "mesh": "block.obj",
             "units": "m",
             "material": "crystal",
             "elastic_guess": GUESS | {"density": entry["density_kg_m3"]},

@@ -14,16 +14,18 @@ import numpy as np
 
 from sonic_bullet.diagnosis.bodies import Struck
 from sonic_bullet.diagnosis.evidence import evidence_of
-from sonic_bullet.diagnosis.judge import Judged, least_db, mean_db
-from sonic_bullet.diagnosis.play import Hypothesis
+from sonic_bullet.diagnosis.judge import Judged, Take, least_db, mean_db
+from sonic_bullet.diagnosis.play import Hypothesis, play
 from sonic_bullet.diagnosis.refit import refitted
 from sonic_bullet.diagnosis.trial import Candidate, trials
 from sonic_bullet.effects.values import Effect
+from sonic_bullet.estimator.distance import with_noise
 
 ROUNDS = 4
 LEAST_DB = 0.4
 LEAST_SHARE = 0.08
 SURE, MANY = 2.0, 4  # standard errors; strikes of which none may lose
+MESH = 1e-3  # of a frequency: what a good mesh gets wrong
 SUFFICES_DB = 1.5  # a gap below this is the mesh's and the shapes' own
 EXPLAINED = 0.4  # of the gap; part of it is the mesh's and the shapes' own
 OPEN = 0.3  # of the first gap: with less left, no costly suspect is asked
@@ -77,10 +79,26 @@ def closed(
         h, added = _pruned(h, added, bodies, takes, before - floor)
         now = mean_db(takes, h) or 0.0
     gap, left = before - floor, now - floor
-    verdict = "explained" if added else "none" if gap < SUFFICES_DB else "unexplained"
+    verdict = "explained" if added else "none" if gap < SUFFICES_DB or gap < of_the_mesh(h, bodies, takes, seed) else "unexplained"
     if added and left > max((1 - EXPLAINED) * gap, SUFFICES_DB):  # a name for less of what is seen would be a guess
         verdict, h, now, added = "unexplained", start, before, []
     return Closed(start, h, tuple(added), tuple(last.values()), verdict, before, now, floor)
+
+
+def of_the_mesh(h: Hypothesis, bodies: tuple[Struck, ...], takes: Sequence[Judged], seed: int) -> float:
+    """What a mesh's error in modes that no line could correct would add to the distance, in dB: those moved at random by as much as the others were corrected."""
+    rng = np.random.default_rng([seed, 5])
+    moved = dict(h.correction or {})
+    for body in bodies:
+        mine = moved.get(body.name)
+        if mine is None or body.gathered is None or len(mine) != len(body.line):
+            continue
+        paired = body.line >= 0
+        size = float(np.sqrt((mine[paired] ** 2).mean())) if paired.any() else 0.0
+        moved[body.name] = np.where(paired, mine, mine + max(size, MESH) * rng.standard_normal(len(mine)))
+    other = replace(h, correction=moved)
+    twice = [replace(t, sample=with_noise(play(h, t.body, t.strike, len(t.sample), t.sr), t.floor, 1000 + t.strike)) for t in takes if isinstance(t, Take)]
+    return (mean_db(twice, other) or 0.0) - (mean_db(twice, h) or 0.0)
 
 
 def _pruned(h: Hypothesis, added: list[Candidate], bodies: tuple[Struck, ...], takes: Sequence[Judged], gap_db: float) -> tuple[Hypothesis, list[Candidate]]:

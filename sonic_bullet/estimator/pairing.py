@@ -21,6 +21,7 @@ from sonic_bullet.modal.reduced import Family
 from sonic_bullet.records import Array
 
 TWINS = 6e-4
+MESHED = 2.5  # times as far apart where elements have torn them from each other
 MESH_SD = 2.5e-3  # of a mode's frequency, the mesh's and the shape's own error
 LOWEST = 0.2  # of that, in the lowest modes
 GAMMA_REACH = 0.65  # of ln γ: E and ρ both wrong by 30 %
@@ -56,7 +57,7 @@ def grouped(family: Family, seen: Observation, log_gamma: float, poisson: float)
     """The family's modes as lines at (γ, ν)."""
     value, vector = family.modes(1.0, poisson)
     freq = np.sqrt(value) / (2 * np.pi)
-    cut = np.flatnonzero(np.diff(np.log(freq)) > TWINS) + 1
+    cut = np.flatnonzero(np.diff(np.log(freq)) > TWINS * (MESHED if family.meshed else 1.0)) + 1
     member = tuple(np.split(np.arange(len(freq)), cut))
     sums = np.zeros((len(freq), len(member)))
     for g, who in enumerate(member):
