@@ -4,3 +4,7 @@ Case -> CaseFit (estimator) -> Struck bodies (bodies.py) + Hypothesis (play.py) 
   -> every suspect's `propose` -> trial: leave one strike out, render, compare; null effects alike (trial.py)
   -> the best is added, and again -> Diagnosis: verdict, errors, predictions (diagnose.py) -> report, preset, WAV
 """
+
+from sonic_bullet.diagnosis.diagnose import Diagnosis, diagnose
+
+__all__ = ["Diagnosis", "diagnose"]
