@@ -80,7 +80,9 @@ def closed(
         now = mean_db(takes, h) or 0.0
     gap, left = before - floor, now - floor
     verdict = "explained" if added else "none" if gap < SUFFICES_DB or gap < of_the_mesh(h, bodies, takes, seed) else "unexplained"
-    if added and left > max((1 - EXPLAINED) * gap, SUFFICES_DB):  # a name for less of what is seen would be a guess
+    if (
+        added and left > max((1 - EXPLAINED) * gap, SUFFICES_DB) and left > of_the_mesh(h, bodies, takes, seed)
+    ):  # a name for less of what is seen would be a guess
         verdict, h, now, added = "unexplained", start, before, []
     return Closed(start, h, tuple(added), tuple(last.values()), verdict, before, now, floor)
 
