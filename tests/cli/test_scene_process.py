@@ -58,13 +58,14 @@ def test_a_scene_renders_and_its_log_renders_the_same_bits_without_pybullet(tmp_
 @pytest.mark.parametrize(("word", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_an_interrupted_render_is_a_valid_named_file(tmp_path: Path, word: signal.Signals, code: int) -> None:
     write_scene(tmp_path, seconds=1000, act="open('stepping', 'w').close() if time_s > 0.2 else None; import time; time.sleep(0.001)")
-    running = subprocess.Popen([sys.executable, "-c", MAIN, "render", "scene.py", "-o", "a.wav"], cwd=tmp_path, stderr=subprocess.PIPE, text=True)
+    awake = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "  # a shell's background jobs are started deaf to SIGINT
+    running = subprocess.Popen([sys.executable, "-c", awake + MAIN, "render", "scene.py", "-o", "a.wav"], cwd=tmp_path, stderr=subprocess.PIPE, text=True)
     try:
         end = time.monotonic() + 200
         while not (tmp_path / "stepping").exists() and running.poll() is None and time.monotonic() < end:
             time.sleep(0.05)
         os.kill(running.pid, word)
-        said = running.communicate(timeout=200)[1]
+        said = running.communicate(timeout=100)[1]
     finally:
         running.kill()
     assert running.returncode == code, said
