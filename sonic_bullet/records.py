@@ -51,6 +51,10 @@ def isotropic_stiffness_pa(youngs_pa: float, poisson: float) -> Array:
     return stiffness
 
 
+ORTHOTROPIC = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1), (3, 3), (4, 4), (5, 5))
+"""Places in the Voigt tensor of C11 C22 C33 C23 C13 C12 C44 C55 C66, the constants that symmetry planes along the axes leave."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Material:
     """What a body is made of.

@@ -9,17 +9,15 @@ whose x component is each mode's weight. Without a mesh the modes are the lines 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from sonic_bullet.effects.values import Elastic
-from sonic_bullet.errors import FileError
 from sonic_bullet.estimator.evidence import Evidence as Gathered
 from sonic_bullet.estimator.evidence import body_family, guess_of
 from sonic_bullet.estimator.fitted import CaseFit, ObjectFit
 from sonic_bullet.estimator.observe import pressure_weight
-from sonic_bullet.estimator.pairing import grouped
 from sonic_bullet.files.cases import Case, CaseRecording
 from sonic_bullet.modal.cache import Place
 from sonic_bullet.modal.reduced import Family
@@ -177,20 +175,3 @@ def amplitude_per_impulse(gathered: Gathered) -> Array:
     """Rms over the strikes of |A|/J (k,); J = 1 where it is not known."""
     level = np.array([r.impulse_n_s or 1.0 for r in gathered.recordings])
     return np.asarray(np.sqrt(np.nanmean(np.abs(gathered.lines.amplitude / level[:, None]) ** 2, axis=0)))
-
-
-def at_group(found: CaseFit, o: ObjectFit) -> Array:
-    """Undamped frequencies (g,) of an object's groups under the fitted material."""
-    assert o.evidence.family is not None and o.evidence.seen is not None
-    return grouped(o.evidence.family, o.evidence.seen, float(np.log(found.fit.gamma_m2_s2)), found.fit.poisson_ratio).freq_hz
-
-
-def without_corrections(body: Struck) -> Struck:
-    """The same with the mesh's own frequencies."""
-    return replace(body, correction=np.zeros(len(body.correction)))
-
-
-def needs_mesh(body: Struck) -> None:
-    """Raises FileError where a body has no mesh."""
-    if body.family is None:
-        raise FileError(f"object '{body.name}' has no mesh", "a prediction needs its shape")

@@ -25,7 +25,6 @@ from sonic_bullet.diagnosis.sone import sone_distance
 from sonic_bullet.diagnosis.unexplained import remainder
 from sonic_bullet.effects import EFFECTS
 from sonic_bullet.effects.values import Effect
-from sonic_bullet.estimator.evidence import Evidence as Gathered
 from sonic_bullet.estimator.evidence import gather
 from sonic_bullet.estimator.fit import fit_evidence
 from sonic_bullet.estimator.fitted import CaseFit
@@ -172,11 +171,6 @@ def predictions(d: Diagnosis) -> list[tuple[str, int, Array, Array]]:
             pair = [np.concatenate([np.zeros(start), play(h, body, i, n - start, sr)]) for h in (d.closed.before, d.closed.after)]
             made.append((Path(r.file).stem, sr, pair[0], pair[1]))
     return made
-
-
-def gathered_of(d: Diagnosis) -> list[Gathered]:
-    """What was heard of every fitted object."""
-    return [b.gathered for b in d.bodies if b.gathered is not None]
 
 
 def described(d: Diagnosis) -> dict[str, Any]:

@@ -125,11 +125,6 @@ def earns(c: Candidate, gap_db: float) -> bool:
     return c.mean_db > SURE * c.sd_db and c.mean_db - max(c.null_db, 0.0) > max(SURE * c.sd_db, 0.5 * need)
 
 
-def strip(h: Hypothesis) -> Hypothesis:
-    """The same without effects."""
-    return replace(h, effects=())
-
-
 def described(candidates: Sequence[Candidate]) -> list[dict[str, Any]]:
     """For JSON."""
     return [{"id": c.id, "cv_error_drop_db": c.mean_db, "null_drop_db": c.null_db, "parameters": c.effect.parameters()} for c in candidates]

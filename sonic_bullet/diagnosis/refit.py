@@ -13,9 +13,9 @@ from dataclasses import replace
 import numpy as np
 
 from sonic_bullet.diagnosis.bodies import Struck
-from sonic_bullet.diagnosis.evidence import MOVES, heard_of, paired
+from sonic_bullet.diagnosis.evidence import MOVES, heard_of, paired, path_response
 from sonic_bullet.diagnosis.play import Hypothesis, modes_of, undamped
-from sonic_bullet.effects.values import Heard, Stage
+from sonic_bullet.effects.values import Blow, Heard, Stage
 from sonic_bullet.estimator.rayleigh import rayleigh
 from sonic_bullet.records import Array
 
@@ -24,14 +24,13 @@ CORRECTION = 0.01
 NEAR, ALIKE = 5e-3, 1.6  # of ln f and ln d: lines of one mode
 
 
-def refitted(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...] | None = None, *, reference: Hypothesis | None = None) -> Hypothesis:
-    """The hypothesis with α, β and σ fitted again beside its effects; ``heard``: evidence to fit them to, thinned or whole, under ``reference``."""
+def refitted(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...] | None = None) -> Hypothesis:
+    """The hypothesis with α, β and σ fitted again beside its effects; ``heard``: evidence to fit them to, thinned or whole."""
     moved = any(e.stage is Stage.MATERIAL or e.id in MOVES for e in h.effects)
     if moved:
         h = corrected(h, bodies)
     if heard is None or moved:
         heard = tuple(heard_of(replace(h, effects=tuple(e for e in h.effects if e.stage is not Stage.SOUND)), b) for b in bodies if b.gathered is not None)
-        return _gained(_damped(h, bodies, heard), bodies, heard)
     return _gained(_damped(h, bodies, heard), bodies, heard)
 
 
@@ -79,9 +78,9 @@ def _damped(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...])
         if not len(one.freq_hz):
             continue
         model, _ = modes_of(bare, body)
-        extra = np.array([np.interp(f, model.freq_hz, np.zeros(model.mode_count)) for f in one.freq_hz])
+        extra = np.zeros(len(one.freq_hz))
         if h.at(Stage.MODES):
-            near = np.array([np.argmin(np.abs(model.freq_hz - one_f)) for one_f in _expected_hz(one)])
+            near = np.array([np.argmin(np.abs(model.freq_hz - one_f)) for one_f in one.freq_hz])
             extra = np.array([model.decay_per_s[_members(model.freq_hz, i, len(who))].mean() for i, who in zip(near, one.mode, strict=True)])
         lam.append(one.omega**2)
         left.append(np.maximum(one.decay_per_s - extra, 1e-3 * one.decay_per_s))
@@ -90,10 +89,6 @@ def _damped(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...])
         return h
     found = rayleigh(np.concatenate(lam), np.concatenate(left), np.concatenate(sd), (max(h.alpha_per_s, 1e-3), max(h.beta_s, 1e-12)))
     return replace(h, alpha_per_s=found.alpha_per_s, beta_s=found.beta_s)
-
-
-def _expected_hz(one: Heard) -> Array:
-    return one.freq_hz
 
 
 def _members(freq: Array, near: int, count: int) -> Array:
@@ -120,9 +115,6 @@ def _middle(ratio: Array, weight: Array) -> float:
 
 def _gained(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...]) -> Hypothesis:
     """σ by the amplitudes."""
-    from sonic_bullet.diagnosis.evidence import path_response
-    from sonic_bullet.effects.values import Blow
-
     known = [e.gain for e in h.effects if np.isfinite(getattr(e, "gain", np.nan))]  # type: ignore[attr-defined]
     if known:
         return replace(h, gain=known[-1])

@@ -14,9 +14,9 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from sonic_bullet.effects.elasticities import CAP, WIDTHS, Tensor, fitted, isotropic_p, ringing, search, told_of
-from sonic_bullet.effects.tensors import NAMES, PLACE, SYMMETRIES, p_of
+from sonic_bullet.effects.tensors import NAMES, SYMMETRIES, p_of
 from sonic_bullet.effects.values import Evidence, Heard, Owner, Stage
-from sonic_bullet.records import Array, Material
+from sonic_bullet.records import ORTHOTROPIC, Array, Material
 
 BETTER = 10.0  # in BIC, than isotropy
 NEARER = 0.7  # of isotropy's rms of ln f, lines beyond the cap counted at the cap
@@ -42,7 +42,7 @@ class Orthotropy:
     def stiffness_pa(self) -> Array:
         """(6, 6), Voigt."""
         found = np.zeros((6, 6))
-        for (i, j), c in zip(PLACE, self.constants_pa, strict=True):
+        for (i, j), c in zip(ORTHOTROPIC, self.constants_pa, strict=True):
             found[i, j] = found[j, i] = c
         return found
 
@@ -69,7 +69,7 @@ class Orthotropy:
     def of(cls, tensor: Tensor, density_kg_m3: float) -> Self:
         """A fitted tensor's."""
         stiff = tensor.stiffness_m2_s2 * density_kg_m3
-        return cls(tuple(float(stiff[i, j]) for i, j in PLACE), tensor.symmetry, tensor.held)
+        return cls(tuple(float(stiff[i, j]) for i, j in ORTHOTROPIC), tensor.symmetry, tensor.held)
 
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:

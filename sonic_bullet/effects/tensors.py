@@ -9,10 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from sonic_bullet.records import Array
+from sonic_bullet.records import ORTHOTROPIC, Array
 
 SYMMETRIES = {"isotropic": 2, "cubic": 3, "hexagonal-x": 5, "hexagonal-y": 5, "hexagonal-z": 5, "orthorhombic": 9}
-PLACE = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1), (3, 3), (4, 4), (5, 5))
 NAMES = ("youngs_x", "youngs_y", "youngs_z", "n_yz", "n_xz", "n_xy", "shear_yz", "shear_xz", "shear_xy")
 
 
@@ -35,7 +34,7 @@ def sound(p: Array) -> bool:
 def constants(p: Array) -> Array:
     """The nine constants (9,) of C/ρ, as `Elastic.look` orders them."""
     c = stiffness(p)
-    return np.array([c[i, j] for i, j in PLACE])
+    return np.array([c[i, j] for i, j in ORTHOTROPIC])
 
 
 def expanded(symmetry: str, q: Array) -> Array:

@@ -179,7 +179,10 @@ class Evidence:
 
 @runtime_checkable
 class Effect(Protocol):
-    """One physical effect: a frozen dataclass of its parameters. Every member also has a docstring that gives its equation."""
+    """One physical effect: a frozen dataclass of its parameters. Every member also has a docstring that gives its equation.
+
+    A class that says ``costly = True`` is asked last, and only where cheaper suspects leave much open.
+    """
 
     id: ClassVar[str]
     stage: ClassVar[Stage]

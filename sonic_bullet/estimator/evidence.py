@@ -8,15 +8,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from sonic_bullet.errors import AudioError, FileError, MeshError
-from sonic_bullet.estimator.lines import Lines, joint_lines, noise_rms
+from sonic_bullet.estimator.lines import Lines, joint_lines
 from sonic_bullet.estimator.observe import Observation, observation
 from sonic_bullet.estimator.onset import span
-from sonic_bullet.estimator.shared_poles import start_poles
 from sonic_bullet.files import read_audio
 from sonic_bullet.files.cases import Case, CaseObject, CaseRecording, Line
 from sonic_bullet.modal import read_mesh
@@ -29,10 +28,6 @@ MESH_M = (2e-4, 5.0)  # bodies smaller or larger than this are in another unit
 PLATE_DOF = 52_000  # unknowns: 36 ab/e² in one layer of cells
 CLIPPED = 8  # samples in a row at the file's peak
 CLIPPED_RUNS = 4  # or as many rows of three: a sound that decays has one highest peak
-
-
-CROWD, FEWER = 2.5, 0.3  # lines over a body's modes; of the lines at the onset
-LATE_S = 0.03
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,7 +70,7 @@ def guess_of(thing: CaseObject) -> Material:
 def gather(
     case: Case, *, split: str = "fit", cache: Place = "default", clipped: bool = False, progress: Callable[[str], None] | None = None
 ) -> tuple[Evidence, ...]:
-    """Evidence of all objects that have strikes of ``split`` with audio or features. clipped: let through what stands at its peak.
+    """Evidence of all objects that have strikes of ``split`` with audio or features. clipped: let through what stands at its peak, and what holds several hits.
 
     Raises SonicBulletError where there is none.
     """
@@ -99,9 +94,8 @@ def gather(
             signals, sr, told = sounds
             seen = observed(case, thing, guess, played, body) if body is not None else None
             say(f"listening to {len(played)} recordings of {name or 'the object'}")
-            signed = case.onset_s is not None
-            late = crowded(signals, sr, case.band_hz, _modes_heard(body, guess, case.band_hz)) if clipped and body is not None else 0
-            lines = settled(signals, late, sr, case.band_hz, signed) if late else joint_lines(signals, sr, band_hz=case.band_hz, signed=signed)
+            modes = _modes_heard(body, guess, case.band_hz) if clipped and body is not None else None
+            lines = joint_lines(signals, sr, band_hz=case.band_hz, signed=case.onset_s is not None, modes=modes)
             notes = (*(f"{g} is missing" for g in gone), *told)
             found.append(Evidence(thing, guess, played, lines, body, seen, signals, sr, notes))
         found += [_listed(case, thing, guess, entry, body) for entry in listed]
@@ -113,25 +107,6 @@ def gather(
 def _modes_heard(body: Family, guess: Material, band_hz: tuple[float, float]) -> int:
     value, _ = body.modes(guess.youngs_pa / guess.density_kg_m3, guess.poisson)
     return int((np.sqrt(value) / (2 * np.pi) < band_hz[1]).sum())
-
-
-def crowded(signals: Array, sr: int, band_hz: tuple[float, float], modes: int) -> int:
-    """Samples after the onset from which on lines are far fewer: several hits in a row make a crowd of them, none of them a mode. 0 where that is not so."""
-    late = round(LATE_S * sr)
-    if signals.shape[1] < 8 * late:
-        return 0
-    loud, band = signals / noise_rms(signals, sr)[:, None], (max(band_hz[0], 5.0), min(band_hz[1], 0.485 * sr))
-    at_once = len(start_poles(loud, sr, *band))
-    if at_once < CROWD * modes:
-        return 0
-    return late if 3 <= len(start_poles(loud[:, late:], sr, *band)) < FEWER * at_once else 0
-
-
-def settled(signals: Array, late: int, sr: int, band_hz: tuple[float, float], signed: bool) -> Lines:
-    """Lines of what is left ``late`` samples after the onset, taken back to it: A e^{(d − iω)t}, what a single hit there would have had to leave. Raises AudioError."""
-    found = joint_lines(signals[:, late:], sr, band_hz=band_hz, signed=signed)
-    back = np.exp((found.decay_per_s - 2j * np.pi * found.freq_hz) * late / sr)
-    return replace(found, amplitude=found.amplitude * back, amplitude_sd=found.amplitude_sd * np.abs(back))
 
 
 def body_family(case: Case, thing: CaseObject, guess: Material, cache: Place, say: Callable[[str], None]) -> Family:

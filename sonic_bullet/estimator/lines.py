@@ -12,7 +12,7 @@ All inner products of damped sinusoids over N samples are geometric sums, closed
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numba import njit
@@ -24,6 +24,8 @@ from sonic_bullet.records import Array
 SIGNIFICANT = 60.0  # energy of a line over the noise's density, all recordings: a²·sr/(4dσ²) summed
 MOST_LINES = 160
 SECONDS_MAX = 8.0
+CROWD, FEWER = 2.5, 0.3  # starting lines over a body's modes; of the lines at the onset
+LATE_S = 0.03
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,8 +46,12 @@ class Lines:
     signed: bool
 
 
-def joint_lines(signals: Array, sr: int, *, band_hz: tuple[float, float] = (20.0, 20_000.0), signed: bool = True) -> Lines:
-    """Lines of signals (s, n), all starting at the onset of their strike. Raises AudioError where there is too little signal."""
+def joint_lines(signals: Array, sr: int, *, band_hz: tuple[float, float] = (20.0, 20_000.0), signed: bool = True, modes: int | None = None) -> Lines:
+    """Lines of signals (s, n), all starting at the onset of their strike. Raises AudioError where there is too little signal.
+
+    modes: about how many the body has, where more than one hit may be in a signal: several in a row make a crowd of lines, none of them a mode. Where
+    far fewer are left after LATE_S, lines are those, taken back to the onset: A e^{(d − iω)t}, what a single hit there would have had to leave.
+    """
     signals = np.asarray(signals, float)[:, : int(SECONDS_MAX * sr)]
     if signals.shape[1] < 256 or not np.isfinite(signals).all():
         raise AudioError(f"recordings of {signals.shape[1]} samples after the onset", "a fit needs at least 256 finite samples")
@@ -55,7 +61,12 @@ def joint_lines(signals: Array, sr: int, *, band_hz: tuple[float, float] = (20.0
     low, high = max(band_hz[0], 5.0), min(band_hz[1], 0.485 * sr)
     noise = noise_rms(signals, sr)
     colour = _colour(signals, noise, sr)
-    pole = start_poles(signals / noise[:, None], sr, low, high)
+    pole, late = start_poles(signals / noise[:, None], sr, low, high), round(LATE_S * sr)
+    crowd = modes is not None and len(pole) >= CROWD * modes and signals.shape[1] >= 8 * late
+    if crowd and 3 <= len(start_poles(signals[:, late:] / noise[:, None], sr, low, high)) < FEWER * len(pole):
+        found = joint_lines(signals[:, late:], sr, band_hz=band_hz, signed=signed)
+        back = np.exp((found.decay_per_s - 2j * np.pi * found.freq_hz) * late / sr)
+        return replace(found, amplitude=found.amplitude * back, amplitude_sd=found.amplitude_sd * np.abs(back))
     try:
         for _ in range(3):
             before = len(pole)

@@ -1,6 +1,6 @@
 """All orthotropic materials of one body at once, axes along the mesh's: its modes at several anchors span those between.
 
-    K(C) = Σ_k C_k K_k over the nine constants of `PLACE`;  V: modes at the anchors together, VᵀMV = 1
+    K(C) = Σ_k C_k K_k over the nine constants of `ORTHOTROPIC`;  V: modes at the anchors together, VᵀMV = 1
     (Σ_k (C_k/ρ) VᵀK_kV) q = λL² q,   ∂ ln λ/∂C_k = qᵀK_kq / qᵀKq,  qᵀq = 1                  [Rayleigh-Ritz; Hellmann-Feynman]
 
 C_k/ρ in m²/s². A box whose sides lie along the axes takes polynomials (polynomials.py) and keeps its three mirrors: eight small problems.
@@ -20,10 +20,8 @@ from sonic_bullet.errors import MeshError
 from sonic_bullet.modal import cache as store
 from sonic_bullet.modal.model import MOST_MODES, SHIFT, _diagonal_m
 from sonic_bullet.modal.reduced import Family
-from sonic_bullet.records import Array, Shape
+from sonic_bullet.records import ORTHOTROPIC, Array, Shape
 
-PLACE = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1), (3, 3), (4, 4), (5, 5))
-"""Of the constants C11 C22 C33 C23 C13 C12 C44 C55 C66 in the Voigt tensor."""
 ANCHORS: tuple[tuple[tuple[float, float, float], tuple[float, float, float]], ...] = (
     ((1, 1, 1), (1, 1, 1)),
     ((1, 0.1, 0.1), (1, 1, 1)),
@@ -52,7 +50,7 @@ KEPT = ("part", "ends", "skin", "vertex", "face", "numbers")
 class TensorFamily:
     """A body's modes for every orthotropic tensor. body: its surface and basis, as of `reduced.Family`, the isotropic family in this basis.
 
-    part (9, b, b): reduced stiffness of each constant of `PLACE`. ends (p + 1,): the basis falls into p pieces that no such tensor couples.
+    part (9, b, b): reduced stiffness of each constant of `ORTHOTROPIC`. ends (p + 1,): the basis falls into p pieces that no such tensor couples.
     """
 
     body: Family
@@ -60,7 +58,7 @@ class TensorFamily:
     ends: Array
 
     def modes(self, stiffness_m2_s2: Array) -> tuple[Array, Array]:
-        """λ (m,) in 1/s² ascending, and the modes (b, m) in the basis, of C/ρ (6, 6), of which only the constants of `PLACE` count."""
+        """λ (m,) in 1/s² ascending, and the modes (b, m) in the basis, of C/ρ (6, 6), of which only the constants of `ORTHOTROPIC` count."""
         constant = constants_of(stiffness_m2_s2)
         values, vectors = [], []
         for a, b in pairwise(self.ends):
@@ -75,7 +73,7 @@ class TensorFamily:
 
     def slopes(self, vector: Array, value: Array) -> Array:
         """∂ ln λ/∂(C_k/ρ) (9, m) in s²/m² of modes (b, m) with λ (m,), as `modes` gives them."""
-        found = np.zeros((len(PLACE), vector.shape[1]))
+        found = np.zeros((len(ORTHOTROPIC), vector.shape[1]))
         for a, b in pairwise(self.ends):
             mine = np.flatnonzero(vector[a:b].any(axis=0))
             q = vector[a:b, mine]
@@ -85,13 +83,13 @@ class TensorFamily:
 
 def constants_of(stiffness: Array) -> Array:
     """The nine constants (9,) of a tensor (6, 6)."""
-    return np.array([stiffness[i, j] for i, j in PLACE])
+    return np.array([stiffness[i, j] for i, j in ORTHOTROPIC])
 
 
 def unit_tensors() -> Array:
     """The tensor (9, 6, 6) that each constant multiplies."""
-    found = np.zeros((len(PLACE), 6, 6))
-    for k, (i, j) in enumerate(PLACE):
+    found = np.zeros((len(ORTHOTROPIC), 6, 6))
+    for k, (i, j) in enumerate(ORTHOTROPIC):
         found[k, i, j] = found[k, j, i] = 1
     return found
 
@@ -239,7 +237,7 @@ def _of_elements(shape: Shape, length: float, count: int, poisson: float, clamp:
     if not len(free):
         raise MeshError("body has no unknowns", "clamp less of it")
     rigid = 6 - (int(np.linalg.matrix_rank(fem.rigid_modes(unit.node_m)[np.repeat(held, 3)], tol=1e-9)) if held.any() else 0)
-    say(f"assembling {len(free)} unknowns for {len(PLACE)} constants")
+    say(f"assembling {len(free)} unknowns for {len(ORTHOTROPIC)} constants")
     stiff: list[Any] = []
     mass: Any = None
     for tensor in unit_tensors():

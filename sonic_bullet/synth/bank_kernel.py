@@ -133,7 +133,7 @@ def _drive(at, i, end, place, b, out, z, driven, is_driven, tiled, pole, block, 
     width = len(rows) // 8
     for k in range(i, end):
         sample = at + k
-        if bent[b] and is_driven[b] and sample % DRIVEN == 0:
+        if bent[b] and (not is_driven[b] or sample % DRIVEN == 0):  # what begins to be driven begins with the poles of what rings then
             bend_poles(z, driven, DRIVEN, log_pole, bend, choke, modes, start, stop, pole, block)
         if is_driven[b]:
             drive.turn_driven(driven, pole, modes, start, stop - start)

@@ -8,7 +8,7 @@ import pytest
 from sonic_bullet.effects.ringing import sounded
 from sonic_bullet.effects.values import Blow, Ring
 from sonic_bullet.records import Array
-from sonic_bullet.synth.bank import ModeSet, Strike, advance, append, empty_bank
+from sonic_bullet.synth.bank import ModeSet, Strike, advance, append, empty_bank, silence
 
 SR = 48_000
 HZ, DECAY, GAIN = np.array([440.0, 1234.5, 3000.0]), np.array([3.0, 8.0, 20.0]), np.array([1.0, 0.6, 0.8])
@@ -65,3 +65,14 @@ def test_decaying_from_any_level_never_grows() -> None:
     sound = played(0.01, 3.0, [SR])
     energy = (sound[: SR - SR % 2400].reshape(-1, 2400) ** 2).sum(axis=1)
     assert (np.diff(energy) <= 0).all()
+
+
+def test_a_quenched_body_begins_anew_with_its_own_poles() -> None:
+    """Struck hard, quenched while its poles are bent, struck softly: the soft strike is as from rest."""
+    bank, state = append(*empty_bank(SR), [modes(0.02, 2.0)])
+    soft = np.full(1, 0.05)
+    advance(bank, state, 2000, [Strike(0, 0.0, 1.0, np.ones(1), GAIN)])
+    state = silence(state)
+    again = advance(bank, state, 4000, [Strike(0, 2010.0, 1.0, soft, GAIN)])[0, 0]
+    bank, fresh = append(*empty_bank(SR, at=2000), [modes(0.02, 2.0)])
+    assert np.array_equal(again, advance(bank, fresh, 4000, [Strike(0, 2010.0, 1.0, soft, GAIN)])[0, 0])
