@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,14 +17,17 @@ import numpy as np
 
 from sonic_bullet.diagnosis.bodies import Struck, shapeless, struck_bodies
 from sonic_bullet.diagnosis.elastic import with_elastic
-from sonic_bullet.diagnosis.judge import Take, floor_between, least_db, mean_db
+from sonic_bullet.diagnosis.judge import Take, least_db, mean_db
 from sonic_bullet.diagnosis.listed import CAP, listed, off_by
 from sonic_bullet.diagnosis.loop import Closed, closed
 from sonic_bullet.diagnosis.play import Hypothesis, play
+from sonic_bullet.diagnosis.refit import refitted
 from sonic_bullet.diagnosis.sone import sone_distance
 from sonic_bullet.diagnosis.unexplained import remainder
+from sonic_bullet.diagnosis.unheard import settled
 from sonic_bullet.effects import EFFECTS
 from sonic_bullet.effects.values import Effect
+from sonic_bullet.estimator.distance import floor_between
 from sonic_bullet.estimator.evidence import gather
 from sonic_bullet.estimator.fit import fit_evidence
 from sonic_bullet.estimator.fitted import CaseFit
@@ -78,9 +81,10 @@ def diagnose(
     found = fit_evidence(case, gathered, check_mesh=False, progress=progress)
     bodies = struck_bodies(found, cache=cache, progress=progress) if found.objects else tuple(shapeless(found, g) for g in gathered)
     bodies = with_elastic(found, bodies, cache=cache, progress=progress)
-    correction = {b.name: b.correction for b in bodies}
     gain = found.fit.sigma if np.isfinite(found.fit.sigma) and found.fit.sigma > 0 else 1.0
-    base = Hypothesis(found.fit.alpha_per_s, found.fit.beta_s, gain, (), correction)
+    base = Hypothesis(found.fit.alpha_per_s, found.fit.beta_s, gain, (), {b.name: b.correction for b in bodies})
+    bodies = settled(refitted(base, bodies), bodies)
+    base = replace(base, correction={b.name: b.correction for b in bodies})
     takes = _takes(bodies)
     end = closed(base, bodies, takes or listed(bodies), effects, case.band_hz, seed=seed, progress=progress)
     say("comparing with what was not fitted")

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from sonic_bullet.diagnosis.bodies import Struck
-from sonic_bullet.diagnosis.play import Hypothesis, blow_of, modes_of, pattern, play, start
+from sonic_bullet.diagnosis.play import Hypothesis, blow_of, modes_of, moves, pattern, play, start
 from sonic_bullet.effects.values import Evidence, Heard, Sound, Stage
 from sonic_bullet.estimator.lines import noise_rms
 from sonic_bullet.estimator.pairing import TWINS
@@ -88,17 +88,13 @@ def heard_of(h: Hypothesis, body: Struck) -> Heard:
 
 def paired(h: Hypothesis, body: Struck, model: ModalModel, order: Array) -> tuple[Array, tuple[Array, ...]]:
     """Lines (p,) and the modes of ``model`` each stands for: as they were fitted, where no effect has moved the modes, else by nearness and pattern."""
-    moved = any(e.stage is Stage.MATERIAL or e.id in MOVES for e in h.effects)
     place = {int(k): i for i, k in enumerate(order)}
-    if not moved:
+    if not moves(h):
         line = np.unique(body.line[body.line >= 0])
         mode = tuple(np.array(sorted(place[int(k)] for k in np.flatnonzero(body.line == one) if int(k) in place), int) for one in line)
         good = [i for i, m in enumerate(mode) if len(m)]
         return line[good], tuple(mode[i] for i in good)
     return _nearest(body, model)
-
-
-MOVES = frozenset({"added-mass", "mode-splitting", "orthotropy"})
 
 
 def _nearest(body: Struck, model: ModalModel) -> tuple[Array, tuple[Array, ...]]:

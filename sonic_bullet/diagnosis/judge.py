@@ -1,7 +1,6 @@
 """How far what is played is from what was recorded, over the noise that all recordings of a case share.
 
 D(recorded, played + noise), D of two noisy takes of what is played                       (estimator.distance)
-noise: per bin the lower quartile over the last third of every recording, and over neighbouring bins, as nothing stationary is narrow
 """
 
 from __future__ import annotations
@@ -16,10 +15,6 @@ from sonic_bullet.diagnosis.bodies import Struck
 from sonic_bullet.diagnosis.play import Hypothesis, play
 from sonic_bullet.estimator.distance import Floor, log_spectral_db, noise_floor_db, with_noise
 from sonic_bullet.records import Array
-
-WINDOW = 1024
-SIDE = 8  # bins to each side
-QUARTILE = float(np.log(4 / 3))  # of an exponential law over its mean
 
 
 class Judged(Protocol):
@@ -52,22 +47,6 @@ class Take:
     def least(self, h: Hypothesis) -> float:
         """D of two noisy takes of what the hypothesis plays."""
         return noise_floor_db(play(h, self.body, self.strike, len(self.sample), self.sr), self.floor)
-
-
-def floor_between(signals: list[Array]) -> Floor:
-    """The stationary noise of recordings (n,)."""
-    rows = []
-    shape = np.hanning(WINDOW)
-    for signal in signals:
-        tail = signal[-max(len(signal) // 3, min(len(signal), 2 * WINDOW)) :]
-        if len(tail) < WINDOW:
-            tail = np.pad(tail, (0, WINDOW - len(tail)))
-        frames = np.lib.stride_tricks.sliding_window_view(tail, WINDOW)[:: WINDOW // 2]
-        rows.append(np.abs(np.fft.rfft(frames * shape, axis=1)) ** 2 / (shape**2).sum())
-    power = np.concatenate(rows)
-    level = np.quantile(power, 0.25, axis=0) / QUARTILE
-    side = np.pad(level, SIDE, mode="edge")
-    return Floor(np.maximum(np.quantile(np.lib.stride_tricks.sliding_window_view(side, 2 * SIDE + 1), 0.4, axis=1), 1e-24))
 
 
 def mean_db(takes: Sequence[Judged], h: Hypothesis) -> float | None:

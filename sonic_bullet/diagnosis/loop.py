@@ -16,7 +16,7 @@ from sonic_bullet.diagnosis.bodies import Struck
 from sonic_bullet.diagnosis.evidence import evidence_of
 from sonic_bullet.diagnosis.judge import Judged, Take, least_db, mean_db
 from sonic_bullet.diagnosis.play import Hypothesis, play
-from sonic_bullet.diagnosis.refit import refitted
+from sonic_bullet.diagnosis.refit import ROUGH, refitted
 from sonic_bullet.diagnosis.trial import Candidate, trials
 from sonic_bullet.effects.values import Effect
 from sonic_bullet.estimator.distance import with_noise
@@ -26,6 +26,7 @@ LEAST_DB = 0.4
 LEAST_SHARE = 0.08
 SURE, MANY = 2.0, 4  # standard errors; strikes of which none may lose
 MESH = 1e-3  # of a frequency: what a good mesh gets wrong
+ALIKE = 0.1  # of a drop: names that differ by less may be told apart by how much they need
 SUFFICES_DB = 1.5  # a gap below this is the mesh's and the shapes' own
 EXPLAINED = 0.4  # of the gap; part of it is the mesh's and the shapes' own
 OPEN = 0.3  # of the first gap: with less left, no costly suspect is asked
@@ -65,13 +66,16 @@ def closed(
     last: dict[str, Candidate] = {}
     for turn in range(ROUNDS):
         say(f"round {turn + 1}: {now:.2f} dB from the recordings, noise alone {floor:.2f} dB")
+        if now - floor < LEAST_DB:
+            break  # nothing can earn its keep
         evidence = evidence_of(h, bodies, band_hz, seed=seed)
         found = trials(h, bodies, takes, evidence, effects, seed=seed + turn, say=say, costly=now - floor > OPEN * (before - floor))
         for candidate in found:
             last.setdefault(candidate.id, candidate)
-        best = next((c for c in found if earns(c, max(now - floor, 0.0))), None)
-        if best is None:
+        able = [c for c in found if earns(c, max(now - floor, 0.0))]
+        if not able:
             break
+        best = simplest(able)
         h, added = best.hypothesis, [*added, best]
         now = mean_db(takes, h) or 0.0
         floor = least_db(takes, h) or floor
@@ -88,9 +92,10 @@ def closed(
 
 
 def of_the_mesh(h: Hypothesis, bodies: tuple[Struck, ...], takes: Sequence[Judged], seed: int) -> float:
-    """What a mesh's error in modes that no line could correct would add to the distance, in dB: those moved at random by as much as the others were corrected."""
+    """What a mesh's errors would add to the distance, in dB: modes that no line could correct moved at random by as much as the others were
+    corrected, and every shape at the strikes by ROUGH of its strongest there."""
     rng = np.random.default_rng([seed, 5])
-    moved = dict(h.correction or {})
+    moved, other = dict(h.correction or {}), {}
     for body in bodies:
         mine = moved.get(body.name)
         if mine is None or body.gathered is None or len(mine) != len(body.line):
@@ -98,9 +103,20 @@ def of_the_mesh(h: Hypothesis, bodies: tuple[Struck, ...], takes: Sequence[Judge
         paired = body.line >= 0
         size = float(np.sqrt((mine[paired] ** 2).mean())) if paired.any() else 0.0
         moved[body.name] = np.where(paired, mine, mine + max(size, MESH) * rng.standard_normal(len(mine)))
-    other = replace(h, correction=moved)
-    twice = [replace(t, sample=with_noise(play(h, t.body, t.strike, len(t.sample), t.sr), t.floor, 1000 + t.strike)) for t in takes if isinstance(t, Take)]
-    return (mean_db(twice, other) or 0.0) - (mean_db(twice, h) or 0.0)
+        other[body.name] = _roughened(body, rng)
+    far = replace(h, correction=moved)
+    pairs = [(t, play(h, t.body, t.strike, len(t.sample), t.sr)) for t in takes if isinstance(t, Take)]
+    twice = [replace(t, sample=with_noise(made, t.floor, 1000 + t.strike)) for t, made in pairs]
+    return (mean_db([replace(t, body=other.get(t.body.name, t.body)) for t in twice], far) or 0.0) - (mean_db(twice, h) or 0.0)
+
+
+def _roughened(body: Struck, rng: np.random.Generator) -> Struck:
+    """The body with shapes at its strikes off by ROUGH of each mode's strongest there."""
+    shape = body.model.shape.copy()
+    at = slice(body.surface_count(), len(shape) - 1)
+    most = np.abs(np.einsum("sxm,sx->sm", shape[at], body.way[:-1])).max(axis=0)
+    shape[at] += (ROUGH * most * rng.standard_normal((body.strikes, 1, len(most))) * body.way[:-1, :, None]).astype(np.float32)
+    return replace(body, model=replace(body.model, shape=shape))
 
 
 def _pruned(h: Hypothesis, added: list[Candidate], bodies: tuple[Struck, ...], takes: Sequence[Judged], gap_db: float) -> tuple[Hypothesis, list[Candidate]]:
@@ -123,6 +139,17 @@ def earns(c: Candidate, gap_db: float) -> bool:
     if len(c.drop_db) >= MANY and c.drop_db.min() > -0.1 * c.mean_db and float(np.median(c.drop_db)) > 0.5 * need:
         return c.mean_db - max(c.null_db, 0.0) > 0.5 * need  # no strike speaks against it, though loud ones may gain far more than soft ones
     return c.mean_db > SURE * c.sd_db and c.mean_db - max(c.null_db, 0.0) > max(SURE * c.sd_db, 0.5 * need)
+
+
+def simplest(able: Sequence[Candidate]) -> Candidate:
+    """The best, or the one with the fewest numbers of those that strikes cannot tell from it: SURE standard errors of the difference."""
+    best = able[0]
+
+    def close(c: Candidate) -> bool:
+        more = best.drop_db - c.drop_db
+        return bool(more.mean() <= SURE * more.std(ddof=1) / np.sqrt(len(more)) and more.mean() < ALIKE * best.mean_db)
+
+    return min((c for c in able if close(c)), key=lambda c: (c.effect.freedom(), -c.mean_db))
 
 
 def described(candidates: Sequence[Candidate]) -> list[dict[str, Any]]:

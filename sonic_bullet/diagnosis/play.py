@@ -17,6 +17,7 @@ from sonic_bullet.effects.ringing import sounded
 from sonic_bullet.effects.values import CARRIES, Blow, Effect, Ring, Sound, Stage
 from sonic_bullet.records import Array, ModalModel
 
+MOVES = frozenset({"added-mass", "mode-splitting", "orthotropy"})  # effects under which modes are no longer where they were
 KEPT = 4  # hypotheses and bodies whose modes are remembered
 
 
@@ -60,20 +61,29 @@ def undamped(h: Hypothesis, body: Struck) -> ModalModel:
     return body.elastic.solve(material.stiffness_pa / material.density_kg_m3)
 
 
+def moves(h: Hypothesis) -> bool:
+    """Whether an effect moves modes, so that lines and corrections are told anew."""
+    return any(e.stage is Stage.MATERIAL or e.id in MOVES for e in h.effects)
+
+
 @lru_cache(maxsize=KEPT)
 def modes_of(h: Hypothesis, body: Struck) -> tuple[ModalModel, Array]:
-    """The body's damped modes under the hypothesis, and which uncorrected mode each was (m,). Remembered: every strike of a body asks."""
+    """The body's damped modes under the hypothesis, and which uncorrected mode each was (m,). Remembered: every strike of a body asks.
+
+    Corrections come before the effects; where these move modes, after them, as they were learnt on the moved ones.
+    """
     base = undamped(h, body)
-    correction = (h.correction or {}).get(body.name, np.zeros(0))
-    if len(correction) != base.mode_count:  # learnt under another material, or not at all
-        correction = np.zeros(base.mode_count)
-    lam = (2 * np.pi * base.freq_hz * (1 + correction) * np.exp(h.stretch)) ** 2
+    none = np.zeros(base.mode_count)
+    correction = (h.correction or {}).get(body.name, none)
+    if len(correction) != len(none):  # learnt under another material
+        correction = none
+    last = moves(h)
+    lam = (2 * np.pi * base.freq_hz * (1 + (none if last else correction)) * np.exp(h.stretch)) ** 2
     decay = (h.alpha_per_s + h.beta_s * lam) / 2
     model, order = ordered(base, np.sqrt(np.maximum(lam - decay**2, 0)) / (2 * np.pi), decay)
-    fitted = body.gathered is not None
-    for effect in h.at(Stage.MODES, fitted=fitted):
+    for effect in h.at(Stage.MODES, fitted=body.gathered is not None):
         model = effect.apply(model)
-    return model, order
+    return ordered(model, model.freq_hz * (1 + correction[: model.mode_count]), model.decay_per_s) if last else (model, order)
 
 
 def pattern(body: Struck, model: ModalModel) -> Array:

@@ -13,8 +13,9 @@ from dataclasses import replace
 import numpy as np
 
 from sonic_bullet.diagnosis.bodies import Struck
-from sonic_bullet.diagnosis.evidence import MOVES, heard_of, paired, path_response
-from sonic_bullet.diagnosis.play import Hypothesis, modes_of, undamped
+from sonic_bullet.diagnosis.evidence import heard_of, paired, path_response
+from sonic_bullet.diagnosis.play import Hypothesis, modes_of, moves, undamped
+from sonic_bullet.diagnosis.unheard import can_tell, sought
 from sonic_bullet.effects.values import Blow, Heard, Stage
 from sonic_bullet.estimator.rayleigh import rayleigh
 from sonic_bullet.records import Array
@@ -26,7 +27,7 @@ NEAR, ALIKE = 5e-3, 1.6  # of ln f and ln d: lines of one mode
 
 def refitted(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...] | None = None) -> Hypothesis:
     """The hypothesis with α, β and σ fitted again beside its effects; ``heard``: evidence to fit them to, thinned or whole."""
-    moved = any(e.stage is Stage.MATERIAL or e.id in MOVES for e in h.effects)
+    moved = moves(h)
     if moved:
         h = corrected(h, bodies)
     if heard is None or moved:
@@ -51,6 +52,8 @@ def corrected(h: Hypothesis, bodies: tuple[Struck, ...]) -> Hypothesis:
             step = np.zeros(len(ratio))
             step[place] = np.expm1(off)
             found[body.name] = np.clip((1 + ratio) * (1 + step) - 1, -CORRECTION, CORRECTION)
+        if can_tell(body):
+            found[body.name] = sought(replace(h, correction=found), body, np.setdiff1d(np.arange(len(ratio)), place))
     return replace(h, correction=found)
 
 

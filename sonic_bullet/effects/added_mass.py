@@ -1,7 +1,9 @@
 """`added-mass`: a sensor, a blob of wax, water: a small mass that rides on one point.
 
-    (Λ − λ (1 + m ΦᵀΦ)) q = 0,  Φ = φ(p) (3, n)      to first order Δλ/λ = −m |φ(p)|²                [Rayleigh 1894, § 88-90; modal synthesis]
+    (Λ − λ (1 + m ΦᵀΦ)) q = 0,  Φ = (φ(p), √(λ_r R)) (3, n + 3)      to first order Δλ/λ = −m |φ(p)|²                [Rayleigh 1894, § 88-90; modal synthesis]
 
+R: what the modes above the band yield at the point, along its normal and across: residual attachment modes far above them [Rubin 1975]. Without it a
+point mass is held too stiffly, and its higher modes come out several per cent high.
 Read off frequencies and patterns together: for points all over the surface and masses up to a sixth of the body's, lines are paired with the loaded
 body's modes anew; the pairs that agree best stand, where they agree better than the bare body's.
 """
@@ -14,20 +16,27 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from sonic_bullet.effects.pairs import agreed, every_line, patterns
+from sonic_bullet.effects.points import vertex_normals
 from sonic_bullet.effects.support_damping import nearest
 from sonic_bullet.effects.values import Evidence, Heard, Owner, Stage
 from sonic_bullet.records import Array, ModalModel
 
-POINTS = 140
-SHARES = (0.002, 0.006, 0.015, 0.035, 0.08, 0.16)  # of the body's mass
-TRIES = 4
+POINTS = 100
+SHARES = (0.002, 0.006, 0.015, 0.03, 0.055, 0.1, 0.16)  # of the body's mass
+YIELDS = (0.0, 0.25, 0.8)  # of what the modes in the band yield along the normal, to begin with
+ACROSS = 1 / 3  # of that along the normal, to begin with
+FAR = 16.0  # of the highest mode's λ: where what is left of the modes is put
+STEPS = (0.5, 0.8, 0.93, 0.98, 1.02, 1.07, 1.25, 2.0)
+NEAR, TURNS = 16, 5  # vertices and turns of the search about one of them
+TRIES = 6
+WIDTHS = (0.016, 0.008, 0.004)  # of ln f: lines and modes are paired ever more closely
 MATCHED, MOVED = 0.8, 2.5e-3  # share of lines, and how far nine in ten of them may lie off: a mesh's error
 BETTER = (1.5, 0.12)  # in price: as much as a strong line and a half, paired well; and of the bare body's own
 
 
 @dataclass(frozen=True)
 class AddedMass:
-    """mass_kg riding on position_m (3,) of the surface, in the mesh's frame."""
+    """mass_kg riding on position_m (3,) of the surface, in the mesh's frame. yield_m_n: along the normal and across it, of what the model's modes leave out."""
 
     id: ClassVar[str] = "added-mass"
     stage: ClassVar[Stage] = Stage.MODES
@@ -36,51 +45,55 @@ class AddedMass:
 
     position_m: tuple[float, float, float]
     mass_kg: float
+    yield_m_n: tuple[float, float] = (0.0, 0.0)
 
     def apply(self, x: ModalModel) -> ModalModel:
         """The modes with the effect in them."""
         if not x.mode_count or self.mass_kg == 0:
             return x
-        return loaded(x, x.shape[nearest(x, self.position_m)].astype(float), self.mass_kg)
+        at = nearest(x, self.position_m)
+        return loaded(x, attached(x.shape[at].astype(float), vertex_normals(x)[at], self.yield_m_n, x), self.mass_kg)
 
     def parameters(self) -> dict[str, Any]:
         """What it says, for people and JSON, in SI units."""
-        return {"mass_kg": self.mass_kg, "position_m": list(self.position_m)}
+        return {"mass_kg": self.mass_kg, "position_m": list(self.position_m), "yield_m_n": list(self.yield_m_n)}
 
     def freedom(self) -> int:
-        return 4
+        return 6
 
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
         heard = max(evidence.heard, key=lambda h: len(h.freq_hz) if h.plain is not None else 0)
         if heard.plain is None or len(heard.freq_hz) + len(heard.foreign_hz) < 8 or not heard.plain.mass_kg:
             return None
-        line, size, _, _ = every_line(heard)
-        small = _at_points(heard.plain, heard)
+        trial = _Trial.of(heard)
+        x = heard.plain
         if isinstance(evidence.known, cls):
-            at = int(np.argmin(((heard.plain.vertex_m - evidence.known.position_m) ** 2).sum(axis=1)))
-            start = (_score(small, heard, heard.plain.shape[at].astype(float), evidence.known.mass_kg, line, size)[0], at, evidence.known.mass_kg)
-            _, vertex, mass = _refined(small, heard, start, line, size)
-            return cls._at(heard.plain, vertex, mass)
-        none = agreed(line, size, heard.plain.freq_hz, patterns(heard, heard.plain))
-        if _in_place(line, heard.plain.freq_hz, none):
+            at = int(np.argmin(((x.vertex_m - evidence.known.position_m) ** 2).sum(axis=1)))
+            return cls._at(x, trial.refined((0.0, at, evidence.known.mass_kg, evidence.known.yield_m_n), WIDTHS[-1:]))
+        none = agreed(trial.line, trial.size, x.freq_hz, patterns(heard, x))
+        if _in_place(trial.line, x.freq_hz, none):
             return None
         found = []
-        for vertex in spread_out(heard.plain, POINTS):
-            for share in SHARES:
-                mass = share * heard.plain.mass_kg
-                score = _score(small, heard, heard.plain.shape[vertex].astype(float), mass, line, size)[0]
-                found.append((score, vertex, mass))
+        for vertex in spread_out(x, POINTS):
+            most = trial.yields(int(vertex))
+            found += [trial.scored(int(vertex), s * x.mass_kg, (y * most, ACROSS * y * most), WIDTHS[0]) for s in SHARES for y in YIELDS]
         found.sort()
-        score, vertex, mass = min(_refined(small, heard, start, line, size) for start in found[:TRIES])
-        if score > none[0] - max(BETTER[0], BETTER[1] * abs(none[0])):
+        first: dict[tuple[int, bool], Scored] = {}
+        for one in found:
+            first.setdefault((one[1], one[2] > 0.02 * x.mass_kg), one)  # one light and one heavy start a vertex
+        best = min(trial.refined(start) for start in list(first.values())[:TRIES])
+        again = sorted(trial.scored(int(v), best[2], best[3], WIDTHS[1]) for v in spread_out(x, 3 * POINTS))  # round bodies: as heavy, elsewhere
+        best = min(best, *(trial.refined(start, WIDTHS[1:]) for start in again[: TRIES // 2]))
+        if best[0] > none[0] - max(BETTER[0], BETTER[1] * abs(none[0])):
             return None
-        return cls._at(heard.plain, vertex, mass)
+        return cls._at(x, best)
 
     @classmethod
-    def _at(cls, x: ModalModel, vertex: int, mass_kg: float) -> Self:
+    def _at(cls, x: ModalModel, found: Scored) -> Self:
+        _, vertex, mass_kg, along = found
         place = x.vertex_m[vertex]
-        return cls((float(place[0]), float(place[1]), float(place[2])), float(mass_kg))
+        return cls((float(place[0]), float(place[1]), float(place[2])), float(mass_kg), (float(along[0]), float(along[1])))
 
 
 def _in_place(line_hz: Array, mode_hz: Array, none: tuple[float, Array, Array, float]) -> bool:
@@ -108,50 +121,85 @@ def _at_points(x: ModalModel, heard: Heard) -> ModalModel:
     return replace(x, shape=x.shape[rows], vertex_m=x.vertex_m[rows], face=np.zeros((0, 3), np.int32), curvature_per_m=np.zeros(0))
 
 
+def attached(phi: Array, normal: Array, yield_m_n: tuple[float, float], x: ModalModel) -> Array:
+    """Φ (3, m + 3) of a point where the modes are phi (3, m) and the rest yields so much along its normal (3,) and across."""
+    axis = np.linalg.qr(np.column_stack([normal, np.eye(3)]))[0]
+    root = np.sqrt(np.array([yield_m_n[0], yield_m_n[1], yield_m_n[1]]) * FAR * x.omega0_squared_per_s2.max())
+    return np.concatenate([phi, axis * root], axis=1)
+
+
 def loaded(x: ModalModel, phi: Array, mass_kg: float) -> ModalModel:
-    """The model with a mass where its modes are phi (3, m)."""
-    lam = x.omega0_squared_per_s2
+    """The model with a mass where its modes, and three far above them, are phi (3, m + 3)."""
+    own = x.mode_count
+    lam = np.append(x.omega0_squared_per_s2, np.full(3, FAR * x.omega0_squared_per_s2.max()))
     root = 1 / np.sqrt(lam)  # Λ^{-1/2}(1 + mΦᵀΦ)Λ^{-1/2} q' = q'/λ, so the lowest modes come out best
     value, vector = np.linalg.eigh((np.eye(len(lam)) + mass_kg * phi.T @ phi) * root[:, None] * root)
-    value, vector = value[::-1], vector[:, ::-1]
+    value, vector = value[::-1][:own], vector[:, ::-1][:, :own]
     turn = root[:, None] * vector / np.sqrt(value)
     omega = 1 / np.sqrt(value)
-    decay = np.minimum((turn**2 * x.decay_per_s[:, None]).sum(axis=0), 0.99 * omega)
+    loss = np.append(x.decay_per_s, np.full(3, FAR * x.decay_per_s[-1]))  # what yields more loses as the highest mode does: with its stiffness
+    decay = np.minimum((turn**2 * loss[:, None]).sum(axis=0), 0.99 * omega)
+    turn = turn[:own]
     freq = np.sqrt(omega**2 - decay**2) / (2 * np.pi)
     order = np.argsort(freq, kind="stable")
-    shape = (x.shape.reshape(-1, x.mode_count) @ turn[:, order].astype(np.float32)).reshape(x.shape.shape)
+    shape = (x.shape.reshape(-1, own) @ turn[:, order].astype(np.float32)).reshape(x.shape.shape)
     return replace(x, freq_hz=freq[order], decay_per_s=decay[order], shape=shape)
 
 
-def _score(small: ModalModel, heard: Heard, phi: Array, mass: float, line: Array, size: Array) -> tuple[float, float]:
-    """Price of the best pairs, and the misfit of their frequencies."""
-    x = loaded(small, phi, mass)
-    s = len(heard.strike_vertex)
-    level = np.where(np.isfinite(heard.impulse_n_s), heard.impulse_n_s, 1.0)
-    push = np.einsum("sxm,sx->sm", x.shape[:s].astype(float), heard.strike_way) * level[:, None]
-    told = np.abs(push * np.einsum("xm,x->m", x.shape[s].astype(float), heard.sensor_way))
-    score, row, column, shift = agreed(line, size, x.freq_hz, told, turns=1)
-    off = np.log(line[row] / x.freq_hz[column]) - shift
-    return score, float(np.minimum(np.abs(off), 0.01).mean()) if len(off) else 0.01
+Scored = tuple[float, int, float, tuple[float, float]]  # price, vertex, mass in kg, yields in m/N
 
 
-def _refined(small: ModalModel, heard: Heard, start: tuple[float, int, float], line: Array, size: Array) -> tuple[float, int, float]:
-    """The best of nearby vertices and masses, in turns."""
-    assert heard.plain is not None
-    x = heard.plain
-    body = np.unique(x.face)
-    score, vertex, mass = start
-    reach = np.linalg.norm(np.ptp(x.vertex_m[body], axis=0)) / np.sqrt(POINTS)
-    for _ in range(4):
-        near = body[((x.vertex_m[body] - x.vertex_m[vertex]) ** 2).sum(axis=1) < reach**2]
-        near = near[:: max(1, len(near) // 24)]
-        trials = [(_score(small, heard, x.shape[v].astype(float), mass, line, size)[0], int(v), mass) for v in near]
-        trials += [
-            (_score(small, heard, x.shape[vertex].astype(float), mass * f, line, size)[0], int(vertex), mass * f)
-            for f in (0.8, 0.9, 0.95, 0.98, 1.02, 1.05, 1.1, 1.25)
-        ]
-        best = min(trials)
-        reach *= 0.6
-        if best[0] < score:
-            score, vertex, mass = best
-    return score, vertex, mass
+@dataclass(frozen=True, slots=True, eq=False)
+class _Trial:
+    """Prices of masses on one object: its lines and sizes, its bare model, that at strikes and sensor alone, and its normals."""
+
+    heard: Heard
+    line: Array
+    size: Array
+    bare: ModalModel
+    small: ModalModel
+    normal: Array
+
+    @classmethod
+    def of(cls, heard: Heard) -> _Trial:
+        assert heard.plain is not None
+        line, size, _, _ = every_line(heard)
+        return cls(heard, line, size, heard.plain, _at_points(heard.plain, heard), vertex_normals(heard.plain))
+
+    def yields(self, vertex: int) -> float:
+        """What the model's own modes yield along a vertex' normal, in m/N."""
+        return float(((self.normal[vertex] @ self.bare.shape[vertex].astype(float)) ** 2 / self.bare.omega0_squared_per_s2).sum())
+
+    def scored(self, vertex: int, mass: float, along: tuple[float, float], width: float) -> Scored:
+        """The price of the best pairs first."""
+        x = loaded(self.small, attached(self.bare.shape[vertex].astype(float), self.normal[vertex], along, self.bare), mass)
+        s, heard = len(self.heard.strike_vertex), self.heard
+        level = np.where(np.isfinite(heard.impulse_n_s), heard.impulse_n_s, 1.0)
+        push = np.einsum("sxm,sx->sm", x.shape[:s].astype(float), heard.strike_way) * level[:, None]
+        told = np.abs(push * np.einsum("xm,x->m", x.shape[s].astype(float), heard.sensor_way))
+        return agreed(self.line, self.size, x.freq_hz, told, turns=1, width=width)[0], vertex, mass, along
+
+    def refined(self, best: Scored, widths: tuple[float, ...] = WIDTHS) -> Scored:
+        """The best of nearby vertices, masses and yields, in turns."""
+        for width in widths:
+            best = self.scored(*best[1:], width)
+            reach = 0.12 * float(np.linalg.norm(np.ptp(self.bare.vertex_m[self.bare.face], axis=(0, 1))))
+            for _ in range(TURNS):
+                better = min(best, *self._around(best, reach, width))
+                reach *= 0.5
+                if better == best and reach < 0.02:
+                    break
+                best = better
+        return best
+
+    def _around(self, best: Scored, reach: float, width: float) -> list[Scored]:
+        _, vertex, mass, (up, side) = best
+        at = self.bare.vertex_m
+        body = np.unique(self.bare.face)
+        near = body[((at[body] - at[vertex]) ** 2).sum(axis=1) < reach**2]
+        least = 0.02 * self.yields(vertex)
+        trials = [(int(v), mass, (up, side)) for v in near[:: max(1, len(near) // NEAR)]]
+        trials += [(vertex, mass * f, (up, side)) for f in STEPS]
+        trials += [(vertex, mass, (max(up, least) * f, side)) for f in (0, *STEPS)] + [(vertex, mass, (up, max(side, least) * f)) for f in (0, *STEPS)]
+        trials += [(vertex, mass * f, (max(up, least) * g, max(side, least) * g)) for f in (0.93, 1.07) for g in (0.6, 1.0, 1.5)]
+        return [self.scored(*one, width) for one in trials]

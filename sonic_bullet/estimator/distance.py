@@ -11,12 +11,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import convolve1d
 
 from sonic_bullet.records import Array
 
 WINDOWS = (512, 2048, 8192)
 ABOVE = 10.0  # m: cells 10 dB above the noise count
 FLOOR_WINDOW = 1024
+MOST = 8192  # of its window, where recordings are long: low noise needs narrow bins
+SIDE = 8  # bins of the short window to each side
+REACH = 2.5  # of a frequency, up and down: more than a strong hum and its skirt take up
+QUARTILE = float(np.log(4 / 3))  # of an exponential law over its mean
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -26,8 +31,17 @@ class Floor:
     variance: Array
 
     def at(self, bins: int) -> Array:
-        """The same at another number of bins (bins,)."""
-        return np.asarray(np.interp(np.linspace(0, 1, bins), np.linspace(0, 1, len(self.variance)), self.variance))
+        """The same at another number of bins (bins,): fewer are each what a Hann window of their width takes in, as noise may be steep."""
+        fine, wide = len(self.variance), (len(self.variance) - 1) / max(bins - 1, 1)
+        return np.asarray(np.interp(np.linspace(0, 1, bins), np.linspace(0, 1, fine), _taken_in(self.variance, wide) if wide > 1.5 else self.variance))
+
+
+def _taken_in(variance: Array, wide: float) -> Array:
+    """Means (b,) under the main lobe of a Hann window whose bins are ``wide`` of these apart."""
+    x = np.arange(-int(2 * wide), int(2 * wide) + 1) / wide
+    with np.errstate(divide="ignore", invalid="ignore"):
+        lobe = np.where(np.abs(np.abs(x) - 1) < 1e-9, 0.5, np.sinc(x) / (1 - x**2)) ** 2  # [Harris 1978, eq. 27]
+    return np.asarray(convolve1d(variance, lobe / lobe.sum(), mode="mirror"))
 
 
 def floor_of(residual: Array) -> Floor:
@@ -37,6 +51,34 @@ def floor_of(residual: Array) -> Floor:
     frames = np.lib.stride_tricks.sliding_window_view(residual, window)[:: window // 2]
     power = np.abs(np.fft.rfft(frames * shape, axis=1)) ** 2 / (shape**2).sum()
     return Floor(np.maximum(np.median(power, axis=0) / np.log(2), 1e-24))  # the median of an exponential law is ln 2 of its mean
+
+
+def floor_between(signals: list[Array]) -> Floor:
+    """The stationary noise that recordings (n,) share.
+
+    Per bin the lower quartile over the last third of every recording, and over neighbouring bins, as no noise is narrow (hum is no noise).
+    """
+    length = min(len(signal) for signal in signals)
+    window = max(FLOOR_WINDOW, 1 << int(np.log2(max(min(length // 6, MOST), 1))))
+    rows = []
+    shape = np.hanning(window)
+    for signal in signals:
+        tail = signal[-max(len(signal) // 3, min(len(signal), 2 * window)) :]
+        if len(tail) < window:
+            tail = np.pad(tail, (0, window - len(tail)))
+        frames = np.lib.stride_tricks.sliding_window_view(tail, window)[:: window // 2]
+        rows.append(np.abs(np.fft.rfft(frames * shape, axis=1)) ** 2 / (shape**2).sum())
+    level = np.quantile(np.concatenate(rows), 0.25, axis=0) / QUARTILE
+    return Floor(np.maximum(_broad(level, SIDE * window // FLOOR_WINDOW), 1e-24))
+
+
+def _broad(level: Array, side: int) -> Array:
+    """What neighbours (b,) agree on: ``side`` bins to each side, and no further than a factor, as a noise may fall steeply with frequency."""
+    count = len(level)
+    k = np.arange(count)
+    first = np.maximum(np.ceil(k / REACH).astype(int), k - side)
+    last = np.minimum(np.minimum(np.floor(k * REACH).astype(int), k + side), count - 1)
+    return np.array([np.quantile(level[a : b + 1], 0.4) for a, b in zip(first, last, strict=True)])
 
 
 def white(rms: float) -> Floor:

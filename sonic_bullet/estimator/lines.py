@@ -18,6 +18,7 @@ import numpy as np
 from numba import njit
 
 from sonic_bullet.errors import AudioError
+from sonic_bullet.estimator.distance import floor_between
 from sonic_bullet.estimator.shared_poles import FASTEST_PER_S, start_poles
 from sonic_bullet.records import Array
 
@@ -89,15 +90,9 @@ def noise_rms(signals: Array, sr: int) -> Array:
 
 
 def _colour(signals: Array, noise: Array, sr: int) -> Callable[[Array], Array]:
-    """Power of the floor at a frequency over the white noise's: lower quartile of neighbouring bins in the last half, mean over recordings."""
-    tail = signals[:, signals.shape[1] // 2 :] / noise[:, None]
-    window = min(4096, tail.shape[1])
-    frames = np.lib.stride_tricks.sliding_window_view(tail, window, axis=1)[:, :: window // 2]
-    shape = np.hanning(window)
-    power = (np.abs(np.fft.rfft(frames * shape, axis=2)) ** 2).mean(axis=(0, 1)) / (shape**2).sum()
-    side = np.pad(power, 12, mode="edge")
-    level = np.maximum(np.quantile(np.lib.stride_tricks.sliding_window_view(side, 25), 0.25, axis=1), 1.0)
-    return lambda freq: np.asarray(np.interp(freq, np.fft.rfftfreq(window, 1 / sr), level))
+    """Power of the floor at a frequency over the white noise's, which it is at least."""
+    level = np.maximum(floor_between(list(signals / noise[:, None])).variance, 1.0)
+    return lambda freq: np.asarray(np.interp(freq, np.linspace(0, sr / 2, len(level)), level))
 
 
 @njit(cache=True, nogil=True)

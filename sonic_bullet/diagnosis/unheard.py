@@ -1,0 +1,101 @@
+"""Modes that no line could be told for: what their frequencies are, by the recordings themselves.
+
+    T_s = recording − all other modes;   r_j -> argmin Σ_s ∫ |T_s(f) − A_sj L(f; f_j (1 + r_j), d_j)|² df,   |r_j| <= 1 %,   L(f) = ½ Σ_t e^{(−d + iω)t} e^{−2πi f t}
+
+Twins that a mesh has torn apart, modes in each other's skirts and short ones stand in no list of lines, but the model knows their amplitudes at every strike, so
+their place shows. The baseline's correction of a mesh's error, for those of its modes; one that the recordings do not clearly want elsewhere stays.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from sonic_bullet.diagnosis.bodies import Struck
+from sonic_bullet.diagnosis.evidence import heard_of
+from sonic_bullet.diagnosis.play import Hypothesis, modes_of
+from sonic_bullet.records import Array
+
+CORRECTION = 0.01
+TURNS = 3
+BETTER = 0.25  # of a mode's own energy must go from what is left
+SKIRT, WIDE = 4.0, 40.0  # half widths to both sides: where a mode is looked for, and taken out
+FINE = 0.25  # of a mode's half width, or of a bin: steps of the search
+
+
+def settled(h: Hypothesis, bodies: tuple[Struck, ...]) -> tuple[Struck, ...]:
+    """The bodies, modes without a line corrected where their sounds say so; a mode that has come to a line's frequency belongs to it."""
+    return tuple(_settled(h, body) if can_tell(body) else body for body in bodies)
+
+
+def can_tell(body: Struck) -> bool:
+    """Whether amplitudes are known with their signs, and there are sounds to hold them against."""
+    g = body.gathered
+    return g is not None and g.signals is not None and body.family is not None and g.lines.signed and body.kind in ("velocity", "sum")
+
+
+def _settled(h: Hypothesis, body: Struck) -> Struck:
+    correction = sought(h, body, np.flatnonzero(body.line < 0))
+    freq = body.model.freq_hz * (1 + correction)
+    line, paired = body.line.copy(), np.flatnonzero(body.line >= 0)
+    for j in np.flatnonzero((body.line < 0) & (correction != body.correction)) if len(paired) else ():
+        other = int(paired[np.argmin(np.abs(freq[paired] - freq[j]))])
+        width = (h.alpha_per_s + h.beta_s * (2 * np.pi * freq[j]) ** 2) / (4 * np.pi)
+        if abs(freq[other] - freq[j]) < width:
+            line[j] = line[other]
+    return replace(body, correction=correction, line=line)
+
+
+def sought(h: Hypothesis, body: Struck, which: Array) -> Array:
+    """The hypothesis' corrections (m,) of a body, those of ``which`` modes searched for anew, the loudest first."""
+    assert body.gathered is not None and body.gathered.signals is not None
+    heard, (model, order) = heard_of(h, body), modes_of(h, body)
+    plain, plain_order = modes_of(replace(h, correction=None), body)
+    correction = np.zeros(len(order)) if h.correction is None else h.correction[body.name].copy()
+    own = np.empty(len(order))
+    own[plain_order] = plain.freq_hz
+    rank = np.argsort(order)
+    energy = (np.abs(heard.push) ** 2).sum(axis=0) / np.maximum(model.decay_per_s, 1e-3)
+    loud = [int(j) for j in which if energy[rank[j]] > 2 * (heard.noise**2).sum() / heard.sr]
+    loud.sort(key=lambda j: -energy[rank[j]])
+    left, n = np.fft.rfft(heard.residual, axis=1), body.gathered.signals.shape[1]
+    for _ in range(TURNS):
+        before = correction.copy()
+        for j in loud:
+            decay, push = float(model.decay_per_s[rank[j]]), heard.push[:, rank[j]]
+            ratio = _best(left, push, decay, own[j], correction[j], n, heard.sr)
+            if ratio != correction[j]:
+                half = 2 * CORRECTION * own[j] + WIDE * (decay / (2 * np.pi) + heard.sr / n)
+                bins = _bins(own[j], half, n, heard.sr)
+                left[:, bins] += push[:, None] * (
+                    _line(own[j] * (1 + correction[j]), decay, bins, n, heard.sr) - _line(own[j] * (1 + ratio), decay, bins, n, heard.sr)
+                )
+                correction[j] = ratio
+        if (correction == before).all():
+            break
+    return correction
+
+
+def _best(left: Array, push: Array, decay: float, own: float, now: float, n: int, sr: int) -> float:
+    """The correction of a mode of amplitudes push (s,) that leaves least around it, if it is clearly better than the one it has."""
+    step = FINE * max(decay / (2 * np.pi), sr / n) / own
+    grid = np.concatenate([[now], np.linspace(-CORRECTION, CORRECTION, 2 * int(np.ceil(CORRECTION / step)) + 1)])
+    bins = _bins(own, CORRECTION * own + SKIRT * decay / (2 * np.pi) + 2 * sr / n, n, sr)
+    shape = _line(own * (1 + grid[:, None]), decay, bins, n, sr)
+    target = left[:, bins] + push[:, None] * shape[0]
+    energy = (np.abs(push) ** 2).sum() * (np.abs(shape) ** 2).sum(axis=1)
+    cost = energy - 2 * (shape @ (np.conj(target) * push[:, None]).sum(axis=0)).real
+    i = int(cost.argmin())
+    inside = abs(grid[i]) < 0.99 * CORRECTION  # at the end of its reach it runs after something else
+    return float(grid[i]) if inside and cost[i] < cost[0] - BETTER * energy[0] else now
+
+
+def _bins(freq_hz: float, half_hz: float, n: int, sr: int) -> Array:
+    return np.arange(max(int((freq_hz - half_hz) * n / sr), 1), min(int((freq_hz + half_hz) * n / sr) + 2, n // 2))
+
+
+def _line(freq_hz: Array | float, decay: float, bins: Array, n: int, sr: int) -> Array:
+    """½ Σ_t e^{(−d + iω)t} e^{−2πi kt/n} at some bins of n-point spectra."""
+    ratio = np.exp((-decay + 2j * np.pi * (freq_hz - bins * sr / n)) / sr)
+    return np.asarray(0.5 * (1 - ratio**n) / (1 - ratio))
