@@ -31,7 +31,7 @@ class Struck:
     way (s + 1, 3): directions there, zero for a strike of unknown place. impulse_n_s (s,): NaN where unknown. kind: `Case.sensor`.
     family: for another elasticity, None without a mesh. correction (m,): relative, of each mode's frequency, learnt on its fitted strikes, else 0.
     line (m,): the fitted line a mode was paired with, or -1. gathered: its fitted lines and sounds, None for an object nobody fitted.
-    elastic: for tensors, see elastic.py.
+    elastic: for tensors, see elastic.py. band_hz: nothing outside it is recorded, though its modes are in the model: a mesh may have put them there.
     """
 
     name: str
@@ -45,6 +45,7 @@ class Struck:
     line: Array
     gathered: Gathered | None
     elastic: Elastic | None = None
+    band_hz: tuple[float, float] = (0.0, float("inf"))
 
     @property
     def strikes(self) -> int:
@@ -100,7 +101,7 @@ def _placed(found: CaseFit, name: str, family: Family, density: float, o: Object
                 correction[inside] = (1 + ratio) * np.exp(np.log(member).mean()) / member - 1
     model, way = modal_model(case, name, mine, family, density, value, vector)
     impulse = np.array([np.nan if r.impulse_n_s is None else r.impulse_n_s for r in mine])
-    return Struck(name, mine, model, way, impulse, case.sensor, family, correction, line, o.evidence if o is not None else None)
+    return Struck(name, mine, model, way, impulse, case.sensor, family, correction, line, o.evidence if o is not None else None, band_hz=case.band_hz)
 
 
 def modal_model(

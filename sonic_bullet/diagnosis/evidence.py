@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from sonic_bullet.diagnosis.bodies import Struck
-from sonic_bullet.diagnosis.play import Hypothesis, blow_of, modes_of, moves, pattern, play, start
+from sonic_bullet.diagnosis.play import Hypothesis, blow_of, in_band, modes_of, moves, pattern, play, start
 from sonic_bullet.effects.values import Evidence, Heard, Sound, Stage
 from sonic_bullet.estimator.lines import noise_rms
 from sonic_bullet.estimator.pairing import TWINS
@@ -37,7 +37,7 @@ def heard_of(h: Hypothesis, body: Struck) -> Heard:
     line, mode = paired(h, body, model, order)
     mine = body.fitted[: len(lines.amplitude)]
     rows = pattern(body, model)[mine]
-    push = rows * start(body.kind, model)
+    push = rows * start(body.kind, model) * in_band(body, model)
     direct = path_response(h, body, model.freq_hz, gathered.sr) if gathered.signals is not None else np.ones(model.mode_count)
     spectrum = np.stack([blow_of(h, body, i).spectrum(model.freq_hz) for i in mine]) * direct
     expected = np.stack([(h.gain * push * spectrum)[:, m].sum(axis=1) for m in mode], axis=1) if mode else np.zeros((len(mine), 0), complex)

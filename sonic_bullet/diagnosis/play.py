@@ -94,6 +94,11 @@ def pattern(body: Struck, model: ModalModel) -> Array:
     return np.asarray(level[:, None] * row[:-1] * row[-1])
 
 
+def in_band(body: Struck, model: ModalModel) -> Array:
+    """1 for modes (m,) that a recording can hold, else 0."""
+    return np.asarray((model.freq_hz >= body.band_hz[0]) & (model.freq_hz <= body.band_hz[1]), float)
+
+
 def start(kind: str, model: ModalModel) -> Array:
     """Complex factor (m,) of the amplitude: the phase a mode starts with; see estimator.observe."""
     if kind == "velocity":
@@ -111,9 +116,9 @@ def blow_of(h: Hypothesis, body: Struck, strike: int) -> Blow:
 
 
 def ring_of(h: Hypothesis, body: Struck, strike: int) -> Ring:
-    """The modes as a strike starts them, before its pulse's spectrum."""
+    """The modes as a strike starts them, before its pulse's spectrum; those outside the band are silent."""
     model, _ = modes_of(h, body)
-    row = pattern(body, model)[strike]
+    row = pattern(body, model)[strike] * in_band(body, model)
     push = np.einsum("xm,x->m", model.shape[body.surface_count(model) + strike].astype(float), body.way[strike])
     most = np.ones(len(row))
     if any(e.stage is Stage.BANK for e in h.effects) and body.surface_count(model):
