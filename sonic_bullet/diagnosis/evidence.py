@@ -56,7 +56,7 @@ def heard_of(h: Hypothesis, body: Struck) -> Heard:
         freq_hz=lines.freq_hz[line],
         decay_per_s=lines.decay_per_s[line],
         freq_sd_hz=lines.freq_sd_hz[line],
-        decay_sd_per_s=lines.decay_sd_per_s[line],
+        decay_sd_per_s=lines.told_sd_per_s[line],
         amplitude=lines.amplitude[:, line],
         amplitude_sd=lines.amplitude_sd[:, line],
         mode=mode,

@@ -140,6 +140,6 @@ def _decays(evidence: tuple[Evidence, ...], pairs: tuple[Pairs, ...]) -> tuple[A
             which = pairs[at].line
             at += 1
         d = e.lines.decay_per_s[which]
-        found.append(np.stack([(2 * np.pi * e.lines.freq_hz[which]) ** 2 + np.nan_to_num(d) ** 2, d, e.lines.decay_sd_per_s[which]]))
+        found.append(np.stack([(2 * np.pi * e.lines.freq_hz[which]) ** 2 + np.nan_to_num(d) ** 2, d, e.lines.told_sd_per_s[which]]))
     lam, decay, decay_sd = np.concatenate(found, axis=1)
     return lam, decay, decay_sd

@@ -27,6 +27,7 @@ MOST_LINES = 160
 SECONDS_MAX = 8.0
 CROWD, FEWER = 2.5, 0.3  # starting lines over a body's modes; of the lines at the onset
 LATE_S = 0.03
+PINNED = 0.98  # of the fastest decay there is
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,6 +46,11 @@ class Lines:
     noise: Array
     energy: Array
     signed: bool
+
+    @property
+    def told_sd_per_s(self) -> Array:
+        """Spreads of the decays (k,), infinite at the fastest there is: a bound, no value."""
+        return np.asarray(np.where(np.nan_to_num(self.decay_per_s) > PINNED * FASTEST_PER_S, np.inf, self.decay_sd_per_s))
 
 
 def joint_lines(signals: Array, sr: int, *, band_hz: tuple[float, float] = (20.0, 20_000.0), signed: bool = True, modes: int | None = None) -> Lines:

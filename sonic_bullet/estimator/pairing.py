@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sonic_bullet.estimator.lines import Lines
+from sonic_bullet.estimator.lines import PINNED, Lines
 from sonic_bullet.estimator.observe import Observation
 from sonic_bullet.estimator.shared_poles import FASTEST_PER_S
 from sonic_bullet.modal.reduced import Family
@@ -28,7 +28,7 @@ GAMMA_REACH = 0.65  # of ln γ: E and ρ both wrong by 30 %
 POISSON_REACH = 0.05
 CANDIDATES = 8
 MISSED = 0.3
-PINNED, NEVER = 0.98, 0.02
+NEVER = 0.02
 BRIEF = 25.0  # times the decay that holds half of the energy: clicks, filters' and rooms' first milliseconds are made of such lines, bodies' modes seldom
 
 

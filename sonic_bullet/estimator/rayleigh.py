@@ -31,8 +31,8 @@ class Damping:
 
 
 def rayleigh(lambda_per_s2: Array, decay_per_s: Array, decay_sd_per_s: Array, guess: tuple[float, float]) -> Damping:
-    """α and β of lines (k,). guess: (α, β) whose ratio stands in for what one line cannot tell."""
-    good = np.isfinite(decay_per_s) & (decay_per_s > 0)
+    """α and β of lines (k,). guess: (α, β) whose ratio stands in for what one line cannot tell. A spread that is infinite: no value; NaN: 5 %."""
+    good = np.isfinite(decay_per_s) & (decay_per_s > 0) & ~np.isposinf(decay_sd_per_s)
     lam, decay = lambda_per_s2[good], decay_per_s[good]
     spread = np.where(np.isfinite(decay_sd_per_s[good]), decay_sd_per_s[good], 0.05 * decay)
     unknown = np.full((2, 2), np.nan)
