@@ -14,7 +14,7 @@ from sonic_bullet.files.cases import Case, CaseObject, CaseRecording, read_case
 from sonic_bullet.records import Array
 
 Point = tuple[float, float, float]
-ONE = ("mesh", "strike", "direction", "impulse", "material", "scale", "sensor", "sensor_at", "onset_s", "fixed")
+ONE = ("mesh", "strike", "direction", "impulse", "material", "scale", "sensor", "sensor_at", "sensor_direction", "onset_s", "fixed")
 
 
 def run_fit(source: str, *, output: str, picture: str | None, json_to: str | None, **one: Any) -> None:
@@ -67,16 +67,24 @@ def as_case(source: str, one: dict[str, Any]) -> Case:
     kind = one["sensor"] or "pressure"
     if kind == "velocity" and one["sensor_at"] is None:
         raise FileError("--sensor velocity needs a place", "give --sensor-at X,Y,Z")
+    if kind != "velocity" and one["sensor_direction"] is not None:
+        raise FileError(f"--sensor-direction is given, but --sensor is {kind}", "give --sensor velocity, or leave the direction out")
     thing = CaseObject("object", Path(one["mesh"]), 1.0 if one["scale"] is None else one["scale"], one["material"], fixed=one["fixed"])
-    direction: Point | None = one["direction"]
-    if direction is not None:
-        length = float(np.linalg.norm(direction))
-        if not length > 0:
-            raise FileError("--direction is zero", "give the direction of the impulse")
-        direction = (direction[0] / length, direction[1] / length, direction[2] / length)
-    recording = CaseRecording(path, None, "object", "fit", one["strike"], direction, one["impulse"])
+    recording = CaseRecording(path, None, "object", "fit", one["strike"], _unit("direction", one), one["impulse"])
     at = {"object": one["sensor_at"]} if one["sensor_at"] is not None else None
-    return Case(path.stem, path.parent, {"object": thing}, (recording,), kind, at, None, onset_s=one["onset_s"])
+    along = _unit("sensor_direction", one)
+    return Case(path.stem, path.parent, {"object": thing}, (recording,), kind, at, None if along is None else {"object": along}, onset_s=one["onset_s"])
+
+
+def _unit(name: str, one: dict[str, Any]) -> Point | None:
+    """An option's direction, of length 1. Raises FileError."""
+    way: Point | None = one[name]
+    if way is None:
+        return None
+    length = float(np.linalg.norm(way))
+    if not length > 0:
+        raise FileError(f"--{name.replace('_', '-')} is zero", "give a direction")
+    return (way[0] / length, way[1] / length, way[2] / length)
 
 
 def described(found: Any) -> dict[str, Any]:

@@ -81,7 +81,7 @@ def test_one_recording_of_undeclared_onset(folder: Path, tmp_path: Path, capfd: 
     case = json.loads((folder / "case.json").read_text())
     strike = ",".join(map(str, case["recordings"][0]["strike"]["position"]))
     at = ",".join(map(str, case["sensor"]["position"]["box"]))
-    words = ["--mesh", folder / "box.obj", "--strike", strike, "--sensor", "velocity", "--sensor-at", at, "--material", "brass"]
+    words = ["--mesh", folder / "box.obj", "--strike", strike, "--sensor", "velocity", "--sensor-at", at, "--sensor-direction", "0,0,2", "--material", "brass"]
     assert run("fit", tmp_path / "late.wav", *words, "-o", tmp_path / "p.json", "--json", tmp_path / "f.json") == 0
     told = json.loads((tmp_path / "f.json").read_text())
     assert told["alpha_per_s"] == pytest.approx(8.0, rel=0.02)
@@ -101,6 +101,12 @@ def test_one_recording_of_undeclared_onset(folder: Path, tmp_path: Path, capfd: 
         (["s0.wav", "--mesh", "box.obj", "--strike", "0,0,0.003", "--material", "brass", "--scale", "1000"], "across"),
         (["box.obj", "--mesh", "box.obj", "--strike", "0,0,0.003", "--material", "brass"], "cannot read"),
         (["s0.wav", "--mesh", "box.obj", "--strike", "0,nan,0", "--material", "brass"], "finite"),
+        (["s0.wav", "--mesh", "box.obj", "--strike", "0,0,0.003", "--material", "brass", "--sensor-direction", "0,0,1"], "--sensor is pressure"),
+        (
+            ["s0.wav", "--mesh", "box.obj", "--strike", "0,0,0.003", "--material", "brass", "--sensor", "velocity", "--sensor-at", "0.1,0,0.003"]
+            + ["--sensor-direction", "0,0,0"],
+            "--sensor-direction is zero",
+        ),
         (["."], "out.txt"),
     ],
 )
