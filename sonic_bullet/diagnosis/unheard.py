@@ -2,8 +2,8 @@
 
     T_s = recording − all other modes;   r_j -> argmin Σ_s ∫ |T_s(f) − A_sj L(f; f_j (1 + r_j), d_j)|² df,   |r_j| <= 1 %,   L(f) = ½ Σ_t e^{(−d + iω)t} e^{−2πi f t}
 
-Twins that a mesh has torn apart, modes in each other's skirts and short ones stand in no list of lines, but the model knows their amplitudes at every strike, so
-their place shows. The baseline's correction of a mesh's error, for those of its modes; one that the recordings do not clearly want elsewhere stays.
+Twins that a mesh has torn apart, or put together that are none, modes in each other's skirts and short ones stand in no list of lines, but the model knows
+their amplitudes at every strike, so their place shows. The baseline's correction of a mesh's error, for those of its modes; one that the recordings do not clearly want elsewhere stays.
 """
 
 from __future__ import annotations
@@ -36,14 +36,16 @@ def can_tell(body: Struck) -> bool:
 
 
 def _settled(h: Hypothesis, body: Struck) -> Struck:
-    correction = sought(h, body, np.flatnonzero(body.line < 0))
-    freq = body.model.freq_hz * (1 + correction)
-    line, paired = body.line.copy(), np.flatnonzero(body.line >= 0)
-    for j in np.flatnonzero((body.line < 0) & (correction != body.correction)) if len(paired) else ():
-        other = int(paired[np.argmin(np.abs(freq[paired] - freq[j]))])
-        width = (h.alpha_per_s + h.beta_s * (2 * np.pi * freq[j]) ** 2) / (4 * np.pi)
-        if abs(freq[other] - freq[j]) < width:
-            line[j] = line[other]
+    assert body.gathered is not None
+    shared = np.bincount(body.line[body.line >= 0], minlength=1)[np.maximum(body.line, 0)] > 1
+    free = (body.line < 0) | shared  # modes that a mesh has put side by side may have taken one line where there are two
+    correction = sought(h, body, np.flatnonzero(free))
+    lines, line = body.gathered.lines.freq_hz, body.line.copy()
+    for j in np.flatnonzero(correction != body.correction):
+        freq = body.model.freq_hz[j] * (1 + correction[j])
+        width = (h.alpha_per_s + h.beta_s * (2 * np.pi * freq) ** 2) / (4 * np.pi)
+        near = int(np.argmin(np.abs(lines - freq)))
+        line[j] = near if abs(lines[near] - freq) < width else -1
     return replace(body, correction=correction, line=line)
 
 

@@ -53,7 +53,7 @@ def _subtracted(signal: Array, pole: Array, amplitude: Array) -> Array:
     return np.asarray(signal - sound.ravel()[: len(signal)])
 
 
-def _moments(signal: Array, pole: Array) -> tuple[Array, Array]:
+def moments(signal: Array, pole: Array) -> tuple[Array, Array]:
     """Σ x e^{pn} and Σ n x e^{pn}, both (k,), by the same division of n."""
     blocks, k = -(-len(signal) // BLOCK), len(pole)
     padded = np.zeros((blocks, BLOCK))
@@ -106,7 +106,7 @@ def amplitudes(signal: Array, pole: Array, sr: int, *, passes: int = 3) -> Modes
     scale = 1 / np.sqrt(np.diag(matrix))
     matrix = matrix * scale[:, None] * scale + 1e-13 * np.eye(2 * k)
     for _ in range(passes):
-        first, _ = _moments(residual(signal, modes, sr), pole / sr)
+        first, _ = moments(residual(signal, modes, sr), pole / sr)
         step = scale * np.linalg.solve(matrix, scale * np.concatenate([first.real, -first.imag]))
         modes = Modes(pole, modes.amplitude + step[:k] + 1j * step[k:])
     return modes
@@ -114,7 +114,7 @@ def amplitudes(signal: Array, pole: Array, sr: int, *, passes: int = 3) -> Modes
 
 def alone(signal: Array, pole: Array, sr: int) -> Array:
     """Energy (k,) that each pole would take from a signal (n,) by itself, others left out of account."""
-    first, _ = _moments(signal, pole / sr)
+    first, _ = moments(signal, pole / sr)
     power = np.expm1(2 * pole.real / sr * len(signal)) / np.expm1(2 * pole.real / sr)
     return np.asarray(2 * np.abs(first) ** 2 / power)
 
@@ -130,7 +130,7 @@ def fitted(signal: Array, start: Modes, sr: int, *, band: tuple[float, float], f
         matrix = information(modes, sr, len(signal))
         scale = 1 / np.sqrt(np.maximum(np.diag(matrix), 1e-300))
         matrix = matrix * scale[:, None] * scale
-        first, second = _moments(left, modes.pole / sr)
+        first, second = moments(left, modes.pole / sr)
         gradient = np.concatenate([(1j * modes.amplitude * second).real / sr, (-modes.amplitude * second).real / sr, first.real, -first.imag])
         before = cost
         while lift < 1e6:

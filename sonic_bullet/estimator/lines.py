@@ -8,17 +8,16 @@
 All inner products of damped sinusoids over N samples are geometric sums, closed in w = z_j z_k*: Σ wⁿ, Σ n wⁿ, Σ n² wⁿ.
 """
 
-# mypy: disable-error-code="no-untyped-def"
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numba import njit
 
 from sonic_bullet.errors import AudioError
 from sonic_bullet.estimator.distance import floor_between
+from sonic_bullet.estimator.likelihood import moments
 from sonic_bullet.estimator.shared_poles import FASTEST_PER_S, start_poles
 from sonic_bullet.records import Array
 
@@ -101,24 +100,6 @@ def _colour(signals: Array, noise: Array, sr: int) -> Callable[[Array], Array]:
     return lambda freq: np.asarray(np.interp(freq, np.linspace(0, sr / 2, len(level)), level))
 
 
-@njit(cache=True, nogil=True)
-def _moments(signal, pole):
-    """Σ x zⁿ and Σ n x zⁿ (k,), z = e^pole: Horner's rule from the end."""
-    first, second = np.zeros(len(pole), np.complex128), np.zeros(len(pole), np.complex128)
-    for k in range(len(pole)):
-        z = np.exp(pole[k])
-        power, a, b = 1.0 + 0.0j, 0.0 + 0.0j, 0.0 + 0.0j
-        for n in range(len(signal)):
-            if n % 4096 == 0:
-                power = np.exp(pole[k] * n)
-            term = signal[n] * power
-            a += term
-            b += n * term
-            power *= z
-        first[k], second[k] = a, b
-    return first, second
-
-
 def _sums(log_w: Array, count: int) -> tuple[Array, Array, Array]:
     """Σ wⁿ, Σ n wⁿ, Σ n² wⁿ over n < count, w = e^log_w; near w = 1 by the integral's series is never needed: |log_w|·count stays above 1e-6."""
     gap = -np.expm1(log_w)
@@ -179,7 +160,7 @@ def _solved(signals: Array, noise: Array, pole: Array, sr: int) -> tuple[Array, 
     amplitude = np.zeros((len(signals), k), complex)
     residual = np.zeros(len(signals))
     for s, signal in enumerate(signals):
-        first, _ = _moments(signal, z)
+        first, _ = moments(signal, z)
         right = np.concatenate([first.real, -first.imag])
         a = _solve(factor, right)
         amplitude[s] = a[:k] + 1j * a[k:]
@@ -197,7 +178,7 @@ def _normal(signals: Array, noise: Array, pole: Array, sr: int) -> tuple[Array, 
     one, turn = np.ones(k, complex), np.full(k, 1j)
     matrix, gradient, cost = np.zeros((2 * k, 2 * k)), np.zeros(2 * k), 0.0
     for signal, sigma in zip(signals, noise, strict=True):
-        first, second = _moments(signal, z)
+        first, second = moments(signal, z)
         right = np.concatenate([first.real, -first.imag])
         a = _solve(factor, right)
         amplitude = a[:k] + 1j * a[k:]

@@ -103,8 +103,21 @@ def test_one_recording_of_undeclared_onset(folder: Path, tmp_path: Path, capfd: 
         (["s0.wav", "--mesh", "box.obj", "--strike", "0,nan,0", "--material", "brass"], "finite"),
         (["s0.wav", "--mesh", "box.obj", "--strike", "0,0,0.003", "--material", "brass", "--sensor-direction", "0,0,1"], "--sensor is pressure"),
         (
-            ["s0.wav", "--mesh", "box.obj", "--strike", "0,0,0.003", "--material", "brass", "--sensor", "velocity", "--sensor-at", "0.1,0,0.003"]
-            + ["--sensor-direction", "0,0,0"],
+            [
+                "s0.wav",
+                "--mesh",
+                "box.obj",
+                "--strike",
+                "0,0,0.003",
+                "--material",
+                "brass",
+                "--sensor",
+                "velocity",
+                "--sensor-at",
+                "0.1,0,0.003",
+                "--sensor-direction",
+                "0,0,0",
+            ],
             "--sensor-direction is zero",
         ),
         (["."], "out.txt"),
