@@ -14,7 +14,7 @@ import numpy as np
 
 from sonic_bullet.diagnosis.bodies import Struck
 from sonic_bullet.diagnosis.evidence import heard_of
-from sonic_bullet.diagnosis.play import Hypothesis, modes_of
+from sonic_bullet.diagnosis.play import Hypothesis, modes_of, undamped
 from sonic_bullet.records import Array
 
 CORRECTION = 0.01
@@ -54,12 +54,12 @@ def sought(h: Hypothesis, body: Struck, which: Array) -> Array:
     assert body.gathered is not None and body.gathered.signals is not None
     heard, (model, order) = heard_of(h, body), modes_of(h, body)
     plain, plain_order = modes_of(replace(h, correction=None), body)
-    correction = np.zeros(len(order)) if h.correction is None else h.correction[body.name].copy()
-    own = np.empty(len(order))
-    own[plain_order] = plain.freq_hz
-    rank = np.argsort(order)
+    count = undamped(h, body).mode_count
+    correction = np.zeros(count) if h.correction is None else h.correction[body.name].copy()
+    own, rank = np.full(count, np.nan), np.full(count, -1)  # overdamped modes are in neither
+    own[plain_order], rank[order] = plain.freq_hz, np.arange(len(order))
     energy = (np.abs(heard.push) ** 2).sum(axis=0) / np.maximum(model.decay_per_s, 1e-3)
-    loud = [int(j) for j in which if energy[rank[j]] > 2 * (heard.noise**2).sum() / heard.sr]
+    loud = [int(j) for j in which if rank[j] >= 0 and np.isfinite(own[j]) and energy[rank[j]] > 2 * (heard.noise**2).sum() / heard.sr]
     loud.sort(key=lambda j: -energy[rank[j]])
     left, n = np.fft.rfft(heard.residual, axis=1), body.gathered.signals.shape[1]
     for _ in range(TURNS):
