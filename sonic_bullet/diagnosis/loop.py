@@ -15,7 +15,7 @@ import numpy as np
 from sonic_bullet.diagnosis.bodies import Struck
 from sonic_bullet.diagnosis.evidence import evidence_of
 from sonic_bullet.diagnosis.judge import Judged, Take, least_db, mean_db
-from sonic_bullet.diagnosis.play import Hypothesis, play
+from sonic_bullet.diagnosis.play import Hypothesis, moves, play
 from sonic_bullet.diagnosis.refit import ROUGH, refitted
 from sonic_bullet.diagnosis.trial import Candidate, trials
 from sonic_bullet.effects.values import Effect
@@ -142,14 +142,18 @@ def earns(c: Candidate, gap_db: float) -> bool:
 
 
 def simplest(able: Sequence[Candidate]) -> Candidate:
-    """The best, or the one with the fewest numbers of those that strikes cannot tell from it: SURE standard errors of the difference."""
+    """The best, or the one with the fewest numbers of those that strikes cannot tell from it: SURE standard errors of the difference.
+
+    Effects that move modes stand aside: corrections are learnt anew beside them, and are numbers too.
+    """
     best = able[0]
 
     def close(c: Candidate) -> bool:
         more = best.drop_db - c.drop_db
         return bool(more.mean() <= SURE * more.std(ddof=1) / np.sqrt(len(more)) and more.mean() < ALIKE * best.mean_db)
 
-    return min((c for c in able if close(c)), key=lambda c: (c.effect.freedom(), -c.mean_db))
+    rivals = [c for c in able if close(c) and not moves(c.hypothesis)]
+    return best if moves(best.hypothesis) else min(rivals, key=lambda c: (c.effect.freedom(), -c.mean_db))
 
 
 def described(candidates: Sequence[Candidate]) -> list[dict[str, Any]]:

@@ -18,6 +18,7 @@ from sonic_bullet.effects.values import CARRIES, Blow, Effect, Ring, Sound, Stag
 from sonic_bullet.records import Array, ModalModel
 
 MOVES = frozenset({"added-mass", "mode-splitting", "orthotropy"})  # effects under which modes are no longer where they were
+LAST = frozenset({"added-mass"})  # of those, under which no mode keeps its own correction
 KEPT = 4  # hypotheses and bodies whose modes are remembered
 
 
@@ -66,18 +67,23 @@ def moves(h: Hypothesis) -> bool:
     return any(e.stage is Stage.MATERIAL or e.id in MOVES for e in h.effects)
 
 
+def mixes(h: Hypothesis) -> bool:
+    """Whether an effect makes all modes anew out of the old ones."""
+    return any(e.id in LAST for e in h.effects)
+
+
 @lru_cache(maxsize=KEPT)
 def modes_of(h: Hypothesis, body: Struck) -> tuple[ModalModel, Array]:
     """The body's damped modes under the hypothesis, and which uncorrected mode each was (m,). Remembered: every strike of a body asks.
 
-    Corrections come before the effects; where these move modes, after them, as they were learnt on the moved ones.
+    Corrections come before the effects; where these mix modes, after them, as they were learnt on what came of it.
     """
     base = undamped(h, body)
     none = np.zeros(base.mode_count)
     correction = (h.correction or {}).get(body.name, none)
     if len(correction) != len(none):  # learnt under another material
         correction = none
-    last = moves(h)
+    last = mixes(h)
     lam = (2 * np.pi * base.freq_hz * (1 + (none if last else correction)) * np.exp(h.stretch)) ** 2
     decay = (h.alpha_per_s + h.beta_s * lam) / 2
     model, order = ordered(base, np.sqrt(np.maximum(lam - decay**2, 0)) / (2 * np.pi), decay)

@@ -17,6 +17,7 @@ from sonic_bullet.diagnosis.evidence import heard_of, paired, path_response
 from sonic_bullet.diagnosis.play import Hypothesis, modes_of, moves, undamped
 from sonic_bullet.diagnosis.unheard import can_tell, sought
 from sonic_bullet.effects.values import Blow, Heard, Stage
+from sonic_bullet.estimator.pairing import MESHED, TWINS
 from sonic_bullet.estimator.rayleigh import rayleigh
 from sonic_bullet.records import Array
 
@@ -52,9 +53,22 @@ def corrected(h: Hypothesis, bodies: tuple[Struck, ...]) -> Hypothesis:
             step = np.zeros(len(ratio))
             step[place] = np.expm1(off)
             found[body.name] = np.clip((1 + ratio) * (1 + step) - 1, -CORRECTION, CORRECTION)
+            if any(e.id == "mode-splitting" for e in h.effects):
+                found[body.name] = _alike(undamped(h, body).freq_hz, found[body.name])
         if can_tell(body):
-            found[body.name] = sought(replace(h, correction=found), body, np.setdiff1d(np.arange(len(ratio)), place))
+            now = replace(h, correction=found)
+            _, order = modes_of(now, body)
+            groups = [order[who] for who in paired(now, body, *modes_of(now, body))[1]]
+            lone = np.setdiff1d(np.arange(len(ratio)), np.concatenate([*groups, np.zeros(0, int)]))
+            shared = np.concatenate([*(g for g in groups if len(g) > 1), np.zeros(0, int)])
+            found[body.name] = sought(now, body, np.concatenate([lone, shared]), alone=np.isin(np.arange(len(ratio)), lone))
     return replace(h, correction=found)
+
+
+def _alike(freq_hz: Array, correction: Array) -> Array:
+    """Corrections (m,), the mean of each run of modes that a mesh leaves side by side: what sets twins apart is an effect's, or they would change places."""
+    run = np.cumsum(np.diff(np.log(freq_hz), prepend=-np.inf) > TWINS * MESHED)
+    return np.asarray((np.bincount(run, correction) / np.maximum(np.bincount(run), 1))[run])
 
 
 def _off(h: Hypothesis, body: Struck) -> tuple[Array, Array]:

@@ -169,6 +169,8 @@ def _tried(kind: type[Effect], whole: Effect, h: Hypothesis, bodies: tuple[Struc
     drops, nulls, seen = [], [], []
     for i, fold in enumerate(folds):
         less = fold.evidence
+        if getattr(kind, "by_line", False) and not isinstance(fold.take, Listed):
+            less = thinned(evidence, i, 1.0, np.random.default_rng(0))  # a line's own numbers are told by no other line, but by the other strikes
         effect = kind.propose(replace(less, known=whole))
         if effect is None:
             drops.append(0.0)

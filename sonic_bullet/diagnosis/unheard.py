@@ -20,6 +20,7 @@ from sonic_bullet.records import Array
 CORRECTION = 0.01
 TURNS = 3
 BETTER = 0.25  # of a mode's own energy must go from what is left
+PURE = 0.1  # of its energy near its line may be something else
 SKIRT, WIDE = 4.0, 40.0  # half widths to both sides: where a mode is looked for, and taken out
 FINE = 0.25  # of a mode's half width, or of a bin: steps of the search
 
@@ -39,7 +40,7 @@ def _settled(h: Hypothesis, body: Struck) -> Struck:
     assert body.gathered is not None
     shared = np.bincount(body.line[body.line >= 0], minlength=1)[np.maximum(body.line, 0)] > 1
     free = (body.line < 0) | shared  # modes that a mesh has put side by side may have taken one line where there are two
-    correction = sought(h, body, np.flatnonzero(free))
+    correction = sought(h, body, np.flatnonzero(free), alone=body.line < 0)
     lines, line = body.gathered.lines.freq_hz, body.line.copy()
     for j in np.flatnonzero(correction != body.correction):
         freq = body.model.freq_hz[j] * (1 + correction[j])
@@ -49,8 +50,11 @@ def _settled(h: Hypothesis, body: Struck) -> Struck:
     return replace(body, correction=correction, line=line)
 
 
-def sought(h: Hypothesis, body: Struck, which: Array) -> Array:
-    """The hypothesis' corrections (m,) of a body, those of ``which`` modes searched for anew, the loudest first."""
+def sought(h: Hypothesis, body: Struck, which: Array, *, alone: Array | None = None) -> Array:
+    """The hypothesis' corrections (m,) of a body, those of ``which`` modes searched for anew, the loudest first. alone (m,): without a line; all where None.
+
+    One that shares a line goes elsewhere only if nothing but itself, as the mesh has it, is there: twins that an imperfection has turned are not the mesh's.
+    """
     assert body.gathered is not None and body.gathered.signals is not None
     heard, (model, order) = heard_of(h, body), modes_of(h, body)
     plain, plain_order = modes_of(replace(h, correction=None), body)
@@ -66,7 +70,8 @@ def sought(h: Hypothesis, body: Struck, which: Array) -> Array:
         before = correction.copy()
         for j in loud:
             decay, push = float(model.decay_per_s[rank[j]]), heard.push[:, rank[j]]
-            ratio = _best(left, push, decay, own[j], correction[j], n, heard.sr)
+            most = np.inf if alone is None or alone[j] else PURE
+            ratio = _best(left, push, decay, own[j], correction[j], n, heard.sr, most)
             if ratio != correction[j]:
                 half = 2 * CORRECTION * own[j] + WIDE * (decay / (2 * np.pi) + heard.sr / n)
                 bins = _bins(own[j], half, n, heard.sr)
@@ -79,8 +84,8 @@ def sought(h: Hypothesis, body: Struck, which: Array) -> Array:
     return correction
 
 
-def _best(left: Array, push: Array, decay: float, own: float, now: float, n: int, sr: int) -> float:
-    """The correction of a mode of amplitudes push (s,) that leaves least around it, if it is clearly better than the one it has."""
+def _best(left: Array, push: Array, decay: float, own: float, now: float, n: int, sr: int, most: float) -> float:
+    """The correction of a mode of amplitudes push (s,) that leaves least around it, if it is clearly better than the one it has and leaves no more than ``most``."""
     step = FINE * max(decay / (2 * np.pi), sr / n) / own
     grid = np.concatenate([[now], np.linspace(-CORRECTION, CORRECTION, 2 * int(np.ceil(CORRECTION / step)) + 1)])
     bins = _bins(own, CORRECTION * own + SKIRT * decay / (2 * np.pi) + 2 * sr / n, n, sr)
@@ -90,7 +95,10 @@ def _best(left: Array, push: Array, decay: float, own: float, now: float, n: int
     cost = energy - 2 * (shape @ (np.conj(target) * push[:, None]).sum(axis=0)).real
     i = int(cost.argmin())
     inside = abs(grid[i]) < 0.99 * CORRECTION  # at the end of its reach it runs after something else
-    return float(grid[i]) if inside and cost[i] < cost[0] - BETTER * energy[0] else now
+    near = np.abs(bins * sr / n - own * (1 + grid[i])) < decay / np.pi + 2 * sr / n
+    rest = np.abs(target - push[:, None] * shape[i])[:, near] ** 2
+    pure = rest.sum() < most * (np.abs(push[:, None] * shape[i])[:, near] ** 2).sum()
+    return float(grid[i]) if inside and pure and cost[i] < cost[0] - BETTER * energy[0] else now
 
 
 def _bins(freq_hz: float, half_hz: float, n: int, sr: int) -> Array:

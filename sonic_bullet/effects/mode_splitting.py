@@ -19,7 +19,7 @@ from sonic_bullet.records import Array, ModalModel
 PAIR = 6e-3  # relative: modes of a mesh nearer than this may be a pair
 SPLIT = (1e-4, 3e-2)
 HEARD = 0.12  # of a line's own width: pairs nearer than that sound as one
-REACH = 1.5e-2  # of a line from its pair's middle
+REACH = 2e-2  # of a line from its pair's middle
 LOUD, CLEAR = 1e-3, 30.0  # of the strongest line; of a line's own spread
 MOST = 7
 ALIKE = 0.9
@@ -32,6 +32,7 @@ class ModeSplitting:
     id: ClassVar[str] = "mode-splitting"
     stage: ClassVar[Stage] = Stage.MODES
     owner: ClassVar[Owner] = Owner.OBJECT
+    by_line: ClassVar[bool] = True
     reference: ClassVar[str] = "Perrin & Charnley 1973"
 
     freq_hz: tuple[float, ...]
@@ -63,8 +64,13 @@ class ModeSplitting:
 
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
-        rows = [row for h in evidence.heard if h.model is not None for row in _pairs(h)]
-        return cls(*(tuple(r[i] for r in rows) for i in range(3))) if rows else None
+        rows = []
+        for h in (h for h in evidence.heard if h.plain is not None):
+            found = _pairs(h, 1.0)
+            if len(found) > 1:  # E/ρ may have been fitted to one line of each pair
+                found = [row[:3] for row in _pairs(h, float(np.median([row[3] for row in found])))]
+            rows += found
+        return cls(*(tuple(float(r[i]) for r in rows) for i in range(3))) if rows else None
 
 
 def _pair(freq: Array, f: float) -> tuple[int, int]:
@@ -77,21 +83,24 @@ def _pair(freq: Array, f: float) -> tuple[int, int]:
     return int(near[i]), int(near[i + 1])
 
 
-def _pairs(h: Heard) -> list[tuple[float, float, float]]:
-    """(f, ε, ψ) of every pair of modes that two lines stand for; a line stands for one mode, the surest pairs choose first."""
-    assert h.model is not None
+def _pairs(h: Heard, scale: float) -> list[tuple[float, ...]]:
+    """(f, ε, ψ, f over the mesh's) of every pair of modes, their frequencies times ``scale``, that two lines stand for.
+
+    A line stands for one mode; the surest pairs choose first.
+    """
+    assert h.plain is not None  # the mesh's own order: corrections may have turned a pair's about
     every = np.concatenate([h.freq_hz, h.foreign_hz])
     decay = np.concatenate([h.decay_per_s, h.foreign_decay_per_s])
     amplitude = np.concatenate([h.amplitude, h.foreign_amplitude], axis=1)
     level = np.where(np.isfinite(h.impulse_n_s), h.impulse_n_s, 1.0)
-    strike = np.einsum("sxm,sx->sm", h.model.shape[h.strike_vertex].astype(float), h.strike_way) * level[:, None]
-    sensor = np.einsum("xm,x->m", h.model.shape[h.sensor_vertex].astype(float), h.sensor_way)
-    model_hz = h.model.freq_hz
+    strike = np.einsum("sxm,sx->sm", h.plain.shape[h.strike_vertex].astype(float), h.strike_way) * level[:, None]
+    sensor = np.einsum("xm,x->m", h.plain.shape[h.sensor_vertex].astype(float), h.sensor_way)
+    model_hz = h.plain.freq_hz
     size = np.abs(amplitude).max(axis=0)
     clear = size > np.maximum(LOUD * size.max(), CLEAR * np.concatenate([h.amplitude_sd, h.foreign_sd], axis=1).max(axis=0))
     trials: list[tuple[float, int, int, int, float, float]] = []
     for a in np.flatnonzero(np.diff(model_hz) < PAIR * model_hz[:-1]):
-        middle = (model_hz[a] + model_hz[a + 1]) / 2
+        middle = scale * (model_hz[a] + model_hz[a + 1]) / 2
         near = np.flatnonzero((np.abs(every / middle - 1) < REACH) & clear)
         near = np.sort(near[np.argsort(-size[near])][:MOST])
         for i, j in combinations(near.tolist(), 2):
@@ -103,7 +112,7 @@ def _pairs(h: Heard) -> list[tuple[float, float, float]]:
             off = abs((every[low] + every[high]) / (2 * middle) - 1)
             if alike > ALIKE:
                 trials.append((float(alike - off / REACH * (1 - ALIKE)), int(a), int(low), int(high), split, turn))
-    found: list[tuple[float, float, float]] = []
+    found: list[tuple[float, ...]] = []
     taken: set[int] = set()
     done: set[int] = set()
     for _, mode, low, high, split, turn in sorted(trials, reverse=True):
@@ -111,7 +120,8 @@ def _pairs(h: Heard) -> list[tuple[float, float, float]]:
             continue
         taken.update((low, high))
         done.update((mode, mode + 1))
-        found.append((float((every[low] + every[high]) / 2), split, turn))
+        middle = float((every[low] + every[high]) / 2)
+        found.append((middle, split, turn, 2 * middle / float(model_hz[mode] + model_hz[mode + 1])))
     return sorted(found)
 
 
