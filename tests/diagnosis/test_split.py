@@ -1,0 +1,67 @@
+"""Split pairs are told from the recordings alone: whatever corrections have made of the pair's order, or of E/ρ."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from made_body import plate, recorded, truth
+
+from sonic_bullet.diagnosis.bodies import Struck
+from sonic_bullet.diagnosis.evidence import evidence_of
+from sonic_bullet.effects.mode_splitting import ModeSplitting
+from sonic_bullet.records import ModalModel
+
+BAND = (50.0, 7_500.0)
+PAIRS = ((3, 4), (9, 10))
+
+
+def twins() -> ModalModel:
+    """The plate, two pairs of its modes at one frequency each."""
+    model = plate()
+    freq = model.freq_hz.copy()
+    for a, b in PAIRS:
+        freq[b] = freq[a]
+    return replace(model, freq_hz=freq)
+
+
+def split() -> ModeSplitting:
+    freq = twins().freq_hz
+    return ModeSplitting(tuple(float(freq[a]) for a, _ in PAIRS), (0.012, 0.009), (0.5, 2.0))
+
+
+def told(body: Struck, correction: dict[int, float]) -> ModeSplitting:
+    """What is proposed where the baseline has corrected some modes."""
+    ratio = np.zeros(body.model.mode_count)
+    for k, r in correction.items():
+        ratio[k] = r
+    found = ModeSplitting.propose(evidence_of(replace(truth(), correction={"plate": ratio}), (body,), BAND))
+    assert found is not None
+    return found
+
+
+@pytest.mark.parametrize("correction", [{}, {3: 0.006, 4: -0.006}, {3: -0.006, 4: 0.006, 9: 0.0045}])
+def test_the_turn_is_the_meshs_whatever_corrections_say(correction: dict[int, float]) -> None:
+    found = told(recorded(split(), model=twins(), seconds=1.0), correction)
+    assert found.split == pytest.approx((0.012, 0.009), rel=0.02)
+    assert found.turn_rad == pytest.approx((0.5, 2.0), abs=0.03)
+
+
+def test_pairs_are_found_where_elasticity_was_fitted_to_one_line_of_each() -> None:
+    """All modes of the mesh 1 % high, and splits that add 0.6 %: the pairs agree on the scale between them."""
+    body = recorded(split(), model=twins(), seconds=1.0)
+    high = replace(body, model=replace(body.model, freq_hz=1.01 * body.model.freq_hz))
+    found = told(high, {})
+    assert len(found.split) == 2
+    assert found.turn_rad == pytest.approx((0.5, 2.0), abs=0.03)
+
+
+def test_a_split_pair_sounds_as_two_modes_that_fill_the_same_space() -> None:
+    """φφᵀ of the pair summed over both is the same, whatever the turn."""
+    model = twins()
+    after = split().apply(model)
+    for a, b in PAIRS:
+        before, now = model.shape[:, 2, [a, b]].astype(float), after.shape[:, 2, [a, b]].astype(float)
+        assert np.allclose(before @ before.T, now @ now.T, atol=1e-6 * np.abs(before @ before.T).max())
+        assert after.freq_hz[b] / after.freq_hz[a] - 1 == pytest.approx(0.012 if a == 3 else 0.009, rel=0.01)
