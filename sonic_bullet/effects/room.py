@@ -23,6 +23,7 @@ MODEL_ERROR = 0.08  # of the direct sound's spectrum, relative
 TURNS = 40
 EARLY_S = 6e-3
 ALIKE = 0.2  # of ln δ: how far the bands' late decays may lie from one another, by the middle
+FASTER, FEWEST, SHARE = 1.5, 4, 0.35  # than the room; bands that are, and of all: who they must be to tell it
 SPECKLE, SHAPE = 0.8, 0.5  # of ln power: of a frame in a diffuse tail, of a mode's level
 
 
@@ -128,18 +129,16 @@ def late(h: Heard, evidence: Evidence) -> tuple[float, float] | None:
 
 
 def _alike(t: Array, y: Array, weight: Array, damping: Array, omega2: Array, delta: float) -> bool:
-    """Whether the bands' late decays are one, δ, and most modes of themselves decay faster: what no body does and every room."""
+    """Whether bands whose modes of themselves decay faster than δ end with it, all of them alike: what no body does and every room."""
+    own = (damping[0] + damping[1] * omega2) / 2
     late_slope = []
-    for row, w in zip(y, weight, strict=True):
+    for row, w, d in zip(y, weight, own, strict=True):
         last = int(w.sum())
         first = max(3, last // 4)
-        if last - first >= 6:
+        if last - first >= 6 and d > FASTER * delta:  # a mode that outlasts the room ends as it began
             late_slope.append(-np.polyfit(t[first:last], row[first:last], 1)[0] / 2)
-    own = (damping[0] + damping[1] * omega2) / 2
-    if len(late_slope) < 4:
-        return False
     off = np.abs(np.log(np.maximum(late_slope, 1e-3) / delta))
-    return bool(np.median(off) < ALIKE and (off < 2.5 * ALIKE).mean() > 0.7 and (own > 1.5 * delta).mean() > 0.5)
+    return bool(len(off) >= FEWEST and len(off) > SHARE * len(own) and np.median(off) < ALIKE and (off < 2.5 * ALIKE).mean() > 0.7)
 
 
 def early(h: Heard, evidence: Evidence) -> tuple[float, float, float]:
