@@ -22,6 +22,7 @@ MOST_HITS = 8
 FAINT = 0.02
 LEAST = 0.06  # of the first hit's share
 GAIN = 0.02  # of what is left must go with another hit
+NEAR = 0.03  # of ln t: delays that agree
 EXPONENTS = (0.0, 1.0, 0.5, -0.2)
 
 
@@ -75,18 +76,34 @@ class Rebound:
         if len(found) < max(2, 0.6 * len(h.impulse_n_s)):
             return None
         level = np.array([j if np.isfinite(j) else 1.0 for j, _ in found])
-        gap = np.array([hits[0][0] for _, hits in found])
-        share = np.array([hits[0][1] for _, hits in found])
         reference = float(np.exp(np.log(level).mean()))
-        exponent = min(EXPONENTS, key=lambda p: _spread(np.log(gap) - p * np.log(level)))
-        if _spread(np.log(gap) - exponent * np.log(level)) > 0.1 or _spread(np.log(share)) > 0.5:
+        every = [np.array(hits) for _, hits in found]
+        agreed = [
+            (_agreed([np.log(t[:, 0]) - p * np.log(j / reference) for t, j in zip(every, level, strict=True)], [t[:, 1] for t in every]), p) for p in EXPONENTS
+        ]
+        (_, first, which), exponent = max(agreed, key=lambda a: a[0][0])
+        mine = [(t, i) for t, i in zip(every, which, strict=True) if i >= 0]
+        share = np.array([t[i, 1] for t, i in mine])
+        if len(mine) < max(2, 0.6 * len(h.impulse_n_s)) or _spread(np.log(share)) > 0.5:
             return None
-        first = float(np.exp(np.median(np.log(gap) - exponent * np.log(level / reference))))
-        ratio = [hits[1][0] / hits[0][0] - 1 for _, hits in found if len(hits) > 1 and hits[1][0] > hits[0][0]]
+        after = [t[t[:, 0] > 1.03 * t[i, 0]] for t, i in mine]
+        score, ratio, _ = _agreed([np.log(np.maximum(a[:, 0] / t[i, 0] - 1, 1e-3)) for a, (t, i) in zip(after, mine, strict=True)], [a[:, 1] for a in after])
+        shrink = float(np.clip(np.exp(ratio), 0.03, 1.0)) if score > 0 and sum(len(a) > 0 for a in after) >= 2 else None
         e = float(np.clip(np.median(share), 0.03, 0.97))
-        shrink = float(np.clip(np.median(ratio), 0.03, 1.0)) if len(ratio) >= 2 else None
-        count = 1 + round(float(np.median([len(hits) for _, hits in found])))
-        return cls(first, reference, e, exponent, shrink, count if count <= 2 else MOST_HITS)
+        count = 1 + round(float(np.median([len(t) - i for t, i in mine])))
+        return cls(float(np.exp(first)), reference, e, exponent, shrink, count if count <= 2 else MOST_HITS)
+
+
+def _agreed(value: list[Array], share: list[Array]) -> tuple[float, float, list[int]]:
+    """(share in all, value, which of each strike's or -1) of the value that the largest shares of the strikes agree on."""
+    best: tuple[float, float, list[int]] = (0.0, 0.0, [-1] * len(value))
+    for centre in np.concatenate([*value, np.zeros(0)]):
+        near = [np.where(np.abs(v - centre) < NEAR, s, 0.0) for v, s in zip(value, share, strict=True)]
+        total = float(sum(s.max(initial=0.0) for s in near))
+        if total > best[0]:
+            which = [int(s.argmax()) if s.any() else -1 for s in near]
+            best = (total, float(np.median([v[i] for v, i in zip(value, which, strict=True) if i >= 0])), which)
+    return best
 
 
 def _spread(y: Array) -> float:

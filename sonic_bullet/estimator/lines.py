@@ -25,7 +25,7 @@ SIGNIFICANT = 60.0  # energy of a line over the noise's density, all recordings:
 MOST_LINES = 160
 SECONDS_MAX = 8.0
 CROWD, FEWER = 2.5, 0.3  # starting lines over a body's modes; of the lines at the onset
-LATE_S = 0.03
+LATE_S = (0.03, 0.1)
 PINNED = 0.98  # of the fastest decay there is
 
 
@@ -67,12 +67,12 @@ def joint_lines(signals: Array, sr: int, *, band_hz: tuple[float, float] = (20.0
     low, high = max(band_hz[0], 5.0), min(band_hz[1], 0.485 * sr)
     noise = noise_rms(signals, sr)
     colour = _colour(signals, noise, sr)
-    pole, late = start_poles(signals / noise[:, None], sr, low, high), round(LATE_S * sr)
-    crowd = modes is not None and len(pole) >= CROWD * modes and signals.shape[1] >= 8 * late
-    if crowd and 3 <= len(start_poles(signals[:, late:] / noise[:, None], sr, low, high)) < FEWER * len(pole):
-        found = joint_lines(signals[:, late:], sr, band_hz=band_hz, signed=signed)
-        back = np.exp((found.decay_per_s - 2j * np.pi * found.freq_hz) * late / sr)
-        return replace(found, amplitude=found.amplitude * back, amplitude_sd=found.amplitude_sd * np.abs(back))
+    pole = start_poles(signals / noise[:, None], sr, low, high)
+    for late in (round(t * sr) for t in LATE_S) if modes is not None and len(pole) >= CROWD * modes else ():
+        if signals.shape[1] >= 8 * late and 3 <= len(start_poles(signals[:, late:] / noise[:, None], sr, low, high)) < FEWER * len(pole):
+            found = joint_lines(signals[:, late:], sr, band_hz=band_hz, signed=signed)
+            back = np.exp((found.decay_per_s - 2j * np.pi * found.freq_hz) * late / sr)
+            return replace(found, amplitude=found.amplitude * back, amplitude_sd=found.amplitude_sd * np.abs(back))
     try:
         for _ in range(3):
             before = len(pole)
