@@ -41,6 +41,7 @@ class AddedMass:
     id: ClassVar[str] = "added-mass"
     stage: ClassVar[Stage] = Stage.MODES
     owner: ClassVar[Owner] = Owner.FIXTURE
+    costly: ClassVar[bool] = True
     reference: ClassVar[str] = "Rayleigh 1894, § 88-90"
 
     position_m: tuple[float, float, float]

@@ -10,6 +10,7 @@ Read off the recordings: what remains of them beside the model is the model agai
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -159,7 +160,8 @@ def _solved(x: Array, y: Array, lags: list[float], sr: int) -> tuple[Array, Arra
 def _sought(x: Array, rest: Array, sr: int, reach: int) -> tuple[float | None, float]:
     """The delay at which x explains most of what is left, to a sixteenth of a sample, and its strength."""
     size = 2 * len(x)
-    cross = np.fft.irfft(np.conj(np.fft.rfft(x, size)) * np.fft.rfft(rest, size), size)[:reach]
+    both = np.conj(np.fft.rfft(x, size)) * np.fft.rfft(rest, size)
+    cross = np.fft.irfft(both, size)[:reach]
     energy = np.cumsum((x**2)[::-1])[::-1]  # of what of x is still inside, once delayed
     inside = energy[0] - np.concatenate([[0.0], np.cumsum((x**2)[::-1])])[:reach]
     if not energy[0] > 0:
@@ -171,5 +173,14 @@ def _sought(x: Array, rest: Array, sr: int, reach: int) -> tuple[float | None, f
     i = int(gain.argmax())
     if gain[i] <= 0:
         return None, 0.0
-    best = max((float(_delayed(x, (i + f) / sr, sr) @ rest), f) for f in np.linspace(-1, 1, 33))
-    return (i + best[1]) / sr, best[0] / max(float(inside[i]), 1e-300)
+    between, turn = _between(size)
+    fine = (turn @ (both * np.exp(2j * np.pi * np.arange(len(both)) * i / size))).real * 2 / size  # <x later by (i + between)/sr, rest>
+    at = int(fine.argmax())
+    return (i + float(between[at])) / sr, float(fine[at]) / max(float(inside[i]), 1e-300)
+
+
+@lru_cache(maxsize=1)
+def _between(size: int) -> tuple[Array, Array]:
+    """Fractions of a sample (33,), and what turns a spectrum's products by each (33, b)."""
+    between = np.linspace(-1, 1, 33)
+    return between, np.exp(2j * np.pi * np.outer(between, np.arange(size // 2 + 1)) / size)
