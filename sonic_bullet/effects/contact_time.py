@@ -50,7 +50,8 @@ class ContactTime:
 
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
-        tables = [_table(h) for h in evidence.heard if len(h.freq_hz) >= 4]
+        fewest = 4 if evidence.known is None else 3  # lines: to look for it, and to fit it again without one of them
+        tables = [_table(h) for h in evidence.heard if len(h.freq_hz) >= fewest]
         if not tables:
             return None
         freq, level, told, heard, sd, most = (np.concatenate([t[i] for t in tables]) for i in range(6))
