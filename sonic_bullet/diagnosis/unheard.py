@@ -42,7 +42,7 @@ def _settled(h: Hypothesis, body: Struck) -> Struck:
     free = (body.line < 0) | shared  # modes that a mesh has put side by side may have taken one line where there are two
     correction = sought(h, body, np.flatnonzero(free), alone=body.line < 0)
     lines, line = body.gathered.lines.freq_hz, body.line.copy()
-    for j in np.flatnonzero(correction != body.correction):
+    for j in np.flatnonzero(correction != body.correction) if len(lines) else ():
         freq = body.model.freq_hz[j] * (1 + correction[j])
         width = (h.alpha_per_s + h.beta_s * (2 * np.pi * freq) ** 2) / (4 * np.pi)
         near = int(np.argmin(np.abs(lines - freq)))
