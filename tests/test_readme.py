@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 from sonic_bullet.files import read_audio, read_log
+from sonic_bullet.listener import disconnect
 
 REPO = Path(__file__).parents[1]
 README = (REPO / "README.md").read_text(encoding="utf-8")
@@ -53,7 +54,7 @@ def test_the_first_example_makes_sound_and_log(tmp_path: Path) -> None:
     log = read_log(tmp_path / "bar.npz")
     assert {body.material.name for body in log.bodies if body.material is not None} == {"wood", "steel"}
     assert names["client"].isConnected()
-    names["client"].disconnect()
+    disconnect(names["client"])
 
 
 def test_the_gymnasium_example_hears_the_hidden_steps() -> None:

@@ -59,6 +59,7 @@ def test_preset_plays_at_once(folder: Path, tmp_path: Path, capfd: pytest.Captur
     from pybullet_utils.bullet_client import BulletClient
 
     import sonic_bullet
+    from sonic_bullet.listener import disconnect
 
     client = BulletClient(pybullet.DIRECT)
     client.setGravity(0, 0, -9.81)
@@ -71,7 +72,7 @@ def test_preset_plays_at_once(folder: Path, tmp_path: Path, capfd: pytest.Captur
             client.stepSimulation()
             heard.append(listener.frame)
     assert max(float(np.abs(f).max()) for f in heard) > 1e-4
-    client.disconnect()
+    disconnect(client)  # its finaliser would end whoever has its id next
 
 
 def test_one_recording_of_undeclared_onset(folder: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:

@@ -104,6 +104,7 @@ def test_a_lost_connection_is_named_and_the_sound_so_far_stays(tmp_path: Path) -
     p.disconnect(raw)
     with pytest.raises(SceneError) as error:
         client.stepSimulation()
+    disconnect(client)  # or its finaliser ends whoever has its id next
     one_line(error)
     listener.write(tmp_path / "so_far.wav")
     assert np.abs(sb.read_audio(str(tmp_path / "so_far.wav"))[0]).max() > 0.01
