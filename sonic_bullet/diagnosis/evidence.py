@@ -51,7 +51,7 @@ def heard_of(h: Hypothesis, body: Struck) -> Heard:
     if gathered.signals is not None:
         predicted = np.stack([play(h, body, i, gathered.signals.shape[1], gathered.sr) for i in mine])
     count = body.surface_count(model)
-    return Heard(
+    heard = Heard(
         impulse_n_s=body.impulse_n_s[mine],
         freq_hz=lines.freq_hz[line],
         decay_per_s=lines.decay_per_s[line],
@@ -84,6 +84,15 @@ def heard_of(h: Hypothesis, body: Struck) -> Heard:
         strike=tuple(range(len(mine))),
         elastic=body.elastic,
     )
+    return outside(h, heard)
+
+
+def outside(h: Hypothesis, heard: Heard) -> Heard:
+    """The evidence with its lines as they would be outside the room that the hypothesis has found."""
+    for effect in h.effects:
+        if hasattr(effect, "dried"):
+            heard = effect.dried(heard)
+    return heard
 
 
 def paired(h: Hypothesis, body: Struck, model: ModalModel, order: Array) -> tuple[Array, tuple[Array, ...]]:
@@ -123,7 +132,7 @@ def _nearest(body: Struck, model: ModalModel) -> tuple[Array, tuple[Array, ...]]
 
 def path_response(h: Hypothesis, body: Struck, freq_hz: Array, sr: int) -> Array:
     """Complex response (f,) of the sound path's first milliseconds: its effects applied to a weak impulse less what they add to silence."""
-    effects = h.at(Stage.SOUND, fitted=body.gathered is not None)
+    effects = [e for e in h.at(Stage.SOUND, fitted=body.gathered is not None) if not hasattr(e, "dried")]  # lines are told as without those
     if not effects:
         return np.ones(len(freq_hz), complex)
     n = round(DIRECT_S * sr)

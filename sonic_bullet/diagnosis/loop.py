@@ -16,7 +16,7 @@ from sonic_bullet.diagnosis.bodies import Struck
 from sonic_bullet.diagnosis.evidence import evidence_of
 from sonic_bullet.diagnosis.judge import Judged, Take, least_db, mean_db
 from sonic_bullet.diagnosis.play import Hypothesis, moves, play
-from sonic_bullet.diagnosis.refit import ROUGH, refitted
+from sonic_bullet.diagnosis.refit import ROUGH, refitted, retold
 from sonic_bullet.diagnosis.trial import Candidate, trials
 from sonic_bullet.effects.values import Effect
 from sonic_bullet.estimator.distance import with_noise
@@ -82,6 +82,9 @@ def closed(
     if len(added) > 1:
         h, added = _pruned(h, added, bodies, takes, before - floor)
         now = mean_db(takes, h) or 0.0
+    again = retold(h, bodies)
+    if again is not h and (closer := mean_db(takes, again) or 0.0) < now:
+        h, now = again, closer
     gap, left = before - floor, now - floor
     verdict = "explained" if added else "none" if gap < SUFFICES_DB or gap < of_the_mesh(h, bodies, takes, seed) else "unexplained"
     if (

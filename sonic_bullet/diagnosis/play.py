@@ -2,7 +2,8 @@
 
     λ -> corrections -> d = ½(α + βλ) -> MODES -> A = g J (φ(p)·e)(φ(q)·n) · start -> Ring -> BANK -> hits and pulses -> SOUND -> samples
 
-Every stage hands a value to the next, and effects of a stage act in the order in which they were found.
+Every stage hands a value to the next, and effects of a stage act in the order in which they were found, those on a sound in that of its way: what
+rings along with the body is heard in the room, and both through the chain.
 """
 
 from __future__ import annotations
@@ -14,11 +15,12 @@ import numpy as np
 
 from sonic_bullet.diagnosis.bodies import Struck
 from sonic_bullet.effects.ringing import sounded
-from sonic_bullet.effects.values import CARRIES, Blow, Effect, Ring, Sound, Stage
+from sonic_bullet.effects.values import CARRIES, Blow, Effect, Owner, Ring, Sound, Stage
 from sonic_bullet.records import Array, ModalModel
 
 MOVES = frozenset({"added-mass", "mode-splitting", "orthotropy"})  # effects under which modes are no longer where they were
 LAST = frozenset({"added-mass"})  # of those, under which no mode keeps its own correction
+WAY = tuple(Owner)  # material, object, fixture, striker, room, chain: a sound's
 KEPT = 4  # hypotheses and bodies whose modes are remembered
 
 
@@ -38,7 +40,8 @@ class Hypothesis:
 
     def at(self, stage: Stage, *, fitted: bool = True) -> tuple[Effect, ...]:
         """The effects of a stage; on an object that was not fitted only those that carry over."""
-        return tuple(e for e in self.effects if e.stage is stage and (fitted or e.owner in CARRIES))
+        mine = (e for e in self.effects if e.stage is stage and (fitted or e.owner in CARRIES))
+        return tuple(sorted(mine, key=lambda e: WAY.index(e.owner)) if stage is Stage.SOUND else mine)
 
 
 def ordered(model: ModalModel, freq_hz: Array, decay_per_s: Array, shape: Array | None = None) -> tuple[ModalModel, Array]:

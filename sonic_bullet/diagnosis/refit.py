@@ -13,10 +13,11 @@ from dataclasses import replace
 import numpy as np
 
 from sonic_bullet.diagnosis.bodies import Struck
-from sonic_bullet.diagnosis.evidence import heard_of, paired, path_response
-from sonic_bullet.diagnosis.play import Hypothesis, modes_of, moves, undamped
+from sonic_bullet.diagnosis.evidence import heard_of, outside, paired, path_response
+from sonic_bullet.diagnosis.play import Hypothesis, modes_of, moves, play, undamped
 from sonic_bullet.diagnosis.unheard import can_tell, sought
 from sonic_bullet.effects.values import Blow, Heard, Stage
+from sonic_bullet.estimator.lines import noise_rms
 from sonic_bullet.estimator.pairing import MESHED, TWINS
 from sonic_bullet.estimator.rayleigh import rayleigh
 from sonic_bullet.records import Array
@@ -33,7 +34,22 @@ def refitted(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...]
         h = corrected(h, bodies)
     if heard is None or moved:
         heard = tuple(heard_of(replace(h, effects=tuple(e for e in h.effects if e.stage is not Stage.SOUND)), b) for b in bodies if b.gathered is not None)
+    heard = tuple(outside(h, one) for one in heard)
     return _gained(_damped(h, bodies, heard), bodies, heard)
+
+
+def retold(h: Hypothesis, bodies: tuple[Struck, ...]) -> Hypothesis:
+    """The hypothesis with a room's response told again, beside all that has been found."""
+    fitted = [b for b in bodies if b.gathered is not None]
+    for room in (e for e in h.effects if hasattr(e, "told_by")):
+        body = max(fitted, key=lambda b: len(b.gathered.lines.freq_hz))  # type: ignore[union-attr]
+        assert body.gathered is not None and body.gathered.signals is not None
+        signal, sr = body.gathered.signals, body.gathered.sr
+        bare = replace(h, effects=tuple(e for e in h.effects if e is not room))
+        sound = np.stack([play(bare, body, i, signal.shape[1], sr) for i in body.fitted])
+        again = room.told_by(signal, sound, noise_rms(signal, sr), sr)
+        h = replace(h, effects=tuple(again if e is room else e for e in h.effects))
+    return h
 
 
 def corrected(h: Hypothesis, bodies: tuple[Struck, ...]) -> Hypothesis:

@@ -7,8 +7,9 @@
     SOUND     Sound      -> Sound         what happens on the way to the file
 
 An effect is physics with few parameters. `propose` reads them off the evidence, or says None; it never scores itself: the diagnosis
-renders strikes that were not fitted, with and without it. An effect that hides the modes' own decays or levels from the lines (a room, friction)
-carries alpha_per_s, beta_s and gain as it found them beside itself; the host takes those over.
+renders strikes that were not fitted, with and without it. An effect that hides the modes' own decays or levels from the lines either carries
+alpha_per_s, beta_s and gain as it found them beside itself, and the host takes those over (friction), or has a method `dried`, Heard -> Heard: the same
+lines as they would be without it (a room), and the host tells everything else from those.
 """
 
 from __future__ import annotations
@@ -147,6 +148,7 @@ class Heard:
     plain: ModalModel | None  # `model` with the mesh's own frequencies
     strike: tuple[int, ...] = ()
     elastic: Elastic | None = None
+    dry: bool = False  # whether lines are told as they would be without the room they were recorded in
 
     @property
     def residual(self) -> Array:
