@@ -97,12 +97,12 @@ def late(h: Heard, known: float | None = None) -> tuple[float, float] | None:
     """δ, w; None where the lines' late decays are not one. known: δ as the whole evidence has it, to be told again near by."""
     lines = np.sort(np.argsort(-np.abs(h.amplitude).max(axis=0))[:LINES])
     rates = known * np.exp(2 * FINE[::2]) if known else RATES
-    r = tails.read(h, rates, lines)
+    r = tails.modes(h, rates, lines, every=1 if known else 2)
     best = int(_agreed(r).argmax())
     if not known:
         if best in (0, len(rates) - 1) or not _one(r, best):
             return None
-        r = tails.read(h, rates[best] * np.exp(FINE), lines)
+        r = tails.modes(h, rates[best] * np.exp(FINE), lines)
         best = int(_agreed(r).argmax())
     mine = r.decay_per_s[best] > FASTER * r.delta[best]
     return float(r.delta[best]), float(np.median(r.wet[best][mine] if mine.any() else r.wet[best]))

@@ -9,7 +9,9 @@ z is the line's baseband over all strikes at once, in short frames: weighted wit
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -21,8 +23,9 @@ FRAME_S = 0.012
 DENSE, FRAMES = 24, 56  # frames one after another, then ever farther apart
 NODES = 8  # of a window's quadrature
 DECAYS = np.geomspace(2.0, 600.0, 25)
-SHARES = np.geomspace(1e-3, 4.0, 10)  # |A|² w² over what the first frame suggests |A|² to be
-SHIFTS = 25
+SHARES = np.geomspace(1e-3, 4.0, 9)  # |A|² w² over what the first frame suggests |A|² to be
+SHIFTS = 21
+FAINT = 1e-25  # of the direct sound's power
 PATTERN = 0.03  # of a line's strongest: what shapes are wrong by
 SURE = 0.1  # of a decay and of an amplitude: the tail's early echoes are no noise
 
@@ -45,49 +48,73 @@ class Read:
     wet: Array
 
 
-def read(h: Heard, delta: Array, lines: Array) -> Read:
-    """Some of an object's lines (k,), by index, at some δ (t,)."""
+def read(h: Heard, delta: Array, freq_hz: Array, own: Array, members: Sequence[Array], *, every: int = 1) -> Read:
+    """Lines at freq_hz (k,) at some δ (t,). own (s, k): what A is told in units of, complex; members: the modes that each is, so that others are its neighbours.
+
+    every: of the decays how many are looked at, for a first look.
+    """
     assert h.signal is not None
     start, window = _frames(h)
-    z, noise = _basebands(h, lines, start, window)
-    time = start / h.sr
-    same = _overlap(start, window)
-    value, vector = np.linalg.eigh(same)
-    white = (vector / np.sqrt(value)) @ vector.T
-    node = (np.arange(NODES) + 0.5) / NODES * FRAME_S
-    weight = np.hanning(NODES + 2)[1:-1]
-    rows = [[_at(z, noise, time, node, weight / weight.sum(), white, d, float(one), h.sr) for d in DECAYS] for one in delta]
-    return _summed(delta, rows)
+    z, noise = _basebands(h, freq_hz, own, members, start, window)
+    time = tuple((start / h.sr).tolist())
+    rows = [[_at(z, noise, time, float(d), float(one)) for d in DECAYS[::every]] for one in delta]
+    return _summed(delta, DECAYS[::every], rows)
+
+
+def modes(h: Heard, delta: Array, lines: Array, *, every: int = 1) -> Read:
+    """Some of an object's lines (k,), by index, in units of what the model so far says of them."""
+    return read(h, delta, h.freq_hz[lines], told(h)[:, lines], [h.mode[k] for k in lines], every=every)
+
+
+def told(h: Heard) -> Array:
+    """What the model so far says of the lines (s, k), complex."""
+    return np.stack([h.push[:, m].sum(axis=1) for m in h.mode], axis=1)
+
+
+@lru_cache(maxsize=4)
+def through(h: Heard, delta: float) -> Read:
+    """All lines of an object at one δ; remembered, as evidence is asked for it more than once."""
+    return modes(h, np.array([delta]), np.arange(len(h.freq_hz)))
 
 
 def dried(h: Heard, delta: float) -> Heard:
-    """The same with frequencies, decays and amplitudes of the lines as they would be without the tail. No value for lines it has buried."""
-    lines = np.arange(len(h.freq_hz))
-    if h.dry or h.signal is None or not len(lines):
+    """The same with frequencies, decays and amplitudes of all lines as they would be without the tail; those that are no mode go with the impulse."""
+    if h.dry or h.signal is None or not len(h.freq_hz):
         return h
-    r = read(h, np.array([delta]), lines)
-    decay, sd = r.decay_per_s[0], np.hypot(r.ln_sd[0], SURE) * r.decay_per_s[0]
-    told = _own(h, lines)
-    now = (np.conj(told) * h.amplitude).sum(axis=0) / (np.abs(told) ** 2).sum(axis=0)
-    factor = r.amplitude[0] / np.where(now == 0, 1, now)
-    spread = np.hypot(h.amplitude_sd * np.abs(factor), np.abs(told) * np.hypot(r.amplitude_sd[0], SURE * np.abs(r.amplitude[0])))
-    return replace(
+    r = through(h, delta)
+    amplitude, spread = _rescaled(r, told(h), h.amplitude, h.amplitude_sd)
+    decay = r.decay_per_s[0]
+    dry = replace(
         h,
         freq_hz=h.freq_hz + r.shift_hz[0],
         decay_per_s=decay,
         freq_sd_hz=np.hypot(h.freq_sd_hz, decay / (2 * np.pi) * r.ln_sd[0]),
-        decay_sd_per_s=sd,
-        amplitude=h.amplitude * factor,
+        decay_sd_per_s=np.hypot(r.ln_sd[0], SURE) * decay,
+        amplitude=amplitude,
         amplitude_sd=spread,
         dry=True,
     )
+    if not len(h.foreign_hz):
+        return dry
+    level = np.where(np.isfinite(h.impulse_n_s), h.impulse_n_s, 1.0)
+    alone = np.repeat(level[:, None], len(h.foreign_hz), axis=1).astype(complex)
+    r = read(h, np.array([delta]), h.foreign_hz, alone, [np.zeros(0, int)] * len(h.foreign_hz))
+    amplitude, spread = _rescaled(r, alone, h.foreign_amplitude, h.foreign_sd)
+    return replace(dry, foreign_hz=h.foreign_hz + r.shift_hz[0], foreign_decay_per_s=r.decay_per_s[0], foreign_amplitude=amplitude, foreign_sd=spread)
+
+
+def _rescaled(r: Read, own: Array, amplitude: Array, sd: Array) -> tuple[Array, Array]:
+    """Amplitudes and spreads (s, k) with what all strikes have in common read anew."""
+    now = (np.conj(own) * amplitude).sum(axis=0) / np.maximum((np.abs(own) ** 2).sum(axis=0), 1e-300)
+    factor = r.amplitude[0] / np.where(now == 0, 1, now)
+    common = np.abs(own) * np.hypot(r.amplitude_sd[0], SURE * np.abs(r.amplitude[0]))
+    return amplitude * factor, np.hypot(sd * np.abs(factor), common)
 
 
 def direct(h: Heard, delta: float) -> Array:
     """What the strikes (s, n) would sound like without the tail: the lines' modes as they are read, the others as the nearest of those."""
     assert h.signal is not None
-    lines = np.arange(len(h.freq_hz))
-    r = read(h, np.array([delta]), lines)
+    r = through(h, delta)
     near = np.abs(np.log(h.all_hz[:, None] / h.freq_hz)).argmin(axis=1)
     shift = np.zeros(len(h.all_hz))
     for k, members in enumerate(h.mode):
@@ -109,70 +136,76 @@ def _frames(h: Heard) -> tuple[Array, Array]:
     return hop * np.unique(np.concatenate([dense, sparse])), window / window.sum()
 
 
-def _own(h: Heard, lines: Array) -> Array:
-    """What the model so far says of the lines (s, k), complex."""
-    return np.stack([h.push[:, h.mode[k]].sum(axis=1) for k in lines], axis=1)
-
-
-def _basebands(h: Heard, lines: Array, start: Array, window: Array) -> tuple[Array, Array]:
-    """Frames (k, n) of every line in units of the model's own amplitude, and the noise's variance there (k,)."""
+def _basebands(h: Heard, freq: Array, own: Array, members: Sequence[Array], start: Array, window: Array) -> tuple[Array, Array]:
+    """Frames (k, n) of every line in units of its own, and the noise's variance there (k,)."""
     assert h.signal is not None
     at = np.arange(len(window)) / h.sr
     piece = h.signal[:, start[:, None] + np.arange(len(window))] * window
-    freq = h.freq_hz[lines]
     spectrum = 2 * np.einsum("snt,tk->ksn", piece, np.exp(-2j * np.pi * np.outer(at, freq)), optimize=True)
     spectrum *= np.exp(-2j * np.pi * freq[:, None] * start / h.sr)[:, None, :]
-    own = _own(h, lines)
     mixed, noise = [], []
-    level = np.broadcast_to(h.noise, (h.signal.shape[0],))
-    for i, k in enumerate(lines):
-        other = np.setdiff1d(np.flatnonzero(np.abs(h.all_hz - freq[i]) < 2 / FRAME_S), h.mode[k])
+    for i, mine in enumerate(members):
+        other = np.setdiff1d(np.flatnonzero(np.abs(h.all_hz - freq[i]) < 2 / FRAME_S), mine)
         through = np.abs(window @ np.exp(2j * np.pi * np.outer(at, h.all_hz[other] - freq[i])))
         near = h.push[:, other] * through
         size = float(np.linalg.norm(own[:, i]))
-        spread = near @ near.conj().T + (PATTERN * size) ** 2 * np.eye(len(own)) + 1e-300 * np.eye(len(own))
+        spread = near @ near.conj().T + ((PATTERN * size) ** 2 + 1e-300) * np.eye(len(own))
         row = np.linalg.solve(spread, own[:, i]).conj()
         row = row / (row @ own[:, i]) if size else np.zeros(len(own))
         mixed.append(row @ spectrum[i])
-        noise.append(4 * (np.abs(row) ** 2 * level**2).sum() * (window**2).sum())
+        noise.append(4 * (np.abs(row) ** 2 * np.broadcast_to(h.noise, len(own)) ** 2).sum() * (window**2).sum())
     return np.array(mixed), np.maximum(np.array(noise), 1e-300)
 
 
-def _overlap(start: Array, window: Array) -> Array:
-    """Correlation (n, n) of white noise in two frames."""
-    whole = np.correlate(window, window, "full")
-    lag = np.abs(start[:, None] - start[None, :])
-    mine = np.where(lag < len(window), whole[np.minimum(lag, len(window) - 1) + len(window) - 1], 0.0)
-    return np.asarray(mine / whole[len(window) - 1])
+@lru_cache(maxsize=4)
+def _whitener(time: tuple[float, ...]) -> Array:
+    """What makes white noise in the frames uncorrelated (n, n)."""
+    value, vector = np.linalg.eigh(_overlap(np.array(time)))
+    return np.asarray((vector / np.sqrt(np.maximum(value, 1e-6))) @ vector.T)
 
 
-def _tail(time: Array, node: Array, weight: Array, decay: float, delta: float) -> tuple[Array, Array]:
-    """Frames (n,) of e^{−dt}, and the covariance (n, n) of a tail's of unit wet."""
-    t = (time[:, None] + node).ravel()
+def _overlap(time: Array) -> Array:
+    """Correlation (n, n) of white noise in two frames: of Hann windows at a distance u of their length, (1 − u)(2 + cos 2πu)/3 + sin 2πu/2π [Harris 1978, eq. 9]."""
+    u = np.minimum(np.abs(time[:, None] - time[None, :]) / FRAME_S, 1.0)
+    return np.asarray(((1 - u) * (2 + np.cos(2 * np.pi * u)) + 1.5 / np.pi * np.sin(2 * np.pi * u)) / 3)
+
+
+@lru_cache(maxsize=1500)
+def _tail(time: tuple[float, ...], decay: float, delta: float) -> tuple[Array, Array, Array]:
+    """What a decay and a rate say of frames (n,), whatever the line: their first mean, variances (n,) of a tail of unit wet along uncorrelated
+    directions, for white noise of unit variance, and the frames' means and directions there (n, 1 + n)."""
+    at = np.array(time)
+    node, weight = (np.arange(NODES) + 0.5) / NODES * FRAME_S, np.hanning(NODES + 2)[1:-1]
+    weight = weight / weight.sum()
+    t = (at[:, None] + node).ravel()
     gap = 2 * (decay - delta)
     gap = gap if abs(gap) > 1e-3 else 1e-3
     var = 2 * delta * (np.exp(-2 * delta * t) - np.exp(-2 * decay * t)) / gap
-    early = np.minimum(np.arange(len(t))[:, None], np.arange(len(t))[None, :])
-    early = np.where(t[:, None] < t[None, :], np.arange(len(t))[:, None], np.arange(len(t))[None, :])
-    both = np.exp(-decay * np.abs(t[:, None] - t[None, :])) * var[early]
-    both = (both.reshape(len(time), len(node), len(time), len(node)) * weight[:, None, None] * weight).sum(axis=(1, 3))
-    return np.exp(-decay * (time[:, None] + node)) @ weight, both
-
-
-def _at(z: Array, noise: Array, time: Array, node: Array, weight: Array, white: Array, decay: float, delta: float, sr: int) -> tuple[Array, ...]:
-    """For every line: ln likelihood (k, w), A, its sd, Δf at its best and w, each (k, w), at one decay and one δ."""
-    mean, both = _tail(time, node, weight, decay, delta)
+    both = np.exp(-decay * np.abs(t[:, None] - t[None, :])) * np.where(t[:, None] < t[None, :], var[:, None], var[None, :])
+    both = weight @ both.reshape(len(at), NODES, -1)
+    both = both.reshape(len(at), len(at), NODES) @ weight
+    both[both < FAINT] = 0.0  # or the solver works on numbers that processors are a hundred times slower with
+    white = _whitener(time)
     value, vector = np.linalg.eigh(white @ both @ white)
+    mean = np.exp(-decay * (at[:, None] + node)) @ weight
     turn = vector.T @ white
-    half = min(max(2 * max(decay, delta) / np.pi, 2.0), 0.4 / (time[1] - time[0]))
+    return mean[0], np.maximum(value, 0), np.column_stack([turn @ mean, turn])
+
+
+def _at(z: Array, noise: Array, time: tuple[float, ...], decay: float, delta: float) -> tuple[Array, ...]:
+    """For every line: ln likelihood (k, w), A, its sd, Δf at its best and w, each (k, w), at one decay and one δ."""
+    mean, value, turn = _tail(time, decay, delta)
+    at = np.array(time)
+    half = min(max(2 * max(decay, delta) / np.pi, 2.0), 0.4 / (at[1] - at[0]))
     shift = np.linspace(-half, half, SHIFTS)
-    moved = z[:, :, None] * np.exp(-2j * np.pi * time[:, None] * shift)
-    b, m = turn @ moved, turn @ mean  # (k, n, Δ), (n,)
-    first = np.abs(z[:, 0] / mean[0]) ** 2
-    scale = first[:, None] * SHARES  # (k, w): |A|² w²
-    over = 1 / (scale[:, :, None] * np.maximum(value, 0) + noise[:, None, None])  # (k, w, n)
-    power, cross, size = over @ np.abs(b) ** 2, (over * m) @ b, over @ m**2  # (k, w, Δ), (k, w, Δ), (k, w)
-    best = (power - np.abs(cross) ** 2 / size[:, :, None]).argmin(axis=2)
+    moved = z[:, :, None] * np.exp(-2j * np.pi * at[:, None] * shift)
+    m, b = turn[:, 0], turn[:, 1:] @ moved.view(float).reshape(len(z), len(at), -1)  # (n,), (k, n, Δ) real and imaginary side by side
+    b = b.view(complex)
+    scale = (np.abs(z[:, 0] / mean) ** 2)[:, None] * SHARES  # (k, w): |A|² w²
+    over = 1 / (scale[:, :, None] * value + noise[:, None, None])  # (k, w, n)
+    power, size = over @ (b.real**2 + b.imag**2), over @ m**2  # (k, w, Δ), (k, w)
+    cross = ((over * m) @ b.view(float)).view(complex)
+    best = (power - (cross.real**2 + cross.imag**2) / size[:, :, None]).argmin(axis=2)
     pick = np.take_along_axis(cross, best[:, :, None], axis=2)[:, :, 0]
     left = np.take_along_axis(power, best[:, :, None], axis=2)[:, :, 0] - np.abs(pick) ** 2 / size
     amplitude = pick / size
@@ -180,7 +213,7 @@ def _at(z: Array, noise: Array, time: Array, node: Array, weight: Array, white: 
     return -left + np.log(over).sum(axis=2), amplitude, 1 / np.sqrt(size), shift[best], wet
 
 
-def _summed(delta: Array, rows: list[list[tuple[Array, ...]]]) -> Read:
+def _summed(delta: Array, decays: Array, rows: list[list[tuple[Array, ...]]]) -> Read:
     """Over decays and wets: means of ln d, the rest at the likeliest."""
     like, amplitude, sd, shift, wet = (np.array([[one[i] for one in row] for row in rows]) for i in range(5))  # (t, d, k, w)
     t, _, k, _ = like.shape
@@ -188,12 +221,12 @@ def _summed(delta: Array, rows: list[list[tuple[Array, ...]]]) -> Read:
     share = np.exp(like - top)
     by_decay = share.sum(axis=3)
     total = by_decay.sum(axis=1)
-    mean = np.einsum("tdk,d->tk", by_decay, np.log(DECAYS)) / total
-    square = np.einsum("tdk,d->tk", by_decay, np.log(DECAYS) ** 2) / total
+    mean = np.einsum("tdk,d->tk", by_decay, np.log(decays)) / total
+    square = np.einsum("tdk,d->tk", by_decay, np.log(decays) ** 2) / total
     flat = like.transpose(0, 2, 1, 3).reshape(t, k, -1)
     best = flat.argmax(axis=2)[:, :, None]
     at = [np.take_along_axis(x.transpose(0, 2, 1, 3).reshape(t, k, -1), best, axis=2)[:, :, 0] for x in (amplitude, sd, shift, wet)]
     plain = like[:, :, :, 0].max(axis=(0, 1))
-    step = np.log(DECAYS[1] / DECAYS[0])
+    step = np.log(decays[1] / decays[0])
     ln_sd = np.sqrt(np.maximum(square - mean**2, 0) + step**2 / 12)
     return Read(delta, top[:, 0, :, 0] + np.log(total), plain, np.exp(mean), ln_sd, at[2], at[0], at[1], at[3])

@@ -1,0 +1,106 @@
+"""Lines in a room: what a tail makes of a mode, taken back; and what is told of other effects beside it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from made_body import ALPHA, BETA, recorded, truth
+from test_found_again import BAND, fitted
+
+from sonic_bullet.diagnosis.evidence import evidence_of, heard_of, outside
+from sonic_bullet.diagnosis.refit import refitted
+from sonic_bullet.effects import tails
+from sonic_bullet.effects.contact_time import ContactTime
+from sonic_bullet.effects.damping_law import DampingLaw
+from sonic_bullet.effects.foreign_mode import ForeignMode
+from sonic_bullet.effects.measurement_chain import MeasurementChain
+from sonic_bullet.effects.room import RT60, Room, late
+from sonic_bullet.effects.values import Stage
+
+
+def test_the_covariance_of_a_driven_tail() -> None:
+    """`_tail`'s closed form against ten thousand tails drawn tap by tap and rung through the mode."""
+    decay, delta, step, n = 40.0, 9.0, 5e-4, 240
+    rng = np.random.default_rng(2)
+    t = (np.arange(n) + 0.5) * step
+    tap = rng.standard_normal((10_000, n)) * np.sqrt(2 * delta * step) * np.exp(-delta * t)
+    ring = np.exp(-decay * (t[:, None] - t)) * (t[:, None] >= t)
+    r = tap @ ring.T
+    start = np.array([0.0, 0.012, 0.03, 0.06, 0.09])
+    window = np.hanning(26)[1:-1]
+    frame = np.stack([r[:, round(s / step) : round(s / step) + 24] @ (window / window.sum()) for s in start], axis=1)
+    drawn = frame.T @ frame / len(frame)
+    _, value, turn = tails._tail(tuple(start.tolist()), decay, delta)
+    back = np.linalg.inv(turn[:, 1:])
+    told = back @ np.diag(value) @ back.T
+    assert np.allclose(told, drawn, rtol=0.06, atol=0.02 * drawn.max())
+
+
+def test_modes_read_through_a_room() -> None:
+    """Decays and gains that a strong room hides from the lines come back within the spreads said."""
+    body = recorded(Room(0.9, 0.9, 4), seconds=1.2)
+    heard = heard_of(truth(), body)
+    dry = tails.dried(heard, RT60 / 0.9)
+    own = 0.5 * (ALPHA + BETA * dry.omega**2)
+    off = np.log(dry.decay_per_s / own)
+    assert np.abs(off).mean() < 0.4 * np.abs(np.log(heard.decay_per_s / own)).mean()
+    assert np.sqrt(np.mean((off / (dry.decay_sd_per_s / dry.decay_per_s)) ** 2)) < 1.6
+    size = np.abs(dry.amplitude).max(axis=0) / np.abs(dry.expected).max(axis=0)
+    assert np.exp(np.abs(np.log(size)).mean()) < 1.35
+    assert tails.dried(dry, 5.0) is dry  # what is dry stays as it is
+
+
+@pytest.mark.parametrize("rt60", [0.5, 0.8, 1.6])
+def test_the_rate_of_a_room(rt60: float) -> None:
+    found = late(heard_of(truth(), recorded(Room(rt60, 0.5, 8), seconds=1.2)))
+    assert found is not None
+    assert RT60 / found[0] == pytest.approx(rt60, rel=0.12)
+    assert found[1] == pytest.approx(0.5, rel=0.35)
+
+
+@pytest.mark.parametrize(
+    "effect",
+    [
+        DampingLaw("constant-loss", 6e-3),
+        ForeignMode((1000.0, 2610.0), (11.0, 25.0), (1.2, 0.9), (0.3, -1.0)),
+        MeasurementChain(hum_hz=50.0, hum_amplitude=(0.01, 0.005), hum_phase_rad=(0.0, 1.0)),
+    ],
+    ids=lambda e: e.id,
+)
+def test_no_room_where_none_is(effect: object) -> None:
+    body = recorded(effect)  # type: ignore[arg-type]
+    assert late(heard_of(refitted(fitted(body), (body,)), body)) is None
+
+
+@pytest.mark.parametrize(
+    ("other", "parameter", "within"),
+    [(ContactTime(4e-4, 0.016, 0.0, "half-sine"), "tau_s", 0.15), (DampingLaw("constant-loss", 2e-2), "eta", 0.2)],
+    ids=["contact-time", "damping-law"],
+)
+def test_another_effect_is_told_beside_a_room(other: ContactTime | DampingLaw, parameter: str, within: float) -> None:
+    """From lines as the room made them it is not, or not with its own number."""
+    body = recorded(other, Room(0.9, 0.8, 11), seconds=1.2)
+    base = refitted(fitted(body), (body,))
+    room = Room.propose(evidence_of(base, (body,), BAND))
+    assert room is not None
+    assert room.rt60_s == pytest.approx(0.9, rel=0.12)
+    beside = refitted(replace(base, effects=(room,)), (body,), evidence_of(base, (body,), BAND).heard)
+    found = type(other).propose(evidence_of(beside, (body,), BAND))
+    assert found is not None
+    assert found.parameters()[parameter] == pytest.approx(other.parameters()[parameter], rel=within)
+
+
+def test_what_rings_along_is_heard_in_the_room_and_both_through_the_chain() -> None:
+    """However they were found: a sound takes its own way."""
+    chain, room, lodger = MeasurementChain(high_pass_hz=900.0), Room(0.5, 0.5, 3), ForeignMode((1000.0,), (9.0,), (1.0,), (0.0,))
+    assert [e.id for e in truth(chain, room, lodger).at(Stage.SOUND)] == ["foreign-mode", "room", "measurement-chain"]
+
+
+def test_lines_are_dried_once() -> None:
+    body = recorded(Room(0.9, 0.9, 4), seconds=1.2)
+    h = truth(Room(0.9, 0.9, 4))
+    heard = heard_of(h, body)
+    assert heard.dry
+    assert outside(h, heard) is heard
