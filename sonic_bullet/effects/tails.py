@@ -214,7 +214,7 @@ def _at(z: Array, noise: Array, time: tuple[float, ...], decay: float, delta: fl
 
 
 def _summed(delta: Array, decays: Array, rows: list[list[tuple[Array, ...]]]) -> Read:
-    """Over decays and wets: means of ln d, the rest at the likeliest."""
+    """Over decays and wets: means of ln d and ln w, the rest at the likeliest."""
     like, amplitude, sd, shift, wet = (np.array([[one[i] for one in row] for row in rows]) for i in range(5))  # (t, d, k, w)
     t, _, k, _ = like.shape
     top = like.max(axis=(1, 3), keepdims=True)
@@ -225,8 +225,9 @@ def _summed(delta: Array, decays: Array, rows: list[list[tuple[Array, ...]]]) ->
     square = np.einsum("tdk,d->tk", by_decay, np.log(decays) ** 2) / total
     flat = like.transpose(0, 2, 1, 3).reshape(t, k, -1)
     best = flat.argmax(axis=2)[:, :, None]
-    at = [np.take_along_axis(x.transpose(0, 2, 1, 3).reshape(t, k, -1), best, axis=2)[:, :, 0] for x in (amplitude, sd, shift, wet)]
+    at = [np.take_along_axis(x.transpose(0, 2, 1, 3).reshape(t, k, -1), best, axis=2)[:, :, 0] for x in (amplitude, sd, shift)]
+    wettest = np.exp((share * np.log(np.maximum(wet, 1e-300))).sum(axis=(1, 3)) / total)
     plain = like[:, :, :, 0].max(axis=(0, 1))
     step = np.log(decays[1] / decays[0])
     ln_sd = np.sqrt(np.maximum(square - mean**2, 0) + step**2 / 12)
-    return Read(delta, top[:, 0, :, 0] + np.log(total), plain, np.exp(mean), ln_sd, at[2], at[0], at[1], at[3])
+    return Read(delta, top[:, 0, :, 0] + np.log(total), plain, np.exp(mean), ln_sd, at[2], at[0], at[1], wettest)

@@ -76,7 +76,7 @@ def test_no_room_where_none_is(effect: object) -> None:
 
 @pytest.mark.parametrize(
     ("other", "parameter", "within"),
-    [(ContactTime(4e-4, 0.016, 0.0, "half-sine"), "tau_s", 0.15), (DampingLaw("constant-loss", 2e-2), "eta", 0.2)],
+    [(ContactTime(4e-4, 0.016, 0.0, "half-sine"), "tau_s", 0.15), (DampingLaw("constant-loss", 8e-3), "eta", 0.2)],
     ids=["contact-time", "damping-law"],
 )
 def test_another_effect_is_told_beside_a_room(other: ContactTime | DampingLaw, parameter: str, within: float) -> None:
