@@ -16,7 +16,8 @@ import numpy as np
 
 from sonic_bullet.effects.dashpots import damped
 from sonic_bullet.effects.points import nearest, vertex_normals
-from sonic_bullet.effects.support_trial import NEARER, Dashpot, Trial
+from sonic_bullet.effects.support_search import NEARER, refined, sought, tuned
+from sonic_bullet.effects.support_trial import Dashpot, Trial
 from sonic_bullet.effects.values import Evidence, Owner, Stage
 from sonic_bullet.records import Array, ModalModel
 
@@ -60,8 +61,8 @@ class SupportDamping:
             return None
         trial = Trial.of(heard)
         if isinstance(evidence.known, cls):
-            return cls._of(trial, trial.refined(evidence.known._on(heard.model), NEARER[-2:])[1])
-        found = trial.sought()
+            return cls._of(trial, tuned(trial, refined(trial, evidence.known._on(heard.model), NEARER[-2:])[1]))
+        found = sought(trial)
         return cls._of(trial, found) if found else None
 
     @classmethod

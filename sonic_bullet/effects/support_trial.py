@@ -2,15 +2,16 @@
 
     price_kj = (Δln f/w)²/18 + (Δln d/e)²/18 + 1 − c_kj, at most 1;   Σ worth_k (price − 1) -> min over one-to-one pairs       [Kuhn 1955; Crouse 2016]
     d_k = Δ_k(dashpots) + law(ω_k),  law = ½(a + bω + cω²) or as it is, a, b, c >= 0, refitted beside every trial by Huber's loss
-    left = Σ_k worth_k ρ((d_k − Δ_k − law)/σ_k),  σ = SCATTER d;  lines that no mode explains count as outliers
+    left = Σ_k worth_k [ρ((d_k − Δ_k − law)/SCATTER d_k) + (1 − C_k²)/ROUGH²], each bounded;  lines that no mode explains count as outliers
 
-c: cosine of a line's amplitudes over the strikes with what one exponential at the mode's pole would take of all modes:
-A_j = Σ_i a_i 2d_j/((d_i + d_j) − i(ω_i − ω_j)): modes that sound as one line are one, those that a dashpot has told apart are not.
+c_kj: cosine of a line's amplitudes over the strikes with what one exponential at the mode's pole would take of all modes,
+Σ_i a_i 2d_j/((d_i + d_j) − i(ω_i − ω_j)), or with the mode's own. C_k: with what exponentials at the lines' poles take of all modes together
+(variable projection's linear half [Golub & Pereyra 1973]): modes that sound as one line are one, those that a dashpot has told apart are not.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -25,14 +26,7 @@ WIDTH, DECADE = 0.004, 0.4  # of ln f and ln d, of a pair
 MISSED = 9.0  # what a line costs that nothing explains: three spreads, as Huber's loss has its bend there
 WEAK, HALF = 0.05, 0.5  # of the worth of a line that the model does not expect: it may be a click or another body's; near a mode, its twin
 LOW = 0.3  # of a line's spread where it lies under the least law
-POINTS = 90
-STEPS = (0.06, 0.25, 1.0, 4.0, 16.0)  # of the strength that doubles the typical decay
-FINER, COARSER = (0.6, 0.8, 0.92, 1.08, 1.25, 1.6), (0.1, 0.3, 3.0, 10.0)
-LOOKED, STARTS, NEAR = 40, 4, 14  # of the grid, looked at closer; refined; vertices of a turn about one
-NEARER = (0.12, 0.07, 0.04, 0.02)  # turns, in sizes of the body
 RUN = 10  # modes whose coupling is reckoned with in a first look
-MOST = 4
-BETTER = 6.0  # in BIC, for another dashpot
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +43,10 @@ Dashpots = tuple[Dashpot, ...]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Trial:
-    """An object's lines (k,) and modes (m,). size (s, k) complex, worth (k,); push (s, m): J φ(p)·e φ(q)·n of strikes in parts; shape, normal of all vertices."""
+    """An object's lines (k,) and modes (m,). size (s, k) complex, worth (k,); into (s, m): J φ(p)·e of the strikes; out (m,): φ(q)·n of the sensor.
+
+    normal (v, 3) of all vertices, body: those of the surface. runs: neighbours that may couple; least (3,): the law that most lines lie above.
+    """
 
     freq_hz: Array
     decay_per_s: Array
@@ -74,6 +71,8 @@ class Trial:
         sd = np.concatenate([h.decay_sd_per_s, lone])
         every = np.concatenate([h.freq_hz, h.foreign_hz])
         index = np.array([int(np.flatnonzero(every == f)[0]) for f in freq], int)
+        good = np.isfinite(decay) & (decay > 0)
+        freq, size, decay, index = freq[good], size[:, good], decay[good], index[good]
         told = index < len(h.freq_hz)
         at_home = np.abs(np.log(freq[:, None] / x.freq_hz)).min(axis=1) < WIDTH
         strength = np.nan_to_num(size).max(axis=0)
@@ -100,85 +99,15 @@ class Trial:
             _least_law(h.omega, h.decay_per_s),
         )
 
-    def sought(self) -> Dashpots:
-        """The dashpots that earn their place, one after another; the least Bayes information criterion says how many, with BETTER for each on top."""
-        data = 2 * len(self.freq_hz)  # a decay and a pattern each
-        chosen: Dashpots = ()
-        left = self.left(chosen)
-        tried = [(data * np.log(max(left, 1e-9)), chosen)]
-        if left < self.worth.sum():  # within the spreads: nothing to look for
-            return chosen
-        grid = [Dashpot(int(v), c, way) for v in self._spread(POINTS) for c in self._strengths().tolist() for way in ("normal", "every")]
-        while len(chosen) < MOST:
-            trials = [(*chosen, d) for d in grid]
-            few = self._best([self._price(*modes) for modes in self._roughly(trials)], trials, LOOKED)
-            few = self._best([self._left(*modes, 1) for modes in self._roughly(few)], few, STARTS)
-            starts = [self.refined(one, NEARER[:2]) for one in few]
-            best = self.refined(min(starts, key=lambda pair: pair[0])[1], (np.inf, *NEARER))[1]
-            chosen = min(best, self.refined(best, NEARER[-1:], whole=True)[1], key=self.left)
-            tried.append((data * np.log(max(self.left(chosen), 1e-9)) + len(chosen) * (3 * np.log(data) + BETTER), chosen))
-            enough = min(range(len(tried)), key=lambda i: tried[i][0])
-            if enough < len(chosen) and (enough > 0 or len(chosen) > 1):  # two may show where neither does alone
-                break
-        return min(tried, key=lambda pair: pair[0])[1]
-
-    @staticmethod
-    def _best(price: list[float], trials: list[Dashpots], count: int) -> list[Dashpots]:
-        """The few at the least price, the last dashpot of each at its own vertex."""
-        found: dict[int, Dashpots] = {}
-        for i in np.argsort(price, kind="stable"):
-            found.setdefault(trials[i][-1].vertex, trials[i])
-        return list(found.values())[:count]
-
-    def _spread(self, count: int) -> Array:
-        """Surface vertices (p,) where a dashpot would do different things: each the farthest, in n·φ of all modes, from those before it [Gonzalez 1985]."""
-        body = self.body
-        motion = np.einsum("vxm,vx->vm", self.model.shape[body].astype(float), self.normal[body])
-        motion /= np.maximum(np.sqrt((motion**2).mean(axis=0)), 1e-300)
-        square = (motion**2).sum(axis=1)
-        picked = [int(square.argmax())]
-        gap = np.full(len(body), np.inf)
-        for _ in range(min(count, len(body)) - 1):
-            last = picked[-1]
-            gap = np.minimum(gap, square + square[last] - 2 * np.abs(motion @ motion[last]))  # a mode's sign is nobody's
-            picked.append(int(gap.argmax()))
-        return np.asarray(body[picked])
-
-    def _strengths(self) -> Array:
-        """STEPS times the strength in N·s/m that doubles the typical decay."""
-        square = float((self.model.shape[self.body].astype(float) ** 2).sum(axis=1).mean()) / 3
-        return np.array(STEPS) * 2 * float(np.median(self.decay_per_s)) / max(square, 1e-300)
-
-    def refined(self, start: Dashpots, reaches: tuple[float, ...], *, whole: bool = False) -> tuple[float, Dashpots]:
-        """What is left, and the best of strengths, directions and places, one dashpot after another, in turns that reach so far, in sizes of the body."""
-        size = float(np.linalg.norm(np.ptp(self.model.vertex_m[self.body], axis=0)))
-        best, least = start, np.inf
-        for reach in reaches:
-            for i in range(len(best)):
-                trials = [(*best[:i], d, *best[i + 1 :]) for d in (best[i], *self._around(best[i], reach * size))]
-                left = [self.left(t) for t in trials] if whole else [self._left(*modes, 1) for modes in self._roughly(trials)]
-                least, best = min(zip(left, trials, strict=True), key=lambda pair: pair[0])
-        return least, best
-
-    def _around(self, d: Dashpot, reach_m: float) -> list[Dashpot]:
-        """Others instead of one: as strong anywhere, or near it and stronger, weaker or along the other direction."""
-        if not np.isfinite(reach_m):
-            return [replace(d, vertex=int(v)) for v in self._spread(2 * POINTS)] + [replace(d, c=d.c * f) for f in COARSER]
-        at = self.model.vertex_m[self.body]
-        near = self.body[((at - self.model.vertex_m[d.vertex]) ** 2).sum(axis=1) < reach_m**2]
-        found = [replace(d, c=d.c * f) for f in FINER]
-        found.append(replace(d, along="every" if d.along == "normal" else "normal"))
-        return found + [replace(d, vertex=int(v)) for v in near[:: max(1, len(near) // NEAR)]]
-
     def left(self, dashpots: Dashpots) -> float:
         """Of the lines' decays and patterns, in squared spreads, beside the law that suits them best."""
         x = self.model
         if not dashpots:
-            return self._left(-x.decay_per_s + 2j * np.pi * x.freq_hz, np.eye(x.mode_count, dtype=complex), 2)
+            return self.beside(-x.decay_per_s + 2j * np.pi * x.freq_hz, np.eye(x.mode_count, dtype=complex), 2)
         found = coupled(x.omega0_squared_per_s2, x.decay_per_s, self._rows([dashpots])[0])
-        return self._left(found.pole, found.turn, 2)
+        return self.beside(found.pole, found.turn, 2)
 
-    def _roughly(self, trials: list[Dashpots]) -> list[tuple[Array, Array]]:
+    def roughly(self, trials: list[Dashpots]) -> list[tuple[Array, Array]]:
         """Poles (m,) and turns (m, m) of many, modes coupling with their neighbours only."""
         phi, m = self._rows(trials), self.model.mode_count
         lam, own = self.model.omega0_squared_per_s2, self.model.decay_per_s
@@ -198,7 +127,7 @@ class Trial:
         along[:, :, 0] = np.einsum("tjx,tjxm->tjm", self.normal[vertex], moved)
         return np.asarray((root[:, :, None, None] * np.where(every[:, :, None, None], moved, along)).reshape(len(trials), -1, moved.shape[-1]))
 
-    def _price(self, pole: Array, turn: Array) -> float:
+    def price(self, pole: Array, turn: Array) -> float:
         """Of the pairs of lines and modes beside the least law: a first look."""
         pole, turn = _alive(pole, turn)
         decay = -pole.real - self._own(turn) + _smooth(pole.imag) @ self.least
@@ -210,15 +139,15 @@ class Trial:
         share = np.abs(turn) ** 2
         return np.asarray((share * self.model.decay_per_s[:, None]).sum(axis=0) / share.sum(axis=0))
 
-    def _left(self, pole: Array, turn: Array, turns: int) -> float:
+    def beside(self, pole: Array, turn: Array, turns: int) -> float:
         pole, turn = _alive(pole, turn)
         own = self._own(turn)
         column = np.column_stack([_smooth(pole.imag), own])
         push = (self.into @ turn) * (self.out @ turn)
         starts = (_smooth(pole.imag) @ self.least, own)[:turns]
-        return min(self._beside(start, pole.imag, -pole.real - own, column, push, turns) for start in starts)
+        return min(self._by_law(start, pole.imag, -pole.real - own, column, push, turns) for start in starts)
 
-    def _beside(self, law: Array, omega: Array, extra: Array, column: Array, push: Array, turns: int) -> float:
+    def _by_law(self, law: Array, omega: Array, extra: Array, column: Array, push: Array, turns: int) -> float:
         """What is left where lines and modes are first paired by a law (m,), then by the law that the pairs ask for."""
         nothing = 2 * MISSED * float(self.worth.sum())
         for _ in range(turns):
