@@ -87,14 +87,16 @@ def refined(t: Trial, start: Dashpots, reaches: tuple[float, ...], *, whole: boo
 
 
 def _around(t: Trial, d: Dashpot, reach_m: float) -> list[Dashpot]:
-    """Others instead of one: elsewhere and as strong there, or near it, and stronger, weaker or along the other direction."""
+    """Others instead of one: elsewhere, as strong or taking as much, or near it, and stronger, weaker or along the other direction."""
     if not np.isfinite(reach_m):
-        return [_moved(t, d, int(v)) for v in _spread(t, 2 * POINTS)] + [replace(d, c=d.c * f) for f in COARSER]
+        some = _spread(t, 2 * POINTS).tolist()
+        return [_moved(t, d, v) for v in some] + [replace(d, vertex=v) for v in some] + [replace(d, c=d.c * f) for f in COARSER]
     at = t.model.vertex_m[t.body]
     near = t.body[((at - t.model.vertex_m[d.vertex]) ** 2).sum(axis=1) < reach_m**2]
     found = [replace(d, c=d.c * f) for f in FINER]
     found.append(replace(d, along="every" if d.along == "normal" else "normal"))
-    return found + [_moved(t, d, int(v)) for v in near[:: max(1, len(near) // NEAR)]]
+    some = near[:: max(1, len(near) // NEAR)].tolist()
+    return found + [_moved(t, d, v) for v in some] + [replace(d, vertex=v) for v in some]
 
 
 def _moved(t: Trial, d: Dashpot, vertex: int) -> Dashpot:
