@@ -19,6 +19,7 @@ from sonic_bullet.estimator.pairing import TWINS
 from sonic_bullet.records import Array, ModalModel
 
 REACH = 0.012  # of a line from its mode where effects have moved it
+LOSSY, TOGETHER = 0.06, 0.25  # price of (ln d)² of a line over its mode; ln d of modes that sound as one line
 DIRECT_S = 0.008  # of the sound path: what comes later is an echo
 
 
@@ -117,14 +118,17 @@ def _nearest(body: Struck, model: ModalModel) -> tuple[Array, tuple[Array, ...]]
     mine = body.fitted[: len(lines.amplitude)]
     told, heard = np.abs(pattern(body, model)[mine]), np.abs(lines.amplitude)
     alike = (heard.T @ told) / np.maximum(np.linalg.norm(heard, axis=0)[:, None] * np.linalg.norm(told, axis=0)[None, :], 1e-300)
-    price = np.minimum((gap / REACH) ** 2 + 0.5 * (1 - np.nan_to_num(alike)), 1.0) - 1.0
+    with np.errstate(divide="ignore", invalid="ignore"):
+        worse = np.nan_to_num(np.log(lines.decay_per_s[:, None] / model.decay_per_s[None, :]), posinf=0.0, neginf=0.0)
+    price = np.minimum((gap / REACH) ** 2 + 0.5 * (1 - np.nan_to_num(alike)) + LOSSY * worse**2, 1.0) - 1.0
     row, column = linear_sum_assignment(price)
     good = price[row, column] < 0
     row, column = row[good], column[good]
     group = np.cumsum(np.diff(np.log(model.freq_hz), prepend=-np.inf) > TWINS)  # twins that nothing has set apart are one line
     taken, mode = set(column.tolist()), []
     for c in column:
-        others = [int(k) for k in np.flatnonzero(group == group[c]) if k == c or int(k) not in taken]
+        like = np.abs(np.log(np.maximum(model.decay_per_s, 1e-9) / max(float(model.decay_per_s[c]), 1e-9))) < TOGETHER
+        others = [int(k) for k in np.flatnonzero((group == group[c]) & like) if k == c or int(k) not in taken]
         taken |= set(others)
         mode.append(np.array(others))
     return row, tuple(mode)

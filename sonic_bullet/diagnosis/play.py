@@ -18,9 +18,11 @@ from sonic_bullet.effects.ringing import sounded
 from sonic_bullet.effects.values import CARRIES, Blow, Effect, Owner, Ring, Sound, Stage
 from sonic_bullet.records import Array, ModalModel
 
-MOVES = frozenset({"added-mass", "mode-splitting", "orthotropy"})  # effects under which modes are no longer where they were
+MOVES = frozenset({"added-mass", "mode-splitting", "orthotropy", "support-damping"})  # effects under which modes are no longer where, or what, they were
+TURNS = frozenset({"support-damping"})  # of those, under which modes mix with their neighbours
 LAST = frozenset({"added-mass"})  # of those, under which no mode keeps its own correction
 WAY = tuple(Owner)  # material, object, fixture, striker, room, chain: a sound's
+SAMPLED = 300  # vertices by which modes are told to be alike
 KEPT = 4  # hypotheses and bodies whose modes are remembered
 
 
@@ -90,9 +92,22 @@ def modes_of(h: Hypothesis, body: Struck) -> tuple[ModalModel, Array]:
     lam = (2 * np.pi * base.freq_hz * (1 + (none if last else correction)) * np.exp(h.stretch)) ** 2
     decay = (h.alpha_per_s + h.beta_s * lam) / 2
     model, order = ordered(base, np.sqrt(np.maximum(lam - decay**2, 0)) / (2 * np.pi), decay)
-    for effect in h.at(Stage.MODES, fitted=body.gathered is not None):
-        model = effect.apply(model)
+    for effect in sorted(
+        h.at(Stage.MODES, fitted=body.gathered is not None), key=lambda e: e.owner is not Owner.MATERIAL
+    ):  # a law of the material is no fixture's
+        before, model = model, effect.apply(model)
+        if effect.id in TURNS:
+            order = order[came_from(before, model)]
     return ordered(model, model.freq_hz * (1 + correction[: model.mode_count]), model.decay_per_s) if last else (model, order)
+
+
+def came_from(old: ModalModel, new: ModalModel) -> Array:
+    """The old mode (m,) that each new one is most like, by their motion on the surface, one to one."""
+    from scipy.optimize import linear_sum_assignment
+
+    step = max(1, len(old.shape) // SAMPLED)
+    a, b = (x.shape[::step].reshape(-1, x.mode_count).astype(float) for x in (old, new))
+    return np.asarray(linear_sum_assignment(-np.abs(b.T @ a) / np.linalg.norm(a, axis=0))[1])
 
 
 def pattern(body: Struck, model: ModalModel) -> Array:

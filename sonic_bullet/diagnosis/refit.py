@@ -112,7 +112,9 @@ def _damped(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...])
             continue
         model, _ = modes_of(bare, body)
         extra = np.zeros(len(one.freq_hz))
-        if h.at(Stage.MODES):
+        if moves(h):  # ``one`` is of h itself, and its lines are paired anew
+            extra = np.maximum(one.expected_decay_per_s - (h.alpha_per_s + h.beta_s * one.omega**2) / 2, 0.0)
+        elif h.at(Stage.MODES):
             near = np.array([np.argmin(np.abs(model.freq_hz - one_f)) for one_f in one.freq_hz])
             extra = np.array([model.decay_per_s[_members(model.freq_hz, i, len(who))].mean() for i, who in zip(near, one.mode, strict=True)])
         lam.append(one.omega**2)

@@ -16,8 +16,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from sonic_bullet.effects.pairs import agreed, every_line, patterns
-from sonic_bullet.effects.points import vertex_normals
-from sonic_bullet.effects.support_damping import nearest
+from sonic_bullet.effects.points import nearest, spread_out, vertex_normals
 from sonic_bullet.effects.values import Evidence, Heard, Owner, Stage
 from sonic_bullet.records import Array, ModalModel
 
@@ -102,18 +101,6 @@ def _in_place(line_hz: Array, mode_hz: Array, none: tuple[float, Array, Array, f
     _, row, column, shift = none
     off = np.abs(np.log(line_hz[row] / mode_hz[column]) - shift)
     return len(row) > MATCHED * len(line_hz) and float(np.quantile(off, 0.9)) < MOVED
-
-
-def spread_out(x: ModalModel, count: int) -> Array:
-    """About ``count`` surface vertices (p,), each the farthest from those before it [Gonzalez 1985]."""
-    body = np.unique(x.face)
-    at = x.vertex_m[body]
-    picked = [0]
-    gap = ((at - at[0]) ** 2).sum(axis=1)
-    for _ in range(min(count, len(body)) - 1):
-        picked.append(int(gap.argmax()))
-        gap = np.minimum(gap, ((at - at[picked[-1]]) ** 2).sum(axis=1))
-    return np.asarray(body[picked])
 
 
 def _at_points(x: ModalModel, heard: Heard) -> ModalModel:

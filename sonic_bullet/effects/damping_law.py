@@ -22,6 +22,7 @@ LAWS = {"constant-loss": 1, "power": 2, "relaxation": 3}
 OMEGA_1 = 2000 * np.pi
 SCATTER = 0.02  # of a decay about its law, relative, that no law is asked to explain
 BETTER = 6.0  # in BIC, than Rayleigh's law
+TAKEN, MOST = 0.1, 0.95  # of what other effects take of a line's decay: how unsure it is; of the decay, at most
 
 
 @dataclass(frozen=True)
@@ -69,6 +70,9 @@ class DampingLaw:
         omega = np.concatenate([h.omega for h in evidence.heard])
         decay = np.concatenate([h.decay_per_s for h in evidence.heard])
         spread = np.concatenate([h.decay_sd_per_s for h in evidence.heard])
+        rayleigh = 0.5 * (evidence.alpha_per_s + evidence.beta_s * omega**2)
+        extra = np.clip(np.concatenate([h.expected_decay_per_s for h in evidence.heard]) - rayleigh, 0.0, MOST * decay)  # what effects found so far take
+        decay, spread = decay - extra, np.hypot(spread, TAKEN * extra)
         good = np.isfinite(decay) & (decay > 0)
         if good.sum() < 5:
             return None

@@ -13,6 +13,7 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
+from sonic_bullet.effects.points import solved
 from sonic_bullet.effects.values import Evidence, Heard, Owner, Stage, ascending
 from sonic_bullet.records import Array, ModalModel
 
@@ -92,9 +93,8 @@ def areas(x: ModalModel) -> Array:
 
 
 def _left(decay: Array, sd: Array, columns: Array) -> tuple[Array, float]:
-    from sonic_bullet.effects.points import _solve
-
-    return _solve(decay, 1 / sd, columns, True)
+    value, left = solved(decay, sd, columns)
+    return value, float(left.sum())
 
 
 def _tilt(heard: Heard, made: Radiation) -> float:

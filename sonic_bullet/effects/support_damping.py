@@ -1,8 +1,10 @@
 """`support-damping`: a fixture takes energy where it touches.
 
-    Δd_k = ½ Σ_j c_j |φ_k(p_j)|²      c in N·s/m, φ mass-normalised                    [Zheng & James 2011; physics of a viscous contact]
+    q̈ + (2d + Σ_j c_j Φ_jᵀΦ_j) q̇ + Λq = 0      c in N·s/m; Φ_j: φ(p_j)·n, or φ(p_j) in every direction        [Zheng & James 2011; Woodhouse 1998, eq. 12]
 
-Read off the decays: what Rayleigh's law, refitted beside it, leaves goes as φ² at one or a few points.
+to first order Δd_k = ½ Σ_j c_j |φ_k(p_j)|²; modes at one frequency turn to the dashpot, and strong ones couple: `dashpots`.
+Read off decays and patterns together: what dashpots all over the surface would make of the modes is held against the lines, beside a smooth law
+of the material; one after another the best stand, while each explains enough of what is left.
 """
 
 from __future__ import annotations
@@ -12,40 +14,38 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from sonic_bullet.effects.points import best_spot, candidates, vertex_normals
-from sonic_bullet.effects.values import Evidence, Heard, Owner, Stage, ascending
+from sonic_bullet.effects.dashpots import damped
+from sonic_bullet.effects.points import nearest, vertex_normals
+from sonic_bullet.effects.support_search import NEARER, refined, sought, tuned
+from sonic_bullet.effects.support_trial import Dashpot, Trial
+from sonic_bullet.effects.values import Evidence, Owner, Stage
 from sonic_bullet.records import Array, ModalModel
-
-SCATTER = 0.03
-MOST = 4
-BETTER = 12.0  # in BIC, for another point
 
 
 @dataclass(frozen=True)
 class SupportDamping:
-    """Dashpots of strength (j,) in N·s/m at position_m (j, 3) on the surface, in the mesh's frame; along: "normal" to it, or "every" direction."""
+    """Dashpots of strength (j,) in N·s/m at position_m (j, 3) on the surface, in the mesh's frame; along (j,): "normal" to it, or "every" direction; () all normal."""
 
     id: ClassVar[str] = "support-damping"
     stage: ClassVar[Stage] = Stage.MODES
     owner: ClassVar[Owner] = Owner.FIXTURE
-    reference: ClassVar[str] = "Zheng & James 2011, section 5 (contact damping)"
+    reference: ClassVar[str] = "Zheng & James 2011, section 5 (contact damping); Woodhouse 1998, eq. 12"
 
     position_m: tuple[tuple[float, float, float], ...]
     strength_n_s_m: tuple[float, ...]
-    along: str = "normal"
+    along: tuple[str, ...] = ()
 
     def apply(self, x: ModalModel) -> ModalModel:
         """The modes with the effect in them."""
-        extra = np.zeros(x.mode_count)
-        normal = vertex_normals(x) if self.along == "normal" else None
-        for place, c in zip(self.position_m, self.strength_n_s_m, strict=True):
-            vertex = nearest(x, place)
-            moved = x.shape[vertex].astype(float)
-            extra += 0.5 * c * ((moved**2).sum(axis=0) if normal is None else (normal[vertex] @ moved) ** 2)
-        omega = np.sqrt(x.omega0_squared_per_s2)
-        decay = np.minimum(x.decay_per_s + extra, 0.99 * omega)
-        freq = np.sqrt(omega**2 - decay**2) / (2 * np.pi)
-        return ascending(x, freq, decay)
+        if not any(self.strength_n_s_m) or not x.mode_count:
+            return x
+        normal = vertex_normals(x)
+        rows: list[Array] = []
+        for place, c, way in zip(self.position_m, self.strength_n_s_m, self.along or ("normal",) * len(self.position_m), strict=True):
+            at = nearest(x, place)
+            phi = x.shape[at].astype(float)
+            rows.append(np.sqrt(c) * (phi if way == "every" else normal[at][None] @ phi))
+        return damped(x, np.concatenate(rows))
 
     def parameters(self) -> dict[str, Any]:
         """What it says, for people and JSON, in SI units."""
@@ -59,35 +59,17 @@ class SupportDamping:
         heard = max(evidence.heard, key=lambda h: len(h.freq_hz) if h.model is not None else 0)
         if heard.model is None or len(heard.freq_hz) < 6 or not np.isfinite(heard.decay_per_s).all():
             return None
-        decay = heard.decay_per_s
-        sd = np.hypot(heard.decay_sd_per_s, SCATTER * decay) + 1e-3
-        columns = np.stack([np.full(len(decay), 0.5), 0.5 * heard.omega**2], axis=1)
-        found = [(_points(heard, decay, sd, columns, normal=along == "normal", sure=evidence.known is None), along) for along in ("normal", "every")]
-        (_, chosen, strength), along = min(found, key=lambda pair: pair[0][0])
-        if not len(chosen):
-            return None
-        places = heard.model.vertex_m[chosen]
-        return cls(tuple((float(a), float(b), float(c)) for a, b, c in places), tuple(float(c) for c in strength), along)
+        trial = Trial.of(heard)
+        if isinstance(evidence.known, cls):
+            return cls._of(trial, tuned(trial, refined(trial, evidence.known._on(heard.model), NEARER[-2:])[1]))
+        found = sought(trial)
+        return cls._of(trial, found) if found else None
 
+    @classmethod
+    def _of(cls, trial: Trial, found: tuple[Dashpot, ...]) -> Self:
+        place = [trial.model.vertex_m[d.vertex] for d in found]
+        return cls(tuple((float(a), float(b), float(c)) for a, b, c in place), tuple(d.c for d in found), tuple(d.along for d in found))
 
-def _points(heard: Heard, decay: Array, sd: Array, columns: Array, *, normal: bool, sure: bool = True) -> tuple[float, Array, Array]:
-    """What is left, vertices (j,) and strengths (j,) of the dashpots that earn their place, one after another."""
-    vertex, square = candidates(heard, normal=normal)
-    chosen: list[int] = []
-    strength, left = np.zeros(0), np.inf
-    need = (BETTER + 3 * np.log(len(decay)), 0.6) if sure else (0.5 * BETTER, 0.8)
-    for _ in range(MOST):
-        spot = best_spot(decay, sd, columns, vertex, 0.5 * square)
-        if spot is None or spot.before - spot.left < need[0] or spot.left > need[1] * spot.before:
-            break
-        chosen.append(spot.vertex)
-        columns = np.column_stack([columns, 0.5 * square[np.searchsorted(vertex, spot.vertex)]])
-        strength, left = np.append(spot.nuisance[2:], spot.strength), spot.left
-    keep = strength > 0
-    return left, np.array(chosen, int)[keep], strength[keep]
-
-
-def nearest(x: ModalModel, place: tuple[float, float, float]) -> int:
-    """The surface vertex nearest to a place."""
-    body: Array = np.unique(x.face)
-    return int(body[np.argmin(((x.vertex_m[body] - np.array(place)) ** 2).sum(axis=1))])
+    def _on(self, x: ModalModel) -> tuple[Dashpot, ...]:
+        along = self.along or ("normal",) * len(self.position_m)
+        return tuple(Dashpot(nearest(x, p), c, way) for p, c, way in zip(self.position_m, self.strength_n_s_m, along, strict=True))

@@ -156,8 +156,8 @@ def test_added_mass_is_rayleighs_to_first_order() -> None:
 def test_support_damping_adds_half_c_phi_squared() -> None:
     x = given(Stage.MODES)
     vertex = int(np.argmin(((plate().vertex_m[:345] - np.array(SPOT)) ** 2).sum(axis=1)))
-    added = SupportDamping((SPOT,), (0.8,)).apply(x).decay_per_s - x.decay_per_s
-    assert np.allclose(added, 0.4 * x.shape[vertex, 2].astype(float) ** 2, rtol=1e-5)
+    added = SupportDamping((SPOT,), (0.01,)).apply(x).decay_per_s - x.decay_per_s
+    assert np.allclose(added, 0.005 * x.shape[vertex, 2].astype(float) ** 2, rtol=2e-3, atol=1e-6)
 
 
 def test_stored_and_read_back() -> None:

@@ -1,0 +1,119 @@
+"""Where dashpots may be: all over the surface in a first look, then about the best, one after another.
+
+data · ln left + j (3 ln data + BETTER) -> min over the number j of dashpots; each step: grid, the best few of it, refined       [Schwarz 1978]
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from sonic_bullet.effects.support_trial import Dashpot, Dashpots, Trial
+from sonic_bullet.records import Array
+
+POINTS = 90  # vertices of a first look
+STEPS = (0.06, 0.25, 1.0, 4.0, 16.0)  # of the strength that doubles the typical decay
+FINER, COARSER = (0.6, 0.8, 0.92, 1.08, 1.25, 1.6), (0.1, 0.3, 3.0, 10.0)  # times stronger, in turns
+LOOKED, STARTS, NEAR = 40, 4, 14  # of the grid, looked at closer; refined; vertices of a turn about one
+NEARER = (0.12, 0.07, 0.04, 0.02)  # turns, in sizes of the body
+TUNED = 0.15  # of ln c
+MOST = 4
+BETTER = 6.0  # in BIC, for another dashpot
+
+
+def sought(t: Trial) -> Dashpots:
+    """The dashpots that earn their place, one after another; the least Bayes information criterion says how many, with BETTER for each on top."""
+    data = 2 * len(t.freq_hz)  # a decay and a pattern each
+    chosen: Dashpots = ()
+    left, least = t.left(chosen), float(t.worth.sum())  # what is left within the spreads asks for nothing
+    tried = [(data * np.log(max(left, least)), chosen)]
+    if left < least:
+        return chosen
+    grid = [Dashpot(int(v), c, way) for v in _spread(t, POINTS) for c in _strengths(t).tolist() for way in ("normal", "every")]
+    while len(chosen) < MOST:
+        trials = [(*chosen, d) for d in grid]
+        few = _best([t.price(*modes) for modes in t.roughly(trials)], trials, LOOKED)
+        few = _best([t.beside(*modes, 1) for modes in t.roughly(few)], few, STARTS)
+        starts = [refined(t, one, NEARER[:2]) for one in few]
+        best = refined(t, min(starts, key=lambda pair: pair[0])[1], (np.inf, *NEARER))[1]
+        chosen = tuned(t, min(best, refined(t, best, NEARER[-1:], whole=True)[1], key=t.left))
+        tried.append((data * np.log(max(t.left(chosen), least)) + len(chosen) * (3 * np.log(data) + BETTER), chosen))
+        enough = min(range(len(tried)), key=lambda i: tried[i][0])
+        if enough < len(chosen) and (enough > 0 or len(chosen) > 1):  # two may show where neither does alone
+            break
+    return min(tried, key=lambda pair: pair[0])[1]
+
+
+def _best(price: list[float], trials: list[Dashpots], count: int) -> list[Dashpots]:
+    """The few at the least price, the last dashpot of each at its own vertex."""
+    found: dict[int, Dashpots] = {}
+    for i in np.argsort(price, kind="stable"):
+        found.setdefault(trials[i][-1].vertex, trials[i])
+    return list(found.values())[:count]
+
+
+def _spread(t: Trial, count: int) -> Array:
+    """Surface vertices (p,) where a dashpot would do different things: each the farthest, in n·φ of all modes, from those before it [Gonzalez 1985]."""
+    body = t.body
+    motion = np.einsum("vxm,vx->vm", t.model.shape[body].astype(float), t.normal[body])
+    motion /= np.maximum(np.sqrt((motion**2).mean(axis=0)), 1e-300)
+    square = (motion**2).sum(axis=1)
+    picked = [int(square.argmax())]
+    gap = np.full(len(body), np.inf)
+    for _ in range(min(count, len(body)) - 1):
+        last = picked[-1]
+        gap = np.minimum(gap, square + square[last] - 2 * np.abs(motion @ motion[last]))  # a mode's sign is nobody's
+        picked.append(int(gap.argmax()))
+    return np.asarray(body[picked])
+
+
+def _strengths(t: Trial) -> Array:
+    """STEPS times the strength in N·s/m that doubles the typical decay."""
+    square = float((t.model.shape[t.body].astype(float) ** 2).sum(axis=1).mean()) / 3
+    return np.array(STEPS) * 2 * float(np.median(t.decay_per_s)) / max(square, 1e-300)
+
+
+def refined(t: Trial, start: Dashpots, reaches: tuple[float, ...], *, whole: bool = False) -> tuple[float, Dashpots]:
+    """What is left, and the best of strengths, directions and places, one dashpot after another, in turns that reach so far, in sizes of the body."""
+    size = float(np.linalg.norm(np.ptp(t.model.vertex_m[t.body], axis=0)))
+    best, least = start, np.inf
+    for reach in reaches:
+        for i in range(len(best)):
+            trials = [(*best[:i], d, *best[i + 1 :]) for d in (best[i], *_around(t, best[i], reach * size))]
+            left = [t.left(one) for one in trials] if whole else [t.beside(*modes, 1) for modes in t.roughly(trials)]
+            least, best = min(zip(left, trials, strict=True), key=lambda pair: pair[0])
+    return least, best
+
+
+def _around(t: Trial, d: Dashpot, reach_m: float) -> list[Dashpot]:
+    """Others instead of one: elsewhere, as strong or taking as much, or near it, and stronger, weaker or along the other direction."""
+    if not np.isfinite(reach_m):
+        some = _spread(t, 2 * POINTS).tolist()
+        return [_moved(t, d, v) for v in some] + [replace(d, vertex=v) for v in some] + [replace(d, c=d.c * f) for f in COARSER]
+    at = t.model.vertex_m[t.body]
+    near = t.body[((at - t.model.vertex_m[d.vertex]) ** 2).sum(axis=1) < reach_m**2]
+    found = [replace(d, c=d.c * f) for f in FINER]
+    found.append(replace(d, along="every" if d.along == "normal" else "normal"))
+    some = near[:: max(1, len(near) // NEAR)].tolist()
+    return found + [_moved(t, d, v) for v in some] + [replace(d, vertex=v) for v in some]
+
+
+def _moved(t: Trial, d: Dashpot, vertex: int) -> Dashpot:
+    """One elsewhere, of the strength that takes as much of all modes together, to first order."""
+    power = [float(((t.normal[v] @ t.model.shape[v].astype(float)) ** 2).sum()) for v in (d.vertex, vertex)]
+    return Dashpot(vertex, d.c * float(np.clip(power[0] / max(power[1], 1e-300), 0.1, 10)), d.along)
+
+
+def tuned(t: Trial, found: Dashpots) -> Dashpots:
+    """The same with the strengths at which least is left, within TUNED in their logarithms."""
+    from scipy.optimize import minimize_scalar
+
+    for i in range(len(found)):
+
+        def with_one(x: float, i: int = i, found: Dashpots = found) -> Dashpots:
+            return (*found[:i], replace(found[i], c=float(found[i].c * np.exp(x))), *found[i + 1 :])
+
+        best = minimize_scalar(lambda x, of=with_one: t.left(of(x)), bounds=(-TUNED, TUNED), method="bounded", options={"maxiter": 10, "xatol": 2e-3})
+        found = min(found, with_one(float(best.x)), key=t.left)
+    return found

@@ -1,0 +1,246 @@
+"""Dashpots on trial: how far the lines are from the modes that they would make.
+
+    price_kj = (Δln f/w)²/18 + (Δln d/e)²/18 + 1 − c_kj, at most 1;   Σ worth_k (price − 1) -> min over one-to-one pairs       [Kuhn 1955; Crouse 2016]
+    d_k = Δ_k(dashpots) + law(ω_k),  law = ½(a + bω + cω²) or as it is, a, b, c >= 0, refitted beside every trial by Huber's loss
+    left = Σ_k worth_k [ρ((d_k − Δ_k − law)/SCATTER d_k) + (1 − C_k²)/ROUGH²], each bounded;  lines that no mode explains count as outliers
+
+c_kj: cosine of a line's amplitudes over the strikes with what one exponential at the mode's pole would take of all modes,
+Σ_i a_i 2d_j/((d_i + d_j) − i(ω_i − ω_j)), or with the mode's own. C_k: with what exponentials at the lines' poles take of all modes together
+(variable projection's linear half [Golub & Pereyra 1973]): modes that sound as one line are one, those that a dashpot has told apart are not.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sonic_bullet.effects.dashpots import apart, coupled
+from sonic_bullet.effects.pairs import every_line
+from sonic_bullet.effects.points import solved, vertex_normals
+from sonic_bullet.effects.values import Heard
+from sonic_bullet.records import Array, ModalModel
+
+SCATTER, ROUGH = 0.05, 0.15  # of a decay, and of a pattern, relative: shapes err
+WIDTH, DECADE = 0.004, 0.4  # of ln f and ln d, of a pair
+MISSED = 9.0  # what a line costs that nothing explains: three spreads, as Huber's loss has its bend there
+WEAK, HALF = 0.05, 0.5  # of the worth of a line that the model does not expect: it may be a click or another body's; near a mode, its twin
+LOW = 0.3  # of a line's spread where it lies under the least law
+RUN = 10  # modes whose coupling is reckoned with in a first look
+
+
+@dataclass(frozen=True, slots=True)
+class Dashpot:
+    """c in N·s/m at a vertex of the model, along its "normal" or "every" direction."""
+
+    vertex: int
+    c: float
+    along: str
+
+
+Dashpots = tuple[Dashpot, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Trial:
+    """An object's lines (k,) and modes (m,). size (s, k) complex, worth (k,); into (s, m): J φ(p)·e of the strikes; out (m,): φ(q)·n of the sensor.
+
+    normal (v, 3) of all vertices, body: those of the surface. runs: neighbours that may couple; least (3,): the law that most lines lie above.
+    """
+
+    freq_hz: Array
+    decay_per_s: Array
+    sd: Array
+    size: Array
+    worth: Array
+    signed: bool
+    model: ModalModel
+    normal: Array
+    body: Array
+    into: Array
+    out: Array
+    runs: tuple[Array, ...]
+    least: Array
+
+    @classmethod
+    def of(cls, h: Heard) -> Trial:
+        x = h.model
+        assert x is not None
+        lone = np.zeros(len(h.foreign_hz))
+        freq, size, decay, _ = every_line(h)
+        sd = np.concatenate([h.decay_sd_per_s, lone])
+        every = np.concatenate([h.freq_hz, h.foreign_hz])
+        index = np.array([int(np.flatnonzero(every == f)[0]) for f in freq], int)
+        good = np.isfinite(decay) & (decay > 0)
+        freq, size, decay, index = freq[good], size[:, good], decay[good], index[good]
+        told = index < len(h.freq_hz)
+        at_home = np.abs(np.log(freq[:, None] / x.freq_hz)).min(axis=1) < WIDTH
+        strength = np.nan_to_num(size).max(axis=0)
+        worth = np.clip(1 + 0.25 * np.log10(np.maximum(strength / max(strength.max(initial=0.0), 1e-300), 1e-6)), 0.1, 1) * np.where(
+            told, 1, np.where(at_home, HALF, WEAK)
+        )
+        amplitude = np.concatenate([h.amplitude, h.foreign_amplitude], axis=1)[:, index]
+        level = np.where(np.isfinite(h.impulse_n_s), h.impulse_n_s, 1.0)
+        into = np.einsum("sxm,sx->sm", x.shape[h.strike_vertex].astype(float), h.strike_way) * level[:, None]
+        out = np.einsum("xm,x->m", x.shape[h.sensor_vertex].astype(float), h.sensor_way)
+        return cls(
+            freq,
+            decay,
+            np.hypot(np.nan_to_num(sd[index]), SCATTER * decay) + 1e-3,
+            amplitude,
+            worth,
+            h.signed,
+            x,
+            vertex_normals(x),
+            np.unique(x.face),
+            into,
+            out,
+            tuple(apart(x.freq_hz, RUN)),
+            _least_law(h.omega, h.decay_per_s),
+        )
+
+    def left(self, dashpots: Dashpots) -> float:
+        """Of the lines' decays and patterns, in squared spreads, beside the law that suits them best."""
+        x = self.model
+        if not dashpots:
+            return self.beside(-x.decay_per_s + 2j * np.pi * x.freq_hz, np.eye(x.mode_count, dtype=complex), 2)
+        found = coupled(x.omega0_squared_per_s2, x.decay_per_s, self._rows([dashpots])[0])
+        return self.beside(found.pole, found.turn, 2)
+
+    def roughly(self, trials: list[Dashpots]) -> list[tuple[Array, Array]]:
+        """Poles (m,) and turns (m, m) of many, modes coupling with their neighbours only."""
+        phi, m = self._rows(trials), self.model.mode_count
+        lam, own = self.model.omega0_squared_per_s2, self.model.decay_per_s
+        pole, turn = np.empty((len(trials), m), complex), np.zeros((len(trials), m, m), complex)
+        for run in self.runs:
+            part = coupled(lam[run], own[run], phi[:, :, run])
+            pole[:, run], turn[:, run[:, None], run] = part.pole, part.turn
+        return list(zip(pole, turn, strict=True))
+
+    def _rows(self, trials: list[Dashpots]) -> Array:
+        """√c φ (t, 3j, m) of trials of as many dashpots each; rows that say nothing are zero."""
+        vertex = np.array([[d.vertex for d in t] for t in trials])
+        root = np.sqrt(np.array([[d.c for d in t] for t in trials]))
+        moved = self.model.shape[vertex].astype(float)
+        every = np.array([[d.along == "every" for d in t] for t in trials])
+        along = np.zeros_like(moved)
+        along[:, :, 0] = np.einsum("tjx,tjxm->tjm", self.normal[vertex], moved)
+        return np.asarray((root[:, :, None, None] * np.where(every[:, :, None, None], moved, along)).reshape(len(trials), -1, moved.shape[-1]))
+
+    def price(self, pole: Array, turn: Array) -> float:
+        """Of the pairs of lines and modes beside the least law: a first look."""
+        pole, turn = _alive(pole, turn)
+        decay = -pole.real - self._own(turn) + _smooth(pole.imag) @ self.least
+        push = (self.into @ turn) * (self.out @ turn)
+        return self._pairs(pole.imag, decay, self._alike(pole.imag, decay, push))[2]
+
+    def _own(self, turn: Array) -> Array:
+        """The material's part (m,) of the decays."""
+        share = np.abs(turn) ** 2
+        return np.asarray((share * self.model.decay_per_s[:, None]).sum(axis=0) / share.sum(axis=0))
+
+    def beside(self, pole: Array, turn: Array, turns: int) -> float:
+        pole, turn = _alive(pole, turn)
+        own = self._own(turn)
+        column = np.column_stack([_smooth(pole.imag), own])
+        push = (self.into @ turn) * (self.out @ turn)
+        starts = (_smooth(pole.imag) @ self.least, own)[:turns]
+        return min(self._by_law(start, pole.imag, -pole.real - own, column, push, turns) for start in starts)
+
+    def _by_law(self, law: Array, omega: Array, extra: Array, column: Array, push: Array, turns: int) -> float:
+        """What is left where lines and modes are first paired by a law (m,), then by the law that the pairs ask for."""
+        nothing = 2 * MISSED * float(self.worth.sum())
+        for _ in range(turns):
+            alike = self._alike(omega, extra + law, push)
+            line, mode, _ = self._pairs(omega, extra + law, alike)
+            if not len(line):
+                return nothing
+            worth = self.worth[line]
+            law = column @ solved(self.decay_per_s[line] - extra[mode], self.sd[line] / np.sqrt(worth), column[mode])[0]
+        off = np.abs(self.decay_per_s[line] - (extra + law)[mode]) / self.sd[line]
+        decays = np.minimum(np.where(off <= 3, off**2, 6 * off - 9), 2 * MISSED)
+        told = self._told(line, omega[mode], omega, extra + law, push)
+        patterns = np.minimum((1 - _cosine(self._seen(self.size), self._seen(told))[line] ** 2) / ROUGH**2, MISSED)
+        return nothing + float((worth * (decays + patterns - 2 * MISSED)).sum())
+
+    def _told(self, line: Array, at: Array, omega: Array, decay: Array, push: Array) -> Array:
+        """Amplitudes (s, k) that exponentials at the lines' poles take of all modes together: Σ_l <e_k, e_l> A_l = Σ_i <e_k, e_i> a_i.
+
+        Lines (p,) are at modes at (p,) in 1/s; what the mesh has wrong there is taken out, of their neighbours too.
+        """
+        mine = np.sort(at)
+        near = np.clip(np.searchsorted(mine, omega), 1, max(len(mine) - 1, 1))
+        near = np.where(np.abs(mine[near - 1] - omega) < np.abs(mine[np.minimum(near, len(mine) - 1)] - omega), near - 1, np.minimum(near, len(mine) - 1))
+        shift = np.log(2 * np.pi * self.freq_hz[line] / at)[np.argsort(at)][near]
+        z = -self.decay_per_s + 2j * np.pi * self.freq_hz
+        y = -decay + 1j * omega * np.exp(shift)
+        size = np.sqrt(2 * self.decay_per_s)
+        own = -size[:, None] * size / (z.conj()[:, None] + z) + 1e-3 * np.eye(len(z))
+        return np.asarray((np.linalg.solve(own, -size[:, None] / (z.conj()[:, None] + y)) @ push.T).T * size)
+
+    def modes(self, dashpots: tuple[Dashpot, ...], *, quick: bool) -> tuple[Array, Array]:
+        """Poles (m,) and turns (m, m) under dashpots."""
+        x = self.model
+        lam, own = x.omega0_squared_per_s2, x.decay_per_s
+        if not dashpots:
+            return -own + 2j * np.pi * x.freq_hz, np.eye(len(lam), dtype=complex)
+        moved = [(d, x.shape[d.vertex].astype(float)) for d in dashpots]
+        phi = np.concatenate([np.sqrt(d.c) * (at if d.along == "every" else self.normal[d.vertex][None] @ at) for d, at in moved])
+        if not quick:
+            whole = coupled(lam, own, phi)
+            return whole.pole, whole.turn
+        pole, turn = np.empty(len(lam), complex), np.zeros((len(lam), len(lam)), complex)
+        for run in self.runs:
+            part = coupled(lam[run], own[run], phi[:, run])
+            pole[run], turn[np.ix_(run, run)] = part.pole, part.turn
+        return pole, turn
+
+    def _alike(self, omega: Array, decay: Array, push: Array) -> Array:
+        """Cosines (k, m) of the lines' amplitudes over the strikes and what one exponential at each mode's pole takes of all, or the mode's own."""
+        share = 2 * decay[None, :] / (decay[:, None] + decay[None, :] - 1j * (omega[:, None] - omega[None, :]))
+        heard = self._seen(self.size)
+        return np.maximum(_cosine(heard, self._seen(push @ share), every=True), _cosine(heard, self._seen(push), every=True))
+
+    def _seen(self, amplitude: Array) -> Array:
+        return amplitude if self.signed else np.abs(amplitude)
+
+    def _pairs(self, omega: Array, decay: Array, alike: Array) -> tuple[Array, Array, float]:
+        """Lines and modes at the least price, and the price."""
+        from scipy.optimize import linear_sum_assignment
+
+        off = np.log(2 * np.pi * self.freq_hz)[:, None] - np.log(omega)[None, :]
+        worse = np.log(self.decay_per_s)[:, None] - np.log(np.maximum(decay, 1e-3))[None, :]
+        price = np.minimum((off / WIDTH) ** 2 / 18 + (worse / DECADE) ** 2 / 18 + 1 - alike, 1.0) - 1.0
+        row, column = linear_sum_assignment(price * self.worth[:, None])
+        good = price[row, column] < 0
+        row, column = row[good], column[good]
+        return row, column, float((price[row, column] * self.worth[row]).sum())
+
+
+def _alive(pole: Array, turn: Array) -> tuple[Array, Array]:
+    """Without modes that no longer swing."""
+    alive = np.isfinite(pole)
+    return pole[alive], turn[:, alive]
+
+
+def _cosine(a: Array, b: Array, *, every: bool = False) -> Array:
+    """Of columns (s, k) and (s, k), or of every two (k, m); 1 where there is nothing to tell."""
+    if len(a) < 2 or not (np.isfinite(a).all() and np.isfinite(b).all() and b.any()):
+        return np.ones((a.shape[1], b.shape[1]) if every else a.shape[1])
+    one, two = a / np.maximum(np.linalg.norm(a, axis=0), 1e-300), b / np.maximum(np.linalg.norm(b, axis=0), 1e-300)
+    return np.asarray(np.abs(one.conj().T @ two) if every else np.abs((one.conj() * two).sum(axis=0)))
+
+
+def _smooth(omega: Array) -> Array:
+    """Columns (k, 3) of a smooth law of ω (k,)."""
+    return 0.5 * np.stack([np.ones(len(omega)), omega / 1e4, (omega / 1e4) ** 2], axis=1)
+
+
+def _least_law(omega: Array, decay: Array) -> Array:
+    """The smooth law (3,) that most lines (k,) lie above: a dashpot only adds. An expectile [Newey & Powell 1987]."""
+    column, above = _smooth(omega), np.ones(len(omega), bool)
+    value = np.zeros(3)
+    for _ in range(10):
+        value, _ = solved(decay, np.where(above, 1.0, LOW) * decay, column)
+        above = decay > column @ value
+    return value
