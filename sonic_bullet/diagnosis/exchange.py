@@ -18,7 +18,7 @@ from sonic_bullet.diagnosis.bodies import Struck
 from sonic_bullet.diagnosis.evidence import evidence_of, thinned
 from sonic_bullet.diagnosis.judge import Take, mean_db
 from sonic_bullet.diagnosis.play import Hypothesis
-from sonic_bullet.diagnosis.refit import refitted
+from sonic_bullet.diagnosis.refit import refitted, with_effects
 from sonic_bullet.diagnosis.trial import Candidate
 from sonic_bullet.effects.values import Evidence
 from sonic_bullet.records import Array
@@ -47,7 +47,7 @@ def together(h: Hypothesis, bodies: tuple[Struck, ...], band_hz: tuple[float, fl
 def again(h: Hypothesis, i: int, bodies: tuple[Struck, ...], band_hz: tuple[float, float], *, less: Less = lambda e: e, afresh: bool = False) -> Hypothesis:
     """The hypothesis, its i-th effect fitted again beside the others, or looked for anew."""
     effect, before, after = h.effects[i], h.effects[:i], h.effects[i + 1 :]
-    rest = refitted(replace(h, effects=(*before, *after)), bodies)
+    rest = refitted(with_effects(h, (*before, *after), bodies), bodies)
     told = less(evidence_of(rest, bodies, band_hz))
     found = type(effect).propose(told if afresh else replace(told, known=effect))
     return refitted(replace(rest, effects=(*before, found or effect, *after)), bodies, told.heard)
@@ -108,7 +108,7 @@ def exchanged(
             own = added[i]
             say(f"trying {rival.id} in place of {own.id}")
             effects = tuple(rival.effect if e.id == own.id else e for e in best.effects)
-            other = settled(replace(best, effects=effects), bodies, takes, band_hz)
+            other = settled(refitted(with_effects(best, effects, bodies), bodies), bodies, takes, band_hz)
             far = left_out_db(best, bodies, takes, band_hz) if far is None else far
             now = left_out_db(other, bodies, takes, band_hz)
             if surely(far - now, ALIKE * rival.mean_db):

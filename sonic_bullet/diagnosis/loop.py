@@ -17,7 +17,7 @@ from sonic_bullet.diagnosis.evidence import evidence_of
 from sonic_bullet.diagnosis.exchange import ALIKE, MANY, SURE, exchanged, rivals
 from sonic_bullet.diagnosis.judge import Judged, Take, least_db, mean_db
 from sonic_bullet.diagnosis.play import Hypothesis, moves, play
-from sonic_bullet.diagnosis.refit import ROUGH, refitted
+from sonic_bullet.diagnosis.refit import ROUGH, refitted, with_effects
 from sonic_bullet.diagnosis.trial import Candidate, trials
 from sonic_bullet.effects.values import Effect
 from sonic_bullet.estimator.distance import with_noise
@@ -124,7 +124,7 @@ def _pruned(h: Hypothesis, added: list[Candidate], bodies: tuple[Struck, ...], t
     """Without the effects that those found after them have made needless."""
     for candidate in added[:-1]:
         rest = [e for e in h.effects if e.id != candidate.id]
-        without = refitted(replace(h, effects=tuple(rest)), bodies)
+        without = refitted(with_effects(h, tuple(rest), bodies), bodies)
         if (mean_db(takes, without) or 0.0) - (mean_db(takes, h) or 0.0) < max(LEAST_DB, LEAST_SHARE * gap_db):
             h, added = without, [c for c in added if c is not candidate]
     return h, added
