@@ -1,4 +1,4 @@
-"""The loop: try all suspects, add the best that earns its keep, look again; then say what is known and what is not.
+"""The loop: try all suspects, add the best that earns its keep, look again; fit them to each other; then say what is known and what is not.
 
 gap = before − floor on left-out strikes;  an effect earns its keep where its mean drop there
   is over LEAST_DB and LEAST_SHARE of the gap, SURE standard errors above zero and above the null effect's by as much
@@ -14,9 +14,10 @@ import numpy as np
 
 from sonic_bullet.diagnosis.bodies import Struck
 from sonic_bullet.diagnosis.evidence import evidence_of
+from sonic_bullet.diagnosis.exchange import ALIKE, MANY, SURE, exchanged, rivals
 from sonic_bullet.diagnosis.judge import Judged, Take, least_db, mean_db
 from sonic_bullet.diagnosis.play import Hypothesis, moves, play
-from sonic_bullet.diagnosis.refit import ROUGH, refitted, retold
+from sonic_bullet.diagnosis.refit import ROUGH, refitted, retold, with_effects
 from sonic_bullet.diagnosis.trial import Candidate, trials
 from sonic_bullet.effects.values import Effect
 from sonic_bullet.estimator.distance import with_noise
@@ -24,9 +25,7 @@ from sonic_bullet.estimator.distance import with_noise
 ROUNDS = 4
 LEAST_DB = 0.4
 LEAST_SHARE = 0.08
-SURE, MANY = 2.0, 4  # standard errors; strikes of which none may lose
 MESH = 1e-3  # of a frequency: what a good mesh gets wrong
-ALIKE = 0.03  # of a drop: names that differ by less are told apart by how much they need
 SUFFICES_DB = 1.5  # a gap below this is the mesh's and the shapes' own
 EXPLAINED = 0.4  # of the gap; part of it is the mesh's and the shapes' own
 OPEN = 0.3  # of the first gap: with less left, no costly suspect is asked
@@ -63,6 +62,7 @@ def closed(
     floor = least_db(takes, h) or 0.0
     start, now = h, before
     added: list[Candidate] = []
+    passed: list[tuple[Candidate, ...]] = []
     last: dict[str, Candidate] = {}
     for turn in range(ROUNDS):
         say(f"round {turn + 1}: {now:.2f} dB from the recordings, noise alone {floor:.2f} dB")
@@ -76,10 +76,11 @@ def closed(
         if not able:
             break
         best = simplest(able)
-        h, added = best.hypothesis, [*added, best]
+        h, added, passed = best.hypothesis, [*added, best], [*passed, rivals(able, best)]
         now = mean_db(takes, h) or 0.0
         floor = least_db(takes, h) or floor
     if len(added) > 1:
+        h, added = exchanged(h, added, passed, bodies, takes, band_hz, say)
         h, added = _pruned(h, added, bodies, takes, before - floor)
         now = mean_db(takes, h) or 0.0
     again = retold(h, bodies)
@@ -126,7 +127,7 @@ def _pruned(h: Hypothesis, added: list[Candidate], bodies: tuple[Struck, ...], t
     """Without the effects that those found after them have made needless."""
     for candidate in added[:-1]:
         rest = [e for e in h.effects if e.id != candidate.id]
-        without = refitted(replace(h, effects=tuple(rest)), bodies)
+        without = refitted(with_effects(h, tuple(rest), bodies), bodies)
         if (mean_db(takes, without) or 0.0) - (mean_db(takes, h) or 0.0) < max(LEAST_DB, LEAST_SHARE * gap_db):
             h, added = without, [c for c in added if c is not candidate]
     return h, added

@@ -16,7 +16,7 @@ from sonic_bullet.diagnosis.bodies import Struck
 from sonic_bullet.diagnosis.evidence import heard_of, outside, paired, path_response
 from sonic_bullet.diagnosis.play import Hypothesis, modes_of, moves, play, undamped
 from sonic_bullet.diagnosis.unheard import can_tell, sought
-from sonic_bullet.effects.values import Blow, Heard, Stage
+from sonic_bullet.effects.values import Blow, Effect, Heard, Stage
 from sonic_bullet.estimator.lines import noise_rms
 from sonic_bullet.estimator.pairing import MESHED, TWINS
 from sonic_bullet.estimator.rayleigh import rayleigh
@@ -52,9 +52,15 @@ def retold(h: Hypothesis, bodies: tuple[Struck, ...]) -> Hypothesis:
     return h
 
 
+def with_effects(h: Hypothesis, effects: tuple[Effect, ...], bodies: tuple[Struck, ...]) -> Hypothesis:
+    """The hypothesis with other effects, not yet refitted; where none moves modes any more, corrections are the baseline's again."""
+    made = replace(h, effects=effects)
+    return made if moves(made) or not moves(h) else replace(made, stretch=0.0, correction={b.name: b.correction for b in bodies})
+
+
 def corrected(h: Hypothesis, bodies: tuple[Struck, ...]) -> Hypothesis:
-    """The hypothesis with E/ρ and corrections learnt on its own modes."""
-    h = replace(h, correction=None, stretch=0.0)
+    """The hypothesis with E/ρ and corrections learnt on its own modes, from where its effects have found E/ρ (``stretch``)."""
+    h = replace(h, correction=None, stretch=float(sum(getattr(e, "stretch", 0.0) for e in h.effects)))
     for _ in range(3):
         off = np.concatenate([_off(h, body)[1] for body in bodies if body.gathered is not None] or [np.zeros(0)])
         if len(off):

@@ -5,7 +5,8 @@
 R: what the modes above the band yield at the point, along its normal and across: residual attachment modes far above them [Rubin 1975]. Without it a
 point mass is held too stiffly, and its higher modes come out several per cent high.
 Read off frequencies and patterns together: for points all over the surface and masses up to a sixth of the body's, lines are paired with the loaded
-body's modes anew; the pairs that agree best stand, where they agree better than the bare body's.
+body's modes anew; the pairs that agree best stand, where they agree better than the bare body's. E/ρ was fitted to lines that the mass had lowered, so
+the common scale of all frequencies is looked for along with it, on the bare body as well: λ(Λ e^{2s}, R e^{−2s}) = e^{2s} λ(Λ, R).
 """
 
 from __future__ import annotations
@@ -30,12 +31,18 @@ NEAR, TURNS = 16, 5  # vertices and turns of the search about one of them
 TRIES = 6
 WIDTHS = (0.016, 0.008, 0.004)  # of ln f: lines and modes are paired ever more closely
 MATCHED, MOVED = 0.8, 2.5e-3  # share of lines, and how far nine in ten of them may lie off: a mesh's error
+REACH, BINS = (-0.1, 0.25), 0.008  # of ln f: common shifts of the baseline's modes that are looked at; a mass lowers lines, so up above all
+FAR_OFF = 0.015  # of ln f: more than pairs alone find
+PEAKS = 2  # of those shifts, tried further
 BETTER = (1.5, 0.12)  # in price: as much as a strong line and a half, paired well; and of the bare body's own
 
 
 @dataclass(frozen=True)
 class AddedMass:
-    """mass_kg riding on position_m (3,) of the surface, in the mesh's frame. yield_m_n: along the normal and across it, of what the model's modes leave out."""
+    """mass_kg riding on position_m (3,) of the surface, in the mesh's frame. yield_m_n: along the normal and across it, of what the model's modes leave out.
+
+    stretch: ln of what all frequencies of the bare body are to the baseline's; the host takes it over.
+    """
 
     id: ClassVar[str] = "added-mass"
     stage: ClassVar[Stage] = Stage.MODES
@@ -46,6 +53,7 @@ class AddedMass:
     position_m: tuple[float, float, float]
     mass_kg: float
     yield_m_n: tuple[float, float] = (0.0, 0.0)
+    stretch: float = 0.0
 
     def apply(self, x: ModalModel) -> ModalModel:
         """The modes with the effect in them."""
@@ -56,10 +64,10 @@ class AddedMass:
 
     def parameters(self) -> dict[str, Any]:
         """What it says, for people and JSON, in SI units."""
-        return {"mass_kg": self.mass_kg, "position_m": list(self.position_m), "yield_m_n": list(self.yield_m_n)}
+        return {"mass_kg": self.mass_kg, "position_m": list(self.position_m), "yield_m_n": list(self.yield_m_n), "stretch": self.stretch}
 
     def freedom(self) -> int:
-        return 6
+        return 7
 
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
@@ -69,21 +77,24 @@ class AddedMass:
         trial = _Trial.of(heard)
         x = heard.plain
         if isinstance(evidence.known, cls):
-            at = int(np.argmin(((x.vertex_m - evidence.known.position_m) ** 2).sum(axis=1)))
-            return cls._at(x, trial.refined((0.0, at, evidence.known.mass_kg, evidence.known.yield_m_n), WIDTHS[-1:]))
-        none = agreed(trial.line, trial.size, x.freq_hz, patterns(heard, x))
+            known = evidence.known
+            at = int(np.argmin(((x.vertex_m - known.position_m) ** 2).sum(axis=1)))
+            up, side = (float(y * np.exp(2 * known.stretch)) for y in known.yield_m_n)
+            return cls._at(x, trial.refined((0.0, at, known.mass_kg, (up, side), known.stretch), WIDTHS[-1:]))
+        plain = patterns(heard, x)
+        none = min((agreed(trial.line, trial.size, x.freq_hz, plain, shift=s) for s in trial.shifts(x.freq_hz, plain)), key=lambda one: one[0])
         if _in_place(trial.line, x.freq_hz, none):
             return None
         found = []
         for vertex in spread_out(x, POINTS):
             most = trial.yields(int(vertex))
-            found += [trial.scored(int(vertex), s * x.mass_kg, (y * most, ACROSS * y * most), WIDTHS[0]) for s in SHARES for y in YIELDS]
+            found += [one for s in SHARES for y in YIELDS for one in trial.sifted(int(vertex), s * x.mass_kg, (y * most, ACROSS * y * most), WIDTHS[0])]
         found.sort()
-        first: dict[tuple[int, bool], Scored] = {}
-        for one in found:
-            first.setdefault((one[1], one[2] > 0.02 * x.mass_kg), one)  # one light and one heavy start a vertex
-        best = min(trial.refined(start) for start in list(first.values())[:TRIES])
-        again = sorted(trial.scored(int(v), best[2], best[3], WIDTHS[1]) for v in spread_out(x, 3 * POINTS))  # round bodies: as heavy, elsewhere
+        first: dict[bool, dict[tuple[int, bool], Scored]] = {False: {}, True: {}}
+        for one in found:  # one light and one heavy start a vertex, where the baseline's scale may be right and where it is wrong
+            first[abs(one[4]) > FAR_OFF].setdefault((one[1], one[2] > 0.02 * x.mass_kg), one)
+        best = min(trial.refined(start) for some in first.values() for start in list(some.values())[:TRIES])
+        again = sorted(trial.scored(int(v), *best[2:], WIDTHS[1]) for v in spread_out(x, 3 * POINTS))  # round bodies: as heavy, elsewhere
         best = min(best, *(trial.refined(start, WIDTHS[1:]) for start in again[: TRIES // 2]))
         if best[0] > none[0] - max(BETTER[0], BETTER[1] * abs(none[0])):
             return None
@@ -91,9 +102,10 @@ class AddedMass:
 
     @classmethod
     def _at(cls, x: ModalModel, found: Scored) -> Self:
-        _, vertex, mass_kg, along = found
+        _, vertex, mass_kg, along, shift = found
         place = x.vertex_m[vertex]
-        return cls((float(place[0]), float(place[1]), float(place[2])), float(mass_kg), (float(along[0]), float(along[1])))
+        up, side = (float(y * np.exp(-2 * shift)) for y in along)
+        return cls((float(place[0]), float(place[1]), float(place[2])), float(mass_kg), (up, side), float(shift))
 
 
 def _in_place(line_hz: Array, mode_hz: Array, none: tuple[float, Array, Array, float]) -> bool:
@@ -134,7 +146,7 @@ def loaded(x: ModalModel, phi: Array, mass_kg: float) -> ModalModel:
     return replace(x, freq_hz=freq[order], decay_per_s=decay[order], shape=shape)
 
 
-Scored = tuple[float, int, float, tuple[float, float]]  # price, vertex, mass in kg, yields in m/N
+Scored = tuple[float, int, float, tuple[float, float], float]  # price, vertex, mass in kg, yields in m/N of the baseline's stiffness, ln of the scale
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -158,14 +170,40 @@ class _Trial:
         """What the model's own modes yield along a vertex' normal, in m/N."""
         return float(((self.normal[vertex] @ self.bare.shape[vertex].astype(float)) ** 2 / self.bare.omega0_squared_per_s2).sum())
 
-    def scored(self, vertex: int, mass: float, along: tuple[float, float], width: float) -> Scored:
-        """The price of the best pairs first."""
+    def loaded(self, vertex: int, mass: float, along: tuple[float, float]) -> tuple[Array, Array]:
+        """Frequencies (m,) with the mass on, and patterns (s, m)."""
         x = loaded(self.small, attached(self.bare.shape[vertex].astype(float), self.normal[vertex], along, self.bare), mass)
         s, heard = len(self.heard.strike_vertex), self.heard
         level = np.where(np.isfinite(heard.impulse_n_s), heard.impulse_n_s, 1.0)
         push = np.einsum("sxm,sx->sm", x.shape[:s].astype(float), heard.strike_way) * level[:, None]
-        told = np.abs(push * np.einsum("xm,x->m", x.shape[s].astype(float), heard.sensor_way))
-        return agreed(self.line, self.size, x.freq_hz, told, turns=1, width=width)[0], vertex, mass, along
+        return x.freq_hz, np.abs(push * np.einsum("xm,x->m", x.shape[s].astype(float), heard.sensor_way))
+
+    def shifts(self, freq_hz: Array, told: Array) -> list[float]:
+        """None, and the common shifts of modes that most lines of their patterns (s, m) agree on, as two spectra on a logarithmic axis."""
+        alike = 1.0
+        if len(self.size) > 1 and np.isfinite(self.size).all() and np.isfinite(told).all():
+            long = np.linalg.norm(self.size, axis=0)[:, None] * np.linalg.norm(told, axis=0)
+            alike = (self.size.T @ told / np.maximum(long, 1e-300)) ** 4
+        gap = np.log(self.line)[:, None] - np.log(freq_hz)
+        edge = np.arange(REACH[0] - BINS, REACH[1] + 2 * BINS, BINS)
+        count = np.histogram(gap, edge, weights=np.broadcast_to(alike, gap.shape))[0]
+        count = np.convolve(count, (0.5, 1.0, 0.5), "same")
+        peak = np.flatnonzero((count[1:-1] >= count[:-2]) & (count[1:-1] > count[2:])) + 1
+        best = peak[np.argsort(-count[peak])][:PEAKS]
+        return [0.0, *(float(edge[i] + BINS / 2) for i in best)]
+
+    def sifted(self, vertex: int, mass: float, along: tuple[float, float], width: float) -> list[Scored]:
+        """At each of its shifts."""
+        made = self.loaded(vertex, mass, along)
+        return [self._scored(made, vertex, mass, along, shift, width) for shift in self.shifts(*made)]
+
+    def scored(self, vertex: int, mass: float, along: tuple[float, float], shift: float, width: float) -> Scored:
+        """The price of the best pairs first; near a shift."""
+        return self._scored(self.loaded(vertex, mass, along), vertex, mass, along, shift, width)
+
+    def _scored(self, made: tuple[Array, Array], vertex: int, mass: float, along: tuple[float, float], shift: float, width: float) -> Scored:
+        price, _, _, found = agreed(self.line, self.size, *made, shift=shift, turns=1, width=width)
+        return price, vertex, mass, along, found
 
     def refined(self, best: Scored, widths: tuple[float, ...] = WIDTHS) -> Scored:
         """The best of nearby vertices, masses and yields, in turns."""
@@ -181,7 +219,7 @@ class _Trial:
         return best
 
     def _around(self, best: Scored, reach: float, width: float) -> list[Scored]:
-        _, vertex, mass, (up, side) = best
+        _, vertex, mass, (up, side), shift = best
         at = self.bare.vertex_m
         body = np.unique(self.bare.face)
         near = body[((at[body] - at[vertex]) ** 2).sum(axis=1) < reach**2]
@@ -190,4 +228,4 @@ class _Trial:
         trials += [(vertex, mass * f, (up, side)) for f in STEPS]
         trials += [(vertex, mass, (max(up, least) * f, side)) for f in (0, *STEPS)] + [(vertex, mass, (up, max(side, least) * f)) for f in (0, *STEPS)]
         trials += [(vertex, mass * f, (max(up, least) * g, max(side, least) * g)) for f in (0.93, 1.07) for g in (0.6, 1.0, 1.5)]
-        return [self.scored(*one, width) for one in trials]
+        return [self.scored(*one, shift, width) for one in trials]

@@ -84,6 +84,8 @@ class DampingLaw:
             return np.asarray((np.log(np.maximum(model, 1e-9)) - y) / sd)
 
         trials = [(bic, cls(*values)) for bic, values in _fits(omega, cost)]
+        if isinstance(evidence.known, cls):  # a part of the lines may like another law as well; it is this one that is fitted again
+            trials = [t for t in trials if t[1].law == evidence.known.law]
         bic, best = min(trials, key=lambda t: t[0])
         return best if evidence.known is not None or bic < _least(omega, cost, _rayleigh, [_start(omega, decay)], 2)[0] - BETTER else None
 

@@ -3,7 +3,7 @@
     p = (ln E₁₂₃, n₂₃ n₁₃ n₁₂, ln G₂₃ G₁₃ G₁₂), per density;  n_ij = ν_ij √(E_j/E_i),  S = D^{-1/2} (n) D^{-1/2}       [Bodig & Jayne 1982, eq. 3.8]
     pairs: Σ worth·(min((ln f_k − ln f_j)²/18w² + 1 − c_kj, 1) − 1) → min               [Kuhn 1955], c: likeness of patterns over the strikes
     step:  least squares on ln f, ∂ ln λ/∂C by Hellmann-Feynman, Cauchy's weights, a weak prior about isotropy, w from 5 % down
-    BIC = n ln(mean min((ln f_k − ln f_j)², CAP²)) + q ln n                                                            [Schwarz 1978]
+    BIC = n ln(mean min((ln f_k − ln f_j)², CAP²)) + n(s − 1) ln(mean min(1 − c², 1 − 1/s)) + q ln n, means by worth     [Schwarz 1978]
 
 q: 2 isotropic, 3 cubic, 5 hexagonal about x, y or z (transversely isotropic), 9 orthorhombic (orthotropic). Axes are the mesh's.
 """
@@ -15,25 +15,25 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sonic_bullet.effects.tensors import NAMES, SYMMETRIES, constants, expanded, reduced, sound, stiffness
+from sonic_bullet.effects.tensors import NAMES, SYMMETRIES, bricks, constants, cubes, expanded, reduced, sound, stiffness
 from sonic_bullet.effects.values import Elastic, Evidence, Heard
 from sonic_bullet.records import Array
 
 CAP = 0.012  # of ln f: a line farther off is no such mode
 BRIEF = 10.0  # times the modes' usual decay
 FLOOR = 3e-4  # of ln f: less is not told
+SHORT = 2.0  # times its frequency a mode's decay at most: a loss factor of 0.64, more than soft rubber's
+REAL = 0.75  # of a line's energy in phase with the blow, where phases are true: a mode moves with it or against it, noise as it likes
+ROUGH = 0.02  # of 1 − c²: shapes' own error
 WIDTHS = (0.04, 0.025, 0.016, 0.01, 0.007, 0.005, 0.004, 0.004)
 PRIOR_N, PRIOR_G = 0.1, 0.7  # of n about the guess' ν, of ln G about √(E_i E_j)/2(1+n)
 STEP = np.array([0.3] * 3 + [0.08] * 3 + [0.3] * 3)
 LARGEST_N = 0.46
 STARTS = 5  # of those sifted, taken further
-RATIOS = (0.16, 0.4, 1.0, 2.5, 6.0)
 FIRST = 10  # lines that decide where no pattern does
 PEAKS = 2
 BLIND_STARTS = 12
 REACH, WIDE = 0.6, 0.014  # of ln E/ρ in the sieve; of ln f
-ZENER = (0.4, 0.5, 0.62, 0.77, 0.9, 1.0, 1.15, 1.35, 1.6, 2.0, 2.5)
-POISSON = (-0.1, 0.0, 0.1)  # beside the guess'
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,7 +50,10 @@ class Told:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tensor:
-    """A fitted elasticity. p (9,); bic; scatter: rms of ln f of the lines that fit; matched: their share; held: names of `NAMES` that the prior holds."""
+    """A fitted elasticity. p (9,); bic; scatter: rms of ln f of the lines that fit; matched: their share; held: names of `NAMES` that the prior holds.
+
+    off: rms of ln f of all lines, those beyond CAP counted at it.
+    """
 
     symmetry: str
     p: Array
@@ -58,6 +61,7 @@ class Tensor:
     scatter: float
     matched: float
     held: tuple[str, ...] = ()
+    off: float = CAP
 
     @property
     def stiffness_m2_s2(self) -> Array:
@@ -70,10 +74,15 @@ def told_of(evidence: Evidence) -> list[Told]:
 
 
 def ringing(h: Heard) -> Array:
-    """Which foreign lines (f,) may be modes by their decay; others are a click's, a filter's or a room's."""
-    if not np.isfinite(h.decay_per_s).any():
-        return np.ones(len(h.foreign_hz), bool)
-    return np.asarray(np.nan_to_num(h.foreign_decay_per_s) < BRIEF * max(float(np.nanmedian(h.decay_per_s)), 1.0))
+    """Which foreign lines (f,) may be modes by their decay and phases; others are a click's, a filter's, a room's or noise."""
+    decay = np.nan_to_num(h.foreign_decay_per_s)
+    own = decay < SHORT * h.foreign_hz
+    if np.isfinite(h.decay_per_s).any():
+        own &= decay < BRIEF * max(float(np.nanmedian(h.decay_per_s)), 1.0)
+    if h.elastic is not None and h.elastic.phased and h.signed and len(h.foreign_amplitude) > 1:
+        a = np.nan_to_num(h.foreign_amplitude)
+        own &= (a.real**2).sum(axis=0) >= REAL * (np.abs(a) ** 2).sum(axis=0)
+    return np.asarray(own)
 
 
 def _told(h: Heard) -> Told:
@@ -87,6 +96,8 @@ def _told(h: Heard) -> Told:
     size = np.linalg.norm(np.nan_to_num(amplitude), axis=0)
     worth = np.clip(0.5 + 0.06 * np.log10(np.maximum(size / max(size.max(initial=0), 1e-300), 1e-12)), 0.05, 1) if size.any() else np.full(len(freq), 0.5)
     log_hz = np.log(np.hypot(2 * np.pi * freq, np.nan_to_num(decay)) / (2 * np.pi))[order]
+    wide = np.nan_to_num(decay)[order] / (2 * np.pi * np.exp(log_hz))
+    worth = worth / (1 + (wide / CAP) ** 2)  # a line broader than that stands for whatever is beside it, too
     row = h.strike_vertex - h.sensor_vertex  # from the end: the sensor is the last
     known = np.isfinite(amplitude).all() and len(row) > 1
     return Told(log_hz, np.nan_to_num(sd, nan=1e-4)[order], worth, amplitude if known else None, row, h.elastic)
@@ -133,8 +144,8 @@ def search(evidence: Evidence) -> tuple[Tensor, Tensor] | None:
         return None
     start = isotropic_p(told[0].elastic)
     plain = fitted(told, "isotropic", start, start)
-    ends = [fitted(told, "cubic", s, start) for s in _sifted(told, _cubes(start))]
-    ends += [fitted(told, "orthorhombic", s, start) for s in _sifted(told, _bricks(start))]
+    ends = [fitted(told, "cubic", s, start) for s in _sifted(told, cubes(start))]
+    ends += [fitted(told, "orthorhombic", s, start) for s in _sifted(told, bricks(start))]
     best = min((e for e in ends if e.symmetry == "orthorhombic"), key=lambda e: e.bic)
     for symmetry in ("cubic", "hexagonal-x", "hexagonal-y", "hexagonal-z"):
         ends.append(fitted(told, symmetry, best.p, start, WIDTHS[3:]))
@@ -147,31 +158,6 @@ def isotropic_p(elastic: Elastic) -> Array:
     """p (9,) of the isotropic material a body has in the baseline."""
     m = elastic.material
     return expanded("isotropic", np.array([np.log(m.youngs_pa / m.density_kg_m3), m.poisson]))
-
-
-def _cubes(start: Array) -> list[Array]:
-    found = []
-    for ratio in ZENER:
-        for more in POISSON:
-            p = np.array(start)
-            p[3:6] = np.clip(p[3:6] + more, 0.05, 0.42)
-            p[6:] = p[:3] - np.log(2 * (1 + p[3:6])) + np.log(ratio)
-            found.append(p)
-    return found
-
-
-def _bricks(start: Array) -> list[Array]:
-    """E along y and z over that along x, and G as goes with them or softer."""
-    found = []
-    for y in RATIOS:
-        for z in RATIOS:
-            for soft in (1.0, 0.6):
-                e = np.log(np.array([1.0, y, z]))
-                p = np.array(start)
-                p[:3] += e - e.mean()
-                p[6:] = 0.5 * np.array([p[1] + p[2], p[0] + p[2], p[0] + p[1]]) - np.log(2 * (1 + start[3:6])) + np.log(soft)
-                found.append(p)
-    return found
 
 
 def _sifted(told: Sequence[Told], starts: list[Array]) -> list[Array]:
@@ -269,7 +255,7 @@ def _step(pairs: list[tuple[Told, Seen, Array, Array]], symmetry: str, q: Array,
 def _judged(told: Sequence[Told], symmetry: str, q: Array, guess: Array) -> Tensor:
     """BIC and what the lines leave to the prior."""
     p = expanded(symmetry, q)
-    off, good, slopes = [], [], []
+    off, unlike, numbers, slopes = [], [], 0, []
     turn = _jacobian(symmetry, q, constants)
     for t in told:
         s = seen_by(t, p)
@@ -277,13 +263,19 @@ def _judged(told: Sequence[Told], symmetry: str, q: Array, guess: Array) -> Tens
         mine = np.full(len(t.log_hz), CAP)
         mine[line] = np.clip(np.abs(t.log_hz[line] - s.log_hz[mode]), 0, CAP)
         off.append(mine)
-        good.append(mine < CAP)
+        strikes = 1 if t.amplitude is None or (s.alike == 1).all() else len(t.amplitude)
+        other = np.full(len(t.log_hz), 1 - 1 / strikes)  # of patterns that have nothing to do with each other
+        other[line] = np.clip(1 - s.alike[line, mode] ** 2, 0, 1 - 1 / strikes)
+        unlike.append(other + ROUGH)
+        numbers += (strikes - 1) * len(t.log_hz)
         slopes.append(0.5 * s.slope[:, mode].T @ turn)
-    left, inside = np.concatenate(off), np.concatenate(good)
-    n = len(left)
-    bic = n * np.log(np.mean(np.maximum(left, FLOOR) ** 2)) + SYMMETRIES[symmetry] * np.log(n)
+    left, worth = np.concatenate(off), np.concatenate([t.worth for t in told])
+    inside, n = left < CAP, len(left)
+    square = float(np.average(np.maximum(left, FLOOR) ** 2, weights=worth))
+    bic = n * np.log(square) + numbers * np.log(np.average(np.concatenate(unlike), weights=worth)) + SYMMETRIES[symmetry] * np.log(n)
     scatter = float(np.sqrt(np.mean(left[inside] ** 2))) if inside.any() else CAP
-    return Tensor(symmetry, p, float(bic), scatter, float(inside.mean()), _held(np.concatenate(slopes), symmetry, q, guess, max(scatter, FLOOR)))
+    held = _held(np.concatenate(slopes), symmetry, q, guess, max(scatter, FLOOR))
+    return Tensor(symmetry, p, float(bic), scatter, float(inside.mean()), held, float(np.sqrt(square)))
 
 
 def _held(slope: Array, symmetry: str, q: Array, guess: Array, sd: float) -> tuple[str, ...]:

@@ -84,9 +84,7 @@ class Orthotropy:
         if found is None:
             return None
         plain, best = found
-        count = sum(len(t.log_hz) for t in told)
-        nearer = np.exp((best.bic - plain.bic + (SYMMETRIES["isotropic"] - SYMMETRIES[best.symmetry]) * np.log(count)) / (2 * count))
-        if best.bic > plain.bic - BETTER or nearer > NEARER or departure(best) < LEAST:
+        if best.bic > plain.bic - BETTER or best.off > NEARER * plain.off or departure(best) < LEAST:
             return None
         return cls.of(best, told[0].elastic.material.density_kg_m3)
 

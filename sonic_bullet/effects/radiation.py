@@ -8,7 +8,7 @@ Read off the decays beside Rayleigh's: what is left grows with ka, then flattens
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -21,6 +21,7 @@ IMPEDANCE = 1.2 * 343.0  # ρ₀ c in kg/(m² s)
 SOUND = 343.0
 SCATTER = 0.03
 BETTER = 14.0
+AGAIN = 2.0  # times smaller or larger, where it is fitted again
 
 
 @dataclass(frozen=True)
@@ -59,6 +60,10 @@ class Radiation:
     def freedom(self) -> int:
         return 2
 
+    def others(self) -> tuple[Radiation, ...]:
+        """The same energy, heard otherwise: another effect's roll-off may have taken up the tilt, or left it."""
+        return (replace(self, tilt=0.5 - self.tilt),)
+
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
         heard = max(evidence.heard, key=lambda h: len(h.freq_hz) if h.model is not None else 0)
@@ -70,16 +75,24 @@ class Radiation:
         sd = np.hypot(heard.decay_sd_per_s, SCATTER * decay) + 1e-3
         across = float(np.linalg.norm(np.ptp(heard.model.vertex_m[np.unique(heard.model.face)], axis=0)))
         plain = _left(decay, sd, np.stack([np.full(len(w2), 0.5), 0.5 * w2], axis=1))[1]
-        best: tuple[float, float, float] = (np.inf, 0.0, 0.0)
-        for radius in np.geomspace(0.02 * across, across, 40):
+        radii = np.geomspace(0.02 * across, across, 40)
+        if isinstance(evidence.known, cls):  # a part of the lines may leave the knee anywhere below the band: it is this one that is fitted again
+            radii = evidence.known.radius_m * np.geomspace(1 / AGAIN, AGAIN, 21)
+        found = []
+        for radius in radii:
             sigma = cls(float(radius), 1.0).efficiency(heard.freq_hz)
             x, left = _left(decay, sd, np.stack([np.full(len(w2), 0.5), 0.5 * w2, 0.5 * IMPEDANCE * sigma * mine], axis=1))
-            if x[2] > 0 and left < best[0]:
-                best = (left, float(radius), float(x[2]))
-        if best[1] == 0 or (evidence.known is None and (not plain - best[0] > BETTER + 2 * np.log(len(w2)) or best[0] > 0.5 * plain)):
+            if x[2] > 0:
+                found.append((left, cls(float(radius), float(x[2]))))
+        if not found:
             return None
-        made = cls(best[1], best[2])
-        return cls(best[1], best[2], _tilt(heard, made))
+        left, best = min(found, key=lambda one: one[0])
+        if evidence.known is None and (not plain - left > BETTER + 2 * np.log(len(w2)) or left > 0.5 * plain):
+            return None
+        if not _tilts(heard, best):
+            return best
+        both = [(left + _level_cost(heard, one), one) for left, one in found]  # what radiates is heard: levels tell the knee too
+        return replace(min(both, key=lambda one: one[0])[1], tilt=0.5)
 
 
 def areas(x: ModalModel) -> Array:
@@ -97,9 +110,19 @@ def _left(decay: Array, sd: Array, columns: Array) -> tuple[Array, float]:
     return value, float(left.sum())
 
 
-def _tilt(heard: Heard, made: Radiation) -> float:
-    """0 or ½, whichever the amplitudes follow better."""
+def _off(heard: Heard, made: Radiation, tilt: float) -> Array:
+    """ln of every line's level (k,) over the expected one, as the strikes agree on, less the tilt and what is common."""
     ratio = np.log(np.maximum(np.abs(heard.amplitude), 1e-300) / np.maximum(np.abs(heard.expected), 1e-300))
-    middle = np.median(ratio, axis=0)
-    tilt = 0.5 * np.log(made.efficiency(heard.freq_hz))
-    return 0.5 if np.abs(middle - tilt - np.median(middle - tilt)).mean() < 0.8 * np.abs(middle - np.median(middle)).mean() else 0.0
+    left = np.median(ratio, axis=0) - tilt * np.log(made.efficiency(heard.freq_hz))
+    return np.asarray(left - np.median(left))
+
+
+def _tilts(heard: Heard, made: Radiation) -> bool:
+    """Whether the amplitudes follow √σ better than nothing."""
+    return bool(np.abs(_off(heard, made, 0.5)).mean() < 0.8 * np.abs(_off(heard, made, 0.0)).mean())
+
+
+def _level_cost(heard: Heard, made: Radiation) -> float:
+    """Twice the negative log likelihood of tilted levels under Laplace's law of unknown width."""
+    off = np.abs(_off(heard, made, 0.5))
+    return float(2 * len(off) * np.log(max(off.mean(), SCATTER)))

@@ -13,6 +13,9 @@ from sonic_bullet.records import ORTHOTROPIC, Array
 
 SYMMETRIES = {"isotropic": 2, "cubic": 3, "hexagonal-x": 5, "hexagonal-y": 5, "hexagonal-z": 5, "orthorhombic": 9}
 NAMES = ("youngs_x", "youngs_y", "youngs_z", "n_yz", "n_xz", "n_xy", "shear_yz", "shear_xz", "shear_xy")
+RATIOS = (0.16, 0.4, 1.0, 2.5, 6.0)
+ZENER = (0.4, 0.5, 0.62, 0.77, 0.9, 1.0, 1.15, 1.35, 1.6, 2.0, 2.5)
+POISSON = (-0.1, 0.0, 0.1)  # beside the guess'
 
 
 def stiffness(p: Array) -> Array:
@@ -70,3 +73,29 @@ def p_of(stiffness_m2_s2: Array) -> Array:
     youngs = 1 / np.diag(compliance)[:3]
     normal = [-compliance[i, j] * np.sqrt(youngs[i] * youngs[j]) for i, j in ((1, 2), (0, 2), (0, 1))]
     return np.concatenate([np.log(youngs), normal, np.log(np.diag(stiffness_m2_s2)[3:])])
+
+
+def cubes(start: Array) -> list[Array]:
+    """Cubic tensors p to begin a search with, about an isotropic one."""
+    found = []
+    for ratio in ZENER:
+        for more in POISSON:
+            p = np.array(start)
+            p[3:6] = np.clip(p[3:6] + more, 0.05, 0.42)
+            p[6:] = p[:3] - np.log(2 * (1 + p[3:6])) + np.log(ratio)
+            found.append(p)
+    return found
+
+
+def bricks(start: Array) -> list[Array]:
+    """Orthorhombic ones: E along y and z over that along x, and G as goes with them or softer."""
+    found = []
+    for y in RATIOS:
+        for z in RATIOS:
+            for soft in (1.0, 0.6):
+                e = np.log(np.array([1.0, y, z]))
+                p = np.array(start)
+                p[:3] += e - e.mean()
+                p[6:] = 0.5 * np.array([p[1] + p[2], p[0] + p[2], p[0] + p[1]]) - np.log(2 * (1 + start[3:6])) + np.log(soft)
+                found.append(p)
+    return found

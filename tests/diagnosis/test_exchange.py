@@ -1,0 +1,74 @@
+"""Several effects at once: what one took up alone is given back once the other is there, names included."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from made_body import SR, recorded, truth
+
+from sonic_bullet.diagnosis.evidence import evidence_of, thinned
+from sonic_bullet.diagnosis.exchange import exchanged, surely, together
+from sonic_bullet.diagnosis.judge import Take, mean_db
+from sonic_bullet.diagnosis.refit import refitted
+from sonic_bullet.diagnosis.trial import Candidate
+from sonic_bullet.effects.contact_time import ContactTime
+from sonic_bullet.effects.measurement_chain import MeasurementChain
+from sonic_bullet.effects.radiation import Radiation
+from sonic_bullet.estimator.distance import floor_between
+
+BAND = (50.0, 7_500.0)
+PULSE = ContactTime(9e-4, 0.02, 0.0)
+SOUNDING = Radiation(0.05, 3.0, 0.5)
+
+
+def test_a_filter_that_came_first_goes_for_the_pulse_that_a_tilt_of_level_had_hidden() -> None:
+    """√σ and the pulse together look like a gentler low-pass, until both are fitted at once."""
+    body = recorded(PULSE, SOUNDING)
+    assert body.gathered is not None and body.gathered.signals is not None
+    floor = floor_between(list(body.gathered.signals))
+    takes = [Take(body, i, x, SR, floor) for i, x in zip(body.fitted, body.gathered.signals, strict=True)]
+    plain = refitted(truth(), (body,))
+    told = evidence_of(plain, (body,), BAND)
+    low, pulse = MeasurementChain.propose(told), ContactTime.propose(told)
+    assert low is not None and pulse is not None
+    wrong = replace(plain, effects=(low, Radiation(0.05, 3.0, 0.0)))
+    drop = np.full(len(takes), 2.0)
+    chosen, passed = (Candidate(e.id, e, plain, drop, 0.0, {}) for e in (low, pulse))
+    other = Candidate("radiation", wrong.effects[1], plain, drop, 0.0, {})
+    h, added = exchanged(wrong, [chosen, other], [(passed,), ()], (body,), takes, BAND, lambda _: None)
+    assert [c.id for c in added] == ["contact-time", "radiation"]
+    found = {e.id: e for e in h.effects}
+    assert found["contact-time"].parameters()["tau_s"] == pytest.approx(9e-4, rel=0.03)
+    assert found["radiation"].parameters()["tilt"] == 0.5
+    before = mean_db(takes, refitted(wrong, (body,)))
+    after = mean_db(takes, h)
+    assert before is not None and after is not None and after < 0.6 * before
+
+
+def test_effects_that_are_right_stay() -> None:
+    body = recorded(PULSE, SOUNDING)
+    h = together(truth(PULSE, SOUNDING), (body,), BAND)
+    found = {e.id: e.parameters() for e in h.effects}
+    assert found["contact-time"]["tau_s"] == pytest.approx(9e-4, rel=0.02)
+    assert found["radiation"]["radius_m"] == pytest.approx(0.05, rel=0.2)
+    assert found["radiation"]["tilt"] == 0.5
+
+
+def test_a_part_of_the_evidence_fits_the_same_pulse_again() -> None:
+    """Eight lines of a few strikes may like another pulse somewhere else; it was not asked for."""
+    body = recorded(PULSE, SOUNDING)
+    told = evidence_of(truth(SOUNDING), (body,), BAND)
+    for seed in range(6):
+        less = replace(thinned(told, seed % 5, 0.4, np.random.default_rng(seed)), known=PULSE)
+        again = ContactTime.propose(less)
+        assert again is not None and again.pulse == PULSE.pulse
+        assert again.duration_s(0.02) == pytest.approx(9e-4, rel=0.3)
+
+
+def test_strikes_must_agree_before_a_name_is_changed() -> None:
+    assert surely(np.array([0.4, 0.3, 0.4, 2.5, 0.4]), 0.1)  # no strike speaks against it
+    assert not surely(np.array([0.4, -0.9, 0.4, 2.5, 0.4]), 0.1)
+    assert not surely(np.array([0.05, 0.04, 0.05, 0.06, 0.05]), 0.1)  # too alike
+    assert not surely(np.array([2.0]), 0.1)

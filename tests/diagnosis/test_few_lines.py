@@ -1,0 +1,76 @@
+"""Few, broad lines in noise: which of them may be modes, and what their patterns tell of a tensor."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from made_body import recorded, truth
+
+from sonic_bullet.diagnosis.evidence import evidence_of, thinned
+from sonic_bullet.effects.damping_law import DampingLaw
+from sonic_bullet.effects.elasticities import Tensor, Told, _judged, isotropic_p, ringing, told_of
+from sonic_bullet.effects.tensors import reduced
+from sonic_bullet.effects.values import Elastic, Heard
+from sonic_bullet.records import Array, Material
+
+BAND = (50.0, 7_500.0)
+MATERIAL = Material.isotropic("wood", youngs_pa=1e10, poisson=0.3, density_kg_m3=600)
+
+
+def elastic(freq_hz: Array, pattern: Array) -> Elastic:
+    """A body whose modes stay where they are, whatever the tensor."""
+    return Elastic(MATERIAL, True, lambda _: (freq_hz, np.zeros((9, len(freq_hz))), pattern), lambda _: None)  # type: ignore[arg-type,return-value]
+
+
+def heard(hz: list[float], decay: list[float], amplitude: Array) -> Heard:
+    """A plate's strikes that hold foreign lines (f,) of these numbers and amplitudes (s, f)."""
+    body = recorded()
+    one = evidence_of(truth(), (body,), BAND).heard[0]
+    return replace(
+        one,
+        elastic=elastic(np.array(hz), amplitude.real),
+        foreign_hz=np.array(hz),
+        foreign_decay_per_s=np.array(decay),
+        foreign_amplitude=amplitude,
+        foreign_sd=np.full(amplitude.shape, 1e-4),
+    )
+
+
+def test_what_is_gone_within_a_period_or_keeps_no_phase_is_no_mode() -> None:
+    turn = np.exp(1j * np.array([0.3, 1.9, -2.2, 1.1, -1.3]))
+    still = np.array([1.0, -0.5, 0.7, -0.9, 0.4]) + 0j
+    one = heard([20.0, 60.0, 900.0, 1200.0], [60.0, 20.0, 50.0, 50.0], np.stack([still, still, turn, still], axis=1))
+    assert ringing(one).tolist() == [False, True, False, True]
+
+
+def test_broad_lines_are_worth_less() -> None:
+    still = np.array([1.0, -0.5, 0.7, -0.9, 0.4]) + 0j
+    one = heard([900.0, 601.0, 613.0], [5.0, 20.0, 120.0], np.stack([still] * 3, axis=1))
+    told = told_of(replace(evidence_of(truth(), (recorded(),), BAND), heard=(one,)))[0]
+    narrow, broad = (told.worth[int(np.argmin(np.abs(told.log_hz - np.log(f))))] for f in (601.0, 613.0))
+    assert broad < 0.8 * narrow
+
+
+def test_patterns_speak_where_frequencies_agree() -> None:
+    """Two bodies with the same frequencies; only one has the lines' patterns."""
+    rng = np.random.default_rng(0)
+    hz, shape = np.geomspace(800, 3000, 5), rng.standard_normal((5, 5))
+
+    def judged(pattern: Array) -> Tensor:
+        told = Told(np.log(hz), np.full(5, 1e-4), np.full(5, 0.5), shape + 0j, np.arange(-5, 0), elastic(hz, pattern))
+        start = isotropic_p(told.elastic)
+        return _judged([told], "isotropic", reduced("isotropic", start), start)
+
+    right, wrong = judged(shape), judged(rng.standard_normal((5, 5)))
+    assert right.bic < wrong.bic - 10
+
+
+def test_a_part_of_the_lines_fits_the_same_law_again() -> None:
+    law = DampingLaw("power", 6e-3, 1.4)
+    told = evidence_of(truth(), (recorded(law),), BAND)
+    for seed in range(4):
+        again = DampingLaw.propose(replace(thinned(told, seed, 0.4, np.random.default_rng(seed)), known=law))
+        assert again is not None and again.law == "power"
+        assert again.exponent == pytest.approx(1.4, abs=0.15)
