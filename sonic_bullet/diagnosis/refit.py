@@ -15,7 +15,7 @@ import numpy as np
 from sonic_bullet.diagnosis.bodies import Struck
 from sonic_bullet.diagnosis.evidence import heard_of, outside, paired, path_response
 from sonic_bullet.diagnosis.play import Hypothesis, modes_of, moves, play, undamped
-from sonic_bullet.diagnosis.unheard import can_tell, sought
+from sonic_bullet.diagnosis.unheard import CORRECTION, can_tell, sought
 from sonic_bullet.effects.values import Blow, Effect, Heard, Stage
 from sonic_bullet.estimator.lines import noise_rms
 from sonic_bullet.estimator.pairing import MESHED, TWINS
@@ -23,7 +23,6 @@ from sonic_bullet.estimator.rayleigh import rayleigh
 from sonic_bullet.records import Array
 
 ROUGH = 0.02
-CORRECTION = 0.01
 NEAR, ALIKE = 5e-3, 1.6  # of ln f and ln d: lines of one mode
 
 
@@ -79,8 +78,8 @@ def corrected(h: Hypothesis, bodies: tuple[Struck, ...]) -> Hypothesis:
                 found[body.name] = _alike(undamped(h, body).freq_hz, found[body.name])
         if can_tell(body):
             now = replace(h, correction=found)
-            _, order = modes_of(now, body)
-            groups = [order[who] for who in paired(now, body, *modes_of(now, body))[1]]
+            model, order = modes_of(now, body)
+            groups = [order[who] for who in paired(now, body, model, order)[1]]
             lone = np.setdiff1d(np.arange(len(ratio)), np.concatenate([*groups, np.zeros(0, int)]))
             shared = np.concatenate([*(g for g in groups if len(g) > 1), np.zeros(0, int)])
             found[body.name] = sought(now, body, np.concatenate([lone, shared]), alone=np.isin(np.arange(len(ratio)), lone))

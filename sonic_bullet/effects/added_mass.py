@@ -48,7 +48,7 @@ class AddedMass:
     stage: ClassVar[Stage] = Stage.MODES
     owner: ClassVar[Owner] = Owner.FIXTURE
     costly: ClassVar[bool] = True
-    reference: ClassVar[str] = "Rayleigh 1894, § 88-90"
+    reference: ClassVar[str] = "Rayleigh 1894, § 88-90; Rubin 1975"
 
     position_m: tuple[float, float, float]
     mass_kg: float

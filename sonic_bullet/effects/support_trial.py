@@ -178,23 +178,6 @@ class Trial:
         own = -size[:, None] * size / (z.conj()[:, None] + z) + 1e-3 * np.eye(len(z))
         return np.asarray((np.linalg.solve(own, -size[:, None] / (z.conj()[:, None] + y)) @ push.T).T * size)
 
-    def modes(self, dashpots: tuple[Dashpot, ...], *, quick: bool) -> tuple[Array, Array]:
-        """Poles (m,) and turns (m, m) under dashpots."""
-        x = self.model
-        lam, own = x.omega0_squared_per_s2, x.decay_per_s
-        if not dashpots:
-            return -own + 2j * np.pi * x.freq_hz, np.eye(len(lam), dtype=complex)
-        moved = [(d, x.shape[d.vertex].astype(float)) for d in dashpots]
-        phi = np.concatenate([np.sqrt(d.c) * (at if d.along == "every" else self.normal[d.vertex][None] @ at) for d, at in moved])
-        if not quick:
-            whole = coupled(lam, own, phi)
-            return whole.pole, whole.turn
-        pole, turn = np.empty(len(lam), complex), np.zeros((len(lam), len(lam)), complex)
-        for run in self.runs:
-            part = coupled(lam[run], own[run], phi[:, run])
-            pole[run], turn[np.ix_(run, run)] = part.pole, part.turn
-        return pole, turn
-
     def _alike(self, omega: Array, decay: Array, push: Array) -> Array:
         """Cosines (k, m) of the lines' amplitudes over the strikes and what one exponential at each mode's pole takes of all, or the mode's own."""
         share = 2 * decay[None, :] / (decay[:, None] + decay[None, :] - 1j * (omega[:, None] - omega[None, :]))
