@@ -19,13 +19,12 @@ from sonic_bullet.diagnosis.evidence import evidence_of, thinned
 from sonic_bullet.diagnosis.judge import Take, mean_db
 from sonic_bullet.diagnosis.play import Hypothesis
 from sonic_bullet.diagnosis.refit import refitted, with_effects
-from sonic_bullet.diagnosis.trial import Candidate
+from sonic_bullet.diagnosis.trial import MANY, SURE, Candidate
 from sonic_bullet.effects.values import Evidence
 from sonic_bullet.records import Array
 
 TURNS = 2
 RIVAL = 0.5  # of what the best of a round said alone
-SURE, MANY = 2.0, 4  # standard errors of the difference over the strikes; strikes of which none may lose
 ALIKE = 0.03  # of what a name says: those that differ by less are not told apart
 
 Less = Callable[[Evidence], Evidence]

@@ -1,7 +1,6 @@
 """The loop: try all suspects, add the best that earns its keep, look again; fit them to each other; then say what is known and what is not.
 
-gap = before − floor on left-out strikes;  an effect earns its keep where its mean drop there
-  is over LEAST_DB and LEAST_SHARE of the gap, SURE standard errors above zero and above the null effect's by as much
+gap = before − floor on left-out strikes; which effect earns its keep is said in trial.py
 """
 
 from __future__ import annotations
@@ -14,17 +13,15 @@ import numpy as np
 
 from sonic_bullet.diagnosis.bodies import Struck
 from sonic_bullet.diagnosis.evidence import evidence_of
-from sonic_bullet.diagnosis.exchange import ALIKE, MANY, SURE, exchanged, rivals
+from sonic_bullet.diagnosis.exchange import ALIKE, exchanged, rivals
 from sonic_bullet.diagnosis.judge import Judged, Take, least_db, mean_db
 from sonic_bullet.diagnosis.play import Hypothesis, moves, play
 from sonic_bullet.diagnosis.refit import ROUGH, refitted, retold, with_effects
-from sonic_bullet.diagnosis.trial import Candidate, trials
+from sonic_bullet.diagnosis.trial import LEAST_DB, LEAST_SHARE, SURE, Candidate, earns, trials
 from sonic_bullet.effects.values import Effect
 from sonic_bullet.estimator.distance import with_noise
 
 ROUNDS = 4
-LEAST_DB = 0.4
-LEAST_SHARE = 0.08
 MESH = 1e-3  # of a frequency: what a good mesh gets wrong
 SUFFICES_DB = 1.5  # a gap below this is the mesh's and the shapes' own
 EXPLAINED = 0.4  # of the gap; part of it is the mesh's and the shapes' own
@@ -69,7 +66,8 @@ def closed(
         if now - floor < LEAST_DB:
             break  # nothing can earn its keep
         evidence = evidence_of(h, bodies, band_hz, seed=seed)
-        found = trials(h, bodies, takes, evidence, effects, seed=seed + turn, say=say, costly=now - floor > OPEN * (before - floor))
+        told = mean_db(takes, retold(h, bodies)) or 0.0  # a room's response is the lines' so far, which leaves open more than there is
+        found = trials(h, bodies, takes, evidence, effects, seed=seed + turn, say=say, costly=told - floor > OPEN * (before - floor))
         for candidate in found:
             last.setdefault(candidate.id, candidate)
         able = [c for c in found if earns(c, max(now - floor, 0.0))]
@@ -131,18 +129,6 @@ def _pruned(h: Hypothesis, added: list[Candidate], bodies: tuple[Struck, ...], t
         if (mean_db(takes, without) or 0.0) - (mean_db(takes, h) or 0.0) < max(LEAST_DB, LEAST_SHARE * gap_db):
             h, added = without, [c for c in added if c is not candidate]
     return h, added
-
-
-def earns(c: Candidate, gap_db: float) -> bool:
-    """Whether a suspect explains enough, surely enough, and more than chance."""
-    if len(c.drop_db) == 0:
-        return False
-    need = max(LEAST_DB, LEAST_SHARE * gap_db)
-    if not (c.mean_db > need and np.isfinite(c.sd_db)):
-        return False
-    if len(c.drop_db) >= MANY and c.drop_db.min() > -0.1 * c.mean_db and float(np.median(c.drop_db)) > 0.5 * need:
-        return c.mean_db - max(c.null_db, 0.0) > 0.5 * need  # no strike speaks against it, though loud ones may gain far more than soft ones
-    return c.mean_db > SURE * c.sd_db and c.mean_db - max(c.null_db, 0.0) > max(SURE * c.sd_db, 0.5 * need)
 
 
 def simplest(able: Sequence[Candidate]) -> Candidate:

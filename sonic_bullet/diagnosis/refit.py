@@ -37,16 +37,18 @@ def refitted(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...]
     return _gained(_damped(h, bodies, heard), bodies, heard)
 
 
-def retold(h: Hypothesis, bodies: tuple[Struck, ...]) -> Hypothesis:
-    """The hypothesis with a room's response told again, beside all that has been found."""
+def retold(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...] | None = None) -> Hypothesis:
+    """The hypothesis with a room's response told again, beside all that has been found. heard: whose strikes may tell it; all where None."""
     fitted = [b for b in bodies if b.gathered is not None]
+    most = max(range(len(fitted)), key=lambda i: len(fitted[i].gathered.lines.freq_hz), default=0)  # type: ignore[union-attr]
     for room in (e for e in h.effects if hasattr(e, "told_by")):
-        body = max(fitted, key=lambda b: len(b.gathered.lines.freq_hz))  # type: ignore[union-attr]
-        assert body.gathered is not None and body.gathered.signals is not None
-        signal, sr = body.gathered.signals, body.gathered.sr
+        body, g = fitted[most], fitted[most].gathered
+        assert g is not None and g.signals is not None
+        which = list(heard[most].strike) if heard else list(range(len(g.signals)))
+        signal = g.signals[which]
         bare = replace(h, effects=tuple(e for e in h.effects if e is not room))
-        sound = np.stack([play(bare, body, i, signal.shape[1], sr) for i in body.fitted])
-        again = room.told_by(signal, sound, noise_rms(signal, sr), sr)
+        sound = np.stack([play(bare, body, body.fitted[i], signal.shape[1], g.sr) for i in which])
+        again = room.told_by(signal, sound, noise_rms(signal, g.sr), g.sr)
         h = replace(h, effects=tuple(again if e is room else e for e in h.effects))
     return h
 
@@ -182,6 +184,8 @@ def _gained(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...])
     x, y, s = x[good], y[good], s[:, good]
     if not (x > 0).any():
         return h
+    if any(one.dry for one in heard):  # read through a room, a line is off by a factor of its own
+        return replace(h, gain=_middle(y[x > 0] / x[x > 0], (y / s[0])[x > 0]))
     gain, weight = _middle(y[x > 0] / x[x > 0], x[x > 0] / (s[0] + s[1])[x > 0]), np.ones(len(x))
     for _ in range(30):
         sd2 = (s[0] ** 2 + (gain * s[1]) ** 2) + 1e-300

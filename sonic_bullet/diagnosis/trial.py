@@ -3,6 +3,8 @@
     for every strike s:  evidence − s − some lines -> propose -> refit α, β, σ -> D(s)    against the same without the effect
     null: as many numbers, spent on directions drawn at random in the modes' decays and levels, fitted to the same evidence
 
+an effect earns its keep where its mean drop is over LEAST_DB and LEAST_SHARE of the gap, SURE standard errors above zero and above the null effect's by as much
+
 Leaving out lines matters: decays and shapes belong to the body, so every strike shows them, and a pattern fitted to them by chance would pass.
 """
 
@@ -19,12 +21,14 @@ from sonic_bullet.diagnosis.evidence import evidence_of, thinned
 from sonic_bullet.diagnosis.judge import Judged
 from sonic_bullet.diagnosis.listed import Listed
 from sonic_bullet.diagnosis.play import Hypothesis
-from sonic_bullet.diagnosis.refit import refitted
+from sonic_bullet.diagnosis.refit import refitted, retold
 from sonic_bullet.effects.values import Effect, Evidence, Owner, Stage
 from sonic_bullet.records import ModalModel
 
 KEPT = 0.75  # of the lines, in every fold
 DRAWS = 2  # of the null effect
+LEAST_DB, LEAST_SHARE = 0.4, 0.08  # of a drop, and of it in the gap
+SURE, MANY = 2.0, 4  # standard errors; strikes of which none may lose
 PLAIN = 0.6  # of the gap: where a cheap suspect says as much, costly ones wait
 
 
@@ -50,6 +54,18 @@ class Candidate:
     def sd_db(self) -> float:
         """Standard error of the mean."""
         return float(self.drop_db.std(ddof=1) / np.sqrt(len(self.drop_db))) if len(self.drop_db) > 1 else float("inf")
+
+
+def earns(c: Candidate, gap_db: float) -> bool:
+    """Whether a suspect explains enough, surely enough, and more than chance."""
+    if len(c.drop_db) == 0:
+        return False
+    need = max(LEAST_DB, LEAST_SHARE * gap_db)
+    if not (c.mean_db > need and np.isfinite(c.sd_db)):
+        return False
+    if len(c.drop_db) >= MANY and c.drop_db.min() > -0.1 * c.mean_db and float(np.median(c.drop_db)) > 0.5 * need:
+        return c.mean_db - max(c.null_db, 0.0) > 0.5 * need  # no strike speaks against it, though loud ones may gain far more than soft ones
+    return c.mean_db > SURE * c.sd_db and c.mean_db - max(c.null_db, 0.0) > max(SURE * c.sd_db, 0.5 * need)
 
 
 @dataclass(frozen=True)
@@ -124,9 +140,11 @@ def trials(
         return found  # nothing can be left out
     folds = _folds(h, bodies, takes, evidence, seed)
     gap = float(np.mean([f.before for f in folds]) - np.mean([f.take.least(f.base) for f in folds])) if folds else 0.0
-    for kind in sorted(effects, key=lambda kind: bool(getattr(kind, "costly", False))):
+    for kind in sorted(effects, key=lambda kind: (not hasattr(kind, "dried"), bool(getattr(kind, "costly", False)))):
         if kind.id in evidence.found:
             continue
+        if any(hasattr(c.effect, "dried") and earns(c, gap) for c in found):
+            break  # what others say of lines that a room has made is hearsay: in the next round they are told dry
         if getattr(kind, "costly", False) and (not costly or any(c.mean_db > PLAIN * gap for c in found)):
             continue  # something cheap says most of it: what is left may ask for more in the next round
         whole = kind.propose(evidence)
@@ -187,7 +205,10 @@ def _tried(kind: type[Effect], whole: Effect, h: Hypothesis, bodies: tuple[Struc
 
 def _after(fold: Fold, effect: Effect) -> float:
     h = replace(fold.base, effects=(*fold.base.effects, effect))
-    return fold.take.distance(refitted(h, fold.bodies, None if isinstance(fold.take, Listed) else fold.evidence.heard))
+    if isinstance(fold.take, Listed):
+        return fold.take.distance(refitted(h, fold.bodies))
+    fitted = refitted(h, fold.bodies, fold.evidence.heard)
+    return fold.take.distance(retold(fitted, fold.bodies, fold.evidence.heard) if hasattr(effect, "told_by") else fitted)
 
 
 def jackknife(rows: list[dict[str, Any]]) -> dict[str, Any]:

@@ -16,6 +16,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from sonic_bullet.effects import tails
+from sonic_bullet.effects.foreign_mode import ForeignMode
 from sonic_bullet.effects.values import Evidence, Heard, Owner, Sound, Stage
 from sonic_bullet.records import Array
 
@@ -90,7 +91,10 @@ class Room:
         if found is None:
             return None
         delta, wet = found
-        return cls(RT60 / delta, wet).told_by(heard.signal, tails.direct(heard, delta), heard.noise, heard.sr)
+        sound, along = tails.direct(heard, delta), ForeignMode.propose(replace(evidence, heard=(tails.dried(heard, delta),)))
+        if along is not None:  # what rings along is heard in the room too
+            sound = np.stack([along.apply(Sound(x, heard.sr, level)).sample for x, level in zip(sound, heard.impulse_n_s, strict=True)])
+        return cls(RT60 / delta, wet).told_by(heard.signal, sound, heard.noise, heard.sr)
 
 
 def late(h: Heard, known: float | None = None) -> tuple[float, float] | None:
