@@ -140,6 +140,7 @@ class Trial:
         return np.asarray((share * self.model.decay_per_s[:, None]).sum(axis=0) / share.sum(axis=0))
 
     def beside(self, pole: Array, turn: Array, turns: int) -> float:
+        """The same of poles (m,) and turns (m, m) that are at hand; turns: of pairing and the law, and how many laws to begin with."""
         pole, turn = _alive(pole, turn)
         own = self._own(turn)
         column = np.column_stack([_smooth(pole.imag), own])
