@@ -93,7 +93,8 @@ class Room:
         delta, wet = found
         sound, along = tails.direct(heard, delta), ForeignMode.propose(replace(evidence, heard=(tails.dried(heard, delta),)))
         if along is not None:  # what rings along is heard in the room too
-            sound = np.stack([along.apply(Sound(x, heard.sr, level)).sample for x, level in zip(sound, heard.impulse_n_s, strict=True)])
+            level = np.where(np.isfinite(heard.impulse_n_s), heard.impulse_n_s, 1.0)
+            sound = np.stack([along.apply(Sound(x, heard.sr, float(j))).sample for x, j in zip(sound, level, strict=True)])
         return cls(RT60 / delta, wet).told_by(heard.signal, sound, heard.noise, heard.sr)
 
 

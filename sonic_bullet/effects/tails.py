@@ -226,8 +226,8 @@ def _summed(delta: Array, decays: Array, rows: list[list[tuple[Array, ...]]]) ->
     flat = like.transpose(0, 2, 1, 3).reshape(t, k, -1)
     best = flat.argmax(axis=2)[:, :, None]
     at = [np.take_along_axis(x.transpose(0, 2, 1, 3).reshape(t, k, -1), best, axis=2)[:, :, 0] for x in (amplitude, sd, shift)]
-    wettest = np.exp((share * np.log(np.maximum(wet, 1e-300))).sum(axis=(1, 3)) / total)
+    wetness = np.exp((share * np.log(np.maximum(wet, 1e-300))).sum(axis=(1, 3)) / total)
     plain = like[:, :, :, 0].max(axis=(0, 1))
     step = np.log(decays[1] / decays[0])
     ln_sd = np.sqrt(np.maximum(square - mean**2, 0) + step**2 / 12)
-    return Read(delta, top[:, 0, :, 0] + np.log(total), plain, np.exp(mean), ln_sd, at[2], at[0], at[1], wettest)
+    return Read(delta, top[:, 0, :, 0] + np.log(total), plain, np.exp(mean), ln_sd, at[2], at[0], at[1], wetness)
