@@ -25,6 +25,7 @@ from sonic_bullet.records import Array
 
 TURNS = 2
 RIVAL = 0.5  # of what the best of a round said alone
+FAR_DB = 1.0  # on the fitted strikes, before the rest is fitted to it: more than that takes up
 ALIKE = 0.03  # of what a name says: those that differ by less are not told apart
 
 Less = Callable[[Evidence], Evidence]
@@ -73,8 +74,8 @@ def settled(h: Hypothesis, bodies: tuple[Struck, ...], takes: Sequence[Take], ba
     return min(ends, key=lambda end: mean_db(takes, end) or np.inf)
 
 
-def left_out_db(h: Hypothesis, bodies: tuple[Struck, ...], takes: Sequence[Take], band_hz: tuple[float, float]) -> Array:
-    """Distance (s,) of every strike from what is fitted, all effects at once, to the others.
+def left_out_db(h: Hypothesis, i: int, bodies: tuple[Struck, ...], takes: Sequence[Take], band_hz: tuple[float, float]) -> Array:
+    """Distance (s,) of every strike from what is fitted to the others: the i-th effect, the rest as all strikes have it, for one name as for the other.
 
     No lines are left out here: each has stood its trial against chance already, and of two names that need as many numbers neither gains by it.
     """
@@ -82,7 +83,7 @@ def left_out_db(h: Hypothesis, bodies: tuple[Struck, ...], takes: Sequence[Take]
     def without(strike: int) -> Less:
         return lambda told: thinned(told, strike, 1.0, np.random.default_rng(0))
 
-    return np.array([take.distance(together(h, bodies, band_hz, turns=1, less=without(i))) for i, take in enumerate(takes)])
+    return np.array([take.distance(again(h, i, bodies, band_hz, less=without(k))) for k, take in enumerate(takes)])
 
 
 def exchanged(
@@ -101,15 +102,19 @@ def exchanged(
     best = settled(h, bodies, takes, band_hz)
     if (mean_db(takes, best) or 0.0) > (mean_db(takes, h) or 0.0):
         best = h
-    far: Array | None = None
     for i in range(len(added)):
+        far: Array | None = None
         for rival in (c for c in passed[i] if c.id not in names):
             own = added[i]
             say(f"trying {rival.id} in place of {own.id}")
             effects = tuple(rival.effect if e.id == own.id else e for e in best.effects)
-            other = settled(refitted(with_effects(best, effects, bodies), bodies), bodies, takes, band_hz)
-            far = left_out_db(best, bodies, takes, band_hz) if far is None else far
-            now = left_out_db(other, bodies, takes, band_hz)
+            place = next(k for k, e in enumerate(effects) if e.id == rival.id)
+            other = again(refitted(with_effects(best, effects, bodies), bodies), place, bodies, band_hz)
+            if (mean_db(takes, other) or 0.0) > (mean_db(takes, best) or 0.0) + FAR_DB:
+                continue  # it would have to gain by strikes it never saw
+            other = settled(other, bodies, takes, band_hz)
+            far = left_out_db(best, place, bodies, takes, band_hz) if far is None else far
+            now = left_out_db(other, place, bodies, takes, band_hz)
             if surely(far - now, ALIKE * rival.mean_db):
                 best, far, names = other, now, names - {own.id} | {rival.id}
                 added = [*added[:i], rival, *added[i + 1 :]]
