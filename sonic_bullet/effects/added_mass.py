@@ -31,6 +31,7 @@ NEAR, TURNS = 16, 5  # vertices and turns of the search about one of them
 TRIES = 6
 WIDTHS = (0.016, 0.008, 0.004)  # of ln f: lines and modes are paired ever more closely
 MATCHED, MOVED = 0.8, 2.5e-3  # share of lines, and how far nine in ten of them may lie off: a mesh's error
+STAYED = 0.5  # of all lines' strength
 REACH, BINS = (-0.1, 0.25), 0.008  # of ln f: common shifts of the baseline's modes that are looked at; a mass lowers lines, so up above all
 FAR_OFF = 0.015  # of ln f: more than pairs alone find
 PEAKS = 2  # of those shifts, tried further
@@ -83,7 +84,7 @@ class AddedMass:
             return cls._at(x, trial.refined((0.0, at, known.mass_kg, (up, side), known.stretch), WIDTHS[-1:]))
         plain = patterns(heard, x)
         none = min((agreed(trial.line, trial.size, x.freq_hz, plain, shift=s) for s in trial.shifts(x.freq_hz, plain)), key=lambda one: one[0])
-        if _in_place(trial.line, x.freq_hz, none):
+        if _in_place(trial.line, trial.size, x.freq_hz, none):
             return None
         found = []
         for vertex in spread_out(x, POINTS):
@@ -108,11 +109,15 @@ class AddedMass:
         return cls((float(place[0]), float(place[1]), float(place[2])), float(mass_kg), (up, side), float(shift))
 
 
-def _in_place(line_hz: Array, mode_hz: Array, none: tuple[float, Array, Array, float]) -> bool:
-    """Whether the bare body's modes are where the lines are: nothing to look for."""
+def _in_place(line_hz: Array, size: Array, mode_hz: Array, none: tuple[float, Array, Array, float]) -> bool:
+    """Whether the bare body's modes are where the lines are, or half of all that sounds (s, k) is: a mass leaves few in place, and something else splits or bends the others."""
     _, row, column, shift = none
     off = np.abs(np.log(line_hz[row] / mode_hz[column]) - shift)
-    return len(row) > MATCHED * len(line_hz) and float(np.quantile(off, 0.9)) < MOVED
+    if len(row) > MATCHED * len(line_hz) and float(np.quantile(off, 0.9)) < MOVED:
+        return True
+    loud = np.nan_to_num(size).max(axis=0)
+    near = np.abs(np.log(line_hz)[:, None] - np.log(mode_hz) - shift).min(axis=1) < MOVED
+    return bool(loud[near].sum() > STAYED * loud.sum() > 0)
 
 
 def _at_points(x: ModalModel, heard: Heard) -> ModalModel:

@@ -12,7 +12,7 @@ from sonic_bullet.diagnosis.evidence import evidence_of
 from sonic_bullet.diagnosis.judge import Take, mean_db
 from sonic_bullet.diagnosis.refit import refitted, with_effects
 from sonic_bullet.effects import added_mass
-from sonic_bullet.effects.added_mass import AddedMass
+from sonic_bullet.effects.added_mass import AddedMass, _in_place
 from sonic_bullet.effects.contact_time import ContactTime
 from sonic_bullet.estimator.distance import floor_between
 
@@ -63,3 +63,15 @@ def test_without_what_moved_modes_the_baselines_corrections_are_back() -> None:
     assert bare.stretch == 0.0 and bare.effects == (pulse,)
     assert bare.correction is not None and (bare.correction["plate"] == body.correction).all()
     assert with_effects(replace(h, stretch=0.1), (MASS, pulse), (body,)).stretch == 0.1
+
+
+def test_no_mass_is_looked_for_where_half_of_what_sounds_is_in_place() -> None:
+    """Pitch that glides splits loud lines in many; that pairs better with other modes says nothing of a mass."""
+    mode = np.geomspace(300.0, 5000.0, 16)
+    line = mode.copy()
+    line[::2] *= 1.02
+    row = np.arange(16)
+    loud = np.where(row % 2, 1.2, 1.0)[None, :]
+    assert _in_place(line, loud, mode, (0.0, row, row, 0.0))
+    assert not _in_place(line, 1 / loud, mode, (0.0, row, row, 0.0))
+    assert _in_place(mode * 1.001, loud, mode, (0.0, row, row, 0.0))
