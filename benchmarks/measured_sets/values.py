@@ -14,6 +14,7 @@ from sonic_bullet.estimator.values import Features
 
 Array = np.ndarray[Any, Any]
 DRAWS = 200
+ALPHA, BETA = 1.0, 1e-9  # of the model so far, in 1/s and s: lines in a table come with none, and nothing is yet taken from their decays
 EARNS = 0.9  # an effect's error on what it was not fitted to must fall below this share of the baseline's
 CHANCE = 0.05  # of the null's draws, at most, may do as well
 
@@ -111,7 +112,7 @@ def heard(lines: Lines) -> Heard:
         amplitude_sd=0.05 * np.abs(size),
         mode=tuple(np.array([i]) for i in range(k)),
         model_hz=lines.freq_hz,
-        expected_decay_per_s=lines.decay_per_s,
+        expected_decay_per_s=0.5 * (ALPHA + BETA * (2 * np.pi * lines.freq_hz) ** 2),
         expected=size,
         pattern=np.abs(size),
         foreign_hz=none,
@@ -137,4 +138,4 @@ def heard(lines: Lines) -> Heard:
 def evidence(bodies: list[Lines]) -> Evidence:
     """Several bodies' lines, all that is known of them."""
     top = max(float(b.freq_hz.max(initial=1.0)) for b in bodies)
-    return Evidence(tuple(heard(b) for b in bodies), 1.0, 1e-9, 1.0, (20.0, top), 0)
+    return Evidence(tuple(heard(b) for b in bodies), ALPHA, BETA, 1.0, (20.0, top), 0)
