@@ -123,6 +123,7 @@ def exchanged(
 
 def surely(gain_db: Array, least_db: float) -> bool:
     """Whether strikes agree that there is a gain (s,), and more than least_db."""
+    gain_db = gain_db[np.isfinite(gain_db)]  # silent strikes have no distance
     if len(gain_db) < 2 or gain_db.mean() <= least_db:
         return False
     none_loses = len(gain_db) >= MANY and gain_db.min() > -0.1 * gain_db.mean()

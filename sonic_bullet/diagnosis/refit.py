@@ -40,6 +40,8 @@ def refitted(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...]
 def retold(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...] | None = None) -> Hypothesis:
     """The hypothesis with a room's response told again, beside all that has been found. heard: whose strikes may tell it; all where None."""
     fitted = [b for b in bodies if b.gathered is not None]
+    if any(b.gathered is None or b.gathered.signals is None for b in fitted):
+        return h  # lists of lines say nothing of a response
     most = max(range(len(fitted)), key=lambda i: len(fitted[i].gathered.lines.freq_hz), default=0)  # type: ignore[union-attr]
     for room in (e for e in h.effects if hasattr(e, "told_by")):
         body, g = fitted[most], fitted[most].gathered
@@ -185,7 +187,8 @@ def _gained(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...])
     if not (x > 0).any():
         return h
     if any(one.dry for one in heard):  # read through a room, a line is off by a factor of its own
-        return replace(h, gain=_middle(y[x > 0] / x[x > 0], (y / s[0])[x > 0]))
+        told = (x > 0) & (y > 0) & (s[0] > 0)
+        return replace(h, gain=_middle(y[told] / x[told], (y / np.maximum(s[0], 1e-300))[told])) if told.any() else h
     gain, weight = _middle(y[x > 0] / x[x > 0], x[x > 0] / (s[0] + s[1])[x > 0]), np.ones(len(x))
     for _ in range(30):
         sd2 = (s[0] ** 2 + (gain * s[1]) ** 2) + 1e-300

@@ -33,7 +33,7 @@ TURNS = 40
 
 @dataclass(frozen=True)
 class Room:
-    """rt60_s, wet. response (t,): the tail's taps from the first sample after the direct sound on, at rate sr; empty: noise of that law from ``seed``."""
+    """rt60_s, wet. response (t,): the tail's taps at rate sr, the first at the direct sound itself; empty: noise of that law from ``seed``."""
 
     id: ClassVar[str] = "room"
     stage: ClassVar[Stage] = Stage.SOUND
@@ -85,7 +85,7 @@ class Room:
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
         heard = max(evidence.heard, key=lambda h: len(h.freq_hz))
-        if heard.signal is None or heard.predicted is None or len(heard.freq_hz) < FEWEST:
+        if heard.signal is None or heard.predicted is None or len(heard.freq_hz) < FEWEST or heard.signal.shape[1] < tails.LEAST * tails.FRAME_S * heard.sr:
             return None
         found = late(heard, RT60 / evidence.known.rt60_s if isinstance(evidence.known, cls) else None)
         if found is None:

@@ -86,7 +86,7 @@ class Trial:
         return cls(
             freq,
             decay,
-            np.hypot(np.nan_to_num(sd[index]), SCATTER * decay) + 1e-3,
+            np.hypot(np.nan_to_num(sd[index], posinf=1e9), SCATTER * decay) + 1e-3,
             amplitude,
             worth,
             h.signed,

@@ -21,6 +21,7 @@ from sonic_bullet.records import Array
 
 FRAME_S = 0.012
 DENSE, FRAMES = 24, 56  # frames one after another, then ever farther apart
+LEAST = 4  # frames: in less no tail shows
 NODES = 8  # of a window's quadrature
 DECAYS = np.geomspace(2.0, 600.0, 25)
 SHARES = np.geomspace(1e-3, 4.0, 9)  # |A|² w² over what the first frame suggests |A|² to be
@@ -79,7 +80,7 @@ def through(h: Heard, delta: float) -> Read:
 
 def dried(h: Heard, delta: float) -> Heard:
     """The same with frequencies, decays and amplitudes of all lines as they would be without the tail; those that are no mode go with the impulse."""
-    if h.dry or h.signal is None or not len(h.freq_hz):
+    if h.dry or h.signal is None or not len(h.freq_hz) or h.signal.shape[1] < LEAST * FRAME_S * h.sr:
         return h
     r = through(h, delta)
     amplitude, spread = _rescaled(r, told(h), h.amplitude, h.amplitude_sd)
@@ -106,7 +107,8 @@ def dried(h: Heard, delta: float) -> Heard:
 def _rescaled(r: Read, own: Array, amplitude: Array, sd: Array) -> tuple[Array, Array]:
     """Amplitudes and spreads (s, k) with what all strikes have in common read anew."""
     now = (np.conj(own) * amplitude).sum(axis=0) / np.maximum((np.abs(own) ** 2).sum(axis=0), 1e-300)
-    factor = r.amplitude[0] / np.where(now == 0, 1, now)
+    silent = (np.abs(own).sum(axis=0) == 0) | (now == 0)  # the model says nothing of them: they stay as they were heard
+    factor = np.where(silent, 1, r.amplitude[0] / np.where(silent, 1, now))
     common = np.abs(own) * np.hypot(r.amplitude_sd[0], SURE * np.abs(r.amplitude[0]))
     return amplitude * factor, np.hypot(sd * np.abs(factor), common)
 
@@ -179,8 +181,7 @@ def _tail(time: tuple[float, ...], decay: float, delta: float) -> tuple[Array, A
     weight = weight / weight.sum()
     t = (at[:, None] + node).ravel()
     gap = 2 * (decay - delta)
-    gap = gap if abs(gap) > 1e-3 else 1e-3
-    var = 2 * delta * (np.exp(-2 * delta * t) - np.exp(-2 * decay * t)) / gap
+    var = 2 * delta * np.exp(-2 * delta * t) * (-np.expm1(-gap * t) / gap if gap else t)
     both = np.exp(-decay * np.abs(t[:, None] - t[None, :])) * np.where(t[:, None] < t[None, :], var[:, None], var[None, :])
     both = weight @ both.reshape(len(at), NODES, -1)
     both = both.reshape(len(at), len(at), NODES) @ weight

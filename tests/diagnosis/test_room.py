@@ -104,3 +104,30 @@ def test_lines_are_dried_once() -> None:
     heard = heard_of(h, body)
     assert heard.dry
     assert outside(h, heard) is heard
+
+
+def test_what_the_model_says_nothing_of_stays_as_it_was_heard() -> None:
+    """A line whose mode is out of the band has no amplitude to be told against; it is not made silent, nor is the gain."""
+    body = recorded(Room(0.9, 0.9, 4), seconds=1.2)
+    heard = heard_of(truth(), body)
+    push = heard.push.copy()
+    push[:, heard.mode[0]] = 0.0
+    dry = tails.dried(replace(heard, push=push), RT60 / 0.9)
+    assert np.array_equal(dry.amplitude[:, 0], heard.amplitude[:, 0])
+    assert np.isfinite(dry.amplitude).all()
+
+
+def test_a_snippet_has_no_tail() -> None:
+    """Shorter than a few frames: no room is told, and nothing breaks."""
+    heard = heard_of(truth(), recorded(Room(0.9, 0.9, 4)))
+    assert heard.signal is not None
+    short = replace(heard, signal=heard.signal[:, :300])
+    assert tails.dried(short, 7.0) is short
+
+
+def test_a_mode_that_dies_as_the_room_does() -> None:
+    """The covariance goes over into its limit 2δt e^{−2δt}."""
+    time = (0.0, 0.012, 0.03, 0.06)
+    level = [np.sort(tails._tail(time, 5.0, rate)[1]) for rate in (5.0, 5.0002, 5.01)]
+    assert np.allclose(level[0], level[2], rtol=0.01)
+    assert np.allclose(level[1], level[2], rtol=0.01)
