@@ -83,6 +83,7 @@ def heard_of(h: Hypothesis, body: Struck) -> Heard:
         all_hz=model.freq_hz,
         plain=plain if body.family is not None else None,
         strike=tuple(range(len(mine))),
+        name=body.name,
         elastic=body.elastic,
     )
     return outside(h, heard)
@@ -147,9 +148,14 @@ def path_response(h: Hypothesis, body: Struck, freq_hz: Array, sr: int) -> Array
     return np.asarray(np.exp(-2j * np.pi * np.outer(freq_hz, np.arange(n)) / sr) @ tap)
 
 
-def thinned(evidence: Evidence, strike: int | None, keep: float, rng: np.random.Generator) -> Evidence:
-    """The same without one strike and without a random part of the lines: ``keep`` of them stay."""
-    return replace(evidence, heard=tuple(_thin(h, strike, keep, rng) for h in evidence.heard))
+def thinned(evidence: Evidence, at: tuple[str, int], keep: float, rng: np.random.Generator) -> Evidence:
+    """The same without one strike, at: which object's and which of its own, and without a random part of all lines: ``keep`` of them stay.
+
+    An object of which nothing else was heard is left out with it.
+    """
+    name, strike = at
+    rest = [h for h in evidence.heard if h.name != name or len(h.impulse_n_s) > 1]
+    return replace(evidence, heard=tuple(_thin(h, strike if h.name == name else None, keep, rng) for h in rest))
 
 
 def _thin(h: Heard, strike: int | None, keep: float, rng: np.random.Generator) -> Heard:

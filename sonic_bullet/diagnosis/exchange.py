@@ -80,10 +80,10 @@ def left_out_db(h: Hypothesis, i: int, bodies: tuple[Struck, ...], takes: Sequen
     No lines are left out here: each has stood its trial against chance already, and of two names that need as many numbers neither gains by it.
     """
 
-    def without(strike: int) -> Less:
-        return lambda told: thinned(told, strike, 1.0, np.random.default_rng(0))
+    def without(take: Take) -> Less:
+        return lambda told: thinned(told, take.place, 1.0, np.random.default_rng(0))
 
-    return np.array([take.distance(again(h, i, bodies, band_hz, less=without(k))) for k, take in enumerate(takes)])
+    return np.array([take.distance(again(h, i, bodies, band_hz, less=without(take))) for take in takes])
 
 
 def exchanged(

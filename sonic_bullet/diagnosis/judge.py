@@ -39,6 +39,11 @@ class Take:
     sr: int
     floor: Floor
 
+    @property
+    def place(self) -> tuple[str, int]:
+        """Where it is in the evidence: its body's name, and which of the body's fitted strikes it is. Raises ValueError where it was not fitted."""
+        return self.body.name, self.body.fitted.index(self.strike)
+
     def distance(self, h: Hypothesis) -> float:
         """D in dB of the recording and what the hypothesis plays; NaN where nothing stands above the noise."""
         made = play(h, self.body, self.strike, len(self.sample), self.sr)

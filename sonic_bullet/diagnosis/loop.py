@@ -66,7 +66,8 @@ def closed(
         if now - floor < LEAST_DB:
             break  # nothing can earn its keep
         evidence = evidence_of(h, bodies, band_hz, seed=seed)
-        told = mean_db(takes, retold(h, bodies)) or 0.0  # a room's response is the lines' so far, which leaves open more than there is
+        full = retold(h, bodies)  # a room's response is the lines' so far, which leaves open more than there is
+        told = now if full is h else mean_db(takes, full) or 0.0
         found = trials(h, bodies, takes, evidence, effects, seed=seed + turn, say=say, costly=told - floor > OPEN * (before - floor))
         for candidate in found:
             last.setdefault(candidate.id, candidate)

@@ -27,7 +27,7 @@ NEAR, ALIKE = 5e-3, 1.6  # of ln f and ln d: lines of one mode
 
 
 def refitted(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...] | None = None) -> Hypothesis:
-    """The hypothesis with α, β and σ fitted again beside its effects; ``heard``: evidence to fit them to, thinned or whole."""
+    """The hypothesis with α, β and σ fitted again beside its effects; ``heard``: evidence to fit them to, thinned or whole, of all bodies or some."""
     moved = moves(h)
     if moved:
         h = corrected(h, bodies)
@@ -39,17 +39,17 @@ def refitted(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...]
 
 def retold(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...] | None = None) -> Hypothesis:
     """The hypothesis with a room's response told again, beside all that has been found. heard: whose strikes may tell it; all where None."""
-    fitted = [b for b in bodies if b.gathered is not None]
-    if any(b.gathered is None or b.gathered.signals is None for b in fitted):
+    which = {one.name: list(one.strike) for one in heard} if heard else {b.name: list(range(len(b.fitted))) for b in bodies if b.gathered is not None}
+    told = [b for b in bodies if which.get(b.name) and b.gathered is not None and b.gathered.signals is not None]
+    if not told:
         return h  # lists of lines say nothing of a response
-    most = max(range(len(fitted)), key=lambda i: len(fitted[i].gathered.lines.freq_hz), default=0)  # type: ignore[union-attr]
+    body = max(told, key=lambda b: len(np.unique(b.line[b.line >= 0])))  # as the room's own proposal has it: most lines that are modes
     for room in (e for e in h.effects if hasattr(e, "told_by")):
-        body, g = fitted[most], fitted[most].gathered
+        mine, g = which[body.name], body.gathered
         assert g is not None and g.signals is not None
-        which = list(heard[most].strike) if heard else list(range(len(g.signals)))
-        signal = g.signals[which]
+        signal = g.signals[mine]
         bare = replace(h, effects=tuple(e for e in h.effects if e is not room))
-        sound = np.stack([play(bare, body, body.fitted[i], signal.shape[1], g.sr) for i in which])
+        sound = np.stack([play(bare, body, body.fitted[i], signal.shape[1], g.sr) for i in mine])
         again = room.told_by(signal, sound, noise_rms(signal, g.sr), g.sr)
         h = replace(h, effects=tuple(again if e is room else e for e in h.effects))
     return h
@@ -116,10 +116,11 @@ def _damped(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...])
         return replace(h, alpha_per_s=told[-1][0], beta_s=told[-1][1])
     bare = replace(h, alpha_per_s=0.0, beta_s=0.0)
     lam, left, sd = [], [], []
-    for one, body in zip(heard, (b for b in bodies if b.gathered is not None), strict=True):
+    body_of = {body.name: body for body in bodies}
+    for one in heard:
         if not len(one.freq_hz):
             continue
-        model, _ = modes_of(bare, body)
+        model, _ = modes_of(bare, body_of[one.name])
         extra = np.zeros(len(one.freq_hz))
         if moves(h):  # ``one`` is of h itself, and its lines are paired anew
             extra = np.maximum(one.expected_decay_per_s - (h.alpha_per_s + h.beta_s * one.omega**2) / 2, 0.0)
@@ -159,14 +160,12 @@ def _middle(ratio: Array, weight: Array) -> float:
 
 def _gained(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...]) -> Hypothesis:
     """σ by the amplitudes."""
-    known = [e.gain for e in h.effects if np.isfinite(getattr(e, "gain", np.nan))]  # type: ignore[attr-defined]
-    if known:
-        return replace(h, gain=known[-1])
     told, seen, spread = [], [], []
-    for one, body in zip(heard, (b for b in bodies if b.gathered is not None), strict=True):
+    body_of = {body.name: body for body in bodies}
+    for one in heard:
         if not len(one.freq_hz) or one.signal is None:
             continue
-        direct = np.abs(path_response(h, body, one.freq_hz, one.sr))
+        direct = np.abs(path_response(h, body_of[one.name], one.freq_hz, one.sr))
         factor = np.empty(one.pattern.shape)
         for i, level in enumerate(one.impulse_n_s):
             blow = Blow(float(level) if np.isfinite(level) else 1.0, np.zeros(1), np.ones(1))

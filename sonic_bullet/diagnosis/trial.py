@@ -18,7 +18,7 @@ import numpy as np
 
 from sonic_bullet.diagnosis.bodies import Struck
 from sonic_bullet.diagnosis.evidence import evidence_of, thinned
-from sonic_bullet.diagnosis.judge import Judged
+from sonic_bullet.diagnosis.judge import Judged, Take
 from sonic_bullet.diagnosis.listed import Listed
 from sonic_bullet.diagnosis.play import Hypothesis
 from sonic_bullet.diagnosis.refit import refitted, retold
@@ -74,7 +74,7 @@ class Null:
 
     id: ClassVar[str] = "null"
     stage: ClassVar[Stage] = Stage.MODES
-    owner: ClassVar[Owner] = Owner.MATERIAL
+    owner: ClassVar[Owner] = Owner.FIXTURE  # after whatever acts on modes, as a suspect may
     reference: ClassVar[str] = "a control, not physics"
 
     amount: tuple[float, ...]
@@ -169,13 +169,13 @@ class Fold:
 def _folds(h: Hypothesis, bodies: tuple[Struck, ...], takes: Sequence[Judged], evidence: Evidence, seed: int) -> list[Fold]:
     rng = np.random.default_rng([seed, 1])
     made = []
-    for i, take in enumerate(takes):
+    for take in takes:
         if isinstance(take, Listed):
             mine, start = take.rest(bodies, h)
             less = evidence_of(start, mine, evidence.band_hz, seed=seed)
             base = refitted(start, mine)
-        else:
-            mine, less = bodies, thinned(evidence, i, KEPT, rng)
+        elif isinstance(take, Take):
+            mine, less = bodies, thinned(evidence, take.place, KEPT, rng)
             base = refitted(h, bodies, less.heard)
         before = take.distance(base)
         if np.isfinite(before):
@@ -187,8 +187,8 @@ def _tried(kind: type[Effect], whole: Effect, h: Hypothesis, bodies: tuple[Struc
     drops, nulls, seen = [], [], []
     for i, fold in enumerate(folds):
         less = fold.evidence
-        if getattr(kind, "by_line", False) and not isinstance(fold.take, Listed):
-            less = thinned(evidence, i, 1.0, np.random.default_rng(0))  # a line's own numbers are told by no other line, but by the other strikes
+        if getattr(kind, "by_line", False) and isinstance(fold.take, Take):
+            less = thinned(evidence, fold.take.place, 1.0, np.random.default_rng(0))  # a line's own numbers are told by no other line, but by the other strikes
         effect = kind.propose(replace(less, known=whole))
         if effect is None:
             drops.append(0.0)

@@ -78,15 +78,6 @@ def sounded(ring: Ring, blow: Blow, n: int, sr: int) -> Array:
     return out
 
 
-def direct(heard: Heard, alpha_per_s: float, beta_s: float) -> Array:
-    """What the strikes (s, n) would sound like straight from the modes, damped by Rayleigh's law with these constants."""
-    assert heard.signal is not None and heard.all_hz is not None
-    none = np.zeros(len(heard.all_hz))
-    decay = (alpha_per_s + beta_s * (2 * np.pi * heard.all_hz) ** 2) / 2
-    once = Blow(1.0, np.zeros(1), np.ones(1))
-    return np.stack([sounded(Ring(heard.all_hz, decay, row, none, none, none), once, heard.signal.shape[1], heard.sr) for row in heard.push])
-
-
 def direct_as_expected(heard: Heard) -> Array:
     """What single hits (s, n) would sound like, with the lines' own frequencies and decays and the model's amplitudes."""
     assert heard.signal is not None

@@ -8,7 +8,7 @@
 
 An effect is physics with few parameters. `propose` reads them off the evidence, or says None; it never scores itself: the diagnosis
 renders strikes that were not fitted, with and without it. An effect that hides the modes' own decays or levels from the lines either carries
-alpha_per_s, beta_s and gain as it found them beside itself, and the host takes those over (friction), or has a method `dried`, Heard -> Heard: the same
+alpha_per_s and beta_s as it found them beside itself, and the host takes those over (friction), or has a method `dried`, Heard -> Heard: the same
 lines as they would be without it (a room), and the host tells everything else from those.
 """
 
@@ -108,7 +108,7 @@ class Elastic:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Heard:
-    """One object's strikes: k lines that are modes, beside what the model so far expects, and what it leaves.
+    """One object's strikes: k lines that are modes, beside what the model so far expects, and what it leaves. name: the object's.
 
     freq_hz, decay_per_s and their spreads (k,); amplitude (s, k) complex at the onset and its spread. mode: the modes of `model` each line stands for.
     model_hz (k,): the mesh's own, without corrections; expected_decay_per_s (k,), expected (s, k): of the model with the effects found so far.
@@ -147,6 +147,7 @@ class Heard:
     all_hz: Array  # (m,) their frequencies
     plain: ModalModel | None  # `model` with the mesh's own frequencies
     strike: tuple[int, ...] = ()
+    name: str = ""
     elastic: Elastic | None = None
     dry: bool = False  # whether lines are told as they would be without the room they were recorded in
 
