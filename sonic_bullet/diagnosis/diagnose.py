@@ -1,6 +1,6 @@
 """`diagnose`: a case in, a Diagnosis out.
 
-    gather 'fit' strikes -> fit the baseline -> bodies, takes -> loop (loop.py) -> verdict, errors on all splits, predictions
+    gather 'fit' strikes -> fit the baseline (baseline.py) -> loop (loop.py) -> verdict, errors on all splits, predictions
 
 Nothing of 'holdout' and 'transfer' is opened before the loop has ended; where their audio is there, it is compared at the very end and changes nothing.
 """
@@ -9,27 +9,23 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from sonic_bullet.diagnosis.bodies import Struck, shapeless, struck_bodies
-from sonic_bullet.diagnosis.elastic import with_elastic
+from sonic_bullet.diagnosis.baseline import baseline
+from sonic_bullet.diagnosis.bodies import Struck
 from sonic_bullet.diagnosis.judge import Take, least_db, mean_db
 from sonic_bullet.diagnosis.listed import CAP, listed, off_by
 from sonic_bullet.diagnosis.loop import Closed, closed
-from sonic_bullet.diagnosis.play import Hypothesis, play
-from sonic_bullet.diagnosis.refit import refitted
+from sonic_bullet.diagnosis.play import play
 from sonic_bullet.diagnosis.sone import sone_distance
 from sonic_bullet.diagnosis.unexplained import remainder
-from sonic_bullet.diagnosis.unheard import settled
 from sonic_bullet.effects import EFFECTS
 from sonic_bullet.effects.values import Effect
-from sonic_bullet.estimator.distance import floor_between
 from sonic_bullet.estimator.evidence import gather
-from sonic_bullet.estimator.fit import fit_evidence
 from sonic_bullet.estimator.fitted import CaseFit
 from sonic_bullet.files import read_audio
 from sonic_bullet.files.cases import Case, CaseRecording, read_case
@@ -78,15 +74,9 @@ def diagnose(
         case = read_case(case)
     say = progress or (lambda _: None)
     gathered = gather(case, cache=cache, progress=progress, clipped=True)
-    found = fit_evidence(case, gathered, check_mesh=False, progress=progress)
-    bodies = struck_bodies(found, cache=cache, progress=progress) if found.objects else tuple(shapeless(found, g) for g in gathered)
-    bodies = with_elastic(found, bodies, cache=cache, progress=progress)
-    gain = found.fit.sigma if np.isfinite(found.fit.sigma) and found.fit.sigma > 0 else 1.0
-    base = Hypothesis(found.fit.alpha_per_s, found.fit.beta_s, gain, (), {b.name: b.correction for b in bodies})
-    bodies = settled(refitted(base, bodies), bodies)
-    base = replace(base, correction={b.name: b.correction for b in bodies})
-    takes = _takes(bodies)
-    end = closed(base, bodies, takes or listed(bodies), effects, case.band_hz, seed=seed, progress=progress)
+    start = baseline(case, gathered, cache=cache, progress=progress)
+    found, bodies, takes = start.found, start.bodies, start.takes
+    end = closed(start.hypothesis, bodies, takes or listed(bodies), effects, case.band_hz, seed=seed, progress=progress)
     say("comparing with what was not fitted")
     every = {"fit": takes} | {split: _others(case, bodies, takes, split) for split in SPLITS[1:]}
     errors: dict[str, Any] = {"before": {}, "after": {}, "floor": least_db(takes, end.after)}
@@ -115,16 +105,6 @@ def _of_lines(case: Case, bodies: tuple[Struck, ...], end: Closed) -> dict[str, 
                 told |= {"decay_rms": float(np.sqrt(np.nanmean(lost**2)))} if np.isfinite(lost).any() else {}
                 found.setdefault(name, {})[split] = told
     return found
-
-
-def _takes(bodies: tuple[Struck, ...]) -> tuple[Take, ...]:
-    takes: list[Take] = []
-    for body in bodies:
-        if body.gathered is None or body.gathered.signals is None:
-            continue
-        floor = floor_between(list(body.gathered.signals))
-        takes += [Take(body, i, sample, body.gathered.sr, floor) for i, sample in zip(body.fitted, body.gathered.signals, strict=True)]
-    return tuple(takes)
 
 
 def _others(case: Case, bodies: tuple[Struck, ...], takes: tuple[Take, ...], split: str) -> tuple[Take, ...]:

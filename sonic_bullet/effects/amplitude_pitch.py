@@ -17,8 +17,19 @@ from sonic_bullet.effects.values import Evidence, Heard, Owner, Ring, Stage
 from sonic_bullet.records import Array
 
 MEASURES = ("impulse", "velocity", "displacement")
-SURE = 8.0  # spreads that b must stand off zero
-BETTER = 0.4  # of the phase's misfit must go
+SURE = 5.0  # spreads that b must stand off zero
+BETTER = 0.5  # of the phases' misfit must go, in modes that b would move
+FEWEST = 1.5  # of such modes
+
+
+@dataclass(frozen=True, slots=True)
+class Slope:
+    """b, its spread, the share of the phases' misfit that goes with it in modes it would move, and how many modes' misfit that is."""
+
+    bend: float
+    sd: float
+    share: float
+    modes: float
 
 
 @dataclass(frozen=True)
@@ -47,15 +58,18 @@ class AmplitudePitch:
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
         best: tuple[float, float, str] | None = None
-        need = SURE if evidence.known is None else 1.0
+        again = evidence.known is not None
         for h in evidence.heard:
             e = envelopes(h)
             if e is None:
                 continue
             for name, level in levels(h).items():
-                bend, sd, share = _slope(e, h, level[:, e.line])
-                if abs(bend) > need * sd and share > BETTER * (evidence.known is None) and (best is None or share > best[0]):
-                    best = (share, bend, name)
+                if isinstance(evidence.known, cls) and name != evidence.known.measure:
+                    continue
+                b = _slope(e, h, level[:, e.line])
+                sure = abs(b.bend) > (1.0 if again else SURE) * b.sd and b.share > (0.0 if again else BETTER)
+                if sure and (best is None or b.modes > best[0]):
+                    best = (b.modes, b.bend, name)
         return cls(best[1], best[2]) if best is not None else None
 
 
@@ -68,45 +82,47 @@ def _per_velocity(x: Ring, measure: str) -> Array:
     return np.ones(len(x.freq_hz))
 
 
-def _slope(e: Envelopes, h: Heard, level: Array) -> tuple[float, float, float]:
-    """b, its spread by the modes' own scatter, and the share of the phases' misfit it takes away."""
-    top, bottom, before, after, parts = 0.0, 0.0, 0.0, 0.0, []
-    for q, k in enumerate(e.line):
-        decay, omega = max(float(h.decay_per_s[k]), 1e-3), 2 * np.pi * float(h.freq_hz[k])
-        rows, sides, weights, ramps = [], [], [], []
-        for s in range(len(e.z)):
-            use = e.good[s, q]
-            if use.sum() < 8:
-                continue
-            t, phase = e.time_s[q, use], np.unwrap(np.angle(e.z[s, q, use]))
-            w = np.minimum((np.abs(e.z[s, q, use]) / max(e.noise[s, q], 1e-12)) ** 2, 1e4)
-            curve = level[s, q] ** 2 * omega * -np.expm1(-2 * decay * t) / (2 * decay)
-            rows.append(phase - np.average(phase, weights=w))
-            sides.append(curve - np.average(curve, weights=w))
-            ramps.append(t - np.average(t, weights=w))
-            weights.append(w)
-        if len(rows) < 2 and not (rows and len(rows[0]) > 30):
-            continue
-        y, x, t, w = (np.concatenate(part) for part in (rows, sides, ramps, weights))
-        y, x = y - t * (w * t * y).sum() / (w * t * t).sum(), x - t * (w * t * x).sum() / (w * t * t).sum()
-        xx, xy, yy = float((w * x * x).sum()), float((w * x * y).sum()), float((w * y * y).sum())
-        if xx <= 0 or yy <= 0:
-            continue
-        parts.append((xy / xx, xx / yy))  # weight by how much of it the misfit could say
-    if len(parts) < 1:
-        return 0.0, np.inf, 0.0
-    value, weight = np.array(parts).T
+def _slope(e: Envelopes, h: Heard, level: Array) -> Slope:
+    """b by the modes' own, each as heavy as what a bend would be in its phase over what there is; its spread by their scatter [White 1980], none further off than b itself."""
+    table = np.array([one for one in (_moments(e, h, level, q) for q in range(len(e.line))) if one is not None]).reshape(-1, 3)
+    table = table[(table[:, 0] > 0) & (table[:, 2] > 0)]
+    if not len(table):
+        return Slope(0.0, np.inf, 0.0, 0.0)
+    xx, xy, yy = table.T
+    value, weight = xy / xx, xx / yy
     centre = _median(value, weight)
     for _ in range(10):
         off = np.abs(value - centre)
-        near = weight / (1 + (off / (2 * _median(off, weight) + 1e-12 * abs(centre) + 1e-200)) ** 2)
-        centre = float((near * value).sum() / near.sum())
-    top = float((weight * (value - centre) ** 2).sum())
-    bottom = float((weight * value**2).sum())
-    sd = float(np.sqrt(top / weight.sum() / max(len(value) - 1, 1))) if len(value) > 1 else abs(centre) / (SURE + 1)
-    before, after = bottom, top
-    explained = float((weight * value**2).sum() - (weight * (value - centre) ** 2).sum()) / len(value)  # share of the misfit, mean over modes
-    return centre, max(sd, 1e-300), min(max(explained, 0.0), 1 - after / max(before, 1e-300))
+        near = 1 / (1 + (off / (2 * _median(off, weight) + 1e-12 * abs(centre) + 1e-200)) ** 2)
+        centre = float((weight * near * value).sum() / (weight * near).sum())
+    says = np.minimum(centre**2 * weight, 1.0)  # of a mode's misfit, as much as a bend would be of it: the others have no say
+    gone = np.maximum((2 * centre * xy - centre**2 * xx) / yy, -1.0)
+    sd = float(np.sqrt(((says * np.minimum(np.abs(value - centre), abs(centre))) ** 2).sum()) / max(says.sum(), 1e-300))
+    alone = says.sum() ** 2 / max(float((says**2).sum()), 1e-300) < FEWEST
+    return Slope(centre, np.inf if alone else max(sd, 1e-300), float((says * gone).sum() / max(says.sum(), 1e-300)), float(gone.sum()))
+
+
+def _moments(e: Envelopes, h: Heard, level: Array, q: int) -> tuple[float, float, float] | None:
+    """Σ x², Σ xy, Σ y² of a mode: y its strikes' phases without their means and the common slope, x what b = 1 would make of them; None where too little is clear."""
+    k = e.line[q]
+    decay, omega = max(float(h.decay_per_s[k]), 1e-3), 2 * np.pi * float(h.freq_hz[k])
+    rows, sides, weights, ramps = [], [], [], []
+    for s in range(len(e.z)):
+        use = e.good[s, q]
+        if use.sum() < 8:
+            continue
+        t, phase = e.time_s[q, use], np.unwrap(np.angle(e.z[s, q, use]))
+        w = np.minimum((np.abs(e.z[s, q, use]) / max(e.noise[s, q], 1e-12)) ** 2, 1e4)
+        curve = level[s, q] ** 2 * omega * -np.expm1(-2 * decay * t) / (2 * decay)
+        rows.append(phase - np.average(phase, weights=w))
+        sides.append(curve - np.average(curve, weights=w))
+        ramps.append(t - np.average(t, weights=w))
+        weights.append(w)
+    if len(rows) < 2 and not (rows and len(rows[0]) > 30):
+        return None
+    y, x, t, w = (np.concatenate(part) for part in (rows, sides, ramps, weights))
+    y, x = y - t * (w * t * y).sum() / (w * t * t).sum(), x - t * (w * t * x).sum() / (w * t * t).sum()
+    return float((w * x * x).sum()), float((w * x * y).sum()), float((w * y * y).sum())
 
 
 def _median(value: Array, weight: Array) -> float:

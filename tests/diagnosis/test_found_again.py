@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 from made_body import ALPHA, BETA, GAIN, plate, recorded
 
+from sonic_bullet.diagnosis.baseline import takes_of
 from sonic_bullet.diagnosis.bodies import Struck
-from sonic_bullet.diagnosis.diagnose import _takes
 from sonic_bullet.diagnosis.evidence import evidence_of
 from sonic_bullet.diagnosis.judge import least_db, mean_db
 from sonic_bullet.diagnosis.loop import Closed, closed
@@ -53,7 +53,7 @@ def fitted(body: Struck) -> Hypothesis:
 
 def ended(body: Struck) -> Closed:
     """The loop on a recorded plate."""
-    return closed(fitted(body), (body,), _takes((body,)), EFFECTS, BAND)
+    return closed(fitted(body), (body,), takes_of((body,)), EFFECTS, BAND)
 
 
 def test_nothing_is_added_where_nothing_lacks() -> None:
@@ -90,7 +90,7 @@ def close(found: Effect, planted: Effect, within: dict[str, float]) -> None:
 def test_a_planted_effect_is_proposed(effect: Effect, within: dict[str, float]) -> None:
     """With its own numbers, and it brings what is played nearer to the recordings than the best of the baseline."""
     body = recorded(effect)
-    takes = _takes((body,))
+    takes = takes_of((body,))
     base = refitted(fitted(body), (body,))
     evidence = evidence_of(base, (body,), BAND)
     found = type(effect).propose(evidence)
@@ -119,7 +119,7 @@ def test_a_suspect_of_somebody_else_is_tried_and_named() -> None:
     exec(compile(source, "docs/diagnosis.md", "exec"), theirs.__dict__)
     assert isinstance(theirs.SquareLaw(1.0), Effect)
     body = recorded(theirs.SquareLaw(20.0), seconds=0.5)
-    end = closed(fitted(body), (body,), _takes((body,)), (DampingLaw, ForeignMode, theirs.SquareLaw), BAND)
+    end = closed(fitted(body), (body,), takes_of((body,)), (DampingLaw, ForeignMode, theirs.SquareLaw), BAND)
     assert [c.id for c in end.added] == ["square-law"]
     assert end.added[0].effect.parameters()["q"] == pytest.approx(20.0, rel=0.05)
     assert set(EFFECTS) < set(theirs.suspects)

@@ -1,0 +1,81 @@
+"""The baseline of a case: the fitted model, its bodies, and the hypothesis that nothing is lacking.
+
+gathered lines -> estimator.fit -> bodies (corrections learnt) -> Hypothesis
+lines in chains (chains.py): the same with every chain as one line, where what that plays is nearer to the recordings
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sonic_bullet.diagnosis.bodies import Struck, shapeless, struck_bodies
+from sonic_bullet.diagnosis.chains import LINKS, unchained
+from sonic_bullet.diagnosis.elastic import with_elastic
+from sonic_bullet.diagnosis.judge import Take, mean_db
+from sonic_bullet.diagnosis.play import Hypothesis
+from sonic_bullet.diagnosis.refit import refitted
+from sonic_bullet.diagnosis.unheard import settled
+from sonic_bullet.estimator.distance import floor_between
+from sonic_bullet.estimator.evidence import Evidence as Gathered
+from sonic_bullet.estimator.fit import fit_evidence
+from sonic_bullet.estimator.fitted import CaseFit
+from sonic_bullet.files.cases import Case
+from sonic_bullet.modal.cache import Place
+
+NEARER = 0.9  # of the distance, where chains are one line each
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Baseline:
+    """What the case's linear model is. found: the fit. bodies: every object, fitted ones first. takes: the fitted strikes that have audio."""
+
+    found: CaseFit
+    bodies: tuple[Struck, ...]
+    hypothesis: Hypothesis
+    takes: tuple[Take, ...]
+
+
+def baseline(case: Case, gathered: tuple[Gathered, ...], *, cache: Place = "default", progress: Callable[[str], None] | None = None) -> Baseline:
+    """Fit it to gathered evidence. Raises SonicBulletError."""
+    plain = _of(case, gathered, cache, progress)
+    others = [tuple(_unchained(one, link) for one in gathered) for link in LINKS] if plain.takes else []
+    others = [faint for faint in others if any(a is not b for a, b in zip(faint, gathered, strict=True))]
+    if not others:
+        return plain
+    if progress is not None:
+        progress("modes that depend on their level leave chains of lines: fitting what they end as")
+    best = min((_of(case, faint, cache, None) for faint in others), key=_off_db)
+    return best if _off_db(best) < NEARER * _off_db(plain) else plain
+
+
+def _unchained(one: Gathered, link: tuple[float, float, bool]) -> Gathered:
+    lines = unchained(one.lines, link) if one.signals is not None else None
+    return one if lines is None else replace(one, lines=lines)
+
+
+def _off_db(b: Baseline) -> float:
+    return mean_db(b.takes, refitted(b.hypothesis, b.bodies)) or 0.0
+
+
+def _of(case: Case, gathered: tuple[Gathered, ...], cache: Place, progress: Callable[[str], None] | None) -> Baseline:
+    found = fit_evidence(case, gathered, check_mesh=False, progress=progress)
+    bodies = struck_bodies(found, cache=cache, progress=progress) if found.objects else tuple(shapeless(found, g) for g in gathered)
+    bodies = with_elastic(found, bodies, cache=cache, progress=progress)
+    gain = found.fit.sigma if np.isfinite(found.fit.sigma) and found.fit.sigma > 0 else 1.0
+    base = Hypothesis(found.fit.alpha_per_s, found.fit.beta_s, gain, (), {b.name: b.correction for b in bodies})
+    bodies = settled(refitted(base, bodies), bodies)
+    return Baseline(found, bodies, replace(base, correction={b.name: b.correction for b in bodies}), takes_of(bodies))
+
+
+def takes_of(bodies: tuple[Struck, ...]) -> tuple[Take, ...]:
+    """The fitted strikes that have audio."""
+    takes: list[Take] = []
+    for body in bodies:
+        if body.gathered is None or body.gathered.signals is None:
+            continue
+        floor = floor_between(list(body.gathered.signals))
+        takes += [Take(body, i, sample, body.gathered.sr, floor) for i, sample in zip(body.fitted, body.gathered.signals, strict=True)]
+    return tuple(takes)

@@ -1,0 +1,73 @@
+"""What a mode that depends on its own level leaves among the lines: a chain of them; and the one line it rings as when it is faint.
+
+    a e^{−dt} e^{iβ(1 − e^{−2dt})} = a e^{−dt} [e^{iβ} − iβ e^{iβ} e^{−2dt} + …]      decays d, 3d, 5d, …      frequency goes with level²     (effects.amplitude_pitch)
+    a/((1 + c)e^{dt} − c)          = a/(1 + c) [e^{−dt} + c/(1 + c) e^{−2dt} + …]      decays d, 2d, 3d, …      decay goes with level          (effects.amplitude_damping)
+
+Least squares fit such a mode by a few lines, each shorter than the one before and hardly beside it. The slowest is the linear mode, the body's and the material's
+own, and of a mode that is only bent the whole chain's level falls as it does; at the onset all lines add up to what was struck. A baseline fitted to the loudest
+line of each chain has neither.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from sonic_bullet.estimator.lines import Lines
+from sonic_bullet.records import Array
+
+LINKS = (
+    (1.25, 1.0, False),
+    (1.1, 3.0, True),
+)  # a chain's next line is so much shorter at least, and as near as that many times its decay; whether modes are only bent
+SHORTER = 5.0  # at most
+NEAR = 0.012  # of a frequency
+LONG, FRAMES, FAINT = 3.0, 120, 0.03  # of 1/d; of the strongest level
+FEWEST, SHARE = 4, 0.1  # chains, and of all modes' lines: fewer are neighbours, hits or a room's
+
+
+def unchained(lines: Lines, link: tuple[float, float, bool]) -> Lines | None:
+    """Every chain of such links as one line: the slowest's frequency, the slowest's decay or the chain's own, the amplitudes' sum. None where there are too few chains to speak of."""
+    groups = chains(lines, link)
+    many = sum(len(g) > 1 for g in groups)
+    if many < max(FEWEST, SHARE * len(groups)):
+        return None
+    slow = np.array([g[0] for g in groups])
+    order = np.argsort(lines.freq_hz[slow])
+    slow, groups = slow[order], [groups[i] for i in order]
+    decay = np.array([_falls(lines, g) if link[2] and len(g) > 1 else lines.decay_per_s[g[0]] for g in groups])
+    return replace(
+        lines,
+        freq_hz=lines.freq_hz[slow],
+        decay_per_s=decay,
+        freq_sd_hz=lines.freq_sd_hz[slow],
+        decay_sd_per_s=lines.decay_sd_per_s[slow],
+        amplitude=np.stack([lines.amplitude[:, g].sum(axis=1) for g in groups], axis=1),
+        amplitude_sd=np.stack([np.sqrt((lines.amplitude_sd[:, g] ** 2).sum(axis=1)) for g in groups], axis=1),
+        energy=np.array([lines.energy[g].sum() for g in groups]),
+    )
+
+
+def _falls(lines: Lines, group: Array) -> float:
+    """The decay at which a chain's level falls, in 1/s: bent or not, a mode's level does as e^{−dt}, and no line of many is as sure."""
+    pole = -lines.decay_per_s[group] + 2j * np.pi * (lines.freq_hz[group] - lines.freq_hz[group[0]])
+    time = np.linspace(0, LONG / lines.decay_per_s[group[0]], FRAMES)
+    level = np.abs(lines.amplitude[:, group] @ np.exp(pole[:, None] * time))
+    weight = 1 / (1 + (FAINT * level.max() / np.maximum(level, 1e-300)) ** 2)
+    mean = (weight * time).sum(axis=1, keepdims=True) / weight.sum(axis=1, keepdims=True)
+    ramp = time - mean
+    return float(-(weight * ramp * np.log(np.maximum(level, 1e-300))).sum() / (weight * ramp**2).sum())
+
+
+def chains(lines: Lines, link: tuple[float, float, bool]) -> list[Array]:
+    """The lines in groups, by index, the slowest first; most stand alone."""
+    from scipy.sparse import csr_array
+    from scipy.sparse.csgraph import connected_components
+
+    omega, decay = 2 * np.pi * lines.freq_hz, np.nan_to_num(lines.decay_per_s)
+    ratio = decay[None, :] / np.maximum(decay[:, None], 1e-12)
+    gap = np.abs(omega[:, None] - omega[None, :])
+    linked = (ratio > link[0]) & (ratio < SHORTER) & (gap < link[1] * decay[None, :]) & (gap < NEAR * omega[:, None]) & (decay[:, None] > 0)
+    group = connected_components(csr_array(linked), directed=False)[1]
+    return [who[np.argsort(decay[who], kind="stable")] for who in (np.flatnonzero(group == g) for g in range(group.max(initial=-1) + 1))]

@@ -1,0 +1,93 @@
+"""Modes that depend on their own level come as chains of lines; what they end as is read off each chain."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from made_body import ALPHA, BETA, SR, plate, recorded, struck
+from test_found_again import BAND, fitted
+
+from sonic_bullet.diagnosis.chains import LINKS, chains, unchained
+from sonic_bullet.diagnosis.evidence import evidence_of
+from sonic_bullet.diagnosis.refit import refitted
+from sonic_bullet.effects import Effect
+from sonic_bullet.effects.amplitude_damping import AmplitudeDamping
+from sonic_bullet.effects.amplitude_pitch import AmplitudePitch
+from sonic_bullet.effects.room import Room
+from sonic_bullet.estimator.lines import Lines
+from sonic_bullet.records import Array
+
+BENT = AmplitudePitch(0.08, "velocity")
+CHOKED = AmplitudeDamping(5.0, "velocity")
+
+
+def lines_of(*effects: Effect) -> Lines:
+    body = recorded(*effects)
+    assert body.gathered is not None
+    return body.gathered.lines
+
+
+def true_decay(freq_hz: Array) -> Array:
+    """Of the plate's mode nearest to each, in 1/s; and whether it is near."""
+    own = plate().freq_hz
+    at = np.abs(own[:, None] - freq_hz).argmin(axis=0)
+    return np.asarray((ALPHA + BETA * (2 * np.pi * own[at]) ** 2) / 2)
+
+
+@pytest.mark.parametrize("link", LINKS)
+def test_a_bent_mode_is_one_line_with_the_decay_it_has(link: tuple[float, float, bool]) -> None:
+    lines = lines_of(BENT)
+    assert len(lines.freq_hz) > 1.3 * len(plate().freq_hz)
+    one = unchained(lines, link)
+    assert one is not None and len(one.freq_hz) < 0.8 * len(lines.freq_hz)
+    loud = np.abs(one.amplitude).max(axis=0) > 0.02 * np.abs(one.amplitude).max()
+    off = np.abs(one.decay_per_s / true_decay(one.freq_hz) - 1)[loud]
+    assert np.median(off) < 0.03 and off.max() < 0.2
+    before = np.abs(lines.decay_per_s / true_decay(lines.freq_hz) - 1)
+    assert np.quantile(before, 0.6) > 0.2
+
+
+def test_a_choked_mode_ends_with_its_own_decay() -> None:
+    lines = lines_of(CHOKED)
+    one = unchained(lines, LINKS[0])
+    assert one is not None
+    assert np.median(np.abs(one.decay_per_s / true_decay(one.freq_hz) - 1)) < 0.1
+
+
+def test_chains_add_up_to_what_was_struck() -> None:
+    body, plain = recorded(BENT), recorded()
+    assert body.gathered is not None and plain.gathered is not None
+    one, own = unchained(body.gathered.lines, LINKS[1]), plain.gathered.lines
+    assert one is not None
+    for k, f in enumerate(own.freq_hz):
+        near = int(np.argmin(np.abs(one.freq_hz / f - 1)))
+        if abs(one.freq_hz[near] / f - 1) < 1e-3 and np.abs(own.amplitude[:, k]).max() > 0.1 * np.abs(own.amplitude).max():
+            struck_with = np.abs(own.amplitude[:, k])
+            assert np.abs(one.amplitude[:, near]) == pytest.approx(struck_with, rel=0.06, abs=0.02 * float(struck_with.max()))
+
+
+@pytest.mark.parametrize("effects", [(), (Room(0.9, 0.8, 11),)], ids=["linear", "room"])
+def test_no_chains_where_no_level_counts(effects: tuple[Effect, ...]) -> None:
+    assert unchained(lines_of(*effects), LINKS[0]) is None
+
+
+def test_every_line_is_in_one_group() -> None:
+    lines = lines_of(BENT)
+    for link in LINKS:
+        groups = chains(lines, link)
+        assert sorted(np.concatenate(groups).tolist()) == list(range(len(lines.freq_hz)))
+        assert all((np.diff(lines.decay_per_s[g]) >= 0).all() for g in groups)
+
+
+@pytest.mark.parametrize("measure", ["velocity", "displacement"])
+def test_the_bend_and_its_measure_are_read_off_the_modes_that_show_it(measure: str) -> None:
+    """By displacement only the lowest modes bend; the others say nothing for or against it."""
+    true = AmplitudePitch(0.08 if measure == "velocity" else 2.0e6, measure)
+    body = recorded(true)
+    assert body.gathered is not None
+    one = unchained(body.gathered.lines, LINKS[1]) or body.gathered.lines
+    again = struck(lines=one, signals=body.gathered.signals)
+    found = AmplitudePitch.propose(evidence_of(refitted(fitted(again), (again,)), (again,), BAND))
+    assert found is not None and found.measure == measure
+    assert found.bend == pytest.approx(true.bend, rel=0.1)
+    assert body.gathered.sr == SR
