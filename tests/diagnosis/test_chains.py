@@ -59,11 +59,12 @@ def test_chains_add_up_to_what_was_struck() -> None:
     assert body.gathered is not None and plain.gathered is not None
     one, own = unchained(body.gathered.lines, LINKS[1]), plain.gathered.lines
     assert one is not None
-    for k, f in enumerate(own.freq_hz):
-        near = int(np.argmin(np.abs(one.freq_hz / f - 1)))
-        if abs(one.freq_hz[near] / f - 1) < 1e-3 and np.abs(own.amplitude[:, k]).max() > 0.1 * np.abs(own.amplitude).max():
-            struck_with = np.abs(own.amplitude[:, k])
-            assert np.abs(one.amplitude[:, near]) == pytest.approx(struck_with, rel=0.06, abs=0.02 * float(struck_with.max()))
+    apart = np.array([np.sort(np.abs(own.freq_hz / f - 1))[1] > 0.02 for f in own.freq_hz])  # nearer ones lend each other lines
+    assert apart.sum() >= 12
+    for k in np.flatnonzero(apart):
+        near = int(np.argmin(np.abs(one.freq_hz / own.freq_hz[k] - 1)))
+        struck_with = np.abs(own.amplitude[:, k])
+        assert np.abs(one.amplitude[:, near]) == pytest.approx(struck_with, rel=0.03, abs=0.01 * float(struck_with.max()))
 
 
 @pytest.mark.parametrize("effects", [(), (Room(0.9, 0.8, 11),)], ids=["linear", "room"])
