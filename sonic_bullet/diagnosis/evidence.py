@@ -29,8 +29,8 @@ def evidence_of(h: Hypothesis, bodies: tuple[Struck, ...], band_hz: tuple[float,
     return Evidence(heard, h.alpha_per_s, h.beta_s, h.gain, tuple(e.id for e in h.effects), band_hz, seed)
 
 
-def heard_of(h: Hypothesis, body: Struck) -> Heard:
-    """One fitted object's."""
+def heard_of(h: Hypothesis, body: Struck, *, sounds: bool = True) -> Heard:
+    """One fitted object's. sounds: whether what it would sound like is wanted too, which takes longest."""
     gathered = body.gathered
     assert gathered is not None
     lines, model = gathered.lines, None
@@ -49,7 +49,7 @@ def heard_of(h: Hypothesis, body: Struck) -> Heard:
     model_hz = np.array([np.mean([plain.freq_hz[rank[int(order[k])]] if int(order[k]) in rank else model.freq_hz[k] for k in m]) for m in mode])
     rest = np.setdiff1d(np.arange(len(lines.freq_hz)), line)
     predicted = None
-    if gathered.signals is not None:
+    if sounds and gathered.signals is not None:
         predicted = np.stack([play(h, body, i, gathered.signals.shape[1], gathered.sr) for i in mine])
     count = body.surface_count(model)
     heard = Heard(

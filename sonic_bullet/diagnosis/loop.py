@@ -17,6 +17,7 @@ from sonic_bullet.diagnosis.exchange import ALIKE, exchanged, rivals
 from sonic_bullet.diagnosis.judge import Judged, Take, least_db, mean_db
 from sonic_bullet.diagnosis.play import Hypothesis, moves, play
 from sonic_bullet.diagnosis.refit import ROUGH, refitted, retold, with_effects
+from sonic_bullet.diagnosis.ties import misfit
 from sonic_bullet.diagnosis.trial import LEAST_DB, LEAST_SHARE, SURE, Candidate, earns, trials
 from sonic_bullet.effects.values import Effect
 from sonic_bullet.estimator.distance import with_noise
@@ -25,6 +26,7 @@ ROUNDS = 4
 MESH = 1e-3  # of a frequency: what a good mesh gets wrong
 SUFFICES_DB = 1.5  # a gap below this is the mesh's and the shapes' own
 EXPLAINED = 0.4  # of the gap; part of it is the mesh's and the shapes' own
+NEARLY, CLEAR = 0.2, 25.0  # of what a name says, and twice the ln likelihood of phases: where they decide between two
 OPEN = 0.3  # of the first gap: with less left, no costly suspect is asked
 
 
@@ -74,7 +76,7 @@ def closed(
         able = [c for c in found if earns(c, max(now - floor, 0.0))]
         if not able:
             break
-        best = simplest(able)
+        best = simplest(able, bodies)
         h, added, passed = best.hypothesis, [*added, best], [*passed, rivals(able, best)]
         now = mean_db(takes, h) or 0.0
         floor = least_db(takes, h) or floor
@@ -132,19 +134,27 @@ def _pruned(h: Hypothesis, added: list[Candidate], bodies: tuple[Struck, ...], t
     return h, added
 
 
-def simplest(able: Sequence[Candidate]) -> Candidate:
-    """The best, or the one with the fewest numbers of those that strikes cannot tell from it: SURE standard errors of the difference.
+def simplest(able: Sequence[Candidate], bodies: tuple[Struck, ...]) -> Candidate:
+    """The best, or the one with the fewest numbers of those that strikes cannot tell from it: SURE standard errors of the difference, ALIKE of what it says.
 
-    Effects that move modes stand aside: corrections are learnt anew beside them, and are numbers too.
+    Where another with no more numbers says nearly as much (NEARLY), the lines' phases may speak for that one (ties.py). Effects that move modes stand aside:
+    corrections are learnt anew beside them, and are numbers too.
     """
     best = able[0]
+    if moves(best.hypothesis):
+        return best
 
-    def close(c: Candidate) -> bool:
+    def close(c: Candidate, share: float) -> bool:
         more = best.drop_db - c.drop_db
-        return bool(more.mean() <= SURE * more.std(ddof=1) / np.sqrt(len(more)) and more.mean() < ALIKE * best.mean_db)
+        return bool(more.mean() <= SURE * more.std(ddof=1) / np.sqrt(len(more)) and more.mean() < share * best.mean_db)
 
-    rivals = [c for c in able if close(c) and not moves(c.hypothesis)]
-    return best if moves(best.hypothesis) else min(rivals, key=lambda c: (c.effect.freedom(), -c.mean_db))
+    rivals = [c for c in able if not moves(c.hypothesis)]
+    first = min((c for c in rivals if close(c, ALIKE)), key=lambda c: (c.effect.freedom(), -c.mean_db))
+    others = [c for c in rivals if c is not first and c.effect.freedom() <= first.effect.freedom() and close(c, NEARLY)]
+    if not others:
+        return first
+    off = [misfit(c.hypothesis, bodies) for c in others]
+    return others[int(np.argmin(off))] if min(off) < misfit(first.hypothesis, bodies) - CLEAR else first
 
 
 def described(candidates: Sequence[Candidate]) -> list[dict[str, Any]]:

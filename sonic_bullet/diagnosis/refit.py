@@ -32,7 +32,9 @@ def refitted(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...]
     if moved:
         h = corrected(h, bodies)
     if heard is None or moved:
-        heard = tuple(heard_of(replace(h, effects=tuple(e for e in h.effects if e.stage is not Stage.SOUND)), b) for b in bodies if b.gathered is not None)
+        heard = tuple(
+            heard_of(replace(h, effects=tuple(e for e in h.effects if e.stage is not Stage.SOUND)), b, sounds=False) for b in bodies if b.gathered is not None
+        )
     heard = tuple(outside(h, one) for one in heard)
     return _gained(_damped(h, bodies, heard), bodies, heard)
 

@@ -107,5 +107,5 @@ def _bins(freq_hz: float, half_hz: float, n: int, sr: int) -> Array:
 
 def _line(freq_hz: Array | float, decay: float, bins: Array, n: int, sr: int) -> Array:
     """½ Σ_t e^{(−d + iω)t} e^{−2πi kt/n} at some bins of n-point spectra."""
-    ratio = np.exp((-decay + 2j * np.pi * (freq_hz - bins * sr / n)) / sr)
-    return np.asarray(0.5 * (1 - ratio**n) / (1 - ratio))
+    start = (-decay + 2j * np.pi * np.asarray(freq_hz)) / sr  # the bins' own turns come full circle after n samples
+    return np.asarray(0.5 * (1 - np.exp(start * n)) / (1 - np.exp(start) * np.exp(-2j * np.pi * bins / n)))

@@ -104,6 +104,13 @@ def _weighted(lam: Array, decay: Array, sd: Array, start: Array | None = None) -
 
 
 def _not_negative(a: Array, b: Array) -> Array:
-    from scipy.optimize import nnls
-
-    return np.asarray(nnls(a, b)[0])
+    """x (2,) >= 0 of least |a x − b|: inside, or the better one of the two edges."""
+    gram, right = a.T @ a, a.T @ b
+    own = np.diag(gram)
+    det = own[0] * own[1] - gram[0, 1] ** 2
+    if det > 1e-14 * own[0] * own[1]:
+        both = np.array([own[1] * right[0] - gram[0, 1] * right[1], own[0] * right[1] - gram[0, 1] * right[0]]) / det
+        if (both >= 0).all():
+            return np.asarray(both)
+    edge = np.maximum(right, 0.0) / np.maximum(own, 1e-300)
+    return np.asarray(np.where(np.arange(2) == int(np.argmax(edge * right)), edge, 0.0))
