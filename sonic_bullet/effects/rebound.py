@@ -15,6 +15,7 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
+from sonic_bullet.effects.ringing import direct_as_expected
 from sonic_bullet.effects.values import Blow, Evidence, Heard, Owner, Stage
 from sonic_bullet.records import Array
 
@@ -24,6 +25,9 @@ FAINT = 0.02
 LEAST = 0.06  # of the first hit's share
 GAIN = 0.02  # of what is left must go with another hit
 NEAR = 0.03  # of ln t: delays that agree
+MOST = 0.6  # of the strikes show it
+HITS = (3, 4, 5, MOST_HITS)
+RESTITUTIONS = (0.2, 0.35, 0.5, 0.65, 0.8)
 EXPONENTS = (0.0, 1.0, 0.5, -0.2)
 
 
@@ -73,8 +77,11 @@ class Rebound:
         h = max((h for h in evidence.heard if h.signal is not None), key=lambda h: len(h.freq_hz), default=None)
         if h is None or len(h.freq_hz) < 3:
             return None
+        if isinstance(evidence.known, cls):
+            return replace(evidence.known, **_refined(evidence.known, h)[1])
         found = [(level, hits) for level, hits in zip(h.impulse_n_s, _hits(h), strict=True) if len(hits)]
-        if len(found) < max(2, 0.6 * len(h.impulse_n_s)):
+        need = max(2.0, MOST * len(h.impulse_n_s))
+        if len(found) < need:
             return None
         level = np.array([j if np.isfinite(j) else 1.0 for j, _ in found])
         reference = float(np.exp(np.log(level).mean()))
@@ -85,14 +92,56 @@ class Rebound:
         (_, first, which), exponent = max(agreed, key=lambda a: a[0][0])
         mine = [(t, i) for t, i in zip(every, which, strict=True) if i >= 0]
         share = np.array([t[i, 1] for t, i in mine])
-        if len(mine) < max(2, 0.6 * len(h.impulse_n_s)) or _spread(np.log(share)) > 0.5:
+        if len(mine) < need or _spread(np.log(share)) > 0.5:
             return None
         after = [t[t[:, 0] > 1.03 * t[i, 0]] for t, i in mine]
         score, ratio, _ = _agreed([np.log(np.maximum(a[:, 0] / t[i, 0] - 1, 1e-3)) for a, (t, i) in zip(after, mine, strict=True)], [a[:, 1] for a in after])
         shrink = float(np.clip(np.exp(ratio), 0.03, 1.0)) if score > 0 and sum(len(a) > 0 for a in after) >= 2 else None
         e = float(np.clip(np.median(share), 0.03, 0.97))
         count = 1 + round(float(np.median([len(t) - i for t, i in mine])))
-        return cls(float(np.exp(first)), reference, e, exponent, shrink, count if count <= 2 else MOST_HITS)
+        start = cls(float(np.exp(first)), reference, e, exponent, shrink, count)
+        ends = [_refined(replace(start, hits=k), h) for k in ((2,) if count <= 2 or shrink is None else HITS)]
+        return replace(start, **min(ends, key=lambda end: end[0])[1])
+
+
+def _refined(start: Rebound, h: Heard) -> tuple[float, dict[str, Any]]:
+    """What is left, up to a constant, and the restitution, gaps and their ratio that leave least of all strikes at once: Σ_s |<y, m>|²/<m, m> is most, m the sound of all its hits."""
+    from scipy.optimize import minimize
+
+    assert h.signal is not None
+    n = min(h.signal.shape[1], 3 * int(SPAN_S[1] * h.sr))
+    size = 2 * n
+    sound = np.fft.rfft(direct_as_expected(h)[:, :n], size)
+    both, own = np.conj(sound) * np.fft.rfft(h.signal[:, :n], size), np.abs(sound) ** 2
+    omega = 2 * np.pi * np.fft.rfftfreq(size, 1 / h.sr)
+    level = np.where(np.isfinite(h.impulse_n_s), h.impulse_n_s, 1.0)
+    total = (h.signal[:, :n] ** 2).sum(axis=1) * size / 2
+
+    def of(x: Array) -> dict[str, Any]:
+        e = float(np.clip(x[0], 0.03, 0.97))
+        shrink = None if start.shrink is None else float(np.clip(x[2], 0.03, 1.0))
+        return {"gap_s": float(start.gap_s * np.exp(x[1])), "restitution": e, "shrink": shrink, "hits": start.hits}
+
+    def left(x: Array) -> float:
+        trial, gone = replace(start, **of(x)), 0.0
+        for s, j in enumerate(level):
+            blow = trial.apply(Blow(float(j), np.zeros(1), np.ones(1)))
+            turn = np.zeros(len(omega), complex)
+            for share, delay in zip(blow.share, blow.delay_s, strict=True):
+                turn += share * np.exp(-1j * omega * delay)
+            gone += (
+                max(float((np.conj(turn) * both[s]).real.sum()), 0.0) ** 2
+                / max(float((np.abs(turn) ** 2 * own[s]).sum()), 1e-300)
+                / max(float(total[s]), 1e-300)
+            )
+        return -gone
+
+    first = np.array([start.restitution, 0.0, start.restitution if start.shrink is None else start.shrink])
+    tries = [np.array([e, *first[1:]]) for e in (first[0], *RESTITUTIONS)]
+    best = min(tries, key=left)
+    simplex = best + np.array([[0, 0, 0], [0.1, 0, 0], [0, 2e-4, 0], [0, 0, 2e-3]])
+    found = minimize(left, best, method="Nelder-Mead", options={"initial_simplex": simplex, "xatol": 1e-4, "fatol": 1e-6, "maxfev": 120})
+    return float(found.fun), of(found.x)
 
 
 def _agreed(value: list[Array], share: list[Array]) -> tuple[float, float, list[int]]:
@@ -117,8 +166,6 @@ def _hits(h: Heard) -> list[list[tuple[float, float]]]:
     Matching pursuit [Mallat & Zhang 1993]: the sound of one hit, as the lines and the model have it, is sought later in what is left; after every
     find all shares are solved together.
     """
-    from sonic_bullet.effects.ringing import direct_as_expected
-
     assert h.signal is not None
     sound = direct_as_expected(h)
     reach = int(SPAN_S[1] * h.sr)

@@ -26,6 +26,7 @@ MOST_LINES = 160
 SECONDS_MAX = 8.0
 CROWD, FEWER = 2.5, 0.3  # starting lines over a body's modes; of the lines at the onset
 LATE_S = (0.03, 0.1)
+BEYOND = (10.0, 0.1)  # times a recording's peak; share of the lines that begin there: what no single hit leaves
 PINNED = 0.98  # of the fastest decay there is
 
 
@@ -55,8 +56,9 @@ class Lines:
 def joint_lines(signals: Array, sr: int, *, band_hz: tuple[float, float] = (20.0, 20_000.0), signed: bool = True, modes: int | None = None) -> Lines:
     """Lines of signals (s, n), all starting at the onset of their strike. Raises AudioError where there is too little signal.
 
-    modes: about how many the body has, where more than one hit may be in a signal: several in a row make a crowd of lines, none of them a mode. Where
-    far fewer are left after LATE_S, lines are those, taken back to the onset: A e^{(d − iω)t}, what a single hit there would have had to leave.
+    modes: about how many the body has, where more than one hit may be in a signal: several in a row make a crowd of lines, none of them a mode, or lines
+    that would have to begin far above all that was recorded. Where far fewer are left after LATE_S, or none such, lines are those, taken back to the onset:
+    A e^{(d − iω)t}, what a single hit there would have had to leave.
     """
     signals = np.asarray(signals, float)[:, : int(SECONDS_MAX * sr)]
     if signals.shape[1] < 256 or not np.isfinite(signals).all():
@@ -68,11 +70,15 @@ def joint_lines(signals: Array, sr: int, *, band_hz: tuple[float, float] = (20.0
     noise = noise_rms(signals, sr)
     colour = _colour(signals, noise, sr)
     pole = start_poles(signals / noise[:, None], sr, low, high)
+    few: Lines | None = None
     for late in (round(t * sr) for t in LATE_S) if modes is not None and len(pole) >= CROWD * modes else ():
         if signals.shape[1] >= 8 * late and 3 <= len(start_poles(signals[:, late:] / noise[:, None], sr, low, high)) < FEWER * len(pole):
-            found = joint_lines(signals[:, late:], sr, band_hz=band_hz, signed=signed)
-            back = np.exp((found.decay_per_s - 2j * np.pi * found.freq_hz) * late / sr)
-            return replace(found, amplitude=found.amplitude * back, amplitude_sd=found.amplitude_sd * np.abs(back))
+            after = _taken_back(joint_lines(signals[:, late:], sr, band_hz=band_hz, signed=signed), late, sr)
+            few = few or after
+            if _beyond(after, signals) < BEYOND[1]:  # else it still hits
+                return after
+    if few is not None:
+        return few
     try:
         for _ in range(3):
             before = len(pole)
@@ -81,9 +87,28 @@ def joint_lines(signals: Array, sr: int, *, band_hz: tuple[float, float] = (20.0
             pole = pole[energy / colour(pole.imag / (2 * np.pi)) > SIGNIFICANT]
             if len(pole) == before or not len(pole):
                 break
-        return _lines(signals, noise, pole, sr, signed)
+        found = _lines(signals, noise, pole, sr, signed)
     except np.linalg.LinAlgError as error:
         raise AudioError("lines of the recording cannot be told apart: no decaying sound", "give a recording of one impact") from error
+    for late in (round(t * sr) for t in LATE_S) if modes is not None and _beyond(found, signals) > BEYOND[1] else ():
+        if signals.shape[1] < 8 * late:
+            break
+        after = _taken_back(joint_lines(signals[:, late:], sr, band_hz=band_hz, signed=signed), late, sr)
+        if len(after.freq_hz) >= 3 and _beyond(after, signals) < BEYOND[1]:
+            return after
+    return found
+
+
+def _taken_back(lines: Lines, late: int, sr: int) -> Lines:
+    """Lines that were found from a sample on, as they would have begun at the onset."""
+    back = np.exp((lines.decay_per_s - 2j * np.pi * lines.freq_hz) * late / sr)
+    return replace(lines, amplitude=lines.amplitude * back, amplitude_sd=lines.amplitude_sd * np.abs(back))
+
+
+def _beyond(lines: Lines, signals: Array) -> float:
+    """Share of the lines that begin far above a recording's peak, in one of them."""
+    peak = np.abs(signals).max(axis=1, keepdims=True)
+    return float((np.abs(lines.amplitude) > BEYOND[0] * peak).any(axis=0).mean()) if len(lines.freq_hz) else 0.0
 
 
 def noise_rms(signals: Array, sr: int) -> Array:

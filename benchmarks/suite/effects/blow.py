@@ -16,6 +16,7 @@ from benchmarks.suite.effects.base import LOUD, Effect, Scene, jitter, pick
 from benchmarks.suite.physics import Ring, ring
 from sonic_bullet.records import Array
 
+REACH = 32  # samples to both sides of a blow between two of them
 POWERS = {"half-sine": 1.0, "hertz": 1.5, "raised-cosine": 2.0}
 
 
@@ -101,10 +102,10 @@ def rebound(strength: int, rng: np.random.Generator, scene: Scene) -> Effect:
     def taps(impulse: float, rate: float) -> Array:
         first = gap * (impulse / 0.02) ** power
         when = np.concatenate([[0], np.cumsum(first * r ** np.arange(hits - 1))]) * rate
-        out = np.zeros(int(when[-1]) + 2)
+        out = np.zeros(int(when[-1]) + REACH)
         for k, w in enumerate(when):
-            out[int(w)] += r**k * (1 - w % 1)
-            out[int(w) + 1] += r**k * (w % 1)
+            at = np.arange(max(int(w) - REACH + 1, 0), int(w) + REACH)
+            out[at] += r**k * np.sinc(at - w) * np.cos(np.pi * (at - w) / (2 * REACH)) ** 2  # between samples: a bounce is no softer there
         return out
 
     return Effect("rebound", "striker", {"restitution": r, "gap": gap, "J0": 0.02, "exponent": power, "hits": hits}, pulse=taps)

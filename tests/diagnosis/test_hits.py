@@ -1,0 +1,48 @@
+"""Strikes that bounce: how often and how hard is told by all strikes at once, and lines are what is left once it is over."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from made_body import ALPHA, BETA, SR, recorded
+from test_found_again import BAND, fitted
+
+from sonic_bullet.diagnosis.evidence import evidence_of
+from sonic_bullet.diagnosis.refit import refitted
+from sonic_bullet.effects.rebound import Rebound
+from sonic_bullet.estimator.lines import joint_lines
+
+
+@pytest.mark.parametrize("hits", [2, 3, 8])
+def test_restitution_gap_and_hits_are_told(hits: int) -> None:
+    """A train cut short is not a longer one of less restitution."""
+    true = Rebound(0.0131, 0.016, 0.6, 0.0, 0.6, hits)
+    body = recorded(true)
+    found = Rebound.propose(evidence_of(refitted(fitted(body), (body,)), (body,), BAND))
+    assert found is not None
+    assert found.restitution == pytest.approx(0.6, rel=0.03)
+    assert found.gap_s == pytest.approx(0.0131, abs=0.2 / SR)
+    share = 0.6 ** np.arange(found.hits)
+    assert (share[hits:] < 0.14).all() and found.hits >= min(hits, 4)  # what is weaker than the model's own error is not counted
+
+
+def test_lines_of_a_bouncing_strike_are_no_louder_than_the_strike() -> None:
+    """Gaps that go with the impulse: from the first to the last strike no moment after the onset is every strike's last, but a late one is after all of them."""
+    rng = np.random.default_rng(3)
+    freq, t = np.array([952.0, 1310.0, 2093.0, 2740.0, 4095.0, 5410.0]), np.arange(2 * SR) / SR
+    decay = 3 + BETA * (2 * np.pi * freq) ** 2 / 2 + ALPHA / 10
+    signals = []
+    for impulse in (0.005, 0.01, 0.02, 0.03, 0.04):
+        size = rng.uniform(0.3, 1.0, len(freq)) * impulse
+        out = np.zeros(len(t))
+        for share, delay in ((1.0, 0.0), (0.25, 0.8 * impulse), (0.06, 1.0 * impulse)):
+            late = np.maximum(t - delay, 0)
+            out += share * ((t >= delay) * (size @ (np.exp(-decay[:, None] * late) * np.sin(2 * np.pi * freq[:, None] * late))))
+        signals.append(out + 2e-6 * rng.standard_normal(len(t)))
+    found = joint_lines(np.stack(signals), SR, band_hz=(50.0, 7_500.0), modes=8)
+    peak = np.abs(np.stack(signals)).max(axis=1, keepdims=True)
+    assert (np.abs(found.amplitude) < 10 * peak).all()
+    for f, d in zip(freq, decay, strict=True):
+        near = int(np.argmin(np.abs(found.freq_hz - f)))
+        assert found.freq_hz[near] == pytest.approx(f, rel=1e-4)
+        assert found.decay_per_s[near] == pytest.approx(d, rel=0.02)
