@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sonic_bullet.diagnosis.bodies import Struck, shapeless, struck_bodies
-from sonic_bullet.diagnosis.chains import LINKS, unchained
+from sonic_bullet.diagnosis.chains import LINKS, share, unchained
 from sonic_bullet.diagnosis.elastic import with_elastic
 from sonic_bullet.diagnosis.judge import Take, mean_db
 from sonic_bullet.diagnosis.play import Hypothesis
@@ -26,6 +26,7 @@ from sonic_bullet.files.cases import Case
 from sonic_bullet.modal.cache import Place
 
 NEARER = 0.9  # of the distance, where chains are one line each
+OFTEN, MOSTLY = 0.4, 1.05  # chains, of all modes' lines: no linear body has so many, so one line each it is unless that is clearly worse
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,7 +49,8 @@ def baseline(case: Case, gathered: tuple[Gathered, ...], *, cache: Place = "defa
     if progress is not None:
         progress("modes that depend on their level leave chains of lines: fitting what they end as")
     best = min((_of(case, faint, cache, None) for faint in others), key=_off_db)
-    return best if _off_db(best) < NEARER * _off_db(plain) else plain
+    most = MOSTLY if any(share(one.lines, link) > OFTEN for one in gathered for link in LINKS) else NEARER
+    return best if _off_db(best) < most * _off_db(plain) else plain
 
 
 def _unchained(one: Gathered, link: tuple[float, float, bool]) -> Gathered:

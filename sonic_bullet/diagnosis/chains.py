@@ -49,6 +49,12 @@ def unchained(lines: Lines, link: tuple[float, float, bool]) -> Lines | None:
     )
 
 
+def share(lines: Lines, link: tuple[float, float, bool]) -> float:
+    """Chains, of all groups."""
+    groups = chains(lines, link)
+    return sum(len(g) > 1 for g in groups) / max(len(groups), 1)
+
+
 def _falls(lines: Lines, group: Array) -> float:
     """The decay at which a chain's level falls, in 1/s: bent or not, a mode's level does as e^{−dt}, and no line of many is as sure."""
     pole = -lines.decay_per_s[group] + 2j * np.pi * (lines.freq_hz[group] - lines.freq_hz[group[0]])
