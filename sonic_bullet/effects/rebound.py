@@ -25,6 +25,7 @@ FAINT = 0.02
 LEAST = 0.06  # of the first hit's share
 GAIN = 0.02  # of what is left must go with another hit
 NEAR = 0.03  # of ln t: delays that agree
+HELD = 0.999  # of the energy of what is played again
 MOST = 0.6  # of the strikes show it
 HITS = (3, 4, 5, MOST_HITS)
 RESTITUTIONS = (0.2, 0.35, 0.5, 0.65, 0.8)
@@ -113,7 +114,9 @@ def _refined(start: Rebound, h: Heard) -> tuple[float, dict[str, Any]]:
     size = 2 * n
     sound = np.fft.rfft(direct_as_expected(h)[:, :n], size)
     both, own = np.conj(sound) * np.fft.rfft(h.signal[:, :n], size), np.abs(sound) ** 2
-    omega = 2 * np.pi * np.fft.rfftfreq(size, 1 / h.sr)
+    loud = np.argsort(-own.sum(axis=0))
+    loud = np.sort(loud[: 1 + int(np.searchsorted(np.cumsum(own.sum(axis=0)[loud]), HELD * own.sum()))])  # the bins that hold the modes
+    both, own, omega = both[:, loud], own[:, loud], 2 * np.pi * np.fft.rfftfreq(size, 1 / h.sr)[loud]
     level = np.where(np.isfinite(h.impulse_n_s), h.impulse_n_s, 1.0)
     total = (h.signal[:, :n] ** 2).sum(axis=1) * size / 2
 
