@@ -1,7 +1,7 @@
 """The baseline of a case: the fitted model, its bodies, and the hypothesis that nothing is lacking.
 
 gathered lines -> estimator.fit -> bodies (corrections learnt) -> Hypothesis
-lines in chains (chains.py): the same with every chain as one line, where what that plays is nearer to the recordings
+lines in chains (chains.py): the same with every chain as one line, where what that plays is nearer to the recordings, or most modes are chains and it is not clearly farther
 """
 
 from __future__ import annotations
@@ -42,14 +42,15 @@ class Baseline:
 def baseline(case: Case, gathered: tuple[Gathered, ...], *, cache: Place = "default", progress: Callable[[str], None] | None = None) -> Baseline:
     """Fit it to gathered evidence. Raises SonicBulletError."""
     plain = _of(case, gathered, cache, progress)
-    others = [tuple(_unchained(one, link) for one in gathered) for link in LINKS] if plain.takes else []
-    others = [faint for faint in others if any(a is not b for a, b in zip(faint, gathered, strict=True))]
-    if not others:
+    ways = [tuple(_unchained(one, link) for one in gathered) for link in LINKS] if plain.takes else []
+    ways = [faint for faint in ways if any(a is not b for a, b in zip(faint, gathered, strict=True))]
+    if not ways:
         return plain
     if progress is not None:
         progress("modes that depend on their level leave chains of lines: fitting what they end as")
-    best = min((_of(case, faint, cache, None) for faint in others), key=_off_db)
-    most = MOSTLY if any(share(one.lines, link) > OFTEN for one in gathered for link in LINKS) else NEARER
+    best = min((_of(case, faint, cache, None) for faint in ways), key=_off_db)
+    changed = [one for one, faint in zip(gathered, ways[0], strict=True) if faint is not one]
+    most = MOSTLY if all(share(one.lines, LINKS[0]) > OFTEN for one in changed) else NEARER
     return best if _off_db(best) < most * _off_db(plain) else plain
 
 
@@ -59,7 +60,8 @@ def _unchained(one: Gathered, link: tuple[float, float, bool]) -> Gathered:
 
 
 def _off_db(b: Baseline) -> float:
-    return mean_db(b.takes, refitted(b.hypothesis, b.bodies)) or 0.0
+    found = mean_db(b.takes, refitted(b.hypothesis, b.bodies))
+    return np.inf if found is None else found
 
 
 def _of(case: Case, gathered: tuple[Gathered, ...], cache: Place, progress: Callable[[str], None] | None) -> Baseline:

@@ -60,10 +60,13 @@ def _falls(lines: Lines, group: Array) -> float:
     pole = -lines.decay_per_s[group] + 2j * np.pi * (lines.freq_hz[group] - lines.freq_hz[group[0]])
     time = np.linspace(0, LONG / lines.decay_per_s[group[0]], FRAMES)
     level = np.abs(lines.amplitude[:, group] @ np.exp(pole[:, None] * time))
+    level = level[level.max(axis=1) > 0]
+    if not len(level):
+        return float(lines.decay_per_s[group[0]])
     weight = 1 / (1 + (FAINT * level.max() / np.maximum(level, 1e-300)) ** 2)
-    mean = (weight * time).sum(axis=1, keepdims=True) / weight.sum(axis=1, keepdims=True)
-    ramp = time - mean
-    return float(-(weight * ramp * np.log(np.maximum(level, 1e-300))).sum() / (weight * ramp**2).sum())
+    ramp = time - (weight * time).sum(axis=1, keepdims=True) / np.maximum(weight.sum(axis=1, keepdims=True), 1e-300)
+    falls = -(weight * ramp * np.log(np.maximum(level, 1e-300))).sum() / (weight * ramp**2).sum()
+    return float(np.clip(falls, lines.decay_per_s[group[0]], lines.decay_per_s[group[-1]]))  # lines that beat are no chain
 
 
 def chains(lines: Lines, link: tuple[float, float, bool]) -> list[Array]:

@@ -14,6 +14,7 @@ import numpy as np
 from sonic_bullet.diagnosis.bodies import Struck
 from sonic_bullet.diagnosis.play import Hypothesis, blow_of, in_band, modes_of, moves, pattern, play, start
 from sonic_bullet.effects.values import Evidence, Heard, Sound, Stage
+from sonic_bullet.estimator.evidence import Evidence as Gathered
 from sonic_bullet.estimator.lines import noise_rms
 from sonic_bullet.estimator.pairing import TWINS
 from sonic_bullet.records import Array, ModalModel
@@ -83,7 +84,7 @@ def heard_of(h: Hypothesis, body: Struck, *, sounds: bool = True) -> Heard:
         all_hz=model.freq_hz,
         plain=plain if body.family is not None else None,
         strike=tuple(range(len(mine))),
-        name=body.name,
+        source=gathered,
         elastic=body.elastic,
     )
     return outside(h, heard)
@@ -148,14 +149,14 @@ def path_response(h: Hypothesis, body: Struck, freq_hz: Array, sr: int) -> Array
     return np.asarray(np.exp(-2j * np.pi * np.outer(freq_hz, np.arange(n)) / sr) @ tap)
 
 
-def thinned(evidence: Evidence, at: tuple[str, int], keep: float, rng: np.random.Generator) -> Evidence:
-    """The same without one strike, at: which object's and which of its own, and without a random part of all lines: ``keep`` of them stay.
+def thinned(evidence: Evidence, at: tuple[Gathered, int], keep: float, rng: np.random.Generator) -> Evidence:
+    """The same without one strike, at: whose, and which of those, and without a random part of all lines: ``keep`` of them stay.
 
     An object of which nothing else was heard is left out with it.
     """
-    name, strike = at
-    rest = [h for h in evidence.heard if h.name != name or len(h.impulse_n_s) > 1]
-    return replace(evidence, heard=tuple(_thin(h, strike if h.name == name else None, keep, rng) for h in rest))
+    source, strike = at
+    rest = [h for h in evidence.heard if h.source is not source or len(h.impulse_n_s) > 1]
+    return replace(evidence, heard=tuple(_thin(h, strike if h.source is source else None, keep, rng) for h in rest))
 
 
 def _thin(h: Heard, strike: int | None, keep: float, rng: np.random.Generator) -> Heard:

@@ -14,6 +14,7 @@ import numpy as np
 from sonic_bullet.diagnosis.bodies import Struck
 from sonic_bullet.diagnosis.play import Hypothesis, play
 from sonic_bullet.estimator.distance import Floor, log_spectral_db, noise_floor_db, with_noise
+from sonic_bullet.estimator.evidence import Evidence as Gathered
 from sonic_bullet.records import Array
 
 
@@ -40,9 +41,11 @@ class Take:
     floor: Floor
 
     @property
-    def place(self) -> tuple[str, int]:
-        """Where it is in the evidence: its body's name, and which of the body's fitted strikes it is. Raises ValueError where it was not fitted."""
-        return self.body.name, self.body.fitted.index(self.strike)
+    def place(self) -> tuple[Gathered, int]:
+        """Where it is in the evidence: among whose strikes, and which of those. Raises ValueError where it was not fitted."""
+        if self.body.gathered is None:
+            raise ValueError(f"{self.body.name} was not fitted")
+        return self.body.gathered, self.body.fitted.index(self.strike)
 
     def distance(self, h: Hypothesis) -> float:
         """D in dB of the recording and what the hypothesis plays; NaN where nothing stands above the noise."""

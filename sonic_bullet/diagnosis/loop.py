@@ -27,6 +27,7 @@ MESH = 1e-3  # of a frequency: what a good mesh gets wrong
 SUFFICES_DB = 1.5  # a gap below this is the mesh's and the shapes' own
 EXPLAINED = 0.4  # of the gap; part of it is the mesh's and the shapes' own
 NEARLY, CLEAR = 0.2, 25.0  # of what a name says, and twice the ln likelihood of phases: where they decide between two
+HELPS = 0.5  # of what a name must gain on strikes left out, on all of them together: a model of few lines may be saved by chance once one is left out
 OPEN = 0.3  # of the first gap: with less left, no costly suspect is asked
 
 
@@ -73,7 +74,8 @@ def closed(
         found = trials(h, bodies, takes, evidence, effects, seed=seed + turn, say=say, costly=told - floor > OPEN * (before - floor))
         for candidate in found:
             last.setdefault(candidate.id, candidate)
-        able = [c for c in found if earns(c, max(now - floor, 0.0))]
+        gap = max(now - floor, 0.0)
+        able = [c for c in found if earns(c, gap) and now - (mean_db(takes, c.hypothesis) or now) > HELPS * max(LEAST_DB, LEAST_SHARE * gap)]
         if not able:
             break
         best = simplest(able, bodies)
@@ -153,8 +155,8 @@ def simplest(able: Sequence[Candidate], bodies: tuple[Struck, ...]) -> Candidate
     others = [c for c in rivals if c is not first and c.effect.freedom() <= first.effect.freedom() and close(c, NEARLY)]
     if not others:
         return first
-    off = [misfit(c.hypothesis, bodies) for c in others]
-    return others[int(np.argmin(off))] if min(off) < misfit(first.hypothesis, bodies) - CLEAR else first
+    off, own = [misfit(c.hypothesis, bodies) for c in others], misfit(first.hypothesis, bodies)
+    return others[int(np.argmin(off))] if np.isfinite(own) and min(off) < own - CLEAR else first
 
 
 def described(candidates: Sequence[Candidate]) -> list[dict[str, Any]]:

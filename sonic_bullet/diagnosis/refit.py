@@ -41,20 +41,27 @@ def refitted(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...]
 
 def retold(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...] | None = None) -> Hypothesis:
     """The hypothesis with a room's response told again, beside all that has been found. heard: whose strikes may tell it; all where None."""
-    which = {one.name: list(one.strike) for one in heard} if heard else {b.name: list(range(len(b.fitted))) for b in bodies if b.gathered is not None}
-    told = [b for b in bodies if which.get(b.name) and b.gathered is not None and b.gathered.signals is not None]
-    if not told:
-        return h  # lists of lines say nothing of a response
-    body = max(told, key=lambda b: len(np.unique(b.line[b.line >= 0])))  # as the room's own proposal has it: most lines that are modes
+    fitted = [b for b in bodies if b.gathered is not None and b.gathered.signals is not None]  # lists of lines say nothing of a response
+    if heard is not None:
+        fitted = [b for b in fitted if any(one.source is b.gathered for one in heard)]
+    if not fitted:
+        return h
+    body = max(fitted, key=lambda b: len(np.unique(b.line[b.line >= 0])))  # most lines that are modes
     for room in (e for e in h.effects if hasattr(e, "told_by")):
-        mine, g = which[body.name], body.gathered
+        g = body.gathered
         assert g is not None and g.signals is not None
+        mine = list(range(len(g.signals))) if heard is None else next(list(one.strike) for one in heard if one.source is g)
         signal = g.signals[mine]
         bare = replace(h, effects=tuple(e for e in h.effects if e is not room))
         sound = np.stack([play(bare, body, body.fitted[i], signal.shape[1], g.sr) for i in mine])
         again = room.told_by(signal, sound, noise_rms(signal, g.sr), g.sr)
         h = replace(h, effects=tuple(again if e is room else e for e in h.effects))
     return h
+
+
+def _whose(one: Heard, bodies: tuple[Struck, ...]) -> Struck:
+    """The body that lines are of."""
+    return next(body for body in bodies if body.gathered is one.source)
 
 
 def with_effects(h: Hypothesis, effects: tuple[Effect, ...], bodies: tuple[Struck, ...]) -> Hypothesis:
@@ -118,11 +125,10 @@ def _damped(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...])
         return replace(h, alpha_per_s=told[-1][0], beta_s=told[-1][1])
     bare = replace(h, alpha_per_s=0.0, beta_s=0.0)
     lam, left, sd = [], [], []
-    body_of = {body.name: body for body in bodies}
     for one in heard:
         if not len(one.freq_hz):
             continue
-        model, _ = modes_of(bare, body_of[one.name])
+        model, _ = modes_of(bare, _whose(one, bodies))
         extra = np.zeros(len(one.freq_hz))
         if moves(h):  # ``one`` is of h itself, and its lines are paired anew
             extra = np.maximum(one.expected_decay_per_s - (h.alpha_per_s + h.beta_s * one.omega**2) / 2, 0.0)
@@ -163,11 +169,10 @@ def _middle(ratio: Array, weight: Array) -> float:
 def _gained(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...]) -> Hypothesis:
     """σ by the amplitudes."""
     told, seen, spread = [], [], []
-    body_of = {body.name: body for body in bodies}
     for one in heard:
         if not len(one.freq_hz) or one.signal is None:
             continue
-        direct = np.abs(path_response(h, body_of[one.name], one.freq_hz, one.sr))
+        direct = np.abs(path_response(h, _whose(one, bodies), one.freq_hz, one.sr))
         factor = np.empty(one.pattern.shape)
         for i, level in enumerate(one.impulse_n_s):
             blow = Blow(float(level) if np.isfinite(level) else 1.0, np.zeros(1), np.ones(1))

@@ -12,7 +12,7 @@ import numpy as np
 
 from sonic_bullet.diagnosis.bodies import Struck
 from sonic_bullet.diagnosis.evidence import heard_of
-from sonic_bullet.diagnosis.play import Hypothesis
+from sonic_bullet.diagnosis.play import Hypothesis, blow_of
 from sonic_bullet.diagnosis.refit import ROUGH
 from sonic_bullet.records import Array
 
@@ -21,15 +21,18 @@ TURNS = 15
 
 
 def misfit(h: Hypothesis, bodies: tuple[Struck, ...]) -> float:
-    """Twice the negative log likelihood of all objects' onset amplitudes under Cauchy's law, phases counted where they are true."""
+    """Twice the negative log likelihood of all objects' onset amplitudes under Cauchy's law, phases counted where they are true; infinite where a strike hits more than once."""
     return sum(_misfit(h, body) for body in bodies if body.gathered is not None)
 
 
 def _misfit(h: Hypothesis, body: Struck) -> float:
     one = heard_of(h, body, sounds=False)
     told, seen = one.expected, one.amplitude
-    good = np.isfinite(told) & np.isfinite(seen) & np.isfinite(one.amplitude_sd) & (np.abs(told) > 0)
-    if not good.any():
+    if any(len(blow_of(h, body, i).delay_s) > 1 for i in body.fitted):
+        return np.inf  # a line's amplitude at the onset is of one hit
+    good = np.isfinite(seen) & np.isfinite(one.amplitude_sd)  # whatever is expected there, so that all names are held against the same
+    told = np.nan_to_num(told)
+    if not good.any() or not np.abs(told[good]).any():
         return 0.0
     rough = np.broadcast_to(ROUGH * np.abs(told).max(axis=0, keepdims=True), told.shape)[good]
     omega = np.broadcast_to(one.omega, told.shape)[good]

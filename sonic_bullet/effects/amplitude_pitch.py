@@ -83,7 +83,7 @@ def _per_velocity(x: Ring, measure: str) -> Array:
 
 
 def _slope(e: Envelopes, h: Heard, level: Array) -> Slope:
-    """b by the modes' own, each as heavy as what a bend would be in its phase over what there is; its spread by their scatter [White 1980], none further off than b itself."""
+    """b by the modes' own, each as heavy as what a bend would be in its phase over what there is; its spread by their scatter [White 1980]."""
     table = np.array([one for one in (_moments(e, h, level, q) for q in range(len(e.line))) if one is not None]).reshape(-1, 3)
     table = table[(table[:, 0] > 0) & (table[:, 2] > 0)]
     if not len(table):
@@ -97,7 +97,7 @@ def _slope(e: Envelopes, h: Heard, level: Array) -> Slope:
         centre = float((weight * near * value).sum() / (weight * near).sum())
     says = np.minimum(centre**2 * weight, 1.0)  # of a mode's misfit, as much as a bend would be of it: the others have no say
     gone = np.maximum((2 * centre * xy - centre**2 * xx) / yy, -1.0)
-    sd = float(np.sqrt(((says * np.minimum(np.abs(value - centre), abs(centre))) ** 2).sum()) / max(says.sum(), 1e-300))
+    sd = float(np.sqrt(((says * (value - centre)) ** 2).sum()) / max(says.sum(), 1e-300))
     alone = says.sum() ** 2 / max(float((says**2).sum()), 1e-300) < FEWEST
     return Slope(centre, np.inf if alone else max(sd, 1e-300), float((says * gone).sum() / max(says.sum(), 1e-300)), float(gone.sum()))
 

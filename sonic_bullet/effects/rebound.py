@@ -27,6 +27,8 @@ GAIN = 0.02  # of what is left must go with another hit
 NEAR = 0.03  # of ln t: delays that agree
 HELD = 0.999  # of the energy of what is played again
 MOST = 0.6  # of the strikes show it
+FADE = 2.0  # nepers over what is looked at
+RATIOS = (0.75, 0.9, 1.0)
 HITS = (3, 4, 5, MOST_HITS)
 RESTITUTIONS = (0.2, 0.35, 0.5, 0.65, 0.8)
 EXPONENTS = (0.0, 1.0, 0.5, -0.2)
@@ -79,7 +81,8 @@ class Rebound:
         if h is None or len(h.freq_hz) < 3:
             return None
         if isinstance(evidence.known, cls):
-            return replace(evidence.known, **_refined(evidence.known, h)[1])
+            again = _refined(evidence.known, h)[1]
+            return replace(evidence.known, **again) if again["restitution"] > LEAST else None
         found = [(level, hits) for level, hits in zip(h.impulse_n_s, _hits(h), strict=True) if len(hits)]
         need = max(2.0, MOST * len(h.impulse_n_s))
         if len(found) < need:
@@ -112,13 +115,15 @@ def _refined(start: Rebound, h: Heard) -> tuple[float, dict[str, Any]]:
     assert h.signal is not None
     n = min(h.signal.shape[1], 3 * int(SPAN_S[1] * h.sr))
     size = 2 * n
-    sound = np.fft.rfft(direct_as_expected(h)[:, :n], size)
-    both, own = np.conj(sound) * np.fft.rfft(h.signal[:, :n], size), np.abs(sound) ** 2
+    fade = FADE * h.sr / n  # in 1/s: x(t − τ) e^{−wt} = e^{−wτ} (x e^{−wt})(t − τ), so what is cut off at n, of either, counts for less
+    window = np.exp(-fade * np.arange(n) / h.sr)
+    sound = np.fft.rfft(direct_as_expected(h)[:, :n] * window, size)
+    both, own = np.conj(sound) * np.fft.rfft(h.signal[:, :n] * window, size), np.abs(sound) ** 2
     loud = np.argsort(-own.sum(axis=0))
     loud = np.sort(loud[: 1 + int(np.searchsorted(np.cumsum(own.sum(axis=0)[loud]), HELD * own.sum()))])  # the bins that hold the modes
     both, own, omega = both[:, loud], own[:, loud], 2 * np.pi * np.fft.rfftfreq(size, 1 / h.sr)[loud]
     level = np.where(np.isfinite(h.impulse_n_s), h.impulse_n_s, 1.0)
-    total = (h.signal[:, :n] ** 2).sum(axis=1) * size / 2
+    total = ((h.signal[:, :n] * window) ** 2).sum(axis=1) * size / 2
 
     def of(x: Array) -> dict[str, Any]:
         e = float(np.clip(x[0], 0.03, 0.97))
@@ -131,7 +136,7 @@ def _refined(start: Rebound, h: Heard) -> tuple[float, dict[str, Any]]:
             blow = trial.apply(Blow(float(j), np.zeros(1), np.ones(1)))
             turn = np.zeros(len(omega), complex)
             for share, delay in zip(blow.share, blow.delay_s, strict=True):
-                turn += share * np.exp(-1j * omega * delay)
+                turn += share * np.exp(-(fade + 1j * omega) * delay)
             gone += (
                 max(float((np.conj(turn) * both[s]).real.sum()), 0.0) ** 2
                 / max(float((np.abs(turn) ** 2 * own[s]).sum()), 1e-300)
@@ -140,7 +145,7 @@ def _refined(start: Rebound, h: Heard) -> tuple[float, dict[str, Any]]:
         return -gone
 
     first = np.array([start.restitution, 0.0, start.restitution if start.shrink is None else start.shrink])
-    tries = [np.array([e, *first[1:]]) for e in (first[0], *RESTITUTIONS)]
+    tries = [np.array([e, 0.0, r]) for e in (first[0], *RESTITUTIONS) for r in (first[2:] if start.shrink is None else (first[2], e, *RATIOS))]
     best = min(tries, key=left)
     simplex = best + np.array([[0, 0, 0], [0.1, 0, 0], [0, 2e-4, 0], [0, 0, 2e-3]])
     found = minimize(left, best, method="Nelder-Mead", options={"initial_simplex": simplex, "xatol": 1e-4, "fatol": 1e-6, "maxfev": 120})

@@ -108,7 +108,7 @@ class Elastic:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Heard:
-    """One object's strikes: k lines that are modes, beside what the model so far expects, and what it leaves. name: the object's.
+    """One object's strikes: k lines that are modes, beside what the model so far expects, and what it leaves. source: what they were gathered from, the host's own.
 
     freq_hz, decay_per_s and their spreads (k,); amplitude (s, k) complex at the onset and its spread. mode: the modes of `model` each line stands for.
     model_hz (k,): the mesh's own, without corrections; expected_decay_per_s (k,), expected (s, k): of the model with the effects found so far.
@@ -147,7 +147,7 @@ class Heard:
     all_hz: Array  # (m,) their frequencies
     plain: ModalModel | None  # `model` with the mesh's own frequencies
     strike: tuple[int, ...] = ()
-    name: str = ""
+    source: Any = None
     elastic: Elastic | None = None
     dry: bool = False  # whether lines are told as they would be without the room they were recorded in
 

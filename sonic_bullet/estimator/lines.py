@@ -73,9 +73,9 @@ def joint_lines(signals: Array, sr: int, *, band_hz: tuple[float, float] = (20.0
     few: Lines | None = None
     for late in (round(t * sr) for t in LATE_S) if modes is not None and len(pole) >= CROWD * modes else ():
         if signals.shape[1] >= 8 * late and 3 <= len(start_poles(signals[:, late:] / noise[:, None], sr, low, high)) < FEWER * len(pole):
-            after = _taken_back(joint_lines(signals[:, late:], sr, band_hz=band_hz, signed=signed), late, sr)
+            after = _from(late, signals, sr, band_hz, signed)
             few = few or after
-            if _beyond(after, signals) < BEYOND[1]:  # else it still hits
+            if after is not None and _beyond(after, signals) < BEYOND[1]:  # else it still hits
                 return after
     if few is not None:
         return few
@@ -93,14 +93,18 @@ def joint_lines(signals: Array, sr: int, *, band_hz: tuple[float, float] = (20.0
     for late in (round(t * sr) for t in LATE_S) if modes is not None and _beyond(found, signals) > BEYOND[1] else ():
         if signals.shape[1] < 8 * late:
             break
-        after = _taken_back(joint_lines(signals[:, late:], sr, band_hz=band_hz, signed=signed), late, sr)
-        if len(after.freq_hz) >= 3 and _beyond(after, signals) < BEYOND[1]:
+        after = _from(late, signals, sr, band_hz, signed)
+        if after is not None and len(after.freq_hz) >= 3 and _beyond(after, signals) < BEYOND[1]:
             return after
     return found
 
 
-def _taken_back(lines: Lines, late: int, sr: int) -> Lines:
-    """Lines that were found from a sample on, as they would have begun at the onset."""
+def _from(late: int, signals: Array, sr: int, band_hz: tuple[float, float], signed: bool) -> Lines | None:
+    """Lines from a sample on, as they would have begun at the onset; None where nothing can be told from there."""
+    try:
+        lines = joint_lines(signals[:, late:], sr, band_hz=band_hz, signed=signed)
+    except AudioError:
+        return None
     back = np.exp((lines.decay_per_s - 2j * np.pi * lines.freq_hz) * late / sr)
     return replace(lines, amplitude=lines.amplitude * back, amplitude_sd=lines.amplitude_sd * np.abs(back))
 

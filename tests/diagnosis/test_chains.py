@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from made_body import ALPHA, BETA, SR, plate, recorded, struck
+from made_body import ALPHA, BETA, plate, recorded, struck
 from test_found_again import BAND, fitted
 
 from sonic_bullet.diagnosis.chains import LINKS, chains, unchained
@@ -28,7 +28,7 @@ def lines_of(*effects: Effect) -> Lines:
 
 
 def true_decay(freq_hz: Array) -> Array:
-    """Of the plate's mode nearest to each, in 1/s; and whether it is near."""
+    """Of the plate's mode nearest to each, in 1/s."""
     own = plate().freq_hz
     at = np.abs(own[:, None] - freq_hz).argmin(axis=0)
     return np.asarray((ALPHA + BETA * (2 * np.pi * own[at]) ** 2) / 2)
@@ -67,9 +67,10 @@ def test_chains_add_up_to_what_was_struck() -> None:
         assert np.abs(one.amplitude[:, near]) == pytest.approx(struck_with, rel=0.03, abs=0.01 * float(struck_with.max()))
 
 
-@pytest.mark.parametrize("effects", [(), (Room(0.9, 0.8, 11),)], ids=["linear", "room"])
-def test_no_chains_where_no_level_counts(effects: tuple[Effect, ...]) -> None:
-    assert unchained(lines_of(*effects), LINKS[0]) is None
+def test_no_chains_where_no_level_counts() -> None:
+    """In a room the wider links find some; what they play is farther from the recordings, which is for the baseline to see."""
+    assert all(unchained(lines_of(), link) is None for link in LINKS)
+    assert unchained(lines_of(Room(0.9, 0.8, 11)), LINKS[0]) is None
 
 
 def test_every_line_is_in_one_group() -> None:
@@ -91,4 +92,3 @@ def test_the_bend_and_its_measure_are_read_off_the_modes_that_show_it(measure: s
     found = AmplitudePitch.propose(evidence_of(refitted(fitted(again), (again,)), (again,), BAND))
     assert found is not None and found.measure == measure
     assert found.bend == pytest.approx(true.bend, rel=0.1)
-    assert body.gathered.sr == SR

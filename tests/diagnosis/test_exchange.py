@@ -61,7 +61,7 @@ def test_a_part_of_the_evidence_fits_the_same_pulse_again() -> None:
     body = recorded(PULSE, SOUNDING)
     told = evidence_of(truth(SOUNDING), (body,), BAND)
     for seed in range(6):
-        less = replace(thinned(told, ("plate", seed % 5), 0.4, np.random.default_rng(seed)), known=PULSE)
+        less = replace(thinned(told, (told.heard[0].source, seed % 5), 0.4, np.random.default_rng(seed)), known=PULSE)
         again = ContactTime.propose(less)
         assert again is not None and again.pulse == PULSE.pulse
         assert again.duration_s(0.02) == pytest.approx(9e-4, rel=0.3)

@@ -71,6 +71,6 @@ def test_a_part_of_the_lines_fits_the_same_law_again() -> None:
     law = DampingLaw("power", 6e-3, 1.4)
     told = evidence_of(truth(), (recorded(law),), BAND)
     for seed in range(4):
-        again = DampingLaw.propose(replace(thinned(told, ("plate", seed), 0.4, np.random.default_rng(seed)), known=law))
+        again = DampingLaw.propose(replace(thinned(told, (told.heard[0].source, seed), 0.4, np.random.default_rng(seed)), known=law))
         assert again is not None and again.law == "power"
         assert again.exponent == pytest.approx(1.4, abs=0.15)

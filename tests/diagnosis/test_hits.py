@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from made_body import SR, recorded
@@ -24,6 +26,21 @@ def test_restitution_gap_and_hits_are_told(hits: int) -> None:
     assert found.gap_s == pytest.approx(0.0131, abs=0.2 / SR)
     share = 0.6 ** np.arange(found.hits)
     assert (share[hits:] < 0.14).all() and found.hits >= min(hits, 4)  # what is weaker than the model's own error is not counted
+
+
+def test_long_gaps_that_hardly_shrink() -> None:
+    """Hits that ring on beyond what is looked at count for what is inside."""
+    body = recorded(Rebound(0.15, 0.016, 0.6, 0.0, 0.9, 4))
+    found = Rebound.propose(evidence_of(refitted(fitted(body), (body,)), (body,), BAND))
+    assert found is not None and found.shrink is not None
+    assert found.restitution == pytest.approx(0.6, rel=0.03)
+    assert found.shrink == pytest.approx(0.9, rel=0.01)
+
+
+def test_a_bounce_that_is_not_there_is_not_found_again() -> None:
+    body = recorded()
+    told = evidence_of(refitted(fitted(body), (body,)), (body,), BAND)
+    assert Rebound.propose(replace(told, known=Rebound(0.2, 0.016, 0.6, 0.0, 1.0, 8))) is None
 
 
 def test_lines_of_a_bouncing_strike_are_no_louder_than_the_strike(monkeypatch: pytest.MonkeyPatch) -> None:
