@@ -75,7 +75,7 @@ def closed(
         for candidate in found:
             last.setdefault(candidate.id, candidate)
         gap = max(now - floor, 0.0)
-        able = [c for c in found if earns(c, gap) and now - (mean_db(takes, c.hypothesis) or now) > HELPS * max(LEAST_DB, LEAST_SHARE * gap)]
+        able = [c for c in found if earns(c, gap) and now - (mean_db(takes, retold(c.hypothesis, bodies)) or now) > HELPS * max(LEAST_DB, LEAST_SHARE * gap)]
         if not able:
             break
         best = simplest(able, bodies)
