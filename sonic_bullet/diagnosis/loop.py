@@ -18,7 +18,7 @@ from sonic_bullet.diagnosis.judge import Judged, Take, least_db, mean_db
 from sonic_bullet.diagnosis.play import Hypothesis, moves, play
 from sonic_bullet.diagnosis.refit import ROUGH, refitted, retold, with_effects
 from sonic_bullet.diagnosis.ties import misfit
-from sonic_bullet.diagnosis.trial import LEAST_DB, LEAST_SHARE, SURE, Candidate, earns, trials
+from sonic_bullet.diagnosis.trial import LEAST_DB, SURE, Candidate, earns, needed, trials
 from sonic_bullet.effects.values import Effect
 from sonic_bullet.estimator.distance import with_noise
 
@@ -75,7 +75,7 @@ def closed(
         for candidate in found:
             last.setdefault(candidate.id, candidate)
         gap = max(now - floor, 0.0)
-        able = [c for c in found if earns(c, gap) and now - (mean_db(takes, retold(c.hypothesis, bodies)) or now) > HELPS * max(LEAST_DB, LEAST_SHARE * gap)]
+        able = [c for c in found if earns(c, gap) and now - (mean_db(takes, retold(c.hypothesis, bodies)) or now) > HELPS * needed(gap)]
         if not able:
             break
         best = simplest(able, bodies)
@@ -131,7 +131,7 @@ def _pruned(h: Hypothesis, added: list[Candidate], bodies: tuple[Struck, ...], t
     for candidate in added[:-1]:
         rest = [e for e in h.effects if e.id != candidate.id]
         without = refitted(with_effects(h, tuple(rest), bodies), bodies)
-        if (mean_db(takes, without) or 0.0) - (mean_db(takes, h) or 0.0) < max(LEAST_DB, LEAST_SHARE * gap_db):
+        if (mean_db(takes, without) or 0.0) - (mean_db(takes, h) or 0.0) < needed(gap_db):
             h, added = without, [c for c in added if c is not candidate]
     return h, added
 

@@ -26,9 +26,12 @@ ROUGH = 0.02
 NEAR, ALIKE = 5e-3, 1.6  # of ln f and ln d: lines of one mode
 
 
-def refitted(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...] | None = None) -> Hypothesis:
-    """The hypothesis with α, β and σ fitted again beside its effects; ``heard``: evidence to fit them to, thinned or whole, of all bodies or some."""
-    moved = moves(h)
+def refitted(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...] | None = None, *, anew: bool = False) -> Hypothesis:
+    """The hypothesis with α, β and σ fitted again beside its effects; ``heard``: evidence to fit them to, thinned or whole, of all bodies or some.
+
+    anew: with corrections learnt again, too, as they are beside effects that move modes.
+    """
+    moved = anew or moves(h)
     if moved:
         h = corrected(h, bodies)
     if heard is None or moved:

@@ -3,7 +3,7 @@
     for every strike s:  evidence − s − some lines -> propose -> refit α, β, σ -> D(s)    against the same without the effect
     null: as many numbers, spent on directions drawn at random in the modes' decays and levels, fitted to the same evidence
 
-an effect earns its keep where its mean drop is over LEAST_DB and LEAST_SHARE of the gap, SURE standard errors above zero and above the null effect's by as much
+an effect earns its keep where its mean drop is over LEAST_DB (FAINT_DB where that is MOST of the gap) and LEAST_SHARE of the gap, SURE standard errors above zero and above the null effect's by as much
 
 Leaving out lines matters: decays and shapes belong to the body, so every strike shows them, and a pattern fitted to them by chance would pass.
 """
@@ -20,7 +20,7 @@ from sonic_bullet.diagnosis.bodies import Struck
 from sonic_bullet.diagnosis.evidence import evidence_of, thinned
 from sonic_bullet.diagnosis.judge import Judged, Take
 from sonic_bullet.diagnosis.listed import Listed
-from sonic_bullet.diagnosis.play import Hypothesis
+from sonic_bullet.diagnosis.play import Hypothesis, moves
 from sonic_bullet.diagnosis.refit import refitted, retold
 from sonic_bullet.effects.values import Effect, Evidence, Owner, Stage
 from sonic_bullet.records import ModalModel
@@ -28,6 +28,7 @@ from sonic_bullet.records import ModalModel
 KEPT = 0.75  # of the lines, in every fold
 DRAWS = 2  # of the null effect
 LEAST_DB, LEAST_SHARE = 0.4, 0.08  # of a drop, and of it in the gap
+FAINT_DB, MOST = 0.2, 0.5  # of a drop that is as much of the gap: then less than LEAST_DB will do
 SURE, MANY = 2.0, 4  # standard errors; strikes of which none may lose
 PLAIN = 0.6  # of the gap: where a cheap suspect says as much, costly ones wait
 
@@ -56,14 +57,19 @@ class Candidate:
         return float(self.drop_db.std(ddof=1) / np.sqrt(len(self.drop_db))) if len(self.drop_db) > 1 else float("inf")
 
 
+def needed(gap_db: float) -> float:
+    """Of a drop, in dB: LEAST_DB; less where that is most of what is open, more where much is."""
+    return max(min(LEAST_DB, max(FAINT_DB, MOST * gap_db)), LEAST_SHARE * gap_db)
+
+
 def earns(c: Candidate, gap_db: float) -> bool:
     """Whether a suspect explains enough, surely enough, and more than chance."""
     if len(c.drop_db) == 0:
         return False
-    need = max(LEAST_DB, LEAST_SHARE * gap_db)
+    need = needed(gap_db)
     if not (c.mean_db > need and np.isfinite(c.sd_db)):
         return False
-    if len(c.drop_db) >= MANY and c.drop_db.min() > -0.1 * c.mean_db and float(np.median(c.drop_db)) > 0.5 * need:
+    if len(c.drop_db) >= MANY and c.drop_db.min() > -0.1 * c.mean_db and np.sort(c.drop_db)[-2] > need:
         return c.mean_db - max(c.null_db, 0.0) > 0.5 * need  # no strike speaks against it, though loud ones may gain far more than soft ones
     return c.mean_db > SURE * c.sd_db and c.mean_db - max(c.null_db, 0.0) > max(SURE * c.sd_db, 0.5 * need)
 
@@ -139,6 +145,7 @@ def trials(
     if len(takes) < 2:
         return found  # nothing can be left out
     folds = _folds(h, bodies, takes, evidence, seed)
+    fair = False
     gap = float(np.mean([f.before for f in folds]) - np.mean([f.take.least(f.base) for f in folds])) if folds else 0.0
     for kind in sorted(effects, key=lambda kind: (not hasattr(kind, "dried"), bool(getattr(kind, "costly", False)))):
         if kind.id in evidence.found:
@@ -151,19 +158,25 @@ def trials(
         if whole is None:
             continue
         say(f"trying {kind.id}")
+        if not fair and moves(replace(h, effects=(whole,))) and not moves(h):
+            folds, fair = _learnt_anew(h, bodies, folds), True
         found.append(_tried(kind, whole, h, bodies, evidence, folds))
     return sorted(found, key=lambda c: -c.mean_db)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Fold:
-    """What is left to learn from once ``take`` is left out: bodies, evidence, the hypothesis refitted to it, and its distance to the take."""
+    """What is left to learn from once ``take`` is left out: bodies, evidence, the hypothesis refitted to it, and its distance to the take.
+
+    anew: the distance with corrections learnt again, where that has been asked.
+    """
 
     take: Judged
     bodies: tuple[Struck, ...]
     evidence: Evidence
     base: Hypothesis
     before: float
+    anew: float = float("inf")
 
 
 def _folds(h: Hypothesis, bodies: tuple[Struck, ...], takes: Sequence[Judged], evidence: Evidence, seed: int) -> list[Fold]:
@@ -183,8 +196,15 @@ def _folds(h: Hypothesis, bodies: tuple[Struck, ...], takes: Sequence[Judged], e
     return made
 
 
+def _learnt_anew(h: Hypothesis, bodies: tuple[Struck, ...], folds: list[Fold]) -> list[Fold]:
+    """With what corrections alone would leave if they were learnt again, as they are beside whatever moves modes: they are no effect's gain."""
+    again = refitted(h, bodies, anew=True)
+    return [replace(f, anew=f.take.distance(refitted(f.base, f.bodies, anew=True) if isinstance(f.take, Listed) else again)) for f in folds]
+
+
 def _tried(kind: type[Effect], whole: Effect, h: Hypothesis, bodies: tuple[Struck, ...], evidence: Evidence, folds: list[Fold]) -> Candidate:
     drops, nulls, seen = [], [], []
+    moving = moves(replace(h, effects=(whole,)))
     for i, fold in enumerate(folds):
         less = fold.evidence
         if getattr(kind, "by_line", False) and isinstance(fold.take, Take):
@@ -194,7 +214,7 @@ def _tried(kind: type[Effect], whole: Effect, h: Hypothesis, bodies: tuple[Struc
             drops.append(0.0)
             continue
         seen.append(effect)
-        drops.append(fold.before - _after(fold, effect))
+        drops.append((min(fold.before, fold.anew) if moving else fold.before) - _after(fold, effect))
         for draw in range(DRAWS):
             none = Null.fitted(less, min(effect.freedom(), 8), 10 * i + draw)
             if none is not None:
