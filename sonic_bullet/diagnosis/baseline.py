@@ -1,7 +1,8 @@
 """The baseline of a case: the fitted model, its bodies, and the hypothesis that nothing is lacking.
 
 gathered lines -> estimator.fit -> bodies (corrections learnt) -> Hypothesis
-lines in chains (chains.py): the same with every chain as one line, where what that plays is nearer to the recordings, or most modes are chains and it is not clearly farther
+lines in chains (chains.py): the same with every chain as one line, where what that plays is nearer to the recordings, or most modes are chains and it is not clearly farther;
+    and with the lines of the softer strikes, whose modes are nearest to linear ones, at all strikes
 """
 
 from __future__ import annotations
@@ -18,14 +19,17 @@ from sonic_bullet.diagnosis.judge import Take, mean_db
 from sonic_bullet.diagnosis.play import Hypothesis
 from sonic_bullet.diagnosis.refit import refitted
 from sonic_bullet.diagnosis.unheard import settled
+from sonic_bullet.errors import AudioError
 from sonic_bullet.estimator.distance import floor_between
 from sonic_bullet.estimator.evidence import Evidence as Gathered
 from sonic_bullet.estimator.fit import fit_evidence
 from sonic_bullet.estimator.fitted import CaseFit
+from sonic_bullet.estimator.lines import joint_lines, lines_of, noise_rms
 from sonic_bullet.files.cases import Case
 from sonic_bullet.modal.cache import Place
 
 NEARER = 0.9  # of the distance, where chains are one line each
+SOFTER = 0.6  # of the middle strike's impulse at most, of half the strikes: soft enough to be heard apart
 OFTEN, MOSTLY = 0.4, 1.05  # chains, of all modes' lines: no linear body has so many, so one line each it is unless that is clearly worse
 
 
@@ -43,6 +47,7 @@ def baseline(case: Case, gathered: tuple[Gathered, ...], *, cache: Place = "defa
     """Fit it to gathered evidence. Raises SonicBulletError."""
     plain = _of(case, gathered, cache, progress)
     ways = [tuple(_unchained(one, link) for one in gathered) for link in LINKS] if plain.takes else []
+    ways += [tuple(_soft(one, case.band_hz) for one in gathered)] if ways else []
     ways = [faint for faint in ways if any(a is not b for a, b in zip(faint, gathered, strict=True))]
     if not ways:
         return plain
@@ -57,6 +62,22 @@ def baseline(case: Case, gathered: tuple[Gathered, ...], *, cache: Place = "defa
 def _unchained(one: Gathered, link: tuple[float, float, bool]) -> Gathered:
     lines = unchained(one.lines, link) if one.signals is not None else None
     return one if lines is None else replace(one, lines=lines)
+
+
+def _soft(one: Gathered, band_hz: tuple[float, float]) -> Gathered:
+    """Evidence with the lines of its softer strikes alone, each chain of them as one; the same where chains are few or no strikes are much softer than the others."""
+    if one.signals is None or unchained(one.lines, LINKS[0]) is None:
+        return one
+    level = np.array([np.nan if r.impulse_n_s is None else r.impulse_n_s for r in one.recordings])
+    order = np.argsort(level)[: len(level) // 2]
+    if not (len(order) > 1 and np.isfinite(level).all() and level[order].max() < SOFTER * np.median(level)):
+        return one
+    try:
+        soft = joint_lines(one.signals[np.sort(order)], one.sr, band_hz=band_hz, signed=one.lines.signed)
+    except AudioError:  # too soft
+        return one
+    lines = lines_of(one.signals, noise_rms(one.signals, one.sr), -soft.decay_per_s + 2j * np.pi * soft.freq_hz, one.sr, soft.signed)
+    return replace(one, lines=unchained(lines, LINKS[0]) or lines)
 
 
 def _off_db(b: Baseline) -> float:

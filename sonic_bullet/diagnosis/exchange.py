@@ -22,6 +22,7 @@ from sonic_bullet.diagnosis.refit import refitted, with_effects
 from sonic_bullet.diagnosis.trial import MANY, SURE, Candidate
 from sonic_bullet.effects.values import Evidence
 from sonic_bullet.records import Array
+from sonic_bullet.side_by_side import side_by_side
 
 TURNS = 2
 RIVAL = 0.5  # of what the best of a round said alone
@@ -70,7 +71,7 @@ def starts(h: Hypothesis, bodies: tuple[Struck, ...], band_hz: tuple[float, floa
 
 def settled(h: Hypothesis, bodies: tuple[Struck, ...], takes: Sequence[Take], band_hz: tuple[float, float]) -> Hypothesis:
     """The best of `together` from all starts by the fitted strikes; as many numbers each."""
-    ends = [together(start, bodies, band_hz) for start in starts(h, bodies, band_hz)]
+    ends = side_by_side(lambda start: together(start, bodies, band_hz), starts(h, bodies, band_hz))
     return min(ends, key=lambda end: mean_db(takes, end) or np.inf)
 
 
@@ -83,7 +84,7 @@ def left_out_db(h: Hypothesis, i: int, bodies: tuple[Struck, ...], takes: Sequen
     def without(take: Take) -> Less:
         return lambda told: thinned(told, take.place, 1.0, np.random.default_rng(0))
 
-    return np.array([take.distance(again(h, i, bodies, band_hz, less=without(take))) for take in takes])
+    return np.array(side_by_side(lambda take: take.distance(again(h, i, bodies, band_hz, less=without(take))), takes))
 
 
 def exchanged(

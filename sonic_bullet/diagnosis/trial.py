@@ -24,6 +24,7 @@ from sonic_bullet.diagnosis.play import Hypothesis, moves
 from sonic_bullet.diagnosis.refit import refitted, retold
 from sonic_bullet.effects.values import Effect, Evidence, Owner, Stage
 from sonic_bullet.records import ModalModel
+from sonic_bullet.side_by_side import side_by_side
 
 KEPT = 0.75  # of the lines, in every fold
 DRAWS = 2  # of the null effect
@@ -147,21 +148,27 @@ def trials(
     folds = _folds(h, bodies, takes, evidence, seed)
     fair = False
     gap = float(np.mean([f.before for f in folds]) - np.mean([f.take.least(f.base) for f in folds])) if folds else 0.0
-    for kind in sorted(effects, key=lambda kind: (not hasattr(kind, "dried"), bool(getattr(kind, "costly", False)))):
-        if kind.id in evidence.found:
-            continue
+    for group in _groups([kind for kind in effects if kind.id not in evidence.found]):
         if any(hasattr(c.effect, "dried") and earns(c, gap) for c in found):
             break  # what others say of lines that a room has made is hearsay: in the next round they are told dry
-        if getattr(kind, "costly", False) and (not costly or any(c.mean_db > PLAIN * gap for c in found)):
+        if getattr(group[0], "costly", False) and (not costly or any(c.mean_db > PLAIN * gap for c in found)):
             continue  # something cheap says most of it: what is left may ask for more in the next round
-        whole = kind.propose(evidence)
-        if whole is None:
-            continue
-        say(f"trying {kind.id}")
-        if not fair and moves(replace(h, effects=(whole,))) and not moves(h):
-            folds, fair = _learnt_anew(h, bodies, folds), True
-        found.append(_tried(kind, whole, h, bodies, evidence, folds))
+        for kind, whole in zip(group, side_by_side(lambda kind: kind.propose(evidence), group), strict=True):
+            if whole is None:
+                continue
+            say(f"trying {kind.id}")
+            if not fair and moves(replace(h, effects=(whole,))) and not moves(h):
+                folds, fair = _learnt_anew(h, bodies, folds), True
+            found.append(_tried(kind, whole, h, bodies, evidence, folds))
     return sorted(found, key=lambda c: -c.mean_db)
+
+
+def _groups(kinds: list[type[Effect]]) -> list[list[type[Effect]]]:
+    """Rooms, whose echoes others would be told of; what is cheap; and what takes long, one by one."""
+    rooms = [k for k in kinds if hasattr(k, "dried")]
+    dear = [k for k in kinds if k not in rooms and getattr(k, "costly", False)]
+    plain = [k for k in kinds if k not in rooms and k not in dear]
+    return [group for group in (rooms, plain, *([k] for k in dear)) if group]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -203,22 +210,23 @@ def _learnt_anew(h: Hypothesis, bodies: tuple[Struck, ...], folds: list[Fold]) -
 
 
 def _tried(kind: type[Effect], whole: Effect, h: Hypothesis, bodies: tuple[Struck, ...], evidence: Evidence, folds: list[Fold]) -> Candidate:
-    drops, nulls, seen = [], [], []
     moving = moves(replace(h, effects=(whole,)))
-    for i, fold in enumerate(folds):
+
+    def judged(i: int) -> tuple[Effect | None, float, list[float]]:
+        fold = folds[i]
         less = fold.evidence
         if getattr(kind, "by_line", False) and isinstance(fold.take, Take):
             less = thinned(evidence, fold.take.place, 1.0, np.random.default_rng(0))  # a line's own numbers are told by no other line, but by the other strikes
         effect = kind.propose(replace(less, known=whole))
         if effect is None:
-            drops.append(0.0)
-            continue
-        seen.append(effect)
-        drops.append((min(fold.before, fold.anew) if moving else fold.before) - _after(fold, effect))
-        for draw in range(DRAWS):
-            none = Null.fitted(less, min(effect.freedom(), 8), 10 * i + draw)
-            if none is not None:
-                nulls.append(fold.before - _after(fold, none))
+            return None, 0.0, []
+        random = [Null.fitted(less, min(effect.freedom(), 8), 10 * i + draw) for draw in range(DRAWS)]
+        before = min(fold.before, fold.anew) if moving else fold.before
+        return effect, before - _after(fold, effect), [fold.before - _after(fold, none) for none in random if none is not None]
+
+    found = side_by_side(judged, range(len(folds)))
+    seen = [effect for effect, _, _ in found if effect is not None]
+    drops, nulls = [drop for _, drop, _ in found], [drop for _, _, some in found for drop in some]
     added = refitted(replace(h, effects=(*h.effects, whole)), bodies, evidence.heard)
     return Candidate(kind.id, whole, added, np.array(drops), float(np.mean(nulls)) if nulls else 0.0, jackknife([e.parameters() for e in seen]))
 

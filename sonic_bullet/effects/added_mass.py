@@ -20,6 +20,7 @@ from sonic_bullet.effects.pairs import agreed, every_line, patterns
 from sonic_bullet.effects.points import nearest, spread_out, vertex_normals
 from sonic_bullet.effects.values import Evidence, Heard, Owner, Stage
 from sonic_bullet.records import Array, ModalModel
+from sonic_bullet.side_by_side import side_by_side
 
 POINTS = 100
 SHARES = (0.002, 0.006, 0.015, 0.03, 0.055, 0.1, 0.16)  # of the body's mass
@@ -79,24 +80,25 @@ class AddedMass:
         x = heard.plain
         if isinstance(evidence.known, cls):
             known = evidence.known
-            at = int(np.argmin(((x.vertex_m - known.position_m) ** 2).sum(axis=1)))
+            near = int(np.argmin(((x.vertex_m - known.position_m) ** 2).sum(axis=1)))
             up, side = (float(y * np.exp(2 * known.stretch)) for y in known.yield_m_n)
-            return cls._at(x, trial.refined((0.0, at, known.mass_kg, (up, side), known.stretch), WIDTHS[-1:]))
+            return cls._at(x, trial.refined((0.0, near, known.mass_kg, (up, side), known.stretch), WIDTHS[-1:]))
         plain = patterns(heard, x)
         none = min((agreed(trial.line, trial.size, x.freq_hz, plain, shift=s) for s in trial.shifts(x.freq_hz, plain)), key=lambda one: one[0])
         if _in_place(trial.line, trial.size, x.freq_hz, none):
             return None
-        found = []
-        for vertex in spread_out(x, POINTS):
-            most = trial.yields(int(vertex))
-            found += [one for s in SHARES for y in YIELDS for one in trial.sifted(int(vertex), s * x.mass_kg, (y * most, ACROSS * y * most), WIDTHS[0])]
-        found.sort()
+
+        def at(vertex: int) -> list[Scored]:
+            most = trial.yields(vertex)
+            return [one for s in SHARES for y in YIELDS for one in trial.sifted(vertex, s * x.mass_kg, (y * most, ACROSS * y * most), WIDTHS[0])]
+
+        found = sorted(one for some in side_by_side(at, spread_out(x, POINTS).tolist()) for one in some)
         first: dict[bool, dict[tuple[int, bool], Scored]] = {False: {}, True: {}}
         for one in found:  # one light and one heavy start a vertex, where the baseline's scale may be right and where it is wrong
             first[abs(one[4]) > FAR_OFF].setdefault((one[1], one[2] > 0.02 * x.mass_kg), one)
-        best = min(trial.refined(start) for some in first.values() for start in list(some.values())[:TRIES])
+        best = min(side_by_side(trial.refined, [start for some in first.values() for start in list(some.values())[:TRIES]]))
         again = sorted(trial.scored(int(v), *best[2:], WIDTHS[1]) for v in spread_out(x, 3 * POINTS))  # round bodies: as heavy, elsewhere
-        best = min(best, *(trial.refined(start, WIDTHS[1:]) for start in again[: TRIES // 2]))
+        best = min(best, *side_by_side(lambda start: trial.refined(start, WIDTHS[1:]), again[: TRIES // 2]))
         if best[0] > none[0] - max(BETTER[0], BETTER[1] * abs(none[0])):
             return None
         return cls._at(x, best)

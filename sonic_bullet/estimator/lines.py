@@ -87,7 +87,7 @@ def joint_lines(signals: Array, sr: int, *, band_hz: tuple[float, float] = (20.0
             pole = pole[energy / colour(pole.imag / (2 * np.pi)) > SIGNIFICANT]
             if len(pole) == before or not len(pole):
                 break
-        found = _lines(signals, noise, pole, sr, signed)
+        found = lines_of(signals, noise, pole, sr, signed)
     except np.linalg.LinAlgError as error:
         raise AudioError("lines of the recording cannot be told apart: no decaying sound", "give a recording of one impact") from error
     for late in (round(t * sr) for t in LATE_S) if modes is not None and _beyond(found, signals) > BEYOND[1] else ():
@@ -273,7 +273,8 @@ def _apart(pole: Array) -> Array:
     return np.asarray(pole[keep])
 
 
-def _lines(signals: Array, noise: Array, pole: Array, sr: int, signed: bool) -> Lines:
+def lines_of(signals: Array, noise: Array, pole: Array, sr: int, signed: bool) -> Lines:
+    """Lines of signals (s, n) over white noise (s,) at poles (k,) in 1/s that are known already."""
     k, s = len(pole), len(signals)
     if k == 0:
         none = np.zeros(0)

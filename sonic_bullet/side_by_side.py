@@ -1,0 +1,83 @@
+"""Work on several things at once: a second process takes every next one from the same list.
+
+    items -> [do(item), …] in their order, whoever did them
+
+A fork, so that nothing has to be handed over but results; what the other process could not do or send is done here, and raises here. Where processes do not
+fork (Windows; macOS, whose libraries forbid it) or there is one core, all is done here. Work inside work stays where it is.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from collections.abc import Callable, Iterable
+from contextvars import ContextVar
+from multiprocessing import get_context
+from multiprocessing.connection import Connection
+from typing import Any, TypeVar
+
+Item = TypeVar("Item")
+Made = TypeVar("Made")
+
+_INSIDE: ContextVar[bool] = ContextVar("inside", default=False)  # a list that is being worked on
+
+
+def side_by_side(do: Callable[[Item], Made], items: Iterable[Item]) -> list[Made]:
+    """[do(item) for item in items], on two cores where there are two. ``do`` must not depend on what it did before.
+
+    Raises whatever do raises.
+    """
+    listed = list(items)
+    if _INSIDE.get() or len(listed) < 2 or not _can_fork():
+        return [do(item) for item in listed]
+    context: Any = get_context("fork")
+    taken = context.Value("i", 0)
+    made: dict[int, Made] = {}
+    before = _INSIDE.set(True)
+    try:
+        ours, theirs = context.Pipe(duplex=False)
+        other = context.Process(target=_help, args=(do, listed, taken, theirs), daemon=True)
+        other.start()
+        theirs.close()
+        try:
+            while (i := _next(taken)) < len(listed):
+                made[i] = do(listed[i])
+            while (found := _received(ours)) is not None:
+                made[found[0]] = found[1]
+        finally:
+            other.kill()
+            other.join()
+            ours.close()
+        return [made[i] if i in made else do(item) for i, item in enumerate(listed)]
+    finally:
+        _INSIDE.reset(before)
+
+
+def _can_fork() -> bool:
+    return sys.platform == "linux" and len(os.sched_getaffinity(0)) > 1
+
+
+def _next(taken: Any) -> int:
+    with taken.get_lock():
+        taken.value += 1
+        return int(taken.value) - 1
+
+
+def _received(ours: Connection) -> tuple[int, Any] | None:
+    try:
+        found: tuple[int, Any] | None = ours.recv()
+    except (EOFError, OSError):  # the other process is gone: what it has not sent is done here
+        return None
+    return found
+
+
+def _help(do: Callable[[Any], Any], items: list[Any], taken: Any, theirs: Connection) -> None:
+    """The other process: results one by one, then None."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the first one stops, and ends this one
+    while (i := _next(taken)) < len(items):
+        try:
+            theirs.send((i, do(items[i])))
+        except Exception:  # done again where it can be told, or sent nowhere
+            continue
+    theirs.send(None)
