@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from sonic_bullet.effects.support_subsets import subsets
 from sonic_bullet.effects.support_trial import Dashpot, Dashpots, Trial
 from sonic_bullet.records import Array
 
@@ -19,6 +20,7 @@ LOOKED, STARTS, NEAR = 40, 4, 14  # of the grid, looked at closer; refined; vert
 NEARER = (0.12, 0.07, 0.04, 0.02)  # turns, in sizes of the body
 TUNED = 0.15  # of ln c
 MOST = 4
+WEAK, ENOUGH = 2, 2.0  # of each number of dashpots to first order; of the spreads' own: no more is asked
 BETTER = 6.0  # in BIC, for another dashpot
 
 
@@ -27,22 +29,31 @@ def sought(t: Trial) -> Dashpots:
     data = 2 * len(t.freq_hz)  # a decay and a pattern each
     chosen: Dashpots = ()
     left, least = t.left(chosen), float(t.worth.sum())  # what is left within the spreads asks for nothing
-    tried = [(data * np.log(max(left, least)), chosen)]
     if left < least:
         return chosen
+
+    def price(d: Dashpots) -> float:
+        return float(data * np.log(max(t.left(d), least)) + len(d) * (3 * np.log(data) + BETTER))
+
+    weak = [tuned(t, refined(t, d, NEARER[-2:])[1]) for d in subsets(t, _spread(t, POINTS), WEAK)]
+    tried = [(price(d), d) for d in ((), *weak)]
+    best = min(tried, key=lambda pair: pair[0])[1]
+    if best and t.left(best) < ENOUGH * least:
+        return best
+    tried = [tried[0]]
     grid = [Dashpot(int(v), c, way) for v in _spread(t, POINTS) for c in _strengths(t).tolist() for way in ("normal", "every")]
     while len(chosen) < MOST:
         trials = [(*chosen, d) for d in grid]
         few = _best([t.price(*modes) for modes in t.roughly(trials)], trials, LOOKED)
         few = _best([t.beside(*modes, 1) for modes in t.roughly(few)], few, STARTS)
         starts = [refined(t, one, NEARER[:2]) for one in few]
-        best = refined(t, min(starts, key=lambda pair: pair[0])[1], (np.inf, *NEARER))[1]
-        chosen = tuned(t, min(best, refined(t, best, NEARER[-1:], whole=True)[1], key=t.left))
-        tried.append((data * np.log(max(t.left(chosen), least)) + len(chosen) * (3 * np.log(data) + BETTER), chosen))
+        more = refined(t, min(starts, key=lambda pair: pair[0])[1], (np.inf, *NEARER))[1]
+        chosen = tuned(t, min(more, refined(t, more, NEARER[-1:], whole=True)[1], key=t.left))
+        tried.append((price(chosen), chosen))
         enough = min(range(len(tried)), key=lambda i: tried[i][0])
         if enough < len(chosen) and (enough > 0 or len(chosen) > 1):  # two may show where neither does alone
             break
-    return min(tried, key=lambda pair: pair[0])[1]
+    return min([*tried, (price(best), best)], key=lambda pair: pair[0])[1]
 
 
 def _best(price: list[float], trials: list[Dashpots], count: int) -> list[Dashpots]:

@@ -2,7 +2,7 @@
 
     price_kj = (Δln f/w)²/18 + (Δln d/e)²/18 + 1 − c_kj, at most 1;   Σ worth_k (price − 1) -> min over one-to-one pairs       [Kuhn 1955; Crouse 2016]
     d_k = Δ_k(dashpots) + law(ω_k),  law = ½(a + bω + cω²) or as it is, a, b, c >= 0, refitted beside every trial by Huber's loss
-    left = Σ_k worth_k [ρ((d_k − Δ_k − law)/SCATTER d_k) + (1 − C_k²)/ROUGH²], each bounded;  lines that no mode explains count as outliers
+    left = Σ_k worth_k [ρ((d_k − Δ_k − law)/(SCATTER Δ_k + LAW d_k)) + (1 − C_k²)/ROUGH²], each bounded;  lines that no mode explains count as outliers
 
 c_kj: cosine of a line's amplitudes over the strikes with what one exponential at the mode's pole would take of all modes,
 Σ_i a_i 2d_j/((d_i + d_j) − i(ω_i − ω_j)), or with the mode's own. C_k: with what exponentials at the lines' poles take of all modes together
@@ -21,7 +21,7 @@ from sonic_bullet.effects.points import solved, vertex_normals
 from sonic_bullet.effects.values import Heard
 from sonic_bullet.records import Array, ModalModel
 
-SCATTER, ROUGH = 0.05, 0.15  # of a decay, and of a pattern, relative: shapes err
+SCATTER, LAW, ROUGH = 0.05, 0.005, 0.15  # of what dashpots add to a decay, of the decay, and of a pattern, relative: shapes err, and laws
 WIDTH, DECADE = 0.004, 0.4  # of ln f and ln d, of a pair
 MISSED = 9.0  # what a line costs that nothing explains: three spreads, as Huber's loss has its bend there
 WEAK, HALF = 0.05, 0.5  # of the worth of a line that the model does not expect: it may be a click or another body's; near a mode, its twin
@@ -86,7 +86,7 @@ class Trial:
         return cls(
             freq,
             decay,
-            np.hypot(np.nan_to_num(sd[index], posinf=1e9), SCATTER * decay) + 1e-3,
+            np.hypot(np.nan_to_num(sd[index], posinf=1e9), LAW * decay) + 1e-3,
             amplitude,
             worth,
             h.signed,
@@ -106,6 +106,11 @@ class Trial:
             return self.beside(-x.decay_per_s + 2j * np.pi * x.freq_hz, np.eye(x.mode_count, dtype=complex), 2)
         found = coupled(x.omega0_squared_per_s2, x.decay_per_s, self._rows([dashpots])[0])
         return self.beside(found.pole, found.turn, 2)
+
+    def plain(self) -> tuple[Array, Array]:
+        """Lines (p,) and the modes (p,) they stand for without any dashpot."""
+        x, omega = self.model, 2 * np.pi * self.model.freq_hz
+        return self._pairs(omega, x.decay_per_s, self._alike(omega, x.decay_per_s, self.into * self.out))[:2]
 
     def roughly(self, trials: list[Dashpots]) -> list[tuple[Array, Array]]:
         """Poles (m,) and turns (m, m) of many, modes coupling with their neighbours only."""
@@ -156,9 +161,9 @@ class Trial:
             line, mode, _ = self._pairs(omega, extra + law, alike)
             if not len(line):
                 return nothing
-            worth = self.worth[line]
-            law = column @ solved(self.decay_per_s[line] - extra[mode], self.sd[line] / np.sqrt(worth), column[mode])[0]
-        off = np.abs(self.decay_per_s[line] - (extra + law)[mode]) / self.sd[line]
+            worth, sd = self.worth[line], np.hypot(self.sd[line], SCATTER * np.minimum(extra[mode], self.decay_per_s[line]))
+            law = column @ solved(self.decay_per_s[line] - extra[mode], sd / np.sqrt(worth), column[mode])[0]
+        off = np.abs(self.decay_per_s[line] - (extra + law)[mode]) / sd
         decays = np.minimum(np.where(off <= 3, off**2, 6 * off - 9), 2 * MISSED)
         told = self._told(line, omega[mode], omega, extra + law, push)
         patterns = np.minimum((1 - _cosine(self._seen(self.size), self._seen(told))[line] ** 2) / ROUGH**2, MISSED)
