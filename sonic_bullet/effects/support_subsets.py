@@ -14,6 +14,8 @@ from sonic_bullet.records import Array
 
 PAIRS = 200  # best of two, of which threes are made
 APART = 1e-6  # of the columns' Gram determinant: two that do the same are one
+STILL = 1e-3  # of what the most telling point does: where nothing moves, nothing is weak
+SAME = 1e-6  # of what a set explains
 
 
 def subsets(t: Trial, vertices: Array, few: int) -> list[Dashpots]:
@@ -29,14 +31,16 @@ def subsets(t: Trial, vertices: Array, few: int) -> list[Dashpots]:
     column, y = column - (column @ law) @ law.T, y - law @ (law.T @ y)
     gram, told = column @ column.T, column @ y
     place = [(int(v), way) for way in ("normal", "every") for v in vertices]
-    one = np.arange(len(place))
+    size = np.linalg.norm(column, axis=1)
+    one = np.flatnonzero(size > STILL * size.max())
     found: list[Dashpots] = []
     sets = one[:, None]
     for size in (1, 2, 3):
-        best, strength = _best(gram, told, sets)
+        best, strength, gain = _best(gram, told, sets)
+        new = np.flatnonzero(np.diff(gain, prepend=np.inf) < -SAME * gain)[:few]  # a body's mirrors do the same
         found += [
             tuple(Dashpot(place[k][0], c, place[k][1]) for k, c in zip(s, x, strict=True))
-            for s, x in zip(best[:few].tolist(), strength[:few].tolist(), strict=True)
+            for s, x in zip(best[new].tolist(), strength[new].tolist(), strict=True)
         ]
         if size < 3:  # with every other one
             kept = one[:, None] if size == 1 else best[:PAIRS]
@@ -45,8 +49,8 @@ def subsets(t: Trial, vertices: Array, few: int) -> list[Dashpots]:
     return found
 
 
-def _best(gram: Array, told: Array, sets: Array) -> tuple[Array, Array]:
-    """Of subsets (n, r) of columns those with strengths above zero, the best first, and their strengths."""
+def _best(gram: Array, told: Array, sets: Array) -> tuple[Array, Array, Array]:
+    """Of subsets (n, r) of columns those with strengths above zero, the best first, their strengths, and what each takes off Σ y²."""
     size = np.sqrt(np.maximum(np.diag(gram), 1e-300))[sets]
     matrix = gram[sets[:, :, None], sets[:, None, :]] / (size[:, :, None] * size[:, None, :])
     good = np.linalg.det(matrix) > APART
@@ -56,4 +60,4 @@ def _best(gram: Array, told: Array, sets: Array) -> tuple[Array, Array]:
     gain = np.where((strength > 0).all(axis=1), (strength * right).sum(axis=1), 0.0)
     order = np.argsort(-gain, kind="stable")
     order = order[gain[order] > 0]
-    return sets[order], (strength / size)[order]
+    return sets[order], (strength / size)[order], gain[order]

@@ -275,10 +275,9 @@ def _apart(pole: Array) -> Array:
 
 def lines_of(signals: Array, noise: Array, pole: Array, sr: int, signed: bool) -> Lines:
     """Lines of signals (s, n) over white noise (s,) at poles (k,) in 1/s that are known already."""
-    k, s = len(pole), len(signals)
+    k, none = len(pole), np.zeros(0)
     if k == 0:
-        none = np.zeros(0)
-        return Lines(none, none, np.zeros((s, 0), complex), none, none, np.zeros((s, 0)), noise, none, signed)
+        return Lines(none, none, np.zeros((len(signals), 0), complex), none, none, np.zeros((len(signals), 0)), noise, none, signed)
     amplitude, _, energy, residual = _solved(signals, noise, pole, sr)
     level = np.maximum(noise, residual)  # what the lines leave is noise too, to whoever asks how sure they are
     matrix, _, _ = _normal(signals, level, pole, sr)

@@ -1,0 +1,135 @@
+"""What a suspect must gain, and against what: not against numbers that the baseline may learn again."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import combinations
+from typing import Any, ClassVar, Self
+
+import numpy as np
+import pytest
+from made_body import plate, recorded, struck
+from scipy.optimize import nnls
+from test_chains import BENT
+from test_found_again import BAND, fitted
+
+from sonic_bullet.diagnosis.baseline import _soft, takes_of
+from sonic_bullet.diagnosis.chains import LINKS, unchained
+from sonic_bullet.diagnosis.evidence import evidence_of
+from sonic_bullet.diagnosis.judge import mean_db
+from sonic_bullet.diagnosis.refit import refitted
+from sonic_bullet.diagnosis.trial import LEAST_DB, Candidate, earns, needed, trials
+from sonic_bullet.effects.support_damping import SupportDamping
+from sonic_bullet.effects.support_subsets import _best, subsets
+from sonic_bullet.effects.support_trial import Trial
+from sonic_bullet.effects.values import Evidence, Owner, Stage
+from sonic_bullet.records import ModalModel
+
+WEAK = ((0.0477, 0.0371, 0.0), (0.0955, 0.0186, 0.0), (0.1432, 0.0464, 0.0))
+
+
+def candidate(*drop_db: float, null_db: float = 0.0) -> Candidate:
+    return Candidate("radiation", None, None, np.array(drop_db), null_db, {})  # type: ignore[arg-type]
+
+
+def test_less_will_do_where_it_is_most_of_what_is_open() -> None:
+    assert needed(10.0) == pytest.approx(0.8) and needed(2.0) == LEAST_DB and needed(0.5) == pytest.approx(0.25) and needed(0.1) == pytest.approx(0.2)
+    assert earns(candidate(0.3, 0.31, 0.29, 0.3, 0.3), 0.5)
+    assert not earns(candidate(0.3, 0.31, 0.29, 0.3, 0.3), 2.0), "a drop of a seventh is a mesh's"
+    assert not earns(candidate(0.15, 0.15, 0.14, 0.16, 0.15), 0.2), "as little as chance gains"
+
+
+def test_loud_strikes_may_speak_alone_but_not_a_single_one() -> None:
+    assert earns(candidate(0.0, -0.02, 0.05, 1.1, 0.4), 0.5)
+    assert not earns(candidate(0.0, 0.0, 0.0, 0.0, 2.0), 0.5)
+    assert not earns(candidate(0.0, -0.5, 0.05, 1.1, 0.9), 0.5), "one strike speaks against it"
+    assert not earns(candidate(0.0, -0.02, 0.05, 1.1, 0.4, null_db=0.3), 0.5), "as good as chance"
+
+
+@dataclass(frozen=True)
+class Idle:
+    """Does nothing, under a name that has corrections learnt again."""
+
+    id: ClassVar[str] = "mode-splitting"
+    stage: ClassVar[Stage] = Stage.MODES
+    owner: ClassVar[Owner] = Owner.OBJECT
+    reference: ClassVar[str] = "none"
+
+    def apply(self, x: ModalModel) -> ModalModel:
+        return x
+
+    def parameters(self) -> dict[str, Any]:
+        return {}
+
+    def freedom(self) -> int:
+        return 2
+
+    @classmethod
+    def propose(cls, evidence: Evidence) -> Self | None:
+        return cls()
+
+
+def test_what_corrections_alone_would_gain_is_no_effects() -> None:
+    """Corrections that are three per mille off cost decibels; learnt again beside an effect that does nothing, they are not its gain."""
+    body = recorded()
+    rng = np.random.default_rng(3)
+    h = fitted(body)
+    assert h.correction is not None
+    stale = replace(h, correction={"plate": h.correction["plate"] + 3e-3 * rng.choice([-1, 1], body.model.mode_count)})
+    takes = takes_of((body,))
+    lost = (mean_db(takes, stale) or 0.0) - (mean_db(takes, refitted(stale, (body,), anew=True)) or 0.0)
+    assert lost > 3.0
+    found = trials(stale, (body,), takes, evidence_of(stale, (body,), BAND), (Idle,), seed=0, say=lambda _: None)
+    assert [c.id for c in found] == ["mode-splitting"]
+    assert np.abs(found[0].drop_db).max() < 0.1 * lost
+    assert not earns(found[0], lost)
+
+
+def test_softer_strikes_tell_the_linear_modes_of_a_body_that_bends() -> None:
+    body = recorded(BENT)
+    assert body.gathered is not None
+    soft = _soft(body.gathered, BAND)
+    assert soft is not body.gathered and soft.lines.amplitude.shape[0] == len(body.gathered.recordings)
+    chained = unchained(body.gathered.lines, LINKS[0])
+    assert chained is not None
+
+    def off(freq_hz: np.ndarray[Any, Any]) -> float:
+        return float(np.median(np.abs(freq_hz[:, None] / plate().freq_hz - 1).min(axis=0)))
+
+    assert off(soft.lines.freq_hz) < min(2e-4, off(chained.freq_hz))
+    assert _soft(recorded().gathered, BAND) is not soft  # type: ignore[arg-type]
+    plain = recorded().gathered
+    assert plain is not None and _soft(plain, BAND) is plain, "nothing bends there"
+    level = tuple(replace(r, impulse_n_s=0.01) for r in body.gathered.recordings)
+    alike = replace(body.gathered, recordings=level)
+    assert _soft(alike, BAND) is alike, "none is softer"
+
+
+def test_the_best_pairs_are_those_that_counting_through_finds() -> None:
+    rng = np.random.default_rng(8)
+    column, y = np.abs(rng.standard_normal((9, 14))), np.abs(rng.standard_normal(14))
+    every = np.array(list(combinations(range(9), 2)))
+    sets, strength, gain = _best(column @ column.T, column @ y, every)
+    cost = {tuple(s): float(np.linalg.norm(y - column[list(s)].T @ nnls(column[list(s)].T, y)[0])) for s in every.tolist()}
+    both = {s: c for s, c in cost.items() if (nnls(column[list(s)].T, y)[0] > 1e-9).all()}
+    assert tuple(sets[0]) == min(both, key=both.__getitem__)
+    assert gain[0] == pytest.approx(float(y @ y) - min(both.values()) ** 2)
+    assert strength[0] == pytest.approx(nnls(column[sets[0]].T, y)[0], rel=1e-6)
+
+
+def test_three_weak_dashpots_are_told_together() -> None:
+    """A thirtieth of the decays, where a law is good to a two-hundredth: no one says half of it, all three do."""
+    fixture = SupportDamping(WEAK, (0.15, 0.1, 0.12))
+    body = recorded(fixture, noise=2e-6)
+    trial = Trial.of(evidence_of(fitted(body), (body,), BAND).heard[0])
+    grid = np.unique(trial.model.face)
+    found = subsets(trial, grid[::7], 2)
+    assert [len(s) for s in found] == [1, 1, 2, 2, 3, 3]
+    least = [min(trial.left(s) for s in found if len(s) == size) for size in (1, 3)]
+    assert least[1] < 0.5 * least[0] < 0.5 * trial.left(())
+    told = SupportDamping._of(trial, min((s for s in found if len(s) == 3), key=trial.left))
+    bare = replace(struck().model, decay_per_s=np.full(18, 5.0))
+    law = np.linalg.qr(np.stack([np.ones(18), bare.freq_hz**2], axis=1))[0]  # which takes up what a law of the material may
+    true, made = (x.apply(bare).decay_per_s - 5.0 for x in (fixture, told))
+    own, missed = (y - law @ (law.T @ y) for y in (true, made - true))
+    assert np.linalg.norm(missed) < 0.5 * np.linalg.norm(own)

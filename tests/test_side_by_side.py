@@ -1,0 +1,83 @@
+"""Two processes do what one would have done: the same results in the same order, the same errors, and nothing left behind."""
+
+from __future__ import annotations
+
+import os
+import time
+from multiprocessing import active_children
+
+import pytest
+
+import sonic_bullet.side_by_side as module
+from sonic_bullet.errors import AudioError
+from sonic_bullet.side_by_side import side_by_side
+
+TWO = module._can_fork()
+
+
+def test_results_come_in_order_whoever_made_them() -> None:
+    def square(x: int) -> tuple[int, int]:
+        time.sleep(0.02)
+        return x * x, os.getpid()
+
+    found = side_by_side(square, range(12))
+    assert [x for x, _ in found] == [x * x for x in range(12)]
+    assert len({who for _, who in found}) == (2 if TWO else 1)
+    assert not active_children()
+
+
+def test_errors_are_raised_here_as_they_are() -> None:
+    def fails(x: int) -> int:
+        if x == 3:
+            raise AudioError("a recording is silent", "leave it out of the case")
+        return x
+
+    with pytest.raises(AudioError, match="silent"):
+        side_by_side(fails, range(6))
+    assert not active_children()
+
+
+def test_what_cannot_be_sent_is_made_here() -> None:
+    found = side_by_side(lambda x: lambda: x, range(6))
+    assert [made() for made in found] == list(range(6))
+
+
+def test_a_process_that_dies_takes_nothing_with_it() -> None:
+    here = os.getpid()
+
+    def dies(x: int) -> int:
+        if os.getpid() != here:
+            os._exit(9)
+        time.sleep(0.02)
+        return x + 1
+
+    assert side_by_side(dies, range(5)) == [1, 2, 3, 4, 5]
+    assert not active_children()
+
+
+def test_work_inside_work_stays_where_it_is() -> None:
+    def outer(x: int) -> tuple[int, set[int]]:
+        inner = side_by_side(lambda y: (time.sleep(0.005), os.getpid())[1], range(4))
+        return os.getpid(), set(inner)
+
+    assert all(inside == {who} for who, inside in side_by_side(outer, range(4)))
+
+
+def test_one_core_does_it_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "_can_fork", lambda: False)
+    assert set(side_by_side(lambda _: os.getpid(), range(4))) == {os.getpid()}
+
+
+def test_an_interrupt_here_ends_the_other() -> None:
+    here = os.getpid()
+
+    def waits(x: int) -> int:
+        if os.getpid() == here:
+            raise KeyboardInterrupt
+        time.sleep(30)
+        return x
+
+    start = time.monotonic()
+    with pytest.raises(KeyboardInterrupt):
+        side_by_side(waits, range(4))
+    assert time.monotonic() - start < 5 and not active_children()
