@@ -12,9 +12,11 @@ import os
 import signal
 import sys
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from contextvars import ContextVar
-from multiprocessing import get_context
+from multiprocessing import current_process, get_context
 from multiprocessing.connection import Connection
+from multiprocessing.reduction import ForkingPickler
 from typing import Any, TypeVar
 
 Item = TypeVar("Item")
@@ -55,7 +57,7 @@ def side_by_side(do: Callable[[Item], Made], items: Iterable[Item]) -> list[Made
 
 
 def _can_fork() -> bool:
-    return sys.platform == "linux" and len(os.sched_getaffinity(0)) > 1
+    return sys.platform == "linux" and len(os.sched_getaffinity(0)) > 1 and not current_process().daemon  # a pool's worker may have no children
 
 
 def _next(taken: Any) -> int:
@@ -75,9 +77,11 @@ def _received(ours: Connection) -> tuple[int, Any] | None:
 def _help(do: Callable[[Any], Any], items: list[Any], taken: Any, theirs: Connection) -> None:
     """The other process: results one by one, then None."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the first one stops, and ends this one
-    while (i := _next(taken)) < len(items):
-        try:
-            theirs.send((i, do(items[i])))
-        except Exception:  # done again where it can be told, or sent nowhere
-            continue
-    theirs.send(None)
+    with suppress(OSError):  # nobody listens any more
+        while (i := _next(taken)) < len(items):
+            try:
+                message = ForkingPickler.dumps((i, do(items[i])))
+            except Exception:  # done again where it can be told, or sent nowhere
+                continue
+            theirs.send_bytes(message)
+        theirs.send(None)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from multiprocessing import active_children
+from multiprocessing import active_children, get_context
 
 import pytest
 
@@ -61,6 +61,16 @@ def test_work_inside_work_stays_where_it_is() -> None:
         return os.getpid(), set(inner)
 
     assert all(inside == {who} for who, inside in side_by_side(outer, range(4)))
+
+
+def in_a_pool() -> list[int]:
+    return side_by_side(lambda x: x + 1, range(4))
+
+
+def test_a_pools_worker_may_use_it() -> None:
+    """Which may have no children of its own."""
+    with get_context().Pool(1) as pool:
+        assert pool.apply(in_a_pool) == [1, 2, 3, 4]
 
 
 def test_one_core_does_it_alone(monkeypatch: pytest.MonkeyPatch) -> None:
