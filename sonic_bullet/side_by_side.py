@@ -33,27 +33,39 @@ def side_by_side(do: Callable[[Item], Made], items: Iterable[Item]) -> list[Made
     listed = list(items)
     if _INSIDE.get() or len(listed) < 2 or not _can_fork():
         return [do(item) for item in listed]
-    context: Any = get_context("fork")
-    taken = context.Value("i", 0)
+    try:
+        other, ours, taken = _started(do, listed)
+    except OSError:  # no memory or no process to be had
+        return [do(item) for item in listed]
     made: dict[int, Made] = {}
     before = _INSIDE.set(True)
     try:
-        ours, theirs = context.Pipe(duplex=False)
-        other = context.Process(target=_help, args=(do, listed, taken, theirs), daemon=True)
-        other.start()
-        theirs.close()
-        try:
-            while (i := _next(taken)) < len(listed):
-                made[i] = do(listed[i])
-            while (found := _received(ours)) is not None:
-                made[found[0]] = found[1]
-        finally:
-            other.kill()
-            other.join()
-            ours.close()
+        while (i := _next(taken)) < len(listed):
+            made[i] = do(listed[i])
+        while (found := _received(ours)) is not None:
+            made[found[0]] = found[1]
         return [made[i] if i in made else do(item) for i, item in enumerate(listed)]
     finally:
         _INSIDE.reset(before)
+        other.kill()
+        other.join()
+        ours.close()
+
+
+def _started(do: Callable[[Any], Any], items: list[Any]) -> tuple[Any, Connection, Any]:
+    """The other process, where its results come out, and the count of what is taken. Raises OSError."""
+    context: Any = get_context("fork")
+    taken = context.Value("i", 0)
+    ours, theirs = context.Pipe(duplex=False)
+    other = context.Process(target=_help, args=(do, items, taken, ours, theirs, os.getpid()), daemon=True)
+    try:
+        other.start()
+    except OSError:
+        ours.close()
+        raise
+    finally:
+        theirs.close()
+    return other, ours, taken
 
 
 def _can_fork() -> bool:
@@ -67,18 +79,20 @@ def _next(taken: Any) -> int:
 
 
 def _received(ours: Connection) -> tuple[int, Any] | None:
+    """What the other process has sent; None at its end, or where it cannot be read: what is missing is done here."""
     try:
         found: tuple[int, Any] | None = ours.recv()
-    except (EOFError, OSError):  # the other process is gone: what it has not sent is done here
+    except Exception:  # the other process is gone, or has sent what no one can put together
         return None
     return found
 
 
-def _help(do: Callable[[Any], Any], items: list[Any], taken: Any, theirs: Connection) -> None:
+def _help(do: Callable[[Any], Any], items: list[Any], taken: Any, ours: Connection, theirs: Connection, parent: int) -> None:
     """The other process: results one by one, then None."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the first one stops, and ends this one
+    ours.close()
     with suppress(OSError):  # nobody listens any more
-        while (i := _next(taken)) < len(items):
+        while os.getppid() == parent and (i := _next(taken)) < len(items):
             try:
                 message = ForkingPickler.dumps((i, do(items[i])))
             except Exception:  # done again where it can be told, or sent nowhere

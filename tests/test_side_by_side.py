@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 import time
 from multiprocessing import active_children, get_context
+from pathlib import Path
 
 import pytest
 
@@ -16,8 +19,13 @@ TWO = module._can_fork()
 
 
 def test_results_come_in_order_whoever_made_them() -> None:
+    here, begun = os.getpid(), get_context("fork").Event() if TWO else None
+
     def square(x: int) -> tuple[int, int]:
-        time.sleep(0.02)
+        if begun is not None and os.getpid() != here:
+            begun.set()
+        elif begun is not None:
+            begun.wait(20)
         return x * x, os.getpid()
 
     found = side_by_side(square, range(12))
@@ -91,3 +99,34 @@ def test_an_interrupt_here_ends_the_other() -> None:
     with pytest.raises(KeyboardInterrupt):
         side_by_side(waits, range(4))
     assert time.monotonic() - start < 5 and not active_children()
+
+
+@pytest.mark.skipif(not TWO, reason="one core")
+def test_none_is_left_behind_by_one_that_is_killed() -> None:
+    """A script that dies without a word, its helper at work on more than a pipe holds."""
+    script = (
+        "import os, signal, time\n"
+        "from sonic_bullet.side_by_side import side_by_side\n"
+        "me = os.getpid()\n"
+        "def do(x):\n"
+        "    if os.getpid() == me:\n"
+        "        time.sleep(1.0); os.kill(me, signal.SIGKILL)\n"
+        "    print(os.getpid(), flush=True); time.sleep(0.05)\n"
+        "    return bytes(300_000)\n"
+        "side_by_side(do, range(400))\n"
+    )
+    out = subprocess.run([sys.executable, "-c", script], check=False, capture_output=True, text=True, timeout=60).stdout
+    helpers = {int(line) for line in out.split()}
+    assert helpers
+    until = time.monotonic() + 20
+    while any(alive(who) for who in helpers) and time.monotonic() < until:
+        time.sleep(0.05)
+    assert not any(alive(who) for who in helpers)
+
+
+def alive(who: int) -> bool:
+    """Whether a process is there and no zombie."""
+    try:
+        return Path(f"/proc/{who}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
+    except OSError:
+        return False

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sonic_bullet.diagnosis.bodies import Struck, shapeless, struck_bodies
-from sonic_bullet.diagnosis.chains import LINKS, share, unchained
+from sonic_bullet.diagnosis.chains import FEWEST, LINKS, share, unchained
 from sonic_bullet.diagnosis.elastic import with_elastic
 from sonic_bullet.diagnosis.judge import Take, mean_db
 from sonic_bullet.diagnosis.play import Hypothesis
@@ -74,9 +74,11 @@ def _soft(one: Gathered, band_hz: tuple[float, float]) -> Gathered:
         return one
     try:
         soft = joint_lines(one.signals[np.sort(order)], one.sr, band_hz=band_hz, signed=one.lines.signed)
-    except AudioError:  # too soft
+        lines = lines_of(one.signals, noise_rms(one.signals, one.sr), -soft.decay_per_s + 2j * np.pi * soft.freq_hz, one.sr, soft.signed)
+    except (AudioError, np.linalg.LinAlgError):  # too soft
         return one
-    lines = lines_of(one.signals, noise_rms(one.signals, one.sr), -soft.decay_per_s + 2j * np.pi * soft.freq_hz, one.sr, soft.signed)
+    if len(lines.freq_hz) < FEWEST:
+        return one
     return replace(one, lines=unchained(lines, LINKS[0]) or lines)
 
 

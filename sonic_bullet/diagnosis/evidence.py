@@ -30,13 +30,13 @@ def evidence_of(h: Hypothesis, bodies: tuple[Struck, ...], band_hz: tuple[float,
     return Evidence(heard, h.alpha_per_s, h.beta_s, h.gain, tuple(e.id for e in h.effects), band_hz, seed)
 
 
-def heard_of(h: Hypothesis, body: Struck, *, sounds: bool = True) -> Heard:
-    """One fitted object's. sounds: whether what it would sound like is wanted too, which takes longest."""
+def heard_of(h: Hypothesis, body: Struck, *, sounds: bool = True, anew: bool = False) -> Heard:
+    """One fitted object's. sounds: whether what it would sound like is wanted too, which takes longest. anew: lines paired as beside effects that move modes."""
     gathered = body.gathered
     assert gathered is not None
     lines, model = gathered.lines, None
     model, order = modes_of(h, body)
-    line, mode = paired(h, body, model, order)
+    line, mode = paired(h, body, model, order, anew=anew)
     mine = body.fitted[: len(lines.amplitude)]
     rows = pattern(body, model)[mine]
     push = rows * start(body.kind, model) * in_band(body, model)
@@ -98,10 +98,10 @@ def outside(h: Hypothesis, heard: Heard) -> Heard:
     return heard
 
 
-def paired(h: Hypothesis, body: Struck, model: ModalModel, order: Array) -> tuple[Array, tuple[Array, ...]]:
-    """Lines (p,) and the modes of ``model`` each stands for: as they were fitted, where no effect has moved the modes, else by nearness and pattern."""
+def paired(h: Hypothesis, body: Struck, model: ModalModel, order: Array, *, anew: bool = False) -> tuple[Array, tuple[Array, ...]]:
+    """Lines (p,) and the modes of ``model`` each stands for: as they were fitted, where no effect has moved the modes, else, or anew, by nearness and pattern."""
     place = {int(k): i for i, k in enumerate(order)}
-    if not moves(h):
+    if not (anew or moves(h)):
         line = np.unique(body.line[body.line >= 0])
         mode = tuple(np.array(sorted(place[int(k)] for k in np.flatnonzero(body.line == one) if int(k) in place), int) for one in line)
         good = [i for i, m in enumerate(mode) if len(m)]

@@ -29,14 +29,16 @@ NEAR, ALIKE = 5e-3, 1.6  # of ln f and ln d: lines of one mode
 def refitted(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...] | None = None, *, anew: bool = False) -> Hypothesis:
     """The hypothesis with α, β and σ fitted again beside its effects; ``heard``: evidence to fit them to, thinned or whole, of all bodies or some.
 
-    anew: with corrections learnt again, too, as they are beside effects that move modes.
+    anew: with lines paired and corrections learnt again, too, as they are beside effects that move modes.
     """
     moved = anew or moves(h)
     if moved:
-        h = corrected(h, bodies)
+        h = corrected(h, bodies, anew=anew)
     if heard is None or moved:
         heard = tuple(
-            heard_of(replace(h, effects=tuple(e for e in h.effects if e.stage is not Stage.SOUND)), b, sounds=False) for b in bodies if b.gathered is not None
+            heard_of(replace(h, effects=tuple(e for e in h.effects if e.stage is not Stage.SOUND)), b, sounds=False, anew=anew)
+            for b in bodies
+            if b.gathered is not None
         )
     heard = tuple(outside(h, one) for one in heard)
     return _gained(_damped(h, bodies, heard), bodies, heard)
@@ -73,11 +75,11 @@ def with_effects(h: Hypothesis, effects: tuple[Effect, ...], bodies: tuple[Struc
     return made if moves(made) or not moves(h) else replace(made, stretch=0.0, correction={b.name: b.correction for b in bodies})
 
 
-def corrected(h: Hypothesis, bodies: tuple[Struck, ...]) -> Hypothesis:
-    """The hypothesis with E/ρ and corrections learnt on its own modes, from where its effects have found E/ρ (``stretch``)."""
+def corrected(h: Hypothesis, bodies: tuple[Struck, ...], *, anew: bool = False) -> Hypothesis:
+    """The hypothesis with E/ρ and corrections learnt on its own modes, from where its effects have found E/ρ (``stretch``). anew: see refitted."""
     h = replace(h, correction=None, stretch=float(sum(getattr(e, "stretch", 0.0) for e in h.effects)))
     for _ in range(3):
-        off = np.concatenate([_off(h, body)[1] for body in bodies if body.gathered is not None] or [np.zeros(0)])
+        off = np.concatenate([_off(h, body, anew)[1] for body in bodies if body.gathered is not None] or [np.zeros(0)])
         if len(off):
             h = replace(h, stretch=h.stretch + float(np.median(off)))
     found: dict[str, Array] = {}
@@ -85,7 +87,7 @@ def corrected(h: Hypothesis, bodies: tuple[Struck, ...]) -> Hypothesis:
         if body.gathered is None:
             continue
         for _ in range(2):
-            place, off = _off(replace(h, correction=found), body)
+            place, off = _off(replace(h, correction=found), body, anew)
             ratio = np.array(found.get(body.name, np.zeros(undamped(h, body).mode_count)), float)
             step = np.zeros(len(ratio))
             step[place] = np.expm1(off)
@@ -95,7 +97,7 @@ def corrected(h: Hypothesis, bodies: tuple[Struck, ...]) -> Hypothesis:
         if can_tell(body):
             now = replace(h, correction=found)
             model, order = modes_of(now, body)
-            groups = [order[who] for who in paired(now, body, model, order)[1]]
+            groups = [order[who] for who in paired(now, body, model, order, anew=anew)[1]]
             lone = np.setdiff1d(np.arange(len(ratio)), np.concatenate([*groups, np.zeros(0, int)]))
             shared = np.concatenate([*(g for g in groups if len(g) > 1), np.zeros(0, int)])
             found[body.name] = sought(now, body, np.concatenate([lone, shared]), alone=np.isin(np.arange(len(ratio)), lone))
@@ -108,11 +110,11 @@ def _alike(freq_hz: Array, correction: Array) -> Array:
     return np.asarray((np.bincount(run, correction) / np.maximum(np.bincount(run), 1))[run])
 
 
-def _off(h: Hypothesis, body: Struck) -> tuple[Array, Array]:
+def _off(h: Hypothesis, body: Struck, anew: bool) -> tuple[Array, Array]:
     """Uncorrected modes (p,) of a body and ln f of their lines over their own (p,)."""
     assert body.gathered is not None
     model, order = modes_of(h, body)
-    line, mode = paired(h, body, model, order)
+    line, mode = paired(h, body, model, order, anew=anew)
     place = np.concatenate([order[who] for who in mode]) if mode else np.zeros(0, int)
     lines = body.gathered.lines.freq_hz
     off = np.concatenate([np.full(len(who), np.log(lines[one] / model.freq_hz[who].mean())) for one, who in zip(line, mode, strict=True)] or [np.zeros(0)])

@@ -36,7 +36,8 @@ PLAIN = 0.6  # of the gap: where a cheap suspect says as much, costly ones wait
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Candidate:
-    """A suspect after its trial. effect: fitted to all evidence. drop_db (s,): of each left-out strike's distance; null_db: mean over strikes and draws.
+    """A suspect after its trial. effect: fitted to all evidence. drop_db (s,): of each left-out strike's distance, less what corrections learnt again would gain
+    alone where the suspect moves modes; null_db: mean over strikes and draws.
 
     spread: of each number in its parameters over the folds (jackknife).
     """

@@ -31,8 +31,8 @@ def subsets(t: Trial, vertices: Array, few: int) -> list[Dashpots]:
     column, y = column - (column @ law) @ law.T, y - law @ (law.T @ y)
     gram, told = column @ column.T, column @ y
     place = [(int(v), way) for way in ("normal", "every") for v in vertices]
-    size = np.linalg.norm(column, axis=1)
-    one = np.flatnonzero(size > STILL * size.max())
+    does = np.linalg.norm(column, axis=1)
+    one = np.flatnonzero(does > STILL * does.max())
     found: list[Dashpots] = []
     sets = one[:, None]
     for size in (1, 2, 3):

@@ -2,7 +2,7 @@
 
     price_kj = (Δln f/w)²/18 + (Δln d/e)²/18 + 1 − c_kj, at most 1;   Σ worth_k (price − 1) -> min over one-to-one pairs       [Kuhn 1955; Crouse 2016]
     d_k = Δ_k(dashpots) + law(ω_k),  law = ½(a + bω + cω²) or as it is, a, b, c >= 0, refitted beside every trial by Huber's loss
-    left = Σ_k worth_k [ρ((d_k − Δ_k − law)/(SCATTER Δ_k + LAW d_k)) + (1 − C_k²)/ROUGH²], each bounded;  lines that no mode explains count as outliers
+    left = Σ_k worth_k [ρ((d_k − Δ_k − law)/√(sd_k² + (SCATTER Δ_k)² + (LAW d_k)²)) + (1 − C_k²)/ROUGH²], each bounded;  lines that no mode explains count as outliers
 
 c_kj: cosine of a line's amplitudes over the strikes with what one exponential at the mode's pole would take of all modes,
 Σ_i a_i 2d_j/((d_i + d_j) − i(ω_i − ω_j)), or with the mode's own. C_k: with what exponentials at the lines' poles take of all modes together
