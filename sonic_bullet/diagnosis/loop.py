@@ -75,7 +75,8 @@ def closed(
         for candidate in found:
             last.setdefault(candidate.id, candidate)
         gap = max(now - floor, 0.0)
-        able = [c for c in found if earns(c, gap) and now - (mean_db(takes, retold(c.hypothesis, bodies)) or now) > HELPS * needed(gap)]
+        need = HELPS * needed(gap, first=not added)
+        able = [c for c in found if earns(c, gap, first=not added) and now - (mean_db(takes, retold(c.hypothesis, bodies)) or now) > need]
         if not able:
             break
         best = simplest(able, bodies)
@@ -131,7 +132,7 @@ def _pruned(h: Hypothesis, added: list[Candidate], bodies: tuple[Struck, ...], t
     for candidate in added[:-1]:
         rest = [e for e in h.effects if e.id != candidate.id]
         without = refitted(with_effects(h, tuple(rest), bodies), bodies)
-        if (mean_db(takes, without) or 0.0) - (mean_db(takes, h) or 0.0) < needed(gap_db):
+        if (mean_db(takes, without) or 0.0) - (mean_db(takes, h) or 0.0) < needed(gap_db, first=False):
             h, added = without, [c for c in added if c is not candidate]
     return h, added
 

@@ -3,7 +3,7 @@
     for every strike s:  evidence − s − some lines -> propose -> refit α, β, σ -> D(s)    against the same without the effect
     null: as many numbers, spent on directions drawn at random in the modes' decays and levels, fitted to the same evidence
 
-an effect earns its keep where its mean drop is over LEAST_DB (FAINT_DB where that is MOST of the gap) and LEAST_SHARE of the gap, SURE standard errors above zero and above the null effect's by as much
+an effect earns its keep where its mean drop is over LEAST_DB (FAINT_DB where nothing is found yet and that is MOST of the gap) and LEAST_SHARE of the gap, SURE standard errors above zero and above the null effect's by as much
 
 Leaving out lines matters: decays and shapes belong to the body, so every strike shows them, and a pattern fitted to them by chance would pass.
 """
@@ -59,16 +59,19 @@ class Candidate:
         return float(self.drop_db.std(ddof=1) / np.sqrt(len(self.drop_db))) if len(self.drop_db) > 1 else float("inf")
 
 
-def needed(gap_db: float) -> float:
-    """Of a drop, in dB: LEAST_DB; less where that is most of what is open, more where much is."""
-    return max(min(LEAST_DB, max(FAINT_DB, MOST * gap_db)), LEAST_SHARE * gap_db)
+def needed(gap_db: float, *, first: bool) -> float:
+    """Of a drop, in dB: LEAST_DB; less where that is most of what has ever been open (first: nothing is found yet), more where much is.
+
+    What little a name leaves of a wide gap may be its own fit's.
+    """
+    return max(min(LEAST_DB, max(FAINT_DB, MOST * gap_db)) if first else LEAST_DB, LEAST_SHARE * gap_db)
 
 
-def earns(c: Candidate, gap_db: float) -> bool:
-    """Whether a suspect explains enough, surely enough, and more than chance."""
+def earns(c: Candidate, gap_db: float, *, first: bool) -> bool:
+    """Whether a suspect explains enough, surely enough, and more than chance. first: see needed."""
     if len(c.drop_db) == 0:
         return False
-    need = needed(gap_db)
+    need = needed(gap_db, first=first)
     if not (c.mean_db > need and np.isfinite(c.sd_db)):
         return False
     if len(c.drop_db) >= MANY and c.drop_db.min() > -0.1 * c.mean_db and np.sort(c.drop_db)[-2] > need:
@@ -150,7 +153,7 @@ def trials(
     fair = False
     gap = float(np.mean([f.before for f in folds]) - np.mean([f.take.least(f.base) for f in folds])) if folds else 0.0
     for group in _groups([kind for kind in effects if kind.id not in evidence.found]):
-        if any(hasattr(c.effect, "dried") and earns(c, gap) for c in found):
+        if any(hasattr(c.effect, "dried") and earns(c, gap, first=not evidence.found) for c in found):
             break  # what others say of lines that a room has made is hearsay: in the next round they are told dry
         if getattr(group[0], "costly", False) and (not costly or any(c.mean_db > PLAIN * gap for c in found)):
             continue  # something cheap says most of it: what is left may ask for more in the next round
