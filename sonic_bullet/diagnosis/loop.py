@@ -75,8 +75,8 @@ def closed(
         for candidate in found:
             last.setdefault(candidate.id, candidate)
         gap = max(now - floor, 0.0)
-        need = HELPS * needed(gap, first=not added)
-        able = [c for c in found if earns(c, gap, first=not added) and now - (mean_db(takes, retold(c.hypothesis, bodies)) or now) > need]
+        need = HELPS * needed(max(told - floor, 0.0), first=not added)
+        able = [c for c in found if earns(c, gap, first=not added) and told - (mean_db(takes, retold(c.hypothesis, bodies)) or told) > need]
         if not able:
             break
         best = simplest(able, bodies)

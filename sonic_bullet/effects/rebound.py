@@ -132,11 +132,15 @@ def _refined(start: Rebound, h: Heard) -> tuple[float, dict[str, Any]]:
 
     def left(x: Array) -> float:
         trial, gone = replace(start, **of(x)), 0.0
+        turns: dict[bytes, Array] = {}  # where gaps do not go with strength, all strikes have one
         for s, j in enumerate(level):
             blow = trial.apply(Blow(float(j), np.zeros(1), np.ones(1)))
-            turn = np.zeros(len(omega), complex)
-            for share, delay in zip(blow.share, blow.delay_s, strict=True):
-                turn += share * np.exp(-(fade + 1j * omega) * delay)
+            turn = turns.get(blow.delay_s.tobytes())
+            if turn is None:
+                turn = np.zeros(len(omega), complex)
+                for share, delay in zip(blow.share, blow.delay_s, strict=True):
+                    turn += share * np.exp(-(fade + 1j * omega) * delay)
+                turns[blow.delay_s.tobytes()] = turn
             gone += (
                 max(float((np.conj(turn) * both[s]).real.sum()), 0.0) ** 2
                 / max(float((np.abs(turn) ** 2 * own[s]).sum()), 1e-300)

@@ -51,7 +51,7 @@ def sought(t: Trial) -> Dashpots:
         chosen = tuned(t, min(more, refined(t, more, NEARER[-1:], whole=True)[1], key=t.left))
         tried.append((price(chosen), chosen))
         enough = min(range(len(tried)), key=lambda i: tried[i][0])
-        if enough < len(chosen) and (enough > 0 or len(chosen) > 1):  # two may show where neither does alone
+        if enough < len(chosen):  # weak ones that show together alone have been looked for
             break
     return min([*tried, (price(best), best)], key=lambda pair: pair[0])[1]
 
