@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Self
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from sonic_bullet.effects.points import solved
 from sonic_bullet.effects.values import Evidence, Heard, Owner, Stage, ascending
@@ -100,8 +101,11 @@ def areas(x: ModalModel) -> Array:
     corner = x.vertex_m[x.face]
     normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]) / 2
     size = np.linalg.norm(normal, axis=1)
-    mean = x.shape[x.face].astype(float).mean(axis=1)
-    along = np.einsum("fxm,fx->fm", mean, normal / np.maximum(size, 1e-300)[:, None])
+    way = np.broadcast_to((normal / np.maximum(3 * size, 1e-300)[:, None])[:, None], corner.shape)  # of a triangle's middle: a third of each corner's motion
+    place = 3 * x.face[:, :, None] + np.arange(3)
+    along = csr_array((way.ravel(), place.ravel(), np.arange(0, 9 * len(x.face) + 1, 9)), shape=(len(x.face), 3 * len(x.shape))) @ x.shape.reshape(
+        -1, x.mode_count
+    )
     return np.asarray((along**2 * size[:, None]).sum(axis=0))
 
 
