@@ -75,8 +75,7 @@ def closed(
         for candidate in found:
             last.setdefault(candidate.id, candidate)
         gap = max(now - floor, 0.0)
-        need = HELPS * needed(max(told - floor, 0.0), first=not added)
-        able = [c for c in found if earns(c, gap, first=not added) and told - (mean_db(takes, retold(c.hypothesis, bodies)) or told) > need]
+        able = [c for c in found if earns(c, gap, first=not added) and _helps(c, bodies, takes, now, told, floor, first=not added)]
         if not able:
             break
         best = simplest(able, bodies)
@@ -97,6 +96,12 @@ def closed(
     ):  # a name for less of what is seen would be a guess
         verdict, h, now, added = "unexplained", start, before, []
     return Closed(start, h, tuple(added), tuple(last.values()), verdict, before, now, floor)
+
+
+def _helps(c: Candidate, bodies: tuple[Struck, ...], takes: Sequence[Judged], now: float, told: float, floor: float, *, first: bool) -> bool:
+    """Whether all strikes together gain. What moves modes must do so on what a room's response, told again, leaves (told): that takes up what stray modes leave."""
+    before = told if moves(c.hypothesis) else now
+    return before - (mean_db(takes, retold(c.hypothesis, bodies)) or before) > HELPS * needed(max(before - floor, 0.0), first=first)
 
 
 def of_the_mesh(h: Hypothesis, bodies: tuple[Struck, ...], takes: Sequence[Judged], seed: int) -> float:

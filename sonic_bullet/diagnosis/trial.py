@@ -37,7 +37,7 @@ PLAIN = 0.6  # of the gap: where a cheap suspect says as much, costly ones wait
 @dataclass(frozen=True, slots=True, eq=False)
 class Candidate:
     """A suspect after its trial. effect: fitted to all evidence. drop_db (s,): of each left-out strike's distance, less what corrections learnt again would gain
-    alone where the suspect moves modes; null_db: mean over strikes and draws.
+    alone where the suspect moves modes; whole_db: its mean with that in it; null_db: mean over strikes and draws.
 
     spread: of each number in its parameters over the folds (jackknife).
     """
@@ -48,6 +48,7 @@ class Candidate:
     drop_db: np.ndarray[Any, Any]
     null_db: float
     spread: dict[str, Any]
+    whole_db: float = float("-inf")
 
     @property
     def mean_db(self) -> float:
@@ -164,7 +165,7 @@ def trials(
             if not fair and moves(replace(h, effects=(whole,))) and not moves(h):
                 folds, fair = _learnt_anew(h, bodies, folds), True
             found.append(_tried(kind, whole, h, bodies, evidence, folds))
-    return sorted(found, key=lambda c: -c.mean_db)
+    return sorted(found, key=lambda c: -max(c.mean_db, c.whole_db))  # corrections that go with an effect speak for its turn, not for its name
 
 
 def _groups(kinds: list[type[Effect]]) -> list[list[type[Effect]]]:
@@ -216,23 +217,23 @@ def _learnt_anew(h: Hypothesis, bodies: tuple[Struck, ...], folds: list[Fold]) -
 def _tried(kind: type[Effect], whole: Effect, h: Hypothesis, bodies: tuple[Struck, ...], evidence: Evidence, folds: list[Fold]) -> Candidate:
     moving = moves(replace(h, effects=(whole,)))
 
-    def judged(i: int) -> tuple[Effect | None, float, list[float]]:
+    def judged(i: int) -> tuple[Effect | None, float, float, list[float]]:
         fold = folds[i]
         less = fold.evidence
         if getattr(kind, "by_line", False) and isinstance(fold.take, Take):
             less = thinned(evidence, fold.take.place, 1.0, np.random.default_rng(0))  # a line's own numbers are told by no other line, but by the other strikes
         effect = kind.propose(replace(less, known=whole))
         if effect is None:
-            return None, 0.0, []
+            return None, 0.0, 0.0, []
         random = [Null.fitted(less, min(effect.freedom(), 8), 10 * i + draw) for draw in range(DRAWS)]
-        before = min(fold.before, fold.anew) if moving else fold.before
-        return effect, before - _after(fold, effect), [fold.before - _after(fold, none) for none in random if none is not None]
+        before, after = min(fold.before, fold.anew) if moving else fold.before, _after(fold, effect)
+        return effect, before - after, fold.before - after, [fold.before - _after(fold, none) for none in random if none is not None]
 
     found = side_by_side(judged, range(len(folds)))
-    seen = [effect for effect, _, _ in found if effect is not None]
-    drops, nulls = [drop for _, drop, _ in found], [drop for _, _, some in found for drop in some]
+    seen = [effect for effect, *_ in found if effect is not None]
+    drops, nulls, whole_db = [one[1] for one in found], [drop for one in found for drop in one[3]], float(np.mean([one[2] for one in found] or [0.0]))
     added = refitted(replace(h, effects=(*h.effects, whole)), bodies, evidence.heard)
-    return Candidate(kind.id, whole, added, np.array(drops), float(np.mean(nulls)) if nulls else 0.0, jackknife([e.parameters() for e in seen]))
+    return Candidate(kind.id, whole, added, np.array(drops), float(np.mean(nulls)) if nulls else 0.0, jackknife([e.parameters() for e in seen]), whole_db)
 
 
 def _after(fold: Fold, effect: Effect) -> float:
