@@ -75,9 +75,10 @@ def earns(c: Candidate, gap_db: float, *, first: bool) -> bool:
     need = needed(gap_db, first=first)
     if not (c.mean_db > need and np.isfinite(c.sd_db)):
         return False
+    more = max(c.mean_db, c.whole_db) - max(c.null_db, 0.0)  # a null effect is not held against corrections either
     if len(c.drop_db) >= MANY and c.drop_db.min() > -0.1 * c.mean_db and np.sort(c.drop_db)[-2] > need:
-        return c.mean_db - max(c.null_db, 0.0) > 0.5 * need  # no strike speaks against it, though loud ones may gain far more than soft ones
-    return c.mean_db > SURE * c.sd_db and c.mean_db - max(c.null_db, 0.0) > max(SURE * c.sd_db, 0.5 * need)
+        return more > 0.5 * need  # no strike speaks against it, though loud ones may gain far more than soft ones
+    return c.mean_db > SURE * c.sd_db and more > max(SURE * c.sd_db, 0.5 * need)
 
 
 @dataclass(frozen=True)
