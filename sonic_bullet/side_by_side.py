@@ -3,7 +3,8 @@
     items -> [do(item), …] in their order, whoever did them
 
 A fork, so that nothing has to be handed over but results; what the other process could not do or send is done here, and raises here. Where processes do not
-fork (Windows; macOS, whose libraries forbid it) or there is one core, all is done here. Work inside work stays where it is.
+fork (Windows; macOS, whose libraries forbid it) or there is one core, all is done here. Work inside work stays where it is: here by _INSIDE, there because the
+helper is a daemon, which may have no children.
 """
 
 from __future__ import annotations
@@ -69,7 +70,7 @@ def _started(do: Callable[[Any], Any], items: list[Any]) -> tuple[Any, Connectio
 
 
 def _can_fork() -> bool:
-    return sys.platform == "linux" and len(os.sched_getaffinity(0)) > 1 and not current_process().daemon  # a pool's worker may have no children
+    return sys.platform == "linux" and len(os.sched_getaffinity(0)) > 1 and not current_process().daemon  # nor may a pool's worker have children
 
 
 def _next(taken: Any) -> int:

@@ -67,7 +67,7 @@ def closed(
     for turn in range(ROUNDS):
         say(f"round {turn + 1}: {now:.2f} dB from the recordings, noise alone {floor:.2f} dB")
         if now - floor < LEAST_DB:
-            break  # as near as two takes of one strike, but for what a mesh gets wrong
+            break  # too little is open for any name: two takes of one strike, and what a mesh gets wrong
         evidence = evidence_of(h, bodies, band_hz, seed=seed)
         full = retold(h, bodies)  # a room's response is the lines' so far, which leaves open more than there is
         told = now if full is h else mean_db(takes, full) or 0.0

@@ -3,7 +3,8 @@
     for every strike s:  evidence − s − some lines -> propose -> refit α, β, σ -> D(s)    against the same without the effect
     null: as many numbers, spent on directions drawn at random in the modes' decays and levels, fitted to the same evidence
 
-an effect earns its keep where its mean drop is over LEAST_DB (FAINT_DB where nothing is found yet and that is MOST of the gap) and LEAST_SHARE of the gap, SURE standard errors above zero and above the null effect's by as much
+an effect earns its keep where its mean drop is over LEAST_DB (FAINT_DB where nothing is found yet and that is MOST of the gap) and LEAST_SHARE of the gap,
+    SURE standard errors above zero and above the null effect's by as much
 
 Leaving out lines matters: decays and shapes belong to the body, so every strike shows them, and a pattern fitted to them by chance would pass.
 """
@@ -12,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -37,7 +39,7 @@ PLAIN = 0.6  # of the gap: where a cheap suspect says as much, costly ones wait
 @dataclass(frozen=True, slots=True, eq=False)
 class Candidate:
     """A suspect after its trial. effect: fitted to all evidence. drop_db (s,): of each left-out strike's distance, less what corrections learnt again would gain
-    alone where the suspect moves modes; whole_db: its mean with that in it; null_db: mean over strikes and draws.
+    alone where the suspect moves modes. whole_db: mean with that in it, which speaks for a name's turn. null_db: mean over strikes and draws.
 
     spread: of each number in its parameters over the folds (jackknife).
     """
@@ -46,18 +48,22 @@ class Candidate:
     effect: Effect
     hypothesis: Hypothesis
     drop_db: np.ndarray[Any, Any]
+    whole_db: float
     null_db: float
     spread: dict[str, Any]
-    whole_db: float = float("-inf")
 
     @property
     def mean_db(self) -> float:
-        return float(self.drop_db.mean()) if len(self.drop_db) else 0.0
+        return _mean(self.drop_db)
 
     @property
     def sd_db(self) -> float:
         """Standard error of the mean."""
         return float(self.drop_db.std(ddof=1) / np.sqrt(len(self.drop_db))) if len(self.drop_db) > 1 else float("inf")
+
+
+def _mean(x: Sequence[float] | np.ndarray[Any, Any]) -> float:
+    return float(np.mean(x)) if len(x) else 0.0
 
 
 def needed(gap_db: float, *, first: bool) -> float:
@@ -75,7 +81,7 @@ def earns(c: Candidate, gap_db: float, *, first: bool) -> bool:
     need = needed(gap_db, first=first)
     if not (c.mean_db > need and np.isfinite(c.sd_db)):
         return False
-    more = max(c.mean_db, c.whole_db) - max(c.null_db, 0.0)  # a null effect is not held against corrections either
+    more = c.whole_db - max(c.null_db, 0.0)  # a null effect is not held against corrections either
     if len(c.drop_db) >= MANY and c.drop_db.min() > -0.1 * c.mean_db and np.sort(c.drop_db)[-2] > need:
         return more > 0.5 * need  # no strike speaks against it, though loud ones may gain far more than soft ones
     return c.mean_db > SURE * c.sd_db and more > max(SURE * c.sd_db, 0.5 * need)
@@ -152,7 +158,7 @@ def trials(
     if len(takes) < 2:
         return found  # nothing can be left out
     folds = _folds(h, bodies, takes, evidence, seed)
-    fair = False
+    fair = cache(lambda: _learnt_anew(h, bodies, folds))
     gap = float(np.mean([f.before for f in folds]) - np.mean([f.take.least(f.base) for f in folds])) if folds else 0.0
     for group in _groups([kind for kind in effects if kind.id not in evidence.found]):
         if any(hasattr(c.effect, "dried") and earns(c, gap, first=not evidence.found) for c in found):
@@ -163,10 +169,9 @@ def trials(
             if whole is None:
                 continue
             say(f"trying {kind.id}")
-            if not fair and moves(replace(h, effects=(whole,))) and not moves(h):
-                folds, fair = _learnt_anew(h, bodies, folds), True
-            found.append(_tried(kind, whole, h, bodies, evidence, folds))
-    return sorted(found, key=lambda c: -max(c.mean_db, c.whole_db))  # corrections that go with an effect speak for its turn, not for its name
+            first_mover = moves(replace(h, effects=(whole,))) and not moves(h)
+            found.append(_tried(kind, whole, h, bodies, evidence, fair() if first_mover else folds))
+    return sorted(found, key=lambda c: -c.whole_db)
 
 
 def _groups(kinds: list[type[Effect]]) -> list[list[type[Effect]]]:
@@ -181,7 +186,7 @@ def _groups(kinds: list[type[Effect]]) -> list[list[type[Effect]]]:
 class Fold:
     """What is left to learn from once ``take`` is left out: bodies, evidence, the hypothesis refitted to it, and its distance to the take.
 
-    anew: the distance with corrections learnt again, where that has been asked.
+    least: the same distance, or a lesser one that corrections alone come to where they are learnt again.
     """
 
     take: Judged
@@ -189,7 +194,7 @@ class Fold:
     evidence: Evidence
     base: Hypothesis
     before: float
-    anew: float = float("inf")
+    least: float
 
 
 def _folds(h: Hypothesis, bodies: tuple[Struck, ...], takes: Sequence[Judged], evidence: Evidence, seed: int) -> list[Fold]:
@@ -205,36 +210,48 @@ def _folds(h: Hypothesis, bodies: tuple[Struck, ...], takes: Sequence[Judged], e
             base = refitted(h, bodies, less.heard)
         before = take.distance(base)
         if np.isfinite(before):
-            made.append(Fold(take, mine, less, base, before))
+            made.append(Fold(take, mine, less, base, before, before))
     return made
 
 
 def _learnt_anew(h: Hypothesis, bodies: tuple[Struck, ...], folds: list[Fold]) -> list[Fold]:
-    """With what corrections alone would leave if they were learnt again, as they are beside whatever moves modes: they are no effect's gain."""
-    again = refitted(h, bodies, anew=True)
-    return [replace(f, anew=f.take.distance(refitted(f.base, f.bodies, anew=True) if isinstance(f.take, Listed) else again)) for f in folds]
+    """Folds that know what is gained by corrections alone, learnt again as they are beside whatever moves modes: that is no effect's gain."""
+    every = refitted(h, bodies, anew=True) if any(isinstance(f.take, Take) for f in folds) else h
+
+    def least(f: Fold) -> float:
+        again = refitted(f.base, f.bodies, anew=True) if isinstance(f.take, Listed) else every
+        return min(f.before, f.take.distance(again))
+
+    return [replace(f, least=least(f)) for f in folds]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Gain:
+    """On one left-out strike, of an effect fitted without it, if any came of that: as Candidate has them; null_db (n,): of every draw."""
+
+    effect: Effect | None = None
+    drop_db: float = 0.0
+    whole_db: float = 0.0
+    null_db: tuple[float, ...] = ()
 
 
 def _tried(kind: type[Effect], whole: Effect, h: Hypothesis, bodies: tuple[Struck, ...], evidence: Evidence, folds: list[Fold]) -> Candidate:
-    moving = moves(replace(h, effects=(whole,)))
-
-    def judged(i: int) -> tuple[Effect | None, float, float, list[float]]:
+    def judged(i: int) -> Gain:
         fold = folds[i]
         less = fold.evidence
         if getattr(kind, "by_line", False) and isinstance(fold.take, Take):
             less = thinned(evidence, fold.take.place, 1.0, np.random.default_rng(0))  # a line's own numbers are told by no other line, but by the other strikes
         effect = kind.propose(replace(less, known=whole))
         if effect is None:
-            return None, 0.0, 0.0, []
+            return Gain()
         random = [Null.fitted(less, min(effect.freedom(), 8), 10 * i + draw) for draw in range(DRAWS)]
-        before, after = min(fold.before, fold.anew) if moving else fold.before, _after(fold, effect)
-        return effect, before - after, fold.before - after, [fold.before - _after(fold, none) for none in random if none is not None]
+        after = _after(fold, effect)
+        return Gain(effect, fold.least - after, fold.before - after, tuple(fold.before - _after(fold, none) for none in random if none is not None))
 
     found = side_by_side(judged, range(len(folds)))
-    seen = [effect for effect, *_ in found if effect is not None]
-    drops, nulls, whole_db = [one[1] for one in found], [drop for one in found for drop in one[3]], float(np.mean([one[2] for one in found] or [0.0]))
     added = refitted(replace(h, effects=(*h.effects, whole)), bodies, evidence.heard)
-    return Candidate(kind.id, whole, added, np.array(drops), float(np.mean(nulls)) if nulls else 0.0, jackknife([e.parameters() for e in seen]), whole_db)
+    drop, whole_db, null_db = np.array([g.drop_db for g in found]), _mean([g.whole_db for g in found]), _mean([x for g in found for x in g.null_db])
+    return Candidate(kind.id, whole, added, drop, whole_db, null_db, jackknife([g.effect.parameters() for g in found if g.effect is not None]))
 
 
 def _after(fold: Fold, effect: Effect) -> float:

@@ -103,9 +103,8 @@ def areas(x: ModalModel) -> Array:
     size = np.linalg.norm(normal, axis=1)
     way = np.broadcast_to((normal / np.maximum(3 * size, 1e-300)[:, None])[:, None], corner.shape)  # of a triangle's middle: a third of each corner's motion
     place = 3 * x.face[:, :, None] + np.arange(3)
-    along = csr_array((way.ravel(), place.ravel(), np.arange(0, 9 * len(x.face) + 1, 9)), shape=(len(x.face), 3 * len(x.shape))) @ x.shape.reshape(
-        -1, x.mode_count
-    )
+    normal_part = csr_array((way.ravel(), place.ravel(), np.arange(0, 9 * len(x.face) + 1, 9)), shape=(len(x.face), 3 * len(x.shape)))
+    along = normal_part @ x.shape.reshape(-1, x.mode_count)
     return np.asarray((along**2 * size[:, None]).sum(axis=0))
 
 

@@ -13,47 +13,64 @@ from sonic_bullet.effects.support_subsets import subsets
 from sonic_bullet.effects.support_trial import Dashpot, Dashpots, Trial
 from sonic_bullet.records import Array
 
-POINTS = 90  # vertices of a first look
+POINTS, SPOTS = 90, 500  # vertices of a first look, and of those about a point that has been found
 STEPS = (0.06, 0.25, 1.0, 4.0, 16.0)  # of the strength that doubles the typical decay
 FINER, COARSER = (0.6, 0.8, 0.92, 1.08, 1.25, 1.6), (0.1, 0.3, 3.0, 10.0)  # times stronger, in turns
-LOOKED, STARTS, NEAR = 40, 4, 14  # of the grid, looked at closer; refined; vertices of a turn about one
+LOOKED, STARTS, NEAR, FEW = 40, 4, 28, 10  # of the grid, looked at closer; refined; vertices of a turn about one; spots enough to stand for all there
 NEARER = (0.12, 0.07, 0.04, 0.02)  # turns, in sizes of the body
 TUNED = 0.15  # of ln c
 MOST = 4
 WEAK, ENOUGH = 2, 2.0  # of each number of dashpots to first order; of the spreads' own: no more is asked
-BETTER = 6.0  # in BIC, for another dashpot
+BETTER, HALF = 6.0, 0.5  # in BIC, for another dashpot; of what one costs: a first one that explains less has no second
 
 
 def sought(t: Trial) -> Dashpots:
     """The dashpots that earn their place, one after another; the least Bayes information criterion says how many, with BETTER for each on top."""
     data = 2 * len(t.freq_hz)  # a decay and a pattern each
+    apiece = 3 * np.log(data) + BETTER
+    least = float(t.worth.sum())  # what is left within the spreads asks for nothing
+
+    def priced(d: Dashpots, left: float) -> tuple[float, Dashpots]:
+        return float(data * np.log(max(left, least)) + len(d) * apiece), d
+
     chosen: Dashpots = ()
-    left, least = t.left(chosen), float(t.worth.sum())  # what is left within the spreads asks for nothing
-    if left < least:
+    bare = t.left(chosen)
+    if bare < least:
         return chosen
-
-    def price(d: Dashpots) -> float:
-        return float(data * np.log(max(t.left(d), least)) + len(d) * (3 * np.log(data) + BETTER))
-
-    weak = [tuned(t, refined(t, d, NEARER[-2:])[1]) for d in subsets(t, _spread(t, POINTS), WEAK)]
-    tried = [(price(d), d) for d in ((), *weak)]
-    best = min(tried, key=lambda pair: pair[0])[1]
-    if best and t.left(best) < ENOUGH * least:
-        return best
-    tried = [tried[0]]
-    grid = [Dashpot(int(v), c, way) for v in _spread(t, POINTS) for c in _strengths(t).tolist() for way in ("normal", "every")]
+    spots = _spread(t, SPOTS)
+    weak = [tuned(t, refined(t, d, NEARER[-2:])[1]) for d in subsets(t, spots[:POINTS], WEAK)]
+    none = priced((), bare)
+    some = min([none, *(priced(d, t.left(d)) for d in weak)], key=_cost)
+    if some[1] and t.left(some[1]) < ENOUGH * least:
+        return some[1]
+    tried = [none]
+    grid = [Dashpot(int(v), c, way) for v in spots[:POINTS] for c in _strengths(t).tolist() for way in ("normal", "every")]
     while len(chosen) < MOST:
-        trials = [(*chosen, d) for d in grid]
-        few = _best([t.price(*modes) for modes in t.roughly(trials)], trials, LOOKED)
-        few = _best([t.beside(*modes, 1) for modes in t.roughly(few)], few, STARTS)
-        starts = [refined(t, one, NEARER[:2]) for one in few]
-        more = refined(t, min(starts, key=lambda pair: pair[0])[1], (np.inf, *NEARER))[1]
-        chosen = tuned(t, min(more, refined(t, more, NEARER[-1:], whole=True)[1], key=t.left))
-        tried.append((price(chosen), chosen))
-        enough = min(range(len(tried)), key=lambda i: tried[i][0])
-        if enough < len(chosen):  # weak ones that show together alone have been looked for
-            break
-    return min([*tried, (price(best), best)], key=lambda pair: pair[0])[1]
+        chosen = _with_one_more(t, chosen, grid, spots)
+        tried.append(priced(chosen, t.left(chosen)))
+        best = min(tried, key=_cost)
+        if best is not tried[-1] and (len(chosen) > 1 or tried[-1][0] > best[0] + HALF * apiece):
+            break  # weak ones have been looked for; of two as strong as each other, one alone may not pay
+    best = min([*tried, some], key=_cost)
+    for _ in best[1]:  # one that has helped the others to their places may say nothing there any more
+        less = [best[1][:i] + best[1][i + 1 :] for i in range(len(best[1]))]
+        best = min([best, *(priced(d, t.left(d)) for d in less)], key=_cost)
+    return best[1]
+
+
+def _cost(pair: tuple[float, Dashpots]) -> float:
+    return pair[0]
+
+
+def _with_one_more(t: Trial, chosen: Dashpots, grid: list[Dashpot], spots: Array) -> Dashpots:
+    """The best set that a search finds from these and one of the grid."""
+    trials = [(*chosen, d) for d in grid]
+    few = _best([t.price(*modes) for modes in t.coupled(trials, t.runs)], trials, LOOKED)
+    few = _best([t.beside(*modes, 1) for modes in t.coupled(few, t.runs)], few, STARTS)
+    found = min((refined(t, one, NEARER[:2], spots) for one in few), key=lambda pair: pair[0])[1]
+    for _ in range(min(len(found), 2)):  # once all are where they should be, one may be seen to stand at a mirror image
+        found = refined(t, found, (np.inf, *NEARER), spots)[1]
+    return tuned(t, min(found, refined(t, found, NEARER[-1:], whole=True)[1], key=t.left))
 
 
 def _best(price: list[float], trials: list[Dashpots], count: int) -> list[Dashpots]:
@@ -85,29 +102,38 @@ def _strengths(t: Trial) -> Array:
     return np.array(STEPS) * 2 * float(np.median(t.decay_per_s)) / max(square, 1e-300)
 
 
-def refined(t: Trial, start: Dashpots, reaches: tuple[float, ...], *, whole: bool = False) -> tuple[float, Dashpots]:
-    """What is left, and the best of strengths, directions and places, one dashpot after another, in turns that reach so far, in sizes of the body."""
+def refined(t: Trial, start: Dashpots, reaches: tuple[float, ...], spots: Array | None = None, *, whole: bool = False) -> tuple[float, Dashpots]:
+    """What is left, and the best of strengths, directions and places, one dashpot after another, in turns that reach so far, in sizes of the body.
+
+    spots (p,): vertices spread over the surface, for turns that reach far.
+    """
+    spots = t.body[:0] if spots is None else spots
     size = float(np.linalg.norm(np.ptp(t.model.vertex_m[t.body], axis=0)))
     best, least = start, np.inf
     for reach in reaches:
         for i in range(len(best)):
-            trials = [(*best[:i], d, *best[i + 1 :]) for d in (best[i], *_around(t, best[i], reach * size))]
-            left = [t.left(one) for one in trials] if whole else [t.beside(*modes, 1) for modes in t.roughly(trials)]
+            trials = [(*best[:i], d, *best[i + 1 :]) for d in (best[i], *_around(t, best[i], reach * size, spots))]
+            left = [t.left(one, t.wide) for one in trials] if whole else [t.beside(*modes, 1) for modes in t.coupled(trials, t.runs)]
             least, best = min(zip(left, trials, strict=True), key=lambda pair: pair[0])
     return least, best
 
 
-def _around(t: Trial, d: Dashpot, reach_m: float) -> list[Dashpot]:
+def _around(t: Trial, d: Dashpot, reach_m: float, spots: Array) -> list[Dashpot]:
     """Others instead of one: elsewhere, as strong or taking as much, or near it, and stronger, weaker or along the other direction."""
     if not np.isfinite(reach_m):
-        some = _spread(t, 2 * POINTS).tolist()
+        some = spots[: 2 * POINTS].tolist()
         return [_moved(t, d, v) for v in some] + [replace(d, vertex=v) for v in some] + [replace(d, c=d.c * f) for f in COARSER]
-    at = t.model.vertex_m[t.body]
-    near = t.body[((at - t.model.vertex_m[d.vertex]) ** 2).sum(axis=1) < reach_m**2]
+    near = _within(t, d, reach_m, spots)
+    near = near[:NEAR] if len(near) >= FEW else _within(t, d, reach_m, t.body)
     found = [replace(d, c=d.c * f) for f in FINER]
     found.append(replace(d, along="every" if d.along == "normal" else "normal"))
     some = near[:: max(1, len(near) // NEAR)].tolist()
     return found + [_moved(t, d, v) for v in some] + [replace(d, vertex=v) for v in some]
+
+
+def _within(t: Trial, d: Dashpot, reach_m: float, some: Array) -> Array:
+    """Of some vertices those within reach of a dashpot."""
+    return np.asarray(some[((t.model.vertex_m[some] - t.model.vertex_m[d.vertex]) ** 2).sum(axis=1) < reach_m**2])
 
 
 def _moved(t: Trial, d: Dashpot, vertex: int) -> Dashpot:
@@ -125,6 +151,6 @@ def tuned(t: Trial, found: Dashpots) -> Dashpots:
         def with_one(x: float, i: int = i, found: Dashpots = found) -> Dashpots:
             return (*found[:i], replace(found[i], c=float(found[i].c * np.exp(x))), *found[i + 1 :])
 
-        best = minimize_scalar(lambda x, of=with_one: t.left(of(x)), bounds=(-TUNED, TUNED), method="bounded", options={"maxiter": 10, "xatol": 2e-3})
+        best = minimize_scalar(lambda x, of=with_one: t.left(of(x), t.wide), bounds=(-TUNED, TUNED), method="bounded", options={"maxiter": 10, "xatol": 2e-3})
         found = min(found, with_one(float(best.x)), key=t.left)
     return found

@@ -26,7 +26,7 @@ WIDTH, DECADE = 0.004, 0.4  # of ln f and ln d, of a pair
 MISSED = 9.0  # what a line costs that nothing explains: three spreads, as Huber's loss has its bend there
 WEAK, HALF = 0.05, 0.5  # of the worth of a line that the model does not expect: it may be a click or another body's; near a mode, its twin
 LOW = 0.3  # of a line's spread where it lies under the least law
-RUN = 10  # modes whose coupling is reckoned with in a first look
+RUN, WIDE = 10, 20  # modes whose coupling is reckoned with in a first look, and in a closer one: what eigenvalues cost goes with the cube
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +45,7 @@ Dashpots = tuple[Dashpot, ...]
 class Trial:
     """An object's lines (k,) and modes (m,). size (s, k) complex, worth (k,); into (s, m): J φ(p)·e of the strikes; out (m,): φ(q)·n of the sensor.
 
-    normal (v, 3) of all vertices, body: those of the surface. runs: neighbours that may couple; least (3,): the law that most lines lie above.
+    normal (v, 3) of all vertices, body: those of the surface. runs, wide: neighbours that may couple, RUN and WIDE; least (3,): the law that most lines lie above.
     """
 
     freq_hz: Array
@@ -60,6 +60,7 @@ class Trial:
     into: Array
     out: Array
     runs: tuple[Array, ...]
+    wide: tuple[Array, ...]
     least: Array
 
     @classmethod
@@ -96,28 +97,28 @@ class Trial:
             into,
             out,
             tuple(apart(x.freq_hz, RUN)),
+            tuple(apart(x.freq_hz, WIDE)),
             _least_law(h.omega, h.decay_per_s),
         )
 
-    def left(self, dashpots: Dashpots) -> float:
-        """Of the lines' decays and patterns, in squared spreads, beside the law that suits them best."""
+    def left(self, dashpots: Dashpots, runs: tuple[Array, ...] | None = None) -> float:
+        """Of the lines' decays and patterns, in squared spreads, beside the law that suits them best. runs: modes that couple; every one with every other where None."""
         x = self.model
         if not dashpots:
             return self.beside(-x.decay_per_s + 2j * np.pi * x.freq_hz, np.eye(x.mode_count, dtype=complex), 2)
-        found = coupled(x.omega0_squared_per_s2, x.decay_per_s, self._rows([dashpots])[0])
-        return self.beside(found.pole, found.turn, 2)
+        return self.beside(*self.coupled([dashpots], runs or (np.arange(x.mode_count),))[0], 2)
 
     def plain(self) -> tuple[Array, Array]:
         """Lines (p,) and the modes (p,) they stand for without any dashpot."""
         x, omega = self.model, 2 * np.pi * self.model.freq_hz
         return self._pairs(omega, x.decay_per_s, self._alike(omega, x.decay_per_s, self.into * self.out))[:2]
 
-    def roughly(self, trials: list[Dashpots]) -> list[tuple[Array, Array]]:
-        """Poles (m,) and turns (m, m) of many, modes coupling with their neighbours only."""
+    def coupled(self, trials: list[Dashpots], runs: tuple[Array, ...]) -> list[tuple[Array, Array]]:
+        """Poles (m,) and turns (m, m) of many, modes coupling within runs only."""
         phi, m = self._rows(trials), self.model.mode_count
         lam, own = self.model.omega0_squared_per_s2, self.model.decay_per_s
         pole, turn = np.empty((len(trials), m), complex), np.zeros((len(trials), m, m), complex)
-        for run in self.runs:
+        for run in runs:
             part = coupled(lam[run], own[run], phi[:, :, run])
             pole[:, run], turn[:, run[:, None], run] = part.pole, part.turn
         return list(zip(pole, turn, strict=True))

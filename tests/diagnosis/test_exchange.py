@@ -35,8 +35,8 @@ def test_a_filter_that_came_first_goes_for_the_pulse_that_a_tilt_of_level_had_hi
     assert low is not None and pulse is not None
     wrong = replace(plain, effects=(low, Radiation(0.05, 3.0, 0.0)))
     drop = np.full(len(takes), 2.0)
-    chosen, passed = (Candidate(e.id, e, plain, drop, 0.0, {}) for e in (low, pulse))
-    other = Candidate("radiation", wrong.effects[1], plain, drop, 0.0, {})
+    chosen, passed = (Candidate(e.id, e, plain, drop, float(drop.mean()), 0.0, {}) for e in (low, pulse))
+    other = Candidate("radiation", wrong.effects[1], plain, drop, float(drop.mean()), 0.0, {})
     h, added = exchanged(wrong, [chosen, other], [(passed,), ()], (body,), takes, BAND, lambda _: None)
     assert [c.id for c in added] == ["contact-time", "radiation"]
     found = {e.id: e for e in h.effects}

@@ -31,7 +31,7 @@ def told_by(effect: Effect) -> list[Candidate]:
     for kind, other in ((ContactTime, PULSE), (MeasurementChain, LOW)):
         found = kind.propose(evidence) or other
         h = refitted(replace(plain, effects=(found,)), (body,), evidence.heard)
-        made.append(Candidate(kind.id, found, h, np.array([2.0, 2.1, 1.9, 2.0, 2.05]), 0.0, {}))
+        made.append(Candidate(kind.id, found, h, np.array([2.0, 2.1, 1.9, 2.0, 2.05]), 2.01, 0.0, {}))
     return made
 
 

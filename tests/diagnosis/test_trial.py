@@ -31,7 +31,7 @@ WEAK = ((0.0477, 0.0371, 0.0), (0.0955, 0.0186, 0.0), (0.1432, 0.0464, 0.0))
 
 
 def candidate(*drop_db: float, null_db: float = 0.0) -> Candidate:
-    return Candidate("radiation", None, None, np.array(drop_db), null_db, {})  # type: ignore[arg-type]
+    return Candidate("radiation", None, None, np.array(drop_db), float(np.mean(drop_db)), null_db, {})  # type: ignore[arg-type]
 
 
 def test_less_will_do_where_it_is_most_of_what_is_open() -> None:
