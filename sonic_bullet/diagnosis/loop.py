@@ -33,7 +33,7 @@ OPEN = 0.3  # of the first gap: with less left, no costly suspect is asked
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Closed:
-    """How the loop ended. steps: the candidate added in each round, with the mean distance before it. tried: the last look at every suspect."""
+    """How the loop ended. added: the candidate of each round that is still there at the end. tried: the last look at every suspect, of what stands beside those."""
 
     before: Hypothesis
     after: Hypothesis
@@ -73,7 +73,7 @@ def closed(
         told = now if full is h else mean_db(takes, full) or 0.0
         found = trials(h, bodies, takes, evidence, effects, seed=seed + turn, say=say, costly=told - floor > OPEN * (before - floor))
         for candidate in found:
-            last.setdefault(candidate.id, candidate)
+            last[candidate.id] = candidate
         gap = max(now - floor, 0.0)
         able = [c for c in found if earns(c, gap, first=not added) and _helps(c, bodies, takes, now, told, floor, first=not added)]
         if not able:

@@ -14,13 +14,13 @@ import numpy as np
 
 from sonic_bullet.diagnosis.bodies import Struck
 from sonic_bullet.diagnosis.evidence import heard_of, outside, paired, path_response
-from sonic_bullet.diagnosis.play import Hypothesis, modes_of, moves, play, undamped
+from sonic_bullet.diagnosis.play import Hypothesis, modes_of, moves, pattern, play, undamped
 from sonic_bullet.diagnosis.unheard import CORRECTION, can_tell, sought
 from sonic_bullet.effects.values import Blow, Effect, Heard, Stage
 from sonic_bullet.estimator.lines import noise_rms
 from sonic_bullet.estimator.pairing import MESHED, TWINS
 from sonic_bullet.estimator.rayleigh import rayleigh
-from sonic_bullet.records import Array
+from sonic_bullet.records import Array, ModalModel
 
 ROUGH = 0.02
 NEAR, ALIKE = 5e-3, 1.6  # of ln f and ln d: lines of one mode
@@ -138,8 +138,7 @@ def _damped(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...])
         if moves(h):  # ``one`` is of h itself, and its lines are paired anew
             extra = np.maximum(one.expected_decay_per_s - (h.alpha_per_s + h.beta_s * one.omega**2) / 2, 0.0)
         elif h.at(Stage.MODES):
-            near = np.array([np.argmin(np.abs(model.freq_hz - one_f)) for one_f in one.freq_hz])
-            extra = np.array([model.decay_per_s[_members(model.freq_hz, i, len(who))].mean() for i, who in zip(near, one.mode, strict=True)])
+            extra = np.array([model.decay_per_s[who].mean() for who in _members(one, model)])
         lam.append(one.omega**2)
         left.append(np.maximum(one.decay_per_s - extra, 1e-3 * one.decay_per_s))
         sd.append(np.hypot(one.decay_sd_per_s, 0.02 * extra))
@@ -149,9 +148,19 @@ def _damped(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...])
     return replace(h, alpha_per_s=found.alpha_per_s, beta_s=found.beta_s)
 
 
-def _members(freq: Array, near: int, count: int) -> Array:
-    """The ``count`` modes nearest to one."""
-    return np.argsort(np.abs(freq - freq[near]), kind="stable")[:count]
+def _members(one: Heard, model: ModalModel) -> list[Array]:
+    """The modes, by index, that each line stands for in a model whose modes have hardly moved: as many as before, about the one that is nearest."""
+    near = model.freq_hz[np.abs(np.subtract.outer(one.freq_hz, model.freq_hz)).argmin(axis=1)]
+    return [np.argsort(np.abs(model.freq_hz - f), kind="stable")[: len(who)] for f, who in zip(near, one.mode, strict=True)]
+
+
+def _told(h: Hypothesis, body: Struck, one: Heard) -> Array:
+    """Jψ (s, k) of the lines: the evidence's own, or, beside effects that leave modes where they were, as these have them sound."""
+    if moves(h) or not h.at(Stage.MODES):
+        return one.pattern
+    model, _ = modes_of(h, body)
+    row = pattern(body, model)[[body.fitted[i] for i in one.strike]]
+    return np.stack([row[:, who].sum(axis=1) for who in _members(one, model)], axis=1)
 
 
 def whole(one: Heard) -> Array:
@@ -177,7 +186,8 @@ def _gained(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...])
     for one in heard:
         if not len(one.freq_hz) or one.signal is None:
             continue
-        direct = np.abs(path_response(h, _whose(one, bodies), one.freq_hz, one.sr))
+        body = _whose(one, bodies)
+        direct = np.abs(path_response(h, body, one.freq_hz, one.sr))
         factor = np.empty(one.pattern.shape)
         for i, level in enumerate(one.impulse_n_s):
             blow = Blow(float(level) if np.isfinite(level) else 1.0, np.zeros(1), np.ones(1))
@@ -185,7 +195,7 @@ def _gained(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...])
                 blow = effect.apply(blow)
             hits = np.abs((blow.share[:, None] * np.exp((one.decay_per_s - 2j * np.pi * one.freq_hz) * blow.delay_s[:, None])).sum(axis=0))
             factor[i] = np.abs(blow.spectrum(one.freq_hz)) * direct * hits
-        expected = np.abs(one.pattern) * factor
+        expected = np.abs(_told(h, body, one)) * factor
         told.append(expected.ravel())
         seen.append(np.abs(whole(one)).ravel())
         rough = np.broadcast_to(ROUGH * expected.max(axis=0, keepdims=True), expected.shape)

@@ -1,9 +1,10 @@
 """`radiation`: a mode loses energy to the air as it radiates, and is heard as it does.
 
-    Δd = s ½ ρ₀ c σ A,  A = ∮(φ·n)² dS,  σ = (ka)²/(1 + (ka)²)  [k = ω/c; Kinsler et al. 2000, ch. 7; Fahy & Gardonio 2007, ch. 3]
+    Δd = s ½ ρ₀ c σ A,  A = ∮(φ·n)² dS,  σ = (ka)²/(1 + (ka)²) with a net flow of volume, (ka)⁴/(4 + (ka)⁴) without      [k = ω/c; Kinsler et al. 2000, ch. 7;
+    Fahy & Gardonio 2007, ch. 3: the pulsating and the oscillating sphere]
     level tilts as √σ where the sensor hears the far field
 
-Read off the decays beside Rayleigh's: what is left grows with ka, then flattens, and goes with each mode's own area A.
+Read off the decays beside Rayleigh's: what is left grows with ka, then flattens, and goes with each mode's own area A. How steeply it grows, decays say too.
 """
 
 from __future__ import annotations
@@ -23,11 +24,15 @@ SOUND = 343.0
 SCATTER = 0.03
 BETTER = 14.0
 AGAIN = 2.0  # times smaller or larger, where it is fitted again
+ORDERS = (2, 4)
 
 
 @dataclass(frozen=True)
 class Radiation:
-    """Radius a of the equivalent source in m; strength s against the law's own 1; tilt: exponent of σ in the level at the sensor, 0 or ½."""
+    """Radius a of the equivalent source in m; strength s against the law's own 1; tilt: exponent of σ in the level at the sensor, 0 or ½.
+
+    order: of ka where it is small, 2 (monopole) or 4 (dipole: no net flow of volume).
+    """
 
     id: ClassVar[str] = "radiation"
     stage: ClassVar[Stage] = Stage.MODES
@@ -37,11 +42,12 @@ class Radiation:
     radius_m: float
     strength: float
     tilt: float = 0.0
+    order: int = 2
 
     def efficiency(self, freq_hz: Array) -> Array:
         """σ (k,)."""
-        ka2 = (2 * np.pi * np.asarray(freq_hz) * self.radius_m / SOUND) ** 2
-        return np.asarray(ka2 / (1 + ka2))
+        low = (2 * np.pi * np.asarray(freq_hz) * self.radius_m / SOUND) ** self.order
+        return np.asarray(low / (self.order**2 / 4 + low))
 
     def apply(self, x: ModalModel) -> ModalModel:
         """The modes with the effect in them."""
@@ -56,7 +62,7 @@ class Radiation:
 
     def parameters(self) -> dict[str, Any]:
         """What it says, for people and JSON, in SI units."""
-        return {"radius_m": self.radius_m, "strength": self.strength, "tilt": self.tilt}
+        return {"radius_m": self.radius_m, "strength": self.strength, "tilt": self.tilt, "order": self.order}
 
     def freedom(self) -> int:
         return 2
@@ -80,11 +86,10 @@ class Radiation:
         if isinstance(evidence.known, cls):  # a part of the lines may leave the knee anywhere below the band: it is this one that is fitted again
             radii = evidence.known.radius_m * np.geomspace(1 / AGAIN, AGAIN, 21)
         found = []
-        for radius in radii:
-            sigma = cls(float(radius), 1.0).efficiency(heard.freq_hz)
-            x, left = _left(decay, sd, np.stack([np.full(len(w2), 0.5), 0.5 * w2, 0.5 * IMPEDANCE * sigma * mine], axis=1))
+        for one in (cls(float(radius), 1.0, order=order) for order in ORDERS for radius in radii):
+            x, left = _left(decay, sd, np.stack([np.full(len(w2), 0.5), 0.5 * w2, 0.5 * IMPEDANCE * one.efficiency(heard.freq_hz) * mine], axis=1))
             if x[2] > 0:
-                found.append((left, cls(float(radius), float(x[2]))))
+                found.append((left, replace(one, strength=float(x[2]))))
         if not found:
             return None
         left, best = min(found, key=lambda one: one[0])
