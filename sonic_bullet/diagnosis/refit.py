@@ -129,7 +129,7 @@ def _damped(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...])
     if told:
         return replace(h, alpha_per_s=told[-1][0], beta_s=told[-1][1])
     bare = replace(h, alpha_per_s=0.0, beta_s=0.0)
-    lam, left, sd = [], [], []
+    lam, left, sd, all_of_it = [], [], [], []
     for one in heard:
         if not len(one.freq_hz):
             continue
@@ -142,9 +142,11 @@ def _damped(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...])
         lam.append(one.omega**2)
         left.append(np.maximum(one.decay_per_s - extra, 1e-3 * one.decay_per_s))
         sd.append(np.hypot(one.decay_sd_per_s, 0.02 * extra))
+        all_of_it.append(one.decay_per_s)
     if not lam:
         return h
-    found = rayleigh(np.concatenate(lam), np.concatenate(left), np.concatenate(sd), (max(h.alpha_per_s, 1e-3), max(h.beta_s, 1e-12)))
+    guess = (max(h.alpha_per_s, 1e-3), max(h.beta_s, 1e-12))
+    found = rayleigh(np.concatenate(lam), np.concatenate(left), np.concatenate(sd), guess, np.concatenate(all_of_it))
     return replace(h, alpha_per_s=found.alpha_per_s, beta_s=found.beta_s)
 
 

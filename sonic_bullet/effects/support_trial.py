@@ -2,7 +2,8 @@
 
     price_kj = (Δln f/w)²/18 + (Δln d/e)²/18 + 1 − c_kj, at most 1;   Σ worth_k (price − 1) -> min over one-to-one pairs       [Kuhn 1955; Crouse 2016]
     d_k = Δ_k(dashpots) + law(ω_k),  law = ½(a + bω + cω²) or as it is, a, b, c >= 0, refitted beside every trial by Huber's loss
-    left = Σ_k worth_k [ρ((d_k − Δ_k − law)/√(sd_k² + (SCATTER Δ_k)² + (LAW d_k)²)) + (1 − C_k²)/ROUGH²], each bounded;  lines that no mode explains count as outliers
+    left = Σ_k worth_k [ρ((d_k − Δ_k − law)/√(sd_k² + (SCATTER Δ_k)² + (LAW d_k)²)) + (1 − C_k²)/ROUGH²], each bounded, ρ Cauchy's;
+        lines that no mode explains count as outliers, and so do modes that would be heard and that no line shows
 
 c_kj: cosine of a line's amplitudes over the strikes with what one exponential at the mode's pole would take of all modes,
 Σ_i a_i 2d_j/((d_i + d_j) − i(ω_i − ω_j)), or with the mode's own. C_k: with what exponentials at the lines' poles take of all modes together
@@ -23,8 +24,10 @@ from sonic_bullet.records import Array, ModalModel
 
 SCATTER, LAW, ROUGH = 0.05, 0.005, 0.15  # of what dashpots add to a decay, of the decay, and of a pattern, relative: shapes err, and laws
 WIDTH, DECADE = 0.004, 0.4  # of ln f and ln d, of a pair
-MISSED = 9.0  # what a line costs that nothing explains: three spreads, as Huber's loss has its bend there
+MISSED = 9.0  # squared spreads from where on a decay's misfit costs less, and that a pattern costs which nothing explains
+GROSS = 4 * MISSED  # that a decay costs at most: a few spreads may be a shape's error, half or twice is none
 WEAK, HALF = 0.05, 0.5  # of the worth of a line that the model does not expect: it may be a click or another body's; near a mode, its twin
+CLEAR, LONGER = 0.25, 2.0  # quantile of the energy of modes that are heard, for one that would be; times a line's decay, for one that it hides
 LOW = 0.3  # of a line's spread where it lies under the least law
 RUN, WIDE = 10, 20  # modes whose coupling is reckoned with in a first look, and in a closer one: what eigenvalues cost goes with the cube
 
@@ -156,7 +159,7 @@ class Trial:
 
     def _by_law(self, law: Array, omega: Array, extra: Array, column: Array, push: Array, turns: int) -> float:
         """What is left where lines and modes are first paired by a law (m,), then by the law that the pairs ask for."""
-        nothing = 2 * MISSED * float(self.worth.sum())
+        nothing = (GROSS + MISSED) * float(self.worth.sum())
         for _ in range(turns):
             alike = self._alike(omega, extra + law, push)
             line, mode, _ = self._pairs(omega, extra + law, alike)
@@ -165,10 +168,21 @@ class Trial:
             worth, sd = self.worth[line], np.hypot(self.sd[line], SCATTER * np.minimum(extra[mode], self.decay_per_s[line]))
             law = column @ solved(self.decay_per_s[line] - extra[mode], sd / np.sqrt(worth), column[mode])[0]
         off = np.abs(self.decay_per_s[line] - (extra + law)[mode]) / sd
-        decays = np.minimum(np.where(off <= 3, off**2, 6 * off - 9), 2 * MISSED)
+        decays = np.minimum(MISSED * np.log1p(off**2 / MISSED), GROSS)
         told = self._told(line, omega[mode], omega, extra + law, push)
         patterns = np.minimum((1 - _cosine(self._seen(self.size), self._seen(told))[line] ** 2) / ROUGH**2, MISSED)
-        return nothing + float((worth * (decays + patterns - 2 * MISSED)).sum())
+        return nothing + float((worth * (decays + patterns - GROSS - MISSED)).sum()) + self._unheard(mode, omega, extra + law, push)
+
+    def _unheard(self, mode: Array, omega: Array, decay: Array, push: Array) -> float:
+        """What modes (m,) cost that would be heard and are not: of a line's strength there, and no line near that rings as long. mode (p,): those that lines stand for."""
+        freq, level = omega / (2 * np.pi), np.abs(push).max(axis=0)
+        told = np.bincount(mode, minlength=len(omega)) > 0
+        energy = level**2 / np.maximum(decay, 1e-3)
+        loud = ~told & (energy > np.quantile(energy[told], CLEAR)) & (freq > self.freq_hz.min()) & (freq < self.freq_hz.max())
+        near = np.abs(np.log(self.freq_hz[:, None] / freq[loud])) < 2 * WIDTH
+        hidden = (near & (self.decay_per_s[:, None] < LONGER * decay[loud])).any(axis=0)
+        worth = np.clip(1 + 0.25 * np.log10(np.maximum(level[loud] / level[told].max(), 1e-6)), 0.1, 1)
+        return float((GROSS + MISSED) * worth[~hidden].sum())
 
     def _told(self, line: Array, at: Array, omega: Array, decay: Array, push: Array) -> Array:
         """Amplitudes (s, k) that exponentials at the lines' poles take of all modes together: Σ_l <e_k, e_l> A_l = Σ_i <e_k, e_i> a_i.

@@ -30,10 +30,14 @@ class Damping:
     said: tuple[str, ...]
 
 
-def rayleigh(lambda_per_s2: Array, decay_per_s: Array, decay_sd_per_s: Array, guess: tuple[float, float]) -> Damping:
-    """α and β of lines (k,). guess: (α, β) whose ratio stands in for what one line cannot tell. A spread that is infinite: no value; NaN: 5 %."""
+def rayleigh(lambda_per_s2: Array, decay_per_s: Array, decay_sd_per_s: Array, guess: tuple[float, float], whole_per_s: Array | None = None) -> Damping:
+    """α and β of lines (k,). guess: (α, β) whose ratio stands in for what one line cannot tell. A spread that is infinite: no value; NaN: 5 %.
+
+    whole_per_s (k,): what was measured, where decays are what something else has left of it: scatter is relative to that, or what is hardly there would be sure.
+    """
     good = np.isfinite(decay_per_s) & (decay_per_s > 0) & ~np.isposinf(decay_sd_per_s)
     lam, decay = lambda_per_s2[good], decay_per_s[good]
+    size = decay if whole_per_s is None else whole_per_s[good]
     spread = np.where(np.isfinite(decay_sd_per_s[good]), decay_sd_per_s[good], 0.05 * decay)
     unknown = np.full((2, 2), np.nan)
     if len(lam) == 0:
@@ -43,7 +47,7 @@ def rayleigh(lambda_per_s2: Array, decay_per_s: Array, decay_sd_per_s: Array, gu
         share = 0.5 * (guess[0] + guess[1] * lam)
         scale = float((weight * decay * share).sum() / (weight * share**2).sum())
         return Damping(scale * guess[0], scale * guess[1], unknown, np.nan, ("alpha", "beta"))
-    value, information, scatter = _scattered(lam, decay, np.maximum(spread, 1e-6 * decay))
+    value, information, scatter = _scattered(lam, decay, np.maximum(spread, 1e-6 * size), size)
     said = []
     with np.errstate(divide="ignore", invalid="ignore"):
         covariance = np.linalg.inv(information) / np.outer(value, value)
@@ -54,12 +58,12 @@ def rayleigh(lambda_per_s2: Array, decay_per_s: Array, decay_sd_per_s: Array, gu
     return Damping(float(value[0]), float(value[1]), covariance, scatter, tuple(said))
 
 
-def _scattered(lam: Array, decay: Array, spread: Array) -> tuple[Array, Array, float]:
-    """Values, information, τ."""
+def _scattered(lam: Array, decay: Array, spread: Array, size: Array) -> tuple[Array, Array, float]:
+    """Values, information, τ, which is relative to size (k,)."""
     freedom = max(len(lam) - 2, 1)
 
     def at(tau: float) -> tuple[Array, Array, float]:
-        value, information, chi, _, _ = _weighted(lam, decay, np.hypot(spread, tau * decay))
+        value, information, chi, _, _ = _weighted(lam, decay, np.hypot(spread, tau * size))
         return value, information, chi - freedom
 
     low, high = 0.0, 3.0
@@ -72,16 +76,16 @@ def _scattered(lam: Array, decay: Array, spread: Array) -> tuple[Array, Array, f
         low, high = (middle, high) if best[2] > 0 else (low, middle)
     if len(lam) < LEAST_MANY:
         return best[0], best[1], high
-    return *_by_most(lam, decay, spread, freedom), high
+    return *_by_most(lam, decay, spread, size, freedom), high
 
 
-def _by_most(lam: Array, decay: Array, spread: Array, freedom: int) -> tuple[Array, Array]:
+def _by_most(lam: Array, decay: Array, spread: Array, size: Array, freedom: int) -> tuple[Array, Array]:
     """Values and information that most of the lines agree on."""
     tau, weight = 1.0, np.ones(len(lam))
-    value, information, _, weight, _ = _weighted(lam, decay, np.hypot(spread, tau * decay), weight)
+    value, information, _, weight, _ = _weighted(lam, decay, np.hypot(spread, tau * size), weight)
     while tau > 1e-5:
         tau *= 0.8
-        trial = _weighted(lam, decay, np.hypot(spread, tau * decay), weight)
+        trial = _weighted(lam, decay, np.hypot(spread, tau * size), weight)
         if np.median(trial[4]) > HALF * freedom / len(lam):
             break
         value, information, _, weight, _ = trial

@@ -14,10 +14,24 @@ from sonic_bullet.diagnosis.play import came_from, modes_of
 from sonic_bullet.effects.damping_law import DampingLaw
 from sonic_bullet.effects.dashpots import apart, coupled, damped
 from sonic_bullet.effects.support_damping import SupportDamping
+from sonic_bullet.effects.support_trial import GROSS, MISSED, Trial
 from sonic_bullet.records import Array, ModalModel
 
 SPOT, OTHER = (0.0477, 0.0371, 0.0), (0.0955, 0.0186, 0.0)
 BAND = (50.0, 7_500.0)
+
+
+def test_a_mode_that_should_be_heard_and_is_not_costs_as_much_as_a_line_that_no_mode_explains() -> None:
+    body = recorded()
+    t = Trial.of(evidence_of(truth(), (body,), BAND).heard[0])
+    loud = 1 + int(np.argmax(np.abs(t.size[:, 1:-1]).max(axis=0)))  # between two others: beyond them nobody listens
+    rest = np.delete(np.arange(len(t.freq_hz)), loud)
+    deaf = replace(t, freq_hz=t.freq_hz[rest], decay_per_s=t.decay_per_s[rest], sd=t.sd[rest], size=t.size[:, rest], worth=t.worth[rest])
+    assert t.left(()) < GROSS / 2
+    assert deaf.left(()) > t.left(()) + 0.8 * (GROSS + MISSED)
+    quick = deaf.model.decay_per_s.copy()
+    quick[np.abs(deaf.model.freq_hz - t.freq_hz[loud]).argmin()] *= 100
+    assert replace(deaf, model=replace(deaf.model, decay_per_s=quick)).left(()) < t.left(()) + GROSS / 2, "what dies at once is not missed"
 
 
 def some(c: float) -> tuple[Array, Array, Array, Array]:

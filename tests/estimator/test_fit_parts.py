@@ -48,6 +48,21 @@ def test_scatter_is_told_from_spread() -> None:
     assert loose.covariance[0, 0] > 100 * true.covariance[0, 0]
 
 
+def test_what_a_fixture_has_left_of_decays_is_as_sure_as_the_decays() -> None:
+    """A fixture takes ten times the law's part of every second line, and is known to 5 %: nothing may be left of a line, which says nothing of the law."""
+    lam = np.geomspace(1e7, 1e10, 24)
+    law = (20.0 + 1e-8 * lam) / 2
+    part = np.where(np.arange(24) % 2, 10 * law, 0.05 * law)
+    off = 1 + 0.05 * np.random.default_rng(2).standard_normal(24)
+    whole = law + part
+    left, sd = np.maximum(whole - off * part - 0.06 * part, 1e-3 * whole), 0.001 * whole + 0.02 * part
+    found = rayleigh(lam, left, sd, (20.0, 1e-8), whole)
+    assert found.alpha_per_s == pytest.approx(20.0, rel=0.1)
+    assert found.beta_s == pytest.approx(1e-8, rel=0.1)
+    pulled = rayleigh(lam, left, sd, (20.0, 1e-8))
+    assert abs(pulled.alpha_per_s / 20.0 - 1) > 3 * abs(found.alpha_per_s / 20.0 - 1), "a hundredth that is left is no hundredfold certainty"
+
+
 def test_distance_of_a_gain_and_of_nothing() -> None:
     tone = damped_sum(np.array([1000.0]), np.array([5.0]), np.array([1.0 + 0j]), 20_000, 22_050)
     floor = white(1e-4)
