@@ -33,7 +33,8 @@ OPEN = 0.3  # of the first gap: with less left, no costly suspect is asked
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Closed:
-    """How the loop ended. added: the candidate of each round that is still there at the end. tried: the last look at every suspect, of what stands beside those."""
+    """How the loop ended. added: the candidate of each round that is still there at the end. tried: every suspect in the last round in
+    which it was asked and had something to say."""
 
     before: Hypothesis
     after: Hypothesis
@@ -67,7 +68,7 @@ def closed(
     for turn in range(ROUNDS):
         say(f"round {turn + 1}: {now:.2f} dB from the recordings, noise alone {floor:.2f} dB")
         if now - floor < LEAST_DB:
-            break  # too little is open for any name: two takes of one strike, and what a mesh gets wrong
+            break  # so little is what a mesh gets wrong
         evidence = evidence_of(h, bodies, band_hz, seed=seed)
         full = retold(h, bodies)  # a room's response is the lines' so far, which leaves open more than there is
         told = now if full is h else mean_db(takes, full) or 0.0

@@ -30,32 +30,32 @@ def sought(t: Trial) -> Dashpots:
     apiece = 3 * np.log(data) + BETTER
     least = float(t.worth.sum())  # what is left within the spreads asks for nothing
 
-    def priced(d: Dashpots, left: float) -> tuple[float, Dashpots]:
-        return float(data * np.log(max(left, least)) + len(d) * apiece), d
+    def priced(d: Dashpots) -> tuple[float, Dashpots]:
+        return float(data * np.log(max(t.left(d), least)) + len(d) * apiece), d
+
+    def without_idle(best: tuple[float, Dashpots]) -> Dashpots:
+        for _ in best[1]:  # one that has helped the others to their places may say nothing there any more
+            best = min([best, *(priced(best[1][:i] + best[1][i + 1 :]) for i in range(len(best[1])))], key=_cost)
+        return best[1]
 
     chosen: Dashpots = ()
-    bare = t.left(chosen)
-    if bare < least:
+    if t.left(chosen) < least:
         return chosen
     spots = _spread(t, SPOTS)
     weak = [tuned(t, refined(t, d, NEARER[-2:])[1]) for d in subsets(t, spots[:POINTS], WEAK)]
-    none = priced((), bare)
-    some = min([none, *(priced(d, t.left(d)) for d in weak)], key=_cost)
+    none = priced(())
+    some = min([none, *(priced(d) for d in weak)], key=_cost)
     if some[1] and t.left(some[1]) < ENOUGH * least:
-        return some[1]
+        return without_idle(some)
     tried = [none]
     grid = [Dashpot(int(v), c, way) for v in spots[:POINTS] for c in _strengths(t).tolist() for way in ("normal", "every")]
     while len(chosen) < MOST:
         chosen = _with_one_more(t, chosen, grid, spots)
-        tried.append(priced(chosen, t.left(chosen)))
+        tried.append(priced(chosen))
         best = min(tried, key=_cost)
         if best is not tried[-1] and (len(chosen) > 1 or tried[-1][0] > best[0] + HALF * apiece):
             break  # weak ones have been looked for; of two as strong as each other, one alone may not pay
-    best = min([*tried, some], key=_cost)
-    for _ in best[1]:  # one that has helped the others to their places may say nothing there any more
-        less = [best[1][:i] + best[1][i + 1 :] for i in range(len(best[1]))]
-        best = min([best, *(priced(d, t.left(d)) for d in less)], key=_cost)
-    return best[1]
+    return without_idle(min([*tried, some], key=_cost))
 
 
 def _cost(pair: tuple[float, Dashpots]) -> float:
@@ -65,8 +65,8 @@ def _cost(pair: tuple[float, Dashpots]) -> float:
 def _with_one_more(t: Trial, chosen: Dashpots, grid: list[Dashpot], spots: Array) -> Dashpots:
     """The best set that a search finds from these and one of the grid."""
     trials = [(*chosen, d) for d in grid]
-    few = _best([t.price(*modes) for modes in t.coupled(trials, t.runs)], trials, LOOKED)
-    few = _best([t.beside(*modes, 1) for modes in t.coupled(few, t.runs)], few, STARTS)
+    few = _best([t.price(*modes) for modes in t.poles(trials, t.runs)], trials, LOOKED)
+    few = _best([t.beside(*modes, 1) for modes in t.poles(few, t.runs)], few, STARTS)
     found = min((refined(t, one, NEARER[:2], spots) for one in few), key=lambda pair: pair[0])[1]
     for _ in range(min(len(found), 2)):  # once all are where they should be, one may be seen to stand at a mirror image
         found = refined(t, found, (np.inf, *NEARER), spots)[1]
@@ -113,7 +113,7 @@ def refined(t: Trial, start: Dashpots, reaches: tuple[float, ...], spots: Array 
     for reach in reaches:
         for i in range(len(best)):
             trials = [(*best[:i], d, *best[i + 1 :]) for d in (best[i], *_around(t, best[i], reach * size, spots))]
-            left = [t.left(one, t.wide) for one in trials] if whole else [t.beside(*modes, 1) for modes in t.coupled(trials, t.runs)]
+            left = [t.left(one, t.wide) for one in trials] if whole else [t.beside(*modes, 1) for modes in t.poles(trials, t.runs)]
             least, best = min(zip(left, trials, strict=True), key=lambda pair: pair[0])
     return least, best
 

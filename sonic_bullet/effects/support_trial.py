@@ -48,6 +48,7 @@ Dashpots = tuple[Dashpot, ...]
 class Trial:
     """An object's lines (k,) and modes (m,). size (s, k) complex, worth (k,); into (s, m): J φ(p)·e of the strikes; out (m,): φ(q)·n of the sensor.
 
+    heard_hz, rings_per_s (l,): of every line, those too that are not held against modes; through (m,): what pulse and path leave of a mode, relative.
     normal (v, 3) of all vertices, body: those of the surface. runs, wide: neighbours that may couple, RUN and WIDE; least (3,): the law that most lines lie above.
     """
 
@@ -56,6 +57,9 @@ class Trial:
     sd: Array
     size: Array
     worth: Array
+    heard_hz: Array
+    rings_per_s: Array
+    through: Array
     signed: bool
     model: ModalModel
     normal: Array
@@ -87,12 +91,16 @@ class Trial:
         level = np.where(np.isfinite(h.impulse_n_s), h.impulse_n_s, 1.0)
         into = np.einsum("sxm,sx->sm", x.shape[h.strike_vertex].astype(float), h.strike_way) * level[:, None]
         out = np.einsum("xm,x->m", x.shape[h.sensor_vertex].astype(float), h.sensor_way)
+        through = np.nan_to_num(np.abs(h.push).max(axis=0) / np.maximum(np.abs(into * out).max(axis=0), 1e-300))
         return cls(
             freq,
             decay,
             np.hypot(np.nan_to_num(sd[index], posinf=1e9), LAW * decay) + 1e-3,
             amplitude,
             worth,
+            every,
+            np.concatenate([h.decay_per_s, h.foreign_decay_per_s]),
+            through / max(through.max(initial=0.0), 1e-300),
             h.signed,
             x,
             vertex_normals(x),
@@ -109,14 +117,14 @@ class Trial:
         x = self.model
         if not dashpots:
             return self.beside(-x.decay_per_s + 2j * np.pi * x.freq_hz, np.eye(x.mode_count, dtype=complex), 2)
-        return self.beside(*self.coupled([dashpots], runs or (np.arange(x.mode_count),))[0], 2)
+        return self.beside(*self.poles([dashpots], runs or (np.arange(x.mode_count),))[0], 2)
 
     def plain(self) -> tuple[Array, Array]:
         """Lines (p,) and the modes (p,) they stand for without any dashpot."""
         x, omega = self.model, 2 * np.pi * self.model.freq_hz
         return self._pairs(omega, x.decay_per_s, self._alike(omega, x.decay_per_s, self.into * self.out))[:2]
 
-    def coupled(self, trials: list[Dashpots], runs: tuple[Array, ...]) -> list[tuple[Array, Array]]:
+    def poles(self, trials: list[Dashpots], runs: tuple[Array, ...]) -> list[tuple[Array, Array]]:
         """Poles (m,) and turns (m, m) of many, modes coupling within runs only."""
         phi, m = self._rows(trials), self.model.mode_count
         lam, own = self.model.omega0_squared_per_s2, self.model.decay_per_s
@@ -164,7 +172,7 @@ class Trial:
             alike = self._alike(omega, extra + law, push)
             line, mode, _ = self._pairs(omega, extra + law, alike)
             if not len(line):
-                return nothing
+                return 2 * nothing  # nor is any mode heard
             worth, sd = self.worth[line], np.hypot(self.sd[line], SCATTER * np.minimum(extra[mode], self.decay_per_s[line]))
             law = column @ solved(self.decay_per_s[line] - extra[mode], sd / np.sqrt(worth), column[mode])[0]
         off = np.abs(self.decay_per_s[line] - (extra + law)[mode]) / sd
@@ -175,13 +183,14 @@ class Trial:
 
     def _unheard(self, mode: Array, omega: Array, decay: Array, push: Array) -> float:
         """What modes (m,) cost that would be heard and are not: of a line's strength there, and no line near that rings as long. mode (p,): those that lines stand for."""
-        freq, level = omega / (2 * np.pi), np.abs(push).max(axis=0)
+        freq = omega / (2 * np.pi)
+        level = np.abs(push).max(axis=0) * np.interp(freq, self.model.freq_hz, self.through)
         told = np.bincount(mode, minlength=len(omega)) > 0
         energy = level**2 / np.maximum(decay, 1e-3)
-        loud = ~told & (energy > np.quantile(energy[told], CLEAR)) & (freq > self.freq_hz.min()) & (freq < self.freq_hz.max())
-        near = np.abs(np.log(self.freq_hz[:, None] / freq[loud])) < 2 * WIDTH
-        hidden = (near & (self.decay_per_s[:, None] < LONGER * decay[loud])).any(axis=0)
-        worth = np.clip(1 + 0.25 * np.log10(np.maximum(level[loud] / level[told].max(), 1e-6)), 0.1, 1)
+        loud = ~told & (energy > np.quantile(energy[told], CLEAR)) & (freq > freq[told].min()) & (freq < freq[told].max())
+        near = np.abs(np.log(self.heard_hz[:, None] / freq[loud])) < 2 * WIDTH
+        hidden = (near & ~(self.rings_per_s[:, None] > LONGER * decay[loud])).any(axis=0)  # a line of unknown decay may be any
+        worth = np.clip(1 + 0.25 * np.log10(np.maximum(level[loud] / max(level[told].max(), 1e-300), 1e-6)), 0.1, 1)
         return float((GROSS + MISSED) * worth[~hidden].sum())
 
     def _told(self, line: Array, at: Array, omega: Array, decay: Array, push: Array) -> Array:

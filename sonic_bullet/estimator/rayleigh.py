@@ -38,7 +38,7 @@ def rayleigh(lambda_per_s2: Array, decay_per_s: Array, decay_sd_per_s: Array, gu
     good = np.isfinite(decay_per_s) & (decay_per_s > 0) & ~np.isposinf(decay_sd_per_s)
     lam, decay = lambda_per_s2[good], decay_per_s[good]
     size = decay if whole_per_s is None else whole_per_s[good]
-    spread = np.where(np.isfinite(decay_sd_per_s[good]), decay_sd_per_s[good], 0.05 * decay)
+    spread = np.where(np.isfinite(decay_sd_per_s[good]), decay_sd_per_s[good], 0.05 * size)
     unknown = np.full((2, 2), np.nan)
     if len(lam) == 0:
         return Damping(*guess, unknown, np.nan, ("alpha", "beta"))

@@ -14,6 +14,7 @@ from sonic_bullet.diagnosis.play import came_from, modes_of
 from sonic_bullet.effects.damping_law import DampingLaw
 from sonic_bullet.effects.dashpots import apart, coupled, damped
 from sonic_bullet.effects.support_damping import SupportDamping
+from sonic_bullet.effects.support_search import sought
 from sonic_bullet.effects.support_trial import GROSS, MISSED, Trial
 from sonic_bullet.records import Array, ModalModel
 
@@ -26,12 +27,37 @@ def test_a_mode_that_should_be_heard_and_is_not_costs_as_much_as_a_line_that_no_
     t = Trial.of(evidence_of(truth(), (body,), BAND).heard[0])
     loud = 1 + int(np.argmax(np.abs(t.size[:, 1:-1]).max(axis=0)))  # between two others: beyond them nobody listens
     rest = np.delete(np.arange(len(t.freq_hz)), loud)
-    deaf = replace(t, freq_hz=t.freq_hz[rest], decay_per_s=t.decay_per_s[rest], sd=t.sd[rest], size=t.size[:, rest], worth=t.worth[rest])
+    fewer = replace(t, freq_hz=t.freq_hz[rest], decay_per_s=t.decay_per_s[rest], sd=t.sd[rest], size=t.size[:, rest], worth=t.worth[rest])
+    keep = np.abs(t.heard_hz - t.freq_hz[loud]) > 1e-6
+    deaf = replace(fewer, heard_hz=t.heard_hz[keep], rings_per_s=t.rings_per_s[keep])
     assert t.left(()) < GROSS / 2
     assert deaf.left(()) > t.left(()) + 0.8 * (GROSS + MISSED)
+    assert fewer.left(()) < GROSS / 2, "it has a line, though one that is not held against modes"
+    unknown = replace(fewer, rings_per_s=np.where(keep, t.rings_per_s, np.nan))
+    assert unknown.left(()) < GROSS / 2, "a line of unknown decay may hide it"
+    dull = replace(deaf, through=np.where(np.abs(deaf.model.freq_hz - t.freq_hz[loud]) < 1, 1e-3, deaf.through))
+    assert dull.left(()) < GROSS / 2, "the pulse leaves nothing of it"
     quick = deaf.model.decay_per_s.copy()
     quick[np.abs(deaf.model.freq_hz - t.freq_hz[loud]).argmin()] *= 100
     assert replace(deaf, model=replace(deaf.model, decay_per_s=quick)).left(()) < t.left(()) + GROSS / 2, "what dies at once is not missed"
+
+
+def test_a_faint_line_far_above_does_not_hide_a_dashpot() -> None:
+    body = recorded(SupportDamping((SPOT,), (3.0,)))
+    heard = evidence_of(truth(), (body,), BAND).heard[0]
+    low = heard.freq_hz < 3_500
+    one = replace(
+        heard,
+        **{name: getattr(heard, name)[low] for name in ("freq_hz", "decay_per_s", "freq_sd_hz", "decay_sd_per_s", "model_hz", "expected_decay_per_s")},
+        **{name: getattr(heard, name)[:, low] for name in ("amplitude", "amplitude_sd", "expected", "pattern")},
+        mode=tuple(m for m, there in zip(heard.mode, low, strict=True) if there),
+        foreign_hz=np.array([7_000.0]),
+        foreign_decay_per_s=np.array([40.0]),
+        foreign_amplitude=np.full((len(heard.amplitude), 1), 1e-3 * np.abs(heard.amplitude).max()),
+        foreign_sd=np.zeros((len(heard.amplitude), 1)),
+    )
+    found = sought(Trial.of(one))
+    assert [d.c for d in found] == [pytest.approx(3.0, rel=0.15)]
 
 
 def some(c: float) -> tuple[Array, Array, Array, Array]:
