@@ -68,8 +68,8 @@ class Radiation:
         return 2
 
     def others(self) -> tuple[Radiation, ...]:
-        """The same energy, heard otherwise: another effect's roll-off may have taken up the tilt, or left it."""
-        return (replace(self, tilt=0.5 - self.tilt),)
+        """The same energy, heard otherwise, or by the other law: another effect's roll-off may have taken up the tilt, or left it."""
+        return replace(self, tilt=0.5 - self.tilt), replace(self, order=sum(ORDERS) - self.order)
 
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:

@@ -21,7 +21,7 @@ NEARER = (0.12, 0.07, 0.04, 0.02)  # turns, in sizes of the body
 TUNED = 0.15  # of ln c
 MOST = 4
 WEAK, ENOUGH = 2, 2.0  # of each number of dashpots to first order; of the spreads' own: no more is asked
-BETTER, HALF = 6.0, 0.5  # in BIC, for another dashpot; of what one costs: a first one that explains less has no second
+BETTER, HALF = 6.0, 0.5  # in BIC, for another dashpot; of what one costs: one that explains less ends the search
 
 
 def sought(t: Trial) -> Dashpots:
@@ -47,13 +47,13 @@ def sought(t: Trial) -> Dashpots:
     some = min([none, *(priced(d) for d in weak)], key=_cost)
     if some[1] and t.left(some[1]) < ENOUGH * least:
         return without_idle(some)
-    tried = [none]
+    tried, starts = [none], [chosen]
     grid = [Dashpot(int(v), c, way) for v in spots[:POINTS] for c in _strengths(t).tolist() for way in ("normal", "every")]
     while len(chosen) < MOST:
-        chosen = _with_one_more(t, chosen, grid, spots)
+        chosen, starts = _with_one_more(t, starts, grid, spots)
         tried.append(priced(chosen))
         best = min(tried, key=_cost)
-        if best is not tried[-1] and (len(chosen) > 1 or tried[-1][0] > best[0] + HALF * apiece):
+        if tried[-1][0] > best[0] + HALF * apiece or best not in tried[-2:]:
             break  # weak ones have been looked for; of two as strong as each other, one alone may not pay
     return without_idle(min([*tried, some], key=_cost))
 
@@ -62,15 +62,18 @@ def _cost(pair: tuple[float, Dashpots]) -> float:
     return pair[0]
 
 
-def _with_one_more(t: Trial, chosen: Dashpots, grid: list[Dashpot], spots: Array) -> Dashpots:
-    """The best set that a search finds from these and one of the grid."""
-    trials = [(*chosen, d) for d in grid]
-    few = _best([t.price(*modes) for modes in t.poles(trials, t.runs)], trials, LOOKED)
+def _with_one_more(t: Trial, starts: list[Dashpots], grid: list[Dashpot], spots: Array) -> tuple[Dashpots, list[Dashpots]]:
+    """The best set that a search finds from some sets of as many and one of the grid; and the sets to go on from: one dashpot alone may stand best where neither of two is."""
+    few: list[Dashpots] = []
+    for chosen in starts:
+        trials = [(*chosen, d) for d in grid]
+        few += _best([t.price(*modes) for modes in t.poles(trials, t.runs)], trials, LOOKED)
     few = _best([t.beside(*modes, 1) for modes in t.poles(few, t.runs)], few, STARTS)
-    found = min((refined(t, one, NEARER[:2], spots) for one in few), key=lambda pair: pair[0])[1]
+    found, *others = (one for _, one in sorted((refined(t, one, NEARER[:2], spots) for one in few), key=lambda pair: pair[0]))
     for _ in range(min(len(found), 2)):  # once all are where they should be, one may be seen to stand at a mirror image
         found = refined(t, found, (np.inf, *NEARER), spots)[1]
-    return tuned(t, min(found, refined(t, found, NEARER[-1:], whole=True)[1], key=t.left))
+    found = tuned(t, min(found, refined(t, found, NEARER[-1:], whole=True)[1], key=t.left))
+    return found, [found, *(others if len(found) == 1 else [])]
 
 
 def _best(price: list[float], trials: list[Dashpots], count: int) -> list[Dashpots]:
