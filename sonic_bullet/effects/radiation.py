@@ -68,8 +68,8 @@ class Radiation:
         return 2
 
     def others(self) -> tuple[Radiation, ...]:
-        """The same energy, heard otherwise, or by the other law: another effect's roll-off may have taken up the tilt, or left it."""
-        return replace(self, tilt=0.5 - self.tilt), replace(self, order=sum(ORDERS) - self.order)
+        """The same energy, heard otherwise: another effect's roll-off may have taken up the tilt, or left it."""
+        return (replace(self, tilt=0.5 - self.tilt),)
 
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
@@ -82,11 +82,11 @@ class Radiation:
         sd = np.hypot(heard.decay_sd_per_s, SCATTER * decay) + 1e-3
         across = float(np.linalg.norm(np.ptp(heard.model.vertex_m[np.unique(heard.model.face)], axis=0)))
         plain = _left(decay, sd, np.stack([np.full(len(w2), 0.5), 0.5 * w2], axis=1))[1]
-        radii, orders = np.geomspace(0.02 * across, across, 40), ORDERS
+        radii = np.geomspace(0.02 * across, across, 40)
         if isinstance(evidence.known, cls):  # a part of the lines may leave the knee anywhere below the band: it is this one that is fitted again
-            radii, orders = evidence.known.radius_m * np.geomspace(1 / AGAIN, AGAIN, 21), (evidence.known.order,)
+            radii = evidence.known.radius_m * np.geomspace(1 / AGAIN, AGAIN, 21)  # by either law: which one, a pulse or a filter may have hidden
         found = []
-        for one in (cls(float(radius), 1.0, order=order) for order in orders for radius in radii):
+        for one in (cls(float(radius), 1.0, order=order) for order in ORDERS for radius in radii):
             x, left = _left(decay, sd, np.stack([np.full(len(w2), 0.5), 0.5 * w2, 0.5 * IMPEDANCE * one.efficiency(heard.freq_hz) * mine], axis=1))
             if x[2] > 0:
                 found.append((left, replace(one, strength=float(x[2]))))
