@@ -19,13 +19,14 @@ TWO = module._can_fork()
 
 
 def test_results_come_in_order_whoever_made_them() -> None:
-    here, begun = os.getpid(), get_context("fork").Event() if TWO else None
+    both = get_context("fork").Barrier(2) if TWO else None  # else the first to run may take all of such light work
+    met = False
 
     def square(x: int) -> tuple[int, int]:
-        if begun is not None and os.getpid() != here:
-            begun.set()
-        elif begun is not None:
-            begun.wait(20)
+        nonlocal met
+        if both is not None and not met:
+            both.wait(60)
+            met = True
         return x * x, os.getpid()
 
     found = side_by_side(square, range(12))
@@ -106,12 +107,13 @@ def test_none_is_left_behind_by_one_that_is_killed() -> None:
     """A script that dies without a word, its helper at work on more than a pipe holds."""
     script = (
         "import os, signal, time\n"
+        "from multiprocessing import get_context\n"
         "from sonic_bullet.side_by_side import side_by_side\n"
-        "me = os.getpid()\n"
+        "me, begun = os.getpid(), get_context('fork').Event()\n"
         "def do(x):\n"
         "    if os.getpid() == me:\n"
-        "        time.sleep(1.0); os.kill(me, signal.SIGKILL)\n"
-        "    print(os.getpid(), flush=True); time.sleep(0.05)\n"
+        "        begun.wait(30); time.sleep(0.5); os.kill(me, signal.SIGKILL)\n"
+        "    print(os.getpid(), flush=True); begun.set(); time.sleep(0.02)\n"
         "    return bytes(300_000)\n"
         "side_by_side(do, range(400))\n"
     )
