@@ -27,6 +27,7 @@ def main() -> int:
     parser.add_argument("what", choices=["make", "run", "report"])
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--quick", action="store_true", help="20 cases in place of 166")
+    parser.add_argument("--draw", type=int, default=0, help="other cases of the same kinds: other numbers and bodies; a folder each")
     parser.add_argument("--only", default="", help="cases whose name holds this")
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--rows", type=Path, default=None, help="results, one JSON a line; DIR/rows.jsonl by default")
@@ -36,7 +37,7 @@ def main() -> int:
         help="what is run; {case} is the folder",
     )
     args = parser.parse_args()
-    chosen = [p for p in (plans.quick() if args.quick else plans.whole()) if args.only in p.name]
+    chosen = [p for p in (plans.quick(args.draw) if args.quick else plans.whole(args.draw)) if args.only in p.name]
     file = args.rows or args.out / "rows.jsonl"
     if args.what in ("make", "run"):
         for k, plan in enumerate(chosen):

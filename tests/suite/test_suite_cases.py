@@ -73,6 +73,14 @@ def test_plans_are_as_many_as_the_suite_promises_and_names_differ() -> None:
     assert all(p.recipe in cases.RECIPES for p in whole)
 
 
+def test_another_draw_has_the_same_questions_and_other_numbers() -> None:
+    first, other = plans.whole(), plans.whole(1)
+    assert [(p.name, [e for e, _ in p.effects]) for p in first] == [(p.name, [e for e, _ in p.effects]) for p in other]
+    assert not {p.seed for p in first} & {p.seed for p in other}
+    assert all(a.recipe != b.recipe for a, b in zip(plans.nulls(), plans.nulls(draw=1), strict=True))
+    assert plans.whole(1) == other
+
+
 def test_the_command_sees_no_truth_and_a_broken_answer_is_a_failure(small: str, tmp_path: Path) -> None:
     make_case(tmp_path, Plan("one", small, (("room", 2),), 4, seconds=0.5), tmp_path / "modes")
     spy = tmp_path / "spy.py"
