@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from sonic_bullet.diagnosis.bodies import Struck
+from sonic_bullet.diagnosis.glide import fallen
 from sonic_bullet.diagnosis.play import Hypothesis, blow_of, in_band, modes_of, moves, pattern, play, start
 from sonic_bullet.effects.values import Evidence, Heard, Sound, Stage
 from sonic_bullet.estimator.evidence import Evidence as Gathered
@@ -87,7 +88,7 @@ def heard_of(h: Hypothesis, body: Struck, *, sounds: bool = True, anew: bool = F
         source=gathered,
         elastic=body.elastic,
     )
-    return outside(h, heard)
+    return fallen(h, body, outside(h, heard))
 
 
 def outside(h: Hypothesis, heard: Heard) -> Heard:

@@ -72,6 +72,11 @@ def moves(h: Hypothesis) -> bool:
     return any(e.stage is Stage.MATERIAL or e.id in MOVES for e in h.effects)
 
 
+def bends(h: Hypothesis) -> bool:
+    """Whether an effect acts on ringing modes, so that lines are not what linear ones leave."""
+    return bool(h.at(Stage.BANK))
+
+
 def mixes(h: Hypothesis) -> bool:
     """Whether an effect makes all modes anew out of the old ones."""
     return any(e.id in LAST for e in h.effects)

@@ -14,7 +14,9 @@ import numpy as np
 
 from sonic_bullet.diagnosis.bodies import Struck
 from sonic_bullet.diagnosis.evidence import heard_of, outside, paired, path_response
-from sonic_bullet.diagnosis.play import Hypothesis, modes_of, moves, pattern, play, undamped
+from sonic_bullet.diagnosis.glide import fallen
+from sonic_bullet.diagnosis.play import Hypothesis, bends, modes_of, moves, pattern, play, undamped
+from sonic_bullet.diagnosis.rest import at_rest
 from sonic_bullet.diagnosis.unheard import CORRECTION, can_tell, sought
 from sonic_bullet.effects.values import Blow, Effect, Heard, Stage
 from sonic_bullet.estimator.lines import noise_rms
@@ -40,8 +42,9 @@ def refitted(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...]
             for b in bodies
             if b.gathered is not None
         )
-    heard = tuple(outside(h, one) for one in heard)
-    return _gained(_damped(h, bodies, heard), bodies, heard)
+    heard = tuple(fallen(h, _whose(one, bodies), outside(h, one)) for one in heard)
+    h = _gained(_damped(h, bodies, heard), bodies, heard)
+    return at_rest(h, bodies, heard) if bends(h) else h
 
 
 def retold(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...] | None = None) -> Hypothesis:
@@ -70,9 +73,9 @@ def _whose(one: Heard, bodies: tuple[Struck, ...]) -> Struck:
 
 
 def with_effects(h: Hypothesis, effects: tuple[Effect, ...], bodies: tuple[Struck, ...]) -> Hypothesis:
-    """The hypothesis with other effects, not yet refitted; where none moves modes any more, corrections are the baseline's again."""
+    """The hypothesis with other effects, not yet refitted; where none moves modes any more, or bends them otherwise, corrections are the baseline's again."""
     made = replace(h, effects=effects)
-    return made if moves(made) or not moves(h) else replace(made, stretch=0.0, correction={b.name: b.correction for b in bodies})
+    return made if moves(made) or not (moves(h) or bends(h)) else replace(made, stretch=0.0, correction={b.name: b.correction for b in bodies})
 
 
 def corrected(h: Hypothesis, bodies: tuple[Struck, ...], *, anew: bool = False) -> Hypothesis:

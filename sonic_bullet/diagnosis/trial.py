@@ -22,8 +22,9 @@ from sonic_bullet.diagnosis.bodies import Struck
 from sonic_bullet.diagnosis.evidence import evidence_of, thinned
 from sonic_bullet.diagnosis.judge import Judged, Take
 from sonic_bullet.diagnosis.listed import Listed
-from sonic_bullet.diagnosis.play import Hypothesis, moves
+from sonic_bullet.diagnosis.play import Hypothesis, bends, moves
 from sonic_bullet.diagnosis.refit import refitted, retold
+from sonic_bullet.diagnosis.rest import at_rest
 from sonic_bullet.effects.values import Effect, Evidence, Owner, Stage
 from sonic_bullet.records import ModalModel
 from sonic_bullet.side_by_side import side_by_side
@@ -159,6 +160,7 @@ def trials(
         return found  # nothing can be left out
     folds = _folds(h, bodies, takes, evidence, seed)
     fair = cache(lambda: _learnt_anew(h, bodies, folds))
+    still = cache(lambda: _rested(folds))
     gap = float(np.mean([f.before for f in folds]) - np.mean([f.take.least(f.base) for f in folds])) if folds else 0.0
     for group in _groups([kind for kind in effects if kind.id not in evidence.found]):
         if any(hasattr(c.effect, "dried") and earns(c, gap, first=not evidence.found) for c in found):
@@ -169,8 +171,9 @@ def trials(
             if whole is None:
                 continue
             say(f"trying {kind.id}")
-            first_mover = moves(replace(h, effects=(whole,))) and not moves(h)
-            found.append(_tried(kind, whole, h, bodies, evidence, fair() if first_mover else folds))
+            alone = replace(h, effects=(whole,))
+            known = fair() if moves(alone) and not moves(h) else still() if bends(alone) and not bends(h) else folds
+            found.append(_tried(kind, whole, h, bodies, evidence, known))
     return sorted(found, key=lambda c: -c.whole_db)
 
 
@@ -223,6 +226,14 @@ def _learnt_anew(h: Hypothesis, bodies: tuple[Struck, ...], folds: list[Fold]) -
         return min(f.before, f.take.distance(again))
 
     return [replace(f, least=least(f)) for f in folds]
+
+
+def _rested(folds: list[Fold]) -> list[Fold]:
+    """Folds that know what is gained by corrections alone, learnt from what modes ring down to as they are beside whatever makes them glide."""
+    return [
+        replace(f, least=min(f.before, f.take.distance(at_rest(f.base, f.bodies, f.evidence.heard, every=True)))) if isinstance(f.take, Take) else f
+        for f in folds
+    ]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -12,7 +12,7 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from sonic_bullet.effects.envelope import Envelopes, envelopes, levels
+from sonic_bullet.effects.envelope import Envelopes, envelopes, falls, levels
 from sonic_bullet.effects.values import Evidence, Heard, Owner, Ring, Stage
 from sonic_bullet.records import Array
 
@@ -104,14 +104,13 @@ def _slope(e: Envelopes, h: Heard, level: Array) -> Slope:
 
 def _moments(e: Envelopes, h: Heard, level: Array, q: int) -> tuple[float, float, float] | None:
     """Σ x², Σ xy, Σ y² of a mode: y its strikes' phases without their means and the common slope, x what b = 1 would make of them; None where too little is clear."""
-    k = e.line[q]
-    decay, omega = max(float(h.decay_per_s[k]), 1e-3), 2 * np.pi * float(h.freq_hz[k])
+    decay, omega = falls(e, q, float(h.decay_per_s[e.line[q]])), 2 * np.pi * float(h.freq_hz[e.line[q]])
     rows, sides, weights, ramps = [], [], [], []
     for s in range(len(e.z)):
         use = e.good[s, q]
         if use.sum() < 8:
             continue
-        t, phase = e.time_s[q, use], np.unwrap(np.angle(e.z[s, q, use]))
+        t, phase = e.time_s[q, use], e.phase[s, q, use]
         w = np.minimum((np.abs(e.z[s, q, use]) / max(e.noise[s, q], 1e-12)) ** 2, 1e4)
         curve = level[s, q] ** 2 * omega * -np.expm1(-2 * decay * t) / (2 * decay)
         rows.append(phase - np.average(phase, weights=w))

@@ -33,7 +33,7 @@ STARTS = 5  # of those sifted, taken further
 FIRST = 10  # lines that decide where no pattern does
 PEAKS = 2
 BLIND_STARTS = 12
-REACH, WIDE = 0.6, 0.014  # of ln E/ρ in the sieve; of ln f
+REACH, WIDE = 2.0, 0.014  # of ln E/ρ in the sieve: an isotropic body may have been fitted to what goes along a plank, or across; of ln f
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -2,7 +2,7 @@
 
     z_k(t) = 2 (y e^{−iω_k t}) * w,   w a Hann window of length L, centred, sum 1:  nulls at ± 2/L and beyond   [Harris 1978, eq. 27]
 
-Only lines that stand alone are worth it: no other of a twentieth of their strength nearer than 2/L.
+Only lines that stand alone are worth it: no other of a twentieth of their strength nearer than 2/L, but for their own first, short part, which the window has to hold.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ MOST_LINES = 30
 FRAMES = 96
 NEPERS = 8.0  # of a line's decay are looked at
 SELF = 0.006  # relative: lines nearer than this may be one bent mode
+FAR, FASTER = 0.15, 5.0  # of a frequency; of a decay: a line that near and that short is what a mode was before it had glided down, or up
 CLEAR = 12.0  # of |z| over the noise in it
 
 
@@ -27,7 +28,7 @@ CLEAR = 12.0  # of |z| over the noise in it
 class Envelopes:
     """z (s, q, t) complex of q lines at times time_s (q, t), each line its own; good (s, q, t) where it stands clear; line (q,): which of the heard.
 
-    noise (s, q).
+    phase (s, q, t): of z, without jumps, however few the frames are. noise (s, q).
     """
 
     time_s: Array
@@ -35,6 +36,7 @@ class Envelopes:
     good: Array
     line: Array
     noise: Array
+    phase: Array
 
 
 @lru_cache(maxsize=2)
@@ -42,15 +44,19 @@ def envelopes(h: Heard) -> Envelopes | None:
     """Of lines that stand alone and clear, spread over the frequencies; None where there are none."""
     if h.signal is None or not len(h.freq_hz):
         return None
-    n, sr = h.signal.shape[1], h.sr
-    picked, window = _alone(h, n, sr)
-    if not picked:
-        return None
-    z = np.zeros((len(h.signal), len(picked), FRAMES), complex)
+    picked, window = alone(h)
+    return shifted(h, h.signal, picked, window) if picked else None
+
+
+def shifted(h: Heard, signal: Array, picked: list[int], window: list[int]) -> Envelopes:
+    """The lines picked by ``alone``, out of recordings or what is played in their place: signal (s, n)."""
+    n, sr = signal.shape[1], h.sr
+    z = np.zeros((len(signal), len(picked), FRAMES), complex)
     good = np.zeros(z.shape, bool)
+    phase = np.zeros(z.shape)
     noise = np.zeros(z.shape[:2])
     time = np.zeros((len(picked), FRAMES))
-    floor = h.noise if len(h.noise) == len(h.signal) and np.isfinite(h.noise).all() else np.zeros(len(h.signal))
+    floor = h.noise if len(h.noise) == len(signal) and np.isfinite(h.noise).all() else np.zeros(len(signal))
     for q, (k, length) in enumerate(zip(picked, window, strict=True)):
         turn = np.exp(-2j * np.pi * h.freq_hz[k] / sr * np.arange(n))
         shape = np.hanning(length + 2)[1:-1]
@@ -60,29 +66,37 @@ def envelopes(h: Heard) -> Envelopes | None:
         at = np.unique(np.linspace(length // 2, max(last, length // 2 + FRAMES), FRAMES).astype(int))
         at = np.minimum(at, n - 1)
         time[q, : len(at)] = at / sr
-        for s in range(len(h.signal)):
-            whole = np.fft.ifft(np.fft.fft(h.signal[s] * turn, len(spectrum)) * spectrum)
+        for s in range(len(signal)):
+            whole = np.fft.ifft(np.fft.fft(signal[s] * turn, len(spectrum)) * spectrum)
             row = 2 * whole[np.minimum(at + (length - 1) // 2, len(whole) - 1)]  # centred: z(t) belongs to the time t
             z[s, q, : len(at)] = row
+            dense = np.arange(at[0], at[-1] + 1, max(length // 8, 1))
+            angle = np.interp(at, dense, np.unwrap(np.angle(whole[np.minimum(dense + (length - 1) // 2, len(whole) - 1)])))
+            phase[s, q, : len(at)] = angle + (np.angle(row) - angle + np.pi) % (2 * np.pi) - np.pi
             noise[s, q] = 2 * floor[s] * np.sqrt((shape**2).sum())
             clear = np.abs(row) > CLEAR * max(noise[s, q], 1e-12)
             if not clear.all():  # nothing after the first dip: what comes back is something else
                 clear[int(np.argmin(clear)) :] = False
             good[s, q, : len(at)] = clear
-    return Envelopes(time, z, good, np.array(picked), noise)
+    return Envelopes(time, z, good, np.array(picked), noise, phase)
 
 
-def _alone(h: Heard, n: int, sr: int) -> tuple[list[int], list[int]]:
+def alone(h: Heard) -> tuple[list[int], list[int]]:
     """Lines with no strong neighbour, and the window for each; every so many of them, from low to high."""
+    if h.signal is None:
+        return [], []
+    n, sr = h.signal.shape[1], h.sr
     every = np.concatenate([h.freq_hz, h.foreign_hz])
+    decay = np.nan_to_num(np.concatenate([h.decay_per_s, h.foreign_decay_per_s]))
     strength = np.concatenate([np.abs(h.amplitude).max(axis=0), np.abs(h.foreign_amplitude).max(axis=0)])
     picked, window = [], []
     for k in range(len(h.freq_hz)):
         rival = np.abs(every - h.freq_hz[k])
-        near = (rival > 1e-9) & (strength > 0.05 * strength[k]) & (rival > SELF * h.freq_hz[k])
+        glide = (rival < FAR * h.freq_hz[k]) & (decay > FASTER * decay[k])  # its own beginning, while it was loud
+        near = (rival > 1e-9) & (strength > 0.05 * strength[k]) & (rival > SELF * h.freq_hz[k]) & ~glide
         same = (rival < SELF * h.freq_hz[k]) & (strength > 3 * strength[k])  # the louder one of a bent mode's lines stands for it
         gap = rival[near].min() if near.any() else np.inf
-        width = min(0.8 * gap, WIDTH_HZ[1])
+        width = min(0.8 * gap, max([WIDTH_HZ[1], *(2 * rival + decay / np.pi)[glide & (strength > 0.05 * strength[k])]]))
         if width >= max(WIDTH_HZ[0], 0.6 * h.decay_per_s[k]) and not same.any() and int(2 * sr / width) < n // 4:
             picked.append(k)
             window.append(int(2 * sr / width) | 1)
@@ -109,3 +123,17 @@ def levels(h: Heard) -> dict[str, Array]:
     push = np.abs(np.einsum("sxm,sx->sm", h.model.shape[h.strike_vertex].astype(float), h.strike_way)) * most
     velocity = level[:, None] * np.stack([push[:, m].max(axis=1) for m in h.mode], axis=1)
     return found | {"velocity": velocity, "displacement": velocity / (2 * np.pi * h.freq_hz)}
+
+
+def falls(e: Envelopes, q: int, told: float) -> float:
+    """The decay of a line's own level, in 1/s: a mode that glides is several lines to a linear fit, none with its decay. told: by those; what comes back where too little is clear."""
+    top = bottom = 0.0
+    for s in range(len(e.z)):
+        use = e.good[s, q]
+        if use.sum() < 8:
+            continue
+        t, level = e.time_s[q, use], np.log(np.abs(e.z[s, q, use]))
+        w = np.minimum((np.abs(e.z[s, q, use]) / max(e.noise[s, q], 1e-12)) ** 2, 1e4)
+        t = t - np.average(t, weights=w)
+        top, bottom = top - float((w * t * level).sum()), bottom + float((w * t * t).sum())
+    return max(top / bottom if bottom > 0 else told, 1e-3)
