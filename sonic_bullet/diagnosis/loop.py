@@ -100,8 +100,8 @@ def closed(
 
 
 def _helps(c: Candidate, bodies: tuple[Struck, ...], takes: Sequence[Judged], now: float, told: float, floor: float, *, first: bool) -> bool:
-    """Whether all strikes together gain. What moves modes must do so on what a room's response, told again, leaves (told): that takes up what stray modes leave."""
-    before = told if moves(c.hypothesis) else now
+    """Whether all strikes together gain, on what a room's response, told again, leaves (told): that takes up what stray modes leave, and echoes."""
+    before = min(now, told)
     return before - (mean_db(takes, retold(c.hypothesis, bodies)) or before) > HELPS * needed(max(before - floor, 0.0), first=first)
 
 

@@ -20,6 +20,7 @@ from sonic_bullet.records import Array
 ROUGH = 0.03
 BETTER = 16.0
 MAINS = (50.0, 60.0)
+CORNERS, FINER, HIGHEST = 160, 21, 0.49  # tried, and again about the best; of the rate
 STUCK = 4  # samples in a row at the limit, in two recordings or more
 
 
@@ -85,9 +86,9 @@ class MeasurementChain:
         return cls(**parts) if parts else None
 
 
-def butterworth(freq_hz: Array, corner_hz: float, order: int, high: bool) -> Array:
-    """|H| (f,)."""
-    x = np.asarray(freq_hz) / corner_hz
+def butterworth(freq_hz: Array, corner_hz: float, order: int, high: bool, sr: int) -> Array:
+    """|H| (f,) of the filter at a rate: the bilinear transform bends frequencies. Source: Oppenheim & Schafer 2010, eq. 7.28."""
+    x = np.tan(np.pi * np.asarray(freq_hz) / sr) / np.tan(np.pi * corner_hz / sr)
     return np.asarray(1 / np.sqrt(1 + x ** (-2 * order if high else 2 * order)))
 
 
@@ -123,14 +124,16 @@ def _hum(heard: list[Heard]) -> dict[str, Any]:
         near = np.flatnonzero(np.abs(hz - mains) < 1.2 * mains / 50)
         if not len(near):
             continue
-        tone = np.array([power[:, np.minimum(i * near, len(hz) - 1)].min(axis=0) for i in range(1, 9)])
-        score = np.log1p(tone / (30 * floor)).sum(axis=0)
+        beside = np.array([np.median(power[:, np.abs(np.abs(hz - i * mains) - 0.3 * mains) < 0.15 * mains], axis=1) for i in range(1, 9)])  # pink rooms
+        least = np.maximum(beside / np.log(2), floor)  # (8, s)
+        tone = np.array([(power[:, np.minimum(i * near, len(hz) - 1)] / least[i - 1][:, None]).min(axis=0) for i in range(1, 9)])
+        score = np.log1p(tone / 30).sum(axis=0)
         i = int(score.argmax())
         if score[i] > max(most, 1.0):
             lines = near[i] * np.arange(1, 9)
             size = 2 * np.sqrt(power[:, lines]) / shape.sum()
             mean = np.exp(np.log(size).mean(axis=0))
-            steady = (size.max(axis=0) < 1.6 * size.min(axis=0)) & (power[:, lines].min(axis=0) > 30 * floor)
+            steady = (size.max(axis=0) < 1.6 * size.min(axis=0)) & (power[:, lines] > 30 * least.T).all(axis=0)
             if steady.any():
                 last = int(np.flatnonzero(steady).max()) + 1
                 phase = np.angle(spectrum[:, lines]).mean(axis=0)
@@ -151,15 +154,21 @@ def _filter(heard: list[Heard], better: float) -> dict[str, Any]:
     freq, ratio, sd = (np.concatenate([r[i] for r in rows]) for i in range(3))
     if len(freq) < 5:
         return {}
-    plain = _misfit(ratio, sd)
-    best: tuple[float, dict[str, Any]] = (plain - better - 2 * np.log(len(freq)), {})
-    for high in (True, False):
+    sr = min(h.sr for h in heard)
+    best: tuple[float, dict[str, Any]] = (_misfit(ratio, sd) - better - 2 * np.log(len(freq)), {})
+    grid = np.geomspace(0.3 * freq.min(), min(3 * freq.max(), HIGHEST * sr), CORNERS)
+    for name in ("high", "low"):
         for order in (1, 2, 3, 4):
-            for corner in np.geomspace(0.3 * freq.min(), 3 * freq.max(), 160):
-                cost = _misfit(ratio - np.log(butterworth(freq, float(corner), order, high)), sd)
-                if cost < best[0]:
-                    name = "high" if high else "low"
-                    best = (cost, {f"{name}_pass_hz": float(corner), f"{name}_order": order})
+
+            def cost(corner: float, order: int = order, high: bool = name == "high") -> float:
+                return _misfit(ratio - np.log(butterworth(freq, corner, order, high, sr)), sd)
+
+            costs = [cost(corner) for corner in grid]
+            i = int(np.argmin(costs))
+            fine = np.geomspace(grid[max(i - 1, 0)], grid[min(i + 1, CORNERS - 1)], FINER)
+            finer = [cost(corner) for corner in fine]
+            if min(finer) < best[0]:
+                best = (min(finer), {f"{name}_pass_hz": float(fine[int(np.argmin(finer))]), f"{name}_order": order})
     return best[1]
 
 
