@@ -77,7 +77,8 @@ class Radiation:
         if heard.model is None or len(heard.freq_hz) < 6 or not np.isfinite(heard.decay_per_s).all():
             return None
         area = areas(heard.model)
-        mine = np.array([area[m].mean() for m in heard.mode])
+        loud = (np.abs(heard.push) ** 2).sum(axis=0) + 1e-300  # of modes that share a line, the louder is heard: a plate's own plane hardly moves the air
+        mine = np.array([np.average(area[m], weights=loud[m]) for m in heard.mode])
         decay, w2 = heard.decay_per_s, heard.omega**2
         sd = np.hypot(heard.decay_sd_per_s, SCATTER * decay) + 1e-3
         across = float(np.linalg.norm(np.ptp(heard.model.vertex_m[np.unique(heard.model.face)], axis=0)))

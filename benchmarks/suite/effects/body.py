@@ -82,7 +82,8 @@ def radiation(strength: int, rng: np.random.Generator, scene: Scene) -> Effect:
         return np.asarray(ka**order / (1 + ka**order))
 
     def damping(modes: Modes, d: Array) -> Array:
-        return d + np.diag(times * 1.2 * 343 * sigma(modes) * _flow(modes))
+        moved = _flow(modes) / (np.sqrt(sigma(modes)) if tilted else 1.0)  # the shapes come tilted as they are heard: the surface moves as before
+        return d + np.diag(times * 1.2 * 343 * sigma(modes) * moved)
 
     def pairs(modes: Modes) -> Modes:
         return replace(modes, shape=modes.shape * sigma(modes) ** 0.25) if tilted else modes
