@@ -21,6 +21,7 @@ FRAMES = 96
 NEPERS = 8.0  # of a line's decay are looked at
 SELF = 0.006  # relative: lines nearer than this may be one bent mode
 FAR, FASTER = 0.15, 5.0  # of a frequency; of a decay: a line that near and that short is what a mode was before it had glided down, or up
+LINK = 4.0  # of the shorter line's decay: how far in ω two lines of a chain are
 CLEAR = 12.0  # of |z| over the noise in it
 
 
@@ -89,12 +90,13 @@ def alone(h: Heard) -> tuple[list[int], list[int]]:
     every = np.concatenate([h.freq_hz, h.foreign_hz])
     decay = np.nan_to_num(np.concatenate([h.decay_per_s, h.foreign_decay_per_s]))
     strength = np.concatenate([np.abs(h.amplitude).max(axis=0), np.abs(h.foreign_amplitude).max(axis=0)])
+    chain, foreign = _chains(every, decay), np.arange(len(every)) >= len(h.freq_hz)
     picked, window = [], []
     for k in range(len(h.freq_hz)):
         rival = np.abs(every - h.freq_hz[k])
-        glide = (rival < FAR * h.freq_hz[k]) & (decay > FASTER * decay[k])  # its own beginning, while it was loud
+        glide = (chain == chain[k]) & foreign | (rival < FAR * h.freq_hz[k]) & (decay > FASTER * decay[k])  # its own beginning, while it was loud
         near = (rival > 1e-9) & (strength > 0.05 * strength[k]) & (rival > SELF * h.freq_hz[k]) & ~glide
-        same = (rival < SELF * h.freq_hz[k]) & (strength > 3 * strength[k])  # the louder one of a bent mode's lines stands for it
+        same = (rival < SELF * h.freq_hz[k]) & (strength > 3 * strength[k]) & ~glide  # the louder one of a bent mode's lines stands for it
         gap = rival[near].min() if near.any() else np.inf
         width = min(0.8 * gap, max([WIDTH_HZ[1], *(2 * rival + decay / np.pi)[glide & (strength > 0.05 * strength[k])]]))
         if width >= max(WIDTH_HZ[0], 0.6 * h.decay_per_s[k]) and not same.any() and int(2 * sr / width) < n // 4:
@@ -104,6 +106,17 @@ def alone(h: Heard) -> tuple[list[int], list[int]]:
         keep = np.unique(np.linspace(0, len(picked) - 1, MOST_LINES).astype(int))
         picked, window = [picked[i] for i in keep], [window[i] for i in keep]
     return picked, window
+
+
+def _chains(freq_hz: Array, decay_per_s: Array) -> Array:
+    """Which chain each line (k,) belongs to: lines so near each other, for their decays, that one mode that glides may have left them."""
+    from scipy.sparse import csr_array
+    from scipy.sparse.csgraph import connected_components
+
+    slow, fast = np.minimum.outer(decay_per_s, decay_per_s), np.maximum.outer(decay_per_s, decay_per_s)
+    gap = np.abs(np.subtract.outer(freq_hz, freq_hz))
+    linked = (2 * np.pi * gap < LINK * fast) & (fast < FASTER * slow) & (gap < FAR * freq_hz)
+    return np.asarray(connected_components(csr_array(linked), directed=False)[1])
 
 
 def _fast(n: int) -> int:
