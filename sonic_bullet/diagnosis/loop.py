@@ -100,9 +100,10 @@ def closed(
 
 
 def _helps(c: Candidate, bodies: tuple[Struck, ...], takes: Sequence[Judged], now: float, told: float, floor: float, *, first: bool) -> bool:
-    """Whether all strikes together gain, on what a room's response, told again, leaves (told): that takes up what stray modes leave, and echoes."""
-    before = min(now, told)
-    return before - (mean_db(takes, retold(c.hypothesis, bodies)) or before) > HELPS * needed(max(before - floor, 0.0), first=first)
+    """Whether all strikes together gain, and lose nothing of what a room's response, told again without it, says as well (told): that takes up echoes, and
+    some of what stray modes leave, so what moves modes must gain on that."""
+    before, after = told if moves(c.hypothesis) else now, mean_db(takes, retold(c.hypothesis, bodies)) or 0.0
+    return after < told and before - after > HELPS * needed(max(before - floor, 0.0), first=first)
 
 
 def of_the_mesh(h: Hypothesis, bodies: tuple[Struck, ...], takes: Sequence[Judged], seed: int) -> float:
