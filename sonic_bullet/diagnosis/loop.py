@@ -25,7 +25,7 @@ from sonic_bullet.estimator.distance import with_noise
 ROUNDS = 4
 MESH = 1e-3  # of a frequency: what a good mesh gets wrong
 SUFFICES_DB = 1.5  # a gap below this is the mesh's and the shapes' own
-EXPLAINED = 0.4  # of the gap; part of it is the mesh's and the shapes' own
+EXPLAINED = 0.5  # of the gap; part of it is the mesh's and the shapes' own
 NEARLY, CLEAR = 0.2, 25.0  # of what a name says, and twice the ln likelihood of phases: where they decide between two
 HELPS = 0.5  # of what a name must gain on strikes left out, on all of them together: a model of few lines may be saved by chance once one is left out
 OPEN = 0.3  # of the first gap: with less left, no costly suspect is asked
