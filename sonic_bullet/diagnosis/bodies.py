@@ -10,13 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
-from sonic_bullet.effects.values import Elastic
+from sonic_bullet.effects.values import Elastic, Poisson
 from sonic_bullet.estimator.evidence import Evidence as Gathered
 from sonic_bullet.estimator.evidence import body_family, guess_of
-from sonic_bullet.estimator.fitted import CaseFit, ObjectFit
+from sonic_bullet.estimator.fitted import POISSON_SD, CaseFit, ObjectFit
 from sonic_bullet.estimator.observe import pressure_weight
 from sonic_bullet.files.cases import Case, CaseRecording
 from sonic_bullet.modal.cache import Place
@@ -32,6 +33,7 @@ class Struck:
     family: for another elasticity, None without a mesh. correction (m,): relative, of each mode's frequency, learnt on its fitted strikes, else 0.
     line (m,): the fitted line a mode was paired with, or -1. gathered: its fitted lines and sounds, None for an object nobody fitted.
     elastic: for tensors, see elastic.py. band_hz: nothing outside it is recorded, though its modes are in the model: a mesh may have put them there.
+    other: ν -> the model there, of as many modes. poisson: the same, cheap, for a search.
     """
 
     name: str
@@ -46,6 +48,8 @@ class Struck:
     gathered: Gathered | None
     elastic: Elastic | None = None
     band_hz: tuple[float, float] = (0.0, float("inf"))
+    other: Callable[[float], ModalModel] | None = None
+    poisson: Poisson | None = None
 
     @property
     def strikes(self) -> int:
@@ -101,7 +105,22 @@ def _placed(found: CaseFit, name: str, family: Family, density: float, o: Object
                 correction[inside] = (1 + ratio) * np.exp(np.log(member).mean()) / member - 1
     model, way = modal_model(case, name, mine, family, density, value, vector)
     impulse = np.array([np.nan if r.impulse_n_s is None else r.impulse_n_s for r in mine])
-    return Struck(name, mine, model, way, impulse, case.sensor, family, correction, line, o.evidence if o is not None else None, band_hz=case.band_hz)
+
+    def lowest(poisson: float) -> tuple[Array, Array]:
+        lam, turned = family.modes(found.fit.gamma_m2_s2, poisson)
+        return lam[: len(keep)], turned[:, : len(keep)]
+
+    @lru_cache(maxsize=2)
+    def other(poisson: float) -> ModalModel:
+        return modal_model(case, name, mine, family, density, *lowest(poisson))[0]
+
+    def sums(poisson: float) -> tuple[Array, Array]:
+        lam, turned = lowest(poisson)
+        return np.sqrt(lam) / (2 * np.pi), vector.T @ turned
+
+    nu = Poisson(found.fit.poisson_ratio, guess_of(case.objects[name]).poisson, POISSON_SD, sums)
+    gathered = o.evidence if o is not None else None
+    return Struck(name, mine, model, way, impulse, case.sensor, family, correction, line, gathered, band_hz=case.band_hz, other=other, poisson=nu)
 
 
 def modal_model(

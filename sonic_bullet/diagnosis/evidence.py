@@ -87,6 +87,7 @@ def heard_of(h: Hypothesis, body: Struck, *, sounds: bool = True, anew: bool = F
         strike=tuple(range(len(mine))),
         source=gathered,
         elastic=body.elastic,
+        poisson=None if moves(h) or plain.mode_count != body.model.mode_count else body.poisson,
     )
     return fallen(h, body, outside(h, heard))
 

@@ -118,7 +118,8 @@ def of_the_mesh(h: Hypothesis, bodies: tuple[Struck, ...], takes: Sequence[Judge
         paired = body.line >= 0
         size = float(np.sqrt((mine[paired] ** 2).mean())) if paired.any() else 0.0
         moved[body.name] = np.where(paired, mine, mine + max(size, MESH) * rng.standard_normal(len(mine)))
-        other[body.name] = _roughened(body, rng)
+        model = body.model if h.poisson is None or body.other is None else body.other(h.poisson)
+        other[body.name] = _roughened(replace(body, model=model, other=None), rng)
     far = replace(h, correction=moved)
     pairs = [(t, play(h, t.body, t.strike, len(t.sample), t.sr)) for t in takes if isinstance(t, Take)]
     twice = [replace(t, sample=with_noise(made, t.floor, 1000 + t.strike)) for t, made in pairs]

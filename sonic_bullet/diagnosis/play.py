@@ -30,7 +30,7 @@ KEPT = 4  # hypotheses and bodies whose modes are remembered
 class Hypothesis:
     """α, β and gain σ of the case, and the effects in it. correction: by object, (m,) relative; absent: the mesh's own frequencies.
 
-    stretch: ln of what all frequencies are multiplied with, as E/ρ is fitted again beside effects that move modes.
+    stretch: ln of what all frequencies are multiplied with, as E/ρ is fitted again beside effects that move modes; poisson: ν, where it is; else the baseline's.
     """
 
     alpha_per_s: float
@@ -39,6 +39,7 @@ class Hypothesis:
     effects: tuple[Effect, ...] = ()
     correction: dict[str, Array] | None = None
     stretch: float = 0.0
+    poisson: float | None = None
 
     def at(self, stage: Stage, *, fitted: bool = True) -> tuple[Effect, ...]:
         """The effects of a stage; on an object that was not fitted only those that carry over."""
@@ -60,7 +61,7 @@ def undamped(h: Hypothesis, body: Struck) -> ModalModel:
     """The body's model under the effects on its material, uncorrected."""
     effects = h.at(Stage.MATERIAL, fitted=body.gathered is not None)
     if not effects or body.elastic is None:
-        return body.model
+        return body.model if h.poisson is None or body.other is None else body.other(h.poisson)
     material = body.elastic.material
     for effect in effects:
         material = effect.apply(material)

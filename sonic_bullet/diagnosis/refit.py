@@ -75,12 +75,13 @@ def _whose(one: Heard, bodies: tuple[Struck, ...]) -> Struck:
 def with_effects(h: Hypothesis, effects: tuple[Effect, ...], bodies: tuple[Struck, ...]) -> Hypothesis:
     """The hypothesis with other effects, not yet refitted; where none moves modes any more, or bends them otherwise, corrections are the baseline's again."""
     made = replace(h, effects=effects)
-    return made if moves(made) or not (moves(h) or bends(h)) else replace(made, stretch=0.0, correction={b.name: b.correction for b in bodies})
+    return made if moves(made) or not (moves(h) or bends(h)) else replace(made, stretch=0.0, poisson=None, correction={b.name: b.correction for b in bodies})
 
 
 def corrected(h: Hypothesis, bodies: tuple[Struck, ...], *, anew: bool = False) -> Hypothesis:
-    """The hypothesis with E/ρ and corrections learnt on its own modes, from where its effects have found E/ρ (``stretch``). anew: see refitted."""
-    h = replace(h, correction=None, stretch=float(sum(getattr(e, "stretch", 0.0) for e in h.effects)))
+    """The hypothesis with E/ρ and corrections learnt on its own modes, from where its effects have found E/ρ and ν (``stretch``, ``poisson_ratio``). anew: see refitted."""
+    told = [e.poisson_ratio for e in h.effects if getattr(e, "poisson_ratio", None) is not None]  # type: ignore[attr-defined]
+    h = replace(h, correction=None, stretch=float(sum(getattr(e, "stretch", 0.0) for e in h.effects)), poisson=told[-1] if told else None)
     for _ in range(3):
         off = np.concatenate([_off(h, body, anew)[1] for body in bodies if body.gathered is not None] or [np.zeros(0)])
         if len(off):

@@ -107,6 +107,19 @@ class Elastic:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Poisson:
+    """A body at any ratio ν of Poisson's, its E/ρ the baseline's. fitted: the baseline's ν; guess, sd: what was known of it before.
+
+    at: ν -> undamped freq_hz (m,), and the modes there as sums (m, m) of the baseline's own, a column a mode.
+    """
+
+    fitted: float
+    guess: float
+    sd: float
+    at: Callable[[float], tuple[Array, Array]]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Heard:
     """One object's strikes: k lines that are modes, beside what the model so far expects, and what it leaves. source: what they were gathered from, the host's own.
 
@@ -114,7 +127,7 @@ class Heard:
     model_hz (k,): the mesh's own, without corrections; expected_decay_per_s (k,), expected (s, k): of the model with the effects found so far.
     pattern (s, k): J ψ, real. foreign_*: lines that are no mode, amplitudes (s, f). model: the body with its strikes and sensor as last vertices,
     strike_vertex (s,), strike_way (s, 3), sensor_vertex, sensor_way (3,). signal, predicted (s, n) from the onset on, None for lists of features.
-    noise (s,): rms. signed: phases are true.
+    noise (s,): rms. signed: phases are true. poisson: of `plain`, where nothing has moved its modes yet.
     """
 
     impulse_n_s: Array
@@ -149,6 +162,7 @@ class Heard:
     strike: tuple[int, ...] = ()
     source: Any = None
     elastic: Elastic | None = None
+    poisson: Poisson | None = None
     dry: bool = False  # whether lines are told as they would be without the room they were recorded in
 
     @property

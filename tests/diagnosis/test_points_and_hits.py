@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from made_body import plate
 
-from sonic_bullet.effects.added_mass import FAR, AddedMass, attached, loaded
+from sonic_bullet.effects.added_mass import AddedMass
+from sonic_bullet.effects.riding import FAR, attached, loaded
 from sonic_bullet.effects.rebound import _agreed, _delayed, _sought
 
 
