@@ -1,12 +1,13 @@
 """`added-mass`: a sensor, a blob of wax, water: a small mass that rides on one point.
 
-    (Λ − λ (1 + m ΦᵀΦ)) q = 0,  Φ = (φ(p), √(λ_r R)) (3, n + 3)      to first order Δλ/λ = −m |φ(p)|²                [Rayleigh 1894, § 88-90; modal synthesis]
+    (Λ − λ (1 + Φᵀ m' Φ)) q = 0,  Φ = (φ(p), √(λ_r R)) (3, n + 3)      to first order Δλ/λ = −m |φ(p)|²                [Rayleigh 1894, § 88-90; modal synthesis]
 
 R: what the modes above the band yield at the point, along its normal and across: residual attachment modes far above them [Rubin 1975]. Without it a
 point mass is held too stiffly, and its higher modes come out several per cent high.
 Read off frequencies and patterns together: for points all over the surface and masses up to a sixth of the body's, lines are paired with the loaded
 body's modes anew; the pairs that agree best stand, where they agree better than the bare body's. E/ρ was fitted to lines that the mass had lowered, so
-the common scale of all frequencies is looked for along with it, on the bare body as well: λ(Λ e^{2s}, R e^{−2s}) = e^{2s} λ(Λ, R).
+the common scale of all frequencies is looked for along with it, on the bare body as well: λ(Λ e^{2s}, R e^{−2s}) = e^{2s} λ(Λ, R). So was ν: what is twisted
+and what is bent had been lowered differently. A free body moves against the mass as a whole (free_body.py): m' in m's place.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from sonic_bullet.effects.free_body import FreeBody
-from sonic_bullet.effects.mass_search import WIDTHS, Scored, Trial
+from sonic_bullet.effects.mass_search import WIDTHS, Scored, Trial, strict
 from sonic_bullet.effects.pairs import agreed, patterns
 from sonic_bullet.effects.points import nearest, spread_out, vertex_normals
 from sonic_bullet.effects.riding import attached, loaded
@@ -86,7 +87,10 @@ class AddedMass:
             start = (0.0, near, known.mass_kg, (up, side), known.stretch, trial.fitted if ratio is None else ratio)
             return cls._at(x, trial.refined(start, WIDTHS[-1:]), heard.poisson is not None)
         plain = patterns(heard, x)
-        none = min((agreed(trial.line, trial.size, x.freq_hz, plain, shift=s) for s in trial.shifts(x.freq_hz, plain)), key=lambda one: one[0])
+        none = min(
+            (agreed(trial.line, trial.size, x.freq_hz, plain, shift=s, width=WIDTHS[-1], strict=strict(WIDTHS[-1])) for s in trial.shifts(x.freq_hz, plain)),
+            key=lambda one: one[0],
+        )
         if _in_place(trial.line, trial.size, x.freq_hz, none):
             return None
 

@@ -29,6 +29,11 @@ REACH, BINS = (-0.1, 0.25), 0.008  # of ln f: common shifts of the baseline's mo
 PEAKS = 2  # of those shifts, tried further
 
 
+def strict(width: float) -> float:
+    """κ of `pairs`: angles between patterns are held as much more closely as frequencies; in the end a mode may sound at a strike as 8 % of its strongest does, not more."""
+    return (WIDTHS[0] / width) ** 2
+
+
 def _at_points(x: ModalModel, heard: Heard) -> ModalModel:
     """The model at its strikes and sensor alone: what a trial needs."""
     rows = np.append(heard.strike_vertex, heard.sensor_vertex)
@@ -122,7 +127,7 @@ class Trial:
         return self._scored(self.loaded(vertex, mass, along, ratio), vertex, mass, along, shift, ratio, width)
 
     def _scored(self, made: tuple[Array, Array], vertex: int, mass: float, along: tuple[float, float], shift: float, ratio: float, width: float) -> Scored:
-        price, _, _, found = agreed(self.line, self.size, *made, shift=shift, turns=1, width=width)
+        price, _, _, found = agreed(self.line, self.size, *made, shift=shift, turns=1, width=width, strict=strict(width))
         return price + self.unlikely(ratio), vertex, mass, along, found, ratio
 
     def refined(self, best: Scored, widths: tuple[float, ...] = WIDTHS) -> Scored:
@@ -185,7 +190,7 @@ class Trial:
         """Gauss and Newton's (5,), as little as MOST at once; where lines say nothing of a number it stays."""
         _, _, _, _, shift, ratio = best
         made = self.loaded(best[1], best[2], best[3], ratio)
-        _, row, column, shift = agreed(self.line, self.size, *made, shift=shift, turns=1, width=width)
+        _, row, column, shift = agreed(self.line, self.size, *made, shift=shift, turns=1, width=width, strict=strict(width))
         off = np.log(self.line[row] / made[0][column]) - shift
         slope = np.zeros((len(row), 5))
         slope[:, 4] = 1.0

@@ -1,8 +1,8 @@
 """Which line is which mode of a body that an effect has changed: by nearness and by pattern over the strikes.
 
-    price_kj = ((ln f_k − ln f_j − s)/w)²/18 + (1 − c_kj),  at most 1;  Σ worth_k (price − 1) -> min over one-to-one pairs     [Kuhn 1955; Crouse 2016]
+    price_kj = ((ln f_k − ln f_j − s)/w)²/18 + κ (1 − c_kj),  at most 1;  Σ worth_k (price − 1) -> min over one-to-one pairs     [Kuhn 1955; Crouse 2016]
 
-c: cosine of the amplitudes' magnitudes over the strikes; s: the common shift ln f, found in turns with the pairs; worth: a line's strength, in logarithm.
+c: cosine of the amplitudes' magnitudes over the strikes, κ: how strictly it is taken; s: the common shift ln f, found in turns with the pairs; worth: a line's strength, in logarithm.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def patterns(h: Heard, model: ModalModel) -> Array:
 
 
 def agreed(
-    line_hz: Array, size: Array, mode_hz: Array, pattern: Array, *, shift: float = 0.0, turns: int = 2, width: float = WIDTH
+    line_hz: Array, size: Array, mode_hz: Array, pattern: Array, *, shift: float = 0.0, turns: int = 2, width: float = WIDTH, strict: float = 1.0
 ) -> tuple[float, Array, Array, float]:
     """(score, line (p,), mode (p,), shift): the least price, 0 where nothing pairs and −Σ worth where all do."""
     from scipy.optimize import linear_sum_assignment
@@ -54,7 +54,7 @@ def agreed(
     row = column = np.zeros(0, int)
     score = 0.0
     for turn in range(turns + 1):
-        price = np.minimum(((x - y - shift) / width) ** 2 / 18 + (1 - alike), 1.0) - 1.0
+        price = np.minimum(((x - y - shift) / width) ** 2 / 18 + strict * (1 - alike), 1.0) - 1.0
         price = price * worth[:, None] * force[None, :]
         row, column = linear_sum_assignment(price)
         good = price[row, column] < 0

@@ -7,8 +7,8 @@ import pytest
 from made_body import plate
 
 from sonic_bullet.effects.added_mass import AddedMass
-from sonic_bullet.effects.riding import FAR, attached, loaded
 from sonic_bullet.effects.rebound import _agreed, _delayed, _sought
+from sonic_bullet.effects.riding import FAR, attached, loaded
 
 
 def test_a_mass_where_no_mode_moves_hangs_on_what_the_point_yields() -> None:
