@@ -104,6 +104,9 @@ def modes_of(h: Hypothesis, body: Struck) -> tuple[ModalModel, Array]:
         before, model = model, effect.apply(model)
         if effect.id in TURNS:
             order = order[came_from(before, model)]
+    for effect in h.at(Stage.BANK, fitted=body.gathered is not None):
+        if hasattr(effect, "turned"):  # axes of twins
+            model = effect.turned(model)
     return ordered(model, model.freq_hz * (1 + correction[: model.mode_count]), model.decay_per_s) if last else (model, order)
 
 

@@ -187,7 +187,8 @@ def _middle(ratio: Array, weight: Array) -> float:
 
 
 def _gained(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...]) -> Hypothesis:
-    """σ by the amplitudes."""
+    """σ by the amplitudes, times what effects that hide them from the lines know better."""
+    louder = float(np.prod([getattr(e, "louder", 1.0) for e in h.effects]))
     told, seen, spread = [], [], []
     for one in heard:
         if not len(one.freq_hz) or one.signal is None:
@@ -221,4 +222,4 @@ def _gained(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...])
         sd2 = (s[0] ** 2 + (gain * s[1]) ** 2) + 1e-300
         gain = float((weight * x * y / sd2).sum() / max(float((weight * x**2 / sd2).sum()), 1e-300))
         weight = 1 / (1 + ((y - gain * x) ** 2 / sd2) / 6.25)
-    return replace(h, gain=gain) if gain > 0 and np.isfinite(gain) else h
+    return replace(h, gain=gain * louder) if gain > 0 and np.isfinite(gain) else h

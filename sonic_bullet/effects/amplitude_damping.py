@@ -2,7 +2,8 @@
 
     ȧ = −d a (1 + c a)      ->      a₀/a(t) = (1 + c a₀) e^{dt} − c a₀         [Adhikari 2013, ch. 1; equivalent damping: Nayfeh & Mook 1979, § 3.3]
 
-Read off the envelopes of single modes: early decay faster than late, the more so the harder the strike; d is the mode's, c of all.
+Read off the envelopes of single modes, or twins: early decay faster than late, the more so the harder the strike; d is the mode's, c of all,
+and twins have the axes that the envelopes tell (axes.py).
 """
 
 from __future__ import annotations
@@ -13,18 +14,27 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from sonic_bullet.effects.amplitude_pitch import _per_velocity
-from sonic_bullet.effects.envelope import Envelopes, envelopes, levels
+from sonic_bullet.effects.axes import ANGLES, turned
+from sonic_bullet.effects.choked import Line, Told, lines_under, onset, told, would
+from sonic_bullet.effects.envelope import envelopes, levels
 from sonic_bullet.effects.values import Evidence, Heard, Owner, Ring, Stage
-from sonic_bullet.records import Array
+from sonic_bullet.records import Array, ModalModel
 
 BETTER = 3.0  # of ln variance of the envelopes' logarithms, all lines together
-TELL = 3  # lines at least whose variance halves
+SHARE, FEWEST = 0.5, 1.5  # of the misfit must go, in lines that a choke would bend; of such lines
 LEAST = 0.05  # of c a₀ at the loudest
+CHOKES = np.geomspace(0.02, 30, 28)  # of c a₀ at the loudest
+AGAIN = np.geomspace(0.4, 2.5, 9)  # of what all evidence said
+TURNS = 0.1  # of a line's ln variance, that its twins' axes must be worth
 
 
 @dataclass(frozen=True)
 class AmplitudeDamping:
-    """choke: relative rise of the decay per level. measure: as in amplitude-pitch. alpha_per_s, beta_s: the material's, as the decays at low level tell them."""
+    """choke: relative rise of the decay per level. measure: as in amplitude-pitch. alpha_per_s, beta_s: the material's, as the decays at low level tell them.
+
+    louder: modes at the onset over what the linear model plays, as its lines miss some of a fall that is no exponential. freq_hz, turn_rad: of twins, and how
+    far their axes are turned from the mesh's.
+    """
 
     id: ClassVar[str] = "amplitude-damping"
     stage: ClassVar[Stage] = Stage.BANK
@@ -35,60 +45,117 @@ class AmplitudeDamping:
     measure: str = "velocity"
     alpha_per_s: float = float("nan")
     beta_s: float = float("nan")
+    louder: float = 1.0
+    freq_hz: tuple[float, ...] = ()
+    turn_rad: tuple[float, ...] = ()
 
     def apply(self, x: Ring) -> Ring:
         """The ringing with the effect in it."""
         return replace(x, choke=x.choke + self.choke * _per_velocity(x, self.measure))
 
+    def turned(self, x: ModalModel) -> ModalModel:
+        """The modes as they were, twins about their own axes."""
+        return turned(x, self.freq_hz, self.turn_rad)
+
     def parameters(self) -> dict[str, Any]:
         """What it says, for people and JSON, in SI units."""
-        return {"choke": self.choke, "measure": self.measure}
+        twins = [{"freq_hz": f, "turn_rad": t} for f, t in zip(self.freq_hz, self.turn_rad, strict=True)]
+        return {"choke": self.choke, "measure": self.measure} | ({"twins": twins} if twins else {})
 
     def freedom(self) -> int:
-        return 2
+        return 2 + len(self.freq_hz)
 
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
         best: tuple[float, Self] | None = None
+        known = evidence.known if isinstance(evidence.known, cls) else None
         for h in evidence.heard:
             e = envelopes(h)
             if e is None:
                 continue
-            for name, level in levels(h).items():
-                found = _fitted(e, h, level[:, e.line], sure=evidence.known is None)
-                if found is not None and found[2] > BETTER * (evidence.known is None) and (best is None or found[2] > best[0]):
-                    best = (found[2], cls(found[0], name, *found[1]))
+            for name in [known.measure] if known is not None else levels(h):
+                lines = lines_under(e, h, name)
+                found = _fitted(lines, known.choke if known is not None else None)
+                if found is not None and (best is None or found.gain > best[0]):
+                    best = (found.gain, cls(found.choke, name, *_rayleigh(h, lines, found.told), _louder(h, lines, found), *_axes(lines, found)))
         return best[1] if best is not None else None
 
 
-def _fitted(e: Envelopes, h: Heard, level: Array, *, sure: bool = True) -> tuple[float, tuple[float, float], float] | None:
-    """c, (α, β) by the low-level decays, and how much of ln variance goes, all lines together."""
-    rows = [r for r in (_rows(e, h, level, q) for q in range(len(e.line))) if r is not None]
-    if len(rows) < 2:
+@dataclass(frozen=True, slots=True, eq=False)
+class _Fit:
+    """c, what it is worth in ln variance, and what every line says under it."""
+
+    choke: float
+    gain: float
+    told: tuple[Told, ...]
+
+
+def _fitted(lines: list[Line], known: float | None) -> _Fit | None:
+    """The choke that all lines agree on; None where it is not one that they are sure of. known: what all evidence said, if this is a part of it."""
+    if len(lines) < 2:
         return None
-    most = float(np.max([r[2].max() for r in rows]))
-    plain, _ = _misfit(rows, 0.0)
-    grid = np.geomspace(0.02, 30, 28) / most
-    costs = np.array([_misfit(rows, c)[0].sum() for c in grid])
-    i = int(costs.argmin())
-    fine = np.geomspace(grid[max(i - 1, 0)], grid[min(i + 1, len(grid) - 1)], 13)
-    inner = np.array([_misfit(rows, c)[0].sum() for c in fine])
-    choke = float(fine[int(inner.argmin())])
-    cost, ratio = _misfit(rows, choke)
-    gain = plain - cost
+    most = float(max(line.level.max() for line in lines))
+    plain = tuple(told(line, 0.0) for line in lines)
+    grid = CHOKES / most if known is None else known * AGAIN
+    rows = _along(lines, grid)
+    i = int(np.argmin([_cost(row) for row in rows]))
+    fine = np.geomspace(grid[max(i - 1, 0)], grid[min(i + 1, len(grid) - 1)], 9)
+    closer = _along(lines, fine)
+    j = int(np.argmin([_cost(row) for row in closer]))
+    choke, row = float(fine[j]), closer[j]
+    gain = np.array([a.spread.min() - b.spread.min() for a, b in zip(plain, row, strict=True)])
     if choke * most < LEAST:
         return None
-    if sure and ((gain > np.log(2)).sum() < TELL or -gain[gain < 0].sum() > 0.3 * gain[gain > 0].sum()):
+    if known is None and not (gain.sum() > BETTER and -gain[gain < 0].sum() < 0.3 * gain[gain > 0].sum() and _sure(lines, choke, plain, row)):
         return None
-    omega2 = np.array([h.omega[k] ** 2 for k in e.line])[[i for i in range(len(e.line)) if _rows(e, h, level, i) is not None]]
-    low = ratio * np.array([r[4] for r in rows])
-    return choke, _rayleigh(omega2, low), float(gain.sum())
+    return _Fit(choke, float(gain.sum()), row)
 
 
-def _rayleigh(omega2: Array, decay: Array) -> tuple[float, float]:
-    """α, β >= 0 by relative least squares with Huber's weights."""
+def _along(lines: list[Line], chokes: Array) -> list[tuple[Told, ...]]:
+    """What every line says of each choke, every decay found from the one before."""
+    rows: list[tuple[Told, ...]] = []
+    for choke in chokes.tolist():
+        rows.append(tuple(told(line, choke, rows[-1][k].decay_per_s if rows else None) for k, line in enumerate(lines)))
+    return rows
+
+
+def _cost(row: tuple[Told, ...]) -> float:
+    return float(sum(one.spread.min() for one in row))
+
+
+def _sure(lines: list[Line], choke: float, plain: tuple[Told, ...], row: tuple[Told, ...]) -> bool:
+    """Whether the lines that a choke would bend are bent so: each counts by what a choke would be of its misfit, so one loud mode and a softer one will do."""
+    before = np.exp([one.spread[0] for one in plain])
+    after = np.exp([one.spread.min() for one in row])
+    bent = np.array([would(line, choke, float(one.decay_per_s[one.best]), one.best) for line, one in zip(lines, row, strict=True)])
+    says = np.minimum(bent / before, 1.0)
+    gone = np.maximum(1 - after / before, -1.0)
+    many = float(says.sum() ** 2 / max((says**2).sum(), 1e-300))
+    return many >= FEWEST and float((says * gone).sum() / max(says.sum(), 1e-300)) > SHARE
+
+
+def _louder(h: Heard, lines: list[Line], found: _Fit) -> float:
+    """The modes' levels at the onset over the linear model's: the middle one of all lines and strikes."""
+    level = [onset(line, found.choke, float(one.decay_per_s[one.best]), one.best) for line, one in zip(lines, found.told, strict=True)]
+    plain = [np.abs(h.push[:, h.mode[line.number]].sum(axis=1)) for line in lines]
+    ratio = np.stack(level, axis=1) / np.maximum(np.stack(plain, axis=1), 1e-300)
+    return float(np.nanmedian(ratio)) if np.isfinite(ratio).any() else 1.0
+
+
+def _axes(lines: list[Line], found: _Fit) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Frequencies and angles of the twins whose axes are heard."""
+    heard = [
+        (line.freq_hz, float(ANGLES[one.best])) for line, one in zip(lines, found.told, strict=True) if one.best and one.spread[0] - one.spread.min() > TURNS
+    ]
+    return tuple(f for f, _ in heard), tuple(t for _, t in heard)
+
+
+def _rayleigh(h: Heard, lines: list[Line], row: tuple[Told, ...]) -> tuple[float, float]:
+    """α, β >= 0 of the lines' decays at low level, by relative least squares with Huber's weights."""
     from scipy.optimize import nnls
 
+    omega2 = np.array([h.omega[line.number] ** 2 for line in lines])
+    decay = np.array([one.decay_per_s[one.best] for one in row])
     columns = np.stack([0.5 * np.ones(len(omega2)), 0.5 * omega2], axis=1) / decay[:, None]
     scale = np.abs(columns).max(axis=0)
     trust, x = np.ones(len(decay)), np.zeros(2)
@@ -97,34 +164,3 @@ def _rayleigh(omega2: Array, decay: Array) -> tuple[float, float]:
         off = np.abs(columns / scale @ x - 1)
         trust = np.sqrt(np.minimum(1, 0.1 / np.maximum(off, 1e-9)))
     return float(x[0] / scale[0]), float(x[1] / scale[1])
-
-
-def _rows(e: Envelopes, h: Heard, level: Array, q: int) -> tuple[Array, Array, Array, Array, float] | None:
-    """Times, ln |z|, level, strike index of a line's clear frames, and the heard decay."""
-    t, y, a, who = [], [], [], []
-    for s in range(len(e.z)):
-        use = e.good[s, q]
-        if use.sum() < 8:
-            continue
-        t.append(e.time_s[q, use])
-        y.append(np.log(np.abs(e.z[s, q, use])))
-        a.append(np.full(int(use.sum()), level[s, q]))
-        who.append(np.full(int(use.sum()), s))
-    if not t:
-        return None
-    return np.concatenate(t), np.concatenate(y), np.concatenate(a), np.concatenate(who), max(float(h.decay_per_s[e.line[q]]), 1e-2)
-
-
-def _misfit(rows: list[tuple[Array, Array, Array, Array, float]], choke: float) -> tuple[Array, Array]:
-    """ln of the variance (r,) that each line leaves, and the ratio (r,) of its d to the heard one."""
-    found, ratio = [], []
-    scales = np.geomspace(0.2, 1.6, 41)
-    for t, y, a, who, decay in rows:
-        u = np.exp(np.minimum(decay * scales[:, None] * t, 300))
-        left = y + np.log((1 + choke * a) * u - choke * a)
-        mine = (who == np.unique(who)[:, None]).astype(float)
-        left = left - (left @ mine.T / mine.sum(axis=1)) @ mine
-        spread = (left**2).mean(axis=1)
-        found.append(np.log(spread.min() + 2.5e-5))
-        ratio.append(float(scales[int(spread.argmin())]))
-    return np.array(found), np.array(ratio)

@@ -62,6 +62,9 @@ def with_modes(model: ModalModel, material: Material) -> ModalModel:
     effects = of_stage(material, Stage.BANK)
     if not effects:
         return model
+    for effect in effects:
+        if hasattr(effect, "turned"):
+            model = effect.turned(model)
     square = (model.shape.astype(float) ** 2).sum(axis=1)
     level = np.sqrt(square.mean(axis=0) / 3 * square.max(axis=0))
     none = np.zeros(model.mode_count)

@@ -9,7 +9,8 @@
 An effect is physics with few parameters. `propose` reads them off the evidence, or says None; it never scores itself: the diagnosis
 renders strikes that were not fitted, with and without it. An effect that hides the modes' own decays or levels from the lines either carries
 alpha_per_s and beta_s as it found them beside itself, and the host takes those over (friction), or has a method `dried`, Heard -> Heard: the same
-lines as they would be without it (a room), and the host tells everything else from those.
+lines as they would be without it (a room), and the host tells everything else from those. One that has found modes louder at the onset than their lines are
+says so (louder, a factor); one under which the axes of twins are heard has a method `turned`, ModalModel -> ModalModel, for those.
 """
 
 from __future__ import annotations

@@ -1,0 +1,131 @@
+"""Lines whose decay goes with the level of the modes they stand for: d and what is left, for a given choke c; and the axes of twins.
+
+    ln |z_s(t)| = const_s + ln |Σ_m A_sm e/(1 + x_sm (1 − e))|,   e = e^{−dt},  x_sm = c a_sm            [effects.amplitude_damping]
+    d by Gauss and Newton; const_s of each strike alone, so no gain is needed
+
+Two twins are one line, and each is choked by its own level: how loud each is depends on where the pair's axes lie, which in a linear body nobody
+hears, and which a mesh leaves to chance (axes.py). ψ is tried all round, line by line.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sonic_bullet.effects.axes import ANGLES, about, twins
+from sonic_bullet.effects.envelope import Envelopes
+from sonic_bullet.effects.values import Heard
+from sonic_bullet.records import Array
+
+ROUGH = 5e-3  # of ln |z|: what neighbours and windows do to a frame
+FEWEST = 8  # clear frames of a strike
+THIN = 3  # one frame of so many will do where angles are tried
+STEPS = 4  # of Gauss and Newton
+RANGE = (0.2, 1.6)  # of the heard decay
+FAINT = 1e-3  # of Σ|A|: twins may cancel, not vanish
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Line:
+    """A line's frames: time_s (t,), logarithm (s, t) and weight (s, t) of |z|; amplitude and level (p, s, j) of its j modes under p angles of their axes.
+
+    freq_hz: the modes' middle in the model; decay_per_s: as heard. number: which of the heard.
+    """
+
+    number: int
+    freq_hz: float
+    decay_per_s: float
+    time_s: Array
+    log: Array
+    weight: Array
+    amplitude: Array
+    level: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Told:
+    """Of a line under a choke: ln of the variance (p,) it leaves and its decay (p,) under every angle."""
+
+    spread: Array
+    decay_per_s: Array
+
+    @property
+    def best(self) -> int:
+        return int(self.spread.argmin())
+
+
+def lines_under(e: Envelopes, h: Heard, measure: str) -> list[Line]:
+    """The lines that say something, their levels by a measure."""
+    found = []
+    for q, k in enumerate(e.line.tolist()):
+        good = e.good[:, q] & (e.good[:, q].sum(axis=1) >= FEWEST)[:, None]
+        if not good.any():
+            continue
+        pair = twins(h, k)
+        amplitude, level = about(h, k, measure, ANGLES if pair else np.zeros(1))
+        thin = slice(None, None, THIN if pair else 1)
+        size = np.maximum(np.abs(e.z[:, q]), 1e-300)
+        weight = np.where(good, 1 / (ROUGH**2 + (e.noise[:, q, None] / size) ** 2), 0.0)[:, thin]
+        freq = float(h.model.freq_hz[h.mode[k]].mean()) if h.model is not None else float(h.freq_hz[k])
+        found.append(Line(k, freq, max(float(h.decay_per_s[k]), 1e-2), e.time_s[q, thin], np.log(size)[:, thin], weight, amplitude, level))
+    return found
+
+
+def told(line: Line, choke: float, start: Array | None = None) -> Told:
+    """What a line says of a choke. start (p,): decays to begin with."""
+    if choke == 0:  # no angle counts
+        line = _first(line)
+    many = len(line.amplitude)
+    decay = np.full(many, line.decay_per_s) if start is None or len(start) != many else start
+    low, high = RANGE[0] * line.decay_per_s, RANGE[1] * line.decay_per_s
+    for _ in range(STEPS):
+        left, slope = _left(line, choke, decay)
+        step = (line.weight * left * slope).sum(axis=(1, 2)) / np.maximum((line.weight * slope**2).sum(axis=(1, 2)), 1e-300)
+        decay = np.clip(decay - step, low, high)
+    left, _ = _left(line, choke, decay)
+    return Told(np.log((line.weight * left**2).sum(axis=(1, 2)) / line.weight.sum() + ROUGH**2), decay)
+
+
+def would(line: Line, choke: float, decay_per_s: float, angle: int) -> float:
+    """The variance that no choke would leave of a line that is just what a choke makes it: what the choke is of its misfit."""
+    one = _first(line, angle)
+    model = _model(one, choke, np.array([decay_per_s]))[0][0]
+    plain = told(Line(one.number, one.freq_hz, one.decay_per_s, one.time_s, model, one.weight, one.amplitude, one.level), 0.0)
+    return float(np.exp(plain.spread[0]))
+
+
+def onset(line: Line, choke: float, decay_per_s: float, angle: int) -> Array:
+    """|z| (s,) at the onset, as the whole envelope tells it; NaN for strikes that say nothing."""
+    one = _first(line, angle)
+    model = _model(one, choke, np.array([decay_per_s]))[0][0]
+    total = line.weight.sum(axis=1)
+    mean = (line.weight * (line.log - model)).sum(axis=1) / np.where(total > 0, total, np.nan)
+    return np.asarray(np.exp(mean) * np.maximum(np.abs(one.amplitude[0].sum(axis=1)), FAINT * np.abs(one.amplitude[0]).sum(axis=1)))
+
+
+def _first(line: Line, angle: int = 0) -> Line:
+    """The line under one angle alone."""
+    one = slice(angle, angle + 1)
+    return Line(line.number, line.freq_hz, line.decay_per_s, line.time_s, line.log, line.weight, line.amplitude[one], line.level[one])
+
+
+def _model(line: Line, choke: float, decay: Array) -> tuple[Array, Array]:
+    """ln |z| (p, s, t) but for a constant, and its slope over the decay."""
+    fall = np.exp(-decay[:, None] * line.time_s)[:, None, None, :]  # (p, 1, 1, t)
+    x = choke * line.level[..., None]  # (p, s, j, 1)
+    under = 1 + x * (1 - fall)
+    part = line.amplitude[..., None] / under
+    total = part.sum(axis=2)
+    least = FAINT * np.abs(line.amplitude).sum(axis=2)[..., None]
+    total = np.where(np.abs(total) > least, total, np.where(total < 0, -1.0, 1.0) * np.maximum(least, 1e-300))
+    slope = -line.time_s * (part * (1 + x) / under).sum(axis=2) / total
+    return np.log(np.abs(total)) - decay[:, None, None] * line.time_s, slope
+
+
+def _left(line: Line, choke: float, decay: Array) -> tuple[Array, Array]:
+    """Model − heard (p, s, t) and its slope over the decay, without each strike's mean."""
+    model, slope = _model(line, choke, decay)
+    share = line.weight / np.maximum(line.weight.sum(axis=1, keepdims=True), 1e-300)
+    left = model - line.log
+    return left - (share * left).sum(axis=2, keepdims=True), slope - (share * slope).sum(axis=2, keepdims=True)

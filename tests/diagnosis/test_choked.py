@@ -1,0 +1,71 @@
+"""Modes whose decay goes with their level: their numbers are the envelopes', twins and all."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from made_body import ALPHA, BETA, GAIN, plate, recorded
+from test_found_again import BAND, fitted
+
+from sonic_bullet.diagnosis.baseline import takes_of
+from sonic_bullet.diagnosis.evidence import evidence_of
+from sonic_bullet.diagnosis.judge import mean_db
+from sonic_bullet.diagnosis.refit import refitted
+from sonic_bullet.effects.amplitude_damping import AmplitudeDamping
+from sonic_bullet.effects.axes import turned
+from sonic_bullet.records import ModalModel
+
+PAIR = (3, 4)
+
+
+def with_twins() -> ModalModel:
+    """The plate, two neighbours of it at one frequency."""
+    model = plate()
+    freq = model.freq_hz.copy()
+    freq[list(PAIR)] = freq[list(PAIR)].mean()
+    return replace(model, freq_hz=freq)
+
+
+@pytest.mark.parametrize("choke", [2.0, 5.0])
+def test_choke_and_decays_are_told_to_a_few_percent(choke: float) -> None:
+    """However weak, as decays are no longer picked from a grid."""
+    body = recorded(AmplitudeDamping(choke, "velocity"))
+    base = refitted(fitted(body), (body,))
+    found = AmplitudeDamping.propose(evidence_of(base, (body,), BAND))
+    assert found is not None and found.measure == "velocity" and found.freq_hz == ()
+    assert found.choke == pytest.approx(choke, rel=0.1)
+    assert found.alpha_per_s == pytest.approx(ALPHA, rel=0.03)
+    assert found.beta_s == pytest.approx(BETA, rel=0.03)
+    assert base.gain * found.louder == pytest.approx(GAIN, rel=0.03)
+
+
+def test_twins_have_the_axes_that_their_envelopes_tell() -> None:
+    model = with_twins()
+    middle = float(model.freq_hz[PAIR[0]])
+    body = recorded(AmplitudeDamping(5.0, "velocity", freq_hz=(middle,), turn_rad=(0.6,)), model=model)
+    base = refitted(fitted(body), (body,))
+    evidence = evidence_of(base, (body,), BAND)
+    found = AmplitudeDamping.propose(evidence)
+    assert found is not None
+    assert found.choke == pytest.approx(5.0, rel=0.1)
+    assert found.freq_hz == pytest.approx((middle,), rel=1e-3)
+    assert found.turn_rad[0] == pytest.approx(0.6, abs=0.1)
+    takes = takes_of((body,))
+    own, mesh = (mean_db(takes, refitted(replace(base, effects=(e,)), (body,), evidence.heard)) for e in (found, replace(found, freq_hz=(), turn_rad=())))
+    assert own is not None and mesh is not None and own < mesh
+
+
+def test_turned_twins_sound_as_before_where_nothing_is_choked() -> None:
+    model = with_twins()
+    other = turned(model, (float(model.freq_hz[PAIR[0]]),), (0.6,))
+    one, two = (np.einsum("vxj,wyj->vwxy", m.shape[-6:, :, list(PAIR)], m.shape[-6:, :, list(PAIR)]) for m in (model, other))
+    assert np.abs(model.shape - other.shape).max() > 0.1
+    assert np.allclose(one, two, atol=1e-5)
+    assert turned(model, (123.0,), (0.6,)).shape == pytest.approx(model.shape)
+
+
+def test_a_linear_body_proposes_no_choke() -> None:
+    body = recorded(model=with_twins())
+    assert AmplitudeDamping.propose(evidence_of(refitted(fitted(body), (body,)), (body,), BAND)) is None
