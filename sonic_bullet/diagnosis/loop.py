@@ -18,7 +18,7 @@ from sonic_bullet.diagnosis.judge import Judged, Take, least_db, mean_db
 from sonic_bullet.diagnosis.play import Hypothesis, moves, play
 from sonic_bullet.diagnosis.refit import ROUGH, refitted, retold, with_effects
 from sonic_bullet.diagnosis.ties import misfit
-from sonic_bullet.diagnosis.trial import LEAST_DB, SURE, Candidate, earns, needed, trials
+from sonic_bullet.diagnosis.trial import FAINT_DB, LEAST_DB, SURE, Candidate, earns, needed, trials
 from sonic_bullet.effects.values import Effect
 from sonic_bullet.estimator.distance import with_noise
 
@@ -67,7 +67,7 @@ def closed(
     last: dict[str, Candidate] = {}
     for turn in range(ROUNDS):
         say(f"round {turn + 1}: {now:.2f} dB from the recordings, noise alone {floor:.2f} dB")
-        if now - floor < LEAST_DB:
+        if now - floor < (LEAST_DB if added else FAINT_DB):
             break  # so little is what a mesh gets wrong
         evidence = evidence_of(h, bodies, band_hz, seed=seed)
         full = retold(h, bodies)  # a room's response is the lines' so far, which leaves open more than there is
