@@ -22,6 +22,7 @@ NEPERS = 8.0  # of a line's decay are looked at
 SELF = 0.006  # relative: lines nearer than this may be one bent mode
 FAR, FASTER = 0.15, 5.0  # of a frequency; of a decay: a line that near and that short is what a mode was before it had glided down, or up
 LINK = 4.0  # of the shorter line's decay: how far in ω two lines of a chain are
+HELD = 0.8  # of 2/L to both sides, at most: what the window holds of a glide
 CLEAR = 12.0  # of |z| over the noise in it
 
 
@@ -29,7 +30,7 @@ CLEAR = 12.0  # of |z| over the noise in it
 class Envelopes:
     """z (s, q, t) complex of q lines at times time_s (q, t), each line its own; good (s, q, t) where it stands clear; line (q,): which of the heard.
 
-    phase (s, q, t): of z, without jumps, however few the frames are. noise (s, q).
+    phase (s, q, t): of z, without jumps, however few the frames are. noise (s, q). window_s (q,): L.
     """
 
     time_s: Array
@@ -38,6 +39,7 @@ class Envelopes:
     line: Array
     noise: Array
     phase: Array
+    window_s: Array
 
 
 @lru_cache(maxsize=2)
@@ -79,7 +81,7 @@ def shifted(h: Heard, signal: Array, picked: list[int], window: list[int]) -> En
             if not clear.all():  # nothing after the first dip: what comes back is something else
                 clear[int(np.argmin(clear)) :] = False
             good[s, q, : len(at)] = clear
-    return Envelopes(time, z, good, np.array(picked), noise, phase)
+    return Envelopes(time, z, good, np.array(picked), noise, phase, np.array(window) / sr)
 
 
 def alone(h: Heard) -> tuple[list[int], list[int]]:
@@ -145,8 +147,13 @@ def falls(e: Envelopes, q: int, told: float) -> float:
         use = e.good[s, q]
         if use.sum() < 8:
             continue
-        t, level = e.time_s[q, use], np.log(np.abs(e.z[s, q, use]))
-        w = np.minimum((np.abs(e.z[s, q, use]) / max(e.noise[s, q], 1e-12)) ** 2, 1e4)
+        t, size = e.time_s[q, use], np.abs(e.z[s, q, use])
+        off = np.gradient(e.phase[s, q, use], t) / (2 * np.pi) * e.window_s[q]
+        w = np.minimum((size / max(e.noise[s, q], 1e-12)) ** 2, 1e4) * (np.abs(off) < HELD)
+        if (w > 0).sum() < 8:
+            continue
+        off = np.clip(off, -HELD, HELD)
+        level = np.log(size * (1 - off**2) / np.sinc(off))  # while it glides, it is heard through the window's skirt
         t = t - np.average(t, weights=w)
         top, bottom = top - float((w * t * level).sum()), bottom + float((w * t * t).sum())
     return max(top / bottom if bottom > 0 else told, 1e-3)

@@ -1,0 +1,95 @@
+"""Modes that glide: where they are at rest, how fast they fall, and that lines of their own are no neighbours."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from made_body import plate, recorded
+from test_chains import true_decay
+from test_found_again import BAND, fitted
+
+from sonic_bullet.diagnosis.bodies import Struck
+from sonic_bullet.diagnosis.evidence import evidence_of
+from sonic_bullet.diagnosis.glide import fallen
+from sonic_bullet.diagnosis.refit import refitted, with_effects
+from sonic_bullet.diagnosis.rest import at_rest
+from sonic_bullet.effects.amplitude_pitch import AmplitudePitch
+from sonic_bullet.effects.envelope import alone, envelopes
+from sonic_bullet.effects.room import Room
+
+BENT = AmplitudePitch(0.35, "velocity")
+FAR = 2e-3  # of a frequency: what a linear fit of a mode that glides may be off
+
+
+@cache
+def made(bend: float) -> Struck:
+    return recorded(AmplitudePitch(bend, "velocity")) if bend else recorded()
+
+
+def test_modes_ring_down_to_where_they_are_at_rest() -> None:
+    """Corrections that are off come back to the plate's own frequencies beside the true bend, of all modes that stand alone."""
+    body = made(BENT.bend)
+    h = fitted(body)
+    told = evidence_of(h, (body,), BAND).heard[0]
+    mine = np.concatenate([told.mode[k] for k in alone(told)[0]])
+    others = np.setdiff1d(np.arange(len(plate().freq_hz)), mine)
+    assert len(mine) > 12 and len(others) > 0
+    wrong = replace(h, correction={"plate": np.full(len(plate().freq_hz), FAR)}, effects=(BENT,))
+    rested = refitted(wrong, (body,)).correction
+    assert rested is not None
+    assert np.abs(rested["plate"][mine]).max() < 0.1 * FAR
+    assert rested["plate"][others] == pytest.approx(FAR)
+    back = with_effects(replace(wrong, correction=rested), (), (body,)).correction
+    assert back is not None and (back["plate"] == body.correction).all(), "without the effect they are the baseline's again"
+
+
+def test_what_does_not_glide_stays_where_it_is() -> None:
+    body = made(0.0)
+    h = fitted(body)
+    faint = refitted(replace(h, effects=(AmplitudePitch(1e-7, "velocity"),)), (body,))
+    assert faint.correction is not None and h.correction is not None
+    assert (faint.correction["plate"] == h.correction["plate"]).all()
+
+
+@pytest.mark.parametrize("bend", [0.35, 1.0])
+def test_a_level_falls_as_the_linear_mode_does_while_its_lines_do_not(bend: float) -> None:
+    bent = AmplitudePitch(bend, "velocity")
+    body = made(bend)
+    lines = evidence_of(fitted(body), (body,), BAND).heard[0]
+    told = fallen(replace(fitted(body), effects=(bent,)), body, lines)
+    changed = told.decay_per_s != lines.decay_per_s
+    before = np.abs(np.log(lines.decay_per_s / true_decay(lines.freq_hz)))[changed]
+    after = np.abs(np.log(told.decay_per_s / true_decay(told.freq_hz)))[changed]
+    assert changed.sum() > 12 and before.max() > 0.5
+    assert np.median(after) < 0.01 and after.max() < 0.1
+
+
+def test_in_a_room_no_line_is_one_modes_alone() -> None:
+    body = made(BENT.bend)
+    told = evidence_of(replace(fitted(body), effects=(Room(0.4, 0.3, 3),)), (body,), BAND).heard[0]
+    assert told.dry
+    h = replace(fitted(body), effects=(BENT,))
+    assert fallen(h, body, told) is told
+    assert at_rest(h, (body,), (told,)).correction == h.correction
+
+
+@pytest.mark.parametrize("bend", [0.35, 1.0])
+def test_lines_of_a_modes_own_chain_are_no_neighbours(bend: float) -> None:
+    body = made(bend)
+    told = evidence_of(fitted(body), (body,), BAND).heard[0]
+    assert len(told.foreign_hz) > 5, "chains"
+    assert len(alone(told)[0]) >= 6
+
+
+def test_phases_are_whole_turns_apart_however_few_the_frames_are() -> None:
+    """The loudest modes turn by more than half between two frames where they begin."""
+    body = made(1.0)
+    told = evidence_of(fitted(body), (body,), BAND).heard[0]
+    e = envelopes(told)
+    assert e is not None
+    assert np.abs(np.exp(1j * e.phase) - e.z / np.abs(e.z))[e.good].max() < 1e-6
+    turned = np.abs(np.diff(e.phase, axis=2))[e.good[:, :, 1:] & e.good[:, :, :-1]]
+    assert turned.max() > np.pi
