@@ -29,6 +29,7 @@ from sonic_bullet.side_by_side import side_by_side
 POINTS = 100
 SHARES = (0.002, 0.006, 0.015, 0.03, 0.055, 0.1, 0.16)  # of the body's mass
 YIELDS = (0.0, 1.0, 4.0)  # of what modes above the band may yield, to begin with
+LIGHTEST = 0.005  # of the body's: what is lighter moves no mode by 1 % (Δf/f = −2 m/M at a bar's end), so a mesh or the body's own imperfection may be what it stands for
 TRIES = 6
 MATCHED, MOVED = 0.8, 2.5e-3  # share of lines, and how far nine in ten of them may lie off: a mesh's error
 STAYED = 0.5  # of all lines' strength
@@ -106,7 +107,9 @@ class AddedMass:
         again = sorted(trial.scored(int(v), *best[2:], WIDTHS[1]) for v in spread_out(x, 3 * POINTS))  # round bodies: as heavy, elsewhere
         best = min(best, *side_by_side(lambda start: trial.refined(start, WIDTHS[1:]), again[: TRIES // 2]))
         bare = none[0] + trial.unlikely(trial.fitted)
-        return None if best[0] > bare - max(BETTER[0], BETTER[1] * abs(bare)) else cls._at(x, best, heard.poisson is not None)
+        if best[0] > bare - max(BETTER[0], BETTER[1] * abs(bare)) or best[2] < LIGHTEST * x.mass_kg:
+            return None
+        return cls._at(x, best, heard.poisson is not None)
 
     @classmethod
     def _at(cls, x: ModalModel, found: Scored, told: bool) -> Self:
