@@ -55,7 +55,18 @@ def sought(t: Trial) -> Dashpots:
         best = min(tried, key=_cost)
         if tried[-1][0] > best[0] + HALF * apiece or best not in tried[-2:]:
             break  # weak ones have been looked for; of two as strong as each other, one alone may not pay
-    return without_idle(min([*tried, some], key=_cost))
+    return _elsewhere(t, without_idle(min([*tried, some], key=_cost)), spots)
+
+
+def _elsewhere(t: Trial, found: Dashpots, spots: Array) -> Dashpots:
+    """The same number of dashpots, or a better set that some of them being far from where they are lead to: on round bodies a search may end on the wrong side."""
+    best = (t.left(found), found)
+    for i in range(len(found)):
+        moved = [(*found[:i], replace(found[i], vertex=int(v)), *found[i + 1 :]) for v in spots]
+        few = _best([t.beside(*modes, 1) for modes in t.poles(moved, t.runs)], [(*m[:i], *m[i + 1 :], m[i]) for m in moved], STARTS)
+        ends = [refined(t, one, NEARER)[1] for one in few]
+        best = min([best, *((t.left(end), end) for end in ends)], key=_cost)
+    return best[1]
 
 
 def _cost(pair: tuple[float, Dashpots]) -> float:
