@@ -156,8 +156,9 @@ def _filter(heard: list[Heard], better: float) -> dict[str, Any]:
         return {}
     sr = min(h.sr for h in heard)
     best: tuple[float, dict[str, Any]] = (_misfit(ratio, sd) - better - 2 * np.log(len(freq)), {})
-    grid = np.geomspace(0.3 * freq.min(), min(3 * freq.max(), HIGHEST * sr), CORNERS)
-    for name in ("high", "low"):
+    bottom, top = float(freq.min()), min(float(freq.max()), HIGHEST * sr)
+    for name, ends in (("high", (0.3 * bottom, top)), ("low", (bottom, min(3 * top, HIGHEST * sr)))):  # beyond all lines it is a slope, which much else is
+        grid = np.geomspace(*ends, CORNERS)
         for order in (1, 2, 3, 4):
 
             def cost(corner: float, order: int = order, high: bool = name == "high") -> float:

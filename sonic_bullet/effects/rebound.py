@@ -26,7 +26,7 @@ LEAST = 0.06  # of the first hit's share
 GAIN = 0.02  # of what is left must go with another hit
 NEAR = 0.03  # of ln t: delays that agree
 HELD = 0.999  # of the energy of what is played again
-MOST = 0.6  # of the strikes show it
+MOST, FEW = 0.6, 0.05  # of the strikes show it one by one; of all recordings' energy, that it must say together where fewer do: beating twins hide it
 FADE = 2.0  # nepers over what is looked at
 RATIOS = (0.75, 0.9, 1.0)
 HITS = (3, 4, 5, MOST_HITS)
@@ -85,7 +85,7 @@ class Rebound:
             return replace(evidence.known, **again) if again["restitution"] > LEAST else None
         found = [(level, hits) for level, hits in zip(h.impulse_n_s, _hits(h), strict=True) if len(hits)]
         need = max(2.0, MOST * len(h.impulse_n_s))
-        if len(found) < need:
+        if len(found) < 2:
             return None
         level = np.array([j if np.isfinite(j) else 1.0 for j, _ in found])
         reference = float(np.exp(np.log(level).mean()))
@@ -96,7 +96,7 @@ class Rebound:
         (_, first, which), exponent = max(agreed, key=lambda a: a[0][0])
         mine = [(t, i) for t, i in zip(every, which, strict=True) if i >= 0]
         share = np.array([t[i, 1] for t, i in mine])
-        if len(mine) < need or _spread(np.log(share)) > 0.5:
+        if len(mine) < 2 or _spread(np.log(share)) > 0.5:
             return None
         after = [t[t[:, 0] > 1.03 * t[i, 0]] for t, i in mine]
         score, ratio, _ = _agreed([np.log(np.maximum(a[:, 0] / t[i, 0] - 1, 1e-3)) for a, (t, i) in zip(after, mine, strict=True)], [a[:, 1] for a in after])
@@ -105,7 +105,10 @@ class Rebound:
         count = 1 + round(float(np.median([len(t) - i for t, i in mine])))
         start = cls(float(np.exp(first)), reference, e, exponent, shrink, count)
         ends = [_refined(replace(start, hits=k), h) for k in ((2,) if count <= 2 or shrink is None else HITS)]
-        return replace(start, **min(ends, key=lambda end: end[0])[1])
+        left, best = min(ends, key=lambda end: end[0])
+        if len(mine) < need and left > _refined(replace(start, hits=1), h)[0] - FEW * len(h.impulse_n_s):
+            return None
+        return replace(start, **best)
 
 
 def _refined(start: Rebound, h: Heard) -> tuple[float, dict[str, Any]]:
