@@ -26,7 +26,11 @@ ROUNDS = 4
 MESH = 1e-3  # of a frequency: what a good mesh gets wrong
 SUFFICES_DB = 1.5  # a gap below this is the mesh's and the shapes' own
 EXPLAINED = 0.5  # of the gap; part of it is the mesh's and the shapes' own
-NEARLY, CLEAR = 0.2, 25.0  # of what a name says, and twice the ln likelihood of phases: where they decide between two
+NEARLY, CLEAR, HINT = (
+    0.2,
+    25.0,
+    5.0,
+)  # of what a name says, and twice the ln likelihood of phases: where they decide between two, and between two that are ALIKE
 HELPS = 0.5  # of what a name must gain on strikes left out, on all of them together: a model of few lines may be saved by chance once one is left out
 OPEN = 0.3  # of the first gap: with less left, no costly suspect is asked
 
@@ -164,8 +168,9 @@ def simplest(able: Sequence[Candidate], bodies: tuple[Struck, ...]) -> Candidate
     others = [c for c in rivals if c is not first and c.effect.freedom() <= first.effect.freedom() and close(c, NEARLY)]
     if not others:
         return first
-    off, own = [misfit(c.hypothesis, bodies) for c in others], misfit(first.hypothesis, bodies)
-    return others[int(np.argmin(off))] if np.isfinite(own) and min(off) < own - CLEAR else first
+    own = misfit(first.hypothesis, bodies)  # the less strikes say, the less phases need to
+    off = np.array([misfit(c.hypothesis, bodies) + (HINT if close(c, ALIKE) else CLEAR) for c in others])
+    return others[int(off.argmin())] if np.isfinite(own) and off.min() < own else first
 
 
 def described(candidates: Sequence[Candidate]) -> list[dict[str, Any]]:
