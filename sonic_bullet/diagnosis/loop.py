@@ -149,6 +149,11 @@ def _pruned(h: Hypothesis, added: list[Candidate], bodies: tuple[Struck, ...], t
     return h, added
 
 
+def _numbers(c: Candidate) -> int:
+    """How many more a model has with an effect than without: a law in Rayleigh's place takes α and β away."""
+    return c.effect.freedom() - 2 * (c.id == "damping-law")
+
+
 def simplest(able: Sequence[Candidate], bodies: tuple[Struck, ...]) -> Candidate:
     """The best, or the one with the fewest numbers of those that strikes cannot tell from it: SURE standard errors of the difference, ALIKE of what it says.
 
@@ -164,8 +169,8 @@ def simplest(able: Sequence[Candidate], bodies: tuple[Struck, ...]) -> Candidate
         return bool(more.mean() <= SURE * more.std(ddof=1) / np.sqrt(len(more)) and more.mean() < share * best.mean_db)
 
     rivals = [c for c in able if not moves(c.hypothesis)]
-    first = min((c for c in rivals if close(c, ALIKE)), key=lambda c: (c.effect.freedom(), -c.mean_db))
-    others = [c for c in rivals if c is not first and c.effect.freedom() <= first.effect.freedom() and close(c, NEARLY)]
+    first = min((c for c in rivals if close(c, ALIKE)), key=lambda c: (_numbers(c), -c.mean_db))
+    others = [c for c in rivals if c is not first and _numbers(c) <= _numbers(first) and close(c, NEARLY)]
     if not others:
         return first
     own = misfit(first.hypothesis, bodies)  # the less strikes say, the less phases need to
