@@ -26,11 +26,8 @@ ROUNDS = 4
 MESH = 1e-3  # of a frequency: what a good mesh gets wrong
 SUFFICES_DB = 1.5  # a gap below this is the mesh's and the shapes' own
 EXPLAINED = 0.5  # of the gap; part of it is the mesh's and the shapes' own
-NEARLY, CLEAR, HINT = (
-    0.2,
-    25.0,
-    5.0,
-)  # of what a name says, and twice the ln likelihood of phases: where they decide between two, and between two that are ALIKE
+NEARLY = 0.2  # of what a name says: between two that differ by less, phases may decide
+CLEAR, HINT = 25.0, 5.0  # twice the ln likelihood of phases that this takes; where the two are ALIKE
 HELPS = 0.5  # of what a name must gain on strikes left out, on all of them together: a model of few lines may be saved by chance once one is left out
 OPEN = 0.3  # of the first gap: with less left, no costly suspect is asked
 
@@ -157,7 +154,7 @@ def _numbers(c: Candidate) -> int:
 def simplest(able: Sequence[Candidate], bodies: tuple[Struck, ...]) -> Candidate:
     """The best, or the one with the fewest numbers of those that strikes cannot tell from it: SURE standard errors of the difference, ALIKE of what it says.
 
-    Where another with no more numbers says nearly as much (NEARLY), the lines' phases may speak for that one (ties.py). Effects that move modes stand aside:
+    Where another with no more numbers says nearly as much (NEARLY), the lines' phases may speak for that one (ties.py): CLEAR-ly, or by a HINT where it is ALIKE. Effects that move modes stand aside:
     corrections are learnt anew beside them, and are numbers too.
     """
     best = able[0]

@@ -21,7 +21,6 @@ from sonic_bullet.effects.envelope import Envelopes, alone, shifted
 from sonic_bullet.effects.values import Heard
 from sonic_bullet.records import Array
 
-SNR2 = 1e4  # a frame says no more than that
 STEP = 0.1  # of 1/duration: steps of δ
 FEWEST = 8  # frames
 
@@ -50,7 +49,7 @@ def _rested(h: Hypothesis, body: Struck, strikes: list[int], every: bool) -> Arr
     picked, window = [picked[q] for q in kept], [window[q] for q in kept]
     signal = body.gathered.signals[strikes]
     played = np.stack([play(h, body, body.fitted[i], signal.shape[1], body.gathered.sr) for i in strikes])
-    rows = replace(one, noise=one.noise[strikes] if len(one.noise) == len(one.signal if one.signal is not None else ()) else one.noise)
+    rows = replace(one, noise=one.noise[strikes])
     recorded, model = shifted(rows, signal, picked, window), shifted(rows, played, picked, window)
     for q, k in enumerate(picked):
         ratio = 1 + _off_hz(recorded, model, q, CORRECTION * float(one.freq_hz[k])) / float(one.freq_hz[k])
@@ -67,8 +66,7 @@ def _off_hz(recorded: Envelopes, model: Envelopes, q: int, most_hz: float) -> fl
         if use.sum() < FEWEST:
             continue
         both = recorded.z[s, q, use] * np.conj(model.z[s, q, use])
-        weight = np.minimum((np.abs(recorded.z[s, q, use]) / max(recorded.noise[s, q], 1e-12)) ** 2, SNR2)
-        rows.append((recorded.time_s[q, use], weight * both / np.abs(both)))
+        rows.append((recorded.time_s[q, use], recorded.worth(s, q)[use] * both / np.abs(both)))
     if not rows:
         return 0.0
     longest = max(float(np.ptp(t)) for t, _ in rows)

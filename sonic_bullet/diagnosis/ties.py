@@ -46,7 +46,7 @@ def _misfit(h: Hypothesis, body: Struck) -> float:
 
     coarse = [at(t) for t in DELAYS_S]
     middle = DELAYS_S[int(np.argmin(coarse))]
-    return min(at(t) for t in (*(middle + FINER_S), middle))
+    return min(at(t) for t in middle + FINER_S)
 
 
 def _cost(told: Array, seen: Array, sd: Array, rough: Array) -> float:

@@ -111,7 +111,7 @@ def _moments(e: Envelopes, h: Heard, level: Array, q: int) -> tuple[float, float
         if use.sum() < 8:
             continue
         t, phase = e.time_s[q, use], e.phase[s, q, use]
-        w = np.minimum((np.abs(e.z[s, q, use]) / max(e.noise[s, q], 1e-12)) ** 2, 1e4)
+        w = e.worth(s, q)[use]
         curve = level[s, q] ** 2 * omega * -np.expm1(-2 * decay * t) / (2 * decay)
         rows.append(phase - np.average(phase, weights=w))
         sides.append(curve - np.average(curve, weights=w))

@@ -7,16 +7,34 @@ Their sum is the same under every ψ as long as both are linear. Not so where ea
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
 
-from sonic_bullet.effects.mode_splitting import _pair
 from sonic_bullet.effects.values import Heard
 from sonic_bullet.records import Array, ModalModel
 
+PAIR = 6e-3  # relative: modes of a mesh nearer than this may be a pair
 MESHED = 1.5e-3  # relative: modes that a mesh leaves nearer to each other are twins that it tore apart
 ANGLES = np.arange(18) * np.pi / 36  # a quarter turn changes the twins about, and no more
+
+
+def pair_at(freq: Array, f: float) -> tuple[int, int]:
+    """The two modes of a pair about f; (-1, -1) where there is none."""
+    near = np.flatnonzero(np.abs(freq / f - 1) < 2 * PAIR)
+    if len(near) < 2:
+        return -1, -1
+    gaps = np.abs(freq[near[:-1]] + freq[near[1:]] - 2 * f) + 4 * np.diff(freq[near])
+    i = int(np.argmin(gaps))
+    return int(near[i]), int(near[i + 1])
+
+
+def about_axes(pair: Array, turn_rad: float) -> Array:
+    """Shapes (…, 2) of two twins about axes turned by ψ."""
+    c, s = math.cos(turn_rad), math.sin(turn_rad)
+    a, b = pair[..., 0], pair[..., 1]
+    return np.stack([c * a + s * b, -s * a + c * b], axis=-1)
 
 
 def twins(h: Heard, k: int) -> bool:
@@ -34,9 +52,7 @@ def about(h: Heard, k: int, measure: str, angle: Array) -> tuple[Array, Array]:
         one = np.ones((1, len(impulse), 1))
         return one, impulse[None] * one
     shape = np.stack([h.model.shape[:, :, m] for m in h.mode[k]], axis=2).astype(float)
-    c, s = np.cos(angle)[:, None, None], np.sin(angle)[:, None, None]
-    made = np.concatenate([c * shape[..., 0] + s * shape[..., 1], -s * shape[..., 0] + c * shape[..., 1]]) if len(angle) > 1 else None
-    bodies = shape[None] if made is None else np.stack([made[: len(angle)], made[len(angle) :]], axis=-1)  # (p, v, 3, j)
+    bodies = np.stack([about_axes(shape, t) for t in angle.tolist()]) if len(angle) > 1 else shape[None]  # (p, v, 3, j)
     body = np.unique(h.model.face)
     most = np.sqrt((bodies[:, body] ** 2).sum(axis=2)).max(axis=1)  # (p, j)
     push = np.einsum("psxj,sx->psj", bodies[:, h.strike_vertex], h.strike_way)
@@ -55,9 +71,7 @@ def turned(x: ModalModel, freq_hz: tuple[float, ...], turn_rad: tuple[float, ...
         return x
     shape = x.shape.copy()
     for f, turn in zip(freq_hz, turn_rad, strict=True):
-        a, b = _pair(x.freq_hz, f)
-        if a < 0:
-            continue
-        c, s = np.float32(np.cos(turn)), np.float32(np.sin(turn))
-        shape[:, :, a], shape[:, :, b] = c * x.shape[:, :, a] + s * x.shape[:, :, b], -s * x.shape[:, :, a] + c * x.shape[:, :, b]
+        a, b = pair_at(x.freq_hz, f)
+        if a >= 0:
+            shape[:, :, [a, b]] = about_axes(x.shape[:, :, [a, b]], turn)
     return replace(x, shape=shape)

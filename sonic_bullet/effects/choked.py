@@ -9,7 +9,7 @@ hears, and which a mesh leaves to chance (axes.py). ψ is tried all round, line 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -91,7 +91,7 @@ def would(line: Line, choke: float, decay_per_s: float, angle: int) -> float:
     """The variance that no choke would leave of a line that is just what a choke makes it: what the choke is of its misfit."""
     one = _first(line, angle)
     model = _model(one, choke, np.array([decay_per_s]))[0][0]
-    plain = told(Line(one.number, one.freq_hz, one.decay_per_s, one.time_s, model, one.weight, one.amplitude, one.level), 0.0)
+    plain = told(replace(one, log=model), 0.0)
     return float(np.exp(plain.spread[0]))
 
 
@@ -107,7 +107,7 @@ def onset(line: Line, choke: float, decay_per_s: float, angle: int) -> Array:
 def _first(line: Line, angle: int = 0) -> Line:
     """The line under one angle alone."""
     one = slice(angle, angle + 1)
-    return Line(line.number, line.freq_hz, line.decay_per_s, line.time_s, line.log, line.weight, line.amplitude[one], line.level[one])
+    return replace(line, amplitude=line.amplitude[one], level=line.level[one])
 
 
 def _model(line: Line, choke: float, decay: Array) -> tuple[Array, Array]:

@@ -18,6 +18,7 @@ from sonic_bullet.records import Array
 WIDTH_HZ = (30.0, 400.0)
 MOST_LINES = 30
 FRAMES = 96
+MOST_SAID = 1e4
 NEPERS = 8.0  # of a line's decay are looked at
 SELF = 0.006  # relative: lines nearer than this may be one bent mode
 FAR, FASTER = 0.15, 5.0  # of a frequency; of a decay: a line that near and that short is what a mode was before it had glided down, or up
@@ -40,6 +41,10 @@ class Envelopes:
     noise: Array
     phase: Array
     window_s: Array
+
+    def worth(self, s: int, q: int) -> Array:
+        """What each frame (t,) of a line says: its level over the noise, squared, MOST_SAID at most."""
+        return np.asarray(np.minimum((np.abs(self.z[s, q]) / max(self.noise[s, q], 1e-12)) ** 2, MOST_SAID))
 
 
 @lru_cache(maxsize=2)
@@ -149,7 +154,7 @@ def falls(e: Envelopes, q: int, told: float) -> float:
             continue
         t, size = e.time_s[q, use], np.abs(e.z[s, q, use])
         off = np.gradient(e.phase[s, q, use], t) / (2 * np.pi) * e.window_s[q]
-        w = np.minimum((size / max(e.noise[s, q], 1e-12)) ** 2, 1e4) * (np.abs(off) < HELD)
+        w = e.worth(s, q)[use] * (np.abs(off) < HELD)
         if (w > 0).sum() < 8:
             continue
         off = np.clip(off, -HELD, HELD)

@@ -13,10 +13,10 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
+from sonic_bullet.effects.axes import PAIR, about_axes, pair_at
 from sonic_bullet.effects.values import Evidence, Heard, Owner, Stage
 from sonic_bullet.records import Array, ModalModel
 
-PAIR = 6e-3  # relative: modes of a mesh nearer than this may be a pair
 SPLIT = (1e-4, 3e-2)
 HEARD = 0.12  # of a line's own width: pairs nearer than that sound as one
 REACH = 2e-2  # of a line from its pair's middle
@@ -45,13 +45,12 @@ class ModeSplitting:
         for f, split, turn in zip(self.freq_hz, self.split, self.turn_rad, strict=True):
             if split == 0:
                 continue
-            a, b = _pair(x.freq_hz, f)
+            a, b = pair_at(x.freq_hz, f)
             if a < 0:
                 continue
             middle = (x.freq_hz[a] + x.freq_hz[b]) / 2
             freq[a], freq[b] = middle * (1 - split / 2), middle * (1 + split / 2)
-            c, s = np.float32(np.cos(turn)), np.float32(np.sin(turn))
-            shape[:, :, a], shape[:, :, b] = c * x.shape[:, :, a] + s * x.shape[:, :, b], -s * x.shape[:, :, a] + c * x.shape[:, :, b]
+            shape[:, :, [a, b]] = about_axes(x.shape[:, :, [a, b]], turn)
         order = np.argsort(freq, kind="stable")
         return replace(x, freq_hz=freq[order], decay_per_s=x.decay_per_s[order], shape=shape[:, :, order])
 
@@ -71,16 +70,6 @@ class ModeSplitting:
                 found = [row[:3] for row in _pairs(h, float(np.median([row[3] for row in found])))]
             rows += found
         return cls(*(tuple(float(r[i]) for r in rows) for i in range(3))) if rows else None
-
-
-def _pair(freq: Array, f: float) -> tuple[int, int]:
-    """The two modes of a pair about f; (-1, -1) where there is none."""
-    near = np.flatnonzero(np.abs(freq / f - 1) < 2 * PAIR)
-    if len(near) < 2:
-        return -1, -1
-    gaps = np.abs(freq[near[:-1]] + freq[near[1:]] - 2 * f) + 4 * np.diff(freq[near])
-    i = int(np.argmin(gaps))
-    return int(near[i]), int(near[i + 1])
 
 
 def _pairs(h: Heard, scale: float) -> list[tuple[float, ...]]:
