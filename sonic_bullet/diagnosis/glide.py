@@ -19,11 +19,16 @@ TURNS_RAD = 0.2  # of phase, that a mode must gain or lose to be told as one tha
 SPREAD = 0.02  # of a level's own fall
 
 
+def turns_rad(h: Hypothesis, body: Struck, one: Heard) -> Array:
+    """By how much the effects turn the phases of each line's modes (s, k) until they have rung down."""
+    rings = [ring_of(h, body, body.fitted[i]) for i in one.strike]
+    turned = np.stack([np.abs(r.bend) * r.level**2 * np.pi * r.freq_hz / np.maximum(r.decay_per_s, 1e-3) for r in rings])
+    return np.stack([turned[:, who[who < turned.shape[1]]].max(axis=1, initial=0.0) for who in one.mode], axis=1)
+
+
 def gliding(h: Hypothesis, body: Struck, one: Heard) -> Array:
     """Whether each line (k,) is of modes whose phases the effects turn by TURNS_RAD or more in the end, at the strike that moves them most."""
-    rings = [ring_of(h, body, body.fitted[i]) for i in one.strike]
-    turned = np.max([np.abs(r.bend) * r.level**2 * np.pi * r.freq_hz / np.maximum(r.decay_per_s, 1e-3) for r in rings], axis=0)
-    return np.array([turned[who[who < len(turned)]].max(initial=0.0) > TURNS_RAD for who in one.mode], bool)
+    return np.asarray(turns_rad(h, body, one).max(axis=0) > TURNS_RAD)
 
 
 def fallen(h: Hypothesis, body: Struck, one: Heard) -> Heard:
@@ -31,7 +36,7 @@ def fallen(h: Hypothesis, body: Struck, one: Heard) -> Heard:
     if not bends(h) or one.signal is None or one.dry or not len(one.freq_hz):
         return one  # in a room no line is one mode's alone
     glides = gliding(h, body, one)
-    mine = [(k, width) for k, width in zip(*alone(one), strict=True) if glides[k]]
+    mine = [(k, width) for k, width in zip(*alone(one), strict=True) if glides[k] and len(one.mode[k]) == 1]  # twins beat
     if not mine:
         return one
     e = shifted(one, one.signal, [k for k, _ in mine], [width for _, width in mine])

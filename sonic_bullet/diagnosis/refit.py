@@ -14,7 +14,7 @@ import numpy as np
 
 from sonic_bullet.diagnosis.bodies import Struck
 from sonic_bullet.diagnosis.evidence import heard_of, outside, paired, path_response
-from sonic_bullet.diagnosis.glide import fallen
+from sonic_bullet.diagnosis.glide import TURNS_RAD, fallen, turns_rad
 from sonic_bullet.diagnosis.play import Hypothesis, bends, modes_of, moves, pattern, play, undamped
 from sonic_bullet.diagnosis.rest import at_rest
 from sonic_bullet.diagnosis.unheard import CORRECTION, can_tell, sought
@@ -203,9 +203,11 @@ def _gained(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...])
             hits = np.abs((blow.share[:, None] * np.exp((one.decay_per_s - 2j * np.pi * one.freq_hz) * blow.delay_s[:, None])).sum(axis=0))
             factor[i] = np.abs(blow.spectrum(one.freq_hz)) * direct * hits
         expected = np.abs(_told(h, body, one)) * factor
+        if bends(h) and not (glides := turns_rad(h, body, one) > TURNS_RAD).all():
+            expected = np.where(glides, np.nan, expected)  # of what glides a linear fit hears a part
         told.append(expected.ravel())
         seen.append(np.abs(whole(one)).ravel())
-        rough = np.broadcast_to(ROUGH * expected.max(axis=0, keepdims=True), expected.shape)
+        rough = np.broadcast_to(ROUGH * np.nan_to_num(expected).max(axis=0, keepdims=True), expected.shape)
         spread.append(np.stack([one.amplitude_sd.ravel(), rough.ravel()]))
     if not told:
         return h

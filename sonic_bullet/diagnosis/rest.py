@@ -43,7 +43,7 @@ def _rested(h: Hypothesis, body: Struck, strikes: list[int], every: bool) -> Arr
     one, order = heard_of(h, body, sounds=False), modes_of(h, body)[1]
     glides = np.ones(len(one.freq_hz), bool) if every else gliding(h, body, replace(one, strike=tuple(strikes)))
     picked, window = alone(one)
-    kept = [q for q, k in enumerate(picked) if glides[k]]
+    kept = [q for q, k in enumerate(picked) if glides[k] and len(one.mode[k]) == 1]  # twins glide each by its own level, and beat
     if not kept or len(correction) != count:
         return correction
     picked, window = [picked[q] for q in kept], [window[q] for q in kept]

@@ -33,7 +33,7 @@ KEPT = 0.75  # of the lines, in every fold
 DRAWS = 2  # of the null effect
 LEAST_DB, LEAST_SHARE = 0.4, 0.08  # of a drop, and of it in the gap
 FAINT_DB, MOST = 0.2, 0.5  # of a drop that is as much of the gap: then less than LEAST_DB will do
-SURE, MANY = 2.0, 4  # standard errors; strikes of which none may lose
+SURE, MANY = 2.0, 4  # standard errors; strikes of which none may lose, beside one
 PLAIN = 0.6  # of the gap: where a cheap suspect says as much, costly ones wait
 
 
@@ -83,9 +83,13 @@ def earns(c: Candidate, gap_db: float, *, first: bool) -> bool:
     if not (c.mean_db > need and np.isfinite(c.sd_db)):
         return False
     more = c.whole_db - max(c.null_db, 0.0)  # a null effect is not held against corrections either
-    if len(c.drop_db) >= MANY and c.drop_db.min() > -0.1 * c.mean_db and np.sort(c.drop_db)[-2] > need:
+    drop = np.sort(c.drop_db)
+    if len(drop) > MANY and drop[1:].mean() > 3 * need:
+        drop = drop[1:]  # one strike may be odd: what it alone tells, none of the others did
+    sd = float(drop.std(ddof=1) / np.sqrt(len(drop)))
+    if len(drop) >= MANY and drop[0] > -0.1 * drop.mean() and drop[-2] > need:
         return more > 0.5 * need  # no strike speaks against it, though loud ones may gain far more than soft ones
-    return c.mean_db > SURE * c.sd_db and more > max(SURE * c.sd_db, 0.5 * need)
+    return bool(drop.mean() > SURE * sd) and more > max(SURE * sd, 0.5 * need)
 
 
 @dataclass(frozen=True)

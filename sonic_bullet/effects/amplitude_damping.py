@@ -39,6 +39,7 @@ class AmplitudeDamping:
     id: ClassVar[str] = "amplitude-damping"
     stage: ClassVar[Stage] = Stage.BANK
     owner: ClassVar[Owner] = Owner.OBJECT
+    by_line: ClassVar[bool] = True  # the axes of twins are
     reference: ClassVar[str] = "Nayfeh & Mook 1979, section 3.3"
 
     choke: float

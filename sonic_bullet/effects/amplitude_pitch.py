@@ -12,9 +12,11 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
+from sonic_bullet.effects.axes import turned
 from sonic_bullet.effects.envelope import Envelopes, envelopes, falls, levels
+from sonic_bullet.effects.glided import axes_of
 from sonic_bullet.effects.values import Evidence, Heard, Owner, Ring, Stage
-from sonic_bullet.records import Array
+from sonic_bullet.records import Array, ModalModel
 
 MEASURES = ("impulse", "velocity", "displacement")
 SURE = 5.0  # spreads that b must stand off zero
@@ -34,30 +36,40 @@ class Slope:
 
 @dataclass(frozen=True)
 class AmplitudePitch:
-    """bend: relative rise of frequency per level². measure: of the level, one of MEASURES, in N·s, m/s or m."""
+    """bend: relative rise of frequency per level². measure: of the level, one of MEASURES, in N·s, m/s or m. freq_hz, turn_rad: of twins, and how far their axes
+    are turned from the mesh's.
+    """
 
     id: ClassVar[str] = "amplitude-pitch"
     stage: ClassVar[Stage] = Stage.BANK
     owner: ClassVar[Owner] = Owner.OBJECT
+    by_line: ClassVar[bool] = True  # the axes of twins are
     reference: ClassVar[str] = "Nayfeh & Mook 1979, section 2.3"
 
     bend: float
     measure: str = "velocity"
+    freq_hz: tuple[float, ...] = ()
+    turn_rad: tuple[float, ...] = ()
 
     def apply(self, x: Ring) -> Ring:
         """The ringing with the effect in it."""
         return replace(x, bend=x.bend + self.bend * _per_velocity(x, self.measure) ** 2)
 
+    def turned(self, x: ModalModel) -> ModalModel:
+        """The modes as they were, twins about their own axes."""
+        return turned(x, self.freq_hz, self.turn_rad)
+
     def parameters(self) -> dict[str, Any]:
         """What it says, for people and JSON, in SI units."""
-        return {"bend": self.bend, "measure": self.measure}
+        twins = [{"freq_hz": f, "turn_rad": t} for f, t in zip(self.freq_hz, self.turn_rad, strict=True)]
+        return {"bend": self.bend, "measure": self.measure} | ({"twins": twins} if twins else {})
 
     def freedom(self) -> int:
-        return 1
+        return 1 + len(self.freq_hz)
 
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
-        best: tuple[float, float, str] | None = None
+        best: tuple[float, Self] | None = None
         again = evidence.known is not None
         for h in evidence.heard:
             e = envelopes(h)
@@ -69,8 +81,9 @@ class AmplitudePitch:
                 b = _slope(e, h, level[:, e.line])
                 sure = abs(b.bend) > (1.0 if again else SURE) * b.sd and b.share > (0.0 if again else BETTER)
                 if sure and (best is None or b.modes > best[0]):
-                    best = (b.modes, b.bend, name)
-        return cls(best[1], best[2]) if best is not None else None
+                    axes = axes_of(e, h, name, b.bend) if name != "impulse" else ((), ())
+                    best = (b.modes, cls(b.bend, name, *axes))
+        return best[1] if best is not None else None
 
 
 def _per_velocity(x: Ring, measure: str) -> Array:

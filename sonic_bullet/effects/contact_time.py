@@ -19,6 +19,11 @@ from sonic_bullet.records import Array
 HERTZ = -0.2
 AGAIN = 1.29  # times shorter or longer, where it is fitted again: √(5/3), half the way from the half-sine's first zero to its second
 ROUGH = 0.03  # of a mode's strongest expected amplitude: the shapes' own error
+FEWEST, FEW = 2, 3  # lines to tell a roll-off from; with no more than FEW, modes that nobody hears tell it, too
+NEAR = 0.01  # of ln f: a line that near may be that mode
+COMMON, TURNS = 0.05, 15  # of how loud a mode is at the sensor, relative; of weights, gain and that
+STARTS = (0.05, 0.5, 0.95)  # of the ratios of what is heard to what is expected: gains to begin with
+SILENT, HIDDEN = 10.0, 0.02  # times what noise alone makes of an amplitude, and of the strongest: what lines may not be found under
 
 
 @dataclass(frozen=True)
@@ -51,11 +56,11 @@ class ContactTime:
 
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
-        fewest = 4 if evidence.known is None else 3  # lines: to look for it, and to fit it again without one of them
-        tables = [_table(h) for h in evidence.heard if len(h.freq_hz) >= fewest]
+        tables = [_table(h) for h in evidence.heard if len(h.freq_hz) >= FEWEST]
         if not tables:
             return None
         freq, level, told, heard, sd, most = (np.concatenate([t[i] for t in tables]) for i in range(6))
+        mode = np.unique(np.concatenate([np.column_stack([np.full(len(t[0]), i), t[0]]) for i, t in enumerate(tables)]), axis=0, return_inverse=True)[1]
         if len(freq) < 4:
             return None
         reference = float(np.exp(np.log(level).mean()))
@@ -63,7 +68,7 @@ class ContactTime:
         pulses: tuple[str, ...] = PULSES
         if isinstance(evidence.known, cls):  # part of the evidence may have another pulse nearly as good far away; it is this one that is fitted again
             grid, pulses = evidence.known.duration_s(reference) * np.geomspace(1 / AGAIN, AGAIN, 24), (evidence.known.pulse,)
-        plain = _cost(told, heard, sd, ROUGH * most)
+        plain = _cost(told, heard, sd, ROUGH * most, mode)
         best: tuple[float, Self] | None = None
         for pulse in pulses:
             for exponent in (HERTZ, 0.0):
@@ -72,7 +77,7 @@ class ContactTime:
                 def at(tau: float, share: Array = share, pulse: str = pulse) -> float:
                     h = np.abs(magnitude(pulse, freq * tau * share))
                     h = h / max(float(h.max()), 1e-300)  # the gain is free: a pulse so long that it leaves nothing must not pass for a small one
-                    return _cost(told * h, heard, sd, ROUGH * most * np.maximum(h, 0.02))
+                    return _cost(told * h, heard, sd, ROUGH * most * np.maximum(h, 0.02), mode)
 
                 costs = np.array([at(t) for t in grid])
                 i = int(costs.argmin())
@@ -87,22 +92,52 @@ class ContactTime:
 def _table(h: Heard) -> tuple[Array, Array, Array, Array, Array, Array]:
     """Per strike and line, flat: frequency, impulse, expected and heard magnitude, spread, the line's strongest expected magnitude."""
     told, heard = np.abs(h.expected), np.abs(h.amplitude)
+    freq, sd = h.freq_hz, h.amplitude_sd
+    if len(freq) <= FEW and h.model is not None and h.signal is not None:
+        high, quiet, least = _unheard(h)
+        freq, told, heard, sd = np.append(freq, high), np.hstack([told, quiet]), np.hstack([heard, np.zeros(quiet.shape)]), np.hstack([sd, least])
     good = np.isfinite(told) & np.isfinite(heard) & np.isfinite(h.impulse_n_s)[:, None] & (told > 0)
     most = np.broadcast_to(told.max(axis=0, keepdims=True), told.shape)
-    freq = np.broadcast_to(h.freq_hz, told.shape)
+    freq = np.broadcast_to(freq, told.shape)
     level = np.broadcast_to(np.where(np.isfinite(h.impulse_n_s), h.impulse_n_s, 1.0)[:, None], told.shape)
-    return freq[good], level[good], told[good], heard[good], h.amplitude_sd[good], most[good]
+    return freq[good], level[good], told[good], heard[good], sd[good], most[good]
 
 
-def _cost(told: Array, heard: Array, sd: Array, rough: Array) -> float:
-    """Twice the negative log likelihood under Cauchy's law at the best common gain; rough (·): the shapes' own error, which grows with the gain."""
-    weight, gain = np.ones(len(told)), float(np.median(heard) / max(float(np.median(told)), 1e-300))
-    for _ in range(15):
+def _unheard(h: Heard) -> tuple[Array, Array, Array]:
+    """Modes (u,) that no line stands for, what is expected of them (s, u), and what may hide in the noise (s, u), where σ √(4d/sr) is an amplitude's spread,
+    or under what is louder."""
+    assert h.model is not None
+    heard = np.concatenate([h.freq_hz, h.foreign_hz])
+    alone = np.setdiff1d(np.arange(len(h.all_hz)), np.concatenate([*h.mode, np.zeros(0, int)]))
+    alone = alone[np.abs(np.log(h.all_hz[alone, None] / heard)).min(axis=1) > NEAR]
+    hidden = SILENT * h.noise[:, None] * np.sqrt(4 * h.model.decay_per_s[alone] / h.sr) + HIDDEN * np.abs(h.amplitude).max(axis=1)[:, None]
+    return h.all_hz[alone], np.abs(h.push[:, alone]), hidden
+
+
+def _cost(told: Array, heard: Array, sd: Array, rough: Array, mode: Array) -> float:
+    """Twice the negative log likelihood under Cauchy's law at the best common gain; rough (·): the shapes' own error, which grows with the gain.
+
+    mode (·): of each row; how loud the sensor hears a mode is off by COMMON at all strikes alike, integrated out after Laplace.
+    """
+    loud = (heard > 0) & (told > 0)
+    starts = np.quantile(heard[loud] / told[loud], STARTS) if loud.any() else np.ones(1)
+    return min(_from(float(gain), told, heard, sd, rough, mode) for gain in starts)
+
+
+def _from(gain: float, told: Array, heard: Array, sd: Array, rough: Array, mode: Array) -> float:
+    """The same at the gain that one to begin with leads to."""
+    own = np.zeros(int(mode.max()) + 1)
+    for _ in range(TURNS):
         width = sd**2 + (gain * rough) ** 2
-        gain = max(float((weight * told * heard / width).sum() / max(float((weight * told**2 / width).sum()), 1e-300)), 1e-12)
-        weight = 1 / (1 + (heard - gain * told) ** 2 / width / 9)
+        model = told * (1 + COMMON * own[mode])
+        weight = 1 / (1 + (heard - gain * model) ** 2 / width / 9) / width
+        gain = max(float((weight * model * heard).sum() / max(float((weight * model**2).sum()), 1e-300)), 1e-12)
+        slope = COMMON * gain * told
+        stiff = np.bincount(mode, weight * slope**2, len(own))
+        own = np.bincount(mode, weight * slope * (heard - gain * told), len(own)) / (1 + stiff)
     width = sd**2 + (gain * rough) ** 2
-    return float((np.log(width) + 9 * np.log1p((heard - gain * told) ** 2 / width / 9)).sum())
+    off = heard - gain * told * (1 + COMMON * own[mode])
+    return float((np.log(width) + 9 * np.log1p(off**2 / width / 9)).sum() + (own**2 + np.log1p(stiff)).sum())
 
 
 def _golden(f: Any, low: float, high: float) -> float:

@@ -28,6 +28,8 @@ SHARES = np.geomspace(1e-3, 4.0, 9)  # |A|² w² over what the first frame sugge
 SHIFTS = 21
 FAINT = 1e-25  # of the direct sound's power
 PATTERN = 0.03  # of a line's strongest: what shapes are wrong by
+FASTEST = 300.0  # 1/s: what dies sooner is gone within a frame or two, and how soon is not told
+LIKE = 0.7  # squared cosine of amplitudes over the strikes and what the model says: a line less like its mode is the room's own
 SURE = 0.1  # of a decay and of an amplitude: the tail's early echoes are no noise
 
 
@@ -83,14 +85,16 @@ def dried(h: Heard, delta: float) -> Heard:
     if h.dry or h.signal is None or not len(h.freq_hz) or h.signal.shape[1] < LEAST * FRAME_S * h.sr:
         return h
     r = through(h, delta)
-    amplitude, spread = _rescaled(r, told(h), h.amplitude, h.amplitude_sd)
-    decay = r.decay_per_s[0]
+    own, decay = told(h), r.decay_per_s[0]
+    amplitude, spread = _rescaled(r, own, h.amplitude, h.amplitude_sd)
+    like = np.abs((np.conj(own) * h.amplitude).sum(axis=0)) ** 2 / np.maximum((np.abs(own) ** 2).sum(axis=0) * (np.abs(h.amplitude) ** 2).sum(axis=0), 1e-300)
+    ln_sd = np.where((decay > FASTEST) | (like < LIKE), np.inf, np.hypot(r.ln_sd[0], SURE))
     dry = replace(
         h,
         freq_hz=h.freq_hz + r.shift_hz[0],
         decay_per_s=decay,
         freq_sd_hz=np.hypot(h.freq_sd_hz, decay / (2 * np.pi) * r.ln_sd[0]),
-        decay_sd_per_s=np.hypot(r.ln_sd[0], SURE) * decay,
+        decay_sd_per_s=ln_sd * decay,
         amplitude=amplitude,
         amplitude_sd=spread,
         dry=True,
