@@ -96,7 +96,7 @@ def corrected(h: Hypothesis, bodies: tuple[Struck, ...], *, anew: bool = False) 
             step = np.zeros(len(ratio))
             step[place] = np.expm1(off)
             found[body.name] = np.clip((1 + ratio) * (1 + step) - 1, -CORRECTION, CORRECTION)
-            if any(e.id == "mode-splitting" for e in h.effects):
+            if not moves(h) or any(e.id == "mode-splitting" for e in h.effects):
                 found[body.name] = _alike(undamped(h, body).freq_hz, found[body.name])
         if can_tell(body):
             now = replace(h, correction=found)
