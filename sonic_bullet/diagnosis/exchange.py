@@ -75,6 +75,14 @@ def settled(h: Hypothesis, bodies: tuple[Struck, ...], takes: Sequence[Take], ba
     return min(ends, key=lambda end: mean_db(takes, end) or np.inf)
 
 
+def chosen(h: Hypothesis, bodies: tuple[Struck, ...], takes: Sequence[Any], band_hz: tuple[float, float]) -> Hypothesis:
+    """The hypothesis, settled where that is nearer to the fitted strikes."""
+    if not all(isinstance(t, Take) for t in takes):
+        return h
+    best = settled(h, bodies, takes, band_hz)
+    return best if (mean_db(takes, best) or 0.0) <= (mean_db(takes, h) or 0.0) else h
+
+
 def left_out_db(h: Hypothesis, i: int, bodies: tuple[Struck, ...], takes: Sequence[Take], band_hz: tuple[float, float]) -> Array:
     """Distance (s,) of every strike from what is fitted to the others: the i-th effect, the rest as all strikes have it, for one name as for the other.
 
@@ -100,9 +108,7 @@ def exchanged(
     if not all(isinstance(t, Take) for t in takes):
         return h, added
     names = {c.id for c in added}
-    best = settled(h, bodies, takes, band_hz)
-    if (mean_db(takes, best) or 0.0) > (mean_db(takes, h) or 0.0):
-        best = h
+    best = chosen(h, bodies, takes, band_hz)
     for i in range(len(added)):
         far: Array | None = None
         for rival in (c for c in passed[i] if c.id not in names):

@@ -13,7 +13,7 @@ import numpy as np
 
 from sonic_bullet.diagnosis.bodies import Struck
 from sonic_bullet.diagnosis.evidence import evidence_of
-from sonic_bullet.diagnosis.exchange import ALIKE, exchanged, rivals
+from sonic_bullet.diagnosis.exchange import ALIKE, chosen, exchanged, rivals
 from sonic_bullet.diagnosis.judge import Judged, Take, least_db, mean_db
 from sonic_bullet.diagnosis.play import Hypothesis, moves, play
 from sonic_bullet.diagnosis.refit import ROUGH, refitted, retold, with_effects
@@ -82,6 +82,8 @@ def closed(
             break
         best = simplest(able, bodies)
         h, added, passed = best.hypothesis, [*added, best], [*passed, rivals(able, best)]
+        if len(added) > 1 and any(hasattr(e, "others") for e in h.effects):
+            h = chosen(h, bodies, takes, band_hz)  # or a third name is found for what only the other choice would say
         now = mean_db(takes, h) or 0.0
         floor = least_db(takes, h) or floor
     if len(added) > 1:
