@@ -12,7 +12,7 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from sonic_bullet.effects.axes import turned
+from sonic_bullet.effects.axes import turned, twins
 from sonic_bullet.effects.envelope import Envelopes, envelopes, falls, levels
 from sonic_bullet.effects.glided import axes_of
 from sonic_bullet.effects.values import Evidence, Heard, Owner, Ring, Stage
@@ -22,6 +22,7 @@ MEASURES = ("impulse", "velocity", "displacement")
 SURE = 5.0  # spreads that b must stand off zero
 BETTER = 0.5  # of the phases' misfit must go, in modes that b would move
 FEWEST = 1.5  # of such modes
+ENOUGH = 3  # modes without a twin, to be asked alone
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,8 +98,10 @@ def _per_velocity(x: Ring, measure: str) -> Array:
 
 def _slope(e: Envelopes, h: Heard, level: Array) -> Slope:
     """b by the modes' own, each as heavy as what a bend would be in its phase over what there is; its spread by their scatter [White 1980]."""
-    table = np.array([one for one in (_moments(e, h, level, q) for q in range(len(e.line))) if one is not None]).reshape(-1, 3)
-    table = table[(table[:, 0] > 0) & (table[:, 2] > 0)]
+    table = np.array([one or (0.0, 0.0, 0.0) for one in (_moments(e, h, level, q) for q in range(len(e.line)))]).reshape(-1, 3)
+    good = (table[:, 0] > 0) & (table[:, 2] > 0)
+    single = np.array([not twins(h, k) for k in e.line.tolist()], bool)  # twins glide each by its own level
+    table = table[good & single] if (good & single).sum() >= ENOUGH else table[good]
     if not len(table):
         return Slope(0.0, np.inf, 0.0, 0.0)
     xx, xy, yy = table.T

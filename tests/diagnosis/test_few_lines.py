@@ -9,6 +9,7 @@ import pytest
 from made_body import recorded, truth
 
 from sonic_bullet.diagnosis.evidence import evidence_of, thinned
+from sonic_bullet.effects.contact_time import ContactTime
 from sonic_bullet.effects.damping_law import DampingLaw
 from sonic_bullet.effects.elasticities import Tensor, Told, _judged, isotropic_p, ringing, told_of
 from sonic_bullet.effects.tensors import reduced
@@ -16,6 +17,7 @@ from sonic_bullet.effects.values import Elastic, Heard
 from sonic_bullet.records import Array, Material
 
 BAND = (50.0, 7_500.0)
+WIDTH = {"half-sine": 1.0, "hertz": 0.9, "raised-cosine": 0.76}  # of pulses that are as long by their second moments, times the half-sine's
 MATERIAL = Material.isotropic("wood", youngs_pa=1e10, poisson=0.3, density_kg_m3=600)
 
 
@@ -36,6 +38,44 @@ def heard(hz: list[float], decay: list[float], amplitude: Array) -> Heard:
         foreign_amplitude=amplitude,
         foreign_sd=np.full(amplitude.shape, 1e-4),
     )
+
+
+def only(one: Heard, lines: int) -> Heard:
+    """The evidence where no more than the first lines stood above the noise."""
+    k = slice(0, lines)
+    return replace(
+        one,
+        freq_hz=one.freq_hz[k],
+        decay_per_s=one.decay_per_s[k],
+        amplitude=one.amplitude[:, k],
+        amplitude_sd=one.amplitude_sd[:, k],
+        mode=one.mode[k],
+        expected=one.expected[:, k],
+        foreign_hz=np.zeros(0),
+    )
+
+
+LONG = (
+    (ContactTime(1.9e-3, 0.016, 0.0, "raised-cosine"), 2),
+    (ContactTime(1.1e-3, 0.016, 0.0, "half-sine"), 3),
+    (ContactTime(1.2e-3, 0.016, -0.2, "hertz"), 3),
+)
+
+
+@pytest.mark.parametrize(("pulse", "lines"), LONG)
+def test_modes_that_nobody_hears_tell_a_long_contact(pulse: ContactTime, lines: int) -> None:
+    """A soft hammer leaves two or three lines: a pulse far longer would say as much of those, and one far shorter as much of the silence above."""
+    told = evidence_of(truth(), (recorded(pulse),), BAND)
+    found = ContactTime.propose(replace(told, heard=(only(told.heard[0], lines),)))
+    assert found is not None
+    half = [one.duration_s(0.016) * WIDTH[one.pulse] for one in (found, pulse)]
+    assert half[0] == pytest.approx(half[1], rel=0.12)
+
+
+def test_few_lines_of_a_sharp_blow_tell_no_contact_time() -> None:
+    told = evidence_of(truth(), (recorded(),), BAND)
+    loud = replace(told.heard[0], noise=np.full(5, 0.1))  # so loud that silence says nothing
+    assert ContactTime.propose(replace(told, heard=(only(loud, 3),))) is None
 
 
 def test_what_is_gone_within_a_period_or_keeps_no_phase_is_no_mode() -> None:

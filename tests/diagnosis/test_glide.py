@@ -7,13 +7,16 @@ from functools import cache
 
 import numpy as np
 import pytest
-from made_body import plate, recorded
+from made_body import GAIN, plate, recorded
 from test_chains import true_decay
+from test_choked import PAIR, with_twins
 from test_found_again import BAND, fitted
 
+from sonic_bullet.diagnosis.baseline import takes_of
 from sonic_bullet.diagnosis.bodies import Struck
 from sonic_bullet.diagnosis.evidence import evidence_of
 from sonic_bullet.diagnosis.glide import fallen
+from sonic_bullet.diagnosis.judge import mean_db
 from sonic_bullet.diagnosis.refit import refitted, with_effects
 from sonic_bullet.diagnosis.rest import at_rest
 from sonic_bullet.effects.amplitude_pitch import AmplitudePitch
@@ -65,6 +68,30 @@ def test_a_level_falls_as_the_linear_mode_does_while_its_lines_do_not(bend: floa
     after = np.abs(np.log(told.decay_per_s / true_decay(told.freq_hz)))[changed]
     assert changed.sum() > 12 and before.max() > 0.5
     assert np.median(after) < 0.01 and after.max() < 0.1
+
+
+def test_a_gain_is_told_by_what_does_not_glide() -> None:
+    body = made(1.0)
+    h = replace(fitted(body), effects=(AmplitudePitch(1.0, "velocity"),))
+    assert refitted(h, (body,)).gain == pytest.approx(GAIN, rel=0.02)
+    assert abs(refitted(fitted(body), (body,)).gain / GAIN - 1) > 0.03, "lines of what glides hold but a part of it"
+
+
+def test_gliding_twins_have_their_own_axes() -> None:
+    """One of two twins may be loud, and glide away, where the other has hardly been struck; with the mesh's axes both would."""
+    model = with_twins()
+    middle = float(model.freq_hz[PAIR[0]])
+    bent = AmplitudePitch(0.7, "velocity", (middle,), (0.6,))
+    body = recorded(bent, model=model)
+    base = refitted(fitted(body), (body,))
+    evidence = evidence_of(base, (body,), BAND)
+    found = AmplitudePitch.propose(evidence)
+    assert found is not None and found.bend == pytest.approx(0.7, rel=0.05)
+    assert found.freq_hz == pytest.approx((middle,), rel=5e-3)
+    assert found.turn_rad[0] == pytest.approx(0.6, abs=0.06)
+    takes = takes_of((body,))
+    own, mesh = (mean_db(takes, refitted(replace(base, effects=(e,)), (body,), evidence.heard)) for e in (found, replace(found, freq_hz=(), turn_rad=())))
+    assert own is not None and mesh is not None and own < mesh
 
 
 def test_in_a_room_no_line_is_one_modes_alone() -> None:

@@ -52,6 +52,20 @@ def test_modes_read_through_a_room() -> None:
     assert tails.dried(dry, 5.0) is dry  # what is dry stays as it is
 
 
+def test_what_is_gone_at_once_or_is_not_like_its_mode_tells_no_decay() -> None:
+    """Of a lossy body in a room most lines are the room's own: they would bend the material's law to the room's."""
+    heard = heard_of(truth(), recorded(Room(0.9, 0.9, 4), seconds=1.2))
+    assert np.isfinite(tails.dried(heard, RT60 / 0.9).decay_sd_per_s).all()
+    other = heard.amplitude.copy()
+    other[:, 2] = np.array([1.0, -1.0, 1.0, -1.0, 1.0]) * np.abs(other[:, 2]).mean() * np.sign(heard.expected[:, 2].real) * np.array([1, 1, 1, 1, -1])
+    other[:, 2] -= (np.conj(heard.expected[:, 2]) @ other[:, 2]) / (np.abs(heard.expected[:, 2]) ** 2).sum() * heard.expected[:, 2]
+    told = tails.dried(replace(heard, amplitude=other), RT60 / 0.9).decay_sd_per_s
+    assert np.isinf(told[2]) and np.isfinite(np.delete(told, 2)).all()
+    lossy = recorded(Room(0.9, 0.9, 4), DampingLaw("constant-loss", eta=0.05), seconds=1.2)
+    dry = tails.dried(heard_of(truth(), lossy), RT60 / 0.9)
+    assert (np.isinf(dry.decay_sd_per_s) >= (dry.decay_per_s > tails.FASTEST)).all() and np.isinf(dry.decay_sd_per_s).any()
+
+
 @pytest.mark.parametrize("rt60", [0.5, 1.6])
 def test_the_rate_of_a_room(rt60: float) -> None:
     found = late(heard_of(truth(), recorded(Room(rt60, 0.5, 8), seconds=1.2)))

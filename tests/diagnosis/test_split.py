@@ -10,6 +10,7 @@ from made_body import plate, recorded, truth
 
 from sonic_bullet.diagnosis.bodies import Struck
 from sonic_bullet.diagnosis.evidence import evidence_of
+from sonic_bullet.diagnosis.refit import refitted
 from sonic_bullet.effects.mode_splitting import ModeSplitting
 from sonic_bullet.records import ModalModel
 
@@ -55,6 +56,17 @@ def test_pairs_are_found_where_elasticity_was_fitted_to_one_line_of_each() -> No
     found = told(high, {})
     assert len(found.split) == 2
     assert found.turn_rad == pytest.approx((0.5, 2.0), abs=0.03)
+
+
+def test_no_correction_sets_twins_apart() -> None:
+    """What a mesh leaves together shares the mesh's error: corrections learnt again would else pass for the splitting itself, and a true one earn nothing."""
+    body = recorded(split(), model=twins(), seconds=1.0)
+    again = refitted(truth(), (body,), anew=True).correction
+    assert again is not None
+    for a, b in PAIRS:
+        assert again["plate"][a] == pytest.approx(again["plate"][b], abs=1e-12)
+    alone = np.setdiff1d(np.arange(len(again["plate"])), np.array(PAIRS).ravel())
+    assert np.abs(again["plate"][alone]).max() < 2e-3
 
 
 def test_a_split_pair_sounds_as_two_modes_that_fill_the_same_space() -> None:

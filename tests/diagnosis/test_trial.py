@@ -51,6 +51,13 @@ def test_loud_strikes_may_speak_alone_but_not_a_single_one() -> None:
     assert not earns(candidate(0.0, -0.02, 0.05, 1.1, 0.4, null_db=0.3), 0.5, first=True), "as good as chance"
 
 
+def test_one_odd_strike_does_not_outvote_four_that_gain_much() -> None:
+    assert earns(candidate(-0.02, 3.9, -3.5, 5.1, 3.7), 4.0, first=True)
+    assert not earns(candidate(-2.0, 3.9, -3.5, 5.1, 3.7), 4.0, first=True), "nor two"
+    assert not earns(candidate(0.1, 0.9, -0.9, 1.2, 0.8), 4.0, first=True), "what little they gain may be chance"
+    assert not earns(candidate(-0.02, 3.9, -9.0, 5.1, 0.7), 4.0, first=True), "what it loses counts in the mean"
+
+
 @dataclass(frozen=True)
 class Idle:
     """Does nothing, under a name that has corrections learnt again."""
