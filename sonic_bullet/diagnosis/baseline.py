@@ -16,6 +16,7 @@ from sonic_bullet.diagnosis.bodies import Struck, shapeless, struck_bodies
 from sonic_bullet.diagnosis.chains import FEWEST, LINKS, share, unchained
 from sonic_bullet.diagnosis.elastic import with_elastic
 from sonic_bullet.diagnosis.judge import Take, mean_db
+from sonic_bullet.diagnosis.parted import parted
 from sonic_bullet.diagnosis.play import Hypothesis
 from sonic_bullet.diagnosis.refit import refitted
 from sonic_bullet.diagnosis.unheard import settled
@@ -90,7 +91,7 @@ def _off_db(b: Baseline) -> float:
 def _of(case: Case, gathered: tuple[Gathered, ...], cache: Place, progress: Callable[[str], None] | None) -> Baseline:
     found = fit_evidence(case, gathered, check_mesh=False, progress=progress)
     bodies = struck_bodies(found, cache=cache, progress=progress) if found.objects else tuple(shapeless(found, g) for g in gathered)
-    bodies = with_elastic(found, bodies, cache=cache, progress=progress)
+    bodies = with_elastic(found, tuple(parted(body) for body in bodies), cache=cache, progress=progress)
     gain = found.fit.sigma if np.isfinite(found.fit.sigma) and found.fit.sigma > 0 else 1.0
     base = Hypothesis(found.fit.alpha_per_s, found.fit.beta_s, gain, (), {b.name: b.correction for b in bodies})
     bodies = settled(refitted(base, bodies), bodies)
