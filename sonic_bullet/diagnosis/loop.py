@@ -82,6 +82,8 @@ def closed(
             break
         best = simplest(able, bodies)
         h, added, passed = best.hypothesis, [*added, best], [*passed, rivals(able, best)]
+        if (mean_db(takes, h) or 0.0) > now:
+            h = retold(h, bodies)  # a room's response by lines so far off that it sounds worse than none
         if len(added) > 1 and any(hasattr(e, "others") for e in h.effects):
             h = chosen(h, bodies, takes, band_hz)  # or a third name is found for what only the other choice would say
         now = mean_db(takes, h) or 0.0
