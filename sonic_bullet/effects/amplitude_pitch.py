@@ -14,25 +14,30 @@ import numpy as np
 
 from sonic_bullet.effects.axes import turned, twins
 from sonic_bullet.effects.envelope import Envelopes, envelopes, falls, levels
-from sonic_bullet.effects.glided import axes_of
-from sonic_bullet.effects.values import Evidence, Heard, Owner, Ring, Stage
+from sonic_bullet.effects.glided import axes_of, bend_beside
+from sonic_bullet.effects.values import Effect, Evidence, Heard, Owner, Ring, Stage
 from sonic_bullet.records import Array, ModalModel
 
 MEASURES = ("impulse", "velocity", "displacement")
 SURE = 5.0  # spreads that b must stand off zero
 BETTER = 0.5  # of the phases' misfit must go, in modes that b would move
 FEWEST = 1.5  # of such modes
+FAR, NEAR = (
+    np.geomspace(0.6, 1.7, 12),
+    np.geomspace(0.93, 1.07, 5),
+)  # times the bend that twins were told with as if each pair were one mode; about what that leads to
 ENOUGH = 3  # modes without a twin, to be asked alone
 
 
 @dataclass(frozen=True, slots=True)
 class Slope:
-    """b, its spread, the share of the phases' misfit that goes with it in modes it would move, and how many modes' misfit that is."""
+    """b, its spread, the share of the phases' misfit that goes with it in modes it would move, and how many modes' misfit that is. single: of modes without a twin."""
 
     bend: float
     sd: float
     share: float
     modes: float
+    single: bool = True
 
 
 @dataclass(frozen=True)
@@ -82,9 +87,20 @@ class AmplitudePitch:
                 b = _slope(e, h, level[:, e.line])
                 sure = abs(b.bend) > (1.0 if again else SURE) * b.sd and b.share > (0.0 if again else BETTER)
                 if sure and (best is None or b.modes > best[0]):
-                    axes = axes_of(e, h, name, b.bend) if name != "impulse" else ((), ())
-                    best = (b.modes, cls(b.bend, name, *axes))
+                    best = (b.modes, cls._beside_twins(e, h, name, b, evidence.known))
         return best[1] if best is not None else None
+
+    @classmethod
+    def _beside_twins(cls, e: Envelopes, h: Heard, measure: str, b: Slope, known: Effect | None) -> Self:
+        """The same with the axes of twins; where hardly a mode is without its twin, their bend with it."""
+        if h.model is None or measure == "impulse":
+            return cls(b.bend, measure)
+        bend = b.bend
+        if not b.single:
+            factors = ((known.bend, NEAR),) if isinstance(known, cls) else ((bend, FAR), (None, NEAR))
+            for start, factor in factors:
+                bend = bend_beside(e, h, measure, bend if start is None else start, factor)
+        return cls(bend, measure, *axes_of(e, h, measure, bend))
 
 
 def _per_velocity(x: Ring, measure: str) -> Array:
@@ -101,7 +117,8 @@ def _slope(e: Envelopes, h: Heard, level: Array) -> Slope:
     table = np.array([one or (0.0, 0.0, 0.0) for one in (_moments(e, h, level, q) for q in range(len(e.line)))]).reshape(-1, 3)
     good = (table[:, 0] > 0) & (table[:, 2] > 0)
     single = np.array([not twins(h, k) for k in e.line.tolist()], bool)  # twins glide each by its own level
-    table = table[good & single] if (good & single).sum() >= ENOUGH else table[good]
+    enough = bool((good & single).sum() >= ENOUGH)
+    table = table[good & single] if enough else table[good]
     if not len(table):
         return Slope(0.0, np.inf, 0.0, 0.0)
     xx, xy, yy = table.T
@@ -115,7 +132,7 @@ def _slope(e: Envelopes, h: Heard, level: Array) -> Slope:
     gone = np.maximum((2 * centre * xy - centre**2 * xx) / yy, -1.0)
     sd = float(np.sqrt(((says * (value - centre)) ** 2).sum()) / max(says.sum(), 1e-300))
     alone = says.sum() ** 2 / max(float((says**2).sum()), 1e-300) < FEWEST
-    return Slope(centre, np.inf if alone else max(sd, 1e-300), float((says * gone).sum() / max(says.sum(), 1e-300)), float(gone.sum()))
+    return Slope(centre, np.inf if alone else max(sd, 1e-300), float((says * gone).sum() / max(says.sum(), 1e-300)), float(gone.sum()), enough)
 
 
 def _moments(e: Envelopes, h: Heard, level: Array, q: int) -> tuple[float, float, float] | None:

@@ -22,6 +22,13 @@ MOST = 2.0  # of ln |z|: more off is no worse
 TURNS = 0.1  # of a line's ln variance, that its twins' axes must be worth
 
 
+def bend_beside(e: Envelopes, h: Heard, measure: str, bend: float, factor: Array) -> float:
+    """The bend, some factors (n,) about one that was told as if every line were one mode's, that lines agree on best, twins about their own axes."""
+    lines = [q for q in range(len(e.line)) if e.good[:, q].any()]
+    rows = np.array([[spread(e, h, q, measure, bend * f, ANGLES if twins(h, int(e.line[q])) else np.zeros(1)).min() for q in lines] for f in factor])
+    return float(bend * factor[int(rows.sum(axis=1).argmin())])
+
+
 def axes_of(e: Envelopes, h: Heard, measure: str, bend: float) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Frequencies and angles of the twins whose axes are heard."""
     assert h.model is not None
