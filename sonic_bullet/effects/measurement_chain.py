@@ -21,6 +21,7 @@ ROUGH = 0.03
 BETTER = 16.0
 MAINS = (50.0, 60.0)
 CORNERS, FINER, HIGHEST = 160, 21, 0.49  # tried, and again about the best; of the rate
+FEWEST, AGAIN = 5, 3  # lines: to look for a filter, and to fit it again to a part of them
 STUCK = 4  # samples in a row at the limit, in two recordings or more
 
 
@@ -82,7 +83,7 @@ class MeasurementChain:
         parts |= _limit(heard)
         parts |= _hum(heard)
         if "limit" not in parts:
-            parts |= _filter(heard, BETTER if evidence.known is None else 0.0)
+            parts |= _filter(heard, BETTER, FEWEST) if evidence.known is None else _filter(heard, 0.0, AGAIN)
         return cls(**parts) if parts else None
 
 
@@ -146,13 +147,13 @@ def _hum(heard: list[Heard]) -> dict[str, Any]:
     return best
 
 
-def _filter(heard: list[Heard], better: float) -> dict[str, Any]:
+def _filter(heard: list[Heard], better: float, fewest: int) -> dict[str, Any]:
     """One high-pass or low-pass that all strikes share."""
-    rows = [_ratio(h) for h in heard if len(h.freq_hz) >= 5]
+    rows = [_ratio(h) for h in heard if len(h.freq_hz) >= fewest]
     if not rows:
         return {}
     freq, ratio, sd = (np.concatenate([r[i] for r in rows]) for i in range(3))
-    if len(freq) < 5:
+    if len(freq) < fewest:
         return {}
     sr = min(h.sr for h in heard)
     best: tuple[float, dict[str, Any]] = (_misfit(ratio, sd) - better - 2 * np.log(len(freq)), {})

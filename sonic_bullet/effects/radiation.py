@@ -23,6 +23,7 @@ IMPEDANCE = 1.2 * 343.0  # ρ₀ c in kg/(m² s)
 SOUND = 343.0
 SCATTER = 0.03
 BETTER = 14.0
+FEWEST, FEW = 6, 4  # lines: to look for it, and to fit it again to a part of them
 AGAIN = 2.0  # times smaller or larger, where it is fitted again
 CLEARER = 0.45  # twice the ln likelihood, a line, that a tilt must be worth: a fifth less misfit
 ORDERS: tuple[int, ...] = (2, 4)
@@ -75,7 +76,7 @@ class Radiation:
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
         heard = max(evidence.heard, key=lambda h: len(h.freq_hz) if h.model is not None else 0)
-        if heard.model is None or len(heard.freq_hz) < 6 or not np.isfinite(heard.decay_per_s).all():
+        if heard.model is None or len(heard.freq_hz) < (FEWEST if evidence.known is None else FEW) or not np.isfinite(heard.decay_per_s).all():
             return None
         area = areas(heard.model)
         loud = (np.abs(heard.push) ** 2).sum(axis=0) + 1e-300  # of modes that share a line, the louder is heard: a plate's own plane hardly moves the air

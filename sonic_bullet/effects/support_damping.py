@@ -21,6 +21,8 @@ from sonic_bullet.effects.support_trial import Dashpot, Trial
 from sonic_bullet.effects.values import Evidence, Owner, Stage
 from sonic_bullet.records import Array, ModalModel
 
+FEWEST, AGAIN = 6, 4  # lines: to look for dashpots, and to fit them again to a part of them
+
 
 @dataclass(frozen=True)
 class SupportDamping:
@@ -57,7 +59,7 @@ class SupportDamping:
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
         heard = max(evidence.heard, key=lambda h: len(h.freq_hz) if h.model is not None else 0)
-        if heard.model is None or len(heard.freq_hz) < 6 or not np.isfinite(heard.decay_per_s).all():
+        if heard.model is None or len(heard.freq_hz) < (FEWEST if evidence.known is None else AGAIN) or not np.isfinite(heard.decay_per_s).all():
             return None
         trial = Trial.of(heard)
         if isinstance(evidence.known, cls):
