@@ -97,9 +97,8 @@ class AmplitudePitch:
             return cls(b.bend, measure)
         bend = b.bend
         if not b.single:
-            factors = ((known.bend, NEAR),) if isinstance(known, cls) else ((bend, FAR), (None, NEAR))
-            for start, factor in factors:
-                bend = bend_beside(e, h, measure, bend if start is None else start, factor)
+            bend = known.bend if isinstance(known, cls) else bend_beside(e, h, measure, bend, FAR)
+            bend = bend_beside(e, h, measure, bend, NEAR)
         return cls(bend, measure, *axes_of(e, h, measure, bend))
 
 

@@ -19,8 +19,10 @@ from sonic_bullet.diagnosis.glide import fallen
 from sonic_bullet.diagnosis.judge import mean_db
 from sonic_bullet.diagnosis.refit import refitted, with_effects
 from sonic_bullet.diagnosis.rest import at_rest
-from sonic_bullet.effects.amplitude_pitch import AmplitudePitch
+from sonic_bullet.effects.amplitude_pitch import FAR as FARTHER
+from sonic_bullet.effects.amplitude_pitch import NEAR, AmplitudePitch
 from sonic_bullet.effects.envelope import alone, envelopes
+from sonic_bullet.effects.glided import bend_beside
 from sonic_bullet.effects.room import Room
 
 BENT = AmplitudePitch(0.35, "velocity")
@@ -92,6 +94,18 @@ def test_gliding_twins_have_their_own_axes() -> None:
     takes = takes_of((body,))
     own, mesh = (mean_db(takes, refitted(replace(base, effects=(e,)), (body,), evidence.heard)) for e in (found, replace(found, freq_hz=(), turn_rad=())))
     assert own is not None and mesh is not None and own < mesh
+
+
+def test_a_bend_is_told_with_the_axes_of_twins() -> None:
+    """From half as far off as twins, read as one mode, may lead."""
+    model = with_twins()
+    bent = AmplitudePitch(0.7, "velocity", (float(model.freq_hz[PAIR[0]]),), (0.6,))
+    body = recorded(bent, model=model)
+    told = evidence_of(refitted(fitted(body), (body,)), (body,), BAND).heard[0]
+    e = envelopes(told)
+    assert e is not None
+    near = bend_beside(e, told, "velocity", bend_beside(e, told, "velocity", 0.5, FARTHER), NEAR)
+    assert near == pytest.approx(0.7, rel=0.04)
 
 
 def test_in_a_room_no_line_is_one_modes_alone() -> None:
