@@ -1,6 +1,6 @@
 """The baseline of a case: the fitted model, its bodies, and the hypothesis that nothing is lacking.
 
-gathered lines -> estimator.fit -> bodies (corrections learnt) -> Hypothesis
+gathered lines -> estimator.fit -> bodies (groups parted, corrections learnt) -> Hypothesis
 lines in chains (chains.py): the same with every chain as one line, where what that plays is nearer to the recordings, or most modes are chains and it is not clearly farther;
     and with the lines of the softer strikes, whose modes are nearest to linear ones, at all strikes
 """

@@ -82,7 +82,7 @@ def closed(
             break
         best = simplest(able, bodies)
         h, added, passed = best.hypothesis, [*added, best], [*passed, rivals(able, best)]
-        if (mean_db(takes, h) or 0.0) > now:
+        if hasattr(best.effect, "told_by") and (mean_db(takes, h) or 0.0) > now:
             h = retold(h, bodies)  # a room's response by lines so far off that it sounds worse than none
         if len(added) > 1 and any(hasattr(e, "others") for e in h.effects):
             h = chosen(h, bodies, takes, band_hz)  # or a third name is found for what only the other choice would say
@@ -158,8 +158,8 @@ def _numbers(c: Candidate) -> int:
 def simplest(able: Sequence[Candidate], bodies: tuple[Struck, ...]) -> Candidate:
     """The best, or the one with the fewest numbers of those that strikes cannot tell from it: SURE standard errors of the difference, ALIKE of what it says.
 
-    Where another with no more numbers says nearly as much (NEARLY), the lines' phases may speak for that one (ties.py): CLEAR-ly, or by a HINT where it is ALIKE. Effects that move modes stand aside:
-    corrections are learnt anew beside them, and are numbers too.
+    Where another with no more numbers says nearly as much (NEARLY), the lines' phases may speak for that one (ties.py): by CLEAR, or by HINT where it is ALIKE.
+    Effects that move modes stand aside: corrections are learnt anew beside them, and are numbers too.
     """
     best = able[0]
     if moves(best.hypothesis):

@@ -44,6 +44,6 @@ def parted(body: Struck) -> Struck:
 
 
 def _like(amplitude: Array, pattern_of: Array) -> float:
-    """Cosine of |A| (s,) and the modes' |Σ J ψ| (s,), of columns (s, p)."""
+    """Cosine of a line's |A| (s,) and |Σ J ψ| (s,) of some modes' patterns (s, p)."""
     a, b = np.abs(amplitude), np.abs(pattern_of.sum(axis=1))
     return float(a @ b / max(np.linalg.norm(a) * np.linalg.norm(b), 1e-300))

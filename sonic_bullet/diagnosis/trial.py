@@ -4,7 +4,7 @@
     null: as many numbers, spent on directions drawn at random in the modes' decays and levels, fitted to the same evidence
 
 an effect earns its keep where its mean drop is over LEAST_DB (FAINT_DB where nothing is found yet and that is MOST of the gap) and LEAST_SHARE of the gap,
-    SURE standard errors above zero and above the null effect's by as much
+    SURE standard errors above zero and above the null effect's by as much; of more than MANY strikes that gain much one may be odd
 
 Leaving out lines matters: decays and shapes belong to the body, so every strike shows them, and a pattern fitted to them by chance would pass.
 """

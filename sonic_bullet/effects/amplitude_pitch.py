@@ -2,7 +2,8 @@
 
     ω(t) = ω (1 + b a²(t))                                                    [Nayfeh & Mook 1979, eq. 2.3.35: the Duffing oscillator]
 
-Read off the phase of single modes: θ(t) = θ₀ + δ t + b a₀² ω (1 − e^{−2dt})/2d, θ₀ each strike's own, δ the mode's, b of all.
+Read off the phase of single modes: θ(t) = θ₀ + δ t + b a₀² ω (1 − e^{−2dt})/2d, θ₀ each strike's own, δ the mode's, b of all;
+by modes without a twin, where there are enough, else by pairs about their own axes (glided.py).
 """
 
 from __future__ import annotations
@@ -22,16 +23,17 @@ MEASURES = ("impulse", "velocity", "displacement")
 SURE = 5.0  # spreads that b must stand off zero
 BETTER = 0.5  # of the phases' misfit must go, in modes that b would move
 FEWEST = 1.5  # of such modes
-FAR, NEAR = (
-    np.geomspace(0.6, 1.7, 12),
-    np.geomspace(0.93, 1.07, 5),
-)  # times the bend that twins were told with as if each pair were one mode; about what that leads to
+FAR = np.geomspace(0.6, 1.7, 12)  # times the bend that twins were told with as if each pair were one mode
+NEAR = np.geomspace(0.93, 1.07, 5)  # about what that leads to
 ENOUGH = 3  # modes without a twin, to be asked alone
 
 
 @dataclass(frozen=True, slots=True)
 class Slope:
-    """b, its spread, the share of the phases' misfit that goes with it in modes it would move, and how many modes' misfit that is. single: of modes without a twin."""
+    """b, its spread, the share of the phases' misfit that goes with it in modes it would move, and how many modes' misfit that is.
+
+    single: whether it is told by modes without a twin alone.
+    """
 
     bend: float
     sd: float
@@ -67,8 +69,8 @@ class AmplitudePitch:
 
     def parameters(self) -> dict[str, Any]:
         """What it says, for people and JSON, in SI units."""
-        twins = [{"freq_hz": f, "turn_rad": t} for f, t in zip(self.freq_hz, self.turn_rad, strict=True)]
-        return {"bend": self.bend, "measure": self.measure} | ({"twins": twins} if twins else {})
+        pairs = [{"freq_hz": f, "turn_rad": t} for f, t in zip(self.freq_hz, self.turn_rad, strict=True)]
+        return {"bend": self.bend, "measure": self.measure} | ({"twins": pairs} if pairs else {})
 
     def freedom(self) -> int:
         return 1 + len(self.freq_hz)

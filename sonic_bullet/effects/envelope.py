@@ -18,7 +18,7 @@ from sonic_bullet.records import Array
 WIDTH_HZ = (30.0, 400.0)
 MOST_LINES = 30
 FRAMES = 96
-MOST_SAID = 1e4
+MOST_SAID = 1e4  # by one frame
 NEPERS = 8.0  # of a line's decay are looked at
 SELF = 0.006  # relative: lines nearer than this may be one bent mode
 FAR, FASTER = 0.15, 5.0  # of a frequency; of a decay: a line that near and that short is what a mode was before it had glided down, or up

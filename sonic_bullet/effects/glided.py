@@ -15,7 +15,7 @@ from sonic_bullet.effects.envelope import Envelopes
 from sonic_bullet.effects.values import Heard
 from sonic_bullet.records import Array
 
-FINER = (ANGLES[1] - ANGLES[0]) * np.linspace(-1, 1, 15)
+FINER = (ANGLES[1] - ANGLES[0]) * np.linspace(-1, 1, 15)  # about the best angle
 LAGS = (2, 6, 18)  # frames
 ROUGH = 0.1  # of ln |z| and of a phase: what neighbours, windows and shapes do to a frame
 MOST = 2.0  # of ln |z|: more off is no worse
@@ -25,8 +25,12 @@ TURNS = 0.1  # of a line's ln variance, that its twins' axes must be worth
 def bend_beside(e: Envelopes, h: Heard, measure: str, bend: float, factor: Array) -> float:
     """The bend, some factors (n,) about one that was told as if every line were one mode's, that lines agree on best, twins about their own axes."""
     lines = [q for q in range(len(e.line)) if e.good[:, q].any()]
-    rows = np.array([[spread(e, h, q, measure, bend * f, ANGLES if twins(h, int(e.line[q])) else np.zeros(1)).min() for q in lines] for f in factor])
-    return float(bend * factor[int(rows.sum(axis=1).argmin())])
+    cost = np.zeros(len(factor))
+    for q in lines:
+        k = int(e.line[q])
+        pair = about(h, k, measure, ANGLES if twins(h, k) else np.zeros(1))
+        cost += [spread(e, h, q, bend * f, *pair).min() for f in factor.tolist()]
+    return float(bend * factor[int(cost.argmin())])
 
 
 def axes_of(e: Envelopes, h: Heard, measure: str, bend: float) -> tuple[tuple[float, ...], tuple[float, ...]]:
@@ -36,24 +40,23 @@ def axes_of(e: Envelopes, h: Heard, measure: str, bend: float) -> tuple[tuple[fl
     for q, k in enumerate(e.line.tolist()):
         if not (twins(h, k) and e.good[:, q].any()):
             continue
-        cost = spread(e, h, q, measure, bend, ANGLES)
+        cost = spread(e, h, q, bend, *about(h, k, measure, ANGLES))
         fine = ANGLES[int(cost.argmin())] + FINER
-        closer = spread(e, h, q, measure, bend, fine)
+        closer = spread(e, h, q, bend, *about(h, k, measure, fine))
         if cost[0] - closer.min() > TURNS:
             found.append((float(h.model.freq_hz[h.mode[k]].mean()), float(fine[int(closer.argmin())])))
     return tuple(f for f, _ in found), tuple(t for _, t in found)
 
 
-def spread(e: Envelopes, h: Heard, q: int, measure: str, bend: float, angle: Array) -> Array:
-    """Ln of the variances (p,) that levels, beside one factor, and gains of phase leave of a pair of twins under every angle (p,) of their axes."""
+def spread(e: Envelopes, h: Heard, q: int, bend: float, amplitude: Array, level: Array) -> Array:
+    """Ln of the variances (p,) that levels, beside one factor, and gains of phase leave of a line. amplitude, level (p, s, j): of its modes under p angles of their axes."""
     k = int(e.line[q])
-    amplitude, level = about(h, k, measure, angle)
     decay, omega, t = max(float(h.decay_per_s[k]), 1e-2), 2 * np.pi * float(h.freq_hz[k]), e.time_s[q]
     turn = bend * omega * level[..., None] ** 2 * -np.expm1(-2 * decay * t) / (2 * decay)  # (p, s, j, t)
     told = (amplitude[..., None] * np.exp(1j * turn)).sum(axis=2) * np.exp(-decay * t)
     heard, good = e.z[:, q], e.good[:, q]
     worth = good / (ROUGH**2 + (e.noise[:, q, None] / np.maximum(np.abs(heard), 1e-300)) ** 2)
-    agree, most = np.zeros(len(angle)), 0.0
+    agree, most = np.zeros(len(amplitude)), 0.0
     for lag in LAGS:
         both = np.conj(_step(heard, lag)) * _step(told, lag)
         weight = np.minimum(worth[:, lag:], worth[:, :-lag])

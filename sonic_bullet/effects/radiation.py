@@ -25,7 +25,7 @@ SCATTER = 0.03
 BETTER = 14.0
 FEWEST, FEW = 6, 4  # lines: to look for it, and to fit it again to a part of them
 AGAIN = 2.0  # times smaller or larger, where it is fitted again
-CLEARER = 0.45  # twice the ln likelihood, a line, that a tilt must be worth: a fifth less misfit
+CLEARER = 0.45  # twice the ln likelihood, a line, that a tilt must be worth
 ORDERS: tuple[int, ...] = (2, 4)
 
 

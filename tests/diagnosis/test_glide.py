@@ -9,14 +9,12 @@ import numpy as np
 import pytest
 from made_body import GAIN, plate, recorded
 from test_chains import true_decay
-from test_choked import PAIR, with_twins
+from test_choked import PAIR, assert_nearer_than_the_meshs, with_twins
 from test_found_again import BAND, fitted
 
-from sonic_bullet.diagnosis.baseline import takes_of
 from sonic_bullet.diagnosis.bodies import Struck
 from sonic_bullet.diagnosis.evidence import evidence_of
 from sonic_bullet.diagnosis.glide import fallen
-from sonic_bullet.diagnosis.judge import mean_db
 from sonic_bullet.diagnosis.refit import refitted, with_effects
 from sonic_bullet.diagnosis.rest import at_rest
 from sonic_bullet.effects.amplitude_pitch import FAR as FARTHER
@@ -91,9 +89,7 @@ def test_gliding_twins_have_their_own_axes() -> None:
     assert found is not None and found.bend == pytest.approx(0.7, rel=0.05)
     assert found.freq_hz == pytest.approx((middle,), rel=5e-3)
     assert found.turn_rad[0] == pytest.approx(0.6, abs=0.06)
-    takes = takes_of((body,))
-    own, mesh = (mean_db(takes, refitted(replace(base, effects=(e,)), (body,), evidence.heard)) for e in (found, replace(found, freq_hz=(), turn_rad=())))
-    assert own is not None and mesh is not None and own < mesh
+    assert_nearer_than_the_meshs(found, base, body, evidence)
 
 
 def test_a_bend_is_told_with_the_axes_of_twins() -> None:
