@@ -29,6 +29,7 @@ EXPLAINED = 0.5  # of the gap; part of it is the mesh's and the shapes' own
 NEARLY = 0.2  # of what a name says: between two that differ by less, phases may decide
 CLEAR, HINT = 25.0, 5.0  # twice the ln likelihood of phases that this takes; where the two are ALIKE
 HELPS = 0.5  # of what a name must gain on strikes left out, on all of them together: a model of few lines may be saved by chance once one is left out
+SAME = 0.1  # of what a room's response leaves open: two that differ by less say the same
 OPEN = 0.3  # of the first gap: with less left, no costly suspect is asked
 
 
@@ -106,9 +107,9 @@ def closed(
 
 def _helps(c: Candidate, bodies: tuple[Struck, ...], takes: Sequence[Judged], now: float, told: float, floor: float, *, first: bool) -> bool:
     """Whether all strikes together gain, and lose nothing of what a room's response, told again without it, says as well (told): that takes up echoes, and
-    some of what stray modes leave, so what moves modes must gain on that."""
+    some of what stray modes leave, so what moves modes must gain on that. A filter or a slow law it takes up whole: then both say the same."""
     before, after = told if moves(c.hypothesis) else now, mean_db(takes, retold(c.hypothesis, bodies)) or 0.0
-    return after < told and before - after > HELPS * needed(max(before - floor, 0.0), first=first)
+    return after < told + SAME * max(told - floor, 0.0) and before - after > HELPS * needed(max(before - floor, 0.0), first=first)
 
 
 def of_the_mesh(h: Hypothesis, bodies: tuple[Struck, ...], takes: Sequence[Judged], seed: int) -> float:

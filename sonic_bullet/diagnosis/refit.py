@@ -171,8 +171,8 @@ def _told(h: Hypothesis, body: Struck, one: Heard) -> Array:
 
 def whole(one: Heard) -> Array:
     """Amplitudes (s, k) with those of lines so near that they may be the same mode, bent or split: at the onset they add up to what was struck."""
-    if not len(one.foreign_hz) or not len(one.freq_hz):
-        return one.amplitude
+    if one.dry or not len(one.foreign_hz) or not len(one.freq_hz):
+        return one.amplitude  # in a room what rings close by is mostly the room
     gap = np.abs(np.log(one.foreign_hz[:, None] / one.freq_hz[None, :]))
     alike = np.abs(np.log(np.maximum(one.foreign_decay_per_s[:, None], 1e-3) / np.maximum(one.decay_per_s, 1e-3))) < ALIKE  # clicks are no part of a mode
     mine = (gap.argmin(axis=1)[:, None] == np.arange(len(one.freq_hz))) & (gap < NEAR) & alike

@@ -79,6 +79,9 @@ def _steady(h: Heard) -> list[tuple[float, float, float, float]]:
     if h.model is not None and len(h.freq_hz):
         apart = np.abs(np.log(h.foreign_hz[:, None] / h.freq_hz)).min(axis=1) > APART
     good = loud & apart & (loose < STEADY) & (coherent > 0.9) & (np.abs(lean) < 0.25)
+    if h.dry:  # a room makes several lines of one, and read outside it each is that one
+        at = np.log(h.foreign_hz)
+        good &= ~((np.abs(at[:, None] - at) < APART) & good & (mean > mean[:, None])).any(axis=1)
     phase = np.angle((weight * per).sum(axis=0))
     return [(h.foreign_hz[k], max(h.foreign_decay_per_s[k], 0.0), mean[k], phase[k]) for k in np.flatnonzero(good)]
 

@@ -105,7 +105,8 @@ def dried(h: Heard, delta: float) -> Heard:
     alone = np.repeat(level[:, None], len(h.foreign_hz), axis=1).astype(complex)
     r = read(h, np.array([delta]), h.foreign_hz, alone, [np.zeros(0, int)] * len(h.foreign_hz))
     amplitude, spread = _rescaled(r, alone, h.foreign_amplitude, h.foreign_sd)
-    return replace(dry, foreign_hz=h.foreign_hz + r.shift_hz[0], foreign_decay_per_s=r.decay_per_s[0], foreign_amplitude=amplitude, foreign_sd=spread)
+    strange = h.foreign_sd * np.abs(amplitude) / np.maximum(np.abs(h.foreign_amplitude), 1e-300)  # what strikes have in common says nothing of how they differ
+    return replace(dry, foreign_hz=h.foreign_hz + r.shift_hz[0], foreign_decay_per_s=r.decay_per_s[0], foreign_amplitude=amplitude, foreign_sd=strange)
 
 
 def _rescaled(r: Read, own: Array, amplitude: Array, sd: Array) -> tuple[Array, Array]:
@@ -113,7 +114,8 @@ def _rescaled(r: Read, own: Array, amplitude: Array, sd: Array) -> tuple[Array, 
     now = (np.conj(own) * amplitude).sum(axis=0) / np.maximum((np.abs(own) ** 2).sum(axis=0), 1e-300)
     silent = (np.abs(own).sum(axis=0) == 0) | (now == 0)  # the model says nothing of them: they stay as they were heard
     factor = np.where(silent, 1, r.amplitude[0] / np.where(silent, 1, now))
-    common = np.abs(own) * np.hypot(r.amplitude_sd[0], SURE * np.abs(r.amplitude[0]))
+    each = np.maximum(np.abs(own * r.amplitude[0]), np.abs(amplitude * factor))  # where a mode is hardly struck, more is heard of it than the model says
+    common = each * np.hypot(r.amplitude_sd[0] / np.maximum(np.abs(r.amplitude[0]), 1e-300), SURE)
     return amplitude * factor, np.hypot(sd * np.abs(factor), common)
 
 
