@@ -172,7 +172,7 @@ def simplest(able: Sequence[Candidate], bodies: tuple[Struck, ...]) -> Candidate
 
     rivals = [c for c in able if not moves(c.hypothesis)]
     first = min((c for c in rivals if close(c, ALIKE)), key=lambda c: (_numbers(c), -c.mean_db))
-    others = [c for c in rivals if c is not first and _numbers(c) <= _numbers(first) and close(c, NEARLY)]
+    others = [c for c in rivals if c is not first and _numbers(c) <= _numbers(first) and (best.drop_db - c.drop_db).mean() < NEARLY * best.mean_db]
     if not others:
         return first
     own = misfit(first.hypothesis, bodies)  # the less strikes say, the less phases need to

@@ -2,8 +2,8 @@
 
     A_k -> A_k F̂(f_k τ)/F̂(0),   τ = τ₀ (J/J₀)^{−1/5}   (Hertz), or τ₀ whatever J (flat faces)        [Hertz 1882; Hunter 1957; Johnson 1985, ch. 11]
 
-Read off the amplitudes: a roll-off common to all modes of a strike, with the pulse's zeros. Moments about the strike's own pattern; no phase is used.
-Where a long contact leaves two or three lines, modes that should be heard and are not tell it, too.
+Read off the amplitudes: a roll-off common to all modes of a strike, with the pulse's zeros. Moments about the strike's own pattern. Phases, where they are
+true, only tell whether τ goes with J: a pulse's middle comes πfτ late, which is seen long before its roll-off differs. Where a long contact leaves two or three lines, modes that should be heard and are not tell it, too.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ FEWEST, FEW = 2, 3  # lines to tell a roll-off from; with no more than FEW, mode
 NEAR = 0.01  # of ln f: a line that near may be that mode
 COMMON, TURNS = 0.05, 15  # of how loud a mode is at the sensor, relative; of weights, gain and that
 STARTS = (0.05, 0.5, 0.95)  # of the ratios of what is heard to what is expected: gains to begin with
+DELAYS_S, FINER_S = np.arange(-4e-5, 4.01e-5, 2e-6), np.linspace(-2e-6, 2e-6, 9)  # of the files' onset
 SILENT, HIDDEN = 10.0, 0.02  # times what noise alone makes of an amplitude, and of the strongest: what lines may not be found under
 
 
@@ -71,9 +72,10 @@ class ContactTime:
         if isinstance(evidence.known, cls):  # part of the evidence may have another pulse nearly as good far away; it is this one that is fitted again
             grid, pulses = evidence.known.duration_s(reference) * np.geomspace(1 / AGAIN, AGAIN, 24), (evidence.known.pulse,)
         plain = _cost(told, heard, sd, ROUGH * most, mode)
-        best: tuple[float, Self] | None = None
-        for pulse in pulses:
-            for exponent in (HERTZ, 0.0):
+        ways: list[tuple[float, float, Self]] = []
+        for exponent in (HERTZ, 0.0):
+            best: tuple[float, Self] | None = None
+            for pulse in pulses:
                 share = (level / reference) ** exponent
 
                 def at(tau: float, share: Array = share, pulse: str = pulse) -> float:
@@ -87,8 +89,10 @@ class ContactTime:
                 cost = at(tau) + (0.0 if exponent else 1e-9)
                 if best is None or cost < best[0]:
                     best = (cost, cls(tau, reference, exponent, pulse))
-        assert best is not None
-        return best[1] if evidence.known is not None or best[0] < plain - 4 * np.log(len(freq)) else None
+            assert best is not None
+            ways.append((best[0] + sum(_late(h, best[1]) for h in evidence.heard), *best))
+        _, cost, found = min(ways, key=lambda way: way[0])
+        return found if evidence.known is not None or cost < plain - 4 * np.log(len(freq)) else None
 
 
 def _table(h: Heard) -> tuple[Array, Array, Array, Array, Array, Array]:
@@ -141,6 +145,25 @@ def _from(gain: float, told: Array, heard: Array, sd: Array, rough: Array, mode:
     width = sd**2 + (gain * rough) ** 2
     off = heard - gain * told * (1 + COMMON * own[mode])
     return float((np.log(width) + 9 * np.log1p(off**2 / width / 9)).sum() + (own**2 + np.log1p(stiff)).sum())
+
+
+def _late(h: Heard, effect: ContactTime) -> float:
+    """Twice the negative log likelihood under Cauchy's law of the phases (s, k) at the best common delay; 0 where they are not true."""
+    if not h.signed or h.dry:
+        return 0.0
+    tau = np.array([effect.duration_s(float(j)) if np.isfinite(j) else np.nan for j in h.impulse_n_s])[:, None]
+    turn, x = 2 * np.pi * h.freq_hz, np.abs(h.expected)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        off = np.angle(h.amplitude / h.expected * np.sign(magnitude(effect.pulse, h.freq_hz * tau))) + turn * tau / 2
+        width = np.hypot(h.amplitude_sd / np.abs(h.amplitude), ROUGH * x.max(axis=0) / x)
+    good = np.isfinite(off) & np.isfinite(width) & (width < 1)
+    turn, off, width = np.broadcast_to(turn, off.shape)[good], off[good], width[good]
+
+    def at(delay_s: float) -> float:
+        return float(9 * np.log1p((2 * np.sin((off + turn * delay_s) / 2) / width) ** 2 / 9).sum())
+
+    middle = min(DELAYS_S, key=at)
+    return min(at(t) for t in middle + FINER_S)
 
 
 def _golden(f: Any, low: float, high: float) -> float:

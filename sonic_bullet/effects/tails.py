@@ -114,8 +114,8 @@ def _rescaled(r: Read, own: Array, amplitude: Array, sd: Array) -> tuple[Array, 
     now = (np.conj(own) * amplitude).sum(axis=0) / np.maximum((np.abs(own) ** 2).sum(axis=0), 1e-300)
     silent = (np.abs(own).sum(axis=0) == 0) | (now == 0)  # the model says nothing of them: they stay as they were heard
     factor = np.where(silent, 1, r.amplitude[0] / np.where(silent, 1, now))
-    each = np.maximum(np.abs(own * r.amplitude[0]), np.abs(amplitude * factor))  # where a mode is hardly struck, more is heard of it than the model says
-    common = each * np.hypot(r.amplitude_sd[0] / np.maximum(np.abs(r.amplitude[0]), 1e-300), SURE)
+    common = np.abs(own) * np.hypot(r.amplitude_sd[0], SURE * np.abs(r.amplitude[0]))
+    common = np.maximum(common, SURE * np.abs(amplitude * factor))  # where a mode is hardly struck, more is heard of it than the model says
     return amplitude * factor, np.hypot(sd * np.abs(factor), common)
 
 

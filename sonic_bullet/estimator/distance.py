@@ -17,6 +17,7 @@ from sonic_bullet.records import Array
 
 WINDOWS = (512, 2048, 8192)
 ABOVE = 10.0  # m: cells 10 dB above the noise count
+FEWEST = 20  # cells
 FLOOR_WINDOW = 1024
 MOST = 8192  # of its window, where recordings are long: low noise needs narrow bins
 SIDE = 8  # bins of the short window to each side
@@ -89,9 +90,10 @@ def white(rms: float) -> Floor:
 def log_spectral_db(a: Array, b: Array, floor: Floor, *, windows: tuple[int, ...] = WINDOWS, above: float = ABOVE) -> float:
     """Distance D of two sounds (n,), each with a noise like ``floor`` in it; NaN where no cell stands above it.
 
-    A sound without noise (a prediction) must be given some, or its silence counts: see `with_noise`.
+    A sound without noise (a prediction) must be given some, or its silence counts: see `with_noise`. Windows with FEWEST cells speak, or, where none has so
+    many, all: of fewer, one in which noise happens to cancel a sound says more than all others.
     """
-    found = []
+    found, few = [], []
     for window in windows:
         if window > len(a):
             continue
@@ -99,8 +101,9 @@ def log_spectral_db(a: Array, b: Array, floor: Floor, *, windows: tuple[int, ...
         heard = (power_a + power_b) / 2 > above * cell
         if heard.any():
             tiny = np.broadcast_to(1e-3 * cell, heard.shape)[heard]
-            found.append(np.sqrt(((10 * np.log10((power_a[heard] + tiny) / (power_b[heard] + tiny))) ** 2).mean()))
-    return float(np.mean(found)) if found else float("nan")
+            off = np.sqrt(((10 * np.log10((power_a[heard] + tiny) / (power_b[heard] + tiny))) ** 2).mean())
+            (found if heard.sum() >= FEWEST else few).append(off)
+    return float(np.mean(found or few)) if found or few else float("nan")
 
 
 def with_noise(sound: Array, floor: Floor, seed: int) -> Array:

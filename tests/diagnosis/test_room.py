@@ -10,7 +10,7 @@ from made_body import ALPHA, BETA, recorded, truth
 from test_found_again import BAND, fitted
 
 from sonic_bullet.diagnosis.evidence import evidence_of, heard_of, outside
-from sonic_bullet.diagnosis.refit import refitted
+from sonic_bullet.diagnosis.refit import refitted, whole
 from sonic_bullet.effects import tails
 from sonic_bullet.effects.contact_time import ContactTime
 from sonic_bullet.effects.damping_law import DampingLaw
@@ -129,6 +129,42 @@ def test_what_the_model_says_nothing_of_stays_as_it_was_heard() -> None:
     dry = tails.dried(replace(heard, push=push), RT60 / 0.9)
     assert np.array_equal(dry.amplitude[:, 0], heard.amplitude[:, 0])
     assert np.isfinite(dry.amplitude).all()
+
+
+def test_what_rings_along_in_a_room_is_told_once() -> None:
+    """A room makes several lines of one; outside it they are one, and as steady over the strikes as it was struck."""
+    lodger = ForeignMode((1000.0, 2710.0), (9.0, 14.0), (1.2, 0.9), (0.0, 0.0))
+    body = recorded(Room(0.9, 0.9, 4), lodger, seconds=1.2)
+    evidence = evidence_of(truth(Room(0.9, 0.9, 4)), (body,), (50.0, 7_500.0))
+    assert evidence.heard[0].dry
+    found = ForeignMode.propose(evidence)
+    assert found is not None
+    assert found.freq_hz == pytest.approx((1000.0, 2710.0), rel=2e-3)
+
+
+def test_a_gain_beside_a_room_is_the_lines_of_modes_alone() -> None:
+    """Lines that the room leaves next to a mode's are no part of it."""
+    body = recorded(Room(0.9, 0.9, 4), seconds=1.2)
+    heard = heard_of(truth(Room(0.9, 0.9, 4)), body)
+    beside = replace(
+        heard,
+        foreign_hz=heard.freq_hz * 1.001,
+        foreign_decay_per_s=heard.decay_per_s,
+        foreign_amplitude=5 * heard.amplitude,
+        foreign_sd=heard.amplitude_sd,
+    )
+    assert np.array_equal(whole(beside), heard.amplitude)
+    assert np.abs(whole(replace(beside, dry=False))).max() > np.abs(heard.amplitude).max()
+
+
+def test_a_mode_that_is_hardly_struck_is_not_read_more_surely() -> None:
+    """What the model says nothing of, a tail's echoes make as unsure as anything else they touch."""
+    body = recorded(Room(0.9, 0.9, 4), seconds=1.2)
+    heard = heard_of(truth(), body)
+    push = heard.push.copy()
+    push[0] *= 1e-6
+    dry = tails.dried(replace(heard, push=push), RT60 / 0.9)
+    assert (dry.amplitude_sd[0] > 0.09 * np.abs(dry.amplitude[0])).all()
 
 
 def test_a_snippet_has_no_tail() -> None:

@@ -44,6 +44,28 @@ def test_a_pulse_and_a_low_pass_are_told_apart(effect: Effect) -> None:
     assert simplest(both[::-1], (body,)).id == effect.id
 
 
+@pytest.mark.parametrize("effect", [ContactTime(1.2e-4, 0.016, -0.2, "half-sine"), LOW], ids=lambda e: e.id)
+def test_phases_speak_though_every_strike_says_a_little_more_for_the_other(effect: Effect) -> None:
+    """A pulse in few samples, or a filter between two, has magnitudes that are off by a little at all strikes alike; phases are off by a turn."""
+    body = recorded(effect)
+    both = [replace(c, drop_db=c.drop_db * (0.9 if c.id == effect.id else 1.0)) for c in told_by(effect)]
+    assert simplest(sorted(both, key=lambda c: -c.mean_db), (body,)).id == effect.id
+
+
+@pytest.mark.parametrize("exponent", [-0.2, 0.0])
+def test_whether_a_pulse_goes_with_the_blow_is_told_by_its_middle(exponent: float) -> None:
+    """Of a pulse so short that hardly anything rolls off: longer for a soft blow, or not; and files may begin a little late, all alike."""
+    body = recorded(ContactTime(1.4e-4, 0.016, exponent, "raised-cosine"))
+    h = refitted(truth(), (body,))
+    heard = evidence_of(h, (body,), BAND).heard[0]
+    late = replace(heard, amplitude=heard.amplitude * np.exp(-2j * np.pi * heard.freq_hz * 1.1e-5))
+    for one in (heard, late):
+        found = ContactTime.propose(replace(evidence_of(h, (body,), BAND), heard=(one,)))
+        assert found is not None
+        assert found.exponent == exponent
+        assert found.tau_s == pytest.approx(1.4e-4, rel=0.2)  # a shorter one of another shape rolls off alike
+
+
 def test_neither_gain_nor_delay_is_a_misfit() -> None:
     body = recorded(PULSE)
     h = truth(PULSE)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sonic_bullet.estimator.distance import log_spectral_db, white, with_noise
+from sonic_bullet.estimator.distance import log_spectral_db, noise_floor_db, white, with_noise
 from sonic_bullet.estimator.lines import joint_lines
 from sonic_bullet.estimator.picture import circle
 from sonic_bullet.estimator.predict import damped_sum
@@ -70,6 +70,17 @@ def test_distance_of_a_gain_and_of_nothing() -> None:
     assert log_spectral_db(2 * tone, tone, floor) == pytest.approx(6.02, abs=0.02)
     assert np.isnan(log_spectral_db(np.zeros(20_000), np.zeros(20_000), floor))
     assert with_noise(np.zeros(20_000), floor, 1).std() == pytest.approx(1e-4, rel=0.03)
+
+
+def test_few_cells_do_not_speak_for_a_window() -> None:
+    """A sound that hardly stands above the noise: by the widest window in a handful of cells, in one of which noise may cancel it."""
+    t = np.arange(48_000) / 48_000
+    sound, floor = 2e-3 * np.exp(-100 * t) * np.sin(2 * np.pi * 3000 * t), white(1e-4)
+    least = [noise_floor_db(sound, floor, seeds=(2 * k, 2 * k + 1)) for k in range(12)]
+    assert max(least) < 2.0
+    alone = [noise_floor_db(sound, floor, seeds=(2 * k, 2 * k + 1), windows=(8192,)) for k in range(12)]
+    assert max(alone) > max(least) + 1  # which had said as much as all others together
+    assert np.isfinite(alone).any()  # and still speaks where nothing else does
 
 
 def test_circle_is_equation_8() -> None:
