@@ -93,7 +93,8 @@ def log_spectral_db(a: Array, b: Array, floor: Floor, *, windows: tuple[int, ...
     A sound without noise (a prediction) must be given some, or its silence counts: see `with_noise`. Windows with FEWEST cells speak, or, where none has so
     many, all: of fewer, one in which noise happens to cancel a sound says more than all others.
     """
-    found, few = [], []
+    found: list[float] = []
+    few: list[float] = []
     for window in windows:
         if window > len(a):
             continue
@@ -101,7 +102,7 @@ def log_spectral_db(a: Array, b: Array, floor: Floor, *, windows: tuple[int, ...
         heard = (power_a + power_b) / 2 > above * cell
         if heard.any():
             tiny = np.broadcast_to(1e-3 * cell, heard.shape)[heard]
-            off = np.sqrt(((10 * np.log10((power_a[heard] + tiny) / (power_b[heard] + tiny))) ** 2).mean())
+            off = float(np.sqrt(((10 * np.log10((power_a[heard] + tiny) / (power_b[heard] + tiny))) ** 2).mean()))
             (found if heard.sum() >= FEWEST else few).append(off)
     return float(np.mean(found or few)) if found or few else float("nan")
 
