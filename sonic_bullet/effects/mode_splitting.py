@@ -63,8 +63,11 @@ class ModeSplitting:
 
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
-        rows = []
+        rows: list[tuple[float, ...]] = []
         for h in (h for h in evidence.heard if h.plain is not None):
+            if isinstance(evidence.known, cls):
+                rows += _again(h, evidence.known)
+                continue
             found = _pairs(h, 1.0)
             if len(found) > 1:  # E/ρ may have been fitted to one line of each pair
                 found = [row[:3] for row in _pairs(h, float(np.median([row[3] for row in found])))]
@@ -78,12 +81,7 @@ def _pairs(h: Heard, scale: float) -> list[tuple[float, ...]]:
     A line stands for one mode; the surest pairs choose first.
     """
     assert h.plain is not None  # the mesh's own order: corrections may have turned a pair's about
-    every = np.concatenate([h.freq_hz, h.foreign_hz])
-    decay = np.concatenate([h.decay_per_s, h.foreign_decay_per_s])
-    amplitude = np.concatenate([h.amplitude, h.foreign_amplitude], axis=1)
-    level = np.where(np.isfinite(h.impulse_n_s), h.impulse_n_s, 1.0)
-    strike = np.einsum("sxm,sx->sm", h.plain.shape[h.strike_vertex].astype(float), h.strike_way) * level[:, None]
-    sensor = np.einsum("xm,x->m", h.plain.shape[h.sensor_vertex].astype(float), h.sensor_way)
+    every, decay, amplitude, strike, sensor = _lines(h)
     model_hz = h.plain.freq_hz
     size = np.abs(amplitude).max(axis=0)
     clear = size > np.maximum(LOUD * size.max(), CLEAR * np.concatenate([h.amplitude_sd, h.foreign_sd], axis=1).max(axis=0))
@@ -112,6 +110,32 @@ def _pairs(h: Heard, scale: float) -> list[tuple[float, ...]]:
         middle = float((every[low] + every[high]) / 2)
         found.append((middle, split, turn, 2 * middle / float(model_hz[mode] + model_hz[mode + 1])))
     return sorted(found)
+
+
+def _again(h: Heard, known: ModeSplitting) -> list[tuple[float, ...]]:
+    """(f, ε, ψ) of the pairs that are known, by fewer strikes: two lines that only the one left out showed loudly are no single mode because of that."""
+    assert h.plain is not None
+    every, _, amplitude, strike, sensor = _lines(h)
+    found: list[tuple[float, ...]] = []
+    for f, split in zip(known.freq_hz, known.split, strict=True):
+        a, b = pair_at(h.plain.freq_hz, f)
+        line = [int(np.abs(every - f * (1 + side * split / 2)).argmin()) for side in (-1, 1)]
+        if a < 0 or line[0] == line[1] or (np.abs(every[line] / (f * (1 + np.array([-1, 1]) * split / 2)) - 1) > split / 4).any():
+            continue
+        turn, _ = _turn(strike[:, [a, b]], sensor[[a, b]], amplitude[:, line], h.signed)
+        found.append((float(every[line].mean()), float(np.ptp(every[line]) / every[line].mean()), turn))
+    return found
+
+
+def _lines(h: Heard) -> tuple[Array, Array, Array, Array, Array]:
+    """All lines' frequencies and decays (k,) and amplitudes (s, k); what a strike gives to every mode (s, m), and how the sensor sees them (m,)."""
+    assert h.plain is not None
+    every = np.concatenate([h.freq_hz, h.foreign_hz])
+    decay = np.concatenate([h.decay_per_s, h.foreign_decay_per_s])
+    amplitude = np.concatenate([h.amplitude, h.foreign_amplitude], axis=1)
+    level = np.where(np.isfinite(h.impulse_n_s), h.impulse_n_s, 1.0)
+    strike = np.einsum("sxm,sx->sm", h.plain.shape[h.strike_vertex].astype(float), h.strike_way) * level[:, None]
+    return every, decay, amplitude, strike, np.einsum("xm,x->m", h.plain.shape[h.sensor_vertex].astype(float), h.sensor_way)
 
 
 def _turn(strike: Array, sensor: Array, amplitude: Array, signed: bool) -> tuple[float, float]:

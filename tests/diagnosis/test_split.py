@@ -9,7 +9,7 @@ import pytest
 from made_body import plate, recorded, truth
 
 from sonic_bullet.diagnosis.bodies import Struck
-from sonic_bullet.diagnosis.evidence import evidence_of
+from sonic_bullet.diagnosis.evidence import evidence_of, thinned
 from sonic_bullet.diagnosis.refit import refitted
 from sonic_bullet.effects.mode_splitting import ModeSplitting
 from sonic_bullet.records import ModalModel
@@ -77,3 +77,25 @@ def test_a_split_pair_sounds_as_two_modes_that_fill_the_same_space() -> None:
         before, now = model.shape[:, 2, [a, b]].astype(float), after.shape[:, 2, [a, b]].astype(float)
         assert np.allclose(before @ before.T, now @ now.T, atol=1e-6 * np.abs(before @ before.T).max())
         assert after.freq_hz[b] / after.freq_hz[a] - 1 == pytest.approx(0.012 if a == 3 else 0.009, rel=0.01)
+
+
+def test_a_pair_that_one_strike_shows_is_no_single_mode_without_it() -> None:
+    """Left out of the evidence, that strike leaves one line of the pair under the noise: the lines are there all the same, and the other strikes tell the turn."""
+    body = recorded(split(), model=twins())
+    whole = ModeSplitting.propose(evidence_of(truth(), (body,), BAND))
+    assert whole is not None
+    assert body.gathered is not None
+    less = thinned(evidence_of(truth(), (body,), BAND), (body.gathered, 1), 1.0, np.random.default_rng(0))
+    heard = less.heard[0]
+    faint = np.abs(heard.freq_hz - whole.freq_hz[0] * (1 + whole.split[0] / 2)).argmin()
+    sd = heard.amplitude_sd.copy()
+    sd[:, faint] = np.abs(heard.amplitude[:, faint])
+    less = replace(less, heard=(replace(heard, amplitude_sd=sd),))
+    alone = ModeSplitting.propose(less)
+    assert alone is not None
+    assert len(alone.freq_hz) == len(whole.freq_hz) - 1
+    again = ModeSplitting.propose(replace(less, known=whole))
+    assert again is not None
+    assert again.freq_hz == pytest.approx(whole.freq_hz, rel=1e-6)
+    assert again.split == pytest.approx(whole.split, rel=1e-3)
+    assert np.abs(np.sin(np.subtract(again.turn_rad, whole.turn_rad))).max() < 0.06
