@@ -44,7 +44,8 @@ def solved(y: Array, sd: Array, columns: Array) -> tuple[Array, Array]:
     from scipy.optimize import nnls
 
     weight = 1 / sd
-    scale = 1 / np.maximum(np.sqrt(((columns * weight[:, None]) ** 2).sum(axis=0)), 1e-300)
+    size = np.sqrt(((columns * weight[:, None]) ** 2).sum(axis=0))
+    scale = np.divide(1, size, out=np.zeros(len(size)), where=size > 0)  # of what nothing is told, nothing is said
     a, b = columns * scale * weight[:, None], y * weight
     trust, x = np.ones(len(y)), np.zeros(columns.shape[1])
     for _ in range(8):

@@ -76,7 +76,8 @@ class Radiation:
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
         heard = max(evidence.heard, key=lambda h: len(h.freq_hz) if h.model is not None else 0)
-        if heard.model is None or len(heard.freq_hz) < (FEWEST if evidence.known is None else FEW) or not np.isfinite(heard.decay_per_s).all():
+        told = int((~np.isposinf(heard.decay_sd_per_s)).sum())  # in a room some lines tell no decay
+        if heard.model is None or told < (FEWEST if evidence.known is None else FEW) or not np.isfinite(heard.decay_per_s).all():
             return None
         area = areas(heard.model)
         loud = (np.abs(heard.push) ** 2).sum(axis=0) + 1e-300  # of modes that share a line, the louder is heard: a plate's own plane hardly moves the air
