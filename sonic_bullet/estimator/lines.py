@@ -26,6 +26,7 @@ MOST_LINES = 160
 SECONDS_MAX = 8.0
 CROWD, FEWER = 2.5, 0.3  # starting lines over a body's modes; of the lines at the onset
 LATE_S = (0.03, 0.1)
+DEAD = 9.0  # of ln amplitude: 78 dB
 BEYOND = (10.0, 0.1)  # times a recording's peak; share of the lines that begin there: what no single hit leaves
 PINNED = 0.98  # of the fastest decay there is
 
@@ -105,6 +106,9 @@ def _from(late: int, signals: Array, sr: int, band_hz: tuple[float, float], sign
         lines = joint_lines(signals[:, late:], sr, band_hz=band_hz, signed=signed)
     except AudioError:
         return None
+    alive = lines.decay_per_s * late / sr < DEAD  # what would have been over by then began later
+    if not alive.all():
+        lines = lines_of(signals[:, late:], lines.noise, (-lines.decay_per_s + 2j * np.pi * lines.freq_hz)[alive], sr, signed)
     back = np.exp((lines.decay_per_s - 2j * np.pi * lines.freq_hz) * late / sr)
     return replace(lines, amplitude=lines.amplitude * back, amplitude_sd=lines.amplitude_sd * np.abs(back))
 

@@ -29,6 +29,7 @@ POISSON_REACH = 0.05
 CANDIDATES = 8
 MISSED = 0.3
 NEVER = 0.02
+HEAPED = 10.0  # times the energy of all lines: what none can hold that is not cancelled
 BRIEF = 25.0  # times the decay that holds half of the energy: clicks, filters' and rooms' first milliseconds are made of such lines, bodies' modes seldom
 
 
@@ -100,17 +101,32 @@ def _patterns(lines: Lines, seen: Observation, modes: Array) -> tuple[Array, Arr
 def _rings(lines: Lines) -> Array:
     """How much each line (k,) may be a mode by its decay: 1, less where it is over far sooner than what holds the energy.
 
-    Lines at the fastest decay there is come in heaps that cancel one another, so their strengths say nothing.
+    Lines at the fastest decay there is come in heaps that cancel one another, so their strengths say nothing; no more do those of other heaps.
     """
     decay, energy = np.nan_to_num(lines.decay_per_s), np.nan_to_num(lines.energy)
-    energy = np.where(decay > PINNED * FASTEST_PER_S, 0.0, energy)
+    heaped = _heaped(lines)
+    energy = np.where((decay > PINNED * FASTEST_PER_S) | heaped, 0.0, energy)
     if not (energy > 0).any() or not (decay > 0).any():
         return np.ones(len(decay))
     order = np.argsort(decay)
     share = np.cumsum(energy[order])
     typical = max(float(decay[order][np.searchsorted(share, share[-1] / 2)]), 1.0)
     rings = np.clip(BRIEF * typical / np.maximum(decay, 1e-9), NEVER, 1.0)
-    return np.asarray(np.where(decay > PINNED * FASTEST_PER_S, np.minimum(rings, NEVER), rings))
+    return np.asarray(np.where(heaped, 0.0, np.where(decay > PINNED * FASTEST_PER_S, np.minimum(rings, NEVER), rings)))
+
+
+def _heaped(lines: Lines) -> Array:
+    """Which lines (k,) are mostly cancelled by their neighbours: alone they would hold HEAPED times the energy of all lines together.
+
+    ∫ |Σ A e^{pt}|² dt = −Σ_jk A_j Ā_k/(p_j + p̄_k)
+    """
+    pole, a = -lines.decay_per_s + 2j * np.pi * lines.freq_hz, lines.amplitude
+    if not len(pole) or not np.isfinite(a).all() or not (lines.decay_per_s > 0).all():
+        return np.zeros(len(pole), bool)
+    shared = -1 / (pole[:, None] + pole.conj())
+    together = np.maximum(np.einsum("sj,jk,sk->s", a, shared, a.conj()).real, 0)
+    alone = np.abs(a) ** 2 / (2 * lines.decay_per_s)
+    return np.asarray((alone > HEAPED * together[:, None]).any(axis=0))
 
 
 def _overlap(a: Array, b: Array, width: float) -> Array:
