@@ -104,18 +104,18 @@ def _rings(lines: Lines) -> Array:
     Lines at the fastest decay there is come in heaps that cancel one another, so their strengths say nothing; no more do those of other heaps.
     """
     decay, energy = np.nan_to_num(lines.decay_per_s), np.nan_to_num(lines.energy)
-    heaped = _heaped(lines)
-    energy = np.where((decay > PINNED * FASTEST_PER_S) | heaped, 0.0, energy)
+    piled = heaped(lines)
+    energy = np.where((decay > PINNED * FASTEST_PER_S) | piled, 0.0, energy)
     if not (energy > 0).any() or not (decay > 0).any():
         return np.ones(len(decay))
     order = np.argsort(decay)
     share = np.cumsum(energy[order])
     typical = max(float(decay[order][np.searchsorted(share, share[-1] / 2)]), 1.0)
     rings = np.clip(BRIEF * typical / np.maximum(decay, 1e-9), NEVER, 1.0)
-    return np.asarray(np.where(heaped, 0.0, np.where(decay > PINNED * FASTEST_PER_S, np.minimum(rings, NEVER), rings)))
+    return np.asarray(np.where(piled, 0.0, np.where(decay > PINNED * FASTEST_PER_S, np.minimum(rings, NEVER), rings)))
 
 
-def _heaped(lines: Lines) -> Array:
+def heaped(lines: Lines) -> Array:
     """Which lines (k,) are mostly cancelled by their neighbours: alone they would hold HEAPED times the energy of all lines together.
 
     ∫ |Σ A e^{pt}|² dt = −Σ_jk A_j Ā_k/(p_j + p̄_k)

@@ -63,3 +63,18 @@ def test_lines_of_a_bouncing_strike_are_no_louder_than_the_strike(monkeypatch: p
         near = int(np.argmin(np.abs(found.freq_hz - f)))
         assert found.freq_hz[near] == pytest.approx(f, rel=1e-4)
         assert found.decay_per_s[near] == pytest.approx(d, rel=0.02)
+
+
+def test_what_began_late_is_not_taken_back_to_the_onset(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Lines told once a crowd is over: one that would have died long before is a late burst's, and at the onset it would have been louder than anything."""
+    monkeypatch.setattr(line_fit, "CROWD", 0.0)
+    monkeypatch.setattr(line_fit, "FEWER", np.inf)
+    t = np.arange(2 * SR) / SR
+    freq, late = np.array([952.0, 2093.0, 4095.0]), line_fit.LATE_S[0]
+    ring = np.exp(-np.array([[6.0], [11.0], [20.0]]) * t) * np.sin(2 * np.pi * freq[:, None] * t)
+    burst = (t >= late) * np.exp(-900 * np.maximum(t - late, 0)) * np.sin(2 * np.pi * 3000 * t)
+    rng = np.random.default_rng(4)
+    signals = np.stack([size @ ring + 0.05 * burst + 1e-5 * rng.standard_normal(len(t)) for size in rng.uniform(0.05, 0.2, (4, 3))])
+    found = line_fit.joint_lines(signals, SR, band_hz=(50.0, 7_500.0), modes=3)
+    assert found.freq_hz == pytest.approx(freq, rel=1e-4)
+    assert (np.abs(found.amplitude) < 1).all()

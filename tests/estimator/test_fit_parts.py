@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from sonic_bullet.estimator.distance import log_spectral_db, noise_floor_db, white, with_noise
-from sonic_bullet.estimator.lines import joint_lines
+from sonic_bullet.estimator.lines import Lines, joint_lines
+from sonic_bullet.estimator.pairing import heaped
 from sonic_bullet.estimator.picture import circle
 from sonic_bullet.estimator.predict import damped_sum
 from sonic_bullet.estimator.rayleigh import rayleigh
@@ -81,6 +82,15 @@ def test_few_cells_do_not_speak_for_a_window() -> None:
     alone = [noise_floor_db(sound, floor, seeds=(2 * k, 2 * k + 1), windows=(8192,)) for k in range(12)]
     assert max(alone) > max(least) + 1  # which had said as much as all others together
     assert np.isfinite(alone).any()  # and still speaks where nothing else does
+
+
+def test_lines_that_cancel_one_another_hold_more_than_all_do() -> None:
+    """A burst that no damped sinusoid is takes several, each far above it; twins that beat are what they are."""
+    freq, decay = np.array([400.0, 900.0, 900.4, 3000.0, 3004.0, 3008.0]), np.array([5.0, 8.0, 8.0, 900.0, 940.0, 980.0])
+    amplitude = np.array([[1.0, 1.0, -0.9, 500.0, -1000.0, 500.2], [0.3, 0.5, 0.6, 200.0, -400.0, 200.1]]) + 0j
+    none = np.zeros(6)
+    lines = Lines(freq, decay, amplitude, none, none, np.zeros((2, 6)), np.ones(2), np.ones(6), True)
+    assert heaped(lines).tolist() == [False, False, False, True, True, True]
 
 
 def test_circle_is_equation_8() -> None:
