@@ -90,6 +90,8 @@ def corrected(h: Hypothesis, bodies: tuple[Struck, ...], *, anew: bool = False) 
     for body in bodies:
         if body.gathered is None:
             continue
+        for e in (e for e in h.effects if hasattr(e, "heard_at")):  # lines of twins go to their own: half a split off, either would do
+            found[body.name] = np.clip(e.heard_at(undamped(h, body).freq_hz * np.exp(h.stretch)), -CORRECTION, CORRECTION)
         for _ in range(2):
             place, off = _off(replace(h, correction=found), body, anew)
             ratio = np.array(found.get(body.name, np.zeros(undamped(h, body).mode_count)), float)

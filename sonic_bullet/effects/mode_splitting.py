@@ -54,6 +54,15 @@ class ModeSplitting:
         order = np.argsort(freq, kind="stable")
         return replace(x, freq_hz=freq[order], decay_per_s=x.decay_per_s[order], shape=shape[:, :, order])
 
+    def heard_at(self, freq_hz: Array) -> Array:
+        """How far off (m,), relative, modes at freq_hz (m,) are from the middles of the pairs that were heard; 0 for all others."""
+        off = np.zeros(len(freq_hz))
+        for f in self.freq_hz:
+            pair = list(pair_at(freq_hz, f))
+            if pair[0] >= 0:
+                off[pair] = f / freq_hz[pair].mean() - 1
+        return off
+
     def parameters(self) -> dict[str, Any]:
         """What it says, for people and JSON, in SI units."""
         return {"pairs": [{"freq_hz": f, "split": s, "turn_rad": t} for f, s, t in zip(self.freq_hz, self.split, self.turn_rad, strict=True)]}

@@ -10,6 +10,7 @@ from made_body import plate, recorded, truth
 
 from sonic_bullet.diagnosis.bodies import Struck
 from sonic_bullet.diagnosis.evidence import evidence_of, thinned
+from sonic_bullet.diagnosis.play import modes_of
 from sonic_bullet.diagnosis.refit import refitted
 from sonic_bullet.effects.mode_splitting import ModeSplitting
 from sonic_bullet.records import ModalModel
@@ -99,3 +100,16 @@ def test_a_pair_that_one_strike_shows_is_no_single_mode_without_it() -> None:
     assert again.freq_hz == pytest.approx(whole.freq_hz, rel=1e-6)
     assert again.split == pytest.approx(whole.split, rel=1e-3)
     assert np.abs(np.sin(np.subtract(again.turn_rad, whole.turn_rad))).max() < 0.06
+
+
+def test_lines_of_twins_go_to_their_own_modes_though_the_mesh_is_off_by_half_a_split() -> None:
+    """The lower line of a pair lies on the mesh's upper twin then; the pair is where it was heard."""
+    body = recorded(split(), model=twins())
+    effect = split()
+    off = body.model.freq_hz.copy()
+    off[list(PAIRS[0])] /= 1.0095
+    shifted = replace(body, model=replace(body.model, freq_hz=off))
+    h = refitted(truth(effect), (shifted,))
+    got = np.sort(modes_of(h, shifted)[0].freq_hz)
+    want = np.sort(modes_of(truth(effect), body)[0].freq_hz)
+    assert np.abs(got / want - 1).max() < 1e-3
