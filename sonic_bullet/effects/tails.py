@@ -104,7 +104,7 @@ def dried(h: Heard, delta: float) -> Heard:
     level = np.where(np.isfinite(h.impulse_n_s), h.impulse_n_s, 1.0)
     alone = np.repeat(level[:, None], len(h.foreign_hz), axis=1).astype(complex)
     r = read(h, np.array([delta]), h.foreign_hz, alone, [np.zeros(0, int)] * len(h.foreign_hz))
-    amplitude, spread = _rescaled(r, alone, h.foreign_amplitude, h.foreign_sd)
+    amplitude, _ = _rescaled(r, alone, h.foreign_amplitude, h.foreign_sd)
     strange = h.foreign_sd * np.abs(amplitude) / np.maximum(np.abs(h.foreign_amplitude), 1e-300)  # what strikes have in common says nothing of how they differ
     return replace(dry, foreign_hz=h.foreign_hz + r.shift_hz[0], foreign_decay_per_s=r.decay_per_s[0], foreign_amplitude=amplitude, foreign_sd=strange)
 

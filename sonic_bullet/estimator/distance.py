@@ -17,7 +17,7 @@ from sonic_bullet.records import Array
 
 WINDOWS = (512, 2048, 8192)
 ABOVE = 10.0  # m: cells 10 dB above the noise count
-FEWEST = 20  # cells
+FEWEST = 20  # cells of a window that may speak for itself
 FLOOR_WINDOW = 1024
 MOST = 8192  # of its window, where recordings are long: low noise needs narrow bins
 SIDE = 8  # bins of the short window to each side
