@@ -124,7 +124,7 @@ def _refined(start: Rebound, h: Heard) -> tuple[float, dict[str, Any]]:
     both, own = np.conj(sound) * np.fft.rfft(h.signal[:, :n] * window, size), np.abs(sound) ** 2
     loud = np.argsort(-own.sum(axis=0))
     loud = np.sort(loud[: 1 + int(np.searchsorted(np.cumsum(own.sum(axis=0)[loud]), HELD * own.sum()))])  # the bins that hold the modes
-    both, own, omega = both[:, loud], own[:, loud], 2 * np.pi * np.fft.rfftfreq(size, 1 / h.sr)[loud]
+    both, own, cycles = both[:, loud], own[:, loud], np.fft.rfftfreq(size, 1 / h.sr)[loud]
     level = np.where(np.isfinite(h.impulse_n_s), h.impulse_n_s, 1.0)
     total = ((h.signal[:, :n] * window) ** 2).sum(axis=1) * size / 2
 
@@ -140,9 +140,7 @@ def _refined(start: Rebound, h: Heard) -> tuple[float, dict[str, Any]]:
             blow = trial.apply(Blow(float(j), np.zeros(1), np.ones(1)))
             turn = turns.get(blow.delay_s.tobytes())
             if turn is None:
-                turn = np.zeros(len(omega), complex)
-                for share, delay in zip(blow.share, blow.delay_s, strict=True):
-                    turn += share * np.exp(-(fade + 1j * omega) * delay)
+                turn = _turned(blow, cycles, fade)
                 turns[blow.delay_s.tobytes()] = turn
             gone += (
                 max(float((np.conj(turn) * both[s]).real.sum()), 0.0) ** 2
@@ -157,6 +155,14 @@ def _refined(start: Rebound, h: Heard) -> tuple[float, dict[str, Any]]:
     simplex = best + np.array([[0, 0, 0], [0.1, 0, 0], [0, 2e-4, 0], [0, 0, 2e-3]])
     found = minimize(left, best, method="Nelder-Mead", options={"initial_simplex": simplex, "xatol": 1e-4, "fatol": 1e-6, "maxfev": 120})
     return float(found.fun), of(found.x)
+
+
+def _turned(blow: Blow, freq_hz: Array, fade: float) -> Array:
+    """Σ_j share_j e^{−(fade + 2πif) delay_j} (f,), in half the usual digits: phases, turns taken off, are good to 4e-7, and all of a search's time goes here."""
+    phase = np.multiply.outer(blow.delay_s, freq_hz)
+    phase = (2 * np.pi * (phase - np.rint(phase))).astype(np.float32)
+    share = (blow.share * np.exp(-fade * blow.delay_s)).astype(np.float32)
+    return np.asarray(share @ np.cos(phase) - 1j * (share @ np.sin(phase)))
 
 
 def _agreed(value: list[Array], share: list[Array]) -> tuple[float, float, list[int]]:

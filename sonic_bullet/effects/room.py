@@ -27,8 +27,8 @@ LINES = 24  # the strongest
 CAP = 20.0  # of ln likelihood: what one line can speak against a rate
 FASTER, FEWEST, SHARE = 1.5, 3, 0.35  # than the room; lines that are, and of all: who they must be to tell it
 TELLS, ALIKE = 10.0, 0.3  # ln likelihood a line gains with a tail; of ln δ: how far lines may lie from one another, by the middle
-MODEL_ERROR = 0.08  # of the direct sound's spectrum, relative
-TURNS = 40
+MODEL_ERROR = 0.03  # of the direct sound's spectrum, relative: what shapes and pulses get wrong
+TURNS = 150  # what is heard between the loudest modes comes last
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ import numpy as np
 from sonic_bullet.effects.support_subsets import subsets
 from sonic_bullet.effects.support_trial import Dashpot, Dashpots, Trial
 from sonic_bullet.records import Array
+from sonic_bullet.side_by_side import side_by_side
 
 POINTS, SPOTS = 90, 500  # vertices of a first look, and of those about a point that has been found
 STEPS = (0.06, 0.25, 1.0, 4.0, 16.0)  # of the strength that doubles the typical decay
@@ -42,7 +43,7 @@ def sought(t: Trial) -> Dashpots:
     if t.left(chosen) < least:
         return chosen
     spots = _spread(t, SPOTS)
-    weak = [tuned(t, refined(t, d, NEARER[-2:])[1]) for d in subsets(t, spots[:POINTS], WEAK)]
+    weak = side_by_side(lambda d: tuned(t, refined(t, d, NEARER[-2:])[1]), subsets(t, spots[:POINTS], WEAK))
     none = priced(())
     some = min([none, *(priced(d) for d in weak)], key=_cost)
     if some[1] and t.left(some[1]) < ENOUGH * least:
@@ -64,7 +65,7 @@ def _elsewhere(t: Trial, found: Dashpots, spots: Array) -> Dashpots:
     for i in range(len(found)):
         moved = [(*found[:i], replace(found[i], vertex=int(v)), *found[i + 1 :]) for v in spots]
         few = _best([t.beside(*modes, 1) for modes in t.poles(moved, t.runs)], [(*m[:i], *m[i + 1 :], m[i]) for m in moved], STARTS)
-        ends = [refined(t, one, NEARER)[1] for one in few]
+        ends = side_by_side(lambda one: refined(t, one, NEARER)[1], few)
         best = min([best, *((t.left(end), end) for end in ends)], key=_cost)
     return best[1]
 
@@ -80,7 +81,7 @@ def _with_one_more(t: Trial, starts: list[Dashpots], grid: list[Dashpot], spots:
         trials = [(*chosen, d) for d in grid]
         few += _best([t.price(*modes) for modes in t.poles(trials, t.runs)], trials, LOOKED)
     few = _best([t.beside(*modes, 1) for modes in t.poles(few, t.runs)], few, STARTS)
-    found, *others = (one for _, one in sorted((refined(t, one, NEARER[:2], spots) for one in few), key=lambda pair: pair[0]))
+    found, *others = (one for _, one in sorted(side_by_side(lambda one: refined(t, one, NEARER[:2], spots), few), key=lambda pair: pair[0]))
     for _ in range(min(len(found), 2)):  # once all are where they should be, one may be seen to stand at a mirror image
         found = refined(t, found, (np.inf, *NEARER), spots)[1]
     found = tuned(t, min(found, refined(t, found, NEARER[-1:], whole=True)[1], key=t.left))

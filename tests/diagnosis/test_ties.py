@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from made_body import recorded, truth
 
+from sonic_bullet.diagnosis.choice import simplest
 from sonic_bullet.diagnosis.evidence import evidence_of
-from sonic_bullet.diagnosis.loop import simplest
 from sonic_bullet.diagnosis.refit import refitted
 from sonic_bullet.diagnosis.ties import misfit
 from sonic_bullet.diagnosis.trial import Candidate

@@ -1,0 +1,69 @@
+"""Which of the suspects that stood their trial is added, and which of the added ones are still needed at the end.
+
+able -> on all strikes together it helps, too -> the best, or the simplest of those that strikes cannot tell from it -> phases, where two say nearly the same
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from sonic_bullet.diagnosis.bodies import Struck
+from sonic_bullet.diagnosis.exchange import ALIKE
+from sonic_bullet.diagnosis.judge import Judged, mean_db
+from sonic_bullet.diagnosis.play import Hypothesis, moves
+from sonic_bullet.diagnosis.refit import refitted, retold, with_effects
+from sonic_bullet.diagnosis.ties import misfit
+from sonic_bullet.diagnosis.trial import SURE, Candidate, needed
+
+NEARLY = 0.2  # of what a name says: between two that differ by less, phases may decide
+CLEAR, HINT = 25.0, 5.0  # twice the ln likelihood of phases that this takes; where the two are ALIKE
+HELPS = 0.5  # of what a name must gain on strikes left out, on all of them together: a model of few lines may be saved by chance once one is left out
+SAME = 0.1  # of what a room's response leaves open: two that differ by less say the same
+
+
+def helps(c: Candidate, bodies: tuple[Struck, ...], takes: Sequence[Judged], now: float, told: float, floor: float, *, first: bool) -> bool:
+    """Whether all strikes together gain, and lose nothing of what a room's response, told again without it, says as well (told): that takes up echoes, and
+    some of what stray modes leave, so what moves modes must gain on that. A filter or a slow law it takes up whole: then both say the same."""
+    before, after = told if moves(c.hypothesis) else now, mean_db(takes, retold(c.hypothesis, bodies)) or 0.0
+    return after < told + SAME * max(told - floor, 0.0) and before - after > HELPS * needed(max(before - floor, 0.0), first=first)
+
+
+def _numbers(c: Candidate) -> int:
+    """How many more a model has with an effect than without: a law in Rayleigh's place takes α and β away."""
+    return c.effect.freedom() - 2 * (c.id == "damping-law")
+
+
+def simplest(able: Sequence[Candidate], bodies: tuple[Struck, ...]) -> Candidate:
+    """The best, or the one with the fewest numbers of those that strikes cannot tell from it: SURE standard errors of the difference, ALIKE of what it says.
+
+    Where another with no more numbers says nearly as much (NEARLY), the lines' phases may speak for that one (ties.py): by CLEAR, or by HINT where it is ALIKE.
+    Effects that move modes stand aside: corrections are learnt anew beside them, and are numbers too.
+    """
+    best = able[0]
+    if moves(best.hypothesis):
+        return best
+
+    def close(c: Candidate, share: float) -> bool:
+        more = best.drop_db - c.drop_db
+        return bool(more.mean() <= SURE * more.std(ddof=1) / np.sqrt(len(more)) and more.mean() < share * best.mean_db)
+
+    rivals = [c for c in able if not moves(c.hypothesis)]
+    first = min((c for c in rivals if close(c, ALIKE)), key=lambda c: (_numbers(c), -c.mean_db))
+    others = [c for c in rivals if c is not first and _numbers(c) <= _numbers(first) and (best.drop_db - c.drop_db).mean() < NEARLY * best.mean_db]
+    if not others:
+        return first
+    own = misfit(first.hypothesis, bodies)  # the less strikes say, the less phases need to
+    off = np.array([misfit(c.hypothesis, bodies) + (HINT if close(c, ALIKE) else CLEAR) for c in others])
+    return others[int(off.argmin())] if np.isfinite(own) and off.min() < own else first
+
+
+def pruned(h: Hypothesis, added: list[Candidate], bodies: tuple[Struck, ...], takes: Sequence[Judged], gap_db: float) -> tuple[Hypothesis, list[Candidate]]:
+    """Without the effects that those found after them have made needless."""
+    for candidate in added[:-1]:
+        rest = [e for e in h.effects if e.id != candidate.id]
+        without = refitted(with_effects(h, tuple(rest), bodies), bodies)
+        if (mean_db(takes, without) or 0.0) - (mean_db(takes, h) or 0.0) < needed(gap_db, first=False):
+            h, added = without, [c for c in added if c is not candidate]
+    return h, added

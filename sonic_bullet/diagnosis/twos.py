@@ -1,0 +1,96 @@
+"""Two names at once, where one after another explains too little: each alone may leave, or even open, most of what only both close.
+
+    first round's suspects: A as it was found, B -> propose(evidence beside A)      -> least D(A, B) on all strikes, if it leaves little
+                            B moves no modes: what does is searched for all over a body, and that takes long
+    then each stands its trial beside the other: fitted without one strike at a time, against null effects, as in any round
+
+What a dashpot does to decays hides what a long pulse leaves of the high modes: played with the right pulse and wrong decays, a body is as far from its recording
+as with neither. Coordinate steps stop there; a step along two coordinates does not [cf. forward selection of groups: Efroymson 1960; Yuan & Lin 2006].
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sonic_bullet.diagnosis.bodies import Struck
+from sonic_bullet.diagnosis.choice import CLEAR, NEARLY, helps
+from sonic_bullet.diagnosis.evidence import evidence_of
+from sonic_bullet.diagnosis.exchange import again
+from sonic_bullet.diagnosis.judge import Judged, Take, least_db, mean_db
+from sonic_bullet.diagnosis.play import Hypothesis, moves
+from sonic_bullet.diagnosis.refit import refitted, with_effects
+from sonic_bullet.diagnosis.ties import misfit
+from sonic_bullet.diagnosis.trial import Candidate, earns, trials
+from sonic_bullet.side_by_side import side_by_side
+
+LEFT = 0.25  # of the gap: two at once are twice as many choices, so they must say more than one after another
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Two:
+    """A hypothesis with two effects, the second fitted beside the first, and how far it is from the fitted strikes, in dB."""
+
+    h: Hypothesis
+    db: float
+
+
+def in_twos(
+    start: Hypothesis,
+    first: Sequence[Candidate],
+    bodies: tuple[Struck, ...],
+    takes: Sequence[Judged],
+    band_hz: tuple[float, float],
+    *,
+    seed: int,
+    say: Callable[[str], None],
+) -> tuple[Hypothesis, list[Candidate]] | None:
+    """The two of a first round's suspects that explain nearly all together, each of which earns its keep beside the other; None where no two do."""
+    if len(first) < 2 or not all(isinstance(t, Take) for t in takes):
+        return None
+    kinds = [type(c.effect) for c in first if not moves(replace(c.hypothesis, effects=(c.effect,)))]
+    say("trying two at once")
+
+    def beside(one: Candidate) -> list[Two]:
+        told = evidence_of(one.hypothesis, bodies, band_hz, seed=seed)
+        found = []
+        for kind in kinds:
+            other = None if kind is type(one.effect) else kind.propose(told)
+            if other is not None:
+                h = refitted(replace(one.hypothesis, effects=(*one.hypothesis.effects, other)), bodies, told.heard)
+                found.append(Two(h, mean_db(takes, h) or np.inf))
+        return found
+
+    pairs = [two for some in side_by_side(beside, first) for two in some]
+    floor = least_db(takes, start) or 0.0
+    gap = (mean_db(takes, start) or 0.0) - floor
+    if not pairs or min(two.db for two in pairs) - floor > LEFT * gap:
+        return None
+    h = _likeliest(pairs, floor + gap, bodies)
+    closer = again(again(h, 0, bodies, band_hz, afresh=True), 1, bodies, band_hz)  # what was found alone had the other's share to explain, too
+    h = closer if (mean_db(takes, closer) or np.inf) < (mean_db(takes, h) or np.inf) else h
+    added: list[Candidate] = []
+    for effect in h.effects[::-1]:
+        rest = refitted(with_effects(h, tuple(e for e in h.effects if e.id != effect.id), bodies), bodies)
+        told = replace(evidence_of(rest, bodies, band_hz, seed=seed), known=next(e for e in h.effects if e.id == effect.id))
+        now, least = mean_db(takes, rest) or 0.0, least_db(takes, rest) or 0.0
+        for c in trials(rest, bodies, takes, told, [type(effect)], seed=seed, say=say):
+            if earns(c, max(now - least, 0.0), first=False) and helps(c, bodies, takes, now, now, least, first=False):
+                h, added = c.hypothesis, [c, *added]
+    return (h, added) if len(added) == 2 else None
+
+
+def _likeliest(pairs: Sequence[Two], before_db: float, bodies: tuple[Struck, ...]) -> Hypothesis:
+    """The nearest to the strikes; or, of those that share the effect that moves modes, and say nearly as much, the one for which phases speak clearly (ties.py)."""
+    best = min(pairs, key=lambda two: two.db)
+    shared = {e.id for e in best.h.effects if moves(replace(best.h, effects=(e,)))}
+    others = [
+        two.h
+        for two in pairs
+        if two.db - best.db < NEARLY * (before_db - best.db) and {e.id for e in two.h.effects if moves(replace(two.h, effects=(e,)))} == shared
+    ]
+    off = [misfit(h, bodies) + CLEAR for h in others]
+    own = misfit(best.h, bodies)
+    return others[int(np.argmin(off))] if np.isfinite(own) and min(off) < own else best.h

@@ -1,0 +1,66 @@
+"""Two names at once: what hides each other one by one is found together, and one name's worth is not told as two."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from made_body import SR, recorded, truth
+
+from sonic_bullet.diagnosis.evidence import evidence_of
+from sonic_bullet.diagnosis.judge import Take
+from sonic_bullet.diagnosis.play import Hypothesis
+from sonic_bullet.diagnosis.refit import refitted
+from sonic_bullet.diagnosis.trial import Candidate
+from sonic_bullet.diagnosis.twos import in_twos
+from sonic_bullet.effects import Effect
+from sonic_bullet.effects.contact_time import ContactTime
+from sonic_bullet.effects.damping_law import DampingLaw
+from sonic_bullet.effects.measurement_chain import MeasurementChain
+from sonic_bullet.estimator.distance import floor_between
+
+BAND = (50.0, 7_500.0)
+PULSE = ContactTime(3e-4, 0.016, -0.2)
+LAW = DampingLaw("power", 0.02, exponent=0.3)
+
+
+def tried(*effects: Effect, kinds: tuple[type[Effect], ...]) -> tuple[list[Candidate], tuple[Hypothesis, list[Candidate]] | None]:
+    """A first round of suspects that have not stood any trial, and what two at once make of them."""
+    body = recorded(*effects)
+    assert body.gathered is not None and body.gathered.signals is not None
+    floor = floor_between(list(body.gathered.signals))
+    takes = [Take(body, i, x, SR, floor) for i, x in zip(body.fitted, body.gathered.signals, strict=True)]
+    start = refitted(truth(), (body,))
+    told = evidence_of(start, (body,), BAND)
+    first = []
+    for kind in kinds:
+        found = kind.propose(told)
+        if found is not None:
+            h = refitted(replace(start, effects=(found,)), (body,), told.heard)
+            first.append(Candidate(kind.id, found, h, np.zeros(len(takes)), 0.0, 0.0, {}))
+    return first, in_twos(start, first, (body,), takes, BAND, seed=0, say=lambda _: None)
+
+
+def test_a_law_and_a_pulse_are_found_at_once_whatever_each_says_alone() -> None:
+    """None of the first round's drops are looked at: they are zero here; and the pulse is not taken for the filter, which phases tell from it."""
+    first, two = tried(PULSE, LAW, kinds=(DampingLaw, ContactTime, MeasurementChain))
+    assert len(first) == 3
+    assert two is not None
+    h, added = two
+    assert {c.id for c in added} == {"damping-law", "contact-time"} == {e.id for e in h.effects}
+    assert all(c.mean_db > 1.0 for c in added)
+    found = {e.id: e.parameters() for e in h.effects}
+    assert found["contact-time"]["tau_s"] == pytest.approx(3e-4, rel=0.05)
+
+
+def test_one_effect_is_not_told_as_two() -> None:
+    first, two = tried(PULSE, kinds=(ContactTime, MeasurementChain, DampingLaw))
+    assert first
+    assert two is None
+
+
+def test_one_suspect_alone_makes_no_two() -> None:
+    first, two = tried(PULSE, kinds=(ContactTime,))
+    assert len(first) == 1
+    assert two is None
