@@ -86,7 +86,12 @@ def diagnose(
             errors[name][split] = mean_db(mine, h)
             sone[name][split] = sone_distance(mine, h)
     few = ("one strike alone: nothing can be left out, so no effect can be named; record more strikes",) if len(takes) == 1 else ()
-    return Diagnosis(case, found, bodies, takes, end, errors, sone, _of_lines(case, bodies, end), remainder(end, takes), (*found.warnings, *few))
+    coarse = (
+        (f"upper modes are up to {100 * end.mesh_off:.1f} % off, more than is corrected: what is left open is the mesh's; a finer one closes it",)
+        if end.mesh_off
+        else ()
+    )
+    return Diagnosis(case, found, bodies, takes, end, errors, sone, _of_lines(case, bodies, end), remainder(end, takes), (*found.warnings, *few, *coarse))
 
 
 def _of_lines(case: Case, bodies: tuple[Struck, ...], end: Closed) -> dict[str, Any]:

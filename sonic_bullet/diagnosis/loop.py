@@ -9,25 +9,22 @@ gap = before − floor on left-out strikes; which effect earns its keep is said 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
-
-import numpy as np
 
 from sonic_bullet.diagnosis.bodies import Struck
 from sonic_bullet.diagnosis.choice import helps, pruned, simplest
 from sonic_bullet.diagnosis.evidence import evidence_of
 from sonic_bullet.diagnosis.exchange import chosen, exchanged, rivals
-from sonic_bullet.diagnosis.judge import Judged, Take, least_db, mean_db
-from sonic_bullet.diagnosis.play import Hypothesis, play
-from sonic_bullet.diagnosis.refit import ROUGH, refitted, retold
+from sonic_bullet.diagnosis.judge import Judged, least_db, mean_db
+from sonic_bullet.diagnosis.meshed import beyond, of_the_mesh
+from sonic_bullet.diagnosis.play import Hypothesis
+from sonic_bullet.diagnosis.refit import refitted, retold
 from sonic_bullet.diagnosis.trial import FAINT_DB, LEAST_DB, Candidate, earns, trials
 from sonic_bullet.diagnosis.twos import in_twos
 from sonic_bullet.effects.values import Effect
-from sonic_bullet.estimator.distance import with_noise
 
 ROUNDS = 4
-MESH = 1e-3  # of a frequency: what a good mesh gets wrong
 SUFFICES_DB = 1.5  # a gap below this is the mesh's and the shapes' own
 EXPLAINED = 0.5  # of the gap; part of it is the mesh's and the shapes' own
 WEAK = 0.5  # of the gap: where every suspect leaves more, two are tried at once
@@ -37,7 +34,7 @@ OPEN = 0.3  # of the first gap: with less left, no costly suspect is asked
 @dataclass(frozen=True, slots=True, eq=False)
 class Closed:
     """How the loop ended. added: the candidate of each round that is still there at the end. tried: every suspect in the last round in
-    which it was asked and had something to say."""
+    which it was asked and had something to say. mesh_off: of a frequency, what the mesh is off by where that alone is what was left."""
 
     before: Hypothesis
     after: Hypothesis
@@ -47,6 +44,7 @@ class Closed:
     before_db: float
     after_db: float
     floor_db: float
+    mesh_off: float = 0.0
 
 
 def closed(
@@ -66,15 +64,18 @@ def closed(
     one = _one_by_one(start, bodies, takes, effects, band_hz, seed=seed, say=say)
     h, added, last = one.h, one.added, dict(one.last)
     now, floor = mean_db(takes, h) or 0.0, one.floor
-    verdict = _verdict(h, added, before, now, floor, bodies, takes, seed)
+    verdict, off = _verdict(h, added, before, now, floor, bodies, takes, seed), 0.0
+    if verdict == "unexplained":
+        far, off = beyond(start, bodies)
+        verdict = "none" if off and (mean_db(takes, far) or 0.0) - (least_db(takes, far) or 0.0) < SUFFICES_DB else verdict
     if verdict == "unexplained" and not one.in_twos and (two := in_twos(start, one.first, bodies, takes, band_hz, seed=seed, say=say)):
         h, added = two
         last |= {c.id: c for c in added}
         now, floor = mean_db(takes, h) or 0.0, least_db(takes, h) or floor
         verdict = _verdict(h, added, before, now, floor, bodies, takes, seed)
-    if verdict == "unexplained":
+    if verdict != "explained":
         h, now, added = start, before, []
-    return Closed(start, h, tuple(added), tuple(last.values()), verdict, before, now, floor)
+    return Closed(start, h, tuple(added), tuple(last.values()), verdict, before, now, floor, off if verdict == "none" else 0.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -153,35 +154,6 @@ def _verdict(
         return "none" if gap < SUFFICES_DB or gap < of_the_mesh(h, bodies, takes, seed) else "unexplained"
     enough = left <= max((1 - EXPLAINED) * gap, SUFFICES_DB) or left <= of_the_mesh(h, bodies, takes, seed)
     return "explained" if enough else "unexplained"
-
-
-def of_the_mesh(h: Hypothesis, bodies: tuple[Struck, ...], takes: Sequence[Judged], seed: int) -> float:
-    """What a mesh's errors would add to the distance, in dB: modes that no line could correct moved at random by as much as the others were
-    corrected, and every shape at the strikes by ROUGH of its strongest there."""
-    rng = np.random.default_rng([seed, 5])
-    moved, other = dict(h.correction or {}), {}
-    for body in bodies:
-        mine = moved.get(body.name)
-        if mine is None or body.gathered is None or len(mine) != len(body.line):
-            continue
-        paired = body.line >= 0
-        size = float(np.sqrt((mine[paired] ** 2).mean())) if paired.any() else 0.0
-        moved[body.name] = np.where(paired, mine, mine + max(size, MESH) * rng.standard_normal(len(mine)))
-        model = body.model if h.poisson is None or body.other is None else body.other(h.poisson)
-        other[body.name] = _roughened(replace(body, model=model, other=None), rng)
-    far = replace(h, correction=moved)
-    pairs = [(t, play(h, t.body, t.strike, len(t.sample), t.sr)) for t in takes if isinstance(t, Take)]
-    twice = [replace(t, sample=with_noise(made, t.floor, 1000 + t.strike)) for t, made in pairs]
-    return (mean_db([replace(t, body=other.get(t.body.name, t.body)) for t in twice], far) or 0.0) - (mean_db(twice, h) or 0.0)
-
-
-def _roughened(body: Struck, rng: np.random.Generator) -> Struck:
-    """The body with shapes at its strikes off by ROUGH of each mode's strongest there."""
-    shape = body.model.shape.copy()
-    at = slice(body.surface_count(), len(shape) - 1)
-    most = np.abs(np.einsum("sxm,sx->sm", shape[at], body.way[:-1])).max(axis=0)
-    shape[at] += (ROUGH * most * rng.standard_normal((body.strikes, 1, len(most))) * body.way[:-1, :, None]).astype(np.float32)
-    return replace(body, model=replace(body.model, shape=shape))
 
 
 def described(candidates: Sequence[Candidate]) -> list[dict[str, Any]]:

@@ -1,0 +1,70 @@
+"""What a coarse mesh gets wrong in its upper modes is told from what the model lacks, and it alone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from made_body import SR, plate, recorded, struck, truth
+
+from sonic_bullet.diagnosis.bodies import Struck
+from sonic_bullet.diagnosis.judge import Take, least_db, mean_db
+from sonic_bullet.diagnosis.loop import closed
+from sonic_bullet.diagnosis.meshed import FAR, beyond
+from sonic_bullet.diagnosis.play import Hypothesis, ordered
+from sonic_bullet.diagnosis.refit import refitted
+from sonic_bullet.estimator.distance import floor_between
+
+BAND = (50.0, 7_500.0)
+
+
+def misjudged(off: np.ndarray) -> tuple[Struck, Hypothesis, tuple[Take, ...]]:
+    """The plate as its mesh has it, recorded where modes are off (m,) from there, relative; nothing is corrected."""
+    mesh = plate()
+    heard = recorded(model=ordered(mesh, mesh.freq_hz * (1 + off), mesh.decay_per_s)[0]).gathered
+    assert heard is not None and heard.signals is not None
+    body = struck(mesh, heard.lines, heard.signals)
+    floor = floor_between(list(heard.signals))
+    takes = tuple(Take(body, i, x, SR, floor) for i, x in zip(body.fitted, heard.signals, strict=True))
+    h = refitted(replace(truth(), correction={body.name: np.zeros(mesh.mode_count)}), (body,))
+    return body, h, takes
+
+
+def upper(off: float) -> np.ndarray:
+    """Three of the upper modes off, the farther the higher: 2970, 3240 and 3909 Hz, which have no neighbours within 5 %."""
+    found = np.zeros(18)
+    found[[11, 12, 15]] = np.array([0.7, 0.8, 1.0]) * off
+    return found
+
+
+@pytest.mark.parametrize("off", [0.022, -0.022])
+def test_upper_modes_two_percent_off_are_the_meshs(off: float) -> None:
+    body, h, takes = misjudged(upper(off))
+    far, most = beyond(h, (body,))
+    assert far.correction is not None
+    assert far.correction[body.name] == pytest.approx(upper(off), abs=2e-4)
+    assert most == pytest.approx(abs(off), rel=0.02)
+    before, after, floor = mean_db(takes, h), mean_db(takes, far), least_db(takes, far)
+    assert before is not None and after is not None and floor is not None
+    assert before - floor > 2.0  # something was open
+    assert after - floor < 0.3
+    end = closed(h, (body,), takes, (), BAND)
+    assert end.verdict == "none" and end.mesh_off == most
+    assert end.after_db == end.before_db  # what is played knows nothing of it
+
+
+@pytest.mark.parametrize("off", [np.r_[np.full(3, 0.02), np.zeros(15)], upper(1.6 * FAR)], ids=["low modes", "too far"])
+def test_what_no_mesh_does_stays_open(off: np.ndarray) -> None:
+    """Long waves are what meshes get right; and nothing is moved by more than FAR, or to a line of another pattern."""
+    body, h, takes = misjudged(off)
+    most = beyond(h, (body,))[1]
+    assert most < FAR
+    assert closed(h, (body,), takes, (), BAND).verdict == "unexplained"
+
+
+def test_nothing_is_put_anywhere_where_every_mode_has_its_line() -> None:
+    body, h, takes = misjudged(np.zeros(18))
+    far, most = beyond(h, (body,))
+    assert most == 0.0 and far is h
+    assert closed(h, (body,), takes, (), BAND).verdict == "none"
