@@ -20,6 +20,7 @@ from sonic_bullet.diagnosis.trial import SURE, Candidate, needed
 NEARLY = 0.2  # of what a name says: between two that differ by less, phases may decide
 CLEAR, HINT = 25.0, 5.0  # twice the ln likelihood of phases that this takes; where the two are ALIKE
 HELPS = 0.5  # of what a name must gain on strikes left out, on all of them together: a model of few lines may be saved by chance once one is left out
+LINES = 6.0  # twice the ln likelihood of decays left out: what a name must gain where the room's response says the same of the strikes
 SAME = 0.1  # of what a room's response leaves open: two that differ by less say the same
 
 
@@ -28,6 +29,11 @@ def helps(c: Candidate, bodies: tuple[Struck, ...], takes: Sequence[Judged], now
     some of what stray modes leave, so what moves modes must gain on that. A filter or a slow law it takes up whole: then both say the same."""
     before, after = told if moves(c.hypothesis) else now, mean_db(takes, retold(c.hypothesis, bodies)) or 0.0
     return after < told + SAME * max(told - floor, 0.0) and before - after > HELPS * needed(max(before - floor, 0.0), first=first)
+
+
+def by_lines(c: Candidate, bodies: tuple[Struck, ...], takes: Sequence[Judged], told: float, floor: float) -> bool:
+    """Whether lines left out speak for it (by_lines.py), and a room's response, told again beside it, says no less than without it (told)."""
+    return c.lines > LINES and (mean_db(takes, retold(c.hypothesis, bodies)) or 0.0) < told + SAME * max(told - floor, 0.0)
 
 
 def _numbers(c: Candidate) -> int:
@@ -62,6 +68,8 @@ def simplest(able: Sequence[Candidate], bodies: tuple[Struck, ...]) -> Candidate
 def pruned(h: Hypothesis, added: list[Candidate], bodies: tuple[Struck, ...], takes: Sequence[Judged], gap_db: float) -> tuple[Hypothesis, list[Candidate]]:
     """Without the effects that those found after them have made needless."""
     for candidate in added[:-1]:
+        if candidate.lines > LINES:
+            continue  # strikes had not spoken for it
         rest = [e for e in h.effects if e.id != candidate.id]
         without = refitted(with_effects(h, tuple(rest), bodies), bodies)
         if (mean_db(takes, without) or 0.0) - (mean_db(takes, h) or 0.0) < needed(gap_db, first=False):

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from sonic_bullet.diagnosis.bodies import Struck
-from sonic_bullet.diagnosis.choice import helps, pruned, simplest
+from sonic_bullet.diagnosis.choice import by_lines, helps, pruned, simplest
 from sonic_bullet.diagnosis.evidence import evidence_of
 from sonic_bullet.diagnosis.exchange import chosen, exchanged, rivals
 from sonic_bullet.diagnosis.judge import Judged, least_db, mean_db
@@ -127,6 +127,7 @@ def _one_by_one(
             now, floor = mean_db(takes, h) or 0.0, least_db(takes, h) or floor
             continue
         able = [c for c in found if earns(c, gap, first=not added) and helps(c, bodies, takes, now, told, floor, first=not added)]
+        able = able or sorted((c for c in found if by_lines(c, bodies, takes, told, floor)), key=lambda c: -c.lines)[:1]
         if not able:
             break
         best = simplest(able, bodies)

@@ -14,19 +14,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import Any, ClassVar, Self
+from typing import Any
 
 import numpy as np
 
 from sonic_bullet.diagnosis.bodies import Struck
+from sonic_bullet.diagnosis.by_lines import likelier, tells
 from sonic_bullet.diagnosis.evidence import evidence_of, thinned
 from sonic_bullet.diagnosis.judge import Judged, Take
 from sonic_bullet.diagnosis.listed import Listed
+from sonic_bullet.diagnosis.null import Null
 from sonic_bullet.diagnosis.play import Hypothesis, bends, moves
 from sonic_bullet.diagnosis.refit import refitted, retold
 from sonic_bullet.diagnosis.rest import at_rest
-from sonic_bullet.effects.values import Effect, Evidence, Owner, Stage
-from sonic_bullet.records import ModalModel
+from sonic_bullet.effects.values import Effect, Evidence
 from sonic_bullet.side_by_side import side_by_side
 
 KEPT = 0.75  # of the lines, in every fold
@@ -42,7 +43,7 @@ class Candidate:
     """A suspect after its trial. effect: fitted to all evidence. drop_db (s,): of each left-out strike's distance, less what corrections learnt again would gain
     alone where the suspect moves modes. whole_db: mean with that in it, which speaks for a name's turn. null_db: mean over strikes and draws.
 
-    spread: of each number in its parameters over the folds (jackknife).
+    spread: of each number in its parameters over the folds (jackknife). lines: by how much lines left out are likelier with it (by_lines.py).
     """
 
     id: str
@@ -52,6 +53,7 @@ class Candidate:
     whole_db: float
     null_db: float
     spread: dict[str, Any]
+    lines: float = 0.0
 
     @property
     def mean_db(self) -> float:
@@ -90,61 +92,6 @@ def earns(c: Candidate, gap_db: float, *, first: bool) -> bool:
     if len(drop) >= MANY and drop[0] > -0.1 * drop.mean() and drop[-2] > need:
         return more > 0.5 * need  # no strike speaks against it, though loud ones may gain far more than soft ones
     return bool(drop.mean() > SURE * sd) and more > max(SURE * sd, 0.5 * need)
-
-
-@dataclass(frozen=True)
-class Null:
-    """A number per direction spent at random: ln d and ln level of every mode move along random vectors of the modes."""
-
-    id: ClassVar[str] = "null"
-    stage: ClassVar[Stage] = Stage.MODES
-    owner: ClassVar[Owner] = Owner.FIXTURE  # after whatever acts on modes, as a suspect may
-    reference: ClassVar[str] = "a control, not physics"
-
-    amount: tuple[float, ...]
-    seed: int
-
-    def apply(self, x: ModalModel) -> ModalModel:
-        """The modes with the effect in them."""
-        way = directions(self.seed, len(self.amount), x.mode_count)
-        half = (len(self.amount) + 1) // 2
-        decay = x.decay_per_s * np.exp(np.clip(np.array(self.amount[:half]) @ way[:half], -3, 3))
-        shape = x.shape.copy()
-        shape[-1] *= np.exp(np.clip(np.array(self.amount[half:]) @ way[half:], -3, 3)).astype(np.float32) if len(way) > half else np.float32(1)
-        return replace(x, decay_per_s=decay, shape=shape)
-
-    def parameters(self) -> dict[str, Any]:
-        """What it says, for people and JSON, in SI units."""
-        return {"amount": list(self.amount)}
-
-    def freedom(self) -> int:
-        return len(self.amount)
-
-    @classmethod
-    def propose(cls, evidence: Evidence) -> Self | None:
-        return cls.fitted(evidence, 2, 0)
-
-    @classmethod
-    def fitted(cls, evidence: Evidence, freedom: int, seed: int) -> Self | None:
-        """The random effect of so many numbers that the first object's lines suggest most."""
-        h = evidence.heard[0]
-        count = len(h.all_hz)
-        way = directions(seed, freedom, count)
-        half = (freedom + 1) // 2
-        if len(h.freq_hz) <= freedom:
-            return None
-        member = [int(np.argmin(np.abs(h.all_hz - f))) for f in h.freq_hz]
-        y = np.log(np.maximum(h.decay_per_s, 1e-3) / np.maximum(h.expected_decay_per_s, 1e-3))
-        size = np.log(np.maximum(np.abs(h.amplitude), 1e-12) / np.maximum(np.abs(h.expected), 1e-12))
-        z = np.nan_to_num(np.median(size, axis=0))
-        a = np.linalg.lstsq(way[:half, member].T, np.nan_to_num(y), rcond=None)[0]
-        b = np.linalg.lstsq(way[half:, member].T, z - np.median(z), rcond=None)[0] if freedom > half else np.zeros(0)
-        return cls(tuple(float(v) for v in np.concatenate([a, b])), seed)
-
-
-def directions(seed: int, count: int, modes: int) -> np.ndarray[Any, Any]:
-    """Random directions (count, modes): the same for the same seed, whatever the number of modes asked for."""
-    return np.random.default_rng([seed, 77]).standard_normal((modes, count)).T
 
 
 def trials(
@@ -248,6 +195,7 @@ class Gain:
     drop_db: float = 0.0
     whole_db: float = 0.0
     null_db: tuple[float, ...] = ()
+    lines: float = 0.0
 
 
 def _tried(kind: type[Effect], whole: Effect, h: Hypothesis, bodies: tuple[Struck, ...], evidence: Evidence, folds: list[Fold]) -> Candidate:
@@ -260,21 +208,26 @@ def _tried(kind: type[Effect], whole: Effect, h: Hypothesis, bodies: tuple[Struc
         if effect is None:
             return Gain()
         random = [Null.fitted(less, min(effect.freedom(), 8), 10 * i + draw) for draw in range(DRAWS)]
-        after = _after(fold, effect)
-        return Gain(effect, fold.least - after, fold.before - after, tuple(fold.before - _after(fold, none) for none in random if none is not None))
+        beside = _beside(fold, effect)
+        after = fold.take.distance(beside)
+        chance = tuple(fold.before - fold.take.distance(_beside(fold, none)) for none in random if none is not None)
+        lines = likelier(fold.base, beside, evidence, less, bodies) if isinstance(fold.take, Take) and tells(h, effect) else 0.0
+        return Gain(effect, fold.least - after, fold.before - after, chance, lines)
 
     found = side_by_side(judged, range(len(folds)))
     added = refitted(replace(h, effects=(*h.effects, whole)), bodies, evidence.heard)
     drop, whole_db, null_db = np.array([g.drop_db for g in found]), _mean([g.whole_db for g in found]), _mean([x for g in found for x in g.null_db])
-    return Candidate(kind.id, whole, added, drop, whole_db, null_db, jackknife([g.effect.parameters() for g in found if g.effect is not None]))
+    lines = _mean([g.lines for g in found]) / (1 - KEPT)  # each line is left out in so many of the folds
+    return Candidate(kind.id, whole, added, drop, whole_db, null_db, jackknife([g.effect.parameters() for g in found if g.effect is not None]), lines)
 
 
-def _after(fold: Fold, effect: Effect) -> float:
+def _beside(fold: Fold, effect: Effect) -> Hypothesis:
+    """A fold's hypothesis with one more effect, fitted to what it may learn from."""
     h = replace(fold.base, effects=(*fold.base.effects, effect))
     if isinstance(fold.take, Listed):
-        return fold.take.distance(refitted(h, fold.bodies))
+        return refitted(h, fold.bodies)
     fitted = refitted(h, fold.bodies, fold.evidence.heard)
-    return fold.take.distance(retold(fitted, fold.bodies, fold.evidence.heard) if hasattr(effect, "told_by") else fitted)
+    return retold(fitted, fold.bodies, fold.evidence.heard) if hasattr(effect, "told_by") else fitted
 
 
 def jackknife(rows: list[dict[str, Any]]) -> dict[str, Any]:

@@ -1,0 +1,45 @@
+"""What lines left out say of a suspect where strikes left out say nothing: beside a room.
+
+    2 Δ ln L = Σ_k ρ(z_k without) − ρ(z_k with),   z_k = ln(d_k / d of its modes) / spread,   ρ Cauchy's, over the lines that a fold had left out, each counted once
+
+A room's response has a tap for every sample. Told from the strikes, it takes up what a law of damping does to every line, on strikes that it never saw as well: a line is as narrow as what a
+response can bend. But lines are told dry, each by its own baseband (effects/tails.py), before there is any response; a law told from three lines in four must hold for the fourth.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sonic_bullet.diagnosis.bodies import Struck
+from sonic_bullet.diagnosis.play import Hypothesis, modes_of, moves
+from sonic_bullet.effects.values import Effect, Evidence, Stage
+from sonic_bullet.records import Array
+
+SCATTER = 0.02  # of a decay about its law, relative
+WIDTH = 2.0  # spreads within which Cauchy's loss is quadratic
+
+
+def tells(h: Hypothesis, effect: Effect) -> bool:
+    """Whether lines are asked: of what changes decays and leaves modes where they are, beside a room."""
+    return any(hasattr(e, "dried") for e in h.effects) and effect.stage is Stage.MODES and not moves(Hypothesis(0.0, 0.0, 1.0, (effect,)))
+
+
+def likelier(without: Hypothesis, beside: Hypothesis, every: Evidence, told: Evidence, bodies: tuple[Struck, ...]) -> float:
+    """Twice the gain in ln likelihood of the decays that are in ``every`` and not in ``told``, from which both hypotheses were fitted."""
+    total = 0.0
+    for one in every.heard:
+        seen = next((h.freq_hz for h in told.heard if h.source is one.source), one.freq_hz[:0])
+        out = ~np.isin(one.freq_hz, seen) & np.isfinite(one.decay_per_s) & (one.decay_per_s > 0) & ~np.isposinf(one.decay_sd_per_s)
+        body = next(b for b in bodies if b.gathered is one.source)
+        cost = [_cost(modes_of(h, body)[0].decay_per_s, one.mode, one.decay_per_s, one.decay_sd_per_s)[out].sum() for h in (without, beside)]
+        total += float(cost[0] - cost[1])
+    return total
+
+
+def _cost(model_per_s: Array, mode: tuple[Array, ...], decay_per_s: Array, sd_per_s: Array) -> Array:
+    """ρ (k,) of lines' decays (k,) against those of the modes (m,) each stands for."""
+    model = np.array([model_per_s[m].mean() for m in mode])
+    sd = np.hypot(np.nan_to_num(sd_per_s / decay_per_s, nan=0.05, posinf=1e3), SCATTER)
+    with np.errstate(divide="ignore"):
+        z = np.log(decay_per_s / np.maximum(model, 1e-9)) / sd
+    return np.asarray(WIDTH**2 * np.log1p((z / WIDTH) ** 2))
