@@ -28,7 +28,7 @@ CAP = 20.0  # of ln likelihood: what one line can speak against a rate
 FASTER, FEWEST, SHARE = 1.5, 3, 0.35  # than the room; lines that are, and of all: who they must be to tell it
 TELLS, ALIKE = 10.0, 0.3  # ln likelihood a line gains with a tail; of ln δ: how far lines may lie from one another, by the middle
 MODEL_ERROR = 0.03  # of the direct sound's spectrum, relative: what shapes and pulses get wrong
-TURNS = 150  # what is heard between the loudest modes comes last
+TURNS, AGAIN = 150, 40  # what is heard between the loudest modes comes last; from a response that is nearly right there is less to do
 
 
 @dataclass(frozen=True)
@@ -72,8 +72,9 @@ class Room:
         return tails.dried(heard, RT60 / self.rt60_s)
 
     def told_by(self, signal: Array, sound: Array, noise: Array, sr: int) -> Self:
-        """The same room, its response by what strikes (s, n) were recorded as, and what they would sound like without it."""
-        return replace(self, response=identified(signal, sound, noise, sr, RT60 / self.rt60_s, self.wet), sr=sr)
+        """The same room, its response by what strikes (s, n) were recorded as, and what they would sound like without it; sought from the one it has."""
+        start = self.response if self.sr == sr and len(self.response) == signal.shape[1] else None
+        return replace(self, response=identified(signal, sound, noise, sr, RT60 / self.rt60_s, self.wet, start), sr=sr)
 
     def parameters(self) -> dict[str, Any]:
         """What it says, for people and JSON, in SI units."""
@@ -126,8 +127,8 @@ def _one(r: tails.Read, best: int) -> bool:
     return bool(mine.sum() >= FEWEST and mine.mean() > SHARE and np.median(off) < ALIKE and (off < 2 * ALIKE).mean() > 0.7)
 
 
-def identified(signal: Array, sound: Array, noise: Array, sr: int, delta: float, wet: float) -> Array:
-    """The tail (n,) that makes the direct sounds (s, n) the recorded ones, by conjugate gradients on the normal equations under its prior."""
+def identified(signal: Array, sound: Array, noise: Array, sr: int, delta: float, wet: float, start: Array | None = None) -> Array:
+    """The tail (n,) that makes the direct sounds (s, n) the recorded ones, by conjugate gradients on the normal equations under its prior, from none or from start (n,)."""
     from scipy.fft import irfft, next_fast_len, rfft
 
     n = signal.shape[1]
@@ -145,13 +146,17 @@ def identified(signal: Array, sound: Array, noise: Array, sr: int, delta: float,
     def back(spectrum: Array) -> Array:
         return np.asarray(irfft(spectrum, size)[:n] * size * root)
 
-    right = back(trust * (np.conj(x) * y).sum(axis=0)) / 1.0
-    g, r = np.zeros(n), right.copy()
+    def normal(g: Array) -> Array:
+        return np.asarray(back(trust * power * forward(g)) + g)
+
+    right = back(trust * (np.conj(x) * y).sum(axis=0))
+    g = np.zeros(n) if start is None else start / np.maximum(root, 1e-300)
+    r = right.copy() if start is None else right - normal(g)
     step, size_r = r.copy(), float(r @ r)
-    for _ in range(TURNS):
+    for _ in range(TURNS if start is None else AGAIN):
         if size_r <= 1e-10 * float(right @ right):
             break
-        turned = back(trust * power * forward(step)) + step * 1.0
+        turned = normal(step)
         along = size_r / float(step @ turned)
         g += along * step
         r -= along * turned
