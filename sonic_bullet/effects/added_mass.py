@@ -32,7 +32,7 @@ YIELDS = (0.0, 1.0, 4.0)  # of what modes above the band may yield, to begin wit
 LIGHTEST = 0.005  # of the body's: what is lighter moves no mode by 1 % (Δf/f = −2 m/M at a bar's end), so a mesh or the body's own imperfection may be what it stands for
 TRIES = 6
 MATCHED, MOVED = 0.8, 2.5e-3  # share of lines, and how far nine in ten of them may lie off: a mesh's error
-STAYED = 0.5  # of all lines' strength
+STAYED, TWINS = 0.6, 1e-3  # of the lines' strength; of ln f, between modes of which a mass leaves one where it was
 FAR_OFF = 0.015  # of ln f: more than pairs alone find
 BETTER = (1.5, 0.12)  # in price: as much as a strong line and a half, paired well; and of the bare body's own
 
@@ -121,11 +121,15 @@ class AddedMass:
 
 
 def _in_place(line_hz: Array, size: Array, mode_hz: Array, none: tuple[float, Array, Array, float]) -> bool:
-    """Whether the bare body's modes are where the lines are, or half of all that sounds (s, k) is: a mass leaves few in place, and something else splits or bends the others."""
+    """Whether the bare body's modes are where the lines are, or most of what sounds (s, k) is: a mass leaves few in place, and something else splits or bends the others.
+
+    Of twins a mass leaves one, which stands still under it: only modes without a twin are asked.
+    """
     _, row, column, shift = none
     off = np.abs(np.log(line_hz[row] / mode_hz[column]) - shift)
     if len(row) > MATCHED * len(line_hz) and float(np.quantile(off, 0.9)) < MOVED:
         return True
-    loud = np.nan_to_num(size).max(axis=0)
-    near = np.abs(np.log(line_hz)[:, None] - np.log(mode_hz) - shift).min(axis=1) < MOVED
-    return bool(loud[near].sum() > STAYED * loud.sum() > 0)
+    off = np.abs(np.log(line_hz)[:, None] - np.log(mode_hz) - shift)
+    gap = np.diff(np.log(mode_hz), prepend=-np.inf, append=np.inf)
+    loud = np.nan_to_num(size).max(axis=0) * (np.minimum(gap[1:], gap[:-1]) > TWINS)[off.argmin(axis=1)]
+    return bool(loud[off.min(axis=1) < MOVED].sum() > STAYED * loud.sum() > 0)
