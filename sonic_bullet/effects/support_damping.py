@@ -22,6 +22,7 @@ from sonic_bullet.effects.values import Evidence, Owner, Stage
 from sonic_bullet.records import Array, ModalModel
 
 FEWEST, AGAIN = 6, 4  # lines: to look for dashpots, and to fit them again to a part of them
+LEAST = 0.02  # of a decay: dashpots that add less to every one are none, though modes are told anew beside them
 
 
 @dataclass(frozen=True)
@@ -65,7 +66,7 @@ class SupportDamping:
         if isinstance(evidence.known, cls):
             return cls._of(trial, tuned(trial, refined(trial, evidence.known._on(heard.model), NEARER[-2:])[1]))
         found = sought(trial)
-        return cls._of(trial, found) if found else None
+        return cls._of(trial, found) if found and _most(heard.model, found) > LEAST else None
 
     @classmethod
     def _of(cls, trial: Trial, found: tuple[Dashpot, ...]) -> Self:
@@ -75,3 +76,13 @@ class SupportDamping:
     def _on(self, x: ModalModel) -> tuple[Dashpot, ...]:
         along = self.along or ("normal",) * len(self.position_m)
         return tuple(Dashpot(nearest(x, p), c, way) for p, c, way in zip(self.position_m, self.strength_n_s_m, along, strict=True))
+
+
+def _most(x: ModalModel, found: tuple[Dashpot, ...]) -> float:
+    """The largest share that dashpots add to a mode's decay, to first order: ½ Σ_j c_j |Φ_j|²/d."""
+    normal = vertex_normals(x)
+    added = np.zeros(x.mode_count)
+    for d in found:
+        phi = x.shape[d.vertex].astype(float)
+        added += d.c / 2 * ((phi**2).sum(axis=0) if d.along == "every" else (normal[d.vertex] @ phi) ** 2)
+    return float((added / np.maximum(x.decay_per_s, 1e-9)).max(initial=0.0))

@@ -13,9 +13,9 @@ from sonic_bullet.diagnosis.evidence import evidence_of
 from sonic_bullet.diagnosis.play import came_from, modes_of
 from sonic_bullet.effects.damping_law import DampingLaw
 from sonic_bullet.effects.dashpots import apart, coupled, damped
-from sonic_bullet.effects.support_damping import SupportDamping
+from sonic_bullet.effects.support_damping import LEAST, SupportDamping
 from sonic_bullet.effects.support_search import sought
-from sonic_bullet.effects.support_trial import GROSS, MISSED, Trial
+from sonic_bullet.effects.support_trial import GROSS, MISSED, Dashpot, Trial
 from sonic_bullet.records import Array, ModalModel
 
 SPOT, OTHER = (0.0477, 0.0371, 0.0), (0.0955, 0.0186, 0.0)
@@ -158,3 +158,17 @@ def test_a_law_of_the_material_is_read_beside_dashpots_and_acts_under_them() -> 
     assert found.eta == pytest.approx(6e-3, rel=0.02)
     one, two = (modes_of(truth(*order), body)[0] for order in ((law, fixture), (fixture, law)))
     assert np.array_equal(one.decay_per_s, two.decay_per_s), "whichever was found first"
+
+
+def test_a_dashpot_that_does_nothing_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Beside whatever moves modes twins keep corrections of their own, which gains something where a mesh is off: that is no dashpot's."""
+    told = evidence_of(truth(), (recorded(),), BAND)
+    x = told.heard[0].model
+    assert x is not None
+    vertex = int((x.shape[: len(np.unique(x.face)), 2].astype(float) ** 2).sum(axis=1).argmax())
+    for share, named in ((0.5 * LEAST, False), (2.0 * LEAST, True)):
+        c = (
+            2 * share * float((x.decay_per_s / np.maximum(x.shape[vertex, 2].astype(float) ** 2, 1e-30)).min())
+        )  # ½ c φ² = share · d, of the mode it takes most of
+        monkeypatch.setattr("sonic_bullet.effects.support_damping.sought", lambda _, c=c: (Dashpot(vertex, c, "every"),))
+        assert (SupportDamping.propose(told) is not None) is named
