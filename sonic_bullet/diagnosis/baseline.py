@@ -75,7 +75,7 @@ def _soft(one: Gathered, band_hz: tuple[float, float]) -> Gathered:
         return one
     try:
         soft = joint_lines(one.signals[np.sort(order)], one.sr, band_hz=band_hz, signed=one.lines.signed)
-        lines = lines_of(one.signals, noise_rms(one.signals, one.sr), -soft.decay_per_s + 2j * np.pi * soft.freq_hz, one.sr, soft.signed)
+        lines = lines_of(one.signals, noise_rms(one.signals, one.sr), soft.pole, one.sr, soft.signed)
     except (AudioError, np.linalg.LinAlgError):  # too soft
         return one
     if len(lines.freq_hz) < FEWEST:

@@ -8,6 +8,8 @@ response can bend. But lines are told dry, each by its own baseband (effects/tai
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from sonic_bullet.diagnosis.bodies import Struck
@@ -21,7 +23,7 @@ WIDTH = 2.0  # spreads within which Cauchy's loss is quadratic
 
 def tells(h: Hypothesis, effect: Effect) -> bool:
     """Whether lines are asked: of what changes decays and leaves modes where they are, beside a room."""
-    return any(hasattr(e, "dried") for e in h.effects) and effect.stage is Stage.MODES and not moves(Hypothesis(0.0, 0.0, 1.0, (effect,)))
+    return any(hasattr(e, "dried") for e in h.effects) and effect.stage is Stage.MODES and not moves(replace(h, effects=(effect,)))
 
 
 def likelier(without: Hypothesis, beside: Hypothesis, every: Evidence, told: Evidence, bodies: tuple[Struck, ...]) -> float:

@@ -69,7 +69,7 @@ def pruned(h: Hypothesis, added: list[Candidate], bodies: tuple[Struck, ...], ta
     """Without the effects that those found after them have made needless."""
     for candidate in added[:-1]:
         if candidate.lines > LINES:
-            continue  # strikes had not spoken for it
+            continue  # strikes need not speak for it
         rest = [e for e in h.effects if e.id != candidate.id]
         without = refitted(with_effects(h, tuple(rest), bodies), bodies)
         if (mean_db(takes, without) or 0.0) - (mean_db(takes, h) or 0.0) < needed(gap_db, first=False):

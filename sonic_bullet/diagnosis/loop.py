@@ -117,15 +117,15 @@ def _one_by_one(
         full = retold(h, bodies)  # a room's response is the lines' so far, which leaves open more than there is
         told = now if full is h else mean_db(takes, full) or 0.0
         found = trials(h, bodies, takes, evidence, effects, seed=seed + turn, say=say, costly=told - floor > OPEN * (before - floor))
-        first = first or found
         last |= {c.id: c for c in found}
         gap = max(now - floor, 0.0)
-        weak = weak or (not added and all((mean_db(takes, c.hypothesis) or 0.0) - floor > WEAK * gap for c in found))
-        if weak and not added and (two := in_twos(start, found, bodies, takes, band_hz, seed=seed, say=say)):
-            (h, added), passed = two, [(), ()]
-            last |= {c.id: c for c in added}
-            now, floor = mean_db(takes, h) or 0.0, least_db(takes, h) or floor
-            continue
+        if not added:
+            first, weak = found, all((mean_db(takes, c.hypothesis) or 0.0) - floor > WEAK * gap for c in found)
+            if weak and (two := in_twos(start, found, bodies, takes, band_hz, seed=seed, say=say)):
+                (h, added), passed = two, [(), ()]
+                last |= {c.id: c for c in added}
+                now, floor = mean_db(takes, h) or 0.0, least_db(takes, h) or floor
+                continue
         able = [c for c in found if earns(c, gap, first=not added) and helps(c, bodies, takes, now, told, floor, first=not added)]
         able = able or sorted((c for c in found if by_lines(c, bodies, takes, told, floor)), key=lambda c: -c.lines)[:1]
         if not able:

@@ -16,7 +16,7 @@ import numpy as np
 
 from sonic_bullet.diagnosis.bodies import Struck
 from sonic_bullet.diagnosis.judge import Judged, Take, mean_db
-from sonic_bullet.diagnosis.parted import FEWEST, LIKE
+from sonic_bullet.diagnosis.parted import FEWEST, LIKE, like
 from sonic_bullet.diagnosis.play import Hypothesis, modes_of, pattern, play
 from sonic_bullet.diagnosis.refit import ROUGH, refitted
 from sonic_bullet.estimator.distance import with_noise
@@ -53,7 +53,7 @@ def _put(h: Hypothesis, body: Struck, correction: Array) -> tuple[Array, float]:
             continue
         near = np.unique(group[~told & (np.abs(np.log(model.freq_hz / lines.freq_hz[k])) < FAR)])
         members = [np.flatnonzero(group == g) for g in near]
-        alike = [_like(heard[:, k], np.abs(row[:, who].sum(axis=1))) if not told[who].any() else 0.0 for who in members]
+        alike = [like(lines.amplitude[:, k], row[:, who]) if not told[who].any() else 0.0 for who in members]
         if not alike or max(alike) < LIKE:
             continue
         who = members[int(np.argmax(alike))]
@@ -61,11 +61,6 @@ def _put(h: Hypothesis, body: Struck, correction: Array) -> tuple[Array, float]:
         told[who], most = True, max(most, abs(step))
         found[order[who]] = (1 + found[order[who]]) * (1 + step) - 1
     return found, most
-
-
-def _like(a: Array, b: Array) -> float:
-    """Cosine of two columns (s,)."""
-    return float(a @ b / max(np.linalg.norm(a) * np.linalg.norm(b), 1e-300))
 
 
 def of_the_mesh(h: Hypothesis, bodies: tuple[Struck, ...], takes: Sequence[Judged], seed: int) -> float:

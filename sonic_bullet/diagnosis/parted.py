@@ -34,7 +34,7 @@ def parted(body: Struck) -> Struck:
         cut = 1 + int(np.diff(freq[group]).argmax())
         free = [k for k in range(len(lines.freq_hz)) if k not in line and abs(lines.freq_hz[k] / freq[group].mean() - 1) < CORRECTION]
         ways = [(low, high) for k in free for low, high in ((one, k), (k, one))]
-        fits = [min(_like(lines.amplitude[:, a], row[:, group[:cut]]), _like(lines.amplitude[:, b], row[:, group[cut:]])) for a, b in ways]
+        fits = [min(like(lines.amplitude[:, a], row[:, group[:cut]]), like(lines.amplitude[:, b], row[:, group[cut:]])) for a, b in ways]
         if not fits or max(fits) < LIKE:
             continue
         for k, part in zip(ways[int(np.argmax(fits))], (group[:cut], group[cut:]), strict=True):
@@ -43,7 +43,7 @@ def parted(body: Struck) -> Struck:
     return replace(body, line=line, correction=correction) if (line != body.line).any() else body
 
 
-def _like(amplitude: Array, pattern_of: Array) -> float:
+def like(amplitude: Array, pattern_of: Array) -> float:
     """Cosine of a line's |A| (s,) and |Σ J ψ| (s,) of some modes' patterns (s, p)."""
     a, b = np.abs(amplitude), np.abs(pattern_of.sum(axis=1))
     return float(a @ b / max(np.linalg.norm(a) * np.linalg.norm(b), 1e-300))

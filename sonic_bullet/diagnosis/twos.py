@@ -50,7 +50,7 @@ def in_twos(
     """The two of a first round's suspects that explain nearly all together, each of which earns its keep beside the other; None where no two do."""
     if len(first) < 2 or not all(isinstance(t, Take) for t in takes):
         return None
-    kinds = [type(c.effect) for c in first if not moves(replace(c.hypothesis, effects=(c.effect,)))]
+    kinds = [type(c.effect) for c in first if not _movers(c.hypothesis)]
     say("trying two at once")
 
     def beside(one: Candidate) -> list[Two]:
@@ -73,24 +73,26 @@ def in_twos(
     h = closer if (mean_db(takes, closer) or np.inf) < (mean_db(takes, h) or np.inf) else h
     added: list[Candidate] = []
     for effect in h.effects[::-1]:
-        rest = refitted(with_effects(h, tuple(e for e in h.effects if e.id != effect.id), bodies), bodies)
-        told = replace(evidence_of(rest, bodies, band_hz, seed=seed), known=next(e for e in h.effects if e.id == effect.id))
+        rest = refitted(with_effects(h, tuple(e for e in h.effects if e is not effect), bodies), bodies)
+        told = replace(evidence_of(rest, bodies, band_hz, seed=seed), known=effect)
         now, least = mean_db(takes, rest) or 0.0, least_db(takes, rest) or 0.0
-        for c in trials(rest, bodies, takes, told, [type(effect)], seed=seed, say=say):
-            if earns(c, max(now - least, 0.0), first=False) and helps(c, bodies, takes, now, now, least, first=False):
-                h, added = c.hypothesis, [c, *added]
-    return (h, added) if len(added) == 2 else None
+        stood = trials(rest, bodies, takes, told, [type(effect)], seed=seed, say=say)
+        if not stood or not (earns(stood[0], max(now - least, 0.0), first=False) and helps(stood[0], bodies, takes, now, now, least, first=False)):
+            return None
+        h, added = stood[0].hypothesis, [stood[0], *added]
+    return h, added
 
 
 def _likeliest(pairs: Sequence[Two], before_db: float, bodies: tuple[Struck, ...]) -> Hypothesis:
     """The nearest to the strikes; or, of those that share the effect that moves modes, and say nearly as much, the one for which phases speak clearly (ties.py)."""
     best = min(pairs, key=lambda two: two.db)
-    shared = {e.id for e in best.h.effects if moves(replace(best.h, effects=(e,)))}
-    others = [
-        two.h
-        for two in pairs
-        if two.db - best.db < NEARLY * (before_db - best.db) and {e.id for e in two.h.effects if moves(replace(two.h, effects=(e,)))} == shared
-    ]
+    near = best.db + NEARLY * (before_db - best.db)
+    others = [two.h for two in pairs if two.db < near and _movers(two.h) == _movers(best.h)]
     off = [misfit(h, bodies) + CLEAR for h in others]
     own = misfit(best.h, bodies)
     return others[int(np.argmin(off))] if np.isfinite(own) and min(off) < own else best.h
+
+
+def _movers(h: Hypothesis) -> set[str]:
+    """Which of its effects move modes."""
+    return {e.id for e in h.effects if moves(replace(h, effects=(e,)))}

@@ -66,7 +66,7 @@ class SupportDamping:
         if isinstance(evidence.known, cls):
             return cls._of(trial, tuned(trial, refined(trial, evidence.known._on(heard.model), NEARER[-2:])[1]))
         found = sought(trial)
-        return cls._of(trial, found) if found and _most(heard.model, found) > LEAST else None
+        return cls._of(trial, found) if found and _most(trial, found) > LEAST else None
 
     @classmethod
     def _of(cls, trial: Trial, found: tuple[Dashpot, ...]) -> Self:
@@ -78,11 +78,7 @@ class SupportDamping:
         return tuple(Dashpot(nearest(x, p), c, way) for p, c, way in zip(self.position_m, self.strength_n_s_m, along, strict=True))
 
 
-def _most(x: ModalModel, found: tuple[Dashpot, ...]) -> float:
+def _most(trial: Trial, found: tuple[Dashpot, ...]) -> float:
     """The largest share that dashpots add to a mode's decay, to first order: ½ Σ_j c_j |Φ_j|²/d."""
-    normal = vertex_normals(x)
-    added = np.zeros(x.mode_count)
-    for d in found:
-        phi = x.shape[d.vertex].astype(float)
-        added += d.c / 2 * ((phi**2).sum(axis=0) if d.along == "every" else (normal[d.vertex] @ phi) ** 2)
-    return float((added / np.maximum(x.decay_per_s, 1e-9)).max(initial=0.0))
+    added = (trial.rows([found])[0] ** 2).sum(axis=0) / 2
+    return float((added / np.maximum(trial.model.decay_per_s, 1e-9)).max(initial=0.0))

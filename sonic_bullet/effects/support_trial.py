@@ -126,7 +126,7 @@ class Trial:
 
     def poles(self, trials: list[Dashpots], runs: tuple[Array, ...]) -> list[tuple[Array, Array]]:
         """Poles (m,) and turns (m, m) of many, modes coupling within runs only."""
-        phi, m = self._rows(trials), self.model.mode_count
+        phi, m = self.rows(trials), self.model.mode_count
         lam, own = self.model.omega0_squared_per_s2, self.model.decay_per_s
         pole, turn = np.empty((len(trials), m), complex), np.zeros((len(trials), m, m), complex)
         for run in runs:
@@ -134,7 +134,7 @@ class Trial:
             pole[:, run], turn[:, run[:, None], run] = part.pole, part.turn
         return list(zip(pole, turn, strict=True))
 
-    def _rows(self, trials: list[Dashpots]) -> Array:
+    def rows(self, trials: list[Dashpots]) -> Array:
         """√c φ (t, 3j, m) of trials of as many dashpots each; rows that say nothing are zero."""
         vertex = np.array([[d.vertex for d in t] for t in trials])
         root = np.sqrt(np.array([[d.c for d in t] for t in trials]))

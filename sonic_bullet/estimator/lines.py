@@ -49,6 +49,11 @@ class Lines:
     signed: bool
 
     @property
+    def pole(self) -> Array:
+        """−d + iω (k,) in 1/s."""
+        return np.asarray(-self.decay_per_s + 2j * np.pi * self.freq_hz)
+
+    @property
     def told_sd_per_s(self) -> Array:
         """Spreads of the decays (k,), infinite at the fastest there is: a bound, no value."""
         return np.asarray(np.where(np.nan_to_num(self.decay_per_s) > PINNED * FASTEST_PER_S, np.inf, self.decay_sd_per_s))
@@ -108,8 +113,8 @@ def _from(late: int, signals: Array, sr: int, band_hz: tuple[float, float], sign
         return None
     alive = lines.decay_per_s * late / sr < DEAD  # what would have been over by then began later
     if not alive.all():
-        lines = lines_of(signals[:, late:], lines.noise, (-lines.decay_per_s + 2j * np.pi * lines.freq_hz)[alive], sr, signed)
-    back = np.exp((lines.decay_per_s - 2j * np.pi * lines.freq_hz) * late / sr)
+        lines = lines_of(signals[:, late:], lines.noise, lines.pole[alive], sr, signed)
+    back = np.exp(-lines.pole * late / sr)
     return replace(lines, amplitude=lines.amplitude * back, amplitude_sd=lines.amplitude_sd * np.abs(back))
 
 

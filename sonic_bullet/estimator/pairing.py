@@ -120,7 +120,7 @@ def heaped(lines: Lines) -> Array:
 
     ∫ |Σ A e^{pt}|² dt = −Σ_jk A_j Ā_k/(p_j + p̄_k)
     """
-    pole, a = -lines.decay_per_s + 2j * np.pi * lines.freq_hz, lines.amplitude
+    pole, a = lines.pole, lines.amplitude
     if not len(pole) or not np.isfinite(a).all() or not (lines.decay_per_s > 0).all():
         return np.zeros(len(pole), bool)
     shared = -1 / (pole[:, None] + pole.conj())

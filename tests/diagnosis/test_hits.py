@@ -11,7 +11,8 @@ from test_found_again import BAND, fitted
 
 from sonic_bullet.diagnosis.evidence import evidence_of
 from sonic_bullet.diagnosis.refit import refitted
-from sonic_bullet.effects.rebound import Rebound
+from sonic_bullet.effects.rebound import Rebound, _turned
+from sonic_bullet.effects.values import Blow
 from sonic_bullet.estimator import lines as line_fit
 
 
@@ -78,3 +79,11 @@ def test_what_began_late_is_not_taken_back_to_the_onset(monkeypatch: pytest.Monk
     found = line_fit.joint_lines(signals, SR, band_hz=(50.0, 7_500.0), modes=3)
     assert found.freq_hz == pytest.approx(freq, rel=1e-4)
     assert (np.abs(found.amplitude) < 1).all()
+
+
+def test_turns_in_half_the_digits_are_the_sum_of_the_hits() -> None:
+    """At a quarter of a second and 20 kHz a phase is 31 000 radians: whole turns go before digits do."""
+    freq = np.linspace(20.0, 20_000.0, 3001)
+    blow = Blow(0.02, np.array([0.0, 0.011, 0.02, 0.25]), np.array([1.0, 0.7, 0.5, 0.3]))
+    want = (blow.share[:, None] * np.exp(-(8.0 + 2j * np.pi * freq) * blow.delay_s[:, None])).sum(axis=0)
+    assert np.abs(_turned(blow, freq, 8.0) - want).max() < 1e-6
