@@ -16,6 +16,7 @@ from sonic_bullet.diagnosis.bodies import Struck
 from sonic_bullet.diagnosis.choice import by_lines, helps, pruned, simplest
 from sonic_bullet.diagnosis.evidence import evidence_of
 from sonic_bullet.diagnosis.exchange import chosen, exchanged, rivals
+from sonic_bullet.diagnosis.in_phase import of_no_body
 from sonic_bullet.diagnosis.judge import Judged, least_db, mean_db
 from sonic_bullet.diagnosis.meshed import beyond, of_the_mesh
 from sonic_bullet.diagnosis.play import Hypothesis
@@ -27,6 +28,8 @@ from sonic_bullet.effects.values import Effect
 ROUNDS = 4
 SUFFICES_DB = 1.5  # a gap below this is the mesh's and the shapes' own
 EXPLAINED = 0.5  # of the gap; part of it is the mesh's and the shapes' own
+BY_A_ROOM = 0.7  # of the gap: a response has a tap for every sample, so what is a room's it leaves little of
+NO_BODY = 0.25  # of the gap: with more of it in lines that are out of phase, it is no mesh's
 WEAK = 0.5  # of the gap: where every suspect leaves more, two are tried at once
 OPEN = 0.3  # of the first gap: with less left, no costly suspect is asked
 
@@ -152,8 +155,10 @@ def _verdict(
     """What is known: a name for less than EXPLAINED of what is seen would be a guess, unless what is left is what a mesh gets wrong."""
     gap, left = before - floor, now - floor
     if not added:
-        return "none" if gap < SUFFICES_DB or gap < of_the_mesh(h, bodies, takes, seed) else "unexplained"
-    enough = left <= max((1 - EXPLAINED) * gap, SUFFICES_DB) or left <= of_the_mesh(h, bodies, takes, seed)
+        mesh = gap < SUFFICES_DB or (gap < of_the_mesh(h, bodies, takes, seed) and of_no_body(takes) < NO_BODY * gap)
+        return "none" if mesh else "unexplained"
+    asked = BY_A_ROOM if any(hasattr(e, "told_by") for e in h.effects) else EXPLAINED
+    enough = left <= max((1 - asked) * gap, SUFFICES_DB) or left <= of_the_mesh(h, bodies, takes, seed)
     return "explained" if enough else "unexplained"
 
 

@@ -1,6 +1,6 @@
 """What no suspect accounts for, told so that a person can name it: when, where in frequency, how it goes with strength and place.
 
-e = |recorded − played|² in third octaves and thirds of the time, over the recording's own; slopes against ln J; lines that are no mode
+e = |recorded − played|² in third octaves and thirds of the time, over the recording's own; slopes against ln J; lines that are no mode, or none that a linear body has (in_phase.py)
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from sonic_bullet.diagnosis.in_phase import of_no_body
 from sonic_bullet.diagnosis.judge import Take
 from sonic_bullet.diagnosis.loop import Closed
 from sonic_bullet.diagnosis.play import Hypothesis, play
@@ -16,6 +17,7 @@ from sonic_bullet.records import Array
 
 WINDOW = 1024
 SHOWN = 4
+PLAIN_DB = 1.0  # of the distance, said by lines that are out of phase: worth telling
 
 
 def remainder(end: Closed, takes: tuple[Take, ...]) -> dict[str, Any]:
@@ -44,6 +46,9 @@ def remainder(end: Closed, takes: tuple[Take, ...]) -> dict[str, Any]:
         )
     if len(total) > 1:
         words += "; it differs from place to place" if scatter > 0.5 else "; it is alike wherever the body is struck"
+    odd = of_no_body(takes)
+    if odd > PLAIN_DB:
+        words += "; there are lines whose phase differs from strike to strike by more than a sign, which no body of fixed modes plays"
     return {
         "left_db": end.after_db - end.floor_db,
         "words": words,
@@ -51,6 +56,7 @@ def remainder(end: Closed, takes: tuple[Take, ...]) -> dict[str, Any]:
         "when": dict(zip(thirds, when, strict=True)),
         "slope_against_impulse": slope,
         "scatter_over_strikes": scatter,
+        "out_of_phase_db": odd,
     }
 
 
