@@ -114,12 +114,19 @@ def _per_velocity(x: Ring, measure: str) -> Array:
 
 
 def _slope(e: Envelopes, h: Heard, level: Array) -> Slope:
-    """b by the modes' own, each as heavy as what a bend would be in its phase over what there is; its spread by their scatter [White 1980]."""
+    """b by modes without a twin, where those are ENOUGH and more than one of them has a say; else by all."""
     table = np.array([one or (0.0, 0.0, 0.0) for one in (_moments(e, h, level, q) for q in range(len(e.line)))]).reshape(-1, 3)
     good = (table[:, 0] > 0) & (table[:, 2] > 0)
     single = np.array([not twins(h, k) for k in e.line.tolist()], bool)  # twins glide each by its own level
-    enough = bool((good & single).sum() >= ENOUGH)
-    table = table[good & single] if enough else table[good]
+    if (good & single).sum() >= ENOUGH:
+        found = _agreed(table[good & single])
+        if np.isfinite(found.sd) or single[good].all():
+            return found
+    return replace(_agreed(table[good]), single=False)
+
+
+def _agreed(table: Array) -> Slope:
+    """b by the modes' own (n, 3), each as heavy as what a bend would be in its phase over what there is; its spread by their scatter [White 1980]."""
     if not len(table):
         return Slope(0.0, np.inf, 0.0, 0.0)
     xx, xy, yy = table.T
@@ -133,7 +140,7 @@ def _slope(e: Envelopes, h: Heard, level: Array) -> Slope:
     gone = np.maximum((2 * centre * xy - centre**2 * xx) / yy, -1.0)
     sd = float(np.sqrt(((says * (value - centre)) ** 2).sum()) / max(says.sum(), 1e-300))
     alone = says.sum() ** 2 / max(float((says**2).sum()), 1e-300) < FEWEST
-    return Slope(centre, np.inf if alone else max(sd, 1e-300), float((says * gone).sum() / max(says.sum(), 1e-300)), float(gone.sum()), enough)
+    return Slope(centre, np.inf if alone else max(sd, 1e-300), float((says * gone).sum() / max(says.sum(), 1e-300)), float(gone.sum()))
 
 
 def _moments(e: Envelopes, h: Heard, level: Array, q: int) -> tuple[float, float, float] | None:

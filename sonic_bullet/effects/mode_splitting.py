@@ -23,6 +23,7 @@ REACH = 2e-2  # of a line from its pair's middle
 LOUD, CLEAR = 1e-3, 30.0  # of the strongest line; of a line's own spread
 MOST = 7
 ALIKE = 0.9
+BESIDE, ALSO = 3, 0.8  # pairs that make it plain that the body is split: how alike others then need to be
 
 
 @dataclass(frozen=True)
@@ -87,14 +88,14 @@ class ModeSplitting:
 def _pairs(h: Heard, scale: float) -> list[tuple[float, ...]]:
     """(f, ε, ψ, f over the mesh's) of every pair of modes, their frequencies times ``scale``, that two lines stand for.
 
-    A line stands for one mode; the surest pairs choose first.
+    A line stands for one mode; the surest pairs choose first. What splits a body splits many: beside some that are plain, others may be less so.
     """
     assert h.plain is not None  # the mesh's own order: corrections may have turned a pair's about
     every, decay, amplitude, strike, sensor = _lines(h)
     model_hz = h.plain.freq_hz
     size = np.abs(amplitude).max(axis=0)
     clear = size > np.maximum(LOUD * size.max(), CLEAR * np.concatenate([h.amplitude_sd, h.foreign_sd], axis=1).max(axis=0))
-    trials: list[tuple[float, int, int, int, float, float]] = []
+    trials: list[tuple[bool, float, int, int, int, float, float]] = []
     for a in np.flatnonzero(np.diff(model_hz) < PAIR * model_hz[:-1]):
         middle = scale * (model_hz[a] + model_hz[a + 1]) / 2
         near = np.flatnonzero((np.abs(every / middle - 1) < REACH) & clear)
@@ -106,12 +107,14 @@ def _pairs(h: Heard, scale: float) -> list[tuple[float, ...]]:
                 continue
             turn, alike = _turn(strike[:, [a, a + 1]], sensor[[a, a + 1]], amplitude[:, [low, high]], h.signed)
             off = abs((every[low] + every[high]) / (2 * middle) - 1)
-            if alike > ALIKE:
-                trials.append((float(alike - off / REACH * (1 - ALIKE)), int(a), int(low), int(high), split, turn))
+            if alike > ALSO:
+                trials.append((bool(alike > ALIKE), float(alike - off / REACH * (1 - ALIKE)), int(a), int(low), int(high), split, turn))
     found: list[tuple[float, ...]] = []
     taken: set[int] = set()
     done: set[int] = set()
-    for _, mode, low, high, split, turn in sorted(trials, reverse=True):
+    for plain, _, mode, low, high, split, turn in sorted(trials, reverse=True):
+        if not plain and len(found) < BESIDE:
+            break
         if low in taken or high in taken or mode in done or mode + 1 in done:
             continue
         taken.update((low, high))
