@@ -3,7 +3,7 @@
     for every strike s:  evidence − s − some lines -> propose -> refit α, β, σ -> D(s)    against the same without the effect
     null: as many numbers, spent on directions drawn at random in the modes' decays and levels, fitted to the same evidence
 
-an effect earns its keep where its mean drop is over LEAST_DB (FAINT_DB where nothing is found yet and that is MOST of the gap) and LEAST_SHARE of the gap,
+an effect earns its keep where its mean drop is over LEAST_DB (where nothing is found yet: FAINT_DB if that is MOST of the gap, CERTAIN_DB if lines are sure of it) and LEAST_SHARE of the gap,
     SURE standard errors above zero and above the null effect's by as much; of more than MANY strikes that gain much one may be odd
 
 Leaving out lines matters: decays and shapes belong to the body, so every strike shows them, and a pattern fitted to them by chance would pass.
@@ -34,6 +34,7 @@ KEPT = 0.75  # of the lines, in every fold
 DRAWS = 2  # of the null effect
 LEAST_DB, LEAST_SHARE = 0.4, 0.08  # of a drop, and of it in the gap
 FAINT_DB, MOST = 0.2, 0.5  # of a drop that is as much of the gap: then less than LEAST_DB will do
+CERTAIN_DB = 0.1  # of a drop, where many lines have told of an effect, each by its own baseband
 SURE, MANY = 2.0, 4  # standard errors; strikes of which none may lose, beside one
 PLAIN = 0.6  # of the gap: where a cheap suspect says as much, costly ones wait
 
@@ -60,6 +61,11 @@ class Candidate:
         return _mean(self.drop_db)
 
     @property
+    def certain(self) -> bool:
+        """Whether its lines are sure of it (see needed)."""
+        return getattr(self.effect, "certain", False)
+
+    @property
     def sd_db(self) -> float:
         """Standard error of the mean."""
         return float(self.drop_db.std(ddof=1) / np.sqrt(len(self.drop_db))) if len(self.drop_db) > 1 else float("inf")
@@ -69,19 +75,21 @@ def _mean(x: Sequence[float] | np.ndarray[Any, Any]) -> float:
     return float(np.mean(x)) if len(x) else 0.0
 
 
-def needed(gap_db: float, *, first: bool) -> float:
+def needed(gap_db: float, *, first: bool, certain: bool = False) -> float:
     """Of a drop, in dB: LEAST_DB; less where that is most of what has ever been open (first: nothing is found yet), more where much is.
 
+    certain: many lines agreed on it, each by its own frames, before it was proposed; then strikes left out need only say the same.
     What little a name leaves of a wide gap may be its own fit's.
     """
-    return max(min(LEAST_DB, max(FAINT_DB, MOST * gap_db)) if first else LEAST_DB, LEAST_SHARE * gap_db)
+    least = LEAST_DB if not first else CERTAIN_DB if certain else min(LEAST_DB, max(FAINT_DB, MOST * gap_db))
+    return max(least, LEAST_SHARE * gap_db)
 
 
 def earns(c: Candidate, gap_db: float, *, first: bool) -> bool:
     """Whether a suspect explains enough, surely enough, and more than chance. first: see needed."""
     if len(c.drop_db) == 0:
         return False
-    need = needed(gap_db, first=first)
+    need = needed(gap_db, first=first, certain=c.certain)
     if not (c.mean_db > need and np.isfinite(c.sd_db)):
         return False
     more = c.whole_db - max(c.null_db, 0.0)  # a null effect is not held against corrections either
