@@ -36,6 +36,7 @@ LEAST_DB, LEAST_SHARE = 0.4, 0.08  # of a drop, and of it in the gap
 FAINT_DB, MOST = 0.2, 0.5  # of a drop that is as much of the gap: then less than LEAST_DB will do
 CERTAIN_DB = 0.1  # of a drop, where many lines have told of an effect, each by its own baseband
 SURE, MANY = 2.0, 4  # standard errors; strikes of which none may lose, beside one
+NOISE_DB = 0.03  # of a distance, by noise alone
 PLAIN = 0.6  # of the gap: where a cheap suspect says as much, costly ones wait
 
 
@@ -97,7 +98,7 @@ def earns(c: Candidate, gap_db: float, *, first: bool) -> bool:
     if len(drop) > MANY and drop[1:].mean() > 3 * need:
         drop = drop[1:]  # one strike may be odd: what it alone tells, none of the others did
     sd = float(drop.std(ddof=1) / np.sqrt(len(drop)))
-    if len(drop) >= MANY and drop[0] > -0.1 * drop.mean() and drop[-2] > need:
+    if len(drop) >= MANY and drop[0] > -max(0.1 * drop.mean(), NOISE_DB) and (drop[-2] > need or c.certain):
         return more > 0.5 * need  # no strike speaks against it, though loud ones may gain far more than soft ones
     return bool(drop.mean() > SURE * sd) and more > max(SURE * sd, 0.5 * need)
 
