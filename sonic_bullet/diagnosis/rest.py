@@ -23,6 +23,7 @@ from sonic_bullet.records import Array
 
 STEP = 0.1  # of 1/duration: steps of δ
 FEWEST = 8  # frames
+HALFWAY = 0.5  # to the next mode
 
 
 def at_rest(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...], *, every: bool = False) -> Hypothesis:
@@ -40,7 +41,7 @@ def _rested(h: Hypothesis, body: Struck, strikes: list[int], every: bool) -> Arr
     assert body.gathered is not None and body.gathered.signals is not None
     count = undamped(h, body).mode_count
     correction = np.array((h.correction or {}).get(body.name, np.zeros(count)), float)
-    one, order = heard_of(h, body, sounds=False), modes_of(h, body)[1]
+    one, (modes, order) = heard_of(h, body, sounds=False), modes_of(h, body)
     glides = np.ones(len(one.freq_hz), bool) if every else gliding(h, body, replace(one, strike=tuple(strikes)))
     picked, window = alone(one)
     kept = [q for q, k in enumerate(picked) if glides[k] and len(one.mode[k]) == 1]  # twins glide each by its own level, and beat
@@ -52,7 +53,8 @@ def _rested(h: Hypothesis, body: Struck, strikes: list[int], every: bool) -> Arr
     rows = replace(one, noise=one.noise[strikes])
     recorded, model = shifted(rows, signal, picked, window), shifted(rows, played, picked, window)
     for q, k in enumerate(picked):
-        ratio = 1 + _off_hz(recorded, model, q, CORRECTION * float(one.freq_hz[k])) / float(one.freq_hz[k])
+        next_hz = np.abs(np.delete(modes.freq_hz, one.mode[k]) - modes.freq_hz[one.mode[k]]).min(initial=np.inf)  # or it would be taken for its neighbour
+        ratio = 1 + _off_hz(recorded, model, q, min(CORRECTION * float(one.freq_hz[k]), HALFWAY * float(next_hz))) / float(one.freq_hz[k])
         who = order[one.mode[k]]
         correction[who] = np.clip((1 + correction[who]) * ratio - 1, -CORRECTION, CORRECTION)
     return correction
