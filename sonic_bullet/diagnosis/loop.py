@@ -29,7 +29,7 @@ ROUNDS = 4
 SUFFICES_DB = 1.5  # a gap below this is the mesh's and the shapes' own
 EXPLAINED = 0.5  # of the gap; part of it is the mesh's and the shapes' own
 BY_A_ROOM = 0.7  # of the gap: a response has a tap for every sample, so what is a room's it leaves little of
-NO_BODY = 0.25  # of the gap: with more of it in lines that are out of phase, it is no mesh's
+NO_BODY = 0.5  # of what is open: with more of it said by lines that are out of phase, it is no mesh's
 WEAK = 0.5  # of the gap: where every suspect leaves more, two are tried at once
 OPEN = 0.3  # of the first gap: with less left, no costly suspect is asked
 
@@ -70,7 +70,8 @@ def closed(
     verdict, off = _verdict(h, added, before, now, floor, bodies, takes, seed), 0.0
     if verdict == "unexplained":
         far, off = beyond(start, bodies)
-        verdict = "none" if off and (mean_db(takes, far) or 0.0) - (least_db(takes, far) or 0.0) < SUFFICES_DB else verdict
+        excused = off and (mean_db(takes, far) or 0.0) - (least_db(takes, far) or 0.0) < SUFFICES_DB and of_no_body(start, takes) < NO_BODY
+        verdict = "none" if excused else verdict
     if verdict == "unexplained" and not one.in_twos and (two := in_twos(start, one.first, bodies, takes, band_hz, seed=seed, say=say)):
         h, added = two
         last |= {c.id: c for c in added}
@@ -155,8 +156,8 @@ def _verdict(
     """What is known: a name for less than EXPLAINED of what is seen would be a guess, unless what is left is what a mesh gets wrong."""
     gap, left = before - floor, now - floor
     if not added:
-        mesh = gap < SUFFICES_DB or (gap < of_the_mesh(h, bodies, takes, seed) and of_no_body(takes) < NO_BODY * gap)
-        return "none" if mesh else "unexplained"
+        excused = gap < SUFFICES_DB or (gap < of_the_mesh(h, bodies, takes, seed) and of_no_body(h, takes) < NO_BODY)
+        return "none" if excused else "unexplained"
     asked = BY_A_ROOM if any(hasattr(e, "told_by") for e in h.effects) else EXPLAINED
     enough = left <= max((1 - asked) * gap, SUFFICES_DB) or left <= of_the_mesh(h, bodies, takes, seed)
     return "explained" if enough else "unexplained"

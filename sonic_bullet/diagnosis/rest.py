@@ -24,6 +24,7 @@ from sonic_bullet.records import Array
 STEP = 0.1  # of 1/duration: steps of δ
 FEWEST = 8  # frames
 HALFWAY = 0.5  # to the next mode
+AGREE = 0.5  # of all frames' worth, once shifted: what is played is what was recorded
 
 
 def at_rest(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...], *, every: bool = False) -> Hypothesis:
@@ -79,5 +80,9 @@ def _off_hz(recorded: Envelopes, model: Envelopes, q: int, most_hz: float) -> fl
         return np.asarray(np.sum([np.abs(u @ np.exp(-2j * np.pi * np.outer(t, delta))) for t, u in rows], axis=0))
 
     coarse = step * np.arange(-int(reach / step), int(reach / step) + 1)
-    fine = coarse[int(agree(coarse).argmax())] + step * np.linspace(-1, 1, 41)
+    score = agree(coarse)
+    best = int(score.argmax())
+    if best in (0, len(coarse) - 1) or score[best] < AGREE * sum(float(np.abs(u).sum()) for _, u in rows):
+        return 0.0  # its best is elsewhere, or nowhere
+    fine = coarse[best] + step * np.linspace(-1, 1, 41)
     return float(fine[int(agree(fine).argmax())])

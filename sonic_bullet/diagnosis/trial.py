@@ -3,7 +3,7 @@
     for every strike s:  evidence − s − some lines -> propose -> refit α, β, σ -> D(s)    against the same without the effect
     null: as many numbers, spent on directions drawn at random in the modes' decays and levels, fitted to the same evidence
 
-an effect earns its keep where its mean drop is over LEAST_DB (where nothing is found yet: FAINT_DB if that is MOST of the gap, CERTAIN_DB if lines are sure of it) and LEAST_SHARE of the gap,
+an effect earns its keep where its mean drop is over LEAST_DB (where nothing is found yet: FAINT_DB if that is MOST of the gap, CERTAIN_DB if lines are sure of it and that is SAID of the gap) and LEAST_SHARE of the gap,
     SURE standard errors above zero and above the null effect's by as much; of more than MANY strikes that gain much one may be odd
 
 Leaving out lines matters: decays and shapes belong to the body, so every strike shows them, and a pattern fitted to them by chance would pass.
@@ -12,7 +12,7 @@ Leaving out lines matters: decays and shapes belong to the body, so every strike
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import Any
 
@@ -34,7 +34,8 @@ KEPT = 0.75  # of the lines, in every fold
 DRAWS = 2  # of the null effect
 LEAST_DB, LEAST_SHARE = 0.4, 0.08  # of a drop, and of it in the gap
 FAINT_DB, MOST = 0.2, 0.5  # of a drop that is as much of the gap: then less than LEAST_DB will do
-CERTAIN_DB = 0.1  # of a drop, where many lines have told of an effect, each by its own baseband
+CERTAIN_DB, SAID = 0.1, 0.25  # of a drop that is as much of the gap, where lines have told of an effect, each by its own baseband
+LOUDEST = 2  # strikes, of which what goes with level must gain most
 SURE, MANY = 2.0, 4  # standard errors; strikes of which none may lose, beside one
 NOISE_DB = 0.03  # of a distance, by noise alone
 PLAIN = 0.6  # of the gap: where a cheap suspect says as much, costly ones wait
@@ -46,6 +47,7 @@ class Candidate:
     alone where the suspect moves modes. whole_db: mean with that in it, which speaks for a name's turn. null_db: mean over strikes and draws.
 
     spread: of each number in its parameters over the folds (jackknife). lines: by how much lines left out are likelier with it (by_lines.py).
+    impulse_n_s (s,): of the strikes.
     """
 
     id: str
@@ -56,6 +58,7 @@ class Candidate:
     null_db: float
     spread: dict[str, Any]
     lines: float = 0.0
+    impulse_n_s: np.ndarray[Any, Any] = field(default_factory=lambda: np.zeros(0))
 
     @property
     def mean_db(self) -> float:
@@ -65,6 +68,11 @@ class Candidate:
     def certain(self) -> bool:
         """Whether its lines are sure of it (see needed)."""
         return getattr(self.effect, "certain", False)
+
+    @property
+    def loud(self) -> bool:
+        """Whether the strike that gains most is one of the LOUDEST."""
+        return len(self.impulse_n_s) == len(self.drop_db) and int(self.drop_db.argmax()) in np.argsort(-self.impulse_n_s)[:LOUDEST]
 
     @property
     def sd_db(self) -> float:
@@ -79,11 +87,12 @@ def _mean(x: Sequence[float] | np.ndarray[Any, Any]) -> float:
 def needed(gap_db: float, *, first: bool, certain: bool = False) -> float:
     """Of a drop, in dB: LEAST_DB; less where that is most of what has ever been open (first: nothing is found yet), more where much is.
 
-    certain: many lines agreed on it, each by its own frames, before it was proposed; then strikes left out need only say the same.
+    certain: lines agreed on it, each by its own frames, before it was proposed; then strikes left out need only say the same.
+
     What little a name leaves of a wide gap may be its own fit's.
     """
-    least = LEAST_DB if not first else CERTAIN_DB if certain else min(LEAST_DB, max(FAINT_DB, MOST * gap_db))
-    return max(least, LEAST_SHARE * gap_db)
+    faint, share = (CERTAIN_DB, SAID) if certain else (FAINT_DB, MOST)
+    return max(min(LEAST_DB, max(faint, share * gap_db)) if first else LEAST_DB, LEAST_SHARE * gap_db)
 
 
 def earns(c: Candidate, gap_db: float, *, first: bool) -> bool:
@@ -95,10 +104,10 @@ def earns(c: Candidate, gap_db: float, *, first: bool) -> bool:
         return False
     more = c.whole_db - max(c.null_db, 0.0)  # a null effect is not held against corrections either
     drop = np.sort(c.drop_db)
-    if len(drop) > MANY and drop[1:].mean() > 3 * need:
+    if len(drop) > MANY and drop[1:].mean() > 3 * max(need, needed(gap_db, first=first)):
         drop = drop[1:]  # one strike may be odd: what it alone tells, none of the others did
     sd = float(drop.std(ddof=1) / np.sqrt(len(drop)))
-    if len(drop) >= MANY and drop[0] > -max(0.1 * drop.mean(), NOISE_DB) and (drop[-2] > need or c.certain):
+    if len(drop) >= MANY and drop[0] > -max(0.1 * drop.mean(), NOISE_DB) and (drop[-2] > need or (first and c.certain and c.loud)):
         return more > 0.5 * need  # no strike speaks against it, though loud ones may gain far more than soft ones
     return bool(drop.mean() > SURE * sd) and more > max(SURE * sd, 0.5 * need)
 
@@ -227,7 +236,8 @@ def _tried(kind: type[Effect], whole: Effect, h: Hypothesis, bodies: tuple[Struc
     added = refitted(replace(h, effects=(*h.effects, whole)), bodies, evidence.heard)
     drop, whole_db, null_db = np.array([g.drop_db for g in found]), _mean([g.whole_db for g in found]), _mean([x for g in found for x in g.null_db])
     lines = _mean([g.lines for g in found]) / (1 - KEPT)  # each line is left out in so many of the folds
-    return Candidate(kind.id, whole, added, drop, whole_db, null_db, jackknife([g.effect.parameters() for g in found if g.effect is not None]), lines)
+    level = np.array([f.take.body.impulse_n_s[f.take.strike] if isinstance(f.take, Take) else np.nan for f in folds])
+    return Candidate(kind.id, whole, added, drop, whole_db, null_db, jackknife([g.effect.parameters() for g in found if g.effect is not None]), lines, level)
 
 
 def _beside(fold: Fold, effect: Effect) -> Hypothesis:

@@ -11,13 +11,12 @@ import numpy as np
 
 from sonic_bullet.diagnosis.in_phase import of_no_body
 from sonic_bullet.diagnosis.judge import Take
-from sonic_bullet.diagnosis.loop import Closed
+from sonic_bullet.diagnosis.loop import NO_BODY, Closed
 from sonic_bullet.diagnosis.play import Hypothesis, play
 from sonic_bullet.records import Array
 
 WINDOW = 1024
 SHOWN = 4
-PLAIN_DB = 1.0  # of the distance, said by lines that are out of phase: worth telling
 
 
 def remainder(end: Closed, takes: tuple[Take, ...]) -> dict[str, Any]:
@@ -46,9 +45,9 @@ def remainder(end: Closed, takes: tuple[Take, ...]) -> dict[str, Any]:
         )
     if len(total) > 1:
         words += "; it differs from place to place" if scatter > 0.5 else "; it is alike wherever the body is struck"
-    odd = of_no_body(takes)
-    if odd > PLAIN_DB:
-        words += "; there are lines whose phase differs from strike to strike by more than a sign, which no body of fixed modes plays"
+    odd = of_no_body(end.after, takes)
+    if odd > NO_BODY:
+        words += "; much of it is in lines whose phase differs from strike to strike by more than a sign and a delay, which modes of their own do not do"
     return {
         "left_db": end.after_db - end.floor_db,
         "words": words,
@@ -56,7 +55,7 @@ def remainder(end: Closed, takes: tuple[Take, ...]) -> dict[str, Any]:
         "when": dict(zip(thirds, when, strict=True)),
         "slope_against_impulse": slope,
         "scatter_over_strikes": scatter,
-        "out_of_phase_db": odd,
+        "share_out_of_phase": odd,
     }
 
 

@@ -40,7 +40,7 @@ class AmplitudeDamping:
     stage: ClassVar[Stage] = Stage.BANK
     owner: ClassVar[Owner] = Owner.OBJECT
     by_line: ClassVar[bool] = True  # the axes of twins are
-    certain: ClassVar[bool] = True  # many modes agree, each by its own baseband, or nothing is proposed
+    certain: ClassVar[bool] = True  # modes agree, each by its own baseband, or nothing is proposed
     reference: ClassVar[str] = "Nayfeh & Mook 1979, section 3.3"
 
     choke: float

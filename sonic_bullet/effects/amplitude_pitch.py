@@ -3,7 +3,7 @@
     ω(t) = ω (1 + b a²(t))                                                    [Nayfeh & Mook 1979, eq. 2.3.35: the Duffing oscillator]
 
 Read off the phase of single modes: θ(t) = θ₀ + δ t + b a₀² ω (1 − e^{−2dt})/2d, θ₀ each strike's own, δ the mode's, b of all;
-by modes without a twin, where there are enough, else by pairs about their own axes (glided.py).
+by modes without a twin, where there are enough that are sure of it, else by all, pairs about their own axes (glided.py).
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 from sonic_bullet.effects.axes import turned, twins
 from sonic_bullet.effects.envelope import Envelopes, envelopes, falls, levels
 from sonic_bullet.effects.glided import axes_of, bend_beside
-from sonic_bullet.effects.values import Effect, Evidence, Heard, Owner, Ring, Stage
+from sonic_bullet.effects.values import Evidence, Heard, Owner, Ring, Stage
 from sonic_bullet.records import Array, ModalModel
 
 MEASURES = ("impulse", "velocity", "displacement")
@@ -39,7 +39,7 @@ class Slope:
     sd: float
     share: float
     modes: float
-    single: bool = True
+    single: bool
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class AmplitudePitch:
     stage: ClassVar[Stage] = Stage.BANK
     owner: ClassVar[Owner] = Owner.OBJECT
     by_line: ClassVar[bool] = True  # the axes of twins are
-    certain: ClassVar[bool] = True  # many modes agree, each by its own baseband, or nothing is proposed
+    certain: ClassVar[bool] = True  # modes agree, each by its own baseband, or nothing is proposed
     reference: ClassVar[str] = "Nayfeh & Mook 1979, section 2.3"
 
     bend: float
@@ -79,28 +79,23 @@ class AmplitudePitch:
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
         best: tuple[float, Self] | None = None
-        again = evidence.known is not None
+        known = evidence.known if isinstance(evidence.known, cls) else None
         for h in evidence.heard:
             e = envelopes(h)
-            if e is None:
-                continue
-            for name, level in levels(h).items():
-                if isinstance(evidence.known, cls) and name != evidence.known.measure:
-                    continue
-                b = _slope(e, h, level[:, e.line])
-                sure = abs(b.bend) > (1.0 if again else SURE) * b.sd and b.share > (0.0 if again else BETTER)
-                if sure and (best is None or b.modes > best[0]):
-                    best = (b.modes, cls._beside_twins(e, h, name, b, evidence.known))
+            for name, b in (_slopes(e, h, known) if e is not None else {}).items():
+                if best is None or b.modes > best[0]:
+                    assert e is not None
+                    best = (b.modes, cls._beside_twins(e, h, name, b, known))
         return best[1] if best is not None else None
 
     @classmethod
-    def _beside_twins(cls, e: Envelopes, h: Heard, measure: str, b: Slope, known: Effect | None) -> Self:
+    def _beside_twins(cls, e: Envelopes, h: Heard, measure: str, b: Slope, known: AmplitudePitch | None) -> Self:
         """The same with the axes of twins; where hardly a mode is without its twin, their bend with it."""
         if h.model is None or measure == "impulse":
             return cls(b.bend, measure)
         bend = b.bend
         if not b.single:
-            bend = known.bend if isinstance(known, cls) else bend_beside(e, h, measure, bend, FAR)
+            bend = known.bend if known is not None else bend_beside(e, h, measure, bend, FAR)
             bend = bend_beside(e, h, measure, bend, NEAR)
         return cls(bend, measure, *axes_of(e, h, measure, bend))
 
@@ -114,22 +109,37 @@ def _per_velocity(x: Ring, measure: str) -> Array:
     return np.ones(len(x.freq_hz))
 
 
-def _slope(e: Envelopes, h: Heard, level: Array) -> Slope:
-    """b by modes without a twin, where those are ENOUGH and more than one of them has a say; else by all."""
-    table = np.array([one or (0.0, 0.0, 0.0) for one in (_moments(e, h, level, q) for q in range(len(e.line)))]).reshape(-1, 3)
-    good = (table[:, 0] > 0) & (table[:, 2] > 0)
+def _slopes(e: Envelopes, h: Heard, known: AmplitudePitch | None) -> dict[str, Slope]:
+    """Of every measure that lines are sure of: modes without a twin where those are ENOUGH and sure of any, else all. known: what all evidence said."""
     single = np.array([not twins(h, k) for k in e.line.tolist()], bool)  # twins glide each by its own level
-    if (good & single).sum() >= ENOUGH:
-        found = _agreed(table[good & single])
-        if np.isfinite(found.sd) or single[good].all():
-            return found
-    return replace(_agreed(table[good]), single=False)
+    rows = {
+        name: np.array([one or (0.0, 0.0, 0.0) for one in (_moments(e, h, level[:, e.line], q) for q in range(len(e.line)))]).reshape(-1, 3)
+        for name, level in levels(h).items()
+        if known is None or name == known.measure
+    }
+    for alone in (True, False):
+        found: dict[str, Slope] = {}
+        for name, row in rows.items():
+            good = (row[:, 0] > 0) & (row[:, 2] > 0) & (single if alone else True)
+            b = _agreed(row[good], alone)
+            if good.sum() >= (ENOUGH if alone else 1) and _sure(b, known):
+                found[name] = b
+        if found:
+            break
+    return found
 
 
-def _agreed(table: Array) -> Slope:
+def _sure(b: Slope, known: AmplitudePitch | None) -> bool:
+    """Whether lines are sure of b; by fewer strikes, that it is no less than nothing of what all said (known)."""
+    if known is None:
+        return abs(b.bend) > SURE * b.sd and b.share > BETTER
+    return b.bend * np.sign(known.bend) > b.sd and b.share > 0
+
+
+def _agreed(table: Array, single: bool) -> Slope:
     """b by the modes' own (n, 3), each as heavy as what a bend would be in its phase over what there is; its spread by their scatter [White 1980]."""
     if not len(table):
-        return Slope(0.0, np.inf, 0.0, 0.0)
+        return Slope(0.0, np.inf, 0.0, 0.0, single)
     xx, xy, yy = table.T
     value, weight = xy / xx, xx / yy
     centre = _median(value, weight)
@@ -141,7 +151,7 @@ def _agreed(table: Array) -> Slope:
     gone = np.maximum((2 * centre * xy - centre**2 * xx) / yy, -1.0)
     sd = float(np.sqrt(((says * (value - centre)) ** 2).sum()) / max(says.sum(), 1e-300))
     alone = says.sum() ** 2 / max(float((says**2).sum()), 1e-300) < FEWEST
-    return Slope(centre, np.inf if alone else max(sd, 1e-300), float((says * gone).sum() / max(says.sum(), 1e-300)), float(gone.sum()))
+    return Slope(centre, np.inf if alone else max(sd, 1e-300), float((says * gone).sum() / max(says.sum(), 1e-300)), float(gone.sum()), single)
 
 
 def _moments(e: Envelopes, h: Heard, level: Array, q: int) -> tuple[float, float, float] | None:

@@ -152,7 +152,7 @@ def search(evidence: Evidence) -> tuple[Tensor, Tensor] | None:
     cube = min((e for e in ends if e.symmetry == "cubic"), key=lambda e: e.bic)
     ends += [fitted(told, symmetry, cube.p, start, WIDTHS[4:]) for symmetry in ("hexagonal-x", "hexagonal-y", "hexagonal-z", "orthorhombic")]
     near = min(ends, key=lambda e: e.bic)
-    ends += [fitted(told, "orthorhombic", near.p, start, WIDTHS[k:]) for k in (0, 1, 3)]  # three numbers in one were held together
+    ends += [fitted(told, "orthorhombic", near.p, start, WIDTHS[k:]) for k in (0, 1, 3)]  # what a symmetry ties is freed, pairing wide, less so, and near
     return plain, min(ends, key=lambda e: e.bic)
 
 

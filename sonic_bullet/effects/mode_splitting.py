@@ -23,7 +23,7 @@ REACH = 2e-2  # of a line from its pair's middle
 LOUD, CLEAR = 1e-3, 30.0  # of the strongest line; of a line's own spread
 MOST = 7
 ALIKE = 0.9
-BESIDE, ALSO = 3, 0.8  # pairs that make it plain that the body is split: how alike others then need to be
+BESIDE, ALSO, STRIKES = 3, 0.8, 5  # pairs that make it plain that the body is split: how alike others then need to be, every strike as loud, of so many
 
 
 @dataclass(frozen=True)
@@ -92,6 +92,8 @@ def _pairs(h: Heard, scale: float) -> list[tuple[float, ...]]:
     """
     assert h.plain is not None  # the mesh's own order: corrections may have turned a pair's about
     every, decay, amplitude, strike, sensor = _lines(h)
+    level = np.where(np.isfinite(h.impulse_n_s), h.impulse_n_s, 1.0)[:, None]
+    even, evenly = strike / level, amplitude / level  # one loud strike is alike with anything
     model_hz = h.plain.freq_hz
     size = np.abs(amplitude).max(axis=0)
     clear = size > np.maximum(LOUD * size.max(), CLEAR * np.concatenate([h.amplitude_sd, h.foreign_sd], axis=1).max(axis=0))
@@ -107,7 +109,8 @@ def _pairs(h: Heard, scale: float) -> list[tuple[float, ...]]:
                 continue
             turn, alike = _turn(strike[:, [a, a + 1]], sensor[[a, a + 1]], amplitude[:, [low, high]], h.signed)
             off = abs((every[low] + every[high]) / (2 * middle) - 1)
-            if alike > ALSO:
+            also = len(strike) >= STRIKES and min(alike, _turn(even[:, [a, a + 1]], sensor[[a, a + 1]], evenly[:, [low, high]], h.signed)[1]) > ALSO
+            if alike > ALIKE or also:
                 trials.append((bool(alike > ALIKE), float(alike - off / REACH * (1 - ALIKE)), int(a), int(low), int(high), split, turn))
     found: list[tuple[float, ...]] = []
     taken: set[int] = set()

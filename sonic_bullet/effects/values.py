@@ -200,8 +200,8 @@ class Effect(Protocol):
     """One physical effect: a frozen dataclass of its parameters. Every member also has a docstring that gives its equation.
 
     A class that says ``costly = True`` is asked last, and only where cheaper suspects leave much open. One that says ``by_line = True`` has numbers of
-    single lines, which no other line tells: on trial it is told all lines, of the other strikes. One that says ``certain = True`` is proposed where many
-    lines agree on it, each by its own baseband, and nowhere else: a smaller drop on strikes left out will do.
+    single lines, which no other line tells: on trial it is told all lines, of the other strikes. One that says ``certain = True`` is proposed where lines
+    agree on it, each by its own baseband, and nowhere else, and goes with level: a smaller drop will do on strikes left out, of which a loud one gains most.
     """
 
     id: ClassVar[str]

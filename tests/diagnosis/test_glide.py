@@ -16,12 +16,14 @@ from sonic_bullet.diagnosis.bodies import Struck
 from sonic_bullet.diagnosis.evidence import evidence_of
 from sonic_bullet.diagnosis.glide import fallen
 from sonic_bullet.diagnosis.refit import refitted, with_effects
-from sonic_bullet.diagnosis.rest import at_rest
+from sonic_bullet.diagnosis.rest import _off_hz, at_rest
+from sonic_bullet.effects import amplitude_pitch
 from sonic_bullet.effects.amplitude_pitch import FAR as FARTHER
-from sonic_bullet.effects.amplitude_pitch import NEAR, AmplitudePitch
-from sonic_bullet.effects.envelope import alone, envelopes
+from sonic_bullet.effects.amplitude_pitch import NEAR, AmplitudePitch, _moments, _slopes
+from sonic_bullet.effects.envelope import Envelopes, alone, envelopes
 from sonic_bullet.effects.glided import bend_beside
 from sonic_bullet.effects.room import Room
+from sonic_bullet.effects.values import Heard
 
 BENT = AmplitudePitch(0.35, "velocity")
 FAR = 2e-3  # of a frequency: what a linear fit of a mode that glides may be off
@@ -130,3 +132,34 @@ def test_phases_are_whole_turns_apart_however_few_the_frames_are() -> None:
     assert np.abs(np.exp(1j * e.phase) - e.z / np.abs(e.z))[e.good].max() < 1e-6
     turned = np.abs(np.diff(e.phase, axis=2))[e.good[:, :, 1:] & e.good[:, :, :-1]]
     assert turned.max() > np.pi
+
+
+@pytest.mark.parametrize(("reach_hz", "off_hz"), [(7.5, 0.0), (20.0, 15.0)])
+def test_a_mode_at_rest_is_not_taken_for_its_neighbour(reach_hz: float, off_hz: float) -> None:
+    """What is played there may be the neighbour's alone, 15 Hz away: with less than that in reach nothing is moved, nor to the end of the reach."""
+    t = np.linspace(0.01, 0.5, 96)[None]
+    heard, good = np.exp(2j * np.pi * 15 * t)[None], np.ones((1, 1, 96), bool)
+    recording = Envelopes(t, heard, good, np.zeros(1, int), np.full((1, 1), 1e-3), np.angle(heard), np.full(1, 0.02))
+    assert _off_hz(recording, replace(recording, z=np.ones_like(heard)), 0, reach_hz) == pytest.approx(off_hz, abs=0.02)
+
+
+def test_a_bend_that_one_lone_mode_alone_tells_is_told_by_all(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Three modes without a twin, but two of them hardly move: the pairs have to say it, too."""
+    body = made(BENT.bend)
+    told = evidence_of(fitted(body), (body,), BAND).heard[0]
+    e = envelopes(told)
+    assert e is not None
+    assert _slopes(e, told, None)["velocity"].single
+    lone = e.line[:3]
+
+    def still(e: Envelopes, h: Heard, level: np.ndarray, q: int) -> tuple[float, float, float] | None:
+        """Two of the three hardly move: what a bend would turn is a thousandth of what there is."""
+        xx, xy, yy = _moments(e, h, level, q) or (0.0, 0.0, 0.0)
+        return (1e-6 * xx, 1e-3 * xy, yy) if q < 2 else (xx, xy, yy)
+
+    monkeypatch.setattr(amplitude_pitch, "twins", lambda _, k: k not in lone)
+    monkeypatch.setattr(amplitude_pitch, "_moments", still)
+    found = _slopes(e, told, None)["velocity"]
+    assert not found.single
+    assert found.bend == pytest.approx(BENT.bend, rel=0.15)
+    assert not _slopes(e, told, AmplitudePitch(-BENT.bend)), "the other way is another bend"

@@ -13,6 +13,7 @@ from sonic_bullet.diagnosis.evidence import evidence_of, thinned
 from sonic_bullet.diagnosis.play import modes_of
 from sonic_bullet.diagnosis.refit import refitted
 from sonic_bullet.effects.mode_splitting import ModeSplitting
+from sonic_bullet.effects.values import Evidence
 from sonic_bullet.records import ModalModel
 
 BAND = (50.0, 7_500.0)
@@ -113,3 +114,30 @@ def test_lines_of_twins_go_to_their_own_modes_though_the_mesh_is_off_by_half_a_s
     got = np.sort(modes_of(h, shifted)[0].freq_hz)
     want = np.sort(modes_of(truth(effect), body)[0].freq_hz)
     assert np.abs(got / want - 1).max() < 1e-3
+
+
+def rough(body: Struck, f: float, gain: list[float]) -> Evidence:
+    """What is heard, amplitudes of lines about f off by a factor a strike, as shapes on a slope are."""
+    every = evidence_of(replace(truth(), correction={"plate": np.zeros(body.model.mode_count)}), (body,), BAND)
+    one, by = every.heard[0], np.array(gain)[:, None]
+    near, strange = (np.abs(x / f - 1) < 0.01 for x in (one.freq_hz, one.foreign_hz))
+    amplitude, foreign = np.where(near, by * one.amplitude, one.amplitude), np.where(strange, by * one.foreign_amplitude, one.foreign_amplitude)
+    return replace(every, heard=(replace(one, amplitude=amplitude, foreign_amplitude=foreign),))
+
+
+@pytest.mark.parametrize("plain", [1, 3])
+def test_beside_three_plain_pairs_another_may_be_less_so(plain: int) -> None:
+    """The plate with two or four pairs, of which the second's patterns are its modes' but for a factor of 0.35 at one strike and 1.7 at another."""
+    places = ((9, 10), (3, 4), (6, 7), (14, 15))[: plain + 1]
+    model = plate()
+    freq = model.freq_hz.copy()
+    for a, b in places:
+        freq[b] = freq[a]
+    model = replace(model, freq_hz=freq)
+    apart = ModeSplitting(tuple(float(freq[a]) for a, _ in places), (0.012, 0.009, 0.01, 0.008)[: plain + 1], (0.5, 2.0, 1.0, 2.5)[: plain + 1])
+    body = recorded(apart, model=model, seconds=1.0)
+    less = apart.freq_hz[1]
+    found = ModeSplitting.propose(rough(body, less, [1.0, 1.0, 1.0, 0.35, 1.7]))
+    assert found is not None
+    assert len(found.freq_hz) == (plain + 1 if plain == 3 else plain)
+    assert (np.abs(np.array(found.freq_hz) / less - 1) < 5e-3).any() == (plain == 3)

@@ -20,6 +20,7 @@ from sonic_bullet.diagnosis.judge import mean_db
 from sonic_bullet.diagnosis.refit import refitted
 from sonic_bullet.diagnosis.trial import LEAST_DB, Candidate, earns, needed, trials
 from sonic_bullet.effects.amplitude_damping import AmplitudeDamping
+from sonic_bullet.effects.amplitude_pitch import AmplitudePitch
 from sonic_bullet.effects.radiation import Radiation
 from sonic_bullet.effects.support_damping import SupportDamping
 from sonic_bullet.effects.support_subsets import _best, subsets
@@ -49,6 +50,19 @@ def test_loud_strikes_may_speak_alone_but_not_a_single_one() -> None:
     assert not earns(candidate(0.0, 0.0, 0.0, 0.0, 2.0), 0.5, first=True)
     assert not earns(candidate(0.0, -0.5, 0.05, 1.1, 0.9), 0.5, first=True), "one strike speaks against it"
     assert not earns(candidate(0.0, -0.02, 0.05, 1.1, 0.4, null_db=0.3), 0.5, first=True), "as good as chance"
+
+
+def test_of_what_lines_are_sure_of_one_loud_strike_will_do() -> None:
+    """What goes with level squared is plain at the loudest; a loud one that is not the one to gain is no such thing."""
+    drop, level = (0.0, 0.01, 0.02, 0.06, 0.8), np.array([1.0, 2.0, 3.0, 4.0, 9.0])
+    sure = replace(candidate(*drop), effect=AmplitudePitch(0.1), impulse_n_s=level)
+    assert sure.certain and sure.loud
+    assert earns(sure, 0.4, first=True)
+    assert not earns(replace(sure, effect=Radiation(0.1, 1.0)), 0.4, first=True), "its lines were not asked"
+    assert not earns(replace(sure, impulse_n_s=level[::-1]), 0.4, first=True), "the softest gains"
+    assert not earns(sure, 0.4, first=False)
+    assert not earns(sure, 1.2, first=True), "a seventh of the gap"
+    assert not earns(replace(sure, drop_db=np.array([-0.9, 0.4, 0.4, 0.4, 0.41])), 1.0, first=True), "one speaks against it"
 
 
 def test_one_odd_strike_does_not_outvote_four_that_gain_much() -> None:
