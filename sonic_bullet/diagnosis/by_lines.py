@@ -1,4 +1,4 @@
-"""What lines left out say of a suspect where strikes left out say nothing: beside a room.
+"""What lines' decays say of suspects where strikes say nothing: beside a room those left out, and of two that strikes cannot tell apart all of them.
 
     2 Δ ln L = Σ_k ρ(z_k without) − ρ(z_k with),   z_k = ln(d_k / d of its modes) / spread,   ρ Cauchy's, over the lines that a fold had left out, each counted once
 
@@ -14,16 +14,37 @@ import numpy as np
 
 from sonic_bullet.diagnosis.bodies import Struck
 from sonic_bullet.diagnosis.play import Hypothesis, modes_of, moves
-from sonic_bullet.effects.values import Effect, Evidence, Stage
+from sonic_bullet.effects.values import Effect, Evidence, Heard, Stage
 from sonic_bullet.records import Array
 
 SCATTER = 0.02  # of a decay about its law, relative
 WIDTH = 2.0  # spreads within which Cauchy's loss is quadratic
 
 
+def of_decays(h: Hypothesis, effect: Effect) -> bool:
+    """Whether it changes decays, and leaves modes where they are."""
+    return effect.stage is Stage.MODES and not moves(replace(h, effects=(effect,)))
+
+
 def tells(h: Hypothesis, effect: Effect) -> bool:
-    """Whether lines are asked: of what changes decays and leaves modes where they are, beside a room."""
-    return any(hasattr(e, "dried") for e in h.effects) and effect.stage is Stage.MODES and not moves(replace(h, effects=(effect,)))
+    """Whether lines are asked instead of strikes: of what changes decays, beside a room."""
+    return any(hasattr(e, "dried") for e in h.effects) and of_decays(h, effect)
+
+
+def misfit(h: Hypothesis, evidence: Evidence, bodies: tuple[Struck, ...], numbers: int) -> float:
+    """Twice −ln likelihood of all lines' decays, and ``numbers`` at ln n each [Schwarz 1978]."""
+    total, count = 0.0, 0
+    for one in evidence.heard:
+        body = next(b for b in bodies if b.gathered is one.source)
+        good = _told(one)
+        total += float(_cost(modes_of(h, body)[0].decay_per_s, one.mode, one.decay_per_s, one.decay_sd_per_s)[good].sum())
+        count += int(good.sum())
+    return total + numbers * float(np.log(max(count, 1)))
+
+
+def _told(one: Heard) -> Array:
+    """Which lines (k,) tell a decay."""
+    return np.asarray(np.isfinite(one.decay_per_s) & (one.decay_per_s > 0) & ~np.isposinf(one.decay_sd_per_s))
 
 
 def likelier(without: Hypothesis, beside: Hypothesis, every: Evidence, told: Evidence, bodies: tuple[Struck, ...]) -> float:
@@ -31,7 +52,7 @@ def likelier(without: Hypothesis, beside: Hypothesis, every: Evidence, told: Evi
     total = 0.0
     for one in every.heard:
         seen = next((h.freq_hz for h in told.heard if h.source is one.source), one.freq_hz[:0])
-        out = ~np.isin(one.freq_hz, seen) & np.isfinite(one.decay_per_s) & (one.decay_per_s > 0) & ~np.isposinf(one.decay_sd_per_s)
+        out = ~np.isin(one.freq_hz, seen) & _told(one)
         body = next(b for b in bodies if b.gathered is one.source)
         cost = [_cost(modes_of(h, body)[0].decay_per_s, one.mode, one.decay_per_s, one.decay_sd_per_s)[out].sum() for h in (without, beside)]
         total += float(cost[0] - cost[1])

@@ -10,12 +10,15 @@ from collections.abc import Sequence
 import numpy as np
 
 from sonic_bullet.diagnosis.bodies import Struck
+from sonic_bullet.diagnosis.by_lines import misfit as decays
+from sonic_bullet.diagnosis.by_lines import of_decays
 from sonic_bullet.diagnosis.exchange import ALIKE
 from sonic_bullet.diagnosis.judge import Judged, mean_db
 from sonic_bullet.diagnosis.play import Hypothesis, moves
 from sonic_bullet.diagnosis.refit import refitted, retold, with_effects
 from sonic_bullet.diagnosis.ties import misfit
 from sonic_bullet.diagnosis.trial import SURE, Candidate, needed
+from sonic_bullet.effects.values import Evidence
 
 NEARLY = 0.2  # of what a name says: between two that differ by less, phases may decide
 CLEAR, HINT = 25.0, 5.0  # twice the ln likelihood of phases that this takes; where the two are ALIKE
@@ -41,11 +44,11 @@ def _numbers(c: Candidate) -> int:
     return c.effect.freedom() - 2 * (c.id == "damping-law")
 
 
-def simplest(able: Sequence[Candidate], bodies: tuple[Struck, ...]) -> Candidate:
+def simplest(able: Sequence[Candidate], bodies: tuple[Struck, ...], evidence: Evidence) -> Candidate:
     """The best, or the one with the fewest numbers of those that strikes cannot tell from it: SURE standard errors of the difference, ALIKE of what it says.
 
     Where another with no more numbers says nearly as much (NEARLY), the lines' phases may speak for that one (ties.py): by CLEAR, or by HINT where it is ALIKE.
-    Effects that move modes stand aside: corrections are learnt anew beside them, and are numbers too.
+    Of two that only change decays the lines' own decays tell, by BIC. Effects that move modes stand aside: corrections are learnt anew beside them, and are numbers too.
     """
     best = able[0]
     if moves(best.hypothesis):
@@ -57,6 +60,9 @@ def simplest(able: Sequence[Candidate], bodies: tuple[Struck, ...]) -> Candidate
 
     rivals = [c for c in able if not moves(c.hypothesis)]
     first = min((c for c in rivals if close(c, ALIKE)), key=lambda c: (_numbers(c), -c.mean_db))
+    if of_decays(first.hypothesis, first.effect):
+        alike = [c for c in rivals if of_decays(c.hypothesis, c.effect) and (best.drop_db - c.drop_db).mean() < NEARLY * best.mean_db]
+        first = min(alike, key=lambda c: decays(c.hypothesis, evidence, bodies, _numbers(c)))
     others = [c for c in rivals if c is not first and _numbers(c) <= _numbers(first) and (best.drop_db - c.drop_db).mean() < NEARLY * best.mean_db]
     if not others:
         return first

@@ -134,7 +134,7 @@ def _one_by_one(
         able = able or sorted((c for c in found if by_lines(c, bodies, takes, told, floor)), key=lambda c: -c.lines)[:1]
         if not able:
             break
-        best = simplest(able, bodies)
+        best = simplest(able, bodies, evidence)
         h, added, passed = best.hypothesis, [*added, best], [*passed, rivals(able, best)]
         if hasattr(best.effect, "told_by") and (mean_db(takes, h) or 0.0) > now:
             h = retold(h, bodies)  # a room's response by lines so far off that it sounds worse than none

@@ -15,7 +15,9 @@ from sonic_bullet.diagnosis.ties import misfit
 from sonic_bullet.diagnosis.trial import Candidate
 from sonic_bullet.effects import Effect
 from sonic_bullet.effects.contact_time import ContactTime
+from sonic_bullet.effects.damping_law import DampingLaw
 from sonic_bullet.effects.measurement_chain import MeasurementChain
+from sonic_bullet.effects.radiation import Radiation
 
 BAND = (50.0, 7_500.0)
 PULSE = ContactTime(1.6e-4, 0.016, 0.0, "raised-cosine")
@@ -40,8 +42,9 @@ def test_a_pulse_and_a_low_pass_are_told_apart(effect: Effect) -> None:
     body = recorded(effect)
     both = told_by(effect)
     assert both[0].effect.freedom() == both[1].effect.freedom()
-    assert simplest(both, (body,)).id == effect.id
-    assert simplest(both[::-1], (body,)).id == effect.id
+    told = evidence_of(truth(), (body,), BAND)
+    assert simplest(both, (body,), told).id == effect.id
+    assert simplest(both[::-1], (body,), told).id == effect.id
 
 
 @pytest.mark.parametrize("effect", [ContactTime(1.2e-4, 0.016, -0.2, "half-sine"), LOW], ids=lambda e: e.id)
@@ -49,7 +52,21 @@ def test_phases_speak_though_every_strike_says_a_little_more_for_the_other(effec
     """A pulse in few samples, or a filter between two, has magnitudes that are off by a little at all strikes alike; phases are off by a turn."""
     body = recorded(effect)
     both = [replace(c, drop_db=c.drop_db * (0.9 if c.id == effect.id else 1.0)) for c in told_by(effect)]
-    assert simplest(sorted(both, key=lambda c: -c.mean_db), (body,)).id == effect.id
+    assert simplest(sorted(both, key=lambda c: -c.mean_db), (body,), evidence_of(truth(), (body,), BAND)).id == effect.id
+
+
+@pytest.mark.parametrize("effect", [Radiation(0.03, 9.0), DampingLaw("relaxation", 5e-3, strength=0.045, tau_s=1.2e-4)], ids=lambda e: e.id)
+def test_of_two_that_only_change_decays_the_decays_tell(effect: Effect) -> None:
+    """Strikes say a little more for the other one; the law asks for fewer numbers."""
+    body = recorded(effect)
+    plain = refitted(truth(), (body,))
+    evidence = evidence_of(plain, (body,), BAND)
+    both = []
+    for kind, other in ((Radiation, Radiation(0.03, 2.0)), (DampingLaw, DampingLaw("relaxation", 5e-3, strength=0.045, tau_s=4e-5))):
+        found = kind.propose(evidence) or other
+        h = refitted(replace(plain, effects=(found,)), (body,), evidence.heard)
+        both.append(Candidate(kind.id, found, h, np.array([2.0, 2.1, 1.9, 2.0, 2.05]) * (0.95 if kind.id == effect.id else 1.0), 2.0, 0.0, {}))
+    assert simplest(sorted(both, key=lambda c: -c.mean_db), (body,), evidence).id == effect.id
 
 
 @pytest.mark.parametrize("exponent", [-0.2, 0.0])
