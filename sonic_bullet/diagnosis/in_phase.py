@@ -46,17 +46,20 @@ def _in_time(a: Array, freq_hz: Array) -> Array:
 
 
 def of_no_body(h: Hypothesis, takes: Sequence[Judged]) -> float:
-    """Of the squared distance between strikes and h, over noise alone, the share that lines which are out of phase say: of all lines played, how much farther off without them."""
+    """Of the squared distance between strikes and h, over noise alone, the share that lines which are out of phase say: of all lines played, how much farther off without them.
+
+    0 where all lines together are farther off than h is: they were not told well enough to be asked.
+    """
     heard = [take for take in takes if isinstance(take, Take)]
     played = {id(g): _played(g) for g in {id(t.place[0]): t.place[0] for t in heard}.values()}
-    said, gap = 0.0, 0.0
+    said, gap, better = 0.0, 0.0, 0.0
     for take in heard:
         gathered, strike = take.place
         every, rest = (_off(take, row[strike]) for row in played[id(gathered)])
         off, least = take.distance(h), take.least(h)
         if np.isfinite([every, rest, off, least]).all():
-            said, gap = said + rest**2 - every**2, gap + off**2 - least**2
-    return float(np.clip(said / gap, 0.0, 1.0)) if gap > 0 else 0.0
+            said, gap, better = said + rest**2 - every**2, gap + off**2 - least**2, better + off**2 - every**2
+    return float(np.clip(said / gap, 0.0, 1.0)) if min(gap, better) > 0 else 0.0
 
 
 def _played(g: Gathered) -> tuple[Array, Array]:
