@@ -163,10 +163,10 @@ def predictions(d: Diagnosis) -> list[tuple[str, int, Array, Array]]:
 
 
 def described(d: Diagnosis) -> dict[str, Any]:
-    """The diagnosis as JSON holds it."""
+    """The diagnosis as JSON holds it: null for what is no number."""
     from sonic_bullet.diagnosis.loop import described as tried
 
-    return {
+    whole = {
         "case": d.case.name,
         "verdict": d.verdict,
         "effects": [
@@ -197,3 +197,13 @@ def described(d: Diagnosis) -> dict[str, Any]:
         "after": {"alpha_per_s": d.closed.after.alpha_per_s, "beta_s": d.closed.after.beta_s, "gain": d.closed.after.gain},
         "warnings": list(d.warnings),
     }
+    return {name: _finite(value) for name, value in whole.items()}
+
+
+def _finite(x: Any) -> Any:
+    """The same, None where a number is not finite."""
+    if isinstance(x, dict):
+        return {k: _finite(v) for k, v in x.items()}
+    if isinstance(x, (list, tuple)):
+        return [_finite(v) for v in x]
+    return None if isinstance(x, float) and not np.isfinite(x) else x

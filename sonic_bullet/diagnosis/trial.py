@@ -227,8 +227,8 @@ def _tried(kind: type[Effect], whole: Effect, h: Hypothesis, bodies: tuple[Struc
             return Gain()
         random = [Null.fitted(less, min(effect.freedom(), 8), 10 * i + draw) for draw in range(DRAWS)]
         beside = _beside(fold, effect)
-        after = fold.take.distance(beside)
-        chance = tuple(fold.before - fold.take.distance(_beside(fold, none)) for none in random if none is not None)
+        after = _after(fold, beside)
+        chance = tuple(fold.before - _after(fold, _beside(fold, none)) for none in random if none is not None)
         lines = likelier(fold.base, beside, evidence, less, bodies) if isinstance(fold.take, Take) and tells(h, effect) else 0.0
         return Gain(effect, fold.least - after, fold.before - after, chance, lines)
 
@@ -238,6 +238,11 @@ def _tried(kind: type[Effect], whole: Effect, h: Hypothesis, bodies: tuple[Struc
     lines = _mean([g.lines for g in found]) / (1 - KEPT)  # each line is left out in so many of the folds
     level = np.array([f.take.body.impulse_n_s[f.take.strike] if isinstance(f.take, Take) else np.nan for f in folds])
     return Candidate(kind.id, whole, added, drop, whole_db, null_db, jackknife([g.effect.parameters() for g in found if g.effect is not None]), lines, level)
+
+
+def _after(fold: Fold, h: Hypothesis) -> float:
+    """The distance to a fold's take; what noise alone makes where neither that nor what is played stands above it any more."""
+    return next((d for d in (fold.take.distance(h), fold.take.least(fold.base)) if np.isfinite(d)), fold.before)
 
 
 def _beside(fold: Fold, effect: Effect) -> Hypothesis:

@@ -15,10 +15,12 @@ from test_found_again import BAND, fitted
 
 from sonic_bullet.diagnosis.baseline import _soft, takes_of
 from sonic_bullet.diagnosis.chains import LINKS, unchained
+from sonic_bullet.diagnosis.diagnose import _finite
 from sonic_bullet.diagnosis.evidence import evidence_of
 from sonic_bullet.diagnosis.judge import mean_db
+from sonic_bullet.diagnosis.play import Hypothesis
 from sonic_bullet.diagnosis.refit import refitted
-from sonic_bullet.diagnosis.trial import LEAST_DB, Candidate, earns, needed, trials
+from sonic_bullet.diagnosis.trial import LEAST_DB, Candidate, Fold, _after, earns, needed, trials
 from sonic_bullet.effects.amplitude_damping import AmplitudeDamping
 from sonic_bullet.effects.amplitude_pitch import AmplitudePitch
 from sonic_bullet.effects.radiation import Radiation
@@ -63,6 +65,26 @@ def test_of_what_lines_are_sure_of_one_loud_strike_will_do() -> None:
     assert not earns(sure, 0.4, first=False)
     assert not earns(sure, 1.2, first=True), "a seventh of the gap"
     assert not earns(replace(sure, drop_db=np.array([-0.9, 0.4, 0.4, 0.4, 0.41])), 1.0, first=True), "one speaks against it"
+
+
+@pytest.mark.parametrize(("least", "after"), [(1.1, 1.1), (np.nan, 4.0)])
+def test_a_strike_that_neither_plays_above_the_noise_is_as_far_off_as_noise_makes(least: float, after: float) -> None:
+    """The baseline played it too loud; with the pulse it is as silent as the recording: no distance, and no NaN in the mean either."""
+
+    @dataclass
+    class Silent:
+        def distance(self, h: Hypothesis) -> float:
+            return np.nan
+
+        def least(self, h: Hypothesis) -> float:
+            return least
+
+    fold = Fold(Silent(), (), Evidence((), 0.0, 0.0, 1.0, (), BAND), fitted(recorded()), 4.0, 4.0)
+    assert _after(fold, fold.base) == after
+
+
+def test_what_is_no_number_is_null_in_json() -> None:
+    assert _finite({"a": [1.0, np.nan, {"b": np.float64(np.inf)}], "c": ("x", 2, None)}) == {"a": [1.0, None, {"b": None}], "c": ["x", 2, None]}
 
 
 def test_one_odd_strike_does_not_outvote_four_that_gain_much() -> None:
