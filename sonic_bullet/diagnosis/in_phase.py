@@ -1,9 +1,9 @@
-"""How much of what is open is in lines that no body of real modes plays: their phases differ from strike to strike.
+"""How much of what is open no body of real modes plays: no sum of lines whose phases are the same at every strike.
 
     A_ks = J_s Φ_k(x_s) |F̂_s| e^{iθ_k − 2πi f_k D_s}, but for its sign:    |Σ_s a²|/Σ_s |a|² = 1,   a = A e^{2πi f D_s}/|A_s|      [real modes: Ewins 2000, ch. 2]
 
 One phase a line and one delay a strike, the middle of its pulse. Whatever a mesh gets wrong, that stays so, wherever and however hard a body is struck once. A level that swings, a part that
-rattles or an echo that moves makes lines of its own, side by side with the modes', that the fit tells and that do not. Nor do pairs too near each other to be told apart, modes that dashpots
+rattles or an echo that moves makes lines of its own, side by side with the modes', that the fit tells and that do not, and a mode that goes with its level is no line at all. Nor do pairs too near each other to be told apart, modes that dashpots
 couple, and what a room rings at: a verdict asks here only before it puts down to a mesh what nothing explains.
 """
 
@@ -46,31 +46,24 @@ def _in_time(a: Array, freq_hz: Array) -> Array:
 
 
 def of_no_body(h: Hypothesis, takes: Sequence[Judged]) -> float:
-    """Of the squared distance between strikes and h, over noise alone, the share that lines which are out of phase say: of all lines played, how much farther off without them.
-
-    0 where all lines together are farther off than h is: they were not told well enough to be asked.
-    """
+    """Of the squared distance between strikes and h, over noise alone, the share that the strikes' own lines leave, those that are in phase: 0 to 1."""
     heard = [take for take in takes if isinstance(take, Take)]
     played = {id(g): _played(g) for g in {id(t.place[0]): t.place[0] for t in heard}.values()}
-    said, gap, better = 0.0, 0.0, 0.0
+    left, gap = 0.0, 0.0
     for take in heard:
         gathered, strike = take.place
-        every, rest = (_off(take, row[strike]) for row in played[id(gathered)])
-        off, least = take.distance(h), take.least(h)
-        if np.isfinite([every, rest, off, least]).all():
-            said, gap, better = said + rest**2 - every**2, gap + off**2 - least**2, better + off**2 - every**2
-    return float(np.clip(said / gap, 0.0, 1.0)) if min(gap, better) > 0 else 0.0
+        mine, off, least = _off(take, played[id(gathered)][strike]), take.distance(h), take.least(h)
+        if np.isfinite([mine, off, least]).all():
+            left, gap = left + max(mine**2 - least**2, 0.0), gap + max(off**2 - least**2, 0.0)
+    return float(min(left / gap, 1.0)) if gap > 0 else 0.0
 
 
-def _played(g: Gathered) -> tuple[Array, Array]:
-    """What all lines of the strikes play (s, n), and what those that are in phase do, told without the others."""
+def _played(g: Gathered) -> Array:
+    """What the lines that are in phase play (s, n), told without the others where there are others."""
     assert g.signals is not None
     odd = out_of_phase(g.lines)
-    every = _sum(g.lines, g.signals.shape[1], g.sr)
-    if not odd.any():
-        return every, every
-    rest = lines_of(g.signals, noise_rms(g.signals, g.sr), g.lines.pole[~odd], g.sr, g.lines.signed)
-    return every, _sum(rest, g.signals.shape[1], g.sr)
+    lines = lines_of(g.signals, noise_rms(g.signals, g.sr), g.lines.pole[~odd], g.sr, g.lines.signed) if odd.any() else g.lines
+    return _sum(lines, g.signals.shape[1], g.sr)
 
 
 def _sum(lines: Lines, count: int, sr: int) -> Array:

@@ -29,7 +29,7 @@ ROUNDS = 4
 SUFFICES_DB = 1.5  # a gap below this is the mesh's and the shapes' own
 EXPLAINED = 0.5  # of the gap; part of it is the mesh's and the shapes' own
 BY_A_ROOM = 0.7  # of the gap: a response has a tap for every sample, so what is a room's it leaves little of
-NO_BODY = 0.3  # of what is open: with more of it said by lines that are out of phase, it is no mesh's
+NO_BODY = 0.5  # of what is open: with more of it left by the strikes' own lines, those that are in phase, it is no mesh's
 WEAK = 0.5  # of the gap: where every suspect leaves more, two are tried at once
 OPEN = 0.3  # of the first gap: with less left, no costly suspect is asked
 

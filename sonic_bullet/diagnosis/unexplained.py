@@ -45,9 +45,9 @@ def remainder(end: Closed, takes: tuple[Take, ...]) -> dict[str, Any]:
         )
     if len(total) > 1:
         words += "; it differs from place to place" if scatter > 0.5 else "; it is alike wherever the body is struck"
-    odd = of_no_body(end.after, takes)
-    if odd > NO_BODY:
-        words += "; much of it is in lines whose phase differs from strike to strike by more than a sign and a delay, which modes of their own do not do"
+    strange = of_no_body(end.after, takes)
+    if strange > NO_BODY:
+        words += "; modes of one frequency, decay and phase each, whatever they are, do not play it: something goes with time or level, or is noise"
     return {
         "left_db": end.after_db - end.floor_db,
         "words": words,
@@ -55,7 +55,7 @@ def remainder(end: Closed, takes: tuple[Take, ...]) -> dict[str, Any]:
         "when": dict(zip(thirds, when, strict=True)),
         "slope_against_impulse": slope,
         "scatter_over_strikes": scatter,
-        "share_out_of_phase": odd,
+        "share_of_no_modes": strange,
     }
 
 

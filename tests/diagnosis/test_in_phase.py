@@ -35,7 +35,7 @@ def test_modes_are_in_phase_and_sidebands_are_not() -> None:
     still, turning = recorded(), swung(0.8)
     assert still.gathered is not None and turning.gathered is not None
     assert not out_of_phase(still.gathered.lines).any()
-    assert of_no_body(fitted(still), takes_of((still,))) == 0
+    assert of_no_body(replace(fitted(still), correction={"plate": np.full(18, 1e-3)}), takes_of((still,))) < 0.05
     assert out_of_phase(turning.gathered.lines).any()
     assert of_no_body(fitted(turning), takes_of((turning,))) > 0.7
 
@@ -84,7 +84,7 @@ def test_a_swing_is_no_meshs_however_wrong_a_mesh_is(monkeypatch: pytest.MonkeyP
     assert end.before_db - end.floor_db > loop.SUFFICES_DB
     assert end.verdict == verdict
     if depth > 0:
-        assert "phase differs from strike to strike" in remainder(end, takes_of((body,)))["words"]
+        assert "do not play it" in remainder(end, takes_of((body,)))["words"]
 
 
 @pytest.mark.parametrize(("left_db", "verdict"), [(5.0, "explained"), (9.0, "unexplained")])
