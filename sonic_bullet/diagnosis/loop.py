@@ -28,7 +28,7 @@ from sonic_bullet.effects.values import Effect
 ROUNDS = 4
 SUFFICES_DB = 1.5  # a gap below this is the mesh's and the shapes' own
 EXPLAINED = 0.5  # of the gap; part of it is the mesh's and the shapes' own
-BY_A_ROOM = 0.7  # of the gap: a response has a tap for every sample, so what is a room's it leaves little of
+BY_A_ROOM = 0.7  # of the gap, by a room alone: a response has a tap for every sample, so what is a room's it leaves little of
 NO_BODY = 0.5  # of what is open: with more of it left by the strikes' own lines, those that are in phase, it is no mesh's
 WEAK = 0.5  # of the gap: where every suspect leaves more, two are tried at once
 OPEN = 0.3  # of the first gap: with less left, no costly suspect is asked
@@ -158,7 +158,7 @@ def _verdict(
     if not added:
         excused = gap < SUFFICES_DB or (gap < of_the_mesh(h, bodies, takes, seed) and of_no_body(h, takes) < NO_BODY)
         return "none" if excused else "unexplained"
-    asked = BY_A_ROOM if any(hasattr(e, "told_by") for e in h.effects) else EXPLAINED
+    asked = BY_A_ROOM if all(hasattr(e, "told_by") for e in h.effects) else EXPLAINED
     enough = left <= max((1 - asked) * gap, SUFFICES_DB) or left <= of_the_mesh(h, bodies, takes, seed)
     return "explained" if enough else "unexplained"
 

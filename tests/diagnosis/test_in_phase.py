@@ -87,10 +87,12 @@ def test_a_swing_is_no_meshs_however_wrong_a_mesh_is(monkeypatch: pytest.MonkeyP
         assert "do not play it" in remainder(end, takes_of((body,)))["words"]
 
 
-@pytest.mark.parametrize(("left_db", "verdict"), [(5.0, "explained"), (9.0, "unexplained")])
-def test_a_room_leaves_little(monkeypatch: pytest.MonkeyPatch, left_db: float, verdict: str) -> None:
-    """Its response takes more than half of a rattle's noise, too."""
+@pytest.mark.parametrize(
+    ("left_db", "others", "verdict"), [(5.0, (), "explained"), (9.0, (), "unexplained"), (9.0, (DampingLaw("constant-loss", 6e-3),), "explained")]
+)
+def test_a_room_alone_leaves_little(monkeypatch: pytest.MonkeyPatch, left_db: float, others: tuple[Effect, ...], verdict: str) -> None:
+    """Its response takes more than half of a rattle's noise, too; what has earned its keep beside it has done so on strikes left out."""
     monkeypatch.setattr(loop, "of_the_mesh", lambda *_: 0.0)
     body = recorded()
-    h = replace(fitted(body), effects=(Room(0.5, 0.4, 1),))
+    h = replace(fitted(body), effects=(Room(0.5, 0.4, 1), *others))
     assert loop._verdict(h, [None], 20.0, left_db + 1.0, 1.0, (body,), takes_of((body,)), 0) == verdict  # type: ignore[list-item]
