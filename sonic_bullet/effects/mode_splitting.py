@@ -23,6 +23,11 @@ REACH = 2e-2  # of a line from its pair's middle
 LOUD, CLEAR = 1e-3, 30.0  # of the strongest line; of a line's own spread
 MOST = 7
 ALIKE = 0.9
+SAME, TURNED, MOSTLY = (
+    1e-4,
+    0.3,
+    0.5,
+)  # relative; sin 2ψ; of the pairs: what the mesh has apart, and nothing has turned, are neighbours by chance that it has too near, or too far
 BESIDE, ALSO, STRIKES = 3, 0.8, 5  # pairs that make it plain that the body is split: how alike others then need to be, every strike as loud, of so many
 
 
@@ -113,6 +118,7 @@ def _pairs(h: Heard, scale: float) -> list[tuple[float, ...]]:
             if alike > ALIKE or also:
                 trials.append((bool(alike > ALIKE), float(alike - off / REACH * (1 - ALIKE)), int(a), int(low), int(high), split, turn))
     found: list[tuple[float, ...]] = []
+    split_off: list[bool] = []
     taken: set[int] = set()
     done: set[int] = set()
     for plain, _, mode, low, high, split, turn in sorted(trials, reverse=True):
@@ -124,7 +130,8 @@ def _pairs(h: Heard, scale: float) -> list[tuple[float, ...]]:
         done.update((mode, mode + 1))
         middle = float((every[low] + every[high]) / 2)
         found.append((middle, split, turn, 2 * middle / float(model_hz[mode] + model_hz[mode + 1])))
-    return sorted(found)
+        split_off.append(bool(model_hz[mode + 1] / model_hz[mode] - 1 < SAME or abs(np.sin(2 * turn)) > TURNED))
+    return sorted(found) if split_off and np.mean(split_off) >= MOSTLY else []
 
 
 def _again(h: Heard, known: ModeSplitting) -> list[tuple[float, ...]]:

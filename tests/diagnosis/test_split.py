@@ -141,3 +141,21 @@ def test_beside_three_plain_pairs_another_may_be_less_so(plain: int) -> None:
     assert found is not None
     assert len(found.freq_hz) == (plain + 1 if plain == 3 else plain)
     assert (np.abs(np.array(found.freq_hz) / less - 1) < 5e-3).any() == (plain == 3)
+
+
+def test_neighbours_by_chance_that_the_mesh_has_too_near_are_no_split_pair() -> None:
+    """Two modes 0.4 % apart in the mesh and 0.9 % in truth swing about the mesh's own axes; turned, or twins of the mesh, they are a pair."""
+    model = plate()
+    freq = model.freq_hz.copy()
+    for a, b in PAIRS:
+        freq[b] = 1.004 * freq[a]
+    mesh = replace(model, freq_hz=freq)
+    middle = tuple(float((freq[a] + freq[b]) / 2) for a, b in PAIRS)
+
+    def found(turn: float) -> ModeSplitting | None:
+        body = recorded(ModeSplitting(middle, (0.009, 0.009), (turn, turn)), model=mesh, seconds=1.0)
+        return ModeSplitting.propose(evidence_of(replace(truth(), correction={"plate": np.zeros(model.mode_count)}), (body,), BAND))
+
+    assert found(0.0) is None
+    turned = found(0.6)
+    assert turned is not None and turned.turn_rad == pytest.approx((0.6, 0.6), abs=0.05)
