@@ -23,11 +23,8 @@ REACH = 2e-2  # of a line from its pair's middle
 LOUD, CLEAR = 1e-3, 30.0  # of the strongest line; of a line's own spread
 MOST = 7
 ALIKE = 0.9
-SAME, TURNED, MOSTLY = (
-    1e-4,
-    0.3,
-    0.5,
-)  # relative; sin 2ψ; of the pairs: what the mesh has apart, and nothing has turned, are neighbours by chance that it has too near, or too far
+SAME, TURNED = 1e-4, 0.3  # relative; sin 2ψ: what the mesh has apart, and nothing has turned, are neighbours by chance, which it has too near or too far
+MOSTLY = 0.5  # of the pairs must be more than that
 BESIDE, ALSO, STRIKES = 3, 0.8, 5  # pairs that make it plain that the body is split: how alike others then need to be, every strike as loud, of so many
 
 
@@ -114,9 +111,11 @@ def _pairs(h: Heard, scale: float) -> list[tuple[float, ...]]:
                 continue
             turn, alike = _turn(strike[:, [a, a + 1]], sensor[[a, a + 1]], amplitude[:, [low, high]], h.signed)
             off = abs((every[low] + every[high]) / (2 * middle) - 1)
-            also = len(strike) >= STRIKES and min(alike, _turn(even[:, [a, a + 1]], sensor[[a, a + 1]], evenly[:, [low, high]], h.signed)[1]) > ALSO
-            if alike > ALIKE or also:
-                trials.append((bool(alike > ALIKE), float(alike - off / REACH * (1 - ALIKE)), int(a), int(low), int(high), split, turn))
+            plain = alike > ALIKE
+            if not plain and alike > ALSO and len(strike) >= STRIKES:
+                alike = min(alike, _turn(even[:, [a, a + 1]], sensor[[a, a + 1]], evenly[:, [low, high]], h.signed)[1])
+            if plain or (alike > ALSO and len(strike) >= STRIKES):
+                trials.append((plain, float(alike - off / REACH * (1 - ALIKE)), int(a), int(low), int(high), split, turn))
     found: list[tuple[float, ...]] = []
     split_off: list[bool] = []
     taken: set[int] = set()
