@@ -26,20 +26,25 @@ def of_decays(h: Hypothesis, effect: Effect) -> bool:
     return effect.stage is Stage.MODES and not moves(replace(h, effects=(effect,)))
 
 
+def numbers(effect: Effect) -> int:
+    """How many more a model has with an effect than without: a law in Rayleigh's place takes α and β away."""
+    return effect.freedom() - 2 * (effect.id == "damping-law")
+
+
 def tells(h: Hypothesis, effect: Effect) -> bool:
     """Whether lines are asked instead of strikes: of what changes decays, beside a room."""
     return any(hasattr(e, "dried") for e in h.effects) and of_decays(h, effect)
 
 
-def misfit(h: Hypothesis, evidence: Evidence, bodies: tuple[Struck, ...], numbers: int) -> float:
-    """Twice −ln likelihood of all lines' decays, and ``numbers`` at ln n each [Schwarz 1978]."""
+def misfit(h: Hypothesis, effect: Effect, evidence: Evidence, bodies: tuple[Struck, ...]) -> float:
+    """Twice −ln likelihood of all lines' decays by a model with this effect, and its numbers at ln n each [Schwarz 1978]."""
     total, count = 0.0, 0
     for one in evidence.heard:
         body = next(b for b in bodies if b.gathered is one.source)
         good = _told(one)
         total += float(_cost(modes_of(h, body)[0].decay_per_s, one.mode, one.decay_per_s, one.decay_sd_per_s)[good].sum())
         count += int(good.sum())
-    return total + numbers * float(np.log(max(count, 1)))
+    return total + numbers(effect) * float(np.log(max(count, 1)))
 
 
 def _told(one: Heard) -> Array:

@@ -11,7 +11,7 @@ import numpy as np
 
 from sonic_bullet.diagnosis.bodies import Struck
 from sonic_bullet.diagnosis.by_lines import misfit as decays
-from sonic_bullet.diagnosis.by_lines import of_decays
+from sonic_bullet.diagnosis.by_lines import numbers, of_decays
 from sonic_bullet.diagnosis.exchange import ALIKE
 from sonic_bullet.diagnosis.judge import Judged, mean_db
 from sonic_bullet.diagnosis.play import Hypothesis, moves
@@ -39,11 +39,6 @@ def by_lines(c: Candidate, bodies: tuple[Struck, ...], takes: Sequence[Judged], 
     return c.lines > LINES and (mean_db(takes, retold(c.hypothesis, bodies)) or 0.0) < told + SAME * max(told - floor, 0.0)
 
 
-def _numbers(c: Candidate) -> int:
-    """How many more a model has with an effect than without: a law in Rayleigh's place takes α and β away."""
-    return c.effect.freedom() - 2 * (c.id == "damping-law")
-
-
 def simplest(able: Sequence[Candidate], bodies: tuple[Struck, ...], evidence: Evidence) -> Candidate:
     """The best, or the one with the fewest numbers of those that strikes cannot tell from it: SURE standard errors of the difference, ALIKE of what it says.
 
@@ -59,11 +54,11 @@ def simplest(able: Sequence[Candidate], bodies: tuple[Struck, ...], evidence: Ev
         return bool(more.mean() <= SURE * more.std(ddof=1) / np.sqrt(len(more)) and more.mean() < share * best.mean_db)
 
     rivals = [c for c in able if not moves(c.hypothesis)]
-    first = min((c for c in rivals if close(c, ALIKE)), key=lambda c: (_numbers(c), -c.mean_db))
+    first = min((c for c in rivals if close(c, ALIKE)), key=lambda c: (numbers(c.effect), -c.mean_db))
     if of_decays(first.hypothesis, first.effect):
         alike = [c for c in rivals if of_decays(c.hypothesis, c.effect) and (best.drop_db - c.drop_db).mean() < NEARLY * best.mean_db]
-        first = min(alike, key=lambda c: decays(c.hypothesis, evidence, bodies, _numbers(c)))
-    others = [c for c in rivals if c is not first and _numbers(c) <= _numbers(first) and (best.drop_db - c.drop_db).mean() < NEARLY * best.mean_db]
+        first = min(alike, key=lambda c: decays(c.hypothesis, c.effect, evidence, bodies))
+    others = [c for c in rivals if c is not first and numbers(c.effect) <= numbers(first.effect) and (best.drop_db - c.drop_db).mean() < NEARLY * best.mean_db]
     if not others:
         return first
     own = misfit(first.hypothesis, bodies)  # the less strikes say, the less phases need to

@@ -15,12 +15,13 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet.diagnosis.bodies import Struck
+from sonic_bullet.diagnosis.by_lines import misfit, of_decays
 from sonic_bullet.diagnosis.evidence import evidence_of, thinned
 from sonic_bullet.diagnosis.judge import Take, mean_db
 from sonic_bullet.diagnosis.play import Hypothesis
 from sonic_bullet.diagnosis.refit import refitted, with_effects
 from sonic_bullet.diagnosis.trial import MANY, SURE, Candidate
-from sonic_bullet.effects.values import Evidence
+from sonic_bullet.effects.values import Effect, Evidence
 from sonic_bullet.records import Array
 from sonic_bullet.side_by_side import side_by_side
 
@@ -122,10 +123,19 @@ def exchanged(
             other = settled(other, bodies, takes, band_hz)
             far = left_out_db(best, place, bodies, takes, band_hz) if far is None else far
             now = left_out_db(other, place, bodies, takes, band_hz)
-            if surely(far - now, ALIKE * rival.mean_db):
+            if surely(far - now, ALIKE * rival.mean_db) and not decays_against(other.effects[place], best, other, place, bodies, band_hz):
                 best, far, names = other, now, names - {own.id} | {rival.id}
                 added = [*added[:i], rival, *added[i + 1 :]]
     return best, [replace(c, effect=next(e for e in best.effects if e.id == c.id)) for c in added]
+
+
+def decays_against(rival: Effect, best: Hypothesis, other: Hypothesis, i: int, bodies: tuple[Struck, ...], band_hz: tuple[float, float]) -> bool:
+    """Whether, of two that change nothing but decays, the lines' own decays speak for the one that is there: strikes hardly tell such two."""
+    own = best.effects[i]
+    if not (of_decays(best, own) and of_decays(other, rival)):
+        return False
+    told = evidence_of(best, bodies, band_hz)
+    return misfit(other, rival, told, bodies) > misfit(best, own, told, bodies)
 
 
 def surely(gain_db: Array, least_db: float) -> bool:

@@ -27,7 +27,7 @@ BETTER, HALF = 6.0, 0.5  # in BIC, for another dashpot; of what one costs: one t
 
 def sought(t: Trial) -> Dashpots:
     """The dashpots that earn their place, one after another; the least Bayes information criterion says how many, with BETTER for each on top."""
-    data = 2 * len(t.freq_hz)  # a decay and a pattern each
+    data = 3 * len(t.freq_hz)  # a decay, a pattern and a level each
     apiece = 3 * np.log(data) + BETTER
     least = float(t.worth.sum())  # what is left within the spreads asks for nothing
 

@@ -1,13 +1,15 @@
 """Dashpots on trial: how far the lines are from the modes that they would make.
 
     price_kj = (Δln f/w)²/18 + (Δln d/e)²/18 + 1 − c_kj, at most 1;   Σ worth_k (price − 1) -> min over one-to-one pairs       [Kuhn 1955; Crouse 2016]
-    d_k = Δ_k(dashpots) + law(ω_k),  law = ½(a + bω + cω²) or as it is, a, b, c >= 0, refitted beside every trial by Huber's loss
-    left = Σ_k worth_k [ρ((d_k − Δ_k − law)/√(sd_k² + (SCATTER Δ_k)² + (LAW d_k)²)) + (1 − C_k²)/ROUGH²], each bounded, ρ Cauchy's;
+    d_k = Δ_k(dashpots) + law(ω_k),  law = ½[a + bω + cω² + Σ_j e_j (ωτ_j)²/(1 + (ωτ_j)²)] or as it is, a, b, c, e >= 0, refitted beside every trial
+        by Huber's loss: what a passive solid of whatever discrete spectrum of relaxations loses [Nowick & Berry 1972, ch. 3]
+    left = Σ_k worth_k [ρ((d_k − Δ_k − law)/√(sd_k² + (SCATTER Δ_k)² + (LAW d_k)²)) + (1 − C_k²)/ROUGH² + (l_k/LEVEL)²], each bounded, ρ Cauchy's;
         lines that no mode explains count as outliers, and so do modes that would be heard and that no line shows
 
 c_kj: cosine of a line's amplitudes over the strikes with what one exponential at the mode's pole would take of all modes,
 Σ_i a_i 2d_j/((d_i + d_j) − i(ω_i − ω_j)), or with the mode's own. C_k: with what exponentials at the lines' poles take of all modes together
-(variable projection's linear half [Golub & Pereyra 1973]): modes that sound as one line are one, those that a dashpot has told apart are not.
+(variable projection's linear half [Golub & Pereyra 1973]): modes that sound as one line are one, those that a dashpot has told apart are not. l_k: ln of a
+line's level over that, less what is common to all: of twins that a dashpot has turned, which one the sensor hears, all strikes show alike, so C_k does not.
 """
 
 from __future__ import annotations
@@ -22,13 +24,16 @@ from sonic_bullet.effects.points import solved, vertex_normals
 from sonic_bullet.effects.values import Heard
 from sonic_bullet.records import Array, ModalModel
 
-SCATTER, LAW, ROUGH = 0.05, 0.005, 0.15  # of what dashpots add to a decay, of the decay, and of a pattern, relative: shapes err, and laws
+SCATTER, LAW, ROUGH = 0.05, 0.02, 0.15  # of what dashpots add to a decay, of the decay, and of a pattern, relative: shapes err, and laws
 WIDTH, DECADE = 0.004, 0.4  # of ln f and ln d, of a pair
+LEVEL = 0.3  # of ln of a line's level
 MISSED = 9.0  # squared spreads from where on a decay's misfit costs less, and that a pattern costs which nothing explains
 GROSS = 4 * MISSED  # that a decay costs at most: a few spreads may be a shape's error, half or twice is none
+LOST = 2 * GROSS + MISSED  # that a line costs at most
 WEAK, HALF = 0.05, 0.5  # of the worth of a line that the model does not expect: it may be a click or another body's; near a mode, its twin
 CLEAR, LONGER = 0.25, 2.0  # quantile of the energy of modes that are heard, for one that would be; times a line's decay, for one that it hides
 LOW = 0.3  # of a line's spread where it lies under the least law
+TAU_S = (1e-5, 3e-5, 1e-4)  # of relaxations between those that only show as ω (slow ones of all kinds) or as ω² (fast ones)
 RUN, WIDE = 10, 20  # modes whose coupling is reckoned with in a first look, and in a closer one: what eigenvalues cost goes with the cube
 
 
@@ -49,7 +54,7 @@ class Trial:
     """An object's lines (k,) and modes (m,). size (s, k) complex, worth (k,); into (s, m): J φ(p)·e of the strikes; out (m,): φ(q)·n of the sensor.
 
     heard_hz, rings_per_s (l,): of every line, those too that are not held against modes; through (m,): what pulse and path leave of a mode, relative.
-    normal (v, 3) of all vertices, body: those of the surface. runs, wide: neighbours that may couple, RUN and WIDE; least (3,): the law that most lines lie above.
+    normal (v, 3) of all vertices, body: those of the surface. runs, wide: neighbours that may couple, RUN and WIDE; least (c,): the law that most lines lie above.
     """
 
     freq_hz: Array
@@ -167,7 +172,7 @@ class Trial:
 
     def _by_law(self, law: Array, omega: Array, extra: Array, column: Array, push: Array, turns: int) -> float:
         """What is left where lines and modes are first paired by a law (m,), then by the law that the pairs ask for."""
-        nothing = (GROSS + MISSED) * float(self.worth.sum())
+        nothing = LOST * float(self.worth.sum())
         for _ in range(turns):
             alike = self._alike(omega, extra + law, push)
             line, mode, _ = self._pairs(omega, extra + law, alike)
@@ -177,21 +182,27 @@ class Trial:
             law = column @ solved(self.decay_per_s[line] - extra[mode], sd / np.sqrt(worth), column[mode])[0]
         off = np.abs(self.decay_per_s[line] - (extra + law)[mode]) / sd
         decays = np.minimum(MISSED * np.log1p(off**2 / MISSED), GROSS)
-        told = self._told(line, omega[mode], omega, extra + law, push)
-        patterns = np.minimum((1 - _cosine(self._seen(self.size), self._seen(told))[line] ** 2) / ROUGH**2, MISSED)
-        return nothing + float((worth * (decays + patterns - GROSS - MISSED)).sum()) + self._unheard(mode, omega, extra + law, push)
+        heard, told = self._seen(self.size), self._seen(self._told(line, omega[mode], omega, extra + law, push))
+        patterns = np.minimum((1 - _cosine(heard, told)[line] ** 2) / ROUGH**2, MISSED)
+        level = _level(heard[:, line], told[:, line] * self._through(self.freq_hz[line])) / LEVEL
+        levels = np.minimum(MISSED * np.log1p(level**2 / MISSED), GROSS)
+        return nothing + float((worth * (decays + patterns + levels - LOST)).sum()) + self._unheard(mode, omega, extra + law, push)
+
+    def _through(self, freq_hz: Array) -> Array:
+        """What pulse and path leave (k,), relative."""
+        return np.interp(freq_hz, self.model.freq_hz, self.through)
 
     def _unheard(self, mode: Array, omega: Array, decay: Array, push: Array) -> float:
         """What modes (m,) cost that would be heard and are not: of a line's strength there, and no line near that rings as long. mode (p,): those that lines stand for."""
         freq = omega / (2 * np.pi)
-        level = np.abs(push).max(axis=0) * np.interp(freq, self.model.freq_hz, self.through)
+        level = np.abs(push).max(axis=0) * self._through(freq)
         told = np.bincount(mode, minlength=len(omega)) > 0
         energy = level**2 / np.maximum(decay, 1e-3)
         loud = ~told & (energy > np.quantile(energy[told], CLEAR)) & (freq > freq[told].min()) & (freq < freq[told].max())
         near = np.abs(np.log(self.heard_hz[:, None] / freq[loud])) < 2 * WIDTH
         hidden = (near & ~(self.rings_per_s[:, None] > LONGER * decay[loud])).any(axis=0)  # a line of unknown decay may be any
         worth = np.clip(1 + 0.25 * np.log10(np.maximum(level[loud] / max(level[told].max(), 1e-300), 1e-6)), 0.1, 1)
-        return float((GROSS + MISSED) * worth[~hidden].sum())
+        return float(LOST * worth[~hidden].sum())
 
     def _told(self, line: Array, at: Array, omega: Array, decay: Array, push: Array) -> Array:
         """Amplitudes (s, k) that exponentials at the lines' poles take of all modes together: Σ_l <e_k, e_l> A_l = Σ_i <e_k, e_i> a_i.
@@ -244,15 +255,24 @@ def _cosine(a: Array, b: Array, *, every: bool = False) -> Array:
     return np.asarray(np.abs(one.conj().T @ two) if every else np.abs((one.conj() * two).sum(axis=0)))
 
 
+def _level(heard: Array, told: Array) -> Array:
+    """ln of the level (k,) of columns (s, k) over that of others, less their median; 0 where there is nothing to tell."""
+    if not (np.isfinite(heard).all() and np.isfinite(told).all() and told.any()):
+        return np.zeros(heard.shape[1])
+    ratio = np.log(np.maximum(np.linalg.norm(heard, axis=0), 1e-300)) - np.log(np.maximum(np.linalg.norm(told, axis=0), 1e-300))
+    return np.asarray(ratio - np.median(ratio))
+
+
 def _smooth(omega: Array) -> Array:
-    """Columns (k, 3) of a smooth law of ω (k,)."""
-    return 0.5 * np.stack([np.ones(len(omega)), omega / 1e4, (omega / 1e4) ** 2], axis=1)
+    """Columns (k, 3 + τ) of a smooth law of ω (k,)."""
+    peak = [(omega * tau) ** 2 / (1 + (omega * tau) ** 2) for tau in TAU_S]
+    return 0.5 * np.stack([np.ones(len(omega)), omega / 1e4, (omega / 1e4) ** 2, *peak], axis=1)
 
 
 def _least_law(omega: Array, decay: Array) -> Array:
-    """The smooth law (3,) that most lines (k,) lie above: a dashpot only adds. An expectile [Newey & Powell 1987]."""
+    """The smooth law (c,) that most lines (k,) lie above: a dashpot only adds. An expectile [Newey & Powell 1987]."""
     column, above = _smooth(omega), np.ones(len(omega), bool)
-    value = np.zeros(3)
+    value = np.zeros(column.shape[1])
     for _ in range(10):
         value, _ = solved(decay, np.where(above, 1.0, LOW) * decay, column)
         above = decay > column @ value

@@ -9,11 +9,12 @@ import pytest
 from made_body import SR, recorded, truth
 
 from sonic_bullet.diagnosis.evidence import evidence_of, thinned
-from sonic_bullet.diagnosis.exchange import exchanged, surely, together
+from sonic_bullet.diagnosis.exchange import decays_against, exchanged, surely, together
 from sonic_bullet.diagnosis.judge import Take, mean_db
 from sonic_bullet.diagnosis.refit import refitted
 from sonic_bullet.diagnosis.trial import Candidate
 from sonic_bullet.effects.contact_time import ContactTime
+from sonic_bullet.effects.damping_law import DampingLaw
 from sonic_bullet.effects.measurement_chain import MeasurementChain
 from sonic_bullet.effects.radiation import Radiation
 from sonic_bullet.estimator.distance import floor_between
@@ -72,3 +73,13 @@ def test_strikes_must_agree_before_a_name_is_changed() -> None:
     assert not surely(np.array([0.4, -0.9, 0.4, 2.5, 0.4]), 0.1)
     assert not surely(np.array([0.05, 0.04, 0.05, 0.06, 0.05]), 0.1)  # too alike
     assert not surely(np.array([2.0]), 0.1)
+
+
+def test_strikes_alone_do_not_put_one_decay_for_another() -> None:
+    """A law and a radiation fitted in its place: the decays of lines know which, and are not asked of what says more than decays."""
+    law = DampingLaw("relaxation", 5e-3, strength=0.03, tau_s=8e-5)
+    body = recorded(law)
+    right, wrong = truth(law), refitted(truth(Radiation(0.05, 3.0)), (body,))
+    assert decays_against(wrong.effects[0], right, wrong, 0, (body,), BAND)
+    assert not decays_against(right.effects[0], wrong, right, 0, (body,), BAND)
+    assert not decays_against(PULSE, right, truth(PULSE), 0, (body,), BAND)
