@@ -22,7 +22,7 @@ from sonic_bullet.diagnosis.meshed import beyond, of_the_mesh
 from sonic_bullet.diagnosis.play import Hypothesis
 from sonic_bullet.diagnosis.refit import refitted, retold
 from sonic_bullet.diagnosis.trial import FAINT_DB, LEAST_DB, Candidate, earns, trials
-from sonic_bullet.diagnosis.twos import in_twos
+from sonic_bullet.diagnosis.twos import in_a_room, in_twos
 from sonic_bullet.effects.values import Effect
 
 ROUNDS = 4
@@ -132,6 +132,11 @@ def _one_by_one(
                 continue
         able = [c for c in found if earns(c, gap, first=not added) and helps(c, bodies, takes, now, told, floor, first=not added)]
         able = able or sorted((c for c in found if by_lines(c, bodies, takes, told, floor)), key=lambda c: -c.lines)[:1]
+        if not able and len(added) == 1 and (two := in_a_room(h, found, bodies, takes, band_hz, seed=seed, say=say)):
+            (h, added), passed = two, [(), ()]
+            last |= {c.id: c for c in added}
+            now, floor = mean_db(takes, h) or 0.0, least_db(takes, h) or floor
+            continue
         if not able:
             break
         best = simplest(able, bodies, evidence)

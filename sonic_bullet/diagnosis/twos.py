@@ -21,7 +21,7 @@ from sonic_bullet.diagnosis.evidence import evidence_of
 from sonic_bullet.diagnosis.exchange import again
 from sonic_bullet.diagnosis.judge import Judged, Take, least_db, mean_db
 from sonic_bullet.diagnosis.play import Hypothesis, moves
-from sonic_bullet.diagnosis.refit import refitted, with_effects
+from sonic_bullet.diagnosis.refit import refitted, retold, with_effects
 from sonic_bullet.diagnosis.ties import misfit
 from sonic_bullet.diagnosis.trial import Candidate, earns, trials
 from sonic_bullet.side_by_side import side_by_side
@@ -71,6 +71,48 @@ def in_twos(
     h = _likeliest(pairs, floor + gap, bodies)
     closer = again(again(h, 0, bodies, band_hz, afresh=True), 1, bodies, band_hz)  # what was found alone had the other's share to explain, too
     h = closer if (mean_db(takes, closer) or np.inf) < (mean_db(takes, h) or np.inf) else h
+    return _stood(h, bodies, takes, band_hz, seed=seed, say=say)
+
+
+def in_a_room(
+    h: Hypothesis,
+    found: Sequence[Candidate],
+    bodies: tuple[Struck, ...],
+    takes: Sequence[Judged],
+    band_hz: tuple[float, float],
+    *,
+    seed: int,
+    say: Callable[[str], None],
+) -> tuple[Hypothesis, list[Candidate]] | None:
+    """A room that has been found alone, heard anew beside one of the suspects (found) that move modes; None where no two say nearly all.
+
+    Outside the room lines lie where they lie, and tell of masses and tensors. But a response told from modes that lie elsewhere plays what these lack, so that every
+    other set of modes sounds worse with it: the suspect is tried with a response of its own.
+    """
+    rooms = [e for e in h.effects if hasattr(e, "told_by")]
+    movers = [c for c in found if _movers(replace(h, effects=(c.effect,)))]
+    if len(rooms) != 1 or len(h.effects) != 1 or not movers or not all(isinstance(t, Take) for t in takes):
+        return None
+    say("hearing the room anew beside what moves modes")
+    pairs = []
+    for c in movers:
+        alone = refitted(with_effects(h, (c.effect,), bodies), bodies)
+        told = evidence_of(alone, bodies, band_hz, seed=seed)
+        room = type(rooms[0]).propose(told)
+        if room is not None:
+            two = retold(refitted(replace(alone, effects=(c.effect, room)), bodies, told.heard), bodies)
+            pairs.append(Two(two, mean_db(takes, two) or np.inf))
+    floor, left = least_db(takes, h) or 0.0, mean_db(takes, retold(h, bodies)) or 0.0
+    best = min(pairs, key=lambda two: two.db, default=None)
+    if best is None or best.db - floor > LEFT * (left - floor):
+        return None
+    return _stood(best.h, bodies, takes, band_hz, seed=seed, say=say)
+
+
+def _stood(
+    h: Hypothesis, bodies: tuple[Struck, ...], takes: Sequence[Judged], band_hz: tuple[float, float], *, seed: int, say: Callable[[str], None]
+) -> tuple[Hypothesis, list[Candidate]] | None:
+    """The two, if each earns its keep beside the other."""
     added: list[Candidate] = []
     for effect in h.effects[::-1]:
         rest = refitted(with_effects(h, tuple(e for e in h.effects if e is not effect), bodies), bodies)

@@ -20,6 +20,7 @@ from sonic_bullet.records import ORTHOTROPIC, Array, Material
 
 BETTER = 10.0  # in BIC, than isotropy
 NEARER = 0.7  # of isotropy's rms of ln f, lines beyond the cap counted at the cap
+IN_A_ROOM = 30.0  # in BIC, than isotropy, in its place: half the lines of a room are no modes, and beyond the cap whatever the tensor
 SUFFICES = 5e-3  # rms of ln f from the nearest isotropic mode that leaves nothing to look for: split pairs, corrected meshes
 LEAST = 0.03  # of ln E_i/E_j or ln of Zener's ratio: less is the mesh's
 
@@ -84,7 +85,8 @@ class Orthotropy:
         if found is None:
             return None
         plain, best = found
-        if best.bic > plain.bic - BETTER or best.off > NEARER * plain.off or departure(best) < LEAST:
+        dry = any(h.dry for h in evidence.heard)
+        if best.bic > plain.bic - (IN_A_ROOM if dry else BETTER) or (best.off > NEARER * plain.off and not dry) or departure(best) < LEAST:
             return None
         return cls.of(best, told[0].elastic.material.density_kg_m3)
 
