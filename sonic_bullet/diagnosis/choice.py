@@ -46,7 +46,7 @@ def simplest(able: Sequence[Candidate], bodies: tuple[Struck, ...], evidence: Ev
     Of two that only change decays the lines' own decays tell, by BIC. Effects that move modes stand aside: corrections are learnt anew beside them, and are numbers too.
     """
     best = able[0]
-    if moves(best.hypothesis):
+    if moves(best.hypothesis) or len(able) == 1:  # by lines alone one may be named that strikes speak against
         return best
 
     def close(c: Candidate, share: float) -> bool:

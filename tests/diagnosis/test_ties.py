@@ -69,6 +69,12 @@ def test_of_two_that_only_change_decays_the_decays_tell(effect: Effect) -> None:
     assert simplest(sorted(both, key=lambda c: -c.mean_db), (body,), evidence).id == effect.id
 
 
+def test_what_lines_alone_have_named_needs_no_strike_to_speak_for_it() -> None:
+    """Beside a room: none of the strikes gains by the law, and it is the only one to choose from."""
+    one = replace(told_by(LOW)[1], drop_db=np.array([-0.2, -0.1, 0.0, -0.3, -0.1]), lines=30.0)
+    assert simplest([one], (recorded(LOW),), evidence_of(truth(), (recorded(LOW),), BAND)) is one
+
+
 @pytest.mark.parametrize("exponent", [-0.2, 0.0])
 def test_whether_a_pulse_goes_with_the_blow_is_told_by_its_middle(exponent: float) -> None:
     """Of a pulse so short that hardly anything rolls off: longer for a soft blow, or not; and files may begin a little late, all alike."""

@@ -13,16 +13,20 @@ from sonic_bullet.diagnosis.judge import Take
 from sonic_bullet.diagnosis.play import Hypothesis
 from sonic_bullet.diagnosis.refit import refitted
 from sonic_bullet.diagnosis.trial import Candidate
-from sonic_bullet.diagnosis.twos import in_twos
+from sonic_bullet.diagnosis.twos import in_a_room, in_twos
 from sonic_bullet.effects import Effect
+from sonic_bullet.effects.added_mass import AddedMass
 from sonic_bullet.effects.contact_time import ContactTime
 from sonic_bullet.effects.damping_law import DampingLaw
 from sonic_bullet.effects.measurement_chain import MeasurementChain
+from sonic_bullet.effects.room import Room
 from sonic_bullet.estimator.distance import floor_between
 
 BAND = (50.0, 7_500.0)
 PULSE = ContactTime(3e-4, 0.016, -0.2)
 LAW = DampingLaw("power", 0.02, exponent=0.3)
+ROOM = Room(1.2, 0.8, seed=4)
+MASS = AddedMass((0.0477, 0.0371, 0.0), 0.06)
 
 
 def tried(*effects: Effect, kinds: tuple[type[Effect], ...]) -> tuple[list[Candidate], tuple[Hypothesis, list[Candidate]] | None]:
@@ -64,3 +68,37 @@ def test_one_suspect_alone_makes_no_two() -> None:
     first, two = tried(PULSE, kinds=(ContactTime,))
     assert len(first) == 1
     assert two is None
+
+
+def heard_anew(planted: tuple[Effect, ...], suspect: Effect) -> tuple[Hypothesis, list[Candidate]] | None:
+    """What a room's own trial beside a suspect that moves modes comes to, where the room was found first, alone."""
+    body = recorded(*planted)
+    assert body.gathered is not None and body.gathered.signals is not None
+    floor = floor_between(list(body.gathered.signals))
+    takes = [Take(body, i, x, SR, floor) for i, x in zip(body.fitted, body.gathered.signals, strict=True)]
+    start = refitted(truth(), (body,))
+    told = evidence_of(start, (body,), BAND)
+    room = Room.propose(told)
+    assert room is not None
+    h = refitted(replace(start, effects=(room,)), (body,), told.heard)
+    found = [Candidate(suspect.id, suspect, h, np.zeros(len(takes)), 0.0, 0.0, {})]
+    return in_a_room(h, found, (body,), takes, BAND, seed=0, say=lambda _: None)
+
+
+def test_a_mass_in_a_room_is_heard_with_a_response_of_its_own() -> None:
+    """The room found alone plays what the wrong modes lack: with that response the mass made everything worse."""
+    two = heard_anew((MASS, ROOM), MASS)
+    assert two is not None
+    h, added = two
+    assert {c.id for c in added} == {"added-mass", "room"} == {e.id for e in h.effects}
+    assert all(c.mean_db > 1.0 for c in added)
+    found = next(e for e in h.effects if isinstance(e, AddedMass))
+    assert found.mass_kg == pytest.approx(MASS.mass_kg, rel=0.3)
+
+
+def test_a_room_alone_needs_no_mass() -> None:
+    assert heard_anew((ROOM,), MASS) is None
+
+
+def test_what_moves_no_modes_is_not_tried_so() -> None:
+    assert heard_anew((PULSE, ROOM), PULSE) is None
