@@ -9,6 +9,7 @@ import pytest
 from made_body import recorded, truth
 
 from sonic_bullet.diagnosis.evidence import evidence_of, thinned
+from sonic_bullet.effects import orthotropy
 from sonic_bullet.effects.contact_time import ContactTime
 from sonic_bullet.effects.damping_law import DampingLaw
 from sonic_bullet.effects.elasticities import Tensor, Told, _judged, isotropic_p, ringing, told_of
@@ -114,3 +115,22 @@ def test_a_part_of_the_lines_fits_the_same_law_again() -> None:
         again = DampingLaw.propose(replace(thinned(told, (told.heard[0].source, seed), 0.4, np.random.default_rng(seed)), known=law))
         assert again is not None and again.law == "power"
         assert again.exponent == pytest.approx(1.4, abs=0.15)
+
+
+@pytest.mark.parametrize(("gain", "matched", "off", "dry", "named"), [
+    (150.0, 0.51, 0.0079, True, True),  # a slab in a room: half of its lines are no modes, whatever the tensor
+    (150.0, 0.51, 0.0079, False, False),  # outside a room lines that stay off are another effect's
+    (64.0, 0.32, 0.0097, True, False),  # few lines' patterns alone, where a pulse has left three of nineteen modes
+    (20.0, 0.51, 0.0079, True, False),
+    (150.0, 0.95, 0.0010, False, True),
+])  # fmt: skip
+def test_in_a_room_a_tensor_must_place_more_lines_and_need_not_place_all(
+    gain: float, matched: float, off: float, dry: bool, named: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    hz = [410.0, 700.0, 1110.0, 1630.0, 2410.0, 3050.0, 4100.0]
+    one = replace(heard(hz, [30.0] * len(hz), np.ones((5, len(hz)), complex)), dry=dry)
+    plain = Tensor("isotropic", isotropic_p(elastic(np.array(hz), np.ones((5, len(hz))))), -600.0, 0.004, 0.27, (), 0.0105)
+    stiff = plain.p + np.array([0.5, -0.5, 0, 0, 0, 0, 0, 0, 0])
+    monkeypatch.setattr(orthotropy, "search", lambda _: (plain, Tensor("orthorhombic", stiff, -600.0 - gain, 0.003, matched, (), off)))
+    monkeypatch.setattr(orthotropy, "_fits", lambda _: False)
+    assert (orthotropy.Orthotropy.propose(replace(evidence_of(truth(), (), BAND), heard=(one,))) is not None) == named
