@@ -6,6 +6,7 @@ able -> on all strikes together it helps, too -> the best, or the simplest of th
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -46,24 +47,29 @@ def simplest(able: Sequence[Candidate], bodies: tuple[Struck, ...], evidence: Ev
     Of two that only change decays the lines' own decays tell, by BIC. Effects that move modes stand aside: corrections are learnt anew beside them, and are numbers too.
     """
     best = able[0]
-    if moves(best.hypothesis) or len(able) == 1:  # by lines alone one may be named that strikes speak against
+    if _moves_itself(best) or len(able) == 1:  # by lines alone one may be named that strikes speak against
         return best
 
     def close(c: Candidate, share: float) -> bool:
         more = best.drop_db - c.drop_db
         return bool(more.mean() <= SURE * more.std(ddof=1) / np.sqrt(len(more)) and more.mean() < share * best.mean_db)
 
-    rivals = [c for c in able if not moves(c.hypothesis)]
+    rivals = [c for c in able if not _moves_itself(c)]
     first = min((c for c in rivals if close(c, ALIKE)), key=lambda c: (numbers(c.effect), -c.mean_db))
     if of_decays(first.hypothesis, first.effect):
         alike = [c for c in rivals if of_decays(c.hypothesis, c.effect) and (best.drop_db - c.drop_db).mean() < NEARLY * best.mean_db]
         first = min(alike, key=lambda c: decays(c.hypothesis, c.effect, evidence, bodies))
     others = [c for c in rivals if c is not first and numbers(c.effect) <= numbers(first.effect) and (best.drop_db - c.drop_db).mean() < NEARLY * best.mean_db]
-    if not others:
-        return first
+    if not others or moves(best.hypothesis):
+        return first  # phases are held against lines as they were fitted
     own = misfit(first.hypothesis, bodies)  # the less strikes say, the less phases need to
     off = np.array([misfit(c.hypothesis, bodies) + (HINT if close(c, ALIKE) else CLEAR) for c in others])
     return others[int(off.argmin())] if np.isfinite(own) and off.min() < own else first
+
+
+def _moves_itself(c: Candidate) -> bool:
+    """Whether it moves modes, whatever has been found before it does."""
+    return moves(replace(c.hypothesis, effects=(c.effect,)))
 
 
 def pruned(h: Hypothesis, added: list[Candidate], bodies: tuple[Struck, ...], takes: Sequence[Judged], gap_db: float) -> tuple[Hypothesis, list[Candidate]]:

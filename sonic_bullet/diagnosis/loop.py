@@ -1,7 +1,7 @@
 """The loop: try all suspects, add the best that earns its keep, look again; fit them to each other; then say what is known and what is not.
 
     one by one -> fitted to each other, exchanged, pruned -> verdict
-    two at once (twos.py) where every one leaves most of the gap open, or all of them did at the end
+    two at once (twos.py) where every one leaves most of the gap open, or all of them did at the end; a room heard anew beside what moves modes
 
 gap = before − floor on left-out strikes; which effect earns its keep is said in trial.py
 """
@@ -21,7 +21,7 @@ from sonic_bullet.diagnosis.judge import Judged, least_db, mean_db
 from sonic_bullet.diagnosis.meshed import beyond, of_the_mesh
 from sonic_bullet.diagnosis.play import Hypothesis
 from sonic_bullet.diagnosis.refit import refitted, retold
-from sonic_bullet.diagnosis.trial import FAINT_DB, LEAST_DB, Candidate, earns, trials
+from sonic_bullet.diagnosis.trial import FAINT_DB, LEAST_DB, Candidate, earns, needed, trials
 from sonic_bullet.diagnosis.twos import in_a_room, in_twos
 from sonic_bullet.effects.values import Effect
 
@@ -163,7 +163,8 @@ def _verdict(
     if not added:
         excused = gap < SUFFICES_DB or (gap < of_the_mesh(h, bodies, takes, seed) and of_no_body(h, takes) < NO_BODY)
         return "none" if excused else "unexplained"
-    asked = BY_A_ROOM if all(hasattr(e, "told_by") for e in h.effects) else EXPLAINED
+    besides = any(c.mean_db > needed(gap, first=False) for c in added if not hasattr(c.effect, "told_by"))  # what lines alone have named closes nothing itself
+    asked = EXPLAINED if besides or not any(hasattr(e, "told_by") for e in h.effects) else BY_A_ROOM
     enough = left <= max((1 - asked) * gap, SUFFICES_DB) or left <= of_the_mesh(h, bodies, takes, seed)
     return "explained" if enough else "unexplained"
 

@@ -3,6 +3,7 @@
     first round's suspects: A as it was found, B -> propose(evidence beside A)      -> least D(A, B) on all strikes, if it leaves little
                             B moves no modes: what does is searched for all over a body, and that takes long
     then each stands its trial beside the other: fitted without one strike at a time, against null effects, as in any round
+    in_a_room: B is a room that was found alone, A what moves modes; the room is heard anew beside A, and told again without it
 
 What a dashpot does to decays hides what a long pulse leaves of the high modes: played with the right pulse and wrong decays, a body is as far from its recording
 as with neither. Coordinate steps stop there; a step along two coordinates does not [cf. forward selection of groups: Efroymson 1960; Yuan & Lin 2006].
@@ -116,10 +117,11 @@ def _stood(
     added: list[Candidate] = []
     for effect in h.effects[::-1]:
         rest = refitted(with_effects(h, tuple(e for e in h.effects if e is not effect), bodies), bodies)
+        without = mean_db(takes, retold(rest, bodies)) or 0.0  # with a response of its own, too
         told = replace(evidence_of(rest, bodies, band_hz, seed=seed), known=effect)
         now, least = mean_db(takes, rest) or 0.0, least_db(takes, rest) or 0.0
         stood = trials(rest, bodies, takes, told, [type(effect)], seed=seed, say=say)
-        if not stood or not (earns(stood[0], max(now - least, 0.0), first=False) and helps(stood[0], bodies, takes, now, now, least, first=False)):
+        if not stood or not (earns(stood[0], max(now - least, 0.0), first=False) and helps(stood[0], bodies, takes, now, without, least, first=False)):
             return None
         h, added = stood[0].hypothesis, [stood[0], *added]
     return h, added

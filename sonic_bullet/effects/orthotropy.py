@@ -20,7 +20,7 @@ from sonic_bullet.records import ORTHOTROPIC, Array, Material
 
 BETTER = 10.0  # in BIC, than isotropy
 NEARER = 0.7  # of isotropy's rms of ln f, lines beyond the cap counted at the cap
-IN_A_ROOM, MORE = 30.0, 0.15  # in its place: in BIC, and of the lines; half of those in a room are no modes, and beyond the cap whatever the tensor
+IN_A_ROOM, MORE = 30.0, 0.15  # or in BIC and of the lines: half of those in a room are no modes, and beyond the cap whatever the tensor
 SUFFICES = 5e-3  # rms of ln f from the nearest isotropic mode that leaves nothing to look for: split pairs, corrected meshes
 LEAST = 0.03  # of ln E_i/E_j or ln of Zener's ratio: less is the mesh's
 
@@ -85,11 +85,9 @@ class Orthotropy:
         if found is None:
             return None
         plain, best = found
-        gain = plain.bic - best.bic
-        if any(h.dry for h in evidence.heard):
-            told_apart = gain > IN_A_ROOM and best.matched > plain.matched + MORE
-        else:
-            told_apart = gain > BETTER and best.off < NEARER * plain.off
+        gain, dry = plain.bic - best.bic, any(h.dry for h in evidence.heard)
+        told_apart = gain > BETTER and best.off < NEARER * plain.off
+        told_apart |= dry and gain > IN_A_ROOM and best.matched > plain.matched + MORE
         if not told_apart or departure(best) < LEAST:
             return None
         return cls.of(best, told[0].elastic.material.density_kg_m3)

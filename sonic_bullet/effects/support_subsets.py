@@ -1,6 +1,6 @@
 """Weak dashpots, all at once: to first order decays are linear in their strengths, so the best ones, twos and threes of a grid can be told by counting through.
 
-    d_k = law(ω_k) + ½ Σ_j c_j |φ_k(p_j)|²,  law = a + bω²;   Σ_k ((d_k − …)/sd_k)² -> min over subsets      (best subsets, law projected out [Frisch & Waugh 1933])
+    d_k = law(ω_k) + ½ Σ_j c_j |φ_k(p_j)|²,  law = a + bω + cω²;   Σ_k ((d_k − …)/sd_k)² -> min over subsets      (best subsets, law projected out [Frisch & Waugh 1933])
 
 One after another is not enough: what two or three do together, no one of them does best alone. Strong dashpots couple modes: support_search.py.
 """
@@ -21,12 +21,12 @@ SAME = 1e-6  # of what a set explains
 def subsets(t: Trial, vertices: Array, few: int) -> list[Dashpots]:
     """The best ``few`` single dashpots, as many pairs and threes, at the vertices (p,) of a grid, along their normal or every direction."""
     line, mode = t.plain()
-    if len(line) < 3:
-        return []
+    if len(line) < 4:
+        return []  # the law says it all
     omega, weight = 2 * np.pi * t.model.freq_hz[mode], np.sqrt(t.worth[line]) / t.sd[line]
     moved = t.model.shape[vertices].astype(float)[:, :, mode]
     along, every = np.einsum("vx,vxm->vm", t.normal[vertices], moved) ** 2, (moved**2).sum(axis=1)
-    law = np.linalg.qr(np.stack([np.ones(len(line)), (omega / omega.max()) ** 2], axis=1) * weight[:, None])[0]
+    law = np.linalg.qr(np.stack([(omega / omega.max()) ** n for n in range(3)], axis=1) * weight[:, None])[0]
     column, y = 0.5 * np.concatenate([along, every]) * weight, t.decay_per_s[line] * weight
     column, y = column - (column @ law) @ law.T, y - law @ (law.T @ y)
     gram, told = column @ column.T, column @ y

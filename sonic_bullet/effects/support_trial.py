@@ -2,8 +2,8 @@
 
     price_kj = (Δln f/w)²/18 + (Δln d/e)²/18 + 1 − c_kj, at most 1;   Σ worth_k (price − 1) -> min over one-to-one pairs       [Kuhn 1955; Crouse 2016]
     d_k = Δ_k(dashpots) + law(ω_k),  law = ½[a + bω + cω² + Σ_j e_j (ωτ_j)²/(1 + (ωτ_j)²)] or as it is, a, b, c, e >= 0, refitted beside every trial
-        by Huber's loss: what a passive solid of whatever discrete spectrum of relaxations loses [Nowick & Berry 1972, ch. 3]
-    left = Σ_k worth_k [ρ((d_k − Δ_k − law)/√(sd_k² + (SCATTER Δ_k)² + (LAW d_k)²)) + (1 − C_k²)/ROUGH² + (l_k/LEVEL)²], each bounded, ρ Cauchy's;
+        by Huber's loss: a discrete spectrum of relaxations, as of a passive solid [Nowick & Berry 1972, ch. 3]
+    left = Σ_k worth_k [ρ((d_k − Δ_k − law)/√(sd_k² + (SCATTER Δ_k)² + (LAW d_k)²)) + (1 − C_k²)/ROUGH² + ρ(l_k/LEVEL)], each bounded, ρ Cauchy's;
         lines that no mode explains count as outliers, and so do modes that would be heard and that no line shows
 
 c_kj: cosine of a line's amplitudes over the strikes with what one exponential at the mode's pole would take of all modes,
@@ -33,7 +33,7 @@ LOST = 2 * GROSS + MISSED  # that a line costs at most
 WEAK, HALF = 0.05, 0.5  # of the worth of a line that the model does not expect: it may be a click or another body's; near a mode, its twin
 CLEAR, LONGER = 0.25, 2.0  # quantile of the energy of modes that are heard, for one that would be; times a line's decay, for one that it hides
 LOW = 0.3  # of a line's spread where it lies under the least law
-TAU_S = (1e-5, 3e-5, 1e-4)  # of relaxations between those that only show as ω (slow ones of all kinds) or as ω² (fast ones)
+TAU_S = (1e-5, 3e-5, 1e-4)  # of relaxations that peak in what is heard, between slow ones, whose decay is a constant, and fast ones, whose goes as ω²
 RUN, WIDE = 10, 20  # modes whose coupling is reckoned with in a first look, and in a closer one: what eigenvalues cost goes with the cube
 
 
@@ -96,6 +96,8 @@ class Trial:
         level = np.where(np.isfinite(h.impulse_n_s), h.impulse_n_s, 1.0)
         into = np.einsum("sxm,sx->sm", x.shape[h.strike_vertex].astype(float), h.strike_way) * level[:, None]
         out = np.einsum("xm,x->m", x.shape[h.sensor_vertex].astype(float), h.sensor_way)
+        known = into.any(axis=1)  # strikes of unknown place tell decays, no pattern
+        amplitude, into = (amplitude[known], into[known]) if known.any() else (amplitude, into)
         through = np.nan_to_num(np.abs(h.push).max(axis=0) / np.maximum(np.abs(into * out).max(axis=0), 1e-300))
         return cls(
             freq,
@@ -118,7 +120,7 @@ class Trial:
         )
 
     def left(self, dashpots: Dashpots, runs: tuple[Array, ...] | None = None) -> float:
-        """Of the lines' decays and patterns, in squared spreads, beside the law that suits them best. runs: modes that couple; every one with every other where None."""
+        """Of the lines' decays, patterns and levels, in squared spreads, beside the law that suits them best. runs: modes that couple; every one with every other where None."""
         x = self.model
         if not dashpots:
             return self.beside(-x.decay_per_s + 2j * np.pi * x.freq_hz, np.eye(x.mode_count, dtype=complex), 2)

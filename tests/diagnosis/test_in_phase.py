@@ -13,6 +13,7 @@ from sonic_bullet.diagnosis import loop
 from sonic_bullet.diagnosis.baseline import takes_of
 from sonic_bullet.diagnosis.bodies import Struck
 from sonic_bullet.diagnosis.in_phase import of_no_body, out_of_phase
+from sonic_bullet.diagnosis.trial import Candidate
 from sonic_bullet.diagnosis.unexplained import remainder
 from sonic_bullet.effects import Effect
 from sonic_bullet.effects.contact_time import ContactTime
@@ -88,11 +89,13 @@ def test_a_swing_is_no_meshs_however_wrong_a_mesh_is(monkeypatch: pytest.MonkeyP
 
 
 @pytest.mark.parametrize(
-    ("left_db", "others", "verdict"), [(5.0, (), "explained"), (9.0, (), "unexplained"), (9.0, (DampingLaw("constant-loss", 6e-3),), "explained")]
+    ("left_db", "gain_db", "verdict"), [(5.0, None, "explained"), (9.0, None, "unexplained"), (9.0, 4.0, "explained"), (9.0, -0.2, "unexplained")]
 )
-def test_a_room_alone_leaves_little(monkeypatch: pytest.MonkeyPatch, left_db: float, others: tuple[Effect, ...], verdict: str) -> None:
-    """Its response takes more than half of a rattle's noise, too; what has earned its keep beside it has done so on strikes left out."""
+def test_a_room_alone_leaves_little(monkeypatch: pytest.MonkeyPatch, left_db: float, gain_db: float | None, verdict: str) -> None:
+    """Its response takes more than half of a rattle's noise, too. What stands beside it counts if strikes left out have gained by it; a law that lines alone have named does not."""
     monkeypatch.setattr(loop, "of_the_mesh", lambda *_: 0.0)
-    body = recorded()
-    h = replace(fitted(body), effects=(Room(0.5, 0.4, 1), *others))
-    assert loop._verdict(h, [None], 20.0, left_db + 1.0, 1.0, (body,), takes_of((body,)), 0) == verdict  # type: ignore[list-item]
+    body, room, law = recorded(), Room(0.5, 0.4, 1), DampingLaw("constant-loss", 6e-3)
+    named: list[tuple[Effect, float]] = [(room, 10.0)] + ([(law, gain_db)] if gain_db is not None else [])
+    h = replace(fitted(body), effects=tuple(e for e, _ in named))
+    added = [Candidate(e.id, e, h, np.full(5, gain), gain, 0.0, {}) for e, gain in named]
+    assert loop._verdict(h, added, 20.0, left_db + 1.0, 1.0, (body,), takes_of((body,)), 0) == verdict

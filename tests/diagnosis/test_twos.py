@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from made_body import SR, recorded, truth
 
+from sonic_bullet.diagnosis import twos
 from sonic_bullet.diagnosis.evidence import evidence_of
 from sonic_bullet.diagnosis.judge import Take
 from sonic_bullet.diagnosis.play import Hypothesis
@@ -96,7 +97,10 @@ def test_a_mass_in_a_room_is_heard_with_a_response_of_its_own() -> None:
     assert found.mass_kg == pytest.approx(MASS.mass_kg, rel=0.3)
 
 
-def test_a_room_alone_needs_no_mass() -> None:
+def test_a_room_alone_needs_no_mass(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nor by its trial alone, were any two that leave less than all let through to it: the room told again without the mass says more."""
+    assert heard_anew((ROOM,), MASS) is None
+    monkeypatch.setattr(twos, "LEFT", np.inf)
     assert heard_anew((ROOM,), MASS) is None
 
 
