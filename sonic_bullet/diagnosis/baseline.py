@@ -2,7 +2,7 @@
 
 gathered lines -> estimator.fit -> bodies (groups parted, corrections learnt) -> Hypothesis
 lines in chains (chains.py): the same with every chain as one line, where what that plays is nearer to the recordings, or most modes are chains and it is not clearly farther;
-    and with the lines of the softer strikes, whose modes are nearest to linear ones, at all strikes
+    and with the lines of the softer strikes, whose modes are nearest to linear ones, or of those below a limit, at all strikes
 """
 
 from __future__ import annotations
@@ -20,17 +20,21 @@ from sonic_bullet.diagnosis.parted import parted
 from sonic_bullet.diagnosis.play import Hypothesis
 from sonic_bullet.diagnosis.refit import refitted
 from sonic_bullet.diagnosis.unheard import settled
+from sonic_bullet.effects.hum import stilled
+from sonic_bullet.effects.measurement_chain import limit_of
 from sonic_bullet.errors import AudioError
 from sonic_bullet.estimator.distance import floor_between
 from sonic_bullet.estimator.evidence import Evidence as Gathered
 from sonic_bullet.estimator.fit import fit_evidence
 from sonic_bullet.estimator.fitted import CaseFit
-from sonic_bullet.estimator.lines import joint_lines, lines_of, noise_rms
+from sonic_bullet.estimator.lines import Lines, joint_lines, lines_of, noise_rms
 from sonic_bullet.files.cases import Case
 from sonic_bullet.modal.cache import Place
+from sonic_bullet.records import Array
 
 NEARER = 0.9  # of the distance, where chains are one line each
 SOFTER = 0.6  # of the middle strike's impulse at most, of half the strikes: soft enough to be heard apart
+BELOW, TOUCHES = 0.998, 3  # of a limit, and samples that may reach it in a strike that stays below
 OFTEN, MOSTLY = 0.4, 1.05  # chains, of all modes' lines: no linear body has so many, so one line each it is unless that is clearly worse
 
 
@@ -48,12 +52,12 @@ def baseline(case: Case, gathered: tuple[Gathered, ...], *, cache: Place = "defa
     """Fit it to gathered evidence. Raises SonicBulletError."""
     plain = _of(case, gathered, cache, progress)
     ways = [tuple(_unchained(one, link) for one in gathered) for link in LINKS] if plain.takes else []
-    ways += [tuple(_soft(one, case.band_hz) for one in gathered)] if ways else []
+    ways += [tuple(way(one, case.band_hz) for one in gathered) for way in (_soft, _unclipped)] if ways else []
     ways = [faint for faint in ways if any(a is not b for a, b in zip(faint, gathered, strict=True))]
     if not ways:
         return plain
     if progress is not None:
-        progress("modes that depend on their level leave chains of lines: fitting what they end as")
+        progress("modes that depend on their level, or a limit, leave lines that are no modes: fitting what is left without")
     best = min((_of(case, faint, cache, None) for faint in ways), key=_off_db)
     changed = [one for one, faint in zip(gathered, ways[0], strict=True) if faint is not one]
     most = MOSTLY if all(share(one.lines, LINKS[0]) > OFTEN for one in changed) else NEARER
@@ -73,14 +77,34 @@ def _soft(one: Gathered, band_hz: tuple[float, float]) -> Gathered:
     order = np.argsort(level)[: len(level) // 2]
     if not (len(order) > 1 and np.isfinite(level).all() and level[order].max() < SOFTER * np.median(level)):
         return one
+    lines = _lines_by(one, np.sort(order), band_hz)
+    return one if lines is None else replace(one, lines=unchained(lines, LINKS[0]) or lines)
+
+
+def _unclipped(one: Gathered, band_hz: tuple[float, float]) -> Gathered:
+    """Evidence with the lines of the strikes that stay below a limit, at all strikes; the same where there is no limit, or fewer than two stay below it."""
+    if one.signals is None or not (limit := limit_of([one.signals])):
+        return one
+    below = np.flatnonzero((np.abs(one.signals) > BELOW * limit).sum(axis=1) <= TOUCHES)
+    lines = _lines_by(one, below, band_hz) if 1 < len(below) < len(one.signals) else None
+    if lines is None:
+        return one
+    cut = np.setdiff1d(np.arange(len(one.signals)), below)
+    spread = lines.amplitude_sd.copy()
+    spread[cut] = np.maximum(spread, np.abs(lines.amplitude))[cut]  # what a limit has cut is no amplitude
+    return replace(one, lines=replace(lines, amplitude_sd=spread))
+
+
+def _lines_by(one: Gathered, strikes: Array, band_hz: tuple[float, float]) -> Lines | None:
+    """The lines of some strikes, by index, at all of them; None where those are too soft to tell."""
+    assert one.signals is not None
+    still = stilled(one.signals, noise_rms(one.signals, one.sr), one.sr)
     try:
-        soft = joint_lines(one.signals[np.sort(order)], one.sr, band_hz=band_hz, signed=one.lines.signed)
-        lines = lines_of(one.signals, noise_rms(one.signals, one.sr), soft.pole, one.sr, soft.signed)
-    except (AudioError, np.linalg.LinAlgError):  # too soft
-        return one
-    if len(lines.freq_hz) < FEWEST:
-        return one
-    return replace(one, lines=unchained(lines, LINKS[0]) or lines)
+        some = joint_lines(still[strikes], one.sr, band_hz=band_hz, signed=one.lines.signed)
+        lines = lines_of(still, noise_rms(still, one.sr), some.pole, one.sr, some.signed)
+    except (AudioError, np.linalg.LinAlgError):
+        return None
+    return lines if len(lines.freq_hz) >= FEWEST else None
 
 
 def _off_db(b: Baseline) -> float:

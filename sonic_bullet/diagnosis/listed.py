@@ -13,7 +13,7 @@ import numpy as np
 
 from sonic_bullet.diagnosis.bodies import Struck
 from sonic_bullet.diagnosis.play import Hypothesis, modes_of
-from sonic_bullet.estimator.lines import Lines
+from sonic_bullet.estimator.values import lines_at
 from sonic_bullet.records import Array
 
 FOLDS = 4
@@ -96,18 +96,4 @@ def _without(body: Struck, line: Array) -> Struck:
     mine = place[body.line]
     return replace(
         body, gathered=replace(body.gathered, lines=lines_at(body.gathered.lines, keep)), line=mine, correction=np.where(mine >= 0, body.correction, 0.0)
-    )
-
-
-def lines_at(lines: Lines, keep: Array) -> Lines:
-    """Some of the lines (k,), by index."""
-    return replace(
-        lines,
-        freq_hz=lines.freq_hz[keep],
-        decay_per_s=lines.decay_per_s[keep],
-        amplitude=lines.amplitude[:, keep],
-        freq_sd_hz=lines.freq_sd_hz[keep],
-        decay_sd_per_s=lines.decay_sd_per_s[keep],
-        amplitude_sd=lines.amplitude_sd[:, keep],
-        energy=lines.energy[keep],
     )

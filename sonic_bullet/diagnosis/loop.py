@@ -9,7 +9,7 @@ gap = before − floor on left-out strikes; which effect earns its keep is said 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from sonic_bullet.diagnosis.bodies import Struck
@@ -19,16 +19,16 @@ from sonic_bullet.diagnosis.exchange import chosen, exchanged, rivals
 from sonic_bullet.diagnosis.in_phase import of_no_body
 from sonic_bullet.diagnosis.judge import Judged, least_db, mean_db
 from sonic_bullet.diagnosis.meshed import beyond, of_the_mesh
-from sonic_bullet.diagnosis.play import Hypothesis
+from sonic_bullet.diagnosis.play import Hypothesis, moves
 from sonic_bullet.diagnosis.refit import refitted, retold
-from sonic_bullet.diagnosis.trial import FAINT_DB, LEAST_DB, Candidate, earns, needed, trials
+from sonic_bullet.diagnosis.trial import FAINT_DB, LEAST_DB, Candidate, earns, trials
 from sonic_bullet.diagnosis.twos import in_a_room, in_twos
 from sonic_bullet.effects.values import Effect
 
 ROUNDS = 4
 SUFFICES_DB = 1.5  # a gap below this is the mesh's and the shapes' own
 EXPLAINED = 0.5  # of the gap; part of it is the mesh's and the shapes' own
-BY_A_ROOM = 0.7  # of the gap, by a room alone: a response has a tap for every sample, so what is a room's it leaves little of
+BY_A_ROOM = 0.7  # of the gap, by a room and what is beside it: a response has a tap for every sample, so what is a room's it leaves little of
 NO_BODY = 0.5  # of what is open: with more of it left by the strikes' own lines, those that are in phase, it is no mesh's
 WEAK = 0.5  # of the gap: where every suspect leaves more, two are tried at once
 OPEN = 0.3  # of the first gap: with less left, no costly suspect is asked
@@ -132,7 +132,11 @@ def _one_by_one(
                 continue
         able = [c for c in found if earns(c, gap, first=not added) and helps(c, bodies, takes, now, told, floor, first=not added)]
         able = able or sorted((c for c in found if by_lines(c, bodies, takes, told, floor)), key=lambda c: -c.lines)[:1]
-        if not able and len(added) == 1 and (two := in_a_room(h, found, bodies, takes, band_hz, seed=seed, say=say)):
+        if (
+            all(moves(replace(h, effects=(c.effect,))) for c in able)
+            and len(added) == 1
+            and (two := in_a_room(h, found, bodies, takes, band_hz, seed=seed, say=say))
+        ):
             (h, added), passed = two, [(), ()]
             last |= {c.id: c for c in added}
             now, floor = mean_db(takes, h) or 0.0, least_db(takes, h) or floor
@@ -151,7 +155,7 @@ def _one_by_one(
         h, added = exchanged(h, added, passed, bodies, takes, band_hz, say)
         h, added = pruned(h, added, bodies, takes, before - floor)
         now = mean_db(takes, h) or 0.0
-    again = retold(h, bodies)
+    again = retold(h, bodies, fully=True)
     return Rounds(again if again is not h and (mean_db(takes, again) or 0.0) < now else h, added, first, last, floor, weak)
 
 
@@ -163,8 +167,7 @@ def _verdict(
     if not added:
         excused = gap < SUFFICES_DB or (gap < of_the_mesh(h, bodies, takes, seed) and of_no_body(h, takes) < NO_BODY)
         return "none" if excused else "unexplained"
-    besides = any(c.mean_db > needed(gap, first=False) for c in added if not hasattr(c.effect, "told_by"))  # what lines alone have named closes nothing itself
-    asked = EXPLAINED if besides or not any(hasattr(e, "told_by") for e in h.effects) else BY_A_ROOM
+    asked = BY_A_ROOM if any(hasattr(e, "told_by") for e in h.effects) else EXPLAINED
     enough = left <= max((1 - asked) * gap, SUFFICES_DB) or left <= of_the_mesh(h, bodies, takes, seed)
     return "explained" if enough else "unexplained"
 

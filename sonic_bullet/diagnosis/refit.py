@@ -47,8 +47,8 @@ def refitted(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...]
     return at_rest(h, bodies, heard) if bends(h) else h
 
 
-def retold(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...] | None = None) -> Hypothesis:
-    """The hypothesis with a room's response told again, beside all that has been found. heard: whose strikes may tell it; all where None."""
+def retold(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...] | None = None, *, fully: bool = False) -> Hypothesis:
+    """The hypothesis with a room's response told again, beside all that has been found. heard: whose strikes may tell it; all where None. fully: to the end."""
     fitted = [b for b in bodies if b.gathered is not None and b.gathered.signals is not None]  # lists of lines say nothing of a response
     if heard is not None:
         fitted = [b for b in fitted if any(one.source is b.gathered for one in heard)]
@@ -62,7 +62,7 @@ def retold(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...] |
         signal = g.signals[mine]
         bare = replace(h, effects=tuple(e for e in h.effects if e is not room))
         sound = np.stack([play(bare, body, body.fitted[i], signal.shape[1], g.sr) for i in mine])
-        again = room.told_by(signal, sound, noise_rms(signal, g.sr), g.sr)
+        again = room.told_by(signal, sound, noise_rms(signal, g.sr), g.sr, fully=fully)
         h = replace(h, effects=tuple(again if e is room else e for e in h.effects))
     return h
 

@@ -101,9 +101,9 @@ def in_a_room(
         told = evidence_of(alone, bodies, band_hz, seed=seed)
         room = type(rooms[0]).propose(told)
         if room is not None:
-            two = retold(refitted(replace(alone, effects=(c.effect, room)), bodies, told.heard), bodies)
+            two = retold(refitted(replace(alone, effects=(c.effect, room)), bodies, told.heard), bodies, fully=True)
             pairs.append(Two(two, mean_db(takes, two) or np.inf))
-    floor, left = least_db(takes, h) or 0.0, mean_db(takes, retold(h, bodies)) or 0.0
+    floor, left = least_db(takes, h) or 0.0, mean_db(takes, retold(h, bodies, fully=True)) or 0.0
     best = min(pairs, key=lambda two: two.db, default=None)
     if best is None or best.db - floor > LEFT * (left - floor):
         return None

@@ -14,15 +14,16 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
+from sonic_bullet.effects.hum import hum_of
 from sonic_bullet.effects.values import Evidence, Heard, Owner, Sound, Stage
 from sonic_bullet.records import Array
 
 ROUGH = 0.03
 BETTER = 16.0
-MAINS = (50.0, 60.0)
 CORNERS, FINER, HIGHEST = 160, 21, 0.49  # tried, and again about the best; of the rate
 FEWEST, AGAIN = 5, 3  # lines: to look for a filter, and to fit it again to a part of them
-STUCK = 4  # samples in a row at the limit, in two recordings or more
+STUCK, OFTEN = 4, 12  # samples in a row at the limit, or in all
+SAME = 2e-3  # of a limit: how far peaks that it has made are apart
 
 
 @dataclass(frozen=True)
@@ -80,7 +81,8 @@ class MeasurementChain:
         if not heard:
             return None
         parts: dict[str, Any] = {}
-        parts |= _limit(heard)
+        if limit := limit_of([h.signal for h in heard if h.signal is not None], evidence.known.limit if isinstance(evidence.known, cls) else 0.0):
+            parts["limit"] = limit
         parts |= _hum(heard)
         if "limit" not in parts:
             parts |= _filter(heard, BETTER, FEWEST) if evidence.known is None else _filter(heard, 0.0, AGAIN)
@@ -93,58 +95,34 @@ def butterworth(freq_hz: Array, corner_hz: float, order: int, high: bool, sr: in
     return np.asarray(1 / np.sqrt(1 + x ** (-2 * order if high else 2 * order)))
 
 
-def _limit(heard: list[Heard]) -> dict[str, float]:
-    """A level at which several samples in a row stand in two recordings or more, the same in all."""
-    levels = []
-    for h in heard:
-        assert h.signal is not None
-        for row in h.signal:
-            peak = float(np.abs(row).max())
-            stuck = np.abs(row) > 0.998 * peak
-            run = np.convolve(stuck, np.ones(STUCK), "valid")
-            if run.max(initial=0) >= STUCK or stuck.sum() > 12:
-                levels.append(peak)
-    if len(levels) >= 2 and max(levels) < 1.02 * min(levels):
-        return {"limit": float(np.median(levels))}
-    return {}
+def limit_of(signals: list[Array], known: float = 0.0) -> float:
+    """The level at which several samples in a row stand in one recording (s, n) or more, and that the peak of another is: no two strikes are as loud to SAME. 0 where there is none.
+
+    known: as the whole evidence has it; then one recording that reaches it will do.
+    """
+    peak = np.concatenate([np.abs(signal).max(axis=1) for signal in signals])
+    if known:
+        return known if abs(float(peak.max()) / known - 1) < SAME else 0.0
+    stands = np.array([_stands(row) for signal in signals for row in signal])
+    if not stands.any():
+        return 0.0
+    level = float(np.median(peak[stands]))
+    at = np.abs(peak / level - 1) < SAME
+    return level if at.sum() >= 2 and at[stands].all() and peak.max() < (1 + SAME) * level else 0.0
+
+
+def _stands(row: Array) -> bool:
+    """Whether a recording (n,) is at its peak for long, or often."""
+    stuck = np.abs(row) > 0.998 * np.abs(row).max()
+    return bool(np.convolve(stuck, np.ones(STUCK), "valid").max(initial=0) >= STUCK or stuck.sum() > OFTEN)
 
 
 def _hum(heard: list[Heard]) -> dict[str, Any]:
-    """A tone at the mains and its multiples in the last third, of one amplitude in all recordings."""
+    """A tone at the mains and its multiples, of one amplitude in all recordings."""
     h = max(heard, key=lambda one: len(one.impulse_n_s))
     assert h.signal is not None
-    tail = h.signal[:, -h.signal.shape[1] // 3 :]
-    n = tail.shape[1]
-    shape = np.hanning(n)
-    spectrum = np.fft.rfft(tail * shape, 4 * n, axis=1)
-    power, hz = np.abs(spectrum) ** 2, np.fft.rfftfreq(4 * n, 1 / h.sr)
-    floor = (shape**2).sum() * np.median(h.noise) ** 2
-    best: dict[str, Any] = {}
-    most = 0.0
-    for mains in MAINS:
-        near = np.flatnonzero(np.abs(hz - mains) < 1.2 * mains / 50)
-        if not len(near):
-            continue
-        beside = np.array([np.median(power[:, np.abs(np.abs(hz - i * mains) - 0.3 * mains) < 0.15 * mains], axis=1) for i in range(1, 9)])  # pink rooms
-        least = np.maximum(beside / np.log(2), floor)  # (8, s)
-        tone = np.array([(power[:, np.minimum(i * near, len(hz) - 1)] / least[i - 1][:, None]).min(axis=0) for i in range(1, 9)])
-        score = np.log1p(tone / 30).sum(axis=0)
-        i = int(score.argmax())
-        if score[i] > max(most, 1.0):
-            lines = near[i] * np.arange(1, 9)
-            size = 2 * np.sqrt(power[:, lines]) / shape.sum()
-            mean = np.exp(np.log(size).mean(axis=0))
-            steady = (size.max(axis=0) < 1.6 * size.min(axis=0)) & (power[:, lines] > 30 * least.T).all(axis=0)
-            if steady.any():
-                last = int(np.flatnonzero(steady).max()) + 1
-                phase = np.angle(spectrum[:, lines]).mean(axis=0)
-                best = {
-                    "hum_hz": float(hz[near[i]]),
-                    "hum_amplitude": tuple(float(a) if s else 0.0 for a, s in zip(mean[:last], steady[:last], strict=True)),
-                    "hum_phase_rad": tuple(float(p) for p in phase[:last]),
-                }
-                most = float(score[i])
-    return best
+    found = hum_of(h.signal, h.noise, h.sr)
+    return {} if found is None else {"hum_hz": found.hz, "hum_amplitude": found.amplitude, "hum_phase_rad": found.phase_rad}
 
 
 def _filter(heard: list[Heard], better: float, fewest: int) -> dict[str, Any]:

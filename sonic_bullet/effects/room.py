@@ -25,10 +25,10 @@ RATES = np.geomspace(1.7, 70.0, 16)  # of δ in 1/s: rt60 of 4 to 0.1 s
 FINE = np.linspace(-0.25, 0.25, 9)  # of ln δ about the best of these
 LINES = 24  # the strongest
 CAP = 20.0  # of ln likelihood: what one line can speak against a rate
-FASTER, FEWEST, SHARE = 1.5, 3, 0.35  # than the room; lines that are, and of all: who they must be to tell it
+FASTER, FEWEST, SHARE = 1.5, 3, 0.3  # than the room; lines that are, and of all: who they must be to tell it
 TELLS, ALIKE = 10.0, 0.3  # ln likelihood a line gains with a tail; of ln δ: how far lines may lie from one another, by the middle
 MODEL_ERROR = 0.03  # of the direct sound's spectrum, relative: what shapes and pulses get wrong
-TURNS, AGAIN = 150, 40  # what is heard between the loudest modes comes last; from a response that is nearly right there is less to do
+TURNS, AGAIN, FULLY = 150, 40, 400  # what is heard between the loudest modes comes last; from a response that is nearly right there is less to do; for good
 
 
 @dataclass(frozen=True)
@@ -71,10 +71,11 @@ class Room:
         """The evidence with its lines as they would be outside the room."""
         return tails.dried(heard, RT60 / self.rt60_s)
 
-    def told_by(self, signal: Array, sound: Array, noise: Array, sr: int) -> Self:
-        """The same room, its response by what strikes (s, n) were recorded as, and what they would sound like without it; sought from the one it has."""
+    def told_by(self, signal: Array, sound: Array, noise: Array, sr: int, *, fully: bool = False) -> Self:
+        """The same room, its response by what strikes (s, n) were recorded as, and what they would sound like without it; sought from the one it has. fully: to the end."""
         start = self.response if self.sr == sr and len(self.response) == signal.shape[1] else None
-        return replace(self, response=identified(signal, sound, noise, sr, RT60 / self.rt60_s, self.wet, start), sr=sr)
+        turns = FULLY if fully else TURNS if start is None else AGAIN
+        return replace(self, response=identified(signal, sound, noise, sr, RT60 / self.rt60_s, self.wet, start, turns), sr=sr)
 
     def parameters(self) -> dict[str, Any]:
         """What it says, for people and JSON, in SI units."""
@@ -127,7 +128,7 @@ def _one(r: tails.Read, best: int) -> bool:
     return bool(mine.sum() >= FEWEST and mine.mean() > SHARE and np.median(off) < ALIKE and (off < 2 * ALIKE).mean() > 0.7)
 
 
-def identified(signal: Array, sound: Array, noise: Array, sr: int, delta: float, wet: float, start: Array | None = None) -> Array:
+def identified(signal: Array, sound: Array, noise: Array, sr: int, delta: float, wet: float, start: Array | None = None, turns: int = TURNS) -> Array:
     """The tail (n,) that makes the direct sounds (s, n) the recorded ones, by conjugate gradients on the normal equations under its prior, from none or from start (n,)."""
     from scipy.fft import irfft, next_fast_len, rfft
 
@@ -153,7 +154,7 @@ def identified(signal: Array, sound: Array, noise: Array, sr: int, delta: float,
     g = np.zeros(n) if start is None else start / np.maximum(root, 1e-300)
     r = right.copy() if start is None else right - normal(g)
     step, size_r = r.copy(), float(r @ r)
-    for _ in range(TURNS if start is None else AGAIN):
+    for _ in range(turns):
         if size_r <= 1e-10 * float(right @ right):
             break
         turned = normal(step)

@@ -1,8 +1,8 @@
 """What a case's strikes of one object say, laid beside the object's modes.
 
-    CaseRecording's files -> onset cut -> Lines (lines.py)  \\
-                                                             Evidence, one per object (and one per list of measured features)
-    mesh + guess -> Family (modal.reduced) -> Observation   /
+    CaseRecording's files -> onset cut -> hum taken out -> Lines (lines.py)  \\
+                                                                              Evidence, one per object (and one per list of measured features)
+    mesh + guess -> Family (modal.reduced) -> Observation                    /
 """
 
 from __future__ import annotations
@@ -12,8 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sonic_bullet.effects.hum import stilled
 from sonic_bullet.errors import AudioError, FileError, MeshError
-from sonic_bullet.estimator.lines import Lines, joint_lines
+from sonic_bullet.estimator.lines import Lines, joint_lines, noise_rms
 from sonic_bullet.estimator.observe import Observation, observation
 from sonic_bullet.estimator.onset import span
 from sonic_bullet.files import read_audio
@@ -95,7 +96,8 @@ def gather(
             seen = observed(case, thing, guess, played, body) if body is not None else None
             say(f"listening to {len(played)} recordings of {name or 'the object'}")
             modes = _modes_heard(body, guess, case.band_hz) if clipped and body is not None else None
-            lines = joint_lines(signals, sr, band_hz=case.band_hz, signed=case.onset_s is not None, modes=modes)
+            still = stilled(signals, noise_rms(signals, sr), sr)
+            lines = joint_lines(still, sr, band_hz=case.band_hz, signed=case.onset_s is not None, modes=modes)
             notes = (*(f"{g} is missing" for g in gone), *told)
             found.append(Evidence(thing, guess, played, lines, body, seen, signals, sr, notes))
         found += [_listed(case, thing, guess, entry, body) for entry in listed]

@@ -11,7 +11,7 @@ All inner products of damped sinusoids over N samples are geometric sums, closed
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -19,7 +19,10 @@ from sonic_bullet.errors import AudioError
 from sonic_bullet.estimator.distance import floor_between
 from sonic_bullet.estimator.likelihood import moments
 from sonic_bullet.estimator.shared_poles import FASTEST_PER_S, start_poles
+from sonic_bullet.estimator.values import PINNED, Lines, lines_at
 from sonic_bullet.records import Array
+
+__all__ = ["PINNED", "Lines", "joint_lines", "lines_of", "noise_rms"]
 
 SIGNIFICANT = 60.0  # energy of a line over the noise's density, all recordings: a²·sr/(4dσ²) summed
 MOST_LINES = 160
@@ -28,35 +31,6 @@ CROWD, FEWER = 2.5, 0.3  # starting lines over a body's modes; of the lines at t
 LATE_S = (0.03, 0.1)
 DEAD = 9.0  # of ln amplitude: 78 dB
 BEYOND = (10.0, 0.1)  # times a recording's peak; share of the lines that begin there: what no single hit leaves
-PINNED = 0.98  # of the fastest decay there is
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Lines:
-    """k lines of s recordings of one object, by frequency. amplitude (s, k) complex at the onset; covariance (2k, 2k) of ω then d, in 1/s.
-
-    noise (s,): rms of what is no line. energy (k,): of a line over the noise's density. signed: phases are true, the onset being known.
-    """
-
-    freq_hz: Array
-    decay_per_s: Array
-    amplitude: Array
-    freq_sd_hz: Array
-    decay_sd_per_s: Array
-    amplitude_sd: Array
-    noise: Array
-    energy: Array
-    signed: bool
-
-    @property
-    def pole(self) -> Array:
-        """−d + iω (k,) in 1/s."""
-        return np.asarray(-self.decay_per_s + 2j * np.pi * self.freq_hz)
-
-    @property
-    def told_sd_per_s(self) -> Array:
-        """Spreads of the decays (k,), infinite at the fastest there is: a bound, no value."""
-        return np.asarray(np.where(np.nan_to_num(self.decay_per_s) > PINNED * FASTEST_PER_S, np.inf, self.decay_sd_per_s))
 
 
 def joint_lines(signals: Array, sr: int, *, band_hz: tuple[float, float] = (20.0, 20_000.0), signed: bool = True, modes: int | None = None) -> Lines:
@@ -82,9 +56,9 @@ def joint_lines(signals: Array, sr: int, *, band_hz: tuple[float, float] = (20.0
             after = _from(late, signals, sr, band_hz, signed)
             few = few or after
             if after is not None and _beyond(after, signals) < BEYOND[1]:  # else it still hits
-                return after
+                return _struck(after, signals)
     if few is not None:
-        return few
+        return _struck(few, signals)
     try:
         for _ in range(3):
             before = len(pole)
@@ -101,7 +75,7 @@ def joint_lines(signals: Array, sr: int, *, band_hz: tuple[float, float] = (20.0
             break
         after = _from(late, signals, sr, band_hz, signed)
         if after is not None and len(after.freq_hz) >= 3 and _beyond(after, signals) < BEYOND[1]:
-            return after
+            return _struck(after, signals)
     return found
 
 
@@ -120,8 +94,18 @@ def _from(late: int, signals: Array, sr: int, band_hz: tuple[float, float], sign
 
 def _beyond(lines: Lines, signals: Array) -> float:
     """Share of the lines that begin far above a recording's peak, in one of them."""
+    return float(_too_loud(lines, signals).mean()) if len(lines.freq_hz) else 0.0
+
+
+def _too_loud(lines: Lines, signals: Array) -> Array:
+    """Which lines (k,) begin far above a recording's peak, in one of them."""
     peak = np.abs(signals).max(axis=1, keepdims=True)
-    return float((np.abs(lines.amplitude) > BEYOND[0] * peak).any(axis=0).mean()) if len(lines.freq_hz) else 0.0
+    return np.asarray((np.abs(lines.amplitude) > BEYOND[0] * peak).any(axis=0))
+
+
+def _struck(lines: Lines, signals: Array) -> Lines:
+    """The lines without those that no hit at the onset can have left: of echoes that arrive late some are over so soon that they would have begun far above all there is."""
+    return lines_at(lines, np.flatnonzero(~_too_loud(lines, signals)))
 
 
 def noise_rms(signals: Array, sr: int) -> Array:

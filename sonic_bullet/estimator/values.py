@@ -8,12 +8,15 @@ f here is the damped frequency a recording shows, d the decay rate of the amplit
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from sonic_bullet.errors import RecordError
+from sonic_bullet.estimator.shared_poles import FASTEST_PER_S
 from sonic_bullet.records import Array, frozen_array
+
+PINNED = 0.98  # of the fastest decay there is
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,3 +74,45 @@ class MaterialFit:
         for name in ("freq_hz", "decay_per_s", "amplitude"):
             object.__setattr__(self, name, frozen_array(getattr(self, name), np.float64, (count,), name))
         object.__setattr__(self, "covariance", frozen_array(self.covariance, np.float64, (5, 5), "covariance", finite=False))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Lines:
+    """k lines of s recordings of one object, by frequency. amplitude (s, k) complex at the onset.
+
+    noise (s,): rms of what is no line. energy (k,): of a line over the noise's density. signed: phases are true, the onset being known.
+    """
+
+    freq_hz: Array
+    decay_per_s: Array
+    amplitude: Array
+    freq_sd_hz: Array
+    decay_sd_per_s: Array
+    amplitude_sd: Array
+    noise: Array
+    energy: Array
+    signed: bool
+
+    @property
+    def pole(self) -> Array:
+        """−d + iω (k,) in 1/s."""
+        return np.asarray(-self.decay_per_s + 2j * np.pi * self.freq_hz)
+
+    @property
+    def told_sd_per_s(self) -> Array:
+        """Spreads of the decays (k,), infinite at the fastest there is: a bound, no value."""
+        return np.asarray(np.where(np.nan_to_num(self.decay_per_s) > PINNED * FASTEST_PER_S, np.inf, self.decay_sd_per_s))
+
+
+def lines_at(lines: Lines, keep: Array) -> Lines:
+    """Some of the lines (k,), by index."""
+    return replace(
+        lines,
+        freq_hz=lines.freq_hz[keep],
+        decay_per_s=lines.decay_per_s[keep],
+        amplitude=lines.amplitude[:, keep],
+        freq_sd_hz=lines.freq_sd_hz[keep],
+        decay_sd_per_s=lines.decay_sd_per_s[keep],
+        amplitude_sd=lines.amplitude_sd[:, keep],
+        energy=lines.energy[keep],
+    )

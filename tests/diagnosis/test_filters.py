@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from made_body import SR, recorded
 from scipy.signal import butter, sosfreqz
 from test_found_again import BAND, fitted
 
+from sonic_bullet.diagnosis.baseline import _unclipped
 from sonic_bullet.diagnosis.evidence import evidence_of
 from sonic_bullet.diagnosis.refit import refitted
-from sonic_bullet.effects.measurement_chain import MeasurementChain, _hum, butterworth
+from sonic_bullet.effects.hum import hum_of, stilled, without
+from sonic_bullet.effects.measurement_chain import MeasurementChain, butterworth, limit_of
 from sonic_bullet.effects.values import Heard
+from sonic_bullet.estimator.lines import joint_lines
 
 
 @pytest.mark.parametrize("kind", ["highpass", "lowpass"])
@@ -48,8 +49,58 @@ def test_hum_stands_out_of_the_noise_beside_it(told: Heard, mains: float) -> Non
     hz = np.fft.rfftfreq(n, 1 / SR)
     pink = np.fft.irfft(np.fft.rfft(rng.standard_normal(told.signal.shape)) / np.sqrt(np.maximum(hz, 5)), n)
     noisy = 2e-4 * pink / pink.std() + (3e-3 * np.cos(2 * np.pi * mains * np.arange(n) / SR) if mains else 0.0)
-    found = _hum([replace(told, signal=noisy)])
-    assert (found.get("hum_hz", 0.0) > 0) == (mains > 0)
-    if mains:
-        assert found["hum_hz"] == pytest.approx(mains, abs=0.5)
-        assert found["hum_amplitude"][0] == pytest.approx(3e-3, rel=0.1)
+    found = hum_of(noisy, told.noise, SR)
+    assert (found is not None) == (mains > 0)
+    if found is not None:
+        assert found.hz == pytest.approx(mains, abs=0.5)
+        assert found.amplitude[0] == pytest.approx(3e-3, rel=0.1)
+
+
+def test_what_hums_is_taken_out_of_every_recording(told: Heard) -> None:
+    """Between the bins of its spectrum, and with a phase of its own in every recording; what rings stays."""
+    assert told.signal is not None
+    time = np.arange(told.signal.shape[1]) / SR
+    phase = np.array([0.3, 1.9, -2.2, 0.0, 2.8])[:, None]
+    hum = 0.02 * np.cos(2 * np.pi * 49.93 * time + phase) + 0.005 * np.cos(2 * np.pi * 3 * 49.93 * time - phase)
+    found = hum_of(told.signal + hum, told.noise, SR)
+    assert found is not None
+    assert found.hz == pytest.approx(49.93, abs=0.01)
+    assert found.amplitude[:3] == pytest.approx((0.02, 0.0, 0.005), rel=0.02)
+    left = without(told.signal + hum, SR, found) - told.signal
+    assert np.sqrt((left**2).mean(axis=1) / (hum**2).mean(axis=1)).max() < 0.02
+    assert hum_of(told.signal, told.noise, SR) is None
+
+
+def test_loud_hum_hides_no_modes(told: Heard) -> None:
+    """Louder than the strikes: with the hum in them, recordings tell of tones that never end, and of no plate."""
+    assert told.signal is not None
+    hum = 0.5 * np.cos(2 * np.pi * 50 * np.arange(told.signal.shape[1]) / SR)
+    lines = joint_lines(stilled(told.signal + hum, told.noise, SR), SR, band_hz=BAND)
+    assert np.abs(np.log(lines.freq_hz[:, None] / told.freq_hz)).min(axis=0).max() < 2e-4
+
+
+@pytest.mark.parametrize(("peak", "limit"), [((0.4, 0.4, 0.1), 0.4), ((0.4, 0.2, 0.1), 0.0), ((0.9, 0.9, 0.95), 0.0)])
+def test_a_limit_is_where_two_strikes_stand(peak: tuple[float, ...], limit: float) -> None:
+    """One that stands there for long and another that touches it; no recording may go beyond."""
+    ring = np.cos(0.3 * np.arange(800)) * np.exp(-0.004 * np.arange(800))
+    loud = np.stack([np.clip(3 * ring, -peak[0], peak[0]), peak[1] * ring, peak[2] * ring])
+    assert limit_of([loud]) == pytest.approx(limit, abs=1e-9)
+    if limit:
+        assert limit_of([loud[:1]]) == 0.0  # one alone may ring so
+        assert limit_of([loud[:1]], known=limit) == limit
+
+
+def test_clipped_strikes_tell_no_amplitudes() -> None:
+    """Modes are the softer strikes' own; what a limit has cut out of the others is as wide as it is large."""
+    plain = recorded()
+    assert plain.gathered is not None
+    assert plain.gathered.signals is not None
+    peak = np.sort(np.abs(plain.gathered.signals).max(axis=1))
+    body = recorded(MeasurementChain(limit=float(0.5 * (peak[1] + peak[2]))), noise=1e-6)
+    assert body.gathered is not None
+    lines = _unclipped(body.gathered, BAND).lines
+    model = body.model.freq_hz
+    assert (np.abs(np.log(lines.freq_hz[:, None] / model)).min(axis=1) < 1e-3).mean() > 0.95
+    wide = (lines.amplitude_sd >= np.abs(lines.amplitude)).all(axis=1)
+    assert wide.sum() == 3
+    assert _unclipped(plain.gathered, BAND) is plain.gathered

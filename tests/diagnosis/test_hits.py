@@ -87,3 +87,18 @@ def test_turns_in_half_the_digits_are_the_sum_of_the_hits() -> None:
     blow = Blow(0.02, np.array([0.0, 0.011, 0.02, 0.25]), np.array([1.0, 0.7, 0.5, 0.3]))
     want = (blow.share[:, None] * np.exp(-(8.0 + 2j * np.pi * freq) * blow.delay_s[:, None])).sum(axis=0)
     assert np.abs(_turned(blow, freq, 8.0) - want).max() < 1e-6
+
+
+def test_no_line_begins_far_above_all_there_is() -> None:
+    """Of an echo that arrives late and is soon over, a hit at the onset would have had to be thousands of times louder than all that was recorded."""
+    late, time = round(0.03 * SR), np.arange(SR) / SR
+    after = np.maximum(time - late / SR, 0)
+    ring = np.exp(-9 * time) * np.cos(2 * np.pi * 700 * time)
+    echo = (time >= late / SR) * np.exp(-270 * after) * np.cos(2 * np.pi * 1930 * after)
+    sound = np.stack([ring, 0.5 * ring]) + 0.3 * echo + 1e-5 * np.random.default_rng(4).standard_normal((2, SR))
+    back = line_fit._from(late, sound, SR, BAND, True)
+    assert back is not None
+    assert (np.abs(back.amplitude) > 100).any()
+    kept = line_fit._struck(back, sound)
+    assert kept.freq_hz == pytest.approx([700.0], rel=1e-4)
+    assert np.abs(kept.amplitude[:, 0]) == pytest.approx([1.0, 0.5], rel=1e-2)
