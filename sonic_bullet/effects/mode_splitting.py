@@ -30,7 +30,7 @@ BESIDE, ALSO, STRIKES = 3, 0.8, 5  # pairs that make it plain that the body is s
 
 @dataclass(frozen=True)
 class ModeSplitting:
-    """freq_hz (p,) of the pairs, split (p,) relative, turn_rad (p,) from the pair's first mode in the mesh as it is solved; place (p, 3): where the lower swings most."""
+    """freq_hz (p,) of the pairs, split (p,) relative, turn_rad (p,) from the pair's first mode in the mesh as it is solved."""
 
     id: ClassVar[str] = "mode-splitting"
     stage: ClassVar[Stage] = Stage.MODES
