@@ -4,7 +4,7 @@
     null: as many numbers, spent on directions drawn at random in the modes' decays and levels, fitted to the same evidence
 
 an effect earns its keep where its mean drop is over LEAST_DB (where nothing is found yet: FAINT_DB if that is MOST of the gap, CERTAIN_DB if lines are sure of it and that is SAID of the gap) and LEAST_SHARE of the gap,
-    SURE standard errors above zero and above the null effect's by as much; of more than MANY strikes that gain much one may be odd
+    SURE standard errors above zero and above the null effect's by as much; of more than MANY strikes that gain much one may be odd; what goes with level may be told by the loudest alone
 
 Leaving out lines matters: decays and shapes belong to the body, so every strike shows them, and a pattern fitted to them by chance would pass.
 """
@@ -36,6 +36,7 @@ LEAST_DB, LEAST_SHARE = 0.4, 0.08  # of a drop, and of it in the gap
 FAINT_DB, MOST = 0.2, 0.5  # of a drop that is as much of the gap: then less than LEAST_DB will do
 CERTAIN_DB, SAID = 0.1, 0.25  # of a drop that is as much of the gap, where lines have told of an effect, each by its own baseband
 LOUDEST = 2  # strikes, of which what goes with level must gain most
+LOST = 0.15  # of what the loudest gains: all that others may lose by what goes with level
 SURE, MANY = 2.0, 4  # standard errors; strikes of which none may lose, beside one
 NOISE_DB = 0.03  # of a distance, by noise alone
 PLAIN = 0.6  # of the gap: where a cheap suspect says as much, costly ones wait
@@ -104,6 +105,8 @@ def earns(c: Candidate, gap_db: float, *, first: bool) -> bool:
         return False
     more = c.whole_db - max(c.null_db, 0.0)  # a null effect is not held against corrections either
     drop = np.sort(c.drop_db)
+    if c.certain and c.loud and c.mean_db > needed(gap_db, first=first) and -np.minimum(drop, 0).sum() < LOST * drop[-1]:
+        return more > 0.5 * need  # what goes with level is for the loudest to tell, which these others were fitted without
     if len(drop) > MANY and drop[1:].mean() > 3 * max(need, needed(gap_db, first=first)):
         drop = drop[1:]  # one strike may be odd: what it alone tells, none of the others did
     sd = float(drop.std(ddof=1) / np.sqrt(len(drop)))

@@ -67,6 +67,17 @@ def test_of_what_lines_are_sure_of_one_loud_strike_will_do() -> None:
     assert not earns(replace(sure, drop_db=np.array([-0.9, 0.4, 0.4, 0.4, 0.41])), 1.0, first=True), "one speaks against it"
 
 
+def test_beside_another_name_the_loudest_may_speak_for_what_goes_with_level() -> None:
+    """It was left out, and the bend that the softer ones told plays it; these hardly sound otherwise, and may lose a little by it."""
+    level = np.array([1.0, 2.0, 3.0, 4.0, 9.0])
+    sure = replace(candidate(-0.01, -0.13, -0.07, -0.11, 2.9), effect=AmplitudePitch(0.1), impulse_n_s=level)
+    assert earns(sure, 0.9, first=False)
+    assert not earns(replace(sure, effect=Radiation(0.1, 1.0)), 0.9, first=False), "its lines were not asked"
+    assert not earns(replace(sure, impulse_n_s=level[::-1]), 0.9, first=False), "the softest gains"
+    assert not earns(replace(sure, drop_db=np.array([-0.2, -0.13, -0.07, -0.11, 2.9])), 0.9, first=False), "the others lose too much"
+    assert not earns(replace(sure, null_db=2.0), 0.9, first=False), "as good as chance"
+
+
 @pytest.mark.parametrize(("least", "after"), [(1.1, 1.1), (np.nan, 4.0)])
 def test_a_strike_that_neither_plays_above_the_noise_is_as_far_off_as_noise_makes(least: float, after: float) -> None:
     """The baseline played it too loud; with the pulse it is as silent as the recording: no distance, and no NaN in the mean either."""
