@@ -25,7 +25,8 @@ RATES = np.geomspace(1.7, 70.0, 16)  # of δ in 1/s: rt60 of 4 to 0.1 s
 FINE = np.linspace(-0.25, 0.25, 9)  # of ln δ about the best of these
 LINES = 24  # the strongest
 CAP = 20.0  # of ln likelihood: what one line can speak against a rate
-FASTER, FEWEST, SHARE = 1.5, 3, 0.3  # than the room; lines that are, and of all: who they must be to tell it
+FASTER, FEWEST, SHARE = 1.5, 3, 0.35  # than the room; lines that are, and of all: who they must be to tell it
+PLAINLY, LESS = 100.0, 0.25  # ln likelihood a line gains; of all lines: so few will do where FEWEST tell it as plainly as that
 TELLS, ALIKE = 10.0, 0.3  # ln likelihood a line gains with a tail; of ln δ: how far lines may lie from one another, by the middle
 MODEL_ERROR = 0.03  # of the direct sound's spectrum, relative: what shapes and pulses get wrong
 TURNS, AGAIN, FULLY = 150, 40, 400  # what is heard between the loudest modes comes last; from a response that is nearly right there is less to do; for good
@@ -125,7 +126,8 @@ def _one(r: tails.Read, best: int) -> bool:
     gain, delta = r.ln_likelihood[best] - r.plain, r.delta[best]
     mine = (r.decay_per_s[best] > FASTER * delta) & (gain > TELLS)
     off = np.abs(np.log(r.delta[r.ln_likelihood.argmax(axis=0)] / delta))[mine]
-    return bool(mine.sum() >= FEWEST and mine.mean() > SHARE and np.median(off) < ALIKE and (off < 2 * ALIKE).mean() > 0.7)
+    many = mine.mean() > SHARE or (mine.mean() > LESS and (gain[mine] > PLAINLY).sum() >= FEWEST)
+    return bool(mine.sum() >= FEWEST and many and np.median(off) < ALIKE and (off < 2 * ALIKE).mean() > 0.7)
 
 
 def identified(signal: Array, sound: Array, noise: Array, sr: int, delta: float, wet: float, start: Array | None = None, turns: int = TURNS) -> Array:

@@ -16,7 +16,7 @@ from sonic_bullet.effects.contact_time import ContactTime
 from sonic_bullet.effects.damping_law import DampingLaw
 from sonic_bullet.effects.foreign_mode import ForeignMode
 from sonic_bullet.effects.measurement_chain import MeasurementChain
-from sonic_bullet.effects.room import RT60, Room, late
+from sonic_bullet.effects.room import RT60, Room, _one, late
 from sonic_bullet.effects.values import Sound, Stage
 
 
@@ -64,6 +64,20 @@ def test_what_is_gone_at_once_or_is_not_like_its_mode_tells_no_decay() -> None:
     lossy = recorded(Room(0.9, 0.9, 4), DampingLaw("constant-loss", eta=0.05), seconds=1.2)
     dry = tails.dried(heard_of(truth(), lossy), RT60 / 0.9)
     assert (np.isinf(dry.decay_sd_per_s) >= (dry.decay_per_s > tails.FASTEST)).all() and np.isinf(dry.decay_sd_per_s).any()
+
+
+@pytest.mark.parametrize(
+    ("gain", "room"), [((20.0,) * 5, True), ((20.0,) * 4, False), ((150.0,) * 3, True), ((600.0, 12.0, 14.0), False), ((150.0,) * 2, False)]
+)
+def test_fewer_lines_will_do_that_tell_a_tail_more_plainly(gain: tuple[float, ...], room: bool) -> None:
+    """Of ten or twelve that ring: a long-lived body has few that die sooner than the room; radiation above its knee makes a few alike, but hardly like a tail."""
+    count = 10 if len(gain) == 3 else 12
+    told = np.zeros((3, count))
+    told[1, : len(gain)] = gain
+    decay = np.where(np.arange(count) < len(gain), 60.0, 4.0)
+    none = np.zeros((3, count))
+    read = tails.Read(np.array([15.0, 20.0, 27.0]), told, np.zeros(count), np.tile(decay, (3, 1)), none, none, none, none, none)
+    assert _one(read, 1) == room
 
 
 @pytest.mark.parametrize("rt60", [0.5, 1.6])
