@@ -8,12 +8,10 @@ response can bend. But lines are told dry, each by its own baseband (effects/tai
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from sonic_bullet.diagnosis.bodies import Struck
-from sonic_bullet.diagnosis.play import Hypothesis, modes_of, moves
+from sonic_bullet.diagnosis.play import Hypothesis, modes_of, moves_itself
 from sonic_bullet.effects.values import Effect, Evidence, Heard, Stage
 from sonic_bullet.records import Array
 
@@ -23,7 +21,7 @@ WIDTH = 2.0  # spreads within which Cauchy's loss is quadratic
 
 def of_decays(h: Hypothesis, effect: Effect) -> bool:
     """Whether it changes decays, and leaves modes where they are."""
-    return effect.stage is Stage.MODES and not moves(replace(h, effects=(effect,)))
+    return effect.stage is Stage.MODES and not moves_itself(h, effect)
 
 
 def numbers(effect: Effect) -> int:

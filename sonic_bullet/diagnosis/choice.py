@@ -6,7 +6,6 @@ able -> on all strikes together it helps, too -> the best, or the simplest of th
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -15,7 +14,7 @@ from sonic_bullet.diagnosis.by_lines import misfit as decays
 from sonic_bullet.diagnosis.by_lines import numbers, of_decays
 from sonic_bullet.diagnosis.exchange import ALIKE
 from sonic_bullet.diagnosis.judge import Judged, mean_db
-from sonic_bullet.diagnosis.play import Hypothesis, moves
+from sonic_bullet.diagnosis.play import Hypothesis, moves, moves_itself
 from sonic_bullet.diagnosis.refit import refitted, retold, with_effects
 from sonic_bullet.diagnosis.ties import misfit
 from sonic_bullet.diagnosis.trial import SURE, Candidate, needed
@@ -47,14 +46,14 @@ def simplest(able: Sequence[Candidate], bodies: tuple[Struck, ...], evidence: Ev
     Of two that only change decays the lines' own decays tell, by BIC. Effects that move modes stand aside: corrections are learnt anew beside them, and are numbers too.
     """
     best = able[0]
-    if _moves_itself(best) or len(able) == 1:  # by lines alone one may be named that strikes speak against
+    if moves_itself(best.hypothesis, best.effect) or len(able) == 1:  # by lines alone one may be named that strikes speak against
         return best
 
     def close(c: Candidate, share: float) -> bool:
         more = best.drop_db - c.drop_db
         return bool(more.mean() <= SURE * more.std(ddof=1) / np.sqrt(len(more)) and more.mean() < share * best.mean_db)
 
-    rivals = [c for c in able if not _moves_itself(c)]
+    rivals = [c for c in able if not moves_itself(c.hypothesis, c.effect)]
     first = min((c for c in rivals if close(c, ALIKE)), key=lambda c: (numbers(c.effect), -c.mean_db))
     if of_decays(first.hypothesis, first.effect):
         alike = [c for c in rivals if of_decays(c.hypothesis, c.effect) and (best.drop_db - c.drop_db).mean() < NEARLY * best.mean_db]
@@ -65,11 +64,6 @@ def simplest(able: Sequence[Candidate], bodies: tuple[Struck, ...], evidence: Ev
     own = misfit(first.hypothesis, bodies)  # the less strikes say, the less phases need to
     off = np.array([misfit(c.hypothesis, bodies) + (HINT if close(c, ALIKE) else CLEAR) for c in others])
     return others[int(off.argmin())] if np.isfinite(own) and off.min() < own else first
-
-
-def _moves_itself(c: Candidate) -> bool:
-    """Whether it moves modes, whatever has been found before it does."""
-    return moves(replace(c.hypothesis, effects=(c.effect,)))
 
 
 def pruned(h: Hypothesis, added: list[Candidate], bodies: tuple[Struck, ...], takes: Sequence[Judged], gap_db: float) -> tuple[Hypothesis, list[Candidate]]:

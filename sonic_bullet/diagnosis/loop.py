@@ -9,7 +9,7 @@ gap = before − floor on left-out strikes; which effect earns its keep is said 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 from sonic_bullet.diagnosis.bodies import Struck
@@ -19,7 +19,7 @@ from sonic_bullet.diagnosis.exchange import chosen, exchanged, rivals
 from sonic_bullet.diagnosis.in_phase import of_no_body
 from sonic_bullet.diagnosis.judge import Judged, least_db, mean_db
 from sonic_bullet.diagnosis.meshed import beyond, of_the_mesh
-from sonic_bullet.diagnosis.play import Hypothesis, moves
+from sonic_bullet.diagnosis.play import Hypothesis, moves_itself
 from sonic_bullet.diagnosis.refit import refitted, retold
 from sonic_bullet.diagnosis.trial import FAINT_DB, LEAST_DB, Candidate, earns, trials
 from sonic_bullet.diagnosis.twos import in_a_room, in_twos
@@ -132,11 +132,7 @@ def _one_by_one(
                 continue
         able = [c for c in found if earns(c, gap, first=not added) and helps(c, bodies, takes, now, told, floor, first=not added)]
         able = able or sorted((c for c in found if by_lines(c, bodies, takes, told, floor)), key=lambda c: -c.lines)[:1]
-        if (
-            all(moves(replace(h, effects=(c.effect,))) for c in able)
-            and len(added) == 1
-            and (two := in_a_room(h, found, bodies, takes, band_hz, seed=seed, say=say))
-        ):
+        if all(moves_itself(h, c.effect) for c in able) and len(added) == 1 and (two := in_a_room(h, found, bodies, takes, band_hz, seed=seed, say=say)):
             (h, added), passed = two, [(), ()]
             last |= {c.id: c for c in added}
             now, floor = mean_db(takes, h) or 0.0, least_db(takes, h) or floor

@@ -73,6 +73,11 @@ def moves(h: Hypothesis) -> bool:
     return any(e.stage is Stage.MATERIAL or e.id in MOVES for e in h.effects)
 
 
+def moves_itself(h: Hypothesis, effect: Effect) -> bool:
+    """Whether an effect moves modes, whatever the others do."""
+    return moves(replace(h, effects=(effect,)))
+
+
 def bends(h: Hypothesis) -> bool:
     """Whether an effect acts on ringing modes, so that lines are not what linear ones leave."""
     return bool(h.at(Stage.BANK))

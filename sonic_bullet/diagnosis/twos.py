@@ -21,7 +21,7 @@ from sonic_bullet.diagnosis.choice import CLEAR, NEARLY, helps
 from sonic_bullet.diagnosis.evidence import evidence_of
 from sonic_bullet.diagnosis.exchange import again
 from sonic_bullet.diagnosis.judge import Judged, Take, least_db, mean_db
-from sonic_bullet.diagnosis.play import Hypothesis, moves
+from sonic_bullet.diagnosis.play import Hypothesis, moves, moves_itself
 from sonic_bullet.diagnosis.refit import refitted, retold, with_effects
 from sonic_bullet.diagnosis.ties import misfit
 from sonic_bullet.diagnosis.trial import Candidate, earns, trials
@@ -51,7 +51,7 @@ def in_twos(
     """The two of a first round's suspects that explain nearly all together, each of which earns its keep beside the other; None where no two do."""
     if len(first) < 2 or not all(isinstance(t, Take) for t in takes):
         return None
-    kinds = [type(c.effect) for c in first if not _movers(c.hypothesis)]
+    kinds = [type(c.effect) for c in first if not moves(c.hypothesis)]
     say("trying two at once")
 
     def beside(one: Candidate) -> list[Two]:
@@ -91,7 +91,7 @@ def in_a_room(
     other set of modes sounds worse with it: the suspect is tried with a response of its own.
     """
     rooms = [e for e in h.effects if hasattr(e, "told_by")]
-    movers = [c for c in found if _movers(replace(h, effects=(c.effect,)))]
+    movers = [c for c in found if moves_itself(h, c.effect)]
     if len(rooms) != 1 or len(h.effects) != 1 or not movers or not all(isinstance(t, Take) for t in takes):
         return None
     say("hearing the room anew beside what moves modes")
@@ -139,4 +139,4 @@ def _likeliest(pairs: Sequence[Two], before_db: float, bodies: tuple[Struck, ...
 
 def _movers(h: Hypothesis) -> set[str]:
     """Which of its effects move modes."""
-    return {e.id for e in h.effects if moves(replace(h, effects=(e,)))}
+    return {e.id for e in h.effects if moves_itself(h, e)}

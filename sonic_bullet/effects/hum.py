@@ -1,6 +1,8 @@
 """Hum: a tone at the mains and its multiples that is there before, during and after, however hard the strike.
 
 Σ_i a_i cos(2π i f₀ t + φ_i),   f₀ about 50 or 60 Hz: read off the last third of every recording, where least else is left
+
+One recording tells no hum from a mode that rings for long; nor do strikes of one strength, unless the tone fades.
 """
 
 from __future__ import annotations
@@ -15,6 +17,8 @@ MAINS = (50.0, 60.0)
 MOST = 8  # multiples
 ABOVE = 30.0  # times the power beside it
 STEADY = 1.6  # loudest over softest recording
+STILL = 0.2  # ln of its amplitude in the second half of the tails over that in the first, at most: modes fade
+FEWEST, LEAST_S = 2, 0.2  # recordings, and the length of their tails
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -27,12 +31,14 @@ class Hum:
 
 
 def hum_of(signals: Array, noise: Array, sr: int) -> Hum | None:
-    """What hums in recordings (s, n) over a noise (s,); None where no tone has one amplitude in all of them."""
+    """What hums in recordings (s, n) over a noise (s,); None where no tone has one amplitude in all of them, and from first to last."""
     from scipy.optimize import minimize_scalar
 
     start = signals.shape[1] - signals.shape[1] // 3
     tail = signals[:, start:]
     n = tail.shape[1]
+    if len(signals) < FEWEST or n < LEAST_S * sr:
+        return None
     shape = np.hanning(n)
     spectrum = np.fft.rfft(tail * shape, 4 * n, axis=1)
     power, hz = np.abs(spectrum) ** 2, np.fft.rfftfreq(4 * n, 1 / sr)
@@ -64,7 +70,11 @@ def hum_of(signals: Array, noise: Array, sr: int) -> Hum | None:
     exact = float(minimize_scalar(quiet, bounds=(hz[line] - step, hz[line] + step), method="bounded", options={"xatol": 1e-4 * step}).x)  # between the steps
     wave = waves(exact)
     size = 2 * np.abs(wave) / shape.sum()
-    steady = (size.max(axis=0) < STEADY * size.min(axis=0)) & (np.abs(wave) ** 2 > ABOVE * least.T).all(axis=0)
+    half = n // 2
+    parts = np.stack([np.hanning(half) * tail[:, i * half : (i + 1) * half] for i in (0, 1)])
+    turn = np.exp(-2j * np.pi * exact * np.outer(np.arange(half) / sr, multiple))
+    fades = np.diff(np.log(np.abs(parts @ turn) + 1e-300), axis=0)[0].mean(axis=0)  # (i,)
+    steady = (size.max(axis=0) < STEADY * size.min(axis=0)) & (np.abs(wave) ** 2 > ABOVE * least.T).all(axis=0) & (np.abs(fades) < STILL)
     if not steady.any():
         return None
     last = int(np.flatnonzero(steady).max()) + 1

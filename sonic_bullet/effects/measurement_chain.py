@@ -96,9 +96,9 @@ def butterworth(freq_hz: Array, corner_hz: float, order: int, high: bool, sr: in
 
 
 def limit_of(signals: list[Array], known: float = 0.0) -> float:
-    """The level at which several samples in a row stand in one recording (s, n) or more, and that the peak of another is: no two strikes are as loud to SAME. 0 where there is none.
+    """The level at which several samples in a row stand in one recording or more, and that the peak of another is: no two strikes are as loud to SAME. 0 where there is none.
 
-    known: as the whole evidence has it; then one recording that reaches it will do.
+    signals: by object, recordings (s, n). known: as the whole evidence has it; then one recording that reaches it will do.
     """
     peak = np.concatenate([np.abs(signal).max(axis=1) for signal in signals])
     if known:

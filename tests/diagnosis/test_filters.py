@@ -56,6 +56,28 @@ def test_hum_stands_out_of_the_noise_beside_it(told: Heard, mains: float) -> Non
         assert found.amplitude[0] == pytest.approx(3e-3, rel=0.1)
 
 
+def ringing(freq_hz: float, decay_per_s: float, strikes: int, seconds: float) -> np.ndarray:
+    """Strikes (s, n) as loud as each other."""
+    t = np.arange(round(seconds * SR)) / SR
+    noise = 1e-5 * np.random.default_rng(5).standard_normal((strikes, len(t)))
+    return np.exp(-decay_per_s * t) * np.cos(2 * np.pi * freq_hz * t) + noise
+
+
+@pytest.mark.parametrize("decay_per_s", [2.0, 4.0, 0.0])
+def test_a_mode_near_a_multiple_of_the_mains_is_no_hum(decay_per_s: float) -> None:
+    """However long it rings, and as equally loud the strikes are: it fades."""
+    assert (hum_of(ringing(401.0, decay_per_s, 4, 1.5), np.full(4, 1e-5), SR) is None) == (decay_per_s > 0)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize(("strikes", "seconds"), [(1, 1.5), (4, 0.3), (4, 300 / SR)])
+def test_too_little_tells_no_hum(strikes: int, seconds: float) -> None:
+    """One recording alone, or recordings too short to hear whether a tone fades, in silence."""
+    sound = ringing(50.0, 0.0, strikes, seconds)
+    assert hum_of(sound, np.full(strikes, 1e-5), SR) is None
+    assert stilled(sound, np.full(strikes, 1e-5), SR) is sound
+
+
 def test_what_hums_is_taken_out_of_every_recording(told: Heard) -> None:
     """Between the bins of its spectrum, and with a phase of its own in every recording; what rings stays."""
     assert told.signal is not None
