@@ -4,7 +4,8 @@
 
 A fork, so that nothing has to be handed over but results; what the other process could not do or send is done here, and raises here. Where processes do not
 fork (Windows; macOS, whose libraries forbid it) or there is one core, all is done here. Work inside work stays where it is: here by _INSIDE, there because the
-helper is a daemon, which may have no children.
+helper is a daemon, which may have no children. Linear algebra has one thread in each: its own, waiting for each other on small matrices, had made two processes slower
+than one, and sums come in another order with every number of threads.
 """
 
 from __future__ import annotations
@@ -12,8 +13,8 @@ from __future__ import annotations
 import os
 import signal
 import sys
-from collections.abc import Callable, Iterable
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from multiprocessing import current_process, get_context
 from multiprocessing.connection import Connection
@@ -26,6 +27,16 @@ Made = TypeVar("Made")
 _INSIDE: ContextVar[bool] = ContextVar("inside", default=False)  # a list that is being worked on
 
 
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """Linear algebra on one thread while this lasts: as fast on matrices of hundreds, and the same bits on every machine's number of cores."""
+    import scipy.linalg  # noqa: F401  its library has threads apart from numpy's, and must be there to be told
+    from threadpoolctl import threadpool_limits
+
+    with threadpool_limits(1, user_api="blas"):
+        yield
+
+
 def side_by_side(do: Callable[[Item], Made], items: Iterable[Item]) -> list[Made]:
     """[do(item) for item in items], on two cores where there are two. ``do`` must not depend on what it did before.
 
@@ -34,6 +45,11 @@ def side_by_side(do: Callable[[Item], Made], items: Iterable[Item]) -> list[Made
     listed = list(items)
     if _INSIDE.get() or len(listed) < 2 or not _can_fork():
         return [do(item) for item in listed]
+    with one_thread():
+        return _shared(do, listed)
+
+
+def _shared(do: Callable[[Item], Made], listed: list[Item]) -> list[Made]:
     try:
         other, ours, taken = _started(do, listed)
     except OSError:  # no memory or no process to be had

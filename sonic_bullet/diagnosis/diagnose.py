@@ -31,6 +31,7 @@ from sonic_bullet.files import read_audio
 from sonic_bullet.files.cases import Case, CaseRecording, read_case
 from sonic_bullet.modal.cache import Place
 from sonic_bullet.records import Array
+from sonic_bullet.side_by_side import one_thread
 
 SPLITS = ("fit", "holdout", "transfer")
 
@@ -58,6 +59,7 @@ class Diagnosis:
         return self.closed.verdict
 
 
+@one_thread()
 def diagnose(
     case: Case | str | os.PathLike[str],
     *,

@@ -77,12 +77,12 @@ def elastic_of(
         way = np.array(along, float) if along is not None else -inward(body, at)
         return strike, body.points(np.array([at]), way[None])[0][0]
 
-    def look(stiffness_m2_s2: Array) -> tuple[Array, Array, Array]:
+    def look(stiffness_m2_s2: Array) -> tuple[Array, Callable[[Array], Array], Array]:
         value, vector = family().modes(stiffness_m2_s2)
         strike, sensor = rows()
         push = strike @ vector if np.isfinite(strike).any() else np.full((len(strike), len(value)), np.nan)
         heard = push * (sensor @ vector if sensor is not None else 1.0)
-        return np.sqrt(value) / (2 * np.pi), family().slopes(vector, value), heard
+        return np.sqrt(value) / (2 * np.pi), lambda mode: family().slopes(vector[:, mode], value[mode]), heard
 
     @lru_cache(maxsize=KEPT)
     def solved(content: bytes) -> ModalModel:

@@ -39,6 +39,7 @@ LOUDEST = 2  # strikes, of which what goes with level must gain most
 LOST = 0.15  # of what the loudest gains: all that others may lose by what goes with level
 SURE, MANY = 2.0, 4  # standard errors; strikes of which none may lose, beside one
 NOISE_DB = 0.03  # of a distance, by noise alone
+ENOUGH = 2  # names: what little is left beside them is worth no search of half a minute
 PLAIN = 0.6  # of the gap: where a cheap suspect says as much, costly ones wait
 
 
@@ -126,7 +127,7 @@ def trials(
     say: Any,
     costly: bool = True,
 ) -> list[Candidate]:
-    """Every suspect that the whole evidence suggests, after its trial; best first. costly: whether those that take long are asked."""
+    """Every suspect that the whole evidence suggests, after its trial; best first. costly: whether those that take long are asked, and that search once ENOUGH have been found."""
     found: list[Candidate] = []
     if len(takes) < 2:
         return found  # nothing can be left out
@@ -134,19 +135,29 @@ def trials(
     fair = cache(lambda: _learnt_anew(h, bodies, folds))
     still = cache(lambda: _rested(folds))
     gap = float(np.mean([f.before for f in folds]) - np.mean([f.take.least(f.base) for f in folds])) if folds else 0.0
-    for group in _groups([kind for kind in effects if kind.id not in evidence.found]):
+    idle = not costly and len(evidence.found) >= ENOUGH
+    for group in _groups([kind for kind in effects if kind.id not in evidence.found and not (idle and getattr(kind, "searches", False))]):
         if any(hasattr(c.effect, "dried") and earns(c, gap, first=not evidence.found) for c in found):
             break  # what others say of lines that a room has made is hearsay: in the next round they are told dry
         if getattr(group[0], "costly", False) and (not costly or any(c.mean_db > PLAIN * gap for c in found)):
             continue  # something cheap says most of it: what is left may ask for more in the next round
-        for kind, whole in zip(group, side_by_side(lambda kind: kind.propose(evidence), group), strict=True):
-            if whole is None:
+        proposed = _proposed(group, evidence)
+        for kind in group:
+            if (whole := proposed[kind]) is None:
                 continue
             say(f"trying {kind.id}")
             alone = replace(h, effects=(whole,))
             known = fair() if moves(alone) and not moves(h) else still() if bends(alone) and not bends(h) else folds
             found.append(_tried(kind, whole, h, bodies, evidence, known))
     return sorted(found, key=lambda c: -c.whole_db)
+
+
+def _proposed(group: list[type[Effect]], evidence: Evidence) -> dict[type[Effect], Effect | None]:
+    """What each makes of the evidence; one that searches side by side would only do so in turn beside others."""
+    rest = [kind for kind in group if not getattr(kind, "searches", False)]
+    return {kind: kind.propose(evidence) for kind in group if kind not in rest} | dict(
+        zip(rest, side_by_side(lambda kind: kind.propose(evidence), rest), strict=True)
+    )
 
 
 def _groups(kinds: list[type[Effect]]) -> list[list[type[Effect]]]:

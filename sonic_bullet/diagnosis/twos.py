@@ -95,14 +95,17 @@ def in_a_room(
     if len(rooms) != 1 or len(h.effects) != 1 or not movers or not all(isinstance(t, Take) for t in takes):
         return None
     say("hearing the room anew beside what moves modes")
-    pairs = []
-    for c in movers:
+
+    def beside(c: Candidate) -> Two | None:
         alone = refitted(with_effects(h, (c.effect,), bodies), bodies)
         told = evidence_of(alone, bodies, band_hz, seed=seed)
         room = type(rooms[0]).propose(told)
-        if room is not None:
-            two = retold(refitted(replace(alone, effects=(c.effect, room)), bodies, told.heard), bodies, fully=True)
-            pairs.append(Two(two, mean_db(takes, two) or np.inf))
+        if room is None:
+            return None
+        two = retold(refitted(replace(alone, effects=(c.effect, room)), bodies, told.heard), bodies, fully=True)
+        return Two(two, mean_db(takes, two) or np.inf)
+
+    pairs = [two for two in side_by_side(beside, movers) if two is not None]
     floor, left = least_db(takes, h) or 0.0, mean_db(takes, retold(h, bodies, fully=True)) or 0.0
     best = min(pairs, key=lambda two: two.db, default=None)
     if best is None or best.db - floor > LEFT * (left - floor):

@@ -15,15 +15,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sonic_bullet.effects.tensor_lines import CAP, Seen, Told, paired, seen_by, told_of
 from sonic_bullet.effects.tensors import NAMES, SYMMETRIES, bricks, constants, cubes, expanded, reduced, sound, stiffness
-from sonic_bullet.effects.values import Elastic, Evidence, Heard
+from sonic_bullet.effects.values import Elastic, Evidence
 from sonic_bullet.records import Array
+from sonic_bullet.side_by_side import side_by_side
 
-CAP = 0.012  # of ln f: a line farther off is no such mode
-BRIEF = 10.0  # times the modes' usual decay
 FLOOR = 3e-4  # of ln f: less is not told
-SHORT = 2.0  # times its frequency a mode's decay at most: a loss factor of 0.64, more than soft rubber's
-REAL = 0.75  # of a line's energy in phase with the blow, where phases are true: a mode moves with it or against it, noise as it likes
 ROUGH = 0.02  # of 1 − c²: shapes' own error
 WIDTHS = (0.04, 0.025, 0.016, 0.01, 0.007, 0.005, 0.004, 0.004)
 PRIOR_N, PRIOR_G = 0.1, 0.7  # of n about the guess' ν, of ln G about √(E_i E_j)/2(1+n)
@@ -33,19 +31,9 @@ STARTS = 5  # of those sifted, taken further
 FIRST = 10  # lines that decide where no pattern does
 PEAKS = 2
 BLIND_STARTS = 12
+FREED = (0, 1, 3)  # WIDTHS from which on what a symmetry ties is freed: pairing wide, less so, and near
+NIL = 5.0  # of WIDE: farther off nothing is in common
 REACH, WIDE = 2.0, 0.014  # of ln E/ρ in the sieve: an isotropic body may have been fitted to what goes along a plank, or across; of ln f
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Told:
-    """One body's lines: ln f and spread (k,), worth (k,), amplitude (s, k) or None where patterns say nothing, row (s,): which strikes of `Elastic.look`."""
-
-    log_hz: Array
-    sd: Array
-    worth: Array
-    amplitude: Array | None
-    row: Array
-    elastic: Elastic
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -68,75 +56,6 @@ class Tensor:
         return stiffness(self.p)
 
 
-def told_of(evidence: Evidence) -> list[Told]:
-    """All lines, whatever they were paired with, of the objects that can be of any elasticity."""
-    return [_told(h) for h in evidence.heard if h.elastic is not None and len(h.freq_hz) + len(h.foreign_hz) > 4]
-
-
-def ringing(h: Heard) -> Array:
-    """Which foreign lines (f,) may be modes by their decay and phases; others are a click's, a filter's, a room's or noise."""
-    decay = np.nan_to_num(h.foreign_decay_per_s)
-    own = decay < SHORT * h.foreign_hz
-    if np.isfinite(h.decay_per_s).any():
-        own &= decay < BRIEF * max(float(np.nanmedian(h.decay_per_s)), 1.0)
-    if h.elastic is not None and h.elastic.phased and h.signed and len(h.foreign_amplitude) > 1:
-        a = np.nan_to_num(h.foreign_amplitude)
-        own &= (a.real**2).sum(axis=0) >= REAL * (np.abs(a) ** 2).sum(axis=0)
-    return np.asarray(own)
-
-
-def _told(h: Heard) -> Told:
-    assert h.elastic is not None
-    own = ringing(h)
-    freq, decay = np.concatenate([h.freq_hz, h.foreign_hz[own]]), np.concatenate([h.decay_per_s, h.foreign_decay_per_s[own]])
-    sd = np.concatenate([h.freq_sd_hz / np.maximum(h.freq_hz, 1e-9), np.full(int(own.sum()), 1e-4)])
-    amplitude = np.concatenate([h.amplitude, h.foreign_amplitude[:, own]], axis=1)
-    order = np.argsort(freq)
-    amplitude = amplitude[:, order]
-    size = np.linalg.norm(np.nan_to_num(amplitude), axis=0)
-    worth = np.clip(0.5 + 0.06 * np.log10(np.maximum(size / max(size.max(initial=0), 1e-300), 1e-12)), 0.05, 1) if size.any() else np.full(len(freq), 0.5)
-    log_hz = np.log(np.hypot(2 * np.pi * freq, np.nan_to_num(decay)) / (2 * np.pi))[order]
-    wide = np.nan_to_num(decay)[order] / (2 * np.pi * np.exp(log_hz))
-    worth = worth / (1 + (wide / CAP) ** 2)  # a line broader than that stands for whatever is beside it, too
-    row = h.strike_vertex - h.sensor_vertex  # from the end: the sensor is the last
-    known = np.isfinite(amplitude).all() and len(row) > 1
-    return Told(log_hz, np.nan_to_num(sd, nan=1e-4)[order], worth, amplitude if known else None, row, h.elastic)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Seen:
-    """A tensor's modes beside one body's lines: log_hz (m,), slope (9, m) of ln λ, alike (k, m)."""
-
-    log_hz: Array
-    slope: Array
-    alike: Array
-
-
-def seen_by(told: Told, p: Array) -> Seen:
-    """The modes of p and how alike their patterns are to the lines'."""
-    freq, slope, psi = told.elastic.look(stiffness(p))
-    alike = np.ones((len(told.log_hz), len(freq)))
-    if told.amplitude is not None:
-        psi = psi[len(psi) + told.row]
-        if np.isfinite(psi).all():
-            a = told.amplitude if told.elastic.phased else np.abs(told.amplitude)
-            psi = psi if told.elastic.phased else np.abs(psi)
-            alike = np.abs(a.T @ psi) / np.maximum(np.linalg.norm(a, axis=0)[:, None] * np.linalg.norm(psi, axis=0), 1e-300)
-    return Seen(np.log(freq), slope, alike)
-
-
-def paired(told: Told, seen: Seen, width: float, lowest: int | None = None) -> tuple[Array, Array, float]:
-    """Lines and modes (k',) paired at the least price, and the price over the lines' worth. lowest: how many of the lines, all where None."""
-    from scipy.optimize import linear_sum_assignment
-
-    gap = (told.log_hz[:lowest, None] - seen.log_hz[None, :]) / width
-    price = told.worth[:lowest, None] * (np.minimum(gap**2 / 18 + 1 - seen.alike[:lowest], 1.0) - 1.0)
-    line, mode = linear_sum_assignment(price)
-    good = price[line, mode] < 0
-    line, mode = line[good], mode[good]
-    return line, mode, 1 + float(price[line, mode].sum() / told.worth.sum())
-
-
 def search(evidence: Evidence) -> tuple[Tensor, Tensor] | None:
     """(isotropic, best) by BIC; None where there are too few lines. Costs seconds."""
     told = told_of(evidence)
@@ -144,15 +63,15 @@ def search(evidence: Evidence) -> tuple[Tensor, Tensor] | None:
         return None
     start = isotropic_p(told[0].elastic)
     plain = fitted(told, "isotropic", start, start)
-    ends = [fitted(told, "cubic", s, start) for s in _sifted(told, cubes(start))]
-    ends += [fitted(told, "orthorhombic", s, start) for s in _sifted(told, bricks(start))]
+    sifted = [("cubic", s) for s in _sifted(told, cubes(start))] + [("orthorhombic", s) for s in _sifted(told, bricks(start))]
+    ends = side_by_side(lambda one: fitted(told, *one, start), sifted)
     best = min((e for e in ends if e.symmetry == "orthorhombic"), key=lambda e: e.bic)
-    for symmetry in ("cubic", "hexagonal-x", "hexagonal-y", "hexagonal-z"):
-        ends.append(fitted(told, symmetry, best.p, start, WIDTHS[3:]))
+    round_axes = ("hexagonal-x", "hexagonal-y", "hexagonal-z")
+    ends += side_by_side(lambda symmetry: fitted(told, symmetry, best.p, start, WIDTHS[3:]), ("cubic", *round_axes))
     cube = min((e for e in ends if e.symmetry == "cubic"), key=lambda e: e.bic)
-    ends += [fitted(told, symmetry, cube.p, start, WIDTHS[4:]) for symmetry in ("hexagonal-x", "hexagonal-y", "hexagonal-z", "orthorhombic")]
+    ends += side_by_side(lambda symmetry: fitted(told, symmetry, cube.p, start, WIDTHS[4:]), (*round_axes, "orthorhombic"))
     near = min(ends, key=lambda e: e.bic)
-    ends += [fitted(told, "orthorhombic", near.p, start, WIDTHS[k:]) for k in (0, 1, 3)]  # what a symmetry ties is freed, pairing wide, less so, and near
+    ends += side_by_side(lambda k: fitted(told, "orthorhombic", near.p, start, WIDTHS[k:]), FREED)
     return plain, min(ends, key=lambda e: e.bic)
 
 
@@ -168,25 +87,30 @@ def _sifted(told: Sequence[Told], starts: list[Array]) -> list[Array]:
     most = max(told, key=lambda t: float(t.worth.sum()))
     blind = most.amplitude is None
     first = 1 / (1 + (np.arange(len(most.log_hz)) / FIRST) ** 2) if blind else np.ones(len(most.log_hz))
-    scored = []
-    for p in starts:
-        seen = seen_by(most, p)
-        gap = most.log_hz[:, None] - seen.log_hz[None, :]
-        weight = most.worth[:, None] * first[:, None] * seen.alike**2
-        own = np.exp(-0.5 * ((seen.log_hz[:, None] - seen.log_hz[None, :]) / WIDE) ** 2)
-        score = np.zeros(len(shift))
-        for i, s in enumerate(shift):
-            place = seen.log_hz + s / 2
-            worth = np.interp(place, most.log_hz, first, 0.0, 0.0)
-            near = np.exp(-0.5 * ((gap - s / 2) / WIDE) ** 2)
-            score[i] = (weight * near * worth).sum() / np.sqrt(max(float(worth @ own @ worth), 1.0))
-        for best in _peaks(score)[: PEAKS if blind else 1]:
-            moved = np.array(p)
-            moved[:3] += shift[best]
-            moved[6:] += shift[best]
-            scored.append((float(score[best]), moved))
-    scored.sort(key=lambda s: -s[0])
-    return [p for _, p in scored[: BLIND_STARTS if blind else STARTS]]
+
+    def scored(p: Array) -> list[tuple[float, Array]]:
+        score = _agreement(most, seen_by(most, p), first, shift)
+        moved = np.array([1.0] * 3 + [0.0] * 3 + [1.0] * 3)
+        return [(float(score[best]), p + shift[best] * moved) for best in _peaks(score)[: PEAKS if blind else 1]]
+
+    found = sorted((one for some in side_by_side(scored, starts) for one in some), key=lambda s: -s[0])
+    return [p for _, p in found[: BLIND_STARTS if blind else STARTS]]
+
+
+def _agreement(told: Told, seen: Seen, first: Array, shift: Array) -> Array:
+    """How much lines, each counted as told by first (k,), and modes whose ln λ is shifted (n,) have in common: (n,)."""
+    place = seen.log_hz + shift[:, None] / 2
+    worth = np.interp(place, told.log_hz, first, 0.0, 0.0)  # (n, m)
+    weight = told.worth[:, None] * first[:, None] * seen.alike**2
+    gap = told.log_hz[:, None] - seen.log_hz[None, :]
+    step = (shift[1] - shift[0]) / 2
+    at = np.rint((gap - shift[0] / 2) / step).astype(int)[..., None] + np.arange(-round(NIL * WIDE / step), round(NIL * WIDE / step) + 1)  # (k, m, a few)
+    near = weight[..., None] * np.exp(-0.5 * ((gap[..., None] - shift[0] / 2 - at * step) / WIDE) ** 2)
+    here = (at >= 0) & (at < len(shift))
+    cell = (at * len(seen.log_hz) + np.arange(len(seen.log_hz))[:, None])[here]
+    shared = np.bincount(cell, near[here], worth.size).reshape(worth.shape)
+    own = np.exp(-0.5 * ((seen.log_hz[:, None] - seen.log_hz[None, :]) / WIDE) ** 2)
+    return np.asarray((shared * worth).sum(axis=1) / np.sqrt(np.maximum(((worth @ own) * worth).sum(axis=1), 1.0)))
 
 
 def _peaks(score: Array) -> list[int]:
@@ -241,7 +165,7 @@ def _step(pairs: list[tuple[Told, Seen, Array, Array]], symmetry: str, q: Array,
     own, bent = prior(expanded(symmetry, q)), _jacobian(symmetry, q, prior)
     turn = _jacobian(symmetry, q, constants)
     off = np.concatenate([t.log_hz[line] - s.log_hz[mode] for t, s, line, mode in pairs])
-    slope = np.concatenate([0.5 * s.slope[:, mode].T @ turn for t, s, line, mode in pairs])
+    slope = np.concatenate([0.5 * s.slope(mode).T @ turn for t, s, line, mode in pairs])
     worth = np.concatenate([t.worth[line] / np.hypot(t.sd[line] / (width / 2), 1.0) for t, s, line, mode in pairs])
     if len(off) < 2:
         return np.zeros(len(q))
@@ -270,7 +194,7 @@ def _judged(told: Sequence[Told], symmetry: str, q: Array, guess: Array) -> Tens
         other[line] = np.clip(1 - s.alike[line, mode] ** 2, 0, 1 - 1 / strikes)
         unlike.append(other + ROUGH)
         numbers += (strikes - 1) * len(t.log_hz)
-        slopes.append(0.5 * s.slope[:, mode].T @ turn)
+        slopes.append(0.5 * s.slope(mode).T @ turn)
     left, worth = np.concatenate(off), np.concatenate([t.worth for t in told])
     inside, n = left < CAP, len(left)
     square = float(np.average(np.maximum(left, FLOOR) ** 2, weights=worth))

@@ -13,7 +13,8 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from sonic_bullet.effects.elasticities import CAP, WIDTHS, Tensor, fitted, isotropic_p, ringing, search, told_of
+from sonic_bullet.effects.elasticities import WIDTHS, Tensor, fitted, isotropic_p, search
+from sonic_bullet.effects.tensor_lines import CAP, ringing, told_of
 from sonic_bullet.effects.tensors import NAMES, SYMMETRIES, p_of
 from sonic_bullet.effects.values import Evidence, Heard, Owner, Stage
 from sonic_bullet.records import ORTHOTROPIC, Array, Material

@@ -32,6 +32,7 @@ class SupportDamping:
     id: ClassVar[str] = "support-damping"
     stage: ClassVar[Stage] = Stage.MODES
     owner: ClassVar[Owner] = Owner.FIXTURE
+    searches: ClassVar[bool] = True
     reference: ClassVar[str] = "Zheng & James 2011, section 5 (contact damping); Woodhouse 1998, eq. 12"
 
     position_m: tuple[tuple[float, float, float], ...]

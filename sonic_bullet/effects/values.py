@@ -97,13 +97,13 @@ class Elastic:
     """A body under any orthotropic elasticity, its axes the mesh's. material: isotropic, as the baseline has it, with the guessed density.
     phased: whether the signs of lines' amplitudes can be held against J ψ.
 
-    look: C/ρ (6, 6) in m²/s² -> undamped freq_hz (m,), ∂ ln λ/∂(C_k/ρ) (9, m) of the constants C11 C22 C33 C23 C13 C12 C44 C55 C66, and J ψ (s, m) up to
-    a factor, NaN for strikes of unknown place. solve: the same tensor -> undamped ModalModel, strikes and sensor as last vertices.
+    look: C/ρ (6, 6) in m²/s² -> undamped freq_hz (m,); of modes (k,), ∂ ln λ/∂(C_i/ρ) (9, k) of the constants C11 C22 C33 C23 C13 C12 C44 C55 C66; and J ψ (s, m)
+    up to a factor, NaN for strikes of unknown place. solve: the same tensor -> undamped ModalModel, strikes and sensor as last vertices.
     """
 
     material: Material
     phased: bool
-    look: Callable[[Array], tuple[Array, Array, Array]]
+    look: Callable[[Array], tuple[Array, Callable[[Array], Array], Array]]
     solve: Callable[[Array], ModalModel]
 
 
@@ -199,7 +199,8 @@ class Evidence:
 class Effect(Protocol):
     """One physical effect: a frozen dataclass of its parameters. Every member also has a docstring that gives its equation.
 
-    A class that says ``costly = True`` is asked last, and only where cheaper suspects leave much open. One that says ``by_line = True`` has numbers of
+    A class that says ``costly = True`` is asked last, and only where cheaper suspects leave much open, one that says ``searches = True`` by itself: it works side by
+    side. One that says ``by_line = True`` has numbers of
     single lines, which no other line tells: on trial it is told all lines, of the other strikes. One that says ``certain = True`` is proposed where lines
     agree on it, each by its own baseband, and nowhere else, and goes with level: a smaller drop will do on strikes left out, of which a loud one gains most.
     """

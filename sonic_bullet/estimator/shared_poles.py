@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from sonic_bullet.records import Array
+from sonic_bullet.side_by_side import side_by_side
 
 FASTEST_PER_S = 2500.0
 MOST_WINDOW, MOST_COLUMNS = 300, 1200  # of the data matrix of one recording
@@ -19,10 +20,12 @@ def start_poles(signals: Array, sr: int, low: float, high: float) -> Array:
     n = signals.shape[1]
     whole = 1 << int(np.ceil(np.log2(2 * n)))
     spectrum = np.fft.fft(signals, whole, axis=1)
-    poles = []
-    edge = low
-    while edge < high:
-        width = max(350.0, 0.09 * edge)
+    edges = [low]
+    while edges[-1] < high:
+        edges.append(edges[-1] + _width(edges[-1]))
+
+    def within(edge: float) -> Array:
+        width = _width(edge)
         bin_number = round((edge + width / 2) / sr * whole)
         centre = bin_number * sr / whole
         step = max(1, int(sr / (2.2 * width)))
@@ -32,9 +35,14 @@ def start_poles(signals: Array, sr: int, low: float, high: float) -> Array:
         found = _subspace(band, step / sr)
         freq = centre + found.imag / (2 * np.pi)
         keep = (freq >= edge) & (freq < min(edge + width, high)) & (found.real < 0) & (found.real > -FASTEST_PER_S)
-        poles.append(found[keep].real + 2j * np.pi * freq[keep])
-        edge += width
-    return np.concatenate(poles) if poles else np.zeros(0, complex)
+        return np.asarray(found[keep].real + 2j * np.pi * freq[keep])
+
+    return np.concatenate([np.zeros(0, complex), *side_by_side(within, edges[:-1])])
+
+
+def _width(edge: float) -> float:
+    """Of a band from an edge on, in Hz."""
+    return max(350.0, 0.09 * edge)
 
 
 def _low_pass(taps: int, cutoff: float) -> Array:

@@ -73,7 +73,7 @@ class TensorFamily:
 
     def slopes(self, vector: Array, value: Array) -> Array:
         """∂ ln λ/∂(C_k/ρ) (9, m) in s²/m² of modes (b, m) with λ (m,), as `modes` gives them."""
-        found = np.zeros((len(ORTHOTROPIC), vector.shape[1]))
+        found = np.zeros((len(ORTHOTROPIC), len(value)))
         for a, b in pairwise(self.ends):
             mine = np.flatnonzero(vector[a:b].any(axis=0))
             q = vector[a:b, mine]

@@ -12,7 +12,8 @@ from sonic_bullet.diagnosis.evidence import evidence_of, thinned
 from sonic_bullet.effects import orthotropy
 from sonic_bullet.effects.contact_time import ContactTime
 from sonic_bullet.effects.damping_law import DampingLaw
-from sonic_bullet.effects.elasticities import Tensor, Told, _judged, isotropic_p, ringing, told_of
+from sonic_bullet.effects.elasticities import Tensor, _judged, isotropic_p
+from sonic_bullet.effects.tensor_lines import Told, ringing, told_of
 from sonic_bullet.effects.tensors import reduced
 from sonic_bullet.effects.values import Elastic, Heard
 from sonic_bullet.records import Array, Material
