@@ -25,13 +25,14 @@ SHORTER = 5.0  # at most
 NEAR = 0.012  # of a frequency
 LONG, FRAMES, FAINT = 3.0, 120, 0.03  # of 1/d; of the strongest level
 FEWEST, SHARE = 4, 0.1  # chains, and of all modes' lines: fewer are neighbours, hits or a room's
+PLAIN = 4  # links of one chain: neighbours are two or three
 
 
 def unchained(lines: Lines, link: tuple[float, float, bool]) -> Lines | None:
     """Every chain of such links as one line: the slowest's frequency, the slowest's decay or the chain's own, the amplitudes' sum. None where there are too few chains to speak of."""
     groups = chains(lines, link)
     many = sum(len(g) > 1 for g in groups)
-    if many < max(FEWEST, SHARE * len(groups)):
+    if many < max(FEWEST, SHARE * len(groups)) and max(map(len, groups), default=0) < PLAIN:
         return None
     slow = np.array([g[0] for g in groups])
     order = np.argsort(lines.freq_hz[slow])

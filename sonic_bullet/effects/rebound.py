@@ -28,6 +28,7 @@ NEAR = 0.03  # of ln t: delays that agree
 HELD = 0.999  # of the energy of what is played again
 MOST, FEW = 0.6, 0.05  # of the strikes show it one by one; of all recordings' energy, that it must say together where fewer do: beating twins hide it
 FADE = 2.0  # nepers over what is looked at
+ALL, CLEARLY, HALF = 0.25, 1.35, 0.5  # of what one hit leaves of all strikes: said by a second one, over the next best exponent, and left by all hits
 RATIOS = (0.75, 0.9, 1.0)
 HITS = (3, 4, 5, MOST_HITS)
 RESTITUTIONS = (0.2, 0.35, 0.5, 0.65, 0.8)
@@ -83,6 +84,24 @@ class Rebound:
         if isinstance(evidence.known, cls):
             again = _refined(evidence.known, h)[1]
             return replace(evidence.known, **again) if again["restitution"] > LEAST else None
+        return cls._one_by_one(h) or cls._of_all(h)
+
+    @classmethod
+    def _of_all(cls, h: Heard) -> Self | None:
+        """Read off all strikes at once: what rings for long is alike a whole number of turns later, so that one strike alone tells many a delay."""
+        level = np.array([j if np.isfinite(j) else 1.0 for j in h.impulse_n_s])
+        reference = float(np.exp(np.log(level).mean()))
+        (said, gap, exponent), (next_best, _, _), *_ = sorted(_common(h, level / reference), reverse=True)
+        if len(level) < 2 or not (said > ALL and said > CLEARLY * next_best):
+            return None
+        start = cls(gap, reference, RESTITUTIONS[1], exponent, None, 2)
+        left, best = min((_refined(replace(start, hits=k), h) for k in (2, *HITS)), key=lambda end: end[0])
+        alone, count = _refined(replace(start, hits=1), h)[0], len(level)
+        return replace(start, **best) if count + left < HALF * (count + alone) else None
+
+    @classmethod
+    def _one_by_one(cls, h: Heard) -> Self | None:
+        """Read off each strike, and what they agree on."""
         found = [(level, hits) for level, hits in zip(h.impulse_n_s, _hits(h), strict=True) if len(hits)]
         need = max(2.0, MOST * len(h.impulse_n_s))
         if len(found) < 2:
@@ -179,6 +198,31 @@ def _agreed(value: list[Array], share: list[Array]) -> tuple[float, float, list[
 
 def _spread(y: Array) -> float:
     return float(np.abs(y - np.median(y)).mean())
+
+
+def _common(h: Heard, level: Array) -> list[tuple[float, float, float]]:
+    """(said, gap in s at level 1, exponent) of the second hit that says most of what one hit leaves of the strikes, on average, by exponent.
+
+    <r, x_τ>²/(|x_τ|² − <x, x_τ>²/|x|²)/|r|², r what the best share of x leaves: what x_τ says beside x   [orthogonal matching pursuit: Pati, Rezaiifar & Krishnaprasad 1993]
+    """
+    assert h.signal is not None
+    sound = direct_as_expected(h)
+    n = min(h.signal.shape[1], 3 * int(SPAN_S[1] * h.sr))
+    reach, size = min(n, int(SPAN_S[1] * h.sr)), 2 * n
+    x, y = sound[:, :n], h.signal[:, :n]
+    energy = np.maximum((x**2).sum(axis=1, keepdims=True), 1e-300)
+    left = y - np.maximum((x * y).sum(axis=1, keepdims=True) / energy, 0.0) * x
+    spectrum = np.fft.rfft(x, size, axis=1)
+    both = np.fft.irfft(np.conj(spectrum) * np.fft.rfft(left, size, axis=1), size, axis=1)[:, :reach]
+    own = np.fft.irfft(np.abs(spectrum) ** 2, size, axis=1)[:, :reach]
+    inside = energy - np.concatenate([np.zeros((len(x), 1)), np.cumsum((x**2)[:, ::-1], axis=1)], axis=1)[:, :reach]
+    says = np.maximum(both, 0.0) ** 2 / np.maximum(inside - own**2 / energy, FAINT * energy) / np.maximum((left**2).sum(axis=1, keepdims=True), 1e-300)
+    says[:, : int(SPAN_S[0] * h.sr)] = 0.0
+    lag, found = np.arange(reach), []
+    for exponent in EXPONENTS:
+        mean = np.mean([np.interp(lag * j**exponent, lag, np.minimum(one, 1.0), 0.0, 0.0) for one, j in zip(says, level, strict=True)], axis=0)
+        found.append((float(mean.max()), float(mean.argmax()) / h.sr, exponent))
+    return found
 
 
 def _hits(h: Heard) -> list[list[tuple[float, float]]]:
