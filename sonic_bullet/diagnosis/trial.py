@@ -132,8 +132,9 @@ def trials(
     if len(takes) < 2:
         return found  # nothing can be left out
     folds = _folds(h, bodies, takes, evidence, seed)
-    fair = cache(lambda: _learnt_anew(h, bodies, folds))
-    still = cache(lambda: _rested(folds))
+    whole_lines = cache(lambda: _folds(h, bodies, takes, evidence, seed, keep=1.0))
+    fair = cache(lambda by_line: _learnt_anew(h, bodies, whole_lines() if by_line else folds))
+    still = cache(lambda by_line: _rested(whole_lines() if by_line else folds))
     gap = float(np.mean([f.before for f in folds]) - np.mean([f.take.least(f.base) for f in folds])) if folds else 0.0
     idle = not costly and len(evidence.found) >= ENOUGH
     for group in _groups([kind for kind in effects if kind.id not in evidence.found and not (idle and getattr(kind, "searches", False))]):
@@ -147,7 +148,9 @@ def trials(
                 continue
             say(f"trying {kind.id}")
             alone = replace(h, effects=(whole,))
-            known = fair() if moves(alone) and not moves(h) else still() if bends(alone) and not bends(h) else folds
+            by_line = bool(getattr(kind, "by_line", False))
+            plain = whole_lines() if by_line else folds
+            known = fair(by_line) if moves(alone) and not moves(h) else still(by_line) if bends(alone) and not bends(h) else plain
             found.append(_tried(kind, whole, h, bodies, evidence, known))
     return sorted(found, key=lambda c: -c.whole_db)
 
@@ -183,7 +186,8 @@ class Fold:
     least: float
 
 
-def _folds(h: Hypothesis, bodies: tuple[Struck, ...], takes: Sequence[Judged], evidence: Evidence, seed: int) -> list[Fold]:
+def _folds(h: Hypothesis, bodies: tuple[Struck, ...], takes: Sequence[Judged], evidence: Evidence, seed: int, keep: float = KEPT) -> list[Fold]:
+    """Without one strike each, and with a part of the lines: all, where an effect has numbers of single lines, which are told by no other, but by the other strikes."""
     rng = np.random.default_rng([seed, 1])
     made = []
     for take in takes:
@@ -192,7 +196,7 @@ def _folds(h: Hypothesis, bodies: tuple[Struck, ...], takes: Sequence[Judged], e
             less = evidence_of(start, mine, evidence.band_hz, seed=seed)
             base = refitted(start, mine)
         elif isinstance(take, Take):
-            mine, less = bodies, thinned(evidence, take.place, KEPT, rng)
+            mine, less = bodies, thinned(evidence, take.place, keep, rng)
             base = refitted(h, bodies, less.heard)
         before = take.distance(base)
         if np.isfinite(before):
@@ -234,8 +238,6 @@ def _tried(kind: type[Effect], whole: Effect, h: Hypothesis, bodies: tuple[Struc
     def judged(i: int) -> Gain:
         fold = folds[i]
         less = fold.evidence
-        if getattr(kind, "by_line", False) and isinstance(fold.take, Take):
-            less = thinned(evidence, fold.take.place, 1.0, np.random.default_rng(0))  # a line's own numbers are told by no other line, but by the other strikes
         effect = kind.propose(replace(less, known=whole))
         if effect is None:
             return Gain()
