@@ -10,10 +10,11 @@ from multiprocessing import active_children, get_context
 from pathlib import Path
 
 import pytest
+from threadpoolctl import threadpool_info, threadpool_limits
 
 import sonic_bullet.side_by_side as module
 from sonic_bullet.errors import AudioError
-from sonic_bullet.side_by_side import side_by_side
+from sonic_bullet.side_by_side import one_thread, side_by_side
 
 TWO = module._can_fork()
 
@@ -132,3 +133,19 @@ def alive(who: int) -> bool:
         return Path(f"/proc/{who}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
     except OSError:
         return False
+
+
+def test_linear_algebra_has_one_thread_in_each_process() -> None:
+    """Numpy's library and scipy's, here and there; and as many as before once it is done."""
+    import scipy.linalg  # noqa: F401
+
+    def threads(_: int = 0) -> set[int]:
+        time.sleep(0.02)  # long enough for the other to take some
+        return {library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"}
+
+    with threadpool_limits(3, user_api="blas"):
+        inside = side_by_side(threads, range(8)) if TWO else []
+        with one_thread():
+            assert threads() == {1}
+        assert threads() == {3}
+    assert all(found == {1} for found in inside)

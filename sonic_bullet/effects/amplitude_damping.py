@@ -39,7 +39,7 @@ class AmplitudeDamping:
     id: ClassVar[str] = "amplitude-damping"
     stage: ClassVar[Stage] = Stage.BANK
     owner: ClassVar[Owner] = Owner.OBJECT
-    by_line: ClassVar[bool] = True  # the axes of twins are
+    by_line: ClassVar[bool] = True  # it may be heard of one alone
     certain: ClassVar[bool] = True  # modes agree, each by its own baseband, or nothing is proposed
     reference: ClassVar[str] = "Nayfeh & Mook 1979, section 3.3"
 
@@ -79,7 +79,8 @@ class AmplitudeDamping:
                 lines = lines_under(e, h, name)
                 found = _fitted(lines, known.choke if known is not None else None)
                 if found is not None and (best is None or found.gain > best[0]):
-                    best = (found.gain, cls(found.choke, name, *_rayleigh(h, lines, found.told), _louder(h, lines, found), *_axes(lines, found)))
+                    axes = _axes(lines, found) if known is None else (known.freq_hz, known.turn_rad)  # as of gliding twins: learnt once
+                    best = (found.gain, cls(found.choke, name, *_rayleigh(h, lines, found.told), _louder(h, lines, found), *axes))
         return best[1] if best is not None else None
 
 

@@ -51,7 +51,7 @@ class AmplitudePitch:
     id: ClassVar[str] = "amplitude-pitch"
     stage: ClassVar[Stage] = Stage.BANK
     owner: ClassVar[Owner] = Owner.OBJECT
-    by_line: ClassVar[bool] = True  # the axes of twins are
+    by_line: ClassVar[bool] = True  # it may be heard of one alone
     certain: ClassVar[bool] = True  # modes agree, each by its own baseband, or nothing is proposed
     reference: ClassVar[str] = "Nayfeh & Mook 1979, section 2.3"
 
@@ -97,6 +97,8 @@ class AmplitudePitch:
         if not b.single:
             bend = known.bend if known is not None else bend_beside(e, h, measure, bend, FAR)
             bend = bend_beside(e, h, measure, bend, NEAR)
+        if known is not None:  # nothing of a linear body goes with the axes: like a correction they are learnt once, on all that may be learnt from
+            return cls(bend, measure, known.freq_hz, known.turn_rad)
         return cls(bend, measure, *axes_of(e, h, measure, bend))
 
 

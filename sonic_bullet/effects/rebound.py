@@ -10,20 +10,16 @@ Read off the recordings: what remains of them beside the model is the model agai
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from typing import Any, ClassVar, Self
 
 import numpy as np
 
+from sonic_bullet.effects.later_hits import EXPONENTS, LEAST, MOST_HITS, SPAN_S, hits_by_strike, second_hit
 from sonic_bullet.effects.ringing import direct_as_expected
 from sonic_bullet.effects.values import Blow, Evidence, Heard, Owner, Stage
 from sonic_bullet.records import Array
 
-SPAN_S = (1.2e-3, 0.25)
-MOST_HITS = 8
-FAINT = 0.02
-LEAST = 0.06  # of the first hit's share
-GAIN = 0.02  # of what is left must go with another hit
+FAINT = 0.02  # of the first hit: weaker ones are not played
 NEAR = 0.03  # of ln t: delays that agree
 HELD = 0.999  # of the energy of what is played again
 MOST, FEW = 0.6, 0.05  # of the strikes show it one by one; of all recordings' energy, that it must say together where fewer do: beating twins hide it
@@ -32,7 +28,6 @@ ALL, CLEARLY, HALF = 0.25, 1.35, 0.5  # of what one hit leaves of all strikes: s
 RATIOS = (0.75, 0.9, 1.0)
 HITS = (3, 4, 5, MOST_HITS)
 RESTITUTIONS = (0.2, 0.35, 0.5, 0.65, 0.8)
-EXPONENTS = (0.0, 1.0, 0.5, -0.2)
 
 
 @dataclass(frozen=True)
@@ -91,7 +86,7 @@ class Rebound:
         """Read off all strikes at once: what rings for long is alike a whole number of turns later, so that one strike alone tells many a delay."""
         level = np.array([j if np.isfinite(j) else 1.0 for j in h.impulse_n_s])
         reference = float(np.exp(np.log(level).mean()))
-        (said, gap, exponent), (next_best, _, _), *_ = sorted(_common(h, level / reference), reverse=True)
+        (said, gap, exponent), (next_best, _, _), *_ = sorted(second_hit(h, level / reference), reverse=True)
         if len(level) < 2 or not (said > ALL and said > CLEARLY * next_best):
             return None
         start = cls(gap, reference, RESTITUTIONS[1], exponent, None, 2)
@@ -102,7 +97,7 @@ class Rebound:
     @classmethod
     def _one_by_one(cls, h: Heard) -> Self | None:
         """Read off each strike, and what they agree on."""
-        found = [(level, hits) for level, hits in zip(h.impulse_n_s, _hits(h), strict=True) if len(hits)]
+        found = [(level, hits) for level, hits in zip(h.impulse_n_s, hits_by_strike(h), strict=True) if len(hits)]
         need = max(2.0, MOST * len(h.impulse_n_s))
         if len(found) < 2:
             return None
@@ -198,101 +193,3 @@ def _agreed(value: list[Array], share: list[Array]) -> tuple[float, float, list[
 
 def _spread(y: Array) -> float:
     return float(np.abs(y - np.median(y)).mean())
-
-
-def _common(h: Heard, level: Array) -> list[tuple[float, float, float]]:
-    """(said, gap in s at level 1, exponent) of the second hit that says most of what one hit leaves of the strikes, on average, by exponent.
-
-    <r, x_τ>²/(|x_τ|² − <x, x_τ>²/|x|²)/|r|², r what the best share of x leaves: what x_τ says beside x   [orthogonal matching pursuit: Pati, Rezaiifar & Krishnaprasad 1993]
-    """
-    assert h.signal is not None
-    sound = direct_as_expected(h)
-    n = min(h.signal.shape[1], 3 * int(SPAN_S[1] * h.sr))
-    reach, size = min(n, int(SPAN_S[1] * h.sr)), 2 * n
-    x, y = sound[:, :n], h.signal[:, :n]
-    energy = np.maximum((x**2).sum(axis=1, keepdims=True), 1e-300)
-    left = y - np.maximum((x * y).sum(axis=1, keepdims=True) / energy, 0.0) * x
-    spectrum = np.fft.rfft(x, size, axis=1)
-    both = np.fft.irfft(np.conj(spectrum) * np.fft.rfft(left, size, axis=1), size, axis=1)[:, :reach]
-    own = np.fft.irfft(np.abs(spectrum) ** 2, size, axis=1)[:, :reach]
-    inside = energy - np.concatenate([np.zeros((len(x), 1)), np.cumsum((x**2)[:, ::-1], axis=1)], axis=1)[:, :reach]
-    says = np.maximum(both, 0.0) ** 2 / np.maximum(inside - own**2 / energy, FAINT * energy) / np.maximum((left**2).sum(axis=1, keepdims=True), 1e-300)
-    says[:, : int(SPAN_S[0] * h.sr)] = 0.0
-    lag, found = np.arange(reach), []
-    for exponent in EXPONENTS:
-        mean = np.mean([np.interp(lag * j**exponent, lag, np.minimum(one, 1.0), 0.0, 0.0) for one, j in zip(says, level, strict=True)], axis=0)
-        found.append((float(mean.max()), float(mean.argmax()) / h.sr, exponent))
-    return found
-
-
-def _hits(h: Heard) -> list[list[tuple[float, float]]]:
-    """Per strike: delays in s and shares of the hits after the first, by their time.
-
-    Matching pursuit [Mallat & Zhang 1993]: the sound of one hit, as the lines and the model have it, is sought later in what is left; after every
-    find all shares are solved together.
-    """
-    assert h.signal is not None
-    sound = direct_as_expected(h)
-    reach = int(SPAN_S[1] * h.sr)
-    n = min(h.signal.shape[1], 3 * reach)
-    found = []
-    for x, y in zip(sound[:, :n], h.signal[:, :n], strict=True):
-        lags = [0.0]
-        share, left = _solved(x, y, lags, h.sr)
-        for _ in range(MOST_HITS - 1):
-            lag, strength = _sought(x, y - left, h.sr, reach)
-            if lag is None or strength < LEAST * max(share[0], 1e-300):
-                break
-            trial = [*lags, lag]
-            new, made = _solved(x, y, trial, h.sr)
-            before, after = ((y - left) ** 2).sum(), ((y - made) ** 2).sum()
-            if after > (1 - GAIN) * before or new[-1] < LEAST * new[0]:
-                break
-            lags, share, left = trial, new, made
-        rest = sorted((t, r / share[0]) for t, r in zip(lags[1:], share[1:], strict=True) if share[0] > 0 and LEAST < r / share[0] < 1.0)
-        found.append(rest)
-    return found
-
-
-def _delayed(x: Array, lag_s: float, sr: int) -> Array:
-    """x (n,) later by lag_s, between samples too: a turn of the spectrum's phase."""
-    n = len(x)
-    size = 2 * n
-    turn = np.exp(-2j * np.pi * np.fft.rfftfreq(size, 1 / sr) * lag_s)
-    return np.asarray(np.fft.irfft(np.fft.rfft(x, size) * turn, size)[:n])
-
-
-def _solved(x: Array, y: Array, lags: list[float], sr: int) -> tuple[Array, Array]:
-    """Shares (h,) by least squares, and what they make (n,)."""
-    columns = np.stack([_delayed(x, lag, sr) for lag in lags], axis=1)
-    share = np.linalg.lstsq(columns, y, rcond=None)[0]
-    return share, columns @ share
-
-
-def _sought(x: Array, rest: Array, sr: int, reach: int) -> tuple[float | None, float]:
-    """The delay at which x explains most of what is left, to a sixteenth of a sample, and its strength."""
-    size = 2 * len(x)
-    both = np.conj(np.fft.rfft(x, size)) * np.fft.rfft(rest, size)
-    cross = np.fft.irfft(both, size)[:reach]
-    energy = np.cumsum((x**2)[::-1])[::-1]  # of what of x is still inside, once delayed
-    inside = energy[0] - np.concatenate([[0.0], np.cumsum((x**2)[::-1])])[:reach]
-    if not energy[0] > 0:
-        return None, 0.0
-    strength = cross / np.maximum(inside, 1e-3 * energy[0])
-    first = int(SPAN_S[0] * sr)
-    gain = np.where(strength > 0, strength**2 * inside, 0.0)
-    gain[:first] = 0.0
-    i = int(gain.argmax())
-    if gain[i] <= 0:
-        return None, 0.0
-    between, turn = _between(size)
-    fine = (turn @ (both * np.exp(2j * np.pi * np.arange(len(both)) * i / size))).real * 2 / size  # <x later by (i + between)/sr, rest>
-    at = int(fine.argmax())
-    return (i + float(between[at])) / sr, float(fine[at]) / max(float(inside[i]), 1e-300)
-
-
-@lru_cache(maxsize=1)
-def _between(size: int) -> tuple[Array, Array]:
-    """Fractions of a sample (33,), and what turns a spectrum's products by each (33, b)."""
-    between = np.linspace(-1, 1, 33)
-    return between, np.exp(2j * np.pi * np.outer(between, np.arange(size // 2 + 1)) / size)

@@ -200,9 +200,9 @@ class Effect(Protocol):
     """One physical effect: a frozen dataclass of its parameters. Every member also has a docstring that gives its equation.
 
     A class that says ``costly = True`` is asked last, and only where cheaper suspects leave much open, one that says ``searches = True`` by itself: it works side by
-    side. One that says ``by_line = True`` has numbers of
-    single lines, which no other line tells: on trial it is told all lines, of the other strikes. One that says ``certain = True`` is proposed where lines
-    agree on it, each by its own baseband, and nowhere else, and goes with level: a smaller drop will do on strikes left out, of which a loud one gains most.
+    side. One that says ``by_line = True`` has numbers of single lines, which no other line tells, or may be heard of one: on trial it is told all lines, of the other
+    strikes. One that says ``certain = True`` is proposed where lines agree on it, each by its own baseband, and nowhere else, and goes with level: a smaller drop will
+    do on strikes left out, of which a loud one gains most.
     """
 
     id: ClassVar[str]

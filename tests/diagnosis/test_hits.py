@@ -11,7 +11,11 @@ from test_found_again import BAND, fitted
 
 from sonic_bullet.diagnosis.evidence import evidence_of
 from sonic_bullet.diagnosis.refit import refitted
-from sonic_bullet.effects.rebound import Rebound, _turned
+from sonic_bullet.effects import Effect
+from sonic_bullet.effects.amplitude_pitch import AmplitudePitch
+from sonic_bullet.effects.later_hits import second_hit
+from sonic_bullet.effects.rebound import ALL, Rebound, _turned
+from sonic_bullet.effects.room import Room
 from sonic_bullet.effects.values import Blow
 from sonic_bullet.estimator import lines as line_fit
 
@@ -27,6 +31,25 @@ def test_restitution_gap_and_hits_are_told(hits: int) -> None:
     assert found.gap_s == pytest.approx(0.0131, abs=0.2 / SR)
     share = 0.6 ** np.arange(found.hits)
     assert (share[hits:] < 0.14).all() and found.hits >= min(hits, 4)  # what is weaker than the model's own error is not counted
+
+
+@pytest.mark.parametrize("exponent", [0.0, 0.5, 1.0, -0.2])
+def test_all_strikes_at_once_tell_a_second_hit(exponent: float) -> None:
+    """Its gap, and how that goes with strength, whatever delays each strike alone would be as content with."""
+    body = recorded(Rebound(0.0197, 0.016, 0.25, exponent, 0.25, 2))
+    heard = evidence_of(refitted(fitted(body), (body,)), (body,), BAND).heard[0]
+    said, gap, told = max(second_hit(heard, heard.impulse_n_s / 0.016))
+    assert told == exponent and said > ALL
+    assert gap == pytest.approx(0.0197, abs=1.5 / SR)
+    found = Rebound._of_all(heard)
+    assert found is not None and found.hits == 2
+    assert found.restitution == pytest.approx(0.25, rel=0.05)
+
+
+@pytest.mark.parametrize("lacks", [(), (AmplitudePitch(0.02, "velocity"),), (Room(0.9, 0.8, 11),)])
+def test_all_strikes_at_once_tell_no_hit_that_is_not_there(lacks: tuple[Effect, ...]) -> None:
+    body = recorded(*lacks)
+    assert Rebound._of_all(evidence_of(refitted(fitted(body), (body,)), (body,), BAND).heard[0]) is None
 
 
 def test_long_gaps_that_hardly_shrink() -> None:

@@ -7,7 +7,8 @@ import pytest
 from made_body import plate
 
 from sonic_bullet.effects.added_mass import AddedMass
-from sonic_bullet.effects.rebound import _agreed, _delayed, _sought
+from sonic_bullet.effects.later_hits import _delayed, _sought
+from sonic_bullet.effects.rebound import _agreed
 from sonic_bullet.effects.riding import FAR, attached, loaded
 
 

@@ -20,7 +20,7 @@ from sonic_bullet.diagnosis.evidence import evidence_of
 from sonic_bullet.diagnosis.judge import mean_db
 from sonic_bullet.diagnosis.play import Hypothesis
 from sonic_bullet.diagnosis.refit import refitted
-from sonic_bullet.diagnosis.trial import LEAST_DB, Candidate, Fold, _after, earns, needed, trials
+from sonic_bullet.diagnosis.trial import KEPT, LEAST_DB, Candidate, Fold, _after, _folds, earns, needed, trials
 from sonic_bullet.effects.amplitude_damping import AmplitudeDamping
 from sonic_bullet.effects.amplitude_pitch import AmplitudePitch
 from sonic_bullet.effects.radiation import Radiation
@@ -204,3 +204,16 @@ def test_three_weak_dashpots_are_told_together() -> None:
     true, made = (x.apply(bare).decay_per_s - 5.0 for x in (fixture, told))
     own, missed = (y - law @ (law.T @ y) for y in (true, made - true))
     assert np.linalg.norm(missed) < 0.5 * np.linalg.norm(own)
+
+
+def test_a_lines_own_numbers_are_tried_with_all_lines() -> None:
+    """Told by no other line, but by the other strikes; the corrections that they are held against, too."""
+    body = recorded()
+    takes, h = takes_of((body,)), refitted(fitted(body), (body,))
+    told = evidence_of(h, (body,), BAND)
+    count = len(told.heard[0].freq_hz)
+    for keep in (KEPT, 1.0):
+        for i, fold in enumerate(_folds(h, (body,), takes, told, 0, keep=keep)):
+            less = fold.evidence.heard[0]
+            assert len(less.freq_hz) == round(keep * count)
+            assert less.impulse_n_s == pytest.approx(np.delete(told.heard[0].impulse_n_s, i))
