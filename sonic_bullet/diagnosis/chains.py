@@ -25,15 +25,17 @@ SHORTER = 5.0  # at most
 NEAR = 0.012  # of a frequency
 LONG, FRAMES, FAINT = 3.0, 120, 0.03  # of 1/d; of the strongest level
 FEWEST, SHARE = 4, 0.1  # chains, and of all modes' lines: fewer are neighbours, hits or a room's
-PLAIN = 4  # links of one chain: neighbours are two or three
+PLAIN = 4  # links of the loudest line's chain, which bends most, the shorter the farther off: neighbours are two or three
 
 
 def unchained(lines: Lines, link: tuple[float, float, bool]) -> Lines | None:
     """Every chain of such links as one line: the slowest's frequency, the slowest's decay or the chain's own, the amplitudes' sum. None where there are too few chains to speak of."""
     groups = chains(lines, link)
     many = sum(len(g) > 1 for g in groups)
-    if many < max(FEWEST, SHARE * len(groups)) and max(map(len, groups), default=0) < PLAIN:
-        return None
+    if many < max(FEWEST, SHARE * len(groups)):
+        loudest = np.abs(lines.amplitude).max(axis=0).argmax() if len(groups) else -1
+        if not any(len(g) >= PLAIN and loudest in g and _one_way(lines.freq_hz[g]) for g in groups):
+            return None
     slow = np.array([g[0] for g in groups])
     order = np.argsort(lines.freq_hz[slow])
     slow, groups = slow[order], [groups[i] for i in order]
@@ -48,6 +50,11 @@ def unchained(lines: Lines, link: tuple[float, float, bool]) -> Lines | None:
         amplitude_sd=np.stack([np.sqrt((lines.amplitude_sd[:, g] ** 2).sum(axis=1)) for g in groups], axis=1),
         energy=np.array([lines.energy[g].sum() for g in groups]),
     )
+
+
+def _one_way(freq_hz: Array) -> bool:
+    """Whether all steps from line to line go the same way."""
+    return len(set(np.sign(np.diff(freq_hz)).tolist())) == 1
 
 
 def share(lines: Lines, link: tuple[float, float, bool]) -> float:
