@@ -27,10 +27,9 @@ WIDTHS = (0.04, 0.025, 0.016, 0.01, 0.007, 0.005, 0.004, 0.004)
 PRIOR_N, PRIOR_G = 0.1, 0.7  # of n about the guess' ν, of ln G about √(E_i E_j)/2(1+n)
 STEP = np.array([0.3] * 3 + [0.08] * 3 + [0.3] * 3)
 LARGEST_N = 0.46
-STARTS = 5  # of those sifted, taken further
+STARTS = 12  # of those sifted, taken further
 FIRST = 10  # lines that decide where no pattern does
 PEAKS = 2
-BLIND_STARTS = 12
 FREED = (0, 1, 3)  # WIDTHS from which on what a symmetry ties is freed: pairing wide, less so, and near
 NIL = 5.0  # of WIDE: farther off nothing is in common
 REACH, WIDE = 2.0, 0.014  # of ln E/ρ in the sieve: an isotropic body may have been fitted to what goes along a plank, or across; of ln f
@@ -94,7 +93,7 @@ def _sifted(told: Sequence[Told], starts: list[Array]) -> list[Array]:
         return [(float(score[best]), p + shift[best] * moved) for best in _peaks(score)[: PEAKS if blind else 1]]
 
     found = sorted((one for some in side_by_side(scored, starts) for one in some), key=lambda s: -s[0])
-    return [p for _, p in found[: BLIND_STARTS if blind else STARTS]]
+    return [p for _, p in found[:STARTS]]
 
 
 def _agreement(told: Told, seen: Seen, first: Array, shift: Array) -> Array:
