@@ -6,6 +6,9 @@ The command line prints ``str(error)`` behind the program's name and exits with 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 
 class SonicBulletError(Exception):
     """Base of all errors raised on purpose: ``what`` is wrong, and the ``remedy``.
@@ -49,3 +52,14 @@ class AudioError(SonicBulletError):
 
 class FileError(SonicBulletError):
     """A path cannot be read or written."""
+
+
+@contextmanager
+def interrupts() -> Iterator[None]:
+    """An interrupt that meets compiled code on its way out arrives as SystemError, caused by it: here it is a KeyboardInterrupt again, with whatever was noted."""
+    try:
+        yield
+    except SystemError as error:
+        if not isinstance(error.__cause__, KeyboardInterrupt):
+            raise
+        raise KeyboardInterrupt("; ".join([str(error.__cause__) or "stopped", *getattr(error, "__notes__", [])])) from error

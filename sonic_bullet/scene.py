@@ -21,7 +21,7 @@ from types import ModuleType
 from typing import Any
 
 from sonic_bullet.contacts import ContactLog
-from sonic_bullet.errors import SceneError, SonicBulletError
+from sonic_bullet.errors import SceneError, SonicBulletError, interrupts
 from sonic_bullet.listener import Finding, diagnose_world, direct_client, disconnect, links_with_shapes, run_script
 from sonic_bullet.records import Array
 from sonic_bullet.render import render_log
@@ -64,7 +64,8 @@ def render_scene(
     """
     with _stage(path, sr=sr, seed=seed, microphones=microphones, material=material, residual=residual) as stage:
         try:
-            notes = stage.run(seconds, progress, say)
+            with interrupts():
+                notes = stage.run(seconds, progress, say)
         except (SonicBulletError, KeyboardInterrupt) as error:
             error.partial = stage.result(()) if stage.listener is not None else None  # type: ignore[union-attr]
             raise
@@ -160,7 +161,8 @@ def _uses_sonic_bullet(path: Path) -> bool:
 def _user_code(path: Path, call: Callable[..., Any], *arguments: Any) -> Any:
     """Call the scene's own code; its exceptions become one line that names the line they came from."""
     try:
-        return call(*arguments)
+        with interrupts():
+            return call(*arguments)
     except (SonicBulletError, KeyboardInterrupt):
         raise
     except BaseException as error:

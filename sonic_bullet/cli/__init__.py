@@ -19,7 +19,7 @@ from typing import Any
 
 import click
 
-from sonic_bullet.errors import SonicBulletError
+from sonic_bullet.errors import SonicBulletError, interrupts
 
 DEFAULT_SR = 48_000
 DEFAULT_MODES_MATERIAL = "steel"
@@ -271,7 +271,7 @@ def main() -> None:
             stream.reconfigure(errors="replace")  # a terminal without Greek letters still gets its table
     signal.signal(signal.SIGTERM, _terminated)
     try:
-        with cli.make_context("sonic-bullet", _settled(sys.argv[1:]) or ["--help"]) as context:  # cli.main() would swallow what an interrupt says
+        with interrupts(), cli.make_context("sonic-bullet", _settled(sys.argv[1:]) or ["--help"]) as context:  # cli.main() would swallow what an interrupt says
             cli.invoke(context)
         sys.stdout.flush()
         sys.exit(0)

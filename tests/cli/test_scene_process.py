@@ -77,6 +77,14 @@ def test_an_interrupted_render_is_a_valid_named_file(tmp_path: Path, word: signa
     assert sorted(p.name for p in tmp_path.iterdir() if p.name.startswith("a")) == ["a.partial.wav"]
 
 
+def test_an_interrupt_that_compiled_code_met_is_an_interrupt(tmp_path: Path) -> None:
+    write_scene(tmp_path, act="if time_s > 0.2: raise SystemError('a result with an exception set') from KeyboardInterrupt('terminated')")
+    done = process(tmp_path, "render", "scene.py", "-o", "a.wav")
+    assert done.returncode == 143, done.stderr
+    assert done.stderr.rstrip().endswith("a.partial.wav")
+    assert read_audio(tmp_path / "a.partial.wav")[0].shape[1] >= 0.2 * 48_000
+
+
 @pytest.mark.parametrize(
     ("options", "words"),
     [

@@ -25,7 +25,7 @@ MATERIAL = Material.isotropic("wood", youngs_pa=1e10, poisson=0.3, density_kg_m3
 
 def elastic(freq_hz: Array, pattern: Array) -> Elastic:
     """A body whose modes stay where they are, whatever the tensor."""
-    return Elastic(MATERIAL, True, lambda _: (freq_hz, np.zeros((9, len(freq_hz))), pattern), lambda _: None)  # type: ignore[arg-type,return-value]
+    return Elastic(MATERIAL, True, lambda _: (freq_hz, lambda mode: np.zeros((9, len(mode))), pattern), lambda _: None)  # type: ignore[arg-type,return-value]
 
 
 def heard(hz: list[float], decay: list[float], amplitude: Array) -> Heard:
