@@ -43,10 +43,10 @@ def side_by_side(do: Callable[[Item], Made], items: Iterable[Item]) -> list[Made
     Raises whatever do raises.
     """
     listed = list(items)
-    if _INSIDE.get() or len(listed) < 2 or not _can_fork():
+    if _INSIDE.get():
         return [do(item) for item in listed]
     with one_thread():
-        return _shared(do, listed)
+        return _shared(do, listed) if len(listed) > 1 and _can_fork() else [do(item) for item in listed]
 
 
 def _shared(do: Callable[[Item], Made], listed: list[Item]) -> list[Made]:

@@ -135,6 +135,18 @@ def alive(who: int) -> bool:
         return False
 
 
+def test_one_thing_alone_is_done_on_one_thread_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    import scipy.linalg  # noqa: F401
+
+    def threads(_: int) -> set[int]:
+        return {one["num_threads"] for one in threadpool_info() if one["user_api"] == "blas"}
+
+    with threadpool_limits(2, user_api="blas"):
+        assert side_by_side(threads, [0]) == [{1}]
+        monkeypatch.setattr(module, "_can_fork", lambda: False)
+        assert side_by_side(threads, range(2)) == [{1}, {1}]
+
+
 def test_linear_algebra_has_one_thread_in_each_process() -> None:
     """Numpy's library and scipy's, here and there; and as many as before once it is done."""
     import scipy.linalg  # noqa: F401

@@ -252,8 +252,6 @@ def residual(**options: Any) -> None:
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of what is left out in turn, and of the null effects.")
 def diagnose(**options: Any) -> None:
     """Say which physical effect the fitted model lacks, judged on strikes it was not fitted to."""
-    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):  # before numpy is there: two processes share the cores; sums of one order, the same bits
-        os.environ.setdefault(name, "1")
     from sonic_bullet.cli.diagnose import run_diagnose
 
     run_diagnose(**options)

@@ -29,13 +29,18 @@ PLAIN = 4  # links of the loudest line's chain, which bends most, the shorter th
 
 
 def unchained(lines: Lines, link: tuple[float, float, bool]) -> Lines | None:
-    """Every chain of such links as one line: the slowest's frequency, the slowest's decay or the chain's own, the amplitudes' sum. None where there are too few chains to speak of."""
+    """Every chain of such links as one line: the slowest's frequency, the slowest's decay or the chain's own, the amplitudes' sum.
+
+    Where there are too few chains to speak of, those alone that are plain, if the loudest line is in one; None if not.
+    """
     groups = chains(lines, link)
     many = sum(len(g) > 1 for g in groups)
     if many < max(FEWEST, SHARE * len(groups)):
         loudest = np.abs(lines.amplitude).max(axis=0).argmax() if len(groups) else -1
-        if not any(len(g) >= PLAIN and loudest in g and _one_way(lines.freq_hz[g]) for g in groups):
+        plain = [len(g) >= PLAIN and _one_way(lines.freq_hz[g]) for g in groups]
+        if not any(p and loudest in g for p, g in zip(plain, groups, strict=True)):
             return None
+        groups = [part for p, g in zip(plain, groups, strict=True) for part in ([g] if p else np.split(g, len(g)))]
     slow = np.array([g[0] for g in groups])
     order = np.argsort(lines.freq_hz[slow])
     slow, groups = slow[order], [groups[i] for i in order]

@@ -1,12 +1,14 @@
 """Suspects on trial: each fitted without one strike and a part of the lines, judged on that strike; null effects alike.
 
-    for every strike s:  evidence − s − some lines -> propose -> refit α, β, σ -> D(s)    against the same without the effect
+    for every strike s:  evidence − s − some lines (none, where a suspect has numbers of single lines) -> propose -> refit α, β, σ -> D(s)    against the same without the effect
     null: as many numbers, spent on directions drawn at random in the modes' decays and levels, fitted to the same evidence
 
 an effect earns its keep where its mean drop is over LEAST_DB (where nothing is found yet: FAINT_DB if that is MOST of the gap, CERTAIN_DB if lines are sure of it and that is SAID of the gap) and LEAST_SHARE of the gap,
     SURE standard errors above zero and above the null effect's by as much; of more than MANY strikes that gain much one may be odd; what goes with level may be told by the loudest alone
 
 Leaving out lines matters: decays and shapes belong to the body, so every strike shows them, and a pattern fitted to them by chance would pass.
+Corrections of frequencies, and the axes of twins that glide or choke, only mend what a mesh leaves to chance: all fitted strikes tell those, once, and the null has no numbers
+for them.
 """
 
 from __future__ import annotations
@@ -48,8 +50,8 @@ class Candidate:
     """A suspect after its trial. effect: fitted to all evidence. drop_db (s,): of each left-out strike's distance, less what corrections learnt again would gain
     alone where the suspect moves modes. whole_db: mean with that in it, which speaks for a name's turn. null_db: mean over strikes and draws.
 
-    spread: of each number in its parameters over the folds (jackknife). lines: by how much lines left out are likelier with it (by_lines.py).
-    impulse_n_s (s,): of the strikes.
+    Its axes of twins, if it has any, all fitted strikes told. spread: of each number in its parameters over the folds (jackknife). lines: by how much lines left
+    out are likelier with it (by_lines.py). impulse_n_s (s,): of the strikes.
     """
 
     id: str
@@ -132,8 +134,10 @@ def trials(
     if len(takes) < 2:
         return found  # nothing can be left out
     folds = _folds(h, bodies, takes, evidence, seed)
-    whole_lines = cache(lambda: _folds(h, bodies, takes, evidence, seed, keep=1.0))
-    fair = cache(lambda by_line: _learnt_anew(h, bodies, whole_lines() if by_line else folds))
+    heard = any(isinstance(take, Take) for take in takes)  # else no lines are left out
+    whole_lines = cache(lambda: _folds(h, bodies, takes, evidence, seed, keep=1.0) if heard else folds)
+    anew = cache(lambda: refitted(h, bodies, anew=True) if heard else h)
+    fair = cache(lambda by_line: _learnt_anew(anew(), whole_lines() if by_line else folds))
     still = cache(lambda by_line: _rested(whole_lines() if by_line else folds))
     gap = float(np.mean([f.before for f in folds]) - np.mean([f.take.least(f.base) for f in folds])) if folds else 0.0
     idle = not costly and len(evidence.found) >= ENOUGH
@@ -187,7 +191,7 @@ class Fold:
 
 
 def _folds(h: Hypothesis, bodies: tuple[Struck, ...], takes: Sequence[Judged], evidence: Evidence, seed: int, keep: float = KEPT) -> list[Fold]:
-    """Without one strike each, and with a part of the lines: all, where an effect has numbers of single lines, which are told by no other, but by the other strikes."""
+    """Without one strike each, and with a part of the lines, keep of them: all for an effect with numbers of single lines, which other lines cannot tell and other strikes can."""
     rng = np.random.default_rng([seed, 1])
     made = []
     for take in takes:
@@ -204,9 +208,8 @@ def _folds(h: Hypothesis, bodies: tuple[Struck, ...], takes: Sequence[Judged], e
     return made
 
 
-def _learnt_anew(h: Hypothesis, bodies: tuple[Struck, ...], folds: list[Fold]) -> list[Fold]:
-    """Folds that know what is gained by corrections alone, learnt again as they are beside whatever moves modes: that is no effect's gain."""
-    every = refitted(h, bodies, anew=True) if any(isinstance(f.take, Take) for f in folds) else h
+def _learnt_anew(every: Hypothesis, folds: list[Fold]) -> list[Fold]:
+    """Folds that know what is gained by corrections alone, learnt again as they are beside whatever moves modes: that is no effect's gain. every: by all strikes."""
 
     def least(f: Fold) -> float:
         again = refitted(f.base, f.bodies, anew=True) if isinstance(f.take, Listed) else every
@@ -238,10 +241,11 @@ def _tried(kind: type[Effect], whole: Effect, h: Hypothesis, bodies: tuple[Struc
     def judged(i: int) -> Gain:
         fold = folds[i]
         less = fold.evidence
-        effect = kind.propose(replace(less, known=whole))
+        effect = kind.propose(replace(less, known=whole, on_trial=True))
         if effect is None:
             return Gain()
-        random = [Null.fitted(less, min(effect.freedom(), 8), 10 * i + draw) for draw in range(DRAWS)]
+        free = effect.freedom() - len(getattr(effect, "turn_rad", ()))  # axes are whole's
+        random = [Null.fitted(less, min(free, 8), 10 * i + draw) for draw in range(DRAWS)]
         beside = _beside(fold, effect)
         after = _after(fold, beside)
         chance = tuple(fold.before - _after(fold, _beside(fold, none)) for none in random if none is not None)

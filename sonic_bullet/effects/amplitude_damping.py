@@ -14,8 +14,8 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from sonic_bullet.effects.amplitude_pitch import _per_velocity
-from sonic_bullet.effects.axes import ANGLES, turned
-from sonic_bullet.effects.choked import Line, Told, lines_under, onset, told, would
+from sonic_bullet.effects.axes import ANGLES, PAIR, turned
+from sonic_bullet.effects.choked import Line, Told, lines_under, onset, told, under, would
 from sonic_bullet.effects.envelope import envelopes, levels
 from sonic_bullet.effects.values import Evidence, Heard, Owner, Ring, Stage
 from sonic_bullet.records import Array, ModalModel
@@ -76,10 +76,10 @@ class AmplitudeDamping:
             if e is None:
                 continue
             for name in [known.measure] if known is not None else levels(h):
-                lines = lines_under(e, h, name)
+                lines = [_held(line, known) if evidence.on_trial and known is not None else line for line in lines_under(e, h, name)]
                 found = _fitted(lines, known.choke if known is not None else None)
                 if found is not None and (best is None or found.gain > best[0]):
-                    axes = _axes(lines, found) if known is None else (known.freq_hz, known.turn_rad)  # as of gliding twins: learnt once
+                    axes = (known.freq_hz, known.turn_rad) if evidence.on_trial and known is not None else _axes(lines, found)
                     best = (found.gain, cls(found.choke, name, *_rayleigh(h, lines, found.told), _louder(h, lines, found), *axes))
         return best[1] if best is not None else None
 
@@ -112,6 +112,12 @@ def _fitted(lines: list[Line], known: float | None) -> _Fit | None:
     if known is None and not (gain.sum() > BETTER and -gain[gain < 0].sum() < 0.3 * gain[gain > 0].sum() and _sure(lines, choke, plain, row)):
         return None
     return _Fit(choke, float(gain.sum()), row)
+
+
+def _held(line: Line, known: AmplitudeDamping) -> Line:
+    """The line under the one angle that its twins are known to have."""
+    turn = next((t for f, t in zip(known.freq_hz, known.turn_rad, strict=True) if abs(f / line.freq_hz - 1) < PAIR), 0.0)
+    return under(line, int(np.abs(ANGLES - turn).argmin())) if len(line.amplitude) > 1 else line
 
 
 def _along(lines: list[Line], chokes: Array) -> list[tuple[Told, ...]]:

@@ -85,19 +85,19 @@ class AmplitudePitch:
             for name, b in (_slopes(e, h, known) if e is not None else {}).items():
                 if best is None or b.modes > best[0]:
                     assert e is not None
-                    best = (b.modes, cls._beside_twins(e, h, name, b, known))
+                    best = (b.modes, cls._beside_twins(e, h, name, b, known, evidence.on_trial))
         return best[1] if best is not None else None
 
     @classmethod
-    def _beside_twins(cls, e: Envelopes, h: Heard, measure: str, b: Slope, known: AmplitudePitch | None) -> Self:
-        """The same with the axes of twins; where hardly a mode is without its twin, their bend with it."""
+    def _beside_twins(cls, e: Envelopes, h: Heard, measure: str, b: Slope, known: AmplitudePitch | None, held: bool) -> Self:
+        """The same with the axes of twins, known's if held; where hardly a mode is without its twin, their bend with it."""
         if h.model is None or measure == "impulse":
             return cls(b.bend, measure)
         bend = b.bend
         if not b.single:
             bend = known.bend if known is not None else bend_beside(e, h, measure, bend, FAR)
             bend = bend_beside(e, h, measure, bend, NEAR)
-        if known is not None:  # nothing of a linear body goes with the axes: like a correction they are learnt once, on all that may be learnt from
+        if held and known is not None:
             return cls(bend, measure, known.freq_hz, known.turn_rad)
         return cls(bend, measure, *axes_of(e, h, measure, bend))
 

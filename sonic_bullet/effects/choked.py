@@ -75,7 +75,7 @@ def lines_under(e: Envelopes, h: Heard, measure: str) -> list[Line]:
 def told(line: Line, choke: float, start: Array | None = None) -> Told:
     """What a line says of a choke. start (p,): decays to begin with."""
     if choke == 0:  # no angle counts
-        line = _first(line)
+        line = under(line)
     many = len(line.amplitude)
     decay = np.full(many, line.decay_per_s) if start is None or len(start) != many else start
     low, high = RANGE[0] * line.decay_per_s, RANGE[1] * line.decay_per_s
@@ -89,7 +89,7 @@ def told(line: Line, choke: float, start: Array | None = None) -> Told:
 
 def would(line: Line, choke: float, decay_per_s: float, angle: int) -> float:
     """The variance that no choke would leave of a line that is just what a choke makes it: what the choke is of its misfit."""
-    one = _first(line, angle)
+    one = under(line, angle)
     model = _model(one, choke, np.array([decay_per_s]))[0][0]
     plain = told(replace(one, log=model), 0.0)
     return float(np.exp(plain.spread[0]))
@@ -97,14 +97,14 @@ def would(line: Line, choke: float, decay_per_s: float, angle: int) -> float:
 
 def onset(line: Line, choke: float, decay_per_s: float, angle: int) -> Array:
     """|z| (s,) at the onset, as the whole envelope tells it; NaN for strikes that say nothing."""
-    one = _first(line, angle)
+    one = under(line, angle)
     model = _model(one, choke, np.array([decay_per_s]))[0][0]
     total = line.weight.sum(axis=1)
     mean = (line.weight * (line.log - model)).sum(axis=1) / np.where(total > 0, total, np.nan)
     return np.asarray(np.exp(mean) * np.maximum(np.abs(one.amplitude[0].sum(axis=1)), FAINT * np.abs(one.amplitude[0]).sum(axis=1)))
 
 
-def _first(line: Line, angle: int = 0) -> Line:
+def under(line: Line, angle: int = 0) -> Line:
     """The line under one angle alone."""
     one = slice(angle, angle + 1)
     return replace(line, amplitude=line.amplitude[one], level=line.level[one])

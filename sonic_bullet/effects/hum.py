@@ -2,7 +2,7 @@
 
 Σ_i a_i cos(2π i f₀ t + φ_i),   f₀ about 50 or 60 Hz: read off the last third of every recording, where least else is left
 
-One recording tells no hum from a mode that rings for long; nor do strikes of one strength, unless the tone fades.
+One recording tells no hum from a mode that rings for long; nor do strikes of one strength, unless the tone fades, or several multiples sound: modes are not in tune with the mains.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ ABOVE = 30.0  # times the power beside it
 STEADY = 1.6  # loudest over softest recording
 STILL = 0.2  # ln of its amplitude in the second half of the tails over that in the first, at most: modes fade
 FEWEST, LEAST_S = 2, 0.2  # recordings, and the length of their tails
+LOW, UNLIKE = 2, 2.0  # multiples where no mode is to be expected; loudest over softest peak of strikes, with which a mode would go
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -30,14 +31,17 @@ class Hum:
     phase_rad: tuple[float, ...]
 
 
-def hum_of(signals: Array, noise: Array, sr: int) -> Hum | None:
-    """What hums in recordings (s, n) over a noise (s,); None where no tone has one amplitude in all of them, and from first to last."""
+def hum_of(signals: Array, noise: Array, sr: int, known_hz: float = 0.0) -> Hum | None:
+    """What hums in recordings (s, n) over a noise (s,); None where no tone has one amplitude in all of them, and from first to last.
+
+    known_hz: as other recordings told it; then one will do.
+    """
     from scipy.optimize import minimize_scalar
 
     start = signals.shape[1] - signals.shape[1] // 3
     tail = signals[:, start:]
     n = tail.shape[1]
-    if len(signals) < FEWEST or n < LEAST_S * sr:
+    if len(signals) < (1 if known_hz else FEWEST) or n < LEAST_S * sr:
         return None
     shape = np.hanning(n)
     spectrum = np.fft.rfft(tail * shape, 4 * n, axis=1)
@@ -45,8 +49,8 @@ def hum_of(signals: Array, noise: Array, sr: int) -> Hum | None:
     floor = (shape**2).sum() * np.median(noise) ** 2
     best: tuple[float, int, Array] | None = None
     multiple = np.arange(1, MOST + 1)
-    for mains in MAINS:
-        near = np.flatnonzero(np.abs(hz - mains) < 1.2 * mains / 50)
+    for mains in [known_hz] if known_hz else MAINS:
+        near = np.flatnonzero(np.abs(hz - mains) < (hz[1] if known_hz else 1.2 * mains / 50))
         if not len(near):
             continue
         beside = np.array([np.median(power[:, np.abs(np.abs(hz - i * mains) - 0.3 * mains) < 0.15 * mains], axis=1) for i in multiple])  # pink rooms
@@ -75,7 +79,9 @@ def hum_of(signals: Array, noise: Array, sr: int) -> Hum | None:
     turn = np.exp(-2j * np.pi * exact * np.outer(np.arange(half) / sr, multiple))
     fades = np.diff(np.log(np.abs(parts @ turn) + 1e-300), axis=0)[0].mean(axis=0)  # (i,)
     steady = (size.max(axis=0) < STEADY * size.min(axis=0)) & (np.abs(wave) ** 2 > ABOVE * least.T).all(axis=0) & (np.abs(fades) < STILL)
-    if not steady.any():
+    peak = np.abs(signals).max(axis=1)
+    alone = steady.sum() == 1 and not steady[:LOW].any() and peak.max() < UNLIKE * peak.min()
+    if not steady.any() or (alone and not known_hz):
         return None
     last = int(np.flatnonzero(steady).max()) + 1
     mean, phase = np.exp(np.log(size).mean(axis=0)), np.angle((wave / np.abs(wave)).sum(axis=0))

@@ -83,7 +83,7 @@ class MeasurementChain:
         parts: dict[str, Any] = {}
         if limit := limit_of([h.signal for h in heard if h.signal is not None], evidence.known.limit if isinstance(evidence.known, cls) else 0.0):
             parts["limit"] = limit
-        parts |= _hum(heard)
+        parts |= _hum(heard, evidence.known.hum_hz if isinstance(evidence.known, cls) else 0.0)
         if "limit" not in parts:
             parts |= _filter(heard, BETTER, FEWEST) if evidence.known is None else _filter(heard, 0.0, AGAIN)
         return cls(**parts) if parts else None
@@ -117,11 +117,11 @@ def _stands(row: Array) -> bool:
     return bool(np.convolve(stuck, np.ones(STUCK), "valid").max(initial=0) >= STUCK or stuck.sum() > OFTEN)
 
 
-def _hum(heard: list[Heard]) -> dict[str, Any]:
-    """A tone at the mains and its multiples, of one amplitude in all recordings."""
+def _hum(heard: list[Heard], known_hz: float) -> dict[str, Any]:
+    """A tone at the mains and its multiples, of one amplitude in all recordings of the object that has most. known_hz: as all evidence had it."""
     h = max(heard, key=lambda one: len(one.impulse_n_s))
     assert h.signal is not None
-    found = hum_of(h.signal, h.noise, h.sr)
+    found = hum_of(h.signal, h.noise, h.sr, known_hz)
     return {} if found is None else {"hum_hz": found.hz, "hum_amplitude": found.amplitude, "hum_phase_rad": found.phase_rad}
 
 

@@ -25,6 +25,7 @@ HELD = 0.999  # of the energy of what is played again
 MOST, FEW = 0.6, 0.05  # of the strikes show it one by one; of all recordings' energy, that it must say together where fewer do: beating twins hide it
 FADE = 2.0  # nepers over what is looked at
 ALL, CLEARLY, HALF = 0.25, 1.35, 0.5  # of what one hit leaves of all strikes: said by a second one, over the next best exponent, and left by all hits
+APART = 1.3  # loudest over softest strike, for that
 RATIOS = (0.75, 0.9, 1.0)
 HITS = (3, 4, 5, MOST_HITS)
 RESTITUTIONS = (0.2, 0.35, 0.5, 0.65, 0.8)
@@ -83,16 +84,21 @@ class Rebound:
 
     @classmethod
     def _of_all(cls, h: Heard) -> Self | None:
-        """Read off all strikes at once: what rings for long is alike a whole number of turns later, so that one strike alone tells many a delay."""
+        """Read off all strikes at once: what rings for long is alike a whole number of turns later, so that one strike alone tells many a delay.
+
+        Strikes of one strength are of no use: there all exponents say the same, and nothing tells a hit from what beats.
+        """
         level = np.array([j if np.isfinite(j) else 1.0 for j in h.impulse_n_s])
+        if len(level) < 2 or level.max() < APART * level.min():
+            return None
         reference = float(np.exp(np.log(level).mean()))
         (said, gap, exponent), (next_best, _, _), *_ = sorted(second_hit(h, level / reference), reverse=True)
-        if len(level) < 2 or not (said > ALL and said > CLEARLY * next_best):
+        if not (said > ALL and said > CLEARLY * next_best):
             return None
         start = cls(gap, reference, RESTITUTIONS[1], exponent, None, 2)
         left, best = min((_refined(replace(start, hits=k), h) for k in (2, *HITS)), key=lambda end: end[0])
         alone, count = _refined(replace(start, hits=1), h)[0], len(level)
-        return replace(start, **best) if count + left < HALF * (count + alone) else None
+        return replace(start, **best) if best["restitution"] > LEAST and count + left < HALF * (count + alone) else None
 
     @classmethod
     def _one_by_one(cls, h: Heard) -> Self | None:

@@ -182,7 +182,8 @@ class Heard:
 class Evidence:
     """All that an effect is told: the objects' strikes, the material's α and β and the case's gain so far, effects found so far by id, band and seed.
 
-    known: what the effect said of the whole evidence, where this is a part of it: it is there to be fitted again, not to be looked for.
+    known: what the effect said of the whole evidence, or beside other effects: it is there to be fitted again, not to be looked for.
+    on_trial: whether this is the evidence without a strike, known's numbers to be told again; axes of twins, which a linear body has no part of, stand as known has them.
     """
 
     heard: tuple[Heard, ...]
@@ -193,6 +194,7 @@ class Evidence:
     band_hz: tuple[float, float]
     seed: int = 0
     known: Effect | None = None
+    on_trial: bool = False
 
 
 @runtime_checkable

@@ -72,7 +72,7 @@ class TensorFamily:
         return value[order] / self.body.length_m**2, np.concatenate(vectors, axis=1)[:, order]
 
     def slopes(self, vector: Array, value: Array) -> Array:
-        """∂ ln λ/∂(C_k/ρ) (9, m) in s²/m² of modes (b, m) with λ (m,), as `modes` gives them."""
+        """∂ ln λ/∂(C_k/ρ) (9, m) in s²/m² of modes (b, m) with λ (m,), all or some of those that `modes` gives."""
         found = np.zeros((len(ORTHOTROPIC), len(value)))
         for a, b in pairwise(self.ends):
             mine = np.flatnonzero(vector[a:b].any(axis=0))

@@ -11,7 +11,7 @@ from test_found_again import BAND, fitted
 
 from sonic_bullet.diagnosis.baseline import takes_of
 from sonic_bullet.diagnosis.bodies import Struck
-from sonic_bullet.diagnosis.evidence import evidence_of
+from sonic_bullet.diagnosis.evidence import evidence_of, thinned
 from sonic_bullet.diagnosis.judge import mean_db
 from sonic_bullet.diagnosis.play import Hypothesis
 from sonic_bullet.diagnosis.refit import refitted
@@ -64,6 +64,12 @@ def test_twins_have_the_axes_that_their_envelopes_tell() -> None:
     assert found.freq_hz == pytest.approx((middle,), rel=1e-3)
     assert found.turn_rad[0] == pytest.approx(0.6, abs=0.1)
     assert_nearer_than_the_meshs(found, base, body, evidence)
+    less = thinned(evidence, (evidence.heard[0].source, 2), 1.0, np.random.default_rng(0))
+    other = replace(found, turn_rad=(1.2,))
+    held, learnt = (AmplitudeDamping.propose(replace(less, known=other, on_trial=trial)) for trial in (True, False))
+    assert held is not None and learnt is not None
+    assert held.turn_rad == (1.2,) and learnt.turn_rad[0] == pytest.approx(0.6, abs=0.1)
+    assert abs(held.alpha_per_s / learnt.alpha_per_s - 1) > 1e-3, "decays are told under the axes that they are played with"
 
 
 def test_turned_twins_sound_as_before_where_nothing_is_choked() -> None:

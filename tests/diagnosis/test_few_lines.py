@@ -135,3 +135,24 @@ def test_in_a_room_a_tensor_must_place_more_lines_and_need_not_place_all(
     monkeypatch.setattr(orthotropy, "search", lambda _: (plain, Tensor("orthorhombic", stiff, -600.0 - gain, 0.003, matched, (), off)))
     monkeypatch.setattr(orthotropy, "_fits", lambda _: False)
     assert (orthotropy.Orthotropy.propose(replace(evidence_of(truth(), (), BAND), heard=(one,))) is not None) == named
+
+
+def test_lines_and_shifted_modes_have_in_common_what_counting_through_finds() -> None:
+    """Σ over pairs, each as far as they are near, over what modes have in common with themselves."""
+    from sonic_bullet.effects.elasticities import REACH, WIDE, _agreement
+    from sonic_bullet.effects.tensor_lines import Seen
+
+    rng = np.random.default_rng(4)
+    lines, modes = np.sort(rng.uniform(6, 9, 14)), np.sort(rng.uniform(6, 9, 22))
+    told = Told(lines, np.full(14, 1e-3), rng.uniform(0.3, 1, 14), None, np.arange(0), elastic(modes, modes))
+    seen = Seen(modes, None, rng.uniform(0, 1, (14, 22)))  # type: ignore[arg-type]
+    first, shift = rng.uniform(0.2, 1, 14), np.arange(-REACH, REACH, WIDE / 2)
+    direct = []
+    for one in shift:
+        place = modes + one / 2
+        worth = np.interp(place, lines, first, 0.0, 0.0)
+        near = np.exp(-0.5 * ((lines[:, None] - place) / WIDE) ** 2)
+        shared = (told.worth[:, None] * first[:, None] * seen.alike**2 * near * worth).sum()
+        own = worth @ np.exp(-0.5 * ((place[:, None] - place) / WIDE) ** 2) @ worth
+        direct.append(shared / np.sqrt(max(own, 1.0)))
+    assert _agreement(told, seen, first, shift) == pytest.approx(np.array(direct), rel=1e-3, abs=1e-5)

@@ -65,8 +65,34 @@ def ringing(freq_hz: float, decay_per_s: float, strikes: int, seconds: float) ->
 
 @pytest.mark.parametrize("decay_per_s", [2.0, 4.0, 0.0])
 def test_a_mode_near_a_multiple_of_the_mains_is_no_hum(decay_per_s: float) -> None:
-    """However long it rings, and as equally loud the strikes are: it fades."""
-    assert (hum_of(ringing(401.0, decay_per_s, 4, 1.5), np.full(4, 1e-5), SR) is None) == (decay_per_s > 0)
+    """However long it rings, and as equally loud the strikes are: it fades, even one that would be low enough."""
+    assert hum_of(ringing(401.0, decay_per_s, 4, 1.5), np.full(4, 1e-5), SR) is None
+    assert (hum_of(ringing(99.0, decay_per_s, 4, 1.5), np.full(4, 1e-5), SR) is None) == (decay_per_s > 0)
+
+
+@pytest.mark.parametrize(("strength", "decay_per_s", "hums"), [((1, 1, 1, 1), 0.5, False), ((1, 2, 4, 8), 0.5, False), ((1, 1, 1, 1), 0.0, False)])
+def test_a_lone_tone_that_hardly_fades_is_no_hum_in_strikes_of_one_strength(strength: tuple[float, ...], decay_per_s: float, hums: bool) -> None:
+    """A bell's lowest mode may ring for ten seconds, and lie near the eighth multiple as near anything; with strength it goes, where there are several."""
+    sound = np.array(strength)[:, None] * ringing(401.0, decay_per_s, 4, 1.5)
+    assert (hum_of(sound, np.full(4, 1e-5), SR) is not None) == hums
+
+
+def test_a_lone_tone_is_a_hum_in_strikes_of_many_strengths_and_several_in_any() -> None:
+    tone, other, quiet = ringing(400.0, 0.0, 4, 1.5), ringing(350.0, 0.0, 4, 1.5), np.full(4, 1e-5)
+    click = np.zeros_like(tone)
+    click[:, 10] = (5.0, 10.0, 20.0, 40.0)
+    for sound, amplitude in ((tone + click, 1), (tone + other, 2)):
+        found = hum_of(sound, quiet, SR)
+        assert found is not None and found.hz == pytest.approx(50.0, abs=0.05)
+        assert np.count_nonzero(found.amplitude) == amplitude
+
+
+def test_one_recording_fits_a_known_hum_again_and_no_other() -> None:
+    sound, quiet = ringing(50.0, 0.0, 1, 1.5), np.full(1, 1e-5)
+    assert hum_of(sound, quiet, SR) is None
+    found = hum_of(sound, quiet, SR, 50.0)
+    assert found is not None and found.hz == pytest.approx(50.0, abs=0.02)
+    assert hum_of(sound, quiet, SR, 60.0) is None
 
 
 @pytest.mark.filterwarnings("error")

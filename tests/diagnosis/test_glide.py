@@ -94,6 +94,20 @@ def test_gliding_twins_have_their_own_axes() -> None:
     assert_nearer_than_the_meshs(found, base, body, evidence)
 
 
+def test_axes_of_twins_are_held_on_trial_and_learnt_again_beside_other_effects() -> None:
+    """By all fitted strikes, once; but where another effect has moved modes meanwhile, what were twins may be two lines, and have no axes to turn."""
+    model = with_twins()
+    body = recorded(AmplitudePitch(0.7, "velocity", (float(model.freq_hz[PAIR[0]]),), (0.6,)), model=model)
+    told = evidence_of(refitted(fitted(body), (body,)), (body,), BAND)
+    wrong = AmplitudePitch(0.7, "velocity", (float(model.freq_hz[PAIR[0]]),), (1.2,))
+    held, learnt = (AmplitudePitch.propose(replace(told, known=wrong, on_trial=trial)) for trial in (True, False))
+    assert held is not None and held.turn_rad == (1.2,)
+    assert learnt is not None and learnt.turn_rad[0] == pytest.approx(0.6, abs=0.06)
+    apart = replace(told.heard[0], plain=replace(model, freq_hz=np.sort(model.freq_hz * np.linspace(1, 1.05, len(model.freq_hz)))))
+    split = AmplitudePitch.propose(replace(told, heard=(apart,), known=wrong))
+    assert split is not None and split.turn_rad == ()
+
+
 def test_a_bend_is_told_with_the_axes_of_twins() -> None:
     """From half as far off as twins, read as one mode, may lead."""
     model = with_twins()

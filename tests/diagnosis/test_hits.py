@@ -52,6 +52,15 @@ def test_all_strikes_at_once_tell_no_hit_that_is_not_there(lacks: tuple[Effect, 
     assert Rebound._of_all(evidence_of(refitted(fitted(body), (body,)), (body,), BAND).heard[0]) is None
 
 
+def test_strikes_of_one_strength_tell_no_hit_from_what_beats() -> None:
+    """All exponents say the same of them, known strengths or none."""
+    body = recorded(Rebound(0.0197, 0.016, 0.25, 0.0, 0.25, 2))
+    heard = evidence_of(refitted(fitted(body), (body,)), (body,), BAND).heard[0]
+    assert Rebound._of_all(heard) is not None
+    for level in (np.full(len(heard.impulse_n_s), 0.016), np.full(len(heard.impulse_n_s), np.nan)):
+        assert Rebound._of_all(replace(heard, impulse_n_s=level)) is None
+
+
 def test_long_gaps_that_hardly_shrink() -> None:
     """Hits that ring on beyond what is looked at count for what is inside."""
     body = recorded(Rebound(0.15, 0.016, 0.6, 0.0, 0.9, 4))

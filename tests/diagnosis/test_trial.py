@@ -206,6 +206,41 @@ def test_three_weak_dashpots_are_told_together() -> None:
     assert np.linalg.norm(missed) < 0.5 * np.linalg.norm(own)
 
 
+def test_trials_tell_what_has_numbers_of_single_lines_all_lines(monkeypatch: pytest.MonkeyPatch) -> None:
+    """And one that searches by itself is not asked once enough is found and little left."""
+    monkeypatch.setattr("sonic_bullet.side_by_side._can_fork", lambda: False)
+    body = recorded()
+    takes, h = takes_of((body,)), refitted(fitted(body), (body,))
+    asked: list[tuple[str, int]] = []
+
+    class Listens(Idle):
+        id: ClassVar[str] = "listens"
+        by_line: ClassVar[bool] = True
+        stage: ClassVar[Stage] = Stage.FORCE
+
+        @classmethod
+        def propose(cls, evidence: Evidence) -> Self | None:
+            asked.append((cls.id, len(evidence.heard[0].freq_hz)))
+            return cls()
+
+    class Part(Listens):
+        id: ClassVar[str] = "part"
+        by_line: ClassVar[bool] = False
+
+    class Searches(Listens):
+        id: ClassVar[str] = "searches"
+        searches: ClassVar[bool] = True
+
+    told = evidence_of(h, (body,), BAND)
+    count = len(told.heard[0].freq_hz)
+    trials(h, (body,), takes, told, (Listens, Part, Searches), seed=0, say=lambda _: None)
+    assert {n for who, n in asked if who in ("listens", "searches")} == {count}
+    assert {n for who, n in asked if who == "part"} == {count, round(KEPT * count)}
+    asked.clear()
+    trials(h, (body,), takes, replace(told, found=("room", "radiation")), (Listens, Searches), seed=0, say=lambda _: None, costly=False)
+    assert {who for who, _ in asked} == {"listens"}
+
+
 def test_a_lines_own_numbers_are_tried_with_all_lines() -> None:
     """Told by no other line, but by the other strikes; the corrections that they are held against, too."""
     body = recorded()
