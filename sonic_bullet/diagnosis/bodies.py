@@ -184,10 +184,10 @@ def shapeless(found: CaseFit, gathered: Gathered) -> Struck:
     shape[:, 0] = 1.0
     shape[-1, 0] = weight
     way = np.tile([1.0, 0, 0], (len(mine) + 1, 1))
-    order = np.argsort(lines.freq_hz)
-    undamped = np.hypot(2 * np.pi * lines.freq_hz, np.nan_to_num(lines.decay_per_s))[order] / (2 * np.pi)
+    undamped = np.hypot(2 * np.pi * lines.freq_hz, np.nan_to_num(lines.decay_per_s)) / (2 * np.pi)
+    order = np.argsort(undamped)
     empty = np.zeros((0, 3))
-    model = ModalModel(undamped, np.zeros(len(order)), shape[:, :, order], np.zeros((len(shape), 3)), empty, np.zeros(0), 0.0, 0.0, note="no mesh")
+    model = ModalModel(undamped[order], np.zeros(len(order)), shape[:, :, order], np.zeros((len(shape), 3)), empty, np.zeros(0), 0.0, 0.0, note="no mesh")
     return Struck(gathered.thing.name, mine, model, way, impulse, "lines", None, np.zeros(len(order)), order, gathered)
 
 

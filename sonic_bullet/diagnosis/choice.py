@@ -16,12 +16,10 @@ from sonic_bullet.diagnosis.exchange import ALIKE
 from sonic_bullet.diagnosis.judge import Judged, mean_db
 from sonic_bullet.diagnosis.play import Hypothesis, moves, moves_itself
 from sonic_bullet.diagnosis.refit import refitted, retold, with_effects
-from sonic_bullet.diagnosis.ties import misfit
+from sonic_bullet.diagnosis.ties import CLEAR, HINT, NEARLY, misfit
 from sonic_bullet.diagnosis.trial import SURE, Candidate, needed
 from sonic_bullet.effects.values import Evidence
 
-NEARLY = 0.2  # of what a name says: between two that differ by less, phases may decide
-CLEAR, HINT = 25.0, 5.0  # twice the ln likelihood of phases that this takes; where the two are ALIKE
 HELPS = 0.5  # of what a name must gain on strikes left out, on all of them together: a model of few lines may be saved by chance once one is left out
 LINES = 6.0  # twice the ln likelihood of decays left out: what a name must gain where the room's response says the same of the strikes
 SAME = 0.1  # of what a room's response leaves open: two that differ by less say the same

@@ -18,8 +18,10 @@ from sonic_bullet.diagnosis.bodies import Struck
 from sonic_bullet.diagnosis.by_lines import misfit, of_decays
 from sonic_bullet.diagnosis.evidence import evidence_of, thinned
 from sonic_bullet.diagnosis.judge import Take, mean_db
-from sonic_bullet.diagnosis.play import Hypothesis
+from sonic_bullet.diagnosis.play import Hypothesis, moves
 from sonic_bullet.diagnosis.refit import refitted, with_effects
+from sonic_bullet.diagnosis.ties import HINT, NEARLY
+from sonic_bullet.diagnosis.ties import misfit as phases
 from sonic_bullet.diagnosis.trial import MANY, SURE, Candidate
 from sonic_bullet.effects.values import Effect, Evidence
 from sonic_bullet.records import Array
@@ -123,7 +125,12 @@ def exchanged(
             other = settled(other, bodies, takes, band_hz)
             far = left_out_db(best, place, bodies, takes, band_hz) if far is None else far
             now = left_out_db(other, place, bodies, takes, band_hz)
-            if surely(far - now, ALIKE * rival.mean_db) and not decays_against(other.effects[place], best, other, place, bodies, band_hz):
+            gain = far - now
+            if (
+                surely(gain, ALIKE * rival.mean_db)
+                and not (np.nanmean(gain) < NEARLY * rival.mean_db and phases_against(best, other, bodies))
+                and not decays_against(other.effects[place], best, other, place, bodies, band_hz)
+            ):
                 best, far, names = other, now, names - {own.id} | {rival.id}
                 added = [*added[:i], rival, *added[i + 1 :]]
     return best, [replace(c, effect=next(e for e in best.effects if e.id == c.id)) for c in added]
@@ -136,6 +143,11 @@ def decays_against(rival: Effect, best: Hypothesis, other: Hypothesis, i: int, b
         return False
     told = evidence_of(best, bodies, band_hz)
     return misfit(other, rival, told, bodies) > misfit(best, own, told, bodies)
+
+
+def phases_against(best: Hypothesis, other: Hypothesis, bodies: tuple[Struck, ...]) -> bool:
+    """Whether the lines' phases (ties.py) speak for the name that is there: of two that strikes hardly tell apart, both must."""
+    return not (moves(best) or moves(other)) and phases(other, bodies) > phases(best, bodies) + HINT  # phases are held against lines as they were fitted
 
 
 def surely(gain_db: Array, least_db: float) -> bool:

@@ -17,13 +17,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sonic_bullet.diagnosis.bodies import Struck
-from sonic_bullet.diagnosis.choice import CLEAR, NEARLY, helps
+from sonic_bullet.diagnosis.choice import helps
 from sonic_bullet.diagnosis.evidence import evidence_of
 from sonic_bullet.diagnosis.exchange import again
 from sonic_bullet.diagnosis.judge import Judged, Take, least_db, mean_db
 from sonic_bullet.diagnosis.play import Hypothesis, moves, moves_itself
 from sonic_bullet.diagnosis.refit import refitted, retold, with_effects
-from sonic_bullet.diagnosis.ties import misfit
+from sonic_bullet.diagnosis.ties import CLEAR, NEARLY, misfit
 from sonic_bullet.diagnosis.trial import Candidate, earns, trials
 from sonic_bullet.side_by_side import side_by_side
 

@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
+import pytest
 from made_body import recorded, truth
 
+from sonic_bullet.diagnosis.bodies import shapeless
 from sonic_bullet.diagnosis.evidence import evidence_of
 from sonic_bullet.effects.damping_law import DampingLaw
 from sonic_bullet.effects.points import solved
 from sonic_bullet.effects.radiation import Radiation
 from sonic_bullet.effects.support_damping import SupportDamping
+from sonic_bullet.estimator.fitted import CaseFit
 
 BAND = (50.0, 7_500.0)
 
@@ -32,3 +37,17 @@ def test_least_squares_say_nothing_where_nothing_is_told() -> None:
     assert left.tolist() == [0.0, 0.0, 0.0]
     found, _ = solved(y, np.full(3, 0.1), columns)
     assert np.allclose(found, [1.0, 1.0])
+
+
+def test_lines_without_a_mesh_are_modes_in_the_order_of_their_undamped_frequencies() -> None:
+    """A tone that is gone at once may lie below another and have the higher undamped frequency."""
+    gathered = recorded().gathered
+    assert gathered is not None
+    decay = gathered.lines.decay_per_s.copy()
+    freq = gathered.lines.freq_hz.copy()
+    freq[5], freq[6], decay[5], decay[6] = 1400.0, 1401.0, 900.0, 10.0
+    lines = replace(gathered.lines, freq_hz=freq, decay_per_s=decay)
+    found = cast(CaseFit, SimpleNamespace(case=SimpleNamespace(recordings=gathered.recordings)))
+    body = shapeless(found, replace(gathered, lines=lines))
+    assert (np.diff(body.model.freq_hz) > 0).all()
+    assert 2 * np.pi * body.model.freq_hz == pytest.approx(np.hypot(2 * np.pi * freq, decay)[body.line])

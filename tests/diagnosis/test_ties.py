@@ -10,6 +10,7 @@ from made_body import recorded, truth
 
 from sonic_bullet.diagnosis.choice import simplest
 from sonic_bullet.diagnosis.evidence import evidence_of
+from sonic_bullet.diagnosis.exchange import phases_against
 from sonic_bullet.diagnosis.refit import refitted
 from sonic_bullet.diagnosis.ties import misfit
 from sonic_bullet.diagnosis.trial import Candidate
@@ -17,6 +18,7 @@ from sonic_bullet.effects import Effect
 from sonic_bullet.effects.contact_time import ContactTime
 from sonic_bullet.effects.damping_law import DampingLaw
 from sonic_bullet.effects.measurement_chain import MeasurementChain
+from sonic_bullet.effects.mode_splitting import ModeSplitting
 from sonic_bullet.effects.radiation import Radiation
 
 BAND = (50.0, 7_500.0)
@@ -99,3 +101,15 @@ def test_neither_gain_nor_delay_is_a_misfit() -> None:
     moved = replace(body, gathered=replace(body.gathered, lines=late))
     assert misfit(h, (moved,)) == pytest.approx(misfit(h, (body,)), abs=3.0)
     assert misfit(truth(), (body,)) > misfit(h, (body,)) + 20
+
+
+def test_a_name_that_phases_speak_for_is_not_left_for_one_that_strikes_hardly_prefer() -> None:
+    """Either way; of two that move modes phases say nothing."""
+    for effect in (PULSE, LOW):
+        body = recorded(effect)
+        pulse, low = (c.hypothesis for c in told_by(effect))
+        own, other = (pulse, low) if effect is PULSE else (low, pulse)
+        assert phases_against(own, other, (body,))
+        assert not phases_against(other, own, (body,))
+        split = replace(own, effects=(*own.effects, ModeSplitting((600.0,), (0.01,), (0.0,))))
+        assert not phases_against(split, other, (body,))
