@@ -1,14 +1,15 @@
 """`amplitude-damping`: friction and plasticity take more of a loud mode than of a soft one.
 
-    ȧ = −d a (1 + c a)      ->      a₀/a(t) = (1 + c a₀) e^{dt} − c a₀         [Adhikari 2013, ch. 1; equivalent damping: Nayfeh & Mook 1979, § 3.3]
+    ȧ = −d a (1 + (c a)^p)      ->      (a₀/a(t))^p = (1 + (c a₀)^p) e^{pdt} − (c a₀)^p       [Adhikari 2013, ch. 1; equivalent damping: Nayfeh & Mook 1979, § 3.3]
 
-Read off the envelopes of single modes, or twins: early decay faster than late, the more so the harder the strike; d is the mode's, c of all,
-and twins have the axes that the envelopes tell (axes.py).
+p = 1: drag that goes with velocity²; p = 2: with velocity³. Read off the envelopes of single modes, or twins: early decay faster than late, the more so the
+harder the strike; d is the mode's, c of all, and twins have the axes that the envelopes tell (axes.py).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -23,6 +24,7 @@ from sonic_bullet.records import Array, ModalModel
 BETTER = 3.0  # of ln variance of the envelopes' logarithms, all lines together
 SHARE, FEWEST = 0.5, 1.5  # of the misfit must go, in lines that a choke would bend; of such lines
 LEAST = 0.05  # of c a₀ at the loudest
+POWERS = (1.0, 2.0)
 CHOKES = np.geomspace(0.02, 30, 28)  # of c a₀ at the loudest
 AGAIN = np.geomspace(0.4, 2.5, 9)  # of what all evidence said
 TURNS = 0.1  # of a line's ln variance, that its twins' axes must be worth
@@ -30,7 +32,7 @@ TURNS = 0.1  # of a line's ln variance, that its twins' axes must be worth
 
 @dataclass(frozen=True)
 class AmplitudeDamping:
-    """choke: relative rise of the decay per level. measure: as in amplitude-pitch. alpha_per_s, beta_s: the material's, as the decays at low level tell them.
+    """choke: 1/level at which the decay has doubled; power: of the level, with which it rises, 1 or 2. measure: as in amplitude-pitch. alpha_per_s, beta_s: the material's, as the decays at low level tell them.
 
     louder: modes at the onset over what the linear model plays, as its lines miss some of a fall that is no exponential. freq_hz, turn_rad: of twins, and how
     far their axes are turned from the mesh's.
@@ -50,10 +52,11 @@ class AmplitudeDamping:
     louder: float = 1.0
     freq_hz: tuple[float, ...] = ()
     turn_rad: tuple[float, ...] = ()
+    power: float = 1.0
 
     def apply(self, x: Ring) -> Ring:
         """The ringing with the effect in it."""
-        return replace(x, choke=x.choke + self.choke * _per_velocity(x, self.measure))
+        return replace(x, choke=x.choke + self.choke * _per_velocity(x, self.measure), choke_power=self.power)
 
     def turned(self, x: ModalModel) -> ModalModel:
         """The modes as they were, twins about their own axes."""
@@ -62,7 +65,7 @@ class AmplitudeDamping:
     def parameters(self) -> dict[str, Any]:
         """What it says, for people and JSON, in SI units."""
         twins = [{"freq_hz": f, "turn_rad": t} for f, t in zip(self.freq_hz, self.turn_rad, strict=True)]
-        return {"choke": self.choke, "measure": self.measure} | ({"twins": twins} if twins else {})
+        return {"choke": self.choke, "measure": self.measure, "power": self.power} | ({"twins": twins} if twins else {})
 
     def freedom(self) -> int:
         return 2 + len(self.freq_hz)
@@ -75,12 +78,14 @@ class AmplitudeDamping:
             e = envelopes(h)
             if e is None:
                 continue
-            for name in [known.measure] if known is not None else levels(h):
-                lines = [_held(line, known) if evidence.on_trial and known is not None else line for line in lines_under(e, h, name)]
+            for name, power in [(known.measure, known.power)] if known is not None else product(levels(h), POWERS):
+                lines = [replace(line, power=power) for line in lines_under(e, h, name)]
+                if evidence.on_trial and known is not None:
+                    lines = [_held(line, known) for line in lines]
                 found = _fitted(lines, known.choke if known is not None else None)
                 if found is not None and (best is None or found.gain > best[0]):
                     axes = (known.freq_hz, known.turn_rad) if evidence.on_trial and known is not None else _axes(lines, found)
-                    best = (found.gain, cls(found.choke, name, *_rayleigh(h, lines, found.told), _louder(h, lines, found), *axes))
+                    best = (found.gain, cls(found.choke, name, *_rayleigh(h, lines, found.told), _louder(h, lines, found), *axes, power))
         return best[1] if best is not None else None
 
 

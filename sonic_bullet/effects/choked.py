@@ -1,6 +1,6 @@
 """Lines whose decay goes with the level of the modes they stand for: d and what is left, for a given choke c; and the axes of twins.
 
-    ln |z_s(t)| = const_s + ln |Σ_m A_sm e/(1 + x_sm (1 − e))|,   e = e^{−dt},  x_sm = c a_sm            [effects.amplitude_damping]
+    ln |z_s(t)| = const_s + ln |Σ_m A_sm e/(1 + x_sm (1 − e^p))^{1/p}|,   e = e^{−dt},  x_sm = (c a_sm)^p            [effects.amplitude_damping]
     d by Gauss and Newton; const_s of each strike alone, so no gain is needed
 
 Two twins are one line, and each is choked by its own level: how loud each is depends on where the pair's axes lie, which in a linear body nobody
@@ -30,7 +30,7 @@ FAINT = 1e-3  # of Σ|A|: twins may cancel, not vanish
 class Line:
     """A line's frames: time_s (t,), logarithm (s, t) and weight (s, t) of |z|; amplitude and level (p, s, j) of its j modes under p angles of their axes.
 
-    freq_hz: the modes' middle in the model; decay_per_s: as heard. number: which of the heard.
+    freq_hz: the modes' middle in the model; decay_per_s: as heard. number: which of the heard. power: p.
     """
 
     number: int
@@ -41,6 +41,7 @@ class Line:
     weight: Array
     amplitude: Array
     level: Array
+    power: float = 1.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -112,14 +113,14 @@ def under(line: Line, angle: int = 0) -> Line:
 
 def _model(line: Line, choke: float, decay: Array) -> tuple[Array, Array]:
     """ln |z| (p, s, t) but for a constant, and its slope over the decay."""
-    fall = np.exp(-decay[:, None] * line.time_s)[:, None, None, :]  # (p, 1, 1, t)
-    x = choke * line.level[..., None]  # (p, s, j, 1)
-    under = 1 + x * (1 - fall)
-    part = line.amplitude[..., None] / under
+    fall = np.exp(-line.power * decay[:, None] * line.time_s)[:, None, None, :]  # (p, 1, 1, t)
+    x = (choke * line.level[..., None]) ** line.power  # (p, s, j, 1)
+    less = 1 + x * (1 - fall)
+    part = line.amplitude[..., None] * less ** (-1 / line.power)
     total = part.sum(axis=2)
     least = FAINT * np.abs(line.amplitude).sum(axis=2)[..., None]
     total = np.where(np.abs(total) > least, total, np.where(total < 0, -1.0, 1.0) * np.maximum(least, 1e-300))
-    slope = -line.time_s * (part * (1 + x) / under).sum(axis=2) / total
+    slope = -line.time_s * (part * (1 + x) / less).sum(axis=2) / total
     return np.log(np.abs(total)) - decay[:, None, None] * line.time_s, slope
 
 

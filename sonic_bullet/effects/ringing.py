@@ -1,11 +1,11 @@
 """Modes that ring, sample by sample: linear ones by recursion, level-dependent ones in closed form.
 
     linear             x_m(t) = Re A e^{(−d + iω)t}
-    choke c            ȧ = −d a (1 + c a/a₀)          ->  a(t)/a₀ = 1/((1 + c) e^{dt} − c)                    (separable)
+    choke c            ȧ = −d a (1 + c (a/a₀)^p)      ->  a(t)/a₀ = ((1 + c) e^{pdt} − c)^{−1/p}, p = 1, 2   (Bernoulli's equation)
     bend b             ω(t) = ω (1 + b a²(t))         ->  phase ω(t + b ∫a²dt)
 
-a is the mode's level (peak velocity at the surface); ∫a² dt = a₀² (1 − e^{−2dt})/2d without choke, and with it, u = e^{dt}, k = c/(1 + c):
-∫ a² dt = a₀²/(d (1 + c)²) ∫₁ᵘ dv/(v (v − k)²) = a₀²/(d (1 + c)²) [ln(v/(v − k))/k² − 1/(k (v − k))]₁ᵘ.
+a is the mode's level (peak velocity at the surface); ∫a² dt = a₀² (1 − e^{−2dt})/2d without choke; a₀² ln(1 + c − c e^{−2dt})/2dc with p = 2; and with p = 1,
+u = e^{dt}, k = c/(1 + c):   ∫ a² dt = a₀²/(d (1 + c)²) ∫₁ᵘ dv/(v (v − k)²) = a₀²/(d (1 + c)²) [ln(v/(v − k))/k² − 1/(k (v − k))]₁ᵘ.
 """
 
 # mypy: disable-error-code="no-untyped-def"
@@ -36,8 +36,8 @@ def _linear(out, start, pole, amplitude, length):
 
 
 @njit(cache=True, nogil=True)
-def _level(out, start, sr, omega, decay, amplitude, bend, choke, length):
-    """The same with ω(t) and d(t) that depend on the mode's level; bend and choke at the level the mode starts with."""
+def _level(out, start, sr, omega, decay, amplitude, bend, choke, power, length):
+    """The same with ω(t) and d(t) that depend on the mode's level; bend and choke at the level the mode starts with, (choke·level)^power."""
     for k in range(len(omega)):
         first = int(np.ceil(start))
         last = min(len(out), first + length[k])
@@ -49,6 +49,10 @@ def _level(out, start, sr, omega, decay, amplitude, bend, choke, length):
             if abs(share) < 1e-4:
                 level = np.exp(-d * t)
                 area = (1.0 - level * level) / (2.0 * d) if d > 0 else t
+            elif power == 2.0:
+                fall = np.exp(-2.0 * d * t)
+                level = np.exp(-d * t) / np.sqrt(1.0 + c - c * fall)
+                area = np.log(1.0 + c - c * fall) / (2.0 * d * c)
             else:
                 u = np.exp(d * t)
                 level = 1.0 / ((1.0 + c) * u - c)
@@ -73,8 +77,19 @@ def sounded(ring: Ring, blow: Blow, n: int, sr: int) -> Array:
             _linear(out, delay * sr, pole[~bent], (share * a)[~bent].astype(complex), length[~bent])
         if bent.any():
             level = (ring.level[use] * share * np.abs(blow.spectrum(f)))[bent]
-            bend, choke = ring.bend[use][bent] * level**2, ring.choke[use][bent] * level
-            _level(out, delay * sr, float(sr), 2 * np.pi * f[bent], np.maximum(d[bent], 1e-6), (share * a)[bent].astype(complex), bend, choke, length[bent])
+            bend, choke = ring.bend[use][bent] * level**2, (ring.choke[use][bent] * level) ** ring.choke_power
+            _level(
+                out,
+                delay * sr,
+                float(sr),
+                2 * np.pi * f[bent],
+                np.maximum(d[bent], 1e-6),
+                (share * a)[bent].astype(complex),
+                bend,
+                choke,
+                ring.choke_power,
+                length[bent],
+            )
     return out
 
 

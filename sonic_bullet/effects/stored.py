@@ -71,7 +71,7 @@ def with_modes(model: ModalModel, material: Material) -> ModalModel:
     ring = Ring(model.freq_hz, model.decay_per_s, none, level, none, none)
     for effect in effects:
         ring = effect.apply(ring)
-    return replace(model, bend_s2_m2=ring.bend, choke_s_m=ring.choke)
+    return replace(model, bend_s2_m2=ring.bend, choke_s_m=ring.choke, choke_power=ring.choke_power)
 
 
 def of_stage(material: Material, stage: Stage) -> Sequence[Effect]:

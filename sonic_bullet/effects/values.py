@@ -70,7 +70,7 @@ class Blow:
 class Ring:
     """m modes as one strike starts them: freq_hz, decay_per_s (m,), amplitude (m,) complex at the sensor; level (m,): peak velocity at the surface in m/s.
 
-    bend, choke (m,): relative change of frequency per level², of decay per level; 0 in a linear body.
+    bend, choke (m,): relative change of frequency bend·level², of decay (choke·level)^choke_power, 1 or 2; 0 in a linear body.
     """
 
     freq_hz: Array
@@ -80,6 +80,7 @@ class Ring:
     bend: Array
     choke: Array
     impulse_n_s: float = 1.0
+    choke_power: float = 1.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)

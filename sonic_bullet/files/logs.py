@@ -56,11 +56,12 @@ RESIDUAL_ARRAYS: dict[str, tuple[int | None, ...]] = {
 Vector = tuple[float, float, float]
 
 
-class _Model(msgspec.Struct):
+class _Model(msgspec.Struct, omit_defaults=True):
     volume_m3: float
     mass_kg: float
     dropped: int
     note: str
+    choke_power: float = 1.0
 
 
 class _Residual(msgspec.Struct):
@@ -225,7 +226,7 @@ def _pack_material(x: Material) -> _Material:
 
 
 def _pack_model(x: ModalModel) -> _Model:
-    return _Model(float(x.volume_m3), float(x.mass_kg), int(x.dropped), _text(x.note))
+    return _Model(float(x.volume_m3), float(x.mass_kg), int(x.dropped), _text(x.note), float(x.choke_power))
 
 
 def _pack_body(x: Body, material: int | None, model: int | None) -> _Body:
@@ -259,7 +260,7 @@ def _model_arrays(model: ModalModel, index: int) -> dict[str, Array]:
 def _unpack_model(header: _Model, arrays: Mapping[str, Array], index: int, path: object) -> ModalModel:
     parts = {name: take(arrays, f"model{index}_{name}", dtype, shape, path) for name, (dtype, shape) in MODEL_ARRAYS.items()}
     parts |= {name: take(arrays, f"model{index}_{name}", float, (None,), path) for name in BENT_ARRAYS if f"model{index}_{name}" in arrays}
-    return ModalModel(**parts, volume_m3=header.volume_m3, mass_kg=header.mass_kg, dropped=header.dropped, note=header.note)
+    return ModalModel(**parts, volume_m3=header.volume_m3, mass_kg=header.mass_kg, dropped=header.dropped, note=header.note, choke_power=header.choke_power)
 
 
 def _unpack_residual(header: _Residual | None, arrays: Mapping[str, Array], index: int, path: object) -> Residual | None:

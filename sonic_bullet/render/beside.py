@@ -60,7 +60,7 @@ def build_beside(sounder: Sounder, sr: int, air: Air) -> Beside | None:
     at, follows = at[keep], follows[keep]
     weight = 1j * voice.lines.ratio[at] * sounder.weight[:, follows]
     bend, choke = (None if x is None else x[follows] for x in (sounder.bend, sounder.choke))
-    return Beside(voice, ModeSet(omega[keep], decay[keep], weight, bend=bend, choke=choke), follows, group)
+    return Beside(voice, ModeSet(omega[keep], decay[keep], weight, bend=bend, choke=choke, choke_power=sounder.choke_power), follows, group)
 
 
 @lru_cache(maxsize=64)

@@ -32,7 +32,7 @@ FASTEST_RIGID = 0.6
 @dataclass(frozen=True, slots=True, eq=False)
 class Sounder:
     """omega_rad_s, decay_per_s (m,): with the air's damping. weight (w, m): complex, one row a weight set (row 0: pressure at 1 m).
-    bend, choke (m,): of frequency per |z|², of decay per |z|, None in a linear body. shape (v, 3, m) float32: audible modes only.
+    bend, choke (m,): of frequency per |z|², of decay by (choke·|z|)^choke_power, None in a linear body. shape (v, 3, m) float32: audible modes only.
     size_m: cube root of the volume. jerk_pa_s3: dipole coefficient [Chadwick 2012]. dropped: modes not played.
     """
 
@@ -49,6 +49,7 @@ class Sounder:
     dropped: int
     bend: Array | None = None
     choke: Array | None = None
+    choke_power: float = 1.0
 
     @property
     def mode_count(self) -> int:
@@ -107,7 +108,7 @@ def build_sounder(body: Body, sensors: tuple[Sensor, ...], sr: int, air: Air) ->
     most = np.sqrt((shape.astype(float) ** 2).sum(axis=1)).max(axis=0, initial=0.0)  # velocity at the surface of a mode with |z| = 1
     bend = None if model.bend_s2_m2 is None else model.bend_s2_m2[keep] * most**2
     choke = None if model.choke_s_m is None else model.choke_s_m[keep] * most
-    return Sounder(body, omega, decay, weight, shape, index, normal, _size(body), radius, rigid, dropped, bend, choke)
+    return Sounder(body, omega, decay, weight, shape, index, normal, _size(body), radius, rigid, dropped, bend, choke, model.choke_power)
 
 
 def _rigid(body: Body, sets: int, sr: int, air: Air) -> ModeSet | None:

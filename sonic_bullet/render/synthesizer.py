@@ -93,7 +93,7 @@ def with_bodies(setup: Setup, state: State, bodies: Sequence[Body]) -> State:
         part
         for s, more in zip(new, beside, strict=True)
         for part in (
-            bank.ModeSet(s.omega_rad_s, s.decay_per_s, s.weight, bend=s.bend, choke=s.choke),
+            bank.ModeSet(s.omega_rad_s, s.decay_per_s, s.weight, bend=s.bend, choke=s.choke, choke_power=s.choke_power),
             *((s.rigid or _nothing(setup),) * 3),
             line_modes(more, len(s.weight)),
         )

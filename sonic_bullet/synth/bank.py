@@ -42,7 +42,7 @@ class ModeSet:
 
     held: forces act evenly over the sample before each instant, (e^s - 1)/s, and strikes' impulses over their spacing, not at once: for modes
     that are gone within a few samples, of which a slow force must leave its slope alone.
-    bend, choke (m,): of level-dependent modes, ω (1 + bend·|z|²) and d (1 + choke·|z|); None: linear. See `bank_kernel.bend_poles`.
+    bend, choke (m,): of level-dependent modes, ω (1 + bend·|z|²) and d (1 + (choke·|z|)^choke_power); None: linear. See `bank_kernel.bend_poles`.
     """
 
     omega_rad_s: Array
@@ -51,6 +51,7 @@ class ModeSet:
     held: bool = False
     bend: Array | None = None
     choke: Array | None = None
+    choke_power: float = 1.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -72,7 +73,7 @@ class Bank:
 
     log_pole (2·modes,): s/sr, real parts first; pole = e^{s/sr}; block = e^{256 s/sr}; quadrature (modes,) = d/ω; weight (W, 2·modes);
     heard (W, b): whether any weight of the body is not zero. held (modes,): of `ModeSet`; there 1 + i·quadrature is what (1 + i d/ω)(e^s - 1)/s
-    is to its real part, which is in the weight. bend, choke (modes,), bent (b,): of bodies whose poles go with their level.
+    is to its real part, which is in the weight. bend, choke, power (modes,), bent (b,): of bodies whose poles go with their level.
     """
 
     sr: int
@@ -87,6 +88,7 @@ class Bank:
     held: Array
     bend: Array
     choke: Array
+    power: Array
     bent: Array
 
     @property
@@ -139,7 +141,7 @@ def empty_bank(sr: int, weight_sets: int = 1, at: int = 0) -> tuple[Bank, BankSt
     none, flags = np.zeros(0), np.zeros(0, bool)
     bank = Bank(
         int(sr), np.zeros(1, np.int64), np.zeros(0, np.int64), none, none, none, none, np.zeros((weight_sets, 0)), np.zeros((weight_sets, 0), bool), flags,
-        none, none, flags,
+        none, none, none, flags,
     )  # fmt: skip
     silent = (np.zeros((weight_sets, 0, BLOCK)), flags.copy(), flags.copy(), flags.copy(), Pending.none())
     return bank, BankState(int(at), none.copy(), none.copy(), *silent, none.copy(), none.copy())
@@ -170,13 +172,14 @@ def append(bank: Bank, state: BankState, bodies: Sequence[ModeSet]) -> tuple[Ban
     s = np.zeros(total, complex)
     pole, block = np.zeros(total, complex), np.zeros(total, complex)
     quadrature, weight, held = np.zeros(total), np.zeros((sets, total), complex), np.zeros(total, bool)
-    bend, choke = np.zeros(total), np.zeros(total)
+    bend, choke, power = np.zeros(total), np.zeros(total), np.ones(total)
     if len(place):
         omega, decay = np.concatenate([x.omega_rad_s for x in bodies]), np.concatenate([x.decay_per_s for x in bodies])
         step = (-decay + 1j * omega) / bank.sr
         s[place], pole[place], block[place] = step, np.exp(step), np.exp(BLOCK * step)
         held[place] = np.repeat([x.held for x in bodies], sizes)
         bend[place], choke[place] = (np.concatenate([_or_zero(getattr(x, name), m) for x, m in zip(bodies, sizes, strict=True)]) for name in ("bend", "choke"))
+        power[place] = np.repeat([x.choke_power for x in bodies], sizes)
         onset = (1 + 1j * decay / omega) * np.where(held[place], np.expm1(step) / step, 1.0)
         quadrature[place] = np.where(held[place], onset.imag / onset.real, decay / omega)
         weight[:, place] = flushed(np.concatenate([x.weight for x in bodies], axis=1) * np.where(held[place], onset.real, 1.0))
@@ -194,6 +197,7 @@ def append(bank: Bank, state: BankState, bodies: Sequence[ModeSet]) -> tuple[Ban
         np.concatenate([bank.held, held]),
         np.concatenate([bank.bend, bend]),
         np.concatenate([bank.choke, choke]),
+        np.concatenate([bank.power, power]),
         np.concatenate([bank.bent, np.array([x.bend is not None or x.choke is not None for x in bodies], bool)]),
     )
     state = state.copy()
@@ -236,7 +240,7 @@ def advance(bank: Bank, state: BankState, n: int, strikes: Sequence[Strike] = ()
     out = np.zeros((bank.weight.shape[0], bank.body_count, n))
     done = np.zeros(len(pending.body), bool)
     bank_kernel.advance(
-        state.at, out, bank.offset, bank.count, state.pole, state.block, bank.log_pole, bank.bend, bank.choke, bank.bent, bank.quadrature, bank.weight, bank.heard,
+        state.at, out, bank.offset, bank.count, state.pole, state.block, bank.log_pole, bank.bend, bank.choke, bank.power, bank.bent, bank.quadrature, bank.weight, bank.heard,
         state.z, state.driven, state.sound, state.ringing, state.is_driven, state.tiled, FLOOR**2,
         np.searchsorted(pending.body, np.arange(bank.body_count + 1)), pending.count, pending.whole, pending.delta, pending.phase,
         pending.upcoming, pending.first, pending.impulse, pending.impulse_at, pending.rows.reshape(-1), pending.rows_at, done,

@@ -39,13 +39,13 @@ def assert_nearer_than_the_meshs(found: AmplitudeDamping | AmplitudePitch, base:
     assert own is not None and mesh is not None and own < mesh
 
 
-@pytest.mark.parametrize("choke", [2.0, 5.0])
-def test_choke_and_decays_are_told_to_a_few_percent(choke: float) -> None:
-    """However weak, as decays are no longer picked from a grid."""
-    body = recorded(AmplitudeDamping(choke, "velocity"))
+@pytest.mark.parametrize(("choke", "power"), [(2.0, 1.0), (5.0, 1.0), (4.0, 2.0)])
+def test_choke_and_decays_are_told_to_a_few_percent(choke: float, power: float) -> None:
+    """However weak, as decays are no longer picked from a grid; and with what power of the level."""
+    body = recorded(AmplitudeDamping(choke, "velocity", power=power))
     base = refitted(fitted(body), (body,))
     found = AmplitudeDamping.propose(evidence_of(base, (body,), BAND))
-    assert found is not None and found.measure == "velocity" and found.freq_hz == ()
+    assert found is not None and (found.measure, found.power, found.freq_hz) == ("velocity", power, ())
     assert found.choke == pytest.approx(choke, rel=0.1)
     assert found.alpha_per_s == pytest.approx(ALPHA, rel=0.03)
     assert found.beta_s == pytest.approx(BETA, rel=0.03)

@@ -121,16 +121,17 @@ def test_a_pulse_is_its_own_integral(pulse: str) -> None:
     assert np.allclose(spectrum(pulse, tau, freq), told, atol=2e-6)
 
 
-def test_a_bent_mode_is_the_equation_solved() -> None:
-    """Against 4th-order Runge-Kutta of ȧ = −d a(1 + c a), θ̇ = ω(1 + b a²)."""
+@pytest.mark.parametrize("power", [1.0, 2.0])
+def test_a_bent_mode_is_the_equation_solved(power: float) -> None:
+    """Against 4th-order Runge-Kutta of ȧ = −d a(1 + (c a)^p), θ̇ = ω(1 + b a²)."""
     f, d, level, bend, choke, sr, n = 300.0, 8.0, 0.4, 0.05, 1.7, 8000, 4000
     one = np.ones(1)
-    ring = Ring(f * one, d * one, 0.7 * one.astype(complex), level * one, bend * one, choke * one)
+    ring = Ring(f * one, d * one, 0.7 * one.astype(complex), level * one, bend * one, choke * one, choke_power=power)
     got = sounded(ring, Blow(1.0, np.zeros(1), one), n, sr)
 
     def slope(state: Any) -> Any:
         a = state[0]
-        return np.array([-d * a * (1 + choke * a), 2 * np.pi * f * (1 + bend * a * a)])
+        return np.array([-d * a * (1 + (choke * a) ** power), 2 * np.pi * f * (1 + bend * a * a)])
 
     state, step, made = np.array([level, 0.0]), 1 / sr / 4, []
     for i in range(4 * n):

@@ -88,7 +88,7 @@ def test_a_wrong_residual_is_one_line_that_names_the_file(tmp_path: Path, change
 EFFECTS = [
     {"id": "damping-law", "law": "constant-loss", "eta": 0.004},
     {"id": "amplitude-pitch", "bend": 50.0, "measure": "velocity"},
-    {"id": "amplitude-damping", "choke": 30.0, "measure": "velocity", "alpha_per_s": 8.0, "beta_s": 1e-8},
+    {"id": "amplitude-damping", "choke": 30.0, "measure": "velocity", "alpha_per_s": 8.0, "beta_s": 1e-8, "power": 2.0},
 ]
 
 
@@ -120,6 +120,7 @@ def test_a_preset_with_effects_and_a_residual_plays_both(tmp_path: Path) -> None
     assert beside is not None and beside.lines.bend is not None and beside.lines.choke is not None and sounder.bend is not None and sounder.choke is not None
     assert (beside.lines.bend == sounder.bend[beside.follows]).all() and beside.lines.bend.all()
     assert (beside.lines.choke == sounder.choke[beside.follows]).all() and beside.lines.choke.all()
+    assert beside.lines.choke_power == sounder.choke_power == 2.0
     whole.save(tmp_path / "both.npz")
     assert (render_log(read_log(tmp_path / "both.npz")) == sound).all()
 
