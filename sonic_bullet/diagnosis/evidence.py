@@ -42,7 +42,8 @@ def heard_of(h: Hypothesis, body: Struck, *, sounds: bool = True, anew: bool = F
     rows = pattern(body, model)[mine]
     push = rows * start(body.kind, model) * in_band(body, model)
     direct = path_response(h, body, model.freq_hz, gathered.sr) if gathered.signals is not None else np.ones(model.mode_count)
-    spectrum = np.stack([blow_of(h, body, i).spectrum(model.freq_hz) for i in mine]) * direct
+    pressed = np.stack([blow_of(h, body, i).spectrum(model.freq_hz) for i in mine])
+    spectrum = pressed * direct
     expected = np.stack([(h.gain * push * spectrum)[:, m].sum(axis=1) for m in mode], axis=1) if mode else np.zeros((len(mine), 0), complex)
     told = np.stack([rows[:, m].sum(axis=1) for m in mode], axis=1) if mode else np.zeros((len(mine), 0))
     own = replace(h, correction=None)
@@ -82,6 +83,7 @@ def heard_of(h: Hypothesis, body: Struck, *, sounds: bool = True, anew: bool = F
         sr=gathered.sr,
         signed=lines.signed,
         push=h.gain * push * spectrum,
+        pressed=np.abs(pressed),
         all_hz=model.freq_hz,
         plain=plain if body.family is not None else None,
         strike=tuple(range(len(mine))),
@@ -186,6 +188,7 @@ def _thin(h: Heard, strike: int | None, keep: float, rng: np.random.Generator) -
         signal=h.signal[s] if h.signal is not None else None,
         predicted=h.predicted[s] if h.predicted is not None else None,
         push=h.push[s],
+        pressed=h.pressed[s],
         noise=h.noise[s] if len(h.noise) == len(h.impulse_n_s) else h.noise,
         strike=tuple(h.strike[i] for i in s),
     )

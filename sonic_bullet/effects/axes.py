@@ -57,7 +57,7 @@ def about(h: Heard, k: int, measure: str, angle: Array) -> tuple[Array, Array]:
     most = np.sqrt((bodies[:, body] ** 2).sum(axis=2)).max(axis=1)  # (p, j)
     push = np.einsum("psxj,sx->psj", bodies[:, h.strike_vertex], h.strike_way)
     heard = np.einsum("pxj,x->pj", bodies[:, h.sensor_vertex], h.sensor_way)
-    level = impulse * np.abs(push) * most[:, None, :]
+    level = impulse * np.abs(push) * most[:, None, :] * h.pressed[:, h.mode[k]]
     if measure == "displacement":
         level = level / (2 * np.pi * h.model.freq_hz[h.mode[k]])
     elif measure == "impulse":

@@ -133,14 +133,14 @@ def _fast(n: int) -> int:
 
 
 def levels(h: Heard) -> dict[str, Array]:
-    """How hard each line (s, k) is driven, by three measures: the impulse, peak velocity and peak displacement at the body's surface."""
+    """How hard each line (s, k) is driven, by three measures: the impulse, and what the pulse leaves of it: peak velocity and peak displacement at the body's surface."""
     level = np.where(np.isfinite(h.impulse_n_s), h.impulse_n_s, 1.0)
     found = {"impulse": np.repeat(level[:, None], len(h.freq_hz), axis=1)}
     if h.model is None:
         return found
     body = np.unique(h.model.face)
     most = np.sqrt((h.model.shape[body].astype(float) ** 2).sum(axis=1)).max(axis=0)
-    push = np.abs(np.einsum("sxm,sx->sm", h.model.shape[h.strike_vertex].astype(float), h.strike_way)) * most
+    push = np.abs(np.einsum("sxm,sx->sm", h.model.shape[h.strike_vertex].astype(float), h.strike_way)) * most * h.pressed
     velocity = level[:, None] * np.stack([push[:, m].max(axis=1) for m in h.mode], axis=1)
     return found | {"velocity": velocity, "displacement": velocity / (2 * np.pi * h.freq_hz)}
 

@@ -159,6 +159,7 @@ class Heard:
     sr: int
     signed: bool
     push: Array  # (s, m) complex: every mode's amplitude at the sensor under the model so far, its pulse included
+    pressed: Array  # (s, m) share of the strike's impulse that each mode takes, under the pulse so far
     all_hz: Array  # (m,) their frequencies
     plain: ModalModel | None  # `model` with the mesh's own frequencies
     strike: tuple[int, ...] = ()

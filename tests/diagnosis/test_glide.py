@@ -20,6 +20,7 @@ from sonic_bullet.diagnosis.rest import _off_hz, at_rest
 from sonic_bullet.effects import amplitude_pitch
 from sonic_bullet.effects.amplitude_pitch import FAR as FARTHER
 from sonic_bullet.effects.amplitude_pitch import NEAR, AmplitudePitch, _moments, _slopes
+from sonic_bullet.effects.contact_time import ContactTime
 from sonic_bullet.effects.envelope import Envelopes, alone, envelopes
 from sonic_bullet.effects.glided import bend_beside
 from sonic_bullet.effects.room import Room
@@ -177,3 +178,14 @@ def test_a_bend_that_one_lone_mode_alone_tells_is_told_by_all(monkeypatch: pytes
     assert not found.single
     assert found.bend == pytest.approx(BENT.bend, rel=0.15)
     assert not _slopes(e, told, AmplitudePitch(-BENT.bend)), "the other way is another bend"
+
+
+def test_a_bend_is_told_by_the_levels_that_the_pulse_leaves() -> None:
+    """A long contact hardly drives high modes: it is their own velocity they bend with, not what the impulse alone would give them."""
+    pulse, bent = ContactTime(6e-4, 0.016, 0.0), AmplitudePitch(0.7, "velocity")
+    body = recorded(pulse, bent, noise=2e-6)
+    told = evidence_of(refitted(replace(fitted(body), effects=(pulse,)), (body,)), (body,), BAND)
+    assert told.heard[0].pressed.min() < 0.2 and told.heard[0].pressed.max() > 0.9
+    found = AmplitudePitch.propose(told)
+    assert found is not None and found.measure == "velocity"
+    assert found.bend == pytest.approx(0.7, rel=0.1)

@@ -32,7 +32,9 @@ def wanted(bend: float, choke: float, n: int, power: float = 1.0) -> Array:
     return sounded(ring, Blow(1.0, np.zeros(1), np.ones(1)), n, SR)
 
 
-@pytest.mark.parametrize(("bend", "choke", "power"), [(0.004, 0.0, 1.0), (-0.004, 0.0, 1.0), (0.0, 0.8, 1.0), (0.003, 0.8, 1.0), (0.0, 0.9, 2.0), (0.003, 0.9, 2.0)])
+@pytest.mark.parametrize(
+    ("bend", "choke", "power"), [(0.004, 0.0, 1.0), (-0.004, 0.0, 1.0), (0.0, 0.8, 1.0), (0.003, 0.8, 1.0), (0.0, 0.9, 2.0), (0.003, 0.9, 2.0)]
+)
 def test_bent_modes_follow_the_closed_form(bend: float, choke: float, power: float) -> None:
     """32 samples late at most: 2π f b a² · 0.67 ms of phase, c a d · 0.67 ms of level, and no drift after that."""
     made, right = played(bend, choke, [SR], power=power), wanted(bend, choke, SR, power)
