@@ -23,6 +23,7 @@ LINKS = (
 )  # a chain's next line is so much shorter at least, and as near as that many times its decay; whether modes are only bent
 SHORTER = 5.0  # at most
 NEAR = 0.012  # of a frequency
+ONE = 2.0  # decays: slow lines that lie nearer are one mode's
 LONG, FRAMES, FAINT = 3.0, 120, 0.03  # of 1/d; of the strongest level
 FEWEST, SHARE = 4, 0.1  # chains, and of all modes' lines: fewer are neighbours, hits or a room's
 PLAIN = 4  # links of the loudest line's chain, which bends most, the shorter the farther off: neighbours are two or three
@@ -83,7 +84,10 @@ def _falls(lines: Lines, group: Array) -> float:
 
 
 def chains(lines: Lines, link: tuple[float, float, bool]) -> list[Array]:
-    """The lines in groups, by index, the slowest first; most stand alone."""
+    """The lines in groups, by index, the slowest first; most stand alone.
+
+    A line follows the nearest one that it may; two that follow none are two modes though others lie between, unless they are one on the other.
+    """
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import connected_components
 
@@ -91,5 +95,12 @@ def chains(lines: Lines, link: tuple[float, float, bool]) -> list[Array]:
     ratio = decay[None, :] / np.maximum(decay[:, None], 1e-12)
     gap = np.abs(omega[:, None] - omega[None, :])
     linked = (ratio > link[0]) & (ratio < SHORTER) & (gap < link[1] * decay[None, :]) & (gap < NEAR * omega[:, None]) & (decay[:, None] > 0)
-    group = connected_components(csr_array(linked), directed=False)[1]
+    first = ~linked.any(axis=0)
+    parent = np.where(linked, gap, np.inf).argmin(axis=0) if len(omega) else np.zeros(0, int)
+    follows = np.zeros_like(linked)
+    follows[parent[~first], np.flatnonzero(~first)] = True
+    shared = linked[first].astype(int) @ linked[first].T.astype(int) > 0
+    same = shared & (gap < ONE * np.maximum(decay[:, None], decay[None, :]))[np.ix_(first, first)]
+    follows[np.ix_(first, first)] |= same
+    group = connected_components(csr_array(follows), directed=False)[1]
     return [who[np.argsort(decay[who], kind="stable")] for who in (np.flatnonzero(group == g) for g in range(group.max(initial=-1) + 1))]

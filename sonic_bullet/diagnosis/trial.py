@@ -108,7 +108,7 @@ def earns(c: Candidate, gap_db: float, *, first: bool) -> bool:
         return False
     more = c.whole_db - max(c.null_db, 0.0)  # a null effect is not held against corrections either
     drop = np.sort(c.drop_db)
-    if c.certain and c.loud and c.mean_db > needed(gap_db, first=first) and -np.minimum(drop, 0).sum() < LOST * drop[-1]:
+    if c.certain and c.loud and -np.minimum(drop, 0).sum() < LOST * drop[-1]:
         return more > 0.5 * need  # what goes with level is for the loudest to tell, which these others were fitted without
     if len(drop) > MANY and drop[1:].mean() > 3 * max(need, needed(gap_db, first=first)):
         drop = drop[1:]  # one strike may be odd: what it alone tells, none of the others did

@@ -94,6 +94,15 @@ def test_the_bend_and_its_measure_are_read_off_the_modes_that_show_it(measure: s
     assert found.bend == pytest.approx(true.bend, rel=0.1)
 
 
+def test_two_slow_lines_are_two_modes_though_a_chain_lies_between() -> None:
+    """A pair that glides up passes its neighbour; as one group it would lose that line, and a mode would be put on the other."""
+    freq = np.array([3430.4, 3430.9, 3436.0, 3444.7, 3450.0])
+    decay = np.array([4.8, 5.0, 12.0, 4.9, 20.0])
+    amplitude, sd, n = np.ones((3, 5), complex), np.full(5, 0.01), np.full(3, 1e-5)
+    groups = chains(Lines(freq, decay, amplitude, sd, sd, np.full(amplitude.shape, 1e-3), n, np.full(5, 1e3), True), LINKS[1])
+    assert sorted(sorted(g.tolist()) for g in groups) == [[0, 1, 2], [3, 4]]
+
+
 @pytest.mark.parametrize(("links", "louder", "step", "one"), [(2, 2, 1, False), (3, 2, 1, False), (4, 0.5, 1, False), (4, 2, -1, False), (4, 2, 1, True)])
 def test_one_long_chain_will_do(links: int, louder: float, step: int, one: bool) -> None:
     """Of a body of which only the lowest mode is struck hard enough to bend; two or three lines together may be neighbours, a room has many that are soft,
