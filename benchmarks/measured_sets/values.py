@@ -130,6 +130,7 @@ def heard(lines: Lines) -> Heard:
         sr=0,
         signed=False,
         push=size,
+        pressed=np.ones(size.shape),
         all_hz=lines.freq_hz,
         plain=None,
     )
