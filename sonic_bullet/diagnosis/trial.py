@@ -244,7 +244,7 @@ def _tried(kind: type[Effect], whole: Effect, h: Hypothesis, bodies: tuple[Struc
         effect = kind.propose(replace(less, known=whole, on_trial=True))
         if effect is None:
             return Gain()
-        free = effect.freedom() - len(getattr(effect, "turn_rad", ()))  # axes are whole's
+        free = effect.freedom() - (len(getattr(effect, "turn_rad", ())) if hasattr(effect, "turned") else 0)  # such axes are whole's (Evidence.on_trial)
         random = [Null.fitted(less, min(free, 8), 10 * i + draw) for draw in range(DRAWS)]
         beside = _beside(fold, effect)
         after = _after(fold, beside)

@@ -78,8 +78,9 @@ class AmplitudeDamping:
             e = envelopes(h)
             if e is None:
                 continue
-            for name, power in [(known.measure, known.power)] if known is not None else product(levels(h), POWERS):
-                lines = [replace(line, power=power) for line in lines_under(e, h, name)]
+            plain = {name: lines_under(e, h, name) for name in (levels(h) if known is None else (known.measure,))}
+            for name, power in product(plain, POWERS if known is None else (known.power,)):
+                lines = [replace(line, power=power) for line in plain[name]]
                 if evidence.on_trial and known is not None:
                     lines = [_held(line, known) for line in lines]
                 found = _fitted(lines, known.choke if known is not None else None)

@@ -2,8 +2,7 @@
 
 Σ_i a_i cos(2π i f₀ t + φ_i),   f₀ about 50 or 60 Hz: read off the last third of every recording, where least else is left
 
-One recording, or strikes of one strength, tell no lone tone from a mode that rings for long, unless it is as low as the mains or fades; several multiples they do: modes are not
-in tune with the mains.
+One recording tells no hum from a mode that rings for long; nor do strikes of one strength, unless the tone fades, or several multiples sound: modes are not in tune with the mains.
 """
 
 from __future__ import annotations
@@ -19,7 +18,7 @@ MOST = 8  # multiples
 ABOVE = 30.0  # times the power beside it
 STEADY = 1.6  # loudest over softest recording
 STILL = 0.2  # ln of its amplitude in the second half of the tails over that in the first, at most: modes fade
-LEAST_S = 0.2  # of tails
+FEWEST, LEAST_S = 2, 0.2  # recordings, and the length of their tails
 LOW, UNLIKE = 2, 2.0  # multiples where no mode is to be expected; loudest over softest peak of strikes, with which a mode would go
 
 
@@ -35,14 +34,14 @@ class Hum:
 def hum_of(signals: Array, noise: Array, sr: int, known_hz: float = 0.0) -> Hum | None:
     """What hums in recordings (s, n) over a noise (s,); None where no tone has one amplitude in all of them, and from first to last.
 
-    known_hz: as other recordings told it; then a lone tone will do.
+    known_hz: as other recordings told it; then one will do.
     """
     from scipy.optimize import minimize_scalar
 
     start = signals.shape[1] - signals.shape[1] // 3
     tail = signals[:, start:]
     n = tail.shape[1]
-    if n < LEAST_S * sr:
+    if len(signals) < (1 if known_hz else FEWEST) or n < LEAST_S * sr:
         return None
     shape = np.hanning(n)
     spectrum = np.fft.rfft(tail * shape, 4 * n, axis=1)

@@ -88,7 +88,7 @@ def test_a_lone_tone_is_a_hum_in_strikes_of_many_strengths_and_several_in_any() 
 
 
 def test_one_recording_fits_a_known_hum_again_and_no_other() -> None:
-    sound, quiet = ringing(400.0, 0.0, 1, 1.5), np.full(1, 1e-5)
+    sound, quiet = ringing(50.0, 0.0, 1, 1.5), np.full(1, 1e-5)
     assert hum_of(sound, quiet, SR) is None
     found = hum_of(sound, quiet, SR, 50.0)
     assert found is not None and found.hz == pytest.approx(50.0, abs=0.02)
@@ -96,10 +96,10 @@ def test_one_recording_fits_a_known_hum_again_and_no_other() -> None:
 
 
 @pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize(("strikes", "seconds", "freq_hz"), [(1, 1.5, 400.0), (4, 0.3, 50.0), (4, 300 / SR, 50.0)])
-def test_too_little_tells_no_hum(strikes: int, seconds: float, freq_hz: float) -> None:
-    """A lone tone of one recording, or recordings too short to hear whether a tone fades, in silence."""
-    sound = ringing(freq_hz, 0.0, strikes, seconds)
+@pytest.mark.parametrize(("strikes", "seconds"), [(1, 1.5), (4, 0.3), (4, 300 / SR)])
+def test_too_little_tells_no_hum(strikes: int, seconds: float) -> None:
+    """One recording alone, or recordings too short to hear whether a tone fades, in silence."""
+    sound = ringing(50.0, 0.0, strikes, seconds)
     assert hum_of(sound, np.full(strikes, 1e-5), SR) is None
     assert stilled(sound, np.full(strikes, 1e-5), SR) is sound
 
