@@ -12,9 +12,10 @@ from __future__ import annotations
 
 import dataclasses
 import sys
+from typing import Any
 
 import numpy as np
-from estimator_speed import problem
+from estimator_speed import problem  # type: ignore[import-not-found]
 
 from sonic_bullet.estimator.metric import Constants
 from sonic_bullet.estimator.optimise import fast, polish
@@ -23,7 +24,7 @@ from sonic_bullet.estimator.values import Features
 from sonic_bullet.records import Array
 
 AWAY = np.array([1.1, 0.93, 1.01, 1.1])
-ROWS: tuple[tuple[str, float | int], ...] = (
+ROWS: tuple[tuple[str, Any], ...] = (
     ("bark_step", 0.25),
     ("bark_step", 1.0),
     ("levels", 3),

@@ -19,16 +19,20 @@ from sonic_bullet.errors import AudioError
 from sonic_bullet.estimator import exact, likelihood, noise, subspace
 from sonic_bullet.estimator.features import BAND_HZ, FASTEST_PER_S, extract
 from sonic_bullet.estimator.greedy import greedy
+from sonic_bullet.records import Array
 
 SR = 44_100
 
 
-def sound(freq, decay, amplitude, phase, count, sr=SR):
+def sound(freq: Array, decay: Array, amplitude: Array, phase: Array, count: int, sr: int = SR) -> Array:
     t = np.arange(count) / sr
-    return sum(a * np.exp(-d * t) * np.cos(2 * np.pi * f * t + p) for f, d, a, p in zip(freq, decay, amplitude, phase, strict=True))
+    found = np.zeros(count)
+    for f, d, a, p in zip(freq, decay, amplitude, phase, strict=True):
+        found += a * np.exp(-d * t) * np.cos(2 * np.pi * f * t + p)
+    return found
 
 
-def hundred(seed, law="uniform", phase="any", sr=SR, seconds=1.0, count=100):
+def hundred(seed: int, law: str = "uniform", phase: str = "any", sr: int = SR, seconds: float = 1.0, count: int = 100) -> tuple[Array, Array, Array, Array]:
     """The paper's test: f uniform in 20 … 21 500 Hz, d in 0.1 … 1000 1/s."""
     rng = np.random.default_rng(seed)
     freq = rng.uniform(20, 21_500, count)
@@ -38,7 +42,7 @@ def hundred(seed, law="uniform", phase="any", sr=SR, seconds=1.0, count=100):
     return freq, decay, amplitude, sound(freq, decay, amplitude, turn, int(seconds * sr), sr)
 
 
-def mixture(seed, db):
+def mixture(seed: int, db: float) -> tuple[Array, Array, Array, float, Array]:
     """Twenty pairs of modes 0.3 to 5 % apart, 100 Hz to 12 kHz, d 1 to 100 1/s, in white noise db below the sound."""
     rng = np.random.default_rng(seed)
     lower = 100 * 120 ** ((np.arange(20) + rng.uniform(0, 0.7, 20)) / 20)
@@ -49,12 +53,13 @@ def mixture(seed, db):
     return freq, decay, amplitude, sigma, clean + sigma * rng.standard_normal(SR)
 
 
-def paper(draws):
+def paper(draws: int) -> None:
     print(f"| sr | d | phase | draws | modes found | worst f | worst d | s of processor a draw |\n{'|---' * 8}|")
     for sr in (44_100, 48_000):
         for law in ("uniform", "logarithmic"):
             for phase in ("any", "sine"):
-                worst, counts, start = np.zeros(2), set(), time.process_time()
+                counts: set[int] = set()
+                worst, start = np.zeros(2), time.process_time()
                 for seed in range(draws):
                     freq, decay, _, x = hundred(seed + sr, law, phase, sr, 1.0 + seed % 3)
                     found = extract(x, sr)
@@ -67,15 +72,16 @@ def paper(draws):
                 )
 
 
-def steps():
-    cases = {"100 sinusoids, no noise": (*hundred(0)[:2], hundred(0)[3]), "40 modes, 40 dB": [mixture(1, 40.0)[k] for k in (0, 1, 4)]}
+def steps() -> None:
+    full, noisy = hundred(0), mixture(1, 40.0)
+    cases = {"100 sinusoids, no noise": (full[0], full[1], full[3]), "40 modes, 40 dB": (noisy[0], noisy[1], noisy[4])}
     print(f"| recording | step | features | of the modes | false | f: mean, median, worst | d: mean, median, worst | s |\n{'|---' * 8}|")
     for name, (freq, decay, x) in cases.items():
         begun = time.process_time()
         rows = [("the paper's, greedy", greedy(x, SR, len(freq))[:, :2])]
         times = [time.process_time() - begun]
 
-        def timed(label, pole, start, rows=rows, times=times):
+        def timed(label: str, pole: Array, start: float, rows: list[tuple[str, Array]] = rows, times: list[float] = times) -> None:
             rows.append((label, np.stack([pole.imag / (2 * np.pi), -pole.real], axis=1)))
             times.append(time.process_time() - start)
 
@@ -85,9 +91,12 @@ def steps():
         timed("poles by bands", pole, begun)
         if len(freq) == 100:
             begun = time.process_time()
-            raw = exact._poles(x[:1499], 500) * SR
-            timed("poles by the rank of the whole", raw, begun)
-            timed("… polished jointly", exact.modes(x, SR).pole, begun)
+            raw = exact._poles(x[:1499], 500)
+            assert raw is not None
+            timed("poles by the rank of the whole", raw * SR, begun)
+            polished = exact.modes(x, SR)
+            assert polished is not None
+            timed("… polished jointly", polished.pole, begun)
         else:
             start = likelihood.amplitudes(x, pole, SR)
             energy = likelihood.spreads(start, SR, len(x))[1] / noise.measured(likelihood.residual(x, start, SR), SR, 0.0).at(pole.imag / 2 / np.pi) ** 2
@@ -110,12 +119,14 @@ def steps():
             print(f"| {name} | {label} | {len(got)} | {len(i)} of {len(freq)} | {len(got) - len(i)} | {said} | {spent:.1f} |", flush=True)
 
 
-def mixtures(seeds):
+def mixtures(seeds: int) -> None:
     print(
         f"| noise | found | false | f: median, 90 % over the bound | d | spread of normalised errors f, d | s of processor a second of sound |\n{'|---' * 7}|"
     )
     for db in (20.0, 40.0, 60.0):
-        tally, errors, normal, start = np.zeros(4, int), ([], []), ([], []), time.process_time()
+        errors: tuple[list[float], list[float]] = ([], [])
+        normal: tuple[list[float], list[float]] = ([], [])
+        tally, start = np.zeros(4, int), time.process_time()
         for seed in range(seeds):
             freq, decay, amplitude, sigma, x = mixture(seed, db)
             found = extract(x, SR, onset_s=0.0)
@@ -139,7 +150,7 @@ def mixtures(seeds):
         )
 
 
-def real(folder):
+def real(folder: str) -> None:
     from sonic_bullet.files import read_audio
 
     print(f"| recording | s | features | the three of most energy: Hz ± sd (d ± sd 1/s) | noise dBFS | processor s | note |\n{'|---' * 7}|")

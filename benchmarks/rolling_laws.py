@@ -44,7 +44,7 @@ def run(kind: str, speed_m_s: float, seconds: float, *, floor: str | None = "woo
         mass, height, spin, friction = 7850 * 4 / 3 * np.pi * BALL_M**3, BALL_M, speed_m_s / BALL_M, 0.6
     else:
         shape = client.createCollisionShape(pybullet.GEOM_BOX, halfExtents=BOX_M)
-        mass, height, spin, friction = 700 * 8 * np.prod(BOX_M), BOX_M[2], 0.0, slope**0.5
+        mass, height, spin, friction = float(700 * 8 * np.prod(BOX_M)), BOX_M[2], 0.0, slope**0.5
     body = client.createMultiBody(mass, shape, basePosition=[start, 0, height])
     for one in (board, body):
         client.changeDynamics(one, -1, lateralFriction=friction, linearDamping=0, angularDamping=0)

@@ -39,7 +39,8 @@ for name, (mass, modulus, radius, zeta) in CASES.items():
     v, h = (a.ravel() for a in np.meshgrid(SPEED, ROUGH))
     p = len(v)
     rough = np.stack([0 * h, h], 1)
-    pairs = SurfacePairs(*(np.full(p, q) for q in (mass, modulus, radius, zeta)), rough, np.full((p, 2), 0.75), np.arange(2 * p).reshape(p, 2))
+    each = np.ones(p)
+    pairs = SurfacePairs(mass * each, modulus * each, radius * each, zeta * each, rough, np.full((p, 2), 0.75), np.arange(2 * p).reshape(p, 2))
     loads, state, out = SurfaceLoads(9.81 * pairs.mass_kg, np.stack([v, v], 1)), SurfaceState.at_rest(p), []
     for _ in range(60):
         force, state = advance(pairs, state, loads, loads, np.arange(960) / 960, SR)

@@ -98,7 +98,7 @@ def fixtures(thing: str, robot: Lines, hammer: Lines) -> tuple[list[Row], str, t
     worst = float(np.median(np.abs(100 * (g / f - 1))))
     fit, held = np.arange(len(f)) % 2 == 0, np.arange(len(f)) % 2 == 1
 
-    def error(extra: Array) -> float:
+    def error(extra: float) -> float:
         return float(np.median(np.abs(DB * np.log(np.maximum(d[held] + extra, 0.05) / e[held]))))
 
     c = max(float(np.median((e - d)[fit])), -0.9 * float(d.min()))
@@ -106,7 +106,7 @@ def fixtures(thing: str, robot: Lines, hammer: Lines) -> tuple[list[Row], str, t
     for _ in range(DRAWS):
         draw = rng.permutation(e[fit]) - d[fit]
         nulls.append(error(max(float(draw[rng.integers(len(draw))]), -0.9 * float(d.min()))))
-    before, after = error(np.zeros(int(held.sum()))), error(np.full(int(held.sum()), c))
+    before, after = error(0.0), error(c)
     rows = [
         Row(f"{thing}: frequencies, hammer from robot", len(f), "% of f", worst, worst, float("nan"), 1.0, ""),
         Row(
@@ -149,7 +149,10 @@ def strikers(takes: dict[tuple[str, str], list[Lines]]) -> tuple[list[Row], str]
             continue
         again = np.abs(there.freq_hz[None, :] / alone[:, None] - 1).min(axis=1) < NEAR
         draws = np.array(
-            [(np.abs(there.freq_hz[None, :] / x[:, None] - 1).min(axis=1) < NEAR).mean() for x in np.exp(rng.uniform(*np.log(BAND), (DRAWS, len(alone))))]
+            [
+                (np.abs(there.freq_hz[None, :] / x[:, None] - 1).min(axis=1) < NEAR).mean()
+                for x in np.exp(rng.uniform(np.log(BAND[0]), np.log(BAND[1]), (DRAWS, len(alone))))
+            ]
         )
         miss, null = 100 * (1 - again.mean()), 100 * (1 - np.median(draws))
         rows.append(

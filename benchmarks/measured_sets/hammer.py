@@ -182,10 +182,10 @@ def levels(name: str, soft: list[Hit], loud: list[Hit], seed: int = 0) -> list[R
     before, after = error(lambda h, f: 1.0), by(law(soft))
     nulls = np.array([by(law(soft, x, c)) for x, c in zip(rng.uniform(-0.5, 0.5, 60), np.exp(rng.uniform(np.log(0.2), np.log(5), 60)), strict=True)])
     own = error(lambda h, f: max(float(h.spectrum(np.array([f]))[0]), 0.02))
-    row = [f"{name}: level of lines", len(pairs), "dB", before]
     chance = [float((nulls <= e).mean()) for e in (after, own)]
     middle = float(np.median(nulls))
-    return [Row(*row, after, middle, chance[0], "contact-time (half-sine, τ ~ J^-1/5)"), Row(*row, own, middle, chance[1], "contact-time (measured pulse)")]
+    kinds = ((after, "contact-time (half-sine, τ ~ J^-1/5)"), (own, "contact-time (measured pulse)"))
+    return [Row(f"{name}: level of lines", len(pairs), "dB", before, e, middle, c, what) for (e, what), c in zip(kinds, chance, strict=True)]
 
 
 def paint(figure: Any, objects: dict[str, list[Hit]]) -> None:

@@ -1,11 +1,12 @@
 """Files of a set -> their damped sinusoids, found once and kept: the extraction is what costs.
 
-channel c of seconds s after t -> sonic_bullet.estimator.features.extract -> Features, in CACHE/<digest of samples and arguments>.npz
+channel c of seconds s after t -> sonic_bullet.estimator.features.extract -> Features, in CACHE/<digest of samples, arguments and code>.npz
+
+The code that finds them is part of the name: lines that an older version found were once taken for today's.
 """
 
 from __future__ import annotations
 
-import hashlib
 import os
 import tempfile
 from dataclasses import fields
@@ -15,8 +16,10 @@ from typing import Any
 
 import numpy as np
 
+from sonic_bullet import estimator
 from sonic_bullet.estimator.features import extract
 from sonic_bullet.estimator.values import Features
+from sonic_bullet.modal.cache import code_digest, key
 
 Array = np.ndarray[Any, Any]
 ARRAYS = tuple(f.name for f in fields(Features) if f.name not in ("onset_s", "noise_dbfs", "sr", "note"))
@@ -44,9 +47,13 @@ def cut(path: Path, channel: int = 0, start_s: float = 0.0, seconds: float | Non
     return np.ascontiguousarray(whole[first:last, channel]), sr
 
 
+def _code() -> bytes:
+    return code_digest(tuple(sorted(Path(estimator.__file__).parent.glob("*.py"))), ("numpy", "scipy", "numba"))
+
+
 def features(signal: Array, sr: int, *, onset_s: float | None = None, band_hz: tuple[float, float] | None = None) -> Features:
     """`extract`, once. Raises AudioError."""
-    text = hashlib.sha256(np.ascontiguousarray(signal).tobytes() + repr((sr, onset_s, band_hz)).encode()).hexdigest()[:24]
+    text = key("lines", np.ascontiguousarray(signal), sr, onset_s, repr(band_hz), code=_code())
     place = cache() / f"{text}.npz"
     if place.is_file():
         with np.load(place, allow_pickle=False) as kept:

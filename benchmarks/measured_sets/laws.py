@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.measured_sets.values import DRAWS, Array, Lines, Row, evidence
-from sonic_bullet.effects import DampingLaw
+from sonic_bullet.effects.damping_law import DampingLaw
 
 DB = 20 / np.log(10)
 SCATTER = 0.02

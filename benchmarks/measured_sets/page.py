@@ -100,6 +100,6 @@ def _figure(page: Page, path: Path) -> None:
     page.found.draw(figure)
     for axes in figure.axes:
         axes.tick_params(labelsize=7)
-        axes.xaxis.label.set_size(8)
-        axes.yaxis.label.set_size(8)
+        axes.xaxis.label.set_fontsize(8)
+        axes.yaxis.label.set_fontsize(8)
     figure.savefig(path, metadata={"Software": None})

@@ -2,6 +2,7 @@
 
 frequency  f_k of all fitted taps -> one factor of all lines a date: √(E/ρ) has changed                error: median |Δf|/f, ppm
 decay      d_k of all fitted taps -> one factor of all lines a date
+           each line by the factor of the others: one that is every line's own tells nothing of the next
 null       the same with the dates of the fitted taps drawn by lot
 """
 
@@ -16,7 +17,8 @@ from benchmarks.measured_sets.heard import lines
 from benchmarks.measured_sets.values import DRAWS, Array, Lines, Outcome, Row, clear
 
 TAPS = 16  # of a recording
-NEAR = 0.012
+NEAR, MOVED = 0.012, 0.04  # relative: from tap to tap, from date to date
+MOST = 0.6
 DB = 20 / np.log(10)
 
 
@@ -55,26 +57,33 @@ def judge(folder: Path, case: dict[str, Any]) -> Outcome:
 
 
 def table(taps: list[Lines], late: Array) -> tuple[Array, Array]:
-    """f and d (taps, k) of the lines that most taps of either date have; NaN where a tap lacks one."""
-    every = np.sort(np.concatenate([t.freq_hz for t in taps]))
-    groups = np.split(every, np.flatnonzero(np.diff(np.log(every)) > NEAR / 3) + 1)
-    rows = []
-    for group in groups:
-        middle = float(np.median(group))
-        row = np.full((2, len(taps)), np.nan)
-        for i, t in enumerate(taps):
-            if len(t.freq_hz):
-                j = int(np.abs(t.freq_hz / middle - 1).argmin())
-                if abs(t.freq_hz[j] / middle - 1) < NEAR:
-                    row[:, i] = t.freq_hz[j], t.decay_per_s[j]
-        have = np.isfinite(row[0])
-        if have[late].mean() > 0.6 and have[~late].mean() > 0.6:
-            rows.append(row)
-    if not rows:
+    """f and d (taps, k) of the lines that most taps of either date have; NaN where a tap lacks one.
+
+    A month may move a piece by more than its neighbouring lines are apart from tap to tap: lines are found date by date, and two dates'
+    are one where each is the other's nearest, within MOVED.
+    """
+    first, last = (often([t for t, x in zip(taps, late, strict=True) if x == side]) for side in (False, True))
+    pairs = [(a, b) for a in first for b in last if abs(b / a - 1) < MOVED and b == _nearest(last, a) and a == _nearest(first, b)]
+    if not pairs:
         raise ValueError("no line that most taps of both dates have")
-    freq, decay = np.array(rows)[:, 0].T, np.array(rows)[:, 1].T
-    _, single = np.unique(np.round(np.nanmedian(freq, axis=0), 0), return_index=True)
-    return freq[:, single], decay[:, single]
+    rows = np.full((2, len(taps), len(pairs)), np.nan)
+    for i, t in enumerate(taps):
+        for k, pair in enumerate(pairs):
+            j = int(np.abs(t.freq_hz / pair[int(late[i])] - 1).argmin()) if len(t.freq_hz) else -1
+            if j >= 0 and abs(t.freq_hz[j] / pair[int(late[i])] - 1) < NEAR:
+                rows[:, i, k] = t.freq_hz[j], t.decay_per_s[j]
+    return rows[0], rows[1]
+
+
+def often(taps: list[Lines]) -> list[float]:
+    """Frequencies in Hz that most of these taps have, ascending."""
+    every = np.sort(np.concatenate([t.freq_hz for t in taps]))
+    middle = [float(np.median(g)) for g in np.split(every, np.flatnonzero(np.diff(np.log(every)) > NEAR / 3) + 1)]
+    return [m for m in middle if np.mean([bool((np.abs(t.freq_hz / m - 1) < NEAR).any()) for t in taps]) > MOST]
+
+
+def _nearest(among: list[float], freq_hz: float) -> float:
+    return min(among, key=lambda f: abs(np.log(f / freq_hz)))
 
 
 def judged(what: str, unit: str, scale: float, value: Array, late: Array, effect: str) -> Row:
@@ -84,7 +93,8 @@ def judged(what: str, unit: str, scale: float, value: Array, late: Array, effect
 
     def error(date: Array, told: Array) -> float:
         middle = np.stack([np.nanmedian(y[fit & (date == side)], axis=0) for side in (False, True)])
-        factor = float(np.nanmedian(middle[1] - middle[0]))
+        moved = middle[1] - middle[0]
+        factor = np.array([np.nanmedian(np.delete(moved, k)) for k in range(len(moved))]) if len(moved) > 1 else np.zeros(1)
         base = np.nanmedian(np.where(date[fit][:, None], y[fit] - factor, y[fit]), axis=0)
         return float(np.nanmedian(np.abs(scale * (y[held] - base - factor * told[held][:, None]))))
 

@@ -68,5 +68,5 @@ def total(what: str, rows: list[Row]) -> Row:
     """Median over rows; chance: the median one's."""
     named = [r.effect for r in rows if r.effect]
     effect = max(set(named), key=named.count) if len(named) * 2 > len(rows) else ""
-    middle = [float(np.median([getattr(r, n) for r in rows])) for n in ("before", "after", "null", "chance")]
-    return Row(what, sum(r.count for r in rows), rows[0].unit, *middle, effect)
+    before, after, null, chance = (float(np.median([getattr(r, n) for r in rows])) for n in ("before", "after", "null", "chance"))
+    return Row(what, sum(r.count for r in rows), rows[0].unit, before, after, null, chance, effect)

@@ -139,4 +139,4 @@ def heard(lines: Lines) -> Heard:
 def evidence(bodies: list[Lines]) -> Evidence:
     """Several bodies' lines, all that is known of them."""
     top = max(float(b.freq_hz.max(initial=1.0)) for b in bodies)
-    return Evidence(tuple(heard(b) for b in bodies), ALPHA, BETA, 1.0, (20.0, top), 0)
+    return Evidence(tuple(heard(b) for b in bodies), ALPHA, BETA, 1.0, (), (20.0, top), 0)
