@@ -3,7 +3,7 @@
     Family at (γ, ν) -> λ (m,), shapes on the skin and at every strike and the sensor, as last "vertices" of one ModalModel
 
 An effect on the modes then changes strikes and sensor along with the body. A sensor without a place (microphone, plain sum) is a last vertex
-whose x component is each mode's weight. Without a mesh the modes are the lines themselves, every strike alike.
+whose x component is each mode's weight. Without a mesh the modes are the lines themselves, places as loud as they are heard.
 """
 
 from __future__ import annotations
@@ -175,7 +175,10 @@ def inward(family: Family, position: tuple[float, float, float]) -> Array:
 
 
 def shapeless(found: CaseFit, gathered: Gathered) -> Struck:
-    """An object without a mesh: its lines are its modes, of amplitudes per N·s that all strikes share (rms over the strikes, phase of the loudest)."""
+    """An object without a mesh: its lines are its modes. Strikes at one place, or at places not told, share the amplitudes per N·s (rms over them); each other place has its own.
+
+    What goes with the place is then nobody's to explain; a strike at a place that no fitted one was at is played as the rms over all.
+    """
     lines = gathered.lines
     mine = tuple(r for r in found.case.recordings if r.object == gathered.thing.name)
     impulse = np.array([np.nan if r.impulse_n_s is None else r.impulse_n_s for r in mine])
@@ -183,6 +186,10 @@ def shapeless(found: CaseFit, gathered: Gathered) -> Struck:
     shape = np.zeros((len(mine) + 1, 3, len(lines.freq_hz)), np.float32)
     shape[:, 0] = 1.0
     shape[-1, 0] = weight
+    for place in {(r.position_m, r.direction) for r in gathered.recordings if r.position_m is not None}:
+        here = np.array([(r.position_m, r.direction) == place for r in gathered.recordings])
+        own = amplitude_per_impulse(gathered, here) * np.where(np.nansum(lines.amplitude[here].real, axis=0) < 0, -1, 1)
+        shape[[i for i, r in enumerate(mine) if (r.position_m, r.direction) == place], 0] = np.nan_to_num(own / np.maximum(weight, 1e-300))
     way = np.tile([1.0, 0, 0], (len(mine) + 1, 1))
     undamped = np.hypot(2 * np.pi * lines.freq_hz, np.nan_to_num(lines.decay_per_s)) / (2 * np.pi)
     order = np.argsort(undamped)
@@ -191,7 +198,8 @@ def shapeless(found: CaseFit, gathered: Gathered) -> Struck:
     return Struck(gathered.thing.name, mine, model, way, impulse, "lines", None, np.zeros(len(order)), order, gathered)
 
 
-def amplitude_per_impulse(gathered: Gathered) -> Array:
-    """Rms over the strikes of |A|/J (k,); J = 1 where it is not known."""
-    level = np.array([r.impulse_n_s or 1.0 for r in gathered.recordings])
-    return np.asarray(np.sqrt(np.nanmean(np.abs(gathered.lines.amplitude / level[:, None]) ** 2, axis=0)))
+def amplitude_per_impulse(gathered: Gathered, of: Array | None = None) -> Array:
+    """Rms over the strikes, or over some (s,), of |A|/J (k,); J = 1 where it is not known."""
+    some = np.ones(len(gathered.recordings), bool) if of is None else of
+    level = np.array([r.impulse_n_s or 1.0 for r in gathered.recordings])[some]
+    return np.asarray(np.sqrt(np.nanmean(np.abs(gathered.lines.amplitude[some] / level[:, None]) ** 2, axis=0)))

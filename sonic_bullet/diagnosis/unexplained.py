@@ -13,6 +13,7 @@ from sonic_bullet.diagnosis.in_phase import of_no_body
 from sonic_bullet.diagnosis.judge import Take
 from sonic_bullet.diagnosis.loop import NO_BODY, Closed
 from sonic_bullet.diagnosis.play import Hypothesis, play
+from sonic_bullet.effects.copies import copied
 from sonic_bullet.records import Array
 
 WINDOW = 1024
@@ -48,6 +49,9 @@ def remainder(end: Closed, takes: tuple[Take, ...]) -> dict[str, Any]:
     strange = of_no_body(end.after, takes)
     if strange > NO_BODY:
         words += "; modes of one frequency, decay and phase each, whatever they are, do not play it: something goes with time or level, or is noise"
+    again = _again(takes)
+    if again is not None:
+        words += f"; most lines are heard again at {again:.4f} times their frequency, as loud against the first in every strike: an echo of something that moves does that"
     return {
         "left_db": end.after_db - end.floor_db,
         "words": words,
@@ -56,7 +60,14 @@ def remainder(end: Closed, takes: tuple[Take, ...]) -> dict[str, Any]:
         "slope_against_impulse": slope,
         "scatter_over_strikes": scatter,
         "share_of_no_modes": strange,
+        "lines_again_at_ratio": again,
     }
+
+
+def _again(takes: tuple[Take, ...]) -> float | None:
+    """The ratio of frequencies at which a body's lines are heard again, if they are."""
+    gathered = [g for body in {id(t.body): t.body for t in takes}.values() if (g := body.gathered) is not None]
+    return next((r for g in gathered if (r := copied(g.lines.freq_hz, g.lines.decay_per_s, g.lines.amplitude)) is not None), None)
 
 
 def _shares(takes: tuple[Take, ...], h: Hypothesis) -> tuple[Array, Array, Array]:

@@ -9,12 +9,13 @@ Read off the recordings: what remains of them beside the model is the model agai
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from sonic_bullet.effects.later_hits import EXPONENTS, LEAST, MOST_HITS, SPAN_S, hits_by_strike, second_hit
+from sonic_bullet.effects.later_hits import EXPONENTS, LEAST, MOST_HITS, SPAN_S, hits_by_strike, second_hit, third_hit
 from sonic_bullet.effects.ringing import direct_as_expected
 from sonic_bullet.effects.values import Blow, Evidence, Heard, Owner, Stage
 from sonic_bullet.records import Array
@@ -29,6 +30,7 @@ APART = 1.3  # loudest over softest strike, for that
 RATIOS = (0.75, 0.9, 1.0)
 HITS = (3, 4, 5, MOST_HITS)
 RESTITUTIONS = (0.2, 0.35, 0.5, 0.65, 0.8)
+SOUGHT = 0.07  # of what is left, that a third hit looked for at every lag must take: some lag always takes something
 
 
 @dataclass(frozen=True)
@@ -78,7 +80,7 @@ class Rebound:
         if h is None or len(h.freq_hz) < 3:
             return None
         if isinstance(evidence.known, cls):
-            again = _refined(evidence.known, h)[1]
+            again = _refined(evidence.known, h, known=True)[1]
             return replace(evidence.known, **again) if again["restitution"] > LEAST else None
         return cls._one_by_one(h) or cls._of_all(h)
 
@@ -131,10 +133,11 @@ class Rebound:
         return replace(start, **best)
 
 
-def _refined(start: Rebound, h: Heard) -> tuple[float, dict[str, Any]]:
-    """What is left, up to a constant, and the restitution, gaps and their ratio that leave least of all strikes at once: Σ_s |<y, m>|²/<m, m> is most, m the sound of all its hits."""
-    from scipy.optimize import minimize
+def _refined(start: Rebound, h: Heard, *, known: bool = False) -> tuple[float, dict[str, Any]]:
+    """What is left, up to a constant, and the restitution, gaps and their ratio that leave least of all strikes at once: Σ_s |<y, m>|²/<m, m> is most, m the sound of all its hits.
 
+    known: whether start is near what is looked for.
+    """
     assert h.signal is not None
     n = min(h.signal.shape[1], 3 * int(SPAN_S[1] * h.sr))
     size = 2 * n
@@ -172,9 +175,24 @@ def _refined(start: Rebound, h: Heard) -> tuple[float, dict[str, Any]]:
     first = np.array([start.restitution, 0.0, start.restitution if start.shrink is None else start.shrink])
     tries = [np.array([e, 0.0, r]) for e in (first[0], *RESTITUTIONS) for r in (first[2:] if start.shrink is None else (first[2], e, *RATIOS))]
     best = min(tries, key=left)
-    simplex = best + np.array([[0, 0, 0], [0.1, 0, 0], [0, 2e-4, 0], [0, 0, 2e-3]])
-    found = minimize(left, best, method="Nelder-Mead", options={"initial_simplex": simplex, "xatol": 1e-4, "fatol": 1e-6, "maxfev": 120})
-    return float(found.fun), of(found.x)
+    found = _nearby(left, best)
+    if start.hits > 2 and not known:
+        gap = start.gap_s * (level / start.impulse_n_s) ** start.exponent
+        whole = np.zeros((2, len(both), size // 2 + 1), complex)
+        whole[:, :, loud] = both, own
+        e = third_hit(gap, whole[0], whole[1], total, h.sr, fade)
+        other = _nearby(left, np.array([e, 0.0, e]))
+        found = other if found[0] - other[0] > SOUGHT * (len(level) + found[0]) else found
+    return found[0], of(found[1])
+
+
+def _nearby(left: Callable[[Array], float], start: Array) -> tuple[float, Array]:
+    """The least about a start."""
+    from scipy.optimize import minimize
+
+    simplex = start + np.array([[0, 0, 0], [0.1, 0, 0], [0, 2e-4, 0], [0, 0, 2e-3]])
+    found = minimize(left, start, method="Nelder-Mead", options={"initial_simplex": simplex, "xatol": 1e-4, "fatol": 1e-6, "maxfev": 120})
+    return float(found.fun), found.x
 
 
 def _turned(blow: Blow, freq_hz: Array, fade: float) -> Array:

@@ -16,6 +16,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from sonic_bullet.effects import tails
+from sonic_bullet.effects.copies import copied
 from sonic_bullet.effects.foreign_mode import ForeignMode
 from sonic_bullet.effects.values import Evidence, Heard, Owner, Sound, Stage
 from sonic_bullet.records import Array
@@ -90,6 +91,9 @@ class Room:
         heard = max(evidence.heard, key=lambda h: len(h.freq_hz))
         if heard.signal is None or heard.predicted is None or len(heard.freq_hz) < FEWEST or heard.signal.shape[1] < tails.LEAST * tails.FRAME_S * heard.sr:
             return None
+        sizes = np.concatenate([heard.amplitude, heard.foreign_amplitude], axis=1)
+        if copied(np.concatenate([heard.freq_hz, heard.foreign_hz]), np.concatenate([heard.decay_per_s, heard.foreign_decay_per_s]), sizes) is not None:
+            return None  # something moves
         found = late(heard, RT60 / evidence.known.rt60_s if isinstance(evidence.known, cls) else None)
         if found is None:
             return None

@@ -13,7 +13,7 @@ from sonic_bullet.diagnosis.evidence import evidence_of
 from sonic_bullet.diagnosis.refit import refitted
 from sonic_bullet.effects import Effect
 from sonic_bullet.effects.amplitude_pitch import AmplitudePitch
-from sonic_bullet.effects.later_hits import second_hit
+from sonic_bullet.effects.later_hits import second_hit, third_hit
 from sonic_bullet.effects.rebound import ALL, Rebound, _turned
 from sonic_bullet.effects.room import Room
 from sonic_bullet.effects.values import Blow
@@ -59,6 +59,19 @@ def test_strikes_of_one_strength_tell_no_hit_from_what_beats() -> None:
     assert Rebound._of_all(heard) is not None
     for level in (np.full(len(heard.impulse_n_s), 0.016), np.full(len(heard.impulse_n_s), np.nan)):
         assert Rebound._of_all(replace(heard, impulse_n_s=level)) is None
+
+
+@pytest.mark.parametrize("e", [0.31, 0.437, 0.72])
+def test_a_restitution_between_the_tried_ones_is_found_by_the_third_hits_phases(e: float) -> None:
+    n, gap = 6_000, np.array([0.0131, 0.0262])
+    t = np.arange(n) / SR
+    sound = sum(a * np.exp(-20 * t) * np.cos(2 * np.pi * f * t) for f, a in ((1_130.0, 1.0), (2_710.0, 0.8), (3_890.0, 0.6)))
+    x = np.stack([sound, 2 * sound])
+    freq, hit = np.fft.rfftfreq(2 * n, 1 / SR), np.fft.rfft(x, 2 * n)
+    late = np.stack([np.zeros(2), gap, gap * (1 + e)], axis=1)
+    y = sum(hit * share * np.exp(-2j * np.pi * freq * late[:, k, None]) for k, share in enumerate((1, e, e * e)))
+    found = third_hit(gap, np.conj(hit) * y, np.abs(hit) ** 2 + 0j, (np.abs(y) ** 2).sum(axis=1), SR, 0.0)
+    assert found == pytest.approx(e, abs=0.25 / 3_890 / gap.max())
 
 
 def test_long_gaps_that_hardly_shrink() -> None:
