@@ -30,6 +30,7 @@ FAINT = 1e-25  # of the direct sound's power
 PATTERN = 0.03  # of a line's strongest: what shapes are wrong by
 FASTEST = 300.0  # 1/s: what dies sooner is gone within a frame or two, and how soon is not told
 LIKE = 0.7  # squared cosine of amplitudes over the strikes and what the model says: a line less like its mode is the room's own
+OWNS = 8.0  # times longer than it is heard to ring: no line's own, though a tail makes several of one, which end sooner
 SURE = 0.1  # of a decay and of an amplitude: the tail's early echoes are no noise
 
 
@@ -106,7 +107,14 @@ def dried(h: Heard, delta: float) -> Heard:
     r = read(h, np.array([delta]), h.foreign_hz, alone, [np.zeros(0, int)] * len(h.foreign_hz))
     amplitude, _ = _rescaled(r, alone, h.foreign_amplitude, h.foreign_sd)
     strange = h.foreign_sd * np.abs(amplitude) / np.maximum(np.abs(h.foreign_amplitude), 1e-300)  # what strikes have in common says nothing of how they differ
-    return replace(dry, foreign_hz=h.foreign_hz + r.shift_hz[0], foreign_decay_per_s=r.decay_per_s[0], foreign_amplitude=amplitude, foreign_sd=strange)
+    other = r.decay_per_s[0] * OWNS < h.foreign_decay_per_s  # a tail prolongs: what is read to ring longer than it is heard to is a neighbour's
+    return replace(
+        dry,
+        foreign_hz=h.foreign_hz + np.where(other, 0, r.shift_hz[0]),
+        foreign_decay_per_s=np.where(other, h.foreign_decay_per_s, r.decay_per_s[0]),
+        foreign_amplitude=np.where(other, h.foreign_amplitude, amplitude),
+        foreign_sd=np.where(other, h.foreign_sd, strange),
+    )
 
 
 def _rescaled(r: Read, own: Array, amplitude: Array, sd: Array) -> tuple[Array, Array]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -154,6 +155,29 @@ def test_what_rings_along_in_a_room_is_told_once() -> None:
     found = ForeignMode.propose(evidence)
     assert found is not None
     assert found.freq_hz == pytest.approx((1000.0, 2710.0), rel=2e-3)
+
+
+def test_what_is_read_to_ring_far_longer_than_it_is_heard_to_is_a_neighbour(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A tail prolongs; of a strong slow mode close by, what is left between the patterns outlasts any lodger."""
+    lodger = ForeignMode((1000.0, 2710.0), (60.0, 14.0), (1.2, 0.9), (0.0, 0.0))
+    heard = heard_of(truth(), recorded(Room(0.9, 0.5, 4), lodger, seconds=1.2))
+    k = int(np.abs(heard.foreign_hz - 1000.0).argmin())
+    read = tails.read
+
+    def deceived(*given: Any, **more: Any) -> tails.Read:
+        told = read(*given, **more)
+        slow, moved = told.decay_per_s.copy(), told.shift_hz.copy()
+        slow[0, k], moved[0, k] = heard.foreign_decay_per_s[k] / 20, -7.0
+        return replace(told, decay_per_s=slow, shift_hz=moved)
+
+    honest = tails.dried(heard, RT60 / 0.9)
+    monkeypatch.setattr(tails, "read", deceived)
+    tails.through(heard, RT60 / 0.9)  # kept: of modes nothing changes
+    dry = tails.dried(heard, RT60 / 0.9)
+    assert dry.foreign_hz[k] == heard.foreign_hz[k] and dry.foreign_decay_per_s[k] == heard.foreign_decay_per_s[k]
+    assert np.array_equal(dry.foreign_amplitude[:, k], heard.foreign_amplitude[:, k])
+    others = np.arange(len(heard.foreign_hz)) != k
+    assert np.array_equal(dry.foreign_hz[others], honest.foreign_hz[others])
 
 
 def test_a_gain_beside_a_room_is_the_lines_of_modes_alone() -> None:
