@@ -14,13 +14,13 @@ from sonic_bullet.effects.support_trial import Dashpot, Dashpots, Trial
 from sonic_bullet.records import Array
 from sonic_bullet.side_by_side import side_by_side
 
-POINTS, SPOTS = 90, 500  # vertices of a first look from each of STARTS, and of those about a point that has been found
+POINTS, SPOTS = 90, 500  # vertices of a first look, and of those about a point that has been found
 STEPS = (0.06, 0.25, 1.0, 4.0, 16.0)  # of the strength that doubles the typical decay
 FINER, COARSER = (0.6, 0.8, 0.92, 1.08, 1.25, 1.6), (0.1, 0.3, 3.0, 10.0)  # times stronger, in turns
 LOOKED, STARTS, NEAR, FEW = 40, 4, 28, 10  # of the grid, looked at closer; refined; vertices of a turn about one; spots enough to stand for all there
 NEARER = (0.12, 0.07, 0.04, 0.02)  # turns, in sizes of the body
 TUNED = 0.15  # of ln c
-MOST, PART = 4, 450  # dashpots; trials looked at together
+MOST = 4
 WEAK, ENOUGH = 2, 2.0  # of each number of dashpots to first order; of the spreads' own: no more is asked
 BETTER, HALF = 6.0, 0.5  # in BIC, for another dashpot; of what one costs: one that explains less ends the search
 
@@ -49,9 +49,8 @@ def sought(t: Trial) -> Dashpots:
     if some[1] and t.left(some[1]) < ENOUGH * least:
         return without_idle(some)
     tried, starts = [none], [chosen]
+    grid = [Dashpot(int(v), c, way) for v in spots[:POINTS] for c in _strengths(t).tolist() for way in ("normal", "every")]
     while len(chosen) < MOST:
-        looked = spots[: POINTS * STARTS // len(starts)]  # as many trials each time: the first one goes without a second start
-        grid = [Dashpot(int(v), c, way) for v in looked for c in _strengths(t).tolist() for way in ("normal", "every")]
         chosen, starts = _with_one_more(t, starts, grid, spots)
         tried.append(priced(chosen))
         best = min(tried, key=_cost)
@@ -80,14 +79,13 @@ def _with_one_more(t: Trial, starts: list[Dashpots], grid: list[Dashpot], spots:
     few: list[Dashpots] = []
     for chosen in starts:
         trials = [(*chosen, d) for d in grid]
-        parts = [trials[i : i + PART] for i in range(0, len(trials), PART)]
-        few += _best([x for part in side_by_side(lambda part: [t.price(*modes) for modes in t.poles(part, t.runs)], parts) for x in part], trials, LOOKED)
+        few += _best([t.price(*modes) for modes in t.poles(trials, t.runs)], trials, LOOKED)
     few = _best([t.beside(*modes, 1) for modes in t.poles(few, t.runs)], few, STARTS)
     found, *others = (one for _, one in sorted(side_by_side(lambda one: refined(t, one, NEARER[:2], spots), few), key=lambda pair: pair[0]))
     for _ in range(min(len(found), 2)):  # once all are where they should be, one may be seen to stand at a mirror image
         found = refined(t, found, (np.inf, *NEARER), spots)[1]
     found = tuned(t, min(found, refined(t, found, NEARER[-1:], whole=True)[1], key=t.left))
-    return found, [found, *dict.fromkeys(others)]
+    return found, [found, *(others if len(found) == 1 else [])]
 
 
 def _best(price: list[float], trials: list[Dashpots], count: int) -> list[Dashpots]:

@@ -116,7 +116,7 @@ class Trial:
             out,
             tuple(apart(x.freq_hz, RUN)),
             tuple(apart(x.freq_hz, WIDE)),
-            least_law(h.omega, h.decay_per_s),
+            _least_law(h.omega, h.decay_per_s),
         )
 
     def left(self, dashpots: Dashpots, runs: tuple[Array, ...] | None = None) -> float:
@@ -271,7 +271,7 @@ def _smooth(omega: Array) -> Array:
     return 0.5 * np.stack([np.ones(len(omega)), omega / 1e4, (omega / 1e4) ** 2, *peak], axis=1)
 
 
-def least_law(omega: Array, decay: Array) -> Array:
+def _least_law(omega: Array, decay: Array) -> Array:
     """The smooth law (c,) that most lines (k,) lie above: a dashpot only adds. An expectile [Newey & Powell 1987]."""
     column, above = _smooth(omega), np.ones(len(omega), bool)
     value = np.zeros(column.shape[1])

@@ -13,10 +13,9 @@ from sonic_bullet.diagnosis.evidence import evidence_of
 from sonic_bullet.diagnosis.play import came_from, modes_of
 from sonic_bullet.effects.damping_law import DampingLaw
 from sonic_bullet.effects.dashpots import apart, coupled, damped
-from sonic_bullet.effects.points import vertex_normals
 from sonic_bullet.effects.support_damping import LEAST, SupportDamping
 from sonic_bullet.effects.support_search import sought
-from sonic_bullet.effects.support_trial import GROSS, LEVEL, LOST, MISSED, RUN, WIDE, Dashpot, Trial, least_law
+from sonic_bullet.effects.support_trial import GROSS, LEVEL, LOST, MISSED, Dashpot, Trial
 from sonic_bullet.records import Array, ModalModel
 
 SPOT, OTHER = (0.0477, 0.0371, 0.0), (0.0955, 0.0186, 0.0)
@@ -69,30 +68,6 @@ def test_a_line_louder_than_its_mode_counts_as_one_of_another_decay_does() -> No
     changed = replace(t, size=t.size * one)
     assert changed.left(()) - t.left(()) == pytest.approx(t.worth[3] * by_hand, rel=0.05, abs=0.5)
     assert replace(t, size=10 * t.size).left(()) == pytest.approx(t.left(()))
-
-
-def told(vertex: int, c: float, modes: int = 80) -> Trial:
-    """The plate's lines under a dashpot as they are, without a recording."""
-    x = plate(modes)
-    x = replace(x, decay_per_s=0.5 * (20 + 2e-8 * (2 * np.pi * x.freq_hz) ** 2))
-    normal = vertex_normals(x)
-    y = damped(x, np.sqrt(c) * (normal[vertex] @ x.shape[vertex].astype(float))[None])
-    into, out = (m.shape[-6:-1, 2].astype(float) * m.shape[-1, 2].astype(float) for m in (y, x)), x.shape[-1, 2].astype(float)
-    size, plain = into
-    alive = y.decay_per_s < np.pi * y.freq_hz
-    f, d, ones = y.freq_hz[alive], y.decay_per_s[alive], np.ones(int(alive.sum()))
-    runs = tuple(apart(x.freq_hz, RUN)), tuple(apart(x.freq_hz, WIDE))
-    seen = (f, d, 0.02 * d, size[:, alive].astype(complex), ones, f, d, np.ones(modes), True)
-    return Trial(*seen, x, normal, np.unique(x.face), plain / out, out, *runs, least_law(2 * np.pi * f, d))
-
-
-def test_a_stiff_dashpot_amid_a_plate_is_found_where_only_points_near_it_tell_of_it() -> None:
-    """Half a wave of the highest mode is a few per cent of the plate: a first look at fewer points had ended on the other side."""
-    x = plate(80)
-    vertex = int(np.abs(x.vertex_m - (0.181, 0.074, 0.0)).sum(axis=1).argmin())
-    found = sought(told(vertex, 300.0))
-    assert sum(d.c for d in found) == pytest.approx(300.0, rel=0.1)
-    assert all(np.linalg.norm(x.vertex_m[d.vertex] - x.vertex_m[vertex]) < 0.012 for d in found)
 
 
 def some(c: float) -> tuple[Array, Array, Array, Array]:
