@@ -78,8 +78,12 @@ def table(taps: list[Lines], late: Array) -> tuple[Array, Array]:
 def often(taps: list[Lines]) -> list[float]:
     """Frequencies in Hz that most of these taps have, ascending."""
     every = np.sort(np.concatenate([t.freq_hz for t in taps]))
-    middle = [float(np.median(g)) for g in np.split(every, np.flatnonzero(np.diff(np.log(every)) > NEAR / 3) + 1)]
-    return [m for m in middle if np.mean([bool((np.abs(t.freq_hz / m - 1) < NEAR).any()) for t in taps]) > MOST]
+    found: list[float] = []
+    for group in np.split(every, np.flatnonzero(np.diff(np.log(every)) > NEAR / 3) + 1):
+        m = float(np.median(group))
+        if np.mean([bool((np.abs(t.freq_hz / m - 1) < NEAR).any()) for t in taps]) > MOST and (not found or m / found[-1] > 1 + NEAR):
+            found.append(m)  # what lies nearer is the same line of every tap
+    return found
 
 
 def _nearest(among: list[float], freq_hz: float) -> float:

@@ -146,8 +146,15 @@ def decays_against(rival: Effect, best: Hypothesis, other: Hypothesis, i: int, b
 
 
 def phases_against(best: Hypothesis, other: Hypothesis, bodies: tuple[Struck, ...]) -> bool:
-    """Whether the lines' phases (ties.py) speak for the name that is there: of two that strikes hardly tell apart, both must."""
-    return not (moves(best) or moves(other)) and phases(other, bodies) > phases(best, bodies) + HINT  # phases are held against lines as they were fitted
+    """Whether the lines' phases (ties.py) speak for the name that is there: of two that strikes hardly tell apart, both must.
+
+    Phases are held against lines as they were fitted; of several hits they say nothing, and beside a room lines are others.
+    """
+    dry = [any(hasattr(e, "dried") for e in h.effects) for h in (best, other)]
+    if moves(best) or moves(other) or dry[0] != dry[1]:
+        return False
+    mine, its = phases(best, bodies), phases(other, bodies)
+    return bool(np.isfinite([mine, its]).all() and its > mine + HINT)
 
 
 def surely(gain_db: Array, least_db: float) -> bool:

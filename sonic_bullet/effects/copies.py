@@ -2,7 +2,8 @@
 
     x(t) + r x((1 + ε)t − T):  every line (f, d) again at ((1 + ε)f, (1 + ε)d), and as loud against the first in every strike    [Doppler; Pierce 1989, § 9-1]
 
-No room does that: what is linear and stands still brings no frequency of its own. No body does: its modes' patterns differ.
+No room does that: what is linear and stands still brings no frequency of its own. No body does, where its modes' patterns differ: struck at one place alone all lines are
+alike, and pairs split by one share would pass for copies.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ LEAST, MOST = 2e-3, 0.08  # of |ln(1 + ε)|: closer ones are twins; 14 m/s of a 
 NEAR = 3e-4  # of ln f: copies that agree
 ALIKE, DECAY = 0.97, 0.1  # cosine over the strikes; of ln d
 FEWEST, SHARE = 5, 0.2  # pairs; of all lines, in pairs: what comes late is no sum of modes, and leaves other lines besides
+ALL = 0.5  # of all two lines alike: then strikes tell none apart
 CHANCE = 1e-6  # that so many agree on any ratio, of pairs that fall anywhere
 
 
@@ -28,7 +30,10 @@ def copied(freq_hz: Array, decay_per_s: Array, amplitude: Array) -> float | None
         return None
     size = size / np.maximum(np.linalg.norm(size, axis=0), 1e-300)
     up, slower = np.log(f[None, :] / f[:, None]), np.log(d[None, :] / d[:, None])
-    lower, upper = np.nonzero((up > LEAST) & (up < MOST) & (np.abs(slower - up) < DECAY) & (np.abs(size.conj().T @ size) > ALIKE))
+    like = np.abs(size.conj().T @ size) > ALIKE
+    if like.mean() > ALL:
+        return None
+    lower, upper = np.nonzero((up > LEAST) & (up < MOST) & (np.abs(slower - up) < DECAY) & like)
     ratio = up[lower, upper]
     near = np.abs(ratio[:, None] - ratio) < NEAR
     pairs = [min(len(np.unique(lower[row])), len(np.unique(upper[row]))) for row in near]

@@ -61,11 +61,16 @@ def third_hit(gap_s: Array, both: Array, own: Array, total: Array, sr: int, fade
     for c, a, g, energy in zip(cross, auto, gap_s, total, strict=True):
         late = g * (1 + e)
         second, third = e * np.exp(-fade * g), e**2 * np.exp(-fade * late)
-        c_2, c_3, a_2, a_3, a_23 = (x[np.rint(t * sr * FINER).astype(int) % len(x)] for x, t in ((c, g), (c, late), (a, g), (a, late), (a, late - g)))
+        c_2, c_3, a_2, a_3, a_23 = (_lagged(x, np.rint(t * sr * FINER).astype(int)) for x, t in ((c, g), (c, late), (a, g), (a, late), (a, late - g)))
         told = c[0] + second * c_2 + third * c_3
         cost = a[0] * (1 + second**2 + third**2) + 2 * (second * a_2 + third * a_3 + second * third * a_23)
         said += np.maximum(told, 0.0) ** 2 / np.maximum(cost, 1e-300) / energy
     return float(e[int(said.argmax())])
+
+
+def _lagged(x: Array, lag: Array) -> Array:
+    """A correlation at some lags; none beyond the recording, where the transform holds negative ones."""
+    return np.where(lag < len(x) // 2, x[np.minimum(lag, len(x) - 1)], 0.0)
 
 
 def hits_by_strike(h: Heard) -> list[list[tuple[float, float]]]:

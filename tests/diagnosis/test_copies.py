@@ -90,3 +90,12 @@ def test_one_strike_tells_no_copies() -> None:
     twice = np.concatenate([f, 1.03 * f]), np.concatenate([d, 1.03 * d]), np.concatenate([a, a], axis=1)
     assert copied(*twice) == pytest.approx(1.03)
     assert copied(twice[0], twice[1], twice[2][:1]) is None
+
+
+def test_pairs_split_by_one_share_and_struck_at_one_place_are_no_copies() -> None:
+    """There all lines are alike over the strikes, and patterns tell none apart."""
+    f, d, a = some(16)
+    level = np.array([1.0, 2.0, 3.0, 4.0, 5.0])[:, None] * a[:1]
+    twice = np.concatenate([f, 1.004 * f]), np.concatenate([d, 1.004 * d])
+    assert copied(*twice, np.concatenate([a, a], axis=1)) == pytest.approx(1.004)
+    assert copied(*twice, np.concatenate([level, level], axis=1)) is None

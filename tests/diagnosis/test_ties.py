@@ -20,6 +20,8 @@ from sonic_bullet.effects.damping_law import DampingLaw
 from sonic_bullet.effects.measurement_chain import MeasurementChain
 from sonic_bullet.effects.mode_splitting import ModeSplitting
 from sonic_bullet.effects.radiation import Radiation
+from sonic_bullet.effects.rebound import Rebound
+from sonic_bullet.effects.room import Room
 
 BAND = (50.0, 7_500.0)
 PULSE = ContactTime(1.6e-4, 0.016, 0.0, "raised-cosine")
@@ -113,3 +115,13 @@ def test_a_name_that_phases_speak_for_is_not_left_for_one_that_strikes_hardly_pr
         assert not phases_against(other, own, (body,))
         split = replace(own, effects=(*own.effects, ModeSplitting((600.0,), (0.01,), (0.0,))))
         assert not phases_against(split, other, (body,))
+
+
+def test_phases_speak_against_nobody_of_whom_they_say_nothing() -> None:
+    """Of several hits they tell nothing, and in a room lines are other lines."""
+    train = Rebound(0.0131, 0.016, 0.4, 0.0, 0.4, 3)
+    body = recorded(train)
+    pulse, hits, room = (refitted(truth(e), (body,)) for e in (PULSE, train, Room(0.5, 0.3, 3)))
+    assert not np.isfinite(misfit(hits, (body,)))
+    assert not phases_against(pulse, hits, (body,)) and not phases_against(hits, pulse, (body,))
+    assert not phases_against(pulse, room, (body,)) and not phases_against(room, pulse, (body,))
