@@ -51,7 +51,7 @@ def remainder(end: Closed, takes: tuple[Take, ...]) -> dict[str, Any]:
         words += "; modes of one frequency, decay and phase each, whatever they are, do not play it: something goes with time or level, or is noise"
     again = _again(takes)
     if again is not None:
-        words += f"; most lines are heard again at {again:.4f} times their frequency, as loud against the first in every strike: an echo of something that moves does that"
+        words += f"; many lines are heard again at {again:.4f} times their frequency, as loud against the first in every strike: an echo of something that moves does that"
     return {
         "left_db": end.after_db - end.floor_db,
         "words": words,

@@ -1,6 +1,6 @@
 """What is heard twice at one ratio of frequencies: an echo of something that moves.
 
-    x(t) + r x((1 + ε)t − T):  every line (f, d) again at ((1 + ε)f, (1 + ε)d), and as loud against the first in every strike    [Doppler; Pierce 1989, § 9-1]
+    x(t) + r x((1 + ε)t − T):  every line (f, d) again at ((1 + ε)f, (1 + ε)d), and as loud against the first in every strike    [Doppler; Pierce 1989, ch. 9]
 
 No room does that: what is linear and stands still brings no frequency of its own. No body does, where its modes' patterns differ: struck at one place alone all lines are
 alike, and pairs split by one share would pass for copies.
@@ -21,7 +21,7 @@ CHANCE = 1e-6  # that so many agree on any ratio, of pairs that fall anywhere
 
 
 def copied(freq_hz: Array, decay_per_s: Array, amplitude: Array) -> float | None:
-    """The ratio 1 + ε > 1 at which most lines (k,) are heard again, by amplitudes (s, k) of two strikes or more; None where they are not."""
+    """The ratio 1 + ε > 1 at which many lines (k,), SHARE of all or more, are heard again, by amplitudes (s, k) of two strikes or more; None where they are not."""
     from scipy.stats import poisson
 
     good = np.isfinite(amplitude).all(axis=0) & (decay_per_s > 0)
@@ -38,7 +38,7 @@ def copied(freq_hz: Array, decay_per_s: Array, amplitude: Array) -> float | None
     near = np.abs(ratio[:, None] - ratio) < NEAR
     pairs = [min(len(np.unique(lower[row])), len(np.unique(upper[row]))) for row in near]
     many = max(pairs, default=0)
-    wide = 2 * NEAR / np.log1p(MOST)
+    wide = 2 * NEAR / (MOST - LEAST)
     if many < FEWEST or 2 * many < SHARE * len(f) or poisson.sf(many - 1, (len(ratio) - many) * wide) > CHANCE * wide:
         return None
     return float(np.exp(np.median(ratio[near[int(np.argmax(pairs))]])))

@@ -25,7 +25,7 @@ class Moving:
     id: ClassVar[str] = "moving"
     stage: ClassVar[Stage] = Stage.SOUND
     owner: ClassVar[Owner] = Owner.ROOM
-    reference: ClassVar[str] = "Pierce 1989, § 9-1"
+    reference: ClassVar[str] = "Pierce 1989, ch. 9"
     speed_m_s: float
 
     def apply(self, x: Sound) -> Sound:
