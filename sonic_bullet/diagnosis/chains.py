@@ -1,7 +1,7 @@
 """What a mode that depends on its own level leaves among the lines: a chain of them; and the one line it rings as when it is faint.
 
     a e^{−dt} e^{iβ(1 − e^{−2dt})} = a e^{−dt} [e^{iβ} − iβ e^{iβ} e^{−2dt} + …]      decays d, 3d, 5d, …      frequency goes with level²     (effects.amplitude_pitch)
-    a/((1 + c)e^{dt} − c)          = a/(1 + c) [e^{−dt} + c/(1 + c) e^{−2dt} + …]      decays d, 2d, 3d, …      decay goes with level          (effects.amplitude_damping)
+    a/((1 + c)e^{dt} − c)          = a/(1 + c) [e^{−dt} + c/(1 + c) e^{−2dt} + …]      decays d, 2d, 3d, …      decay goes with level; with its square: d, 3d, 5d, …   (effects.amplitude_damping)
 
 Least squares fit such a mode by a few lines, each shorter than the one before and hardly beside it. The slowest is the linear mode, the body's and the material's
 own, and of a mode that is only bent the whole chain's level falls as it does; at the onset all lines add up to what was struck. A baseline fitted to the loudest

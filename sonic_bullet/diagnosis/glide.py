@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from sonic_bullet.diagnosis.bodies import Struck
-from sonic_bullet.diagnosis.play import Hypothesis, bends, ring_of
+from sonic_bullet.diagnosis.play import Hypothesis, bends, blow_of, ring_of
 from sonic_bullet.effects.envelope import alone, falls, shifted
 from sonic_bullet.effects.values import Heard
 from sonic_bullet.records import Array
@@ -21,8 +21,9 @@ SPREAD = 0.02  # of a level's own fall
 
 def turns_rad(h: Hypothesis, body: Struck, one: Heard) -> Array:
     """By how much the effects turn the phases of each line's modes (s, k) until they have rung down."""
-    rings = [ring_of(h, body, body.fitted[i]) for i in one.strike]
-    turned = np.stack([np.abs(r.bend) * r.level**2 * np.pi * r.freq_hz / np.maximum(r.decay_per_s, 1e-3) for r in rings])
+    each = [(ring_of(h, body, body.fitted[i]), blow_of(h, body, body.fitted[i])) for i in one.strike]
+    level = [r.level * np.abs(b.spectrum(r.freq_hz)) for r, b in each]  # what a long pulse leaves of it
+    turned = np.stack([np.abs(r.bend) * a**2 * np.pi * r.freq_hz / np.maximum(r.decay_per_s, 1e-3) for (r, _), a in zip(each, level, strict=True)])
     return np.stack([turned[:, who[who < turned.shape[1]]].max(axis=1, initial=0.0) for who in one.mode], axis=1)
 
 

@@ -14,10 +14,11 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from sonic_bullet.effects.amplitude_pitch import _per_velocity
+from sonic_bullet.effects.amplitude_pitch import MEASURES, _per_velocity
 from sonic_bullet.effects.axes import ANGLES, PAIR, turned
 from sonic_bullet.effects.choked import Line, Told, lines_under, onset, told, under, would
 from sonic_bullet.effects.envelope import envelopes, levels
+from sonic_bullet.effects.proofs import finite, one_of, side_by_side
 from sonic_bullet.effects.values import Evidence, Heard, Owner, Ring, Stage
 from sonic_bullet.records import Array, ModalModel
 
@@ -53,6 +54,14 @@ class AmplitudeDamping:
     freq_hz: tuple[float, ...] = ()
     turn_rad: tuple[float, ...] = ()
     power: float = 1.0
+
+    def __post_init__(self) -> None:
+        one_of("power", self.power, POWERS)  # of drag: others have no closed form
+        one_of("measure", self.measure, MEASURES)
+        finite("choke", self.choke, least=0.0)
+        finite("freq_hz", *self.freq_hz, least=0.0)
+        finite("turn_rad", *self.turn_rad)
+        side_by_side(freq_hz=self.freq_hz, turn_rad=self.turn_rad)
 
     def apply(self, x: Ring) -> Ring:
         """The ringing with the effect in it."""

@@ -16,6 +16,7 @@ import numpy as np
 from sonic_bullet.effects.axes import turned, twins
 from sonic_bullet.effects.envelope import Envelopes, envelopes, falls, levels
 from sonic_bullet.effects.glided import axes_of, bend_beside
+from sonic_bullet.effects.proofs import finite, one_of, side_by_side
 from sonic_bullet.effects.values import Evidence, Heard, Owner, Ring, Stage
 from sonic_bullet.records import Array, ModalModel
 
@@ -59,6 +60,13 @@ class AmplitudePitch:
     measure: str = "velocity"
     freq_hz: tuple[float, ...] = ()
     turn_rad: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        one_of("measure", self.measure, MEASURES)
+        finite("bend", self.bend)
+        finite("freq_hz", *self.freq_hz, least=0.0)
+        finite("turn_rad", *self.turn_rad)
+        side_by_side(freq_hz=self.freq_hz, turn_rad=self.turn_rad)
 
     def apply(self, x: Ring) -> Ring:
         """The ringing with the effect in it."""

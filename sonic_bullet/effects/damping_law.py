@@ -15,6 +15,7 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
+from sonic_bullet.effects.proofs import finite, one_of
 from sonic_bullet.effects.values import Evidence, Owner, Stage, ascending
 from sonic_bullet.records import Array, ModalModel
 
@@ -40,6 +41,12 @@ class DampingLaw:
     exponent: float = 1.0
     strength: float = 0.0
     tau_s: float = 0.0
+
+    def __post_init__(self) -> None:
+        one_of("law", self.law, LAWS)
+        finite("exponent", self.exponent)
+        for name in ("eta", "strength", "tau_s"):
+            finite(name, getattr(self, name), least=0.0)
 
     def decay_per_s(self, omega_per_s: Array) -> Array:
         """d (k,) at undamped ω (k,)."""

@@ -133,9 +133,9 @@ def _fast(n: int) -> int:
 
 
 def levels(h: Heard) -> dict[str, Array]:
-    """How hard each line (s, k) is driven, by three measures: the impulse, and what the pulse leaves of it: peak velocity and peak displacement at the body's surface."""
+    """How hard each line (s, k) is driven, by three measures of what the pulse leaves of a blow: its impulse, and peak velocity and peak displacement at the body's surface."""
     level = np.where(np.isfinite(h.impulse_n_s), h.impulse_n_s, 1.0)
-    found = {"impulse": np.repeat(level[:, None], len(h.freq_hz), axis=1)}
+    found = {"impulse": level[:, None] * np.stack([h.pressed[:, m].max(axis=1) for m in h.mode], axis=1)}
     if h.model is None:
         return found
     body = np.unique(h.model.face)

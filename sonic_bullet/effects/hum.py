@@ -2,7 +2,8 @@
 
 Σ_i a_i cos(2π i f₀ t + φ_i),   f₀ about 50 or 60 Hz: read off the last third of every recording, where least else is left
 
-One recording tells no hum from a mode that rings for long; nor do strikes of one strength, unless the tone fades, or several multiples sound: modes are not in tune with the mains.
+One recording tells no hum from a mode that rings for long; nor do strikes of one strength, unless several multiples sound, as modes are not in tune with the mains, or one so
+low that no mode is to be expected there.
 """
 
 from __future__ import annotations

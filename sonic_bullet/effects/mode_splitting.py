@@ -14,6 +14,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from sonic_bullet.effects.axes import PAIR, about_axes, pair_at
+from sonic_bullet.effects.proofs import finite, side_by_side
 from sonic_bullet.effects.values import Evidence, Heard, Owner, Stage
 from sonic_bullet.records import Array, ModalModel
 
@@ -41,6 +42,12 @@ class ModeSplitting:
     freq_hz: tuple[float, ...]
     split: tuple[float, ...]
     turn_rad: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        finite("freq_hz", *self.freq_hz, least=0.0)
+        finite("split", *self.split, least=0.0)
+        finite("turn_rad", *self.turn_rad)
+        side_by_side(freq_hz=self.freq_hz, split=self.split, turn_rad=self.turn_rad)
 
     def apply(self, x: ModalModel) -> ModalModel:
         """The modes with the effect in them."""

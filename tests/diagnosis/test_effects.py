@@ -181,3 +181,21 @@ def test_stored_and_read_back() -> None:
         effect_of({"id": "room", "rt60_s": 1.0})
     with pytest.raises(RecordError, match="damping-law"):
         effect_of({"id": "damping-law", "law": "power", "eta": "much"})
+
+
+@pytest.mark.parametrize(
+    ("data", "field"),
+    [
+        ({"id": "damping-law", "law": "viscous", "eta": 0.1}, "law"),
+        ({"id": "damping-law", "law": "constant-loss", "eta": -0.1}, "eta"),
+        ({"id": "mode-splitting", "freq_hz": [100.0], "split": [0.01, 0.02], "turn_rad": [0.1]}, "split holds 2"),
+        ({"id": "amplitude-pitch", "bend": 1.0, "measure": "loudness"}, "measure"),
+        ({"id": "amplitude-pitch", "bend": 1.0, "freq_hz": [100.0], "turn_rad": []}, "turn_rad holds 0"),
+        ({"id": "amplitude-damping", "choke": -1.0}, "choke"),
+        ({"id": "amplitude-damping", "choke": 1.0, "power": 1.5}, "power"),
+    ],
+    ids=lambda x: x["id"] if isinstance(x, dict) else x,
+)
+def test_numbers_that_no_body_has_are_refused_by_the_fields_name(data: dict[str, Any], field: str) -> None:
+    with pytest.raises(RecordError, match=field):
+        effect_of(data)

@@ -70,11 +70,11 @@ def test_a_mode_near_a_multiple_of_the_mains_is_no_hum(decay_per_s: float) -> No
     assert (hum_of(ringing(99.0, decay_per_s, 4, 1.5), np.full(4, 1e-5), SR) is None) == (decay_per_s > 0)
 
 
-@pytest.mark.parametrize(("strength", "decay_per_s", "hums"), [((1, 1, 1, 1), 0.5, False), ((1, 2, 4, 8), 0.5, False), ((1, 1, 1, 1), 0.0, False)])
-def test_a_lone_tone_that_hardly_fades_is_no_hum_in_strikes_of_one_strength(strength: tuple[float, ...], decay_per_s: float, hums: bool) -> None:
+@pytest.mark.parametrize(("strength", "decay_per_s"), [((1, 1, 1, 1), 0.5), ((1, 2, 4, 8), 0.5), ((1, 1, 1, 1), 0.0)])
+def test_a_lone_tone_that_hardly_fades_is_no_hum_in_strikes_of_one_strength(strength: tuple[float, ...], decay_per_s: float) -> None:
     """A bell's lowest mode may ring for ten seconds, and lie near the eighth multiple as near anything; with strength it goes, where there are several."""
     sound = np.array(strength)[:, None] * ringing(401.0, decay_per_s, 4, 1.5)
-    assert (hum_of(sound, np.full(4, 1e-5), SR) is not None) == hums
+    assert hum_of(sound, np.full(4, 1e-5), SR) is None
 
 
 def test_a_lone_tone_is_a_hum_in_strikes_of_many_strengths_and_several_in_any() -> None:

@@ -14,7 +14,7 @@ from test_found_again import BAND, fitted
 
 from sonic_bullet.diagnosis.bodies import Struck
 from sonic_bullet.diagnosis.evidence import evidence_of
-from sonic_bullet.diagnosis.glide import fallen
+from sonic_bullet.diagnosis.glide import fallen, gliding, turns_rad
 from sonic_bullet.diagnosis.refit import refitted, with_effects
 from sonic_bullet.diagnosis.rest import _off_hz, at_rest
 from sonic_bullet.effects import amplitude_pitch
@@ -58,6 +58,32 @@ def test_what_does_not_glide_stays_where_it_is() -> None:
     faint = refitted(replace(h, effects=(AmplitudePitch(1e-7, "velocity"),)), (body,))
     assert faint.correction is not None and h.correction is not None
     assert (faint.correction["plate"] == h.correction["plate"]).all()
+
+
+def test_what_a_long_pulse_has_left_faint_does_not_glide() -> None:
+    """A mode far above the pulse's own spectrum starts as softly as that has it, and turns by the square of it."""
+    body = made(BENT.bend)
+    h = fitted(body)
+    long = ContactTime(6e-4, 0.02)
+    lines = [evidence_of(replace(h, effects=effects), (body,), BAND).heard[0] for effects in ((BENT,), (BENT, long))]
+    hard = turns_rad(replace(h, effects=(BENT,)), body, lines[0])
+    soft = turns_rad(replace(h, effects=(BENT, long)), body, lines[1])
+    one = lines[1]
+    pressed = np.stack([one.pressed[:, m].max(axis=1) for m in one.mode], axis=1)
+    assert pressed.min() < 0.1
+    assert pressed.max() > 0.9
+    assert soft == pytest.approx(hard * pressed**2, rel=0.05, abs=1e-6)
+    assert 0 < np.count_nonzero(gliding(replace(h, effects=(BENT, long)), body, one)) < len(one.freq_hz)
+
+
+def test_a_bend_by_impulse_is_told_by_what_the_pulse_leaves_of_it() -> None:
+    """As it is played: by how hard a mode is pushed, not by the hammer's own impulse."""
+    pulse, bend = ContactTime(4e-4, 0.02), 40.0
+    body = recorded(pulse, AmplitudePitch(bend, "impulse"))
+    found = AmplitudePitch.propose(evidence_of(replace(fitted(body), effects=(pulse,)), (body,), BAND))
+    assert found is not None
+    assert found.measure == "impulse"
+    assert found.bend == pytest.approx(bend, rel=0.15)
 
 
 @pytest.mark.parametrize("bend", [0.35, 1.0])
