@@ -13,7 +13,7 @@ import numpy as np
 
 from sonic_bullet.diagnosis.bodies import Struck
 from sonic_bullet.diagnosis.glide import fallen
-from sonic_bullet.diagnosis.play import Hypothesis, blow_of, in_band, modes_of, moves, pattern, play, start
+from sonic_bullet.diagnosis.play import BESIDE, Hypothesis, blow_of, in_band, modes_of, moves, pattern, play, start
 from sonic_bullet.effects.values import Evidence, Heard, Sound, Stage
 from sonic_bullet.estimator.evidence import Evidence as Gathered
 from sonic_bullet.estimator.lines import noise_rms
@@ -51,9 +51,9 @@ def heard_of(h: Hypothesis, body: Struck, *, sounds: bool = True, anew: bool = F
     rank = {int(k): i for i, k in enumerate(plain_order)}
     model_hz = np.array([np.mean([plain.freq_hz[rank[int(order[k])]] if int(order[k]) in rank else model.freq_hz[k] for k in m]) for m in mode])
     rest = np.setdiff1d(np.arange(len(lines.freq_hz)), line)
-    predicted = None
+    predicted = own = None
     if sounds and gathered.signals is not None:
-        predicted = np.stack([play(h, body, i, gathered.signals.shape[1], gathered.sr) for i in mine])
+        predicted, own = _played(h, body, mine, gathered.signals)
     count = body.surface_count(model)
     heard = Heard(
         impulse_n_s=body.impulse_n_s[mine],
@@ -79,6 +79,7 @@ def heard_of(h: Hypothesis, body: Struck, *, sounds: bool = True, anew: bool = F
         sensor_way=body.way[-1],
         signal=gathered.signals,
         predicted=predicted,
+        own=own,
         noise=noise_rms(gathered.signals, gathered.sr) if gathered.signals is not None else lines.noise,
         sr=gathered.sr,
         signed=lines.signed,
@@ -92,6 +93,17 @@ def heard_of(h: Hypothesis, body: Struck, *, sounds: bool = True, anew: bool = F
         poisson=None if moves(h) or plain.mode_count != body.model.mode_count else body.poisson,
     )
     return fallen(h, body, outside(h, heard))
+
+
+def _played(h: Hypothesis, body: Struck, strikes: list[int], signals: Array) -> tuple[Array, Array | None]:
+    """What strikes sound like (s, n), and the recordings without what rings beside the body, where the hypothesis knows of such."""
+
+    def played(one: Hypothesis) -> Array:
+        assert body.gathered is not None
+        return np.stack([play(one, body, i, signals.shape[1], body.gathered.sr) for i in strikes])
+
+    all_of_it, rest = played(h), tuple(e for e in h.effects if e.id not in BESIDE)
+    return all_of_it, None if len(rest) == len(h.effects) else signals - (all_of_it - played(replace(h, effects=rest)))
 
 
 def outside(h: Hypothesis, heard: Heard) -> Heard:
@@ -187,6 +199,7 @@ def _thin(h: Heard, strike: int | None, keep: float, rng: np.random.Generator) -
         strike_way=h.strike_way[s],
         signal=h.signal[s] if h.signal is not None else None,
         predicted=h.predicted[s] if h.predicted is not None else None,
+        own=h.own[s] if h.own is not None else None,
         push=h.push[s],
         pressed=h.pressed[s],
         noise=h.noise[s] if len(h.noise) == len(h.impulse_n_s) else h.noise,

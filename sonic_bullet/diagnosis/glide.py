@@ -40,7 +40,7 @@ def fallen(h: Hypothesis, body: Struck, one: Heard) -> Heard:
     mine = [(k, width) for k, width in zip(*alone(one), strict=True) if glides[k] and len(one.mode[k]) == 1]  # twins beat
     if not mine:
         return one
-    e = shifted(one, one.signal, [k for k, _ in mine], [width for _, width in mine])
+    e = shifted(one, one.signal if one.own is None else one.own, [k for k, _ in mine], [width for _, width in mine])
     decay, sd = one.decay_per_s.copy(), one.decay_sd_per_s.copy()
     for q, (k, _) in enumerate(mine):
         decay[k] = falls(e, q, float(decay[k]))

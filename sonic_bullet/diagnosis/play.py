@@ -20,6 +20,7 @@ from sonic_bullet.records import Array, ModalModel
 
 MOVES = frozenset({"added-mass", "mode-splitting", "orthotropy", "support-damping"})  # effects under which modes are no longer where, or what, they were
 TURNS = frozenset({"support-damping"})  # of those, under which modes mix with their neighbours
+BESIDE = frozenset({"foreign-mode"})  # effects that ring beside the body, and are none of its modes
 LAST = frozenset({"added-mass"})  # of those, under which no mode keeps its own correction
 WAY = tuple(Owner)  # material, object, fixture, striker, room, chain: a sound's
 SAMPLED = 300  # vertices by which modes are told to be alike

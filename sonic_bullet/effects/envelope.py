@@ -53,7 +53,7 @@ def envelopes(h: Heard) -> Envelopes | None:
     if h.signal is None or not len(h.freq_hz):
         return None
     picked, window = alone(h)
-    return shifted(h, h.signal, picked, window) if picked else None
+    return shifted(h, h.signal if h.own is None else h.own, picked, window) if picked else None
 
 
 def shifted(h: Heard, signal: Array, picked: list[int], window: list[int]) -> Envelopes:

@@ -166,6 +166,7 @@ class Heard:
     source: Any = None
     elastic: Elastic | None = None
     poisson: Poisson | None = None
+    own: Array | None = None  # (s, n) signal without what the model so far knows to ring beside the body, where there is such
     dry: bool = False  # whether lines are told as they would be without the room they were recorded in
 
     @property

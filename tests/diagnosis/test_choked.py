@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_body import ALPHA, BETA, GAIN, plate, recorded
+from made_body import ALPHA, BETA, GAIN, SR, plate, recorded
 from test_found_again import BAND, fitted
 
 from sonic_bullet.diagnosis.baseline import takes_of
@@ -18,6 +18,7 @@ from sonic_bullet.diagnosis.refit import refitted
 from sonic_bullet.effects.amplitude_damping import AmplitudeDamping
 from sonic_bullet.effects.amplitude_pitch import AmplitudePitch
 from sonic_bullet.effects.axes import turned
+from sonic_bullet.effects.foreign_mode import ForeignMode
 from sonic_bullet.effects.values import Evidence
 from sonic_bullet.records import ModalModel
 
@@ -70,6 +71,27 @@ def test_twins_have_the_axes_that_their_envelopes_tell() -> None:
     assert held is not None and learnt is not None
     assert held.turn_rad == (1.2,) and learnt.turn_rad[0] == pytest.approx(0.6, abs=0.1)
     assert abs(held.alpha_per_s / learnt.alpha_per_s - 1) > 1e-3, "decays are told under the axes that they are played with"
+
+
+def test_what_is_known_to_ring_beside_the_body_is_taken_out_of_its_lines() -> None:
+    """A stand that rings just beside every mode hides how these fall; once it is named, its sound is no part of theirs."""
+    freq = plate().freq_hz
+    apart = np.array([np.abs(np.delete(freq, k) - f).min() for k, f in enumerate(freq)])
+    beside = tuple(float(f) - 45.0 for f in freq[apart > 150])
+    stand = ForeignMode(beside, (35.0,) * len(beside), (0.6,) * len(beside), (0.3,) * len(beside))
+    body = recorded(AmplitudeDamping(4.0, "velocity", power=2.0), stand)
+    told = evidence_of(refitted(replace(fitted(body), effects=(stand,)), (body,)), (body,), BAND)
+    one = told.heard[0]
+    assert len(beside) > 4
+    assert one.signal is not None and one.own is not None
+    t = np.arange(one.signal.shape[1]) / SR
+    rings = sum(0.6 * one.impulse_n_s[0] * np.exp(-35.0 * t) * np.cos(2 * np.pi * f * t + 0.3) for f in beside)
+    assert one.signal[0] - one.own[0] == pytest.approx(rings, abs=1e-9)
+    found = AmplitudeDamping.propose(told)
+    assert found is not None and (found.measure, found.power) == ("velocity", 2.0)
+    assert found.choke == pytest.approx(4.0, rel=0.1)
+    hidden = AmplitudeDamping.propose(replace(told, heard=(replace(one, own=None),)))
+    assert hidden is None or abs(hidden.choke / 4.0 - 1) > abs(found.choke / 4.0 - 1)
 
 
 def test_turned_twins_sound_as_before_where_nothing_is_choked() -> None:
