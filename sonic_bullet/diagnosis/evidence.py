@@ -46,8 +46,8 @@ def heard_of(h: Hypothesis, body: Struck, *, sounds: bool = True, anew: bool = F
     spectrum = pressed * direct
     expected = np.stack([(h.gain * push * spectrum)[:, m].sum(axis=1) for m in mode], axis=1) if mode else np.zeros((len(mine), 0), complex)
     told = np.stack([rows[:, m].sum(axis=1) for m in mode], axis=1) if mode else np.zeros((len(mine), 0))
-    own = replace(h, correction=None)
-    plain, plain_order = modes_of(own, body)
+    uncorrected = replace(h, correction=None)
+    plain, plain_order = modes_of(uncorrected, body)
     rank = {int(k): i for i, k in enumerate(plain_order)}
     model_hz = np.array([np.mean([plain.freq_hz[rank[int(order[k])]] if int(order[k]) in rank else model.freq_hz[k] for k in m]) for m in mode])
     rest = np.setdiff1d(np.arange(len(lines.freq_hz)), line)
