@@ -19,11 +19,11 @@ from sonic_bullet.diagnosis.exchange import chosen, exchanged, rivals
 from sonic_bullet.diagnosis.in_phase import of_no_body
 from sonic_bullet.diagnosis.judge import Judged, least_db, mean_db
 from sonic_bullet.diagnosis.meshed import beyond, of_the_mesh
-from sonic_bullet.diagnosis.play import Hypothesis, moves_itself
+from sonic_bullet.diagnosis.play import TURNS, Hypothesis, moves_itself
 from sonic_bullet.diagnosis.refit import refitted, retold
 from sonic_bullet.diagnosis.trial import FAINT_DB, LEAST_DB, Candidate, earns, trials
 from sonic_bullet.diagnosis.twos import in_a_room, in_twos
-from sonic_bullet.effects.values import Effect
+from sonic_bullet.effects.values import Effect, Stage
 
 ROUNDS = 4
 SUFFICES_DB = 1.5  # a gap below this is the mesh's and the shapes' own
@@ -120,23 +120,26 @@ def _one_by_one(
         evidence = evidence_of(h, bodies, band_hz, seed=seed)
         full = retold(h, bodies)  # a room's response is the lines' so far, which leaves open more than there is
         told = now if full is h else mean_db(takes, full) or 0.0
-        found = trials(h, bodies, takes, evidence, effects, seed=seed + turn, say=say, costly=told - floor > OPEN * (before - floor))
+        costly = told - floor > OPEN * (before - floor)
+        found = trials(h, bodies, takes, evidence, effects, seed=seed + turn, say=say, costly=costly)
         last |= {c.id: c for c in found}
-        gap = max(now - floor, 0.0)
         if not added:
-            first, weak = found, all((mean_db(takes, c.hypothesis) or 0.0) - floor > WEAK * gap for c in found)
+            first, weak = found, all((mean_db(takes, c.hypothesis) or 0.0) - floor > WEAK * max(now - floor, 0.0) for c in found)
             if weak and (two := in_twos(start, found, bodies, takes, band_hz, seed=seed, say=say)):
                 (h, added), passed = two, [(), ()]
                 last |= {c.id: c for c in added}
                 now, floor = mean_db(takes, h) or 0.0, least_db(takes, h) or floor
                 continue
-        able = [c for c in found if earns(c, gap, first=not added) and helps(c, bodies, takes, now, told, floor, first=not added)]
-        able = able or sorted((c for c in found if by_lines(c, bodies, takes, told, floor)), key=lambda c: -c.lines)[:1]
+        able = _able(found, bodies, takes, now, told, floor, first=not added)
         if all(moves_itself(h, c.effect) for c in able) and len(added) == 1 and (two := in_a_room(h, found, bodies, takes, band_hz, seed=seed, say=say)):
             (h, added), passed = two, [(), ()]
             last |= {c.id: c for c in added}
             now, floor = mean_db(takes, h) or 0.0, least_db(takes, h) or floor
             continue
+        if not able and any(c.effect.stage is Stage.MATERIAL for c in found) and (late := [k for k in effects if k.id in TURNS and k.id not in last]):
+            found = trials(h, bodies, takes, evidence, late, seed=seed + turn, say=say, costly=costly)  # which had to wait for a tensor that came to nothing
+            last |= {c.id: c for c in found}
+            able = _able(found, bodies, takes, now, told, floor, first=not added)
         if not able:
             break
         best = simplest(able, bodies, evidence)
@@ -153,6 +156,14 @@ def _one_by_one(
         now = mean_db(takes, h) or 0.0
     again = retold(h, bodies, fully=True)
     return Rounds(again if again is not h and (mean_db(takes, again) or 0.0) < now else h, added, first, last, floor, weak)
+
+
+def _able(
+    found: Sequence[Candidate], bodies: tuple[Struck, ...], takes: Sequence[Judged], now: float, told: float, floor: float, *, first: bool
+) -> list[Candidate]:
+    """Those that strikes left out speak for; or, where they speak for none, the one that lines do."""
+    able = [c for c in found if earns(c, max(now - floor, 0.0), first=first) and helps(c, bodies, takes, now, told, floor, first=first)]
+    return able or sorted((c for c in found if by_lines(c, bodies, takes, told, floor)), key=lambda c: -c.lines)[:1]
 
 
 def _verdict(

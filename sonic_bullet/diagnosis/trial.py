@@ -26,10 +26,10 @@ from sonic_bullet.diagnosis.evidence import evidence_of, thinned
 from sonic_bullet.diagnosis.judge import Judged, Take
 from sonic_bullet.diagnosis.listed import Listed
 from sonic_bullet.diagnosis.null import Null
-from sonic_bullet.diagnosis.play import Hypothesis, bends, moves
+from sonic_bullet.diagnosis.play import TURNS, Hypothesis, bends, moves
 from sonic_bullet.diagnosis.refit import refitted, retold
 from sonic_bullet.diagnosis.rest import at_rest
-from sonic_bullet.effects.values import Effect, Evidence
+from sonic_bullet.effects.values import Effect, Evidence, Stage
 from sonic_bullet.side_by_side import side_by_side
 
 KEPT = 0.75  # of the lines, in every fold
@@ -41,6 +41,7 @@ LOUDEST = 2  # strikes, of which what goes with level must gain most
 LOST = 0.15  # of what the loudest gains: all that others may lose by what goes with level
 SURE, MANY = 2.0, 4  # standard errors; strikes of which none may lose, beside one
 NOISE_DB = 0.03  # of a distance, by noise alone
+HOPELESS_DB, FIRST = 3.0, 2  # lost on each of the first strikes left out: the others are not asked
 ENOUGH = 2  # names: what little is left beside them is worth no search of half a minute
 PLAIN = 0.6  # of the gap: where a cheap suspect says as much, costly ones wait
 
@@ -48,7 +49,7 @@ PLAIN = 0.6  # of the gap: where a cheap suspect says as much, costly ones wait
 @dataclass(frozen=True, slots=True, eq=False)
 class Candidate:
     """A suspect after its trial. effect: fitted to all evidence. drop_db (s,): of each left-out strike's distance, less what corrections learnt again would gain
-    alone where the suspect moves modes. whole_db: mean with that in it, which speaks for a name's turn. null_db: mean over strikes and draws.
+    alone where the suspect moves modes; of the FIRST alone where each of those is farther off by HOPELESS_DB. whole_db: mean with that in it, which speaks for a name's turn. null_db: mean over strikes and draws.
 
     Its axes of twins, if it has any, all fitted strikes told. spread: of each number in its parameters over the folds (jackknife). lines: by how much lines left
     out are likelier with it (by_lines.py). impulse_n_s (s,): of the strikes.
@@ -141,9 +142,13 @@ def trials(
     still = cache(lambda by_line: _rested(whole_lines() if by_line else folds))
     gap = float(np.mean([f.before for f in folds]) - np.mean([f.take.least(f.base) for f in folds])) if folds else 0.0
     idle = not costly and len(evidence.found) >= ENOUGH
-    for group in _groups([kind for kind in effects if kind.id not in evidence.found and not (idle and getattr(kind, "searches", False))]):
+    dry = any(one.dry for one in evidence.heard)
+    kinds = [kind for kind in effects if kind.id not in evidence.found and not (idle and getattr(kind, "searches", False))]
+    for group in _groups(kinds, last=TURNS if dry and costly else frozenset()):
         if any(hasattr(c.effect, "dried") and earns(c, gap, first=not evidence.found) for c in found):
             break  # what others say of lines that a room has made is hearsay: in the next round they are told dry
+        if dry and group[0].id in TURNS and len(kinds) > len(group) and any(c.effect.stage is Stage.MATERIAL for c in found):
+            continue  # lines that were paired with another material's modes tell little of what mixes these
         if getattr(group[0], "costly", False) and (not costly or any(c.mean_db > PLAIN * gap for c in found)):
             continue  # something cheap says most of it: what is left may ask for more in the next round
         proposed = _proposed(group, evidence)
@@ -167,12 +172,13 @@ def _proposed(group: list[type[Effect]], evidence: Evidence) -> dict[type[Effect
     )
 
 
-def _groups(kinds: list[type[Effect]]) -> list[list[type[Effect]]]:
-    """Rooms, whose echoes others would be told of; what is cheap; and what takes long, one by one."""
+def _groups(kinds: list[type[Effect]], last: frozenset[str]) -> list[list[type[Effect]]]:
+    """Rooms, whose echoes others would be told of; what is cheap; and what takes long, one by one; then those that come last."""
     rooms = [k for k in kinds if hasattr(k, "dried")]
-    dear = [k for k in kinds if k not in rooms and getattr(k, "costly", False)]
-    plain = [k for k in kinds if k not in rooms and k not in dear]
-    return [group for group in (rooms, plain, *([k] for k in dear)) if group]
+    late = [k for k in kinds if k.id in last]
+    dear = [k for k in kinds if k not in rooms + late and getattr(k, "costly", False)]
+    plain = [k for k in kinds if k not in rooms + late + dear]
+    return [group for group in (rooms, plain, *([k] for k in (*dear, *late))) if group]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -252,11 +258,13 @@ def _tried(kind: type[Effect], whole: Effect, h: Hypothesis, bodies: tuple[Struc
         lines = likelier(fold.base, beside, evidence, less, bodies) if isinstance(fold.take, Take) and tells(h, effect) else 0.0
         return Gain(effect, fold.least - after, fold.before - after, chance, lines)
 
-    found = side_by_side(judged, range(len(folds)))
+    found = side_by_side(judged, range(min(FIRST, len(folds))))
+    if not all(g.effect is not None and g.whole_db < -HOPELESS_DB for g in found) or tells(h, whole):  # lines may speak for what strikes do not
+        found += side_by_side(judged, range(len(found), len(folds)))
     added = refitted(replace(h, effects=(*h.effects, whole)), bodies, evidence.heard)
     drop, whole_db, null_db = np.array([g.drop_db for g in found]), _mean([g.whole_db for g in found]), _mean([x for g in found for x in g.null_db])
     lines = _mean([g.lines for g in found]) / (1 - KEPT)  # each line is left out in so many of the folds
-    level = np.array([f.take.body.impulse_n_s[f.take.strike] if isinstance(f.take, Take) else np.nan for f in folds])
+    level = np.array([f.take.body.impulse_n_s[f.take.strike] if isinstance(f.take, Take) else np.nan for f in folds[: len(found)]])
     return Candidate(kind.id, whole, added, drop, whole_db, null_db, jackknife([g.effect.parameters() for g in found if g.effect is not None]), lines, level)
 
 

@@ -21,7 +21,7 @@ from sonic_bullet.diagnosis.choice import helps
 from sonic_bullet.diagnosis.evidence import evidence_of
 from sonic_bullet.diagnosis.exchange import again
 from sonic_bullet.diagnosis.judge import Judged, Take, least_db, mean_db
-from sonic_bullet.diagnosis.play import Hypothesis, moves, moves_itself
+from sonic_bullet.diagnosis.play import TURNS, Hypothesis, moves, moves_itself
 from sonic_bullet.diagnosis.refit import refitted, retold, with_effects
 from sonic_bullet.diagnosis.ties import CLEAR, NEARLY, misfit
 from sonic_bullet.diagnosis.trial import Candidate, earns, trials
@@ -105,10 +105,12 @@ def in_a_room(
         two = retold(refitted(replace(alone, effects=(c.effect, room)), bodies, told.heard), bodies, fully=True)
         return Two(two, mean_db(takes, two) or np.inf)
 
-    pairs = [two for two in side_by_side(beside, movers) if two is not None]
     floor, left = least_db(takes, h) or 0.0, mean_db(takes, retold(h, bodies, fully=True)) or 0.0
-    best = min(pairs, key=lambda two: two.db, default=None)
-    if best is None or best.db - floor > LEFT * (left - floor):
+    for some in ([c for c in movers if c.id not in TURNS], [c for c in movers if c.id in TURNS]):  # what hardly moves modes is asked where nothing else will do
+        best = min((two for two in side_by_side(beside, some) if two is not None), key=lambda two: two.db, default=None)
+        if best is not None and best.db - floor <= LEFT * (left - floor):
+            break
+    else:
         return None
     return _stood(best.h, bodies, takes, band_hz, seed=seed, say=say)
 

@@ -21,7 +21,7 @@ from sonic_bullet.records import ORTHOTROPIC, Array, Material
 
 BETTER = 10.0  # in BIC, than isotropy
 NEARER = 0.7  # of isotropy's rms of ln f, lines beyond the cap counted at the cap
-IN_A_ROOM, MORE = 30.0, 0.15  # or in BIC and of the lines: half of those in a room are no modes, and beyond the cap whatever the tensor
+IN_A_ROOM = 30.0  # or in BIC, with a line more within the cap: half of those in a room are no modes, and beyond it whatever the tensor
 SUFFICES = 5e-3  # rms of ln f from the nearest isotropic mode that leaves nothing to look for: split pairs, corrected meshes
 LEAST = 0.03  # of ln E_i/E_j or ln of Zener's ratio: less is the mesh's
 
@@ -80,7 +80,8 @@ class Orthotropy:
             density = told[0].elastic.material.density_kg_m3
             start = p_of(evidence.known.stiffness_pa / density)
             return cls.of(fitted(told, evidence.known.symmetry, start, isotropic_p(told[0].elastic), WIDTHS[4:]), density)
-        if not told or sum(len(t.log_hz) for t in told) < 6 or all(_fits(h) for h in evidence.heard):
+        lines = sum(len(t.log_hz) for t in told)
+        if lines < 6 or all(_fits(h) for h in evidence.heard):
             return None
         found = search(evidence)
         if found is None:
@@ -88,7 +89,7 @@ class Orthotropy:
         plain, best = found
         gain, dry = plain.bic - best.bic, any(h.dry for h in evidence.heard)
         told_apart = gain > BETTER and best.off < NEARER * plain.off
-        told_apart |= dry and gain > IN_A_ROOM and best.matched > plain.matched + MORE
+        told_apart |= dry and gain > IN_A_ROOM and round(lines * (best.matched - plain.matched)) >= 1
         if not told_apart or departure(best) < LEAST:
             return None
         return cls.of(best, told[0].elastic.material.density_kg_m3)
