@@ -28,7 +28,6 @@ LEAST = 0.05  # of c a₀ at the loudest
 POWERS = (1.0, 2.0)
 CHOKES = np.geomspace(0.02, 30, 28)  # of c a₀ at the loudest
 AGAIN = np.geomspace(0.4, 2.5, 9)  # of what all evidence said
-TURNS = 0.1  # of a line's ln variance, that its twins' axes must be worth
 
 
 @dataclass(frozen=True)
@@ -121,7 +120,7 @@ def _fitted(lines: list[Line], known: float | None) -> _Fit | None:
     closer = _along(lines, fine)
     j = int(np.argmin([_cost(row) for row in closer]))
     choke, row = float(fine[j]), closer[j]
-    gain = np.array([a.spread.min() - b.spread.min() for a, b in zip(plain, row, strict=True)])
+    gain = np.array([a.least - b.least for a, b in zip(plain, row, strict=True)])
     if choke * most < LEAST:
         return None
     if known is None and not (gain.sum() > BETTER and -gain[gain < 0].sum() < 0.3 * gain[gain > 0].sum() and _sure(lines, choke, plain, row)):
@@ -144,13 +143,13 @@ def _along(lines: list[Line], chokes: Array) -> list[tuple[Told, ...]]:
 
 
 def _cost(row: tuple[Told, ...]) -> float:
-    return float(sum(one.spread.min() for one in row))
+    return float(sum(one.least for one in row))
 
 
 def _sure(lines: list[Line], choke: float, plain: tuple[Told, ...], row: tuple[Told, ...]) -> bool:
     """Whether the lines that a choke would bend are bent so: each counts by what a choke would be of its misfit, so one loud mode and a softer one will do."""
     before = np.exp([one.spread[0] for one in plain])
-    after = np.exp([one.spread.min() for one in row])
+    after = np.exp([one.least for one in row])
     bent = np.array([would(line, choke, float(one.decay_per_s[one.best]), one.best) for line, one in zip(lines, row, strict=True)])
     says = np.minimum(bent / before, 1.0)
     gone = np.maximum(1 - after / before, -1.0)
@@ -168,9 +167,7 @@ def _louder(h: Heard, lines: list[Line], found: _Fit) -> float:
 
 def _axes(lines: list[Line], found: _Fit) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Frequencies and angles of the twins whose axes are heard."""
-    heard = [
-        (line.freq_hz, float(ANGLES[one.best])) for line, one in zip(lines, found.told, strict=True) if one.best and one.spread[0] - one.spread.min() > TURNS
-    ]
+    heard = [(line.freq_hz, float(ANGLES[one.best])) for line, one in zip(lines, found.told, strict=True) if one.turned]
     return tuple(f for f, _ in heard), tuple(t for _, t in heard)
 
 

@@ -1,7 +1,7 @@
 """Lines whose decay goes with the level of the modes they stand for: d and what is left, for a given choke c; and the axes of twins.
 
     ln |z_s(t)| = const_s + ln |Σ_m A_sm e/(1 + x_sm (1 − e^p))^{1/p}|,   e = e^{−dt},  x_sm = (c a_sm)^p            [effects.amplitude_damping]
-    d by Gauss and Newton; const_s of each strike alone, so no gain is needed
+    d by Gauss and Newton; const_s of each strike alone, so no gain is needed; how far these differ from strike to strike tells angles alone
 
 Two twins are one line, and each is choked by its own level: how loud each is depends on where the pair's axes lie, which in a linear body nobody
 hears, and which a mesh leaves to chance (axes.py). ψ is tried all round, line by line.
@@ -23,6 +23,8 @@ FEWEST = 8  # clear frames of a strike
 THIN = 3  # one frame of so many will do where angles are tried
 STEPS = 4  # of Gauss and Newton
 RANGE = (0.2, 1.6)  # of the heard decay
+TURNS = 0.1  # of a line's ln variance, that its twins' axes must be worth
+LEVEL, MOST, EARLY = 0.1, 2.0, 0.5  # of ln |z|: shapes' own error; more off is no worse; nepers of a line's decay
 FAINT = 1e-3  # of Σ|A|: twins may cancel, not vanish
 
 
@@ -46,14 +48,27 @@ class Line:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Told:
-    """Of a line under a choke: ln of the variance (p,) it leaves and its decay (p,) under every angle."""
+    """Of a line under a choke: ln of the variance (p,) it leaves within strikes, ln of that between them, and its decay (p,) under every angle."""
 
     spread: Array
+    between: Array
     decay_per_s: Array
 
     @property
     def best(self) -> int:
-        return int(self.spread.argmin())
+        """The angle that all strikes tell, those as well in which nobody hears the line."""
+        return int((self.spread + self.between).argmin())
+
+    @property
+    def least(self) -> float:
+        """What the best angle leaves within strikes."""
+        return float(self.spread[self.best])
+
+    @property
+    def turned(self) -> bool:
+        """Whether the mesh's own axes are surely not the best."""
+        whole = self.spread + self.between
+        return bool(self.best and whole[0] - whole[self.best] > TURNS)
 
 
 def lines_under(e: Envelopes, h: Heard, measure: str) -> list[Line]:
@@ -85,7 +100,19 @@ def told(line: Line, choke: float, start: Array | None = None) -> Told:
         step = (line.weight * left * slope).sum(axis=(1, 2)) / np.maximum((line.weight * slope**2).sum(axis=(1, 2)), 1e-300)
         decay = np.clip(decay - step, low, high)
     left, _ = _left(line, choke, decay)
-    return Told(np.log((line.weight * left**2).sum(axis=(1, 2)) / line.weight.sum() + ROUGH**2), decay)
+    within = np.log((line.weight * left**2).sum(axis=(1, 2)) / line.weight.sum() + ROUGH**2)
+    return Told(within, _between(line, choke, decay) if many > 1 else np.zeros(many), decay)
+
+
+def _between(line: Line, choke: float, decay: Array) -> Array:
+    """ln of the variance (p,) of the levels that strikes are told over those that they are heard with; one in which the line is not heard may not be told louder."""
+    heard = line.weight.sum(axis=1) > 0
+    early = line.time_s < line.time_s[0] + EARLY / line.decay_per_s
+    weight = np.where(heard[:, None], line.weight, early.astype(float))
+    off = (weight / weight.sum(axis=1, keepdims=True) * (line.log - _model(line, choke, decay)[0])).sum(axis=2)  # (p, s)
+    off = off - np.median(off[:, heard], axis=1, keepdims=True)
+    off = np.clip(np.where(heard, off, np.minimum(off, 0.0)), -MOST, MOST)
+    return np.asarray(np.log((off**2).mean(axis=1) + LEVEL**2))
 
 
 def would(line: Line, choke: float, decay_per_s: float, angle: int) -> float:

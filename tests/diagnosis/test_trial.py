@@ -27,7 +27,7 @@ from sonic_bullet.effects.radiation import Radiation
 from sonic_bullet.effects.support_damping import SupportDamping
 from sonic_bullet.effects.support_subsets import _best, subsets
 from sonic_bullet.effects.support_trial import Trial
-from sonic_bullet.effects.values import Evidence, Owner, Stage
+from sonic_bullet.effects.values import Evidence, Owner, Sound, Stage
 from sonic_bullet.records import ModalModel
 
 WEAK = ((0.0477, 0.0371, 0.0), (0.0955, 0.0186, 0.0), (0.1432, 0.0464, 0.0))
@@ -142,6 +142,25 @@ def test_what_corrections_alone_would_gain_is_no_effects() -> None:
     assert [c.id for c in found] == ["mode-splitting"]
     assert np.abs(found[0].drop_db).max() < 0.1 * lost
     assert not earns(found[0], lost, first=True)
+
+
+@pytest.mark.parametrize(("spoils", "asked"), [((0, 1, 2, 3, 4), 2), ((0, 2, 3, 4), 5), ((), 5)], ids=["all", "but one", "none"])
+def test_what_spoils_each_of_the_first_strikes_is_asked_no_more(spoils: tuple[int, ...], asked: int) -> None:
+    """Fitted without them, it plays both far worse: no other strike could make up for that. A suspect that lines may speak for is asked to the end."""
+
+    class Mutes(Idle):
+        id: ClassVar[str] = "mutes"
+        stage: ClassVar[Stage] = Stage.SOUND
+
+        def apply(self, x: Sound) -> Sound:
+            return replace(x, sample=0.01 * x.sample) if x.strike in spoils else x
+
+    body = recorded()
+    takes, h = takes_of((body,)), refitted(fitted(body), (body,))
+    found = trials(h, (body,), takes, evidence_of(h, (body,), BAND), (Mutes,), seed=0, say=lambda _: None)[0]
+    assert len(found.drop_db) == len(found.impulse_n_s) == asked
+    assert (found.drop_db < -3.0).tolist() == [i in spoils for i in range(asked)]
+    assert not earns(found, 1.0, first=True)
 
 
 def test_two_processes_find_what_one_finds(monkeypatch: pytest.MonkeyPatch) -> None:
