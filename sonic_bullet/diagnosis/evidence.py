@@ -16,12 +16,13 @@ from sonic_bullet.diagnosis.glide import fallen
 from sonic_bullet.diagnosis.play import BESIDE, Hypothesis, blow_of, in_band, modes_of, moves, pattern, play, start
 from sonic_bullet.effects.values import Evidence, Heard, Sound, Stage
 from sonic_bullet.estimator.evidence import Evidence as Gathered
-from sonic_bullet.estimator.lines import noise_rms
+from sonic_bullet.estimator.lines import Lines, noise_rms
 from sonic_bullet.estimator.pairing import TWINS
 from sonic_bullet.records import Array, ModalModel
 
 REACH = 0.012  # of a line from its mode where effects have moved it
 LOSSY, TOGETHER = 0.06, 0.25  # price of (ln d)² of a line over its mode; ln d of modes that sound as one line
+OWN, ALIKE = 1e-4, 2.0  # of a frequency, beside its width; times its decay: a line so near what is known to ring beside the body is that
 DIRECT_S = 0.008  # of the sound path: what comes later is an echo
 
 
@@ -50,7 +51,7 @@ def heard_of(h: Hypothesis, body: Struck, *, sounds: bool = True, anew: bool = F
     plain, plain_order = modes_of(uncorrected, body)
     rank = {int(k): i for i, k in enumerate(plain_order)}
     model_hz = np.array([np.mean([plain.freq_hz[rank[int(order[k])]] if int(order[k]) in rank else model.freq_hz[k] for k in m]) for m in mode])
-    rest = np.setdiff1d(np.arange(len(lines.freq_hz)), line)
+    rest = np.setdiff1d(np.flatnonzero(~named(h, lines)), line)
     predicted = own = None
     if sounds and gathered.signals is not None:
         predicted, own = _played(h, body, mine, gathered.signals)
@@ -106,6 +107,14 @@ def _played(h: Hypothesis, body: Struck, strikes: list[int], signals: Array) -> 
     return all_of_it, None if len(rest) == len(h.effects) else signals - (all_of_it - played(replace(h, effects=rest)))
 
 
+def named(h: Hypothesis, lines: Lines) -> Array:
+    """Which lines (l,) are of what the hypothesis knows to ring beside the body: nobody else is told of them."""
+    freq, decay = (np.concatenate([np.array(getattr(e, name)) for e in h.effects if e.id in BESIDE] or [np.zeros(0)]) for name in ("freq_hz", "decay_per_s"))
+    near = np.abs(lines.freq_hz[:, None] - freq) < decay / (2 * np.pi) + OWN * freq
+    slow, fast = (f(np.nan_to_num(lines.decay_per_s)[:, None], decay) for f in (np.minimum, np.maximum))
+    return np.asarray((near & (fast <= ALIKE * slow)).any(axis=1))
+
+
 def outside(h: Hypothesis, heard: Heard) -> Heard:
     """The evidence with its lines as they would be outside the room that the hypothesis has found."""
     for effect in h.effects:
@@ -122,10 +131,11 @@ def paired(h: Hypothesis, body: Struck, model: ModalModel, order: Array, *, anew
         mode = tuple(np.array(sorted(place[int(k)] for k in np.flatnonzero(body.line == one) if int(k) in place), int) for one in line)
         good = [i for i, m in enumerate(mode) if len(m)]
         return line[good], tuple(mode[i] for i in good)
-    return _nearest(body, model)
+    assert body.gathered is not None
+    return _nearest(body, model, named(h, body.gathered.lines))
 
 
-def _nearest(body: Struck, model: ModalModel) -> tuple[Array, tuple[Array, ...]]:
+def _nearest(body: Struck, model: ModalModel, known: Array) -> tuple[Array, tuple[Array, ...]]:
     from scipy.optimize import linear_sum_assignment
 
     assert body.gathered is not None
@@ -139,6 +149,7 @@ def _nearest(body: Struck, model: ModalModel) -> tuple[Array, tuple[Array, ...]]
     with np.errstate(divide="ignore", invalid="ignore"):
         worse = np.nan_to_num(np.log(lines.decay_per_s[:, None] / model.decay_per_s[None, :]), posinf=0.0, neginf=0.0)
     price = np.minimum((gap / REACH) ** 2 + 0.5 * (1 - np.nan_to_num(alike)) + LOSSY * worse**2, 1.0) - 1.0
+    price[known] = 0.0
     row, column = linear_sum_assignment(price)
     good = price[row, column] < 0
     row, column = row[good], column[good]
