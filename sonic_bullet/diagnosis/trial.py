@@ -140,7 +140,7 @@ def trials(
     anew = cache(lambda: refitted(h, bodies, anew=True) if heard else h)
     fair = cache(lambda by_line: _learnt_anew(anew(), whole_lines() if by_line else folds))
     still = cache(lambda by_line: _rested(whole_lines() if by_line else folds))
-    gap = float(np.mean([f.before for f in folds]) - np.mean([f.take.least(f.base) for f in folds])) if folds else 0.0
+    gap = _mean([f.before - f.noise for f in folds])
     idle = not costly and len(evidence.found) >= ENOUGH
     dry = any(one.dry for one in evidence.heard)
     kinds = [kind for kind in effects if kind.id not in evidence.found and not (idle and getattr(kind, "searches", False))]
@@ -185,7 +185,8 @@ def _groups(kinds: list[type[Effect]], last: frozenset[str]) -> list[list[type[E
 class Fold:
     """What is left to learn from once ``take`` is left out: bodies, evidence, the hypothesis refitted to it, and its distance to the take.
 
-    least: the same distance, or a lesser one that corrections alone come to where they are learnt again.
+    least: the same distance, or a lesser one that corrections alone come to where they are learnt again. noise: what noise alone makes, of the other takes where this one
+    is silent.
     """
 
     take: Judged
@@ -194,6 +195,7 @@ class Fold:
     base: Hypothesis
     before: float
     least: float
+    noise: float
 
 
 def _folds(h: Hypothesis, bodies: tuple[Struck, ...], takes: Sequence[Judged], evidence: Evidence, seed: int, keep: float = KEPT) -> list[Fold]:
@@ -210,8 +212,9 @@ def _folds(h: Hypothesis, bodies: tuple[Struck, ...], takes: Sequence[Judged], e
             base = refitted(h, bodies, less.heard)
         before = take.distance(base)
         if np.isfinite(before):
-            made.append(Fold(take, mine, less, base, before, before))
-    return made
+            made.append(Fold(take, mine, less, base, before, before, take.least(base)))
+    usual = [f.noise for f in made if np.isfinite(f.noise)]
+    return [f if np.isfinite(f.noise) else replace(f, noise=_mean(usual) if usual else f.before) for f in made]
 
 
 def _learnt_anew(every: Hypothesis, folds: list[Fold]) -> list[Fold]:
@@ -270,7 +273,8 @@ def _tried(kind: type[Effect], whole: Effect, h: Hypothesis, bodies: tuple[Struc
 
 def _after(fold: Fold, h: Hypothesis) -> float:
     """The distance to a fold's take; what noise alone makes where neither that nor what is played stands above it any more."""
-    return next((d for d in (fold.take.distance(h), fold.take.least(fold.base)) if np.isfinite(d)), fold.before)
+    far = fold.take.distance(h)
+    return far if np.isfinite(far) else fold.noise
 
 
 def _beside(fold: Fold, effect: Effect) -> Hypothesis:
