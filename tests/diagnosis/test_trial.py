@@ -13,6 +13,7 @@ from scipy.optimize import nnls
 from test_chains import BENT
 from test_found_again import BAND, fitted
 
+from sonic_bullet.diagnosis import loop
 from sonic_bullet.diagnosis.baseline import _soft, takes_of
 from sonic_bullet.diagnosis.chains import LINKS, unchained
 from sonic_bullet.diagnosis.diagnose import _finite
@@ -21,9 +22,12 @@ from sonic_bullet.diagnosis.judge import mean_db
 from sonic_bullet.diagnosis.play import Hypothesis
 from sonic_bullet.diagnosis.refit import refitted
 from sonic_bullet.diagnosis.trial import KEPT, LEAST_DB, Candidate, Fold, _after, _folds, earns, needed, trials
+from sonic_bullet.effects import EFFECTS
 from sonic_bullet.effects.amplitude_damping import AmplitudeDamping
 from sonic_bullet.effects.amplitude_pitch import AmplitudePitch
+from sonic_bullet.effects.orthotropy import Orthotropy
 from sonic_bullet.effects.radiation import Radiation
+from sonic_bullet.effects.room import Room
 from sonic_bullet.effects.support_damping import SupportDamping
 from sonic_bullet.effects.support_subsets import _best, subsets
 from sonic_bullet.effects.support_trial import Trial
@@ -257,6 +261,70 @@ def test_trials_tell_what_has_numbers_of_single_lines_all_lines(monkeypatch: pyt
     asked.clear()
     trials(h, (body,), takes, replace(told, found=("room", "radiation")), (Listens, Searches), seed=0, say=lambda _: None, costly=False)
     assert {who for who, _ in asked} == {"listens"}
+
+
+@pytest.mark.parametrize(
+    ("dry", "costly", "asked"), [(True, True, ["tensor"]), (False, True, ["support-damping", "tensor"]), (True, False, ["support-damping"])]
+)
+def test_in_a_room_dashpots_wait_for_a_tensor(dry: bool, costly: bool, asked: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Lines that are paired with another material's modes tell little of what mixes these; asked alone, dashpots are sought."""
+    monkeypatch.setattr("sonic_bullet.side_by_side._can_fork", lambda: False)
+    seen: list[str] = []
+
+    class Dashpots(Idle):
+        id: ClassVar[str] = "support-damping"
+        searches: ClassVar[bool] = True
+
+        @classmethod
+        def propose(cls, evidence: Evidence) -> Self | None:
+            seen.append(cls.id)
+            return None
+
+    class Tensor(Idle):
+        id: ClassVar[str] = "tensor"
+        stage: ClassVar[Stage] = Stage.MATERIAL
+        costly: ClassVar[bool] = True
+
+        @classmethod
+        def propose(cls, evidence: Evidence) -> Self | None:
+            seen.append(cls.id)
+            return cls()
+
+    body = recorded()
+    takes, h = takes_of((body,)), refitted(fitted(body), (body,))
+    told = evidence_of(h, (body,), BAND)
+    told = replace(told, heard=(replace(told.heard[0], dry=dry),))
+    trials(h, (body,), takes, told, (Dashpots, Tensor), seed=0, say=lambda _: None, costly=costly)
+    assert list(dict.fromkeys(seen)) == asked
+    seen.clear()
+    trials(h, (body,), takes, told, (Dashpots,), seed=0, say=lambda _: None, costly=costly)
+    assert seen == ["support-damping"]
+
+
+def test_dashpots_are_asked_after_a_tensor_that_came_to_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[list[str]] = []
+    room = Room(1.1, 0.7, 11)
+    body = recorded(room)
+    takes = takes_of((body,))
+
+    def told(h: Hypothesis, bodies: Any, takes: Any, evidence: Any, effects: Any, **_: Any) -> list[Candidate]:
+        asked.append([kind.id for kind in effects])
+        drop = np.full(len(takes), 5.0)
+        if len(asked) == 1:
+            found = Room.propose(evidence_of(h, (body,), BAND))
+            assert found is not None
+            return [Candidate("room", found, refitted(replace(h, effects=(found,)), (body,)), drop, 5.0, 0.0, {})]
+        if len(asked) == 2:
+            return [Candidate("tensor", Orthotropy((1.0,) * 9), h, -drop, -5.0, 0.0, {})]
+        return []
+
+    monkeypatch.setattr(loop, "trials", told)
+    monkeypatch.setattr(loop, "in_a_room", lambda *_, **__: None)
+    monkeypatch.setattr(loop, "in_twos", lambda *_, **__: None)
+    end = loop.closed(fitted(body), (body,), takes, EFFECTS, BAND)
+    every = [kind.id for kind in EFFECTS]
+    assert asked == [every, every, ["support-damping"]]
+    assert [c.id for c in end.added] == ["room"]
 
 
 def test_a_lines_own_numbers_are_tried_with_all_lines() -> None:
