@@ -51,7 +51,8 @@ def heard_of(h: Hypothesis, body: Struck, *, sounds: bool = True, anew: bool = F
     plain, plain_order = modes_of(uncorrected, body)
     rank = {int(k): i for i, k in enumerate(plain_order)}
     model_hz = np.array([np.mean([plain.freq_hz[rank[int(order[k])]] if int(order[k]) in rank else model.freq_hz[k] for k in m]) for m in mode])
-    rest = np.setdiff1d(np.flatnonzero(~named(h, lines)), line)
+    gone = named(h, lines) & sounds  # else they are in the recordings, and neighbours
+    rest = np.setdiff1d(np.flatnonzero(~gone), line)
     predicted = own = None
     if sounds and gathered.signals is not None:
         predicted, own = _played(h, body, mine, gathered.signals)
@@ -108,11 +109,12 @@ def _played(h: Hypothesis, body: Struck, strikes: list[int], signals: Array) -> 
 
 
 def named(h: Hypothesis, lines: Lines) -> Array:
-    """Which lines (l,) are of what the hypothesis knows to ring beside the body: nobody else is told of them."""
+    """Which lines (l,), one of each mode, are of what the hypothesis knows to ring beside the body: nobody else is told of them."""
     freq, decay = (np.concatenate([np.array(getattr(e, name)) for e in h.effects if e.id in BESIDE] or [np.zeros(0)]) for name in ("freq_hz", "decay_per_s"))
-    near = np.abs(lines.freq_hz[:, None] - freq) < decay / (2 * np.pi) + OWN * freq
-    slow, fast = (f(np.nan_to_num(lines.decay_per_s)[:, None], decay) for f in (np.minimum, np.maximum))
-    return np.asarray((near & (fast <= ALIKE * slow)).any(axis=1))
+    off, own = np.abs(lines.freq_hz[:, None] - freq), np.maximum(np.nan_to_num(lines.decay_per_s), 0.0)[:, None]
+    alike = (off < decay / (2 * np.pi) + OWN * freq) & (np.maximum(own, decay) <= ALIKE * np.minimum(own, decay))
+    off = np.where(alike, off, np.inf)
+    return np.asarray((alike & (off == off.min(axis=0, initial=np.inf))).any(axis=1))
 
 
 def outside(h: Hypothesis, heard: Heard) -> Heard:

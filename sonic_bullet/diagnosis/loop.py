@@ -23,7 +23,7 @@ from sonic_bullet.diagnosis.play import TURNS, Hypothesis, moves_itself
 from sonic_bullet.diagnosis.refit import refitted, retold
 from sonic_bullet.diagnosis.trial import FAINT_DB, LEAST_DB, Candidate, earns, trials
 from sonic_bullet.diagnosis.twos import in_a_room, in_twos
-from sonic_bullet.effects.values import Effect, Stage
+from sonic_bullet.effects.values import Effect, Evidence, Stage
 
 ROUNDS = 4
 SUFFICES_DB = 1.5  # a gap below this is the mesh's and the shapes' own
@@ -123,23 +123,21 @@ def _one_by_one(
         costly = told - floor > OPEN * (before - floor)
         found = trials(h, bodies, takes, evidence, effects, seed=seed + turn, say=say, costly=costly)
         last |= {c.id: c for c in found}
+        two, able = None, _able(found, bodies, takes, now, told, floor, first=not added)
         if not added:
             first, weak = found, all((mean_db(takes, c.hypothesis) or 0.0) - floor > WEAK * max(now - floor, 0.0) for c in found)
-            if weak and (two := in_twos(start, found, bodies, takes, band_hz, seed=seed, say=say)):
-                (h, added), passed = two, [(), ()]
-                last |= {c.id: c for c in added}
-                now, floor = mean_db(takes, h) or 0.0, least_db(takes, h) or floor
-                continue
-        able = _able(found, bodies, takes, now, told, floor, first=not added)
-        if all(moves_itself(h, c.effect) for c in able) and len(added) == 1 and (two := in_a_room(h, found, bodies, takes, band_hz, seed=seed, say=say)):
+            two = in_twos(start, found, bodies, takes, band_hz, seed=seed, say=say) if weak else None
+        two = two or _anew(h, able, found, bodies, takes, band_hz, seed, say)
+        if not (two or able) and costly and (late := _waited(found, evidence, effects)):
+            found = trials(h, bodies, takes, evidence, late, seed=seed + turn, say=say, costly=costly)
+            last |= {c.id: c for c in found}
+            able = _able(found, bodies, takes, now, told, floor, first=not added)
+            two = _anew(h, able, found, bodies, takes, band_hz, seed, say)
+        if two:
             (h, added), passed = two, [(), ()]
             last |= {c.id: c for c in added}
             now, floor = mean_db(takes, h) or 0.0, least_db(takes, h) or floor
             continue
-        if not able and any(c.effect.stage is Stage.MATERIAL for c in found) and (late := [k for k in effects if k.id in TURNS and k.id not in last]):
-            found = trials(h, bodies, takes, evidence, late, seed=seed + turn, say=say, costly=costly)  # which had to wait for a tensor that came to nothing
-            last |= {c.id: c for c in found}
-            able = _able(found, bodies, takes, now, told, floor, first=not added)
         if not able:
             break
         best = simplest(able, bodies, evidence)
@@ -164,6 +162,26 @@ def _able(
     """Those that strikes left out speak for; or, where they speak for none, the one that lines do."""
     able = [c for c in found if earns(c, max(now - floor, 0.0), first=first) and helps(c, bodies, takes, now, told, floor, first=first)]
     return able or sorted((c for c in found if by_lines(c, bodies, takes, told, floor)), key=lambda c: -c.lines)[:1]
+
+
+def _anew(
+    h: Hypothesis,
+    able: Sequence[Candidate],
+    found: Sequence[Candidate],
+    bodies: tuple[Struck, ...],
+    takes: Sequence[Judged],
+    band_hz: tuple[float, float],
+    seed: int,
+    say: Callable[[str], None],
+) -> tuple[Hypothesis, list[Candidate]] | None:
+    """A room that stands alone heard anew beside what moves modes (twos.py), unless something else is able to."""
+    return in_a_room(h, found, bodies, takes, band_hz, seed=seed, say=say) if all(moves_itself(h, c.effect) for c in able) and len(h.effects) == 1 else None
+
+
+def _waited(found: Sequence[Candidate], evidence: Evidence, effects: Sequence[type[Effect]]) -> list[type[Effect]]:
+    """The suspects that had to wait in a room for a tensor (trial.py), if that came to nothing."""
+    tensor = any(c.effect.stage is Stage.MATERIAL for c in found) and any(one.dry for one in evidence.heard)
+    return [k for k in effects if k.id in TURNS and tensor and k.id not in {c.id for c in found}]
 
 
 def _verdict(

@@ -41,7 +41,7 @@ LOUDEST = 2  # strikes, of which what goes with level must gain most
 LOST = 0.15  # of what the loudest gains: all that others may lose by what goes with level
 SURE, MANY = 2.0, 4  # standard errors; strikes of which none may lose, beside one
 NOISE_DB = 0.03  # of a distance, by noise alone
-HOPELESS_DB, FIRST = 3.0, 2  # lost on each of the first strikes left out: the others are not asked
+FIRST = 2  # strikes left out, after which a suspect is let go that could not earn its keep if all the others gained all there is
 ENOUGH = 2  # names: what little is left beside them is worth no search of half a minute
 PLAIN = 0.6  # of the gap: where a cheap suspect says as much, costly ones wait
 
@@ -49,7 +49,7 @@ PLAIN = 0.6  # of the gap: where a cheap suspect says as much, costly ones wait
 @dataclass(frozen=True, slots=True, eq=False)
 class Candidate:
     """A suspect after its trial. effect: fitted to all evidence. drop_db (s,): of each left-out strike's distance, less what corrections learnt again would gain
-    alone where the suspect moves modes; of the FIRST alone where each of those is farther off by HOPELESS_DB. whole_db: mean with that in it, which speaks for a name's turn. null_db: mean over strikes and draws.
+    alone where the suspect moves modes; of the FIRST alone where those lose more than all the others could gain. whole_db: mean with that in it, which speaks for a name's turn. null_db: mean over strikes and draws.
 
     Its axes of twins, if it has any, all fitted strikes told. spread: of each number in its parameters over the folds (jackknife). lines: by how much lines left
     out are likelier with it (by_lines.py). impulse_n_s (s,): of the strikes.
@@ -262,13 +262,24 @@ def _tried(kind: type[Effect], whole: Effect, h: Hypothesis, bodies: tuple[Struc
         return Gain(effect, fold.least - after, fold.before - after, chance, lines)
 
     found = side_by_side(judged, range(min(FIRST, len(folds))))
-    if not all(g.effect is not None and g.whole_db < -HOPELESS_DB for g in found) or tells(h, whole):  # lines may speak for what strikes do not
+    if _hopeful(kind.id, whole, h, found, folds) or tells(h, whole):  # lines may speak for what strikes do not
         found += side_by_side(judged, range(len(found), len(folds)))
     added = refitted(replace(h, effects=(*h.effects, whole)), bodies, evidence.heard)
     drop, whole_db, null_db = np.array([g.drop_db for g in found]), _mean([g.whole_db for g in found]), _mean([x for g in found for x in g.null_db])
     lines = _mean([g.lines for g in found]) / (1 - KEPT)  # each line is left out in so many of the folds
-    level = np.array([f.take.body.impulse_n_s[f.take.strike] if isinstance(f.take, Take) else np.nan for f in folds[: len(found)]])
+    level = _levels(folds[: len(found)])
     return Candidate(kind.id, whole, added, drop, whole_db, null_db, jackknife([g.effect.parameters() for g in found if g.effect is not None]), lines, level)
+
+
+def _hopeful(name: str, whole: Effect, h: Hypothesis, asked: Sequence[Gain], folds: Sequence[Fold]) -> bool:
+    """Whether a suspect would earn its keep if it were the recordings themselves on every strike that has not been asked."""
+    drop = np.array([*(g.drop_db for g in asked), *(f.least - f.noise for f in folds[len(asked) :])])
+    best = Candidate(name, whole, h, drop, _mean([f.before - f.noise for f in folds]), 0.0, {}, impulse_n_s=_levels(folds))
+    return earns(best, _mean([f.before - f.noise for f in folds]), first=True)
+
+
+def _levels(folds: Sequence[Fold]) -> np.ndarray[Any, Any]:
+    return np.array([f.take.body.impulse_n_s[f.take.strike] if isinstance(f.take, Take) else np.nan for f in folds])
 
 
 def _after(fold: Fold, h: Hypothesis) -> float:

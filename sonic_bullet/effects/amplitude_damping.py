@@ -58,7 +58,8 @@ class AmplitudeDamping:
         one_of("power", self.power, POWERS)  # of drag: others have no closed form
         one_of("measure", self.measure, MEASURES)
         finite("choke", self.choke, least=0.0)
-        finite("freq_hz", *self.freq_hz, least=0.0)
+        finite("louder", self.louder, least=1e-6)
+        finite("freq_hz", *self.freq_hz, least=1e-3)
         finite("turn_rad", *self.turn_rad)
         side_by_side(freq_hz=self.freq_hz, turn_rad=self.turn_rad)
 

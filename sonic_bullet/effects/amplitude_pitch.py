@@ -64,7 +64,7 @@ class AmplitudePitch:
     def __post_init__(self) -> None:
         one_of("measure", self.measure, MEASURES)
         finite("bend", self.bend)
-        finite("freq_hz", *self.freq_hz, least=0.0)
+        finite("freq_hz", *self.freq_hz, least=1e-3)
         finite("turn_rad", *self.turn_rad)
         side_by_side(freq_hz=self.freq_hz, turn_rad=self.turn_rad)
 

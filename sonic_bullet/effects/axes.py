@@ -46,11 +46,11 @@ def twins(h: Heard, k: int) -> bool:
 
 
 def about(h: Heard, k: int, measure: str, angle: Array) -> tuple[Array, Array]:
-    """Amplitudes at the sensor, but for a factor, and levels (p, s, j) of the modes a line stands for, with twins turned by p angles. measure: see envelope.levels."""
+    """Amplitudes at the sensor, but for one factor, and levels (p, s, j) of the modes a line stands for, with twins turned by p angles. measure: see envelope.levels."""
     impulse = np.where(np.isfinite(h.impulse_n_s), h.impulse_n_s, 1.0)[:, None]
     if h.model is None:
         pressed = h.pressed[:, h.mode[k]].max(axis=1)[None, :, None]
-        return np.ones_like(pressed), impulse[None] * pressed
+        return impulse[None] * pressed, impulse[None] * pressed
     shape = np.stack([h.model.shape[:, :, m] for m in h.mode[k]], axis=2).astype(float)
     bodies = np.stack([about_axes(shape, t) for t in angle.tolist()]) if len(angle) > 1 else shape[None]  # (p, v, 3, j)
     body = np.unique(h.model.face)
@@ -62,7 +62,7 @@ def about(h: Heard, k: int, measure: str, angle: Array) -> tuple[Array, Array]:
         level = level / (2 * np.pi * h.model.freq_hz[h.mode[k]])
     elif measure == "impulse":
         level = np.broadcast_to(impulse * h.pressed[:, h.mode[k]], push.shape)
-    return push * heard[:, None, :], level
+    return impulse * h.pressed[:, h.mode[k]] * push * heard[:, None, :], level
 
 
 def turned(x: ModalModel, freq_hz: tuple[float, ...], turn_rad: tuple[float, ...]) -> ModalModel:

@@ -44,8 +44,8 @@ class ModeSplitting:
     turn_rad: tuple[float, ...]
 
     def __post_init__(self) -> None:
-        finite("freq_hz", *self.freq_hz, least=0.0)
-        finite("split", *self.split, least=0.0)
+        finite("freq_hz", *self.freq_hz, least=1e-3)
+        finite("split", *self.split, least=0.0, most=2.0)
         finite("turn_rad", *self.turn_rad)
         side_by_side(freq_hz=self.freq_hz, split=self.split, turn_rad=self.turn_rad)
 

@@ -15,11 +15,12 @@ def one_of(name: str, value: Any, known: Collection[Any]) -> None:
         raise RecordError(f"{name} is {value!r}, which is none there is", f"use one of {', '.join(map(str, known))}")
 
 
-def finite(name: str, *values: float, least: float = -math.inf) -> None:
-    """Raise RecordError where a field's values are not all finite, and `least` or more."""
+def finite(name: str, *values: float, least: float = -math.inf, most: float = math.inf) -> None:
+    """Raise RecordError where a field's values are not all finite, `least` or more and below `most`."""
     for value in values:
-        if not (math.isfinite(value) and value >= least):
-            raise RecordError(f"{name} is {value}", "use a finite number" + (f" >= {least:g}" if math.isfinite(least) else ""))
+        if not (math.isfinite(value) and least <= value < most):
+            within = (f" >= {least:g}" if math.isfinite(least) else "") + (f", below {most:g}" if math.isfinite(most) else "")
+            raise RecordError(f"{name} is {value}", "use a finite number" + within)
 
 
 def side_by_side(**fields: Sequence[Any]) -> None:

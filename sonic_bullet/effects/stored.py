@@ -40,6 +40,8 @@ def effect_of(data: dict[str, Any]) -> Effect:
         made: Effect = msgspec.convert({k: v for k, v in data.items() if k != "id"}, kind)
     except msgspec.ValidationError as error:
         raise RecordError(f"effect '{name}': {error}", "mend that field") from error
+    except RecordError as error:
+        raise RecordError(f"effect '{name}': {error.what}", error.remedy) from error
     return made
 
 

@@ -17,7 +17,9 @@ from sonic_bullet.diagnosis.play import Hypothesis
 from sonic_bullet.diagnosis.refit import refitted
 from sonic_bullet.effects.amplitude_damping import AmplitudeDamping
 from sonic_bullet.effects.amplitude_pitch import AmplitudePitch
-from sonic_bullet.effects.axes import turned
+from sonic_bullet.effects.axes import ANGLES, turned
+from sonic_bullet.effects.choked import lines_under, told
+from sonic_bullet.effects.envelope import envelopes
 from sonic_bullet.effects.foreign_mode import ForeignMode
 from sonic_bullet.effects.values import Evidence
 from sonic_bullet.records import ModalModel
@@ -71,6 +73,22 @@ def test_twins_have_the_axes_that_their_envelopes_tell() -> None:
     assert held is not None and learnt is not None
     assert held.turn_rad == (1.2,) and learnt.turn_rad[0] == pytest.approx(0.6, abs=0.1)
     assert abs(held.alpha_per_s / learnt.alpha_per_s - 1) > 1e-3, "decays are told under the axes that they are played with"
+
+
+def test_levels_from_strike_to_strike_tell_the_axes_too() -> None:
+    """Strikes an octave apart: the louder, the sooner choked; and where nobody hears the line, no angle is likely under which it would be loud."""
+    model = with_twins()
+    body = recorded(AmplitudeDamping(5.0, "velocity", freq_hz=(float(model.freq_hz[PAIR[0]]),), turn_rad=(0.6,)), model=model)
+    heard = evidence_of(refitted(fitted(body), (body,)), (body,), BAND).heard[0]
+    e = envelopes(heard)
+    assert e is not None
+    line = next(one for one in lines_under(e, heard, "velocity") if len(one.amplitude) > 1)
+    found = told(line, 5.0)
+    assert ANGLES[int(found.between.argmin())] == pytest.approx(0.6, abs=0.1)
+    assert np.ptp(found.between) > 1.0
+    loud = np.abs(line.amplitude.sum(axis=2)[0] * line.level.max(axis=2)[0]).argmax()
+    silent = replace(line, weight=np.where(np.arange(5)[:, None] == loud, 0.0, line.weight), log=np.where(np.arange(5)[:, None] == loud, -30.0, line.log))
+    assert (told(silent, 5.0).between > found.between.min() + 1.0).all()
 
 
 def test_what_is_known_to_ring_beside_the_body_is_taken_out_of_its_lines() -> None:

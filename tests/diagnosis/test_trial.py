@@ -21,7 +21,7 @@ from sonic_bullet.diagnosis.evidence import evidence_of
 from sonic_bullet.diagnosis.judge import mean_db
 from sonic_bullet.diagnosis.play import Hypothesis
 from sonic_bullet.diagnosis.refit import refitted
-from sonic_bullet.diagnosis.trial import KEPT, LEAST_DB, Candidate, Fold, _after, _folds, earns, needed, trials
+from sonic_bullet.diagnosis.trial import KEPT, LEAST_DB, Candidate, Fold, Gain, _after, _folds, _hopeful, earns, needed, trials
 from sonic_bullet.effects import EFFECTS
 from sonic_bullet.effects.amplitude_damping import AmplitudeDamping
 from sonic_bullet.effects.amplitude_pitch import AmplitudePitch
@@ -147,9 +147,9 @@ def test_what_corrections_alone_would_gain_is_no_effects() -> None:
     assert not earns(found[0], lost, first=True)
 
 
-@pytest.mark.parametrize(("spoils", "asked"), [((0, 1, 2, 3, 4), 2), ((0, 2, 3, 4), 5), ((), 5)], ids=["all", "but one", "none"])
-def test_what_spoils_each_of_the_first_strikes_is_asked_no_more(spoils: tuple[int, ...], asked: int) -> None:
-    """Fitted without them, it plays both far worse: no other strike could make up for that. A suspect that lines may speak for is asked to the end."""
+@pytest.mark.parametrize(("spoils", "asked"), [((0, 1, 2, 3, 4), 2), ((0, 1), 2), ((), 2)], ids=["all", "two", "none"])
+def test_what_could_not_earn_its_keep_any_more_is_asked_no_further(spoils: tuple[int, ...], asked: int) -> None:
+    """Fitted without the first two, it says nothing of them, or plays them far worse, and there is nothing open on the others that would make up for it."""
 
     class Mutes(Idle):
         id: ClassVar[str] = "mutes"
@@ -164,6 +164,15 @@ def test_what_spoils_each_of_the_first_strikes_is_asked_no_more(spoils: tuple[in
     assert len(found.drop_db) == len(found.impulse_n_s) == asked
     assert (found.drop_db < -3.0).tolist() == [i in spoils for i in range(asked)]
     assert not earns(found, 1.0, first=True)
+
+
+@pytest.mark.parametrize(
+    ("drop", "before", "hopeful"), [((-3.1, -3.1), 2.0, False), ((-3.1, -3.1), 12.0, True), ((-0.1, 0.3), 3.0, True), ((0.0, 0.0), 0.1, False)]
+)
+def test_a_suspect_has_hope_as_long_as_the_rest_may_make_up_for_it(drop: tuple[float, ...], before: float, hopeful: bool) -> None:
+    h = fitted(recorded())
+    fold = Fold(takes_of((recorded(),))[0], (), Evidence((), 0.0, 0.0, 1.0, (), BAND), h, before + 1.0, before + 1.0, 1.0)
+    assert _hopeful("radiation", Radiation(0.1, 1.0), h, [Gain(drop_db=x) for x in drop], [fold] * 8) == hopeful
 
 
 def test_two_processes_find_what_one_finds(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -316,14 +325,17 @@ def test_dashpots_are_asked_after_a_tensor_that_came_to_nothing(monkeypatch: pyt
             return [Candidate("room", found, refitted(replace(h, effects=(found,)), (body,)), drop, 5.0, 0.0, {})]
         if len(asked) == 2:
             return [Candidate("tensor", Orthotropy((1.0,) * 9), h, -drop, -5.0, 0.0, {})]
-        return []
+        return [Candidate("support-damping", SupportDamping(((0.0, 0.0, 0.0),), (1.0,)), h, -drop, -5.0, 0.0, {})]
 
     monkeypatch.setattr(loop, "trials", told)
-    monkeypatch.setattr(loop, "in_a_room", lambda *_, **__: None)
+    anew: list[list[str]] = []
+    monkeypatch.setattr(loop, "in_a_room", lambda _, found, *__, **___: anew.append([c.id for c in found]))
     monkeypatch.setattr(loop, "in_twos", lambda *_, **__: None)
+    monkeypatch.setattr(loop, "OPEN", -1.0)  # however little the room leaves
     end = loop.closed(fitted(body), (body,), takes, EFFECTS, BAND)
     every = [kind.id for kind in EFFECTS]
     assert asked == [every, every, ["support-damping"]]
+    assert anew == [["tensor"], ["support-damping"]], "the room is heard anew beside both"
     assert [c.id for c in end.added] == ["room"]
 
 
