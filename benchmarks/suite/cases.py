@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import os
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from benchmarks.suite import objects, physics
 from benchmarks.suite.effects import CARRIED, LISTED, UNLISTED, Effect, Scene
 from benchmarks.suite.objects import MATERIALS, RECIPES, Body, Material, Recipe
 from benchmarks.suite.physics import Strike
+from benchmarks.suite.sounding import HELD_OUT, apart, as_it_acts, as_recorded, damping_of, each_beside, paired, short_of, strike_sound
 from sonic_bullet.records import Array
 
 PEAK = 0.5
@@ -43,9 +45,7 @@ class Plan:
     form: str = "audio"
 
 
-LEAST = (1.0, 1.8, 3.0)  # dB beyond the floor, in squares, that a weak, medium, strong effect must move the holdout strikes
 TRIES = 6
-HELD_OUT = (5, 6, 7)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,30 +64,24 @@ class Take:
 def make_case(folder: Path, plan: Plan, cache: Path) -> dict[str, Any]:
     """Writes folder/plan.name whole (case.json last, by rename) and gives its truth.
 
-    An effect that cannot be heard is drawn again, up to TRIES times; then the strongest draw is kept.
+    Effects that cannot be heard, alone or beside each other, are drawn again, up to TRIES times; then the draw is kept that comes nearest.
     """
-    least = LEAST[min(s for _, s in plan.effects)] if plan.effects else 0.0
-    weak: list[float] = []
-    take: Take | dict[str, float] = {}
+    short: list[float] = []
+    take: Take | float = 0.0
     for attempt in range(TRIES):
-        take = _take(plan, np.random.default_rng([plan.seed, attempt]), cache, least)
+        take = _take(plan, np.random.default_rng([plan.seed, attempt]), cache, lacking=0.0)
         if isinstance(take, Take):
             break
-        weak.append(_beyond(take))
+        short.append(take)
     if not isinstance(take, Take):
-        take = _take(plan, np.random.default_rng([plan.seed, int(np.argmax(weak))]), cache, 0.0)
+        take = _take(plan, np.random.default_rng([plan.seed, int(np.argmin(short))]), cache, lacking=np.inf)
     assert isinstance(take, Take)
     _save(folder / plan.name, plan, take)
     return take.truth
 
 
-def _beyond(distance: dict[str, float]) -> float:
-    """By how many dB the effect stands out of the floor, in squares."""
-    return float(np.sqrt(max(0.0, distance["effect"] ** 2 - distance["floor"] ** 2)))
-
-
-def _take(plan: Plan, rng: np.random.Generator, cache: Path, least: float) -> Take | dict[str, float]:
-    """A case, or only its distances where its effects stand out by less than ``least`` dB."""
+def _take(plan: Plan, rng: np.random.Generator, cache: Path, lacking: float) -> Take | float:
+    """A case, or only the dB that it lacks to be heard where these are more than ``lacking``."""
     recipe = RECIPES[plan.recipe]
     material = _as_it_is(MATERIALS[recipe.material], rng)
     unit = objects.solved(recipe, material.poisson, cache, fineness=plan.fineness)
@@ -96,11 +90,10 @@ def _take(plan: Plan, rng: np.random.Generator, cache: Path, least: float) -> Ta
     strikes = _strikes(plain, rng, 8)
     n = int(plan.seconds * plan.rate)
     quiet = Scene(recipe, material, plain, strikes, sensor, 1.0, plan.rate, n, cache)
-    dry = [_strike_sound(quiet, plain, s, sensor, (), i) for i, s in enumerate(strikes)]
+    dry = [strike_sound(quiet, plain, s, sensor, (), i) for i, s in enumerate(strikes)]
     scene = replace(quiet, gain=PEAK / max(float(np.abs(x).max()) for x in dry))
     effects = tuple({**LISTED, **UNLISTED}[name](strength, rng, scene) for name, strength in plan.effects)
-    unit_now = next((e.modes(recipe, material.poisson, cache) for e in effects if e.modes), unit)
-    body = objects.body(recipe.name, objects.as_made(unit_now, material))
+    body = as_it_acts(scene, material, effects, unit)
     bodies, sensors = [body], [sensor]
     all_strikes, owner = list(strikes), [0] * 8
     if plan.transfer:
@@ -113,22 +106,24 @@ def _take(plan: Plan, rng: np.random.Generator, cache: Path, least: float) -> Ta
 
     def sound(i: int) -> Array:
         o = owner[i]
-        return _strike_sound(scene, bodies[o], all_strikes[i], sensors[o], acting[o], i)
+        return strike_sound(scene, bodies[o], all_strikes[i], sensors[o], acting[o], i)
 
     def recorded(x: Array) -> Array:
-        x = x + physics.noise(rng, n, sd, plan.colour)
-        for e in effects:
-            x = e.last(x) if e.last is not None else x
-        return x
+        return as_recorded(x, effects, physics.noise(rng, n, sd, plan.colour))
 
     judged = {i: sound(i) for i in HELD_OUT}
-    distance = _distances([dry[i] for i in HELD_OUT], [recorded(judged[i]) for i in HELD_OUT], scene.gain, sd, plan.colour, rng)
-    if effects and _beyond(distance) < least:
-        return distance
+    heard = [recorded(judged[i]) for i in HELD_OUT]
+    without = [[scene.gain * dry[i] + physics.noise(rng, n, sd, plan.colour) for i in HELD_OUT] for _ in range(2)]
+    distance = apart(without, heard, sd)
+    own = rng.spawn(1)[0]  # its own, so that a single's bytes do not hang on it
+    another = partial(physics.noise, own, n, sd, plan.colour)
+    beside = each_beside(scene, material, unit, effects, [judged[i] for i in HELD_OUT], sd, another) if len(effects) > 1 else []
+    if (short := short_of(tuple(s for _, s in plan.effects), distance, beside)) > lacking:
+        return short
     clean = [judged[i] if i in judged else sound(i) for i in range(len(all_strikes))]
     quieter = min(1.0, 0.95 / max(float(np.abs(x).max()) for x in clean))
     heard = [recorded(quieter * x) for x in clean]
-    ringing = physics.ring(_paired(body, effects), _damping(body, material, effects), strikes[0], sensor)
+    ringing = physics.ring(paired(body, effects), damping_of(body, material, effects), strikes[0], sensor)
     truth = {
         "effects": [{"id": e.id, "strength": s, **e.truth} for e, (_, s) in zip(effects, plan.effects, strict=True)],
         "alpha": material.alpha,
@@ -141,6 +136,7 @@ def _take(plan: Plan, rng: np.random.Generator, cache: Path, least: float) -> Ta
         "poisson_ratio": material.poisson,
         "noise_sd": sd,
         "distance_db": distance,
+        "beside_db": {e.id: d for e, d in zip(effects, beside, strict=False)},
         "plan": asdict(plan),
     }
     return Take(bodies, sensors, all_strikes, owner, heard, ringing, truth)
@@ -160,9 +156,9 @@ def _save(where: Path, plan: Plan, take: Take) -> None:
         for b in take.bodies:
             objects.write_obj(where / f"{b.name}.obj", b)
     (where / "truth.json").write_text(json.dumps(take.truth, indent=1, default=float))
-    partial = where / "case.json.partial"
-    partial.write_text(json.dumps(_declared(plan, take.bodies, RECIPES[plan.recipe], take.sensors, entries), indent=1, default=float))
-    os.replace(partial, where / "case.json")
+    unfinished = where / "case.json.partial"
+    unfinished.write_text(json.dumps(_declared(plan, take.bodies, RECIPES[plan.recipe], take.sensors, entries), indent=1, default=float))
+    os.replace(unfinished, where / "case.json")
 
 
 def _as_it_is(guess: Material, rng: np.random.Generator) -> Material:
@@ -201,47 +197,6 @@ def _other(recipe: Recipe, material: Material, effects: tuple[Effect, ...], rng:
     unit = made or objects.solved(second, material.poisson, cache, fineness=plan.fineness)
     name = second.name if recipe.other else f"{recipe.name}_x{scale:g}"
     return objects.body(name, objects.as_made(unit, material, scale))
-
-
-def _paired(body: Body, effects: tuple[Effect, ...]) -> Body:
-    modes = body.modes
-    for e in effects:
-        if e.pairs:
-            modes = e.pairs(modes)
-    return replace(body, modes=modes)
-
-
-def _damping(body: Body, material: Material, effects: tuple[Effect, ...]) -> Array:
-    modes = _paired(body, effects).modes
-    damping = physics.rayleigh(modes.value, material)
-    for e in sorted(effects, key=lambda e: e.id != "damping-law"):
-        if e.damping:
-            damping = e.damping(modes, damping)
-    return damping
-
-
-def _strike_sound(scene: Scene, body: Body, strike: Strike, sensor: tuple[int, Array], effects: tuple[Effect, ...], which: int) -> Array:
-    """What is recorded of one blow, without noise."""
-    ringing = physics.ring(_paired(body, effects), _damping(body, scene.material, effects), strike, sensor)
-    run = next((e.ring for e in effects if e.ring), None)
-    x = run(ringing, strike.impulse, scene.n, scene.rate) if run else physics.sounded(ringing, scene.n, scene.rate)
-    x = scene.gain * strike.impulse * x
-    for e in effects:
-        if e.pulse:
-            x = np.convolve(x, e.pulse(strike.impulse, scene.rate))[: scene.n]
-    order = ("object", "fixture", "striker", "room", "chain")
-    for e in sorted((e for e in effects if e.sound), key=lambda e: order.index(e.belongs)):
-        assert e.sound
-        x = e.sound(x, strike.impulse, scene.rate, which)
-    return np.asarray(x)
-
-
-def _distances(dry: list[Array], heard: list[Array], gain: float, sd: float, colour: str, rng: np.random.Generator) -> dict[str, float]:
-    """How far the effects move the holdout strikes from the plain body's (nothing fitted), and two takes of a plain strike from each other."""
-    plain = [[gain * x + physics.noise(rng, len(x), sd, colour) for x in dry] for _ in range(2)]
-    pairs = zip(plain[0], plain[1], heard, strict=True)
-    both = [(physics.spectral_distance_db(a, h, sd), physics.spectral_distance_db(a, b, sd)) for a, b, h in pairs]
-    return {"effect": round(float(np.mean([a for a, _ in both])), 3), "floor": round(float(np.mean([b for _, b in both])), 3)}
 
 
 def _measured(ringing: physics.Ring, name: str, rng: np.random.Generator) -> list[dict[str, Any]]:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.suite import cases, objects, plans
+from benchmarks.suite import cases, objects, plans, sounding
 from benchmarks.suite.cases import Plan, make_case
 from benchmarks.suite.effects import LISTED, UNLISTED
 from benchmarks.suite.run import diagnose, rows, write_row
@@ -55,6 +55,18 @@ def test_a_null_lies_at_its_floor_and_an_effect_beyond_it(small: str, tmp_path: 
     assert null["effect"] == pytest.approx(null["floor"], abs=0.5)
     moved = make_case(tmp_path, Plan("law", small, (("damping-law", 2),), 5, seconds=0.5), tmp_path / "modes")["distance_db"]
     assert moved["effect"] > moved["floor"] + 1
+
+
+def test_each_of_a_pair_is_heard_beside_the_other(small: str, tmp_path: Path) -> None:
+    plan = Plan("two", small, (("foreign-mode", 1), ("contact-time", 2)), 3, seconds=0.5)
+    truth = make_case(tmp_path, plan, tmp_path / "modes")
+    heard = truth["beside_db"]
+    assert list(heard) == ["foreign-mode", "contact-time"]
+    assert sounding.beyond(heard["foreign-mode"]) > 1.8
+    assert sounding.beyond(heard["contact-time"]) > 3
+    # one that the other hides makes no pair, however loud both are together
+    assert sounding.short_of((1, 2), {"effect": 9.0, "floor": 1.0}, [{"effect": 9.0, "floor": 1.0}, {"effect": 1.0, "floor": 1.0}]) == 3.0
+    assert sounding.short_of((1, 2), {"effect": 9.0, "floor": 1.0}, [{"effect": 9.0, "floor": 1.0}, {"effect": 4.0, "floor": 1.0}]) == 0.0
 
 
 def test_lines_and_cases_without_a_mesh_read(small: str, tmp_path: Path) -> None:

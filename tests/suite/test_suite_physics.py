@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from benchmarks.suite import bricks, objects, physics
-from benchmarks.suite.effects import LISTED, Scene, blow, body, sound
+from benchmarks.suite.effects import LISTED, Effect, Scene, blow, body, sound
+from benchmarks.suite.sounding import strike_sound
 
 STEEL = objects.MATERIALS["steel"]
 BAR = objects.Recipe("test_bar", "steel", (10, 2, 1), lambda u: (u - 0.5) * np.array([0.16, 0.02, 0.008]))
@@ -166,3 +167,21 @@ def test_surfaces_are_closed_without_degenerate_faces_and_face_outward(name: str
     assert np.isfinite(
         objects.body(name, bricks.Modes(np.ones(1), np.zeros((len(vertex), 3, 1)), np.zeros((len(vertex), 3, 6)), vertex, face, 1.0)).normal
     ).all()
+
+
+def test_a_mode_bends_by_the_level_that_a_half_sine_leaves(bar: objects.Body, folder: Path) -> None:
+    """|P(f)| of a half sine of unit area is |cos(pi f tau) / (1 - (2 f tau)^2)|."""
+    tau, levels = 4e-4, []
+
+    def spied(r: physics.Ring, impulse: float, n: int, rate: float) -> Any:
+        levels.append(r.level)
+        return physics.sounded(r, n, rate)
+
+    where = scene(bar, BAR, folder)
+    bend = Effect("amplitude-pitch", "object", {}, ring=spied)
+    soft = Effect("contact-time", "striker", {}, pulse=lambda impulse, rate: blow.pulse(tau, rate, 1.0))
+    for effects in ((bend,), (bend, soft)):
+        strike_sound(where, bar, where.strikes[0], where.sensor, effects, 0)
+    f = np.sqrt(bar.modes.value) / (2 * np.pi)
+    low = f < 6000
+    assert np.allclose((levels[1] / levels[0])[low], np.abs(np.cos(np.pi * f * tau) / (1 - (2 * f * tau) ** 2))[low], atol=0.01)
