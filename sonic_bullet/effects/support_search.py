@@ -5,6 +5,7 @@ data · ln left + j (3 ln data + BETTER) -> min over the number j of dashpots; e
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -14,13 +15,14 @@ from sonic_bullet.effects.support_trial import Dashpot, Dashpots, Trial
 from sonic_bullet.records import Array
 from sonic_bullet.side_by_side import side_by_side
 
-POINTS, SPOTS = 90, 500  # vertices of a first look, and of those about a point that has been found
+POINTS, SPOTS = 90, 500  # vertices where another dashpot is looked for; and where the first is, or one that is moved
 STEPS = (0.06, 0.25, 1.0, 4.0, 16.0)  # of the strength that doubles the typical decay
 FINER, COARSER = (0.6, 0.8, 0.92, 1.08, 1.25, 1.6), (0.1, 0.3, 3.0, 10.0)  # times stronger, in turns
 LOOKED, STARTS, NEAR, FEW = 40, 4, 28, 10  # of the grid, looked at closer; refined; vertices of a turn about one; spots enough to stand for all there
 NEARER = (0.12, 0.07, 0.04, 0.02)  # turns, in sizes of the body
 TUNED = 0.15  # of ln c
 MOST = 4
+MANY = 40  # trials that are worth a second process
 WEAK, ENOUGH = 2, 2.0  # of each number of dashpots to first order; of the spreads' own: no more is asked
 BETTER, HALF = 6.0, 0.5  # in BIC, for another dashpot; of what one costs: one that explains less ends the search
 
@@ -49,9 +51,8 @@ def sought(t: Trial) -> Dashpots:
     if some[1] and t.left(some[1]) < ENOUGH * least:
         return without_idle(some)
     tried, starts = [none], [chosen]
-    grid = [Dashpot(int(v), c, way) for v in spots[:POINTS] for c in _strengths(t).tolist() for way in ("normal", "every")]
-    while len(chosen) < MOST:
-        chosen, starts = _with_one_more(t, starts, grid, spots)
+    while len(chosen) < MOST:  # of one alone a basin may lie between the points of a coarse grid
+        chosen, starts = _with_one_more(t, starts, _grid(t, spots[:POINTS] if chosen else spots), spots)
         tried.append(priced(chosen))
         best = min(tried, key=_cost)
         if tried[-1][0] > best[0] + HALF * apiece or best not in tried[-2:]:
@@ -59,12 +60,16 @@ def sought(t: Trial) -> Dashpots:
     return _elsewhere(t, without_idle(min([*tried, some], key=_cost)), spots)
 
 
+def _grid(t: Trial, vertices: Array) -> list[Dashpot]:
+    return [Dashpot(int(v), c, way) for v in vertices for c in _strengths(t).tolist() for way in ("normal", "every")]
+
+
 def _elsewhere(t: Trial, found: Dashpots, spots: Array) -> Dashpots:
     """The same number of dashpots, or a better set that some of them being far from where they are lead to: on round bodies a search may end on the wrong side."""
     best = (t.left(found), found)
     for i in range(len(found)):
         moved = [(*found[:i], replace(found[i], vertex=int(v)), *found[i + 1 :]) for v in spots]
-        few = _best([t.beside(*modes, 1) for modes in t.poles(moved, t.runs)], [(*m[:i], *m[i + 1 :], m[i]) for m in moved], STARTS)
+        few = _best(_left(t, moved), [(*m[:i], *m[i + 1 :], m[i]) for m in moved], STARTS)
         ends = side_by_side(lambda one: refined(t, one, NEARER)[1], few)
         best = min([best, *((t.left(end), end) for end in ends)], key=_cost)
     return best[1]
@@ -79,13 +84,24 @@ def _with_one_more(t: Trial, starts: list[Dashpots], grid: list[Dashpot], spots:
     few: list[Dashpots] = []
     for chosen in starts:
         trials = [(*chosen, d) for d in grid]
-        few += _best([t.price(*modes) for modes in t.poles(trials, t.runs)], trials, LOOKED)
-    few = _best([t.beside(*modes, 1) for modes in t.poles(few, t.runs)], few, STARTS)
+        few += _best(_of_each(lambda part: [t.price(*modes) for modes in t.poles(part, t.runs)], trials), trials, LOOKED)
+    few = _best(_left(t, few), few, STARTS)
     found, *others = (one for _, one in sorted(side_by_side(lambda one: refined(t, one, NEARER[:2], spots), few), key=lambda pair: pair[0]))
     for _ in range(min(len(found), 2)):  # once all are where they should be, one may be seen to stand at a mirror image
         found = refined(t, found, (np.inf, *NEARER), spots)[1]
     found = tuned(t, min(found, refined(t, found, NEARER[-1:], whole=True)[1], key=t.left))
     return found, [found, *(others if len(found) == 1 else [])]
+
+
+def _left(t: Trial, trials: list[Dashpots]) -> list[float]:
+    """What each leaves, modes coupling within runs only."""
+    return _of_each(lambda part: [t.beside(*modes, 1) for modes in t.poles(part, t.runs)], trials)
+
+
+def _of_each(price: Callable[[list[Dashpots]], list[float]], trials: list[Dashpots]) -> list[float]:
+    """The prices of many, one half beside the other."""
+    parts = [trials[: len(trials) // 2], trials[len(trials) // 2 :]] if len(trials) >= MANY else [trials]
+    return [one for part in side_by_side(price, parts) for one in part]
 
 
 def _best(price: list[float], trials: list[Dashpots], count: int) -> list[Dashpots]:
@@ -128,7 +144,7 @@ def refined(t: Trial, start: Dashpots, reaches: tuple[float, ...], spots: Array 
     for reach in reaches:
         for i in range(len(best)):
             trials = [(*best[:i], d, *best[i + 1 :]) for d in (best[i], *_around(t, best[i], reach * size, spots))]
-            left = [t.left(one, t.wide) for one in trials] if whole else [t.beside(*modes, 1) for modes in t.poles(trials, t.runs)]
+            left = _of_each(lambda part: [t.left(one, t.wide) for one in part], trials) if whole else _left(t, trials)
             least, best = min(zip(left, trials, strict=True), key=lambda pair: pair[0])
     return least, best
 

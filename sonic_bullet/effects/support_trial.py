@@ -30,6 +30,7 @@ LEVEL = 0.3  # of ln of a line's level
 MISSED = 9.0  # squared spreads from where on a decay's misfit costs less, and that a pattern costs which nothing explains
 GROSS = 4 * MISSED  # that a decay costs at most: a few spreads may be a shape's error, half or twice is none
 LOST = 2 * GROSS + MISSED  # that a line costs at most
+MUTE = MISSED  # that a mode costs that no line shows: a mesh may have it elsewhere
 WEAK, HALF = 0.05, 0.5  # of the worth of a line that the model does not expect: it may be a click or another body's; near a mode, its twin
 CLEAR, LONGER = 0.25, 2.0  # quantile of the energy of modes that are heard, for one that would be; times a line's decay, for one that it hides
 LOW = 0.3  # of a line's spread where it lies under the least law
@@ -54,7 +55,7 @@ class Trial:
     """An object's lines (k,) and modes (m,). size (s, k) complex, worth (k,); into (s, m): J φ(p)·e of the strikes; out (m,): φ(q)·n of the sensor.
 
     heard_hz, rings_per_s (l,): of every line, those too that are not held against modes; through (m,): what pulse and path leave of a mode, relative.
-    normal (v, 3) of all vertices, body: those of the surface. runs, wide: neighbours that may couple, RUN and WIDE; least (c,): the law that most lines lie above.
+    normal (v, 3) of all vertices, body: those of the surface. runs, wide: neighbours that may couple, RUN and WIDE; least (c,): the law that most lines lie above; untied (k, k): of the lines' exponentials.
     """
 
     freq_hz: Array
@@ -74,6 +75,7 @@ class Trial:
     runs: tuple[Array, ...]
     wide: tuple[Array, ...]
     least: Array
+    untied: Array
 
     @classmethod
     def of(cls, h: Heard) -> Trial:
@@ -117,6 +119,7 @@ class Trial:
             tuple(apart(x.freq_hz, RUN)),
             tuple(apart(x.freq_hz, WIDE)),
             _least_law(h.omega, h.decay_per_s),
+            _untied(freq, decay),
         )
 
     def left(self, dashpots: Dashpots, runs: tuple[Array, ...] | None = None) -> float:
@@ -204,7 +207,7 @@ class Trial:
         near = np.abs(np.log(self.heard_hz[:, None] / freq[loud])) < 2 * WIDTH
         hidden = (near & ~(self.rings_per_s[:, None] > LONGER * decay[loud])).any(axis=0)  # a line of unknown decay may be any
         worth = np.clip(1 + 0.25 * np.log10(np.maximum(level[loud] / max(level[told].max(), 1e-300), 1e-6)), 0.1, 1)
-        return float(LOST * worth[~hidden].sum())
+        return float(MUTE * worth[~hidden].sum())
 
     def _told(self, line: Array, at: Array, omega: Array, decay: Array, push: Array) -> Array:
         """Amplitudes (s, k) that exponentials at the lines' poles take of all modes together: Σ_l <e_k, e_l> A_l = Σ_i <e_k, e_i> a_i.
@@ -215,11 +218,9 @@ class Trial:
         near = np.clip(np.searchsorted(mine, omega), 1, max(len(mine) - 1, 1))
         near = np.where(np.abs(mine[near - 1] - omega) < np.abs(mine[np.minimum(near, len(mine) - 1)] - omega), near - 1, np.minimum(near, len(mine) - 1))
         shift = np.log(2 * np.pi * self.freq_hz[line] / at)[np.argsort(at)][near]
-        z = -self.decay_per_s + 2j * np.pi * self.freq_hz
+        z, size = _poles_of(self.freq_hz, self.decay_per_s)
         y = -decay + 1j * omega * np.exp(shift)
-        size = np.sqrt(2 * self.decay_per_s)
-        own = -size[:, None] * size / (z.conj()[:, None] + z) + 1e-3 * np.eye(len(z))
-        return np.asarray((np.linalg.solve(own, -size[:, None] / (z.conj()[:, None] + y)) @ push.T).T * size)
+        return np.asarray((self.untied @ ((-size[:, None] / (z.conj()[:, None] + y)) @ push.T)).T * size)
 
     def _alike(self, omega: Array, decay: Array, push: Array) -> Array:
         """Cosines (k, m) of the lines' amplitudes over the strikes and what one exponential at each mode's pole takes of all, or the mode's own."""
@@ -241,6 +242,17 @@ class Trial:
         good = price[row, column] < 0
         row, column = row[good], column[good]
         return row, column, float((price[row, column] * self.worth[row]).sum())
+
+
+def _poles_of(freq_hz: Array, decay_per_s: Array) -> tuple[Array, Array]:
+    """z (k,) in 1/s and the size (k,) by which e^{zt} has norm one."""
+    return -decay_per_s + 2j * np.pi * freq_hz, np.sqrt(2 * decay_per_s)
+
+
+def _untied(freq_hz: Array, decay_per_s: Array) -> Array:
+    """(k, k): what undoes what exponentials of norm one have in common, a little damped where two are all but one."""
+    z, size = _poles_of(freq_hz, decay_per_s)
+    return np.asarray(np.linalg.inv(-size[:, None] * size / (z.conj()[:, None] + z) + 1e-3 * np.eye(len(z))))
 
 
 def _alive(pole: Array, turn: Array) -> tuple[Array, Array]:
