@@ -18,6 +18,7 @@ import numpy as np
 from sonic_bullet.errors import AudioError
 from sonic_bullet.estimator.distance import floor_between
 from sonic_bullet.estimator.likelihood import moments
+from sonic_bullet.estimator.picked import apart, picked, sums
 from sonic_bullet.estimator.shared_poles import FASTEST_PER_S, start_poles
 from sonic_bullet.estimator.values import PINNED, Lines, lines_at
 from sonic_bullet.records import Array
@@ -122,20 +123,9 @@ def _colour(signals: Array, noise: Array, sr: int) -> Callable[[Array], Array]:
     return lambda freq: np.asarray(np.interp(freq, np.linspace(0, sr / 2, len(level)), level))
 
 
-def _sums(log_w: Array, count: int) -> tuple[Array, Array, Array]:
-    """Σ wⁿ, Σ n wⁿ, Σ n² wⁿ over n < count, w = e^log_w; near w = 1 by the integral's series is never needed: |log_w|·count stays above 1e-6."""
-    gap = -np.expm1(log_w)
-    gap = np.where(np.abs(gap) < 1e-12, 1e-12, gap)
-    w, last = np.exp(log_w), np.exp(log_w * count)
-    zeroth = (1 - last) / gap
-    first = (w * zeroth - count * last) / gap
-    second = (w * (zeroth + 2 * first) - count**2 * last) / gap
-    return zeroth, first, second
-
-
 def _products(pole: Array, count: int) -> tuple[list[Array], list[Array]]:
     """Geometric sums of z_j z_k* and z_j z_k, poles per sample."""
-    return list(_sums(pole[:, None] + pole[None, :].conj(), count)), list(_sums(pole[:, None] + pole[None, :], count))
+    return list(sums(pole[:, None] + pole[None, :].conj(), count)), list(sums(pole[:, None] + pole[None, :], count))
 
 
 def _inner(a: Array, b: Array, even: Array, odd: Array) -> Array:
@@ -223,12 +213,11 @@ def _normal(signals: Array, noise: Array, pole: Array, sr: int) -> tuple[Array, 
 
 def _polished(signals: Array, noise: Array, pole: Array, sr: int, low: float, high: float) -> Array:
     """Poles at the maximum of the likelihood, from the k nearest start."""
-    pole = _apart(pole)
+    pole = apart(pole)
     if not len(pole):
         return pole
     if len(pole) > MOST_LINES:
-        _, _, energy, _ = _solved(signals, noise, pole, sr)
-        pole = pole[np.argsort(-energy)[:MOST_LINES]]
+        pole = pole[picked(signals, noise, pole, sr, MOST_LINES)]
     damping = 1e-4
     matrix, gradient, cost = _normal(signals, noise, pole, sr)
     for _ in range(12):
@@ -251,19 +240,6 @@ def _polished(signals: Array, noise: Array, pole: Array, sr: int, low: float, hi
             if damping > 1e4:
                 break
     return pole
-
-
-def _apart(pole: Array) -> Array:
-    """Poles sorted by frequency without near doubles, which no recording of finite length tells apart."""
-    pole = pole[np.argsort(pole.imag)]
-    keep = np.ones(len(pole), bool)
-    for i in range(1, len(pole)):
-        j = i - 1
-        while j >= 0 and not keep[j]:
-            j -= 1
-        if j >= 0 and abs(pole[i] - pole[j]) < 0.1 * min(-pole[i].real, -pole[j].real) + 0.2:
-            keep[i] = False
-    return np.asarray(pole[keep])
 
 
 def lines_of(signals: Array, noise: Array, pole: Array, sr: int, signed: bool) -> Lines:
