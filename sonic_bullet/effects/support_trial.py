@@ -14,7 +14,7 @@ line's level over that, less what is common to all: of twins that a dashpot has 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -75,7 +75,10 @@ class Trial:
     runs: tuple[Array, ...]
     wide: tuple[Array, ...]
     least: Array
-    untied: Array
+    untied: Array = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "untied", _untied(self.freq_hz, self.decay_per_s))
 
     @classmethod
     def of(cls, h: Heard) -> Trial:
@@ -119,7 +122,6 @@ class Trial:
             tuple(apart(x.freq_hz, RUN)),
             tuple(apart(x.freq_hz, WIDE)),
             _least_law(h.omega, h.decay_per_s),
-            _untied(freq, decay),
         )
 
     def left(self, dashpots: Dashpots, runs: tuple[Array, ...] | None = None) -> float:
