@@ -13,6 +13,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from sonic_bullet.effects.ringing import sounded
+from sonic_bullet.effects.tails import FRAME_S
 from sonic_bullet.effects.values import Blow, Evidence, Heard, Owner, Ring, Sound, Stage
 from sonic_bullet.records import Array
 
@@ -79,9 +80,9 @@ def _steady(h: Heard) -> list[tuple[float, float, float, float]]:
     if h.model is not None and len(h.freq_hz):
         apart = np.abs(np.log(h.foreign_hz[:, None] / h.freq_hz)).min(axis=1) > APART
     good = loud & apart & (loose < STEADY) & (coherent > 0.9) & (np.abs(lean) < 0.25)
-    if h.dry:  # a room makes several lines of one, and read outside it each is that one
-        at = np.log(h.foreign_hz)
-        good &= ~((np.abs(at[:, None] - at) < APART) & good & (mean > mean[:, None])).any(axis=1)
+    if h.dry:  # a room makes several lines of one, and read outside it, in short frames, each is that one
+        gap = np.abs(h.foreign_hz[:, None] - h.foreign_hz)
+        good &= ~(((gap < APART * h.foreign_hz) | (gap < 1 / FRAME_S)) & good & (mean > mean[:, None])).any(axis=1)
     phase = np.angle((weight * per).sum(axis=0))
     return [(h.foreign_hz[k], max(h.foreign_decay_per_s[k], 0.0), mean[k], phase[k]) for k in np.flatnonzero(good)]
 

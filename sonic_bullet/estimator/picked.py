@@ -43,7 +43,8 @@ def picked(signals: Array, noise: Array, pole: Array, sr: int, count: int) -> Ar
     All at once, poles of a crowd (a reverberation's) cancel each other at amplitudes that say nothing. A line's other half, at −ω, is taken to be far away.
     """
     z = pole / sr
-    gram = sums(z[:, None].conj() + z[None, :], signals.shape[1])[0]
+    gap = z[:, None].conj() + z[None, :]
+    gram = np.expm1(gap * signals.shape[1]) / np.expm1(gap)
     left = np.stack([moments(signal, z)[0].conj() / sigma for signal, sigma in zip(signals, noise, strict=True)], axis=1)  # (k, s)
     own = np.real(np.diag(gram))
     basis, new, found = np.zeros((len(pole), count), complex), own.copy(), []  # <e_k, the n-th direction>; of own, what is apart from those picked
