@@ -31,6 +31,7 @@ SECONDS_MAX = 8.0
 CROWD, FEWER = 2.5, 0.3  # starting lines over a body's modes; of the lines at the onset
 LATE_S = (0.03, 0.1)
 DEAD = 9.0  # of ln amplitude: 78 dB
+PLAINLY = 0.75  # of what other lines leave, in squares
 BEYOND = (10.0, 0.1)  # times a recording's peak; share of the lines that begin there: what no single hit leaves
 
 
@@ -49,28 +50,32 @@ def joint_lines(signals: Array, sr: int, *, band_hz: tuple[float, float] = (20.0
         raise AudioError("a recording is silent", "leave it out of the case")
     low, high = max(band_hz[0], 5.0), min(band_hz[1], 0.485 * sr)
     noise = noise_rms(signals, sr)
-    colour = _colour(signals, noise, sr)
-    pole = start_poles(signals / noise[:, None], sr, low, high)
+    try:
+        return _told(signals, noise, sr, (low, high), signed, modes, crowd=True)
+    except np.linalg.LinAlgError as error:
+        raise AudioError("lines of the recording cannot be told apart: no decaying sound", "give a recording of one impact") from error
+
+
+def _told(signals: Array, noise: Array, sr: int, band_hz: tuple[float, float], signed: bool, modes: int | None, *, crowd: bool) -> Lines:
+    """Lines of one hit, or what is left after several; crowd: of more poles than lines those, too, that take most one after another, where these say plainly more."""
+    start = start_poles(signals / noise[:, None], sr, *band_hz)
     few: Lines | None = None
-    for late in (round(t * sr) for t in LATE_S) if modes is not None and len(pole) >= CROWD * modes else ():
-        if signals.shape[1] >= 8 * late and 3 <= len(start_poles(signals[:, late:] / noise[:, None], sr, low, high)) < FEWER * len(pole):
+    for late in (round(t * sr) for t in LATE_S) if modes is not None and len(start) >= CROWD * modes else ():
+        if signals.shape[1] >= 8 * late and 3 <= len(start_poles(signals[:, late:] / noise[:, None], sr, *band_hz)) < FEWER * len(start):
             after = _from(late, signals, sr, band_hz, signed)
             few = few or after
             if after is not None and _beyond(after, signals) < BEYOND[1]:  # else it still hits
                 return _struck(after, signals)
     if few is not None:
         return _struck(few, signals)
-    try:
-        for _ in range(3):
-            before = len(pole)
-            pole = _polished(signals, noise, pole, sr, low, high)
-            _, _, energy, _ = _solved(signals, noise, pole, sr)
-            pole = pole[energy / colour(pole.imag / (2 * np.pi)) > SIGNIFICANT]
-            if len(pole) == before or not len(pole):
-                break
-        found = lines_of(signals, noise, pole, sr, signed)
-    except np.linalg.LinAlgError as error:
-        raise AudioError("lines of the recording cannot be told apart: no decaying sound", "give a recording of one impact") from error
+    start = apart(start)
+    many = len(start) > MOST_LINES
+    loudest = np.argsort(-_solved(signals, noise, start, sr)[2])[:MOST_LINES] if many else np.arange(len(start))
+    found = lines_of(signals, noise, _significant(signals, noise, start[loudest], sr, *band_hz), sr, signed)
+    if many and crowd:
+        other = lines_of(signals, noise, _significant(signals, noise, start[picked(signals, noise, start, sr, MOST_LINES)], sr, *band_hz), sr, signed)
+        if ((other.noise / noise) ** 2).sum() < PLAINLY * ((found.noise / noise) ** 2).sum():
+            return other  # a room's: of hits one after another the loudest poles leave least
     for late in (round(t * sr) for t in LATE_S) if modes is not None and _beyond(found, signals) > BEYOND[1] else ():
         if signals.shape[1] < 8 * late:
             break
@@ -80,11 +85,25 @@ def joint_lines(signals: Array, sr: int, *, band_hz: tuple[float, float] = (20.0
     return found
 
 
+def _significant(signals: Array, noise: Array, pole: Array, sr: int, low: float, high: float) -> Array:
+    """Poles polished, a full crowd twice, without those that stand out of the noise too little to be a line."""
+    colour = _colour(signals, noise, sr)
+    for turn in range(3):
+        before = len(pole)
+        pole = _polished(signals, noise, apart(pole) if turn else pole, sr, low, high)
+        _, _, energy, _ = _solved(signals, noise, pole, sr)
+        pole = pole[energy / colour(pole.imag / (2 * np.pi)) > SIGNIFICANT]
+        if (len(pole) == before and (turn or before < MOST_LINES)) or not len(pole):
+            break
+    return pole
+
+
 def _from(late: int, signals: Array, sr: int, band_hz: tuple[float, float], signed: bool) -> Lines | None:
     """Lines from a sample on, as they would have begun at the onset; None where nothing can be told from there."""
     try:
-        lines = joint_lines(signals[:, late:], sr, band_hz=band_hz, signed=signed)
-    except AudioError:
+        rest = signals[:, late:]
+        lines = _told(rest, noise_rms(rest, sr), sr, band_hz, signed, None, crowd=False)
+    except np.linalg.LinAlgError:
         return None
     alive = lines.decay_per_s * late / sr < DEAD  # what would have been over by then began later
     if not alive.all():
@@ -213,11 +232,8 @@ def _normal(signals: Array, noise: Array, pole: Array, sr: int) -> tuple[Array, 
 
 def _polished(signals: Array, noise: Array, pole: Array, sr: int, low: float, high: float) -> Array:
     """Poles at the maximum of the likelihood, from the k nearest start."""
-    pole = apart(pole)
     if not len(pole):
         return pole
-    if len(pole) > MOST_LINES:
-        pole = pole[picked(signals, noise, pole, sr, MOST_LINES)]
     damping = 1e-4
     matrix, gradient, cost = _normal(signals, noise, pole, sr)
     for _ in range(12):

@@ -83,10 +83,12 @@ def test_fewer_lines_will_do_that_tell_a_tail_more_plainly(gain: tuple[float, ..
 
 @pytest.mark.parametrize("rt60", [0.5, 1.6])
 def test_the_rate_of_a_room(rt60: float) -> None:
-    found = late(heard_of(truth(), recorded(Room(rt60, 0.5, 8), seconds=1.2)))
-    assert found is not None
-    assert RT60 / found[0] == pytest.approx(rt60, rel=0.12)
-    assert found[1] == pytest.approx(0.5, rel=0.35)
+    """Three rooms: how wet one sounds to a dozen lines is a matter of its taps, by a third."""
+    found = [late(heard_of(truth(), recorded(Room(rt60, 0.5, seed), seconds=1.2))) for seed in (7, 8, 9)]
+    assert all(one is not None for one in found)
+    for delta, _ in (one for one in found if one):
+        assert RT60 / delta == pytest.approx(rt60, rel=0.12)
+    assert np.median([wet for _, wet in (one for one in found if one)]) == pytest.approx(0.5, rel=0.25)
 
 
 @pytest.mark.parametrize(
