@@ -92,10 +92,14 @@ def test_a_swing_is_no_meshs_however_wrong_a_mesh_is(monkeypatch: pytest.MonkeyP
     ("left_db", "gain_db", "verdict"), [(5.0, None, "explained"), (9.0, None, "unexplained"), (5.0, 4.0, "explained"), (9.0, 4.0, "unexplained")]
 )
 def test_a_room_leaves_little_whatever_is_beside_it(monkeypatch: pytest.MonkeyPatch, left_db: float, gain_db: float | None, verdict: str) -> None:
-    """Its response takes more than half of a rattle's noise, too; with much left beside it, the other name would be a guess."""
-    monkeypatch.setattr(loop, "of_the_mesh", lambda *_: 0.0)
+    """Its response takes more than half of a rattle's noise, too; with much left beside it, the other name would be a guess, and no mesh is to blame: a response takes up its errors."""
+    monkeypatch.setattr(loop, "of_the_mesh", lambda *_: np.inf)
     body, room, law = recorded(), Room(0.5, 0.4, 1), DampingLaw("constant-loss", 6e-3)
     named: list[tuple[Effect, float]] = [(room, 10.0)] + ([(law, gain_db)] if gain_db is not None else [])
     h = replace(fitted(body), effects=tuple(e for e, _ in named))
     added = [Candidate(e.id, e, h, np.full(5, gain), gain, 0.0, {}) for e, gain in named]
     assert loop._verdict(h, added, 20.0, left_db + 1.0, 1.0, (body,), takes_of((body,)), 0) == verdict
+    dry = replace(h, effects=(law,))
+    assert loop._verdict(dry, added[1:] or added, 20.0, left_db + 1.0, 1.0, (body,), takes_of((body,)), 0) == "explained", (
+        "where there is no room, a mesh may be to blame"
+    )
