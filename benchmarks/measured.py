@@ -2,7 +2,7 @@
 
     python benchmarks/measured.py --data ../shared/measured [--out docs/measured.md] [SET ...]
 
-DATA/SET/case.json, dev/ -> measured_sets/ judge of that set, or plain.py's for a set of unknown kind -> OUT, and OUT without .md / SET.png
+DATA/SET/case.json, dev/ -> measured_sets/ judge of that set, or plain.py's for a set of unknown kind, READINGS times (heard.py) -> OUT, and OUT without .md / SET.png
 What is missing or cannot be read gives one line that names it, and the count of it is printed. Features are kept in SONIC_BULLET_MEASURED_CACHE.
 """
 
@@ -11,12 +11,17 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from benchmarks.measured_sets.heard import READINGS, reading
 from benchmarks.measured_sets.page import Page, written
 from benchmarks.measured_sets.table import JUDGES, PLAIN
+from benchmarks.measured_sets.values import Judge, Row
+from sonic_bullet.side_by_side import one_thread, side_by_side
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -40,7 +45,9 @@ def main(arguments: list[str] | None = None) -> int:
         pages.append(page)
         skipped += [f"{name}: {line}" for line in page.found.skipped]
         for row in page.found.rows:
-            print(f"  {row.what}: {row.before:.3g} -> {row.after:.3g} {row.unit} (null {row.null:.3g}) {row.effect}", flush=True)
+            print(
+                f"  {row.what}: {row.before:.3g} -> {row.after:.3g} {row.unit} (null {row.null:.3g}) {row.effect}{' earned' if row.earned else ''}", flush=True
+            )
     written(asked.out, pages, skipped)
     for line in skipped:
         print(f"skipped: {line}")
@@ -56,9 +63,24 @@ def judged(folder: Path) -> Page | str:
         text = (folder / "README.md").read_text() if (folder / "README.md").is_file() else ""
         case = json.loads((folder / "case.json").read_text()) if (folder / "case.json").is_file() else {}
         case.setdefault("set", folder.name)
-        return Page(folder.name, text, case, JUDGES.get(folder.name, PLAIN)(folder, case))
+        judge = JUDGES.get(folder.name, PLAIN)
+        read = side_by_side(lambda number: _rows(judge, folder, case, number), range(READINGS))
+        with one_thread():
+            found = judge(folder, case)  # its lines are kept by now
+        return Page(folder.name, text, case, replace(found, rows=tuple(r.read_again(read[1:]) for r in found.rows)))
     except Exception as error:  # a set fails alone
         return f"{type(error).__name__}: {' '.join(str(error).split())}"
+
+
+def _rows(judge: Judge, folder: Path, case: dict[str, Any], number: int) -> tuple[Row, ...]:
+    """What one reading says; nothing where another than the first fails, so that nothing stands."""
+    with reading(number):
+        try:
+            return judge(folder, case).rows
+        except Exception:
+            if not number:
+                raise
+            return ()
 
 
 if __name__ == "__main__":

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.measured_sets.heard import cut, features, lines
+from benchmarks.measured_sets.heard import cut, features, jittered, lines
 from benchmarks.measured_sets.values import DRAWS, Array, Lines, Outcome, Row, clear
 from sonic_bullet.effects.contact_time import ContactTime
 from sonic_bullet.effects.pulses import magnitude
@@ -115,7 +115,9 @@ def _measured(path: Path, fs_hz: float) -> list[Hit]:
         at = float(np.argmax(force)) / fs_hz
         impulse, tau, shape = pulse(np.asarray(force, float), sr, at)
         first = round((at + AFTER_S) * fs_hz)
-        mine = clear(features(np.ascontiguousarray(sound[first : first + round(0.5 * fs_hz)], float), sr, onset_s=0.0, band_hz=(200.0, 0.45 * fs_hz)), sure=0.3)
+        mine = clear(
+            features(jittered(np.ascontiguousarray(sound[first : first + round(0.5 * fs_hz)], float)), sr, onset_s=0.0, band_hz=(200.0, 0.45 * fs_hz)), sure=0.3
+        )
         mine = Lines(mine.freq_hz, mine.decay_per_s, mine.decay_sd_per_s, mine.amplitude * np.exp(mine.decay_per_s * AFTER_S), mine.freq_sd_hz)
         found.append(Hit(impulse, tau, shape, sr, mine, 0))
     return found

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from benchmarks.measured_sets.heard import JITTER, READINGS
 from benchmarks.measured_sets.values import CHANCE, DRAWS, EARNS, Outcome, Row
 
 HEAD = f"""# Measured data: fitted on one part, judged on another
@@ -18,6 +19,10 @@ Each set's source and licence stand under it.
 **Null** is the median error of {DRAWS} effects of as many numbers that mean nothing (each set says which); **chance** the share of them that do at least as well as the effect.
 An effect is *named* where it takes the error on the held-out part below {EARNS:.0%} of the baseline's and at most {CHANCE:.0%} of the null's draws do so; else the set's verdict
 is *unexplained*, and what is left is said. Errors of decays are in dB of d (20 lg d'/d: 6 dB are a factor of two), medians over the lines held out.
+
+Every set is read {READINGS} times: as it was recorded, and with every sample off by {JITTER:g} of itself, which is far below the last bit. A rattling tap is no sum of a few
+decays, and a search for them may end elsewhere for as little (or on another processor): an effect is *named* only where it is in all readings. The range of *after*
+over them stands in brackets where they differ.
 """
 
 
@@ -68,7 +73,7 @@ def summary(pages: list[Page]) -> str:
 def section(page: Page, figure: str) -> str:
     head = "| held out | items | unit | before | after | null | chance | effect |\n|---|---|---|---|---|---|---|---|"
     rows = [
-        f"| {r.what} | {r.count} | {r.unit} | {r.before:.3g} | {r.after:.3g} | {r.null:.3g} | {r.chance:.0%} | {r.effect or 'none proposed'}{' **earned**' if r.earned else ''} |"
+        f"| {r.what} | {r.count} | {r.unit} | {r.before:.3g} | {_after_all(r)} | {r.null:.3g} | {r.chance:.0%} | {r.effect or 'none proposed'}{_said(r)} |"
         for r in page.found.rows
     ]
     what = str(page.case.get("type") or page.case.get("object") or "")
@@ -89,6 +94,22 @@ def section(page: Page, figure: str) -> str:
             "",
         ]
     )
+
+
+def _after_all(r: Row) -> str:
+    """The error after, and its range over all readings where they differ."""
+    told = [f"{x.after:.3g}" for x in (r, *r.again) if x is not None]
+    ends = sorted(told, key=float)
+    spread = [f"{ends[0]} to {ends[-1]}"] if ends[0] != ends[-1] else []
+    gone = [f"none in {r.again.count(None)}"] if None in r.again else []
+    return f"{told[0]} ({', '.join(spread + gone)})" if spread or gone else told[0]
+
+
+def _said(r: Row) -> str:
+    if r.earned:
+        return " **earned**"
+    times = sum(x is not None and x.earns for x in (r, *r.again))
+    return f" (earned in {times} of {1 + len(r.again)} readings)" if times else ""
 
 
 def _figure(page: Page, path: Path) -> None:

@@ -39,6 +39,8 @@ def judge(folder: Path, case: dict[str, Any]) -> Outcome:
         raise ValueError(f"{len(dates)} dates with taps: two are compared")
     late = np.array([t[0] == dates[1] for t in taps])
     freq, decay = table([t[1] for t in taps], late)
+    if freq.shape[1] < 2:
+        raise ValueError("one line alone that most taps of both dates have: what is every line's takes two to tell")
     rows = [
         judged("frequencies of taps left out", "ppm of f", 1e6, freq, late, "stiffness drift (one factor a date)"),
         judged("decays of taps left out", "dB of d", DB, decay, late, "damping drift (one factor a date)"),
@@ -51,8 +53,10 @@ def judge(folder: Path, case: dict[str, Any]) -> Outcome:
         + "; ".join(f"{f:.0f} Hz (repeats to {1e6 * r / f:.0f} ppm, moved by {s:+.0f} ppm)" for f, r, s in zip(first, apart, share, strict=True))
         + ". A drift of stiffness is no member of the effects' family: it belongs to the piece's moisture and age; one factor for all lines is the physics of E/ρ alone."
     )
-    spread = float(np.ptp(share)) if share else 0.0
-    left = f"lines move by amounts that differ by {spread:.0f} ppm among themselves: more than one stiffness, or another hanging; dimensions and mass are not given, E is not told"
+    spread, repeats = float(np.ptp(share)), float(np.median(1e6 * apart / first))
+    alike = f"lines move by amounts that differ by {spread:.0f} ppm among themselves"
+    why = "more than one stiffness, or another hanging" if spread > 2 * repeats else f"no more than they repeat from tap to tap ({repeats:.0f} ppm)"
+    left = f"{alike}: {why}; dimensions and mass are not given, E is not told"
     return Outcome(tuple(rows), text, left, lambda figure: paint(figure, freq, late, dates), tuple(skipped))
 
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +23,7 @@ CHANCE = 0.05  # of the null's draws, at most, may do as well
 class Row:
     """One number predicted for the held-out part (count items) by baseline and by baseline + effect, in unit; null: median error of the null, chance: its share as good.
 
-    effect: what was added, "" where nothing was proposed (after = before).
+    effect: what was added, "" where nothing was proposed (after = before). again: the same of every other reading (heard.py), None where one came to nothing of the kind.
     """
 
     what: str
@@ -34,9 +34,20 @@ class Row:
     null: float
     chance: float
     effect: str
+    again: tuple[Row | None, ...] = ()
+
+    def read_again(self, others: Sequence[Sequence[Row]]) -> Row:
+        """With what other readings' rows say of the same."""
+        return replace(self, again=tuple(next((r for r in rows if (r.what, r.effect) == (self.what, self.effect)), None) for rows in others))
 
     @property
     def earned(self) -> bool:
+        """Whether it earns its keep in every reading."""
+        return self.earns and all(r is not None and r.earns for r in self.again)
+
+    @property
+    def earns(self) -> bool:
+        """Whether it does in this one."""
         return bool(self.effect and "no effect" not in self.effect and self.after < EARNS * self.before and self.chance <= CHANCE)
 
 

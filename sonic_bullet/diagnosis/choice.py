@@ -12,12 +12,12 @@ import numpy as np
 from sonic_bullet.diagnosis.bodies import Struck
 from sonic_bullet.diagnosis.by_lines import misfit as decays
 from sonic_bullet.diagnosis.by_lines import numbers, of_decays
+from sonic_bullet.diagnosis.candidate import SURE, Candidate, needed
 from sonic_bullet.diagnosis.exchange import ALIKE
 from sonic_bullet.diagnosis.judge import Judged, mean_db
 from sonic_bullet.diagnosis.play import Hypothesis, moves, moves_itself
 from sonic_bullet.diagnosis.refit import refitted, retold, with_effects
 from sonic_bullet.diagnosis.ties import CLEAR, HINT, NEARLY, misfit
-from sonic_bullet.diagnosis.trial import SURE, Candidate, needed
 from sonic_bullet.effects.values import Evidence
 
 HELPS = 0.5  # of what a name must gain on strikes left out, on all of them together: a model of few lines may be saved by chance once one is left out

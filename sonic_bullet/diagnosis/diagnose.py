@@ -25,7 +25,7 @@ from sonic_bullet.diagnosis.sone import sone_distance
 from sonic_bullet.diagnosis.unexplained import remainder
 from sonic_bullet.effects import EFFECTS
 from sonic_bullet.effects.values import Effect
-from sonic_bullet.estimator.evidence import gather
+from sonic_bullet.estimator.evidence import gather, onset_sample, until_it_breaks_off
 from sonic_bullet.estimator.fitted import CaseFit
 from sonic_bullet.files import read_audio
 from sonic_bullet.files.cases import Case, CaseRecording, read_case
@@ -123,7 +123,7 @@ def _others(case: Case, bodies: tuple[Struck, ...], takes: tuple[Take, ...], spl
                 continue
             sample, sr = read_audio(r.file)
             start = onset_of(case, bodies, sr)
-            found.append(Take(body, i, sample[r.channel][start:], sr, takes[0].floor))
+            found.append(Take(body, i, until_it_breaks_off(sample[r.channel], sr)[start:], sr, takes[0].floor))
     return tuple(found)
 
 
@@ -131,14 +131,11 @@ def onset_of(case: Case, bodies: tuple[Struck, ...], sr: int) -> int:
     """The sample at which strikes arrive: as declared, or the median of where the fitted ones did."""
     if case.onset_s is not None:
         return round(case.onset_s * sr)
-    late = [
-        length_of(r)[0] - body.gathered.signals.shape[1]
-        for body in bodies
-        if body.gathered is not None and body.gathered.signals is not None
-        for r in body.gathered.recordings
-        if r.file
+    files = [
+        (r.file, r.channel) for body in bodies if body.gathered is not None and body.gathered.signals is not None for r in body.gathered.recordings if r.file
     ]
-    return max(int(np.median(late)), 0) if late else 0
+    late = [onset_sample(read_audio(file)[0][channel], sr) for file, channel in files]
+    return int(np.median(late)) if late else 0
 
 
 def length_of(recording: CaseRecording) -> tuple[int, int]:

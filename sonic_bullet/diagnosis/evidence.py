@@ -109,7 +109,7 @@ def _played(h: Hypothesis, body: Struck, strikes: list[int], signals: Array) -> 
 
 
 def named(h: Hypothesis, lines: Lines) -> Array:
-    """Which lines (l,), one of each mode, are of what the hypothesis knows to ring beside the body: nobody else is told of them."""
+    """Which lines (l,), one of each mode, are nearest to what the hypothesis knows to ring beside the body: nobody else is told of these."""
     freq, decay = (np.concatenate([np.array(getattr(e, name)) for e in h.effects if e.id in BESIDE] or [np.zeros(0)]) for name in ("freq_hz", "decay_per_s"))
     off, own = np.abs(lines.freq_hz[:, None] - freq), np.maximum(np.nan_to_num(lines.decay_per_s), 0.0)[:, None]
     alike = (off < decay / (2 * np.pi) + OWN * freq) & (np.maximum(own, decay) <= ALIKE * np.minimum(own, decay))

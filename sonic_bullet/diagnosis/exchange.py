@@ -16,13 +16,13 @@ import numpy as np
 
 from sonic_bullet.diagnosis.bodies import Struck
 from sonic_bullet.diagnosis.by_lines import misfit, of_decays
+from sonic_bullet.diagnosis.candidate import MANY, SURE, Candidate
 from sonic_bullet.diagnosis.evidence import evidence_of, thinned
 from sonic_bullet.diagnosis.judge import Take, mean_db
 from sonic_bullet.diagnosis.play import Hypothesis, moves
 from sonic_bullet.diagnosis.refit import refitted, with_effects
 from sonic_bullet.diagnosis.ties import HINT, NEARLY
 from sonic_bullet.diagnosis.ties import misfit as phases
-from sonic_bullet.diagnosis.trial import MANY, SURE, Candidate
 from sonic_bullet.effects.values import Effect, Evidence
 from sonic_bullet.records import Array
 from sonic_bullet.side_by_side import side_by_side

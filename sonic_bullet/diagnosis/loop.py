@@ -3,7 +3,7 @@
     one by one -> fitted to each other, exchanged, pruned -> verdict
     two at once (twos.py) where every one leaves most of the gap open, or all of them did at the end; a room heard anew beside what moves modes
 
-gap = before − floor on left-out strikes; which effect earns its keep is said in trial.py
+gap = before − floor on left-out strikes; which effect earns its keep is said in candidate.py
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from sonic_bullet.diagnosis.bodies import Struck
+from sonic_bullet.diagnosis.candidate import FAINT_DB, LEAST_DB, Candidate, earns
 from sonic_bullet.diagnosis.choice import by_lines, helps, pruned, simplest
 from sonic_bullet.diagnosis.evidence import evidence_of
 from sonic_bullet.diagnosis.exchange import chosen, exchanged, rivals
@@ -21,7 +22,7 @@ from sonic_bullet.diagnosis.judge import Judged, least_db, mean_db
 from sonic_bullet.diagnosis.meshed import beyond, of_the_mesh
 from sonic_bullet.diagnosis.play import TURNS, Hypothesis, moves_itself
 from sonic_bullet.diagnosis.refit import refitted, retold
-from sonic_bullet.diagnosis.trial import FAINT_DB, LEAST_DB, Candidate, earns, trials
+from sonic_bullet.diagnosis.trial import trials
 from sonic_bullet.diagnosis.twos import in_a_room, in_twos
 from sonic_bullet.effects.values import Effect, Evidence, Stage
 

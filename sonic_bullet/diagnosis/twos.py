@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sonic_bullet.diagnosis.bodies import Struck
+from sonic_bullet.diagnosis.candidate import Candidate, earns
 from sonic_bullet.diagnosis.choice import helps
 from sonic_bullet.diagnosis.evidence import evidence_of
 from sonic_bullet.diagnosis.exchange import again
@@ -24,7 +25,7 @@ from sonic_bullet.diagnosis.judge import Judged, Take, least_db, mean_db
 from sonic_bullet.diagnosis.play import TURNS, Hypothesis, moves, moves_itself
 from sonic_bullet.diagnosis.refit import refitted, retold, with_effects
 from sonic_bullet.diagnosis.ties import CLEAR, NEARLY, misfit
-from sonic_bullet.diagnosis.trial import Candidate, earns, trials
+from sonic_bullet.diagnosis.trial import trials
 from sonic_bullet.side_by_side import side_by_side
 
 LEFT = 0.25  # of the gap: two at once are twice as many choices, so they must say more than one after another

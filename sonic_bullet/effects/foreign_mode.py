@@ -81,10 +81,17 @@ def _steady(h: Heard) -> list[tuple[float, float, float, float]]:
         apart = np.abs(np.log(h.foreign_hz[:, None] / h.freq_hz)).min(axis=1) > APART
     good = loud & apart & (loose < STEADY) & (coherent > 0.9) & (np.abs(lean) < 0.25)
     if h.dry:  # a room makes several lines of one, and read outside it, in short frames, each is that one
-        gap = np.abs(h.foreign_hz[:, None] - h.foreign_hz)
-        good &= ~(((gap < APART * h.foreign_hz) | (gap < 1 / FRAME_S)) & good & (mean > mean[:, None])).any(axis=1)
+        good &= _alone(h.foreign_hz, np.where(good, mean, 0.0))
     phase = np.angle((weight * per).sum(axis=0))
     return [(h.foreign_hz[k], max(h.foreign_decay_per_s[k], 0.0), mean[k], phase[k]) for k in np.flatnonzero(good)]
+
+
+def _alone(freq_hz: Array, size: Array) -> Array:
+    """Which lines (k,) stand for those about them: the loudest first, none within reach of one that does."""
+    found = np.zeros(len(freq_hz), bool)
+    for k in np.argsort(-size, kind="stable"):
+        found[k] = not (found & (np.abs(freq_hz - freq_hz[k]) < max(APART * freq_hz[k], 1 / FRAME_S))).any()
+    return found
 
 
 def _against_level(size: Array, sd: Array, level: Array) -> Array:

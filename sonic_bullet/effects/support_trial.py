@@ -14,6 +14,7 @@ line's level over that, less what is common to all: of twins that a dashpot has 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -30,6 +31,7 @@ LEVEL = 0.3  # of ln of a line's level
 MISSED = 9.0  # squared spreads from where on a decay's misfit costs less, and that a pattern costs which nothing explains
 GROSS = 4 * MISSED  # that a decay costs at most: a few spreads may be a shape's error, half or twice is none
 LOST = 2 * GROSS + MISSED  # that a line costs at most
+AT_ONCE = 100  # trials whose poles are found together: (100, m, m) complex, 64 MB of 200 modes
 MUTE = MISSED  # that a mode costs that no line shows: a mesh may have it elsewhere
 WEAK, HALF = 0.05, 0.5  # of the worth of a line that the model does not expect: it may be a click or another body's; near a mode, its twin
 CLEAR, LONGER = 0.25, 2.0  # quantile of the energy of modes that are heard, for one that would be; times a line's decay, for one that it hides
@@ -129,15 +131,19 @@ class Trial:
         x = self.model
         if not dashpots:
             return self.beside(-x.decay_per_s + 2j * np.pi * x.freq_hz, np.eye(x.mode_count, dtype=complex), 2)
-        return self.beside(*self.poles([dashpots], runs or (np.arange(x.mode_count),))[0], 2)
+        return self.beside(*self._poles([dashpots], runs or (np.arange(x.mode_count),))[0], 2)
 
     def plain(self) -> tuple[Array, Array]:
         """Lines (p,) and the modes (p,) they stand for without any dashpot."""
         x, omega = self.model, 2 * np.pi * self.model.freq_hz
         return self._pairs(omega, x.decay_per_s, self._alike(omega, x.decay_per_s, self.into * self.out))[:2]
 
-    def poles(self, trials: list[Dashpots], runs: tuple[Array, ...]) -> list[tuple[Array, Array]]:
-        """Poles (m,) and turns (m, m) of many, modes coupling within runs only."""
+    def poles(self, trials: list[Dashpots], runs: tuple[Array, ...]) -> Iterator[tuple[Array, Array]]:
+        """Poles (m,) and turns (m, m) of many, one after another, modes coupling within runs only. AT_ONCE are held: of thousands, turns fill the memory."""
+        for first in range(0, len(trials), AT_ONCE):
+            yield from self._poles(trials[first : first + AT_ONCE], runs)
+
+    def _poles(self, trials: list[Dashpots], runs: tuple[Array, ...]) -> list[tuple[Array, Array]]:
         phi, m = self.rows(trials), self.model.mode_count
         lam, own = self.model.omega0_squared_per_s2, self.model.decay_per_s
         pole, turn = np.empty((len(trials), m), complex), np.zeros((len(trials), m, m), complex)

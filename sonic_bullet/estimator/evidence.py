@@ -28,6 +28,7 @@ MARGIN = 1.36  # √(1.3/0.7): how far the guess may put a mode too high
 MESH_M = (2e-4, 5.0)  # bodies smaller or larger than this are in another unit
 PLATE_DOF = 52_000  # unknowns: 36 ab/e² in one layer of cells
 CLIPPED = 8  # samples in a row at the file's peak
+SHUT_S, SHUT = 0.01, 1e-3  # of a gate: what lies before it, and behind it at least; of the peak (16 bits end at 3e-5)
 CLIPPED_RUNS = 4  # or as many rows of three: a sound that decays has one highest peak
 
 
@@ -155,7 +156,9 @@ def _sounds(case: Case, thing: CaseObject, recordings: tuple[CaseRecording, ...]
         sound, sr = read_audio(r.file or "")
         if r.channel >= len(sound):
             raise FileError(f"{r.file} has no channel {r.channel}", "name one it has")
-        sounds.append(_checked(sound[r.channel], str(r.file), clipped))
+        sounds.append(until_it_breaks_off(_checked(sound[r.channel], str(r.file), clipped), sr))
+        if len(sounds[-1]) < sound.shape[1]:
+            told.append(f"{r.file} breaks off after {len(sounds[-1]) / sr:.3g} s: the digital silence behind is no decay, and is left out")
         rates.append(sr)
         if len(sound) > 1 and r.channel == 0:
             told.append(f"{r.file} has {len(sound)} channels: the first is used")
@@ -185,6 +188,14 @@ def _checked(sound: Array, name: str, clipped: bool = False) -> Array:
     if not clipped and ((len(runs) and runs.max() >= CLIPPED) or flat >= CLIPPED_RUNS):
         raise AudioError(f"{name} is clipped: rows of samples stand at its peak", "record at a lower level; a fit of it would be of the limiter")
     return sound
+
+
+def until_it_breaks_off(sound: Array, sr: int) -> Array:
+    """A recording (n,) without the digital silence that it is filled up with: a decay ends in its last bit or in noise, not far above."""
+    heard = np.flatnonzero(sound)
+    last, short = int(heard[-1]) + 1 if len(heard) else 0, max(1, round(SHUT_S * sr))
+    end = sound[max(0, last - short) : last]
+    return sound[:last] if 0 < last < len(sound) - short and np.abs(end).max() > SHUT * np.abs(sound).max() else sound
 
 
 def onset_sample(sound: Array, sr: int) -> int:

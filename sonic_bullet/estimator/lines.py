@@ -17,8 +17,8 @@ import numpy as np
 
 from sonic_bullet.errors import AudioError
 from sonic_bullet.estimator.distance import floor_between
-from sonic_bullet.estimator.likelihood import moments
-from sonic_bullet.estimator.picked import apart, picked, sums
+from sonic_bullet.estimator.likelihood import geometric, moments
+from sonic_bullet.estimator.picked import apart, picked
 from sonic_bullet.estimator.shared_poles import FASTEST_PER_S, start_poles
 from sonic_bullet.estimator.values import PINNED, Lines, lines_at
 from sonic_bullet.records import Array
@@ -32,6 +32,8 @@ CROWD, FEWER = 2.5, 0.3  # starting lines over a body's modes; of the lines at t
 LATE_S = (0.03, 0.1)
 DEAD = 9.0  # of ln amplitude: 78 dB
 PLAINLY = 0.75  # of what other lines leave, in squares
+SILENT = 1e-9  # rms, of full scale 1
+FEWEST = 3  # lines that say what rings
 BEYOND = (10.0, 0.1)  # times a recording's peak; share of the lines that begin there: what no single hit leaves
 
 
@@ -45,8 +47,7 @@ def joint_lines(signals: Array, sr: int, *, band_hz: tuple[float, float] = (20.0
     signals = np.asarray(signals, float)[:, : int(SECONDS_MAX * sr)]
     if signals.shape[1] < 256 or not np.isfinite(signals).all():
         raise AudioError(f"recordings of {signals.shape[1]} samples after the onset", "a fit needs at least 256 finite samples")
-    level = np.sqrt((signals**2).mean(axis=1))
-    if not (level > 1e-9).all():
+    if not (np.sqrt((signals**2).mean(axis=1)) > SILENT).all():
         raise AudioError("a recording is silent", "leave it out of the case")
     low, high = max(band_hz[0], 5.0), min(band_hz[1], 0.485 * sr)
     noise = noise_rms(signals, sr)
@@ -61,7 +62,7 @@ def _told(signals: Array, noise: Array, sr: int, band_hz: tuple[float, float], s
     start = start_poles(signals / noise[:, None], sr, *band_hz)
     few: Lines | None = None
     for late in (round(t * sr) for t in LATE_S) if modes is not None and len(start) >= CROWD * modes else ():
-        if signals.shape[1] >= 8 * late and 3 <= len(start_poles(signals[:, late:] / noise[:, None], sr, *band_hz)) < FEWER * len(start):
+        if signals.shape[1] >= 8 * late and FEWEST <= len(start_poles(signals[:, late:] / noise[:, None], sr, *band_hz)) < FEWER * len(start):
             after = _from(late, signals, sr, band_hz, signed)
             few = few or after
             if after is not None and _beyond(after, signals) < BEYOND[1]:  # else it still hits
@@ -80,7 +81,7 @@ def _told(signals: Array, noise: Array, sr: int, band_hz: tuple[float, float], s
         if signals.shape[1] < 8 * late:
             break
         after = _from(late, signals, sr, band_hz, signed)
-        if after is not None and len(after.freq_hz) >= 3 and _beyond(after, signals) < BEYOND[1]:
+        if after is not None and len(after.freq_hz) >= FEWEST and _beyond(after, signals) < BEYOND[1]:
             return _struck(after, signals)
     return found
 
@@ -99,15 +100,19 @@ def _significant(signals: Array, noise: Array, pole: Array, sr: int, low: float,
 
 
 def _from(late: int, signals: Array, sr: int, band_hz: tuple[float, float], signed: bool) -> Lines | None:
-    """Lines from a sample on, as they would have begun at the onset; None where nothing can be told from there."""
+    """Lines from a sample on, as they would have begun at the onset; None where nothing can be told from there, or a recording is over."""
+    rest = signals[:, late:]
+    if not (np.sqrt((rest**2).mean(axis=1)) > SILENT).all():
+        return None  # by a recording that a gate has shut nothing rang at the onset
     try:
-        rest = signals[:, late:]
         lines = _told(rest, noise_rms(rest, sr), sr, band_hz, signed, None, crowd=False)
     except np.linalg.LinAlgError:
         return None
     alive = lines.decay_per_s * late / sr < DEAD  # what would have been over by then began later
     if not alive.all():
-        lines = lines_of(signals[:, late:], lines.noise, lines.pole[alive], sr, signed)
+        lines = lines_of(rest, lines.noise, lines.pole[alive], sr, signed)
+    if not len(lines.freq_hz):
+        return None
     back = np.exp(-lines.pole * late / sr)
     return replace(lines, amplitude=lines.amplitude * back, amplitude_sd=lines.amplitude_sd * np.abs(back))
 
@@ -144,7 +149,7 @@ def _colour(signals: Array, noise: Array, sr: int) -> Callable[[Array], Array]:
 
 def _products(pole: Array, count: int) -> tuple[list[Array], list[Array]]:
     """Geometric sums of z_j z_k* and z_j z_k, poles per sample."""
-    return list(sums(pole[:, None] + pole[None, :].conj(), count)), list(sums(pole[:, None] + pole[None, :], count))
+    return list(geometric(pole, pole.conj(), count)), list(geometric(pole, pole, count))
 
 
 def _inner(a: Array, b: Array, even: Array, odd: Array) -> Array:
@@ -262,7 +267,8 @@ def lines_of(signals: Array, noise: Array, pole: Array, sr: int, signed: bool) -
     """Lines of signals (s, n) over white noise (s,) at poles (k,) in 1/s that are known already."""
     k, none = len(pole), np.zeros(0)
     if k == 0:
-        return Lines(none, none, np.zeros((len(signals), 0), complex), none, none, np.zeros((len(signals), 0)), noise, none, signed)
+        left = np.sqrt((signals**2).mean(axis=1))
+        return Lines(none, none, np.zeros((len(signals), 0), complex), none, none, np.zeros((len(signals), 0)), left, none, signed)
     amplitude, _, energy, residual = _solved(signals, noise, pole, sr)
     level = np.maximum(noise, residual)  # what the lines leave is noise too, to whoever asks how sure they are
     matrix, _, _ = _normal(signals, level, pole, sr)

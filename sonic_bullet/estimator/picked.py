@@ -13,17 +13,6 @@ from sonic_bullet.records import Array
 SAME = 1e-6  # of a pole's own energy: with less of it apart from those picked it says nothing of its own
 
 
-def sums(log_w: Array, count: int) -> tuple[Array, Array, Array]:
-    """Σ wⁿ, Σ n wⁿ, Σ n² wⁿ over n < count, w = e^log_w; near w = 1 by the integral's series is never needed: |log_w|·count stays above 1e-6."""
-    gap = -np.expm1(log_w)
-    gap = np.where(np.abs(gap) < 1e-12, 1e-12, gap)
-    w, last = np.exp(log_w), np.exp(log_w * count)
-    zeroth = (1 - last) / gap
-    first = (w * zeroth - count * last) / gap
-    second = (w * (zeroth + 2 * first) - count**2 * last) / gap
-    return zeroth, first, second
-
-
 def apart(pole: Array) -> Array:
     """Poles sorted by frequency without near doubles, which no recording of finite length tells apart."""
     pole = pole[np.argsort(pole.imag)]
@@ -42,6 +31,8 @@ def picked(signals: Array, noise: Array, pole: Array, sr: int, count: int) -> Ar
 
     All at once, poles of a crowd (a reverberation's) cancel each other at amplitudes that say nothing. A line's other half, at −ω, is taken to be far away.
     """
+    if not len(pole):
+        return np.zeros(0, int)
     z = pole / sr
     gap = z[:, None].conj() + z[None, :]
     gram = np.expm1(gap * signals.shape[1]) / np.expm1(gap)

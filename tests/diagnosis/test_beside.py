@@ -9,7 +9,7 @@ from made_body import plate, recorded
 from test_found_again import BAND, fitted
 
 from sonic_bullet.diagnosis.evidence import _nearest, evidence_of, named
-from sonic_bullet.effects.foreign_mode import ForeignMode
+from sonic_bullet.effects.foreign_mode import ForeignMode, _alone
 
 STAND = ForeignMode((790.0, 2310.0), (12.0, 30.0), (1.0, 0.8), (0.3, -1.0))
 OTHER = ForeignMode((4000.0,), (15.0,), (1.0,), (0.0,))
@@ -49,3 +49,11 @@ def test_a_line_of_another_decay_is_not_named() -> None:
     h = replace(fitted(body), effects=(STAND,))
     assert named(h, lines)[k] and not named(h, short)[k]
     assert not named(fitted(body), lines).any()
+
+
+def test_in_a_room_a_line_is_suppressed_by_one_that_stands_not_by_one_that_fell() -> None:
+    """840 Hz stands for 770, which is within a short frame's width of it; 700 is not, and stands for itself."""
+    freq = np.array([700.0, 770.0, 840.0, 2000.0])
+    assert _alone(freq, np.array([0.8, 0.9, 1.0, 0.1])).tolist() == [True, False, True, True]
+    assert _alone(freq, np.array([0.8, 1.0, 0.9, 0.1])).tolist() == [False, True, False, True]
+    assert _alone(freq[:0], freq[:0]).tolist() == []

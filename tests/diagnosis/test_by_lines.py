@@ -7,11 +7,12 @@ import pytest
 from made_body import SR, plate, recorded, truth
 
 from sonic_bullet.diagnosis.by_lines import likelier, tells
+from sonic_bullet.diagnosis.candidate import Candidate
 from sonic_bullet.diagnosis.choice import LINES, by_lines
 from sonic_bullet.diagnosis.evidence import evidence_of, thinned
 from sonic_bullet.diagnosis.judge import Take, least_db, mean_db
 from sonic_bullet.diagnosis.refit import refitted, retold
-from sonic_bullet.diagnosis.trial import Candidate, trials
+from sonic_bullet.diagnosis.trial import trials
 from sonic_bullet.effects.added_mass import AddedMass
 from sonic_bullet.effects.contact_time import ContactTime
 from sonic_bullet.effects.damping_law import DampingLaw

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from made_body import SR, recorded, truth
 
+from sonic_bullet.diagnosis.candidate import Candidate
 from sonic_bullet.diagnosis.evidence import evidence_of, thinned
 from sonic_bullet.diagnosis.exchange import decays_against, exchanged, surely, together
 from sonic_bullet.diagnosis.judge import Take, mean_db
 from sonic_bullet.diagnosis.refit import refitted
-from sonic_bullet.diagnosis.trial import Candidate
 from sonic_bullet.effects.contact_time import ContactTime
 from sonic_bullet.effects.damping_law import DampingLaw
 from sonic_bullet.effects.measurement_chain import MeasurementChain

@@ -12,8 +12,8 @@ from test_found_again import BAND, fitted
 from sonic_bullet.diagnosis import loop
 from sonic_bullet.diagnosis.baseline import takes_of
 from sonic_bullet.diagnosis.bodies import Struck
+from sonic_bullet.diagnosis.candidate import Candidate
 from sonic_bullet.diagnosis.in_phase import of_no_body, out_of_phase
-from sonic_bullet.diagnosis.trial import Candidate
 from sonic_bullet.diagnosis.unexplained import remainder
 from sonic_bullet.effects import Effect
 from sonic_bullet.effects.contact_time import ContactTime

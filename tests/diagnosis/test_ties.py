@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from made_body import recorded, truth
 
+from sonic_bullet.diagnosis.candidate import Candidate
 from sonic_bullet.diagnosis.choice import simplest
 from sonic_bullet.diagnosis.evidence import evidence_of
 from sonic_bullet.diagnosis.exchange import phases_against
 from sonic_bullet.diagnosis.refit import refitted
 from sonic_bullet.diagnosis.ties import misfit
-from sonic_bullet.diagnosis.trial import Candidate
 from sonic_bullet.effects import Effect
 from sonic_bullet.effects.contact_time import ContactTime
 from sonic_bullet.effects.damping_law import DampingLaw

@@ -15,16 +15,16 @@ from test_found_again import BAND, fitted
 
 from sonic_bullet.diagnosis import loop
 from sonic_bullet.diagnosis.baseline import _soft, takes_of
+from sonic_bullet.diagnosis.candidate import Candidate, earns
 from sonic_bullet.diagnosis.chains import LINKS, unchained
 from sonic_bullet.diagnosis.diagnose import _finite
 from sonic_bullet.diagnosis.evidence import evidence_of
 from sonic_bullet.diagnosis.judge import mean_db
 from sonic_bullet.diagnosis.play import Hypothesis
 from sonic_bullet.diagnosis.refit import refitted
-from sonic_bullet.diagnosis.trial import KEPT, LEAST_DB, Candidate, Fold, Gain, _after, _folds, _hopeful, earns, needed, trials
+from sonic_bullet.diagnosis.trial import KEPT, Fold, _after, _folds, trials
 from sonic_bullet.effects import EFFECTS
 from sonic_bullet.effects.amplitude_damping import AmplitudeDamping
-from sonic_bullet.effects.amplitude_pitch import AmplitudePitch
 from sonic_bullet.effects.orthotropy import Orthotropy
 from sonic_bullet.effects.radiation import Radiation
 from sonic_bullet.effects.room import Room
@@ -35,51 +35,6 @@ from sonic_bullet.effects.values import Evidence, Owner, Sound, Stage
 from sonic_bullet.records import ModalModel
 
 WEAK = ((0.0477, 0.0371, 0.0), (0.0955, 0.0186, 0.0), (0.1432, 0.0464, 0.0))
-
-
-def candidate(*drop_db: float, null_db: float = 0.0) -> Candidate:
-    return Candidate("radiation", None, None, np.array(drop_db), float(np.mean(drop_db)), null_db, {})  # type: ignore[arg-type]
-
-
-def test_less_will_do_where_it_is_most_of_what_is_open() -> None:
-    told = [needed(gap, first=True) for gap in (10.0, 2.0, 0.5, 0.1)]
-    assert told == pytest.approx([0.8, LEAST_DB, 0.25, 0.2])
-    assert [needed(gap, first=False) for gap in (10.0, 2.0, 0.5, 0.1)] == pytest.approx([0.8, LEAST_DB, LEAST_DB, LEAST_DB])
-    assert earns(candidate(0.3, 0.31, 0.29, 0.3, 0.3), 0.5, first=True)
-    assert not earns(candidate(0.3, 0.31, 0.29, 0.3, 0.3), 0.5, first=False), "what a name leaves may be its own fit's"
-    assert not earns(candidate(0.3, 0.31, 0.29, 0.3, 0.3), 2.0, first=True), "a drop of a seventh is a mesh's"
-    assert not earns(candidate(0.15, 0.15, 0.14, 0.16, 0.15), 0.2, first=True), "as little as chance gains"
-
-
-def test_loud_strikes_may_speak_alone_but_not_a_single_one() -> None:
-    assert earns(candidate(0.0, -0.02, 0.05, 1.1, 0.4), 0.5, first=True)
-    assert not earns(candidate(0.0, 0.0, 0.0, 0.0, 2.0), 0.5, first=True)
-    assert not earns(candidate(0.0, -0.5, 0.05, 1.1, 0.9), 0.5, first=True), "one strike speaks against it"
-    assert not earns(candidate(0.0, -0.02, 0.05, 1.1, 0.4, null_db=0.3), 0.5, first=True), "as good as chance"
-
-
-def test_of_what_lines_are_sure_of_one_loud_strike_will_do() -> None:
-    """What goes with level squared is plain at the loudest; a loud one that is not the one to gain is no such thing."""
-    drop, level = (0.0, 0.01, 0.02, 0.06, 0.8), np.array([1.0, 2.0, 3.0, 4.0, 9.0])
-    sure = replace(candidate(*drop), effect=AmplitudePitch(0.1), impulse_n_s=level)
-    assert sure.certain and sure.loud
-    assert earns(sure, 0.4, first=True)
-    assert not earns(replace(sure, effect=Radiation(0.1, 1.0)), 0.4, first=True), "its lines were not asked"
-    assert not earns(replace(sure, impulse_n_s=level[::-1]), 0.4, first=True), "the softest gains"
-    assert not earns(sure, 0.4, first=False)
-    assert not earns(sure, 1.2, first=True), "a seventh of the gap"
-    assert not earns(replace(sure, drop_db=np.array([-0.9, 0.4, 0.4, 0.4, 0.41])), 1.0, first=True), "one speaks against it"
-
-
-def test_beside_another_name_the_loudest_may_speak_for_what_goes_with_level() -> None:
-    """It was left out, and the bend that the softer ones told plays it; these hardly sound otherwise, and may lose a little by it."""
-    level = np.array([1.0, 2.0, 3.0, 4.0, 9.0])
-    sure = replace(candidate(-0.01, -0.13, -0.07, -0.11, 2.9), effect=AmplitudePitch(0.1), impulse_n_s=level)
-    assert earns(sure, 0.9, first=False)
-    assert not earns(replace(sure, effect=Radiation(0.1, 1.0)), 0.9, first=False), "its lines were not asked"
-    assert not earns(replace(sure, impulse_n_s=level[::-1]), 0.9, first=False), "the softest gains"
-    assert not earns(replace(sure, drop_db=np.array([-0.2, -0.13, -0.07, -0.11, 2.9])), 0.9, first=False), "the others lose too much"
-    assert not earns(replace(sure, null_db=2.0), 0.9, first=False), "as good as chance"
 
 
 def test_a_strike_that_neither_plays_above_the_noise_is_as_far_off_as_noise_makes() -> None:
@@ -99,13 +54,6 @@ def test_a_strike_that_neither_plays_above_the_noise_is_as_far_off_as_noise_make
 
 def test_what_is_no_number_is_null_in_json() -> None:
     assert _finite({"a": [1.0, np.nan, {"b": np.float64(np.inf)}], "c": ("x", 2, None)}) == {"a": [1.0, None, {"b": None}], "c": ["x", 2, None]}
-
-
-def test_one_odd_strike_does_not_outvote_four_that_gain_much() -> None:
-    assert earns(candidate(-0.02, 3.9, -3.5, 5.1, 3.7), 4.0, first=True)
-    assert not earns(candidate(-2.0, 3.9, -3.5, 5.1, 3.7), 4.0, first=True), "nor two"
-    assert not earns(candidate(0.1, 0.9, -0.9, 1.2, 0.8), 4.0, first=True), "what little they gain may be chance"
-    assert not earns(candidate(-0.02, 3.9, -9.0, 5.1, 0.7), 4.0, first=True), "what it loses counts in the mean"
 
 
 @dataclass(frozen=True)
@@ -164,15 +112,6 @@ def test_what_could_not_earn_its_keep_any_more_is_asked_no_further(spoils: tuple
     assert len(found.drop_db) == len(found.impulse_n_s) == asked
     assert (found.drop_db < -3.0).tolist() == [i in spoils for i in range(asked)]
     assert not earns(found, 1.0, first=True)
-
-
-@pytest.mark.parametrize(
-    ("drop", "before", "hopeful"), [((-3.1, -3.1), 2.0, False), ((-3.1, -3.1), 12.0, True), ((-0.1, 0.3), 3.0, True), ((0.0, 0.0), 0.1, False)]
-)
-def test_a_suspect_has_hope_as_long_as_the_rest_may_make_up_for_it(drop: tuple[float, ...], before: float, hopeful: bool) -> None:
-    h = fitted(recorded())
-    fold = Fold(takes_of((recorded(),))[0], (), Evidence((), 0.0, 0.0, 1.0, (), BAND), h, before + 1.0, before + 1.0, 1.0)
-    assert _hopeful("radiation", Radiation(0.1, 1.0), h, [Gain(drop_db=x) for x in drop], [fold] * 8) == hopeful
 
 
 def test_two_processes_find_what_one_finds(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,11 +8,12 @@ import numpy as np
 from made_body import SR, recorded, truth
 
 from sonic_bullet.diagnosis.bodies import Struck
+from sonic_bullet.diagnosis.candidate import earns
 from sonic_bullet.diagnosis.evidence import evidence_of, thinned
 from sonic_bullet.diagnosis.exchange import left_out_db
 from sonic_bullet.diagnosis.judge import Take
 from sonic_bullet.diagnosis.refit import refitted
-from sonic_bullet.diagnosis.trial import earns, trials
+from sonic_bullet.diagnosis.trial import trials
 from sonic_bullet.effects.damping_law import DampingLaw
 from sonic_bullet.estimator.distance import floor_between
 

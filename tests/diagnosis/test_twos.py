@@ -9,11 +9,11 @@ import pytest
 from made_body import SR, recorded, truth
 
 from sonic_bullet.diagnosis import twos
+from sonic_bullet.diagnosis.candidate import Candidate
 from sonic_bullet.diagnosis.evidence import evidence_of
 from sonic_bullet.diagnosis.judge import Take
 from sonic_bullet.diagnosis.play import Hypothesis
 from sonic_bullet.diagnosis.refit import refitted
-from sonic_bullet.diagnosis.trial import Candidate
 from sonic_bullet.diagnosis.twos import in_a_room, in_twos
 from sonic_bullet.effects import Effect
 from sonic_bullet.effects.added_mass import AddedMass

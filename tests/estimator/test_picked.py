@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
-from sonic_bullet.estimator.lines import joint_lines
+from sonic_bullet.estimator.evidence import until_it_breaks_off
+from sonic_bullet.estimator.lines import joint_lines, lines_of
 from sonic_bullet.estimator.picked import picked
 from sonic_bullet.records import Array
 
@@ -52,3 +54,35 @@ def test_low_lines_of_a_reverberant_recording_are_still_lines() -> None:
     low = freq[freq < 4000]
     near = np.abs(found[None, :] / low[:, None] - 1).min(axis=1)
     assert (near < 0.003).mean() > 0.9, low[near >= 0.003]
+
+
+def test_of_no_pole_none_is_picked_and_what_no_line_takes_is_left() -> None:
+    none = np.zeros(0, complex)
+    signals = rings(TRUE, DECAY, SIZE)
+    assert len(picked(signals, np.ones(2), none, SR, 10)) == 0
+    assert lines_of(signals, np.full(2, 1e-6), none, SR, True).noise == pytest.approx(np.sqrt((signals**2).mean(axis=1)))
+
+
+def test_a_strike_that_a_gate_has_shut_is_no_silent_one() -> None:
+    """Ten hits within 29 ms make a crowd; what is left after them is read back to the onset, but not where one recording is over by then."""
+    rng = np.random.default_rng(3)
+    freq, decay = np.geomspace(300, 9000, 8), np.full(8, 25.0)
+    late = np.zeros(N)
+    late[rng.choice(round(0.029 * SR), 10, replace=False)] = rng.uniform(0.5, 1, 10)
+    one = rings(freq, decay, rng.choice([-1, 1], (3, 8)) * rng.uniform(0.3, 1, (3, 8)))
+    hits = np.stack([np.convolve(x, late)[:N] for x in one]) + 1e-5 * rng.standard_normal(one.shape)
+    found = joint_lines(hits, SR, modes=8)
+    assert len(found.freq_hz) == 8, "what rings after them is told"
+    shut = hits.copy()
+    shut[1, round(0.029 * SR) :] = 0
+    silent = joint_lines(shut, SR, modes=8)
+    assert np.abs(silent.amplitude[1]).max() > 0.01
+
+
+def test_a_recording_ends_where_it_breaks_off() -> None:
+    x = rings(TRUE, DECAY, SIZE)[0]
+    cut = np.where(np.arange(N) < N // 8, x, 0.0)
+    assert len(until_it_breaks_off(cut, SR)) == N // 8
+    assert len(until_it_breaks_off(np.round(x * 2**15) / 2**15, SR)) == N, "a decay ends in its last bit"
+    assert len(until_it_breaks_off(x[: N // 8], SR)) == N // 8
+    assert len(until_it_breaks_off(np.zeros(N), SR)) == N
