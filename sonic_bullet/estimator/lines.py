@@ -263,6 +263,11 @@ def _polished(signals: Array, noise: Array, pole: Array, sr: int, low: float, hi
     return pole
 
 
+def _roots(matrix: Array) -> Array:
+    """Spreads (n,) that go with an information matrix (n, n). Of two poles that all but coincide rounding may turn a variance's sign; it is as large for that."""
+    return np.asarray(np.sqrt(np.abs(np.diag(np.linalg.pinv(matrix)))))
+
+
 def lines_of(signals: Array, noise: Array, pole: Array, sr: int, signed: bool) -> Lines:
     """Lines of signals (s, n) over white noise (s,) at poles (k,) in 1/s that are known already."""
     k, none = len(pole), np.zeros(0)
@@ -273,11 +278,11 @@ def lines_of(signals: Array, noise: Array, pole: Array, sr: int, signed: bool) -
     level = np.maximum(noise, residual)  # what the lines leave is noise too, to whoever asks how sure they are
     matrix, _, _ = _normal(signals, level, pole, sr)
     scale = 1 / np.sqrt(np.maximum(np.diag(matrix), 1e-300))
-    spread = np.sqrt(np.maximum(np.diag(np.linalg.pinv(matrix * scale[:, None] * scale)), 0)) * scale
+    spread = _roots(matrix * scale[:, None] * scale) * scale
     even, odd = _products(pole / sr, signals.shape[1])
     gram = _basis(even[0], odd[0])
     width = 1 / np.sqrt(np.diag(gram))
-    root = np.sqrt(np.diag(np.linalg.pinv(gram * width[:, None] * width))) * width
+    root = _roots(gram * width[:, None] * width) * width
     return Lines(
         pole.imag / (2 * np.pi),
         -pole.real,

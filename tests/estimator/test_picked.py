@@ -86,3 +86,11 @@ def test_a_recording_ends_where_it_breaks_off() -> None:
     assert len(until_it_breaks_off(np.round(x * 2**15) / 2**15, SR)) == N, "a decay ends in its last bit"
     assert len(until_it_breaks_off(x[: N // 8], SR)) == N // 8
     assert len(until_it_breaks_off(np.zeros(N), SR)) == N
+
+
+def test_poles_that_all_but_coincide_have_spreads() -> None:
+    pole = np.array([-20 + 2j * np.pi * 440, -20 + 2j * np.pi * 440 * (1 + 1e-13), -15 + 2j * np.pi * 900])
+    found = lines_of(rings(TRUE, DECAY, SIZE), np.full(2, 1e-3), pole, SR, True)
+    assert np.isfinite(found.amplitude_sd).all()
+    assert (found.amplitude_sd > 0).all()
+    assert np.isfinite(found.freq_sd_hz).all()
