@@ -28,6 +28,7 @@ MARGIN = 1.36  # √(1.3/0.7): how far the guess may put a mode too high
 MESH_M = (2e-4, 5.0)  # bodies smaller or larger than this are in another unit
 PLATE_DOF = 52_000  # unknowns: 36 ab/e² in one layer of cells
 CLIPPED = 8  # samples in a row at the file's peak
+LEAST_SAMPLES, LEAST_S, SHORTER = 256, 0.02, 0.5  # after an onset; of the usual length: that much shorter is worth a word
 SHUT_S, SHUT = 0.01, 1e-3  # of a gate: what lies before it, and behind it at least; of the peak (16 bits end at 3e-5)
 CLIPPED_RUNS = 4  # or as many rows of three: a sound that decays has one highest peak
 
@@ -169,9 +170,14 @@ def _sounds(case: Case, thing: CaseObject, recordings: tuple[CaseRecording, ...]
         raise AudioError(f"recordings of {thing.name} have rates {sorted(set(rates))} Hz", "give files of one rate")
     sr = rates[0]
     starts = [round(case.onset_s * sr) if case.onset_s is not None else onset_sample(sound, sr) for sound in sounds]
-    length = min(len(sound) - start for sound, start in zip(sounds, starts, strict=True))
-    if length < 256:
-        raise AudioError(f"only {max(length, 0)} samples follow the onset in the shortest recording", "give recordings that hold the sound's decay")
+    lengths = [len(sound) - start for sound, start in zip(sounds, starts, strict=True)]
+    length, which = min(lengths), str(recordings[int(np.argmin(lengths))].file)
+    if length < max(LEAST_SAMPLES, LEAST_S * sr):
+        raise AudioError(
+            f"{which} holds {1000 * max(length, 0) / sr:.0f} ms after the onset", "all are read as far as the shortest: leave it out, or give the whole"
+        )
+    if length < SHORTER * np.median(lengths):
+        told.append(f"all recordings of {thing.name} are read for {length / sr:.3g} s, as far as {which} goes")
     return np.stack([sound[start : start + length] for sound, start in zip(sounds, starts, strict=True)]), sr, told
 
 

@@ -96,6 +96,20 @@ def test_only_what_precedes_a_second_hit_is_listened_to(planted: Planted, tmp_pa
     assert any("2 hits" in note for note in e.notes)
 
 
+def test_what_breaks_off_ends_there_and_is_named(planted: Planted, tmp_path: Path) -> None:
+    """Filled up with zeros, as an editor leaves it: they are no sound that has died away."""
+    case = read_case(planted.folder)
+    sound, sr = soundfile.read(planted.folder / "s0.wav")
+    end = round(0.2 * len(sound))
+    soundfile.write(tmp_path / "cut.wav", np.where(np.arange(len(sound)) < end, sound, 0.0), sr, subtype="FLOAT")
+    thing = replace(case.objects["box"], mesh=None)
+    first, *others = case.recordings
+    (e,) = gather(replace(case, objects={"box": thing}, recordings=(replace(first, file=tmp_path / "cut.wav"), *others)))
+    assert e.signals is not None and e.signals.shape[1] <= end
+    assert any("cut.wav breaks off after" in note for note in e.notes)
+    assert any("as far as" in note and "cut.wav" in note for note in e.notes)
+
+
 def _millimetres(case: dict[str, Any], folder: Path) -> None:
     write_box(folder / "box.obj", (140.0, 30.0, 5.0))
 
@@ -139,7 +153,7 @@ def _two_materials(case: dict[str, Any], folder: Path) -> None:
         (_unit_twice, MeshError, "0.000143 m across"),
         (_strike_in_millimetres, MeshError, "strike 1 at .* off the surface"),
         (_sensor_in_millimetres, MeshError, "sensor at .* off the surface"),
-        (_cut, AudioError, "samples"),
+        (_cut, AudioError, "s0.wav holds .* ms after the onset"),
         (_header_alone, SonicBulletError, "s0.wav"),
         (_two_rates, AudioError, "rates"),
         (_two_materials, SonicBulletError, "several materials"),
