@@ -33,8 +33,9 @@ def helps(c: Candidate, bodies: tuple[Struck, ...], takes: Sequence[Judged], now
 
 
 def by_lines(c: Candidate, bodies: tuple[Struck, ...], takes: Sequence[Judged], told: float, floor: float) -> bool:
-    """Whether lines left out speak for it (by_lines.py), and a room's response, told again beside it, says no less than without it (told)."""
-    return c.lines > LINES and (mean_db(takes, retold(c.hypothesis, bodies)) or 0.0) < told + SAME * max(told - floor, 0.0)
+    """Whether lines left out speak for it (by_lines.py), and a room's response, told again beside it, says no less than without it (told). Without a mesh nothing tells which of a room's lines are modes."""
+    known = all(body.family is not None for body in bodies)
+    return known and c.lines > LINES and (mean_db(takes, retold(c.hypothesis, bodies)) or 0.0) < told + SAME * max(told - floor, 0.0)
 
 
 def simplest(able: Sequence[Candidate], bodies: tuple[Struck, ...], evidence: Evidence) -> Candidate:
