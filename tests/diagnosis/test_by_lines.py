@@ -35,7 +35,9 @@ def tried(*effects: DampingLaw) -> tuple[list[Candidate], bool]:
     h = retold(refitted(truth(ROOM), (body,)), (body,))
     found = trials(h, (body,), takes, evidence_of(h, (body,), BAND), [DampingLaw], seed=0, say=lambda _: None)
     told, least = mean_db(takes, h) or 0.0, least_db(takes, h) or 0.0
-    assert not any(by_lines(c, (replace(body, family=None),), takes, told, least) for c in found), "without a mesh, of a room's lines none is known to be a mode"
+    assert not any(by_lines(c, (replace(body, family=None),), takes, told, least) for c in found), (
+        "without a mesh, of a room's lines none is known to be a mode"
+    )
     return found, any(by_lines(c, (body,), takes, told, least) for c in found)
 
 
