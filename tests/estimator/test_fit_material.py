@@ -130,7 +130,7 @@ def test_clamped_body_is_fitted_clamped(tmp_path: Path) -> None:
         (lambda c: c.update(recordings=[{"file": "quiet.wav", "object": "box"}]), AudioError, "silent"),
         (lambda c: c.update(recordings=[{"file": "clipped.wav", "object": "box"}]), AudioError, "clipped"),
         (lambda c: c.update(recordings=[{"file": "nan.wav", "object": "box"}]), AudioError, "NaN"),
-        (lambda c: c.update(recordings=[{"file": "short.wav", "object": "box"}]), AudioError, "samples"),
+        (lambda c: c.update(recordings=[{"file": "short.wav", "object": "box"}]), AudioError, "short.wav holds 1 ms after the onset"),
         (lambda c: c.update(recordings=[{"file": "noise.wav", "object": "box"}]), AudioError, "no damped sinusoid"),
         (lambda c: c.update(recordings=[{"file": "text.wav", "object": "box"}]), FileError, "cannot read"),
     ],
