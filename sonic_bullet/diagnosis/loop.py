@@ -38,7 +38,7 @@ OPEN = 0.3  # of the first gap: with less left, no costly suspect is asked
 @dataclass(frozen=True, slots=True, eq=False)
 class Closed:
     """How the loop ended. added: the candidate of each round that is still there at the end. tried: every suspect in the last round in
-    which it was asked and had something to say. mesh_off: of a frequency, what the mesh is off by where that alone is what was left."""
+    which it was asked and had something to say. mesh_off: of a frequency, what the mesh is off by where that is why the verdict stands."""
 
     before: Hypothesis
     after: Hypothesis
@@ -70,17 +70,15 @@ def closed(
     now, floor = mean_db(takes, h) or 0.0, one.floor
     verdict, off = _verdict(h, added, before, now, floor, bodies, takes, seed), 0.0
     if verdict == "unexplained":
-        far, off = beyond(start, bodies)
-        excused = off and (mean_db(takes, far) or 0.0) - (least_db(takes, far) or 0.0) < SUFFICES_DB and of_no_body(start, takes) < NO_BODY
-        verdict = "none" if excused else verdict
+        verdict, off = _by_a_finer_mesh(start, h, added, before, bodies, takes, seed)
     if verdict == "unexplained" and not one.in_twos and (two := in_twos(start, one.first, bodies, takes, band_hz, seed=seed, say=say)):
         h, added = two
         last |= {c.id: c for c in added}
         now, floor = mean_db(takes, h) or 0.0, least_db(takes, h) or floor
-        verdict = _verdict(h, added, before, now, floor, bodies, takes, seed)
+        verdict, off = _verdict(h, added, before, now, floor, bodies, takes, seed), 0.0
     if verdict != "explained":
         h, now, added = start, before, []
-    return Closed(start, h, tuple(added), tuple(last.values()), verdict, before, now, floor, off if verdict == "none" else 0.0)
+    return Closed(start, h, tuple(added), tuple(last.values()), verdict, before, now, floor, off)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -196,6 +194,22 @@ def _verdict(
     room = any(hasattr(e, "told_by") for e in h.effects)  # whose response takes up what a mesh gets wrong, too: that is no excuse
     enough = left <= max((1 - (BY_A_ROOM if room else EXPLAINED)) * gap, SUFFICES_DB) or (not room and left <= of_the_mesh(h, bodies, takes, seed))
     return "explained" if enough else "unexplained"
+
+
+def _by_a_finer_mesh(
+    start: Hypothesis, h: Hypothesis, added: Sequence[Candidate], before: float, bodies: tuple[Struck, ...], takes: Sequence[Judged], seed: int
+) -> tuple[str, float]:
+    """What would be known with upper modes where their lines are, and how far off the mesh has them; unexplained and 0 where that helps nobody."""
+    verdict, (far, off) = "unexplained", beyond(start, bodies)
+    if not off:
+        return verdict, 0.0
+    ideal, floor = min(mean_db(takes, far) or 0.0, before), least_db(takes, far) or 0.0
+    if ideal - floor < SUFFICES_DB and of_no_body(start, takes) < NO_BODY:
+        verdict = "none"
+    elif added:
+        both, _ = beyond(h, bodies)
+        verdict = _verdict(both, added, ideal, mean_db(takes, both) or 0.0, floor, bodies, takes, seed)
+    return verdict, off if verdict != "unexplained" else 0.0
 
 
 def described(candidates: Sequence[Candidate]) -> list[dict[str, Any]]:

@@ -17,6 +17,7 @@ from sonic_bullet.records import Array, ModalModel
 
 PAIR = 6e-3  # relative: modes of a mesh nearer than this may be a pair
 MESHED = 1.5e-3  # relative: modes that a mesh leaves nearer to each other are twins that it tore apart
+ONE = 1e-4  # relative: twins that corrections have not brought nearer than this are played as two, and turned they would be two others
 ANGLES = np.arange(18) * np.pi / 36  # a quarter turn changes the twins about, and no more
 
 
@@ -43,6 +44,12 @@ def twins(h: Heard, k: int) -> bool:
         return False
     near = np.sort(h.plain.freq_hz[np.argsort(np.abs(h.plain.freq_hz - h.model_hz[k]))[:2]])
     return bool(near[1] / near[0] - 1 < MESHED)
+
+
+def torn(h: Heard, k: int) -> bool:
+    """Whether the modes of a line, as they are played, are still apart."""
+    freq = h.model.freq_hz[h.mode[k]] if h.model is not None else np.zeros(0)
+    return bool(len(freq) > 1 and freq.max() / freq.min() - 1 > ONE)
 
 
 def about(h: Heard, k: int, measure: str, angle: Array) -> tuple[Array, Array]:

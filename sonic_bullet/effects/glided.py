@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sonic_bullet.effects.axes import ANGLES, about, twins
+from sonic_bullet.effects.axes import ANGLES, about, torn, twins
 from sonic_bullet.effects.envelope import Envelopes
 from sonic_bullet.effects.values import Heard
 from sonic_bullet.records import Array
@@ -38,7 +38,7 @@ def axes_of(e: Envelopes, h: Heard, measure: str, bend: float) -> tuple[tuple[fl
     assert h.model is not None
     found = []
     for q, k in enumerate(e.line.tolist()):
-        if not (twins(h, k) and e.good[:, q].any()):
+        if torn(h, k) or not (twins(h, k) and e.good[:, q].any()):
             continue
         cost = spread(e, h, q, bend, *about(h, k, measure, ANGLES))
         fine = ANGLES[int(cost.argmin())] + FINER
