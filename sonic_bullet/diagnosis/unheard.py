@@ -4,6 +4,7 @@
 
 Twins that a mesh has torn apart, or put together that are none, modes in each other's skirts and short ones stand in no list of lines, but the model knows
 their amplitudes at every strike, so their place shows. The baseline's correction of a mesh's error, for those of its modes; one that the recordings do not clearly want elsewhere stays.
+Beyond the band's edges L is 0: a mode that the mesh has just inside, and that nobody hears, may lie just outside.
 """
 
 from __future__ import annotations
@@ -71,25 +72,24 @@ def sought(h: Hypothesis, body: Struck, which: Array, *, alone: Array | None = N
         for j in loud:
             decay, push = float(model.decay_per_s[rank[j]]), heard.push[:, rank[j]]
             most = np.inf if alone is None or alone[j] else PURE
-            ratio = _best(left, push, decay, own[j], correction[j], n, heard.sr, most)
+            ratio = _best(left, push, decay, own[j], correction[j], n, heard.sr, most, body.band_hz)
             if ratio != correction[j]:
                 half = 2 * CORRECTION * own[j] + WIDE * (decay / (2 * np.pi) + heard.sr / n)
                 bins = _bins(own[j], half, n, heard.sr)
-                left[:, bins] += push[:, None] * (
-                    _line(own[j] * (1 + correction[j]), decay, bins, n, heard.sr) - _line(own[j] * (1 + ratio), decay, bins, n, heard.sr)
-                )
+                was, will = (_line(own[j] * (1 + r), decay, bins, n, heard.sr, body.band_hz) for r in (correction[j], ratio))
+                left[:, bins] += push[:, None] * (was - will)
                 correction[j] = ratio
         if (correction == before).all():
             break
     return correction
 
 
-def _best(left: Array, push: Array, decay: float, own: float, now: float, n: int, sr: int, most: float) -> float:
+def _best(left: Array, push: Array, decay: float, own: float, now: float, n: int, sr: int, most: float, band_hz: tuple[float, float]) -> float:
     """The correction of a mode of amplitudes push (s,) that leaves least around it, if it is clearly better than the one it has and leaves no more than ``most``."""
     step = FINE * max(decay / (2 * np.pi), sr / n) / own
     grid = np.concatenate([[now], np.linspace(-CORRECTION, CORRECTION, 2 * int(np.ceil(CORRECTION / step)) + 1)])
     bins = _bins(own, CORRECTION * own + SKIRT * decay / (2 * np.pi) + 2 * sr / n, n, sr)
-    shape = _line(own * (1 + grid[:, None]), decay, bins, n, sr)
+    shape = _line(own * (1 + grid[:, None]), decay, bins, n, sr, band_hz)
     target = left[:, bins] + push[:, None] * shape[0]
     energy = (np.abs(push) ** 2).sum() * (np.abs(shape) ** 2).sum(axis=1)
     cost = energy - 2 * (shape @ (np.conj(target) * push[:, None]).sum(axis=0)).real
@@ -97,7 +97,7 @@ def _best(left: Array, push: Array, decay: float, own: float, now: float, n: int
     inside = abs(grid[i]) < 0.99 * CORRECTION  # at the end of its reach it runs after something else
     near = np.abs(bins * sr / n - own * (1 + grid[i])) < decay / np.pi + 2 * sr / n
     rest = np.abs(target - push[:, None] * shape[i])[:, near] ** 2
-    pure = rest.sum() < most * (np.abs(push[:, None] * shape[i])[:, near] ** 2).sum()
+    pure = most == np.inf or rest.sum() < most * (np.abs(push[:, None] * shape[i])[:, near] ** 2).sum()
     return float(grid[i]) if inside and pure and cost[i] < cost[0] - BETTER * energy[0] else now
 
 
@@ -105,7 +105,9 @@ def _bins(freq_hz: float, half_hz: float, n: int, sr: int) -> Array:
     return np.arange(max(int((freq_hz - half_hz) * n / sr), 1), min(int((freq_hz + half_hz) * n / sr) + 2, n // 2))
 
 
-def _line(freq_hz: Array | float, decay: float, bins: Array, n: int, sr: int) -> Array:
-    """½ Σ_t e^{(−d + iω)t} e^{−2πi kt/n} at some bins of n-point spectra."""
-    start = (-decay + 2j * np.pi * np.asarray(freq_hz)) / sr  # the bins' own turns come full circle after n samples
-    return np.asarray(0.5 * (1 - np.exp(start * n)) / (1 - np.exp(start) * np.exp(-2j * np.pi * bins / n)))
+def _line(freq_hz: Array | float, decay: float, bins: Array, n: int, sr: int, band_hz: tuple[float, float]) -> Array:
+    """½ Σ_t e^{(−d + iω)t} e^{−2πi kt/n} at some bins of n-point spectra; 0 outside the band."""
+    freq = np.asarray(freq_hz)
+    start = (-decay + 2j * np.pi * freq) / sr  # the bins' own turns come full circle after n samples
+    line = 0.5 * (1 - np.exp(start * n)) / (1 - np.exp(start) * np.exp(-2j * np.pi * bins / n))
+    return np.asarray(np.where((freq >= band_hz[0]) & (freq <= band_hz[1]), line, 0))
