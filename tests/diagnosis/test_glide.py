@@ -135,6 +135,41 @@ def test_axes_of_twins_are_held_on_trial_and_learnt_again_beside_other_effects()
     assert split is not None and split.turn_rad == ()
 
 
+@pytest.mark.parametrize("off_per_s", [-5.0, 5.0])
+def test_twins_that_glide_and_beat_fall_as_what_is_played_does(off_per_s: float) -> None:
+    """By what it is played with that is a third off, their decay is told to 5 %, and by that to 2 %; the line itself is farther off."""
+    model = with_twins()
+    middle = float(model.freq_hz[PAIR[0]])
+    bent = AmplitudePitch(2.0, "velocity", (middle,), (0.6,))
+    body = recorded(bent, model=model)
+    h = replace(fitted(body), effects=(bent,))
+    lines = evidence_of(replace(h, effects=()), (body,), BAND).heard[0]
+    k = int(np.abs(lines.freq_hz / middle - 1).argmin())
+    assert len(lines.mode[k]) == 2
+    right = float(true_decay(lines.freq_hz[k : k + 1])[0])
+    assert abs(lines.decay_per_s[k] / right - 1) > 0.1
+    told = right + off_per_s
+    for close in (0.05, 0.02):
+        alpha = 2 * told - h.beta_s * (2 * np.pi * middle) ** 2
+        told = float(fallen(replace(h, alpha_per_s=alpha), body, lines).decay_per_s[k])
+        assert told == pytest.approx(right, rel=close)
+
+
+def test_twins_that_are_played_as_two_are_not_turned() -> None:
+    """Two modes that corrections have left apart are no pair of one frequency: about other axes they would be two others."""
+    model = with_twins()
+    body = recorded(AmplitudePitch(0.7, "velocity", (float(model.freq_hz[PAIR[0]]),), (0.6,)), model=model)
+    told = evidence_of(refitted(fitted(body), (body,)), (body,), BAND)
+    one = told.heard[0]
+    assert one.model is not None
+    freq = one.model.freq_hz.copy()
+    freq[PAIR[1]] *= 1 + 9e-4
+    apart = replace(one, model=replace(one.model, freq_hz=freq))
+    for heard, turned in ((one, 1), (apart, 0)):
+        found = AmplitudePitch.propose(replace(told, heard=(heard,)))
+        assert found is not None and len(found.turn_rad) == turned
+
+
 def test_a_bend_is_told_with_the_axes_of_twins() -> None:
     """From half as far off as twins, read as one mode, may lead."""
     model = with_twins()

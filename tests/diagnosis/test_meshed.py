@@ -14,15 +14,18 @@ from sonic_bullet.diagnosis.loop import closed
 from sonic_bullet.diagnosis.meshed import FAR, beyond
 from sonic_bullet.diagnosis.play import Hypothesis, ordered
 from sonic_bullet.diagnosis.refit import refitted
+from sonic_bullet.effects import Effect
+from sonic_bullet.effects.amplitude_pitch import AmplitudePitch
+from sonic_bullet.effects.contact_time import ContactTime
 from sonic_bullet.estimator.distance import floor_between
 
 BAND = (50.0, 7_500.0)
 
 
-def misjudged(off: np.ndarray) -> tuple[Struck, Hypothesis, tuple[Take, ...]]:
-    """The plate as its mesh has it, recorded where modes are off (m,) from there, relative; nothing is corrected."""
+def misjudged(off: np.ndarray, *effects: Effect) -> tuple[Struck, Hypothesis, tuple[Take, ...]]:
+    """The plate as its mesh has it, recorded with effects where modes are off (m,) from there, relative; nothing is corrected."""
     mesh = plate()
-    heard = recorded(model=ordered(mesh, mesh.freq_hz * (1 + off), mesh.decay_per_s)[0]).gathered
+    heard = recorded(*effects, model=ordered(mesh, mesh.freq_hz * (1 + off), mesh.decay_per_s)[0]).gathered
     assert heard is not None and heard.signals is not None
     body = struck(mesh, heard.lines, heard.signals)
     floor = floor_between(list(heard.signals))
@@ -61,6 +64,19 @@ def test_what_no_mesh_does_stays_open(off: np.ndarray) -> None:
     most = beyond(h, (body,))[1]
     assert most < FAR
     assert closed(h, (body,), takes, (), BAND).verdict == "unexplained"
+
+
+def test_a_name_is_judged_by_what_a_finer_mesh_would_leave() -> None:
+    """More than half of what is open is the mesh's: a name that closes the rest is the right one; not where something else is open beside it."""
+    off, bent = np.where(np.arange(18) == 12, 0.02, 0.0), AmplitudePitch(0.35, "velocity")
+    body, h, takes = misjudged(off, bent)
+    end = closed(h, (body,), takes, (AmplitudePitch,), BAND)
+    assert end.verdict == "explained" and [c.id for c in end.added] == ["amplitude-pitch"]
+    assert end.mesh_off == pytest.approx(0.02, rel=0.02)
+    assert end.after_db - end.floor_db > 0.5 * (end.before_db - end.floor_db)
+    body, h, takes = misjudged(off, bent, ContactTime(1e-3, 0.02))
+    end = closed(h, (body,), takes, (AmplitudePitch,), BAND)
+    assert end.verdict == "unexplained" and end.mesh_off == 0.0
 
 
 def test_nothing_is_put_anywhere_where_every_mode_has_its_line() -> None:

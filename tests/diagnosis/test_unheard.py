@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_body import plate, recorded, truth
+from made_body import plate, recorded, struck, truth
 
 from sonic_bullet.diagnosis.unheard import settled
 from sonic_bullet.effects.contact_time import ContactTime
@@ -56,6 +56,22 @@ def test_what_the_recordings_do_not_want_elsewhere_stays() -> None:
     (right,) = settled(replace(truth(ContactTime(1.2e-3, 0.016, 0.0, "half-sine")), correction={"plate": wrong.correction}), (wrong,))
     assert right.correction[2] == 0
     assert right.correction[-1] == 0
+
+
+@pytest.mark.parametrize(("reach", "outside"), [(1.004, True), (1.03, False)])
+def test_a_mode_at_the_bands_edge_that_nobody_hears_lies_outside(reach: float, outside: bool) -> None:
+    """The mesh has the highest mode inside the band by less than its error; one farther inside is not silenced so, whatever is not heard of it."""
+    model = plate()
+    shape = model.shape.copy()
+    shape[:, :, -1] = 0.0
+    heard = recorded(model=replace(model, shape=shape)).gathered
+    assert heard is not None
+    edge = float(model.freq_hz[-1]) * reach
+    wrong = replace(struck(model, heard.lines, heard.signals), band_hz=(50.0, edge))
+    assert wrong.line[-1] == -1
+    (right,) = settled(replace(truth(), correction={"plate": wrong.correction}), (wrong,))
+    assert (model.freq_hz[-1] * (1 + right.correction[-1]) > edge) == outside
+    assert (right.correction[:-1] == wrong.correction[:-1]).all()
 
 
 @pytest.mark.parametrize("slope", [0.0, 1.0, 2.0])
