@@ -11,7 +11,7 @@ import numpy as np
 
 from sonic_bullet.diagnosis.bodies import Struck
 from sonic_bullet.diagnosis.by_lines import misfit as decays
-from sonic_bullet.diagnosis.by_lines import numbers, of_decays
+from sonic_bullet.diagnosis.by_lines import numbers, of_decays, tells
 from sonic_bullet.diagnosis.candidate import SURE, Candidate, needed
 from sonic_bullet.diagnosis.exchange import ALIKE
 from sonic_bullet.diagnosis.judge import Judged, mean_db
@@ -27,7 +27,10 @@ SAME = 0.1  # of what a room's response leaves open: two that differ by less say
 
 def helps(c: Candidate, bodies: tuple[Struck, ...], takes: Sequence[Judged], now: float, told: float, floor: float, *, first: bool) -> bool:
     """Whether all strikes together gain, and lose nothing of what a room's response, told again without it, says as well (told): that takes up echoes, and
-    some of what stray modes leave, so what moves modes must gain on that. A filter or a slow law it takes up whole: then both say the same."""
+    some of what stray modes leave, so what moves modes must gain on that. A filter or a slow law it takes up whole: then both say the same.
+    Without a mesh nothing tells which of a room's lines are modes, and what changes decays would be told by all of them."""
+    if tells(c.hypothesis, c.effect) and any(body.family is None for body in bodies):
+        return False
     before, after = told if moves(c.hypothesis) else now, mean_db(takes, retold(c.hypothesis, bodies)) or 0.0
     return after < told + SAME * max(told - floor, 0.0) and before - after > HELPS * needed(max(before - floor, 0.0), first=first, certain=c.certain)
 

@@ -200,14 +200,14 @@ def _by_a_finer_mesh(
     start: Hypothesis, h: Hypothesis, added: Sequence[Candidate], before: float, bodies: tuple[Struck, ...], takes: Sequence[Judged], seed: int
 ) -> tuple[str, float]:
     """What would be known with upper modes where their lines are, and how far off the mesh has them; unexplained and 0 where that helps nobody."""
-    verdict, (far, off) = "unexplained", beyond(start, bodies)
+    verdict, (far, off) = "unexplained", beyond(start, bodies, takes)
     if not off:
         return verdict, 0.0
     ideal, floor = min(mean_db(takes, far) or 0.0, before), least_db(takes, far) or 0.0
     if ideal - floor < SUFFICES_DB and of_no_body(start, takes) < NO_BODY:
         verdict = "none"
     elif added:
-        both, _ = beyond(h, bodies)
+        both, _ = beyond(h, bodies, takes)
         verdict = _verdict(both, added, ideal, mean_db(takes, both) or 0.0, floor, bodies, takes, seed)
     return verdict, off if verdict != "unexplained" else 0.0
 

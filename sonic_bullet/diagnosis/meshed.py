@@ -2,6 +2,7 @@
 
     modes moved at random as much as the others are off           -> what that adds                    (of_the_mesh)
     lines of no mode, that have a mode's pattern and lie FAR from it at most, where waves are short:  the modes put there     -> what is left   (beyond)
+    modes FAR below the band's edge at most, of which nothing is recorded:                            the modes put outside   -> the same
 
 A correction is 1 % at most and part of the baseline; finite elements of a coarse mesh err by more in the upper modes, with h⁴ of quadratic ones [Hughes 2000, ch. 7].
 That is no effect and nothing that anybody would want named, so a verdict knows of it; what is played before and after does not.
@@ -25,17 +26,42 @@ from sonic_bullet.records import Array
 
 MESH = 1e-3  # of a frequency: what a good mesh gets wrong
 FAR = 0.03  # of a frequency: what a coarse one does, in modes of few elements a wavelength
+NEARER_DB = 0.05  # without a mode, that ought to be silent
 
 
-def beyond(h: Hypothesis, bodies: tuple[Struck, ...]) -> tuple[Hypothesis, float]:
-    """The hypothesis with modes that no line was told for where lines of their pattern are; and how far the farthest was put, relative: 0 where none was."""
-    moved, most = dict(h.correction or {}), 0.0
-    for body in bodies:
-        if body.gathered is None or body.family is None or len(body.fitted) < FEWEST or body.name not in moved:
-            continue
-        moved[body.name], off = _put(h, body, moved[body.name])
+def beyond(h: Hypothesis, bodies: tuple[Struck, ...], takes: Sequence[Judged]) -> tuple[Hypothesis, float]:
+    """The hypothesis with modes that no line was told for where lines of their pattern are, or outside the band; and how far the farthest was put, relative: 0 where none was."""
+    start, most = h, 0.0
+    mine = [b for b in bodies if b.gathered is not None and b.family is not None and len(b.fitted) >= FEWEST and b.name in (h.correction or {})]
+    for body in mine:
+        found, off = _put(h, body, (h.correction or {})[body.name])
+        if off:
+            h, most = replace(h, correction={**(h.correction or {}), body.name: found}), max(most, off)
+    h = refitted(h, bodies) if most else h
+    for body in mine:
+        h, off = _outside(start, h, body, takes)
         most = max(most, off)
-    return (refitted(replace(h, correction=moved), bodies), most) if most else (h, 0.0)
+    return h, most
+
+
+def _outside(start: Hypothesis, h: Hypothesis, body: Struck, takes: Sequence[Judged]) -> tuple[Hypothesis, float]:
+    """The hypothesis with a body's modes near the band's upper edge outside it, one frequency after another from the top, where strikes are nearer so."""
+    model, order = modes_of(h, body)
+    old, most, top = (start.correction or {})[body.name], 0.0, body.band_hz[1]
+    group = np.cumsum(np.diff(np.log(model.freq_hz), prepend=-np.inf) > TWINS)
+    free = (body.line[order] < 0) & (old[order] == (h.correction or {})[body.name][order])
+    near = free & (model.freq_hz <= top) & (model.freq_hz * (1 + FAR) > top)
+    now = mean_db(takes, h) if near.any() else None
+    for g in np.unique(group[near])[::-1]:
+        who = np.flatnonzero((group == g) & near)
+        step = float(top / model.freq_hz[who].min() * (1 + MESH) - 1)
+        other = (h.correction or {})[body.name].copy()
+        other[order[who]] = (1 + other[order[who]]) * (1 + step) - 1
+        silent = replace(h, correction={**(h.correction or {}), body.name: other})
+        far = mean_db(takes, silent)
+        if now is not None and far is not None and far < now - NEARER_DB:
+            h, now, most = silent, far, max(most, step)
+    return h, most
 
 
 def _put(h: Hypothesis, body: Struck, correction: Array) -> tuple[Array, float]:
