@@ -29,7 +29,7 @@ def helps(c: Candidate, bodies: tuple[Struck, ...], takes: Sequence[Judged], now
     """Whether all strikes together gain, and lose nothing of what a room's response, told again without it, says as well (told): that takes up echoes, and
     some of what stray modes leave, so what moves modes must gain on that. A filter or a slow law it takes up whole: then both say the same.
     Without a mesh nothing tells which of a room's lines are modes, and what changes decays would be told by all of them."""
-    if tells(c.hypothesis, c.effect) and any(body.family is None for body in bodies):
+    if tells(c.hypothesis, c.effect) and not _shaped(bodies):
         return False
     before, after = told if moves(c.hypothesis) else now, mean_db(takes, retold(c.hypothesis, bodies)) or 0.0
     return after < told + SAME * max(told - floor, 0.0) and before - after > HELPS * needed(max(before - floor, 0.0), first=first, certain=c.certain)
@@ -37,8 +37,12 @@ def helps(c: Candidate, bodies: tuple[Struck, ...], takes: Sequence[Judged], now
 
 def by_lines(c: Candidate, bodies: tuple[Struck, ...], takes: Sequence[Judged], told: float, floor: float) -> bool:
     """Whether lines left out speak for it (by_lines.py), and a room's response, told again beside it, says no less than without it (told). Without a mesh nothing tells which of a room's lines are modes."""
-    known = all(body.family is not None for body in bodies)
-    return known and c.lines > LINES and (mean_db(takes, retold(c.hypothesis, bodies)) or 0.0) < told + SAME * max(told - floor, 0.0)
+    return _shaped(bodies) and c.lines > LINES and (mean_db(takes, retold(c.hypothesis, bodies)) or 0.0) < told + SAME * max(told - floor, 0.0)
+
+
+def _shaped(bodies: tuple[Struck, ...]) -> bool:
+    """Whether every body has a mesh."""
+    return all(body.family is not None for body in bodies)
 
 
 def simplest(able: Sequence[Candidate], bodies: tuple[Struck, ...], evidence: Evidence) -> Candidate:
