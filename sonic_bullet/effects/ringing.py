@@ -44,20 +44,23 @@ def _level(out, start, sr, omega, decay, amplitude, bend, choke, power, length):
         c, d = choke[k], decay[k]
         share = c / (1.0 + c)
         size, angle = abs(amplitude[k]), np.angle(amplitude[k])
-        for n in range(first, last):
-            t = (n - start) / sr
-            if abs(share) < 1e-4:
-                level = np.exp(-d * t)
-                area = (1.0 - level * level) / (2.0 * d) if d > 0 else t
-            elif power == 2.0:
-                fall = np.exp(-2.0 * d * t)
-                level = np.exp(-d * t) / np.sqrt(1.0 + c - c * fall)
-                area = np.log(1.0 + c - c * fall) / (2.0 * d * c)
-            else:
-                u = np.exp(d * t)
-                level = 1.0 / ((1.0 + c) * u - c)
-                area = (np.log(u * (1.0 - share) / (u - share)) / share**2 - 1.0 / (share * (u - share)) + 1.0 / (share * (1.0 - share))) / (d * (1.0 + c) ** 2)
-            out[n] += size * level * np.cos(angle + omega[k] * (t + bend[k] * area))
+        for block in range(first, last, STEP):
+            fall, step = np.exp(-d * (block - start) / sr), np.exp(-d / sr)
+            for n in range(block, min(block + STEP, last)):
+                t = (n - start) / sr
+                if abs(share) < 1e-4:
+                    level = fall
+                    area = (1.0 - fall * fall) / (2.0 * d) if d > 0 else t
+                elif power == 2.0:
+                    rest = 1.0 + c - c * fall * fall
+                    level = fall / np.sqrt(rest)
+                    area = np.log(rest) / (2.0 * d * c)
+                else:
+                    u = 1.0 / fall
+                    level = 1.0 / ((1.0 + c) * u - c)
+                    area = (np.log(u * (1.0 - share) / (u - share)) / share**2 - 1.0 / (share * (u - share)) + 1.0 / (share * (1.0 - share))) / (d * (1.0 + c) ** 2)
+                out[n] += size * level * np.cos(angle + omega[k] * (t + bend[k] * area))
+                fall *= step
 
 
 def sounded(ring: Ring, blow: Blow, n: int, sr: int) -> Array:
