@@ -102,7 +102,7 @@ def windowed(y: Array, omega: float, length: int, at: Array) -> Array:
 
 
 @njit(cache=True, nogil=True)
-def _running(y, omega, theta):
+def _running(y: Array, omega: float, theta: float) -> Array:
     """Σ of y e^{−i(ω − aθ)n} before each sample (3, n + 1), a = −1, 0, 1."""
     out = np.zeros((3, len(y) + 1), np.complex128)
     for a in range(3):
