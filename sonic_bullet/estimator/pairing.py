@@ -30,7 +30,7 @@ CANDIDATES = 8
 MISSED = 0.3
 NEVER = 0.02
 HEAPED = 10.0  # times the energy of all lines: what none can hold that is not cancelled
-BRIEF = 25.0  # times the decay that holds half of the energy: clicks, filters' and rooms' first milliseconds are made of such lines, bodies' modes seldom
+BRIEF = 25.0  # times the decay that holds half of the energy, higher up times its loss factor: clicks, filters' and rooms' first milliseconds are made of such lines, bodies' modes seldom
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -110,7 +110,8 @@ def _rings(lines: Lines) -> Array:
         return np.ones(len(decay))
     order = np.argsort(decay)
     share = np.cumsum(energy[order])
-    typical = max(float(decay[order][np.searchsorted(share, share[-1] / 2)]), 1.0)
+    middle = order[np.searchsorted(share, share[-1] / 2)]
+    typical = max(float(decay[middle]), 1.0) * np.maximum(lines.freq_hz / lines.freq_hz[middle], 1.0)  # what loses as much a cycle ends sooner
     rings = np.clip(BRIEF * typical / np.maximum(decay, 1e-9), NEVER, 1.0)
     return np.asarray(np.where(piled, 0.0, np.where(decay > PINNED * FASTEST_PER_S, np.minimum(rings, NEVER), rings)))
 

@@ -16,6 +16,8 @@ from sonic_bullet.records import Array
 
 LEAST_MANY = 8  # lines of which a majority can be told
 HALF = 0.4549  # median of χ² with one degree of freedom
+NEARER = 0.5  # of what most lines are off by: a law through two of them that leaves less is where to start from
+CLOSE = 0.01  # relative: nearer need no start be
 SURE = 0.5  # a parameter whose logarithm is surer than this is told by the lines
 
 
@@ -80,8 +82,37 @@ def _scattered(lam: Array, decay: Array, spread: Array, size: Array) -> tuple[Ar
 
 
 def _by_most(lam: Array, decay: Array, spread: Array, size: Array, freedom: int) -> tuple[Array, Array]:
-    """Values and information that most of the lines agree on."""
-    tau, weight = 1.0, np.ones(len(lam))
+    """Values and information that most of the lines agree on; where a law through two of them leaves far less of that, those it leads to."""
+    best = _descended(lam, decay, spread, size, freedom, 1.0, np.ones(len(lam)))
+    law, off = _through_two(lam, decay, size)
+    if off > NEARER * _middle_off(best[0], lam, decay, size):
+        return best
+    tau = max(off, CLOSE)
+    residual = (decay - 0.5 * (law[0] + law[1] * lam)) / np.hypot(spread, tau * size)
+    return _descended(lam, decay, spread, size, freedom, tau, 1 / (1 + (residual / 3.0) ** 2))
+
+
+def _through_two(lam: Array, decay: Array, size: Array) -> tuple[Array, float]:
+    """Of the laws through two lines the one that is nearest to most of them, and how far that is: elemental sets [Rousseeuw 1984, sec. 5]."""
+    i, j = np.triu_indices(len(lam), 1)
+    apart = np.abs(np.log(lam[i] / lam[j])) > 0.05
+    i, j = i[apart], j[apart]
+    beta = 2 * (decay[i] - decay[j]) / (lam[i] - lam[j])
+    law = np.stack([2 * decay[i] - beta * lam[i], beta])
+    law = law[:, (law >= 0).all(axis=0)]
+    if not law.size:
+        return np.zeros(2), np.inf
+    off = np.array([_middle_off(one, lam, decay, size) for one in law.T])
+    return law[:, int(off.argmin())], float(off.min())
+
+
+def _middle_off(law: Array, lam: Array, decay: Array, size: Array) -> float:
+    """The median, over lines, of what a law (2,) is off by, relative to size (k,)."""
+    return float(np.median(np.abs(decay - 0.5 * (law[0] + law[1] * lam)) / size))
+
+
+def _descended(lam: Array, decay: Array, spread: Array, size: Array, freedom: int, tau: float, weight: Array) -> tuple[Array, Array]:
+    """Values and information, from a relative scatter τ and weights (k,) down to that of which half of the lines fall within their spreads."""
     value, information, _, weight, _ = _weighted(lam, decay, np.hypot(spread, tau * size), weight)
     while tau > 1e-5:
         tau *= 0.8
