@@ -58,7 +58,9 @@ def _level(out, start, sr, omega, decay, amplitude, bend, choke, power, length):
                 else:
                     u = 1.0 / fall
                     level = 1.0 / ((1.0 + c) * u - c)
-                    area = (np.log(u * (1.0 - share) / (u - share)) / share**2 - 1.0 / (share * (u - share)) + 1.0 / (share * (1.0 - share))) / (d * (1.0 + c) ** 2)
+                    area = (np.log(u * (1.0 - share) / (u - share)) / share**2 - 1.0 / (share * (u - share)) + 1.0 / (share * (1.0 - share))) / (
+                        d * (1.0 + c) ** 2
+                    )
                 out[n] += size * level * np.cos(angle + omega[k] * (t + bend[k] * area))
                 fall *= step
 

@@ -23,7 +23,7 @@ FRAME_S = 0.012
 DENSE, FRAMES = 24, 56  # frames one after another, then ever farther apart
 LEAST = 4  # frames: in less no tail shows
 NODES = 8  # of a window's quadrature
-DECAYS = np.geomspace(2.0, 600.0, 25)
+DECAYS = np.geomspace(0.5, 600.0, 31)
 SHARES = np.geomspace(1e-3, 4.0, 9)  # |A|² w² over what the first frame suggests |A|² to be
 SHIFTS = 21
 FAINT = 1e-25  # of the direct sound's power
@@ -31,6 +31,7 @@ PATTERN = 0.03  # of a line's strongest: what shapes are wrong by
 FASTEST = 300.0  # 1/s: what dies sooner is gone within a frame or two, and how soon is not told
 LIKE = 0.7  # squared cosine of amplitudes over the strikes and what the model says: a line less like its mode is the room's own
 OWNS = 8.0  # times longer than it is heard to ring: no line's own, though a tail makes several of one, which end sooner
+OUTLASTS = 0.5  # of the tail's decay: what falls slower has the recording to itself in the end
 SURE = 0.1  # of a decay and of an amplitude: the tail's early echoes are no noise
 
 
@@ -77,8 +78,16 @@ def told(h: Heard) -> Array:
 
 @lru_cache(maxsize=4)
 def through(h: Heard, delta: float) -> Read:
-    """All lines of an object at one δ; remembered, as evidence is asked for it more than once."""
-    return modes(h, np.array([delta]), np.arange(len(h.freq_hz)))
+    """All lines of an object at one δ; remembered, as evidence is asked for it more than once. What outlasts the tail is left as it was heard: late, it rings alone."""
+    r = modes(h, np.array([delta]), np.arange(len(h.freq_hz)))
+    sd = h.decay_sd_per_s / np.maximum(h.decay_per_s, 1e-9)
+    alone = (h.decay_per_s < OUTLASTS * delta) & (sd < SURE)
+    return replace(
+        r,
+        decay_per_s=np.where(alone, h.decay_per_s, r.decay_per_s),
+        ln_sd=np.where(alone, sd, r.ln_sd),
+        shift_hz=np.where(alone, 0.0, r.shift_hz),
+    )
 
 
 def dried(h: Heard, delta: float) -> Heard:

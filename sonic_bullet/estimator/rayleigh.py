@@ -17,7 +17,7 @@ from sonic_bullet.records import Array
 LEAST_MANY = 8  # lines of which a majority can be told
 HALF = 0.4549  # median of χ² with one degree of freedom
 NEARER = 0.5  # of what most lines are off by: a law through two of them that leaves less is where to start from
-CLOSE = 0.01  # relative: nearer need no start be
+MET = 0.01  # relative: a law that lines obey is met by most of them so well, or they obey another
 SURE = 0.5  # a parameter whose logarithm is surer than this is told by the lines
 
 
@@ -85,9 +85,9 @@ def _by_most(lam: Array, decay: Array, spread: Array, size: Array, freedom: int)
     """Values and information that most of the lines agree on; where a law through two of them leaves far less of that, those it leads to."""
     best = _descended(lam, decay, spread, size, freedom, 1.0, np.ones(len(lam)))
     law, off = _through_two(lam, decay, size)
-    if off > NEARER * _middle_off(best[0], lam, decay, size):
+    if off > MET or off > NEARER * _middle_off(best[0], lam, decay, size):
         return best
-    tau = max(off, CLOSE)
+    tau = MET
     residual = (decay - 0.5 * (law[0] + law[1] * lam)) / np.hypot(spread, tau * size)
     return _descended(lam, decay, spread, size, freedom, tau, 1 / (1 + (residual / 3.0) ** 2))
 
