@@ -81,7 +81,7 @@ def through(h: Heard, delta: float) -> Read:
     """All lines of an object at one δ; remembered, as evidence is asked for it more than once. What outlasts the tail is left as it was heard: late, it rings alone."""
     r = modes(h, np.array([delta]), np.arange(len(h.freq_hz)))
     sd = h.decay_sd_per_s / np.maximum(h.decay_per_s, 1e-9)
-    alone = (h.decay_per_s < OUTLASTS * delta) & (sd < SURE)
+    alone = (h.decay_per_s < OUTLASTS * delta) & (r.decay_per_s < delta) & (sd < SURE)  # by both: a faint line may beat with the tail's own
     return replace(
         r,
         decay_per_s=np.where(alone, h.decay_per_s, r.decay_per_s),

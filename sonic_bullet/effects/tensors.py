@@ -14,6 +14,7 @@ from sonic_bullet.records import ORTHOTROPIC, Array
 SYMMETRIES = {"isotropic": 2, "cubic": 3, "hexagonal-x": 5, "hexagonal-y": 5, "hexagonal-z": 5, "orthorhombic": 9}
 NAMES = ("youngs_x", "youngs_y", "youngs_z", "n_yz", "n_xz", "n_xy", "shear_yz", "shear_xz", "shear_xy")
 RATIOS = (0.04, 0.1, 0.25, 0.6, 1.5, 4.0, 10.0)
+MILD = (0.16, 0.4, 1.0, 2.5, 6.0)
 ZENER = (0.4, 0.5, 0.62, 0.77, 0.9, 1.0, 1.15, 1.35, 1.6, 2.0, 2.5)
 POISSON = (-0.1, 0.0, 0.1)  # beside the guess'
 
@@ -87,11 +88,11 @@ def cubes(start: Array) -> list[Array]:
     return found
 
 
-def bricks(start: Array) -> list[Array]:
+def bricks(start: Array, ratios: tuple[float, ...] = RATIOS) -> list[Array]:
     """Orthorhombic ones: E along y and z over that along x, and G as goes with them or softer."""
     found = []
-    for y in RATIOS:
-        for z in RATIOS:
+    for y in ratios:
+        for z in ratios:
             for soft in (1.0, 0.6):
                 e = np.log(np.array([1.0, y, z]))
                 p = np.array(start)
