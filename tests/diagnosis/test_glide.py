@@ -21,7 +21,7 @@ from sonic_bullet.effects import amplitude_pitch
 from sonic_bullet.effects.amplitude_pitch import FAR as FARTHER
 from sonic_bullet.effects.amplitude_pitch import NEAR, AmplitudePitch, _moments, _slopes
 from sonic_bullet.effects.contact_time import ContactTime
-from sonic_bullet.effects.envelope import Envelopes, alone, envelopes
+from sonic_bullet.effects.envelope import Envelopes, alone, envelopes, windowed
 from sonic_bullet.effects.glided import bend_beside
 from sonic_bullet.effects.room import Room
 from sonic_bullet.effects.values import Heard
@@ -250,3 +250,16 @@ def test_a_bend_is_told_by_the_levels_that_the_pulse_leaves() -> None:
     found = AmplitudePitch.propose(told)
     assert found is not None and found.measure == "velocity"
     assert found.bend == pytest.approx(0.7, rel=0.1)
+
+
+@pytest.mark.parametrize("length", [5, 401, 1_999])
+def test_a_mode_shifted_to_zero_is_what_the_window_says(length: int) -> None:
+    """Running sums of three exponentials are the window's sum, sample by sample, at both ends too, whatever came before."""
+    rng = np.random.default_rng(length)
+    n, omega = 6_000, 0.37
+    y = rng.standard_normal(n) * np.exp(-np.arange(n) / 300.0)
+    at = np.array([0, 1, length // 2, 1_500, 3_300, n - 2, n - 1])
+    window = np.hanning(length + 2)[1:-1]
+    padded = np.concatenate([np.zeros(length), y * np.exp(-1j * omega * np.arange(n)), np.zeros(length)])
+    direct = np.array([2 * (padded[length + m - length // 2 : length + m + length // 2 + 1] * window).sum() / window.sum() for m in at])
+    assert np.allclose(windowed(y, omega, length, at), direct, rtol=1e-6, atol=1e-12 * np.abs(direct).max())

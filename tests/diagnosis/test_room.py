@@ -53,6 +53,22 @@ def test_modes_read_through_a_room() -> None:
     assert tails.dried(dry, 5.0) is dry  # what is dry stays as it is
 
 
+def test_what_outlasts_a_room_is_left_as_it_was_heard() -> None:
+    """By lines and by what they are read to be: a faint line of a mode that dies sooner may beat with the tail, and be heard to ring on."""
+    heard = heard_of(truth(), recorded(Room(0.15, 0.3, 4), seconds=1.2))
+    own, delta = 0.5 * (ALPHA + BETA * heard.omega**2), RT60 / 0.15
+    slow = own < 0.4 * delta
+    assert slow.sum() >= 3
+    dry = tails.dried(heard, delta)
+    assert np.array_equal(dry.decay_per_s[slow], heard.decay_per_s[slow])
+    assert np.abs(np.log(dry.decay_per_s / own))[slow].max() < 0.05
+    assert np.array_equal(dry.freq_hz[slow], heard.freq_hz[slow])
+    fast = recorded(Room(0.9, 0.9, 4), seconds=1.2)
+    beats = heard_of(truth(), fast)
+    beats = replace(beats, decay_per_s=np.full(len(beats.freq_hz), 2.0), decay_sd_per_s=np.full(len(beats.freq_hz), 0.02))
+    assert (tails.dried(beats, RT60 / 0.9).decay_per_s > 4.0).all()
+
+
 def test_what_is_gone_at_once_or_is_not_like_its_mode_tells_no_decay() -> None:
     """Of a lossy body in a room most lines are the room's own: they would bend the material's law to the room's."""
     heard = heard_of(truth(), recorded(Room(0.9, 0.9, 4), seconds=1.2))

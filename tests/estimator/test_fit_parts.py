@@ -7,7 +7,7 @@ import pytest
 
 from sonic_bullet.estimator.distance import log_spectral_db, noise_floor_db, white, with_noise
 from sonic_bullet.estimator.lines import Lines, joint_lines
-from sonic_bullet.estimator.pairing import heaped
+from sonic_bullet.estimator.pairing import BRIEF, _rings, heaped
 from sonic_bullet.estimator.picture import circle
 from sonic_bullet.estimator.predict import damped_sum
 from sonic_bullet.estimator.rayleigh import rayleigh
@@ -62,6 +62,32 @@ def test_what_a_fixture_has_left_of_decays_is_as_sure_as_the_decays() -> None:
     assert found.beta_s == pytest.approx(1e-8, rel=0.1)
     pulled = rayleigh(lam, left, sd, (20.0, 1e-8))
     assert abs(pulled.alpha_per_s / 20.0 - 1) > 3 * abs(found.alpha_per_s / 20.0 - 1), "a hundredth that is left is no hundredfold certainty"
+
+
+def test_a_law_that_most_lines_obey_is_told_whatever_the_others_do() -> None:
+    """Three of eleven fall far too slowly: the law that is nearest to all of them, by a third, is no one's. Where no law is anyone's, all lines tell one."""
+    lam = (2 * np.pi * np.array([1346, 3676, 4352, 5133, 7108, 8000, 9200, 10885, 11542, 15693, 16889.0])) ** 2
+    decay = 0.5 * (1.45 + 1.34e-8 * lam) * (1 + 0.004 * np.array([1, -1, 1, 1, -1, -1, 1, -1, 0, 0, 0]))
+    decay[8:] = [22.0, 27.0, 23.0]
+    sd = 0.02 * decay
+    found = rayleigh(lam, decay, sd, (1.0, 1e-8))
+    assert (found.alpha_per_s, found.beta_s) == (pytest.approx(1.45, rel=0.03), pytest.approx(1.34e-8, rel=0.02))
+    hysteretic = 0.002 * np.sqrt(lam)
+    all_of_them = rayleigh(lam, hysteretic, 0.02 * hysteretic, (1.0, 1e-8))
+    assert np.abs(0.5 * (all_of_them.alpha_per_s + all_of_them.beta_s * lam) / hysteretic - 1).max() < 0.5
+
+
+def test_what_loses_as_much_a_cycle_is_no_click() -> None:
+    """A bar's low mode rings for seconds: at ten times its frequency a mode with its loss factor may end ten times sooner, a click a hundred times."""
+    freq = np.array([1300.0, 13000.0, 13100.0])
+    none = np.zeros(3)
+
+    def worth(decay: float) -> list[float]:
+        lines = Lines(freq, np.array([1.2, decay, 1.2]), np.ones((2, 3)) + 0j, none, none, np.zeros((2, 3)), np.ones(2), np.array([1.0, 0.01, 0.01]), True)
+        return _rings(lines).tolist()
+
+    assert worth(1.2 * BRIEF * 9) == [1.0, 1.0, 1.0]
+    assert worth(1.2 * BRIEF * 20)[1] == pytest.approx(0.5)
 
 
 def test_distance_of_a_gain_and_of_nothing() -> None:
