@@ -31,13 +31,13 @@ def helps(c: Candidate, bodies: tuple[Struck, ...], takes: Sequence[Judged], now
     Without a mesh nothing tells which of a room's lines are modes, and what changes decays would be told by all of them."""
     if tells(c.hypothesis, c.effect) and not _shaped(bodies):
         return False
-    before, after = told if moves(c.hypothesis) else now, mean_db(takes, retold(c.hypothesis, bodies, fully=True)) or 0.0
+    before, after = told if moves(c.hypothesis) else now, mean_db(takes, retold(c.hypothesis, bodies)) or 0.0
     return after < told + SAME * max(told - floor, 0.0) and before - after > HELPS * needed(max(before - floor, 0.0), first=first, certain=c.certain)
 
 
 def by_lines(c: Candidate, bodies: tuple[Struck, ...], takes: Sequence[Judged], told: float, floor: float) -> bool:
     """Whether lines left out speak for it (by_lines.py), and a room's response, told again beside it, says no less than without it (told). Without a mesh nothing tells which of a room's lines are modes."""
-    return _shaped(bodies) and c.lines > LINES and (mean_db(takes, retold(c.hypothesis, bodies, fully=True)) or 0.0) < told + SAME * max(told - floor, 0.0)
+    return _shaped(bodies) and c.lines > LINES and (mean_db(takes, retold(c.hypothesis, bodies)) or 0.0) < told + SAME * max(told - floor, 0.0)
 
 
 def _shaped(bodies: tuple[Struck, ...]) -> bool:

@@ -117,7 +117,7 @@ def _one_by_one(
         if now - floor < (LEAST_DB if added else FAINT_DB):
             break  # so little is what a mesh gets wrong
         evidence = evidence_of(h, bodies, band_hz, seed=seed)
-        full = retold(h, bodies, fully=True)  # a room's response is the lines' so far, which leaves open more than there is
+        full = retold(h, bodies)  # a room's response is the lines' so far, which leaves open more than there is
         told = now if full is h else mean_db(takes, full) or 0.0
         costly = told - floor > OPEN * (before - floor)
         found = trials(h, bodies, takes, evidence, effects, seed=seed + turn, say=say, costly=costly)

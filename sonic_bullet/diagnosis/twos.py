@@ -123,7 +123,7 @@ def _stood(
     added: list[Candidate] = []
     for effect in h.effects[::-1]:
         rest = refitted(with_effects(h, tuple(e for e in h.effects if e is not effect), bodies), bodies)
-        without = mean_db(takes, retold(rest, bodies, fully=True)) or 0.0  # with a response of its own, too
+        without = mean_db(takes, retold(rest, bodies)) or 0.0  # with a response of its own, too
         told = replace(evidence_of(rest, bodies, band_hz, seed=seed), known=effect)
         now, least = mean_db(takes, rest) or 0.0, least_db(takes, rest) or 0.0
         stood = trials(rest, bodies, takes, told, [type(effect)], seed=seed, say=say)
