@@ -1,7 +1,7 @@
 """Audio and npz in and out: what reaches a disk is whole, finite and said.
 
-    samples (channels, n) Pa -> scale -> check -> clip and count -> NAME.partial.EXT -> fsync -> NAME.EXT
-    ContactLog | ModalModel  -> arrays + one JSON entry, no pickle -> NAME.EXT.*.partial -> fsync -> NAME.EXT
+    samples (channels, n) Pa -> scale -> check -> clip and count -> partial file -> read back -> fsync -> NAME.EXT
+    ContactLog | ModalModel  -> arrays + one JSON entry, no pickle -> partial file -> fsync -> NAME.EXT
 
 `audio` writes sound, `logs` writes contact logs and modal models (their format is described there), `container` is the npz
 beneath them, `atomic` the replacing.

@@ -7,13 +7,16 @@
 Float files hold y as it is, above full scale too. Every other format holds |y| ≤ 1: what is beyond is clipped and counted in
 `AudioReport.clipped`. float32 subnormals are flushed to zero (decaying tails are full of them, and they slow every player), NaN and
 infinities are refused. The same samples give the same bytes, except in OGG, whose streams carry a random serial number.
+
+libsndfile says neither why a write failed nor, when it closes, whether one did: before a file gets its name it is read to its end and its
+rate, channels and frames are compared with what was written; where they differ the disk itself is asked why.
 """
 
 from __future__ import annotations
 
 import math
 import os
-import secrets
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -22,7 +25,8 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet.errors import AudioError, FileError, SonicBulletError
-from sonic_bullet.files.atomic import cannot, check_output, sync
+from sonic_bullet.files.atomic import cannot, check_output, kept_name
+from sonic_bullet.partial_file import PartialFile
 from sonic_bullet.records import Array
 
 FORMATS = {
@@ -105,8 +109,9 @@ def check_audio_output(path: str | os.PathLike[str], subtype: str | None = None)
 class AudioWriter:
     """An audio file that grows block by block; a context manager.
 
-    `write` takes (channels, n) pascals, into NAME.<random>.partial.EXT; leaving the block renames that to NAME.EXT. Leaving it with an
-    error, or with Ctrl-C, closes what was written as a valid file NAME.partial.EXT and says so in the error; NAME.EXT is untouched.
+    `write` takes (channels, n) pascals, into a partial file; leaving the block gives that the name NAME.EXT, once it has been read back.
+    Leaving it with an error, or with Ctrl-C, keeps what was written as a valid file NAME.partial.EXT and says so in the error; NAME.EXT is
+    untouched.
     gain_per_pa: file units for one pascal. expected_frames: chooses RF64 over WAV where the file will pass 4 GiB.
     """
 
@@ -125,8 +130,6 @@ class AudioWriter:
 
         self.path = os.fspath(path)
         self.target, self.format, self.subtype = check_audio_output(path, subtype)
-        self.temporary = self.target.with_name(f"{self.target.stem}.{secrets.token_hex(4)}.partial{self.target.suffix}")
-        self.partial = self.target.with_name(f"{self.target.stem}.partial{self.target.suffix}")
         self.sr, self.channels, self.gain_per_pa = check_sr(sr), channels, float(gain_per_pa)
         if not (math.isfinite(self.gain_per_pa) and self.gain_per_pa > 0):
             raise AudioError(f"a gain of {gain_per_pa} per Pa", "give a full scale above zero")
@@ -136,12 +139,16 @@ class AudioWriter:
         self.frames = self.clipped = self.over = 0
         self.peak_pa = self.energy_pa2 = 0.0
         try:
-            self.temporary.touch()  # libsndfile does not say why it could not
-            self.file: Any = soundfile.SoundFile(self.temporary, "w", self.sr, channels, self.subtype, format=self.format)
+            self.partial = PartialFile(self.target.parent)
         except OSError as error:
             raise cannot("write", path, error) from error
+        try:
+            self.file: Any = soundfile.SoundFile(self.partial.fd, "w", self.sr, channels, self.subtype, format=self.format, closefd=False)
         except soundfile.LibsndfileError as error:
-            self.temporary.unlink(missing_ok=True)
+            reason = self.partial.refusal()
+            self.partial.close()
+            if reason is not None:
+                raise cannot("write", path, reason) from error
             raise AudioError(f"cannot write {channels} channels at {self.sr} Hz to {path}: {error.error_string}", "write .wav, or fewer channels") from error
 
     @property
@@ -177,8 +184,7 @@ class AudioWriter:
         try:
             self.file.write(scaled.T)
         except (soundfile.LibsndfileError, AssertionError) as error:  # soundfile asserts that all was written: a full disk
-            reason = getattr(error, "error_string", "the disk took only a part of it")
-            raise FileError(f"cannot write {self.path}: {reason}", "free space or choose another place") from error
+            raise self._refused() from error
         self.frames += block.shape[1]
         if block.size:
             self.peak_pa = max(self.peak_pa, float(np.abs(block).max()))
@@ -195,39 +201,70 @@ class AudioWriter:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        import soundfile
-
         try:
-            self.file.close()
+            with suppress(RuntimeError):  # LibsndfileError: what became of the file is seen when it is read back
+                self.file.close()
             if error is None:
-                _forget_time(self.temporary)
-                sync(self.temporary)
-                os.replace(self.temporary, self.target)
-            elif self.frames:
-                os.replace(self.temporary, self.partial)
-        except (OSError, soundfile.LibsndfileError) as failure:
-            reason = failure if isinstance(failure, OSError) else OSError(str(failure))
-            raise cannot("write", self.path, reason) from error or failure
+                self._name_it()
+                return
+            kept = self._keep()
+        except OSError as failure:
+            raise cannot("write", self.path, failure) from error or failure
         finally:
-            self.temporary.unlink(missing_ok=True)
-        if error is None or self.frames == 0:
+            self.partial.close()
+        if not kept:
             return
-        saved = f"the first {self.frames / self.sr:.3f} s are in {self.partial}"
+        saved = f"the first {kept / self.sr:.3f} s are in {kept_name(self.target)}"
         if isinstance(error, SonicBulletError):
             raise type(error)(error.what, f"{error.remedy}; {saved}" if error.remedy else saved) from error
         if isinstance(error, KeyboardInterrupt):
             raise KeyboardInterrupt(f"stopped; {saved}") from error
         error.add_note(saved)
 
+    def _name_it(self) -> None:
+        """Give the whole file its name. Raises FileError, OSError."""
+        if self._read_back() != self.frames:
+            raise self._refused()
+        _forget_time(self.partial.fd)
+        self.partial.replace(self.target)
 
-def _forget_time(path: Path) -> None:
+    def _keep(self) -> int:
+        """Keep what can be read of an unfinished file beside its target; how many frames that is. Raises OSError."""
+        frames = self._read_back() if self.frames else 0
+        if frames:
+            self.partial.replace(kept_name(self.target))
+        return frames
+
+    def _refused(self) -> FileError:
+        """Why the file is not what was written to it, by what the disk says."""
+        reason = self.partial.refusal() or OSError("the disk took only a part of it")
+        return cannot("write", self.path, reason)
+
+    def _read_back(self) -> int:
+        """How many frames the closed file holds, decoded to its end; -1 where it is of another rate or number of channels, 0 where it cannot be read."""
+        import soundfile
+
+        os.lseek(self.partial.fd, 0, os.SEEK_SET)
+        frames = 0
+        try:
+            with soundfile.SoundFile(self.partial.fd, closefd=False) as file:
+                if (file.samplerate, file.channels) != (self.sr, self.channels):
+                    return -1
+                while count := len(file.read(BLOCK_FRAMES, dtype="float32", always_2d=True)):
+                    frames += count
+        except (soundfile.LibsndfileError, AssertionError):
+            pass
+        return frames
+
+
+def _forget_time(fd: int) -> None:
     """Zero the time of day that libsndfile puts into the PEAK chunk (id, size, version, time) of float files: equal sound, equal bytes."""
-    with path.open("rb+") as file:
-        head = file.read(512)
-        found = head.split(b"data")[0].split(b"SSND")[0].find(b"PEAK")
-        if found >= 0:
-            file.seek(found + 12)
-            file.write(bytes(4))
+    os.lseek(fd, 0, os.SEEK_SET)
+    head = os.read(fd, 512)
+    found = head.split(b"data")[0].split(b"SSND")[0].find(b"PEAK")
+    if found >= 0:
+        os.lseek(fd, found + 12, os.SEEK_SET)
+        os.write(fd, bytes(4))
 
 
 def write_audio(

@@ -14,8 +14,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from sonic_bullet.compiled import njit
 from sonic_bullet.records import Air, Array, Body, Microphone, ModalSum, Sensor, Vibrometer
 from sonic_bullet.render.radiated import radiation_of
 from sonic_bullet.surface_index import SurfaceIndex, nearest, surface_index
@@ -152,7 +152,7 @@ def uplift(sounder: Sounder, face: Array, barycentric: Array, force: Array) -> A
     return np.asarray(participation(sounder.shape, sounder.body.model.face, face, barycentric, np.ascontiguousarray(force)))
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(nogil=True)
 def participation(shape: Array, face: Array, at_face: Array, barycentric: Array, force: Array) -> Array:  # pragma: no cover - compiled
     """Σ over contacts of the shapes, linear in the triangle, times the force: (v, 3, m), (f, 3), (k,), (k, 3), (k, 3) -> (m,)."""
     modes = shape.shape[2]
