@@ -57,7 +57,7 @@ def writers(folder: Path) -> dict[str, Callable[[Path], None]]:
     sound = np.random.default_rng(0).normal(0, 0.1, (2, FRAMES))
     ears = (Microphone(np.array([0.0, -1.0, 0.5])),)
     step = Step(0.01, np.zeros((0, 3)), np.zeros((0, 4)), np.zeros(0, bool), Contacts.none())
-    log = ContactLog((), (step,) * 50, ears, SR)
+    log = ContactLog((), (step,) * 50, ears, SR, 0)
     page = np.random.default_rng(1).integers(32, 127, 300_000).astype(np.uint8).tobytes()
 
     def api(write: Callable[[Path], object]) -> Callable[[Path], None]:

@@ -13,8 +13,10 @@ from __future__ import annotations
 
 import ast
 import importlib.util
+import os
 import traceback
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import ModuleType
@@ -25,7 +27,7 @@ from sonic_bullet.errors import SceneError, SonicBulletError, interrupts
 from sonic_bullet.listener import Finding, diagnose_world, direct_client, disconnect, links_with_shapes, run_script
 from sonic_bullet.records import Array
 from sonic_bullet.render import render_log
-from sonic_bullet.session import Listener, as_sensors, attach
+from sonic_bullet.session import Listener, as_material, as_sensors, attach
 
 DEFAULT_SECONDS = 4.0
 DEFAULT_MATERIAL = "plastic"
@@ -108,11 +110,17 @@ class _Stage:
     residual: bool = True
     listener: Listener | None = None
     client: Any = None
+    folder: str | None = None
 
     def __enter__(self) -> _Stage:
+        with suppress(OSError):
+            self.folder = os.getcwd()
         return self
 
     def __exit__(self, *_: object) -> None:
+        if self.folder is not None:  # a scene may change it; what follows means the one that it began in
+            with suppress(OSError):
+                os.chdir(self.folder)
         if self.listener is not None:
             self.listener.detach()
         if self.client is not None:
@@ -222,6 +230,7 @@ def _run_plain(stage: _Stage, seconds: float | None, progress: Progress | None, 
             )
         return notes
     material = stage.material or DEFAULT_MATERIAL
+    made = as_material(material)  # a preset file is read now: the script may change the folder that its path starts from
     places = stage.microphones if stage.microphones is not None else (0.0, -1.0, 0.5)
     stage.microphones = None
     known: set[tuple[int, int]] = set()
@@ -232,7 +241,7 @@ def _run_plain(stage: _Stage, seconds: float | None, progress: Progress | None, 
         for body, link in links_with_shapes(stage.listener.world):
             if (body, link) not in known:
                 known.add((body, link))
-                stage.listener.add(body, link, material=material, progress=say)
+                stage.listener.add(body, link, material=made, progress=say)
 
     def after(_: int) -> None:
         stage.need_listener().step()

@@ -6,10 +6,11 @@ import os
 from pathlib import Path
 from typing import Any
 
-from sonic_bullet.cli.output import clean_stdout, status, table, write_json
+from sonic_bullet.cli.output import clean_stdout, folder_place, places, status, table, write_json
 from sonic_bullet.errors import FileError
-from sonic_bullet.files import check_output
 from sonic_bullet.files.cases import read_case
+
+SIDES = ("before", "after")  # the folders of --predict
 
 
 def run_diagnose(source: str, *, output: str | None, json_to: str | None, predict: str | None, report: str | None, seed: int) -> None:
@@ -18,17 +19,16 @@ def run_diagnose(source: str, *, output: str | None, json_to: str | None, predic
         raise FileError(f"cannot write {output}: presets are JSON files", "end the name with .json")
     if report is not None and not report.endswith((".html", ".htm")):
         raise FileError(f"cannot write {report}: a report is a page", "end the name with .html")
-    for place in (output, report, json_to if json_to != "-" else None):
-        if place is not None:
-            check_output(place)
+    output, report, json_to = places(output, report, json_to)
+    folder = None if predict is None else folder_place(predict, *SIDES)
     case = read_case(source)
     with clean_stdout(json_to) as say:
         from sonic_bullet.diagnosis.diagnose import described, diagnose
 
         with status(source) as progress:
             found = diagnose(case, seed=seed, progress=progress)
-            if predict is not None:
-                written = _predicted(found, predict)
+            if folder is not None:
+                written = _predicted(found, folder)
             if report is not None:
                 from sonic_bullet.diagnosis.report import write_report
 
@@ -51,7 +51,7 @@ def _predicted(found: Any, folder: str) -> int:
     from sonic_bullet.files import write_audio
 
     made = predictions(found)
-    for side in ("before", "after"):
+    for side in SIDES:
         try:
             os.makedirs(Path(folder) / side, exist_ok=True)
         except OSError as error:

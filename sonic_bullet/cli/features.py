@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.cli.output import clean_stdout, status, table, write_json
+from sonic_bullet.cli.output import clean_stdout, places, status, table, write_json
 from sonic_bullet.errors import FileError
 from sonic_bullet.estimator.values import Features
-from sonic_bullet.files import check_output, read_audio
+from sonic_bullet.files import read_audio
 from sonic_bullet.records import Array
 
 
@@ -19,9 +19,7 @@ def run_features(recording: str, *, onset_s: float | None, band: tuple[float, ..
     """The `features` command. Raises SonicBulletError."""
     if picture is not None and not picture.endswith((".png", ".pdf", ".svg")):
         raise FileError(f"cannot write {picture}: pictures are .png, .pdf or .svg", "end the name with one of them")
-    for place in (picture, json_to if json_to != "-" else None):
-        if place is not None:
-            check_output(place)
+    picture, json_to = places(picture, json_to)
     sound, sr = read_audio(recording)
     channel = int(np.argmax((sound**2).sum(axis=1)))
     with clean_stdout(json_to) as say:

@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.cli.output import clean_stdout, status, table, write_json
+from sonic_bullet.cli.output import clean_stdout, places, status, table, write_json
 from sonic_bullet.errors import FileError
-from sonic_bullet.files import check_output
 from sonic_bullet.files.cases import Case, CaseObject, CaseRecording, read_case
 from sonic_bullet.records import Array
 
@@ -23,9 +22,7 @@ def run_fit(source: str, *, output: str, picture: str | None, json_to: str | Non
         raise FileError(f"cannot write {output}: presets are JSON files", "end the name with .json")
     if picture is not None and not picture.endswith((".png", ".pdf", ".svg")):
         raise FileError(f"cannot write {picture}: pictures are .png, .pdf or .svg", "end the name with one of them")
-    for place in (output, picture, json_to if json_to != "-" else None):
-        if place is not None:
-            check_output(place)
+    to, picture, json_to = places(output, picture, json_to)
     case = as_case(source, one)
     with clean_stdout(json_to) as say:
         from sonic_bullet.estimator.fit import fit_case
@@ -34,7 +31,7 @@ def run_fit(source: str, *, output: str, picture: str | None, json_to: str | Non
 
         with status(source) as progress:
             found = fit_case(case, progress=progress)
-        write_preset(output, preset_of(found))
+        write_preset(str(to), preset_of(found))
         if picture is not None:
             from sonic_bullet.estimator.picture import write_fit_picture
 

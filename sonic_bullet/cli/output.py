@@ -11,8 +11,11 @@ import json
 import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, redirect_stdout
+from contextlib import contextmanager, redirect_stdout, suppress
+from pathlib import Path
 from typing import Any
+
+from sonic_bullet.errors import FileError
 
 
 @contextmanager
@@ -44,6 +47,41 @@ def quiet_stderr() -> Iterator[None]:
         os.dup2(kept, 2)
         os.close(kept)
         os.close(nowhere)
+
+
+def places(*asked: str | None) -> tuple[str | None, ...]:
+    """Each output's absolute path, resolved once and tried before anything runs: what is run may change the folder.
+
+    None (not asked for) and "-" (stdout) stay as they are. Raises FileError where one cannot be written or two are one file.
+    """
+    from sonic_bullet.files import check_output
+
+    real = [check_output(place) for place in asked if place is not None and place != "-"]
+    if len(set(real)) < len(real):
+        raise FileError("two outputs have one name", "give each its own")
+    return tuple(place if place is None or place == "-" else os.path.join(os.getcwd(), place) for place in asked)
+
+
+def folder_place(asked: str, *inside: str) -> str:
+    """The absolute path of a folder for outputs, tried: it and the folders ``inside`` can be made and take files. Nothing of that is left.
+
+    Raises FileError.
+    """
+    from sonic_bullet.files import cannot, check_output
+
+    folder = Path(os.path.join(os.getcwd(), asked))
+    missing = [place for place in (*(folder / name for name in inside), folder, *folder.parents) if not os.path.lexists(place)]
+    try:
+        for name in inside:
+            (folder / name).mkdir(parents=True, exist_ok=True)
+            check_output(folder / name / "sound.wav")
+    except OSError as error:
+        raise cannot("make the folder", os.path.join(asked, name), error) from error
+    finally:
+        for place in missing:
+            with suppress(OSError):
+                place.rmdir()
+    return str(folder)
 
 
 def write_json(json_to: str | None, value: Any) -> None:

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet.cli.fit import as_case
-from sonic_bullet.cli.output import clean_stdout, status, write_json
+from sonic_bullet.cli.output import clean_stdout, places, status, write_json
 from sonic_bullet.errors import AudioError, FileError
-from sonic_bullet.files import check_output, read_audio
+from sonic_bullet.files import read_audio
 from sonic_bullet.records import Residual
 
 UNSHAPED = ("strike", "direction", "impulse", "scale", "sensor", "sensor_at", "sensor_direction", "fixed")
@@ -22,16 +22,14 @@ def run_residual(source: str, *, output: str, picture: str | None, json_to: str 
         raise FileError(f"cannot write {output}: presets are JSON files", "end the name with .json")
     if picture is not None and not picture.endswith((".png", ".pdf", ".svg")):
         raise FileError(f"cannot write {picture}: pictures are .png, .pdf or .svg", "end the name with one of them")
-    for place in (output, picture, json_to if json_to != "-" else None):
-        if place is not None:
-            check_output(place)
+    to, picture, json_to = places(output, picture, json_to)
     with clean_stdout(json_to) as say:
         from sonic_bullet.presets import write_preset
 
         whole = Path(source).is_dir() or Path(source).name == "case.json" or one["mesh"] is not None
         with status(source) as progress:
             preset, strikes = (_shaped if whole else _unshaped)(source, one, progress)
-        write_preset(output, preset)
+        write_preset(str(to), preset)
         if picture is not None:
             from sonic_bullet.estimator.residual_picture import write_residual_picture
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sonic_bullet.cli.output import clean_stdout, progress_bar, quiet_stderr, status, write_json
+from sonic_bullet.cli.output import clean_stdout, places, progress_bar, quiet_stderr, status, write_json
 from sonic_bullet.errors import AudioError, FileError, SceneError, SonicBulletError
-from sonic_bullet.files import AudioReport, check_audio_output, check_output, check_sr, read_log, write_audio, write_log
+from sonic_bullet.files import AudioReport, check_audio_output, check_sr, kept_name, read_log, write_audio, write_log
 
 if TYPE_CHECKING:
     from sonic_bullet.contacts import ContactLog
@@ -39,18 +39,18 @@ def run_render(
     """The `render` command. Raises SonicBulletError, and KeyboardInterrupt whose text names the file with what was rendered so far."""
     rate = None if sr is None else check_sr(sr)
     _check_request(scene, seconds, peak_dbfs, lufs, material)
-    _check_places(output, contacts, picture, json_to)
+    to, contacts, picture, json_to = _check_places(output, contacts, picture, json_to)
     with clean_stdout(json_to) as say:
         try:
             with progress_bar(Path(scene).name) as (progress, tell):
                 wish = _Wish(seconds, rate, microphones, seed, material, residual, progress, tell)
                 result: RenderResult | _Replay = _replayed(scene, wish) if _is_log(scene) else _simulated(scene, wish)
         except (SonicBulletError, KeyboardInterrupt) as error:
-            raise _with_partial(error, output, peak_dbfs, lufs) from error
-        if contacts:
+            raise _with_partial(error, to, output, peak_dbfs, lufs) from error
+        if contacts is not None:
             write_log(contacts, result.log)
-        report = write_audio(output, result.samples, result.sr, peak_dbfs=peak_dbfs, lufs=lufs)
-        if picture:
+        report = replace(write_audio(to, result.samples, result.sr, peak_dbfs=peak_dbfs, lufs=lufs), path=output)
+        if picture is not None:
             from sonic_bullet.picture import render_picture
 
             render_picture(picture, result.samples, result.sr, result.log, Path(scene).name)
@@ -63,8 +63,7 @@ def run_render(
 
 def run_doctor(scene: str, seconds: float, json_to: str | None) -> None:
     """The `doctor` command. Raises SonicBulletError."""
-    if json_to not in (None, "-"):
-        check_output(str(json_to))
+    (json_to,) = places(json_to)
     if _is_log(scene):
         raise SceneError(f"{scene} is a contact log, which has no settings", "give the scene it came from")
     with clean_stdout(json_to) as say:
@@ -102,21 +101,17 @@ def _check_request(scene: str, seconds: float | None, peak_dbfs: float | None, l
         load_material(material)
 
 
-def _check_places(output: str, contacts: str | None, picture: str | None, json_to: str | None) -> None:
-    """All outputs can be written, and no two are one file: before anything is simulated."""
-    places = [check_audio_output(output)[0]]
-    if contacts:
-        if not contacts.endswith(".npz"):
-            raise FileError(f"cannot write {contacts}: contact logs are npz files", "end the name with .npz")
-        places.append(check_output(contacts))
-    if picture:
+def _check_places(output: str, contacts: str | None, picture: str | None, json_to: str | None) -> tuple[str, str | None, str | None, str | None]:
+    """Where all outputs go, absolute: each can be written, and no two are one file, before anything is simulated. Raises FileError."""
+    check_audio_output(output)
+    if contacts is not None and not contacts.endswith(".npz"):
+        raise FileError(f"cannot write {contacts}: contact logs are npz files", "end the name with .npz")
+    if picture is not None:
         from sonic_bullet.picture import check_picture_output
 
-        places.append(check_picture_output(picture))
-    if json_to not in (None, "-"):
-        places.append(check_output(str(json_to)))
-    if len(set(places)) < len(places):
-        raise FileError("two outputs have one name", "give each its own")
+        check_picture_output(picture)
+    to, *others = places(output, contacts, picture, json_to)
+    return str(to), others[0], others[1], others[2]
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,19 +175,18 @@ def _replayed(path: str, wish: _Wish) -> _Replay:
 
 
 def _with_partial(
-    error: SonicBulletError | KeyboardInterrupt, output: str, peak_dbfs: float | None, lufs: float | None
+    error: SonicBulletError | KeyboardInterrupt, to: str, output: str, peak_dbfs: float | None, lufs: float | None
 ) -> SonicBulletError | KeyboardInterrupt:
-    """The error, its text naming NAME.partial.EXT, where what was rendered before it is written as a valid file."""
+    """The error, its text naming NAME.partial.EXT as the user would, where what was rendered before it is written as a valid file beside ``to``."""
     result: RenderResult | None = getattr(error, "partial", None)
     said = ""
     if result is not None and result.samples.shape[-1] > 0:
-        target = Path(output)
-        partial = target.with_name(f"{target.stem}.partial{target.suffix}")
+        partial = kept_name(Path(to))
         try:
             write_audio(partial, result.samples, result.sr, peak_dbfs=peak_dbfs, lufs=lufs)
         except AudioError:
             write_audio(partial, result.samples, result.sr)  # silent or too short for the level asked for: kept as it is
-        said = f"the first {result.samples.shape[-1] / result.sr:.3f} s are in {partial}"
+        said = f"the first {result.samples.shape[-1] / result.sr:.3f} s are in {kept_name(Path(output))}"
     if isinstance(error, SonicBulletError):
         return type(error)(error.what, "; ".join(part for part in (error.remedy, said) if part))
     return KeyboardInterrupt("; ".join(part for part in (str(error) or "stopped", said) if part))
