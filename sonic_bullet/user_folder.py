@@ -34,9 +34,12 @@ def cache_folder(name: str) -> Path | None:
 
 
 def private_folder(path: Path) -> Path | None:
-    """``path`` as a folder of mode 0700 that belongs to this user (made, or made private), None where that cannot be had."""
+    """``path`` as a folder of mode 0700 that belongs to this user, None where that cannot be had.
+
+    It is made, or made private; the folder above it is made too, but no home that is missing.
+    """
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+        path.parent.mkdir(mode=0o700, exist_ok=True)
         path.mkdir(mode=0o700, exist_ok=True)
         found = path.lstat()
         if hasattr(os, "geteuid"):

@@ -259,11 +259,13 @@ def diagnose(**options: Any) -> None:
 
 def main() -> None:
     """The console script: run a command, turn every error into one line on stderr, and exit."""
+    import logging
     import warnings
 
     debug = bool(os.environ.get("SONIC_BULLET_DEBUG"))
     if not debug:
         warnings.simplefilter("ignore")  # a library's warning is no line of ours
+        logging.getLogger("matplotlib").setLevel(logging.ERROR)  # nor that it found no home for its fonts
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")  # a terminal without Greek letters still gets its table
@@ -271,6 +273,7 @@ def main() -> None:
     try:
         with interrupts(), cli.make_context("sonic-bullet", _settled(sys.argv[1:]) or ["--help"]) as context:  # cli.main() would swallow what an interrupt says
             cli.invoke(context)
+        _say_what_is_not_kept()
         sys.stdout.flush()
         sys.exit(0)
     except click.exceptions.Exit as done:
@@ -307,6 +310,13 @@ def _settled(words: list[str]) -> list[str]:
 
 def _terminated(*_: object) -> None:
     raise KeyboardInterrupt("terminated")
+
+
+def _say_what_is_not_kept() -> None:
+    """One note where there was no folder for compiled code and computed models: each run then takes a minute that the next could do without."""
+    folder = sys.modules.get("sonic_bullet.user_folder")
+    if folder is not None and folder.NOTES:
+        _say(f"note: compiled code and computed models are not kept for the next run: {folder.NOTES[0]}; XDG_CACHE_HOME names another folder")
 
 
 def _say(text: str) -> None:

@@ -96,7 +96,7 @@ NO_UNICODE = b"a\xff.wav"
         (("-o", "a.wav", "--json", b"\xff.json"), "Unicode"),
         (("-o", "a.wav", "--json", "no/such/a.json"), "no folder"),
         (("-o", "a.wav", "--contacts", "/proc/a.npz"), "cannot write"),
-        (("-o", "a.wav", "--picture", "elsewhere/b.png", "--contacts", "elsewhere/../elsewhere/b.npz", "--json", "elsewhere/b.npz"), "one name"),
+        (("-o", "a.wav", "--picture", "elsewhere/b.png", "--contacts", "elsewhere/../elsewhere/b.npz", "--json=elsewhere/b.npz"), "one name"),
     ],
 )
 def test_a_name_that_cannot_be_written_ends_before_the_scene_runs(folder: Path, words: tuple[str | bytes, ...], says: str) -> None:
