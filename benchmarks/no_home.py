@@ -103,6 +103,7 @@ def good(way: str, name: str, scratch: Path, work: Path) -> tuple[bool | None, s
     lines = [line for line in done.stderr.splitlines() if not line.startswith(("sonic-bullet: note:", "pybullet build time"))]
     if name in ("fit", "residual", "diagnose"):
         lines = [line for line in lines if not line.startswith("sonic-bullet: warning:")]
+    lines += [line for line in done.stderr.splitlines() if "are not kept" in line][1:]  # said once at most
     there = [file for file in made if (work / file).exists()]
     said = f"exit {done.returncode}, {len(there)} of {len(made)} outputs, {time.monotonic() - start:.0f} s {' | '.join(lines)[-300:]}"
     return done.returncode == 0 and len(there) == len(made) and not lines, said

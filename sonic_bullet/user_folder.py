@@ -43,6 +43,8 @@ def private_folder(path: Path) -> Path | None:
         path.mkdir(mode=0o700, exist_ok=True)
         found = path.lstat()
         if hasattr(os, "geteuid"):
+            if stat.S_ISLNK(found.st_mode) and found.st_uid == os.geteuid():  # this user's own link to another disk
+                found = path.stat()
             if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.geteuid():
                 _note(f"{path} is not a folder of this user")
                 return None

@@ -121,14 +121,18 @@ def test_a_folder_is_made_this_users_alone(tmp_path: Path) -> None:
     assert private_folder(tmp_path / "two" / "are" / "missing") is None
 
 
-def test_a_folder_that_is_another_users_or_a_link_is_not_used(tmp_path: Path) -> None:
+def test_a_folder_that_is_another_users_or_behind_anothers_link_is_not_used(tmp_path: Path) -> None:
     (tmp_path / "folder").mkdir()
-    (tmp_path / "link").symlink_to(tmp_path / "folder")
     (tmp_path / "file").touch()
-    assert private_folder(tmp_path / "link") is private_folder(tmp_path / "file") is None
+    (tmp_path / "link").symlink_to(tmp_path / "folder")
+    assert private_folder(tmp_path / "file") is None
+    assert private_folder(tmp_path / "link") == tmp_path / "link"  # one's own, to another disk say
     if os.geteuid() == 0:
+        os.chown(tmp_path / "link", 54321, 54321, follow_symlinks=False)
+        assert private_folder(tmp_path / "link") is None
+        (tmp_path / "mine").symlink_to(tmp_path / "folder")
         os.chown(tmp_path / "folder", 54321, 54321)
-        assert private_folder(tmp_path / "folder") is None
+        assert private_folder(tmp_path / "folder") is private_folder(tmp_path / "mine") is None
 
 
 @pytest.mark.parametrize("home", ["/dev/null", "", "not/absolute"])
