@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from sonic_bullet.cli.output import clean_stdout, progress_bar, quiet_stderr, status, write_json
 from sonic_bullet.errors import AudioError, FileError, SceneError, SonicBulletError
-from sonic_bullet.files import AudioReport, check_audio_output, check_output, check_sr, read_log, write_audio, write_log
+from sonic_bullet.files import AudioReport, check_audio_output, check_levels, check_output, check_sr, read_log, write_audio, write_log
 
 if TYPE_CHECKING:
     from sonic_bullet.contacts import ContactLog
@@ -88,8 +88,7 @@ def _is_log(scene: str) -> bool:
 def _check_request(scene: str, seconds: float | None, peak_dbfs: float | None, lufs: float | None, material: str | None) -> None:
     if seconds is not None and not 0 < seconds < 1e6:
         raise AudioError(f"{seconds} seconds cannot be rendered", "give --seconds above 0")
-    if peak_dbfs is not None and lufs is not None:
-        raise AudioError("both a peak and a loudness are asked for", "give one of --peak-dbfs and --lufs")
+    check_levels(peak_dbfs, lufs)
     if not Path(scene).is_file():
         raise FileError(f"cannot read {scene}: no such file", "give a scene (.py) or a contact log (.npz)")
     if Path(scene).suffix.lower() not in (".py", ".npz"):

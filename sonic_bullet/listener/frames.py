@@ -74,7 +74,7 @@ def decode(code: int) -> tuple[int, int]:
 
 def check_connected(client_id: int) -> None:
     """Raise SceneError unless a physics server answers under this client id."""
-    if client_id < 0 or not pybullet.getConnectionInfo(physicsClientId=client_id)["isConnected"]:
+    if not 0 <= client_id < 2**31 or not pybullet.getConnectionInfo(physicsClientId=client_id)["isConnected"]:
         raise SceneError(f"PyBullet client {client_id} is not connected", "connect first, e.g. BulletClient(pybullet.DIRECT), and attach before disconnecting")
 
 
