@@ -22,12 +22,14 @@ def frozen_array(value: object, dtype: Any, shape: tuple[int | None, ...], name:
     kept = isinstance(value, np.ndarray) and not value.flags.writeable and value.base is None  # a record's own: read-only and nobody's view
     try:
         given = value if isinstance(value, np.ndarray) else np.asarray(value)
+        if given.dtype.kind not in "biufO":  # texts, complex numbers, dates
+            raise TypeError
         with np.errstate(invalid="ignore", over="ignore"):
             array = np.asarray(given, dtype=dtype, order="C") if kept else np.array(given, dtype=dtype, order="C")
         exact = array.dtype.kind != "i" or given.dtype == array.dtype or bool((array == given).all())
-    except (TypeError, ValueError, OverflowError, np.exceptions.ComplexWarning):
+    except (TypeError, ValueError, OverflowError):
         raise RecordError(f"{name} is {shown(value)}", f"pass numbers of shape {shape}") from None
-    if given.dtype.kind not in "biufO" or not exact:
+    if not exact:
         raise RecordError(f"{name} is {shown(value)}, which is no array of {array.dtype.name}", f"pass numbers of shape {shape}")
     if array.ndim != len(shape) or any(want is not None and have != want for have, want in zip(array.shape, shape, strict=True)):
         raise RecordError(f"{name} has shape {array.shape}, wanted {shape}", "pass an array of that shape")

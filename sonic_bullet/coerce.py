@@ -13,6 +13,7 @@ import numbers
 import os
 import reprlib
 from collections.abc import Callable, Collection, Iterable
+from contextlib import suppress
 from typing import Any, TypeVar
 
 import numpy as np
@@ -26,6 +27,8 @@ Error = type[SonicBulletError]
 _SHORT = reprlib.Repr()
 _SHORT.maxstring = _SHORT.maxother = _SHORT.maxlong = 60
 _SHORT.maxlevel = 3
+LONGEST_NAME = 255
+"""Bytes of a file's name that file systems take."""
 LISTED = 8
 """Names that a message lists at most."""
 
@@ -39,6 +42,12 @@ def shown(value: object) -> str:
     except Exception:  # a foreign object's own repr may raise anything, and an int of 5000 digits has none
         text = f"a {type(value).__name__}"
     return text if len(text) <= 80 else f"{text[:77]}..."
+
+
+def brief(text: object) -> str:
+    """A name as a message repeats it: its first 117 characters where it has over 120."""
+    name = str(text)
+    return name if len(name) <= 120 else f"{name[:117]}..."
 
 
 def as_number(
@@ -64,8 +73,8 @@ def as_number(
     raise error(f"{name} is {shown(value)}", remedy)
 
 
-def as_whole(value: object, name: str, remedy: str, *, least: float = -math.inf, most: float = math.inf, error: Error = RecordError) -> int:
-    """A whole number between ``least`` and ``most``, of any numeric type. Raises ``error``."""
+def as_whole(value: object, name: str, remedy: str, *, least: int = -(2**63), most: int = 2**63 - 1, error: Error = RecordError) -> int:
+    """A whole number of at most 64 bits between ``least`` and ``most``, of any numeric type. Raises ``error``."""
     value = _scalar(value)
     if isinstance(value, numbers.Integral) and not isinstance(value, (bool, np.bool_)):
         whole = int(value)
@@ -98,12 +107,14 @@ def as_text(value: object, name: str, remedy: str, *, error: Error = RecordError
 
 
 def as_path(value: object, name: str, remedy: str, *, error: Error = FileError) -> str:
-    """The name of a file: a text or what has one (os.PathLike). Raises ``error``."""
-    if isinstance(value, (str, os.PathLike)):
-        text = os.fspath(value)
-        if isinstance(text, str):
+    """The name of a file, as a text or as what has one (os.PathLike). Raises ``error``, also for names that no file can have."""
+    text = os.fspath(value) if isinstance(value, (str, os.PathLike)) else None
+    if not isinstance(text, str):
+        raise error(f"{name} is {shown(value)}", remedy)
+    with suppress(UnicodeEncodeError):
+        if "\0" not in text and all(len(os.fsencode(part)) <= LONGEST_NAME for part in text.split(os.sep)):
             return text
-    raise error(f"{name} is {shown(value)}", remedy)
+    raise error(f"cannot read or write {shown(text)}: {name} is no name that a file can have", remedy)
 
 
 def as_call(value: Call | None, name: str) -> Call | None:
@@ -150,9 +161,10 @@ def as_rows(value: Any, name: str, columns: int, remedy: str, *, error: Error = 
 
 def nearest(word: str, known: Collection[str], otherwise: str = "") -> str:
     """A remedy for a word that is none of ``known``: the nearest of them, or all where nothing is near, ``otherwise`` behind them."""
-    near = difflib.get_close_matches(word.lower()[:100], known, n=3, cutoff=0.5)
+    lower = {one.lower(): one for one in reversed(list(known))}
+    near = difflib.get_close_matches(word.lower()[:100], lower, n=3, cutoff=0.5)
     if near:
-        return f"did you mean {' or '.join(near)}?"
+        return f"did you mean {' or '.join(lower[one] for one in near)}?"
     listed = ", ".join(list(known)[:LISTED]) + (f" and {len(known) - LISTED} more" if len(known) > LISTED else "")
     return f"one of {listed}{otherwise}" if known else f"there are none{otherwise}"
 

@@ -122,12 +122,14 @@ class ContactLog:
     untouched: frozenset[int] = frozenset()
 
     def __post_init__(self) -> None:
+        ids = ("give ids of bodies",)
         checked = {
             "bodies": as_kinds(self.bodies, Body, "log: bodies", "give a tuple of Body", error=LogError),
             "steps": as_kinds(self.steps, Step, "log: steps", "give a tuple of Step", error=LogError),
             "sensors": as_kinds(self.sensors, Sensor, "log: sensors", "give a tuple of sensors", error=LogError),
             "air": as_kind(self.air, Air, "log: air", "give an Air", error=LogError),
             "seed": as_whole(self.seed, "log: seed", "give a whole number, 0 or more", least=0, error=LogError),
+            "untouched": frozenset(as_whole(x, "log: untouched", *ids) for x in as_items(self.untouched, "log: untouched", *ids)),
             "sr": as_whole(self.sr, "log: sr", "give a sample rate in Hz", least=1, error=LogError),
         }
         for name, value in checked.items():

@@ -87,7 +87,7 @@ class Material:
         _require(bool(np.allclose(stiffness, stiffness.T, rtol=1e-9)), f"{where}: stiffness_pa is not symmetric", "give a symmetric tensor")
         _require(
             bool(np.linalg.eigvalsh(stiffness)[0] > 0),
-            f"{where}: stiffness is not positive definite",
+            f"{where}: stiffness_pa is not positive definite",
             "Young's modulus must be above 0 and Poisson's ratio within -1 … 0.5",
         )
         for name in ("alpha_per_s", "beta_s"):
@@ -301,7 +301,8 @@ class Vibrometer:
 
     def __post_init__(self) -> None:
         direction = frozen_array(self.direction, float, (3,), "vibrometer: direction")
-        length = float(np.linalg.norm(direction))
+        with np.errstate(over="ignore"):
+            length = float(np.linalg.norm(direction))
         _require(0 < length < np.inf, "vibrometer: direction is zero", "give the direction in which it looks")
         _store(
             self,

@@ -69,7 +69,7 @@ def as_shapes(mesh: str | Path | Shape | Sequence[Shape]) -> tuple[Shape, ...]:
     if isinstance(mesh, Shape):
         return (mesh,)
     if isinstance(mesh, (str, Path)):
-        return (read_mesh(mesh),)
+        return (read_mesh(as_path(mesh, "mesh", "give a mesh file in metres")),)
     return as_kinds(mesh, Shape, "mesh", "give a mesh file in metres, a Shape or several", error=MeshError)
 
 
@@ -118,7 +118,7 @@ class Listener:
     def __init__(self, client: Any, *, sr: int, sensors: tuple[Sensor, ...], seed: int, air: Air) -> None:
         from sonic_bullet.listener import open_world
 
-        self.sr, self.sensors = check_sr(sr), as_sensors(sensors)
+        self.sr, self.sensors = check_sr(sr), as_sensors(sensors, "sensors")
         self.seed = as_whole(seed, "seed", "give a whole number, 0 or more", least=0, most=2**63 - 1)
         self.air = as_kind(air, Air, "air", "give an Air(density_kg_m3=…, sound_speed_m_s=…), or leave it out")
         self.world = open_world(client)
@@ -199,6 +199,7 @@ class Listener:
         for i in sorted(range(len(parts)), key=lambda i: -triangles[i]):
             name, shapes = parts[i]
             head = f"modes of {name}" + (f", {len(models) + 1} of {len(parts)}" if len(parts) > 1 else "")
+            say(head)
             with _naming(name, len(parts)):
                 solved = modal.analyse(shapes, material, **asdict(options), progress=_headed(say, head))
                 models[i] = self._shared(with_modes(solved, material), models.values())

@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.coerce import as_number, as_path, as_text, as_whole, shown
+from sonic_bullet.coerce import as_number, as_path, as_text, as_whole, brief, nearest, shown
 from sonic_bullet.errors import AudioError, FileError, SonicBulletError
 from sonic_bullet.files.atomic import cannot, check_output, sync
 from sonic_bullet.records import Array
@@ -89,7 +89,7 @@ def check_audio_output(path: str | os.PathLike[str], subtype: str | None = None)
     path = as_path(path, "path", "name a sound file, such as out.wav")
     extension = Path(path).suffix.lower()
     if extension not in FORMATS:
-        raise FileError(f"cannot write {path}: '{extension}' is no audio format known here", f"end the name with one of {' '.join(FORMATS)}")
+        raise FileError(f"cannot write {brief(path)}: {shown(extension)} is no audio format known here", f"end the name with one of {' '.join(FORMATS)}")
     target = check_output(path)
     container, default = FORMATS[extension]
     wanted = default if subtype is None else as_text(subtype, "subtype", "give one of libsndfile's names, PCM_16 say", error=FileError).upper()
@@ -97,8 +97,8 @@ def check_audio_output(path: str | os.PathLike[str], subtype: str | None = None)
         import soundfile
 
         if not soundfile.check_format(container, wanted):
-            known = " ".join(soundfile.available_subtypes(container))
-            raise FileError(f"cannot write {path}: {container} holds no {wanted} samples", f"one of {known}")
+            known = list(soundfile.available_subtypes(container))
+            raise FileError(f"cannot write {brief(path)}: {container} holds no subtype {shown(wanted)}", nearest(wanted, known))
     return target, container, wanted
 
 
@@ -319,8 +319,12 @@ def read_audio(path: str | os.PathLike[str]) -> tuple[Array, int]:
     import soundfile
 
     path = as_path(path, "path", "name a sound file")
-    if not Path(path).is_file():
-        raise FileError(f"cannot read {path}: no such file", "check the path")
+    try:
+        there = Path(path).is_file()
+    except OSError:  # a name too long to be one
+        there = False
+    if not there:
+        raise FileError(f"cannot read {brief(path)}: no such file", "check the path")
     try:
         samples, sr = soundfile.read(os.fspath(path), dtype="float64", always_2d=True)
     except (soundfile.LibsndfileError, OSError) as error:
