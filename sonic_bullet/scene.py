@@ -26,7 +26,7 @@ from sonic_bullet.errors import SceneError, SonicBulletError, interrupts
 from sonic_bullet.files import check_sr
 from sonic_bullet.listener import Finding, diagnose_world, direct_client, disconnect, links_with_shapes, run_script
 from sonic_bullet.records import Array, Material, Sensor
-from sonic_bullet.render import render_log
+from sonic_bullet.render import render_log, silence_notes
 from sonic_bullet.session import Listener, MicrophoneLike, as_material, as_sensors, attach
 
 DEFAULT_SECONDS = 4.0
@@ -92,7 +92,13 @@ def examine_scene(path: str | Path, seconds: float = 1.0, say: Say | None = None
     with _stage(path, sr=8_000, seed=0, microphones=(), material=None) as stage:  # nobody hears it: contacts alone
         stage.run(as_seconds(seconds, "seconds"), None, say)
         listener = stage.need_listener()
-        return (*diagnose_world(listener.world), *_mute_bodies(listener))
+        return (*diagnose_world(listener.world), *_nothing_added(listener), *_mute_bodies(listener))
+
+
+def _nothing_added(listener: Listener) -> tuple[Finding, ...]:
+    if not listener.world.has_bodies or any(body.material is not None for body in listener.contacts.bodies):
+        return ()
+    return (Finding("nothing-added", "error", "no body has a material: all are silent partners", "add(body, material=…), or return it in build's cast"),)
 
 
 def as_seconds(seconds: object, name: str) -> float:
@@ -147,9 +153,11 @@ class _Stage:
         listener = self.need_listener()
         log = listener.contacts
         if listener.sr == self.sr and self.microphones is None and (self.residual or not any(b.material and b.material.residual for b in log.bodies)):
-            return RenderResult(listener.sound(), log, self.sr, notes)
+            samples = listener.sound()
+            return RenderResult(samples, log, self.sr, (*notes, *silence_notes(samples, log)))
         log = replace(log, sr=self.sr, sensors=log.sensors if self.microphones is None else self.microphones)
-        return RenderResult(render_log(log, residual=self.residual), log, self.sr, notes)
+        samples = render_log(log, residual=self.residual)
+        return RenderResult(samples, log, self.sr, (*notes, *silence_notes(samples, log)))
 
 
 def _stage(path: str | Path, **options: Any) -> _Stage:

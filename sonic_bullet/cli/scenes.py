@@ -49,7 +49,7 @@ def run_render(
             raise _with_partial(error, output, peak_dbfs, lufs) from error
         if contacts:
             write_log(contacts, result.log)
-        report = write_audio(output, result.samples, result.sr, peak_dbfs=peak_dbfs, lufs=lufs)
+        report = _written(output, result, peak_dbfs, lufs)
         if picture:
             from sonic_bullet.picture import render_picture
 
@@ -163,7 +163,7 @@ def _replayed(path: str, wish: _Wish) -> _Replay:
     import numpy as np
 
     from sonic_bullet.records import Microphone
-    from sonic_bullet.render import render_log
+    from sonic_bullet.render import render_log, silence_notes
 
     log = read_log(path)
     if wish.microphones:
@@ -175,7 +175,18 @@ def _replayed(path: str, wish: _Wish) -> _Replay:
             raise AudioError(f"{path} lasts {log.duration_s:.3f} s, shorter than {seconds} s", "give fewer seconds, or simulate the scene for longer")
         log = replace(log, steps=tuple(step for step, start in zip(log.steps, log.start_s, strict=True) if start < seconds - 1e-9))
     samples = render_log(log, sr=wish.rate, residual=wish.residual, progress=wish.progress, say=wish.say)
-    return _Replay(samples, log, wish.rate or log.sr)
+    return _Replay(samples, log, wish.rate or log.sr, silence_notes(samples, log))
+
+
+def _written(output: str, result: RenderResult | _Replay, peak_dbfs: float | None, lufs: float | None) -> AudioReport:
+    """The sound as a file. Where silence keeps it from being one, the error says why it is silent."""
+    from sonic_bullet.render import why_silent
+
+    try:
+        return write_audio(output, result.samples, result.sr, peak_dbfs=peak_dbfs, lufs=lufs)
+    except AudioError as error:
+        reason = None if result.samples.any() else why_silent(result.log)
+        raise AudioError(error.what, reason) if reason else error from error
 
 
 def _with_partial(
@@ -184,7 +195,7 @@ def _with_partial(
     """The error, its text naming NAME.partial.EXT, where what was rendered before it is written as a valid file."""
     result: RenderResult | None = getattr(error, "partial", None)
     said = ""
-    if result is not None and result.samples.shape[-1] > 0:
+    if result is not None and result.samples.size:
         target = Path(output)
         partial = target.with_name(f"{target.stem}.partial{target.suffix}")
         try:

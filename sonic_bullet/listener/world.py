@@ -72,6 +72,11 @@ class World:
         """Ids of the bodies that were in the world at the last step and have met nobody yet."""
         return frozenset(body for body, _, _ in self._past.roster.bodies) - {code // LINK_SPAN for code in self._live}
 
+    @property
+    def has_bodies(self) -> bool:
+        """Whether anybody was in the world at the last step."""
+        return bool(self._past.roster.bodies)
+
     def index_of(self, body: int, link: int = -1) -> int:
         """Index into `bodies` of the living record of a link, or -1."""
         return self._live.get(int(encode(body, link)), -1)

@@ -1,6 +1,6 @@
 """Forces become sound: the synthesizer of live steps, and the replay of a contact log.
 
-clock: which samples a step covers | sounder: a body as it is played | blows: strikes | rubbing: rolling and sliding | beside: residuals | synthesizer: all together
+silence: why there is none | clock: which samples a step covers | sounder: a body as it is played | blows: strikes | rubbing: rolling and sliding | beside: residuals | synthesizer: all together
 """
 
 from __future__ import annotations
@@ -15,9 +15,10 @@ from sonic_bullet.contacts import ContactLog
 from sonic_bullet.errors import LogError
 from sonic_bullet.records import Array
 from sonic_bullet.render.radiated import radiation_of
+from sonic_bullet.render.silence import silence_notes, why_silent
 from sonic_bullet.render.synthesizer import LATENCY_STEPS, Synthesizer
 
-__all__ = ["LATENCY_STEPS", "Synthesizer", "render_log"]
+__all__ = ["LATENCY_STEPS", "Synthesizer", "render_log", "silence_notes", "why_silent"]
 
 
 def render_log(

@@ -47,7 +47,7 @@ class Solver:
     def __call__(self, shapes: tuple[sb.Shape, ...], *_: Any, progress: Callable[[str], None], **__: Any) -> sb.ModalModel:
         progress("filling")
         time.sleep(self.pause_s)
-        size_m = float(shapes[0].size_m.max())
+        size_m = round(float(shapes[0].size_m.max()), 6)
         if size_m == self.fails_at_m:
             raise ModalError("the clamps hold the whole body", "give a smaller radius")
         self.solved_m.append(size_m)
