@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from sonic_bullet.coerce import as_items, as_kind, as_kinds, as_number, as_path, as_whole, shown
 from sonic_bullet.errors import LogError
 from sonic_bullet.records import Air, Array, Body, Sensor, frozen_array
 
@@ -40,7 +41,7 @@ class Contacts:
     gap_m: Array
 
     def __post_init__(self) -> None:
-        k = len(np.atleast_1d(self.a))
+        k = np.shape(self.a)[0] if isinstance(self.a, np.ndarray) and self.a.ndim else len(as_items(self.a, "contact a", "give indices of bodies (k,)"))
         for name, (dtype, tail) in ROW_FIELDS.items():
             object.__setattr__(self, name, frozen_array(getattr(self, name), dtype, (k, *tail), f"contact {name}"))
 
@@ -93,13 +94,14 @@ class Step:
     gravity_m_s2: Array = field(default_factory=lambda: np.zeros(3))
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "position_m", frozen_array(self.position_m, float, (None, 3), "step: position_m"))
         b = len(self.position_m)
-        object.__setattr__(self, "position_m", frozen_array(self.position_m, float, (b, 3), "body positions"))
-        object.__setattr__(self, "quaternion_xyzw", frozen_array(self.quaternion_xyzw, float, (b, 4), "body orientations"))
+        object.__setattr__(self, "quaternion_xyzw", frozen_array(self.quaternion_xyzw, float, (b, 4), "step: quaternion_xyzw"))
         object.__setattr__(self, "teleported", frozen_array(self.teleported, bool, (b,), "teleported"))
-        object.__setattr__(self, "gravity_m_s2", frozen_array(self.gravity_m_s2, float, (3,), "gravity"))
-        if not (np.isfinite(self.dt_s) and 0 < self.dt_s <= 1):
-            raise LogError(f"a physics step of {self.dt_s} s", "set a time step between 0 and 1 s with setTimeStep")
+        object.__setattr__(self, "gravity_m_s2", frozen_array(self.gravity_m_s2, float, (3,), "step: gravity_m_s2"))
+        remedy = "set a time step between 0 and 1 s with setTimeStep"
+        object.__setattr__(self, "dt_s", as_number(self.dt_s, "dt_s of a physics step", remedy, above=0, most=1, error=LogError))
+        as_kind(self.contacts, Contacts, "step: contacts", "give Contacts, of no rows where nothing touches", error=LogError)
         if len(self.contacts) and max(self.contacts.a.max(), self.contacts.b.max()) >= b:
             raise LogError("a contact names a body that the step does not know", "use an unbroken contact log")
 
@@ -120,6 +122,18 @@ class ContactLog:
     untouched: frozenset[int] = frozenset()
 
     def __post_init__(self) -> None:
+        ids = ("give ids of bodies",)
+        checked = {
+            "bodies": as_kinds(self.bodies, Body, "log: bodies", "give a tuple of Body", error=LogError),
+            "steps": as_kinds(self.steps, Step, "log: steps", "give a tuple of Step", error=LogError),
+            "sensors": as_kinds(self.sensors, Sensor, "log: sensors", "give a tuple of sensors", error=LogError),
+            "air": as_kind(self.air, Air, "log: air", "give an Air", error=LogError),
+            "seed": as_whole(self.seed, "log: seed", "give a whole number, 0 or more", least=0, error=LogError),
+            "untouched": frozenset(as_whole(x, "log: untouched", *ids) for x in as_items(self.untouched, "log: untouched", *ids)),
+            "sr": as_whole(self.sr, "log: sr", "give a sample rate in Hz", least=1, error=LogError),
+        }
+        for name, value in checked.items():
+            object.__setattr__(self, name, value)
         for step in self.steps:
             if len(step.position_m) > len(self.bodies):
                 raise LogError("a step has more poses than the log has bodies", "use an unbroken contact log")
@@ -170,12 +184,14 @@ class ContactLog:
         return np.flatnonzero(self._side(self.rows, body, link)[1])
 
     def _side(self, rows: Contacts, body: int, link: int | None) -> tuple[Array, Array]:
+        body = as_whole(body, "body", "give a body's id", error=LogError)
+        link = None if link is None else as_whole(link, "link", "give a link's number, -1 the base, or None for all", error=LogError)
         bearers = [i for i, x in enumerate(self.bodies) if x.body_id == body and (link is None or x.link == link)]
         if not bearers and body in self.untouched:
             return np.zeros(len(rows)), np.zeros(len(rows), bool)
         if not bearers:
             known = sorted({x.body_id for x in self.bodies})
-            raise LogError(f"the log holds no body {body}" + ("" if link is None else f" link {link}"), f"known bodies: {known}")
+            raise LogError(f"the log holds no body {shown(body)}" + ("" if link is None else f" link {shown(link)}"), f"known bodies: {shown(known)}")
         epoch = max(self.bodies[i].epoch for i in bearers)
         bearers = [i for i in bearers if self.bodies[i].epoch == epoch]
         on_a, on_b = np.isin(rows.a, bearers), np.isin(rows.b, bearers)
@@ -185,4 +201,4 @@ class ContactLog:
         """Write the log as npz (numpy arrays and JSON, no pickle), whole or not at all. Raises FileError."""
         from sonic_bullet.files import write_log
 
-        write_log(str(path), self)
+        write_log(as_path(path, "path", "name a file, such as contacts.npz"), self)

@@ -19,7 +19,6 @@ Between them the loss is smaller (at √(ω₁ω₂) by 2√(ω₁ω₂)/(ω₁+
 
 from __future__ import annotations
 
-import difflib
 import math
 import os
 from functools import cache
@@ -29,6 +28,7 @@ from typing import Annotated, Any
 import msgspec
 import numpy as np
 
+from sonic_bullet.coerce import as_path, nearest, shown
 from sonic_bullet.effects.stored import effect_of
 from sonic_bullet.effects.values import Effect
 from sonic_bullet.errors import MaterialError, RecordError
@@ -39,6 +39,7 @@ from sonic_bullet.residual.code import ResidualForm, residual_of
 FORMAT = "sonic-bullet-preset/1"
 FOLDER = Path(__file__).parent / "materials"
 BYTES_MAX = 1 << 20
+_REMEDY = "give a material's name, or the path of a preset file"
 
 Positive = Annotated[float, msgspec.Meta(gt=0)]
 NotNegative = Annotated[float, msgspec.Meta(ge=0)]
@@ -122,21 +123,20 @@ def load_material(name: str | os.PathLike[str]) -> Material:
 
     Raises MaterialError: unknown name (listing the near ones), unreadable file, a wrong field (named), unphysical numbers.
     """
-    text = os.fspath(name)
-    return material_of(named_preset(name), text if text.endswith(".json") or os.sep in text else "")
+    text = as_path(name, "name", _REMEDY, error=MaterialError)
+    return material_of(named_preset(text), text if text.endswith(".json") or os.sep in text else "")
 
 
 def named_preset(name: str | os.PathLike[str]) -> Preset:
     """The preset of that name, or of a file where ``name`` is a path or ends in .json. Raises MaterialError as `load_material` does."""
-    text = os.fspath(name)
+    text = as_path(name, "name", _REMEDY, error=MaterialError)
     if text.endswith(".json") or os.sep in text:
-        return read_preset(name)
+        return read_preset(text)
     known = material_names()
     if text.lower() in known:
         return read_preset(FOLDER / f"{text.lower()}.json")
-    near = difflib.get_close_matches(text.lower(), known, n=3, cutoff=0.5)
-    remedy = f"did you mean {' or '.join(near)}?" if near else f"one of {', '.join(known)}, or the path of a preset file"
-    raise MaterialError(f"there is no material '{text}'", f"{remedy}; 'sonic-bullet materials' lists all")
+    remedy = nearest(text, known, ", or the path of a preset file")
+    raise MaterialError(f"there is no material {shown(text)}", f"{remedy}; 'sonic-bullet materials' lists all")
 
 
 def list_materials() -> tuple[Material, ...]:

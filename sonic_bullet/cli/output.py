@@ -16,6 +16,9 @@ from pathlib import Path
 from typing import Any
 
 from sonic_bullet.errors import FileError
+from sonic_bullet.terminal import shown_by, status
+
+__all__ = ["clean_stdout", "places", "progress_bar", "quiet_stderr", "status", "table", "write_json"]
 
 
 @contextmanager
@@ -120,22 +123,8 @@ def progress_bar(label: str) -> Iterator[tuple[Callable[[float], None], Callable
     )
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
         task = progress.add_task(label, total=1.0)
-        yield (
-            lambda share: progress.update(task, description=label, completed=share),
-            lambda text: progress.update(task, description=escape(f"{label}: {text}")),
-        )
-
-
-@contextmanager
-def status(label: str) -> Iterator[Callable[[str], None]]:
-    """A function of the present activity, drawn as a spinner on a terminal's stderr; in a pipe it does nothing."""
-    if not sys.stderr.isatty():
-        yield lambda text: None
-        return
-    from rich.console import Console
-
-    with Console(stderr=True).status(label) as line:
-        yield lambda text: line.update(f"{label}: {text}")
+        with shown_by(lambda text: progress.update(task, description=escape(f"{label}: {text}"))) as say:
+            yield (lambda share: progress.update(task, description=label, completed=share)), say
 
 
 def table(head: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> str:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from sonic_bullet.cli.output import clean_stdout, places, progress_bar, quiet_stderr, status, write_json
 from sonic_bullet.errors import AudioError, FileError, SceneError, SonicBulletError
-from sonic_bullet.files import AudioReport, check_audio_output, check_sr, kept_name, read_log, write_audio, write_log
+from sonic_bullet.files import AudioReport, check_audio_output, check_levels, check_sr, kept_name, read_log, write_audio, write_log
 
 if TYPE_CHECKING:
     from sonic_bullet.contacts import ContactLog
@@ -49,7 +49,7 @@ def run_render(
             raise _with_partial(error, to, output, peak_dbfs, lufs) from error
         if contacts is not None:
             write_log(contacts, result.log)
-        report = replace(write_audio(to, result.samples, result.sr, peak_dbfs=peak_dbfs, lufs=lufs), path=output)
+        report = replace(_written(to, result, peak_dbfs, lufs), path=output)
         if picture is not None:
             from sonic_bullet.picture import render_picture
 
@@ -87,8 +87,7 @@ def _is_log(scene: str) -> bool:
 def _check_request(scene: str, seconds: float | None, peak_dbfs: float | None, lufs: float | None, material: str | None) -> None:
     if seconds is not None and not 0 < seconds < 1e6:
         raise AudioError(f"{seconds} seconds cannot be rendered", "give --seconds above 0")
-    if peak_dbfs is not None and lufs is not None:
-        raise AudioError("both a peak and a loudness are asked for", "give one of --peak-dbfs and --lufs")
+    check_levels(peak_dbfs, lufs)
     if not Path(scene).is_file():
         raise FileError(f"cannot read {scene}: no such file", "give a scene (.py) or a contact log (.npz)")
     if Path(scene).suffix.lower() not in (".py", ".npz"):
@@ -159,7 +158,7 @@ def _replayed(path: str, wish: _Wish) -> _Replay:
     import numpy as np
 
     from sonic_bullet.records import Microphone
-    from sonic_bullet.render import render_log
+    from sonic_bullet.render import render_log, silence_notes
 
     log = read_log(path)
     if wish.microphones:
@@ -171,7 +170,18 @@ def _replayed(path: str, wish: _Wish) -> _Replay:
             raise AudioError(f"{path} lasts {log.duration_s:.3f} s, shorter than {seconds} s", "give fewer seconds, or simulate the scene for longer")
         log = replace(log, steps=tuple(step for step, start in zip(log.steps, log.start_s, strict=True) if start < seconds - 1e-9))
     samples = render_log(log, sr=wish.rate, residual=wish.residual, progress=wish.progress, say=wish.say)
-    return _Replay(samples, log, wish.rate or log.sr)
+    return _Replay(samples, log, wish.rate or log.sr, silence_notes(samples, log))
+
+
+def _written(output: str, result: RenderResult | _Replay, peak_dbfs: float | None, lufs: float | None) -> AudioReport:
+    """The sound as a file. Where silence keeps it from being one, the error says why it is silent."""
+    from sonic_bullet.render import why_silent
+
+    try:
+        return write_audio(output, result.samples, result.sr, peak_dbfs=peak_dbfs, lufs=lufs)
+    except AudioError as error:
+        reason = None if result.samples.any() else why_silent(result.log)
+        raise AudioError(error.what, reason) if reason else error from error
 
 
 def _with_partial(
@@ -180,7 +190,7 @@ def _with_partial(
     """The error, its text naming NAME.partial.EXT as the user would, where what was rendered before it is written as a valid file beside ``to``."""
     result: RenderResult | None = getattr(error, "partial", None)
     said = ""
-    if result is not None and result.samples.shape[-1] > 0:
+    if result is not None and result.samples.size:
         partial = kept_name(Path(to))
         try:
             write_audio(partial, result.samples, result.sr, peak_dbfs=peak_dbfs, lufs=lufs)

@@ -8,7 +8,7 @@ beneath them, `atomic` the replacing.
 """
 
 from sonic_bullet.files.atomic import cannot, check_output, kept_name, replacing
-from sonic_bullet.files.audio import AudioReport, AudioWriter, check_audio_output, check_sr, read_audio, write_audio
+from sonic_bullet.files.audio import AudioReport, AudioWriter, check_audio_output, check_levels, check_sr, read_audio, write_audio
 from sonic_bullet.files.logs import read_log, read_model, write_log, write_model
 
 __all__ = [
@@ -16,6 +16,7 @@ __all__ = [
     "AudioWriter",
     "cannot",
     "check_audio_output",
+    "check_levels",
     "check_output",
     "check_sr",
     "kept_name",

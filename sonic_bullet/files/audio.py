@@ -24,6 +24,7 @@ from typing import Any
 
 import numpy as np
 
+from sonic_bullet.coerce import as_number, as_path, as_text, as_whole, brief, nearest, shown
 from sonic_bullet.errors import AudioError, FileError, SonicBulletError
 from sonic_bullet.files.atomic import cannot, check_output, kept_name
 from sonic_bullet.partial_file import PartialFile
@@ -76,14 +77,12 @@ class AudioReport:
 
 def check_sr(sr: object) -> int:
     """``sr`` as a whole number of Hz between 8000 and 384 000. Raises AudioError on anything else."""
-    if isinstance(sr, bool) or not hasattr(sr, "__float__"):
-        raise AudioError(f"sample rate {sr!r} is not a number", "give it in Hz, 48000 say")
-    rate = float(sr)
-    if not math.isfinite(rate) or not SR_MIN_HZ <= rate <= SR_MAX_HZ:
-        raise AudioError(f"sample rate {rate:g} Hz is out of range", f"give one between {SR_MIN_HZ} and {SR_MAX_HZ} Hz, 48000 say")
-    if rate != int(rate):
-        raise AudioError(f"sample rate {rate!r} Hz is not whole", "give a whole number of Hz, 48000 say")
-    return int(rate)
+    remedy = f"give a whole number of Hz between {SR_MIN_HZ} and {SR_MAX_HZ}, 48000 say"
+    try:
+        return as_whole(sr, "sr", remedy, least=SR_MIN_HZ, most=SR_MAX_HZ, error=AudioError)
+    except AudioError:
+        said = f"{sr:g} Hz" if isinstance(sr, float) else f"{shown(sr)} Hz"
+        raise AudioError(f"sr: sample rate {said} cannot be", remedy) from None
 
 
 def check_audio_output(path: str | os.PathLike[str], subtype: str | None = None) -> tuple[Path, str, str]:
@@ -91,18 +90,19 @@ def check_audio_output(path: str | os.PathLike[str], subtype: str | None = None)
 
     Raises FileError where the place cannot be written or the extension or subtype is unknown.
     """
+    path = as_path(path, "path", "name a sound file, such as out.wav")
     extension = Path(path).suffix.lower()
     if extension not in FORMATS:
-        raise FileError(f"cannot write {path}: '{extension}' is no audio format known here", f"end the name with one of {' '.join(FORMATS)}")
+        raise FileError(f"cannot write {brief(path)}: {shown(extension)} is no audio format known here", f"end the name with one of {' '.join(FORMATS)}")
     target = check_output(path)
     container, default = FORMATS[extension]
-    wanted = default if subtype is None else subtype.upper()
+    wanted = default if subtype is None else as_text(subtype, "subtype", "give one of libsndfile's names, PCM_16 say", error=FileError).upper()
     if wanted != default:
         import soundfile
 
         if not soundfile.check_format(container, wanted):
-            known = " ".join(soundfile.available_subtypes(container))
-            raise FileError(f"cannot write {path}: {container} holds no {wanted} samples", f"one of {known}")
+            known = list(soundfile.available_subtypes(container))
+            raise FileError(f"cannot write {brief(path)}: {container} holds no subtype {shown(wanted)}", nearest(wanted, known))
     return target, container, wanted
 
 
@@ -285,10 +285,12 @@ def write_audio(
     """
     rate = check_sr(sr)
     check_audio_output(path, subtype)
-    sound = np.asarray(samples, float)
+    check_levels(peak_dbfs, lufs)
+    full_scale_pa = as_number(full_scale_pa, "full_scale_pa", "give a full scale in Pa, above zero", above=0, error=AudioError)
+    sound = as_sound(samples)
     sound = sound[None, :] if sound.ndim == 1 else sound
     if sound.ndim != 2 or sound.shape[0] == 0:
-        raise AudioError(f"samples of shape {np.shape(samples)}", "pass (channels, n)")
+        raise AudioError(f"samples of shape {sound.shape}", "pass (channels, n)")
     gain = _gain_per_pa(sound, rate, peak_dbfs, lufs, full_scale_pa)
     with AudioWriter(path, rate, sound.shape[0], gain_per_pa=gain, subtype=subtype, expected_frames=sound.shape[1]) as writer:
         for start in range(0, sound.shape[1], BLOCK_FRAMES):
@@ -299,22 +301,37 @@ def write_audio(
 def _gain_per_pa(sound: Array, sr: int, peak_dbfs: float | None, lufs: float | None, full_scale_pa: float) -> float:
     """The factor g of the module's head; peak and loudness are of the whole sound."""
     if peak_dbfs is None and lufs is None:
-        if not (math.isfinite(full_scale_pa) and full_scale_pa > 0):
-            raise AudioError(f"a full scale of {full_scale_pa} Pa", "give one above zero")
         return 1 / full_scale_pa
-    if peak_dbfs is not None and lufs is not None:
-        raise AudioError("both a peak and a loudness are asked for", "give one of --peak-dbfs and --lufs")
-    level = peak_dbfs if peak_dbfs is not None else lufs
-    if level is None or not -200 <= level <= 200:
-        raise AudioError(f"a level of {level} dB", "give one between -200 and 200 dB")
     peak = float(np.abs(sound).max()) if sound.size else 0.0
     if not math.isfinite(peak):
         raise AudioError("the samples hold NaN or infinite numbers", "sound must be finite: examine the scene with 'sonic-bullet doctor'")
     if peak < 1e-300:
         raise AudioError("the sound is silent, so no level can be given to it", "leave out --peak-dbfs and --lufs, or make something collide")
-    if lufs is None:
-        return float(10 ** (level / 20)) / peak
-    return float(10 ** ((level - _loudness_lufs(sound / peak, sr)) / 20)) / peak
+    if peak_dbfs is not None:
+        return float(10 ** (peak_dbfs / 20)) / peak
+    assert lufs is not None
+    return float(10 ** ((lufs - _loudness_lufs(sound / peak, sr)) / 20)) / peak
+
+
+def as_sound(samples: object) -> Array:
+    """Samples as float64. Raises AudioError where they are no array of real numbers."""
+    try:
+        sound = np.asarray(samples)
+        if sound.dtype.kind in "biuf":
+            return sound.astype(float, copy=False)
+    except ValueError:  # rows of several lengths
+        pass
+    raise AudioError(f"samples is {shown(samples)}", "pass real numbers, (channels, n)")
+
+
+def check_levels(peak_dbfs: float | None, lufs: float | None) -> None:
+    """Raise AudioError where a level cannot be asked for: before anything is rendered."""
+    if peak_dbfs is not None and lufs is not None:
+        raise AudioError("both peak_dbfs and lufs are given", "give one of a peak and a loudness")
+    if peak_dbfs is not None:
+        as_number(peak_dbfs, "peak_dbfs, a level re full scale,", "give one between -200 and 0 dB, -1 say", least=-200, most=0, error=AudioError)
+    if lufs is not None:
+        as_number(lufs, "lufs, a loudness level,", "give one between -200 and 200, -23 say", least=-200, most=200, error=AudioError)
 
 
 def _loudness_lufs(sound: Array, sr: int) -> float:
@@ -338,8 +355,13 @@ def read_audio(path: str | os.PathLike[str]) -> tuple[Array, int]:
     """
     import soundfile
 
-    if not Path(path).is_file():
-        raise FileError(f"cannot read {path}: no such file", "check the path")
+    path = as_path(path, "path", "name a sound file")
+    try:
+        there = Path(path).is_file()
+    except OSError:  # a name too long to be one
+        there = False
+    if not there:
+        raise FileError(f"cannot read {brief(path)}: no such file", "check the path")
     try:
         samples, sr = soundfile.read(os.fspath(path), dtype="float64", always_2d=True)
     except (soundfile.LibsndfileError, OSError) as error:

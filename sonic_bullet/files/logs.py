@@ -29,6 +29,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
+from sonic_bullet.coerce import as_path
 from sonic_bullet.contacts import ROW_FIELDS, ContactLog, Contacts, Step
 from sonic_bullet.errors import AudioError, LogError, RecordError
 from sonic_bullet.files.audio import check_sr
@@ -166,6 +167,7 @@ def write_log(path: str | os.PathLike[str], log: ContactLog) -> None:
 
 def read_log(path: str | os.PathLike[str]) -> ContactLog:
     """The contact log that `write_log` wrote. Raises FileError (no such file) and LogError (cut, foreign, forged, inconsistent)."""
+    path = as_path(path, "path", "name a contact log (.npz)")
     header, arrays = read_container(path, _LogHeader, LOG_FORMAT, "contact log")
     try:
         check_sr(header.sr)

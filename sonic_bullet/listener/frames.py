@@ -16,6 +16,7 @@ from itertools import chain
 import numpy as np
 import pybullet
 
+from sonic_bullet.coerce import shown
 from sonic_bullet.errors import SceneError
 from sonic_bullet.listener.kinematics import jumps
 from sonic_bullet.records import Array
@@ -74,8 +75,10 @@ def decode(code: int) -> tuple[int, int]:
 
 def check_connected(client_id: int) -> None:
     """Raise SceneError unless a physics server answers under this client id."""
-    if client_id < 0 or not pybullet.getConnectionInfo(physicsClientId=client_id)["isConnected"]:
-        raise SceneError(f"PyBullet client {client_id} is not connected", "connect first, e.g. BulletClient(pybullet.DIRECT), and attach before disconnecting")
+    if not 0 <= client_id < 2**31 or not pybullet.getConnectionInfo(physicsClientId=client_id)["isConnected"]:
+        raise SceneError(
+            f"PyBullet client {shown(client_id)} is not connected", "connect first, e.g. BulletClient(pybullet.DIRECT), and attach before disconnecting"
+        )
 
 
 def body_ids(client_id: int) -> list[int]:

@@ -5,6 +5,8 @@ Shape -> solid.Solid (structured.py, tetrahedra.py) -> K, M (fem.py) -> λ, U (e
 
 from sonic_bullet.modal.mesh_files import read_mesh
 from sonic_bullet.modal.model import analyse
+from sonic_bullet.modal.options import ModalOptions
+from sonic_bullet.modal.shapes import check_fillable
 from sonic_bullet.modal.solid import COARSER
 
-__all__ = ["COARSER", "analyse", "read_mesh"]
+__all__ = ["COARSER", "ModalOptions", "analyse", "check_fillable", "read_mesh"]

@@ -8,7 +8,7 @@ Solved without units: lengths by the body's diagonal L, stiffness by its largest
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -17,6 +17,7 @@ import numpy as np
 
 from sonic_bullet.errors import MeshError, ModalError
 from sonic_bullet.modal import cache as store
+from sonic_bullet.modal.options import ModalOptions
 from sonic_bullet.records import Array, Material, ModalModel, Shape
 
 MOST_MODES = 200
@@ -42,7 +43,7 @@ def analyse(
     *,
     to_hz: float = 20_000.0,
     count: int | None = None,
-    fixed: tuple[tuple[float, float, float, float], ...] = (),
+    fixed: Sequence[Sequence[float]] = (),
     thickness_m: float | None = None,
     edge_m: float | None = None,
     cache: Path | Literal["default"] | None = "default",
@@ -57,24 +58,20 @@ def analyse(
     Raises MeshError (broken, empty, flat, absurd or too slow mesh), ModalError (no usable modes).
     """
     say = progress or (lambda _: None)
+    asked = ModalOptions(to_hz, count, fixed, thickness_m)
+    to_hz, count, thickness_m = asked.to_hz, asked.count, asked.thickness_m
     if not shapes:
         raise MeshError("body has no shape", "give it a collision or visual shape, or pass mesh=")
     if any(shape.kind == "plane" for shape in shapes):
         none = np.zeros(0)
         return ModalModel(none, none, np.zeros((0, 3, 0)), np.zeros((0, 3)), np.zeros((0, 3)), none, 0.0, 0.0, note="plane: unbounded, no modes")
-    if not (np.isfinite(to_hz) and to_hz > 0):
-        raise ModalError(f"to_hz is {to_hz}", "give a frequency above zero")
-    if count is not None and not (int(count) == count and 0 < count <= 2000):
-        raise ModalError(f"count is {count}", "ask for 1 to 2000 modes")
     geometry_parts = [part for s in shapes for part in (s.kind, s.size_m, s.position_m, s.quaternion_xyzw, s.vertex_m, s.face)]
     solid_key = store.key("solid", *geometry_parts, thickness_m, edge_m)
     length_m = _diagonal_m(shapes)
     pascal = float(np.abs(material.stiffness_pa).max())
     per_s2 = pascal / (material.density_kg_m3 * length_m**2)
     limit = (2 * np.pi * to_hz) ** 2 / per_s2
-    clamp = np.array(fixed, float).reshape(-1, 4)
-    if not np.isfinite(clamp).all() or (clamp[:, 3] < 0).any():
-        raise ModalError(f"fixed is {fixed}", "give clamps as (x, y, z, radius) in metres")
+    clamp = np.array(asked.fixed, float).reshape(-1, 4)
     unit_stiffness = material.stiffness_pa / pascal
     name = store.key("modes", solid_key, unit_stiffness, clamp, count if count is not None else limit)
     unit = _recall(store.load(cache, name))
