@@ -39,7 +39,7 @@ class Kind:
 
 def kinds() -> dict[str, Kind]:
     """What is written, by kind."""
-    from sonic_bullet import compiled, presets
+    from sonic_bullet import kept_code, presets
     from sonic_bullet.contacts import ContactLog, Contacts, Step
     from sonic_bullet.files import read_audio, read_log, write_audio, write_log
     from sonic_bullet.modal import cache
@@ -75,7 +75,7 @@ def kinds() -> dict[str, Kind]:
         return 0 if imread(folder / "a.png").size else None
 
     def files(folder: Path) -> Any:
-        return compiled._Files(str(folder), "kernel", "stamp")
+        return kept_code.KeptFiles(str(folder), "kernel", "stamp")
 
     steel = presets.named_preset("steel")
     import msgspec

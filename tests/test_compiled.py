@@ -9,6 +9,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numba.core.caching
 import pytest
 
 from sonic_bullet import compiled
@@ -140,6 +141,13 @@ def test_without_a_place_kernels_are_compiled_in_every_process(folder: Path, hom
     before = {path.name for path in folder.iterdir()}
     assert hits(folder, HOME=home, XDG_CACHE_HOME=home or "/proc/none") == 0
     assert {path.name for path in folder.iterdir()} - before <= {"__pycache__"}
+
+
+def test_a_numba_whose_inner_parts_moved_compiles(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delattr(numba.core.caching.CompileResultCacheImpl, "rebuild")
+    monkeypatch.delattr(numba.core.caching.FunctionCache, "_impl_class")
+    monkeypatch.setattr(numba.core.caching.Cache, "__init__", None)
+    assert [found_here(), found_here()] == [0, 0]
 
 
 def test_every_kernel_is_compiled_in_the_one_place() -> None:
