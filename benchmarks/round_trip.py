@@ -130,7 +130,7 @@ def fitted(trial: Trial, model: ModalModel, sound: Array, sensor: str, at: tuple
     strike = CaseRecording(folder / "strike.wav", None, "object", "fit", tuple(place), tuple(-out), IMPULSE_N_S)  # type: ignore[arg-type]
     thing = CaseObject("object", trial.mesh, 1.0, trial.material)
     seen = ({"object": tuple(look)}, {"object": tuple(along)}) if sensor == "velocity" else (None, None)
-    case = Case(trial.name, folder, {"object": thing}, (strike,), sensor, *seen)  # type: ignore[arg-type]
+    case = Case(trial.name, folder, {"object": thing}, (strike,), sensor, *seen, medium="air")  # type: ignore[arg-type]
     return material_of(preset_of(fit_case(case, check_mesh=False)))
 
 

@@ -178,6 +178,7 @@ class Listener:
             body.model
             for body in self.world.bodies
             if body.model is not None
+            and body.model.includes_radiation == model.includes_radiation
             and all(np.array_equal(getattr(body.model, name), getattr(model, name)) for name in ("freq_hz", "decay_per_s", "vertex_m", "face", "shape"))
         )
         return next(same, model)

@@ -101,6 +101,7 @@ def analyse(
         mass_kg=volume * material.density_kg_m3,
         dropped=dropped,
         note=note,
+        includes_radiation=material.includes_radiation,
     )
 
 
