@@ -107,8 +107,8 @@ def rendered(model: ModalModel, material: Material, sensor: str, at: tuple[Array
     striker = Body(1, -1, 0, "striker", 0.0, np.zeros((3, 3)))
     eye: Microphone | Vibrometer = Vibrometer(0, look, along) if sensor == "velocity" else Microphone(MICROPHONE_M * np.array([0.36, 0.48, 0.8]))
     poses, upright = np.zeros((2, 3)), np.tile([0.0, 0.0, 0.0, 1.0], (2, 1))
-    one = [np.array([value], float) for value in (place, place, -out, -IMPULSE_N_S * out, np.zeros(3), np.zeros(2))]
-    hit = Contacts(np.array([0]), np.array([1]), *one, np.array([1.0]), np.array([0.0]))
+    still, touching = np.zeros((1, 3)), np.zeros(1)
+    hit = Contacts(np.array([0]), np.array([1]), place[None], place[None], -out[None], -IMPULSE_N_S * out[None], still, np.zeros((1, 2)), np.ones(1), touching)
     steps = [Step(STEP_S, poses, upright, np.zeros(2, bool), hit if i == 4 else Contacts.none()) for i in range(round(SECONDS / STEP_S))]
     (sound,) = render_log(ContactLog((body_of(model, material), striker), tuple(steps), (eye,), SR, 0))
     return np.asarray(sound)
@@ -127,11 +127,17 @@ def fitted(trial: Trial, model: ModalModel, sound: Array, sensor: str, at: tuple
     place, out, look, along = at
     noisy = sound + NOISE * np.abs(sound).max() * np.random.default_rng(3).standard_normal(len(sound))
     write_audio(str(folder / "strike.wav"), noisy[None] / np.abs(noisy).max() / 2, SR)
-    strike = CaseRecording(folder / "strike.wav", None, "object", "fit", tuple(place), tuple(-out), IMPULSE_N_S)  # type: ignore[arg-type]
+    strike = CaseRecording(folder / "strike.wav", None, "object", "fit", triple(place), triple(-out), IMPULSE_N_S)
     thing = CaseObject("object", trial.mesh, 1.0, trial.material)
-    seen = ({"object": tuple(look)}, {"object": tuple(along)}) if sensor == "velocity" else (None, None)
-    case = Case(trial.name, folder, {"object": thing}, (strike,), sensor, *seen, medium="air")  # type: ignore[arg-type]
+    at_m, way = ({"object": triple(look)}, {"object": triple(along)}) if sensor == "velocity" else (None, None)
+    case = Case(trial.name, folder, {"object": thing}, (strike,), sensor, at_m, way, medium="air")
     return material_of(preset_of(fit_case(case, check_mesh=False)))
+
+
+def triple(vector: Array) -> tuple[float, float, float]:
+    """A vector (3,) as a case holds it."""
+    x, y, z = (float(value) for value in vector)
+    return x, y, z
 
 
 def compared(first: Lines, again: Lines) -> tuple[int, float, float]:

@@ -17,7 +17,7 @@ from sonic_bullet.errors import AudioError, FileError, MeshError
 from sonic_bullet.estimator.lines import Lines, joint_lines, noise_rms
 from sonic_bullet.estimator.observe import Observation, observation
 from sonic_bullet.estimator.onset import span
-from sonic_bullet.files import read_audio
+from sonic_bullet.files import channel_of, channel_words, read_audio
 from sonic_bullet.files.cases import Case, CaseObject, CaseRecording, Line
 from sonic_bullet.modal import read_mesh
 from sonic_bullet.modal.cache import Place
@@ -153,19 +153,18 @@ def observed(case: Case, thing: CaseObject, guess: Material, recordings: tuple[C
 def _sounds(case: Case, thing: CaseObject, recordings: tuple[CaseRecording, ...], clipped: bool) -> tuple[Array, int, list[str]]:
     """Signals (s, n) of an object's strikes, each from its onset, their rate, and what is odd about them. Raises FileError, AudioError."""
     sounds, rates, told = [], [], []
+    several: dict[str, list[str]] = {}
     for r in recordings:
         sound, sr = read_audio(r.file or "")
-        if r.channel >= len(sound):
-            raise FileError(f"{r.file} has no channel {r.channel}", "name one it has")
-        sounds.append(until_it_breaks_off(_checked(sound[r.channel], str(r.file), clipped), sr))
+        sounds.append(until_it_breaks_off(_checked(channel_of(sound, r.channel, r.file), str(r.file), clipped), sr))
         if len(sounds[-1]) < sound.shape[1]:
             told.append(f"{r.file} breaks off after {len(sounds[-1]) / sr:.3g} s: the digital silence behind is no decay, and is left out")
         rates.append(sr)
-        if len(sound) > 1 and r.channel == 0:
-            told.append(f"{r.file} has {len(sound)} channels: the first is used")
+        several.setdefault(channel_words(len(sound), r.channel), []).append(str(r.file))
         if case.onset_s is None and (heard := span(sounds[-1], sr)).hits > 1:
             told.append(f"{r.file} holds {heard.hits} hits: only what comes before the second is used")
             sounds[-1] = sounds[-1][: heard.stop]
+    told += [f"{names[0]}{f' and {len(names) - 1} more' * (len(names) > 1)}: {words}" for words, names in several.items() if words]
     if len(set(rates)) > 1:
         raise AudioError(f"recordings of {thing.name} have rates {sorted(set(rates))} Hz", "give files of one rate")
     sr = rates[0]

@@ -19,9 +19,9 @@ import numpy as np
 from sonic_bullet.errors import AudioError, FileError
 from sonic_bullet.estimator.evidence import Evidence, gather
 from sonic_bullet.estimator.fitted import POISSON_SD, POISSON_TOLD, CaseFit, ObjectFit
-from sonic_bullet.estimator.objects import CORRECTION, fitted_object, gain_of, in_air, object_of
+from sonic_bullet.estimator.objects import CORRECTION, fitted_object, gain_of, object_of
 from sonic_bullet.estimator.pairing import GAMMA_REACH, MESH_SD, Pairs, assign, grouped, paired, sift, solve
-from sonic_bullet.estimator.radiated import KNOWN, Radiated, radiation_in
+from sonic_bullet.estimator.radiated import KNOWN, Radiated, in_air, radiation_in
 from sonic_bullet.estimator.rayleigh import rayleigh
 from sonic_bullet.estimator.verdict import finished
 from sonic_bullet.files.cases import Case
@@ -37,11 +37,17 @@ def fit_case(case: Case, *, cache: Place = "default", check_mesh: bool = True, p
     Raises SonicBulletError where a file, mesh or number makes a fit impossible; what the recordings do not say stands in the verdict instead.
     """
     evidence = gather(case, cache=cache, progress=progress)
-    return fit_evidence(case, evidence, check_mesh=check_mesh, progress=progress)
+    return fit_evidence(case, evidence, cache=cache, check_mesh=check_mesh, progress=progress)
 
 
 def fit_evidence(
-    case: Case, evidence: tuple[Evidence, ...], *, check_mesh: bool = True, total: bool = False, progress: Callable[[str], None] | None = None
+    case: Case,
+    evidence: tuple[Evidence, ...],
+    *,
+    cache: Place = "default",
+    check_mesh: bool = True,
+    total: bool = False,
+    progress: Callable[[str], None] | None = None,
 ) -> CaseFit:
     """`fit_case` on evidence already gathered. total: α and β of the decays as they are, whatever the air takes of them. Raises SonicBulletError."""
     if len({e.guess.name for e in evidence}) > 1:
@@ -61,7 +67,7 @@ def fit_evidence(
     apart = radiation == "apart"
     if apart and progress is not None:
         progress("how its modes radiate")
-    air = tuple(in_air(e, log_gamma, poisson, case.band_hz[1], apart) for e in shaped)
+    air = tuple(in_air(e, log_gamma, poisson, case.band_hz[1], apart, cache) for e in shaped)
     lam, decay, decay_sd, extra = _decays(evidence, pairs, air if apart else (None,) * len(air))
     start = (guess.alpha_per_s or 1.0, guess.beta_s or 1.0 / (float(np.median(lam)) if len(lam) else 1e8))
     damping = rayleigh(lam, decay - extra, np.hypot(decay_sd, KNOWN * extra), start, decay)

@@ -13,18 +13,13 @@ from sonic_bullet.estimator.fitted import CaseFit, ObjectFit
 from sonic_bullet.estimator.lines import Lines
 from sonic_bullet.estimator.observe import Observation
 from sonic_bullet.estimator.pairing import Pairs, grouped, phased
-from sonic_bullet.estimator.radiated import Radiated, nothing, radiated
+from sonic_bullet.estimator.radiated import Radiated, in_air, nothing
 from sonic_bullet.estimator.rayleigh import Damping
 from sonic_bullet.files.cases import CaseObject
 from sonic_bullet.modal.reduced import Family
 from sonic_bullet.records import Material
 
 CORRECTION = 0.01
-
-
-def in_air(e: Evidence, log_gamma: float, poisson: float, high_hz: float, taken_off: bool) -> Radiated | None:
-    """What an object's modes radiate, where its sensor is a microphone or the material's damping goes without it; else None."""
-    return radiated(e, log_gamma, poisson, high_hz) if taken_off or (e.seen is not None and e.seen.kind == "pressure") else None
 
 
 def fitted_object(e: Evidence, pairs: Pairs, air: Radiated | None, damping: Damping, band_hz: tuple[float, float], *, taken_off: bool = False) -> ObjectFit:

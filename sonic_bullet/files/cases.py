@@ -88,7 +88,7 @@ class _Recording(msgspec.Struct, frozen=True):
     object: str | None = None
     split: str = "fit"
     strike: _Strike = _Strike()
-    channel: int = 0
+    channel: int | None = None
 
 
 class _Raw(msgspec.Struct, frozen=True):
@@ -119,7 +119,7 @@ class CaseObject:
 
 @dataclass(frozen=True, slots=True)
 class CaseRecording:
-    """One strike: an audio file or measured lines, on which object, for what use, and where and how hard; None where not declared."""
+    """One strike: an audio file or measured lines, on which object, for what use, and where and how hard; None where not declared. channel: from 0."""
 
     file: Path | None
     lines: tuple[Line, ...] | None
@@ -128,7 +128,7 @@ class CaseRecording:
     position_m: Vector | None = None
     direction: Vector | None = None
     impulse_n_s: float | None = None
-    channel: int = 0
+    channel: int | None = None
     force: tuple[Path, int, float | None] | None = None
 
 
@@ -236,7 +236,7 @@ def _recording(entry: _Recording, number: int, objects: dict[str, CaseObject], o
             raise FileError(
                 f"{where}: a feature of {line.freq_hz:g} Hz and decay {line.decay_per_s}", "give frequencies above zero and decays of at least zero"
             )
-    if entry.channel < 0:
+    if entry.channel is not None and entry.channel < 0:
         raise FileError(f"{where} has channel {entry.channel}", "channels are counted from 0")
     strike = entry.strike
     direction = strike.direction

@@ -263,7 +263,15 @@ def _model_arrays(model: ModalModel, index: int) -> dict[str, Array]:
 def _unpack_model(header: _Model, arrays: Mapping[str, Array], index: int, path: object) -> ModalModel:
     parts = {name: take(arrays, f"model{index}_{name}", dtype, shape, path) for name, (dtype, shape) in MODEL_ARRAYS.items()}
     parts |= {name: take(arrays, f"model{index}_{name}", float, (None,), path) for name in BENT_ARRAYS if f"model{index}_{name}" in arrays}
-    return ModalModel(**parts, **msgspec.structs.asdict(header))
+    return ModalModel(
+        **parts,
+        volume_m3=header.volume_m3,
+        mass_kg=header.mass_kg,
+        dropped=header.dropped,
+        note=header.note,
+        choke_power=header.choke_power,
+        includes_radiation=header.includes_radiation,
+    )
 
 
 def _unpack_residual(header: _Residual | None, arrays: Mapping[str, Array], index: int, path: object) -> Residual | None:
