@@ -181,14 +181,14 @@ def around(trial: Trial, sensor: str, folder: Path) -> tuple[int, float, float, 
     return *compared(lines_of(sound), lines_of(again)), off(played(model, truth), played(anew, found), model.freq_hz)
 
 
-def thicker(folder: Path, sensor: str, name: str = "glass") -> float:
+def thicker(folder: Path, sensor: str, name: str = "glass", size_m: tuple[float, float, float] = (0.2, 0.15, 0.004)) -> float:
     """Worst decay of a plate twice as thick, played with what was fitted on the thin one."""
-    thin = Trial("plate", box_obj(folder / "thin.obj", (0.2, 0.15, 0.004)), name)
+    thin = Trial("plate", box_obj(folder / "thin.obj", size_m), name)
     truth, shape = load_material(name), modal.read_mesh(thin.mesh)
     model = modal.analyse((shape,), truth)
     at = places(model)
     found = fitted(thin, model, rendered(model, truth, sensor, at), sensor, at, folder)
-    thick: Shape = modal.read_mesh(box_obj(folder / "thick.obj", (0.2, 0.15, 0.008)))
+    thick: Shape = modal.read_mesh(box_obj(folder / "thick.obj", (*size_m[:2], 2 * size_m[2])))
     one, two = (modal.analyse((thick,), x) for x in (truth, found))
     return off(played(one, truth), played(two, found), one.freq_hz)
 

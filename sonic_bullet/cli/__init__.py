@@ -215,6 +215,11 @@ def strike_options(command: Any) -> Any:
             ),
             click.option("--sensor-at", type=Numbers("X,Y,Z"), help="Where the surface was heard, in m, for --sensor velocity."),
             click.option("--sensor-direction", type=Numbers("X,Y,Z"), help="Along which, for --sensor velocity. [default: out of the surface]"),
+            click.option(
+                "--medium",
+                type=click.Choice(["air", "none"]),
+                help="What it rang in: 'none' loses nothing to radiation. [default: air; with --sensor sum unknown]",
+            ),
             click.option("--onset", "onset_s", type=click.FloatRange(0), metavar="S", help="When the impulse arrives. [default: found]"),
             channel_option,
             click.option("--fix", "fixed", type=Numbers("X,Y,Z,R"), multiple=True, help="Clamp all within R of a point, in m, mesh frame; repeatable."),

@@ -14,7 +14,7 @@ from sonic_bullet.files.cases import Case, CaseObject, CaseRecording, medium_of,
 from sonic_bullet.records import Array
 
 Point = tuple[float, float, float]
-ONE = ("mesh", "strike", "direction", "impulse", "material", "scale", "sensor", "sensor_at", "sensor_direction", "onset_s", "fixed", "channel")
+ONE = ("mesh", "strike", "direction", "impulse", "material", "scale", "sensor", "sensor_at", "sensor_direction", "onset_s", "fixed", "channel", "medium")
 
 
 def run_fit(source: str, *, output: str, picture: str | None, json_to: str | None, **one: Any) -> None:
@@ -76,7 +76,7 @@ def as_case(source: str, one: dict[str, Any]) -> Case:
     at = {"object": one["sensor_at"]} if one["sensor_at"] is not None else None
     along = _unit("sensor_direction", one)
     way = None if along is None else {"object": along}
-    medium = medium_of(None, kind)
+    medium = medium_of(one["medium"], kind)
     return Case(path.stem, path.parent, {"object": thing}, (recording,), kind, at, way, onset_s=one["onset_s"], medium=medium)
 
 

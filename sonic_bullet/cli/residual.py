@@ -13,7 +13,7 @@ from sonic_bullet.errors import AudioError, FileError
 from sonic_bullet.files import channel_of, channel_words, check_output, read_audio
 from sonic_bullet.records import Residual
 
-UNSHAPED = ("strike", "direction", "impulse", "scale", "sensor", "sensor_at", "sensor_direction", "fixed")
+UNSHAPED = ("strike", "direction", "impulse", "scale", "sensor", "sensor_at", "sensor_direction", "fixed", "medium")
 
 
 def run_residual(source: str, *, output: str, picture: str | None, json_to: str | None, **one: Any) -> None:

@@ -25,7 +25,7 @@ from sonic_bullet.diagnosis.sone import sone_distance
 from sonic_bullet.diagnosis.unexplained import remainder
 from sonic_bullet.effects import EFFECTS
 from sonic_bullet.effects.values import Effect
-from sonic_bullet.estimator.evidence import gather, onset_sample, until_it_breaks_off
+from sonic_bullet.estimator.evidence import check_meshes, gather, onset_sample, until_it_breaks_off
 from sonic_bullet.estimator.fitted import CaseFit
 from sonic_bullet.files import channel_of, read_audio
 from sonic_bullet.files.cases import Case, CaseRecording, read_case
@@ -75,6 +75,7 @@ def diagnose(
     if not isinstance(case, Case):
         case = read_case(case)
     say = progress or (lambda _: None)
+    check_meshes(case, (r.object for r in case.recordings))
     gathered = gather(case, cache=cache, progress=progress, clipped=True)
     start = baseline(case, gathered, cache=cache, progress=progress)
     found, bodies, takes = start.found, start.bodies, start.takes

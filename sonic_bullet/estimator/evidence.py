@@ -7,7 +7,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -79,7 +79,9 @@ def gather(
     """
     say = progress or (lambda _: None)
     found: list[Evidence] = []
-    for name in dict.fromkeys(r.object for r in case.recordings if r.split == split):
+    names = tuple(dict.fromkeys(r.object for r in case.recordings if r.split == split))
+    check_meshes(case, names)
+    for name in names:
         thing = case.objects.get(name, CaseObject(name or "object", None, 1.0, None, 2e11, 7850.0, 0.3))
         guess = guess_of(thing)
         mine = tuple(r for r in case.recordings if r.object == name and r.split == split)
@@ -106,6 +108,14 @@ def gather(
     if not found:
         raise FileError(f"case {case.name} has no '{split}' strike with audio or features", "mark at least one recording with split 'fit'")
     return tuple(found)
+
+
+def check_meshes(case: Case, names: Iterable[str]) -> None:
+    """Raise FileError where the mesh file of one of a case's objects is not there: before any of them is listened to, which takes long."""
+    for name in names:
+        mesh = case.objects[name].mesh if name in case.objects else None
+        if mesh is not None and not mesh.is_file():
+            raise FileError(f"mesh file '{mesh}' does not exist", "check the path")
 
 
 def _modes_heard(body: Family, guess: Material, band_hz: tuple[float, float]) -> int:

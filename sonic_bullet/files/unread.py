@@ -1,6 +1,6 @@
 """Fields of a JSON file that its typed form does not read: a name mistyped is said, not passed over.
 
-    decoded JSON, msgspec.Struct -> one line for each field that no struct at that place has, with the nearest one that it has
+decoded JSON, msgspec.Struct -> one line for each field that no struct at that place has, with the nearest one that it has
 """
 
 from __future__ import annotations
