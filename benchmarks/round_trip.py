@@ -3,7 +3,7 @@
     python benchmarks/round_trip.py --data ../shared/practice [OBJECT ...]
 
 Each object is played at a microphone and at a vibrometer, with noise 90 dB below the peak. Lines of both renders that are the same mode are compared: their
-decays must agree within 3 %, their levels within 0.5 dB. A mode is identified where it stands two widths apart from its neighbours and a line lies on it whose
+decays must agree within 3 %, their levels within 0.5 dB. A mode is identified where it stands three widths apart from its neighbours and a line lies on it whose
 decay is known to 0.5 %; beside that, the decays that the run time plays are compared of all modes, heard or not. `thick` fits a plate and plays the preset on one
 twice as thick, beside the true material there: 5 %.
 """
@@ -41,7 +41,8 @@ IMPULSE_N_S = 0.01
 NOISE = 10 ** (-90 / 20)
 MICROPHONE_M = 0.5
 LIMIT_DECAY, LIMIT_THICK, LIMIT_DB = 0.03, 0.05, 0.5
-APART = 2.0  # widths d/π between modes: nearer ones ring as one line, whose decay is no mode's
+PUSH_S = 3e-3  # after the onset: while it is pushed, a body does not ring freely
+APART, TWINS = 3.0, 0.1  # widths d/π between modes: nearer ones ring as one line, whose decay is no mode's; but for twins, which decay alike
 NEAR = 0.3  # of a width: a line that is the mode
 KNOWN = 5e-3  # relative spread of a decay that is known
 ROOT = Path(__file__).parents[1]
@@ -116,12 +117,17 @@ def rendered(model: ModalModel, material: Material, sensor: str, at: tuple[Array
     return np.asarray(sound)
 
 
-def lines_of(sound: Array) -> Lines:
-    """The lines of a render, its onset where its power rises."""
+def pushed(sound: Array) -> int:
+    """The sample at which the push of a render is over: the same for every render of the same steps."""
     from sonic_bullet.estimator.evidence import onset_sample
 
+    return onset_sample(sound, SR) + round(PUSH_S * SR)
+
+
+def lines_of(sound: Array, start: int) -> Lines:
+    """The lines of a render from a sample on."""
     noisy = sound + NOISE * np.abs(sound).max() * np.random.default_rng(7).standard_normal(len(sound))
-    return joint_lines(noisy[None, onset_sample(noisy, SR) :], SR, signed=False)
+    return joint_lines(noisy[None, start:], SR, signed=False)
 
 
 def fitted(trial: Trial, model: ModalModel, sound: Array, sensor: str, at: tuple[Array, Array, Array, Array], folder: Path) -> Material:
@@ -143,21 +149,20 @@ def triple(vector: Array) -> tuple[float, float, float]:
 
 
 def identified(lines: Lines, model: ModalModel, decay: Array) -> Array:
-    """The line (m,) that each mode of a model is, -1 where none is: of modes that stand apart from their neighbours, lines of known decay.
+    """The line (m,) that each mode of a model is, -1 where none is: of modes, or twins, that stand apart from their neighbours, lines of known decay.
 
     Apart by their frequencies and widths alone, so that what is compared, decays and levels, has no say in it.
     """
-    freq = model.freq_hz[: len(decay)]
-    width = decay / np.pi
-    gap = np.full(len(freq), np.inf)
-    gap[1:] = np.diff(freq) - APART * np.maximum(width[1:], width[:-1])
-    gap[:-1] = np.minimum(gap[:-1], np.diff(freq) - APART * np.maximum(width[1:], width[:-1]))
+    freq, width = model.freq_hz[: len(decay)], decay / np.pi
     found = np.full(len(freq), -1)
     known = np.flatnonzero(lines.decay_sd_per_s < KNOWN * lines.decay_per_s)
-    for m in np.flatnonzero((gap > 0) & (freq < 20_000)) if len(known) else ():
-        off = np.abs(lines.freq_hz[known] - freq[m])
-        if off.min() < NEAR * width[m]:
-            found[m] = known[off.argmin()]
+    step = np.diff(freq) / np.maximum(width[1:], width[:-1])
+    for who in np.split(np.arange(len(freq)), np.flatnonzero(step > TWINS) + 1) if len(known) else ():
+        first, last = who[0], who[-1]
+        apart = min(step[first - 1] if first else np.inf, step[last] if last < len(step) else np.inf)
+        off = np.abs(lines.freq_hz[known] - freq[who].mean())
+        if apart > APART and freq[first] < 20_000 and off.min() < NEAR * width[first]:
+            found[first] = known[off.argmin()]
     return found
 
 
@@ -193,7 +198,8 @@ def around(trial: Trial, sensor: str, folder: Path) -> tuple[int, float, float, 
     anew = modal.analyse((shape,), found)
     again = rendered(anew, found, sensor, at)
     decays = played(model, truth), played(anew, found)
-    lines = lines_of(sound), lines_of(again)
+    start = pushed(sound)
+    lines = lines_of(sound, start), lines_of(again, start)
     which = identified(lines[0], model, decays[0]), identified(lines[1], anew, decays[1])
     return *compared(*lines, which), off(*decays, model.freq_hz)
 
