@@ -62,7 +62,8 @@ class Material:
     """What a body is made of.
 
     stiffness_pa (6, 6): Voigt tensor, positive definite. alpha_per_s, beta_s: Rayleigh damping d = (alpha + beta·lambda)/2
-    [Ren, Yeh, Lin 2013, eq. 6], None where unknown. roughness_m: rms height of the surface profile; hurst: its Hurst
+    [Ren, Yeh, Lin 2013, eq. 6], None where unknown. includes_radiation: they, and laws among the effects, are a body's total damping
+    as it was recorded, so the run time adds no radiation to it; else the material's own, to which it does. roughness_m: rms height of the surface profile; hurst: its Hurst
     exponent (profile spectrum ∝ k^-(1+2·hurst)). restitution: of an impact against a rigid wall, for pulses only.
     residual: what sounds beside the modes, None: nothing. effects: what else belongs to it (sonic_bullet.effects), in the order in which they act.
     """
@@ -78,6 +79,7 @@ class Material:
     source: str = ""
     residual: Residual | None = None
     effects: tuple[Any, ...] = ()
+    includes_radiation: bool = False
 
     def __post_init__(self) -> None:
         as_text(self.name, "the name of a material", "give a text")
@@ -186,7 +188,7 @@ class ModalModel:
     of the smooth surface (0 flat, 1/r sphere, negative inside a bowl). volume_m3, mass_kg: of the meshed solid at the
     material's density. dropped: modes left out as overdamped. note: how it was made (element size, order, choices).
     bend_s2_m2, choke_s_m (m,): relative rise of a mode's frequency per square of its peak velocity at the surface, of its decay
-    (choke · that velocity)^choke_power, 1 or 2; None: a linear body.
+    (choke · that velocity)^choke_power, 1 or 2; None: a linear body. includes_radiation: of decay_per_s, as the material's (see `Material`).
     A body without audible modes has m = 0; a plane has v = f = 0 besides.
     """
 
@@ -203,6 +205,7 @@ class ModalModel:
     bend_s2_m2: Array | None = None
     choke_s_m: Array | None = None
     choke_power: float = 1.0
+    includes_radiation: bool = False
 
     def __post_init__(self) -> None:
         freq = frozen_array(self.freq_hz, float, (None,), "freq_hz")

@@ -211,7 +211,8 @@ class Listener:
         same = (
             other
             for other in known
-            if all(np.array_equal(getattr(other, name), getattr(model, name)) for name in ("freq_hz", "decay_per_s", "vertex_m", "face", "shape"))
+            if other.includes_radiation == model.includes_radiation
+            and all(np.array_equal(getattr(other, name), getattr(model, name)) for name in ("freq_hz", "decay_per_s", "vertex_m", "face", "shape"))
         )
         return next(same, model)
 

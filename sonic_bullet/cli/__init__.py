@@ -177,10 +177,16 @@ def doctor(scene: str, seconds: float, json_to: str | None) -> None:
     run_doctor(scene, seconds, json_to)
 
 
+channel_option = click.option(
+    "--channel", type=click.IntRange(0), metavar="N", help="Which channel of a file of several, counted from 0. [default: the first, 0]"
+)
+
+
 @cli.command(epilog=FEATURES_EPILOG)
 @click.argument("recording")
 @click.option("--onset", "onset_s", type=click.FloatRange(0), metavar="S", help="When the impact starts. [default: found]")
 @click.option("--band", type=Numbers("LO,HI"), help="Look between these frequencies in Hz. [default: 20,20000]")
+@channel_option
 @click.option("--picture", metavar="NAME.png", help="Also draw the spectrogram with the features on it, and decay over frequency.")
 @json_option
 def features(**options: Any) -> None:
@@ -209,7 +215,13 @@ def strike_options(command: Any) -> Any:
             ),
             click.option("--sensor-at", type=Numbers("X,Y,Z"), help="Where the surface was heard, in m, for --sensor velocity."),
             click.option("--sensor-direction", type=Numbers("X,Y,Z"), help="Along which, for --sensor velocity. [default: out of the surface]"),
+            click.option(
+                "--medium",
+                type=click.Choice(["air", "none"]),
+                help="What it rang in: 'none' loses nothing to radiation. [default: air; with --sensor sum unknown]",
+            ),
             click.option("--onset", "onset_s", type=click.FloatRange(0), metavar="S", help="When the impulse arrives. [default: found]"),
+            channel_option,
             click.option("--fix", "fixed", type=Numbers("X,Y,Z,R"), multiple=True, help="Clamp all within R of a point, in m, mesh frame; repeatable."),
         )
     ):

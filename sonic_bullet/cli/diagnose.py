@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 from typing import Any
 
-from sonic_bullet.cli.output import clean_stdout, folder_place, places, status, table, write_json
+from sonic_bullet.cli.output import clean_stdout, folder_place, places, status, table, warn, write_json
 from sonic_bullet.errors import FileError
 from sonic_bullet.files.cases import read_case
 
@@ -22,6 +22,7 @@ def run_diagnose(source: str, *, output: str | None, json_to: str | None, predic
     output, report, json_to = places(output, report, json_to)
     folder = None if predict is None else folder_place(predict, *SIDES)
     case = read_case(source)
+    warn(case.warnings)
     with clean_stdout(json_to) as say:
         from sonic_bullet.diagnosis.diagnose import described, diagnose
 
@@ -42,6 +43,7 @@ def run_diagnose(source: str, *, output: str | None, json_to: str | None, predic
         say(_told(found))
         if predict is not None:
             say(f"{written} strikes predicted in {predict}")
+    warn(found.warnings)
     write_json(json_to, described(found))
 
 
@@ -86,7 +88,7 @@ def _told(found: Any) -> str:
         text.append("tried and not kept: " + "; ".join(f"{c.id} {c.mean_db:+.2f} dB (chance {c.null_db:+.2f})" for c in others))
     if found.unexplained:
         text.append(f"left: {found.unexplained['words']}")
-    return "\n".join([*text, *(f"warning: {w}" for w in found.warnings)])
+    return "\n".join(text)
 
 
 def _number(value: Any) -> str:

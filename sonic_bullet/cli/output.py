@@ -2,6 +2,7 @@
 
 result -> JSON  -> PATH, or stdout and nothing else there
        -> text  -> stdout
+warnings        -> stderr, a line each
 progress        -> stderr, on a terminal only
 """
 
@@ -10,7 +11,7 @@ from __future__ import annotations
 import json
 import os
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, redirect_stdout, suppress
 from pathlib import Path
 from typing import Any
@@ -36,6 +37,12 @@ def clean_stdout(json_to: str | None) -> Iterator[Callable[[str], None]]:
     finally:
         os.dup2(kept, 1)
         os.close(kept)
+
+
+def warn(lines: Iterable[str]) -> None:
+    """A line of stderr each: what a user should know of a result that stands all the same."""
+    for line in lines:
+        print("sonic-bullet: warning: " + " ".join(line.split()), file=sys.stderr)
 
 
 @contextmanager

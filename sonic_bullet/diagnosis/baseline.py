@@ -113,7 +113,7 @@ def _off_db(b: Baseline) -> float:
 
 
 def _of(case: Case, gathered: tuple[Gathered, ...], cache: Place, progress: Callable[[str], None] | None) -> Baseline:
-    found = fit_evidence(case, gathered, check_mesh=False, progress=progress)
+    found = fit_evidence(case, gathered, check_mesh=False, total=True, progress=progress)
     bodies = struck_bodies(found, cache=cache, progress=progress) if found.objects else tuple(shapeless(found, g) for g in gathered)
     bodies = with_elastic(found, tuple(parted(body) for body in bodies), cache=cache, progress=progress)
     gain = found.fit.sigma if np.isfinite(found.fit.sigma) and found.fit.sigma > 0 else 1.0

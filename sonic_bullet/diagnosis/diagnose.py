@@ -25,9 +25,9 @@ from sonic_bullet.diagnosis.sone import sone_distance
 from sonic_bullet.diagnosis.unexplained import remainder
 from sonic_bullet.effects import EFFECTS
 from sonic_bullet.effects.values import Effect
-from sonic_bullet.estimator.evidence import gather, onset_sample, until_it_breaks_off
+from sonic_bullet.estimator.evidence import check_meshes, gather, onset_sample, until_it_breaks_off
 from sonic_bullet.estimator.fitted import CaseFit
-from sonic_bullet.files import read_audio
+from sonic_bullet.files import channel_of, read_audio
 from sonic_bullet.files.cases import Case, CaseRecording, read_case
 from sonic_bullet.modal.cache import Place
 from sonic_bullet.records import Array
@@ -75,6 +75,7 @@ def diagnose(
     if not isinstance(case, Case):
         case = read_case(case)
     say = progress or (lambda _: None)
+    check_meshes(case, (r.object for r in case.recordings))
     gathered = gather(case, cache=cache, progress=progress, clipped=True)
     start = baseline(case, gathered, cache=cache, progress=progress)
     found, bodies, takes = start.found, start.bodies, start.takes
@@ -123,7 +124,7 @@ def _others(case: Case, bodies: tuple[Struck, ...], takes: tuple[Take, ...], spl
                 continue
             sample, sr = read_audio(r.file)
             start = onset_of(case, bodies, sr)
-            found.append(Take(body, i, until_it_breaks_off(sample[r.channel], sr)[start:], sr, takes[0].floor))
+            found.append(Take(body, i, until_it_breaks_off(channel_of(sample, r.channel, r.file), sr)[start:], sr, takes[0].floor))
     return tuple(found)
 
 
@@ -134,7 +135,7 @@ def onset_of(case: Case, bodies: tuple[Struck, ...], sr: int) -> int:
     files = [
         (r.file, r.channel) for body in bodies if body.gathered is not None and body.gathered.signals is not None for r in body.gathered.recordings if r.file
     ]
-    late = [onset_sample(read_audio(file)[0][channel], sr) for file, channel in files]
+    late = [onset_sample(channel_of(read_audio(file)[0], channel, file), sr) for file, channel in files]
     return int(np.median(late)) if late else 0
 
 
@@ -194,7 +195,7 @@ def described(d: Diagnosis) -> dict[str, Any]:
             "correction_rms": {b.name: float(np.sqrt((b.correction**2).mean())) if len(b.correction) else 0.0 for b in d.bodies if b.gathered is not None},
         },
         "after": {"alpha_per_s": d.closed.after.alpha_per_s, "beta_s": d.closed.after.beta_s, "gain": d.closed.after.gain},
-        "warnings": list(d.warnings),
+        "warnings": [*d.case.warnings, *d.warnings],
     }
     return {name: _finite(value) for name, value in whole.items()}
 

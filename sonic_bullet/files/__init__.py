@@ -9,12 +9,15 @@ beneath them, `atomic` the replacing.
 
 from sonic_bullet.files.atomic import cannot, check_output, kept_name, replacing
 from sonic_bullet.files.audio import AudioReport, AudioWriter, check_audio_output, check_levels, check_sr, read_audio, write_audio
+from sonic_bullet.files.channels import channel_of, channel_words
 from sonic_bullet.files.logs import read_log, read_model, write_log, write_model
 
 __all__ = [
     "AudioReport",
     "AudioWriter",
     "cannot",
+    "channel_of",
+    "channel_words",
     "check_audio_output",
     "check_levels",
     "check_output",

@@ -63,6 +63,7 @@ class _Model(msgspec.Struct, omit_defaults=True):
     dropped: int
     note: str
     choke_power: float = 1.0
+    includes_radiation: bool = False
 
 
 class _Residual(msgspec.Struct):
@@ -80,6 +81,7 @@ class _Material(msgspec.Struct, omit_defaults=True):
     restitution: float
     source: str
     residual: _Residual | None = None
+    includes_radiation: bool = False
 
 
 class _Body(msgspec.Struct):
@@ -224,11 +226,12 @@ def _pack_material(x: Material) -> _Material:
         restitution=float(x.restitution),
         source=_text(x.source),
         residual=None if x.residual is None else _Residual(float(x.residual.clip_energy), _text(x.residual.source)),
+        includes_radiation=bool(x.includes_radiation),
     )
 
 
 def _pack_model(x: ModalModel) -> _Model:
-    return _Model(float(x.volume_m3), float(x.mass_kg), int(x.dropped), _text(x.note), float(x.choke_power))
+    return _Model(float(x.volume_m3), float(x.mass_kg), int(x.dropped), _text(x.note), float(x.choke_power), bool(x.includes_radiation))
 
 
 def _pack_body(x: Body, material: int | None, model: int | None) -> _Body:
@@ -262,7 +265,15 @@ def _model_arrays(model: ModalModel, index: int) -> dict[str, Array]:
 def _unpack_model(header: _Model, arrays: Mapping[str, Array], index: int, path: object) -> ModalModel:
     parts = {name: take(arrays, f"model{index}_{name}", dtype, shape, path) for name, (dtype, shape) in MODEL_ARRAYS.items()}
     parts |= {name: take(arrays, f"model{index}_{name}", float, (None,), path) for name in BENT_ARRAYS if f"model{index}_{name}" in arrays}
-    return ModalModel(**parts, volume_m3=header.volume_m3, mass_kg=header.mass_kg, dropped=header.dropped, note=header.note, choke_power=header.choke_power)
+    return ModalModel(
+        **parts,
+        volume_m3=header.volume_m3,
+        mass_kg=header.mass_kg,
+        dropped=header.dropped,
+        note=header.note,
+        choke_power=header.choke_power,
+        includes_radiation=header.includes_radiation,
+    )
 
 
 def _unpack_residual(header: _Residual | None, arrays: Mapping[str, Array], index: int, path: object) -> Residual | None:

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -19,6 +19,9 @@ from sonic_bullet.errors import MeshError, ModalError
 from sonic_bullet.modal import cache as store
 from sonic_bullet.modal.options import ModalOptions
 from sonic_bullet.records import Array, Material, ModalModel, Shape
+
+if TYPE_CHECKING:
+    from sonic_bullet.modal.shapes import Filled
 
 MOST_MODES = 200
 SHIFT = 20.0  # × (2V/A)²/L²: a third of the first elastic λ' of plates and bars, less of chunky bodies
@@ -65,8 +68,7 @@ def analyse(
     if any(shape.kind == "plane" for shape in shapes):
         none = np.zeros(0)
         return ModalModel(none, none, np.zeros((0, 3, 0)), np.zeros((0, 3)), np.zeros((0, 3)), none, 0.0, 0.0, note="plane: unbounded, no modes")
-    geometry_parts = [part for s in shapes for part in (s.kind, s.size_m, s.position_m, s.quaternion_xyzw, s.vertex_m, s.face)]
-    solid_key = store.key("solid", *geometry_parts, thickness_m, edge_m)
+    solid_key = _solid_key(shapes, thickness_m, edge_m)
     length_m = _diagonal_m(shapes)
     pascal = float(np.abs(material.stiffness_pa).max())
     per_s2 = pascal / (material.density_kg_m3 * length_m**2)
@@ -98,7 +100,20 @@ def analyse(
         mass_kg=volume * material.density_kg_m3,
         dropped=dropped,
         note=note,
+        includes_radiation=material.includes_radiation,
     )
+
+
+def surface_of(shapes: tuple[Shape, ...], *, cache: store.Place = "default", progress: Callable[[str], None] | None = None) -> tuple[Array, Array]:
+    """vertex_m (v, 3) and face (f, 3) of the surface on which `analyse` gives the modes of these shapes, without solving for them. Raises MeshError."""
+    _diagonal_m(shapes)
+    body = _filled(shapes, (None, None), (cache, _solid_key(shapes, None, None)), progress or (lambda _: None))
+    return body.solid.node_m[body.skin.node], body.skin.face
+
+
+def _solid_key(shapes: tuple[Shape, ...], thickness_m: float | None, edge_m: float | None) -> str:
+    parts = [part for s in shapes for part in (s.kind, s.size_m, s.position_m, s.quaternion_xyzw, s.vertex_m, s.face)]
+    return store.key("solid", *parts, thickness_m, edge_m)
 
 
 def _diagonal_m(shapes: tuple[Shape, ...]) -> float:
@@ -121,6 +136,29 @@ def damped(lambda_per_s2: Array, material: Material) -> tuple[Array, Array, Arra
     return freq[order], decay[alive[order]], alive[order]
 
 
+def _filled(shapes: tuple[Shape, ...], sizes: tuple[float | None, float | None], kept: tuple[store.Place, str], say: Callable[[str], None]) -> Filled:
+    """The body's inside and skin, from the cache where it is there. sizes: edge_m, thickness_m."""
+    from sonic_bullet.modal.shapes import Filled, fill
+    from sonic_bullet.modal.solid import Solid, Surface
+
+    found = store.load(*kept)
+    if found is not None:
+        a, note = found
+        return Filled(Solid(a["node"], a["tet"], bool(a["affine"][0]), note), Surface(a["skin"], a["face"]), a["curvature"])
+    body = fill(shapes, *sizes, say)
+    solid, skin = body.solid, body.skin
+    arrays = {
+        "node": solid.node_m,
+        "tet": solid.tet,
+        "affine": np.array([solid.affine]),
+        "skin": skin.node,
+        "face": skin.face,
+        "curvature": body.curvature_per_m,
+    }
+    store.save(*kept, arrays, solid.note)
+    return body
+
+
 def _solve(
     shapes: tuple[Shape, ...],
     sizes: tuple[float | None, float | None],
@@ -134,25 +172,9 @@ def _solve(
 ) -> _Unit:
     """Fill (or fetch the filled body), assemble, clamp and solve, all without units."""
     from sonic_bullet.modal import eigen, fem, polynomials
-    from sonic_bullet.modal.shapes import Filled, fill
-    from sonic_bullet.modal.solid import Solid, Surface
+    from sonic_bullet.modal.solid import Solid
 
-    found = store.load(*kept)
-    if found is not None:
-        a, note = found
-        body = Filled(Solid(a["node"], a["tet"], bool(a["affine"][0]), note), Surface(a["skin"], a["face"]), a["curvature"])
-    else:
-        body = fill(shapes, *sizes, say)
-        solid, skin = body.solid, body.skin
-        arrays = {
-            "node": solid.node_m,
-            "tet": solid.tet,
-            "affine": np.array([solid.affine]),
-            "skin": skin.node,
-            "face": skin.face,
-            "curvature": body.curvature_per_m,
-        }
-        store.save(*kept, arrays, solid.note)
+    body = _filled(shapes, sizes, kept, say)
     unit = Solid(body.solid.node_m / length_m, body.solid.tet, body.solid.affine)
     skin_m = unit.node_m[body.skin.node]
     corner = skin_m[body.skin.face]

@@ -31,7 +31,7 @@ FASTEST_RIGID = 0.6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sounder:
-    """omega_rad_s, decay_per_s (m,): with the air's damping. weight (w, m): complex, one row a weight set (row 0: pressure at 1 m).
+    """omega_rad_s, decay_per_s (m,): with the air's damping, once. weight (w, m): complex, one row a weight set (row 0: pressure at 1 m).
     bend, choke (m,): of frequency per |z|², of decay by (choke·|z|)^choke_power, None in a linear body. shape (v, 3, m) float32: audible modes only.
     size_m: cube root of the volume. jerk_pa_s3: dipole coefficient [Chadwick 2012]. dropped: modes not played.
     """
@@ -85,7 +85,8 @@ def build_sounder(body: Body, sensors: tuple[Sensor, ...], sr: int, air: Air) ->
         )
     pressure, extra = radiation_of(model, air)
     omega0_squared = model.omega0_squared_per_s2
-    decay = np.nan_to_num(model.decay_per_s) + extra
+    own = np.nan_to_num(model.decay_per_s)
+    decay = own if model.includes_radiation else own + extra
     omega = np.sqrt(np.maximum(omega0_squared - decay**2, 0.0))
     keep = audible(omega, decay, sr)
     omega, decay = omega[keep], decay[keep]
