@@ -199,7 +199,8 @@ class Listener:
         for i in sorted(range(len(parts)), key=lambda i: -triangles[i]):
             name, shapes = parts[i]
             head = f"modes of {name}" + (f", {len(models) + 1} of {len(parts)}" if len(parts) > 1 else "")
-            say(head)
+            if len(parts) > 1:
+                say(head)
             with _naming(name, len(parts)):
                 solved = modal.analyse(shapes, material, **asdict(options), progress=_headed(say, head))
                 models[i] = self._shared(with_modes(solved, material), models.values())

@@ -27,7 +27,7 @@ def shown_by(say: Say) -> Iterator[Say]:
 @contextmanager
 def status(label: str) -> Iterator[Say]:
     """A function of the present activity, drawn as a spinner on a terminal's stderr; in a pipe it does nothing."""
-    if not sys.stderr.isatty():
+    if sys.stderr is None or not sys.stderr.isatty():  # None: a program without a console
         yield lambda text: None
         return
     if _SHOWN:
