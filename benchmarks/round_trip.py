@@ -4,7 +4,8 @@
 
 Each object is played at a microphone and at a vibrometer, with noise 90 dB below the peak. Lines of both renders that are the same mode are compared: their
 decays must agree within 3 %, their levels within 0.5 dB. A mode is identified where it stands three widths apart from its neighbours and a line lies on it whose
-decay is known to 0.5 %; beside that, the decays that the run time plays are compared of all modes, heard or not. `thick` fits a plate and plays the preset on one
+decay is known to 0.5 %; of a bowl, whose twins its mesh tears, there are few. Beside that, decays and levels that the run time plays are compared of all modes,
+heard or not, in levels those nearer than a width as one. `thick` fits a plate and plays the preset on one
 twice as thick, beside the true material there: 5 %.
 """
 
@@ -32,7 +33,7 @@ from sonic_bullet.files.cases import Case, CaseObject, CaseRecording
 from sonic_bullet.presets import load_material, material_of
 from sonic_bullet.records import Air, Array, Body, Material, Microphone, ModalModel, Shape, Vibrometer
 from sonic_bullet.render import render_log
-from sonic_bullet.render.sounder import build_sounder
+from sonic_bullet.render.sounder import build_sounder, touch_one, uplift
 
 SR = 48_000
 STEP_S = 1 / 240
@@ -46,6 +47,8 @@ APART, TWINS = 3.0, 0.1  # widths d/π between modes: nearer ones ring as one li
 NEAR = 0.3  # of a width: a line that is the mode
 KNOWN = 5e-3  # relative spread of a decay that is known
 ROOT = Path(__file__).parents[1]
+Places = tuple[Array, Array, Array, Array]
+"""Where it is struck, the outward normal there, where a vibrometer looks, the normal there."""
 
 
 @dataclass(frozen=True)
@@ -75,7 +78,7 @@ def trials(data: Path | None, folder: Path) -> list[Trial]:
     return made
 
 
-def places(model: ModalModel) -> tuple[Array, Array, Array, Array]:
+def places(model: ModalModel) -> Places:
     """Where it is struck and where a vibrometer looks, (3,) each, with the outward normals there: two vertices far from each other, on faces that look alike."""
     from sonic_bullet.effects.points import vertex_normals
 
@@ -104,7 +107,7 @@ def body_of(model: ModalModel, material: Material) -> Body:
     return Body(0, -1, 0, "object", model.mass_kg, 1e-3 * np.eye(3), model.volume_m3, material=material, model=model)
 
 
-def rendered(model: ModalModel, material: Material, sensor: str, at: tuple[Array, Array, Array, Array]) -> Array:
+def rendered(model: ModalModel, material: Material, sensor: str, at: Places) -> Array:
     """The strike's sound (n,) at the sensor: a silent partner pushes once, into the surface."""
     place, out, look, along = at
     striker = Body(1, -1, 0, "striker", 0.0, np.zeros((3, 3)))
@@ -130,7 +133,7 @@ def lines_of(sound: Array, start: int) -> Lines:
     return joint_lines(noisy[None, start:], SR, signed=False)
 
 
-def fitted(trial: Trial, model: ModalModel, sound: Array, sensor: str, at: tuple[Array, Array, Array, Array], folder: Path) -> Material:
+def fitted(trial: Trial, model: ModalModel, sound: Array, sensor: str, at: Places, folder: Path) -> Material:
     """The material of the preset that `fit` makes of the recording."""
     place, out, look, along = at
     noisy = sound + NOISE * np.abs(sound).max() * np.random.default_rng(3).standard_normal(len(sound))
@@ -176,9 +179,14 @@ def compared(first: Lines, again: Lines, which: tuple[Array, Array]) -> tuple[in
     return len(both), float(decay.max(initial=0.0)), float(level.max(initial=0.0))
 
 
-def played(model: ModalModel, material: Material) -> Array:
-    """Decays (m,) that the run time plays."""
-    return build_sounder(body_of(model, material), (), 4 * SR, Air()).decay_per_s
+def played(model: ModalModel, material: Material, sensor: str = "pressure", at: Places | None = None) -> tuple[Array, Array]:
+    """Decays (m,) that the run time plays, and what the strike starts each mode with at the sensor (m,)."""
+    eye = (Vibrometer(0, at[2], at[3]),) if at is not None and sensor == "velocity" else ()
+    sounder = build_sounder(body_of(model, material), eye, 4 * SR, Air())
+    if at is None:
+        return sounder.decay_per_s, np.ones(sounder.mode_count)
+    face, barycentric, _ = touch_one(sounder, at[0][None], at[1][None])
+    return sounder.decay_per_s, np.abs(uplift(sounder, face, barycentric, -at[1][None]) * sounder.weight[-1])
 
 
 def off(a: Array, b: Array, to_hz: Array) -> float:
@@ -187,8 +195,18 @@ def off(a: Array, b: Array, to_hz: Array) -> float:
     return float(np.abs(b[:m] / a[:m] - 1).max())
 
 
-def around(trial: Trial, sensor: str, folder: Path) -> tuple[int, float, float, float]:
-    """Modes identified in both, worst decay, worst level, and the worst decay of all modes that are played."""
+def off_db(a: Array, b: Array, freq_hz: Array, decay: Array) -> float:
+    """Largest difference of levels, of modes nearer than a width taken together, from the strongest down to 60 dB below."""
+    m = min(len(a), len(b), int((freq_hz < 20_000).sum()))
+    step = np.diff(freq_hz[:m]) / (np.maximum(decay[1:m], decay[: m - 1]) / np.pi)
+    start = np.concatenate([[0], np.flatnonzero(step > 1) + 1])
+    one, two = (np.add.reduceat(x[:m] ** 2, start) for x in (a, b))
+    loud = one > 1e-6 * one.max()
+    return float(np.abs(10 * np.log10(two[loud] / one[loud])).max())
+
+
+def around(trial: Trial, sensor: str, folder: Path) -> tuple[int, float, float, float, float]:
+    """Modes identified in both, their worst decay and level, and the worst decay and level of all modes that are played."""
     shape = modal.read_mesh(trial.mesh)
     truth = load_material(trial.material)
     model = modal.analyse((shape,), truth)
@@ -197,11 +215,11 @@ def around(trial: Trial, sensor: str, folder: Path) -> tuple[int, float, float, 
     found = fitted(trial, model, sound, sensor, at, folder)
     anew = modal.analyse((shape,), found)
     again = rendered(anew, found, sensor, at)
-    decays = played(model, truth), played(anew, found)
+    (one, first), (two, second) = played(model, truth, sensor, at), played(anew, found, sensor, at)
     start = pushed(sound)
     lines = lines_of(sound, start), lines_of(again, start)
-    which = identified(lines[0], model, decays[0]), identified(lines[1], anew, decays[1])
-    return *compared(*lines, which), off(*decays, model.freq_hz)
+    which = identified(lines[0], model, one), identified(lines[1], anew, two)
+    return *compared(*lines, which), off(one, two, model.freq_hz), off_db(first, second, model.freq_hz, one)
 
 
 def thicker(folder: Path, sensor: str, name: str = "glass", size_m: tuple[float, float, float] = (0.2, 0.15, 0.004)) -> float:
@@ -213,7 +231,7 @@ def thicker(folder: Path, sensor: str, name: str = "glass", size_m: tuple[float,
     found = fitted(thin, model, rendered(model, truth, sensor, at), sensor, at, folder)
     thick: Shape = modal.read_mesh(box_obj(folder / "thick.obj", (*size_m[:2], 2 * size_m[2])))
     one, two = (modal.analyse((thick,), x) for x in (truth, found))
-    return off(played(one, truth), played(two, found), one.freq_hz)
+    return off(played(one, truth)[0], played(two, found)[0], one.freq_hz)
 
 
 def main() -> int:
@@ -222,7 +240,7 @@ def main() -> int:
     parser.add_argument("objects", nargs="*", metavar="OBJECT", help="parts of names; 'thick' for the plates")
     asked = parser.parse_args()
     missed = 0
-    print("| object | sensor | modes | decay % | level dB | all modes' decay % | | wall s |\n|---|---|---|---|---|---|---|---|")
+    print("| object | sensor | modes | decay % | level dB | all modes' decay % | level dB | | wall s |\n|---|---|---|---|---|---|---|---|---|")
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
         for trial in trials(asked.data, folder):
@@ -231,23 +249,23 @@ def main() -> int:
             for sensor in ("pressure", "velocity"):
                 begun = time.monotonic()
                 try:
-                    count, decay, level, every = around(trial, sensor, folder)
+                    count, decay, level, every, every_db = around(trial, sensor, folder)
                 except SonicBulletError as error:
-                    print(f"| {trial.name} | {sensor} | | | | | {error} | |", flush=True)
+                    print(f"| {trial.name} | {sensor} | | | | | | {error} | |", flush=True)
                     missed += 1
                     continue
-                held = count >= 5 and decay <= LIMIT_DECAY and level <= LIMIT_DB
+                held = max(decay, every) <= LIMIT_DECAY and max(level, every_db) <= LIMIT_DB
                 missed += not held
                 spent = time.monotonic() - begun
                 print(
-                    f"| {trial.name} | {sensor} | {count} | {100 * decay:.2f} | {level:.3f} | {100 * every:.2f} | {'met' if held else 'missed'} | {spent:.0f} |",
+                    f"| {trial.name} | {sensor} | {count} | {100 * decay:.2f} | {level:.3f} | {100 * every:.2f} | {every_db:.3f} | {'met' if held else 'missed'} | {spent:.0f} |",
                     flush=True,
                 )
         for name in ("glass", "steel") if not asked.objects or "thick" in asked.objects else ():
             for sensor in ("pressure", "velocity"):
                 worst = thicker(folder, sensor, name)
                 missed += not worst <= LIMIT_THICK
-                print(f"| {name} plate, twice as thick | {sensor} | | | | {100 * worst:.2f} | {'met' if worst <= LIMIT_THICK else 'missed'} | |", flush=True)
+                print(f"| {name} plate, twice as thick | {sensor} | | | | {100 * worst:.2f} | | {'met' if worst <= LIMIT_THICK else 'missed'} | |", flush=True)
     print(f"\n{missed} missed")
     return 1 if missed else 0
 

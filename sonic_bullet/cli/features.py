@@ -22,7 +22,7 @@ def run_features(
         raise FileError(f"cannot write {picture}: pictures are .png, .pdf or .svg", "end the name with one of them")
     picture, json_to = places(picture, json_to)
     sound, sr = read_audio(recording)
-    heard, which = channel_of(sound, channel, recording), channel_words(len(sound), channel)
+    heard, which = channel_of(sound, channel or 0, recording), channel_words(len(sound), channel)
     warn(f"{recording}: {words}" for words in [which] if words)
     with clean_stdout(json_to) as say:
         from sonic_bullet.estimator.features import extract

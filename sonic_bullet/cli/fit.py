@@ -69,7 +69,8 @@ def as_case(source: str, one: dict[str, Any]) -> Case:
     if kind != "velocity" and one["sensor_direction"] is not None:
         raise FileError(f"--sensor-direction is given, but --sensor is {kind}", "give --sensor velocity, or leave the direction out")
     thing = CaseObject("object", Path(one["mesh"]), 1.0 if one["scale"] is None else one["scale"], one["material"], fixed=one["fixed"])
-    recording = CaseRecording(path, None, "object", "fit", one["strike"], _unit("direction", one), one["impulse"], one["channel"])
+    heard = one["channel"] or 0, None, one["channel"] is not None
+    recording = CaseRecording(path, None, "object", "fit", one["strike"], _unit("direction", one), one["impulse"], *heard)
     at = {"object": one["sensor_at"]} if one["sensor_at"] is not None else None
     along = _unit("sensor_direction", one)
     way = None if along is None else {"object": along}

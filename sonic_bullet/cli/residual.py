@@ -79,7 +79,7 @@ def _unshaped(source: str, one: dict[str, Any], progress: Any) -> tuple[Any, Any
     sound, sr = read_audio(source)
     if not sound.size:
         raise AudioError(f"{source} is empty", "give a recording of an impact")
-    heard = channel_of(sound, one["channel"], source)
+    heard = channel_of(sound, one["channel"] or 0, source)
     warn(f"{source}: {words}" for words in [channel_words(len(sound), one["channel"])] if words)
     progress("looking for modes")
     strikes = recording_strikes(heard, sr, one["onset_s"], Path(source).name)

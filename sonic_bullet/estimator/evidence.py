@@ -170,7 +170,7 @@ def _sounds(case: Case, thing: CaseObject, recordings: tuple[CaseRecording, ...]
         if len(sounds[-1]) < sound.shape[1]:
             told.append(f"{r.file} breaks off after {len(sounds[-1]) / sr:.3g} s: the digital silence behind is no decay, and is left out")
         rates.append(sr)
-        several.setdefault(channel_words(len(sound), r.channel), []).append(str(r.file))
+        several.setdefault(channel_words(len(sound), r.channel if r.channel_named else None), []).append(str(r.file))
         if case.onset_s is None and (heard := span(sounds[-1], sr)).hits > 1:
             told.append(f"{r.file} holds {heard.hits} hits: only what comes before the second is used")
             sounds[-1] = sounds[-1][: heard.stop]

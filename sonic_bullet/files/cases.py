@@ -119,7 +119,10 @@ class CaseObject:
 
 @dataclass(frozen=True, slots=True)
 class CaseRecording:
-    """One strike: an audio file or measured lines, on which object, for what use, and where and how hard; None where not declared. channel: from 0."""
+    """One strike: an audio file or measured lines, on which object, for what use, and where and how hard; None where not declared.
+
+    channel: counted from 0; channel_named: whether the case says so, else it is the first.
+    """
 
     file: Path | None
     lines: tuple[Line, ...] | None
@@ -128,8 +131,9 @@ class CaseRecording:
     position_m: Vector | None = None
     direction: Vector | None = None
     impulse_n_s: float | None = None
-    channel: int | None = None
+    channel: int = 0
     force: tuple[Path, int, float | None] | None = None
+    channel_named: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -250,7 +254,8 @@ def _recording(entry: _Recording, number: int, objects: dict[str, CaseObject], o
     force = strike.force
     kept = (inside(path.parent, force.file), force.channel, force.newton_per_unit) if force is not None else None
     file = inside(path.parent, entry.file) if entry.file is not None else None
-    return CaseRecording(file, entry.features, name, entry.split, strike.position, direction, strike.impulse, entry.channel, kept)
+    heard = entry.channel or 0, kept, entry.channel is not None
+    return CaseRecording(file, entry.features, name, entry.split, strike.position, direction, strike.impulse, *heard)
 
 
 def inside(folder: Path, name: str) -> Path:

@@ -6,13 +6,12 @@ from sonic_bullet.arrays import Array
 from sonic_bullet.errors import FileError
 
 
-def channel_of(samples: Array, channel: int | None, name: object) -> Array:
-    """One channel (n,) of samples (channels, n), counted from 0; None: the first. Raises FileError where the file ``name`` has no such channel."""
-    which = channel or 0
-    if not 0 <= which < len(samples):
+def channel_of(samples: Array, channel: int, name: object) -> Array:
+    """One channel (n,) of samples (channels, n), counted from 0. Raises FileError where the file ``name`` has no such channel."""
+    if not 0 <= channel < len(samples):
         known = "1 channel, 0" if len(samples) == 1 else f"{len(samples)} channels, 0 to {len(samples) - 1}"
-        raise FileError(f"{name} has no channel {which}", f"it has {known}")
-    one: Array = samples[which]
+        raise FileError(f"{name} has no channel {channel}", f"it has {known}")
+    one: Array = samples[channel]
     return one
 
 
