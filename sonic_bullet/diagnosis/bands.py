@@ -3,8 +3,9 @@
     d_sb = 10 lg Σ|R|² / Σ(|P|² + N)   over the cells of a band b, the first EARLY_S and the rest apart;   third octaves that overlap by half
     off:  |mean_s d| > APART_DB  and  > SURE standard errors,   over the strikes s in which either stands ABOVE over the noise N
 
-A tone on a band's edge belongs to either side: recorded is more only where it is more than what is played up to a cell beyond, and the other way round. Each band has the shortest window that
-keeps FINE cells in it. No effect is looked for here: it only takes away the comfort of a verdict `none`.
+A correction may put a mode CORRECTION away, over a band's edge, and a window spreads it over LOBE cells to each side: recorded is more only where it is more than what is
+played so much beyond the band, too, and the other way round.
+Each band has the shortest window that keeps FINE cells in it. No effect is looked for here: it only takes away the comfort of a verdict `none`.
 """
 
 from __future__ import annotations
@@ -23,7 +24,8 @@ from sonic_bullet.records import Array
 
 EARLY_S = 0.05  # of the attack, which a long decay would outweigh
 APART_DB = 3.0  # a band half or twice as loud
-FINE = 4  # cells of a band, so that a window's main lobe is as wide
+FINE = 4  # cells of a band at least
+LOBE = 2  # cells to each side in a Hann window's main lobe
 WINDOWS = (512, 1024, 2048, 4096, 8192)
 CENTRE_HZ = 1000 * 2.0 ** (np.arange(-24, 28) / 6)  # third octaves every sixth
 HALF = 2 ** (1 / 6)  # of a third octave, to each side
@@ -71,16 +73,13 @@ def _over_db(recorded: Array, played: Array, sr: int, floor: Floor, band_hz: tup
     window = np.array([next((w for w in fits if FINE * sr / w <= wide), 0) for wide in high - low])
     for w in np.unique(window[inside & (window > 0)]):
         who = np.flatnonzero(inside & (window == w))
-        ours, theirs = _power(recorded, w), _power(played, w)
-        noise = floor.at(w // 2 + 1) * (np.hanning(w) ** 2).sum() * _frames(len(recorded), w)
-        cell = sr / w
-        edge = np.maximum(cell, CORRECTION * CENTRE_HZ[who])
-        (a, wide_a), (b, wide_b), (n, _) = (
-            (_within(x, low[who], high[who], cell), _within(x, low[who] - edge, high[who] + edge, cell)) for x in (ours, theirs, noise)
-        )
-        more, less = 10 * np.log10(np.maximum(a, n) / (wide_b + n)), 10 * np.log10(np.maximum(wide_a, n) / (b + n))
-        either = (a > ABOVE * n) | (b > ABOVE * n)
-        found[who] = np.where(either, np.maximum(more, 0) + np.minimum(less, 0), np.nan)
+        cell, mine = sr / w, (low[who], high[who])
+        edge = np.maximum(LOBE * cell, CORRECTION * CENTRE_HZ[who])
+        beyond = (mine[0] - edge, mine[1] + edge)
+        (a, near_a), (b, near_b) = ((_within(p, *mine, cell), _within(p, *beyond, cell)) for p in (_power(recorded, w), _power(played, w)))
+        n = _within(floor.at(w // 2 + 1) * (np.hanning(w) ** 2).sum() * _frames(len(recorded), w), *mine, cell)
+        more, less = 10 * np.log10(np.maximum(a, n) / (near_b + n)), 10 * np.log10(np.maximum(near_a, n) / (b + n))
+        found[who] = np.where((a > ABOVE * n) | (b > ABOVE * n), np.maximum(more, 0) + np.minimum(less, 0), np.nan)
     return found
 
 
