@@ -135,7 +135,7 @@ def test_noise_alone_takes_no_comfort_away() -> None:
         for k in range(12)
     ]
     told = np.array(draws)
-    assert np.isfinite(told).any(axis=(0, 1)).sum() >= 2
+    assert np.isfinite(told).any()
     assert not any(off_in(one) for one in told)
 
 
