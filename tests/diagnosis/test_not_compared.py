@@ -17,6 +17,7 @@ import sonic_bullet
 from sonic_bullet.cli.diagnose import run_diagnose
 from sonic_bullet.diagnosis import loop
 from sonic_bullet.diagnosis.baseline import takes_of
+from sonic_bullet.diagnosis.diagnose import _warnings
 from sonic_bullet.diagnosis.evidence import evidence_of
 from sonic_bullet.diagnosis.judge import EDGE_DB, Compared, Incomparable, Take, comparable, mean_db
 from sonic_bullet.diagnosis.loop import Closed, NothingCompared, closed
@@ -180,3 +181,13 @@ def test_the_command_says_it_on_the_console_in_json_and_on_the_page(tmp_path: Pa
     assert answer["not_compared"] == [{"split": "fit", "name": "the list of lines of bar", "why": why.removeprefix("the list of lines of bar ")}]
     assert answer["errors"]["before"]["fit"] is None and answer["errors"]["floor"] is None
     assert "Nothing could be compared" in page.read_text() and why in page.read_text()
+
+
+def test_what_was_left_out_of_a_split_is_a_warning() -> None:
+    body = recorded()
+    takes = takes_of((body,))
+    end = closed(fitted(body), (body,), (*spoiled(takes[:1], 0), takes[1]), (), BAND)
+    assert _warnings(end, {"fit": end.left_out}) == [
+        "1 of split 'fit' could not be compared: strike-0.wav holds 11200 samples that are no numbers",
+        "one strike alone: nothing can be left out, so no effect can be named; record more strikes",
+    ]
