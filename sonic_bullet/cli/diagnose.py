@@ -66,17 +66,25 @@ def _predicted(found: Any, folder: str) -> int:
 
 def _told(found: Any) -> str:
     """For people."""
+    from sonic_bullet.diagnosis.loop import NothingCompared
+    from sonic_bullet.diagnosis.unexplained import NOTHING
+
+    def missing(split: str) -> str:
+        return "not compared" if split in found.not_compared else "no audio"
+
     words = {
         "none": "the model suffices: no effect earns its keep",
         "explained": "the model lacks",
         "unexplained": "something is left that no known effect explains",
+        "nothing": NOTHING,
     }
-    text = [f"{found.case.name}: {found.verdict}: {words[found.verdict]}"]
+    nothing = isinstance(found.closed, NothingCompared)
+    text = [f"{found.case.name}: {found.verdict}: {words['nothing' if nothing else found.verdict]}"]
     for c in found.closed.added:
         numbers = ", ".join(f"{k} {_number(v)}" for k, v in c.effect.parameters().items())
         text.append(f"  {c.id} ({c.effect.owner.value}): {numbers}; {c.mean_db:.2f} dB nearer on strikes left out, chance {c.null_db:.2f} dB")
     rows = [
-        (split, *(f"{found.errors[side][split]:.2f} dB" if found.errors[side][split] is not None else "no audio" for side in ("before", "after")))
+        (split, *(f"{found.errors[side][split]:.2f} dB" if found.errors[side][split] is not None else missing(split) for side in ("before", "after")))
         for split in ("fit", "holdout", "transfer")
         if split in found.errors["before"]
     ]

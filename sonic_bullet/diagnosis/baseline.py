@@ -15,7 +15,7 @@ import numpy as np
 from sonic_bullet.diagnosis.bodies import Struck, shapeless, struck_bodies
 from sonic_bullet.diagnosis.chains import FEWEST, LINKS, share, unchained
 from sonic_bullet.diagnosis.elastic import with_elastic
-from sonic_bullet.diagnosis.judge import Take, mean_db
+from sonic_bullet.diagnosis.judge import Compared, Take, comparable, mean_db
 from sonic_bullet.diagnosis.parted import parted
 from sonic_bullet.diagnosis.play import Hypothesis
 from sonic_bullet.diagnosis.refit import refitted
@@ -23,7 +23,7 @@ from sonic_bullet.diagnosis.unheard import settled
 from sonic_bullet.effects.hum import stilled
 from sonic_bullet.effects.measurement_chain import limit_of
 from sonic_bullet.errors import AudioError
-from sonic_bullet.estimator.distance import floor_between
+from sonic_bullet.estimator.distance import floor_between, white
 from sonic_bullet.estimator.evidence import Evidence as Gathered
 from sonic_bullet.estimator.fit import fit_evidence
 from sonic_bullet.estimator.fitted import CaseFit
@@ -108,8 +108,10 @@ def _lines_by(one: Gathered, strikes: Array, band_hz: tuple[float, float]) -> Li
 
 
 def _off_db(b: Baseline) -> float:
-    found = mean_db(b.takes, refitted(b.hypothesis, b.bodies))
-    return np.inf if found is None else found
+    """How far its strikes are; ∞ where none can be compared: no way of fitting is nearer than another then."""
+    h = refitted(b.hypothesis, b.bodies)
+    found = comparable(b.takes, h)
+    return mean_db(found.takes, h) if isinstance(found, Compared) else np.inf
 
 
 def _of(case: Case, gathered: tuple[Gathered, ...], cache: Place, progress: Callable[[str], None] | None) -> Baseline:
@@ -128,6 +130,7 @@ def takes_of(bodies: tuple[Struck, ...]) -> tuple[Take, ...]:
     for body in bodies:
         if body.gathered is None or body.gathered.signals is None:
             continue
-        floor = floor_between(list(body.gathered.signals))
+        finite = [signal for signal in body.gathered.signals if np.isfinite(signal).all()]
+        floor = floor_between(finite) if finite else white(np.inf)  # over which nothing stands
         takes += [Take(body, i, sample, body.gathered.sr, floor) for i, sample in zip(body.fitted, body.gathered.signals, strict=True)]
     return tuple(takes)

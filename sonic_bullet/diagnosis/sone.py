@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sonic_bullet.diagnosis.judge import Take
+from sonic_bullet.diagnosis.judge import Comparable, Take
 from sonic_bullet.diagnosis.play import Hypothesis, play
 from sonic_bullet.errors import RecordError
 from sonic_bullet.estimator.distance import with_noise
@@ -20,10 +20,10 @@ LEVELS = 2
 HEARD = 0.05  # sone
 
 
-def sone_distance(takes: tuple[Take, ...], h: Hypothesis) -> float | None:
+def sone_distance(takes: Comparable, h: Hypothesis) -> float | None:
     """Mean over takes; None where there is none that is heard."""
     found = []
-    for take in takes:
+    for take in (t for t in takes if isinstance(t, Take)):
         made = with_noise(play(h, take.body, take.strike, len(take.sample), take.sr), take.floor, take.strike)
         try:
             a, b = (image(x, take.sr, 0.0, FULL_SCALE, levels=LEVELS, bark_step=1.0) for x in (take.sample, made))

@@ -22,7 +22,7 @@ from sonic_bullet.diagnosis.evidence import evidence_of
 from sonic_bullet.diagnosis.judge import mean_db
 from sonic_bullet.diagnosis.play import Hypothesis
 from sonic_bullet.diagnosis.refit import refitted
-from sonic_bullet.diagnosis.trial import KEPT, Fold, _after, _folds, trials
+from sonic_bullet.diagnosis.trial import KEPT, _folds, trials
 from sonic_bullet.effects import EFFECTS
 from sonic_bullet.effects.amplitude_damping import AmplitudeDamping
 from sonic_bullet.effects.orthotropy import Orthotropy
@@ -35,21 +35,6 @@ from sonic_bullet.effects.values import Evidence, Owner, Sound, Stage
 from sonic_bullet.records import ModalModel
 
 WEAK = ((0.0477, 0.0371, 0.0), (0.0955, 0.0186, 0.0), (0.1432, 0.0464, 0.0))
-
-
-def test_a_strike_that_neither_plays_above_the_noise_is_as_far_off_as_noise_makes() -> None:
-    """The baseline played it too loud; with the pulse it is as silent as the recording: no distance, and no NaN in the mean either."""
-
-    @dataclass
-    class Silent:
-        def distance(self, h: Hypothesis) -> float:
-            return np.nan
-
-        def least(self, h: Hypothesis) -> float:
-            return np.nan
-
-    fold = Fold(Silent(), (), Evidence((), 0.0, 0.0, 1.0, (), BAND), fitted(recorded()), 4.0, 4.0, 1.1)
-    assert _after(fold, fold.base) == 1.1
 
 
 def test_what_is_no_number_is_null_in_json() -> None:
