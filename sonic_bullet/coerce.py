@@ -111,10 +111,13 @@ def as_path(value: object, name: str, remedy: str, *, error: Error = FileError) 
     text = os.fspath(value) if isinstance(value, (str, os.PathLike)) else None
     if not isinstance(text, str):
         raise error(f"{name} is {shown(value)}", remedy)
+    reason = "no name that a file can have"
     with suppress(UnicodeEncodeError):
-        if "\0" not in text and all(len(os.fsencode(part)) <= LONGEST_NAME for part in text.split(os.sep)):
-            return text
-    raise error(f"cannot read or write {shown(text)}: {name} is no name that a file can have", remedy)
+        if "\0" not in text:
+            if all(len(os.fsencode(part)) <= LONGEST_NAME for part in text.split(os.sep)):
+                return text
+            reason = f"too long: a file's name has at most {LONGEST_NAME} bytes"
+    raise error(f"cannot read or write {shown(text)}: {name} is {reason}", remedy)
 
 
 def as_call(value: Call | None, name: str) -> Call | None:
