@@ -17,7 +17,7 @@ import numpy as np
 from sonic_bullet.arrays import Array, frozen_array
 from sonic_bullet.arrays import require as _require
 from sonic_bullet.arrays import store as _store
-from sonic_bullet.coerce import as_items, as_kind, as_number, as_text, as_whole, check_options, nearest, shown
+from sonic_bullet.coerce import as_flag, as_items, as_kind, as_number, as_text, as_whole, check_options, nearest, shown
 from sonic_bullet.errors import RecordError
 from sonic_bullet.residual_record import Residual
 
@@ -102,6 +102,7 @@ class Material:
             hurst=as_number(self.hurst, f"{where}: hurst", "the Hurst exponent lies between 0 and 1", above=0, below=1),
             restitution=as_number(self.restitution, f"{where}: restitution", "restitution lies between 0 and 1", least=0, most=1),
             effects=as_items(self.effects, f"{where}: effects", "give effects of sonic_bullet.effects"),
+            includes_radiation=as_flag(self.includes_radiation, f"{where}: includes_radiation"),
         )
         as_text(self.source, f"{where}: source", "give a text")
         if self.residual is not None:
@@ -235,6 +236,7 @@ class ModalModel:
         )
         _require(self.choke_power in (1.0, 2.0), f"decays that rise with power {self.choke_power} of the level", "give 1 or 2")
         as_text(self.note, "note", "give a text")
+        as_flag(self.includes_radiation, "includes_radiation")
         for name in ("bend_s2_m2", "choke_s_m"):
             if getattr(self, name) is not None:
                 _store(self, **{name: frozen_array(getattr(self, name), float, (m,), name)})

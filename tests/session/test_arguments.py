@@ -61,6 +61,7 @@ MATERIAL = {
     "source": "",
     "residual": None,
     "effects": (),
+    "includes_radiation": False,
 }
 MODEL = dict(
     freq_hz=[100.0],
@@ -75,6 +76,7 @@ MODEL = dict(
     bend_s2_m2=None,
     choke_s_m=None,
     choke_power=1,
+    includes_radiation=False,
 )
 LOG = {"bodies": (), "steps": (), "sensors": (), "sr": 48_000, "seed": 0, "air": sb.Air(), "untouched": frozenset()}
 BUILT = "import pybullet as p\nSECONDS = 0.01\n\ndef build(client):\n    client.createMultiBody(0, client.createCollisionShape(p.GEOM_PLANE))\n    return {}\n"
@@ -214,6 +216,7 @@ BAD: dict[str, dict[str, list[Any]]] = {
         "source": TEXT,
         "residual": RECORD,
         "effects": ["x", 5, None, object(), {}],
+        "includes_radiation": FLAG,
     },
     "Material.isotropic": {"name": TEXT, "youngs_pa": [*NUMBER, 0], "poisson": [*NUMBER, 0.5, -1], "density_kg_m3": [*NUMBER, 0]},
     "Microphone": {"position_m": [*ARRAY, [0, 0]]},
@@ -226,6 +229,7 @@ BAD: dict[str, dict[str, list[Any]]] = {
         "note": TEXT,
         **{name: [value for value in ARRAY if value is not None] for name in ("bend_s2_m2", "choke_s_m")},
         "choke_power": NUMBER,
+        "includes_radiation": FLAG,
     },
     "ModalSum": {"scale": NUMBER},
     "Shape": {

@@ -154,5 +154,5 @@ def test_doctor_of_a_scene_that_cannot_sound(tmp_path: Path, text: str, found: s
 
 
 def test_doctor_of_a_script_without_bodies(tmp_path: Path) -> None:
-    (tmp_path / "plain.py").write_text("import pybullet as p\np.connect(p.GUI)\nfor _ in range(9):\n    p.stepSimulation()\n")
+    (tmp_path / "plain.py").write_text("import pybullet as p\nme = p.connect(p.GUI)\nfor _ in range(9):\n    p.stepSimulation(physicsClientId=me)\n")
     assert ids(examine_scene(tmp_path / "plain.py", 0.1)) == [("no-body", "error")]
