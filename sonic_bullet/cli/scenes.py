@@ -192,11 +192,14 @@ def _with_partial(
     said = ""
     if result is not None and result.samples.size:
         partial = kept_name(Path(to))
-        try:
-            write_audio(partial, result.samples, result.sr, peak_dbfs=peak_dbfs, lufs=lufs)
-        except AudioError:
-            write_audio(partial, result.samples, result.sr)  # silent or too short for the level asked for: kept as it is
         said = f"the first {result.samples.shape[-1] / result.sr:.3f} s are in {kept_name(Path(output))}"
+        try:
+            try:
+                write_audio(partial, result.samples, result.sr, peak_dbfs=peak_dbfs, lufs=lufs)
+            except AudioError:
+                write_audio(partial, result.samples, result.sr)  # silent or too short for the level asked for: kept as it is
+        except FileError as failure:  # the error itself is what the user must read first
+            said = failure.what
     if isinstance(error, SonicBulletError):
         return type(error)(error.what, "; ".join(part for part in (error.remedy, said) if part))
     return KeyboardInterrupt("; ".join(part for part in (str(error) or "stopped", said) if part))
