@@ -1,4 +1,4 @@
-"""Samples in pascals to an audio file and back.
+"""Samples in pascals to an audio file.
 
     y = g·x,  g = 1/full_scale_pa                      calibrated (the default: 1.0 in the file = 1 Pa)
               10^(peak_dbfs/20)/max|x|                 --peak-dbfs
@@ -346,24 +346,3 @@ def _loudness_lufs(sound: Array, sr: int) -> float:
     if not math.isfinite(loudness):
         raise AudioError("the sound has no measurable loudness (a click under the gate of BS.1770)", "use --peak-dbfs")
     return loudness
-
-
-def read_audio(path: str | os.PathLike[str]) -> tuple[Array, int]:
-    """Samples (channels, n) float64 in file units (pascals where written with full scale 1 Pa) and the rate in Hz.
-
-    Raises FileError where the file is missing, cut or no audio.
-    """
-    import soundfile
-
-    path = as_path(path, "path", "name a sound file")
-    try:
-        there = Path(path).is_file()
-    except OSError:  # a name too long to be one
-        there = False
-    if not there:
-        raise FileError(f"cannot read {brief(path)}: no such file", "check the path")
-    try:
-        samples, sr = soundfile.read(os.fspath(path), dtype="float64", always_2d=True)
-    except (soundfile.LibsndfileError, OSError) as error:
-        raise FileError(f"cannot read {path}: {str(getattr(error, 'error_string', error)).rstrip('.')}", "give an unbroken audio file") from error
-    return np.ascontiguousarray(samples.T), int(sr)
