@@ -11,13 +11,15 @@ from sonic_bullet.coerce import shown
 from sonic_bullet.errors import RecordError
 
 Array = NDArray[Any]
+LARGEST = 1e30
+"""No length, force, stiffness or frequency in SI units is larger, and fourth powers of such numbers are still finite."""
 
 
 def frozen_array(value: object, dtype: Any, shape: tuple[int | None, ...], name: str, *, finite: bool = True) -> Array:
     """Read-only C-contiguous copy of ``value`` with ``dtype`` and ``shape`` (None: any length); the same array where it is one already.
 
     Raises RecordError where it holds no numbers, or none that ``dtype`` can hold (1.5 is no index), where the shape differs or, with
-    ``finite``, a number is NaN or infinite.
+    ``finite``, a number is NaN, infinite or beyond `LARGEST`.
     """
     kept = isinstance(value, np.ndarray) and not value.flags.writeable and value.base is None  # a record's own: read-only and nobody's view
     try:
@@ -33,8 +35,9 @@ def frozen_array(value: object, dtype: Any, shape: tuple[int | None, ...], name:
         raise RecordError(f"{name} is {shown(value)}, which is no array of {array.dtype.name}", f"pass numbers of shape {shape}")
     if array.ndim != len(shape) or any(want is not None and have != want for have, want in zip(array.shape, shape, strict=True)):
         raise RecordError(f"{name} has shape {array.shape}, wanted {shape}", "pass an array of that shape")
-    if finite and array.dtype.kind in "fc" and not np.isfinite(array).all():
-        raise RecordError(f"{name} holds NaN or infinite numbers", "look for the step or file that produced them")
+    if finite and array.dtype.kind == "f" and not (array.max(initial=0) <= LARGEST and array.min(initial=0) >= -LARGEST):  # False for NaN too
+        what = f"a number of {float(np.abs(array).max()):.3g}" if np.isfinite(array).all() else "NaN or infinite numbers"
+        raise RecordError(f"{name} holds {what}", "look for the step or file that produced them")
     array.setflags(write=False)
     return array
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import inspect
 import numbers
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import asdict, replace
@@ -21,8 +22,9 @@ import numpy as np
 
 from sonic_bullet.coerce import as_call, as_items, as_kind, as_kinds, as_number, as_path, as_rows, as_whole, check_options
 from sonic_bullet.contacts import ContactLog, Step
-from sonic_bullet.errors import AudioError, MaterialError, MeshError, ModalError, SceneError
+from sonic_bullet.errors import AudioError, MaterialError, MeshError, ModalError, SceneError, SizeWarning
 from sonic_bullet.files import AudioReport, check_sr, write_audio
+from sonic_bullet.geometry import oversize
 from sonic_bullet.records import Air, Array, Material, Microphone, ModalModel, Sensor, Shape
 from sonic_bullet.render import LATENCY_STEPS, Synthesizer
 from sonic_bullet.render.radiated import radiation_of
@@ -153,7 +155,8 @@ class Listener:
         (x, y, z, radius) in m, body frame. thickness_m: wall of an open surface. to_hz, count: how many modes. progress: told now and then
         which link's modes are being computed, how far that is, and that it is their radiation next (seconds a link the first time, then
         the cache has both); without one, a terminal shows it.
-        Raises SceneError (unknown body or link), MaterialError, MeshError, ModalError naming body and link, RecordError.
+        Warns (`errors.SizeWarning`) of a link larger than anything that is struck to sound. Raises SceneError (unknown body or link),
+        MaterialError, MeshError, ModalError naming body and link, RecordError.
         """
         from sonic_bullet.effects.stored import with_material
         from sonic_bullet.listener import links_called
@@ -182,6 +185,10 @@ class Listener:
                     radiation_of(solved, self.air)
         for one, (_, shapes), solved in zip(links, parts, models, strict=True):
             self.world.add(body, one, material=made, model=solved, shapes=shapes)
+        for one, (name, _), solved in zip(links, parts, models, strict=True):
+            if large := oversize(solved.vertex_m, solved.mass_kg):
+                remedy = "load it with globalScaling=0.001, or give its mesh in metres, if its numbers are millimetres"
+                warnings.warn(f"body {body} link {one} ({name}) {large}; {remedy}", SizeWarning, stacklevel=2)
         return tuple(models)
 
     def _solved(

@@ -54,7 +54,7 @@ def run_render(
             from sonic_bullet.picture import render_picture
 
             render_picture(picture, result.samples, result.sr, result.log, Path(scene).name)
-        notes = (*result.notes, *_coarse(result.log), *_warnings(report))
+        notes = (*result.notes, *_coarse(result.log), *_oversized(result.log), *_warnings(report))
         say(_summary(report, result.log))
         for note in notes:
             print(f"sonic-bullet: note: {note}", file=sys.stderr)
@@ -210,6 +210,14 @@ def _coarse(log: ContactLog) -> tuple[str, ...]:
 
     names = sorted({body.name for body in log.bodies if body.model is not None and COARSER in body.model.note})
     return (f"the mesh of {', '.join(names)} is {COARSER}: a faster machine may compute slightly other modes",) if names else ()
+
+
+def _oversized(log: ContactLog) -> tuple[str, ...]:
+    from sonic_bullet.geometry import oversize
+
+    large = [(body, oversize(body.model.vertex_m, body.model.mass_kg)) for body in log.bodies if body.model is not None]
+    remedy = "load it with globalScaling=0.001, or give its mesh in metres, if its numbers are millimetres"
+    return tuple(f"body {body.body_id} link {body.link} ({body.name}) {words}; {remedy}" for body, words in large if words)
 
 
 def _warnings(report: AudioReport) -> tuple[str, ...]:

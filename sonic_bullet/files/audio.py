@@ -1,4 +1,4 @@
-"""Samples in pascals to an audio file and back.
+"""Samples in pascals to an audio file.
 
     y = g·x,  g of `levels`: 1 by default, so that 1.0 in the file is 1 Pa
 
@@ -295,24 +295,3 @@ def write_audio(
         for start in range(0, sound.shape[1], BLOCK_FRAMES):
             writer.write(sound[:, start : start + BLOCK_FRAMES])
     return writer.report()
-
-
-def read_audio(path: str | os.PathLike[str]) -> tuple[Array, int]:
-    """Samples (channels, n) float64 in file units (pascals where written with full scale 1 Pa) and the rate in Hz.
-
-    Raises FileError where the file is missing, cut or no audio.
-    """
-    import soundfile
-
-    path = as_path(path, "path", "name a sound file")
-    try:
-        there = Path(path).is_file()
-    except OSError:  # a name too long to be one
-        there = False
-    if not there:
-        raise FileError(f"cannot read {brief(path)}: no such file", "check the path")
-    try:
-        samples, sr = soundfile.read(os.fspath(path), dtype="float64", always_2d=True)
-    except (soundfile.LibsndfileError, OSError) as error:
-        raise FileError(f"cannot read {path}: {str(getattr(error, 'error_string', error)).rstrip('.')}", "give an unbroken audio file") from error
-    return np.ascontiguousarray(samples.T), int(sr)

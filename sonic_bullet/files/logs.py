@@ -31,9 +31,10 @@ import numpy as np
 
 from sonic_bullet.coerce import as_path
 from sonic_bullet.contacts import ROW_FIELDS, ContactLog, Contacts, Step
-from sonic_bullet.errors import AudioError, LogError, RecordError
+from sonic_bullet.errors import LogError
 from sonic_bullet.files.audio import check_sr
 from sonic_bullet.files.container import REMEDY, read_container, take, write_container
+from sonic_bullet.files.reading import reading
 from sonic_bullet.records import Air, Array, Body, Material, Microphone, ModalModel, ModalSum, Residual, Sensor, Vibrometer
 
 LOG_FORMAT = "sonic-bullet-contacts/1"
@@ -171,13 +172,9 @@ def read_log(path: str | os.PathLike[str]) -> ContactLog:
     """The contact log that `write_log` wrote. Raises FileError (no such file) and LogError (cut, foreign, forged, inconsistent)."""
     path = as_path(path, "path", "name a contact log (.npz)")
     header, arrays = read_container(path, _LogHeader, LOG_FORMAT, "contact log")
-    try:
+    with reading(path, "contact log", LogError, REMEDY):
         check_sr(header.sr)
         return _unpack_log(header, arrays, path)
-    except (RecordError, LogError, AudioError) as error:
-        if str(path) in error.what:
-            raise
-        raise LogError(f"{path}: {error.what}", REMEDY) from error
 
 
 def write_model(path: str | os.PathLike[str], model: ModalModel) -> None:
@@ -188,10 +185,8 @@ def write_model(path: str | os.PathLike[str], model: ModalModel) -> None:
 def read_model(path: str | os.PathLike[str]) -> ModalModel:
     """The modal model that `write_model` wrote. Raises FileError (no such file) and LogError (cut, foreign, forged, inconsistent)."""
     header, arrays = read_container(path, _ModelHeader, MODEL_FORMAT, "modal model")
-    try:
+    with reading(path, "modal model", LogError, REMEDY):
         return _unpack_model(header.model, arrays, 0, path)
-    except RecordError as error:
-        raise LogError(f"{path}: {error.what}", REMEDY) from error
 
 
 def _distinct(things: list[Any], key: Any) -> tuple[list[Any], list[int | None]]:
