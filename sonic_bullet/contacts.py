@@ -1,4 +1,4 @@
-"""What a simulation told us, step by step: `Contacts` (rows of one step), `Step`, and the `ContactLog` they add up to.
+"""What a simulation told us, step by step: `Contacts` (rows of one step), `Step`, `Event`, and the `ContactLog` they add up to.
 
     getContactPoints -> Contacts -> Step -> synthesizer (live)      -> frame
                                       \\-> ContactLog -> npz -> Step -> the same synthesizer (replay) -> the same bits
@@ -8,8 +8,9 @@ k rows, s steps, b bodies. A row's a and b are indices into the log's `bodies`; 
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -106,11 +107,37 @@ class Step:
             raise LogError("a contact names a body that the step does not know", "use an unbroken contact log")
 
 
+EVENT_KINDS = ("quench",)
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """What changed the sound between two physics steps without being a contact.
+
+    kind: "quench", all that rings stops. step: the number of the step before which it happened; it acts at that step's first sample,
+    whatever the rate. body: index into the log's `bodies` of the one it concerns, None: all of them (a quench is of all).
+    Raises LogError for a kind that this version does not know: passed over, it would make another sound of the log.
+    """
+
+    kind: str
+    step: int
+    body: int | None = None
+
+    def __post_init__(self) -> None:
+        if self.kind not in EVENT_KINDS:
+            raise LogError(f"an event of the unknown kind '{self.kind[:40]}'", "use the version that wrote the log")
+        if self.step < 0:
+            raise LogError(f"an event before step {self.step}", "use an unbroken contact log")
+        if self.body is not None:
+            raise LogError(f"a {self.kind} of body {self.body} alone", "use the version that wrote the log")
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class ContactLog:
     """Everything a later render needs, by value: bodies with their models, steps, sensors, rate and seed.
 
     untouched: ids of bodies that were in the world and touched nothing; known while listening, not kept in files.
+    events: whatever else changed the sound, in the order in which it happened.
     """
 
     bodies: tuple[Body, ...]
@@ -120,12 +147,14 @@ class ContactLog:
     seed: int
     air: Air = field(default_factory=Air)
     untouched: frozenset[int] = frozenset()
+    events: tuple[Event, ...] = ()
 
     def __post_init__(self) -> None:
         ids = ("give ids of bodies",)
         checked = {
             "bodies": as_kinds(self.bodies, Body, "log: bodies", "give a tuple of Body", error=LogError),
             "steps": as_kinds(self.steps, Step, "log: steps", "give a tuple of Step", error=LogError),
+            "events": as_kinds(self.events, Event, "log: events", "give a tuple of Event", error=LogError),
             "sensors": as_kinds(self.sensors, Sensor, "log: sensors", "give a tuple of sensors", error=LogError),
             "air": as_kind(self.air, Air, "log: air", "give an Air", error=LogError),
             "seed": as_whole(self.seed, "log: seed", "give a whole number, 0 or more", least=0, error=LogError),
@@ -134,6 +163,8 @@ class ContactLog:
         }
         for name, value in checked.items():
             object.__setattr__(self, name, value)
+        if any(later.step < earlier.step for earlier, later in itertools.pairwise(self.events)):
+            raise LogError("events that are not in the order of their steps", "use an unbroken contact log")
         for step in self.steps:
             if len(step.position_m) > len(self.bodies):
                 raise LogError("a step has more poses than the log has bodies", "use an unbroken contact log")
@@ -196,6 +227,10 @@ class ContactLog:
         bearers = [i for i in bearers if self.bodies[i].epoch == epoch]
         on_a, on_b = np.isin(rows.a, bearers), np.isin(rows.b, bearers)
         return on_a.astype(float) - on_b.astype(float), on_a ^ on_b
+
+    def first(self, count: int) -> ContactLog:
+        """The log of the first ``count`` steps and of what happened up to their end."""
+        return replace(self, steps=self.steps[:count], events=tuple(event for event in self.events if event.step <= count))
 
     def save(self, path: object) -> None:
         """Write the log as npz (numpy arrays and JSON, no pickle), whole or not at all. Raises FileError."""

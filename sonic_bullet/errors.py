@@ -63,6 +63,10 @@ class SceneError(SonicBulletError):
     """The PyBullet world or the scene script is not usable (NaN mass, removed body, lost connection)."""
 
 
+class SceneWarning(UserWarning):
+    """Part of a world is left out of its sound, and the rest goes on; said once for each thing left out."""
+
+
 class LogError(SonicBulletError):
     """A contact log is cut, foreign or inconsistent."""
 

@@ -15,6 +15,7 @@ import ast
 import importlib.util
 import os
 import traceback
+import warnings
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -24,7 +25,7 @@ from typing import Any
 
 from sonic_bullet.coerce import as_call, as_flag, as_number, as_path, as_whole, shown
 from sonic_bullet.contacts import ContactLog
-from sonic_bullet.errors import SceneError, SonicBulletError, interrupts
+from sonic_bullet.errors import SceneError, SceneWarning, SonicBulletError, interrupts
 from sonic_bullet.files import check_sr
 from sonic_bullet.listener import Finding, diagnose_world, direct_client, disconnect, links_with_shapes, run_script
 from sonic_bullet.records import Array, Material, Sensor
@@ -150,7 +151,9 @@ class _Stage:
             disconnect(self.client)
 
     def run(self, seconds: float | None, progress: Progress | None, say: Say | None) -> tuple[str, ...]:
-        return (_run_built if _defines_build(self.path) else _run_plain)(self, seconds, progress, say)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", SceneWarning)  # the result's notes say it
+            return (_run_built if _defines_build(self.path) else _run_plain)(self, seconds, progress, say)
 
     def need_listener(self) -> Listener:
         if self.listener is None:
@@ -159,6 +162,7 @@ class _Stage:
 
     def result(self, notes: tuple[str, ...]) -> RenderResult:
         listener = self.need_listener()
+        notes = (*notes, *listener.notes)
         log = listener.contacts
         if listener.sr == self.sr and self.microphones is None and (self.residual or not any(b.material and b.material.residual for b in log.bodies)):
             samples = listener.sound()

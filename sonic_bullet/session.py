@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from sonic_bullet.coerce import as_call, as_items, as_kind, as_kinds, as_number, as_path, as_rows, as_whole, check_options
-from sonic_bullet.contacts import ContactLog, Step
+from sonic_bullet.contacts import ContactLog, Event, Step
 from sonic_bullet.errors import AudioError, MaterialError, MeshError, ModalError, SceneError, SizeWarning
 from sonic_bullet.files import AudioReport, check_sr, write_audio
 from sonic_bullet.geometry import oversize
@@ -126,6 +126,7 @@ class Listener:
         self.world = open_world(client)
         self._synth = Synthesizer(sr=self.sr, sensors=self.sensors, seed=self.seed, air=self.air)
         self._steps: list[Step] = []
+        self._events: list[Event] = []
         self._unread: list[Array] = []
         self._attached = True
         self.frame: Array = np.zeros((len(self.sensors), 0))
@@ -227,7 +228,8 @@ class Listener:
     def step(self) -> Array:
         """Take in the physics step just made; returns `frame`. Called by the hook of a `BulletClient`, by hand otherwise.
 
-        A second call without a physics step between gives a frame of no length. Raises SceneError for NaN or a lost connection.
+        A second call without a physics step between gives a frame of no length. A body whose numbers cease to be numbers is left out from
+        then on and named (`notes`). Raises SceneError for a lost connection.
         """
         if not self._attached:
             raise SceneError("the listener is detached", "attach a new one")
@@ -246,13 +248,24 @@ class Listener:
         return np.concatenate(frames, axis=1) if frames else np.zeros((len(self.sensors), 0))
 
     def quench(self) -> None:
-        """Stop everything that rings, as a hand would; what is struck afterwards sounds again."""
+        """Stop everything that rings, as a hand would, now: where the last step taken in ends. What strikes from the next step on sounds again.
+
+        What was struck before is silent from then on, strikes that are still to be heard included, and so is what travels to the
+        microphones; what rolls or slides goes on. `sound` and files fall silent at that very sample, `frame` as much later as it lags.
+        It is an event of the log, so that a replay stops there too, at any rate.
+        """
+        self._events.append(Event("quench", len(self._steps)))
         self._synth.quench()
 
     @property
     def contacts(self) -> ContactLog:
         """The contact log so far: all that a later render needs."""
-        return ContactLog(tuple(self.world.bodies), tuple(self._steps), self.sensors, self.sr, self.seed, self.air, self.world.untouched)
+        return ContactLog(tuple(self.world.bodies), tuple(self._steps), self.sensors, self.sr, self.seed, self.air, self.world.untouched, tuple(self._events))
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What of the world is left out of the sound, and why; each was a `SceneWarning` when it happened."""
+        return tuple(self.world.left_out.notes)
 
     @property
     def time_s(self) -> float:

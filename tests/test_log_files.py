@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from sonic_bullet import files
-from sonic_bullet.contacts import ROW_FIELDS, ContactLog, Contacts, Step
+from sonic_bullet.contacts import ROW_FIELDS, ContactLog, Contacts, Event, Step
 from sonic_bullet.errors import FileError, LogError, ModalError, SonicBulletError
 from sonic_bullet.records import Air, Body, Material, Microphone, ModalModel, ModalSum, Vibrometer
 
@@ -54,7 +54,8 @@ def log(seed: int = 0, steps: int = 5) -> ContactLog:
         return Step(1 / (240 + i), rng.normal(size=(b, 3)) / 3, rng.normal(size=(b, 4)) / 7, rng.random(b) < 0.3, Contacts(**rows))
 
     sensors = (Microphone([0.1, -1 / 3, 1e-300]), Vibrometer(1, [1 / 3, 2 / 3, 0], [1, 2, 3 / 7], 0), ModalSum(1 / 7))
-    return ContactLog(bodies, tuple(step(i) for i in range(steps)), sensors, 44_100, 2**40 + 1, Air(1.19, 340.1 / 3))
+    events = (Event("quench", 0), Event("quench", 3), Event("quench", 3))
+    return ContactLog(bodies, tuple(step(i) for i in range(steps)), sensors, 44_100, 2**40 + 1, Air(1.19, 340.1 / 3), events=events)
 
 
 def same(x: object, y: object) -> bool:
@@ -101,7 +102,7 @@ def test_equal_models_and_materials_are_stored_once(tmp_path: Path) -> None:
 def test_a_model_comes_back_bit_for_bit(tmp_path: Path) -> None:
     files.write_model(tmp_path / "m.npz", model())
     assert same(model(), files.read_model(tmp_path / "m.npz"))
-    with pytest.raises(LogError, match="sonic-bullet-contacts/1"):
+    with pytest.raises(LogError, match="sonic-bullet-contacts/2"):
         files.read_log(tmp_path / "m.npz")
 
 
@@ -201,6 +202,11 @@ def test_forged_logs_are_refused_by_name(tmp_path: Path, entry: str, value: byte
         (b'"sr":44100', b'"sr":"x"', "sr"),
         (b'"sr":44100', b'"sr":0', "sample rate"),
         (b'"microphone"', b'"ear"', "ear"),
+        (b'"kind":"quench","step":0', b'"kind":"gong","step":0', "unknown kind 'gong'"),
+        (b'"kind":"quench","step":0', b'"kind":"quench","step":4', "order"),
+        (b'"kind":"quench","step":0', b'"kind":"quench","step":-1', "before step -1"),
+        (b'"kind":"quench","step":0', b'"kind":"quench","step":0,"body":2', "body 2 alone"),
+        (b'"kind":"quench","step":0', b'"kind":"quench","step":0.5', "step"),
     ],
 )
 def test_forged_headers_are_refused_by_name(tmp_path: Path, old: bytes, new: bytes, words: str) -> None:
@@ -323,6 +329,25 @@ def test_degenerate_vertices_of_a_model_end_in_sound_or_in_our_own_error(tmp_pat
 def test_numbers_beyond_physics_are_refused_where_they_are_read(tmp_path: Path, value: float) -> None:
     with pytest.raises(LogError, match=r"contact point_a_m holds (a number of|NaN or infinite)"):
         files.read_log(forged(tmp_path, contact_point_a_m=np.full((len(log().rows), 3), value)))
+
+
+def test_a_log_of_the_first_format_reads_as_one_without_events(tmp_path: Path) -> None:
+    """The header names format 1 and has no events."""
+    written = replace(log(), events=())
+    files.write_log(tmp_path / "new.npz", written)
+    with zipfile.ZipFile(tmp_path / "new.npz") as source, zipfile.ZipFile(tmp_path / "old.npz", "w") as target:
+        for name in source.namelist():
+            content = source.read(name)
+            if name == "header.npy":
+                with np.load(tmp_path / "new.npz") as entries:
+                    text = entries["header"].tobytes()
+                old = text.replace(b"sonic-bullet-contacts/2", b"sonic-bullet-contacts/1").replace(b',"events":[]', b"")
+                assert old != text and b"events" not in old
+                stream = io.BytesIO()
+                np.save(stream, np.frombuffer(old, np.uint8))
+                content = stream.getvalue()
+            target.writestr(name, content)
+    assert same(files.read_log(tmp_path / "old.npz"), written)
 
 
 def test_a_pickle_is_never_opened(tmp_path: Path) -> None:

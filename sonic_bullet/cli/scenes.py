@@ -168,7 +168,7 @@ def _replayed(path: str, wish: _Wish) -> _Replay:
     if (seconds := wish.seconds) is not None:
         if seconds > log.duration_s + 1e-9:
             raise AudioError(f"{path} lasts {log.duration_s:.3f} s, shorter than {seconds} s", "give fewer seconds, or simulate the scene for longer")
-        log = replace(log, steps=tuple(step for step, start in zip(log.steps, log.start_s, strict=True) if start < seconds - 1e-9))
+        log = log.first(int((log.start_s < seconds - 1e-9).sum()))
     samples = render_log(log, sr=wish.rate, residual=wish.residual, progress=wish.progress, say=wish.say)
     return _Replay(samples, log, wish.rate or log.sr, silence_notes(samples, log))
 

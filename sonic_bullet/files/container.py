@@ -53,11 +53,11 @@ def write_container(path: str | os.PathLike[str], header: msgspec.Struct, arrays
                 np.lib.format.write_array(entry, np.ascontiguousarray(array), version=(1, 0), allow_pickle=False)
 
 
-def read_container(path: str | os.PathLike[str], kind: type[Header], form: str, what: str) -> tuple[Header, dict[str, Array]]:
+def read_container(path: str | os.PathLike[str], kind: type[Header], form: str | tuple[str, ...], what: str) -> tuple[Header, dict[str, Array]]:
     """The header as ``kind`` and all arrays, by name, read-only.
 
-    form: the format id asked for; what: the thing, in words, for messages ("contact log"). Raises FileError where there is no readable
-    file, LogError where it is cut, foreign, compressed, pickled, holds an entry twice or beside its directory, or lies about a size.
+    form: the format id asked for, or several that will do, the newest first; what: the thing, in words, for messages
+    ("contact log"). Raises FileError where there is no readable file, LogError where it is cut, foreign, compressed, pickled, holds an entry twice or beside its directory, or lies about a size.
     """
     with reading(path, what, LogError, REMEDY):
         status = os.stat(path)
@@ -78,8 +78,9 @@ def read_container(path: str | os.PathLike[str], kind: type[Header], form: str, 
         text = arrays.pop(HEADER).tobytes()
         try:
             found = msgspec.json.decode(text, type=_Format).format
-            if found != form:
-                raise LogError(f"{path} has format '{found}', wanted '{form}'", f"give a {what} of this version")
+            forms = (form,) if isinstance(form, str) else form
+            if found not in forms:
+                raise LogError(f"{path} has format '{found}', wanted '{forms[0]}'", f"give a {what} of this version")
             return msgspec.json.decode(text, type=kind), arrays
         except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
             raise LogError(f"{path} is no {what}: {error}", REMEDY) from error

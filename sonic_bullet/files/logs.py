@@ -2,7 +2,7 @@
 
 The container is `container`'s npz. Scalars, names and references are JSON (`header.npy`), all arrays are entries of their own:
 
-    format "sonic-bullet-contacts/1"; b bodies, s steps, p = Σ bodies known at each step, k = Σ contacts of each step
+    format "sonic-bullet-contacts/2"; b bodies, s steps, p = Σ bodies known at each step, k = Σ contacts of each step
       step_dt_s (s,) f8                     length of each step
       step_gravity_m_s2 (s, 3) f8            gravity in the world
       step_body_count, step_contact_count (s,) i8   how many of the p and k rows are each step's, in order
@@ -14,6 +14,9 @@ The container is `container`'s npz. Scalars, names and references are JSON (`hea
       residual<i>_<field> f8                 of material i, where it has one: the arrays of `Residual`
       model<i>_freq_hz, _decay_per_s (m,) f8, _shape (v, 3, m) f4, _vertex_m (v, 3) f8, _face (f, 3) i4, _curvature_per_m (f,) f8
       model<i>_bend_s2_m2, _choke_s_m (m,) f8  only where its modes go with their level
+      events (in the header)                 what else changed the sound, in order: {"kind": "quench", "step": the step before which it happened,
+                                            "body": index, left out where it concerns all}
+    format "sonic-bullet-contacts/1"        the same without events: read as a log in which there were none
     format "sonic-bullet-model/1"           one model: model0_… as above
 
 A reader checks sizes before it allocates and records check their invariants, so a cut, foreign or forged file is one line of LogError.
@@ -30,14 +33,16 @@ import msgspec
 import numpy as np
 
 from sonic_bullet.coerce import as_path
-from sonic_bullet.contacts import ROW_FIELDS, ContactLog, Contacts, Step
+from sonic_bullet.contacts import ROW_FIELDS, ContactLog, Contacts, Event, Step
 from sonic_bullet.errors import LogError
 from sonic_bullet.files.audio import check_sr
 from sonic_bullet.files.container import REMEDY, read_container, take, write_container
 from sonic_bullet.files.reading import reading
 from sonic_bullet.records import Air, Array, Body, Material, Microphone, ModalModel, ModalSum, Residual, Sensor, Vibrometer
 
-LOG_FORMAT = "sonic-bullet-contacts/1"
+LOG_FORMAT = "sonic-bullet-contacts/2"
+LOG_FORMATS = (LOG_FORMAT, "sonic-bullet-contacts/1")
+"""What is read; the first is what is written."""
 MODEL_FORMAT = "sonic-bullet-model/1"
 MODEL_ARRAYS: dict[str, tuple[type, tuple[int | None, ...]]] = {
     "freq_hz": (float, (None,)),
@@ -113,6 +118,12 @@ class _ModalSum(msgspec.Struct, tag="modal-sum"):
     scale: float
 
 
+class _Event(msgspec.Struct, omit_defaults=True):
+    kind: str
+    step: int
+    body: int | None = None
+
+
 class _LogHeader(msgspec.Struct):
     format: str
     sr: int
@@ -123,6 +134,7 @@ class _LogHeader(msgspec.Struct):
     materials: list[_Material]
     models: list[_Model]
     bodies: list[_Body]
+    events: list[_Event] = []
 
 
 class _ModelHeader(msgspec.Struct):
@@ -144,6 +156,7 @@ def write_log(path: str | os.PathLike[str], log: ContactLog) -> None:
         materials=[_pack_material(material) for material in materials],
         models=[_pack_model(model) for model in models],
         bodies=[_pack_body(body, m, n) for body, m, n in zip(log.bodies, material_of, model_of, strict=True)],
+        events=[_Event(event.kind, event.step, event.body) for event in log.events],
     )
     steps = log.steps
     rows = Contacts.joined([step.contacts for step in steps])
@@ -171,7 +184,7 @@ def write_log(path: str | os.PathLike[str], log: ContactLog) -> None:
 def read_log(path: str | os.PathLike[str]) -> ContactLog:
     """The contact log that `write_log` wrote. Raises FileError (no such file) and LogError (cut, foreign, forged, inconsistent)."""
     path = as_path(path, "path", "name a contact log (.npz)")
-    header, arrays = read_container(path, _LogHeader, LOG_FORMAT, "contact log")
+    header, arrays = read_container(path, _LogHeader, LOG_FORMATS, "contact log")
     with reading(path, "contact log", LogError, REMEDY):
         check_sr(header.sr)
         return _unpack_log(header, arrays, path)
@@ -314,6 +327,7 @@ def _unpack_log(header: _LogHeader, arrays: Mapping[str, Array], path: object) -
         sr=header.sr,
         seed=header.seed,
         air=Air(header.air_density_kg_m3, header.air_sound_speed_m_s),
+        events=tuple(Event(event.kind, event.step, event.body) for event in header.events),
     )
 
 

@@ -18,7 +18,7 @@ from sonic_bullet.errors import MeshError, SceneError
 from sonic_bullet.geometry import LARGEST_M, oversize
 from sonic_bullet.listener import shapes
 from sonic_bullet.listener.bodies import checked_mass_kg, link_name
-from sonic_bullet.listener.frames import read_motion, read_roster
+from sonic_bullet.listener.frames import NO_NUMBER, read_motion, read_roster
 from sonic_bullet.listener.mesh_files import Surface, lid_height_m, read_surfaces
 from sonic_bullet.listener.pieces import collision_pieces
 from sonic_bullet.listener.polling import FORCE
@@ -126,10 +126,9 @@ def _masses(client_id: int) -> list[Finding]:
             checked_mass_kg(pybullet.getDynamicsInfo(body, link, physicsClientId=client_id), body, link)
         except SceneError as error:
             found.append(Finding("mass", "error", error.what, error.remedy))
-    try:
-        read_motion(client_id, read_roster(client_id))
-    except SceneError as error:
-        found.append(Finding("nan", "error", error.what, error.remedy))
+    for body in read_motion(client_id, read_roster(client_id)).broken:
+        remedy = "check its mass, inertia and what touches it; remove it or reset the scene"
+        found.append(Finding("nan", "error", f"body {body} has {NO_NUMBER}", remedy))
     return found
 
 
