@@ -36,7 +36,7 @@ def reading(path: str | os.PathLike[str], thing: str, kind: type[SonicBulletErro
 
 def _told(error: SonicBulletError, path: str, kind: type[SonicBulletError]) -> SonicBulletError | None:
     """The error as ``kind``, with the path and no more of the file than is allowed; None where it is all that already."""
-    before, named, after = error.what.partition(path)
+    before, named, after = error.what.partition(path) if path else (error.what, " ", "")  # every text has the empty name in it
     if named and type(error) is kind and len(before) + len(after) + len(error.remedy) <= QUOTED:
         return None
     if not named:
