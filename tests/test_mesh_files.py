@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import struct
+import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
 
@@ -135,13 +136,17 @@ def test_counts_that_a_file_does_not_hold_take_no_memory(tmp_path: Path) -> None
     text += b" " * (-len(text) % 4)
     rest = data[20 + size :]
     (tmp_path / "a.glb").write_bytes(struct.pack("<4sIII4s", b"glTF", 2, 20 + len(text) + len(rest), len(text), b"JSON") + text + rest)
+    (tmp_path / "b.glb").write_bytes(data[:12] + struct.pack("<I", 2**32 - 4) + data[16:])
     head = b"ply\nformat binary_little_endian 1.0\nelement vertex 4000000000\nproperty float x\nproperty float y\nproperty float z\nend_header\n"
     (tmp_path / "a.ply").write_bytes(head + bytes(120))
     (tmp_path / "a.stl").write_bytes(bytes(80) + struct.pack("<I", 2**32 - 1) + bytes(50))
-    for name in ("a.glb", "a.ply", "a.stl"):
+    tracemalloc.start()
+    for name in ("a.glb", "b.glb", "a.ply", "a.stl"):
         for read in READERS:
             with pytest.raises(MeshError, match=name):
                 read(tmp_path / name)
+    assert tracemalloc.get_traced_memory()[1] < 100e6
+    tracemalloc.stop()
 
 
 def test_archives_are_not_opened_and_nothing_is_no_mesh(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ A face that names a vertex which is not there is refused: taken as an index from
 
 from __future__ import annotations
 
+import io
 import json
 import struct
 from collections.abc import Iterator
@@ -115,8 +116,8 @@ def _other(path: Path) -> Iterator[Surface]:
         if kind in BESIDE:
             scene = trimesh.load_scene(path, process=False, maintain_order=True, skip_materials=True)
         else:
-            with path.open("rb") as file:
-                scene = trimesh.load_scene(file, file_type=kind, process=False, maintain_order=True, skip_materials=True)
+            content = io.BytesIO(path.read_bytes())  # a read of as many bytes as a header claims gives what there is, and takes no more memory
+            scene = trimesh.load_scene(content, file_type=kind, process=False, maintain_order=True, skip_materials=True)
     except ImportError:  # a parser of text asks for a package to guess its encoding: the file is not of its kind
         raise MeshError(f"mesh file {path} is no {kind} file", REMEDY) from None
     for part in scene.geometry.values():  # before they are placed: placing may follow a face's indices
