@@ -3,8 +3,8 @@
     samples (channels, n) Pa -> scale -> check -> clip and count -> partial file -> read back -> fsync -> NAME.EXT
     ContactLog | ModalModel  -> arrays + one JSON entry, no pickle -> partial file -> fsync -> NAME.EXT
 
-`audio` writes sound, as loud as `levels` says, `recordings` reads it, `logs` writes contact logs and modal models (their format is described
-there), `container` is the npz beneath them, `meshes` and `cases` read what they are named after, `reading` is the boundary of all readers,
+`audio` writes sound, as loud as `levels` says, `recordings` reads it, `logs` and `models` write contact logs and modal models (`logs` describes
+both), `container` is the npz beneath them, `meshes` and `cases` read what they are named after, `reading` is the boundary of all readers,
 `atomic` the replacing.
 """
 
@@ -12,7 +12,8 @@ from sonic_bullet.files.atomic import cannot, check_output, kept_name, replacing
 from sonic_bullet.files.audio import AudioReport, AudioWriter, check_audio_output, check_sr, write_audio
 from sonic_bullet.files.channels import channel_of, channel_words
 from sonic_bullet.files.levels import check_levels
-from sonic_bullet.files.logs import read_log, read_model, write_log, write_model
+from sonic_bullet.files.logs import read_log, write_log
+from sonic_bullet.files.models import read_model, write_model
 from sonic_bullet.files.recordings import read_audio
 
 __all__ = [

@@ -1,4 +1,4 @@
-"""Contact logs and modal models on disk: every number bit for bit, no pickle.
+"""Contact logs on disk: every number bit for bit, no pickle.
 
 The container is `container`'s npz. Scalars, names and references are JSON (`header.npy`), all arrays are entries of their own:
 
@@ -17,14 +17,12 @@ The container is `container`'s npz. Scalars, names and references are JSON (`hea
       events (in the header)                 what else changed the sound, in order: {"kind": "quench", "step": the step before which it happened,
                                             "body": index, left out where it concerns all}
     format "sonic-bullet-contacts/1"        the same without events: read as a log in which there were none
-    format "sonic-bullet-model/1"           one model: model0_… as above
 
 A reader checks sizes before it allocates and records check their invariants, so a cut, foreign or forged file is one line of LogError.
 """
 
 from __future__ import annotations
 
-import hashlib
 import os
 from collections.abc import Mapping
 from typing import Any
@@ -37,23 +35,13 @@ from sonic_bullet.contacts import ROW_FIELDS, ContactLog, Contacts, Event, Step
 from sonic_bullet.errors import LogError
 from sonic_bullet.files.audio import check_sr
 from sonic_bullet.files.container import REMEDY, read_container, take, write_container
+from sonic_bullet.files.models import ModelEntry, as_json_text, model_arrays, model_key, pack_model, unpack_model
 from sonic_bullet.files.reading import reading
-from sonic_bullet.records import Air, Array, Body, Material, Microphone, ModalModel, ModalSum, Residual, Sensor, Vibrometer
+from sonic_bullet.records import Air, Array, Body, Material, Microphone, ModalSum, Residual, Sensor, Vibrometer
 
 LOG_FORMAT = "sonic-bullet-contacts/2"
 LOG_FORMATS = (LOG_FORMAT, "sonic-bullet-contacts/1")
 """What is read; the first is what is written."""
-MODEL_FORMAT = "sonic-bullet-model/1"
-MODEL_ARRAYS: dict[str, tuple[type, tuple[int | None, ...]]] = {
-    "freq_hz": (float, (None,)),
-    "decay_per_s": (float, (None,)),
-    "shape": (np.float32, (None, 3, None)),
-    "vertex_m": (float, (None, 3)),
-    "face": (np.int32, (None, 3)),
-    "curvature_per_m": (float, (None,)),
-}
-BENT_ARRAYS = ("bend_s2_m2", "choke_s_m")
-"""Of models whose modes go with their level; others have none."""
 RESIDUAL_ARRAYS: dict[str, tuple[int | None, ...]] = {
     **{f"{part}_{name}": (None,) for part in ("mode", "line") for name in ("freq_hz", "decay_per_s", "amplitude")},
     "freq_hz": (None,),
@@ -61,15 +49,6 @@ RESIDUAL_ARRAYS: dict[str, tuple[int | None, ...]] = {
     "power_per_hz": (None, None),
 }
 Vector = tuple[float, float, float]
-
-
-class _Model(msgspec.Struct, omit_defaults=True):
-    volume_m3: float
-    mass_kg: float
-    dropped: int
-    note: str
-    choke_power: float = 1.0
-    includes_radiation: bool = False
 
 
 class _Residual(msgspec.Struct):
@@ -132,20 +111,15 @@ class _LogHeader(msgspec.Struct):
     air_sound_speed_m_s: float
     sensors: list[_Microphone | _Vibrometer | _ModalSum]
     materials: list[_Material]
-    models: list[_Model]
+    models: list[ModelEntry]
     bodies: list[_Body]
     events: list[_Event] = []
-
-
-class _ModelHeader(msgspec.Struct):
-    format: str
-    model: _Model
 
 
 def write_log(path: str | os.PathLike[str], log: ContactLog) -> None:
     """Write a contact log, whole or not at all; equal logs give equal bytes. Raises FileError."""
     materials, material_of = _distinct([body.material for body in log.bodies], _material_key)
-    models, model_of = _distinct([body.model for body in log.bodies], _model_key)
+    models, model_of = _distinct([body.model for body in log.bodies], model_key)
     header = _LogHeader(
         format=LOG_FORMAT,
         sr=int(log.sr),
@@ -154,7 +128,7 @@ def write_log(path: str | os.PathLike[str], log: ContactLog) -> None:
         air_sound_speed_m_s=float(log.air.sound_speed_m_s),
         sensors=[_pack_sensor(sensor) for sensor in log.sensors],
         materials=[_pack_material(material) for material in materials],
-        models=[_pack_model(model) for model in models],
+        models=[pack_model(model) for model in models],
         bodies=[_pack_body(body, m, n) for body, m, n in zip(log.bodies, material_of, model_of, strict=True)],
         events=[_Event(event.kind, event.step, event.body) for event in log.events],
     )
@@ -174,7 +148,7 @@ def write_log(path: str | os.PathLike[str], log: ContactLog) -> None:
     }
     arrays |= {f"contact_{name}": getattr(rows, name) for name in ROW_FIELDS}
     for i, model in enumerate(models):
-        arrays |= _model_arrays(model, i)
+        arrays |= model_arrays(model, i)
     for i, material in enumerate(materials):
         if material.residual is not None:
             arrays |= {f"residual{i}_{name}": getattr(material.residual, name) for name in RESIDUAL_ARRAYS}
@@ -188,18 +162,6 @@ def read_log(path: str | os.PathLike[str]) -> ContactLog:
     with reading(path, "contact log", LogError, REMEDY):
         check_sr(header.sr)
         return _unpack_log(header, arrays, path)
-
-
-def write_model(path: str | os.PathLike[str], model: ModalModel) -> None:
-    """Write one modal model, whole or not at all. Raises FileError."""
-    write_container(path, _ModelHeader(MODEL_FORMAT, _pack_model(model)), _model_arrays(model, 0))
-
-
-def read_model(path: str | os.PathLike[str]) -> ModalModel:
-    """The modal model that `write_model` wrote. Raises FileError (no such file) and LogError (cut, foreign, forged, inconsistent)."""
-    header, arrays = read_container(path, _ModelHeader, MODEL_FORMAT, "modal model")
-    with reading(path, "modal model", LogError, REMEDY):
-        return _unpack_model(header.model, arrays, 0, path)
 
 
 def _distinct(things: list[Any], key: Any) -> tuple[list[Any], list[int | None]]:
@@ -216,35 +178,24 @@ def _material_key(material: Material) -> bytes:
     return msgspec.json.encode(_pack_material(material)) + material.stiffness_pa.tobytes() + more
 
 
-def _model_key(model: ModalModel) -> bytes:
-    digest = hashlib.sha256(msgspec.json.encode(_pack_model(model)))
-    for name, array in _model_arrays(model, 0).items():
-        digest.update(f"{name} {array.shape}".encode() + array.tobytes())
-    return digest.digest()
-
-
 def _pack_material(x: Material) -> _Material:
     return _Material(
-        name=_text(x.name),
+        name=as_json_text(x.name),
         density_kg_m3=float(x.density_kg_m3),
         alpha_per_s=None if x.alpha_per_s is None else float(x.alpha_per_s),
         beta_s=None if x.beta_s is None else float(x.beta_s),
         roughness_m=float(x.roughness_m),
         hurst=float(x.hurst),
         restitution=float(x.restitution),
-        source=_text(x.source),
-        residual=None if x.residual is None else _Residual(float(x.residual.clip_energy), _text(x.residual.source)),
+        source=as_json_text(x.source),
+        residual=None if x.residual is None else _Residual(float(x.residual.clip_energy), as_json_text(x.residual.source)),
         includes_radiation=bool(x.includes_radiation),
     )
 
 
-def _pack_model(x: ModalModel) -> _Model:
-    return _Model(float(x.volume_m3), float(x.mass_kg), int(x.dropped), _text(x.note), float(x.choke_power), bool(x.includes_radiation))
-
-
 def _pack_body(x: Body, material: int | None, model: int | None) -> _Body:
     numbers = (int(x.body_id), int(x.link), int(x.epoch))
-    return _Body(*numbers, _text(x.name), float(x.mass_kg), float(x.volume_m3), int(x.since_step), int(x.until_step), material, model)
+    return _Body(*numbers, as_json_text(x.name), float(x.mass_kg), float(x.volume_m3), int(x.since_step), int(x.until_step), material, model)
 
 
 def _pack_sensor(sensor: Sensor) -> _Microphone | _Vibrometer | _ModalSum:
@@ -258,30 +209,6 @@ def _pack_sensor(sensor: Sensor) -> _Microphone | _Vibrometer | _ModalSum:
 def _vector(array: Array) -> Vector:
     x, y, z = (float(value) for value in array)
     return x, y, z
-
-
-def _text(text: str) -> str:
-    """``text`` as JSON can hold it: lone surrogates, as undecodable names carry them, become question marks."""
-    return text.encode("utf-8", "replace").decode()
-
-
-def _model_arrays(model: ModalModel, index: int) -> dict[str, Array]:
-    names = (*MODEL_ARRAYS, *(name for name in BENT_ARRAYS if getattr(model, name) is not None))
-    return {f"model{index}_{name}": getattr(model, name) for name in names}
-
-
-def _unpack_model(header: _Model, arrays: Mapping[str, Array], index: int, path: object) -> ModalModel:
-    parts = {name: take(arrays, f"model{index}_{name}", dtype, shape, path) for name, (dtype, shape) in MODEL_ARRAYS.items()}
-    parts |= {name: take(arrays, f"model{index}_{name}", float, (None,), path) for name in BENT_ARRAYS if f"model{index}_{name}" in arrays}
-    return ModalModel(
-        **parts,
-        volume_m3=header.volume_m3,
-        mass_kg=header.mass_kg,
-        dropped=header.dropped,
-        note=header.note,
-        choke_power=header.choke_power,
-        includes_radiation=header.includes_radiation,
-    )
 
 
 def _unpack_residual(header: _Residual | None, arrays: Mapping[str, Array], index: int, path: object) -> Residual | None:
@@ -311,7 +238,7 @@ def _unpack_log(header: _LogHeader, arrays: Mapping[str, Array], path: object) -
         Material(stiffness_pa=stiffness[i], **{**msgspec.structs.asdict(x), "residual": _unpack_residual(x.residual, arrays, i, path)})
         for i, x in enumerate(header.materials)
     ]
-    models = [_unpack_model(x, arrays, i, path) for i, x in enumerate(header.models)]
+    models = [unpack_model(x, arrays, i, path) for i, x in enumerate(header.models)]
     bodies = [
         Body(
             **{**msgspec.structs.asdict(x), "material": _pick(materials, x.material, path), "model": _pick(models, x.model, path)},
