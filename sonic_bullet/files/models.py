@@ -31,6 +31,8 @@ BENT_ARRAYS = ("bend_s2_m2", "choke_s_m")
 
 
 class ModelEntry(msgspec.Struct, omit_defaults=True):
+    """What the header says of a model: all that is no array."""
+
     volume_m3: float
     mass_kg: float
     dropped: int
@@ -57,6 +59,7 @@ def read_model(path: str | os.PathLike[str]) -> ModalModel:
 
 
 def model_key(model: ModalModel) -> bytes:
+    """Digest of a model's content: equal models are stored once."""
     digest = hashlib.sha256(msgspec.json.encode(pack_model(model)))
     for name, array in model_arrays(model, 0).items():
         digest.update(f"{name} {array.shape}".encode() + array.tobytes())
@@ -64,15 +67,18 @@ def model_key(model: ModalModel) -> bytes:
 
 
 def pack_model(x: ModalModel) -> ModelEntry:
+    """The header's part of a model."""
     return ModelEntry(float(x.volume_m3), float(x.mass_kg), int(x.dropped), as_json_text(x.note), float(x.choke_power), bool(x.includes_radiation))
 
 
 def model_arrays(model: ModalModel, index: int) -> dict[str, Array]:
+    """The arrays of a model, by their names in the file."""
     names = (*MODEL_ARRAYS, *(name for name in BENT_ARRAYS if getattr(model, name) is not None))
     return {f"model{index}_{name}": getattr(model, name) for name in names}
 
 
 def unpack_model(header: ModelEntry, arrays: Mapping[str, Array], index: int, path: object) -> ModalModel:
+    """The model that these were made of. Raises LogError, RecordError."""
     parts = {name: take(arrays, f"model{index}_{name}", dtype, shape, path) for name, (dtype, shape) in MODEL_ARRAYS.items()}
     parts |= {name: take(arrays, f"model{index}_{name}", float, (None,), path) for name in BENT_ARRAYS if f"model{index}_{name}" in arrays}
     return ModalModel(
