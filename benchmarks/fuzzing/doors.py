@@ -21,7 +21,7 @@ import numpy as np
 from benchmarks.fuzzing import containers, meshes, sounds
 from benchmarks.fuzzing.mutations import json_changed
 from sonic_bullet import files, presets
-from sonic_bullet.contacts import ContactLog, Contacts, Step
+from sonic_bullet.contacts import ContactLog, Contacts, Event, Step
 from sonic_bullet.effects.stored import with_material, with_modes
 from sonic_bullet.files.cases import read_case
 from sonic_bullet.geometry import is_closed, volume_m3
@@ -64,7 +64,7 @@ def small_log(model: ModalModel, material: Material = STEEL, *, microphone: bool
     place, upright = [[0, 0, 0.1], [0, 0, 0]], [[0, 0, 0, 1.0]] * 2
     steps = [Step(1 / 240, place, upright, [False, False], Contacts(**one) if i != 1 else Contacts.none(), [0, 0, -9.81]) for i in range(3)]  # type: ignore[arg-type]
     sensors = (Microphone([0, -1, 0.5]), Vibrometer(0, [0, 0, 0.025], [0, 0, 1]), ModalSum(1.0))  # type: ignore[arg-type]
-    return ContactLog(bodies, tuple(steps), sensors if microphone else sensors[2:], SR, 0)
+    return ContactLog(bodies, tuple(steps), sensors if microphone else sensors[2:], SR, 0, events=(Event("quench", 1), Event("quench", 2)))
 
 
 def struck(model: ModalModel, material: Material = STEEL) -> None:
@@ -122,7 +122,7 @@ def case_seed() -> dict[str, Any]:
 
 def _enter_log(path: Path) -> None:
     log = files.read_log(path)
-    render_log(replace(log, steps=log.steps[:2]))
+    render_log(log.first(2))
 
 
 def _enter_model(path: Path) -> None:
