@@ -17,10 +17,10 @@ from typing import Any
 import numpy as np
 from estimator_speed import problem  # type: ignore[import-not-found]
 
-from sonic_bullet.estimator.metric import Constants
-from sonic_bullet.estimator.optimise import fast, polish
-from sonic_bullet.estimator.problem import Problem, modes_of
-from sonic_bullet.estimator.values import Features
+from sonic_bullet.estimator.lines.line_values import Features
+from sonic_bullet.estimator.perceptual.metric import Constants
+from sonic_bullet.estimator.perceptual.optimise import fast, polish
+from sonic_bullet.estimator.perceptual.problem import Problem, modes_of
 from sonic_bullet.records import Array
 
 AWAY = np.array([1.1, 0.93, 1.01, 1.1])

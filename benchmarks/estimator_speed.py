@@ -16,10 +16,10 @@ import time
 
 import numpy as np
 
-from sonic_bullet.estimator.metric import hybrid, target
-from sonic_bullet.estimator.optimise import fast, reference
-from sonic_bullet.estimator.problem import Problem, modes_of
-from sonic_bullet.estimator.values import Features
+from sonic_bullet.estimator.lines.line_values import Features
+from sonic_bullet.estimator.perceptual.metric import hybrid, target
+from sonic_bullet.estimator.perceptual.optimise import fast, reference
+from sonic_bullet.estimator.perceptual.problem import Problem, modes_of
 from sonic_bullet.modal import analyse
 from sonic_bullet.presets import load_material
 from sonic_bullet.records import Array, Material, Shape

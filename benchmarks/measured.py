@@ -21,7 +21,7 @@ from benchmarks.measured_sets.heard import READINGS, reading
 from benchmarks.measured_sets.page import Page, written
 from benchmarks.measured_sets.table import JUDGES, PLAIN
 from benchmarks.measured_sets.values import Judge, Row
-from sonic_bullet.side_by_side import one_thread, side_by_side
+from sonic_bullet.parallel import one_thread, side_by_side
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -18,7 +18,7 @@ import pybullet_utils.bullet_client as bc
 from scipy.signal import welch
 
 import sonic_bullet as sb
-from sonic_bullet.contacts import ContactLog
+from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.records import Array
 from sonic_bullet.render import render_log
 

@@ -29,11 +29,11 @@ from typing import Annotated, Any
 import msgspec
 import numpy as np
 
-from sonic_bullet.effects.stored import effect_of
-from sonic_bullet.effects.values import Effect
-from sonic_bullet.errors import MaterialError, RecordError
+from sonic_bullet.effects.presets_of_effects import effect_of
+from sonic_bullet.effects.protocol import Effect
 from sonic_bullet.files import replacing
 from sonic_bullet.records import Material
+from sonic_bullet.records.errors import MaterialError, RecordError
 from sonic_bullet.residual.code import ResidualForm, residual_of
 
 FORMAT = "sonic-bullet-preset/1"

@@ -20,10 +20,10 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from sonic_bullet.contacts import ContactLog
-from sonic_bullet.errors import SceneError, SonicBulletError, interrupts
+from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.listener import Finding, diagnose_world, direct_client, disconnect, links_with_shapes, run_script
 from sonic_bullet.records import Array
+from sonic_bullet.records.errors import SceneError, SonicBulletError, interrupts
 from sonic_bullet.render import render_log
 from sonic_bullet.session import Listener, as_sensors, attach
 

@@ -17,10 +17,11 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.contacts import ContactLog, Step
-from sonic_bullet.errors import MaterialError, RecordError, SceneError
 from sonic_bullet.files import AudioReport, check_sr, write_audio
+from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.records import Air, Array, Material, Microphone, ModalModel, ModalSum, Sensor, Shape, Vibrometer
+from sonic_bullet.records.contacts import Step
+from sonic_bullet.records.errors import MaterialError, RecordError, SceneError
 from sonic_bullet.render import LATENCY_STEPS, Synthesizer
 from sonic_bullet.render.radiated import radiation_of
 
@@ -146,7 +147,7 @@ class Listener:
         progress: Callable[[str], None] | None,
     ) -> ModalModel:
         from sonic_bullet import modal
-        from sonic_bullet.effects.stored import with_material, with_modes
+        from sonic_bullet.effects.presets_of_effects import with_material, with_modes
 
         name = self.world.name_of(body, link)
         material = with_material(material)

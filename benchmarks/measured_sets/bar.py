@@ -15,7 +15,7 @@ import numpy as np
 from benchmarks.measured_sets.heard import cut, lines
 from benchmarks.measured_sets.laws import draw, trial
 from benchmarks.measured_sets.values import DRAWS, Array, Lines, Outcome, Row, clear
-from sonic_bullet.modal.mesh_files import read_mesh
+from sonic_bullet.modal.meshing.mesh_files import read_mesh
 from sonic_bullet.modal.reduced import Family, family
 
 SPLIT_HZ = 8000.0

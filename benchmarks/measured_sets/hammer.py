@@ -18,8 +18,8 @@ import numpy as np
 
 from benchmarks.measured_sets.heard import cut, features, jittered, lines
 from benchmarks.measured_sets.values import DRAWS, Array, Lines, Outcome, Row, clear
+from sonic_bullet.effects.common.pulses import magnitude
 from sonic_bullet.effects.contact_time import ContactTime
-from sonic_bullet.effects.pulses import magnitude
 
 HALF_SINE = 1 / (1 - 2 * np.arcsin(0.1) / np.pi)
 AFTER_S = 0.0015

@@ -21,8 +21,8 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet import estimator
-from sonic_bullet.estimator.features import extract
-from sonic_bullet.estimator.values import Features
+from sonic_bullet.estimator.lines.extraction import extract
+from sonic_bullet.estimator.lines.line_values import Features
 from sonic_bullet.modal.cache import code_digest, key
 
 Array = np.ndarray[Any, Any]

@@ -16,8 +16,8 @@ import numpy as np
 
 from benchmarks.measured_sets.heard import lines
 from benchmarks.measured_sets.values import DRAWS, Array, Lines, Outcome, Row, clear
+from sonic_bullet.effects.common.pulses import magnitude
 from sonic_bullet.effects.contact_time import ContactTime
-from sonic_bullet.effects.pulses import magnitude
 
 LATE_S = {"agogo-forzee": 0.0015, "ride-bja": 0.003}
 PART = {"agogo-forzee": (1.2, (500.0, 14000.0)), "ride-bja": (1.0, (300.0, 5000.0))}

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet.effects import Evidence, Heard
-from sonic_bullet.estimator.values import Features
+from sonic_bullet.estimator.lines.line_values import Features
 
 Array = np.ndarray[Any, Any]
 DRAWS = 200

@@ -19,7 +19,7 @@ from typing import Any
 
 import click
 
-from sonic_bullet.errors import SonicBulletError, interrupts
+from sonic_bullet.records.errors import SonicBulletError, interrupts
 
 DEFAULT_SR = 48_000
 DEFAULT_MODES_MATERIAL = "steel"
@@ -130,7 +130,7 @@ def cli() -> None:
 @click.option("--residual/--no-residual", default=True, help="What presets sound beside their modes. [default: heard]")
 def render(**options: Any) -> None:
     """Run a PyBullet scene, or replay a contact log, to a sound file."""
-    from sonic_bullet.cli.scenes import run_render
+    from sonic_bullet.cli.scene_commands import run_render
 
     run_render(**options)
 
@@ -152,7 +152,7 @@ def render(**options: Any) -> None:
 @click.option("-o", "--output", metavar="MODEL.npz", help="Also write the modal model: frequencies, decays, shapes on the surface.")
 def modes(**options: Any) -> None:
     """Vibration modes of a mesh: the elastic ones, ascending."""
-    from sonic_bullet.cli.solids import run_modes
+    from sonic_bullet.cli.solid_commands import run_modes
 
     run_modes(**options)
 
@@ -161,7 +161,7 @@ def modes(**options: Any) -> None:
 @json_option
 def materials(json_to: str | None) -> None:
     """List the materials that come with the package, with their sources."""
-    from sonic_bullet.cli.solids import run_materials
+    from sonic_bullet.cli.solid_commands import run_materials
 
     run_materials(json_to)
 
@@ -172,7 +172,7 @@ def materials(json_to: str | None) -> None:
 @json_option
 def doctor(scene: str, seconds: float, json_to: str | None) -> None:
     """Name the settings of a scene that would ruin its sound, and how to mend them."""
-    from sonic_bullet.cli.scenes import run_doctor
+    from sonic_bullet.cli.scene_commands import run_doctor
 
     run_doctor(scene, seconds, json_to)
 
@@ -185,7 +185,7 @@ def doctor(scene: str, seconds: float, json_to: str | None) -> None:
 @json_option
 def features(**options: Any) -> None:
     """The damped sinusoids of a recorded impact: frequency, decay, amplitude, each with its spread."""
-    from sonic_bullet.cli.features import run_features
+    from sonic_bullet.cli.features_command import run_features
 
     run_features(**options)
 
@@ -225,7 +225,7 @@ def strike_options(command: Any) -> Any:
 @json_option
 def fit(**options: Any) -> None:
     """Fit a material to recorded strikes: E/density, Poisson's ratio, damping, gain, with spreads and a verdict."""
-    from sonic_bullet.cli.fit import run_fit
+    from sonic_bullet.cli.fit_command import run_fit
 
     run_fit(**options)
 
@@ -238,7 +238,7 @@ def fit(**options: Any) -> None:
 @json_option
 def residual(**options: Any) -> None:
     """What the modes of recorded strikes leave unsaid, into a preset that sounds it with every contact."""
-    from sonic_bullet.cli.residual import run_residual
+    from sonic_bullet.cli.residual_command import run_residual
 
     run_residual(**options)
 
@@ -252,7 +252,7 @@ def residual(**options: Any) -> None:
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of what is left out in turn, and of the null effects.")
 def diagnose(**options: Any) -> None:
     """Say which physical effect the fitted model lacks, judged on strikes it was not fitted to."""
-    from sonic_bullet.cli.diagnose import run_diagnose
+    from sonic_bullet.cli.diagnose_command import run_diagnose
 
     run_diagnose(**options)
 

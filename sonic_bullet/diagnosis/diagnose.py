@@ -15,23 +15,23 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.diagnosis.baseline import baseline
-from sonic_bullet.diagnosis.bodies import Struck
-from sonic_bullet.diagnosis.judge import Take, least_db, mean_db
-from sonic_bullet.diagnosis.listed import CAP, listed, off_by
-from sonic_bullet.diagnosis.loop import Closed, closed
-from sonic_bullet.diagnosis.play import play
-from sonic_bullet.diagnosis.sone import sone_distance
-from sonic_bullet.diagnosis.unexplained import remainder
+from sonic_bullet.diagnosis.evidence.baseline import baseline
+from sonic_bullet.diagnosis.prediction.hypothesis import play
+from sonic_bullet.diagnosis.prediction.line_score import CAP, listed, off_by
+from sonic_bullet.diagnosis.prediction.loudness_distance import sone_distance
+from sonic_bullet.diagnosis.prediction.score import Take, least_db, mean_db
+from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.diagnosis.remainder import remainder
+from sonic_bullet.diagnosis.selection.stepwise import Closed, closed
 from sonic_bullet.effects import EFFECTS
-from sonic_bullet.effects.values import Effect
-from sonic_bullet.estimator.evidence import gather, onset_sample, until_it_breaks_off
-from sonic_bullet.estimator.fitted import CaseFit
+from sonic_bullet.effects.protocol import Effect
+from sonic_bullet.estimator.fit.case_fit import CaseFit
+from sonic_bullet.estimator.fit.observed import gather, onset_sample, until_it_breaks_off
 from sonic_bullet.files import read_audio
 from sonic_bullet.files.cases import Case, CaseRecording, read_case
 from sonic_bullet.modal.cache import Place
+from sonic_bullet.parallel import one_thread
 from sonic_bullet.records import Array
-from sonic_bullet.side_by_side import one_thread
 
 SPLITS = ("fit", "holdout", "transfer")
 
@@ -163,7 +163,7 @@ def predictions(d: Diagnosis) -> list[tuple[str, int, Array, Array]]:
 
 def described(d: Diagnosis) -> dict[str, Any]:
     """The diagnosis as JSON holds it: null for what is no number."""
-    from sonic_bullet.diagnosis.loop import described as tried
+    from sonic_bullet.diagnosis.selection.stepwise import described as tried
 
     whole = {
         "case": d.case.name,

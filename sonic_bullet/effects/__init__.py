@@ -9,11 +9,11 @@ from sonic_bullet.effects.foreign_mode import ForeignMode
 from sonic_bullet.effects.measurement_chain import MeasurementChain
 from sonic_bullet.effects.mode_splitting import ModeSplitting
 from sonic_bullet.effects.orthotropy import Orthotropy
+from sonic_bullet.effects.protocol import Blow, Effect, Evidence, Heard, Owner, Ring, Sound, Stage
 from sonic_bullet.effects.radiation import Radiation
 from sonic_bullet.effects.rebound import Rebound
 from sonic_bullet.effects.room import Room
 from sonic_bullet.effects.support_damping import SupportDamping
-from sonic_bullet.effects.values import Blow, Effect, Evidence, Heard, Owner, Ring, Sound, Stage
 
 EFFECTS: tuple[type[Effect], ...] = (
     DampingLaw,

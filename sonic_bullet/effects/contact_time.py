@@ -13,8 +13,8 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from sonic_bullet.effects.pulses import PULSES, magnitude
-from sonic_bullet.effects.values import Blow, Evidence, Heard, Owner, Stage
+from sonic_bullet.effects.common.pulses import PULSES, magnitude
+from sonic_bullet.effects.protocol import Blow, Evidence, Heard, Owner, Stage
 from sonic_bullet.records import Array
 
 HERTZ = -0.2

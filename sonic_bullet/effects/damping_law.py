@@ -15,8 +15,8 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from sonic_bullet.effects.proofs import finite, one_of
-from sonic_bullet.effects.values import Evidence, Owner, Stage, ascending
+from sonic_bullet.effects.common.proofs import finite, one_of
+from sonic_bullet.effects.protocol import Evidence, Owner, Stage, ascending
 from sonic_bullet.records import Array, ModalModel
 
 LAWS = {"constant-loss": 1, "power": 2, "relaxation": 3}

@@ -12,9 +12,9 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from sonic_bullet.effects.ringing import sounded
-from sonic_bullet.effects.tails import FRAME_S
-from sonic_bullet.effects.values import Blow, Evidence, Heard, Owner, Ring, Sound, Stage
+from sonic_bullet.effects.common.reverberant_tail import FRAME_S
+from sonic_bullet.effects.common.ringing import sounded
+from sonic_bullet.effects.protocol import Blow, Evidence, Heard, Owner, Ring, Sound, Stage
 from sonic_bullet.records import Array
 
 STEADY = 0.12  # relative scatter of |A|/J over the strikes, rms

@@ -14,8 +14,8 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from sonic_bullet.effects.hum import hum_of
-from sonic_bullet.effects.values import Evidence, Heard, Owner, Sound, Stage
+from sonic_bullet.effects.common.hum import hum_of
+from sonic_bullet.effects.protocol import Evidence, Heard, Owner, Sound, Stage
 from sonic_bullet.records import Array
 
 ROUGH = 0.03

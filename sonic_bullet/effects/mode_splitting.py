@@ -13,9 +13,9 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from sonic_bullet.effects.axes import PAIR, about_axes, pair_at
-from sonic_bullet.effects.proofs import finite, side_by_side
-from sonic_bullet.effects.values import Evidence, Heard, Owner, Stage
+from sonic_bullet.effects.common.axes import PAIR, about_axes, pair_at
+from sonic_bullet.effects.common.proofs import finite, side_by_side
+from sonic_bullet.effects.protocol import Evidence, Heard, Owner, Stage
 from sonic_bullet.records import Array, ModalModel
 
 SPLIT = (1e-4, 3e-2)

@@ -15,8 +15,8 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from scipy.sparse import csr_array
 
-from sonic_bullet.effects.points import solved
-from sonic_bullet.effects.values import Evidence, Heard, Owner, Stage, ascending
+from sonic_bullet.effects.common.points import solved
+from sonic_bullet.effects.protocol import Evidence, Heard, Owner, Stage, ascending
 from sonic_bullet.records import Array, ModalModel
 
 IMPEDANCE = 1.2 * 343.0  # ρ₀ c in kg/(m² s)

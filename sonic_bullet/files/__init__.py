@@ -9,11 +9,13 @@ beneath them, `atomic` the replacing.
 
 from sonic_bullet.files.atomic import check_output, replacing
 from sonic_bullet.files.audio import AudioReport, AudioWriter, check_audio_output, check_sr, read_audio, write_audio
+from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.logs import read_log, read_model, write_log, write_model
 
 __all__ = [
     "AudioReport",
     "AudioWriter",
+    "ContactLog",
     "check_audio_output",
     "check_output",
     "check_sr",

@@ -14,7 +14,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
 
-from sonic_bullet.errors import FileError
+from sonic_bullet.records.errors import FileError
 
 
 def check_output(path: str | os.PathLike[str]) -> Path:

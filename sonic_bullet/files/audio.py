@@ -21,9 +21,9 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.errors import AudioError, FileError, SonicBulletError
 from sonic_bullet.files.atomic import cannot, check_output, sync
 from sonic_bullet.records import Array
+from sonic_bullet.records.errors import AudioError, FileError, SonicBulletError
 
 FORMATS = {
     ".wav": ("WAV", "FLOAT"),

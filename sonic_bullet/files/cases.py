@@ -16,7 +16,7 @@ from typing import Any
 
 import msgspec
 
-from sonic_bullet.errors import FileError
+from sonic_bullet.records.errors import FileError
 
 FORMAT = "sonic-bullet-case/1"
 BYTES_MAX = 1 << 24

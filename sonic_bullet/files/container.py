@@ -19,9 +19,9 @@ from typing import Any, TypeVar
 import msgspec
 import numpy as np
 
-from sonic_bullet.errors import LogError
 from sonic_bullet.files.atomic import cannot, replacing
 from sonic_bullet.records import Array
+from sonic_bullet.records.errors import LogError
 
 HEADER = "header"
 REMEDY = "use the file as sonic-bullet wrote it, or make it again"

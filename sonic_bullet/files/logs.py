@@ -29,11 +29,12 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from sonic_bullet.contacts import ROW_FIELDS, ContactLog, Contacts, Step
-from sonic_bullet.errors import AudioError, LogError, RecordError
 from sonic_bullet.files.audio import check_sr
+from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.container import REMEDY, read_container, take, write_container
 from sonic_bullet.records import Air, Array, Body, Material, Microphone, ModalModel, ModalSum, Residual, Sensor, Vibrometer
+from sonic_bullet.records.contacts import ROW_FIELDS, Contacts, Step
+from sonic_bullet.records.errors import AudioError, LogError, RecordError
 
 LOG_FORMAT = "sonic-bullet-contacts/1"
 MODEL_FORMAT = "sonic-bullet-model/1"

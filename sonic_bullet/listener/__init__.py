@@ -11,10 +11,10 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from sonic_bullet.listener.clients import direct_client, disconnect, links_with_shapes
-    from sonic_bullet.listener.doctor import Finding, diagnose_world, keep_restitution
-    from sonic_bullet.listener.script import run_script
-    from sonic_bullet.listener.world import World, open_world
+    from sonic_bullet.listener.pybullet.clients import direct_client, disconnect, links_with_shapes
+    from sonic_bullet.listener.pybullet.doctor import Finding, diagnose_world, keep_restitution
+    from sonic_bullet.listener.pybullet.script import run_script
+    from sonic_bullet.listener.pybullet.world import World, open_world
 
 __all__ = ["Finding", "World", "diagnose_world", "direct_client", "disconnect", "keep_restitution", "links_with_shapes", "open_world", "run_script"]
 
@@ -33,5 +33,5 @@ _HOME = {
 
 def __getattr__(name: str) -> Any:
     if name in _HOME:
-        return getattr(importlib.import_module(f"sonic_bullet.listener.{_HOME[name]}"), name)
+        return getattr(importlib.import_module(f"sonic_bullet.listener.pybullet.{_HOME[name]}"), name)
     raise AttributeError(f"module 'sonic_bullet.listener' has no attribute '{name}'")

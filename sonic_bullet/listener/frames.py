@@ -16,9 +16,9 @@ from itertools import chain
 import numpy as np
 import pybullet
 
-from sonic_bullet.errors import SceneError
 from sonic_bullet.listener.kinematics import jumps
 from sonic_bullet.records import Array
+from sonic_bullet.records.errors import SceneError
 
 LINK_SPAN = 1 << 20
 JUMP_FLOOR_M = 1e-3

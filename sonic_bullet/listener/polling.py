@@ -17,10 +17,10 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.errors import SceneError
 from sonic_bullet.listener.frames import encode
 from sonic_bullet.listener.kinematics import impulses
 from sonic_bullet.records import Array
+from sonic_bullet.records.errors import SceneError
 
 RawContact = tuple[Any, ...]
 FORCE, FRICTION_1, FRICTION_2 = 9, 10, 12

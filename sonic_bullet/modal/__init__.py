@@ -3,8 +3,8 @@
 Shape -> solid.Solid (structured.py, tetrahedra.py) -> K, M (fem.py) -> λ, U (eigen.py) -> ModalModel (model.py), kept by cache.py
 """
 
-from sonic_bullet.modal.mesh_files import read_mesh
+from sonic_bullet.modal.meshing.mesh_files import read_mesh
+from sonic_bullet.modal.meshing.solid import COARSER
 from sonic_bullet.modal.model import analyse
-from sonic_bullet.modal.solid import COARSER
 
 __all__ = ["COARSER", "analyse", "read_mesh"]

@@ -18,8 +18,8 @@ from typing import Literal
 import msgspec
 import numpy as np
 
-from sonic_bullet.errors import FileError, LogError
 from sonic_bullet.records import Array
+from sonic_bullet.records.errors import FileError, LogError
 
 Place = Path | Literal["default"] | None
 FORMAT = "sonic-bullet-cache/1"
@@ -60,7 +60,7 @@ def code_digest(files: tuple[Path, ...], packages: tuple[str, ...]) -> bytes:
 def _code() -> bytes:
     """Digest of all that turns a surface into modes: this room's source, the geometry below it, the solvers' versions."""
     here = Path(__file__).resolve().parent
-    return code_digest((*sorted(here.glob("*.py")), here.parent / "geometry.py", here.parent / "surface_index.py"), SOLVERS)
+    return code_digest((*sorted(here.rglob("*.py")), *sorted((here.parent / "geometry").glob("*.py"))), SOLVERS)
 
 
 def key(kind: str, *parts: Array | str | float | int | None, code: bytes | None = None) -> str:

@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.errors import ModalError
 from sonic_bullet.records import Array
+from sonic_bullet.records.errors import ModalError
 
 BLOCK = 8
 TOLERANCE = 1e-7  # of the residual bound, relative to θ

@@ -15,9 +15,9 @@ from typing import Literal
 
 import numpy as np
 
-from sonic_bullet.errors import MeshError, ModalError
 from sonic_bullet.modal import cache as store
 from sonic_bullet.records import Array, Material, ModalModel, Shape
+from sonic_bullet.records.errors import MeshError, ModalError
 
 MOST_MODES = 200
 SHIFT = 20.0  # × (2V/A)²/L²: a third of the first elastic λ' of plates and bars, less of chunky bodies
@@ -137,8 +137,8 @@ def _solve(
 ) -> _Unit:
     """Fill (or fetch the filled body), assemble, clamp and solve, all without units."""
     from sonic_bullet.modal import eigen, fem, polynomials
-    from sonic_bullet.modal.shapes import Filled, fill
-    from sonic_bullet.modal.solid import Solid, Surface
+    from sonic_bullet.modal.meshing.shape_meshes import Filled, fill
+    from sonic_bullet.modal.meshing.solid import Solid, Surface
 
     found = store.load(*kept)
     if found is not None:

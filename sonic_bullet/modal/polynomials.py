@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet import geometry
-from sonic_bullet.modal import prisms
-from sonic_bullet.modal.shapes import rotation
+from sonic_bullet.modal.meshing import prisms
+from sonic_bullet.modal.meshing.shape_meshes import rotation
 from sonic_bullet.records import Array, Shape
 
 MOST_UNKNOWNS = 1800

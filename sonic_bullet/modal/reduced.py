@@ -16,11 +16,11 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.errors import MeshError, ModalError
+from sonic_bullet.geometry.nearest_point import closest_point
 from sonic_bullet.modal import cache as store
 from sonic_bullet.modal.model import MOST_MODES, SHIFT, _diagonal_m
 from sonic_bullet.records import Array, Shape
-from sonic_bullet.surface_index import closest_point
+from sonic_bullet.records.errors import MeshError, ModalError
 
 APART = 0.05  # of ν₁ and ν₂ from the guess
 POISSON = (-0.5, 0.485)
@@ -152,8 +152,9 @@ def _of_box(shape: Shape, length: float, limit: float, poisson: float, say: Call
     """The family of a free box, without elements; None where the shape is no box, or one of too many unknowns."""
     from scipy.linalg import block_diag
 
-    from sonic_bullet.modal import polynomials, structured
-    from sonic_bullet.modal.solid import surface
+    from sonic_bullet.modal import polynomials
+    from sonic_bullet.modal.meshing import structured
+    from sonic_bullet.modal.meshing.solid import surface
 
     box = polynomials.recognised(shape)
     if box is None:
@@ -255,8 +256,8 @@ def _mixed(poisson: float, lame: Any, shear: Any) -> Any:
 
 def _family(shape: Shape, length: float, limit: float, poisson: float, clamp: Array, edge_m: float | None, say: Callable[[str], None]) -> Family:
     from sonic_bullet.modal import eigen, fem
-    from sonic_bullet.modal.shapes import fill
-    from sonic_bullet.modal.solid import Solid
+    from sonic_bullet.modal.meshing.shape_meshes import fill
+    from sonic_bullet.modal.meshing.solid import Solid
 
     body = fill((shape,), edge_m, None, say)
     unit = Solid(body.solid.node_m / length, body.solid.tet, body.solid.affine)

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet import geometry
-from sonic_bullet.modal.prisms import triangulated
-from sonic_bullet.modal.solid import QUARTERS
+from sonic_bullet.modal.meshing.prisms import triangulated
+from sonic_bullet.modal.meshing.solid import QUARTERS
 from sonic_bullet.records import Array
 
 ROUND = 2e-5  # of the diagonal: what a ring's vertices may differ by

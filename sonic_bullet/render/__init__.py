@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from sonic_bullet.contacts import ContactLog
+from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.records import Array
 from sonic_bullet.render.radiated import radiation_of
 from sonic_bullet.render.synthesizer import LATENCY_STEPS, Synthesizer

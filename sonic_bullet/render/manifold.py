@@ -11,10 +11,10 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from sonic_bullet.contacts import Step
 from sonic_bullet.records import Array
+from sonic_bullet.records.contacts import Step
+from sonic_bullet.render.resonator import Sounder, Touch, touch_one, uplift
 from sonic_bullet.render.rotation import matrix
-from sonic_bullet.render.sounder import Sounder, Touch, touch_one, uplift
 from sonic_bullet.synth.strikes import pair_key
 
 STEEPEST = 10.0

@@ -12,7 +12,8 @@ import numpy as np
 
 from sonic_bullet.modal import cache as store
 from sonic_bullet.records import Air, Array, ModalModel
-from sonic_bullet.synth import added_mass, radiation
+from sonic_bullet.synth import entrained_mass as added_mass
+from sonic_bullet.synth import far_field as radiation
 
 SOURCES = tuple(Path(str(room.__file__)).resolve() for room in (radiation, added_mass))
 PACKAGES = ("numpy", "scipy", "numba")

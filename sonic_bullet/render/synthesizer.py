@@ -15,15 +15,15 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from sonic_bullet.contacts import Contacts, Step
-from sonic_bullet.errors import AudioError
 from sonic_bullet.records import Air, Array, Body, Microphone, Sensor
-from sonic_bullet.render.beside import Beside, Rubs, blow_grains, build_beside, line_modes, rubbing_grains
-from sonic_bullet.render.blows import Blow, find_blows
+from sonic_bullet.records.contacts import Contacts, Step
+from sonic_bullet.records.errors import AudioError
 from sonic_bullet.render.clock import Clock, exact_step
+from sonic_bullet.render.friction_voice import Drive, Rubbing, advance_rubbing
+from sonic_bullet.render.impacts import Blow, find_blows
 from sonic_bullet.render.manifold import Rows, orient
-from sonic_bullet.render.rubbing import Drive, Rubbing, advance_rubbing
-from sonic_bullet.render.sounder import Sounder, build_sounder, weight_sets
+from sonic_bullet.render.residual_voice import Beside, Rubs, blow_grains, build_beside, line_modes, rubbing_grains
+from sonic_bullet.render.resonator import Sounder, build_sounder, weight_sets
 from sonic_bullet.residual.player import Grain, add_grains
 from sonic_bullet.synth import bank, path
 from sonic_bullet.synth.bank import Bank, BankState

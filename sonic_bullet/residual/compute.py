@@ -16,8 +16,8 @@ import itertools
 import numpy as np
 from numba import njit
 
-from sonic_bullet.errors import AudioError
 from sonic_bullet.records import Array, Residual
+from sonic_bullet.records.errors import AudioError
 from sonic_bullet.residual.spectrogram import WINDOW, Power, checked, power, transform
 from sonic_bullet.residual.transfer import Modes
 

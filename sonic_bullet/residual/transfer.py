@@ -19,8 +19,8 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from sonic_bullet.errors import AudioError
 from sonic_bullet.records import Array, Residual, frozen_array
+from sonic_bullet.records.errors import AudioError
 from sonic_bullet.residual.spectrogram import Power
 
 DOMINANT = 24

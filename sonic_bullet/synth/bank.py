@@ -20,8 +20,8 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.errors import AudioError
 from sonic_bullet.records import Array
+from sonic_bullet.records.errors import AudioError
 from sonic_bullet.synth import bank_kernel
 from sonic_bullet.synth.pending import Pending, Strike, flushed, padded_gains, with_strikes, without
 from sonic_bullet.synth.tile import BLOCK

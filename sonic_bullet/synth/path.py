@@ -17,8 +17,8 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.errors import AudioError
 from sonic_bullet.records import Air, Array
+from sonic_bullet.records.errors import AudioError
 from sonic_bullet.synth import path_kernel
 
 FARTHEST_M = 1000.0

@@ -15,8 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from sonic_bullet.errors import AudioError
 from sonic_bullet.records import Array
+from sonic_bullet.records.errors import AudioError
 
 FLUSH = 1e-30
 LONGEST_SPACING = 16.0

@@ -26,8 +26,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sonic_bullet.contacts import Contacts
 from sonic_bullet.records import Array
+from sonic_bullet.records.contacts import Contacts
 
 SPAN = 4
 NOW = SPAN - 1

@@ -11,12 +11,10 @@ import numpy as np
 import pytest
 import soundfile
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "estimator"))
-from made_case import make
-
 from sonic_bullet.cli import main
 from sonic_bullet.presets import load_material, read_preset
 from sonic_bullet.records import Material
+from tests.made.case import make
 
 KEYS = {"alpha_per_s", "beta_s", "gamma_m2_s2", "sigma", "poisson_ratio", "covariance", "verdict", "metric", "log_spectral_db", "modes"}
 BRASS = Material.isotropic("made", youngs_pa=1.0e11, poisson=0.36, density_kg_m3=8400, alpha_per_s=8.0, beta_s=4e-8)

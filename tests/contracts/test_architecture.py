@@ -72,7 +72,7 @@ def test_help_is_quick() -> None:
 
 
 @pytest.mark.parametrize(
-    "module", ["sonic_bullet", "sonic_bullet.cli", "sonic_bullet.files", "sonic_bullet.presets", "sonic_bullet.picture", "sonic_bullet.render"]
+    "module", ["sonic_bullet", "sonic_bullet.cli", "sonic_bullet.files", "sonic_bullet.presets", "sonic_bullet.plots.scene_plot", "sonic_bullet.render"]
 )
 def test_importing_brings_nothing_heavy(module: str) -> None:
     heavy = ["pybullet", "skfem", "matplotlib", "trimesh", "soundfile", "pytetwild", "pyloudnorm", "scipy.sparse.linalg", "rich"]

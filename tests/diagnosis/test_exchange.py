@@ -6,18 +6,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_body import SR, recorded, truth
 
-from sonic_bullet.diagnosis.candidate import Candidate
-from sonic_bullet.diagnosis.evidence import evidence_of, thinned
-from sonic_bullet.diagnosis.exchange import decays_against, exchanged, surely, together
-from sonic_bullet.diagnosis.judge import Take, mean_db
-from sonic_bullet.diagnosis.refit import refitted
+from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of, thinned
+from sonic_bullet.diagnosis.evidence.refit import refitted
+from sonic_bullet.diagnosis.prediction.score import Take, mean_db
+from sonic_bullet.diagnosis.selection.acceptance import Candidate
+from sonic_bullet.diagnosis.selection.exchange import decays_against, exchanged, surely, together
 from sonic_bullet.effects.contact_time import ContactTime
 from sonic_bullet.effects.damping_law import DampingLaw
 from sonic_bullet.effects.measurement_chain import MeasurementChain
 from sonic_bullet.effects.radiation import Radiation
-from sonic_bullet.estimator.distance import floor_between
+from sonic_bullet.estimator.lines.log_spectral import floor_between
+from tests.made.body import SR, recorded, truth
 
 BAND = (50.0, 7_500.0)
 PULSE = ContactTime(9e-4, 0.02, 0.0)

@@ -13,15 +13,14 @@ from types import ModuleType
 
 import numpy as np
 import pytest
-from made_body import ALPHA, BETA, GAIN, plate, recorded
 
-from sonic_bullet.diagnosis.baseline import takes_of
-from sonic_bullet.diagnosis.bodies import Struck
-from sonic_bullet.diagnosis.evidence import evidence_of
-from sonic_bullet.diagnosis.judge import least_db, mean_db
-from sonic_bullet.diagnosis.loop import Closed, closed
-from sonic_bullet.diagnosis.play import Hypothesis
-from sonic_bullet.diagnosis.refit import refitted
+from sonic_bullet.diagnosis.evidence.baseline import takes_of
+from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of
+from sonic_bullet.diagnosis.evidence.refit import refitted
+from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis
+from sonic_bullet.diagnosis.prediction.score import least_db, mean_db
+from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.diagnosis.selection.stepwise import Closed, closed
 from sonic_bullet.effects import EFFECTS, Effect
 from sonic_bullet.effects.added_mass import AddedMass
 from sonic_bullet.effects.amplitude_damping import AmplitudeDamping
@@ -33,6 +32,7 @@ from sonic_bullet.effects.measurement_chain import MeasurementChain
 from sonic_bullet.effects.rebound import Rebound
 from sonic_bullet.effects.room import Room
 from sonic_bullet.effects.support_damping import SupportDamping
+from tests.made.body import ALPHA, BETA, GAIN, plate, recorded
 
 BAND = (50.0, 7_500.0)
 

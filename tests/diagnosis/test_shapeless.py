@@ -8,11 +8,11 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
-from made_body import recorded
 
-from sonic_bullet.diagnosis.bodies import Struck, shapeless
+from sonic_bullet.diagnosis.prediction.struck_bodies import Struck, shapeless
 from sonic_bullet.files.cases import CaseRecording
 from sonic_bullet.records import Array
+from tests.made.body import recorded
 
 
 def made(change: Any = lambda r, i: r, more: tuple[CaseRecording, ...] = ()) -> tuple[Struck, Array, Array]:

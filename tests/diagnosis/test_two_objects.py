@@ -5,17 +5,17 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from made_body import SR, recorded, truth
 
-from sonic_bullet.diagnosis.bodies import Struck
-from sonic_bullet.diagnosis.candidate import earns
-from sonic_bullet.diagnosis.evidence import evidence_of, thinned
-from sonic_bullet.diagnosis.exchange import left_out_db
-from sonic_bullet.diagnosis.judge import Take
-from sonic_bullet.diagnosis.refit import refitted
-from sonic_bullet.diagnosis.trial import trials
+from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of, thinned
+from sonic_bullet.diagnosis.evidence.refit import refitted
+from sonic_bullet.diagnosis.prediction.score import Take
+from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.diagnosis.selection.acceptance import earns
+from sonic_bullet.diagnosis.selection.cross_validation import trials
+from sonic_bullet.diagnosis.selection.exchange import left_out_db
 from sonic_bullet.effects.damping_law import DampingLaw
-from sonic_bullet.estimator.distance import floor_between
+from sonic_bullet.estimator.lines.log_spectral import floor_between
+from tests.made.body import SR, recorded, truth
 
 BAND = (50.0, 7_500.0)
 LAW = DampingLaw("power", 6e-3, 1.4)

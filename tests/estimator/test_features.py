@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.optimize import linear_sum_assignment
 
-from sonic_bullet.estimator import exact, likelihood
-from sonic_bullet.estimator.features import extract
+from sonic_bullet.estimator.lines import exact_modes, likelihood
+from sonic_bullet.estimator.lines.extraction import extract
 
 SR = 44_100
 
@@ -64,10 +64,10 @@ def test_a_hundred_sinusoids_without_noise_come_back_exactly(law: str, phase: st
 def test_no_rank_is_claimed_where_there_is_noise_or_no_mode() -> None:
     rng = np.random.default_rng(2)
     hit = sound(np.array([900.0, 2300.0]), np.array([20.0, 350.0]), np.array([0.3, 0.2]), np.zeros(2), 4000)
-    assert exact.modes(hit, SR) is not None
-    assert exact.modes(hit + 1e-5 * rng.standard_normal(4000), SR) is None
-    assert exact.modes(hit / (1 + np.arange(4000)), SR) is None
-    assert exact.modes(np.sin(1e-4 * np.arange(4000.0) ** 2), SR) is None
+    assert exact_modes.modes(hit, SR) is not None
+    assert exact_modes.modes(hit + 1e-5 * rng.standard_normal(4000), SR) is None
+    assert exact_modes.modes(hit / (1 + np.arange(4000)), SR) is None
+    assert exact_modes.modes(np.sin(1e-4 * np.arange(4000.0) ** 2), SR) is None
 
 
 @pytest.mark.parametrize("noise", [0.0, 1e-5, 1e-3])

@@ -8,14 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 import soundfile
-from made_case import SR, Planted, make
 
-from sonic_bullet.errors import AudioError, FileError, MeshError
-from sonic_bullet.estimator.distance import floor_of, log_spectral_db, noise_floor_db, with_noise
-from sonic_bullet.estimator.fit import CaseFit, fit_case
-from sonic_bullet.estimator.predict import lines_sound, strike_sound
+from sonic_bullet.estimator.fit.material_fit import CaseFit, fit_case
+from sonic_bullet.estimator.fit.prediction_of_lines import lines_sound, strike_sound
+from sonic_bullet.estimator.lines.log_spectral import floor_of, log_spectral_db, noise_floor_db, with_noise
 from sonic_bullet.files.cases import read_case
 from sonic_bullet.records import Material
+from sonic_bullet.records.errors import AudioError, FileError, MeshError
+from tests.made.case import SR, Planted, make
 
 BRASS = Material.isotropic("made", youngs_pa=1.04e11, poisson=0.345, density_kg_m3=8500, alpha_per_s=6.0, beta_s=3e-8)
 GUESS = (1.25e11, 8000.0, 0.31)  # E and E/ρ off by 20 and 28 %, ν by 0.035

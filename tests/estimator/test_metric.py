@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sonic_bullet.errors import RecordError
-from sonic_bullet.estimator.image import Image, distance, image, plain_distance
-from sonic_bullet.estimator.loudness import bark, bark_to_hz, level_of_phon, loudness, phon, sone
-from sonic_bullet.estimator.matching import match_ratio_product, points
-from sonic_bullet.estimator.metric import hybrid, match, residuals, target
-from sonic_bullet.estimator.problem import Problem, modes_of
-from sonic_bullet.estimator.values import Features
+from sonic_bullet.estimator.lines.line_values import Features
+from sonic_bullet.estimator.perceptual.image import Image, distance, image, plain_distance
+from sonic_bullet.estimator.perceptual.loudness import bark, bark_to_hz, level_of_phon, loudness, phon, sone
+from sonic_bullet.estimator.perceptual.matching import match_ratio_product, points
+from sonic_bullet.estimator.perceptual.metric import hybrid, match, residuals, target
+from sonic_bullet.estimator.perceptual.problem import Problem, modes_of
 from sonic_bullet.records import Array
+from sonic_bullet.records.errors import RecordError
 
 SR = 48000
 

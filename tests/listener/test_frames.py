@@ -9,11 +9,11 @@ import pybullet as p
 import pybullet_data
 import pytest
 
-from scenes import DUCK, floor, impulse_on, listen, thing, turned
 from sonic_bullet.listener import direct_client, disconnect, open_world
 from sonic_bullet.listener.frames import rotation_between
 from sonic_bullet.listener.frames import turned as turn_by
 from sonic_bullet.records import Material
+from tests.made.scenes import DUCK, floor, impulse_on, listen, thing, turned
 
 STEEL = Material.isotropic("steel", youngs_pa=2e11, poisson=0.3, density_kg_m3=7800, alpha_per_s=1.0, beta_s=1e-8)
 

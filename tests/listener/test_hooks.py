@@ -7,9 +7,9 @@ from typing import Any
 import pybullet as p
 import pytest
 
-from scenes import floor, listen, thing
-from sonic_bullet.errors import SceneError
 from sonic_bullet.listener import open_world
+from sonic_bullet.records.errors import SceneError
+from tests.made.scenes import floor, listen, thing
 
 
 def test_unhook_restores_the_client_exactly(client: Any) -> None:

@@ -10,12 +10,12 @@ import pybullet as p
 import pybullet_data
 import pytest
 
-from scenes import DUCK, collision, floor, thing, turned
-from sonic_bullet.errors import MeshError
 from sonic_bullet.geometry import is_closed, volume_m3
 from sonic_bullet.listener import links_with_shapes, open_world
-from sonic_bullet.listener.mesh_files import hull, lid_height_m, read_surfaces
+from sonic_bullet.listener.pybullet.urdf_meshes import hull, lid_height_m, read_surfaces
 from sonic_bullet.records import Shape
+from sonic_bullet.records.errors import MeshError
+from tests.made.scenes import DUCK, collision, floor, thing, turned
 
 DATA = Path(pybullet_data.getDataPath())
 MARGIN_M = 0.0045

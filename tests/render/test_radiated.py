@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_models import STEEL, box_model
 
 from sonic_bullet.records import Air
 from sonic_bullet.render import radiated as room
-from sonic_bullet.synth import radiation
+from sonic_bullet.synth import far_field as radiation
+from tests.made.models import STEEL, box_model
 
 MODEL = box_model((0.2, 0.1, 0.01), (740.0, 1230.0, 2950.0), STEEL)
 

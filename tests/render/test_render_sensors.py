@@ -6,15 +6,16 @@ from typing import Any
 
 import numpy as np
 import pytest
-from made_models import STEEL, ball_body, box_body, row, step, wall_body
 
-from sonic_bullet.contacts import ContactLog, Contacts, Step
+from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.records import Air, Microphone, ModalSum, Vibrometer
+from sonic_bullet.records.contacts import Contacts, Step
 from sonic_bullet.render import render_log, synthesizer
-from sonic_bullet.render.blows import Blow, find_blows
-from sonic_bullet.render.sounder import build_sounder
+from sonic_bullet.render.impacts import Blow, find_blows
+from sonic_bullet.render.resonator import build_sounder
 from sonic_bullet.synth import bank
-from sonic_bullet.synth.radiation import jerk_coefficient, radiation
+from sonic_bullet.synth.far_field import jerk_coefficient, radiation
+from tests.made.models import STEEL, ball_body, box_body, row, step, wall_body
 
 SR = 48_000
 EDGES_M = (0.2, 0.1, 0.01)
@@ -163,9 +164,8 @@ def test_a_rigid_click_has_a_dipoles_direction() -> None:
 
 def test_a_slow_compact_click_is_the_jerk_law() -> None:
     """p = K cosθ · da/dt(t - r/c) / r [Chadwick, Zheng, James 2012], where the blow is long against a/c: a soft 4 mm ball."""
-    from made_models import Material
-
     from sonic_bullet.synth.pulse import add_jerk
+    from tests.made.models import Material
 
     rubber = Material.isotropic("rubber", youngs_pa=3e6, poisson=0.45, density_kg_m3=1100, alpha_per_s=50.0, beta_s=1e-6)
     radius, impulse = 0.004, 1e-4

@@ -9,18 +9,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from made_models import STEEL, box_body, row, step, wall_body
-from made_residuals import SR, modes, residual
 
 from sonic_bullet.cli import cli
-from sonic_bullet.contacts import ContactLog, Contacts
 from sonic_bullet.files import read_audio, read_log
+from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.records import Air, Material, Microphone, ModalSum
+from sonic_bullet.records.contacts import Contacts
 from sonic_bullet.render import Synthesizer, render_log
-from sonic_bullet.render.beside import build_beside, struck_power
-from sonic_bullet.render.sounder import build_sounder, uplift
+from sonic_bullet.render.residual_voice import build_beside, struck_power
+from sonic_bullet.render.resonator import build_sounder, uplift
 from sonic_bullet.residual.grains import faded, filtered, make_voice, mixed_number, placed, response, varied
 from sonic_bullet.residual.player import SECTION, Grain, Rubbed, add_grains, rubbed, section_grain, section_window
+from tests.made.models import STEEL, box_body, row, step, wall_body
+from tests.made.residuals import SR, modes, residual
 
 FREQ = (400.0, 900.0, 1500.0, 2600.0, 4100.0, 6000.0)
 IDLE_S = 0.02  # of the work in `slower`, nothing else running

@@ -7,14 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_residuals import SR, banded, modes
 
-from sonic_bullet.errors import AudioError
+from sonic_bullet.records.errors import AudioError
 from sonic_bullet.residual.compute import clip_residual, damped
 from sonic_bullet.residual.invert import ITERATIONS, inconsistency, invert, magnitude_of, noise_phases
 from sonic_bullet.residual.offline import transferred_clip
 from sonic_bullet.residual.spectrogram import Power, inverse, power, transform
 from sonic_bullet.residual.transfer import Modes, come_from, merged, pair, shifted_hz, transfer
+from tests.made.residuals import SR, banded, modes
 
 REPO = Path(__file__).resolve().parents[2]
 PLATE = np.array([402.0, 611.0, 890.0, 1210.0, 1700.0, 2350.0, 3120.0, 4260.0, 6020.0, 8300.0])

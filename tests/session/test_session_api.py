@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 import pybullet as p
 import pytest
-from made_models import STEEL
-from made_worlds import floor, plate_model, sounding_box
 from pybullet_utils.bullet_client import BulletClient
 
 import sonic_bullet as sb
-from sonic_bullet.errors import SceneError
+from sonic_bullet.records.errors import SceneError
 from sonic_bullet.render.clock import exact_step
+from tests.made.models import STEEL
+from tests.made.worlds import floor, plate_model, sounding_box
 
 
 def heard(client: Any, steps: int, **how: Any) -> tuple[Any, list[np.ndarray]]:
@@ -109,7 +109,7 @@ def test_the_raw_module_is_stepped_by_hand() -> None:
     script = """
 import pybullet as p, numpy as np, sonic_bullet as sb, sys
 sys.path[:0] = sys.argv[1:]
-from made_models import STEEL, box_model
+from tests.made.models import STEEL, box_model
 assert p.connect(p.DIRECT) == 0
 p.setGravity(0, 0, -9.81)
 p.createMultiBody(0, p.createCollisionShape(p.GEOM_PLANE))
@@ -238,7 +238,7 @@ def test_how_the_sound_is_read_out_does_not_matter(client: Any) -> None:
 
 
 def test_without_a_microphone_contacts_are_kept_and_nothing_is_computed(client: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    from sonic_bullet.synth import radiation
+    from sonic_bullet.synth import far_field as radiation
 
     monkeypatch.setattr(radiation, "radiation", lambda *_: pytest.fail("nobody hears it"))
     floor(client)

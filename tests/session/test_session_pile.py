@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 import pybullet as p
 import pytest
-from made_models import GLASS, STEEL, WOOD, ball_body, box_model
 
 import sonic_bullet as sb
-from sonic_bullet.contacts import ContactLog
+from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.listener import direct_client, disconnect
 from sonic_bullet.records import Microphone, ModalSum
 from sonic_bullet.render import Synthesizer, synthesizer
+from tests.made.models import GLASS, STEEL, WOOD, ball_body, box_model
 
 STRIKE_N_S = 1e-3
 DT = 1 / 240

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sonic_bullet.effects.ringing import sounded
-from sonic_bullet.effects.values import Blow, Ring
+from sonic_bullet.effects.common.ringing import sounded
+from sonic_bullet.effects.protocol import Blow, Ring
 from sonic_bullet.records import Array
 from sonic_bullet.synth.bank import ModeSet, Strike, advance, append, empty_bank, silence
 

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sonic_bullet.errors import AudioError
 from sonic_bullet.records import Air, Array
+from sonic_bullet.records.errors import AudioError
 from sonic_bullet.synth.path import Path, PathState, append_bodies, empty_path, propagate
 
 SR = 48_000

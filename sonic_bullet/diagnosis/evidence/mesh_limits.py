@@ -1,0 +1,118 @@
+"""What a mesh's errors make of the distance: how much of what nothing explains may be theirs.
+
+    modes moved at random as much as the others are off           -> what that adds                    (of_the_mesh)
+    lines of no mode, that have a mode's pattern and lie FAR from it at most, where waves are short:  the modes put there     -> what is left   (beyond)
+    modes FAR below the band's edge at most, of which nothing is recorded:                            the modes put outside   -> the same
+
+A correction is 1 % at most and part of the baseline; finite elements of a coarse mesh err by more in the upper modes, with h⁴ of quadratic ones [Hughes 2000, ch. 7].
+That is no effect and nothing that anybody would want named, so a verdict knows of it; what is played before and after does not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from sonic_bullet.diagnosis.evidence.degenerate_pairs import FEWEST, LIKE, like
+from sonic_bullet.diagnosis.evidence.refit import ROUGH, refitted
+from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, modes_of, pattern, play
+from sonic_bullet.diagnosis.prediction.score import Judged, Take, mean_db
+from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.estimator.fit.pairing import TWINS
+from sonic_bullet.estimator.lines.log_spectral import with_noise
+from sonic_bullet.records import Array
+
+MESH = 1e-3  # of a frequency: what a good mesh gets wrong
+FAR = 0.03  # of a frequency: what a coarse one does, in modes of few elements a wavelength
+NEARER_DB = 0.05  # without a mode, that ought to be silent
+
+
+def beyond(h: Hypothesis, bodies: tuple[Struck, ...], takes: Sequence[Judged]) -> tuple[Hypothesis, float]:
+    """The hypothesis with modes that no line was told for where lines of their pattern are, or outside the band; and how far the farthest was put, relative: 0 where none was."""
+    start, most = h, 0.0
+    mine = [b for b in bodies if b.gathered is not None and b.family is not None and len(b.fitted) >= FEWEST and b.name in (h.correction or {})]
+    for body in mine:
+        found, off = _put(h, body, (h.correction or {})[body.name])
+        if off:
+            h, most = replace(h, correction={**(h.correction or {}), body.name: found}), max(most, off)
+    h = refitted(h, bodies) if most else h
+    for body in mine:
+        h, off = _outside(start, h, body, takes)
+        most = max(most, off)
+    return h, most
+
+
+def _outside(start: Hypothesis, h: Hypothesis, body: Struck, takes: Sequence[Judged]) -> tuple[Hypothesis, float]:
+    """The hypothesis with a body's modes near the band's upper edge outside it, one frequency after another from the top, where strikes are nearer so."""
+    model, order = modes_of(h, body)
+    old, most, top = (start.correction or {})[body.name], 0.0, body.band_hz[1]
+    group = np.cumsum(np.diff(np.log(model.freq_hz), prepend=-np.inf) > TWINS)
+    free = (body.line[order] < 0) & (old[order] == (h.correction or {})[body.name][order])
+    near = free & (model.freq_hz <= top) & (model.freq_hz * (1 + FAR) > top)
+    now = mean_db(takes, h) if near.any() else None
+    for g in np.unique(group[near])[::-1]:
+        who = np.flatnonzero((group == g) & near)
+        step = float(top / model.freq_hz[who].min() * (1 + MESH) - 1)
+        other = (h.correction or {})[body.name].copy()
+        other[order[who]] = (1 + other[order[who]]) * (1 + step) - 1
+        silent = replace(h, correction={**(h.correction or {}), body.name: other})
+        far = mean_db(takes, silent)
+        if now is not None and far is not None and far < now - NEARER_DB:
+            h, now, most = silent, far, max(most, step)
+    return h, most
+
+
+def _put(h: Hypothesis, body: Struck, correction: Array) -> tuple[Array, float]:
+    """Corrections (m,) of a body with such modes put to their lines, the loudest first, and the largest step."""
+    assert body.gathered is not None
+    lines, (model, order) = body.gathered.lines, modes_of(h, body)
+    heard = np.abs(lines.amplitude)
+    row = pattern(body, model)[body.fitted[: len(heard)]]
+    told = body.line[order] >= 0
+    upper = np.median(model.freq_hz[told]) if told.any() else np.inf
+    group = np.cumsum(np.diff(np.log(model.freq_hz), prepend=-np.inf) > TWINS)
+    found, most = correction.copy(), 0.0
+    for k in sorted(set(range(len(lines.freq_hz))) - set(body.line.tolist()), key=lambda k: -float(heard[:, k].max())):
+        if lines.freq_hz[k] < upper:
+            continue
+        near = np.unique(group[~told & (np.abs(np.log(model.freq_hz / lines.freq_hz[k])) < FAR)])
+        members = [np.flatnonzero(group == g) for g in near]
+        alike = [like(lines.amplitude[:, k], row[:, who]) if not told[who].any() else 0.0 for who in members]
+        if not alike or max(alike) < LIKE:
+            continue
+        who = members[int(np.argmax(alike))]
+        step = float(lines.freq_hz[k] / model.freq_hz[who].mean() - 1)
+        told[who], most = True, max(most, abs(step))
+        found[order[who]] = (1 + found[order[who]]) * (1 + step) - 1
+    return found, most
+
+
+def of_the_mesh(h: Hypothesis, bodies: tuple[Struck, ...], takes: Sequence[Judged], seed: int) -> float:
+    """What a mesh's errors would add to the distance, in dB: modes that no line could correct moved at random by as much as the others were
+    corrected, and every shape at the strikes by ROUGH of its strongest there."""
+    rng = np.random.default_rng([seed, 5])
+    moved, other = dict(h.correction or {}), {}
+    for body in bodies:
+        mine = moved.get(body.name)
+        if mine is None or body.gathered is None or len(mine) != len(body.line):
+            continue
+        paired = body.line >= 0
+        size = float(np.sqrt((mine[paired] ** 2).mean())) if paired.any() else 0.0
+        moved[body.name] = np.where(paired, mine, mine + max(size, MESH) * rng.standard_normal(len(mine)))
+        model = body.model if h.poisson is None or body.other is None else body.other(h.poisson)
+        other[body.name] = _roughened(replace(body, model=model, other=None), rng)
+    far = replace(h, correction=moved)
+    pairs = [(t, play(h, t.body, t.strike, len(t.sample), t.sr)) for t in takes if isinstance(t, Take)]
+    twice = [replace(t, sample=with_noise(made, t.floor, 1000 + t.strike)) for t, made in pairs]
+    return (mean_db([replace(t, body=other.get(t.body.name, t.body)) for t in twice], far) or 0.0) - (mean_db(twice, h) or 0.0)
+
+
+def _roughened(body: Struck, rng: np.random.Generator) -> Struck:
+    """The body with shapes at its strikes off by ROUGH of each mode's strongest there."""
+    shape = body.model.shape.copy()
+    at = slice(body.surface_count(), len(shape) - 1)
+    most = np.abs(np.einsum("sxm,sx->sm", shape[at], body.way[:-1])).max(axis=0)
+    shape[at] += (ROUGH * most * rng.standard_normal((body.strikes, 1, len(most))) * body.way[:-1, :, None]).astype(np.float32)
+    return replace(body, model=replace(body.model, shape=shape))

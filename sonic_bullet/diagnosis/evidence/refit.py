@@ -1,0 +1,229 @@
+"""What the baseline's own numbers become once an effect is there: α, β, σ and the corrections, from the same lines.
+
+    d − Δd(effects) = ½(α + βλ)         (estimator.rayleigh)
+    |A_sk| = σ |J ψ F̂|                  least squares with Cauchy's weights, 2 % of a mode's strongest for the shapes' own error
+
+A correction is the mesh's error alone: a mode that an effect moves keeps only what is left of it, within 1 %.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from sonic_bullet.diagnosis.evidence.amplitude_dependence import TURNS_RAD, fallen, turns_rad
+from sonic_bullet.diagnosis.evidence.effect_evidence import heard_of, outside, paired, path_response
+from sonic_bullet.diagnosis.evidence.small_amplitude import at_rest
+from sonic_bullet.diagnosis.evidence.unmatched_modes import CORRECTION, can_tell, sought
+from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, bends, modes_of, moves, pattern, play, undamped
+from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.effects.protocol import Blow, Effect, Heard, Stage
+from sonic_bullet.estimator.fit.pairing import MESHED, TWINS
+from sonic_bullet.estimator.fit.rayleigh import rayleigh
+from sonic_bullet.estimator.lines.joint_lines import noise_rms
+from sonic_bullet.records import Array, ModalModel
+
+ROUGH = 0.02
+NEAR, ALIKE = 5e-3, 1.6  # of ln f and ln d: lines of one mode
+
+
+def refitted(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...] | None = None, *, anew: bool = False) -> Hypothesis:
+    """The hypothesis with α, β and σ fitted again beside its effects; ``heard``: evidence to fit them to, thinned or whole, of all bodies or some.
+
+    anew: with lines paired and corrections learnt again, too, as they are beside effects that move modes.
+    """
+    moved = anew or moves(h)
+    if moved:
+        h = corrected(h, bodies, anew=anew)
+    if heard is None or moved:
+        heard = tuple(
+            heard_of(replace(h, effects=tuple(e for e in h.effects if e.stage is not Stage.SOUND)), b, sounds=False, anew=anew)
+            for b in bodies
+            if b.gathered is not None
+        )
+    heard = tuple(fallen(h, _whose(one, bodies), outside(h, one)) for one in heard)
+    h = _gained(_damped(h, bodies, heard), bodies, heard)
+    return at_rest(h, bodies, heard) if bends(h) else h
+
+
+def retold(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...] | None = None, *, fully: bool = False) -> Hypothesis:
+    """The hypothesis with a room's response told again, beside all that has been found. heard: whose strikes may tell it; all where None. fully: to the end."""
+    fitted = [b for b in bodies if b.gathered is not None and b.gathered.signals is not None]  # lists of lines say nothing of a response
+    if heard is not None:
+        fitted = [b for b in fitted if any(one.source is b.gathered for one in heard)]
+    if not fitted:
+        return h
+    body = max(fitted, key=lambda b: len(np.unique(b.line[b.line >= 0])))  # most lines that are modes
+    for room in (e for e in h.effects if hasattr(e, "told_by")):
+        g = body.gathered
+        assert g is not None and g.signals is not None
+        mine = list(range(len(g.signals))) if heard is None else next(list(one.strike) for one in heard if one.source is g)
+        signal = g.signals[mine]
+        bare = replace(h, effects=tuple(e for e in h.effects if e is not room))
+        sound = np.stack([play(bare, body, body.fitted[i], signal.shape[1], g.sr) for i in mine])
+        again = room.told_by(signal, sound, noise_rms(signal, g.sr), g.sr, fully=fully)
+        h = replace(h, effects=tuple(again if e is room else e for e in h.effects))
+    return h
+
+
+def _whose(one: Heard, bodies: tuple[Struck, ...]) -> Struck:
+    """The body that lines are of."""
+    return next(body for body in bodies if body.gathered is one.source)
+
+
+def with_effects(h: Hypothesis, effects: tuple[Effect, ...], bodies: tuple[Struck, ...]) -> Hypothesis:
+    """The hypothesis with other effects, not yet refitted; where none moves modes any more, or bends them otherwise, corrections are the baseline's again."""
+    made = replace(h, effects=effects)
+    return made if moves(made) or not (moves(h) or bends(h)) else replace(made, stretch=0.0, poisson=None, correction={b.name: b.correction for b in bodies})
+
+
+def corrected(h: Hypothesis, bodies: tuple[Struck, ...], *, anew: bool = False) -> Hypothesis:
+    """The hypothesis with E/ρ and corrections learnt on its own modes, from where its effects have found E/ρ and ν (``stretch``, ``poisson_ratio``). anew: see refitted."""
+    told = [e.poisson_ratio for e in h.effects if getattr(e, "poisson_ratio", None) is not None]  # type: ignore[attr-defined]
+    h = replace(h, correction=None, stretch=float(sum(getattr(e, "stretch", 0.0) for e in h.effects)), poisson=told[-1] if told else None)
+    for _ in range(3):
+        off = np.concatenate([_off(h, body, anew)[1] for body in bodies if body.gathered is not None] or [np.zeros(0)])
+        if len(off):
+            h = replace(h, stretch=h.stretch + float(np.median(off)))
+    found: dict[str, Array] = {}
+    for body in bodies:
+        if body.gathered is None:
+            continue
+        for e in (e for e in h.effects if hasattr(e, "heard_at")):  # lines of twins go to their own: half a split off, either would do
+            found[body.name] = np.clip(e.heard_at(undamped(h, body).freq_hz * np.exp(h.stretch)), -CORRECTION, CORRECTION)
+        for _ in range(2):
+            place, off = _off(replace(h, correction=found), body, anew)
+            ratio = np.array(found.get(body.name, np.zeros(undamped(h, body).mode_count)), float)
+            step = np.zeros(len(ratio))
+            step[place] = np.expm1(off)
+            found[body.name] = np.clip((1 + ratio) * (1 + step) - 1, -CORRECTION, CORRECTION)
+            if not moves(h) or any(e.id == "mode-splitting" for e in h.effects):
+                found[body.name] = _alike(undamped(h, body).freq_hz, found[body.name])
+        if can_tell(body):
+            now = replace(h, correction=found)
+            model, order = modes_of(now, body)
+            groups = [order[who] for who in paired(now, body, model, order, anew=anew)[1]]
+            lone = np.setdiff1d(np.arange(len(ratio)), np.concatenate([*groups, np.zeros(0, int)]))
+            shared = np.concatenate([*(g for g in groups if len(g) > 1), np.zeros(0, int)])
+            found[body.name] = sought(now, body, np.concatenate([lone, shared]), alone=np.isin(np.arange(len(ratio)), lone))
+    return replace(h, correction=found)
+
+
+def _alike(freq_hz: Array, correction: Array) -> Array:
+    """Corrections (m,), the mean of each run of modes that a mesh leaves side by side: what sets twins apart is an effect's, or they would change places."""
+    run = np.cumsum(np.diff(np.log(freq_hz), prepend=-np.inf) > TWINS * MESHED)
+    return np.asarray((np.bincount(run, correction) / np.maximum(np.bincount(run), 1))[run])
+
+
+def _off(h: Hypothesis, body: Struck, anew: bool) -> tuple[Array, Array]:
+    """Uncorrected modes (p,) of a body and ln f of their lines over their own (p,)."""
+    assert body.gathered is not None
+    model, order = modes_of(h, body)
+    line, mode = paired(h, body, model, order, anew=anew)
+    place = np.concatenate([order[who] for who in mode]) if mode else np.zeros(0, int)
+    lines = body.gathered.lines.freq_hz
+    off = np.concatenate([np.full(len(who), np.log(lines[one] / model.freq_hz[who].mean())) for one, who in zip(line, mode, strict=True)] or [np.zeros(0)])
+    return place, off
+
+
+def _damped(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...]) -> Hypothesis:
+    """α and β beside the effects' own decay."""
+    if any(e.id == "damping-law" for e in h.effects):
+        return h
+    told = [(e.alpha_per_s, e.beta_s) for e in h.effects if np.isfinite(getattr(e, "alpha_per_s", np.nan))]  # type: ignore[attr-defined]
+    if told:
+        return replace(h, alpha_per_s=told[-1][0], beta_s=told[-1][1])
+    bare = replace(h, alpha_per_s=0.0, beta_s=0.0)
+    lam, left, sd, all_of_it = [], [], [], []
+    for one in heard:
+        if not len(one.freq_hz):
+            continue
+        model, _ = modes_of(bare, _whose(one, bodies))
+        extra = np.zeros(len(one.freq_hz))
+        if moves(h):  # ``one`` is of h itself, and its lines are paired anew
+            extra = np.maximum(one.expected_decay_per_s - (h.alpha_per_s + h.beta_s * one.omega**2) / 2, 0.0)
+        elif h.at(Stage.MODES):
+            extra = np.array([model.decay_per_s[who].mean() for who in _members(one, model)])
+        lam.append(one.omega**2)
+        left.append(np.maximum(one.decay_per_s - extra, 1e-3 * one.decay_per_s))
+        sd.append(np.hypot(one.decay_sd_per_s, 0.02 * extra))
+        all_of_it.append(one.decay_per_s)
+    if not lam:
+        return h
+    guess = (max(h.alpha_per_s, 1e-3), max(h.beta_s, 1e-12))
+    found = rayleigh(np.concatenate(lam), np.concatenate(left), np.concatenate(sd), guess, np.concatenate(all_of_it))
+    return replace(h, alpha_per_s=found.alpha_per_s, beta_s=found.beta_s)
+
+
+def _members(one: Heard, model: ModalModel) -> list[Array]:
+    """The modes, by index, that each line stands for in a model whose modes have hardly moved: as many as before, about the one that is nearest."""
+    near = model.freq_hz[np.abs(np.subtract.outer(one.freq_hz, model.freq_hz)).argmin(axis=1)]
+    return [np.argsort(np.abs(model.freq_hz - f), kind="stable")[: len(who)] for f, who in zip(near, one.mode, strict=True)]
+
+
+def _told(h: Hypothesis, body: Struck, one: Heard) -> Array:
+    """Jψ (s, k) of the lines: the evidence's own, or, beside effects that leave modes where they were, as these have them sound."""
+    if moves(h) or not h.at(Stage.MODES):
+        return one.pattern
+    model, _ = modes_of(h, body)
+    row = pattern(body, model)[[body.fitted[i] for i in one.strike]]
+    return np.stack([row[:, who].sum(axis=1) for who in _members(one, model)], axis=1)
+
+
+def whole(one: Heard) -> Array:
+    """Amplitudes (s, k) with those of lines so near that they may be the same mode, bent or split: at the onset they add up to what was struck."""
+    if one.dry or not len(one.foreign_hz) or not len(one.freq_hz):
+        return one.amplitude  # in a room what rings close by is mostly the room
+    gap = np.abs(np.log(one.foreign_hz[:, None] / one.freq_hz[None, :]))
+    alike = np.abs(np.log(np.maximum(one.foreign_decay_per_s[:, None], 1e-3) / np.maximum(one.decay_per_s, 1e-3))) < ALIKE  # clicks are no part of a mode
+    mine = (gap.argmin(axis=1)[:, None] == np.arange(len(one.freq_hz))) & (gap < NEAR) & alike
+    return np.asarray(one.amplitude + one.foreign_amplitude @ mine)
+
+
+def _middle(ratio: Array, weight: Array) -> float:
+    """Weighted median, no heavier than 100 to 1: where weights that fall off with the misfit may start from."""
+    order = np.argsort(ratio)
+    total = np.cumsum(np.clip(weight[order], weight.max() / 100, None))
+    return float(ratio[order][np.searchsorted(total, total[-1] / 2)])
+
+
+def _gained(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...]) -> Hypothesis:
+    """σ by the amplitudes, times what effects that hide them from the lines know better."""
+    louder = float(np.prod([getattr(e, "louder", 1.0) for e in h.effects]))
+    told, seen, spread = [], [], []
+    for one in heard:
+        if not len(one.freq_hz) or one.signal is None:
+            continue
+        body = _whose(one, bodies)
+        direct = np.abs(path_response(h, body, one.freq_hz, one.sr))
+        factor = np.empty(one.pattern.shape)
+        for i, level in enumerate(one.impulse_n_s):
+            blow = Blow(float(level) if np.isfinite(level) else 1.0, np.zeros(1), np.ones(1))
+            for effect in h.at(Stage.FORCE):
+                blow = effect.apply(blow)
+            hits = np.abs((blow.share[:, None] * np.exp((one.decay_per_s - 2j * np.pi * one.freq_hz) * blow.delay_s[:, None])).sum(axis=0))
+            factor[i] = np.abs(blow.spectrum(one.freq_hz)) * direct * hits
+        expected = np.abs(_told(h, body, one)) * factor
+        if bends(h) and not (glides := turns_rad(h, body, one) > TURNS_RAD).all():
+            expected = np.where(glides, np.nan, expected)  # of what glides a linear fit hears a part
+        told.append(expected.ravel())
+        seen.append(np.abs(whole(one)).ravel())
+        rough = np.broadcast_to(ROUGH * np.nan_to_num(expected).max(axis=0, keepdims=True), expected.shape)
+        spread.append(np.stack([one.amplitude_sd.ravel(), rough.ravel()]))
+    if not told:
+        return h
+    x, y, s = np.concatenate(told), np.concatenate(seen), np.concatenate(spread, axis=1)
+    good = np.isfinite(x) & np.isfinite(y) & np.isfinite(s).all(axis=0)
+    x, y, s = x[good], y[good], s[:, good]
+    if not (x > 0).any():
+        return h
+    if any(one.dry for one in heard):  # read through a room, a line is off by a factor of its own
+        told = (x > 0) & (y > 0) & (s[0] > 0)
+        return replace(h, gain=_middle(y[told] / x[told], (y / np.maximum(s[0], 1e-300))[told])) if told.any() else h
+    gain, weight = _middle(y[x > 0] / x[x > 0], x[x > 0] / (s[0] + s[1])[x > 0]), np.ones(len(x))
+    for _ in range(30):
+        sd2 = (s[0] ** 2 + (gain * s[1]) ** 2) + 1e-300
+        gain = float((weight * x * y / sd2).sum() / max(float((weight * x**2 / sd2).sum()), 1e-300))
+        weight = 1 / (1 + ((y - gain * x) ** 2 / sd2) / 6.25)
+    return replace(h, gain=gain * louder) if gain > 0 and np.isfinite(gain) else h

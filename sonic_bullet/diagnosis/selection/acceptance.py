@@ -1,0 +1,140 @@
+"""A suspect after its trial, and whether it earns its keep.
+
+an effect earns its keep where its mean drop is over LEAST_DB (where nothing is found yet: FAINT_DB if that is MOST of the gap, CERTAIN_DB if lines are sure of it and
+    that is SAID of the gap) and LEAST_SHARE of the gap, SURE standard errors above zero and above the null effect's by as much; of more than MANY strikes that gain much
+    one may be odd; what goes with level may be told by the loudest alone
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis
+from sonic_bullet.effects.protocol import Effect
+
+LEAST_DB, LEAST_SHARE = 0.4, 0.08  # of a drop, and of it in the gap
+FAINT_DB, MOST = 0.2, 0.5  # of a drop that is as much of the gap: then less than LEAST_DB will do
+CERTAIN_DB, SAID = 0.1, 0.25  # of a drop that is as much of the gap, where lines have told of an effect, each by its own baseband
+LOUDEST = 2  # strikes, of which what goes with level must gain most
+LOST = 0.15  # of what the loudest gains: all that others may lose by what goes with level
+SURE, MANY = 2.0, 4  # standard errors; strikes of which none may lose, beside one
+NOISE_DB = 0.03  # of a distance, by noise alone
+CAPS = 60  # of what is open, tried
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Candidate:
+    """A suspect after its trial. effect: fitted to all evidence. drop_db (s,): of each left-out strike's distance, less what corrections learnt again would gain
+    alone where the suspect moves modes; of the FIRST alone where it could not earn its keep any more. whole_db: mean with that in it, which speaks for a name's turn. null_db: mean over strikes and draws.
+
+    Its axes of twins, if it has any, all fitted strikes told. spread: of each number in its parameters over the folds (jackknife). lines: by how much lines left
+    out are likelier with it (by_lines.py). impulse_n_s (s,): of the strikes.
+    """
+
+    id: str
+    effect: Effect
+    hypothesis: Hypothesis
+    drop_db: np.ndarray[Any, Any]
+    whole_db: float
+    null_db: float
+    spread: dict[str, Any]
+    lines: float = 0.0
+    impulse_n_s: np.ndarray[Any, Any] = field(default_factory=lambda: np.zeros(0))
+
+    @property
+    def mean_db(self) -> float:
+        return mean(self.drop_db)
+
+    @property
+    def certain(self) -> bool:
+        """Whether its lines are sure of it (see needed)."""
+        return getattr(self.effect, "certain", False)
+
+    @property
+    def loud(self) -> bool:
+        """Whether the strike that gains most is one of the LOUDEST."""
+        return len(self.impulse_n_s) == len(self.drop_db) and int(self.drop_db.argmax()) in np.argsort(-self.impulse_n_s)[:LOUDEST]
+
+    @property
+    def sd_db(self) -> float:
+        """Standard error of the mean."""
+        return float(self.drop_db.std(ddof=1) / np.sqrt(len(self.drop_db))) if len(self.drop_db) > 1 else float("inf")
+
+
+def mean(x: Sequence[float] | np.ndarray[Any, Any]) -> float:
+    """0 of none."""
+    return float(np.mean(x)) if len(x) else 0.0
+
+
+def needed(gap_db: float, *, first: bool, certain: bool = False) -> float:
+    """Of a drop, in dB: LEAST_DB; less where that is most of what has ever been open (first: nothing is found yet), more where much is.
+
+    certain: lines agreed on it, each by its own frames, before it was proposed; then strikes left out need only say the same.
+
+    What little a name leaves of a wide gap may be its own fit's.
+    """
+    faint, share = (CERTAIN_DB, SAID) if certain else (FAINT_DB, MOST)
+    return max(min(LEAST_DB, max(faint, share * gap_db)) if first else LEAST_DB, LEAST_SHARE * gap_db)
+
+
+def earns(c: Candidate, gap_db: float, *, first: bool) -> bool:
+    """Whether a suspect explains enough, surely enough, and more than chance. first: see needed."""
+    if len(c.drop_db) == 0:
+        return False
+    need = needed(gap_db, first=first, certain=c.certain)
+    if not (c.mean_db > need and np.isfinite(c.sd_db)):
+        return False
+    more = c.whole_db - max(c.null_db, 0.0)  # a null effect is not held against corrections either
+    drop = np.sort(c.drop_db)
+    if c.certain and c.loud and -np.minimum(drop, 0).sum() < LOST * drop[-1]:
+        return more > 0.5 * need  # what goes with level is for the loudest to tell, which these others were fitted without
+    if len(drop) > MANY and drop[1:].mean() > 3 * max(need, needed(gap_db, first=first)):
+        drop = drop[1:]  # one strike may be odd: what it alone tells, none of the others did
+    sd = float(drop.std(ddof=1) / np.sqrt(len(drop)))
+    if len(drop) >= MANY and drop[0] > -max(0.1 * drop.mean(), NOISE_DB) and (drop[-2] > need or (first and c.certain and c.loud)):
+        return more > 0.5 * need  # no strike speaks against it, though loud ones may gain far more than soft ones
+    return bool(drop.mean() > SURE * sd) and more > max(SURE * sd, 0.5 * need)
+
+
+def may_earn(asked: Candidate, open_db: np.ndarray[Any, Any], gap_db: float) -> bool:
+    """Whether a suspect could still earn its keep that has been asked on the first few strikes alone.
+
+    open_db (s,): the most it may gain on each; of those that it has not been asked on it may gain that, or less where that suits it: alike is surer than much.
+    Of drops at most m_i the mean over its standard error is largest at min(m_i, c) for some c, so CAPS of these are tried; loud strikes may gain most.
+    asked.impulse_n_s (s,): of all.
+    """
+    first, loud = len(asked.drop_db), np.isin(np.arange(len(open_db)), np.argsort(-asked.impulse_n_s)[:LOUDEST])
+    for cap in (np.inf, *np.linspace(0.0, max(float(open_db.max()), 0.0), CAPS)[1:]):
+        for free in (np.zeros(len(open_db), bool), loud):
+            drop = np.where(free, open_db, np.minimum(open_db, cap))
+            drop[:first] = asked.drop_db
+            if earns(replace(asked, drop_db=drop, whole_db=gap_db, null_db=0.0), gap_db, first=True):
+                return True
+    return False
+
+
+def jackknife(rows: list[dict[str, Any]]) -> dict[str, Any]:
+    """Standard errors of every number that all folds give [Efron & Tibshirani 1993, eq. 11.5]; numbers in lists of one length each their own."""
+    if len(rows) < 2:
+        return {}
+    found: dict[str, Any] = {}
+    for name in rows[0]:
+        values = [row.get(name) for row in rows]
+        if all(isinstance(v, (int, float)) and not isinstance(v, bool) for v in values):
+            found[name] = _spread(np.array(values, float))
+        elif all(isinstance(v, list) for v in values):
+            try:
+                table = np.array(values, float)
+            except (ValueError, TypeError):
+                continue
+            found[name] = np.apply_along_axis(_spread, 0, table).tolist()
+    return found
+
+
+def _spread(x: np.ndarray[Any, Any]) -> float:
+    n = len(x)
+    return float(np.sqrt((n - 1) / n * ((x - x.mean()) ** 2).sum()))

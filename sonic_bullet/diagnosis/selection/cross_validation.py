@@ -1,0 +1,213 @@
+"""Suspects on trial: each fitted without one strike and a part of the lines, judged on that strike; null effects alike.
+
+    for every strike s:  evidence − s − some lines (none, where a suspect has numbers of single lines) -> propose -> refit α, β, σ -> D(s)    against the same without the effect
+    null: as many numbers, spent on directions drawn at random in the modes' decays and levels, fitted to the same evidence
+
+Leaving out lines matters: decays and shapes belong to the body, so every strike shows them, and a pattern fitted to them by chance would pass.
+Corrections of frequencies, and the axes of twins that glide or choke, only mend what a mesh leaves to chance: all fitted strikes tell those, once, and the null has no numbers
+for them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of, thinned
+from sonic_bullet.diagnosis.evidence.refit import refitted, retold
+from sonic_bullet.diagnosis.evidence.small_amplitude import at_rest
+from sonic_bullet.diagnosis.prediction.hypothesis import TURNS, Hypothesis, bends, moves
+from sonic_bullet.diagnosis.prediction.line_score import Listed
+from sonic_bullet.diagnosis.prediction.score import Judged, Take
+from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.diagnosis.selection.acceptance import Candidate, earns, jackknife, may_earn, mean
+from sonic_bullet.diagnosis.selection.control_effect import Null
+from sonic_bullet.diagnosis.selection.decay_test import likelier, tells
+from sonic_bullet.effects.protocol import Effect, Evidence, Stage
+from sonic_bullet.parallel import side_by_side
+
+KEPT = 0.75  # of the lines, in every fold
+DRAWS = 2  # of the null effect
+FIRST = 2  # strikes left out, after which a suspect is let go that could not earn its keep any more (may_earn)
+ENOUGH = 2  # names: what little is left beside them is worth no search of half a minute
+PLAIN = 0.6  # of the gap: where a cheap suspect says as much, costly ones wait
+
+
+def trials(
+    h: Hypothesis,
+    bodies: tuple[Struck, ...],
+    takes: Sequence[Judged],
+    evidence: Evidence,
+    effects: Sequence[type[Effect]],
+    *,
+    seed: int,
+    say: Any,
+    costly: bool = True,
+) -> list[Candidate]:
+    """Every suspect that the whole evidence suggests, after its trial; best first. costly: whether those that take long are asked, and that search once ENOUGH have been found."""
+    found: list[Candidate] = []
+    if len(takes) < 2:
+        return found  # nothing can be left out
+    folds = _folds(h, bodies, takes, evidence, seed)
+    heard = any(isinstance(take, Take) for take in takes)  # else no lines are left out
+    whole_lines = cache(lambda: _folds(h, bodies, takes, evidence, seed, keep=1.0) if heard else folds)
+    anew = cache(lambda: refitted(h, bodies, anew=True) if heard else h)
+    fair = cache(lambda by_line: _learnt_anew(anew(), whole_lines() if by_line else folds))
+    still = cache(lambda by_line: _rested(whole_lines() if by_line else folds))
+    gap = mean([f.before - f.noise for f in folds])
+    idle = not costly and len(evidence.found) >= ENOUGH
+    dry = any(one.dry for one in evidence.heard)
+    kinds = [kind for kind in effects if kind.id not in evidence.found and not (idle and getattr(kind, "searches", False))]
+    for group in _groups(kinds, last=TURNS if dry and costly else frozenset()):
+        if any(hasattr(c.effect, "dried") and earns(c, gap, first=not evidence.found) for c in found):
+            break  # what others say of lines that a room has made is hearsay: in the next round they are told dry
+        if dry and group[0].id in TURNS and len(kinds) > len(group) and any(c.effect.stage is Stage.MATERIAL for c in found):
+            continue  # lines that were paired with another material's modes tell little of what mixes these
+        if getattr(group[0], "costly", False) and (not costly or any(c.mean_db > PLAIN * gap for c in found)):
+            continue  # something cheap says most of it: what is left may ask for more in the next round
+        if getattr(group[0], "costly", False):
+            say(f"searching for {group[0].id}")
+        proposed = _proposed(group, evidence)
+        for kind in group:
+            if (whole := proposed[kind]) is None:
+                continue
+            say(f"trying {kind.id}")
+            alone = replace(h, effects=(whole,))
+            by_line = bool(getattr(kind, "by_line", False))
+            plain = whole_lines() if by_line else folds
+            known = fair(by_line) if moves(alone) and not moves(h) else still(by_line) if bends(alone) and not bends(h) else plain
+            found.append(_tried(kind, whole, h, bodies, evidence, known))
+    return sorted(found, key=lambda c: -c.whole_db)
+
+
+def _proposed(group: list[type[Effect]], evidence: Evidence) -> dict[type[Effect], Effect | None]:
+    """What each makes of the evidence; one that searches side by side would only do so in turn beside others."""
+    rest = [kind for kind in group if not getattr(kind, "searches", False)]
+    return {kind: kind.propose(evidence) for kind in group if kind not in rest} | dict(
+        zip(rest, side_by_side(lambda kind: kind.propose(evidence), rest), strict=True)
+    )
+
+
+def _groups(kinds: list[type[Effect]], last: frozenset[str]) -> list[list[type[Effect]]]:
+    """Rooms, whose echoes others would be told of; what is cheap; and what takes long, one by one; then those that come last."""
+    rooms = [k for k in kinds if hasattr(k, "dried")]
+    late = [k for k in kinds if k.id in last]
+    dear = [k for k in kinds if k not in rooms + late and getattr(k, "costly", False)]
+    plain = [k for k in kinds if k not in rooms + late + dear]
+    return [group for group in (rooms, plain, *([k] for k in (*dear, *late))) if group]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Fold:
+    """What is left to learn from once ``take`` is left out: bodies, evidence, the hypothesis refitted to it, and its distance to the take.
+
+    least: the same distance, or a lesser one that corrections alone come to where they are learnt again. noise: what noise alone makes, of the other takes where this one
+    is silent.
+    """
+
+    take: Judged
+    bodies: tuple[Struck, ...]
+    evidence: Evidence
+    base: Hypothesis
+    before: float
+    least: float
+    noise: float
+
+
+def _folds(h: Hypothesis, bodies: tuple[Struck, ...], takes: Sequence[Judged], evidence: Evidence, seed: int, keep: float = KEPT) -> list[Fold]:
+    """Without one strike each, and with a part of the lines, keep of them: all for an effect with numbers of single lines, which other lines cannot tell and other strikes can."""
+    rng = np.random.default_rng([seed, 1])
+    made = []
+    for take in takes:
+        if isinstance(take, Listed):
+            mine, start = take.rest(bodies, h)
+            less = evidence_of(start, mine, evidence.band_hz, seed=seed)
+            base = refitted(start, mine)
+        elif isinstance(take, Take):
+            mine, less = bodies, thinned(evidence, take.place, keep, rng)
+            base = refitted(h, bodies, less.heard)
+        before = take.distance(base)
+        if np.isfinite(before):
+            made.append(Fold(take, mine, less, base, before, before, take.least(base)))
+    usual = [f.noise for f in made if np.isfinite(f.noise)]
+    return [f if np.isfinite(f.noise) else replace(f, noise=mean(usual) if usual else f.before) for f in made]
+
+
+def _learnt_anew(every: Hypothesis, folds: list[Fold]) -> list[Fold]:
+    """Folds that know what is gained by corrections alone, learnt again as they are beside whatever moves modes: that is no effect's gain. every: by all strikes."""
+
+    def least(f: Fold) -> float:
+        again = refitted(f.base, f.bodies, anew=True) if isinstance(f.take, Listed) else every
+        return min(f.before, f.take.distance(again))
+
+    return [replace(f, least=least(f)) for f in folds]
+
+
+def _rested(folds: list[Fold]) -> list[Fold]:
+    """Folds that know what is gained by corrections alone, learnt from what modes ring down to as they are beside whatever makes them glide."""
+    return [
+        replace(f, least=min(f.before, f.take.distance(at_rest(f.base, f.bodies, f.evidence.heard, every=True)))) if isinstance(f.take, Take) else f
+        for f in folds
+    ]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Gain:
+    """On one left-out strike, of an effect fitted without it, if any came of that: as Candidate has them; null_db (n,): of every draw."""
+
+    effect: Effect | None = None
+    drop_db: float = 0.0
+    whole_db: float = 0.0
+    null_db: tuple[float, ...] = ()
+    lines: float = 0.0
+
+
+def _tried(kind: type[Effect], whole: Effect, h: Hypothesis, bodies: tuple[Struck, ...], evidence: Evidence, folds: list[Fold]) -> Candidate:
+    def judged(i: int) -> Gain:
+        fold = folds[i]
+        less = fold.evidence
+        effect = kind.propose(replace(less, known=whole, on_trial=True))
+        if effect is None:
+            return Gain()
+        free = effect.freedom() - (len(getattr(effect, "turn_rad", ())) if hasattr(effect, "turned") else 0)  # such axes are whole's (Evidence.on_trial)
+        random = [Null.fitted(less, min(free, 8), 10 * i + draw) for draw in range(DRAWS)]
+        beside = _beside(fold, effect)
+        after = _after(fold, beside)
+        chance = tuple(fold.before - _after(fold, _beside(fold, none)) for none in random if none is not None)
+        lines = likelier(fold.base, beside, evidence, less, bodies) if isinstance(fold.take, Take) and tells(h, effect) else 0.0
+        return Gain(effect, fold.least - after, fold.before - after, chance, lines)
+
+    found = side_by_side(judged, range(min(FIRST, len(folds))))
+    asked = Candidate(kind.id, whole, h, np.array([g.drop_db for g in found]), 0.0, 0.0, {}, impulse_n_s=_levels(folds))
+    if may_earn(asked, np.array([f.least - f.noise for f in folds]), mean([f.before - f.noise for f in folds])) or tells(
+        h, whole
+    ):  # lines may speak for what strikes do not
+        found += side_by_side(judged, range(len(found), len(folds)))
+    added = refitted(replace(h, effects=(*h.effects, whole)), bodies, evidence.heard)
+    drop, whole_db, null_db = np.array([g.drop_db for g in found]), mean([g.whole_db for g in found]), mean([x for g in found for x in g.null_db])
+    lines = mean([g.lines for g in found]) / (1 - KEPT)  # each line is left out in so many of the folds
+    level = _levels(folds[: len(found)])
+    return Candidate(kind.id, whole, added, drop, whole_db, null_db, jackknife([g.effect.parameters() for g in found if g.effect is not None]), lines, level)
+
+
+def _levels(folds: Sequence[Fold]) -> np.ndarray[Any, Any]:
+    return np.array([f.take.body.impulse_n_s[f.take.strike] if isinstance(f.take, Take) else np.nan for f in folds])
+
+
+def _after(fold: Fold, h: Hypothesis) -> float:
+    """The distance to a fold's take; what noise alone makes where neither that nor what is played stands above it any more."""
+    far = fold.take.distance(h)
+    return far if np.isfinite(far) else fold.noise
+
+
+def _beside(fold: Fold, effect: Effect) -> Hypothesis:
+    """A fold's hypothesis with one more effect, fitted to what it may learn from."""
+    h = replace(fold.base, effects=(*fold.base.effects, effect))
+    if isinstance(fold.take, Listed):
+        return refitted(h, fold.bodies)
+    fitted = refitted(h, fold.bodies, fold.evidence.heard)
+    return retold(fitted, fold.bodies, fold.evidence.heard) if hasattr(effect, "told_by") else fitted

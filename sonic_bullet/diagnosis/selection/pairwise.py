@@ -1,0 +1,148 @@
+"""Two names at once, where one after another explains too little: each alone may leave, or even open, most of what only both close.
+
+    first round's suspects: A as it was found, B -> propose(evidence beside A)      -> least D(A, B) on all strikes, if it leaves little
+                            B moves no modes: what does is searched for all over a body, and that takes long
+    then each stands its trial beside the other: fitted without one strike at a time, against null effects, as in any round
+    in_a_room: B is a room that was found alone, A what moves modes; the room is heard anew beside A, and told again without it
+
+What a dashpot does to decays hides what a long pulse leaves of the high modes: played with the right pulse and wrong decays, a body is as far from its recording
+as with neither. Coordinate steps stop there; a step along two coordinates does not [cf. forward selection of groups: Efroymson 1960; Yuan & Lin 2006].
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of
+from sonic_bullet.diagnosis.evidence.refit import refitted, retold, with_effects
+from sonic_bullet.diagnosis.prediction.hypothesis import TURNS, Hypothesis, moves, moves_itself
+from sonic_bullet.diagnosis.prediction.score import Judged, Take, least_db, mean_db
+from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.diagnosis.selection.acceptance import Candidate, earns
+from sonic_bullet.diagnosis.selection.cross_validation import trials
+from sonic_bullet.diagnosis.selection.exchange import again
+from sonic_bullet.diagnosis.selection.phase_test import CLEAR, NEARLY, misfit
+from sonic_bullet.diagnosis.selection.simplest import helps
+from sonic_bullet.parallel import side_by_side
+
+LEFT = 0.25  # of the gap: two at once are twice as many choices, so they must say more than one after another
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Two:
+    """A hypothesis with two effects, the second fitted beside the first, and how far it is from the fitted strikes, in dB."""
+
+    h: Hypothesis
+    db: float
+
+
+def in_twos(
+    start: Hypothesis,
+    first: Sequence[Candidate],
+    bodies: tuple[Struck, ...],
+    takes: Sequence[Judged],
+    band_hz: tuple[float, float],
+    *,
+    seed: int,
+    say: Callable[[str], None],
+) -> tuple[Hypothesis, list[Candidate]] | None:
+    """The two of a first round's suspects that explain nearly all together, each of which earns its keep beside the other; None where no two do."""
+    if len(first) < 2 or not all(isinstance(t, Take) for t in takes):
+        return None
+    kinds = [type(c.effect) for c in first if not moves(c.hypothesis)]
+    say("trying two at once")
+
+    def beside(one: Candidate) -> list[Two]:
+        told = evidence_of(one.hypothesis, bodies, band_hz, seed=seed)
+        found = []
+        for kind in kinds:
+            other = None if kind is type(one.effect) else kind.propose(told)
+            if other is not None:
+                h = refitted(replace(one.hypothesis, effects=(*one.hypothesis.effects, other)), bodies, told.heard)
+                found.append(Two(h, mean_db(takes, h) or np.inf))
+        return found
+
+    pairs = [two for some in side_by_side(beside, first) for two in some]
+    floor = least_db(takes, start) or 0.0
+    gap = (mean_db(takes, start) or 0.0) - floor
+    if not pairs or min(two.db for two in pairs) - floor > LEFT * gap:
+        return None
+    h = _likeliest(pairs, floor + gap, bodies)
+    closer = again(again(h, 0, bodies, band_hz, afresh=True), 1, bodies, band_hz)  # what was found alone had the other's share to explain, too
+    h = closer if (mean_db(takes, closer) or np.inf) < (mean_db(takes, h) or np.inf) else h
+    return _stood(h, bodies, takes, band_hz, seed=seed, say=say)
+
+
+def in_a_room(
+    h: Hypothesis,
+    found: Sequence[Candidate],
+    bodies: tuple[Struck, ...],
+    takes: Sequence[Judged],
+    band_hz: tuple[float, float],
+    *,
+    seed: int,
+    say: Callable[[str], None],
+) -> tuple[Hypothesis, list[Candidate]] | None:
+    """A room that has been found alone, heard anew beside one of the suspects (found) that move modes; None where no two say nearly all.
+
+    Outside the room lines lie where they lie, and tell of masses and tensors. But a response told from modes that lie elsewhere plays what these lack, so that every
+    other set of modes sounds worse with it: the suspect is tried with a response of its own.
+    """
+    rooms = [e for e in h.effects if hasattr(e, "told_by")]
+    movers = [c for c in found if moves_itself(h, c.effect)]
+    if len(rooms) != 1 or len(h.effects) != 1 or not movers or not all(isinstance(t, Take) for t in takes):
+        return None
+    say("hearing the room anew beside what moves modes")
+
+    def beside(c: Candidate) -> Two | None:
+        alone = refitted(with_effects(h, (c.effect,), bodies), bodies)
+        told = evidence_of(alone, bodies, band_hz, seed=seed)
+        room = type(rooms[0]).propose(told)
+        if room is None:
+            return None
+        two = retold(refitted(replace(alone, effects=(c.effect, room)), bodies, told.heard), bodies, fully=True)
+        return Two(two, mean_db(takes, two) or np.inf)
+
+    floor, left = least_db(takes, h) or 0.0, mean_db(takes, retold(h, bodies, fully=True)) or 0.0
+    for some in ([c for c in movers if c.id not in TURNS], [c for c in movers if c.id in TURNS]):  # what hardly moves modes is asked where nothing else will do
+        best = min((two for two in side_by_side(beside, some) if two is not None), key=lambda two: two.db, default=None)
+        if best is not None and best.db - floor <= LEFT * (left - floor):
+            break
+    else:
+        return None
+    return _stood(best.h, bodies, takes, band_hz, seed=seed, say=say)
+
+
+def _stood(
+    h: Hypothesis, bodies: tuple[Struck, ...], takes: Sequence[Judged], band_hz: tuple[float, float], *, seed: int, say: Callable[[str], None]
+) -> tuple[Hypothesis, list[Candidate]] | None:
+    """The two, if each earns its keep beside the other."""
+    added: list[Candidate] = []
+    for effect in h.effects[::-1]:
+        rest = refitted(with_effects(h, tuple(e for e in h.effects if e is not effect), bodies), bodies)
+        without = mean_db(takes, retold(rest, bodies)) or 0.0  # with a response of its own, too
+        told = replace(evidence_of(rest, bodies, band_hz, seed=seed), known=effect)
+        now, least = mean_db(takes, rest) or 0.0, least_db(takes, rest) or 0.0
+        stood = trials(rest, bodies, takes, told, [type(effect)], seed=seed, say=say)
+        if not stood or not (earns(stood[0], max(now - least, 0.0), first=False) and helps(stood[0], bodies, takes, now, without, least, first=False)):
+            return None
+        h, added = stood[0].hypothesis, [stood[0], *added]
+    return h, added
+
+
+def _likeliest(pairs: Sequence[Two], before_db: float, bodies: tuple[Struck, ...]) -> Hypothesis:
+    """The nearest to the strikes; or, of those that share the effect that moves modes, and say nearly as much, the one for which phases speak clearly (ties.py)."""
+    best = min(pairs, key=lambda two: two.db)
+    near = best.db + NEARLY * (before_db - best.db)
+    others = [two.h for two in pairs if two.db < near and _movers(two.h) == _movers(best.h)]
+    off = [misfit(h, bodies) + CLEAR for h in others]
+    own = misfit(best.h, bodies)
+    return others[int(np.argmin(off))] if np.isfinite(own) and min(off) < own else best.h
+
+
+def _movers(h: Hypothesis) -> set[str]:
+    """Which of its effects move modes."""
+    return {e.id for e in h.effects if moves_itself(h, e)}

@@ -1,0 +1,84 @@
+"""Which of the suspects that stood their trial is added, and which of the added ones are still needed at the end.
+
+able -> on all strikes together it helps, too -> the best, or the simplest of those that strikes cannot tell from it -> phases, where two say nearly the same
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from sonic_bullet.diagnosis.evidence.refit import refitted, retold, with_effects
+from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, moves, moves_itself
+from sonic_bullet.diagnosis.prediction.score import Judged, mean_db
+from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.diagnosis.selection.acceptance import SURE, Candidate, needed
+from sonic_bullet.diagnosis.selection.decay_test import misfit as decays
+from sonic_bullet.diagnosis.selection.decay_test import numbers, of_decays, tells
+from sonic_bullet.diagnosis.selection.exchange import ALIKE
+from sonic_bullet.diagnosis.selection.phase_test import CLEAR, HINT, NEARLY, misfit
+from sonic_bullet.effects.protocol import Evidence
+
+HELPS = 0.5  # of what a name must gain on strikes left out, on all of them together: a model of few lines may be saved by chance once one is left out
+LINES = 6.0  # twice the ln likelihood of decays left out: what a name must gain where the room's response says the same of the strikes
+SAME = 0.1  # of what a room's response leaves open: two that differ by less say the same
+
+
+def helps(c: Candidate, bodies: tuple[Struck, ...], takes: Sequence[Judged], now: float, told: float, floor: float, *, first: bool) -> bool:
+    """Whether all strikes together gain, and lose nothing of what a room's response, told again without it, says as well (told): that takes up echoes, and
+    some of what stray modes leave, so what moves modes must gain on that. A filter or a slow law it takes up whole: then both say the same.
+    Without a mesh nothing tells which of a room's lines are modes, and what changes decays would be told by all of them."""
+    if tells(c.hypothesis, c.effect) and not _shaped(bodies):
+        return False
+    before, after = told if moves(c.hypothesis) else now, mean_db(takes, retold(c.hypothesis, bodies)) or 0.0
+    return after < told + SAME * max(told - floor, 0.0) and before - after > HELPS * needed(max(before - floor, 0.0), first=first, certain=c.certain)
+
+
+def by_lines(c: Candidate, bodies: tuple[Struck, ...], takes: Sequence[Judged], told: float, floor: float) -> bool:
+    """Whether lines left out speak for it (by_lines.py), and a room's response, told again beside it, says no less than without it (told). Without a mesh nothing tells which of a room's lines are modes."""
+    return _shaped(bodies) and c.lines > LINES and (mean_db(takes, retold(c.hypothesis, bodies)) or 0.0) < told + SAME * max(told - floor, 0.0)
+
+
+def _shaped(bodies: tuple[Struck, ...]) -> bool:
+    """Whether every body has a mesh."""
+    return all(body.family is not None for body in bodies)
+
+
+def simplest(able: Sequence[Candidate], bodies: tuple[Struck, ...], evidence: Evidence) -> Candidate:
+    """The best, or the one with the fewest numbers of those that strikes cannot tell from it: SURE standard errors of the difference, ALIKE of what it says.
+
+    Where another with no more numbers says nearly as much (NEARLY), the lines' phases may speak for that one (ties.py): by CLEAR, or by HINT where it is ALIKE.
+    Of two that only change decays the lines' own decays tell, by BIC. Effects that move modes stand aside: corrections are learnt anew beside them, and are numbers too.
+    """
+    best = able[0]
+    if moves_itself(best.hypothesis, best.effect) or len(able) == 1:  # by lines alone one may be named that strikes speak against
+        return best
+
+    def close(c: Candidate, share: float) -> bool:
+        more = best.drop_db - c.drop_db
+        return bool(more.mean() <= SURE * more.std(ddof=1) / np.sqrt(len(more)) and more.mean() < share * best.mean_db)
+
+    rivals = [c for c in able if not moves_itself(c.hypothesis, c.effect)]
+    first = min((c for c in rivals if close(c, ALIKE)), key=lambda c: (numbers(c.effect), -c.mean_db))
+    if of_decays(first.hypothesis, first.effect):
+        alike = [c for c in rivals if of_decays(c.hypothesis, c.effect) and (best.drop_db - c.drop_db).mean() < NEARLY * best.mean_db]
+        first = min(alike, key=lambda c: decays(c.hypothesis, c.effect, evidence, bodies))
+    others = [c for c in rivals if c is not first and numbers(c.effect) <= numbers(first.effect) and (best.drop_db - c.drop_db).mean() < NEARLY * best.mean_db]
+    if not others or moves(best.hypothesis):
+        return first  # phases are held against lines as they were fitted
+    own = misfit(first.hypothesis, bodies)  # the less strikes say, the less phases need to
+    off = np.array([misfit(c.hypothesis, bodies) + (HINT if close(c, ALIKE) else CLEAR) for c in others])
+    return others[int(off.argmin())] if np.isfinite(own) and off.min() < own else first
+
+
+def pruned(h: Hypothesis, added: list[Candidate], bodies: tuple[Struck, ...], takes: Sequence[Judged], gap_db: float) -> tuple[Hypothesis, list[Candidate]]:
+    """Without the effects that those found after them have made needless."""
+    for candidate in added[:-1]:
+        if candidate.lines > LINES:
+            continue  # strikes need not speak for it
+        rest = [e for e in h.effects if e.id != candidate.id]
+        without = refitted(with_effects(h, tuple(rest), bodies), bodies)
+        if (mean_db(takes, without) or 0.0) - (mean_db(takes, h) or 0.0) < needed(gap_db, first=False):
+            h, added = without, [c for c in added if c is not candidate]
+    return h, added

@@ -1,0 +1,217 @@
+"""The loop: try all suspects, add the best that earns its keep, look again; fit them to each other; then say what is known and what is not.
+
+    one by one -> fitted to each other, exchanged, pruned -> verdict
+    two at once (twos.py) where every one leaves most of the gap open, or all of them did at the end; a room heard anew beside what moves modes
+
+gap = before − floor on left-out strikes; which effect earns its keep is said in candidate.py
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of
+from sonic_bullet.diagnosis.evidence.mesh_limits import beyond, of_the_mesh
+from sonic_bullet.diagnosis.evidence.refit import refitted, retold
+from sonic_bullet.diagnosis.prediction.hypothesis import TURNS, Hypothesis, moves_itself
+from sonic_bullet.diagnosis.prediction.score import Judged, least_db, mean_db
+from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.diagnosis.selection.acceptance import FAINT_DB, LEAST_DB, Candidate, earns
+from sonic_bullet.diagnosis.selection.coherent_residual import of_no_body
+from sonic_bullet.diagnosis.selection.cross_validation import trials
+from sonic_bullet.diagnosis.selection.exchange import chosen, exchanged, rivals
+from sonic_bullet.diagnosis.selection.pairwise import in_a_room, in_twos
+from sonic_bullet.diagnosis.selection.simplest import by_lines, helps, pruned, simplest
+from sonic_bullet.effects.protocol import Effect, Evidence, Stage
+
+ROUNDS = 4
+SUFFICES_DB = 1.5  # a gap below this is the mesh's and the shapes' own
+EXPLAINED = 0.5  # of the gap; part of it is the mesh's and the shapes' own
+BY_A_ROOM = 0.7  # of the gap, by a room and what is beside it: a response has a tap for every sample, so what is a room's it leaves little of
+NO_BODY = 0.5  # of what is open: with more of it left by the strikes' own lines, those that are in phase, it is no mesh's
+WEAK = 0.5  # of the gap: where every suspect leaves more, two are tried at once
+OPEN = 0.3  # of the first gap: with less left, no costly suspect is asked
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Closed:
+    """How the loop ended. added: the candidate of each round that is still there at the end. tried: every suspect in the last round in
+    which it was asked and had something to say. mesh_off: of a frequency, what the mesh is off by where that is why the verdict stands."""
+
+    before: Hypothesis
+    after: Hypothesis
+    added: tuple[Candidate, ...]
+    tried: tuple[Candidate, ...]
+    verdict: str
+    before_db: float
+    after_db: float
+    floor_db: float
+    mesh_off: float = 0.0
+
+
+def closed(
+    base: Hypothesis,
+    bodies: tuple[Struck, ...],
+    takes: Sequence[Judged],
+    effects: Sequence[type[Effect]],
+    band_hz: tuple[float, float],
+    *,
+    seed: int = 0,
+    progress: Callable[[str], None] | None = None,
+) -> Closed:
+    """Run it on fitted strikes alone."""
+    say = progress or (lambda _: None)
+    start = refitted(base, bodies)
+    before = mean_db(takes, start) or 0.0
+    one = _one_by_one(start, bodies, takes, effects, band_hz, seed=seed, say=say)
+    h, added, last = one.h, one.added, dict(one.last)
+    now, floor = mean_db(takes, h) or 0.0, one.floor
+    verdict, off = _verdict(h, added, before, now, floor, bodies, takes, seed), 0.0
+    if verdict == "unexplained":
+        verdict, off = _by_a_finer_mesh(start, h, added, before, bodies, takes, seed)
+    if verdict == "unexplained" and not one.in_twos and (two := in_twos(start, one.first, bodies, takes, band_hz, seed=seed, say=say)):
+        h, added = two
+        last |= {c.id: c for c in added}
+        now, floor = mean_db(takes, h) or 0.0, least_db(takes, h) or floor
+        verdict, off = _verdict(h, added, before, now, floor, bodies, takes, seed), 0.0
+    if verdict != "explained":
+        h, now, added = start, before, []
+    return Closed(start, h, tuple(added), tuple(last.values()), verdict, before, now, floor, off)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rounds:
+    """Where round after round came to. first, last: all suspects of the first round, and each as it was when asked last. in_twos: whether twos were tried."""
+
+    h: Hypothesis
+    added: list[Candidate]
+    first: list[Candidate]
+    last: dict[str, Candidate]
+    floor: float
+    in_twos: bool
+
+
+def _one_by_one(
+    start: Hypothesis,
+    bodies: tuple[Struck, ...],
+    takes: Sequence[Judged],
+    effects: Sequence[type[Effect]],
+    band_hz: tuple[float, float],
+    *,
+    seed: int,
+    say: Callable[[str], None],
+) -> Rounds:
+    """The best of every round added, until nothing earns its keep; then fitted to each other."""
+    h = start
+    before = now = mean_db(takes, h) or 0.0
+    floor = least_db(takes, h) or 0.0
+    added: list[Candidate] = []
+    passed: list[tuple[Candidate, ...]] = []
+    first: list[Candidate] = []
+    last: dict[str, Candidate] = {}
+    weak = False
+    for turn in range(ROUNDS):
+        say(f"round {turn + 1}: {now:.2f} dB from the recordings, noise alone {floor:.2f} dB")
+        if now - floor < (LEAST_DB if added else FAINT_DB):
+            break  # so little is what a mesh gets wrong
+        evidence = evidence_of(h, bodies, band_hz, seed=seed)
+        full = retold(h, bodies)  # a room's response is the lines' so far, which leaves open more than there is
+        told = now if full is h else mean_db(takes, full) or 0.0
+        costly = told - floor > OPEN * (before - floor)
+        found = trials(h, bodies, takes, evidence, effects, seed=seed + turn, say=say, costly=costly)
+        last |= {c.id: c for c in found}
+        two, able = None, _able(found, bodies, takes, now, told, floor, first=not added)
+        if not added:
+            first, weak = found, all((mean_db(takes, c.hypothesis) or 0.0) - floor > WEAK * max(now - floor, 0.0) for c in found)
+            two = in_twos(start, found, bodies, takes, band_hz, seed=seed, say=say) if weak else None
+        two = two or _anew(h, able, found, bodies, takes, band_hz, seed, say)
+        if not (two or able) and costly and (late := _waited(found, evidence, effects)):
+            found = trials(h, bodies, takes, evidence, late, seed=seed + turn, say=say, costly=costly)
+            last |= {c.id: c for c in found}
+            able = _able(found, bodies, takes, now, told, floor, first=not added)
+            two = _anew(h, able, found, bodies, takes, band_hz, seed, say)
+        if two:
+            (h, added), passed = two, [(), ()]
+            last |= {c.id: c for c in added}
+            now, floor = mean_db(takes, h) or 0.0, least_db(takes, h) or floor
+            continue
+        if not able:
+            break
+        best = simplest(able, bodies, evidence)
+        h, added, passed = best.hypothesis, [*added, best], [*passed, rivals(able, best)]
+        if hasattr(best.effect, "told_by") and (mean_db(takes, h) or 0.0) > now:
+            h = retold(h, bodies)  # a room's response by lines so far off that it sounds worse than none
+        if len(added) > 1 and any(hasattr(e, "others") for e in h.effects):
+            h = chosen(h, bodies, takes, band_hz)  # or a third name is found for what only the other choice would say
+        now = mean_db(takes, h) or 0.0
+        floor = least_db(takes, h) or floor
+    if len(added) > 1:
+        h, added = exchanged(h, added, passed, bodies, takes, band_hz, say)
+        h, added = pruned(h, added, bodies, takes, before - floor)
+        now = mean_db(takes, h) or 0.0
+    again = retold(h, bodies, fully=True)
+    return Rounds(again if again is not h and (mean_db(takes, again) or 0.0) < now else h, added, first, last, floor, weak)
+
+
+def _able(
+    found: Sequence[Candidate], bodies: tuple[Struck, ...], takes: Sequence[Judged], now: float, told: float, floor: float, *, first: bool
+) -> list[Candidate]:
+    """Those that strikes left out speak for; or, where they speak for none, the one that lines do."""
+    able = [c for c in found if earns(c, max(now - floor, 0.0), first=first) and helps(c, bodies, takes, now, told, floor, first=first)]
+    return able or sorted((c for c in found if by_lines(c, bodies, takes, told, floor)), key=lambda c: -c.lines)[:1]
+
+
+def _anew(
+    h: Hypothesis,
+    able: Sequence[Candidate],
+    found: Sequence[Candidate],
+    bodies: tuple[Struck, ...],
+    takes: Sequence[Judged],
+    band_hz: tuple[float, float],
+    seed: int,
+    say: Callable[[str], None],
+) -> tuple[Hypothesis, list[Candidate]] | None:
+    """A room that stands alone heard anew beside what moves modes (twos.py), unless something else is able to."""
+    return in_a_room(h, found, bodies, takes, band_hz, seed=seed, say=say) if all(moves_itself(h, c.effect) for c in able) and len(h.effects) == 1 else None
+
+
+def _waited(found: Sequence[Candidate], evidence: Evidence, effects: Sequence[type[Effect]]) -> list[type[Effect]]:
+    """The suspects that had to wait in a room for a tensor (trial.py), if that came to nothing."""
+    tensor = any(c.effect.stage is Stage.MATERIAL for c in found) and any(one.dry for one in evidence.heard)
+    return [k for k in effects if k.id in TURNS and tensor and k.id not in {c.id for c in found}]
+
+
+def _verdict(
+    h: Hypothesis, added: Sequence[Candidate], before: float, now: float, floor: float, bodies: tuple[Struck, ...], takes: Sequence[Judged], seed: int
+) -> str:
+    """What is known: a name for less than EXPLAINED of what is seen would be a guess, unless what is left is what a mesh gets wrong."""
+    gap, left = before - floor, now - floor
+    if not added:
+        excused = gap < SUFFICES_DB or (gap < of_the_mesh(h, bodies, takes, seed) and of_no_body(h, takes) < NO_BODY)
+        return "none" if excused else "unexplained"
+    room = any(hasattr(e, "told_by") for e in h.effects)  # whose response takes up what a mesh gets wrong, too: that is no excuse
+    enough = left <= max((1 - (BY_A_ROOM if room else EXPLAINED)) * gap, SUFFICES_DB) or (not room and left <= of_the_mesh(h, bodies, takes, seed))
+    return "explained" if enough else "unexplained"
+
+
+def _by_a_finer_mesh(
+    start: Hypothesis, h: Hypothesis, added: Sequence[Candidate], before: float, bodies: tuple[Struck, ...], takes: Sequence[Judged], seed: int
+) -> tuple[str, float]:
+    """What would be known with upper modes where their lines are, and how far off the mesh has them; unexplained and 0 where that helps nobody."""
+    verdict, (far, off) = "unexplained", beyond(start, bodies, takes)
+    if not off:
+        return verdict, 0.0
+    ideal, floor = min(mean_db(takes, far) or 0.0, before), least_db(takes, far) or 0.0
+    if ideal - floor < SUFFICES_DB and of_no_body(start, takes) < NO_BODY:
+        verdict = "none"
+    elif added:
+        both, _ = beyond(h, bodies, takes)
+        verdict = _verdict(both, added, ideal, mean_db(takes, both) or 0.0, floor, bodies, takes, seed)
+    return verdict, off if verdict != "unexplained" else 0.0
+
+
+def described(candidates: Sequence[Candidate]) -> list[dict[str, Any]]:
+    """For JSON."""
+    return [{"id": c.id, "cv_error_drop_db": c.mean_db, "null_drop_db": c.null_db, "parameters": c.effect.parameters()} for c in candidates]

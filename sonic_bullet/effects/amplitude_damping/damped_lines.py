@@ -1,0 +1,159 @@
+"""Lines whose decay goes with the level of the modes they stand for: d and what is left, for a given choke c; and the axes of twins.
+
+    ln |z_s(t)| = const_s + ln |Σ_m A_sm e/(1 + x_sm (1 − e^p))^{1/p}|,   e = e^{−dt},  x_sm = (c a_sm)^p            [effects.amplitude_damping]
+    d by Gauss and Newton; const_s of each strike alone, so no gain is needed; how far these differ from strike to strike tells angles alone
+
+Two twins are one line, and each is choked by its own level: how loud each is depends on where the pair's axes lie, which in a linear body nobody
+hears, and which a mesh leaves to chance (axes.py). ψ is tried all round, line by line.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sonic_bullet.effects.common.axes import ANGLES, about, twins
+from sonic_bullet.effects.common.envelope import Envelopes
+from sonic_bullet.effects.protocol import Heard
+from sonic_bullet.records import Array
+
+ROUGH = 5e-3  # of ln |z|: what neighbours and windows do to a frame
+FEWEST = 8  # clear frames of a strike
+THIN = 3  # one frame of so many will do where angles are tried
+STEPS = 4  # of Gauss and Newton
+RANGE = (0.2, 1.6)  # of the heard decay
+TURNS = 0.1  # of a line's ln variance, that its twins' axes must be worth
+LEVEL, MOST, EARLY = 0.1, 2.0, 0.5  # of ln |z|: shapes' own error; more off is no worse; nepers of a line's decay
+FAINT = 1e-3  # of Σ|A|: twins may cancel, not vanish
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Line:
+    """A line's frames: time_s (t,), logarithm (s, t) and weight (s, t) of |z|; amplitude and level (p, s, j) of its j modes under p angles of their axes.
+
+    freq_hz: the modes' middle in the model; decay_per_s: as heard. number: which of the heard. power: p.
+    """
+
+    number: int
+    freq_hz: float
+    decay_per_s: float
+    time_s: Array
+    log: Array
+    weight: Array
+    amplitude: Array
+    level: Array
+    power: float = 1.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Told:
+    """Of a line under a choke: ln of the variance (p,) it leaves within strikes, ln of that between them, and its decay (p,) under every angle."""
+
+    spread: Array
+    between: Array
+    decay_per_s: Array
+
+    @property
+    def best(self) -> int:
+        """The angle that all strikes tell, those as well in which nobody hears the line."""
+        return int((self.spread + self.between).argmin())
+
+    @property
+    def least(self) -> float:
+        """What the best angle leaves within strikes."""
+        return float(self.spread[self.best])
+
+    @property
+    def turned(self) -> bool:
+        """Whether the mesh's own axes are surely not the best."""
+        whole = self.spread + self.between
+        return bool(self.best and whole[0] - whole[self.best] > TURNS)
+
+
+def lines_under(e: Envelopes, h: Heard, measure: str) -> list[Line]:
+    """The lines that say something, their levels by a measure."""
+    found = []
+    for q, k in enumerate(e.line.tolist()):
+        good = e.good[:, q] & (e.good[:, q].sum(axis=1) >= FEWEST)[:, None]
+        if not good.any():
+            continue
+        pair = twins(h, k)
+        amplitude, level = about(h, k, measure, ANGLES if pair else np.zeros(1))
+        thin = slice(None, None, THIN if pair else 1)
+        size = np.maximum(np.abs(e.z[:, q]), 1e-300)
+        weight = np.where(good, 1 / (ROUGH**2 + (e.noise[:, q, None] / size) ** 2), 0.0)[:, thin]
+        freq = float(h.model.freq_hz[h.mode[k]].mean()) if h.model is not None else float(h.freq_hz[k])
+        found.append(Line(k, freq, max(float(h.decay_per_s[k]), 1e-2), e.time_s[q, thin], np.log(size)[:, thin], weight, amplitude, level))
+    return found
+
+
+def told(line: Line, choke: float, start: Array | None = None) -> Told:
+    """What a line says of a choke. start (p,): decays to begin with."""
+    if choke == 0:  # no angle counts
+        line = under(line)
+    many = len(line.amplitude)
+    decay = np.full(many, line.decay_per_s) if start is None or len(start) != many else start
+    low, high = RANGE[0] * line.decay_per_s, RANGE[1] * line.decay_per_s
+    for _ in range(STEPS):
+        left, slope = _left(line, choke, decay)
+        step = (line.weight * left * slope).sum(axis=(1, 2)) / np.maximum((line.weight * slope**2).sum(axis=(1, 2)), 1e-300)
+        decay = np.clip(decay - step, low, high)
+    left, _ = _left(line, choke, decay)
+    within = np.log((line.weight * left**2).sum(axis=(1, 2)) / line.weight.sum() + ROUGH**2)
+    return Told(within, _between(line, choke, decay) if many > 1 else np.zeros(many), decay)
+
+
+def _between(line: Line, choke: float, decay: Array) -> Array:
+    """ln of the variance (p,) of the levels that strikes are told over those that they are heard with; one in which the line is not heard may not be told louder."""
+    heard = line.weight.sum(axis=1) > 0
+    early = line.time_s < line.time_s[0] + EARLY / line.decay_per_s
+    weight = np.where(heard[:, None], line.weight, early.astype(float))
+    off = (weight / weight.sum(axis=1, keepdims=True) * (line.log - _model(line, choke, decay)[0])).sum(axis=2)  # (p, s)
+    off = off - np.median(off[:, heard], axis=1, keepdims=True)
+    off = np.clip(np.where(heard, off, np.minimum(off, 0.0)), -MOST, MOST)
+    return np.asarray(np.log((off**2).mean(axis=1) + LEVEL**2))
+
+
+def would(line: Line, choke: float, decay_per_s: float, angle: int) -> float:
+    """The variance that no choke would leave of a line that is just what a choke makes it: what the choke is of its misfit."""
+    one = under(line, angle)
+    model = _model(one, choke, np.array([decay_per_s]))[0][0]
+    plain = told(replace(one, log=model), 0.0)
+    return float(np.exp(plain.spread[0]))
+
+
+def onset(line: Line, choke: float, decay_per_s: float, angle: int) -> Array:
+    """|z| (s,) at the onset, as the whole envelope tells it; NaN for strikes that say nothing."""
+    one = under(line, angle)
+    model = _model(one, choke, np.array([decay_per_s]))[0][0]
+    total = line.weight.sum(axis=1)
+    mean = (line.weight * (line.log - model)).sum(axis=1) / np.where(total > 0, total, np.nan)
+    return np.asarray(np.exp(mean) * np.maximum(np.abs(one.amplitude[0].sum(axis=1)), FAINT * np.abs(one.amplitude[0]).sum(axis=1)))
+
+
+def under(line: Line, angle: int = 0) -> Line:
+    """The line under one angle alone."""
+    one = slice(angle, angle + 1)
+    return replace(line, amplitude=line.amplitude[one], level=line.level[one])
+
+
+def _model(line: Line, choke: float, decay: Array) -> tuple[Array, Array]:
+    """ln |z| (p, s, t) but for a constant, and its slope over the decay."""
+    fall = np.exp(-line.power * decay[:, None] * line.time_s)[:, None, None, :]  # (p, 1, 1, t)
+    x = (choke * line.level[..., None]) ** line.power  # (p, s, j, 1)
+    less = 1 + x * (1 - fall)
+    part = line.amplitude[..., None] * less ** (-1 / line.power)
+    total = part.sum(axis=2)
+    least = FAINT * np.abs(line.amplitude).sum(axis=2)[..., None]
+    total = np.where(np.abs(total) > least, total, np.where(total < 0, -1.0, 1.0) * np.maximum(least, 1e-300))
+    slope = -line.time_s * (part * (1 + x) / less).sum(axis=2) / total
+    return np.log(np.abs(total)) - decay[:, None, None] * line.time_s, slope
+
+
+def _left(line: Line, choke: float, decay: Array) -> tuple[Array, Array]:
+    """Model − heard (p, s, t) and its slope over the decay, without each strike's mean."""
+    model, slope = _model(line, choke, decay)
+    share = line.weight / np.maximum(line.weight.sum(axis=1, keepdims=True), 1e-300)
+    left = model - line.log
+    return left - (share * left).sum(axis=2, keepdims=True), slope - (share * slope).sum(axis=2, keepdims=True)

@@ -1,0 +1,242 @@
+"""What effects act on, what they are told, and what every effect is.
+
+    MATERIAL  Material   -> Material      stiffness, density: the host solves the modes again
+    MODES     ModalModel -> ModalModel    frequencies, decays, shapes
+    FORCE     Blow       -> Blow          when, how long, how often a strike presses
+    BANK      Ring       -> Ring          how a ringing mode depends on its own level
+    SOUND     Sound      -> Sound         what happens on the way to the file
+
+An effect is physics with few parameters. `propose` reads them off the evidence, or says None; it never scores itself: the diagnosis
+renders strikes that were not fitted, with and without it. An effect that hides the modes' own decays or levels from the lines either carries
+alpha_per_s and beta_s as it found them beside itself, and the host takes those over (friction), or has a method `dried`, Heard -> Heard: the same
+lines as they would be without it (a room), and the host tells everything else from those. One that has found modes louder at the onset than their lines are
+says so (louder, a factor); one under which the axes of twins are heard has a method `turned`, ModalModel -> ModalModel, for those.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from enum import Enum
+from typing import Any, ClassVar, Protocol, Self, runtime_checkable
+
+import numpy as np
+
+from sonic_bullet.records import Array, Material, ModalModel
+
+
+class Stage(Enum):
+    """Where an effect acts, in the order in which sound is made."""
+
+    MATERIAL = "material"
+    MODES = "modes"
+    FORCE = "force"
+    BANK = "bank"
+    SOUND = "sound"
+
+
+class Owner(Enum):
+    """Whose an effect is. What belongs to material and object goes into a preset; to material, room and chain, to other objects too."""
+
+    MATERIAL = "material"
+    OBJECT = "object"
+    FIXTURE = "fixture"
+    STRIKER = "striker"
+    ROOM = "room"
+    CHAIN = "chain"
+
+
+CARRIES = frozenset({Owner.MATERIAL, Owner.STRIKER, Owner.ROOM, Owner.CHAIN})  # over to another object of the material
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Blow:
+    """A strike of impulse_n_s: h hits after delay_s (h,), each with share (h,) of it, each a pulse of the duration tau_s, 0 for none. pulse: see `pulses`."""
+
+    impulse_n_s: float
+    delay_s: Array
+    share: Array
+    tau_s: float = 0.0
+    pulse: str = "impulse"
+
+    def spectrum(self, freq_hz: Array) -> Array:
+        """Complex share (f,) of the impulse that a mode at freq_hz takes from one hit, the hit beginning at 0."""
+        from sonic_bullet.effects.common.pulses import spectrum
+
+        return spectrum(self.pulse, self.tau_s, freq_hz)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Ring:
+    """m modes as one strike starts them: freq_hz, decay_per_s (m,), amplitude (m,) complex at the sensor; level (m,): peak velocity at the surface in m/s.
+
+    bend, choke (m,): relative change of frequency bend·level², of decay (choke·level)^choke_power, 1 or 2; 0 in a linear body.
+    """
+
+    freq_hz: Array
+    decay_per_s: Array
+    amplitude: Array
+    level: Array
+    bend: Array
+    choke: Array
+    impulse_n_s: float = 1.0
+    choke_power: float = 1.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sound:
+    """A strike's sound (n,) in units of the file, from the onset on, and what made it. impulse_n_s: 1 where unknown. direct (n,): the first sound, untouched."""
+
+    sample: Array
+    sr: int
+    impulse_n_s: float
+    strike: int = -1  # of the fitted ones, where an effect was fitted to each of them; -1 else
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Elastic:
+    """A body under any orthotropic elasticity, its axes the mesh's. material: isotropic, as the baseline has it, with the guessed density.
+    phased: whether the signs of lines' amplitudes can be held against J ψ.
+
+    look: C/ρ (6, 6) in m²/s² -> undamped freq_hz (m,); of modes (k,), ∂ ln λ/∂(C_i/ρ) (9, k) of the constants C11 C22 C33 C23 C13 C12 C44 C55 C66; and J ψ (s, m)
+    up to a factor, NaN for strikes of unknown place. solve: the same tensor -> undamped ModalModel, strikes and sensor as last vertices.
+    """
+
+    material: Material
+    phased: bool
+    look: Callable[[Array], tuple[Array, Callable[[Array], Array], Array]]
+    solve: Callable[[Array], ModalModel]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Poisson:
+    """A body at any ratio ν of Poisson's, its E/ρ the baseline's. fitted: the baseline's ν; guess, sd: what was known of it before.
+
+    at: ν -> undamped freq_hz (m,), and the modes there as sums (m, m) of the baseline's own, a column a mode.
+    """
+
+    fitted: float
+    guess: float
+    sd: float
+    at: Callable[[float], tuple[Array, Array]]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Heard:
+    """One object's strikes: k lines that are modes, beside what the model so far expects, and what it leaves. source: what they were gathered from, the host's own.
+
+    freq_hz, decay_per_s and their spreads (k,); amplitude (s, k) complex at the onset and its spread. mode: the modes of `model` each line stands for.
+    model_hz (k,): the mesh's own, without corrections; expected_decay_per_s (k,), expected (s, k): of the model with the effects found so far.
+    pattern (s, k): J ψ, real. foreign_*: lines that are no mode, amplitudes (s, f). model: the body with its strikes and sensor as last vertices,
+    strike_vertex (s,), strike_way (s, 3), sensor_vertex, sensor_way (3,). signal, predicted (s, n) from the onset on, None for lists of features.
+    noise (s,): rms. signed: phases are true. poisson: of `plain`, where nothing has moved its modes yet.
+    """
+
+    impulse_n_s: Array
+    freq_hz: Array
+    decay_per_s: Array
+    freq_sd_hz: Array
+    decay_sd_per_s: Array
+    amplitude: Array
+    amplitude_sd: Array
+    mode: tuple[Array, ...]
+    model_hz: Array
+    expected_decay_per_s: Array
+    expected: Array
+    pattern: Array
+    foreign_hz: Array
+    foreign_decay_per_s: Array
+    foreign_amplitude: Array
+    foreign_sd: Array
+    model: ModalModel | None
+    strike_vertex: Array
+    strike_way: Array
+    sensor_vertex: int
+    sensor_way: Array
+    signal: Array | None
+    predicted: Array | None
+    noise: Array
+    sr: int
+    signed: bool
+    push: Array  # (s, m) complex: every mode's amplitude at the sensor under the model so far, its pulse included
+    pressed: Array  # (s, m) share of the strike's impulse that each mode takes, under the pulse so far
+    all_hz: Array  # (m,) their frequencies
+    plain: ModalModel | None  # `model` with the mesh's own frequencies
+    strike: tuple[int, ...] = ()
+    source: Any = None
+    elastic: Elastic | None = None
+    poisson: Poisson | None = None
+    own: Array | None = None  # (s, n) signal without what the model so far knows to ring beside the body, where there is such
+    dry: bool = False  # whether lines are told as they would be without the room they were recorded in
+
+    @property
+    def residual(self) -> Array:
+        """signal - predicted (s, n)."""
+        assert self.signal is not None and self.predicted is not None
+        return np.asarray(self.signal - self.predicted)
+
+    @property
+    def omega(self) -> Array:
+        """Undamped angular frequency (k,) of the lines."""
+        return np.asarray(np.hypot(2 * np.pi * self.freq_hz, np.nan_to_num(self.decay_per_s)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Evidence:
+    """All that an effect is told: the objects' strikes, the material's α and β and the case's gain so far, effects found so far by id, band and seed.
+
+    known: what the effect said of the whole evidence, or beside other effects: it is there to be fitted again, not to be looked for.
+    on_trial: whether this is the evidence without a strike, known's numbers to be told again; axes of twins, which a linear body has no part of, stand as known has them.
+    """
+
+    heard: tuple[Heard, ...]
+    alpha_per_s: float
+    beta_s: float
+    gain: float
+    found: tuple[str, ...]
+    band_hz: tuple[float, float]
+    seed: int = 0
+    known: Effect | None = None
+    on_trial: bool = False
+
+
+@runtime_checkable
+class Effect(Protocol):
+    """One physical effect: a frozen dataclass of its parameters. Every member also has a docstring that gives its equation.
+
+    A class that says ``costly = True`` is asked last, and only where cheaper suspects leave much open, one that says ``searches = True`` by itself: it works side by
+    side. One that says ``by_line = True`` has numbers of single lines, which no other line tells, or may be heard of one: on trial it is told all lines, of the other
+    strikes. One that says ``certain = True`` is proposed where lines agree on it, each by its own baseband, and nowhere else, and goes with level: a smaller drop will
+    do on strikes left out, of which a loud one gains most.
+    """
+
+    id: ClassVar[str]
+    stage: ClassVar[Stage]
+    owner: ClassVar[Owner]
+    reference: ClassVar[str]
+
+    def apply(self, x: Any) -> Any:
+        """The stage's value with the effect in it; x is left as it is."""
+        ...
+
+    @classmethod
+    def propose(cls, evidence: Evidence) -> Self | None:
+        """The effect with the parameters that the evidence suggests, or None where it suggests none."""
+        ...
+
+    def parameters(self) -> dict[str, Any]:
+        """Numbers, by name with unit, that say what it is: what a report and a preset hold."""
+        ...
+
+    def freedom(self) -> int:
+        """How many numbers were free when it was proposed."""
+        ...
+
+
+def ascending(x: ModalModel, freq_hz: Array, decay_per_s: Array, shape: Array | None = None) -> ModalModel:
+    """The model with other frequencies, decays (m,) and shapes (v, 3, m), its own where None, in ascending order."""
+    order = np.argsort(freq_hz, kind="stable")
+    shape = x.shape if shape is None else shape
+    if (np.diff(order) < 0).any():
+        shape = shape[:, :, order]
+    return replace(x, freq_hz=freq_hz[order], decay_per_s=decay_per_s[order], shape=shape)

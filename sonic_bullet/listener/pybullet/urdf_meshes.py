@@ -1,0 +1,95 @@
+"""The mesh file behind a collision shape, in its own frame and unit. OBJ is read here, the way Bullet cuts it into objects."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from sonic_bullet.geometry import closest_point, welded
+from sonic_bullet.records import Array
+from sonic_bullet.records.errors import MeshError
+
+Surface = tuple[Array, Array]
+LID_GRID = 5
+
+
+def read_surfaces(path: Path) -> list[Surface]:
+    """Objects of a mesh file: (vertices (v, 3), faces (f, 3)) each, identical vertices made one. Raises MeshError."""
+    try:
+        surfaces = _read_obj(path) if path.suffix.lower() == ".obj" else _read_other(path)
+    except MeshError:
+        raise
+    except Exception as error:  # a parser meets anything in a foreign file, and throws anything
+        raise MeshError(f"mesh file '{path.name}' cannot be read: {type(error).__name__} {error}"[:300], "repair it, or convert it to OBJ or STL") from error
+    whole = [welded(vertex, face) for vertex, face in surfaces if len(face)]
+    whole = [(vertex, face) for vertex, face in whole if len(face) and np.isfinite(vertex).all()]
+    if not whole:
+        raise MeshError(f"mesh file '{path.name}' holds no triangle", "export it again")
+    return whole
+
+
+def _read_obj(path: Path) -> list[Surface]:
+    """Wavefront OBJ: v, f, and o or g as the start of an object; polygons become fans, texture and normals are skipped."""
+    vertex: list[tuple[float, float, float]] = []
+    objects: list[list[tuple[int, int, int]]] = [[]]
+    with path.open(encoding="utf-8", errors="replace") as file:
+        for line in file:
+            words = line.split()
+            if not words:
+                continue
+            if words[0] == "v":
+                vertex.append((float(words[1]), float(words[2]), float(words[3])))
+            elif words[0] == "f":
+                corner = [int(word.split("/", 1)[0]) for word in words[1:]]
+                corner = [c - 1 if c > 0 else len(vertex) + c for c in corner]
+                objects[-1].extend((corner[0], corner[i], corner[i + 1]) for i in range(1, len(corner) - 1))
+            elif words[0] in ("o", "g") and objects[-1]:
+                objects.append([])
+    points = np.array(vertex, float).reshape(-1, 3)
+    return [(points[np.unique(faces)], np.searchsorted(np.unique(faces), faces)) for faces in map(np.array, objects) if len(faces)]
+
+
+def _read_other(path: Path) -> list[Surface]:
+    import trimesh
+
+    scene = trimesh.load_scene(path, process=False, skip_materials=True)
+    return [(np.asarray(part.vertices, float), np.asarray(part.faces)) for part in scene.dump() if isinstance(part, trimesh.Trimesh)]
+
+
+def joined(surfaces: list[Surface]) -> Surface:
+    """All surfaces as one: (v, 3), (f, 3)."""
+    offset = np.cumsum([0] + [len(vertex) for vertex, _ in surfaces])
+    return np.concatenate([v for v, _ in surfaces]), np.concatenate([f + o for (_, f), o in zip(surfaces, offset, strict=False)])
+
+
+def hull(vertex_m: Array) -> Surface:
+    """Convex hull of points (v, 3), faces outward. Raises MeshError where they lie in a plane."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    try:
+        shell = ConvexHull(vertex_m)
+    except (QhullError, ValueError) as error:
+        raise MeshError("a collision mesh is flat or empty", "give it thickness, or pass mesh=") from error
+    face = shell.simplices.copy()
+    a, b, c = (vertex_m[face[:, k]] for k in range(3))
+    inward = (np.cross(b - a, c - a) * shell.equations[:, :3]).sum(axis=1) < 0
+    face[inward] = face[inward][:, ::-1]
+    used = np.unique(face)
+    return vertex_m[used], np.searchsorted(used, face)
+
+
+def lid_height_m(vertex_m: Array, face: Array) -> float:
+    """How far the convex hull's surface stands at most from the true one: the depth below the lid over a bowl, 0 for a convex body.
+
+    Looked at on a grid of LID_GRID points a side on each of the hull's triangles.
+    """
+    try:
+        shell_m, shell = hull(vertex_m)
+    except MeshError:
+        return 0.0
+    i, j = (part.ravel() for part in np.meshgrid(np.arange(LID_GRID), np.arange(LID_GRID)))
+    inside = i + j < LID_GRID
+    share = np.stack([i, j, LID_GRID - 1 - i - j], axis=1)[inside] / (LID_GRID - 1)
+    point = np.unique(np.einsum("gc,fcx->fgx", share, shell_m[shell]).reshape(-1, 3), axis=0)
+    return float(closest_point(vertex_m, face, point)[2].max())

@@ -1,0 +1,39 @@
+"""What records are built of: read-only arrays of a stated shape, and conditions that name what is wrong."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sonic_bullet.records.errors import RecordError
+
+Array = NDArray[Any]
+
+
+def frozen_array(value: object, dtype: Any, shape: tuple[int | None, ...], name: str, *, finite: bool = True) -> Array:
+    """Read-only C-contiguous copy of ``value`` with ``dtype`` and ``shape`` (None: any length); the same array where it is one already.
+
+    Raises RecordError where the shape differs or, with ``finite``, a number is NaN or infinite.
+    """
+    kept = isinstance(value, np.ndarray) and not value.flags.writeable and value.base is None  # a record's own: read-only and nobody's view
+    array = np.asarray(value, dtype=dtype, order="C") if kept else np.array(value, dtype=dtype, order="C")
+    if array.ndim != len(shape) or any(want is not None and have != want for have, want in zip(array.shape, shape, strict=True)):
+        raise RecordError(f"{name} has shape {array.shape}, wanted {shape}", "pass an array of that shape")
+    if finite and array.dtype.kind in "fc" and not np.isfinite(array).all():
+        raise RecordError(f"{name} holds NaN or infinite numbers", "look for the step or file that produced them")
+    array.setflags(write=False)
+    return array
+
+
+def store(record: object, **values: object) -> None:
+    """Set fields of a frozen record that is being built."""
+    for name, value in values.items():
+        object.__setattr__(record, name, value)
+
+
+def require(condition: bool, what: str, remedy: str) -> None:
+    """Raise RecordError unless the condition holds."""
+    if not condition:
+        raise RecordError(what, remedy)
