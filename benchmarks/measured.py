@@ -17,7 +17,7 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from benchmarks.measured_sets.heard import READINGS, reading
+from benchmarks.measured_sets.observed import READINGS, reading
 from benchmarks.measured_sets.page import Page, written
 from benchmarks.measured_sets.table import JUDGES, PLAIN
 from benchmarks.measured_sets.values import Judge, Row

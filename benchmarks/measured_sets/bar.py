@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.measured_sets.heard import cut, lines
 from benchmarks.measured_sets.laws import draw, trial
+from benchmarks.measured_sets.observed import cut, lines
 from benchmarks.measured_sets.values import DRAWS, Array, Lines, Outcome, Row, clear
 from sonic_bullet.modal.meshing.mesh_files import read_mesh
 from sonic_bullet.modal.reduced import Family, family

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.measured_sets.heard import cut, features, jittered, lines
+from benchmarks.measured_sets.observed import cut, features, jittered, lines
 from benchmarks.measured_sets.values import DRAWS, Array, Lines, Outcome, Row, clear
 from sonic_bullet.effects.common.pulses import magnitude
 from sonic_bullet.effects.contact_time import ContactTime

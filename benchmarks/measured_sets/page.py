@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from benchmarks.measured_sets.heard import JITTER, READINGS
+from benchmarks.measured_sets.observed import JITTER, READINGS
 from benchmarks.measured_sets.values import CHANCE, DRAWS, EARNS, Outcome, Row
 
 HEAD = f"""# Measured data: fitted on one part, judged on another

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.measured_sets.heard import lines
+from benchmarks.measured_sets.observed import lines
 from benchmarks.measured_sets.values import DRAWS, Array, Lines, Outcome, Row, clear
 from sonic_bullet.effects.common.pulses import magnitude
 from sonic_bullet.effects.contact_time import ContactTime

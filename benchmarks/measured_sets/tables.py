@@ -103,9 +103,9 @@ def _plate(modes: list[dict[str, Any]]) -> Lines:
     return told(f, 2 * np.pi * f * zeta, 0.1 * 2 * np.pi * f * zeta)
 
 
-def clamp(heard: Array, rigid: Array) -> Row:
+def clamp(observed: Array, rigid: Array) -> Row:
     """Odd modes fitted, even ones predicted: all lowered by one factor."""
-    y, fit = np.log(heard / rigid), np.arange(len(heard)) % 2 == 0
+    y, fit = np.log(observed / rigid), np.arange(len(observed)) % 2 == 0
     factor, held = float(np.median(y[fit])), y[~fit]
     rng = np.random.default_rng(0)
     nulls = np.array([np.median(np.abs(100 * (held - f))) for f in rng.choice([-1, 1], DRAWS) * abs(factor)])

@@ -78,13 +78,13 @@ def as_case(source: str, one: dict[str, Any]) -> Case:
 
 def _unit(name: str, one: dict[str, Any]) -> Point | None:
     """An option's direction, of length 1. Raises FileError."""
-    way: Point | None = one[name]
-    if way is None:
+    direction: Point | None = one[name]
+    if direction is None:
         return None
-    length = float(np.linalg.norm(way))
+    length = float(np.linalg.norm(direction))
     if not length > 0:
         raise FileError(f"--{name.replace('_', '-')} is zero", "give a direction")
-    return (way[0] / length, way[1] / length, way[2] / length)
+    return (direction[0] / length, direction[1] / length, direction[2] / length)
 
 
 def described(found: Any) -> dict[str, Any]:

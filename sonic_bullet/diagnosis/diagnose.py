@@ -75,8 +75,8 @@ def diagnose(
     if not isinstance(case, Case):
         case = read_case(case)
     say = progress or (lambda _: None)
-    gathered = gather(case, cache=cache, progress=progress, clipped=True)
-    start = baseline(case, gathered, cache=cache, progress=progress)
+    recorded = gather(case, cache=cache, progress=progress, clipped=True)
+    start = baseline(case, recorded, cache=cache, progress=progress)
     found, bodies, takes = start.found, start.bodies, start.takes
     end = closed(start.hypothesis, bodies, takes or listed(bodies), effects, case.band_hz, seed=seed, progress=progress)
     say("comparing with what was not fitted")
@@ -132,7 +132,7 @@ def onset_of(case: Case, bodies: tuple[Struck, ...], sr: int) -> int:
     if case.onset_s is not None:
         return round(case.onset_s * sr)
     files = [
-        (r.file, r.channel) for body in bodies if body.gathered is not None and body.gathered.signals is not None for r in body.gathered.recordings if r.file
+        (r.file, r.channel) for body in bodies if body.recorded is not None and body.recorded.signals is not None for r in body.recorded.recordings if r.file
     ]
     late = [onset_sample(read_audio(file)[0][channel], sr) for file, channel in files]
     return int(np.median(late)) if late else 0
@@ -146,7 +146,7 @@ def length_of(recording: CaseRecording) -> tuple[int, int]:
 
 def predictions(d: Diagnosis) -> list[tuple[str, int, Array, Array]]:
     """(stem, sr, before (n,), after (n,)) of every strike that has a place, of every split: as long as the fitted recordings, in their units."""
-    known = [r for b in d.bodies if b.gathered is not None for r in b.gathered.recordings if r.file is not None]
+    known = [r for b in d.bodies if b.recorded is not None for r in b.recorded.recordings if r.file is not None]
     if not known:
         return []
     n, sr = length_of(known[0])
@@ -191,7 +191,7 @@ def described(d: Diagnosis) -> dict[str, Any]:
             "gamma_m2_s2": d.found.fit.gamma_m2_s2,
             "poisson_ratio": d.found.fit.poisson_ratio,
             "gain": d.closed.before.gain,
-            "correction_rms": {b.name: float(np.sqrt((b.correction**2).mean())) if len(b.correction) else 0.0 for b in d.bodies if b.gathered is not None},
+            "correction_rms": {b.name: float(np.sqrt((b.correction**2).mean())) if len(b.correction) else 0.0 for b in d.bodies if b.recorded is not None},
         },
         "after": {"alpha_per_s": d.closed.after.alpha_per_s, "beta_s": d.closed.after.beta_s, "gain": d.closed.after.gain},
         "warnings": list(d.warnings),

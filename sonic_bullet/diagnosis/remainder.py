@@ -66,8 +66,8 @@ def remainder(end: Closed, takes: tuple[Take, ...]) -> dict[str, Any]:
 
 def _again(takes: tuple[Take, ...]) -> float | None:
     """The ratio of frequencies at which a body's lines are heard again, if they are."""
-    gathered = [g for body in {id(t.body): t.body for t in takes}.values() if (g := body.gathered) is not None]
-    return next((r for g in gathered if (r := copied(g.lines.freq_hz, g.lines.decay_per_s, g.lines.amplitude)) is not None), None)
+    recorded = [g for body in {id(t.body): t.body for t in takes}.values() if (g := body.recorded) is not None]
+    return next((r for g in recorded if (r := copied(g.lines.freq_hz, g.lines.decay_per_s, g.lines.amplitude)) is not None), None)
 
 
 def _shares(takes: tuple[Take, ...], h: Hypothesis) -> tuple[Array, Array, Array]:

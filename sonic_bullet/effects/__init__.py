@@ -9,7 +9,7 @@ from sonic_bullet.effects.foreign_mode import ForeignMode
 from sonic_bullet.effects.measurement_chain import MeasurementChain
 from sonic_bullet.effects.mode_splitting import ModeSplitting
 from sonic_bullet.effects.orthotropy import Orthotropy
-from sonic_bullet.effects.protocol import Blow, Effect, Evidence, Heard, Owner, Ring, Sound, Stage
+from sonic_bullet.effects.protocol import Effect, Evidence, Impact, ObjectEvidence, Owner, Ring, Sound, Stage
 from sonic_bullet.effects.radiation import Radiation
 from sonic_bullet.effects.rebound import Rebound
 from sonic_bullet.effects.room import Room
@@ -31,4 +31,4 @@ EFFECTS: tuple[type[Effect], ...] = (
     MeasurementChain,
 )
 
-__all__ = ["EFFECTS", "Blow", "Effect", "Evidence", "Heard", "Owner", "Ring", "Sound", "Stage"]
+__all__ = ["EFFECTS", "Effect", "Evidence", "Impact", "ObjectEvidence", "Owner", "Ring", "Sound", "Stage"]

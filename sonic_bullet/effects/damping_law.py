@@ -75,11 +75,11 @@ class DampingLaw:
 
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
-        omega = np.concatenate([h.omega for h in evidence.heard])
-        decay = np.concatenate([h.decay_per_s for h in evidence.heard])
-        spread = np.concatenate([h.decay_sd_per_s for h in evidence.heard])
+        omega = np.concatenate([h.omega for h in evidence.observed])
+        decay = np.concatenate([h.decay_per_s for h in evidence.observed])
+        spread = np.concatenate([h.decay_sd_per_s for h in evidence.observed])
         rayleigh = 0.5 * (evidence.alpha_per_s + evidence.beta_s * omega**2)
-        extra = np.clip(np.concatenate([h.expected_decay_per_s for h in evidence.heard]) - rayleigh, 0.0, MOST * decay)  # what effects found so far take
+        extra = np.clip(np.concatenate([h.expected_decay_per_s for h in evidence.observed]) - rayleigh, 0.0, MOST * decay)  # what effects found so far take
         decay, spread = decay - extra, np.hypot(spread, TAKEN * extra)
         good = np.isfinite(decay) & (decay > 0) & ~np.isposinf(spread)  # in a room some lines tell no decay
         if good.sum() < (FEWEST if evidence.known is None else AGAIN):

@@ -24,9 +24,13 @@ KEPT: tuple[type[Effect], ...] = (DampingLaw, ModeSplitting, AmplitudePitch, Amp
 """Effects that a preset may hold. A stiffness that depends on direction is the preset's own elasticity; radiation is the run time's own."""
 
 
+FILE_NAMES = {"damping_growth": "choke"}
+"""Fields whose name in a preset file is another: files written before keep their meaning."""
+
+
 def stored(effect: Effect) -> dict[str, Any]:
     """What a preset file holds of an effect: all but what it does not say (NaN)."""
-    values: dict[str, Any] = msgspec.to_builtins({f.name: getattr(effect, f.name) for f in fields(effect)})  # type: ignore[arg-type]
+    values: dict[str, Any] = msgspec.to_builtins({FILE_NAMES.get(f.name, f.name): getattr(effect, f.name) for f in fields(effect)})  # type: ignore[arg-type]
     return {"id": effect.id} | {name: value for name, value in values.items() if not (isinstance(value, float) and np.isnan(value))}
 
 
@@ -36,8 +40,9 @@ def effect_of(data: dict[str, Any]) -> Effect:
     kind = next((k for k in KEPT if k.id == name), None)
     if kind is None:
         raise RecordError(f"there is no effect '{name}' that a preset can hold", f"use one of {', '.join(k.id for k in KEPT)}")
+    field_of = {in_file: field for field, in_file in FILE_NAMES.items()}
     try:
-        made: Effect = msgspec.convert({k: v for k, v in data.items() if k != "id"}, kind)
+        made: Effect = msgspec.convert({field_of.get(k, k): v for k, v in data.items() if k != "id"}, kind)
     except msgspec.ValidationError as error:
         raise RecordError(f"effect '{name}': {error}", "mend that field") from error
     except RecordError as error:
@@ -73,7 +78,7 @@ def with_modes(model: ModalModel, material: Material) -> ModalModel:
     ring = Ring(model.freq_hz, model.decay_per_s, none, level, none, none)
     for effect in effects:
         ring = effect.apply(ring)
-    return replace(model, bend_s2_m2=ring.bend, choke_s_m=ring.choke, choke_power=ring.choke_power)
+    return replace(model, bend_s2_m2=ring.bend, damping_growth_s_m=ring.damping_growth, damping_growth_power=ring.damping_growth_power)
 
 
 def of_stage(material: Material, stage: Stage) -> Sequence[Effect]:

@@ -8,7 +8,7 @@
 
 An effect is physics with few parameters. `propose` reads them off the evidence, or says None; it never scores itself: the diagnosis
 renders strikes that were not fitted, with and without it. An effect that hides the modes' own decays or levels from the lines either carries
-alpha_per_s and beta_s as it found them beside itself, and the host takes those over (friction), or has a method `dried`, Heard -> Heard: the same
+alpha_per_s and beta_s as it found them beside itself, and the host takes those over (friction), or has a method `dereverberated`, Heard -> Heard: the same
 lines as they would be without it (a room), and the host tells everything else from those. One that has found modes louder at the onset than their lines are
 says so (louder, a factor); one under which the axes of twins are heard has a method `turned`, ModalModel -> ModalModel, for those.
 """
@@ -50,7 +50,7 @@ CARRIES = frozenset({Owner.MATERIAL, Owner.STRIKER, Owner.ROOM, Owner.CHAIN})  #
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Blow:
+class Impact:
     """A strike of impulse_n_s: h hits after delay_s (h,), each with share (h,) of it, each a pulse of the duration tau_s, 0 for none. pulse: see `pulses`."""
 
     impulse_n_s: float
@@ -70,7 +70,7 @@ class Blow:
 class Ring:
     """m modes as one strike starts them: freq_hz, decay_per_s (m,), amplitude (m,) complex at the sensor; level (m,): peak velocity at the surface in m/s.
 
-    bend, choke (m,): relative change of frequency bend·level², of decay (choke·level)^choke_power, 1 or 2; 0 in a linear body.
+    bend, damping_growth (m,): relative change of frequency bend·level², of decay (choke·level)^choke_power, 1 or 2; 0 in a linear body.
     """
 
     freq_hz: Array
@@ -78,9 +78,9 @@ class Ring:
     amplitude: Array
     level: Array
     bend: Array
-    choke: Array
+    damping_growth: Array
     impulse_n_s: float = 1.0
-    choke_power: float = 1.0
+    damping_growth_power: float = 1.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -122,7 +122,7 @@ class Poisson:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Heard:
+class ObjectEvidence:
     """One object's strikes: k lines that are modes, beside what the model so far expects, and what it leaves. source: what they were gathered from, the host's own.
 
     freq_hz, decay_per_s and their spreads (k,); amplitude (s, k) complex at the onset and its spread. mode: the modes of `model` each line stands for.
@@ -150,9 +150,9 @@ class Heard:
     foreign_sd: Array
     model: ModalModel | None
     strike_vertex: Array
-    strike_way: Array
+    strike_direction: Array
     sensor_vertex: int
-    sensor_way: Array
+    sensor_direction: Array
     signal: Array | None
     predicted: Array | None
     noise: Array
@@ -189,7 +189,7 @@ class Evidence:
     on_trial: whether this is the evidence without a strike, known's numbers to be told again; axes of twins, which a linear body has no part of, stand as known has them.
     """
 
-    heard: tuple[Heard, ...]
+    observed: tuple[ObjectEvidence, ...]
     alpha_per_s: float
     beta_s: float
     gain: float

@@ -46,8 +46,8 @@ MODEL_ARRAYS: dict[str, tuple[type, tuple[int | None, ...]]] = {
     "face": (np.int32, (None, 3)),
     "curvature_per_m": (float, (None,)),
 }
-BENT_ARRAYS = ("bend_s2_m2", "choke_s_m")
-"""Of models whose modes go with their level; others have none."""
+BENT_ARRAYS = {"bend_s2_m2": "bend_s2_m2", "choke_s_m": "damping_growth_s_m"}
+"""Array in the file -> field, of models whose modes go with their level; others have none."""
 RESIDUAL_ARRAYS: dict[str, tuple[int | None, ...]] = {
     **{f"{part}_{name}": (None,) for part in ("mode", "line") for name in ("freq_hz", "decay_per_s", "amplitude")},
     "freq_hz": (None,),
@@ -62,7 +62,7 @@ class _Model(msgspec.Struct, omit_defaults=True):
     mass_kg: float
     dropped: int
     note: str
-    choke_power: float = 1.0
+    damping_growth_power: float = msgspec.field(default=1.0, name="choke_power")
 
 
 class _Residual(msgspec.Struct):
@@ -227,7 +227,7 @@ def _pack_material(x: Material) -> _Material:
 
 
 def _pack_model(x: ModalModel) -> _Model:
-    return _Model(float(x.volume_m3), float(x.mass_kg), int(x.dropped), _text(x.note), float(x.choke_power))
+    return _Model(float(x.volume_m3), float(x.mass_kg), int(x.dropped), _text(x.note), float(x.damping_growth_power))
 
 
 def _pack_body(x: Body, material: int | None, model: int | None) -> _Body:
@@ -254,14 +254,16 @@ def _text(text: str) -> str:
 
 
 def _model_arrays(model: ModalModel, index: int) -> dict[str, Array]:
-    names = (*MODEL_ARRAYS, *(name for name in BENT_ARRAYS if getattr(model, name) is not None))
-    return {f"model{index}_{name}": getattr(model, name) for name in names}
+    bent = {name: field for name, field in BENT_ARRAYS.items() if getattr(model, field) is not None}
+    return {f"model{index}_{name}": getattr(model, field) for name, field in ({name: name for name in MODEL_ARRAYS} | bent).items()}
 
 
 def _unpack_model(header: _Model, arrays: Mapping[str, Array], index: int, path: object) -> ModalModel:
     parts = {name: take(arrays, f"model{index}_{name}", dtype, shape, path) for name, (dtype, shape) in MODEL_ARRAYS.items()}
-    parts |= {name: take(arrays, f"model{index}_{name}", float, (None,), path) for name in BENT_ARRAYS if f"model{index}_{name}" in arrays}
-    return ModalModel(**parts, volume_m3=header.volume_m3, mass_kg=header.mass_kg, dropped=header.dropped, note=header.note, choke_power=header.choke_power)
+    parts |= {field: take(arrays, f"model{index}_{name}", float, (None,), path) for name, field in BENT_ARRAYS.items() if f"model{index}_{name}" in arrays}
+    return ModalModel(
+        **parts, volume_m3=header.volume_m3, mass_kg=header.mass_kg, dropped=header.dropped, note=header.note, damping_growth_power=header.damping_growth_power
+    )
 
 
 def _unpack_residual(header: _Residual | None, arrays: Mapping[str, Array], index: int, path: object) -> Residual | None:

@@ -239,9 +239,9 @@ def _of_revolution(shape: Shape, length: float, limit: float, poisson: float, sa
         return None
     cells = int(np.clip(AROUND * parts[-1][0], 24, 96))
     point, face = revolved.skin(section, cells)
-    twins = [(part, twin) for part in parts for twin in ((False, True) if part[0] else (False,))]
-    lame, shear = (block_diag(*(part[k] for part, _ in twins)) for k in (1, 2))
-    moved = np.concatenate([revolved.shapes_at(section, part[3], part[0], twin, cells).astype(np.float32) for part, twin in twins], axis=2)
+    degenerate = [(part, second) for part in parts for second in ((False, True) if part[0] else (False,))]
+    lame, shear = (block_diag(*(part[k] for part, _ in degenerate)) for k in (1, 2))
+    moved = np.concatenate([revolved.shapes_at(section, part[3], part[0], second, cells).astype(np.float32) for part, second in degenerate], axis=2)
     moved = np.ascontiguousarray(np.einsum("yx,vxb->vyb", body.axes.astype(np.float32), moved))
     note = f"body of revolution, section of {n} nodes, up to {parts[-1][0]} waves around; nu {low:g} and {high:g}"
     vertex_m = point * length @ body.axes.T + body.centre_m

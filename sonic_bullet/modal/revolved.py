@@ -243,7 +243,7 @@ def angles(cells: int) -> Array:
     return np.arange(2 * cells) * np.pi / cells
 
 
-def shapes_at(section: Section, vector: Array, m: int, twin: bool, cells: int) -> Array:
+def shapes_at(section: Section, vector: Array, m: int, second: bool, cells: int) -> Array:
     """Displacements (v, 3, b) at `skin`'s points of vectors (3n, b), in the body's frame; ∫|u|² over the body is one where vᵀMv is."""
     n = len(section.order)
     field = vector.reshape(3, n, -1)
@@ -253,7 +253,7 @@ def shapes_at(section: Section, vector: Array, m: int, twin: bool, cells: int) -
     )
     rim = np.stack([corner, middle], axis=2).reshape(3, 2 * len(section.rim), 1, -1)[:, section.shown] / np.sqrt(2 * np.pi if m == 0 else np.pi)
     angle = angles(cells)[:, None]
-    turned = m * angle - (np.pi / 2 if twin else 0)
+    turned = m * angle - (np.pi / 2 if second else 0)
     even, odd = np.cos(turned), np.sin(turned) if m else np.ones_like(angle)
     out, around, up = rim[0] * even, rim[1] * odd, rim[2] * even
     moved = np.stack([out * np.cos(angle) - around * np.sin(angle), out * np.sin(angle) + around * np.cos(angle), up], axis=2)

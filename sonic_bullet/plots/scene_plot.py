@@ -139,8 +139,8 @@ def render_picture(path: str | os.PathLike[str], samples: Array, sr: int, log: C
         _draw_events(axes[2], log, events, lanes)
     axes[-1].set_xlabel("time in s")
     axes[-1].set_xlim(0, max(sound.shape[1] / rate, log.duration_s if log is not None else 0, 1e-3))
-    heard = f"channel 1 of {sound.shape[0]}" if sound.shape[0] > 1 else ""
-    figure.suptitle(" · ".join(part for part in (title.replace("$", r"\$"), heard) if part), fontsize=11)
+    observed = f"channel 1 of {sound.shape[0]}" if sound.shape[0] > 1 else ""
+    figure.suptitle(" · ".join(part for part in (title.replace("$", r"\$"), observed) if part), fontsize=11)
     extension = Path(path).suffix.lower()[1:]
     timeless = {"png": {"Software": None}, "pdf": {"CreationDate": None}, "svg": {"Date": None}}[extension]
     with replacing(path) as file:

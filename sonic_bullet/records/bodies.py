@@ -171,7 +171,7 @@ class ModalModel:
     vertex_m (v, 3), face (f, 3): the surface, body frame, outward. curvature_per_m (f,): mean of the principal curvatures
     of the smooth surface (0 flat, 1/r sphere, negative inside a bowl). volume_m3, mass_kg: of the meshed solid at the
     material's density. dropped: modes left out as overdamped. note: how it was made (element size, order, choices).
-    bend_s2_m2, choke_s_m (m,): relative rise of a mode's frequency per square of its peak velocity at the surface, of its decay
+    bend_s2_m2, damping_growth_s_m (m,): relative rise of a mode's frequency per square of its peak velocity at the surface, of its decay
     (choke · that velocity)^choke_power, 1 or 2; None: a linear body.
     A body without audible modes has m = 0; a plane has v = f = 0 besides.
     """
@@ -187,8 +187,8 @@ class ModalModel:
     dropped: int = 0
     note: str = ""
     bend_s2_m2: Array | None = None
-    choke_s_m: Array | None = None
-    choke_power: float = 1.0
+    damping_growth_s_m: Array | None = None
+    damping_growth_power: float = 1.0
 
     def __post_init__(self) -> None:
         freq = frozen_array(self.freq_hz, float, (None,), "freq_hz")
@@ -212,9 +212,9 @@ class ModalModel:
         _require(
             len(face) == 0 or bool((face >= 0).all() and (face < len(vertex)).all()), "faces point at missing vertices", "build the model with modal.analyse"
         )
-        _require(self.choke_power in (1.0, 2.0), f"decays that rise with power {self.choke_power} of the level", "give 1 or 2")
+        _require(self.damping_growth_power in (1.0, 2.0), f"decays that rise with power {self.damping_growth_power} of the level", "give 1 or 2")
         _require(self.volume_m3 >= 0 and self.mass_kg >= 0, "negative volume or mass", "orient the mesh outward")
-        for name in ("bend_s2_m2", "choke_s_m"):
+        for name in ("bend_s2_m2", "damping_growth_s_m"):
             if getattr(self, name) is not None:
                 _store(self, **{name: frozen_array(getattr(self, name), float, (m,), name)})
 

@@ -18,21 +18,21 @@ from sonic_bullet.records import Array
 from sonic_bullet.records.contacts import Step
 from sonic_bullet.render.impacts import effective_mass, flat_area_m2, modulus_pa
 from sonic_bullet.render.manifold import STEEPEST, Rows, group_sum, modal_pushes, touches
-from sonic_bullet.render.resonator import Sounder, touch_one
+from sonic_bullet.render.resonator import Resonator, touch_one
 from sonic_bullet.render.rotation import matrix
 from sonic_bullet.synth.pulse import contact_modulus_pa
 from sonic_bullet.synth.strikes import Split, key_bodies
 from sonic_bullet.synth.surface import SurfaceLoads, SurfacePairs, SurfaceState, advance, contact_radius_m, damping_ratio
 
 FOLLOW_S = 0.02
-RUBBING_FLAT = 0.25
+FRICTION_FLAT = 0.25
 """Radius, as a share of the smaller body's size, of the least area on which a flat face rubs."""
 SWEEP_FLOOR_M_S = 2e-4
 """Slower sweeps make nothing audible: even waves of 10 µm pass at 20 Hz. Solvers let bodies at rest creep about as fast."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Rubbing:
+class FrictionVoice:
     """The touching pairs between two steps. key (p,) sorted; load_n (p,), sweep_m_s (p, 2); direction (p, 3): force on the lower body per
     newton of normal load, world; gain: per pair Uᵀ of that force on either body's modes, None until it moves.
     """
@@ -46,15 +46,15 @@ class Rubbing:
     gain: tuple[tuple[Array, Array] | None, ...]
 
     @classmethod
-    def none(cls) -> Rubbing:
+    def none(cls) -> FrictionVoice:
         """No pair touches."""
         pairs = SurfacePairs(*(np.zeros(0),) * 4, *(np.zeros((0, 2)),) * 3)
         return cls(np.zeros(0, np.int64), pairs, SurfaceState.at_rest(0), np.zeros(0), np.zeros((0, 2)), np.zeros((0, 3)), ())
 
-    def take(self, rows: Array) -> Rubbing:
+    def take(self, rows: Array) -> FrictionVoice:
         """The pairs ``rows`` alone."""
         gain = tuple(self.gain[r] for r in rows)
-        return Rubbing(self.key[rows], self.pairs.take(rows), self.state.take(rows), self.load_n[rows], self.sweep_m_s[rows], self.direction[rows], gain)
+        return FrictionVoice(self.key[rows], self.pairs.take(rows), self.state.take(rows), self.load_n[rows], self.sweep_m_s[rows], self.direction[rows], gain)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -109,37 +109,39 @@ def _targets(key: Array, split: Split, rows: Rows) -> _Target:
     return _Target(load, np.where(sweep < SWEEP_FLOOR_M_S, 0.0, sweep), direction, rows, np.searchsorted(at, np.arange(count + 1)))
 
 
-def advance_rubbing(
-    rubbing: Rubbing, split: Split, step: Step, following: Step, rows: Rows, sounders: tuple[Sounder, ...], x: Array, sr: int, seed: int
-) -> tuple[tuple[Drive, ...], Rubbing]:
+def advance_friction(
+    friction: FrictionVoice, split: Split, step: Step, following: Step, rows: Rows, resonators: tuple[Resonator, ...], x: Array, sr: int, seed: int
+) -> tuple[tuple[Drive, ...], FrictionVoice]:
     """Drives of ``step``, and the state after it. following, rows: the next step and its rows. x (n,): share of the step of each sample."""
-    key = np.union1d(rubbing.key, split.key[split.support_n.any(axis=1)])
-    key = key[[_audible_pair(sounders, k) for k in key]] if len(key) else key
+    key = np.union1d(friction.key, split.key[split.support_n.any(axis=1)])
+    key = key[[_audible_pair(resonators, k) for k in key]] if len(key) else key
     target = _targets(key, split, rows)
-    rubbing = _joined(rubbing.take(np.flatnonzero(np.isin(rubbing.key, key))), key, target, following, sounders, seed)
-    moving = (rubbing.sweep_m_s > 0).any(axis=1) | (target.sweep_m_s > 0).any(axis=1) | (rubbing.state.depth != 0) | (rubbing.state.lift != 0)
+    friction = _joined(friction.take(np.flatnonzero(np.isin(friction.key, key))), key, target, following, resonators, seed)
+    moving = (friction.sweep_m_s > 0).any(axis=1) | (target.sweep_m_s > 0).any(axis=1) | (friction.state.depth != 0) | (friction.state.lift != 0)
     follow = -np.expm1(-step.dt_s / FOLLOW_S)
     touching = target.touching
-    fresh = ~rubbing.direction.any(axis=1)
-    direction = np.where((fresh & touching)[:, None], target.direction, rubbing.direction)
+    fresh = ~friction.direction.any(axis=1)
+    direction = np.where((fresh & touching)[:, None], target.direction, friction.direction)
     turned = direction + np.where(touching, follow, 0.0)[:, None] * (target.direction - direction)
-    ends = SurfaceLoads(rubbing.load_n, rubbing.sweep_m_s), SurfaceLoads(target.load_n, target.sweep_m_s)
-    force, state = advance(rubbing.pairs, rubbing.state, *ends, x, sr)
-    before, after = _followed(rubbing.gain, np.flatnonzero(moving & touching), target, sounders, follow)
+    ends = SurfaceLoads(friction.load_n, friction.sweep_m_s), SurfaceLoads(target.load_n, target.sweep_m_s)
+    force, state = advance(friction.pairs, friction.state, *ends, x, sr)
+    before, after = _followed(friction.gain, np.flatnonzero(moving & touching), target, resonators, follow)
     low, high = key_bodies(key)
     drives = []
     for p in np.flatnonzero(moving & force.any(axis=1)):
         start, end = before[p], after[p]
         if start is not None and end is not None:
             drives.append(Drive(int(low[p]), int(high[p]), force[p], start, end, direction[p], turned[p]))
-    now = Rubbing(key, rubbing.pairs, state, target.load_n, target.sweep_m_s, turned, tuple(after))
+    now = FrictionVoice(key, friction.pairs, state, target.load_n, target.sweep_m_s, turned, tuple(after))
     return tuple(drives), now.take(np.flatnonzero(target.load_n > 0))
 
 
 Gains = list[tuple[Array, Array] | None]
 
 
-def _followed(gain: Sequence[tuple[Array, Array] | None], which: Array, target: _Target, sounders: tuple[Sounder, ...], follow: float) -> tuple[Gains, Gains]:
+def _followed(
+    gain: Sequence[tuple[Array, Array] | None], which: Array, target: _Target, resonators: tuple[Resonator, ...], follow: float
+) -> tuple[Gains, Gains]:
     """Gains at the step's start and end; those of the pairs ``which`` move by ``follow`` towards where the contacts are now."""
     before, after = list(gain), list(gain)
     if len(which):
@@ -149,42 +151,42 @@ def _followed(gain: Sequence[tuple[Array, Array] | None], which: Array, target: 
         bounds = np.concatenate([[0], np.cumsum(stops - starts)])
         group = np.repeat(np.arange(len(which)), stops - starts)
         total = np.bincount(group, rows.load_n_s, len(which))
-        for p, aim in zip(which, modal_pushes(sounders, rows, touches(sounders, rows), bounds, (1 / total)[group]), strict=True):
+        for p, aim in zip(which, modal_pushes(resonators, rows, touches(resonators, rows), bounds, (1 / total)[group]), strict=True):
             start = before[p] = before[p] or aim
             after[p] = (start[0] + follow * (aim[0] - start[0]), start[1] + follow * (aim[1] - start[1]))
     return before, after
 
 
-def _audible_pair(sounders: tuple[Sounder, ...], key: int) -> bool:
+def _audible_pair(resonators: tuple[Resonator, ...], key: int) -> bool:
     low, high = int(key) >> 32, int(key) & 0xFFFFFFFF
-    sides = sounders[low], sounders[high]
+    sides = resonators[low], resonators[high]
     return any(s.mode_count > 0 or s.rigid is not None for s in sides) and any(s.body.mass_kg > 0 for s in sides)
 
 
-def _joined(rubbing: Rubbing, key: Array, target: _Target, step: Step, sounders: tuple[Sounder, ...], seed: int) -> Rubbing:
+def _joined(friction: FrictionVoice, key: Array, target: _Target, step: Step, resonators: tuple[Resonator, ...], seed: int) -> FrictionVoice:
     """The pairs ``key``: those that touched before as they are, new ones at rest and without load."""
-    new = np.flatnonzero(~np.isin(key, rubbing.key))
+    new = np.flatnonzero(~np.isin(key, friction.key))
     if not len(new):
-        return rubbing
+        return friction
     count = len(new)
-    fresh = _new_pairs(key[new], [target.rows.take(np.arange(target.bounds[p], target.bounds[p + 1])) for p in new], step, sounders, seed)
-    grown = Rubbing(
-        np.concatenate([rubbing.key, key[new]]),
-        rubbing.pairs.append(fresh),
-        rubbing.state.append(SurfaceState.at_rest(count)),
-        np.concatenate([rubbing.load_n, np.zeros(count)]),
-        np.concatenate([rubbing.sweep_m_s, target.sweep_m_s[new]]),
-        np.concatenate([rubbing.direction, np.zeros((count, 3))]),
-        (*rubbing.gain, *(None,) * count),
+    fresh = _new_pairs(key[new], [target.rows.take(np.arange(target.bounds[p], target.bounds[p + 1])) for p in new], step, resonators, seed)
+    grown = FrictionVoice(
+        np.concatenate([friction.key, key[new]]),
+        friction.pairs.append(fresh),
+        friction.state.append(SurfaceState.at_rest(count)),
+        np.concatenate([friction.load_n, np.zeros(count)]),
+        np.concatenate([friction.sweep_m_s, target.sweep_m_s[new]]),
+        np.concatenate([friction.direction, np.zeros((count, 3))]),
+        (*friction.gain, *(None,) * count),
     )
     return grown.take(np.argsort(grown.key, kind="stable"))
 
 
-def _new_pairs(key: Array, manifolds: list[Rows], step: Step, sounders: tuple[Sounder, ...], seed: int) -> SurfacePairs:
+def _new_pairs(key: Array, manifolds: list[Rows], step: Step, resonators: tuple[Resonator, ...], seed: int) -> SurfacePairs:
     """Constants of new pairs, from the manifold with which they begin (none: as two flats of the bodies' size)."""
     table = np.zeros((len(key), 10))
     for row, (one, rows) in enumerate(zip(key, manifolds, strict=True)):
-        sides = sounders[int(one) >> 32], sounders[int(one) & 0xFFFFFFFF]
+        sides = resonators[int(one) >> 32], resonators[int(one) & 0xFFFFFFFF]
         mass, curvature, area = _contact(rows, step, sides)
         modulus = float(contact_modulus_pa(*(np.array(modulus_pa(s.body)) for s in sides)))
         radius = float(contact_radius_m(np.array(curvature), np.array(area)))
@@ -197,18 +199,18 @@ def _new_pairs(key: Array, manifolds: list[Rows], step: Step, sounders: tuple[So
     return SurfacePairs(mass_kg, modulus_all, radius_m, zeta, table[:, 4:6], table[:, 6:8], table[:, 8:10].astype(np.int64))
 
 
-def _surface_seed(seed: int, sounder: Sounder) -> int:
+def _surface_seed(seed: int, resonator: Resonator) -> int:
     """A number for a body's surface, the same in every run: of the seed and of who the body is."""
-    who = np.random.SeedSequence([seed & 0xFFFFFFFF, sounder.body.body_id & 0xFFFFFFFF, (sounder.body.link + 1) & 0xFFFFFFFF, sounder.body.epoch])
+    who = np.random.SeedSequence([seed & 0xFFFFFFFF, resonator.body.body_id & 0xFFFFFFFF, (resonator.body.link + 1) & 0xFFFFFFFF, resonator.body.epoch])
     return int(who.generate_state(1)[0])
 
 
-def _contact(rows: Rows, step: Step, sides: tuple[Sounder, Sounder]) -> tuple[float, float, float]:
+def _contact(rows: Rows, step: Step, sides: tuple[Resonator, Resonator]) -> tuple[float, float, float]:
     """Effective mass in kg, relative curvature in 1/m and flat area in m² of a manifold."""
     bodies = [s.body for s in sides]
     if not len(rows.key):
         masses = [b.mass_kg for b in bodies if b.mass_kg > 0]
-        return (1 / sum(1 / m for m in masses) if masses else 1.0), 0.0, flat_area_m2(np.zeros((1, 3)), np.ones(1), sides, 0.0, RUBBING_FLAT)
+        return (1 / sum(1 / m for m in masses) if masses else 1.0), 0.0, flat_area_m2(np.zeros((1, 3)), np.ones(1), sides, 0.0, FRICTION_FLAT)
     share = rows.load_n_s / rows.load_n_s.sum()
     normal = share @ rows.normal
     normal = (normal / max(float(np.linalg.norm(normal)), 1e-300))[None]
@@ -217,10 +219,10 @@ def _contact(rows: Rows, step: Step, sides: tuple[Sounder, Sounder]) -> tuple[fl
     touched = _touch_pair(rows, sides)
     strongest = int(np.argmax(share))
     curvature = float(touched[0][strongest] + touched[1][strongest])
-    return mass, curvature, flat_area_m2(rows.point_m[:, 0], rows.load_n_s, sides, curvature, RUBBING_FLAT)
+    return mass, curvature, flat_area_m2(rows.point_m[:, 0], rows.load_n_s, sides, curvature, FRICTION_FLAT)
 
 
-def _touch_pair(rows: Rows, sides: tuple[Sounder, Sounder]) -> tuple[Array, Array]:
+def _touch_pair(rows: Rows, sides: tuple[Resonator, Resonator]) -> tuple[Array, Array]:
     """Curvature (k,) of either surface at the rows of one pair."""
     low, high = (touch_one(sides[side], rows.point_m[:, side], rows.outward[:, side])[2] for side in (0, 1))
     return low, high

@@ -2,7 +2,7 @@
 
     Split (synth.strikes) + rows of the step and the next ones -> Blow: time, length, impulse, Uᵀf on either body
 
-One `Blow` is one pulse: rows of up to three steps, several points each, share its time history, so that the manifold's
+One `Impact` is one pulse: rows of up to three steps, several points each, share its time history, so that the manifold's
 sum and moment, which are all that is reliable, are kept: Uᵀf is summed over the rows, each at its own point with its own
 direction, friction included.
 """
@@ -18,7 +18,7 @@ import numpy as np
 from sonic_bullet.records import Array, Body
 from sonic_bullet.records.contacts import Step
 from sonic_bullet.render.manifold import STEEPEST, Rows, group_sum, modal_pushes, touches
-from sonic_bullet.render.resonator import Sounder
+from sonic_bullet.render.resonator import Resonator
 from sonic_bullet.render.rotation import matrix
 from sonic_bullet.synth.pulse import compliant_share, contact_modulus_pa, contact_time_s, effective_mass_kg
 from sonic_bullet.synth.strikes import Split, accepted_impulse, causing_approach_m_s, key_bodies, unheld_steps
@@ -32,7 +32,7 @@ LEAST_JUMP_M_S = 1e-6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Blow:
+class ForcePulse:
     """One strike. low, high: body indices. start_s: after its step's start, or before it. length_s: of the pulse. flat: half-sine, not Hertz'.
 
     impulse_n_s (3,): world, on low. modes_low, modes_high (m,): Uᵀj of the whole impulse in N·s/√kg.
@@ -73,7 +73,9 @@ def _gather(split: Split, oriented: Sequence[Rows]) -> tuple[Rows, Array, Array]
     return Rows.joined(parts).take(order), strike[order], np.concatenate(delays)[order]
 
 
-def find_blows(split: Split, oriented: Sequence[Rows], step: Step, sounders: tuple[Sounder, ...], placed: Array, earliest_s: float) -> tuple[Blow, ...]:
+def find_blows(
+    split: Split, oriented: Sequence[Rows], step: Step, resonators: tuple[Resonator, ...], placed: Array, earliest_s: float
+) -> tuple[ForcePulse, ...]:
     """The strikes that the rows of ``step`` begin; oriented: the rows of that step and of the known ones after it. placed (bodies,): just put there.
 
     earliest_s: not after 0; a strike is dated back that far at most, where the bodies overlap as the step starts.
@@ -84,7 +86,7 @@ def find_blows(split: Split, oriented: Sequence[Rows], step: Step, sounders: tup
     rows, strike, delay = _gather(split, oriented)
     count = len(split.strike)
     low, high = key_bodies(split.key[split.strike])
-    bodies = [sounder.body for sounder in sounders]
+    bodies = [resonator.body for resonator in resonators]
     raw = group_sum(strike, rows.load_n_s, count)
     share = rows.load_n_s / np.maximum(raw, 1e-300)[strike]
     normal = group_sum(strike, share[:, None] * rows.normal, count)
@@ -99,45 +101,45 @@ def find_blows(split: Split, oriented: Sequence[Rows], step: Step, sounders: tup
     caused = causing_approach_m_s(approach, low, high, normal, unheld_steps(split, mobile, placed), step.gravity_m_s2 * step.dt_s)
     accepted = accepted_impulse(raw, 2.0 * mass * caused, low, high, mobile)
     impulse = group_sum(strike, rows.impulse_n_s, count)
-    audible = np.array([_can_sound(sounders[i]) or _can_sound(sounders[j]) for i, j in zip(low, high, strict=True)])
-    heard = np.flatnonzero((mass > 0) & (accepted > LEAST_JUMP_M_S * mass) & (raw * STEEPEST >= np.linalg.norm(impulse, axis=1)) & audible)
-    if not len(heard):
+    audible = np.array([_can_sound(resonators[i]) or _can_sound(resonators[j]) for i, j in zip(low, high, strict=True)])
+    observed = np.flatnonzero((mass > 0) & (accepted > LEAST_JUMP_M_S * mass) & (raw * STEEPEST >= np.linalg.norm(impulse, axis=1)) & audible)
+    if not len(observed):
         return ()
-    return _blows(rows, strike, delay, heard, sounders, (low, high), mass, raw, accepted, approach, impulse, earliest_s, step.dt_s)
+    return _blows(rows, strike, delay, observed, resonators, (low, high), mass, raw, accepted, approach, impulse, earliest_s, step.dt_s)
 
 
 def _blows(
-    rows: Rows, strike: Array, delay: Array, heard: Array, sounders: tuple[Sounder, ...], pair: tuple[Array, Array],
+    rows: Rows, strike: Array, delay: Array, observed: Array, resonators: tuple[Resonator, ...], pair: tuple[Array, Array],
     mass: Array, raw: Array, accepted: Array, approach: Array, impulse: Array, earliest_s: float, dt_s: float,
-) -> tuple[Blow, ...]:  # fmt: skip
-    """The blows of the strikes ``heard``, of all strikes (q,) and their rows (r,)."""
+) -> tuple[ForcePulse, ...]:  # fmt: skip
+    """The blows of the strikes ``observed``, of all strikes (q,) and their rows (r,)."""
     start = _start_s(rows, strike, delay, len(mass), earliest_s, dt_s)
-    mine = np.flatnonzero(np.isin(strike, heard))
-    rows, group = rows.take(mine), np.searchsorted(heard, strike[mine])
-    bounds = np.searchsorted(group, np.arange(len(heard) + 1))
-    where = touches(sounders, rows)
-    scale = (accepted / np.maximum(raw, 1e-300))[heard]
-    pushes = modal_pushes(sounders, rows, where, bounds, scale[group])
+    mine = np.flatnonzero(np.isin(strike, observed))
+    rows, group = rows.take(mine), np.searchsorted(observed, strike[mine])
+    bounds = np.searchsorted(group, np.arange(len(observed) + 1))
+    where = touches(resonators, rows)
+    scale = (accepted / np.maximum(raw, 1e-300))[observed]
+    pushes = modal_pushes(resonators, rows, where, bounds, scale[group])
     bent = where[0].curvature_per_m + where[1].curvature_per_m
     strongest = [start_ + int(np.argmax(rows.load_n_s[start_:stop])) for start_, stop in itertools.pairwise(bounds)]
-    sides = [(sounders[pair[0][q]], sounders[pair[1][q]]) for q in heard]
-    speed = np.where(approach[heard] > 0, approach[heard], accepted[heard] / (1.5 * mass[heard]))
+    sides = [(resonators[pair[0][q]], resonators[pair[1][q]]) for q in observed]
+    speed = np.where(approach[observed] > 0, approach[observed], accepted[observed] / (1.5 * mass[observed]))
     area = [
         flat_area_m2(rows.point_m[bounds[i] : bounds[i + 1], 0], rows.load_n_s[bounds[i] : bounds[i + 1]], sides[i], float(bent[strongest[i]]), STRUCK_FLAT)
-        for i in range(len(heard))
+        for i in range(len(observed))
     ]
     modulus = contact_modulus_pa(*(np.array([modulus_pa(side[i].body) for side in sides]) for i in (0, 1)))
-    length, flat = contact_time_s(mass[heard], modulus, bent[strongest], np.array(area), np.maximum(speed, 1e-6))
-    blows = []
-    for i, q in enumerate(heard):
+    length, flat = contact_time_s(mass[observed], modulus, bent[strongest], np.array(area), np.maximum(speed, 1e-6))
+    pulses = []
+    for i, q in enumerate(observed):
         pushed = [(side.omega_rad_s / (2 * np.pi), push) for side, push in zip(sides[i], pushes[i], strict=True)]
         share = compliant_share(float(mass[q]), float(accepted[q]), pushed, float(length[i]), bool(flat[i]))
-        blows.append(Blow(int(pair[0][q]), int(pair[1][q]), float(start[q]), float(length[i]), bool(flat[i]), scale[i] * impulse[q], *pushes[i], share))
-    return tuple(blows)
+        pulses.append(ForcePulse(int(pair[0][q]), int(pair[1][q]), float(start[q]), float(length[i]), bool(flat[i]), scale[i] * impulse[q], *pushes[i], share))
+    return tuple(pulses)
 
 
-def _can_sound(sounder: Sounder) -> bool:
-    return sounder.mode_count > 0 or sounder.rigid is not None
+def _can_sound(resonator: Resonator) -> bool:
+    return resonator.mode_count > 0 or resonator.rigid is not None
 
 
 def modulus_pa(body: Body) -> float:
@@ -166,7 +168,7 @@ def _start_s(rows: Rows, strike: Array, delay: Array, count: int, earliest_s: fl
     return np.clip(np.where(np.isfinite(meet), meet, 0.0), earliest_s, dt_s)
 
 
-def flat_area_m2(point_m: Array, load: Array, pair: tuple[Sounder, Sounder], curvature_per_m: float, least_share: float) -> float:
+def flat_area_m2(point_m: Array, load: Array, pair: tuple[Resonator, Resonator], curvature_per_m: float, least_share: float) -> float:
     """Area of a flat contact, 0 where it is curved: the disc with the spread of the manifold's points (r, 3) under loads (r,).
 
     least_share: of the smaller body's size, below which no flat contact's radius is taken to be.

@@ -19,8 +19,8 @@ import numpy as np
 
 from sonic_bullet.records import Air, Array, Body, ModalModel, Residual
 from sonic_bullet.render.friction_voice import Drive
-from sonic_bullet.render.impacts import Blow
-from sonic_bullet.render.resonator import Sounder, build_sounder
+from sonic_bullet.render.impacts import ForcePulse
+from sonic_bullet.render.resonator import Resonator, build_resonator
 from sonic_bullet.residual.grains import Voice, make_voice, mixed_number, placed, varied
 from sonic_bullet.residual.player import SECTION, Grain, Rubbed, rubbed, section_grain
 from sonic_bullet.residual.transfer import Modes
@@ -32,7 +32,7 @@ Rubs = Mapping[tuple[int, int, int], Rubbed]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Beside:
+class ResidualVoice:
     """One body's residual. lines: for the bank; follows (l,): the sounder's mode that each is struck as. group (m,): the voice's pair of each mode, or -1."""
 
     voice: Voice
@@ -41,14 +41,14 @@ class Beside:
     group: Array
 
 
-def build_beside(sounder: Sounder, sr: int, air: Air) -> Beside | None:
+def build_residual_voice(resonator: Resonator, sr: int, air: Air) -> ResidualVoice | None:
     """A body's residual as it is played, or None where it has none, or no modes to follow."""
-    material, model = sounder.body.material, sounder.body.model
-    if material is None or material.residual is None or model is None or not sounder.mode_count or not sounder.weight.any():
+    material, model = resonator.body.material, resonator.body.model
+    if material is None or material.residual is None or model is None or not resonator.mode_count or not resonator.weight.any():
         return None
     voice = _voice(material.residual, model, air, sr)
-    group = np.empty(sounder.mode_count, np.int64)
-    group[np.argsort(sounder.omega_rad_s, kind="stable")] = voice.pairs.group
+    group = np.empty(resonator.mode_count, np.int64)
+    group[np.argsort(resonator.omega_rad_s, kind="stable")] = voice.pairs.group
     line, mode = [], []
     for i, pair in enumerate(voice.lines.follows):
         members = np.flatnonzero(group == pair)
@@ -58,15 +58,20 @@ def build_beside(sounder: Sounder, sr: int, air: Air) -> Beside | None:
     omega, decay = 2 * np.pi * voice.lines.freq_hz[at], voice.lines.decay_per_s[at]
     keep = audible(omega, decay, sr)
     at, follows = at[keep], follows[keep]
-    weight = 1j * voice.lines.ratio[at] * sounder.weight[:, follows]
-    bend, choke = (None if x is None else x[follows] for x in (sounder.bend, sounder.choke))
-    return Beside(voice, ModeSet(omega[keep], decay[keep], weight, bend=bend, choke=choke, choke_power=sounder.choke_power), follows, group)
+    weight = 1j * voice.lines.ratio[at] * resonator.weight[:, follows]
+    bend, damping_growth = (None if x is None else x[follows] for x in (resonator.bend, resonator.damping_growth))
+    return ResidualVoice(
+        voice,
+        ModeSet(omega[keep], decay[keep], weight, bend=bend, damping_growth=damping_growth, damping_growth_power=resonator.damping_growth_power),
+        follows,
+        group,
+    )
 
 
 @lru_cache(maxsize=64)
 def _voice(residual: Residual, model: ModalModel, air: Air, sr: int) -> Voice:
     """A voice, once for bodies that share residual and model (records are compared by identity); pairs by the modes' mean square over the surface."""
-    s = build_sounder(Body(0, -1, 0, "", 0.0, np.zeros((3, 3)), model=model), (), sr, air)
+    s = build_resonator(Body(0, -1, 0, "", 0.0, np.zeros((3, 3)), model=model), (), sr, air)
     order = np.argsort(s.omega_rad_s, kind="stable")
     shape = np.sqrt((s.shape.astype(float) ** 2).sum(axis=1).mean(axis=0)) if len(s.shape) else np.ones(s.mode_count)
     loud = np.abs(s.weight[0]) if s.weight[0].any() else np.ones(s.mode_count)
@@ -84,42 +89,42 @@ def pulse(f_tau: Array, flat: bool) -> Array:
     return np.asarray(np.interp(f_tau, *_pulse_table(flat), right=0.0))
 
 
-def struck_power(beside: Beside, weight: Array, push: Array) -> Array:
+def struck_power(voice: ResidualVoice, weight: Array, push: Array) -> Array:
     """a² (p,) at the onset of the pairs' modes, for Uᵀj (m,) of an impulse and the modes' weights (m,)."""
-    used = beside.group >= 0
-    return np.bincount(beside.group[used], (np.abs(weight * push) ** 2)[used], len(beside.voice.pairs.target_hz))
+    used = voice.group >= 0
+    return np.bincount(voice.group[used], (np.abs(weight * push) ** 2)[used], len(voice.voice.pairs.target_hz))
 
 
-def blow_grains(
-    blow: Blow, step_start_s: float, sounders: Sequence[Sounder], beside: Sequence[Beside | None], sr: int, earliest: int, seed: int
+def impact_grains(
+    impact: ForcePulse, step_start_s: float, resonators: Sequence[Resonator], voice: Sequence[ResidualVoice | None], sr: int, earliest: int, seed: int
 ) -> list[Grain]:
     """What one strike adds on both bodies."""
-    start = max((step_start_s + blow.start_s) * sr, float(earliest))
+    start = max((step_start_s + impact.start_s) * sr, float(earliest))
     first, grains = int(np.ceil(start)), []
-    for body, push in ((blow.low, blow.modes_low), (blow.high, blow.modes_high)):
-        mine = beside[body]
+    for body, push in ((impact.low, impact.modes_low), (impact.high, impact.modes_high)):
+        mine = voice[body]
         if mine is None:
             continue
-        who = sounders[body].body
+        who = resonators[body].body
         number = mixed_number(seed, who.body_id, who.link + 1, who.epoch, int(start * 1048576))
-        for w, weight in enumerate(sounders[body].weight):
+        for w, weight in enumerate(resonators[body].weight):
             if weight.any():
-                pair, level = placed(mine.voice, struck_power(mine, weight, blow.share * push), blow.length_s, blow.flat, pulse)
+                pair, level = placed(mine.voice, struck_power(mine, weight, impact.share * push), impact.length_s, impact.flat, pulse)
                 if level > 0:
                     grains.append(Grain(first, w, body, varied(pair, level, number)))
     return grains
 
 
-def rubbing_grains(
-    rubs: Rubs, drives: Sequence[Drive], sounders: Sequence[Sounder], beside: Sequence[Beside | None], at: int, n: int, seed: int
+def friction_grains(
+    rubs: Rubs, drives: Sequence[Drive], resonators: Sequence[Resonator], voice: Sequence[ResidualVoice | None], at: int, n: int, seed: int
 ) -> tuple[list[Grain], Rubs]:
     """Grains of the sections of rubbing that end within the n samples from ``at`` on, and what goes on afterwards."""
-    driven = {(d.low, d.high, side): d for d in drives for side in (0, 1) if beside[(d.low, d.high)[side]] is not None}
+    driven = {(d.low, d.high, side): d for d in drives for side in (0, 1) if voice[(d.low, d.high)[side]] is not None}
     grains, kept = [], {}
     for key in sorted(set(rubs) | set(driven)):
         drive, body = driven.get(key), key[key[2]]
         sections, state = rubbed(rubs.get(key), None if drive is None else drive.force_n, at, n)
-        mine, who = beside[body], sounders[body].body
+        mine, who = voice[body], resonators[body].body
         if mine is None:
             continue
         gain = rubs[key].gain if drive is None else drive.gain1[key[2]]
@@ -127,13 +132,13 @@ def rubbing_grains(
             kept[key] = replace(state, gain=gain)
         for number, force_n in sections:
             own = mixed_number(seed, who.body_id, who.link + 1, who.epoch, key[1 - key[2]], number)
-            for w, weight in enumerate(sounders[body].weight):
+            for w, weight in enumerate(resonators[body].weight):
                 sample = section_grain(mine.voice, force_n, struck_power(mine, weight, gain), own) if weight.any() else np.zeros(0)
                 if len(sample):
                     grains.append(Grain((number + 2) * SECTION, w, body, sample))
     return grains, kept
 
 
-def line_modes(beside: Beside | None, sets: int) -> ModeSet:
+def line_modes(voice: ResidualVoice | None, sets: int) -> ModeSet:
     """What of a body's residual the bank plays."""
-    return beside.lines if beside is not None else ModeSet(np.zeros(0), np.zeros(0), np.zeros((sets, 0), complex))
+    return voice.lines if voice is not None else ModeSet(np.zeros(0), np.zeros(0), np.zeros((sets, 0), complex))

@@ -30,9 +30,9 @@ FASTEST_RIGID = 0.6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Sounder:
+class Resonator:
     """omega_rad_s, decay_per_s (m,): with the air's damping. weight (w, m): complex, one row a weight set (row 0: pressure at 1 m).
-    bend, choke (m,): of frequency per |z|², of decay by (choke·|z|)^choke_power, None in a linear body. shape (v, 3, m) float32: audible modes only.
+    bend, damping_growth (m,): of frequency per |z|², of decay by (choke·|z|)^choke_power, None in a linear body. shape (v, 3, m) float32: audible modes only.
     size_m: cube root of the volume. jerk_pa_s3: dipole coefficient [Chadwick 2012]. dropped: modes not played.
     """
 
@@ -48,8 +48,8 @@ class Sounder:
     rigid: ModeSet | None
     dropped: int
     bend: Array | None = None
-    choke: Array | None = None
-    choke_power: float = 1.0
+    damping_growth: Array | None = None
+    damping_growth_power: float = 1.0
 
     @property
     def mode_count(self) -> int:
@@ -70,7 +70,7 @@ def weight_sets(sensors: tuple[Sensor, ...]) -> tuple[Sensor, ...]:
     return tuple(sensor for sensor in sensors if not isinstance(sensor, Microphone))
 
 
-def build_sounder(body: Body, sensors: tuple[Sensor, ...], sr: int, air: Air) -> Sounder:
+def build_resonator(body: Body, sensors: tuple[Sensor, ...], sr: int, air: Air) -> Resonator:
     """Prepare one body. Modes at or above sr/2 and overdamped ones are dropped and counted.
 
     The pressure weight of mode and microphone is the far-field map of `synth.radiation`; a vibrometer reads (φ(q)·n); the
@@ -80,7 +80,7 @@ def build_sounder(body: Body, sensors: tuple[Sensor, ...], sr: int, air: Air) ->
     readers = weight_sets(sensors)
     if model is None:
         none = np.zeros(0)
-        return Sounder(
+        return Resonator(
             body, none, none, np.zeros((1 + len(readers), 0), complex), np.zeros((0, 3, 0), np.float32), None, np.zeros((0, 3)), _size(body), 0.0, None, 0
         )
     pressure, extra = radiation_of(model, air)
@@ -107,8 +107,8 @@ def build_sounder(body: Body, sensors: tuple[Sensor, ...], sr: int, air: Air) ->
     rigid = _rigid(body, 1 + len(readers), sr, air)
     most = np.sqrt((shape.astype(float) ** 2).sum(axis=1)).max(axis=0, initial=0.0)  # velocity at the surface of a mode with |z| = 1
     bend = None if model.bend_s2_m2 is None else model.bend_s2_m2[keep] * most**2
-    choke = None if model.choke_s_m is None else model.choke_s_m[keep] * most
-    return Sounder(body, omega, decay, weight, shape, index, normal, _size(body), radius, rigid, dropped, bend, choke, model.choke_power)
+    damping_growth = None if model.damping_growth_s_m is None else model.damping_growth_s_m[keep] * most
+    return Resonator(body, omega, decay, weight, shape, index, normal, _size(body), radius, rigid, dropped, bend, damping_growth, model.damping_growth_power)
 
 
 def _rigid(body: Body, sets: int, sr: int, air: Air) -> ModeSet | None:
@@ -126,30 +126,30 @@ def _size(body: Body) -> float:
     return float(max(body.volume_m3, 1e-9) ** (1 / 3))
 
 
-def touch_one(sounder: Sounder, point_m: Array, outward: Array) -> tuple[Array, Array, Array]:
+def touch_one(resonator: Resonator, point_m: Array, outward: Array) -> tuple[Array, Array, Array]:
     """Face (k,), barycentric (k, 3) and curvature (k,) where contacts (k, 3) in the body frame, outward normals (k, 3), lie on the true surface.
 
     Where the contact's normal leans more than 20° from the face's, an edge or corner is touched: its radius is taken as
     0.5 % of the body's size, at least 0.2 mm (a broken edge, as made things have).
     """
     count = len(point_m)
-    body = sounder.body
+    body = resonator.body
     everywhere = body.curvature_per_m if np.isfinite(body.curvature_per_m) else 0.0
-    if sounder.index is None or body.model is None:
+    if resonator.index is None or body.model is None:
         return np.zeros(count, np.int64), np.zeros((count, 3)), np.full(count, everywhere)
-    face, barycentric, _ = nearest(sounder.index, point_m, outward)
+    face, barycentric, _ = nearest(resonator.index, point_m, outward)
     if np.isfinite(body.curvature_per_m):
         return face, barycentric, np.full(count, everywhere)
-    edge = 1.0 / max(EDGE_RADIUS_SHARE * sounder.size_m, EDGE_RADIUS_LEAST_M)
-    leaning = np.einsum("ki,ki->k", sounder.normal[face], outward) < CREASE_COS
+    edge = 1.0 / max(EDGE_RADIUS_SHARE * resonator.size_m, EDGE_RADIUS_LEAST_M)
+    leaning = np.einsum("ki,ki->k", resonator.normal[face], outward) < CREASE_COS
     return face, barycentric, np.where(leaning, edge, body.model.curvature_per_m[face])
 
 
-def uplift(sounder: Sounder, face: Array, barycentric: Array, force: Array) -> Array:
+def uplift(resonator: Resonator, face: Array, barycentric: Array, force: Array) -> Array:
     """Uᵀf (m,): forces (k, 3) in the body frame at contacts, onto the body's audible modes, summed."""
-    if sounder.body.model is None or sounder.mode_count == 0:
-        return np.zeros(sounder.mode_count)
-    return np.asarray(participation(sounder.shape, sounder.body.model.face, face, barycentric, np.ascontiguousarray(force)))
+    if resonator.body.model is None or resonator.mode_count == 0:
+        return np.zeros(resonator.mode_count)
+    return np.asarray(participation(resonator.shape, resonator.body.model.face, face, barycentric, np.ascontiguousarray(force)))
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet.diagnosis.diagnose import Diagnosis
-from sonic_bullet.diagnosis.evidence.effect_evidence import heard_of
+from sonic_bullet.diagnosis.evidence.effect_evidence import object_evidence
 from sonic_bullet.diagnosis.prediction.hypothesis import play
 from sonic_bullet.files import replacing
 from sonic_bullet.records import Array
@@ -51,7 +51,7 @@ def page(d: Diagnosis) -> str:
         f"<p>{html.escape(d.unexplained['words'])}.</p>" if d.unexplained else "",
         _players(d),
         _plane(d),
-        _suspects(d),
+        _candidates(d),
         _notes(d),
         "</html>",
     ]
@@ -98,12 +98,12 @@ def _players(d: Diagnosis) -> str:
 
 
 def _plane(d: Diagnosis) -> str:
-    body = next((b for b in d.bodies if b.gathered is not None), None)
+    body = next((b for b in d.bodies if b.recorded is not None), None)
     if body is None:
         return ""
     plt = _pyplot()
     figure, axis = plt.subplots(figsize=(9, 4.5))
-    before, after = heard_of(d.closed.before, body), heard_of(d.closed.after, body)
+    before, after = object_evidence(d.closed.before, body), object_evidence(d.closed.after, body)
     axis.plot(before.freq_hz, before.decay_per_s, "k.", label="lines heard")
     axis.vlines(before.freq_hz, before.expected_decay_per_s, before.decay_per_s, color="0.7", lw=1, label="residual before")
     axis.plot(before.freq_hz, before.expected_decay_per_s, "x", color="#c33", label="model before")
@@ -115,7 +115,7 @@ def _plane(d: Diagnosis) -> str:
     return "<h2>Frequencies and decays</h2>" + _figure(_png(figure), "each line heard, and where the model has its mode")
 
 
-def _suspects(d: Diagnosis) -> str:
+def _candidates(d: Diagnosis) -> str:
     kept = {c.id for c in d.closed.added}
     rows = [
         (c.id, "added" if c.id in kept else "no", f"{c.mean_db:+.2f}", f"{c.null_db:+.2f}", " ".join(f"{x:+.2f}" for x in c.drop_db))

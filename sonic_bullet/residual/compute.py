@@ -98,10 +98,10 @@ def cells(left: Power, floor_per_hz: Array) -> tuple[Array, Array, Array]:
     np.add.at(total, (band[:, None], frame[None]), left.per_hz[:, :last])
     np.add.at(quiet, band, floor_per_hz)
     mean, quiet = total / np.maximum(count, 1), quiet / np.maximum(np.bincount(band), 1)
-    heard = mean > quiet[:, None] * (ABOVE + 3 / np.sqrt(count + 1e-9))
+    observed = mean > quiet[:, None] * (ABOVE + 3 / np.sqrt(count + 1e-9))
     centre_hz = np.bincount(band, left.freq_hz) / np.maximum(np.bincount(band), 1)
     centre_s = np.bincount(frame, left.time_s[:last]) / np.bincount(frame)
-    return centre_hz[kept], centre_s, np.where(heard, mean - quiet[:, None], 0.0)[kept]
+    return centre_hz[kept], centre_s, np.where(observed, mean - quiet[:, None], 0.0)[kept]
 
 
 def shared_cells(left: list[Power]) -> tuple[Array, Array, Array]:

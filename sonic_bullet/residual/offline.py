@@ -55,9 +55,9 @@ def residual_sound(residual: Residual, freq_hz: Array, decay_per_s: Array, ampli
         if voice.pairs.group[k] >= 0:
             lead[voice.pairs.group[k]] = start[k] / max(abs(start[k]), 1e-300)
     lines = voice.lines
-    heard = lines.freq_hz < sr / 2
+    observed = lines.freq_hz < sr / 2
     turned = 1j * lead[lines.follows] * lines.ratio * np.sqrt(power[lines.follows])
-    out = damped(lines.freq_hz[heard], lines.decay_per_s[heard], turned[heard], n, sr)
+    out = damped(lines.freq_hz[observed], lines.decay_per_s[observed], turned[observed], n, sr)
     grain = varied(filtered(voice, response(voice, power)), 1.0, mixed_number(seed)) if not voice.silent else np.zeros(0)
     count = min(n, len(grain))
     out[:count] += grain[:count]

@@ -151,11 +151,11 @@ def _near_mesh(corner: Array, area: Array, normal: Array) -> tuple[Array, Array]
         cell = _cells(point, outward, edge_m)
         size = np.bincount(cell)
         middle = np.stack([np.bincount(cell, point[:, i]) / size for i in range(3)], axis=1)
-        way = np.stack([np.bincount(cell, outward[:, i]) for i in range(3)], axis=1)
-        way = way / np.maximum(np.linalg.norm(way, axis=1), 1e-300)[:, None]
+        direction = np.stack([np.bincount(cell, outward[:, i]) for i in range(3)], axis=1)
+        direction = direction / np.maximum(np.linalg.norm(direction, axis=1), 1e-300)[:, None]
         reach = np.zeros(len(middle))
-        np.maximum.at(reach, cell, ((point - middle[cell]) * way[cell]).sum(axis=1))
-        middle += reach[:, None] * way  # else edges are planed off
+        np.maximum.at(reach, cell, ((point - middle[cell]) * direction[cell]).sum(axis=1))
+        middle += reach[:, None] * direction  # else edges are planed off
         triangle = cell[name]
         triangle = triangle[(triangle[:, 0] != triangle[:, 1]) & (triangle[:, 1] != triangle[:, 2]) & (triangle[:, 2] != triangle[:, 0])]
         _, first, alike = np.unique(np.sort(triangle, axis=1), axis=0, return_index=True, return_inverse=True)

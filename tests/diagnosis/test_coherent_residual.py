@@ -24,20 +24,20 @@ from tests.made.body import SR, plate, recorded, struck
 
 def swung(depth: float, rate_hz: float = 9.0) -> Struck:
     """The plate turning before its microphone: every strike at another moment of the turn."""
-    heard = recorded().gathered
-    assert heard is not None and heard.signals is not None
-    n, s = heard.signals.shape[1], len(heard.signals)
+    observed = recorded().recorded
+    assert observed is not None and observed.signals is not None
+    n, s = observed.signals.shape[1], len(observed.signals)
     turn = np.arange(s)[:, None] * 2.4
-    signals = heard.signals * (1 + depth * np.sin(2 * np.pi * rate_hz * np.arange(n) / SR + turn))
+    signals = observed.signals * (1 + depth * np.sin(2 * np.pi * rate_hz * np.arange(n) / SR + turn))
     return struck(plate(), joint_lines(signals, SR, band_hz=BAND), signals)
 
 
 def test_modes_are_in_phase_and_sidebands_are_not() -> None:
     still, turning = recorded(), swung(0.8)
-    assert still.gathered is not None and turning.gathered is not None
-    assert not out_of_phase(still.gathered.lines).any()
+    assert still.recorded is not None and turning.recorded is not None
+    assert not out_of_phase(still.recorded.lines).any()
     assert of_no_body(replace(fitted(still), correction={"plate": np.full(18, 1e-3)}), takes_of((still,))) < 0.05
-    assert out_of_phase(turning.gathered.lines).any()
+    assert out_of_phase(turning.recorded.lines).any()
     assert of_no_body(fitted(turning), takes_of((turning,))) > 0.7
 
 
@@ -49,26 +49,26 @@ def test_modes_are_in_phase_and_sidebands_are_not() -> None:
 def test_what_leaves_modes_real_leaves_them_in_phase(effect: Effect) -> None:
     """But for a delay a strike: of a pulse it is the middle, and soft blows last longer."""
     body = recorded(effect)
-    assert body.gathered is not None
+    assert body.recorded is not None
     mine = np.unique(body.line[body.line >= 0])
     assert len(mine) > 8
-    assert not out_of_phase(body.gathered.lines)[mine].any()
+    assert not out_of_phase(body.recorded.lines)[mine].any()
 
 
 def test_every_strike_has_as_much_to_say() -> None:
     """A line in phase at the loudest of five, a hundred times as loud, and at no other; all others are in phase."""
     turn = np.exp(1j * np.array([[0.0, 0.0], [2.4, 0.0], [4.8, 0.0], [0.9, 0.0], [3.3, 0.0]]))
     loud = np.array([100.0, 1.0, 1.0, 1.0, 1.0])[:, None]
-    heard = recorded().gathered
-    assert heard is not None
+    observed = recorded().recorded
+    assert observed is not None
     amplitude = loud * np.concatenate([turn, np.ones((5, 14))], axis=1)
     count = amplitude.shape[1]
-    lines = replace(heard.lines, freq_hz=np.linspace(300, 7000, count), amplitude=amplitude, amplitude_sd=1e-6 * np.ones((5, count)), signed=True)
+    lines = replace(observed.lines, freq_hz=np.linspace(300, 7000, count), amplitude=amplitude, amplitude_sd=1e-6 * np.ones((5, count)), signed=True)
     assert out_of_phase(lines).tolist() == [True] + [False] * (count - 1)
 
 
 def test_phases_are_not_asked_where_no_onset_is_known() -> None:
-    turning = swung(0.8).gathered
+    turning = swung(0.8).recorded
     assert turning is not None
     assert not out_of_phase(replace(turning.lines, signed=False)).any()
 

@@ -129,20 +129,20 @@ def test_two_processes_find_what_one_finds(monkeypatch: pytest.MonkeyPatch) -> N
 
 def test_softer_strikes_tell_the_linear_modes_of_a_body_that_bends() -> None:
     body = recorded(BENT)
-    assert body.gathered is not None
-    soft = _soft(body.gathered, BAND)
-    assert soft is not body.gathered and soft.lines.amplitude.shape[0] == len(body.gathered.recordings)
-    chained = unchained(body.gathered.lines, LINKS[0])
+    assert body.recorded is not None
+    soft = _soft(body.recorded, BAND)
+    assert soft is not body.recorded and soft.lines.amplitude.shape[0] == len(body.recorded.recordings)
+    chained = unchained(body.recorded.lines, LINKS[0])
     assert chained is not None
 
     def off(freq_hz: np.ndarray[Any, Any]) -> float:
         return float(np.median(np.abs(freq_hz[:, None] / plate().freq_hz - 1).min(axis=0)))
 
     assert off(soft.lines.freq_hz) < 1e-5 and off(chained.freq_hz) < 1e-5
-    plain = recorded().gathered
+    plain = recorded().recorded
     assert plain is not None and _soft(plain, BAND) is plain, "nothing bends there"
-    level = tuple(replace(r, impulse_n_s=0.01) for r in body.gathered.recordings)
-    alike = replace(body.gathered, recordings=level)
+    level = tuple(replace(r, impulse_n_s=0.01) for r in body.recorded.recordings)
+    alike = replace(body.recorded, recordings=level)
     assert _soft(alike, BAND) is alike, "none is softer"
 
 
@@ -162,7 +162,7 @@ def test_three_weak_dashpots_are_told_together() -> None:
     """A thirtieth of the decays, where a law is good to a two-hundredth: no one says half of it, all three do."""
     fixture = SupportDamping(WEAK, (0.15, 0.1, 0.12))
     body = recorded(fixture, noise=2e-6)
-    trial = Trial.of(evidence_of(fitted(body), (body,), BAND).heard[0])
+    trial = Trial.of(evidence_of(fitted(body), (body,), BAND).observed[0])
     grid = np.unique(trial.model.face)
     found = subsets(trial, grid[::7], 2)
     assert [len(s) for s in found] == [1, 1, 2, 2, 3, 3]
@@ -190,7 +190,7 @@ def test_trials_tell_what_has_numbers_of_single_lines_all_lines(monkeypatch: pyt
 
         @classmethod
         def propose(cls, evidence: Evidence) -> Self | None:
-            asked.append((cls.id, len(evidence.heard[0].freq_hz)))
+            asked.append((cls.id, len(evidence.observed[0].freq_hz)))
             return cls()
 
     class Part(Listens):
@@ -202,7 +202,7 @@ def test_trials_tell_what_has_numbers_of_single_lines_all_lines(monkeypatch: pyt
         searches: ClassVar[bool] = True
 
     told = evidence_of(h, (body,), BAND)
-    count = len(told.heard[0].freq_hz)
+    count = len(told.observed[0].freq_hz)
     trials(h, (body,), takes, told, (Listens, Part, Searches), seed=0, say=lambda _: None)
     assert {n for who, n in asked if who in ("listens", "searches")} == {count}
     assert {n for who, n in asked if who == "part"} == {count, round(KEPT * count)}
@@ -241,7 +241,7 @@ def test_in_a_room_dashpots_wait_for_a_tensor(dry: bool, costly: bool, asked: li
     body = recorded()
     takes, h = takes_of((body,)), refitted(fitted(body), (body,))
     told = evidence_of(h, (body,), BAND)
-    told = replace(told, heard=(replace(told.heard[0], dry=dry),))
+    told = replace(told, observed=(replace(told.observed[0], dry=dry),))
     trials(h, (body,), takes, told, (Dashpots, Tensor), seed=0, say=lambda _: None, costly=costly)
     assert list(dict.fromkeys(seen)) == asked
     seen.clear()
@@ -283,9 +283,9 @@ def test_a_lines_own_numbers_are_tried_with_all_lines() -> None:
     body = recorded()
     takes, h = takes_of((body,)), refitted(fitted(body), (body,))
     told = evidence_of(h, (body,), BAND)
-    count = len(told.heard[0].freq_hz)
+    count = len(told.observed[0].freq_hz)
     for keep in (KEPT, 1.0):
         for i, fold in enumerate(_folds(h, (body,), takes, told, 0, keep=keep)):
-            less = fold.evidence.heard[0]
+            less = fold.evidence.observed[0]
             assert len(less.freq_hz) == round(keep * count)
-            assert less.impulse_n_s == pytest.approx(np.delete(told.heard[0].impulse_n_s, i))
+            assert less.impulse_n_s == pytest.approx(np.delete(told.observed[0].impulse_n_s, i))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of, thinned
-from sonic_bullet.diagnosis.evidence.refit import refitted, retold
+from sonic_bullet.diagnosis.evidence.refit import refitted, reidentified
 from sonic_bullet.diagnosis.prediction.score import Take, least_db, mean_db
 from sonic_bullet.diagnosis.selection.acceptance import Candidate
 from sonic_bullet.diagnosis.selection.cross_validation import trials
@@ -29,10 +29,10 @@ LAW = DampingLaw("power", 0.03, exponent=0.9)
 def tried(*effects: DampingLaw) -> tuple[list[Candidate], bool]:
     """A law's trial beside a room that is known, and whether lines alone would have it named."""
     body = recorded(*effects, ROOM)
-    assert body.gathered is not None and body.gathered.signals is not None
-    floor = floor_between(list(body.gathered.signals))
-    takes = [Take(body, i, x, SR, floor) for i, x in zip(body.fitted, body.gathered.signals, strict=True)]
-    h = retold(refitted(truth(ROOM), (body,)), (body,))
+    assert body.recorded is not None and body.recorded.signals is not None
+    floor = floor_between(list(body.recorded.signals))
+    takes = [Take(body, i, x, SR, floor) for i, x in zip(body.fitted, body.recorded.signals, strict=True)]
+    h = reidentified(refitted(truth(ROOM), (body,)), (body,))
     found = trials(h, (body,), takes, evidence_of(h, (body,), BAND), [DampingLaw], seed=0, say=lambda _: None)
     told, least = mean_db(takes, h) or 0.0, least_db(takes, h) or 0.0
     shapeless = (replace(body, family=None),)
@@ -67,16 +67,16 @@ def test_only_what_changes_decays_and_moves_nothing_is_asked_of_lines() -> None:
 def test_lines_that_were_fitted_to_say_nothing() -> None:
     """And those that were not count by Cauchy's loss: with the decays' own law each gains what the other law has it miss."""
     body = recorded(LAW)
-    assert body.gathered is not None
+    assert body.recorded is not None
     wrong, right = refitted(truth(), (body,)), truth(LAW)
     every = evidence_of(wrong, (body,), BAND)
     assert likelier(wrong, right, every, every, (body,)) == 0.0
-    told = thinned(every, (body.gathered, 0), 0.75, np.random.default_rng(1))
+    told = thinned(every, (body.recorded, 0), 0.75, np.random.default_rng(1))
     gain = likelier(wrong, right, every, told, (body,))
     assert gain > 0
     assert likelier(right, wrong, every, told, (body,)) == pytest.approx(-gain)
-    one, x = every.heard[0], plate()
-    out = ~np.isin(one.freq_hz, told.heard[0].freq_hz)
+    one, x = every.observed[0], plate()
+    out = ~np.isin(one.freq_hz, told.observed[0].freq_hz)
     law = LAW.decay_per_s(2 * np.pi * x.freq_hz[[m[0] for m in one.mode]])
     rayleigh = 0.5 * (wrong.alpha_per_s + wrong.beta_s * (2 * np.pi * x.freq_hz[[m[0] for m in one.mode]]) ** 2)
     sd = np.hypot(one.decay_sd_per_s / one.decay_per_s, 0.02)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sonic_bullet.diagnosis.evidence.degenerate_pairs import parted
+from sonic_bullet.diagnosis.evidence.degenerate_pairs import separated
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.records import ModalModel
 from tests.made.body import plate, recorded
@@ -26,9 +26,9 @@ def beside(apart: float) -> ModalModel:
 def meshed(apart: float) -> Struck:
     """Recorded where the lone mode is ``apart`` from the pair, told by a mesh that leaves it 1e-4 from it: one line for all three."""
     body = recorded(model=beside(apart), seconds=1.2)
-    assert body.gathered is not None
+    assert body.recorded is not None
     line = body.line.copy()
-    line[GROUP] = int(np.abs(body.gathered.lines.freq_hz / beside(apart).freq_hz[GROUP[0]] - 1).argmin())
+    line[GROUP] = int(np.abs(body.recorded.lines.freq_hz / beside(apart).freq_hz[GROUP[0]] - 1).argmin())
     model = beside(1e-4)
     return replace(body, model=model, line=line, correction=np.zeros(len(line)))
 
@@ -36,9 +36,9 @@ def meshed(apart: float) -> Struck:
 @pytest.mark.parametrize("apart", [0.005, 0.008])
 def test_two_lines_part_a_group_of_three(apart: float) -> None:
     body = meshed(apart)
-    told = parted(body)
-    assert told.gathered is not None
-    lines = told.gathered.lines.freq_hz
+    told = separated(body)
+    assert told.recorded is not None
+    lines = told.recorded.lines.freq_hz
     own = beside(apart).freq_hz[GROUP]
     assert lines[told.line[GROUP]] == pytest.approx(own, rel=2e-4)
     assert told.model.freq_hz[GROUP] * (1 + told.correction[GROUP]) == pytest.approx(own, rel=2e-4)
@@ -48,15 +48,15 @@ def test_two_lines_part_a_group_of_three(apart: float) -> None:
 
 def test_what_no_second_line_shows_stays_one() -> None:
     body = meshed(0.0)
-    assert parted(body) is body
+    assert separated(body) is body
 
 
 def test_lines_unlike_the_modes_part_nothing() -> None:
     body = meshed(0.006)
-    assert body.gathered is not None
-    lines = body.gathered.lines
+    assert body.recorded is not None
+    lines = body.recorded.lines
     turned = np.roll(lines.amplitude, 1, axis=0)
-    assert parted(replace(body, gathered=replace(body.gathered, lines=replace(lines, amplitude=turned)))).line.tolist() == body.line.tolist()
+    assert separated(replace(body, recorded=replace(body.recorded, lines=replace(lines, amplitude=turned)))).line.tolist() == body.line.tolist()
 
 
 def test_of_two_alone_nobody_can_say() -> None:
@@ -64,4 +64,4 @@ def test_of_two_alone_nobody_can_say() -> None:
     line = body.line.copy()
     line[GROUP[0]] = -1
     pair = replace(body, line=line)
-    assert parted(pair) is pair
+    assert separated(pair) is pair

@@ -27,9 +27,9 @@ SOUNDING = Radiation(0.05, 3.0, 0.5)
 def test_a_filter_that_came_first_goes_for_the_pulse_that_a_tilt_of_level_had_hidden() -> None:
     """√σ and the pulse together look like a gentler low-pass, until both are fitted at once."""
     body = recorded(PULSE, SOUNDING)
-    assert body.gathered is not None and body.gathered.signals is not None
-    floor = floor_between(list(body.gathered.signals))
-    takes = [Take(body, i, x, SR, floor) for i, x in zip(body.fitted, body.gathered.signals, strict=True)]
+    assert body.recorded is not None and body.recorded.signals is not None
+    floor = floor_between(list(body.recorded.signals))
+    takes = [Take(body, i, x, SR, floor) for i, x in zip(body.fitted, body.recorded.signals, strict=True)]
     plain = refitted(truth(), (body,))
     told = evidence_of(plain, (body,), BAND)
     low, pulse = MeasurementChain.propose(told), ContactTime.propose(told)
@@ -62,7 +62,7 @@ def test_a_part_of_the_evidence_fits_the_same_pulse_again() -> None:
     body = recorded(PULSE, SOUNDING)
     told = evidence_of(truth(SOUNDING), (body,), BAND)
     for seed in range(6):
-        less = replace(thinned(told, (told.heard[0].source, seed % 5), 0.4, np.random.default_rng(seed)), known=PULSE)
+        less = replace(thinned(told, (told.observed[0].source, seed % 5), 0.4, np.random.default_rng(seed)), known=PULSE)
         again = ContactTime.propose(less)
         assert again is not None and again.pulse == PULSE.pulse
         assert again.duration_s(0.02) == pytest.approx(9e-4, rel=0.3)

@@ -39,8 +39,8 @@ BAND = (50.0, 7_500.0)
 
 def fitted(body: Struck) -> Hypothesis:
     """The baseline as lines give it: Rayleigh's law by least squares on the decays."""
-    assert body.gathered is not None
-    lines = body.gathered.lines
+    assert body.recorded is not None
+    lines = body.recorded.lines
     w2 = (2 * np.pi * lines.freq_hz) ** 2
     a = np.stack([0.5 * np.ones(len(w2)), 0.5 * w2], axis=1)
     weight = 1 / lines.decay_per_s
@@ -96,7 +96,7 @@ def test_a_planted_effect_is_proposed(effect: Effect, within: dict[str, float]) 
     found = type(effect).propose(evidence)
     assert found is not None
     close(found, effect, within)
-    with_it = refitted(replace(base, effects=(found,)), (body,), evidence.heard)
+    with_it = refitted(replace(base, effects=(found,)), (body,), evidence.observed)
     before, after, floor = (mean_db(takes, base) or 0.0, mean_db(takes, with_it) or 0.0, least_db(takes, with_it) or 0.0)
     assert after - floor < 0.35 * (before - floor)
 
@@ -131,7 +131,7 @@ def test_proposals_depend_on_the_evidence_alone() -> None:
     evidence = evidence_of(fitted(body), (body,), BAND)
     once, again = DampingLaw.propose(evidence), DampingLaw.propose(evidence)
     assert once == again
-    louder = replace(evidence, heard=tuple(replace(h, amplitude=7 * h.amplitude, signal=7 * h.signal) for h in evidence.heard if h.signal is not None))
+    louder = replace(evidence, observed=tuple(replace(h, amplitude=7 * h.amplitude, signal=7 * h.signal) for h in evidence.observed if h.signal is not None))
     assert DampingLaw.propose(louder) == once
 
 

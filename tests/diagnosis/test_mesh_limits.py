@@ -25,11 +25,11 @@ BAND = (50.0, 7_500.0)
 def misjudged(off: np.ndarray, *effects: Effect) -> tuple[Struck, Hypothesis, tuple[Take, ...]]:
     """The plate as its mesh has it, recorded with effects where modes are off (m,) from there, relative; nothing is corrected."""
     mesh = plate()
-    heard = recorded(*effects, model=ordered(mesh, mesh.freq_hz * (1 + off), mesh.decay_per_s)[0]).gathered
-    assert heard is not None and heard.signals is not None
-    body = struck(mesh, heard.lines, heard.signals)
-    floor = floor_between(list(heard.signals))
-    takes = tuple(Take(body, i, x, SR, floor) for i, x in zip(body.fitted, heard.signals, strict=True))
+    observed = recorded(*effects, model=ordered(mesh, mesh.freq_hz * (1 + off), mesh.decay_per_s)[0]).recorded
+    assert observed is not None and observed.signals is not None
+    body = struck(mesh, observed.lines, observed.signals)
+    floor = floor_between(list(observed.signals))
+    takes = tuple(Take(body, i, x, SR, floor) for i, x in zip(body.fitted, observed.signals, strict=True))
     h = refitted(replace(truth(), correction={body.name: np.zeros(mesh.mode_count)}), (body,))
     return body, h, takes
 
@@ -72,11 +72,11 @@ def test_a_mode_below_the_bands_edge_that_nobody_hears_is_the_meshs(reach: float
     model = plate()
     shape = model.shape.copy()
     shape[:, :, -1] = 0.0
-    heard = recorded(model=replace(model, shape=shape)).gathered
-    assert heard is not None and heard.signals is not None
+    observed = recorded(model=replace(model, shape=shape)).recorded
+    assert observed is not None and observed.signals is not None
     edge = float(model.freq_hz[-1]) * reach
-    body = replace(struck(model, heard.lines, heard.signals), band_hz=(50.0, edge))
-    takes = tuple(Take(body, i, x, SR, floor_between(list(heard.signals))) for i, x in zip(body.fitted, heard.signals, strict=True))
+    body = replace(struck(model, observed.lines, observed.signals), band_hz=(50.0, edge))
+    takes = tuple(Take(body, i, x, SR, floor_between(list(observed.signals))) for i, x in zip(body.fitted, observed.signals, strict=True))
     h = refitted(replace(truth(), correction={body.name: np.zeros(model.mode_count)}), (body,))
     far, most = beyond(h, (body,), takes)
     assert (most > 0) == outside

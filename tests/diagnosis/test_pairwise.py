@@ -13,7 +13,7 @@ from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis
 from sonic_bullet.diagnosis.prediction.score import Take
 from sonic_bullet.diagnosis.selection import pairwise as twos
 from sonic_bullet.diagnosis.selection.acceptance import Candidate
-from sonic_bullet.diagnosis.selection.pairwise import in_a_room, in_twos
+from sonic_bullet.diagnosis.selection.pairwise import in_a_room, pairwise
 from sonic_bullet.effects import Effect
 from sonic_bullet.effects.added_mass import AddedMass
 from sonic_bullet.effects.contact_time import ContactTime
@@ -33,18 +33,18 @@ MASS = AddedMass((0.0477, 0.0371, 0.0), 0.06)
 def tried(*effects: Effect, kinds: tuple[type[Effect], ...]) -> tuple[list[Candidate], tuple[Hypothesis, list[Candidate]] | None]:
     """A first round of suspects that have not stood any trial, and what two at once make of them."""
     body = recorded(*effects)
-    assert body.gathered is not None and body.gathered.signals is not None
-    floor = floor_between(list(body.gathered.signals))
-    takes = [Take(body, i, x, SR, floor) for i, x in zip(body.fitted, body.gathered.signals, strict=True)]
+    assert body.recorded is not None and body.recorded.signals is not None
+    floor = floor_between(list(body.recorded.signals))
+    takes = [Take(body, i, x, SR, floor) for i, x in zip(body.fitted, body.recorded.signals, strict=True)]
     start = refitted(truth(), (body,))
     told = evidence_of(start, (body,), BAND)
     first = []
     for kind in kinds:
         found = kind.propose(told)
         if found is not None:
-            h = refitted(replace(start, effects=(found,)), (body,), told.heard)
+            h = refitted(replace(start, effects=(found,)), (body,), told.observed)
             first.append(Candidate(kind.id, found, h, np.zeros(len(takes)), 0.0, 0.0, {}))
-    return first, in_twos(start, first, (body,), takes, BAND, seed=0, say=lambda _: None)
+    return first, pairwise(start, first, (body,), takes, BAND, seed=0, say=lambda _: None)
 
 
 def test_a_law_and_a_pulse_are_found_at_once_whatever_each_says_alone() -> None:
@@ -74,14 +74,14 @@ def test_one_suspect_alone_makes_no_two() -> None:
 def heard_anew(planted: tuple[Effect, ...], suspect: Effect) -> tuple[Hypothesis, list[Candidate]] | None:
     """What a room's own trial beside a suspect that moves modes comes to, where the room was found first, alone."""
     body = recorded(*planted)
-    assert body.gathered is not None and body.gathered.signals is not None
-    floor = floor_between(list(body.gathered.signals))
-    takes = [Take(body, i, x, SR, floor) for i, x in zip(body.fitted, body.gathered.signals, strict=True)]
+    assert body.recorded is not None and body.recorded.signals is not None
+    floor = floor_between(list(body.recorded.signals))
+    takes = [Take(body, i, x, SR, floor) for i, x in zip(body.fitted, body.recorded.signals, strict=True)]
     start = refitted(truth(), (body,))
     told = evidence_of(start, (body,), BAND)
     room = Room.propose(told)
     assert room is not None
-    h = refitted(replace(start, effects=(room,)), (body,), told.heard)
+    h = refitted(replace(start, effects=(room,)), (body,), told.observed)
     found = [Candidate(suspect.id, suspect, h, np.zeros(len(takes)), 0.0, 0.0, {})]
     return in_a_room(h, found, (body,), takes, BAND, seed=0, say=lambda _: None)
 

@@ -23,8 +23,8 @@ CHOKED = AmplitudeDamping(5.0, "velocity")
 
 def lines_of(*effects: Effect) -> Lines:
     body = recorded(*effects)
-    assert body.gathered is not None
-    return body.gathered.lines
+    assert body.recorded is not None
+    return body.recorded.lines
 
 
 def true_decay(freq_hz: Array) -> Array:
@@ -56,8 +56,8 @@ def test_a_choked_mode_ends_with_its_own_decay() -> None:
 
 def test_chains_add_up_to_what_was_struck() -> None:
     body, plain = recorded(BENT), recorded()
-    assert body.gathered is not None and plain.gathered is not None
-    one, own = unchained(body.gathered.lines, LINKS[1]), plain.gathered.lines
+    assert body.recorded is not None and plain.recorded is not None
+    one, own = unchained(body.recorded.lines, LINKS[1]), plain.recorded.lines
     assert one is not None
     apart = np.array([np.sort(np.abs(own.freq_hz / f - 1))[1] > 0.02 for f in own.freq_hz])  # nearer ones lend each other lines
     assert apart.sum() >= 12
@@ -86,9 +86,9 @@ def test_the_bend_and_its_measure_are_read_off_the_modes_that_show_it(measure: s
     """By displacement only the lowest modes bend; the others say nothing for or against it."""
     true = AmplitudePitch(0.08 if measure == "velocity" else 2.0e6, measure)
     body = recorded(true)
-    assert body.gathered is not None
-    one = unchained(body.gathered.lines, LINKS[1]) or body.gathered.lines
-    again = struck(lines=one, signals=body.gathered.signals)
+    assert body.recorded is not None
+    one = unchained(body.recorded.lines, LINKS[1]) or body.recorded.lines
+    again = struck(lines=one, signals=body.recorded.signals)
     found = AmplitudePitch.propose(evidence_of(refitted(fitted(again), (again,)), (again,), BAND))
     assert found is not None and found.measure == measure
     assert found.bend == pytest.approx(true.bend, rel=0.1)

@@ -35,14 +35,14 @@ def test_a_twin_that_a_mesh_has_torn_off_goes_back_to_its_line() -> None:
     freq = model.freq_hz.copy()
     freq[4] = freq[3]
     body = recorded(model=replace(model, freq_hz=freq))
-    torn = freq.copy()
-    torn[4] *= 1.002
+    split_apart = freq.copy()
+    split_apart[4] *= 1.002
     line = body.line.copy()
     line[4] = -1
-    wrong = replace(body, model=replace(body.model, freq_hz=torn), line=line)
+    wrong = replace(body, model=replace(body.model, freq_hz=split_apart), line=line)
     (right,) = settled(replace(truth(), correction={"plate": wrong.correction}), (wrong,))
     assert right.line[4] == right.line[3]
-    assert torn[4] * (1 + right.correction[4]) == pytest.approx(freq[3], rel=3e-4)
+    assert split_apart[4] * (1 + right.correction[4]) == pytest.approx(freq[3], rel=3e-4)
 
 
 def test_what_the_recordings_do_not_want_elsewhere_stays() -> None:
@@ -64,10 +64,10 @@ def test_a_mode_at_the_bands_edge_that_nobody_hears_lies_outside(reach: float, o
     model = plate()
     shape = model.shape.copy()
     shape[:, :, -1] = 0.0
-    heard = recorded(model=replace(model, shape=shape)).gathered
-    assert heard is not None
+    observed = recorded(model=replace(model, shape=shape)).recorded
+    assert observed is not None
     edge = float(model.freq_hz[-1]) * reach
-    wrong = replace(struck(model, heard.lines, heard.signals), band_hz=(50.0, edge))
+    wrong = replace(struck(model, observed.lines, observed.signals), band_hz=(50.0, edge))
     assert wrong.line[-1] == -1
     (right,) = settled(replace(truth(), correction={"plate": wrong.correction}), (wrong,))
     assert (model.freq_hz[-1] * (1 + right.correction[-1]) > edge) == outside

@@ -38,18 +38,18 @@ def with_twins() -> ModalModel:
 def assert_nearer_than_the_meshs(found: AmplitudeDamping | AmplitudePitch, base: Hypothesis, body: Struck, evidence: Evidence) -> None:
     """The axes that were found play nearer to the recordings than the mesh's."""
     takes = takes_of((body,))
-    own, mesh = (mean_db(takes, refitted(replace(base, effects=(e,)), (body,), evidence.heard)) for e in (found, replace(found, freq_hz=(), turn_rad=())))
+    own, mesh = (mean_db(takes, refitted(replace(base, effects=(e,)), (body,), evidence.observed)) for e in (found, replace(found, freq_hz=(), turn_rad=())))
     assert own is not None and mesh is not None and own < mesh
 
 
 @pytest.mark.parametrize(("choke", "power"), [(2.0, 1.0), (5.0, 1.0), (4.0, 2.0)])
-def test_choke_and_decays_are_told_to_a_few_percent(choke: float, power: float) -> None:
+def test_choke_and_decays_are_told_to_a_few_percent(damping_growth: float, power: float) -> None:
     """However weak, as decays are no longer picked from a grid; and with what power of the level."""
-    body = recorded(AmplitudeDamping(choke, "velocity", power=power))
+    body = recorded(AmplitudeDamping(damping_growth, "velocity", power=power))
     base = refitted(fitted(body), (body,))
     found = AmplitudeDamping.propose(evidence_of(base, (body,), BAND))
     assert found is not None and (found.measure, found.power, found.freq_hz) == ("velocity", power, ())
-    assert found.choke == pytest.approx(choke, rel=0.1)
+    assert found.damping_growth == pytest.approx(damping_growth, rel=0.1)
     assert found.alpha_per_s == pytest.approx(ALPHA, rel=0.03)
     assert found.beta_s == pytest.approx(BETA, rel=0.03)
     assert base.gain * found.louder == pytest.approx(GAIN, rel=0.03)
@@ -63,11 +63,11 @@ def test_twins_have_the_axes_that_their_envelopes_tell() -> None:
     evidence = evidence_of(base, (body,), BAND)
     found = AmplitudeDamping.propose(evidence)
     assert found is not None
-    assert found.choke == pytest.approx(5.0, rel=0.1)
+    assert found.damping_growth == pytest.approx(5.0, rel=0.1)
     assert found.freq_hz == pytest.approx((middle,), rel=1e-3)
     assert found.turn_rad[0] == pytest.approx(0.6, abs=0.1)
     assert_nearer_than_the_meshs(found, base, body, evidence)
-    less = thinned(evidence, (evidence.heard[0].source, 2), 1.0, np.random.default_rng(0))
+    less = thinned(evidence, (evidence.observed[0].source, 2), 1.0, np.random.default_rng(0))
     other = replace(found, turn_rad=(1.2,))
     held, learnt = (AmplitudeDamping.propose(replace(less, known=other, on_trial=trial)) for trial in (True, False))
     assert held is not None and learnt is not None
@@ -79,10 +79,10 @@ def test_levels_from_strike_to_strike_tell_the_axes_too() -> None:
     """Strikes an octave apart: the louder, the sooner choked; and where nobody hears the line, no angle is likely under which it would be loud."""
     model = with_twins()
     body = recorded(AmplitudeDamping(5.0, "velocity", freq_hz=(float(model.freq_hz[PAIR[0]]),), turn_rad=(0.6,)), model=model)
-    heard = evidence_of(refitted(fitted(body), (body,)), (body,), BAND).heard[0]
-    e = envelopes(heard)
+    observed = evidence_of(refitted(fitted(body), (body,)), (body,), BAND).observed[0]
+    e = envelopes(observed)
     assert e is not None
-    line = next(one for one in lines_under(e, heard, "velocity") if len(one.amplitude) > 1)
+    line = next(one for one in lines_under(e, observed, "velocity") if len(one.amplitude) > 1)
     found = told(line, 5.0)
     assert ANGLES[int(found.between.argmin())] == pytest.approx(0.6, abs=0.1)
     assert np.ptp(found.between) > 1.0
@@ -99,7 +99,7 @@ def test_what_is_known_to_ring_beside_the_body_is_taken_out_of_its_lines() -> No
     stand = ForeignMode(beside, (35.0,) * len(beside), (0.6,) * len(beside), (0.3,) * len(beside))
     body = recorded(AmplitudeDamping(4.0, "velocity", power=2.0), stand)
     told = evidence_of(refitted(replace(fitted(body), effects=(stand,)), (body,)), (body,), BAND)
-    one = told.heard[0]
+    one = told.observed[0]
     assert len(beside) > 4
     assert one.signal is not None and one.own is not None
     t = np.arange(one.signal.shape[1]) / SR
@@ -107,9 +107,9 @@ def test_what_is_known_to_ring_beside_the_body_is_taken_out_of_its_lines() -> No
     assert one.signal[0] - one.own[0] == pytest.approx(rings, abs=1e-9)
     found = AmplitudeDamping.propose(told)
     assert found is not None and (found.measure, found.power) == ("velocity", 2.0)
-    assert found.choke == pytest.approx(4.0, rel=0.1)
-    hidden = AmplitudeDamping.propose(replace(told, heard=(replace(one, own=None),)))
-    assert hidden is None or abs(hidden.choke / 4.0 - 1) > abs(found.choke / 4.0 - 1)
+    assert found.damping_growth == pytest.approx(4.0, rel=0.1)
+    hidden = AmplitudeDamping.propose(replace(told, observed=(replace(one, own=None),)))
+    assert hidden is None or abs(hidden.damping_growth / 4.0 - 1) > abs(found.damping_growth / 4.0 - 1)
 
 
 def test_turned_twins_sound_as_before_where_nothing_is_choked() -> None:

@@ -22,7 +22,7 @@ from sonic_bullet.effects.amplitude_pitch import NEAR, AmplitudePitch, _moments,
 from sonic_bullet.effects.amplitude_pitch.degenerate_pitch import bend_beside
 from sonic_bullet.effects.common.envelope import Envelopes, alone, envelopes, windowed
 from sonic_bullet.effects.contact_time import ContactTime
-from sonic_bullet.effects.protocol import Heard
+from sonic_bullet.effects.protocol import ObjectEvidence
 from sonic_bullet.effects.room import Room
 from tests.made.body import GAIN, plate, recorded
 
@@ -39,7 +39,7 @@ def test_modes_ring_down_to_where_they_are_at_rest() -> None:
     """Corrections that are off come back to the plate's own frequencies beside the true bend, of all modes that stand alone."""
     body = made(BENT.bend)
     h = fitted(body)
-    told = evidence_of(h, (body,), BAND).heard[0]
+    told = evidence_of(h, (body,), BAND).observed[0]
     mine = np.concatenate([told.mode[k] for k in alone(told)[0]])
     others = np.setdiff1d(np.arange(len(plate().freq_hz)), mine)
     assert len(mine) > 12 and len(others) > 0
@@ -65,7 +65,7 @@ def test_what_a_long_pulse_has_left_faint_does_not_glide() -> None:
     body = made(BENT.bend)
     h = fitted(body)
     long = ContactTime(6e-4, 0.02)
-    lines = [evidence_of(replace(h, effects=effects), (body,), BAND).heard[0] for effects in ((BENT,), (BENT, long))]
+    lines = [evidence_of(replace(h, effects=effects), (body,), BAND).observed[0] for effects in ((BENT,), (BENT, long))]
     hard = turns_rad(replace(h, effects=(BENT,)), body, lines[0])
     soft = turns_rad(replace(h, effects=(BENT, long)), body, lines[1])
     one = lines[1]
@@ -90,7 +90,7 @@ def test_a_bend_by_impulse_is_told_by_what_the_pulse_leaves_of_it() -> None:
 def test_a_level_falls_as_the_linear_mode_does_while_its_lines_do_not(bend: float) -> None:
     bent = AmplitudePitch(bend, "velocity")
     body = made(bend)
-    lines = evidence_of(fitted(body), (body,), BAND).heard[0]
+    lines = evidence_of(fitted(body), (body,), BAND).observed[0]
     told = fallen(replace(fitted(body), effects=(bent,)), body, lines)
     changed = told.decay_per_s != lines.decay_per_s
     before = np.abs(np.log(lines.decay_per_s / true_decay(lines.freq_hz)))[changed]
@@ -130,8 +130,8 @@ def test_axes_of_twins_are_held_on_trial_and_learnt_again_beside_other_effects()
     held, learnt = (AmplitudePitch.propose(replace(told, known=wrong, on_trial=trial)) for trial in (True, False))
     assert held is not None and held.turn_rad == (1.2,)
     assert learnt is not None and learnt.turn_rad[0] == pytest.approx(0.6, abs=0.06)
-    apart = replace(told.heard[0], plain=replace(model, freq_hz=np.sort(model.freq_hz * np.linspace(1, 1.05, len(model.freq_hz)))))
-    split = AmplitudePitch.propose(replace(told, heard=(apart,), known=wrong))
+    apart = replace(told.observed[0], plain=replace(model, freq_hz=np.sort(model.freq_hz * np.linspace(1, 1.05, len(model.freq_hz)))))
+    split = AmplitudePitch.propose(replace(told, observed=(apart,), known=wrong))
     assert split is not None and split.turn_rad == ()
 
 
@@ -143,7 +143,7 @@ def test_twins_that_glide_and_beat_fall_as_what_is_played_does(off_per_s: float)
     bent = AmplitudePitch(2.0, "velocity", (middle,), (0.6,))
     body = recorded(bent, model=model)
     h = replace(fitted(body), effects=(bent,))
-    lines = evidence_of(replace(h, effects=()), (body,), BAND).heard[0]
+    lines = evidence_of(replace(h, effects=()), (body,), BAND).observed[0]
     k = int(np.abs(lines.freq_hz / middle - 1).argmin())
     assert len(lines.mode[k]) == 2
     right = float(true_decay(lines.freq_hz[k : k + 1])[0])
@@ -160,13 +160,13 @@ def test_twins_that_are_played_as_two_are_not_turned() -> None:
     model = with_twins()
     body = recorded(AmplitudePitch(0.7, "velocity", (float(model.freq_hz[PAIR[0]]),), (0.6,)), model=model)
     told = evidence_of(refitted(fitted(body), (body,)), (body,), BAND)
-    one = told.heard[0]
+    one = told.observed[0]
     assert one.model is not None
     freq = one.model.freq_hz.copy()
     freq[PAIR[1]] *= 1 + 9e-4
     apart = replace(one, model=replace(one.model, freq_hz=freq))
-    for heard, turned in ((one, 1), (apart, 0)):
-        found = AmplitudePitch.propose(replace(told, heard=(heard,)))
+    for observed, turned in ((one, 1), (apart, 0)):
+        found = AmplitudePitch.propose(replace(told, observed=(observed,)))
         assert found is not None and len(found.turn_rad) == turned
 
 
@@ -175,7 +175,7 @@ def test_a_bend_is_told_with_the_axes_of_twins() -> None:
     model = with_twins()
     bent = AmplitudePitch(0.7, "velocity", (float(model.freq_hz[PAIR[0]]),), (0.6,))
     body = recorded(bent, model=model)
-    told = evidence_of(refitted(fitted(body), (body,)), (body,), BAND).heard[0]
+    told = evidence_of(refitted(fitted(body), (body,)), (body,), BAND).observed[0]
     e = envelopes(told)
     assert e is not None
     near = bend_beside(e, told, "velocity", bend_beside(e, told, "velocity", 0.5, FARTHER), NEAR)
@@ -184,7 +184,7 @@ def test_a_bend_is_told_with_the_axes_of_twins() -> None:
 
 def test_in_a_room_no_line_is_one_modes_alone() -> None:
     body = made(BENT.bend)
-    told = evidence_of(replace(fitted(body), effects=(Room(0.4, 0.3, 3),)), (body,), BAND).heard[0]
+    told = evidence_of(replace(fitted(body), effects=(Room(0.4, 0.3, 3),)), (body,), BAND).observed[0]
     assert told.dry
     h = replace(fitted(body), effects=(BENT,))
     assert fallen(h, body, told) is told
@@ -194,7 +194,7 @@ def test_in_a_room_no_line_is_one_modes_alone() -> None:
 @pytest.mark.parametrize("bend", [0.35, 1.0])
 def test_lines_of_a_modes_own_chain_are_no_neighbours(bend: float) -> None:
     body = made(bend)
-    told = evidence_of(fitted(body), (body,), BAND).heard[0]
+    told = evidence_of(fitted(body), (body,), BAND).observed[0]
     assert len(told.foreign_hz) > 5, "chains"
     assert len(alone(told)[0]) >= 6
 
@@ -202,7 +202,7 @@ def test_lines_of_a_modes_own_chain_are_no_neighbours(bend: float) -> None:
 def test_phases_are_whole_turns_apart_however_few_the_frames_are() -> None:
     """The loudest modes turn by more than half between two frames where they begin."""
     body = made(1.0)
-    told = evidence_of(fitted(body), (body,), BAND).heard[0]
+    told = evidence_of(fitted(body), (body,), BAND).observed[0]
     e = envelopes(told)
     assert e is not None
     assert np.abs(np.exp(1j * e.phase) - e.z / np.abs(e.z))[e.good].max() < 1e-6
@@ -214,21 +214,21 @@ def test_phases_are_whole_turns_apart_however_few_the_frames_are() -> None:
 def test_a_mode_at_rest_is_not_taken_for_its_neighbour(reach_hz: float, off_hz: float) -> None:
     """What is played there may be the neighbour's alone, 15 Hz away: with less than that in reach nothing is moved, nor to the end of the reach."""
     t = np.linspace(0.01, 0.5, 96)[None]
-    heard, good = np.exp(2j * np.pi * 15 * t)[None], np.ones((1, 1, 96), bool)
-    recording = Envelopes(t, heard, good, np.zeros(1, int), np.full((1, 1), 1e-3), np.angle(heard), np.full(1, 0.02))
-    assert _off_hz(recording, replace(recording, z=np.ones_like(heard)), 0, reach_hz) == pytest.approx(off_hz, abs=0.02)
+    observed, good = np.exp(2j * np.pi * 15 * t)[None], np.ones((1, 1, 96), bool)
+    recording = Envelopes(t, observed, good, np.zeros(1, int), np.full((1, 1), 1e-3), np.angle(observed), np.full(1, 0.02))
+    assert _off_hz(recording, replace(recording, z=np.ones_like(observed)), 0, reach_hz) == pytest.approx(off_hz, abs=0.02)
 
 
 def test_a_bend_that_one_lone_mode_alone_tells_is_told_by_all(monkeypatch: pytest.MonkeyPatch) -> None:
     """Three modes without a twin, but two of them hardly move: the pairs have to say it, too."""
     body = made(BENT.bend)
-    told = evidence_of(fitted(body), (body,), BAND).heard[0]
+    told = evidence_of(fitted(body), (body,), BAND).observed[0]
     e = envelopes(told)
     assert e is not None
     assert _slopes(e, told, None)["velocity"].single
     lone = e.line[:3]
 
-    def still(e: Envelopes, h: Heard, level: np.ndarray, q: int) -> tuple[float, float, float] | None:
+    def still(e: Envelopes, h: ObjectEvidence, level: np.ndarray, q: int) -> tuple[float, float, float] | None:
         """Two of the three hardly move: what a bend would turn is a thousandth of what there is."""
         xx, xy, yy = _moments(e, h, level, q) or (0.0, 0.0, 0.0)
         return (1e-6 * xx, 1e-3 * xy, yy) if q < 2 else (xx, xy, yy)
@@ -246,7 +246,7 @@ def test_a_bend_is_told_by_the_levels_that_the_pulse_leaves() -> None:
     pulse, bent = ContactTime(6e-4, 0.016, 0.0), AmplitudePitch(0.7, "velocity")
     body = recorded(pulse, bent, noise=2e-6)
     told = evidence_of(refitted(replace(fitted(body), effects=(pulse,)), (body,)), (body,), BAND)
-    assert told.heard[0].pressed.min() < 0.2 and told.heard[0].pressed.max() > 0.9
+    assert told.observed[0].pressed.min() < 0.2 and told.observed[0].pressed.max() > 0.9
     found = AmplitudePitch.propose(told)
     assert found is not None and found.measure == "velocity"
     assert found.bend == pytest.approx(0.7, rel=0.1)

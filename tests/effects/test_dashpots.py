@@ -24,12 +24,12 @@ BAND = (50.0, 7_500.0)
 
 def test_a_mode_that_should_be_heard_and_is_not_costs_something() -> None:
     body = recorded()
-    t = Trial.of(evidence_of(truth(), (body,), BAND).heard[0])
+    t = Trial.of(evidence_of(truth(), (body,), BAND).observed[0])
     loud = 1 + int(np.argmax(np.abs(t.size[:, 1:-1]).max(axis=0)))  # between two others: beyond them nobody listens
     rest = np.delete(np.arange(len(t.freq_hz)), loud)
     fewer = replace(t, freq_hz=t.freq_hz[rest], decay_per_s=t.decay_per_s[rest], sd=t.sd[rest], size=t.size[:, rest], worth=t.worth[rest])
-    keep = np.abs(t.heard_hz - t.freq_hz[loud]) > 1e-6
-    deaf = replace(fewer, heard_hz=t.heard_hz[keep], rings_per_s=t.rings_per_s[keep])
+    keep = np.abs(t.observed_hz - t.freq_hz[loud]) > 1e-6
+    deaf = replace(fewer, observed_hz=t.observed_hz[keep], rings_per_s=t.rings_per_s[keep])
     # the two differ in whether a line is there, one that is held against no mode
     assert deaf.left(()) - fewer.left(()) > 0.8 * MUTE
     unknown = replace(fewer, rings_per_s=np.where(keep, t.rings_per_s, np.nan))
@@ -46,17 +46,17 @@ def test_a_mode_that_should_be_heard_and_is_not_costs_something() -> None:
 
 def test_a_faint_line_far_above_does_not_hide_a_dashpot() -> None:
     body = recorded(SupportDamping((SPOT,), (3.0,)))
-    heard = evidence_of(truth(), (body,), BAND).heard[0]
-    low = heard.freq_hz < 3_500
+    observed = evidence_of(truth(), (body,), BAND).observed[0]
+    low = observed.freq_hz < 3_500
     one = replace(
-        heard,
-        **{name: getattr(heard, name)[low] for name in ("freq_hz", "decay_per_s", "freq_sd_hz", "decay_sd_per_s", "model_hz", "expected_decay_per_s")},
-        **{name: getattr(heard, name)[:, low] for name in ("amplitude", "amplitude_sd", "expected", "pattern")},
-        mode=tuple(m for m, there in zip(heard.mode, low, strict=True) if there),
+        observed,
+        **{name: getattr(observed, name)[low] for name in ("freq_hz", "decay_per_s", "freq_sd_hz", "decay_sd_per_s", "model_hz", "expected_decay_per_s")},
+        **{name: getattr(observed, name)[:, low] for name in ("amplitude", "amplitude_sd", "expected", "pattern")},
+        mode=tuple(m for m, there in zip(observed.mode, low, strict=True) if there),
         foreign_hz=np.array([7_000.0]),
         foreign_decay_per_s=np.array([40.0]),
-        foreign_amplitude=np.full((len(heard.amplitude), 1), 1e-3 * np.abs(heard.amplitude).max()),
-        foreign_sd=np.zeros((len(heard.amplitude), 1)),
+        foreign_amplitude=np.full((len(observed.amplitude), 1), 1e-3 * np.abs(observed.amplitude).max()),
+        foreign_sd=np.zeros((len(observed.amplitude), 1)),
     )
     found = sought(Trial.of(one))
     assert [d.c for d in found] == [pytest.approx(3.0, rel=0.15)]
@@ -64,7 +64,7 @@ def test_a_faint_line_far_above_does_not_hide_a_dashpot() -> None:
 
 def test_a_line_louder_than_its_mode_counts_as_one_of_another_decay_does() -> None:
     """All strikes alike: a pattern's cosine sees nothing of it. What is common to all lines is a gain, and says nothing."""
-    t = Trial.of(evidence_of(truth(), (recorded(),), BAND).heard[0])
+    t = Trial.of(evidence_of(truth(), (recorded(),), BAND).observed[0])
     one = np.where(np.arange(len(t.freq_hz)) == 3, 10.0, 1.0)
     by_hand = MISSED * np.log1p((np.log(10) / LEVEL) ** 2 / MISSED)
     changed = replace(t, size=t.size * one)
@@ -176,7 +176,7 @@ def test_a_law_of_the_material_is_read_beside_dashpots_and_acts_under_them() -> 
 def test_a_dashpot_that_does_nothing_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
     """Beside whatever moves modes twins keep corrections of their own, which gains something where a mesh is off: that is no dashpot's."""
     told = evidence_of(truth(), (recorded(),), BAND)
-    x = told.heard[0].model
+    x = told.observed[0].model
     assert x is not None
     vertex = int((x.shape[: len(np.unique(x.face)), 2].astype(float) ** 2).sum(axis=1).argmax())
     for share, named in ((0.5 * LEAST, False), (2.0 * LEAST, True)):

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from sonic_bullet.diagnosis.prediction.hypothesis import modes_of
-from sonic_bullet.effects import EFFECTS, Blow, Effect, Ring, Sound, Stage
+from sonic_bullet.effects import EFFECTS, Effect, Impact, Ring, Sound, Stage
 from sonic_bullet.effects.added_mass import AddedMass
 from sonic_bullet.effects.amplitude_damping import AmplitudeDamping
 from sonic_bullet.effects.amplitude_pitch import AmplitudePitch
@@ -55,7 +55,7 @@ def given(stage: Stage) -> Any:
     if stage is Stage.MODES:
         return modes_of(truth(), struck())[0]
     if stage is Stage.FORCE:
-        return Blow(0.02, np.zeros(1), np.ones(1))
+        return Impact(0.02, np.zeros(1), np.ones(1))
     if stage is Stage.BANK:
         m = np.arange(1.0, 6.0)
         return Ring(400 * m, 5 * m, 0.1 * m + 0.05j, 0.02 * m, 0 * m, 0 * m, 0.02)
@@ -124,14 +124,14 @@ def test_a_pulse_is_its_own_integral(pulse: str) -> None:
 @pytest.mark.parametrize("power", [1.0, 2.0])
 def test_a_bent_mode_is_the_equation_solved(power: float) -> None:
     """Against 4th-order Runge-Kutta of ȧ = −d a(1 + (c a)^p), θ̇ = ω(1 + b a²)."""
-    f, d, level, bend, choke, sr, n = 300.0, 8.0, 0.4, 0.05, 1.7, 8000, 4000
+    f, d, level, bend, damping_growth, sr, n = 300.0, 8.0, 0.4, 0.05, 1.7, 8000, 4000
     one = np.ones(1)
-    ring = Ring(f * one, d * one, 0.7 * one.astype(complex), level * one, bend * one, choke * one, choke_power=power)
-    got = sounded(ring, Blow(1.0, np.zeros(1), one), n, sr)
+    ring = Ring(f * one, d * one, 0.7 * one.astype(complex), level * one, bend * one, damping_growth * one, damping_growth_power=power)
+    got = sounded(ring, Impact(1.0, np.zeros(1), one), n, sr)
 
     def slope(state: Any) -> Any:
         a = state[0]
-        return np.array([-d * a * (1 + (choke * a) ** power), 2 * np.pi * f * (1 + bend * a * a)])
+        return np.array([-d * a * (1 + (damping_growth * a) ** power), 2 * np.pi * f * (1 + bend * a * a)])
 
     state, step, made = np.array([level, 0.0]), 1 / sr / 4, []
     for i in range(4 * n):

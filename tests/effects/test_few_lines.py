@@ -14,7 +14,7 @@ from sonic_bullet.effects.damping_law import DampingLaw
 from sonic_bullet.effects.orthotropy.tensor_lines import Told, ringing, told_of
 from sonic_bullet.effects.orthotropy.tensor_search import Tensor, _judged, isotropic_p
 from sonic_bullet.effects.orthotropy.tensors import reduced
-from sonic_bullet.effects.protocol import Elastic, Heard
+from sonic_bullet.effects.protocol import Elastic, ObjectEvidence
 from sonic_bullet.records import Array, Material
 from tests.made.body import recorded, truth
 
@@ -28,10 +28,10 @@ def elastic(freq_hz: Array, pattern: Array) -> Elastic:
     return Elastic(MATERIAL, True, lambda _: (freq_hz, lambda mode: np.zeros((9, len(mode))), pattern), lambda _: None)  # type: ignore[arg-type,return-value]
 
 
-def heard(hz: list[float], decay: list[float], amplitude: Array) -> Heard:
+def observed(hz: list[float], decay: list[float], amplitude: Array) -> ObjectEvidence:
     """A plate's strikes that hold foreign lines (f,) of these numbers and amplitudes (s, f)."""
     body = recorded()
-    one = evidence_of(truth(), (body,), BAND).heard[0]
+    one = evidence_of(truth(), (body,), BAND).observed[0]
     return replace(
         one,
         elastic=elastic(np.array(hz), amplitude.real),
@@ -42,7 +42,7 @@ def heard(hz: list[float], decay: list[float], amplitude: Array) -> Heard:
     )
 
 
-def only(one: Heard, lines: int) -> Heard:
+def only(one: ObjectEvidence, lines: int) -> ObjectEvidence:
     """The evidence where no more than the first lines stood above the noise."""
     k = slice(0, lines)
     return replace(
@@ -68,7 +68,7 @@ LONG = (
 def test_modes_that_nobody_hears_tell_a_long_contact(pulse: ContactTime, lines: int) -> None:
     """A soft hammer leaves two or three lines: a pulse far longer would say as much of those, and one far shorter as much of the silence above."""
     told = evidence_of(truth(), (recorded(pulse),), BAND)
-    found = ContactTime.propose(replace(told, heard=(only(told.heard[0], lines),)))
+    found = ContactTime.propose(replace(told, observed=(only(told.observed[0], lines),)))
     assert found is not None
     half = [one.duration_s(0.016) * WIDTH[one.pulse] for one in (found, pulse)]
     assert half[0] == pytest.approx(half[1], rel=0.12)
@@ -76,21 +76,21 @@ def test_modes_that_nobody_hears_tell_a_long_contact(pulse: ContactTime, lines: 
 
 def test_few_lines_of_a_sharp_blow_tell_no_contact_time() -> None:
     told = evidence_of(truth(), (recorded(),), BAND)
-    loud = replace(told.heard[0], noise=np.full(5, 0.1))  # so loud that silence says nothing
-    assert ContactTime.propose(replace(told, heard=(only(loud, 3),))) is None
+    loud = replace(told.observed[0], noise=np.full(5, 0.1))  # so loud that silence says nothing
+    assert ContactTime.propose(replace(told, observed=(only(loud, 3),))) is None
 
 
 def test_what_is_gone_within_a_period_or_keeps_no_phase_is_no_mode() -> None:
     turn = np.exp(1j * np.array([0.3, 1.9, -2.2, 1.1, -1.3]))
     still = np.array([1.0, -0.5, 0.7, -0.9, 0.4]) + 0j
-    one = heard([20.0, 60.0, 900.0, 1200.0], [60.0, 20.0, 50.0, 50.0], np.stack([still, still, turn, still], axis=1))
+    one = observed([20.0, 60.0, 900.0, 1200.0], [60.0, 20.0, 50.0, 50.0], np.stack([still, still, turn, still], axis=1))
     assert ringing(one).tolist() == [False, True, False, True]
 
 
 def test_broad_lines_are_worth_less() -> None:
     still = np.array([1.0, -0.5, 0.7, -0.9, 0.4]) + 0j
-    one = heard([900.0, 601.0, 613.0], [5.0, 20.0, 120.0], np.stack([still] * 3, axis=1))
-    told = told_of(replace(evidence_of(truth(), (recorded(),), BAND), heard=(one,)))[0]
+    one = observed([900.0, 601.0, 613.0], [5.0, 20.0, 120.0], np.stack([still] * 3, axis=1))
+    told = told_of(replace(evidence_of(truth(), (recorded(),), BAND), observed=(one,)))[0]
     narrow, broad = (told.worth[int(np.argmin(np.abs(told.log_hz - np.log(f))))] for f in (601.0, 613.0))
     assert broad < 0.8 * narrow
 
@@ -113,7 +113,7 @@ def test_a_part_of_the_lines_fits_the_same_law_again() -> None:
     law = DampingLaw("power", 6e-3, 1.4)
     told = evidence_of(truth(), (recorded(law),), BAND)
     for seed in range(4):
-        again = DampingLaw.propose(replace(thinned(told, (told.heard[0].source, seed), 0.4, np.random.default_rng(seed)), known=law))
+        again = DampingLaw.propose(replace(thinned(told, (told.observed[0].source, seed), 0.4, np.random.default_rng(seed)), known=law))
         assert again is not None and again.law == "power"
         assert again.exponent == pytest.approx(1.4, abs=0.15)
 
@@ -130,12 +130,12 @@ def test_in_a_room_a_tensor_must_place_a_line_more_and_need_not_place_all(
     gain: float, matched: float, off: float, dry: bool, named: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     hz = [410.0, 700.0, 1110.0, 1630.0, 2410.0, 3050.0, 4100.0]
-    one = replace(heard(hz, [30.0] * len(hz), np.ones((5, len(hz)), complex)), dry=dry)
+    one = replace(observed(hz, [30.0] * len(hz), np.ones((5, len(hz)), complex)), dry=dry)
     plain = Tensor("isotropic", isotropic_p(elastic(np.array(hz), np.ones((5, len(hz))))), -600.0, 0.004, 0.27, (), 0.0105)
     stiff = plain.p + np.array([0.5, -0.5, 0, 0, 0, 0, 0, 0, 0])
     monkeypatch.setattr(orthotropy, "search", lambda _: (plain, Tensor("orthorhombic", stiff, -600.0 - gain, 0.003, matched, (), off)))
     monkeypatch.setattr(orthotropy, "_fits", lambda _: False)
-    assert (orthotropy.Orthotropy.propose(replace(evidence_of(truth(), (), BAND), heard=(one,))) is not None) == named
+    assert (orthotropy.Orthotropy.propose(replace(evidence_of(truth(), (), BAND), observed=(one,))) is not None) == named
 
 
 def test_lines_and_shifted_modes_have_in_common_what_counting_through_finds() -> None:

@@ -10,9 +10,9 @@ from test_found_again import BAND, fitted
 from sonic_bullet.diagnosis.evidence.baseline import _unclipped
 from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of
 from sonic_bullet.diagnosis.evidence.refit import refitted
-from sonic_bullet.effects.common.hum import hum_of, stilled, without
+from sonic_bullet.effects.common.hum import hum_of, without, without_hum
 from sonic_bullet.effects.measurement_chain import MeasurementChain, butterworth, limit_of
-from sonic_bullet.effects.protocol import Heard
+from sonic_bullet.effects.protocol import ObjectEvidence
 from sonic_bullet.estimator.lines.joint_lines import joint_lines
 from tests.made.body import SR, recorded
 
@@ -36,13 +36,13 @@ def test_a_corner_near_nyquist_is_found_where_it_is(planted: MeasurementChain) -
 
 
 @pytest.fixture(scope="module")
-def told() -> Heard:
+def told() -> ObjectEvidence:
     body = recorded(seconds=1.5)
-    return evidence_of(fitted(body), (body,), BAND).heard[0]
+    return evidence_of(fitted(body), (body,), BAND).observed[0]
 
 
 @pytest.mark.parametrize("mains", [0.0, 50.0])
-def test_hum_stands_out_of_the_noise_beside_it(told: Heard, mains: float) -> None:
+def test_hum_stands_out_of_the_noise_beside_it(told: ObjectEvidence, mains: float) -> None:
     """Pink noise is strongest where mains hum."""
     assert told.signal is not None
     rng, n = np.random.default_rng(3), told.signal.shape[1]
@@ -101,10 +101,10 @@ def test_too_little_tells_no_hum(strikes: int, seconds: float) -> None:
     """One recording alone, or recordings too short to hear whether a tone fades, in silence."""
     sound = ringing(50.0, 0.0, strikes, seconds)
     assert hum_of(sound, np.full(strikes, 1e-5), SR) is None
-    assert stilled(sound, np.full(strikes, 1e-5), SR) is sound
+    assert without_hum(sound, np.full(strikes, 1e-5), SR) is sound
 
 
-def test_what_hums_is_taken_out_of_every_recording(told: Heard) -> None:
+def test_what_hums_is_taken_out_of_every_recording(told: ObjectEvidence) -> None:
     """Between the bins of its spectrum, and with a phase of its own in every recording; what rings stays."""
     assert told.signal is not None
     time = np.arange(told.signal.shape[1]) / SR
@@ -119,11 +119,11 @@ def test_what_hums_is_taken_out_of_every_recording(told: Heard) -> None:
     assert hum_of(told.signal, told.noise, SR) is None
 
 
-def test_loud_hum_hides_no_modes(told: Heard) -> None:
+def test_loud_hum_hides_no_modes(told: ObjectEvidence) -> None:
     """Louder than the strikes: with the hum in them, recordings tell of tones that never end, and of no plate."""
     assert told.signal is not None
     hum = 0.5 * np.cos(2 * np.pi * 50 * np.arange(told.signal.shape[1]) / SR)
-    lines = joint_lines(stilled(told.signal + hum, told.noise, SR), SR, band_hz=BAND)
+    lines = joint_lines(without_hum(told.signal + hum, told.noise, SR), SR, band_hz=BAND)
     assert np.abs(np.log(lines.freq_hz[:, None] / told.freq_hz)).min(axis=0).max() < 2e-4
 
 
@@ -141,14 +141,14 @@ def test_a_limit_is_where_two_strikes_stand(peak: tuple[float, ...], limit: floa
 def test_clipped_strikes_tell_no_amplitudes() -> None:
     """Modes are the softer strikes' own; what a limit has cut out of the others is as wide as it is large."""
     plain = recorded()
-    assert plain.gathered is not None
-    assert plain.gathered.signals is not None
-    peak = np.sort(np.abs(plain.gathered.signals).max(axis=1))
+    assert plain.recorded is not None
+    assert plain.recorded.signals is not None
+    peak = np.sort(np.abs(plain.recorded.signals).max(axis=1))
     body = recorded(MeasurementChain(limit=float(0.5 * (peak[1] + peak[2]))), noise=1e-6)
-    assert body.gathered is not None
-    lines = _unclipped(body.gathered, BAND).lines
+    assert body.recorded is not None
+    lines = _unclipped(body.recorded, BAND).lines
     model = body.model.freq_hz
     assert (np.abs(np.log(lines.freq_hz[:, None] / model)).min(axis=1) < 1e-3).mean() > 0.95
     wide = (lines.amplitude_sd >= np.abs(lines.amplitude)).all(axis=1)
     assert wide.sum() == 3
-    assert _unclipped(plain.gathered, BAND) is plain.gathered
+    assert _unclipped(plain.recorded, BAND) is plain.recorded

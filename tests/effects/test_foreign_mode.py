@@ -17,7 +17,7 @@ OTHER = ForeignMode((4000.0,), (15.0,), (1.0,), (0.0,))
 
 def test_lines_that_are_named_are_no_other_effects() -> None:
     body = recorded(STAND, OTHER)
-    before, after = (evidence_of(replace(fitted(body), effects=effects), (body,), BAND).heard[0] for effects in ((), (STAND,)))
+    before, after = (evidence_of(replace(fitted(body), effects=effects), (body,), BAND).observed[0] for effects in ((), (STAND,)))
 
     def near(freq_hz: np.ndarray, effect: ForeignMode) -> list[bool]:
         return [bool((np.abs(freq_hz / f - 1) < 1e-3).any()) for f in effect.freq_hz]
@@ -33,17 +33,17 @@ def test_lines_that_are_named_are_no_other_effects() -> None:
 def test_nor_are_they_paired_with_modes_that_an_effect_has_moved() -> None:
     """Modes are paired anew there, with every line that is near."""
     body = recorded()
-    assert body.gathered is not None
-    every = _nearest(body, plate(), np.zeros(len(body.gathered.lines.freq_hz), bool))[0]
+    assert body.recorded is not None
+    every = _nearest(body, plate(), np.zeros(len(body.recorded.lines.freq_hz), bool))[0]
     k = int(every[3])
-    rest = _nearest(body, plate(), np.arange(len(body.gathered.lines.freq_hz)) == k)[0]
+    rest = _nearest(body, plate(), np.arange(len(body.recorded.lines.freq_hz)) == k)[0]
     assert k not in rest and set(rest) == set(every) - {k}
 
 
 def test_a_line_of_another_decay_is_not_named() -> None:
     body = recorded(STAND)
-    assert body.gathered is not None
-    lines = body.gathered.lines
+    assert body.recorded is not None
+    lines = body.recorded.lines
     k = int(np.argmin(np.abs(lines.freq_hz - 790.0)))
     short = replace(lines, decay_per_s=np.where(np.arange(len(lines.freq_hz)) == k, 60.0, lines.decay_per_s))
     h = replace(fitted(body), effects=(STAND,))

@@ -12,7 +12,7 @@ from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of
 from sonic_bullet.diagnosis.evidence.refit import refitted
 from sonic_bullet.effects import Effect
 from sonic_bullet.effects.amplitude_pitch import AmplitudePitch
-from sonic_bullet.effects.protocol import Blow
+from sonic_bullet.effects.protocol import Impact
 from sonic_bullet.effects.rebound import ALL, Rebound, _turned
 from sonic_bullet.effects.rebound.later_hits import second_hit, third_hit
 from sonic_bullet.effects.room import Room
@@ -37,11 +37,11 @@ def test_restitution_gap_and_hits_are_told(hits: int) -> None:
 def test_all_strikes_at_once_tell_a_second_hit(exponent: float) -> None:
     """Its gap, and how that goes with strength, whatever delays each strike alone would be as content with."""
     body = recorded(Rebound(0.0197, 0.016, 0.25, exponent, 0.25, 2))
-    heard = evidence_of(refitted(fitted(body), (body,)), (body,), BAND).heard[0]
-    said, gap, told = max(second_hit(heard, heard.impulse_n_s / 0.016))
+    observed = evidence_of(refitted(fitted(body), (body,)), (body,), BAND).observed[0]
+    said, gap, told = max(second_hit(observed, observed.impulse_n_s / 0.016))
     assert told == exponent and said > ALL
     assert gap == pytest.approx(0.0197, abs=1.5 / SR)
-    found = Rebound._of_all(heard)
+    found = Rebound._of_all(observed)
     assert found is not None and found.hits == 2
     assert found.restitution == pytest.approx(0.25, rel=0.05)
 
@@ -49,16 +49,16 @@ def test_all_strikes_at_once_tell_a_second_hit(exponent: float) -> None:
 @pytest.mark.parametrize("lacks", [(), (AmplitudePitch(0.02, "velocity"),), (Room(0.9, 0.8, 11),)])
 def test_all_strikes_at_once_tell_no_hit_that_is_not_there(lacks: tuple[Effect, ...]) -> None:
     body = recorded(*lacks)
-    assert Rebound._of_all(evidence_of(refitted(fitted(body), (body,)), (body,), BAND).heard[0]) is None
+    assert Rebound._of_all(evidence_of(refitted(fitted(body), (body,)), (body,), BAND).observed[0]) is None
 
 
 def test_strikes_of_one_strength_tell_no_hit_from_what_beats() -> None:
     """All exponents say the same of them, known strengths or none."""
     body = recorded(Rebound(0.0197, 0.016, 0.25, 0.0, 0.25, 2))
-    heard = evidence_of(refitted(fitted(body), (body,)), (body,), BAND).heard[0]
-    assert Rebound._of_all(heard) is not None
-    for level in (np.full(len(heard.impulse_n_s), 0.016), np.full(len(heard.impulse_n_s), np.nan)):
-        assert Rebound._of_all(replace(heard, impulse_n_s=level)) is None
+    observed = evidence_of(refitted(fitted(body), (body,)), (body,), BAND).observed[0]
+    assert Rebound._of_all(observed) is not None
+    for level in (np.full(len(observed.impulse_n_s), 0.016), np.full(len(observed.impulse_n_s), np.nan)):
+        assert Rebound._of_all(replace(observed, impulse_n_s=level)) is None
 
 
 @pytest.mark.parametrize("e", [0.31, 0.437, 0.72])
@@ -129,9 +129,9 @@ def test_what_began_late_is_not_taken_back_to_the_onset(monkeypatch: pytest.Monk
 def test_turns_in_half_the_digits_are_the_sum_of_the_hits() -> None:
     """At a quarter of a second and 20 kHz a phase is 31 000 radians: whole turns go before digits do."""
     freq = np.linspace(20.0, 20_000.0, 3001)
-    blow = Blow(0.02, np.array([0.0, 0.011, 0.02, 0.25]), np.array([1.0, 0.7, 0.5, 0.3]))
-    want = (blow.share[:, None] * np.exp(-(8.0 + 2j * np.pi * freq) * blow.delay_s[:, None])).sum(axis=0)
-    assert np.abs(_turned(blow, freq, 8.0) - want).max() < 1e-6
+    impact = Impact(0.02, np.array([0.0, 0.011, 0.02, 0.25]), np.array([1.0, 0.7, 0.5, 0.3]))
+    want = (impact.share[:, None] * np.exp(-(8.0 + 2j * np.pi * freq) * impact.delay_s[:, None])).sum(axis=0)
+    assert np.abs(_turned(impact, freq, 8.0) - want).max() < 1e-6
 
 
 def test_no_line_begins_far_above_all_there_is() -> None:

@@ -24,8 +24,8 @@ BAND = (50.0, 7_500.0)
 def test_decays_of_no_line_tell_no_law_and_nothing_that_radiates_or_rubs() -> None:
     """As in a room that drowns all of them."""
     evidence = evidence_of(truth(), (recorded(),), BAND)
-    heard = evidence.heard[0]
-    drowned = replace(evidence, heard=(replace(heard, decay_sd_per_s=np.full(len(heard.freq_hz), np.inf)),))
+    observed = evidence.observed[0]
+    drowned = replace(evidence, observed=(replace(observed, decay_sd_per_s=np.full(len(observed.freq_hz), np.inf)),))
     for kind in (DampingLaw, Radiation, SupportDamping):
         assert kind.propose(drowned) is None
 
@@ -41,13 +41,13 @@ def test_least_squares_say_nothing_where_nothing_is_told() -> None:
 
 def test_lines_without_a_mesh_are_modes_in_the_order_of_their_undamped_frequencies() -> None:
     """A tone that is gone at once may lie below another and have the higher undamped frequency."""
-    gathered = recorded().gathered
-    assert gathered is not None
-    decay = gathered.lines.decay_per_s.copy()
-    freq = gathered.lines.freq_hz.copy()
+    mine = recorded().recorded
+    assert mine is not None
+    decay = mine.lines.decay_per_s.copy()
+    freq = mine.lines.freq_hz.copy()
     freq[5], freq[6], decay[5], decay[6] = 1400.0, 1401.0, 900.0, 10.0
-    lines = replace(gathered.lines, freq_hz=freq, decay_per_s=decay)
-    found = cast(CaseFit, SimpleNamespace(case=SimpleNamespace(recordings=gathered.recordings)))
-    body = shapeless(found, replace(gathered, lines=lines))
+    lines = replace(mine.lines, freq_hz=freq, decay_per_s=decay)
+    found = cast(CaseFit, SimpleNamespace(case=SimpleNamespace(recordings=mine.recordings)))
+    body = shapeless(found, replace(mine, lines=lines))
     assert (np.diff(body.model.freq_hz) > 0).all()
     assert 2 * np.pi * body.model.freq_hz == pytest.approx(np.hypot(2 * np.pi * freq, decay)[body.line])

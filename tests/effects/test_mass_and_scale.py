@@ -25,7 +25,7 @@ def test_a_mass_is_found_beside_the_wrong_elasticity(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(added_mass, "POINTS", 30)  # of a plate with 18 modes: a start within a wavelength of each
     low = 0.9
     body = recorded(MASS)
-    assert body.gathered is not None and body.gathered.signals is not None
+    assert body.recorded is not None and body.recorded.signals is not None
     off = replace(body, model=replace(body.model, freq_hz=low * body.model.freq_hz), line=np.full(body.model.mode_count, -1))
     base = truth()
     found = AddedMass.propose(evidence_of(base, (off,), BAND))
@@ -34,8 +34,8 @@ def test_a_mass_is_found_beside_the_wrong_elasticity(monkeypatch: pytest.MonkeyP
     assert found.stretch == pytest.approx(-np.log(low), abs=2e-3)
     h = refitted(replace(base, effects=(found,)), (off,))
     assert h.stretch == pytest.approx(-np.log(low), abs=2e-3)
-    floor = floor_between(list(body.gathered.signals))
-    takes = [Take(off, i, x, SR, floor) for i, x in zip(body.fitted, body.gathered.signals, strict=True)]
+    floor = floor_between(list(body.recorded.signals))
+    takes = [Take(off, i, x, SR, floor) for i, x in zip(body.fitted, body.recorded.signals, strict=True)]
     assert (mean_db(takes, h) or 0.0) < 0.3 * (mean_db(takes, base) or 0.0)
     again = AddedMass.propose(replace(evidence_of(base, (off,), BAND), known=found))
     assert again is not None and again.position_m == found.position_m

@@ -20,7 +20,7 @@ BAND = (50.0, 7_500.0)
 PAIRS = ((3, 4), (9, 10))
 
 
-def twins() -> ModalModel:
+def degenerate() -> ModalModel:
     """The plate, two pairs of its modes at one frequency each."""
     model = plate()
     freq = model.freq_hz.copy()
@@ -30,7 +30,7 @@ def twins() -> ModalModel:
 
 
 def split() -> ModeSplitting:
-    freq = twins().freq_hz
+    freq = degenerate().freq_hz
     return ModeSplitting(tuple(float(freq[a]) for a, _ in PAIRS), (0.012, 0.009), (0.5, 2.0))
 
 
@@ -46,14 +46,14 @@ def told(body: Struck, correction: dict[int, float]) -> ModeSplitting:
 
 @pytest.mark.parametrize("correction", [{}, {3: 0.006, 4: -0.006}, {3: -0.006, 4: 0.006, 9: 0.0045}])
 def test_the_turn_is_the_meshs_whatever_corrections_say(correction: dict[int, float]) -> None:
-    found = told(recorded(split(), model=twins(), seconds=1.0), correction)
+    found = told(recorded(split(), model=degenerate(), seconds=1.0), correction)
     assert found.split == pytest.approx((0.012, 0.009), rel=0.02)
     assert found.turn_rad == pytest.approx((0.5, 2.0), abs=0.03)
 
 
 def test_pairs_are_found_where_elasticity_was_fitted_to_one_line_of_each() -> None:
     """All modes of the mesh 1 % high, and splits that add 0.6 %: the pairs agree on the scale between them."""
-    body = recorded(split(), model=twins(), seconds=1.0)
+    body = recorded(split(), model=degenerate(), seconds=1.0)
     high = replace(body, model=replace(body.model, freq_hz=1.01 * body.model.freq_hz))
     found = told(high, {})
     assert len(found.split) == 2
@@ -62,7 +62,7 @@ def test_pairs_are_found_where_elasticity_was_fitted_to_one_line_of_each() -> No
 
 def test_no_correction_sets_twins_apart() -> None:
     """What a mesh leaves together shares the mesh's error: corrections learnt again would else pass for the splitting itself, and a true one earn nothing."""
-    body = recorded(split(), model=twins(), seconds=1.0)
+    body = recorded(split(), model=degenerate(), seconds=1.0)
     again = refitted(truth(), (body,), anew=True).correction
     assert again is not None
     for a, b in PAIRS:
@@ -73,7 +73,7 @@ def test_no_correction_sets_twins_apart() -> None:
 
 def test_a_split_pair_sounds_as_two_modes_that_fill_the_same_space() -> None:
     """φφᵀ of the pair summed over both is the same, whatever the turn."""
-    model = twins()
+    model = degenerate()
     after = split().apply(model)
     for a, b in PAIRS:
         before, now = model.shape[:, 2, [a, b]].astype(float), after.shape[:, 2, [a, b]].astype(float)
@@ -83,16 +83,16 @@ def test_a_split_pair_sounds_as_two_modes_that_fill_the_same_space() -> None:
 
 def test_a_pair_that_one_strike_shows_is_no_single_mode_without_it() -> None:
     """Left out of the evidence, that strike leaves one line of the pair under the noise: the lines are there all the same, and the other strikes tell the turn."""
-    body = recorded(split(), model=twins())
+    body = recorded(split(), model=degenerate())
     whole = ModeSplitting.propose(evidence_of(truth(), (body,), BAND))
     assert whole is not None
-    assert body.gathered is not None
-    less = thinned(evidence_of(truth(), (body,), BAND), (body.gathered, 1), 1.0, np.random.default_rng(0))
-    heard = less.heard[0]
-    faint = np.abs(heard.freq_hz - whole.freq_hz[0] * (1 + whole.split[0] / 2)).argmin()
-    sd = heard.amplitude_sd.copy()
-    sd[:, faint] = np.abs(heard.amplitude[:, faint])
-    less = replace(less, heard=(replace(heard, amplitude_sd=sd),))
+    assert body.recorded is not None
+    less = thinned(evidence_of(truth(), (body,), BAND), (body.recorded, 1), 1.0, np.random.default_rng(0))
+    observed = less.observed[0]
+    faint = np.abs(observed.freq_hz - whole.freq_hz[0] * (1 + whole.split[0] / 2)).argmin()
+    sd = observed.amplitude_sd.copy()
+    sd[:, faint] = np.abs(observed.amplitude[:, faint])
+    less = replace(less, observed=(replace(observed, amplitude_sd=sd),))
     alone = ModeSplitting.propose(less)
     assert alone is not None
     assert len(alone.freq_hz) == len(whole.freq_hz) - 1
@@ -105,7 +105,7 @@ def test_a_pair_that_one_strike_shows_is_no_single_mode_without_it() -> None:
 
 def test_lines_of_twins_go_to_their_own_modes_though_the_mesh_is_off_by_half_a_split() -> None:
     """The lower line of a pair lies on the mesh's upper twin then; the pair is where it was heard."""
-    body = recorded(split(), model=twins())
+    body = recorded(split(), model=degenerate())
     effect = split()
     off = body.model.freq_hz.copy()
     off[list(PAIRS[0])] /= 1.0095
@@ -119,10 +119,10 @@ def test_lines_of_twins_go_to_their_own_modes_though_the_mesh_is_off_by_half_a_s
 def rough(body: Struck, f: float, gain: list[float]) -> Evidence:
     """What is heard, amplitudes of lines about f off by a factor a strike, as shapes on a slope are."""
     every = evidence_of(replace(truth(), correction={"plate": np.zeros(body.model.mode_count)}), (body,), BAND)
-    one, by = every.heard[0], np.array(gain)[:, None]
+    one, by = every.observed[0], np.array(gain)[:, None]
     near, strange = (np.abs(x / f - 1) < 0.01 for x in (one.freq_hz, one.foreign_hz))
     amplitude, foreign = np.where(near, by * one.amplitude, one.amplitude), np.where(strange, by * one.foreign_amplitude, one.foreign_amplitude)
-    return replace(every, heard=(replace(one, amplitude=amplitude, foreign_amplitude=foreign),))
+    return replace(every, observed=(replace(one, amplitude=amplitude, foreign_amplitude=foreign),))
 
 
 @pytest.mark.parametrize("plain", [1, 3])

@@ -35,7 +35,7 @@ def test_how_steeply_a_body_radiates_is_read_off_its_decays(planted: Radiation) 
     assert found is not None
     assert (found.order, found.tilt) == (planted.order, planted.tilt)
     assert found.radius_m == pytest.approx(planted.radius_m, rel=0.15)
-    after = refitted(replace(h, effects=(found,)), (body,), told.heard)
+    after = refitted(replace(h, effects=(found,)), (body,), told.observed)
     assert after.gain == pytest.approx(GAIN, rel=0.06), "modes that are tilted are as loud as they sound"
     takes = takes_of((body,))
     before_db, after_db, floor_db = mean_db(takes, h), mean_db(takes, after), least_db(takes, after)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from test_found_again import BAND, fitted
 
-from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of, heard_of, outside
+from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of, object_evidence, outside
 from sonic_bullet.diagnosis.evidence.refit import refitted, whole
 from sonic_bullet.effects.common import reverberant_tail as tails
 from sonic_bullet.effects.contact_time import ContactTime
@@ -42,44 +42,44 @@ def test_the_covariance_of_a_driven_tail() -> None:
 def test_modes_read_through_a_room() -> None:
     """Decays and gains that a strong room hides from the lines come back within the spreads said."""
     body = recorded(Room(0.9, 0.9, 4), seconds=1.2)
-    heard = heard_of(truth(), body)
-    dry = tails.dried(heard, RT60 / 0.9)
+    observed = object_evidence(truth(), body)
+    dry = tails.dereverberated(observed, RT60 / 0.9)
     own = 0.5 * (ALPHA + BETA * dry.omega**2)
     off = np.log(dry.decay_per_s / own)
-    assert np.abs(off).mean() < 0.4 * np.abs(np.log(heard.decay_per_s / own)).mean()
+    assert np.abs(off).mean() < 0.4 * np.abs(np.log(observed.decay_per_s / own)).mean()
     assert np.sqrt(np.mean((off / (dry.decay_sd_per_s / dry.decay_per_s)) ** 2)) < 1.6
     size = np.abs(dry.amplitude).max(axis=0) / np.abs(dry.expected).max(axis=0)
     assert np.exp(np.abs(np.log(size)).mean()) < 1.35
-    assert tails.dried(dry, 5.0) is dry  # what is dry stays as it is
+    assert tails.dereverberated(dry, 5.0) is dry  # what is dry stays as it is
 
 
 def test_what_outlasts_a_room_is_left_as_it_was_heard() -> None:
     """By lines and by what they are read to be: a faint line of a mode that dies sooner may beat with the tail, and be heard to ring on."""
-    heard = heard_of(truth(), recorded(Room(0.15, 0.3, 4), seconds=1.2))
-    own, delta = 0.5 * (ALPHA + BETA * heard.omega**2), RT60 / 0.15
+    observed = object_evidence(truth(), recorded(Room(0.15, 0.3, 4), seconds=1.2))
+    own, delta = 0.5 * (ALPHA + BETA * observed.omega**2), RT60 / 0.15
     slow = own < 0.4 * delta
     assert slow.sum() >= 3
-    dry = tails.dried(heard, delta)
-    assert np.array_equal(dry.decay_per_s[slow], heard.decay_per_s[slow])
+    dry = tails.dereverberated(observed, delta)
+    assert np.array_equal(dry.decay_per_s[slow], observed.decay_per_s[slow])
     assert np.abs(np.log(dry.decay_per_s / own))[slow].max() < 0.05
-    assert np.array_equal(dry.freq_hz[slow], heard.freq_hz[slow])
+    assert np.array_equal(dry.freq_hz[slow], observed.freq_hz[slow])
     fast = recorded(Room(0.9, 0.9, 4), seconds=1.2)
-    beats = heard_of(truth(), fast)
+    beats = object_evidence(truth(), fast)
     beats = replace(beats, decay_per_s=np.full(len(beats.freq_hz), 2.0), decay_sd_per_s=np.full(len(beats.freq_hz), 0.02))
-    assert (tails.dried(beats, RT60 / 0.9).decay_per_s > 4.0).all()
+    assert (tails.dereverberated(beats, RT60 / 0.9).decay_per_s > 4.0).all()
 
 
 def test_what_is_gone_at_once_or_is_not_like_its_mode_tells_no_decay() -> None:
     """Of a lossy body in a room most lines are the room's own: they would bend the material's law to the room's."""
-    heard = heard_of(truth(), recorded(Room(0.9, 0.9, 4), seconds=1.2))
-    assert np.isfinite(tails.dried(heard, RT60 / 0.9).decay_sd_per_s).all()
-    other = heard.amplitude.copy()
-    other[:, 2] = np.array([1.0, -1.0, 1.0, -1.0, 1.0]) * np.abs(other[:, 2]).mean() * np.sign(heard.expected[:, 2].real) * np.array([1, 1, 1, 1, -1])
-    other[:, 2] -= (np.conj(heard.expected[:, 2]) @ other[:, 2]) / (np.abs(heard.expected[:, 2]) ** 2).sum() * heard.expected[:, 2]
-    told = tails.dried(replace(heard, amplitude=other), RT60 / 0.9).decay_sd_per_s
+    observed = object_evidence(truth(), recorded(Room(0.9, 0.9, 4), seconds=1.2))
+    assert np.isfinite(tails.dereverberated(observed, RT60 / 0.9).decay_sd_per_s).all()
+    other = observed.amplitude.copy()
+    other[:, 2] = np.array([1.0, -1.0, 1.0, -1.0, 1.0]) * np.abs(other[:, 2]).mean() * np.sign(observed.expected[:, 2].real) * np.array([1, 1, 1, 1, -1])
+    other[:, 2] -= (np.conj(observed.expected[:, 2]) @ other[:, 2]) / (np.abs(observed.expected[:, 2]) ** 2).sum() * observed.expected[:, 2]
+    told = tails.dereverberated(replace(observed, amplitude=other), RT60 / 0.9).decay_sd_per_s
     assert np.isinf(told[2]) and np.isfinite(np.delete(told, 2)).all()
     lossy = recorded(Room(0.9, 0.9, 4), DampingLaw("constant-loss", eta=0.05), seconds=1.2)
-    dry = tails.dried(heard_of(truth(), lossy), RT60 / 0.9)
+    dry = tails.dereverberated(object_evidence(truth(), lossy), RT60 / 0.9)
     assert (np.isinf(dry.decay_sd_per_s) >= (dry.decay_per_s > tails.FASTEST)).all() and np.isinf(dry.decay_sd_per_s).any()
 
 
@@ -100,11 +100,11 @@ def test_fewer_lines_will_do_that_tell_a_tail_more_plainly(gain: tuple[float, ..
 @pytest.mark.parametrize("rt60", [0.5, 1.6])
 def test_the_rate_of_a_room(rt60: float) -> None:
     """Three rooms: how wet one sounds to a dozen lines is a matter of its taps, by a third."""
-    found = [late(heard_of(truth(), recorded(Room(rt60, 0.5, seed), seconds=1.2))) for seed in (7, 8, 9)]
+    found = [late(object_evidence(truth(), recorded(Room(rt60, 0.5, seed), seconds=1.2))) for seed in (7, 8, 9)]
     assert all(one is not None for one in found)
     for delta, _ in (one for one in found if one):
         assert RT60 / delta == pytest.approx(rt60, rel=0.12)
-    assert np.median([wet for _, wet in (one for one in found if one)]) == pytest.approx(0.5, rel=0.25)
+    assert np.median([wet_level for _, wet_level in (one for one in found if one)]) == pytest.approx(0.5, rel=0.25)
 
 
 @pytest.mark.parametrize(
@@ -118,7 +118,7 @@ def test_the_rate_of_a_room(rt60: float) -> None:
 )
 def test_no_room_where_none_is(effect: object) -> None:
     body = recorded(effect)  # type: ignore[arg-type]
-    assert late(heard_of(refitted(fitted(body), (body,)), body)) is None
+    assert late(object_evidence(refitted(fitted(body), (body,)), body)) is None
 
 
 @pytest.mark.parametrize(
@@ -133,7 +133,7 @@ def test_another_effect_is_told_beside_a_room(other: ContactTime | DampingLaw, p
     room = Room.propose(evidence_of(base, (body,), BAND))
     assert room is not None
     assert room.rt60_s == pytest.approx(0.9, rel=0.12)
-    beside = refitted(replace(base, effects=(room,)), (body,), evidence_of(base, (body,), BAND).heard)
+    beside = refitted(replace(base, effects=(room,)), (body,), evidence_of(base, (body,), BAND).observed)
     found = type(other).propose(evidence_of(beside, (body,), BAND))
     assert found is not None
     assert found.parameters()[parameter] == pytest.approx(other.parameters()[parameter], rel=within)
@@ -148,19 +148,19 @@ def test_what_rings_along_is_heard_in_the_room_and_both_through_the_chain() -> N
 def test_lines_are_dried_once() -> None:
     body = recorded(Room(0.9, 0.9, 4), seconds=1.2)
     h = truth(Room(0.9, 0.9, 4))
-    heard = heard_of(h, body)
-    assert heard.dry
-    assert outside(h, heard) is heard
+    observed = object_evidence(h, body)
+    assert observed.dry
+    assert outside(h, observed) is observed
 
 
 def test_what_the_model_says_nothing_of_stays_as_it_was_heard() -> None:
     """A line whose mode is out of the band has no amplitude to be told against; it is not made silent, nor is the gain."""
     body = recorded(Room(0.9, 0.9, 4), seconds=1.2)
-    heard = heard_of(truth(), body)
-    push = heard.push.copy()
-    push[:, heard.mode[0]] = 0.0
-    dry = tails.dried(replace(heard, push=push), RT60 / 0.9)
-    assert np.array_equal(dry.amplitude[:, 0], heard.amplitude[:, 0])
+    observed = object_evidence(truth(), body)
+    push = observed.push.copy()
+    push[:, observed.mode[0]] = 0.0
+    dry = tails.dereverberated(replace(observed, push=push), RT60 / 0.9)
+    assert np.array_equal(dry.amplitude[:, 0], observed.amplitude[:, 0])
     assert np.isfinite(dry.amplitude).all()
 
 
@@ -169,7 +169,7 @@ def test_what_rings_along_in_a_room_is_told_once() -> None:
     lodger = ForeignMode((1000.0, 2710.0), (9.0, 14.0), (1.2, 0.9), (0.0, 0.0))
     body = recorded(Room(0.9, 0.9, 4), lodger, seconds=1.2)
     evidence = evidence_of(truth(Room(0.9, 0.9, 4)), (body,), (50.0, 7_500.0))
-    assert evidence.heard[0].dry
+    assert evidence.observed[0].dry
     found = ForeignMode.propose(evidence)
     assert found is not None
     assert found.freq_hz == pytest.approx((1000.0, 2710.0), rel=2e-3)
@@ -178,56 +178,56 @@ def test_what_rings_along_in_a_room_is_told_once() -> None:
 def test_what_is_read_to_ring_far_longer_than_it_is_heard_to_is_a_neighbour(monkeypatch: pytest.MonkeyPatch) -> None:
     """A tail prolongs; of a strong slow mode close by, what is left between the patterns outlasts any lodger."""
     lodger = ForeignMode((1000.0, 2710.0), (60.0, 14.0), (1.2, 0.9), (0.0, 0.0))
-    heard = heard_of(truth(), recorded(Room(0.9, 0.5, 4), lodger, seconds=1.2))
-    k = int(np.abs(heard.foreign_hz - 1000.0).argmin())
+    observed = object_evidence(truth(), recorded(Room(0.9, 0.5, 4), lodger, seconds=1.2))
+    k = int(np.abs(observed.foreign_hz - 1000.0).argmin())
     read = tails.read
 
     def deceived(*given: Any, **more: Any) -> tails.Read:
         told = read(*given, **more)
         slow, moved = told.decay_per_s.copy(), told.shift_hz.copy()
-        slow[0, k], moved[0, k] = heard.foreign_decay_per_s[k] / 20, -7.0
+        slow[0, k], moved[0, k] = observed.foreign_decay_per_s[k] / 20, -7.0
         return replace(told, decay_per_s=slow, shift_hz=moved)
 
-    honest = tails.dried(heard, RT60 / 0.9)
+    honest = tails.dereverberated(observed, RT60 / 0.9)
     monkeypatch.setattr(tails, "read", deceived)
-    dry = tails.dried(heard, RT60 / 0.9)
-    assert dry.foreign_hz[k] == heard.foreign_hz[k] and dry.foreign_decay_per_s[k] == heard.foreign_decay_per_s[k]
-    assert np.array_equal(dry.foreign_amplitude[:, k], heard.foreign_amplitude[:, k])
-    others = np.arange(len(heard.foreign_hz)) != k
+    dry = tails.dereverberated(observed, RT60 / 0.9)
+    assert dry.foreign_hz[k] == observed.foreign_hz[k] and dry.foreign_decay_per_s[k] == observed.foreign_decay_per_s[k]
+    assert np.array_equal(dry.foreign_amplitude[:, k], observed.foreign_amplitude[:, k])
+    others = np.arange(len(observed.foreign_hz)) != k
     assert np.array_equal(dry.foreign_hz[others], honest.foreign_hz[others])
 
 
 def test_a_gain_beside_a_room_is_the_lines_of_modes_alone() -> None:
     """Lines that the room leaves next to a mode's are no part of it."""
     body = recorded(Room(0.9, 0.9, 4), seconds=1.2)
-    heard = heard_of(truth(Room(0.9, 0.9, 4)), body)
+    observed = object_evidence(truth(Room(0.9, 0.9, 4)), body)
     beside = replace(
-        heard,
-        foreign_hz=heard.freq_hz * 1.001,
-        foreign_decay_per_s=heard.decay_per_s,
-        foreign_amplitude=5 * heard.amplitude,
-        foreign_sd=heard.amplitude_sd,
+        observed,
+        foreign_hz=observed.freq_hz * 1.001,
+        foreign_decay_per_s=observed.decay_per_s,
+        foreign_amplitude=5 * observed.amplitude,
+        foreign_sd=observed.amplitude_sd,
     )
-    assert np.array_equal(whole(beside), heard.amplitude)
-    assert np.abs(whole(replace(beside, dry=False))).max() > np.abs(heard.amplitude).max()
+    assert np.array_equal(whole(beside), observed.amplitude)
+    assert np.abs(whole(replace(beside, dry=False))).max() > np.abs(observed.amplitude).max()
 
 
 def test_a_mode_that_is_hardly_struck_is_not_read_more_surely() -> None:
     """What the model says nothing of, a tail's echoes make as unsure as anything else they touch."""
     body = recorded(Room(0.9, 0.9, 4), seconds=1.2)
-    heard = heard_of(truth(), body)
-    push = heard.push.copy()
+    observed = object_evidence(truth(), body)
+    push = observed.push.copy()
     push[0] *= 1e-6
-    dry = tails.dried(replace(heard, push=push), RT60 / 0.9)
+    dry = tails.dereverberated(replace(observed, push=push), RT60 / 0.9)
     assert (dry.amplitude_sd[0] > 0.09 * np.abs(dry.amplitude[0])).all()
 
 
 def test_a_snippet_has_no_tail() -> None:
     """Shorter than a few frames: no room is told, and nothing breaks."""
-    heard = heard_of(truth(), recorded(Room(0.9, 0.9, 4)))
-    assert heard.signal is not None
-    short = replace(heard, signal=heard.signal[:, :300])
-    assert tails.dried(short, 7.0) is short
+    observed = object_evidence(truth(), recorded(Room(0.9, 0.9, 4)))
+    assert observed.signal is not None
+    short = replace(observed, signal=observed.signal[:, :300])
+    assert tails.dereverberated(short, 7.0) is short
 
 
 def test_a_mode_that_dies_as_the_room_does() -> None:
@@ -246,8 +246,8 @@ def test_a_response_is_told_to_the_end_and_sought_on_from_where_it_was() -> None
     sound = rng.standard_normal((4, n)) * fade
     room = Room(0.6, 0.4, seed=1)
     signal = np.stack([room.apply(Sound(x, sr, 1.0, 0)).sample for x in sound]) + noise * rng.standard_normal((4, n))
-    once = Room(0.6, 0.4).told_by(signal[:3], sound[:3], np.full(3, noise), sr)
-    again = once.told_by(signal[:3], sound[:3], np.full(3, noise), sr)
+    once = Room(0.6, 0.4).identified_from(signal[:3], sound[:3], np.full(3, noise), sr)
+    again = once.identified_from(signal[:3], sound[:3], np.full(3, noise), sr)
 
     def off(x: Room) -> float:
         made = x.apply(Sound(sound[3], sr, 1.0, 0)).sample
@@ -256,4 +256,4 @@ def test_a_response_is_told_to_the_end_and_sought_on_from_where_it_was() -> None
     assert off(once) < 0.05
     assert off(again) <= off(once) * 1.01  # nothing is lost, though it takes a quarter of the steps
     elsewhere = replace(once, response=once.response[: n // 2])  # of another length: from the beginning
-    assert np.array_equal(elsewhere.told_by(signal[:3], sound[:3], np.full(3, noise), sr).response, once.response)
+    assert np.array_equal(elsewhere.identified_from(signal[:3], sound[:3], np.full(3, noise), sr).response, once.response)

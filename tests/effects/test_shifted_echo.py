@@ -46,16 +46,16 @@ class Moving:
 
 def test_the_ratio_of_a_moving_echo_is_told_and_no_room_proposed() -> None:
     body = recorded(Moving(7.0))
-    assert body.gathered is not None
-    lines = body.gathered.lines
+    assert body.recorded is not None
+    lines = body.recorded.lines
     assert copied(lines.freq_hz, lines.decay_per_s, lines.amplitude) == pytest.approx(1 / (1 - 14 / 343), rel=2e-4)
     assert Room.propose(evidence_of(refitted(fitted(body), (body,)), (body,), BAND)) is None
 
 
 def test_what_stands_still_brings_no_copies() -> None:
     for body in (recorded(), recorded(Room(0.9, 0.8, 11))):
-        assert body.gathered is not None
-        lines = body.gathered.lines
+        assert body.recorded is not None
+        lines = body.recorded.lines
         assert copied(lines.freq_hz, lines.decay_per_s, lines.amplitude) is None
 
 

@@ -58,13 +58,13 @@ def test_modes_are_the_bodys(planted: tuple[Planted, CaseFit]) -> None:
 def test_held_out_strike_is_predicted_to_the_noise(planted: tuple[Planted, CaseFit]) -> None:
     _, found = planted
     held = next(r for r in found.case.recordings if r.split == "holdout")
-    heard, sr = soundfile.read(str(held.file))
-    made = strike_sound(found, held, len(heard), sr)
+    observed, sr = soundfile.read(str(held.file))
+    made = strike_sound(found, held, len(observed), sr)
     o = found.objects[0].evidence
     assert o.signals is not None
     floor = floor_of(o.signals[0] - lines_sound(o.lines, 0, o.signals.shape[1], o.sr))
-    assert log_spectral_db(heard, with_noise(made, floor, 7), floor) < noise_floor_db(made, floor) + 0.2
-    assert log_spectral_db(heard, with_noise(2 * made, floor, 7), floor) > noise_floor_db(made, floor) + 3
+    assert log_spectral_db(observed, with_noise(made, floor, 7), floor) < noise_floor_db(made, floor) + 0.2
+    assert log_spectral_db(observed, with_noise(2 * made, floor, 7), floor) > noise_floor_db(made, floor) + 3
 
 
 def test_constant_loss_is_no_rayleigh_damping(planted: tuple[Planted, CaseFit], tmp_path: Path) -> None:
@@ -79,8 +79,8 @@ def test_foreign_line_is_named(planted: tuple[Planted, CaseFit], tmp_path: Path)
     make(tmp_path, BRASS, guess=GUESS)
     t = np.arange(int(0.8 * SR)) / SR
     for path in tmp_path.glob("s*.wav"):
-        heard, _ = soundfile.read(path)
-        soundfile.write(path, heard + 0.1 * np.exp(-20 * t) * np.sin(2 * np.pi * 1733 * t), SR, subtype="FLOAT")
+        observed, _ = soundfile.read(path)
+        soundfile.write(path, observed + 0.1 * np.exp(-20 * t) * np.sin(2 * np.pi * 1733 * t), SR, subtype="FLOAT")
     found = fit_case(read_case(tmp_path), check_mesh=False)
     assert "belong to no mode (1733 Hz)" in found.fit.verdict
     assert found.fit.alpha_per_s == pytest.approx(6.0, rel=0.02)
@@ -171,7 +171,7 @@ def test_practice_01(shared_path: Path) -> None:
     held = [r for r in case.recordings if r.split == "holdout"]
     assert len(held) == 3
     for r in held:
-        heard, sr = soundfile.read(str(r.file))
-        made = strike_sound(found, r, len(heard), sr)
-        assert log_spectral_db(heard, with_noise(made, floor, 5), floor) < noise_floor_db(made, floor) + 0.5
+        observed, sr = soundfile.read(str(r.file))
+        made = strike_sound(found, r, len(observed), sr)
+        assert log_spectral_db(observed, with_noise(made, floor, 5), floor) < noise_floor_db(made, floor) + 0.5
     assert np.abs(found.objects[0].correction).max() <= 0.01

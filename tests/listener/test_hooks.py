@@ -86,13 +86,13 @@ def test_unmodified_gym_environments_are_heard_to_the_last_step() -> None:
 
 @pytest.mark.parametrize("order", [(0, 1), (1, 0)])
 def test_two_hooks_on_one_client_leave_in_any_order(client: Any, order: tuple[int, int]) -> None:
-    heard = [0, 0]
+    observed = [0, 0]
     before = dict(vars(client))
 
     def hear(which: int) -> None:
-        heard[which] += 1
+        observed[which] += 1
 
-    worlds = [open_world(client) for _ in heard]
+    worlds = [open_world(client) for _ in observed]
     for which, world in enumerate(worlds):
         world.hook(world.before_step, lambda which=which: hear(which))
     client.stepSimulation()
@@ -100,7 +100,7 @@ def test_two_hooks_on_one_client_leave_in_any_order(client: Any, order: tuple[in
     client.stepSimulation()
     worlds[order[1]].unhook()
     client.stepSimulation()
-    assert heard[order[0]] == 1
-    assert heard[order[1]] == 2
+    assert observed[order[0]] == 1
+    assert observed[order[1]] == 2
     if order == (1, 0):
         assert dict(vars(client)) == before

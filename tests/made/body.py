@@ -14,7 +14,7 @@ import numpy as np
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, play
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.effects import Effect
-from sonic_bullet.estimator.fit.observed import Evidence as Gathered
+from sonic_bullet.estimator.fit.observed import Evidence as Recorded
 from sonic_bullet.estimator.lines.joint_lines import joint_lines
 from sonic_bullet.files.cases import CaseObject, CaseRecording
 from sonic_bullet.modal.reduced import Family
@@ -56,17 +56,17 @@ def struck(model: ModalModel | None = None, lines: Any = None, signals: Array | 
         CaseRecording(Path(f"strike-{i}.wav"), None, "plate", "fit", (p[0] * SIDE_M[0], p[1] * SIDE_M[1], 0.0), (0.0, 0.0, -1.0), j)
         for i, (p, j) in enumerate(zip(STRIKES, IMPULSE, strict=True))
     )
-    way = np.array([[0.0, 0.0, -1.0]] * len(STRIKES) + [[0.0, 0.0, 1.0]])
-    gathered, line = None, np.full(model.mode_count, -1)
+    direction = np.array([[0.0, 0.0, -1.0]] * len(STRIKES) + [[0.0, 0.0, 1.0]])
+    recorded, line = None, np.full(model.mode_count, -1)
     if lines is not None:
         guess = Material.isotropic("glass", youngs_pa=7e10, poisson=0.22, density_kg_m3=2500)
         thing = CaseObject("plate", None, 1.0, "glass")
-        gathered = Gathered(thing, guess, recordings, lines, None, None, signals, SR)
+        recorded = Recorded(thing, guess, recordings, lines, None, None, signals, SR)
         for k, f in enumerate(model.freq_hz):
             near = np.abs(lines.freq_hz / f - 1)
             if len(near) and near.min() < 0.006:
                 line[k] = int(near.argmin())
-    return Struck("plate", recordings, model, way, np.array(IMPULSE), "velocity", cast(Family, object()), np.zeros(model.mode_count), line, gathered)
+    return Struck("plate", recordings, model, direction, np.array(IMPULSE), "velocity", cast(Family, object()), np.zeros(model.mode_count), line, recorded)
 
 
 def truth(*effects: Effect) -> Hypothesis:
@@ -78,10 +78,10 @@ def recorded(*effects: Effect, seconds: float = 0.7, noise: float = 2e-5, seed: 
     """The body with the effects as a recording shows it: played, noise added, lines found."""
     plain = struck(model)
     n = int(seconds * SR)
-    heard = replace(
-        plain, gathered=cast(Gathered, Gathered(CaseObject("plate", None, 1.0, None), cast(Material, None), plain.recordings, None, None, None, None, SR))
+    observed = replace(
+        plain, recorded=cast(Recorded, Recorded(CaseObject("plate", None, 1.0, None), cast(Material, None), plain.recordings, None, None, None, None, SR))
     )  # type: ignore[arg-type]
     rng = np.random.default_rng(seed)
-    signals = np.stack([play(truth(*effects), heard, i, n, SR) + noise * rng.standard_normal(n) for i in range(len(STRIKES))])
+    signals = np.stack([play(truth(*effects), observed, i, n, SR) + noise * rng.standard_normal(n) for i in range(len(STRIKES))])
     lines = joint_lines(signals, SR, band_hz=(50.0, 7_500.0))
     return struck(model, lines, signals)

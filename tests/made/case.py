@@ -34,9 +34,9 @@ def write_box(path: Path, size_m: tuple[float, float, float]) -> None:
     path.write_text("\n".join(lines) + "\n")
 
 
-def sound(model: ModalModel, decay: Array, points: tuple[int, int], ways: tuple[Array, Array], impulse: float, n: int) -> Array:
+def sound(model: ModalModel, decay: Array, points: tuple[int, int], directions: tuple[Array, Array], impulse: float, n: int) -> Array:
     """gain 1 · J (φ(p)·e)(φ(q)·n) e^{−dt}(cos ωt − (d/ω) sin ωt)."""
-    psi = (ways[0] @ model.shape[points[0]].astype(float)) * (ways[1] @ model.shape[points[1]].astype(float)) * impulse
+    psi = (directions[0] @ model.shape[points[0]].astype(float)) * (directions[1] @ model.shape[points[1]].astype(float)) * impulse
     t = np.arange(n) / SR
     omega = 2 * np.pi * model.freq_hz
     made = np.zeros(n)
@@ -68,12 +68,12 @@ def make(
     top = np.flatnonzero(model.vertex_m[:, 2] > size_m[2] / 2 - 1e-9)
     end = int(top[np.argmax(model.vertex_m[top] @ (1.0, 0.7, 0))])
     up, down = np.array([0, 0, 1.0]), np.array([0, 0, -1.0])
-    picked = rng.choice(top, strikes, replace=False)
+    selected = rng.choice(top, strikes, replace=False)
     impulses = rng.uniform(0.005, 0.03, strikes)
-    sounds = [sound(model, decay, (int(p), end), (down, up), float(j), int(seconds * SR)) for p, j in zip(picked, impulses, strict=True)]
+    sounds = [sound(model, decay, (int(p), end), (down, up), float(j), int(seconds * SR)) for p, j in zip(selected, impulses, strict=True)]
     gain = 0.3 / max(np.abs(s).max() for s in sounds)
     entries = []
-    for i, (p, j, s) in enumerate(zip(picked, impulses, sounds, strict=True)):
+    for i, (p, j, s) in enumerate(zip(selected, impulses, sounds, strict=True)):
         soundfile.write(folder / f"s{i}.wav", gain * s + noise * rng.standard_normal(len(s)), SR, subtype="FLOAT")
         strike = {"position": [float(x) for x in model.vertex_m[p]], "direction": [0, 0, -1], "impulse": float(j)}
         entries.append({"file": f"s{i}.wav", "object": "box", "split": "holdout" if i == strikes - 1 and strikes > 1 else "fit", "strike": strike})

@@ -54,7 +54,7 @@ def thing(client: Any, shape: str, position: Any, *, orientation: Any = (0, 0, 0
     return body
 
 
-def listen(client: Any, heard: Callable[[Step], None] | None = None) -> tuple[World, list[Step]]:
+def listen(client: Any, observed: Callable[[Step], None] | None = None) -> tuple[World, list[Step]]:
     """A hooked world and the list its steps go to."""
     world, steps = open_world(client), []
 

@@ -127,8 +127,8 @@ def test_a_larger_body_sounds_lower_and_longer(band: float, size: float) -> None
     j = int(np.argmin(np.abs(PLATE - band)))
     rate = target.decay_per_s[j] / source.decay_per_s[j]
     row = got[int(np.argmax(got[:, 0]))]
-    heard = row > 1e-3 * row[0]
-    slope = -np.polyfit(time[heard], np.log(row[heard]), 1)[0] / 2
+    observed = row > 1e-3 * row[0]
+    slope = -np.polyfit(time[observed], np.log(row[observed]), 1)[0] / 2
     assert slope == pytest.approx(10.0 * rate, rel=0.02)
     energy = [np.trapezoid(np.trapezoid(p, t, axis=1), f) for p, t, f in ((left.per_hz, left.time_s, left.freq_hz), (got, time, freq))]
     between = band not in PLATE  # then the band's halves belong to two modes, whose rates differ

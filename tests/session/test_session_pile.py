@@ -59,7 +59,7 @@ class Pile:
 
     log: ContactLog
     sound: np.ndarray
-    blows: list[tuple[int, int, float]]
+    impacts: list[tuple[int, int, float]]
 
 
 @pytest.fixture(scope="module")
@@ -74,11 +74,11 @@ def pile() -> Any:
     begun: list[tuple[int, int, float]] = []
     real = synthesizer.find_blows
 
-    def listening(split: Any, rows: Any, step: Any, sounders: Any, placed: Any, earliest: float) -> Any:
-        blows = real(split, rows, step, sounders, placed, earliest)
+    def listening(split: Any, rows: Any, step: Any, resonators: Any, placed: Any, earliest: float) -> Any:
+        impacts = real(split, rows, step, resonators, placed, earliest)
         number = len(listener.contacts.steps) - 4 + (earliest < 0)
-        begun.extend((number, (blow.low << 16) | blow.high, float(np.linalg.norm(blow.impulse_n_s))) for blow in blows)
-        return blows
+        begun.extend((number, (impact.low << 16) | impact.high, float(np.linalg.norm(impact.impulse_n_s))) for impact in impacts)
+        return impacts
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(synthesizer, "find_blows", listening)
@@ -152,7 +152,7 @@ def test_a_settled_pile_is_silent(pile: Pile) -> None:
 def test_a_settled_pile_rings_out_with_nothing_but_decay(pile: Pile) -> None:
     """Without a quench: from one second after the last strike no blow begins, and energy falls from each fifth of a second to the next."""
     begin = last_strike_s(pile.log) + 1.0
-    assert not [blow for blow in pile.blows if blow[0] >= begin / DT]
+    assert not [impact for impact in pile.impacts if impact[0] >= begin / DT]
     tail = pile.sound[:, round(begin * SR) :]
     block = SR // 5
     energy = (tail[:, : tail.shape[1] // block * block].reshape(len(tail), -1, block) ** 2).sum(axis=2)
@@ -166,11 +166,11 @@ def test_every_impact_is_a_blow(pile: Pile) -> None:
     assert len(wanted) > 40
     missed, share = [], []
     for number, key, impulse in wanted:
-        mine = sum(j for at, pair, j in pile.blows if pair == key and abs(at - number) <= 2)
+        mine = sum(j for at, pair, j in pile.impacts if pair == key and abs(at - number) <= 2)
         share.append(mine / impulse)
         if mine < STRIKE_N_S:
             missed.append((number, key >> 16, key & 0xFFFF, impulse, mine))
-    print(f"{len(wanted)} impacts, {len(pile.blows)} blows, missed {missed}; share of the impulse: median {np.median(share):.2f}, least {min(share):.2f}")
+    print(f"{len(wanted)} impacts, {len(pile.impacts)} blows, missed {missed}; share of the impulse: median {np.median(share):.2f}, least {min(share):.2f}")
     assert not missed
     assert np.median(share) == pytest.approx(1.0, abs=0.1)
 
@@ -179,7 +179,7 @@ def played(setup: synthesizer.Setup, state: synthesizer.State, log: ContactLog, 
     """Frames (channels, n) of the steps three before the ``numbers``, which are fed, and the state after them."""
     frames = [np.zeros((len(setup.sensors), 0))]
     for step in log.steps[numbers.start : numbers.stop]:
-        state = synthesizer.with_bodies(setup, state, log.bodies[len(state.sounders) : len(step.position_m)])
+        state = synthesizer.with_bodies(setup, state, log.bodies[len(state.resonators) : len(step.position_m)])
         frame, state = synthesizer.take_step(setup, state, step)
         frames += [frame] if frame is not None else []
     return np.concatenate(frames, axis=1), state
@@ -208,8 +208,8 @@ def test_every_impact_is_an_onset_in_the_sound(pile: Pile, monkeypatch: pytest.M
         assert len(changed), f"step {number}: no difference"
         begins.append((first + changed[0]) / SR / DT - number)
         window = slice(changed[0], changed[0] + 160)
-        blow, rest = np.abs(np.fft.rfft(np.hanning(160) * np.stack([both[0] - both[1], both[1]])[:, window], 512))
-        above_db.append(20 * np.log10(np.max(blow / np.maximum(rest, 1e-30))))
+        impact, rest = np.abs(np.fft.rfft(np.hanning(160) * np.stack([both[0] - both[1], both[1]])[:, window], 512))
+        above_db.append(20 * np.log10(np.max(impact / np.maximum(rest, 1e-30))))
     print(f"{len(wanted)} impacts begin {min(begins):.2f} … {max(begins):.2f} steps after their step's start")
     print(f"the blow over the rest, in the band where it is most: median {np.median(above_db):.1f} dB, a tenth below {np.percentile(above_db, 10):.1f} dB")
     assert len(wanted) > 40

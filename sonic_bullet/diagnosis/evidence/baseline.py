@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sonic_bullet.diagnosis.evidence.degenerate_pairs import parted
+from sonic_bullet.diagnosis.evidence.degenerate_pairs import separated
 from sonic_bullet.diagnosis.evidence.recording_chain import FEWEST, LINKS, share, unchained
 from sonic_bullet.diagnosis.evidence.refit import refitted
 from sonic_bullet.diagnosis.evidence.unmatched_modes import settled
@@ -20,11 +20,11 @@ from sonic_bullet.diagnosis.prediction.elastic_bodies import with_elastic
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis
 from sonic_bullet.diagnosis.prediction.score import Take, mean_db
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck, shapeless, struck_bodies
-from sonic_bullet.effects.common.hum import stilled
+from sonic_bullet.effects.common.hum import without_hum
 from sonic_bullet.effects.measurement_chain import limit_of
 from sonic_bullet.estimator.fit.case_fit import CaseFit
 from sonic_bullet.estimator.fit.material_fit import fit_evidence
-from sonic_bullet.estimator.fit.observed import Evidence as Gathered
+from sonic_bullet.estimator.fit.observed import Evidence as Recorded
 from sonic_bullet.estimator.lines.joint_lines import Lines, joint_lines, lines_of, noise_rms
 from sonic_bullet.estimator.lines.log_spectral import floor_between
 from sonic_bullet.files.cases import Case
@@ -48,28 +48,28 @@ class Baseline:
     takes: tuple[Take, ...]
 
 
-def baseline(case: Case, gathered: tuple[Gathered, ...], *, cache: Place = "default", progress: Callable[[str], None] | None = None) -> Baseline:
+def baseline(case: Case, recorded: tuple[Recorded, ...], *, cache: Place = "default", progress: Callable[[str], None] | None = None) -> Baseline:
     """Fit it to gathered evidence. Raises SonicBulletError."""
-    plain = _of(case, gathered, cache, progress)
-    ways = [tuple(_unchained(one, link) for one in gathered) for link in LINKS] if plain.takes else []
-    ways += [tuple(way(one, case.band_hz) for one in gathered) for way in (_soft, _unclipped)] if ways else []
-    ways = [faint for faint in ways if any(a is not b for a, b in zip(faint, gathered, strict=True))]
-    if not ways:
+    plain = _of(case, recorded, cache, progress)
+    directions = [tuple(_unchained(one, link) for one in recorded) for link in LINKS] if plain.takes else []
+    directions += [tuple(direction(one, case.band_hz) for one in recorded) for direction in (_soft, _unclipped)] if directions else []
+    directions = [faint for faint in directions if any(a is not b for a, b in zip(faint, recorded, strict=True))]
+    if not directions:
         return plain
     if progress is not None:
         progress("modes that depend on their level, or a limit, leave lines that are no modes: fitting what is left without")
-    best = min((_of(case, faint, cache, None) for faint in ways), key=_off_db)
-    changed = [one for one, faint in zip(gathered, ways[0], strict=True) if faint is not one]
+    best = min((_of(case, faint, cache, None) for faint in directions), key=_off_db)
+    changed = [one for one, faint in zip(recorded, directions[0], strict=True) if faint is not one]
     most = MOSTLY if all(share(one.lines, LINKS[0]) > OFTEN for one in changed) else NEARER
     return best if _off_db(best) < most * _off_db(plain) else plain
 
 
-def _unchained(one: Gathered, link: tuple[float, float, bool]) -> Gathered:
+def _unchained(one: Recorded, link: tuple[float, float, bool]) -> Recorded:
     lines = unchained(one.lines, link) if one.signals is not None else None
     return one if lines is None else replace(one, lines=lines)
 
 
-def _soft(one: Gathered, band_hz: tuple[float, float]) -> Gathered:
+def _soft(one: Recorded, band_hz: tuple[float, float]) -> Recorded:
     """Evidence with the lines of its softer strikes alone, each chain of them as one; the same where chains are few or no strikes are much softer than the others."""
     if one.signals is None or unchained(one.lines, LINKS[0]) is None:
         return one
@@ -81,7 +81,7 @@ def _soft(one: Gathered, band_hz: tuple[float, float]) -> Gathered:
     return one if lines is None else replace(one, lines=unchained(lines, LINKS[0]) or lines)
 
 
-def _unclipped(one: Gathered, band_hz: tuple[float, float]) -> Gathered:
+def _unclipped(one: Recorded, band_hz: tuple[float, float]) -> Recorded:
     """Evidence with the lines of the strikes that stay below a limit, at all strikes; the same where there is no limit, or fewer than two stay below it."""
     if one.signals is None or not (limit := limit_of([one.signals])):
         return one
@@ -95,10 +95,10 @@ def _unclipped(one: Gathered, band_hz: tuple[float, float]) -> Gathered:
     return replace(one, lines=replace(lines, amplitude_sd=spread))
 
 
-def _lines_by(one: Gathered, strikes: Array, band_hz: tuple[float, float]) -> Lines | None:
+def _lines_by(one: Recorded, strikes: Array, band_hz: tuple[float, float]) -> Lines | None:
     """The lines of some strikes, by index, at all of them; None where those are too soft to tell."""
     assert one.signals is not None
-    still = stilled(one.signals, noise_rms(one.signals, one.sr), one.sr)
+    still = without_hum(one.signals, noise_rms(one.signals, one.sr), one.sr)
     try:
         some = joint_lines(still[strikes], one.sr, band_hz=band_hz, signed=one.lines.signed)
         lines = lines_of(still, noise_rms(still, one.sr), some.pole, one.sr, some.signed)
@@ -112,10 +112,10 @@ def _off_db(b: Baseline) -> float:
     return np.inf if found is None else found
 
 
-def _of(case: Case, gathered: tuple[Gathered, ...], cache: Place, progress: Callable[[str], None] | None) -> Baseline:
-    found = fit_evidence(case, gathered, check_mesh=False, progress=progress)
-    bodies = struck_bodies(found, cache=cache, progress=progress) if found.objects else tuple(shapeless(found, g) for g in gathered)
-    bodies = with_elastic(found, tuple(parted(body) for body in bodies), cache=cache, progress=progress)
+def _of(case: Case, recorded: tuple[Recorded, ...], cache: Place, progress: Callable[[str], None] | None) -> Baseline:
+    found = fit_evidence(case, recorded, check_mesh=False, progress=progress)
+    bodies = struck_bodies(found, cache=cache, progress=progress) if found.objects else tuple(shapeless(found, g) for g in recorded)
+    bodies = with_elastic(found, tuple(separated(body) for body in bodies), cache=cache, progress=progress)
     gain = found.fit.sigma if np.isfinite(found.fit.sigma) and found.fit.sigma > 0 else 1.0
     base = Hypothesis(found.fit.alpha_per_s, found.fit.beta_s, gain, (), {b.name: b.correction for b in bodies})
     bodies = settled(refitted(base, bodies), bodies)
@@ -126,8 +126,8 @@ def takes_of(bodies: tuple[Struck, ...]) -> tuple[Take, ...]:
     """The fitted strikes that have audio."""
     takes: list[Take] = []
     for body in bodies:
-        if body.gathered is None or body.gathered.signals is None:
+        if body.recorded is None or body.recorded.signals is None:
             continue
-        floor = floor_between(list(body.gathered.signals))
-        takes += [Take(body, i, sample, body.gathered.sr, floor) for i, sample in zip(body.fitted, body.gathered.signals, strict=True)]
+        floor = floor_between(list(body.recorded.signals))
+        takes += [Take(body, i, sample, body.recorded.sr, floor) for i, sample in zip(body.fitted, body.recorded.signals, strict=True)]
     return tuple(takes)

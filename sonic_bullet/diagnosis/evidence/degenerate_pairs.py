@@ -21,11 +21,11 @@ LIKE = 0.97  # cosine of a line's amplitudes over the strikes and its modes' pat
 FEWEST = 3  # modes of such a group; strikes that tell
 
 
-def parted(body: Struck) -> Struck:
+def separated(body: Struck) -> Struck:
     """The body with such groups told as the two lines they are."""
-    if body.gathered is None or body.family is None or len(body.fitted) < FEWEST:
+    if body.recorded is None or body.family is None or len(body.fitted) < FEWEST:
         return body
-    lines, row = body.gathered.lines, pattern(body, body.model)[body.fitted]
+    lines, row = body.recorded.lines, pattern(body, body.model)[body.fitted]
     line, correction, freq = body.line.copy(), body.correction.copy(), body.model.freq_hz
     for one in np.unique(line[line >= 0]):
         group = np.flatnonzero(line == one)
@@ -33,11 +33,11 @@ def parted(body: Struck) -> Struck:
             continue
         cut = 1 + int(np.diff(freq[group]).argmax())
         free = [k for k in range(len(lines.freq_hz)) if k not in line and abs(lines.freq_hz[k] / freq[group].mean() - 1) < CORRECTION]
-        ways = [(low, high) for k in free for low, high in ((one, k), (k, one))]
-        fits = [min(like(lines.amplitude[:, a], row[:, group[:cut]]), like(lines.amplitude[:, b], row[:, group[cut:]])) for a, b in ways]
+        directions = [(low, high) for k in free for low, high in ((one, k), (k, one))]
+        fits = [min(like(lines.amplitude[:, a], row[:, group[:cut]]), like(lines.amplitude[:, b], row[:, group[cut:]])) for a, b in directions]
         if not fits or max(fits) < LIKE:
             continue
-        for k, part in zip(ways[int(np.argmax(fits))], (group[:cut], group[cut:]), strict=True):
+        for k, part in zip(directions[int(np.argmax(fits))], (group[:cut], group[cut:]), strict=True):
             line[part] = k
             correction[part] = np.clip(lines.freq_hz[k] / freq[part] - 1, -CORRECTION, CORRECTION)
     return replace(body, line=line, correction=correction) if (line != body.line).any() else body

@@ -20,7 +20,7 @@ from sonic_bullet.diagnosis.evidence.refit import ROUGH, refitted
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, modes_of, pattern, play
 from sonic_bullet.diagnosis.prediction.score import Judged, Take, mean_db
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
-from sonic_bullet.estimator.fit.pairing import TWINS
+from sonic_bullet.estimator.fit.pairing import DEGENERATE
 from sonic_bullet.estimator.lines.log_spectral import with_noise
 from sonic_bullet.records import Array
 
@@ -32,7 +32,7 @@ NEARER_DB = 0.05  # without a mode, that ought to be silent
 def beyond(h: Hypothesis, bodies: tuple[Struck, ...], takes: Sequence[Judged]) -> tuple[Hypothesis, float]:
     """The hypothesis with modes that no line was told for where lines of their pattern are, or outside the band; and how far the farthest was put, relative: 0 where none was."""
     start, most = h, 0.0
-    mine = [b for b in bodies if b.gathered is not None and b.family is not None and len(b.fitted) >= FEWEST and b.name in (h.correction or {})]
+    mine = [b for b in bodies if b.recorded is not None and b.family is not None and len(b.fitted) >= FEWEST and b.name in (h.correction or {})]
     for body in mine:
         found, off = _put(h, body, (h.correction or {})[body.name])
         if off:
@@ -48,7 +48,7 @@ def _outside(start: Hypothesis, h: Hypothesis, body: Struck, takes: Sequence[Jud
     """The hypothesis with a body's modes near the band's upper edge outside it, one frequency after another from the top, where strikes are nearer so."""
     model, order = modes_of(h, body)
     old, most, top = (start.correction or {})[body.name], 0.0, body.band_hz[1]
-    group = np.cumsum(np.diff(np.log(model.freq_hz), prepend=-np.inf) > TWINS)
+    group = np.cumsum(np.diff(np.log(model.freq_hz), prepend=-np.inf) > DEGENERATE)
     free = (body.line[order] < 0) & (old[order] == (h.correction or {})[body.name][order])
     near = free & (model.freq_hz <= top) & (model.freq_hz * (1 + FAR) > top)
     now = mean_db(takes, h) if near.any() else None
@@ -66,15 +66,15 @@ def _outside(start: Hypothesis, h: Hypothesis, body: Struck, takes: Sequence[Jud
 
 def _put(h: Hypothesis, body: Struck, correction: Array) -> tuple[Array, float]:
     """Corrections (m,) of a body with such modes put to their lines, the loudest first, and the largest step."""
-    assert body.gathered is not None
-    lines, (model, order) = body.gathered.lines, modes_of(h, body)
-    heard = np.abs(lines.amplitude)
-    row = pattern(body, model)[body.fitted[: len(heard)]]
+    assert body.recorded is not None
+    lines, (model, order) = body.recorded.lines, modes_of(h, body)
+    observed = np.abs(lines.amplitude)
+    row = pattern(body, model)[body.fitted[: len(observed)]]
     told = body.line[order] >= 0
     upper = np.median(model.freq_hz[told]) if told.any() else np.inf
-    group = np.cumsum(np.diff(np.log(model.freq_hz), prepend=-np.inf) > TWINS)
+    group = np.cumsum(np.diff(np.log(model.freq_hz), prepend=-np.inf) > DEGENERATE)
     found, most = correction.copy(), 0.0
-    for k in sorted(set(range(len(lines.freq_hz))) - set(body.line.tolist()), key=lambda k: -float(heard[:, k].max())):
+    for k in sorted(set(range(len(lines.freq_hz))) - set(body.line.tolist()), key=lambda k: -float(observed[:, k].max())):
         if lines.freq_hz[k] < upper:
             continue
         near = np.unique(group[~told & (np.abs(np.log(model.freq_hz / lines.freq_hz[k])) < FAR)])
@@ -96,7 +96,7 @@ def of_the_mesh(h: Hypothesis, bodies: tuple[Struck, ...], takes: Sequence[Judge
     moved, other = dict(h.correction or {}), {}
     for body in bodies:
         mine = moved.get(body.name)
-        if mine is None or body.gathered is None or len(mine) != len(body.line):
+        if mine is None or body.recorded is None or len(mine) != len(body.line):
             continue
         paired = body.line >= 0
         size = float(np.sqrt((mine[paired] ** 2).mean())) if paired.any() else 0.0
@@ -113,6 +113,6 @@ def _roughened(body: Struck, rng: np.random.Generator) -> Struck:
     """The body with shapes at its strikes off by ROUGH of each mode's strongest there."""
     shape = body.model.shape.copy()
     at = slice(body.surface_count(), len(shape) - 1)
-    most = np.abs(np.einsum("sxm,sx->sm", shape[at], body.way[:-1])).max(axis=0)
-    shape[at] += (ROUGH * most * rng.standard_normal((body.strikes, 1, len(most))) * body.way[:-1, :, None]).astype(np.float32)
+    most = np.abs(np.einsum("sxm,sx->sm", shape[at], body.direction[:-1])).max(axis=0)
+    shape[at] += (ROUGH * most * rng.standard_normal((body.strikes, 1, len(most))) * body.direction[:-1, :, None]).astype(np.float32)
     return replace(body, model=replace(body.model, shape=shape))

@@ -38,7 +38,7 @@ def unchained(lines: Lines, link: tuple[float, float, bool]) -> Lines | None:
     many = sum(len(g) > 1 for g in groups)
     if many < max(FEWEST, SHARE * len(groups)):
         loudest = np.abs(lines.amplitude).max(axis=0).argmax() if len(groups) else -1
-        plain = [len(g) >= PLAIN and _one_way(lines.freq_hz[g]) for g in groups]
+        plain = [len(g) >= PLAIN and _one_direction(lines.freq_hz[g]) for g in groups]
         if not any(p and loudest in g for p, g in zip(plain, groups, strict=True)):
             return None
         groups = [part for p, g in zip(plain, groups, strict=True) for part in ([g] if p else np.split(g, len(g)))]
@@ -58,7 +58,7 @@ def unchained(lines: Lines, link: tuple[float, float, bool]) -> Lines | None:
     )
 
 
-def _one_way(freq_hz: Array) -> bool:
+def _one_direction(freq_hz: Array) -> bool:
     """Whether all steps from line to line go the same way."""
     return len(set(np.sign(np.diff(freq_hz)).tolist())) == 1
 

@@ -13,13 +13,13 @@ from dataclasses import replace
 import numpy as np
 
 from sonic_bullet.diagnosis.evidence.amplitude_dependence import TURNS_RAD, fallen, turns_rad
-from sonic_bullet.diagnosis.evidence.effect_evidence import heard_of, outside, paired, path_response
+from sonic_bullet.diagnosis.evidence.effect_evidence import object_evidence, outside, paired, path_response
 from sonic_bullet.diagnosis.evidence.small_amplitude import at_rest
 from sonic_bullet.diagnosis.evidence.unmatched_modes import CORRECTION, can_tell, sought
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, bends, modes_of, moves, pattern, play, undamped
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
-from sonic_bullet.effects.protocol import Blow, Effect, Heard, Stage
-from sonic_bullet.estimator.fit.pairing import MESHED, TWINS
+from sonic_bullet.effects.protocol import Effect, Impact, ObjectEvidence, Stage
+from sonic_bullet.estimator.fit.pairing import DEGENERATE, MESHED
 from sonic_bullet.estimator.fit.rayleigh import rayleigh
 from sonic_bullet.estimator.lines.joint_lines import noise_rms
 from sonic_bullet.records import Array, ModalModel
@@ -28,48 +28,48 @@ ROUGH = 0.02
 NEAR, ALIKE = 5e-3, 1.6  # of ln f and ln d: lines of one mode
 
 
-def refitted(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...] | None = None, *, anew: bool = False) -> Hypothesis:
-    """The hypothesis with α, β and σ fitted again beside its effects; ``heard``: evidence to fit them to, thinned or whole, of all bodies or some.
+def refitted(h: Hypothesis, bodies: tuple[Struck, ...], observed: tuple[ObjectEvidence, ...] | None = None, *, anew: bool = False) -> Hypothesis:
+    """The hypothesis with α, β and σ fitted again beside its effects; ``observed``: evidence to fit them to, thinned or whole, of all bodies or some.
 
     anew: with lines paired and corrections learnt again, too, as they are beside effects that move modes.
     """
     moved = anew or moves(h)
     if moved:
         h = corrected(h, bodies, anew=anew)
-    if heard is None or moved:
-        heard = tuple(
-            heard_of(replace(h, effects=tuple(e for e in h.effects if e.stage is not Stage.SOUND)), b, sounds=False, anew=anew)
+    if observed is None or moved:
+        observed = tuple(
+            object_evidence(replace(h, effects=tuple(e for e in h.effects if e.stage is not Stage.SOUND)), b, sounds=False, anew=anew)
             for b in bodies
-            if b.gathered is not None
+            if b.recorded is not None
         )
-    heard = tuple(fallen(h, _whose(one, bodies), outside(h, one)) for one in heard)
-    h = _gained(_damped(h, bodies, heard), bodies, heard)
-    return at_rest(h, bodies, heard) if bends(h) else h
+    observed = tuple(fallen(h, _whose(one, bodies), outside(h, one)) for one in observed)
+    h = _gained(_damped(h, bodies, observed), bodies, observed)
+    return at_rest(h, bodies, observed) if bends(h) else h
 
 
-def retold(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...] | None = None, *, fully: bool = False) -> Hypothesis:
-    """The hypothesis with a room's response told again, beside all that has been found. heard: whose strikes may tell it; all where None. fully: to the end."""
-    fitted = [b for b in bodies if b.gathered is not None and b.gathered.signals is not None]  # lists of lines say nothing of a response
-    if heard is not None:
-        fitted = [b for b in fitted if any(one.source is b.gathered for one in heard)]
+def reidentified(h: Hypothesis, bodies: tuple[Struck, ...], observed: tuple[ObjectEvidence, ...] | None = None, *, fully: bool = False) -> Hypothesis:
+    """The hypothesis with a room's response told again, beside all that has been found. observed: whose strikes may tell it; all where None. fully: to the end."""
+    fitted = [b for b in bodies if b.recorded is not None and b.recorded.signals is not None]  # lists of lines say nothing of a response
+    if observed is not None:
+        fitted = [b for b in fitted if any(one.source is b.recorded for one in observed)]
     if not fitted:
         return h
     body = max(fitted, key=lambda b: len(np.unique(b.line[b.line >= 0])))  # most lines that are modes
-    for room in (e for e in h.effects if hasattr(e, "told_by")):
-        g = body.gathered
+    for room in (e for e in h.effects if hasattr(e, "identified_from")):
+        g = body.recorded
         assert g is not None and g.signals is not None
-        mine = list(range(len(g.signals))) if heard is None else next(list(one.strike) for one in heard if one.source is g)
+        mine = list(range(len(g.signals))) if observed is None else next(list(one.strike) for one in observed if one.source is g)
         signal = g.signals[mine]
         bare = replace(h, effects=tuple(e for e in h.effects if e is not room))
         sound = np.stack([play(bare, body, body.fitted[i], signal.shape[1], g.sr) for i in mine])
-        again = room.told_by(signal, sound, noise_rms(signal, g.sr), g.sr, fully=fully)
+        again = room.identified_from(signal, sound, noise_rms(signal, g.sr), g.sr, fully=fully)
         h = replace(h, effects=tuple(again if e is room else e for e in h.effects))
     return h
 
 
-def _whose(one: Heard, bodies: tuple[Struck, ...]) -> Struck:
+def _whose(one: ObjectEvidence, bodies: tuple[Struck, ...]) -> Struck:
     """The body that lines are of."""
-    return next(body for body in bodies if body.gathered is one.source)
+    return next(body for body in bodies if body.recorded is one.source)
 
 
 def with_effects(h: Hypothesis, effects: tuple[Effect, ...], bodies: tuple[Struck, ...]) -> Hypothesis:
@@ -83,15 +83,15 @@ def corrected(h: Hypothesis, bodies: tuple[Struck, ...], *, anew: bool = False) 
     told = [e.poisson_ratio for e in h.effects if getattr(e, "poisson_ratio", None) is not None]  # type: ignore[attr-defined]
     h = replace(h, correction=None, stretch=float(sum(getattr(e, "stretch", 0.0) for e in h.effects)), poisson=told[-1] if told else None)
     for _ in range(3):
-        off = np.concatenate([_off(h, body, anew)[1] for body in bodies if body.gathered is not None] or [np.zeros(0)])
+        off = np.concatenate([_off(h, body, anew)[1] for body in bodies if body.recorded is not None] or [np.zeros(0)])
         if len(off):
             h = replace(h, stretch=h.stretch + float(np.median(off)))
     found: dict[str, Array] = {}
     for body in bodies:
-        if body.gathered is None:
+        if body.recorded is None:
             continue
-        for e in (e for e in h.effects if hasattr(e, "heard_at")):  # lines of twins go to their own: half a split off, either would do
-            found[body.name] = np.clip(e.heard_at(undamped(h, body).freq_hz * np.exp(h.stretch)), -CORRECTION, CORRECTION)
+        for e in (e for e in h.effects if hasattr(e, "observed_correction")):  # lines of twins go to their own: half a split off, either would do
+            found[body.name] = np.clip(e.observed_correction(undamped(h, body).freq_hz * np.exp(h.stretch)), -CORRECTION, CORRECTION)
         for _ in range(2):
             place, off = _off(replace(h, correction=found), body, anew)
             ratio = np.array(found.get(body.name, np.zeros(undamped(h, body).mode_count)), float)
@@ -112,22 +112,22 @@ def corrected(h: Hypothesis, bodies: tuple[Struck, ...], *, anew: bool = False) 
 
 def _alike(freq_hz: Array, correction: Array) -> Array:
     """Corrections (m,), the mean of each run of modes that a mesh leaves side by side: what sets twins apart is an effect's, or they would change places."""
-    run = np.cumsum(np.diff(np.log(freq_hz), prepend=-np.inf) > TWINS * MESHED)
+    run = np.cumsum(np.diff(np.log(freq_hz), prepend=-np.inf) > DEGENERATE * MESHED)
     return np.asarray((np.bincount(run, correction) / np.maximum(np.bincount(run), 1))[run])
 
 
 def _off(h: Hypothesis, body: Struck, anew: bool) -> tuple[Array, Array]:
     """Uncorrected modes (p,) of a body and ln f of their lines over their own (p,)."""
-    assert body.gathered is not None
+    assert body.recorded is not None
     model, order = modes_of(h, body)
     line, mode = paired(h, body, model, order, anew=anew)
     place = np.concatenate([order[who] for who in mode]) if mode else np.zeros(0, int)
-    lines = body.gathered.lines.freq_hz
+    lines = body.recorded.lines.freq_hz
     off = np.concatenate([np.full(len(who), np.log(lines[one] / model.freq_hz[who].mean())) for one, who in zip(line, mode, strict=True)] or [np.zeros(0)])
     return place, off
 
 
-def _damped(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...]) -> Hypothesis:
+def _damped(h: Hypothesis, bodies: tuple[Struck, ...], observed: tuple[ObjectEvidence, ...]) -> Hypothesis:
     """α and β beside the effects' own decay."""
     if any(e.id == "damping-law" for e in h.effects):
         return h
@@ -136,7 +136,7 @@ def _damped(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...])
         return replace(h, alpha_per_s=told[-1][0], beta_s=told[-1][1])
     bare = replace(h, alpha_per_s=0.0, beta_s=0.0)
     lam, left, sd, all_of_it = [], [], [], []
-    for one in heard:
+    for one in observed:
         if not len(one.freq_hz):
             continue
         model, _ = modes_of(bare, _whose(one, bodies))
@@ -156,13 +156,13 @@ def _damped(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...])
     return replace(h, alpha_per_s=found.alpha_per_s, beta_s=found.beta_s)
 
 
-def _members(one: Heard, model: ModalModel) -> list[Array]:
+def _members(one: ObjectEvidence, model: ModalModel) -> list[Array]:
     """The modes, by index, that each line stands for in a model whose modes have hardly moved: as many as before, about the one that is nearest."""
     near = model.freq_hz[np.abs(np.subtract.outer(one.freq_hz, model.freq_hz)).argmin(axis=1)]
     return [np.argsort(np.abs(model.freq_hz - f), kind="stable")[: len(who)] for f, who in zip(near, one.mode, strict=True)]
 
 
-def _told(h: Hypothesis, body: Struck, one: Heard) -> Array:
+def _told(h: Hypothesis, body: Struck, one: ObjectEvidence) -> Array:
     """Jψ (s, k) of the lines: the evidence's own, or, beside effects that leave modes where they were, as these have them sound."""
     if moves(h) or not h.at(Stage.MODES):
         return one.pattern
@@ -171,7 +171,7 @@ def _told(h: Hypothesis, body: Struck, one: Heard) -> Array:
     return np.stack([row[:, who].sum(axis=1) for who in _members(one, model)], axis=1)
 
 
-def whole(one: Heard) -> Array:
+def whole(one: ObjectEvidence) -> Array:
     """Amplitudes (s, k) with those of lines so near that they may be the same mode, bent or split: at the onset they add up to what was struck."""
     if one.dry or not len(one.foreign_hz) or not len(one.freq_hz):
         return one.amplitude  # in a room what rings close by is mostly the room
@@ -188,22 +188,22 @@ def _middle(ratio: Array, weight: Array) -> float:
     return float(ratio[order][np.searchsorted(total, total[-1] / 2)])
 
 
-def _gained(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...]) -> Hypothesis:
+def _gained(h: Hypothesis, bodies: tuple[Struck, ...], observed: tuple[ObjectEvidence, ...]) -> Hypothesis:
     """σ by the amplitudes, times what effects that hide them from the lines know better."""
     louder = float(np.prod([getattr(e, "louder", 1.0) for e in h.effects]))
     told, seen, spread = [], [], []
-    for one in heard:
+    for one in observed:
         if not len(one.freq_hz) or one.signal is None:
             continue
         body = _whose(one, bodies)
         direct = np.abs(path_response(h, body, one.freq_hz, one.sr))
         factor = np.empty(one.pattern.shape)
         for i, level in enumerate(one.impulse_n_s):
-            blow = Blow(float(level) if np.isfinite(level) else 1.0, np.zeros(1), np.ones(1))
+            impact = Impact(float(level) if np.isfinite(level) else 1.0, np.zeros(1), np.ones(1))
             for effect in h.at(Stage.FORCE):
-                blow = effect.apply(blow)
-            hits = np.abs((blow.share[:, None] * np.exp((one.decay_per_s - 2j * np.pi * one.freq_hz) * blow.delay_s[:, None])).sum(axis=0))
-            factor[i] = np.abs(blow.spectrum(one.freq_hz)) * direct * hits
+                impact = effect.apply(impact)
+            hits = np.abs((impact.share[:, None] * np.exp((one.decay_per_s - 2j * np.pi * one.freq_hz) * impact.delay_s[:, None])).sum(axis=0))
+            factor[i] = np.abs(impact.spectrum(one.freq_hz)) * direct * hits
         expected = np.abs(_told(h, body, one)) * factor
         if bends(h) and not (glides := turns_rad(h, body, one) > TURNS_RAD).all():
             expected = np.where(glides, np.nan, expected)  # of what glides a linear fit hears a part
@@ -218,7 +218,7 @@ def _gained(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...])
     x, y, s = x[good], y[good], s[:, good]
     if not (x > 0).any():
         return h
-    if any(one.dry for one in heard):  # read through a room, a line is off by a factor of its own
+    if any(one.dry for one in observed):  # read through a room, a line is off by a factor of its own
         told = (x > 0) & (y > 0) & (s[0] > 0)
         return replace(h, gain=_middle(y[told] / x[told], (y / np.maximum(s[0], 1e-300))[told])) if told.any() else h
     gain, weight = _middle(y[x > 0] / x[x > 0], x[x > 0] / (s[0] + s[1])[x > 0]), np.ones(len(x))

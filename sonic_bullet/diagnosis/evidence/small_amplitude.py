@@ -13,12 +13,12 @@ from dataclasses import replace
 import numpy as np
 
 from sonic_bullet.diagnosis.evidence.amplitude_dependence import gliding
-from sonic_bullet.diagnosis.evidence.effect_evidence import heard_of
+from sonic_bullet.diagnosis.evidence.effect_evidence import object_evidence
 from sonic_bullet.diagnosis.evidence.unmatched_modes import CORRECTION
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, modes_of, play, undamped
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.effects.common.envelope import Envelopes, alone, shifted
-from sonic_bullet.effects.protocol import Heard
+from sonic_bullet.effects.protocol import ObjectEvidence
 from sonic_bullet.records import Array
 
 STEP = 0.1  # of 1/duration: steps of δ
@@ -27,11 +27,11 @@ HALFWAY = 0.5  # to the next mode
 AGREE = 0.5  # of all frames' worth, once shifted: what is played is what was recorded
 
 
-def at_rest(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...], *, every: bool = False) -> Hypothesis:
-    """The hypothesis with the corrections of modes that glide learnt on what they ring down to, by the strikes in ``heard``. every: of all modes that stand alone."""
+def at_rest(h: Hypothesis, bodies: tuple[Struck, ...], observed: tuple[ObjectEvidence, ...], *, every: bool = False) -> Hypothesis:
+    """The hypothesis with the corrections of modes that glide learnt on what they ring down to, by the strikes in ``observed``. every: of all modes that stand alone."""
     found = dict(h.correction or {})
     for body in bodies:
-        mine = next((one for one in heard if body.gathered is not None and one.source is body.gathered), None)
+        mine = next((one for one in observed if body.recorded is not None and one.source is body.recorded), None)
         if mine is not None and mine.signal is not None and not mine.dry:  # in a room no line is one mode's alone
             found[body.name] = _rested(h, body, list(mine.strike), every)
     return replace(h, correction=found)
@@ -39,21 +39,21 @@ def at_rest(h: Hypothesis, bodies: tuple[Struck, ...], heard: tuple[Heard, ...],
 
 def _rested(h: Hypothesis, body: Struck, strikes: list[int], every: bool) -> Array:
     """Corrections (m,) of a body."""
-    assert body.gathered is not None and body.gathered.signals is not None
+    assert body.recorded is not None and body.recorded.signals is not None
     count = undamped(h, body).mode_count
     correction = np.array((h.correction or {}).get(body.name, np.zeros(count)), float)
-    one, (modes, order) = heard_of(h, body, sounds=False), modes_of(h, body)
+    one, (modes, order) = object_evidence(h, body, sounds=False), modes_of(h, body)
     glides = np.ones(len(one.freq_hz), bool) if every else gliding(h, body, replace(one, strike=tuple(strikes)))
-    picked, window = alone(one)
-    kept = [q for q, k in enumerate(picked) if glides[k] and len(one.mode[k]) == 1]  # twins glide each by its own level, and beat
+    selected, window = alone(one)
+    kept = [q for q, k in enumerate(selected) if glides[k] and len(one.mode[k]) == 1]  # twins glide each by its own level, and beat
     if not kept or len(correction) != count:
         return correction
-    picked, window = [picked[q] for q in kept], [window[q] for q in kept]
-    signal = body.gathered.signals[strikes]
-    played = np.stack([play(h, body, body.fitted[i], signal.shape[1], body.gathered.sr) for i in strikes])
+    selected, window = [selected[q] for q in kept], [window[q] for q in kept]
+    signal = body.recorded.signals[strikes]
+    played = np.stack([play(h, body, body.fitted[i], signal.shape[1], body.recorded.sr) for i in strikes])
     rows = replace(one, noise=one.noise[strikes])
-    recorded, model = shifted(rows, signal, picked, window), shifted(rows, played, picked, window)
-    for q, k in enumerate(picked):
+    recorded, model = shifted(rows, signal, selected, window), shifted(rows, played, selected, window)
+    for q, k in enumerate(selected):
         next_hz = np.abs(np.delete(modes.freq_hz, one.mode[k]) - modes.freq_hz[one.mode[k]]).min(initial=np.inf)  # or it would be taken for its neighbour
         ratio = 1 + _off_hz(recorded, model, q, min(CORRECTION * float(one.freq_hz[k]), HALFWAY * float(next_hz))) / float(one.freq_hz[k])
         who = order[one.mode[k]]

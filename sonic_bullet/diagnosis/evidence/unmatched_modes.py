@@ -13,7 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from sonic_bullet.diagnosis.evidence.effect_evidence import heard_of
+from sonic_bullet.diagnosis.evidence.effect_evidence import object_evidence
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, modes_of, undamped
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.records import Array
@@ -33,16 +33,16 @@ def settled(h: Hypothesis, bodies: tuple[Struck, ...]) -> tuple[Struck, ...]:
 
 def can_tell(body: Struck) -> bool:
     """Whether amplitudes are known with their signs, and there are sounds to hold them against."""
-    g = body.gathered
+    g = body.recorded
     return g is not None and g.signals is not None and body.family is not None and g.lines.signed and body.kind in ("velocity", "sum")
 
 
 def _settled(h: Hypothesis, body: Struck) -> Struck:
-    assert body.gathered is not None
+    assert body.recorded is not None
     shared = np.bincount(body.line[body.line >= 0], minlength=1)[np.maximum(body.line, 0)] > 1
     free = (body.line < 0) | shared  # modes that a mesh has put side by side may have taken one line where there are two
     correction = sought(h, body, np.flatnonzero(free), alone=body.line < 0)
-    lines, line = body.gathered.lines.freq_hz, body.line.copy()
+    lines, line = body.recorded.lines.freq_hz, body.line.copy()
     for j in np.flatnonzero(correction != body.correction) if len(lines) else ():
         freq = body.model.freq_hz[j] * (1 + correction[j])
         width = (h.alpha_per_s + h.beta_s * (2 * np.pi * freq) ** 2) / (4 * np.pi)
@@ -56,27 +56,27 @@ def sought(h: Hypothesis, body: Struck, which: Array, *, alone: Array | None = N
 
     One that shares a line goes elsewhere only if nothing but itself, as the mesh has it, is there: twins that an imperfection has turned are not the mesh's.
     """
-    assert body.gathered is not None and body.gathered.signals is not None
-    heard, (model, order) = heard_of(h, body), modes_of(h, body)
+    assert body.recorded is not None and body.recorded.signals is not None
+    observed, (model, order) = object_evidence(h, body), modes_of(h, body)
     plain, plain_order = modes_of(replace(h, correction=None), body)
     count = undamped(h, body).mode_count
     correction = np.zeros(count) if h.correction is None else h.correction[body.name].copy()
     own, rank = np.full(count, np.nan), np.full(count, -1)  # overdamped modes are in neither
     own[plain_order], rank[order] = plain.freq_hz, np.arange(len(order))
-    energy = (np.abs(heard.push) ** 2).sum(axis=0) / np.maximum(model.decay_per_s, 1e-3)
-    loud = [int(j) for j in which if rank[j] >= 0 and np.isfinite(own[j]) and energy[rank[j]] > 2 * (heard.noise**2).sum() / heard.sr]
+    energy = (np.abs(observed.push) ** 2).sum(axis=0) / np.maximum(model.decay_per_s, 1e-3)
+    loud = [int(j) for j in which if rank[j] >= 0 and np.isfinite(own[j]) and energy[rank[j]] > 2 * (observed.noise**2).sum() / observed.sr]
     loud.sort(key=lambda j: -energy[rank[j]])
-    left, n = np.fft.rfft(heard.residual, axis=1), body.gathered.signals.shape[1]
+    left, n = np.fft.rfft(observed.residual, axis=1), body.recorded.signals.shape[1]
     for _ in range(TURNS):
         before = correction.copy()
         for j in loud:
-            decay, push = float(model.decay_per_s[rank[j]]), heard.push[:, rank[j]]
+            decay, push = float(model.decay_per_s[rank[j]]), observed.push[:, rank[j]]
             most = np.inf if alone is None or alone[j] else PURE
-            ratio = _best(left, push, decay, own[j], correction[j], n, heard.sr, most, body.band_hz)
+            ratio = _best(left, push, decay, own[j], correction[j], n, observed.sr, most, body.band_hz)
             if ratio != correction[j]:
-                half = 2 * CORRECTION * own[j] + WIDE * (decay / (2 * np.pi) + heard.sr / n)
-                bins = _bins(own[j], half, n, heard.sr)
-                was, will = (_line(own[j] * (1 + r), decay, bins, n, heard.sr, body.band_hz) for r in (correction[j], ratio))
+                half = 2 * CORRECTION * own[j] + WIDE * (decay / (2 * np.pi) + observed.sr / n)
+                bins = _bins(own[j], half, n, observed.sr)
+                was, will = (_line(own[j] * (1 + r), decay, bins, n, observed.sr, body.band_hz) for r in (correction[j], ratio))
                 left[:, bins] += push[:, None] * (was - will)
                 correction[j] = ratio
         if (correction == before).all():

@@ -39,7 +39,7 @@ def with_elastic(found: CaseFit, bodies: tuple[Struck, ...], *, cache: Place = "
         density = guess_of(found.case.objects[body.name]).density_kg_m3
         gamma, poisson = found.fit.gamma_m2_s2, found.fit.poisson_ratio
         material = Material.isotropic("fitted", youngs_pa=gamma * density, poisson=poisson, density_kg_m3=density)
-        lines = len(body.gathered.lines.freq_hz) if body.gathered is not None else 0
+        lines = len(body.recorded.lines.freq_hz) if body.recorded is not None else 0
         count = max(int(MORE * body.model.mode_count), round(1.2 * lines) + 8)
         made.append(replace(body, elastic=elastic_of(found.case, body.name, body.recordings, material, count, cache=cache, say=progress or (lambda _: None))))
     return tuple(made)
@@ -69,20 +69,20 @@ def elastic_of(
         strike = np.full((len(recordings), body.skin.shape[2]), np.nan)
         for i, r in enumerate(recordings):
             if r.position_m is not None:
-                way = np.array(r.direction, float) if r.direction is not None else inward(body, r.position_m)
-                strike[i] = body.points(np.array([r.position_m]), way[None])[0][0] * (1.0 if r.impulse_n_s is None else r.impulse_n_s)
+                direction = np.array(r.direction, float) if r.direction is not None else inward(body, r.position_m)
+                strike[i] = body.points(np.array([r.position_m]), direction[None])[0][0] * (1.0 if r.impulse_n_s is None else r.impulse_n_s)
         at, along = (None if spots is None else spots.get(name) for spots in (case.sensor_m, case.sensor_direction))
         if case.sensor != "velocity" or at is None:
             return strike, None
-        way = np.array(along, float) if along is not None else -inward(body, at)
-        return strike, body.points(np.array([at]), way[None])[0][0]
+        direction = np.array(along, float) if along is not None else -inward(body, at)
+        return strike, body.points(np.array([at]), direction[None])[0][0]
 
     def look(stiffness_m2_s2: Array) -> tuple[Array, Callable[[Array], Array], Array]:
         value, vector = family().modes(stiffness_m2_s2)
         strike, sensor = rows()
         push = strike @ vector if np.isfinite(strike).any() else np.full((len(strike), len(value)), np.nan)
-        heard = push * (sensor @ vector if sensor is not None else 1.0)
-        return np.sqrt(value) / (2 * np.pi), lambda mode: family().slopes(vector[:, mode], value[mode]), heard
+        observed = push * (sensor @ vector if sensor is not None else 1.0)
+        return np.sqrt(value) / (2 * np.pi), lambda mode: family().slopes(vector[:, mode], value[mode]), observed
 
     @lru_cache(maxsize=KEPT)
     def solved(content: bytes) -> ModalModel:

@@ -15,14 +15,14 @@ import numpy as np
 
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.effects.common.ringing import sounded
-from sonic_bullet.effects.protocol import CARRIES, Blow, Effect, Owner, Ring, Sound, Stage
+from sonic_bullet.effects.protocol import CARRIES, Effect, Impact, Owner, Ring, Sound, Stage
 from sonic_bullet.records import Array, ModalModel
 
 MOVES = frozenset({"added-mass", "mode-splitting", "orthotropy", "support-damping"})  # effects under which modes are no longer where, or what, they were
 TURNS = frozenset({"support-damping"})  # of those, under which modes mix with their neighbours
-BESIDE = frozenset({"foreign-mode"})  # effects that ring beside the body, and are none of its modes
+RINGS_BESIDE_BODY = frozenset({"foreign-mode"})  # effects that ring beside the body, and are none of its modes
 LAST = frozenset({"added-mass"})  # of those, under which no mode keeps its own correction
-WAY = tuple(Owner)  # material, object, fixture, striker, room, chain: a sound's
+OWNER_ORDER = tuple(Owner)  # material, object, fixture, striker, room, chain: a sound's
 SAMPLED = 300  # vertices by which modes are told to be alike
 KEPT = 4  # hypotheses and bodies whose modes are remembered
 
@@ -45,7 +45,7 @@ class Hypothesis:
     def at(self, stage: Stage, *, fitted: bool = True) -> tuple[Effect, ...]:
         """The effects of a stage; on an object that was not fitted only those that carry over."""
         mine = (e for e in self.effects if e.stage is stage and (fitted or e.owner in CARRIES))
-        return tuple(sorted(mine, key=lambda e: WAY.index(e.owner)) if stage is Stage.SOUND else mine)
+        return tuple(sorted(mine, key=lambda e: OWNER_ORDER.index(e.owner)) if stage is Stage.SOUND else mine)
 
 
 def ordered(model: ModalModel, freq_hz: Array, decay_per_s: Array, shape: Array | None = None) -> tuple[ModalModel, Array]:
@@ -60,7 +60,7 @@ def ordered(model: ModalModel, freq_hz: Array, decay_per_s: Array, shape: Array 
 
 def undamped(h: Hypothesis, body: Struck) -> ModalModel:
     """The body's model under the effects on its material, uncorrected."""
-    effects = h.at(Stage.MATERIAL, fitted=body.gathered is not None)
+    effects = h.at(Stage.MATERIAL, fitted=body.recorded is not None)
     if not effects or body.elastic is None:
         return body.model if h.poisson is None or body.other is None else body.other(h.poisson)
     material = body.elastic.material
@@ -105,12 +105,12 @@ def modes_of(h: Hypothesis, body: Struck) -> tuple[ModalModel, Array]:
     decay = (h.alpha_per_s + h.beta_s * lam) / 2
     model, order = ordered(base, np.sqrt(np.maximum(lam - decay**2, 0)) / (2 * np.pi), decay)
     for effect in sorted(
-        h.at(Stage.MODES, fitted=body.gathered is not None), key=lambda e: e.owner is not Owner.MATERIAL
+        h.at(Stage.MODES, fitted=body.recorded is not None), key=lambda e: e.owner is not Owner.MATERIAL
     ):  # a law of the material is no fixture's
         before, model = model, effect.apply(model)
         if effect.id in TURNS:
             order = order[came_from(before, model)]
-    for effect in h.at(Stage.BANK, fitted=body.gathered is not None):
+    for effect in h.at(Stage.BANK, fitted=body.recorded is not None):
         if hasattr(effect, "turned"):  # axes of twins
             model = effect.turned(model)
     return ordered(model, model.freq_hz * (1 + correction[: model.mode_count]), model.decay_per_s) if last else (model, order)
@@ -128,7 +128,7 @@ def came_from(old: ModalModel, new: ModalModel) -> Array:
 def pattern(body: Struck, model: ModalModel) -> Array:
     """J ψ (s, m), real, of the body's strikes at the sensor; J = 1 where it is not known."""
     at = model.shape[body.surface_count(model) :].astype(float)
-    row = np.einsum("sxm,sx->sm", at, body.way)
+    row = np.einsum("sxm,sx->sm", at, body.direction)
     level = np.where(np.isfinite(body.impulse_n_s), body.impulse_n_s, 1.0)
     return np.asarray(level[:, None] * row[:-1] * row[-1])
 
@@ -145,39 +145,41 @@ def start(kind: str, model: ModalModel) -> Array:
     return np.full(model.mode_count, -1j if kind in ("sum", "lines") else 1.0 + 0j)
 
 
-def blow_of(h: Hypothesis, body: Struck, strike: int) -> Blow:
+def impact_of(h: Hypothesis, body: Struck, strike: int) -> Impact:
     """What the strike is under the hypothesis."""
     level = body.impulse_n_s[strike]
-    blow = Blow(float(level) if np.isfinite(level) else 1.0, np.zeros(1), np.ones(1))
-    for effect in h.at(Stage.FORCE, fitted=body.gathered is not None):
-        blow = effect.apply(blow)
-    return blow
+    impact = Impact(float(level) if np.isfinite(level) else 1.0, np.zeros(1), np.ones(1))
+    for effect in h.at(Stage.FORCE, fitted=body.recorded is not None):
+        impact = effect.apply(impact)
+    return impact
 
 
 def ring_of(h: Hypothesis, body: Struck, strike: int) -> Ring:
     """The modes as a strike starts them, before its pulse's spectrum; those outside the band are silent."""
     model, _ = modes_of(h, body)
     row = pattern(body, model)[strike] * in_band(body, model)
-    push = np.einsum("xm,x->m", model.shape[body.surface_count(model) + strike].astype(float), body.way[strike])
+    push = np.einsum("xm,x->m", model.shape[body.surface_count(model) + strike].astype(float), body.direction[strike])
     most = np.ones(len(row))
     if any(e.stage is Stage.BANK for e in h.effects) and body.surface_count(model):
         most = np.sqrt((model.shape[: body.surface_count(model)].astype(float) ** 2).sum(axis=1)).max(axis=0)
-    blow = blow_of(h, body, strike)
+    impact = impact_of(h, body, strike)
     none = np.zeros(len(row))
-    ring = Ring(model.freq_hz, model.decay_per_s, h.gain * row * start(body.kind, model), np.abs(blow.impulse_n_s * push) * most, none, none, blow.impulse_n_s)
-    for effect in h.at(Stage.BANK, fitted=body.gathered is not None):
+    ring = Ring(
+        model.freq_hz, model.decay_per_s, h.gain * row * start(body.kind, model), np.abs(impact.impulse_n_s * push) * most, none, none, impact.impulse_n_s
+    )
+    for effect in h.at(Stage.BANK, fitted=body.recorded is not None):
         ring = effect.apply(ring)
     return ring
 
 
 def play(h: Hypothesis, body: Struck, strike: int, n: int, sr: int) -> Array:
     """The strike's sound (n,) from the onset on, in units of the file."""
-    blow = blow_of(h, body, strike)
-    sample = sounded(ring_of(h, body, strike), blow, n, sr)
+    impact = impact_of(h, body, strike)
+    sample = sounded(ring_of(h, body, strike), impact, n, sr)
     index = -1
-    if body.gathered is not None:
+    if body.recorded is not None:
         index = body.fitted.index(strike) if strike in body.fitted else -1
-    sound = Sound(sample, sr, blow.impulse_n_s, index)
-    for effect in h.at(Stage.SOUND, fitted=body.gathered is not None):
+    sound = Sound(sample, sr, impact.impulse_n_s, index)
+    for effect in h.at(Stage.SOUND, fitted=body.recorded is not None):
         sound = effect.apply(sound)
     return sound.sample

@@ -31,14 +31,14 @@ class Listed:
 
     def distance(self, h: Hypothesis) -> float:
         """D in dB; NaN where there is no line."""
-        assert self.body.gathered is not None
-        lines = self.body.gathered.lines
+        assert self.body.recorded is not None
+        lines = self.body.recorded.lines
         return distance_db(*off_by(h, self.body, lines.freq_hz[self.line], lines.decay_per_s[self.line]))
 
     def least(self, h: Hypothesis) -> float:
         """D of the lines' own spreads."""
-        assert self.body.gathered is not None
-        lines = self.body.gathered.lines
+        assert self.body.recorded is not None
+        lines = self.body.recorded.lines
         sd, decay = np.nan_to_num(lines.freq_sd_hz[self.line]) / lines.freq_hz[self.line], lines.decay_per_s[self.line]
         return distance_db(sd, np.where(np.isfinite(decay), np.nan_to_num(lines.decay_sd_per_s[self.line]) / np.maximum(decay, 1e-9), np.nan))
 
@@ -56,7 +56,7 @@ def listed(bodies: tuple[Struck, ...]) -> tuple[Listed, ...]:
     """Every body's lines in turns."""
     made = []
     for body in bodies:
-        count = len(body.gathered.lines.freq_hz) if body.gathered is not None else 0
+        count = len(body.recorded.lines.freq_hz) if body.recorded is not None else 0
         if count >= 2 * FOLDS:
             made += [Listed(body, np.arange(i, count, FOLDS)) for i in range(FOLDS)]
     return tuple(made)
@@ -89,11 +89,11 @@ def distance_db(off: Array, lost: Array) -> float:
 
 
 def _without(body: Struck, line: Array) -> Struck:
-    assert body.gathered is not None
-    keep = np.setdiff1d(np.arange(len(body.gathered.lines.freq_hz)), line)
-    place = np.full(len(body.gathered.lines.freq_hz) + 1, -1)
+    assert body.recorded is not None
+    keep = np.setdiff1d(np.arange(len(body.recorded.lines.freq_hz)), line)
+    place = np.full(len(body.recorded.lines.freq_hz) + 1, -1)
     place[keep] = np.arange(len(keep))
     mine = place[body.line]
     return replace(
-        body, gathered=replace(body.gathered, lines=lines_at(body.gathered.lines, keep)), line=mine, correction=np.where(mine >= 0, body.correction, 0.0)
+        body, recorded=replace(body.recorded, lines=lines_at(body.recorded.lines, keep)), line=mine, correction=np.where(mine >= 0, body.correction, 0.0)
     )

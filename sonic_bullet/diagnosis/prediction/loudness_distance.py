@@ -17,7 +17,7 @@ from sonic_bullet.records.errors import RecordError
 
 FULL_SCALE = 90.0
 LEVELS = 2
-HEARD = 0.05  # sone
+OBSERVED = 0.05  # sone
 
 
 def sone_distance(takes: tuple[Take, ...], h: Hypothesis) -> float | None:
@@ -30,7 +30,7 @@ def sone_distance(takes: tuple[Take, ...], h: Hypothesis) -> float | None:
         except RecordError:
             continue
         for one, two in zip(a.levels, b.levels, strict=False):
-            heard = one.loud.sum(axis=1) > HEARD
-            if heard.any():
-                found.append(float(np.abs(one.loud - two.loud).sum(axis=1)[heard].mean()))
+            observed = one.loud.sum(axis=1) > OBSERVED
+            if observed.any():
+                found.append(float(np.abs(one.loud - two.loud).sum(axis=1)[observed].mean()))
     return float(np.mean(found)) if found else None

@@ -13,7 +13,7 @@ import numpy as np
 
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, play
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
-from sonic_bullet.estimator.fit.observed import Evidence as Gathered
+from sonic_bullet.estimator.fit.observed import Evidence as Recorded
 from sonic_bullet.estimator.lines.log_spectral import Floor, log_spectral_db, noise_floor_db, with_noise
 from sonic_bullet.records import Array
 
@@ -41,11 +41,11 @@ class Take:
     floor: Floor
 
     @property
-    def place(self) -> tuple[Gathered, int]:
+    def place(self) -> tuple[Recorded, int]:
         """Where it is in the evidence: among whose strikes, and which of those. Raises ValueError where it was not fitted."""
-        if self.body.gathered is None:
+        if self.body.recorded is None:
             raise ValueError(f"{self.body.name} was not fitted")
-        return self.body.gathered, self.body.fitted.index(self.strike)
+        return self.body.recorded, self.body.fitted.index(self.strike)
 
     def distance(self, h: Hypothesis) -> float:
         """D in dB of the recording and what the hypothesis plays; NaN where nothing stands above the noise."""

@@ -17,7 +17,7 @@ import numpy as np
 from sonic_bullet.effects.protocol import Elastic, Poisson
 from sonic_bullet.estimator.fit.case_fit import POISSON_SD, CaseFit, ObjectFit
 from sonic_bullet.estimator.fit.observation import pressure_weight
-from sonic_bullet.estimator.fit.observed import Evidence as Gathered
+from sonic_bullet.estimator.fit.observed import Evidence as Recorded
 from sonic_bullet.estimator.fit.observed import body_family, guess_of
 from sonic_bullet.files.cases import Case, CaseRecording
 from sonic_bullet.modal.cache import Place
@@ -31,7 +31,7 @@ class Struck:
 
     way (s + 1, 3): directions there, zero for a strike of unknown place. impulse_n_s (s,): NaN where unknown. kind: `Case.sensor`.
     family: for another elasticity, None without a mesh. correction (m,): relative, of each mode's frequency, learnt on its fitted strikes, else 0.
-    line (m,): the fitted line a mode was paired with, or -1. gathered: its fitted lines and sounds, None for an object nobody fitted.
+    line (m,): the fitted line a mode was paired with, or -1. recorded: its fitted lines and sounds, None for an object nobody fitted.
     elastic: for tensors, see elastic.py. band_hz: nothing outside it is recorded, though its modes are in the model: a mesh may have put them there.
     other: ν -> the model there, of as many modes. poisson: the same, cheap, for a search.
     """
@@ -39,13 +39,13 @@ class Struck:
     name: str
     recordings: tuple[CaseRecording, ...]
     model: ModalModel
-    way: Array
+    direction: Array
     impulse_n_s: Array
     kind: str
     family: Family | None
     correction: Array
     line: Array
-    gathered: Gathered | None
+    recorded: Recorded | None
     elastic: Elastic | None = None
     band_hz: tuple[float, float] = (0.0, float("inf"))
     other: Callable[[float], ModalModel] | None = None
@@ -58,8 +58,8 @@ class Struck:
     @property
     def fitted(self) -> list[int]:
         """Which of the recordings its lines and sounds belong to, in their order: those of the split 'fit' that could be read."""
-        heard = self.gathered.recordings if self.gathered is not None else ()
-        return [i for one in heard for i, r in enumerate(self.recordings) if r is one or r == one]
+        observed = self.recorded.recordings if self.recorded is not None else ()
+        return [i for one in observed for i, r in enumerate(self.recordings) if r is one or r == one]
 
     def surface_count(self, model: ModalModel | None = None) -> int:
         """How many of the vertices of its model, or of its model under another elasticity, are the body's."""
@@ -103,7 +103,7 @@ def _placed(found: CaseFit, name: str, family: Family, density: float, o: Object
             if at >= 0:  # modes that one line stands for are one frequency, whatever the mesh made of them
                 member = np.sqrt(value[inside])
                 correction[inside] = (1 + ratio) * np.exp(np.log(member).mean()) / member - 1
-    model, way = modal_model(case, name, mine, family, density, value, vector)
+    model, direction = modal_model(case, name, mine, family, density, value, vector)
     impulse = np.array([np.nan if r.impulse_n_s is None else r.impulse_n_s for r in mine])
 
     def lowest(poisson: float) -> tuple[Array, Array]:
@@ -119,8 +119,8 @@ def _placed(found: CaseFit, name: str, family: Family, density: float, o: Object
         return np.sqrt(lam) / (2 * np.pi), vector.T @ turned
 
     nu = Poisson(found.fit.poisson_ratio, guess_of(case.objects[name]).poisson, POISSON_SD, sums)
-    gathered = o.evidence if o is not None else None
-    return Struck(name, mine, model, way, impulse, case.sensor, family, correction, line, gathered, band_hz=case.band_hz, other=other, poisson=nu)
+    recorded = o.evidence if o is not None else None
+    return Struck(name, mine, model, direction, impulse, case.sensor, family, correction, line, recorded, band_hz=case.band_hz, other=other, poisson=nu)
 
 
 def modal_model(
@@ -129,24 +129,24 @@ def modal_model(
     """The undamped model of modes (b, m) with λ (m,), strikes and sensor as last vertices, and the directions there (s + 1, 3). Raises MeshError."""
     scale = np.sqrt(density * family.length_m**3)
     axes = np.eye(3)
-    extra, way, place = [], [], []
-    at, along = (None if spots is None else spots.get(name) for spots in (case.sensor_m, case.sensor_direction))
-    wanted = [(r.position_m, r.direction) for r in recordings] + ([(at, along)] if case.sensor == "velocity" else [])
-    for position, direction in wanted:
+    extra, direction, place = [], [], []
+    at, normal = (None if spots is None else spots.get(name) for spots in (case.sensor_m, case.sensor_direction))
+    wanted = [(r.position_m, r.direction) for r in recordings] + ([(at, normal)] if case.sensor == "velocity" else [])
+    for position, along in wanted:
         if position is None:
             extra.append(np.zeros((3, len(value))))
-            way.append(np.zeros(3))
+            direction.append(np.zeros(3))
             place.append(np.zeros(3))
             continue
         rows, _ = family.points(np.tile(position, (3, 1)), axes)
         extra.append(rows @ vector / scale)
-        way.append(np.array(direction, float) if direction is not None else inward(family, position))
+        direction.append(np.array(along, float) if along is not None else inward(family, position))
         place.append(np.array(position, float))
     freq = np.sqrt(value) / (2 * np.pi)
     if case.sensor != "velocity":
         weight = pressure_weight(family, density, freq, np.zeros(len(freq)), vector) if case.sensor == "pressure" else np.ones(len(freq))
         extra.append(np.stack([weight, 0 * weight, 0 * weight]))
-        way.append(axes[0])
+        direction.append(axes[0])
         place.append(family.vertex_m.mean(axis=0))
     skin = np.einsum("vxb,bm->vxm", family.skin, vector.astype(np.float32)) / np.float32(scale)
     flat = np.zeros(len(family.face))
@@ -162,7 +162,7 @@ def modal_model(
         mass,
         note=family.note,
     )
-    return model, np.array(way)
+    return model, np.array(direction)
 
 
 def inward(family: Family, position: tuple[float, float, float]) -> Array:
@@ -174,32 +174,32 @@ def inward(family: Family, position: tuple[float, float, float]) -> Array:
     return -np.asarray(outward_normals(family.vertex_m, family.face[face])[0])
 
 
-def shapeless(found: CaseFit, gathered: Gathered) -> Struck:
+def shapeless(found: CaseFit, recorded: Recorded) -> Struck:
     """An object without a mesh: its lines are its modes. Strikes at one place, or at places not told, share the amplitudes per N·s (rms over them); each other place has its own.
 
     What goes with the place is then nobody's to explain; a strike at a place that no fitted one was at is played as the rms over all.
     """
-    lines = gathered.lines
-    mine = tuple(r for r in found.case.recordings if r.object == gathered.thing.name)
+    lines = recorded.lines
+    mine = tuple(r for r in found.case.recordings if r.object == recorded.thing.name)
     impulse = np.array([np.nan if r.impulse_n_s is None else r.impulse_n_s for r in mine])
-    weight = amplitude_per_impulse(gathered)
+    weight = amplitude_per_impulse(recorded)
     shape = np.zeros((len(mine) + 1, 3, len(lines.freq_hz)), np.float32)
     shape[:, 0] = 1.0
     shape[-1, 0] = weight
-    for place in {(r.position_m, r.direction) for r in gathered.recordings if r.position_m is not None}:
-        here = np.array([(r.position_m, r.direction) == place for r in gathered.recordings])
-        own = amplitude_per_impulse(gathered, here) * np.where(np.nansum(lines.amplitude[here].real, axis=0) < 0, -1, 1)
+    for place in {(r.position_m, r.direction) for r in recorded.recordings if r.position_m is not None}:
+        here = np.array([(r.position_m, r.direction) == place for r in recorded.recordings])
+        own = amplitude_per_impulse(recorded, here) * np.where(np.nansum(lines.amplitude[here].real, axis=0) < 0, -1, 1)
         shape[[i for i, r in enumerate(mine) if (r.position_m, r.direction) == place], 0] = np.nan_to_num(own / np.maximum(weight, 1e-300))
-    way = np.tile([1.0, 0, 0], (len(mine) + 1, 1))
+    direction = np.tile([1.0, 0, 0], (len(mine) + 1, 1))
     undamped = np.hypot(2 * np.pi * lines.freq_hz, np.nan_to_num(lines.decay_per_s)) / (2 * np.pi)
     order = np.argsort(undamped)
     empty = np.zeros((0, 3))
     model = ModalModel(undamped[order], np.zeros(len(order)), shape[:, :, order], np.zeros((len(shape), 3)), empty, np.zeros(0), 0.0, 0.0, note="no mesh")
-    return Struck(gathered.thing.name, mine, model, way, impulse, "lines", None, np.zeros(len(order)), order, gathered)
+    return Struck(recorded.thing.name, mine, model, direction, impulse, "lines", None, np.zeros(len(order)), order, recorded)
 
 
-def amplitude_per_impulse(gathered: Gathered, of: Array | None = None) -> Array:
+def amplitude_per_impulse(recorded: Recorded, of: Array | None = None) -> Array:
     """Rms over the strikes, or over some (s,), of |A|/J (k,); J = 1 where it is not known."""
-    some = np.ones(len(gathered.recordings), bool) if of is None else of
-    level = np.array([r.impulse_n_s or 1.0 for r in gathered.recordings])[some]
-    return np.asarray(np.sqrt(np.nanmean(np.abs(gathered.lines.amplitude[some] / level[:, None]) ** 2, axis=0)))
+    some = np.ones(len(recorded.recordings), bool) if of is None else of
+    level = np.array([r.impulse_n_s or 1.0 for r in recorded.recordings])[some]
+    return np.asarray(np.sqrt(np.nanmean(np.abs(recorded.lines.amplitude[some] / level[:, None]) ** 2, axis=0)))

@@ -21,7 +21,7 @@ FAINT_DB, MOST = 0.2, 0.5  # of a drop that is as much of the gap: then less tha
 CERTAIN_DB, SAID = 0.1, 0.25  # of a drop that is as much of the gap, where lines have told of an effect, each by its own baseband
 LOUDEST = 2  # strikes, of which what goes with level must gain most
 LOST = 0.15  # of what the loudest gains: all that others may lose by what goes with level
-SURE, MANY = 2.0, 4  # standard errors; strikes of which none may lose, beside one
+STANDARD_ERRORS, MANY = 2.0, 4  # standard errors; strikes of which none may lose, beside one
 NOISE_DB = 0.03  # of a distance, by noise alone
 CAPS = 60  # of what is open, tried
 
@@ -97,7 +97,7 @@ def earns(c: Candidate, gap_db: float, *, first: bool) -> bool:
     sd = float(drop.std(ddof=1) / np.sqrt(len(drop)))
     if len(drop) >= MANY and drop[0] > -max(0.1 * drop.mean(), NOISE_DB) and (drop[-2] > need or (first and c.certain and c.loud)):
         return more > 0.5 * need  # no strike speaks against it, though loud ones may gain far more than soft ones
-    return bool(drop.mean() > SURE * sd) and more > max(SURE * sd, 0.5 * need)
+    return bool(drop.mean() > STANDARD_ERRORS * sd) and more > max(STANDARD_ERRORS * sd, 0.5 * need)
 
 
 def may_earn(asked: Candidate, open_db: np.ndarray[Any, Any], gap_db: float) -> bool:

@@ -15,7 +15,7 @@ import numpy as np
 
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis
 from sonic_bullet.diagnosis.prediction.score import Judged, Take
-from sonic_bullet.estimator.fit.observed import Evidence as Gathered
+from sonic_bullet.estimator.fit.observed import Evidence as Recorded
 from sonic_bullet.estimator.lines.joint_lines import Lines, lines_of, noise_rms
 from sonic_bullet.estimator.lines.log_spectral import log_spectral_db, with_noise
 from sonic_bullet.records import Array
@@ -47,18 +47,18 @@ def _in_time(a: Array, freq_hz: Array) -> Array:
 
 def of_no_body(h: Hypothesis, takes: Sequence[Judged]) -> float:
     """Of the squared distance between strikes and h, over noise alone, the share that the strikes' own lines leave, those that are in phase: 0 to 1."""
-    heard = [take for take in takes if isinstance(take, Take)]
-    played = {id(g): _played(g) for g in {id(t.place[0]): t.place[0] for t in heard}.values()}
+    observed = [take for take in takes if isinstance(take, Take)]
+    played = {id(g): _played(g) for g in {id(t.place[0]): t.place[0] for t in observed}.values()}
     left, gap = 0.0, 0.0
-    for take in heard:
-        gathered, strike = take.place
-        mine, off, least = _off(take, played[id(gathered)][strike]), take.distance(h), take.least(h)
+    for take in observed:
+        recorded, strike = take.place
+        mine, off, least = _off(take, played[id(recorded)][strike]), take.distance(h), take.least(h)
         if np.isfinite([mine, off, least]).all():
             left, gap = left + max(mine**2 - least**2, 0.0), gap + max(off**2 - least**2, 0.0)
     return float(min(left / gap, 1.0)) if gap > 0 else 0.0
 
 
-def _played(g: Gathered) -> Array:
+def _played(g: Recorded) -> Array:
     """What the lines that are in phase play (s, n), told without the others where there are others."""
     assert g.signals is not None
     odd = out_of_phase(g.lines)

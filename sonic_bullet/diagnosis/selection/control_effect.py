@@ -28,11 +28,11 @@ class Null:
 
     def apply(self, x: ModalModel) -> ModalModel:
         """The modes with the effect in them."""
-        way = directions(self.seed, len(self.amount), x.mode_count)
+        direction = directions(self.seed, len(self.amount), x.mode_count)
         half = (len(self.amount) + 1) // 2
-        decay = x.decay_per_s * np.exp(np.clip(np.array(self.amount[:half]) @ way[:half], -3, 3))
+        decay = x.decay_per_s * np.exp(np.clip(np.array(self.amount[:half]) @ direction[:half], -3, 3))
         shape = x.shape.copy()
-        shape[-1] *= np.exp(np.clip(np.array(self.amount[half:]) @ way[half:], -3, 3)).astype(np.float32) if len(way) > half else np.float32(1)
+        shape[-1] *= np.exp(np.clip(np.array(self.amount[half:]) @ direction[half:], -3, 3)).astype(np.float32) if len(direction) > half else np.float32(1)
         return replace(x, decay_per_s=decay, shape=shape)
 
     def parameters(self) -> dict[str, Any]:
@@ -49,9 +49,9 @@ class Null:
     @classmethod
     def fitted(cls, evidence: Evidence, freedom: int, seed: int) -> Self | None:
         """The random effect of so many numbers that the first object's lines suggest most."""
-        h = evidence.heard[0]
+        h = evidence.observed[0]
         count = len(h.all_hz)
-        way = directions(seed, freedom, count)
+        direction = directions(seed, freedom, count)
         half = (freedom + 1) // 2
         if len(h.freq_hz) <= freedom:
             return None
@@ -59,8 +59,8 @@ class Null:
         y = np.log(np.maximum(h.decay_per_s, 1e-3) / np.maximum(h.expected_decay_per_s, 1e-3))
         size = np.log(np.maximum(np.abs(h.amplitude), 1e-12) / np.maximum(np.abs(h.expected), 1e-12))
         z = np.nan_to_num(np.median(size, axis=0))
-        a = np.linalg.lstsq(way[:half, member].T, np.nan_to_num(y), rcond=None)[0]
-        b = np.linalg.lstsq(way[half:, member].T, z - np.median(z), rcond=None)[0] if freedom > half else np.zeros(0)
+        a = np.linalg.lstsq(direction[:half, member].T, np.nan_to_num(y), rcond=None)[0]
+        b = np.linalg.lstsq(direction[half:, member].T, z - np.median(z), rcond=None)[0] if freedom > half else np.zeros(0)
         return cls(tuple(float(v) for v in np.concatenate([a, b])), seed)
 
 

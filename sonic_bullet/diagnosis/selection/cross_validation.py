@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of, thinned
-from sonic_bullet.diagnosis.evidence.refit import refitted, retold
+from sonic_bullet.diagnosis.evidence.refit import refitted, reidentified
 from sonic_bullet.diagnosis.evidence.small_amplitude import at_rest
 from sonic_bullet.diagnosis.prediction.hypothesis import TURNS, Hypothesis, bends, moves
 from sonic_bullet.diagnosis.prediction.line_score import Listed
@@ -53,17 +53,17 @@ def trials(
     if len(takes) < 2:
         return found  # nothing can be left out
     folds = _folds(h, bodies, takes, evidence, seed)
-    heard = any(isinstance(take, Take) for take in takes)  # else no lines are left out
-    whole_lines = cache(lambda: _folds(h, bodies, takes, evidence, seed, keep=1.0) if heard else folds)
-    anew = cache(lambda: refitted(h, bodies, anew=True) if heard else h)
+    observed = any(isinstance(take, Take) for take in takes)  # else no lines are left out
+    whole_lines = cache(lambda: _folds(h, bodies, takes, evidence, seed, keep=1.0) if observed else folds)
+    anew = cache(lambda: refitted(h, bodies, anew=True) if observed else h)
     fair = cache(lambda by_line: _learnt_anew(anew(), whole_lines() if by_line else folds))
     still = cache(lambda by_line: _rested(whole_lines() if by_line else folds))
     gap = mean([f.before - f.noise for f in folds])
     idle = not costly and len(evidence.found) >= ENOUGH
-    dry = any(one.dry for one in evidence.heard)
+    dry = any(one.dry for one in evidence.observed)
     kinds = [kind for kind in effects if kind.id not in evidence.found and not (idle and getattr(kind, "searches", False))]
     for group in _groups(kinds, last=TURNS if dry and costly else frozenset()):
-        if any(hasattr(c.effect, "dried") and earns(c, gap, first=not evidence.found) for c in found):
+        if any(hasattr(c.effect, "dereverberated") and earns(c, gap, first=not evidence.found) for c in found):
             break  # what others say of lines that a room has made is hearsay: in the next round they are told dry
         if dry and group[0].id in TURNS and len(kinds) > len(group) and any(c.effect.stage is Stage.MATERIAL for c in found):
             continue  # lines that were paired with another material's modes tell little of what mixes these
@@ -94,7 +94,7 @@ def _proposed(group: list[type[Effect]], evidence: Evidence) -> dict[type[Effect
 
 def _groups(kinds: list[type[Effect]], last: frozenset[str]) -> list[list[type[Effect]]]:
     """Rooms, whose echoes others would be told of; what is cheap; and what takes long, one by one; then those that come last."""
-    rooms = [k for k in kinds if hasattr(k, "dried")]
+    rooms = [k for k in kinds if hasattr(k, "dereverberated")]
     late = [k for k in kinds if k.id in last]
     dear = [k for k in kinds if k not in rooms + late and getattr(k, "costly", False)]
     plain = [k for k in kinds if k not in rooms + late + dear]
@@ -129,7 +129,7 @@ def _folds(h: Hypothesis, bodies: tuple[Struck, ...], takes: Sequence[Judged], e
             base = refitted(start, mine)
         elif isinstance(take, Take):
             mine, less = bodies, thinned(evidence, take.place, keep, rng)
-            base = refitted(h, bodies, less.heard)
+            base = refitted(h, bodies, less.observed)
         before = take.distance(base)
         if np.isfinite(before):
             made.append(Fold(take, mine, less, base, before, before, take.least(base)))
@@ -150,7 +150,7 @@ def _learnt_anew(every: Hypothesis, folds: list[Fold]) -> list[Fold]:
 def _rested(folds: list[Fold]) -> list[Fold]:
     """Folds that know what is gained by corrections alone, learnt from what modes ring down to as they are beside whatever makes them glide."""
     return [
-        replace(f, least=min(f.before, f.take.distance(at_rest(f.base, f.bodies, f.evidence.heard, every=True)))) if isinstance(f.take, Take) else f
+        replace(f, least=min(f.before, f.take.distance(at_rest(f.base, f.bodies, f.evidence.observed, every=True)))) if isinstance(f.take, Take) else f
         for f in folds
     ]
 
@@ -187,7 +187,7 @@ def _tried(kind: type[Effect], whole: Effect, h: Hypothesis, bodies: tuple[Struc
         h, whole
     ):  # lines may speak for what strikes do not
         found += side_by_side(judged, range(len(found), len(folds)))
-    added = refitted(replace(h, effects=(*h.effects, whole)), bodies, evidence.heard)
+    added = refitted(replace(h, effects=(*h.effects, whole)), bodies, evidence.observed)
     drop, whole_db, null_db = np.array([g.drop_db for g in found]), mean([g.whole_db for g in found]), mean([x for g in found for x in g.null_db])
     lines = mean([g.lines for g in found]) / (1 - KEPT)  # each line is left out in so many of the folds
     level = _levels(folds[: len(found)])
@@ -209,5 +209,5 @@ def _beside(fold: Fold, effect: Effect) -> Hypothesis:
     h = replace(fold.base, effects=(*fold.base.effects, effect))
     if isinstance(fold.take, Listed):
         return refitted(h, fold.bodies)
-    fitted = refitted(h, fold.bodies, fold.evidence.heard)
-    return retold(fitted, fold.bodies, fold.evidence.heard) if hasattr(effect, "told_by") else fitted
+    fitted = refitted(h, fold.bodies, fold.evidence.observed)
+    return reidentified(fitted, fold.bodies, fold.evidence.observed) if hasattr(effect, "identified_from") else fitted

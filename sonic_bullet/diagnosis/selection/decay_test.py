@@ -12,7 +12,7 @@ import numpy as np
 
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, modes_of, moves_itself
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
-from sonic_bullet.effects.protocol import Effect, Evidence, Heard, Stage
+from sonic_bullet.effects.protocol import Effect, Evidence, ObjectEvidence, Stage
 from sonic_bullet.records import Array
 
 SCATTER = 0.02  # of a decay about its law, relative
@@ -31,21 +31,21 @@ def numbers(effect: Effect) -> int:
 
 def tells(h: Hypothesis, effect: Effect) -> bool:
     """Whether lines are asked instead of strikes: of what changes decays, beside a room."""
-    return any(hasattr(e, "dried") for e in h.effects) and of_decays(h, effect)
+    return any(hasattr(e, "dereverberated") for e in h.effects) and of_decays(h, effect)
 
 
 def misfit(h: Hypothesis, effect: Effect, evidence: Evidence, bodies: tuple[Struck, ...]) -> float:
     """Twice −ln likelihood of all lines' decays by a model with this effect, and its numbers at ln n each [Schwarz 1978]."""
     total, count = 0.0, 0
-    for one in evidence.heard:
-        body = next(b for b in bodies if b.gathered is one.source)
+    for one in evidence.observed:
+        body = next(b for b in bodies if b.recorded is one.source)
         good = _told(one)
         total += float(_cost(modes_of(h, body)[0].decay_per_s, one.mode, one.decay_per_s, one.decay_sd_per_s)[good].sum())
         count += int(good.sum())
     return total + numbers(effect) * float(np.log(max(count, 1)))
 
 
-def _told(one: Heard) -> Array:
+def _told(one: ObjectEvidence) -> Array:
     """Which lines (k,) tell a decay."""
     return np.asarray(np.isfinite(one.decay_per_s) & (one.decay_per_s > 0) & ~np.isposinf(one.decay_sd_per_s))
 
@@ -53,10 +53,10 @@ def _told(one: Heard) -> Array:
 def likelier(without: Hypothesis, beside: Hypothesis, every: Evidence, told: Evidence, bodies: tuple[Struck, ...]) -> float:
     """Twice the gain in ln likelihood of the decays that are in ``every`` and not in ``told``, from which both hypotheses were fitted."""
     total = 0.0
-    for one in every.heard:
-        seen = next((h.freq_hz for h in told.heard if h.source is one.source), one.freq_hz[:0])
+    for one in every.observed:
+        seen = next((h.freq_hz for h in told.observed if h.source is one.source), one.freq_hz[:0])
         out = ~np.isin(one.freq_hz, seen) & _told(one)
-        body = next(b for b in bodies if b.gathered is one.source)
+        body = next(b for b in bodies if b.recorded is one.source)
         cost = [_cost(modes_of(h, body)[0].decay_per_s, one.mode, one.decay_per_s, one.decay_sd_per_s)[out].sum() for h in (without, beside)]
         total += float(cost[0] - cost[1])
     return total

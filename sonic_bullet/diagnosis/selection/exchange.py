@@ -19,7 +19,7 @@ from sonic_bullet.diagnosis.evidence.refit import refitted, with_effects
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, moves
 from sonic_bullet.diagnosis.prediction.score import Take, mean_db
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
-from sonic_bullet.diagnosis.selection.acceptance import MANY, SURE, Candidate
+from sonic_bullet.diagnosis.selection.acceptance import MANY, STANDARD_ERRORS, Candidate
 from sonic_bullet.diagnosis.selection.decay_test import misfit, of_decays
 from sonic_bullet.diagnosis.selection.phase_test import HINT, NEARLY
 from sonic_bullet.diagnosis.selection.phase_test import misfit as phases
@@ -54,7 +54,7 @@ def again(h: Hypothesis, i: int, bodies: tuple[Struck, ...], band_hz: tuple[floa
     rest = refitted(with_effects(h, (*before, *after), bodies), bodies)
     told = less(evidence_of(rest, bodies, band_hz))
     found = type(effect).propose(told if afresh else replace(told, known=effect))
-    return refitted(replace(rest, effects=(*before, found or effect, *after)), bodies, told.heard)
+    return refitted(replace(rest, effects=(*before, found or effect, *after)), bodies, told.observed)
 
 
 def starts(h: Hypothesis, bodies: tuple[Struck, ...], band_hz: tuple[float, float]) -> list[Hypothesis]:
@@ -150,7 +150,7 @@ def phases_against(best: Hypothesis, other: Hypothesis, bodies: tuple[Struck, ..
 
     Phases are held against lines as they were fitted; of several hits they say nothing, and beside a room lines are others.
     """
-    dry = [any(hasattr(e, "dried") for e in h.effects) for h in (best, other)]
+    dry = [any(hasattr(e, "dereverberated") for e in h.effects) for h in (best, other)]
     if moves(best) or moves(other) or dry[0] != dry[1]:
         return False
     mine, its = phases(best, bodies), phases(other, bodies)
@@ -163,4 +163,4 @@ def surely(gain_db: Array, least_db: float) -> bool:
     if len(gain_db) < 2 or gain_db.mean() <= least_db:
         return False
     none_loses = len(gain_db) >= MANY and gain_db.min() > -0.1 * gain_db.mean()
-    return bool(none_loses or gain_db.mean() > SURE * gain_db.std(ddof=1) / np.sqrt(len(gain_db)))
+    return bool(none_loses or gain_db.mean() > STANDARD_ERRORS * gain_db.std(ddof=1) / np.sqrt(len(gain_db)))

@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of
-from sonic_bullet.diagnosis.evidence.refit import refitted, retold, with_effects
+from sonic_bullet.diagnosis.evidence.refit import refitted, reidentified, with_effects
 from sonic_bullet.diagnosis.prediction.hypothesis import TURNS, Hypothesis, moves, moves_itself
 from sonic_bullet.diagnosis.prediction.score import Judged, Take, least_db, mean_db
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
@@ -39,7 +39,7 @@ class Two:
     db: float
 
 
-def in_twos(
+def pairwise(
     start: Hypothesis,
     first: Sequence[Candidate],
     bodies: tuple[Struck, ...],
@@ -61,7 +61,7 @@ def in_twos(
         for kind in kinds:
             other = None if kind is type(one.effect) else kind.propose(told)
             if other is not None:
-                h = refitted(replace(one.hypothesis, effects=(*one.hypothesis.effects, other)), bodies, told.heard)
+                h = refitted(replace(one.hypothesis, effects=(*one.hypothesis.effects, other)), bodies, told.observed)
                 found.append(Two(h, mean_db(takes, h) or np.inf))
         return found
 
@@ -91,7 +91,7 @@ def in_a_room(
     Outside the room lines lie where they lie, and tell of masses and tensors. But a response told from modes that lie elsewhere plays what these lack, so that every
     other set of modes sounds worse with it: the suspect is tried with a response of its own.
     """
-    rooms = [e for e in h.effects if hasattr(e, "told_by")]
+    rooms = [e for e in h.effects if hasattr(e, "identified_from")]
     movers = [c for c in found if moves_itself(h, c.effect)]
     if len(rooms) != 1 or len(h.effects) != 1 or not movers or not all(isinstance(t, Take) for t in takes):
         return None
@@ -103,10 +103,10 @@ def in_a_room(
         room = type(rooms[0]).propose(told)
         if room is None:
             return None
-        two = retold(refitted(replace(alone, effects=(c.effect, room)), bodies, told.heard), bodies, fully=True)
+        two = reidentified(refitted(replace(alone, effects=(c.effect, room)), bodies, told.observed), bodies, fully=True)
         return Two(two, mean_db(takes, two) or np.inf)
 
-    floor, left = least_db(takes, h) or 0.0, mean_db(takes, retold(h, bodies, fully=True)) or 0.0
+    floor, left = least_db(takes, h) or 0.0, mean_db(takes, reidentified(h, bodies, fully=True)) or 0.0
     for some in ([c for c in movers if c.id not in TURNS], [c for c in movers if c.id in TURNS]):  # what hardly moves modes is asked where nothing else will do
         best = min((two for two in side_by_side(beside, some) if two is not None), key=lambda two: two.db, default=None)
         if best is not None and best.db - floor <= LEFT * (left - floor):
@@ -123,7 +123,7 @@ def _stood(
     added: list[Candidate] = []
     for effect in h.effects[::-1]:
         rest = refitted(with_effects(h, tuple(e for e in h.effects if e is not effect), bodies), bodies)
-        without = mean_db(takes, retold(rest, bodies)) or 0.0  # with a response of its own, too
+        without = mean_db(takes, reidentified(rest, bodies)) or 0.0  # with a response of its own, too
         told = replace(evidence_of(rest, bodies, band_hz, seed=seed), known=effect)
         now, least = mean_db(takes, rest) or 0.0, least_db(takes, rest) or 0.0
         stood = trials(rest, bodies, takes, told, [type(effect)], seed=seed, say=say)

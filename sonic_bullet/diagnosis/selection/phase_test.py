@@ -1,4 +1,4 @@
-"""Which of two names that strikes cannot tell apart by what is heard: the one whose lines agree in phase, too.
+"""Which of two names that strikes cannot tell apart by what is observed: the one whose lines agree in phase, too.
 
     A_sk ≈ σ E_sk e^{−iω_k t₀}      E: onset amplitudes of the modes under a hypothesis, its pulse and sound path included; σ, t₀ free
 
@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from sonic_bullet.diagnosis.evidence.effect_evidence import heard_of
+from sonic_bullet.diagnosis.evidence.effect_evidence import object_evidence
 from sonic_bullet.diagnosis.evidence.refit import ROUGH
-from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, blow_of
+from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, impact_of
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.records import Array
 
@@ -25,13 +25,13 @@ CLEAR, HINT = 25.0, 5.0  # twice the ln likelihood of phases that this takes; wh
 
 def misfit(h: Hypothesis, bodies: tuple[Struck, ...]) -> float:
     """Twice the negative log likelihood of all objects' onset amplitudes under Cauchy's law, phases counted where they are true; infinite where a strike hits more than once."""
-    return sum(_misfit(h, body) for body in bodies if body.gathered is not None)
+    return sum(_misfit(h, body) for body in bodies if body.recorded is not None)
 
 
 def _misfit(h: Hypothesis, body: Struck) -> float:
-    one = heard_of(h, body, sounds=False)
+    one = object_evidence(h, body, sounds=False)
     told, seen = one.expected, one.amplitude
-    if any(len(blow_of(h, body, i).delay_s) > 1 for i in body.fitted):
+    if any(len(impact_of(h, body, i).delay_s) > 1 for i in body.fitted):
         return np.inf  # a line's amplitude at the onset is of one hit
     good = np.isfinite(seen) & np.isfinite(one.amplitude_sd)  # whatever is expected there, so that all names are held against the same
     told = np.nan_to_num(told)

@@ -9,11 +9,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from sonic_bullet.diagnosis.evidence.refit import refitted, retold, with_effects
+from sonic_bullet.diagnosis.evidence.refit import refitted, reidentified, with_effects
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, moves, moves_itself
 from sonic_bullet.diagnosis.prediction.score import Judged, mean_db
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
-from sonic_bullet.diagnosis.selection.acceptance import SURE, Candidate, needed
+from sonic_bullet.diagnosis.selection.acceptance import STANDARD_ERRORS, Candidate, needed
 from sonic_bullet.diagnosis.selection.decay_test import misfit as decays
 from sonic_bullet.diagnosis.selection.decay_test import numbers, of_decays, tells
 from sonic_bullet.diagnosis.selection.exchange import ALIKE
@@ -31,13 +31,13 @@ def helps(c: Candidate, bodies: tuple[Struck, ...], takes: Sequence[Judged], now
     Without a mesh nothing tells which of a room's lines are modes, and what changes decays would be told by all of them."""
     if tells(c.hypothesis, c.effect) and not _shaped(bodies):
         return False
-    before, after = told if moves(c.hypothesis) else now, mean_db(takes, retold(c.hypothesis, bodies)) or 0.0
+    before, after = told if moves(c.hypothesis) else now, mean_db(takes, reidentified(c.hypothesis, bodies)) or 0.0
     return after < told + SAME * max(told - floor, 0.0) and before - after > HELPS * needed(max(before - floor, 0.0), first=first, certain=c.certain)
 
 
 def by_lines(c: Candidate, bodies: tuple[Struck, ...], takes: Sequence[Judged], told: float, floor: float) -> bool:
     """Whether lines left out speak for it (by_lines.py), and a room's response, told again beside it, says no less than without it (told). Without a mesh nothing tells which of a room's lines are modes."""
-    return _shaped(bodies) and c.lines > LINES and (mean_db(takes, retold(c.hypothesis, bodies)) or 0.0) < told + SAME * max(told - floor, 0.0)
+    return _shaped(bodies) and c.lines > LINES and (mean_db(takes, reidentified(c.hypothesis, bodies)) or 0.0) < told + SAME * max(told - floor, 0.0)
 
 
 def _shaped(bodies: tuple[Struck, ...]) -> bool:
@@ -57,7 +57,7 @@ def simplest(able: Sequence[Candidate], bodies: tuple[Struck, ...], evidence: Ev
 
     def close(c: Candidate, share: float) -> bool:
         more = best.drop_db - c.drop_db
-        return bool(more.mean() <= SURE * more.std(ddof=1) / np.sqrt(len(more)) and more.mean() < share * best.mean_db)
+        return bool(more.mean() <= STANDARD_ERRORS * more.std(ddof=1) / np.sqrt(len(more)) and more.mean() < share * best.mean_db)
 
     rivals = [c for c in able if not moves_itself(c.hypothesis, c.effect)]
     first = min((c for c in rivals if close(c, ALIKE)), key=lambda c: (numbers(c.effect), -c.mean_db))

@@ -14,7 +14,7 @@ from typing import Any
 
 from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of
 from sonic_bullet.diagnosis.evidence.mesh_limits import beyond, of_the_mesh
-from sonic_bullet.diagnosis.evidence.refit import refitted, retold
+from sonic_bullet.diagnosis.evidence.refit import refitted, reidentified
 from sonic_bullet.diagnosis.prediction.hypothesis import TURNS, Hypothesis, moves_itself
 from sonic_bullet.diagnosis.prediction.score import Judged, least_db, mean_db
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
@@ -22,7 +22,7 @@ from sonic_bullet.diagnosis.selection.acceptance import FAINT_DB, LEAST_DB, Cand
 from sonic_bullet.diagnosis.selection.coherent_residual import of_no_body
 from sonic_bullet.diagnosis.selection.cross_validation import trials
 from sonic_bullet.diagnosis.selection.exchange import chosen, exchanged, rivals
-from sonic_bullet.diagnosis.selection.pairwise import in_a_room, in_twos
+from sonic_bullet.diagnosis.selection.pairwise import in_a_room, pairwise
 from sonic_bullet.diagnosis.selection.simplest import by_lines, helps, pruned, simplest
 from sonic_bullet.effects.protocol import Effect, Evidence, Stage
 
@@ -71,7 +71,7 @@ def closed(
     verdict, off = _verdict(h, added, before, now, floor, bodies, takes, seed), 0.0
     if verdict == "unexplained":
         verdict, off = _by_a_finer_mesh(start, h, added, before, bodies, takes, seed)
-    if verdict == "unexplained" and not one.in_twos and (two := in_twos(start, one.first, bodies, takes, band_hz, seed=seed, say=say)):
+    if verdict == "unexplained" and not one.pairwise and (two := pairwise(start, one.first, bodies, takes, band_hz, seed=seed, say=say)):
         h, added = two
         last |= {c.id: c for c in added}
         now, floor = mean_db(takes, h) or 0.0, least_db(takes, h) or floor
@@ -83,14 +83,14 @@ def closed(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rounds:
-    """Where round after round came to. first, last: all suspects of the first round, and each as it was when asked last. in_twos: whether twos were tried."""
+    """Where round after round came to. first, last: all suspects of the first round, and each as it was when asked last. pairwise: whether twos were tried."""
 
     h: Hypothesis
     added: list[Candidate]
     first: list[Candidate]
     last: dict[str, Candidate]
     floor: float
-    in_twos: bool
+    pairwise: bool
 
 
 def _one_by_one(
@@ -117,7 +117,7 @@ def _one_by_one(
         if now - floor < (LEAST_DB if added else FAINT_DB):
             break  # so little is what a mesh gets wrong
         evidence = evidence_of(h, bodies, band_hz, seed=seed)
-        full = retold(h, bodies)  # a room's response is the lines' so far, which leaves open more than there is
+        full = reidentified(h, bodies)  # a room's response is the lines' so far, which leaves open more than there is
         told = now if full is h else mean_db(takes, full) or 0.0
         costly = told - floor > OPEN * (before - floor)
         found = trials(h, bodies, takes, evidence, effects, seed=seed + turn, say=say, costly=costly)
@@ -125,7 +125,7 @@ def _one_by_one(
         two, able = None, _able(found, bodies, takes, now, told, floor, first=not added)
         if not added:
             first, weak = found, all((mean_db(takes, c.hypothesis) or 0.0) - floor > WEAK * max(now - floor, 0.0) for c in found)
-            two = in_twos(start, found, bodies, takes, band_hz, seed=seed, say=say) if weak else None
+            two = pairwise(start, found, bodies, takes, band_hz, seed=seed, say=say) if weak else None
         two = two or _anew(h, able, found, bodies, takes, band_hz, seed, say)
         if not (two or able) and costly and (late := _waited(found, evidence, effects)):
             found = trials(h, bodies, takes, evidence, late, seed=seed + turn, say=say, costly=costly)
@@ -141,8 +141,8 @@ def _one_by_one(
             break
         best = simplest(able, bodies, evidence)
         h, added, passed = best.hypothesis, [*added, best], [*passed, rivals(able, best)]
-        if hasattr(best.effect, "told_by") and (mean_db(takes, h) or 0.0) > now:
-            h = retold(h, bodies)  # a room's response by lines so far off that it sounds worse than none
+        if hasattr(best.effect, "identified_from") and (mean_db(takes, h) or 0.0) > now:
+            h = reidentified(h, bodies)  # a room's response by lines so far off that it sounds worse than none
         if len(added) > 1 and any(hasattr(e, "others") for e in h.effects):
             h = chosen(h, bodies, takes, band_hz)  # or a third name is found for what only the other choice would say
         now = mean_db(takes, h) or 0.0
@@ -151,7 +151,7 @@ def _one_by_one(
         h, added = exchanged(h, added, passed, bodies, takes, band_hz, say)
         h, added = pruned(h, added, bodies, takes, before - floor)
         now = mean_db(takes, h) or 0.0
-    again = retold(h, bodies, fully=True)
+    again = reidentified(h, bodies, fully=True)
     return Rounds(again if again is not h and (mean_db(takes, again) or 0.0) < now else h, added, first, last, floor, weak)
 
 
@@ -179,7 +179,7 @@ def _anew(
 
 def _waited(found: Sequence[Candidate], evidence: Evidence, effects: Sequence[type[Effect]]) -> list[type[Effect]]:
     """The suspects that had to wait in a room for a tensor (trial.py), if that came to nothing."""
-    tensor = any(c.effect.stage is Stage.MATERIAL for c in found) and any(one.dry for one in evidence.heard)
+    tensor = any(c.effect.stage is Stage.MATERIAL for c in found) and any(one.dry for one in evidence.observed)
     return [k for k in effects if k.id in TURNS and tensor and k.id not in {c.id for c in found}]
 
 
@@ -191,7 +191,7 @@ def _verdict(
     if not added:
         excused = gap < SUFFICES_DB or (gap < of_the_mesh(h, bodies, takes, seed) and of_no_body(h, takes) < NO_BODY)
         return "none" if excused else "unexplained"
-    room = any(hasattr(e, "told_by") for e in h.effects)  # whose response takes up what a mesh gets wrong, too: that is no excuse
+    room = any(hasattr(e, "identified_from") for e in h.effects)  # whose response takes up what a mesh gets wrong, too: that is no excuse
     enough = left <= max((1 - (BY_A_ROOM if room else EXPLAINED)) * gap, SUFFICES_DB) or (not room and left <= of_the_mesh(h, bodies, takes, seed))
     return "explained" if enough else "unexplained"
 

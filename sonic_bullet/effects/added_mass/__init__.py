@@ -32,7 +32,7 @@ YIELDS = (0.0, 1.0, 4.0)  # of what modes above the band may yield, to begin wit
 LIGHTEST = 0.005  # of the body's: what is lighter moves no mode by 1 % (Δf/f = −2 m/M at a bar's end), so a mesh or the body's own imperfection may be what it stands for
 TRIES = 6
 MATCHED, MOVED = 0.8, 2.5e-3  # share of lines, and how far nine in ten of them may lie off: a mesh's error
-STAYED, TWINS = 0.6, 1e-3  # of the lines' strength; of ln f, between modes of which a mass leaves one where it was
+STAYED, DEGENERATE = 0.6, 1e-3  # of the lines' strength; of ln f, between modes of which a mass leaves one where it was
 FAR_OFF = 0.015  # of ln f: more than pairs alone find
 BETTER = (1.5, 0.12)  # in price: as much as a strong line and a half, paired well; and of the bare body's own
 
@@ -73,21 +73,21 @@ class AddedMass:
 
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
-        heard = max(evidence.heard, key=lambda h: len(h.freq_hz) if h.plain is not None else 0)
-        if heard.plain is None or len(heard.freq_hz) + len(heard.foreign_hz) < 8 or not heard.plain.mass_kg:
+        observed = max(evidence.observed, key=lambda h: len(h.freq_hz) if h.plain is not None else 0)
+        if observed.plain is None or len(observed.freq_hz) + len(observed.foreign_hz) < 8 or not observed.plain.mass_kg:
             return None
-        trial = Trial.of(heard)
-        x = heard.plain
+        trial = Trial.of(observed)
+        x = observed.plain
         if isinstance(evidence.known, cls):
             known = evidence.known
             near = int(np.argmin(((x.vertex_m - known.position_m) ** 2).sum(axis=1)))
             up, side = (float(y * np.exp(2 * known.stretch)) for y in known.yield_m_n)
             ratio = known.poisson_ratio
-            if heard.poisson is None and ratio is not None:
+            if observed.poisson is None and ratio is not None:
                 return known  # beside what moves modes too, no other ν is at hand
             start = (0.0, near, known.mass_kg, (up, side), known.stretch, trial.fitted if ratio is None else ratio)
-            return cls._at(x, trial.refined(start, WIDTHS[-1:]), heard.poisson is not None)
-        plain = patterns(heard, x)
+            return cls._at(x, trial.refined(start, WIDTHS[-1:]), observed.poisson is not None)
+        plain = patterns(observed, x)
         none = min(
             (agreed(trial.line, trial.size, x.freq_hz, plain, shift=s, width=WIDTHS[-1], strict=strict(WIDTHS[-1])) for s in trial.shifts(x.freq_hz, plain)),
             key=lambda one: one[0],
@@ -109,7 +109,7 @@ class AddedMass:
         bare = none[0] + trial.unlikely(trial.fitted)
         if best[0] > bare - max(BETTER[0], BETTER[1] * abs(bare)) or best[2] < LIGHTEST * x.mass_kg:
             return None
-        return cls._at(x, best, heard.poisson is not None)
+        return cls._at(x, best, observed.poisson is not None)
 
     @classmethod
     def _at(cls, x: ModalModel, found: Scored, told: bool) -> Self:
@@ -131,5 +131,5 @@ def _in_place(line_hz: Array, size: Array, mode_hz: Array, none: tuple[float, Ar
         return True
     off = np.abs(np.log(line_hz)[:, None] - np.log(mode_hz) - shift)
     gap = np.diff(np.log(mode_hz), prepend=-np.inf, append=np.inf)
-    loud = np.nan_to_num(size).max(axis=0) * (np.minimum(gap[1:], gap[:-1]) > TWINS)[off.argmin(axis=1)]
+    loud = np.nan_to_num(size).max(axis=0) * (np.minimum(gap[1:], gap[:-1]) > DEGENERATE)[off.argmin(axis=1)]
     return bool(loud[off.min(axis=1) < MOVED].sum() > STAYED * loud.sum() > 0)

@@ -1,4 +1,4 @@
-"""Search for the mass that makes of a body's modes the lines that were heard: its price, and the best near a start.
+"""Search for the mass that makes of a body's modes the lines that were observed: its price, and the best near a start.
 
 price(vertex, m, R, s, ν) = Σ pairs (pairs.py) + ((ν − ν_guess)/σ_ν)²/18       as much as a line so many widths off
 places in turns, each with Gauss and Newton's steps of (ln m, ln R, s, ν) on the pairs' ln f, Cauchy's weights     [Besl & McKay 1992; Holland & Welsch 1977]
@@ -14,7 +14,7 @@ from sonic_bullet.effects.added_mass.free_body import FreeBody
 from sonic_bullet.effects.added_mass.mass_loaded_modes import attached, loaded
 from sonic_bullet.effects.common.pairs import agreed, every_line
 from sonic_bullet.effects.common.points import vertex_normals
-from sonic_bullet.effects.protocol import Heard
+from sonic_bullet.effects.protocol import ObjectEvidence
 from sonic_bullet.records import Array, ModalModel
 
 STEPS = (0.5, 0.8, 1.25, 2.0)
@@ -34,9 +34,9 @@ def strict(width: float) -> float:
     return (WIDTHS[0] / width) ** 2
 
 
-def _at_points(x: ModalModel, heard: Heard) -> ModalModel:
+def _at_points(x: ModalModel, observed: ObjectEvidence) -> ModalModel:
     """The model at its strikes and sensor alone: what a trial needs."""
-    rows = np.append(heard.strike_vertex, heard.sensor_vertex)
+    rows = np.append(observed.strike_vertex, observed.sensor_vertex)
     return replace(x, shape=x.shape[rows], vertex_m=x.vertex_m[rows], face=np.zeros((0, 3), np.int32), curvature_per_m=np.zeros(0))
 
 
@@ -47,7 +47,7 @@ Scored = tuple[float, int, float, tuple[float, float], float, float]  # price, v
 class Trial:
     """Prices of masses on one object: its lines and sizes, its bare model, that at strikes and sensor alone, and its normals."""
 
-    heard: Heard
+    observed: ObjectEvidence
     line: Array
     size: Array
     bare: ModalModel
@@ -57,10 +57,10 @@ class Trial:
     kept: dict[float, tuple[ModalModel, Array | None]] = field(default_factory=dict)  # by ν
 
     @classmethod
-    def of(cls, heard: Heard) -> Trial:
-        assert heard.plain is not None
-        line, size, _, _ = every_line(heard)
-        return cls(heard, line, size, heard.plain, _at_points(heard.plain, heard), vertex_normals(heard.plain), FreeBody.of(heard.plain))
+    def of(cls, observed: ObjectEvidence) -> Trial:
+        assert observed.plain is not None
+        line, size, _, _ = every_line(observed)
+        return cls(observed, line, size, observed.plain, _at_points(observed.plain, observed), vertex_normals(observed.plain), FreeBody.of(observed.plain))
 
     def rest(self, vertex: int) -> tuple[float, float]:
         """What modes above the band may yield at a vertex, along its normal and across, in m/N: Σ φ²/λ where as many go on moving as much with every hertz."""
@@ -72,16 +72,16 @@ class Trial:
     @property
     def fitted(self) -> float:
         """The baseline's ν."""
-        return self.heard.poisson.fitted if self.heard.poisson is not None else 0.0
+        return self.observed.poisson.fitted if self.observed.poisson is not None else 0.0
 
     def unlikely(self, ratio: float) -> float:
         """Price of a ν, by how far it is from what was known of it."""
-        told = self.heard.poisson
+        told = self.observed.poisson
         return 0.0 if told is None else ((ratio - told.guess) / told.sd) ** 2 / 18
 
     def at(self, ratio: float) -> tuple[ModalModel, Array | None]:
         """The bare model at strikes and sensor at a ν, and its modes as sums (m, m) of the baseline's, None where they are those."""
-        told = self.heard.poisson
+        told = self.observed.poisson
         if told is None or ratio == told.fitted:
             return self.small, None
         if ratio not in self.kept:
@@ -98,10 +98,10 @@ class Trial:
         phi = self.bare.shape[vertex].astype(float)
         phi = attached(phi if sums is None else phi @ sums, self.normal[vertex], along, small)
         x = loaded(small, phi, mass, self.bare.vertex_m[vertex], self.free)
-        s, heard = len(self.heard.strike_vertex), self.heard
-        level = np.where(np.isfinite(heard.impulse_n_s), heard.impulse_n_s, 1.0)
-        push = np.einsum("sxm,sx->sm", x.shape[:s].astype(float), heard.strike_way) * level[:, None]
-        return x.freq_hz, np.abs(push * np.einsum("xm,x->m", x.shape[s].astype(float), heard.sensor_way))
+        s, observed = len(self.observed.strike_vertex), self.observed
+        level = np.where(np.isfinite(observed.impulse_n_s), observed.impulse_n_s, 1.0)
+        push = np.einsum("sxm,sx->sm", x.shape[:s].astype(float), observed.strike_direction) * level[:, None]
+        return x.freq_hz, np.abs(push * np.einsum("xm,x->m", x.shape[s].astype(float), observed.sensor_direction))
 
     def shifts(self, freq_hz: Array, told: Array) -> list[float]:
         """None, and the common shifts of modes that most lines of their patterns (s, m) agree on, as two spectra on a logarithmic axis."""
@@ -156,12 +156,12 @@ class Trial:
         trials += [(vertex, mass * f, (up, side)) for f in STEPS]
         trials += [(vertex, mass, (max(up, least[0]) * f, side)) for f in (0, *STEPS)] + [(vertex, mass, (up, max(side, least[1]) * f)) for f in (0, *STEPS)]
         found = [self.scored(*one, shift, ratio, width) for one in trials]
-        other = [] if self.heard.poisson is None else [self._solid(ratio + s) for s in RATIOS]
+        other = [] if self.observed.poisson is None else [self._solid(ratio + s) for s in RATIOS]
         return found + [self.scored(vertex, mass, (up, side), shift, r, width) for r in other]
 
     def _solid(self, ratio: float) -> float:
         """A ν that there may be, by what was known of it, in steps that keep few."""
-        told = self.heard.poisson
+        told = self.observed.poisson
         if told is None:
             return ratio
         return float(np.clip(round(ratio / FINE) * FINE, told.guess - MOST_SD * told.sd, min(told.guess + MOST_SD * told.sd, SOLID)))
@@ -194,12 +194,12 @@ class Trial:
         off = np.log(self.line[row] / made[0][column]) - shift
         slope = np.zeros((len(row), 5))
         slope[:, 4] = 1.0
-        for k in range(4 if self.heard.poisson is not None else 3):
+        for k in range(4 if self.observed.poisson is not None else 3):
             vertex, mass, along, _, other = self._stepped(best, SMALL[k] * np.eye(5)[k])
             if k == 3 and other == ratio:
                 continue
             slope[:, k] = np.log(self.loaded(vertex, mass, along, other)[0][column] / made[0][column]) / SMALL[k]
-        told = self.heard.poisson
+        told = self.observed.poisson
         pull = np.array([0, 0, 0, (told.guess - ratio) / told.sd**2 if told is not None else 0.0, 0])
         weight = 1 / (1 + (off / width) ** 2) / width**2
         held = np.diag(np.array([1.0, 1.0, 1.0, told.sd if told is not None else 1.0, 1.0]) ** -2)

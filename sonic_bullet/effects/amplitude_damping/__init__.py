@@ -19,7 +19,7 @@ from sonic_bullet.effects.amplitude_pitch import MEASURES, _per_velocity
 from sonic_bullet.effects.common.axes import ANGLES, PAIR, turned
 from sonic_bullet.effects.common.envelope import envelopes, levels
 from sonic_bullet.effects.common.proofs import finite, one_of, side_by_side
-from sonic_bullet.effects.protocol import Evidence, Heard, Owner, Ring, Stage
+from sonic_bullet.effects.protocol import Evidence, ObjectEvidence, Owner, Ring, Stage
 from sonic_bullet.records import Array, ModalModel
 
 BETTER = 3.0  # of ln variance of the envelopes' logarithms, all lines together
@@ -45,7 +45,7 @@ class AmplitudeDamping:
     certain: ClassVar[bool] = True  # modes agree, each by its own baseband, or nothing is proposed
     reference: ClassVar[str] = "Nayfeh & Mook 1979, section 3.3"
 
-    choke: float
+    damping_growth: float
     measure: str = "velocity"
     alpha_per_s: float = float("nan")
     beta_s: float = float("nan")
@@ -57,7 +57,7 @@ class AmplitudeDamping:
     def __post_init__(self) -> None:
         one_of("power", self.power, POWERS)  # of drag: others have no closed form
         one_of("measure", self.measure, MEASURES)
-        finite("choke", self.choke, least=0.0)
+        finite("choke", self.damping_growth, least=0.0)
         finite("louder", self.louder, least=1e-6)
         finite("freq_hz", *self.freq_hz, least=1e-3)
         finite("turn_rad", *self.turn_rad)
@@ -65,7 +65,7 @@ class AmplitudeDamping:
 
     def apply(self, x: Ring) -> Ring:
         """The ringing with the effect in it."""
-        return replace(x, choke=x.choke + self.choke * _per_velocity(x, self.measure), choke_power=self.power)
+        return replace(x, damping_growth=x.damping_growth + self.damping_growth * _per_velocity(x, self.measure), damping_growth_power=self.power)
 
     def turned(self, x: ModalModel) -> ModalModel:
         """The modes as they were, twins about their own axes."""
@@ -73,8 +73,8 @@ class AmplitudeDamping:
 
     def parameters(self) -> dict[str, Any]:
         """What it says, for people and JSON, in SI units."""
-        twins = [{"freq_hz": f, "turn_rad": t} for f, t in zip(self.freq_hz, self.turn_rad, strict=True)]
-        return {"choke": self.choke, "measure": self.measure, "power": self.power} | ({"twins": twins} if twins else {})
+        degenerate = [{"freq_hz": f, "turn_rad": t} for f, t in zip(self.freq_hz, self.turn_rad, strict=True)]
+        return {"choke": self.damping_growth, "measure": self.measure, "power": self.power} | ({"twins": degenerate} if degenerate else {})
 
     def freedom(self) -> int:
         return 2 + len(self.freq_hz)
@@ -83,7 +83,7 @@ class AmplitudeDamping:
     def propose(cls, evidence: Evidence) -> Self | None:
         best: tuple[float, Self] | None = None
         known = evidence.known if isinstance(evidence.known, cls) else None
-        for h in evidence.heard:
+        for h in evidence.observed:
             e = envelopes(h)
             if e is None:
                 continue
@@ -92,10 +92,10 @@ class AmplitudeDamping:
                 lines = [replace(line, power=power) for line in plain[name]]
                 if evidence.on_trial and known is not None:
                     lines = [_held(line, known) for line in lines]
-                found = _fitted(lines, known.choke if known is not None else None)
+                found = _fitted(lines, known.damping_growth if known is not None else None)
                 if found is not None and (best is None or found.gain > best[0]):
                     axes = (known.freq_hz, known.turn_rad) if evidence.on_trial and known is not None else _axes(lines, found)
-                    best = (found.gain, cls(found.choke, name, *_rayleigh(h, lines, found.told), _louder(h, lines, found), *axes, power))
+                    best = (found.gain, cls(found.damping_growth, name, *_rayleigh(h, lines, found.told), _louder(h, lines, found), *axes, power))
         return best[1] if best is not None else None
 
 
@@ -103,7 +103,7 @@ class AmplitudeDamping:
 class _Fit:
     """c, what it is worth in ln variance, and what every line says under it."""
 
-    choke: float
+    damping_growth: float
     gain: float
     told: tuple[Told, ...]
 
@@ -120,13 +120,13 @@ def _fitted(lines: list[Line], known: float | None) -> _Fit | None:
     fine = np.geomspace(grid[max(i - 1, 0)], grid[min(i + 1, len(grid) - 1)], 9)
     closer = _along(lines, fine)
     j = int(np.argmin([_cost(row) for row in closer]))
-    choke, row = float(fine[j]), closer[j]
+    damping_growth, row = float(fine[j]), closer[j]
     gain = np.array([a.least - b.least for a, b in zip(plain, row, strict=True)])
-    if choke * most < LEAST:
+    if damping_growth * most < LEAST:
         return None
-    if known is None and not (gain.sum() > BETTER and -gain[gain < 0].sum() < 0.3 * gain[gain > 0].sum() and _sure(lines, choke, plain, row)):
+    if known is None and not (gain.sum() > BETTER and -gain[gain < 0].sum() < 0.3 * gain[gain > 0].sum() and _sure(lines, damping_growth, plain, row)):
         return None
-    return _Fit(choke, float(gain.sum()), row)
+    return _Fit(damping_growth, float(gain.sum()), row)
 
 
 def _held(line: Line, known: AmplitudeDamping) -> Line:
@@ -138,8 +138,8 @@ def _held(line: Line, known: AmplitudeDamping) -> Line:
 def _along(lines: list[Line], chokes: Array) -> list[tuple[Told, ...]]:
     """What every line says of each choke, every decay found from the one before."""
     rows: list[tuple[Told, ...]] = []
-    for choke in chokes.tolist():
-        rows.append(tuple(told(line, choke, rows[-1][k].decay_per_s if rows else None) for k, line in enumerate(lines)))
+    for damping_growth in chokes.tolist():
+        rows.append(tuple(told(line, damping_growth, rows[-1][k].decay_per_s if rows else None) for k, line in enumerate(lines)))
     return rows
 
 
@@ -147,20 +147,20 @@ def _cost(row: tuple[Told, ...]) -> float:
     return float(sum(one.least for one in row))
 
 
-def _sure(lines: list[Line], choke: float, plain: tuple[Told, ...], row: tuple[Told, ...]) -> bool:
+def _sure(lines: list[Line], damping_growth: float, plain: tuple[Told, ...], row: tuple[Told, ...]) -> bool:
     """Whether the lines that a choke would bend are bent so: each counts by what a choke would be of its misfit, so one loud mode and a softer one will do."""
     before = np.exp([one.spread[0] for one in plain])
     after = np.exp([one.least for one in row])
-    bent = np.array([would(line, choke, float(one.decay_per_s[one.best]), one.best) for line, one in zip(lines, row, strict=True)])
+    bent = np.array([would(line, damping_growth, float(one.decay_per_s[one.best]), one.best) for line, one in zip(lines, row, strict=True)])
     says = np.minimum(bent / before, 1.0)
     gone = np.maximum(1 - after / before, -1.0)
     many = float(says.sum() ** 2 / max((says**2).sum(), 1e-300))
     return many >= FEWEST and float((says * gone).sum() / max(says.sum(), 1e-300)) > SHARE
 
 
-def _louder(h: Heard, lines: list[Line], found: _Fit) -> float:
+def _louder(h: ObjectEvidence, lines: list[Line], found: _Fit) -> float:
     """The modes' levels at the onset over the linear model's: the middle one of all lines and strikes."""
-    level = [onset(line, found.choke, float(one.decay_per_s[one.best]), one.best) for line, one in zip(lines, found.told, strict=True)]
+    level = [onset(line, found.damping_growth, float(one.decay_per_s[one.best]), one.best) for line, one in zip(lines, found.told, strict=True)]
     plain = [np.abs(h.push[:, h.mode[line.number]].sum(axis=1)) for line in lines]
     ratio = np.stack(level, axis=1) / np.maximum(np.stack(plain, axis=1), 1e-300)
     return float(np.nanmedian(ratio)) if np.isfinite(ratio).any() else 1.0
@@ -168,11 +168,11 @@ def _louder(h: Heard, lines: list[Line], found: _Fit) -> float:
 
 def _axes(lines: list[Line], found: _Fit) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Frequencies and angles of the twins whose axes are heard."""
-    heard = [(line.freq_hz, float(ANGLES[one.best])) for line, one in zip(lines, found.told, strict=True) if one.turned]
-    return tuple(f for f, _ in heard), tuple(t for _, t in heard)
+    observed = [(line.freq_hz, float(ANGLES[one.best])) for line, one in zip(lines, found.told, strict=True) if one.turned]
+    return tuple(f for f, _ in observed), tuple(t for _, t in observed)
 
 
-def _rayleigh(h: Heard, lines: list[Line], row: tuple[Told, ...]) -> tuple[float, float]:
+def _rayleigh(h: ObjectEvidence, lines: list[Line], row: tuple[Told, ...]) -> tuple[float, float]:
     """α, β >= 0 of the lines' decays at low level, by relative least squares with Huber's weights."""
     from scipy.optimize import nnls
 

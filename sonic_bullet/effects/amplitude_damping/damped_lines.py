@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sonic_bullet.effects.common.axes import ANGLES, about, twins
+from sonic_bullet.effects.common.axes import ANGLES, about, degenerate
 from sonic_bullet.effects.common.envelope import Envelopes
-from sonic_bullet.effects.protocol import Heard
+from sonic_bullet.effects.protocol import ObjectEvidence
 from sonic_bullet.records import Array
 
 ROUGH = 5e-3  # of ln |z|: what neighbours and windows do to a frame
@@ -48,7 +48,7 @@ class Line:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Told:
-    """Of a line under a choke: ln of the variance (p,) it leaves within strikes, ln of that between them, and its decay (p,) under every angle."""
+    """Of a line under a damping_growth: ln of the variance (p,) it leaves within strikes, ln of that between them, and its decay (p,) under every angle."""
 
     spread: Array
     between: Array
@@ -71,14 +71,14 @@ class Told:
         return bool(self.best and whole[0] - whole[self.best] > TURNS)
 
 
-def lines_under(e: Envelopes, h: Heard, measure: str) -> list[Line]:
+def lines_under(e: Envelopes, h: ObjectEvidence, measure: str) -> list[Line]:
     """The lines that say something, their levels by a measure."""
     found = []
     for q, k in enumerate(e.line.tolist()):
         good = e.good[:, q] & (e.good[:, q].sum(axis=1) >= FEWEST)[:, None]
         if not good.any():
             continue
-        pair = twins(h, k)
+        pair = degenerate(h, k)
         amplitude, level = about(h, k, measure, ANGLES if pair else np.zeros(1))
         thin = slice(None, None, THIN if pair else 1)
         size = np.maximum(np.abs(e.z[:, q]), 1e-300)
@@ -88,45 +88,45 @@ def lines_under(e: Envelopes, h: Heard, measure: str) -> list[Line]:
     return found
 
 
-def told(line: Line, choke: float, start: Array | None = None) -> Told:
+def told(line: Line, damping_growth: float, start: Array | None = None) -> Told:
     """What a line says of a choke. start (p,): decays to begin with."""
-    if choke == 0:  # no angle counts
+    if damping_growth == 0:  # no angle counts
         line = under(line)
     many = len(line.amplitude)
     decay = np.full(many, line.decay_per_s) if start is None or len(start) != many else start
     low, high = RANGE[0] * line.decay_per_s, RANGE[1] * line.decay_per_s
     for _ in range(STEPS):
-        left, slope = _left(line, choke, decay)
+        left, slope = _left(line, damping_growth, decay)
         step = (line.weight * left * slope).sum(axis=(1, 2)) / np.maximum((line.weight * slope**2).sum(axis=(1, 2)), 1e-300)
         decay = np.clip(decay - step, low, high)
-    left, _ = _left(line, choke, decay)
+    left, _ = _left(line, damping_growth, decay)
     within = np.log((line.weight * left**2).sum(axis=(1, 2)) / line.weight.sum() + ROUGH**2)
-    return Told(within, _between(line, choke, decay) if many > 1 else np.zeros(many), decay)
+    return Told(within, _between(line, damping_growth, decay) if many > 1 else np.zeros(many), decay)
 
 
-def _between(line: Line, choke: float, decay: Array) -> Array:
+def _between(line: Line, damping_growth: float, decay: Array) -> Array:
     """ln of the variance (p,) of the levels that strikes are told over those that they are heard with; one in which the line is not heard may not be told louder."""
-    heard = line.weight.sum(axis=1) > 0
+    observed = line.weight.sum(axis=1) > 0
     early = line.time_s < line.time_s[0] + EARLY / line.decay_per_s
-    weight = np.where(heard[:, None], line.weight, early.astype(float))
-    off = (weight / weight.sum(axis=1, keepdims=True) * (line.log - _model(line, choke, decay)[0])).sum(axis=2)  # (p, s)
-    off = off - np.median(off[:, heard], axis=1, keepdims=True)
-    off = np.clip(np.where(heard, off, np.minimum(off, 0.0)), -MOST, MOST)
+    weight = np.where(observed[:, None], line.weight, early.astype(float))
+    off = (weight / weight.sum(axis=1, keepdims=True) * (line.log - _model(line, damping_growth, decay)[0])).sum(axis=2)  # (p, s)
+    off = off - np.median(off[:, observed], axis=1, keepdims=True)
+    off = np.clip(np.where(observed, off, np.minimum(off, 0.0)), -MOST, MOST)
     return np.asarray(np.log((off**2).mean(axis=1) + LEVEL**2))
 
 
-def would(line: Line, choke: float, decay_per_s: float, angle: int) -> float:
+def would(line: Line, damping_growth: float, decay_per_s: float, angle: int) -> float:
     """The variance that no choke would leave of a line that is just what a choke makes it: what the choke is of its misfit."""
     one = under(line, angle)
-    model = _model(one, choke, np.array([decay_per_s]))[0][0]
+    model = _model(one, damping_growth, np.array([decay_per_s]))[0][0]
     plain = told(replace(one, log=model), 0.0)
     return float(np.exp(plain.spread[0]))
 
 
-def onset(line: Line, choke: float, decay_per_s: float, angle: int) -> Array:
+def onset(line: Line, damping_growth: float, decay_per_s: float, angle: int) -> Array:
     """|z| (s,) at the onset, as the whole envelope tells it; NaN for strikes that say nothing."""
     one = under(line, angle)
-    model = _model(one, choke, np.array([decay_per_s]))[0][0]
+    model = _model(one, damping_growth, np.array([decay_per_s]))[0][0]
     total = line.weight.sum(axis=1)
     mean = (line.weight * (line.log - model)).sum(axis=1) / np.where(total > 0, total, np.nan)
     return np.asarray(np.exp(mean) * np.maximum(np.abs(one.amplitude[0].sum(axis=1)), FAINT * np.abs(one.amplitude[0]).sum(axis=1)))
@@ -138,10 +138,10 @@ def under(line: Line, angle: int = 0) -> Line:
     return replace(line, amplitude=line.amplitude[one], level=line.level[one])
 
 
-def _model(line: Line, choke: float, decay: Array) -> tuple[Array, Array]:
+def _model(line: Line, damping_growth: float, decay: Array) -> tuple[Array, Array]:
     """ln |z| (p, s, t) but for a constant, and its slope over the decay."""
     fall = np.exp(-line.power * decay[:, None] * line.time_s)[:, None, None, :]  # (p, 1, 1, t)
-    x = (choke * line.level[..., None]) ** line.power  # (p, s, j, 1)
+    x = (damping_growth * line.level[..., None]) ** line.power  # (p, s, j, 1)
     less = 1 + x * (1 - fall)
     part = line.amplitude[..., None] * less ** (-1 / line.power)
     total = part.sum(axis=2)
@@ -151,9 +151,9 @@ def _model(line: Line, choke: float, decay: Array) -> tuple[Array, Array]:
     return np.log(np.abs(total)) - decay[:, None, None] * line.time_s, slope
 
 
-def _left(line: Line, choke: float, decay: Array) -> tuple[Array, Array]:
+def _left(line: Line, damping_growth: float, decay: Array) -> tuple[Array, Array]:
     """Model − heard (p, s, t) and its slope over the decay, without each strike's mean."""
-    model, slope = _model(line, choke, decay)
+    model, slope = _model(line, damping_growth, decay)
     share = line.weight / np.maximum(line.weight.sum(axis=1, keepdims=True), 1e-300)
     left = model - line.log
     return left - (share * left).sum(axis=2, keepdims=True), slope - (share * slope).sum(axis=2, keepdims=True)

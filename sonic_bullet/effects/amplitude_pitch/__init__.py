@@ -14,14 +14,14 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from sonic_bullet.effects.amplitude_pitch.degenerate_pitch import axes_of, bend_beside
-from sonic_bullet.effects.common.axes import turned, twins
+from sonic_bullet.effects.common.axes import degenerate, turned
 from sonic_bullet.effects.common.envelope import Envelopes, envelopes, falls, levels
 from sonic_bullet.effects.common.proofs import finite, one_of, side_by_side
-from sonic_bullet.effects.protocol import Evidence, Heard, Owner, Ring, Stage
+from sonic_bullet.effects.protocol import Evidence, ObjectEvidence, Owner, Ring, Stage
 from sonic_bullet.records import Array, ModalModel
 
 MEASURES = ("impulse", "velocity", "displacement")
-SURE = 5.0  # spreads that b must stand off zero
+STANDARD_ERRORS = 5.0  # spreads that b must stand off zero
 BETTER = 0.5  # of the phases' misfit must go, in modes that b would move
 FEWEST = 1.5  # of such modes
 FAR = np.geomspace(0.6, 1.7, 12)  # times the bend that twins were told with as if each pair were one mode
@@ -88,7 +88,7 @@ class AmplitudePitch:
     def propose(cls, evidence: Evidence) -> Self | None:
         best: tuple[float, Self] | None = None
         known = evidence.known if isinstance(evidence.known, cls) else None
-        for h in evidence.heard:
+        for h in evidence.observed:
             e = envelopes(h)
             for name, b in (_slopes(e, h, known) if e is not None else {}).items():
                 if best is None or b.modes > best[0]:
@@ -97,7 +97,7 @@ class AmplitudePitch:
         return best[1] if best is not None else None
 
     @classmethod
-    def _beside_twins(cls, e: Envelopes, h: Heard, measure: str, b: Slope, known: AmplitudePitch | None, held: bool) -> Self:
+    def _beside_twins(cls, e: Envelopes, h: ObjectEvidence, measure: str, b: Slope, known: AmplitudePitch | None, held: bool) -> Self:
         """The same with the axes of twins, known's if held; where hardly a mode is without its twin, their bend with it."""
         if h.model is None or measure == "impulse":
             return cls(b.bend, measure)
@@ -119,9 +119,9 @@ def _per_velocity(x: Ring, measure: str) -> Array:
     return np.ones(len(x.freq_hz))
 
 
-def _slopes(e: Envelopes, h: Heard, known: AmplitudePitch | None) -> dict[str, Slope]:
+def _slopes(e: Envelopes, h: ObjectEvidence, known: AmplitudePitch | None) -> dict[str, Slope]:
     """Of every measure that lines are sure of: modes without a twin where those are ENOUGH and sure of any, else all. known: what all evidence said."""
-    single = np.array([not twins(h, k) for k in e.line.tolist()], bool)  # twins glide each by its own level
+    single = np.array([not degenerate(h, k) for k in e.line.tolist()], bool)  # twins glide each by its own level
     rows = {
         name: np.array([one or (0.0, 0.0, 0.0) for one in (_moments(e, h, level[:, e.line], q) for q in range(len(e.line)))]).reshape(-1, 3)
         for name, level in levels(h).items()
@@ -142,7 +142,7 @@ def _slopes(e: Envelopes, h: Heard, known: AmplitudePitch | None) -> dict[str, S
 def _sure(b: Slope, known: AmplitudePitch | None) -> bool:
     """Whether lines are sure of b; by fewer strikes, that it is no less than nothing of what all said (known)."""
     if known is None:
-        return abs(b.bend) > SURE * b.sd and b.share > BETTER
+        return abs(b.bend) > STANDARD_ERRORS * b.sd and b.share > BETTER
     return b.bend * np.sign(known.bend) > b.sd and b.share > 0
 
 
@@ -164,7 +164,7 @@ def _agreed(table: Array, single: bool) -> Slope:
     return Slope(centre, np.inf if alone else max(sd, 1e-300), float((says * gone).sum() / max(says.sum(), 1e-300)), float(gone.sum()), single)
 
 
-def _moments(e: Envelopes, h: Heard, level: Array, q: int) -> tuple[float, float, float] | None:
+def _moments(e: Envelopes, h: ObjectEvidence, level: Array, q: int) -> tuple[float, float, float] | None:
     """Σ x², Σ xy, Σ y² of a mode: y its strikes' phases without their means and the common slope, x what b = 1 would make of them; None where too little is clear."""
     decay, omega = falls(e, q, float(h.decay_per_s[e.line[q]])), 2 * np.pi * float(h.freq_hz[e.line[q]])
     rows, sides, weights, ramps = [], [], [], []

@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from sonic_bullet.effects.protocol import Heard
+from sonic_bullet.effects.protocol import ObjectEvidence
 from sonic_bullet.records import Array, ModalModel
 
 PAIR = 6e-3  # relative: modes of a mesh nearer than this may be a pair
@@ -38,7 +38,7 @@ def about_axes(pair: Array, turn_rad: float) -> Array:
     return np.stack([c * a + s * b, -s * a + c * b], axis=-1)
 
 
-def twins(h: Heard, k: int) -> bool:
+def degenerate(h: ObjectEvidence, k: int) -> bool:
     """Whether a line stands for two modes that the mesh itself leaves side by side."""
     if h.model is None or h.plain is None or len(h.mode[k]) != 2:
         return False
@@ -46,13 +46,13 @@ def twins(h: Heard, k: int) -> bool:
     return bool(near[1] / near[0] - 1 < MESHED)
 
 
-def torn(h: Heard, k: int) -> bool:
+def split_apart(h: ObjectEvidence, k: int) -> bool:
     """Whether the modes of a line, as they are played, are still apart."""
     freq = h.model.freq_hz[h.mode[k]] if h.model is not None else np.zeros(0)
     return bool(len(freq) > 1 and freq.max() / freq.min() - 1 > ONE)
 
 
-def about(h: Heard, k: int, measure: str, angle: Array) -> tuple[Array, Array]:
+def about(h: ObjectEvidence, k: int, measure: str, angle: Array) -> tuple[Array, Array]:
     """Amplitudes at the sensor, but for one factor, and levels (p, s, j) of the modes a line stands for, with twins turned by p angles. measure: see envelope.levels."""
     impulse = np.where(np.isfinite(h.impulse_n_s), h.impulse_n_s, 1.0)[:, None]
     if h.model is None:
@@ -62,14 +62,14 @@ def about(h: Heard, k: int, measure: str, angle: Array) -> tuple[Array, Array]:
     bodies = np.stack([about_axes(shape, t) for t in angle.tolist()]) if len(angle) > 1 else shape[None]  # (p, v, 3, j)
     body = np.unique(h.model.face)
     most = np.sqrt((bodies[:, body] ** 2).sum(axis=2)).max(axis=1)  # (p, j)
-    push = np.einsum("psxj,sx->psj", bodies[:, h.strike_vertex], h.strike_way)
-    heard = np.einsum("pxj,x->pj", bodies[:, h.sensor_vertex], h.sensor_way)
+    push = np.einsum("psxj,sx->psj", bodies[:, h.strike_vertex], h.strike_direction)
+    observed = np.einsum("pxj,x->pj", bodies[:, h.sensor_vertex], h.sensor_direction)
     level = impulse * np.abs(push) * most[:, None, :] * h.pressed[:, h.mode[k]]
     if measure == "displacement":
         level = level / (2 * np.pi * h.model.freq_hz[h.mode[k]])
     elif measure == "impulse":
         level = np.broadcast_to(impulse * h.pressed[:, h.mode[k]], push.shape)
-    return impulse * h.pressed[:, h.mode[k]] * push * heard[:, None, :], level
+    return impulse * h.pressed[:, h.mode[k]] * push * observed[:, None, :], level
 
 
 def turned(x: ModalModel, freq_hz: tuple[float, ...], turn_rad: tuple[float, ...]) -> ModalModel:

@@ -15,7 +15,7 @@ from functools import lru_cache
 import numpy as np
 from numba import njit
 
-from sonic_bullet.effects.protocol import Heard
+from sonic_bullet.effects.protocol import ObjectEvidence
 from sonic_bullet.records import Array
 
 WIDTH_HZ = (30.0, 400.0)
@@ -52,24 +52,24 @@ class Envelopes:
 
 
 @lru_cache(maxsize=2)
-def envelopes(h: Heard) -> Envelopes | None:
+def envelopes(h: ObjectEvidence) -> Envelopes | None:
     """Of lines that stand alone and clear, spread over the frequencies; None where there are none."""
     if h.signal is None or not len(h.freq_hz):
         return None
-    picked, window = alone(h)
-    return shifted(h, h.signal if h.own is None else h.own, picked, window) if picked else None
+    selected, window = alone(h)
+    return shifted(h, h.signal if h.own is None else h.own, selected, window) if selected else None
 
 
-def shifted(h: Heard, signal: Array, picked: list[int], window: list[int]) -> Envelopes:
+def shifted(h: ObjectEvidence, signal: Array, selected: list[int], window: list[int]) -> Envelopes:
     """The lines picked by ``alone``, out of recordings or what is played in their place: signal (s, n)."""
     n, sr = signal.shape[1], h.sr
-    z = np.zeros((len(signal), len(picked), FRAMES), complex)
+    z = np.zeros((len(signal), len(selected), FRAMES), complex)
     good = np.zeros(z.shape, bool)
     phase = np.zeros(z.shape)
     noise = np.zeros(z.shape[:2])
-    time = np.zeros((len(picked), FRAMES))
+    time = np.zeros((len(selected), FRAMES))
     floor = h.noise if len(h.noise) == len(signal) and np.isfinite(h.noise).all() else np.zeros(len(signal))
-    for q, (k, length) in enumerate(zip(picked, window, strict=True)):
+    for q, (k, length) in enumerate(zip(selected, window, strict=True)):
         shape = np.hanning(length + 2)[1:-1]
         shape /= shape.sum()
         last = min(n - length, int(NEPERS / max(h.decay_per_s[k], 1e-2) * sr) + length)
@@ -88,7 +88,7 @@ def shifted(h: Heard, signal: Array, picked: list[int], window: list[int]) -> En
             if not clear.all():  # nothing after the first dip: what comes back is something else
                 clear[int(np.argmin(clear)) :] = False
             good[s, q, : len(at)] = clear
-    return Envelopes(time, z, good, np.array(picked), noise, phase, np.array(window) / sr)
+    return Envelopes(time, z, good, np.array(selected), noise, phase, np.array(window) / sr)
 
 
 def windowed(y: Array, omega: float, length: int, at: Array) -> Array:
@@ -117,7 +117,7 @@ def _running(y: Array, omega: float, theta: float) -> Array:
     return out
 
 
-def alone(h: Heard) -> tuple[list[int], list[int]]:
+def alone(h: ObjectEvidence) -> tuple[list[int], list[int]]:
     """Lines with no strong neighbour, and the window for each; every so many of them, from low to high."""
     if h.signal is None:
         return [], []
@@ -126,21 +126,21 @@ def alone(h: Heard) -> tuple[list[int], list[int]]:
     decay = np.nan_to_num(np.concatenate([h.decay_per_s, h.foreign_decay_per_s]))
     strength = np.concatenate([np.abs(h.amplitude).max(axis=0), np.abs(h.foreign_amplitude).max(axis=0)])
     chain, foreign = _chains(every, decay), np.arange(len(every)) >= len(h.freq_hz)
-    picked, window = [], []
+    selected, window = [], []
     for k in range(len(h.freq_hz)):
         rival = np.abs(every - h.freq_hz[k])
-        glide = (chain == chain[k]) & foreign | (rival < FAR * h.freq_hz[k]) & (decay > FASTER * decay[k])  # its own beginning, while it was loud
-        near = (rival > 1e-9) & (strength > 0.05 * strength[k]) & (rival > SELF * h.freq_hz[k]) & ~glide
-        same = (rival < SELF * h.freq_hz[k]) & (strength > 3 * strength[k]) & ~glide  # the louder one of a bent mode's lines stands for it
+        pitch_fall = (chain == chain[k]) & foreign | (rival < FAR * h.freq_hz[k]) & (decay > FASTER * decay[k])  # its own beginning, while it was loud
+        near = (rival > 1e-9) & (strength > 0.05 * strength[k]) & (rival > SELF * h.freq_hz[k]) & ~pitch_fall
+        same = (rival < SELF * h.freq_hz[k]) & (strength > 3 * strength[k]) & ~pitch_fall  # the louder one of a bent mode's lines stands for it
         gap = rival[near].min() if near.any() else np.inf
-        width = min(0.8 * gap, max([WIDTH_HZ[1], *(2 * rival + decay / np.pi)[glide & (strength > 0.05 * strength[k])]]))
+        width = min(0.8 * gap, max([WIDTH_HZ[1], *(2 * rival + decay / np.pi)[pitch_fall & (strength > 0.05 * strength[k])]]))
         if width >= max(WIDTH_HZ[0], 0.6 * h.decay_per_s[k]) and not same.any() and int(2 * sr / width) < n // 4:
-            picked.append(k)
+            selected.append(k)
             window.append(int(2 * sr / width) | 1)
-    if len(picked) > MOST_LINES:
-        keep = np.unique(np.linspace(0, len(picked) - 1, MOST_LINES).astype(int))
-        picked, window = [picked[i] for i in keep], [window[i] for i in keep]
-    return picked, window
+    if len(selected) > MOST_LINES:
+        keep = np.unique(np.linspace(0, len(selected) - 1, MOST_LINES).astype(int))
+        selected, window = [selected[i] for i in keep], [window[i] for i in keep]
+    return selected, window
 
 
 def _chains(freq_hz: Array, decay_per_s: Array) -> Array:
@@ -154,7 +154,7 @@ def _chains(freq_hz: Array, decay_per_s: Array) -> Array:
     return np.asarray(connected_components(csr_array(linked), directed=False)[1])
 
 
-def levels(h: Heard) -> dict[str, Array]:
+def levels(h: ObjectEvidence) -> dict[str, Array]:
     """How hard each line (s, k) is driven, by three measures of what the pulse leaves of a blow: its impulse, and peak velocity and peak displacement at the body's surface."""
     level = np.where(np.isfinite(h.impulse_n_s), h.impulse_n_s, 1.0)
     found = {"impulse": level[:, None] * np.stack([h.pressed[:, m].max(axis=1) for m in h.mode], axis=1)}
@@ -162,7 +162,7 @@ def levels(h: Heard) -> dict[str, Array]:
         return found
     body = np.unique(h.model.face)
     most = np.sqrt((h.model.shape[body].astype(float) ** 2).sum(axis=1)).max(axis=0)
-    push = np.abs(np.einsum("sxm,sx->sm", h.model.shape[h.strike_vertex].astype(float), h.strike_way)) * most * h.pressed
+    push = np.abs(np.einsum("sxm,sx->sm", h.model.shape[h.strike_vertex].astype(float), h.strike_direction)) * most * h.pressed
     velocity = level[:, None] * np.stack([push[:, m].max(axis=1) for m in h.mode], axis=1)
     return found | {"velocity": velocity, "displacement": velocity / (2 * np.pi * h.freq_hz)}
 

@@ -99,7 +99,7 @@ def without(signals: Array, sr: int, hum: Hum) -> Array:
     return np.asarray(signals - (wave @ part).T)
 
 
-def stilled(signals: Array, noise: Array, sr: int) -> Array:
+def without_hum(signals: Array, noise: Array, sr: int) -> Array:
     """The recordings (s, n) over a noise (s,) less their hum, if they have any."""
     hum = hum_of(signals, noise, sr)
     return signals if hum is None else without(signals, sr, hum)

@@ -9,14 +9,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from sonic_bullet.effects.protocol import Heard
+from sonic_bullet.effects.protocol import ObjectEvidence
 from sonic_bullet.records import Array, ModalModel
 
 WIDTH = 0.004
 MOST_LINES = 48
 
 
-def every_line(h: Heard) -> tuple[Array, Array, Array, Array]:
+def every_line(h: ObjectEvidence) -> tuple[Array, Array, Array, Array]:
     """The strongest lines of an object, paired or not, ascending: f (k,), |A| (s, k), d (k,), and spread of f (k,)."""
     freq = np.concatenate([h.freq_hz, h.foreign_hz])
     size = np.abs(np.concatenate([h.amplitude, h.foreign_amplitude], axis=1))
@@ -27,11 +27,11 @@ def every_line(h: Heard) -> tuple[Array, Array, Array, Array]:
     return freq[strong], size[:, strong], decay[strong], sd[strong]
 
 
-def patterns(h: Heard, model: ModalModel) -> Array:
+def patterns(h: ObjectEvidence, model: ModalModel) -> Array:
     """|J φ(p)·e φ(q)·n| (s, m) of the strikes."""
     level = np.where(np.isfinite(h.impulse_n_s), h.impulse_n_s, 1.0)
-    push = np.einsum("sxm,sx->sm", model.shape[h.strike_vertex].astype(float), h.strike_way) * level[:, None]
-    return np.asarray(np.abs(push * np.einsum("xm,x->m", model.shape[h.sensor_vertex].astype(float), h.sensor_way)))
+    push = np.einsum("sxm,sx->sm", model.shape[h.strike_vertex].astype(float), h.strike_direction) * level[:, None]
+    return np.asarray(np.abs(push * np.einsum("xm,x->m", model.shape[h.sensor_vertex].astype(float), h.sensor_direction)))
 
 
 def agreed(

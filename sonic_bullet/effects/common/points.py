@@ -17,12 +17,12 @@ def spread_out(x: ModalModel, count: int) -> Array:
     """About ``count`` surface vertices (p,), each the farthest from those before it [Gonzalez 1985]."""
     body = np.unique(x.face)
     at = x.vertex_m[body]
-    picked = [0]
+    selected = [0]
     gap = ((at - at[0]) ** 2).sum(axis=1)
     for _ in range(min(count, len(body)) - 1):
-        picked.append(int(gap.argmax()))
-        gap = np.minimum(gap, ((at - at[picked[-1]]) ** 2).sum(axis=1))
-    return np.asarray(body[picked])
+        selected.append(int(gap.argmax()))
+        gap = np.minimum(gap, ((at - at[selected[-1]]) ** 2).sum(axis=1))
+    return np.asarray(body[selected])
 
 
 def vertex_normals(model: ModalModel) -> Array:

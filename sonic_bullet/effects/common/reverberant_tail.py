@@ -16,7 +16,7 @@ from functools import lru_cache
 import numpy as np
 
 from sonic_bullet.effects.common.ringing import sounded
-from sonic_bullet.effects.protocol import Blow, Heard, Ring
+from sonic_bullet.effects.protocol import Impact, ObjectEvidence, Ring
 from sonic_bullet.records import Array
 
 FRAME_S = 0.012
@@ -32,7 +32,7 @@ FASTEST = 300.0  # 1/s: what dies sooner is gone within a frame or two, and how 
 LIKE = 0.7  # squared cosine of amplitudes over the strikes and what the model says: a line less like its mode is the room's own
 OWNS = 8.0  # times longer than it is heard to ring: no line's own, though a tail makes several of one, which end sooner
 OUTLASTS = 0.5  # of the tail's decay: what falls slower has the recording to itself in the end
-SURE = 0.1  # of a decay and of an amplitude: the tail's early echoes are no noise
+STANDARD_ERRORS = 0.1  # of a decay and of an amplitude: the tail's early echoes are no noise
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,10 +50,10 @@ class Read:
     shift_hz: Array
     amplitude: Array
     amplitude_sd: Array
-    wet: Array
+    wet_level: Array
 
 
-def read(h: Heard, delta: Array, freq_hz: Array, own: Array, members: Sequence[Array], *, every: int = 1) -> Read:
+def read(h: ObjectEvidence, delta: Array, freq_hz: Array, own: Array, members: Sequence[Array], *, every: int = 1) -> Read:
     """Lines at freq_hz (k,) at some δ (t,). own (s, k): what A is told in units of, complex; members: the modes that each is, so that others are its neighbours.
 
     every: of the decays how many are looked at, for a first look.
@@ -66,22 +66,22 @@ def read(h: Heard, delta: Array, freq_hz: Array, own: Array, members: Sequence[A
     return _summed(delta, DECAYS[::every], rows)
 
 
-def modes(h: Heard, delta: Array, lines: Array, *, every: int = 1) -> Read:
+def modes(h: ObjectEvidence, delta: Array, lines: Array, *, every: int = 1) -> Read:
     """Some of an object's lines (k,), by index, in units of what the model so far says of them."""
     return read(h, delta, h.freq_hz[lines], told(h)[:, lines], [h.mode[k] for k in lines], every=every)
 
 
-def told(h: Heard) -> Array:
+def told(h: ObjectEvidence) -> Array:
     """What the model so far says of the lines (s, k), complex."""
     return np.stack([h.push[:, m].sum(axis=1) for m in h.mode], axis=1)
 
 
 @lru_cache(maxsize=4)
-def through(h: Heard, delta: float) -> Read:
-    """All lines of an object at one δ; remembered, as evidence is asked for it more than once. What outlasts the tail is left as it was heard: late, it rings alone."""
+def through(h: ObjectEvidence, delta: float) -> Read:
+    """All lines of an object at one δ; remembered, as evidence is asked for it more than once. What outlasts the tail is left as it was observed: late, it rings alone."""
     r = modes(h, np.array([delta]), np.arange(len(h.freq_hz)))
     sd = h.decay_sd_per_s / np.maximum(h.decay_per_s, 1e-9)
-    alone = (h.decay_per_s < OUTLASTS * delta) & (r.decay_per_s < delta) & (sd < SURE)  # by both: a faint line may beat with the tail's own
+    alone = (h.decay_per_s < OUTLASTS * delta) & (r.decay_per_s < delta) & (sd < STANDARD_ERRORS)  # by both: a faint line may beat with the tail's own
     return replace(
         r,
         decay_per_s=np.where(alone, h.decay_per_s, r.decay_per_s),
@@ -90,7 +90,7 @@ def through(h: Heard, delta: float) -> Read:
     )
 
 
-def dried(h: Heard, delta: float) -> Heard:
+def dereverberated(h: ObjectEvidence, delta: float) -> ObjectEvidence:
     """The same with frequencies, decays and amplitudes of all lines as they would be without the tail; those that are no mode go with the impulse."""
     if h.dry or h.signal is None or not len(h.freq_hz) or h.signal.shape[1] < LEAST * FRAME_S * h.sr:
         return h
@@ -98,7 +98,7 @@ def dried(h: Heard, delta: float) -> Heard:
     own, decay = told(h), r.decay_per_s[0]
     amplitude, spread = _rescaled(r, own, h.amplitude, h.amplitude_sd)
     like = np.abs((np.conj(own) * h.amplitude).sum(axis=0)) ** 2 / np.maximum((np.abs(own) ** 2).sum(axis=0) * (np.abs(h.amplitude) ** 2).sum(axis=0), 1e-300)
-    ln_sd = np.where((decay > FASTEST) | (like < LIKE), np.inf, np.hypot(r.ln_sd[0], SURE))
+    ln_sd = np.where((decay > FASTEST) | (like < LIKE), np.inf, np.hypot(r.ln_sd[0], STANDARD_ERRORS))
     dry = replace(
         h,
         freq_hz=h.freq_hz + r.shift_hz[0],
@@ -131,12 +131,12 @@ def _rescaled(r: Read, own: Array, amplitude: Array, sd: Array) -> tuple[Array, 
     now = (np.conj(own) * amplitude).sum(axis=0) / np.maximum((np.abs(own) ** 2).sum(axis=0), 1e-300)
     silent = (np.abs(own).sum(axis=0) == 0) | (now == 0)  # the model says nothing of them: they stay as they were heard
     factor = np.where(silent, 1, r.amplitude[0] / np.where(silent, 1, now))
-    common = np.abs(own) * np.hypot(r.amplitude_sd[0], SURE * np.abs(r.amplitude[0]))
-    common = np.maximum(common, SURE * np.abs(amplitude * factor))  # where a mode is hardly struck, more is heard of it than the model says
+    common = np.abs(own) * np.hypot(r.amplitude_sd[0], STANDARD_ERRORS * np.abs(r.amplitude[0]))
+    common = np.maximum(common, STANDARD_ERRORS * np.abs(amplitude * factor))  # where a mode is hardly struck, more is heard of it than the model says
     return amplitude * factor, np.hypot(sd * np.abs(factor), common)
 
 
-def direct(h: Heard, delta: float) -> Array:
+def direct(h: ObjectEvidence, delta: float) -> Array:
     """What the strikes (s, n) would sound like without the tail: the lines' modes as they are read, the others as the nearest of those."""
     assert h.signal is not None
     r = through(h, delta)
@@ -145,12 +145,12 @@ def direct(h: Heard, delta: float) -> Array:
     for k, members in enumerate(h.mode):
         near[members], shift[members] = k, h.freq_hz[k] + r.shift_hz[0, k] - h.all_hz[members]
     none = np.zeros(len(near))
-    once = Blow(1.0, np.zeros(1), np.ones(1))
+    once = Impact(1.0, np.zeros(1), np.ones(1))
     rings = (Ring(h.all_hz + shift, r.decay_per_s[0, near], row * r.amplitude[0, near], none, none, none) for row in h.push)
     return np.stack([sounded(ring, once, h.signal.shape[1], h.sr) for ring in rings])
 
 
-def _frames(h: Heard) -> tuple[Array, Array]:
+def _frames(h: ObjectEvidence) -> tuple[Array, Array]:
     """First samples (n,) of the frames, and their window."""
     assert h.signal is not None
     window = np.hanning(round(FRAME_S * h.sr) + 2)[1:-1]
@@ -161,7 +161,7 @@ def _frames(h: Heard) -> tuple[Array, Array]:
     return hop * np.unique(np.concatenate([dense, sparse])), window / window.sum()
 
 
-def _basebands(h: Heard, freq: Array, own: Array, members: Sequence[Array], start: Array, window: Array) -> tuple[Array, Array]:
+def _basebands(h: ObjectEvidence, freq: Array, own: Array, members: Sequence[Array], start: Array, window: Array) -> tuple[Array, Array]:
     """Frames (k, n) of every line in units of its own, and the noise's variance there (k,)."""
     assert h.signal is not None
     at = np.arange(len(window)) / h.sr
@@ -233,13 +233,13 @@ def _at(z: Array, noise: Array, time: tuple[float, ...], decay: float, delta: fl
     pick = np.take_along_axis(cross, best[:, :, None], axis=2)[:, :, 0]
     left = np.take_along_axis(power, best[:, :, None], axis=2)[:, :, 0] - np.abs(pick) ** 2 / size
     amplitude = pick / size
-    wet = np.sqrt(scale) / np.maximum(np.abs(amplitude), 1e-300)
-    return -left + np.log(over).sum(axis=2), amplitude, 1 / np.sqrt(size), shift[best], wet
+    wet_level = np.sqrt(scale) / np.maximum(np.abs(amplitude), 1e-300)
+    return -left + np.log(over).sum(axis=2), amplitude, 1 / np.sqrt(size), shift[best], wet_level
 
 
 def _summed(delta: Array, decays: Array, rows: list[list[tuple[Array, ...]]]) -> Read:
     """Over decays and wets: means of ln d and ln w, the rest at the likeliest."""
-    like, amplitude, sd, shift, wet = (np.array([[one[i] for one in row] for row in rows]) for i in range(5))  # (t, d, k, w)
+    like, amplitude, sd, shift, wet_level = (np.array([[one[i] for one in row] for row in rows]) for i in range(5))  # (t, d, k, w)
     t, _, k, _ = like.shape
     top = like.max(axis=(1, 3), keepdims=True)
     share = np.exp(like - top)
@@ -250,7 +250,7 @@ def _summed(delta: Array, decays: Array, rows: list[list[tuple[Array, ...]]]) ->
     flat = like.transpose(0, 2, 1, 3).reshape(t, k, -1)
     best = flat.argmax(axis=2)[:, :, None]
     at = [np.take_along_axis(x.transpose(0, 2, 1, 3).reshape(t, k, -1), best, axis=2)[:, :, 0] for x in (amplitude, sd, shift)]
-    wetness = np.exp((share * np.log(np.maximum(wet, 1e-300))).sum(axis=(1, 3)) / total)
+    wetness = np.exp((share * np.log(np.maximum(wet_level, 1e-300))).sum(axis=(1, 3)) / total)
     plain = like[:, :, :, 0].max(axis=(0, 1))
     step = np.log(decays[1] / decays[0])
     ln_sd = np.sqrt(np.maximum(square - mean**2, 0) + step**2 / 12)

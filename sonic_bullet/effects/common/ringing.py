@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from sonic_bullet.effects.protocol import Blow, Heard, Ring
+from sonic_bullet.effects.protocol import Impact, ObjectEvidence, Ring
 from sonic_bullet.records import Array
 
 FAINT = 40.0  # nepers after which a mode is over
@@ -36,12 +36,12 @@ def _linear(out, start, pole, amplitude, length):
 
 
 @njit(cache=True, nogil=True)
-def _level(out, start, sr, omega, decay, amplitude, bend, choke, power, length):
+def _level(out, start, sr, omega, decay, amplitude, bend, damping_growth, power, length):
     """The same with ω(t) and d(t) that depend on the mode's level; bend and choke at the level the mode starts with, (choke·level)^power."""
     for k in range(len(omega)):
         first = int(np.ceil(start))
         last = min(len(out), first + length[k])
-        c, d = choke[k], decay[k]
+        c, d = damping_growth[k], decay[k]
         share = c / (1.0 + c)
         size, angle = abs(amplitude[k]), np.angle(amplitude[k])
         for block in range(first, last, STEP):
@@ -65,24 +65,24 @@ def _level(out, start, sr, omega, decay, amplitude, bend, choke, power, length):
                 fall *= step
 
 
-def sounded(ring: Ring, blow: Blow, n: int, sr: int) -> Array:
+def sounded(ring: Ring, impact: Impact, n: int, sr: int) -> Array:
     """The ring's sound (n,) under every hit of the blow; modes above Nyquist are left out."""
     out = np.zeros(n)
     use = (ring.freq_hz < 0.5 * sr) & (np.abs(ring.amplitude) > 0)
     if not use.any():
         return out
-    f, d, a = ring.freq_hz[use], ring.decay_per_s[use], ring.amplitude[use] * blow.spectrum(ring.freq_hz[use])
+    f, d, a = ring.freq_hz[use], ring.decay_per_s[use], ring.amplitude[use] * impact.spectrum(ring.freq_hz[use])
     length = np.full(len(f), n, np.int64)
     alive = d * n / sr > FAINT
     length[alive] = (FAINT / d[alive] * sr).astype(np.int64)
     pole = (-d + 2j * np.pi * f) / sr
-    bent = (ring.bend[use] != 0) | (ring.choke[use] != 0)
-    for delay, share in zip(blow.delay_s, blow.share, strict=True):
+    bent = (ring.bend[use] != 0) | (ring.damping_growth[use] != 0)
+    for delay, share in zip(impact.delay_s, impact.share, strict=True):
         if (~bent).any():
             _linear(out, delay * sr, pole[~bent], (share * a)[~bent].astype(complex), length[~bent])
         if bent.any():
-            level = (ring.level[use] * share * np.abs(blow.spectrum(f)))[bent]
-            bend, choke = ring.bend[use][bent] * level**2, (ring.choke[use][bent] * level) ** ring.choke_power
+            level = (ring.level[use] * share * np.abs(impact.spectrum(f)))[bent]
+            bend, damping_growth = ring.bend[use][bent] * level**2, (ring.damping_growth[use][bent] * level) ** ring.damping_growth_power
             _level(
                 out,
                 delay * sr,
@@ -91,17 +91,17 @@ def sounded(ring: Ring, blow: Blow, n: int, sr: int) -> Array:
                 np.maximum(d[bent], 1e-6),
                 (share * a)[bent].astype(complex),
                 bend,
-                choke,
-                ring.choke_power,
+                damping_growth,
+                ring.damping_growth_power,
                 length[bent],
             )
     return out
 
 
-def direct_as_expected(heard: Heard) -> Array:
+def direct_as_expected(observed: ObjectEvidence) -> Array:
     """What single hits (s, n) would sound like, with the lines' own frequencies and decays and the model's amplitudes."""
-    assert heard.signal is not None
-    none = np.zeros(len(heard.freq_hz))
-    once = Blow(1.0, np.zeros(1), np.ones(1))
-    rings = (Ring(heard.freq_hz, np.nan_to_num(heard.decay_per_s), row, none, none, none) for row in heard.expected)
-    return np.stack([sounded(ring, once, heard.signal.shape[1], heard.sr) for ring in rings])
+    assert observed.signal is not None
+    none = np.zeros(len(observed.freq_hz))
+    once = Impact(1.0, np.zeros(1), np.ones(1))
+    rings = (Ring(observed.freq_hz, np.nan_to_num(observed.decay_per_s), row, none, none, none) for row in observed.expected)
+    return np.stack([sounded(ring, once, observed.signal.shape[1], observed.sr) for ring in rings])

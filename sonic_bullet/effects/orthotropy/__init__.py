@@ -16,7 +16,7 @@ import numpy as np
 from sonic_bullet.effects.orthotropy.tensor_lines import CAP, ringing, told_of
 from sonic_bullet.effects.orthotropy.tensor_search import WIDTHS, Tensor, fitted, isotropic_p, search
 from sonic_bullet.effects.orthotropy.tensors import NAMES, SYMMETRIES, p_of
-from sonic_bullet.effects.protocol import Evidence, Heard, Owner, Stage
+from sonic_bullet.effects.protocol import Evidence, ObjectEvidence, Owner, Stage
 from sonic_bullet.records import ORTHOTROPIC, Array, Material
 
 BETTER = 10.0  # in BIC, than isotropy
@@ -81,13 +81,13 @@ class Orthotropy:
             start = p_of(evidence.known.stiffness_pa / density)
             return cls.of(fitted(told, evidence.known.symmetry, start, isotropic_p(told[0].elastic), WIDTHS[4:]), density)
         lines = sum(len(t.log_hz) for t in told)
-        if lines < 6 or all(_fits(h) for h in evidence.heard):
+        if lines < 6 or all(_fits(h) for h in evidence.observed):
             return None
         found = search(evidence)
         if found is None:
             return None
         plain, best = found
-        gain, dry = plain.bic - best.bic, any(h.dry for h in evidence.heard)
+        gain, dry = plain.bic - best.bic, any(h.dry for h in evidence.observed)
         told_apart = gain > BETTER and best.off < NEARER * plain.off
         told_apart |= dry and gain > IN_A_ROOM and round(lines * (best.matched - plain.matched)) >= 1
         if not told_apart or departure(best) < LEAST:
@@ -102,7 +102,7 @@ def departure(tensor: Tensor) -> float:
     return float(max(np.ptp(p[:3]), np.abs(p[6:] - goes).max()))
 
 
-def _fits(h: Heard) -> bool:
+def _fits(h: ObjectEvidence) -> bool:
     """Whether the isotropic body's modes are where the lines are."""
     if not len(h.freq_hz):
         return False

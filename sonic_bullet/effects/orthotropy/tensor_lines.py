@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sonic_bullet.effects.orthotropy.tensors import stiffness
-from sonic_bullet.effects.protocol import Elastic, Evidence, Heard
+from sonic_bullet.effects.protocol import Elastic, Evidence, ObjectEvidence
 from sonic_bullet.records import Array
 
 CAP = 0.012  # of ln f: a line farther off is no such mode
@@ -34,10 +34,10 @@ class Told:
 
 def told_of(evidence: Evidence) -> list[Told]:
     """All lines, whatever they were paired with, of the objects that can be of any elasticity."""
-    return [_told(h) for h in evidence.heard if h.elastic is not None and len(h.freq_hz) + len(h.foreign_hz) > 4]
+    return [_told(h) for h in evidence.observed if h.elastic is not None and len(h.freq_hz) + len(h.foreign_hz) > 4]
 
 
-def ringing(h: Heard) -> Array:
+def ringing(h: ObjectEvidence) -> Array:
     """Which foreign lines (f,) may be modes by their decay and phases; others are a click's, a filter's, a room's or noise."""
     decay = np.nan_to_num(h.foreign_decay_per_s)
     own = decay < SHORT * h.foreign_hz
@@ -49,7 +49,7 @@ def ringing(h: Heard) -> Array:
     return np.asarray(own)
 
 
-def _told(h: Heard) -> Told:
+def _told(h: ObjectEvidence) -> Told:
     assert h.elastic is not None
     own = ringing(h)
     freq, decay = np.concatenate([h.freq_hz, h.foreign_hz[own]]), np.concatenate([h.decay_per_s, h.foreign_decay_per_s[own]])

@@ -16,7 +16,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from sonic_bullet.effects.common.ringing import direct_as_expected
-from sonic_bullet.effects.protocol import Blow, Evidence, Heard, Owner, Stage
+from sonic_bullet.effects.protocol import Evidence, Impact, ObjectEvidence, Owner, Stage
 from sonic_bullet.effects.rebound.later_hits import EXPONENTS, LEAST, MOST_HITS, SPAN_S, hits_by_strike, second_hit, third_hit
 from sonic_bullet.records import Array
 
@@ -49,7 +49,7 @@ class Rebound:
     shrink: float | None = None  # of the gaps; the restitution where None
     hits: int = MOST_HITS
 
-    def apply(self, x: Blow) -> Blow:
+    def apply(self, x: Impact) -> Impact:
         """The blow with the effect in it."""
         gap = self.gap_s * (x.impulse_n_s / self.impulse_n_s) ** self.exponent
         ratio = self.restitution if self.shrink is None else self.shrink
@@ -76,7 +76,7 @@ class Rebound:
 
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
-        h = max((h for h in evidence.heard if h.signal is not None), key=lambda h: len(h.freq_hz), default=None)
+        h = max((h for h in evidence.observed if h.signal is not None), key=lambda h: len(h.freq_hz), default=None)
         if h is None or len(h.freq_hz) < 3:
             return None
         if isinstance(evidence.known, cls):
@@ -85,7 +85,7 @@ class Rebound:
         return cls._one_by_one(h) or cls._of_all(h)
 
     @classmethod
-    def _of_all(cls, h: Heard) -> Self | None:
+    def _of_all(cls, h: ObjectEvidence) -> Self | None:
         """Read off all strikes at once: what rings for long is alike a whole number of turns later, so that one strike alone tells many a delay.
 
         Strikes of one strength are of no use: there all exponents say the same, and nothing tells a hit from what beats.
@@ -103,7 +103,7 @@ class Rebound:
         return replace(start, **best) if best["restitution"] > LEAST and count + left < HALF * (count + alone) else None
 
     @classmethod
-    def _one_by_one(cls, h: Heard) -> Self | None:
+    def _one_by_one(cls, h: ObjectEvidence) -> Self | None:
         """Read off each strike, and what they agree on."""
         found = [(level, hits) for level, hits in zip(h.impulse_n_s, hits_by_strike(h), strict=True) if len(hits)]
         need = max(2.0, MOST * len(h.impulse_n_s))
@@ -133,7 +133,7 @@ class Rebound:
         return replace(start, **best)
 
 
-def _refined(start: Rebound, h: Heard, *, known: bool = False) -> tuple[float, dict[str, Any]]:
+def _refined(start: Rebound, h: ObjectEvidence, *, known: bool = False) -> tuple[float, dict[str, Any]]:
     """What is left, up to a constant, and the restitution, gaps and their ratio that leave least of all strikes at once: Σ_s |<y, m>|²/<m, m> is most, m the sound of all its hits.
 
     known: whether start is near what is looked for.
@@ -160,11 +160,11 @@ def _refined(start: Rebound, h: Heard, *, known: bool = False) -> tuple[float, d
         trial, gone = replace(start, **of(x)), 0.0
         turns: dict[bytes, Array] = {}  # where gaps do not go with strength, all strikes have one
         for s, j in enumerate(level):
-            blow = trial.apply(Blow(float(j), np.zeros(1), np.ones(1)))
-            turn = turns.get(blow.delay_s.tobytes())
+            impact = trial.apply(Impact(float(j), np.zeros(1), np.ones(1)))
+            turn = turns.get(impact.delay_s.tobytes())
             if turn is None:
-                turn = _turned(blow, cycles, fade)
-                turns[blow.delay_s.tobytes()] = turn
+                turn = _turned(impact, cycles, fade)
+                turns[impact.delay_s.tobytes()] = turn
             gone += (
                 max(float((np.conj(turn) * both[s]).real.sum()), 0.0) ** 2
                 / max(float((np.abs(turn) ** 2 * own[s]).sum()), 1e-300)
@@ -195,11 +195,11 @@ def _nearby(left: Callable[[Array], float], start: Array) -> tuple[float, Array]
     return float(found.fun), found.x
 
 
-def _turned(blow: Blow, freq_hz: Array, fade: float) -> Array:
+def _turned(impact: Impact, freq_hz: Array, fade: float) -> Array:
     """Σ_j share_j e^{−(fade + 2πif) delay_j} (f,), in half the usual digits: phases, turns taken off, are good to 4e-7, and all of a search's time goes here."""
-    phase = np.multiply.outer(blow.delay_s, freq_hz)
+    phase = np.multiply.outer(impact.delay_s, freq_hz)
     phase = (2 * np.pi * (phase - np.rint(phase))).astype(np.float32)
-    share = (blow.share * np.exp(-fade * blow.delay_s)).astype(np.float32)
+    share = (impact.share * np.exp(-fade * impact.delay_s)).astype(np.float32)
     return np.asarray(share @ np.cos(phase) - 1j * (share @ np.sin(phase)))
 
 

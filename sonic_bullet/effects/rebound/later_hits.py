@@ -11,7 +11,7 @@ from functools import lru_cache
 import numpy as np
 
 from sonic_bullet.effects.common.ringing import direct_as_expected
-from sonic_bullet.effects.protocol import Heard
+from sonic_bullet.effects.protocol import ObjectEvidence
 from sonic_bullet.records import Array
 
 FINER, LOWEST = 4, 0.15  # lags to a sample; restitution
@@ -23,7 +23,7 @@ GAIN = 0.02  # of what is left must go with another hit
 EXPONENTS = (0.0, 1.0, 0.5, -0.2)
 
 
-def second_hit(h: Heard, level: Array) -> list[tuple[float, float, float]]:
+def second_hit(h: ObjectEvidence, level: Array) -> list[tuple[float, float, float]]:
     """(said, gap in s at level 1, exponent) of the second hit that says most of what one hit leaves of the strikes, on average, by exponent.
 
     <r, x_τ>²/(|x_τ|² − <x, x_τ>²/|x|²)/|r|², r what the best share of x leaves: what x_τ says beside x   [orthogonal matching pursuit: Pati, Rezaiifar & Krishnaprasad 1993]
@@ -73,7 +73,7 @@ def _lagged(x: Array, lag: Array) -> Array:
     return np.where(lag < len(x) // 2, x[np.minimum(lag, len(x) - 1)], 0.0)
 
 
-def hits_by_strike(h: Heard) -> list[list[tuple[float, float]]]:
+def hits_by_strike(h: ObjectEvidence) -> list[list[tuple[float, float]]]:
     """Per strike: delays in s and shares of the hits after the first, by their time.
 
     Matching pursuit [Mallat & Zhang 1993]: the sound of one hit, as the lines and the model have it, is sought later in what is left; after every

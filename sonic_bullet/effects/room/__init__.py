@@ -5,7 +5,7 @@
 
 δ is the one rate that makes all lines likeliest as modes that ring on in such a tail (tails.py), each with a decay and a share of its own; lines that of
 themselves die sooner than the room must agree on it: what no body does and every room. h, if several strikes tell it, by least squares with that
-variance as its prior [Wiener 1949]. Beside a room, lines are told as they would be without it (`dried`).
+variance as its prior [Wiener 1949]. Beside a room, lines are told as they would be without it (`dereverberated`).
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy as np
 
 from sonic_bullet.effects.common import reverberant_tail
 from sonic_bullet.effects.foreign_mode import ForeignMode
-from sonic_bullet.effects.protocol import Evidence, Heard, Owner, Sound, Stage
+from sonic_bullet.effects.protocol import Evidence, ObjectEvidence, Owner, Sound, Stage
 from sonic_bullet.effects.room.shifted_echo import copied
 from sonic_bullet.records import Array
 
@@ -43,7 +43,7 @@ class Room:
     reference: ClassVar[str] = "Schroeder 1965; Polack 1988; Kuttruff 2009, ch. 4"
 
     rt60_s: float
-    wet: float
+    wet_level: float
     seed: int = 0
     response: Array = field(default_factory=lambda: np.zeros(0), repr=False, compare=False)
     sr: int = 0
@@ -55,62 +55,68 @@ class Room:
         if len(self.response):
             from scipy.signal import resample_poly
 
-            return Room(self.rt60_s, self.wet, self.seed, np.asarray(resample_poly(self.response, sr, self.sr)) * self.sr / sr, sr).taps(sr, n)
+            return Room(self.rt60_s, self.wet_level, self.seed, np.asarray(resample_poly(self.response, sr, self.sr)) * self.sr / sr, sr).taps(sr, n)
         delta = RT60 / self.rt60_s
         t = np.arange(n) / sr
-        return np.asarray(self.wet * np.sqrt(2 * delta / sr) * np.exp(-delta * t) * np.random.default_rng(self.seed).standard_normal(n))
+        return np.asarray(self.wet_level * np.sqrt(2 * delta / sr) * np.exp(-delta * t) * np.random.default_rng(self.seed).standard_normal(n))
 
     def apply(self, x: Sound) -> Sound:
         """The sound with the effect in it."""
-        if self.wet == 0 or not len(x.sample):
+        if self.wet_level == 0 or not len(x.sample):
             return x
         from scipy.signal import fftconvolve
 
         tail = fftconvolve(x.sample, self.taps(x.sr, len(x.sample)))[: len(x.sample)]
         return replace(x, sample=x.sample + tail)
 
-    def dried(self, heard: Heard) -> Heard:
+    def dereverberated(self, observed: ObjectEvidence) -> ObjectEvidence:
         """The evidence with its lines as they would be outside the room."""
-        return reverberant_tail.dried(heard, RT60 / self.rt60_s)
+        return reverberant_tail.dereverberated(observed, RT60 / self.rt60_s)
 
-    def told_by(self, signal: Array, sound: Array, noise: Array, sr: int, *, fully: bool = False) -> Self:
+    def identified_from(self, signal: Array, sound: Array, noise: Array, sr: int, *, fully: bool = False) -> Self:
         """The same room, its response by what strikes (s, n) were recorded as, and what they would sound like without it; sought from the one it has. fully: to the end."""
         start = self.response if self.sr == sr and len(self.response) == signal.shape[1] else None
         turns = FULLY if fully else TURNS if start is None else AGAIN
-        return replace(self, response=identified(signal, sound, noise, sr, RT60 / self.rt60_s, self.wet, start, turns), sr=sr)
+        return replace(self, response=identified(signal, sound, noise, sr, RT60 / self.rt60_s, self.wet_level, start, turns), sr=sr)
 
     def parameters(self) -> dict[str, Any]:
         """What it says, for people and JSON, in SI units."""
-        return {"rt60_s": self.rt60_s, "wet": self.wet}
+        return {"rt60_s": self.rt60_s, "wet": self.wet_level}
 
     def freedom(self) -> int:
         return 2
 
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
-        heard = max(evidence.heard, key=lambda h: len(h.freq_hz))
+        observed = max(evidence.observed, key=lambda h: len(h.freq_hz))
         if (
-            heard.signal is None
-            or heard.predicted is None
-            or len(heard.freq_hz) < FEWEST
-            or heard.signal.shape[1] < reverberant_tail.LEAST * reverberant_tail.FRAME_S * heard.sr
+            observed.signal is None
+            or observed.predicted is None
+            or len(observed.freq_hz) < FEWEST
+            or observed.signal.shape[1] < reverberant_tail.LEAST * reverberant_tail.FRAME_S * observed.sr
         ):
             return None
-        sizes = np.concatenate([heard.amplitude, heard.foreign_amplitude], axis=1)
-        if copied(np.concatenate([heard.freq_hz, heard.foreign_hz]), np.concatenate([heard.decay_per_s, heard.foreign_decay_per_s]), sizes) is not None:
+        sizes = np.concatenate([observed.amplitude, observed.foreign_amplitude], axis=1)
+        if (
+            copied(np.concatenate([observed.freq_hz, observed.foreign_hz]), np.concatenate([observed.decay_per_s, observed.foreign_decay_per_s]), sizes)
+            is not None
+        ):
             return None  # something moves
-        found = late(heard, RT60 / evidence.known.rt60_s if isinstance(evidence.known, cls) else None)
+        found = late(observed, RT60 / evidence.known.rt60_s if isinstance(evidence.known, cls) else None)
         if found is None:
             return None
-        delta, wet = found
-        sound, along = reverberant_tail.direct(heard, delta), ForeignMode.propose(replace(evidence, heard=(reverberant_tail.dried(heard, delta),)))
+        delta, wet_level = found
+        sound, along = (
+            reverberant_tail.direct(observed, delta),
+            ForeignMode.propose(replace(evidence, observed=(reverberant_tail.dereverberated(observed, delta),))),
+        )
         if along is not None:  # what rings along is heard in the room too
-            level = np.where(np.isfinite(heard.impulse_n_s), heard.impulse_n_s, 1.0)
-            sound = np.stack([along.apply(Sound(x, heard.sr, float(j))).sample for x, j in zip(sound, level, strict=True)])
-        return cls(RT60 / delta, wet).told_by(heard.signal, sound, heard.noise, heard.sr)
+            level = np.where(np.isfinite(observed.impulse_n_s), observed.impulse_n_s, 1.0)
+            sound = np.stack([along.apply(Sound(x, observed.sr, float(j))).sample for x, j in zip(sound, level, strict=True)])
+        return cls(RT60 / delta, wet_level).identified_from(observed.signal, sound, observed.noise, observed.sr)
 
 
-def late(h: Heard, known: float | None = None) -> tuple[float, float] | None:
+def late(h: ObjectEvidence, known: float | None = None) -> tuple[float, float] | None:
     """δ, w; None where the lines' late decays are not one. known: δ as the whole evidence has it, to be told again near by."""
     lines = np.sort(np.argsort(-np.abs(h.amplitude).max(axis=0))[:LINES])
     rates = known * np.exp(2 * FINE[::2]) if known else RATES
@@ -122,7 +128,7 @@ def late(h: Heard, known: float | None = None) -> tuple[float, float] | None:
         r = reverberant_tail.modes(h, rates[best] * np.exp(FINE), lines)
         best = int(_agreed(r).argmax())
     mine = r.decay_per_s[best] > FASTER * r.delta[best]
-    return float(r.delta[best]), float(np.median(r.wet[best][mine] if mine.any() else r.wet[best]))
+    return float(r.delta[best]), float(np.median(r.wet_level[best][mine] if mine.any() else r.wet_level[best]))
 
 
 def _agreed(r: reverberant_tail.Read) -> Array:
@@ -139,7 +145,7 @@ def _one(r: reverberant_tail.Read, best: int) -> bool:
     return bool(mine.sum() >= FEWEST and many and np.median(off) < ALIKE and (off < 2 * ALIKE).mean() > 0.7)
 
 
-def identified(signal: Array, sound: Array, noise: Array, sr: int, delta: float, wet: float, start: Array | None = None, turns: int = TURNS) -> Array:
+def identified(signal: Array, sound: Array, noise: Array, sr: int, delta: float, wet_level: float, start: Array | None = None, turns: int = TURNS) -> Array:
     """The tail (n,) that makes the direct sounds (s, n) the recorded ones, by conjugate gradients on the normal equations under its prior, from none or from start (n,)."""
     from scipy.fft import irfft, next_fast_len, rfft
 
@@ -150,7 +156,7 @@ def identified(signal: Array, sound: Array, noise: Array, sr: int, delta: float,
     power = (np.abs(x) ** 2).sum(axis=0)
     smooth = np.convolve(power, np.ones(9) / 9, "same")
     trust = 1 / (level + MODEL_ERROR**2 * smooth + 1e-12 * smooth.max())
-    root = wet * np.sqrt(2 * delta / sr) * np.exp(-delta * np.arange(n) / sr)  # h = root · g, g of unit variance
+    root = wet_level * np.sqrt(2 * delta / sr) * np.exp(-delta * np.arange(n) / sr)  # h = root · g, g of unit variance
 
     def forward(g: Array) -> Array:
         return np.asarray(rfft(root * g, size))

@@ -45,10 +45,10 @@ class SupportDamping:
             return x
         normal = vertex_normals(x)
         rows: list[Array] = []
-        for place, c, way in zip(self.position_m, self.strength_n_s_m, self.along or ("normal",) * len(self.position_m), strict=True):
+        for place, c, direction in zip(self.position_m, self.strength_n_s_m, self.along or ("normal",) * len(self.position_m), strict=True):
             at = nearest(x, place)
             phi = x.shape[at].astype(float)
-            rows.append(np.sqrt(c) * (phi if way == "every" else normal[at][None] @ phi))
+            rows.append(np.sqrt(c) * (phi if direction == "every" else normal[at][None] @ phi))
         return damped(x, np.concatenate(rows))
 
     def parameters(self) -> dict[str, Any]:
@@ -60,12 +60,12 @@ class SupportDamping:
 
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
-        heard = max(evidence.heard, key=lambda h: len(h.freq_hz) if h.model is not None else 0)
-        if heard.model is None or len(heard.freq_hz) < (FEWEST if evidence.known is None else AGAIN) or not np.isfinite(heard.decay_per_s).all():
+        observed = max(evidence.observed, key=lambda h: len(h.freq_hz) if h.model is not None else 0)
+        if observed.model is None or len(observed.freq_hz) < (FEWEST if evidence.known is None else AGAIN) or not np.isfinite(observed.decay_per_s).all():
             return None
-        trial = Trial.of(heard)
+        trial = Trial.of(observed)
         if isinstance(evidence.known, cls):
-            return cls._of(trial, tuned(trial, refined(trial, evidence.known._on(heard.model), NEARER[-2:])[1]))
+            return cls._of(trial, tuned(trial, refined(trial, evidence.known._on(observed.model), NEARER[-2:])[1]))
         found = sought(trial)
         return cls._of(trial, found) if found and _most(trial, found) > LEAST else None
 
@@ -76,7 +76,7 @@ class SupportDamping:
 
     def _on(self, x: ModalModel) -> tuple[Dashpot, ...]:
         along = self.along or ("normal",) * len(self.position_m)
-        return tuple(Dashpot(nearest(x, p), c, way) for p, c, way in zip(self.position_m, self.strength_n_s_m, along, strict=True))
+        return tuple(Dashpot(nearest(x, p), c, direction) for p, c, direction in zip(self.position_m, self.strength_n_s_m, along, strict=True))
 
 
 def _most(trial: Trial, found: tuple[Dashpot, ...]) -> float:

@@ -22,7 +22,7 @@ import numpy as np
 from sonic_bullet.effects.common.dashpots import apart, coupled
 from sonic_bullet.effects.common.pairs import every_line
 from sonic_bullet.effects.common.points import solved, vertex_normals
-from sonic_bullet.effects.protocol import Heard
+from sonic_bullet.effects.protocol import ObjectEvidence
 from sonic_bullet.records import Array, ModalModel
 
 SCATTER, LAW, ROUGH = 0.05, 0.02, 0.15  # of what dashpots add to a decay, of the decay, and of a pattern, relative: shapes err, and laws
@@ -56,7 +56,7 @@ Dashpots = tuple[Dashpot, ...]
 class Trial:
     """An object's lines (k,) and modes (m,). size (s, k) complex, worth (k,); into (s, m): J φ(p)·e of the strikes; out (m,): φ(q)·n of the sensor.
 
-    heard_hz, rings_per_s (l,): of every line, those too that are not held against modes; through (m,): what pulse and path leave of a mode, relative.
+    observed_hz, rings_per_s (l,): of every line, those too that are not held against modes; through (m,): what pulse and path leave of a mode, relative.
     normal (v, 3) of all vertices, body: those of the surface. runs, wide: neighbours that may couple, RUN and WIDE; least (c,): the law that most lines lie above; untied (k, k): of the lines' exponentials.
     """
 
@@ -65,7 +65,7 @@ class Trial:
     sd: Array
     size: Array
     worth: Array
-    heard_hz: Array
+    observed_hz: Array
     rings_per_s: Array
     through: Array
     signed: bool
@@ -83,7 +83,7 @@ class Trial:
         object.__setattr__(self, "untied", _untied(self.freq_hz, self.decay_per_s))
 
     @classmethod
-    def of(cls, h: Heard) -> Trial:
+    def of(cls, h: ObjectEvidence) -> Trial:
         x = h.model
         assert x is not None
         lone = np.zeros(len(h.foreign_hz))
@@ -101,8 +101,8 @@ class Trial:
         )
         amplitude = np.concatenate([h.amplitude, h.foreign_amplitude], axis=1)[:, index]
         level = np.where(np.isfinite(h.impulse_n_s), h.impulse_n_s, 1.0)
-        into = np.einsum("sxm,sx->sm", x.shape[h.strike_vertex].astype(float), h.strike_way) * level[:, None]
-        out = np.einsum("xm,x->m", x.shape[h.sensor_vertex].astype(float), h.sensor_way)
+        into = np.einsum("sxm,sx->sm", x.shape[h.strike_vertex].astype(float), h.strike_direction) * level[:, None]
+        out = np.einsum("xm,x->m", x.shape[h.sensor_vertex].astype(float), h.sensor_direction)
         known = into.any(axis=1)  # strikes of unknown place tell decays, no pattern
         amplitude, into = (amplitude[known], into[known]) if known.any() else (amplitude, into)
         through = np.nan_to_num(np.abs(h.push).max(axis=0) / np.maximum(np.abs(into * out).max(axis=0), 1e-300))
@@ -195,24 +195,24 @@ class Trial:
             law = column @ solved(self.decay_per_s[line] - extra[mode], sd / np.sqrt(worth), column[mode])[0]
         off = np.abs(self.decay_per_s[line] - (extra + law)[mode]) / sd
         decays = np.minimum(MISSED * np.log1p(off**2 / MISSED), GROSS)
-        heard, told = self._seen(self.size), self._seen(self._told(line, omega[mode], omega, extra + law, push))
-        patterns = np.minimum((1 - _cosine(heard, told)[line] ** 2) / ROUGH**2, MISSED)
-        level = _level(heard[:, line], told[:, line] * self._through(self.freq_hz[line])) / LEVEL
+        observed, told = self._seen(self.size), self._seen(self._told(line, omega[mode], omega, extra + law, push))
+        patterns = np.minimum((1 - _cosine(observed, told)[line] ** 2) / ROUGH**2, MISSED)
+        level = _level(observed[:, line], told[:, line] * self._through(self.freq_hz[line])) / LEVEL
         levels = np.minimum(MISSED * np.log1p(level**2 / MISSED), GROSS)
-        return nothing + float((worth * (decays + patterns + levels - LOST)).sum()) + self._unheard(mode, omega, extra + law, push)
+        return nothing + float((worth * (decays + patterns + levels - LOST)).sum()) + self._unobserved(mode, omega, extra + law, push)
 
     def _through(self, freq_hz: Array) -> Array:
         """What pulse and path leave (k,), relative."""
         return np.interp(freq_hz, self.model.freq_hz, self.through)
 
-    def _unheard(self, mode: Array, omega: Array, decay: Array, push: Array) -> float:
+    def _unobserved(self, mode: Array, omega: Array, decay: Array, push: Array) -> float:
         """What modes (m,) cost that would be heard and are not: of a line's strength there, and no line near that rings as long. mode (p,): those that lines stand for."""
         freq = omega / (2 * np.pi)
         level = np.abs(push).max(axis=0) * self._through(freq)
         told = np.bincount(mode, minlength=len(omega)) > 0
         energy = level**2 / np.maximum(decay, 1e-3)
         loud = ~told & (energy > np.quantile(energy[told], CLEAR)) & (freq > freq[told].min()) & (freq < freq[told].max())
-        near = np.abs(np.log(self.heard_hz[:, None] / freq[loud])) < 2 * WIDTH
+        near = np.abs(np.log(self.observed_hz[:, None] / freq[loud])) < 2 * WIDTH
         hidden = (near & ~(self.rings_per_s[:, None] > LONGER * decay[loud])).any(axis=0)  # a line of unknown decay may be any
         worth = np.clip(1 + 0.25 * np.log10(np.maximum(level[loud] / max(level[told].max(), 1e-300), 1e-6)), 0.1, 1)
         return float(MUTE * worth[~hidden].sum())
@@ -233,8 +233,8 @@ class Trial:
     def _alike(self, omega: Array, decay: Array, push: Array) -> Array:
         """Cosines (k, m) of the lines' amplitudes over the strikes and what one exponential at each mode's pole takes of all, or the mode's own."""
         share = 2 * decay[None, :] / (decay[:, None] + decay[None, :] - 1j * (omega[:, None] - omega[None, :]))
-        heard = self._seen(self.size)
-        return np.maximum(_cosine(heard, self._seen(push @ share), every=True), _cosine(heard, self._seen(push), every=True))
+        observed = self._seen(self.size)
+        return np.maximum(_cosine(observed, self._seen(push @ share), every=True), _cosine(observed, self._seen(push), every=True))
 
     def _seen(self, amplitude: Array) -> Array:
         return amplitude if self.signed else np.abs(amplitude)
@@ -277,11 +277,11 @@ def _cosine(a: Array, b: Array, *, every: bool = False) -> Array:
     return np.asarray(np.abs(one.conj().T @ two) if every else np.abs((one.conj() * two).sum(axis=0)))
 
 
-def _level(heard: Array, told: Array) -> Array:
+def _level(observed: Array, told: Array) -> Array:
     """ln of the level (k,) of columns (s, k) over that of others, less their median; 0 where there is nothing to tell."""
-    if not (np.isfinite(heard).all() and np.isfinite(told).all() and told.any()):
-        return np.zeros(heard.shape[1])
-    ratio = np.log(np.maximum(np.linalg.norm(heard, axis=0), 1e-300)) - np.log(np.maximum(np.linalg.norm(told, axis=0), 1e-300))
+    if not (np.isfinite(observed).all() and np.isfinite(told).all() and told.any()):
+        return np.zeros(observed.shape[1])
+    ratio = np.log(np.maximum(np.linalg.norm(observed, axis=0), 1e-300)) - np.log(np.maximum(np.linalg.norm(told, axis=0), 1e-300))
     return np.asarray(ratio - np.median(ratio))
 
 

@@ -61,7 +61,7 @@ def sought(t: Trial) -> Dashpots:
 
 
 def _grid(t: Trial, vertices: Array) -> list[Dashpot]:
-    return [Dashpot(int(v), c, way) for v in vertices for c in _strengths(t).tolist() for way in ("normal", "every")]
+    return [Dashpot(int(v), c, direction) for v in vertices for c in _strengths(t).tolist() for direction in ("normal", "every")]
 
 
 def _elsewhere(t: Trial, found: Dashpots, spots: Array) -> Dashpots:
@@ -118,13 +118,13 @@ def _spread(t: Trial, count: int) -> Array:
     motion = np.einsum("vxm,vx->vm", t.model.shape[body].astype(float), t.normal[body])
     motion /= np.maximum(np.sqrt((motion**2).mean(axis=0)), 1e-300)
     square = (motion**2).sum(axis=1)
-    picked = [int(square.argmax())]
+    selected = [int(square.argmax())]
     gap = np.full(len(body), np.inf)
     for _ in range(min(count, len(body)) - 1):
-        last = picked[-1]
+        last = selected[-1]
         gap = np.minimum(gap, square + square[last] - 2 * np.abs(motion @ motion[last]))  # a mode's sign is nobody's
-        picked.append(int(gap.argmax()))
-    return np.asarray(body[picked])
+        selected.append(int(gap.argmax()))
+    return np.asarray(body[selected])
 
 
 def _strengths(t: Trial) -> Array:

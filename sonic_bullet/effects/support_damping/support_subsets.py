@@ -30,7 +30,7 @@ def subsets(t: Trial, vertices: Array, few: int) -> list[Dashpots]:
     column, y = 0.5 * np.concatenate([along, every]) * weight, t.decay_per_s[line] * weight
     column, y = column - (column @ law) @ law.T, y - law @ (law.T @ y)
     gram, told = column @ column.T, column @ y
-    place = [(int(v), way) for way in ("normal", "every") for v in vertices]
+    place = [(int(v), direction) for direction in ("normal", "every") for v in vertices]
     does = np.linalg.norm(column, axis=1)
     one = np.flatnonzero(does > STILL * does.max())
     found: list[Dashpots] = []

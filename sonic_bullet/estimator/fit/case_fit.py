@@ -15,7 +15,7 @@ from sonic_bullet.files.cases import Case
 from sonic_bullet.records import Array
 
 POISSON_SD = 0.04  # of a guess
-POISSON_TOLD = 0.03  # a spread of ν above this says nothing that the guess did not
+POISSON_IDENTIFIED = 0.03  # a spread of ν above this says nothing that the guess did not
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -9,11 +9,11 @@ from collections.abc import Callable
 
 import numpy as np
 
-from sonic_bullet.estimator.fit.case_fit import POISSON_SD, POISSON_TOLD, CaseFit, ObjectFit
+from sonic_bullet.estimator.fit.case_fit import POISSON_IDENTIFIED, POISSON_SD, CaseFit, ObjectFit
 from sonic_bullet.estimator.fit.comparison import hybrid_of, log_spectral_of
 from sonic_bullet.estimator.fit.mesh_error import mesh_warning
 from sonic_bullet.estimator.fit.observed import Evidence
-from sonic_bullet.estimator.fit.pairing import TWINS
+from sonic_bullet.estimator.fit.pairing import DEGENERATE
 from sonic_bullet.estimator.fit.rayleigh import Damping
 from sonic_bullet.estimator.lines.line_values import MaterialFit
 from sonic_bullet.files.cases import Case
@@ -92,7 +92,7 @@ def _elastic(covariance: Array, information: Array, unsaid: list[str], shaped: b
         return
     determinant = np.linalg.det(information)
     own = np.linalg.inv(information) if determinant > 1e-12 * information[0, 0] * information[1, 1] else np.full((2, 2), np.inf)
-    if own[1, 1] < POISSON_TOLD**2:
+    if own[1, 1] < POISSON_IDENTIFIED**2:
         covariance[np.ix_([2, 4], [2, 4])] = own
         return
     unsaid.append("poisson_ratio (the lines change with it as with gamma)")
@@ -109,7 +109,7 @@ def _foreign(evidence: tuple[Evidence, ...], objects: tuple[ObjectFit, ...]) -> 
         taken = np.isin(np.arange(len(lines.freq_hz)), o.line[o.line >= 0])
         double = np.array([f for f, who in zip(o.freq_hz, o.member, strict=True) if len(who) > 1])
         if len(double):  # two lines of modes that count as one
-            taken |= np.abs(np.log(lines.freq_hz[:, None] / double)).min(axis=1) < 2 * TWINS
+            taken |= np.abs(np.log(lines.freq_hz[:, None] / double)).min(axis=1) < 2 * DEGENERATE
         hz += list(lines.freq_hz[strong & ~taken])
         good, total = good + float((strong & taken).sum()), total + float(strong.sum())
     return np.array(sorted(hz)), good / total if total else np.nan

@@ -16,18 +16,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from sonic_bullet.estimator.fit.case_fit import POISSON_SD, POISSON_TOLD, CaseFit, ObjectFit
+from sonic_bullet.estimator.fit.case_fit import POISSON_IDENTIFIED, POISSON_SD, CaseFit, ObjectFit
 from sonic_bullet.estimator.fit.fit_verdict import finished
 from sonic_bullet.estimator.fit.object_fit import CORRECTION, fitted_object, gain_of, object_of
 from sonic_bullet.estimator.fit.observed import Evidence, gather
-from sonic_bullet.estimator.fit.pairing import GAMMA_REACH, MESH_SD, Pairs, assign, grouped, paired, sift, solve
+from sonic_bullet.estimator.fit.pairing import GAMMA_REACH, MESH_SD, Pairs, assign, best_pairs, grouped, paired, solve
 from sonic_bullet.estimator.fit.rayleigh import rayleigh
 from sonic_bullet.files.cases import Case
 from sonic_bullet.modal.cache import Place
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import AudioError, FileError
 
-__all__ = ["CORRECTION", "POISSON_SD", "POISSON_TOLD", "CaseFit", "ObjectFit", "fit_case", "fit_evidence", "gain_of", "object_of"]
+__all__ = ["CORRECTION", "POISSON_IDENTIFIED", "POISSON_SD", "CaseFit", "ObjectFit", "fit_case", "fit_evidence", "gain_of", "object_of"]
 
 
 def fit_case(case: Case, *, cache: Place = "default", check_mesh: bool = True, progress: Callable[[str], None] | None = None) -> CaseFit:
@@ -77,7 +77,7 @@ def _placed(shaped: tuple[Evidence, ...], band_hz: tuple[float, float]) -> tuple
     starts = []
     for e in shaped:
         if e.family is not None and e.seen is not None and len(e.lines.freq_hz):
-            starts += sift(e.family, e.lines, e.seen, centre, guess.poisson, band_hz, GAMMA_REACH)
+            starts += best_pairs(e.family, e.lines, e.seen, centre, guess.poisson, band_hz, GAMMA_REACH)
     starts = starts or [(centre, guess.poisson)]
     ends = []
     for start in starts:
@@ -114,7 +114,7 @@ def _together(shaped: tuple[Evidence, ...], start: tuple[float, float], guess_po
             break
         weight, off = np.concatenate(offs, axis=1)
         scatter = float(np.sqrt((weight * off**2).sum() / max(weight.sum() - 2, 1)))
-        told = np.linalg.det(information) > 0 and np.linalg.inv(information)[1, 1] < POISSON_TOLD**2
+        told = np.linalg.det(information) > 0 and np.linalg.inv(information)[1, 1] < POISSON_IDENTIFIED**2
         prior = np.diag([1e-12, 0.0 if told else POISSON_SD**-2])
         step = np.linalg.solve(information + prior, pull - prior @ (0.0, poisson - guess_poisson))
         log_gamma += float(np.clip(step[0], -0.05, 0.05))
@@ -140,6 +140,6 @@ def _decays(evidence: tuple[Evidence, ...], pairs: tuple[Pairs, ...]) -> tuple[A
             which = pairs[at].line
             at += 1
         d = e.lines.decay_per_s[which]
-        found.append(np.stack([(2 * np.pi * e.lines.freq_hz[which]) ** 2 + np.nan_to_num(d) ** 2, d, e.lines.told_sd_per_s[which]]))
+        found.append(np.stack([(2 * np.pi * e.lines.freq_hz[which]) ** 2 + np.nan_to_num(d) ** 2, d, e.lines.identified_sd_per_s[which]]))
     lam, decay, decay_sd = np.concatenate(found, axis=1)
     return lam, decay, decay_sd

@@ -43,11 +43,11 @@ def halving_moves(o: ObjectFit, youngs_pa: float, density: float, poisson: float
     Raises MeshError, ModalError where a coarser mesh fails.
     """
     family = o.evidence.family
-    heard = np.array([int(i) for who, line in zip(o.member, o.line, strict=True) if line >= 0 for i in who], int)
-    if family is None or o.evidence.thing.mesh is None or not len(heard):
+    observed = np.array([int(i) for who, line in zip(o.member, o.line, strict=True) if line >= 0 for i in who], int)
+    if family is None or o.evidence.thing.mesh is None or not len(observed):
         return float("nan")
-    heard = heard[heard < max(MOST, int(heard.min()) + 1)]
-    count = int(heard.max()) + 1
+    observed = observed[observed < max(MOST, int(observed.min()) + 1)]
+    count = int(observed.max()) + 1
     material = Material.isotropic("fit", youngs_pa=youngs_pa, poisson=poisson, density_kg_m3=density)
     fine = np.log(family.modes(youngs_pa / density, poisson)[0][:count])
     edges, shifts = [_edge_m(family.vertex_m, family.face)], []
@@ -58,7 +58,7 @@ def halving_moves(o: ObjectFit, youngs_pa: float, density: float, poisson: float
             times *= 1.6
             coarse, edge = _coarser(o, material, times, edges[0], count, say)
         times *= 2
-        shared = heard[heard < len(coarse)]
+        shared = observed[observed < len(coarse)]
         if not len(shared):
             return float("nan")
         shifts.append(float((coarse[shared] - fine[shared]).mean()))

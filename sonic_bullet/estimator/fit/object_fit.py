@@ -59,7 +59,7 @@ def gain_of(objects: tuple[ObjectFit, ...]) -> tuple[float, float, float]:
 
     Least squares with Cauchy's weights; an amplitude counts as known to its spread and to 2 % of the mode's strongest ψ, the shapes' own error.
     """
-    heard, turned, told, loose = [], [], [], []
+    observed, turned, told, loose = [], [], [], []
     for o in objects:
         e, mode = o.evidence, np.flatnonzero(o.line >= 0)
         line = o.line[mode]
@@ -74,13 +74,13 @@ def gain_of(objects: tuple[ObjectFit, ...]) -> tuple[float, float, float]:
         else:
             a, p = np.abs(a), np.abs(p)
         rough = float(np.linalg.norm(a)) / max(float(np.linalg.norm(p)), 1e-300)
-        heard.append(a.ravel())
+        observed.append(a.ravel())
         turned.append(np.real(a * np.exp(-1j * own)).ravel())
         told.append(p.ravel())
         loose.append(np.hypot(e.lines.amplitude_sd[use][:, line] / rough, 0.02 * np.abs(p).max(axis=0, keepdims=True) + 1e-300).ravel())
-    if not heard:
+    if not observed:
         return np.nan, np.nan, np.nan
-    y, z, x, s = (np.concatenate(part) for part in (heard, turned, told, loose))
+    y, z, x, s = (np.concatenate(part) for part in (observed, turned, told, loose))
     weight, gain = np.ones(len(y)), 0.0
     for _ in range(30):
         gain = float((weight * x * z / s**2).sum() / max(float((weight * x**2 / s**2).sum()), 1e-300))

@@ -65,12 +65,12 @@ def observation(
     for i, (position, direction, impulse) in enumerate(strikes):
         if position is None:
             continue
-        way = np.array(direction, float) if direction is not None else -_normal(family, position)
-        rows[i] = _row(family, position, way, f"strike {i + 1}") * (1.0 if impulse is None else impulse)
+        unit = np.array(direction, float) if direction is not None else -_normal(family, position)
+        rows[i] = _row(family, position, unit, f"strike {i + 1}") * (1.0 if impulse is None else impulse)
     sensor = None
     if kind == "velocity" and sensor_m is not None:
-        way = np.array(sensor_direction, float) if sensor_direction is not None else _normal(family, sensor_m)
-        sensor = _row(family, sensor_m, way / np.linalg.norm(way), "sensor")
+        unit = np.array(sensor_direction, float) if sensor_direction is not None else _normal(family, sensor_m)
+        sensor = _row(family, sensor_m, unit / np.linalg.norm(unit), "sensor")
     level = np.array([impulse is not None for _, _, impulse in strikes])
     return Observation(rows, sensor, known, level, kind, 1 / (density_kg_m3 * family.length_m**3))
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sonic_bullet.effects.common.hum import stilled
+from sonic_bullet.effects.common.hum import without_hum
 from sonic_bullet.estimator.fit.observation import Observation, observation
 from sonic_bullet.estimator.lines.joint_lines import Lines, joint_lines, noise_rms
 from sonic_bullet.estimator.lines.onset import span
@@ -97,8 +97,8 @@ def gather(
             signals, sr, told = sounds
             seen = observed(case, thing, guess, played, body) if body is not None else None
             say(f"listening to {len(played)} recordings of {name or 'the object'}")
-            modes = _modes_heard(body, guess, case.band_hz) if clipped and body is not None else None
-            still = stilled(signals, noise_rms(signals, sr), sr)
+            modes = _modes_observed(body, guess, case.band_hz) if clipped and body is not None else None
+            still = without_hum(signals, noise_rms(signals, sr), sr)
             lines = joint_lines(still, sr, band_hz=case.band_hz, signed=case.onset_s is not None, modes=modes)
             notes = (*(f"{g} is missing" for g in gone), *told)
             found.append(Evidence(thing, guess, played, lines, body, seen, signals, sr, notes))
@@ -108,7 +108,7 @@ def gather(
     return tuple(found)
 
 
-def _modes_heard(body: Family, guess: Material, band_hz: tuple[float, float]) -> int:
+def _modes_observed(body: Family, guess: Material, band_hz: tuple[float, float]) -> int:
     value, _ = body.modes(guess.youngs_pa / guess.density_kg_m3, guess.poisson)
     return int((np.sqrt(value) / (2 * np.pi) < band_hz[1]).sum())
 
@@ -163,9 +163,9 @@ def _sounds(case: Case, thing: CaseObject, recordings: tuple[CaseRecording, ...]
         rates.append(sr)
         if len(sound) > 1 and r.channel == 0:
             told.append(f"{r.file} has {len(sound)} channels: the first is used")
-        if case.onset_s is None and (heard := span(sounds[-1], sr)).hits > 1:
-            told.append(f"{r.file} holds {heard.hits} hits: only what comes before the second is used")
-            sounds[-1] = sounds[-1][: heard.stop]
+        if case.onset_s is None and (observed := span(sounds[-1], sr)).hits > 1:
+            told.append(f"{r.file} holds {observed.hits} hits: only what comes before the second is used")
+            sounds[-1] = sounds[-1][: observed.stop]
     if len(set(rates)) > 1:
         raise AudioError(f"recordings of {thing.name} have rates {sorted(set(rates))} Hz", "give files of one rate")
     sr = rates[0]
@@ -198,8 +198,8 @@ def _checked(sound: Array, name: str, clipped: bool = False) -> Array:
 
 def until_it_breaks_off(sound: Array, sr: int) -> Array:
     """A recording (n,) without the digital silence that it is filled up with: a decay ends in its last bit or in noise, not far above."""
-    heard = np.flatnonzero(sound)
-    last, short = int(heard[-1]) + 1 if len(heard) else 0, max(1, round(SHUT_S * sr))
+    observed = np.flatnonzero(sound)
+    last, short = int(observed[-1]) + 1 if len(observed) else 0, max(1, round(SHUT_S * sr))
     end = sound[max(0, last - short) : last]
     return sound[:last] if 0 < last < len(sound) - short and np.abs(end).max() > SHUT * np.abs(sound).max() else sound
 

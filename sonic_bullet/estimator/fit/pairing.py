@@ -20,7 +20,7 @@ from sonic_bullet.estimator.lines.shared_poles import FASTEST_PER_S
 from sonic_bullet.modal.reduced import Family
 from sonic_bullet.records import Array
 
-TWINS = 6e-4
+DEGENERATE = 6e-4
 MESHED = 2.5  # times as far apart where elements have torn them from each other
 MESH_SD = 2.5e-3  # of a mode's frequency, the mesh's and the shape's own error
 LOWEST = 0.2  # of that, in the lowest modes
@@ -58,7 +58,7 @@ def grouped(family: Family, seen: Observation, log_gamma: float, poisson: float)
     """The family's modes as lines at (γ, ν)."""
     value, vector = family.modes(1.0, poisson)
     freq = np.sqrt(value) / (2 * np.pi)
-    cut = np.flatnonzero(np.diff(np.log(freq)) > TWINS * (MESHED if family.meshed else 1.0)) + 1
+    cut = np.flatnonzero(np.diff(np.log(freq)) > DEGENERATE * (MESHED if family.meshed else 1.0)) + 1
     member = tuple(np.split(np.arange(len(freq)), cut))
     sums = np.zeros((len(freq), len(member)))
     for g, who in enumerate(member):
@@ -69,7 +69,7 @@ def grouped(family: Family, seen: Observation, log_gamma: float, poisson: float)
     return Group(freq_g * np.exp(log_gamma / 2), pattern, family.slope(poisson, vector) @ sums / count, member)
 
 
-def _heard(lines: Lines, seen: Observation) -> Array:
+def _observed(lines: Lines, seen: Observation) -> Array:
     """Line patterns (s, k): complex where phases are true, but for one common phase a mode, which a finite contact turns; else magnitudes."""
     return lines.amplitude if phased(lines, seen) else np.abs(lines.amplitude)
 
@@ -90,7 +90,7 @@ def _patterns(lines: Lines, seen: Observation, modes: Array) -> tuple[Array, Arr
     k, m = len(lines.freq_hz), modes.shape[1]
     if not use.any():
         return np.ones(k), np.ones(m), np.ones((k, m))
-    a, p = _heard(lines, seen)[use] * _rings(lines), modes[use]
+    a, p = _observed(lines, seen)[use] * _rings(lines), modes[use]
     if not phased(lines, seen):
         p = np.abs(p)
     size, strength = np.linalg.norm(a, axis=0), np.linalg.norm(p, axis=0)
@@ -134,19 +134,19 @@ def _overlap(a: Array, b: Array, width: float) -> Array:
     return np.asarray(np.exp(-(((a[:, None] - b[None, :]) / width) ** 2) / 2))
 
 
-def sift(
+def best_pairs(
     family: Family, lines: Lines, seen: Observation, log_gamma: float, poisson: float, band_hz: tuple[float, float], reach: float
 ) -> list[tuple[float, float]]:
     """The best few (ln γ, ν) of the grid, best first."""
     width = 0.006
     grid = log_gamma + np.arange(-reach, reach + 1e-9, 0.004)
-    heard, rings = np.log(lines.freq_hz), _rings(lines)
+    observed, rings = np.log(lines.freq_hz), _rings(lines)
     found: list[tuple[float, float, float]] = []
     for nu in np.clip(poisson + np.linspace(-POISSON_REACH, POISSON_REACH, 9), -0.4, 0.48):
         group = grouped(family, seen, 0.0, float(nu))
         size, strength, alike = _patterns(lines, seen, group.pattern)
         root, force = np.sqrt(size) * rings, np.sqrt(strength)
-        own = np.sqrt(root @ _overlap(heard, heard, width) @ root)
+        own = np.sqrt(root @ _overlap(observed, observed, width) @ root)
         place = np.log(group.freq_hz)
         both = force[:, None] * force * _overlap(place, place, width)
         weight = root[:, None] * force * alike**2
@@ -154,7 +154,7 @@ def sift(
         for i, g in enumerate(grid):
             inside = (place + g / 2 > np.log(band_hz[0])) & (place + g / 2 < np.log(band_hz[1]))
             total = np.sqrt(both[inside][:, inside].sum())
-            score[i] = (weight[:, inside] * _overlap(heard, place[inside] + g / 2, width)).sum() / (own * total) if total > 0 else 0.0
+            score[i] = (weight[:, inside] * _overlap(observed, place[inside] + g / 2, width)).sum() / (own * total) if total > 0 else 0.0
         peak = np.flatnonzero((score[1:-1] >= score[:-2]) & (score[1:-1] > score[2:])) + 1
         found += [(float(score[i]), float(grid[i]), float(nu)) for i in peak]
     found.sort(reverse=True)

@@ -39,8 +39,8 @@ def predicted(o: ObjectFit, pattern: Array, gain: float, n: int, sr: int) -> Arr
     """Sound (n,) of an object's modes with pattern (m,) = J ψ from the onset on."""
     assert o.evidence.seen is not None
     start = o.evidence.seen.start(o.freq_hz, o.decay_per_s)
-    heard = o.freq_hz < 0.5 * sr
-    return damped_sum(o.freq_hz[heard], o.decay_per_s[heard], (gain * pattern * start)[heard], n, sr)
+    observed = o.freq_hz < 0.5 * sr
+    return damped_sum(o.freq_hz[observed], o.decay_per_s[observed], (gain * pattern * start)[observed], n, sr)
 
 
 def strike_sound(found: CaseFit, recording: CaseRecording, n: int, sr: int, *, corrected: bool = True) -> Array:

@@ -18,7 +18,7 @@ LEAST_MANY = 8  # lines of which a majority can be told
 HALF = 0.4549  # median of χ² with one degree of freedom
 NEARER = 0.5  # of what most lines are off by: a law through two of them that leaves less is where to start from
 MET = 0.01  # relative: a law that lines obey is met by most of them so well, or they obey another
-SURE = 0.5  # a parameter whose logarithm is surer than this is told by the lines
+STANDARD_ERRORS = 0.5  # a parameter whose logarithm is surer than this is told by the lines
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,7 +54,7 @@ def rayleigh(lambda_per_s2: Array, decay_per_s: Array, decay_sd_per_s: Array, gu
     with np.errstate(divide="ignore", invalid="ignore"):
         covariance = np.linalg.inv(information) / np.outer(value, value)
         for i, name in enumerate(("alpha", "beta")):
-            if not (value[i] > 0 and 0 <= covariance[i, i] < SURE**2):
+            if not (value[i] > 0 and 0 <= covariance[i, i] < STANDARD_ERRORS**2):
                 said.append(name)
                 covariance[i, :] = covariance[:, i] = np.nan
     return Damping(float(value[0]), float(value[1]), covariance, scatter, tuple(said))

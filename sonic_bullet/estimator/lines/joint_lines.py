@@ -18,7 +18,7 @@ import numpy as np
 from sonic_bullet.estimator.lines.likelihood import geometric, moments
 from sonic_bullet.estimator.lines.line_values import PINNED, Lines, lines_at
 from sonic_bullet.estimator.lines.log_spectral import floor_between
-from sonic_bullet.estimator.lines.pole_selection import apart, picked
+from sonic_bullet.estimator.lines.pole_selection import apart, selected
 from sonic_bullet.estimator.lines.shared_poles import FASTEST_PER_S, start_poles
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import AudioError
@@ -74,7 +74,7 @@ def _told(signals: Array, noise: Array, sr: int, band_hz: tuple[float, float], s
     loudest = np.argsort(-_solved(signals, noise, start, sr)[2])[:MOST_LINES] if many else np.arange(len(start))
     found = lines_of(signals, noise, _significant(signals, noise, start[loudest], sr, *band_hz), sr, signed)
     if many and crowd:
-        other = lines_of(signals, noise, _significant(signals, noise, start[picked(signals, noise, start, sr, MOST_LINES)], sr, *band_hz), sr, signed)
+        other = lines_of(signals, noise, _significant(signals, noise, start[selected(signals, noise, start, sr, MOST_LINES)], sr, *band_hz), sr, signed)
         if ((other.noise / noise) ** 2).sum() < PLAINLY * ((found.noise / noise) ** 2).sum():
             return other  # a room's: of hits one after another the loudest poles leave least
     for late in (round(t * sr) for t in LATE_S) if modes is not None and _beyond(found, signals) > BEYOND[1] else ():

@@ -99,7 +99,7 @@ class Lines:
         return np.asarray(-self.decay_per_s + 2j * np.pi * self.freq_hz)
 
     @property
-    def told_sd_per_s(self) -> Array:
+    def identified_sd_per_s(self) -> Array:
         """Spreads of the decays (k,), infinite at the fastest there is: a bound, no value."""
         return np.asarray(np.where(np.nan_to_num(self.decay_per_s) > PINNED * FASTEST_PER_S, np.inf, self.decay_sd_per_s))
 

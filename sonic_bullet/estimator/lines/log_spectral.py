@@ -99,11 +99,11 @@ def log_spectral_db(a: Array, b: Array, floor: Floor, *, windows: tuple[int, ...
         if window > len(a):
             continue
         power_a, power_b, cell = _power(a, window), _power(b, window), floor.at(window // 2 + 1) * (np.hanning(window) ** 2).sum()
-        heard = (power_a + power_b) / 2 > above * cell
-        if heard.any():
-            tiny = np.broadcast_to(1e-3 * cell, heard.shape)[heard]
-            off = float(np.sqrt(((10 * np.log10((power_a[heard] + tiny) / (power_b[heard] + tiny))) ** 2).mean()))
-            (found if heard.sum() >= FEWEST else few).append(off)
+        observed = (power_a + power_b) / 2 > above * cell
+        if observed.any():
+            tiny = np.broadcast_to(1e-3 * cell, observed.shape)[observed]
+            off = float(np.sqrt(((10 * np.log10((power_a[observed] + tiny) / (power_b[observed] + tiny))) ** 2).mean()))
+            (found if observed.sum() >= FEWEST else few).append(off)
     return float(np.mean(found or few)) if found or few else float("nan")
 
 

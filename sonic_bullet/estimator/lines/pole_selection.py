@@ -26,7 +26,7 @@ def apart(pole: Array) -> Array:
     return np.asarray(pole[keep])
 
 
-def picked(signals: Array, noise: Array, pole: Array, sr: int, count: int) -> Array:
+def selected(signals: Array, noise: Array, pole: Array, sr: int, count: int) -> Array:
     """Which poles (at most count,) take most of the signals (s, n) one after another, each of what those before it have left.
 
     All at once, poles of a crowd (a reverberation's) cancel each other at amplitudes that say nothing. A line's other half, at −ω, is taken to be far away.

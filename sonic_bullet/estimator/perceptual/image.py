@@ -100,20 +100,20 @@ def image(
     Raises RecordError where less than one window follows the onset, or nothing there is loud enough to be heard.
     """
     first = int(np.ceil(onset_s * sr - 1e-9))
-    heard = np.ascontiguousarray(signal[first : first + int(seconds * sr)])
+    observed = np.ascontiguousarray(signal[first : first + int(seconds * sr)])
     bands = int(BARK_LAST / bark_step)
     middle_hz = bark_to_hz(bark_step * np.arange(1, bands + 1))
     shortest = 2 ** round(np.log2(shortest_s * sr))
-    if len(heard) < shortest:
-        raise RecordError(f"{len(heard)} samples follow the onset at {onset_s:.4f} s", f"an image needs {shortest}")
+    if len(observed) < shortest:
+        raise RecordError(f"{len(observed)} samples follow the onset at {onset_s:.4f} s", f"an image needs {shortest}")
     made = []
     for step in range(levels):
         length = shortest * 2**step
-        if length > len(heard):
+        if length > len(observed):
             break
         band, share = _bins(length, sr, bark_step, bands)
         scale = 2 / (length * float((window(length) ** 2).sum()))
-        power = _pool(np.abs(spectra(heard, length, length // 2)) ** 2 * scale, band, share, bands)
+        power = _pool(np.abs(spectra(observed, length, length // 2)) ** 2 * scale, band, share, bands)
         made.append(Level(length, length // 2, band, share, scale, loudness(power, middle_hz, full_scale_db_spl)))
     norm = float(sum(level.hop * (level.loud**2).sum() for level in made))
     if norm <= 0:

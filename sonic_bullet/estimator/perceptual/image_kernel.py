@@ -153,7 +153,7 @@ def compare(reach, slot, used, shapes, state, turn, floor, band, share, scale, l
                 power[runs[r, 2] + 1] += (whole - upper) * scale
                 power[runs[r, 2] + 2] += upper * scale
         for b in range(bands):
-            heard = 0.0
+            observed = 0.0
             cell = (bits[b + 1] >> 49) - ((1023 + TABLE_FROM) << 3)
             if cell >= 0:
                 cell = min(cell, table.shape[1] - 2)
@@ -161,8 +161,8 @@ def compare(reach, slot, used, shapes, state, turn, floor, band, share, scale, l
                 y0, y1, s0 = table[b, cell, 0], table[b, cell + 1, 0], table[b, cell, 1]
                 # the cell after an octave's last is twice as wide, its slope a cell twice as steep
                 s1 = table[b, cell + 1, 1] * (0.5 if cell & 7 == 7 else 1.0)
-                heard = y0 + x * (s0 + x * (3 * (y1 - y0) - 2 * s0 - s1 + x * (2 * (y0 - y1) + s0 + s1)))
-            difference = heard - loud[m, b]
+                observed = y0 + x * (s0 + x * (3 * (y1 - y0) - 2 * s0 - s1 + x * (2 * (y0 - y1) + s0 + s1)))
+            difference = observed - loud[m, b]
             total += difference * difference
             if len(out):
                 out[m * bands + b] = root * difference

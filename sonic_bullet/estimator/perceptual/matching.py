@@ -63,14 +63,14 @@ def match_ratio_product(reference: Points, freq_hz: Array, decay_per_s: Array, a
     )
 
 
-def sift(reference: Points, lambda_hat: Array, amplitude_hat: Array, alpha_per_s: float, beta_s: float, gamma_m2_s2: Array) -> Array:
+def best_pairs(reference: Points, lambda_hat: Array, amplitude_hat: Array, alpha_per_s: float, beta_s: float, gamma_m2_s2: Array) -> Array:
     """(g,) Π_MRP at each γ with α, β held."""
     known = (reference.x, reference.y, reference.weight, reference.per_bark, reference.per_s, reference.near**2, reference.power)
-    return np.asarray(_sift(known, lambda_hat, amplitude_hat, alpha_per_s, beta_s, gamma_m2_s2))
+    return np.asarray(_best_pairs(known, lambda_hat, amplitude_hat, alpha_per_s, beta_s, gamma_m2_s2))
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _sift(known, lambda_hat, amplitude_hat, alpha, beta, gammas):  # type: ignore[no-untyped-def]
+def _best_pairs(known, lambda_hat, amplitude_hat, alpha, beta, gammas):  # type: ignore[no-untyped-def]
     products = np.empty(len(gammas))
     for g in range(len(gammas)):
         decay = 0.5 * (alpha + beta * gammas[g] * lambda_hat)

@@ -16,7 +16,7 @@ from collections.abc import Callable
 import numpy as np
 
 from sonic_bullet.estimator.perceptual.metric import Constants, Target, hybrid, residuals, target
-from sonic_bullet.estimator.perceptual.partners import candidates, laid
+from sonic_bullet.estimator.perceptual.partners import all_partners, candidates
 from sonic_bullet.estimator.perceptual.problem import Found, Problem
 from sonic_bullet.estimator.perceptual.starts import feature_eigenvalues, seed_starts
 from sonic_bullet.records import Array
@@ -79,7 +79,7 @@ def fast(problem: Problem, constants: Constants | None = None) -> Found:
     aim = target(problem, constants)
     count = _Counted(aim)
     rough = candidates(aim, SIFTED)
-    solved = np.array([laid(problem, start) for start in rough])
+    solved = np.array([all_partners(problem, start) for start in rough])
     starts = np.unique(np.vstack([solved, rough]), axis=0)
     metric, logs = min(((count(start), start) for start in np.log(starts)), key=lambda end: end[0])
     if metric > EXACT:

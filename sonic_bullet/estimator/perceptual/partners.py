@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 
 from sonic_bullet.estimator.lines.line_values import Features
-from sonic_bullet.estimator.perceptual.matching import energy, sift
+from sonic_bullet.estimator.perceptual.matching import best_pairs, energy
 from sonic_bullet.estimator.perceptual.metric import Target
 from sonic_bullet.estimator.perceptual.problem import Problem, modes_of
 from sonic_bullet.estimator.perceptual.starts import by_energy, feature_eigenvalues, undominated
@@ -93,7 +93,7 @@ def partners(problem: Problem, parameters: Array, tolerance: float) -> tuple[Arr
     return mode, (off_eigen[np.arange(len(mode)), mode] < tolerance) & (least <= best[mode])
 
 
-def laid(problem: Problem, start: Array) -> Array:
+def all_partners(problem: Problem, start: Array) -> Array:
     """(4,) α, β, γ, σ by least squares from a start near enough that features find their modes."""
     features = problem.features
     alpha, beta, gamma, sigma = start
@@ -151,7 +151,7 @@ def candidates(aim: Target, most: int) -> Array:
         guess = np.log(np.clip(eigen[strong[:1]] / problem.lambda_hat[audible[:1]], problem.lower[2], problem.upper[2]))
     group = np.concatenate([[0], np.cumsum(np.diff(guess) > APART)])
     guess = np.bincount(group, guess) / np.bincount(group)
-    score = sift(aim.points, problem.lambda_hat, problem.amplitude_hat, alpha, beta, np.exp(guess))
+    score = best_pairs(aim.points, problem.lambda_hat, problem.amplitude_hat, alpha, beta, np.exp(guess))
     surest = np.log(eigen[strong[0]] / problem.lambda_hat[undominated(problem.lambda_hat, problem.amplitude_hat)[-UNDOMINATED:]])
     kept: list[float] = []
     for log_gamma in (*guess[np.argsort(score, kind="stable")], *np.clip(surest, *np.log([problem.lower[2], problem.upper[2]]))):
@@ -161,8 +161,8 @@ def candidates(aim: Target, most: int) -> Array:
     rows = []
     for gamma in np.exp(kept):
         freq_hz, decay, amplitude = modes_of(np.array([alpha, beta, gamma, 1.0]), problem.lambda_hat, problem.amplitude_hat)
-        heard = (freq_hz > 0) & (freq_hz < features.sr / 2)
-        total = energy(decay, amplitude)[heard].sum()
+        observed = (freq_hz > 0) & (freq_hz < features.sr / 2)
+        total = energy(decay, amplitude)[observed].sum()
         sigma = np.sqrt(energy(features.decay_per_s, features.amplitude).sum() / total) if total > 0 else problem.features.amplitude.max() / size.max()
         rows.append((alpha, beta, gamma, sigma))
     return np.asarray(np.clip(np.array(rows), problem.lower, problem.upper))

@@ -96,10 +96,10 @@ def strikes_of(signals: Array, left: Array, sr: int, lines: tuple[Array, Array, 
 
 def case_strikes(found: CaseFit) -> Strikes:
     """The residual of a fitted case, of the object with the most strikes. Raises AudioError where no recording can be heard."""
-    heard = [o for o in found.objects if o.evidence.signals is not None and len(o.freq_hz)]
-    if not heard:
+    observed = [o for o in found.objects if o.evidence.signals is not None and len(o.freq_hz)]
+    if not observed:
         raise AudioError(f"case {found.case.name} has no recording of a body with a mesh", "a residual is what a recording has beside its modes")
-    o = max(heard, key=lambda x: len(x.evidence.recordings))
+    o = max(observed, key=lambda x: len(x.evidence.recordings))
     e = o.evidence
     assert e.signals is not None and e.seen is not None
     sr, n = e.sr, e.signals.shape[1]
@@ -122,9 +122,9 @@ def recording_strikes(sample: Array, sr: int, onset_s: float | None, name: str) 
         raise AudioError(f"{name} has no damped sinusoid above its noise", "record a louder strike, nearer, in a quieter place")
     signal = np.asarray(sample, float)[round(found.onset_s * sr) :]
     amplitude = found.amplitude * np.exp(1j * (found.phase_rad - np.pi / 2))  # a sin(ωt + φ) = Re a e^{i(φ - π/2)} e^{iωt}
-    heard = damped(found.freq_hz, found.decay_per_s, amplitude, len(signal), sr)
+    observed = damped(found.freq_hz, found.decay_per_s, amplitude, len(signal), sr)
     modes = found.freq_hz, found.decay_per_s, amplitude[None]
-    return strikes_of(signal[None], (signal - heard)[None], sr, modes, modes, name)
+    return strikes_of(signal[None], (signal - observed)[None], sr, modes, modes, name)
 
 
 def strike_modes(found: CaseFit, recording: CaseRecording, sr: int) -> tuple[Array, Array, Array]:

@@ -71,7 +71,7 @@ def run_script(
 @contextmanager
 def _stage(before: ClientHook | None, after: ClientHook | None, seconds: float, progress: Callable[[float], None] | None) -> Iterator[None]:
     real_connect, real_step = pybullet.connect, pybullet.stepSimulation
-    heard: list[int] = []
+    observed: list[int] = []
     real_time: set[int] = set()
     sliders: list[float] = []
     elapsed_s = 0.0
@@ -82,9 +82,9 @@ def _stage(before: ClientHook | None, after: ClientHook | None, seconds: float, 
 
     def step(physicsClientId: int = 0) -> Any:
         nonlocal elapsed_s
-        if not heard:
-            heard.append(physicsClientId)
-        if physicsClientId != heard[0]:
+        if not observed:
+            observed.append(physicsClientId)
+        if physicsClientId != observed[0]:
             return real_step(physicsClientId=physicsClientId)
         if elapsed_s >= seconds - 1e-9:
             raise _TimeIsUp

@@ -130,8 +130,8 @@ def gather_substeps(records: Array, last: list[RawContact], dt_s: float, substep
 def friction_ratio(code_a: Array, code_b: Array, last: list[RawContact]) -> Array:
     """Friction over normal force (k, 3), world frame, of each row's pair in the last sub-step; 0 where it says nothing."""
     ratio = np.zeros((len(code_a), 3))
-    rubbing = [raw for raw in last if raw[FORCE] > 0 and (raw[FRICTION_1] or raw[FRICTION_2])]
-    if not rubbing:
+    friction = [raw for raw in last if raw[FORCE] > 0 and (raw[FRICTION_1] or raw[FRICTION_2])]
+    if not friction:
         return ratio
     plain = gather([raw for raw in last if raw[FORCE] > 0], 1.0)
     along = (plain.impulse_n_s * plain.normal).sum(axis=1)
