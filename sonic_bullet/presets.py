@@ -19,7 +19,6 @@ Between them the loss is smaller (at √(ω₁ω₂) by 2√(ω₁ω₂)/(ω₁+
 
 from __future__ import annotations
 
-import difflib
 import math
 import os
 from functools import cache
@@ -33,12 +32,16 @@ from sonic_bullet.effects.presets_of_effects import effect_of
 from sonic_bullet.effects.protocol import Effect
 from sonic_bullet.files import replacing
 from sonic_bullet.records import Material
+from sonic_bullet.records.coerce import as_path, nearest, shown
 from sonic_bullet.records.errors import MaterialError, RecordError
 from sonic_bullet.residual.code import ResidualForm, residual_of
 
 FORMAT = "sonic-bullet-preset/1"
 FOLDER = Path(__file__).parent / "materials"
 BYTES_MAX = 1 << 20
+_REMEDY = "give a material's name, or the path of a preset file"
+DAMPING_TAKEN = "damping (from '"
+"""How a provenance begins to say whose damping it is where recordings told none: a table's, without radiation."""
 
 Positive = Annotated[float, msgspec.Meta(gt=0)]
 NotNegative = Annotated[float, msgspec.Meta(ge=0)]
@@ -65,12 +68,17 @@ class Elasticity(_Part, frozen=True):
 
 
 class Damping(_Part, frozen=True):
-    """Rayleigh's alpha_per_s and beta_s, or a loss_factor and the two frequencies at which it is met."""
+    """Rayleigh's alpha_per_s and beta_s, or a loss_factor and the two frequencies at which it is met.
+
+    includes_radiation: these numbers, and laws among the effects, are total damping as recorded, and the run time adds no radiation. Absent: false, but for
+    presets that an older `fit` made of recordings.
+    """
 
     alpha_per_s: NotNegative | None = None
     beta_s: NotNegative | None = None
     loss_factor: NotNegative | None = None
     equal_at_hz: tuple[Positive, Positive] | None = None
+    includes_radiation: bool | None = None
 
 
 class Surface(_Part, frozen=True):
@@ -122,21 +130,20 @@ def load_material(name: str | os.PathLike[str]) -> Material:
 
     Raises MaterialError: unknown name (listing the near ones), unreadable file, a wrong field (named), unphysical numbers.
     """
-    text = os.fspath(name)
-    return material_of(named_preset(name), text if text.endswith(".json") or os.sep in text else "")
+    text = as_path(name, "name", _REMEDY, error=MaterialError)
+    return material_of(named_preset(text), text if text.endswith(".json") or os.sep in text else "")
 
 
 def named_preset(name: str | os.PathLike[str]) -> Preset:
     """The preset of that name, or of a file where ``name`` is a path or ends in .json. Raises MaterialError as `load_material` does."""
-    text = os.fspath(name)
+    text = as_path(name, "name", _REMEDY, error=MaterialError)
     if text.endswith(".json") or os.sep in text:
-        return read_preset(name)
+        return read_preset(text)
     known = material_names()
     if text.lower() in known:
         return read_preset(FOLDER / f"{text.lower()}.json")
-    near = difflib.get_close_matches(text.lower(), known, n=3, cutoff=0.5)
-    remedy = f"did you mean {' or '.join(near)}?" if near else f"one of {', '.join(known)}, or the path of a preset file"
-    raise MaterialError(f"there is no material '{text}'", f"{remedy}; 'sonic-bullet materials' lists all")
+    remedy = nearest(text, known, ", or the path of a preset file")
+    raise MaterialError(f"there is no material {shown(text)}", f"{remedy}; 'sonic-bullet materials' lists all")
 
 
 def list_materials() -> tuple[Material, ...]:
@@ -186,6 +193,7 @@ def material_of(preset: Preset, where: str = "") -> Material:
         "hurst": preset.surface.hurst,
         "restitution": preset.impact.restitution,
         "effects": _effects(preset, label),
+        "includes_radiation": total_damping(preset),
         "residual": residual_of(preset.residual, f"preset {label}") if preset.residual is not None else None,
         "source": f"elasticity: {elastic.source} | damping: {preset.damping.source} | surface: {preset.surface.source} | impact: {preset.impact.source}",
     }
@@ -197,6 +205,14 @@ def material_of(preset: Preset, where: str = "") -> Material:
     except RecordError as error:
         raise MaterialError(f"preset {label}: {error.what}", error.remedy) from error
     raise MaterialError(f"preset {label}: elasticity is neither isotropic nor a tensor", "give youngs_pa and poisson, or stiffness_pa alone")
+
+
+def total_damping(preset: Preset) -> bool:
+    """Whether a preset's damping has radiation in it: as it says, else where it was fitted, as `fit` read total decays before it said so."""
+    if preset.damping.includes_radiation is not None:
+        return preset.damping.includes_radiation
+    fitted = preset.provenance
+    return fitted is not None and not any(line.startswith(DAMPING_TAKEN) for line in fitted.assumed)
 
 
 def _effects(preset: Preset, label: str) -> tuple[Effect, ...]:

@@ -13,19 +13,23 @@ from __future__ import annotations
 
 import ast
 import importlib.util
+import os
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from sonic_bullet.files import check_sr
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.listener import Finding, diagnose_world, direct_client, disconnect, links_with_shapes, run_script
-from sonic_bullet.records import Array
+from sonic_bullet.records import Array, Material, Sensor
+from sonic_bullet.records.coerce import as_call, as_flag, as_number, as_path, as_whole, shown
 from sonic_bullet.records.errors import SceneError, SonicBulletError, interrupts
-from sonic_bullet.render import render_log
-from sonic_bullet.session import Listener, as_sensors, attach
+from sonic_bullet.render import render_log, silence_notes
+from sonic_bullet.session import Listener, MicrophoneLike, as_material, as_sensors, attach
 
 DEFAULT_SECONDS = 4.0
 DEFAULT_MATERIAL = "plastic"
@@ -49,8 +53,8 @@ def render_scene(
     seconds: float | None = None,
     sr: int = 48_000,
     seed: int = 0,
-    microphones: Sequence[Sequence[float]] | None = None,
-    material: str | None = None,
+    microphones: MicrophoneLike | None = None,
+    material: str | Path | Material | None = None,
     residual: bool = True,
     progress: Progress | None = None,
     say: Say | None = None,
@@ -62,7 +66,16 @@ def render_scene(
     what is being computed before the first step (modes: seconds a body). Raises SonicBulletError; where the scene broke or was interrupted
     under way, the exception carries what was rendered so far as ``partial``.
     """
-    with _stage(path, sr=sr, seed=seed, microphones=microphones, material=material, residual=residual) as stage:
+    asked: dict[str, Any] = {
+        "sr": check_sr(sr),
+        "seed": as_whole(seed, "seed", "give a whole number, 0 or more", least=0),
+        "microphones": None if microphones is None else as_sensors(microphones, "microphones"),
+        "material": None if material is None else as_material(material),
+        "residual": as_flag(residual, "residual"),
+    }
+    seconds = None if seconds is None else as_seconds(seconds, "seconds")
+    as_call(progress, "progress"), as_call(say, "say")
+    with _stage(path, **asked) as stage:
         try:
             with interrupts():
                 notes = stage.run(seconds, progress, say)
@@ -77,10 +90,22 @@ def examine_scene(path: str | Path, seconds: float = 1.0, say: Say | None = None
 
     Raises SonicBulletError.
     """
+    as_call(say, "say")
     with _stage(path, sr=8_000, seed=0, microphones=(), material=None) as stage:  # nobody hears it: contacts alone
-        stage.run(seconds, None, say)
+        stage.run(as_seconds(seconds, "seconds"), None, say)
         listener = stage.need_listener()
-        return (*diagnose_world(listener.world), *_mute_bodies(listener))
+        return (*diagnose_world(listener.world), *_nothing_added(listener), *_mute_bodies(listener))
+
+
+def _nothing_added(listener: Listener) -> tuple[Finding, ...]:
+    if not listener.world.has_bodies or any(body.material is not None for body in listener.contacts.bodies):
+        return ()
+    return (Finding("nothing-added", "error", "no body has a material: all are silent partners", "add(body, material=…), or return it in build's cast"),)
+
+
+def as_seconds(seconds: object, name: str) -> float:
+    """A length of physics time. Raises SceneError."""
+    return as_number(seconds, name, "give seconds of physics time, above 0", above=0, most=1e6, error=SceneError)
 
 
 def _mute_bodies(listener: Listener) -> tuple[Finding, ...]:
@@ -103,16 +128,22 @@ class _Stage:
     path: Path
     sr: int
     seed: int
-    microphones: Sequence[Sequence[float]] | None
-    material: str | None
+    microphones: tuple[Sensor, ...] | None
+    material: Material | None
     residual: bool = True
     listener: Listener | None = None
     client: Any = None
+    folder: str | None = None
 
     def __enter__(self) -> _Stage:
+        with suppress(OSError):
+            self.folder = os.getcwd()
         return self
 
     def __exit__(self, *_: object) -> None:
+        if self.folder is not None:  # a scene may change it; what follows means the one that it began in
+            with suppress(OSError):
+                os.chdir(self.folder)
         if self.listener is not None:
             self.listener.detach()
         if self.client is not None:
@@ -130,15 +161,22 @@ class _Stage:
         listener = self.need_listener()
         log = listener.contacts
         if listener.sr == self.sr and self.microphones is None and (self.residual or not any(b.material and b.material.residual for b in log.bodies)):
-            return RenderResult(listener.sound(), log, self.sr, notes)
-        log = replace(log, sr=self.sr, sensors=log.sensors if self.microphones is None else as_sensors(self.microphones))
-        return RenderResult(render_log(log, residual=self.residual), log, self.sr, notes)
+            samples = listener.sound()
+            return RenderResult(samples, log, self.sr, (*notes, *silence_notes(samples, log)))
+        log = replace(log, sr=self.sr, sensors=log.sensors if self.microphones is None else self.microphones)
+        samples = render_log(log, residual=self.residual)
+        return RenderResult(samples, log, self.sr, (*notes, *silence_notes(samples, log)))
 
 
 def _stage(path: str | Path, **options: Any) -> _Stage:
-    place = Path(path).resolve()
+    remedy = "give the path of a Python scene"
+    name = as_path(path, "path", remedy, error=SceneError)
+    try:
+        place = Path(name).resolve(strict=True)
+    except (OSError, ValueError):  # not there, or no name that could be
+        raise SceneError(f"no scene file {shown(name)}", remedy) from None
     if not place.is_file():
-        raise SceneError(f"no scene file '{path}'", "give the path of a Python scene or of a contact log")
+        raise SceneError(f"{shown(name)} is no scene file", remedy)
     return _Stage(place, **options)
 
 
@@ -191,7 +229,7 @@ def _run_built(stage: _Stage, seconds: float | None, progress: Progress | None, 
     stage.microphones = None
     _user_code(stage.path, _add_cast, listener, cast, say)
     act = getattr(module, "act", None)
-    total = seconds if seconds is not None else _user_code(stage.path, float, getattr(module, "SECONDS", DEFAULT_SECONDS))
+    total = seconds if seconds is not None else as_seconds(getattr(module, "SECONDS", DEFAULT_SECONDS), f"SECONDS of scene '{stage.path.name}'")
     while listener.time_s < total - 1e-9:
         if act is not None:
             _user_code(stage.path, act, client, listener.time_s)
@@ -221,7 +259,7 @@ def _run_plain(stage: _Stage, seconds: float | None, progress: Progress | None, 
                 f"scene '{stage.path.name}' imports sonic_bullet but keeps no listener in a top-level name", "write listener = sonic_bullet.attach(...)"
             )
         return notes
-    material = stage.material or DEFAULT_MATERIAL
+    material = stage.material or as_material(DEFAULT_MATERIAL)
     places = stage.microphones if stage.microphones is not None else (0.0, -1.0, 0.5)
     stage.microphones = None
     known: set[tuple[int, int]] = set()
@@ -238,4 +276,4 @@ def _run_plain(stage: _Stage, seconds: float | None, progress: Progress | None, 
         stage.need_listener().step()
 
     run_script(stage.path, (before, after), total, progress=progress)
-    return (f"every body sounds as {material}: the script names no materials",)
+    return (f"every body sounds as {material.name}: the script names no materials",)

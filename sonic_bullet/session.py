@@ -9,52 +9,83 @@ A frame lags physics by `latency_steps`, because a strike spans steps and loads 
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+import numbers
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager, nullcontext
+from dataclasses import asdict, replace
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from sonic_bullet.files import AudioReport, check_sr, write_audio
 from sonic_bullet.files.contact_log import ContactLog
-from sonic_bullet.records import Air, Array, Material, Microphone, ModalModel, ModalSum, Sensor, Shape, Vibrometer
+from sonic_bullet.machine.terminal import status
+from sonic_bullet.records import Air, Array, Material, Microphone, ModalModel, Sensor, Shape
+from sonic_bullet.records.coerce import as_call, as_items, as_kind, as_kinds, as_number, as_path, as_rows, as_whole, check_options
 from sonic_bullet.records.contacts import Step
-from sonic_bullet.records.errors import MaterialError, RecordError, SceneError
+from sonic_bullet.records.errors import AudioError, MaterialError, MeshError, ModalError, SceneError
 from sonic_bullet.render import LATENCY_STEPS, Synthesizer
 from sonic_bullet.render.radiated import radiation_of
+
+if TYPE_CHECKING:
+    from sonic_bullet.modal import ModalOptions
 
 MicrophoneLike = Sequence[float] | Sequence[Sequence[float]] | Sensor | Sequence[Sensor] | Array
 
 
-def as_sensors(microphone: MicrophoneLike) -> tuple[Sensor, ...]:
+def as_sensors(microphone: MicrophoneLike, name: str = "microphone") -> tuple[Sensor, ...]:
     """Sensors of anything that names them: a point, several points, a sensor or several.
 
     Raises RecordError where a point is not three finite numbers.
     """
-    if isinstance(microphone, (Microphone, Vibrometer, ModalSum)):
+    if isinstance(microphone, Sensor):
         return (microphone,)
-    items = list(microphone) if isinstance(microphone, (Sequence, np.ndarray)) else [microphone]
-    if not items:
-        return ()
-    if all(isinstance(item, (Microphone, Vibrometer, ModalSum)) for item in items):
-        return tuple(items)
-    try:
-        points = np.atleast_2d(np.asarray(microphone, dtype=float))
-    except (TypeError, ValueError):
-        raise RecordError(f"microphone {microphone!r} is no place", "give x, y, z in m, several such points, or sensors") from None
-    return tuple(Microphone(point) for point in points)
+    remedy = "give x, y, z in m, several such points, or sensors"
+    items = as_items(microphone, name, remedy)
+    if all(isinstance(item, Sensor) for item in items):
+        return items
+    points = items if any(isinstance(item, Iterable) for item in items) else (items,)
+    return tuple(Microphone(np.array(point)) for point in as_rows(points, name, 3, remedy))
 
 
 def as_material(material: str | Path | Material) -> Material:
     """The material itself, or the preset of that name or path. Raises MaterialError where it has no damping: it would ring for ever."""
+    from sonic_bullet.effects.protocol import Effect
     from sonic_bullet.presets import load_material
 
-    made = material if isinstance(material, Material) else load_material(material)
+    remedy = "give a name ('sonic-bullet materials' lists them), a preset file or a Material"
+    made = material if isinstance(material, Material) else load_material(as_path(material, "material", remedy, error=MaterialError))
     if made.alpha_per_s is None:
         raise MaterialError(f"material '{made.name}' states no damping", "give alpha_per_s and beta_s")
+    as_kinds(made.effects, Effect, f"material '{made.name}': effects", "give effects of sonic_bullet.effects", error=MaterialError)
     return made
+
+
+def as_shapes(mesh: str | Path | Shape | Sequence[Shape]) -> tuple[Shape, ...]:
+    """A mesh file, a shape or several as shapes in the body frame. Raises MeshError and FileError."""
+    from sonic_bullet.modal import read_mesh
+
+    if isinstance(mesh, Shape):
+        return (mesh,)
+    if isinstance(mesh, (str, Path)):
+        return (read_mesh(as_path(mesh, "mesh", "give a mesh file in metres")),)
+    return as_kinds(mesh, Shape, "mesh", "give a mesh file in metres, a Shape or several", error=MeshError)
+
+
+@contextmanager
+def _naming(link: str, of: int) -> Iterator[None]:
+    """Errors of a link's mesh or modes name that link, one of ``of``, and what can be done about it here."""
+    try:
+        yield
+    except (MeshError, ModalError) as error:
+        rest = "; or give another shape with mesh=" + (", or add the other links one by one, by their names" if of > 1 else "")
+        raise type(error)(f"{link}: {error.what}", error.remedy + rest) from error
+
+
+def _headed(say: Callable[[str], None], head: str) -> Callable[[str], None]:
+    return lambda text: say(f"{head}: {text}")
 
 
 def attach(
@@ -73,9 +104,7 @@ def attach(
     alone, no sound. seed: of the surfaces' roughness. air: the medium, 1.2 kg/m³ and 343 m/s by default. Raises SceneError for a client
     that is not connected, AudioError for a bad rate, RecordError for a microphone or a seed that is none.
     """
-    if not isinstance(seed, (int, np.integer)) or seed < 0:
-        raise RecordError(f"seed is {seed!r}", "give a whole number, 0 or more")
-    return Listener(client, sr=check_sr(sr), sensors=as_sensors(microphone), seed=int(seed), air=air or Air())
+    return Listener(client, sr=sr, sensors=as_sensors(microphone), seed=seed, air=Air() if air is None else air)
 
 
 class Listener:
@@ -90,14 +119,16 @@ class Listener:
     def __init__(self, client: Any, *, sr: int, sensors: tuple[Sensor, ...], seed: int, air: Air) -> None:
         from sonic_bullet.listener import open_world
 
-        self.sr, self.seed, self.sensors, self.air = sr, seed, sensors, air
+        self.sr, self.sensors = check_sr(sr), as_sensors(sensors, "sensors")
+        self.seed = as_whole(seed, "seed", "give a whole number, 0 or more", least=0, most=2**63 - 1)
+        self.air = as_kind(air, Air, "air", "give an Air(density_kg_m3=…, sound_speed_m_s=…), or leave it out")
         self.world = open_world(client)
-        self._synth = Synthesizer(sr=sr, sensors=sensors, seed=seed, air=air)
+        self._synth = Synthesizer(sr=self.sr, sensors=self.sensors, seed=self.seed, air=self.air)
         self._steps: list[Step] = []
         self._unread: list[Array] = []
         self._attached = True
-        self.frame: Array = np.zeros((len(sensors), 0))
-        if not isinstance(client, int) and not inspect.ismodule(client):
+        self.frame: Array = np.zeros((len(self.sensors), 0))
+        if not isinstance(client, numbers.Integral) and not inspect.ismodule(client):
             self.world.hook(self.world.before_step, self.step)
 
     def add(
@@ -117,69 +148,73 @@ class Listener:
     ) -> tuple[ModalModel, ...]:
         """Let a body sound; returns the modal models of its links.
 
-        link: -1 is the base, "all" every link with a collision shape. material: a preset's name, a preset file or a `Material`.
+        link: -1 is the base; a link's number or name; "all" every link with a collision shape, all of them or, where one fails, none. material: a preset's name, a preset file or a `Material`.
         mesh: a file (in metres) or shapes in the body frame, where the body's own collision shapes should not be used.
         model: modes computed before. roughness_m: rms height of its surface in place of the material's. fixed: clamped spheres
         (x, y, z, radius) in m, body frame. thickness_m: wall of an open surface. to_hz, count: how many modes. progress: told now and then
-        which body's modes are being computed, how far that is, and that it is their radiation next (seconds a body the first time, then
-        the cache has both).
-        Raises SceneError (unknown body), MaterialError, MeshError, ModalError.
+        which link's modes are being computed, how far that is, and that it is their radiation next (seconds a link the first time, then
+        the cache has both); without one, a terminal shows it.
+        Raises SceneError (unknown body or link), MaterialError, MeshError, ModalError naming body and link, RecordError.
         """
-        from sonic_bullet.listener import links_with_shapes
+        from sonic_bullet.effects.presets_of_effects import with_material
+        from sonic_bullet.listener import links_called
+        from sonic_bullet.modal import ModalOptions
 
         made = as_material(material)
         if roughness_m is not None:
-            made = replace(made, roughness_m=roughness_m)
-        links = [one for _, one in links_with_shapes(self.world, body)] if link == "all" else [int(link)]
-        return tuple(self._add_link(body, one, made, mesh, model, fixed, thickness_m, to_hz, count, progress) for one in links)
+            made = replace(made, roughness_m=as_number(roughness_m, "roughness_m", "give an rms height in m, zero or above", least=0))
+        made = with_material(made)
+        options = ModalOptions(to_hz=to_hz, count=count, fixed=fixed, thickness_m=thickness_m)
+        if model is not None:
+            as_kind(model, ModalModel, "model", "give a ModalModel, or leave it out", error=ModalError)
+        as_call(progress, "progress")
+        body, links = links_called(self.world, body, link)
+        given = None if mesh is None else as_shapes(mesh)
+        parts = []
+        for one in links:
+            name = self.world.name_of(body, one)
+            with _naming(name, len(links)):
+                parts.append((name, self.world.shapes_of(body, one) if given is None else given))
+        with status("sonic_bullet") if progress is None else nullcontext(progress) as say:
+            models = [model] * len(parts) if model is not None else self._solved(parts, made, options, say)
+            for (name, _), solved in zip(parts, models, strict=True):
+                if self.sensors and solved.mode_count:
+                    say(f"how {solved.mode_count} modes of {name} radiate")
+                    radiation_of(solved, self.air)
+        for one, (_, shapes), solved in zip(links, parts, models, strict=True):
+            self.world.add(body, one, material=made, model=solved, shapes=shapes)
+        return tuple(models)
 
-    def _add_link(
-        self,
-        body: int,
-        link: int,
-        material: Material,
-        mesh: str | Path | Shape | Sequence[Shape] | None,
-        model: ModalModel | None,
-        fixed: Sequence[Sequence[float]],
-        thickness_m: float | None,
-        to_hz: float,
-        count: int | None,
-        progress: Callable[[str], None] | None,
-    ) -> ModalModel:
+    def _solved(
+        self, parts: Sequence[tuple[str, tuple[Shape, ...]]], material: Material, options: ModalOptions, say: Callable[[str], None]
+    ) -> list[ModalModel]:
+        """The modal models of named links (name, shapes). What fails shall fail early: all are looked at first, and the most intricate is filled first."""
         from sonic_bullet import modal
-        from sonic_bullet.effects.presets_of_effects import with_material, with_modes
+        from sonic_bullet.effects.presets_of_effects import with_modes
 
-        name = self.world.name_of(body, link)
-        material = with_material(material)
+        triangles = [0] * len(parts)
+        for i, (name, shapes) in enumerate(parts if len(parts) > 1 else ()):
+            with _naming(name, len(parts)):
+                triangles[i] = modal.check_fillable(shapes, options.thickness_m)
+        models: dict[int, ModalModel] = {}
+        for i in sorted(range(len(parts)), key=lambda i: -triangles[i]):
+            name, shapes = parts[i]
+            head = f"modes of {name}" + (f", {len(models) + 1} of {len(parts)}" if len(parts) > 1 else "")
+            if len(parts) > 1:
+                say(head)
+            with _naming(name, len(parts)):
+                solved = modal.analyse(shapes, material, **asdict(options), progress=_headed(say, head))
+                models[i] = self._shared(with_modes(solved, material), models.values())
+        return [models[i] for i in range(len(parts))]
 
-        shapes: tuple[Shape, ...]
-        if mesh is None:
-            shapes = self.world.shapes_of(body, link)
-        elif isinstance(mesh, Shape):
-            shapes = (mesh,)
-        elif isinstance(mesh, (str, Path)):
-            shapes = (modal.read_mesh(mesh),)
-        else:
-            shapes = tuple(mesh)
-        if model is None:
-            clamps = tuple((float(x), float(y), float(z), float(r)) for x, y, z, r in fixed)
-            say = (lambda text: progress(f"modes of {name}: {text}")) if progress is not None else None
-            solved = modal.analyse(shapes, material, to_hz=to_hz, count=count, fixed=clamps, thickness_m=thickness_m, progress=say)
-            model = self._shared(with_modes(solved, material))
-        if self.sensors and model.mode_count:
-            if progress is not None:
-                progress(f"how {model.mode_count} modes of {name} radiate")
-            radiation_of(model, self.air)
-        self.world.add(body, link, material=material, model=model, shapes=shapes)
-        return model
-
-    def _shared(self, model: ModalModel) -> ModalModel:
-        """The model itself, or the same one that a body has already: equal bodies then share memory and what is derived from it."""
+    def _shared(self, model: ModalModel, fresh: Iterable[ModalModel]) -> ModalModel:
+        """The model itself, or the same one that a body has already or is about to have: equal bodies then share memory and what is derived from it."""
+        known = (*(body.model for body in self.world.bodies if body.model is not None), *fresh)
         same = (
-            body.model
-            for body in self.world.bodies
-            if body.model is not None
-            and all(np.array_equal(getattr(body.model, name), getattr(model, name)) for name in ("freq_hz", "decay_per_s", "vertex_m", "face", "shape"))
+            other
+            for other in known
+            if other.includes_radiation == model.includes_radiation
+            and all(np.array_equal(getattr(other, name), getattr(model, name)) for name in ("freq_hz", "decay_per_s", "vertex_m", "face", "shape"))
         )
         return next(same, model)
 
@@ -227,7 +262,12 @@ class Listener:
 
         Raises FileError, AudioError.
         """
-        return write_audio(str(path), self.sound(), self.sr, **options)
+        levels = [name for name, one in inspect.signature(write_audio).parameters.items() if one.kind is inspect.Parameter.KEYWORD_ONLY]
+        check_options(options, levels, "write", error=AudioError)
+        place = as_path(path, "path", "name a file, such as out.wav")
+        if not self.sensors:
+            raise AudioError("there is no microphone, so there is no sound to write", "attach with microphone=(x, y, z)")
+        return write_audio(place, self.sound(), self.sr, **options)
 
     def detach(self) -> None:
         """Stop listening and leave the client as it was; sound and log stay. Twice is once."""

@@ -177,10 +177,16 @@ def doctor(scene: str, seconds: float, json_to: str | None) -> None:
     run_doctor(scene, seconds, json_to)
 
 
+channel_option = click.option(
+    "--channel", type=click.IntRange(0), metavar="N", help="Which channel of a file of several, counted from 0. [default: the first, 0]"
+)
+
+
 @cli.command(epilog=FEATURES_EPILOG)
 @click.argument("recording")
 @click.option("--onset", "onset_s", type=click.FloatRange(0), metavar="S", help="When the impact starts. [default: found]")
 @click.option("--band", type=Numbers("LO,HI"), help="Look between these frequencies in Hz. [default: 20,20000]")
+@channel_option
 @click.option("--picture", metavar="NAME.png", help="Also draw the spectrogram with the features on it, and decay over frequency.")
 @json_option
 def features(**options: Any) -> None:
@@ -209,7 +215,13 @@ def strike_options(command: Any) -> Any:
             ),
             click.option("--sensor-at", type=Numbers("X,Y,Z"), help="Where the surface was heard, in m, for --sensor velocity."),
             click.option("--sensor-direction", type=Numbers("X,Y,Z"), help="Along which, for --sensor velocity. [default: out of the surface]"),
+            click.option(
+                "--medium",
+                type=click.Choice(["air", "none"]),
+                help="What it rang in: 'none' loses nothing to radiation. [default: air; with --sensor sum unknown]",
+            ),
             click.option("--onset", "onset_s", type=click.FloatRange(0), metavar="S", help="When the impulse arrives. [default: found]"),
+            channel_option,
             click.option("--fix", "fixed", type=Numbers("X,Y,Z,R"), multiple=True, help="Clamp all within R of a point, in m, mesh frame; repeatable."),
         )
     ):
@@ -259,11 +271,13 @@ def diagnose(**options: Any) -> None:
 
 def main() -> None:
     """The console script: run a command, turn every error into one line on stderr, and exit."""
+    import logging
     import warnings
 
     debug = bool(os.environ.get("SONIC_BULLET_DEBUG"))
     if not debug:
         warnings.simplefilter("ignore")  # a library's warning is no line of ours
+        logging.getLogger("matplotlib").setLevel(logging.ERROR)  # nor that it found no home for its fonts
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")  # a terminal without Greek letters still gets its table
@@ -271,6 +285,7 @@ def main() -> None:
     try:
         with interrupts(), cli.make_context("sonic-bullet", _settled(sys.argv[1:]) or ["--help"]) as context:  # cli.main() would swallow what an interrupt says
             cli.invoke(context)
+        _say_what_is_not_kept()
         sys.stdout.flush()
         sys.exit(0)
     except click.exceptions.Exit as done:
@@ -307,6 +322,13 @@ def _settled(words: list[str]) -> list[str]:
 
 def _terminated(*_: object) -> None:
     raise KeyboardInterrupt("terminated")
+
+
+def _say_what_is_not_kept() -> None:
+    """One note where there was no folder for compiled code and computed models: each run then takes a minute that the next could do without."""
+    folder = sys.modules.get("sonic_bullet.machine.user_folder")
+    if folder is not None and folder.NOTES:
+        _say(f"note: compiled code and computed models are not kept for the next run: {folder.NOTES[0]}; XDG_CACHE_HOME names another folder")
 
 
 def _say(text: str) -> None:

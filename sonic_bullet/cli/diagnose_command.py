@@ -6,10 +6,11 @@ import os
 from pathlib import Path
 from typing import Any
 
-from sonic_bullet.cli.output import clean_stdout, status, table, write_json
-from sonic_bullet.files import check_output
+from sonic_bullet.cli.output import clean_stdout, folder_place, places, status, table, warn, write_json
 from sonic_bullet.files.cases import read_case
 from sonic_bullet.records.errors import FileError
+
+SIDES = ("before", "after")  # the folders of --predict
 
 
 def run_diagnose(source: str, *, output: str | None, json_to: str | None, predict: str | None, report: str | None, seed: int) -> None:
@@ -18,17 +19,17 @@ def run_diagnose(source: str, *, output: str | None, json_to: str | None, predic
         raise FileError(f"cannot write {output}: presets are JSON files", "end the name with .json")
     if report is not None and not report.endswith((".html", ".htm")):
         raise FileError(f"cannot write {report}: a report is a page", "end the name with .html")
-    for place in (output, report, json_to if json_to != "-" else None):
-        if place is not None:
-            check_output(place)
+    output, report, json_to = places(output, report, json_to)
+    folder = None if predict is None else folder_place(predict, *SIDES)
     case = read_case(source)
+    warn(case.warnings)
     with clean_stdout(json_to) as say:
         from sonic_bullet.diagnosis.diagnose import described, diagnose
 
         with status(source) as progress:
             found = diagnose(case, seed=seed, progress=progress)
-            if predict is not None:
-                written = _predicted(found, predict)
+            if folder is not None:
+                written = _predicted(found, folder)
             if report is not None:
                 from sonic_bullet.report.diagnosis_page import write_report
 
@@ -42,6 +43,7 @@ def run_diagnose(source: str, *, output: str | None, json_to: str | None, predic
         say(_told(found))
         if predict is not None:
             say(f"{written} strikes predicted in {predict}")
+    warn(found.warnings)
     write_json(json_to, described(found))
 
 
@@ -51,7 +53,7 @@ def _predicted(found: Any, folder: str) -> int:
     from sonic_bullet.files import write_audio
 
     made = predictions(found)
-    for side in ("before", "after"):
+    for side in SIDES:
         try:
             os.makedirs(Path(folder) / side, exist_ok=True)
         except OSError as error:
@@ -64,17 +66,25 @@ def _predicted(found: Any, folder: str) -> int:
 
 def _told(found: Any) -> str:
     """For people."""
+    from sonic_bullet.diagnosis.remainder import NOTHING
+    from sonic_bullet.diagnosis.selection.stepwise import NothingCompared
+
+    def missing(split: str) -> str:
+        return "not compared" if split in found.not_compared else "no audio"
+
     words = {
         "none": "the model suffices: no effect earns its keep",
         "explained": "the model lacks",
         "unexplained": "something is left that no known effect explains",
+        "nothing": NOTHING,
     }
-    text = [f"{found.case.name}: {found.verdict}: {words[found.verdict]}"]
+    nothing = isinstance(found.closed, NothingCompared)
+    text = [f"{found.case.name}: {found.verdict}: {words['nothing' if nothing else found.verdict]}"]
     for c in found.closed.added:
         numbers = ", ".join(f"{k} {_number(v)}" for k, v in c.effect.parameters().items())
         text.append(f"  {c.id} ({c.effect.owner.value}): {numbers}; {c.mean_db:.2f} dB nearer on strikes left out, chance {c.null_db:.2f} dB")
     rows = [
-        (split, *(f"{found.errors[side][split]:.2f} dB" if found.errors[side][split] is not None else "no audio" for side in ("before", "after")))
+        (split, *(f"{found.errors[side][split]:.2f} dB" if found.errors[side][split] is not None else missing(split) for side in ("before", "after")))
         for split in ("fit", "holdout", "transfer")
         if split in found.errors["before"]
     ]
@@ -86,7 +96,7 @@ def _told(found: Any) -> str:
         text.append("tried and not kept: " + "; ".join(f"{c.id} {c.mean_db:+.2f} dB (chance {c.null_db:+.2f})" for c in others))
     if found.unexplained:
         text.append(f"left: {found.unexplained['words']}")
-    return "\n".join([*text, *(f"warning: {w}" for w in found.warnings)])
+    return "\n".join(text)
 
 
 def _number(value: Any) -> str:

@@ -3,48 +3,47 @@
 from __future__ import annotations
 
 import math
-import sys
 from typing import Any
 
 import numpy as np
 
-from sonic_bullet.cli.output import clean_stdout, status, table, write_json
+from sonic_bullet.cli.output import clean_stdout, places, status, table, warn, write_json
 from sonic_bullet.estimator.lines.line_values import Features
-from sonic_bullet.files import check_output, read_audio
+from sonic_bullet.files import channel_of, channel_words, read_audio
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import FileError
 
 
-def run_features(recording: str, *, onset_s: float | None, band: tuple[float, ...] | None, json_to: str | None, picture: str | None) -> None:
+def run_features(
+    recording: str, *, onset_s: float | None, band: tuple[float, ...] | None, channel: int | None, json_to: str | None, picture: str | None
+) -> None:
     """The `features` command. Raises SonicBulletError."""
     if picture is not None and not picture.endswith((".png", ".pdf", ".svg")):
         raise FileError(f"cannot write {picture}: pictures are .png, .pdf or .svg", "end the name with one of them")
-    for place in (picture, json_to if json_to != "-" else None):
-        if place is not None:
-            check_output(place)
+    picture, json_to = places(picture, json_to)
     sound, sr = read_audio(recording)
-    channel = int(np.argmax((sound**2).sum(axis=1)))
+    observed, which = channel_of(sound, channel or 0, recording), channel_words(len(sound), channel)
+    warn(f"{recording}: {words}" for words in [which] if words)
     with clean_stdout(json_to) as say:
         from sonic_bullet.estimator.lines.extraction import extract
 
         with status(recording) as progress:
             progress("looking for modes")
-            found = extract(sound[channel], sr, onset_s=onset_s, band_hz=(band[0], band[1]) if band else None)
-        notes = "; ".join(([f"channel {channel + 1} of {len(sound)}, the loudest, is used"] if len(sound) > 1 else []) + ([found.note] if found.note else []))
+            found = extract(observed, sr, onset_s=onset_s, band_hz=(band[0], band[1]) if band else None)
+        notes = "; ".join(filter(None, (which, found.note)))
         if picture is not None:
-            _draw(picture, sound[channel], sr, found)
+            _draw(picture, observed, sr, found)
         say(_told(recording, found))
-    if notes:
-        print(f"sonic-bullet: warning: {recording}: {notes}", file=sys.stderr)
-    write_json(json_to, described(found, notes))
+    warn(f"{recording}: {note}" for note in [found.note] if note)
+    write_json(json_to, described(found, notes, doubtful=bool(found.note) or (len(sound) > 1 and channel is None)))
 
 
-def described(found: Features, notes: str) -> dict[str, Any]:
-    """Features as JSON-able values; null for a spread that is not known."""
+def described(found: Features, notes: str, *, doubtful: bool) -> dict[str, Any]:
+    """Features as JSON-able values; null for a spread that is not known. doubtful: whether a note speaks against them."""
     names = ("freq_hz", "decay_per_s", "amplitude", "freq_sd_hz", "decay_sd_per_s", "amplitude_sd")
     columns = [getattr(found, name) for name in names]
     rows = [{name: _number(column[k]) for name, column in zip(names, columns, strict=True)} for k in range(len(found.freq_hz))]
-    verdict = "features" if rows and not notes else "doubtful" if rows else "no features"
+    verdict = "features" if rows and not doubtful else "doubtful" if rows else "no features"
     return {"features": rows, "onset_s": found.onset_s, "noise_dbfs": found.noise_dbfs, "sr": found.sr, "verdict": verdict, "note": notes}
 
 

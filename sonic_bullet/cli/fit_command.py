@@ -7,14 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.cli.output import clean_stdout, status, table, write_json
-from sonic_bullet.files import check_output
-from sonic_bullet.files.cases import Case, CaseObject, CaseRecording, read_case
+from sonic_bullet.cli.output import clean_stdout, places, status, table, warn, write_json
+from sonic_bullet.files.cases import Case, CaseObject, CaseRecording, medium_of, read_case
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import FileError
 
 Point = tuple[float, float, float]
-ONE = ("mesh", "strike", "direction", "impulse", "material", "scale", "sensor", "sensor_at", "sensor_direction", "onset_s", "fixed")
+ONE = ("mesh", "strike", "direction", "impulse", "material", "scale", "sensor", "sensor_at", "sensor_direction", "onset_s", "fixed", "channel", "medium")
 
 
 def run_fit(source: str, *, output: str, picture: str | None, json_to: str | None, **one: Any) -> None:
@@ -23,10 +22,9 @@ def run_fit(source: str, *, output: str, picture: str | None, json_to: str | Non
         raise FileError(f"cannot write {output}: presets are JSON files", "end the name with .json")
     if picture is not None and not picture.endswith((".png", ".pdf", ".svg")):
         raise FileError(f"cannot write {picture}: pictures are .png, .pdf or .svg", "end the name with one of them")
-    for place in (output, picture, json_to if json_to != "-" else None):
-        if place is not None:
-            check_output(place)
+    to, picture, json_to = places(output, picture, json_to)
     case = as_case(source, one)
+    warn(case.warnings)
     with clean_stdout(json_to) as say:
         from sonic_bullet.estimator.fit.fitted_preset import preset_of
         from sonic_bullet.estimator.fit.material_fit import fit_case
@@ -34,12 +32,13 @@ def run_fit(source: str, *, output: str, picture: str | None, json_to: str | Non
 
         with status(source) as progress:
             found = fit_case(case, progress=progress)
-        write_preset(output, preset_of(found))
+        write_preset(str(to), preset_of(found))
         if picture is not None:
             from sonic_bullet.plots.fit_plot import write_fit_picture
 
             write_fit_picture(picture, found)
         say(_told(found))
+    warn(found.warnings)
     write_json(json_to, described(found))
 
 
@@ -47,7 +46,7 @@ def as_case(source: str, one: dict[str, Any]) -> Case:
     """The case in a folder, or the one the options describe. Raises FileError."""
     path = Path(source)
     if path.is_dir() or path.name == "case.json":
-        given = [f"--{name.replace('_s', '').replace('_', '-')}" for name in ONE if one[name]]
+        given = [f"--{name.replace('_s', '').replace('_', '-')}" for name in ONE if one[name] not in (None, ())]
         if given:
             raise FileError(f"{' and '.join(given)} given beside a case", "a case says that itself; leave it out")
         return read_case(path)
@@ -70,10 +69,13 @@ def as_case(source: str, one: dict[str, Any]) -> Case:
     if kind != "velocity" and one["sensor_direction"] is not None:
         raise FileError(f"--sensor-direction is given, but --sensor is {kind}", "give --sensor velocity, or leave the direction out")
     thing = CaseObject("object", Path(one["mesh"]), 1.0 if one["scale"] is None else one["scale"], one["material"], fixed=one["fixed"])
-    recording = CaseRecording(path, None, "object", "fit", one["strike"], _unit("direction", one), one["impulse"])
+    observed = one["channel"] or 0, None, one["channel"] is not None
+    recording = CaseRecording(path, None, "object", "fit", one["strike"], _unit("direction", one), one["impulse"], *observed)
     at = {"object": one["sensor_at"]} if one["sensor_at"] is not None else None
     along = _unit("sensor_direction", one)
-    return Case(path.stem, path.parent, {"object": thing}, (recording,), kind, at, None if along is None else {"object": along}, onset_s=one["onset_s"])
+    direction = None if along is None else {"object": along}
+    medium = medium_of(one["medium"], kind)
+    return Case(path.stem, path.parent, {"object": thing}, (recording,), kind, at, direction, onset_s=one["onset_s"], medium=medium)
 
 
 def _unit(name: str, one: dict[str, Any]) -> Point | None:
@@ -132,4 +134,4 @@ def _told(found: Any) -> str:
         text.append(f"hybrid metric of recording and synthesis: {fit.metric:.3g} (0 the same, 1 and more as far as silence)")
     if found.log_spectral_db >= 0:
         text.append(f"log-spectral distance of recording and synthesis: {found.log_spectral_db:.2f} dB")
-    return "\n".join([*text, *(f"warning: {w}" for w in found.warnings)])
+    return "\n".join(text)

@@ -2,6 +2,7 @@
 
 result -> JSON  -> PATH, or stdout and nothing else there
        -> text  -> stdout
+warnings        -> stderr, a line each
 progress        -> stderr, on a terminal only
 """
 
@@ -10,9 +11,15 @@ from __future__ import annotations
 import json
 import os
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, redirect_stdout
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager, redirect_stdout, suppress
+from pathlib import Path
 from typing import Any
+
+from sonic_bullet.machine.terminal import shown_by, status
+from sonic_bullet.records.errors import FileError
+
+__all__ = ["clean_stdout", "places", "progress_bar", "quiet_stderr", "status", "table", "write_json"]
 
 
 @contextmanager
@@ -32,6 +39,12 @@ def clean_stdout(json_to: str | None) -> Iterator[Callable[[str], None]]:
         os.close(kept)
 
 
+def warn(lines: Iterable[str]) -> None:
+    """A line of stderr each: what a user should know of a result that stands all the same."""
+    for line in lines:
+        print("sonic-bullet: warning: " + " ".join(line.split()), file=sys.stderr)
+
+
 @contextmanager
 def quiet_stderr() -> Iterator[None]:
     """Nothing reaches stderr meanwhile, from C neither: PyBullet says when it was built as soon as it is imported."""
@@ -44,6 +57,41 @@ def quiet_stderr() -> Iterator[None]:
         os.dup2(kept, 2)
         os.close(kept)
         os.close(nowhere)
+
+
+def places(*asked: str | None) -> tuple[str | None, ...]:
+    """Each output's absolute path, resolved once and tried before anything runs: what is run may change the folder.
+
+    None (not asked for) and "-" (stdout) stay as they are. Raises FileError where one cannot be written or two are one file.
+    """
+    from sonic_bullet.files import check_output
+
+    real = [check_output(place) for place in asked if place is not None and place != "-"]
+    if len(set(real)) < len(real):
+        raise FileError("two outputs have one name", "give each its own")
+    return tuple(place if place is None or place == "-" else os.path.join(os.getcwd(), place) for place in asked)
+
+
+def folder_place(asked: str, *inside: str) -> str:
+    """The absolute path of a folder for outputs, tried: it and the folders ``inside`` can be made and take files. Nothing of that is left.
+
+    Raises FileError.
+    """
+    from sonic_bullet.files import cannot, check_output
+
+    folder = Path(os.path.join(os.getcwd(), asked))
+    missing = [place for place in (*(folder / name for name in inside), folder, *folder.parents) if not os.path.lexists(place)]
+    try:
+        for name in inside:
+            (folder / name).mkdir(parents=True, exist_ok=True)
+            check_output(folder / name / "sound.wav")
+    except OSError as error:
+        raise cannot("make the folder", os.path.join(asked, name), error) from error
+    finally:
+        for place in missing:
+            with suppress(OSError):
+                place.rmdir()
+    return str(folder)
 
 
 def write_json(json_to: str | None, value: Any) -> None:
@@ -82,22 +130,8 @@ def progress_bar(label: str) -> Iterator[tuple[Callable[[float], None], Callable
     )
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
         task = progress.add_task(label, total=1.0)
-        yield (
-            lambda share: progress.update(task, description=label, completed=share),
-            lambda text: progress.update(task, description=escape(f"{label}: {text}")),
-        )
-
-
-@contextmanager
-def status(label: str) -> Iterator[Callable[[str], None]]:
-    """A function of the present activity, drawn as a spinner on a terminal's stderr; in a pipe it does nothing."""
-    if not sys.stderr.isatty():
-        yield lambda text: None
-        return
-    from rich.console import Console
-
-    with Console(stderr=True).status(label) as line:
-        yield lambda text: line.update(f"{label}: {text}")
+        with shown_by(lambda text: progress.update(task, description=escape(f"{label}: {text}"))) as say:
+            yield (lambda share: progress.update(task, description=label, completed=share)), say
 
 
 def table(head: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> str:

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet.cli.fit_command import as_case
-from sonic_bullet.cli.output import clean_stdout, status, write_json
-from sonic_bullet.files import check_output, read_audio
+from sonic_bullet.cli.output import clean_stdout, places, status, warn, write_json
+from sonic_bullet.files import channel_of, channel_words, read_audio
 from sonic_bullet.records import Residual
 from sonic_bullet.records.errors import AudioError, FileError
 
-UNSHAPED = ("strike", "direction", "impulse", "scale", "sensor", "sensor_at", "sensor_direction", "fixed")
+UNSHAPED = ("strike", "direction", "impulse", "scale", "sensor", "sensor_at", "sensor_direction", "fixed", "medium")
 
 
 def run_residual(source: str, *, output: str, picture: str | None, json_to: str | None, **one: Any) -> None:
@@ -22,16 +22,14 @@ def run_residual(source: str, *, output: str, picture: str | None, json_to: str 
         raise FileError(f"cannot write {output}: presets are JSON files", "end the name with .json")
     if picture is not None and not picture.endswith((".png", ".pdf", ".svg")):
         raise FileError(f"cannot write {picture}: pictures are .png, .pdf or .svg", "end the name with one of them")
-    for place in (output, picture, json_to if json_to != "-" else None):
-        if place is not None:
-            check_output(place)
+    to, picture, json_to = places(output, picture, json_to)
     with clean_stdout(json_to) as say:
         from sonic_bullet.presets import write_preset
 
         whole = Path(source).is_dir() or Path(source).name == "case.json" or one["mesh"] is not None
         with status(source) as progress:
             preset, strikes = (_shaped if whole else _unshaped)(source, one, progress)
-        write_preset(output, preset)
+        write_preset(str(to), preset)
         if picture is not None:
             from sonic_bullet.plots.residual_plot import write_residual_picture
 
@@ -49,7 +47,12 @@ def _shaped(source: str, one: dict[str, Any], progress: Any) -> tuple[Any, Any]:
     from sonic_bullet.estimator.residual.recorded_strikes import case_strikes
     from sonic_bullet.residual.code import form_of
 
-    found = fit_case(as_case(source, one), progress=progress)
+    case = as_case(source, one)
+    warn(case.warnings)
+    if not any(r.split == "fit" and r.file is not None and r.object in case.objects and case.objects[r.object].mesh is not None for r in case.recordings):
+        raise FileError(f"case {case.name} has no 'fit' recording of an object with a mesh", "a residual is what a recording has beside its object's modes")
+    found = fit_case(case, progress=progress)
+    warn(found.warnings)
     progress("taking what is left")
     strikes = case_strikes(found)
     return msgspec.structs.replace(preset_of(found), residual=form_of(strikes.residual)), strikes
@@ -76,8 +79,10 @@ def _unshaped(source: str, one: dict[str, Any], progress: Any) -> tuple[Any, Any
     sound, sr = read_audio(source)
     if not sound.size:
         raise AudioError(f"{source} is empty", "give a recording of an impact")
+    observed = channel_of(sound, one["channel"] or 0, source)
+    warn(f"{source}: {words}" for words in [channel_words(len(sound), one["channel"])] if words)
     progress("looking for modes")
-    strikes = recording_strikes(sound[int(np.argmax((sound**2).sum(axis=1)))], sr, one["onset_s"], Path(source).name)
+    strikes = recording_strikes(observed, sr, one["onset_s"], Path(source).name)
     return msgspec.structs.replace(preset, residual=form_of(strikes.residual)), strikes
 
 

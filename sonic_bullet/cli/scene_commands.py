@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sonic_bullet.cli.output import clean_stdout, progress_bar, quiet_stderr, status, write_json
-from sonic_bullet.files import AudioReport, check_audio_output, check_output, check_sr, read_log, write_audio, write_log
+from sonic_bullet.cli.output import clean_stdout, places, progress_bar, quiet_stderr, status, write_json
+from sonic_bullet.files import AudioReport, check_audio_output, check_levels, check_sr, kept_name, read_log, write_audio, write_log
 from sonic_bullet.records.errors import AudioError, FileError, SceneError, SonicBulletError
 
 if TYPE_CHECKING:
@@ -39,18 +39,18 @@ def run_render(
     """The `render` command. Raises SonicBulletError, and KeyboardInterrupt whose text names the file with what was rendered so far."""
     rate = None if sr is None else check_sr(sr)
     _check_request(scene, seconds, peak_dbfs, lufs, material)
-    _check_places(output, contacts, picture, json_to)
+    to, contacts, picture, json_to = _check_places(output, contacts, picture, json_to)
     with clean_stdout(json_to) as say:
         try:
             with progress_bar(Path(scene).name) as (progress, tell):
                 wish = _Wish(seconds, rate, microphones, seed, material, residual, progress, tell)
                 result: RenderResult | _Replay = _replayed(scene, wish) if _is_log(scene) else _simulated(scene, wish)
         except (SonicBulletError, KeyboardInterrupt) as error:
-            raise _with_partial(error, output, peak_dbfs, lufs) from error
-        if contacts:
+            raise _with_partial(error, to, output, peak_dbfs, lufs) from error
+        if contacts is not None:
             write_log(contacts, result.log)
-        report = write_audio(output, result.samples, result.sr, peak_dbfs=peak_dbfs, lufs=lufs)
-        if picture:
+        report = replace(_written(to, result, peak_dbfs, lufs), path=output)
+        if picture is not None:
             from sonic_bullet.plots.scene_plot import render_picture
 
             render_picture(picture, result.samples, result.sr, result.log, Path(scene).name)
@@ -63,8 +63,7 @@ def run_render(
 
 def run_doctor(scene: str, seconds: float, json_to: str | None) -> None:
     """The `doctor` command. Raises SonicBulletError."""
-    if json_to not in (None, "-"):
-        check_output(str(json_to))
+    (json_to,) = places(json_to)
     if _is_log(scene):
         raise SceneError(f"{scene} is a contact log, which has no settings", "give the scene it came from")
     with clean_stdout(json_to) as say:
@@ -88,8 +87,7 @@ def _is_log(scene: str) -> bool:
 def _check_request(scene: str, seconds: float | None, peak_dbfs: float | None, lufs: float | None, material: str | None) -> None:
     if seconds is not None and not 0 < seconds < 1e6:
         raise AudioError(f"{seconds} seconds cannot be rendered", "give --seconds above 0")
-    if peak_dbfs is not None and lufs is not None:
-        raise AudioError("both a peak and a loudness are asked for", "give one of --peak-dbfs and --lufs")
+    check_levels(peak_dbfs, lufs)
     if not Path(scene).is_file():
         raise FileError(f"cannot read {scene}: no such file", "give a scene (.py) or a contact log (.npz)")
     if Path(scene).suffix.lower() not in (".py", ".npz"):
@@ -102,21 +100,17 @@ def _check_request(scene: str, seconds: float | None, peak_dbfs: float | None, l
         load_material(material)
 
 
-def _check_places(output: str, contacts: str | None, picture: str | None, json_to: str | None) -> None:
-    """All outputs can be written, and no two are one file: before anything is simulated."""
-    places = [check_audio_output(output)[0]]
-    if contacts:
-        if not contacts.endswith(".npz"):
-            raise FileError(f"cannot write {contacts}: contact logs are npz files", "end the name with .npz")
-        places.append(check_output(contacts))
-    if picture:
+def _check_places(output: str, contacts: str | None, picture: str | None, json_to: str | None) -> tuple[str, str | None, str | None, str | None]:
+    """Where all outputs go, absolute: each can be written, and no two are one file, before anything is simulated. Raises FileError."""
+    check_audio_output(output)
+    if contacts is not None and not contacts.endswith(".npz"):
+        raise FileError(f"cannot write {contacts}: contact logs are npz files", "end the name with .npz")
+    if picture is not None:
         from sonic_bullet.plots.scene_plot import check_picture_output
 
-        places.append(check_picture_output(picture))
-    if json_to not in (None, "-"):
-        places.append(check_output(str(json_to)))
-    if len(set(places)) < len(places):
-        raise FileError("two outputs have one name", "give each its own")
+        check_picture_output(picture)
+    to, *others = places(output, contacts, picture, json_to)
+    return str(to), others[0], others[1], others[2]
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,7 +158,7 @@ def _replayed(path: str, wish: _Wish) -> _Replay:
     import numpy as np
 
     from sonic_bullet.records import Microphone
-    from sonic_bullet.render import render_log
+    from sonic_bullet.render import render_log, silence_notes
 
     log = read_log(path)
     if wish.microphones:
@@ -176,23 +170,33 @@ def _replayed(path: str, wish: _Wish) -> _Replay:
             raise AudioError(f"{path} lasts {log.duration_s:.3f} s, shorter than {seconds} s", "give fewer seconds, or simulate the scene for longer")
         log = replace(log, steps=tuple(step for step, start in zip(log.steps, log.start_s, strict=True) if start < seconds - 1e-9))
     samples = render_log(log, sr=wish.rate, residual=wish.residual, progress=wish.progress, say=wish.say)
-    return _Replay(samples, log, wish.rate or log.sr)
+    return _Replay(samples, log, wish.rate or log.sr, silence_notes(samples, log))
+
+
+def _written(output: str, result: RenderResult | _Replay, peak_dbfs: float | None, lufs: float | None) -> AudioReport:
+    """The sound as a file. Where silence keeps it from being one, the error says why it is silent."""
+    from sonic_bullet.render import why_silent
+
+    try:
+        return write_audio(output, result.samples, result.sr, peak_dbfs=peak_dbfs, lufs=lufs)
+    except AudioError as error:
+        reason = None if result.samples.any() else why_silent(result.log)
+        raise AudioError(error.what, reason) if reason else error from error
 
 
 def _with_partial(
-    error: SonicBulletError | KeyboardInterrupt, output: str, peak_dbfs: float | None, lufs: float | None
+    error: SonicBulletError | KeyboardInterrupt, to: str, output: str, peak_dbfs: float | None, lufs: float | None
 ) -> SonicBulletError | KeyboardInterrupt:
-    """The error, its text naming NAME.partial.EXT, where what was rendered before it is written as a valid file."""
+    """The error, its text naming NAME.partial.EXT as the user would, where what was rendered before it is written as a valid file beside ``to``."""
     result: RenderResult | None = getattr(error, "partial", None)
     said = ""
-    if result is not None and result.samples.shape[-1] > 0:
-        target = Path(output)
-        partial = target.with_name(f"{target.stem}.partial{target.suffix}")
+    if result is not None and result.samples.size:
+        partial = kept_name(Path(to))
         try:
             write_audio(partial, result.samples, result.sr, peak_dbfs=peak_dbfs, lufs=lufs)
         except AudioError:
             write_audio(partial, result.samples, result.sr)  # silent or too short for the level asked for: kept as it is
-        said = f"the first {result.samples.shape[-1] / result.sr:.3f} s are in {partial}"
+        said = f"the first {result.samples.shape[-1] / result.sr:.3f} s are in {kept_name(Path(output))}"
     if isinstance(error, SonicBulletError):
         return type(error)(error.what, "; ".join(part for part in (error.remedy, said) if part))
     return KeyboardInterrupt("; ".join(part for part in (str(error) or "stopped", said) if part))

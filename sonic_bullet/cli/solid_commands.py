@@ -6,8 +6,8 @@ import math
 from dataclasses import replace
 from typing import Any
 
-from sonic_bullet.cli.output import clean_stdout, status, table, write_json
-from sonic_bullet.files import check_output, write_model
+from sonic_bullet.cli.output import clean_stdout, places, status, table, write_json
+from sonic_bullet.files import write_model
 from sonic_bullet.records import Material, ModalModel
 from sonic_bullet.records.errors import FileError, MaterialError
 from sonic_bullet.records.units import HEARING_LIMIT_HZ
@@ -33,9 +33,7 @@ def run_modes(
     """The `modes` command. Raises SonicBulletError."""
     if output is not None and not output.endswith(".npz"):
         raise FileError(f"cannot write {output}: modal models are npz files", "end the name with .npz")
-    for place in (output, json_to if json_to != "-" else None):
-        if place is not None:
-            check_output(place)
+    to, json_to = places(output, json_to)
     if count is not None and to_hz is not None:
         raise FileError("both --count and --to-hz are given", "give one of them")
     made = chosen_material(material, youngs_pa, poisson, density_kg_m3)
@@ -46,8 +44,8 @@ def run_modes(
         with status(mesh) as progress:
             shape = read_mesh(mesh, scale)
             model = modal.analyse((shape,), made, count=count, fixed=fixed, thickness_m=thickness_m, progress=progress, to_hz=to_hz or HEARING_LIMIT_HZ)
-        if output is not None:
-            write_model(output, model)
+        if to is not None:
+            write_model(to, model)
         say(_told(mesh, made, model))
     write_json(json_to, _described(mesh, made, model, output))
 

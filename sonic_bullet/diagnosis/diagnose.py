@@ -19,15 +19,15 @@ from sonic_bullet.diagnosis.evidence.baseline import baseline
 from sonic_bullet.diagnosis.prediction.hypothesis import play
 from sonic_bullet.diagnosis.prediction.line_score import CAP, listed, off_by
 from sonic_bullet.diagnosis.prediction.loudness_distance import sone_distance
-from sonic_bullet.diagnosis.prediction.score import Take, least_db, mean_db
+from sonic_bullet.diagnosis.prediction.score import Compared, LeftOut, Take, comparable, least_db, mean_db
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
-from sonic_bullet.diagnosis.remainder import remainder
-from sonic_bullet.diagnosis.selection.stepwise import Closed, closed
+from sonic_bullet.diagnosis.remainder import listing, remainder
+from sonic_bullet.diagnosis.selection.stepwise import Closed, NothingCompared, closed
 from sonic_bullet.effects import EFFECTS
 from sonic_bullet.effects.protocol import Effect
 from sonic_bullet.estimator.fit.case_fit import CaseFit
-from sonic_bullet.estimator.fit.observed import gather, onset_sample, until_it_breaks_off
-from sonic_bullet.files import read_audio
+from sonic_bullet.estimator.fit.observed import check_meshes, gather, onset_sample, until_it_breaks_off
+from sonic_bullet.files import channel_of, read_audio
 from sonic_bullet.files.cases import Case, CaseRecording, read_case
 from sonic_bullet.modal.cache import Place
 from sonic_bullet.parallel import one_thread
@@ -38,7 +38,8 @@ SPLITS = ("fit", "holdout", "transfer")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Diagnosis:
-    """What the model lacks. errors, errors_sone: {"before": {split: …}, "after": {split: …}, "floor": …}, None where there is no audio.
+    """What the model lacks. errors, errors_sone: {"before": {split: …}, "after": {split: …}, "floor": …}, None where there is no audio,
+    or none of it could be compared. not_compared: by split, what could not be; empty where all could.
 
     errors_lines: likewise for measured lines in place of audio, of ln f and ln d. unexplained: what is left, in words and numbers; empty where nothing is. warnings: one line each, the fit's among them.
     """
@@ -47,11 +48,12 @@ class Diagnosis:
     found: CaseFit
     bodies: tuple[Struck, ...]
     takes: tuple[Take, ...]
-    closed: Closed
+    closed: Closed | NothingCompared
     errors: dict[str, Any]
     errors_sone: dict[str, Any]
     errors_lines: dict[str, Any]
     unexplained: dict[str, Any]
+    not_compared: dict[str, tuple[LeftOut, ...]]
     warnings: tuple[str, ...]
 
     @property
@@ -75,28 +77,41 @@ def diagnose(
     if not isinstance(case, Case):
         case = read_case(case)
     say = progress or (lambda _: None)
+    check_meshes(case, (r.object for r in case.recordings))
     recorded = gather(case, cache=cache, progress=progress, clipped=True)
     start = baseline(case, recorded, cache=cache, progress=progress)
     found, bodies, takes = start.found, start.bodies, start.takes
     end = closed(start.hypothesis, bodies, takes or listed(bodies), effects, case.band_hz, seed=seed, progress=progress)
     say("comparing with what was not fitted")
     every = {"fit": takes} | {split: _others(case, bodies, takes, split) for split in SPLITS[1:]}
-    errors: dict[str, Any] = {"before": {}, "after": {}, "floor": least_db(takes, end.after)}
+    errors: dict[str, Any] = {"before": {}, "after": {}, "floor": None}
     sone: dict[str, Any] = {"before": {}, "after": {}, "floor": None}
+    out: dict[str, tuple[LeftOut, ...]] = {"fit": end.left_out} if end.left_out else {}
     for split, mine in every.items():
+        held = comparable(mine, end.before)
+        out |= {split: held.left_out} if held.left_out else {}
         for name, h in (("before", end.before), ("after", end.after)):
-            errors[name][split] = mean_db(mine, h)
-            sone[name][split] = sone_distance(mine, h)
-    few = ("one strike alone: nothing can be left out, so no effect can be named; record more strikes",) if len(takes) == 1 else ()
-    coarse = (
-        (f"upper modes are up to {100 * end.mesh_off:.1f} % off, more than is corrected: what is left open is the mesh's; a finer one closes it",)
-        if end.mesh_off
-        else ()
-    )
-    return Diagnosis(case, found, bodies, takes, end, errors, sone, _of_lines(case, bodies, end), remainder(end, takes), (*found.warnings, *few, *coarse))
+            errors[name][split] = mean_db(held.takes, h) if isinstance(held, Compared) else None
+            sone[name][split] = sone_distance(held.takes, h) if isinstance(held, Compared) else None
+        if split == "fit" and isinstance(held, Compared):
+            errors["floor"] = least_db(held.takes, end.after)
+    left, warnings = remainder(end, takes), (*found.warnings, *_warnings(end, out))
+    return Diagnosis(case, found, bodies, takes, end, errors, sone, _of_lines(case, bodies, end), left, out, warnings)
 
 
-def _of_lines(case: Case, bodies: tuple[Struck, ...], end: Closed) -> dict[str, Any]:
+def _warnings(end: Closed | NothingCompared, out: dict[str, tuple[LeftOut, ...]]) -> list[str]:
+    """What a verdict does not rest on, and what stands in its way: a line each."""
+    said = [f"{len(one)} of split '{split}' could not be compared: {listing(one)}" for split, one in out.items()]
+    if isinstance(end, NothingCompared):
+        return said
+    if len(end.judged) == 1:
+        said.append("one strike alone: nothing can be left out, so no effect can be named; record more strikes")
+    if end.mesh_off:
+        said.append(f"upper modes are up to {100 * end.mesh_off:.1f} % off, more than is corrected: what is left open is the mesh's; a finer one closes it")
+    return said
+
+
+def _of_lines(case: Case, bodies: tuple[Struck, ...], end: Closed | NothingCompared) -> dict[str, Any]:
     """Rms of ln f and of ln d of measured lines that came in place of audio, before and after, by split; empty where there are none."""
     found: dict[str, Any] = {}
     for body in bodies:
@@ -123,7 +138,7 @@ def _others(case: Case, bodies: tuple[Struck, ...], takes: tuple[Take, ...], spl
                 continue
             sample, sr = read_audio(r.file)
             start = onset_of(case, bodies, sr)
-            found.append(Take(body, i, until_it_breaks_off(sample[r.channel], sr)[start:], sr, takes[0].floor))
+            found.append(Take(body, i, until_it_breaks_off(channel_of(sample, r.channel, r.file), sr)[start:], sr, takes[0].floor))
     return tuple(found)
 
 
@@ -134,7 +149,7 @@ def onset_of(case: Case, bodies: tuple[Struck, ...], sr: int) -> int:
     files = [
         (r.file, r.channel) for body in bodies if body.recorded is not None and body.recorded.signals is not None for r in body.recorded.recordings if r.file
     ]
-    late = [onset_sample(read_audio(file)[0][channel], sr) for file, channel in files]
+    late = [onset_sample(channel_of(read_audio(file)[0], channel, file), sr) for file, channel in files]
     return int(np.median(late)) if late else 0
 
 
@@ -185,6 +200,7 @@ def described(d: Diagnosis) -> dict[str, Any]:
         "errors_sone": d.errors_sone,
         **({"errors_lines": d.errors_lines} if d.errors_lines else {}),
         "unexplained": d.unexplained,
+        "not_compared": [{"split": split, "name": one.name, "why": one.why} for split, left in d.not_compared.items() for one in left],
         "baseline": {
             "alpha_per_s": d.closed.before.alpha_per_s,
             "beta_s": d.closed.before.beta_s,
@@ -194,7 +210,7 @@ def described(d: Diagnosis) -> dict[str, Any]:
             "correction_rms": {b.name: float(np.sqrt((b.correction**2).mean())) if len(b.correction) else 0.0 for b in d.bodies if b.recorded is not None},
         },
         "after": {"alpha_per_s": d.closed.after.alpha_per_s, "beta_s": d.closed.after.beta_s, "gain": d.closed.after.gain},
-        "warnings": list(d.warnings),
+        "warnings": [*d.case.warnings, *d.warnings],
     }
     return {name: _finite(value) for name, value in whole.items()}
 

@@ -5,23 +5,31 @@ e = |recorded − played|² in third octaves and thirds of the time, over the re
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, play
-from sonic_bullet.diagnosis.prediction.score import Take
+from sonic_bullet.diagnosis.prediction.score import LeftOut, Take
+from sonic_bullet.diagnosis.selection.band_levels import in_words
 from sonic_bullet.diagnosis.selection.coherent_residual import of_no_body
-from sonic_bullet.diagnosis.selection.stepwise import NO_BODY, Closed
+from sonic_bullet.diagnosis.selection.stepwise import NO_BODY, Closed, NothingCompared
 from sonic_bullet.effects.room.shifted_echo import copied
 from sonic_bullet.records import Array
 
 WINDOW = 1024
 SHOWN = 4
+NOTHING = "nothing could be compared"
 
 
-def remainder(end: Closed, takes: tuple[Take, ...]) -> dict[str, Any]:
+def remainder(end: Closed | NothingCompared, takes: Sequence[Take]) -> dict[str, Any]:
     """Of the last hypothesis; empty where the verdict leaves nothing open or there is no audio."""
+    if isinstance(end, NothingCompared):
+        return {"left_db": None, "words": f"{NOTHING}: {listing(end.left_out) or 'nothing was measured'}"}
+    judged = {(t.body.name, t.strike) for t in end.judged if isinstance(t, Take)}
+    takes = [t for t in takes if (t.body.name, t.strike) in judged]
     if end.verdict != "unexplained" or not takes:
         return {}
     share, band_hz, level = _shares(takes, end.after)
@@ -33,7 +41,8 @@ def remainder(end: Closed, takes: tuple[Take, ...]) -> dict[str, Any]:
     slope = _slope(np.log(level), np.log(np.maximum(total, 1e-9))) if np.ptp(np.log(level)) > 0.3 and len(total) > 2 else None
     scatter = float(np.std(np.log(np.maximum(total, 1e-9))))
     thirds = ["first", "second", "last"]
-    words = f"most of it in the {thirds[int(np.nanargmax(when))]} third of the recordings, around " + ", ".join(
+    words = in_words(end.bands) + "; " if end.bands else ""
+    words += f"most of it in the {thirds[int(np.nanargmax(when))]} third of the recordings, around " + ", ".join(
         f"{b['from_hz']:.0f} to {b['to_hz']:.0f} Hz" for b in bands[:2]
     )
     if slope is not None:
@@ -56,6 +65,7 @@ def remainder(end: Closed, takes: tuple[Take, ...]) -> dict[str, Any]:
         "left_db": end.after_db - end.floor_db,
         "words": words,
         "bands": bands,
+        "bands_off": [asdict(band) for band in end.bands],
         "when": dict(zip(thirds, when, strict=True)),
         "slope_against_impulse": slope,
         "scatter_over_strikes": scatter,
@@ -64,13 +74,19 @@ def remainder(end: Closed, takes: tuple[Take, ...]) -> dict[str, Any]:
     }
 
 
-def _again(takes: tuple[Take, ...]) -> float | None:
+def listing(left_out: Sequence[LeftOut]) -> str:
+    """The first SHOWN of what could not be compared, each with its reason."""
+    said = "; ".join(map(str, left_out[:SHOWN]))
+    return f"{said}; and {len(left_out) - SHOWN} more" if len(left_out) > SHOWN else said
+
+
+def _again(takes: Sequence[Take]) -> float | None:
     """The ratio of frequencies at which a body's lines are heard again, if they are."""
     recorded = [g for body in {id(t.body): t.body for t in takes}.values() if (g := body.recorded) is not None]
     return next((r for g in recorded if (r := copied(g.lines.freq_hz, g.lines.decay_per_s, g.lines.amplitude)) is not None), None)
 
 
-def _shares(takes: tuple[Take, ...], h: Hypothesis) -> tuple[Array, Array, Array]:
+def _shares(takes: Sequence[Take], h: Hypothesis) -> tuple[Array, Array, Array]:
     """Energy left over the recording's (s, 3, f), band edges (f + 1,) in Hz, impulses (s,)."""
     sr = takes[0].sr
     edges = 1000 * 2.0 ** (np.arange(-17, 14) / 3)

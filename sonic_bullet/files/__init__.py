@@ -1,14 +1,15 @@
 """Audio and npz in and out: what reaches a disk is whole, finite and said.
 
-    samples (channels, n) Pa -> scale -> check -> clip and count -> NAME.partial.EXT -> fsync -> NAME.EXT
-    ContactLog | ModalModel  -> arrays + one JSON entry, no pickle -> NAME.EXT.*.partial -> fsync -> NAME.EXT
+    samples (channels, n) Pa -> scale -> check -> clip and count -> partial file -> read back -> fsync -> NAME.EXT
+    ContactLog | ModalModel  -> arrays + one JSON entry, no pickle -> partial file -> fsync -> NAME.EXT
 
 `audio` writes sound, `logs` writes contact logs and modal models (their format is described there), `container` is the npz
 beneath them, `atomic` the replacing.
 """
 
-from sonic_bullet.files.atomic import check_output, replacing
-from sonic_bullet.files.audio import AudioReport, AudioWriter, check_audio_output, check_sr, read_audio, write_audio
+from sonic_bullet.files.atomic import cannot, check_output, kept_name, replacing
+from sonic_bullet.files.audio import AudioReport, AudioWriter, check_audio_output, check_levels, check_sr, read_audio, write_audio
+from sonic_bullet.files.channels import channel_of, channel_words
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.logs import read_log, read_model, write_log, write_model
 
@@ -16,9 +17,14 @@ __all__ = [
     "AudioReport",
     "AudioWriter",
     "ContactLog",
+    "cannot",
+    "channel_of",
+    "channel_words",
     "check_audio_output",
+    "check_levels",
     "check_output",
     "check_sr",
+    "kept_name",
     "read_audio",
     "read_log",
     "read_model",

@@ -7,13 +7,16 @@
 Float files hold y as it is, above full scale too. Every other format holds |y| ≤ 1: what is beyond is clipped and counted in
 `AudioReport.clipped`. float32 subnormals are flushed to zero (decaying tails are full of them, and they slow every player), NaN and
 infinities are refused. The same samples give the same bytes, except in OGG, whose streams carry a random serial number.
+
+libsndfile says neither why a write failed nor, when it closes, whether one did: before a file gets its name it is read to its end and its
+rate, channels and frames are compared with what was written; where they differ the disk itself is asked why.
 """
 
 from __future__ import annotations
 
 import math
 import os
-import secrets
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -21,8 +24,10 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.files.atomic import cannot, check_output, sync
+from sonic_bullet.files.atomic import cannot, check_output, kept_name
+from sonic_bullet.machine.partial_file import PartialFile
 from sonic_bullet.records import Array
+from sonic_bullet.records.coerce import as_number, as_path, as_text, as_whole, brief, nearest, shown
 from sonic_bullet.records.errors import AudioError, FileError, SonicBulletError
 
 FORMATS = {
@@ -72,14 +77,12 @@ class AudioReport:
 
 def check_sr(sr: object) -> int:
     """``sr`` as a whole number of Hz between 8000 and 384 000. Raises AudioError on anything else."""
-    if isinstance(sr, bool) or not hasattr(sr, "__float__"):
-        raise AudioError(f"sample rate {sr!r} is not a number", "give it in Hz, 48000 say")
-    rate = float(sr)
-    if not math.isfinite(rate) or not SR_MIN_HZ <= rate <= SR_MAX_HZ:
-        raise AudioError(f"sample rate {rate:g} Hz is out of range", f"give one between {SR_MIN_HZ} and {SR_MAX_HZ} Hz, 48000 say")
-    if rate != int(rate):
-        raise AudioError(f"sample rate {rate!r} Hz is not whole", "give a whole number of Hz, 48000 say")
-    return int(rate)
+    remedy = f"give a whole number of Hz between {SR_MIN_HZ} and {SR_MAX_HZ}, 48000 say"
+    try:
+        return as_whole(sr, "sr", remedy, least=SR_MIN_HZ, most=SR_MAX_HZ, error=AudioError)
+    except AudioError:
+        said = f"{sr:g} Hz" if isinstance(sr, float) else f"{shown(sr)} Hz"
+        raise AudioError(f"sr: sample rate {said} cannot be", remedy) from None
 
 
 def check_audio_output(path: str | os.PathLike[str], subtype: str | None = None) -> tuple[Path, str, str]:
@@ -87,26 +90,28 @@ def check_audio_output(path: str | os.PathLike[str], subtype: str | None = None)
 
     Raises FileError where the place cannot be written or the extension or subtype is unknown.
     """
+    path = as_path(path, "path", "name a sound file, such as out.wav")
     extension = Path(path).suffix.lower()
     if extension not in FORMATS:
-        raise FileError(f"cannot write {path}: '{extension}' is no audio format known here", f"end the name with one of {' '.join(FORMATS)}")
+        raise FileError(f"cannot write {brief(path)}: {shown(extension)} is no audio format known here", f"end the name with one of {' '.join(FORMATS)}")
     target = check_output(path)
     container, default = FORMATS[extension]
-    wanted = default if subtype is None else subtype.upper()
+    wanted = default if subtype is None else as_text(subtype, "subtype", "give one of libsndfile's names, PCM_16 say", error=FileError).upper()
     if wanted != default:
         import soundfile
 
         if not soundfile.check_format(container, wanted):
-            known = " ".join(soundfile.available_subtypes(container))
-            raise FileError(f"cannot write {path}: {container} holds no {wanted} samples", f"one of {known}")
+            known = list(soundfile.available_subtypes(container))
+            raise FileError(f"cannot write {brief(path)}: {container} holds no subtype {shown(wanted)}", nearest(wanted, known))
     return target, container, wanted
 
 
 class AudioWriter:
     """An audio file that grows block by block; a context manager.
 
-    `write` takes (channels, n) pascals, into NAME.<random>.partial.EXT; leaving the block renames that to NAME.EXT. Leaving it with an
-    error, or with Ctrl-C, closes what was written as a valid file NAME.partial.EXT and says so in the error; NAME.EXT is untouched.
+    `write` takes (channels, n) pascals, into a partial file; leaving the block gives that the name NAME.EXT, once it has been read back.
+    Leaving it with an error, or with Ctrl-C, keeps what was written as a valid file NAME.partial.EXT and says so in the error; NAME.EXT is
+    untouched.
     gain_per_pa: file units for one pascal. expected_frames: chooses RF64 over WAV where the file will pass 4 GiB.
     """
 
@@ -125,8 +130,6 @@ class AudioWriter:
 
         self.path = os.fspath(path)
         self.target, self.format, self.subtype = check_audio_output(path, subtype)
-        self.temporary = self.target.with_name(f"{self.target.stem}.{secrets.token_hex(4)}.partial{self.target.suffix}")
-        self.partial = self.target.with_name(f"{self.target.stem}.partial{self.target.suffix}")
         self.sr, self.channels, self.gain_per_pa = check_sr(sr), channels, float(gain_per_pa)
         if not (math.isfinite(self.gain_per_pa) and self.gain_per_pa > 0):
             raise AudioError(f"a gain of {gain_per_pa} per Pa", "give a full scale above zero")
@@ -136,12 +139,16 @@ class AudioWriter:
         self.frames = self.clipped = self.over = 0
         self.peak_pa = self.energy_pa2 = 0.0
         try:
-            self.temporary.touch()  # libsndfile does not say why it could not
-            self.file: Any = soundfile.SoundFile(self.temporary, "w", self.sr, channels, self.subtype, format=self.format)
+            self.partial = PartialFile(self.target.parent)
         except OSError as error:
             raise cannot("write", path, error) from error
+        try:
+            self.file: Any = soundfile.SoundFile(self.partial.fd, "w", self.sr, channels, self.subtype, format=self.format, closefd=False)
         except soundfile.LibsndfileError as error:
-            self.temporary.unlink(missing_ok=True)
+            reason = self.partial.refusal()
+            self.partial.close()
+            if reason is not None:
+                raise cannot("write", path, reason) from error
             raise AudioError(f"cannot write {channels} channels at {self.sr} Hz to {path}: {error.error_string}", "write .wav, or fewer channels") from error
 
     @property
@@ -177,8 +184,7 @@ class AudioWriter:
         try:
             self.file.write(scaled.T)
         except (soundfile.LibsndfileError, AssertionError) as error:  # soundfile asserts that all was written: a full disk
-            reason = getattr(error, "error_string", "the disk took only a part of it")
-            raise FileError(f"cannot write {self.path}: {reason}", "free space or choose another place") from error
+            raise self._refused() from error
         self.frames += block.shape[1]
         if block.size:
             self.peak_pa = max(self.peak_pa, float(np.abs(block).max()))
@@ -195,39 +201,70 @@ class AudioWriter:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        import soundfile
-
         try:
-            self.file.close()
+            with suppress(RuntimeError):  # LibsndfileError: what became of the file is seen when it is read back
+                self.file.close()
             if error is None:
-                _forget_time(self.temporary)
-                sync(self.temporary)
-                os.replace(self.temporary, self.target)
-            elif self.frames:
-                os.replace(self.temporary, self.partial)
-        except (OSError, soundfile.LibsndfileError) as failure:
-            reason = failure if isinstance(failure, OSError) else OSError(str(failure))
-            raise cannot("write", self.path, reason) from error or failure
+                self._name_it()
+                return
+            kept = self._keep()
+        except OSError as failure:
+            raise cannot("write", self.path, failure) from error or failure
         finally:
-            self.temporary.unlink(missing_ok=True)
-        if error is None or self.frames == 0:
+            self.partial.close()
+        if not kept:
             return
-        saved = f"the first {self.frames / self.sr:.3f} s are in {self.partial}"
+        saved = f"the first {kept / self.sr:.3f} s are in {kept_name(self.target)}"
         if isinstance(error, SonicBulletError):
             raise type(error)(error.what, f"{error.remedy}; {saved}" if error.remedy else saved) from error
         if isinstance(error, KeyboardInterrupt):
             raise KeyboardInterrupt(f"stopped; {saved}") from error
         error.add_note(saved)
 
+    def _name_it(self) -> None:
+        """Give the whole file its name. Raises FileError, OSError."""
+        if self._read_back() != self.frames:
+            raise self._refused()
+        _forget_time(self.partial.fd)
+        self.partial.replace(self.target)
 
-def _forget_time(path: Path) -> None:
+    def _keep(self) -> int:
+        """Keep what can be read of an unfinished file beside its target; how many frames that is. Raises OSError."""
+        frames = self._read_back() if self.frames else 0
+        if frames:
+            self.partial.replace(kept_name(self.target))
+        return frames
+
+    def _refused(self) -> FileError:
+        """Why the file is not what was written to it, by what the disk says."""
+        reason = self.partial.refusal() or OSError("the disk took only a part of it")
+        return cannot("write", self.path, reason)
+
+    def _read_back(self) -> int:
+        """How many frames the closed file holds, decoded to its end; -1 where it is of another rate or number of channels, 0 where it cannot be read."""
+        import soundfile
+
+        os.lseek(self.partial.fd, 0, os.SEEK_SET)
+        frames = 0
+        try:
+            with soundfile.SoundFile(self.partial.fd, closefd=False) as file:
+                if (file.samplerate, file.channels) != (self.sr, self.channels):
+                    return -1
+                while count := len(file.read(BLOCK_FRAMES, dtype="float32", always_2d=True)):
+                    frames += count
+        except (soundfile.LibsndfileError, AssertionError):
+            pass
+        return frames
+
+
+def _forget_time(fd: int) -> None:
     """Zero the time of day that libsndfile puts into the PEAK chunk (id, size, version, time) of float files: equal sound, equal bytes."""
-    with path.open("rb+") as file:
-        head = file.read(512)
-        found = head.split(b"data")[0].split(b"SSND")[0].find(b"PEAK")
-        if found >= 0:
-            file.seek(found + 12)
-            file.write(bytes(4))
+    os.lseek(fd, 0, os.SEEK_SET)
+    head = os.read(fd, 512)
+    found = head.split(b"data")[0].split(b"SSND")[0].find(b"PEAK")
+    if found >= 0:
+        os.lseek(fd, found + 12, os.SEEK_SET)
+        os.write(fd, bytes(4))
 
 
 def write_audio(
@@ -248,10 +285,12 @@ def write_audio(
     """
     rate = check_sr(sr)
     check_audio_output(path, subtype)
-    sound = np.asarray(samples, float)
+    check_levels(peak_dbfs, lufs)
+    full_scale_pa = as_number(full_scale_pa, "full_scale_pa", "give a full scale in Pa, above zero", above=0, error=AudioError)
+    sound = as_sound(samples)
     sound = sound[None, :] if sound.ndim == 1 else sound
     if sound.ndim != 2 or sound.shape[0] == 0:
-        raise AudioError(f"samples of shape {np.shape(samples)}", "pass (channels, n)")
+        raise AudioError(f"samples of shape {sound.shape}", "pass (channels, n)")
     gain = _gain_per_pa(sound, rate, peak_dbfs, lufs, full_scale_pa)
     with AudioWriter(path, rate, sound.shape[0], gain_per_pa=gain, subtype=subtype, expected_frames=sound.shape[1]) as writer:
         for start in range(0, sound.shape[1], BLOCK_FRAMES):
@@ -262,22 +301,37 @@ def write_audio(
 def _gain_per_pa(sound: Array, sr: int, peak_dbfs: float | None, lufs: float | None, full_scale_pa: float) -> float:
     """The factor g of the module's head; peak and loudness are of the whole sound."""
     if peak_dbfs is None and lufs is None:
-        if not (math.isfinite(full_scale_pa) and full_scale_pa > 0):
-            raise AudioError(f"a full scale of {full_scale_pa} Pa", "give one above zero")
         return 1 / full_scale_pa
-    if peak_dbfs is not None and lufs is not None:
-        raise AudioError("both a peak and a loudness are asked for", "give one of --peak-dbfs and --lufs")
-    level = peak_dbfs if peak_dbfs is not None else lufs
-    if level is None or not -200 <= level <= 200:
-        raise AudioError(f"a level of {level} dB", "give one between -200 and 200 dB")
     peak = float(np.abs(sound).max()) if sound.size else 0.0
     if not math.isfinite(peak):
         raise AudioError("the samples hold NaN or infinite numbers", "sound must be finite: examine the scene with 'sonic-bullet doctor'")
     if peak < 1e-300:
         raise AudioError("the sound is silent, so no level can be given to it", "leave out --peak-dbfs and --lufs, or make something collide")
-    if lufs is None:
-        return float(10 ** (level / 20)) / peak
-    return float(10 ** ((level - _loudness_lufs(sound / peak, sr)) / 20)) / peak
+    if peak_dbfs is not None:
+        return float(10 ** (peak_dbfs / 20)) / peak
+    assert lufs is not None
+    return float(10 ** ((lufs - _loudness_lufs(sound / peak, sr)) / 20)) / peak
+
+
+def as_sound(samples: object) -> Array:
+    """Samples as float64. Raises AudioError where they are no array of real numbers."""
+    try:
+        sound = np.asarray(samples)
+        if sound.dtype.kind in "biuf":
+            return sound.astype(float, copy=False)
+    except ValueError:  # rows of several lengths
+        pass
+    raise AudioError(f"samples is {shown(samples)}", "pass real numbers, (channels, n)")
+
+
+def check_levels(peak_dbfs: float | None, lufs: float | None) -> None:
+    """Raise AudioError where a level cannot be asked for: before anything is rendered."""
+    if peak_dbfs is not None and lufs is not None:
+        raise AudioError("both peak_dbfs and lufs are given", "give one of a peak and a loudness")
+    if peak_dbfs is not None:
+        as_number(peak_dbfs, "peak_dbfs, a level re full scale,", "give one between -200 and 0 dB, -1 say", least=-200, most=0, error=AudioError)
+    if lufs is not None:
+        as_number(lufs, "lufs, a loudness level,", "give one between -200 and 200, -23 say", least=-200, most=200, error=AudioError)
 
 
 def _loudness_lufs(sound: Array, sr: int) -> float:
@@ -301,8 +355,13 @@ def read_audio(path: str | os.PathLike[str]) -> tuple[Array, int]:
     """
     import soundfile
 
-    if not Path(path).is_file():
-        raise FileError(f"cannot read {path}: no such file", "check the path")
+    path = as_path(path, "path", "name a sound file")
+    try:
+        there = Path(path).is_file()
+    except OSError:  # a name too long to be one
+        there = False
+    if not there:
+        raise FileError(f"cannot read {brief(path)}: no such file", "check the path")
     try:
         samples, sr = soundfile.read(os.fspath(path), dtype="float64", always_2d=True)
     except (soundfile.LibsndfileError, OSError) as error:

@@ -3,7 +3,7 @@
     FOLDER/case.json ("sonic-bullet-case/1") -> typed, every path inside the folder -> Case
 
 A case may lack a mesh, positions, impulses, a sensor, or give measured `features` in place of a file; what it does not declare is None and is
-found by the fit, or said to be unknown. Fields that this version does not know are left alone. Nothing in a case is ever executed.
+found by the fit, or said to be unknown. Fields that this version does not know are left alone, and named (`unread.py`). Nothing in a case is ever executed.
 """
 
 from __future__ import annotations
@@ -16,12 +16,16 @@ from typing import Any
 
 import msgspec
 
+from sonic_bullet.files.unread import shown, unread_fields
 from sonic_bullet.records.errors import FileError
 
 FORMAT = "sonic-bullet-case/1"
 BYTES_MAX = 1 << 24
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 SPLITS = ("fit", "holdout", "transfer")
+MEDIA = ("air", "none")
+IN_AIR = ("velocity", "pressure")
+"""Sensors of real things: what they recorded was in air where a case does not say otherwise."""
 Vector = tuple[float, float, float]
 
 
@@ -84,7 +88,7 @@ class _Recording(msgspec.Struct, frozen=True):
     object: str | None = None
     split: str = "fit"
     strike: _Strike = _Strike()
-    channel: int = 0
+    channel: int | None = None
 
 
 class _Raw(msgspec.Struct, frozen=True):
@@ -96,6 +100,7 @@ class _Raw(msgspec.Struct, frozen=True):
     sensor: _Sensor | None = None
     band_hz: tuple[float, float] | None = None
     onset: str | float | None = None
+    medium: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,7 +119,10 @@ class CaseObject:
 
 @dataclass(frozen=True, slots=True)
 class CaseRecording:
-    """One strike: an audio file or measured lines, on which object, for what use, and where and how hard; None where not declared."""
+    """One strike: an audio file or measured lines, on which object, for what use, and where and how hard; None where not declared.
+
+    channel: counted from 0; channel_named: whether the case says so, else it is the first.
+    """
 
     file: Path | None
     lines: tuple[Line, ...] | None
@@ -125,13 +133,15 @@ class CaseRecording:
     impulse_n_s: float | None = None
     channel: int = 0
     force: tuple[Path, int, float | None] | None = None
+    channel_named: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class Case:
     """A case. sensor: "velocity" (of the surface at sensor_m along sensor_direction, by object), "pressure" (a microphone), "sum" (of modes) or "unknown".
 
-    onset_s: when the impulse arrives in every file, or None. support: as declared, in words; clamps stand with the objects.
+    onset_s: when the impulse arrives in every file, or None. support: as declared, in words; clamps stand with the objects. medium: what the object radiates
+    into, "air", "none" or "unknown": as declared, else air where a microphone or a vibrometer heard it. warnings: of fields that are not read, one line each.
     """
 
     name: str
@@ -144,6 +154,8 @@ class Case:
     band_hz: tuple[float, float] = (20.0, 20_000.0)
     onset_s: float | None = None
     support: str = ""
+    medium: str = "unknown"
+    warnings: tuple[str, ...] = ()
 
 
 def read_case(folder: str | os.PathLike[str]) -> Case:
@@ -160,16 +172,17 @@ def read_case(folder: str | os.PathLike[str]) -> Case:
         raise FileError(f"case {path} is over 16 MiB", "give a case.json")
     try:
         raw = msgspec.json.decode(content, type=_Raw)
+        unread = unread_fields(msgspec.json.decode(content), _Raw, f"case {path}")
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
         raise FileError(f"case {path}: {error}", "mend that field; docs/measurements-fit.md describes the file") from error
     if raw.format != FORMAT:
         raise FileError(f"case {path} has format '{raw.format}', wanted '{FORMAT}'", "use a sonic_bullet that knows that format")
     if not raw.recordings:
         raise FileError(f"case {path} has no recordings", "list at least one strike")
-    return _case(raw, path)
+    return _case(raw, path, unread)
 
 
-def _case(raw: _Raw, path: Path) -> Case:
+def _case(raw: _Raw, path: Path, unread: tuple[str, ...]) -> Case:
     folder = path.parent
     clamps = raw.support.fixed if isinstance(raw.support, _Support) else ()
     for clamp in clamps:
@@ -185,7 +198,18 @@ def _case(raw: _Raw, path: Path) -> Case:
     if not 0 <= low < high:
         raise FileError(f"case {path}: band_hz is {low:g} to {high:g}", "give a low and a high frequency")
     places, directions = (_by_object(value, objects) for value in (sensor.position, sensor.direction))
-    return Case(raw.case or folder.name, folder, objects, recordings, _response(sensor), places, directions, (low, high), _onset(raw.onset), _said(raw.support))
+    observed = _response(sensor)
+    if raw.medium is not None and raw.medium not in MEDIA:
+        unread = (*unread, f"case {path}: medium '{shown(raw.medium)}' is not known (known: {', '.join(MEDIA)}): damping is fitted as a whole")
+    where = _onset(raw.onset), _said(raw.support), medium_of(raw.medium, observed)
+    return Case(raw.case or folder.name, folder, objects, recordings, observed, places, directions, (low, high), *where, unread)
+
+
+def medium_of(declared: str | None, sensor: str) -> str:
+    """What the object radiates into: "air", "none" or "unknown"."""
+    if declared is None:
+        return "air" if sensor in IN_AIR else "unknown"
+    return declared if declared in MEDIA else "unknown"
 
 
 def _object(name: str, thing: _Object, folder: Path, clamps: tuple[_Fixed, ...]) -> CaseObject:
@@ -216,6 +240,8 @@ def _recording(entry: _Recording, number: int, objects: dict[str, CaseObject], o
             raise FileError(
                 f"{where}: a feature of {line.freq_hz:g} Hz and decay {line.decay_per_s}", "give frequencies above zero and decays of at least zero"
             )
+    if entry.channel is not None and entry.channel < 0:
+        raise FileError(f"{where} has channel {entry.channel}", "channels are counted from 0")
     strike = entry.strike
     direction = strike.direction
     if direction is not None:
@@ -228,7 +254,8 @@ def _recording(entry: _Recording, number: int, objects: dict[str, CaseObject], o
     force = strike.force
     kept = (inside(path.parent, force.file), force.channel, force.newton_per_unit) if force is not None else None
     file = inside(path.parent, entry.file) if entry.file is not None else None
-    return CaseRecording(file, entry.features, name, entry.split, strike.position, direction, strike.impulse, entry.channel, kept)
+    observed = entry.channel or 0, kept, entry.channel is not None
+    return CaseRecording(file, entry.features, name, entry.split, strike.position, direction, strike.impulse, *observed)
 
 
 def inside(folder: Path, name: str) -> Path:

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from sonic_bullet.records import Air, Array, Body, Sensor
+from sonic_bullet.records.coerce import as_items, as_kind, as_kinds, as_path, as_whole, shown
 from sonic_bullet.records.contacts import Contacts, Step
 from sonic_bullet.records.errors import LogError
 
@@ -31,6 +32,18 @@ class ContactLog:
     untouched: frozenset[int] = frozenset()
 
     def __post_init__(self) -> None:
+        ids = ("give ids of bodies",)
+        checked = {
+            "bodies": as_kinds(self.bodies, Body, "log: bodies", "give a tuple of Body", error=LogError),
+            "steps": as_kinds(self.steps, Step, "log: steps", "give a tuple of Step", error=LogError),
+            "sensors": as_kinds(self.sensors, Sensor, "log: sensors", "give a tuple of sensors", error=LogError),
+            "air": as_kind(self.air, Air, "log: air", "give an Air", error=LogError),
+            "seed": as_whole(self.seed, "log: seed", "give a whole number, 0 or more", least=0, error=LogError),
+            "untouched": frozenset(as_whole(x, "log: untouched", *ids) for x in as_items(self.untouched, "log: untouched", *ids)),
+            "sr": as_whole(self.sr, "log: sr", "give a sample rate in Hz", least=1, error=LogError),
+        }
+        for name, value in checked.items():
+            object.__setattr__(self, name, value)
         for step in self.steps:
             if len(step.position_m) > len(self.bodies):
                 raise LogError("a step has more poses than the log has bodies", "use an unbroken contact log")
@@ -81,12 +94,14 @@ class ContactLog:
         return np.flatnonzero(self._side(self.rows, body, link)[1])
 
     def _side(self, rows: Contacts, body: int, link: int | None) -> tuple[Array, Array]:
+        body = as_whole(body, "body", "give a body's id", error=LogError)
+        link = None if link is None else as_whole(link, "link", "give a link's number, -1 the base, or None for all", error=LogError)
         bearers = [i for i, x in enumerate(self.bodies) if x.body_id == body and (link is None or x.link == link)]
         if not bearers and body in self.untouched:
             return np.zeros(len(rows)), np.zeros(len(rows), bool)
         if not bearers:
             known = sorted({x.body_id for x in self.bodies})
-            raise LogError(f"the log holds no body {body}" + ("" if link is None else f" link {link}"), f"known bodies: {known}")
+            raise LogError(f"the log holds no body {shown(body)}" + ("" if link is None else f" link {shown(link)}"), f"known bodies: {shown(known)}")
         epoch = max(self.bodies[i].epoch for i in bearers)
         bearers = [i for i in bearers if self.bodies[i].epoch == epoch]
         on_a, on_b = np.isin(rows.a, bearers), np.isin(rows.b, bearers)
@@ -96,4 +111,4 @@ class ContactLog:
         """Write the log as npz (numpy arrays and JSON, no pickle), whole or not at all. Raises FileError."""
         from sonic_bullet.files.logs import write_log
 
-        write_log(str(path), self)
+        write_log(as_path(path, "path", "name a file, such as contacts.npz"), self)

@@ -33,6 +33,7 @@ from sonic_bullet.files.audio import check_sr
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.container import REMEDY, read_container, take, write_container
 from sonic_bullet.records import Air, Array, Body, Material, Microphone, ModalModel, ModalSum, Residual, Sensor, Vibrometer
+from sonic_bullet.records.coerce import as_path
 from sonic_bullet.records.contacts import ROW_FIELDS, Contacts, Step
 from sonic_bullet.records.errors import AudioError, LogError, RecordError
 
@@ -63,6 +64,7 @@ class _Model(msgspec.Struct, omit_defaults=True):
     dropped: int
     note: str
     damping_growth_power: float = msgspec.field(default=1.0, name="choke_power")
+    includes_radiation: bool = False
 
 
 class _Residual(msgspec.Struct):
@@ -80,6 +82,7 @@ class _Material(msgspec.Struct, omit_defaults=True):
     restitution: float
     source: str
     residual: _Residual | None = None
+    includes_radiation: bool = False
 
 
 class _Body(msgspec.Struct):
@@ -167,6 +170,7 @@ def write_log(path: str | os.PathLike[str], log: ContactLog) -> None:
 
 def read_log(path: str | os.PathLike[str]) -> ContactLog:
     """The contact log that `write_log` wrote. Raises FileError (no such file) and LogError (cut, foreign, forged, inconsistent)."""
+    path = as_path(path, "path", "name a contact log (.npz)")
     header, arrays = read_container(path, _LogHeader, LOG_FORMAT, "contact log")
     try:
         check_sr(header.sr)
@@ -223,11 +227,12 @@ def _pack_material(x: Material) -> _Material:
         restitution=float(x.restitution),
         source=_text(x.source),
         residual=None if x.residual is None else _Residual(float(x.residual.clip_energy), _text(x.residual.source)),
+        includes_radiation=bool(x.includes_radiation),
     )
 
 
 def _pack_model(x: ModalModel) -> _Model:
-    return _Model(float(x.volume_m3), float(x.mass_kg), int(x.dropped), _text(x.note), float(x.damping_growth_power))
+    return _Model(float(x.volume_m3), float(x.mass_kg), int(x.dropped), _text(x.note), float(x.damping_growth_power), bool(x.includes_radiation))
 
 
 def _pack_body(x: Body, material: int | None, model: int | None) -> _Body:
@@ -262,7 +267,13 @@ def _unpack_model(header: _Model, arrays: Mapping[str, Array], index: int, path:
     parts = {name: take(arrays, f"model{index}_{name}", dtype, shape, path) for name, (dtype, shape) in MODEL_ARRAYS.items()}
     parts |= {field: take(arrays, f"model{index}_{name}", float, (None,), path) for name, field in BENT_ARRAYS.items() if f"model{index}_{name}" in arrays}
     return ModalModel(
-        **parts, volume_m3=header.volume_m3, mass_kg=header.mass_kg, dropped=header.dropped, note=header.note, damping_growth_power=header.damping_growth_power
+        **parts,
+        volume_m3=header.volume_m3,
+        mass_kg=header.mass_kg,
+        dropped=header.dropped,
+        note=header.note,
+        damping_growth_power=header.damping_growth_power,
+        includes_radiation=header.includes_radiation,
     )
 
 

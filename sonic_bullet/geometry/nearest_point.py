@@ -13,8 +13,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import MeshError
 
@@ -73,7 +73,7 @@ def closest_point(vertex_m: Array, face: Array, points: Array, normals: Array | 
     return nearest(surface_index(vertex_m, face), points, normals)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(nogil=True)
 def _grow(low: Array, high: Array, centre: Array) -> tuple[Array, Array, Array, Array]:
     """Boxes and children of a balanced tree: each node's faces split at the median of their longest axis."""
     count = len(low)
@@ -111,7 +111,7 @@ def _grow(low: Array, high: Array, centre: Array) -> tuple[Array, Array, Array, 
     return order, node_low[:made].copy(), node_high[:made].copy(), child[:made].copy()
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(nogil=True)
 def _in_triangle(p: Array, abc: Array) -> tuple[float, float, float]:  # noqa: PLR0911 - one return a Voronoi region
     """Barycentric coordinates of the triangle's point nearest to p [Ericson 2005, p. 141]."""
     ab0, ab1, ab2 = abc[1, 0] - abc[0, 0], abc[1, 1] - abc[0, 1], abc[1, 2] - abc[0, 2]
@@ -146,7 +146,7 @@ def _in_triangle(p: Array, abc: Array) -> tuple[float, float, float]:  # noqa: P
     return 1 - vb / total - vc / total, vb / total, vc / total
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(nogil=True)
 def _box_gap(p: Array, low: Array, high: Array) -> float:
     gap = 0.0
     for x in range(3):
@@ -155,7 +155,7 @@ def _box_gap(p: Array, low: Array, high: Array) -> float:
     return gap
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(nogil=True)
 def _search(corner: Array, normal: Array, low: Array, high: Array, child: Array, wall: float, points: Array, wanted: Array) -> tuple[Array, Array, Array]:
     count = len(points)
     face, barycentric, distance = np.empty(count, np.int64), np.empty((count, 3)), np.empty(count)

@@ -11,12 +11,23 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from sonic_bullet.listener.pybullet.clients import direct_client, disconnect, links_with_shapes
+    from sonic_bullet.listener.pybullet.clients import direct_client, disconnect, links_called, links_with_shapes
     from sonic_bullet.listener.pybullet.doctor import Finding, diagnose_world, keep_restitution
     from sonic_bullet.listener.pybullet.script import run_script
     from sonic_bullet.listener.pybullet.world import World, open_world
 
-__all__ = ["Finding", "World", "diagnose_world", "direct_client", "disconnect", "keep_restitution", "links_with_shapes", "open_world", "run_script"]
+__all__ = [
+    "Finding",
+    "World",
+    "diagnose_world",
+    "direct_client",
+    "disconnect",
+    "keep_restitution",
+    "links_called",
+    "links_with_shapes",
+    "open_world",
+    "run_script",
+]
 
 _HOME = {
     "Finding": "doctor",
@@ -25,6 +36,7 @@ _HOME = {
     "direct_client": "clients",
     "disconnect": "clients",
     "keep_restitution": "doctor",
+    "links_called": "clients",
     "links_with_shapes": "clients",
     "open_world": "world",
     "run_script": "script",

@@ -18,6 +18,7 @@ import pybullet
 
 from sonic_bullet.listener.kinematics import jumps
 from sonic_bullet.records import Array
+from sonic_bullet.records.coerce import shown
 from sonic_bullet.records.errors import SceneError
 
 LINK_SPAN = 1 << 20
@@ -74,8 +75,10 @@ def decode(code: int) -> tuple[int, int]:
 
 def check_connected(client_id: int) -> None:
     """Raise SceneError unless a physics server answers under this client id."""
-    if client_id < 0 or not pybullet.getConnectionInfo(physicsClientId=client_id)["isConnected"]:
-        raise SceneError(f"PyBullet client {client_id} is not connected", "connect first, e.g. BulletClient(pybullet.DIRECT), and attach before disconnecting")
+    if not 0 <= client_id < 2**31 or not pybullet.getConnectionInfo(physicsClientId=client_id)["isConnected"]:
+        raise SceneError(
+            f"PyBullet client {shown(client_id)} is not connected", "connect first, e.g. BulletClient(pybullet.DIRECT), and attach before disconnecting"
+        )
 
 
 def body_ids(client_id: int) -> list[int]:

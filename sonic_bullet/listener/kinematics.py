@@ -11,22 +11,22 @@ Compiled passes over k contacts and n bodies: numpy would spend more on calls th
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array
 
 Table = tuple[Array, Array, Array, Array]
 """Columns of a Motion: position (n, 3), quaternion xyzw (n, 4), velocity (n, 3), spin (n, 3)."""
 
 
-@njit(cache=True, fastmath=False, nogil=True, inline="always")  # type: ignore[untyped-decorator]
+@njit(fastmath=False, nogil=True, inline="always")
 def turn(qx: float, qy: float, qz: float, qw: float, x: float, y: float, z: float) -> tuple[float, float, float]:
     """Rotate (x, y, z) by a unit quaternion: v + 2 w (q × v) + 2 q × (q × v)."""
     cx, cy, cz = 2 * (qy * z - qz * y), 2 * (qz * x - qx * z), 2 * (qx * y - qy * x)
     return x + qw * cx + qy * cz - qz * cy, y + qw * cy + qz * cx - qx * cz, z + qw * cz + qx * cy - qy * cx
 
 
-@njit(cache=True, fastmath=False, nogil=True)  # type: ignore[untyped-decorator]
+@njit(fastmath=False, nogil=True)
 def pose_after(table: Table, row: int, elapsed: float, position: Array, quaternion: Array) -> None:
     """Position (3,) and orientation (4,) of a body `elapsed` seconds into the step, by its twist before it, written in place."""
     x, q, v, w = table[0][row], table[1][row], table[2][row], table[3][row]
@@ -44,7 +44,7 @@ def pose_after(table: Table, row: int, elapsed: float, position: Array, quaterni
     quaternion[3] = c * q[3] - a * q[0] - b * q[1] - d * q[2]
 
 
-@njit(cache=True, fastmath=False, nogil=True)  # type: ignore[untyped-decorator]
+@njit(fastmath=False, nogil=True)
 def relative_motion(point_a: Array, point_b: Array, normal: Array, table: Table, row_a: Array, row_b: Array) -> tuple[Array, Array]:
     """slip (k, 3) and approach (k,) in m/s at points (k, 3) of the bodies in rows row_a, row_b (k,)."""
     position, _, velocity, spin = table
@@ -64,7 +64,7 @@ def relative_motion(point_a: Array, point_b: Array, normal: Array, table: Table,
     return slip, approach
 
 
-@njit(cache=True, fastmath=False, nogil=True)  # type: ignore[untyped-decorator]
+@njit(fastmath=False, nogil=True)
 def impulses(dt: float, normal: Array, tangent_1: Array, tangent_2: Array, force: Array) -> Array:
     """J (k, 3) in N·s of forces (3, k) along normal and both tangents (k, 3)."""
     result = np.empty_like(normal)
@@ -74,7 +74,7 @@ def impulses(dt: float, normal: Array, tangent_1: Array, tangent_2: Array, force
     return result
 
 
-@njit(cache=True, fastmath=False, nogil=True)  # type: ignore[untyped-decorator]
+@njit(fastmath=False, nogil=True)
 def jumps(earlier: Table, later: Table, old: Array, static: Array, dt: float, driven: float, floor: float) -> Array:
     """(n,) of `later`: farther from its row `old` (n,) of `earlier` than 1.5 × both speeds (static: `driven`) · dt + floor; never where old < 0."""
     result = np.zeros(len(old), np.bool_)

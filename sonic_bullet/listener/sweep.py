@@ -14,9 +14,9 @@ pair keeps its last velocity; a new pair's contact stays on the smaller body.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from sonic_bullet.listener.kinematics import Table, pose_after, turn
+from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array
 
 MEMORY_STEPS = 5
@@ -30,7 +30,7 @@ NO_TRACE: Trace = (np.zeros(0, np.int64), np.zeros((0, 10)))
 NO_TRACES = (NO_TRACE,) * MEMORY_STEPS
 
 
-@njit(cache=True, fastmath=False, nogil=True, inline="always")  # type: ignore[untyped-decorator]
+@njit(fastmath=False, nogil=True, inline="always")
 def surface_velocity(rows: Array, i: int, old: Array, j: int, first: int, quaternion: Array, normal: Array) -> tuple[float, float, float]:
     """Velocity of a contact over a surface, world axes: from row j of `old` to row i of `rows`, point in columns first … first + 2.
 
@@ -48,7 +48,7 @@ def surface_velocity(rows: Array, i: int, old: Array, j: int, first: int, quater
     return dx * scale, dy * scale, dz * scale
 
 
-@njit(cache=True, fastmath=False, nogil=True, inline="always")  # type: ignore[untyped-decorator]
+@njit(fastmath=False, nogil=True, inline="always")
 def slower(x: float, y: float, z: float, slip: Array, i: int) -> float:
     """The smaller of |u_a| and |u_b|, u_a = (x, y, z)."""
     a = x * x + y * y + z * z
@@ -56,7 +56,7 @@ def slower(x: float, y: float, z: float, slip: Array, i: int) -> float:
     return float(np.sqrt(min(a, b)))
 
 
-@njit(cache=True, fastmath=False, nogil=True)  # type: ignore[untyped-decorator]
+@njit(fastmath=False, nogil=True)
 def recognise(rows: Array, i: int, pair: int, traces: tuple[Trace, ...], quat_a: Array, quat_b: Array, normal: Array, slip: Array, limit: float) -> bool:
     """Fill u_a (columns 7-9) of row i, whose time and points stand already; False where nothing of the pair is known that fits.
 
@@ -84,7 +84,7 @@ def recognise(rows: Array, i: int, pair: int, traces: tuple[Trace, ...], quat_a:
     return held and slower(rows[i, 7], rows[i, 8], rows[i, 9], slip, i) <= limit
 
 
-@njit(cache=True, fastmath=False, nogil=True)  # type: ignore[untyped-decorator]
+@njit(fastmath=False, nogil=True)
 def place_and_match(
     traces: tuple[Trace, ...],
     pair: Array,

@@ -2,13 +2,15 @@
 
     sha256(numbers, options, source text that computes it) -> KEY.npz in SONIC_BULLET_CACHE, or the user's cache folder
 
-A file is written beside its name and moved there whole; a cut, foreign or unreadable file is a miss. Nothing is pickled.
+A file is written beside its name and moved there whole; a cut, foreign or unreadable file is a miss, and so is what is no file. Nothing is pickled.
+The user's cache folder is private (`sonic_bullet.machine.user_folder`); without a home nothing is kept.
 """
 
 from __future__ import annotations
 
 import hashlib
 import os
+import stat
 from contextlib import suppress
 from functools import lru_cache
 from importlib.metadata import PackageNotFoundError, version
@@ -18,6 +20,7 @@ from typing import Literal
 import msgspec
 import numpy as np
 
+from sonic_bullet.machine.user_folder import START, cache_folder
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import FileError, LogError
 
@@ -38,11 +41,7 @@ def folder(place: Place) -> Path | None:
     if place != "default":
         return Path(place)
     given = os.environ.get("SONIC_BULLET_CACHE")
-    if given:
-        return Path(given)
-    from platformdirs import user_cache_path
-
-    return user_cache_path("sonic_bullet") / "modal"
+    return START / given if given else cache_folder("modal")
 
 
 @lru_cache(maxsize=4)
@@ -80,13 +79,21 @@ def load(place: Place, name: str) -> tuple[dict[str, Array], str] | None:
     from sonic_bullet.files.container import read_container
 
     where = folder(place)
-    if where is None:
+    if where is None or not _is_file(where / f"{name}.npz"):
         return None
     try:
         header, arrays = read_container(where / f"{name}.npz", _Header, FORMAT, "cached model")
     except (FileError, LogError):
         return None
     return arrays, header.note
+
+
+def _is_file(path: Path) -> bool:
+    """A regular file stands there: a pipe would be waited for, for ever."""
+    try:
+        return stat.S_ISREG(path.stat().st_mode)
+    except (OSError, ValueError):
+        return False
 
 
 def save(place: Place, name: str, arrays: dict[str, Array], note: str) -> None:
@@ -97,5 +104,5 @@ def save(place: Place, name: str, arrays: dict[str, Array], note: str) -> None:
     if where is None:
         return
     with suppress(OSError, FileError):
-        where.mkdir(parents=True, exist_ok=True)
+        where.mkdir(mode=0o700, parents=True, exist_ok=True)
         write_container(where / f"{name}.npz", _Header(FORMAT, note), arrays)

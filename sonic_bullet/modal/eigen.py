@@ -40,7 +40,7 @@ def factorised(matrix: Any) -> Any:
     try:
         return splu(matrix.tocsc(), permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
     except (RuntimeError, MemoryError) as error:
-        raise ModalError(f"stiffness of {matrix.shape[0]} unknowns cannot be factorised ({error})", "give a larger edge_m") from error
+        raise ModalError(f"stiffness of {matrix.shape[0]} unknowns cannot be factorised ({error})", "give a simpler mesh") from error
 
 
 def _orthonormal(block: Array, mass: Any) -> tuple[Array, Array, Array]:

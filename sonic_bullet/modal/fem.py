@@ -36,7 +36,7 @@ def _geometry(solid: Solid, tet: Array, gradient: Array, weight: Array) -> tuple
     jacobian = np.einsum("tid,ikq->tqdk", solid.node_m[tet], gradient)  # dx_d / dξ_k
     determinant = np.linalg.det(jacobian)
     if not (determinant > 0).all():
-        raise MeshError("an element is turned inside out", "give a smaller edge_m")
+        raise MeshError("an element is turned inside out", "repair the mesh, or give a simpler one")
     physical = np.einsum("ikq,tqkd->tqid", gradient, np.linalg.inv(jacobian))
     return determinant * weight, physical
 

@@ -8,16 +8,20 @@ Solved without units: lengths by the body's diagonal L, stiffness by its largest
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from sonic_bullet.modal import cache as store
+from sonic_bullet.modal.options import ModalOptions
 from sonic_bullet.records import Array, Material, ModalModel, Shape
 from sonic_bullet.records.errors import MeshError, ModalError
+
+if TYPE_CHECKING:
+    from sonic_bullet.modal.meshing.shape_meshes import Filled
 
 MOST_MODES = 200
 SHIFT = 20.0  # × (2V/A)²/L²: a third of the first elastic λ' of plates and bars, less of chunky bodies
@@ -42,7 +46,7 @@ def analyse(
     *,
     to_hz: float = 20_000.0,
     count: int | None = None,
-    fixed: tuple[tuple[float, float, float, float], ...] = (),
+    fixed: Sequence[Sequence[float]] = (),
     thickness_m: float | None = None,
     edge_m: float | None = None,
     cache: Path | Literal["default"] | None = "default",
@@ -57,24 +61,19 @@ def analyse(
     Raises MeshError (broken, empty, flat, absurd or too slow mesh), ModalError (no usable modes).
     """
     say = progress or (lambda _: None)
+    asked = ModalOptions(to_hz, count, fixed, thickness_m)
+    to_hz, count, thickness_m = asked.to_hz, asked.count, asked.thickness_m
     if not shapes:
         raise MeshError("body has no shape", "give it a collision or visual shape, or pass mesh=")
     if any(shape.kind == "plane" for shape in shapes):
         none = np.zeros(0)
         return ModalModel(none, none, np.zeros((0, 3, 0)), np.zeros((0, 3)), np.zeros((0, 3)), none, 0.0, 0.0, note="plane: unbounded, no modes")
-    if not (np.isfinite(to_hz) and to_hz > 0):
-        raise ModalError(f"to_hz is {to_hz}", "give a frequency above zero")
-    if count is not None and not (int(count) == count and 0 < count <= 2000):
-        raise ModalError(f"count is {count}", "ask for 1 to 2000 modes")
-    geometry_parts = [part for s in shapes for part in (s.kind, s.size_m, s.position_m, s.quaternion_xyzw, s.vertex_m, s.face)]
-    solid_key = store.key("solid", *geometry_parts, thickness_m, edge_m)
+    solid_key = _solid_key(shapes, thickness_m, edge_m)
     length_m = _diagonal_m(shapes)
     pascal = float(np.abs(material.stiffness_pa).max())
     per_s2 = pascal / (material.density_kg_m3 * length_m**2)
     limit = (2 * np.pi * to_hz) ** 2 / per_s2
-    clamp = np.array(fixed, float).reshape(-1, 4)
-    if not np.isfinite(clamp).all() or (clamp[:, 3] < 0).any():
-        raise ModalError(f"fixed is {fixed}", "give clamps as (x, y, z, radius) in metres")
+    clamp = np.array(asked.fixed, float).reshape(-1, 4)
     unit_stiffness = material.stiffness_pa / pascal
     name = store.key("modes", solid_key, unit_stiffness, clamp, count if count is not None else limit)
     unit = _recall(store.load(cache, name))
@@ -101,7 +100,20 @@ def analyse(
         mass_kg=volume * material.density_kg_m3,
         dropped=dropped,
         note=note,
+        includes_radiation=material.includes_radiation,
     )
+
+
+def surface_of(shapes: tuple[Shape, ...], *, cache: store.Place = "default", progress: Callable[[str], None] | None = None) -> tuple[Array, Array]:
+    """vertex_m (v, 3) and face (f, 3) of the surface on which `analyse` gives the modes of these shapes, without solving for them. Raises MeshError."""
+    _diagonal_m(shapes)
+    body = _filled(shapes, (None, None), (cache, _solid_key(shapes, None, None)), progress or (lambda _: None))
+    return body.solid.node_m[body.skin.node], body.skin.face
+
+
+def _solid_key(shapes: tuple[Shape, ...], thickness_m: float | None, edge_m: float | None) -> str:
+    parts = [part for s in shapes for part in (s.kind, s.size_m, s.position_m, s.quaternion_xyzw, s.vertex_m, s.face)]
+    return store.key("solid", *parts, thickness_m, edge_m)
 
 
 def _diagonal_m(shapes: tuple[Shape, ...]) -> float:
@@ -124,6 +136,29 @@ def damped(lambda_per_s2: Array, material: Material) -> tuple[Array, Array, Arra
     return freq[order], decay[alive[order]], alive[order]
 
 
+def _filled(shapes: tuple[Shape, ...], sizes: tuple[float | None, float | None], kept: tuple[store.Place, str], say: Callable[[str], None]) -> Filled:
+    """The body's inside and skin, from the cache where it is there. sizes: edge_m, thickness_m."""
+    from sonic_bullet.modal.meshing.shape_meshes import Filled, fill
+    from sonic_bullet.modal.meshing.solid import Solid, Surface
+
+    found = store.load(*kept)
+    if found is not None:
+        a, note = found
+        return Filled(Solid(a["node"], a["tet"], bool(a["affine"][0]), note), Surface(a["skin"], a["face"]), a["curvature"])
+    body = fill(shapes, *sizes, say)
+    solid, skin = body.solid, body.skin
+    arrays = {
+        "node": solid.node_m,
+        "tet": solid.tet,
+        "affine": np.array([solid.affine]),
+        "skin": skin.node,
+        "face": skin.face,
+        "curvature": body.curvature_per_m,
+    }
+    store.save(*kept, arrays, solid.note)
+    return body
+
+
 def _solve(
     shapes: tuple[Shape, ...],
     sizes: tuple[float | None, float | None],
@@ -137,25 +172,9 @@ def _solve(
 ) -> _Unit:
     """Fill (or fetch the filled body), assemble, clamp and solve, all without units."""
     from sonic_bullet.modal import eigen, fem, polynomials
-    from sonic_bullet.modal.meshing.shape_meshes import Filled, fill
-    from sonic_bullet.modal.meshing.solid import Solid, Surface
+    from sonic_bullet.modal.meshing.solid import Solid
 
-    found = store.load(*kept)
-    if found is not None:
-        a, note = found
-        body = Filled(Solid(a["node"], a["tet"], bool(a["affine"][0]), note), Surface(a["skin"], a["face"]), a["curvature"])
-    else:
-        body = fill(shapes, *sizes, say)
-        solid, skin = body.solid, body.skin
-        arrays = {
-            "node": solid.node_m,
-            "tet": solid.tet,
-            "affine": np.array([solid.affine]),
-            "skin": skin.node,
-            "face": skin.face,
-            "curvature": body.curvature_per_m,
-        }
-        store.save(*kept, arrays, solid.note)
+    body = _filled(shapes, sizes, kept, say)
     unit = Solid(body.solid.node_m / length_m, body.solid.tet, body.solid.affine)
     skin_m = unit.node_m[body.skin.node]
     corner = skin_m[body.skin.face]

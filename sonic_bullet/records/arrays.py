@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sonic_bullet.records.coerce import shown
 from sonic_bullet.records.errors import RecordError
 
 Array = NDArray[Any]
@@ -15,10 +16,21 @@ Array = NDArray[Any]
 def frozen_array(value: object, dtype: Any, shape: tuple[int | None, ...], name: str, *, finite: bool = True) -> Array:
     """Read-only C-contiguous copy of ``value`` with ``dtype`` and ``shape`` (None: any length); the same array where it is one already.
 
-    Raises RecordError where the shape differs or, with ``finite``, a number is NaN or infinite.
+    Raises RecordError where it holds no numbers, or none that ``dtype`` can hold (1.5 is no index), where the shape differs or, with
+    ``finite``, a number is NaN or infinite.
     """
     kept = isinstance(value, np.ndarray) and not value.flags.writeable and value.base is None  # a record's own: read-only and nobody's view
-    array = np.asarray(value, dtype=dtype, order="C") if kept else np.array(value, dtype=dtype, order="C")
+    try:
+        given = value if isinstance(value, np.ndarray) else np.asarray(value)
+        if given.dtype.kind not in "biufO":  # texts, complex numbers, dates
+            raise TypeError
+        with np.errstate(invalid="ignore", over="ignore"):
+            array = np.asarray(given, dtype=dtype, order="C") if kept else np.array(given, dtype=dtype, order="C")
+        exact = array.dtype.kind != "i" or given.dtype == array.dtype or bool((array == given).all())
+    except (TypeError, ValueError, OverflowError):
+        raise RecordError(f"{name} is {shown(value)}", f"pass numbers of shape {shape}") from None
+    if not exact:
+        raise RecordError(f"{name} is {shown(value)}, which is no array of {array.dtype.name}", f"pass numbers of shape {shape}")
     if array.ndim != len(shape) or any(want is not None and have != want for have, want in zip(array.shape, shape, strict=True)):
         raise RecordError(f"{name} has shape {array.shape}, wanted {shape}", "pass an array of that shape")
     if finite and array.dtype.kind in "fc" and not np.isfinite(array).all():

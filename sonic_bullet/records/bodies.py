@@ -9,14 +9,16 @@ means the frame PyBullet calls inertial: origin at the centre of mass, axes as `
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Any, Literal
+from dataclasses import dataclass, field, fields
+from typing import Any, Literal, get_args
 
 import numpy as np
 
 from sonic_bullet.records.arrays import Array, frozen_array
 from sonic_bullet.records.arrays import require as _require
 from sonic_bullet.records.arrays import store as _store
+from sonic_bullet.records.coerce import as_flag, as_items, as_kind, as_number, as_text, as_whole, check_options, nearest, shown
+from sonic_bullet.records.errors import RecordError
 from sonic_bullet.records.residual import Residual
 
 __all__ = [
@@ -60,7 +62,8 @@ class Material:
     """What a body is made of.
 
     stiffness_pa (6, 6): Voigt tensor, positive definite. alpha_per_s, beta_s: Rayleigh damping d = (alpha + beta·lambda)/2
-    [Ren, Yeh, Lin 2013, eq. 6], None where unknown. roughness_m: rms height of the surface profile; hurst: its Hurst
+    [Ren, Yeh, Lin 2013, eq. 6], None where unknown. includes_radiation: they, and laws among the effects, are a body's total damping
+    as it was recorded, so the run time adds no radiation to it; else the material's own, to which it does. roughness_m: rms height of the surface profile; hurst: its Hurst
     exponent (profile spectrum ∝ k^-(1+2·hurst)). restitution: of an impact against a rigid wall, for pulses only.
     residual: what sounds beside the modes, None: nothing. effects: what else belongs to it (sonic_bullet.effects), in the order in which they act.
     """
@@ -76,32 +79,43 @@ class Material:
     source: str = ""
     residual: Residual | None = None
     effects: tuple[Any, ...] = ()
+    includes_radiation: bool = False
 
     def __post_init__(self) -> None:
-        stiffness = frozen_array(self.stiffness_pa, float, (6, 6), f"material '{self.name}': stiffness_pa")
-        _store(self, stiffness_pa=stiffness)
-        where = f"material '{self.name}'"
-        _require(np.isfinite(self.density_kg_m3) and self.density_kg_m3 > 0, f"{where}: density_kg_m3 is {self.density_kg_m3}", "give a density above zero")
+        as_text(self.name, "the name of a material", "give a text")
+        where = f"material {shown(self.name)}"
+        stiffness = frozen_array(self.stiffness_pa, float, (6, 6), f"{where}: stiffness_pa")
+        _store(self, stiffness_pa=stiffness, density_kg_m3=as_number(self.density_kg_m3, f"{where}: density_kg_m3", "give a density above zero", above=0))
         _require(bool(np.allclose(stiffness, stiffness.T, rtol=1e-9)), f"{where}: stiffness_pa is not symmetric", "give a symmetric tensor")
         _require(
             bool(np.linalg.eigvalsh(stiffness)[0] > 0),
-            f"{where}: stiffness is not positive definite",
+            f"{where}: stiffness_pa is not positive definite",
             "Young's modulus must be above 0 and Poisson's ratio within -1 … 0.5",
         )
         for name in ("alpha_per_s", "beta_s"):
-            value = getattr(self, name)
-            _require(value is None or (np.isfinite(value) and value >= 0), f"{where}: {name} is {value}", "damping must be zero or above")
+            if getattr(self, name) is not None:
+                _store(self, **{name: as_number(getattr(self, name), f"{where}: {name}", "damping must be zero or above", least=0)})
         _require((self.alpha_per_s is None) == (self.beta_s is None), f"{where}: only one of alpha_per_s, beta_s is given", "give both or neither")
-        _require(np.isfinite(self.roughness_m) and self.roughness_m >= 0, f"{where}: roughness_m is {self.roughness_m}", "rms height must be zero or above")
-        _require(0 < self.hurst < 1, f"{where}: hurst is {self.hurst}", "the Hurst exponent lies between 0 and 1")
-        _require(0 <= self.restitution <= 1, f"{where}: restitution is {self.restitution}", "restitution lies between 0 and 1")
+        _store(
+            self,
+            roughness_m=as_number(self.roughness_m, f"{where}: roughness_m", "rms height must be zero or above", least=0),
+            hurst=as_number(self.hurst, f"{where}: hurst", "the Hurst exponent lies between 0 and 1", above=0, below=1),
+            restitution=as_number(self.restitution, f"{where}: restitution", "restitution lies between 0 and 1", least=0, most=1),
+            effects=as_items(self.effects, f"{where}: effects", "give effects of sonic_bullet.effects"),
+            includes_radiation=as_flag(self.includes_radiation, f"{where}: includes_radiation"),
+        )
+        as_text(self.source, f"{where}: source", "give a text")
+        if self.residual is not None:
+            as_kind(self.residual, Residual, f"{where}: residual", "give a Residual, or none")
 
     @classmethod
     def isotropic(cls, name: str, *, youngs_pa: float, poisson: float, density_kg_m3: float, **rest: Any) -> Material:
         """Material with the same stiffness in every direction. Raises RecordError on unphysical constants."""
-        _require(np.isfinite(youngs_pa) and youngs_pa > 0, f"material '{name}': youngs_pa is {youngs_pa}", "give a Young's modulus above zero")
-        _require(-1 < poisson < 0.5, f"material '{name}': poisson is {poisson}", "Poisson's ratio lies between -1 and 0.5")
-        return cls(name=name, density_kg_m3=density_kg_m3, stiffness_pa=isotropic_stiffness_pa(youngs_pa, poisson), **rest)
+        where = f"material {shown(name)}"
+        modulus = as_number(youngs_pa, f"{where}: youngs_pa", "give a Young's modulus above zero", above=0)
+        ratio = as_number(poisson, f"{where}: poisson", "Poisson's ratio lies between -1 and 0.5", above=-1, below=0.5)
+        check_options(rest, [f.name for f in fields(cls) if f.name not in ("name", "density_kg_m3", "stiffness_pa")], "Material.isotropic")
+        return cls(name=name, density_kg_m3=density_kg_m3, stiffness_pa=isotropic_stiffness_pa(modulus, ratio), **rest)
 
     @property
     def bulk_pa(self) -> float:
@@ -148,15 +162,18 @@ class Shape:
     face: Array = field(default_factory=lambda: np.zeros((0, 3), np.int32))
 
     def __post_init__(self) -> None:
+        kinds = get_args(ShapeKind)
+        if as_text(self.kind, "kind of a shape", f"one of {', '.join(kinds)}") not in kinds:
+            raise RecordError(f"kind of a shape is {shown(self.kind)}", nearest(self.kind, kinds))
         _store(
             self,
-            size_m=frozen_array(self.size_m, float, (3,), "shape size"),
-            position_m=frozen_array(self.position_m, float, (3,), "shape position"),
-            quaternion_xyzw=frozen_array(self.quaternion_xyzw, float, (4,), "shape quaternion"),
-            vertex_m=frozen_array(self.vertex_m, float, (None, 3), "mesh vertices"),
-            face=frozen_array(self.face, np.int32, (None, 3), "mesh faces"),
+            size_m=frozen_array(self.size_m, float, (3,), "shape: size_m"),
+            position_m=frozen_array(self.position_m, float, (3,), "shape: position_m"),
+            quaternion_xyzw=frozen_array(self.quaternion_xyzw, float, (4,), "shape: quaternion_xyzw"),
+            vertex_m=frozen_array(self.vertex_m, float, (None, 3), "mesh: vertex_m"),
+            face=frozen_array(self.face, np.int32, (None, 3), "mesh: face"),
         )
-        _require(bool((self.size_m >= 0).all()), f"{self.kind}: size {self.size_m} is negative", "give sizes above zero")
+        _require(bool((self.size_m >= 0).all()), f"{self.kind}: size_m {self.size_m} is negative", "give sizes above zero")
         if self.kind == "mesh":
             _require(len(self.face) > 0, "mesh without triangles", "give a triangle mesh")
             _require(bool((self.face >= 0).all() and (self.face < len(self.vertex_m)).all()), "mesh faces point at missing vertices", "repair the mesh file")
@@ -172,7 +189,7 @@ class ModalModel:
     of the smooth surface (0 flat, 1/r sphere, negative inside a bowl). volume_m3, mass_kg: of the meshed solid at the
     material's density. dropped: modes left out as overdamped. note: how it was made (element size, order, choices).
     bend_s2_m2, damping_growth_s_m (m,): relative rise of a mode's frequency per square of its peak velocity at the surface, of its decay
-    (choke · that velocity)^choke_power, 1 or 2; None: a linear body.
+    (choke · that velocity)^choke_power, 1 or 2; None: a linear body. includes_radiation: of decay_per_s, as the material's (see `Material`).
     A body without audible modes has m = 0; a plane has v = f = 0 besides.
     """
 
@@ -189,6 +206,7 @@ class ModalModel:
     bend_s2_m2: Array | None = None
     damping_growth_s_m: Array | None = None
     damping_growth_power: float = 1.0
+    includes_radiation: bool = False
 
     def __post_init__(self) -> None:
         freq = frozen_array(self.freq_hz, float, (None,), "freq_hz")
@@ -203,6 +221,10 @@ class ModalModel:
             vertex_m=vertex,
             face=face,
             shape=frozen_array(self.shape, np.float32, (len(vertex), 3, m), "mode shape"),
+            damping_growth_power=as_number(self.damping_growth_power, "choke_power", "give 1 or 2"),
+            volume_m3=as_number(self.volume_m3, "volume_m3", "orient the mesh outward", least=0),
+            mass_kg=as_number(self.mass_kg, "mass_kg", "orient the mesh outward", least=0),
+            dropped=as_whole(self.dropped, "dropped", "give the number of modes left out", least=0),
             curvature_per_m=frozen_array(self.curvature_per_m, float, (len(face),), "curvature_per_m"),
         )
         _require(
@@ -213,7 +235,8 @@ class ModalModel:
             len(face) == 0 or bool((face >= 0).all() and (face < len(vertex)).all()), "faces point at missing vertices", "build the model with modal.analyse"
         )
         _require(self.damping_growth_power in (1.0, 2.0), f"decays that rise with power {self.damping_growth_power} of the level", "give 1 or 2")
-        _require(self.volume_m3 >= 0 and self.mass_kg >= 0, "negative volume or mass", "orient the mesh outward")
+        as_text(self.note, "note", "give a text")
+        as_flag(self.includes_radiation, "includes_radiation")
         for name in ("bend_s2_m2", "damping_growth_s_m"):
             if getattr(self, name) is not None:
                 _store(self, **{name: frozen_array(getattr(self, name), float, (m,), name)})
@@ -253,13 +276,13 @@ class Body:
     until_step: int = -1
 
     def __post_init__(self) -> None:
-        _store(self, inertia_kg_m2=frozen_array(self.inertia_kg_m2, float, (3, 3), f"body {self.body_id}: inertia"))
-        _require(
-            np.isfinite(self.mass_kg) and 0 <= self.mass_kg < 1e12,
-            f"body {self.body_id} link {self.link} has mass {self.mass_kg} kg",
-            "give it a finite mass with changeDynamics",
+        where = f"body {shown(self.body_id)} link {shown(self.link)}"
+        _store(
+            self,
+            inertia_kg_m2=frozen_array(self.inertia_kg_m2, float, (3, 3), f"{where}: inertia_kg_m2"),
+            mass_kg=as_number(self.mass_kg, f"{where}: mass_kg", "give it a finite mass with changeDynamics", least=0, below=1e12),
+            volume_m3=as_number(self.volume_m3, f"{where}: volume_m3", "orient its mesh outward", least=0),
         )
-        _require(np.isfinite(self.volume_m3) and self.volume_m3 >= 0, f"body {self.body_id}: volume {self.volume_m3} m³", "orient its mesh outward")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -269,7 +292,7 @@ class Microphone:
     position_m: Array
 
     def __post_init__(self) -> None:
-        _store(self, position_m=frozen_array(self.position_m, float, (3,), "microphone position"))
+        _store(self, position_m=frozen_array(self.position_m, float, (3,), "microphone: position_m"))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -282,13 +305,16 @@ class Vibrometer:
     link: int = -1
 
     def __post_init__(self) -> None:
-        direction = np.array(self.direction, float)
-        length = float(np.linalg.norm(direction))
-        _require(length > 0, "vibrometer direction is zero", "give the direction in which it looks")
+        direction = frozen_array(self.direction, float, (3,), "vibrometer: direction")
+        with np.errstate(over="ignore"):
+            length = float(np.linalg.norm(direction))
+        _require(0 < length < np.inf, "vibrometer: direction is zero", "give the direction in which it looks")
         _store(
             self,
-            point_m=frozen_array(self.point_m, float, (3,), "vibrometer point"),
-            direction=frozen_array(direction / length, float, (3,), "vibrometer direction"),
+            body_id=as_whole(self.body_id, "vibrometer: body_id", "give the body's id"),
+            link=as_whole(self.link, "vibrometer: link", "give -1 (the base) or a link's number"),
+            point_m=frozen_array(self.point_m, float, (3,), "vibrometer: point_m"),
+            direction=frozen_array(direction / length, float, (3,), "vibrometer: direction"),
         )
 
 
@@ -297,6 +323,9 @@ class ModalSum:
     """The seed's observation: the plain sum Σ a·e^{-dt}·sin(2πft), a = scale·Uᵀj for an impulse j in N·s [Ren et al. 2013, eq. 11, 13]."""
 
     scale: float = 1.0
+
+    def __post_init__(self) -> None:
+        _store(self, scale=as_number(self.scale, "modal sum: scale", "give a number"))
 
 
 Sensor = Microphone | Vibrometer | ModalSum
@@ -310,8 +339,8 @@ class Air:
     sound_speed_m_s: float = 343.0
 
     def __post_init__(self) -> None:
-        _require(
-            0 < self.density_kg_m3 < 1e4 and 0 < self.sound_speed_m_s < 1e5,
-            f"air of {self.density_kg_m3} kg/m³ and {self.sound_speed_m_s} m/s",
-            "give both above zero",
+        _store(
+            self,
+            density_kg_m3=as_number(self.density_kg_m3, "air: density_kg_m3", "give kg/m³, above zero", above=0, below=1e4),
+            sound_speed_m_s=as_number(self.sound_speed_m_s, "air: sound_speed_m_s", "give m/s, above zero", above=0, below=1e5),
         )

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from sonic_bullet.records import Array, frozen_array
+from sonic_bullet.records.coerce import as_items, as_kind, as_number
 from sonic_bullet.records.errors import LogError
 
 
@@ -39,7 +40,7 @@ class Contacts:
     gap_m: Array
 
     def __post_init__(self) -> None:
-        k = len(np.atleast_1d(self.a))
+        k = np.shape(self.a)[0] if isinstance(self.a, np.ndarray) and self.a.ndim else len(as_items(self.a, "contact a", "give indices of bodies (k,)"))
         for name, (dtype, tail) in ROW_FIELDS.items():
             object.__setattr__(self, name, frozen_array(getattr(self, name), dtype, (k, *tail), f"contact {name}"))
 
@@ -92,12 +93,13 @@ class Step:
     gravity_m_s2: Array = field(default_factory=lambda: np.zeros(3))
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "position_m", frozen_array(self.position_m, float, (None, 3), "step: position_m"))
         b = len(self.position_m)
-        object.__setattr__(self, "position_m", frozen_array(self.position_m, float, (b, 3), "body positions"))
-        object.__setattr__(self, "quaternion_xyzw", frozen_array(self.quaternion_xyzw, float, (b, 4), "body orientations"))
+        object.__setattr__(self, "quaternion_xyzw", frozen_array(self.quaternion_xyzw, float, (b, 4), "step: quaternion_xyzw"))
         object.__setattr__(self, "teleported", frozen_array(self.teleported, bool, (b,), "teleported"))
-        object.__setattr__(self, "gravity_m_s2", frozen_array(self.gravity_m_s2, float, (3,), "gravity"))
-        if not (np.isfinite(self.dt_s) and 0 < self.dt_s <= 1):
-            raise LogError(f"a physics step of {self.dt_s} s", "set a time step between 0 and 1 s with setTimeStep")
+        object.__setattr__(self, "gravity_m_s2", frozen_array(self.gravity_m_s2, float, (3,), "step: gravity_m_s2"))
+        remedy = "set a time step between 0 and 1 s with setTimeStep"
+        object.__setattr__(self, "dt_s", as_number(self.dt_s, "dt_s of a physics step", remedy, above=0, most=1, error=LogError))
+        as_kind(self.contacts, Contacts, "step: contacts", "give Contacts, of no rows where nothing touches", error=LogError)
         if len(self.contacts) and max(self.contacts.a.max(), self.contacts.b.max()) >= b:
             raise LogError("a contact names a body that the step does not know", "use an unbroken contact log")

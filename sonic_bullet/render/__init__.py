@@ -1,6 +1,6 @@
 """Forces become sound: the synthesizer of live steps, and the replay of a contact log.
 
-clock: which samples a step covers | sounder: a body as it is played | blows: strikes | rubbing: rolling and sliding | beside: residuals | synthesizer: all together
+silence: why there is none | clock: which samples a step covers | sounder: a body as it is played | blows: strikes | rubbing: rolling and sliding | beside: residuals | synthesizer: all together
 """
 
 from __future__ import annotations
@@ -12,10 +12,13 @@ import numpy as np
 
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.records import Array
+from sonic_bullet.records.coerce import as_call, as_flag, as_kind
+from sonic_bullet.records.errors import LogError
 from sonic_bullet.render.radiated import radiation_of
+from sonic_bullet.render.silence import silence_notes, why_silent
 from sonic_bullet.render.synthesizer import LATENCY_STEPS, Synthesizer
 
-__all__ = ["LATENCY_STEPS", "Synthesizer", "render_log"]
+__all__ = ["LATENCY_STEPS", "Synthesizer", "render_log", "silence_notes", "why_silent"]
 
 
 def render_log(
@@ -29,11 +32,14 @@ def render_log(
     """The sound of a contact log, (channels, floor(sr·time)) in pascals; with the log's own rate the same bits as were heard live.
 
     residual False: without what materials sound beside their modes. progress is told the share done, say
-    what is being computed before the first step. Raises AudioError for a rate that cannot be.
+    what is being computed before the first step. Raises AudioError for a rate that cannot be, LogError for what is no log.
     """
     from sonic_bullet.files import check_sr
 
+    as_kind(log, ContactLog, "log", "give listener.contacts, or read_log(path)", error=LogError)
     log = replace(log, sr=check_sr(sr if sr is not None else log.sr))
+    residual = as_flag(residual, "residual")
+    as_call(progress, "progress"), as_call(say, "say")
     for body in log.bodies if log.sensors else ():
         if body.model is not None and body.model.mode_count:
             if say is not None:

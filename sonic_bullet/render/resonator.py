@@ -14,9 +14,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from sonic_bullet.geometry.nearest_point import SurfaceIndex, nearest, surface_index
+from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Air, Array, Body, Microphone, ModalSum, Sensor, Vibrometer
 from sonic_bullet.render.radiated import radiation_of
 from sonic_bullet.synth.bank import ModeSet, audible
@@ -31,7 +31,7 @@ FASTEST_RIGID = 0.6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Resonator:
-    """omega_rad_s, decay_per_s (m,): with the air's damping. weight (w, m): complex, one row a weight set (row 0: pressure at 1 m).
+    """omega_rad_s, decay_per_s (m,): with the air's damping, once. weight (w, m): complex, one row a weight set (row 0: pressure at 1 m).
     bend, damping_growth (m,): of frequency per |z|², of decay by (choke·|z|)^choke_power, None in a linear body. shape (v, 3, m) float32: audible modes only.
     size_m: cube root of the volume. jerk_pa_s3: dipole coefficient [Chadwick 2012]. dropped: modes not played.
     """
@@ -85,7 +85,8 @@ def build_resonator(body: Body, sensors: tuple[Sensor, ...], sr: int, air: Air) 
         )
     pressure, extra = radiation_of(model, air)
     omega0_squared = model.omega0_squared_per_s2
-    decay = np.nan_to_num(model.decay_per_s) + extra
+    own = np.nan_to_num(model.decay_per_s)
+    decay = own if model.includes_radiation else own + extra
     omega = np.sqrt(np.maximum(omega0_squared - decay**2, 0.0))
     keep = audible(omega, decay, sr)
     omega, decay = omega[keep], decay[keep]
@@ -152,7 +153,7 @@ def uplift(resonator: Resonator, face: Array, barycentric: Array, force: Array) 
     return np.asarray(participation(resonator.shape, resonator.body.model.face, face, barycentric, np.ascontiguousarray(force)))
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(nogil=True)
 def participation(shape: Array, face: Array, at_face: Array, barycentric: Array, force: Array) -> Array:  # pragma: no cover - compiled
     """Σ over contacts of the shapes, linear in the triangle, times the force: (v, 3, m), (f, 3), (k,), (k, 3), (k, 3) -> (m,)."""
     modes = shape.shape[2]

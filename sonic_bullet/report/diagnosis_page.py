@@ -17,6 +17,7 @@ import numpy as np
 from sonic_bullet.diagnosis.diagnose import Diagnosis
 from sonic_bullet.diagnosis.evidence.effect_evidence import object_evidence
 from sonic_bullet.diagnosis.prediction.hypothesis import play
+from sonic_bullet.diagnosis.selection.stepwise import NothingCompared
 from sonic_bullet.files import replacing
 from sonic_bullet.records import Array
 
@@ -31,6 +32,7 @@ WORDS = {
     "none": "The model suffices: no known effect brings it nearer to strikes it was not fitted to.",
     "explained": "The model lacks something, and what it lacks has a name.",
     "unexplained": "Something is left that none of the known effects accounts for.",
+    "nothing": "Nothing could be compared, so nothing is known of what the model lacks.",
 }
 
 
@@ -45,7 +47,7 @@ def page(d: Diagnosis) -> str:
     name = html.escape(d.case.name)
     parts = [
         f"<!doctype html><html lang=en><meta charset=utf-8><title>{name}</title><style>{STYLE}</style>",
-        f"<h1>{name}</h1><p class=verdict><b>{d.verdict}</b>. {WORDS[d.verdict]}</p>",
+        f"<h1>{name}</h1><p class=verdict><b>{d.verdict}</b>. {WORDS['nothing' if isinstance(d.closed, NothingCompared) else d.verdict]}</p>",
         _effects(d),
         _errors(d),
         f"<p>{html.escape(d.unexplained['words'])}.</p>" if d.unexplained else "",
@@ -77,15 +79,19 @@ def _errors(d: Diagnosis) -> str:
     rows = []
     for split in ("fit", "holdout", "transfer"):
         values = [d.errors[side].get(split) for side in ("before", "after")] + [d.errors_sone[side].get(split) for side in ("before", "after")]
-        if any(v is not None for v in values):
-            rows.append((split, *(f"{v:.2f}" if v is not None else "no audio" for v in values)))
+        if any(v is not None for v in values) or split in d.not_compared:
+            rows.append((split, *(f"{v:.2f}" if v is not None else _why_none(d, split) for v in values)))
     floor = f"Two noisy takes of one sound: {d.errors['floor']:.2f} dB." if d.errors["floor"] is not None else ""
     return f"<h2>How far from the recordings</h2>{_table(('strikes', 'before, dB', 'after, dB', 'before, sone', 'after, sone'), rows)}<p>{floor}</p>"
 
 
+def _why_none(d: Diagnosis, split: str) -> str:
+    return "not compared" if split in d.not_compared else "no audio"
+
+
 def _players(d: Diagnosis) -> str:
     parts = []
-    for take in d.takes[:SHOWN]:
+    for take in [t for t in d.takes if np.isfinite(t.sample).all()][:SHOWN]:
         before, after = (play(h, take.body, take.strike, len(take.sample), take.sr) for h in (d.closed.before, d.closed.after))
         peak = max(float(np.abs(x).max()) for x in (take.sample, before, after)) or 1.0
         sounds = (("recorded", take.sample), ("before", before), ("after", after))

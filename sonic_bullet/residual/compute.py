@@ -14,8 +14,8 @@ from __future__ import annotations
 import itertools
 
 import numpy as np
-from numba import njit
 
+from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array, Residual
 from sonic_bullet.records.errors import AudioError
 from sonic_bullet.residual.spectrogram import WINDOW, Power, checked, power, transform
@@ -47,7 +47,7 @@ def damped(freq_hz: Array, decay_per_s: Array, amplitude: Array, n: int, sr: int
     return out
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(nogil=True)
 def _damped(pole: Array, amplitude: Array, length: Array, out: Array) -> None:  # pragma: no cover - compiled
     for k in range(len(pole)):
         p, z = pole[k], amplitude[k]

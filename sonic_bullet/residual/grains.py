@@ -16,8 +16,8 @@ from functools import lru_cache
 from math import log2
 
 import numpy as np
-from numba import njit
 
+from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array, Residual
 from sonic_bullet.residual.invert import OVERLAP, invert, magnitude_of, noise_phases
 from sonic_bullet.residual.spectrogram import WINDOW, axes
@@ -149,7 +149,7 @@ def fraction(number: int) -> float:
     return (number >> 11) / (1 << 53)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(nogil=True)
 def _steps(power: Array, most: float, step: Array) -> None:  # pragma: no cover - compiled
     """step (p + 2,) ← levels of power (p,) below the most, in whole steps."""
     least = most * 10.0 ** (LEAST_DB / 10.0)
@@ -157,13 +157,13 @@ def _steps(power: Array, most: float, step: Array) -> None:  # pragma: no cover 
         step[p] = round(10.0 * np.log10(max(power[p], least) / most) / STEP_DB)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(nogil=True)
 def _mix(grains: Array, first: np.float32, second: np.float32, out: Array) -> None:  # pragma: no cover - compiled
     for n in range(len(out)):
         out[n] = first * grains[0, n] + second * grains[1, n]
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(nogil=True)
 def _filter(base: Array, gain: Array, out: Array) -> None:  # pragma: no cover - compiled
     """out (v, F) = base · gain, the gain (k,) linear between its bins."""
     every = (base.shape[1] - 1) // (len(gain) - 1)
@@ -184,7 +184,7 @@ def angles(number: int) -> Array:
     return np.asarray(2 * np.pi * np.interp(np.arange(WINDOW // 2 + 1), np.linspace(0, WINDOW // 2, KNOTS), knot))
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(nogil=True)
 def shape(spectrum: Array, base: Array, first: Array, second: Array) -> None:  # pragma: no cover - compiled
     """spectrum (F,) ← spectrum·(first·base_0 + second·base_1), first and second (k,) linear between their bins."""
     every = (base.shape[1] - 1) // (len(first) - 1)

@@ -11,8 +11,8 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from numba import njit
 
+from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array
 from sonic_bullet.residual.spectrogram import WINDOW, frame_count, hann, inverse, transform
 
@@ -64,7 +64,7 @@ def inconsistency(magnitude: Array, sample: Array, window: int = WINDOW, overlap
     return float(np.linalg.norm(np.abs(transform(sample, window, overlap)) - magnitude) / max(float(np.linalg.norm(magnitude)), 1e-300))
 
 
-@njit(cache=True, nogil=True, fastmath={"contract", "nnan", "ninf"})  # type: ignore[untyped-decorator]
+@njit(nogil=True, fastmath={"contract", "nnan", "ninf"})
 def _phased(spectrum: Array, before: Array, magnitude: Array, momentum: np.float32) -> None:  # pragma: no cover - compiled
     """spectrum ← magnitude·Q/|Q|, Q = spectrum + momentum (spectrum - before); before ← spectrum as it came. Real and imaginary parts in turn."""
     tiny, more = np.float32(1e-30), np.float32(1.0) + momentum

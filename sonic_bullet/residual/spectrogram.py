@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numba import njit
 
+from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array, frozen_array
 from sonic_bullet.records.errors import AudioError
 
@@ -113,7 +113,7 @@ def checked(sample: Array, sr: int) -> Array:
     return sample
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(nogil=True)
 def _cut(sample: Array, window: Array, hop: int, frames: Array) -> None:  # pragma: no cover - compiled
     """frames (m, N) of samples under the window, zeros outside."""
     size = len(window)
@@ -128,7 +128,7 @@ def _cut(sample: Array, window: Array, hop: int, frames: Array) -> None:  # prag
             out[k] = part[k] * shape[k]
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(nogil=True)
 def _add(frames: Array, window: Array, hop: int, out: Array) -> None:  # pragma: no cover - compiled
     """Add frames (m, N) under the window to out (n,), where they lie in it."""
     size = len(window)

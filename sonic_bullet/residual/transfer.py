@@ -17,8 +17,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array, Residual, frozen_array
 from sonic_bullet.records.errors import AudioError
 from sonic_bullet.residual.spectrogram import Power
@@ -170,7 +170,7 @@ def scale(pairs: Pairs, source_power: Array, target_power: Array, freq_hz: Array
     return out
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(nogil=True)
 def _scale(freq: Array, centre: Array, half: Array, below: Array, above: Array, out: Array) -> None:  # pragma: no cover - compiled
     for k in range(len(freq)):
         up, down = 0.0, 0.0
@@ -203,7 +203,7 @@ def moved(residual: Power, come_from_hz: Array, level: Array, rate: Array, time_
     return out
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(nogil=True)
 def _moved(freq: Array, time: Array, power: Array, come_from: Array, level: Array, rate: Array, at: Array, out: Array) -> None:  # pragma: no cover - compiled
     row = np.empty(len(time))
     for k in range(len(come_from)):

@@ -12,8 +12,8 @@ Blocks lie on a fixed grid of absolute samples, and f runs sample by sample: whe
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from sonic_bullet.machine.compiled import njit
 from sonic_bullet.synth import drive, tile
 from sonic_bullet.synth.tile import BLOCK, CHUNK, ROW, ROWS
 from sonic_bullet.synth.vector import LANES
@@ -24,14 +24,14 @@ FLUSH = 1e-30
 """Output samples below this become 0: they have no meaning in pascal or m/s, and their float32 would be subnormal."""
 
 
-@njit(cache=True, nogil=True, inline="always")
+@njit(nogil=True, inline="always")
 def _aligned(size):  # pragma: no cover - compiled
     raw = np.empty(size + LANES)
     skip = (-(raw.ctypes.data // 8)) % LANES
     return raw[skip : skip + size]
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _ring(b, z, pole, block, weight, modes, start, stop, size, observed, floor, sound, now, powers, table, column):  # pragma: no cover - compiled
     """Tile of body b for the block that starts: sound (W, b, BLOCK). Turns z to the next block. False where all modes are below the floor."""
     ringing = False
@@ -53,7 +53,7 @@ def _ring(b, z, pole, block, weight, modes, start, stop, size, observed, floor, 
     return ringing
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def bend_poles(z, driven, span, log_pole, bend, damping_growth, power, modes, start, stop, pole, block):  # pragma: no cover - compiled
     """Poles of a level-dependent body for the ``span`` samples to come: means over them of what its modes do if nothing strikes them.
 
@@ -76,7 +76,7 @@ def bend_poles(z, driven, span, log_pole, bend, damping_growth, power, modes, st
             block[m], block[modes + m] = q * np.cos(turn * BLOCK), q * np.sin(turn * BLOCK)
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _strike(
     j, n, state, modes, start, lanes, count, whole, delta, phase, upcoming, first, impulse, impulse_at, rows, rows_at, width
 ):  # pragma: no cover - compiled
@@ -95,7 +95,7 @@ def _strike(
     return upcoming[j] >= count[j]
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _begins(first, done, s0, s1, end):  # pragma: no cover - compiled
     """Whether one of the strikes s0 … s1 - 1 has nodes before sample ``end``."""
     begins = False  # numba knows no any()
@@ -104,14 +104,14 @@ def _begins(first, done, s0, s1, end):  # pragma: no cover - compiled
     return begins
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _copy_flushed(values, out):  # pragma: no cover - compiled
     for k in range(len(out)):
         value = values[k]
         out[k] = value if abs(value) >= FLUSH else 0.0
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _close_block(b, z, driven, pole, modes, start, stop, ringing, is_driven, tiled):  # pragma: no cover - compiled
     """End of a block: what was driven within it joins the free state of the next."""
     tiled[b] = False
@@ -126,7 +126,7 @@ def _close_block(b, z, driven, pole, modes, start, stop, ringing, is_driven, til
         is_driven[b] = False
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _drive(at, i, end, place, b, out, z, driven, is_driven, tiled, pole, block, log_pole, bend, damping_growth, power, bent, modes, start, stop, quadrature, weight_flat, observed,
            sound, s0, s1, count, whole, delta, phase, upcoming, first, impulse, impulse_at, rows, rows_at, done, f0, f1, force, gain0, gain1, gain_at, progress, period):  # fmt: skip  # pragma: no cover - compiled
     """Samples i … end - 1 of body b, sample by sample: strikes and forces enter, free and driven part are heard together."""
@@ -172,7 +172,7 @@ def _drive(at, i, end, place, b, out, z, driven, is_driven, tiled, pole, block, 
                 out[w, b, k] = value if abs(value) >= FLUSH else 0.0
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def advance(at, out, offset, size, pole, block, log_pole, bend, damping_growth, power, bent, quadrature, weight, observed, z, driven, sound, ringing, is_driven, tiled, floor,
             strike_of, count, whole, delta, phase, upcoming, first, impulse, impulse_at, rows, rows_at, done,
             force_of, force, gain0, gain1, gain_at, progress, period):  # fmt: skip  # pragma: no cover - compiled

@@ -17,8 +17,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array
 
 
@@ -50,7 +50,7 @@ def moved_air(corner_m: Array) -> Moved:
     return Moved(area, np.maximum(value, 1e-2 * root.min()), vector)
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _matrices(corner, normal, beta):
     """½ - K - βD and S + β(½ + K'), both (f, f)."""
     count = len(corner)

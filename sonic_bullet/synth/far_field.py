@@ -18,8 +18,8 @@ v vertices, f faces, m modes, s patches, n directions in pairs ±r̂.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Air, Array, ModalModel
 from sonic_bullet.synth.entrained_mass import Moved, moved_air
 
@@ -197,7 +197,7 @@ def _moments(speed: Array, level: Array, corner: Array, area: Array, normal: Arr
     out[:, 4:7] = np.add.reduceat(push.imag[order], start).transpose(2, 1, 0)
 
 
-@njit(cache=True, nogil=True, fastmath=True)
+@njit(nogil=True, fastmath=True)
 def _map(k, moment, place, direction):
     """Σ over patches [v + ik r̂·(v y + n ψ)] e^{ik r̂·x} (m, n), place (3, s), for directions (n, 3) and for their negatives. Sums run in vectors: no order to keep."""
     m, n = len(k), len(direction)

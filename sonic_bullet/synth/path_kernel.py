@@ -15,9 +15,10 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numba import njit, types
+from numba import types
 from numba.extending import intrinsic
 
+from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array
 from sonic_bullet.synth.vector import LANES, Emit
 
@@ -75,7 +76,7 @@ def _interpolate(typingctx, ring, at, taps, t):
     return types.float64(ring, at, taps, t), codegen
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy")
 def _listen(line, at, emitted, delay, observed, ring, delays, awake, cursor, last, taps):  # pragma: no cover - compiled
     """Run one line, its ring and delays (a power of two long, the ring TAPS longer), over emitted (n,), adding to heard (n,)."""
     size = len(delays)
@@ -122,7 +123,7 @@ def _listen(line, at, emitted, delay, observed, ring, delays, awake, cursor, las
     awake[line], cursor[line], last[line] = running, m, newest
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy")
 def _emit(source, jerk, coefficient, radius, from_m, to_m, fade, progress, microphone, samples_per_m, emitted, delay):  # pragma: no cover - compiled
     """a and D of the module's equations for one body, place and microphone. fade: 0 none, 1 in, -1 out, 2 nothing any more."""
     for i in range(len(progress)):
@@ -143,7 +144,7 @@ def _emit(source, jerk, coefficient, radius, from_m, to_m, fade, progress, micro
         delay[i] = max(r * samples_per_m, LEAST_DELAY)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy")
 def farthest(from_m, to_m, microphone, out):  # pragma: no cover - compiled
     """Greatest distance (t,) of each place's ends from any microphone: on a straight way it lies at an end."""
     for t in range(len(out)):
@@ -157,7 +158,7 @@ def farthest(from_m, to_m, microphone, out):  # pragma: no cover - compiled
         out[t] = np.sqrt(square)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy")
 def _judged(values):  # pragma: no cover - compiled
     """Whether any of the values is not zero, and whether any is not finite."""
     some, bad = 0, 0
@@ -167,7 +168,7 @@ def _judged(values):  # pragma: no cover - compiled
     return some != 0, bad != 0
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy")
 def survey(source, jerk, coefficient, loud):  # pragma: no cover - compiled
     """Mark the bodies that emit anything (b,). False where a number is not finite."""
     for b in range(len(source)):
@@ -182,7 +183,7 @@ def survey(source, jerk, coefficient, loud):  # pragma: no cover - compiled
     return True
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy")
 def propagate(at, out, source, jerk, coefficient, radius, order, body, from_m, to_m, fade, progress, microphone, samples_per_m,
               ring, ring_at, delays, delays_at, size, awake, cursor, last, taps, loud):  # fmt: skip  # pragma: no cover - compiled
     """Samples at … at + n - 1 into out (c, n), the places summed in ``order``; see path.py for the arrays."""

@@ -13,8 +13,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import AudioError
 
@@ -148,7 +148,7 @@ def without(pending: Pending, done: Array, offset: Array) -> Pending:
     return kept
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _fill_rows(rows, rows_at, body, offset, log_pole, quadrature, gain, phase, delta, whole, held):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
     """The phasors r, D, E0 = e^{s(1 - whole δ)}, E1 = E0/D of each strike, real and imaginary rows in turn."""
     modes = len(quadrature)

@@ -19,9 +19,9 @@ The voice needs dh/dt alone: Σ g A n'(x/Δ)·v/Δ. So a changing gain never mov
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 
+from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array
 
 OCTAVES = 14
@@ -49,7 +49,7 @@ def octave_gains(speed_m_s: Array, patch_radius_m: Array, sr: int) -> Array:
     return np.asarray(patch * np.clip((0.4 - f / sr) / 0.2, 0, 1) * np.clip(f / SLOWEST_HZ - 1, 0, 1))
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy")
 def _noise(first, out):  # type: ignore[no-untyped-def]
     """Values on ±1 of the lattice points from ``first`` (uint32) on: a 32-bit integer mix [Wellons 2018, "lowbias32"], kept in 32 bits so that it vectorises."""
     for i in range(len(out)):
@@ -59,7 +59,7 @@ def _noise(first, out):  # type: ignore[no-untyped-def]
         out[i] = np.float64(np.int32(h ^ (h >> np.uint32(16)))) * (1.0 / 2147483648.0)
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy")
 def _refine(coarse, fine, height, noise, count):  # type: ignore[no-untyped-def]
     """2·count B-spline coefficients on half the lattice, from coarse[0] … coarse[count + 1], and this octave's own noise."""
     for i in range(count):
@@ -67,7 +67,7 @@ def _refine(coarse, fine, height, noise, count):  # type: ignore[no-untyped-def]
         fine[2 * i + 1] = 0.5 * (coarse[i + 1] + coarse[i + 2]) + height * noise[2 * i + 1]
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy")
 def sweep(swept, speed, x, key, height0, height1, sr, rate):  # type: ignore[no-untyped-def]
     """Add dh/dt of one side of one pair to ``rate`` (n,) in m/s; returns the distance swept after the n samples.
 

@@ -17,9 +17,9 @@ from collections.abc import Sequence
 from functools import lru_cache
 from math import gamma, pi, sqrt
 
-import numba
 import numpy as np
 
+from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import RecordError
 
@@ -195,7 +195,7 @@ def _table() -> Array:
     return table
 
 
-@numba.njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _cumulated(s, table, flat):  # type: ignore[no-untyped-def]
     if s <= 0.0:
         return 0.0
@@ -210,7 +210,7 @@ def _cumulated(s, table, flat):  # type: ignore[no-untyped-def]
     return q0 + t * (f0 + t * (3.0 * (q1 - q0) - 2.0 * f0 - f1 + t * (2.0 * (q0 - q1) + f0 + f1)))
 
 
-@numba.njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _cumulated_many(s, table, flat):  # type: ignore[no-untyped-def]
     out = np.empty(s.size)
     for i, value in enumerate(s.ravel()):
@@ -218,7 +218,7 @@ def _cumulated_many(s, table, flat):  # type: ignore[no-untyped-def]
     return out.reshape(s.shape)
 
 
-@numba.njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _add_jerk(out, body, t0, tau, flat, impulse, sr, first, table):  # type: ignore[no-untyped-def]
     n = out.shape[2]
     for k in range(len(body)):

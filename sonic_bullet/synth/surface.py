@@ -22,9 +22,9 @@ from __future__ import annotations
 
 from dataclasses import Field, dataclass, field, fields
 
-import numba
 import numpy as np
 
+from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array, frozen_array
 from sonic_bullet.synth.profile import octave_gains, octave_heights, sweep
 
@@ -193,7 +193,7 @@ def _law(k: Array, mass: Array, load: Array, sr: int) -> tuple[Array, Array, Arr
     return substeps, limit, depth
 
 
-@numba.njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _rates(swept, rows, speed, x, seed, height, sr):  # type: ignore[no-untyped-def]
     """dh/dt (rows, n) in m/s of both sides together; moves ``swept`` (p, 2) on."""
     rate = np.zeros((len(rows), len(x)))
@@ -205,7 +205,7 @@ def _rates(swept, rows, speed, x, seed, height, sr):  # type: ignore[no-untyped-
     return rate
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy")
 def _oscillate(depth, lift, rows, g, rate, rate_unit, force_unit, rest, damping, x, substeps, still, out):  # type: ignore[no-untyped-def]
     """f - N of the pairs ``rows`` (r of p), all with equal substeps, into out (p, n); depth and lift (p,) move on. g: their rows in rate.
 
@@ -231,7 +231,7 @@ def _oscillate(depth, lift, rows, g, rate, rate_unit, force_unit, rest, damping,
         depth[rows[r]], lift[rows[r]] = z[r], u[r]
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy")
 def _rest(d0, c, load, total, rest, damping, share):  # type: ignore[no-untyped-def]
     """Resting penetration, damping and load of all pairs (r,) at this share of the step."""
     for r in range(len(d0)):
@@ -241,7 +241,7 @@ def _rest(d0, c, load, total, rest, damping, share):  # type: ignore[no-untyped-
         load[r] = low * np.sqrt(low) + 1.5 * (d0[r] - low)
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy")
 def _substep(z, u, dh, d0, c, load, total):  # type: ignore[no-untyped-def]
     """One step of semi-implicit Euler of all pairs (r,); the force above the load is added to total."""
     for r in range(len(z)):

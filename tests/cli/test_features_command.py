@@ -19,15 +19,34 @@ def test_a_tap_in_stereo(tmp_path: Path) -> None:
     time = np.arange(24_000) / 48_000
     tap = 0.3 * np.exp(-12 * time) * np.sin(2 * np.pi * 700 * time) + 1e-5 * np.random.default_rng(0).standard_normal(len(time))
     soundfile.write(tmp_path / "tap.wav", np.stack([0.1 * tap, tap], axis=1), 48_000, subtype="FLOAT")
-    done = features(tmp_path / "tap.wav", "--json", "--picture", tmp_path / "tap.png")
+    done = features(tmp_path / "tap.wav", "--channel", "1", "--json", "--picture", tmp_path / "tap.png")
     assert done.returncode == 0, done.stderr
     said = json.loads(done.stdout)
     (one,) = said["features"]
     assert abs(one["freq_hz"] - 700) < 5 * one["freq_sd_hz"] and abs(one["decay_per_s"] - 12) < 5 * one["decay_sd_per_s"]
     assert abs(one["amplitude"] - 0.3) < 5 * one["amplitude_sd"]
-    assert "channel 2 of 2" in said["note"] and "channel 2 of 2" in done.stderr
+    assert "2 channels: channel 1 is used" in said["note"] and "2 channels: channel 1 is used" in done.stderr
+    assert said["verdict"] == "features"  # asked for, so no doubt
     assert set(said) >= {"features", "onset_s", "noise_dbfs"} and {"freq_hz", "decay_per_s", "amplitude", "freq_sd_hz", "decay_sd_per_s"} <= set(one)
     assert (tmp_path / "tap.png").stat().st_size > 10_000
+
+
+def test_the_first_channel_is_used_and_said(tmp_path: Path) -> None:
+    """As `fit`, `residual` and `diagnose` do, however loud the others are; what is not there is one line."""
+    time = np.arange(24_000) / 48_000
+    one, two = (0.3 * np.exp(-12 * time) * np.sin(2 * np.pi * f * time) for f in (700, 1900))
+    soundfile.write(tmp_path / "two.wav", np.stack([0.1 * one, two], axis=1), 48_000, subtype="FLOAT")
+    for words, freq_hz, said in (
+        ([], 700, "2 channels: the first is used"),
+        (["--channel", "0"], 700, "channel 0 is used"),
+        (["--channel", "1"], 1900, "channel 1 is used"),
+    ):
+        done = features(tmp_path / "two.wav", *words, "--json")
+        assert [round(line["freq_hz"]) for line in json.loads(done.stdout)["features"]] == [freq_hz]
+        assert len(done.stderr.splitlines()) == 1 and said in done.stderr
+    done = features(tmp_path / "two.wav", "--channel", "2")
+    assert done.returncode == 2
+    assert done.stderr.splitlines() == [f"sonic-bullet: {tmp_path / 'two.wav'} has no channel 2; it has 2 channels, 0 to 1"]
 
 
 def test_what_is_no_recording_gets_one_line(tmp_path: Path) -> None:

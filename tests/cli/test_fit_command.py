@@ -81,6 +81,7 @@ def test_one_recording_of_undeclared_onset(folder: Path, tmp_path: Path, capfd: 
     strike = ",".join(map(str, case["recordings"][0]["strike"]["position"]))
     at = ",".join(map(str, case["sensor"]["position"]["box"]))
     words = ["--mesh", folder / "box.obj", "--strike", strike, "--sensor", "velocity", "--sensor-at", at, "--sensor-direction", "0,0,2", "--material", "brass"]
+    words += ["--medium", "none"]
     assert run("fit", tmp_path / "late.wav", *words, "-o", tmp_path / "p.json", "--json", tmp_path / "f.json") == 0
     told = json.loads((tmp_path / "f.json").read_text())
     assert told["alpha_per_s"] == pytest.approx(8.0, rel=0.02)
@@ -193,3 +194,77 @@ def test_numbers_that_are_none_are_refused(folder: Path, tmp_path: Path, capfd: 
     error = capfd.readouterr().err
     assert error.count("\n") == 1
     assert "DEBUG" not in error
+
+
+def stereo(folder: Path, place: Path, **entry: Any) -> Path:
+    """A case of the first strike in the second of two channels, noise in the first."""
+    observed, sr = soundfile.read(folder / "s0.wav")
+    noise = 1e-3 * np.random.default_rng(2).standard_normal(len(observed))
+    soundfile.write(place / "two.wav", np.stack([noise, observed], axis=1), sr, subtype="FLOAT")
+    (place / "box.obj").write_text((folder / "box.obj").read_text())
+    case = json.loads((folder / "case.json").read_text())
+    case["recordings"] = [{**case["recordings"][0], "file": "two.wav", **entry}]
+    (place / "case.json").write_text(json.dumps(case))
+    return place
+
+
+def test_the_entrys_channel_is_fitted_and_said(folder: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    assert run("fit", stereo(folder, tmp_path, channel=1, chanel=0), "-o", tmp_path / "p.json", "--json") == 0
+    out, err = capfd.readouterr()
+    assert json.loads(out)["alpha_per_s"] == pytest.approx(8.0, rel=0.02)
+    lines = err.splitlines()
+    assert len(lines) == 2 and all(line.startswith("sonic-bullet: warning: ") for line in lines)
+    assert "field 'chanel' is not known and not read: did you mean 'channel'?" in lines[0]
+    assert lines[1].endswith("two.wav: 2 channels: channel 1 is used, counted from 0")
+
+
+@pytest.mark.parametrize("command", ["fit", "residual", "diagnose"])
+def test_the_first_channel_unless_another_is_named(folder: Path, tmp_path: Path, command: str, capfd: pytest.CaptureFixture[str]) -> None:
+    assert run(command, stereo(folder, tmp_path), "-o", tmp_path / "p.json") == 2  # noise alone
+    assert "no damped sinusoid" in capfd.readouterr().err
+    assert run(command, stereo(folder, tmp_path, channel=2), "-o", tmp_path / "p.json") == 2
+    (line,) = capfd.readouterr().err.splitlines()
+    assert line.endswith("two.wav has no channel 2; it has 2 channels, 0 to 1")
+
+
+def test_channels_of_a_recording_alone(folder: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    stereo(folder, tmp_path)
+    words = ["--mesh", folder / "box.obj", "--strike", "0,0,0.003", "--material", "brass", "-o", tmp_path / "p.json"]
+    for command in ("fit", "residual"):
+        assert run(command, tmp_path / "two.wav", *words, "--channel", "5") == 2
+        assert "has no channel 5; it has 2 channels, 0 to 1" in capfd.readouterr().err
+        assert run(command, tmp_path, "-o", tmp_path / "p.json", "--channel", "0") == 2
+        assert "--channel given beside a case" in capfd.readouterr().err
+    unshaped = ["residual", tmp_path / "two.wav", "--material", "brass", "-o", tmp_path / "p.json"]
+    assert run(*unshaped, "--channel", "1") == 0
+    assert "2 channels: channel 1 is used" in capfd.readouterr().err
+    assert run(*unshaped) == 2  # noise alone
+    assert "2 channels: the first is used" in capfd.readouterr().err
+
+
+def test_a_residual_without_a_mesh_is_refused_at_once(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
+    """Before a recording is opened, whatever the case holds."""
+    monkeypatch.setattr("sonic_bullet.estimator.fit.material_fit.observed.read_audio", lambda *_: pytest.fail("a recording was read"))
+    case = json.loads((stereo(folder, tmp_path) / "case.json").read_text())
+    lines = [{"object": "box", "features": [{"freq_hz": 1000.0, "decay_per_s": 3.0}]}]
+    for change in ({"objects": {"box": {"material": "brass"}}}, {"objects": {}, "recordings": [{"file": "two.wav"}]}, {"recordings": lines}):
+        (tmp_path / "case.json").write_text(json.dumps(case | change))
+        assert run("residual", tmp_path, "-o", tmp_path / "p.json") == 2
+        (line,) = capfd.readouterr().err.splitlines()
+        assert "has no 'fit' recording of an object with a mesh" in line
+        assert not (tmp_path / "p.json").exists()
+
+
+@pytest.mark.parametrize("command", ["fit", "residual", "diagnose"])
+def test_a_mesh_that_is_not_there_is_said_at_once(
+    folder: Path, tmp_path: Path, command: str, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """Also where it is the last object's, or one that a diagnosis is only held against."""
+    monkeypatch.setattr("sonic_bullet.estimator.fit.material_fit.observed.read_audio", lambda *_: pytest.fail("a recording was read"))
+    case = json.loads((stereo(folder, tmp_path) / "case.json").read_text())
+    case["objects"]["other"] = {**case["objects"]["box"], "mesh": "none.obj"}
+    split = "transfer" if command == "diagnose" else "fit"
+    case["recordings"].append({**case["recordings"][0], "object": "other", "split": split})
+    (tmp_path / "case.json").write_text(json.dumps(case))
+    assert run(command, tmp_path, "-o", tmp_path / "p.json") == 2
+    assert "none.obj' does not exist" in capfd.readouterr().err.splitlines()[-1]

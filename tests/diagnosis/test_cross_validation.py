@@ -9,8 +9,6 @@ from typing import Any, ClassVar, Self
 import numpy as np
 import pytest
 from scipy.optimize import nnls
-from test_chains import BENT
-from test_found_again import BAND, fitted
 
 from sonic_bullet.diagnosis.diagnose import _finite
 from sonic_bullet.diagnosis.evidence.baseline import _soft, takes_of
@@ -21,7 +19,7 @@ from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis
 from sonic_bullet.diagnosis.prediction.score import mean_db
 from sonic_bullet.diagnosis.selection import stepwise as loop
 from sonic_bullet.diagnosis.selection.acceptance import Candidate, earns
-from sonic_bullet.diagnosis.selection.cross_validation import KEPT, Fold, _after, _folds, trials
+from sonic_bullet.diagnosis.selection.cross_validation import KEPT, _folds, trials
 from sonic_bullet.effects import EFFECTS
 from sonic_bullet.effects.amplitude_damping import AmplitudeDamping
 from sonic_bullet.effects.orthotropy import Orthotropy
@@ -32,24 +30,11 @@ from sonic_bullet.effects.support_damping import SupportDamping
 from sonic_bullet.effects.support_damping.dashpot_fit import Trial
 from sonic_bullet.effects.support_damping.support_subsets import _best, subsets
 from sonic_bullet.records import ModalModel
+from tests.diagnosis.test_found_again import BAND, fitted
+from tests.diagnosis.test_recording_chain import BENT
 from tests.made.body import plate, recorded, struck
 
 WEAK = ((0.0477, 0.0371, 0.0), (0.0955, 0.0186, 0.0), (0.1432, 0.0464, 0.0))
-
-
-def test_a_strike_that_neither_plays_above_the_noise_is_as_far_off_as_noise_makes() -> None:
-    """The baseline played it too loud; with the pulse it is as silent as the recording: no distance, and no NaN in the mean either."""
-
-    @dataclass
-    class Silent:
-        def distance(self, h: Hypothesis) -> float:
-            return np.nan
-
-        def least(self, h: Hypothesis) -> float:
-            return np.nan
-
-    fold = Fold(Silent(), (), Evidence((), 0.0, 0.0, 1.0, (), BAND), fitted(recorded()), 4.0, 4.0, 1.1)
-    assert _after(fold, fold.base) == 1.1
 
 
 def test_what_is_no_number_is_null_in_json() -> None:
@@ -120,7 +105,7 @@ def test_two_processes_find_what_one_finds(monkeypatch: pytest.MonkeyPatch) -> N
     h = refitted(fitted(body), (body,))
     takes, evidence, kinds = takes_of((body,)), evidence_of(h, (body,), BAND), (AmplitudeDamping, Radiation, SupportDamping, Idle)
     two = trials(h, (body,), takes, evidence, kinds, seed=3, say=lambda _: None)
-    monkeypatch.setattr("sonic_bullet.side_by_side._can_fork", lambda: False)
+    monkeypatch.setattr("sonic_bullet.parallel._can_fork", lambda: False)
     one = trials(h, (body,), takes, evidence, kinds, seed=3, say=lambda _: None)
     assert len(one) >= 2
     assert [(c.id, c.effect.parameters(), c.null_db, c.spread) for c in two] == [(c.id, c.effect.parameters(), c.null_db, c.spread) for c in one]
@@ -178,7 +163,7 @@ def test_three_weak_dashpots_are_told_together() -> None:
 
 def test_trials_tell_what_has_numbers_of_single_lines_all_lines(monkeypatch: pytest.MonkeyPatch) -> None:
     """And one that searches by itself is not asked once enough is found and little left."""
-    monkeypatch.setattr("sonic_bullet.side_by_side._can_fork", lambda: False)
+    monkeypatch.setattr("sonic_bullet.parallel._can_fork", lambda: False)
     body = recorded()
     takes, h = takes_of((body,)), refitted(fitted(body), (body,))
     asked: list[tuple[str, int]] = []
@@ -216,7 +201,7 @@ def test_trials_tell_what_has_numbers_of_single_lines_all_lines(monkeypatch: pyt
 )
 def test_in_a_room_dashpots_wait_for_a_tensor(dry: bool, costly: bool, asked: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
     """Lines that are paired with another material's modes tell little of what mixes these; asked alone, dashpots are sought."""
-    monkeypatch.setattr("sonic_bullet.side_by_side._can_fork", lambda: False)
+    monkeypatch.setattr("sonic_bullet.parallel._can_fork", lambda: False)
     seen: list[str] = []
 
     class Dashpots(Idle):

@@ -101,3 +101,47 @@ def test_broken_json_is_one_line(tmp_path: Path, content: bytes) -> None:
 def test_missing_folder(tmp_path: Path) -> None:
     with pytest.raises(FileError, match="cannot read"):
         read_case(tmp_path / "none")
+
+
+def test_fields_that_are_not_read_are_named_with_the_nearest(tmp_path: Path) -> None:
+    """At every level, a line each; nothing is refused."""
+    bar = {"mesh": "bar.obj", "unit": "mm", "material": "steel", "elastic_guess": {"youngs_modulus": 2e11, "dens": 7850}}
+    strike = {"position": [0, 0, 0.1], "impuls": 0.01, "force": {"file": "f.wav", "chanel": 1}}
+    entry = {"file": "a.wav", "chanel": 1, "strike": strike, "features": [{"freq_hz": 100.0, "decay": 3.0}]}
+    fixed = {"position": [0, 0, 0], "raduis": 0.1}
+    case = read_case(
+        written(tmp_path, band=[20, 5000], objects={"bar": bar}, recordings=[entry], support={"fixed": [fixed]}, sensor={"respons": "velocity"}, qwxz=1)
+    )
+    assert case.band_hz == (20.0, 20_000.0)
+    said = {line.split("field '")[1].split("'")[0]: line for line in case.warnings}
+    meant = {"band": "band_hz", "unit": "units", "dens": "density", "impuls": "impulse", "decay": "decay_per_s", "raduis": "radius", "respons": "response"}
+    assert {name: line.split("did you mean '")[1].rstrip("'?") for name, line in said.items() if name in meant} == meant
+    assert sum("'chanel'" in line and "'channel'" in line for line in case.warnings) == 2  # of the recording and of its force
+    assert "known here: format, recordings" in said["qwxz"]
+    assert len(case.warnings) == len(meant) + 3
+    assert "recordings 1: strike: force: field 'chanel'" in " ".join(case.warnings)
+
+
+def test_words_for_people_and_what_is_documented_are_no_warning(tmp_path: Path) -> None:
+    assert not read_case(written(tmp_path, note="a tap", source="mine", medium="air", onset=0.0, sensor={"type": "microphone"})).warnings
+    assert read_case(tmp_path).medium == "air"
+
+
+def test_warnings_are_few_and_short(tmp_path: Path) -> None:
+    case = read_case(written(tmp_path, **{f"{i}{'x' * 5000}\n": 1 for i in range(500)}))
+    assert len(case.warnings) == 21
+    assert "480 more" in case.warnings[-1]
+    assert all("\n" not in line and len(line) < 500 for line in case.warnings)
+
+
+@pytest.mark.shared
+def test_no_practice_case_warns(shared_path: Path) -> None:
+    cases = [read_case(folder) for folder in sorted((shared_path / "practice").glob("practice-*"))]
+    assert len(cases) >= 6
+    assert not [line for case in cases for line in case.warnings]
+    assert {case.medium for case in cases} == {"none"}
+
+
+def test_a_channel_below_zero_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(FileError, match="channel -1"):
+        read_case(written(tmp_path, recordings=[{"file": "a.wav", "channel": -1}]))

@@ -1,4 +1,4 @@
-"""Cases with known answers: a box of our own choice, struck and heard in closed form, written as anyone would record it."""
+"""Cases with known answers: a box of our own choice, struck and heard in closed form, without air, written as anyone would record it."""
 
 from __future__ import annotations
 
@@ -82,6 +82,7 @@ def make(
         "objects": {
             "box": {"mesh": "box.obj", "material": "brass", "elastic_guess": dict(zip(("youngs_modulus", "density", "poisson_ratio"), guess, strict=True))}
         },
+        "medium": "none",
         "support": {"fixed": [{"position": list(f[:3]), "radius": f[3]} for f in fixed]},
         "sensor": {"response": "gain * normal surface velocity", "position": {"box": [float(x) for x in model.vertex_m[end]]}, "direction": {"box": [0, 0, 1]}},
         "band_hz": [20, 18000],

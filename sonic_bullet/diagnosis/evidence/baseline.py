@@ -18,7 +18,7 @@ from sonic_bullet.diagnosis.evidence.refit import refitted
 from sonic_bullet.diagnosis.evidence.unmatched_modes import settled
 from sonic_bullet.diagnosis.prediction.elastic_bodies import with_elastic
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis
-from sonic_bullet.diagnosis.prediction.score import Take, mean_db
+from sonic_bullet.diagnosis.prediction.score import Compared, Take, comparable, mean_db
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck, shapeless, struck_bodies
 from sonic_bullet.effects.common.hum import without_hum
 from sonic_bullet.effects.measurement_chain import limit_of
@@ -26,7 +26,7 @@ from sonic_bullet.estimator.fit.case_fit import CaseFit
 from sonic_bullet.estimator.fit.material_fit import fit_evidence
 from sonic_bullet.estimator.fit.observed import Evidence as Recorded
 from sonic_bullet.estimator.lines.joint_lines import Lines, joint_lines, lines_of, noise_rms
-from sonic_bullet.estimator.lines.log_spectral import floor_between
+from sonic_bullet.estimator.lines.log_spectral import floor_between, white
 from sonic_bullet.files.cases import Case
 from sonic_bullet.modal.cache import Place
 from sonic_bullet.records import Array
@@ -108,12 +108,14 @@ def _lines_by(one: Recorded, strikes: Array, band_hz: tuple[float, float]) -> Li
 
 
 def _off_db(b: Baseline) -> float:
-    found = mean_db(b.takes, refitted(b.hypothesis, b.bodies))
-    return np.inf if found is None else found
+    """How far its strikes are; ∞ where none can be compared: no way of fitting is nearer than another then."""
+    h = refitted(b.hypothesis, b.bodies)
+    found = comparable(b.takes, h)
+    return mean_db(found.takes, h) if isinstance(found, Compared) else np.inf
 
 
 def _of(case: Case, recorded: tuple[Recorded, ...], cache: Place, progress: Callable[[str], None] | None) -> Baseline:
-    found = fit_evidence(case, recorded, check_mesh=False, progress=progress)
+    found = fit_evidence(case, recorded, check_mesh=False, total=True, progress=progress)
     bodies = struck_bodies(found, cache=cache, progress=progress) if found.objects else tuple(shapeless(found, g) for g in recorded)
     bodies = with_elastic(found, tuple(separated(body) for body in bodies), cache=cache, progress=progress)
     gain = found.fit.sigma if np.isfinite(found.fit.sigma) and found.fit.sigma > 0 else 1.0
@@ -128,6 +130,7 @@ def takes_of(bodies: tuple[Struck, ...]) -> tuple[Take, ...]:
     for body in bodies:
         if body.recorded is None or body.recorded.signals is None:
             continue
-        floor = floor_between(list(body.recorded.signals))
+        finite = [signal for signal in body.recorded.signals if np.isfinite(signal).all()]
+        floor = floor_between(finite) if finite else white(np.inf)  # over which nothing stands
         takes += [Take(body, i, sample, body.recorded.sr, floor) for i, sample in zip(body.fitted, body.recorded.signals, strict=True)]
     return tuple(takes)

@@ -10,7 +10,6 @@ That is no effect and nothing that anybody would want named, so a verdict knows 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -18,7 +17,7 @@ import numpy as np
 from sonic_bullet.diagnosis.evidence.degenerate_pairs import FEWEST, LIKE, like
 from sonic_bullet.diagnosis.evidence.refit import ROUGH, refitted
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, modes_of, pattern, play
-from sonic_bullet.diagnosis.prediction.score import Judged, Take, mean_db
+from sonic_bullet.diagnosis.prediction.score import Comparable, Take, mean_db
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.estimator.fit.pairing import DEGENERATE
 from sonic_bullet.estimator.lines.log_spectral import with_noise
@@ -29,7 +28,7 @@ FAR = 0.03  # of a frequency: what a coarse one does, in modes of few elements a
 NEARER_DB = 0.05  # without a mode, that ought to be silent
 
 
-def beyond(h: Hypothesis, bodies: tuple[Struck, ...], takes: Sequence[Judged]) -> tuple[Hypothesis, float]:
+def beyond(h: Hypothesis, bodies: tuple[Struck, ...], takes: Comparable) -> tuple[Hypothesis, float]:
     """The hypothesis with modes that no line was told for where lines of their pattern are, or outside the band; and how far the farthest was put, relative: 0 where none was."""
     start, most = h, 0.0
     mine = [b for b in bodies if b.recorded is not None and b.family is not None and len(b.fitted) >= FEWEST and b.name in (h.correction or {})]
@@ -44,14 +43,16 @@ def beyond(h: Hypothesis, bodies: tuple[Struck, ...], takes: Sequence[Judged]) -
     return h, most
 
 
-def _outside(start: Hypothesis, h: Hypothesis, body: Struck, takes: Sequence[Judged]) -> tuple[Hypothesis, float]:
+def _outside(start: Hypothesis, h: Hypothesis, body: Struck, takes: Comparable) -> tuple[Hypothesis, float]:
     """The hypothesis with a body's modes near the band's upper edge outside it, one frequency after another from the top, where strikes are nearer so."""
     model, order = modes_of(h, body)
     old, most, top = (start.correction or {})[body.name], 0.0, body.band_hz[1]
     group = np.cumsum(np.diff(np.log(model.freq_hz), prepend=-np.inf) > DEGENERATE)
     free = (body.line[order] < 0) & (old[order] == (h.correction or {})[body.name][order])
     near = free & (model.freq_hz <= top) & (model.freq_hz * (1 + FAR) > top)
-    now = mean_db(takes, h) if near.any() else None
+    if not near.any():
+        return h, most
+    now = mean_db(takes, h)
     for g in np.unique(group[near])[::-1]:
         who = np.flatnonzero((group == g) & near)
         step = float(top / model.freq_hz[who].min() * (1 + MESH) - 1)
@@ -59,7 +60,7 @@ def _outside(start: Hypothesis, h: Hypothesis, body: Struck, takes: Sequence[Jud
         other[order[who]] = (1 + other[order[who]]) * (1 + step) - 1
         silent = replace(h, correction={**(h.correction or {}), body.name: other})
         far = mean_db(takes, silent)
-        if now is not None and far is not None and far < now - NEARER_DB:
+        if far < now - NEARER_DB:
             h, now, most = silent, far, max(most, step)
     return h, most
 
@@ -89,7 +90,7 @@ def _put(h: Hypothesis, body: Struck, correction: Array) -> tuple[Array, float]:
     return found, most
 
 
-def of_the_mesh(h: Hypothesis, bodies: tuple[Struck, ...], takes: Sequence[Judged], seed: int) -> float:
+def of_the_mesh(h: Hypothesis, bodies: tuple[Struck, ...], takes: Comparable, seed: int) -> float:
     """What a mesh's errors would add to the distance, in dB: modes that no line could correct moved at random by as much as the others were
     corrected, and every shape at the strikes by ROUGH of its strongest there."""
     rng = np.random.default_rng([seed, 5])
@@ -105,8 +106,11 @@ def of_the_mesh(h: Hypothesis, bodies: tuple[Struck, ...], takes: Sequence[Judge
         other[body.name] = _roughened(replace(body, model=model, other=None), rng)
     far = replace(h, correction=moved)
     pairs = [(t, play(h, t.body, t.strike, len(t.sample), t.sr)) for t in takes if isinstance(t, Take)]
+    if not pairs:
+        return 0.0  # lists of lines are held against frequencies alone, and corrected by them
     twice = [replace(t, sample=with_noise(made, t.floor, 1000 + t.strike)) for t, made in pairs]
-    return (mean_db([replace(t, body=other.get(t.body.name, t.body)) for t in twice], far) or 0.0) - (mean_db(twice, h) or 0.0)
+    moved_db = mean_db(Comparable(tuple(replace(t, body=other.get(t.body.name, t.body)) for t in twice)), far)
+    return moved_db - mean_db(Comparable(tuple(twice)), h)
 
 
 def _roughened(body: Struck, rng: np.random.Generator) -> Struck:

@@ -29,8 +29,19 @@ class Listed:
     body: Struck
     line: Array
 
+    @property
+    def name(self) -> str:
+        """Whose lines they are."""
+        return f"the list of lines of {self.body.name}"
+
+    def hindrance(self, h: Hypothesis) -> str:
+        """Why they have no distance from a hypothesis; empty where they have one."""
+        assert self.body.recorded is not None
+        count = len(self.body.recorded.lines.freq_hz)
+        return "" if count >= 2 * FOLDS else f"holds {count}, and {2 * FOLDS} are needed to leave some out in turn"
+
     def distance(self, h: Hypothesis) -> float:
-        """D in dB; NaN where there is no line."""
+        """D in dB."""
         assert self.body.recorded is not None
         lines = self.body.recorded.lines
         return distance_db(*off_by(h, self.body, lines.freq_hz[self.line], lines.decay_per_s[self.line]))
@@ -53,12 +64,11 @@ class Listed:
 
 
 def listed(bodies: tuple[Struck, ...]) -> tuple[Listed, ...]:
-    """Every body's lines in turns."""
+    """Every body's lines in turns; too few to leave some out as they are (`Listed.hindrance`)."""
     made = []
-    for body in bodies:
+    for body in (b for b in bodies if b.recorded is not None):
         count = len(body.recorded.lines.freq_hz) if body.recorded is not None else 0
-        if count >= 2 * FOLDS:
-            made += [Listed(body, np.arange(i, count, FOLDS)) for i in range(FOLDS)]
+        made += [Listed(body, np.arange(i, count, FOLDS)) for i in range(FOLDS if count >= 2 * FOLDS else 1)]
     return tuple(made)
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, play
-from sonic_bullet.diagnosis.prediction.score import Take
+from sonic_bullet.diagnosis.prediction.score import Comparable, Take
 from sonic_bullet.estimator.lines.log_spectral import with_noise
 from sonic_bullet.estimator.perceptual.image import image
 from sonic_bullet.records.errors import RecordError
@@ -20,10 +20,10 @@ LEVELS = 2
 OBSERVED = 0.05  # sone
 
 
-def sone_distance(takes: tuple[Take, ...], h: Hypothesis) -> float | None:
+def sone_distance(takes: Comparable, h: Hypothesis) -> float | None:
     """Mean over takes; None where there is none that is heard."""
     found = []
-    for take in takes:
+    for take in (t for t in takes if isinstance(t, Take)):
         made = with_noise(play(h, take.body, take.strike, len(take.sample), take.sr), take.floor, take.strike)
         try:
             a, b = (image(x, take.sr, 0.0, FULL_SCALE, levels=LEVELS, bark_step=1.0) for x in (take.sample, made))

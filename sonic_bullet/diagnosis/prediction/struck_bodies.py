@@ -16,9 +16,9 @@ import numpy as np
 
 from sonic_bullet.effects.protocol import Elastic, Poisson
 from sonic_bullet.estimator.fit.case_fit import POISSON_SD, CaseFit, ObjectFit
-from sonic_bullet.estimator.fit.observation import pressure_weight
 from sonic_bullet.estimator.fit.observed import Evidence as Recorded
 from sonic_bullet.estimator.fit.observed import body_family, guess_of
+from sonic_bullet.estimator.fit.radiation_share import into_air
 from sonic_bullet.files.cases import Case, CaseRecording
 from sonic_bullet.modal.cache import Place
 from sonic_bullet.modal.reduced import Family
@@ -144,7 +144,7 @@ def modal_model(
         place.append(np.array(position, float))
     freq = np.sqrt(value) / (2 * np.pi)
     if case.sensor != "velocity":
-        weight = pressure_weight(family, density, freq, np.zeros(len(freq)), vector) if case.sensor == "pressure" else np.ones(len(freq))
+        weight = into_air(family, density, freq, vector)[0] if case.sensor == "pressure" else np.ones(len(freq))
         extra.append(np.stack([weight, 0 * weight, 0 * weight]))
         direction.append(axes[0])
         place.append(family.vertex_m.mean(axis=0))

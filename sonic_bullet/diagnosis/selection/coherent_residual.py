@@ -17,7 +17,6 @@ from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis
 from sonic_bullet.diagnosis.prediction.score import Judged, Take
 from sonic_bullet.estimator.fit.observed import Evidence as Recorded
 from sonic_bullet.estimator.lines.joint_lines import Lines, lines_of, noise_rms
-from sonic_bullet.estimator.lines.log_spectral import log_spectral_db, with_noise
 from sonic_bullet.records import Array
 
 IN_PHASE = 0.8  # of a line's energy, where 1 has one phase but for signs
@@ -53,8 +52,7 @@ def of_no_body(h: Hypothesis, takes: Sequence[Judged]) -> float:
     for take in observed:
         recorded, strike = take.place
         mine, off, least = _off(take, played[id(recorded)][strike]), take.distance(h), take.least(h)
-        if np.isfinite([mine, off, least]).all():
-            left, gap = left + max(mine**2 - least**2, 0.0), gap + max(off**2 - least**2, 0.0)
+        left, gap = left + max(mine**2 - least**2, 0.0), gap + max(off**2 - least**2, 0.0)
     return float(min(left / gap, 1.0)) if gap > 0 else 0.0
 
 
@@ -77,4 +75,4 @@ def _sum(lines: Lines, count: int, sr: int) -> Array:
 def _off(take: Take, made: Array) -> float:
     """D of a take and what was made in its place."""
     n = len(take.sample)
-    return log_spectral_db(take.sample, with_noise(np.pad(made, (0, max(n - len(made), 0)))[:n], take.floor, take.strike), take.floor)
+    return take.apart_db(np.pad(made, (0, max(n - len(made), 0)))[:n])

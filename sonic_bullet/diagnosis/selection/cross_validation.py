@@ -22,7 +22,7 @@ from sonic_bullet.diagnosis.evidence.refit import refitted, reidentified
 from sonic_bullet.diagnosis.evidence.small_amplitude import at_rest
 from sonic_bullet.diagnosis.prediction.hypothesis import TURNS, Hypothesis, bends, moves
 from sonic_bullet.diagnosis.prediction.line_score import Listed
-from sonic_bullet.diagnosis.prediction.score import Judged, Take
+from sonic_bullet.diagnosis.prediction.score import Comparable, Judged, Take
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.diagnosis.selection.acceptance import Candidate, earns, jackknife, may_earn, mean
 from sonic_bullet.diagnosis.selection.control_effect import Null
@@ -40,7 +40,7 @@ PLAIN = 0.6  # of the gap: where a cheap suspect says as much, costly ones wait
 def trials(
     h: Hypothesis,
     bodies: tuple[Struck, ...],
-    takes: Sequence[Judged],
+    takes: Comparable,
     evidence: Evidence,
     effects: Sequence[type[Effect]],
     *,
@@ -53,6 +53,8 @@ def trials(
     if len(takes) < 2:
         return found  # nothing can be left out
     folds = _folds(h, bodies, takes, evidence, seed)
+    if not folds:
+        return found
     observed = any(isinstance(take, Take) for take in takes)  # else no lines are left out
     whole_lines = cache(lambda: _folds(h, bodies, takes, evidence, seed, keep=1.0) if observed else folds)
     anew = cache(lambda: refitted(h, bodies, anew=True) if observed else h)
@@ -105,8 +107,7 @@ def _groups(kinds: list[type[Effect]], last: frozenset[str]) -> list[list[type[E
 class Fold:
     """What is left to learn from once ``take`` is left out: bodies, evidence, the hypothesis refitted to it, and its distance to the take.
 
-    least: the same distance, or a lesser one that corrections alone come to where they are learnt again. noise: what noise alone makes, of the other takes where this one
-    is silent.
+    least: the same distance, or a lesser one that corrections alone come to where they are learnt again. noise: what noise alone makes.
     """
 
     take: Judged
@@ -118,7 +119,7 @@ class Fold:
     noise: float
 
 
-def _folds(h: Hypothesis, bodies: tuple[Struck, ...], takes: Sequence[Judged], evidence: Evidence, seed: int, keep: float = KEPT) -> list[Fold]:
+def _folds(h: Hypothesis, bodies: tuple[Struck, ...], takes: Comparable, evidence: Evidence, seed: int, keep: float = KEPT) -> list[Fold]:
     """Without one strike each, and with a part of the lines, keep of them: all for an effect with numbers of single lines, which other lines cannot tell and other strikes can."""
     rng = np.random.default_rng([seed, 1])
     made = []
@@ -131,10 +132,9 @@ def _folds(h: Hypothesis, bodies: tuple[Struck, ...], takes: Sequence[Judged], e
             mine, less = bodies, thinned(evidence, take.place, keep, rng)
             base = refitted(h, bodies, less.observed)
         before = take.distance(base)
-        if np.isfinite(before):
+        if np.isfinite(before):  # of the others alone a model may come that cannot be played
             made.append(Fold(take, mine, less, base, before, before, take.least(base)))
-    usual = [f.noise for f in made if np.isfinite(f.noise)]
-    return [f if np.isfinite(f.noise) else replace(f, noise=mean(usual) if usual else f.before) for f in made]
+    return made
 
 
 def _learnt_anew(every: Hypothesis, folds: list[Fold]) -> list[Fold]:
@@ -176,8 +176,8 @@ def _tried(kind: type[Effect], whole: Effect, h: Hypothesis, bodies: tuple[Struc
         free = effect.freedom() - (len(getattr(effect, "turn_rad", ())) if hasattr(effect, "turned") else 0)  # such axes are whole's (Evidence.on_trial)
         random = [Null.fitted(less, min(free, 8), 10 * i + draw) for draw in range(DRAWS)]
         beside = _beside(fold, effect)
-        after = _after(fold, beside)
-        chance = tuple(fold.before - _after(fold, _beside(fold, none)) for none in random if none is not None)
+        after = fold.take.distance(beside)
+        chance = tuple(fold.before - fold.take.distance(_beside(fold, none)) for none in random if none is not None)
         lines = likelier(fold.base, beside, evidence, less, bodies) if isinstance(fold.take, Take) and tells(h, effect) else 0.0
         return Gain(effect, fold.least - after, fold.before - after, chance, lines)
 
@@ -196,12 +196,6 @@ def _tried(kind: type[Effect], whole: Effect, h: Hypothesis, bodies: tuple[Struc
 
 def _levels(folds: Sequence[Fold]) -> np.ndarray[Any, Any]:
     return np.array([f.take.body.impulse_n_s[f.take.strike] if isinstance(f.take, Take) else np.nan for f in folds])
-
-
-def _after(fold: Fold, h: Hypothesis) -> float:
-    """The distance to a fold's take; what noise alone makes where neither that nor what is played stands above it any more."""
-    far = fold.take.distance(h)
-    return far if np.isfinite(far) else fold.noise
 
 
 def _beside(fold: Fold, effect: Effect) -> Hypothesis:

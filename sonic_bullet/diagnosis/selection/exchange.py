@@ -10,14 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of, thinned
 from sonic_bullet.diagnosis.evidence.refit import refitted, with_effects
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, moves
-from sonic_bullet.diagnosis.prediction.score import Take, mean_db
+from sonic_bullet.diagnosis.prediction.score import Comparable, Judged, Take, mean_db
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.diagnosis.selection.acceptance import MANY, STANDARD_ERRORS, Candidate
 from sonic_bullet.diagnosis.selection.decay_test import misfit, of_decays
@@ -72,28 +71,30 @@ def starts(h: Hypothesis, bodies: tuple[Struck, ...], band_hz: tuple[float, floa
     return found
 
 
-def settled(h: Hypothesis, bodies: tuple[Struck, ...], takes: Sequence[Take], band_hz: tuple[float, float]) -> Hypothesis:
+def settled(h: Hypothesis, bodies: tuple[Struck, ...], takes: Comparable, band_hz: tuple[float, float]) -> Hypothesis:
     """The best of `together` from all starts by the fitted strikes; as many numbers each."""
     ends = side_by_side(lambda start: together(start, bodies, band_hz), starts(h, bodies, band_hz))
-    return min(ends, key=lambda end: mean_db(takes, end) or np.inf)
+    return min(ends, key=lambda end: mean_db(takes, end))
 
 
-def chosen(h: Hypothesis, bodies: tuple[Struck, ...], takes: Sequence[Any], band_hz: tuple[float, float]) -> Hypothesis:
+def chosen(h: Hypothesis, bodies: tuple[Struck, ...], takes: Comparable, band_hz: tuple[float, float]) -> Hypothesis:
     """The hypothesis, settled where that is nearer to the fitted strikes."""
     if not all(isinstance(t, Take) for t in takes):
         return h
     best = settled(h, bodies, takes, band_hz)
-    return best if (mean_db(takes, best) or 0.0) <= (mean_db(takes, h) or 0.0) else h
+    return best if mean_db(takes, best) <= mean_db(takes, h) else h
 
 
-def left_out_db(h: Hypothesis, i: int, bodies: tuple[Struck, ...], takes: Sequence[Take], band_hz: tuple[float, float]) -> Array:
+def left_out_db(h: Hypothesis, i: int, bodies: tuple[Struck, ...], takes: Comparable, band_hz: tuple[float, float]) -> Array:
     """Distance (s,) of every strike from what is fitted to the others: the i-th effect, the rest as all strikes have it, for one name as for the other.
 
     No lines are left out here: each has stood its trial against chance already, and of two names that need as many numbers neither gains by it.
     """
 
-    def without(take: Take) -> Less:
-        return lambda told: thinned(told, take.place, 1.0, np.random.default_rng(0))
+    def without(take: Judged) -> Less:
+        assert isinstance(take, Take)
+        place = take.place
+        return lambda told: thinned(told, place, 1.0, np.random.default_rng(0))
 
     return np.array(side_by_side(lambda take: take.distance(again(h, i, bodies, band_hz, less=without(take))), takes))
 
@@ -103,7 +104,7 @@ def exchanged(
     added: list[Candidate],
     passed: Sequence[Sequence[Candidate]],
     bodies: tuple[Struck, ...],
-    takes: Sequence[Any],
+    takes: Comparable,
     band_hz: tuple[float, float],
     say: Callable[[str], None],
 ) -> tuple[Hypothesis, list[Candidate]]:
@@ -120,7 +121,7 @@ def exchanged(
             effects = tuple(rival.effect if e.id == own.id else e for e in best.effects)
             place = next(k for k, e in enumerate(effects) if e.id == rival.id)
             other = again(refitted(with_effects(best, effects, bodies), bodies), place, bodies, band_hz)
-            if (mean_db(takes, other) or 0.0) > (mean_db(takes, best) or 0.0) + FAR_DB:
+            if mean_db(takes, other) > mean_db(takes, best) + FAR_DB:
                 continue  # it would have to gain by strikes it never saw
             other = settled(other, bodies, takes, band_hz)
             far = left_out_db(best, place, bodies, takes, band_hz) if far is None else far
@@ -159,7 +160,6 @@ def phases_against(best: Hypothesis, other: Hypothesis, bodies: tuple[Struck, ..
 
 def surely(gain_db: Array, least_db: float) -> bool:
     """Whether strikes agree that there is a gain (s,), and more than least_db."""
-    gain_db = gain_db[np.isfinite(gain_db)]  # silent strikes have no distance
     if len(gain_db) < 2 or gain_db.mean() <= least_db:
         return False
     none_loses = len(gain_db) >= MANY and gain_db.min() > -0.1 * gain_db.mean()

@@ -19,7 +19,7 @@ import numpy as np
 from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of
 from sonic_bullet.diagnosis.evidence.refit import refitted, reidentified, with_effects
 from sonic_bullet.diagnosis.prediction.hypothesis import TURNS, Hypothesis, moves, moves_itself
-from sonic_bullet.diagnosis.prediction.score import Judged, Take, least_db, mean_db
+from sonic_bullet.diagnosis.prediction.score import Comparable, Take, least_db, mean_db
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.diagnosis.selection.acceptance import Candidate, earns
 from sonic_bullet.diagnosis.selection.cross_validation import trials
@@ -43,7 +43,7 @@ def pairwise(
     start: Hypothesis,
     first: Sequence[Candidate],
     bodies: tuple[Struck, ...],
-    takes: Sequence[Judged],
+    takes: Comparable,
     band_hz: tuple[float, float],
     *,
     seed: int,
@@ -62,17 +62,17 @@ def pairwise(
             other = None if kind is type(one.effect) else kind.propose(told)
             if other is not None:
                 h = refitted(replace(one.hypothesis, effects=(*one.hypothesis.effects, other)), bodies, told.observed)
-                found.append(Two(h, mean_db(takes, h) or np.inf))
+                found.append(Two(h, mean_db(takes, h)))
         return found
 
     pairs = [two for some in side_by_side(beside, first) for two in some]
-    floor = least_db(takes, start) or 0.0
-    gap = (mean_db(takes, start) or 0.0) - floor
+    floor = least_db(takes, start)
+    gap = mean_db(takes, start) - floor
     if not pairs or min(two.db for two in pairs) - floor > LEFT * gap:
         return None
     h = _likeliest(pairs, floor + gap, bodies)
     closer = again(again(h, 0, bodies, band_hz, afresh=True), 1, bodies, band_hz)  # what was found alone had the other's share to explain, too
-    h = closer if (mean_db(takes, closer) or np.inf) < (mean_db(takes, h) or np.inf) else h
+    h = closer if mean_db(takes, closer) < mean_db(takes, h) else h
     return _stood(h, bodies, takes, band_hz, seed=seed, say=say)
 
 
@@ -80,7 +80,7 @@ def in_a_room(
     h: Hypothesis,
     found: Sequence[Candidate],
     bodies: tuple[Struck, ...],
-    takes: Sequence[Judged],
+    takes: Comparable,
     band_hz: tuple[float, float],
     *,
     seed: int,
@@ -104,9 +104,9 @@ def in_a_room(
         if room is None:
             return None
         two = reidentified(refitted(replace(alone, effects=(c.effect, room)), bodies, told.observed), bodies, fully=True)
-        return Two(two, mean_db(takes, two) or np.inf)
+        return Two(two, mean_db(takes, two))
 
-    floor, left = least_db(takes, h) or 0.0, mean_db(takes, reidentified(h, bodies, fully=True)) or 0.0
+    floor, left = least_db(takes, h), mean_db(takes, reidentified(h, bodies, fully=True))
     for some in ([c for c in movers if c.id not in TURNS], [c for c in movers if c.id in TURNS]):  # what hardly moves modes is asked where nothing else will do
         best = min((two for two in side_by_side(beside, some) if two is not None), key=lambda two: two.db, default=None)
         if best is not None and best.db - floor <= LEFT * (left - floor):
@@ -117,15 +117,15 @@ def in_a_room(
 
 
 def _stood(
-    h: Hypothesis, bodies: tuple[Struck, ...], takes: Sequence[Judged], band_hz: tuple[float, float], *, seed: int, say: Callable[[str], None]
+    h: Hypothesis, bodies: tuple[Struck, ...], takes: Comparable, band_hz: tuple[float, float], *, seed: int, say: Callable[[str], None]
 ) -> tuple[Hypothesis, list[Candidate]] | None:
     """The two, if each earns its keep beside the other."""
     added: list[Candidate] = []
     for effect in h.effects[::-1]:
         rest = refitted(with_effects(h, tuple(e for e in h.effects if e is not effect), bodies), bodies)
-        without = mean_db(takes, reidentified(rest, bodies)) or 0.0  # with a response of its own, too
+        without = mean_db(takes, reidentified(rest, bodies))  # with a response of its own, too
         told = replace(evidence_of(rest, bodies, band_hz, seed=seed), known=effect)
-        now, least = mean_db(takes, rest) or 0.0, least_db(takes, rest) or 0.0
+        now, least = mean_db(takes, rest), least_db(takes, rest)
         stood = trials(rest, bodies, takes, told, [type(effect)], seed=seed, say=say)
         if not stood or not (earns(stood[0], max(now - least, 0.0), first=False) and helps(stood[0], bodies, takes, now, without, least, first=False)):
             return None

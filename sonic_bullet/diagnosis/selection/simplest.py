@@ -11,7 +11,7 @@ import numpy as np
 
 from sonic_bullet.diagnosis.evidence.refit import refitted, reidentified, with_effects
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, moves, moves_itself
-from sonic_bullet.diagnosis.prediction.score import Judged, mean_db
+from sonic_bullet.diagnosis.prediction.score import Comparable, mean_db
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.diagnosis.selection.acceptance import STANDARD_ERRORS, Candidate, needed
 from sonic_bullet.diagnosis.selection.decay_test import misfit as decays
@@ -25,19 +25,19 @@ LINES = 6.0  # twice the ln likelihood of decays left out: what a name must gain
 SAME = 0.1  # of what a room's response leaves open: two that differ by less say the same
 
 
-def helps(c: Candidate, bodies: tuple[Struck, ...], takes: Sequence[Judged], now: float, told: float, floor: float, *, first: bool) -> bool:
+def helps(c: Candidate, bodies: tuple[Struck, ...], takes: Comparable, now: float, told: float, floor: float, *, first: bool) -> bool:
     """Whether all strikes together gain, and lose nothing of what a room's response, told again without it, says as well (told): that takes up echoes, and
     some of what stray modes leave, so what moves modes must gain on that. A filter or a slow law it takes up whole: then both say the same.
     Without a mesh nothing tells which of a room's lines are modes, and what changes decays would be told by all of them."""
     if tells(c.hypothesis, c.effect) and not _shaped(bodies):
         return False
-    before, after = told if moves(c.hypothesis) else now, mean_db(takes, reidentified(c.hypothesis, bodies)) or 0.0
+    before, after = told if moves(c.hypothesis) else now, mean_db(takes, reidentified(c.hypothesis, bodies))
     return after < told + SAME * max(told - floor, 0.0) and before - after > HELPS * needed(max(before - floor, 0.0), first=first, certain=c.certain)
 
 
-def by_lines(c: Candidate, bodies: tuple[Struck, ...], takes: Sequence[Judged], told: float, floor: float) -> bool:
+def by_lines(c: Candidate, bodies: tuple[Struck, ...], takes: Comparable, told: float, floor: float) -> bool:
     """Whether lines left out speak for it (by_lines.py), and a room's response, told again beside it, says no less than without it (told). Without a mesh nothing tells which of a room's lines are modes."""
-    return _shaped(bodies) and c.lines > LINES and (mean_db(takes, reidentified(c.hypothesis, bodies)) or 0.0) < told + SAME * max(told - floor, 0.0)
+    return _shaped(bodies) and c.lines > LINES and mean_db(takes, reidentified(c.hypothesis, bodies)) < told + SAME * max(told - floor, 0.0)
 
 
 def _shaped(bodies: tuple[Struck, ...]) -> bool:
@@ -72,13 +72,13 @@ def simplest(able: Sequence[Candidate], bodies: tuple[Struck, ...], evidence: Ev
     return others[int(off.argmin())] if np.isfinite(own) and off.min() < own else first
 
 
-def pruned(h: Hypothesis, added: list[Candidate], bodies: tuple[Struck, ...], takes: Sequence[Judged], gap_db: float) -> tuple[Hypothesis, list[Candidate]]:
+def pruned(h: Hypothesis, added: list[Candidate], bodies: tuple[Struck, ...], takes: Comparable, gap_db: float) -> tuple[Hypothesis, list[Candidate]]:
     """Without the effects that those found after them have made needless."""
     for candidate in added[:-1]:
         if candidate.lines > LINES:
             continue  # strikes need not speak for it
         rest = [e for e in h.effects if e.id != candidate.id]
         without = refitted(with_effects(h, tuple(rest), bodies), bodies)
-        if (mean_db(takes, without) or 0.0) - (mean_db(takes, h) or 0.0) < needed(gap_db, first=False):
+        if mean_db(takes, without) - mean_db(takes, h) < needed(gap_db, first=False):
             h, added = without, [c for c in added if c is not candidate]
     return h, added

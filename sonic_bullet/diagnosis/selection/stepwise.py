@@ -10,15 +10,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of
 from sonic_bullet.diagnosis.evidence.mesh_limits import beyond, of_the_mesh
 from sonic_bullet.diagnosis.evidence.refit import refitted, reidentified
 from sonic_bullet.diagnosis.prediction.hypothesis import TURNS, Hypothesis, moves_itself
-from sonic_bullet.diagnosis.prediction.score import Judged, least_db, mean_db
+from sonic_bullet.diagnosis.prediction.score import Comparable, Compared, Incomparable, Judged, LeftOut, comparable, least_db, mean_db
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.diagnosis.selection.acceptance import FAINT_DB, LEAST_DB, Candidate, earns
+from sonic_bullet.diagnosis.selection.band_levels import BandOff, bands_off
 from sonic_bullet.diagnosis.selection.coherent_residual import of_no_body
 from sonic_bullet.diagnosis.selection.cross_validation import trials
 from sonic_bullet.diagnosis.selection.exchange import chosen, exchanged, rivals
@@ -38,7 +39,11 @@ OPEN = 0.3  # of the first gap: with less left, no costly suspect is asked
 @dataclass(frozen=True, slots=True, eq=False)
 class Closed:
     """How the loop ended. added: the candidate of each round that is still there at the end. tried: every suspect in the last round in
-    which it was asked and had something to say. mesh_off: of a frequency, what the mesh is off by where that is why the verdict stands."""
+    which it was asked and had something to say. mesh_off: of a frequency, what the mesh is off by where that is why the verdict stands.
+
+    bands: where what is played is not as loud as what was recorded, which is why the verdict is not `none`. judged, left_out: what the
+    hypotheses were held against, and what could not be compared.
+    """
 
     before: Hypothesis
     after: Hypothesis
@@ -48,7 +53,25 @@ class Closed:
     before_db: float
     after_db: float
     floor_db: float
-    mesh_off: float = 0.0
+    mesh_off: float
+    bands: tuple[BandOff, ...]
+    judged: Comparable
+    left_out: tuple[LeftOut, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NothingCompared:
+    """A loop that never began: no distance is known, so nothing is. left_out: what could not be compared, and why; empty where nothing was measured."""
+
+    before: Hypothesis
+    left_out: tuple[LeftOut, ...]
+    verdict: ClassVar[str] = "unexplained"
+    added: ClassVar[tuple[Candidate, ...]] = ()
+    tried: ClassVar[tuple[Candidate, ...]] = ()
+
+    @property
+    def after(self) -> Hypothesis:
+        return self.before
 
 
 def closed(
@@ -60,25 +83,46 @@ def closed(
     *,
     seed: int = 0,
     progress: Callable[[str], None] | None = None,
-) -> Closed:
-    """Run it on fitted strikes alone."""
+) -> Closed | NothingCompared:
+    """Run it on fitted strikes alone, those that can be compared."""
     say = progress or (lambda _: None)
     start = refitted(base, bodies)
-    before = mean_db(takes, start) or 0.0
+    found = comparable(takes, start)
+    if isinstance(found, Incomparable):
+        return NothingCompared(start, found.left_out)
+    return _closed(start, bodies, found, effects, band_hz, seed=seed, say=say)
+
+
+def _closed(
+    start: Hypothesis,
+    bodies: tuple[Struck, ...],
+    found: Compared,
+    effects: Sequence[type[Effect]],
+    band_hz: tuple[float, float],
+    *,
+    seed: int,
+    say: Callable[[str], None],
+) -> Closed:
+    """The loop over what can be compared."""
+    takes = found.takes
+    before = mean_db(takes, start)
     one = _one_by_one(start, bodies, takes, effects, band_hz, seed=seed, say=say)
     h, added, last = one.h, one.added, dict(one.last)
-    now, floor = mean_db(takes, h) or 0.0, one.floor
-    verdict, off = _verdict(h, added, before, now, floor, bodies, takes, seed), 0.0
+    now, floor = mean_db(takes, h), one.floor
+    verdict, off, by = _verdict(h, added, before, now, floor, bodies, takes, seed), 0.0, h
     if verdict == "unexplained":
-        verdict, off = _by_a_finer_mesh(start, h, added, before, bodies, takes, seed)
+        verdict, off, by = _by_a_finer_mesh(start, h, added, before, bodies, takes, seed)
     if verdict == "unexplained" and not one.pairwise and (two := pairwise(start, one.first, bodies, takes, band_hz, seed=seed, say=say)):
         h, added = two
         last |= {c.id: c for c in added}
-        now, floor = mean_db(takes, h) or 0.0, least_db(takes, h) or floor
+        now, floor = mean_db(takes, h), least_db(takes, h)
         verdict, off = _verdict(h, added, before, now, floor, bodies, takes, seed), 0.0
+    bands = bands_off(by, takes) if verdict == "none" else ()
+    if bands:
+        verdict, off = "unexplained", 0.0
     if verdict != "explained":
         h, now, added = start, before, []
-    return Closed(start, h, tuple(added), tuple(last.values()), verdict, before, now, floor, off)
+    return Closed(start, h, tuple(added), tuple(last.values()), verdict, before, now, floor, off, bands, takes, found.left_out)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -96,7 +140,7 @@ class Rounds:
 def _one_by_one(
     start: Hypothesis,
     bodies: tuple[Struck, ...],
-    takes: Sequence[Judged],
+    takes: Comparable,
     effects: Sequence[type[Effect]],
     band_hz: tuple[float, float],
     *,
@@ -105,8 +149,8 @@ def _one_by_one(
 ) -> Rounds:
     """The best of every round added, until nothing earns its keep; then fitted to each other."""
     h = start
-    before = now = mean_db(takes, h) or 0.0
-    floor = least_db(takes, h) or 0.0
+    before = now = mean_db(takes, h)
+    floor = least_db(takes, h)
     added: list[Candidate] = []
     passed: list[tuple[Candidate, ...]] = []
     first: list[Candidate] = []
@@ -118,13 +162,13 @@ def _one_by_one(
             break  # so little is what a mesh gets wrong
         evidence = evidence_of(h, bodies, band_hz, seed=seed)
         full = reidentified(h, bodies)  # a room's response is the lines' so far, which leaves open more than there is
-        told = now if full is h else mean_db(takes, full) or 0.0
+        told = now if full is h else mean_db(takes, full)
         costly = told - floor > OPEN * (before - floor)
         found = trials(h, bodies, takes, evidence, effects, seed=seed + turn, say=say, costly=costly)
         last |= {c.id: c for c in found}
         two, able = None, _able(found, bodies, takes, now, told, floor, first=not added)
         if not added:
-            first, weak = found, all((mean_db(takes, c.hypothesis) or 0.0) - floor > WEAK * max(now - floor, 0.0) for c in found)
+            first, weak = found, all(mean_db(takes, c.hypothesis) - floor > WEAK * max(now - floor, 0.0) for c in found)
             two = pairwise(start, found, bodies, takes, band_hz, seed=seed, say=say) if weak else None
         two = two or _anew(h, able, found, bodies, takes, band_hz, seed, say)
         if not (two or able) and costly and (late := _waited(found, evidence, effects)):
@@ -135,29 +179,27 @@ def _one_by_one(
         if two:
             (h, added), passed = two, [(), ()]
             last |= {c.id: c for c in added}
-            now, floor = mean_db(takes, h) or 0.0, least_db(takes, h) or floor
+            now, floor = mean_db(takes, h), least_db(takes, h)
             continue
         if not able:
             break
         best = simplest(able, bodies, evidence)
         h, added, passed = best.hypothesis, [*added, best], [*passed, rivals(able, best)]
-        if hasattr(best.effect, "identified_from") and (mean_db(takes, h) or 0.0) > now:
+        if hasattr(best.effect, "identified_from") and mean_db(takes, h) > now:
             h = reidentified(h, bodies)  # a room's response by lines so far off that it sounds worse than none
         if len(added) > 1 and any(hasattr(e, "others") for e in h.effects):
             h = chosen(h, bodies, takes, band_hz)  # or a third name is found for what only the other choice would say
-        now = mean_db(takes, h) or 0.0
-        floor = least_db(takes, h) or floor
+        now = mean_db(takes, h)
+        floor = least_db(takes, h)
     if len(added) > 1:
         h, added = exchanged(h, added, passed, bodies, takes, band_hz, say)
         h, added = pruned(h, added, bodies, takes, before - floor)
-        now = mean_db(takes, h) or 0.0
+        now = mean_db(takes, h)
     again = reidentified(h, bodies, fully=True)
-    return Rounds(again if again is not h and (mean_db(takes, again) or 0.0) < now else h, added, first, last, floor, weak)
+    return Rounds(again if again is not h and mean_db(takes, again) < now else h, added, first, last, floor, weak)
 
 
-def _able(
-    found: Sequence[Candidate], bodies: tuple[Struck, ...], takes: Sequence[Judged], now: float, told: float, floor: float, *, first: bool
-) -> list[Candidate]:
+def _able(found: Sequence[Candidate], bodies: tuple[Struck, ...], takes: Comparable, now: float, told: float, floor: float, *, first: bool) -> list[Candidate]:
     """Those that strikes left out speak for; or, where they speak for none, the one that lines do."""
     able = [c for c in found if earns(c, max(now - floor, 0.0), first=first) and helps(c, bodies, takes, now, told, floor, first=first)]
     return able or sorted((c for c in found if by_lines(c, bodies, takes, told, floor)), key=lambda c: -c.lines)[:1]
@@ -168,7 +210,7 @@ def _anew(
     able: Sequence[Candidate],
     found: Sequence[Candidate],
     bodies: tuple[Struck, ...],
-    takes: Sequence[Judged],
+    takes: Comparable,
     band_hz: tuple[float, float],
     seed: int,
     say: Callable[[str], None],
@@ -184,7 +226,7 @@ def _waited(found: Sequence[Candidate], evidence: Evidence, effects: Sequence[ty
 
 
 def _verdict(
-    h: Hypothesis, added: Sequence[Candidate], before: float, now: float, floor: float, bodies: tuple[Struck, ...], takes: Sequence[Judged], seed: int
+    h: Hypothesis, added: Sequence[Candidate], before: float, now: float, floor: float, bodies: tuple[Struck, ...], takes: Comparable, seed: int
 ) -> str:
     """What is known: a name for less than EXPLAINED of what is seen would be a guess, unless what is left is what a mesh gets wrong."""
     gap, left = before - floor, now - floor
@@ -197,19 +239,19 @@ def _verdict(
 
 
 def _by_a_finer_mesh(
-    start: Hypothesis, h: Hypothesis, added: Sequence[Candidate], before: float, bodies: tuple[Struck, ...], takes: Sequence[Judged], seed: int
-) -> tuple[str, float]:
-    """What would be known with upper modes where their lines are, and how far off the mesh has them; unexplained and 0 where that helps nobody."""
+    start: Hypothesis, h: Hypothesis, added: Sequence[Candidate], before: float, bodies: tuple[Struck, ...], takes: Comparable, seed: int
+) -> tuple[str, float, Hypothesis]:
+    """What would be known with upper modes where their lines are, how far off the mesh has them, and with them there; unexplained and 0 where that helps nobody."""
     verdict, (far, off) = "unexplained", beyond(start, bodies, takes)
     if not off:
-        return verdict, 0.0
-    ideal, floor = min(mean_db(takes, far) or 0.0, before), least_db(takes, far) or 0.0
+        return verdict, 0.0, start
+    ideal, floor = min(mean_db(takes, far), before), least_db(takes, far)
     if ideal - floor < SUFFICES_DB and of_no_body(start, takes) < NO_BODY:
         verdict = "none"
     elif added:
         both, _ = beyond(h, bodies, takes)
-        verdict = _verdict(both, added, ideal, mean_db(takes, both) or 0.0, floor, bodies, takes, seed)
-    return verdict, off if verdict != "unexplained" else 0.0
+        verdict = _verdict(both, added, ideal, mean_db(takes, both), floor, bodies, takes, seed)
+    return verdict, off if verdict != "unexplained" else 0.0, far
 
 
 def described(candidates: Sequence[Candidate]) -> list[dict[str, Any]]:

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numba import njit
 
 from sonic_bullet.effects.protocol import ObjectEvidence
+from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array
 
 WIDTH_HZ = (30.0, 400.0)
@@ -101,7 +101,7 @@ def windowed(y: Array, omega: float, length: int, at: Array) -> Array:
     return np.asarray(2 / (length + 1) * (part[1] + 0.5 * (part[0] * around + part[2] / around)))
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(nogil=True)
 def _running(y: Array, omega: float, theta: float) -> Array:
     """Σ of y e^{−i(ω − aθ)n} before each sample (3, n + 1), a = −1, 0, 1."""
     out = np.zeros((3, len(y) + 1), np.complex128)

@@ -12,16 +12,16 @@ u = e^{dt}, k = c/(1 + c):   ∫ a² dt = a₀²/(d (1 + c)²) ∫₁ᵘ dv/(v (
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from sonic_bullet.effects.protocol import Impact, ObjectEvidence, Ring
+from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array
 
 FAINT = 40.0  # nepers after which a mode is over
 STEP = 1024  # samples between two exact phasors
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _linear(out, start, pole, amplitude, length):
     """Add Re A z^(n − start) to out, n from ceil(start)."""
     for k in range(len(pole)):
@@ -35,7 +35,7 @@ def _linear(out, start, pole, amplitude, length):
                 power *= z
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _level(out, start, sr, omega, decay, amplitude, bend, damping_growth, power, length):
     """The same with ω(t) and d(t) that depend on the mode's level; bend and choke at the level the mode starts with, (choke·level)^power."""
     for k in range(len(omega)):

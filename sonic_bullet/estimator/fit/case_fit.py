@@ -6,6 +6,7 @@ fit.py makes them, verdict.py judges, predict.py, preset.py and picture.py use t
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -15,6 +16,8 @@ from sonic_bullet.files.cases import Case
 from sonic_bullet.records import Array
 
 POISSON_SD = 0.04  # of a guess
+RadiationIn = Literal["nothing", "apart", "damping"]
+"""Where a fit has what the air takes: nowhere, as nothing is lost to a medium; beside the material's α and β; or in them, where it cannot be told from them."""
 POISSON_IDENTIFIED = 0.03  # a spread of ν above this says nothing that the guess did not
 
 
@@ -48,6 +51,7 @@ class CaseFit:
 
     amplitude_scatter: relative, of amplitudes about σψ. foreign_hz: strong lines that are no mode. assumed: what was taken from the guess. warnings: one line each.
     log_spectral_db: distance of recording and synthesis (distance.py), mean over the fitted strikes; -1 where there is nothing to compare.
+    radiation: what α and β are without, or with.
     """
 
     case: Case
@@ -63,3 +67,4 @@ class CaseFit:
     assumed: tuple[str, ...]
     warnings: tuple[str, ...]
     log_spectral_db: float = -1.0
+    radiation: RadiationIn = "damping"

@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from sonic_bullet.estimator.fit.case_fit import POISSON_IDENTIFIED, POISSON_SD, CaseFit, ObjectFit
+from sonic_bullet.estimator.fit.case_fit import POISSON_IDENTIFIED, POISSON_SD, CaseFit, ObjectFit, RadiationIn
 from sonic_bullet.estimator.fit.comparison import hybrid_of, log_spectral_of
 from sonic_bullet.estimator.fit.mesh_error import mesh_warning
 from sonic_bullet.estimator.fit.observed import Evidence
@@ -35,6 +35,7 @@ def finished(
     damping: Damping,
     gain: tuple[float, float, float],
     *,
+    radiation: RadiationIn,
     check_mesh: bool,
     progress: Callable[[str], None] | None,
 ) -> CaseFit:
@@ -78,7 +79,7 @@ def finished(
     if check_mesh and objects and not np.isnan(covariance[2, 2]):
         warnings += mesh_warning(objects[0], gamma * density, density, poisson, progress)
     scatters = (damping.scatter, scatter, gain[2])
-    return CaseFit(case, found, objects, gamma * density, density, gain[1], *scatters, foreign, tuple(assumed), tuple(warnings), decibels)
+    return CaseFit(case, found, objects, gamma * density, density, gain[1], *scatters, foreign, tuple(assumed), tuple(warnings), decibels, radiation)
 
 
 def _decays_seen(evidence: tuple[Evidence, ...]) -> int:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from sonic_bullet.estimator.fit.case_fit import CaseFit
-from sonic_bullet.presets import FORMAT, Damping, Elasticity, Impact, Preset, Provenance, Surface, load_material, material_names
+from sonic_bullet.presets import DAMPING_TAKEN, FORMAT, Damping, Elasticity, Impact, Preset, Provenance, Surface, load_material, material_names
 
 NAMES = ("alpha_per_s", "beta_s", "gamma_m2_s2", "sigma", "poisson_ratio")
 
@@ -28,9 +28,9 @@ def preset_of(found: CaseFit) -> Preset:
         youngs, poisson, assumed = own.youngs_pa, own.poisson, (*assumed, "youngs_pa and poisson (from the guess)")
     known = guess is not None and guess.lower() in material_names()
     base = load_material(guess.lower() if known and guess is not None else "steel")
-    alpha, beta = fit.alpha_per_s, fit.beta_s
+    alpha, beta, total = fit.alpha_per_s, fit.beta_s, found.radiation == "damping"
     if np.isnan(sd[:2]).all() and base.alpha_per_s is not None and base.beta_s is not None:
-        alpha, beta, assumed = base.alpha_per_s, base.beta_s, (*assumed, f"damping (from '{base.name}')")
+        alpha, beta, total, assumed = base.alpha_per_s, base.beta_s, base.includes_radiation, (*assumed, f"{DAMPING_TAKEN}{base.name}')")
     source = f"fitted: {found.case.name}"
     taken = f"taken from '{base.name}'"
     used = {o.evidence.thing.name: o for o in found.objects}
@@ -40,7 +40,7 @@ def preset_of(found: CaseFit) -> Preset:
         name=f"{guess or 'fitted'} ({found.case.name})"[:100],
         density_kg_m3=found.density_kg_m3,
         elasticity=Elasticity(youngs_pa=youngs, poisson=float(np.clip(poisson, -0.99, 0.499)), source=source, note="; ".join(assumed)),
-        damping=Damping(alpha_per_s=alpha, beta_s=beta, source=source),
+        damping=Damping(alpha_per_s=alpha, beta_s=beta, includes_radiation=total, source=source),
         surface=Surface(roughness_m=base.roughness_m, hurst=base.hurst, source=taken),
         impact=Impact(restitution=base.restitution, source=taken),
         provenance=Provenance(

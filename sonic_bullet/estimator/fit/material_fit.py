@@ -1,7 +1,7 @@
 """Recordings -> material: which mode each line is, γ and ν from the frequencies, α and β from the decays, σ from the amplitudes.
 
     Evidence per object -> pairs (pairing.py), all objects at one (γ, ν) -> ln γ, ν: weighted least squares on ln λ
-                        -> d = ½(α + βλ) (rayleigh.py)   [Ren, Yeh, Lin 2013, eq. 6]
+                        -> d − Δd = ½(α + βλ) (rayleigh.py)   [Ren, Yeh, Lin 2013, eq. 6; Δd: radiated.py]
                         -> A_sj = σ J_s ψ_sj             [eq. 11, 13; observe.py]
     -> MaterialFit, one correction a mode (the mesh's error, at most 1 %), and a verdict
 
@@ -21,6 +21,7 @@ from sonic_bullet.estimator.fit.fit_verdict import finished
 from sonic_bullet.estimator.fit.object_fit import CORRECTION, fitted_object, gain_of, object_of
 from sonic_bullet.estimator.fit.observed import Evidence, gather
 from sonic_bullet.estimator.fit.pairing import GAMMA_REACH, MESH_SD, Pairs, assign, best_pairs, grouped, paired, solve
+from sonic_bullet.estimator.fit.radiation_share import KNOWN, Radiated, in_air, radiation_in
 from sonic_bullet.estimator.fit.rayleigh import rayleigh
 from sonic_bullet.files.cases import Case
 from sonic_bullet.modal.cache import Place
@@ -36,11 +37,19 @@ def fit_case(case: Case, *, cache: Place = "default", check_mesh: bool = True, p
     Raises SonicBulletError where a file, mesh or number makes a fit impossible; what the recordings do not say stands in the verdict instead.
     """
     evidence = gather(case, cache=cache, progress=progress)
-    return fit_evidence(case, evidence, check_mesh=check_mesh, progress=progress)
+    return fit_evidence(case, evidence, cache=cache, check_mesh=check_mesh, progress=progress)
 
 
-def fit_evidence(case: Case, evidence: tuple[Evidence, ...], *, check_mesh: bool = True, progress: Callable[[str], None] | None = None) -> CaseFit:
-    """`fit_case` on evidence already gathered. Raises SonicBulletError."""
+def fit_evidence(
+    case: Case,
+    evidence: tuple[Evidence, ...],
+    *,
+    cache: Place = "default",
+    check_mesh: bool = True,
+    total: bool = False,
+    progress: Callable[[str], None] | None = None,
+) -> CaseFit:
+    """`fit_case` on evidence already gathered. total: α and β of the decays as they are, whatever the air takes of them. Raises SonicBulletError."""
     if len({e.guess.name for e in evidence}) > 1:
         raise FileError("the 'fit' strikes are of objects of several materials", "give a case for each material")
     if not any(len(e.lines.freq_hz) for e in evidence):
@@ -53,10 +62,16 @@ def fit_evidence(case: Case, evidence: tuple[Evidence, ...], *, check_mesh: bool
     else:
         pairs, information, scatter = (), np.zeros((2, 2)), np.nan
         log_gamma, poisson = float(np.log(guess.youngs_pa / guess.density_kg_m3)), guess.poisson
-    lam, decay, decay_sd = _decays(evidence, pairs)
+    radiation = radiation_in(case, evidence)
+    radiation = "damping" if total and radiation == "apart" else radiation
+    apart = radiation == "apart"
+    if apart and progress is not None:
+        progress("how its modes radiate")
+    air = tuple(in_air(e, log_gamma, poisson, case.band_hz[1], apart, cache) for e in shaped)
+    lam, decay, decay_sd, extra = _decays(evidence, pairs, air if apart else (None,) * len(air))
     start = (guess.alpha_per_s or 1.0, guess.beta_s or 1.0 / (float(np.median(lam)) if len(lam) else 1e8))
-    damping = rayleigh(lam, decay, decay_sd, start)
-    objects = tuple(fitted_object(e, p, log_gamma, poisson, damping, case.band_hz) for e, p in zip(shaped, pairs, strict=True))
+    damping = rayleigh(lam, decay - extra, np.hypot(decay_sd, KNOWN * extra), start, decay)
+    objects = tuple(fitted_object(e, p, a, damping, case.band_hz, taken_off=apart) for e, p, a in zip(shaped, pairs, air, strict=True))
     gain, gain_sd, amplitude_scatter = gain_of(objects)
     return finished(
         case,
@@ -65,6 +80,7 @@ def fit_evidence(case: Case, evidence: tuple[Evidence, ...], *, check_mesh: bool
         (log_gamma, poisson, information, scatter),
         damping,
         (gain, gain_sd, amplitude_scatter),
+        radiation=radiation,
         check_mesh=check_mesh,
         progress=progress,
     )
@@ -131,15 +147,17 @@ def _undamped_hz(e: Evidence, line: Array) -> Array:
     return np.asarray(np.hypot(2 * np.pi * e.lines.freq_hz[line], np.nan_to_num(e.lines.decay_per_s[line])) / (2 * np.pi))
 
 
-def _decays(evidence: tuple[Evidence, ...], pairs: tuple[Pairs, ...]) -> tuple[Array, Array, Array]:
-    """λ, d and its spread of the lines that are modes; of all lines where there is no shape."""
+def _decays(evidence: tuple[Evidence, ...], pairs: tuple[Pairs, ...], air: tuple[Radiated | None, ...]) -> tuple[Array, Array, Array, Array]:
+    """λ, d, its spread and what of it is radiation, of the lines that are modes; of all lines where there is no shape."""
     found, at = [], 0
     for e in evidence:
         which = np.arange(len(e.lines.freq_hz))
+        extra = np.zeros(len(which))
         if e.family is not None:
-            which = pairs[at].line
+            which, mine = pairs[at].line, air[at]
+            extra = np.zeros(len(which)) if mine is None else mine.extra_per_s[pairs[at].mode]
             at += 1
         d = e.lines.decay_per_s[which]
-        found.append(np.stack([(2 * np.pi * e.lines.freq_hz[which]) ** 2 + np.nan_to_num(d) ** 2, d, e.lines.identified_sd_per_s[which]]))
-    lam, decay, decay_sd = np.concatenate(found, axis=1)
-    return lam, decay, decay_sd
+        found.append(np.stack([(2 * np.pi * e.lines.freq_hz[which]) ** 2 + np.nan_to_num(d) ** 2, d, e.lines.identified_sd_per_s[which], extra]))
+    lam, decay, decay_sd, radiated = np.concatenate(found, axis=1)
+    return lam, decay, decay_sd, radiated

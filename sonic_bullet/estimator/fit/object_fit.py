@@ -1,6 +1,6 @@
 """One object's modes under a material: frequencies corrected where a line says, decays by the law, patterns as the sensor hears them; and σ.
 
-(γ, ν) -> modes of the family -> λ, d = ½(α + βλ), f = √(λ − d²)/2π        [Ren, Yeh, Lin 2013, eq. 6, 7]
+(γ, ν) -> modes of the family -> λ, d = ½(α + βλ) + Δd, f = √(λ − d²)/2π   [Ren, Yeh, Lin 2013, eq. 6, 7; Δd: radiated.py]
 A_sj = σ J_s ψ_sj                                                          [eq. 11, 13; observe.py]
 """
 
@@ -9,24 +9,26 @@ from __future__ import annotations
 import numpy as np
 
 from sonic_bullet.estimator.fit.case_fit import CaseFit, ObjectFit
-from sonic_bullet.estimator.fit.observation import Observation, pressure_weight
+from sonic_bullet.estimator.fit.observation import Observation
 from sonic_bullet.estimator.fit.observed import Evidence
-from sonic_bullet.estimator.fit.pairing import Group, Pairs, grouped, phased
+from sonic_bullet.estimator.fit.pairing import Pairs, grouped, phased
+from sonic_bullet.estimator.fit.radiation_share import Radiated, in_air, nothing
 from sonic_bullet.estimator.fit.rayleigh import Damping
 from sonic_bullet.estimator.lines.joint_lines import Lines
 from sonic_bullet.files.cases import CaseObject
 from sonic_bullet.modal.reduced import Family
-from sonic_bullet.records import Array, Material
+from sonic_bullet.records import Material
 
 CORRECTION = 0.01
 
 
-def fitted_object(e: Evidence, pairs: Pairs, log_gamma: float, poisson: float, damping: Damping, band_hz: tuple[float, float]) -> ObjectFit:
-    """An object's modes under the material, corrected where a line says."""
+def fitted_object(e: Evidence, pairs: Pairs, air: Radiated | None, damping: Damping, band_hz: tuple[float, float], *, taken_off: bool = False) -> ObjectFit:
+    """An object's modes under the material, corrected where a line says. taken_off: damping is the material's own, and radiation comes on top."""
     assert e.family is not None and e.seen is not None
-    group = grouped(e.family, e.seen, log_gamma, poisson)
+    group = grouped(e.family, e.seen, pairs.log_gamma, pairs.poisson)
+    air = air or nothing(group)
+    extra = np.nan_to_num(air.extra_per_s) if taken_off else np.zeros(len(group.freq_hz))
     lam = (2 * np.pi * group.freq_hz) ** 2
-    decay = (damping.alpha_per_s + damping.beta_s * lam) / 2
     ratio = np.ones(len(lam))
     line = np.full(len(lam), -1)
     line[pairs.mode] = pairs.line
@@ -36,22 +38,13 @@ def fitted_object(e: Evidence, pairs: Pairs, log_gamma: float, poisson: float, d
     good = np.isfinite(undamped)
     ratio[good] = np.clip(undamped[good] / group.freq_hz[good], 1 - CORRECTION, 1 + CORRECTION)
     true_lam = lam * ratio**2
-    decay = (damping.alpha_per_s + damping.beta_s * true_lam) / 2
+    decay = (damping.alpha_per_s + damping.beta_s * true_lam) / 2 + extra
     alive = decay**2 < 0.98 * np.minimum(lam, true_lam)
     model, freq = (np.sqrt(np.maximum(x - decay**2, 0)) / (2 * np.pi) for x in (lam, true_lam))
     use = np.flatnonzero(alive & (freq >= band_hz[0]) & (freq <= band_hz[1]))
-    weight = _weight(e, group, log_gamma, poisson, freq, decay, use)
+    weight = np.nan_to_num(air.weight[use]) if e.seen.kind == "pressure" else np.ones(len(use))
     kept = (freq[use], model[use], decay[use], group.pattern[:, use] * weight, line[use], measured[use], measured_decay[use], weight)
     return ObjectFit(e, *kept, tuple(group.member[i] for i in use))
-
-
-def _weight(e: Evidence, group: Group, log_gamma: float, poisson: float, freq: Array, decay: Array, use: Array) -> Array:
-    """What a microphone makes of each group: radiation of its members; 1 for other sensors."""
-    if e.seen is None or e.family is None or e.seen.kind != "pressure" or not len(use):
-        return np.ones(len(use))
-    _, vector = e.family.modes(1.0, poisson)
-    first = np.array([group.member[i][0] for i in use])
-    return pressure_weight(e.family, e.guess.density_kg_m3, freq[use], decay[use], vector[:, first])
 
 
 def gain_of(objects: tuple[ObjectFit, ...]) -> tuple[float, float, float]:
@@ -106,4 +99,6 @@ def object_of(found: CaseFit, thing: CaseObject, guess: Material, body: Family, 
         both = [(int(known.line[i]), place[int(m[0])]) for i, m in enumerate(known.member) if known.line[i] >= 0 and int(m[0]) in place]
         line, mode = (np.array(side, int) for side in zip(*both, strict=True)) if both else (line, mode)
     damping = Damping(found.fit.alpha_per_s, found.fit.beta_s, np.full((2, 2), np.nan), np.nan, ())
-    return fitted_object(e, Pairs(log_gamma, poisson, line, mode, 0.0), log_gamma, poisson, damping, found.case.band_hz)
+    off = found.radiation == "apart"
+    air = in_air(e, log_gamma, poisson, found.case.band_hz[1], off)
+    return fitted_object(e, Pairs(log_gamma, poisson, line, mode, 0.0), air, damping, found.case.band_hz, taken_off=off)

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sonic_bullet.modal.reduced import Family
-from sonic_bullet.records import Air, Array, ModalModel
+from sonic_bullet.records import Array
 from sonic_bullet.records.errors import MeshError
 
 OFF = 0.02  # of the body's diagonal: farther from the surface a point is not on it
@@ -73,20 +73,6 @@ def observation(
         sensor = _row(family, sensor_m, unit / np.linalg.norm(unit), "sensor")
     level = np.array([impulse is not None for _, _, impulse in strikes])
     return Observation(rows, sensor, known, level, kind, 1 / (density_kg_m3 * family.length_m**3))
-
-
-def pressure_weight(family: Family, density_kg_m3: float, freq_hz: Array, decay_per_s: Array, vector: Array, air: Air | None = None) -> Array:
-    """|w| (m,) in Pa·m per modal velocity of modes (b, m) of the family, for microphones. Source: `synth.radiation`."""
-    from sonic_bullet.synth.far_field import radiation
-
-    shape = np.einsum("vxb,bm->vxm", family.skin, vector.astype(np.float32)) / np.float32(np.sqrt(density_kg_m3 * family.length_m**3))
-    order = np.argsort(freq_hz, kind="stable")
-    flat = np.zeros(len(family.face))
-    mass = family.volume_m3 * density_kg_m3
-    model = ModalModel(freq_hz[order], decay_per_s[order], shape[:, :, order], family.vertex_m, family.face, flat, family.volume_m3, mass)
-    weight = np.empty(len(freq_hz))
-    weight[order] = np.abs(radiation(model, air or Air())[0])
-    return weight
 
 
 def _row(family: Family, position: tuple[float, float, float], direction: Array, what: str) -> Array:

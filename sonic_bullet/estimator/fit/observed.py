@@ -7,7 +7,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +16,7 @@ from sonic_bullet.effects.common.hum import without_hum
 from sonic_bullet.estimator.fit.observation import Observation, observation
 from sonic_bullet.estimator.lines.joint_lines import Lines, joint_lines, noise_rms
 from sonic_bullet.estimator.lines.onset import span
-from sonic_bullet.files import read_audio
+from sonic_bullet.files import channel_of, channel_words, read_audio
 from sonic_bullet.files.cases import Case, CaseObject, CaseRecording, Line
 from sonic_bullet.modal import read_mesh
 from sonic_bullet.modal.cache import Place
@@ -79,7 +79,9 @@ def gather(
     """
     say = progress or (lambda _: None)
     found: list[Evidence] = []
-    for name in dict.fromkeys(r.object for r in case.recordings if r.split == split):
+    names = tuple(dict.fromkeys(r.object for r in case.recordings if r.split == split))
+    check_meshes(case, names)
+    for name in names:
         thing = case.objects.get(name, CaseObject(name or "object", None, 1.0, None, 2e11, 7850.0, 0.3))
         guess = guess_of(thing)
         mine = tuple(r for r in case.recordings if r.object == name and r.split == split)
@@ -106,6 +108,14 @@ def gather(
     if not found:
         raise FileError(f"case {case.name} has no '{split}' strike with audio or features", "mark at least one recording with split 'fit'")
     return tuple(found)
+
+
+def check_meshes(case: Case, names: Iterable[str]) -> None:
+    """Raise FileError where the mesh file of one of a case's objects is not there: before any of them is listened to, which takes long."""
+    for name in names:
+        mesh = case.objects[name].mesh if name in case.objects else None
+        if mesh is not None and not mesh.is_file():
+            raise FileError(f"mesh file '{mesh}' does not exist", "check the path")
 
 
 def _modes_observed(body: Family, guess: Material, band_hz: tuple[float, float]) -> int:
@@ -153,19 +163,18 @@ def observed(case: Case, thing: CaseObject, guess: Material, recordings: tuple[C
 def _sounds(case: Case, thing: CaseObject, recordings: tuple[CaseRecording, ...], clipped: bool) -> tuple[Array, int, list[str]]:
     """Signals (s, n) of an object's strikes, each from its onset, their rate, and what is odd about them. Raises FileError, AudioError."""
     sounds, rates, told = [], [], []
+    several: dict[str, list[str]] = {}
     for r in recordings:
         sound, sr = read_audio(r.file or "")
-        if r.channel >= len(sound):
-            raise FileError(f"{r.file} has no channel {r.channel}", "name one it has")
-        sounds.append(until_it_breaks_off(_checked(sound[r.channel], str(r.file), clipped), sr))
+        sounds.append(until_it_breaks_off(_checked(channel_of(sound, r.channel, r.file), str(r.file), clipped), sr))
         if len(sounds[-1]) < sound.shape[1]:
             told.append(f"{r.file} breaks off after {len(sounds[-1]) / sr:.3g} s: the digital silence behind is no decay, and is left out")
         rates.append(sr)
-        if len(sound) > 1 and r.channel == 0:
-            told.append(f"{r.file} has {len(sound)} channels: the first is used")
+        several.setdefault(channel_words(len(sound), r.channel if r.channel_named else None), []).append(str(r.file))
         if case.onset_s is None and (observed := span(sounds[-1], sr)).hits > 1:
             told.append(f"{r.file} holds {observed.hits} hits: only what comes before the second is used")
             sounds[-1] = sounds[-1][: observed.stop]
+    told += [f"{names[0]}{f' and {len(names) - 1} more' * (len(names) > 1)}: {words}" for words, names in several.items() if words]
     if len(set(rates)) > 1:
         raise AudioError(f"recordings of {thing.name} have rates {sorted(set(rates))} Hz", "give files of one rate")
     sr = rates[0]

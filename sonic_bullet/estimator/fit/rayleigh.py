@@ -36,8 +36,9 @@ def rayleigh(lambda_per_s2: Array, decay_per_s: Array, decay_sd_per_s: Array, gu
     """α and β of lines (k,). guess: (α, β) whose ratio stands in for what one line cannot tell. A spread that is infinite: no value; NaN: 5 %.
 
     whole_per_s (k,): what was measured, where decays are what something else has left of it: scatter is relative to that, or what is hardly there would be sure.
+    What is left may then be below zero: leaving that out would bend the law upwards.
     """
-    good = np.isfinite(decay_per_s) & (decay_per_s > 0) & ~np.isposinf(decay_sd_per_s)
+    good = np.isfinite(decay_per_s) & ((decay_per_s if whole_per_s is None else whole_per_s) > 0) & ~np.isposinf(decay_sd_per_s)
     lam, decay = lambda_per_s2[good], decay_per_s[good]
     size = decay if whole_per_s is None else whole_per_s[good]
     spread = np.where(np.isfinite(decay_sd_per_s[good]), decay_sd_per_s[good], 0.05 * size)

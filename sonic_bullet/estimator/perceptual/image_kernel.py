@@ -7,7 +7,8 @@ depends on the arguments' lengths alone, so the same call gives the same bits.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from sonic_bullet.machine.compiled import njit
 
 WINDOW = (0.355768, 0.487396, 0.144232, 0.012604)
 NODES = 8  # of the loudness table, an octave of power
@@ -15,13 +16,13 @@ OUTSIDE = -2  # in Level.band: a bin that feeds no triangle
 TABLE_FROM, TABLE_TO = -13, 54  # its powers of two: −39 to 162 dB SPL
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy")
 def centre_and_radius(freq_hz, decay_per_s, sr, length):  # type: ignore[no-untyped-def]
     """Of a mode's spectrum, in bins."""
     return freq_hz / sr * length, 6 + 3 * decay_per_s * length / (2 * np.pi * sr)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy")
 def reach(freq_hz, decay_per_s, amplitude, sr, length, floor):  # type: ignore[no-untyped-def]
     """(m, 3) first bin, bin after the last, place of the first among all.
 
@@ -40,7 +41,7 @@ def reach(freq_hz, decay_per_s, amplitude, sr, length, floor):  # type: ignore[n
     return reach
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def slots(reach, band):  # type: ignore[no-untyped-def]
     """Bins that some mode reaches, and each bin's place among them."""
     bins = len(band)
@@ -60,7 +61,7 @@ def slots(reach, band):  # type: ignore[no-untyped-def]
     return slot, used[:count]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy")
 def frame(freq_hz, decay_per_s, amplitude, reach, sr, late_s, length, hop):  # type: ignore[no-untyped-def]
     """Frame 0 of every mode in closed form: shapes (2, room) real and imaginary, state and turn (m,): its factor, and what a hop makes of it."""
     modes = len(freq_hz)
@@ -94,7 +95,7 @@ def frame(freq_hz, decay_per_s, amplitude, reach, sr, late_s, length, hop):  # t
     return shapes, state, turn
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def runs_of(used, band):  # type: ignore[no-untyped-def]
     """(r, 3) runs of used bins that feed one triangle: first slot, slot after the last, the lower triangle; those outside are left out."""
     runs = np.zeros((len(used), 3), np.int64)
@@ -111,7 +112,7 @@ def runs_of(used, band):  # type: ignore[no-untyped-def]
     return runs[:count]
 
 
-@njit(cache=True, nogil=True, fastmath={"reassoc", "contract"}, error_model="numpy")
+@njit(nogil=True, fastmath={"reassoc", "contract"}, error_model="numpy")
 def compare(reach, slot, used, shapes, state, turn, floor, band, share, scale, loud, table, out, weight):  # type: ignore[no-untyped-def]
     """Σ weight·ΔT² of one level; state is used up."""
     frames, bands = loud.shape

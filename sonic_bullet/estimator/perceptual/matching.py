@@ -17,10 +17,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from sonic_bullet.estimator.lines.line_values import Features
 from sonic_bullet.estimator.perceptual.loudness import bark
+from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array
 
 AUDIBLE_HZ = (20.0, 20000.0)
@@ -69,7 +69,7 @@ def best_pairs(reference: Points, lambda_hat: Array, amplitude_hat: Array, alpha
     return np.asarray(_best_pairs(known, lambda_hat, amplitude_hat, alpha_per_s, beta_s, gamma_m2_s2))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy")
 def _best_pairs(known, lambda_hat, amplitude_hat, alpha, beta, gammas):  # type: ignore[no-untyped-def]
     products = np.empty(len(gammas))
     for g in range(len(gammas)):
@@ -79,7 +79,7 @@ def _best_pairs(known, lambda_hat, amplitude_hat, alpha, beta, gammas):  # type:
     return products
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy")
 def _product(x, y, weight, per_bark, per_s, near_square, power, freq_hz, decay_per_s, amplitude):  # type: ignore[no-untyped-def]
     known, modes = len(x), len(freq_hz)
     top, bottom = np.zeros(known), np.zeros(known)

@@ -10,13 +10,13 @@ square [Huber 1964]. Where everything fits, the answer is exact to rounding, wha
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from sonic_bullet.estimator.lines.line_values import Features
 from sonic_bullet.estimator.perceptual.matching import best_pairs, energy
 from sonic_bullet.estimator.perceptual.metric import Target
 from sonic_bullet.estimator.perceptual.problem import Problem, modes_of
 from sonic_bullet.estimator.perceptual.starts import by_energy, feature_eigenvalues, undominated
+from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array
 
 STRONGEST = 12  # features that are laid on modes to guess γ
@@ -33,7 +33,7 @@ def _relative(spread: Array, value: Array) -> Array:
     return np.where(sound, spread / value, np.median((spread / value)[sound]) if sound.any() else 1e-9)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy")
 def _mean(value, spread, trust):  # type: ignore[no-untyped-def]
     """Robust mean of (k,) values and the misfit beyond their spreads."""
     middle = np.median(value)
@@ -52,7 +52,7 @@ def rayleigh(features: Features, trust: Array, lower: Array, upper: Array) -> tu
     return float(np.clip(alpha, lower[0], upper[0])), float(np.clip(beta, lower[1], upper[1]))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy")
 def _rayleigh(eigen, decay, spread, trust):  # type: ignore[no-untyped-def]
     """Robust non-negative α, β; spread (k,) relative. The misfit shared by all starts at all of it and shrinks to what is left."""
     unit = np.median(eigen)

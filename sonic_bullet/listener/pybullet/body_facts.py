@@ -11,6 +11,7 @@ import pybullet
 from sonic_bullet.listener.frames import body_ids, link_words
 from sonic_bullet.listener.pybullet.pieces import collision_pieces
 from sonic_bullet.records import Body
+from sonic_bullet.records.coerce import LISTED, shown
 from sonic_bullet.records.errors import SceneError
 
 HEAVIEST_KG = 1e12
@@ -20,10 +21,11 @@ def check_exists(client_id: int, body: int, link: int) -> None:
     """Raise SceneError unless the world holds this link. (getDynamicsInfo would end the process on a link that is not there.)"""
     known = body_ids(client_id)
     if body not in known:
-        raise SceneError(f"no body {body}; known: {', '.join(map(str, known)) or 'none'}", "load it first, and use the id that loading returned")
+        few = ", ".join(map(str, known[:LISTED])) + (f" and {len(known) - LISTED} more" if len(known) > LISTED else "")
+        raise SceneError(f"no body {shown(body)}; known: {few or 'none'}", "load it first, and use the id that loading returned")
     joints = pybullet.getNumJoints(body, physicsClientId=client_id)
     if not -1 <= link < joints:
-        raise SceneError(f"body {body} has no link {link}", "use -1, the base, its only link" if joints == 0 else f"use -1 (base) … {joints - 1}")
+        raise SceneError(f"body {body} has no link {shown(link)}", "use -1, the base, its only link" if joints == 0 else f"use -1 (base) … {joints - 1}")
 
 
 def link_name(client_id: int, body: int, link: int) -> str:
@@ -31,6 +33,13 @@ def link_name(client_id: int, body: int, link: int) -> str:
     base, whole = (text.decode(errors="replace") for text in pybullet.getBodyInfo(body, physicsClientId=client_id))
     name = whole or base or f"body {body}"
     return name if link < 0 else f"{name}/{pybullet.getJointInfo(body, link, physicsClientId=client_id)[12].decode(errors='replace')}"
+
+
+def link_names(client_id: int, body: int) -> list[str]:
+    """The names that PyBullet has for a body's links, the base's first."""
+    base = pybullet.getBodyInfo(body, physicsClientId=client_id)[0].decode(errors="replace")
+    joints = range(pybullet.getNumJoints(body, physicsClientId=client_id))
+    return [base, *(pybullet.getJointInfo(body, joint, physicsClientId=client_id)[12].decode(errors="replace") for joint in joints)]
 
 
 def checked_mass_kg(info: tuple[Any, ...], body: int, link: int) -> float:

@@ -7,10 +7,13 @@ from typing import Any
 import pybullet
 from pybullet_utils.bullet_client import BulletClient
 
+from sonic_bullet.listener.frames import check_connected
+from sonic_bullet.listener.pybullet import body_facts as facts
 from sonic_bullet.listener.pybullet.pieces import collision_pieces
 from sonic_bullet.listener.pybullet.world import World
 from sonic_bullet.listener.quiet import quiet_stdout
-from sonic_bullet.records.errors import SceneError
+from sonic_bullet.records.coerce import as_whole, nearest, shown
+from sonic_bullet.records.errors import MeshError, SceneError
 
 
 def direct_client() -> BulletClient:
@@ -35,3 +38,34 @@ def links_with_shapes(world: World, body: int | None = None) -> tuple[tuple[int,
     cid = world.client_id
     bodies = [ask.getBodyUniqueId(i, physicsClientId=cid) for i in range(ask.getNumBodies(physicsClientId=cid))] if body is None else [body]
     return tuple((one, link) for one in bodies for link in range(-1, ask.getNumJoints(one, physicsClientId=cid)) if collision_pieces(cid, one, link))
+
+
+def links_called(world: World, body: Any, link: Any) -> tuple[int, tuple[int, ...]]:
+    """The body's id and its links of that number or name; "all": every link that has a collision shape. All have a mass and an inertia that are some.
+
+    Raises SceneError (no such body or link, an absurd mass), and MeshError where "all" are none.
+    """
+    cid = world.client_id
+    check_connected(cid)
+    number = as_whole(body, "body", "pass the id that loading it returned", error=SceneError)
+    facts.check_exists(cid, number, -1)
+    if isinstance(link, str) and link == "all":
+        links = tuple(one for _, one in links_with_shapes(world, number))
+        if not links:
+            raise MeshError(f"link is 'all', but no link of body {number} has a collision shape", "give it one, or add a link with mesh=")
+    elif isinstance(link, str):
+        links = (_link_named(cid, number, link),)
+    else:
+        links = (as_whole(link, "link", 'give -1 (the base), a link\'s number or name, or "all"', error=SceneError),)
+    for one in links:
+        facts.check_exists(cid, number, one)
+        facts.describe(cid, number, one, 0)
+    return number, links
+
+
+def _link_named(client_id: int, body: int, name: str) -> int:
+    """The link of that name, by PyBullet; the base has one too. Raises SceneError listing the nearest names."""
+    names = facts.link_names(client_id, body)
+    if name not in names:
+        raise SceneError(f"link is {shown(name)}, and body {body} has none of that name", nearest(name, names, ', or "all"'))
+    return names.index(name) - 1

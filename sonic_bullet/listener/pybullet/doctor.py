@@ -66,7 +66,7 @@ def diagnose_world(world: World | Any, steps: int = 0) -> tuple[Finding, ...]:
     the client is not connected.
     """
     client_id = world.client_id if isinstance(world, World) else client_id_of(world)
-    findings = [*_settings(client_id), *_masses(client_id)]
+    findings = [*_settings(client_id), *_empty(client_id), *_masses(client_id)]
     if not any(finding.severity == "error" for finding in findings):
         findings += [*_restitution(client_id), *_lids(client_id), *_scale(client_id), *_ahead(client_id, steps)]
         if isinstance(world, World):
@@ -105,6 +105,17 @@ def _settings(client_id: int) -> list[Finding]:
             )
         )
     return found
+
+
+def _empty(client_id: int) -> list[Finding]:
+    """A world in which nothing can touch."""
+    links = _links(client_id)
+    if not links:
+        return [Finding("no-body", "error", "there is no body in this world", "load some before stepping, into the client that steps")]
+    if not any(collision_pieces(client_id, *link) for link in links):
+        what = f"no link of the {len({body for body, _ in links})} bodies has a collision shape that PyBullet describes: nothing can touch"
+        return [Finding("no-shape", "error", what, "give bodies collision shapes: createCollisionShape, or <collision> in their URDF")]
+    return []
 
 
 def _masses(client_id: int) -> list[Finding]:

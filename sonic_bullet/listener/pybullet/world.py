@@ -12,6 +12,7 @@ inside another, for then the position correction leaks into the impulse.
 
 from __future__ import annotations
 
+import numbers
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
@@ -29,6 +30,7 @@ from sonic_bullet.listener.rows import Meetings, contact_rows, meetings
 from sonic_bullet.listener.start import Start, hooked_start, polled_start, taken
 from sonic_bullet.listener.sweep import NO_TRACES, Trace
 from sonic_bullet.records import Array, Body, Material, ModalModel, Shape
+from sonic_bullet.records.coerce import shown
 from sonic_bullet.records.contacts import Contacts, Step
 from sonic_bullet.records.errors import SceneError
 
@@ -70,6 +72,11 @@ class World:
     def untouched(self) -> frozenset[int]:
         """Ids of the bodies that were in the world at the last step and have met nobody yet."""
         return frozenset(body for body, _, _ in self._past.roster.bodies) - {code // LINK_SPAN for code in self._live}
+
+    @property
+    def has_bodies(self) -> bool:
+        """Whether anybody was in the world at the last step."""
+        return bool(self._past.roster.bodies)
 
     def index_of(self, body: int, link: int = -1) -> int:
         """Index into `bodies` of the living record of a link, or -1."""
@@ -309,12 +316,12 @@ def client_id_of(client: Any) -> int:
     """The client id of a BulletClient, the pybullet module (its default client 0) or an id. Raises SceneError where nothing is connected."""
     if client is pybullet:
         client_id = 0
-    elif isinstance(client, int) and not isinstance(client, bool):
-        client_id = client
+    elif isinstance(client, numbers.Integral) and not isinstance(client, bool):
+        client_id = int(client)
     elif isinstance(getattr(client, "_client", None), int):
         client_id = client._client
     else:
-        raise SceneError(f"{type(client).__name__} is no PyBullet client", "pass a BulletClient, the pybullet module or a client id")
+        raise SceneError(f"client is {shown(client)}", "pass a BulletClient, the pybullet module or a client id")
     check_connected(client_id)
     return client_id
 

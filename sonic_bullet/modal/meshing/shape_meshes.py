@@ -184,7 +184,7 @@ def _meshed(skin: Skin, edge_m: float | None, say: Callable[[str], None]) -> Sol
     edge = edge_m if edge_m is not None else _edge_m(geometry.volume_m3(vertex, face), thickness, spent)
     envelope = max(min(ENVELOPE[0] * thickness, ENVELOPE[1] * diagonal), ENVELOPE_OF_EDGE * edge)
     say(f"filling {len(face)} triangles with tetrahedra of {edge:.3g} m")
-    too_fine = MeshError(f"mesh needs more than {MOST_TETS} tetrahedra", "give a larger edge_m or a simpler mesh")
+    too_fine = MeshError(f"mesh needs more than {MOST_TETS} tetrahedra", "give a simpler mesh")
     failure, said = too_fine, ""
     limits_s = FILL_LIMITS_S if edge_m is None else FILL_LIMITS_S[:1]
     for limit_s in limits_s:
@@ -212,23 +212,20 @@ def _check_filled(vertex: Array, face: Array, node: Array, tet: Array) -> None:
         return
     kept = float(np.abs(corner_volume_m3(node, tet)).sum()) / geometry.volume_m3(vertex, face)
     if not FILLED[0] < kept < FILLED[1]:
-        raise MeshError(f"filling the mesh with tetrahedra turns its volume to {kept:.0%}", "give a smaller edge_m, or a mesh with thicker walls")
+        raise MeshError(f"filling the mesh with tetrahedra turns its volume to {kept:.0%}", "give a mesh with thicker walls, or a simpler one")
 
 
 def fill(shapes: tuple[Shape, ...], edge_m: float | None, thickness_m: float | None, say: Callable[[str], None]) -> Filled:
     """One solid, the union of ``shapes``, in the body frame, its nodes in elimination order. Raises MeshError."""
     if edge_m is not None and not (np.isfinite(edge_m) and edge_m > 0):
         raise MeshError(f"edge_m is {edge_m}", "give an element size above zero")
-    one = shapes[0] if len(shapes) == 1 and shapes[0].kind != "mesh" and thickness_m is None else None
     vertex, face = np.zeros((0, 3)), np.zeros((0, 3), np.int32)
+    one = _alone(shapes, thickness_m)
     if one is not None:
-        if not SIZE_M[0] < one.size_m.max() < SIZE_M[1]:
-            raise MeshError(f"{one.kind} is {one.size_m.max():.3g} m across", "check its unit and scale: metres are expected")
         made = _named(one, edge_m)
         made = Solid(_placed(one, made.node_m), made.tet, made.affine, made.note)
     else:
-        vertex, face = _soup(shapes)
-        skin_given = prepared(vertex, face, thickness_m)
+        skin_given = prepared(*_soup(shapes), thickness_m)
         vertex, face = skin_given.vertex_m, skin_given.face
         made = _meshed(_united(skin_given), edge_m, say)
     order = dissection(made.node_m, made.tet)
@@ -237,6 +234,32 @@ def fill(shapes: tuple[Shape, ...], edge_m: float | None, thickness_m: float | N
     solid = Solid(made.node_m[order], place[made.tet], made.affine, made.note)
     skin = surface(solid)
     return Filled(solid, skin, _curvature(one, vertex, face, solid.node_m[skin.node], skin.face))
+
+
+def check_fillable(shapes: tuple[Shape, ...], thickness_m: float | None) -> int:
+    """Raise MeshError where `fill` would for what can be seen at once: no extent, no volume, a sheet without a wall; the triangles to be filled.
+
+    Whether a surface that passes through itself can be filled is known only when it is.
+    """
+    if not shapes:
+        raise MeshError("body has no shape", "give it a collision or visual shape, or pass mesh=")
+    if any(shape.kind == "plane" for shape in shapes):
+        return 0
+    one = _alone(shapes, thickness_m)
+    if one is not None:
+        _named(one, float(one.size_m.max()))
+        return 0
+    return len(prepared(*_soup(shapes), thickness_m).face)
+
+
+def _alone(shapes: tuple[Shape, ...], thickness_m: float | None) -> Shape | None:
+    """The one solid box, ball, cylinder or capsule that the shapes are, else None. Raises MeshError where its size is absurd."""
+    if len(shapes) > 1 or shapes[0].kind == "mesh" or thickness_m is not None:
+        return None
+    one = shapes[0]
+    if not SIZE_M[0] < one.size_m.max() < SIZE_M[1]:
+        raise MeshError(f"{one.kind} is {one.size_m.max():.3g} m across", "check its unit and scale: metres are expected")
+    return one
 
 
 def _curvature(one: Shape | None, vertex_m: Array, face: Array, skin_m: Array, skin_face: Array) -> Array:

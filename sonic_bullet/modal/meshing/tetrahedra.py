@@ -56,10 +56,10 @@ def tetrahedra(vertex_m: Array, face: Array, edge_m: float, envelope_m: float, *
         except subprocess.TimeoutExpired:
             ended = None
         if ended is None or -ended.returncode in CUT_OFF:
-            raise TooSlow(f"filling the mesh with tetrahedra took more than {time_limit_s:.0f} s of processor time", "give a larger edge_m or a simpler mesh")
+            raise TooSlow(f"filling the mesh with tetrahedra took more than {time_limit_s:.0f} s of processor time", "give a simpler mesh")
         if ended.returncode != 0 or not target.exists():
             said = (ended.stderr.strip().splitlines() or ["no message"])[-1]
-            raise MeshError(f"fTetWild failed on the mesh (exit {ended.returncode}: {said[:200]})", "repair the mesh, or give a larger edge_m")
+            raise MeshError(f"fTetWild failed on the mesh (exit {ended.returncode}: {said[:200]})", "repair the mesh, or give a simpler one")
         with np.load(target, allow_pickle=False) as result:
             node, tet = result["node"], result["tet"]
     if len(tet) == 0:

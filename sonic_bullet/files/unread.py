@@ -1,0 +1,56 @@
+"""Fields of a JSON file that its typed form does not read: a name mistyped is said, not passed over.
+
+decoded JSON, msgspec.Struct -> one line for each field that no struct at that place has, with the nearest one that it has
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterator
+from typing import Any
+
+import msgspec
+
+FREE = frozenset({"note", "source", "licence", "license"})
+"""Words for people, which may stand at any place of a file."""
+MOST = 20  # lines; more of them tell nothing new
+QUOTED = 60  # characters of a name from a file
+
+
+def unread_fields(value: Any, form: type[msgspec.Struct], where: str) -> tuple[str, ...]:
+    """A line for each field of a decoded value that ``form`` and the structs inside it do not have, `MOST` at most and how many more."""
+    lines = list(_unread(value, msgspec.inspect.type_info(form), where))
+    more = len(lines) - MOST
+    return tuple(lines[:MOST] + ([f"{where}: {more} more fields are not known"] if more > 0 else []))
+
+
+def _unread(value: Any, form: msgspec.inspect.Type, where: str) -> Iterator[str]:
+    match form:
+        case msgspec.inspect.UnionType(types=kinds):
+            for kind in kinds:
+                yield from _unread(value, kind, where)
+        case msgspec.inspect.StructType(fields=fields) if isinstance(value, dict):
+            known = {field.encode_name: field.type for field in fields}
+            for name, inner in value.items():
+                if name in known:
+                    yield from _unread(inner, known[name], f"{where}: {name}")
+                elif name not in FREE:
+                    yield f"{where}: field '{shown(name)}' is not known and not read{_nearest(name, tuple(known))}"
+        case msgspec.inspect.DictType(value_type=kind) if isinstance(value, dict):
+            for name, inner in value.items():
+                yield from _unread(inner, kind, f"{where} '{shown(name)}'")
+        case msgspec.inspect.VarTupleType(item_type=kind) if isinstance(value, list):
+            for i, inner in enumerate(value):
+                yield from _unread(inner, kind, f"{where} {i + 1}")
+
+
+def _nearest(name: str, known: tuple[str, ...]) -> str:
+    """The field that may have been meant, in words; all there are where none is like it."""
+    near = difflib.get_close_matches(name[:QUOTED].lower(), known, n=1, cutoff=0.5)
+    return f": did you mean '{near[0]}'?" if near else f" (known here: {', '.join(known)})"
+
+
+def shown(text: str) -> str:
+    """A file's own words, short and on one line, as a message may quote them."""
+    line = " ".join(text.split())
+    return line if len(line) <= QUOTED else line[:QUOTED] + "…"

@@ -1,0 +1,77 @@
+"""The user's own folder for what is kept between runs: nobody else can put anything into it.
+
+    platformdirs' cache folder / sonic_bullet, mode 0700, owner checked -> "modal" (computed models), "compiled" (machine code)
+
+Machine code read from a file is run, and a computed model is believed: both come from a folder of this user that no other may write to.
+Without a home, on a disk that takes nothing, or where the folder belongs to somebody else there is none, and everything is computed anew.
+"""
+
+from __future__ import annotations
+
+import os
+import stat
+from pathlib import Path
+
+NOTES: list[str] = []
+"""Why something cannot be kept, for those who want to say it; empty where all is well."""
+
+
+def _start() -> Path:
+    try:
+        return Path.cwd()
+    except OSError:  # removed meanwhile
+        return Path("/")
+
+
+START = _start()
+"""Where the process was when this module came: a scene may change the folder, and a relative path of the environment means this one."""
+
+
+def cache_folder(name: str) -> Path | None:
+    """The folder ``name`` in the user's cache folder, made where it is missing, or None where there can be none of this user's own."""
+    root = _root()
+    return None if root is None else private_folder(root / name)
+
+
+def private_folder(path: Path) -> Path | None:
+    """``path`` as a folder of mode 0700 that belongs to this user, None where that cannot be had.
+
+    It is made, or made private; the folder above it is made too, but no home that is missing.
+    """
+    try:
+        path.parent.mkdir(mode=0o700, exist_ok=True)
+        path.mkdir(mode=0o700, exist_ok=True)
+        found = path.lstat()
+        if hasattr(os, "geteuid"):
+            if stat.S_ISLNK(found.st_mode) and found.st_uid == os.geteuid():  # this user's own link to another disk
+                found = path.stat()
+            if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.geteuid():
+                _note(f"{path} is not a folder of this user")
+                return None
+            if stat.S_IMODE(found.st_mode) & 0o077:
+                path.chmod(0o700)
+        if not os.access(path, os.W_OK | os.X_OK):
+            _note(f"{path} cannot be written")  # what it holds can be read
+    except (OSError, RuntimeError) as error:
+        _note(f"{path}: {getattr(error, 'strerror', None) or error}")
+        return None
+    return path
+
+
+def _root() -> Path | None:
+    from platformdirs import user_cache_path
+
+    try:
+        path = user_cache_path("sonic_bullet")
+    except (OSError, RuntimeError, KeyError) as error:  # a user without a name or a home
+        _note(f"this user has no home ({error})")
+        return None
+    if not path.is_absolute():  # "~" stays "~" where nobody knows this user
+        _note("this user has no home")
+        return None
+    return private_folder(path)
+
+
+def _note(why: str) -> None:
+    if why not in NOTES:
+        NOTES.append(why)

@@ -1,0 +1,43 @@
+"""What is asked of the modes of a body, proven when it is built: how many, held where, and how thick the walls are."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from sonic_bullet.records.arrays import store
+from sonic_bullet.records.coerce import as_number, as_rows, as_whole
+from sonic_bullet.records.errors import MeshError, ModalError
+
+MOST_ASKED = 2000
+HIGHEST_HZ = 1e9
+THICKEST_M = 1e4
+
+
+@dataclass(frozen=True, slots=True)
+class ModalOptions:
+    """to_hz, or the lowest ``count``: which modes. fixed: clamped where (x, y, z, radius) in m, body frame, reach. thickness_m: wall of open surfaces.
+
+    Raises ModalError (to_hz, count, fixed) and MeshError (thickness_m), naming the argument.
+    """
+
+    to_hz: float = 20_000.0
+    count: int | None = None
+    fixed: Sequence[Sequence[float]] = ()
+    thickness_m: float | None = None
+
+    def __post_init__(self) -> None:
+        remedy = "give clamps as [(x, y, z, radius), …] in metres, body frame"
+        fixed = as_rows(self.fixed, "fixed", 4, remedy, error=ModalError)
+        for number, row in enumerate(fixed):
+            as_number(row[3], f"the radius of fixed[{number}]", remedy, least=0, error=ModalError)
+        store(
+            self,
+            to_hz=as_number(self.to_hz, "to_hz", "give a frequency above zero, in Hz", above=0, most=HIGHEST_HZ, error=ModalError),
+            fixed=fixed,
+        )
+        if self.count is not None:
+            store(self, count=as_whole(self.count, "count", f"ask for 1 to {MOST_ASKED} modes", least=1, most=MOST_ASKED, error=ModalError))
+        if self.thickness_m is not None:
+            wall = as_number(self.thickness_m, "thickness_m", "give a wall thickness above zero, in m", above=0, most=THICKEST_M, error=MeshError)
+            store(self, thickness_m=wall)

@@ -1,0 +1,128 @@
+"""Why a render is silent, read off its log: what a user would otherwise look for with a debugger.
+
+samples + ContactLog -> silent? -> the first of: no microphone, no step, nothing added, moved by hand, nothing touched, only others touched,
+                                   no audible mode, a vibrometer elsewhere, support at rest, not there yet
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from sonic_bullet.files.contact_log import ContactLog
+from sonic_bullet.records import Array, Body, Microphone, Vibrometer
+from sonic_bullet.records.contacts import Contacts
+from sonic_bullet.records.units import REFERENCE_PRESSURE_PA
+from sonic_bullet.render.resonator import Resonator, build_resonator
+from sonic_bullet.synth.strikes import SPAN
+
+BY_HAND = 0.5
+"""Share of its steps in which a body was set elsewhere by hand, from which on that is what moves it."""
+SLIDES_M_S = 1e-3
+"""Speed of a contact over a surface below which nothing rolls or slides: a settled pile creeps at a tenth of it (synth.strikes)."""
+NAMED = 3
+
+
+def silence_notes(samples: Array, log: ContactLog) -> tuple[str, ...]:
+    """One note that says why (channels, n) samples are silent; none where they are not.
+
+    Silent: no channel, none but zeros, or no pressure above the threshold of hearing, 20 µPa.
+    """
+    if not log.sensors:
+        return (f"the render is silent: {why_silent(log)}",)
+    peaks = np.abs(samples).max(axis=1, initial=0.0)
+    least = np.array([REFERENCE_PRESSURE_PA if isinstance(sensor, Microphone) else 0.0 for sensor in log.sensors])
+    if (peaks > least).any():
+        return ()
+    faint = f"its peak of {peaks.max():.2g} Pa is below the threshold of hearing, 20 µPa: move the microphone nearer, or --peak-dbfs -1 scales it"
+    unknown = faint if peaks.any() else "its log does not say why: write it with --contacts and report it"
+    return (f"the render is silent: {why_silent(log) or unknown}",)
+
+
+def why_silent(log: ContactLog) -> str | None:
+    """The reason why a log has no sound, with its remedy, in one line; None where something in it should be heard."""
+    if not log.sensors:
+        return "there is no microphone; give one, such as (0, -1, 0.5)"
+    if not log.steps:
+        return "there is no physics step; call stepSimulation"
+    rows, added = log.rows, np.array([body.material is not None for body in log.bodies], bool)
+    if not added.any():
+        return "nothing was added, so no body has a material; call listener.add(body, material=…)"
+    mine = np.flatnonzero(added[rows.a] | added[rows.b])
+    if not len(mine):
+        return _untouched(log, rows, added)
+    touched = np.unique(np.concatenate([rows.a[mine], rows.b[mine]]))
+    resonators = [build_resonator(log.bodies[i], log.sensors, log.sr, log.air) for i in touched if added[i]]
+    return _mute(log, resonators) or _at_rest(log, rows, mine) or _under_way(log, mine)
+
+
+def _untouched(log: ContactLog, rows: Contacts, added: Array) -> str:
+    """Why none of the added bodies met anybody."""
+    named = _names(body for body, one in zip(log.bodies, added, strict=True) if one)
+    moved = np.zeros(len(added))
+    lived = np.zeros(len(added))
+    for step in log.steps:
+        moved[: len(step.teleported)] += step.teleported
+        lived[: len(step.teleported)] += 1
+    hand = np.flatnonzero((moved > 0) & (moved >= BY_HAND * lived))
+    if len(hand):
+        return (
+            f"{_names(log.bodies[i] for i in hand)} was moved by hand in {int(moved[hand].max())} of {len(log.steps)} steps, "
+            "and what is set somewhere presses on nothing; move it by forces, velocities or constraints"
+        )
+    if len(rows):
+        others = _names(log.bodies[i] for i in np.unique(np.concatenate([rows.a, rows.b])))
+        return f"only bodies that were not added touched ({others}), while {named} met nobody; add what shall sound"
+    return f"nothing touched: {named} met nobody in {log.duration_s:.3g} s; run for longer, or let them meet"
+
+
+def _mute(log: ContactLog, resonators: list[Resonator]) -> str | None:
+    """Why no sensor can hear any of the bodies that were touched."""
+    readers = [sensor for sensor in log.sensors if isinstance(sensor, Vibrometer)]
+    ringing = [resonator for resonator in resonators if resonator.mode_count]
+    if len(readers) == len(log.sensors):
+        there = {(resonator.body.body_id, resonator.body.link) for resonator in ringing}
+        if ringing and not any((sensor.body_id, sensor.link) in there for sensor in readers):
+            places = ", ".join(sorted({f"body {sensor.body_id} link {sensor.link}" for sensor in readers}))
+            return f"the vibrometer reads {places}, and only {_names(s.body for s in ringing)} was touched; put it there"
+    if ringing:
+        return None
+    if any(isinstance(sensor, Microphone) for sensor in log.sensors) and any(resonator.rigid is not None for resonator in resonators):
+        return None  # it clicks
+    higher = [resonator.body for resonator in resonators if resonator.body.model is not None and resonator.body.model.mode_count]
+    if higher:
+        return f"no audible mode: those of {_names(higher)} are at or above half the sample rate, {log.sr / 2:g} Hz, or overdamped; give a higher sr"
+    return (
+        f"no audible mode: {_names(resonator.body for resonator in resonators)} has none below 20 kHz and does not move freely; a larger or thinner body rings"
+    )
+
+
+def _at_rest(log: ContactLog, rows: Contacts, mine: Array) -> str | None:
+    """Whether all that happens is that bodies lie: nothing came faster than gravity brings it while it settles, nothing slid or rolled."""
+    step = log.step[mine]
+    fall = np.array([one.gravity_m_s2 * one.dt_s for one in log.steps])[step]
+    settling = SPAN * (1.1 * np.abs(np.einsum("ki,ki->k", fall, rows.normal[mine])) + 0.01 * np.linalg.norm(fall, axis=1))  # as synth.strikes has it
+    slides = np.unique(step[(rows.sweep_m_s[mine] > SLIDES_M_S).any(axis=1)])
+    if (rows.approach_m_s[mine] > settling).any() or len(slides) > SPAN:  # what is shorter is no support yet, but settling
+        return None
+    fastest = float(rows.approach_m_s[mine].max())
+    return f"all {len(mine)} contacts are support at rest: nothing approached faster than {max(fastest, 0.0):.2g} m/s and nothing slid; let something fall"
+
+
+def _under_way(log: ContactLog, mine: Array) -> str | None:
+    """Whether the sound of the first contact would come to every microphone only after the end."""
+    places = [sensor.position_m for sensor in log.sensors if isinstance(sensor, Microphone)]
+    if len(places) < len(log.sensors):
+        return None
+    first = log.steps[int(log.step[mine[0]])]
+    away = float(min(np.linalg.norm(first.position_m - place, axis=1).min() for place in places))
+    begins_s, travels_s = float(log.time_s[mine[0]]), away / log.air.sound_speed_m_s
+    if begins_s + travels_s < log.duration_s:
+        return None
+    return f"the sound is still under way: the nearest microphone is {away:.3g} m off, {travels_s:.2g} s; run for longer, or move it nearer"
+
+
+def _names(bodies: Iterable[Body]) -> str:
+    names = [body.name if body.name == f"body {body.body_id}" else f"{body.name} (body {body.body_id})" for body in bodies]
+    return ", ".join(names[:NAMED]) + (f" and {len(names) - NAMED} more" if len(names) > NAMED else "")

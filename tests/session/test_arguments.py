@@ -1,0 +1,386 @@
+"""Every argument of everything public: what is no value of it is one line of our own that names it, whatever it is."""
+
+from __future__ import annotations
+
+import inspect
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pybullet
+import pytest
+
+import sonic_bullet as sb
+from sonic_bullet import scene
+from sonic_bullet.records.errors import AudioError, MaterialError, MeshError, ModalError, RecordError, SceneError, SonicBulletError
+from tests.made.models import STEEL
+from tests.made.worlds import box, plate_model
+
+LONGEST = 300
+Made = tuple[Callable[..., Any], dict[str, Any]]
+SHAPE = {
+    "kind": "box",
+    "size_m": [0.1, 0.1, 0.1],
+    "position_m": [0, 0, 0],
+    "quaternion_xyzw": [0, 0, 0, 1],
+    "vertex_m": np.zeros((0, 3)),
+    "face": np.zeros((0, 3), np.int32),
+}
+TETRAHEDRON = {"vertex_m": [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], "face": [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]}
+ROW = {
+    "a": [0],
+    "b": [1],
+    "point_a_m": [[0, 0, 0]],
+    "point_b_m": [[0, 0, 0]],
+    "normal": [[0, 0, 1]],
+    "impulse_n_s": [[0, 0, 1]],
+    "slip_m_s": [[0, 0, 0]],
+    "sweep_m_s": [[0, 0]],
+    "approach_m_s": [1],
+    "gap_m": [0],
+}
+STEP = {
+    "dt_s": 1 / 240,
+    "position_m": np.zeros((2, 3)),
+    "quaternion_xyzw": [[0, 0, 0, 1]] * 2,
+    "teleported": [False, False],
+    "contacts": sb.Contacts.none(),
+    "gravity_m_s2": [0, 0, -9.8],
+}
+MATERIAL = {
+    "name": "m",
+    "density_kg_m3": 1000,
+    "stiffness_pa": STEEL.stiffness_pa,
+    "alpha_per_s": 1,
+    "beta_s": 0,
+    "roughness_m": 0,
+    "hurst": 0.5,
+    "restitution": 0,
+    "source": "",
+    "residual": None,
+    "effects": (),
+    "includes_radiation": False,
+}
+MODEL = dict(
+    freq_hz=[100.0],
+    decay_per_s=[1.0],
+    shape=np.zeros((4, 3, 1)),
+    **TETRAHEDRON,
+    curvature_per_m=np.zeros(4),
+    volume_m3=1,
+    mass_kg=1,
+    dropped=0,
+    note="",
+    bend_s2_m2=None,
+    damping_growth_s_m=None,
+    damping_growth_power=1,
+    includes_radiation=False,
+)
+LOG = {"bodies": (), "steps": (), "sensors": (), "sr": 48_000, "seed": 0, "air": sb.Air(), "untouched": frozenset()}
+BUILT = "import pybullet as p\nSECONDS = 0.01\n\ndef build(client):\n    client.createMultiBody(0, client.createCollisionShape(p.GEOM_PLANE))\n    return {}\n"
+
+
+def listener_of(client: Any) -> tuple[sb.Listener, int]:
+    body = box(client, (0, 0, 1))
+    return sb.attach(client), body
+
+
+def adding(client: Any, _: Path) -> Made:
+    listener, body = listener_of(client)
+    rest = {"mesh": None, "roughness_m": 0, "fixed": (), "thickness_m": None, "to_hz": 20_000, "count": None, "progress": None}
+    return listener.add, {"body": body, "link": -1, "material": STEEL, "model": plate_model(), **rest}
+
+
+def writing(client: Any, folder: Path) -> Made:
+    listener, _ = listener_of(client)
+    client.stepSimulation()
+    return listener.write, {"path": folder / "a.wav", "peak_dbfs": None, "lufs": None, "full_scale_pa": 1, "subtype": None}
+
+
+def scene_file(_: Any, folder: Path) -> Made:
+    (folder / "scene.py").write_text(BUILT)
+    rest = {"seconds": None, "sr": 8000, "seed": 0, "microphones": None, "material": None, "residual": True, "progress": None, "say": None}
+    return scene.render_scene, {"path": folder / "scene.py", **rest}
+
+
+def reading_audio(_: Any, folder: Path) -> Made:
+    sb.write_audio(folder / "a.wav", np.zeros((1, 10)), 8000)
+    return sb.read_audio, {"path": folder / "a.wav"}
+
+
+def reading_log(_: Any, folder: Path) -> Made:
+    sb.ContactLog(**LOG).save(folder / "a.npz")
+    return sb.read_log, {"path": folder / "a.npz"}
+
+
+def of_log(name: str) -> Callable[[Any, Path], Made]:
+    def make(client: Any, _: Path) -> Made:
+        listener, body = listener_of(client)
+        listener.add(body, material=STEEL, model=plate_model())
+        return getattr(listener.contacts, name), {"body": body, "link": None}
+
+    return make
+
+
+DOORS: dict[str, Callable[[Any, Path], Made]] = {
+    "Air": lambda *_: (sb.Air, {"density_kg_m3": 1, "sound_speed_m_s": 343}),
+    "ContactLog": lambda *_: (sb.ContactLog, LOG),
+    "ContactLog.impulse_on": of_log("impulse_on"),
+    "ContactLog.rows_on": of_log("rows_on"),
+    "ContactLog.save": lambda _, folder: (sb.ContactLog(**LOG).save, {"path": folder / "a.npz"}),
+    "Contacts": lambda *_: (sb.Contacts, ROW),
+    "Listener": lambda client, _: (sb.Listener, {"client": client, "sr": 48_000, "sensors": (), "seed": 0, "air": sb.Air()}),
+    "Listener.add": adding,
+    "Listener.write": writing,
+    "Material": lambda *_: (sb.Material, MATERIAL),
+    "Material.isotropic": lambda *_: (sb.Material.isotropic, {"name": "m", "youngs_pa": 1e9, "poisson": 0.3, "density_kg_m3": 1000}),
+    "Microphone": lambda *_: (sb.Microphone, {"position_m": [0, 0, 0]}),
+    "ModalModel": lambda *_: (sb.ModalModel, MODEL),
+    "ModalSum": lambda *_: (sb.ModalSum, {"scale": 1}),
+    "Shape": lambda *_: (sb.Shape, SHAPE),
+    "Step": lambda *_: (sb.Step, STEP),
+    "Vibrometer": lambda *_: (sb.Vibrometer, {"body_id": 0, "point_m": [0, 0, 0], "direction": [0, 0, 1], "link": -1}),
+    "attach": lambda client, _: (sb.attach, {"client": client, "sr": 48_000, "microphone": (0, 0, 1), "seed": 0, "air": None}),
+    "keep_restitution": lambda client, _: (sb.keep_restitution, {"client": client}),
+    "load_material": lambda *_: (sb.load_material, {"name": "steel"}),
+    "read_audio": reading_audio,
+    "read_log": reading_log,
+    "render_log": lambda *_: (sb.render_log, {"log": sb.ContactLog(**LOG), "sr": None, "residual": True, "progress": None, "say": None}),
+    "render_scene": scene_file,
+    "write_audio": lambda _, folder: (
+        sb.write_audio,
+        {"path": folder / "a.wav", "samples": np.ones((1, 8000)), "sr": 8000, "peak_dbfs": None, "lufs": None, "full_scale_pa": 1, "subtype": None},
+    ),
+}
+WITHOUT_ARGUMENTS = {"list_materials", "SonicBulletError"}
+
+WORDS = ["x", object(), {}, 1j, Exception]
+"""No number, no point, no array, no path, no record."""
+NUMBER = [*WORDS, None, math.nan, math.inf, 10**400, [1, 2], True]
+OPTIONAL = [value for value in NUMBER if value is not None]
+ARRAY = ["x", object(), {}, 1j, None, [[1], [2, 3]], ["a", "b", "c"], math.nan, [math.nan] * 3]
+PATH = [None, 5, object(), b"a.wav", ["a.wav"], 1.5]
+CALL = ["x", 5, [print]]
+FLAG = ["no", None, 0, 1.0]
+TEXT = [None, 5, b"m", ["m"]]
+RECORD = ["helium", 5, object(), {}]
+WHOLE = [*NUMBER, 1.5]
+CLIENT = [None, "client", 99, -1, 10**30, True, object(), pybullet.connect]
+BAD: dict[str, dict[str, list[Any]]] = {
+    "Air": {"density_kg_m3": [*NUMBER, 0, -1], "sound_speed_m_s": [*NUMBER, 0]},
+    "ContactLog": {
+        "bodies": ["x", 5, [3], None],
+        "steps": ["x", 5, [3], None],
+        "sensors": ["x", 5, [3], None],
+        "sr": [*NUMBER, 0],
+        "seed": [*NUMBER, -1],
+        "air": [*RECORD, None],
+        "untouched": ["x", 5, None],
+    },
+    "ContactLog.impulse_on": {"body": WHOLE, "link": [*OPTIONAL, 1.5]},
+    "ContactLog.rows_on": {"body": WHOLE, "link": [*OPTIONAL, 1.5]},
+    "ContactLog.save": {"path": PATH},
+    "Contacts": {name: [*ARRAY, 5, [0, 1, 2, 3]] for name in ROW} | {"a": ["x", object(), {}, 1j, None, 5, [0.5], [2**40], [math.nan]]},
+    "Listener": {"client": CLIENT, "sr": [*NUMBER, 0], "sensors": ["x", 5, [3], None, object()], "seed": [*WHOLE, -1], "air": [*RECORD, None]},
+    "Listener.add": {
+        "body": [*WHOLE, -5, 10**12],
+        "link": [*[value for value in WHOLE if value != "x"], -2, 7, "arm", b"arm", (0, 1)],
+        "material": [None, 5, b"steel", object(), ["steel"], {}],
+        "mesh": [5, object(), {}, True, [5], ["a.obj"], b"a.obj", pybullet],
+        "model": [*RECORD],
+        "roughness_m": [*OPTIONAL, -1],
+        "fixed": ["x", 5, None, [(0, 0, 0)], (0, 0, 0, 0.1), [(0, 0, 0, "r")], [(0, 0, 0, math.nan)], [(0, 0, 0, -1)], {}, [5], object()],
+        "thickness_m": [*OPTIONAL, 0, -1, 1e308],
+        "to_hz": [*NUMBER, 0, -1, 1e308],
+        "count": [*OPTIONAL, 0, -1, 2.5, 10**9],
+        "progress": CALL,
+    },
+    "Listener.write": {
+        "path": PATH,
+        "peak_dbfs": [*OPTIONAL, 3, 0.1, -1e9],
+        "lufs": [*OPTIONAL, 1e9],
+        "full_scale_pa": [*NUMBER, 0, -1],
+        "subtype": [5, b"PCM_16", object()],
+    },
+    "Material": {
+        "name": TEXT,
+        "density_kg_m3": [*NUMBER, 0],
+        "stiffness_pa": [*ARRAY, np.zeros((6, 6)), np.ones((3, 3))],
+        "alpha_per_s": [*OPTIONAL, -1],
+        "beta_s": [*OPTIONAL, -1],
+        "roughness_m": [*NUMBER, -1],
+        "hurst": [*NUMBER, 0, 1],
+        "restitution": [value for value in NUMBER if value is not True] + [-0.1, 1.1],
+        "source": TEXT,
+        "residual": RECORD,
+        "effects": ["x", 5, None, object(), {}],
+        "includes_radiation": FLAG,
+    },
+    "Material.isotropic": {"name": TEXT, "youngs_pa": [*NUMBER, 0], "poisson": [*NUMBER, 0.5, -1], "density_kg_m3": [*NUMBER, 0]},
+    "Microphone": {"position_m": [*ARRAY, [0, 0]]},
+    "ModalModel": {
+        **{name: [*ARRAY, 5] for name in ("freq_hz", "shape", "vertex_m", "face", "curvature_per_m")},
+        "face": [*ARRAY, [[0, 1, 1.5]] * 4],
+        "decay_per_s": ["x", object(), {}, 1j, [[1], [2, 3]]],
+        **{name: [*NUMBER, -1] for name in ("volume_m3", "mass_kg")},
+        "dropped": [*WHOLE, -1],
+        "note": TEXT,
+        **{name: [value for value in ARRAY if value is not None] for name in ("bend_s2_m2", "choke_s_m")},
+        "choke_power": NUMBER,
+        "includes_radiation": FLAG,
+    },
+    "ModalSum": {"scale": NUMBER},
+    "Shape": {
+        "kind": [*TEXT, "ball"],
+        **{name: [*ARRAY, 5] for name in ("size_m", "position_m", "quaternion_xyzw", "vertex_m", "face")},
+    },
+    "Step": {
+        "dt_s": [*[value for value in NUMBER if value is not True], 0, -1, 2],
+        "position_m": [*ARRAY, 5],
+        "quaternion_xyzw": [*ARRAY, 5],
+        "teleported": ["x", object(), {}, 1j, [[1], [2, 3]], ["a", "b"], 5],
+        "contacts": [*RECORD, None],
+        "gravity_m_s2": [*ARRAY, 5],
+    },
+    "Vibrometer": {"body_id": WHOLE, "point_m": [*ARRAY, [0, 0]], "direction": [*ARRAY, [0, 0], [0, 0, 0]], "link": WHOLE},
+    "attach": {
+        "client": CLIENT,
+        "sr": [*NUMBER, 0, 10**9, 44_100.5],
+        "microphone": ["here", 5, None, object(), {}, [(0, 0)], (0, 0), (0, 0, "z"), [(0, 0, 1), (2,)], ["a", "b", "c"], (0, math.nan, 0), sb.Microphone],
+        "seed": [*WHOLE, -1, 10**30],
+        "air": RECORD,
+    },
+    "keep_restitution": {"client": CLIENT},
+    "load_material": {"name": [None, 5, b"steel", object(), ["steel"]]},
+    "read_audio": {"path": PATH},
+    "read_log": {"path": PATH},
+    "render_log": {"log": [*RECORD, None], "sr": [*OPTIONAL, 0], "residual": FLAG, "progress": CALL, "say": CALL},
+    "render_scene": {
+        "path": PATH,
+        "seconds": [*[value for value in OPTIONAL if value is not True], 0, -1],
+        "sr": [*NUMBER, 0],
+        "seed": [*WHOLE, -1],
+        "microphones": ["here", 5, object(), [(0, 0)]],
+        "material": [5, b"steel", object(), ["steel"]],
+        "residual": FLAG,
+        "progress": CALL,
+        "say": CALL,
+    },
+    "write_audio": {
+        "path": PATH,
+        "samples": ["x", object(), {}, None, [[1], [2, 3]], ["a"], np.ones(3, complex), 5],
+        "sr": [*NUMBER, 0],
+        "peak_dbfs": [*OPTIONAL, 3, -1e9],
+        "lufs": [*OPTIONAL, 1e9],
+        "full_scale_pa": [*NUMBER, 0],
+        "subtype": [5, b"PCM_16", object()],
+    },
+}
+MENU: list[Any] = [
+    *(None, True, 0, -1, 1, 2**31, 10**400, 0.5, -0.0, math.nan, math.inf, -math.inf, 1e308, 5e-324, 1j, np.float32(1), np.int8(-1), np.bool_(True)),
+    *("", "x", "all", "0", "a\0b", "\ud800", "y" * 400, b"", b"x", bytearray(3), [], [[]], [0], [0, 0, 0], [[0, 0, 0]], [[1], [2, 3]], [None] * 3, ["a"] * 3),
+    *((), {}, {1: 2}, {1}, range(3), object(), object, print, Exception("e"), math, Ellipsis, lambda: 0),
+    *(np.zeros(0), np.zeros((2, 3)), np.array(1.0), np.array(["a"]), np.array([None]), np.full(3, 1e308), np.zeros(3, complex), np.datetime64("2020")),
+    *(STEEL, sb.Air(), sb.Contacts.none(), sb.Microphone([0, 0, 0])),
+]
+
+
+def test_every_argument_of_everything_public_is_looked_at(client: Any, tmp_path: Path) -> None:
+    assert {door.split(".")[0] for door in DOORS} | WITHOUT_ARGUMENTS == {*sb.__all__, "render_scene"}
+    assert set(BAD) == set(DOORS)
+    looked_at = 0
+    for door, make in DOORS.items():
+        call, good = make(client, tmp_path)
+        kinds = inspect.Parameter
+        named = {name for name, one in inspect.signature(call).parameters.items() if one.kind not in (kinds.VAR_KEYWORD, kinds.VAR_POSITIONAL)}
+        assert named <= set(BAD[door]) <= set(good), door
+        call(**good)
+        looked_at += sum(map(len, BAD[door].values()))
+    print(f"{looked_at} bad values at {len(DOORS)} doors")
+    assert looked_at > 700
+
+
+def refusal(call: Callable[..., Any], arguments: dict[str, Any]) -> str | None:
+    """What the door says, None where it takes the arguments. Anything but our own error, of one short line, fails."""
+    try:
+        call(**arguments)
+    except SonicBulletError as error:
+        said = str(error)
+        assert "\n" not in said
+        assert len(said) < LONGEST, said
+        assert error.remedy, said
+        return said
+    return None
+
+
+@pytest.mark.parametrize("door", DOORS)
+def test_a_wrong_value_is_refused_by_name(client: Any, tmp_path: Path, door: str) -> None:
+    call, good = DOORS[door](client, tmp_path)
+    for argument, values in BAD[door].items():
+        for value in values:
+            said = refusal(call, {**good, argument: value})
+            assert said is not None, f"{door}({argument}={value!r}) is taken"
+            assert argument in said, said
+
+
+@pytest.mark.parametrize("door", DOORS)
+def test_whatever_is_passed_is_taken_or_refused(client: Any, tmp_path: Path, door: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A menu of everything at every argument: a result, or our own error."""
+    monkeypatch.chdir(tmp_path)
+    call, good = DOORS[door](client, tmp_path)
+    tried = 0
+    for argument in good:
+        for value in MENU:
+            if argument not in ("progress", "say") or not callable(value):  # a user's function raises what it likes
+                refusal(call, {**good, argument: value})
+                tried += 1
+    assert tried > len(good) * len(MENU) * 0.8
+
+
+@pytest.mark.parametrize(
+    ("argument", "value", "kind"),
+    [
+        ("link", "arm", SceneError),
+        ("material", None, MaterialError),
+        ("mesh", 5, MeshError),
+        ("count", "x", ModalError),
+        ("fixed", [(0, 0, 0)], ModalError),
+        ("to_hz", "x", ModalError),
+        ("thickness_m", "x", MeshError),
+        ("roughness_m", "x", RecordError),
+        ("progress", 5, RecordError),
+        ("body", True, SceneError),
+        ("body", "box", SceneError),
+    ],
+)
+def test_errors_are_of_the_kind_that_the_argument_is_of(client: Any, argument: str, value: Any, kind: type[SonicBulletError]) -> None:
+    listener, body = listener_of(client)
+    with pytest.raises(kind, match=argument):
+        listener.add(**{"body": body, "material": STEEL, argument: value})
+    assert not listener.world.bodies
+
+
+@pytest.mark.parametrize(
+    ("options", "words"), [({"peak_dbfs": "x"}, "peak_dbfs"), ({"peak_dbfs": 3}, "full scale"), ({"peak_db": -1}, "peak_dbfs"), ({"colour": 1}, "subtype")]
+)
+def test_options_of_write(client: Any, tmp_path: Path, options: dict[str, Any], words: str) -> None:
+    """A misspelt option names the near one; a peak above full scale cannot be written."""
+    call, _ = writing(client, tmp_path)
+    with pytest.raises(AudioError, match=words):
+        call(tmp_path / "a.wav", **options)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_misspelt_constant_names_the_near_one() -> None:
+    with pytest.raises(RecordError, match="roughness_m"):
+        sb.Material.isotropic("m", youngs_pa=1e9, poisson=0.3, density_kg_m3=1e3, roughnes_m=1e-6)
+
+
+def test_numbers_of_every_type_are_taken(client: Any) -> None:
+    listener, body = listener_of(client)
+    (model,) = listener.add(np.int64(body), np.int32(-1), material=STEEL, model=plate_model(), roughness_m=np.float32(1e-6), to_hz=np.float64(2e4), count=5.0)
+    assert model.mode_count > 0
+    assert type(listener.world.bodies[0].body_id) is int
+    assert sb.attach(np.int64(client._client), sr=np.float64(44_100), seed=np.uint8(3), microphone=np.array([[0, 0, 1], [1, 0, 1]])).frame.shape == (2, 0)

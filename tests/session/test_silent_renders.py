@@ -1,0 +1,158 @@
+"""A silent render says why, from its log; a world in which nothing can touch is no healthy one."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pybullet as p
+import pytest
+
+import sonic_bullet as sb
+from sonic_bullet.cli import main
+from sonic_bullet.listener import diagnose_world
+from sonic_bullet.records.errors import AudioError
+from sonic_bullet.render import silence_notes, why_silent
+from sonic_bullet.scene import examine_scene, render_scene
+from tests.made.worlds import floor
+
+HEAD = """
+import pybullet as p
+from tests.made.models import STEEL, box_model
+from tests.made.worlds import EDGES_M, ball, box, floor, plate_model
+from sonic_bullet import Vibrometer
+
+PLATE = {"material": STEEL, "model": plate_model()}
+SECONDS = 0.25
+"""
+REST = "box(client, (0, 0, 0.005), turn=(0, 0, 0))"
+SCENES = {
+    "nothing was added": "def build(client):\n    floor(client)\n    box(client, (0, 0, 0.2))\n    return {}\n",
+    "nothing touched": "def build(client):\n    return {box(client, (0, 0, 1)): PLATE}\n",
+    "only bodies that were not added touched": (
+        "def build(client):\n    floor(client)\n    ball(client, (3, 0, 0.05))\n    return {box(client, (0, 0, 9)): PLATE}\n"
+    ),
+    "moved by hand in": (
+        "def build(client):\n    floor(client)\n    return {box(client, (0, 0, 0.02)): PLATE}\n\n"
+        "def act(client, time_s):\n    client.resetBasePositionAndOrientation(1, [0, 0, 0.02 - 0.2 * time_s], [0, 0, 0, 1])\n"
+    ),
+    "no audible mode: those of": (
+        "MODEL = box_model(EDGES_M, (5000.0, 9000.0), STEEL)\n\n"
+        "def build(client):\n    still = box(client, (0, 0, 0), mass=0, turn=(0, 0, 0))\n    ball(client, (0, 0, 0.06))\n"
+        '    return {still: {"material": STEEL, "model": MODEL}}\n'
+    ),
+    "no audible mode: link0 (body 0) has none": (
+        "MODEL = box_model(EDGES_M, (), STEEL)\n\n"
+        "def build(client):\n    still = box(client, (0, 0, 0), mass=0, turn=(0, 0, 0))\n    ball(client, (0, 0, 0.06))\n"
+        '    return {still: {"material": STEEL, "model": MODEL}}\n'
+    ),
+    "the vibrometer reads body 2 link -1": (
+        "MICROPHONE = [Vibrometer(2, (0, 0, 0), (0, 0, 1))]\n\n"
+        "def build(client):\n    floor(client)\n    return {box(client, (0, 0, 0.1)): PLATE, box(client, (0, 0, 9)): PLATE}\n"
+    ),
+    "support at rest": f"def build(client):\n    client.setGravity(0, 0, -9.81)\n    floor(client)\n    return {{{REST}: PLATE}}\n",
+    "still under way": "MICROPHONE = (0, 0, 1000)\n\ndef build(client):\n    floor(client)\n    return {box(client, (0, 0, 0.1)): PLATE}\n",
+    "there is no microphone": "MICROPHONE = ()\n\ndef build(client):\n    floor(client)\n    return {box(client, (0, 0, 0.1)): PLATE}\n",
+}
+LOUD = "def build(client):\n    floor(client)\n    return {box(client, (0, 0, 0.1)): PLATE}\n"
+
+
+def scene(folder: Path, text: str) -> Path:
+    path = folder / "scene.py"
+    text = text.replace("def build(client):\n", "def build(client):\n    client.setGravity(0, 0, -9.81)\n")
+    path.write_text(HEAD + text)
+    return path
+
+
+@pytest.mark.parametrize("reason", SCENES)
+def test_a_silent_render_says_why(tmp_path: Path, reason: str) -> None:
+    """In the notes of a scene, and of the log that it leaves."""
+    result = render_scene(scene(tmp_path, SCENES[reason]), sr=8000)
+    assert not np.abs(result.samples).max(initial=0) > 2e-5
+    (note,) = result.notes
+    assert "silent" in note
+    assert reason in note
+    assert "\n" not in note
+    result.log.save(tmp_path / "log.npz")
+    log = sb.read_log(tmp_path / "log.npz")
+    assert silence_notes(sb.render_log(log), log) == (note,)
+
+
+def test_a_render_that_sounds_says_nothing(tmp_path: Path) -> None:
+    result = render_scene(scene(tmp_path, LOUD), sr=8000)
+    assert np.abs(result.samples).max() > 1e-3
+    assert result.notes == ()
+    assert why_silent(result.log) is None
+
+
+def test_a_log_without_steps_and_a_faint_sound(tmp_path: Path) -> None:
+    log = render_scene(scene(tmp_path, LOUD), sr=8000).log
+    assert "no physics step" in str(why_silent(replace(log, steps=())))
+    (faint,) = silence_notes(np.full((1, 8), 1e-6), log)
+    assert "threshold of hearing" in faint
+    (unknown,) = silence_notes(np.zeros((1, 8)), log)
+    assert "does not say why" in unknown
+
+
+def test_the_command_line_says_why(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
+    """Of a scene, of a log, and where silence leaves nothing to write."""
+    monkeypatch.chdir(tmp_path)
+    scene(tmp_path, SCENES["nothing touched"])
+
+    def run(*words: str) -> tuple[int, str]:
+        monkeypatch.setattr("sys.argv", ["sonic-bullet", *words])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        return int(ended.value.code or 0), capfd.readouterr().err
+
+    for words in (["scene.py", "--contacts", "log.npz"], ["log.npz"]):
+        code, err = run("render", *words, "-o", "a.wav", "--sr", "8000")
+        assert code == 0
+        assert "note: the render is silent: nothing touched" in err
+    code, err = run("render", "log.npz", "-o", "b.wav", "--peak-dbfs", "-1")
+    assert code == 2
+    assert "nothing touched" in err
+    scene(tmp_path, SCENES["there is no microphone"])
+    code, err = run("render", "scene.py", "-o", "b.wav")
+    assert code == 2
+    assert "there is no microphone" in err
+    assert not (tmp_path / "b.wav").exists()
+
+
+def test_write_without_a_microphone_says_so(client: Any, tmp_path: Path) -> None:
+    listener = sb.attach(client, microphone=())
+    client.stepSimulation()
+    with pytest.raises(AudioError, match="no microphone"):
+        listener.write(tmp_path / "a.wav")
+
+
+# --- doctor
+
+
+def ids(findings: Any) -> list[tuple[str, str]]:
+    return [(finding.id, finding.severity) for finding in findings]
+
+
+def test_a_world_without_bodies_is_not_well(client: Any) -> None:
+    assert ids(diagnose_world(client)) == [("no-body", "error")]
+
+
+def test_a_world_whose_bodies_cannot_touch_is_not_well(client: Any) -> None:
+    client.createMultiBody(1)
+    client.createMultiBody(0, -1, client.createVisualShape(p.GEOM_BOX, halfExtents=[1, 1, 1]))
+    assert ids(diagnose_world(client)) == [("no-shape", "error")]
+    floor(client)
+    assert ids(diagnose_world(client)) == []
+
+
+@pytest.mark.parametrize(("text", "found"), [("def build(client):\n    return {}\n", "no-body"), (SCENES["nothing was added"], "nothing-added"), (LOUD, None)])
+def test_doctor_of_a_scene_that_cannot_sound(tmp_path: Path, text: str, found: str | None) -> None:
+    errors = [one for one in ids(examine_scene(scene(tmp_path, text), 0.05)) if one[1] == "error"]
+    assert errors == ([(found, "error")] if found else [])
+
+
+def test_doctor_of_a_script_without_bodies(tmp_path: Path) -> None:
+    (tmp_path / "plain.py").write_text("import pybullet as p\nme = p.connect(p.GUI)\nfor _ in range(9):\n    p.stepSimulation(physicsClientId=me)\n")
+    assert ids(examine_scene(tmp_path / "plain.py", 0.1)) == [("no-body", "error")]
