@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from scipy.optimize import nnls
 from test_chains import BENT
-from test_found_again import BAND, fitted
 
 from sonic_bullet.diagnosis.diagnose import _finite
 from sonic_bullet.diagnosis.evidence.baseline import _soft, takes_of
@@ -32,6 +31,7 @@ from sonic_bullet.effects.support_damping import SupportDamping
 from sonic_bullet.effects.support_damping.dashpot_fit import Trial
 from sonic_bullet.effects.support_damping.support_subsets import _best, subsets
 from sonic_bullet.records import ModalModel
+from tests.diagnosis.test_found_again import BAND, fitted
 from tests.made.body import plate, recorded, struck
 
 WEAK = ((0.0477, 0.0371, 0.0), (0.0955, 0.0186, 0.0), (0.1432, 0.0464, 0.0))

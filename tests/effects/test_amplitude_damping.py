@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_found_again import BAND, fitted
 
 from sonic_bullet.diagnosis.evidence.baseline import takes_of
 from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of, thinned
@@ -22,6 +21,7 @@ from sonic_bullet.effects.common.envelope import envelopes
 from sonic_bullet.effects.foreign_mode import ForeignMode
 from sonic_bullet.effects.protocol import Evidence
 from sonic_bullet.records import ModalModel
+from tests.diagnosis.test_found_again import BAND, fitted
 from tests.made.body import ALPHA, BETA, GAIN, SR, plate, recorded
 
 PAIR = (3, 4)
