@@ -9,7 +9,6 @@ from typing import Any, ClassVar, Self
 import numpy as np
 import pytest
 from scipy.optimize import nnls
-from test_chains import BENT
 
 from sonic_bullet.diagnosis.diagnose import _finite
 from sonic_bullet.diagnosis.evidence.baseline import _soft, takes_of
@@ -32,6 +31,7 @@ from sonic_bullet.effects.support_damping.dashpot_fit import Trial
 from sonic_bullet.effects.support_damping.support_subsets import _best, subsets
 from sonic_bullet.records import ModalModel
 from tests.diagnosis.test_found_again import BAND, fitted
+from tests.diagnosis.test_recording_chain import BENT
 from tests.made.body import plate, recorded, struck
 
 WEAK = ((0.0477, 0.0371, 0.0), (0.0955, 0.0186, 0.0), (0.1432, 0.0464, 0.0))
