@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from benchmarks.measured_sets.heard import JITTER, READINGS, jittered, reading
 
 from benchmarks import measured
+from benchmarks.measured_sets.observed import JITTER, READINGS, jittered, reading
 from benchmarks.measured_sets.page import section, verdict
 from benchmarks.measured_sets.values import Outcome, Row
 
