@@ -1,8 +1,8 @@
-"""What effects act on, what they are told, and what every effect is.
+"""What effects act on, what they are given, and what every effect is.
 
     MATERIAL  Material   -> Material      stiffness, density: the host solves the modes again
     MODES     ModalModel -> ModalModel    frequencies, decays, shapes
-    FORCE     Blow       -> Blow          when, how long, how often a strike presses
+    FORCE     Impact     -> Impact          when, how long, how often a strike presses
     BANK      Ring       -> Ring          how a ringing mode depends on its own level
     SOUND     Sound      -> Sound         what happens on the way to the file
 
@@ -69,7 +69,7 @@ class Impact:
 class Ring:
     """m modes as one strike starts them: freq_hz, decay_per_s (m,), amplitude (m,) complex at the sensor; level (m,): peak velocity at the surface in m/s.
 
-    bend, damping_growth (m,): relative change of frequency bend·level², of decay (choke·level)^choke_power, 1 or 2; 0 in a linear body.
+    bend, damping_growth (m,): relative change of frequency bend·level², of decay (damping_growth·level)^damping_growth_power, 1 or 2; 0 in a linear body.
     """
 
     freq_hz: Array
@@ -122,12 +122,12 @@ class Poisson:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ObjectEvidence:
-    """One object's strikes: k lines that are modes, beside what the model so far expects, and what it leaves. source: what they were gathered from, the host's own.
+    """One object's strikes: k lines that are modes, beside what the model so far expects, and what it leaves. source: what they were recorded from, the host's own.
 
     freq_hz, decay_per_s and their spreads (k,); amplitude (s, k) complex at the onset and its spread. mode: the modes of `model` each line stands for.
     model_hz (k,): the mesh's own, without corrections; expected_decay_per_s (k,), expected (s, k): of the model with the effects found so far.
     pattern (s, k): J ψ, real. foreign_*: lines that are no mode, amplitudes (s, f). model: the body with its strikes and sensor as last vertices,
-    strike_vertex (s,), strike_way (s, 3), sensor_vertex, sensor_way (3,). signal, predicted (s, n) from the onset on, None for lists of features.
+    strike_vertex (s,), strike_direction (s, 3), sensor_vertex, sensor_direction (3,). signal, predicted (s, n) from the onset on, None for lists of features.
     noise (s,): rms. signed: phases are true. poisson: of `plain`, where nothing has moved its modes yet.
     """
 
@@ -166,7 +166,7 @@ class ObjectEvidence:
     elastic: Elastic | None = None
     poisson: Poisson | None = None
     own: Array | None = None  # (s, n) signal without what the model so far knows to ring beside the body, where there is such
-    dry: bool = False  # whether lines are told as they would be without the room they were recorded in
+    dry: bool = False  # whether lines are identified as they would be without the room they were recorded in
 
     @property
     def residual(self) -> Array:
@@ -182,10 +182,10 @@ class ObjectEvidence:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Evidence:
-    """All that an effect is told: the objects' strikes, the material's α and β and the case's gain so far, effects found so far by id, band and seed.
+    """All that an effect is given: the objects' strikes, the material's α and β and the case's gain so far, effects found so far by id, band and seed.
 
-    known: what the effect said of the whole evidence, or beside other effects: it is there to be fitted again, not to be looked for.
-    on_trial: whether this is the evidence without a strike, known's numbers to be told again; axes of twins, which a linear body has no part of, stand as known has them.
+    known: what the effect said of the whole evidence, or together with other effects: it is there to be fitted again, not to be looked for.
+    on_trial: whether this is the evidence without a strike, known's numbers to be identified again; axes of degenerate modes, which a linear body has no part of, stand as known has them.
     """
 
     observed: tuple[ObjectEvidence, ...]
