@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sonic_bullet.estimator.fit.observed import until_it_breaks_off
+from sonic_bullet.estimator.fit.recorded import until_it_breaks_off
 from sonic_bullet.estimator.lines.joint_lines import joint_lines, lines_of
 from sonic_bullet.estimator.lines.pole_selection import selected
 from sonic_bullet.records import Array

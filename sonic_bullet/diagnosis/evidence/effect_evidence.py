@@ -15,8 +15,8 @@ from sonic_bullet.diagnosis.evidence.amplitude_dependence import fallen
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, impact_of, in_band, modes_of, moves, pattern, play, start
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.effects.protocol import Dereverberates, Evidence, ObjectEvidence, RingsBeside, Sound, Stage
-from sonic_bullet.estimator.fit.observed import Evidence as Recorded
 from sonic_bullet.estimator.fit.pairing import DEGENERATE
+from sonic_bullet.estimator.fit.recorded import RecordedObject as Recorded
 from sonic_bullet.estimator.lines.joint_lines import Lines, noise_rms
 from sonic_bullet.records import Array, ModalModel
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sonic_bullet.estimator.fit.observed import Evidence
+from sonic_bullet.estimator.fit.recorded import RecordedObject
 from sonic_bullet.estimator.lines.line_values import MaterialFit
 from sonic_bullet.files.cases import Case
 from sonic_bullet.records import Array
@@ -25,7 +25,7 @@ class ObjectFit:
     pattern (s, m): J ψ; line (m,): the line that each is, or -1; measured_hz, measured_decay_per_s (m,) NaN where none. sensor_weight (m,): of a microphone, else 1.
     """
 
-    evidence: Evidence
+    evidence: RecordedObject
     freq_hz: Array
     model_hz: Array
     decay_per_s: Array

@@ -22,7 +22,7 @@ OFF = 0.02  # of the body's diagonal: farther from the surface a point is not on
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Observation:
-    """How s strikes of one body are heard, in the family's basis. strike (s, b): J φ(p)·e; sensor (b,): φ(q)·n, or None for what has no place.
+    """How s strikes of one body are observed, in the family's basis. strike (s, b): J φ(p)·e; sensor (b,): φ(q)·n, or None for what has no place.
 
     known (s,): whether a strike's place is declared. level (s,): whether its impulse is. kind: as `Case.sensor`.
     """
@@ -56,7 +56,7 @@ def observation(
     sensor_m: tuple[float, float, float] | None = None,
     sensor_direction: tuple[float, float, float] | None = None,
 ) -> Observation:
-    """Strikes (position in m, direction, impulse in N·s; None where not known) of a body, heard by a sensor. A direction not given is the inward normal.
+    """Strikes (position in m, direction, impulse in N·s; None where not known) of a body, observed by a sensor. A direction not given is the inward normal.
 
     Raises MeshError where a point lies off the surface.
     """

@@ -51,7 +51,7 @@ def strike_sound(found: CaseFit, recording: CaseRecording, n: int, sr: int, *, c
     from dataclasses import replace
 
     from sonic_bullet.estimator.fit.object_fit import object_of
-    from sonic_bullet.estimator.fit.observed import body_family, guess_of, observed
+    from sonic_bullet.estimator.fit.recorded import body_family, guess_of, observed
     from sonic_bullet.records.errors import FileError
 
     if recording.position_m is None:
