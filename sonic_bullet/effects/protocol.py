@@ -289,7 +289,7 @@ class SplitsPairs(ABC):
         """Relative correction (m,) of the mesh's modes freq_hz (m,), ascending, to the middle of what was split."""
 
 
-class RingsBeside(ABC):
+class RingsAlong(ABC):
     """An effect that rings beside the body: its lines are none of the body's modes, and nobody else's evidence."""
 
     @abstractmethod

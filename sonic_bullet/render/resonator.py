@@ -73,7 +73,7 @@ def weight_sets(sensors: tuple[Sensor, ...]) -> tuple[Sensor, ...]:
 def build_resonator(body: Body, sensors: tuple[Sensor, ...], sr: int, air: Air) -> Resonator:
     """Prepare one body. Modes at or above sr/2 and overdamped ones are dropped and counted.
 
-    The pressure weight of mode and microphone is the far-field map of `synth.radiation`; a vibrometer reads (φ(q)·n); the
+    The pressure weight of mode and microphone is the far-field map of `synth.far_field`; a vibrometer reads (φ(q)·n); the
     seed's plain sum reads a·sin(ωt) for each mode [Ren et al. 2013, eq. 13], hence the turn by -i/(1 + i d/ω).
     """
     model = body.model

@@ -2,7 +2,7 @@
 
     RecordedObject per object -> pairs (pairing.py), all objects at one (γ, ν) -> ln γ, ν: weighted least squares on ln λ
                         -> d = ½(α + βλ) (rayleigh.py)   [Ren, Yeh, Lin 2013, eq. 6]
-                        -> A_sj = σ J_s ψ_sj             [eq. 11, 13; observe.py]
+                        -> A_sj = σ J_s ψ_sj             [eq. 11, 13; observation.py]
     -> MaterialFit, one correction a mode (the mesh's error, at most 1 %), and a verdict
 
 The lines are maximum-likelihood estimates with their Cramér-Rao spreads, so least squares on them loses nothing against a fit of the samples.

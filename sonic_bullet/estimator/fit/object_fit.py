@@ -1,7 +1,7 @@
 """One object's modes under a material: frequencies corrected where a line says, decays by the law, patterns as the sensor hears them; and σ.
 
 (γ, ν) -> modes of the family -> λ, d = ½(α + βλ), f = √(λ − d²)/2π        [Ren, Yeh, Lin 2013, eq. 6, 7]
-A_sj = σ J_s ψ_sj                                                          [eq. 11, 13; observe.py]
+A_sj = σ J_s ψ_sj                                                          [eq. 11, 13; observation.py]
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """A fitted material played on strikes, those fitted and those not: what the sensor would record, in the recording's units.
 
-x(t) = Re Σ_j σ J ψ_j s_j e^{(−d_j + iω_j)t}      ψ, s: observe.py; ω_j with the correction learnt on the fitted strikes
+x(t) = Re Σ_j σ J ψ_j s_j e^{(−d_j + iω_j)t}      ψ, s: observation.py; ω_j with the correction learnt on the fitted strikes
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """What a case's strikes of one object say, and the object's modes to hold it against.
 
-    CaseRecording's files -> onset cut -> hum taken out -> Lines (lines.py)  \\
-                                                                              RecordedObject, one per object (and one per list of measured features)
-    mesh + guess -> Family (modal.reduced) -> Observation                    /
+    CaseRecording's files -> onset cut -> hum taken out -> Lines (joint_lines.py)  \\
+                                                                                    RecordedObject, one per object
+    mesh + guess -> Family (modal.reduced) -> Observation                          /  (and one per list of features)
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """One recorded impact -> its damped sinusoids, each with its spread [Ren, Yeh, Lin 2013, section 4; and what has been learnt since].
 
     recording -> onset.py (which part is one impact)
-    -> exact.py   where there is no noise: the rank of the Hankel matrix tells all modes at once
-    -> noise.py   density over frequency, course over time
+    -> exact_modes.py     where there is no noise: the rank of the Hankel matrix tells all modes at once
+    -> noise_density.py   density over frequency, course over time
     -> subspace.py (poles, band by band)       every frequency resolution at once, where the paper goes from level to level
     -> likelihood.py (all modes jointly)       the paper's "everything found so far subtracted", to the optimum
     -> the residual's matched filter adds poles while they are significant; what is not, goes

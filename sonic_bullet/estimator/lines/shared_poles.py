@@ -1,4 +1,4 @@
-"""Several recordings of one object -> rough poles that they share, band by band: where the likelihood of lines.py starts.
+"""Several recordings of one object -> rough poles that they share, band by band: where the likelihood of joint_lines.py starts.
 
 bands, decimated; poles = eigenvalues of the shift between the rows of the signal subspace of all recordings at once
                                                                          (ESPRIT)       [Roy & Kailath 1989, eq. 3.12-3.17]
