@@ -233,7 +233,7 @@ def test_a_bend_that_one_lone_mode_alone_tells_is_told_by_all(monkeypatch: pytes
         xx, xy, yy = _moments(e, h, level, q) or (0.0, 0.0, 0.0)
         return (1e-6 * xx, 1e-3 * xy, yy) if q < 2 else (xx, xy, yy)
 
-    monkeypatch.setattr(amplitude_pitch, "twins", lambda _, k: k not in lone)
+    monkeypatch.setattr(amplitude_pitch, "degenerate", lambda _, k: k not in lone)
     monkeypatch.setattr(amplitude_pitch, "_moments", still)
     found = _slopes(e, told, None)["velocity"]
     assert not found.single
