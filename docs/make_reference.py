@@ -1,6 +1,6 @@
 """The pages of docs/reference that are made of the code: what a docstring, a command's help or a class says is said once.
 
-python docs/make_reference.py            writes api.md, commands.md, case.schema.json and the table in case.md
+python docs/make_reference.py            writes api.md, commands.md, case.schema.json, and what is marked in case.md and contact-log.md
 python docs/make_reference.py --check    writes nothing; names what is out of date, and exits with 1 where something is
 """
 
@@ -178,6 +178,13 @@ def case_fields() -> str:
     return "\n".join(parts).strip()
 
 
+def log_arrays() -> str:
+    """The formats as the file that writes them describes them."""
+    lines = (importlib.import_module("sonic_bullet.files.logs").__doc__ or "").splitlines()
+    kept = [line[4:] for line in lines if line.startswith("    ")]
+    return "\n".join(["```text", *kept, "```"])
+
+
 def kind_of(about: dict[str, Any]) -> str:
     """A field's JSON type, in words."""
     if "$ref" in about:
@@ -202,12 +209,13 @@ def between(page: str, mark: str, text: str) -> str:
 
 def pages() -> dict[Path, str]:
     """Every made file, and what it should hold."""
-    case = PLACE / "case.md"
+    case, log = PLACE / "case.md", PLACE / "contact-log.md"
     return {
         PLACE / "api.md": api_page(),
         PLACE / "commands.md": commands_page(),
         PLACE / "case.schema.json": schema_text(),
         case: between(case.read_text(encoding="utf-8"), "fields", case_fields()),
+        log: between(log.read_text(encoding="utf-8"), "arrays", log_arrays()),
     }
 
 
