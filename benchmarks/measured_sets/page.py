@@ -37,8 +37,8 @@ class Page:
 
     @property
     def credit(self) -> str:
-        source = _after(self.readme, "Source") or str(self.case.get("source", "not told"))
-        licence = _after(self.readme, "Licence") or str(self.case.get("licence", "not told"))
+        source = _after(self.readme, "Source") or str(self.case.get("source", "not stated"))
+        licence = _after(self.readme, "Licence") or str(self.case.get("licence", "not stated"))
         return f"Source: {source.strip().rstrip('.')}. Licence: {licence.strip().rstrip('.')}."
 
 
