@@ -14,7 +14,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from sonic_bullet.effects.common.pulses import PULSES, magnitude
-from sonic_bullet.effects.protocol import Evidence, Impact, ObjectEvidence, Owner, Stage
+from sonic_bullet.effects.protocol import Evidence, Impact, ObjectEvidence, Owner, Stage, Traits
 from sonic_bullet.records import Array
 
 HERTZ = -0.2
@@ -36,6 +36,7 @@ class ContactTime:
     stage: ClassVar[Stage] = Stage.FORCE
     owner: ClassVar[Owner] = Owner.STRIKER
     reference: ClassVar[str] = "Hunter 1957; Johnson 1985, section 11.4"
+    traits: ClassVar[Traits] = Traits()
 
     tau_s: float
     impulse_n_s: float

@@ -16,7 +16,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from sonic_bullet.effects.common.proofs import finite, one_of
-from sonic_bullet.effects.protocol import Evidence, Owner, Stage, ascending
+from sonic_bullet.effects.protocol import Evidence, Owner, Stage, Traits, ascending
 from sonic_bullet.records import Array, ModalModel
 
 LAWS = {"constant-loss": 1, "power": 2, "relaxation": 3}
@@ -35,6 +35,7 @@ class DampingLaw:
     stage: ClassVar[Stage] = Stage.MODES
     owner: ClassVar[Owner] = Owner.MATERIAL
     reference: ClassVar[str] = "Cremer, Heckl, Petersson 2005, ch. 3; Nowick & Berry 1972, ch. 3"
+    traits: ClassVar[Traits] = Traits(replaces_rayleigh=True)
 
     law: str
     eta: float

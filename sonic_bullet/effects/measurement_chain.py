@@ -15,7 +15,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from sonic_bullet.effects.common.hum import hum_of
-from sonic_bullet.effects.protocol import Evidence, ObjectEvidence, Owner, Sound, Stage
+from sonic_bullet.effects.protocol import Evidence, ObjectEvidence, Owner, Sound, Stage, Traits
 from sonic_bullet.records import Array
 
 ROUGH = 0.03
@@ -34,6 +34,7 @@ class MeasurementChain:
     stage: ClassVar[Stage] = Stage.SOUND
     owner: ClassVar[Owner] = Owner.CHAIN
     reference: ClassVar[str] = "Oppenheim & Schafer 2010, app. B"
+    traits: ClassVar[Traits] = Traits()
 
     high_pass_hz: float = 0.0
     high_order: int = 1

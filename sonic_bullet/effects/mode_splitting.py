@@ -15,7 +15,7 @@ import numpy as np
 
 from sonic_bullet.effects.common.axes import PAIR, about_axes, pair_at
 from sonic_bullet.effects.common.proofs import finite, side_by_side
-from sonic_bullet.effects.protocol import Evidence, ObjectEvidence, Owner, Stage
+from sonic_bullet.effects.protocol import Evidence, ObjectEvidence, Owner, SplitsPairs, Stage, Traits
 from sonic_bullet.records import Array, ModalModel
 
 SPLIT = (1e-4, 3e-2)
@@ -26,7 +26,7 @@ MOST = 7
 ALIKE = 0.9
 SAME, TURNED = 1e-4, 0.3  # relative; sin 2ψ: what the mesh has apart, and nothing has turned, are neighbours by chance, which it has too near or too far
 MOSTLY = 0.5  # of the pairs must be more than that
-RINGS_BESIDE_BODY, ALSO, STRIKES = (
+PLAINLY, ALSO, STRIKES = (
     3,
     0.8,
     5,
@@ -34,14 +34,14 @@ RINGS_BESIDE_BODY, ALSO, STRIKES = (
 
 
 @dataclass(frozen=True)
-class ModeSplitting:
+class ModeSplitting(SplitsPairs):
     """freq_hz (p,) of the pairs, split (p,) relative, turn_rad (p,) from the pair's first mode in the mesh as it is solved."""
 
     id: ClassVar[str] = "mode-splitting"
     stage: ClassVar[Stage] = Stage.MODES
     owner: ClassVar[Owner] = Owner.OBJECT
-    by_line: ClassVar[bool] = True
     reference: ClassVar[str] = "Perrin & Charnley 1973"
+    traits: ClassVar[Traits] = Traits(moves_modes=True, by_line=True)
 
     freq_hz: tuple[float, ...]
     split: tuple[float, ...]
@@ -132,7 +132,7 @@ def _pairs(h: ObjectEvidence, scale: float) -> list[tuple[float, ...]]:
     taken: set[int] = set()
     done: set[int] = set()
     for plain, _, mode, low, high, split, turn in sorted(trials, reverse=True):
-        if not plain and len(found) < RINGS_BESIDE_BODY:
+        if not plain and len(found) < PLAINLY:
             break
         if low in taken or high in taken or mode in done or mode + 1 in done:
             continue

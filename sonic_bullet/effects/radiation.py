@@ -16,7 +16,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from sonic_bullet.effects.common.points import solved
-from sonic_bullet.effects.protocol import Evidence, ObjectEvidence, Owner, Stage, ascending
+from sonic_bullet.effects.protocol import Alternatives, Evidence, ObjectEvidence, Owner, Stage, Traits, ascending
 from sonic_bullet.records import Array, ModalModel
 
 IMPEDANCE = 1.2 * 343.0  # ρ₀ c in kg/(m² s)
@@ -30,7 +30,7 @@ ORDERS: tuple[int, ...] = (2, 4)
 
 
 @dataclass(frozen=True)
-class Radiation:
+class Radiation(Alternatives):
     """Radius a of the equivalent source in m; strength s against the law's own 1; tilt: exponent of σ in the level at the sensor, 0 or ½.
 
     order: of ka where it is small, 2 (monopole) or 4 (dipole: no net flow of volume).
@@ -40,6 +40,7 @@ class Radiation:
     stage: ClassVar[Stage] = Stage.MODES
     owner: ClassVar[Owner] = Owner.OBJECT
     reference: ClassVar[str] = "Fahy & Gardonio 2007, ch. 3"
+    traits: ClassVar[Traits] = Traits()
 
     radius_m: float
     strength: float

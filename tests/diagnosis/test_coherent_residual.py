@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_found_again import BAND, fitted
 
 from sonic_bullet.diagnosis.evidence.baseline import takes_of
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
@@ -19,6 +18,7 @@ from sonic_bullet.effects.contact_time import ContactTime
 from sonic_bullet.effects.damping_law import DampingLaw
 from sonic_bullet.effects.room import Room
 from sonic_bullet.estimator.lines.joint_lines import joint_lines
+from tests.diagnosis.test_found_again import BAND, fitted
 from tests.made.body import SR, plate, recorded, struck
 
 

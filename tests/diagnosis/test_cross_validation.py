@@ -9,8 +9,6 @@ from typing import Any, ClassVar, Self
 import numpy as np
 import pytest
 from scipy.optimize import nnls
-from test_chains import BENT
-from test_found_again import BAND, fitted
 
 from sonic_bullet.diagnosis.diagnose import _finite
 from sonic_bullet.diagnosis.evidence.baseline import _soft, takes_of
@@ -25,13 +23,15 @@ from sonic_bullet.diagnosis.selection.cross_validation import KEPT, Fold, _after
 from sonic_bullet.effects import EFFECTS
 from sonic_bullet.effects.amplitude_damping import AmplitudeDamping
 from sonic_bullet.effects.orthotropy import Orthotropy
-from sonic_bullet.effects.protocol import Evidence, Owner, Sound, Stage
+from sonic_bullet.effects.protocol import Cost, Evidence, Owner, Sound, Stage, Traits
 from sonic_bullet.effects.radiation import Radiation
 from sonic_bullet.effects.room import Room
 from sonic_bullet.effects.support_damping import SupportDamping
 from sonic_bullet.effects.support_damping.dashpot_fit import Trial
 from sonic_bullet.effects.support_damping.support_subsets import _best, subsets
 from sonic_bullet.records import ModalModel
+from tests.diagnosis.test_found_again import BAND, fitted
+from tests.diagnosis.test_recording_chain import BENT
 from tests.made.body import plate, recorded, struck
 
 WEAK = ((0.0477, 0.0371, 0.0), (0.0955, 0.0186, 0.0), (0.1432, 0.0464, 0.0))
@@ -58,12 +58,13 @@ def test_what_is_no_number_is_null_in_json() -> None:
 
 @dataclass(frozen=True)
 class Idle:
-    """Does nothing, under a name that has corrections learnt again."""
+    """Does nothing, and says that it moves modes, so that corrections are learnt again."""
 
     id: ClassVar[str] = "mode-splitting"
     stage: ClassVar[Stage] = Stage.MODES
     owner: ClassVar[Owner] = Owner.OBJECT
     reference: ClassVar[str] = "none"
+    traits: ClassVar[Traits] = Traits(moves_modes=True)
 
     def apply(self, x: ModalModel) -> ModalModel:
         return x
@@ -102,6 +103,7 @@ def test_what_could_not_earn_its_keep_any_more_is_asked_no_further(spoils: tuple
     class Mutes(Idle):
         id: ClassVar[str] = "mutes"
         stage: ClassVar[Stage] = Stage.SOUND
+        traits: ClassVar[Traits] = Traits()
 
         def apply(self, x: Sound) -> Sound:
             return replace(x, sample=0.01 * x.sample) if x.strike in spoils else x
@@ -120,7 +122,7 @@ def test_two_processes_find_what_one_finds(monkeypatch: pytest.MonkeyPatch) -> N
     h = refitted(fitted(body), (body,))
     takes, evidence, kinds = takes_of((body,)), evidence_of(h, (body,), BAND), (AmplitudeDamping, Radiation, SupportDamping, Idle)
     two = trials(h, (body,), takes, evidence, kinds, seed=3, say=lambda _: None)
-    monkeypatch.setattr("sonic_bullet.side_by_side._can_fork", lambda: False)
+    monkeypatch.setattr("sonic_bullet.parallel._can_fork", lambda: False)
     one = trials(h, (body,), takes, evidence, kinds, seed=3, say=lambda _: None)
     assert len(one) >= 2
     assert [(c.id, c.effect.parameters(), c.null_db, c.spread) for c in two] == [(c.id, c.effect.parameters(), c.null_db, c.spread) for c in one]
@@ -178,14 +180,14 @@ def test_three_weak_dashpots_are_told_together() -> None:
 
 def test_trials_tell_what_has_numbers_of_single_lines_all_lines(monkeypatch: pytest.MonkeyPatch) -> None:
     """And one that searches by itself is not asked once enough is found and little left."""
-    monkeypatch.setattr("sonic_bullet.side_by_side._can_fork", lambda: False)
+    monkeypatch.setattr("sonic_bullet.parallel._can_fork", lambda: False)
     body = recorded()
     takes, h = takes_of((body,)), refitted(fitted(body), (body,))
     asked: list[tuple[str, int]] = []
 
     class Listens(Idle):
         id: ClassVar[str] = "listens"
-        by_line: ClassVar[bool] = True
+        traits: ClassVar[Traits] = Traits(by_line=True)
         stage: ClassVar[Stage] = Stage.FORCE
 
         @classmethod
@@ -195,11 +197,11 @@ def test_trials_tell_what_has_numbers_of_single_lines_all_lines(monkeypatch: pyt
 
     class Part(Listens):
         id: ClassVar[str] = "part"
-        by_line: ClassVar[bool] = False
+        traits: ClassVar[Traits] = Traits()
 
     class Searches(Listens):
         id: ClassVar[str] = "searches"
-        searches: ClassVar[bool] = True
+        traits: ClassVar[Traits] = Traits(by_line=True, cost=Cost.SEARCHES)
 
     told = evidence_of(h, (body,), BAND)
     count = len(told.observed[0].freq_hz)
@@ -216,12 +218,12 @@ def test_trials_tell_what_has_numbers_of_single_lines_all_lines(monkeypatch: pyt
 )
 def test_in_a_room_dashpots_wait_for_a_tensor(dry: bool, costly: bool, asked: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
     """Lines that are paired with another material's modes tell little of what mixes these; asked alone, dashpots are sought."""
-    monkeypatch.setattr("sonic_bullet.side_by_side._can_fork", lambda: False)
+    monkeypatch.setattr("sonic_bullet.parallel._can_fork", lambda: False)
     seen: list[str] = []
 
     class Dashpots(Idle):
         id: ClassVar[str] = "support-damping"
-        searches: ClassVar[bool] = True
+        traits: ClassVar[Traits] = SupportDamping.traits
 
         @classmethod
         def propose(cls, evidence: Evidence) -> Self | None:
@@ -231,7 +233,7 @@ def test_in_a_room_dashpots_wait_for_a_tensor(dry: bool, costly: bool, asked: li
     class Tensor(Idle):
         id: ClassVar[str] = "tensor"
         stage: ClassVar[Stage] = Stage.MATERIAL
-        costly: ClassVar[bool] = True
+        traits: ClassVar[Traits] = Traits(cost=Cost.COSTLY)
 
         @classmethod
         def propose(cls, evidence: Evidence) -> Self | None:

@@ -117,7 +117,6 @@ def test_a_suspect_of_somebody_else_is_tried_and_named() -> None:
     theirs = ModuleType("theirs")
     sys.modules["theirs"] = theirs  # dataclasses look their module up
     exec(compile(source, "docs/how-to/add-an-effect.md", "exec"), theirs.__dict__)
-    assert isinstance(theirs.SquareLaw(1.0), Effect)
     body = recorded(theirs.SquareLaw(20.0), seconds=0.5)
     end = closed(fitted(body), (body,), takes_of((body,)), (DampingLaw, ForeignMode, theirs.SquareLaw), BAND)
     assert [c.id for c in end.added] == ["square-law"]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from test_found_again import BAND, fitted
 
 from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of
 from sonic_bullet.diagnosis.evidence.recording_chain import LINKS, chains, unchained
@@ -15,6 +14,7 @@ from sonic_bullet.effects.amplitude_pitch import AmplitudePitch
 from sonic_bullet.effects.room import Room
 from sonic_bullet.estimator.lines.joint_lines import Lines
 from sonic_bullet.records import Array
+from tests.diagnosis.test_found_again import BAND, fitted
 from tests.made.body import ALPHA, BETA, plate, recorded, struck
 
 BENT = AmplitudePitch(0.08, "velocity")

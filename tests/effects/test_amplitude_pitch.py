@@ -7,9 +7,6 @@ from functools import cache
 
 import numpy as np
 import pytest
-from test_chains import true_decay
-from test_choked import PAIR, assert_nearer_than_the_meshs, with_twins
-from test_found_again import BAND, fitted
 
 from sonic_bullet.diagnosis.evidence.amplitude_dependence import fallen, gliding, turns_rad
 from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of
@@ -24,6 +21,9 @@ from sonic_bullet.effects.common.envelope import Envelopes, alone, envelopes, wi
 from sonic_bullet.effects.contact_time import ContactTime
 from sonic_bullet.effects.protocol import ObjectEvidence
 from sonic_bullet.effects.room import Room
+from tests.diagnosis.test_found_again import BAND, fitted
+from tests.diagnosis.test_recording_chain import true_decay
+from tests.effects.test_amplitude_damping import PAIR, assert_nearer_than_the_meshs, with_twins
 from tests.made.body import GAIN, plate, recorded
 
 BENT = AmplitudePitch(0.35, "velocity")

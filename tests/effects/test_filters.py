@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.signal import butter, sosfreqz
-from test_found_again import BAND, fitted
 
 from sonic_bullet.diagnosis.evidence.baseline import _unclipped
 from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of
@@ -14,6 +13,7 @@ from sonic_bullet.effects.common.hum import hum_of, without, without_hum
 from sonic_bullet.effects.measurement_chain import MeasurementChain, butterworth, limit_of
 from sonic_bullet.effects.protocol import ObjectEvidence
 from sonic_bullet.estimator.lines.joint_lines import joint_lines
+from tests.diagnosis.test_found_again import BAND, fitted
 from tests.made.body import SR, recorded
 
 

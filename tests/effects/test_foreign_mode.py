@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from test_found_again import BAND, fitted
 
 from sonic_bullet.diagnosis.evidence.effect_evidence import _nearest, evidence_of, named
 from sonic_bullet.effects.foreign_mode import ForeignMode, _alone
+from tests.diagnosis.test_found_again import BAND, fitted
 from tests.made.body import plate, recorded
 
 STAND = ForeignMode((790.0, 2310.0), (12.0, 30.0), (1.0, 0.8), (0.3, -1.0))

@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_found_again import BAND, fitted
 
 from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of
 from sonic_bullet.diagnosis.evidence.refit import refitted
@@ -17,6 +16,7 @@ from sonic_bullet.effects.rebound import ALL, Rebound, _turned
 from sonic_bullet.effects.rebound.later_hits import second_hit, third_hit
 from sonic_bullet.effects.room import Room
 from sonic_bullet.estimator.lines import joint_lines as line_fit
+from tests.diagnosis.test_found_again import BAND, fitted
 from tests.made.body import SR, recorded
 
 

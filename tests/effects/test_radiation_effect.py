@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.special import spherical_jn, spherical_yn
-from test_found_again import BAND, fitted
 
 from sonic_bullet.diagnosis.evidence.baseline import takes_of
 from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of
 from sonic_bullet.diagnosis.evidence.refit import refitted
 from sonic_bullet.diagnosis.prediction.score import least_db, mean_db
 from sonic_bullet.effects.radiation import SOUND, Radiation
+from tests.diagnosis.test_found_again import BAND, fitted
 from tests.made.body import GAIN, recorded
 
 

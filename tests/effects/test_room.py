@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from test_found_again import BAND, fitted
 
 from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of, object_evidence, outside
 from sonic_bullet.diagnosis.evidence.refit import refitted, whole
@@ -18,6 +17,7 @@ from sonic_bullet.effects.foreign_mode import ForeignMode
 from sonic_bullet.effects.measurement_chain import MeasurementChain
 from sonic_bullet.effects.protocol import Sound, Stage
 from sonic_bullet.effects.room import RT60, Room, _one, late
+from tests.diagnosis.test_found_again import BAND, fitted
 from tests.made.body import ALPHA, BETA, recorded, truth
 
 

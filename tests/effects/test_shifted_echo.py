@@ -8,13 +8,13 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 from scipy.signal import resample
-from test_found_again import BAND, fitted
 
 from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of
 from sonic_bullet.diagnosis.evidence.refit import refitted
-from sonic_bullet.effects.protocol import Evidence, Owner, Sound, Stage
+from sonic_bullet.effects.protocol import Evidence, Owner, Sound, Stage, Traits
 from sonic_bullet.effects.room import Room
 from sonic_bullet.effects.room.shifted_echo import FEWEST, copied
+from tests.diagnosis.test_found_again import BAND, fitted
 from tests.made.body import recorded
 
 
@@ -26,6 +26,7 @@ class Moving:
     stage: ClassVar[Stage] = Stage.SOUND
     owner: ClassVar[Owner] = Owner.ROOM
     reference: ClassVar[str] = "Pierce 1989, ch. 9"
+    traits: ClassVar[Traits] = Traits()
     speed_m_s: float
 
     def apply(self, x: Sound) -> Sound:

@@ -35,7 +35,7 @@ def wanted(bend: float, damping_growth: float, n: int, power: float = 1.0) -> Ar
 
 
 @pytest.mark.parametrize(
-    ("bend", "choke", "power"), [(0.004, 0.0, 1.0), (-0.004, 0.0, 1.0), (0.0, 0.8, 1.0), (0.003, 0.8, 1.0), (0.0, 0.9, 2.0), (0.003, 0.9, 2.0)]
+    ("bend", "damping_growth", "power"), [(0.004, 0.0, 1.0), (-0.004, 0.0, 1.0), (0.0, 0.8, 1.0), (0.003, 0.8, 1.0), (0.0, 0.9, 2.0), (0.003, 0.9, 2.0)]
 )
 def test_bent_modes_follow_the_closed_form(bend: float, damping_growth: float, power: float) -> None:
     """32 samples late at most: 2π f b a² · 0.67 ms of phase, c a d · 0.67 ms of level, and no drift after that."""

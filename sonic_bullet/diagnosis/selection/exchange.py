@@ -23,7 +23,7 @@ from sonic_bullet.diagnosis.selection.acceptance import MANY, STANDARD_ERRORS, C
 from sonic_bullet.diagnosis.selection.decay_test import misfit, of_decays
 from sonic_bullet.diagnosis.selection.phase_test import HINT, NEARLY
 from sonic_bullet.diagnosis.selection.phase_test import misfit as phases
-from sonic_bullet.effects.protocol import Effect, Evidence
+from sonic_bullet.effects.protocol import Alternatives, Dereverberates, Effect, Evidence
 from sonic_bullet.parallel import side_by_side
 from sonic_bullet.records import Array
 
@@ -64,7 +64,7 @@ def starts(h: Hypothesis, bodies: tuple[Struck, ...], band_hz: tuple[float, floa
     """
     found = [h]
     for i, effect in enumerate(h.effects):
-        for other in getattr(effect, "others", tuple)():
+        for other in effect.others() if isinstance(effect, Alternatives) else ():
             start = replace(h, effects=(*h.effects[:i], other, *h.effects[i + 1 :]))
             for j in range(len(h.effects)):
                 start = again(start, j, bodies, band_hz, afresh=True) if j != i else start
@@ -150,7 +150,7 @@ def phases_against(best: Hypothesis, other: Hypothesis, bodies: tuple[Struck, ..
 
     Phases are held against lines as they were fitted; of several hits they say nothing, and beside a room lines are others.
     """
-    dry = [any(hasattr(e, "dereverberated") for e in h.effects) for h in (best, other)]
+    dry = [any(isinstance(e, Dereverberates) for e in h.effects) for h in (best, other)]
     if moves(best) or moves(other) or dry[0] != dry[1]:
         return False
     mine, its = phases(best, bodies), phases(other, bodies)

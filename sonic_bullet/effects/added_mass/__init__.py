@@ -22,7 +22,7 @@ from sonic_bullet.effects.added_mass.mass_loaded_modes import attached, loaded
 from sonic_bullet.effects.added_mass.mass_search import WIDTHS, Scored, Trial, strict
 from sonic_bullet.effects.common.pairs import agreed, patterns
 from sonic_bullet.effects.common.points import nearest, spread_out, vertex_normals
-from sonic_bullet.effects.protocol import Evidence, Owner, Stage
+from sonic_bullet.effects.protocol import BaselineChange, ChangesBaseline, Cost, Evidence, Mixing, Owner, Stage, Traits
 from sonic_bullet.parallel import side_by_side
 from sonic_bullet.records import Array, ModalModel
 
@@ -38,7 +38,7 @@ BETTER = (1.5, 0.12)  # in price: as much as a strong line and a half, paired we
 
 
 @dataclass(frozen=True)
-class AddedMass:
+class AddedMass(ChangesBaseline):
     """mass_kg riding on position_m (3,) of the surface, in the mesh's frame. yield_m_n: along the normal and across it, of what the model's modes leave out.
 
     stretch: ln of what all frequencies of the bare body are to the baseline's; poisson_ratio: its ν, None for the baseline's. The host takes them over.
@@ -47,8 +47,8 @@ class AddedMass:
     id: ClassVar[str] = "added-mass"
     stage: ClassVar[Stage] = Stage.MODES
     owner: ClassVar[Owner] = Owner.FIXTURE
-    costly: ClassVar[bool] = True
     reference: ClassVar[str] = "Rayleigh 1894, § 88-90; Rubin 1975"
+    traits: ClassVar[Traits] = Traits(moves_modes=True, mixing=Mixing.ALL, cost=Cost.COSTLY)
 
     position_m: tuple[float, float, float]
     mass_kg: float
@@ -62,6 +62,10 @@ class AddedMass:
             return x
         at = nearest(x, self.position_m)
         return loaded(x, attached(x.shape[at].astype(float), vertex_normals(x)[at], self.yield_m_n, x), self.mass_kg, x.vertex_m[at], FreeBody.of(x))
+
+    def baseline_change(self) -> BaselineChange:
+        """E/ρ and ν of the bare body, found along with the mass."""
+        return BaselineChange(stretch=self.stretch, poisson_ratio=self.poisson_ratio)
 
     def parameters(self) -> dict[str, Any]:
         """What it says, for people and JSON, in SI units."""

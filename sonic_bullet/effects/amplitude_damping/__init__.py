@@ -19,7 +19,7 @@ from sonic_bullet.effects.amplitude_pitch import MEASURES, _per_velocity
 from sonic_bullet.effects.common.axes import ANGLES, PAIR, turned
 from sonic_bullet.effects.common.envelope import envelopes, levels
 from sonic_bullet.effects.common.proofs import finite, one_of, side_by_side
-from sonic_bullet.effects.protocol import Evidence, ObjectEvidence, Owner, Ring, Stage
+from sonic_bullet.effects.protocol import BaselineChange, ChangesBaseline, Evidence, ObjectEvidence, Owner, Ring, RotatesPairs, Stage, Traits
 from sonic_bullet.records import Array, ModalModel
 
 BETTER = 3.0  # of ln variance of the envelopes' logarithms, all lines together
@@ -31,7 +31,7 @@ AGAIN = np.geomspace(0.4, 2.5, 9)  # of what all evidence said
 
 
 @dataclass(frozen=True)
-class AmplitudeDamping:
+class AmplitudeDamping(RotatesPairs, ChangesBaseline):
     """choke: 1/level at which the decay has doubled; power: of the level, with which it rises, 1 or 2. measure: as in amplitude-pitch. alpha_per_s, beta_s: the material's, as the decays at low level tell them.
 
     louder: modes at the onset over what the linear model plays, as its lines miss some of a fall that is no exponential. freq_hz, turn_rad: of twins, and how
@@ -41,9 +41,8 @@ class AmplitudeDamping:
     id: ClassVar[str] = "amplitude-damping"
     stage: ClassVar[Stage] = Stage.BANK
     owner: ClassVar[Owner] = Owner.OBJECT
-    by_line: ClassVar[bool] = True  # it may be heard of one alone
-    certain: ClassVar[bool] = True  # modes agree, each by its own baseband, or nothing is proposed
     reference: ClassVar[str] = "Nayfeh & Mook 1979, section 3.3"
+    traits: ClassVar[Traits] = Traits(by_line=True, certain=True)
 
     damping_growth: float
     measure: str = "velocity"
@@ -70,6 +69,16 @@ class AmplitudeDamping:
     def turned(self, x: ModalModel) -> ModalModel:
         """The modes as they were, twins about their own axes."""
         return turned(x, self.freq_hz, self.turn_rad)
+
+    def angles(self) -> int:
+        """How many of its numbers are axes of degenerate pairs."""
+        return len(self.turn_rad)
+
+    def baseline_change(self) -> BaselineChange:
+        """The material's α and β, as the decays at low level state them, and by how much lines miss the onset."""
+        if not np.isfinite(self.alpha_per_s):
+            return BaselineChange(onset_gain=self.louder)
+        return BaselineChange(self.alpha_per_s, self.beta_s, onset_gain=self.louder)
 
     def parameters(self) -> dict[str, Any]:
         """What it says, for people and JSON, in SI units."""

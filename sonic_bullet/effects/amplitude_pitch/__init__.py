@@ -17,7 +17,7 @@ from sonic_bullet.effects.amplitude_pitch.degenerate_pitch import axes_of, bend_
 from sonic_bullet.effects.common.axes import degenerate, turned
 from sonic_bullet.effects.common.envelope import Envelopes, envelopes, falls, levels
 from sonic_bullet.effects.common.proofs import finite, one_of, side_by_side
-from sonic_bullet.effects.protocol import Evidence, ObjectEvidence, Owner, Ring, Stage
+from sonic_bullet.effects.protocol import Evidence, ObjectEvidence, Owner, Ring, RotatesPairs, Stage, Traits
 from sonic_bullet.records import Array, ModalModel
 
 MEASURES = ("impulse", "velocity", "displacement")
@@ -44,7 +44,7 @@ class Slope:
 
 
 @dataclass(frozen=True)
-class AmplitudePitch:
+class AmplitudePitch(RotatesPairs):
     """bend: relative rise of frequency per level². measure: of the level, one of MEASURES, in N·s, m/s or m. freq_hz, turn_rad: of twins, and how far their axes
     are turned from the mesh's.
     """
@@ -52,9 +52,8 @@ class AmplitudePitch:
     id: ClassVar[str] = "amplitude-pitch"
     stage: ClassVar[Stage] = Stage.BANK
     owner: ClassVar[Owner] = Owner.OBJECT
-    by_line: ClassVar[bool] = True  # it may be heard of one alone
-    certain: ClassVar[bool] = True  # modes agree, each by its own baseband, or nothing is proposed
     reference: ClassVar[str] = "Nayfeh & Mook 1979, section 2.3"
+    traits: ClassVar[Traits] = Traits(by_line=True, certain=True)
 
     bend: float
     measure: str = "velocity"
@@ -75,6 +74,10 @@ class AmplitudePitch:
     def turned(self, x: ModalModel) -> ModalModel:
         """The modes as they were, twins about their own axes."""
         return turned(x, self.freq_hz, self.turn_rad)
+
+    def angles(self) -> int:
+        """How many of its numbers are axes of degenerate pairs."""
+        return len(self.turn_rad)
 
     def parameters(self) -> dict[str, Any]:
         """What it says, for people and JSON, in SI units."""

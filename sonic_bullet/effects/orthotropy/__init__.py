@@ -16,7 +16,7 @@ import numpy as np
 from sonic_bullet.effects.orthotropy.tensor_lines import CAP, ringing, told_of
 from sonic_bullet.effects.orthotropy.tensor_search import WIDTHS, Tensor, fitted, isotropic_p, search
 from sonic_bullet.effects.orthotropy.tensors import NAMES, SYMMETRIES, p_of
-from sonic_bullet.effects.protocol import Evidence, ObjectEvidence, Owner, Stage
+from sonic_bullet.effects.protocol import Cost, Evidence, ObjectEvidence, Owner, Stage, Traits
 from sonic_bullet.records import ORTHOTROPIC, Array, Material
 
 BETTER = 10.0  # in BIC, than isotropy
@@ -33,8 +33,8 @@ class Orthotropy:
     id: ClassVar[str] = "orthotropy"
     stage: ClassVar[Stage] = Stage.MATERIAL
     owner: ClassVar[Owner] = Owner.MATERIAL
-    costly: ClassVar[bool] = True
     reference: ClassVar[str] = "Nye 1957, ch. VIII; Migliori et al. 1993; Bodig & Jayne 1982, ch. 3"
+    traits: ClassVar[Traits] = Traits(moves_modes=True, cost=Cost.COSTLY)
 
     constants_pa: tuple[float, ...]
     symmetry: str = "orthorhombic"

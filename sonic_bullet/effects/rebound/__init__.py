@@ -16,7 +16,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from sonic_bullet.effects.common.ringing import direct_as_expected
-from sonic_bullet.effects.protocol import Evidence, Impact, ObjectEvidence, Owner, Stage
+from sonic_bullet.effects.protocol import Evidence, Impact, ObjectEvidence, Owner, Stage, Traits
 from sonic_bullet.effects.rebound.later_hits import EXPONENTS, LEAST, MOST_HITS, SPAN_S, hits_by_strike, second_hit, third_hit
 from sonic_bullet.records import Array
 
@@ -41,6 +41,7 @@ class Rebound:
     stage: ClassVar[Stage] = Stage.FORCE
     owner: ClassVar[Owner] = Owner.STRIKER
     reference: ClassVar[str] = "Goldsmith 1960, ch. 1; Falcon et al. 1998"
+    traits: ClassVar[Traits] = Traits()
 
     gap_s: float
     impulse_n_s: float

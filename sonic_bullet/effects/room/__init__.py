@@ -17,7 +17,7 @@ import numpy as np
 
 from sonic_bullet.effects.common import reverberant_tail
 from sonic_bullet.effects.foreign_mode import ForeignMode
-from sonic_bullet.effects.protocol import Evidence, ObjectEvidence, Owner, Sound, Stage
+from sonic_bullet.effects.protocol import Dereverberates, Evidence, ObjectEvidence, Owner, Sound, Stage, Traits
 from sonic_bullet.effects.room.shifted_echo import copied
 from sonic_bullet.records import Array
 
@@ -34,13 +34,14 @@ TURNS, AGAIN, FULLY = 150, 40, 400  # what is heard between the loudest modes co
 
 
 @dataclass(frozen=True)
-class Room:
+class Room(Dereverberates):
     """rt60_s, wet. response (t,): the tail's taps at rate sr, the first at the direct sound itself; empty: noise of that law from ``seed``."""
 
     id: ClassVar[str] = "room"
     stage: ClassVar[Stage] = Stage.SOUND
     owner: ClassVar[Owner] = Owner.ROOM
     reference: ClassVar[str] = "Schroeder 1965; Polack 1988; Kuttruff 2009, ch. 4"
+    traits: ClassVar[Traits] = Traits()
 
     rt60_s: float
     wet_level: float

@@ -16,7 +16,7 @@ import numpy as np
 
 from sonic_bullet.effects.common.dashpots import damped
 from sonic_bullet.effects.common.points import nearest, vertex_normals
-from sonic_bullet.effects.protocol import Evidence, Owner, Stage
+from sonic_bullet.effects.protocol import Cost, Evidence, Mixing, Owner, Stage, Traits
 from sonic_bullet.effects.support_damping.dashpot_fit import Dashpot, Trial
 from sonic_bullet.effects.support_damping.support_search import NEARER, refined, sought, tuned
 from sonic_bullet.records import Array, ModalModel
@@ -32,8 +32,8 @@ class SupportDamping:
     id: ClassVar[str] = "support-damping"
     stage: ClassVar[Stage] = Stage.MODES
     owner: ClassVar[Owner] = Owner.FIXTURE
-    searches: ClassVar[bool] = True
     reference: ClassVar[str] = "Zheng & James 2011, section 5 (contact damping); Woodhouse 1998, eq. 12"
+    traits: ClassVar[Traits] = Traits(moves_modes=True, mixing=Mixing.NEIGHBOURS, cost=Cost.SEARCHES)
 
     position_m: tuple[tuple[float, float, float], ...]
     strength_n_s_m: tuple[float, ...]
