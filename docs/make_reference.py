@@ -25,14 +25,18 @@ if str(REPO) not in sys.path:
 PLACE = REPO / "docs" / "reference"
 MADE = "<!-- Made by `make docs` of the code; change it there. -->"
 WIDTH = 100
+FIELD = re.compile(r"(?<=[.;])\s+(?=[a-z_]\w*\*?(?:(?:, | and )[a-z_]\w*)*(?: \([^)]*\))*[^.:]{0,40}: )")  # where a docstring goes on to its next field
 
+EFFECT_PARTS = ("Effect", "Stage", "Owner", "Traits", "Mixing", "Cost", "Evidence", "ObjectEvidence", "Impact", "Ring", "Sound", "BaselineChange")
+EFFECT_PARTS += ("ChangesBaseline", "Dereverberates", "RotatesPairs", "SplitsPairs", "RingsBeside", "Alternatives")
 API = (
     ("sonic_bullet", "What `import sonic_bullet` offers.", None),
     ("sonic_bullet.estimator.fit.material_fit", "Fit a material to a case.", ("fit_case",)),
     ("sonic_bullet.files.cases", "Read a case.", ("read_case", "Case", "CaseObject", "CaseRecording", "Line", "case_schema")),
     ("sonic_bullet.presets", "Read and write presets.", ("read_preset", "write_preset", "material_of")),
     ("sonic_bullet.diagnosis.diagnose", "Diagnose a case.", ("diagnose", "described")),
-    ("sonic_bullet.effects", "What an effect is, and what it acts on.", None),
+    ("sonic_bullet.effects", "The effects of the package; what they share is in the next section.", ("EFFECTS",)),
+    ("sonic_bullet.effects.protocol", "What an effect is, what it acts on and what it reads.", EFFECT_PARTS),
 )
 
 
@@ -81,7 +85,12 @@ def described(thing: Any) -> Iterator[str]:
             yield from ["", "```text", *(line[4:] for line in lines), "```"]
         else:
             yield ""
-            yield from filled(" ".join(line.strip() for line in lines))
+            fields = re.split(FIELD, " ".join(line.strip() for line in lines))
+            if len(fields) < 2:
+                yield from filled(" ".join(fields))
+                continue
+            for field in fields:
+                yield from (f"{'  ' if i else '- '}{line}" for i, line in enumerate(filled(field)))
 
 
 def filled(text: str) -> list[str]:

@@ -89,7 +89,7 @@ def cli() -> None:
 )
 @click.option("--seed", type=click.IntRange(0), help="Seed of the surfaces' roughness. [default: 0; a log's own]")
 @click.option("--material", metavar="M", help="Material of the bodies of a script that names none (a name or a preset file).")
-@click.option("--residual/--no-residual", default=True, help="What presets sound beside their modes. [default: heard]")
+@click.option("--residual/--no-residual", default=True, help="What presets sound beside their modes. [default: sounded]")
 def render(**options: Any) -> None:
     """Run a PyBullet scene, or replay a contact log, to a sound file."""
     from sonic_bullet.cli.scene_commands import run_render
@@ -153,7 +153,7 @@ def features(**options: Any) -> None:
 
 
 def strike_options(command: Any) -> Any:
-    """The options that say how one recording was struck and heard; a case says it itself."""
+    """The options that say how one recording was struck and recorded; a case says it itself."""
     for option in reversed(
         (
             click.option("--mesh", metavar="M", help="Mesh of what was struck."),
@@ -169,7 +169,7 @@ def strike_options(command: Any) -> Any:
                 type=click.Choice(["sum", "pressure", "velocity"]),
                 help="What was recorded: plain sum of modes, a microphone, a surface. [default: pressure]",
             ),
-            click.option("--sensor-at", type=Numbers("X,Y,Z"), help="Where the surface was heard, in m, for --sensor velocity."),
+            click.option("--sensor-at", type=Numbers("X,Y,Z"), help="Where the surface was measured, in m, for --sensor velocity."),
             click.option("--sensor-direction", type=Numbers("X,Y,Z"), help="Along which, for --sensor velocity. [default: out of the surface]"),
             click.option("--onset", "onset_s", type=click.FloatRange(0), metavar="S", help="When the impulse arrives. [default: found]"),
             click.option("--fix", "fixed", type=Numbers("X,Y,Z,R"), multiple=True, help="Clamp all within R of a point, in m, mesh frame; repeatable."),
@@ -238,7 +238,7 @@ def case() -> None:
     show_default=True,
     help="What was recorded: plain sum of modes, a microphone, a surface.",
 )
-@click.option("--sensor-at", type=Numbers("X,Y,Z"), help="Where the surface was heard, in m, for --sensor velocity.")
+@click.option("--sensor-at", type=Numbers("X,Y,Z"), help="Where the surface was measured, in m, for --sensor velocity.")
 @click.option("--sensor-direction", type=Numbers("X,Y,Z"), help="Along which, for --sensor velocity. [default: out of the surface]")
 def case_new(folder: str, more: tuple[str, ...], recordings: tuple[str, ...], **options: Any) -> None:
     """Write FOLDER/case.json for recordings of one object; files from elsewhere are copied into the folder."""

@@ -155,7 +155,7 @@ def run_case_check(folder: str) -> None:
         if recording.channel >= len(sound):
             raise AudioError(f"{recording.file} has no channel {recording.channel}", "name one it has")
     split = {name: sum(r.split == name for r in case.recordings) for name in dict.fromkeys(r.split for r in case.recordings)}
-    print(f"{case.name}: {len(case.recordings)} strikes ({', '.join(f'{count} {name}' for name, count in split.items())}), heard as {case.sensor}")
+    print(f"{case.name}: {len(case.recordings)} strikes ({', '.join(f'{count} {name}' for name, count in split.items())}), recorded as {case.sensor}")
     if rows:
         print(table(("object", "mesh", "size in mm", "guess", "strikes placed"), rows))
     if missing:

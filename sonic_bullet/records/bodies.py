@@ -172,7 +172,7 @@ class ModalModel:
     of the smooth surface (0 flat, 1/r sphere, negative inside a bowl). volume_m3, mass_kg: of the meshed solid at the
     material's density. dropped: modes left out as overdamped. note: how it was made (element size, order, choices).
     bend_s2_m2, damping_growth_s_m (m,): relative rise of a mode's frequency per square of its peak velocity at the surface, of its decay
-    (choke · that velocity)^choke_power, 1 or 2; None: a linear body.
+    (damping_growth · that velocity)^damping_growth_power, 1 or 2; None: a linear body.
     A body without audible modes has m = 0; a plane has v = f = 0 besides.
     """
 
