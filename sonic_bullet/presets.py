@@ -5,7 +5,7 @@
 A file is UTF-8 JSON, format "sonic-bullet-preset/1": name, density_kg_m3, elasticity (youngs_pa and poisson, or stiffness_pa 6×6),
 damping, surface, impact, each group with the `source` of its numbers, an optional `note`, and how far they differ between objects of that
 material: `range`, `range_source`, `spread`. `provenance` says what a fitted preset was
-fitted from, and how sure it is; it changes no sound. `residual` is what the modes do not say (docs/residual.md), played with every contact. `effects` are what a
+fitted from, and how sure it is; it changes no sound. `residual` is what the modes do not say (docs/explanation/residual.md), played with every contact. `effects` are what a
 diagnosis found to belong to material or object (sonic_bullet.effects.presets_of_effects): they sound in every scene.
 
 Damping is Rayleigh's, d = ½(α + βλ) [Ren, Yeh, Lin 2013, eq. 6]: alpha_per_s and beta_s, or a loss factor η of the handbooks. η = 2d/ω
@@ -173,7 +173,7 @@ def read_preset(path: str | os.PathLike[str]) -> Preset:
     try:
         preset = msgspec.json.decode(content, type=Preset)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise MaterialError(f"preset {path}: {error}", "mend that field; docs/materials.md describes the file") from error
+        raise MaterialError(f"preset {path}: {error}", "mend that field; docs/reference/preset.md describes the file") from error
     if preset.format != FORMAT:
         raise MaterialError(f"preset {path} has format '{preset.format}', wanted '{FORMAT}'", "use a sonic_bullet that knows that format")
     return preset

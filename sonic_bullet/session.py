@@ -120,7 +120,7 @@ class Listener:
         link: -1 is the base, "all" every link with a collision shape. material: a preset's name, a preset file or a `Material`.
         mesh: a file (in metres) or shapes in the body frame, where the body's own collision shapes should not be used.
         model: modes computed before. roughness_m: rms height of its surface in place of the material's. fixed: clamped spheres
-        (x, y, z, radius) in m, body frame. thickness_m: wall of an open surface. to_hz, count: how many modes. progress: told now and then
+        (x, y, z, radius) in m, body frame. thickness_m: wall of an open surface. to_hz, count: how many modes. progress: called now and then with
         which body's modes are being computed, how far that is, and that it is their radiation next (seconds a body the first time, then
         the cache has both).
         Raises SceneError (unknown body), MaterialError, MeshError, ModalError.
@@ -215,7 +215,7 @@ class Listener:
 
     @property
     def time_s(self) -> float:
-        """Physics time heard so far."""
+        """Physics time so far."""
         return float(self._synth.time_s)
 
     def sound(self) -> Array:

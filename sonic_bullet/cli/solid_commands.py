@@ -96,7 +96,7 @@ def run_materials(json_to: str | None) -> None:
             for m in found
         ]
         print(table(head, rows))
-        print("\nsources: 'sonic-bullet materials --json' and docs/materials.md")
+        print("\nsources: 'sonic-bullet materials --json' and docs/explanation/materials.md")
     write_json(json_to, {"materials": [_material(m) for m in found]})
 
 

@@ -68,7 +68,7 @@ def diagnose(
     cache: Place = "default",
     progress: Callable[[str], None] | None = None,
 ) -> Diagnosis:
-    """Say what the fitted model lacks, from the case's 'fit' strikes. effects: the suspects, your own beside the package's: ``EFFECTS + (Mine,)``.
+    """Say what the fitted model lacks, from the case's 'fit' strikes. effects: the candidates, your own beside the package's: ``EFFECTS + (Mine,)``.
 
     Raises SonicBulletError where a file, mesh or number makes a fit impossible.
     """

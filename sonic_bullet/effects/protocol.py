@@ -1,8 +1,8 @@
-"""What effects act on, what they are given, and what every effect is.
+"""What effects act on, what they read, and what every effect is.
 
     MATERIAL  Material   -> Material      stiffness, density: the host solves the modes again
     MODES     ModalModel -> ModalModel    frequencies, decays, shapes
-    FORCE     Impact     -> Impact          when, how long, how often a strike presses
+    FORCE     Impact     -> Impact        when, how long, how often a strike presses
     BANK      Ring       -> Ring          how a ringing mode depends on its own level
     SOUND     Sound      -> Sound         what happens on the way to the file
 
@@ -182,10 +182,10 @@ class ObjectEvidence:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Evidence:
-    """All that an effect is given: the objects' strikes, the material's α and β and the case's gain so far, effects found so far by id, band and seed.
+    """All that an effect may read: the objects' strikes, the material's α and β and the case's gain so far, effects found so far by id, band and seed.
 
-    known: what the effect said of the whole evidence, or together with other effects: it is there to be fitted again, not to be looked for.
-    on_trial: whether this is the evidence without a strike, known's numbers to be identified again; axes of degenerate modes, which a linear body has no part of, stand as known has them.
+    known: what the effect said of the whole evidence, or beside other effects: it is there to be fitted again, not to be looked for.
+    on_trial: whether this is the evidence without a strike, known's numbers to be estimated again; axes of degenerate pairs, which a linear body has no part of, stand as known has them.
     """
 
     observed: tuple[ObjectEvidence, ...]

@@ -26,9 +26,9 @@ def render_log(
     progress: Callable[[float], None] | None = None,
     say: Callable[[str], None] | None = None,
 ) -> Array:
-    """The sound of a contact log, (channels, floor(sr·time)) in pascals; with the log's own rate the same bits as were heard live.
+    """The sound of a contact log, (channels, floor(sr·time)) in pascals; with the log's own rate the same bits as live.
 
-    residual False: without what materials sound beside their modes. progress is told the share done, say
+    residual False: without what materials sound beside their modes. progress is given the share done, say
     what is being computed before the first step. Raises AudioError for a rate that cannot be.
     """
     from sonic_bullet.files import check_sr
