@@ -123,7 +123,7 @@ def rendered(model: ModalModel, material: Material, sensor: str, at: Places) -> 
 
 def pushed(sound: Array) -> int:
     """The sample at which the push of a render is over: the same for every render of the same steps."""
-    from sonic_bullet.estimator.fit.observed import onset_sample
+    from sonic_bullet.estimator.fit.recorded import onset_sample
 
     return onset_sample(sound, SR) + round(PUSH_S * SR)
 

@@ -62,7 +62,7 @@ def render_scene(
     """Run a scene for ``seconds`` of physics time and return its sound.
 
     seconds None: the scene's own SECONDS, or 4. microphones None: the scene's own, or (0, -1, 0.5). material: of the bodies of a
-    plain script. residual: whether what materials sound beside their modes is heard. progress is told the share done, say
+    plain script. residual: whether what materials sound beside their modes is sounded. progress is given the share done, say
     what is being computed before the first step (modes: seconds a body). Raises SonicBulletError; where the scene broke or was interrupted
     under way, the exception carries what was rendered so far as ``partial``.
     """

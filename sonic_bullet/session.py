@@ -250,7 +250,7 @@ class Listener:
 
     @property
     def time_s(self) -> float:
-        """Physics time heard so far."""
+        """Physics time so far."""
         return float(self._synth.time_s)
 
     def sound(self) -> Array:

@@ -88,7 +88,7 @@ def judge(folder: Path, case: dict[str, Any]) -> Outcome:
         )
     left = (
         "places of the hits are not given and vary, so a line's level per impulse moves by several dB from hit to hit, before and after alike; "
-        "with two to five hits an exponent of −1/5 is not told from 0"
+        "with two to five hits an exponent of −1/5 cannot be distinguished from 0"
     )
     return Outcome(tuple(rows), " ".join(texts), left, lambda figure: paint(figure, objects), tuple(skipped))
 

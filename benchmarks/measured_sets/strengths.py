@@ -61,7 +61,7 @@ def judge(folder: Path, case: dict[str, Any]) -> Outcome:
         tables.append(table)
     if not tables:
         raise ValueError("; ".join(skipped) or "no stroke has two strengths")
-    left = "decays and levels line by line differ between strikes by more than any law of level tells: where and with what was struck is not told"
+    left = "decays and levels line by line differ between strikes by more than any law of level explains: where and with what was struck is not given"
     return Outcome(tuple(rows), " ".join(texts), left, lambda figure: paint(figure, tables[0]), tuple(skipped))
 
 

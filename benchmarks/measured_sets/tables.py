@@ -50,7 +50,7 @@ def materials(folder: Path, case: dict[str, Any]) -> Outcome:
     if pictured is None:
         raise ValueError("no material with four lines")
     text = f"{len(tables)} distinct tables, the {MOST_LINES} strongest lines of each, T60 over {LONGEST_S:.0f} s left out. A size class of a material is predicted from its others."
-    left = "T60 against frequency scatters within a class by as much as between laws; which recording stands behind a table is not told, so a law here is a range, not a material's"
+    left = "T60 against frequency scatters within a class by as much as between laws; which recording stands behind a table is not known, so a law here is a range, not a material's"
     kind, one = pictured
     return Outcome(tuple(rows), text, left, lambda figure: draw(figure.subplots(), [one[0]], one[1], one[2], kind), tuple(skipped))
 

@@ -40,7 +40,7 @@ def run_diagnose(source: str, *, output: str | None, json_to: str | None, predic
             from sonic_bullet.presets import write_preset
 
             write_preset(output, preset_of(found))
-        say(_told(found))
+        say(_summary(found))
         if predict is not None:
             say(f"{written} strikes predicted in {predict}")
     warn(found.warnings)
@@ -64,7 +64,7 @@ def _predicted(found: Any, folder: str) -> int:
     return len(made)
 
 
-def _told(found: Any) -> str:
+def _summary(found: Any) -> str:
     """For people."""
     from sonic_bullet.diagnosis.remainder import NOTHING
     from sonic_bullet.diagnosis.selection.stepwise import NothingCompared
@@ -73,7 +73,7 @@ def _told(found: Any) -> str:
         return "not compared" if split in found.not_compared else "no audio"
 
     words = {
-        "none": "the model suffices: no effect earns its keep",
+        "none": "the model suffices: no effect is accepted",
         "explained": "the model lacks",
         "unexplained": "something is left that no known effect explains",
         "nothing": NOTHING,

@@ -33,7 +33,7 @@ def run_features(
         notes = "; ".join(filter(None, (which, found.note)))
         if picture is not None:
             _draw(picture, observed, sr, found)
-        say(_told(recording, found))
+        say(_summary(recording, found))
     warn(f"{recording}: {note}" for note in [found.note] if note)
     write_json(json_to, described(found, notes, doubtful=bool(found.note) or (len(sound) > 1 and channel is None)))
 
@@ -51,7 +51,7 @@ def _number(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
 
 
-def _told(recording: str, found: Features) -> str:
+def _summary(recording: str, found: Features) -> str:
     order = np.argsort(found.freq_hz)
     rows = [
         (

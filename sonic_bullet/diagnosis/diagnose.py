@@ -26,7 +26,7 @@ from sonic_bullet.diagnosis.selection.stepwise import Closed, NothingCompared, c
 from sonic_bullet.effects import EFFECTS
 from sonic_bullet.effects.protocol import Effect
 from sonic_bullet.estimator.fit.case_fit import CaseFit
-from sonic_bullet.estimator.fit.observed import check_meshes, gather, onset_sample, until_it_breaks_off
+from sonic_bullet.estimator.fit.recorded import check_meshes, gather, onset_sample, until_it_breaks_off
 from sonic_bullet.files import channel_of, read_audio
 from sonic_bullet.files.cases import Case, CaseRecording, read_case
 from sonic_bullet.modal.cache import Place
@@ -70,7 +70,7 @@ def diagnose(
     cache: Place = "default",
     progress: Callable[[str], None] | None = None,
 ) -> Diagnosis:
-    """Say what the fitted model lacks, from the case's 'fit' strikes. effects: the suspects, your own beside the package's: ``EFFECTS + (Mine,)``.
+    """Say what the fitted model lacks, from the case's 'fit' strikes. effects: the candidates, your own beside the package's: ``EFFECTS + (Mine,)``.
 
     Raises SonicBulletError where a file, mesh or number makes a fit impossible.
     """

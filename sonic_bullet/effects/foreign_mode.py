@@ -14,7 +14,7 @@ import numpy as np
 
 from sonic_bullet.effects.common.reverberant_tail import FRAME_S
 from sonic_bullet.effects.common.ringing import sounded
-from sonic_bullet.effects.protocol import Evidence, Impact, ObjectEvidence, Owner, Ring, Sound, Stage
+from sonic_bullet.effects.protocol import Evidence, Impact, ObjectEvidence, Owner, Ring, RingsAlong, Sound, Stage, Traits
 from sonic_bullet.records import Array
 
 STEADY = 0.12  # relative scatter of |A|/J over the strikes, rms
@@ -24,13 +24,14 @@ APART = 0.004  # from a mode of the body
 
 
 @dataclass(frozen=True)
-class ForeignMode:
+class ForeignMode(RingsAlong):
     """freq_hz, decay_per_s, amplitude per N·s, phase_rad of each line that is not the body's."""
 
     id: ClassVar[str] = "foreign-mode"
     stage: ClassVar[Stage] = Stage.SOUND
     owner: ClassVar[Owner] = Owner.STRIKER
     reference: ClassVar[str] = "physics of a second resonator driven by the same blow: Morse & Ingard 1968, ch. 2"
+    traits: ClassVar[Traits] = Traits()
 
     freq_hz: tuple[float, ...]
     decay_per_s: tuple[float, ...]
@@ -43,6 +44,10 @@ class ForeignMode:
         none = np.zeros(len(a))
         ring = Ring(np.array(self.freq_hz), np.array(self.decay_per_s), a, none, none, none)
         return replace(x, sample=x.sample + sounded(ring, Impact(1.0, np.zeros(1), np.ones(1)), len(x.sample), x.sr))
+
+    def lines(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Frequencies and decays of what rings."""
+        return self.freq_hz, self.decay_per_s
 
     def parameters(self) -> dict[str, Any]:
         """What it says, for people and JSON, in SI units."""

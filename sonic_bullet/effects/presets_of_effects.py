@@ -16,7 +16,7 @@ from sonic_bullet.effects.amplitude_damping import AmplitudeDamping
 from sonic_bullet.effects.amplitude_pitch import AmplitudePitch
 from sonic_bullet.effects.damping_law import DampingLaw
 from sonic_bullet.effects.mode_splitting import ModeSplitting
-from sonic_bullet.effects.protocol import Effect, Ring, Stage
+from sonic_bullet.effects.protocol import Effect, Ring, RotatesPairs, Stage
 from sonic_bullet.records import Material, ModalModel
 from sonic_bullet.records.errors import RecordError
 
@@ -58,7 +58,7 @@ def with_material(material: Material) -> Material:
 
 
 def with_modes(model: ModalModel, material: Material) -> ModalModel:
-    """A body's model with its material's effects on modes in it, and on how they ring: bend and choke per peak velocity at the surface.
+    """A body's model with its material's effects on modes in it, and on how they ring: bend and damping growth per peak velocity at the surface.
 
     Where a level was measured as an impulse, the velocity is what that impulse brings about at a typical place (rms over the surface).
     """
@@ -70,7 +70,7 @@ def with_modes(model: ModalModel, material: Material) -> ModalModel:
     if not effects:
         return model
     for effect in effects:
-        if hasattr(effect, "turned"):
+        if isinstance(effect, RotatesPairs):
             model = effect.turned(model)
     square = (model.shape.astype(float) ** 2).sum(axis=1)
     level = np.sqrt(square.mean(axis=0) / 3 * square.max(axis=0))

@@ -139,12 +139,12 @@ def damped(lambda_per_s2: Array, material: Material) -> tuple[Array, Array, Arra
 def _filled(shapes: tuple[Shape, ...], sizes: tuple[float | None, float | None], kept: tuple[store.Place, str], say: Callable[[str], None]) -> Filled:
     """The body's inside and skin, from the cache where it is there. sizes: edge_m, thickness_m."""
     from sonic_bullet.modal.meshing.shape_meshes import Filled, fill
-    from sonic_bullet.modal.meshing.solid import Solid, Surface
+    from sonic_bullet.modal.meshing.solid import Solid, SolidSurface
 
     found = store.load(*kept)
     if found is not None:
         a, note = found
-        return Filled(Solid(a["node"], a["tet"], bool(a["affine"][0]), note), Surface(a["skin"], a["face"]), a["curvature"])
+        return Filled(Solid(a["node"], a["tet"], bool(a["affine"][0]), note), SolidSurface(a["skin"], a["face"]), a["curvature"])
     body = fill(shapes, *sizes, say)
     solid, skin = body.solid, body.skin
     arrays = {

@@ -9,6 +9,7 @@ means the frame PyBullet calls inertial: origin at the centre of mass, axes as `
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass, field, fields
 from typing import Any, Literal, get_args
 
@@ -189,7 +190,8 @@ class ModalModel:
     of the smooth surface (0 flat, 1/r sphere, negative inside a bowl). volume_m3, mass_kg: of the meshed solid at the
     material's density. dropped: modes left out as overdamped. note: how it was made (element size, order, choices).
     bend_s2_m2, damping_growth_s_m (m,): relative rise of a mode's frequency per square of its peak velocity at the surface, of its decay
-    (choke · that velocity)^choke_power, 1 or 2; None: a linear body. includes_radiation: of decay_per_s, as the material's (see `Material`).
+    (damping_growth · that velocity)^damping_growth_power, 1 or 2; None: a linear body. includes_radiation: of decay_per_s, as the
+    material (see `Material`).
     A body without audible modes has m = 0; a plane has v = f = 0 besides.
     """
 
@@ -249,6 +251,12 @@ class ModalModel:
     def omega0_squared_per_s2(self) -> Array:
         """Eigenvalues λ = ω² + d² (m,), of the undamped body [Ren et al. 2013, eq. 7]; NaN decays count as zero."""
         return np.asarray((2 * np.pi * self.freq_hz) ** 2 + np.nan_to_num(self.decay_per_s) ** 2)
+
+    @property
+    def choke_s_m(self) -> Array | None:
+        """Former name of `damping_growth_s_m`."""
+        warnings.warn("ModalModel.choke_s_m is now damping_growth_s_m", DeprecationWarning, stacklevel=2)
+        return self.damping_growth_s_m
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -82,7 +82,7 @@ class Step:
 
     position_m (b, 3), quaternion_xyzw (b, 4): body frames in the world; a removed body keeps its last pose.
     teleported (b,): True where the body was moved by hand since the previous step. gravity_m_s2 (3,): world frame; what falls for one
-    step gains that speed, which is no blow (see synth.strikes).
+    step gains that speed, which is no impact (see synth.strikes).
     """
 
     dt_s: float

@@ -1,6 +1,7 @@
 """Forces become sound: the synthesizer of live steps, and the replay of a contact log.
 
-silence: why there is none | clock: which samples a step covers | sounder: a body as it is played | blows: strikes | rubbing: rolling and sliding | beside: residuals | synthesizer: all together
+silence: why there is none | clock: which samples a step covers | resonator: a body as it is played | impacts: strikes
+friction_voice: rolling and sliding | residual_voice: residuals | synthesizer: all together
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ def render_log(
     progress: Callable[[float], None] | None = None,
     say: Callable[[str], None] | None = None,
 ) -> Array:
-    """The sound of a contact log, (channels, floor(sr·time)) in pascals; with the log's own rate the same bits as were heard live.
+    """The sound of a contact log, (channels, floor(sr·time)) in pascals; with the log's own rate the same bits as live.
 
     residual False: without what materials sound beside their modes. progress is told the share done, say
     what is being computed before the first step. Raises AudioError for a rate that cannot be, LogError for what is no log.

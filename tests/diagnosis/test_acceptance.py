@@ -13,7 +13,7 @@ from sonic_bullet.effects.radiation import Radiation
 
 
 def candidate(*drop_db: float, null_db: float = 0.0) -> Candidate:
-    return Candidate("radiation", None, None, np.array(drop_db), float(np.mean(drop_db)), null_db, {})  # type: ignore[arg-type]
+    return Candidate("radiation", Radiation(0.1, 1.0), None, np.array(drop_db), float(np.mean(drop_db)), null_db, {})  # type: ignore[arg-type]
 
 
 def test_less_will_do_where_it_is_most_of_what_is_open() -> None:

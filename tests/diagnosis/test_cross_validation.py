@@ -23,11 +23,11 @@ from sonic_bullet.diagnosis.selection.cross_validation import KEPT, _folds, tria
 from sonic_bullet.effects import EFFECTS
 from sonic_bullet.effects.amplitude_damping import AmplitudeDamping
 from sonic_bullet.effects.orthotropy import Orthotropy
-from sonic_bullet.effects.protocol import Evidence, Owner, Sound, Stage
+from sonic_bullet.effects.protocol import Cost, Evidence, Owner, Sound, Stage, Traits
 from sonic_bullet.effects.radiation import Radiation
 from sonic_bullet.effects.room import Room
 from sonic_bullet.effects.support_damping import SupportDamping
-from sonic_bullet.effects.support_damping.dashpot_fit import Trial
+from sonic_bullet.effects.support_damping.dashpot_fit import DashpotFit
 from sonic_bullet.effects.support_damping.support_subsets import _best, subsets
 from sonic_bullet.records import ModalModel
 from tests.diagnosis.test_found_again import BAND, fitted
@@ -43,12 +43,13 @@ def test_what_is_no_number_is_null_in_json() -> None:
 
 @dataclass(frozen=True)
 class Idle:
-    """Does nothing, under a name that has corrections learnt again."""
+    """Does nothing, and says that it moves modes, so that corrections are learnt again."""
 
     id: ClassVar[str] = "mode-splitting"
     stage: ClassVar[Stage] = Stage.MODES
     owner: ClassVar[Owner] = Owner.OBJECT
     reference: ClassVar[str] = "none"
+    traits: ClassVar[Traits] = Traits(moves_modes=True)
 
     def apply(self, x: ModalModel) -> ModalModel:
         return x
@@ -87,6 +88,7 @@ def test_what_could_not_earn_its_keep_any_more_is_asked_no_further(spoils: tuple
     class Mutes(Idle):
         id: ClassVar[str] = "mutes"
         stage: ClassVar[Stage] = Stage.SOUND
+        traits: ClassVar[Traits] = Traits()
 
         def apply(self, x: Sound) -> Sound:
             return replace(x, sample=0.01 * x.sample) if x.strike in spoils else x
@@ -147,7 +149,7 @@ def test_three_weak_dashpots_are_told_together() -> None:
     """A thirtieth of the decays, where a law is good to a two-hundredth: no one says half of it, all three do."""
     fixture = SupportDamping(WEAK, (0.15, 0.1, 0.12))
     body = recorded(fixture, noise=2e-6)
-    trial = Trial.of(evidence_of(fitted(body), (body,), BAND).observed[0])
+    trial = DashpotFit.of(evidence_of(fitted(body), (body,), BAND).observed[0])
     grid = np.unique(trial.model.face)
     found = subsets(trial, grid[::7], 2)
     assert [len(s) for s in found] == [1, 1, 2, 2, 3, 3]
@@ -170,7 +172,7 @@ def test_trials_tell_what_has_numbers_of_single_lines_all_lines(monkeypatch: pyt
 
     class Listens(Idle):
         id: ClassVar[str] = "listens"
-        by_line: ClassVar[bool] = True
+        traits: ClassVar[Traits] = Traits(by_line=True)
         stage: ClassVar[Stage] = Stage.FORCE
 
         @classmethod
@@ -180,11 +182,11 @@ def test_trials_tell_what_has_numbers_of_single_lines_all_lines(monkeypatch: pyt
 
     class Part(Listens):
         id: ClassVar[str] = "part"
-        by_line: ClassVar[bool] = False
+        traits: ClassVar[Traits] = Traits()
 
     class Searches(Listens):
         id: ClassVar[str] = "searches"
-        searches: ClassVar[bool] = True
+        traits: ClassVar[Traits] = Traits(by_line=True, cost=Cost.SEARCHES)
 
     told = evidence_of(h, (body,), BAND)
     count = len(told.observed[0].freq_hz)
@@ -206,7 +208,7 @@ def test_in_a_room_dashpots_wait_for_a_tensor(dry: bool, costly: bool, asked: li
 
     class Dashpots(Idle):
         id: ClassVar[str] = "support-damping"
-        searches: ClassVar[bool] = True
+        traits: ClassVar[Traits] = SupportDamping.traits
 
         @classmethod
         def propose(cls, evidence: Evidence) -> Self | None:
@@ -216,7 +218,7 @@ def test_in_a_room_dashpots_wait_for_a_tensor(dry: bool, costly: bool, asked: li
     class Tensor(Idle):
         id: ClassVar[str] = "tensor"
         stage: ClassVar[Stage] = Stage.MATERIAL
-        costly: ClassVar[bool] = True
+        traits: ClassVar[Traits] = Traits(cost=Cost.COSTLY)
 
         @classmethod
         def propose(cls, evidence: Evidence) -> Self | None:

@@ -112,17 +112,16 @@ def test_a_planted_effect_is_named(number: int) -> None:
 
 
 def test_a_suspect_of_somebody_else_is_tried_and_named() -> None:
-    """The example of docs/diagnosis.md, run as it stands."""
-    source = re.findall(r"```python\n(.*?)```", (Path(__file__).parents[2] / "docs" / "diagnosis.md").read_text(), re.S)[0]
+    """The example of docs/how-to/add-an-effect.md, run as it stands."""
+    source = re.findall(r"```python\n(.*?)```", (Path(__file__).parents[2] / "docs" / "how-to" / "add-an-effect.md").read_text(), re.S)[0]
     theirs = ModuleType("theirs")
     sys.modules["theirs"] = theirs  # dataclasses look their module up
-    exec(compile(source, "docs/diagnosis.md", "exec"), theirs.__dict__)
-    assert isinstance(theirs.SquareLaw(1.0), Effect)
+    exec(compile(source, "docs/how-to/add-an-effect.md", "exec"), theirs.__dict__)
     body = recorded(theirs.SquareLaw(20.0), seconds=0.5)
     end = closed(fitted(body), (body,), takes_of((body,)), (DampingLaw, ForeignMode, theirs.SquareLaw), BAND)
     assert [c.id for c in end.added] == ["square-law"]
     assert end.added[0].effect.parameters()["q"] == pytest.approx(20.0, rel=0.05)
-    assert set(EFFECTS) < set(theirs.suspects)
+    assert set(EFFECTS) < set(theirs.effects)
 
 
 def test_proposals_depend_on_the_evidence_alone() -> None:

@@ -69,7 +69,7 @@ def test_damping_says_what_it_includes(tmp_path: Path, more: dict[str, Any], med
 
 def test_a_diagnosis_counts_radiation_once(tmp_path: Path) -> None:
     from sonic_bullet.estimator.fit.material_fit import fit_evidence
-    from sonic_bullet.estimator.fit.observed import gather
+    from sonic_bullet.estimator.fit.recorded import gather
 
     def kept(found: Any, *effects: Any) -> bool:
         after = Hypothesis(found.fit.alpha_per_s, found.fit.beta_s, 1.0, effects)

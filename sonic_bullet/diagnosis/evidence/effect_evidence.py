@@ -12,11 +12,11 @@ from dataclasses import replace
 import numpy as np
 
 from sonic_bullet.diagnosis.evidence.amplitude_dependence import fallen
-from sonic_bullet.diagnosis.prediction.hypothesis import RINGS_BESIDE_BODY, Hypothesis, impact_of, in_band, modes_of, moves, pattern, play, start
+from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, impact_of, in_band, modes_of, moves, pattern, play, start
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
-from sonic_bullet.effects.protocol import Evidence, ObjectEvidence, Sound, Stage
-from sonic_bullet.estimator.fit.observed import Evidence as Recorded
+from sonic_bullet.effects.protocol import Dereverberates, Evidence, ObjectEvidence, RingsAlong, Sound, Stage
 from sonic_bullet.estimator.fit.pairing import DEGENERATE
+from sonic_bullet.estimator.fit.recorded import RecordedObject as Recorded
 from sonic_bullet.estimator.lines.joint_lines import Lines, noise_rms
 from sonic_bullet.records import Array, ModalModel
 
@@ -104,15 +104,14 @@ def _played(h: Hypothesis, body: Struck, strikes: list[int], signals: Array) -> 
         assert body.recorded is not None
         return np.stack([play(one, body, i, signals.shape[1], body.recorded.sr) for i in strikes])
 
-    all_of_it, rest = played(h), tuple(e for e in h.effects if e.id not in RINGS_BESIDE_BODY)
+    all_of_it, rest = played(h), tuple(e for e in h.effects if not isinstance(e, RingsAlong))
     return all_of_it, None if len(rest) == len(h.effects) else signals - (all_of_it - played(replace(h, effects=rest)))
 
 
 def named(h: Hypothesis, lines: Lines) -> Array:
     """Which lines (l,), one of each mode, are nearest to what the hypothesis knows to ring beside the body: nobody else is told of these."""
-    freq, decay = (
-        np.concatenate([np.array(getattr(e, name)) for e in h.effects if e.id in RINGS_BESIDE_BODY] or [np.zeros(0)]) for name in ("freq_hz", "decay_per_s")
-    )
+    beside = [np.array(e.lines(), float) for e in h.effects if isinstance(e, RingsAlong)]
+    freq, decay = np.concatenate(beside, axis=1) if beside else np.zeros((2, 0))
     off, own = np.abs(lines.freq_hz[:, None] - freq), np.maximum(np.nan_to_num(lines.decay_per_s), 0.0)[:, None]
     alike = (off < decay / (2 * np.pi) + OWN * freq) & (np.maximum(own, decay) <= ALIKE * np.minimum(own, decay))
     off = np.where(alike, off, np.inf)
@@ -122,7 +121,7 @@ def named(h: Hypothesis, lines: Lines) -> Array:
 def outside(h: Hypothesis, observed: ObjectEvidence) -> ObjectEvidence:
     """The evidence with its lines as they would be outside the room that the hypothesis has found."""
     for effect in h.effects:
-        if hasattr(effect, "dereverberated"):
+        if isinstance(effect, Dereverberates):
             observed = effect.dereverberated(observed)
     return observed
 
@@ -169,7 +168,7 @@ def _nearest(body: Struck, model: ModalModel, known: Array) -> tuple[Array, tupl
 
 def path_response(h: Hypothesis, body: Struck, freq_hz: Array, sr: int) -> Array:
     """Complex response (f,) of the sound path's first milliseconds: its effects applied to a weak impulse less what they add to silence."""
-    effects = [e for e in h.at(Stage.SOUND, fitted=body.recorded is not None) if not hasattr(e, "dereverberated")]  # lines are told as without those
+    effects = [e for e in h.at(Stage.SOUND, fitted=body.recorded is not None) if not isinstance(e, Dereverberates)]  # lines are told as without those
     if not effects:
         return np.ones(len(freq_hz), complex)
     n = round(DIRECT_S * sr)

@@ -18,7 +18,7 @@ from sonic_bullet.diagnosis.evidence.small_amplitude import at_rest
 from sonic_bullet.diagnosis.evidence.unmatched_modes import CORRECTION, can_tell, sought
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, bends, modes_of, moves, pattern, play, undamped
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
-from sonic_bullet.effects.protocol import Effect, Impact, ObjectEvidence, Stage
+from sonic_bullet.effects.protocol import BaselineChange, ChangesBaseline, Dereverberates, Effect, Impact, ObjectEvidence, SplitsPairs, Stage
 from sonic_bullet.estimator.fit.pairing import DEGENERATE, MESHED
 from sonic_bullet.estimator.fit.rayleigh import rayleigh
 from sonic_bullet.estimator.lines.joint_lines import noise_rms
@@ -55,7 +55,7 @@ def reidentified(h: Hypothesis, bodies: tuple[Struck, ...], observed: tuple[Obje
     if not fitted:
         return h
     body = max(fitted, key=lambda b: len(np.unique(b.line[b.line >= 0])))  # most lines that are modes
-    for room in (e for e in h.effects if hasattr(e, "identified_from")):
+    for room in (e for e in h.effects if isinstance(e, Dereverberates)):
         g = body.recorded
         assert g is not None and g.signals is not None
         mine = list(range(len(g.signals))) if observed is None else next(list(one.strike) for one in observed if one.source is g)
@@ -65,6 +65,11 @@ def reidentified(h: Hypothesis, bodies: tuple[Struck, ...], observed: tuple[Obje
         again = room.identified_from(signal, sound, noise_rms(signal, g.sr), g.sr, fully=fully)
         h = replace(h, effects=tuple(again if e is room else e for e in h.effects))
     return h
+
+
+def baseline_changes(h: Hypothesis) -> list[BaselineChange]:
+    """What its effects have found of the baseline's own numbers, in their order."""
+    return [e.baseline_change() for e in h.effects if isinstance(e, ChangesBaseline)]
 
 
 def _whose(one: ObjectEvidence, bodies: tuple[Struck, ...]) -> Struck:
@@ -80,8 +85,9 @@ def with_effects(h: Hypothesis, effects: tuple[Effect, ...], bodies: tuple[Struc
 
 def corrected(h: Hypothesis, bodies: tuple[Struck, ...], *, anew: bool = False) -> Hypothesis:
     """The hypothesis with E/ρ and corrections learnt on its own modes, from where its effects have found E/ρ and ν (``stretch``, ``poisson_ratio``). anew: see refitted."""
-    told = [e.poisson_ratio for e in h.effects if getattr(e, "poisson_ratio", None) is not None]  # type: ignore[attr-defined]
-    h = replace(h, correction=None, stretch=float(sum(getattr(e, "stretch", 0.0) for e in h.effects)), poisson=told[-1] if told else None)
+    changes = baseline_changes(h)
+    known = [c.poisson_ratio for c in changes if c.poisson_ratio is not None]
+    h = replace(h, correction=None, stretch=float(sum(c.stretch for c in changes)), poisson=known[-1] if known else None)
     for _ in range(3):
         off = np.concatenate([_off(h, body, anew)[1] for body in bodies if body.recorded is not None] or [np.zeros(0)])
         if len(off):
@@ -90,7 +96,7 @@ def corrected(h: Hypothesis, bodies: tuple[Struck, ...], *, anew: bool = False) 
     for body in bodies:
         if body.recorded is None:
             continue
-        for e in (e for e in h.effects if hasattr(e, "observed_correction")):  # lines of twins go to their own: half a split off, either would do
+        for e in (e for e in h.effects if isinstance(e, SplitsPairs)):  # lines of twins go to their own: half a split off, either would do
             found[body.name] = np.clip(e.observed_correction(undamped(h, body).freq_hz * np.exp(h.stretch)), -CORRECTION, CORRECTION)
         for _ in range(2):
             place, off = _off(replace(h, correction=found), body, anew)
@@ -98,7 +104,7 @@ def corrected(h: Hypothesis, bodies: tuple[Struck, ...], *, anew: bool = False) 
             step = np.zeros(len(ratio))
             step[place] = np.expm1(off)
             found[body.name] = np.clip((1 + ratio) * (1 + step) - 1, -CORRECTION, CORRECTION)
-            if not moves(h) or any(e.id == "mode-splitting" for e in h.effects):
+            if not moves(h) or any(isinstance(e, SplitsPairs) for e in h.effects):
                 found[body.name] = _alike(undamped(h, body).freq_hz, found[body.name])
         if can_tell(body):
             now = replace(h, correction=found)
@@ -129,11 +135,11 @@ def _off(h: Hypothesis, body: Struck, anew: bool) -> tuple[Array, Array]:
 
 def _damped(h: Hypothesis, bodies: tuple[Struck, ...], observed: tuple[ObjectEvidence, ...]) -> Hypothesis:
     """α and β beside the effects' own decay."""
-    if any(e.id == "damping-law" for e in h.effects):
+    if any(e.traits.replaces_rayleigh for e in h.effects):
         return h
-    told = [(e.alpha_per_s, e.beta_s) for e in h.effects if np.isfinite(getattr(e, "alpha_per_s", np.nan))]  # type: ignore[attr-defined]
-    if told:
-        return replace(h, alpha_per_s=told[-1][0], beta_s=told[-1][1])
+    known = [(c.alpha_per_s, c.beta_s) for c in baseline_changes(h) if c.alpha_per_s is not None and c.beta_s is not None]
+    if known:
+        return replace(h, alpha_per_s=known[-1][0], beta_s=known[-1][1])
     bare = replace(h, alpha_per_s=0.0, beta_s=0.0)
     lam, left, sd, all_of_it = [], [], [], []
     for one in observed:
@@ -190,7 +196,7 @@ def _middle(ratio: Array, weight: Array) -> float:
 
 def _gained(h: Hypothesis, bodies: tuple[Struck, ...], observed: tuple[ObjectEvidence, ...]) -> Hypothesis:
     """σ by the amplitudes, times what effects that hide them from the lines know better."""
-    louder = float(np.prod([getattr(e, "louder", 1.0) for e in h.effects]))
+    louder = float(np.prod([c.onset_gain for c in baseline_changes(h)]))
     told, seen, spread = [], [], []
     for one in observed:
         if not len(one.freq_hz) or one.signal is None:

@@ -15,13 +15,9 @@ import numpy as np
 
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.effects.common.ringing import sounded
-from sonic_bullet.effects.protocol import CARRIES, Effect, Impact, Owner, Ring, Sound, Stage
+from sonic_bullet.effects.protocol import CARRIES, Effect, Impact, Mixing, Owner, Ring, RotatesPairs, Sound, Stage
 from sonic_bullet.records import Array, ModalModel
 
-MOVES = frozenset({"added-mass", "mode-splitting", "orthotropy", "support-damping"})  # effects under which modes are no longer where, or what, they were
-TURNS = frozenset({"support-damping"})  # of those, under which modes mix with their neighbours
-RINGS_BESIDE_BODY = frozenset({"foreign-mode"})  # effects that ring beside the body, and are none of its modes
-LAST = frozenset({"added-mass"})  # of those, under which no mode keeps its own correction
 OWNER_ORDER = tuple(Owner)  # material, object, fixture, striker, room, chain: a sound's
 SAMPLED = 300  # vertices by which modes are told to be alike
 KEPT = 4  # hypotheses and bodies whose modes are remembered
@@ -71,12 +67,17 @@ def undamped(h: Hypothesis, body: Struck) -> ModalModel:
 
 def moves(h: Hypothesis) -> bool:
     """Whether an effect moves modes, so that lines and corrections are told anew."""
-    return any(e.stage is Stage.MATERIAL or e.id in MOVES for e in h.effects)
+    return any(e.stage is Stage.MATERIAL or e.traits.moves_modes for e in h.effects)
 
 
 def moves_itself(h: Hypothesis, effect: Effect) -> bool:
     """Whether an effect moves modes, whatever the others do."""
     return moves(replace(h, effects=(effect,)))
+
+
+def mixes_neighbours(effect: Effect | type[Effect]) -> bool:
+    """Whether modes take on their neighbours' shapes under it."""
+    return effect.traits.mixing is Mixing.NEIGHBOURS
 
 
 def bends(h: Hypothesis) -> bool:
@@ -86,7 +87,7 @@ def bends(h: Hypothesis) -> bool:
 
 def mixes(h: Hypothesis) -> bool:
     """Whether an effect makes all modes anew out of the old ones."""
-    return any(e.id in LAST for e in h.effects)
+    return any(e.traits.mixing is Mixing.ALL for e in h.effects)
 
 
 @lru_cache(maxsize=KEPT)
@@ -108,10 +109,10 @@ def modes_of(h: Hypothesis, body: Struck) -> tuple[ModalModel, Array]:
         h.at(Stage.MODES, fitted=body.recorded is not None), key=lambda e: e.owner is not Owner.MATERIAL
     ):  # a law of the material is no fixture's
         before, model = model, effect.apply(model)
-        if effect.id in TURNS:
+        if effect.traits.mixing is Mixing.NEIGHBOURS:
             order = order[came_from(before, model)]
     for effect in h.at(Stage.BANK, fitted=body.recorded is not None):
-        if hasattr(effect, "turned"):  # axes of twins
+        if isinstance(effect, RotatesPairs):  # axes of twins
             model = effect.turned(model)
     return ordered(model, model.freq_hz * (1 + correction[: model.mode_count]), model.decay_per_s) if last else (model, order)
 

@@ -52,7 +52,7 @@ class Candidate:
     @property
     def certain(self) -> bool:
         """Whether its lines are sure of it (see needed)."""
-        return getattr(self.effect, "certain", False)
+        return self.effect.traits.certain
 
     @property
     def loud(self) -> bool:

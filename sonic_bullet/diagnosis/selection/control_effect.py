@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from sonic_bullet.effects.protocol import Evidence, Owner, Stage
+from sonic_bullet.effects.protocol import Evidence, Owner, Stage, Traits
 from sonic_bullet.records import ModalModel
 
 
@@ -22,6 +22,7 @@ class Null:
     stage: ClassVar[Stage] = Stage.MODES
     owner: ClassVar[Owner] = Owner.FIXTURE  # after whatever acts on modes, as a suspect may
     reference: ClassVar[str] = "a control, not physics"
+    traits: ClassVar[Traits] = Traits()
 
     amount: tuple[float, ...]
     seed: int

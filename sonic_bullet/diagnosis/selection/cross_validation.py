@@ -20,15 +20,15 @@ import numpy as np
 from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of, thinned
 from sonic_bullet.diagnosis.evidence.refit import refitted, reidentified
 from sonic_bullet.diagnosis.evidence.small_amplitude import at_rest
-from sonic_bullet.diagnosis.prediction.hypothesis import TURNS, Hypothesis, bends, moves
+from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, bends, mixes_neighbours, moves
 from sonic_bullet.diagnosis.prediction.line_score import Listed
 from sonic_bullet.diagnosis.prediction.score import Comparable, Judged, Take
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.diagnosis.selection.acceptance import Candidate, earns, jackknife, may_earn, mean
 from sonic_bullet.diagnosis.selection.control_effect import Null
 from sonic_bullet.diagnosis.selection.decay_test import likelier, tells
-from sonic_bullet.effects.protocol import Effect, Evidence, Stage
-from sonic_bullet.parallel import side_by_side
+from sonic_bullet.effects.protocol import Cost, Dereverberates, Effect, Evidence, RotatesPairs, Stage
+from sonic_bullet.parallel import parallel_map
 
 KEPT = 0.75  # of the lines, in every fold
 DRAWS = 2  # of the null effect
@@ -63,15 +63,15 @@ def trials(
     gap = mean([f.before - f.noise for f in folds])
     idle = not costly and len(evidence.found) >= ENOUGH
     dry = any(one.dry for one in evidence.observed)
-    kinds = [kind for kind in effects if kind.id not in evidence.found and not (idle and getattr(kind, "searches", False))]
-    for group in _groups(kinds, last=TURNS if dry and costly else frozenset()):
-        if any(hasattr(c.effect, "dereverberated") and earns(c, gap, first=not evidence.found) for c in found):
+    kinds = [kind for kind in effects if kind.id not in evidence.found and not (idle and kind.traits.cost is Cost.SEARCHES)]
+    for group in _groups(kinds, late=dry and costly):
+        if any(isinstance(c.effect, Dereverberates) and earns(c, gap, first=not evidence.found) for c in found):
             break  # what others say of lines that a room has made is hearsay: in the next round they are told dry
-        if dry and group[0].id in TURNS and len(kinds) > len(group) and any(c.effect.stage is Stage.MATERIAL for c in found):
+        if dry and mixes_neighbours(group[0]) and len(kinds) > len(group) and any(c.effect.stage is Stage.MATERIAL for c in found):
             continue  # lines that were paired with another material's modes tell little of what mixes these
-        if getattr(group[0], "costly", False) and (not costly or any(c.mean_db > PLAIN * gap for c in found)):
+        if group[0].traits.cost is Cost.COSTLY and (not costly or any(c.mean_db > PLAIN * gap for c in found)):
             continue  # something cheap says most of it: what is left may ask for more in the next round
-        if getattr(group[0], "costly", False):
+        if group[0].traits.cost is Cost.COSTLY:
             say(f"searching for {group[0].id}")
         proposed = _proposed(group, evidence)
         for kind in group:
@@ -79,7 +79,7 @@ def trials(
                 continue
             say(f"trying {kind.id}")
             alone = replace(h, effects=(whole,))
-            by_line = bool(getattr(kind, "by_line", False))
+            by_line = kind.traits.by_line
             plain = whole_lines() if by_line else folds
             known = fair(by_line) if moves(alone) and not moves(h) else still(by_line) if bends(alone) and not bends(h) else plain
             found.append(_tried(kind, whole, h, bodies, evidence, known))
@@ -88,19 +88,20 @@ def trials(
 
 def _proposed(group: list[type[Effect]], evidence: Evidence) -> dict[type[Effect], Effect | None]:
     """What each makes of the evidence; one that searches side by side would only do so in turn beside others."""
-    rest = [kind for kind in group if not getattr(kind, "searches", False)]
+    rest = [kind for kind in group if kind.traits.cost is not Cost.SEARCHES]
     return {kind: kind.propose(evidence) for kind in group if kind not in rest} | dict(
-        zip(rest, side_by_side(lambda kind: kind.propose(evidence), rest), strict=True)
+        zip(rest, parallel_map(lambda kind: kind.propose(evidence), rest), strict=True)
     )
 
 
-def _groups(kinds: list[type[Effect]], last: frozenset[str]) -> list[list[type[Effect]]]:
+def _groups(kinds: list[type[Effect]], *, late: bool) -> list[list[type[Effect]]]:
     """Rooms, whose echoes others would be told of; what is cheap; and what takes long, one by one; then those that come last."""
-    rooms = [k for k in kinds if hasattr(k, "dereverberated")]
-    late = [k for k in kinds if k.id in last]
-    dear = [k for k in kinds if k not in rooms + late and getattr(k, "costly", False)]
-    plain = [k for k in kinds if k not in rooms + late + dear]
-    return [group for group in (rooms, plain, *([k] for k in (*dear, *late))) if group]
+    rooms: list[type[Effect]] = [k for k in kinds if issubclass(k, Dereverberates)]
+    last = [k for k in kinds if late and mixes_neighbours(k)]
+    dear = [k for k in kinds if k not in rooms + last and k.traits.cost is Cost.COSTLY]
+    plain = [k for k in kinds if k not in rooms + last + dear]
+    alone: list[list[type[Effect]]] = [[k] for k in (*dear, *last)]
+    return [group for group in (rooms, plain, *alone) if group]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -173,7 +174,7 @@ def _tried(kind: type[Effect], whole: Effect, h: Hypothesis, bodies: tuple[Struc
         effect = kind.propose(replace(less, known=whole, on_trial=True))
         if effect is None:
             return Gain()
-        free = effect.freedom() - (len(getattr(effect, "turn_rad", ())) if hasattr(effect, "turned") else 0)  # such axes are whole's (Evidence.on_trial)
+        free = effect.freedom() - (effect.angles() if isinstance(effect, RotatesPairs) else 0)  # such axes are whole's (Evidence.on_trial)
         random = [Null.fitted(less, min(free, 8), 10 * i + draw) for draw in range(DRAWS)]
         beside = _beside(fold, effect)
         after = fold.take.distance(beside)
@@ -181,12 +182,12 @@ def _tried(kind: type[Effect], whole: Effect, h: Hypothesis, bodies: tuple[Struc
         lines = likelier(fold.base, beside, evidence, less, bodies) if isinstance(fold.take, Take) and tells(h, effect) else 0.0
         return Gain(effect, fold.least - after, fold.before - after, chance, lines)
 
-    found = side_by_side(judged, range(min(FIRST, len(folds))))
+    found = parallel_map(judged, range(min(FIRST, len(folds))))
     asked = Candidate(kind.id, whole, h, np.array([g.drop_db for g in found]), 0.0, 0.0, {}, impulse_n_s=_levels(folds))
     if may_earn(asked, np.array([f.least - f.noise for f in folds]), mean([f.before - f.noise for f in folds])) or tells(
         h, whole
     ):  # lines may speak for what strikes do not
-        found += side_by_side(judged, range(len(found), len(folds)))
+        found += parallel_map(judged, range(len(found), len(folds)))
     added = refitted(replace(h, effects=(*h.effects, whole)), bodies, evidence.observed)
     drop, whole_db, null_db = np.array([g.drop_db for g in found]), mean([g.whole_db for g in found]), mean([x for g in found for x in g.null_db])
     lines = mean([g.lines for g in found]) / (1 - KEPT)  # each line is left out in so many of the folds
@@ -204,4 +205,4 @@ def _beside(fold: Fold, effect: Effect) -> Hypothesis:
     if isinstance(fold.take, Listed):
         return refitted(h, fold.bodies)
     fitted = refitted(h, fold.bodies, fold.evidence.observed)
-    return reidentified(fitted, fold.bodies, fold.evidence.observed) if hasattr(effect, "identified_from") else fitted
+    return reidentified(fitted, fold.bodies, fold.evidence.observed) if isinstance(effect, Dereverberates) else fitted

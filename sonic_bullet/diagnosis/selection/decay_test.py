@@ -12,7 +12,7 @@ import numpy as np
 
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, modes_of, moves_itself
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
-from sonic_bullet.effects.protocol import Effect, Evidence, ObjectEvidence, Stage
+from sonic_bullet.effects.protocol import Dereverberates, Effect, Evidence, ObjectEvidence, Stage
 from sonic_bullet.records import Array
 
 SCATTER = 0.02  # of a decay about its law, relative
@@ -26,12 +26,12 @@ def of_decays(h: Hypothesis, effect: Effect) -> bool:
 
 def numbers(effect: Effect) -> int:
     """How many more a model has with an effect than without: a law in Rayleigh's place takes α and β away."""
-    return effect.freedom() - 2 * (effect.id == "damping-law")
+    return effect.freedom() - 2 * effect.traits.replaces_rayleigh
 
 
 def tells(h: Hypothesis, effect: Effect) -> bool:
     """Whether lines are asked instead of strikes: of what changes decays, beside a room."""
-    return any(hasattr(e, "dereverberated") for e in h.effects) and of_decays(h, effect)
+    return any(isinstance(e, Dereverberates) for e in h.effects) and of_decays(h, effect)
 
 
 def misfit(h: Hypothesis, effect: Effect, evidence: Evidence, bodies: tuple[Struck, ...]) -> float:

@@ -22,8 +22,8 @@ from sonic_bullet.diagnosis.selection.acceptance import MANY, STANDARD_ERRORS, C
 from sonic_bullet.diagnosis.selection.decay_test import misfit, of_decays
 from sonic_bullet.diagnosis.selection.phase_test import HINT, NEARLY
 from sonic_bullet.diagnosis.selection.phase_test import misfit as phases
-from sonic_bullet.effects.protocol import Effect, Evidence
-from sonic_bullet.parallel import side_by_side
+from sonic_bullet.effects.protocol import Alternatives, Dereverberates, Effect, Evidence
+from sonic_bullet.parallel import parallel_map
 from sonic_bullet.records import Array
 
 TURNS = 2
@@ -63,7 +63,7 @@ def starts(h: Hypothesis, bodies: tuple[Struck, ...], band_hz: tuple[float, floa
     """
     found = [h]
     for i, effect in enumerate(h.effects):
-        for other in getattr(effect, "others", tuple)():
+        for other in effect.others() if isinstance(effect, Alternatives) else ():
             start = replace(h, effects=(*h.effects[:i], other, *h.effects[i + 1 :]))
             for j in range(len(h.effects)):
                 start = again(start, j, bodies, band_hz, afresh=True) if j != i else start
@@ -73,7 +73,7 @@ def starts(h: Hypothesis, bodies: tuple[Struck, ...], band_hz: tuple[float, floa
 
 def settled(h: Hypothesis, bodies: tuple[Struck, ...], takes: Comparable, band_hz: tuple[float, float]) -> Hypothesis:
     """The best of `together` from all starts by the fitted strikes; as many numbers each."""
-    ends = side_by_side(lambda start: together(start, bodies, band_hz), starts(h, bodies, band_hz))
+    ends = parallel_map(lambda start: together(start, bodies, band_hz), starts(h, bodies, band_hz))
     return min(ends, key=lambda end: mean_db(takes, end))
 
 
@@ -96,7 +96,7 @@ def left_out_db(h: Hypothesis, i: int, bodies: tuple[Struck, ...], takes: Compar
         place = take.place
         return lambda told: thinned(told, place, 1.0, np.random.default_rng(0))
 
-    return np.array(side_by_side(lambda take: take.distance(again(h, i, bodies, band_hz, less=without(take))), takes))
+    return np.array(parallel_map(lambda take: take.distance(again(h, i, bodies, band_hz, less=without(take))), takes))
 
 
 def exchanged(
@@ -151,7 +151,7 @@ def phases_against(best: Hypothesis, other: Hypothesis, bodies: tuple[Struck, ..
 
     Phases are held against lines as they were fitted; of several hits they say nothing, and beside a room lines are others.
     """
-    dry = [any(hasattr(e, "dereverberated") for e in h.effects) for h in (best, other)]
+    dry = [any(isinstance(e, Dereverberates) for e in h.effects) for h in (best, other)]
     if moves(best) or moves(other) or dry[0] != dry[1]:
         return False
     mine, its = phases(best, bodies), phases(other, bodies)

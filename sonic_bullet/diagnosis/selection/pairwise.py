@@ -18,7 +18,7 @@ import numpy as np
 
 from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of
 from sonic_bullet.diagnosis.evidence.refit import refitted, reidentified, with_effects
-from sonic_bullet.diagnosis.prediction.hypothesis import TURNS, Hypothesis, moves, moves_itself
+from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, mixes_neighbours, moves, moves_itself
 from sonic_bullet.diagnosis.prediction.score import Comparable, Take, least_db, mean_db
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.diagnosis.selection.acceptance import Candidate, earns
@@ -26,7 +26,8 @@ from sonic_bullet.diagnosis.selection.cross_validation import trials
 from sonic_bullet.diagnosis.selection.exchange import again
 from sonic_bullet.diagnosis.selection.phase_test import CLEAR, NEARLY, misfit
 from sonic_bullet.diagnosis.selection.simplest import helps
-from sonic_bullet.parallel import side_by_side
+from sonic_bullet.effects.protocol import Dereverberates
+from sonic_bullet.parallel import parallel_map
 
 LEFT = 0.25  # of the gap: two at once are twice as many choices, so they must say more than one after another
 
@@ -65,7 +66,7 @@ def pairwise(
                 found.append(Two(h, mean_db(takes, h)))
         return found
 
-    pairs = [two for some in side_by_side(beside, first) for two in some]
+    pairs = [two for some in parallel_map(beside, first) for two in some]
     floor = least_db(takes, start)
     gap = mean_db(takes, start) - floor
     if not pairs or min(two.db for two in pairs) - floor > LEFT * gap:
@@ -91,7 +92,7 @@ def in_a_room(
     Outside the room lines lie where they lie, and tell of masses and tensors. But a response told from modes that lie elsewhere plays what these lack, so that every
     other set of modes sounds worse with it: the suspect is tried with a response of its own.
     """
-    rooms = [e for e in h.effects if hasattr(e, "identified_from")]
+    rooms = [e for e in h.effects if isinstance(e, Dereverberates)]
     movers = [c for c in found if moves_itself(h, c.effect)]
     if len(rooms) != 1 or len(h.effects) != 1 or not movers or not all(isinstance(t, Take) for t in takes):
         return None
@@ -107,8 +108,11 @@ def in_a_room(
         return Two(two, mean_db(takes, two))
 
     floor, left = least_db(takes, h), mean_db(takes, reidentified(h, bodies, fully=True))
-    for some in ([c for c in movers if c.id not in TURNS], [c for c in movers if c.id in TURNS]):  # what hardly moves modes is asked where nothing else will do
-        best = min((two for two in side_by_side(beside, some) if two is not None), key=lambda two: two.db, default=None)
+    for some in (
+        [c for c in movers if not mixes_neighbours(c.effect)],
+        [c for c in movers if mixes_neighbours(c.effect)],
+    ):  # what hardly moves modes is asked where nothing else will do
+        best = min((two for two in parallel_map(beside, some) if two is not None), key=lambda two: two.db, default=None)
         if best is not None and best.db - floor <= LEFT * (left - floor):
             break
     else:

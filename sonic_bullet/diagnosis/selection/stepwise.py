@@ -15,7 +15,7 @@ from typing import Any, ClassVar
 from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of
 from sonic_bullet.diagnosis.evidence.mesh_limits import beyond, of_the_mesh
 from sonic_bullet.diagnosis.evidence.refit import refitted, reidentified
-from sonic_bullet.diagnosis.prediction.hypothesis import TURNS, Hypothesis, moves_itself
+from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, mixes_neighbours, moves_itself
 from sonic_bullet.diagnosis.prediction.score import Comparable, Compared, Incomparable, Judged, LeftOut, comparable, least_db, mean_db
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.diagnosis.selection.acceptance import FAINT_DB, LEAST_DB, Candidate, earns
@@ -25,7 +25,7 @@ from sonic_bullet.diagnosis.selection.cross_validation import trials
 from sonic_bullet.diagnosis.selection.exchange import chosen, exchanged, rivals
 from sonic_bullet.diagnosis.selection.pairwise import in_a_room, pairwise
 from sonic_bullet.diagnosis.selection.simplest import by_lines, helps, pruned, simplest
-from sonic_bullet.effects.protocol import Effect, Evidence, Stage
+from sonic_bullet.effects.protocol import Alternatives, Dereverberates, Effect, Evidence, Stage
 
 ROUNDS = 4
 SUFFICES_DB = 1.5  # a gap below this is the mesh's and the shapes' own
@@ -185,9 +185,9 @@ def _one_by_one(
             break
         best = simplest(able, bodies, evidence)
         h, added, passed = best.hypothesis, [*added, best], [*passed, rivals(able, best)]
-        if hasattr(best.effect, "identified_from") and mean_db(takes, h) > now:
+        if isinstance(best.effect, Dereverberates) and mean_db(takes, h) > now:
             h = reidentified(h, bodies)  # a room's response by lines so far off that it sounds worse than none
-        if len(added) > 1 and any(hasattr(e, "others") for e in h.effects):
+        if len(added) > 1 and any(isinstance(e, Alternatives) for e in h.effects):
             h = chosen(h, bodies, takes, band_hz)  # or a third name is found for what only the other choice would say
         now = mean_db(takes, h)
         floor = least_db(takes, h)
@@ -222,7 +222,7 @@ def _anew(
 def _waited(found: Sequence[Candidate], evidence: Evidence, effects: Sequence[type[Effect]]) -> list[type[Effect]]:
     """The suspects that had to wait in a room for a tensor (trial.py), if that came to nothing."""
     tensor = any(c.effect.stage is Stage.MATERIAL for c in found) and any(one.dry for one in evidence.observed)
-    return [k for k in effects if k.id in TURNS and tensor and k.id not in {c.id for c in found}]
+    return [k for k in effects if mixes_neighbours(k) and tensor and k.id not in {c.id for c in found}]
 
 
 def _verdict(
@@ -233,7 +233,7 @@ def _verdict(
     if not added:
         excused = gap < SUFFICES_DB or (gap < of_the_mesh(h, bodies, takes, seed) and of_no_body(h, takes) < NO_BODY)
         return "none" if excused else "unexplained"
-    room = any(hasattr(e, "identified_from") for e in h.effects)  # whose response takes up what a mesh gets wrong, too: that is no excuse
+    room = any(isinstance(e, Dereverberates) for e in h.effects)  # whose response takes up what a mesh gets wrong, too: that is no excuse
     enough = left <= max((1 - (BY_A_ROOM if room else EXPLAINED)) * gap, SUFFICES_DB) or (not room and left <= of_the_mesh(h, bodies, takes, seed))
     return "explained" if enough else "unexplained"
 

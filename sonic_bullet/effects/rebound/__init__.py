@@ -16,14 +16,17 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from sonic_bullet.effects.common.ringing import direct_as_expected
-from sonic_bullet.effects.protocol import Evidence, Impact, ObjectEvidence, Owner, Stage
+from sonic_bullet.effects.protocol import Evidence, Impact, ObjectEvidence, Owner, Stage, Traits
 from sonic_bullet.effects.rebound.later_hits import EXPONENTS, LEAST, MOST_HITS, SPAN_S, hits_by_strike, second_hit, third_hit
 from sonic_bullet.records import Array
 
 FAINT = 0.02  # of the first hit: weaker ones are not played
 NEAR = 0.03  # of ln t: delays that agree
 HELD = 0.999  # of the energy of what is played again
-MOST, FEW = 0.6, 0.05  # of the strikes show it one by one; of all recordings' energy, that it must say together where fewer do: beating twins hide it
+MOST, FEW = (
+    0.6,
+    0.05,
+)  # of the strikes show it one by one; of all recordings' energy, that it must say together where fewer do: beating degenerate modes hide it
 FADE = 2.0  # nepers over what is looked at
 ALL, CLEARLY, HALF = 0.25, 1.35, 0.5  # of what one hit leaves of all strikes: said by a second one, over the next best exponent, and left by all hits
 APART = 1.3  # loudest over softest strike, for that
@@ -41,6 +44,7 @@ class Rebound:
     stage: ClassVar[Stage] = Stage.FORCE
     owner: ClassVar[Owner] = Owner.STRIKER
     reference: ClassVar[str] = "Goldsmith 1960, ch. 1; Falcon et al. 1998"
+    traits: ClassVar[Traits] = Traits()
 
     gap_s: float
     impulse_n_s: float
@@ -50,7 +54,7 @@ class Rebound:
     hits: int = MOST_HITS
 
     def apply(self, x: Impact) -> Impact:
-        """The blow with the effect in it."""
+        """The impact with the effect in it."""
         gap = self.gap_s * (x.impulse_n_s / self.impulse_n_s) ** self.exponent
         ratio = self.restitution if self.shrink is None else self.shrink
         share = self.restitution ** np.arange(self.hits)

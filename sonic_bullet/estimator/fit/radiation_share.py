@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from sonic_bullet.estimator.fit.case_fit import RadiationIn
-from sonic_bullet.estimator.fit.observed import Evidence
 from sonic_bullet.estimator.fit.pairing import Group, grouped
+from sonic_bullet.estimator.fit.recorded import RecordedObject
 from sonic_bullet.files.cases import Case
 from sonic_bullet.modal import read_mesh
 from sonic_bullet.modal.cache import Place
@@ -40,14 +40,14 @@ def nothing(group: Group) -> Radiated:
     return Radiated(np.ones(len(group.freq_hz)), np.zeros(len(group.freq_hz)))
 
 
-def radiation_in(case: Case, evidence: tuple[Evidence, ...]) -> RadiationIn:
+def radiation_in(case: Case, evidence: tuple[RecordedObject, ...]) -> RadiationIn:
     """Whether the material's own damping can be told from what the air takes: nothing is lost to a medium, or it is known, and so are all shapes."""
     if case.medium == "none":
         return "nothing"
     return "apart" if case.medium == "air" and all(e.family is not None for e in evidence) else "damping"
 
 
-def in_air(e: Evidence, log_gamma: float, poisson: float, to_hz: float, apart: bool, cache: Place = "default") -> Radiated | None:
+def in_air(e: RecordedObject, log_gamma: float, poisson: float, to_hz: float, apart: bool, cache: Place = "default") -> Radiated | None:
     """What an object's modes at (γ, ν) and the guess's density, those up to to_hz, radiate; None where neither its sensor nor the fit asks for the air.
 
     apart: radiation is no part of the material's damping. Raises MeshError where its surface cannot be made.

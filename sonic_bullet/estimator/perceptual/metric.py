@@ -3,7 +3,7 @@
     Π = Π_psycho/|Π_MRP|                                                              [Ren, Yeh, Lin 2013, eq. 27]
 
 Π_psycho is divided by its value for silence (image.py), so that Π has no unit and its minimum stays where it was.
-The constants the paper's lost appendix held are the fields of `Constants`; docs/measurements-estimator.md shows what hangs on them.
+The constants the paper's lost appendix held are the fields of `Constants`; docs/measured/estimator.md shows what hangs on them.
 """
 
 from __future__ import annotations
