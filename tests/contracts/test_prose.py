@@ -1,4 +1,4 @@
-"""The documentation keeps its own rules: short sentences, lines that fit, the field's words, links and names that lead somewhere, made pages up to date."""
+"""The documentation keeps its own rules: short sentences, the field's words, links that lead somewhere."""
 
 from __future__ import annotations
 
@@ -198,6 +198,12 @@ def test_every_effect_has_a_page_and_a_picture() -> None:
 @pytest.mark.parametrize("place", ["reference"])
 def test_made_pages_are_up_to_date(place: str) -> None:
     """`make docs` writes them."""
-    done = subprocess.run([sys.executable, str(REPO / "docs" / "make_reference.py"), "--check"], check=False, capture_output=True, text=True, timeout=120)
+    done = subprocess.run(
+        [sys.executable, str(REPO / "docs" / "make_reference.py"), "--check"],
+        check=False,
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
     assert done.returncode == 0, done.stderr
     assert (REPO / "docs" / place / "api.md").is_file()
