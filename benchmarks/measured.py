@@ -22,7 +22,7 @@ from benchmarks.measured_sets.observed import READINGS, reading
 from benchmarks.measured_sets.page import Page, written
 from benchmarks.measured_sets.table import JUDGES, PLAIN
 from benchmarks.measured_sets.values import Judge, Row
-from sonic_bullet.parallel import one_thread, side_by_side
+from sonic_bullet.parallel import one_thread, parallel_map
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -65,7 +65,7 @@ def judged(folder: Path) -> Page | str:
         case = json.loads((folder / "case.json").read_text()) if (folder / "case.json").is_file() else {}
         case.setdefault("set", folder.name)
         judge = JUDGES.get(folder.name, PLAIN)
-        read = side_by_side(lambda number: _rows(judge, folder, case, number), range(READINGS))
+        read = parallel_map(lambda number: _rows(judge, folder, case, number), range(READINGS))
         with one_thread():
             found = judge(folder, case)  # its lines are kept by now
         return Page(folder.name, text, case, replace(found, rows=tuple(r.read_again(read[1:]) for r in found.rows)))

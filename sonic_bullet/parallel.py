@@ -37,7 +37,7 @@ def one_thread() -> Iterator[None]:
         yield
 
 
-def side_by_side(do: Callable[[Item], Made], items: Iterable[Item]) -> list[Made]:
+def parallel_map(do: Callable[[Item], Made], items: Iterable[Item]) -> list[Made]:
     """[do(item) for item in items], on two cores where there are two. ``do`` must not depend on what it did before.
 
     Raises whatever do raises.

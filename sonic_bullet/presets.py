@@ -6,7 +6,7 @@ A file is UTF-8 JSON, format "sonic-bullet-preset/1": name, density_kg_m3, elast
 damping, surface, impact, each group with the `source` of its numbers, an optional `note`, and how far they differ between objects of that
 material: `range`, `range_source`, `spread`. `provenance` says what a fitted preset was
 fitted from, and how sure it is; it changes no sound. `residual` is what the modes do not say (docs/explanation/residual.md), played with every contact. `effects` are what a
-diagnosis found to belong to material or object (sonic_bullet.effects.stored): they sound in every scene.
+diagnosis found to belong to material or object (sonic_bullet.effects.presets_of_effects): they sound in every scene.
 
 Damping is Rayleigh's, d = ½(α + βλ) [Ren, Yeh, Lin 2013, eq. 6]: alpha_per_s and beta_s, or a loss factor η of the handbooks. η = 2d/ω
 independent of frequency is no Rayleigh damping; α and β are the pair that meets it at the two frequencies of `equal_at_hz`
@@ -22,9 +22,10 @@ from __future__ import annotations
 import difflib
 import math
 import os
+import warnings
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import msgspec
 import numpy as np
@@ -80,8 +81,8 @@ class Surface(_Part, frozen=True):
     hurst: Annotated[float, msgspec.Meta(gt=0, lt=1)]
 
 
-class Impact(_Part, frozen=True):
-    """restitution of an impact against a rigid wall."""
+class Restitution(_Part, frozen=True):
+    """restitution of an impact against a rigid wall: the file's group `impact`."""
 
     restitution: Fraction
 
@@ -110,11 +111,21 @@ class Preset(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     elasticity: Elasticity
     damping: Damping
     surface: Surface
-    impact: Impact
+    impact: Restitution
     note: str = ""
     effects: tuple[dict[str, Any], ...] = ()
     residual: ResidualForm | None = None
     provenance: Provenance | None = None
+
+
+if not TYPE_CHECKING:  # or a type checker would take any name for one of this module
+
+    def __getattr__(name: str) -> type:
+        """`Restitution` by the name that it had in earlier versions, with a DeprecationWarning."""
+        if name != "Impact":
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        warnings.warn("sonic_bullet.presets.Impact is now Restitution", DeprecationWarning, stacklevel=2)
+        return Restitution
 
 
 def load_material(name: str | os.PathLike[str]) -> Material:

@@ -13,7 +13,7 @@ import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
 import sonic_bullet.parallel as module
-from sonic_bullet.parallel import one_thread, side_by_side
+from sonic_bullet.parallel import one_thread, parallel_map
 from sonic_bullet.records.errors import AudioError
 
 TWO = module._can_fork()
@@ -30,7 +30,7 @@ def test_results_come_in_order_whoever_made_them() -> None:
             met = True
         return x * x, os.getpid()
 
-    found = side_by_side(square, range(12))
+    found = parallel_map(square, range(12))
     assert [x for x, _ in found] == [x * x for x in range(12)]
     assert len({who for _, who in found}) == (2 if TWO else 1)
     assert not active_children()
@@ -43,12 +43,12 @@ def test_errors_are_raised_here_as_they_are() -> None:
         return x
 
     with pytest.raises(AudioError, match="silent"):
-        side_by_side(fails, range(6))
+        parallel_map(fails, range(6))
     assert not active_children()
 
 
 def test_what_cannot_be_sent_is_made_here() -> None:
-    found = side_by_side(lambda x: lambda: x, range(6))
+    found = parallel_map(lambda x: lambda: x, range(6))
     assert [made() for made in found] == list(range(6))
 
 
@@ -61,20 +61,20 @@ def test_a_process_that_dies_takes_nothing_with_it() -> None:
         time.sleep(0.02)
         return x + 1
 
-    assert side_by_side(dies, range(5)) == [1, 2, 3, 4, 5]
+    assert parallel_map(dies, range(5)) == [1, 2, 3, 4, 5]
     assert not active_children()
 
 
 def test_work_inside_work_stays_where_it_is() -> None:
     def outer(x: int) -> tuple[int, set[int]]:
-        inner = side_by_side(lambda y: (time.sleep(0.005), os.getpid())[1], range(4))
+        inner = parallel_map(lambda y: (time.sleep(0.005), os.getpid())[1], range(4))
         return os.getpid(), set(inner)
 
-    assert all(inside == {who} for who, inside in side_by_side(outer, range(4)))
+    assert all(inside == {who} for who, inside in parallel_map(outer, range(4)))
 
 
 def in_a_pool() -> list[int]:
-    return side_by_side(lambda x: x + 1, range(4))
+    return parallel_map(lambda x: x + 1, range(4))
 
 
 def test_a_pools_worker_may_use_it() -> None:
@@ -85,7 +85,7 @@ def test_a_pools_worker_may_use_it() -> None:
 
 def test_one_core_does_it_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "_can_fork", lambda: False)
-    assert set(side_by_side(lambda _: os.getpid(), range(4))) == {os.getpid()}
+    assert set(parallel_map(lambda _: os.getpid(), range(4))) == {os.getpid()}
 
 
 def test_an_interrupt_here_ends_the_other() -> None:
@@ -99,7 +99,7 @@ def test_an_interrupt_here_ends_the_other() -> None:
 
     start = time.monotonic()
     with pytest.raises(KeyboardInterrupt):
-        side_by_side(waits, range(4))
+        parallel_map(waits, range(4))
     assert time.monotonic() - start < 5 and not active_children()
 
 
@@ -109,14 +109,14 @@ def test_none_is_left_behind_by_one_that_is_killed() -> None:
     script = (
         "import os, signal, time\n"
         "from multiprocessing import get_context\n"
-        "from sonic_bullet.side_by_side import side_by_side\n"
+        "from sonic_bullet.parallel import parallel_map\n"
         "me, begun = os.getpid(), get_context('fork').Event()\n"
         "def do(x):\n"
         "    if os.getpid() == me:\n"
         "        begun.wait(30); time.sleep(0.5); os.kill(me, signal.SIGKILL)\n"
         "    print(os.getpid(), flush=True); begun.set(); time.sleep(0.02)\n"
         "    return bytes(300_000)\n"
-        "side_by_side(do, range(400))\n"
+        "parallel_map(do, range(400))\n"
     )
     out = subprocess.run([sys.executable, "-c", script], check=False, capture_output=True, text=True, timeout=60).stdout
     helpers = {int(line) for line in out.split()}
@@ -142,9 +142,9 @@ def test_one_thing_alone_is_done_on_one_thread_too(monkeypatch: pytest.MonkeyPat
         return {one["num_threads"] for one in threadpool_info() if one["user_api"] == "blas"}
 
     with threadpool_limits(2, user_api="blas"):
-        assert side_by_side(threads, [0]) == [{1}]
+        assert parallel_map(threads, [0]) == [{1}]
         monkeypatch.setattr(module, "_can_fork", lambda: False)
-        assert side_by_side(threads, range(2)) == [{1}, {1}]
+        assert parallel_map(threads, range(2)) == [{1}, {1}]
 
 
 def test_linear_algebra_has_one_thread_in_each_process() -> None:
@@ -156,7 +156,7 @@ def test_linear_algebra_has_one_thread_in_each_process() -> None:
         return {library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"}
 
     with threadpool_limits(3, user_api="blas"):
-        inside = side_by_side(threads, range(8)) if TWO else []
+        inside = parallel_map(threads, range(8)) if TWO else []
         with one_thread():
             assert threads() == {1}
         assert threads() == {3}

@@ -39,7 +39,7 @@ def run_diagnose(source: str, *, output: str | None, json_to: str | None, predic
             from sonic_bullet.presets import write_preset
 
             write_preset(output, preset_of(found))
-        say(_told(found))
+        say(_summary(found))
         if predict is not None:
             say(f"{written} strikes predicted in {predict}")
     write_json(json_to, described(found))
@@ -62,10 +62,10 @@ def _predicted(found: Any, folder: str) -> int:
     return len(made)
 
 
-def _told(found: Any) -> str:
+def _summary(found: Any) -> str:
     """For people."""
     words = {
-        "none": "the model suffices: no effect earns its keep",
+        "none": "the model suffices: no effect is accepted",
         "explained": "the model lacks",
         "unexplained": "something is left that no known effect explains",
     }

@@ -33,7 +33,7 @@ def run_features(recording: str, *, onset_s: float | None, band: tuple[float, ..
         notes = "; ".join(([f"channel {channel + 1} of {len(sound)}, the loudest, is used"] if len(sound) > 1 else []) + ([found.note] if found.note else []))
         if picture is not None:
             _draw(picture, sound[channel], sr, found)
-        say(_told(recording, found))
+        say(_summary(recording, found))
     if notes:
         print(f"sonic-bullet: warning: {recording}: {notes}", file=sys.stderr)
     write_json(json_to, described(found, notes))
@@ -52,7 +52,7 @@ def _number(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
 
 
-def _told(recording: str, found: Features) -> str:
+def _summary(recording: str, found: Features) -> str:
     order = np.argsort(found.freq_hz)
     rows = [
         (

@@ -39,7 +39,7 @@ def run_fit(source: str, *, output: str, picture: str | None, json_to: str | Non
             from sonic_bullet.plots.fit_plot import write_fit_picture
 
             write_fit_picture(picture, found)
-        say(_told(found))
+        say(_summary(found))
     write_json(json_to, described(found))
 
 
@@ -106,7 +106,7 @@ def described(found: Any) -> dict[str, Any]:
     }
 
 
-def _told(found: Any) -> str:
+def _summary(found: Any) -> str:
     fit = found.fit
     sd = np.sqrt(np.diag(fit.covariance))
 
@@ -125,7 +125,7 @@ def _told(found: Any) -> str:
     paired = sum(int((o.line >= 0).sum()) for o in found.objects)
     lines = sum(len(o.evidence.lines.freq_hz) for o in found.objects)
     correction: Array = np.concatenate([o.correction[o.line >= 0] for o in found.objects]) if found.objects else np.zeros(0)
-    text = [f"{found.case.name}: {fit.verdict}", table(("", "value", "spread"), rows), f"{paired} modes paired with {lines} lines heard"]
+    text = [f"{found.case.name}: {fit.verdict}", table(("", "value", "spread"), rows), f"{paired} modes paired with {lines} observed lines"]
     if len(correction):
         text.append(f"corrections of single modes' frequencies: rms {np.sqrt((correction**2).mean()):.2%}, largest {np.abs(correction).max():.2%}")
     if fit.metric >= 0:

@@ -36,7 +36,7 @@ def run_residual(source: str, *, output: str, picture: str | None, json_to: str 
             from sonic_bullet.plots.residual_plot import write_residual_picture
 
             write_residual_picture(picture, strikes)
-        say(_told(source, strikes.residual))
+        say(_summary(source, strikes.residual))
     write_json(json_to, described(strikes.residual))
 
 
@@ -95,8 +95,8 @@ def described(residual: Residual) -> dict[str, Any]:
     }
 
 
-def _told(source: str, residual: Residual) -> str:
-    told = described(residual)
-    level = told["residual_of_clip_db"]
+def _summary(source: str, residual: Residual) -> str:
+    shown = described(residual)
+    level = shown["residual_of_clip_db"]
     loud = "nothing" if level is None else f"{level:.1f} dB of the recordings' energy"
-    return f"{source}: beside {told['modes']} modes there is {loud}: {len(told['lines'])} lines, and noise in {told['noise_cells']} cells of band and time"
+    return f"{source}: beside {shown['modes']} modes there is {loud}: {len(shown['lines'])} lines, and noise in {shown['noise_cells']} cells of band and time"

@@ -48,7 +48,7 @@ def run_modes(
             model = modal.analyse((shape,), made, count=count, fixed=fixed, thickness_m=thickness_m, progress=progress, to_hz=to_hz or HEARING_LIMIT_HZ)
         if output is not None:
             write_model(output, model)
-        say(_told(mesh, made, model))
+        say(_summary(mesh, made, model))
     write_json(json_to, _described(mesh, made, model, output))
 
 
@@ -130,7 +130,7 @@ def _described(mesh: str, material: Material, model: ModalModel, output: str | N
     }
 
 
-def _told(mesh: str, material: Material, model: ModalModel) -> str:
+def _summary(mesh: str, material: Material, model: ModalModel) -> str:
     rows = [(str(i), f"{f:.2f}", "-" if math.isnan(d) else f"{d:.3f}") for i, (f, d) in enumerate(zip(model.freq_hz, model.decay_per_s, strict=True), 1)]
     dropped = f", {model.dropped} overdamped modes dropped" if model.dropped else ""
     head = f"{mesh}: {material.name}, {model.volume_m3 * 1e6:.4g} cm³, {model.mass_kg:.4g} kg, {model.mode_count} modes{dropped}\n{model.note}"

@@ -26,7 +26,7 @@ from sonic_bullet.diagnosis.selection.stepwise import Closed, closed
 from sonic_bullet.effects import EFFECTS
 from sonic_bullet.effects.protocol import Effect
 from sonic_bullet.estimator.fit.case_fit import CaseFit
-from sonic_bullet.estimator.fit.observed import gather, onset_sample, until_it_breaks_off
+from sonic_bullet.estimator.fit.recorded import gather, onset_sample, until_it_breaks_off
 from sonic_bullet.files import read_audio
 from sonic_bullet.files.cases import Case, CaseRecording, read_case
 from sonic_bullet.modal.cache import Place

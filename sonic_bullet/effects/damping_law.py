@@ -24,7 +24,7 @@ OMEGA_1 = 2000 * np.pi
 SCATTER = 0.02  # of a decay about its law, relative, that no law is asked to explain
 BETTER = 6.0  # in BIC, than Rayleigh's law
 TAKEN, MOST = 0.1, 0.95  # of what other effects take of a line's decay: how unsure it is; of the decay, at most
-FEWEST, AGAIN = 5, 4  # lines: to look for a law, and to fit it again to a part of them
+FEWEST_LINES, AGAIN = 5, 4  # lines: to look for a law, and to fit it again to a part of them
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ class DampingLaw:
         extra = np.clip(np.concatenate([h.expected_decay_per_s for h in evidence.observed]) - rayleigh, 0.0, MOST * decay)  # what effects found so far take
         decay, spread = decay - extra, np.hypot(spread, TAKEN * extra)
         good = np.isfinite(decay) & (decay > 0) & ~np.isposinf(spread)  # in a room some lines tell no decay
-        if good.sum() < (FEWEST if evidence.known is None else AGAIN):
+        if good.sum() < (FEWEST_LINES if evidence.known is None else AGAIN):
             return None
         omega, decay = omega[good], decay[good]
         sd = np.hypot(np.nan_to_num(spread[good] / decay, nan=0.05), SCATTER)

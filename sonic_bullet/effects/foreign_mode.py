@@ -14,7 +14,7 @@ import numpy as np
 
 from sonic_bullet.effects.common.reverberant_tail import FRAME_S
 from sonic_bullet.effects.common.ringing import sounded
-from sonic_bullet.effects.protocol import Evidence, Impact, ObjectEvidence, Owner, Ring, RingsBeside, Sound, Stage, Traits
+from sonic_bullet.effects.protocol import Evidence, Impact, ObjectEvidence, Owner, Ring, RingsAlong, Sound, Stage, Traits
 from sonic_bullet.records import Array
 
 STEADY = 0.12  # relative scatter of |A|/J over the strikes, rms
@@ -24,7 +24,7 @@ APART = 0.004  # from a mode of the body
 
 
 @dataclass(frozen=True)
-class ForeignMode(RingsBeside):
+class ForeignMode(RingsAlong):
     """freq_hz, decay_per_s, amplitude per N·s, phase_rad of each line that is not the body's."""
 
     id: ClassVar[str] = "foreign-mode"

@@ -21,7 +21,7 @@ from sonic_bullet.records import Array
 ROUGH = 0.03
 BETTER = 16.0
 CORNERS, FINER, HIGHEST = 160, 21, 0.49  # tried, and again about the best; of the rate
-FEWEST, AGAIN = 5, 3  # lines: to look for a filter, and to fit it again to a part of them
+FEWEST_LINES, AGAIN = 5, 3  # lines: to look for a filter, and to fit it again to a part of them
 STUCK, OFTEN = 4, 12  # samples in a row at the limit, or in all
 SAME = 2e-3  # of a limit: how far peaks that it has made are apart
 
@@ -86,7 +86,7 @@ class MeasurementChain:
             parts["limit"] = limit
         parts |= _hum(observed, evidence.known.hum_hz if isinstance(evidence.known, cls) else 0.0)
         if "limit" not in parts:
-            parts |= _filter(observed, BETTER, FEWEST) if evidence.known is None else _filter(observed, 0.0, AGAIN)
+            parts |= _filter(observed, BETTER, FEWEST_LINES) if evidence.known is None else _filter(observed, 0.0, AGAIN)
         return cls(**parts) if parts else None
 
 
@@ -154,12 +154,12 @@ def _filter(observed: list[ObjectEvidence], better: float, fewest: int) -> dict[
 
 
 def _ratio(h: ObjectEvidence) -> tuple[Array, Array, Array]:
-    """Per line: frequency, ln of heard over expected amplitude over the strikes, and its spread, which grows where the strikes disagree."""
-    told, seen = np.abs(h.expected), np.abs(h.amplitude)
-    width = np.hypot(h.amplitude_sd, ROUGH * told.max(axis=0, keepdims=True)) + 1e-300
-    gain = (told * seen / width**2).sum(axis=0) / np.maximum((told**2 / width**2).sum(axis=0), 1e-300)
-    left = np.sqrt((((seen - gain * told) / width) ** 2).mean(axis=0))
-    size = np.sqrt((told**2 / width**2).sum(axis=0))
+    """Per line: frequency, ln of observed over expected amplitude over the strikes, and its spread, which grows where the strikes disagree."""
+    expected, seen = np.abs(h.expected), np.abs(h.amplitude)
+    width = np.hypot(h.amplitude_sd, ROUGH * expected.max(axis=0, keepdims=True)) + 1e-300
+    gain = (expected * seen / width**2).sum(axis=0) / np.maximum((expected**2 / width**2).sum(axis=0), 1e-300)
+    left = np.sqrt((((seen - gain * expected) / width) ** 2).mean(axis=0))
+    size = np.sqrt((expected**2 / width**2).sum(axis=0))
     good = (gain > 0) & (size > 3)
     sd = np.hypot(np.maximum(left, 1.0)[good] / (size[good] * np.maximum(gain[good], 1e-300)), ROUGH)
     return h.freq_hz[good], np.log(gain[good]), sd

@@ -14,7 +14,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from sonic_bullet.effects.common.axes import PAIR, about_axes, pair_at
-from sonic_bullet.effects.common.proofs import finite, side_by_side
+from sonic_bullet.effects.common.proofs import finite, same_length
 from sonic_bullet.effects.protocol import Evidence, ObjectEvidence, Owner, SplitsPairs, Stage, Traits
 from sonic_bullet.records import Array, ModalModel
 
@@ -51,7 +51,7 @@ class ModeSplitting(SplitsPairs):
         finite("freq_hz", *self.freq_hz, least=1e-3)
         finite("split", *self.split, least=0.0, most=2.0)
         finite("turn_rad", *self.turn_rad)
-        side_by_side(freq_hz=self.freq_hz, split=self.split, turn_rad=self.turn_rad)
+        same_length(freq_hz=self.freq_hz, split=self.split, turn_rad=self.turn_rad)
 
     def apply(self, x: ModalModel) -> ModalModel:
         """The modes with the effect in them."""
@@ -69,7 +69,7 @@ class ModeSplitting(SplitsPairs):
         return replace(x, freq_hz=freq[order], decay_per_s=x.decay_per_s[order], shape=shape[:, :, order])
 
     def observed_correction(self, freq_hz: Array) -> Array:
-        """How far off (m,), relative, modes at freq_hz (m,) are from the middles of the pairs that were heard; 0 for all others."""
+        """How far off (m,), relative, modes at freq_hz (m,) are from the middles of the pairs that were observed; 0 for all others."""
         off = np.zeros(len(freq_hz))
         for f in self.freq_hz:
             pair = list(pair_at(freq_hz, f))
@@ -175,10 +175,10 @@ def _turn(strike: Array, sensor: Array, amplitude: Array, signed: bool) -> tuple
     observed = np.real(amplitude * np.exp(-1j * np.angle((amplitude**2).sum(axis=0)) / 2)) if signed else np.abs(amplitude)
     turn = np.linspace(0, np.pi, 181)[:-1]
     direction = np.stack([np.stack([np.cos(turn), np.sin(turn)]), np.stack([-np.sin(turn), np.cos(turn)])], axis=1)  # (2, line, turn)
-    told = np.einsum("sx,xlt->tsl", strike, direction) * np.einsum("x,xlt->tl", sensor, direction)[:, None, :]
-    told = told if signed else np.abs(told)
-    size, loud = np.linalg.norm(told, axis=1), np.linalg.norm(observed, axis=0)
-    fit = np.abs(np.einsum("tsl,sl->tl", told, observed)) / np.maximum(size * loud, 1e-300)
+    participation = np.einsum("sx,xlt->tsl", strike, direction) * np.einsum("x,xlt->tl", sensor, direction)[:, None, :]
+    participation = participation if signed else np.abs(participation)
+    size, loud = np.linalg.norm(participation, axis=1), np.linalg.norm(observed, axis=0)
+    fit = np.abs(np.einsum("tsl,sl->tl", participation, observed)) / np.maximum(size * loud, 1e-300)
     ratio = (size @ loud) / np.maximum(np.linalg.norm(size, axis=1) * np.linalg.norm(loud), 1e-300)
     score = fit.mean(axis=1) * np.sqrt(np.maximum(ratio, 0.0))
     best = int(score.argmax())

@@ -58,7 +58,7 @@ def with_material(material: Material) -> Material:
 
 
 def with_modes(model: ModalModel, material: Material) -> ModalModel:
-    """A body's model with its material's effects on modes in it, and on how they ring: bend and choke per peak velocity at the surface.
+    """A body's model with its material's effects on modes in it, and on how they ring: bend and damping growth per peak velocity at the surface.
 
     Where a level was measured as an impulse, the velocity is what that impulse brings about at a typical place (rms over the surface).
     """

@@ -122,12 +122,12 @@ class Poisson:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ObjectEvidence:
-    """One object's strikes: k lines that are modes, beside what the model so far expects, and what it leaves. source: what they were gathered from, the host's own.
+    """One object's strikes: k lines that are modes, beside what the model so far expects, and what it leaves. source: what they were recorded from, the host's own.
 
     freq_hz, decay_per_s and their spreads (k,); amplitude (s, k) complex at the onset and its spread. mode: the modes of `model` each line stands for.
     model_hz (k,): the mesh's own, without corrections; expected_decay_per_s (k,), expected (s, k): of the model with the effects found so far.
     pattern (s, k): J ψ, real. foreign_*: lines that are no mode, amplitudes (s, f). model: the body with its strikes and sensor as last vertices,
-    strike_vertex (s,), strike_way (s, 3), sensor_vertex, sensor_way (3,). signal, predicted (s, n) from the onset on, None for lists of features.
+    strike_vertex (s,), strike_direction (s, 3), sensor_vertex, sensor_direction (3,). signal, predicted (s, n) from the onset on, None for lists of features.
     noise (s,): rms. signed: phases are true. poisson: of `plain`, where nothing has moved its modes yet.
     """
 
@@ -166,7 +166,7 @@ class ObjectEvidence:
     elastic: Elastic | None = None
     poisson: Poisson | None = None
     own: Array | None = None  # (s, n) signal without what the model so far knows to ring beside the body, where there is such
-    dry: bool = False  # whether lines are told as they would be without the room they were recorded in
+    dry: bool = False  # whether lines are identified as they would be without the room they were recorded in
 
     @property
     def residual(self) -> Array:
@@ -289,7 +289,7 @@ class SplitsPairs(ABC):
         """Relative correction (m,) of the mesh's modes freq_hz (m,), ascending, to the middle of what was split."""
 
 
-class RingsBeside(ABC):
+class RingsAlong(ABC):
     """An effect that rings beside the body: its lines are none of the body's modes, and nobody else's evidence."""
 
     @abstractmethod

@@ -23,7 +23,7 @@ IMPEDANCE = 1.2 * 343.0  # ρ₀ c in kg/(m² s)
 SOUND = 343.0
 SCATTER = 0.03
 BETTER = 14.0
-FEWEST, FEW = 6, 4  # lines: to look for it, and to fit it again to a part of them
+FEWEST_LINES, FEWEST_LINES_AGAIN = 6, 4  # lines: to look for it, and to fit it again to a part of them
 AGAIN = 2.0  # times smaller or larger, where it is fitted again
 CLEARER = 0.45  # twice the ln likelihood, a line, that a tilt must be worth
 ORDERS: tuple[int, ...] = (2, 4)
@@ -77,8 +77,12 @@ class Radiation(Alternatives):
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
         observed = max(evidence.observed, key=lambda h: len(h.freq_hz) if h.model is not None else 0)
-        told = int((~np.isposinf(observed.decay_sd_per_s)).sum())  # in a room some lines tell no decay
-        if observed.model is None or told < (FEWEST if evidence.known is None else FEW) or not np.isfinite(observed.decay_per_s).all():
+        with_decay = int((~np.isposinf(observed.decay_sd_per_s)).sum())  # in a room some lines tell no decay
+        if (
+            observed.model is None
+            or with_decay < (FEWEST_LINES if evidence.known is None else FEWEST_LINES_AGAIN)
+            or not np.isfinite(observed.decay_per_s).all()
+        ):
             return None
         area = areas(observed.model)
         loud = (np.abs(observed.push) ** 2).sum(axis=0) + 1e-300  # of modes that share a line, the louder is observed: a plate's own plane hardly moves the air

@@ -1,4 +1,4 @@
-"""Triangle surfaces: volume, inertia, normals, curvature (the nearest point is in surface_index.py, and offered here too).
+"""Triangle surfaces: volume, inertia, normals, curvature (the nearest point is in nearest_point.py, and offered here too).
 
     V = ⅙ Σ a·(b×c),   ∫x xᵀ dV by signed tetrahedra about the origin             [Tonon 2004, eq. 9; Eberly 2002]
     second fundamental form of a face from its corner normals: II·e = Δn on each edge       [Rusinkiewicz 2004, eq. 3]

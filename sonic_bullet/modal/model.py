@@ -138,12 +138,12 @@ def _solve(
     """Fill (or fetch the filled body), assemble, clamp and solve, all without units."""
     from sonic_bullet.modal import eigen, fem, polynomials
     from sonic_bullet.modal.meshing.shape_meshes import Filled, fill
-    from sonic_bullet.modal.meshing.solid import Solid, Surface
+    from sonic_bullet.modal.meshing.solid import Solid, SolidSurface
 
     found = store.load(*kept)
     if found is not None:
         a, note = found
-        body = Filled(Solid(a["node"], a["tet"], bool(a["affine"][0]), note), Surface(a["skin"], a["face"]), a["curvature"])
+        body = Filled(Solid(a["node"], a["tet"], bool(a["affine"][0]), note), SolidSurface(a["skin"], a["face"]), a["curvature"])
     else:
         body = fill(shapes, *sizes, say)
         solid, skin = body.solid, body.skin

@@ -3,7 +3,7 @@
     u_r = U cos mθ,  u_z = W cos mθ,  u_θ = V sin mθ     [Zienkiewicz & Taylor, The Finite Element Method (2000), vol. 2, ch. 9.4-9.5]
     ε_rr = U,r   ε_zz = W,z   ε_θθ = (U + mV)/r   γ_rz = U,z + W,r   γ_rθ = V,r − (V + mU)/r   γ_zθ = V,z − mW/r
 
-Each m is a small plane problem, each mode of m > 0 has a twin turned by π/2m, exactly. A surface is recognised by its rings: vertices of one radius
+Each m is a small plane problem, each mode of m > 0 has a degenerate partner turned by π/2m, exactly. A surface is recognised by its rings: vertices of one radius
 and height that go round evenly; the section is the polygon of the rings, so that the body is round where the mesh is faceted.
 """
 
@@ -96,15 +96,15 @@ def _outline(point: Array, face: Array) -> Array | None:
         return None
     edge = np.unique(np.sort(ring[np.concatenate([face[:, [0, 1]], face[:, [1, 2]], face[:, [2, 0]]])], axis=1), axis=0)
     edge = edge[edge[:, 0] != edge[:, 1]]
-    beside: list[set[int]] = [set() for _ in range(rings)]
+    neighbours: list[set[int]] = [set() for _ in range(rings)]
     for a, b in edge.tolist():
-        beside[a].add(b)
-        beside[b].add(a)
+        neighbours[a].add(b)
+        neighbours[b].add(a)
     # A diagonal may join a ring to the next but one: where a third lies on the way, it is no side.
     side: list[list[int]] = [[] for _ in range(rings)]
     for a, b in edge.tolist():
         direct = np.linalg.norm(middle[a] - middle[b])
-        over = any(np.linalg.norm(middle[a] - middle[c]) + np.linalg.norm(middle[c] - middle[b]) < 1.02 * direct for c in beside[a] & beside[b])
+        over = any(np.linalg.norm(middle[a] - middle[c]) + np.linalg.norm(middle[c] - middle[b]) < 1.02 * direct for c in neighbours[a] & neighbours[b])
         if not over:
             side[a].append(b)
             side[b].append(a)

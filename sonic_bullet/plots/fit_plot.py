@@ -69,7 +69,7 @@ def _plane(axes: Axes, found: CaseFit) -> None:
     if others and np.concatenate(others, axis=1).size:
         axes.plot(*np.concatenate(others, axis=1), "x", color="0.5", label="lines that are no mode")
     if any((each.line < 0).any() for each in found.objects):
-        axes.plot([], [], "o", ms=5, mfc="none", color="0.3", label="modes not heard")
+        axes.plot([], [], "o", ms=5, mfc="none", color="0.3", label="modes not observed")
     if not found.objects:
         axes.plot(fit.freq_hz / 1000, fit.decay_per_s, "o", ms=4, label="lines")
     freq = np.linspace(0, 1.05 * fit.freq_hz.max(initial=1000.0), 600)

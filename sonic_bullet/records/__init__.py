@@ -1,24 +1,32 @@
 """Values that prove themselves when built: read-only arrays of a stated shape, units in the names.
 
 bodies, contacts, residual: what one room hands another;  arrays: what records are built of;  units; errors
+
+Names are imported when first used: errors and units need no numpy, and neither does who prints a help text.
 """
 
-from sonic_bullet.records.arrays import Array, frozen_array
-from sonic_bullet.records.bodies import (
-    ORTHOTROPIC,
-    Air,
-    Body,
-    Material,
-    Microphone,
-    ModalModel,
-    ModalSum,
-    Sensor,
-    Shape,
-    ShapeKind,
-    Vibrometer,
-    isotropic_stiffness_pa,
-)
-from sonic_bullet.records.residual import Residual
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from sonic_bullet.records.arrays import Array, frozen_array
+    from sonic_bullet.records.bodies import (
+        ORTHOTROPIC,
+        Air,
+        Body,
+        Material,
+        Microphone,
+        ModalModel,
+        ModalSum,
+        Sensor,
+        Shape,
+        ShapeKind,
+        Vibrometer,
+        isotropic_stiffness_pa,
+    )
+    from sonic_bullet.records.residual import Residual
 
 __all__ = [
     "ORTHOTROPIC",
@@ -37,3 +45,27 @@ __all__ = [
     "frozen_array",
     "isotropic_stiffness_pa",
 ]
+
+_HOME = {
+    "Air": "bodies",
+    "Array": "arrays",
+    "Body": "bodies",
+    "Material": "bodies",
+    "Microphone": "bodies",
+    "ModalModel": "bodies",
+    "ModalSum": "bodies",
+    "ORTHOTROPIC": "bodies",
+    "Residual": "residual",
+    "Sensor": "bodies",
+    "Shape": "bodies",
+    "ShapeKind": "bodies",
+    "Vibrometer": "bodies",
+    "frozen_array": "arrays",
+    "isotropic_stiffness_pa": "bodies",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name in _HOME:
+        return getattr(importlib.import_module(f"sonic_bullet.records.{_HOME[name]}"), name)
+    raise AttributeError(f"module 'sonic_bullet.records' has no attribute '{name}'")

@@ -1,6 +1,6 @@
 """Forces become sound: the synthesizer of live steps, and the replay of a contact log.
 
-clock: which samples a step covers | sounder: a body as it is played | blows: strikes | rubbing: rolling and sliding | beside: residuals | synthesizer: all together
+clock: which samples a step covers | resonator: a body as it is played | impacts: strikes | friction_voice: rolling and sliding | residual_voice: residuals | synthesizer: all together
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Strikes of one physics step, from contact rows to force pulses on modes.
 
-    Split (synth.strikes) + rows of the step and the next ones -> Blow: time, length, impulse, Uᵀf on either body
+    Split (synth.strikes) + rows of the step and the next ones -> ForcePulse: time, length, impulse, Uᵀf on either body
 
 One `Impact` is one pulse: rows of up to three steps, several points each, share its time history, so that the manifold's
 sum and moment, which are all that is reliable, are kept: Uᵀf is summed over the rows, each at its own point with its own
@@ -24,11 +24,11 @@ from sonic_bullet.synth.pulse import compliant_share, contact_modulus_pa, contac
 from sonic_bullet.synth.strikes import Split, accepted_impulse, causing_approach_m_s, key_bodies, unheld_steps
 
 STRUCK_FLAT = 0.02
-"""Radius, as a share of the smaller body's size, of the least area that a nearly flat blow touches."""
+"""Radius, as a share of the smaller body's size, of the least area that a nearly flat impact touches."""
 FLAT_CURVATURE = 0.1
 """Curvature times size below which a contact is flat: a cap of ten times the body's size."""
 LEAST_JUMP_M_S = 1e-6
-"""A blow that changes the speed of its effective mass by less is passed over: a body of 10 cm sends 0 dB SPL to 1 m then."""
+"""An impact that changes the speed of its effective mass by less is passed over: a body of 10 cm sends 0 dB SPL to 1 m then."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,7 +73,7 @@ def _gather(split: Split, oriented: Sequence[Rows]) -> tuple[Rows, Array, Array]
     return Rows.joined(parts).take(order), strike[order], np.concatenate(delays)[order]
 
 
-def find_blows(
+def find_pulses(
     split: Split, oriented: Sequence[Rows], step: Step, resonators: tuple[Resonator, ...], placed: Array, earliest_s: float
 ) -> tuple[ForcePulse, ...]:
     """The strikes that the rows of ``step`` begin; oriented: the rows of that step and of the known ones after it. placed (bodies,): just put there.
@@ -112,7 +112,7 @@ def _blows(
     rows: Rows, strike: Array, delay: Array, observed: Array, resonators: tuple[Resonator, ...], pair: tuple[Array, Array],
     mass: Array, raw: Array, accepted: Array, approach: Array, impulse: Array, earliest_s: float, dt_s: float,
 ) -> tuple[ForcePulse, ...]:  # fmt: skip
-    """The blows of the strikes ``observed``, of all strikes (q,) and their rows (r,)."""
+    """The pulses of the strikes ``observed``, of all strikes (q,) and their rows (r,)."""
     start = _start_s(rows, strike, delay, len(mass), earliest_s, dt_s)
     mine = np.flatnonzero(np.isin(strike, observed))
     rows, group = rows.take(mine), np.searchsorted(observed, strike[mine])

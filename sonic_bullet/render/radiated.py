@@ -1,6 +1,6 @@
 """How a body's modes radiate, computed once: the first scene with a model waits a second or two for it, the next ones do not.
 
-sha256(frequencies, shapes, surface, air, source text of synth.radiation) -> weight, Δd in the cache that keeps the models themselves
+sha256(frequencies, shapes, surface, air, source text of synth.far_field) -> weight, Δd in the cache that keeps the models themselves
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ PACKAGES = ("numpy", "scipy", "numba")
 
 @lru_cache(maxsize=64)
 def radiation_of(model: ModalModel, air: Air, cache: store.Place = "default") -> tuple[Array, Array]:
-    """`synth.radiation.radiation` of a model: pressure weight (m,) complex and radiation damping (m,).
+    """`synth.far_field.radiation` of a model: pressure weight (m,) complex and radiation damping (m,).
 
     Bodies that share a model share it (models are compared by identity). cache: folder, "default" or None.
     """

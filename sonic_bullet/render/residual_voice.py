@@ -1,7 +1,7 @@
-"""What sounds beside the modes of bodies whose material brings a residual: lines in the bank, grains of noise for strikes and rubbing.
+"""What sounds besides the modes of bodies whose material brings a residual: lines in the bank, grains of noise for strikes and rubbing.
 
     Sounder + Residual -> Beside: lines as further modes (each struck as the mode it follows is), a voice for the noise (residual.grains)
-    Blow  -> a² of each pair of modes, at each sensor's weights -> Grain              level, place and pulse as the modes have them
+    ForcePulse -> a² of each pair of modes, at each sensor's weights -> Grain              level, place and pulse as the modes have them
     Drive -> sections of force -> Grain
 
 Lines weigh i·c/a times what their mode weighs: a quarter turn away, so that at one frequency powers add, as a residual of powers says. Where a mode's
@@ -23,7 +23,7 @@ from sonic_bullet.render.impacts import ForcePulse
 from sonic_bullet.render.resonator import Resonator, build_resonator
 from sonic_bullet.residual.grains import Voice, make_voice, mixed_number, placed, varied
 from sonic_bullet.residual.player import SECTION, Grain, Rubbed, rubbed, section_grain
-from sonic_bullet.residual.transfer import Modes
+from sonic_bullet.residual.transfer import StruckModes
 from sonic_bullet.synth.bank import ModeSet, audible
 from sonic_bullet.synth.pulse import pulse_spectrum
 
@@ -33,7 +33,7 @@ Rubs = Mapping[tuple[int, int, int], Rubbed]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ResidualVoice:
-    """One body's residual. lines: for the bank; follows (l,): the sounder's mode that each is struck as. group (m,): the voice's pair of each mode, or -1."""
+    """One body's residual. lines: for the bank; follows (l,): the resonator's mode that each is struck as. group (m,): the voice's pair of each mode, or -1."""
 
     voice: Voice
     lines: ModeSet
@@ -75,7 +75,7 @@ def _voice(residual: Residual, model: ModalModel, air: Air, sr: int) -> Voice:
     order = np.argsort(s.omega_rad_s, kind="stable")
     shape = np.sqrt((s.shape.astype(float) ** 2).sum(axis=1).mean(axis=0)) if len(s.shape) else np.ones(s.mode_count)
     loud = np.abs(s.weight[0]) if s.weight[0].any() else np.ones(s.mode_count)
-    return make_voice(residual, Modes(s.omega_rad_s[order] / (2 * np.pi), s.decay_per_s[order], (loud * shape)[order]), sr)
+    return make_voice(residual, StruckModes(s.omega_rad_s[order] / (2 * np.pi), s.decay_per_s[order], (loud * shape)[order]), sr)
 
 
 @lru_cache(maxsize=2)

@@ -32,7 +32,7 @@ FASTEST_RIGID = 0.6
 @dataclass(frozen=True, slots=True, eq=False)
 class Resonator:
     """omega_rad_s, decay_per_s (m,): with the air's damping. weight (w, m): complex, one row a weight set (row 0: pressure at 1 m).
-    bend, damping_growth (m,): of frequency per |z|², of decay by (choke·|z|)^choke_power, None in a linear body. shape (v, 3, m) float32: audible modes only.
+    bend, damping_growth (m,): of frequency per |z|², of decay by (damping_growth·|z|)^damping_growth_power, None in a linear body. shape (v, 3, m) float32: audible modes only.
     size_m: cube root of the volume. jerk_pa_s3: dipole coefficient [Chadwick 2012]. dropped: modes not played.
     """
 
@@ -73,7 +73,7 @@ def weight_sets(sensors: tuple[Sensor, ...]) -> tuple[Sensor, ...]:
 def build_resonator(body: Body, sensors: tuple[Sensor, ...], sr: int, air: Air) -> Resonator:
     """Prepare one body. Modes at or above sr/2 and overdamped ones are dropped and counted.
 
-    The pressure weight of mode and microphone is the far-field map of `synth.radiation`; a vibrometer reads (φ(q)·n); the
+    The pressure weight of mode and microphone is the far-field map of `synth.far_field`; a vibrometer reads (φ(q)·n); the
     seed's plain sum reads a·sin(ωt) for each mode [Ren et al. 2013, eq. 13], hence the turn by -i/(1 + i d/ω).
     """
     model = body.model

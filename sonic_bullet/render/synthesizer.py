@@ -1,8 +1,8 @@
 """The run time: physics steps in, frames of sound out, with one explicit state between.
 
-    Step -> loads (synth.strikes) -> blows, rubbing -> bank of modes and of rigid motions (synth.bank) + residual -> sound path (synth.path) -> frame
+    Step -> loads (synth.strikes) -> impacts, friction -> bank of modes and of rigid motions (synth.bank) + residual -> sound path (synth.path) -> frame
 
-Each body has five places in the bank: its modes, its three translations (see sounder.py), and the lines of its residual (see beside.py).
+Each body has five places in the bank: its modes, its three translations (see resonator.py), and the lines of its residual (see residual_voice.py).
 
 A step's sound is made when the `LOOKAHEAD` steps after it are known. Live listening, `sound` (which drains a copy of the state)
 and the replay of a log run the same code on the same numbers in the same order: the same bits.
@@ -20,7 +20,7 @@ from sonic_bullet.records.contacts import Contacts, Step
 from sonic_bullet.records.errors import AudioError
 from sonic_bullet.render.clock import Clock, exact_step
 from sonic_bullet.render.friction_voice import Drive, FrictionVoice, advance_friction
-from sonic_bullet.render.impacts import ForcePulse, find_blows
+from sonic_bullet.render.impacts import ForcePulse, find_pulses
 from sonic_bullet.render.manifold import Rows, orient
 from sonic_bullet.render.residual_voice import ResidualVoice, Rubs, build_residual_voice, friction_grains, impact_grains, line_modes
 from sonic_bullet.render.resonator import Resonator, build_resonator, weight_sets
@@ -56,7 +56,7 @@ class Setup:
 @dataclass(frozen=True, slots=True, eq=False)
 class State:
     """All that the next frame hangs on. number: of the step to be rendered next; window: that step and those known after it, rows: their contacts.
-    placed (b,): step in which each body began or was last moved by hand. beside (b): their residuals; grains, rubs: what of those is under way.
+    placed (b,): step in which each body began or was last moved by hand. voices (b): their residuals; grains, rubs: what of those is under way.
     """
 
     number: int
@@ -163,9 +163,9 @@ def _render(setup: Setup, state: State) -> tuple[Array, State]:
     moved = np.flatnonzero(window[1].teleported)
     placed[moved] = state.number + 1
     parts, loads = split(state.loads, ahead=0)  # of the first step, and what was not sure a step ago
-    pulses = [(float(clock.time_s), pulse) for pulse in find_blows(parts, rows, step, resonators, state.number - placed < SPAN, 0.0)]
+    pulses = [(float(clock.time_s), pulse) for pulse in find_pulses(parts, rows, step, resonators, state.number - placed < SPAN, 0.0)]
     parts, loads = split(loads)
-    pulses += [(float(after.time_s), pulse) for pulse in find_blows(parts, rows[1:], window[1], resonators, state.number + 1 - placed < SPAN, -step.dt_s)]
+    pulses += [(float(after.time_s), pulse) for pulse in find_pulses(parts, rows[1:], window[1], resonators, state.number + 1 - placed < SPAN, -step.dt_s)]
     drives, friction = advance_friction(state.friction, parts, step, window[1], rows[1], resonators, x, sr, setup.seed)
     first, voices = clock.sample(sr), state.voices
     strikes = [strike for begin_s, pulse in pulses for strike in _strikes(pulse, begin_s, resonators, voices, sr, first)]

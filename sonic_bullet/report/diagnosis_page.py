@@ -1,6 +1,6 @@
-"""One page that opens offline: the verdict in words, what to hear, what to see, and each suspect's evidence.
+"""One page that opens offline: the verdict in words, what to hear, what to see, and each candidate effect's evidence.
 
-    Diagnosis -> players (WAV, 16 bit, one scale for all three sounds of a strike), spectrograms, (f, d) plane, table of suspects -> one HTML file
+    Diagnosis -> players (WAV, 16 bit, one scale for all three sounds of a strike), spectrograms, (f, d) plane, table of candidate effects -> one HTML file
 
 Sounds and pictures stand in the page itself as data; nothing is fetched, nothing runs.
 """
@@ -104,7 +104,7 @@ def _plane(d: Diagnosis) -> str:
     plt = _pyplot()
     figure, axis = plt.subplots(figsize=(9, 4.5))
     before, after = object_evidence(d.closed.before, body), object_evidence(d.closed.after, body)
-    axis.plot(before.freq_hz, before.decay_per_s, "k.", label="lines heard")
+    axis.plot(before.freq_hz, before.decay_per_s, "k.", label="observed lines")
     axis.vlines(before.freq_hz, before.expected_decay_per_s, before.decay_per_s, color="0.7", lw=1, label="residual before")
     axis.plot(before.freq_hz, before.expected_decay_per_s, "x", color="#c33", label="model before")
     axis.plot(after.freq_hz, after.expected_decay_per_s, "+", color="#28c", label="model after")
@@ -112,7 +112,7 @@ def _plane(d: Diagnosis) -> str:
         axis.plot(before.foreign_hz, np.maximum(before.foreign_decay_per_s, 0.02), "o", mfc="none", color="#888", label="lines that are no mode")
     axis.set(xlabel="frequency in Hz", ylabel="decay in 1/s", yscale="log")
     axis.legend(frameon=False)
-    return "<h2>Frequencies and decays</h2>" + _figure(_png(figure), "each line heard, and where the model has its mode")
+    return "<h2>Frequencies and decays</h2>" + _figure(_png(figure), "each observed line, and where the model has its mode")
 
 
 def _candidates(d: Diagnosis) -> str:
@@ -121,9 +121,9 @@ def _candidates(d: Diagnosis) -> str:
         (c.id, "added" if c.id in kept else "no", f"{c.mean_db:+.2f}", f"{c.null_db:+.2f}", " ".join(f"{x:+.2f}" for x in c.drop_db))
         for c in sorted(d.closed.tried, key=lambda c: -c.mean_db)
     ]
-    head = ("suspect", "kept", "nearer, dB", "chance, dB", "strike by strike, each left out in turn")
+    head = ("candidate", "kept", "nearer, dB", "chance, dB", "strike by strike, each left out in turn")
     silent = "<p>Suspects that do not stand here found nothing of theirs in the recordings.</p>"
-    return "<h2>The suspects</h2>" + (_table(head, rows) if rows else "") + silent
+    return "<h2>Candidate effects</h2>" + (_table(head, rows) if rows else "") + silent
 
 
 def _notes(d: Diagnosis) -> str:

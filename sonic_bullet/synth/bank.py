@@ -42,7 +42,7 @@ class ModeSet:
 
     held: forces act evenly over the sample before each instant, (e^s - 1)/s, and strikes' impulses over their spacing, not at once: for modes
     that are gone within a few samples, of which a slow force must leave its slope alone.
-    bend, damping_growth (m,): of level-dependent modes, ω (1 + bend·|z|²) and d (1 + (choke·|z|)^choke_power); None: linear. See `bank_kernel.bend_poles`.
+    bend, damping_growth (m,): of level-dependent modes, ω (1 + bend·|z|²) and d (1 + (damping_growth·|z|)^damping_growth_power); None: linear. See `bank_kernel.bend_poles`.
     """
 
     omega_rad_s: Array
@@ -72,8 +72,8 @@ class Bank:
     """The instrument. offset (b+1,): segments of the flat arrays (whole groups of 8 lanes); count (b,): modes in each.
 
     log_pole (2·modes,): s/sr, real parts first; pole = e^{s/sr}; block = e^{256 s/sr}; quadrature (modes,) = d/ω; weight (W, 2·modes);
-    heard (W, b): whether any weight of the body is not zero. held (modes,): of `ModeSet`; there 1 + i·quadrature is what (1 + i d/ω)(e^s - 1)/s
-    is to its real part, which is in the weight. bend, choke, power (modes,), bent (b,): of bodies whose poles go with their level.
+    observed (W, b): whether any weight of the body is not zero. held (modes,): of `ModeSet`; there 1 + i·quadrature is what (1 + i d/ω)(e^s - 1)/s
+    is to its real part, which is in the weight. bend, damping_growth, power (modes,), bent (b,): of bodies whose poles go with their level.
     """
 
     sr: int

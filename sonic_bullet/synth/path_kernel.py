@@ -77,7 +77,7 @@ def _interpolate(typingctx, ring, at, taps, t):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _listen(line, at, emitted, delay, observed, ring, delays, awake, cursor, last, taps):  # pragma: no cover - compiled
-    """Run one line, its ring and delays (a power of two long, the ring TAPS longer), over emitted (n,), adding to heard (n,)."""
+    """Run one line, its ring and delays (a power of two long, the ring TAPS longer), over emitted (n,), adding to observed (n,)."""
     size = len(delays)
     mask = np.uintp(size - 1)  # unsigned indices: numba checks no wrap-around
     running, m, newest = awake[line], cursor[line], last[line]

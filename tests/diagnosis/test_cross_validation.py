@@ -27,7 +27,7 @@ from sonic_bullet.effects.protocol import Cost, Evidence, Owner, Sound, Stage, T
 from sonic_bullet.effects.radiation import Radiation
 from sonic_bullet.effects.room import Room
 from sonic_bullet.effects.support_damping import SupportDamping
-from sonic_bullet.effects.support_damping.dashpot_fit import Trial
+from sonic_bullet.effects.support_damping.dashpot_fit import DashpotFit
 from sonic_bullet.effects.support_damping.support_subsets import _best, subsets
 from sonic_bullet.records import ModalModel
 from tests.diagnosis.test_found_again import BAND, fitted
@@ -164,7 +164,7 @@ def test_three_weak_dashpots_are_told_together() -> None:
     """A thirtieth of the decays, where a law is good to a two-hundredth: no one says half of it, all three do."""
     fixture = SupportDamping(WEAK, (0.15, 0.1, 0.12))
     body = recorded(fixture, noise=2e-6)
-    trial = Trial.of(evidence_of(fitted(body), (body,), BAND).observed[0])
+    trial = DashpotFit.of(evidence_of(fitted(body), (body,), BAND).observed[0])
     grid = np.unique(trial.model.face)
     found = subsets(trial, grid[::7], 2)
     assert [len(s) for s in found] == [1, 1, 2, 2, 3, 3]

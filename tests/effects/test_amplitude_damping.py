@@ -14,7 +14,7 @@ from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis
 from sonic_bullet.diagnosis.prediction.score import mean_db
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.effects.amplitude_damping import AmplitudeDamping
-from sonic_bullet.effects.amplitude_damping.damped_lines import lines_under, told
+from sonic_bullet.effects.amplitude_damping.damped_lines import fitted_decay, lines_under
 from sonic_bullet.effects.amplitude_pitch import AmplitudePitch
 from sonic_bullet.effects.common.axes import ANGLES, turned
 from sonic_bullet.effects.common.envelope import envelopes
@@ -83,12 +83,12 @@ def test_levels_from_strike_to_strike_tell_the_axes_too() -> None:
     e = envelopes(observed)
     assert e is not None
     line = next(one for one in lines_under(e, observed, "velocity") if len(one.amplitude) > 1)
-    found = told(line, 5.0)
+    found = fitted_decay(line, 5.0)
     assert ANGLES[int(found.between.argmin())] == pytest.approx(0.6, abs=0.1)
     assert np.ptp(found.between) > 1.0
     loud = np.abs(line.amplitude.sum(axis=2)[0] * line.level.max(axis=2)[0]).argmax()
     silent = replace(line, weight=np.where(np.arange(5)[:, None] == loud, 0.0, line.weight), log=np.where(np.arange(5)[:, None] == loud, -30.0, line.log))
-    assert (told(silent, 5.0).between > found.between.min() + 1.0).all()
+    assert (fitted_decay(silent, 5.0).between > found.between.min() + 1.0).all()
 
 
 def test_what_is_known_to_ring_beside_the_body_is_taken_out_of_its_lines() -> None:

@@ -16,7 +16,7 @@ from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.effects import amplitude_pitch
 from sonic_bullet.effects.amplitude_pitch import FAR as FARTHER
 from sonic_bullet.effects.amplitude_pitch import NEAR, AmplitudePitch, _moments, _slopes
-from sonic_bullet.effects.amplitude_pitch.degenerate_pitch import bend_beside
+from sonic_bullet.effects.amplitude_pitch.degenerate_pitch import bend_with_axes
 from sonic_bullet.effects.common.envelope import Envelopes, alone, envelopes, windowed
 from sonic_bullet.effects.contact_time import ContactTime
 from sonic_bullet.effects.protocol import ObjectEvidence
@@ -178,7 +178,7 @@ def test_a_bend_is_told_with_the_axes_of_twins() -> None:
     told = evidence_of(refitted(fitted(body), (body,)), (body,), BAND).observed[0]
     e = envelopes(told)
     assert e is not None
-    near = bend_beside(e, told, "velocity", bend_beside(e, told, "velocity", 0.5, FARTHER), NEAR)
+    near = bend_with_axes(e, told, "velocity", bend_with_axes(e, told, "velocity", 0.5, FARTHER), NEAR)
     assert near == pytest.approx(0.7, rel=0.04)
 
 
@@ -233,7 +233,7 @@ def test_a_bend_that_one_lone_mode_alone_tells_is_told_by_all(monkeypatch: pytes
         xx, xy, yy = _moments(e, h, level, q) or (0.0, 0.0, 0.0)
         return (1e-6 * xx, 1e-3 * xy, yy) if q < 2 else (xx, xy, yy)
 
-    monkeypatch.setattr(amplitude_pitch, "twins", lambda _, k: k not in lone)
+    monkeypatch.setattr(amplitude_pitch, "degenerate", lambda _, k: k not in lone)
     monkeypatch.setattr(amplitude_pitch, "_moments", still)
     found = _slopes(e, told, None)["velocity"]
     assert not found.single

@@ -13,7 +13,7 @@ from sonic_bullet.diagnosis.prediction.hypothesis import came_from, modes_of
 from sonic_bullet.effects.common.dashpots import apart, coupled, damped
 from sonic_bullet.effects.damping_law import DampingLaw
 from sonic_bullet.effects.support_damping import LEAST, SupportDamping
-from sonic_bullet.effects.support_damping.dashpot_fit import LEVEL, MISSED, MUTE, Dashpot, Trial
+from sonic_bullet.effects.support_damping.dashpot_fit import LEVEL, MISSED, MUTE, Dashpot, DashpotFit
 from sonic_bullet.effects.support_damping.support_search import sought
 from sonic_bullet.records import Array, ModalModel
 from tests.made.body import GAIN, plate, recorded, truth
@@ -24,7 +24,7 @@ BAND = (50.0, 7_500.0)
 
 def test_a_mode_that_should_be_heard_and_is_not_costs_something() -> None:
     body = recorded()
-    t = Trial.of(evidence_of(truth(), (body,), BAND).observed[0])
+    t = DashpotFit.of(evidence_of(truth(), (body,), BAND).observed[0])
     loud = 1 + int(np.argmax(np.abs(t.size[:, 1:-1]).max(axis=0)))  # between two others: beyond them nobody listens
     rest = np.delete(np.arange(len(t.freq_hz)), loud)
     fewer = replace(t, freq_hz=t.freq_hz[rest], decay_per_s=t.decay_per_s[rest], sd=t.sd[rest], size=t.size[:, rest], worth=t.worth[rest])
@@ -58,13 +58,13 @@ def test_a_faint_line_far_above_does_not_hide_a_dashpot() -> None:
         foreign_amplitude=np.full((len(observed.amplitude), 1), 1e-3 * np.abs(observed.amplitude).max()),
         foreign_sd=np.zeros((len(observed.amplitude), 1)),
     )
-    found = sought(Trial.of(one))
+    found = sought(DashpotFit.of(one))
     assert [d.c for d in found] == [pytest.approx(3.0, rel=0.15)]
 
 
 def test_a_line_louder_than_its_mode_counts_as_one_of_another_decay_does() -> None:
     """All strikes alike: a pattern's cosine sees nothing of it. What is common to all lines is a gain, and says nothing."""
-    t = Trial.of(evidence_of(truth(), (recorded(),), BAND).observed[0])
+    t = DashpotFit.of(evidence_of(truth(), (recorded(),), BAND).observed[0])
     one = np.where(np.arange(len(t.freq_hz)) == 3, 10.0, 1.0)
     by_hand = MISSED * np.log1p((np.log(10) / LEVEL) ** 2 / MISSED)
     changed = replace(t, size=t.size * one)

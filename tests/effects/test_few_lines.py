@@ -11,7 +11,7 @@ from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of, thinned
 from sonic_bullet.effects import orthotropy
 from sonic_bullet.effects.contact_time import ContactTime
 from sonic_bullet.effects.damping_law import DampingLaw
-from sonic_bullet.effects.orthotropy.tensor_lines import Told, ringing, told_of
+from sonic_bullet.effects.orthotropy.tensor_lines import BodyLines, body_lines_of, ringing
 from sonic_bullet.effects.orthotropy.tensor_search import Tensor, _judged, isotropic_p
 from sonic_bullet.effects.orthotropy.tensors import reduced
 from sonic_bullet.effects.protocol import Elastic, ObjectEvidence
@@ -90,7 +90,7 @@ def test_what_is_gone_within_a_period_or_keeps_no_phase_is_no_mode() -> None:
 def test_broad_lines_are_worth_less() -> None:
     still = np.array([1.0, -0.5, 0.7, -0.9, 0.4]) + 0j
     one = observed([900.0, 601.0, 613.0], [5.0, 20.0, 120.0], np.stack([still] * 3, axis=1))
-    told = told_of(replace(evidence_of(truth(), (recorded(),), BAND), observed=(one,)))[0]
+    told = body_lines_of(replace(evidence_of(truth(), (recorded(),), BAND), observed=(one,)))[0]
     narrow, broad = (told.worth[int(np.argmin(np.abs(told.log_hz - np.log(f))))] for f in (601.0, 613.0))
     assert broad < 0.8 * narrow
 
@@ -101,7 +101,7 @@ def test_patterns_speak_where_frequencies_agree() -> None:
     hz, shape = np.geomspace(800, 3000, 5), rng.standard_normal((5, 5))
 
     def judged(pattern: Array) -> Tensor:
-        told = Told(np.log(hz), np.full(5, 1e-4), np.full(5, 0.5), shape + 0j, np.arange(-5, 0), elastic(hz, pattern))
+        told = BodyLines(np.log(hz), np.full(5, 1e-4), np.full(5, 0.5), shape + 0j, np.arange(-5, 0), elastic(hz, pattern))
         start = isotropic_p(told.elastic)
         return _judged([told], "isotropic", reduced("isotropic", start), start)
 
@@ -145,7 +145,7 @@ def test_lines_and_shifted_modes_have_in_common_what_counting_through_finds() ->
 
     rng = np.random.default_rng(4)
     lines, modes = np.sort(rng.uniform(6, 9, 14)), np.sort(rng.uniform(6, 9, 22))
-    told = Told(lines, np.full(14, 1e-3), rng.uniform(0.3, 1, 14), None, np.arange(0), elastic(modes, modes))
+    told = BodyLines(lines, np.full(14, 1e-3), rng.uniform(0.3, 1, 14), None, np.arange(0), elastic(modes, modes))
     seen = Seen(modes, None, rng.uniform(0, 1, (14, 22)))  # type: ignore[arg-type]
     first, shift = rng.uniform(0.2, 1, 14), np.arange(-REACH, REACH, WIDE / 2)
     direct = []

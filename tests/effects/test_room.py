@@ -104,7 +104,7 @@ def test_the_rate_of_a_room(rt60: float) -> None:
     assert all(one is not None for one in found)
     for delta, _ in (one for one in found if one):
         assert RT60 / delta == pytest.approx(rt60, rel=0.12)
-    assert np.median([wet_level for _, wet_level in (one for one in found if one)]) == pytest.approx(0.5, rel=0.25)
+    assert np.median([reverberant_level for _, reverberant_level in (one for one in found if one)]) == pytest.approx(0.5, rel=0.25)
 
 
 @pytest.mark.parametrize(

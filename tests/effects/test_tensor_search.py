@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sonic_bullet.effects.orthotropy import tensor_search as elasticities
-from sonic_bullet.effects.orthotropy.tensor_lines import Told
+from sonic_bullet.effects.orthotropy import tensor_search
+from sonic_bullet.effects.orthotropy.tensor_lines import BodyLines
 from sonic_bullet.effects.orthotropy.tensor_search import CAP, STEP, WIDTHS, _hopped, fitted, isotropic_p, search
 from sonic_bullet.effects.orthotropy.tensors import constants, stiffness
 from sonic_bullet.effects.protocol import Elastic, Evidence
@@ -41,18 +41,18 @@ def far(seed: int) -> Array:
     return np.concatenate([across, rng.uniform(0.1, 0.3, 3), goes - np.log(2.6) + rng.uniform(-0.4, 0.0, 3)])
 
 
-def lines(seed: int) -> Told:
+def lines(seed: int) -> BodyLines:
     """The lowest LINES modes of a plank, each 0.1 % off."""
     body, rng = plank(seed), np.random.default_rng(200 + seed)
     freq, _, pattern = body.look(stiffness(far(seed)))
     log_hz = np.log(freq[:LINES]) + 1e-3 * rng.standard_normal(LINES)
     amplitude = pattern[:STRIKES, :LINES] * (1 + 0.05 * rng.standard_normal((STRIKES, LINES)))
-    return Told(log_hz, np.full(LINES, 1e-4), np.full(LINES, 0.5), amplitude + 0j, np.arange(STRIKES) - (STRIKES + 1), body)
+    return BodyLines(log_hz, np.full(LINES, 1e-4), np.full(LINES, 0.5), amplitude + 0j, np.arange(STRIKES) - (STRIKES + 1), body)
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_a_wood_is_told_from_an_isotropic_start(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(elasticities, "told_of", lambda _: [lines(seed)])
+    monkeypatch.setattr(tensor_search, "body_lines_of", lambda _: [lines(seed)])
     both = search(EVIDENCE)
     assert both is not None and both[1].off < 2e-3, "as near as the lines are told"
     assert np.abs(constants(both[1].p) / constants(far(seed)) - 1)[[0, 1, 6, 7, 8]].max() < 0.1

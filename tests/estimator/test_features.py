@@ -31,11 +31,11 @@ def mixture(seed: int, db: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, f
 
 def test_residual_moments_and_information_agree_with_differences() -> None:
     """JᵀJ from geometric sums equals the product of differences of the sound itself."""
-    modes = likelihood.Modes(np.array([-30 + 4000j, -55 + 4100j, -3 + 9000j]), np.array([0.3 + 0.1j, -0.2 + 0.5j, 0.1j]))
+    modes = likelihood.Sinusoids(np.array([-30 + 4000j, -55 + 4100j, -3 + 9000j]), np.array([0.3 + 0.1j, -0.2 + 0.5j, 0.1j]))
     none = np.zeros(3000)
 
     def observed(change: np.ndarray) -> np.ndarray:
-        turned = likelihood.Modes(modes.pole + 1j * change[0:3] - change[3:6], modes.amplitude + change[6:9] + 1j * change[9:12])
+        turned = likelihood.Sinusoids(modes.pole + 1j * change[0:3] - change[3:6], modes.amplitude + change[6:9] + 1j * change[9:12])
         return -likelihood.residual(none, turned, SR)
 
     step = np.r_[np.full(6, 1e-3), np.full(6, 1e-4)]

@@ -13,7 +13,7 @@ import soundfile
 
 from sonic_bullet import modal
 from sonic_bullet.estimator.fit.material_fit import fit_case, fit_evidence
-from sonic_bullet.estimator.fit.observed import gather, observed
+from sonic_bullet.estimator.fit.recorded import gather, observed
 from sonic_bullet.files.cases import Case, read_case
 from sonic_bullet.records import Material
 from sonic_bullet.records.errors import AudioError, MeshError, SonicBulletError

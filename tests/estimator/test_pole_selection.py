@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sonic_bullet.estimator.fit.observed import until_it_breaks_off
+from sonic_bullet.estimator.fit.recorded import until_it_breaks_off
 from sonic_bullet.estimator.lines.joint_lines import joint_lines, lines_of
 from sonic_bullet.estimator.lines.pole_selection import selected
 from sonic_bullet.records import Array
@@ -49,8 +49,8 @@ def test_low_lines_of_a_reverberant_recording_are_still_lines() -> None:
     t = np.arange(int(0.5 * SR)) / SR
     room = 0.02 * rng.standard_normal(len(t)) * np.exp(-6.91 / 0.6 * t)
     room[0] = 1.0
-    wet_level = np.stack([np.fft.irfft(np.fft.rfft(x, 2 * N) * np.fft.rfft(room, 2 * N))[:N] for x in dry])
-    found = joint_lines(wet_level + 1e-4 * rng.standard_normal(wet_level.shape), SR).freq_hz
+    reverberant = np.stack([np.fft.irfft(np.fft.rfft(x, 2 * N) * np.fft.rfft(room, 2 * N))[:N] for x in dry])
+    found = joint_lines(reverberant + 1e-4 * rng.standard_normal(reverberant.shape), SR).freq_hz
     low = freq[freq < 4000]
     near = np.abs(found[None, :] / low[:, None] - 1).min(axis=1)
     assert (near < 0.003).mean() > 0.9, low[near >= 0.003]

@@ -14,7 +14,7 @@ import numpy as np
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, play
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.effects import Effect
-from sonic_bullet.estimator.fit.observed import Evidence as Recorded
+from sonic_bullet.estimator.fit.recorded import RecordedObject as Recorded
 from sonic_bullet.estimator.lines.joint_lines import joint_lines
 from sonic_bullet.files.cases import CaseObject, CaseRecording
 from sonic_bullet.modal.reduced import Family

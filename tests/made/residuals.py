@@ -6,18 +6,18 @@ import numpy as np
 
 from sonic_bullet.records import Residual
 from sonic_bullet.residual.spectrogram import Power
-from sonic_bullet.residual.transfer import Modes
+from sonic_bullet.residual.transfer import StruckModes
 
 SR = 48_000
 
 
-def modes(freq_hz: object, decay_per_s: object = 20.0, amplitude: object = 1.0) -> Modes:
+def modes(freq_hz: object, decay_per_s: object = 20.0, amplitude: object = 1.0) -> StruckModes:
     freq = np.asarray(freq_hz, float)
-    return Modes(freq, np.broadcast_to(np.asarray(decay_per_s, float), freq.shape), np.broadcast_to(np.asarray(amplitude, float), freq.shape))
+    return StruckModes(freq, np.broadcast_to(np.asarray(decay_per_s, float), freq.shape), np.broadcast_to(np.asarray(amplitude, float), freq.shape))
 
 
 def residual(
-    source: Modes, *, per_hz: float = 1e-7, decay_per_s: float = 10.0, last_s: float = 0.5, lines: tuple[tuple[float, float, float], ...] = ()
+    source: StruckModes, *, per_hz: float = 1e-7, decay_per_s: float = 10.0, last_s: float = 0.5, lines: tuple[tuple[float, float, float], ...] = ()
 ) -> Residual:
     """Noise of one level over the whole band, falling as e^(-2dt), beside the modes; lines of (Hz, 1/s, amplitude)."""
     freq, time = np.linspace(0, 24_000, 200), np.linspace(0, last_s, 100)

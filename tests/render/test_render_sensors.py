@@ -11,7 +11,7 @@ from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.records import Air, Microphone, ModalSum, Vibrometer
 from sonic_bullet.records.contacts import Contacts, Step
 from sonic_bullet.render import render_log, synthesizer
-from sonic_bullet.render.impacts import ForcePulse, find_blows
+from sonic_bullet.render.impacts import ForcePulse, find_pulses
 from sonic_bullet.render.resonator import build_resonator
 from sonic_bullet.synth import bank
 from sonic_bullet.synth.far_field import jerk_coefficient, radiation
@@ -70,7 +70,7 @@ def test_the_level_is_the_radiation_law() -> None:
     resonator = build_resonator(body, (Microphone([0, 0, 2.0]),), SR, Air())
     from sonic_bullet.synth.pulse import pulse_spectrum
 
-    pulse = only_blow(body, row(0, 1, (0, 0, -0.01), normal=(0, 0, -1), point_a=(0, 0, 0.005)))
+    pulse = only_pulse(body, row(0, 1, (0, 0, -0.01), normal=(0, 0, -1), point_a=(0, 0, 0.005)))
     spectrum = pulse_spectrum(np.array([1500.0 * pulse.length_s]), flat=pulse.flat)[0]
     start = 3000
     decay = float(resonator.decay_per_s[0])
@@ -81,17 +81,17 @@ def test_the_level_is_the_radiation_law() -> None:
     assert extra[0] > 0
 
 
-def only_blow(body: Any, contacts: Contacts) -> ForcePulse:
+def only_pulse(body: Any, contacts: Contacts) -> ForcePulse:
     """The blow that a lone strike is, of body 0 against a wall."""
     found: list[ForcePulse] = []
     with pytest.MonkeyPatch.context() as patch:
 
         def listening(*args: Any) -> Any:
-            impacts = find_blows(*args)
+            impacts = find_pulses(*args)
             found.extend(impacts)
             return impacts
 
-        patch.setattr(synthesizer, "find_blows", listening)
+        patch.setattr(synthesizer, "find_pulses", listening)
         rendered((body, wall_body()), one_strike((body, wall_body()), contacts, [(0, 0, 0), (0, 0, 0.01)], at=0, steps=5), (ModalSum(),))
     (pulse,) = found
     return pulse
@@ -102,7 +102,7 @@ def test_the_plain_sum_is_the_seeds_sum() -> None:
     body = box_body(EDGES_M, (900.0, 2100.0))
     contacts = row(0, 1, (0, 0, -0.01), normal=(0, 0, -1), point_a=(0.03, 0.01, 0.005))
     (signal,) = struck_box((ModalSum(2.0),), freq=(900.0, 2100.0), where=(0.03, 0.01, 0.005))
-    pulse = only_blow(body, contacts)
+    pulse = only_pulse(body, contacts)
     resonator = build_resonator(body, (), SR, Air())
     from sonic_bullet.synth.pulse import pulse_spectrum
 
@@ -127,7 +127,7 @@ def test_a_vibrometer_reads_the_surfaces_velocity() -> None:
     contacts = row(0, 1, (0, 0, -0.01), normal=(0, 0, -1), point_a=(0.1, 0.05, 0.005))
     (signal,) = struck_box((Vibrometer(0, [0.1, 0.05, 0.005], [0, 0, -1]),), freq=(300.0,), where=(0.1, 0.05, 0.005))
     phi = float(body.model.shape[np.argmax(body.model.vertex_m.sum(axis=1)), 2, 0])
-    pulse = only_blow(body, contacts)
+    pulse = only_pulse(body, contacts)
     assert pulse.modes_low[0] == pytest.approx(-0.01 * phi, rel=1e-6)
     resonator = build_resonator(body, (), SR, Air())
     time = np.arange(signal.size) / SR - 2 / 240 - pulse.start_s - pulse.length_s / 2
@@ -150,7 +150,7 @@ def clicked(direction_deg: tuple[float, ...], *, radius: float, material: Any, i
 
 
 def click_blow(radius: float, material: Any, impulse: float) -> Any:
-    return only_blow(ball_body(radius, material), row(0, 1, (0, 0, impulse), normal=(0, 0, 1), point_a=(0, 0, -radius), approach=1.0))
+    return only_pulse(ball_body(radius, material), row(0, 1, (0, 0, impulse), normal=(0, 0, 1), point_a=(0, 0, -radius), approach=1.0))
 
 
 def test_a_rigid_click_has_a_dipoles_direction() -> None:

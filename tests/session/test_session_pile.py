@@ -72,7 +72,7 @@ def pile() -> Any:
     for number in range(20):
         thrown_in(client, listener, number, rng)
     begun: list[tuple[int, int, float]] = []
-    real = synthesizer.find_blows
+    real = synthesizer.find_pulses
 
     def listening(split: Any, rows: Any, step: Any, resonators: Any, placed: Any, earliest: float) -> Any:
         impacts = real(split, rows, step, resonators, placed, earliest)
@@ -81,7 +81,7 @@ def pile() -> Any:
         return impacts
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(synthesizer, "find_blows", listening)
+        patch.setattr(synthesizer, "find_pulses", listening)
         for _ in range(round(SECONDS / DT)):
             client.stepSimulation()
     yield Pile(listener.contacts, listener.sound(), begun)
@@ -191,7 +191,7 @@ def test_every_impact_is_an_onset_in_the_sound(pile: Pile, monkeypatch: pytest.M
     From then on means from one step before the impact's (where bodies overlap as a step starts, they met in the one before) to its end and
     3 ms of travel. How far an impact stands out of what rings already is physics: printed, and half of them are the loudest thing in some band.
     """
-    log, real = pile.log, synthesizer.find_blows
+    log, real = pile.log, synthesizer.find_pulses
     setup = synthesizer.Setup(log.sr, log.sensors, log.seed, log.air)
     state, at = synthesizer.start(setup), 0
     wanted = impacts(log)
@@ -200,7 +200,7 @@ def test_every_impact_is_an_onset_in_the_sound(pile: Pile, monkeypatch: pytest.M
         _, state = played(setup, state, log, range(at, number))
         at = number
         with monkeypatch.context() as patch:
-            patch.setattr(synthesizer, "find_blows", lambda *a, key=key: tuple(b for b in real(*a) if (b.low << 16) | b.high != key))
+            patch.setattr(synthesizer, "find_pulses", lambda *a, key=key: tuple(b for b in real(*a) if (b.low << 16) | b.high != key))
             without, _ = played(setup, synthesizer.copied(state), log, range(number, number + 7))
         first = int(np.floor((number - 3) * SR * DT + 1e-9))
         both = np.stack([pile.sound[0, first : first + without.shape[1]], without[0, : pile.sound.shape[1] - first]])

@@ -24,7 +24,7 @@ from sonic_bullet.effects.common.hum import without_hum
 from sonic_bullet.effects.measurement_chain import limit_of
 from sonic_bullet.estimator.fit.case_fit import CaseFit
 from sonic_bullet.estimator.fit.material_fit import fit_evidence
-from sonic_bullet.estimator.fit.observed import Evidence as Recorded
+from sonic_bullet.estimator.fit.recorded import RecordedObject as Recorded
 from sonic_bullet.estimator.lines.joint_lines import Lines, joint_lines, lines_of, noise_rms
 from sonic_bullet.estimator.lines.log_spectral import floor_between
 from sonic_bullet.files.cases import Case

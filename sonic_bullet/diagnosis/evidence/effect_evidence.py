@@ -14,9 +14,9 @@ import numpy as np
 from sonic_bullet.diagnosis.evidence.amplitude_dependence import fallen
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, impact_of, in_band, modes_of, moves, pattern, play, start
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
-from sonic_bullet.effects.protocol import Dereverberates, Evidence, ObjectEvidence, RingsBeside, Sound, Stage
-from sonic_bullet.estimator.fit.observed import Evidence as Recorded
+from sonic_bullet.effects.protocol import Dereverberates, Evidence, ObjectEvidence, RingsAlong, Sound, Stage
 from sonic_bullet.estimator.fit.pairing import DEGENERATE
+from sonic_bullet.estimator.fit.recorded import RecordedObject as Recorded
 from sonic_bullet.estimator.lines.joint_lines import Lines, noise_rms
 from sonic_bullet.records import Array, ModalModel
 
@@ -104,13 +104,13 @@ def _played(h: Hypothesis, body: Struck, strikes: list[int], signals: Array) -> 
         assert body.recorded is not None
         return np.stack([play(one, body, i, signals.shape[1], body.recorded.sr) for i in strikes])
 
-    all_of_it, rest = played(h), tuple(e for e in h.effects if not isinstance(e, RingsBeside))
+    all_of_it, rest = played(h), tuple(e for e in h.effects if not isinstance(e, RingsAlong))
     return all_of_it, None if len(rest) == len(h.effects) else signals - (all_of_it - played(replace(h, effects=rest)))
 
 
 def named(h: Hypothesis, lines: Lines) -> Array:
     """Which lines (l,), one of each mode, are nearest to what the hypothesis knows to ring beside the body: nobody else is told of these."""
-    beside = [np.array(e.lines(), float) for e in h.effects if isinstance(e, RingsBeside)]
+    beside = [np.array(e.lines(), float) for e in h.effects if isinstance(e, RingsAlong)]
     freq, decay = np.concatenate(beside, axis=1) if beside else np.zeros((2, 0))
     off, own = np.abs(lines.freq_hz[:, None] - freq), np.maximum(np.nan_to_num(lines.decay_per_s), 0.0)[:, None]
     alike = (off < decay / (2 * np.pi) + OWN * freq) & (np.maximum(own, decay) <= ALIKE * np.minimum(own, decay))

@@ -17,7 +17,7 @@ import numpy as np
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck, inward, modal_model
 from sonic_bullet.effects.protocol import Elastic
 from sonic_bullet.estimator.fit.case_fit import CaseFit
-from sonic_bullet.estimator.fit.observed import guess_of
+from sonic_bullet.estimator.fit.recorded import guess_of
 from sonic_bullet.files.cases import Case, CaseRecording
 from sonic_bullet.modal import read_mesh
 from sonic_bullet.modal.cache import Place

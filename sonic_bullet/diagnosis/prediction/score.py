@@ -13,7 +13,7 @@ import numpy as np
 
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, play
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
-from sonic_bullet.estimator.fit.observed import Evidence as Recorded
+from sonic_bullet.estimator.fit.recorded import RecordedObject as Recorded
 from sonic_bullet.estimator.lines.log_spectral import Floor, log_spectral_db, noise_floor_db, with_noise
 from sonic_bullet.records import Array
 

@@ -17,8 +17,8 @@ import numpy as np
 from sonic_bullet.effects.protocol import Elastic, Poisson
 from sonic_bullet.estimator.fit.case_fit import POISSON_SD, CaseFit, ObjectFit
 from sonic_bullet.estimator.fit.observation import pressure_weight
-from sonic_bullet.estimator.fit.observed import Evidence as Recorded
-from sonic_bullet.estimator.fit.observed import body_family, guess_of
+from sonic_bullet.estimator.fit.recorded import RecordedObject as Recorded
+from sonic_bullet.estimator.fit.recorded import body_family, guess_of
 from sonic_bullet.files.cases import Case, CaseRecording
 from sonic_bullet.modal.cache import Place
 from sonic_bullet.modal.reduced import Family

@@ -15,7 +15,7 @@ import numpy as np
 
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis
 from sonic_bullet.diagnosis.prediction.score import Judged, Take
-from sonic_bullet.estimator.fit.observed import Evidence as Recorded
+from sonic_bullet.estimator.fit.recorded import RecordedObject as Recorded
 from sonic_bullet.estimator.lines.joint_lines import Lines, lines_of, noise_rms
 from sonic_bullet.estimator.lines.log_spectral import log_spectral_db, with_noise
 from sonic_bullet.records import Array

@@ -28,7 +28,7 @@ from sonic_bullet.diagnosis.selection.acceptance import Candidate, earns, jackkn
 from sonic_bullet.diagnosis.selection.control_effect import Null
 from sonic_bullet.diagnosis.selection.decay_test import likelier, tells
 from sonic_bullet.effects.protocol import Cost, Dereverberates, Effect, Evidence, RotatesPairs, Stage
-from sonic_bullet.parallel import side_by_side
+from sonic_bullet.parallel import parallel_map
 
 KEPT = 0.75  # of the lines, in every fold
 DRAWS = 2  # of the null effect
@@ -88,7 +88,7 @@ def _proposed(group: list[type[Effect]], evidence: Evidence) -> dict[type[Effect
     """What each makes of the evidence; one that searches side by side would only do so in turn beside others."""
     rest = [kind for kind in group if kind.traits.cost is not Cost.SEARCHES]
     return {kind: kind.propose(evidence) for kind in group if kind not in rest} | dict(
-        zip(rest, side_by_side(lambda kind: kind.propose(evidence), rest), strict=True)
+        zip(rest, parallel_map(lambda kind: kind.propose(evidence), rest), strict=True)
     )
 
 
@@ -182,12 +182,12 @@ def _tried(kind: type[Effect], whole: Effect, h: Hypothesis, bodies: tuple[Struc
         lines = likelier(fold.base, beside, evidence, less, bodies) if isinstance(fold.take, Take) and tells(h, effect) else 0.0
         return Gain(effect, fold.least - after, fold.before - after, chance, lines)
 
-    found = side_by_side(judged, range(min(FIRST, len(folds))))
+    found = parallel_map(judged, range(min(FIRST, len(folds))))
     asked = Candidate(kind.id, whole, h, np.array([g.drop_db for g in found]), 0.0, 0.0, {}, impulse_n_s=_levels(folds))
     if may_earn(asked, np.array([f.least - f.noise for f in folds]), mean([f.before - f.noise for f in folds])) or tells(
         h, whole
     ):  # lines may speak for what strikes do not
-        found += side_by_side(judged, range(len(found), len(folds)))
+        found += parallel_map(judged, range(len(found), len(folds)))
     added = refitted(replace(h, effects=(*h.effects, whole)), bodies, evidence.observed)
     drop, whole_db, null_db = np.array([g.drop_db for g in found]), mean([g.whole_db for g in found]), mean([x for g in found for x in g.null_db])
     lines = mean([g.lines for g in found]) / (1 - KEPT)  # each line is left out in so many of the folds

@@ -24,7 +24,7 @@ from sonic_bullet.diagnosis.selection.decay_test import misfit, of_decays
 from sonic_bullet.diagnosis.selection.phase_test import HINT, NEARLY
 from sonic_bullet.diagnosis.selection.phase_test import misfit as phases
 from sonic_bullet.effects.protocol import Alternatives, Dereverberates, Effect, Evidence
-from sonic_bullet.parallel import side_by_side
+from sonic_bullet.parallel import parallel_map
 from sonic_bullet.records import Array
 
 TURNS = 2
@@ -74,7 +74,7 @@ def starts(h: Hypothesis, bodies: tuple[Struck, ...], band_hz: tuple[float, floa
 
 def settled(h: Hypothesis, bodies: tuple[Struck, ...], takes: Sequence[Take], band_hz: tuple[float, float]) -> Hypothesis:
     """The best of `together` from all starts by the fitted strikes; as many numbers each."""
-    ends = side_by_side(lambda start: together(start, bodies, band_hz), starts(h, bodies, band_hz))
+    ends = parallel_map(lambda start: together(start, bodies, band_hz), starts(h, bodies, band_hz))
     return min(ends, key=lambda end: mean_db(takes, end) or np.inf)
 
 
@@ -95,7 +95,7 @@ def left_out_db(h: Hypothesis, i: int, bodies: tuple[Struck, ...], takes: Sequen
     def without(take: Take) -> Less:
         return lambda told: thinned(told, take.place, 1.0, np.random.default_rng(0))
 
-    return np.array(side_by_side(lambda take: take.distance(again(h, i, bodies, band_hz, less=without(take))), takes))
+    return np.array(parallel_map(lambda take: take.distance(again(h, i, bodies, band_hz, less=without(take))), takes))
 
 
 def exchanged(

@@ -27,7 +27,7 @@ from sonic_bullet.diagnosis.selection.exchange import again
 from sonic_bullet.diagnosis.selection.phase_test import CLEAR, NEARLY, misfit
 from sonic_bullet.diagnosis.selection.simplest import helps
 from sonic_bullet.effects.protocol import Dereverberates
-from sonic_bullet.parallel import side_by_side
+from sonic_bullet.parallel import parallel_map
 
 LEFT = 0.25  # of the gap: two at once are twice as many choices, so they must say more than one after another
 
@@ -66,7 +66,7 @@ def pairwise(
                 found.append(Two(h, mean_db(takes, h) or np.inf))
         return found
 
-    pairs = [two for some in side_by_side(beside, first) for two in some]
+    pairs = [two for some in parallel_map(beside, first) for two in some]
     floor = least_db(takes, start) or 0.0
     gap = (mean_db(takes, start) or 0.0) - floor
     if not pairs or min(two.db for two in pairs) - floor > LEFT * gap:
@@ -112,7 +112,7 @@ def in_a_room(
         [c for c in movers if not mixes_neighbours(c.effect)],
         [c for c in movers if mixes_neighbours(c.effect)],
     ):  # what hardly moves modes is asked where nothing else will do
-        best = min((two for two in side_by_side(beside, some) if two is not None), key=lambda two: two.db, default=None)
+        best = min((two for two in parallel_map(beside, some) if two is not None), key=lambda two: two.db, default=None)
         if best is not None and best.db - floor <= LEFT * (left - floor):
             break
     else:

@@ -19,11 +19,11 @@ import numpy as np
 
 from sonic_bullet.effects.added_mass.free_body import FreeBody
 from sonic_bullet.effects.added_mass.mass_loaded_modes import attached, loaded
-from sonic_bullet.effects.added_mass.mass_search import WIDTHS, Scored, Trial, strict
+from sonic_bullet.effects.added_mass.mass_search import WIDTHS, MassFit, Scored, strict
 from sonic_bullet.effects.common.pairs import agreed, patterns
 from sonic_bullet.effects.common.points import nearest, spread_out, vertex_normals
 from sonic_bullet.effects.protocol import BaselineChange, ChangesBaseline, Cost, Evidence, Mixing, Owner, Stage, Traits
-from sonic_bullet.parallel import side_by_side
+from sonic_bullet.parallel import parallel_map
 from sonic_bullet.records import Array, ModalModel
 
 POINTS = 100
@@ -39,7 +39,7 @@ BETTER = (1.5, 0.12)  # in price: as much as a strong line and a half, paired we
 
 @dataclass(frozen=True)
 class AddedMass(ChangesBaseline):
-    """mass_kg riding on position_m (3,) of the surface, in the mesh's frame. yield_m_n: along the normal and across it, of what the model's modes leave out.
+    """mass_kg attached at position_m (3,) of the surface, in the mesh's frame. yield_m_n: along the normal and across it, of what the model's modes leave out.
 
     stretch: ln of what all frequencies of the bare body are to the baseline's; poisson_ratio: its ν, None for the baseline's. The host takes them over.
     """
@@ -80,7 +80,7 @@ class AddedMass(ChangesBaseline):
         observed = max(evidence.observed, key=lambda h: len(h.freq_hz) if h.plain is not None else 0)
         if observed.plain is None or len(observed.freq_hz) + len(observed.foreign_hz) < 8 or not observed.plain.mass_kg:
             return None
-        trial = Trial.of(observed)
+        trial = MassFit.of(observed)
         x = observed.plain
         if isinstance(evidence.known, cls):
             known = evidence.known
@@ -103,31 +103,31 @@ class AddedMass(ChangesBaseline):
             up, side = trial.rest(vertex)
             return [one for s in SHARES for y in YIELDS for one in trial.sifted(vertex, s * x.mass_kg, (y * up, y * side), WIDTHS[0])]
 
-        found = sorted(one for some in side_by_side(at, spread_out(x, POINTS).tolist()) for one in some)
+        found = sorted(one for some in parallel_map(at, spread_out(x, POINTS).tolist()) for one in some)
         first: dict[bool, dict[tuple[int, bool], Scored]] = {False: {}, True: {}}
         for one in found:  # one light and one heavy start a vertex, where the baseline's scale may be right and where it is wrong
             first[abs(one[4]) > FAR_OFF].setdefault((one[1], one[2] > 0.02 * x.mass_kg), one)
-        best = min(side_by_side(trial.refined, [start for some in first.values() for start in list(some.values())[:TRIES]]))
+        best = min(parallel_map(trial.refined, [start for some in first.values() for start in list(some.values())[:TRIES]]))
         again = sorted(trial.scored(int(v), *best[2:], WIDTHS[1]) for v in spread_out(x, 3 * POINTS))  # round bodies: as heavy, elsewhere
-        best = min(best, *side_by_side(lambda start: trial.refined(start, WIDTHS[1:]), again[: TRIES // 2]))
+        best = min(best, *parallel_map(lambda start: trial.refined(start, WIDTHS[1:]), again[: TRIES // 2]))
         bare = none[0] + trial.unlikely(trial.fitted)
         if best[0] > bare - max(BETTER[0], BETTER[1] * abs(bare)) or best[2] < LIGHTEST * x.mass_kg:
             return None
         return cls._at(x, best, observed.poisson is not None)
 
     @classmethod
-    def _at(cls, x: ModalModel, found: Scored, told: bool) -> Self:
-        """told: whether ν is."""
+    def _at(cls, x: ModalModel, found: Scored, poisson_identified: bool) -> Self:
+        """poisson_identified: whether ν is."""
         _, vertex, mass_kg, along, shift, ratio = found
         place = x.vertex_m[vertex]
         up, side = (float(y * np.exp(-2 * shift)) for y in along)
-        return cls((float(place[0]), float(place[1]), float(place[2])), float(mass_kg), (up, side), float(shift), float(ratio) if told else None)
+        return cls((float(place[0]), float(place[1]), float(place[2])), float(mass_kg), (up, side), float(shift), float(ratio) if poisson_identified else None)
 
 
 def _in_place(line_hz: Array, size: Array, mode_hz: Array, none: tuple[float, Array, Array, float]) -> bool:
     """Whether the bare body's modes are where the lines are, or most of what sounds (s, k) is: a mass leaves few in place, and something else splits or bends the others.
 
-    Of twins a mass leaves one, which stands still under it: only modes without a twin are asked.
+    Of degenerate modes a mass leaves one, which stands still under it: only modes without a degenerate partner are asked.
     """
     _, row, column, shift = none
     off = np.abs(np.log(line_hz[row] / mode_hz[column]) - shift)

@@ -1,6 +1,6 @@
 """A model with a mass on one of its points: what the point yields, what the body gives way as a whole, and the modes that come of it.
 
-(Λ − λ (1 + Φᵀ m' Φ)) q = 0,  Φ = (φ(p), √(λ_r R)) (3, n + 3),  m' = (1/m + G(p, p))⁻¹ (3, 3)      [added_mass.py, free_body.py]
+(Λ − λ (1 + Φᵀ m' Φ)) q = 0,  Φ = (φ(p), √(λ_r R)) (3, n + 3),  m' = (1/m + G(p, p))⁻¹ (3, 3)      [added_mass/__init__.py, free_body.py]
 """
 
 from __future__ import annotations

@@ -44,7 +44,7 @@ Scored = tuple[float, int, float, tuple[float, float], float, float]  # price, v
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Trial:
+class MassFit:
     """Prices of masses on one object: its lines and sizes, its bare model, that at strikes and sensor alone, and its normals."""
 
     observed: ObjectEvidence
@@ -57,7 +57,7 @@ class Trial:
     kept: dict[float, tuple[ModalModel, Array | None]] = field(default_factory=dict)  # by ν
 
     @classmethod
-    def of(cls, observed: ObjectEvidence) -> Trial:
+    def of(cls, observed: ObjectEvidence) -> MassFit:
         assert observed.plain is not None
         line, size, _, _ = every_line(observed)
         return cls(observed, line, size, observed.plain, _at_points(observed.plain, observed), vertex_normals(observed.plain), FreeBody.of(observed.plain))
@@ -76,17 +76,17 @@ class Trial:
 
     def unlikely(self, ratio: float) -> float:
         """Price of a ν, by how far it is from what was known of it."""
-        told = self.observed.poisson
-        return 0.0 if told is None else ((ratio - told.guess) / told.sd) ** 2 / 18
+        poisson_range = self.observed.poisson
+        return 0.0 if poisson_range is None else ((ratio - poisson_range.guess) / poisson_range.sd) ** 2 / 18
 
     def at(self, ratio: float) -> tuple[ModalModel, Array | None]:
         """The bare model at strikes and sensor at a ν, and its modes as sums (m, m) of the baseline's, None where they are those."""
-        told = self.observed.poisson
-        if told is None or ratio == told.fitted:
+        poisson_range = self.observed.poisson
+        if poisson_range is None or ratio == poisson_range.fitted:
             return self.small, None
         if ratio not in self.kept:
             x = self.small
-            freq, sums = told.at(ratio)
+            freq, sums = poisson_range.at(ratio)
             freq = np.sqrt(np.maximum(freq**2 - (x.decay_per_s / (2 * np.pi)) ** 2, (0.1 * freq) ** 2))
             order = np.argsort(freq, kind="stable")
             self.kept[ratio] = replace(x, freq_hz=freq[order], shape=x.shape @ sums[:, order].astype(np.float32)), sums[:, order]
@@ -103,12 +103,12 @@ class Trial:
         push = np.einsum("sxm,sx->sm", x.shape[:s].astype(float), observed.strike_direction) * level[:, None]
         return x.freq_hz, np.abs(push * np.einsum("xm,x->m", x.shape[s].astype(float), observed.sensor_direction))
 
-    def shifts(self, freq_hz: Array, told: Array) -> list[float]:
+    def shifts(self, freq_hz: Array, pattern: Array) -> list[float]:
         """None, and the common shifts of modes that most lines of their patterns (s, m) agree on, as two spectra on a logarithmic axis."""
         alike = 1.0
-        if len(self.size) > 1 and np.isfinite(self.size).all() and np.isfinite(told).all():
-            long = np.linalg.norm(self.size, axis=0)[:, None] * np.linalg.norm(told, axis=0)
-            alike = (self.size.T @ told / np.maximum(long, 1e-300)) ** 4
+        if len(self.size) > 1 and np.isfinite(self.size).all() and np.isfinite(pattern).all():
+            long = np.linalg.norm(self.size, axis=0)[:, None] * np.linalg.norm(pattern, axis=0)
+            alike = (self.size.T @ pattern / np.maximum(long, 1e-300)) ** 4
         gap = np.log(self.line)[:, None] - np.log(freq_hz)
         edge = np.arange(REACH[0] - BINS, REACH[1] + 2 * BINS, BINS)
         count = np.histogram(gap, edge, weights=np.broadcast_to(alike, gap.shape))[0]
@@ -161,13 +161,15 @@ class Trial:
 
     def _solid(self, ratio: float) -> float:
         """A ν that there may be, by what was known of it, in steps that keep few."""
-        told = self.observed.poisson
-        if told is None:
+        poisson_range = self.observed.poisson
+        if poisson_range is None:
             return ratio
-        return float(np.clip(round(ratio / FINE) * FINE, told.guess - MOST_SD * told.sd, min(told.guess + MOST_SD * told.sd, SOLID)))
+        return float(
+            np.clip(round(ratio / FINE) * FINE, poisson_range.guess - MOST_SD * poisson_range.sd, min(poisson_range.guess + MOST_SD * poisson_range.sd, SOLID))
+        )
 
     def polished(self, best: Scored, width: float) -> Scored:
-        """The same with its numbers at its place fitted to its pairs, which are told again with every step."""
+        """The same with its numbers at its place fitted to its pairs, which are assigned again with every step."""
         for _ in range(POLISH):
             step = self._step(best, width)
             better = best
@@ -199,9 +201,9 @@ class Trial:
             if k == 3 and other == ratio:
                 continue
             slope[:, k] = np.log(self.loaded(vertex, mass, along, other)[0][column] / made[0][column]) / SMALL[k]
-        told = self.observed.poisson
-        pull = np.array([0, 0, 0, (told.guess - ratio) / told.sd**2 if told is not None else 0.0, 0])
+        poisson_range = self.observed.poisson
+        pull = np.array([0, 0, 0, (poisson_range.guess - ratio) / poisson_range.sd**2 if poisson_range is not None else 0.0, 0])
         weight = 1 / (1 + (off / width) ** 2) / width**2
-        held = np.diag(np.array([1.0, 1.0, 1.0, told.sd if told is not None else 1.0, 1.0]) ** -2)
+        held = np.diag(np.array([1.0, 1.0, 1.0, poisson_range.sd if poisson_range is not None else 1.0, 1.0]) ** -2)
         step = np.linalg.solve((slope.T * weight) @ slope + held, (slope.T * weight) @ off + pull)
         return np.asarray(np.clip(step, -np.array(MOST), MOST))

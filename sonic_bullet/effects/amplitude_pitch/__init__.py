@@ -3,7 +3,7 @@
     ω(t) = ω (1 + b a²(t))                                                    [Nayfeh & Mook 1979, eq. 2.3.35: the Duffing oscillator]
 
 Read off the phase of single modes: θ(t) = θ₀ + δ t + b a₀² ω (1 − e^{−2dt})/2d, θ₀ each strike's own, δ the mode's, b of all;
-by modes without a twin, where there are enough that are sure of it, else by all, pairs about their own axes (glided.py).
+by modes without a degenerate partner, where there are enough that are sure of it, else by all, pairs about their own axes (degenerate_pitch.py).
 """
 
 from __future__ import annotations
@@ -13,27 +13,27 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from sonic_bullet.effects.amplitude_pitch.degenerate_pitch import axes_of, bend_beside
+from sonic_bullet.effects.amplitude_pitch.degenerate_pitch import axes_of, bend_with_axes
 from sonic_bullet.effects.common.axes import degenerate, turned
 from sonic_bullet.effects.common.envelope import Envelopes, envelopes, falls, levels
-from sonic_bullet.effects.common.proofs import finite, one_of, side_by_side
+from sonic_bullet.effects.common.proofs import finite, one_of, same_length
 from sonic_bullet.effects.protocol import Evidence, ObjectEvidence, Owner, Ring, RotatesPairs, Stage, Traits
 from sonic_bullet.records import Array, ModalModel
 
 MEASURES = ("impulse", "velocity", "displacement")
 STANDARD_ERRORS = 5.0  # spreads that b must stand off zero
 BETTER = 0.5  # of the phases' misfit must go, in modes that b would move
-FEWEST = 1.5  # of such modes
-FAR = np.geomspace(0.6, 1.7, 12)  # times the bend that twins were told with as if each pair were one mode
+FEWEST_MODES = 1.5  # of such modes
+FAR = np.geomspace(0.6, 1.7, 12)  # times the bend that degenerate modes were identified with as if each pair were one mode
 NEAR = np.geomspace(0.93, 1.07, 5)  # about what that leads to
-ENOUGH = 3  # modes without a twin, to be asked alone
+ENOUGH = 3  # modes without a degenerate partner, to be asked alone
 
 
 @dataclass(frozen=True, slots=True)
 class Slope:
     """b, its spread, the share of the phases' misfit that goes with it in modes it would move, and how many modes' misfit that is.
 
-    single: whether it is told by modes without a twin alone.
+    single: whether it is identified by modes without a degenerate partner alone.
     """
 
     bend: float
@@ -45,7 +45,7 @@ class Slope:
 
 @dataclass(frozen=True)
 class AmplitudePitch(RotatesPairs):
-    """bend: relative rise of frequency per level². measure: of the level, one of MEASURES, in N·s, m/s or m. freq_hz, turn_rad: of twins, and how far their axes
+    """bend: relative rise of frequency per level². measure: of the level, one of MEASURES, in N·s, m/s or m. freq_hz, turn_rad: of degenerate modes, and how far their axes
     are turned from the mesh's.
     """
 
@@ -65,14 +65,14 @@ class AmplitudePitch(RotatesPairs):
         finite("bend", self.bend)
         finite("freq_hz", *self.freq_hz, least=1e-3)
         finite("turn_rad", *self.turn_rad)
-        side_by_side(freq_hz=self.freq_hz, turn_rad=self.turn_rad)
+        same_length(freq_hz=self.freq_hz, turn_rad=self.turn_rad)
 
     def apply(self, x: Ring) -> Ring:
         """The ringing with the effect in it."""
         return replace(x, bend=x.bend + self.bend * _per_velocity(x, self.measure) ** 2)
 
     def turned(self, x: ModalModel) -> ModalModel:
-        """The modes as they were, twins about their own axes."""
+        """The modes as they were, degenerate modes about their own axes."""
         return turned(x, self.freq_hz, self.turn_rad)
 
     def angles(self) -> int:
@@ -96,18 +96,18 @@ class AmplitudePitch(RotatesPairs):
             for name, b in (_slopes(e, h, known) if e is not None else {}).items():
                 if best is None or b.modes > best[0]:
                     assert e is not None
-                    best = (b.modes, cls._beside_twins(e, h, name, b, known, evidence.on_trial))
+                    best = (b.modes, cls._with_axes(e, h, name, b, known, evidence.on_trial))
         return best[1] if best is not None else None
 
     @classmethod
-    def _beside_twins(cls, e: Envelopes, h: ObjectEvidence, measure: str, b: Slope, known: AmplitudePitch | None, held: bool) -> Self:
-        """The same with the axes of twins, known's if held; where hardly a mode is without its twin, their bend with it."""
+    def _with_axes(cls, e: Envelopes, h: ObjectEvidence, measure: str, b: Slope, known: AmplitudePitch | None, held: bool) -> Self:
+        """The same with the axes of degenerate modes, known's if held; where hardly a mode is without its degenerate partner, their bend with it."""
         if h.model is None or measure == "impulse":
             return cls(b.bend, measure)
         bend = b.bend
         if not b.single:
-            bend = known.bend if known is not None else bend_beside(e, h, measure, bend, FAR)
-            bend = bend_beside(e, h, measure, bend, NEAR)
+            bend = known.bend if known is not None else bend_with_axes(e, h, measure, bend, FAR)
+            bend = bend_with_axes(e, h, measure, bend, NEAR)
         if held and known is not None:
             return cls(bend, measure, known.freq_hz, known.turn_rad)
         return cls(bend, measure, *axes_of(e, h, measure, bend))
@@ -123,8 +123,8 @@ def _per_velocity(x: Ring, measure: str) -> Array:
 
 
 def _slopes(e: Envelopes, h: ObjectEvidence, known: AmplitudePitch | None) -> dict[str, Slope]:
-    """Of every measure that lines are sure of: modes without a twin where those are ENOUGH and sure of any, else all. known: what all evidence said."""
-    single = np.array([not degenerate(h, k) for k in e.line.tolist()], bool)  # twins glide each by its own level
+    """Of every measure that lines are sure of: modes without a degenerate partner where those are ENOUGH and sure of any, else all. known: what all evidence said."""
+    single = np.array([not degenerate(h, k) for k in e.line.tolist()], bool)  # the frequencies of degenerate modes drift each by its own level
     rows = {
         name: np.array([one or (0.0, 0.0, 0.0) for one in (_moments(e, h, level[:, e.line], q) for q in range(len(e.line)))]).reshape(-1, 3)
         for name, level in levels(h).items()
@@ -135,14 +135,14 @@ def _slopes(e: Envelopes, h: ObjectEvidence, known: AmplitudePitch | None) -> di
         for name, row in rows.items():
             good = (row[:, 0] > 0) & (row[:, 2] > 0) & (single if alone else True)
             b = _agreed(row[good], alone)
-            if good.sum() >= (ENOUGH if alone else 1) and _sure(b, known):
+            if good.sum() >= (ENOUGH if alone else 1) and _significant(b, known):
                 found[name] = b
         if found:
             break
     return found
 
 
-def _sure(b: Slope, known: AmplitudePitch | None) -> bool:
+def _significant(b: Slope, known: AmplitudePitch | None) -> bool:
     """Whether lines are sure of b; by fewer strikes, that it is no less than nothing of what all said (known)."""
     if known is None:
         return abs(b.bend) > STANDARD_ERRORS * b.sd and b.share > BETTER
@@ -163,7 +163,7 @@ def _agreed(table: Array, single: bool) -> Slope:
     says = np.minimum(centre**2 * weight, 1.0)  # of a mode's misfit, as much as a bend would be of it: the others have no say
     gone = np.maximum((2 * centre * xy - centre**2 * xx) / yy, -1.0)
     sd = float(np.sqrt(((says * (value - centre)) ** 2).sum()) / max(says.sum(), 1e-300))
-    alone = says.sum() ** 2 / max(float((says**2).sum()), 1e-300) < FEWEST
+    alone = says.sum() ** 2 / max(float((says**2).sum()), 1e-300) < FEWEST_MODES
     return Slope(centre, np.inf if alone else max(sd, 1e-300), float((says * gone).sum() / max(says.sum(), 1e-300)), float(gone.sum()), single)
 
 

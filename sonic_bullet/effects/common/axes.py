@@ -1,8 +1,8 @@
-"""Axes of twins: two modes of one frequency swing about whatever axes an imperfection gives them, and a mesh gives them any.
+"""Axes of degenerate modes: two modes of one frequency swing about whatever axes an imperfection gives them, and a mesh gives them any.
 
     (a, b) -> (cos ψ a + sin ψ b, −sin ψ a + cos ψ b)          [Rayleigh 1894, § 221]
 
-Their sum is the same under every ψ as long as both are linear. Not so where each goes with its own level: then ψ is heard.
+Their sum is the same under every ψ as long as both are linear. Not so where each goes with its own level: then ψ is observable.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ from sonic_bullet.effects.protocol import ObjectEvidence
 from sonic_bullet.records import Array, ModalModel
 
 PAIR = 6e-3  # relative: modes of a mesh nearer than this may be a pair
-MESHED = 1.5e-3  # relative: modes that a mesh leaves nearer to each other are twins that it tore apart
-ONE = 1e-4  # relative: twins that corrections have not brought nearer than this are played as two, and turned they would be two others
-ANGLES = np.arange(18) * np.pi / 36  # a quarter turn changes the twins about, and no more
+MESHED = 1.5e-3  # relative: modes that a mesh leaves nearer to each other are degenerate modes that it split apart
+ONE = 1e-4  # relative: degenerate modes that corrections have not brought nearer than this are played as two, and turned they would be two others
+ANGLES = np.arange(18) * np.pi / 36  # a quarter turn changes the degenerate modes about, and no more
 
 
 def pair_at(freq: Array, f: float) -> tuple[int, int]:
@@ -32,7 +32,7 @@ def pair_at(freq: Array, f: float) -> tuple[int, int]:
 
 
 def about_axes(pair: Array, turn_rad: float) -> Array:
-    """Shapes (…, 2) of two twins about axes turned by ψ."""
+    """Shapes (…, 2) of two degenerate modes about axes turned by ψ."""
     c, s = math.cos(turn_rad), math.sin(turn_rad)
     a, b = pair[..., 0], pair[..., 1]
     return np.stack([c * a + s * b, -s * a + c * b], axis=-1)
@@ -53,7 +53,7 @@ def split_apart(h: ObjectEvidence, k: int) -> bool:
 
 
 def about(h: ObjectEvidence, k: int, measure: str, angle: Array) -> tuple[Array, Array]:
-    """Amplitudes at the sensor, but for one factor, and levels (p, s, j) of the modes a line stands for, with twins turned by p angles. measure: see envelope.levels."""
+    """Amplitudes at the sensor, but for one factor, and levels (p, s, j) of the modes a line stands for, with degenerate modes turned by p angles. measure: see envelope.levels."""
     impulse = np.where(np.isfinite(h.impulse_n_s), h.impulse_n_s, 1.0)[:, None]
     if h.model is None:
         pressed = h.pressed[:, h.mode[k]].max(axis=1)[None, :, None]
@@ -73,7 +73,7 @@ def about(h: ObjectEvidence, k: int, measure: str, angle: Array) -> tuple[Array,
 
 
 def turned(x: ModalModel, freq_hz: tuple[float, ...], turn_rad: tuple[float, ...]) -> ModalModel:
-    """The model with the twins about each frequency turned to other axes."""
+    """The model with the degenerate modes about each frequency turned to other axes."""
     if not freq_hz:
         return x
     shape = x.shape.copy()

@@ -24,16 +24,16 @@ FRAMES = 96
 MOST_SAID = 1e4  # by one frame
 NEPERS = 8.0  # of a line's decay are looked at
 SELF = 0.006  # relative: lines nearer than this may be one bent mode
-FAR, FASTER = 0.15, 5.0  # of a frequency; of a decay: a line that near and that short is what a mode was before it had glided down, or up
+FAR, FASTER = 0.15, 5.0  # of a frequency; of a decay: a line that near and that short is what a mode was before its frequency had drifted down, or up
 LINK = 4.0  # of the shorter line's decay: how far in ω two lines of a chain are
-HELD = 0.8  # of 2/L to both sides, at most: what the window holds of a glide
+HELD = 0.8  # of 2/L to both sides, at most: what the window holds of a drifting frequency
 CLEAR = 12.0  # of |z| over the noise in it
 STEP = 1024  # samples between two exact phasors
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Envelopes:
-    """z (s, q, t) complex of q lines at times time_s (q, t), each line its own; good (s, q, t) where it stands clear; line (q,): which of the heard.
+    """z (s, q, t) complex of q lines at times time_s (q, t), each line its own; good (s, q, t) where it stands clear; line (q,): which of the observed.
 
     phase (s, q, t): of z, without jumps, however few the frames are. noise (s, q). window_s (q,): L.
     """
@@ -144,7 +144,7 @@ def alone(h: ObjectEvidence) -> tuple[list[int], list[int]]:
 
 
 def _chains(freq_hz: Array, decay_per_s: Array) -> Array:
-    """Which chain each line (k,) belongs to: lines so near each other, for their decays, that one mode that glides may have left them."""
+    """Which chain each line (k,) belongs to: lines so near each other, for their decays, that one mode of drifting frequency may have left them."""
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import connected_components
 
@@ -155,7 +155,7 @@ def _chains(freq_hz: Array, decay_per_s: Array) -> Array:
 
 
 def levels(h: ObjectEvidence) -> dict[str, Array]:
-    """How hard each line (s, k) is driven, by three measures of what the pulse leaves of a blow: its impulse, and peak velocity and peak displacement at the body's surface."""
+    """How hard each line (s, k) is driven, by three measures of what the pulse leaves of an impact: its impulse, and peak velocity and peak displacement at the body's surface."""
     level = np.where(np.isfinite(h.impulse_n_s), h.impulse_n_s, 1.0)
     found = {"impulse": level[:, None] * np.stack([h.pressed[:, m].max(axis=1) for m in h.mode], axis=1)}
     if h.model is None:
@@ -167,8 +167,8 @@ def levels(h: ObjectEvidence) -> dict[str, Array]:
     return found | {"velocity": velocity, "displacement": velocity / (2 * np.pi * h.freq_hz)}
 
 
-def falls(e: Envelopes, q: int, told: float) -> float:
-    """The decay of a line's own level, in 1/s: a mode that glides is several lines to a linear fit, none with its decay. told: by those; what comes back where too little is clear."""
+def falls(e: Envelopes, q: int, fitted: float) -> float:
+    """The decay of a line's own level, in 1/s: a mode of drifting frequency is several lines to a linear fit, none with its decay. fitted: by those; what comes back where too little is clear."""
     top = bottom = 0.0
     for s in range(len(e.z)):
         use = e.good[s, q]
@@ -180,7 +180,7 @@ def falls(e: Envelopes, q: int, told: float) -> float:
         if (w > 0).sum() < 8:
             continue
         off = np.clip(off, -HELD, HELD)
-        level = np.log(size * (1 - off**2) / np.sinc(off))  # while it glides, it is heard through the window's skirt
+        level = np.log(size * (1 - off**2) / np.sinc(off))  # while its frequency drifts, it is observed through the window's skirt
         t = t - np.average(t, weights=w)
         top, bottom = top - float((w * t * level).sum()), bottom + float((w * t * t).sum())
-    return max(top / bottom if bottom > 0 else told, 1e-3)
+    return max(top / bottom if bottom > 0 else fitted, 1e-3)

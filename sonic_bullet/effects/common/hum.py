@@ -19,7 +19,7 @@ MOST = 8  # multiples
 ABOVE = 30.0  # times the power beside it
 STEADY = 1.6  # loudest over softest recording
 STILL = 0.2  # ln of its amplitude in the second half of the tails over that in the first, at most: modes fade
-FEWEST, LEAST_S = 2, 0.2  # recordings, and the length of their tails
+FEWEST_RECORDINGS, LEAST_S = 2, 0.2  # recordings, and the length of their tails
 LOW, UNLIKE = 2, 2.0  # multiples where no mode is to be expected; loudest over softest peak of strikes, with which a mode would go
 
 
@@ -35,14 +35,14 @@ class Hum:
 def hum_of(signals: Array, noise: Array, sr: int, known_hz: float = 0.0) -> Hum | None:
     """What hums in recordings (s, n) over a noise (s,); None where no tone has one amplitude in all of them, and from first to last.
 
-    known_hz: as other recordings told it; then one will do.
+    known_hz: as other recordings gave it; then one will do.
     """
     from scipy.optimize import minimize_scalar
 
     start = signals.shape[1] - signals.shape[1] // 3
     tail = signals[:, start:]
     n = tail.shape[1]
-    if len(signals) < (1 if known_hz else FEWEST) or n < LEAST_S * sr:
+    if len(signals) < (1 if known_hz else FEWEST_RECORDINGS) or n < LEAST_S * sr:
         return None
     shape = np.hanning(n)
     spectrum = np.fft.rfft(tail * shape, 4 * n, axis=1)
@@ -54,8 +54,8 @@ def hum_of(signals: Array, noise: Array, sr: int, known_hz: float = 0.0) -> Hum 
         near = np.flatnonzero(np.abs(hz - mains) < (hz[1] if known_hz else 1.2 * mains / 50))
         if not len(near):
             continue
-        beside = np.array([np.median(power[:, np.abs(np.abs(hz - i * mains) - 0.3 * mains) < 0.15 * mains], axis=1) for i in multiple])  # pink rooms
-        least = np.maximum(beside / np.log(2), floor)  # (i, s)
+        background = np.array([np.median(power[:, np.abs(np.abs(hz - i * mains) - 0.3 * mains) < 0.15 * mains], axis=1) for i in multiple])  # pink rooms
+        least = np.maximum(background / np.log(2), floor)  # (i, s)
         tone = np.array([(power[:, np.minimum(i * near, len(hz) - 1)] / least[i - 1][:, None]).min(axis=0) for i in multiple])
         score = np.log1p(tone / ABOVE).sum(axis=0)
         at = int(score.argmax())

@@ -44,8 +44,8 @@ def agreed(
         size, pattern = np.ones((1, len(line_hz))), np.ones((1, len(mode_hz)))
     strength = size.max(axis=0)
     worth = np.clip(1 + 0.25 * np.log10(np.maximum(strength / strength.max(), 1e-6)), 0.1, 1)
-    told = pattern.max(axis=0)
-    force = np.clip(1 + 0.25 * np.log10(np.maximum(told / max(told.max(), 1e-300), 1e-6)), 0.1, 1)
+    participation = pattern.max(axis=0)
+    force = np.clip(1 + 0.25 * np.log10(np.maximum(participation / max(participation.max(), 1e-300), 1e-6)), 0.1, 1)
     if len(size) > 1:
         alike = (size.T @ pattern) / np.maximum(np.linalg.norm(size, axis=0)[:, None] * np.linalg.norm(pattern, axis=0)[None, :], 1e-300)
     else:

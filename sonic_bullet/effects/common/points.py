@@ -45,7 +45,7 @@ def solved(y: Array, sd: Array, columns: Array) -> tuple[Array, Array]:
 
     weight = 1 / sd
     size = np.sqrt(((columns * weight[:, None]) ** 2).sum(axis=0))
-    scale = np.divide(1, size, out=np.zeros(len(size)), where=size > 0)  # of what nothing is told, nothing is said
+    scale = np.divide(1, size, out=np.zeros(len(size)), where=size > 0)  # of what nothing is known, nothing is said
     a, b = columns * scale * weight[:, None], y * weight
     trust, x = np.ones(len(y)), np.zeros(columns.shape[1])
     for _ in range(8):

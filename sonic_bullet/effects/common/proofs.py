@@ -23,7 +23,7 @@ def finite(name: str, *values: float, least: float = -math.inf, most: float = ma
             raise RecordError(f"{name} is {value}", "use a finite number" + within)
 
 
-def side_by_side(**fields: Sequence[Any]) -> None:
+def same_length(**fields: Sequence[Any]) -> None:
     """Raise RecordError where lists that belong together are not as long as each other."""
     if len({len(values) for values in fields.values()}) > 1:
         raise RecordError(", ".join(f"{name} holds {len(values)}" for name, values in fields.items()), "give as many of each")

@@ -28,16 +28,16 @@ SHARES = np.geomspace(1e-3, 4.0, 9)  # |A|² w² over what the first frame sugge
 SHIFTS = 21
 FAINT = 1e-25  # of the direct sound's power
 PATTERN = 0.03  # of a line's strongest: what shapes are wrong by
-FASTEST = 300.0  # 1/s: what dies sooner is gone within a frame or two, and how soon is not told
+FASTEST = 300.0  # 1/s: what dies sooner is gone within a frame or two, and how soon is not identifiable
 LIKE = 0.7  # squared cosine of amplitudes over the strikes and what the model says: a line less like its mode is the room's own
-OWNS = 8.0  # times longer than it is heard to ring: no line's own, though a tail makes several of one, which end sooner
+OWNS = 8.0  # times longer than it is observed to ring: no line's own, though a tail makes several of one, which end sooner
 OUTLASTS = 0.5  # of the tail's decay: what falls slower has the recording to itself in the end
 STANDARD_ERRORS = 0.1  # of a decay and of an amplitude: the tail's early echoes are no noise
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Read:
-    """k lines at each δ of t: ln_likelihood, decay_per_s and its ln_sd, shift_hz, amplitude (over the model's so far) with amplitude_sd, wet: all (t, k).
+    """k lines at each δ of t: ln_likelihood, decay_per_s and its ln_sd, shift_hz, amplitude (over the model's so far) with amplitude_sd, reverberant_level: all (t, k).
 
     plain (k,): ln likelihood of the line without a tail, at the same decays.
     """
@@ -50,11 +50,11 @@ class Read:
     shift_hz: Array
     amplitude: Array
     amplitude_sd: Array
-    wet_level: Array
+    reverberant_level: Array
 
 
 def read(h: ObjectEvidence, delta: Array, freq_hz: Array, own: Array, members: Sequence[Array], *, every: int = 1) -> Read:
-    """Lines at freq_hz (k,) at some δ (t,). own (s, k): what A is told in units of, complex; members: the modes that each is, so that others are its neighbours.
+    """Lines at freq_hz (k,) at some δ (t,). own (s, k): what A is in units of, complex; members: the modes that each is, so that others are its neighbours.
 
     every: of the decays how many are looked at, for a first look.
     """
@@ -68,10 +68,10 @@ def read(h: ObjectEvidence, delta: Array, freq_hz: Array, own: Array, members: S
 
 def modes(h: ObjectEvidence, delta: Array, lines: Array, *, every: int = 1) -> Read:
     """Some of an object's lines (k,), by index, in units of what the model so far says of them."""
-    return read(h, delta, h.freq_hz[lines], told(h)[:, lines], [h.mode[k] for k in lines], every=every)
+    return read(h, delta, h.freq_hz[lines], expected_amplitude(h)[:, lines], [h.mode[k] for k in lines], every=every)
 
 
-def told(h: ObjectEvidence) -> Array:
+def expected_amplitude(h: ObjectEvidence) -> Array:
     """What the model so far says of the lines (s, k), complex."""
     return np.stack([h.push[:, m].sum(axis=1) for m in h.mode], axis=1)
 
@@ -95,7 +95,7 @@ def dereverberated(h: ObjectEvidence, delta: float) -> ObjectEvidence:
     if h.dry or h.signal is None or not len(h.freq_hz) or h.signal.shape[1] < LEAST * FRAME_S * h.sr:
         return h
     r = through(h, delta)
-    own, decay = told(h), r.decay_per_s[0]
+    own, decay = expected_amplitude(h), r.decay_per_s[0]
     amplitude, spread = _rescaled(r, own, h.amplitude, h.amplitude_sd)
     like = np.abs((np.conj(own) * h.amplitude).sum(axis=0)) ** 2 / np.maximum((np.abs(own) ** 2).sum(axis=0) * (np.abs(h.amplitude) ** 2).sum(axis=0), 1e-300)
     ln_sd = np.where((decay > FASTEST) | (like < LIKE), np.inf, np.hypot(r.ln_sd[0], STANDARD_ERRORS))
@@ -116,7 +116,7 @@ def dereverberated(h: ObjectEvidence, delta: float) -> ObjectEvidence:
     r = read(h, np.array([delta]), h.foreign_hz, alone, [np.zeros(0, int)] * len(h.foreign_hz))
     amplitude, _ = _rescaled(r, alone, h.foreign_amplitude, h.foreign_sd)
     strange = h.foreign_sd * np.abs(amplitude) / np.maximum(np.abs(h.foreign_amplitude), 1e-300)  # what strikes have in common says nothing of how they differ
-    other = r.decay_per_s[0] * OWNS < h.foreign_decay_per_s  # a tail prolongs: what is read to ring longer than it is heard to is a neighbour's
+    other = r.decay_per_s[0] * OWNS < h.foreign_decay_per_s  # a tail prolongs: what is read to ring longer than it is observed to is a neighbour's
     return replace(
         dry,
         foreign_hz=h.foreign_hz + np.where(other, 0, r.shift_hz[0]),
@@ -129,10 +129,10 @@ def dereverberated(h: ObjectEvidence, delta: float) -> ObjectEvidence:
 def _rescaled(r: Read, own: Array, amplitude: Array, sd: Array) -> tuple[Array, Array]:
     """Amplitudes and spreads (s, k) with what all strikes have in common read anew."""
     now = (np.conj(own) * amplitude).sum(axis=0) / np.maximum((np.abs(own) ** 2).sum(axis=0), 1e-300)
-    silent = (np.abs(own).sum(axis=0) == 0) | (now == 0)  # the model says nothing of them: they stay as they were heard
+    silent = (np.abs(own).sum(axis=0) == 0) | (now == 0)  # the model says nothing of them: they stay as they were observed
     factor = np.where(silent, 1, r.amplitude[0] / np.where(silent, 1, now))
     common = np.abs(own) * np.hypot(r.amplitude_sd[0], STANDARD_ERRORS * np.abs(r.amplitude[0]))
-    common = np.maximum(common, STANDARD_ERRORS * np.abs(amplitude * factor))  # where a mode is hardly struck, more is heard of it than the model says
+    common = np.maximum(common, STANDARD_ERRORS * np.abs(amplitude * factor))  # where a mode is hardly struck, more is observed of it than the model says
     return amplitude * factor, np.hypot(sd * np.abs(factor), common)
 
 
@@ -197,7 +197,7 @@ def _overlap(time: Array) -> Array:
 
 @lru_cache(maxsize=1500)
 def _tail(time: tuple[float, ...], decay: float, delta: float) -> tuple[Array, Array, Array]:
-    """What a decay and a rate say of frames (n,), whatever the line: their first mean, variances (n,) of a tail of unit wet along uncorrelated
+    """What a decay and a rate say of frames (n,), whatever the line: their first mean, variances (n,) of a tail of unit reverberant level along uncorrelated
     directions, for white noise of unit variance, and the frames' means and directions there (n, 1 + n)."""
     at = np.array(time)
     node, weight = (np.arange(NODES) + 0.5) / NODES * FRAME_S, np.hanning(NODES + 2)[1:-1]
@@ -233,13 +233,13 @@ def _at(z: Array, noise: Array, time: tuple[float, ...], decay: float, delta: fl
     pick = np.take_along_axis(cross, best[:, :, None], axis=2)[:, :, 0]
     left = np.take_along_axis(power, best[:, :, None], axis=2)[:, :, 0] - np.abs(pick) ** 2 / size
     amplitude = pick / size
-    wet_level = np.sqrt(scale) / np.maximum(np.abs(amplitude), 1e-300)
-    return -left + np.log(over).sum(axis=2), amplitude, 1 / np.sqrt(size), shift[best], wet_level
+    reverberant_level = np.sqrt(scale) / np.maximum(np.abs(amplitude), 1e-300)
+    return -left + np.log(over).sum(axis=2), amplitude, 1 / np.sqrt(size), shift[best], reverberant_level
 
 
 def _summed(delta: Array, decays: Array, rows: list[list[tuple[Array, ...]]]) -> Read:
-    """Over decays and wets: means of ln d and ln w, the rest at the likeliest."""
-    like, amplitude, sd, shift, wet_level = (np.array([[one[i] for one in row] for row in rows]) for i in range(5))  # (t, d, k, w)
+    """Over decays and reverberant levels: means of ln d and ln w, the rest at the likeliest."""
+    like, amplitude, sd, shift, reverberant_level = (np.array([[one[i] for one in row] for row in rows]) for i in range(5))  # (t, d, k, w)
     t, _, k, _ = like.shape
     top = like.max(axis=(1, 3), keepdims=True)
     share = np.exp(like - top)
@@ -250,8 +250,8 @@ def _summed(delta: Array, decays: Array, rows: list[list[tuple[Array, ...]]]) ->
     flat = like.transpose(0, 2, 1, 3).reshape(t, k, -1)
     best = flat.argmax(axis=2)[:, :, None]
     at = [np.take_along_axis(x.transpose(0, 2, 1, 3).reshape(t, k, -1), best, axis=2)[:, :, 0] for x in (amplitude, sd, shift)]
-    wetness = np.exp((share * np.log(np.maximum(wet_level, 1e-300))).sum(axis=(1, 3)) / total)
+    mean_level = np.exp((share * np.log(np.maximum(reverberant_level, 1e-300))).sum(axis=(1, 3)) / total)
     plain = like[:, :, :, 0].max(axis=(0, 1))
     step = np.log(decays[1] / decays[0])
     ln_sd = np.sqrt(np.maximum(square - mean**2, 0) + step**2 / 12)
-    return Read(delta, top[:, 0, :, 0] + np.log(total), plain, np.exp(mean), ln_sd, at[2], at[0], at[1], wetness)
+    return Read(delta, top[:, 0, :, 0] + np.log(total), plain, np.exp(mean), ln_sd, at[2], at[0], at[1], mean_level)

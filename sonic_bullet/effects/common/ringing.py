@@ -1,10 +1,10 @@
 """Modes that ring, sample by sample: linear ones by recursion, level-dependent ones in closed form.
 
     linear             x_m(t) = Re A e^{(−d + iω)t}
-    choke c            ȧ = −d a (1 + c (a/a₀)^p)      ->  a(t)/a₀ = ((1 + c) e^{pdt} − c)^{−1/p}, p = 1, 2   (Bernoulli's equation)
+    growth c           ȧ = −d a (1 + c (a/a₀)^p)      ->  a(t)/a₀ = ((1 + c) e^{pdt} − c)^{−1/p}, p = 1, 2   (Bernoulli's equation)
     bend b             ω(t) = ω (1 + b a²(t))         ->  phase ω(t + b ∫a²dt)
 
-a is the mode's level (peak velocity at the surface); ∫a² dt = a₀² (1 − e^{−2dt})/2d without choke; a₀² ln(1 + c − c e^{−2dt})/2dc with p = 2; and with p = 1,
+a is the mode's level (peak velocity at the surface); ∫a² dt = a₀² (1 − e^{−2dt})/2d without damping growth; a₀² ln(1 + c − c e^{−2dt})/2dc with p = 2; and with p = 1,
 u = e^{dt}, k = c/(1 + c):   ∫ a² dt = a₀²/(d (1 + c)²) ∫₁ᵘ dv/(v (v − k)²) = a₀²/(d (1 + c)²) [ln(v/(v − k))/k² − 1/(k (v − k))]₁ᵘ.
 """
 
@@ -37,7 +37,7 @@ def _linear(out, start, pole, amplitude, length):
 
 @njit(cache=True, nogil=True)
 def _level(out, start, sr, omega, decay, amplitude, bend, damping_growth, power, length):
-    """The same with ω(t) and d(t) that depend on the mode's level; bend and choke at the level the mode starts with, (choke·level)^power."""
+    """The same with ω(t) and d(t) that depend on the mode's level; bend and damping growth at the level the mode starts with, (damping_growth·level)^power."""
     for k in range(len(omega)):
         first = int(np.ceil(start))
         last = min(len(out), first + length[k])
@@ -66,7 +66,7 @@ def _level(out, start, sr, omega, decay, amplitude, bend, damping_growth, power,
 
 
 def sounded(ring: Ring, impact: Impact, n: int, sr: int) -> Array:
-    """The ring's sound (n,) under every hit of the blow; modes above Nyquist are left out."""
+    """The ring's sound (n,) under every hit of the impact; modes above Nyquist are left out."""
     out = np.zeros(n)
     use = (ring.freq_hz < 0.5 * sr) & (np.abs(ring.amplitude) > 0)
     if not use.any():

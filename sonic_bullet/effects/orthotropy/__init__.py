@@ -2,7 +2,7 @@
 
     σ = C ε with C cubic (3 constants), hexagonal about x, y or z (5) or orthorhombic (9)      [Nye 1957, ch. VIII; Migliori et al. 1993]
 
-Read off all lines, whatever isotropic modes they were paired with (elasticities.py); None where isotropy does as well. Density is the guess's:
+Read off all lines, whatever isotropic modes they were paired with (tensor_search.py); None where isotropy does as well. Density is the guess's:
 modes tell C/ρ alone.
 """
 
@@ -13,7 +13,7 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from sonic_bullet.effects.orthotropy.tensor_lines import CAP, ringing, told_of
+from sonic_bullet.effects.orthotropy.tensor_lines import CAP, body_lines_of, ringing
 from sonic_bullet.effects.orthotropy.tensor_search import WIDTHS, Tensor, fitted, isotropic_p, search
 from sonic_bullet.effects.orthotropy.tensors import NAMES, SYMMETRIES, p_of
 from sonic_bullet.effects.protocol import Cost, Evidence, ObjectEvidence, Owner, Stage, Traits
@@ -28,7 +28,7 @@ LEAST = 0.03  # of ln E_i/E_j or ln of Zener's ratio: less is the mesh's
 
 @dataclass(frozen=True)
 class Orthotropy:
-    """constants_pa (9,): C11 C22 C33 C23 C13 C12 C44 C55 C66. symmetry: one of "cubic", "hexagonal-x" to "-z", "orthorhombic". held: told by no mode."""
+    """constants_pa (9,): C11 C22 C33 C23 C13 C12 C44 C55 C66. symmetry: one of "cubic", "hexagonal-x" to "-z", "orthorhombic". held: identified by no mode."""
 
     id: ClassVar[str] = "orthotropy"
     stage: ClassVar[Stage] = Stage.MATERIAL
@@ -58,11 +58,11 @@ class Orthotropy:
         youngs = 1 / np.diag(compliance)
         c = dict(zip(("c11", "c22", "c33", "c23", "c13", "c12", "c44", "c55", "c66"), self.constants_pa, strict=True))
         names = {"cubic": ("c11", "c12", "c44")}.get(self.symmetry, tuple(c))
-        told: dict[str, Any] = {"symmetry": self.symmetry} | {f"{name}_pa": float(c[name]) for name in names}
-        told |= {"youngs_ratio": [1.0, float(youngs[1] / youngs[0]), float(youngs[2] / youngs[0])], "youngs_x_pa": float(youngs[0])}
+        values: dict[str, Any] = {"symmetry": self.symmetry} | {f"{name}_pa": float(c[name]) for name in names}
+        values |= {"youngs_ratio": [1.0, float(youngs[1] / youngs[0]), float(youngs[2] / youngs[0])], "youngs_x_pa": float(youngs[0])}
         if self.symmetry == "cubic":
-            told["zener_ratio"] = float(2 * c["c44"] / (c["c11"] - c["c12"]))
-        return told | ({"held_near_isotropy": list(self.held)} if self.held else {})
+            values["zener_ratio"] = float(2 * c["c44"] / (c["c11"] - c["c12"]))
+        return values | ({"held_near_isotropy": list(self.held)} if self.held else {})
 
     def freedom(self) -> int:
         return SYMMETRIES[self.symmetry]
@@ -75,12 +75,12 @@ class Orthotropy:
 
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
-        told = told_of(evidence)
-        if isinstance(evidence.known, cls) and told:
-            density = told[0].elastic.material.density_kg_m3
+        bodies = body_lines_of(evidence)
+        if isinstance(evidence.known, cls) and bodies:
+            density = bodies[0].elastic.material.density_kg_m3
             start = p_of(evidence.known.stiffness_pa / density)
-            return cls.of(fitted(told, evidence.known.symmetry, start, isotropic_p(told[0].elastic), WIDTHS[4:]), density)
-        lines = sum(len(t.log_hz) for t in told)
+            return cls.of(fitted(bodies, evidence.known.symmetry, start, isotropic_p(bodies[0].elastic), WIDTHS[4:]), density)
+        lines = sum(len(t.log_hz) for t in bodies)
         if lines < 6 or all(_fits(h) for h in evidence.observed):
             return None
         found = search(evidence)
@@ -88,11 +88,11 @@ class Orthotropy:
             return None
         plain, best = found
         gain, dry = plain.bic - best.bic, any(h.dry for h in evidence.observed)
-        told_apart = gain > BETTER and best.off < NEARER * plain.off
-        told_apart |= dry and gain > IN_A_ROOM and round(lines * (best.matched - plain.matched)) >= 1
-        if not told_apart or departure(best) < LEAST:
+        anisotropic = gain > BETTER and best.off < NEARER * plain.off
+        anisotropic |= dry and gain > IN_A_ROOM and round(lines * (best.matched - plain.matched)) >= 1
+        if not anisotropic or departure(best) < LEAST:
             return None
-        return cls.of(best, told[0].elastic.material.density_kg_m3)
+        return cls.of(best, bodies[0].elastic.material.density_kg_m3)
 
 
 def departure(tensor: Tensor) -> float:

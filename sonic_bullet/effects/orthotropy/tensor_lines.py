@@ -1,6 +1,6 @@
 """A body's lines, whatever they stand for, beside the modes that a tensor gives it, and which is which.
 
-Heard -> Told;   Told, p -> Seen (`Elastic.look`);   Told, Seen -> pairs at the least price      [Kuhn 1955]
+ObjectEvidence -> BodyLines;   BodyLines, p -> Seen (`Elastic.look`);   BodyLines, Seen -> pairs at the least price      [Kuhn 1955]
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from sonic_bullet.records import Array
 CAP = 0.012  # of ln f: a line farther off is no such mode
 BRIEF = 10.0  # times the modes' usual decay
 SHORT = 2.0  # times its frequency a mode's decay at most: a loss factor of 0.64, more than soft rubber's
-REAL = 0.75  # of a line's energy in phase with the blow, where phases are true: a mode moves with it or against it, noise as it likes
+REAL = 0.75  # of a line's energy in phase with the impact, where phases are true: a mode moves with it or against it, noise as it likes
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Told:
+class BodyLines:
     """One body's lines: ln f and spread (k,), worth (k,), amplitude (s, k) or None where patterns say nothing, row (s,): which strikes of `Elastic.look`."""
 
     log_hz: Array
@@ -32,9 +32,9 @@ class Told:
     elastic: Elastic
 
 
-def told_of(evidence: Evidence) -> list[Told]:
+def body_lines_of(evidence: Evidence) -> list[BodyLines]:
     """All lines, whatever they were paired with, of the objects that can be of any elasticity."""
-    return [_told(h) for h in evidence.observed if h.elastic is not None and len(h.freq_hz) + len(h.foreign_hz) > 4]
+    return [_body_lines(h) for h in evidence.observed if h.elastic is not None and len(h.freq_hz) + len(h.foreign_hz) > 4]
 
 
 def ringing(h: ObjectEvidence) -> Array:
@@ -49,7 +49,7 @@ def ringing(h: ObjectEvidence) -> Array:
     return np.asarray(own)
 
 
-def _told(h: ObjectEvidence) -> Told:
+def _body_lines(h: ObjectEvidence) -> BodyLines:
     assert h.elastic is not None
     own = ringing(h)
     freq, decay = np.concatenate([h.freq_hz, h.foreign_hz[own]]), np.concatenate([h.decay_per_s, h.foreign_decay_per_s[own]])
@@ -64,7 +64,7 @@ def _told(h: ObjectEvidence) -> Told:
     worth = worth / (1 + (wide / CAP) ** 2)  # a line broader than that stands for whatever is beside it, too
     row = h.strike_vertex - h.sensor_vertex  # from the end: the sensor is the last
     known = np.isfinite(amplitude).all() and len(row) > 1
-    return Told(log_hz, np.nan_to_num(sd, nan=1e-4)[order], worth, amplitude if known else None, row, h.elastic)
+    return BodyLines(log_hz, np.nan_to_num(sd, nan=1e-4)[order], worth, amplitude if known else None, row, h.elastic)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,26 +76,26 @@ class Seen:
     alike: Array
 
 
-def seen_by(told: Told, p: Array) -> Seen:
+def seen_by(lines: BodyLines, p: Array) -> Seen:
     """The modes of p and how alike their patterns are to the lines'."""
-    freq, slope, psi = told.elastic.look(stiffness(p))
-    alike = np.ones((len(told.log_hz), len(freq)))
-    if told.amplitude is not None:
-        psi = psi[len(psi) + told.row]
+    freq, slope, psi = lines.elastic.look(stiffness(p))
+    alike = np.ones((len(lines.log_hz), len(freq)))
+    if lines.amplitude is not None:
+        psi = psi[len(psi) + lines.row]
         if np.isfinite(psi).all():
-            a = told.amplitude if told.elastic.phased else np.abs(told.amplitude)
-            psi = psi if told.elastic.phased else np.abs(psi)
+            a = lines.amplitude if lines.elastic.phased else np.abs(lines.amplitude)
+            psi = psi if lines.elastic.phased else np.abs(psi)
             alike = np.abs(a.T @ psi) / np.maximum(np.linalg.norm(a, axis=0)[:, None] * np.linalg.norm(psi, axis=0), 1e-300)
     return Seen(np.log(freq), slope, alike)
 
 
-def paired(told: Told, seen: Seen, width: float, lowest: int | None = None) -> tuple[Array, Array, float]:
+def paired(lines: BodyLines, seen: Seen, width: float, lowest: int | None = None) -> tuple[Array, Array, float]:
     """Lines and modes (k',) paired at the least price, and the price over the lines' worth. lowest: how many of the lines, all where None."""
     from scipy.optimize import linear_sum_assignment
 
-    gap = (told.log_hz[:lowest, None] - seen.log_hz[None, :]) / width
-    price = told.worth[:lowest, None] * (np.minimum(gap**2 / 18 + 1 - seen.alike[:lowest], 1.0) - 1.0)
+    gap = (lines.log_hz[:lowest, None] - seen.log_hz[None, :]) / width
+    price = lines.worth[:lowest, None] * (np.minimum(gap**2 / 18 + 1 - seen.alike[:lowest], 1.0) - 1.0)
     line, mode = linear_sum_assignment(price)
     good = price[line, mode] < 0
     line, mode = line[good], mode[good]
-    return line, mode, 1 + float(price[line, mode].sum() / told.worth.sum())
+    return line, mode, 1 + float(price[line, mode].sum() / lines.worth.sum())

@@ -15,13 +15,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sonic_bullet.effects.orthotropy.tensor_lines import CAP, Seen, Told, paired, seen_by, told_of
+from sonic_bullet.effects.orthotropy.tensor_lines import CAP, BodyLines, Seen, body_lines_of, paired, seen_by
 from sonic_bullet.effects.orthotropy.tensors import MILD, NAMES, RATIOS, SYMMETRIES, bricks, constants, cubes, expanded, reduced, sound, stiffness
 from sonic_bullet.effects.protocol import Elastic, Evidence
-from sonic_bullet.parallel import side_by_side
+from sonic_bullet.parallel import parallel_map
 from sonic_bullet.records import Array
 
-FLOOR = 3e-4  # of ln f: less is not told
+FLOOR = 3e-4  # of ln f: less is not identifiable
 ROUGH = 0.02  # of 1 − c²: shapes' own error
 WIDTHS = (0.04, 0.025, 0.016, 0.01, 0.007, 0.005, 0.004, 0.004)
 PRIOR_N, PRIOR_G = 0.1, 0.7  # of n about the guess' ν, of ln G about √(E_i E_j)/2(1+n)
@@ -59,36 +59,36 @@ class Tensor:
 
 def search(evidence: Evidence) -> tuple[Tensor, Tensor] | None:
     """(isotropic, best) by BIC; None where there are too few lines. Costs seconds."""
-    told = told_of(evidence)
-    if not told:
+    bodies = body_lines_of(evidence)
+    if not bodies:
         return None
-    start = isotropic_p(told[0].elastic)
-    plain = fitted(told, "isotropic", start, start)
+    start = isotropic_p(bodies[0].elastic)
+    plain = fitted(bodies, "isotropic", start, start)
     blind = all(
-        t.amplitude is None for t in told
+        t.amplitude is None for t in bodies
     )  # without patterns some start or other says more by chance, the likelier the softer it is: modes are denser there
-    sifted = [("cubic", s) for s in _sifted(told, cubes(start))] + [("orthorhombic", s) for s in _sifted(told, bricks(start, MILD if blind else RATIOS))]
-    ends = side_by_side(lambda one: fitted(told, *one, start), sifted)
+    sifted = [("cubic", s) for s in _sifted(bodies, cubes(start))] + [("orthorhombic", s) for s in _sifted(bodies, bricks(start, MILD if blind else RATIOS))]
+    ends = parallel_map(lambda one: fitted(bodies, *one, start), sifted)
     best = min((e for e in ends if e.symmetry == "orthorhombic"), key=lambda e: e.bic)
     round_axes = ("hexagonal-x", "hexagonal-y", "hexagonal-z")
-    ends += side_by_side(lambda symmetry: fitted(told, symmetry, best.p, start, WIDTHS[3:]), ("cubic", *round_axes))
+    ends += parallel_map(lambda symmetry: fitted(bodies, symmetry, best.p, start, WIDTHS[3:]), ("cubic", *round_axes))
     cube = min((e for e in ends if e.symmetry == "cubic"), key=lambda e: e.bic)
-    ends += side_by_side(lambda symmetry: fitted(told, symmetry, cube.p, start, WIDTHS[4:]), (*round_axes, "orthorhombic"))
+    ends += parallel_map(lambda symmetry: fitted(bodies, symmetry, cube.p, start, WIDTHS[4:]), (*round_axes, "orthorhombic"))
     near = min(ends, key=lambda e: e.bic)
-    ends += side_by_side(lambda k: fitted(told, "orthorhombic", near.p, start, WIDTHS[k:]), FREED)
+    ends += parallel_map(lambda k: fitted(bodies, "orthorhombic", near.p, start, WIDTHS[k:]), FREED)
     if plain.bic - min(e.bic for e in ends) > HINTED and not blind:
-        ends += [_hopped(told, e, start) for e in sorted((e for e in ends if e.symmetry == "orthorhombic"), key=lambda e: e.bic)[:HOPPERS]]
+        ends += [_hopped(bodies, e, start) for e in sorted((e for e in ends if e.symmetry == "orthorhombic"), key=lambda e: e.bic)[:HOPPERS]]
         near = min(ends, key=lambda e: e.bic)
-        ends += side_by_side(lambda symmetry: fitted(told, symmetry, near.p, start, WIDTHS[4:]), ("cubic", *round_axes))
+        ends += parallel_map(lambda symmetry: fitted(bodies, symmetry, near.p, start, WIDTHS[4:]), ("cubic", *round_axes))
     return plain, min(ends, key=lambda e: e.bic)
 
 
-def _hopped(told: Sequence[Told], best: Tensor, guess: Array) -> Tensor:
+def _hopped(bodies: Sequence[BodyLines], best: Tensor, guess: Array) -> Tensor:
     """From an orthorhombic end, each of its numbers a step to either side and fitted again, as long as one of those ends says more: wrong pairs of upper
     lines and modes hold one another where the low ones hardly tell.                                          [iterated local search: Lourenço, Martin & Stützle 2003]"""
     for _ in range(HOPS):
         sides = [p for p in (best.p + sign * one for one in np.diag(STEP) for sign in (-1, 1)) if sound(p)]
-        end = min(side_by_side(lambda p: fitted(told, "orthorhombic", p, guess, WIDTHS[FREED[-1] :]), sides), key=lambda e: e.bic)
+        end = min(parallel_map(lambda p: fitted(bodies, "orthorhombic", p, guess, WIDTHS[FREED[-1] :]), sides), key=lambda e: e.bic)
         if end.bic > best.bic - HOP:
             break
         best = end
@@ -101,10 +101,10 @@ def isotropic_p(elastic: Elastic) -> Array:
     return expanded("isotropic", np.array([np.log(m.youngs_pa / m.density_kg_m3), m.poisson]))
 
 
-def _sifted(told: Sequence[Told], starts: list[Array]) -> list[Array]:
+def _sifted(bodies: Sequence[BodyLines], starts: list[Array]) -> list[Array]:
     """The best few, each with all its moduli scaled so that its modes agree best with the lines, as two spectra on a logarithmic axis (see pairing.py)."""
     shift = np.arange(-REACH, REACH + 1e-9, WIDE / 2)
-    most = max(told, key=lambda t: float(t.worth.sum()))
+    most = max(bodies, key=lambda t: float(t.worth.sum()))
     blind = most.amplitude is None
     first = 1 / (1 + (np.arange(len(most.log_hz)) / FIRST) ** 2) if blind else np.ones(len(most.log_hz))
 
@@ -113,16 +113,16 @@ def _sifted(told: Sequence[Told], starts: list[Array]) -> list[Array]:
         moved = np.array([1.0] * 3 + [0.0] * 3 + [1.0] * 3)
         return [(float(score[best]), p + shift[best] * moved) for best in _peaks(score)[: PEAKS if blind else 1]]
 
-    found = sorted((one for some in side_by_side(scored, starts) for one in some), key=lambda s: -s[0])
+    found = sorted((one for some in parallel_map(scored, starts) for one in some), key=lambda s: -s[0])
     return [p for _, p in found[: BLIND if blind else STARTS]]
 
 
-def _agreement(told: Told, seen: Seen, first: Array, shift: Array) -> Array:
-    """How much lines, each counted as told by first (k,), and modes whose ln λ is shifted (n,) have in common: (n,)."""
+def _agreement(lines: BodyLines, seen: Seen, first: Array, shift: Array) -> Array:
+    """How much lines, each weighted by first (k,), and modes whose ln λ is shifted (n,) have in common: (n,)."""
     place = seen.log_hz + shift[:, None] / 2
-    worth = np.interp(place, told.log_hz, first, 0.0, 0.0)  # (n, m)
-    weight = told.worth[:, None] * first[:, None] * seen.alike**2
-    gap = told.log_hz[:, None] - seen.log_hz[None, :]
+    worth = np.interp(place, lines.log_hz, first, 0.0, 0.0)  # (n, m)
+    weight = lines.worth[:, None] * first[:, None] * seen.alike**2
+    gap = lines.log_hz[:, None] - seen.log_hz[None, :]
     step = (shift[1] - shift[0]) / 2
     at = np.rint((gap - shift[0] / 2) / step).astype(int)[..., None] + np.arange(-round(NIL * WIDE / step), round(NIL * WIDE / step) + 1)  # (k, m, a few)
     near = weight[..., None] * np.exp(-0.5 * ((gap[..., None] - shift[0] / 2 - at * step) / WIDE) ** 2)
@@ -139,12 +139,12 @@ def _peaks(score: Array) -> list[int]:
     return [int(i) for i in inner[np.argsort(-score[inner])]] or [int(np.argmax(score))]
 
 
-def fitted(told: Sequence[Told], symmetry: str, start: Array, guess: Array, widths: Sequence[float] = WIDTHS) -> Tensor:
+def fitted(bodies: Sequence[BodyLines], symmetry: str, start: Array, guess: Array, widths: Sequence[float] = WIDTHS) -> Tensor:
     """The best tensor of a symmetry from a start; guess: isotropic, what the prior leans to."""
     q = reduced(symmetry, start)
     p = expanded(symmetry, q)
     for width in widths:
-        pairs = [(t, s, *paired(t, s, width, _few(t, width))[:2]) for t in told for s in (seen_by(t, p),)]
+        pairs = [(t, s, *paired(t, s, width, _few(t, width))[:2]) for t in bodies for s in (seen_by(t, p),)]
         step = _step(pairs, symmetry, q, guess, width)
         for _ in range(6):
             trial = expanded(symmetry, q + step)
@@ -155,12 +155,12 @@ def fitted(told: Sequence[Told], symmetry: str, start: Array, guess: Array, widt
             step = np.zeros(len(q))
         q = q + step
         p = expanded(symmetry, q)
-    return _judged(told, symmetry, q, guess)
+    return _judged(bodies, symmetry, q, guess)
 
 
-def _few(told: Told, width: float) -> int | None:
+def _few(lines: BodyLines, width: float) -> int | None:
     """How many of the lowest lines to begin with where no pattern tells modes apart: low modes lie farther apart than a start is wrong."""
-    return None if told.amplitude is not None or width <= WIDTHS[-1] else max(FIRST, round(len(told.log_hz) * WIDTHS[-1] / width * 2))
+    return None if lines.amplitude is not None or width <= WIDTHS[-1] else max(FIRST, round(len(lines.log_hz) * WIDTHS[-1] / width * 2))
 
 
 def _jacobian(symmetry: str, q: Array, of: Callable[[Array], Array]) -> Array:
@@ -180,7 +180,7 @@ def _prior(guess: Array) -> Callable[[Array], Array]:
     return of
 
 
-def _step(pairs: list[tuple[Told, Seen, Array, Array]], symmetry: str, q: Array, guess: Array, width: float) -> Array:
+def _step(pairs: list[tuple[BodyLines, Seen, Array, Array]], symmetry: str, q: Array, guess: Array, width: float) -> Array:
     prior = _prior(guess)
     own, bent = prior(expanded(symmetry, q)), _jacobian(symmetry, q, prior)
     turn = _jacobian(symmetry, q, constants)
@@ -198,12 +198,12 @@ def _step(pairs: list[tuple[Told, Seen, Array, Array]], symmetry: str, q: Array,
     return np.asarray(step / max(1.0, float(most.max())))
 
 
-def _judged(told: Sequence[Told], symmetry: str, q: Array, guess: Array) -> Tensor:
+def _judged(bodies: Sequence[BodyLines], symmetry: str, q: Array, guess: Array) -> Tensor:
     """BIC and what the lines leave to the prior."""
     p = expanded(symmetry, q)
     off, unlike, numbers, slopes = [], [], 0, []
     turn = _jacobian(symmetry, q, constants)
-    for t in told:
+    for t in bodies:
         s = seen_by(t, p)
         line, mode, _ = paired(t, s, CAP / 3)
         mine = np.full(len(t.log_hz), CAP)
@@ -215,7 +215,7 @@ def _judged(told: Sequence[Told], symmetry: str, q: Array, guess: Array) -> Tens
         unlike.append(other + ROUGH)
         numbers += (strikes - 1) * len(t.log_hz)
         slopes.append(0.5 * s.slope(mode).T @ turn)
-    left, worth = np.concatenate(off), np.concatenate([t.worth for t in told])
+    left, worth = np.concatenate(off), np.concatenate([t.worth for t in bodies])
     inside, n = left < CAP, len(left)
     square = float(np.average(np.maximum(left, FLOOR) ** 2, weights=worth))
     bic = n * np.log(square) + numbers * np.log(np.average(np.concatenate(unlike), weights=worth)) + SYMMETRIES[symmetry] * np.log(n)

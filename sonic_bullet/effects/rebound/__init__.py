@@ -23,7 +23,10 @@ from sonic_bullet.records import Array
 FAINT = 0.02  # of the first hit: weaker ones are not played
 NEAR = 0.03  # of ln t: delays that agree
 HELD = 0.999  # of the energy of what is played again
-MOST, FEW = 0.6, 0.05  # of the strikes show it one by one; of all recordings' energy, that it must say together where fewer do: beating twins hide it
+MOST, FEW = (
+    0.6,
+    0.05,
+)  # of the strikes show it one by one; of all recordings' energy, that it must say together where fewer do: beating degenerate modes hide it
 FADE = 2.0  # nepers over what is looked at
 ALL, CLEARLY, HALF = 0.25, 1.35, 0.5  # of what one hit leaves of all strikes: said by a second one, over the next best exponent, and left by all hits
 APART = 1.3  # loudest over softest strike, for that
@@ -51,7 +54,7 @@ class Rebound:
     hits: int = MOST_HITS
 
     def apply(self, x: Impact) -> Impact:
-        """The blow with the effect in it."""
+        """The impact with the effect in it."""
         gap = self.gap_s * (x.impulse_n_s / self.impulse_n_s) ** self.exponent
         ratio = self.restitution if self.shrink is None else self.shrink
         share = self.restitution ** np.arange(self.hits)

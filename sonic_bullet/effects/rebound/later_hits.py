@@ -62,9 +62,9 @@ def third_hit(gap_s: Array, both: Array, own: Array, total: Array, sr: int, fade
         late = g * (1 + e)
         second, third = e * np.exp(-fade * g), e**2 * np.exp(-fade * late)
         c_2, c_3, a_2, a_3, a_23 = (_lagged(x, np.rint(t * sr * FINER).astype(int)) for x, t in ((c, g), (c, late), (a, g), (a, late), (a, late - g)))
-        told = c[0] + second * c_2 + third * c_3
+        product = c[0] + second * c_2 + third * c_3
         cost = a[0] * (1 + second**2 + third**2) + 2 * (second * a_2 + third * a_3 + second * third * a_23)
-        said += np.maximum(told, 0.0) ** 2 / np.maximum(cost, 1e-300) / energy
+        said += np.maximum(product, 0.0) ** 2 / np.maximum(cost, 1e-300) / energy
     return float(e[int(said.argmax())])
 
 

@@ -17,12 +17,12 @@ import numpy as np
 from sonic_bullet.effects.common.dashpots import damped
 from sonic_bullet.effects.common.points import nearest, vertex_normals
 from sonic_bullet.effects.protocol import Cost, Evidence, Mixing, Owner, Stage, Traits
-from sonic_bullet.effects.support_damping.dashpot_fit import Dashpot, Trial
+from sonic_bullet.effects.support_damping.dashpot_fit import Dashpot, DashpotFit
 from sonic_bullet.effects.support_damping.support_search import NEARER, refined, sought, tuned
 from sonic_bullet.records import Array, ModalModel
 
-FEWEST, AGAIN = 6, 4  # lines: to look for dashpots, and to fit them again to a part of them
-LEAST = 0.02  # of a decay: dashpots that add less to every one are none, though modes are told anew beside them
+FEWEST_LINES, AGAIN = 6, 4  # lines: to look for dashpots, and to fit them again to a part of them
+LEAST = 0.02  # of a decay: dashpots that add less to every one are none, though modes are identified anew with them
 
 
 @dataclass(frozen=True)
@@ -61,16 +61,16 @@ class SupportDamping:
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
         observed = max(evidence.observed, key=lambda h: len(h.freq_hz) if h.model is not None else 0)
-        if observed.model is None or len(observed.freq_hz) < (FEWEST if evidence.known is None else AGAIN) or not np.isfinite(observed.decay_per_s).all():
+        if observed.model is None or len(observed.freq_hz) < (FEWEST_LINES if evidence.known is None else AGAIN) or not np.isfinite(observed.decay_per_s).all():
             return None
-        trial = Trial.of(observed)
+        trial = DashpotFit.of(observed)
         if isinstance(evidence.known, cls):
             return cls._of(trial, tuned(trial, refined(trial, evidence.known._on(observed.model), NEARER[-2:])[1]))
         found = sought(trial)
         return cls._of(trial, found) if found and _most(trial, found) > LEAST else None
 
     @classmethod
-    def _of(cls, trial: Trial, found: tuple[Dashpot, ...]) -> Self:
+    def _of(cls, trial: DashpotFit, found: tuple[Dashpot, ...]) -> Self:
         place = [trial.model.vertex_m[d.vertex] for d in found]
         return cls(tuple((float(a), float(b), float(c)) for a, b, c in place), tuple(d.c for d in found), tuple(d.along for d in found))
 
@@ -79,7 +79,7 @@ class SupportDamping:
         return tuple(Dashpot(nearest(x, p), c, direction) for p, c, direction in zip(self.position_m, self.strength_n_s_m, along, strict=True))
 
 
-def _most(trial: Trial, found: tuple[Dashpot, ...]) -> float:
+def _most(trial: DashpotFit, found: tuple[Dashpot, ...]) -> float:
     """The largest share that dashpots add to a mode's decay, to first order: ½ Σ_j c_j |Φ_j|²/d."""
     added = (trial.rows([found])[0] ** 2).sum(axis=0) / 2
     return float((added / np.maximum(trial.model.decay_per_s, 1e-9)).max(initial=0.0))

@@ -4,12 +4,12 @@
     d_k = Δ_k(dashpots) + law(ω_k),  law = ½[a + bω + cω² + Σ_j e_j (ωτ_j)²/(1 + (ωτ_j)²)] or as it is, a, b, c, e >= 0, refitted beside every trial
         by Huber's loss: a discrete spectrum of relaxations, as of a passive solid [Nowick & Berry 1972, ch. 3]
     left = Σ_k worth_k [ρ((d_k − Δ_k − law)/√(sd_k² + (SCATTER Δ_k)² + (LAW d_k)²)) + (1 − C_k²)/ROUGH² + ρ(l_k/LEVEL)], each bounded, ρ Cauchy's;
-        lines that no mode explains count as outliers, and so do modes that would be heard and that no line shows
+        lines that no mode explains count as outliers, and so do modes that would be observable and that no line shows
 
 c_kj: cosine of a line's amplitudes over the strikes with what one exponential at the mode's pole would take of all modes,
 Σ_i a_i 2d_j/((d_i + d_j) − i(ω_i − ω_j)), or with the mode's own. C_k: with what exponentials at the lines' poles take of all modes together
 (variable projection's linear half [Golub & Pereyra 1973]): modes that sound as one line are one, those that a dashpot has told apart are not. l_k: ln of a
-line's level over that, less what is common to all: of twins that a dashpot has turned, which one the sensor hears, all strikes show alike, so C_k does not.
+line's level over that, less what is common to all: of degenerate modes that a dashpot has turned, which one the sensor hears, all strikes show alike, so C_k does not.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ GROSS = 4 * MISSED  # that a decay costs at most: a few spreads may be a shape's
 LOST = 2 * GROSS + MISSED  # that a line costs at most
 AT_ONCE = 100  # trials whose poles are found together: (100, m, m) complex, 64 MB of 200 modes
 MUTE = MISSED  # that a mode costs that no line shows: a mesh may have it elsewhere
-WEAK, HALF = 0.05, 0.5  # of the worth of a line that the model does not expect: it may be a click or another body's; near a mode, its twin
-CLEAR, LONGER = 0.25, 2.0  # quantile of the energy of modes that are heard, for one that would be; times a line's decay, for one that it hides
+WEAK, HALF = 0.05, 0.5  # of the worth of a line that the model does not expect: it may be a click or another body's; near a mode, its degenerate partner
+CLEAR, LONGER = 0.25, 2.0  # quantile of the energy of modes that are observed, for one that would be; times a line's decay, for one that it hides
 LOW = 0.3  # of a line's spread where it lies under the least law
 TAU_S = (1e-5, 3e-5, 1e-4)  # of relaxations that peak in what is heard, between slow ones, whose decay is a constant, and fast ones, whose goes as ω²
 RUN, WIDE = 10, 20  # modes whose coupling is reckoned with in a first look, and in a closer one: what eigenvalues cost goes with the cube
@@ -53,7 +53,7 @@ Dashpots = tuple[Dashpot, ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Trial:
+class DashpotFit:
     """An object's lines (k,) and modes (m,). size (s, k) complex, worth (k,); into (s, m): J φ(p)·e of the strikes; out (m,): φ(q)·n of the sensor.
 
     observed_hz, rings_per_s (l,): of every line, those too that are not held against modes; through (m,): what pulse and path leave of a mode, relative.
@@ -83,7 +83,7 @@ class Trial:
         object.__setattr__(self, "untied", _untied(self.freq_hz, self.decay_per_s))
 
     @classmethod
-    def of(cls, h: ObjectEvidence) -> Trial:
+    def of(cls, h: ObjectEvidence) -> DashpotFit:
         x = h.model
         assert x is not None
         lone = np.zeros(len(h.foreign_hz))
@@ -93,11 +93,11 @@ class Trial:
         index = np.array([int(np.flatnonzero(every == f)[0]) for f in freq], int)
         good = np.isfinite(decay) & (decay > 0)
         freq, size, decay, index = freq[good], size[:, good], decay[good], index[good]
-        told = index < len(h.freq_hz)
+        is_mode = index < len(h.freq_hz)
         at_home = np.abs(np.log(freq[:, None] / x.freq_hz)).min(axis=1) < WIDTH
         strength = np.nan_to_num(size).max(axis=0)
         worth = np.clip(1 + 0.25 * np.log10(np.maximum(strength / max(strength.max(initial=0.0), 1e-300), 1e-6)), 0.1, 1) * np.where(
-            told, 1, np.where(at_home, HALF, WEAK)
+            is_mode, 1, np.where(at_home, HALF, WEAK)
         )
         amplitude = np.concatenate([h.amplitude, h.foreign_amplitude], axis=1)[:, index]
         level = np.where(np.isfinite(h.impulse_n_s), h.impulse_n_s, 1.0)
@@ -130,8 +130,8 @@ class Trial:
         """Of the lines' decays, patterns and levels, in squared spreads, beside the law that suits them best. runs: modes that couple; every one with every other where None."""
         x = self.model
         if not dashpots:
-            return self.beside(-x.decay_per_s + 2j * np.pi * x.freq_hz, np.eye(x.mode_count, dtype=complex), 2)
-        return self.beside(*self._poles([dashpots], runs or (np.arange(x.mode_count),))[0], 2)
+            return self.misfit(-x.decay_per_s + 2j * np.pi * x.freq_hz, np.eye(x.mode_count, dtype=complex), 2)
+        return self.misfit(*self._poles([dashpots], runs or (np.arange(x.mode_count),))[0], 2)
 
     def plain(self) -> tuple[Array, Array]:
         """Lines (p,) and the modes (p,) they stand for without any dashpot."""
@@ -174,7 +174,7 @@ class Trial:
         share = np.abs(turn) ** 2
         return np.asarray((share * self.model.decay_per_s[:, None]).sum(axis=0) / share.sum(axis=0))
 
-    def beside(self, pole: Array, turn: Array, turns: int) -> float:
+    def misfit(self, pole: Array, turn: Array, turns: int) -> float:
         """The same of poles (m,) and turns (m, m) that are at hand; turns: of pairing and the law, and how many laws to begin with."""
         pole, turn = _alive(pole, turn)
         own = self._own(turn)
@@ -195,9 +195,9 @@ class Trial:
             law = column @ solved(self.decay_per_s[line] - extra[mode], sd / np.sqrt(worth), column[mode])[0]
         off = np.abs(self.decay_per_s[line] - (extra + law)[mode]) / sd
         decays = np.minimum(MISSED * np.log1p(off**2 / MISSED), GROSS)
-        observed, told = self._seen(self.size), self._seen(self._told(line, omega[mode], omega, extra + law, push))
-        patterns = np.minimum((1 - _cosine(observed, told)[line] ** 2) / ROUGH**2, MISSED)
-        level = _level(observed[:, line], told[:, line] * self._through(self.freq_hz[line])) / LEVEL
+        observed, modelled = self._seen(self.size), self._seen(self._amplitudes_at_lines(line, omega[mode], omega, extra + law, push))
+        patterns = np.minimum((1 - _cosine(observed, modelled)[line] ** 2) / ROUGH**2, MISSED)
+        level = _level(observed[:, line], modelled[:, line] * self._through(self.freq_hz[line])) / LEVEL
         levels = np.minimum(MISSED * np.log1p(level**2 / MISSED), GROSS)
         return nothing + float((worth * (decays + patterns + levels - LOST)).sum()) + self._unobserved(mode, omega, extra + law, push)
 
@@ -206,18 +206,18 @@ class Trial:
         return np.interp(freq_hz, self.model.freq_hz, self.through)
 
     def _unobserved(self, mode: Array, omega: Array, decay: Array, push: Array) -> float:
-        """What modes (m,) cost that would be heard and are not: of a line's strength there, and no line near that rings as long. mode (p,): those that lines stand for."""
+        """What modes (m,) cost that would be observable and are not observed: of a line's strength there, and no line near that rings as long. mode (p,): those that lines stand for."""
         freq = omega / (2 * np.pi)
         level = np.abs(push).max(axis=0) * self._through(freq)
-        told = np.bincount(mode, minlength=len(omega)) > 0
+        paired = np.bincount(mode, minlength=len(omega)) > 0
         energy = level**2 / np.maximum(decay, 1e-3)
-        loud = ~told & (energy > np.quantile(energy[told], CLEAR)) & (freq > freq[told].min()) & (freq < freq[told].max())
+        loud = ~paired & (energy > np.quantile(energy[paired], CLEAR)) & (freq > freq[paired].min()) & (freq < freq[paired].max())
         near = np.abs(np.log(self.observed_hz[:, None] / freq[loud])) < 2 * WIDTH
         hidden = (near & ~(self.rings_per_s[:, None] > LONGER * decay[loud])).any(axis=0)  # a line of unknown decay may be any
-        worth = np.clip(1 + 0.25 * np.log10(np.maximum(level[loud] / max(level[told].max(), 1e-300), 1e-6)), 0.1, 1)
+        worth = np.clip(1 + 0.25 * np.log10(np.maximum(level[loud] / max(level[paired].max(), 1e-300), 1e-6)), 0.1, 1)
         return float(MUTE * worth[~hidden].sum())
 
-    def _told(self, line: Array, at: Array, omega: Array, decay: Array, push: Array) -> Array:
+    def _amplitudes_at_lines(self, line: Array, at: Array, omega: Array, decay: Array, push: Array) -> Array:
         """Amplitudes (s, k) that exponentials at the lines' poles take of all modes together: Σ_l <e_k, e_l> A_l = Σ_i <e_k, e_i> a_i.
 
         Lines (p,) are at modes at (p,) in 1/s; what the mesh has wrong there is taken out, of their neighbours too.
@@ -277,11 +277,11 @@ def _cosine(a: Array, b: Array, *, every: bool = False) -> Array:
     return np.asarray(np.abs(one.conj().T @ two) if every else np.abs((one.conj() * two).sum(axis=0)))
 
 
-def _level(observed: Array, told: Array) -> Array:
+def _level(observed: Array, modelled: Array) -> Array:
     """ln of the level (k,) of columns (s, k) over that of others, less their median; 0 where there is nothing to tell."""
-    if not (np.isfinite(observed).all() and np.isfinite(told).all() and told.any()):
+    if not (np.isfinite(observed).all() and np.isfinite(modelled).all() and modelled.any()):
         return np.zeros(observed.shape[1])
-    ratio = np.log(np.maximum(np.linalg.norm(observed, axis=0), 1e-300)) - np.log(np.maximum(np.linalg.norm(told, axis=0), 1e-300))
+    ratio = np.log(np.maximum(np.linalg.norm(observed, axis=0), 1e-300)) - np.log(np.maximum(np.linalg.norm(modelled, axis=0), 1e-300))
     return np.asarray(ratio - np.median(ratio))
 
 

@@ -10,9 +10,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from sonic_bullet.effects.support_damping.dashpot_fit import Dashpot, Dashpots, Trial
+from sonic_bullet.effects.support_damping.dashpot_fit import Dashpot, DashpotFit, Dashpots
 from sonic_bullet.effects.support_damping.support_subsets import subsets
-from sonic_bullet.parallel import side_by_side
+from sonic_bullet.parallel import parallel_map
 from sonic_bullet.records import Array
 
 POINTS, SPOTS = 90, 500  # vertices where another dashpot is looked for; and where the first is, or one that is moved
@@ -27,8 +27,8 @@ WEAK, ENOUGH = 2, 2.0  # of each number of dashpots to first order; of the sprea
 BETTER, HALF = 6.0, 0.5  # in BIC, for another dashpot; of what one costs: one that explains less ends the search
 
 
-def sought(t: Trial) -> Dashpots:
-    """The dashpots that earn their place, one after another; the least Bayes information criterion says how many, with BETTER for each on top."""
+def sought(t: DashpotFit) -> Dashpots:
+    """The dashpots that are accepted, one after another; the least Bayes information criterion says how many, with BETTER for each on top."""
     data = 3 * len(t.freq_hz)  # a decay, a pattern and a level each
     apiece = 3 * np.log(data) + BETTER
     least = float(t.worth.sum())  # what is left within the spreads asks for nothing
@@ -45,7 +45,7 @@ def sought(t: Trial) -> Dashpots:
     if t.left(chosen) < least:
         return chosen
     spots = _spread(t, SPOTS)
-    weak = side_by_side(lambda d: tuned(t, refined(t, d, NEARER[-2:])[1]), subsets(t, spots[:POINTS], WEAK))
+    weak = parallel_map(lambda d: tuned(t, refined(t, d, NEARER[-2:])[1]), subsets(t, spots[:POINTS], WEAK))
     none = priced(())
     some = min([none, *(priced(d) for d in weak)], key=_cost)
     if some[1] and t.left(some[1]) < ENOUGH * least:
@@ -60,17 +60,17 @@ def sought(t: Trial) -> Dashpots:
     return _elsewhere(t, without_idle(min([*tried, some], key=_cost)), spots)
 
 
-def _grid(t: Trial, vertices: Array) -> list[Dashpot]:
+def _grid(t: DashpotFit, vertices: Array) -> list[Dashpot]:
     return [Dashpot(int(v), c, direction) for v in vertices for c in _strengths(t).tolist() for direction in ("normal", "every")]
 
 
-def _elsewhere(t: Trial, found: Dashpots, spots: Array) -> Dashpots:
+def _elsewhere(t: DashpotFit, found: Dashpots, spots: Array) -> Dashpots:
     """The same number of dashpots, or a better set that some of them being far from where they are lead to: on round bodies a search may end on the wrong side."""
     best = (t.left(found), found)
     for i in range(len(found)):
         moved = [(*found[:i], replace(found[i], vertex=int(v)), *found[i + 1 :]) for v in spots]
         few = _best(_left(t, moved), [(*m[:i], *m[i + 1 :], m[i]) for m in moved], STARTS)
-        ends = side_by_side(lambda one: refined(t, one, NEARER)[1], few)
+        ends = parallel_map(lambda one: refined(t, one, NEARER)[1], few)
         best = min([best, *((t.left(end), end) for end in ends)], key=_cost)
     return best[1]
 
@@ -79,29 +79,29 @@ def _cost(pair: tuple[float, Dashpots]) -> float:
     return pair[0]
 
 
-def _with_one_more(t: Trial, starts: list[Dashpots], grid: list[Dashpot], spots: Array) -> tuple[Dashpots, list[Dashpots]]:
+def _with_one_more(t: DashpotFit, starts: list[Dashpots], grid: list[Dashpot], spots: Array) -> tuple[Dashpots, list[Dashpots]]:
     """The best set that a search finds from some sets of as many and one of the grid; and the sets to go on from: one dashpot alone may stand best where neither of two is."""
     few: list[Dashpots] = []
     for chosen in starts:
         trials = [(*chosen, d) for d in grid]
         few += _best(_of_each(lambda part: [t.price(*modes) for modes in t.poles(part, t.runs)], trials), trials, LOOKED)
     few = _best(_left(t, few), few, STARTS)
-    found, *others = (one for _, one in sorted(side_by_side(lambda one: refined(t, one, NEARER[:2], spots), few), key=lambda pair: pair[0]))
+    found, *others = (one for _, one in sorted(parallel_map(lambda one: refined(t, one, NEARER[:2], spots), few), key=lambda pair: pair[0]))
     for _ in range(min(len(found), 2)):  # once all are where they should be, one may be seen to stand at a mirror image
         found = refined(t, found, (np.inf, *NEARER), spots)[1]
     found = tuned(t, min(found, refined(t, found, NEARER[-1:], whole=True)[1], key=t.left))
     return found, [found, *(others if len(found) == 1 else [])]
 
 
-def _left(t: Trial, trials: list[Dashpots]) -> list[float]:
+def _left(t: DashpotFit, trials: list[Dashpots]) -> list[float]:
     """What each leaves, modes coupling within runs only."""
-    return _of_each(lambda part: [t.beside(*modes, 1) for modes in t.poles(part, t.runs)], trials)
+    return _of_each(lambda part: [t.misfit(*modes, 1) for modes in t.poles(part, t.runs)], trials)
 
 
 def _of_each(price: Callable[[list[Dashpots]], list[float]], trials: list[Dashpots]) -> list[float]:
     """The prices of many, one half beside the other."""
     parts = [trials[: len(trials) // 2], trials[len(trials) // 2 :]] if len(trials) >= MANY else [trials]
-    return [one for part in side_by_side(price, parts) for one in part]
+    return [one for part in parallel_map(price, parts) for one in part]
 
 
 def _best(price: list[float], trials: list[Dashpots], count: int) -> list[Dashpots]:
@@ -112,7 +112,7 @@ def _best(price: list[float], trials: list[Dashpots], count: int) -> list[Dashpo
     return list(found.values())[:count]
 
 
-def _spread(t: Trial, count: int) -> Array:
+def _spread(t: DashpotFit, count: int) -> Array:
     """Surface vertices (p,) where a dashpot would do different things: each the farthest, in n·φ of all modes, from those before it [Gonzalez 1985]."""
     body = t.body
     motion = np.einsum("vxm,vx->vm", t.model.shape[body].astype(float), t.normal[body])
@@ -127,13 +127,13 @@ def _spread(t: Trial, count: int) -> Array:
     return np.asarray(body[selected])
 
 
-def _strengths(t: Trial) -> Array:
+def _strengths(t: DashpotFit) -> Array:
     """STEPS times the strength in N·s/m that doubles the typical decay."""
     square = float((t.model.shape[t.body].astype(float) ** 2).sum(axis=1).mean()) / 3
     return np.array(STEPS) * 2 * float(np.median(t.decay_per_s)) / max(square, 1e-300)
 
 
-def refined(t: Trial, start: Dashpots, reaches: tuple[float, ...], spots: Array | None = None, *, whole: bool = False) -> tuple[float, Dashpots]:
+def refined(t: DashpotFit, start: Dashpots, reaches: tuple[float, ...], spots: Array | None = None, *, whole: bool = False) -> tuple[float, Dashpots]:
     """What is left, and the best of strengths, directions and places, one dashpot after another, in turns that reach so far, in sizes of the body.
 
     spots (p,): vertices spread over the surface, for turns that reach far.
@@ -149,7 +149,7 @@ def refined(t: Trial, start: Dashpots, reaches: tuple[float, ...], spots: Array 
     return least, best
 
 
-def _around(t: Trial, d: Dashpot, reach_m: float, spots: Array) -> list[Dashpot]:
+def _around(t: DashpotFit, d: Dashpot, reach_m: float, spots: Array) -> list[Dashpot]:
     """Others instead of one: elsewhere, as strong or taking as much, or near it, and stronger, weaker or along the other direction."""
     if not np.isfinite(reach_m):
         some = spots[: 2 * POINTS].tolist()
@@ -162,18 +162,18 @@ def _around(t: Trial, d: Dashpot, reach_m: float, spots: Array) -> list[Dashpot]
     return found + [_moved(t, d, v) for v in some] + [replace(d, vertex=v) for v in some]
 
 
-def _within(t: Trial, d: Dashpot, reach_m: float, some: Array) -> Array:
+def _within(t: DashpotFit, d: Dashpot, reach_m: float, some: Array) -> Array:
     """Of some vertices those within reach of a dashpot."""
     return np.asarray(some[((t.model.vertex_m[some] - t.model.vertex_m[d.vertex]) ** 2).sum(axis=1) < reach_m**2])
 
 
-def _moved(t: Trial, d: Dashpot, vertex: int) -> Dashpot:
+def _moved(t: DashpotFit, d: Dashpot, vertex: int) -> Dashpot:
     """One elsewhere, of the strength that takes as much of all modes together, to first order."""
     power = [float(((t.normal[v] @ t.model.shape[v].astype(float)) ** 2).sum()) for v in (d.vertex, vertex)]
     return Dashpot(vertex, d.c * float(np.clip(power[0] / max(power[1], 1e-300), 0.1, 10)), d.along)
 
 
-def tuned(t: Trial, found: Dashpots) -> Dashpots:
+def tuned(t: DashpotFit, found: Dashpots) -> Dashpots:
     """The same with the strengths at which least is left, within TUNED in their logarithms."""
     from scipy.optimize import minimize_scalar
 

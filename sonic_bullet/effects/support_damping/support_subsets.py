@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sonic_bullet.effects.support_damping.dashpot_fit import Dashpot, Dashpots, Trial
+from sonic_bullet.effects.support_damping.dashpot_fit import Dashpot, DashpotFit, Dashpots
 from sonic_bullet.records import Array
 
 PAIRS = 200  # best of two, of which threes are made
@@ -18,7 +18,7 @@ STILL = 1e-3  # of what the most telling point does: where nothing moves, nothin
 SAME = 1e-6  # of what a set explains
 
 
-def subsets(t: Trial, vertices: Array, few: int) -> list[Dashpots]:
+def subsets(t: DashpotFit, vertices: Array, few: int) -> list[Dashpots]:
     """The best ``few`` single dashpots, as many pairs and threes, at the vertices (p,) of a grid, along their normal or every direction."""
     line, mode = t.plain()
     if len(line) < 4:
@@ -29,14 +29,14 @@ def subsets(t: Trial, vertices: Array, few: int) -> list[Dashpots]:
     law = np.linalg.qr(np.stack([(omega / omega.max()) ** n for n in range(3)], axis=1) * weight[:, None])[0]
     column, y = 0.5 * np.concatenate([along, every]) * weight, t.decay_per_s[line] * weight
     column, y = column - (column @ law) @ law.T, y - law @ (law.T @ y)
-    gram, told = column @ column.T, column @ y
+    gram, projection = column @ column.T, column @ y
     place = [(int(v), direction) for direction in ("normal", "every") for v in vertices]
     does = np.linalg.norm(column, axis=1)
     one = np.flatnonzero(does > STILL * does.max())
     found: list[Dashpots] = []
     sets = one[:, None]
     for size in (1, 2, 3):
-        best, strength, gain = _best(gram, told, sets)
+        best, strength, gain = _best(gram, projection, sets)
         new = np.flatnonzero(np.diff(gain, prepend=np.inf) < -SAME * gain)[:few]  # a body's mirrors do the same
         found += [
             tuple(Dashpot(place[k][0], c, place[k][1]) for k, c in zip(s, x, strict=True))
@@ -49,13 +49,13 @@ def subsets(t: Trial, vertices: Array, few: int) -> list[Dashpots]:
     return found
 
 
-def _best(gram: Array, told: Array, sets: Array) -> tuple[Array, Array, Array]:
+def _best(gram: Array, projection: Array, sets: Array) -> tuple[Array, Array, Array]:
     """Of subsets (n, r) of columns those with strengths above zero, the best first, their strengths, and what each takes off Σ y²."""
     size = np.sqrt(np.maximum(np.diag(gram), 1e-300))[sets]
     matrix = gram[sets[:, :, None], sets[:, None, :]] / (size[:, :, None] * size[:, None, :])
     good = np.linalg.det(matrix) > APART
     sets, size, matrix = sets[good], size[good], matrix[good]
-    right = told[sets] / size
+    right = projection[sets] / size
     strength = np.linalg.solve(matrix, right[..., None])[..., 0]
     gain = np.where((strength > 0).all(axis=1), (strength * right).sum(axis=1), 0.0)
     order = np.argsort(-gain, kind="stable")

@@ -1,6 +1,6 @@
 """What a fit hands on: one object under the fitted material, and the case with all its objects.
 
-fit.py makes them, verdict.py judges, predict.py, preset.py and picture.py use them; none of those knows another.
+material_fit.py makes them, fit_verdict.py judges, prediction_of_lines.py, fitted_preset.py and plots/fit_plot.py use them; none of those knows another.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sonic_bullet.estimator.fit.observed import Evidence
+from sonic_bullet.estimator.fit.recorded import RecordedObject
 from sonic_bullet.estimator.lines.line_values import MaterialFit
 from sonic_bullet.files.cases import Case
 from sonic_bullet.records import Array
@@ -25,7 +25,7 @@ class ObjectFit:
     pattern (s, m): J ψ; line (m,): the line that each is, or -1; measured_hz, measured_decay_per_s (m,) NaN where none. sensor_weight (m,): of a microphone, else 1.
     """
 
-    evidence: Evidence
+    evidence: RecordedObject
     freq_hz: Array
     model_hz: Array
     decay_per_s: Array
@@ -47,7 +47,7 @@ class CaseFit:
     """A fit and what it rests on. youngs_pa = γρ with ρ of the guess. damping_scatter: relative, of decays about the law.
 
     amplitude_scatter: relative, of amplitudes about σψ. foreign_hz: strong lines that are no mode. assumed: what was taken from the guess. warnings: one line each.
-    log_spectral_db: distance of recording and synthesis (distance.py), mean over the fitted strikes; -1 where there is nothing to compare.
+    log_spectral_db: distance of recording and synthesis (log_spectral.py), mean over the fitted strikes; -1 where there is nothing to compare.
     """
 
     case: Case

@@ -1,7 +1,7 @@
 """Recording and synthesis at the fitted parameters, compared over the fitted strikes: by the paper's hybrid metric and by log spectra.
 
     Π = Π_psycho/|Π_MRP|                                                    [Ren, Yeh, Lin 2013, eq. 27; metric.py]
-    D in dB, where either stands above the noise                            [distance.py]
+    D in dB, where either stands above the noise                            [log_spectral.py]
 
 Π here is taken with everything the fit found: modes corrected for the mesh, in the phase that the sensor starts them with.
 """

@@ -12,9 +12,9 @@ import numpy as np
 from sonic_bullet.estimator.fit.case_fit import POISSON_IDENTIFIED, POISSON_SD, CaseFit, ObjectFit
 from sonic_bullet.estimator.fit.comparison import hybrid_of, log_spectral_of
 from sonic_bullet.estimator.fit.mesh_error import mesh_warning
-from sonic_bullet.estimator.fit.observed import Evidence
 from sonic_bullet.estimator.fit.pairing import DEGENERATE
-from sonic_bullet.estimator.fit.rayleigh import Damping
+from sonic_bullet.estimator.fit.rayleigh import RayleighFit
+from sonic_bullet.estimator.fit.recorded import RecordedObject
 from sonic_bullet.estimator.lines.line_values import MaterialFit
 from sonic_bullet.files.cases import Case
 from sonic_bullet.records import Array
@@ -29,10 +29,10 @@ CHANCE = 0.35  # and below this share, they may be by chance: nothing is known t
 
 def finished(
     case: Case,
-    evidence: tuple[Evidence, ...],
+    evidence: tuple[RecordedObject, ...],
     objects: tuple[ObjectFit, ...],
     elastic: tuple[float, float, Array, float],
-    damping: Damping,
+    damping: RayleighFit,
     gain: tuple[float, float, float],
     *,
     check_mesh: bool,
@@ -58,8 +58,8 @@ def finished(
     if share < CHANCE:  # another object, another rate, no impact: nothing that rests on the pairs is known, nor whose decays these are
         covariance[:] = np.nan
         unsaid = ["alpha, beta, gamma, poisson_ratio, sigma (few lines are modes, maybe by chance)"]
-    told = np.isfinite(np.diag(covariance))
-    covariance[np.outer(told, told) & np.isnan(covariance)] = 0.0  # frequencies, decays and amplitudes are found apart
+    identified = np.isfinite(np.diag(covariance))
+    covariance[np.outer(identified, identified) & np.isnan(covariance)] = 0.0  # frequencies, decays and amplitudes are found apart
     amiss = _amiss(objects, damping, scatter, gain[2], foreign, share)
     amplitude = gain[0] if np.isfinite(gain[0]) else 1.0
     metric, decibels = hybrid_of(objects, amplitude), log_spectral_of(objects, amplitude)
@@ -81,7 +81,7 @@ def finished(
     return CaseFit(case, found, objects, gamma * density, density, gain[1], *scatters, foreign, tuple(assumed), tuple(warnings), decibels)
 
 
-def _decays_seen(evidence: tuple[Evidence, ...]) -> int:
+def _decays_seen(evidence: tuple[RecordedObject, ...]) -> int:
     return int(sum(np.isfinite(e.lines.decay_per_s).sum() for e in evidence))
 
 
@@ -99,7 +99,7 @@ def _elastic(covariance: Array, information: Array, unsaid: list[str], shaped: b
     covariance[2, 2] = np.linalg.inv(information + np.diag([0, POISSON_SD**-2]))[0, 0]
 
 
-def _foreign(evidence: tuple[Evidence, ...], objects: tuple[ObjectFit, ...]) -> tuple[Array, float]:
+def _foreign(evidence: tuple[RecordedObject, ...], objects: tuple[ObjectFit, ...]) -> tuple[Array, float]:
     """Frequencies of strong lines that are no mode, and the share of strong lines' worth that are modes."""
     hz: list[float] = []
     good = total = 0.0
@@ -115,7 +115,7 @@ def _foreign(evidence: tuple[Evidence, ...], objects: tuple[ObjectFit, ...]) -> 
     return np.array(sorted(hz)), good / total if total else np.nan
 
 
-def _amiss(objects: tuple[ObjectFit, ...], damping: Damping, scatter: float, amplitude: float, foreign: Array, share: float) -> list[str]:
+def _amiss(objects: tuple[ObjectFit, ...], damping: RayleighFit, scatter: float, amplitude: float, foreign: Array, share: float) -> list[str]:
     amiss = []
     if objects and len(foreign):
         shown = ", ".join(f"{f:.0f}" for f in foreign[:6]) + (" …" if len(foreign) > 6 else "")
@@ -131,7 +131,7 @@ def _amiss(objects: tuple[ObjectFit, ...], damping: Damping, scatter: float, amp
     return amiss
 
 
-def _modes(evidence: tuple[Evidence, ...], objects: tuple[ObjectFit, ...], gain: float) -> tuple[Array, Array, Array]:
+def _modes(evidence: tuple[RecordedObject, ...], objects: tuple[ObjectFit, ...], gain: float) -> tuple[Array, Array, Array]:
     """Modes of the first object at its first strike; the lines themselves where there is no shape."""
     if objects:
         o = objects[0]

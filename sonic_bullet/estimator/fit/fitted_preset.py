@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from sonic_bullet.estimator.fit.case_fit import CaseFit
-from sonic_bullet.presets import FORMAT, Damping, Elasticity, Impact, Preset, Provenance, Surface, load_material, material_names
+from sonic_bullet.presets import FORMAT, Damping, Elasticity, Preset, Provenance, Restitution, Surface, load_material, material_names
 
 NAMES = ("alpha_per_s", "beta_s", "gamma_m2_s2", "sigma", "poisson_ratio")
 
@@ -42,7 +42,7 @@ def preset_of(found: CaseFit) -> Preset:
         elasticity=Elasticity(youngs_pa=youngs, poisson=float(np.clip(poisson, -0.99, 0.499)), source=source, note="; ".join(assumed)),
         damping=Damping(alpha_per_s=alpha, beta_s=beta, source=source),
         surface=Surface(roughness_m=base.roughness_m, hurst=base.hurst, source=taken),
-        impact=Impact(restitution=base.restitution, source=taken),
+        impact=Restitution(restitution=base.restitution, source=taken),
         provenance=Provenance(
             method="modes paired with damped sinusoids of maximum likelihood; least squares",
             recordings=tuple(recordings),

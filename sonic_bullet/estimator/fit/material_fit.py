@@ -1,8 +1,8 @@
 """Recordings -> material: which mode each line is, γ and ν from the frequencies, α and β from the decays, σ from the amplitudes.
 
-    Evidence per object -> pairs (pairing.py), all objects at one (γ, ν) -> ln γ, ν: weighted least squares on ln λ
+    RecordedObject per object -> pairs (pairing.py), all objects at one (γ, ν) -> ln γ, ν: weighted least squares on ln λ
                         -> d = ½(α + βλ) (rayleigh.py)   [Ren, Yeh, Lin 2013, eq. 6]
-                        -> A_sj = σ J_s ψ_sj             [eq. 11, 13; observe.py]
+                        -> A_sj = σ J_s ψ_sj             [eq. 11, 13; observation.py]
     -> MaterialFit, one correction a mode (the mesh's error, at most 1 %), and a verdict
 
 The lines are maximum-likelihood estimates with their Cramér-Rao spreads, so least squares on them loses nothing against a fit of the samples.
@@ -19,9 +19,9 @@ import numpy as np
 from sonic_bullet.estimator.fit.case_fit import POISSON_IDENTIFIED, POISSON_SD, CaseFit, ObjectFit
 from sonic_bullet.estimator.fit.fit_verdict import finished
 from sonic_bullet.estimator.fit.object_fit import CORRECTION, fitted_object, gain_of, object_of
-from sonic_bullet.estimator.fit.observed import Evidence, gather
 from sonic_bullet.estimator.fit.pairing import GAMMA_REACH, MESH_SD, Pairs, assign, best_pairs, grouped, paired, solve
 from sonic_bullet.estimator.fit.rayleigh import rayleigh
+from sonic_bullet.estimator.fit.recorded import RecordedObject, gather
 from sonic_bullet.files.cases import Case
 from sonic_bullet.modal.cache import Place
 from sonic_bullet.records import Array
@@ -39,7 +39,7 @@ def fit_case(case: Case, *, cache: Place = "default", check_mesh: bool = True, p
     return fit_evidence(case, evidence, check_mesh=check_mesh, progress=progress)
 
 
-def fit_evidence(case: Case, evidence: tuple[Evidence, ...], *, check_mesh: bool = True, progress: Callable[[str], None] | None = None) -> CaseFit:
+def fit_evidence(case: Case, evidence: tuple[RecordedObject, ...], *, check_mesh: bool = True, progress: Callable[[str], None] | None = None) -> CaseFit:
     """`fit_case` on evidence already gathered. Raises SonicBulletError."""
     if len({e.guess.name for e in evidence}) > 1:
         raise FileError("the 'fit' strikes are of objects of several materials", "give a case for each material")
@@ -70,7 +70,7 @@ def fit_evidence(case: Case, evidence: tuple[Evidence, ...], *, check_mesh: bool
     )
 
 
-def _placed(shaped: tuple[Evidence, ...], band_hz: tuple[float, float]) -> tuple[tuple[Pairs, ...], Array, float]:
+def _placed(shaped: tuple[RecordedObject, ...], band_hz: tuple[float, float]) -> tuple[tuple[Pairs, ...], Array, float]:
     """Pairs of every object at one common (ln γ, ν), information (2, 2) of the lines on it, relative scatter of frequencies."""
     guess = shaped[0].guess
     centre = float(np.log(guess.youngs_pa / guess.density_kg_m3))
@@ -91,7 +91,7 @@ def _placed(shaped: tuple[Evidence, ...], band_hz: tuple[float, float]) -> tuple
     return min(ends, key=lambda end: end[0])[1]
 
 
-def _together(shaped: tuple[Evidence, ...], start: tuple[float, float], guess_poisson: float) -> tuple[tuple[Pairs, ...], Array, float]:
+def _together(shaped: tuple[RecordedObject, ...], start: tuple[float, float], guess_poisson: float) -> tuple[tuple[Pairs, ...], Array, float]:
     """Assign and solve for all objects at once until nothing moves; what the modes scatter is then learnt, in place of `MESH_SD`."""
     log_gamma, poisson = start
     information, scatter, mesh_sd = np.zeros((2, 2)), np.nan, MESH_SD
@@ -114,8 +114,8 @@ def _together(shaped: tuple[Evidence, ...], start: tuple[float, float], guess_po
             break
         weight, off = np.concatenate(offs, axis=1)
         scatter = float(np.sqrt((weight * off**2).sum() / max(weight.sum() - 2, 1)))
-        told = np.linalg.det(information) > 0 and np.linalg.inv(information)[1, 1] < POISSON_IDENTIFIED**2
-        prior = np.diag([1e-12, 0.0 if told else POISSON_SD**-2])
+        poisson_identified = np.linalg.det(information) > 0 and np.linalg.inv(information)[1, 1] < POISSON_IDENTIFIED**2
+        prior = np.diag([1e-12, 0.0 if poisson_identified else POISSON_SD**-2])
         step = np.linalg.solve(information + prior, pull - prior @ (0.0, poisson - guess_poisson))
         log_gamma += float(np.clip(step[0], -0.05, 0.05))
         poisson = float(np.clip(poisson + np.clip(step[1], -0.02, 0.02), -0.45, 0.48))
@@ -127,11 +127,11 @@ def _together(shaped: tuple[Evidence, ...], start: tuple[float, float], guess_po
     return tuple(pairs), information, scatter
 
 
-def _undamped_hz(e: Evidence, line: Array) -> Array:
+def _undamped_hz(e: RecordedObject, line: Array) -> Array:
     return np.asarray(np.hypot(2 * np.pi * e.lines.freq_hz[line], np.nan_to_num(e.lines.decay_per_s[line])) / (2 * np.pi))
 
 
-def _decays(evidence: tuple[Evidence, ...], pairs: tuple[Pairs, ...]) -> tuple[Array, Array, Array]:
+def _decays(evidence: tuple[RecordedObject, ...], pairs: tuple[Pairs, ...]) -> tuple[Array, Array, Array]:
     """λ, d and its spread of the lines that are modes; of all lines where there is no shape."""
     found, at = [], 0
     for e in evidence:

@@ -1,4 +1,4 @@
-"""How far the mesh itself bends γ: what halving its elements would do, told from what doubling them twice does.
+"""How far the mesh itself bends γ: what halving its elements would do, estimated from what doubling them twice does.
 
     ln λ(h) = ln λ + C h^p       h, r₁h, r₁r₂h solved: p, then  ln λ(h) − ln λ(h/2) = Δ₁ (1 − 2^−p)/(r₁^p − 1)       [Richardson 1911]
 
@@ -25,7 +25,7 @@ MOST_TIMES = 12.0
 
 
 def mesh_warning(o: ObjectFit, youngs_pa: float, density: float, poisson: float, progress: Callable[[str], None] | None) -> list[str]:
-    """A warning where halving the elements would move γ by over 1 %, or where that cannot be told; none for one solved without them (polynomials.py, revolved.py)."""
+    """A warning where halving the elements would move γ by over 1 %, or where that cannot be estimated; none for one solved without them (polynomials.py, revolved.py)."""
     if o.evidence.family is not None and not o.evidence.family.meshed:
         return []
     try:
@@ -38,7 +38,7 @@ def mesh_warning(o: ObjectFit, youngs_pa: float, density: float, poisson: float,
 
 
 def halving_moves(o: ObjectFit, youngs_pa: float, density: float, poisson: float, progress: Callable[[str], None] | None = None) -> float:
-    """Relative change of γ (the mean over the heard modes, the lowest 40 at most) that halving the elements would bring; NaN where it cannot be told.
+    """Relative change of γ (the mean over the observed modes, the lowest 40 at most) that halving the elements would bring; NaN where it cannot be estimated.
 
     Raises MeshError, ModalError where a coarser mesh fails.
     """
@@ -114,7 +114,7 @@ def _coarser(o: ObjectFit, material: Material, times: float, edge_m: float, coun
 
 def _filled(o: ObjectFit, times: float, edge_m: float, say: Callable[[str], None]) -> Solid:
     """The body's solid with coarser elements: a box by the same grid with fewer cells, anything else by a larger edge."""
-    from sonic_bullet.estimator.fit.observed import mesh_edge_m
+    from sonic_bullet.estimator.fit.recorded import mesh_edge_m
     from sonic_bullet.geometry import is_closed
     from sonic_bullet.modal import read_mesh
     from sonic_bullet.modal.meshing import shape_meshes, structured

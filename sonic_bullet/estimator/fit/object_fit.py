@@ -1,7 +1,7 @@
 """One object's modes under a material: frequencies corrected where a line says, decays by the law, patterns as the sensor hears them; and σ.
 
 (γ, ν) -> modes of the family -> λ, d = ½(α + βλ), f = √(λ − d²)/2π        [Ren, Yeh, Lin 2013, eq. 6, 7]
-A_sj = σ J_s ψ_sj                                                          [eq. 11, 13; observe.py]
+A_sj = σ J_s ψ_sj                                                          [eq. 11, 13; observation.py]
 """
 
 from __future__ import annotations
@@ -10,9 +10,9 @@ import numpy as np
 
 from sonic_bullet.estimator.fit.case_fit import CaseFit, ObjectFit
 from sonic_bullet.estimator.fit.observation import Observation, pressure_weight
-from sonic_bullet.estimator.fit.observed import Evidence
 from sonic_bullet.estimator.fit.pairing import Group, Pairs, grouped, phased
-from sonic_bullet.estimator.fit.rayleigh import Damping
+from sonic_bullet.estimator.fit.rayleigh import RayleighFit
+from sonic_bullet.estimator.fit.recorded import RecordedObject
 from sonic_bullet.estimator.lines.joint_lines import Lines
 from sonic_bullet.files.cases import CaseObject
 from sonic_bullet.modal.reduced import Family
@@ -21,7 +21,7 @@ from sonic_bullet.records import Array, Material
 CORRECTION = 0.01
 
 
-def fitted_object(e: Evidence, pairs: Pairs, log_gamma: float, poisson: float, damping: Damping, band_hz: tuple[float, float]) -> ObjectFit:
+def fitted_object(e: RecordedObject, pairs: Pairs, log_gamma: float, poisson: float, damping: RayleighFit, band_hz: tuple[float, float]) -> ObjectFit:
     """An object's modes under the material, corrected where a line says."""
     assert e.family is not None and e.seen is not None
     group = grouped(e.family, e.seen, log_gamma, poisson)
@@ -45,7 +45,7 @@ def fitted_object(e: Evidence, pairs: Pairs, log_gamma: float, poisson: float, d
     return ObjectFit(e, *kept, tuple(group.member[i] for i in use))
 
 
-def _weight(e: Evidence, group: Group, log_gamma: float, poisson: float, freq: Array, decay: Array, use: Array) -> Array:
+def _weight(e: RecordedObject, group: Group, log_gamma: float, poisson: float, freq: Array, decay: Array, use: Array) -> Array:
     """What a microphone makes of each group: radiation of its members; 1 for other sensors."""
     if e.seen is None or e.family is None or e.seen.kind != "pressure" or not len(use):
         return np.ones(len(use))
@@ -59,7 +59,7 @@ def gain_of(objects: tuple[ObjectFit, ...]) -> tuple[float, float, float]:
 
     Least squares with Cauchy's weights; an amplitude counts as known to its spread and to 2 % of the mode's strongest ψ, the shapes' own error.
     """
-    observed, turned, told, loose = [], [], [], []
+    observed, turned, predicted, loose = [], [], [], []
     for o in objects:
         e, mode = o.evidence, np.flatnonzero(o.line >= 0)
         line = o.line[mode]
@@ -76,11 +76,11 @@ def gain_of(objects: tuple[ObjectFit, ...]) -> tuple[float, float, float]:
         rough = float(np.linalg.norm(a)) / max(float(np.linalg.norm(p)), 1e-300)
         observed.append(a.ravel())
         turned.append(np.real(a * np.exp(-1j * own)).ravel())
-        told.append(p.ravel())
+        predicted.append(p.ravel())
         loose.append(np.hypot(e.lines.amplitude_sd[use][:, line] / rough, 0.02 * np.abs(p).max(axis=0, keepdims=True) + 1e-300).ravel())
     if not observed:
         return np.nan, np.nan, np.nan
-    y, z, x, s = (np.concatenate(part) for part in (observed, turned, told, loose))
+    y, z, x, s = (np.concatenate(part) for part in (observed, turned, predicted, loose))
     weight, gain = np.ones(len(y)), 0.0
     for _ in range(30):
         gain = float((weight * x * z / s**2).sum() / max(float((weight * x**2 / s**2).sum()), 1e-300))
@@ -94,10 +94,10 @@ def gain_of(objects: tuple[ObjectFit, ...]) -> tuple[float, float, float]:
 
 
 def object_of(found: CaseFit, thing: CaseObject, guess: Material, body: Family, seen: Observation, known: ObjectFit | None) -> ObjectFit:
-    """An object under a fitted material, heard as ``seen``; corrections and paired lines from ``known``."""
+    """An object under a fitted material, observed as ``seen``; corrections and paired lines from ``known``."""
     none = np.zeros(0)
     lines = known.evidence.lines if known is not None else Lines(none, none, np.zeros((1, 0), complex), none, none, np.zeros((1, 0)), none, none, True)
-    e = Evidence(thing, guess, (), lines, body, seen, None, 0)
+    e = RecordedObject(thing, guess, (), lines, body, seen, None, 0)
     log_gamma, poisson = float(np.log(found.fit.gamma_m2_s2)), found.fit.poisson_ratio
     group = grouped(body, seen, log_gamma, poisson)
     line = mode = np.zeros(0, int)
@@ -105,5 +105,5 @@ def object_of(found: CaseFit, thing: CaseObject, guess: Material, body: Family, 
         place = {int(member[0]): i for i, member in enumerate(group.member)}
         both = [(int(known.line[i]), place[int(m[0])]) for i, m in enumerate(known.member) if known.line[i] >= 0 and int(m[0]) in place]
         line, mode = (np.array(side, int) for side in zip(*both, strict=True)) if both else (line, mode)
-    damping = Damping(found.fit.alpha_per_s, found.fit.beta_s, np.full((2, 2), np.nan), np.nan, ())
+    damping = RayleighFit(found.fit.alpha_per_s, found.fit.beta_s, np.full((2, 2), np.nan), np.nan, ())
     return fitted_object(e, Pairs(log_gamma, poisson, line, mode, 0.0), log_gamma, poisson, damping, found.case.band_hz)

@@ -2,7 +2,7 @@
 
     sum       Σ J (φ(p)·e) e^{−dt} sin ωt                                                  [Ren, Yeh, Lin 2013, eq. 11, 13]
     velocity  Σ J (φ(p)·e)(φ(q)·n) e^{−dt} (cos ωt − (d/ω) sin ωt)       an impulse J at p along e, seen at q along n
-    pressure  Σ J (φ(p)·e) |w| e^{−dt} cos ωt, w the radiation weight of the mode          [synth.radiation]
+    pressure  Σ J (φ(p)·e) |w| e^{−dt} cos ωt, w the radiation weight of the mode          [synth.far_field]
 
 All as Re[A e^{(−d+iω)t}]: A = g·J·ψ·(−i | 1 + i d/ω | 1), with ψ the real transfer of the mode and g the gain, one number for the case.
 """
@@ -22,7 +22,7 @@ OFF = 0.02  # of the body's diagonal: farther from the surface a point is not on
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Observation:
-    """How s strikes of one body are heard, in the family's basis. strike (s, b): J φ(p)·e; sensor (b,): φ(q)·n, or None for what has no place.
+    """How s strikes of one body are observed, in the family's basis. strike (s, b): J φ(p)·e; sensor (b,): φ(q)·n, or None for what has no place.
 
     known (s,): whether a strike's place is declared. level (s,): whether its impulse is. kind: as `Case.sensor`.
     """
@@ -56,7 +56,7 @@ def observation(
     sensor_m: tuple[float, float, float] | None = None,
     sensor_direction: tuple[float, float, float] | None = None,
 ) -> Observation:
-    """Strikes (position in m, direction, impulse in N·s; None where not known) of a body, heard by a sensor. A direction not given is the inward normal.
+    """Strikes (position in m, direction, impulse in N·s; None where not known) of a body, observed by a sensor. A direction not given is the inward normal.
 
     Raises MeshError where a point lies off the surface.
     """
@@ -76,7 +76,7 @@ def observation(
 
 
 def pressure_weight(family: Family, density_kg_m3: float, freq_hz: Array, decay_per_s: Array, vector: Array, air: Air | None = None) -> Array:
-    """|w| (m,) in Pa·m per modal velocity of modes (b, m) of the family, for microphones. Source: `synth.radiation`."""
+    """|w| (m,) in Pa·m per modal velocity of modes (b, m) of the family, for microphones. Source: `synth.far_field`."""
     from sonic_bullet.synth.far_field import radiation
 
     shape = np.einsum("vxb,bm->vxm", family.skin, vector.astype(np.float32)) / np.float32(np.sqrt(density_kg_m3 * family.length_m**3))

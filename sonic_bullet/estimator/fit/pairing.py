@@ -35,7 +35,7 @@ BRIEF = 25.0  # times the decay that holds half of the energy, higher up times i
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Group:
-    """Modes of a family at (γ, ν), twins as one. freq_hz (m,) undamped, pattern (s, m) real, share (m,) ∂ ln λ/∂ν; member: each group's modes."""
+    """Modes of a family at (γ, ν), degenerate modes as one. freq_hz (m,) undamped, pattern (s, m) real, share (m,) ∂ ln λ/∂ν; member: each group's modes."""
 
     freq_hz: Array
     pattern: Array
@@ -173,17 +173,17 @@ def assign(group: Group, lines: Lines, seen: Observation, width: float) -> tuple
 
     size, strength, alike = _patterns(lines, seen, group.pattern)
     gap = (np.log(lines.freq_hz)[:, None] - np.log(group.freq_hz)[None, :]) / width
-    told = np.clip(0.5 + 0.06 * np.log10(np.maximum(size, 1e-12)), 0.05, 1) * _rings(lines)  # what a line is worth
-    worth = told[:, None] * np.clip(0.6 + 0.1 * np.log10(np.maximum(strength, 1e-12)), 0.05, 1)
+    line_worth = np.clip(0.5 + 0.06 * np.log10(np.maximum(size, 1e-12)), 0.05, 1) * _rings(lines)  # what a line is worth
+    worth = line_worth[:, None] * np.clip(0.6 + 0.1 * np.log10(np.maximum(strength, 1e-12)), 0.05, 1)
     price = np.minimum(gap**2 / 18 + 1.0 * (1 - alike), 1.0)  # 3 widths off, or another pattern: no pair
     row, column = linear_sum_assignment(worth * (price - 1.0))
     paired = price[row, column] < 1.0
     row, column = row[paired], column[paired]
     missed = 0.0
-    if not _usable(lines, seen).any():  # where no pattern tells modes apart, those between the lines that nobody heard count against
+    if not _usable(lines, seen).any():  # where no pattern tells modes apart, those between the lines that nobody observed count against
         between = (group.freq_hz > lines.freq_hz.min() * 0.98) & (group.freq_hz < lines.freq_hz.max() * 1.02)
         missed = MISSED * float((between & ~np.isin(np.arange(len(between)), column)).sum())
-    return row, column, float(told.sum() + (worth * (price - 1.0))[row, column].sum()) + missed
+    return row, column, float(line_worth.sum() + (worth * (price - 1.0))[row, column].sum()) + missed
 
 
 def paired(family: Family, lines: Lines, seen: Observation, start: tuple[float, float], guess_poisson: float, poisson_sd: float) -> Pairs:

@@ -1,6 +1,6 @@
 """A fitted material played on strikes, those fitted and those not: what the sensor would record, in the recording's units.
 
-x(t) = Re Σ_j σ J ψ_j s_j e^{(−d_j + iω_j)t}      ψ, s: observe.py; ω_j with the correction learnt on the fitted strikes
+x(t) = Re Σ_j σ J ψ_j s_j e^{(−d_j + iω_j)t}      ψ, s: observation.py; ω_j with the correction learnt on the fitted strikes
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def strike_sound(found: CaseFit, recording: CaseRecording, n: int, sr: int, *, c
     from dataclasses import replace
 
     from sonic_bullet.estimator.fit.object_fit import object_of
-    from sonic_bullet.estimator.fit.observed import body_family, guess_of, observed
+    from sonic_bullet.estimator.fit.recorded import body_family, guess_of, observed
     from sonic_bullet.records.errors import FileError
 
     if recording.position_m is None:

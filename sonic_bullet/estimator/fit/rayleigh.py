@@ -14,15 +14,15 @@ import numpy as np
 
 from sonic_bullet.records import Array
 
-LEAST_MANY = 8  # lines of which a majority can be told
+LEAST_MANY = 8  # lines of which a majority can be identified
 HALF = 0.4549  # median of χ² with one degree of freedom
 NEARER = 0.5  # of what most lines are off by: a law through two of them that leaves less is where to start from
 MET = 0.01  # relative: a law that lines obey is met by most of them so well, or they obey another
-STANDARD_ERRORS = 0.5  # a parameter whose logarithm is surer than this is told by the lines
+STANDARD_ERRORS = 0.5  # a parameter whose logarithm is surer than this is identified by the lines
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Damping:
+class RayleighFit:
     """alpha_per_s, beta_s; covariance (2, 2) of their logarithms, NaN where the lines do not say; scatter: τ of all lines; said: what is not identifiable."""
 
     alpha_per_s: float
@@ -32,7 +32,7 @@ class Damping:
     said: tuple[str, ...]
 
 
-def rayleigh(lambda_per_s2: Array, decay_per_s: Array, decay_sd_per_s: Array, guess: tuple[float, float], whole_per_s: Array | None = None) -> Damping:
+def rayleigh(lambda_per_s2: Array, decay_per_s: Array, decay_sd_per_s: Array, guess: tuple[float, float], whole_per_s: Array | None = None) -> RayleighFit:
     """α and β of lines (k,). guess: (α, β) whose ratio stands in for what one line cannot tell. A spread that is infinite: no value; NaN: 5 %.
 
     whole_per_s (k,): what was measured, where decays are what something else has left of it: scatter is relative to that, or what is hardly there would be sure.
@@ -43,12 +43,12 @@ def rayleigh(lambda_per_s2: Array, decay_per_s: Array, decay_sd_per_s: Array, gu
     spread = np.where(np.isfinite(decay_sd_per_s[good]), decay_sd_per_s[good], 0.05 * size)
     unknown = np.full((2, 2), np.nan)
     if len(lam) == 0:
-        return Damping(*guess, unknown, np.nan, ("alpha", "beta"))
+        return RayleighFit(*guess, unknown, np.nan, ("alpha", "beta"))
     if len(lam) == 1 or np.ptp(np.log(lam)) < 0.05:
         weight = spread**-2
         share = 0.5 * (guess[0] + guess[1] * lam)
         scale = float((weight * decay * share).sum() / (weight * share**2).sum())
-        return Damping(scale * guess[0], scale * guess[1], unknown, np.nan, ("alpha", "beta"))
+        return RayleighFit(scale * guess[0], scale * guess[1], unknown, np.nan, ("alpha", "beta"))
     value, information, scatter = _scattered(lam, decay, np.maximum(spread, 1e-6 * size), size)
     said = []
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -57,7 +57,7 @@ def rayleigh(lambda_per_s2: Array, decay_per_s: Array, decay_sd_per_s: Array, gu
             if not (value[i] > 0 and 0 <= covariance[i, i] < STANDARD_ERRORS**2):
                 said.append(name)
                 covariance[i, :] = covariance[:, i] = np.nan
-    return Damping(float(value[0]), float(value[1]), covariance, scatter, tuple(said))
+    return RayleighFit(float(value[0]), float(value[1]), covariance, scatter, tuple(said))
 
 
 def _scattered(lam: Array, decay: Array, spread: Array, size: Array) -> tuple[Array, Array, float]:
@@ -70,7 +70,7 @@ def _scattered(lam: Array, decay: Array, spread: Array, size: Array) -> tuple[Ar
 
     low, high = 0.0, 3.0
     best = at(low)
-    if len(lam) == 2 or best[2] <= 2 * np.sqrt(2 * freedom):  # the law holds as far as can be told
+    if len(lam) == 2 or best[2] <= 2 * np.sqrt(2 * freedom):  # the law holds as far as can be identified
         return best[0], best[1] / max(1.0, best[2] / freedom + 1), 0.0
     for _ in range(40):
         middle = (low + high) / 2

@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from sonic_bullet.estimator.lines import likelihood
-from sonic_bullet.estimator.lines.likelihood import Modes
+from sonic_bullet.estimator.lines.likelihood import Sinusoids
 from sonic_bullet.records import Array
 
 SIZES = ((64, 256), (500, 1000), (700, 2000))  # rows, columns
@@ -24,7 +24,7 @@ ROUNDED = 1e-10  # left more than this: noise, though little, and more samples a
 POLISHED, POLISHED_ROUNDED, STEPS = 3000, 10_000, 5
 
 
-def modes(signal: Array, sr: int) -> Modes | None:
+def modes(signal: Array, sr: int) -> Sinusoids | None:
     """All modes of a signal (n,) that starts with or after its onset; None where it has noise or is not modal."""
     rms = float(np.sqrt((signal**2).mean()))
     for rows, columns in SIZES:
@@ -42,7 +42,7 @@ def modes(signal: Array, sr: int) -> Modes | None:
     return None
 
 
-def _left(signal: Array, found: Modes, sr: int) -> float:
+def _left(signal: Array, found: Sinusoids, sr: int) -> float:
     """Rms that the modes leave; infinite where one grows or is none."""
     if (found.pole.real >= 0).any() or (found.pole.imag <= 0).any():
         return float("inf")
@@ -75,11 +75,11 @@ def _jacobian(pole: Array, amplitude: Array, sr: int, count: int) -> Array:
     return np.concatenate([-sloped.imag, -sloped.real, sound.real, -sound.imag], axis=1)
 
 
-def _amplitudes(signal: Array, pole: Array, sr: int) -> Modes:
+def _amplitudes(signal: Array, pole: Array, sr: int) -> Sinusoids:
     k = len(pole)
     columns = _jacobian(pole, np.zeros(k), sr, len(signal))[:, 2 * k :]
     answer = _solved(columns, signal)
-    return Modes(pole, answer[:k] + 1j * answer[k:])
+    return Sinusoids(pole, answer[:k] + 1j * answer[k:])
 
 
 def _solved(columns: Array, wanted: Array) -> Array:
@@ -88,7 +88,7 @@ def _solved(columns: Array, wanted: Array) -> Array:
     return np.asarray(np.linalg.lstsq(r, q.T @ wanted, rcond=1e-15)[0] * scale)
 
 
-def _polished(signal: Array, start: Modes, sr: int) -> Modes:
+def _polished(signal: Array, start: Sinusoids, sr: int) -> Sinusoids:
     """Down to rounding: a step that does not lower the residual is the last."""
     k = len(start.pole)
     left = likelihood.residual(signal, start, sr)
@@ -96,7 +96,7 @@ def _polished(signal: Array, start: Modes, sr: int) -> Modes:
         step = _solved(_jacobian(start.pole, start.amplitude, sr, len(signal)), left)
         if (np.abs(step[: 2 * k]).reshape(2, k) > 1e3 + np.abs(start.pole)).any():
             break
-        moved = Modes(start.pole - step[k : 2 * k] + 1j * step[:k], start.amplitude + step[2 * k : 3 * k] + 1j * step[3 * k :])
+        moved = Sinusoids(start.pole - step[k : 2 * k] + 1j * step[:k], start.amplitude + step[2 * k : 3 * k] + 1j * step[3 * k :])
         rest = likelihood.residual(signal, moved, sr)
         if not float(rest @ rest) < float(left @ left):
             break

@@ -1,8 +1,8 @@
 """One recorded impact -> its damped sinusoids, each with its spread [Ren, Yeh, Lin 2013, section 4; and what has been learnt since].
 
     recording -> onset.py (which part is one impact)
-    -> exact.py   where there is no noise: the rank of the Hankel matrix tells all modes at once
-    -> noise.py   density over frequency, course over time
+    -> exact_modes.py     where there is no noise: the rank of the Hankel matrix tells all modes at once
+    -> noise_density.py   density over frequency, course over time
     -> subspace.py (poles, band by band)       every frequency resolution at once, where the paper goes from level to level
     -> likelihood.py (all modes jointly)       the paper's "everything found so far subtracted", to the optimum
     -> the residual's matched filter adds poles while they are significant; what is not, goes
@@ -20,7 +20,7 @@ from collections.abc import Callable
 import numpy as np
 
 from sonic_bullet.estimator.lines import exact_modes, likelihood, onset, subspace
-from sonic_bullet.estimator.lines.likelihood import Modes
+from sonic_bullet.estimator.lines.likelihood import Sinusoids
 from sonic_bullet.estimator.lines.line_values import Features
 from sonic_bullet.estimator.lines.noise_density import Noise, matched, measured, noise_density, white
 from sonic_bullet.records import Array
@@ -44,7 +44,7 @@ SWELLS = 3.0  # times its first 50 ms: two modes that start against one another 
 SHORT_S, LOW_RATE, GROWS_S = 0.1, 30_000, 0.4
 PINNED = 0.999  # of the fastest decay looked for
 CANCELLING = 4.0  # of the recording's peak: modes that large cancel one another, and model what is no mode
-TOLD = 2.0  # spreads that a decay must be away from none
+DECAY_IDENTIFIED = 2.0  # spreads that a decay must be away from none
 NEAR = 4.0  # decays within which one mode can do another's work
 STEADY = 0.02  # a decay of less than this over the whole recording, or within two of its spreads of none, is a tone
 
@@ -70,7 +70,7 @@ def extract(signal: Array, sr: int, *, onset_s: float | None = None, band_hz: tu
     if len(x) < LEAST_SAMPLES:
         raise AudioError(f"{len(x)} samples follow the onset", f"an impact needs {LEAST_SAMPLES} at least")
     notes, hopeless = _doubts(signal, x, part.hits, sr)
-    modes, noise = (Modes(np.zeros(0, complex), np.zeros(0, complex)), white(_rms(x), sr)) if hopeless else _modes(x, sr, (low, high))
+    modes, noise = (Sinusoids(np.zeros(0, complex), np.zeros(0, complex)), white(_rms(x), sr)) if hopeless else _modes(x, sr, (low, high))
     start = part.start
     if onset_s is None and len(modes.pole):
         start = onset.by_modes(signal, part.start, modes, sr, _rms(likelihood.residual(x, modes, sr)))
@@ -107,11 +107,11 @@ def _reach(band_hz: tuple[float, float], sr: int) -> tuple[float, float]:
     return 2 * np.pi * 0.5 * band_hz[0], 2 * np.pi * min(1.02 * band_hz[1], 0.4999 * sr)
 
 
-def _fit(signal: Array, start: Modes, sr: int, band_hz: tuple[float, float], effort: tuple[int, float] = QUICK) -> Modes:
+def _fit(signal: Array, start: Sinusoids, sr: int, band_hz: tuple[float, float], effort: tuple[int, float] = QUICK) -> Sinusoids:
     return likelihood.fitted(signal, start, sr, band=_reach(band_hz, sr), fastest_per_s=FASTEST_PER_S, steps=effort[0], tolerance=effort[1])
 
 
-def _modes(x: Array, sr: int, band_hz: tuple[float, float]) -> tuple[Modes, Noise]:
+def _modes(x: Array, sr: int, band_hz: tuple[float, float]) -> tuple[Sinusoids, Noise]:
     """The significant modes of a signal and the noise they leave."""
     floor = FLOOR * _rms(x)
     without_noise = exact_modes.modes(x, sr)
@@ -133,7 +133,7 @@ def _modes(x: Array, sr: int, band_hz: tuple[float, float]) -> tuple[Modes, Nois
     return modes, measured(likelihood.residual(x, modes, sr), sr, floor, len(modes.pole))
 
 
-def _beside(modes: int, least: float) -> float:
+def _least_of_a_second(modes: int, least: float) -> float:
     """Least energy of a second mode in a line: it has the few cells beside the lines to chance upon, not the whole recording."""
     return float(min(least, 2 * np.log(1.5 * 2 * NEAR * max(modes, 1) / FALSE_ALARMS)))
 
@@ -145,14 +145,14 @@ def _needed(pole: Array, least: float) -> Callable[[Array], Array]:
     def at(freq_hz: Array) -> Array:
         need = np.full(len(freq_hz), least)
         for first, last in zip(np.searchsorted(freq_hz, centre - reach), np.searchsorted(freq_hz, centre + reach), strict=True):
-            need[first:last] = _beside(len(pole), least)
+            need[first:last] = _least_of_a_second(len(pole), least)
         return need
 
     return at
 
 
-def _first(x: Array, sr: int, band_hz: tuple[float, float], least: float, floor: float) -> tuple[Modes, Noise]:
-    """The significant ones of the bands' poles, fitted; the strongest alone where there are more than can be told."""
+def _first(x: Array, sr: int, band_hz: tuple[float, float], least: float, floor: float) -> tuple[Sinusoids, Noise]:
+    """The significant ones of the bands' poles, fitted; the strongest alone where there are more than can be identified."""
     density = np.maximum(noise_density(x, tail=True), floor)
     slow = subspace.poles(x, sr, density, band_hz, BAND_HZ, FASTEST_PER_S)
     fast = subspace.early_poles(x, sr, density, band_hz, FASTEST_PER_S)
@@ -173,8 +173,8 @@ def _first(x: Array, sr: int, band_hz: tuple[float, float], least: float, floor:
     return _pruned(x, band_hz, modes, noise, least), noise
 
 
-def _pruned(x: Array, band_hz: tuple[float, float], modes: Modes, noise: Noise, least: float) -> Modes:
-    """Without the modes that are not significant, or share a line with others so that no decay is told, the weakest first, the rest fitted again."""
+def _pruned(x: Array, band_hz: tuple[float, float], modes: Sinusoids, noise: Noise, least: float) -> Sinusoids:
+    """Without the modes that are not significant, or share a line with others so that no decay is identified, the weakest first, the rest fitted again."""
     while len(modes.pole):
         met = noise.rms(modes.pole.imag / (2 * np.pi), -modes.pole.real)
         spread, energy = likelihood.spreads(modes, noise.sr, len(x))
@@ -183,8 +183,8 @@ def _pruned(x: Array, band_hz: tuple[float, float], modes: Modes, noise: Noise, 
         energy[outside | (np.abs(modes.amplitude) > CANCELLING * np.abs(x).max())] *= 1e-9
         far, fade = np.abs(modes.pole.imag[:, None] - modes.pole.imag), -modes.pole.real
         near = far < NEAR * np.maximum(fade[:, None], fade)
-        vague = (fade < TOLD * spread[1] * met) & (near.sum(axis=1) > 1)
-        weak = np.flatnonzero((energy <= np.where(near.sum(axis=1) > 1, _beside(len(fade), least), least)) | vague)
+        vague = (fade < DECAY_IDENTIFIED * spread[1] * met) & (near.sum(axis=1) > 1)
+        weak = np.flatnonzero((energy <= np.where(near.sum(axis=1) > 1, _least_of_a_second(len(fade), least), least)) | vague)
         if not len(weak):
             break
         rival = near[np.ix_(weak, weak)] & (energy[weak] < energy[weak, None])  # two that share one line: one may stay
@@ -194,21 +194,21 @@ def _pruned(x: Array, band_hz: tuple[float, float], modes: Modes, noise: Noise, 
     return modes
 
 
-def _moved(x: Array, modes: Modes, noise: Noise, band_hz: tuple[float, float], later: int) -> Modes:
+def _moved(x: Array, modes: Sinusoids, noise: Noise, band_hz: tuple[float, float], later: int) -> Sinusoids:
     """The same modes for a signal that starts ``later`` samples after the one they were found in."""
     if later == 0:
         return modes
-    turned = Modes(modes.pole, modes.amplitude * np.exp(modes.pole / noise.sr * later))
+    turned = Sinusoids(modes.pole, modes.amplitude * np.exp(modes.pole / noise.sr * later))
     return turned if len(noise.density) == 2 else _fit(x, turned, noise.sr, band_hz, (QUICK[0], THOROUGH[1]))
 
 
-def _features(x: Array, modes: Modes, noise: Noise, band_hz: tuple[float, float], start: int, notes: list[str]) -> Features:
+def _features(x: Array, modes: Sinusoids, noise: Noise, band_hz: tuple[float, float], start: int, notes: list[str]) -> Features:
     k, sr = len(modes.pole), noise.sr
     left = likelihood.residual(x, modes, sr)
     explained = 1 - float(left @ left) / float(x @ x)
     freq, decay = modes.pole.imag / (2 * np.pi), -modes.pole.real
     sd = likelihood.spreads(modes, sr, len(x))[0] * noise.rms(freq, decay) if k else np.zeros((4, 0))
-    tone, vague = decay * len(x) / sr < STEADY, decay < TOLD * sd[1]
+    tone, vague = decay * len(x) / sr < STEADY, decay < DECAY_IDENTIFIED * sd[1]
     for which, said in ((tone, "do not decay"), (vague & ~tone, "have no decay that can be told")):
         if which.any():
             shown = ", ".join(f"{f:.1f}" for f in np.sort(freq[which])[:8])

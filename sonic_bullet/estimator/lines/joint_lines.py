@@ -33,7 +33,7 @@ LATE_S = (0.03, 0.1)
 DEAD = 9.0  # of ln amplitude: 78 dB
 PLAINLY = 0.75  # of what other lines leave, in squares
 SILENT = 1e-9  # rms, of full scale 1
-FEWEST = 3  # lines that say what rings
+FEWEST_LINES = 3  # lines that say what rings
 BEYOND = (10.0, 0.1)  # times a recording's peak; share of the lines that begin there: what no single hit leaves
 
 
@@ -52,17 +52,17 @@ def joint_lines(signals: Array, sr: int, *, band_hz: tuple[float, float] = (20.0
     low, high = max(band_hz[0], 5.0), min(band_hz[1], 0.485 * sr)
     noise = noise_rms(signals, sr)
     try:
-        return _told(signals, noise, sr, (low, high), signed, modes, crowd=True)
+        return _identified(signals, noise, sr, (low, high), signed, modes, crowd=True)
     except np.linalg.LinAlgError as error:
         raise AudioError("lines of the recording cannot be told apart: no decaying sound", "give a recording of one impact") from error
 
 
-def _told(signals: Array, noise: Array, sr: int, band_hz: tuple[float, float], signed: bool, modes: int | None, *, crowd: bool) -> Lines:
+def _identified(signals: Array, noise: Array, sr: int, band_hz: tuple[float, float], signed: bool, modes: int | None, *, crowd: bool) -> Lines:
     """Lines of one hit, or what is left after several; crowd: of more poles than lines those, too, that take most one after another, where these say plainly more."""
     start = start_poles(signals / noise[:, None], sr, *band_hz)
     few: Lines | None = None
     for late in (round(t * sr) for t in LATE_S) if modes is not None and len(start) >= CROWD * modes else ():
-        if signals.shape[1] >= 8 * late and FEWEST <= len(start_poles(signals[:, late:] / noise[:, None], sr, *band_hz)) < FEWER * len(start):
+        if signals.shape[1] >= 8 * late and FEWEST_LINES <= len(start_poles(signals[:, late:] / noise[:, None], sr, *band_hz)) < FEWER * len(start):
             after = _from(late, signals, sr, band_hz, signed)
             few = few or after
             if after is not None and _beyond(after, signals) < BEYOND[1]:  # else it still hits
@@ -81,7 +81,7 @@ def _told(signals: Array, noise: Array, sr: int, band_hz: tuple[float, float], s
         if signals.shape[1] < 8 * late:
             break
         after = _from(late, signals, sr, band_hz, signed)
-        if after is not None and len(after.freq_hz) >= FEWEST and _beyond(after, signals) < BEYOND[1]:
+        if after is not None and len(after.freq_hz) >= FEWEST_LINES and _beyond(after, signals) < BEYOND[1]:
             return _struck(after, signals)
     return found
 
@@ -100,12 +100,12 @@ def _significant(signals: Array, noise: Array, pole: Array, sr: int, low: float,
 
 
 def _from(late: int, signals: Array, sr: int, band_hz: tuple[float, float], signed: bool) -> Lines | None:
-    """Lines from a sample on, as they would have begun at the onset; None where nothing can be told from there, or a recording is over."""
+    """Lines from a sample on, as they would have begun at the onset; None where nothing can be identified from there, or a recording is over."""
     rest = signals[:, late:]
     if not (np.sqrt((rest**2).mean(axis=1)) > SILENT).all():
         return None  # by a recording that a gate has shut nothing rang at the onset
     try:
-        lines = _told(rest, noise_rms(rest, sr), sr, band_hz, signed, None, crowd=False)
+        lines = _identified(rest, noise_rms(rest, sr), sr, band_hz, signed, None, crowd=False)
     except np.linalg.LinAlgError:
         return None
     alive = lines.decay_per_s * late / sr < DEAD  # what would have been over by then began later

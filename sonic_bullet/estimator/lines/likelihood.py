@@ -23,15 +23,15 @@ FINE = 16
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Modes:
+class Sinusoids:
     """pole (k,) −d + iω in 1/s, amplitude (k,) complex at sample 0."""
 
     pole: Array
     amplitude: Array
 
-    def take(self, which: Array) -> Modes:
+    def take(self, which: Array) -> Sinusoids:
         """The modes of that index or mask."""
-        return Modes(self.pole[which], self.amplitude[which])
+        return Sinusoids(self.pole[which], self.amplitude[which])
 
 
 def _powers(pole: Array, step: int, count: int) -> Array:
@@ -78,7 +78,7 @@ def geometric(first: Array, second: Array, count: int) -> tuple[Array, Array, Ar
     return zeroth, first_moment, second_moment
 
 
-def information(modes: Modes, sr: int, count: int) -> Array:
+def information(modes: Sinusoids, sr: int, count: int) -> Array:
     """JᵀJ (4k, 4k) for (ω, d, Re A, Im A), blocks of k; ω and d in 1/s."""
     z, a, k = modes.pole / sr, modes.amplitude, len(modes.pole)
     even, odd = geometric(z, z.conj(), count), geometric(z, z, count)
@@ -91,14 +91,14 @@ def information(modes: Modes, sr: int, count: int) -> Array:
     return matrix
 
 
-def residual(signal: Array, modes: Modes, sr: int) -> Array:
+def residual(signal: Array, modes: Sinusoids, sr: int) -> Array:
     """What the modes leave of a signal (n,)."""
     return np.asarray(_subtracted(signal, modes.pole / sr, modes.amplitude))
 
 
-def amplitudes(signal: Array, pole: Array, sr: int, *, passes: int = 3) -> Modes:
+def amplitudes(signal: Array, pole: Array, sr: int, *, passes: int = 3) -> Sinusoids:
     """Least-squares amplitudes of given poles, refined ``passes`` times on what they leave."""
-    modes = Modes(pole, np.zeros(len(pole), complex))
+    modes = Sinusoids(pole, np.zeros(len(pole), complex))
     k = len(pole)
     if not k:
         return modes
@@ -108,7 +108,7 @@ def amplitudes(signal: Array, pole: Array, sr: int, *, passes: int = 3) -> Modes
     for _ in range(passes):
         first, _ = moments(residual(signal, modes, sr), pole / sr)
         step = scale * np.linalg.solve(matrix, scale * np.concatenate([first.real, -first.imag]))
-        modes = Modes(pole, modes.amplitude + step[:k] + 1j * step[k:])
+        modes = Sinusoids(pole, modes.amplitude + step[:k] + 1j * step[k:])
     return modes
 
 
@@ -119,7 +119,9 @@ def alone(signal: Array, pole: Array, sr: int) -> Array:
     return np.asarray(2 * np.abs(first) ** 2 / power)
 
 
-def fitted(signal: Array, start: Modes, sr: int, *, band: tuple[float, float], fastest_per_s: float, steps: int = STEPS_MOST, tolerance: float = 1e-4) -> Modes:
+def fitted(
+    signal: Array, start: Sinusoids, sr: int, *, band: tuple[float, float], fastest_per_s: float, steps: int = STEPS_MOST, tolerance: float = 1e-4
+) -> Sinusoids:
     """Modes at the least sum of squares near ``start``; band in rad/s. tolerance: relative fall of the sum of squares that ends it."""
     modes, k = start, len(start.pole)
     if not k:
@@ -139,7 +141,7 @@ def fitted(signal: Array, start: Modes, sr: int, *, band: tuple[float, float], f
             turn, fade = np.clip(step[:k], -reach, reach), np.clip(step[k : 2 * k], -reach, reach)
             pole = np.clip(modes.pole.real - fade, -fastest_per_s, -1e-3) + 1j * np.clip(modes.pole.imag + turn, *band)
             whole = np.array_equal(fade, step[k : 2 * k]) and np.array_equal(turn, step[:k])
-            moved = Modes(pole, modes.amplitude + step[2 * k : 3 * k] + 1j * step[3 * k :])
+            moved = Sinusoids(pole, modes.amplitude + step[2 * k : 3 * k] + 1j * step[3 * k :])
             trial = moved if whole else amplitudes(signal, pole, sr, passes=1)
             rest = residual(signal, trial, sr)
             found = float(rest @ rest)
@@ -152,7 +154,7 @@ def fitted(signal: Array, start: Modes, sr: int, *, band: tuple[float, float], f
     return modes
 
 
-def spreads(modes: Modes, sr: int, count: int) -> tuple[Array, Array]:
+def spreads(modes: Sinusoids, sr: int, count: int) -> tuple[Array, Array]:
     """Standard errors (4, k) of ω, d, Re A, Im A in white noise of unit rms, and energies (k,) of each mode given the others.
 
     The energy is |A|² in the metric of A's own covariance at fixed poles [Kay 1998, eq. 7.36].

@@ -1,4 +1,4 @@
-"""The values that travel inside the estimator: what was heard, and what it says of the material.
+"""The values that travel inside the estimator: what was observed, and what it says of the material.
 
     x(t) = Σ a e^{−d(t−t₀)} sin(2πf(t−t₀) + φ)   for t ≥ t₀                            [Ren, Yeh, Lin 2013, eq. 4, 8]
     d = ½(α + βλ),  λ = γ λ̂(ν),  a = σ â                                               [eq. 6-8, section 5]

@@ -17,7 +17,7 @@ from sonic_bullet.records import Array
 
 WINDOWS = (512, 2048, 8192)
 ABOVE = 10.0  # m: cells 10 dB above the noise count
-FEWEST = 20  # cells of a window that may speak for itself
+FEWEST_CELLS = 20  # cells of a window that may speak for itself
 FLOOR_WINDOW = 1024
 MOST = 8192  # of its window, where recordings are long: low noise needs narrow bins
 SIDE = 8  # bins of the short window to each side
@@ -90,7 +90,7 @@ def white(rms: float) -> Floor:
 def log_spectral_db(a: Array, b: Array, floor: Floor, *, windows: tuple[int, ...] = WINDOWS, above: float = ABOVE) -> float:
     """Distance D of two sounds (n,), each with a noise like ``floor`` in it; NaN where no cell stands above it.
 
-    A sound without noise (a prediction) must be given some, or its silence counts: see `with_noise`. Windows with FEWEST cells speak, or, where none has so
+    A sound without noise (a prediction) must be given some, or its silence counts: see `with_noise`. Windows with FEWEST_CELLS cells speak, or, where none has so
     many, all: of fewer, one in which noise happens to cancel a sound says more than all others.
     """
     found: list[float] = []
@@ -103,7 +103,7 @@ def log_spectral_db(a: Array, b: Array, floor: Floor, *, windows: tuple[int, ...
         if observed.any():
             tiny = np.broadcast_to(1e-3 * cell, observed.shape)[observed]
             off = float(np.sqrt(((10 * np.log10((power_a[observed] + tiny) / (power_b[observed] + tiny))) ** 2).mean()))
-            (found if observed.sum() >= FEWEST else few).append(off)
+            (found if observed.sum() >= FEWEST_CELLS else few).append(off)
     return float(np.mean(found or few)) if found or few else float("nan")
 
 

@@ -1,7 +1,7 @@
 """Where an impact starts in a recording, where the next one interrupts it, and what in the recording is no honest signal.
 
 energy in blocks of 1 ms -> the first block within 20 dB of the loudest -> first sample above the noise in that block -> about the onset
-the modes heard after it, run backwards, against silence: the sample where the sound takes over from silence -> the onset
+the modes observed after it, run backwards, against silence: the sample where the sound takes over from silence -> the onset
 a later rise of half of all bands by `AGAIN_DB` above what they held the 30 ms before: another hit; what follows it is left out. Beats are no hit:
 they swell in their own bands only
 """
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sonic_bullet.estimator.lines.likelihood import Modes
+from sonic_bullet.estimator.lines.likelihood import Sinusoids
 from sonic_bullet.records import Array
 
 BLOCK_S = 1e-3
@@ -83,7 +83,7 @@ def _hits(signal: Array, sr: int, loudest: float) -> Array:
     return np.array(kept, int)
 
 
-def by_modes(signal: Array, start: int, modes: Modes, sr: int, noise: float) -> int:
+def by_modes(signal: Array, start: int, modes: Sinusoids, sr: int, noise: float) -> int:
     """The sample at which the modes, of amplitudes at sample ``start``, take over from silence: the earliest of the likeliest.
 
     Σ_{n<t} x² + Σ_{n≥t} (x − m)² is least at the true t; a sine begins with a zero, which silence explains as well: hence the earliest

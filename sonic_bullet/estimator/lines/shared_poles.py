@@ -1,4 +1,4 @@
-"""Several recordings of one object -> rough poles that they share, band by band: where the likelihood of lines.py starts.
+"""Several recordings of one object -> rough poles that they share, band by band: where the likelihood of joint_lines.py starts.
 
 bands, decimated; poles = eigenvalues of the shift between the rows of the signal subspace of all recordings at once
                                                                          (ESPRIT)       [Roy & Kailath 1989, eq. 3.12-3.17]
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sonic_bullet.parallel import side_by_side
+from sonic_bullet.parallel import parallel_map
 from sonic_bullet.records import Array
 
 FASTEST_PER_S = 2500.0
@@ -37,7 +37,7 @@ def start_poles(signals: Array, sr: int, low: float, high: float) -> Array:
         keep = (freq >= edge) & (freq < min(edge + width, high)) & (found.real < 0) & (found.real > -FASTEST_PER_S)
         return np.asarray(found[keep].real + 2j * np.pi * freq[keep])
 
-    return np.concatenate([np.zeros(0, complex), *side_by_side(within, edges[:-1])])
+    return np.concatenate([np.zeros(0, complex), *parallel_map(within, edges[:-1])])
 
 
 def _width(edge: float) -> float:

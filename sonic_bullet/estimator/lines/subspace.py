@@ -5,7 +5,7 @@
                                                                         [Roy & Kailath 1989, eq. 3.12-3.17; Hua & Sarkar 1990]
     noise: singular values of white noise end at σ(√rows + √columns)    [Marchenko & Pastur 1967]
 
-The stop band lies below any converter's noise; recordings without noise are exact.py's.
+The stop band lies below any converter's noise; recordings without noise are exact_modes.py's.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 from sonic_bullet.records import Array
 
 STOP_DB = 160.0
-ROUNDING = 1e-7  # of the largest singular value, by way of H Hᴴ: enough for what a converter writes; exact.py is for the rest
+ROUNDING = 1e-7  # of the largest singular value, by way of H Hᴴ: enough for what a converter writes; exact_modes.py is for the rest
 OVERSAMPLED = 2.5
 COLUMNS_MOST = 1200
 EARLY = 1500  # samples

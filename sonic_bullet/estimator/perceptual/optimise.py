@@ -2,7 +2,7 @@
 
 reference   every start of `seed_starts` walked down Π by Nelder and Mead in the logarithms, the best wins    [Ren, Yeh, Lin 2013, section 5.3]
 fast        1. Π_MRP alone (some tens of µs, blind to σ) sifts γ's from laying every feature on every mode; α, β from all features at once
-            2. the best few are matched feature to mode and solved as least squares, each residual by its spread (laid.py); Π ranks them
+            2. the best few are matched feature to mode and solved as least squares, each residual by its spread (partners.py); Π ranks them
             3. the best is walked down Π, a sum of squares, by Levenberg and Marquardt, then by Newton's method
 
 What the features say is kept where Π below it says that the images agree (EXACT): there they know better.

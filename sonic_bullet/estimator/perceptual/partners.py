@@ -1,4 +1,4 @@
-"""Features laid on modes: which belongs to which, and the four numbers by least squares once that is known.
+"""Features paired with modes: which belongs to which, and the four numbers by least squares once that is known.
 
     ln λ_i = ln γ + ln λ̂_j,   d_i = ½(α + βλ_i),   ln a_i = ln σ + ln |â_j|,   λ_i = ω_i² + d_i²       [Ren, Yeh, Lin 2013, eq. 6, 10-12]
 
@@ -19,7 +19,7 @@ from sonic_bullet.estimator.perceptual.problem import Problem, modes_of
 from sonic_bullet.estimator.perceptual.starts import by_energy, feature_eigenvalues, undominated
 from sonic_bullet.records import Array
 
-STRONGEST = 12  # features that are laid on modes to guess γ
+STRONGEST = 12  # features that are paired with modes to guess γ
 APART = 3e-3  # of ln γ: guesses closer than this are one guess
 DISTINCT = 0.01  # of ln γ: starts closer than this end in one minimum
 UNDOMINATED = 12
@@ -155,7 +155,7 @@ def candidates(aim: Target, most: int) -> Array:
     surest = np.log(eigen[strong[0]] / problem.lambda_hat[undominated(problem.lambda_hat, problem.amplitude_hat)[-UNDOMINATED:]])
     kept: list[float] = []
     for log_gamma in (*guess[np.argsort(score, kind="stable")], *np.clip(surest, *np.log([problem.lower[2], problem.upper[2]]))):
-        # the last ones come whatever Π_MRP says of them: where few of many modes were heard it likes a γ that hides the rest under those
+        # the last ones come whatever Π_MRP says of them: where few of many modes were observed it likes a γ that hides the rest under those
         if (len(kept) < most or log_gamma in surest) and all(abs(log_gamma - other) > DISTINCT for other in kept):
             kept.append(float(log_gamma))
     rows = []

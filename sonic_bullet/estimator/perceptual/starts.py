@@ -1,7 +1,7 @@
 """Where a search for α, β, γ, σ begins.
 
     d_i = ½(α + βλ_i),  λ_i = ω_i² + d_i²       two features make a circle: β = 2(d₁ − d₂)/(λ₁ − λ₂), α = 2d₁ − βλ₁
-    γ = λ₁/λ̂_j,  σ = a₁/|â_j|                    one mode laid on the most dominant feature           [Ren, Yeh, Lin 2013, eq. 8, section 5.3]
+    γ = λ₁/λ̂_j,  σ = a₁/|â_j|                    one mode placed on the most dominant feature           [Ren, Yeh, Lin 2013, eq. 8, section 5.3]
 
 The paper draws pairs from N_dominant features (its Table II counts ten pairs a mode, so five) and modes no other undoes: none of lower
 λ̂ has a larger |â|. A pair whose circle has α or β below its bound is moved to the bound, the other fitted to the stronger feature of the two.
@@ -22,7 +22,7 @@ DOMINANT = 5
 
 
 def feature_eigenvalues(features: Features) -> Array:
-    """(k,) λ = ω² + d² in 1/s² of what was heard. Source: eq. 6, 7."""
+    """(k,) λ = ω² + d² in 1/s² of what was observed. Source: eq. 6, 7."""
     return np.asarray((2 * np.pi * features.freq_hz) ** 2 + features.decay_per_s**2)
 
 

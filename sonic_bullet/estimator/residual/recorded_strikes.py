@@ -23,7 +23,7 @@ from sonic_bullet.files.cases import CaseRecording
 from sonic_bullet.records import Array, Residual
 from sonic_bullet.records.errors import AudioError, FileError
 from sonic_bullet.residual.compute import damped, residual_record
-from sonic_bullet.residual.transfer import Modes
+from sonic_bullet.residual.transfer import StruckModes
 
 PER_BARK = 40.0
 PER_DURATION = 1.0
@@ -90,12 +90,12 @@ def strikes_of(signals: Array, left: Array, sr: int, lines: tuple[Array, Array, 
     loud = np.sqrt(np.where(1 - share**2 > ALIKE, 1 - share**2, 0.0) * (np.abs(amplitude) ** 2).mean(axis=0))
     mean = np.sqrt((np.abs(played) ** 2).mean(axis=0))
     rest = np.stack([x - damped(hz, mode_decay, a, signals.shape[1], sr) for x, a in zip(signals, played, strict=True)])
-    residual = residual_record(signals, left, rest, sr, Modes(hz, mode_decay, mean), (freq, decay, loud), source)
+    residual = residual_record(signals, left, rest, sr, StruckModes(hz, mode_decay, mean), (freq, decay, loud), source)
     return Strikes(signals, left, sr, freq, decay, amplitude, share, hz, mode_decay, played, residual)
 
 
 def case_strikes(found: CaseFit) -> Strikes:
-    """The residual of a fitted case, of the object with the most strikes. Raises AudioError where no recording can be heard."""
+    """The residual of a fitted case, of the object with the most strikes. Raises AudioError where no recording can be used."""
     observed = [o for o in found.objects if o.evidence.signals is not None and len(o.freq_hz)]
     if not observed:
         raise AudioError(f"case {found.case.name} has no recording of a body with a mesh", "a residual is what a recording has beside its modes")
@@ -106,8 +106,8 @@ def case_strikes(found: CaseFit) -> Strikes:
     left = np.stack([signal - lines_sound(e.lines, i, n, sr) for i, signal in enumerate(e.signals)])
     use = o.freq_hz < sr / 2
     measured = np.where(o.line >= 0, e.lines.amplitude[:, o.line], 0.0) if len(e.lines.freq_hz) else np.zeros((len(e.signals), len(o.line)))
-    told = found.fit.sigma * o.pattern * e.seen.start(o.freq_hz, o.decay_per_s)
-    amplitude = np.where(np.isfinite(told), told, measured)
+    predicted = found.fit.sigma * o.pattern * e.seen.start(o.freq_hz, o.decay_per_s)
+    amplitude = np.where(np.isfinite(predicted), predicted, measured)
     lines = e.lines.freq_hz, np.nan_to_num(e.lines.decay_per_s), np.nan_to_num(e.lines.amplitude)
     names = ", ".join(r.file.name for r in e.recordings if r.file is not None)
     return strikes_of(e.signals, left, sr, lines, (o.freq_hz[use], o.decay_per_s[use], amplitude[:, use]), f"{found.case.name}: {names}"[:400])
@@ -130,7 +130,7 @@ def recording_strikes(sample: Array, sr: int, onset_s: float | None, name: str) 
 def strike_modes(found: CaseFit, recording: CaseRecording, sr: int) -> tuple[Array, Array, Array]:
     """Frequency, decay (m,) and complex amplitude (m,) that a fit predicts of any strike of its case at rate ``sr``. Raises FileError, MeshError."""
     from sonic_bullet.estimator.fit.object_fit import object_of
-    from sonic_bullet.estimator.fit.observed import body_family, guess_of, observed
+    from sonic_bullet.estimator.fit.recorded import body_family, guess_of, observed
 
     if recording.position_m is None:
         raise FileError("a strike without a place cannot be predicted", "give its position")

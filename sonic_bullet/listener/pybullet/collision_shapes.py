@@ -18,7 +18,7 @@ import pybullet
 from sonic_bullet.geometry import volume_m3
 from sonic_bullet.listener.frames import link_words
 from sonic_bullet.listener.pybullet.pieces import Piece, collision_pieces, turn_matrix, visual_pieces
-from sonic_bullet.listener.pybullet.urdf_meshes import Surface, hull, joined, read_surfaces
+from sonic_bullet.listener.pybullet.urdf_meshes import MeshSurface, hull, joined, read_surfaces
 from sonic_bullet.listener.quiet import quiet_stdout
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.errors import MeshError
@@ -137,9 +137,9 @@ def _as_cylinder(piece: Piece, vertices: Array) -> Shape | None:
     return Shape("cylinder", np.array([radius.max(), 2 * half.max(), 0]), piece.position, piece.quaternion)
 
 
-def visual_surface(client_id: int, body: int, link: int) -> Surface | None:
+def visual_surface(client_id: int, body: int, link: int) -> MeshSurface | None:
     """The link's visual mesh files together in the body frame, or None where there are none or they cannot be read."""
-    surfaces: list[Surface] = []
+    surfaces: list[MeshSurface] = []
     for piece in visual_pieces(client_id, body, link):
         path = _file(piece)
         if piece.kind != pybullet.GEOM_MESH or path is None:

@@ -19,7 +19,7 @@ from sonic_bullet.listener.polling import FORCE
 from sonic_bullet.listener.pybullet import collision_shapes
 from sonic_bullet.listener.pybullet.body_facts import checked_mass_kg, link_name
 from sonic_bullet.listener.pybullet.pieces import collision_pieces
-from sonic_bullet.listener.pybullet.urdf_meshes import Surface, lid_height_m, read_surfaces
+from sonic_bullet.listener.pybullet.urdf_meshes import MeshSurface, lid_height_m, read_surfaces
 from sonic_bullet.listener.pybullet.world import World, client_id_of
 from sonic_bullet.records.errors import MeshError, SceneError
 
@@ -168,9 +168,9 @@ def _lids(client_id: int) -> list[Finding]:
     return found
 
 
-def _hulled(client_id: int, body: int, link: int) -> list[Surface]:
+def _hulled(client_id: int, body: int, link: int) -> list[MeshSurface]:
     pieces = [piece for piece in collision_pieces(client_id, body, link) if piece.kind == pybullet.GEOM_MESH]
-    surfaces: list[Surface] = []
+    surfaces: list[MeshSurface] = []
     for name, scale in {(piece.file, piece.size) for piece in pieces}:
         if name:
             try:

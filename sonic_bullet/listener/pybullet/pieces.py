@@ -36,10 +36,10 @@ def collision_pieces(client_id: int, body: int, link: int) -> tuple[Piece, ...]:
     """Pieces of an existing link; none where it cannot be touched or PyBullet cannot say how."""
     with quiet_stdout():
         try:
-            told = pybullet.getCollisionShapeData(body, link, physicsClientId=client_id)
+            shapes = pybullet.getCollisionShapeData(body, link, physicsClientId=client_id)
         except pybullet.error:
             return tuple(piece for piece in visual_pieces(client_id, body, link) if piece.kind in KINDS)
-    return tuple(Piece(kind, size, _name(file), position, quaternion) for _, _, kind, size, file, position, quaternion in told)
+    return tuple(Piece(kind, size, _name(file), position, quaternion) for _, _, kind, size, file, position, quaternion in shapes)
 
 
 def visual_pieces(client_id: int, body: int, link: int) -> tuple[Piece, ...]:

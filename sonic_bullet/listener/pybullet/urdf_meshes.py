@@ -10,11 +10,11 @@ from sonic_bullet.geometry import closest_point, welded
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import MeshError
 
-Surface = tuple[Array, Array]
+MeshSurface = tuple[Array, Array]
 LID_GRID = 5
 
 
-def read_surfaces(path: Path) -> list[Surface]:
+def read_surfaces(path: Path) -> list[MeshSurface]:
     """Objects of a mesh file: (vertices (v, 3), faces (f, 3)) each, identical vertices made one. Raises MeshError."""
     try:
         surfaces = _read_obj(path) if path.suffix.lower() == ".obj" else _read_other(path)
@@ -29,7 +29,7 @@ def read_surfaces(path: Path) -> list[Surface]:
     return whole
 
 
-def _read_obj(path: Path) -> list[Surface]:
+def _read_obj(path: Path) -> list[MeshSurface]:
     """Wavefront OBJ: v, f, and o or g as the start of an object; polygons become fans, texture and normals are skipped."""
     vertex: list[tuple[float, float, float]] = []
     objects: list[list[tuple[int, int, int]]] = [[]]
@@ -50,20 +50,20 @@ def _read_obj(path: Path) -> list[Surface]:
     return [(points[np.unique(faces)], np.searchsorted(np.unique(faces), faces)) for faces in map(np.array, objects) if len(faces)]
 
 
-def _read_other(path: Path) -> list[Surface]:
+def _read_other(path: Path) -> list[MeshSurface]:
     import trimesh
 
     scene = trimesh.load_scene(path, process=False, skip_materials=True)
     return [(np.asarray(part.vertices, float), np.asarray(part.faces)) for part in scene.dump() if isinstance(part, trimesh.Trimesh)]
 
 
-def joined(surfaces: list[Surface]) -> Surface:
+def joined(surfaces: list[MeshSurface]) -> MeshSurface:
     """All surfaces as one: (v, 3), (f, 3)."""
     offset = np.cumsum([0] + [len(vertex) for vertex, _ in surfaces])
     return np.concatenate([v for v, _ in surfaces]), np.concatenate([f + o for (_, f), o in zip(surfaces, offset, strict=False)])
 
 
-def hull(vertex_m: Array) -> Surface:
+def hull(vertex_m: Array) -> MeshSurface:
     """Convex hull of points (v, 3), faces outward. Raises MeshError where they lie in a plane."""
     from scipy.spatial import ConvexHull, QhullError
 

@@ -52,7 +52,7 @@ class World:
         self._roster: Roster | None = None
         self._before: Motion | None = None
         self._past_touches: Touches | None = None
-        self._told = self._told_before = self._ask(pybullet.getContactPoints)
+        self._contact_points = self._contact_points_before = self._ask(pybullet.getContactPoints)
         self._moved: set[int] = set()
         self._traces: tuple[Trace, ...] = NO_TRACES
         self._log = SubstepLog(client_id)
@@ -215,9 +215,9 @@ class World:
         if substeps == 1:
             if self._log.is_open:
                 self._log.close()
-            if last != self._told:  # polled twice, it tells the same twice
-                self._told_before, self._told = self._told, last
-            return gather(loaded(last, self._told_before), dt)
+            if last != self._contact_points:  # polled twice, it tells the same twice
+                self._contact_points_before, self._contact_points = self._contact_points, last
+            return gather(loaded(last, self._contact_points_before), dt)
         if not self._log.is_open:
             self._log.open()
             raise SceneError(

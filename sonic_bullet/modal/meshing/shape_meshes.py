@@ -14,7 +14,7 @@ import numpy as np
 
 from sonic_bullet import geometry
 from sonic_bullet.modal.meshing import prisms, structured
-from sonic_bullet.modal.meshing.solid import COARSER, Solid, Surface, corner_volume_m3, largest_component, quadratic, surface
+from sonic_bullet.modal.meshing.solid import COARSER, Solid, SolidSurface, corner_volume_m3, largest_component, quadratic, surface
 from sonic_bullet.modal.meshing.surfaces import SIZE_M, Skin, pieces_of_faces, prepared
 from sonic_bullet.modal.ordering import dissection
 from sonic_bullet.records import Array, Shape
@@ -39,7 +39,7 @@ class Filled:
     """A body ready to be assembled: solid, its skin, curvature_per_m (f,) of the skin's faces."""
 
     solid: Solid
-    skin: Surface
+    skin: SolidSurface
     curvature_per_m: Array
 
 
@@ -192,14 +192,14 @@ def _meshed(skin: Skin, edge_m: float | None, say: Callable[[str], None]) -> Sol
             node, tet = tetrahedra(vertex, face, edge, envelope, passes=passes, time_limit_s=limit_s)
             _check_filled(vertex, face, node, tet)
         except MeshError as error:
-            failure, told = error, COARSER if isinstance(error, TooSlow) else "coarser"
+            failure, coarsening = error, COARSER if isinstance(error, TooSlow) else "coarser"
         else:
             tet, pieces = largest_component(node, tet)
             if len(tet) <= MOST_TETS or edge_m is not None:
                 note = f"fTetWild, {len(tet)} tetrahedra, edge {edge:.3g} m, envelope {envelope:.2g} m{skin.note}{said}"
                 return quadratic(node, tet, note=note + (f"; largest of {pieces} separate pieces kept" if pieces > 1 else ""))
-            failure, told = too_fine, "coarser"
-        said = said if COARSER in said else f"; {told}: {failure.what}"
+            failure, coarsening = too_fine, "coarser"
+        said = said if COARSER in said else f"; {coarsening}: {failure.what}"
         edge, envelope, passes = 1.6 * edge, 2.5 * envelope, LUMP_PASSES
     if len(limits_s) > 1:
         failure = MeshError(f"{failure.what}, the last of {len(limits_s)} attempts, each coarser, within {sum(limits_s):.0f} s in all", failure.remedy)

@@ -36,7 +36,7 @@ class Solid:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Surface:
+class SolidSurface:
     """node (v,): which of the solid's nodes lie on the surface. face (f, 3): indices into ``node``, outward."""
 
     node: Array
@@ -92,7 +92,7 @@ def largest_component(corner_m: Array, tet: Array) -> tuple[Array, int]:
     return tet[label == np.argmax(volume)], int(pieces)
 
 
-def surface(solid: Solid) -> Surface:
+def surface(solid: Solid) -> SolidSurface:
     """Boundary of a solid: every face that belongs to one tetrahedron only, cut into four triangles."""
     faces = solid.tet[:, TET_FACE].reshape(-1, 6)
     key = np.sort(faces[:, :3], axis=1)
@@ -105,4 +105,4 @@ def surface(solid: Solid) -> Surface:
     outer = faces[np.sort(order[single])]
     triangle = outer[:, QUARTERS].reshape(-1, 3)
     node, face = np.unique(triangle, return_inverse=True)
-    return Surface(node, face.reshape(-1, 3).astype(np.int32))
+    return SolidSurface(node, face.reshape(-1, 3).astype(np.int32))

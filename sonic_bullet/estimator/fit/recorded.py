@@ -1,8 +1,8 @@
-"""What a case's strikes of one object say, laid beside the object's modes.
+"""What a case's strikes of one object say, and the object's modes to hold it against.
 
-    CaseRecording's files -> onset cut -> hum taken out -> Lines (lines.py)  \\
-                                                                              Evidence, one per object (and one per list of measured features)
-    mesh + guess -> Family (modal.reduced) -> Observation                    /
+    CaseRecording's files -> onset cut -> hum taken out -> Lines (joint_lines.py)  \\
+                                                                                    RecordedObject, one per object
+    mesh + guess -> Family (modal.reduced) -> Observation                          /  (and one per list of features)
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ CLIPPED_RUNS = 4  # or as many rows of three: a sound that decays has one highes
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Evidence:
-    """One object's lines, its family and how its strikes are heard. family None: no mesh. signals (s, n) from the onset, None for features."""
+class RecordedObject:
+    """One object's lines, its family and how its strikes are observed. family None: no mesh. signals (s, n) from the onset, None for features."""
 
     thing: CaseObject
     guess: Material
@@ -72,13 +72,13 @@ def guess_of(thing: CaseObject) -> Material:
 
 def gather(
     case: Case, *, split: str = "fit", cache: Place = "default", clipped: bool = False, progress: Callable[[str], None] | None = None
-) -> tuple[Evidence, ...]:
-    """Evidence of all objects that have strikes of ``split`` with audio or features. clipped: let through what stands at its peak, and what holds several hits.
+) -> tuple[RecordedObject, ...]:
+    """RecordedObjects of all objects that have strikes of ``split`` with audio or features. clipped: let through what stands at its peak, and what holds several hits.
 
     Raises SonicBulletError where there is none.
     """
     say = progress or (lambda _: None)
-    found: list[Evidence] = []
+    found: list[RecordedObject] = []
     for name in dict.fromkeys(r.object for r in case.recordings if r.split == split):
         thing = case.objects.get(name, CaseObject(name or "object", None, 1.0, None, 2e11, 7850.0, 0.3))
         guess = guess_of(thing)
@@ -89,19 +89,19 @@ def gather(
         if gone and not played and not listed:
             raise FileError(f"cannot read {gone[0]}: no such file", "a fit needs the audio of its 'fit' strikes")
         sounds = None
-        if played:  # before the modes, which take longer: a recording that will not do is told at once
+        if played:  # before the modes, which take longer: a recording that will not do is reported at once
             say(f"reading {len(played)} recordings of {name or 'the object'}")
             sounds = _sounds(case, thing, played, clipped)
         body = body_family(case, thing, guess, cache, say) if thing.mesh is not None else None
         if sounds is not None:
-            signals, sr, told = sounds
+            signals, sr, remarks = sounds
             seen = observed(case, thing, guess, played, body) if body is not None else None
             say(f"listening to {len(played)} recordings of {name or 'the object'}")
             modes = _modes_observed(body, guess, case.band_hz) if clipped and body is not None else None
             still = without_hum(signals, noise_rms(signals, sr), sr)
             lines = joint_lines(still, sr, band_hz=case.band_hz, signed=case.onset_s is not None, modes=modes)
-            notes = (*(f"{g} is missing" for g in gone), *told)
-            found.append(Evidence(thing, guess, played, lines, body, seen, signals, sr, notes))
+            notes = (*(f"{g} is missing" for g in gone), *remarks)
+            found.append(RecordedObject(thing, guess, played, lines, body, seen, signals, sr, notes))
         found += [_listed(case, thing, guess, entry, body) for entry in listed]
     if not found:
         raise FileError(f"case {case.name} has no '{split}' strike with audio or features", "mark at least one recording with split 'fit'")
@@ -145,26 +145,26 @@ def _strikes(recordings: tuple[CaseRecording, ...]) -> list[tuple[tuple[float, f
 
 
 def observed(case: Case, thing: CaseObject, guess: Material, recordings: tuple[CaseRecording, ...], body: Family) -> Observation:
-    """How strikes of an object are heard by the case's sensor. Raises MeshError where a point lies off the surface."""
+    """How strikes of an object are observed by the case's sensor. Raises MeshError where a point lies off the surface."""
     at, along = (None if places is None else places.get(thing.name) for places in (case.sensor_m, case.sensor_direction))
     return observation(body, guess.density_kg_m3, case.sensor, _strikes(recordings), at, along)
 
 
 def _sounds(case: Case, thing: CaseObject, recordings: tuple[CaseRecording, ...], clipped: bool) -> tuple[Array, int, list[str]]:
     """Signals (s, n) of an object's strikes, each from its onset, their rate, and what is odd about them. Raises FileError, AudioError."""
-    sounds, rates, told = [], [], []
+    sounds, rates, remarks = [], [], []
     for r in recordings:
         sound, sr = read_audio(r.file or "")
         if r.channel >= len(sound):
             raise FileError(f"{r.file} has no channel {r.channel}", "name one it has")
         sounds.append(until_it_breaks_off(_checked(sound[r.channel], str(r.file), clipped), sr))
         if len(sounds[-1]) < sound.shape[1]:
-            told.append(f"{r.file} breaks off after {len(sounds[-1]) / sr:.3g} s: the digital silence behind is no decay, and is left out")
+            remarks.append(f"{r.file} breaks off after {len(sounds[-1]) / sr:.3g} s: the digital silence behind is no decay, and is left out")
         rates.append(sr)
         if len(sound) > 1 and r.channel == 0:
-            told.append(f"{r.file} has {len(sound)} channels: the first is used")
+            remarks.append(f"{r.file} has {len(sound)} channels: the first is used")
         if case.onset_s is None and (observed := span(sounds[-1], sr)).hits > 1:
-            told.append(f"{r.file} holds {observed.hits} hits: only what comes before the second is used")
+            remarks.append(f"{r.file} holds {observed.hits} hits: only what comes before the second is used")
             sounds[-1] = sounds[-1][: observed.stop]
     if len(set(rates)) > 1:
         raise AudioError(f"recordings of {thing.name} have rates {sorted(set(rates))} Hz", "give files of one rate")
@@ -177,8 +177,8 @@ def _sounds(case: Case, thing: CaseObject, recordings: tuple[CaseRecording, ...]
             f"{which} holds {1000 * max(length, 0) / sr:.0f} ms after the onset", "all are read as far as the shortest: leave it out, or give the whole"
         )
     if length < SHORTER * np.median(lengths):
-        told.append(f"all recordings of {thing.name} are read for {length / sr:.3g} s, as far as {which} goes")
-    return np.stack([sound[start : start + length] for sound, start in zip(sounds, starts, strict=True)]), sr, told
+        remarks.append(f"all recordings of {thing.name} are read for {length / sr:.3g} s, as far as {which} goes")
+    return np.stack([sound[start : start + length] for sound, start in zip(sounds, starts, strict=True)]), sr, remarks
 
 
 def _checked(sound: Array, name: str, clipped: bool = False) -> Array:
@@ -217,8 +217,8 @@ def onset_sample(sound: Array, sr: int) -> int:
     return start + int(np.argmax(np.abs(sound[start : start + 4 * block])))
 
 
-def _listed(case: Case, thing: CaseObject, guess: Material, entry: CaseRecording, body: Family | None) -> Evidence:
-    """Evidence of a list of measured features: no phases, amplitudes where given."""
+def _listed(case: Case, thing: CaseObject, guess: Material, entry: CaseRecording, body: Family | None) -> RecordedObject:
+    """RecordedObject of a list of measured features: no phases, amplitudes where given."""
     items: tuple[Line, ...] = tuple(sorted(entry.lines or (), key=lambda line: line.freq_hz))
     freq = np.array([line.freq_hz for line in items])
 
@@ -232,4 +232,4 @@ def _listed(case: Case, thing: CaseObject, guess: Material, entry: CaseRecording
     decay_sd = column([line.decay_sd_per_s for line in items], 0.05 * decay)
     lines = Lines(freq, decay, amplitude.astype(complex), freq_sd, decay_sd, np.abs(amplitude) * 0.1, np.array([np.nan]), np.full(len(items), 1e3), False)
     seen = observed(case, thing, guess, (entry,), body) if body is not None else None
-    return Evidence(thing, guess, (entry,), lines, body, seen, None, 0)
+    return RecordedObject(thing, guess, (entry,), lines, body, seen, None, 0)
