@@ -16,6 +16,7 @@ import re
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import click
@@ -28,21 +29,6 @@ MADE = "<!-- Made by `make docs` of the code; change it there. -->"
 WIDTH = 100
 FIELD = re.compile(r"(?<=[.;])\s+(?=[a-z_]\w*\*?(?:(?:, | and )[a-z_]\w*)*(?: \([^)]*\))*[^.:]{0,40}: )")  # where a docstring goes on to its next field
 
-EFFECT_PARTS = (
-    "Effect",
-    "Stage",
-    "Owner",
-    "Traits",
-    "Mixing",
-    "Cost",
-    "Evidence",
-    "ObjectEvidence",
-    "Impact",
-    "Ring",
-    "Sound",
-    "BaselineChange",
-)
-EFFECT_PARTS += ("ChangesBaseline", "Dereverberates", "RotatesPairs", "SplitsPairs", "RingsBeside", "Alternatives")
 API = (
     ("sonic_bullet", "What `import sonic_bullet` offers.", None),
     ("sonic_bullet.estimator.fit.material_fit", "Fit a material to a case.", ("fit_case",)),
@@ -50,7 +36,7 @@ API = (
     ("sonic_bullet.presets", "Read and write presets.", ("read_preset", "write_preset", "material_of")),
     ("sonic_bullet.diagnosis.diagnose", "Diagnose a case.", ("diagnose", "described")),
     ("sonic_bullet.effects", "The effects of the package; what they share is in the next section.", ("EFFECTS",)),
-    ("sonic_bullet.effects.protocol", "What an effect is, what it acts on and what it reads.", EFFECT_PARTS),
+    ("sonic_bullet.effects.protocol", "What an effect is, what it acts on and what it reads.", "classes"),
 )
 
 
@@ -63,12 +49,19 @@ def api_page() -> str:
         "",
         "Errors, units and shapes are those the docstrings name. SI units throughout; `(k, 3)` is an array's shape.",
     ]
-    for module_name, what, names in API:
+    for module_name, what, asked in API:
         module = importlib.import_module(module_name)
+        names = classes_of(module) if asked == "classes" else asked
         parts += ["", f"## {module_name}", "", what]
         for name in names or module.__all__:
             parts += ["", *entry(name, getattr(module, name), 3)]
     return "\n".join(parts) + "\n"
+
+
+def classes_of(module: ModuleType) -> list[str]:
+    """The public classes that a module defines, in its order."""
+    own = (name for name, thing in vars(module).items() if inspect.isclass(thing) and thing.__module__ == module.__name__)
+    return [name for name in own if not name.startswith("_")]
 
 
 def entry(name: str, thing: Any, depth: int) -> Iterator[str]:
