@@ -2,7 +2,7 @@
 
     python benchmarks/effect_pictures.py [-o docs/explanation/pictures] [ID ...]
 
-A free square plate of glass, 150 × 150 × 4 mm, solved as any body is, struck near a corner and heard at the middle of an edge:
+A free square plate of glass, 150 × 150 × 4 mm, solved as any body is, struck near a corner, observed at an edge:
 
     Material -> modes -> effects on MODES -> Ring -> BANK -> pulses (FORCE) -> Sound -> SOUND -> picture
 
@@ -175,7 +175,7 @@ def envelope(sound: Array) -> tuple[Array, Array]:
 
 
 def pair() -> tuple[float, float]:
-    """The plate's lowest pair of one frequency that is heard: its frequency, and half the width of what is drawn beside it."""
+    """The plate's lowest degenerate pair: its frequency, and half the width of what is drawn about it."""
     freq = Chain().model().freq_hz
     low = int(np.flatnonzero(np.diff(freq) < 1e-3 * freq[:-1])[0])
     return float(freq[low]), 0.02 * float(freq[low])
@@ -193,7 +193,10 @@ def drawn() -> dict[str, tuple[Effect, Callable[[Any, Any], None]]]:
     members: tuple[tuple[Any, Callable[[Any, Any], None]], ...] = (
         (DampingLaw("constant-loss", 4e-3), decays),
         (orthotropic(), shifts),
-        (ModeSplitting((middle,), (0.008,), (0.4,)), lambda axes, e: spectra(axes, e, (middle - reach, middle + reach), 3.0)),
+        (
+            ModeSplitting((middle,), (0.008,), (0.4,)),
+            lambda axes, e: spectra(axes, e, (middle - reach, middle + reach), 3.0),
+        ),
         (AddedMass(CORNER, 0.01), shifts),
         (SupportDamping((CORNER,), (2.0,)), decays),
         (Radiation(0.04, 1.0), decays),

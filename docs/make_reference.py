@@ -1,6 +1,7 @@
 """The pages of docs/reference that are made of the code: what a docstring, a command's help or a class says is said once.
 
-python docs/make_reference.py            writes api.md, commands.md, case.schema.json, and what is marked in case.md and contact-log.md
+python docs/make_reference.py            writes api.md, commands.md, case.schema.json, and the marked parts
+                                             of case.md and contact-log.md
 python docs/make_reference.py --check    writes nothing; names what is out of date, and exits with 1 where something is
 """
 
@@ -15,6 +16,7 @@ import re
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import click
@@ -27,28 +29,39 @@ MADE = "<!-- Made by `make docs` of the code; change it there. -->"
 WIDTH = 100
 FIELD = re.compile(r"(?<=[.;])\s+(?=[a-z_]\w*\*?(?:(?:, | and )[a-z_]\w*)*(?: \([^)]*\))*[^.:]{0,40}: )")  # where a docstring goes on to its next field
 
-EFFECT_PARTS = ("Effect", "Stage", "Owner", "Traits", "Mixing", "Cost", "Evidence", "ObjectEvidence", "Impact", "Ring", "Sound", "BaselineChange")
-EFFECT_PARTS += ("ChangesBaseline", "Dereverberates", "RotatesPairs", "SplitsPairs", "RingsBeside", "Alternatives")
 API = (
     ("sonic_bullet", "What `import sonic_bullet` offers.", None),
     ("sonic_bullet.estimator.fit.material_fit", "Fit a material to a case.", ("fit_case",)),
-    ("sonic_bullet.files.cases", "Read a case.", ("read_case", "Case", "CaseObject", "CaseRecording", "Line", "case_schema")),
+    ("sonic_bullet.files.cases", "Read a case.", ("read_case", "Case", "CaseObject", "CaseRecording", "Line")),
     ("sonic_bullet.presets", "Read and write presets.", ("read_preset", "write_preset", "material_of")),
     ("sonic_bullet.diagnosis.diagnose", "Diagnose a case.", ("diagnose", "described")),
     ("sonic_bullet.effects", "The effects of the package; what they share is in the next section.", ("EFFECTS",)),
-    ("sonic_bullet.effects.protocol", "What an effect is, what it acts on and what it reads.", EFFECT_PARTS),
+    ("sonic_bullet.effects.protocol", "What an effect is, what it acts on and what it reads.", "classes"),
 )
 
 
 def api_page() -> str:
     """Every public name with its signature and docstring."""
-    parts = ["# API", "", MADE, "", "Errors, units and shapes are those the docstrings name. SI units throughout; `(k, 3)` is an array's shape."]
-    for module_name, what, names in API:
+    parts = [
+        "# API",
+        "",
+        MADE,
+        "",
+        "Errors, units and shapes are those the docstrings name. SI units throughout; `(k, 3)` is an array's shape.",
+    ]
+    for module_name, what, asked in API:
         module = importlib.import_module(module_name)
+        names = classes_of(module) if asked == "classes" else asked
         parts += ["", f"## {module_name}", "", what]
         for name in names or module.__all__:
             parts += ["", *entry(name, getattr(module, name), 3)]
     return "\n".join(parts) + "\n"
+
+
+def classes_of(module: ModuleType) -> list[str]:
+    """The public classes that a module defines, in its order."""
+    own = (name for name, thing in vars(module).items() if inspect.isclass(thing) and thing.__module__ == module.__name__)
+    return [name for name in own if not name.startswith("_")]
 
 
 def entry(name: str, thing: Any, depth: int) -> Iterator[str]:
@@ -148,8 +161,14 @@ def commands_page() -> str:
     """Every command's own help."""
     from sonic_bullet.cli import cli
 
-    parts = ["# Commands", "", MADE, "", "`sonic-bullet COMMAND --help` says the same. Exit codes: 0 done; 2 one line on stderr says what is wrong;"]
-    parts += ["130 or 143 stopped, with what was rendered so far closed as a valid file. `--json` alone writes JSON, and nothing else, to stdout."]
+    parts = [
+        "# Commands",
+        "",
+        MADE,
+        "",
+        "`sonic-bullet COMMAND --help` says the same. Exit codes: 0 done; 2 one line on stderr says what is wrong;",
+    ]
+    parts += ["130 or 143 stopped, with what was rendered so far closed as a valid file. `--json` alone writes JSON to stdout."]
     for path, command in walked("sonic-bullet", cli):
         context = click.Context(command, info_name=path, terminal_width=WIDTH, max_content_width=WIDTH)
         text = "\n".join(line.rstrip() for line in command.get_help(context).splitlines())
@@ -167,18 +186,25 @@ def walked(path: str, command: click.Command) -> Iterator[tuple[str, click.Comma
 
 def schema_text() -> str:
     """JSON Schema of case.json."""
-    from sonic_bullet.files.cases import case_schema
+    from sonic_bullet.files.case_schema import case_schema
 
     return json.dumps(case_schema(), indent=2, ensure_ascii=False) + "\n"
 
 
 def case_fields() -> str:
     """A table a part of case.json: field, type, default, meaning."""
-    from sonic_bullet.files.cases import case_schema
+    from sonic_bullet.files.case_schema import case_schema
 
     parts = []
     for name, part in case_schema()["$defs"].items():
-        parts += [f"### {name}", "", part.get("description", "").strip(), "", "| field | type | default | meaning |", "|---|---|---|---|"]
+        parts += [
+            f"### {name}",
+            "",
+            part.get("description", "").strip(),
+            "",
+            "| field | type | default | meaning |",
+            "|---|---|---|---|",
+        ]
         required = part.get("required", ())
         for field, about in part["properties"].items():
             default = "required" if field in required else f"`{json.dumps(about.get('default'))}`" if about.get("default") not in ({}, []) else "empty"

@@ -23,7 +23,7 @@ CHANCE = 0.05  # of the null's draws, at most, may do as well
 class Row:
     """One number predicted for the held-out part (count items) by baseline and by baseline + effect, in unit; null: median error of the null, chance: its share as good.
 
-    effect: what was added, "" where nothing was proposed (after = before). again: the same of every other reading (heard.py), None where one came to nothing of the kind.
+    effect: what was added, "" where nothing was proposed (after = before). again: the same of every other reading (observed.py), None where one came to nothing of the kind.
     """
 
     what: str

@@ -17,7 +17,8 @@ from typing import Any
 
 from sonic_bullet.cli.output import table
 from sonic_bullet.files import read_audio, replacing
-from sonic_bullet.files.cases import FORMAT, UNITS, Case, case_schema, read_case
+from sonic_bullet.files.case_schema import case_schema
+from sonic_bullet.files.cases import FORMAT, UNITS, Case, read_case
 from sonic_bullet.records.errors import AudioError, FileError
 
 AUDIO = frozenset({".wav", ".flac", ".ogg", ".aif", ".aiff", ".caf", ".w64", ".rf64"})
@@ -36,7 +37,7 @@ def run_case_new(
     sensor_at: Point | None,
     sensor_direction: Point | None,
 ) -> None:
-    """The `case new` command. The case.json, and copies of files from elsewhere, are written whole or not at all; nothing is overwritten.
+    """The `case new` command: case.json, and copies of files from elsewhere, whole or not at all; nothing is overwritten.
 
     Raises SonicBulletError.
     """
@@ -51,7 +52,10 @@ def run_case_new(
     if mesh is not None and material is None:
         raise FileError("--material missing", "a shape needs a guess of what it is made of; 'sonic-bullet materials' lists names")
     if sensor != "velocity" and (sensor_at is not None or sensor_direction is not None):
-        raise FileError(f"--sensor-at or --sensor-direction is given, but --sensor is {sensor}", "give --sensor velocity, or leave it out")
+        raise FileError(
+            f"--sensor-at or --sensor-direction is given, but --sensor is {sensor}",
+            "give --sensor velocity, or leave it out",
+        )
     for sound in sounds:
         read_audio(sound)
     if mesh is not None:
@@ -63,9 +67,13 @@ def run_case_new(
     name_of = _names(place, listed)
     if mesh is not None:
         thing["mesh"] = name_of[Path(mesh)]
-    _written(place, name_of, _described(place, [name_of[s] for s in sounds], thing, RESPONSES[sensor], sensor_at, sensor_direction))
+    _written(
+        place,
+        name_of,
+        _described(place, [name_of[s] for s in sounds], thing, RESPONSES[sensor], sensor_at, sensor_direction),
+    )
     print(f"{place / 'case.json'}: {len(sounds)} recordings" + ("" if mesh is None else f" of {name_of[Path(mesh)]}"))
-    print("say where and how hard each strike was: strike.position in m, strike.impulse in N·s; what is not known stays null")
+    print("now say where and how hard each strike was: strike.position in m, strike.impulse in N·s, or null")
 
 
 def _object(mesh: str | None, units: str, material: str | None) -> dict[str, Any]:
@@ -76,11 +84,16 @@ def _object(mesh: str | None, units: str, material: str | None) -> dict[str, Any
 
     guess = load_material(material)
     constants = {"youngs_modulus": guess.youngs_pa, "density": guess.density_kg_m3, "poisson_ratio": guess.poisson}
-    return {"mesh": None, "units": units, "material": guess.name, "elastic_guess": {key: float(f"{value:.6g}") for key, value in constants.items()}}
+    return {
+        "mesh": None,
+        "units": units,
+        "material": guess.name,
+        "elastic_guess": {key: float(f"{value:.6g}") for key, value in constants.items()},
+    }
 
 
 def _names(place: Path, files: Sequence[Path]) -> dict[Path, str]:
-    """The name of each file inside the folder: its own where it lies there, else that of a copy. Raises FileError where two would be one."""
+    """The name of each file inside the folder, its own or its copy's. Raises FileError where two would be one."""
     inner = os.path.realpath(place)
     named: dict[Path, str] = {}
     for file in files:
@@ -90,13 +103,21 @@ def _names(place: Path, files: Sequence[Path]) -> dict[Path, str]:
         if name in named.values() and named.get(file) != name:
             raise FileError(f"two files would be called {name} in {place}", "give each a name of its own")
         if not at_home and (place / name).exists():
-            raise FileError(f"{place / name} is there already, and {file} is another file", "name the one inside the folder, or rename one")
+            raise FileError(
+                f"{place / name} is there already, and {file} is another file",
+                "name the one inside the folder, or rename one",
+            )
         named[file] = name
     return named
 
 
 def _described(
-    place: Path, sounds: Sequence[str], thing: dict[str, Any], response: str, sensor_at: Point | None, sensor_direction: Point | None
+    place: Path,
+    sounds: Sequence[str],
+    thing: dict[str, Any],
+    response: str,
+    sensor_at: Point | None,
+    sensor_direction: Point | None,
 ) -> dict[str, Any]:
     """What case.json holds: every field one may want to fill, null where it is not known."""
     strike = {"position": None, "direction": None, "impulse": None}
@@ -141,7 +162,7 @@ def _written(place: Path, name_of: dict[Path, str], case: dict[str, Any]) -> Non
 
 
 def run_case_check(folder: str) -> None:
-    """The `case check` command: what a case holds. Raises SonicBulletError at the first thing that `fit` would stop at."""
+    """The `case check` command: what a case holds. Raises SonicBulletError where `fit` would stop."""
     case = read_case(folder)
     rows = [_object_row(case, name) for name in case.objects]
     missing = 0
@@ -152,10 +173,11 @@ def run_case_check(folder: str) -> None:
             missing += 1
             continue
         sound, _ = read_audio(recording.file)
-        if recording.channel >= len(sound):
+        if (recording.channel or 0) >= len(sound):
             raise AudioError(f"{recording.file} has no channel {recording.channel}", "name one it has")
-    split = {name: sum(r.split == name for r in case.recordings) for name in dict.fromkeys(r.split for r in case.recordings)}
-    print(f"{case.name}: {len(case.recordings)} strikes ({', '.join(f'{count} {name}' for name, count in split.items())}), recorded as {case.sensor}")
+    splits = [r.split for r in case.recordings]
+    listed = ", ".join(f"{splits.count(name)} {name}" for name in dict.fromkeys(splits))
+    print(f"{case.name}: {len(case.recordings)} strikes ({listed}), recorded as {case.sensor}")
     if rows:
         print(table(("object", "mesh", "size in mm", "guess", "strikes placed"), rows))
     if missing:
@@ -177,10 +199,19 @@ def _object_row(case: Case, name: str) -> tuple[str, str, str, str, str]:
     if thing.material is not None and not (whole and thing.material.lower() not in material_names()):
         load_material(thing.material)
     elif not whole:
-        raise FileError(f"object '{name}' has neither a material nor all of elastic_guess", "name a guess; 'sonic-bullet materials' lists all")
+        raise FileError(
+            f"object '{name}' has neither a material nor all of elastic_guess",
+            "name a guess; 'sonic-bullet materials' lists all",
+        )
     mine = [r for r in case.recordings if r.object == name]
     placed = sum(r.position_m is not None for r in mine)
-    return name, "-" if thing.mesh is None else thing.mesh.name, size, thing.material or "elastic_guess", f"{placed} of {len(mine)}"
+    return (
+        name,
+        "-" if thing.mesh is None else thing.mesh.name,
+        size,
+        thing.material or "elastic_guess",
+        f"{placed} of {len(mine)}",
+    )
 
 
 def run_case_schema() -> None:

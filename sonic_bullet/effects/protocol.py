@@ -97,7 +97,7 @@ class Elastic:
     """A body under any orthotropic elasticity, its axes the mesh's. material: isotropic, as the baseline has it, with the guessed density.
     phased: whether the signs of lines' amplitudes can be held against J ψ.
 
-    look: C/ρ (6, 6) in m²/s² -> undamped freq_hz (m,); of modes (k,), ∂ ln λ/∂(C_i/ρ) (9, k) of the constants C11 C22 C33 C23 C13 C12 C44 C55 C66; and J ψ (s, m)
+    look: C/ρ (6, 6) in m²/s² -> undamped freq_hz (m,). Of modes (k,), ∂ ln λ/∂(C_i/ρ) (9, k) of the constants C11 C22 C33 C23 C13 C12 C44 C55 C66; and J ψ (s, m)
     up to a factor, NaN for strikes of unknown place. solve: the same tensor -> undamped ModalModel, strikes and sensor as last vertices.
     """
 

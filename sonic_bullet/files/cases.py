@@ -12,7 +12,7 @@ import math
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import msgspec
 
@@ -29,120 +29,78 @@ IN_AIR = ("velocity", "pressure")
 Vector = tuple[float, float, float]
 
 
-def _about(text: str) -> msgspec.Meta:
-    """What a field means, for the schema and the reference page that are made of it."""
-    return msgspec.Meta(description=text)
-
-
 class _Elastic(msgspec.Struct, frozen=True):
-    """Guessed constants; what is absent is the named material's."""
-
-    youngs_modulus: Annotated[float | None, _about("Pa")] = None
-    density: Annotated[float | None, _about("kg/m³; a fit cannot tell it from E, so it stays as given")] = None
-    poisson_ratio: Annotated[float | None, _about("between -1 and 0.5")] = None
+    youngs_modulus: float | None = None
+    density: float | None = None
+    poisson_ratio: float | None = None
 
 
 class _Object(msgspec.Struct, frozen=True):
-    """One object: its shape and what it is guessed to be made of."""
-
-    mesh: Annotated[str | None, _about("file inside the folder, any mesh that trimesh reads; without it nothing is known of the shape")] = None
-    units: Annotated[str, _about("of the mesh: m, cm or mm")] = "m"
-    material: Annotated[str | None, _about("a name that `sonic-bullet materials` lists, as a guess")] = None
-    elastic_guess: Annotated[_Elastic, _about("in SI units, good to 30 %")] = _Elastic()
+    mesh: str | None = None
+    units: str = "m"
+    material: str | None = None
+    elastic_guess: _Elastic = _Elastic()
 
 
 class _Fixed(msgspec.Struct, frozen=True):
-    """A clamp: all vertices within a radius of a point stand still."""
-
-    position: Annotated[Vector, _about("m, mesh frame")]
-    radius: Annotated[float, _about("m")] = 0.0
-    object: Annotated[str | None, _about("whose; absent: every object's")] = None
+    position: Vector
+    radius: float = 0.0
+    object: str | None = None
 
 
 class _Support(msgspec.Struct, frozen=True):
-    """How the objects were held."""
-
-    fixed: Annotated[tuple[_Fixed, ...], _about("clamps; none: the objects are free")] = ()
+    fixed: tuple[_Fixed, ...] = ()
 
 
 class _Sensor(msgspec.Struct, frozen=True):
-    """What recorded the strikes. Places and directions are one for all objects, or one for each by its name."""
-
-    type: Annotated[str, _about("in words; read where `response` says nothing")] = ""
-    response: Annotated[
-        str, _about("`velocity` of a surface (vibrometer), `pressure` (microphone) or `sum of modes`, as a word in any text; else it is unknown")
-    ] = ""
-    position: Annotated[dict[str, Vector] | Vector | None, _about("m, mesh frame: where a surface's velocity was measured")] = None
-    direction: Annotated[dict[str, Vector] | Vector | None, _about("along which; absent: out of the surface")] = None
+    type: str = ""
+    response: str = ""
+    position: dict[str, Vector] | Vector | None = None
+    direction: dict[str, Vector] | Vector | None = None
 
 
 class _Force(msgspec.Struct, frozen=True):
-    """The force of an instrumented hammer."""
-
-    file: Annotated[str, _about("audio file inside the folder")]
-    channel: Annotated[int, _about("from 0")] = 0
-    newton_per_unit: Annotated[float | None, _about("N per unit of the file")] = None
+    file: str
+    channel: int = 0
+    newton_per_unit: float | None = None
 
 
 class _Strike(msgspec.Struct, frozen=True):
-    """Where and how hard an object was struck."""
-
-    position: Annotated[Vector | None, _about("m, mesh frame, on the surface")] = None
-    direction: Annotated[Vector | None, _about("of the impulse, any length; absent: into the surface")] = None
-    impulse: Annotated[float | None, _about("N·s, above zero; without any, σ stands for gain times impulse")] = None
-    force: Annotated[_Force | None, _about("its recorded force")] = None
+    position: Vector | None = None
+    direction: Vector | None = None
+    impulse: float | None = None
+    force: _Force | None = None
 
 
 class Line(msgspec.Struct, frozen=True):
     """A measured resonance: freq_hz, and what else was measured of it."""
 
-    freq_hz: Annotated[float, _about("Hz, above zero")]
-    decay_per_s: Annotated[float | None, _about("d in e^(−dt), 1/s")] = None
-    freq_sd_hz: Annotated[float | None, _about("standard error, Hz; absent: 10⁻⁴ of the frequency")] = None
-    decay_sd_per_s: Annotated[float | None, _about("standard error, 1/s; absent: 5 % of the decay")] = None
-    amplitude: Annotated[float | None, _about("at the onset, any unit")] = None
+    freq_hz: float
+    decay_per_s: float | None = None
+    freq_sd_hz: float | None = None
+    decay_sd_per_s: float | None = None
+    amplitude: float | None = None
 
 
 class _Recording(msgspec.Struct, frozen=True):
-    """One strike, as an audio file or as a list of measured resonances."""
-
-    file: Annotated[str | None, _about("audio file inside the folder")] = None
-    features: Annotated[tuple[Line, ...] | None, _about("measured resonances, in place of a file")] = None
-    object: Annotated[str | None, _about("name of a listed object; may be left out where there is one")] = None
-    split: Annotated[str, _about("`fit`, `holdout` or `transfer`; only `fit` is opened before a verdict stands")] = "fit"
-    strike: Annotated[_Strike, _about("where and how hard")] = _Strike()
-    channel: Annotated[int | None, _about("of the file, from 0; absent: the first, and a warning says so")] = None
+    file: str | None = None
+    features: tuple[Line, ...] | None = None
+    object: str | None = None
+    split: str = "fit"
+    strike: _Strike = _Strike()
+    channel: int | None = None
 
 
 class _Raw(msgspec.Struct, frozen=True):
-    """A case: recorded strikes of known objects. Unknown fields are left alone; what is not declared is null or absent."""
-
-    format: Annotated[str, _about(f"`{FORMAT}`")]
-    recordings: Annotated[tuple[_Recording, ...], _about("at least one")]
-    objects: Annotated[dict[str, _Object], _about("by name")] = {}
-    case: Annotated[str, _about("a name; absent: the folder's")] = ""
-    support: Annotated[_Support | str | None, _about("clamps, or words")] = None
-    sensor: Annotated[_Sensor | None, _about("one for all recordings")] = None
-    band_hz: Annotated[tuple[float, float] | None, _about("Hz, what the recordings hold; absent: 20 to 20 000")] = None
-    onset: Annotated[
-        str | float | None, _about("when the impulse arrives in every file: s, or words that hold `sample 0`; absent: it is found, and phases are not used")
-    ] = None
-    medium: Annotated[str | None, _about("`air`, or `none` where nothing takes sound away; absent: by the sensor")] = None
-
-
-def case_schema() -> dict[str, Any]:
-    """JSON Schema (draft 2020-12) of case.json, made of the classes that read it."""
-    schema = msgspec.json.schema(_Raw)
-    text = msgspec.json.encode(schema).decode()
-    for name in schema["$defs"]:  # the classes' own names are private, the schema's are not
-        text = text.replace(f'"#/$defs/{name}"', f'"#/$defs/{_public(name)}"').replace(f'"title":"{name}"', f'"title":"{_public(name)}"')
-    plain: dict[str, Any] = msgspec.json.decode(text)
-    plain["$defs"] = {_public(name): value for name, value in plain["$defs"].items()}
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": FORMAT, **plain}
-
-
-def _public(name: str) -> str:
-    return {"_Raw": "Case"}.get(name, name.lstrip("_"))
+    format: str
+    recordings: tuple[_Recording, ...]
+    objects: dict[str, _Object] = {}
+    case: str = ""
+    support: _Support | str | None = None
+    sensor: _Sensor | None = None
+    band_hz: tuple[float, float] | None = None
+    onset: str | float | None = None
+    medium: str | None = None
 
 
 @dataclass(frozen=True, slots=True)

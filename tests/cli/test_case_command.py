@@ -12,7 +12,8 @@ import pytest
 import soundfile
 
 from sonic_bullet.cli import main
-from sonic_bullet.files.cases import case_schema, read_case
+from sonic_bullet.files.case_schema import case_schema
+from sonic_bullet.files.cases import read_case
 from tests.made.case import write_box
 
 
@@ -41,7 +42,23 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_new_writes_a_case_that_fit_reads(place: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    assert run("case", "new", "mine", "--mesh", "bar.obj", "--material", "steel", "--sensor", "pressure", "--recordings", "a.wav", "b.wav") == 0
+    assert (
+        run(
+            "case",
+            "new",
+            "mine",
+            "--mesh",
+            "bar.obj",
+            "--material",
+            "steel",
+            "--sensor",
+            "pressure",
+            "--recordings",
+            "a.wav",
+            "b.wav",
+        )
+        == 0
+    )
     assert {p.name for p in (place / "mine").iterdir()} == {"case.json", "bar.obj", "a.wav", "b.wav"}
     case = read_case(place / "mine")
     assert [r.split for r in case.recordings] == ["fit", "fit"]
@@ -143,6 +160,17 @@ def test_the_schema_names_every_field(capfd: pytest.CaptureFixture[str]) -> None
     assert run("case", "schema") == 0
     assert json.loads(capfd.readouterr().out) == case_schema()
     parts = case_schema()["$defs"]
-    assert set(parts) == {"Case", "Object", "Elastic", "Support", "Fixed", "Sensor", "Force", "Strike", "Line", "Recording"}
+    assert set(parts) == {
+        "Case",
+        "Object",
+        "Elastic",
+        "Support",
+        "Fixed",
+        "Sensor",
+        "Force",
+        "Strike",
+        "Line",
+        "Recording",
+    }
     checked = [name for part in parts.values() for name, field in part["properties"].items() if field.get("description")]
     assert len(checked) == sum(len(part["properties"]) for part in parts.values()) > 30

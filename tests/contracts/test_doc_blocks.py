@@ -1,8 +1,10 @@
 """Every block of Python and of the shell in the documentation runs, page by page, in the order in which it stands.
 
-A page has a folder of its own with `scenes`, `assets`, two recordings of a small brass bar (tap.wav, tap2.wav, bar.obj) and a case of it (my_case).
+A page has a folder of its own with `scenes`, `assets`, two recordings of a small brass bar
+(tap.wav, tap2.wav, bar.obj) and a case of it (my_case).
 A block that cannot run says so and why behind its language: ```python not run: reason. Such blocks are counted.
-README's Python and `sh` blocks run in tests/test_readme.py; the example of an effect also runs on recordings, in tests/diagnosis/test_found_again.py.
+README's Python and `sh` blocks run in tests/test_readme.py; the example of an effect also runs on recordings, in
+tests/diagnosis/test_found_again.py.
 """
 
 from __future__ import annotations

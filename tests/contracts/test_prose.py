@@ -1,4 +1,4 @@
-"""The documentation keeps its own rules: short sentences, lines that fit, the field's words, links and names that lead somewhere, made pages up to date."""
+"""The documentation keeps its own rules: short sentences, the field's words, links that lead somewhere."""
 
 from __future__ import annotations
 
@@ -198,6 +198,44 @@ def test_every_effect_has_a_page_and_a_picture() -> None:
 @pytest.mark.parametrize("place", ["reference"])
 def test_made_pages_are_up_to_date(place: str) -> None:
     """`make docs` writes them."""
-    done = subprocess.run([sys.executable, str(REPO / "docs" / "make_reference.py"), "--check"], check=False, capture_output=True, text=True, timeout=120)
+    done = subprocess.run(
+        [sys.executable, str(REPO / "docs" / "make_reference.py"), "--check"],
+        check=False,
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
     assert done.returncode == 0, done.stderr
     assert (REPO / "docs" / place / "api.md").is_file()
+
+
+def test_names_of_classes_in_pages_exist() -> None:
+    """In the page on effects: what a reader is told to derive from is there."""
+    from sonic_bullet.effects import protocol
+
+    page = (REPO / "docs" / "how-to" / "add-an-effect.md").read_text(encoding="utf-8")
+    table = page[page.index("| class | for an effect that |") : page.index("## Where the file goes")]
+    names = re.findall(r"^\| `(\w+)` \|", table, re.M)
+    assert len(names) > 4
+    assert all(hasattr(protocol, name) for name in names), names
+
+
+def test_every_field_of_a_preset_is_described() -> None:
+    from sonic_bullet import presets
+
+    page = (REPO / "docs" / "reference" / "preset.md").read_text(encoding="utf-8")
+    fields = [
+        *presets.Preset.__struct_fields__,
+        *(f for part in (presets.Elasticity, presets.Damping, presets.Surface, presets.Restitution) for f in part.__struct_fields__),
+    ]
+    assert len(fields) > 20
+    assert not [field for field in fields if not re.search(rf"[`.]{field}[`.]", page)]
+
+
+def test_changelog_has_its_form() -> None:
+    """keepachangelog.com: unreleased first, then versions; entries under a kind of change."""
+    heads = re.findall(r"^(##+) (.*)$", (REPO / "CHANGELOG.md").read_text(encoding="utf-8"), re.M)
+    assert heads[0] == ("##", "[Unreleased]")
+    assert all(re.fullmatch(r"\[\d+\.\d+\.\d+\](?: - \d{4}-\d\d-\d\d)?", head) for depth, head in heads[1:] if depth == "##")
+    kinds = "Added|Changed|Deprecated|Removed|Fixed|Security"
+    assert all(re.fullmatch(rf"(?:{kinds})(?:: .+|, .+)?", head) for depth, head in heads if depth == "###")

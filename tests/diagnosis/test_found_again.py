@@ -111,17 +111,33 @@ def test_a_planted_effect_is_named(number: int) -> None:
     assert end.added[0].mean_db > 2 * max(end.added[0].null_db, 0.0)
 
 
-def test_a_suspect_of_somebody_else_is_tried_and_named() -> None:
-    """The example of docs/how-to/add-an-effect.md, run as it stands."""
-    source = re.findall(r"```python\n(.*?)```", (Path(__file__).parents[2] / "docs" / "how-to" / "add-an-effect.md").read_text(), re.S)[0]
+def of_somebody_else() -> ModuleType:
+    """The examples of docs/how-to/add-an-effect.md, as they stand."""
+    page = Path(__file__).parents[2] / "docs" / "how-to" / "add-an-effect.md"
+    source = "".join(re.findall(r"```python\n(.*?)```", page.read_text(encoding="utf-8"), re.S))
     theirs = ModuleType("theirs")
     sys.modules["theirs"] = theirs  # dataclasses look their module up
     exec(compile(source, "docs/how-to/add-an-effect.md", "exec"), theirs.__dict__)
+    assert {*EFFECTS, theirs.SquareLaw, theirs.GroundedSpring} == set(theirs.effects)
+    return theirs
+
+
+def test_an_effect_of_somebody_else_is_tried_and_named() -> None:
+    theirs = of_somebody_else()
     body = recorded(theirs.SquareLaw(20.0), seconds=0.5)
     end = closed(fitted(body), (body,), takes_of((body,)), (DampingLaw, ForeignMode, theirs.SquareLaw), BAND)
     assert [c.id for c in end.added] == ["square-law"]
     assert end.added[0].effect.parameters()["q"] == pytest.approx(20.0, rel=0.05)
-    assert set(EFFECTS) < set(theirs.effects)
+
+
+def test_an_effect_of_somebody_else_may_move_and_mix_modes() -> None:
+    """Its traits are all that the host knows: modes are paired with lines anew, and corrections come after it."""
+    theirs = of_somebody_else()
+    body = recorded(theirs.GroundedSpring(124, 3e5))
+    end = closed(fitted(body), (body,), takes_of((body,)), (DampingLaw, ForeignMode, theirs.GroundedSpring), BAND)
+    assert [c.id for c in end.added] == ["grounded-spring"]
+    assert end.verdict == "explained"
+    assert end.added[0].effect.parameters()["stiffness_n_m"] == pytest.approx(3e5, rel=0.1)
 
 
 def test_proposals_depend_on_the_evidence_alone() -> None:
