@@ -22,6 +22,7 @@ from __future__ import annotations
 import math
 import os
 import warnings
+from contextlib import nullcontext
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -32,6 +33,7 @@ import numpy as np
 from sonic_bullet.effects.presets_of_effects import effect_of
 from sonic_bullet.effects.protocol import Effect
 from sonic_bullet.files import replacing
+from sonic_bullet.files.reading import reading
 from sonic_bullet.records import Material
 from sonic_bullet.records.coerce import as_path, nearest, shown
 from sonic_bullet.records.errors import MaterialError, RecordError
@@ -142,7 +144,10 @@ def load_material(name: str | os.PathLike[str]) -> Material:
     Raises MaterialError: unknown name (listing the near ones), unreadable file, a wrong field (named), unphysical numbers.
     """
     text = as_path(name, "name", _REMEDY, error=MaterialError)
-    return material_of(named_preset(text), text if text.endswith(".json") or os.sep in text else "")
+    filed = text.endswith(".json") or os.sep in text
+    preset = named_preset(text)
+    with reading(text, "preset", MaterialError, "mend that field; docs/reference/preset.md describes the file") if filed else nullcontext():
+        return material_of(preset, text if filed else "")
 
 
 def named_preset(name: str | os.PathLike[str]) -> Preset:
@@ -170,20 +175,21 @@ def material_names() -> tuple[str, ...]:
 
 def read_preset(path: str | os.PathLike[str]) -> Preset:
     """The typed content of a preset file. Raises MaterialError naming file and field."""
-    try:
-        with open(path, "rb") as file:
-            content = file.read(BYTES_MAX + 1)
-    except (OSError, ValueError) as error:
-        raise MaterialError(f"cannot read preset {path}: {getattr(error, 'strerror', None) or error}", "check the path") from error
-    if len(content) > BYTES_MAX:
-        raise MaterialError(f"preset {path} is over 1 MiB", "give a preset file")
-    try:
-        preset = msgspec.json.decode(content, type=Preset)
-    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise MaterialError(f"preset {path}: {error}", "mend that field; docs/reference/preset.md describes the file") from error
-    if preset.format != FORMAT:
-        raise MaterialError(f"preset {path} has format '{preset.format}', wanted '{FORMAT}'", "use a sonic_bullet that knows that format")
-    return preset
+    with reading(path, "preset", MaterialError, "mend that field; docs/reference/preset.md describes the file"):
+        try:
+            with open(path, "rb") as file:
+                content = file.read(BYTES_MAX + 1)
+        except (OSError, ValueError) as error:
+            raise MaterialError(f"cannot read preset {path}: {getattr(error, 'strerror', None) or error}", "check the path") from error
+        if len(content) > BYTES_MAX:
+            raise MaterialError(f"preset {path} is over 1 MiB", "give a preset file")
+        try:
+            preset = msgspec.json.decode(content, type=Preset)
+        except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+            raise MaterialError(f"preset {path}: {error}", "mend that field; docs/reference/preset.md describes the file") from error
+        if preset.format != FORMAT:
+            raise MaterialError(f"preset {path} has format '{preset.format}', wanted '{FORMAT}'", "use a sonic_bullet that knows that format")
+        return preset
 
 
 def write_preset(path: str | os.PathLike[str], preset: Preset) -> None:

@@ -15,6 +15,7 @@ import ast
 import importlib.util
 import os
 import traceback
+import warnings
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -27,7 +28,7 @@ from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.listener import Finding, diagnose_world, direct_client, disconnect, links_with_shapes, run_script
 from sonic_bullet.records import Array, Material, Sensor
 from sonic_bullet.records.coerce import as_call, as_flag, as_number, as_path, as_whole, shown
-from sonic_bullet.records.errors import SceneError, SonicBulletError, interrupts
+from sonic_bullet.records.errors import SceneError, SceneWarning, SonicBulletError, interrupts
 from sonic_bullet.render import render_log, silence_notes
 from sonic_bullet.session import Listener, MicrophoneLike, as_material, as_sensors, attach
 
@@ -150,7 +151,9 @@ class _Stage:
             disconnect(self.client)
 
     def run(self, seconds: float | None, progress: Progress | None, say: Say | None) -> tuple[str, ...]:
-        return (_run_built if _defines_build(self.path) else _run_plain)(self, seconds, progress, say)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", SceneWarning)  # the result's notes say it
+            return (_run_built if _defines_build(self.path) else _run_plain)(self, seconds, progress, say)
 
     def need_listener(self) -> Listener:
         if self.listener is None:
@@ -159,6 +162,7 @@ class _Stage:
 
     def result(self, notes: tuple[str, ...]) -> RenderResult:
         listener = self.need_listener()
+        notes = (*notes, *listener.notes)
         log = listener.contacts
         if listener.sr == self.sr and self.microphones is None and (self.residual or not any(b.material and b.material.residual for b in log.bodies)):
             samples = listener.sound()

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import inspect
 import numbers
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import asdict, replace
@@ -21,11 +22,12 @@ import numpy as np
 
 from sonic_bullet.files import AudioReport, check_sr, write_audio
 from sonic_bullet.files.contact_log import ContactLog
+from sonic_bullet.geometry import oversize
 from sonic_bullet.machine.terminal import status
 from sonic_bullet.records import Air, Array, Material, Microphone, ModalModel, Sensor, Shape
 from sonic_bullet.records.coerce import as_call, as_items, as_kind, as_kinds, as_number, as_path, as_rows, as_whole, check_options
-from sonic_bullet.records.contacts import Step
-from sonic_bullet.records.errors import AudioError, MaterialError, MeshError, ModalError, SceneError
+from sonic_bullet.records.contacts import Event, Step
+from sonic_bullet.records.errors import AudioError, MaterialError, MeshError, ModalError, SceneError, SizeWarning
 from sonic_bullet.render import LATENCY_STEPS, Synthesizer
 from sonic_bullet.render.radiated import radiation_of
 
@@ -125,6 +127,7 @@ class Listener:
         self.world = open_world(client)
         self._synth = Synthesizer(sr=self.sr, sensors=self.sensors, seed=self.seed, air=self.air)
         self._steps: list[Step] = []
+        self._events: list[Event] = []
         self._unread: list[Array] = []
         self._attached = True
         self.frame: Array = np.zeros((len(self.sensors), 0))
@@ -154,7 +157,8 @@ class Listener:
         (x, y, z, radius) in m, body frame. thickness_m: wall of an open surface. to_hz, count: how many modes. progress: told now and then
         which link's modes are being computed, how far that is, and that it is their radiation next (seconds a link the first time, then
         the cache has both); without one, a terminal shows it.
-        Raises SceneError (unknown body or link), MaterialError, MeshError, ModalError naming body and link, RecordError.
+        Warns (`errors.SizeWarning`) of a link larger than anything that is struck to sound. Raises SceneError (unknown body or link),
+        MaterialError, MeshError, ModalError naming body and link, RecordError.
         """
         from sonic_bullet.effects.presets_of_effects import with_material
         from sonic_bullet.listener import links_called
@@ -183,6 +187,10 @@ class Listener:
                     radiation_of(solved, self.air)
         for one, (_, shapes), solved in zip(links, parts, models, strict=True):
             self.world.add(body, one, material=made, model=solved, shapes=shapes)
+        for one, (name, _), solved in zip(links, parts, models, strict=True):
+            if large := oversize(solved.vertex_m, solved.mass_kg):
+                remedy = "load it with globalScaling=0.001, or give its mesh in metres, if its numbers are millimetres"
+                warnings.warn(f"body {body} link {one} ({name}) {large}; {remedy}", SizeWarning, stacklevel=2)
         return tuple(models)
 
     def _solved(
@@ -221,7 +229,8 @@ class Listener:
     def step(self) -> Array:
         """Take in the physics step just made; returns `frame`. Called by the hook of a `BulletClient`, by hand otherwise.
 
-        A second call without a physics step between gives a frame of no length. Raises SceneError for NaN or a lost connection.
+        A second call without a physics step between gives a frame of no length. A body whose numbers cease to be numbers is left out from
+        then on and named (`notes`). Raises SceneError for a lost connection.
         """
         if not self._attached:
             raise SceneError("the listener is detached", "attach a new one")
@@ -240,13 +249,24 @@ class Listener:
         return np.concatenate(frames, axis=1) if frames else np.zeros((len(self.sensors), 0))
 
     def quench(self) -> None:
-        """Stop everything that rings, as a hand would; what is struck afterwards sounds again."""
+        """Stop everything that rings, as a hand would, now: where the last step taken in ends. What strikes from the next step on sounds again.
+
+        What was struck before is silent from then on, strikes that are still to be heard included, and so is what travels to the
+        microphones; what rolls or slides goes on. `sound` and files fall silent at that very sample, `frame` as much later as it lags.
+        It is an event of the log, so that a replay stops there too, at any rate.
+        """
+        self._events.append(Event("quench", len(self._steps)))
         self._synth.quench()
 
     @property
     def contacts(self) -> ContactLog:
         """The contact log so far: all that a later render needs."""
-        return ContactLog(tuple(self.world.bodies), tuple(self._steps), self.sensors, self.sr, self.seed, self.air, self.world.untouched)
+        return ContactLog(tuple(self.world.bodies), tuple(self._steps), self.sensors, self.sr, self.seed, self.air, self.world.untouched, tuple(self._events))
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What of the world is left out of the sound, and why; each was a `SceneWarning` when it happened."""
+        return tuple(self.world.left_out.notes)
 
     @property
     def time_s(self) -> float:

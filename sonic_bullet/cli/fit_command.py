@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet.cli.output import clean_stdout, places, status, table, warn, write_json
-from sonic_bullet.files.cases import Case, CaseObject, CaseRecording, medium_of, read_case
+from sonic_bullet.files.cases import LARGEST, Case, CaseObject, CaseRecording, medium_of, read_case
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import FileError
 
@@ -55,6 +55,8 @@ def as_case(source: str, one: dict[str, Any]) -> Case:
     for name in ("impulse", "scale", "onset_s"):
         if one[name] is not None and not np.isfinite(one[name]):
             raise FileError(f"--{name.replace('_s', '')} is {one[name]}", "give a finite number")
+    if one["impulse"] is not None and one["impulse"] > LARGEST:
+        raise FileError(f"--impulse is {one['impulse']:g} N·s", f"give it in N·s, at most {LARGEST:g}")
     missing = [f"--{name}" for name in ("mesh", "strike", "material") if one[name] is None]
     if missing:
         raise FileError(f"{' and '.join(missing)} missing", "a recording alone has no shape; see 'sonic-bullet fit --help'")

@@ -54,7 +54,7 @@ def run_render(
             from sonic_bullet.plots.scene_plot import render_picture
 
             render_picture(picture, result.samples, result.sr, result.log, Path(scene).name)
-        notes = (*result.notes, *_coarse(result.log), *_warnings(report))
+        notes = (*result.notes, *_coarse(result.log), *_oversized(result.log), *_warnings(report))
         say(_summary(report, result.log))
         for note in notes:
             print(f"sonic-bullet: note: {note}", file=sys.stderr)
@@ -168,7 +168,7 @@ def _replayed(path: str, wish: _Wish) -> _Replay:
     if (seconds := wish.seconds) is not None:
         if seconds > log.duration_s + 1e-9:
             raise AudioError(f"{path} lasts {log.duration_s:.3f} s, shorter than {seconds} s", "give fewer seconds, or simulate the scene for longer")
-        log = replace(log, steps=tuple(step for step, start in zip(log.steps, log.start_s, strict=True) if start < seconds - 1e-9))
+        log = log.first(int((log.start_s < seconds - 1e-9).sum()))
     samples = render_log(log, sr=wish.rate, residual=wish.residual, progress=wish.progress, say=wish.say)
     return _Replay(samples, log, wish.rate or log.sr, silence_notes(samples, log))
 
@@ -192,11 +192,14 @@ def _with_partial(
     said = ""
     if result is not None and result.samples.size:
         partial = kept_name(Path(to))
-        try:
-            write_audio(partial, result.samples, result.sr, peak_dbfs=peak_dbfs, lufs=lufs)
-        except AudioError:
-            write_audio(partial, result.samples, result.sr)  # silent or too short for the level asked for: kept as it is
         said = f"the first {result.samples.shape[-1] / result.sr:.3f} s are in {kept_name(Path(output))}"
+        try:
+            try:
+                write_audio(partial, result.samples, result.sr, peak_dbfs=peak_dbfs, lufs=lufs)
+            except AudioError:
+                write_audio(partial, result.samples, result.sr)  # silent or too short for the level asked for: kept as it is
+        except FileError as failure:  # the error itself is what the user must read first
+            said = failure.what
     if isinstance(error, SonicBulletError):
         return type(error)(error.what, "; ".join(part for part in (error.remedy, said) if part))
     return KeyboardInterrupt("; ".join(part for part in (str(error) or "stopped", said) if part))
@@ -207,6 +210,14 @@ def _coarse(log: ContactLog) -> tuple[str, ...]:
 
     names = sorted({body.name for body in log.bodies if body.model is not None and COARSER in body.model.note})
     return (f"the mesh of {', '.join(names)} is {COARSER}: a faster machine may compute slightly other modes",) if names else ()
+
+
+def _oversized(log: ContactLog) -> tuple[str, ...]:
+    from sonic_bullet.geometry import oversize
+
+    large = [(body, oversize(body.model.vertex_m, body.model.mass_kg)) for body in log.bodies if body.model is not None]
+    remedy = "load it with globalScaling=0.001, or give its mesh in metres, if its numbers are millimetres"
+    return tuple(f"body {body.body_id} link {body.link} ({body.name}) {words}; {remedy}" for body, words in large if words)
 
 
 def _warnings(report: AudioReport) -> tuple[str, ...]:

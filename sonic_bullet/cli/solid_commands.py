@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+import sys
 from dataclasses import replace
 from typing import Any
 
 from sonic_bullet.cli.output import clean_stdout, places, status, table, write_json
 from sonic_bullet.files import write_model
+from sonic_bullet.geometry import oversize
 from sonic_bullet.records import Material, ModalModel
 from sonic_bullet.records.errors import FileError, MaterialError
 from sonic_bullet.records.units import HEARING_LIMIT_HZ
@@ -47,6 +49,8 @@ def run_modes(
         if to is not None:
             write_model(to, model)
         say(_summary(mesh, made, model))
+    if large := oversize(model.vertex_m, model.mass_kg):
+        print(f"sonic-bullet: warning: {mesh} {large}; give --scale 0.001 if its numbers are millimetres", file=sys.stderr)
     write_json(json_to, _described(mesh, made, model, output))
 
 

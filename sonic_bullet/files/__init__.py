@@ -3,15 +3,19 @@
     samples (channels, n) Pa -> scale -> check -> clip and count -> partial file -> read back -> fsync -> NAME.EXT
     ContactLog | ModalModel  -> arrays + one JSON entry, no pickle -> partial file -> fsync -> NAME.EXT
 
-`audio` writes sound, `logs` writes contact logs and modal models (their format is described there), `container` is the npz
-beneath them, `atomic` the replacing.
+`audio` writes sound, as loud as `levels` says, `recordings` reads it, `logs` and `models` write contact logs and modal models (`logs` describes
+both), `container` is the npz beneath them, `meshes` and `cases` read what they are named after, `reading` is the boundary of all readers,
+`atomic` the replacing.
 """
 
 from sonic_bullet.files.atomic import cannot, check_output, kept_name, replacing
-from sonic_bullet.files.audio import AudioReport, AudioWriter, check_audio_output, check_levels, check_sr, read_audio, write_audio
+from sonic_bullet.files.audio import AudioReport, AudioWriter, check_audio_output, check_sr, write_audio
 from sonic_bullet.files.channels import channel_of, channel_words
 from sonic_bullet.files.contact_log import ContactLog
-from sonic_bullet.files.logs import read_log, read_model, write_log, write_model
+from sonic_bullet.files.levels import check_levels
+from sonic_bullet.files.logs import read_log, write_log
+from sonic_bullet.files.models import read_model, write_model
+from sonic_bullet.files.recordings import read_audio
 
 __all__ = [
     "AudioReport",

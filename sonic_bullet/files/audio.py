@@ -1,8 +1,6 @@
-"""Samples in pascals to an audio file and back.
+"""Samples in pascals to an audio file.
 
-    y = g·x,  g = 1/full_scale_pa                      calibrated (the default: 1.0 in the file = 1 Pa)
-              10^(peak_dbfs/20)/max|x|                 --peak-dbfs
-              10^((lufs - L(x))/20)                    --lufs, L: programme loudness [ITU-R BS.1770-4, eq. 2 and 7, by pyloudnorm]
+    y = g·x,  g of `levels`: 1 by default, so that 1.0 in the file is 1 Pa
 
 Float files hold y as it is, above full scale too. Every other format holds |y| ≤ 1: what is beyond is clipped and counted in
 `AudioReport.clipped`. float32 subnormals are flushed to zero (decaying tails are full of them, and they slow every player), NaN and
@@ -25,6 +23,7 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet.files.atomic import cannot, check_output, kept_name
+from sonic_bullet.files.levels import as_sound, check_levels, gain_per_pa
 from sonic_bullet.machine.partial_file import PartialFile
 from sonic_bullet.records import Array
 from sonic_bullet.records.coerce import as_number, as_path, as_text, as_whole, brief, nearest, shown
@@ -291,79 +290,8 @@ def write_audio(
     sound = sound[None, :] if sound.ndim == 1 else sound
     if sound.ndim != 2 or sound.shape[0] == 0:
         raise AudioError(f"samples of shape {sound.shape}", "pass (channels, n)")
-    gain = _gain_per_pa(sound, rate, peak_dbfs, lufs, full_scale_pa)
+    gain = gain_per_pa(sound, rate, peak_dbfs, lufs, full_scale_pa)
     with AudioWriter(path, rate, sound.shape[0], gain_per_pa=gain, subtype=subtype, expected_frames=sound.shape[1]) as writer:
         for start in range(0, sound.shape[1], BLOCK_FRAMES):
             writer.write(sound[:, start : start + BLOCK_FRAMES])
     return writer.report()
-
-
-def _gain_per_pa(sound: Array, sr: int, peak_dbfs: float | None, lufs: float | None, full_scale_pa: float) -> float:
-    """The factor g of the module's head; peak and loudness are of the whole sound."""
-    if peak_dbfs is None and lufs is None:
-        return 1 / full_scale_pa
-    peak = float(np.abs(sound).max()) if sound.size else 0.0
-    if not math.isfinite(peak):
-        raise AudioError("the samples hold NaN or infinite numbers", "sound must be finite: examine the scene with 'sonic-bullet doctor'")
-    if peak < 1e-300:
-        raise AudioError("the sound is silent, so no level can be given to it", "leave out --peak-dbfs and --lufs, or make something collide")
-    if peak_dbfs is not None:
-        return float(10 ** (peak_dbfs / 20)) / peak
-    assert lufs is not None
-    return float(10 ** ((lufs - _loudness_lufs(sound / peak, sr)) / 20)) / peak
-
-
-def as_sound(samples: object) -> Array:
-    """Samples as float64. Raises AudioError where they are no array of real numbers."""
-    try:
-        sound = np.asarray(samples)
-        if sound.dtype.kind in "biuf":
-            return sound.astype(float, copy=False)
-    except ValueError:  # rows of several lengths
-        pass
-    raise AudioError(f"samples is {shown(samples)}", "pass real numbers, (channels, n)")
-
-
-def check_levels(peak_dbfs: float | None, lufs: float | None) -> None:
-    """Raise AudioError where a level cannot be asked for: before anything is rendered."""
-    if peak_dbfs is not None and lufs is not None:
-        raise AudioError("both peak_dbfs and lufs are given", "give one of a peak and a loudness")
-    if peak_dbfs is not None:
-        as_number(peak_dbfs, "peak_dbfs, a level re full scale,", "give one between -200 and 0 dB, -1 say", least=-200, most=0, error=AudioError)
-    if lufs is not None:
-        as_number(lufs, "lufs, a loudness level,", "give one between -200 and 200, -23 say", least=-200, most=200, error=AudioError)
-
-
-def _loudness_lufs(sound: Array, sr: int) -> float:
-    """Gated programme loudness of (channels, n) [ITU-R BS.1770-4]."""
-    import pyloudnorm
-
-    if sound.shape[0] > 5:
-        raise AudioError(f"loudness is defined for up to 5 channels, not {sound.shape[0]}", "use --peak-dbfs")
-    if sound.shape[1] < math.ceil(0.4 * sr):
-        raise AudioError(f"loudness needs 0.4 s of sound, here are {sound.shape[1] / sr:.3f} s", "use --peak-dbfs, or render longer")
-    loudness = float(pyloudnorm.Meter(sr).integrated_loudness(sound.T))
-    if not math.isfinite(loudness):
-        raise AudioError("the sound has no measurable loudness (a click under the gate of BS.1770)", "use --peak-dbfs")
-    return loudness
-
-
-def read_audio(path: str | os.PathLike[str]) -> tuple[Array, int]:
-    """Samples (channels, n) float64 in file units (pascals where written with full scale 1 Pa) and the rate in Hz.
-
-    Raises FileError where the file is missing, cut or no audio.
-    """
-    import soundfile
-
-    path = as_path(path, "path", "name a sound file")
-    try:
-        there = Path(path).is_file()
-    except OSError:  # a name too long to be one
-        there = False
-    if not there:
-        raise FileError(f"cannot read {brief(path)}: no such file", "check the path")
-    try:
-        samples, sr = soundfile.read(os.fspath(path), dtype="float64", always_2d=True)
-    except (soundfile.LibsndfileError, OSError) as error:
-        raise FileError(f"cannot read {path}: {str(getattr(error, 'error_string', error)).rstrip('.')}", "give an unbroken audio file") from error
-    return np.ascontiguousarray(samples.T), int(sr)

@@ -12,26 +12,33 @@ import math
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import msgspec
 
+from sonic_bullet.files.reading import reading
 from sonic_bullet.files.unread import shown, unread_fields
-from sonic_bullet.records.errors import FileError
+from sonic_bullet.records.errors import FileError, excerpt
 
 FORMAT = "sonic-bullet-case/1"
 BYTES_MAX = 1 << 24
+NAME_BYTES, PATH_BYTES = 255, 4095  # of POSIX file systems
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 SPLITS = ("fit", "holdout", "transfer")
 MEDIA = ("air", "none")
 IN_AIR = ("velocity", "pressure")
 """Sensors of real things: what they recorded was in air where a case does not say otherwise."""
-Vector = tuple[float, float, float]
+LARGEST = 1e6  # metres, or N·s: no place, size or blow of a strike is larger, and squares of such numbers stay finite
+Number = Annotated[float, msgspec.Meta(ge=-LARGEST, le=LARGEST)]
+Magnitude = Annotated[float, msgspec.Meta(ge=-1e12, le=1e12)]
+Hertz = Annotated[float, msgspec.Meta(le=1e7)]
+Channel = Annotated[int, msgspec.Meta(le=4096)]
+Vector = tuple[Number, Number, Number]
 
 
 class _Elastic(msgspec.Struct, frozen=True):
     youngs_modulus: float | None = None
-    density: float | None = None
+    density: Annotated[float, msgspec.Meta(ge=1e-3, le=LARGEST)] | None = None
     poisson_ratio: float | None = None
 
 
@@ -44,7 +51,7 @@ class _Object(msgspec.Struct, frozen=True):
 
 class _Fixed(msgspec.Struct, frozen=True):
     position: Vector
-    radius: float = 0.0
+    radius: Number = 0.0
     object: str | None = None
 
 
@@ -61,25 +68,25 @@ class _Sensor(msgspec.Struct, frozen=True):
 
 class _Force(msgspec.Struct, frozen=True):
     file: str
-    channel: int = 0
-    newton_per_unit: float | None = None
+    channel: Channel = 0
+    newton_per_unit: Magnitude | None = None
 
 
 class _Strike(msgspec.Struct, frozen=True):
     position: Vector | None = None
     direction: Vector | None = None
-    impulse: float | None = None
+    impulse: Annotated[float, msgspec.Meta(ge=1e-12, le=LARGEST)] | None = None
     force: _Force | None = None
 
 
 class Line(msgspec.Struct, frozen=True):
     """A measured resonance: freq_hz, and what else was measured of it."""
 
-    freq_hz: float
-    decay_per_s: float | None = None
-    freq_sd_hz: float | None = None
-    decay_sd_per_s: float | None = None
-    amplitude: float | None = None
+    freq_hz: Hertz
+    decay_per_s: Hertz | None = None
+    freq_sd_hz: Hertz | None = None
+    decay_sd_per_s: Hertz | None = None
+    amplitude: Magnitude | None = None
 
 
 class _Recording(msgspec.Struct, frozen=True):
@@ -88,7 +95,7 @@ class _Recording(msgspec.Struct, frozen=True):
     object: str | None = None
     split: str = "fit"
     strike: _Strike = _Strike()
-    channel: int | None = None
+    channel: Channel | None = None
 
 
 class _Raw(msgspec.Struct, frozen=True):
@@ -98,8 +105,8 @@ class _Raw(msgspec.Struct, frozen=True):
     case: str = ""
     support: _Support | str | None = None
     sensor: _Sensor | None = None
-    band_hz: tuple[float, float] | None = None
-    onset: str | float | None = None
+    band_hz: tuple[Hertz, Hertz] | None = None
+    onset: str | Number | None = None
     medium: str | None = None
 
 
@@ -161,25 +168,26 @@ class Case:
 def read_case(folder: str | os.PathLike[str]) -> Case:
     """The case in a folder (or of a case.json). Raises FileError naming the file and what is wrong with it; audio may be missing."""
     path = Path(folder)
-    if path.is_dir():
-        path = path / "case.json"
-    try:
-        with path.open("rb") as file:
-            content = file.read(BYTES_MAX + 1)
-    except (OSError, ValueError) as error:
-        raise FileError(f"cannot read case {path}: {getattr(error, 'strerror', None) or error}", "give a folder with a case.json") from error
-    if len(content) > BYTES_MAX:
-        raise FileError(f"case {path} is over 16 MiB", "give a case.json")
-    try:
-        raw = msgspec.json.decode(content, type=_Raw)
-        unread = unread_fields(msgspec.json.decode(content), _Raw, f"case {path}")
-    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise FileError(f"case {path}: {error}", "mend that field; docs/reference/case.md describes the file") from error
-    if raw.format != FORMAT:
-        raise FileError(f"case {path} has format '{raw.format}', wanted '{FORMAT}'", "use a sonic_bullet that knows that format")
-    if not raw.recordings:
-        raise FileError(f"case {path} has no recordings", "list at least one strike")
-    return _case(raw, path, unread)
+    with reading(path, "case", FileError, "mend that field; docs/reference/case.md describes the file"):
+        if path.is_dir():
+            path = path / "case.json"
+        try:
+            with path.open("rb") as file:
+                content = file.read(BYTES_MAX + 1)
+        except (OSError, ValueError) as error:
+            raise FileError(f"cannot read case {path}: {getattr(error, 'strerror', None) or error}", "give a folder with a case.json") from error
+        if len(content) > BYTES_MAX:
+            raise FileError(f"case {path} is over 16 MiB", "give a case.json")
+        try:
+            raw = msgspec.json.decode(content, type=_Raw)
+            unread = unread_fields(msgspec.json.decode(content), _Raw, f"case {path}")
+        except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+            raise FileError(f"case {path}: {error}", "mend that field; docs/reference/case.md describes the file") from error
+        if raw.format != FORMAT:
+            raise FileError(f"case {path} has format '{raw.format}', wanted '{FORMAT}'", "use a sonic_bullet that knows that format")
+        if not raw.recordings:
+            raise FileError(f"case {path} has no recordings", "list at least one strike")
+        return _case(raw, path, unread)
 
 
 def _case(raw: _Raw, path: Path, unread: tuple[str, ...]) -> Case:
@@ -249,8 +257,6 @@ def _recording(entry: _Recording, number: int, objects: dict[str, CaseObject], o
         if not length > 0:
             raise FileError(f"{where}: the strike's direction is zero", "give the direction of the impulse")
         direction = (direction[0] / length, direction[1] / length, direction[2] / length)
-    if strike.impulse is not None and not strike.impulse > 0:
-        raise FileError(f"{where}: impulse is {strike.impulse:g} N·s", "give it above zero, or leave it out")
     force = strike.force
     kept = (inside(path.parent, force.file), force.channel, force.newton_per_unit) if force is not None else None
     file = inside(path.parent, entry.file) if entry.file is not None else None
@@ -262,6 +268,8 @@ def inside(folder: Path, name: str) -> Path:
     """The path of a file a case names. Raises FileError where it leads out of the folder, by name or by link."""
     if not name or "\0" in name or os.path.isabs(name) or "\\" in name:
         raise FileError(f"case names the file {name!r}", "name files inside the case's folder")
+    if max(len(part) for part in os.fsencode(name).split(b"/")) > NAME_BYTES or len(os.fsencode(folder / name)) > PATH_BYTES:
+        raise FileError(f"case names the file '{excerpt(name, 80)}' of {len(name)} characters", "give it a name that a disk can hold")
     whole = os.path.realpath(folder / name)
     if not whole.startswith(os.path.join(os.path.realpath(folder), "")):
         raise FileError(f"case names the file '{name}', which lies outside its folder", "name files inside the case's folder")

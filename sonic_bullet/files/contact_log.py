@@ -5,14 +5,15 @@ Step (records.contacts) one after another -> ContactLog -> npz (files.logs) -> C
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from sonic_bullet.records import Air, Array, Body, Sensor
 from sonic_bullet.records.coerce import as_items, as_kind, as_kinds, as_path, as_whole, shown
-from sonic_bullet.records.contacts import Contacts, Step
+from sonic_bullet.records.contacts import Contacts, Event, Step
 from sonic_bullet.records.errors import LogError
 
 
@@ -21,6 +22,7 @@ class ContactLog:
     """Everything a later render needs, by value: bodies with their models, steps, sensors, rate and seed.
 
     untouched: ids of bodies that were in the world and touched nothing; known while listening, not kept in files.
+    events: whatever else changed the sound, in the order in which it happened.
     """
 
     bodies: tuple[Body, ...]
@@ -30,12 +32,14 @@ class ContactLog:
     seed: int
     air: Air = field(default_factory=Air)
     untouched: frozenset[int] = frozenset()
+    events: tuple[Event, ...] = ()
 
     def __post_init__(self) -> None:
         ids = ("give ids of bodies",)
         checked = {
             "bodies": as_kinds(self.bodies, Body, "log: bodies", "give a tuple of Body", error=LogError),
             "steps": as_kinds(self.steps, Step, "log: steps", "give a tuple of Step", error=LogError),
+            "events": as_kinds(self.events, Event, "log: events", "give a tuple of Event", error=LogError),
             "sensors": as_kinds(self.sensors, Sensor, "log: sensors", "give a tuple of sensors", error=LogError),
             "air": as_kind(self.air, Air, "log: air", "give an Air", error=LogError),
             "seed": as_whole(self.seed, "log: seed", "give a whole number, 0 or more", least=0, error=LogError),
@@ -44,6 +48,8 @@ class ContactLog:
         }
         for name, value in checked.items():
             object.__setattr__(self, name, value)
+        if any(later.step < earlier.step for earlier, later in itertools.pairwise(self.events)):
+            raise LogError("events that are not in the order of their steps", "use an unbroken contact log")
         for step in self.steps:
             if len(step.position_m) > len(self.bodies):
                 raise LogError("a step has more poses than the log has bodies", "use an unbroken contact log")
@@ -106,6 +112,10 @@ class ContactLog:
         bearers = [i for i in bearers if self.bodies[i].epoch == epoch]
         on_a, on_b = np.isin(rows.a, bearers), np.isin(rows.b, bearers)
         return on_a.astype(float) - on_b.astype(float), on_a ^ on_b
+
+    def first(self, count: int) -> ContactLog:
+        """The log of the first ``count`` steps and of what happened up to their end."""
+        return replace(self, steps=self.steps[:count], events=tuple(event for event in self.events if event.step <= count))
 
     def save(self, path: object) -> None:
         """Write the log as npz (numpy arrays and JSON, no pickle), whole or not at all. Raises FileError."""

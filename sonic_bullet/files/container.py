@@ -4,28 +4,40 @@
     NAME.npy    one array each, little-endian bool, integer or float
 
 Entries are stored, not deflated: floats hardly shrink, and no entry can then be larger than the file it lies in (no zip bombs). An npy
-header's shape is compared with the entry's true length before anything is allocated. ``numpy.load(path)`` reads the file too.
+header's shape is compared with the entry's true length before anything is allocated. The entries fill the file, each once and as the
+directory says, so that no part of it can hide. ``numpy.load(path)`` reads the file too.
 """
 
 from __future__ import annotations
 
-import io
 import math
 import os
+import re
+import stat
+import struct
 import zipfile
-from collections.abc import Mapping
-from typing import Any, TypeVar
+from collections.abc import Iterator, Mapping
+from typing import Any, BinaryIO, TypeVar
 
 import msgspec
 import numpy as np
 
-from sonic_bullet.files.atomic import cannot, replacing
+from sonic_bullet.files.atomic import replacing
+from sonic_bullet.files.reading import reading
 from sonic_bullet.records import Array
-from sonic_bullet.records.errors import LogError
+from sonic_bullet.records.errors import FileError, LogError
 
 HEADER = "header"
 REMEDY = "use the file as sonic-bullet wrote it, or make it again"
 Header = TypeVar("Header", bound=msgspec.Struct)
+
+LOCAL = struct.Struct("<4s5H3I2H")  # an entry's own header [PKWARE APPNOTE 6.3.10, 4.3.7]
+EXTRA = struct.Struct("<2H2Q")  # its zip64 field: id, length, size, packed size [4.5.3]
+END = struct.Struct("<4s6xH8xH")  # end of the directory: magic, entries in all, length of the comment [4.3.16]
+ZIP64, UTF8 = 0xFFFFFFFF, 1 << 11
+NPY = re.compile(  # [numpy.lib.format, version 1.0 and 2.0], as numpy writes it
+    rb"\{'descr': '(?P<descr>[<>|=][a-zA-Z][0-9]{0,4})', 'fortran_order': (?P<fortran>True|False), 'shape': \((?P<shape>[-0-9, ]{0,400})\), \} *\n"
+)
 
 
 class _Format(msgspec.Struct):
@@ -41,32 +53,37 @@ def write_container(path: str | os.PathLike[str], header: msgspec.Struct, arrays
                 np.lib.format.write_array(entry, np.ascontiguousarray(array), version=(1, 0), allow_pickle=False)
 
 
-def read_container(path: str | os.PathLike[str], kind: type[Header], form: str, what: str) -> tuple[Header, dict[str, Array]]:
+def read_container(path: str | os.PathLike[str], kind: type[Header], form: str | tuple[str, ...], what: str) -> tuple[Header, dict[str, Array]]:
     """The header as ``kind`` and all arrays, by name, read-only.
 
-    form: the format id asked for; what: the thing, in words, for messages ("contact log"). Raises FileError where there is no readable
-    file, LogError where it is cut, foreign, compressed, pickled or lies about a size.
+    form: the format id asked for, or several that will do, the newest first; what: the thing, in words, for messages
+    ("contact log"). Raises FileError where there is no readable file, LogError where it is cut, foreign, compressed, pickled, holds an entry twice or beside its directory, or lies about a size.
     """
-    try:
-        size = os.path.getsize(path)
-        with zipfile.ZipFile(path) as archive:
+    with reading(path, what, LogError, REMEDY):
+        status = os.stat(path)
+        if not stat.S_ISREG(status.st_mode):  # a pipe would be waited for without end
+            raise FileError(f"cannot read {path}: it is not a regular file", f"name a {what}")
+        size = status.st_size
+        with open(path, "rb") as file, zipfile.ZipFile(file) as archive:
             if sum(info.file_size for info in archive.infolist()) > size:
                 raise LogError(f"{path} claims more bytes than it has", REMEDY)
-            arrays = {_entry_name(info, path): _read_entry(archive, info, size, path) for info in archive.infolist()}
-    except OSError as error:
-        raise cannot("read", path, error) from error
-    except (zipfile.BadZipFile, EOFError, NotImplementedError, RuntimeError, KeyError) as error:
-        raise LogError(f"{path} is cut or no {what} ({error})", REMEDY) from error
-    if HEADER not in arrays:
-        raise LogError(f"{path} is no {what}: it has no header", REMEDY)
-    text = arrays.pop(HEADER).tobytes()
-    try:
-        found = msgspec.json.decode(text, type=_Format).format
-        if found != form:
-            raise LogError(f"{path} has format '{found}', wanted '{form}'", f"give a {what} of this version")
-        return msgspec.json.decode(text, type=kind), arrays
-    except (msgspec.DecodeError, UnicodeDecodeError) as error:
-        raise LogError(f"{path} is no {what}: {error}", REMEDY) from error
+            arrays: dict[str, Array] = {}
+            for info in _entries(archive, file, size):
+                name = _entry_name(info)
+                if name in arrays:
+                    raise LogError(f"entry '{info.filename}' is there twice", REMEDY)
+                arrays[name] = _array(archive.read(info), f"entry '{info.filename}'", size)
+        if HEADER not in arrays:
+            raise LogError(f"{path} is no {what}: it has no header", REMEDY)
+        text = arrays.pop(HEADER).tobytes()
+        try:
+            found = msgspec.json.decode(text, type=_Format).format
+            forms = (form,) if isinstance(form, str) else form
+            if found not in forms:
+                raise LogError(f"{path} has format '{found}', wanted '{forms[0]}'", f"give a {what} of this version")
+            return msgspec.json.decode(text, type=kind), arrays
+        except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+            raise LogError(f"{path} is no {what}: {error}", REMEDY) from error
 
 
 def take(arrays: Mapping[str, Array], name: str, dtype: Any, shape: tuple[int | None, ...], path: object) -> Array:
@@ -81,30 +98,59 @@ def take(arrays: Mapping[str, Array], name: str, dtype: Any, shape: tuple[int | 
     return array
 
 
-def _entry_name(info: zipfile.ZipInfo, path: object) -> str:
+def _entries(archive: zipfile.ZipFile, file: BinaryIO, file_bytes: int) -> Iterator[zipfile.ZipInfo]:
+    """The entries in the file's order, once it is known that they fill it: from its first byte to the directory, and that to its end.
+
+    So nothing lies where the directory does not tell of it, and each entry is what its own local header says it is. Raises LogError.
+    """
+    infos = sorted(archive.infolist(), key=lambda info: info.header_offset)
+    at = 0
+    for info in infos:
+        if info.compress_type != zipfile.ZIP_STORED:
+            raise LogError(f"entry '{info.filename}' is compressed, which this format never is", REMEDY)
+        if info.file_size != info.compress_size or info.file_size > file_bytes:
+            raise LogError(f"entry '{info.filename}' claims {info.file_size} bytes in a file of {file_bytes}", REMEDY)
+        file.seek(at)
+        head = file.read(LOCAL.size)
+        if info.header_offset != at or len(head) < LOCAL.size:
+            raise LogError("its directory does not tell of all that lies in it", REMEDY)
+        magic, _, flags, method, _, _, crc, packed, size, name_bytes, extra_bytes = LOCAL.unpack(head)
+        name, extra = file.read(name_bytes), file.read(extra_bytes)
+        if packed == size == ZIP64 and len(extra) == EXTRA.size:
+            *_, size, packed = EXTRA.unpack(extra)
+        said = (magic, flags & ~UTF8, method, crc, packed, size, name)
+        if said != (b"PK\x03\x04", 0, zipfile.ZIP_STORED, info.CRC, info.file_size, info.file_size, info.filename.encode()):
+            raise LogError(f"entry '{info.filename}' is another in the directory", REMEDY)
+        at += LOCAL.size + name_bytes + extra_bytes + info.file_size
+    file.seek(max(file_bytes - END.size, 0))
+    magic, count, comment_bytes = END.unpack(file.read(END.size))
+    if at != archive.start_dir or magic != b"PK\x05\x06" or comment_bytes or count != min(len(infos), 0xFFFF):
+        raise LogError("its directory does not tell of all that lies in it", REMEDY)
+    yield from infos
+
+
+def _entry_name(info: zipfile.ZipInfo) -> str:
     if not info.filename.endswith(".npy"):
-        raise LogError(f"{path} holds a foreign entry '{info.filename}'", REMEDY)
+        raise LogError(f"there is a foreign entry '{info.filename}'", REMEDY)
     return info.filename[:-4]
 
 
-def _read_entry(archive: zipfile.ZipFile, info: zipfile.ZipInfo, file_bytes: int, path: object) -> Array:
-    """One array, allocated only after its claims agree with the file's true size."""
-    where = f"{path}: entry '{info.filename}'"
-    if info.compress_type != zipfile.ZIP_STORED:
-        raise LogError(f"{where} is compressed, which this format never is", REMEDY)
-    if info.file_size != info.compress_size or info.file_size > file_bytes:
-        raise LogError(f"{where} claims {info.file_size} bytes in a file of {file_bytes}", REMEDY)
-    raw = archive.read(info)
-    stream = io.BytesIO(raw)
-    try:
-        version = np.lib.format.read_magic(stream)
-        reader = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}[version]
-        shape, fortran, dtype = reader(stream)
-    except (ValueError, KeyError, EOFError) as error:
-        raise LogError(f"{where} is no array", REMEDY) from error
-    if dtype.hasobject or dtype.kind not in "biuf":
-        raise LogError(f"{where} holds {dtype}, only plain numbers are read", REMEDY)
+def _array(raw: bytes, where: str, file_bytes: int) -> Array:
+    """The array of an npy file, nothing of it evaluated: a header says descr, order and shape as numpy writes them, or it is none."""
+    size_bytes = {b"\x93NUMPY\x01\x00": 2, b"\x93NUMPY\x02\x00": 4}.get(raw[:8], 0)
+    start = 8 + size_bytes
+    stop = start + int.from_bytes(raw[8:start], "little")
+    found = NPY.fullmatch(raw[start:stop]) if size_bytes and stop <= len(raw) else None
+    if found is None:
+        raise LogError(f"{where} is no array", REMEDY)
+    descr = found["descr"].decode()
+    if descr[0] not in "<>|=" or descr[1] not in "biuf":
+        raise LogError(f"{where} holds {descr}, only plain numbers are read", REMEDY)
+    dtype, shape = np.dtype(descr), tuple(int(word) for word in found["shape"].split(b",") if word.strip())
     claimed = math.prod(shape) * dtype.itemsize
-    if min(shape, default=0) < 0 or claimed != len(raw) - stream.tell():
-        raise LogError(f"{where} claims {claimed} bytes of numbers and holds {len(raw) - stream.tell()}", REMEDY)
-    return np.frombuffer(raw, dtype, offset=stream.tell()).reshape(shape, order="F" if fortran else "C")
+    if min(shape, default=0) < 0 or claimed != len(raw) - stop or max(shape, default=0) > file_bytes:
+        raise LogError(f"{where} claims {claimed} bytes of numbers and holds {len(raw) - stop}", REMEDY)
+    array = np.frombuffer(raw, dtype, offset=stop).reshape(shape, order="F" if found["fortran"] == b"True" else "C")
+    if dtype.kind == "b" and array.view(np.uint8).max(initial=0) > 1:
+        raise LogError(f"{where} holds numbers that are neither true nor false", REMEDY)
+    return array

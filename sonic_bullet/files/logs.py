@@ -1,8 +1,8 @@
-"""Contact logs and modal models on disk: every number bit for bit, no pickle.
+"""Contact logs on disk: every number bit for bit, no pickle.
 
 The container is `container`'s npz. Scalars, names and references are JSON (`header.npy`), all arrays are entries of their own:
 
-    format "sonic-bullet-contacts/1"; b bodies, s steps, p = Σ bodies known at each step, k = Σ contacts of each step
+    format "sonic-bullet-contacts/2"; b bodies, s steps, p = Σ bodies known at each step, k = Σ contacts of each step
       step_dt_s (s,) f8                     length of each step
       step_gravity_m_s2 (s, 3) f8            gravity in the world
       step_body_count, step_contact_count (s,) i8   how many of the p and k rows are each step's, in order
@@ -14,14 +14,15 @@ The container is `container`'s npz. Scalars, names and references are JSON (`hea
       residual<i>_<field> f8                 of material i, where it has one: the arrays of `Residual`
       model<i>_freq_hz, _decay_per_s (m,) f8, _shape (v, 3, m) f4, _vertex_m (v, 3) f8, _face (f, 3) i4, _curvature_per_m (f,) f8
       model<i>_bend_s2_m2, _choke_s_m (m,) f8  only where its modes go with their level
-    format "sonic-bullet-model/1"           one model: model0_… as above
+      events (in the header)                 what else changed the sound, in order: {"kind": "quench", "step": the step before which it happened,
+                                            "body": index, left out where it concerns all}
+    format "sonic-bullet-contacts/1"        the same without events: read as a log in which there were none
 
 A reader checks sizes before it allocates and records check their invariants, so a cut, foreign or forged file is one line of LogError.
 """
 
 from __future__ import annotations
 
-import hashlib
 import os
 from collections.abc import Mapping
 from typing import Any
@@ -32,23 +33,16 @@ import numpy as np
 from sonic_bullet.files.audio import check_sr
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.container import REMEDY, read_container, take, write_container
-from sonic_bullet.records import Air, Array, Body, Material, Microphone, ModalModel, ModalSum, Residual, Sensor, Vibrometer
+from sonic_bullet.files.models import ModelEntry, as_json_text, model_arrays, model_key, pack_model, unpack_model
+from sonic_bullet.files.reading import reading
+from sonic_bullet.records import Air, Array, Body, Material, Microphone, ModalSum, Residual, Sensor, Vibrometer
 from sonic_bullet.records.coerce import as_path
-from sonic_bullet.records.contacts import ROW_FIELDS, Contacts, Step
-from sonic_bullet.records.errors import AudioError, LogError, RecordError
+from sonic_bullet.records.contacts import ROW_FIELDS, Contacts, Event, Step
+from sonic_bullet.records.errors import LogError
 
-LOG_FORMAT = "sonic-bullet-contacts/1"
-MODEL_FORMAT = "sonic-bullet-model/1"
-MODEL_ARRAYS: dict[str, tuple[type, tuple[int | None, ...]]] = {
-    "freq_hz": (float, (None,)),
-    "decay_per_s": (float, (None,)),
-    "shape": (np.float32, (None, 3, None)),
-    "vertex_m": (float, (None, 3)),
-    "face": (np.int32, (None, 3)),
-    "curvature_per_m": (float, (None,)),
-}
-BENT_ARRAYS = {"bend_s2_m2": "bend_s2_m2", "choke_s_m": "damping_growth_s_m"}
-"""Array in the file -> field, of models whose modes go with their level; others have none."""
+LOG_FORMAT = "sonic-bullet-contacts/2"
+LOG_FORMATS = (LOG_FORMAT, "sonic-bullet-contacts/1")
+"""What is read; the first is what is written."""
 RESIDUAL_ARRAYS: dict[str, tuple[int | None, ...]] = {
     **{f"{part}_{name}": (None,) for part in ("mode", "line") for name in ("freq_hz", "decay_per_s", "amplitude")},
     "freq_hz": (None,),
@@ -56,15 +50,6 @@ RESIDUAL_ARRAYS: dict[str, tuple[int | None, ...]] = {
     "power_per_hz": (None, None),
 }
 Vector = tuple[float, float, float]
-
-
-class _Model(msgspec.Struct, omit_defaults=True):
-    volume_m3: float
-    mass_kg: float
-    dropped: int
-    note: str
-    damping_growth_power: float = msgspec.field(default=1.0, name="choke_power")
-    includes_radiation: bool = False
 
 
 class _Residual(msgspec.Struct):
@@ -113,6 +98,12 @@ class _ModalSum(msgspec.Struct, tag="modal-sum"):
     scale: float
 
 
+class _Event(msgspec.Struct, omit_defaults=True):
+    kind: str
+    step: int
+    body: int | None = None
+
+
 class _LogHeader(msgspec.Struct):
     format: str
     sr: int
@@ -121,19 +112,15 @@ class _LogHeader(msgspec.Struct):
     air_sound_speed_m_s: float
     sensors: list[_Microphone | _Vibrometer | _ModalSum]
     materials: list[_Material]
-    models: list[_Model]
+    models: list[ModelEntry]
     bodies: list[_Body]
-
-
-class _ModelHeader(msgspec.Struct):
-    format: str
-    model: _Model
+    events: list[_Event] = []
 
 
 def write_log(path: str | os.PathLike[str], log: ContactLog) -> None:
     """Write a contact log, whole or not at all; equal logs give equal bytes. Raises FileError."""
     materials, material_of = _distinct([body.material for body in log.bodies], _material_key)
-    models, model_of = _distinct([body.model for body in log.bodies], _model_key)
+    models, model_of = _distinct([body.model for body in log.bodies], model_key)
     header = _LogHeader(
         format=LOG_FORMAT,
         sr=int(log.sr),
@@ -142,8 +129,9 @@ def write_log(path: str | os.PathLike[str], log: ContactLog) -> None:
         air_sound_speed_m_s=float(log.air.sound_speed_m_s),
         sensors=[_pack_sensor(sensor) for sensor in log.sensors],
         materials=[_pack_material(material) for material in materials],
-        models=[_pack_model(model) for model in models],
+        models=[pack_model(model) for model in models],
         bodies=[_pack_body(body, m, n) for body, m, n in zip(log.bodies, material_of, model_of, strict=True)],
+        events=[_Event(event.kind, event.step, event.body) for event in log.events],
     )
     steps = log.steps
     rows = Contacts.joined([step.contacts for step in steps])
@@ -161,7 +149,7 @@ def write_log(path: str | os.PathLike[str], log: ContactLog) -> None:
     }
     arrays |= {f"contact_{name}": getattr(rows, name) for name in ROW_FIELDS}
     for i, model in enumerate(models):
-        arrays |= _model_arrays(model, i)
+        arrays |= model_arrays(model, i)
     for i, material in enumerate(materials):
         if material.residual is not None:
             arrays |= {f"residual{i}_{name}": getattr(material.residual, name) for name in RESIDUAL_ARRAYS}
@@ -171,28 +159,10 @@ def write_log(path: str | os.PathLike[str], log: ContactLog) -> None:
 def read_log(path: str | os.PathLike[str]) -> ContactLog:
     """The contact log that `write_log` wrote. Raises FileError (no such file) and LogError (cut, foreign, forged, inconsistent)."""
     path = as_path(path, "path", "name a contact log (.npz)")
-    header, arrays = read_container(path, _LogHeader, LOG_FORMAT, "contact log")
-    try:
+    header, arrays = read_container(path, _LogHeader, LOG_FORMATS, "contact log")
+    with reading(path, "contact log", LogError, REMEDY):
         check_sr(header.sr)
         return _unpack_log(header, arrays, path)
-    except (RecordError, LogError, AudioError) as error:
-        if str(path) in error.what:
-            raise
-        raise LogError(f"{path}: {error.what}", REMEDY) from error
-
-
-def write_model(path: str | os.PathLike[str], model: ModalModel) -> None:
-    """Write one modal model, whole or not at all. Raises FileError."""
-    write_container(path, _ModelHeader(MODEL_FORMAT, _pack_model(model)), _model_arrays(model, 0))
-
-
-def read_model(path: str | os.PathLike[str]) -> ModalModel:
-    """The modal model that `write_model` wrote. Raises FileError (no such file) and LogError (cut, foreign, forged, inconsistent)."""
-    header, arrays = read_container(path, _ModelHeader, MODEL_FORMAT, "modal model")
-    try:
-        return _unpack_model(header.model, arrays, 0, path)
-    except RecordError as error:
-        raise LogError(f"{path}: {error.what}", REMEDY) from error
 
 
 def _distinct(things: list[Any], key: Any) -> tuple[list[Any], list[int | None]]:
@@ -209,35 +179,24 @@ def _material_key(material: Material) -> bytes:
     return msgspec.json.encode(_pack_material(material)) + material.stiffness_pa.tobytes() + more
 
 
-def _model_key(model: ModalModel) -> bytes:
-    digest = hashlib.sha256(msgspec.json.encode(_pack_model(model)))
-    for name, array in _model_arrays(model, 0).items():
-        digest.update(f"{name} {array.shape}".encode() + array.tobytes())
-    return digest.digest()
-
-
 def _pack_material(x: Material) -> _Material:
     return _Material(
-        name=_text(x.name),
+        name=as_json_text(x.name),
         density_kg_m3=float(x.density_kg_m3),
         alpha_per_s=None if x.alpha_per_s is None else float(x.alpha_per_s),
         beta_s=None if x.beta_s is None else float(x.beta_s),
         roughness_m=float(x.roughness_m),
         hurst=float(x.hurst),
         restitution=float(x.restitution),
-        source=_text(x.source),
-        residual=None if x.residual is None else _Residual(float(x.residual.clip_energy), _text(x.residual.source)),
+        source=as_json_text(x.source),
+        residual=None if x.residual is None else _Residual(float(x.residual.clip_energy), as_json_text(x.residual.source)),
         includes_radiation=bool(x.includes_radiation),
     )
 
 
-def _pack_model(x: ModalModel) -> _Model:
-    return _Model(float(x.volume_m3), float(x.mass_kg), int(x.dropped), _text(x.note), float(x.damping_growth_power), bool(x.includes_radiation))
-
-
 def _pack_body(x: Body, material: int | None, model: int | None) -> _Body:
     numbers = (int(x.body_id), int(x.link), int(x.epoch))
-    return _Body(*numbers, _text(x.name), float(x.mass_kg), float(x.volume_m3), int(x.since_step), int(x.until_step), material, model)
+    return _Body(*numbers, as_json_text(x.name), float(x.mass_kg), float(x.volume_m3), int(x.since_step), int(x.until_step), material, model)
 
 
 def _pack_sensor(sensor: Sensor) -> _Microphone | _Vibrometer | _ModalSum:
@@ -251,30 +210,6 @@ def _pack_sensor(sensor: Sensor) -> _Microphone | _Vibrometer | _ModalSum:
 def _vector(array: Array) -> Vector:
     x, y, z = (float(value) for value in array)
     return x, y, z
-
-
-def _text(text: str) -> str:
-    """``text`` as JSON can hold it: lone surrogates, as undecodable names carry them, become question marks."""
-    return text.encode("utf-8", "replace").decode()
-
-
-def _model_arrays(model: ModalModel, index: int) -> dict[str, Array]:
-    bent = {name: field for name, field in BENT_ARRAYS.items() if getattr(model, field) is not None}
-    return {f"model{index}_{name}": getattr(model, field) for name, field in ({name: name for name in MODEL_ARRAYS} | bent).items()}
-
-
-def _unpack_model(header: _Model, arrays: Mapping[str, Array], index: int, path: object) -> ModalModel:
-    parts = {name: take(arrays, f"model{index}_{name}", dtype, shape, path) for name, (dtype, shape) in MODEL_ARRAYS.items()}
-    parts |= {field: take(arrays, f"model{index}_{name}", float, (None,), path) for name, field in BENT_ARRAYS.items() if f"model{index}_{name}" in arrays}
-    return ModalModel(
-        **parts,
-        volume_m3=header.volume_m3,
-        mass_kg=header.mass_kg,
-        dropped=header.dropped,
-        note=header.note,
-        damping_growth_power=header.damping_growth_power,
-        includes_radiation=header.includes_radiation,
-    )
 
 
 def _unpack_residual(header: _Residual | None, arrays: Mapping[str, Array], index: int, path: object) -> Residual | None:
@@ -304,7 +239,7 @@ def _unpack_log(header: _LogHeader, arrays: Mapping[str, Array], path: object) -
         Material(stiffness_pa=stiffness[i], **{**msgspec.structs.asdict(x), "residual": _unpack_residual(x.residual, arrays, i, path)})
         for i, x in enumerate(header.materials)
     ]
-    models = [_unpack_model(x, arrays, i, path) for i, x in enumerate(header.models)]
+    models = [unpack_model(x, arrays, i, path) for i, x in enumerate(header.models)]
     bodies = [
         Body(
             **{**msgspec.structs.asdict(x), "material": _pick(materials, x.material, path), "model": _pick(models, x.model, path)},
@@ -320,6 +255,7 @@ def _unpack_log(header: _LogHeader, arrays: Mapping[str, Array], path: object) -
         sr=header.sr,
         seed=header.seed,
         air=Air(header.air_density_kg_m3, header.air_sound_speed_m_s),
+        events=tuple(Event(event.kind, event.step, event.body) for event in header.events),
     )
 
 

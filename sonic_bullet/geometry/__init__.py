@@ -2,17 +2,24 @@
 
 from sonic_bullet.geometry.nearest_point import SurfaceIndex, closest_point, nearest, surface_index
 from sonic_bullet.geometry.triangles import (
+    CREASE_RAD,
+    HEAVIEST_KG,
+    LARGEST_M,
     corner_normals,
     face_areas_m2,
     face_curvature,
     inertia,
     is_closed,
     outward_normals,
+    oversize,
     volume_m3,
     welded,
 )
 
 __all__ = [
+    "CREASE_RAD",
+    "HEAVIEST_KG",
+    "LARGEST_M",
     "SurfaceIndex",
     "closest_point",
     "corner_normals",
@@ -22,6 +29,7 @@ __all__ = [
     "is_closed",
     "nearest",
     "outward_normals",
+    "oversize",
     "surface_index",
     "volume_m3",
     "welded",

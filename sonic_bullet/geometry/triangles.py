@@ -23,11 +23,15 @@ __all__ = [
     "is_closed",
     "nearest",
     "outward_normals",
+    "oversize",
     "surface_index",
     "volume_m3",
     "welded",
 ]
 
+LARGEST_M, HEAVIEST_KG = 10.0, 202e3
+"""Of what is struck to sound: the largest bell ever cast, the Tsar Bell, is 6.6 m wide and weighs 202 t. A mesh in millimetres is a thousand times its size,
+so that all but what is under a centimetre passes the first, and a steel ball of 4 mm the second."""
 CREASE_RAD = np.deg2rad(30.0)
 
 
@@ -77,6 +81,17 @@ def welded(vertex_m: Array, face: Array) -> tuple[Array, Array]:
     face = inverse.ravel()[face]
     whole = (face[:, 0] != face[:, 1]) & (face[:, 1] != face[:, 2]) & (face[:, 2] != face[:, 0])
     return unique, face[whole]
+
+
+def oversize(vertex_m: Array, mass_kg: float) -> str:
+    """How large a body is that is larger than anything that is struck to sound, in words; "" for all others.
+
+    Most such bodies are meshes in millimetres, grounds or terrains: their modes are no mistake, but hardly what was meant.
+    """
+    long_m = float(np.ptp(vertex_m, axis=0).max()) if len(vertex_m) else 0.0
+    if long_m <= LARGEST_M and mass_kg <= HEAVIEST_KG:
+        return ""
+    return f"is {long_m:.3g} m long and would weigh {mass_kg:.3g} kg, larger than anything that is struck to sound"
 
 
 def _edges(face: Array) -> Array:

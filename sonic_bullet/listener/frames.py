@@ -10,7 +10,8 @@ moved by hand. n rows: one for each link of each body, ordered by (body id, link
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Collection
+from dataclasses import dataclass, field
 from itertools import chain
 
 import numpy as np
@@ -24,15 +25,25 @@ from sonic_bullet.records.errors import SceneError
 LINK_SPAN = 1 << 20
 JUMP_FLOOR_M = 1e-3
 DRIVEN_SPEED_M_S = 10.0
+BEYOND = 1e9
+"""Metres, m/s, rad/s, N·s: no scene of these sizes reaches it, and the products of such numbers are still numbers."""
+NO_NUMBER = "a pose or speed that is not a number, or beyond 1e9"
+SOFT = 3
+"""What getDynamicsInfo tells of a soft body as its last entry but one (Bullet's BT_SOFT_BODY)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Roster:
-    """Who is in the world. code (n,) = body · LINK_SPAN + link + 1, ascending; static (n,): mass 0."""
+    """Who is in the world. code (n,) = body · LINK_SPAN + link + 1, ascending; static (n,): mass 0.
+
+    count: of all bodies there when it was made, also those that it leaves out. soft: ids of soft bodies, which it leaves out.
+    """
 
     bodies: tuple[tuple[int, int, bool], ...]
     code: Array
     static: Array
+    count: int = 0
+    soft: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,6 +51,7 @@ class Motion:
     """Poses and twists of a roster at one instant.
 
     position_m (n, 3), quaternion_xyzw (n, 4), velocity_m_s (n, 3) of the centre of mass, spin_rad_s (n, 3): world frame.
+    broken: ids of the bodies of which a number is NaN or `BEYOND`, as read.
     """
 
     roster: Roster
@@ -47,6 +59,7 @@ class Motion:
     quaternion_xyzw: Array
     velocity_m_s: Array
     spin_rad_s: Array
+    broken: tuple[int, ...] = field(default=(), kw_only=True)
 
     @property
     def table(self) -> tuple[Array, Array, Array, Array]:
@@ -86,26 +99,42 @@ def body_ids(client_id: int) -> list[int]:
     return sorted(pybullet.getBodyUniqueId(i, physicsClientId=client_id) for i in range(pybullet.getNumBodies(physicsClientId=client_id)))
 
 
-def read_roster(client_id: int) -> Roster:
-    """List bodies, their links and which of them cannot move."""
+def is_soft(client_id: int, body: int) -> bool:
+    """Whether an existing body is a soft one."""
+    return bool(pybullet.getDynamicsInfo(body, -1, physicsClientId=client_id)[10] == SOFT)
+
+
+def read_roster(client_id: int, leave_out: Collection[int] = ()) -> Roster:
+    """List bodies, their links and which of them cannot move; without those to be left out and the soft ones."""
     bodies: list[tuple[int, int, bool]] = []
     codes: list[int] = []
     static: list[bool] = []
-    for body in body_ids(client_id):
+    soft: list[int] = []
+    everyone = body_ids(client_id)
+    for body in everyone:
+        if body in leave_out:
+            continue
+        info = pybullet.getDynamicsInfo(body, -1, physicsClientId=client_id)
+        if info[10] == SOFT:
+            soft.append(body)
+            continue
         joints = pybullet.getNumJoints(body, physicsClientId=client_id)
-        fixed = pybullet.getDynamicsInfo(body, -1, physicsClientId=client_id)[0] == 0
+        fixed = info[0] == 0
         bodies.append((body, joints, fixed))
         codes.extend(int(encode(body, link)) for link in range(-1, joints))
         static.extend([fixed] + [False] * joints)
-    return Roster(tuple(bodies), np.array(codes, np.int64), np.array(static, bool))
+    return Roster(tuple(bodies), np.array(codes, np.int64), np.array(static, bool), len(everyone), tuple(soft))
 
 
 def read_motion(client_id: int, roster: Roster) -> Motion:
-    """Poses and twists now. Raises pybullet.error where a body of the roster is gone, SceneError on a number that is not finite."""
+    """Poses and twists now, numbers or not (`Motion.broken`). Raises pybullet.error where a body of the roster is gone or has other links."""
     still = (0.0, 0.0, 0.0)
     pose, twist, links = pybullet.getBasePositionAndOrientation, pybullet.getBaseVelocity, pybullet.getLinkStates
+    count = pybullet.getNumJoints
     flat: list[tuple[float, ...]] = []
     for body, joints, fixed in roster.bodies:
+        if count(body, client_id) != joints:  # another body has taken over the id: asking for a link that is not there would end the process
+            raise pybullet.error(f"body {body} has other links than before")
         flat.extend(pose(body, client_id))
         if fixed:
             flat.append(still)
@@ -116,13 +145,9 @@ def read_motion(client_id: int, roster: Roster) -> Motion:
             for state in links(body, range(joints), computeLinkVelocity=1, computeForwardKinematics=1, physicsClientId=client_id):
                 flat.extend((state[0], state[1], state[6], state[7]))
     table = np.fromiter(chain.from_iterable(flat), float, 13 * len(roster.code)).reshape(-1, 13)
-    if not np.isfinite(table).all():
-        body, link = decode(roster.code[np.flatnonzero(~np.isfinite(table).all(axis=1))[0]])
-        raise SceneError(
-            f"body {body}{link_words(link)} has a pose or speed that is not a number",
-            "check its mass, inertia and what touches it; remove it or reset the scene",
-        )
-    return Motion(roster, *(np.ascontiguousarray(part) for part in (table[:, 0:3], table[:, 3:7], table[:, 7:10], table[:, 10:13])))
+    wild = ~(np.abs(table) < BEYOND)
+    broken = tuple(int(body) for body in np.unique(roster.code[wild.any(axis=1)] // LINK_SPAN)) if wild.any() else ()
+    return Motion(roster, *(np.ascontiguousarray(part) for part in (table[:, 0:3], table[:, 3:7], table[:, 7:10], table[:, 10:13])), broken=broken)
 
 
 def link_words(link: int) -> str:

@@ -17,10 +17,9 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.listener.frames import encode
+from sonic_bullet.listener.frames import BEYOND, encode
 from sonic_bullet.listener.kinematics import impulses
 from sonic_bullet.records import Array
-from sonic_bullet.records.errors import SceneError
 
 RawContact = tuple[Any, ...]
 FORCE, FRICTION_1, FRICTION_2 = 9, 10, 12
@@ -42,6 +41,12 @@ class Touches:
 
     def __len__(self) -> int:
         return len(self.code_a)
+
+    @property
+    def usable(self) -> Array:
+        """(k,) False where a force or place is NaN or `BEYOND` what can be."""
+        numbers = np.concatenate([self.impulse_n_s, self.point_a_m, self.point_b_m, self.normal, self.gap_m[:, None]], axis=1)
+        return np.asarray((np.abs(numbers) < BEYOND).all(axis=1))
 
     def kept(self, mask: Array) -> Touches:
         """Only the rows where mask (k,) is True."""
@@ -67,7 +72,7 @@ def loaded(contacts: Iterable[RawContact], before: Iterable[RawContact] = ()) ->
 
 
 def gather(contacts: list[RawContact], dt_s: float) -> Touches:
-    """Arrays of loaded contacts. Raises SceneError naming the pair where a number is not finite."""
+    """Arrays of loaded contacts, numbers or not (`Touches.usable`)."""
     k = len(contacts)
     if k == 0:
         none, none3 = np.zeros(0), np.zeros((0, 3))
@@ -78,11 +83,4 @@ def gather(contacts: list[RawContact], dt_s: float) -> Touches:
     scalar = np.frombuffer(struct.pack(f"{4 * k}d", *gap, *force, *f1, *f2)).reshape(4, k)
     ids = np.frombuffer(struct.pack(f"{4 * k}q", *body_a, *body_b, *link_a, *link_b), np.int64).reshape(4, k)
     impulse = impulses(dt_s, n, tangent_1, tangent_2, scalar[1:])
-    touches = Touches(encode(ids[0], ids[2]), encode(ids[1], ids[3]), place_a, place_b, n, scalar[0], impulse, np.zeros(k))
-    if not (np.isfinite(impulse).all() and np.isfinite(touches.point_a_m).all() and np.isfinite(touches.point_b_m).all() and np.isfinite(scalar[0]).all()):
-        finite = np.isfinite(np.concatenate([impulse, touches.point_a_m, touches.point_b_m, scalar[:1].T], axis=1)).all(axis=1)
-        bad = int(np.flatnonzero(~finite)[0])
-        raise SceneError(
-            f"the contact of bodies {body_a[bad]} and {body_b[bad]} holds a force or place that is not a number", "check the masses and inertias of both"
-        )
-    return touches
+    return Touches(encode(ids[0], ids[2]), encode(ids[1], ids[3]), place_a, place_b, n, scalar[0], impulse, np.zeros(k))

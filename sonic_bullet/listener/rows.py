@@ -28,6 +28,10 @@ class Meetings:
     slip_m_s: Array
     approach_m_s: Array
 
+    def kept(self, mask: Array) -> Meetings:
+        """Only the touches where mask (k,) is True."""
+        return Meetings(self.touches.kept(mask), self.row_a[mask], self.row_b[mask], self.slip_m_s[mask], self.approach_m_s[mask])
+
 
 def meetings(touches: Touches, past: Touches | None, start: Start, dt_s: float) -> Meetings:
     """Touches without those asleep, moved by hand, or of a body in its first step and deeper inside its partner than its speed explains.
@@ -45,10 +49,8 @@ def meetings(touches: Touches, past: Touches | None, start: Start, dt_s: float) 
     if start.born.any():
         inside = touches.gap_m < -(SPAWN_DEPTH_M + np.maximum(approach, 0) * dt_s)
         drop |= (start.born[row_a] | start.born[row_b]) & inside
-    if not drop.any():
-        return Meetings(touches, row_a, row_b, slip, approach)
-    keep = ~drop
-    return Meetings(touches.kept(keep), row_a[keep], row_b[keep], slip[keep], approach[keep])
+    meeting = Meetings(touches, row_a, row_b, slip, approach)
+    return meeting.kept(~drop) if drop.any() else meeting
 
 
 def _asleep(touches: Touches, past: Touches | None, motion: Motion, row_a: Array, row_b: Array) -> Array:

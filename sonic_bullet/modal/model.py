@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from sonic_bullet.geometry import oversize
 from sonic_bullet.modal import cache as store
 from sonic_bullet.modal.options import ModalOptions
 from sonic_bullet.records import Array, Material, ModalModel, Shape
@@ -24,6 +25,22 @@ if TYPE_CHECKING:
     from sonic_bullet.modal.meshing.shape_meshes import Filled
 
 MOST_MODES = 200
+MODES = {
+    "value": store.Kept("f8", ("m",)),
+    "vector": store.Kept("f4", ("v", 3, "m")),
+    "volume": store.Kept("f8", (1,)),
+    "vertex": store.Kept("f8", ("v", 3)),
+    "face": store.Kept("i", ("f", 3), "v"),
+    "curvature": store.Kept("f8", ("f",)),
+}
+SOLID = {
+    "node": store.Kept("f8", ("n", 3)),
+    "tet": store.Kept("i", (None, None), "n"),
+    "affine": store.Kept("b1", (1,)),
+    "skin": store.Kept("i", ("v",), "n"),
+    "face": store.Kept("i", ("f", 3), "v"),
+    "curvature": store.Kept("f8", ("f",)),
+}
 SHIFT = 20.0  # × (2V/A)²/L²: a third of the first elastic λ' of plates and bars, less of chunky bodies
 
 
@@ -76,7 +93,7 @@ def analyse(
     clamp = np.array(asked.fixed, float).reshape(-1, 4)
     unit_stiffness = material.stiffness_pa / pascal
     name = store.key("modes", solid_key, unit_stiffness, clamp, count if count is not None else limit)
-    unit = _recall(store.load(cache, name))
+    unit = _recall(store.load(cache, name, MODES))
     if unit is None:
         unit = _solve(shapes, (edge_m, thickness_m), (cache, solid_key), length_m, unit_stiffness, clamp, count, limit, say)
         store.save(cache, name, _arrays(unit), unit.note)
@@ -89,6 +106,10 @@ def analyse(
     if dropped:
         note += f"; {dropped} overdamped modes dropped"
     volume = unit.volume * length_m**3
+    mass = volume * material.density_kg_m3
+    large = oversize(unit.vertex_m, mass)
+    if large:
+        note += f"; it {large}"
     return ModalModel(
         freq_hz=freq,
         decay_per_s=decay,
@@ -97,7 +118,7 @@ def analyse(
         face=unit.face,
         curvature_per_m=unit.curvature_per_m,
         volume_m3=volume,
-        mass_kg=volume * material.density_kg_m3,
+        mass_kg=mass,
         dropped=dropped,
         note=note,
         includes_radiation=material.includes_radiation,
@@ -141,7 +162,7 @@ def _filled(shapes: tuple[Shape, ...], sizes: tuple[float | None, float | None],
     from sonic_bullet.modal.meshing.shape_meshes import Filled, fill
     from sonic_bullet.modal.meshing.solid import Solid, SolidSurface
 
-    found = store.load(*kept)
+    found = store.load(*kept, SOLID)
     if found is not None:
         a, note = found
         return Filled(Solid(a["node"], a["tet"], bool(a["affine"][0]), note), SolidSurface(a["skin"], a["face"]), a["curvature"])
@@ -224,6 +245,4 @@ def _recall(found: tuple[dict[str, Array], str] | None) -> _Unit | None:
     if found is None:
         return None
     a, note = found
-    if set(a) != {"value", "vector", "volume", "vertex", "face", "curvature"} or a["vector"].shape != (len(a["vertex"]), 3, len(a["value"])):
-        return None
     return _Unit(a["value"], a["vector"], float(a["volume"][0]), a["vertex"], a["face"], a["curvature"], note)

@@ -25,7 +25,14 @@ from sonic_bullet.records.errors import MeshError, ModalError
 APART = 0.05  # of ν₁ and ν₂ from the guess
 POISSON = (-0.5, 0.485)
 BEYOND = 1.1  # of the limit on λ: modes that are none at one ν may be some at the other
-KEPT = ("lame", "shear", "skin", "vertex", "face", "numbers")
+KEPT = {
+    "lame": store.Kept("f8", ("b", "b")),
+    "shear": store.Kept("f8", ("b", "b")),
+    "skin": store.Kept("f4", ("v", 3, "b")),
+    "vertex": store.Kept("f8", ("v", 3)),
+    "face": store.Kept("i", (None, 3), "v"),
+    "numbers": store.Kept("f8", (3,)),
+}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -117,8 +124,8 @@ def family(
     limit = (2 * np.pi * to_hz) ** 2 * length**2 / gamma_m2_s2
     clamp = np.array(fixed, float).reshape(-1, 4)
     name = store.key("family", shape.vertex_m, shape.face, edge_m, clamp, poisson, limit)
-    found = store.load(cache, name)
-    if found is not None and set(found[0]) == set(KEPT):
+    found = store.load(cache, name, KEPT)
+    if found is not None:
         a, note = found
         volume, count, meshed = a["numbers"]
         return Family(a["lame"], a["shear"], a["skin"], a["vertex"], a["face"], length, float(volume), int(count), note, bool(meshed))

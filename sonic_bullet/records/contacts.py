@@ -1,4 +1,4 @@
-"""What a simulation told us, step by step: `Contacts` (rows of one step), `Step`, and the `ContactLog` they add up to.
+"""What a simulation told us, step by step: `Contacts` (rows of one step), `Step`, `Event`, and the `ContactLog` they add up to.
 
     getContactPoints -> Contacts -> Step -> synthesizer (live)      -> frame
                                       \\-> ContactLog -> npz -> Step -> the same synthesizer (replay) -> the same bits
@@ -103,3 +103,28 @@ class Step:
         as_kind(self.contacts, Contacts, "step: contacts", "give Contacts, of no rows where nothing touches", error=LogError)
         if len(self.contacts) and max(self.contacts.a.max(), self.contacts.b.max()) >= b:
             raise LogError("a contact names a body that the step does not know", "use an unbroken contact log")
+
+
+EVENT_KINDS = ("quench",)
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """What changed the sound between two physics steps without being a contact.
+
+    kind: "quench", all that rings stops. step: the number of the step before which it happened; it acts at that step's first sample,
+    whatever the rate. body: index into the log's `bodies` of the one it concerns, None: all of them (a quench is of all).
+    Raises LogError for a kind that this version does not know: passed over, it would make another sound of the log.
+    """
+
+    kind: str
+    step: int
+    body: int | None = None
+
+    def __post_init__(self) -> None:
+        if self.kind not in EVENT_KINDS:
+            raise LogError(f"an event of the unknown kind '{self.kind[:40]}'", "use the version that wrote the log")
+        if self.step < 0:
+            raise LogError(f"an event before step {self.step}", "use an unbroken contact log")
+        if self.body is not None:
+            raise LogError(f"a {self.kind} of body {self.body} alone", "use the version that wrote the log")

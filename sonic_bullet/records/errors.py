@@ -9,17 +9,38 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+TEXT_BYTES = 990  # of a whole message: names and files may hold megabytes, a terminal does not
+REMEDY_BYTES = 350  # of those, where both parts are long
+
 
 class SonicBulletError(Exception):
     """Base of all errors raised on purpose: ``what`` is wrong, and the ``remedy``.
 
-    Both are single lines; ``str(error)`` is ``"what; remedy"``.
+    Both are single lines; ``str(error)`` is ``"what; remedy"``, at most `TEXT_BYTES` in UTF-8: what is longer loses its middle.
     """
 
     def __init__(self, what: str, remedy: str = "") -> None:
-        self.what = " ".join(what.split())
-        self.remedy = " ".join(remedy.split())
+        what, remedy = " ".join(what.split()), " ".join(remedy.split())
+        spare = TEXT_BYTES - 2 - len(_encoded(what))
+        self.remedy = _within(remedy, max(spare, REMEDY_BYTES))
+        self.what = _within(what, TEXT_BYTES - 2 - len(_encoded(self.remedy)))
         super().__init__(f"{self.what}; {self.remedy}" if self.remedy else self.what)
+
+
+def excerpt(text: str, most: int) -> str:
+    """``text``, or its start and end where it has more than ``most`` characters."""
+    return text if len(text) <= most else f"{text[: 2 * most // 3]} … {text[len(text) - (most // 3 - 3) :]}"
+
+
+def _within(text: str, most_bytes: int) -> str:
+    most = len(text)
+    while len(_encoded(short := excerpt(text, most))) > most_bytes:
+        most = min(most, most_bytes) * 3 // 4 if most <= most_bytes else most_bytes
+    return short
+
+
+def _encoded(text: str) -> bytes:
+    return text.encode("utf-8", "replace")
 
 
 class RecordError(SonicBulletError):
@@ -42,12 +63,20 @@ class SceneError(SonicBulletError):
     """The PyBullet world or the scene script is not usable (NaN mass, removed body, lost connection)."""
 
 
+class SceneWarning(UserWarning):
+    """Part of a world is left out of its sound, and the rest goes on; said once for each thing left out."""
+
+
 class LogError(SonicBulletError):
     """A contact log is cut, foreign or inconsistent."""
 
 
 class AudioError(SonicBulletError):
     """Sample rate, samples or level that cannot be written or synthesised."""
+
+
+class SizeWarning(UserWarning):
+    """A body is larger than anything that is struck to sound: a mesh in millimetres, most likely."""
 
 
 class FileError(SonicBulletError):

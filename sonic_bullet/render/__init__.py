@@ -32,6 +32,8 @@ def render_log(
 ) -> Array:
     """The sound of a contact log, (channels, floor(sr·time)) in pascals; with the log's own rate the same bits as live.
 
+    Its events act where they did: at the first sample of the same step, at any rate.
+
     residual False: without what materials sound beside their modes. progress is told the share done, say
     what is being computed before the first step. Raises AudioError for a rate that cannot be, LogError for what is no log.
     """
@@ -47,7 +49,10 @@ def render_log(
                 say(f"how {body.model.mode_count} modes of {body.name} radiate")
             radiation_of(body.model, log.air)
     synth = Synthesizer(sr=log.sr, sensors=log.sensors, seed=log.seed, air=log.air, residual=residual)
+    quenches = {event.step for event in log.events if event.kind == "quench"}
     for number, step in enumerate(log.steps):
+        if number in quenches:
+            synth.quench()
         synth.feed(step, log.bodies[: len(step.position_m)])
         if progress is not None and number % 16 == 0:
             progress(number / len(log.steps))

@@ -12,11 +12,14 @@ import numpy as np
 
 from sonic_bullet.modal import cache as store
 from sonic_bullet.records import Air, Array, ModalModel
+from sonic_bullet.records.errors import ModalError
 from sonic_bullet.synth import entrained_mass as added_mass
 from sonic_bullet.synth import far_field as radiation
 
 SOURCES = tuple(Path(str(room.__file__)).resolve() for room in (radiation, added_mass))
 PACKAGES = ("numpy", "scipy", "numba")
+NO_SURFACE = ("a body's surface crosses itself or has no extent: how it radiates cannot be said", "build the model anew from a closed mesh")
+LAYOUT = {name: store.Kept("f8", ("m",)) for name in ("real", "imag", "damping")}
 
 
 @lru_cache(maxsize=64)
@@ -30,20 +33,29 @@ def radiation_of(model: ModalModel, air: Air, cache: store.Place = "default") ->
         return radiation.radiation(model, air)
     code = store.code_digest(SOURCES, PACKAGES)
     name = store.key("radiation", model.freq_hz, model.shape, model.vertex_m, model.face, air.density_kg_m3, air.sound_speed_m_s, code=code)
-    known = _recall(store.load(cache, name), m)
+    known = _recall(store.load(cache, name, LAYOUT), m)
     if known is None:
-        known = radiation.radiation(model, air)
+        known = _solved(model, air)
         store.save(cache, name, {"real": known[0].real, "imag": known[0].imag, "damping": known[1]}, "")
     return known
 
 
+def _solved(model: ModalModel, air: Air) -> tuple[Array, Array]:
+    """`radiation` of a surface that has one. Raises ModalError where it has not: triangles that cross or meet themselves, or lie in one point."""
+    try:
+        weight, damping = radiation.radiation(model, air)
+    except (ZeroDivisionError, np.linalg.LinAlgError) as error:
+        raise ModalError(*NO_SURFACE) from error
+    if not (np.isfinite(weight).all() and np.isfinite(damping).all()):
+        raise ModalError(*NO_SURFACE)
+    return weight, damping
+
+
 def _recall(found: tuple[dict[str, Array], str] | None, m: int) -> tuple[Array, Array] | None:
-    """What was kept, where it is what could have been kept."""
-    if found is None:
+    """What was kept, where it is of as many modes."""
+    if found is None or len(found[0]["real"]) != m:
         return None
     a = found[0]
-    if set(a) != {"real", "imag", "damping"} or any(x.shape != (m,) or x.dtype != np.float64 or not np.isfinite(x).all() for x in a.values()):
-        return None
     weight = np.empty(m, complex)
     weight.real, weight.imag = a["real"], a["imag"]
     return weight, np.array(a["damping"])

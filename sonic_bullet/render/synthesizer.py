@@ -56,7 +56,7 @@ class Setup:
 @dataclass(frozen=True, slots=True, eq=False)
 class State:
     """All that the next frame hangs on. number: of the step to be rendered next; window: that step and those known after it, rows: their contacts.
-    placed (b,): step in which each body began or was last moved by hand. voices (b): their residuals; grains, rubs: what of those is under way.
+    placed (b,): step in which each body began or was last moved by hand. quenches: steps before which all is to stop ringing. voices (b): their residuals; grains, rubs: what of those is under way.
     """
 
     number: int
@@ -74,6 +74,7 @@ class State:
     voices: tuple[ResidualVoice | None, ...] = ()
     grains: tuple[Grain, ...] = ()
     rubs: Rubs = field(default_factory=dict)
+    quenches: frozenset[int] = frozenset()
 
 
 def start(setup: Setup) -> State:
@@ -146,14 +147,20 @@ def drained(setup: Setup, state: State) -> Array:
 
 
 def quenched(state: State) -> State:
-    """Nothing rings; the sound still travelling to the microphones is gone too."""
+    """Nothing rings from the next sample on; strikes under way and the sound still travelling to the microphones are gone too.
+
+    Loads, and what rubs, stay: a ball that rolls rolls on.
+    """
     air, travelling = path.empty_path(state.path.sr, state.path.air, state.path.microphone_m, state.travelling.at)
     air, travelling = path.append_bodies(air, travelling, *_places(state.resonators))
-    return replace(state, ringing=bank.silence(state.ringing), path=air, travelling=travelling, grains=(), rubs={})
+    still_to_come = frozenset(number for number in state.quenches if number > state.number)
+    return replace(state, ringing=bank.silence(state.ringing), path=air, travelling=travelling, grains=(), rubs={}, quenches=still_to_come)
 
 
 def _render(setup: Setup, state: State) -> tuple[Array, State]:
     """The frame of window[0]."""
+    if state.number in state.quenches:
+        state = quenched(state)
     window, rows, resonators, clock, sr = state.window, state.rows, state.resonators, state.clock, setup.sr
     step = window[0]
     after = clock.after(step.dt_s)
@@ -164,8 +171,10 @@ def _render(setup: Setup, state: State) -> tuple[Array, State]:
     placed[moved] = state.number + 1
     parts, loads = split(state.loads, ahead=0)  # of the first step, and what was not sure a step ago
     pulses = [(float(clock.time_s), pulse) for pulse in find_pulses(parts, rows, step, resonators, state.number - placed < SPAN, 0.0)]
-    parts, loads = split(loads)
-    pulses += [(float(after.time_s), pulse) for pulse in find_pulses(parts, rows[1:], window[1], resonators, state.number + 1 - placed < SPAN, -step.dt_s)]
+    parts, marked = split(loads)
+    if state.number + 1 not in state.quenches:  # else what strikes after the quench would be dated back before it, and be lost: it waits for its own step
+        loads = marked
+        pulses += [(float(after.time_s), pulse) for pulse in find_pulses(parts, rows[1:], window[1], resonators, state.number + 1 - placed < SPAN, -step.dt_s)]
     drives, friction = advance_friction(state.friction, parts, step, window[1], rows[1], resonators, x, sr, setup.seed)
     first, voices = clock.sample(sr), state.voices
     strikes = [strike for begin_s, pulse in pulses for strike in _strikes(pulse, begin_s, resonators, voices, sr, first)]
@@ -299,5 +308,6 @@ class Synthesizer:
         return np.concatenate([np.zeros((len(self._setup.sensors), 0)), *self._frames, drained(self._setup, self._state)], axis=1)
 
     def quench(self) -> None:
-        """Stop all that rings."""
-        self._state = quenched(self._state)
+        """Stop all that rings where the steps taken in so far end, exactly there at any rate: in frames that is LATENCY_STEPS later."""
+        if self._setup.sensors:
+            self._state = replace(self._state, quenches=self._state.quenches | {self._steps})

@@ -166,7 +166,7 @@ def scale(pairs: ModePairs, source_power: Array, target_power: Array, freq_hz: A
     edge = np.concatenate([[0.0], (pairs.source_hz[1:] + pairs.source_hz[:-1]) / 2])
     width = np.append(np.diff(edge), 2 * max(float(pairs.source_hz[-1] - edge[-1]), 1.0))
     out = np.empty(len(freq_hz))
-    _scale(np.asarray(freq_hz, float), pairs.source_hz, SKIRT * width, source_power + FAINT * float(source_power.max()), target_power, out)
+    _scale(np.asarray(freq_hz, float), pairs.source_hz, SKIRT * width, source_power + FAINT * float(source_power.max()) + TINY, target_power, out)
     return out
 
 

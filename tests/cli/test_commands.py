@@ -250,6 +250,19 @@ def test_what_was_rendered_before_an_error_is_a_valid_named_file(
     assert not Path("a.npz").exists()
 
 
+def test_an_error_is_said_where_what_was_rendered_before_it_cannot_be_kept_either(
+    scene: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    def render_scene(path: object, **options: Any) -> RenderResult:
+        error = SceneError("body 3 has mass nan", "mend it")
+        error.partial = RenderResult(sound(0.25), log(), SR)  # type: ignore[attr-defined]
+        raise error
+
+    monkeypatch.setattr(sonic_bullet.scene, "render_scene", render_scene)
+    Path("a.partial.wav").mkdir()
+    assert error_of(capfd, "render", "scene.py", "-o", "a.wav").startswith("sonic-bullet: body 3 has mass nan; mend it; cannot write")
+
+
 @pytest.mark.parametrize("partial", [None, RenderResult(np.zeros((1, 0)), log(), SR)])
 def test_an_error_before_any_sound_leaves_nothing(
     scene: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], partial: RenderResult | None

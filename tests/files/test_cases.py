@@ -82,6 +82,20 @@ def test_paths_stay_inside(tmp_path: Path, name: str, field: str) -> None:
         ({"objects": {"bar": {"elastic_guess": {"poisson_ratio": 0.7}}}}, "poisson"),
         ({"band_hz": [500, 20]}, "band_hz"),
         ({"recordings": "none"}, "Expected"),
+        ({"recordings": [{"file": "a.wav", "strike": {"impulse": 1e308}}]}, "impulse"),
+        ({"recordings": [{"file": "a.wav", "strike": {"impulse": 1e-320}}]}, "impulse"),
+        ({"recordings": [{"file": "a.wav", "strike": {"position": [0, 1e308, 0]}}]}, "position"),
+        ({"recordings": [{"file": "a.wav", "strike": {"direction": [1e200, 0, 0]}}]}, "direction"),
+        ({"recordings": [{"file": "a.wav", "channel": -1}]}, "channel"),
+        ({"recordings": [{"file": "a.wav", "channel": 10**30}]}, "channel"),
+        ({"recordings": [{"features": [{"freq_hz": 1e308}]}]}, "freq_hz"),
+        ({"recordings": [{"file": "x" * 5000}]}, "of 5000 characters"),
+        ({"recordings": [{"file": "x" * 250 + "é" * 3}]}, "of 253 characters"),
+        ({"recordings": [{"file": "a/" * 2500 + "a.wav"}]}, "of 5005 characters"),
+        ({"objects": {"bar": {"mesh": "x" * 5000}}}, "of 5000 characters"),
+        ({"objects": {"bar": {"elastic_guess": {"density": 1e308}}}}, "density"),
+        ({"onset": 1e308}, "onset"),
+        ({"band_hz": [20, 1e308]}, "band_hz"),
         ({"support": {"fixed": [{"position": [0, 0, 0], "radius": -1}]}}, "radius"),
     ],
 )
@@ -145,3 +159,18 @@ def test_no_practice_case_warns(shared_path: Path) -> None:
 def test_a_channel_below_zero_is_refused(tmp_path: Path) -> None:
     with pytest.raises(FileError, match="channel -1"):
         read_case(written(tmp_path, recordings=[{"file": "a.wav", "channel": -1}]))
+
+
+def test_an_impulse_beyond_physics_is_one_line_of_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
+    import sys
+
+    from sonic_bullet.cli import main
+
+    (tmp_path / "a.wav").write_bytes(b"RIFF")
+    for words in (["a.wav", "--mesh", "a.wav", "--strike", "0,0,0", "--material", "steel", "--impulse", "1e308"], [str(written(tmp_path, onset=1e308))]):
+        monkeypatch.chdir(tmp_path)
+        monkeypatch.setattr(sys, "argv", ["sonic-bullet", "fit", *words, "-o", "p.json"])
+        with pytest.raises(SystemExit, match="2"):
+            main()
+        said = capfd.readouterr().err
+        assert said.count("\n") == 1 and ("impulse" in said or "onset" in said)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import io
+import os
 import struct
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +15,8 @@ import pytest
 from sonic_bullet import files
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.records import Air, Body, Material, Microphone, ModalModel, ModalSum, Vibrometer
-from sonic_bullet.records.contacts import ROW_FIELDS, Contacts, Step
-from sonic_bullet.records.errors import FileError, LogError, SonicBulletError
+from sonic_bullet.records.contacts import ROW_FIELDS, Contacts, Event, Step
+from sonic_bullet.records.errors import FileError, LogError, ModalError, SonicBulletError
 
 
 def model(seed: int = 0, modes: int = 3) -> ModalModel:
@@ -53,7 +55,8 @@ def log(seed: int = 0, steps: int = 5) -> ContactLog:
         return Step(1 / (240 + i), rng.normal(size=(b, 3)) / 3, rng.normal(size=(b, 4)) / 7, rng.random(b) < 0.3, Contacts(**rows))
 
     sensors = (Microphone([0.1, -1 / 3, 1e-300]), Vibrometer(1, [1 / 3, 2 / 3, 0], [1, 2, 3 / 7], 0), ModalSum(1 / 7))
-    return ContactLog(bodies, tuple(step(i) for i in range(steps)), sensors, 44_100, 2**40 + 1, Air(1.19, 340.1 / 3))
+    events = (Event("quench", 0), Event("quench", 3), Event("quench", 3))
+    return ContactLog(bodies, tuple(step(i) for i in range(steps)), sensors, 44_100, 2**40 + 1, Air(1.19, 340.1 / 3), events=events)
 
 
 def same(x: object, y: object) -> bool:
@@ -100,7 +103,7 @@ def test_equal_models_and_materials_are_stored_once(tmp_path: Path) -> None:
 def test_a_model_comes_back_bit_for_bit(tmp_path: Path) -> None:
     files.write_model(tmp_path / "m.npz", model())
     assert same(model(), files.read_model(tmp_path / "m.npz"))
-    with pytest.raises(LogError, match="sonic-bullet-contacts/1"):
+    with pytest.raises(LogError, match="sonic-bullet-contacts/2"):
         files.read_log(tmp_path / "m.npz")
 
 
@@ -200,11 +203,152 @@ def test_forged_logs_are_refused_by_name(tmp_path: Path, entry: str, value: byte
         (b'"sr":44100', b'"sr":"x"', "sr"),
         (b'"sr":44100', b'"sr":0', "sample rate"),
         (b'"microphone"', b'"ear"', "ear"),
+        (b'"kind":"quench","step":0', b'"kind":"gong","step":0', "unknown kind 'gong'"),
+        (b'"kind":"quench","step":0', b'"kind":"quench","step":4', "order"),
+        (b'"kind":"quench","step":0', b'"kind":"quench","step":-1', "before step -1"),
+        (b'"kind":"quench","step":0', b'"kind":"quench","step":0,"body":2', "body 2 alone"),
+        (b'"kind":"quench","step":0', b'"kind":"quench","step":0.5', "step"),
     ],
 )
 def test_forged_headers_are_refused_by_name(tmp_path: Path, old: bytes, new: bytes, words: str) -> None:
     with pytest.raises(LogError, match=words):
         files.read_log(forged(tmp_path, header=header_with(tmp_path, old, new)))
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        b"{'descr': '<f8', 'fortran_order': False, 'shape': (5,",
+        b"{'descr': '<f8', 'fortran_order': False, 'shape': (((((5,), }",
+        b"{" * 900,
+        b"'''",
+        b"{'descr': '<f8', 'fortran_order': False, 'shape': (99999999999999999999999999, 0), }",
+        b"{'descr': '<f8', 'fortran_order': False, 'shape': (0, 9223372036854775807), }",
+        b"{'descr': '<f99', 'fortran_order': False, 'shape': (5,), }",
+    ],
+)
+def test_an_npy_header_that_is_none_is_one_line_for_logs_and_models_and_a_miss_for_caches(tmp_path: Path, text: bytes) -> None:
+    from sonic_bullet.modal import cache
+
+    raw = b"\x93NUMPY\x01\x00" + struct.pack("<H", len(text) + 1) + text + b"\n" + bytes(40)
+    files.write_model(tmp_path / "m.npz", model())
+    cache.save(tmp_path, "c", {"x": np.zeros(5)}, "")
+    for name in ("m", "c"):
+        with zipfile.ZipFile(tmp_path / f"{name}.npz") as archive:
+            parts = {n: archive.read(n) for n in archive.namelist()}
+        with zipfile.ZipFile(tmp_path / f"{name}.npz", "w") as archive:
+            for n, content in parts.items():
+                archive.writestr(n, content if n == "header.npy" else raw)
+    assert cache.load(tmp_path, "c", {"x": cache.Kept("f8", (5,))}) is None
+    for path, read in ((forged(tmp_path, step_dt_s=raw), files.read_log), (tmp_path / "m.npz", files.read_model)):
+        with pytest.raises(LogError, match=path.name) as caught:
+            read(path)
+        assert "\n" not in str(caught.value)
+
+
+def without_one(whole: bytes, lost: str) -> bytes:
+    """The same file, its directory silent about one entry and consistent in itself."""
+    end = whole.rindex(b"PK\x05\x06")
+    count, size, start = struct.unpack("<HII", whole[end + 10 : end + 20])
+    at = start
+    while True:
+        name, extra, note = struct.unpack("<HHH", whole[at + 28 : at + 34])
+        stop = at + 46 + name + extra + note
+        if whole[at + 46 : at + 46 + name] == lost.encode():
+            break
+        at = stop
+    tail = whole[end : end + 8] + struct.pack("<HHII", count - 1, count - 1, size - (stop - at), start) + whole[end + 20 :]
+    return whole[:at] + whole[stop:end] + tail
+
+
+def test_an_entry_that_the_directory_hides_is_refused(tmp_path: Path) -> None:
+    """Arrays that only some models have (bend, choke) could vanish without a word."""
+    bent = replace(model(), bend_s2_m2=np.ones(3), damping_growth_s_m=np.ones(3))
+    files.write_model(tmp_path / "m.npz", bent)
+    whole = (tmp_path / "m.npz").read_bytes()
+    for name in ("model0_bend_s2_m2.npy", "model0_choke_s_m.npy", "model0_freq_hz.npy", "header.npy"):
+        (tmp_path / "m.npz").write_bytes(without_one(whole, name))
+        assert name not in zipfile.ZipFile(tmp_path / "m.npz").namelist()
+        with pytest.raises(LogError, match="directory"):
+            files.read_model(tmp_path / "m.npz")
+
+
+@pytest.mark.parametrize(("before", "after"), [(b"x", b""), (b"", b"x"), (bytes(22), b""), (b"", bytes(22)), (b"", b"PK\x05\x06")])
+def test_bytes_around_a_log_are_refused(tmp_path: Path, before: bytes, after: bytes) -> None:
+    files.write_log(tmp_path / "a.npz", log())
+    (tmp_path / "a.npz").write_bytes(before + (tmp_path / "a.npz").read_bytes() + after)
+    with pytest.raises(LogError, match=r"a\.npz"):
+        files.read_log(tmp_path / "a.npz")
+
+
+def test_a_name_twice_and_a_header_that_contradicts_the_directory_are_refused(tmp_path: Path) -> None:
+    files.write_model(tmp_path / "m.npz", model())
+    whole = (tmp_path / "m.npz").read_bytes()
+    with zipfile.ZipFile(tmp_path / "m.npz", "a") as archive, pytest.warns(UserWarning, match="Duplicate"):
+        archive.writestr("model0_freq_hz.npy", npy_claiming((2,)))
+    with pytest.raises(LogError, match="twice"):
+        files.read_model(tmp_path / "m.npz")
+    at = whole.index(b"PK\x03\x04", 1)
+    for offset in (6, 14, 18, 22):  # flags, CRC, packed size, size
+        (tmp_path / "m.npz").write_bytes(whole[: at + offset] + bytes([whole[at + offset] ^ 1]) + whole[at + offset + 1 :])
+        with pytest.raises(LogError, match=r"m\.npz"):
+            files.read_model(tmp_path / "m.npz")
+
+
+def test_what_numpy_saves_is_read_too(tmp_path: Path) -> None:
+    files.write_model(tmp_path / "m.npz", model())
+    with np.load(tmp_path / "m.npz") as plain:
+        np.savez(tmp_path / "n.npz", **{name: plain[name] for name in plain.files})
+    assert same(model(), files.read_model(tmp_path / "n.npz"))
+
+
+@pytest.mark.parametrize(
+    ("scale", "roll", "refused"), [((1, 1, 1), 0, False), ((1, 1, 1), -1, True), ((0, 0, 0), 0, False), ((1, 0, 0), 0, False), ((1e-200,) * 3, 0, False)]
+)
+def test_degenerate_vertices_of_a_model_end_in_sound_or_in_our_own_error(tmp_path: Path, scale: tuple[float, float, float], roll: int, refused: bool) -> None:
+    """Triangles that meet themselves have no near field; a surface without area radiates nothing. Once, the first ended in ZeroDivisionError."""
+    from sonic_bullet.render import render_log
+
+    corner = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * 0.05
+    quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    face = np.array([t for q in quads for t in ((q[0], q[1], q[2]), (q[0], q[2], q[3]))])
+    shape = np.random.default_rng(0).normal(size=(8, 3, 1))
+    made = ModalModel(np.array([900.0]), np.array([5.0]), shape, np.roll(corner * scale, roll, axis=0), face, np.zeros(12), 1e-3, 1.0)
+    wood = Material.isotropic("wood", youngs_pa=1e9, poisson=0.3, density_kg_m3=1e3, alpha_per_s=1.0, beta_s=1e-7)
+    body = Body(0, -1, 0, "box", 1.0, np.eye(3), 1e-3, material=wood, model=made)
+    step = Step(1 / 240, np.zeros((1, 3)), np.array([[0, 0, 0, 1.0]]), np.zeros(1, bool), Contacts.none())
+    files.write_log(tmp_path / "a.npz", ContactLog((body,), (step,), (Microphone(np.array([0.0, -1, 0.5])),), 8000, 0))
+    read = files.read_log(tmp_path / "a.npz")
+    if refused:
+        with pytest.raises(ModalError, match="surface crosses itself"):
+            render_log(read)
+    else:
+        assert np.isfinite(render_log(read)).all()
+
+
+@pytest.mark.parametrize("value", [1e150, 1e308, np.inf, np.nan])
+def test_numbers_beyond_physics_are_refused_where_they_are_read(tmp_path: Path, value: float) -> None:
+    with pytest.raises(LogError, match=r"contact point_a_m holds (a number of|NaN or infinite)"):
+        files.read_log(forged(tmp_path, contact_point_a_m=np.full((len(log().rows), 3), value)))
+
+
+def test_a_log_of_the_first_format_reads_as_one_without_events(tmp_path: Path) -> None:
+    """The header names format 1 and has no events."""
+    written = replace(log(), events=())
+    files.write_log(tmp_path / "new.npz", written)
+    with zipfile.ZipFile(tmp_path / "new.npz") as source, zipfile.ZipFile(tmp_path / "old.npz", "w") as target:
+        for name in source.namelist():
+            content = source.read(name)
+            if name == "header.npy":
+                with np.load(tmp_path / "new.npz") as entries:
+                    text = entries["header"].tobytes()
+                old = text.replace(b"sonic-bullet-contacts/2", b"sonic-bullet-contacts/1").replace(b',"events":[]', b"")
+                assert old != text and b"events" not in old
+                stream = io.BytesIO()
+                np.save(stream, np.frombuffer(old, np.uint8))
+                content = stream.getvalue()
+            target.writestr(name, content)
+    assert same(files.read_log(tmp_path / "old.npz"), written)
 
 
 def test_a_pickle_is_never_opened(tmp_path: Path) -> None:
@@ -233,8 +377,9 @@ def test_foreign_files_are_no_logs(tmp_path: Path, content: bytes) -> None:
         files.read_log(tmp_path / "a.npz")
 
 
-def test_missing_files_and_folders(tmp_path: Path) -> None:
-    for path in (tmp_path, tmp_path / "none.npz"):
+def test_missing_files_folders_and_pipes(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.npz")
+    for path in (tmp_path, tmp_path / "none.npz", tmp_path / "pipe.npz"):
         with pytest.raises(FileError, match="cannot read"):
             files.read_log(path)
     with pytest.raises(FileError, match="mkdir -p"):

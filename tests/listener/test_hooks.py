@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gc
+import itertools
 from typing import Any
 
 import pybullet as p
@@ -84,9 +86,9 @@ def test_unmodified_gym_environments_are_heard_to_the_last_step() -> None:
     env.close()
 
 
-@pytest.mark.parametrize("order", [(0, 1), (1, 0)])
-def test_two_hooks_on_one_client_leave_in_any_order(client: Any, order: tuple[int, int]) -> None:
-    observed = [0, 0]
+@pytest.mark.parametrize("order", list(itertools.permutations(range(3))))
+def test_hooks_of_one_client_leave_in_any_order_without_a_trace(client: Any, order: tuple[int, ...]) -> None:
+    observed = [0, 0, 0]
     before = dict(vars(client))
 
     def hear(which: int) -> None:
@@ -95,12 +97,106 @@ def test_two_hooks_on_one_client_leave_in_any_order(client: Any, order: tuple[in
     worlds = [open_world(client) for _ in observed]
     for which, world in enumerate(worlds):
         world.hook(world.before_step, lambda which=which: hear(which))
+    for which in order:
+        client.stepSimulation()
+        worlds[which].unhook()
     client.stepSimulation()
-    worlds[order[0]].unhook()
+    assert [observed[which] for which in order] == [1, 2, 3]
+    assert dict(vars(client)) == before
+
+
+def test_one_that_leaves_and_comes_again_is_told_once(client: Any) -> None:
+    first, told = listen(client)
+    second, _ = listen(client)
+    first.unhook()
+    first.hook(first.before_step, lambda: told.append(first.after_step()))
     client.stepSimulation()
-    worlds[order[1]].unhook()
+    assert len(told) == 1
+    second.unhook()
+    first.unhook()
+    assert "stepSimulation" not in vars(client)
+
+
+def test_both_are_told_of_removals_and_moves(client: Any) -> None:
+    floor(client)
+    body = thing(client, "box", [0, 0, 0.03])
+    worlds = [listen(client) for _ in range(2)]
     client.stepSimulation()
-    assert observed[order[0]] == 1
-    assert observed[order[1]] == 2
-    if order == (1, 0):
-        assert dict(vars(client)) == before
+    client.resetBasePositionAndOrientation(body, [0, 0, 0.031], [0, 0, 0, 1])
+    client.stepSimulation()
+    for world, steps in worlds:
+        assert steps[-1].teleported[world.index_of(body)]
+    client.removeBody(body)
+    assert [world.index_of(body) for world, _ in worlds] == [-1, -1]
+
+
+def test_a_hook_of_someone_else_over_ours_keeps_working_when_all_have_left(client: Any) -> None:
+    world, steps = listen(client)
+    ours, called = client.stepSimulation, []
+
+    def theirs() -> None:
+        called.append(1)
+        ours()
+
+    client.stepSimulation = theirs
+    later, more = listen(client)
+    client.stepSimulation()
+    world.unhook()
+    client.stepSimulation()
+    later.unhook()
+    client.stepSimulation()
+    assert client.stepSimulation is theirs
+    assert (len(steps), len(more), len(called)) == (1, 2, 3)
+
+
+@pytest.mark.parametrize("listeners", [1, 2])
+def test_a_client_dropped_without_detach_disconnects_at_once(listeners: int) -> None:
+    """Without the garbage collector: nothing of ours holds it, though the listener lives on with what it heard."""
+    import sonic_bullet as sb
+    from sonic_bullet.listener import direct_client
+
+    gc.collect()
+    gc.disable()
+    try:
+        client = direct_client()
+        client.setGravity(0, 0, -9.81)
+        floor(client)
+        thing(client, "box", [0, 0, 0.03])
+        kept = [sb.attach(client) for _ in range(listeners)]
+        for _ in range(10):
+            client.stepSimulation()
+        client_id = client._client
+        del client
+        assert not p.isConnected(client_id)
+        assert kept[0].sound().shape == (1, 2000)
+        with pytest.raises(SceneError, match=r"does not answer|not connected"):
+            kept[0].step()
+        kept[0].detach()
+        kept[-1].detach()
+    finally:
+        gc.enable()
+
+
+def test_a_listener_of_a_dropped_client_leaves_the_next_one_of_that_id_alone(client: Any) -> None:
+    from sonic_bullet.listener import direct_client, disconnect
+
+    old = direct_client()
+    old.setPhysicsEngineParameter(numSubSteps=4)
+    world, _ = listen(old)
+    old.stepSimulation()
+    client_id = old._client
+    del old
+    new = direct_client()
+    assert new._client == client_id, "the id is given anew: the test tests something"
+    new.setPhysicsEngineParameter(numSubSteps=4)
+    new.setGravity(0, 0, -9.81)
+    other, steps = listen(new)
+    floor(new)
+    thing(new, "box", [0, 0, 0.03])
+    world.unhook()
+    for _ in range(5):
+        new.stepSimulation()
+    assert len(steps) == 5
+    assert len(steps[-1].contacts) > 0
+    other.unhook()
+    disconnect(new)

@@ -10,7 +10,7 @@ import pybullet as p
 import pytest
 
 from sonic_bullet.listener import open_world
-from sonic_bullet.records.errors import SceneError
+from sonic_bullet.records.errors import SceneError, SceneWarning
 from tests.made.scenes import MASS_KG, floor, impulse_on, listen, thing
 
 
@@ -213,7 +213,7 @@ def test_a_pose_that_is_no_number_is_named(client: Any) -> None:
     listen(client)
     client.stepSimulation()
     client.resetBaseVelocity(bad, [math.nan, 0, 0])
-    with pytest.raises(SceneError, match=f"body {bad} has a pose or speed that is not a number"):
+    with pytest.warns(SceneWarning, match=rf"body {bad} \(.*\) has a pose or speed that is not a number"):  # the others go on: test_left_out
         for _ in range(3):
             client.stepSimulation()
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import numba.core.caching
 import pytest
 
-from sonic_bullet.machine import compiled
+from sonic_bullet.machine import compiled, user_folder
 from sonic_bullet.machine.user_folder import private_folder
 
 PACKAGE = Path(__file__).resolve().parents[2] / "sonic_bullet"
@@ -31,6 +31,12 @@ assert twice(21.0) == 42.0
 print(sum(twice.stats.cache_hits.values()))
 """
 FORGED = b"cos\nsystem\n(S'touch forged'\ntR."  # a pickle that runs a command
+
+
+@pytest.fixture(autouse=True)
+def unsaid(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is noted here about folders is not for the commands that later tests run in this process."""
+    monkeypatch.setattr(user_folder, "NOTES", [])
 
 
 @pytest.fixture
@@ -127,6 +133,7 @@ def test_a_folder_that_is_another_users_or_behind_anothers_link_is_not_used(tmp_
     (tmp_path / "file").touch()
     (tmp_path / "link").symlink_to(tmp_path / "folder")
     assert private_folder(tmp_path / "file") is None
+    assert len(user_folder.NOTES) == 1
     assert private_folder(tmp_path / "link") == tmp_path / "link"  # one's own, to another disk say
     if os.geteuid() == 0:
         os.chown(tmp_path / "link", 54321, 54321, follow_symlinks=False)

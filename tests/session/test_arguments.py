@@ -78,7 +78,7 @@ MODEL = dict(
     damping_growth_power=1,
     includes_radiation=False,
 )
-LOG = {"bodies": (), "steps": (), "sensors": (), "sr": 48_000, "seed": 0, "air": sb.Air(), "untouched": frozenset()}
+LOG = {"bodies": (), "steps": (), "sensors": (), "sr": 48_000, "seed": 0, "air": sb.Air(), "untouched": frozenset(), "events": ()}
 BUILT = "import pybullet as p\nSECONDS = 0.01\n\ndef build(client):\n    client.createMultiBody(0, client.createCollisionShape(p.GEOM_PLANE))\n    return {}\n"
 
 
@@ -178,6 +178,7 @@ BAD: dict[str, dict[str, list[Any]]] = {
         "seed": [*NUMBER, -1],
         "air": [*RECORD, None],
         "untouched": ["x", 5, None],
+        "events": ["x", 5, None, object(), [3]],
     },
     "ContactLog.impulse_on": {"body": WHOLE, "link": [*OPTIONAL, 1.5]},
     "ContactLog.rows_on": {"body": WHOLE, "link": [*OPTIONAL, 1.5]},

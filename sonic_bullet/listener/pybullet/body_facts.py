@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pybullet
 
-from sonic_bullet.listener.frames import body_ids, link_words
+from sonic_bullet.listener.frames import NO_NUMBER, body_ids, is_soft, link_words, read_motion, read_roster
 from sonic_bullet.listener.pybullet.pieces import collision_pieces
 from sonic_bullet.records import Body
 from sonic_bullet.records.coerce import LISTED, shown
@@ -26,6 +26,16 @@ def check_exists(client_id: int, body: int, link: int) -> None:
     joints = pybullet.getNumJoints(body, physicsClientId=client_id)
     if not -1 <= link < joints:
         raise SceneError(f"body {body} has no link {shown(link)}", "use -1, the base, its only link" if joints == 0 else f"use -1 (base) … {joints - 1}")
+
+
+def check_usable(client_id: int, body: int) -> None:
+    """Raise SceneError where an existing body is soft, or its pose or speed is not a number."""
+    if is_soft(client_id, body):
+        raise SceneError(
+            f"body {body} ({link_name(client_id, body, -1)}) is a soft body, which cannot sound", "load it as a rigid body with createMultiBody or loadURDF"
+        )
+    if read_motion(client_id, read_roster(client_id, [other for other in body_ids(client_id) if other != body])).broken:
+        raise SceneError(f"body {body} has {NO_NUMBER}", "check its mass, inertia and what touches it; remove it or reset the scene")
 
 
 def link_name(client_id: int, body: int, link: int) -> str:

@@ -7,7 +7,7 @@ from typing import Any
 import pybullet
 from pybullet_utils.bullet_client import BulletClient
 
-from sonic_bullet.listener.frames import check_connected
+from sonic_bullet.listener.frames import check_connected, is_soft
 from sonic_bullet.listener.pybullet import body_facts as facts
 from sonic_bullet.listener.pybullet.pieces import collision_pieces
 from sonic_bullet.listener.pybullet.world import World
@@ -33,22 +33,29 @@ def disconnect(client: BulletClient) -> None:
 
 
 def links_with_shapes(world: World, body: int | None = None) -> tuple[tuple[int, int], ...]:
-    """(body, link) of every link, or those of one body, that has a collision shape."""
+    """(body, link) of every link, or those of one body, that has a collision shape; soft bodies have none that could sound."""
     ask: Any = pybullet
     cid = world.client_id
     bodies = [ask.getBodyUniqueId(i, physicsClientId=cid) for i in range(ask.getNumBodies(physicsClientId=cid))] if body is None else [body]
-    return tuple((one, link) for one in bodies for link in range(-1, ask.getNumJoints(one, physicsClientId=cid)) if collision_pieces(cid, one, link))
+    return tuple(
+        (one, link)
+        for one in bodies
+        if not is_soft(cid, one)
+        for link in range(-1, ask.getNumJoints(one, physicsClientId=cid))
+        if collision_pieces(cid, one, link)
+    )
 
 
 def links_called(world: World, body: Any, link: Any) -> tuple[int, tuple[int, ...]]:
     """The body's id and its links of that number or name; "all": every link that has a collision shape. All have a mass and an inertia that are some.
 
-    Raises SceneError (no such body or link, an absurd mass), and MeshError where "all" are none.
+    Raises SceneError (no such body or link, a soft body, an absurd mass, a pose that is no number), and MeshError where "all" are none.
     """
     cid = world.client_id
     check_connected(cid)
     number = as_whole(body, "body", "pass the id that loading it returned", error=SceneError)
     facts.check_exists(cid, number, -1)
+    facts.check_usable(cid, number)
     if isinstance(link, str) and link == "all":
         links = tuple(one for _, one in links_with_shapes(world, number))
         if not links:

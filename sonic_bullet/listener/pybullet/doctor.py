@@ -14,7 +14,8 @@ from typing import Any, Literal
 import numpy as np
 import pybullet
 
-from sonic_bullet.listener.frames import read_motion, read_roster
+from sonic_bullet.geometry import LARGEST_M, oversize
+from sonic_bullet.listener.frames import NO_NUMBER, read_motion, read_roster
 from sonic_bullet.listener.polling import FORCE
 from sonic_bullet.listener.pybullet import collision_shapes
 from sonic_bullet.listener.pybullet.body_facts import checked_mass_kg, link_name
@@ -24,7 +25,7 @@ from sonic_bullet.listener.pybullet.world import World, client_id_of
 from sonic_bullet.records.errors import MeshError, SceneError
 
 LONGEST_STEP_S = 1 / 120
-SMALLEST_M, LARGEST_M = 1e-3, 50.0
+SMALLEST_M = 1e-3
 DENSITY_RATIO = 3.0
 LID_SHARE = 0.15
 KEPT = "sonic_bullet.contactProcessingThreshold"
@@ -68,9 +69,9 @@ def diagnose_world(world: World | Any, steps: int = 0) -> tuple[Finding, ...]:
     client_id = world.client_id if isinstance(world, World) else client_id_of(world)
     findings = [*_settings(client_id), *_empty(client_id), *_masses(client_id)]
     if not any(finding.severity == "error" for finding in findings):
-        findings += [*_restitution(client_id), *_lids(client_id), *_scale(client_id), *_ahead(client_id, steps)]
+        findings += [*_restitution(client_id), *_lids(client_id), *_scale(client_id, _sounding(world)), *_ahead(client_id, steps)]
         if isinstance(world, World):
-            findings += _densities(world)
+            findings += [*_densities(world), *_oversized(world)]
     return tuple(findings)
 
 
@@ -125,10 +126,9 @@ def _masses(client_id: int) -> list[Finding]:
             checked_mass_kg(pybullet.getDynamicsInfo(body, link, physicsClientId=client_id), body, link)
         except SceneError as error:
             found.append(Finding("mass", "error", error.what, error.remedy))
-    try:
-        read_motion(client_id, read_roster(client_id))
-    except SceneError as error:
-        found.append(Finding("nan", "error", error.what, error.remedy))
+    for body in read_motion(client_id, read_roster(client_id)).broken:
+        remedy = "check its mass, inertia and what touches it; remove it or reset the scene"
+        found.append(Finding("nan", "error", f"body {body} has {NO_NUMBER}", remedy))
     return found
 
 
@@ -195,14 +195,19 @@ def _hulled(client_id: int, body: int, link: int) -> list[MeshSurface]:
     return surfaces
 
 
-def _scale(client_id: int) -> list[Finding]:
+def _sounding(world: World | Any) -> set[tuple[int, int]]:
+    """Links that sound, whose size `_oversized` looks at."""
+    return {(body.body_id, body.link) for body in world.bodies if body.model is not None} if isinstance(world, World) else set()
+
+
+def _scale(client_id: int, sounding: set[tuple[int, int]]) -> list[Finding]:
     found = []
     for body, link in _links(client_id):
         if pybullet.getDynamicsInfo(body, link, physicsClientId=client_id)[0] == 0 or not collision_pieces(client_id, body, link):
             continue
         low, high = np.array(pybullet.getAABB(body, link, physicsClientId=client_id))
         size = float((high - low).max())
-        if size > LARGEST_M or size < SMALLEST_M:
+        if size < SMALLEST_M or (size > LARGEST_M and (body, link) not in sounding):
             found.append(
                 Finding(
                     "scale",
@@ -248,6 +253,21 @@ def _sleepers(client_id: int) -> list[Finding]:
             f"{_names(client_id, asleep)} sleeps: its contacts are frozen and make no sound until it wakes",
             "changeDynamics(activationState=pybullet.ACTIVATION_STATE_DISABLE_SLEEPING)",
         )
+    ]
+
+
+def _oversized(world: World) -> list[Finding]:
+    """Bodies that sound, and are larger than anything that is struck to: planes and terrains among them."""
+    large = [(body, oversize(body.model.vertex_m, body.model.mass_kg)) for body in world.bodies if body.model is not None and body.until_step < 0]
+    return [
+        Finding(
+            "scale",
+            "warning",
+            f"body {body.body_id} ({body.name}) {words}",
+            "load it with globalScaling=0.001, or give its mesh in metres, if its numbers are millimetres; leave it out of the sound if it is the ground",
+        )
+        for body, words in large
+        if words
     ]
 
 

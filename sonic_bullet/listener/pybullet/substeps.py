@@ -116,9 +116,6 @@ def gather_substeps(records: Array, last: list[RawContact], dt_s: float, substep
     h = dt_s / substeps
     touched = records["force"] != 0
     loaded = records[touched]
-    if not (np.isfinite(loaded["force"]).all() and np.isfinite(loaded["point_a"]).all()):
-        body = loaded["body"][~(np.isfinite(loaded["force"]) & np.isfinite(loaded["point_a"]).all(axis=1))][0]
-        raise SceneError(f"the contact of bodies {body[0]} and {body[1]} holds a force or place that is not a number", "check the masses and inertias of both")
     code_a, code_b = encode(loaded["body"][:, 0], loaded["link"][:, 0]), encode(loaded["body"][:, 1], loaded["link"][:, 1])
     normal, force = loaded["normal"].astype(float), loaded["force"].astype(float)
     impulse = h * force[:, None] * (normal + friction_ratio(code_a, code_b, last))

@@ -1,4 +1,4 @@
-"""The mesh file behind a collision shape, in its own frame and unit. OBJ is read here, the way Bullet cuts it into objects."""
+"""The mesh file behind a collision shape, in its own frame and unit, cut into objects as Bullet cuts it; hulls, and how far they close what is open."""
 
 from __future__ import annotations
 
@@ -6,55 +6,24 @@ from pathlib import Path
 
 import numpy as np
 
+from sonic_bullet.files import meshes
+from sonic_bullet.files.meshes import MeshSurface
 from sonic_bullet.geometry import closest_point, welded
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import MeshError
 
-MeshSurface = tuple[Array, Array]
+__all__ = ["MeshSurface", "hull", "joined", "lid_height_m", "read_surfaces"]
+
 LID_GRID = 5
 
 
 def read_surfaces(path: Path) -> list[MeshSurface]:
-    """Objects of a mesh file: (vertices (v, 3), faces (f, 3)) each, identical vertices made one. Raises MeshError."""
-    try:
-        surfaces = _read_obj(path) if path.suffix.lower() == ".obj" else _read_other(path)
-    except MeshError:
-        raise
-    except Exception as error:  # a parser meets anything in a foreign file, and throws anything
-        raise MeshError(f"mesh file '{path.name}' cannot be read: {type(error).__name__} {error}"[:300], "repair it, or convert it to OBJ or STL") from error
-    whole = [welded(vertex, face) for vertex, face in surfaces if len(face)]
+    """Objects of a mesh file: (vertices (v, 3), faces (f, 3)) each, identical vertices made one. Raises FileError, MeshError."""
+    whole = [welded(vertex, face) for vertex, face in meshes.read_surfaces(path) if len(face)]
     whole = [(vertex, face) for vertex, face in whole if len(face) and np.isfinite(vertex).all()]
     if not whole:
         raise MeshError(f"mesh file '{path.name}' holds no triangle", "export it again")
     return whole
-
-
-def _read_obj(path: Path) -> list[MeshSurface]:
-    """Wavefront OBJ: v, f, and o or g as the start of an object; polygons become fans, texture and normals are skipped."""
-    vertex: list[tuple[float, float, float]] = []
-    objects: list[list[tuple[int, int, int]]] = [[]]
-    with path.open(encoding="utf-8", errors="replace") as file:
-        for line in file:
-            words = line.split()
-            if not words:
-                continue
-            if words[0] == "v":
-                vertex.append((float(words[1]), float(words[2]), float(words[3])))
-            elif words[0] == "f":
-                corner = [int(word.split("/", 1)[0]) for word in words[1:]]
-                corner = [c - 1 if c > 0 else len(vertex) + c for c in corner]
-                objects[-1].extend((corner[0], corner[i], corner[i + 1]) for i in range(1, len(corner) - 1))
-            elif words[0] in ("o", "g") and objects[-1]:
-                objects.append([])
-    points = np.array(vertex, float).reshape(-1, 3)
-    return [(points[np.unique(faces)], np.searchsorted(np.unique(faces), faces)) for faces in map(np.array, objects) if len(faces)]
-
-
-def _read_other(path: Path) -> list[MeshSurface]:
-    import trimesh
-
-    scene = trimesh.load_scene(path, process=False, skip_materials=True)
-    return [(np.asarray(part.vertices, float), np.asarray(part.faces)) for part in scene.dump() if isinstance(part, trimesh.Trimesh)]
 
 
 def joined(surfaces: list[MeshSurface]) -> MeshSurface:

@@ -7,24 +7,28 @@
 Contact positions belong to the pose at the start of the step, so that is the pose all rows use. No row is made of: pairs
 without force; islands asleep (speeds exactly 0, contacts bit-identical to the step before); a second poll without a step between
 (everything bit-identical); a body moved by hand since the last step; and the first step of a body that began its life
-inside another, for then the position correction leaks into the impulse.
+inside another, for then the position correction leaks into the impulse; and whoever `left_out` names: one body whose numbers break
+takes nothing from the sound of the others.
 """
 
 from __future__ import annotations
 
 import numbers
-from collections.abc import Callable, Sequence
+import weakref
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pybullet
 
-from sonic_bullet.listener.frames import LINK_SPAN, Motion, Roster, check_connected, decode, encode, jumped, read_motion, read_roster, rows_of, same_motion
+from sonic_bullet.listener.frames import LINK_SPAN, Motion, Roster, check_connected, encode, jumped, rows_of, same_motion
 from sonic_bullet.listener.polling import Touches, gather, loaded
 from sonic_bullet.listener.pybullet import body_facts as facts
 from sonic_bullet.listener.pybullet import collision_shapes as shapes
 from sonic_bullet.listener.pybullet import hooks
+from sonic_bullet.listener.pybullet.census import Census, ask
+from sonic_bullet.listener.pybullet.left_out import LeftOut
 from sonic_bullet.listener.pybullet.substeps import SubstepLog, gather_substeps
 from sonic_bullet.listener.rows import Meetings, contact_rows, meetings
 from sonic_bullet.listener.start import Start, hooked_start, polled_start, taken
@@ -39,7 +43,7 @@ class World:
     """State of listening to one client: who lives, what was last seen, what is remembered of contacts. Made by open_world."""
 
     def __init__(self, client: Any, client_id: int) -> None:
-        self.client = client
+        self._client = weakref.ref(client) if hasattr(client, "__weakref__") else lambda: client  # a client that is dropped is to disconnect
         self.client_id = client_id
         self.epoch = 0
         self.step_count = 0
@@ -51,17 +55,27 @@ class World:
         self._quaternion_xyzw = np.zeros((0, 4))
         self._time_s = 0.0
         self._gravity_m_s2 = np.zeros(3)
-        self._roster: Roster | None = None
+        self._census = Census(client_id, self._bury, self._end)
         self._before: Motion | None = None
         self._past_touches: Touches | None = None
-        self._contact_points = self._contact_points_before = self._ask(pybullet.getContactPoints)
+        self._contact_points = self._contact_points_before = ask(self.client_id, pybullet.getContactPoints)
         self._moved: set[int] = set()
         self._traces: tuple[Trace, ...] = NO_TRACES
         self._log = SubstepLog(client_id)
         self._uninstall: Callable[[], None] | None = None
         if self._step_length()[1] > 1:
             self._log.open()
-        self._past: Motion = self._read()
+        self._past: Motion = self._census.read()
+
+    @property
+    def client(self) -> Any:
+        """What is listened to; None once it was dropped."""
+        return self._client()
+
+    @property
+    def left_out(self) -> LeftOut:
+        """Who of the world is left out, and what was said of it."""
+        return self._census.left_out
 
     @property
     def bodies(self) -> tuple[Body, ...]:
@@ -97,11 +111,16 @@ class World:
 
         A record that exists already (a silent partner, or an earlier add) ends with this step and a new one begins.
         volume_m3 None: the model's volume, or 0. shapes: its true geometry where that is not its collision shape; a lone sphere
-        tells its curvature. Raises SceneError for an unknown body or link, or a mass that is not one.
+        tells its curvature. A body that was muted is listened to again. Raises SceneError for an unknown body or link, a soft body, or
+        a mass, pose or speed that is not one.
         """
         check_connected(self.client_id)
         facts.check_exists(self.client_id, body, link)
-        self._read()
+        facts.check_usable(self.client_id, body)
+        if body in self.left_out.muted:
+            self.left_out.forget(body)
+            self._census.stale()
+        self._census.read()
         record = facts.describe(self.client_id, body, link, self.epoch)
         volume = volume_m3 if volume_m3 is not None else (model.volume_m3 if model else 0.0)
         record = replace(record, material=material, model=model, volume_m3=volume, since_step=self.step_count, name=name or record.name)
@@ -128,6 +147,7 @@ class World:
     def forget(self, body: int | None = None) -> None:
         """Say that a body was removed (None: all, by resetSimulation); its id may be given anew. With a hook, nobody need call this."""
         self.epoch += 1
+        self.left_out.forget(body)
         self._close([code for code in self._live if body is None or code // LINK_SPAN == body])
         if body is None:
             self._log.abandon()
@@ -135,10 +155,12 @@ class World:
         past = self._past.roster
         keep = np.flatnonzero(past.code // LINK_SPAN != body) if body is not None else np.zeros(0, int)
         self._past = taken(
-            self._past, Roster(tuple(entry for entry in past.bodies if entry[0] != body and body is not None), past.code[keep], past.static[keep]), keep
+            self._past,
+            replace(past, bodies=tuple(e for e in past.bodies if e[0] != body and body is not None), code=past.code[keep], static=past.static[keep]),
+            keep,
         )
         self._moved = {x for x in self._moved if body is not None and x != body}
-        self._roster = None
+        self._census.stale()
 
     def mark_moved(self, body: int | None) -> None:
         """Note that a body (None: every body) was moved by hand before the coming step."""
@@ -146,7 +168,7 @@ class World:
 
     def mark_changed(self) -> None:
         """Note that masses may have changed: who is static is read again."""
-        self._roster = None
+        self._census.stale()
 
     def hook(self, before: Callable[[], object], after: Callable[[], object]) -> None:
         """Call `before` and `after` round every stepSimulation of a BulletClient; `before` is, or calls, `before_step`.
@@ -162,20 +184,23 @@ class World:
             self._uninstall()
             self._uninstall = None
         self._before = None
-        self._log.close()
+        if self.client is None:
+            self._log.abandon()  # its id may be another's by now
+        else:
+            self._log.close()
 
     def before_step(self) -> None:
-        """Read poses and twists at the start of the step. Raises SceneError (lost connection, numbers that are none)."""
+        """Read poses and twists at the start of the step. Raises SceneError (lost connection)."""
         if self._step_length()[1] > 1 and not self._log.is_open:
             self._log.open()
-        self._before = self._read()
+        self._before = self._census.read()
 
     def after_step(self) -> Step:
         """This step's record. Call once after each stepSimulation; a second call without a step between finds no contacts.
 
         `stepped` tells whether there was a step. Without a hook, a missing one is known by a world in motion that stands where it
         stood, to the bit; where nothing moves at all, a second call passes for a step.
-        Raises SceneError: lost connection, numbers that are none, sub-steps that cannot be heard.
+        Raises SceneError: lost connection, sub-steps that cannot be heard.
         """
         dt, substeps = self._step_length()
         self.stepped = self._uninstall is None or self._before is not None
@@ -183,11 +208,11 @@ class World:
             return self._again(dt)
         touches = self._touches(dt, substeps)
         first, past_touches = self.step_count == 0, self._past_touches
+        now = self._before if self._before is not None else self._census.read()
+        touches = self._census.usable(touches)
         if self._before is not None:
-            now = self._before
             start = hooked_start(None if first else self._past, now, self._moved, dt)
         else:
-            now = self._read()
             frozen = not first and same_motion(self._past, now)
             if frozen and now.would_move(dt) and past_touches is not None and touches.equals(past_touches):
                 self.stepped = False
@@ -197,6 +222,7 @@ class World:
         self._past_touches, self._past, self._before = touches, now, None
         meeting = meetings(touches, past_touches, start, dt)
         of_row = self._of_row(now.roster, meeting)
+        meeting = meeting.kept((of_row[meeting.row_a] >= 0) & (of_row[meeting.row_b] >= 0))
         contacts, self._traces = contact_rows(meeting, of_row[meeting.row_a], of_row[meeting.row_b], start.motion, self._time_s, self._traces)
         step = self._step(dt, start, of_row, contacts)
         self._moved.clear()
@@ -218,7 +244,7 @@ class World:
         return Step(dt, self._position_m, self._quaternion_xyzw, teleported, contacts, self._gravity_m_s2)
 
     def _touches(self, dt: float, substeps: int) -> Touches:
-        last = self._ask(pybullet.getContactPoints)
+        last = ask(self.client_id, pybullet.getContactPoints)
         if substeps == 1:
             if self._log.is_open:
                 self._log.close()
@@ -233,48 +259,31 @@ class World:
         touches, self._log.count = gather_substeps(self._log.records(), last, dt, substeps, self._log.count)
         return touches
 
-    def _ask(self, question: Callable[..., Any]) -> Any:
-        try:
-            return question(physicsClientId=self.client_id)
-        except pybullet.error as error:
-            raise SceneError(f"PyBullet client {self.client_id} does not answer: {error}", "detach the listener before disconnecting") from None
-
     def _step_length(self) -> tuple[float, int]:
-        settings = self._ask(pybullet.getPhysicsEngineParameters)
+        settings = ask(self.client_id, pybullet.getPhysicsEngineParameters)
         self._gravity_m_s2 = np.array([settings[f"gravityAcceleration{axis}"] for axis in "XYZ"])
         return settings["fixedTimeStep"], max(1, settings["numSubSteps"])
 
-    def _known_roster(self) -> Roster:
-        if self._roster is None or len(self._roster.bodies) != self._ask(pybullet.getNumBodies):
-            self._roster = read_roster(self.client_id)
-            self._bury()
-        return self._roster
-
-    def _read(self) -> Motion:
-        """Poses now; who is in the world is read anew where bodies have come or gone."""
-        roster = self._known_roster()
-        try:
-            return read_motion(self.client_id, roster)
-        except pybullet.error:
-            check_connected(self.client_id)
-            self._roster = None
-            return read_motion(self.client_id, self._known_roster())
-
-    def _bury(self) -> None:
+    def _bury(self, roster: Roster) -> None:
         """Close the records of bodies that have gone without a hook seeing it."""
-        assert self._roster is not None
         codes = np.array(list(self._live), np.int64)
-        gone = codes[rows_of(self._roster, codes) < 0]
+        gone = codes[rows_of(roster, codes) < 0]
         if len(gone):
             self.epoch += 1
             self._close(gone.tolist())
+
+    def _end(self, bodies: Collection[int]) -> None:
+        """Close the records of bodies."""
+        self._close([code for code in self._live if code // LINK_SPAN in bodies])
 
     def _expose_impostors(self, now: Motion, dt: float) -> None:
         """Where nobody saw removals: what jumped and has another name, mass or inertia has taken over an old id."""
         for code in now.roster.code[jumped(self._past, now, dt)]:
             index = self._live.get(int(code))
             if index is not None:
-                known, seen = self._bodies[index], facts.describe(self.client_id, *decode(code), self.epoch)
+                known, seen = self._bodies[index], self._census.described(code, self.epoch)
+                if seen is None:
+                    continue
                 same = known.mass_kg == seen.mass_kg and np.array_equal(known.inertia_kg_m2, seen.inertia_kg_m2)
                 if not same or not np.array_equal(known.curvature_per_m, seen.curvature_per_m, equal_nan=True):
                     self.epoch += 1
@@ -286,7 +295,9 @@ class World:
         met = np.unique(np.concatenate([meeting.row_a, meeting.row_b]))
         strangers = met[of_row[met] < 0]
         for code in roster.code[strangers]:
-            self._append(int(code), replace(facts.describe(self.client_id, *decode(code), self.epoch), since_step=self.step_count))
+            record = self._census.described(code, self.epoch)
+            if record is not None:
+                self._append(int(code), replace(record, since_step=self.step_count))
         return self._index_of_row(roster) if len(strangers) else of_row
 
     def _index_of_row(self, roster: Roster) -> Array:

@@ -1,0 +1,262 @@
+"""Every format that the project reads: a seed file, how it is changed, the reader it goes through, and one step beyond that reader.
+
+log -> rendered for two steps     model -> struck once     preset -> material -> struck once     case -> loaded
+cache -> believed only where it is what was kept     audio -> features     mesh -> surface, volume, closed or not
+"""
+
+from __future__ import annotations
+
+import json
+import random
+import shutil
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.fuzzing import containers, meshes, sounds
+from benchmarks.fuzzing.mutations import json_changed
+from sonic_bullet import files, presets
+from sonic_bullet.effects.presets_of_effects import with_material, with_modes
+from sonic_bullet.files.cases import read_case
+from sonic_bullet.files.contact_log import ContactLog
+from sonic_bullet.geometry import is_closed, volume_m3
+from sonic_bullet.records import Air, Body, Material, Microphone, ModalModel, ModalSum, Residual, Vibrometer
+from sonic_bullet.records.contacts import Contacts, Step
+from sonic_bullet.render import radiated, render_log
+
+SR = 8000
+STEEL = Material.isotropic("steel", youngs_pa=2e11, poisson=0.29, density_kg_m3=7850, alpha_per_s=4.0, beta_s=2e-9, restitution=0.6)
+FEATURES_SAMPLES = 560
+
+
+@dataclass(frozen=True)
+class Door:
+    """name: of the format. suffix: of its files. share: of all inputs. seed: the file unchanged; change: mutated. enter: reads it and goes one step on."""
+
+    name: str
+    suffix: str
+    share: float
+    seed: Callable[[], bytes]
+    change: Callable[[random.Random], bytes]
+    enter: Callable[[Path], object]
+
+
+def box_model(modes: int = 3) -> ModalModel:
+    """A small box whose corners move at random."""
+    corner = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * np.array([0.05, 0.04, 0.025])
+    quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    face = np.array([t for q in quads for t in ((q[0], q[1], q[2]), (q[0], q[2], q[3]))])
+    freq = np.array([900.0, 2100.0, 3900.0])[:modes]
+    shape = np.random.default_rng(0).normal(size=(8, 3, modes))
+    return ModalModel(
+        freq, 5 + 1e-6 * freq**2, shape, corner, face, np.zeros(12), 4e-4, 3.14, bend_s2_m2=np.full(modes, 1e-3), damping_growth_s_m=np.zeros(modes)
+    )
+
+
+def small_log(model: ModalModel, material: Material = STEEL, *, microphone: bool = True) -> ContactLog:
+    """A box struck once by a wall, three steps long."""
+    inertia = np.diag([0.002, 0.003, 0.004])
+    bodies = (Body(0, -1, 0, "box", 3.14, inertia, 4e-4, material=material, model=model), Body(3, -1, 0, "wall", 0.0, np.zeros((3, 3))))
+    one: dict[str, Any] = {"a": [0], "b": [1], "point_a_m": [[0.05, 0.04, -0.025]], "point_b_m": [[0, 0, 0]], "normal": [[0, 0, 1]]}
+    one |= {"impulse_n_s": [[0, 0, 0.01]], "slip_m_s": [[0.1, 0, 0]], "sweep_m_s": [[0.1, 0]], "approach_m_s": [1.0], "gap_m": [0.0]}
+    place, upright = [[0, 0, 0.1], [0, 0, 0]], [[0, 0, 0, 1.0]] * 2
+    steps = [Step(1 / 240, place, upright, [False, False], Contacts(**one) if i != 1 else Contacts.none(), [0, 0, -9.81]) for i in range(3)]  # type: ignore[arg-type]
+    sensors = (Microphone([0, -1, 0.5]), Vibrometer(0, [0, 0, 0.025], [0, 0, 1]), ModalSum(1.0))  # type: ignore[arg-type]
+    return ContactLog(bodies, tuple(steps), sensors if microphone else sensors[2:], SR, 0)
+
+
+def struck(model: ModalModel, material: Material = STEEL) -> None:
+    """The sound of the model's body in `small_log`, by the sum of its modes."""
+    render_log(small_log(model, material, microphone=False))
+
+
+def residual() -> Residual:
+    line = np.array([500.0, 1500.0])
+    return Residual(line, line / 100, line / 1e6, line, line / 50, line / 1e6, np.array([100.0, 1e3]), np.array([0.0, 0.1]), np.ones((2, 2)) * 1e-9, 0.1, "x")
+
+
+def preset_seed() -> dict[str, Any]:
+    """A preset with every group, every kind of effect and a residual."""
+    from sonic_bullet.residual.code import form_of
+
+    seed: dict[str, Any] = json.loads((presets.FOLDER / "steel.json").read_text())
+    import msgspec
+
+    seed["effects"] = [
+        {"id": "damping-law", "law": "constant-loss", "eta": 1e-3},
+        {"id": "mode-splitting", "freq_hz": [900.0], "split": [0.01], "turn_rad": [0.1]},
+        {"id": "amplitude-pitch", "bend": 0.01, "measure": "velocity"},
+        {"id": "amplitude-damping", "choke": 0.1, "measure": "velocity", "power": 1.0},
+    ]
+    seed["residual"] = msgspec.to_builtins(form_of(residual()))
+    seed["provenance"] = {
+        "method": "x",
+        "recordings": ["a.wav"],
+        "parameters": {"alpha_per_s": 1.0},
+        "spreads": {"alpha_per_s": None},
+        "correction": {"a": [0.1]},
+    }
+    return seed
+
+
+def case_seed() -> dict[str, Any]:
+    """A case that declares all there is to declare."""
+    strike = {"position": [0, 0, 0.1], "direction": [0, 0, -2], "impulse": 0.01, "force": {"file": "f.wav", "channel": 0, "newton_per_unit": 2.0}}
+    guess = {"youngs_modulus": 2e11, "density": 7850, "poisson_ratio": 0.3}
+    return {
+        "format": "sonic-bullet-case/1",
+        "case": "bar",
+        "objects": {"bar": {"mesh": "bar.obj", "units": "mm", "material": "steel", "elastic_guess": guess}},
+        "support": {"fixed": [{"position": [1, 2, 3], "radius": 0.5, "object": "bar"}]},
+        "sensor": {"type": "microphone", "response": "sound pressure", "position": {"bar": [0, 0, 0]}, "direction": [0, 0, 1]},
+        "band_hz": [20, 20000],
+        "onset": 0.0,
+        "recordings": [
+            {"file": "a.wav", "object": "bar", "split": "fit", "strike": strike, "channel": 0},
+            {"object": "bar", "split": "holdout", "features": [{"freq_hz": 100.0, "decay_per_s": 1.0, "freq_sd_hz": 0.1, "amplitude": 1.0}]},
+        ],
+    }
+
+
+def _enter_log(path: Path) -> None:
+    log = files.read_log(path)
+    render_log(replace(log, steps=log.steps[:2]))
+
+
+def _enter_model(path: Path) -> None:
+    struck(files.read_model(path))
+
+
+def _enter_preset(path: Path) -> None:
+    material = with_material(presets.load_material(path))
+    struck(with_modes(box_model(), material), material)
+
+
+def _enter_case(path: Path) -> None:
+    for thing in read_case(path).objects.values():
+        if thing.mesh is not None:
+            thing.mesh.exists()
+
+
+def _enter_audio(path: Path) -> None:
+    from sonic_bullet.estimator.lines.extraction import extract
+
+    sound, sr = files.read_audio(path)
+    if sum(path.stem.encode()) & 3 == 0:  # a fit takes a hundred times as long as a read: a quarter of them
+        extract(sound[0, :FEATURES_SAMPLES], sr)
+
+
+def _enter_mesh(path: Path) -> None:
+    from sonic_bullet.listener.pybullet.urdf_meshes import joined, read_surfaces
+    from sonic_bullet.modal import read_mesh
+
+    try:
+        shape = read_mesh(path, 0.5)
+        volume_m3(shape.vertex_m, shape.face)
+    finally:
+        is_closed(joined(read_surfaces(path))[1])
+
+
+class Untrue(Exception):
+    """A file was believed that is not what was kept."""
+
+
+@cache
+def _kept() -> tuple[ModalModel, tuple[Any, Any], str, bytes]:
+    """A model, how it radiates, and the name and bytes of the entry that keeps it."""
+    import tempfile
+
+    folder, model = Path(tempfile.mkdtemp()), box_model()
+    known = radiated.radiation_of.__wrapped__(model, Air(), folder)
+    entry = next(folder.iterdir())
+    content = entry.read_bytes()
+    shutil.rmtree(folder)
+    return model, known, entry.name, content
+
+
+def _enter_sealed_cache(path: Path) -> None:
+    """A forger's entry may be believed, but it must be read without harm and be of the right form."""
+    with suppress(Untrue):
+        _enter_cache(path)
+
+
+def _enter_cache(path: Path) -> None:
+    model, known, name, _ = _kept()
+    path.replace(path.with_name(name))
+    try:
+        found = radiated.radiation_of.__wrapped__(model, Air(), path.parent)
+    finally:
+        path.with_name(name).unlink(missing_ok=True)
+    if any(one.tobytes() != other.tobytes() for one, other in zip(found, known, strict=True)):
+        raise Untrue("a cache entry that was changed is believed")
+
+
+def _entries(write: Callable[[str], None]) -> containers.Entries:
+    import tempfile
+
+    with tempfile.TemporaryDirectory() as folder:
+        write(f"{folder}/a.npz")
+        return containers.taken_apart(f"{folder}/a.npz")
+
+
+def _cache_entries() -> containers.Entries:
+    import io
+
+    return containers.taken_apart(io.BytesIO(_kept()[3]))
+
+
+def _sealed(entries: containers.Entries) -> containers.Entries:
+    """A cache entry whose digest is right again, so that what is behind it is reached."""
+    from sonic_bullet.modal.cache import _digest
+
+    kept = dict(entries)
+    try:
+        header = json.loads(containers.array_of(kept["header.npy"]).tobytes())
+        arrays = {name[:-4]: containers.array_of(content) for name, content in entries if name != "header.npy"}
+        header["sha256"] = _digest(_kept()[2][: -len(".npz")], arrays, header["note"])
+    except Exception:  # the mutation left nothing to seal
+        return entries
+    sealed = containers.npy(np.frombuffer(json.dumps(header).encode(), np.uint8))
+    return [(name, sealed if name == "header.npy" else content) for name, content in entries]
+
+
+@cache
+def doors() -> tuple[Door, ...]:
+    """All of them; shares add up to 1."""
+    log, model, kept = (
+        _entries(lambda path: files.write_log(path, small_log(box_model(), replace(STEEL, residual=residual())))),
+        _entries(lambda path: files.write_model(path, box_model())),
+        _cache_entries(),
+    )
+    preset, case = preset_seed(), case_seed()
+
+    def packed(name: str, share: float, entries: containers.Entries, enter: Callable[[Path], object], seal: Any = None) -> Door:
+        return Door(name, ".npz", share, lambda: containers.put_together(entries), lambda draw: containers.container_changed(entries, draw, seal), enter)
+
+    def written(name: str, share: float, seed: dict[str, Any], enter: Callable[[Path], object]) -> Door:
+        return Door(name, ".json", share, lambda: json.dumps(seed).encode(), lambda draw: json_changed(seed, draw), enter)
+
+    def sound(suffix: str, share: float) -> Door:
+        data = sounds.seed(suffix)
+        change = {".flac": sounds.flac_changed, ".ogg": sounds.ogg_changed}.get(suffix, sounds.plain_changed)
+        return Door(suffix[1:], suffix, share, lambda: data, lambda draw: change(data, draw), _enter_audio)
+
+    def mesh(kind: str, share: float) -> Door:
+        data = meshes.seed(kind)
+        return Door(f"mesh {kind}", "." + kind.split("_", maxsplit=1)[0], share, lambda: data, lambda draw: meshes.mesh_changed(kind, data, draw), _enter_mesh)
+
+    return (
+        packed("log", 0.12, log, _enter_log),
+        packed("model", 0.08, model, _enter_model),
+        packed("cache", 0.05, kept, _enter_cache),
+        packed("cache forged", 0.03, kept, _enter_sealed_cache, _sealed),
+        written("preset", 0.12, preset, _enter_preset),
+        written("case", 0.16, case, _enter_case),
+        *(sound(suffix, 0.03) for suffix in (".wav", ".rf64", ".w64", ".flac", ".ogg", ".aiff", ".caf")),
+        *(mesh(kind, 0.23 / len(meshes.KINDS)) for kind in meshes.KINDS),
+    )

@@ -1,0 +1,66 @@
+"""How loud a file is to be: the factor between pascals and file units, of a full scale, a peak or a programme loudness.
+
+g = 1/full_scale_pa                      calibrated (the default: 1.0 in the file = 1 Pa)
+    10^(peak_dbfs/20)/max|x|             --peak-dbfs
+    10^((lufs - L(x))/20)                --lufs, L: programme loudness [ITU-R BS.1770-4, eq. 2 and 7, by pyloudnorm]
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from sonic_bullet.records import Array
+from sonic_bullet.records.coerce import as_number, shown
+from sonic_bullet.records.errors import AudioError
+
+
+def gain_per_pa(sound: Array, sr: int, peak_dbfs: float | None, lufs: float | None, full_scale_pa: float) -> float:
+    """The factor g of the module's head; peak and loudness are of the whole sound."""
+    if peak_dbfs is None and lufs is None:
+        return 1 / full_scale_pa
+    peak = float(np.abs(sound).max()) if sound.size else 0.0
+    if not math.isfinite(peak):
+        raise AudioError("the samples hold NaN or infinite numbers", "sound must be finite: examine the scene with 'sonic-bullet doctor'")
+    if peak < 1e-300:
+        raise AudioError("the sound is silent, so no level can be given to it", "leave out --peak-dbfs and --lufs, or make something collide")
+    if peak_dbfs is not None:
+        return float(10 ** (peak_dbfs / 20)) / peak
+    assert lufs is not None
+    return float(10 ** ((lufs - _loudness_lufs(sound / peak, sr)) / 20)) / peak
+
+
+def as_sound(samples: object) -> Array:
+    """Samples as float64. Raises AudioError where they are no array of real numbers."""
+    try:
+        sound = np.asarray(samples)
+        if sound.dtype.kind in "biuf":
+            return sound.astype(float, copy=False)
+    except ValueError:  # rows of several lengths
+        pass
+    raise AudioError(f"samples is {shown(samples)}", "pass real numbers, (channels, n)")
+
+
+def check_levels(peak_dbfs: float | None, lufs: float | None) -> None:
+    """Raise AudioError where a level cannot be asked for: before anything is rendered."""
+    if peak_dbfs is not None and lufs is not None:
+        raise AudioError("both peak_dbfs and lufs are given", "give one of a peak and a loudness")
+    if peak_dbfs is not None:
+        as_number(peak_dbfs, "peak_dbfs, a level re full scale,", "give one between -200 and 0 dB, -1 say", least=-200, most=0, error=AudioError)
+    if lufs is not None:
+        as_number(lufs, "lufs, a loudness level,", "give one between -200 and 200, -23 say", least=-200, most=200, error=AudioError)
+
+
+def _loudness_lufs(sound: Array, sr: int) -> float:
+    """Gated programme loudness of (channels, n) [ITU-R BS.1770-4]."""
+    import pyloudnorm
+
+    if sound.shape[0] > 5:
+        raise AudioError(f"loudness is defined for up to 5 channels, not {sound.shape[0]}", "use --peak-dbfs")
+    if sound.shape[1] < math.ceil(0.4 * sr):
+        raise AudioError(f"loudness needs 0.4 s of sound, here are {sound.shape[1] / sr:.3f} s", "use --peak-dbfs, or render longer")
+    loudness = float(pyloudnorm.Meter(sr).integrated_loudness(sound.T))
+    if not math.isfinite(loudness):
+        raise AudioError("the sound has no measurable loudness (a click under the gate of BS.1770)", "use --peak-dbfs")
+    return loudness

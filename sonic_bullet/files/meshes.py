@@ -1,0 +1,153 @@
+"""Mesh files -> triangles as the file has them: OBJ is read here, STL, PLY, OFF, GLB and what else there is by trimesh.
+
+    f 1 2 3      the first vertex is 1        [Wavefront, Advanced Visualizer manual, appendix B1]
+    f -3 -2 -1   the last vertex so far is -1
+
+A face that names a vertex which is not there is refused: taken as an index from the end, it would be another mesh.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import struct
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from sonic_bullet.files.reading import reading
+from sonic_bullet.records.arrays import Array
+from sonic_bullet.records.errors import FileError, MeshError
+
+MeshSurface = tuple[Array, Array]
+REMEDY = "repair the mesh, or export it again"
+ARCHIVES = {"zip", "bz2", "tar.gz", "tar.bz2"}
+RINGS_BESIDE_BODY = {"gltf", "dae"}  # formats whose numbers may lie in files beside them
+
+
+def read_surfaces(path: Path) -> list[MeshSurface]:
+    """Objects of a mesh file, in its own unit: (vertices (v, 3), faces (f, 3)) each, polygons as fans, nothing merged or repaired.
+
+    Raises FileError where it cannot be read, MeshError where it is of no known kind, broken, or a face names no vertex (line or number of the face).
+    """
+    with reading(path, "mesh", MeshError, REMEDY):
+        if not path.is_file():
+            raise FileError(f"mesh file '{path}' does not exist", "check the path")
+        surfaces = list(_obj(path) if path.suffix.lower() == ".obj" else _other(path))
+        for vertex, face in surfaces:
+            _check(path, vertex, face)
+        return surfaces
+
+
+def _check(path: Path, vertex: Array, face: Array) -> None:
+    wrong = np.argwhere((face < 0) | (face >= len(vertex)))
+    if len(wrong):
+        triangle, corner = (int(i) for i in wrong[0])
+        raise MeshError(f"mesh file {path}: triangle {triangle + 1} names vertex {face[triangle, corner]} of 0 to {len(vertex) - 1}", REMEDY)
+
+
+def _obj(path: Path) -> Iterator[MeshSurface]:
+    """Wavefront OBJ: v, f, and o or g as the start of an object; texture and normals are skipped."""
+    vertex: list[tuple[float, float, float]] = []
+    objects: list[list[tuple[int, int, int]]] = [[]]  # of vertices as they are counted, from 1
+    largest, largest_line, before = 0, 0, ""
+    with path.open(encoding="utf-8", errors="replace") as file:
+        for number, part in enumerate(file, 1):
+            if part.endswith("\\\n"):  # the line goes on
+                before += part[:-2] + " "
+                continue
+            line, before = before + part, ""
+            words = line.split()
+            if not words or words[0] not in ("v", "f", "o", "g"):
+                continue
+            try:
+                if words[0] == "v":
+                    vertex.append(_vertex(words))
+                elif words[0] == "f":
+                    corner = _corners(line, words, len(vertex))
+                    if corner and max(corner) > largest:
+                        largest, largest_line = max(corner), number
+                    objects[-1].extend((corner[0], corner[i], corner[i + 1]) for i in range(1, len(corner) - 1))
+                elif objects[-1]:
+                    objects.append([])
+            except ValueError as error:
+                raise MeshError(f"mesh file {path}, line {number}: {error}", REMEDY) from error
+    if largest > len(vertex):  # known at the end only: a face may come before its vertices
+        raise MeshError(f"mesh file {path}, line {largest_line}: a face names vertex {largest} of {len(vertex)}", REMEDY)
+    points = np.array(vertex, float).reshape(-1, 3)
+    for faces in objects:
+        if faces:
+            used, index = np.unique(faces, return_inverse=True)
+            yield points[used - 1], index.reshape(-1, 3)
+
+
+def _vertex(words: list[str]) -> tuple[float, float, float]:
+    if len(words) < 4 or "_" in words[1] + words[2] + words[3]:  # an underscore is Python's own, nobody else's
+        raise ValueError("a vertex is three numbers")
+    return float(words[1]), float(words[2]), float(words[3])
+
+
+def _corners(line: str, words: list[str], so_far: int) -> list[int]:
+    """Numbers, from 1, of the vertices that a face names. Raises ValueError."""
+    first = [word.split("/", 1)[0] for word in words[1:]] if "/" in line else words[1:]
+    if "_" in line:
+        raise ValueError("a face names vertices by their numbers")
+    corner = list(map(int, first))
+    if corner and min(corner) < 1:
+        wrong = next((index for index in corner if index == 0 or index < -so_far), None)
+        if wrong is not None:
+            raise ValueError(f"a face names vertex {wrong}, but they count from 1, or from -1 backwards to {-so_far} here")
+        corner = [index if index > 0 else so_far + index + 1 for index in corner]
+    return corner
+
+
+def _other(path: Path) -> Iterator[MeshSurface]:
+    import trimesh
+
+    kind = path.suffix.lower().lstrip(".")
+    if kind in ARCHIVES or kind not in trimesh.available_formats():
+        hint = " (or: pip install pycollada)" if kind == "dae" else ""
+        raise MeshError(f"mesh file {path}: format '{kind}' is not known", "convert it to OBJ, STL or PLY" + hint)
+    if kind == "off":
+        _check_off(path)
+    _check_counts(path, kind)
+    try:
+        if kind in RINGS_BESIDE_BODY:
+            scene = trimesh.load_scene(path, process=False, maintain_order=True, skip_materials=True)
+        else:
+            content = io.BytesIO(path.read_bytes())  # a read of as many bytes as a header claims gives what there is, and takes no more memory
+            scene = trimesh.load_scene(content, file_type=kind, process=False, maintain_order=True, skip_materials=True)
+    except ImportError:  # a parser of text asks for a package to guess its encoding: the file is not of its kind
+        raise MeshError(f"mesh file {path} is no {kind} file", REMEDY) from None
+    for part in scene.geometry.values():  # before they are placed: placing may follow a face's indices
+        if isinstance(part, trimesh.Trimesh):
+            _check(path, np.asarray(part.vertices), np.asarray(part.faces).reshape(-1, 3))
+    for part in scene.dump():
+        if isinstance(part, trimesh.Trimesh) and len(part.faces):
+            yield np.asarray(part.vertices, float), np.asarray(part.faces)
+
+
+def _check_off(path: Path) -> None:
+    """An OFF's faces by their lines: trimesh refuses them too, and does not say which. Raises MeshError."""
+    lines = [(number, line.split("#")[0].split()) for number, line in enumerate(path.read_text(errors="replace").splitlines(), 1)]
+    lines = [(number, words) for number, words in lines if words and words != ["OFF"]]
+    if not lines or len(lines[0][1]) < 2 or not all(word.isdigit() for word in lines[0][1]):
+        return  # of another kind, or none: for trimesh to say
+    vertices, faces = (int(word) for word in lines[0][1][:2])
+    for number, words in lines[1 + vertices : 1 + vertices + faces]:
+        for word in words[1 : 1 + int(words[0])]:
+            if not 0 <= int(word) < vertices:
+                raise MeshError(f"mesh file {path}, line {number}: a face names vertex {word} of 0 to {vertices - 1}", REMEDY)
+
+
+def _check_counts(path: Path, kind: str) -> None:
+    """A glTF accessor without a buffer stands for as many zeros as it says: no more than the file has bytes. Raises MeshError."""
+    if kind not in ("glb", "gltf"):
+        return
+    content = path.read_bytes()
+    text = content[20 : 20 + struct.unpack("<I", content[12:16])[0]] if kind == "glb" else content
+    tree = json.loads(text)
+    for accessor in tree.get("accessors", ()):
+        if "bufferView" not in accessor and accessor.get("count", 0) > len(content):
+            raise MeshError(f"mesh file {path} claims {accessor['count']} numbers that it does not hold", REMEDY)

@@ -1,0 +1,46 @@
+"""The boundary of every reader: what a foreign file makes a parser throw leaves as one error of ours.
+
+    open, zip, npy, JSON, libsndfile, trimesh -> any exception -> kind("PATH …", remedy), at most 200 characters of it the file's own
+
+A lie about a size is no matter for this boundary: MemoryError passes, and readers compare claims with a file's true length first.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from sonic_bullet.files.atomic import cannot
+from sonic_bullet.records.errors import FileError, SonicBulletError, excerpt
+
+QUOTED, WHAT, REMEDY = 200, 120, 80  # characters that may be a file's own: in all; of what is wrong and of the remedy, where it would be more
+
+
+@contextmanager
+def reading(path: str | os.PathLike[str], thing: str, kind: type[SonicBulletError], remedy: str) -> Iterator[None]:
+    """Raises FileError where the system cannot read ``path``, else ``kind``, naming the path. thing: what should be there, in words."""
+    try:
+        yield
+    except SonicBulletError as error:
+        told = _told(error, os.fspath(path), type(error) if isinstance(error, (kind, FileError)) else kind)
+        raise (error if told is None else told) from error.__cause__
+    except OSError as error:
+        raise cannot("read", path, error) from error
+    except MemoryError:
+        raise
+    except Exception as error:
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise kind(f"{path} is cut or no {thing} ({excerpt(reason, WHAT)})", remedy) from error
+
+
+def _told(error: SonicBulletError, path: str, kind: type[SonicBulletError]) -> SonicBulletError | None:
+    """The error as ``kind``, with the path and no more of the file than is allowed; None where it is all that already."""
+    before, named, after = error.what.partition(path) if path else (error.what, " ", "")  # every text has the empty name in it
+    if named and type(error) is kind and len(before) + len(after) + len(error.remedy) <= QUOTED:
+        return None
+    if not named:
+        before, after = "", f": {error.what}"
+    short = len(before) + len(after) <= WHAT or len(before) + len(after) + len(error.remedy) <= QUOTED
+    what = f"{before}{path}{after}" if short else f"{excerpt(before, WHAT // 2)}{path}{excerpt(after, WHAT // 2 if before else WHAT)}"
+    return kind(what, error.remedy if len(error.remedy) <= max(REMEDY, QUOTED - len(before) - len(after)) else excerpt(error.remedy, REMEDY))

@@ -1,0 +1,83 @@
+"""Recordings: audio files of any make to samples.
+
+    file -> libsndfile, by descriptor, forward only -> blocks to the end -> samples (channels, n), rate
+
+What a file says of its length is not believed: streams may not know it beforehand, and others lie.
+"""
+
+from __future__ import annotations
+
+import os
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sonic_bullet.files.reading import reading
+from sonic_bullet.records.arrays import Array
+from sonic_bullet.records.coerce import as_path
+from sonic_bullet.records.errors import FileError
+
+READ_MIN_HZ, READ_MAX_HZ = 1000, 10_000_000  # from a slow accelerometer's to a fast vibrometer's
+MOST_SAMPLES, UNPACKED = 1 << 26, 64  # half a gibibyte as float64; or samples a byte of the file, which only packed silence passes
+UNKNOWN_LENGTH = 1 << 62  # libsndfile's count for a stream that does not state its length, and more
+BLOCK_SAMPLES = 1 << 18
+UNBROKEN = "give an unbroken audio file"
+
+
+def read_audio(path: str | os.PathLike[str]) -> tuple[Array, int]:
+    """Samples (channels, n) float64 in file units (pascals where written with full scale 1 Pa) and the rate in Hz.
+
+    Raises FileError where the file is missing, cut, no audio, of a rate that no recording has, or unpacks to more than memory is for.
+    """
+    import soundfile
+
+    path = as_path(path, "path", "name a sound file")
+    with reading(path, "audio file", FileError, UNBROKEN):
+        if not Path(path).is_file():
+            raise FileError(f"cannot read {path}: no such file", "check the path")
+    with reading(path, "audio file", FileError, UNBROKEN), open(path, "rb") as file:
+        try:  # by its descriptor: what it is stands in its bytes, and a name that ends in .raw would have libsndfile guess
+            with _forward()(file.fileno(), "r", closefd=False) as sound:
+                return _samples(sound, path, os.fstat(file.fileno()).st_size), int(sound.samplerate)
+        except soundfile.LibsndfileError as error:
+            raise FileError(f"cannot read {path}: {error.error_string.rstrip('.')}", UNBROKEN) from error
+
+
+@cache
+def _forward() -> Any:
+    """SoundFile that reads from start to end and never seeks, which a stream without a stated length cannot."""
+    import soundfile
+
+    class Forward(soundfile.SoundFile):  # type: ignore[misc]
+        def seekable(self) -> bool:
+            return False
+
+    return Forward
+
+
+def _samples(sound: Any, path: object, file_bytes: int) -> Array:
+    """All samples (channels, n) of an open file. Raises FileError."""
+    if not READ_MIN_HZ <= sound.samplerate <= READ_MAX_HZ:
+        raise FileError(f"cannot read {path}: sampled at {sound.samplerate} Hz", f"give a recording of {READ_MIN_HZ} to {READ_MAX_HZ} Hz")
+    most = max(MOST_SAMPLES, UNPACKED * file_bytes)
+    size = max(1, BLOCK_SAMPLES // sound.channels)
+    blocks, frames = [], 0
+    while True:
+        block = sound.read(size, dtype="float64", always_2d=True)
+        frames += len(block)
+        if frames * sound.channels > most:
+            raise FileError(f"cannot read {path}: it unpacks to more than {most} samples", "cut out the part that matters")
+        blocks.append(block)
+        if len(block) < size:
+            break
+    if sound.frames < UNKNOWN_LENGTH and frames < sound.frames:
+        raise FileError(f"cannot read {path}: it claims {sound.frames} frames and holds {frames}", UNBROKEN)
+    samples = np.empty((sound.channels, frames))
+    at = 0
+    while blocks:
+        block = blocks.pop(0)
+        samples[:, at : at + len(block)] = block.T
+        at += len(block)
+    return samples
