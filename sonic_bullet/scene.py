@@ -271,7 +271,7 @@ def _run_plain(stage: _Stage, seconds: float | None, progress: Progress | None, 
     def before(client: int) -> None:
         if stage.listener is None:
             stage.listener = attach(client, sr=stage.sr, microphone=places, seed=stage.seed)
-        for body, link in links_with_shapes(stage.listener.world):
+        for body, link in links_with_shapes(client):
             if (body, link) not in known:
                 known.add((body, link))
                 stage.listener.add(body, link, material=material, progress=say)

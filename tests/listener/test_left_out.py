@@ -232,7 +232,7 @@ def test_a_soft_body_is_left_out_and_named_once(client: Any, hooked: bool) -> No
     assert {record.body_id for record in world.bodies} <= {0, body, far}
     assert world.index_of(far) >= 0
     assert len(steps) == 200
-    assert (cloth, -1) not in links_with_shapes(world)
+    assert (cloth, -1) not in links_with_shapes(world.client_id)
     with pytest.raises(SceneError, match=f"body {cloth} .*soft"):
         world.add(cloth)
     assert "nan" not in {finding.id for finding in diagnose_world(client)}

@@ -68,7 +68,7 @@ def test_extents_by_the_body_pose_are_those_of_the_collision(client: Any, urdf: 
     """Links stand at right angles here, so Bullet's boxes round its hulls are tight but for its margins."""
     body = client.loadURDF(str(DATA / urdf), [1, 2, 3], useFixedBase=True)
     world = open_world(client)
-    links = links_with_shapes(world, body)
+    links = links_with_shapes(world.client_id, body)
     assert links
     for _, link in links:
         position, quaternion = client.getBasePositionAndOrientation(body) if link < 0 else client.getLinkState(body, link, computeForwardKinematics=1)[:2]

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 import pybullet
 
-from sonic_bullet.listener.frames import NO_NUMBER, body_ids, is_soft, link_words, read_motion, read_roster
+from sonic_bullet.listener.frames import NO_NUMBER, link_words
 from sonic_bullet.listener.pybullet.pieces import collision_pieces
+from sonic_bullet.listener.pybullet.poses import body_ids, is_soft, read_motion, read_roster
 from sonic_bullet.records import Body
 from sonic_bullet.records.coerce import LISTED, shown
 from sonic_bullet.records.errors import SceneError

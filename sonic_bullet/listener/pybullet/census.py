@@ -10,10 +10,11 @@ from typing import Any
 
 import pybullet
 
-from sonic_bullet.listener.frames import NO_NUMBER, Motion, Roster, body_ids, check_connected, decode, read_motion, read_roster
+from sonic_bullet.listener.frames import NO_NUMBER, Motion, Roster, decode
 from sonic_bullet.listener.polling import Touches
 from sonic_bullet.listener.pybullet import body_facts as facts
 from sonic_bullet.listener.pybullet.left_out import LeftOut
+from sonic_bullet.listener.pybullet.poses import body_ids, check_connected, read_motion, read_roster
 from sonic_bullet.records import Body
 from sonic_bullet.records.errors import SceneError
 

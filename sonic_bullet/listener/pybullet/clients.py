@@ -1,16 +1,17 @@
-"""A client of our own, and who in a world could sound."""
+"""Clients of PyBullet, and who in their worlds could sound."""
 
 from __future__ import annotations
 
+import numbers
 from typing import Any
 
 import pybullet
 from pybullet_utils.bullet_client import BulletClient
 
-from sonic_bullet.listener.frames import check_connected, is_soft
 from sonic_bullet.listener.pybullet import body_facts as facts
 from sonic_bullet.listener.pybullet.pieces import collision_pieces
-from sonic_bullet.listener.pybullet.world import World
+from sonic_bullet.listener.pybullet.poses import check_connected, is_soft
+from sonic_bullet.listener.pybullet.pybullet_world import PyBulletWorld
 from sonic_bullet.listener.quiet import quiet_stdout
 from sonic_bullet.records.coerce import as_whole, nearest, shown
 from sonic_bullet.records.errors import MeshError, SceneError
@@ -32,10 +33,10 @@ def disconnect(client: BulletClient) -> None:
         pybullet.disconnect(client_id)
 
 
-def links_with_shapes(world: World, body: int | None = None) -> tuple[tuple[int, int], ...]:
+def links_with_shapes(client_id: int, body: int | None = None) -> tuple[tuple[int, int], ...]:
     """(body, link) of every link, or those of one body, that has a collision shape; soft bodies have none that could sound."""
     ask: Any = pybullet
-    cid = world.client_id
+    cid = client_id
     bodies = [ask.getBodyUniqueId(i, physicsClientId=cid) for i in range(ask.getNumBodies(physicsClientId=cid))] if body is None else [body]
     return tuple(
         (one, link)
@@ -46,7 +47,7 @@ def links_with_shapes(world: World, body: int | None = None) -> tuple[tuple[int,
     )
 
 
-def links_called(world: World, body: Any, link: Any) -> tuple[int, tuple[int, ...]]:
+def links_called(world: PyBulletWorld, body: Any, link: Any) -> tuple[int, tuple[int, ...]]:
     """The body's id and its links of that number or name; "all": every link that has a collision shape. All have a mass and an inertia that are some.
 
     Raises SceneError (no such body or link, a soft body, an absurd mass, a pose that is no number), and MeshError where "all" are none.
@@ -57,7 +58,7 @@ def links_called(world: World, body: Any, link: Any) -> tuple[int, tuple[int, ..
     facts.check_exists(cid, number, -1)
     facts.check_usable(cid, number)
     if isinstance(link, str) and link == "all":
-        links = tuple(one for _, one in links_with_shapes(world, number))
+        links = tuple(one for _, one in links_with_shapes(cid, number))
         if not links:
             raise MeshError(f"link is 'all', but no link of body {number} has a collision shape", "give it one, or add a link with mesh=")
     elif isinstance(link, str):
@@ -76,3 +77,22 @@ def _link_named(client_id: int, body: int, name: str) -> int:
     if name not in names:
         raise SceneError(f"link is {shown(name)}, and body {body} has none of that name", nearest(name, names, ', or "all"'))
     return names.index(name) - 1
+
+
+def client_id_of(client: Any) -> int:
+    """The client id of a BulletClient, the pybullet module (its default client 0) or an id. Raises SceneError where nothing is connected."""
+    if client is pybullet:
+        client_id = 0
+    elif isinstance(client, numbers.Integral) and not isinstance(client, bool):
+        client_id = int(client)
+    elif isinstance(getattr(client, "_client", None), int):
+        client_id = client._client
+    else:
+        raise SceneError(f"client is {shown(client)}", "pass a BulletClient, the pybullet module or a client id")
+    check_connected(client_id)
+    return client_id
+
+
+def open_world(client: Any) -> PyBulletWorld:
+    """Listen to a BulletClient, the pybullet module (its client 0) or a client id. Raises SceneError where nothing is connected there."""
+    return PyBulletWorld(client, client_id_of(client))

@@ -15,13 +15,15 @@ import numpy as np
 import pybullet
 
 from sonic_bullet.geometry import LARGEST_M, oversize
-from sonic_bullet.listener.frames import NO_NUMBER, read_motion, read_roster
+from sonic_bullet.listener.frames import NO_NUMBER
 from sonic_bullet.listener.polling import FORCE
 from sonic_bullet.listener.pybullet import collision_shapes
 from sonic_bullet.listener.pybullet.body_facts import checked_mass_kg, link_name
+from sonic_bullet.listener.pybullet.clients import client_id_of
 from sonic_bullet.listener.pybullet.pieces import collision_pieces
+from sonic_bullet.listener.pybullet.poses import read_motion, read_roster
+from sonic_bullet.listener.pybullet.pybullet_world import PyBulletWorld
 from sonic_bullet.listener.pybullet.urdf_meshes import MeshSurface, lid_height_m, read_surfaces
-from sonic_bullet.listener.pybullet.world import World, client_id_of
 from sonic_bullet.records.errors import MeshError, SceneError
 
 LONGEST_STEP_S = 1 / 120
@@ -60,17 +62,17 @@ def _links(client_id: int) -> list[tuple[int, int]]:
     return [(body, link) for body, joints, _ in read_roster(client_id).bodies for link in range(-1, joints)]
 
 
-def diagnose_world(world: World | Any, steps: int = 0) -> tuple[Finding, ...]:
-    """What in a world would spoil its sound. world: a World, or what `open_world` takes.
+def diagnose_world(world: PyBulletWorld | Any, steps: int = 0) -> tuple[Finding, ...]:
+    """What in a world would spoil its sound. world: a PyBulletWorld, or what `open_world` takes.
 
     steps: physics steps to look ahead, undone afterwards (saveState); 0 takes the world as it stands. Raises SceneError where
     the client is not connected.
     """
-    client_id = world.client_id if isinstance(world, World) else client_id_of(world)
+    client_id = world.client_id if isinstance(world, PyBulletWorld) else client_id_of(world)
     findings = [*_settings(client_id), *_empty(client_id), *_masses(client_id)]
     if not any(finding.severity == "error" for finding in findings):
         findings += [*_restitution(client_id), *_lids(client_id), *_scale(client_id, _sounding(world)), *_ahead(client_id, steps)]
-        if isinstance(world, World):
+        if isinstance(world, PyBulletWorld):
             findings += [*_densities(world), *_oversized(world)]
     return tuple(findings)
 
@@ -195,9 +197,9 @@ def _hulled(client_id: int, body: int, link: int) -> list[MeshSurface]:
     return surfaces
 
 
-def _sounding(world: World | Any) -> set[tuple[int, int]]:
+def _sounding(world: PyBulletWorld | Any) -> set[tuple[int, int]]:
     """Links that sound, whose size `_oversized` looks at."""
-    return {(body.body_id, body.link) for body in world.bodies if body.model is not None} if isinstance(world, World) else set()
+    return {(body.body_id, body.link) for body in world.bodies if body.model is not None} if isinstance(world, PyBulletWorld) else set()
 
 
 def _scale(client_id: int, sounding: set[tuple[int, int]]) -> list[Finding]:
@@ -256,7 +258,7 @@ def _sleepers(client_id: int) -> list[Finding]:
     ]
 
 
-def _oversized(world: World) -> list[Finding]:
+def _oversized(world: PyBulletWorld) -> list[Finding]:
     """Bodies that sound, and are larger than anything that is struck to: planes and terrains among them."""
     large = [(body, oversize(body.model.vertex_m, body.model.mass_kg)) for body in world.bodies if body.model is not None and body.until_step < 0]
     return [
@@ -271,7 +273,7 @@ def _oversized(world: World) -> list[Finding]:
     ]
 
 
-def _densities(world: World) -> list[Finding]:
+def _densities(world: PyBulletWorld) -> list[Finding]:
     found = []
     for body in world.bodies:
         if body.material is None or body.until_step >= 0 or body.mass_kg == 0:

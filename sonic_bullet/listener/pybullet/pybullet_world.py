@@ -13,33 +13,37 @@ takes nothing from the sound of the others.
 
 from __future__ import annotations
 
+import inspect
 import numbers
 import weakref
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 import pybullet
 
-from sonic_bullet.listener.frames import LINK_SPAN, Motion, Roster, check_connected, encode, jumped, rows_of, same_motion
+from sonic_bullet.listener.frames import LINK_SPAN, Motion, Roster, encode, jumped, rows_of, same_motion
 from sonic_bullet.listener.polling import Touches, gather, loaded
 from sonic_bullet.listener.pybullet import body_facts as facts
 from sonic_bullet.listener.pybullet import collision_shapes as shapes
 from sonic_bullet.listener.pybullet import hooks
 from sonic_bullet.listener.pybullet.census import Census, ask
 from sonic_bullet.listener.pybullet.left_out import LeftOut
+from sonic_bullet.listener.pybullet.poses import check_connected
+from sonic_bullet.listener.pybullet.step_back import undone
 from sonic_bullet.listener.pybullet.substeps import SubstepLog, gather_substeps
 from sonic_bullet.listener.rows import Meetings, contact_rows, meetings
 from sonic_bullet.listener.start import Start, hooked_start, polled_start, taken
 from sonic_bullet.listener.sweep import NO_TRACES, Trace
+from sonic_bullet.listener.world import World
 from sonic_bullet.records import Array, Body, Material, ModalModel, Shape
-from sonic_bullet.records.coerce import shown
 from sonic_bullet.records.contacts import Contacts, Step
 from sonic_bullet.records.errors import SceneError
 
 
-class World:
+class PyBulletWorld(World):
     """State of listening to one client: who lives, what was last seen, what is remembered of contacts. Made by open_world."""
 
     def __init__(self, client: Any, client_id: int) -> None:
@@ -86,6 +90,24 @@ class World:
     def untouched(self) -> frozenset[int]:
         """Ids of the bodies that were in the world at the last step and have met nobody yet."""
         return frozenset(body for body, _, _ in self._past.roster.bodies) - {code // LINK_SPAN for code in self._live}
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What of the world is left out of the sound, and why."""
+        return tuple(self.left_out.notes)
+
+    def listen(self, after: Callable[[], object]) -> bool:
+        """Hook the client's steps, unless it is the pybullet module or a client id: those have no instance to hook."""
+        if isinstance(self.client, numbers.Integral) or inspect.ismodule(self.client):
+            return False
+        self.hook(self.before_step, after)
+        return True
+
+    def links_called(self, body: object, link: object) -> tuple[int, tuple[int, ...]]:
+        """The body's id and its links of that number or name, "all" of them. Raises SceneError, MeshError."""
+        from sonic_bullet.listener.pybullet.clients import links_called
+
+        return links_called(self, body, link)
 
     @property
     def has_bodies(self) -> bool:
@@ -218,7 +240,7 @@ class World:
                 self.stepped = False
                 return self._again(dt)
             self._expose_impostors(now, dt)
-            start = polled_start(self._past, now, touches, dt, client_id=self.client_id, first=first)
+            start = polled_start(self._past, now, touches, dt, undo=partial(undone, client_id=self.client_id), first=first)
         self._past_touches, self._past, self._before = touches, now, None
         meeting = meetings(touches, past_touches, start, dt)
         of_row = self._of_row(now.roster, meeting)
@@ -321,22 +343,3 @@ class World:
                 index = self._live.pop(code)
                 self._bodies[index] = replace(self._bodies[index], until_step=self.step_count)
         self._rows_known = None
-
-
-def client_id_of(client: Any) -> int:
-    """The client id of a BulletClient, the pybullet module (its default client 0) or an id. Raises SceneError where nothing is connected."""
-    if client is pybullet:
-        client_id = 0
-    elif isinstance(client, numbers.Integral) and not isinstance(client, bool):
-        client_id = int(client)
-    elif isinstance(getattr(client, "_client", None), int):
-        client_id = client._client
-    else:
-        raise SceneError(f"client is {shown(client)}", "pass a BulletClient, the pybullet module or a client id")
-    check_connected(client_id)
-    return client_id
-
-
-def open_world(client: Any) -> World:
-    """Listen to a BulletClient, the pybullet module (its client 0) or a client id. Raises SceneError where nothing is connected there."""
-    return World(client, client_id_of(client))

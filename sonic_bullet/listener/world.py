@@ -1,0 +1,77 @@
+"""What a simulator must tell a listener. PyBullet is one (listener/pybullet/), a contact log played back is another (tests).
+
+    the simulator steps -> after_step() -> Step (records.contacts)
+
+A second simulator derives from `World` and is handed to `sonic_bullet.attach` in place of a client.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+
+from sonic_bullet.records import Body, Material, ModalModel, Shape
+from sonic_bullet.records.contacts import Step
+
+
+class World(ABC):
+    """Bodies, poses, twists, contacts and step lengths of one simulated world."""
+
+    stepped: bool
+    """Whether the last `after_step` found a step: a second call without one between finds none."""
+
+    @property
+    @abstractmethod
+    def bodies(self) -> tuple[Body, ...]:
+        """All bodies ever met, in the order that Contacts.a and Contacts.b count them."""
+
+    @property
+    def untouched(self) -> frozenset[int]:
+        """Ids of the bodies that are in the world and have met nobody yet."""
+        return frozenset()
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What of the world is left out of the sound, and why."""
+        return ()
+
+    @property
+    def has_bodies(self) -> bool:
+        """Whether there is any body in the world."""
+        return bool(self.bodies)
+
+    @abstractmethod
+    def links_called(self, body: object, link: object) -> tuple[int, tuple[int, ...]]:
+        """The body's id and its links of that number or name, "all" of them. Raises SceneError."""
+
+    @abstractmethod
+    def name_of(self, body: int, link: int = -1) -> str:
+        """What people call a link. Raises SceneError for an unknown one."""
+
+    @abstractmethod
+    def shapes_of(self, body: int, link: int = -1) -> tuple[Shape, ...]:
+        """Geometry of a link in its body frame. Raises SceneError for an unknown one, MeshError where it has none."""
+
+    @abstractmethod
+    def add(
+        self,
+        body: int,
+        link: int = -1,
+        *,
+        material: Material | None = None,
+        model: ModalModel | None = None,
+        shapes: Sequence[Shape] = (),
+    ) -> Body:
+        """Make a link known with what it is made of; its record, which `bodies` holds from now on. Raises SceneError."""
+
+    @abstractmethod
+    def after_step(self) -> Step:
+        """The record of the step just made. Raises SceneError."""
+
+    def listen(self, after: Callable[[], object]) -> bool:
+        """Call ``after`` after every step from now on, if the simulator can; whether it does. Else somebody calls `Listener.step`."""
+        return False
+
+    @abstractmethod
+    def unhook(self) -> None:
+        """Leave the simulator as it was; harmless when nothing listens."""
