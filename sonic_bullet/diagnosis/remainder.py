@@ -1,6 +1,6 @@
-"""What no suspect accounts for, told so that a person can name it: when, where in frequency, how it goes with strength and place.
+"""What no candidate effect accounts for, in words by which a person can name it: when, where in frequency, how it goes with strength and place.
 
-e = |recorded − played|² in third octaves and thirds of the time, over the recording's own; slopes against ln J; lines that are no mode, or none that a linear body has (in_phase.py)
+e = |recorded − played|² in third octaves and thirds of the time, over the recording's own; slopes against ln J; lines that are no mode, or none that a linear body has (coherent_residual.py)
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ def listing(left_out: Sequence[LeftOut]) -> str:
 
 
 def _again(takes: Sequence[Take]) -> float | None:
-    """The ratio of frequencies at which a body's lines are heard again, if they are."""
+    """The ratio of frequencies at which a body's lines come again, if they do."""
     recorded = [g for body in {id(t.body): t.body for t in takes}.values() if (g := body.recorded) is not None]
     return next((r for g in recorded if (r := copied(g.lines.freq_hz, g.lines.decay_per_s, g.lines.amplitude)) is not None), None)
 

@@ -60,7 +60,7 @@ names in JSON, npz and command lines, stay what files and scripts know."""
 FORMER_NAMES = {"records/bodies.py": {"choke_s_m"}}
 """Deprecated public aliases, by file."""
 
-NOT_YET = frozenset({"diagnosis"})
+NOT_YET: frozenset[str] = frozenset()
 """Rooms that are still to be renamed; empty once they are."""
 
 MOST_FILES = 16

@@ -77,7 +77,7 @@ def test_no_effect_is_looked_for_where_comfort_alone_is_taken_away(monkeypatch: 
 
     asked: list[int] = []
     body = one_mode_more()
-    monkeypatch.setattr(loop, "trials", lambda *_, **__: asked.append(1) or [])
+    monkeypatch.setattr(loop, "cross_validated", lambda *_, **__: asked.append(1) or [])
     monkeypatch.setattr(loop, "in_twos", lambda *_, **__: asked.append(2))
     end = closed(fitted(body), (body,), takes_of((body,)), EFFECTS, BAND)
     assert end.verdict == "unexplained"

@@ -11,7 +11,7 @@ from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of, thinned
 from sonic_bullet.diagnosis.evidence.refit import refitted, reidentified
 from sonic_bullet.diagnosis.prediction.score import Take, least_db, mean_db
 from sonic_bullet.diagnosis.selection.acceptance import Candidate
-from sonic_bullet.diagnosis.selection.cross_validation import trials
+from sonic_bullet.diagnosis.selection.cross_validation import cross_validated
 from sonic_bullet.diagnosis.selection.decay_test import likelier, tells
 from sonic_bullet.diagnosis.selection.simplest import LINES, by_lines, helps
 from sonic_bullet.effects.added_mass import AddedMass
@@ -33,7 +33,7 @@ def tried(*effects: DampingLaw) -> tuple[list[Candidate], bool]:
     floor = floor_between(list(body.recorded.signals))
     takes = [Take(body, i, x, SR, floor) for i, x in zip(body.fitted, body.recorded.signals, strict=True)]
     h = reidentified(refitted(truth(ROOM), (body,)), (body,))
-    found = trials(h, (body,), takes, evidence_of(h, (body,), BAND), [DampingLaw], seed=0, say=lambda _: None)
+    found = cross_validated(h, (body,), takes, evidence_of(h, (body,), BAND), [DampingLaw], seed=0, say=lambda _: None)
     told, least = mean_db(takes, h) or 0.0, least_db(takes, h) or 0.0
     shapeless = (replace(body, family=None),)
     for c in found:

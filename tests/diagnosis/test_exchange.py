@@ -11,7 +11,7 @@ from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of, thinned
 from sonic_bullet.diagnosis.evidence.refit import refitted
 from sonic_bullet.diagnosis.prediction.score import Take, mean_db
 from sonic_bullet.diagnosis.selection.acceptance import Candidate
-from sonic_bullet.diagnosis.selection.exchange import decays_against, exchanged, surely, together
+from sonic_bullet.diagnosis.selection.exchange import decays_against, exchanged, significant, together
 from sonic_bullet.effects.contact_time import ContactTime
 from sonic_bullet.effects.damping_law import DampingLaw
 from sonic_bullet.effects.measurement_chain import MeasurementChain
@@ -69,10 +69,10 @@ def test_a_part_of_the_evidence_fits_the_same_pulse_again() -> None:
 
 
 def test_strikes_must_agree_before_a_name_is_changed() -> None:
-    assert surely(np.array([0.4, 0.3, 0.4, 2.5, 0.4]), 0.1)  # no strike speaks against it
-    assert not surely(np.array([0.4, -0.9, 0.4, 2.5, 0.4]), 0.1)
-    assert not surely(np.array([0.05, 0.04, 0.05, 0.06, 0.05]), 0.1)  # too alike
-    assert not surely(np.array([2.0]), 0.1)
+    assert significant(np.array([0.4, 0.3, 0.4, 2.5, 0.4]), 0.1)  # no strike speaks against it
+    assert not significant(np.array([0.4, -0.9, 0.4, 2.5, 0.4]), 0.1)
+    assert not significant(np.array([0.05, 0.04, 0.05, 0.06, 0.05]), 0.1)  # too alike
+    assert not significant(np.array([2.0]), 0.1)
 
 
 def test_strikes_alone_do_not_put_one_decay_for_another() -> None:

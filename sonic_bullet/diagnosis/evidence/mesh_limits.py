@@ -14,7 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from sonic_bullet.diagnosis.evidence.degenerate_pairs import FEWEST, LIKE, like
+from sonic_bullet.diagnosis.evidence.degenerate_pairs import LEAST_STRIKES, LIKE, like
 from sonic_bullet.diagnosis.evidence.refit import ROUGH, refitted
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, modes_of, pattern, play
 from sonic_bullet.diagnosis.prediction.score import Comparable, Take, mean_db
@@ -29,9 +29,9 @@ NEARER_DB = 0.05  # without a mode, that ought to be silent
 
 
 def beyond(h: Hypothesis, bodies: tuple[Struck, ...], takes: Comparable) -> tuple[Hypothesis, float]:
-    """The hypothesis with modes that no line was told for where lines of their pattern are, or outside the band; and how far the farthest was put, relative: 0 where none was."""
+    """The hypothesis with unmatched modes where lines of their pattern are, or outside the band; and how far the farthest was put, relative: 0 where none was."""
     start, most = h, 0.0
-    mine = [b for b in bodies if b.recorded is not None and b.family is not None and len(b.fitted) >= FEWEST and b.name in (h.correction or {})]
+    mine = [b for b in bodies if b.recorded is not None and b.family is not None and len(b.fitted) >= LEAST_STRIKES and b.name in (h.correction or {})]
     for body in mine:
         found, off = _put(h, body, (h.correction or {})[body.name])
         if off:
@@ -71,21 +71,21 @@ def _put(h: Hypothesis, body: Struck, correction: Array) -> tuple[Array, float]:
     lines, (model, order) = body.recorded.lines, modes_of(h, body)
     observed = np.abs(lines.amplitude)
     row = pattern(body, model)[body.fitted[: len(observed)]]
-    told = body.line[order] >= 0
-    upper = np.median(model.freq_hz[told]) if told.any() else np.inf
+    matched = body.line[order] >= 0
+    upper = np.median(model.freq_hz[matched]) if matched.any() else np.inf
     group = np.cumsum(np.diff(np.log(model.freq_hz), prepend=-np.inf) > DEGENERATE)
     found, most = correction.copy(), 0.0
     for k in sorted(set(range(len(lines.freq_hz))) - set(body.line.tolist()), key=lambda k: -float(observed[:, k].max())):
         if lines.freq_hz[k] < upper:
             continue
-        near = np.unique(group[~told & (np.abs(np.log(model.freq_hz / lines.freq_hz[k])) < FAR)])
+        near = np.unique(group[~matched & (np.abs(np.log(model.freq_hz / lines.freq_hz[k])) < FAR)])
         members = [np.flatnonzero(group == g) for g in near]
-        alike = [like(lines.amplitude[:, k], row[:, who]) if not told[who].any() else 0.0 for who in members]
+        alike = [like(lines.amplitude[:, k], row[:, who]) if not matched[who].any() else 0.0 for who in members]
         if not alike or max(alike) < LIKE:
             continue
         who = members[int(np.argmax(alike))]
         step = float(lines.freq_hz[k] / model.freq_hz[who].mean() - 1)
-        told[who], most = True, max(most, abs(step))
+        matched[who], most = True, max(most, abs(step))
         found[order[who]] = (1 + found[order[who]]) * (1 + step) - 1
     return found, most
 

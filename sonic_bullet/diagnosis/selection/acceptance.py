@@ -1,8 +1,8 @@
-"""A suspect after its trial, and whether it earns its keep.
+"""A candidate effect after cross-validation, and whether it is accepted.
 
-an effect earns its keep where its mean drop is over LEAST_DB (where nothing is found yet: FAINT_DB if that is MOST of the gap, CERTAIN_DB if lines are sure of it and
-    that is SAID of the gap) and LEAST_SHARE of the gap, SURE standard errors above zero and above the null effect's by as much; of more than MANY strikes that gain much
-    one may be odd; what goes with level may be told by the loudest alone
+an effect is accepted where its mean drop is over LEAST_DB (where nothing is found yet: FAINT_DB if that is MOST of the gap, CERTAIN_DB if lines agree on it and
+    that is SAID of the gap) and LEAST_SHARE of the gap, STANDARD_ERRORS standard errors above zero and above the control effect's by as much; of more than MANY strikes that gain much
+    one may be odd; what goes with level may be shown by the loudest alone
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ CAPS = 60  # of what is open, tried
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Candidate:
-    """A suspect after its trial. effect: fitted to all evidence. drop_db (s,): of each left-out strike's distance, less what corrections learnt again would gain
-    alone where the suspect moves modes; of the FIRST alone where it could not earn its keep any more. whole_db: mean with that in it, which speaks for a name's turn. null_db: mean over strikes and draws.
+    """A candidate effect after cross-validation. effect: fitted to all evidence. drop_db (s,): of each left-out strike's distance, less what corrections learnt again would gain
+    alone where it moves modes; of the FIRST alone where it could not be accepted any more. whole_db: mean with that in it, by which candidates are ordered. null_db: mean over strikes and draws.
 
-    Its axes of twins, if it has any, all fitted strikes told. spread: of each number in its parameters over the folds (jackknife). lines: by how much lines left
-    out are likelier with it (by_lines.py). impulse_n_s (s,): of the strikes.
+    Its axes of degenerate pairs, if it has any, are from all fitted strikes. spread: of each number in its parameters over the folds (jackknife). lines: by how much lines left
+    out are likelier with it (decay_test.py). impulse_n_s (s,): of the strikes.
     """
 
     id: str
@@ -51,7 +51,7 @@ class Candidate:
 
     @property
     def certain(self) -> bool:
-        """Whether its lines are sure of it (see needed)."""
+        """Whether lines agreed on it before it was proposed (see needed)."""
         return self.effect.traits.certain
 
     @property
@@ -75,33 +75,33 @@ def needed(gap_db: float, *, first: bool, certain: bool = False) -> float:
 
     certain: lines agreed on it, each by its own frames, before it was proposed; then strikes left out need only say the same.
 
-    What little a name leaves of a wide gap may be its own fit's.
+    What little an effect leaves of a wide gap may be its own fit's.
     """
     faint, share = (CERTAIN_DB, SAID) if certain else (FAINT_DB, MOST)
     return max(min(LEAST_DB, max(faint, share * gap_db)) if first else LEAST_DB, LEAST_SHARE * gap_db)
 
 
-def earns(c: Candidate, gap_db: float, *, first: bool) -> bool:
-    """Whether a suspect explains enough, surely enough, and more than chance. first: see needed."""
+def accepted(c: Candidate, gap_db: float, *, first: bool) -> bool:
+    """Whether a candidate explains enough, significantly, and more than chance. first: see needed."""
     if len(c.drop_db) == 0:
         return False
     need = needed(gap_db, first=first, certain=c.certain)
     if not (c.mean_db > need and np.isfinite(c.sd_db)):
         return False
-    more = c.whole_db - max(c.null_db, 0.0)  # a null effect is not held against corrections either
+    more = c.whole_db - max(c.null_db, 0.0)  # a control effect is not held against corrections either
     drop = np.sort(c.drop_db)
     if c.certain and c.loud and -np.minimum(drop, 0).sum() < LOST * drop[-1]:
-        return more > 0.5 * need  # what goes with level is for the loudest to tell, which these others were fitted without
+        return more > 0.5 * need  # what goes with level is for the loudest to show, which these others were fitted without
     if len(drop) > MANY and drop[1:].mean() > 3 * max(need, needed(gap_db, first=first)):
-        drop = drop[1:]  # one strike may be odd: what it alone tells, none of the others did
+        drop = drop[1:]  # one strike may be odd: what it alone shows, none of the others did
     sd = float(drop.std(ddof=1) / np.sqrt(len(drop)))
     if len(drop) >= MANY and drop[0] > -max(0.1 * drop.mean(), NOISE_DB) and (drop[-2] > need or (first and c.certain and c.loud)):
         return more > 0.5 * need  # no strike speaks against it, though loud ones may gain far more than soft ones
     return bool(drop.mean() > STANDARD_ERRORS * sd) and more > max(STANDARD_ERRORS * sd, 0.5 * need)
 
 
-def may_earn(asked: Candidate, open_db: np.ndarray[Any, Any], gap_db: float) -> bool:
-    """Whether a suspect could still earn its keep that has been asked on the first few strikes alone.
+def may_be_accepted(asked: Candidate, open_db: np.ndarray[Any, Any], gap_db: float) -> bool:
+    """Whether a candidate could still be accepted that has been asked on the first few strikes alone.
 
     open_db (s,): the most it may gain on each; of those that it has not been asked on it may gain that, or less where that suits it: alike is surer than much.
     Of drops at most m_i the mean over its standard error is largest at min(m_i, c) for some c, so CAPS of these are tried; loud strikes may gain most.
@@ -112,7 +112,7 @@ def may_earn(asked: Candidate, open_db: np.ndarray[Any, Any], gap_db: float) -> 
         for free in (np.zeros(len(open_db), bool), loud):
             drop = np.where(free, open_db, np.minimum(open_db, cap))
             drop[:first] = asked.drop_db
-            if earns(replace(asked, drop_db=drop, whole_db=gap_db, null_db=0.0), gap_db, first=True):
+            if accepted(replace(asked, drop_db=drop, whole_db=gap_db, null_db=0.0), gap_db, first=True):
                 return True
     return False
 

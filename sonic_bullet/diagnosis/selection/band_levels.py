@@ -1,7 +1,7 @@
-"""Whether what is played is as loud as what was recorded, band by band: a mean distance over all cells blurs what one band lacks, and what is absent is nobody's line.
+"""Whether what is played is as loud as what was recorded, band by band: a mean distance over all cells blurs what one band lacks, and what is absent has no line.
 
     d_sb = 10 lg Σ|R|² / Σ(|P|² + N)   over the cells of a band b, the first EARLY_S and the rest apart;   third octaves that overlap by half
-    off:  |mean_s d| > APART_DB  and  > SURE standard errors,   over the strikes s in which either stands ABOVE over the noise N
+    off:  |mean_s d| > APART_DB  and  > STANDARD_ERRORS standard errors,   over the strikes s in which either stands ABOVE over the noise N
 
 A correction may put a mode CORRECTION away, over a band's edge, and a window spreads it over LOBE cells to each side: recorded is more only where it is more than what is
 played so much beyond the band, too, and the other way round.
@@ -59,7 +59,7 @@ def bands_off(h: Hypothesis, takes: Sequence[Judged]) -> tuple[BandOff, ...]:
 
 
 def over_db(recorded: Array, played: Array, sr: int, floor: Floor, band_hz: tuple[float, float]) -> Array:
-    """Recorded over played (2, b) in dB, in the first EARLY_S and in the rest, of the bands around CENTRE_HZ; NaN where neither stands above the noise, or a band cannot be told."""
+    """Recorded over played (2, b) in dB, in the first EARLY_S and in the rest, of the bands around CENTRE_HZ; NaN where neither stands above the noise, or a band holds too few cells."""
     early = round(EARLY_S * sr)
     parts = [(x[:early], x[early:]) for x in (recorded, played)]
     return np.array([_over_db(a, b, sr, floor, band_hz) for a, b in zip(*parts, strict=True)])

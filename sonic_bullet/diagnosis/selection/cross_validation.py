@@ -1,10 +1,10 @@
-"""Suspects on trial: each fitted without one strike and a part of the lines, judged on that strike; null effects alike.
+"""Candidate effects under cross-validation: each fitted without one strike and a part of the lines, judged on that strike; control effects alike.
 
-    for every strike s:  evidence − s − some lines (none, where a suspect has numbers of single lines) -> propose -> refit α, β, σ -> D(s)    against the same without the effect
-    null: as many numbers, spent on directions drawn at random in the modes' decays and levels, fitted to the same evidence
+    for every strike s:  evidence − s − some lines (none, where an effect has numbers of single lines) -> propose -> refit α, β, σ -> D(s)    against the same without the effect
+    control effect: as many numbers, spent on directions drawn at random in the modes' decays and levels, fitted to the same evidence
 
 Leaving out lines matters: decays and shapes belong to the body, so every strike shows them, and a pattern fitted to them by chance would pass.
-Corrections of frequencies, and the axes of twins that glide or choke, only mend what a mesh leaves to chance: all fitted strikes tell those, once, and the null has no numbers
+Corrections of frequencies, and the axes of amplitude-dependent pairs, only mend what a mesh leaves to chance: all fitted strikes determine those, once, and the control has no numbers
 for them.
 """
 
@@ -24,7 +24,7 @@ from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, bends, mixe
 from sonic_bullet.diagnosis.prediction.line_score import Listed
 from sonic_bullet.diagnosis.prediction.score import Comparable, Judged, Take
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
-from sonic_bullet.diagnosis.selection.acceptance import Candidate, earns, jackknife, may_earn, mean
+from sonic_bullet.diagnosis.selection.acceptance import Candidate, accepted, jackknife, may_be_accepted, mean
 from sonic_bullet.diagnosis.selection.control_effect import Null
 from sonic_bullet.diagnosis.selection.decay_test import likelier, tells
 from sonic_bullet.effects.protocol import Cost, Dereverberates, Effect, Evidence, RotatesPairs, Stage
@@ -37,7 +37,7 @@ ENOUGH = 2  # names: what little is left beside them is worth no search of half 
 PLAIN = 0.6  # of the gap: where a cheap suspect says as much, costly ones wait
 
 
-def trials(
+def cross_validated(
     h: Hypothesis,
     bodies: tuple[Struck, ...],
     takes: Comparable,
@@ -48,7 +48,7 @@ def trials(
     say: Any,
     costly: bool = True,
 ) -> list[Candidate]:
-    """Every suspect that the whole evidence suggests, after its trial; best first. costly: whether those that take long are asked, and that search once ENOUGH have been found."""
+    """Every candidate that the whole evidence suggests, cross-validated; best first. costly: whether those that take long are asked, and that search once ENOUGH have been found."""
     found: list[Candidate] = []
     if len(takes) < 2:
         return found  # nothing can be left out
@@ -59,14 +59,14 @@ def trials(
     whole_lines = cache(lambda: _folds(h, bodies, takes, evidence, seed, keep=1.0) if observed else folds)
     anew = cache(lambda: refitted(h, bodies, anew=True) if observed else h)
     fair = cache(lambda by_line: _learnt_anew(anew(), whole_lines() if by_line else folds))
-    still = cache(lambda by_line: _rested(whole_lines() if by_line else folds))
+    still = cache(lambda by_line: _at_rest_folds(whole_lines() if by_line else folds))
     gap = mean([f.before - f.noise for f in folds])
     idle = not costly and len(evidence.found) >= ENOUGH
     dry = any(one.dry for one in evidence.observed)
     kinds = [kind for kind in effects if kind.id not in evidence.found and not (idle and kind.traits.cost is Cost.SEARCHES)]
     for group in _groups(kinds, late=dry and costly):
-        if any(isinstance(c.effect, Dereverberates) and earns(c, gap, first=not evidence.found) for c in found):
-            break  # what others say of lines that a room has made is hearsay: in the next round they are told dry
+        if any(isinstance(c.effect, Dereverberates) and accepted(c, gap, first=not evidence.found) for c in found):
+            break  # what others say of lines that a room has made is hearsay: in the next round they are dereverberated
         if dry and mixes_neighbours(group[0]) and len(kinds) > len(group) and any(c.effect.stage is Stage.MATERIAL for c in found):
             continue  # lines that were paired with another material's modes tell little of what mixes these
         if group[0].traits.cost is Cost.COSTLY and (not costly or any(c.mean_db > PLAIN * gap for c in found)):
@@ -82,7 +82,7 @@ def trials(
             by_line = kind.traits.by_line
             plain = whole_lines() if by_line else folds
             known = fair(by_line) if moves(alone) and not moves(h) else still(by_line) if bends(alone) and not bends(h) else plain
-            found.append(_tried(kind, whole, h, bodies, evidence, known))
+            found.append(_cross_validated(kind, whole, h, bodies, evidence, known))
     return sorted(found, key=lambda c: -c.whole_db)
 
 
@@ -95,7 +95,7 @@ def _proposed(group: list[type[Effect]], evidence: Evidence) -> dict[type[Effect
 
 
 def _groups(kinds: list[type[Effect]], *, late: bool) -> list[list[type[Effect]]]:
-    """Rooms, whose echoes others would be told of; what is cheap; and what takes long, one by one; then those that come last."""
+    """Rooms, whose echoes would mislead the others; what is cheap; and what takes long, one by one; then those that come last."""
     rooms: list[type[Effect]] = [k for k in kinds if issubclass(k, Dereverberates)]
     last = [k for k in kinds if late and mixes_neighbours(k)]
     dear = [k for k in kinds if k not in rooms + last and k.traits.cost is Cost.COSTLY]
@@ -121,7 +121,7 @@ class Fold:
 
 
 def _folds(h: Hypothesis, bodies: tuple[Struck, ...], takes: Comparable, evidence: Evidence, seed: int, keep: float = KEPT) -> list[Fold]:
-    """Without one strike each, and with a part of the lines, keep of them: all for an effect with numbers of single lines, which other lines cannot tell and other strikes can."""
+    """Without one strike each, and with a part of the lines, keep of them: all for an effect with numbers of single lines, which other lines do not determine and other strikes do."""
     rng = np.random.default_rng([seed, 1])
     made = []
     for take in takes:
@@ -148,8 +148,8 @@ def _learnt_anew(every: Hypothesis, folds: list[Fold]) -> list[Fold]:
     return [replace(f, least=least(f)) for f in folds]
 
 
-def _rested(folds: list[Fold]) -> list[Fold]:
-    """Folds that know what is gained by corrections alone, learnt from what modes ring down to as they are beside whatever makes them glide."""
+def _at_rest_folds(folds: list[Fold]) -> list[Fold]:
+    """Folds that know what is gained by corrections alone, learnt from what modes ring down to as they are beside whatever makes them depend on amplitude."""
     return [
         replace(f, least=min(f.before, f.take.distance(at_rest(f.base, f.bodies, f.evidence.observed, every=True)))) if isinstance(f.take, Take) else f
         for f in folds
@@ -167,7 +167,7 @@ class Gain:
     lines: float = 0.0
 
 
-def _tried(kind: type[Effect], whole: Effect, h: Hypothesis, bodies: tuple[Struck, ...], evidence: Evidence, folds: list[Fold]) -> Candidate:
+def _cross_validated(kind: type[Effect], whole: Effect, h: Hypothesis, bodies: tuple[Struck, ...], evidence: Evidence, folds: list[Fold]) -> Candidate:
     def judged(i: int) -> Gain:
         fold = folds[i]
         less = fold.evidence
@@ -176,15 +176,15 @@ def _tried(kind: type[Effect], whole: Effect, h: Hypothesis, bodies: tuple[Struc
             return Gain()
         free = effect.freedom() - (effect.angles() if isinstance(effect, RotatesPairs) else 0)  # such axes are whole's (Evidence.on_trial)
         random = [Null.fitted(less, min(free, 8), 10 * i + draw) for draw in range(DRAWS)]
-        beside = _beside(fold, effect)
-        after = fold.take.distance(beside)
-        chance = tuple(fold.before - fold.take.distance(_beside(fold, none)) for none in random if none is not None)
-        lines = likelier(fold.base, beside, evidence, less, bodies) if isinstance(fold.take, Take) and tells(h, effect) else 0.0
+        augmented = _augmented(fold, effect)
+        after = fold.take.distance(augmented)
+        chance = tuple(fold.before - fold.take.distance(_augmented(fold, none)) for none in random if none is not None)
+        lines = likelier(fold.base, augmented, evidence, less, bodies) if isinstance(fold.take, Take) and tells(h, effect) else 0.0
         return Gain(effect, fold.least - after, fold.before - after, chance, lines)
 
     found = parallel_map(judged, range(min(FIRST, len(folds))))
     asked = Candidate(kind.id, whole, h, np.array([g.drop_db for g in found]), 0.0, 0.0, {}, impulse_n_s=_levels(folds))
-    if may_earn(asked, np.array([f.least - f.noise for f in folds]), mean([f.before - f.noise for f in folds])) or tells(
+    if may_be_accepted(asked, np.array([f.least - f.noise for f in folds]), mean([f.before - f.noise for f in folds])) or tells(
         h, whole
     ):  # lines may speak for what strikes do not
         found += parallel_map(judged, range(len(found), len(folds)))
@@ -199,7 +199,7 @@ def _levels(folds: Sequence[Fold]) -> np.ndarray[Any, Any]:
     return np.array([f.take.body.impulse_n_s[f.take.strike] if isinstance(f.take, Take) else np.nan for f in folds])
 
 
-def _beside(fold: Fold, effect: Effect) -> Hypothesis:
+def _augmented(fold: Fold, effect: Effect) -> Hypothesis:
     """A fold's hypothesis with one more effect, fitted to what it may learn from."""
     h = replace(fold.base, effects=(*fold.base.effects, effect))
     if isinstance(fold.take, Listed):

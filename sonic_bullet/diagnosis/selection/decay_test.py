@@ -1,9 +1,9 @@
-"""What lines' decays say of suspects where strikes say nothing: beside a room those left out, and of two that strikes cannot tell apart all of them.
+"""What lines' decays say of candidate effects where strikes say nothing: beside a room those left out, and of two that strikes cannot tell apart all of them.
 
     2 Δ ln L = Σ_k ρ(z_k without) − ρ(z_k with),   z_k = ln(d_k / d of its modes) / spread,   ρ Cauchy's, over the lines that a fold had left out, each counted once
 
-A room's response has a tap for every sample. Told from the strikes, it takes up what a law of damping does to every line, on strikes that it never saw as well: a line is as narrow as what a
-response can bend. But lines are told dry, each by its own baseband (effects/tails.py), before there is any response; a law told from three lines in four must hold for the fourth.
+A room's response has a tap for every sample. Identified from the strikes, it takes up what a law of damping does to every line, on strikes that it never saw as well: a line is as narrow as what a
+response can bend. But lines are dereverberated, each by its own baseband (effects/common/reverberant_tail.py), before there is any response; a law fitted to three lines in four must hold for the fourth.
 """
 
 from __future__ import annotations
@@ -39,25 +39,25 @@ def misfit(h: Hypothesis, effect: Effect, evidence: Evidence, bodies: tuple[Stru
     total, count = 0.0, 0
     for one in evidence.observed:
         body = next(b for b in bodies if b.recorded is one.source)
-        good = _told(one)
+        good = _has_decay(one)
         total += float(_cost(modes_of(h, body)[0].decay_per_s, one.mode, one.decay_per_s, one.decay_sd_per_s)[good].sum())
         count += int(good.sum())
     return total + numbers(effect) * float(np.log(max(count, 1)))
 
 
-def _told(one: ObjectEvidence) -> Array:
-    """Which lines (k,) tell a decay."""
+def _has_decay(one: ObjectEvidence) -> Array:
+    """Which lines (k,) have a decay."""
     return np.asarray(np.isfinite(one.decay_per_s) & (one.decay_per_s > 0) & ~np.isposinf(one.decay_sd_per_s))
 
 
-def likelier(without: Hypothesis, beside: Hypothesis, every: Evidence, told: Evidence, bodies: tuple[Struck, ...]) -> float:
-    """Twice the gain in ln likelihood of the decays that are in ``every`` and not in ``told``, from which both hypotheses were fitted."""
+def likelier(without: Hypothesis, augmented: Hypothesis, every: Evidence, training: Evidence, bodies: tuple[Struck, ...]) -> float:
+    """Twice the gain in ln likelihood of the decays that are in ``every`` and not in ``training``, from which both hypotheses were fitted."""
     total = 0.0
     for one in every.observed:
-        seen = next((h.freq_hz for h in told.observed if h.source is one.source), one.freq_hz[:0])
-        out = ~np.isin(one.freq_hz, seen) & _told(one)
+        seen = next((h.freq_hz for h in training.observed if h.source is one.source), one.freq_hz[:0])
+        out = ~np.isin(one.freq_hz, seen) & _has_decay(one)
         body = next(b for b in bodies if b.recorded is one.source)
-        cost = [_cost(modes_of(h, body)[0].decay_per_s, one.mode, one.decay_per_s, one.decay_sd_per_s)[out].sum() for h in (without, beside)]
+        cost = [_cost(modes_of(h, body)[0].decay_per_s, one.mode, one.decay_per_s, one.decay_sd_per_s)[out].sum() for h in (without, augmented)]
         total += float(cost[0] - cost[1])
     return total
 

@@ -1,7 +1,7 @@
-"""Several effects at once: their numbers fitted to each other, and names that came first though another, beside the rest, says more.
+"""Several effects at once: their numbers fitted to each other, and effects that came first though another, beside the rest, explains more.
 
     e_i -> propose(evidence of the model without e_i, known = e_i), in turns                       (backfitting [Buja, Hastie & Tibshirani 1989])
-    exchange: for each added effect, what earned its keep in the same round and was passed over stands in its place; both are judged on strikes left out
+    exchange: for each added effect, what was accepted in the same round and was passed over stands in its place; both are judged on strikes left out
 
 A round adds what says most of the whole gap alone, and a filter may take up what a pulse and a tilt of level do together; beside the other effect it no longer does.
 """
@@ -35,7 +35,7 @@ Less = Callable[[Evidence], Evidence]
 
 
 def rivals(found: Sequence[Candidate], best: Candidate) -> tuple[Candidate, ...]:
-    """Of a round's candidates that earned their keep, those that the best may stand before by chance, or by what else the model lacks."""
+    """Of a round's accepted candidates, those that the best may stand before by chance, or by what else the model lacks."""
     return tuple(c for c in found if c is not best and c.mean_db > RIVAL * best.mean_db)
 
 
@@ -51,9 +51,9 @@ def again(h: Hypothesis, i: int, bodies: tuple[Struck, ...], band_hz: tuple[floa
     """The hypothesis, its i-th effect fitted again beside the others, or looked for anew."""
     effect, before, after = h.effects[i], h.effects[:i], h.effects[i + 1 :]
     rest = refitted(with_effects(h, (*before, *after), bodies), bodies)
-    told = less(evidence_of(rest, bodies, band_hz))
-    found = type(effect).propose(told if afresh else replace(told, known=effect))
-    return refitted(replace(rest, effects=(*before, found or effect, *after)), bodies, told.observed)
+    evidence = less(evidence_of(rest, bodies, band_hz))
+    found = type(effect).propose(evidence if afresh else replace(evidence, known=effect))
+    return refitted(replace(rest, effects=(*before, found or effect, *after)), bodies, evidence.observed)
 
 
 def starts(h: Hypothesis, bodies: tuple[Struck, ...], band_hz: tuple[float, float]) -> list[Hypothesis]:
@@ -86,15 +86,15 @@ def chosen(h: Hypothesis, bodies: tuple[Struck, ...], takes: Comparable, band_hz
 
 
 def left_out_db(h: Hypothesis, i: int, bodies: tuple[Struck, ...], takes: Comparable, band_hz: tuple[float, float]) -> Array:
-    """Distance (s,) of every strike from what is fitted to the others: the i-th effect, the rest as all strikes have it, for one name as for the other.
+    """Distance (s,) of every strike from what is fitted to the others: the i-th effect, the rest as all strikes have it, for one effect as for the other.
 
-    No lines are left out here: each has stood its trial against chance already, and of two names that need as many numbers neither gains by it.
+    No lines are left out here: each has been held against chance already, and of two effects that need as many numbers neither gains by it.
     """
 
     def without(take: Judged) -> Less:
         assert isinstance(take, Take)
         place = take.place
-        return lambda told: thinned(told, place, 1.0, np.random.default_rng(0))
+        return lambda evidence: thinned(evidence, place, 1.0, np.random.default_rng(0))
 
     return np.array(parallel_map(lambda take: take.distance(again(h, i, bodies, band_hz, less=without(take))), takes))
 
@@ -108,7 +108,7 @@ def exchanged(
     band_hz: tuple[float, float],
     say: Callable[[str], None],
 ) -> tuple[Hypothesis, list[Candidate]]:
-    """The effects fitted to each other, and each left for a rival of its round (passed) with which strikes left out are surely nearer."""
+    """The effects fitted to each other, and each left for a rival of its round (passed) with which strikes left out are significantly nearer."""
     if not all(isinstance(t, Take) for t in takes):
         return h, added
     names = {c.id for c in added}
@@ -128,7 +128,7 @@ def exchanged(
             now = left_out_db(other, place, bodies, takes, band_hz)
             gain = far - now
             if (
-                surely(gain, ALIKE * rival.mean_db)
+                significant(gain, ALIKE * rival.mean_db)
                 and not (np.nanmean(gain) < NEARLY * rival.mean_db and phases_against(best, other, bodies))
                 and not decays_against(other.effects[place], best, other, place, bodies, band_hz)
             ):
@@ -142,12 +142,12 @@ def decays_against(rival: Effect, best: Hypothesis, other: Hypothesis, i: int, b
     own = best.effects[i]
     if not (of_decays(best, own) and of_decays(other, rival)):
         return False
-    told = evidence_of(best, bodies, band_hz)
-    return misfit(other, rival, told, bodies) > misfit(best, own, told, bodies)
+    evidence = evidence_of(best, bodies, band_hz)
+    return misfit(other, rival, evidence, bodies) > misfit(best, own, evidence, bodies)
 
 
 def phases_against(best: Hypothesis, other: Hypothesis, bodies: tuple[Struck, ...]) -> bool:
-    """Whether the lines' phases (ties.py) speak for the name that is there: of two that strikes hardly tell apart, both must.
+    """Whether the lines' phases (phase_test.py) speak for the effect that is there: of two that strikes hardly tell apart, both must.
 
     Phases are held against lines as they were fitted; of several hits they say nothing, and beside a room lines are others.
     """
@@ -158,7 +158,7 @@ def phases_against(best: Hypothesis, other: Hypothesis, bodies: tuple[Struck, ..
     return bool(np.isfinite([mine, its]).all() and its > mine + HINT)
 
 
-def surely(gain_db: Array, least_db: float) -> bool:
+def significant(gain_db: Array, least_db: float) -> bool:
     """Whether strikes agree that there is a gain (s,), and more than least_db."""
     if len(gain_db) < 2 or gain_db.mean() <= least_db:
         return False

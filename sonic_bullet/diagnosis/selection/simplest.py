@@ -1,4 +1,4 @@
-"""Which of the suspects that stood their trial is added, and which of the added ones are still needed at the end.
+"""Which of the accepted candidates is added, and which of the added ones are still needed at the end.
 
 able -> on all strikes together it helps, too -> the best, or the simplest of those that strikes cannot tell from it -> phases, where two say nearly the same
 """
@@ -25,19 +25,23 @@ LINES = 6.0  # twice the ln likelihood of decays left out: what a name must gain
 SAME = 0.1  # of what a room's response leaves open: two that differ by less say the same
 
 
-def helps(c: Candidate, bodies: tuple[Struck, ...], takes: Comparable, now: float, told: float, floor: float, *, first: bool) -> bool:
-    """Whether all strikes together gain, and lose nothing of what a room's response, told again without it, says as well (told): that takes up echoes, and
+def helps(c: Candidate, bodies: tuple[Struck, ...], takes: Comparable, now: float, reidentified_db: float, floor: float, *, first: bool) -> bool:
+    """Whether all strikes together gain, and lose nothing of what a room's response, identified again without it, says as well (reidentified_db): that takes up echoes, and
     some of what stray modes leave, so what moves modes must gain on that. A filter or a slow law it takes up whole: then both say the same.
-    Without a mesh nothing tells which of a room's lines are modes, and what changes decays would be told by all of them."""
+    Without a mesh nothing tells which of a room's lines are modes, and what changes decays would be fitted to all of them."""
     if tells(c.hypothesis, c.effect) and not _shaped(bodies):
         return False
-    before, after = told if moves(c.hypothesis) else now, mean_db(takes, reidentified(c.hypothesis, bodies))
-    return after < told + SAME * max(told - floor, 0.0) and before - after > HELPS * needed(max(before - floor, 0.0), first=first, certain=c.certain)
+    before, after = reidentified_db if moves(c.hypothesis) else now, mean_db(takes, reidentified(c.hypothesis, bodies))
+    return after < reidentified_db + SAME * max(reidentified_db - floor, 0.0) and before - after > HELPS * needed(
+        max(before - floor, 0.0), first=first, certain=c.certain
+    )
 
 
-def by_lines(c: Candidate, bodies: tuple[Struck, ...], takes: Comparable, told: float, floor: float) -> bool:
-    """Whether lines left out speak for it (by_lines.py), and a room's response, told again beside it, says no less than without it (told). Without a mesh nothing tells which of a room's lines are modes."""
-    return _shaped(bodies) and c.lines > LINES and mean_db(takes, reidentified(c.hypothesis, bodies)) < told + SAME * max(told - floor, 0.0)
+def by_lines(c: Candidate, bodies: tuple[Struck, ...], takes: Comparable, reidentified_db: float, floor: float) -> bool:
+    """Whether lines left out speak for it (decay_test.py), and a room's response, identified again beside it, says no less than without it (reidentified_db). Without a mesh nothing tells which of a room's lines are modes."""
+    return (
+        _shaped(bodies) and c.lines > LINES and mean_db(takes, reidentified(c.hypothesis, bodies)) < reidentified_db + SAME * max(reidentified_db - floor, 0.0)
+    )
 
 
 def _shaped(bodies: tuple[Struck, ...]) -> bool:
@@ -46,13 +50,13 @@ def _shaped(bodies: tuple[Struck, ...]) -> bool:
 
 
 def simplest(able: Sequence[Candidate], bodies: tuple[Struck, ...], evidence: Evidence) -> Candidate:
-    """The best, or the one with the fewest numbers of those that strikes cannot tell from it: SURE standard errors of the difference, ALIKE of what it says.
+    """The best, or the one with the fewest numbers of those that strikes cannot tell from it: two standard errors of the difference, ALIKE of what it says.
 
-    Where another with no more numbers says nearly as much (NEARLY), the lines' phases may speak for that one (ties.py): by CLEAR, or by HINT where it is ALIKE.
+    Where another with no more numbers says nearly as much (NEARLY), the lines' phases may speak for that one (phase_test.py): by CLEAR, or by HINT where it is ALIKE.
     Of two that only change decays the lines' own decays tell, by BIC. Effects that move modes stand aside: corrections are learnt anew beside them, and are numbers too.
     """
     best = able[0]
-    if moves_itself(best.hypothesis, best.effect) or len(able) == 1:  # by lines alone one may be named that strikes speak against
+    if moves_itself(best.hypothesis, best.effect) or len(able) == 1:  # by lines alone one may be accepted that strikes speak against
         return best
 
     def close(c: Candidate, share: float) -> bool:

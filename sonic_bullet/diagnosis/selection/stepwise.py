@@ -1,9 +1,9 @@
-"""The loop: try all suspects, add the best that earns its keep, look again; fit them to each other; then say what is known and what is not.
+"""Stepwise selection: try all candidate effects, add the best that is accepted, look again; fit them to each other; then say what is known and what is not.
 
     one by one -> fitted to each other, exchanged, pruned -> verdict
-    two at once (twos.py) where every one leaves most of the gap open, or all of them did at the end; a room heard anew beside what moves modes
+    two at once (pairwise.py) where every one leaves most of the gap open, or all of them did at the end; a room identified anew beside what moves modes
 
-gap = before − floor on left-out strikes; which effect earns its keep is said in candidate.py
+gap = before − floor on left-out strikes; which effect is accepted is said in acceptance.py
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from sonic_bullet.diagnosis.evidence.refit import refitted, reidentified
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, mixes_neighbours, moves_itself
 from sonic_bullet.diagnosis.prediction.score import Comparable, Compared, Incomparable, Judged, LeftOut, comparable, least_db, mean_db
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
-from sonic_bullet.diagnosis.selection.acceptance import FAINT_DB, LEAST_DB, Candidate, earns
+from sonic_bullet.diagnosis.selection.acceptance import FAINT_DB, LEAST_DB, Candidate, accepted
 from sonic_bullet.diagnosis.selection.band_levels import BandOff, bands_off
 from sonic_bullet.diagnosis.selection.coherent_residual import of_no_body
-from sonic_bullet.diagnosis.selection.cross_validation import trials
+from sonic_bullet.diagnosis.selection.cross_validation import cross_validated
 from sonic_bullet.diagnosis.selection.exchange import chosen, exchanged, rivals
 from sonic_bullet.diagnosis.selection.pairwise import in_a_room, pairwise
 from sonic_bullet.diagnosis.selection.simplest import by_lines, helps, pruned, simplest
@@ -38,7 +38,7 @@ OPEN = 0.3  # of the first gap: with less left, no costly suspect is asked
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Closed:
-    """How the loop ended. added: the candidate of each round that is still there at the end. tried: every suspect in the last round in
+    """How the selection ended. added: the candidate of each round that is still there at the end. tried: every candidate effect in the last round in
     which it was asked and had something to say. mesh_off: of a frequency, what the mesh is off by where that is why the verdict stands.
 
     bands: where what is played is not as loud as what was recorded, which is why the verdict is not `none`. judged, left_out: what the
@@ -61,7 +61,7 @@ class Closed:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NothingCompared:
-    """A loop that never began: no distance is known, so nothing is. left_out: what could not be compared, and why; empty where nothing was measured."""
+    """A selection that never began: no distance is known, so nothing is. left_out: what could not be compared, and why; empty where nothing was measured."""
 
     before: Hypothesis
     left_out: tuple[LeftOut, ...]
@@ -84,7 +84,7 @@ def closed(
     seed: int = 0,
     progress: Callable[[str], None] | None = None,
 ) -> Closed | NothingCompared:
-    """Run it on fitted strikes alone, those that can be compared."""
+    """Select effects on fitted strikes alone, those that can be compared."""
     say = progress or (lambda _: None)
     start = refitted(base, bodies)
     found = comparable(takes, start)
@@ -103,7 +103,7 @@ def _closed(
     seed: int,
     say: Callable[[str], None],
 ) -> Closed:
-    """The loop over what can be compared."""
+    """The selection over what can be compared."""
     takes = found.takes
     before = mean_db(takes, start)
     one = _one_by_one(start, bodies, takes, effects, band_hz, seed=seed, say=say)
@@ -112,8 +112,8 @@ def _closed(
     verdict, off, by = _verdict(h, added, before, now, floor, bodies, takes, seed), 0.0, h
     if verdict == "unexplained":
         verdict, off, by = _by_a_finer_mesh(start, h, added, before, bodies, takes, seed)
-    if verdict == "unexplained" and not one.pairwise and (two := pairwise(start, one.first, bodies, takes, band_hz, seed=seed, say=say)):
-        h, added = two
+    if verdict == "unexplained" and not one.pairwise and (pair := pairwise(start, one.first, bodies, takes, band_hz, seed=seed, say=say)):
+        h, added = pair
         last |= {c.id: c for c in added}
         now, floor = mean_db(takes, h), least_db(takes, h)
         verdict, off = _verdict(h, added, before, now, floor, bodies, takes, seed), 0.0
@@ -127,7 +127,7 @@ def _closed(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rounds:
-    """Where round after round came to. first, last: all suspects of the first round, and each as it was when asked last. pairwise: whether twos were tried."""
+    """Where round after round came to. first, last: all candidates of the first round, and each as it was when asked last. pairwise: whether pairs were tried."""
 
     h: Hypothesis
     added: list[Candidate]
@@ -147,7 +147,7 @@ def _one_by_one(
     seed: int,
     say: Callable[[str], None],
 ) -> Rounds:
-    """The best of every round added, until nothing earns its keep; then fitted to each other."""
+    """The best of every round added, until nothing is accepted; then fitted to each other."""
     h = start
     before = now = mean_db(takes, h)
     floor = least_db(takes, h)
@@ -162,33 +162,33 @@ def _one_by_one(
             break  # so little is what a mesh gets wrong
         evidence = evidence_of(h, bodies, band_hz, seed=seed)
         full = reidentified(h, bodies)  # a room's response is the lines' so far, which leaves open more than there is
-        told = now if full is h else mean_db(takes, full)
-        costly = told - floor > OPEN * (before - floor)
-        found = trials(h, bodies, takes, evidence, effects, seed=seed + turn, say=say, costly=costly)
+        reidentified_db = now if full is h else mean_db(takes, full)
+        costly = reidentified_db - floor > OPEN * (before - floor)
+        found = cross_validated(h, bodies, takes, evidence, effects, seed=seed + turn, say=say, costly=costly)
         last |= {c.id: c for c in found}
-        two, able = None, _able(found, bodies, takes, now, told, floor, first=not added)
+        pair, acceptable = None, _acceptable(found, bodies, takes, now, reidentified_db, floor, first=not added)
         if not added:
             first, weak = found, all(mean_db(takes, c.hypothesis) - floor > WEAK * max(now - floor, 0.0) for c in found)
-            two = pairwise(start, found, bodies, takes, band_hz, seed=seed, say=say) if weak else None
-        two = two or _anew(h, able, found, bodies, takes, band_hz, seed, say)
-        if not (two or able) and costly and (late := _waited(found, evidence, effects)):
-            found = trials(h, bodies, takes, evidence, late, seed=seed + turn, say=say, costly=costly)
+            pair = pairwise(start, found, bodies, takes, band_hz, seed=seed, say=say) if weak else None
+        pair = pair or _room_anew(h, acceptable, found, bodies, takes, band_hz, seed, say)
+        if not (pair or acceptable) and costly and (late := _deferred(found, evidence, effects)):
+            found = cross_validated(h, bodies, takes, evidence, late, seed=seed + turn, say=say, costly=costly)
             last |= {c.id: c for c in found}
-            able = _able(found, bodies, takes, now, told, floor, first=not added)
-            two = _anew(h, able, found, bodies, takes, band_hz, seed, say)
-        if two:
-            (h, added), passed = two, [(), ()]
+            acceptable = _acceptable(found, bodies, takes, now, reidentified_db, floor, first=not added)
+            pair = _room_anew(h, acceptable, found, bodies, takes, band_hz, seed, say)
+        if pair:
+            (h, added), passed = pair, [(), ()]
             last |= {c.id: c for c in added}
             now, floor = mean_db(takes, h), least_db(takes, h)
             continue
-        if not able:
+        if not acceptable:
             break
-        best = simplest(able, bodies, evidence)
-        h, added, passed = best.hypothesis, [*added, best], [*passed, rivals(able, best)]
+        best = simplest(acceptable, bodies, evidence)
+        h, added, passed = best.hypothesis, [*added, best], [*passed, rivals(acceptable, best)]
         if isinstance(best.effect, Dereverberates) and mean_db(takes, h) > now:
             h = reidentified(h, bodies)  # a room's response by lines so far off that it sounds worse than none
         if len(added) > 1 and any(isinstance(e, Alternatives) for e in h.effects):
-            h = chosen(h, bodies, takes, band_hz)  # or a third name is found for what only the other choice would say
+            h = chosen(h, bodies, takes, band_hz)  # or a third effect is found for what only the other choice would say
         now = mean_db(takes, h)
         floor = least_db(takes, h)
     if len(added) > 1:
@@ -199,15 +199,17 @@ def _one_by_one(
     return Rounds(again if again is not h and mean_db(takes, again) < now else h, added, first, last, floor, weak)
 
 
-def _able(found: Sequence[Candidate], bodies: tuple[Struck, ...], takes: Comparable, now: float, told: float, floor: float, *, first: bool) -> list[Candidate]:
+def _acceptable(
+    found: Sequence[Candidate], bodies: tuple[Struck, ...], takes: Comparable, now: float, reidentified_db: float, floor: float, *, first: bool
+) -> list[Candidate]:
     """Those that strikes left out speak for; or, where they speak for none, the one that lines do."""
-    able = [c for c in found if earns(c, max(now - floor, 0.0), first=first) and helps(c, bodies, takes, now, told, floor, first=first)]
-    return able or sorted((c for c in found if by_lines(c, bodies, takes, told, floor)), key=lambda c: -c.lines)[:1]
+    acceptable = [c for c in found if accepted(c, max(now - floor, 0.0), first=first) and helps(c, bodies, takes, now, reidentified_db, floor, first=first)]
+    return acceptable or sorted((c for c in found if by_lines(c, bodies, takes, reidentified_db, floor)), key=lambda c: -c.lines)[:1]
 
 
-def _anew(
+def _room_anew(
     h: Hypothesis,
-    able: Sequence[Candidate],
+    acceptable: Sequence[Candidate],
     found: Sequence[Candidate],
     bodies: tuple[Struck, ...],
     takes: Comparable,
@@ -215,12 +217,14 @@ def _anew(
     seed: int,
     say: Callable[[str], None],
 ) -> tuple[Hypothesis, list[Candidate]] | None:
-    """A room that stands alone heard anew beside what moves modes (twos.py), unless something else is able to."""
-    return in_a_room(h, found, bodies, takes, band_hz, seed=seed, say=say) if all(moves_itself(h, c.effect) for c in able) and len(h.effects) == 1 else None
+    """A room that stands alone identified anew beside what moves modes (pairwise.py), unless something else is accepted."""
+    return (
+        in_a_room(h, found, bodies, takes, band_hz, seed=seed, say=say) if all(moves_itself(h, c.effect) for c in acceptable) and len(h.effects) == 1 else None
+    )
 
 
-def _waited(found: Sequence[Candidate], evidence: Evidence, effects: Sequence[type[Effect]]) -> list[type[Effect]]:
-    """The suspects that had to wait in a room for a tensor (trial.py), if that came to nothing."""
+def _deferred(found: Sequence[Candidate], evidence: Evidence, effects: Sequence[type[Effect]]) -> list[type[Effect]]:
+    """The candidates that had to wait in a room for a tensor (cross_validation.py), if that came to nothing."""
     tensor = any(c.effect.stage is Stage.MATERIAL for c in found) and any(one.dry for one in evidence.observed)
     return [k for k in effects if mixes_neighbours(k) and tensor and k.id not in {c.id for c in found}]
 
@@ -228,7 +232,7 @@ def _waited(found: Sequence[Candidate], evidence: Evidence, effects: Sequence[ty
 def _verdict(
     h: Hypothesis, added: Sequence[Candidate], before: float, now: float, floor: float, bodies: tuple[Struck, ...], takes: Comparable, seed: int
 ) -> str:
-    """What is known: a name for less than EXPLAINED of what is seen would be a guess, unless what is left is what a mesh gets wrong."""
+    """What is known: an effect that closes less than EXPLAINED of the gap would be a guess, unless what is left is what a mesh gets wrong."""
     gap, left = before - floor, now - floor
     if not added:
         excused = gap < SUFFICES_DB or (gap < of_the_mesh(h, bodies, takes, seed) and of_no_body(h, takes) < NO_BODY)
