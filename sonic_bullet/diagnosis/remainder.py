@@ -15,7 +15,8 @@ from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, play
 from sonic_bullet.diagnosis.prediction.score import LeftOut, Take
 from sonic_bullet.diagnosis.selection.band_levels import in_words
 from sonic_bullet.diagnosis.selection.coherent_residual import of_no_body
-from sonic_bullet.diagnosis.selection.stepwise import NO_BODY, Closed, NothingCompared
+from sonic_bullet.diagnosis.selection.stepwise import Closed, NothingCompared
+from sonic_bullet.diagnosis.selection.thresholds import RULES
 from sonic_bullet.effects.room.shifted_echo import copied
 from sonic_bullet.records import Array
 
@@ -56,7 +57,7 @@ def remainder(end: Closed | NothingCompared, takes: Sequence[Take]) -> dict[str,
     if len(total) > 1:
         words += "; it differs from place to place" if scatter > 0.5 else "; it is alike wherever the body is struck"
     strange = of_no_body(end.after, takes)
-    if strange > NO_BODY:
+    if strange > RULES.no_body_share:
         words += "; modes of one frequency, decay and phase each, whatever they are, do not play it: something goes with time or level, or is noise"
     again = _again(takes)
     if again is not None:

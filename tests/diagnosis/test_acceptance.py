@@ -1,4 +1,4 @@
-"""Which suspect earns its keep, by what it gained on each strike left out; and which still may, that has been asked on some of them."""
+"""Which candidate effect is accepted, by what it gained on each strike left out; and which still may, that has been asked on some of them."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sonic_bullet.diagnosis.selection.acceptance import LEAST_DB, Candidate, accepted, may_be_accepted, needed
+from sonic_bullet.diagnosis.selection.acceptance import Candidate, accepted, may_be_accepted, needed
+from sonic_bullet.diagnosis.selection.thresholds import RULES
 from sonic_bullet.effects.amplitude_pitch import AmplitudePitch
 from sonic_bullet.effects.radiation import Radiation
 
@@ -18,8 +19,8 @@ def candidate(*drop_db: float, null_db: float = 0.0) -> Candidate:
 
 def test_less_will_do_where_it_is_most_of_what_is_open() -> None:
     told = [needed(gap, first=True) for gap in (10.0, 2.0, 0.5, 0.1)]
-    assert told == pytest.approx([0.8, LEAST_DB, 0.25, 0.2])
-    assert [needed(gap, first=False) for gap in (10.0, 2.0, 0.5, 0.1)] == pytest.approx([0.8, LEAST_DB, LEAST_DB, LEAST_DB])
+    assert told == pytest.approx([0.8, RULES.least_drop_db, 0.25, 0.2])
+    assert [needed(gap, first=False) for gap in (10.0, 2.0, 0.5, 0.1)] == pytest.approx([0.8, RULES.least_drop_db, RULES.least_drop_db, RULES.least_drop_db])
     assert accepted(candidate(0.3, 0.31, 0.29, 0.3, 0.3), 0.5, first=True)
     assert not accepted(candidate(0.3, 0.31, 0.29, 0.3, 0.3), 0.5, first=False), "what a name leaves may be its own fit's"
     assert not accepted(candidate(0.3, 0.31, 0.29, 0.3, 0.3), 2.0, first=True), "a drop of a seventh is a mesh's"
@@ -73,7 +74,7 @@ def test_a_suspect_has_hope_as_long_as_the_rest_may_make_up_for_it(drop: tuple[f
 
 @pytest.mark.parametrize("certain", [False, True])
 @pytest.mark.parametrize("strikes", [3, 4, 5, 8])
-def test_whatever_earns_its_keep_had_hope(strikes: int, certain: bool) -> None:
+def test_whatever_is_accepted_had_hope(strikes: int, certain: bool) -> None:
     """Gains drawn at random below what is open, on strikes of which some have far more open than others: to gain all of that on one would make the mean unsure."""
     rng, kept = np.random.default_rng(strikes), 0
     for _ in range(1500):

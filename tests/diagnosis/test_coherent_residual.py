@@ -13,6 +13,7 @@ from sonic_bullet.diagnosis.remainder import remainder
 from sonic_bullet.diagnosis.selection import stepwise as loop
 from sonic_bullet.diagnosis.selection.acceptance import Candidate
 from sonic_bullet.diagnosis.selection.coherent_residual import of_no_body, out_of_phase
+from sonic_bullet.diagnosis.selection.thresholds import RULES
 from sonic_bullet.effects import Effect
 from sonic_bullet.effects.contact_time import ContactTime
 from sonic_bullet.effects.damping_law import DampingLaw
@@ -82,7 +83,7 @@ def test_a_swing_is_no_meshs_however_wrong_a_mesh_is(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(loop, "refitted", lambda h, _: h)
     monkeypatch.setattr(loop, "beyond", lambda h, *_: (h, 0.0))
     end = loop.closed(off, (body,), takes_of((body,)), (), BAND)
-    assert end.before_db - end.floor_db > loop.SUFFICES_DB
+    assert end.before_db - end.floor_db > RULES.suffices_db
     assert end.verdict == verdict
     if depth > 0:
         assert "do not play it" in remainder(end, takes_of((body,)))["words"]

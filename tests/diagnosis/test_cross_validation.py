@@ -19,7 +19,8 @@ from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis
 from sonic_bullet.diagnosis.prediction.score import mean_db
 from sonic_bullet.diagnosis.selection import stepwise as loop
 from sonic_bullet.diagnosis.selection.acceptance import Candidate, accepted
-from sonic_bullet.diagnosis.selection.cross_validation import KEPT, _folds, cross_validated
+from sonic_bullet.diagnosis.selection.cross_validation import _folds, cross_validated
+from sonic_bullet.diagnosis.selection.thresholds import RULES
 from sonic_bullet.effects import EFFECTS
 from sonic_bullet.effects.amplitude_damping import AmplitudeDamping
 from sonic_bullet.effects.orthotropy import Orthotropy
@@ -192,7 +193,7 @@ def test_trials_tell_what_has_numbers_of_single_lines_all_lines(monkeypatch: pyt
     count = len(told.observed[0].freq_hz)
     cross_validated(h, (body,), takes, told, (Listens, Part, Searches), seed=0, say=lambda _: None)
     assert {n for who, n in asked if who in ("listens", "searches")} == {count}
-    assert {n for who, n in asked if who == "part"} == {count, round(KEPT * count)}
+    assert {n for who, n in asked if who == "part"} == {count, round(RULES.kept_lines_share * count)}
     asked.clear()
     cross_validated(h, (body,), takes, replace(told, found=("room", "radiation")), (Listens, Searches), seed=0, say=lambda _: None, costly=False)
     assert {who for who, _ in asked} == {"listens"}
@@ -256,8 +257,9 @@ def test_dashpots_are_asked_after_a_tensor_that_came_to_nothing(monkeypatch: pyt
     monkeypatch.setattr(loop, "cross_validated", told)
     anew: list[list[str]] = []
     monkeypatch.setattr(loop, "in_a_room", lambda _, found, *__, **___: anew.append([c.id for c in found]))
-    monkeypatch.setattr(loop, "in_twos", lambda *_, **__: None)
-    monkeypatch.setattr(loop, "OPEN", -1.0)  # however little the room leaves
+    monkeypatch.setattr(loop, "pairwise", lambda *_, **__: None)
+    monkeypatch.setattr(loop, "RULES", replace(RULES, costly_open_share=RULES.costly_open_share.at(1e-9)))  # however little the room leaves
+    monkeypatch.setattr(loop, "reidentified", lambda h, *_, **__: h)  # which leaves less than noise does
     end = loop.closed(fitted(body), (body,), takes, EFFECTS, BAND)
     every = [kind.id for kind in EFFECTS]
     assert asked == [every, every, ["support-damping"]]
@@ -271,7 +273,7 @@ def test_a_lines_own_numbers_are_tried_with_all_lines() -> None:
     takes, h = takes_of((body,)), refitted(fitted(body), (body,))
     told = evidence_of(h, (body,), BAND)
     count = len(told.observed[0].freq_hz)
-    for keep in (KEPT, 1.0):
+    for keep in (RULES.kept_lines_share, 1.0):
         for i, fold in enumerate(_folds(h, (body,), takes, told, 0, keep=keep)):
             less = fold.evidence.observed[0]
             assert len(less.freq_hz) == round(keep * count)

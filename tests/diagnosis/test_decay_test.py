@@ -13,7 +13,8 @@ from sonic_bullet.diagnosis.prediction.score import Take, least_db, mean_db
 from sonic_bullet.diagnosis.selection.acceptance import Candidate
 from sonic_bullet.diagnosis.selection.cross_validation import cross_validated
 from sonic_bullet.diagnosis.selection.decay_test import likelier, tells
-from sonic_bullet.diagnosis.selection.simplest import LINES, by_lines, helps
+from sonic_bullet.diagnosis.selection.simplest import by_lines, helps
+from sonic_bullet.diagnosis.selection.thresholds import RULES
 from sonic_bullet.effects.added_mass import AddedMass
 from sonic_bullet.effects.contact_time import ContactTime
 from sonic_bullet.effects.damping_law import DampingLaw
@@ -46,13 +47,13 @@ def tried(*effects: DampingLaw) -> tuple[list[Candidate], bool]:
 
 def test_a_law_in_a_room_is_told_by_lines() -> None:
     found, named = tried(LAW)
-    assert found[0].lines > LINES
+    assert found[0].lines > RULES.line_gain
     assert named
 
 
 def test_rayleighs_own_damping_in_a_room_is_no_law() -> None:
     found, named = tried()
-    assert all(c.lines < LINES for c in found)
+    assert all(c.lines < RULES.line_gain for c in found)
     assert not named
 
 

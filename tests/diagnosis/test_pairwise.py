@@ -14,6 +14,7 @@ from sonic_bullet.diagnosis.prediction.score import Take
 from sonic_bullet.diagnosis.selection import pairwise as twos
 from sonic_bullet.diagnosis.selection.acceptance import Candidate
 from sonic_bullet.diagnosis.selection.pairwise import in_a_room, pairwise
+from sonic_bullet.diagnosis.selection.thresholds import RULES
 from sonic_bullet.effects import Effect
 from sonic_bullet.effects.added_mass import AddedMass
 from sonic_bullet.effects.contact_time import ContactTime
@@ -100,7 +101,7 @@ def test_a_mass_in_a_room_is_heard_with_a_response_of_its_own() -> None:
 def test_a_room_alone_needs_no_mass(monkeypatch: pytest.MonkeyPatch) -> None:
     """Nor by its trial alone, were any two that leave less than all let through to it: the room told again without the mass says more."""
     assert heard_anew((ROOM,), MASS) is None
-    monkeypatch.setattr(twos, "LEFT", np.inf)
+    monkeypatch.setattr(twos, "RULES", replace(RULES, pair_leaves_share=RULES.pair_leaves_share.at(1.0)))
     assert heard_anew((ROOM,), MASS) is None
 
 

@@ -27,14 +27,9 @@ from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.diagnosis.selection.acceptance import Candidate, accepted, jackknife, may_be_accepted, mean
 from sonic_bullet.diagnosis.selection.control_effect import Null
 from sonic_bullet.diagnosis.selection.decay_test import likelier, tells
+from sonic_bullet.diagnosis.selection.thresholds import RULES
 from sonic_bullet.effects.protocol import Cost, Dereverberates, Effect, Evidence, RotatesPairs, Stage
 from sonic_bullet.parallel import parallel_map
-
-KEPT = 0.75  # of the lines, in every fold
-DRAWS = 2  # of the null effect
-FIRST = 2  # strikes left out, after which a suspect is let go that could not earn its keep any more (may_earn)
-ENOUGH = 2  # names: what little is left beside them is worth no search of half a minute
-PLAIN = 0.6  # of the gap: where a cheap suspect says as much, costly ones wait
 
 
 def cross_validated(
@@ -48,7 +43,7 @@ def cross_validated(
     say: Any,
     costly: bool = True,
 ) -> list[Candidate]:
-    """Every candidate that the whole evidence suggests, cross-validated; best first. costly: whether those that take long are asked, and that search once ENOUGH have been found."""
+    """Every candidate that the whole evidence suggests, cross-validated; best first. costly: whether those that take long are asked, and that search once enough_effects have been found."""
     found: list[Candidate] = []
     if len(takes) < 2:
         return found  # nothing can be left out
@@ -61,7 +56,7 @@ def cross_validated(
     fair = cache(lambda by_line: _learnt_anew(anew(), whole_lines() if by_line else folds))
     still = cache(lambda by_line: _at_rest_folds(whole_lines() if by_line else folds))
     gap = mean([f.before - f.noise for f in folds])
-    idle = not costly and len(evidence.found) >= ENOUGH
+    idle = not costly and len(evidence.found) >= RULES.enough_effects
     dry = any(one.dry for one in evidence.observed)
     kinds = [kind for kind in effects if kind.id not in evidence.found and not (idle and kind.traits.cost is Cost.SEARCHES)]
     for group in _groups(kinds, late=dry and costly):
@@ -69,7 +64,7 @@ def cross_validated(
             break  # what others say of lines that a room has made is hearsay: in the next round they are dereverberated
         if dry and mixes_neighbours(group[0]) and len(kinds) > len(group) and any(c.effect.stage is Stage.MATERIAL for c in found):
             continue  # lines that were paired with another material's modes tell little of what mixes these
-        if group[0].traits.cost is Cost.COSTLY and (not costly or any(c.mean_db > PLAIN * gap for c in found)):
+        if group[0].traits.cost is Cost.COSTLY and (not costly or any(c.mean_db > RULES.cheap_share * gap for c in found)):
             continue  # something cheap says most of it: what is left may ask for more in the next round
         if group[0].traits.cost is Cost.COSTLY:
             say(f"searching for {group[0].id}")
@@ -120,7 +115,7 @@ class Fold:
     noise: float
 
 
-def _folds(h: Hypothesis, bodies: tuple[Struck, ...], takes: Comparable, evidence: Evidence, seed: int, keep: float = KEPT) -> list[Fold]:
+def _folds(h: Hypothesis, bodies: tuple[Struck, ...], takes: Comparable, evidence: Evidence, seed: int, keep: float = RULES.kept_lines_share) -> list[Fold]:
     """Without one strike each, and with a part of the lines, keep of them: all for an effect with numbers of single lines, which other lines do not determine and other strikes do."""
     rng = np.random.default_rng([seed, 1])
     made = []
@@ -175,14 +170,14 @@ def _cross_validated(kind: type[Effect], whole: Effect, h: Hypothesis, bodies: t
         if effect is None:
             return Gain()
         free = effect.freedom() - (effect.angles() if isinstance(effect, RotatesPairs) else 0)  # such axes are whole's (Evidence.on_trial)
-        random = [Null.fitted(less, min(free, 8), 10 * i + draw) for draw in range(DRAWS)]
+        random = [Null.fitted(less, min(free, RULES.control_numbers), 10 * i + draw) for draw in range(RULES.control_draws)]
         augmented = _augmented(fold, effect)
         after = fold.take.distance(augmented)
         chance = tuple(fold.before - fold.take.distance(_augmented(fold, none)) for none in random if none is not None)
         lines = likelier(fold.base, augmented, evidence, less, bodies) if isinstance(fold.take, Take) and tells(h, effect) else 0.0
         return Gain(effect, fold.least - after, fold.before - after, chance, lines)
 
-    found = parallel_map(judged, range(min(FIRST, len(folds))))
+    found = parallel_map(judged, range(min(RULES.first_strikes, len(folds))))
     asked = Candidate(kind.id, whole, h, np.array([g.drop_db for g in found]), 0.0, 0.0, {}, impulse_n_s=_levels(folds))
     if may_be_accepted(asked, np.array([f.least - f.noise for f in folds]), mean([f.before - f.noise for f in folds])) or tells(
         h, whole
@@ -190,7 +185,7 @@ def _cross_validated(kind: type[Effect], whole: Effect, h: Hypothesis, bodies: t
         found += parallel_map(judged, range(len(found), len(folds)))
     added = refitted(replace(h, effects=(*h.effects, whole)), bodies, evidence.observed)
     drop, whole_db, null_db = np.array([g.drop_db for g in found]), mean([g.whole_db for g in found]), mean([x for g in found for x in g.null_db])
-    lines = mean([g.lines for g in found]) / (1 - KEPT)  # each line is left out in so many of the folds
+    lines = mean([g.lines for g in found]) / (1 - RULES.kept_lines_share)  # each line is left out in so many of the folds
     level = _levels(folds[: len(found)])
     return Candidate(kind.id, whole, added, drop, whole_db, null_db, jackknife([g.effect.parameters() for g in found if g.effect is not None]), lines, level)
 

@@ -12,11 +12,9 @@ import numpy as np
 
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, modes_of, moves_itself
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.diagnosis.selection.thresholds import RULES
 from sonic_bullet.effects.protocol import Dereverberates, Effect, Evidence, ObjectEvidence, Stage
 from sonic_bullet.records import Array
-
-SCATTER = 0.02  # of a decay about its law, relative
-WIDTH = 2.0  # spreads within which Cauchy's loss is quadratic
 
 
 def of_decays(h: Hypothesis, effect: Effect) -> bool:
@@ -65,7 +63,7 @@ def likelier(without: Hypothesis, augmented: Hypothesis, every: Evidence, traini
 def _cost(model_per_s: Array, mode: tuple[Array, ...], decay_per_s: Array, sd_per_s: Array) -> Array:
     """ρ (k,) of lines' decays (k,) against those of the modes (m,) each stands for."""
     model = np.array([model_per_s[m].mean() for m in mode])
-    sd = np.hypot(np.nan_to_num(sd_per_s / decay_per_s, nan=0.05, posinf=1e3), SCATTER)
+    sd = np.hypot(np.nan_to_num(sd_per_s / decay_per_s, nan=0.05, posinf=1e3), RULES.decay_scatter)
     with np.errstate(divide="ignore"):
         z = np.log(decay_per_s / np.maximum(model, 1e-9)) / sd
-    return np.asarray(WIDTH**2 * np.log1p((z / WIDTH) ** 2))
+    return np.asarray(RULES.cauchy_width**2 * np.log1p((z / RULES.cauchy_width) ** 2))

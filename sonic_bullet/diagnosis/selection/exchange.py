@@ -18,25 +18,22 @@ from sonic_bullet.diagnosis.evidence.refit import refitted, with_effects
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, moves
 from sonic_bullet.diagnosis.prediction.score import Comparable, Judged, Take, mean_db
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
-from sonic_bullet.diagnosis.selection.acceptance import MANY, STANDARD_ERRORS, Candidate
+from sonic_bullet.diagnosis.selection.acceptance import Candidate
 from sonic_bullet.diagnosis.selection.decay_test import misfit, of_decays
-from sonic_bullet.diagnosis.selection.phase_test import HINT, NEARLY
 from sonic_bullet.diagnosis.selection.phase_test import misfit as phases
+from sonic_bullet.diagnosis.selection.thresholds import RULES
 from sonic_bullet.effects.protocol import Alternatives, Dereverberates, Effect, Evidence
 from sonic_bullet.parallel import parallel_map
 from sonic_bullet.records import Array
 
 TURNS = 2
-RIVAL = 0.5  # of what the best of a round said alone
-FAR_DB = 1.0  # on the fitted strikes, before the rest is fitted to it: more than that takes up
-ALIKE = 0.03  # of what a name says: those that differ by less are not told apart
 
 Less = Callable[[Evidence], Evidence]
 
 
 def rivals(found: Sequence[Candidate], best: Candidate) -> tuple[Candidate, ...]:
     """Of a round's accepted candidates, those that the best may stand before by chance, or by what else the model lacks."""
-    return tuple(c for c in found if c is not best and c.mean_db > RIVAL * best.mean_db)
+    return tuple(c for c in found if c is not best and c.mean_db > RULES.rival_share * best.mean_db)
 
 
 def together(h: Hypothesis, bodies: tuple[Struck, ...], band_hz: tuple[float, float], *, turns: int = TURNS, less: Less = lambda e: e) -> Hypothesis:
@@ -121,15 +118,15 @@ def exchanged(
             effects = tuple(rival.effect if e.id == own.id else e for e in best.effects)
             place = next(k for k, e in enumerate(effects) if e.id == rival.id)
             other = again(refitted(with_effects(best, effects, bodies), bodies), place, bodies, band_hz)
-            if mean_db(takes, other) > mean_db(takes, best) + FAR_DB:
+            if mean_db(takes, other) > mean_db(takes, best) + RULES.far_rival_db:
                 continue  # it would have to gain by strikes it never saw
             other = settled(other, bodies, takes, band_hz)
             far = left_out_db(best, place, bodies, takes, band_hz) if far is None else far
             now = left_out_db(other, place, bodies, takes, band_hz)
             gain = far - now
             if (
-                significant(gain, ALIKE * rival.mean_db)
-                and not (np.nanmean(gain) < NEARLY * rival.mean_db and phases_against(best, other, bodies))
+                significant(gain, RULES.alike_share * rival.mean_db)
+                and not (np.nanmean(gain) < RULES.phases_decide_share * rival.mean_db and phases_against(best, other, bodies))
                 and not decays_against(other.effects[place], best, other, place, bodies, band_hz)
             ):
                 best, far, names = other, now, names - {own.id} | {rival.id}
@@ -155,12 +152,12 @@ def phases_against(best: Hypothesis, other: Hypothesis, bodies: tuple[Struck, ..
     if moves(best) or moves(other) or dry[0] != dry[1]:
         return False
     mine, its = phases(best, bodies), phases(other, bodies)
-    return bool(np.isfinite([mine, its]).all() and its > mine + HINT)
+    return bool(np.isfinite([mine, its]).all() and its > mine + RULES.hint_of_phases)
 
 
 def significant(gain_db: Array, least_db: float) -> bool:
     """Whether strikes agree that there is a gain (s,), and more than least_db."""
     if len(gain_db) < 2 or gain_db.mean() <= least_db:
         return False
-    none_loses = len(gain_db) >= MANY and gain_db.min() > -0.1 * gain_db.mean()
-    return bool(none_loses or gain_db.mean() > STANDARD_ERRORS * gain_db.std(ddof=1) / np.sqrt(len(gain_db)))
+    none_loses = len(gain_db) >= RULES.many_strikes and gain_db.min() > -RULES.loss_share * gain_db.mean()
+    return bool(none_loses or gain_db.mean() > RULES.standard_errors * gain_db.std(ddof=1) / np.sqrt(len(gain_db)))

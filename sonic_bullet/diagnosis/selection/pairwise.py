@@ -24,12 +24,11 @@ from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.diagnosis.selection.acceptance import Candidate, accepted
 from sonic_bullet.diagnosis.selection.cross_validation import cross_validated
 from sonic_bullet.diagnosis.selection.exchange import again
-from sonic_bullet.diagnosis.selection.phase_test import CLEAR, NEARLY, misfit
+from sonic_bullet.diagnosis.selection.phase_test import misfit
 from sonic_bullet.diagnosis.selection.simplest import helps
+from sonic_bullet.diagnosis.selection.thresholds import RULES
 from sonic_bullet.effects.protocol import Dereverberates
 from sonic_bullet.parallel import parallel_map
-
-LEFT = 0.25  # of the gap: two at once are twice as many choices, so they must say more than one after another
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,7 +68,7 @@ def pairwise(
     pairs = [pair for some in parallel_map(augmented, first) for pair in some]
     floor = least_db(takes, start)
     gap = mean_db(takes, start) - floor
-    if not pairs or min(pair.db for pair in pairs) - floor > LEFT * gap:
+    if not pairs or min(pair.db for pair in pairs) - floor > RULES.pair_leaves_share * gap:
         return None
     h = _likeliest(pairs, floor + gap, bodies)
     closer = again(again(h, 0, bodies, band_hz, afresh=True), 1, bodies, band_hz)  # what was found alone had the other's share to explain, too
@@ -113,7 +112,7 @@ def in_a_room(
         [c for c in movers if mixes_neighbours(c.effect)],
     ):  # what hardly moves modes is asked where nothing else will do
         best = min((pair for pair in parallel_map(augmented, some) if pair is not None), key=lambda pair: pair.db, default=None)
-        if best is not None and best.db - floor <= LEFT * (left - floor):
+        if best is not None and best.db - floor <= RULES.pair_leaves_share * (left - floor):
             break
     else:
         return None
@@ -142,9 +141,9 @@ def _accepted_together(
 def _likeliest(pairs: Sequence[Pair], before_db: float, bodies: tuple[Struck, ...]) -> Hypothesis:
     """The nearest to the strikes; or, of those that share the effect that moves modes, and say nearly as much, the one for which phases speak clearly (phase_test.py)."""
     best = min(pairs, key=lambda pair: pair.db)
-    near = best.db + NEARLY * (before_db - best.db)
+    near = best.db + RULES.phases_decide_share * (before_db - best.db)
     others = [pair.h for pair in pairs if pair.db < near and _movers(pair.h) == _movers(best.h)]
-    off = [misfit(h, bodies) + CLEAR for h in others]
+    off = [misfit(h, bodies) + RULES.clear_phases for h in others]
     own = misfit(best.h, bodies)
     return others[int(np.argmin(off))] if np.isfinite(own) and min(off) < own else best.h
 

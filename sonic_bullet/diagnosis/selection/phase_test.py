@@ -19,8 +19,6 @@ from sonic_bullet.records import Array
 DELAYS_S = np.arange(-4e-4, 4.01e-4, 1e-5)
 FINER_S = np.linspace(-1e-5, 1e-5, 21)  # half a step of the coarse ones is a sixth of a radian at 5 kHz
 TURNS = 15
-NEARLY = 0.2  # of what a name says: between two that differ by less, phases may decide
-CLEAR, HINT = 25.0, 5.0  # twice the ln likelihood of phases that this takes; where the two are ALIKE (exchange.py), or to leave a name as it is
 
 
 def misfit(h: Hypothesis, bodies: tuple[Struck, ...]) -> float:

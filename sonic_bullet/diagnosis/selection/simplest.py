@@ -13,16 +13,12 @@ from sonic_bullet.diagnosis.evidence.refit import refitted, reidentified, with_e
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, moves, moves_itself
 from sonic_bullet.diagnosis.prediction.score import Comparable, mean_db
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
-from sonic_bullet.diagnosis.selection.acceptance import STANDARD_ERRORS, Candidate, needed
+from sonic_bullet.diagnosis.selection.acceptance import Candidate, needed
 from sonic_bullet.diagnosis.selection.decay_test import misfit as decays
 from sonic_bullet.diagnosis.selection.decay_test import numbers, of_decays, tells
-from sonic_bullet.diagnosis.selection.exchange import ALIKE
-from sonic_bullet.diagnosis.selection.phase_test import CLEAR, HINT, NEARLY, misfit
+from sonic_bullet.diagnosis.selection.phase_test import misfit
+from sonic_bullet.diagnosis.selection.thresholds import RULES
 from sonic_bullet.effects.protocol import Evidence
-
-HELPS = 0.5  # of what a name must gain on strikes left out, on all of them together: a model of few lines may be saved by chance once one is left out
-LINES = 6.0  # twice the ln likelihood of decays left out: what a name must gain where the room's response says the same of the strikes
-SAME = 0.1  # of what a room's response leaves open: two that differ by less say the same
 
 
 def helps(c: Candidate, bodies: tuple[Struck, ...], takes: Comparable, now: float, reidentified_db: float, floor: float, *, first: bool) -> bool:
@@ -32,7 +28,7 @@ def helps(c: Candidate, bodies: tuple[Struck, ...], takes: Comparable, now: floa
     if tells(c.hypothesis, c.effect) and not _shaped(bodies):
         return False
     before, after = reidentified_db if moves(c.hypothesis) else now, mean_db(takes, reidentified(c.hypothesis, bodies))
-    return after < reidentified_db + SAME * max(reidentified_db - floor, 0.0) and before - after > HELPS * needed(
+    return after < reidentified_db + RULES.same_share * max(reidentified_db - floor, 0.0) and before - after > RULES.helps_share * needed(
         max(before - floor, 0.0), first=first, certain=c.certain
     )
 
@@ -40,7 +36,9 @@ def helps(c: Candidate, bodies: tuple[Struck, ...], takes: Comparable, now: floa
 def by_lines(c: Candidate, bodies: tuple[Struck, ...], takes: Comparable, reidentified_db: float, floor: float) -> bool:
     """Whether lines left out speak for it (decay_test.py), and a room's response, identified again beside it, says no less than without it (reidentified_db). Without a mesh nothing tells which of a room's lines are modes."""
     return (
-        _shaped(bodies) and c.lines > LINES and mean_db(takes, reidentified(c.hypothesis, bodies)) < reidentified_db + SAME * max(reidentified_db - floor, 0.0)
+        _shaped(bodies)
+        and c.lines > RULES.line_gain
+        and mean_db(takes, reidentified(c.hypothesis, bodies)) < reidentified_db + RULES.same_share * max(reidentified_db - floor, 0.0)
     )
 
 
@@ -50,9 +48,9 @@ def _shaped(bodies: tuple[Struck, ...]) -> bool:
 
 
 def simplest(able: Sequence[Candidate], bodies: tuple[Struck, ...], evidence: Evidence) -> Candidate:
-    """The best, or the one with the fewest numbers of those that strikes cannot tell from it: two standard errors of the difference, ALIKE of what it says.
+    """The best, or the one with the fewest numbers of those that strikes cannot tell from it: two standard errors of the difference, alike_share of what it says.
 
-    Where another with no more numbers says nearly as much (NEARLY), the lines' phases may speak for that one (phase_test.py): by CLEAR, or by HINT where it is ALIKE.
+    Where another with no more numbers says nearly as much (phases_decide_share), the lines' phases may speak for that one (phase_test.py): by clear_phases, or by hint_of_phases where it is alike_share.
     Of two that only change decays the lines' own decays tell, by BIC. Effects that move modes stand aside: corrections are learnt anew beside them, and are numbers too.
     """
     best = able[0]
@@ -61,25 +59,29 @@ def simplest(able: Sequence[Candidate], bodies: tuple[Struck, ...], evidence: Ev
 
     def close(c: Candidate, share: float) -> bool:
         more = best.drop_db - c.drop_db
-        return bool(more.mean() <= STANDARD_ERRORS * more.std(ddof=1) / np.sqrt(len(more)) and more.mean() < share * best.mean_db)
+        return bool(more.mean() <= RULES.standard_errors * more.std(ddof=1) / np.sqrt(len(more)) and more.mean() < share * best.mean_db)
 
     rivals = [c for c in able if not moves_itself(c.hypothesis, c.effect)]
-    first = min((c for c in rivals if close(c, ALIKE)), key=lambda c: (numbers(c.effect), -c.mean_db))
+    first = min((c for c in rivals if close(c, RULES.alike_share)), key=lambda c: (numbers(c.effect), -c.mean_db))
     if of_decays(first.hypothesis, first.effect):
-        alike = [c for c in rivals if of_decays(c.hypothesis, c.effect) and (best.drop_db - c.drop_db).mean() < NEARLY * best.mean_db]
+        alike = [c for c in rivals if of_decays(c.hypothesis, c.effect) and (best.drop_db - c.drop_db).mean() < RULES.phases_decide_share * best.mean_db]
         first = min(alike, key=lambda c: decays(c.hypothesis, c.effect, evidence, bodies))
-    others = [c for c in rivals if c is not first and numbers(c.effect) <= numbers(first.effect) and (best.drop_db - c.drop_db).mean() < NEARLY * best.mean_db]
+    others = [
+        c
+        for c in rivals
+        if c is not first and numbers(c.effect) <= numbers(first.effect) and (best.drop_db - c.drop_db).mean() < RULES.phases_decide_share * best.mean_db
+    ]
     if not others or moves(best.hypothesis):
         return first  # phases are held against lines as they were fitted
     own = misfit(first.hypothesis, bodies)  # the less strikes say, the less phases need to
-    off = np.array([misfit(c.hypothesis, bodies) + (HINT if close(c, ALIKE) else CLEAR) for c in others])
+    off = np.array([misfit(c.hypothesis, bodies) + (RULES.hint_of_phases if close(c, RULES.alike_share) else RULES.clear_phases) for c in others])
     return others[int(off.argmin())] if np.isfinite(own) and off.min() < own else first
 
 
 def pruned(h: Hypothesis, added: list[Candidate], bodies: tuple[Struck, ...], takes: Comparable, gap_db: float) -> tuple[Hypothesis, list[Candidate]]:
     """Without the effects that those found after them have made needless."""
     for candidate in added[:-1]:
-        if candidate.lines > LINES:
+        if candidate.lines > RULES.line_gain:
             continue  # strikes need not speak for it
         rest = [e for e in h.effects if e.id != candidate.id]
         without = refitted(with_effects(h, tuple(rest), bodies), bodies)

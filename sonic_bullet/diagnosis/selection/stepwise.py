@@ -18,22 +18,15 @@ from sonic_bullet.diagnosis.evidence.refit import refitted, reidentified
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, mixes_neighbours, moves_itself
 from sonic_bullet.diagnosis.prediction.score import Comparable, Compared, Incomparable, Judged, LeftOut, comparable, least_db, mean_db
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
-from sonic_bullet.diagnosis.selection.acceptance import FAINT_DB, LEAST_DB, Candidate, accepted
+from sonic_bullet.diagnosis.selection.acceptance import Candidate, accepted
 from sonic_bullet.diagnosis.selection.band_levels import BandOff, bands_off
 from sonic_bullet.diagnosis.selection.coherent_residual import of_no_body
 from sonic_bullet.diagnosis.selection.cross_validation import cross_validated
 from sonic_bullet.diagnosis.selection.exchange import chosen, exchanged, rivals
 from sonic_bullet.diagnosis.selection.pairwise import in_a_room, pairwise
 from sonic_bullet.diagnosis.selection.simplest import by_lines, helps, pruned, simplest
+from sonic_bullet.diagnosis.selection.thresholds import RULES
 from sonic_bullet.effects.protocol import Alternatives, Dereverberates, Effect, Evidence, Stage
-
-ROUNDS = 4
-SUFFICES_DB = 1.5  # a gap below this is the mesh's and the shapes' own
-EXPLAINED = 0.5  # of the gap; part of it is the mesh's and the shapes' own
-BY_A_ROOM = 0.7  # of the gap, by a room and what is beside it: a response has a tap for every sample, so what is a room's it leaves little of
-NO_BODY = 0.5  # of what is open: with more of it left by the strikes' own lines, those that are in phase, it is no mesh's
-WEAK = 0.5  # of the gap: where every suspect leaves more, two are tried at once
-OPEN = 0.3  # of the first gap: with less left, no costly suspect is asked
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -156,19 +149,19 @@ def _one_by_one(
     first: list[Candidate] = []
     last: dict[str, Candidate] = {}
     weak = False
-    for turn in range(ROUNDS):
+    for turn in range(RULES.rounds):
         say(f"round {turn + 1}: {now:.2f} dB from the recordings, noise alone {floor:.2f} dB")
-        if now - floor < (LEAST_DB if added else FAINT_DB):
+        if now - floor < (RULES.least_drop_db if added else RULES.faint_drop_db):
             break  # so little is what a mesh gets wrong
         evidence = evidence_of(h, bodies, band_hz, seed=seed)
         full = reidentified(h, bodies)  # a room's response is the lines' so far, which leaves open more than there is
         reidentified_db = now if full is h else mean_db(takes, full)
-        costly = reidentified_db - floor > OPEN * (before - floor)
+        costly = reidentified_db - floor > RULES.costly_open_share * (before - floor)
         found = cross_validated(h, bodies, takes, evidence, effects, seed=seed + turn, say=say, costly=costly)
         last |= {c.id: c for c in found}
         pair, acceptable = None, _acceptable(found, bodies, takes, now, reidentified_db, floor, first=not added)
         if not added:
-            first, weak = found, all(mean_db(takes, c.hypothesis) - floor > WEAK * max(now - floor, 0.0) for c in found)
+            first, weak = found, all(mean_db(takes, c.hypothesis) - floor > RULES.weak_share * max(now - floor, 0.0) for c in found)
             pair = pairwise(start, found, bodies, takes, band_hz, seed=seed, say=say) if weak else None
         pair = pair or _room_anew(h, acceptable, found, bodies, takes, band_hz, seed, say)
         if not (pair or acceptable) and costly and (late := _deferred(found, evidence, effects)):
@@ -232,13 +225,15 @@ def _deferred(found: Sequence[Candidate], evidence: Evidence, effects: Sequence[
 def _verdict(
     h: Hypothesis, added: Sequence[Candidate], before: float, now: float, floor: float, bodies: tuple[Struck, ...], takes: Comparable, seed: int
 ) -> str:
-    """What is known: an effect that closes less than EXPLAINED of the gap would be a guess, unless what is left is what a mesh gets wrong."""
+    """What is known: an effect that closes less than explained_share of the gap would be a guess, unless what is left is what a mesh gets wrong."""
     gap, left = before - floor, now - floor
     if not added:
-        excused = gap < SUFFICES_DB or (gap < of_the_mesh(h, bodies, takes, seed) and of_no_body(h, takes) < NO_BODY)
+        excused = gap < RULES.suffices_db or (gap < of_the_mesh(h, bodies, takes, seed) and of_no_body(h, takes) < RULES.no_body_share)
         return "none" if excused else "unexplained"
     room = any(isinstance(e, Dereverberates) for e in h.effects)  # whose response takes up what a mesh gets wrong, too: that is no excuse
-    enough = left <= max((1 - (BY_A_ROOM if room else EXPLAINED)) * gap, SUFFICES_DB) or (not room and left <= of_the_mesh(h, bodies, takes, seed))
+    enough = left <= max((1 - (RULES.explained_by_room_share if room else RULES.explained_share)) * gap, RULES.suffices_db) or (
+        not room and left <= of_the_mesh(h, bodies, takes, seed)
+    )
     return "explained" if enough else "unexplained"
 
 
@@ -250,7 +245,7 @@ def _by_a_finer_mesh(
     if not off:
         return verdict, 0.0, start
     ideal, floor = min(mean_db(takes, far), before), least_db(takes, far)
-    if ideal - floor < SUFFICES_DB and of_no_body(start, takes) < NO_BODY:
+    if ideal - floor < RULES.suffices_db and of_no_body(start, takes) < RULES.no_body_share:
         verdict = "none"
     elif added:
         both, _ = beyond(h, bodies, takes)
