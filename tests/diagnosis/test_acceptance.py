@@ -13,8 +13,8 @@ from sonic_bullet.effects.amplitude_pitch import AmplitudePitch
 from sonic_bullet.effects.radiation import Radiation
 
 
-def candidate(*drop_db: float, null_db: float = 0.0) -> Candidate:
-    return Candidate("radiation", Radiation(0.1, 1.0), None, np.array(drop_db), float(np.mean(drop_db)), null_db, {})  # type: ignore[arg-type]
+def candidate(*drop_db: float, control_db: float = 0.0) -> Candidate:
+    return Candidate("radiation", Radiation(0.1, 1.0), None, np.array(drop_db), float(np.mean(drop_db)), control_db, {})  # type: ignore[arg-type]
 
 
 def test_less_will_do_where_it_is_most_of_what_is_open() -> None:
@@ -31,7 +31,7 @@ def test_loud_strikes_may_speak_alone_but_not_a_single_one() -> None:
     assert accepted(candidate(0.0, -0.02, 0.05, 1.1, 0.4), 0.5, first=True)
     assert not accepted(candidate(0.0, 0.0, 0.0, 0.0, 2.0), 0.5, first=True)
     assert not accepted(candidate(0.0, -0.5, 0.05, 1.1, 0.9), 0.5, first=True), "one strike speaks against it"
-    assert not accepted(candidate(0.0, -0.02, 0.05, 1.1, 0.4, null_db=0.3), 0.5, first=True), "as good as chance"
+    assert not accepted(candidate(0.0, -0.02, 0.05, 1.1, 0.4, control_db=0.3), 0.5, first=True), "as good as chance"
 
 
 def test_of_what_lines_are_sure_of_one_loud_strike_will_do() -> None:
@@ -55,7 +55,7 @@ def test_beside_another_name_the_loudest_may_speak_for_what_goes_with_level() ->
     assert not accepted(replace(sure, effect=Radiation(0.1, 1.0)), 0.9, first=False), "its lines were not asked"
     assert not accepted(replace(sure, impulse_n_s=level[::-1]), 0.9, first=False), "the softest gains"
     assert not accepted(replace(sure, drop_db=np.array([-0.2, -0.13, -0.07, -0.11, 2.9])), 0.9, first=False), "the others lose too much"
-    assert not accepted(replace(sure, null_db=2.0), 0.9, first=False), "as good as chance"
+    assert not accepted(replace(sure, control_db=2.0), 0.9, first=False), "as good as chance"
 
 
 def test_one_odd_strike_does_not_outvote_four_that_gain_much() -> None:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from sonic_bullet.diagnosis.evidence.baseline import takes_of
+from sonic_bullet.diagnosis.prediction.score import Score
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.diagnosis.remainder import remainder
 from sonic_bullet.diagnosis.selection import stepwise as loop
@@ -21,6 +22,7 @@ from sonic_bullet.effects.room import Room
 from sonic_bullet.estimator.lines.joint_lines import joint_lines
 from tests.diagnosis.test_found_again import BAND, fitted
 from tests.made.body import SR, plate, recorded, struck
+from tests.made.problems import posed
 
 
 def swung(depth: float, rate_hz: float = 9.0) -> Struck:
@@ -99,8 +101,8 @@ def test_a_room_leaves_little_whatever_is_beside_it(monkeypatch: pytest.MonkeyPa
     named: list[tuple[Effect, float]] = [(room, 10.0)] + ([(law, gain_db)] if gain_db is not None else [])
     h = replace(fitted(body), effects=tuple(e for e, _ in named))
     added = [Candidate(e.id, e, h, np.full(5, gain), gain, 0.0, {}) for e, gain in named]
-    assert loop._verdict(h, added, 20.0, left_db + 1.0, 1.0, (body,), takes_of((body,)), 0) == verdict
+    assert loop._verdict(h, added, 20.0, Score(left_db + 1.0, 1.0), posed((body,), takes_of((body,)))) == verdict
     dry = replace(h, effects=(law,))
-    assert loop._verdict(dry, added[1:] or added, 20.0, left_db + 1.0, 1.0, (body,), takes_of((body,)), 0) == "explained", (
+    assert loop._verdict(dry, added[1:] or added, 20.0, Score(left_db + 1.0, 1.0), posed((body,), takes_of((body,)))) == "explained", (
         "where there is no room, a mesh may be to blame"
     )

@@ -23,6 +23,7 @@ from sonic_bullet.effects.measurement_chain import MeasurementChain
 from sonic_bullet.effects.room import Room
 from sonic_bullet.estimator.lines.log_spectral import floor_between
 from tests.made.body import SR, recorded, truth
+from tests.made.problems import posed
 
 BAND = (50.0, 7_500.0)
 PULSE = ContactTime(3e-4, 0.016, -0.2)
@@ -45,7 +46,7 @@ def tried(*effects: Effect, kinds: tuple[type[Effect], ...]) -> tuple[list[Candi
         if found is not None:
             h = refitted(replace(start, effects=(found,)), (body,), told.observed)
             first.append(Candidate(kind.id, found, h, np.zeros(len(takes)), 0.0, 0.0, {}))
-    return first, pairwise(start, first, (body,), takes, BAND, seed=0, say=lambda _: None)
+    return first, pairwise(start, first, posed((body,), takes))
 
 
 def test_a_law_and_a_pulse_are_found_at_once_whatever_each_says_alone() -> None:
@@ -84,7 +85,7 @@ def heard_anew(planted: tuple[Effect, ...], suspect: Effect) -> tuple[Hypothesis
     assert room is not None
     h = refitted(replace(start, effects=(room,)), (body,), told.observed)
     found = [Candidate(suspect.id, suspect, h, np.zeros(len(takes)), 0.0, 0.0, {})]
-    return in_a_room(h, found, (body,), takes, BAND, seed=0, say=lambda _: None)
+    return in_a_room(h, found, posed((body,), takes))
 
 
 def test_a_mass_in_a_room_is_heard_with_a_response_of_its_own() -> None:

@@ -25,7 +25,7 @@ from sonic_bullet.effects.protocol import Effect
 @dataclass(frozen=True, slots=True, eq=False)
 class Candidate:
     """A candidate effect after cross-validation. effect: fitted to all evidence. drop_db (s,): of each left-out strike's distance, less what corrections learnt again would gain
-    alone where it moves modes; of the first_strikes alone where it could not be accepted any more. whole_db: mean with that in it, by which candidates are ordered. null_db: mean over strikes and draws.
+    alone where it moves modes; of the first_strikes alone where it could not be accepted any more. whole_db: mean with that in it, by which candidates are ordered. control_db: mean over strikes and draws.
 
     Its axes of degenerate pairs, if it has any, are from all fitted strikes. spread: of each number in its parameters over the folds (jackknife). lines: by how much lines left
     out are likelier with it (decay_test.py). impulse_n_s (s,): of the strikes.
@@ -36,7 +36,7 @@ class Candidate:
     hypothesis: Hypothesis
     drop_db: np.ndarray[Any, Any]
     whole_db: float
-    null_db: float
+    control_db: float
     spread: dict[str, Any]
     lines: float = 0.0
     impulse_n_s: np.ndarray[Any, Any] = field(default_factory=lambda: np.zeros(0))
@@ -84,7 +84,7 @@ def accepted(c: Candidate, gap_db: float, *, first: bool) -> bool:
     need = needed(gap_db, first=first, certain=c.certain)
     if not (c.mean_db > need and np.isfinite(c.sd_db)):
         return False
-    more = c.whole_db - max(c.null_db, 0.0)  # a control effect is not held against corrections either
+    more = c.whole_db - max(c.control_db, 0.0)  # a control effect is not held against corrections either
     drop = np.sort(c.drop_db)
     if c.certain and c.loud and -np.minimum(drop, 0).sum() < RULES.lost_share * drop[-1]:
         return more > RULES.chance_share * need  # what goes with level is for the loudest to show, which these others were fitted without
@@ -112,7 +112,7 @@ def may_be_accepted(asked: Candidate, open_db: np.ndarray[Any, Any], gap_db: flo
         for free in (np.zeros(len(open_db), bool), loud):
             drop = np.where(free, open_db, np.minimum(open_db, cap))
             drop[:first] = asked.drop_db
-            if accepted(replace(asked, drop_db=drop, whole_db=gap_db, null_db=0.0), gap_db, first=True):
+            if accepted(replace(asked, drop_db=drop, whole_db=gap_db, control_db=0.0), gap_db, first=True):
                 return True
     return False
 

@@ -15,8 +15,9 @@ import numpy as np
 
 from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of, thinned
 from sonic_bullet.diagnosis.evidence.refit import refitted, with_effects
+from sonic_bullet.diagnosis.prediction.diagnosis_problem import DiagnosisProblem
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, moves
-from sonic_bullet.diagnosis.prediction.score import Comparable, Judged, Take, mean_db
+from sonic_bullet.diagnosis.prediction.score import Judged, Take
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.diagnosis.selection.acceptance import Candidate
 from sonic_bullet.diagnosis.selection.decay_test import misfit, of_decays
@@ -36,24 +37,24 @@ def rivals(found: Sequence[Candidate], best: Candidate) -> tuple[Candidate, ...]
     return tuple(c for c in found if c is not best and c.mean_db > RULES.rival_share * best.mean_db)
 
 
-def together(h: Hypothesis, bodies: tuple[Struck, ...], band_hz: tuple[float, float], *, turns: int = TURNS, less: Less = lambda e: e) -> Hypothesis:
+def together(h: Hypothesis, problem: DiagnosisProblem, *, turns: int = TURNS, less: Less = lambda e: e) -> Hypothesis:
     """The hypothesis, each effect fitted again beside the others. less: the part of the evidence to fit to."""
     for _ in range(turns):
         for i in range(len(h.effects)):
-            h = again(h, i, bodies, band_hz, less=less)
+            h = again(h, i, problem, less=less)
     return h
 
 
-def again(h: Hypothesis, i: int, bodies: tuple[Struck, ...], band_hz: tuple[float, float], *, less: Less = lambda e: e, afresh: bool = False) -> Hypothesis:
+def again(h: Hypothesis, i: int, problem: DiagnosisProblem, *, less: Less = lambda e: e, afresh: bool = False) -> Hypothesis:
     """The hypothesis, its i-th effect fitted again beside the others, or looked for anew."""
     effect, before, after = h.effects[i], h.effects[:i], h.effects[i + 1 :]
-    rest = refitted(with_effects(h, (*before, *after), bodies), bodies)
-    evidence = less(evidence_of(rest, bodies, band_hz))
+    rest = refitted(with_effects(h, (*before, *after), problem.bodies), problem.bodies)
+    evidence = less(evidence_of(rest, problem.bodies, problem.band_hz))
     found = type(effect).propose(evidence if afresh else replace(evidence, known=effect))
-    return refitted(replace(rest, effects=(*before, found or effect, *after)), bodies, evidence.observed)
+    return refitted(replace(rest, effects=(*before, found or effect, *after)), problem.bodies, evidence.observed)
 
 
-def starts(h: Hypothesis, bodies: tuple[Struck, ...], band_hz: tuple[float, float]) -> list[Hypothesis]:
+def starts(h: Hypothesis, problem: DiagnosisProblem) -> list[Hypothesis]:
     """The hypothesis, and with each effect's choices that no step from one to the other leads to, where it knows of such (``others``).
 
     Beside those the rest is looked for anew: what one takes up, another had taken.
@@ -63,26 +64,26 @@ def starts(h: Hypothesis, bodies: tuple[Struck, ...], band_hz: tuple[float, floa
         for other in effect.others() if isinstance(effect, Alternatives) else ():
             start = replace(h, effects=(*h.effects[:i], other, *h.effects[i + 1 :]))
             for j in range(len(h.effects)):
-                start = again(start, j, bodies, band_hz, afresh=True) if j != i else start
+                start = again(start, j, problem, afresh=True) if j != i else start
             found.append(start)
     return found
 
 
-def settled(h: Hypothesis, bodies: tuple[Struck, ...], takes: Comparable, band_hz: tuple[float, float]) -> Hypothesis:
+def settled(h: Hypothesis, problem: DiagnosisProblem) -> Hypothesis:
     """The best of `together` from all starts by the fitted strikes; as many numbers each."""
-    ends = parallel_map(lambda start: together(start, bodies, band_hz), starts(h, bodies, band_hz))
-    return min(ends, key=lambda end: mean_db(takes, end))
+    ends = parallel_map(lambda start: together(start, problem), starts(h, problem))
+    return min(ends, key=problem.distance_db)
 
 
-def chosen(h: Hypothesis, bodies: tuple[Struck, ...], takes: Comparable, band_hz: tuple[float, float]) -> Hypothesis:
+def chosen(h: Hypothesis, problem: DiagnosisProblem) -> Hypothesis:
     """The hypothesis, settled where that is nearer to the fitted strikes."""
-    if not all(isinstance(t, Take) for t in takes):
+    if not problem.has_audio:
         return h
-    best = settled(h, bodies, takes, band_hz)
-    return best if mean_db(takes, best) <= mean_db(takes, h) else h
+    best = settled(h, problem)
+    return best if problem.distance_db(best) <= problem.distance_db(h) else h
 
 
-def left_out_db(h: Hypothesis, i: int, bodies: tuple[Struck, ...], takes: Comparable, band_hz: tuple[float, float]) -> Array:
+def left_out_db(h: Hypothesis, i: int, problem: DiagnosisProblem) -> Array:
     """Distance (s,) of every strike from what is fitted to the others: the i-th effect, the rest as all strikes have it, for one effect as for the other.
 
     No lines are left out here: each has been held against chance already, and of two effects that need as many numbers neither gains by it.
@@ -93,54 +94,51 @@ def left_out_db(h: Hypothesis, i: int, bodies: tuple[Struck, ...], takes: Compar
         place = take.place
         return lambda evidence: thinned(evidence, place, 1.0, np.random.default_rng(0))
 
-    return np.array(parallel_map(lambda take: take.distance(again(h, i, bodies, band_hz, less=without(take))), takes))
+    return np.array(parallel_map(lambda take: take.distance(again(h, i, problem, less=without(take))), problem.takes))
 
 
 def exchanged(
     h: Hypothesis,
     added: list[Candidate],
     passed: Sequence[Sequence[Candidate]],
-    bodies: tuple[Struck, ...],
-    takes: Comparable,
-    band_hz: tuple[float, float],
-    say: Callable[[str], None],
+    problem: DiagnosisProblem,
 ) -> tuple[Hypothesis, list[Candidate]]:
     """The effects fitted to each other, and each left for a rival of its round (passed) with which strikes left out are significantly nearer."""
-    if not all(isinstance(t, Take) for t in takes):
+    if not problem.has_audio:
         return h, added
     names = {c.id for c in added}
-    best = chosen(h, bodies, takes, band_hz)
+    best = chosen(h, problem)
     for i in range(len(added)):
         far: Array | None = None
         for rival in (c for c in passed[i] if c.id not in names):
             own = added[i]
-            say(f"trying {rival.id} in place of {own.id}")
+            problem.say(f"trying {rival.id} in place of {own.id}")
             effects = tuple(rival.effect if e.id == own.id else e for e in best.effects)
             place = next(k for k, e in enumerate(effects) if e.id == rival.id)
-            other = again(refitted(with_effects(best, effects, bodies), bodies), place, bodies, band_hz)
-            if mean_db(takes, other) > mean_db(takes, best) + RULES.far_rival_db:
+            other = again(refitted(with_effects(best, effects, problem.bodies), problem.bodies), place, problem)
+            if problem.distance_db(other) > problem.distance_db(best) + RULES.far_rival_db:
                 continue  # it would have to gain by strikes it never saw
-            other = settled(other, bodies, takes, band_hz)
-            far = left_out_db(best, place, bodies, takes, band_hz) if far is None else far
-            now = left_out_db(other, place, bodies, takes, band_hz)
+            other = settled(other, problem)
+            far = left_out_db(best, place, problem) if far is None else far
+            now = left_out_db(other, place, problem)
             gain = far - now
             if (
                 significant(gain, RULES.alike_share * rival.mean_db)
-                and not (np.nanmean(gain) < RULES.phases_decide_share * rival.mean_db and phases_against(best, other, bodies))
-                and not decays_against(other.effects[place], best, other, place, bodies, band_hz)
+                and not (np.nanmean(gain) < RULES.phases_decide_share * rival.mean_db and phases_against(best, other, problem.bodies))
+                and not decays_against(other.effects[place], best, other, place, problem)
             ):
                 best, far, names = other, now, names - {own.id} | {rival.id}
                 added = [*added[:i], rival, *added[i + 1 :]]
     return best, [replace(c, effect=next(e for e in best.effects if e.id == c.id)) for c in added]
 
 
-def decays_against(rival: Effect, best: Hypothesis, other: Hypothesis, i: int, bodies: tuple[Struck, ...], band_hz: tuple[float, float]) -> bool:
+def decays_against(rival: Effect, best: Hypothesis, other: Hypothesis, i: int, problem: DiagnosisProblem) -> bool:
     """Whether, of two that change nothing but decays, the lines' own decays speak for the one that is there: strikes hardly tell such two."""
     own = best.effects[i]
     if not (of_decays(best, own) and of_decays(other, rival)):
         return False
-    evidence = evidence_of(best, bodies, band_hz)
-    return misfit(other, rival, evidence, bodies) > misfit(best, own, evidence, bodies)
+    evidence = evidence_of(best, problem.bodies, problem.band_hz)
+    return misfit(other, rival, evidence, problem.bodies) > misfit(best, own, evidence, problem.bodies)
 
 
 def phases_against(best: Hypothesis, other: Hypothesis, bodies: tuple[Struck, ...]) -> bool:

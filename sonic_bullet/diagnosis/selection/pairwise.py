@@ -11,15 +11,15 @@ as with neither. Coordinate steps stop there; a step along two coordinates does 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of
 from sonic_bullet.diagnosis.evidence.refit import refitted, reidentified, with_effects
+from sonic_bullet.diagnosis.prediction.diagnosis_problem import DiagnosisProblem
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, mixes_neighbours, moves, moves_itself
-from sonic_bullet.diagnosis.prediction.score import Comparable, Take, least_db, mean_db
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.diagnosis.selection.acceptance import Candidate, accepted
 from sonic_bullet.diagnosis.selection.cross_validation import cross_validated
@@ -42,49 +42,38 @@ class Pair:
 def pairwise(
     start: Hypothesis,
     first: Sequence[Candidate],
-    bodies: tuple[Struck, ...],
-    takes: Comparable,
-    band_hz: tuple[float, float],
-    *,
-    seed: int,
-    say: Callable[[str], None],
+    problem: DiagnosisProblem,
 ) -> tuple[Hypothesis, list[Candidate]] | None:
     """The two of a first round's candidate effects that explain nearly all together, each accepted beside the other; None where no two do."""
-    if len(first) < 2 or not all(isinstance(t, Take) for t in takes):
+    if len(first) < 2 or not problem.has_audio:
         return None
     kinds = [type(c.effect) for c in first if not moves(c.hypothesis)]
-    say("trying two at once")
+    problem.say("trying two at once")
 
     def augmented(one: Candidate) -> list[Pair]:
-        evidence = evidence_of(one.hypothesis, bodies, band_hz, seed=seed)
+        evidence = evidence_of(one.hypothesis, problem.bodies, problem.band_hz, seed=problem.seed)
         found = []
         for kind in kinds:
             other = None if kind is type(one.effect) else kind.propose(evidence)
             if other is not None:
-                h = refitted(replace(one.hypothesis, effects=(*one.hypothesis.effects, other)), bodies, evidence.observed)
-                found.append(Pair(h, mean_db(takes, h)))
+                h = refitted(replace(one.hypothesis, effects=(*one.hypothesis.effects, other)), problem.bodies, evidence.observed)
+                found.append(Pair(h, problem.distance_db(h)))
         return found
 
     pairs = [pair for some in parallel_map(augmented, first) for pair in some]
-    floor = least_db(takes, start)
-    gap = mean_db(takes, start) - floor
-    if not pairs or min(pair.db for pair in pairs) - floor > RULES.pair_leaves_share * gap:
+    now = problem.score(start)
+    if not pairs or min(pair.db for pair in pairs) - now.floor_db > RULES.pair_leaves_share * now.gap_db:
         return None
-    h = _likeliest(pairs, floor + gap, bodies)
-    closer = again(again(h, 0, bodies, band_hz, afresh=True), 1, bodies, band_hz)  # what was found alone had the other's share to explain, too
-    h = closer if mean_db(takes, closer) < mean_db(takes, h) else h
-    return _accepted_together(h, bodies, takes, band_hz, seed=seed, say=say)
+    h = _likeliest(pairs, now.floor_db + now.gap_db, problem.bodies)
+    closer = again(again(h, 0, problem, afresh=True), 1, problem)  # what was found alone had the other's share to explain, too
+    h = closer if problem.distance_db(closer) < problem.distance_db(h) else h
+    return _accepted_together(h, problem)
 
 
 def in_a_room(
     h: Hypothesis,
     found: Sequence[Candidate],
-    bodies: tuple[Struck, ...],
-    takes: Comparable,
-    band_hz: tuple[float, float],
-    *,
-    seed: int,
-    say: Callable[[str], None],
+    problem: DiagnosisProblem,
 ) -> tuple[Hypothesis, list[Candidate]] | None:
     """A room that has been found alone, identified anew beside one of the candidate effects (found) that move modes; None where no two say nearly all.
 
@@ -93,20 +82,20 @@ def in_a_room(
     """
     rooms = [e for e in h.effects if isinstance(e, Dereverberates)]
     movers = [c for c in found if moves_itself(h, c.effect)]
-    if len(rooms) != 1 or len(h.effects) != 1 or not movers or not all(isinstance(t, Take) for t in takes):
+    if len(rooms) != 1 or len(h.effects) != 1 or not movers or not problem.has_audio:
         return None
-    say("hearing the room anew beside what moves modes")
+    problem.say("hearing the room anew beside what moves modes")
 
     def augmented(c: Candidate) -> Pair | None:
-        alone = refitted(with_effects(h, (c.effect,), bodies), bodies)
-        evidence = evidence_of(alone, bodies, band_hz, seed=seed)
+        alone = refitted(with_effects(h, (c.effect,), problem.bodies), problem.bodies)
+        evidence = evidence_of(alone, problem.bodies, problem.band_hz, seed=problem.seed)
         room = type(rooms[0]).propose(evidence)
         if room is None:
             return None
-        pair = reidentified(refitted(replace(alone, effects=(c.effect, room)), bodies, evidence.observed), bodies, fully=True)
-        return Pair(pair, mean_db(takes, pair))
+        pair = reidentified(refitted(replace(alone, effects=(c.effect, room)), problem.bodies, evidence.observed), problem.bodies, fully=True)
+        return Pair(pair, problem.distance_db(pair))
 
-    floor, left = least_db(takes, h), mean_db(takes, reidentified(h, bodies, fully=True))
+    floor, left = problem.score(h).floor_db, problem.distance_db(reidentified(h, problem.bodies, fully=True))
     for some in (
         [c for c in movers if not mixes_neighbours(c.effect)],
         [c for c in movers if mixes_neighbours(c.effect)],
@@ -116,23 +105,20 @@ def in_a_room(
             break
     else:
         return None
-    return _accepted_together(best.h, bodies, takes, band_hz, seed=seed, say=say)
+    return _accepted_together(best.h, problem)
 
 
-def _accepted_together(
-    h: Hypothesis, bodies: tuple[Struck, ...], takes: Comparable, band_hz: tuple[float, float], *, seed: int, say: Callable[[str], None]
-) -> tuple[Hypothesis, list[Candidate]] | None:
+def _accepted_together(h: Hypothesis, problem: DiagnosisProblem) -> tuple[Hypothesis, list[Candidate]] | None:
     """The two, if each is accepted beside the other."""
     added: list[Candidate] = []
     for effect in h.effects[::-1]:
-        rest = refitted(with_effects(h, tuple(e for e in h.effects if e is not effect), bodies), bodies)
-        without = mean_db(takes, reidentified(rest, bodies))  # with a response of its own, too
-        evidence = replace(evidence_of(rest, bodies, band_hz, seed=seed), known=effect)
-        now, least = mean_db(takes, rest), least_db(takes, rest)
-        candidates = cross_validated(rest, bodies, takes, evidence, [type(effect)], seed=seed, say=say)
-        if not candidates or not (
-            accepted(candidates[0], max(now - least, 0.0), first=False) and helps(candidates[0], bodies, takes, now, without, least, first=False)
-        ):
+        rest = refitted(with_effects(h, tuple(e for e in h.effects if e is not effect), problem.bodies), problem.bodies)
+        response = problem.distance_db(reidentified(rest, problem.bodies))  # with a response of its own, too
+        evidence = replace(evidence_of(rest, problem.bodies, problem.band_hz, seed=problem.seed), known=effect)
+        now = problem.score(rest)
+        full = replace(now, distance_db=response)
+        candidates = cross_validated(rest, problem.only(type(effect)), evidence)
+        if not candidates or not (accepted(candidates[0], max(now.gap_db, 0.0), first=False) and helps(candidates[0], problem, now, full, first=False)):
             return None
         h, added = candidates[0].hypothesis, [candidates[0], *added]
     return h, added

@@ -10,8 +10,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from sonic_bullet.diagnosis.evidence.refit import refitted, reidentified, with_effects
+from sonic_bullet.diagnosis.prediction.diagnosis_problem import DiagnosisProblem
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, moves, moves_itself
-from sonic_bullet.diagnosis.prediction.score import Comparable, mean_db
+from sonic_bullet.diagnosis.prediction.score import Score
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.diagnosis.selection.acceptance import Candidate, needed
 from sonic_bullet.diagnosis.selection.decay_test import misfit as decays
@@ -21,30 +22,23 @@ from sonic_bullet.diagnosis.selection.thresholds import RULES
 from sonic_bullet.effects.protocol import Evidence
 
 
-def helps(c: Candidate, bodies: tuple[Struck, ...], takes: Comparable, now: float, reidentified_db: float, floor: float, *, first: bool) -> bool:
-    """Whether all strikes together gain, and lose nothing of what a room's response, identified again without it, says as well (reidentified_db): that takes up echoes, and
+def helps(c: Candidate, problem: DiagnosisProblem, now: Score, full: Score, *, first: bool) -> bool:
+    """Whether all strikes together gain, and lose nothing of what a room's response, identified again without it, says as well (full): that takes up echoes, and
     some of what stray modes leave, so what moves modes must gain on that. A filter or a slow law it takes up whole: then both say the same.
     Without a mesh nothing tells which of a room's lines are modes, and what changes decays would be fitted to all of them."""
-    if tells(c.hypothesis, c.effect) and not _shaped(bodies):
+    if tells(c.hypothesis, c.effect) and not problem.has_meshes:
         return False
-    before, after = reidentified_db if moves(c.hypothesis) else now, mean_db(takes, reidentified(c.hypothesis, bodies))
-    return after < reidentified_db + RULES.same_share * max(reidentified_db - floor, 0.0) and before - after > RULES.helps_share * needed(
-        max(before - floor, 0.0), first=first, certain=c.certain
-    )
+    before, after = full if moves(c.hypothesis) else now, problem.distance_db(reidentified(c.hypothesis, problem.bodies))
+    if after >= full.distance_db + RULES.same_share * max(full.gap_db, 0.0):
+        return False
+    return before.distance_db - after > RULES.helps_share * needed(max(before.gap_db, 0.0), first=first, certain=c.certain)
 
 
-def by_lines(c: Candidate, bodies: tuple[Struck, ...], takes: Comparable, reidentified_db: float, floor: float) -> bool:
-    """Whether lines left out speak for it (decay_test.py), and a room's response, identified again beside it, says no less than without it (reidentified_db). Without a mesh nothing tells which of a room's lines are modes."""
-    return (
-        _shaped(bodies)
-        and c.lines > RULES.line_gain
-        and mean_db(takes, reidentified(c.hypothesis, bodies)) < reidentified_db + RULES.same_share * max(reidentified_db - floor, 0.0)
-    )
-
-
-def _shaped(bodies: tuple[Struck, ...]) -> bool:
-    """Whether every body has a mesh."""
-    return all(body.family is not None for body in bodies)
+def by_lines(c: Candidate, problem: DiagnosisProblem, full: Score) -> bool:
+    """Whether lines left out speak for it (decay_test.py), and a room's response, identified again beside it, says no less than without it (full). Without a mesh nothing tells which of a room's lines are modes."""
+    if not (problem.has_meshes and c.lines > RULES.line_gain):
+        return False
+    return problem.distance_db(reidentified(c.hypothesis, problem.bodies)) < full.distance_db + RULES.same_share * max(full.gap_db, 0.0)
 
 
 def simplest(able: Sequence[Candidate], bodies: tuple[Struck, ...], evidence: Evidence) -> Candidate:
@@ -78,13 +72,13 @@ def simplest(able: Sequence[Candidate], bodies: tuple[Struck, ...], evidence: Ev
     return others[int(off.argmin())] if np.isfinite(own) and off.min() < own else first
 
 
-def pruned(h: Hypothesis, added: list[Candidate], bodies: tuple[Struck, ...], takes: Comparable, gap_db: float) -> tuple[Hypothesis, list[Candidate]]:
+def pruned(h: Hypothesis, added: list[Candidate], problem: DiagnosisProblem, gap_db: float) -> tuple[Hypothesis, list[Candidate]]:
     """Without the effects that those found after them have made needless."""
     for candidate in added[:-1]:
         if candidate.lines > RULES.line_gain:
             continue  # strikes need not speak for it
         rest = [e for e in h.effects if e.id != candidate.id]
-        without = refitted(with_effects(h, tuple(rest), bodies), bodies)
-        if mean_db(takes, without) - mean_db(takes, h) < needed(gap_db, first=False):
+        without = refitted(with_effects(h, tuple(rest), problem.bodies), problem.bodies)
+        if problem.distance_db(without) - problem.distance_db(h) < needed(gap_db, first=False):
             h, added = without, [c for c in added if c is not candidate]
     return h, added

@@ -9,14 +9,15 @@ gap = before − floor on left-out strikes; which effect is accepted is said in 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of
 from sonic_bullet.diagnosis.evidence.mesh_limits import beyond, of_the_mesh
 from sonic_bullet.diagnosis.evidence.refit import refitted, reidentified
+from sonic_bullet.diagnosis.prediction.diagnosis_problem import DiagnosisProblem, silent
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, mixes_neighbours, moves_itself
-from sonic_bullet.diagnosis.prediction.score import Comparable, Compared, Incomparable, Judged, LeftOut, comparable, least_db, mean_db
+from sonic_bullet.diagnosis.prediction.score import Comparable, Incomparable, Judged, LeftOut, Score, comparable
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.diagnosis.selection.acceptance import Candidate, accepted
 from sonic_bullet.diagnosis.selection.band_levels import BandOff, bands_off
@@ -78,44 +79,34 @@ def closed(
     progress: Callable[[str], None] | None = None,
 ) -> Closed | NothingCompared:
     """Select effects on fitted strikes alone, those that can be compared."""
-    say = progress or (lambda _: None)
     start = refitted(base, bodies)
     found = comparable(takes, start)
     if isinstance(found, Incomparable):
         return NothingCompared(start, found.left_out)
-    return _closed(start, bodies, found, effects, band_hz, seed=seed, say=say)
+    return _closed(start, DiagnosisProblem(bodies, found.takes, band_hz, tuple(effects), seed, progress or silent), found.left_out)
 
 
-def _closed(
-    start: Hypothesis,
-    bodies: tuple[Struck, ...],
-    found: Compared,
-    effects: Sequence[type[Effect]],
-    band_hz: tuple[float, float],
-    *,
-    seed: int,
-    say: Callable[[str], None],
-) -> Closed:
+def _closed(start: Hypothesis, problem: DiagnosisProblem, left_out: tuple[LeftOut, ...]) -> Closed:
     """The selection over what can be compared."""
-    takes = found.takes
-    before = mean_db(takes, start)
-    one = _one_by_one(start, bodies, takes, effects, band_hz, seed=seed, say=say)
+    before = problem.distance_db(start)
+    one = _one_by_one(start, problem)
     h, added, last = one.h, one.added, dict(one.last)
-    now, floor = mean_db(takes, h), one.floor
-    verdict, off, by = _verdict(h, added, before, now, floor, bodies, takes, seed), 0.0, h
+    now = Score(problem.distance_db(h), one.floor_db)
+    verdict, off, by = _verdict(h, added, before, now, problem), 0.0, h
     if verdict == "unexplained":
-        verdict, off, by = _by_a_finer_mesh(start, h, added, before, bodies, takes, seed)
-    if verdict == "unexplained" and not one.pairwise and (pair := pairwise(start, one.first, bodies, takes, band_hz, seed=seed, say=say)):
+        verdict, off, by = _by_a_finer_mesh(start, h, added, before, problem)
+    if verdict == "unexplained" and not one.pairwise and (pair := pairwise(start, one.first, problem)):
         h, added = pair
         last |= {c.id: c for c in added}
-        now, floor = mean_db(takes, h), least_db(takes, h)
-        verdict, off = _verdict(h, added, before, now, floor, bodies, takes, seed), 0.0
-    bands = bands_off(by, takes) if verdict == "none" else ()
+        now = problem.score(h)
+        verdict, off = _verdict(h, added, before, now, problem), 0.0
+    bands = bands_off(by, problem.takes) if verdict == "none" else ()
     if bands:
         verdict, off = "unexplained", 0.0
     if verdict != "explained":
-        h, now, added = start, before, []
-    return Closed(start, h, tuple(added), tuple(last.values()), verdict, before, now, floor, off, bands, takes, found.left_out)
+        h, now, added = start, replace(now, distance_db=before), []
+    tried = tuple(last.values())
+    return Closed(start, h, tuple(added), tried, verdict, before, now.distance_db, now.floor_db, off, bands, problem.takes, left_out)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -126,94 +117,76 @@ class Rounds:
     added: list[Candidate]
     first: list[Candidate]
     last: dict[str, Candidate]
-    floor: float
+    floor_db: float
     pairwise: bool
 
 
-def _one_by_one(
-    start: Hypothesis,
-    bodies: tuple[Struck, ...],
-    takes: Comparable,
-    effects: Sequence[type[Effect]],
-    band_hz: tuple[float, float],
-    *,
-    seed: int,
-    say: Callable[[str], None],
-) -> Rounds:
+def _one_by_one(start: Hypothesis, problem: DiagnosisProblem) -> Rounds:
     """The best of every round added, until nothing is accepted; then fitted to each other."""
     h = start
-    before = now = mean_db(takes, h)
-    floor = least_db(takes, h)
+    now = problem.score(h)
+    before_db = now.distance_db
     added: list[Candidate] = []
     passed: list[tuple[Candidate, ...]] = []
     first: list[Candidate] = []
     last: dict[str, Candidate] = {}
     weak = False
     for turn in range(RULES.rounds):
-        say(f"round {turn + 1}: {now:.2f} dB from the recordings, noise alone {floor:.2f} dB")
-        if now - floor < (RULES.least_drop_db if added else RULES.faint_drop_db):
+        problem.say(f"round {turn + 1}: {now.distance_db:.2f} dB from the recordings, noise alone {now.floor_db:.2f} dB")
+        if now.gap_db < (RULES.least_drop_db if added else RULES.faint_drop_db):
             break  # so little is what a mesh gets wrong
-        evidence = evidence_of(h, bodies, band_hz, seed=seed)
-        full = reidentified(h, bodies)  # a room's response is the lines' so far, which leaves open more than there is
-        reidentified_db = now if full is h else mean_db(takes, full)
-        costly = reidentified_db - floor > RULES.costly_open_share * (before - floor)
-        found = cross_validated(h, bodies, takes, evidence, effects, seed=seed + turn, say=say, costly=costly)
+        drawn = replace(problem, seed=problem.seed + turn)
+        evidence = evidence_of(h, problem.bodies, problem.band_hz, seed=problem.seed)
+        other = reidentified(h, problem.bodies)  # a room's response is the lines' so far, which leaves open more than there is
+        full = now if other is h else replace(now, distance_db=problem.distance_db(other))
+        costly = full.gap_db > RULES.costly_open_share * (before_db - now.floor_db)
+        found = cross_validated(h, drawn, evidence, costly=costly)
         last |= {c.id: c for c in found}
-        pair, acceptable = None, _acceptable(found, bodies, takes, now, reidentified_db, floor, first=not added)
+        pair, acceptable = None, _acceptable(found, problem, now, full, first=not added)
         if not added:
-            first, weak = found, all(mean_db(takes, c.hypothesis) - floor > RULES.weak_share * max(now - floor, 0.0) for c in found)
-            pair = pairwise(start, found, bodies, takes, band_hz, seed=seed, say=say) if weak else None
-        pair = pair or _room_anew(h, acceptable, found, bodies, takes, band_hz, seed, say)
-        if not (pair or acceptable) and costly and (late := _deferred(found, evidence, effects)):
-            found = cross_validated(h, bodies, takes, evidence, late, seed=seed + turn, say=say, costly=costly)
+            first, weak = found, all(problem.distance_db(c.hypothesis) - now.floor_db > RULES.weak_share * max(now.gap_db, 0.0) for c in found)
+            pair = pairwise(start, found, problem) if weak else None
+        pair = pair or _room_anew(h, acceptable, found, problem)
+        if not (pair or acceptable) and costly and (late := _deferred(found, evidence, problem.effects)):
+            found = cross_validated(h, drawn.only(*late), evidence, costly=costly)
             last |= {c.id: c for c in found}
-            acceptable = _acceptable(found, bodies, takes, now, reidentified_db, floor, first=not added)
-            pair = _room_anew(h, acceptable, found, bodies, takes, band_hz, seed, say)
+            acceptable = _acceptable(found, problem, now, full, first=not added)
+            pair = _room_anew(h, acceptable, found, problem)
         if pair:
             (h, added), passed = pair, [(), ()]
             last |= {c.id: c for c in added}
-            now, floor = mean_db(takes, h), least_db(takes, h)
+            now = problem.score(h)
             continue
         if not acceptable:
             break
-        best = simplest(acceptable, bodies, evidence)
+        best = simplest(acceptable, problem.bodies, evidence)
         h, added, passed = best.hypothesis, [*added, best], [*passed, rivals(acceptable, best)]
-        if isinstance(best.effect, Dereverberates) and mean_db(takes, h) > now:
-            h = reidentified(h, bodies)  # a room's response by lines so far off that it sounds worse than none
+        if isinstance(best.effect, Dereverberates) and problem.distance_db(h) > now.distance_db:
+            h = reidentified(h, problem.bodies)  # a room's response by lines so far off that it sounds worse than none
         if len(added) > 1 and any(isinstance(e, Alternatives) for e in h.effects):
-            h = chosen(h, bodies, takes, band_hz)  # or a third effect is found for what only the other choice would say
-        now = mean_db(takes, h)
-        floor = least_db(takes, h)
+            h = chosen(h, problem)  # or a third effect is found for what only the other choice would say
+        now = problem.score(h)
     if len(added) > 1:
-        h, added = exchanged(h, added, passed, bodies, takes, band_hz, say)
-        h, added = pruned(h, added, bodies, takes, before - floor)
-        now = mean_db(takes, h)
-    again = reidentified(h, bodies, fully=True)
-    return Rounds(again if again is not h and mean_db(takes, again) < now else h, added, first, last, floor, weak)
+        h, added = exchanged(h, added, passed, problem)
+        h, added = pruned(h, added, problem, before_db - now.floor_db)
+        now = replace(now, distance_db=problem.distance_db(h))
+    again = reidentified(h, problem.bodies, fully=True)
+    nearer = again is not h and problem.distance_db(again) < now.distance_db
+    return Rounds(again if nearer else h, added, first, last, now.floor_db, weak)
 
 
-def _acceptable(
-    found: Sequence[Candidate], bodies: tuple[Struck, ...], takes: Comparable, now: float, reidentified_db: float, floor: float, *, first: bool
-) -> list[Candidate]:
-    """Those that strikes left out speak for; or, where they speak for none, the one that lines do."""
-    acceptable = [c for c in found if accepted(c, max(now - floor, 0.0), first=first) and helps(c, bodies, takes, now, reidentified_db, floor, first=first)]
-    return acceptable or sorted((c for c in found if by_lines(c, bodies, takes, reidentified_db, floor)), key=lambda c: -c.lines)[:1]
+def _acceptable(found: Sequence[Candidate], problem: DiagnosisProblem, now: Score, full: Score, *, first: bool) -> list[Candidate]:
+    """Those that strikes left out speak for; or, where they speak for none, the one that lines do. full: with a room's response identified again."""
+    able = [c for c in found if accepted(c, max(now.gap_db, 0.0), first=first) and helps(c, problem, now, full, first=first)]
+    return able or sorted((c for c in found if by_lines(c, problem, full)), key=lambda c: -c.lines)[:1]
 
 
 def _room_anew(
-    h: Hypothesis,
-    acceptable: Sequence[Candidate],
-    found: Sequence[Candidate],
-    bodies: tuple[Struck, ...],
-    takes: Comparable,
-    band_hz: tuple[float, float],
-    seed: int,
-    say: Callable[[str], None],
+    h: Hypothesis, acceptable: Sequence[Candidate], found: Sequence[Candidate], problem: DiagnosisProblem
 ) -> tuple[Hypothesis, list[Candidate]] | None:
     """A room that stands alone identified anew beside what moves modes (pairwise.py), unless something else is accepted."""
-    return (
-        in_a_room(h, found, bodies, takes, band_hz, seed=seed, say=say) if all(moves_itself(h, c.effect) for c in acceptable) and len(h.effects) == 1 else None
-    )
+    alone = len(h.effects) == 1 and all(moves_itself(h, c.effect) for c in acceptable)
+    return in_a_room(h, found, problem) if alone else None
 
 
 def _deferred(found: Sequence[Candidate], evidence: Evidence, effects: Sequence[type[Effect]]) -> list[type[Effect]]:
@@ -222,37 +195,34 @@ def _deferred(found: Sequence[Candidate], evidence: Evidence, effects: Sequence[
     return [k for k in effects if mixes_neighbours(k) and tensor and k.id not in {c.id for c in found}]
 
 
-def _verdict(
-    h: Hypothesis, added: Sequence[Candidate], before: float, now: float, floor: float, bodies: tuple[Struck, ...], takes: Comparable, seed: int
-) -> str:
+def _verdict(h: Hypothesis, added: Sequence[Candidate], before_db: float, now: Score, problem: DiagnosisProblem) -> str:
     """What is known: an effect that closes less than explained_share of the gap would be a guess, unless what is left is what a mesh gets wrong."""
-    gap, left = before - floor, now - floor
+    gap, left = before_db - now.floor_db, now.gap_db
     if not added:
-        excused = gap < RULES.suffices_db or (gap < of_the_mesh(h, bodies, takes, seed) and of_no_body(h, takes) < RULES.no_body_share)
+        excused = gap < RULES.suffices_db or (gap < of_the_mesh(h, problem) and of_no_body(h, problem.takes) < RULES.no_body_share)
         return "none" if excused else "unexplained"
     room = any(isinstance(e, Dereverberates) for e in h.effects)  # whose response takes up what a mesh gets wrong, too: that is no excuse
-    enough = left <= max((1 - (RULES.explained_by_room_share if room else RULES.explained_share)) * gap, RULES.suffices_db) or (
-        not room and left <= of_the_mesh(h, bodies, takes, seed)
-    )
-    return "explained" if enough else "unexplained"
+    most = max((1 - (RULES.explained_by_room_share if room else RULES.explained_share)) * gap, RULES.suffices_db)
+    return "explained" if left <= most or (not room and left <= of_the_mesh(h, problem)) else "unexplained"
 
 
 def _by_a_finer_mesh(
-    start: Hypothesis, h: Hypothesis, added: Sequence[Candidate], before: float, bodies: tuple[Struck, ...], takes: Comparable, seed: int
+    start: Hypothesis, h: Hypothesis, added: Sequence[Candidate], before_db: float, problem: DiagnosisProblem
 ) -> tuple[str, float, Hypothesis]:
     """What would be known with upper modes where their lines are, how far off the mesh has them, and with them there; unexplained and 0 where that helps nobody."""
-    verdict, (far, off) = "unexplained", beyond(start, bodies, takes)
+    verdict, (far, off) = "unexplained", beyond(start, problem)
     if not off:
         return verdict, 0.0, start
-    ideal, floor = min(mean_db(takes, far), before), least_db(takes, far)
-    if ideal - floor < RULES.suffices_db and of_no_body(start, takes) < RULES.no_body_share:
+    ideal = problem.score(far)
+    ideal = replace(ideal, distance_db=min(ideal.distance_db, before_db))
+    if ideal.gap_db < RULES.suffices_db and of_no_body(start, problem.takes) < RULES.no_body_share:
         verdict = "none"
     elif added:
-        both, _ = beyond(h, bodies, takes)
-        verdict = _verdict(both, added, ideal, mean_db(takes, both), floor, bodies, takes, seed)
+        both, _ = beyond(h, problem)
+        verdict = _verdict(both, added, ideal.distance_db, replace(ideal, distance_db=problem.distance_db(both)), problem)
     return verdict, off if verdict != "unexplained" else 0.0, far
 
 
 def described(candidates: Sequence[Candidate]) -> list[dict[str, Any]]:
     """For JSON."""
-    return [{"id": c.id, "cv_error_drop_db": c.mean_db, "null_drop_db": c.null_db, "parameters": c.effect.parameters()} for c in candidates]
+    return [{"id": c.id, "cv_error_drop_db": c.mean_db, "null_drop_db": c.control_db, "parameters": c.effect.parameters()} for c in candidates]
