@@ -12,21 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from sonic_bullet.records.arrays import Array, frozen_array
-    from sonic_bullet.records.bodies import (
-        ORTHOTROPIC,
-        Air,
-        Body,
-        Material,
-        Microphone,
-        ModalModel,
-        ModalSum,
-        Sensor,
-        Shape,
-        ShapeKind,
-        Vibrometer,
-        isotropic_stiffness_pa,
-    )
+    from sonic_bullet.records.bodies import ORTHOTROPIC, Body, Material, ModalModel, Shape, ShapeKind, isotropic_stiffness_pa
     from sonic_bullet.records.residual import Residual
+    from sonic_bullet.records.sensors import Air, Microphone, ModalSum, Sensor, Vibrometer
 
 __all__ = [
     "ORTHOTROPIC",
@@ -47,19 +35,19 @@ __all__ = [
 ]
 
 _HOME = {
-    "Air": "bodies",
+    "Air": "sensors",
     "Array": "arrays",
     "Body": "bodies",
     "Material": "bodies",
-    "Microphone": "bodies",
+    "Microphone": "sensors",
     "ModalModel": "bodies",
-    "ModalSum": "bodies",
+    "ModalSum": "sensors",
     "ORTHOTROPIC": "bodies",
     "Residual": "residual",
-    "Sensor": "bodies",
+    "Sensor": "sensors",
     "Shape": "bodies",
     "ShapeKind": "bodies",
-    "Vibrometer": "bodies",
+    "Vibrometer": "sensors",
     "frozen_array": "arrays",
     "isotropic_stiffness_pa": "bodies",
 }
