@@ -48,7 +48,7 @@ def test_of_what_lines_are_sure_of_one_loud_strike_will_do() -> None:
 
 
 def test_beside_another_name_the_loudest_may_speak_for_what_goes_with_level() -> None:
-    """It was left out, and the bend that the softer ones told plays it; these hardly sound otherwise, and may lose a little by it."""
+    """It was left out, and the bend found from the softer ones plays it; these hardly sound otherwise, and may lose a little by it."""
     level = np.array([1.0, 2.0, 3.0, 4.0, 9.0])
     sure = replace(candidate(-0.01, -0.13, -0.07, -0.11, 2.9), effect=AmplitudePitch(0.1), impulse_n_s=level)
     assert accepted(sure, 0.9, first=False)

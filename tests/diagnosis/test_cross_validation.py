@@ -1,4 +1,4 @@
-"""What a suspect must gain, and against what: not against numbers that the baseline may learn again."""
+"""What a candidate effect must gain, and against what: not against numbers that the baseline may learn again."""
 
 from __future__ import annotations
 
@@ -244,7 +244,7 @@ def test_dashpots_are_asked_after_a_tensor_that_came_to_nothing(monkeypatch: pyt
     body = recorded(room)
     takes = takes_of((body,))
 
-    def told(h: Hypothesis, problem: Any, evidence: Any, **_: Any) -> list[Candidate]:
+    def counted(h: Hypothesis, problem: Any, evidence: Any, **_: Any) -> list[Candidate]:
         asked.append([kind.id for kind in problem.effects])
         drop = np.full(len(takes), 5.0)
         if len(asked) == 1:
@@ -255,7 +255,7 @@ def test_dashpots_are_asked_after_a_tensor_that_came_to_nothing(monkeypatch: pyt
             return [Candidate("tensor", Orthotropy((1.0,) * 9), h, -drop, -5.0, 0.0, {})]
         return [Candidate("support-damping", SupportDamping(((0.0, 0.0, 0.0),), (1.0,)), h, -drop, -5.0, 0.0, {})]
 
-    monkeypatch.setattr(loop, "cross_validated", told)
+    monkeypatch.setattr(loop, "cross_validated", counted)
     anew: list[list[str]] = []
     monkeypatch.setattr(loop, "in_a_room", lambda _, found, *__, **___: anew.append([c.id for c in found]))
     monkeypatch.setattr(loop, "pairwise", lambda *_, **__: None)
@@ -264,12 +264,12 @@ def test_dashpots_are_asked_after_a_tensor_that_came_to_nothing(monkeypatch: pyt
     end = loop.closed(fitted(body), (body,), takes, EFFECTS, BAND)
     every = [kind.id for kind in EFFECTS]
     assert asked == [every, every, ["support-damping"]]
-    assert anew == [["tensor"], ["support-damping"]], "the room is heard anew beside both"
+    assert anew == [["tensor"], ["support-damping"]], "the room is identified anew beside both"
     assert [c.id for c in end.added] == ["room"]
 
 
 def test_a_lines_own_numbers_are_tried_with_all_lines() -> None:
-    """Told by no other line, but by the other strikes; the corrections that they are held against, too."""
+    """Identified from no other line, but from the other strikes; the corrections that they are held against, too."""
     body = recorded()
     takes, h = takes_of((body,)), refitted(fitted(body), (body,))
     told = evidence_of(h, (body,), BAND)

@@ -29,7 +29,7 @@ LAW = DampingLaw("power", 0.03, exponent=0.9)
 
 
 def tried(*effects: DampingLaw) -> tuple[list[Candidate], bool]:
-    """A law's trial beside a room that is known, and whether lines alone would have it named."""
+    """A law's cross-validation beside a room that is known, and whether it is accepted by lines alone."""
     body = recorded(*effects, ROOM)
     assert body.recorded is not None and body.recorded.signals is not None
     floor = floor_between(list(body.recorded.signals))

@@ -22,7 +22,7 @@ from sonic_bullet.diagnosis.selection import stepwise as loop
 from sonic_bullet.diagnosis.selection.cross_validation import cross_validated
 from sonic_bullet.diagnosis.selection.stepwise import Closed, NothingCompared, closed
 from sonic_bullet.effects import EFFECTS
-from sonic_bullet.effects.protocol import Evidence, Owner, Sound, Stage
+from sonic_bullet.effects.protocol import Evidence, Owner, Sound, Stage, Traits
 from sonic_bullet.estimator.lines.log_spectral import noise_floor_db, white
 from tests.diagnosis.test_found_again import BAND, fitted
 from tests.made.body import SR, recorded, truth
@@ -125,6 +125,7 @@ class Spoils:
     id: ClassVar[str] = "spoils"
     stage: ClassVar[Stage] = Stage.SOUND
     owner: ClassVar[Owner] = Owner.CHAIN
+    traits: ClassVar[Traits] = Traits()
     reference: ClassVar[str] = "none"
 
     def apply(self, x: Sound) -> Sound:

@@ -1,4 +1,4 @@
-"""Two names at once: what hides each other one by one is found together, and one name's worth is not told as two."""
+"""Two effects at once: what hides each other one by one is found together, and one effect is not found as two."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of
 from sonic_bullet.diagnosis.evidence.refit import refitted
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis
 from sonic_bullet.diagnosis.prediction.score import Take
-from sonic_bullet.diagnosis.selection import pairwise as twos
+from sonic_bullet.diagnosis.selection import pairwise as pairs
 from sonic_bullet.diagnosis.selection.acceptance import Candidate
 from sonic_bullet.diagnosis.selection.pairwise import in_a_room, pairwise
 from sonic_bullet.diagnosis.selection.thresholds import RULES
@@ -33,7 +33,7 @@ MASS = AddedMass((0.0477, 0.0371, 0.0), 0.06)
 
 
 def tried(*effects: Effect, kinds: tuple[type[Effect], ...]) -> tuple[list[Candidate], tuple[Hypothesis, list[Candidate]] | None]:
-    """A first round of suspects that have not stood any trial, and what two at once make of them."""
+    """A first round of candidates that were not cross-validated, and what two at once make of them."""
     body = recorded(*effects)
     assert body.recorded is not None and body.recorded.signals is not None
     floor = floor_between(list(body.recorded.signals))
@@ -61,20 +61,20 @@ def test_a_law_and_a_pulse_are_found_at_once_whatever_each_says_alone() -> None:
     assert found["contact-time"]["tau_s"] == pytest.approx(3e-4, rel=0.05)
 
 
-def test_one_effect_is_not_told_as_two() -> None:
+def test_one_effect_is_not_found_as_two() -> None:
     first, two = tried(PULSE, kinds=(ContactTime, MeasurementChain, DampingLaw))
     assert first
     assert two is None
 
 
-def test_one_suspect_alone_makes_no_two() -> None:
+def test_one_candidate_alone_makes_no_pair() -> None:
     first, two = tried(PULSE, kinds=(ContactTime,))
     assert len(first) == 1
     assert two is None
 
 
-def heard_anew(planted: tuple[Effect, ...], suspect: Effect) -> tuple[Hypothesis, list[Candidate]] | None:
-    """What a room's own trial beside a suspect that moves modes comes to, where the room was found first, alone."""
+def room_anew(planted: tuple[Effect, ...], candidate: Effect) -> tuple[Hypothesis, list[Candidate]] | None:
+    """What a room identified anew beside a candidate that moves modes comes to, where the room was found first, alone."""
     body = recorded(*planted)
     assert body.recorded is not None and body.recorded.signals is not None
     floor = floor_between(list(body.recorded.signals))
@@ -84,13 +84,13 @@ def heard_anew(planted: tuple[Effect, ...], suspect: Effect) -> tuple[Hypothesis
     room = Room.propose(told)
     assert room is not None
     h = refitted(replace(start, effects=(room,)), (body,), told.observed)
-    found = [Candidate(suspect.id, suspect, h, np.zeros(len(takes)), 0.0, 0.0, {})]
+    found = [Candidate(candidate.id, candidate, h, np.zeros(len(takes)), 0.0, 0.0, {})]
     return in_a_room(h, found, posed((body,), takes))
 
 
 def test_a_mass_in_a_room_is_heard_with_a_response_of_its_own() -> None:
     """The room found alone plays what the wrong modes lack: with that response the mass made everything worse."""
-    two = heard_anew((MASS, ROOM), MASS)
+    two = room_anew((MASS, ROOM), MASS)
     assert two is not None
     h, added = two
     assert {c.id for c in added} == {"added-mass", "room"} == {e.id for e in h.effects}
@@ -100,11 +100,11 @@ def test_a_mass_in_a_room_is_heard_with_a_response_of_its_own() -> None:
 
 
 def test_a_room_alone_needs_no_mass(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Nor by its trial alone, were any two that leave less than all let through to it: the room told again without the mass says more."""
-    assert heard_anew((ROOM,), MASS) is None
-    monkeypatch.setattr(twos, "RULES", replace(RULES, pair_leaves_share=RULES.pair_leaves_share.at(1.0)))
-    assert heard_anew((ROOM,), MASS) is None
+    """Nor by cross-validation alone, were any two that leave less than all let through to it: the room identified again without the mass says more."""
+    assert room_anew((ROOM,), MASS) is None
+    monkeypatch.setattr(pairs, "RULES", replace(RULES, pair_leaves_share=RULES.pair_leaves_share.at(1.0)))
+    assert room_anew((ROOM,), MASS) is None
 
 
 def test_what_moves_no_modes_is_not_tried_so() -> None:
-    assert heard_anew((PULSE, ROOM), PULSE) is None
+    assert room_anew((PULSE, ROOM), PULSE) is None

@@ -29,7 +29,7 @@ LOW = MeasurementChain(low_pass_hz=5000.0, low_order=2)
 
 
 def identified_from(effect: Effect) -> list[Candidate]:
-    """A pulse and a low-pass as each is told from a recording of one of them, as if strikes spoke for both alike."""
+    """A pulse and a low-pass as each is found from a recording of one of them, as if strikes spoke for both alike."""
     body = recorded(effect)
     plain = refitted(truth(), (body,))
     evidence = evidence_of(plain, (body,), BAND)

@@ -95,7 +95,7 @@ def test_the_bend_and_its_measure_are_read_off_the_modes_that_show_it(measure: s
 
 
 def test_two_slow_lines_are_two_modes_though_a_chain_lies_between() -> None:
-    """A pair that glides up passes its neighbour; as one group it would lose that line, and a mode would be put on the other."""
+    """A pair that hardens passes its neighbour; as one group it would lose that line, and a mode would be put on the other."""
     freq = np.array([3430.4, 3430.9, 3436.0, 3444.7, 3450.0])
     decay = np.array([4.8, 5.0, 12.0, 4.9, 20.0])
     amplitude, sd, n = np.ones((3, 5), complex), np.full(5, 0.01), np.full(3, 1e-5)

@@ -1,4 +1,4 @@
-"""A body without a mesh: its lines for modes, places as loud as they are heard."""
+"""A body without a mesh: its lines for modes, places as loud as they were recorded."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Modes no line was told for find their frequencies in the recordings; noise that falls with frequency is taken as it is."""
+"""Unmatched modes find their frequencies in the recordings; noise that falls with frequency is taken as it is."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tests.made.body import plate, recorded, struck, truth
 
 @pytest.mark.parametrize("off", [0.004, -0.007])
 def test_a_mode_without_a_line_is_put_where_it_sounds(off: float) -> None:
-    """The mesh has the fourth mode elsewhere, and its line was not told: it comes back to a hundredth of its half width; modes with lines stay."""
+    """The mesh has the fourth mode elsewhere, and its line is missing: it comes back to a hundredth of its half width; modes with lines stay."""
     body = recorded()
     freq = body.model.freq_hz.copy()
     freq[3] *= 1 + off
