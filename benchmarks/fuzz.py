@@ -203,6 +203,7 @@ def _keep(keep: Path | None, door: Door, seed: int, tally: Tally, known: Tally) 
     for kind, number, text in tally.faults:
         key = (kind, text.split(":", 2)[0:2].__repr__())
         if alike[key] <= KEPT_ALIKE or number % 50 == 0:
+            print(f"{door.name}:{number} {kind}: {text[:200]}", file=sys.stderr, flush=True)
             keep.mkdir(parents=True, exist_ok=True)
             (keep / f"{door.name.replace(' ', '-')}-{number}{door.suffix}").write_bytes(mutated(door, seed, number))
 

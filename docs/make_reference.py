@@ -1,7 +1,7 @@
 """The pages of docs/reference that are made of the code: what a docstring, a command's help or a class says is said once.
 
 python docs/make_reference.py            writes api.md, commands.md, case.schema.json, and the marked parts
-                                             of case.md and contact-log.md
+                                             of case.md, contact-log.md and how-a-diagnosis-judges.md
 python docs/make_reference.py --check    writes nothing; names what is out of date, and exits with 1 where something is
 """
 
@@ -242,15 +242,23 @@ def between(page: str, mark: str, text: str) -> str:
     return found
 
 
+def thresholds() -> str:
+    """The numbers that decide what a diagnosis accepts."""
+    module = importlib.import_module("sonic_bullet.diagnosis.selection.thresholds")
+    return str(module.table(module.RULES))
+
+
 def pages() -> dict[Path, str]:
     """Every made file, and what it should hold."""
     case, log = PLACE / "case.md", PLACE / "contact-log.md"
+    judges = PLACE.parent / "explanation" / "how-a-diagnosis-judges.md"
     return {
         PLACE / "api.md": api_page(),
         PLACE / "commands.md": commands_page(),
         PLACE / "case.schema.json": schema_text(),
         case: between(case.read_text(encoding="utf-8"), "fields", case_fields()),
         log: between(log.read_text(encoding="utf-8"), "arrays", log_arrays()),
+        judges: between(judges.read_text(encoding="utf-8"), "thresholds", thresholds()),
     }
 
 

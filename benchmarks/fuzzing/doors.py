@@ -26,7 +26,7 @@ from sonic_bullet.files.cases import read_case
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.geometry import is_closed, volume_m3
 from sonic_bullet.records import Air, Body, Material, Microphone, ModalModel, ModalSum, Residual, Vibrometer
-from sonic_bullet.records.contacts import Contacts, Step
+from sonic_bullet.records.contacts import Contacts, Event, Step
 from sonic_bullet.render import radiated, render_log
 
 SR = 8000
@@ -67,7 +67,7 @@ def small_log(model: ModalModel, material: Material = STEEL, *, microphone: bool
     place, upright = [[0, 0, 0.1], [0, 0, 0]], [[0, 0, 0, 1.0]] * 2
     steps = [Step(1 / 240, place, upright, [False, False], Contacts(**one) if i != 1 else Contacts.none(), [0, 0, -9.81]) for i in range(3)]  # type: ignore[arg-type]
     sensors = (Microphone([0, -1, 0.5]), Vibrometer(0, [0, 0, 0.025], [0, 0, 1]), ModalSum(1.0))  # type: ignore[arg-type]
-    return ContactLog(bodies, tuple(steps), sensors if microphone else sensors[2:], SR, 0)
+    return ContactLog(bodies, tuple(steps), sensors if microphone else sensors[2:], SR, 0, events=(Event("quench", 1), Event("quench", 2)))
 
 
 def struck(model: ModalModel, material: Material = STEEL) -> None:
@@ -125,7 +125,7 @@ def case_seed() -> dict[str, Any]:
 
 def _enter_log(path: Path) -> None:
     log = files.read_log(path)
-    render_log(replace(log, steps=log.steps[:2]))
+    render_log(log.first(2))
 
 
 def _enter_model(path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import json
 import random
 import struct
@@ -122,11 +123,11 @@ def restructured(value: Any, draw: random.Random) -> Any:
     for _ in range(draw.choice((1, 1, 1, 2, 3))):
         places = list(_places(value))
         if not places:
-            return draw.choice(NODES)
+            return _node(draw)
         parent, key = draw.choice(places)
         kind = draw.randrange(8)
         if kind < 4:
-            parent[key] = draw.choice(NODES)
+            parent[key] = _node(draw)
         elif kind == 4:
             del parent[key]
         elif kind == 5 and isinstance(parent, dict):
@@ -135,12 +136,17 @@ def restructured(value: Any, draw: random.Random) -> Any:
             other, there = draw.choice(places)
             parent[key], other[there] = other[there], parent[key]
             if _depth(value) is None:  # a node put into itself
-                return draw.choice(NODES)
+                return _node(draw)
         elif isinstance(parent[key], (int, float)):
             parent[key] = parent[key] * draw.choice((-1, 0.5, 1e-12, 1e12, 1e100))
         else:
             parent[key] = [parent[key]] * draw.choice((2, 50))
     return value
+
+
+def _node(draw: random.Random) -> Any:
+    """One of NODES, its own copy: what is changed later must not change what another number draws."""
+    return copy.deepcopy(draw.choice(NODES))
 
 
 def _places(value: Any) -> list[tuple[Any, Any]]:

@@ -82,7 +82,7 @@ def _summary(found: Any) -> str:
     text = [f"{found.case.name}: {found.verdict}: {words['nothing' if nothing else found.verdict]}"]
     for c in found.closed.added:
         numbers = ", ".join(f"{k} {_number(v)}" for k, v in c.effect.parameters().items())
-        text.append(f"  {c.id} ({c.effect.owner.value}): {numbers}; {c.mean_db:.2f} dB nearer on strikes left out, chance {c.null_db:.2f} dB")
+        text.append(f"  {c.id} ({c.effect.owner.value}): {numbers}; {c.mean_db:.2f} dB nearer on strikes left out, chance {c.control_db:.2f} dB")
     rows = [
         (split, *(f"{found.errors[side][split]:.2f} dB" if found.errors[side][split] is not None else missing(split) for side in ("before", "after")))
         for split in ("fit", "holdout", "transfer")
@@ -93,7 +93,7 @@ def _summary(found: Any) -> str:
         text.append(f"noise alone: {found.errors['floor']:.2f} dB")
     others = [c for c in found.closed.tried if c.id not in {a.id for a in found.closed.added}]
     if others:
-        text.append("tried and not kept: " + "; ".join(f"{c.id} {c.mean_db:+.2f} dB (chance {c.null_db:+.2f})" for c in others))
+        text.append("tried and not kept: " + "; ".join(f"{c.id} {c.mean_db:+.2f} dB (chance {c.control_db:+.2f})" for c in others))
     if found.unexplained:
         text.append(f"left: {found.unexplained['words']}")
     return "\n".join(text)

@@ -1,8 +1,8 @@
 """`diagnose`: a case in, a Diagnosis out.
 
-    gather 'fit' strikes -> fit the baseline (baseline.py) -> loop (loop.py) -> verdict, errors on all splits, predictions
+    read the 'fit' strikes -> fit the baseline (baseline.py) -> select effects (stepwise.py) -> verdict, errors on all splits, predictions
 
-Nothing of 'holdout' and 'transfer' is opened before the loop has ended; where their audio is there, it is compared at the very end and changes nothing.
+Nothing of 'holdout' and 'transfer' is opened before the selection has ended; where their audio is there, it is compared at the very end and changes nothing.
 """
 
 from __future__ import annotations
@@ -123,9 +123,9 @@ def _of_lines(case: Case, bodies: tuple[Struck, ...], end: Closed | NothingCompa
             decay = np.array([np.nan if line.decay_per_s is None else line.decay_per_s for line in rows])
             for name, h in (("before", end.before), ("after", end.after)):
                 off, lost = off_by(h, body, freq, decay)
-                told = {"frequency_rms": float(np.sqrt((off**2).mean())), "lines": len(rows), "unpaired": int((off >= CAP).sum())}
-                told |= {"decay_rms": float(np.sqrt(np.nanmean(lost**2)))} if np.isfinite(lost).any() else {}
-                found.setdefault(name, {})[split] = told
+                entry = {"frequency_rms": float(np.sqrt((off**2).mean())), "lines": len(rows), "unpaired": int((off >= CAP).sum())}
+                entry |= {"decay_rms": float(np.sqrt(np.nanmean(lost**2)))} if np.isfinite(lost).any() else {}
+                found.setdefault(name, {})[split] = entry
     return found
 
 

@@ -1,6 +1,6 @@
-"""What no suspect accounts for, told so that a person can name it: when, where in frequency, how it goes with strength and place.
+"""What no candidate effect accounts for, in words by which a person can name it: when, where in frequency, how it goes with strength and place.
 
-e = |recorded − played|² in third octaves and thirds of the time, over the recording's own; slopes against ln J; lines that are no mode, or none that a linear body has (in_phase.py)
+e = |recorded − played|² in third octaves and thirds of the time, over the recording's own; slopes against ln J; lines that are no mode, or none that a linear body has (coherent_residual.py)
 """
 
 from __future__ import annotations
@@ -15,7 +15,8 @@ from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, play
 from sonic_bullet.diagnosis.prediction.score import LeftOut, Take
 from sonic_bullet.diagnosis.selection.band_levels import in_words
 from sonic_bullet.diagnosis.selection.coherent_residual import of_no_body
-from sonic_bullet.diagnosis.selection.stepwise import NO_BODY, Closed, NothingCompared
+from sonic_bullet.diagnosis.selection.stepwise import Closed, NothingCompared
+from sonic_bullet.diagnosis.selection.thresholds import RULES
 from sonic_bullet.effects.room.shifted_echo import copied
 from sonic_bullet.records import Array
 
@@ -56,7 +57,7 @@ def remainder(end: Closed | NothingCompared, takes: Sequence[Take]) -> dict[str,
     if len(total) > 1:
         words += "; it differs from place to place" if scatter > 0.5 else "; it is alike wherever the body is struck"
     strange = of_no_body(end.after, takes)
-    if strange > NO_BODY:
+    if strange > RULES.no_body_share:
         words += "; modes of one frequency, decay and phase each, whatever they are, do not play it: something goes with time or level, or is noise"
     again = _again(takes)
     if again is not None:
@@ -81,7 +82,7 @@ def listing(left_out: Sequence[LeftOut]) -> str:
 
 
 def _again(takes: Sequence[Take]) -> float | None:
-    """The ratio of frequencies at which a body's lines are heard again, if they are."""
+    """The ratio of frequencies at which a body's lines come again, if they do."""
     recorded = [g for body in {id(t.body): t.body for t in takes}.values() if (g := body.recorded) is not None]
     return next((r for g in recorded if (r := copied(g.lines.freq_hz, g.lines.decay_per_s, g.lines.amplitude)) is not None), None)
 

@@ -46,8 +46,8 @@ class DampingLaw:
     def __post_init__(self) -> None:
         one_of("law", self.law, LAWS)
         finite("exponent", self.exponent)
-        for name in ("eta", "strength", "tau_s"):
-            finite(name, getattr(self, name), least=0.0)
+        for name, value in (("eta", self.eta), ("strength", self.strength), ("tau_s", self.tau_s)):
+            finite(name, value, least=0.0)
 
     def decay_per_s(self, omega_per_s: Array) -> Array:
         """d (k,) at undamped ω (k,)."""

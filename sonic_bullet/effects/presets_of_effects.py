@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 from typing import Any
 
 import msgspec
@@ -30,7 +30,7 @@ FILE_NAMES = {"damping_growth": "choke"}
 
 def stored(effect: Effect) -> dict[str, Any]:
     """What a preset file holds of an effect: all but what it does not say (NaN)."""
-    values: dict[str, Any] = msgspec.to_builtins({FILE_NAMES.get(f.name, f.name): getattr(effect, f.name) for f in fields(effect)})  # type: ignore[arg-type]
+    values = {FILE_NAMES.get(name, name): value for name, value in msgspec.to_builtins(effect).items()}
     return {"id": effect.id} | {name: value for name, value in values.items() if not (isinstance(value, float) and np.isnan(value))}
 
 

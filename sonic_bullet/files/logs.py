@@ -14,9 +14,8 @@ The container is `container`'s npz. Scalars, names and references are JSON (`hea
       residual<i>_<field> f8                 of material i, where it has one: the arrays of `Residual`
       model<i>_freq_hz, _decay_per_s (m,) f8, _shape (v, 3, m) f4, _vertex_m (v, 3) f8, _face (f, 3) i4, _curvature_per_m (f,) f8
       model<i>_bend_s2_m2, _choke_s_m (m,) f8  only where its modes go with their level
-      events (in the header)                 what else changed the sound, in order: {"kind": "quench", "step": the step before which it happened,
-                                            "body": index, left out where it concerns all}
-    format "sonic-bullet-contacts/1"        the same without events: read as a log in which there were none
+      events (in the header)                 in order: {"kind": "quench", "step": the step before which it happened, "body": index, or null: all}
+    format "sonic-bullet-contacts/1"        the same without events
 
 A reader checks sizes before it allocates and records check their invariants, so a cut, foreign or forged file is one line of LogError.
 """
@@ -40,8 +39,7 @@ from sonic_bullet.records.coerce import as_path
 from sonic_bullet.records.contacts import ROW_FIELDS, Contacts, Event, Step
 from sonic_bullet.records.errors import LogError
 
-LOG_FORMAT = "sonic-bullet-contacts/2"
-LOG_FORMATS = (LOG_FORMAT, "sonic-bullet-contacts/1")
+LOG_FORMATS = ("sonic-bullet-contacts/2", "sonic-bullet-contacts/1")
 """What is read; the first is what is written."""
 RESIDUAL_ARRAYS: dict[str, tuple[int | None, ...]] = {
     **{f"{part}_{name}": (None,) for part in ("mode", "line") for name in ("freq_hz", "decay_per_s", "amplitude")},
@@ -98,12 +96,6 @@ class _ModalSum(msgspec.Struct, tag="modal-sum"):
     scale: float
 
 
-class _Event(msgspec.Struct, omit_defaults=True):
-    kind: str
-    step: int
-    body: int | None = None
-
-
 class _LogHeader(msgspec.Struct):
     format: str
     sr: int
@@ -114,7 +106,7 @@ class _LogHeader(msgspec.Struct):
     materials: list[_Material]
     models: list[ModelEntry]
     bodies: list[_Body]
-    events: list[_Event] = []
+    events: list[Event] = []
 
 
 def write_log(path: str | os.PathLike[str], log: ContactLog) -> None:
@@ -122,7 +114,7 @@ def write_log(path: str | os.PathLike[str], log: ContactLog) -> None:
     materials, material_of = _distinct([body.material for body in log.bodies], _material_key)
     models, model_of = _distinct([body.model for body in log.bodies], model_key)
     header = _LogHeader(
-        format=LOG_FORMAT,
+        format=LOG_FORMATS[0],
         sr=int(log.sr),
         seed=int(log.seed),
         air_density_kg_m3=float(log.air.density_kg_m3),
@@ -131,7 +123,7 @@ def write_log(path: str | os.PathLike[str], log: ContactLog) -> None:
         materials=[_pack_material(material) for material in materials],
         models=[pack_model(model) for model in models],
         bodies=[_pack_body(body, m, n) for body, m, n in zip(log.bodies, material_of, model_of, strict=True)],
-        events=[_Event(event.kind, event.step, event.body) for event in log.events],
+        events=list(log.events),
     )
     steps = log.steps
     rows = Contacts.joined([step.contacts for step in steps])
@@ -255,7 +247,7 @@ def _unpack_log(header: _LogHeader, arrays: Mapping[str, Array], path: object) -
         sr=header.sr,
         seed=header.seed,
         air=Air(header.air_density_kg_m3, header.air_sound_speed_m_s),
-        events=tuple(Event(event.kind, event.step, event.body) for event in header.events),
+        events=tuple(header.events),
     )
 
 

@@ -54,7 +54,7 @@ def why_silent(log: ContactLog) -> str | None:
         return _untouched(log, rows, added)
     touched = np.unique(np.concatenate([rows.a[mine], rows.b[mine]]))
     resonators = [build_resonator(log.bodies[i], log.sensors, log.sr, log.air) for i in touched if added[i]]
-    return _mute(log, resonators) or _at_rest(log, rows, mine) or _under_way(log, mine)
+    return _mute(log, resonators) or _at_rest(log, rows, mine) or _arrives_late(log, mine)
 
 
 def _untouched(log: ContactLog, rows: Contacts, added: Array) -> str:
@@ -110,7 +110,7 @@ def _at_rest(log: ContactLog, rows: Contacts, mine: Array) -> str | None:
     return f"all {len(mine)} contacts are support at rest: nothing approached faster than {max(fastest, 0.0):.2g} m/s and nothing slid; let something fall"
 
 
-def _under_way(log: ContactLog, mine: Array) -> str | None:
+def _arrives_late(log: ContactLog, mine: Array) -> str | None:
     """Whether the sound of the first contact would come to every microphone only after the end."""
     places = [sensor.position_m for sensor in log.sensors if isinstance(sensor, Microphone)]
     if len(places) < len(log.sensors):

@@ -67,7 +67,7 @@ def _effects(d: Diagnosis) -> str:
             c.effect.owner.value,
             ", ".join(f"{k} = {_number(v)}" for k, v in c.effect.parameters().items()),
             f"{c.mean_db:.2f} dB ± {c.sd_db:.2f}",
-            f"{c.null_db:.2f} dB",
+            f"{c.control_db:.2f} dB",
             c.effect.reference,
         )
         for c in d.closed.added
@@ -124,7 +124,7 @@ def _plane(d: Diagnosis) -> str:
 def _candidates(d: Diagnosis) -> str:
     kept = {c.id for c in d.closed.added}
     rows = [
-        (c.id, "added" if c.id in kept else "no", f"{c.mean_db:+.2f}", f"{c.null_db:+.2f}", " ".join(f"{x:+.2f}" for x in c.drop_db))
+        (c.id, "added" if c.id in kept else "no", f"{c.mean_db:+.2f}", f"{c.control_db:+.2f}", " ".join(f"{x:+.2f}" for x in c.drop_db))
         for c in sorted(d.closed.tried, key=lambda c: -c.mean_db)
     ]
     head = ("candidate", "kept", "nearer, dB", "chance, dB", "strike by strike, each left out in turn")

@@ -127,9 +127,12 @@ def compliant_share(mass_kg: float, impulse_n_s: float, pushed: Sequence[tuple[A
     the modes as further motions of the bodies, e.g. Stronge 2000, Impact Mechanics, sec. 7.1]. The modes' energy is then at most
     m*v²/2·((1+e)/2)², and not without bound. The rest of the simulator's impulse comes later, softly: it is heard as support.
     """
+    square = impulse_n_s**2
+    if square == 0:  # an impulse below 1e-162 N·s, which only a forged log has: nothing of it is heard
+        return 1.0
     f_tau, power = _spectrum_table(flat)
     given = sum(float(np.sum((push * np.interp(freq_hz * tau_s, f_tau, power, right=0.0)) ** 2)) for freq_hz, push in pushed)
-    return 1.0 / (1.0 + mass_kg * given / impulse_n_s**2)
+    return 1.0 / (1.0 + mass_kg * given / square)
 
 
 def cumulated_force(s: Array, *, flat: bool = False) -> Array:

@@ -60,9 +60,6 @@ names in JSON, npz and command lines, stay what files and scripts know."""
 FORMER_NAMES = {"records/bodies.py": {"choke_s_m"}}
 """Deprecated public aliases, by file."""
 
-NOT_YET = frozenset({"diagnosis"})
-"""Rooms that are still to be renamed; empty once they are."""
-
 MOST_FILES = 16
 """Python files that a folder holds at most."""
 
@@ -102,11 +99,6 @@ def private_words(path: Path) -> set[str]:
     return {name for name in (*identifiers(ast.parse(path.read_text())), path.stem) if parts(name) & PRIVATE_WORDS} - former
 
 
-def room(path: Path) -> str:
-    """The folder, or the file, of the package that a file belongs to."""
-    return path.relative_to(PACKAGE).parts[0]
-
-
 @pytest.mark.parametrize(
     ("name", "words"),
     [("told_by", {"told", "by"}), ("noise_floor", {"noise", "floor"}), ("ToldBy", {"told", "by"}), ("_HTMLPage2", {"html", "page"}), ("TOLD", {"told"})],
@@ -121,16 +113,10 @@ def test_identifiers_are_seen_wherever_they_stand() -> None:
 
 
 def test_identifiers_hold_no_private_word() -> None:
-    looked_at = [path for path in MODULES if room(path) not in NOT_YET]
-    found = {path.relative_to(PACKAGE).as_posix(): sorted(names) for path in looked_at if (names := private_words(path))}
-    print(f"{len(looked_at)} of {len(MODULES)} files looked at")
-    assert len(looked_at) > 100
+    found = {path.relative_to(PACKAGE).as_posix(): sorted(names) for path in MODULES if (names := private_words(path))}
+    print(f"{len(MODULES)} files looked at")
+    assert len(MODULES) > 100
     assert found == {}
-
-
-@pytest.mark.parametrize("name", sorted(NOT_YET))
-def test_a_room_that_is_renamed_is_no_longer_let_off(name: str) -> None:
-    assert any(private_words(path) for path in MODULES if room(path) == name), f"take {name} out of NOT_YET"
 
 
 def test_former_names_are_defined_where_they_are_listed() -> None:

@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 
 from sonic_bullet.diagnosis.evidence.baseline import takes_of
+from sonic_bullet.diagnosis.prediction.score import Score
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.diagnosis.remainder import remainder
 from sonic_bullet.diagnosis.selection import stepwise as loop
 from sonic_bullet.diagnosis.selection.acceptance import Candidate
 from sonic_bullet.diagnosis.selection.coherent_residual import of_no_body, out_of_phase
+from sonic_bullet.diagnosis.selection.thresholds import RULES
 from sonic_bullet.effects import Effect
 from sonic_bullet.effects.contact_time import ContactTime
 from sonic_bullet.effects.damping_law import DampingLaw
@@ -20,6 +22,7 @@ from sonic_bullet.effects.room import Room
 from sonic_bullet.estimator.lines.joint_lines import joint_lines
 from tests.diagnosis.test_found_again import BAND, fitted
 from tests.made.body import SR, plate, recorded, struck
+from tests.made.problems import posed
 
 
 def swung(depth: float, rate_hz: float = 9.0) -> Struck:
@@ -82,7 +85,7 @@ def test_a_swing_is_no_meshs_however_wrong_a_mesh_is(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(loop, "refitted", lambda h, _: h)
     monkeypatch.setattr(loop, "beyond", lambda h, *_: (h, 0.0))
     end = loop.closed(off, (body,), takes_of((body,)), (), BAND)
-    assert end.before_db - end.floor_db > loop.SUFFICES_DB
+    assert end.before_db - end.floor_db > RULES.suffices_db
     assert end.verdict == verdict
     if depth > 0:
         assert "do not play it" in remainder(end, takes_of((body,)))["words"]
@@ -98,8 +101,8 @@ def test_a_room_leaves_little_whatever_is_beside_it(monkeypatch: pytest.MonkeyPa
     named: list[tuple[Effect, float]] = [(room, 10.0)] + ([(law, gain_db)] if gain_db is not None else [])
     h = replace(fitted(body), effects=tuple(e for e, _ in named))
     added = [Candidate(e.id, e, h, np.full(5, gain), gain, 0.0, {}) for e, gain in named]
-    assert loop._verdict(h, added, 20.0, left_db + 1.0, 1.0, (body,), takes_of((body,)), 0) == verdict
+    assert loop._verdict(h, added, 20.0, Score(left_db + 1.0, 1.0), posed((body,), takes_of((body,)))) == verdict
     dry = replace(h, effects=(law,))
-    assert loop._verdict(dry, added[1:] or added, 20.0, left_db + 1.0, 1.0, (body,), takes_of((body,)), 0) == "explained", (
+    assert loop._verdict(dry, added[1:] or added, 20.0, Score(left_db + 1.0, 1.0), posed((body,), takes_of((body,)))) == "explained", (
         "where there is no room, a mesh may be to blame"
     )

@@ -18,8 +18,9 @@ from sonic_bullet.diagnosis.evidence.refit import refitted
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis
 from sonic_bullet.diagnosis.prediction.score import mean_db
 from sonic_bullet.diagnosis.selection import stepwise as loop
-from sonic_bullet.diagnosis.selection.acceptance import Candidate, earns
-from sonic_bullet.diagnosis.selection.cross_validation import KEPT, _folds, trials
+from sonic_bullet.diagnosis.selection.acceptance import Candidate, accepted
+from sonic_bullet.diagnosis.selection.cross_validation import _folds, cross_validated
+from sonic_bullet.diagnosis.selection.thresholds import RULES
 from sonic_bullet.effects import EFFECTS
 from sonic_bullet.effects.amplitude_damping import AmplitudeDamping
 from sonic_bullet.effects.orthotropy import Orthotropy
@@ -33,6 +34,7 @@ from sonic_bullet.records import ModalModel
 from tests.diagnosis.test_found_again import BAND, fitted
 from tests.diagnosis.test_recording_chain import BENT
 from tests.made.body import plate, recorded, struck
+from tests.made.problems import posed
 
 WEAK = ((0.0477, 0.0371, 0.0), (0.0955, 0.0186, 0.0), (0.1432, 0.0464, 0.0))
 
@@ -75,10 +77,10 @@ def test_what_corrections_alone_would_gain_is_no_effects() -> None:
     takes = takes_of((body,))
     lost = (mean_db(takes, stale) or 0.0) - (mean_db(takes, refitted(stale, (body,), anew=True)) or 0.0)
     assert lost > 3.0
-    found = trials(stale, (body,), takes, evidence_of(stale, (body,), BAND), (Idle,), seed=0, say=lambda _: None)
+    found = cross_validated(stale, posed((body,), takes, Idle), evidence_of(stale, (body,), BAND))
     assert [c.id for c in found] == ["mode-splitting"]
     assert np.abs(found[0].drop_db).max() < 0.1 * lost
-    assert not earns(found[0], lost, first=True)
+    assert not accepted(found[0], lost, first=True)
 
 
 @pytest.mark.parametrize(("spoils", "asked"), [((0, 1, 2, 3, 4), 2), ((0, 1), 2), ((), 2)], ids=["all", "two", "none"])
@@ -95,10 +97,10 @@ def test_what_could_not_earn_its_keep_any_more_is_asked_no_further(spoils: tuple
 
     body = recorded()
     takes, h = takes_of((body,)), refitted(fitted(body), (body,))
-    found = trials(h, (body,), takes, evidence_of(h, (body,), BAND), (Mutes,), seed=0, say=lambda _: None)[0]
+    found = cross_validated(h, posed((body,), takes, Mutes), evidence_of(h, (body,), BAND))[0]
     assert len(found.drop_db) == len(found.impulse_n_s) == asked
     assert (found.drop_db < -3.0).tolist() == [i in spoils for i in range(asked)]
-    assert not earns(found, 1.0, first=True)
+    assert not accepted(found, 1.0, first=True)
 
 
 def test_two_processes_find_what_one_finds(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -106,11 +108,11 @@ def test_two_processes_find_what_one_finds(monkeypatch: pytest.MonkeyPatch) -> N
     body = recorded(AmplitudeDamping(5.0, "velocity"))
     h = refitted(fitted(body), (body,))
     takes, evidence, kinds = takes_of((body,)), evidence_of(h, (body,), BAND), (AmplitudeDamping, Radiation, SupportDamping, Idle)
-    two = trials(h, (body,), takes, evidence, kinds, seed=3, say=lambda _: None)
+    two = cross_validated(h, posed((body,), takes, *kinds, seed=3), evidence)
     monkeypatch.setattr("sonic_bullet.parallel._can_fork", lambda: False)
-    one = trials(h, (body,), takes, evidence, kinds, seed=3, say=lambda _: None)
+    one = cross_validated(h, posed((body,), takes, *kinds, seed=3), evidence)
     assert len(one) >= 2
-    assert [(c.id, c.effect.parameters(), c.null_db, c.spread) for c in two] == [(c.id, c.effect.parameters(), c.null_db, c.spread) for c in one]
+    assert [(c.id, c.effect.parameters(), c.control_db, c.spread) for c in two] == [(c.id, c.effect.parameters(), c.control_db, c.spread) for c in one]
     assert all(np.array_equal(a.drop_db, b.drop_db) for a, b in zip(two, one, strict=True))
 
 
@@ -190,11 +192,11 @@ def test_trials_tell_what_has_numbers_of_single_lines_all_lines(monkeypatch: pyt
 
     told = evidence_of(h, (body,), BAND)
     count = len(told.observed[0].freq_hz)
-    trials(h, (body,), takes, told, (Listens, Part, Searches), seed=0, say=lambda _: None)
+    cross_validated(h, posed((body,), takes, Listens, Part, Searches), told)
     assert {n for who, n in asked if who in ("listens", "searches")} == {count}
-    assert {n for who, n in asked if who == "part"} == {count, round(KEPT * count)}
+    assert {n for who, n in asked if who == "part"} == {count, round(RULES.kept_lines_share * count)}
     asked.clear()
-    trials(h, (body,), takes, replace(told, found=("room", "radiation")), (Listens, Searches), seed=0, say=lambda _: None, costly=False)
+    cross_validated(h, posed((body,), takes, Listens, Searches), replace(told, found=("room", "radiation")), costly=False)
     assert {who for who, _ in asked} == {"listens"}
 
 
@@ -229,10 +231,10 @@ def test_in_a_room_dashpots_wait_for_a_tensor(dry: bool, costly: bool, asked: li
     takes, h = takes_of((body,)), refitted(fitted(body), (body,))
     told = evidence_of(h, (body,), BAND)
     told = replace(told, observed=(replace(told.observed[0], dry=dry),))
-    trials(h, (body,), takes, told, (Dashpots, Tensor), seed=0, say=lambda _: None, costly=costly)
+    cross_validated(h, posed((body,), takes, Dashpots, Tensor), told, costly=costly)
     assert list(dict.fromkeys(seen)) == asked
     seen.clear()
-    trials(h, (body,), takes, told, (Dashpots,), seed=0, say=lambda _: None, costly=costly)
+    cross_validated(h, posed((body,), takes, Dashpots), told, costly=costly)
     assert seen == ["support-damping"]
 
 
@@ -242,8 +244,8 @@ def test_dashpots_are_asked_after_a_tensor_that_came_to_nothing(monkeypatch: pyt
     body = recorded(room)
     takes = takes_of((body,))
 
-    def told(h: Hypothesis, bodies: Any, takes: Any, evidence: Any, effects: Any, **_: Any) -> list[Candidate]:
-        asked.append([kind.id for kind in effects])
+    def told(h: Hypothesis, problem: Any, evidence: Any, **_: Any) -> list[Candidate]:
+        asked.append([kind.id for kind in problem.effects])
         drop = np.full(len(takes), 5.0)
         if len(asked) == 1:
             found = Room.propose(evidence_of(h, (body,), BAND))
@@ -253,11 +255,12 @@ def test_dashpots_are_asked_after_a_tensor_that_came_to_nothing(monkeypatch: pyt
             return [Candidate("tensor", Orthotropy((1.0,) * 9), h, -drop, -5.0, 0.0, {})]
         return [Candidate("support-damping", SupportDamping(((0.0, 0.0, 0.0),), (1.0,)), h, -drop, -5.0, 0.0, {})]
 
-    monkeypatch.setattr(loop, "trials", told)
+    monkeypatch.setattr(loop, "cross_validated", told)
     anew: list[list[str]] = []
     monkeypatch.setattr(loop, "in_a_room", lambda _, found, *__, **___: anew.append([c.id for c in found]))
-    monkeypatch.setattr(loop, "in_twos", lambda *_, **__: None)
-    monkeypatch.setattr(loop, "OPEN", -1.0)  # however little the room leaves
+    monkeypatch.setattr(loop, "pairwise", lambda *_, **__: None)
+    monkeypatch.setattr(loop, "RULES", replace(RULES, costly_open_share=RULES.costly_open_share.at(1e-9)))  # however little the room leaves
+    monkeypatch.setattr(loop, "reidentified", lambda h, *_, **__: h)  # which leaves less than noise does
     end = loop.closed(fitted(body), (body,), takes, EFFECTS, BAND)
     every = [kind.id for kind in EFFECTS]
     assert asked == [every, every, ["support-damping"]]
@@ -271,8 +274,8 @@ def test_a_lines_own_numbers_are_tried_with_all_lines() -> None:
     takes, h = takes_of((body,)), refitted(fitted(body), (body,))
     told = evidence_of(h, (body,), BAND)
     count = len(told.observed[0].freq_hz)
-    for keep in (KEPT, 1.0):
-        for i, fold in enumerate(_folds(h, (body,), takes, told, 0, keep=keep)):
+    for keep in (RULES.kept_lines_share, 1.0):
+        for i, fold in enumerate(_folds(h, posed((body,), takes), told, keep=keep)):
             less = fold.evidence.observed[0]
             assert len(less.freq_hz) == round(keep * count)
             assert less.impulse_n_s == pytest.approx(np.delete(told.observed[0].impulse_n_s, i))

@@ -9,17 +9,19 @@ import pytest
 
 from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of, thinned
 from sonic_bullet.diagnosis.evidence.refit import refitted, reidentified
-from sonic_bullet.diagnosis.prediction.score import Take, least_db, mean_db
+from sonic_bullet.diagnosis.prediction.score import Score, Take
 from sonic_bullet.diagnosis.selection.acceptance import Candidate
-from sonic_bullet.diagnosis.selection.cross_validation import trials
+from sonic_bullet.diagnosis.selection.cross_validation import cross_validated
 from sonic_bullet.diagnosis.selection.decay_test import likelier, tells
-from sonic_bullet.diagnosis.selection.simplest import LINES, by_lines, helps
+from sonic_bullet.diagnosis.selection.simplest import by_lines, helps
+from sonic_bullet.diagnosis.selection.thresholds import RULES
 from sonic_bullet.effects.added_mass import AddedMass
 from sonic_bullet.effects.contact_time import ContactTime
 from sonic_bullet.effects.damping_law import DampingLaw
 from sonic_bullet.effects.room import Room
 from sonic_bullet.estimator.lines.log_spectral import floor_between
 from tests.made.body import SR, plate, recorded, truth
+from tests.made.problems import posed
 
 BAND = (50.0, 7_500.0)
 ROOM = Room(0.5, 0.3, seed=3)
@@ -33,26 +35,25 @@ def tried(*effects: DampingLaw) -> tuple[list[Candidate], bool]:
     floor = floor_between(list(body.recorded.signals))
     takes = [Take(body, i, x, SR, floor) for i, x in zip(body.fitted, body.recorded.signals, strict=True)]
     h = reidentified(refitted(truth(ROOM), (body,)), (body,))
-    found = trials(h, (body,), takes, evidence_of(h, (body,), BAND), [DampingLaw], seed=0, say=lambda _: None)
-    told, least = mean_db(takes, h) or 0.0, least_db(takes, h) or 0.0
-    shapeless = (replace(body, family=None),)
+    found = cross_validated(h, posed((body,), takes, DampingLaw), evidence_of(h, (body,), BAND))
+    problem, shapeless = posed((body,), takes), posed((replace(body, family=None),), takes)
+    now = problem.score(h)
+    far = Score(100.0, now.floor_db)
     for c in found:
-        assert helps(c, (body,), takes, 100.0, 100.0, least, first=False), "much nearer than nothing, whatever it is"
-        assert not (helps(c, shapeless, takes, 100.0, 100.0, least, first=False) or by_lines(c, shapeless, takes, told, least)), (
-            "without a mesh, of a room's lines none is known to be a mode"
-        )
-    return found, any(by_lines(c, (body,), takes, told, least) for c in found)
+        assert helps(c, problem, far, far, first=False), "much nearer than nothing, whatever it is"
+        assert not (helps(c, shapeless, far, far, first=False) or by_lines(c, shapeless, now)), "without a mesh, of a room's lines none is known to be a mode"
+    return found, any(by_lines(c, problem, now) for c in found)
 
 
 def test_a_law_in_a_room_is_told_by_lines() -> None:
     found, named = tried(LAW)
-    assert found[0].lines > LINES
+    assert found[0].lines > RULES.line_gain
     assert named
 
 
 def test_rayleighs_own_damping_in_a_room_is_no_law() -> None:
     found, named = tried()
-    assert all(c.lines < LINES for c in found)
+    assert all(c.lines < RULES.line_gain for c in found)
     assert not named
 
 

@@ -108,7 +108,7 @@ def test_a_planted_effect_is_named(number: int) -> None:
     assert [c.id for c in end.added] == [effect.id]
     assert end.verdict == "explained"
     close(end.added[0].effect, effect, within)
-    assert end.added[0].mean_db > 2 * max(end.added[0].null_db, 0.0)
+    assert end.added[0].mean_db > 2 * max(end.added[0].control_db, 0.0)
 
 
 def of_somebody_else() -> ModuleType:

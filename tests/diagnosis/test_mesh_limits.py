@@ -18,6 +18,7 @@ from sonic_bullet.effects.amplitude_pitch import AmplitudePitch
 from sonic_bullet.effects.contact_time import ContactTime
 from sonic_bullet.estimator.lines.log_spectral import floor_between
 from tests.made.body import SR, plate, recorded, struck, truth
+from tests.made.problems import posed
 
 BAND = (50.0, 7_500.0)
 
@@ -44,7 +45,7 @@ def upper(off: float) -> np.ndarray:
 @pytest.mark.parametrize("off", [0.022, -0.022])
 def test_upper_modes_two_percent_off_are_the_meshs(off: float) -> None:
     body, h, takes = misjudged(upper(off))
-    far, most = beyond(h, (body,), takes)
+    far, most = beyond(h, posed((body,), takes))
     assert far.correction is not None
     assert far.correction[body.name] == pytest.approx(upper(off), abs=2e-4)
     assert most == pytest.approx(abs(off), rel=0.02)
@@ -61,7 +62,7 @@ def test_upper_modes_two_percent_off_are_the_meshs(off: float) -> None:
 def test_what_no_mesh_does_stays_open(off: np.ndarray) -> None:
     """Long waves are what meshes get right; and nothing is moved by more than FAR, or to a line of another pattern."""
     body, h, takes = misjudged(off)
-    most = beyond(h, (body,), takes)[1]
+    most = beyond(h, posed((body,), takes))[1]
     assert most < FAR
     assert closed(h, (body,), takes, (), BAND).verdict == "unexplained"
 
@@ -78,7 +79,7 @@ def test_a_mode_below_the_bands_edge_that_nobody_hears_is_the_meshs(reach: float
     body = replace(struck(model, observed.lines, observed.signals), band_hz=(50.0, edge))
     takes = tuple(Take(body, i, x, SR, floor_between(list(observed.signals))) for i, x in zip(body.fitted, observed.signals, strict=True))
     h = refitted(replace(truth(), correction={body.name: np.zeros(model.mode_count)}), (body,))
-    far, most = beyond(h, (body,), takes)
+    far, most = beyond(h, posed((body,), takes))
     assert (most > 0) == outside
     assert not outside or reach - 1 < most < 0.03
     left = (mean_db(takes, far) or 0.0) - (least_db(takes, far) or 0.0)
@@ -100,6 +101,6 @@ def test_a_name_is_judged_by_what_a_finer_mesh_would_leave() -> None:
 
 def test_nothing_is_put_anywhere_where_every_mode_has_its_line() -> None:
     body, h, takes = misjudged(np.zeros(18))
-    far, most = beyond(h, (body,), takes)
+    far, most = beyond(h, posed((body,), takes))
     assert most == 0.0 and far is h
     assert closed(h, (body,), takes, (), BAND).verdict == "none"

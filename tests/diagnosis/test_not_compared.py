@@ -19,13 +19,14 @@ from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of
 from sonic_bullet.diagnosis.prediction.score import EDGE_DB, Compared, Incomparable, Take, comparable, mean_db
 from sonic_bullet.diagnosis.remainder import remainder
 from sonic_bullet.diagnosis.selection import stepwise as loop
-from sonic_bullet.diagnosis.selection.cross_validation import trials
+from sonic_bullet.diagnosis.selection.cross_validation import cross_validated
 from sonic_bullet.diagnosis.selection.stepwise import Closed, NothingCompared, closed
 from sonic_bullet.effects import EFFECTS
 from sonic_bullet.effects.protocol import Evidence, Owner, Sound, Stage
 from sonic_bullet.estimator.lines.log_spectral import noise_floor_db, white
 from tests.diagnosis.test_found_again import BAND, fitted
 from tests.made.body import SR, recorded, truth
+from tests.made.problems import posed
 
 SOURCE = Path(sonic_bullet.__file__).parent
 
@@ -145,7 +146,7 @@ def test_what_cannot_be_played_is_rejected() -> None:
     body = recorded()
     takes, off = takes_of((body,)), replace(fitted(body), gain=0.05)
     assert mean_db(takes, replace(off, effects=(Spoils(),))) == np.inf
-    found = trials(off, (body,), takes, evidence_of(off, (body,), BAND), (Spoils,), seed=0, say=lambda _: None)
+    found = cross_validated(off, posed((body,), takes, Spoils), evidence_of(off, (body,), BAND))
     assert [c.id for c in found] == ["spoils"] and (found[0].drop_db == -np.inf).all()
     end = closed(fitted(body), (body,), takes, (Spoils,), BAND)
     assert isinstance(end, Closed) and end.added == () and end.verdict == "none"

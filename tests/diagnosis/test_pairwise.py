@@ -14,6 +14,7 @@ from sonic_bullet.diagnosis.prediction.score import Take
 from sonic_bullet.diagnosis.selection import pairwise as twos
 from sonic_bullet.diagnosis.selection.acceptance import Candidate
 from sonic_bullet.diagnosis.selection.pairwise import in_a_room, pairwise
+from sonic_bullet.diagnosis.selection.thresholds import RULES
 from sonic_bullet.effects import Effect
 from sonic_bullet.effects.added_mass import AddedMass
 from sonic_bullet.effects.contact_time import ContactTime
@@ -22,6 +23,7 @@ from sonic_bullet.effects.measurement_chain import MeasurementChain
 from sonic_bullet.effects.room import Room
 from sonic_bullet.estimator.lines.log_spectral import floor_between
 from tests.made.body import SR, recorded, truth
+from tests.made.problems import posed
 
 BAND = (50.0, 7_500.0)
 PULSE = ContactTime(3e-4, 0.016, -0.2)
@@ -44,7 +46,7 @@ def tried(*effects: Effect, kinds: tuple[type[Effect], ...]) -> tuple[list[Candi
         if found is not None:
             h = refitted(replace(start, effects=(found,)), (body,), told.observed)
             first.append(Candidate(kind.id, found, h, np.zeros(len(takes)), 0.0, 0.0, {}))
-    return first, pairwise(start, first, (body,), takes, BAND, seed=0, say=lambda _: None)
+    return first, pairwise(start, first, posed((body,), takes))
 
 
 def test_a_law_and_a_pulse_are_found_at_once_whatever_each_says_alone() -> None:
@@ -83,7 +85,7 @@ def heard_anew(planted: tuple[Effect, ...], suspect: Effect) -> tuple[Hypothesis
     assert room is not None
     h = refitted(replace(start, effects=(room,)), (body,), told.observed)
     found = [Candidate(suspect.id, suspect, h, np.zeros(len(takes)), 0.0, 0.0, {})]
-    return in_a_room(h, found, (body,), takes, BAND, seed=0, say=lambda _: None)
+    return in_a_room(h, found, posed((body,), takes))
 
 
 def test_a_mass_in_a_room_is_heard_with_a_response_of_its_own() -> None:
@@ -100,7 +102,7 @@ def test_a_mass_in_a_room_is_heard_with_a_response_of_its_own() -> None:
 def test_a_room_alone_needs_no_mass(monkeypatch: pytest.MonkeyPatch) -> None:
     """Nor by its trial alone, were any two that leave less than all let through to it: the room told again without the mass says more."""
     assert heard_anew((ROOM,), MASS) is None
-    monkeypatch.setattr(twos, "LEFT", np.inf)
+    monkeypatch.setattr(twos, "RULES", replace(RULES, pair_leaves_share=RULES.pair_leaves_share.at(1.0)))
     assert heard_anew((ROOM,), MASS) is None
 
 

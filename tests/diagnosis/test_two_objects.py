@@ -10,12 +10,13 @@ from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of, thinned
 from sonic_bullet.diagnosis.evidence.refit import refitted
 from sonic_bullet.diagnosis.prediction.score import Take
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
-from sonic_bullet.diagnosis.selection.acceptance import earns
-from sonic_bullet.diagnosis.selection.cross_validation import trials
+from sonic_bullet.diagnosis.selection.acceptance import accepted
+from sonic_bullet.diagnosis.selection.cross_validation import cross_validated
 from sonic_bullet.diagnosis.selection.exchange import left_out_db
 from sonic_bullet.effects.damping_law import DampingLaw
 from sonic_bullet.estimator.lines.log_spectral import floor_between
 from tests.made.body import SR, recorded, truth
+from tests.made.problems import posed
 
 BAND = (50.0, 7_500.0)
 LAW = DampingLaw("power", 6e-3, 1.4)
@@ -63,8 +64,8 @@ def test_objects_of_one_strike_stand_trial_with_the_others() -> None:
     bodies = (recorded(LAW), alone(recorded(LAW, seed=6), 3))
     takes = takes_of(*bodies)
     plain = refitted(truth(), bodies)
-    found = trials(plain, bodies, takes, evidence_of(plain, bodies, BAND), (DampingLaw,), seed=0, say=lambda _: None)
+    found = cross_validated(plain, posed(bodies, takes, DampingLaw), evidence_of(plain, bodies, BAND))
     assert [c.id for c in found] == ["damping-law"] and len(found[0].drop_db) == len(takes)
-    assert earns(found[0], 5.0, first=True) and found[0].drop_db.min() > 0
-    out = left_out_db(found[0].hypothesis, 0, bodies, takes, BAND)
+    assert accepted(found[0], 5.0, first=True) and found[0].drop_db.min() > 0
+    out = left_out_db(found[0].hypothesis, 0, posed(bodies, takes))
     assert len(out) == len(takes) and np.isfinite(out).all()

@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from sonic_bullet.diagnosis.evidence.amplitude_dependence import fallen, gliding, turns_rad
+from sonic_bullet.diagnosis.evidence.amplitude_dependence import amplitude_dependent, fallen, turns_rad
 from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of
 from sonic_bullet.diagnosis.evidence.refit import refitted, with_effects
 from sonic_bullet.diagnosis.evidence.small_amplitude import _off_hz, at_rest
@@ -73,7 +73,7 @@ def test_what_a_long_pulse_has_left_faint_does_not_glide() -> None:
     assert pressed.min() < 0.1
     assert pressed.max() > 0.9
     assert soft == pytest.approx(hard * pressed**2, rel=0.05, abs=1e-6)
-    assert 0 < np.count_nonzero(gliding(replace(h, effects=(BENT, long)), body, one)) < len(one.freq_hz)
+    assert 0 < np.count_nonzero(amplitude_dependent(replace(h, effects=(BENT, long)), body, one)) < len(one.freq_hz)
 
 
 def test_a_bend_by_impulse_is_told_by_what_the_pulse_leaves_of_it() -> None:

@@ -231,7 +231,7 @@ def test_lost_and_unknown_clients_are_named(client: Any) -> None:
     for wrong in (4000, -1):
         with pytest.raises(SceneError, match="not connected"):
             open_world(wrong)
-    with pytest.raises(SceneError, match="no PyBullet client"):
+    with pytest.raises(SceneError, match="client is 'client'"):
         open_world("client")
 
 

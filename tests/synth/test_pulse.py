@@ -131,3 +131,7 @@ def test_a_blow_gives_modes_no_more_energy_than_it_has(flat: bool) -> None:
             assert count or share == 1
             checked += 1
     assert checked == 12
+
+
+def test_an_impulse_too_small_to_square_shares_nothing() -> None:
+    assert pulse.compliant_share(1.0, 1e-200, [(np.array([900.0]), np.array([1e-190]))], 1e-3, False) == 1.0

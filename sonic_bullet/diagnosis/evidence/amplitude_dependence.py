@@ -1,7 +1,7 @@
-"""Modes whose frequency goes with their level: how far they glide, and how fast they fall.
+"""Modes whose frequency goes with their level: how far it shifts, and how fast they fall.
 
-A linear fit tells such a mode as a chain of lines (chains.py), none with its decay. But only its frequency bends: its level falls as the linear mode's does.
-Twins beat once each glides by its own level, so theirs is told by what is played: recorded over played falls as e^{−δt}, δ what their decay lacks.
+A linear fit identifies such a mode as a chain of lines (recording_chain.py), none with its decay. But only its frequency bends: its level falls as the linear mode's does.
+Degenerate modes beat once each shifts by its own level, so their decay is identified by what is played: recorded over played falls as e^{−δt}, δ what their decay lacks.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ from sonic_bullet.effects.common.envelope import Envelopes, alone, falls, shifte
 from sonic_bullet.effects.protocol import ObjectEvidence
 from sonic_bullet.records import Array
 
-TURNS_RAD = 0.2  # of phase, that a mode must gain or lose to be told as one that glides
+TURNS_RAD = 0.2  # of phase, that a mode must gain or lose to count as amplitude-dependent
 SPREAD = 0.02  # of a level's own fall
-FEWEST = 8  # frames
+LEAST_FRAMES = 8  # frames
 LACKS = 0.5  # of a decay, at most
 
 
@@ -30,17 +30,17 @@ def turns_rad(h: Hypothesis, body: Struck, one: ObjectEvidence) -> Array:
     return np.stack([turned[:, who[who < turned.shape[1]]].max(axis=1, initial=0.0) for who in one.mode], axis=1)
 
 
-def gliding(h: Hypothesis, body: Struck, one: ObjectEvidence) -> Array:
+def amplitude_dependent(h: Hypothesis, body: Struck, one: ObjectEvidence) -> Array:
     """Whether each line (k,) is of modes whose phases the effects turn by TURNS_RAD or more in the end, at the strike that moves them most."""
     return np.asarray(turns_rad(h, body, one).max(axis=0) > TURNS_RAD)
 
 
 def fallen(h: Hypothesis, body: Struck, one: ObjectEvidence) -> ObjectEvidence:
-    """The evidence, the decays of lines that glide told by their levels' own fall, where they stand alone."""
+    """The evidence, the decays of amplitude-dependent lines identified by their levels' own fall, where they stand alone."""
     if not bends(h) or one.signal is None or one.dry or not len(one.freq_hz):
         return one  # in a room no line is one mode's alone
-    glides = gliding(h, body, one)
-    mine = [(k, width) for k, width in zip(*alone(one), strict=True) if glides[k] and len(one.mode[k]) in (1, 2)]
+    dependent = amplitude_dependent(h, body, one)
+    mine = [(k, width) for k, width in zip(*alone(one), strict=True) if dependent[k] and len(one.mode[k]) in (1, 2)]
     if not mine:
         return one
     selected, window = [k for k, _ in mine], [width for _, width in mine]
@@ -60,11 +60,11 @@ def fallen(h: Hypothesis, body: Struck, one: ObjectEvidence) -> ObjectEvidence:
 
 
 def beats(e: Envelopes, made: Envelopes, q: int, decay_per_s: float) -> float:
-    """The decay of twins, in 1/s, by how what was recorded falls against what is played with one decay; that one where too little is clear in both."""
+    """The decay of a degenerate pair, in 1/s, by how what was recorded falls against what is played with one decay; that one where too little is clear in both."""
     top = bottom = 0.0
     for s in range(len(e.z)):
         use = e.good[s, q] & made.good[s, q]
-        if use.sum() < FEWEST:
+        if use.sum() < LEAST_FRAMES:
             continue
         t, w = e.time_s[q, use], e.worth(s, q)[use]
         left = np.log(np.abs(e.z[s, q, use]) / np.abs(made.z[s, q, use]))

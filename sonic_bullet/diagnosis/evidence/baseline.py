@@ -1,7 +1,7 @@
 """The baseline of a case: the fitted model, its bodies, and the hypothesis that nothing is lacking.
 
-gathered lines -> estimator.fit -> bodies (groups parted, corrections learnt) -> Hypothesis
-lines in chains (chains.py): the same with every chain as one line, where what that plays is nearer to the recordings, or most modes are chains and it is not clearly farther;
+recorded lines -> estimator.fit -> bodies (groups separated, corrections learnt) -> Hypothesis
+lines in chains (recording_chain.py): the same with every chain as one line, where what that plays is nearer to the recordings, or most modes are chains and it is not clearly farther;
     and with the lines of the softer strikes, whose modes are nearest to linear ones, or of those below a limit, at all strikes
 """
 
@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sonic_bullet.diagnosis.evidence.degenerate_pairs import separated
-from sonic_bullet.diagnosis.evidence.recording_chain import FEWEST, LINKS, share, unchained
+from sonic_bullet.diagnosis.evidence.recording_chain import LINKS, share, unchained
 from sonic_bullet.diagnosis.evidence.refit import refitted
 from sonic_bullet.diagnosis.evidence.unmatched_modes import settled
 from sonic_bullet.diagnosis.prediction.elastic_bodies import with_elastic
@@ -32,8 +32,9 @@ from sonic_bullet.modal.cache import Place
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import AudioError
 
+LEAST_LINES = 4  # of some strikes: fewer are no list
 NEARER = 0.9  # of the distance, where chains are one line each
-SOFTER = 0.6  # of the middle strike's impulse at most, of half the strikes: soft enough to be heard apart
+SOFTER = 0.6  # of the middle strike's impulse at most, of half the strikes: soft enough to differ from it
 BELOW, TOUCHES = 0.998, 3  # of a limit, and samples that may reach it in a strike that stays below
 OFTEN, MOSTLY = 0.4, 1.05  # chains, of all modes' lines: no linear body has so many, so one line each it is unless that is clearly worse
 
@@ -49,7 +50,7 @@ class Baseline:
 
 
 def baseline(case: Case, recorded: tuple[Recorded, ...], *, cache: Place = "default", progress: Callable[[str], None] | None = None) -> Baseline:
-    """Fit it to gathered evidence. Raises SonicBulletError."""
+    """Fit it to recorded evidence. Raises SonicBulletError."""
     plain = _of(case, recorded, cache, progress)
     directions = [tuple(_unchained(one, link) for one in recorded) for link in LINKS] if plain.takes else []
     directions += [tuple(direction(one, case.band_hz) for one in recorded) for direction in (_soft, _unclipped)] if directions else []
@@ -104,7 +105,7 @@ def _lines_by(one: Recorded, strikes: Array, band_hz: tuple[float, float]) -> Li
         lines = lines_of(still, noise_rms(still, one.sr), some.pole, one.sr, some.signed)
     except (AudioError, np.linalg.LinAlgError):
         return None
-    return lines if len(lines.freq_hz) >= FEWEST else None
+    return lines if len(lines.freq_hz) >= LEAST_LINES else None
 
 
 def _off_db(b: Baseline) -> float:

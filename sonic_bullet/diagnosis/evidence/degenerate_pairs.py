@@ -18,18 +18,19 @@ from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.records import Array
 
 LIKE = 0.97  # cosine of a line's amplitudes over the strikes and its modes' pattern
-FEWEST = 3  # modes of such a group; strikes that tell
+LEAST_MEMBERS = 3  # modes of such a group
+LEAST_STRIKES = 3  # by which a pattern is known
 
 
 def separated(body: Struck) -> Struck:
-    """The body with such groups told as the two lines they are."""
-    if body.recorded is None or body.family is None or len(body.fitted) < FEWEST:
+    """The body with such groups as the two lines they are."""
+    if body.recorded is None or body.family is None or len(body.fitted) < LEAST_STRIKES:
         return body
     lines, row = body.recorded.lines, pattern(body, body.model)[body.fitted]
     line, correction, freq = body.line.copy(), body.correction.copy(), body.model.freq_hz
     for one in np.unique(line[line >= 0]):
         group = np.flatnonzero(line == one)
-        if len(group) < FEWEST:
+        if len(group) < LEAST_MEMBERS:
             continue
         cut = 1 + int(np.diff(freq[group]).argmax())
         free = [k for k in range(len(lines.freq_hz)) if k not in line and abs(lines.freq_hz[k] / freq[group].mean() - 1) < CORRECTION]

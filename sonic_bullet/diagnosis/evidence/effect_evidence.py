@@ -1,8 +1,8 @@
-"""What effects are told: fitted lines beside the hypothesis' own modes, and the sounds beside what it plays.
+"""What effects propose from: fitted lines beside the hypothesis' own modes, and the sounds beside what it plays.
 
-    Struck + Lines + Hypothesis -> which modes each line stands for -> Heard (effects.values), one per fitted object -> Evidence
+    Struck + Lines + Hypothesis -> which modes each line stands for -> ObjectEvidence (effects.protocol), one per fitted object -> Evidence
 
-Strikes can be left out (their amplitudes and sounds), and lines: what an effect says must hold for those it was not told of.
+Strikes can be left out (their amplitudes and sounds), and lines: what an effect says must hold for those it never saw.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from sonic_bullet.records import Array, ModalModel
 
 REACH = 0.012  # of a line from its mode where effects have moved it
 LOSSY, TOGETHER = 0.06, 0.25  # price of (ln d)² of a line over its mode; ln d of modes that sound as one line
-OWN, ALIKE = 1e-4, 2.0  # of a frequency, beside its width; times its decay: a line so near what is known to ring beside the body is that
+OWN, ALIKE = 1e-4, 2.0  # of a frequency, beside its width; times its decay: a line so near a known residual voice is that voice's
 DIRECT_S = 0.008  # of the sound path: what comes later is an echo
 
 
@@ -46,7 +46,7 @@ def object_evidence(h: Hypothesis, body: Struck, *, sounds: bool = True, anew: b
     pressed = np.stack([impact_of(h, body, i).spectrum(model.freq_hz) for i in mine])
     spectrum = pressed * direct
     expected = np.stack([(h.gain * push * spectrum)[:, m].sum(axis=1) for m in mode], axis=1) if mode else np.zeros((len(mine), 0), complex)
-    told = np.stack([rows[:, m].sum(axis=1) for m in mode], axis=1) if mode else np.zeros((len(mine), 0))
+    participation = np.stack([rows[:, m].sum(axis=1) for m in mode], axis=1) if mode else np.zeros((len(mine), 0))
     uncorrected = replace(h, correction=None)
     plain, plain_order = modes_of(uncorrected, body)
     rank = {int(k): i for i, k in enumerate(plain_order)}
@@ -69,7 +69,7 @@ def object_evidence(h: Hypothesis, body: Struck, *, sounds: bool = True, anew: b
         model_hz=model_hz,
         expected_decay_per_s=np.array([model.decay_per_s[m].mean() for m in mode]),
         expected=expected,
-        pattern=told,
+        pattern=participation,
         foreign_hz=lines.freq_hz[rest],
         foreign_decay_per_s=lines.decay_per_s[rest],
         foreign_amplitude=lines.amplitude[:, rest],
@@ -109,9 +109,9 @@ def _played(h: Hypothesis, body: Struck, strikes: list[int], signals: Array) -> 
 
 
 def named(h: Hypothesis, lines: Lines) -> Array:
-    """Which lines (l,), one of each mode, are nearest to what the hypothesis knows to ring beside the body: nobody else is told of these."""
-    beside = [np.array(e.lines(), float) for e in h.effects if isinstance(e, RingsAlong)]
-    freq, decay = np.concatenate(beside, axis=1) if beside else np.zeros((2, 0))
+    """Which lines (l,), one of each mode, are nearest to what the hypothesis knows to ring beside the body: no other effect sees these."""
+    voices = [np.array(e.lines(), float) for e in h.effects if isinstance(e, RingsAlong)]
+    freq, decay = np.concatenate(voices, axis=1) if voices else np.zeros((2, 0))
     off, own = np.abs(lines.freq_hz[:, None] - freq), np.maximum(np.nan_to_num(lines.decay_per_s), 0.0)[:, None]
     alike = (off < decay / (2 * np.pi) + OWN * freq) & (np.maximum(own, decay) <= ALIKE * np.minimum(own, decay))
     off = np.where(alike, off, np.inf)
@@ -147,8 +147,8 @@ def _nearest(body: Struck, model: ModalModel, known: Array) -> tuple[Array, tupl
         return np.zeros(0, int), ()
     gap = np.log(lines.freq_hz)[:, None] - np.log(model.freq_hz)[None, :]
     mine = body.fitted[: len(lines.amplitude)]
-    told, observed = np.abs(pattern(body, model)[mine]), np.abs(lines.amplitude)
-    alike = (observed.T @ told) / np.maximum(np.linalg.norm(observed, axis=0)[:, None] * np.linalg.norm(told, axis=0)[None, :], 1e-300)
+    expected, observed = np.abs(pattern(body, model)[mine]), np.abs(lines.amplitude)
+    alike = (observed.T @ expected) / np.maximum(np.linalg.norm(observed, axis=0)[:, None] * np.linalg.norm(expected, axis=0)[None, :], 1e-300)
     with np.errstate(divide="ignore", invalid="ignore"):
         worse = np.nan_to_num(np.log(lines.decay_per_s[:, None] / model.decay_per_s[None, :]), posinf=0.0, neginf=0.0)
     price = np.minimum((gap / REACH) ** 2 + 0.5 * (1 - np.nan_to_num(alike)) + LOSSY * worse**2, 1.0) - 1.0
@@ -156,7 +156,7 @@ def _nearest(body: Struck, model: ModalModel, known: Array) -> tuple[Array, tupl
     row, column = linear_sum_assignment(price)
     good = price[row, column] < 0
     row, column = row[good], column[good]
-    group = np.cumsum(np.diff(np.log(model.freq_hz), prepend=-np.inf) > DEGENERATE)  # twins that nothing has set apart are one line
+    group = np.cumsum(np.diff(np.log(model.freq_hz), prepend=-np.inf) > DEGENERATE)  # degenerate modes that nothing has set apart are one line
     taken, mode = set(column.tolist()), []
     for c in column:
         like = np.abs(np.log(np.maximum(model.decay_per_s, 1e-9) / max(float(model.decay_per_s[c]), 1e-9))) < TOGETHER
@@ -168,7 +168,7 @@ def _nearest(body: Struck, model: ModalModel, known: Array) -> tuple[Array, tupl
 
 def path_response(h: Hypothesis, body: Struck, freq_hz: Array, sr: int) -> Array:
     """Complex response (f,) of the sound path's first milliseconds: its effects applied to a weak impulse less what they add to silence."""
-    effects = [e for e in h.at(Stage.SOUND, fitted=body.recorded is not None) if not isinstance(e, Dereverberates)]  # lines are told as without those
+    effects = [e for e in h.at(Stage.SOUND, fitted=body.recorded is not None) if not isinstance(e, Dereverberates)]  # lines are dereverberated already
     if not effects:
         return np.ones(len(freq_hz), complex)
     n = round(DIRECT_S * sr)
@@ -182,7 +182,7 @@ def path_response(h: Hypothesis, body: Struck, freq_hz: Array, sr: int) -> Array
 def thinned(evidence: Evidence, at: tuple[Recorded, int], keep: float, rng: np.random.Generator) -> Evidence:
     """The same without one strike, at: whose, and which of those, and without a random part of all lines: ``keep`` of them stay.
 
-    An object of which nothing else was heard is left out with it.
+    An object of which nothing else was recorded is left out with it.
     """
     source, strike = at
     rest = [h for h in evidence.observed if h.source is not source or len(h.impulse_n_s) > 1]

@@ -25,7 +25,7 @@ SHORTER = 5.0  # at most
 NEAR = 0.012  # of a frequency
 ONE = 2.0  # decays: slow lines that lie nearer are one mode's
 LONG, FRAMES, FAINT = 3.0, 120, 0.03  # of 1/d; of the strongest level
-FEWEST, SHARE = 4, 0.1  # chains, and of all modes' lines: fewer are neighbours, hits or a room's
+LEAST_CHAINS, LEAST_SHARE_OF_CHAINS = 4, 0.1  # chains, and of all modes' lines: fewer are neighbours, hits or a room's
 PLAIN = 4  # links of the loudest line's chain, which bends most, the shorter the farther off: neighbours are two or three
 
 
@@ -36,7 +36,7 @@ def unchained(lines: Lines, link: tuple[float, float, bool]) -> Lines | None:
     """
     groups = chains(lines, link)
     many = sum(len(g) > 1 for g in groups)
-    if many < max(FEWEST, SHARE * len(groups)):
+    if many < max(LEAST_CHAINS, LEAST_SHARE_OF_CHAINS * len(groups)):
         loudest = np.abs(lines.amplitude).max(axis=0).argmax() if len(groups) else -1
         plain = [len(g) >= PLAIN and _one_direction(lines.freq_hz[g]) for g in groups]
         if not any(p and loudest in g for p, g in zip(plain, groups, strict=True)):
@@ -70,7 +70,7 @@ def share(lines: Lines, link: tuple[float, float, bool]) -> float:
 
 
 def _falls(lines: Lines, group: Array) -> float:
-    """The decay at which a chain's level falls, in 1/s: bent or not, a mode's level does as e^{−dt}, and no line of many is as sure."""
+    """The decay at which a chain's level falls, in 1/s: bent or not, a mode's level does as e^{−dt}, and no line of many is as certain."""
     pole = -lines.decay_per_s[group] + 2j * np.pi * (lines.freq_hz[group] - lines.freq_hz[group[0]])
     time = np.linspace(0, LONG / lines.decay_per_s[group[0]], FRAMES)
     level = np.abs(lines.amplitude[:, group] @ np.exp(pole[:, None] * time))

@@ -48,7 +48,7 @@ def refitted(h: Hypothesis, bodies: tuple[Struck, ...], observed: tuple[ObjectEv
 
 
 def reidentified(h: Hypothesis, bodies: tuple[Struck, ...], observed: tuple[ObjectEvidence, ...] | None = None, *, fully: bool = False) -> Hypothesis:
-    """The hypothesis with a room's response told again, beside all that has been found. observed: whose strikes may tell it; all where None. fully: to the end."""
+    """The hypothesis with a room's response identified again, beside all that has been found. observed: the strikes it is identified from; all where None. fully: to the end."""
     fitted = [b for b in bodies if b.recorded is not None and b.recorded.signals is not None]  # lists of lines say nothing of a response
     if observed is not None:
         fitted = [b for b in fitted if any(one.source is b.recorded for one in observed)]
@@ -96,7 +96,7 @@ def corrected(h: Hypothesis, bodies: tuple[Struck, ...], *, anew: bool = False) 
     for body in bodies:
         if body.recorded is None:
             continue
-        for e in (e for e in h.effects if isinstance(e, SplitsPairs)):  # lines of twins go to their own: half a split off, either would do
+        for e in (e for e in h.effects if isinstance(e, SplitsPairs)):  # lines of degenerate modes go to their own: half a split off, either would do
             found[body.name] = np.clip(e.observed_correction(undamped(h, body).freq_hz * np.exp(h.stretch)), -CORRECTION, CORRECTION)
         for _ in range(2):
             place, off = _off(replace(h, correction=found), body, anew)
@@ -117,7 +117,7 @@ def corrected(h: Hypothesis, bodies: tuple[Struck, ...], *, anew: bool = False) 
 
 
 def _alike(freq_hz: Array, correction: Array) -> Array:
-    """Corrections (m,), the mean of each run of modes that a mesh leaves side by side: what sets twins apart is an effect's, or they would change places."""
+    """Corrections (m,), the mean of each run of modes that a mesh leaves side by side: what sets degenerate modes apart is an effect's, or they would change places."""
     run = np.cumsum(np.diff(np.log(freq_hz), prepend=-np.inf) > DEGENERATE * MESHED)
     return np.asarray((np.bincount(run, correction) / np.maximum(np.bincount(run), 1))[run])
 
@@ -168,7 +168,7 @@ def _members(one: ObjectEvidence, model: ModalModel) -> list[Array]:
     return [np.argsort(np.abs(model.freq_hz - f), kind="stable")[: len(who)] for f, who in zip(near, one.mode, strict=True)]
 
 
-def _told(h: Hypothesis, body: Struck, one: ObjectEvidence) -> Array:
+def _participation(h: Hypothesis, body: Struck, one: ObjectEvidence) -> Array:
     """Jψ (s, k) of the lines: the evidence's own, or, beside effects that leave modes where they were, as these have them sound."""
     if moves(h) or not h.at(Stage.MODES):
         return one.pattern
@@ -197,7 +197,7 @@ def _middle(ratio: Array, weight: Array) -> float:
 def _gained(h: Hypothesis, bodies: tuple[Struck, ...], observed: tuple[ObjectEvidence, ...]) -> Hypothesis:
     """σ by the amplitudes, times what effects that hide them from the lines know better."""
     louder = float(np.prod([c.onset_gain for c in baseline_changes(h)]))
-    told, seen, spread = [], [], []
+    modeled, seen, spread = [], [], []
     for one in observed:
         if not len(one.freq_hz) or one.signal is None:
             continue
@@ -210,23 +210,23 @@ def _gained(h: Hypothesis, bodies: tuple[Struck, ...], observed: tuple[ObjectEvi
                 impact = effect.apply(impact)
             hits = np.abs((impact.share[:, None] * np.exp((one.decay_per_s - 2j * np.pi * one.freq_hz) * impact.delay_s[:, None])).sum(axis=0))
             factor[i] = np.abs(impact.spectrum(one.freq_hz)) * direct * hits
-        expected = np.abs(_told(h, body, one)) * factor
-        if bends(h) and not (glides := turns_rad(h, body, one) > TURNS_RAD).all():
-            expected = np.where(glides, np.nan, expected)  # of what glides a linear fit hears a part
-        told.append(expected.ravel())
+        expected = np.abs(_participation(h, body, one)) * factor
+        if bends(h) and not (dependent := turns_rad(h, body, one) > TURNS_RAD).all():
+            expected = np.where(dependent, np.nan, expected)  # of an amplitude-dependent mode a linear fit takes a part
+        modeled.append(expected.ravel())
         seen.append(np.abs(whole(one)).ravel())
         rough = np.broadcast_to(ROUGH * np.nan_to_num(expected).max(axis=0, keepdims=True), expected.shape)
         spread.append(np.stack([one.amplitude_sd.ravel(), rough.ravel()]))
-    if not told:
+    if not modeled:
         return h
-    x, y, s = np.concatenate(told), np.concatenate(seen), np.concatenate(spread, axis=1)
+    x, y, s = np.concatenate(modeled), np.concatenate(seen), np.concatenate(spread, axis=1)
     good = np.isfinite(x) & np.isfinite(y) & np.isfinite(s).all(axis=0)
     x, y, s = x[good], y[good], s[:, good]
     if not (x > 0).any():
         return h
     if any(one.dry for one in observed):  # read through a room, a line is off by a factor of its own
-        told = (x > 0) & (y > 0) & (s[0] > 0)
-        return replace(h, gain=_middle(y[told] / x[told], (y / np.maximum(s[0], 1e-300))[told])) if told.any() else h
+        usable = (x > 0) & (y > 0) & (s[0] > 0)
+        return replace(h, gain=_middle(y[usable] / x[usable], (y / np.maximum(s[0], 1e-300))[usable])) if usable.any() else h
     gain, weight = _middle(y[x > 0] / x[x > 0], x[x > 0] / (s[0] + s[1])[x > 0]), np.ones(len(x))
     for _ in range(30):
         sd2 = (s[0] ** 2 + (gain * s[1]) ** 2) + 1e-300

@@ -2,8 +2,8 @@
 
     line k of strike s, shifted to 0 Hz: recorded z(t), played z'(t)      δ_k -> argmax Σ_s |Σ_t w z z'* / |z z'| e^{−2πi δ t}|      f_k -> f_k + δ_k
 
-A linear fit puts such a mode where it is while it is loud, and the mesh's correction was learnt on that: beside the effect it would glide from the wrong end.
-Which way it glides, and how far, stays the effect's.
+A linear fit puts such a mode where it is while it is loud, and the mesh's correction was learnt on that: beside the effect it would shift from the wrong end.
+Whether it hardens or softens, and how far, stays the effect's.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from sonic_bullet.diagnosis.evidence.amplitude_dependence import gliding
+from sonic_bullet.diagnosis.evidence.amplitude_dependence import amplitude_dependent
 from sonic_bullet.diagnosis.evidence.effect_evidence import object_evidence
 from sonic_bullet.diagnosis.evidence.unmatched_modes import CORRECTION
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, modes_of, play, undamped
@@ -22,13 +22,13 @@ from sonic_bullet.effects.protocol import ObjectEvidence
 from sonic_bullet.records import Array
 
 STEP = 0.1  # of 1/duration: steps of δ
-FEWEST = 8  # frames
+LEAST_FRAMES = 8  # frames
 HALFWAY = 0.5  # to the next mode
 AGREE = 0.5  # of all frames' worth, once shifted: what is played is what was recorded
 
 
 def at_rest(h: Hypothesis, bodies: tuple[Struck, ...], observed: tuple[ObjectEvidence, ...], *, every: bool = False) -> Hypothesis:
-    """The hypothesis with the corrections of modes that glide learnt on what they ring down to, by the strikes in ``observed``. every: of all modes that stand alone."""
+    """The hypothesis with the corrections of amplitude-dependent modes learnt on what they ring down to, by the strikes in ``observed``. every: of all modes that stand alone."""
     found = dict(h.correction or {})
     for body in bodies:
         mine = next((one for one in observed if body.recorded is not None and one.source is body.recorded), None)
@@ -43,9 +43,9 @@ def _rested(h: Hypothesis, body: Struck, strikes: list[int], every: bool) -> Arr
     count = undamped(h, body).mode_count
     correction = np.array((h.correction or {}).get(body.name, np.zeros(count)), float)
     one, (modes, order) = object_evidence(h, body, sounds=False), modes_of(h, body)
-    glides = np.ones(len(one.freq_hz), bool) if every else gliding(h, body, replace(one, strike=tuple(strikes)))
+    dependent = np.ones(len(one.freq_hz), bool) if every else amplitude_dependent(h, body, replace(one, strike=tuple(strikes)))
     selected, window = alone(one)
-    kept = [q for q, k in enumerate(selected) if glides[k] and len(one.mode[k]) == 1]  # twins glide each by its own level, and beat
+    kept = [q for q, k in enumerate(selected) if dependent[k] and len(one.mode[k]) == 1]  # degenerate modes shift each by its own level, and beat
     if not kept or len(correction) != count:
         return correction
     selected, window = [selected[q] for q in kept], [window[q] for q in kept]
@@ -66,7 +66,7 @@ def _off_hz(recorded: Envelopes, model: Envelopes, q: int, most_hz: float) -> fl
     rows = []
     for s in range(len(recorded.z)):
         use = recorded.good[s, q] & (np.abs(model.z[s, q]) > 0)
-        if use.sum() < FEWEST:
+        if use.sum() < LEAST_FRAMES:
             continue
         both = recorded.z[s, q, use] * np.conj(model.z[s, q, use])
         rows.append((recorded.time_s[q, use], recorded.worth(s, q)[use] * both / np.abs(both)))

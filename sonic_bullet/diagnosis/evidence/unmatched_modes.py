@@ -1,8 +1,8 @@
-"""Modes that no line could be told for: what their frequencies are, by the recordings themselves.
+"""Unmatched modes, those without a line: what their frequencies are, by the recordings themselves.
 
     T_s = recording − all other modes;   r_j -> argmin Σ_s ∫ |T_s(f) − A_sj L(f; f_j (1 + r_j), d_j)|² df,   |r_j| <= 1 %,   L(f) = ½ Σ_t e^{(−d + iω)t} e^{−2πi f t}
 
-Twins that a mesh has torn apart, or put together that are none, modes in each other's skirts and short ones stand in no list of lines, but the model knows
+Degenerate modes that a mesh has set apart, modes it has put together, modes in each other's skirts and short ones stand in no list of lines, but the model knows
 their amplitudes at every strike, so their place shows. The baseline's correction of a mesh's error, for those of its modes; one that the recordings do not clearly want elsewhere stays.
 Beyond the band's edges L is 0: a mode that the mesh has just inside, and that nobody hears, may lie just outside.
 """
@@ -54,7 +54,7 @@ def _settled(h: Hypothesis, body: Struck) -> Struck:
 def sought(h: Hypothesis, body: Struck, which: Array, *, alone: Array | None = None) -> Array:
     """The hypothesis' corrections (m,) of a body, those of ``which`` modes searched for anew, the loudest first. alone (m,): without a line; all where None.
 
-    One that shares a line goes elsewhere only if nothing but itself, as the mesh has it, is there: twins that an imperfection has turned are not the mesh's.
+    One that shares a line goes elsewhere only if nothing but itself, as the mesh has it, is there: degenerate modes that an imperfection has turned are not the mesh's.
     """
     assert body.recorded is not None and body.recorded.signals is not None
     observed, (model, order) = object_evidence(h, body), modes_of(h, body)

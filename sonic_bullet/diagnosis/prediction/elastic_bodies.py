@@ -1,7 +1,7 @@
-"""One object under any elasticity: its tensor family (modal.tensor), struck and heard as the case says.
+"""One object under any elasticity: its tensor family (modal.tensor), struck and recorded as the case says.
 
     C/ρ -> λ (m,), ∂ ln λ/∂(C_k/ρ), J ψ (s, m)      cheap, for a search
-        -> ModalModel, strikes and sensor last      as bodies.modal_model makes them
+        -> ModalModel, strikes and sensor last      as struck_bodies.modal_model makes them
 
 The family is computed, or fetched from the cache, when it is first asked for: most cases never ask.
 """

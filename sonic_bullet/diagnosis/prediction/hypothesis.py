@@ -2,8 +2,8 @@
 
     λ -> corrections -> d = ½(α + βλ) -> MODES -> A = g J (φ(p)·e)(φ(q)·n) · start -> Ring -> BANK -> hits and pulses -> SOUND -> samples
 
-Every stage hands a value to the next, and effects of a stage act in the order in which they were found, those on a sound in that of its way: what
-rings along with the body is heard in the room, and both through the chain.
+Every stage hands a value to the next, and effects of a stage act in the order in which they were found, those on a sound in that of its path: what
+rings along with the body sounds in the room, and both through the chain.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from sonic_bullet.effects.protocol import CARRIES, Effect, Impact, Mixing, Owner
 from sonic_bullet.records import Array, ModalModel
 
 OWNER_ORDER = tuple(Owner)  # material, object, fixture, striker, room, chain: a sound's
-SAMPLED = 300  # vertices by which modes are told to be alike
+SAMPLED = 300  # vertices by which modes are compared
 KEPT = 4  # hypotheses and bodies whose modes are remembered
 
 
@@ -66,7 +66,7 @@ def undamped(h: Hypothesis, body: Struck) -> ModalModel:
 
 
 def moves(h: Hypothesis) -> bool:
-    """Whether an effect moves modes, so that lines and corrections are told anew."""
+    """Whether an effect moves modes, so that lines are paired and corrections learnt anew."""
     return any(e.stage is Stage.MATERIAL or e.traits.moves_modes for e in h.effects)
 
 
@@ -112,7 +112,7 @@ def modes_of(h: Hypothesis, body: Struck) -> tuple[ModalModel, Array]:
         if effect.traits.mixing is Mixing.NEIGHBOURS:
             order = order[came_from(before, model)]
     for effect in h.at(Stage.BANK, fitted=body.recorded is not None):
-        if isinstance(effect, RotatesPairs):  # axes of twins
+        if isinstance(effect, RotatesPairs):  # axes of degenerate pairs
             model = effect.turned(model)
     return ordered(model, model.freq_hz * (1 + correction[: model.mode_count]), model.decay_per_s) if last else (model, order)
 

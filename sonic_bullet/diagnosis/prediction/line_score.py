@@ -54,7 +54,7 @@ class Listed:
         return distance_db(sd, np.where(np.isfinite(decay), np.nan_to_num(lines.decay_sd_per_s[self.line]) / np.maximum(decay, 1e-9), np.nan))
 
     def rest(self, bodies: tuple[Struck, ...], h: Hypothesis) -> tuple[tuple[Struck, ...], Hypothesis]:
-        """Bodies that never heard these lines, and the hypothesis without what it learnt of them."""
+        """Bodies without these lines, and the hypothesis without what it learnt of them."""
         mine = _without(self.body, self.line)
         correction = dict(h.correction or {})
         old = correction.get(self.body.name)

@@ -1,6 +1,6 @@
 """The psychoacoustic distance: how much louder or softer each band is, in sone, as an ear would have it.
 
-    Σ over bands |N'_recorded − N'_played|, mean over frames in which the recording is heard       [N': estimator.loudness, ISO 226; bands: Bark]
+    Σ over bands |N'_recorded − N'_played|, mean over frames in which the recording is audible       [N': estimator.loudness, ISO 226; bands: Bark]
 
 Full scale stands for FULL_SCALE dB SPL: recordings have no level of their own.
 """
@@ -21,7 +21,7 @@ OBSERVED = 0.05  # sone
 
 
 def sone_distance(takes: Comparable, h: Hypothesis) -> float | None:
-    """Mean over takes; None where there is none that is heard."""
+    """Mean over takes; None where none is audible."""
     found = []
     for take in (t for t in takes if isinstance(t, Take)):
         made = with_noise(play(h, take.body, take.strike, len(take.sample), take.sr), take.floor, take.strike)

@@ -83,6 +83,22 @@ def comparable(takes: Sequence[Judged], h: Hypothesis) -> Compared | Incomparabl
     return Compared(Comparable(kept), out) if kept else Incomparable(out)
 
 
+@dataclass(frozen=True, slots=True)
+class Score:
+    """How far a hypothesis is from what it was held against, and how far it would be from itself, measured again: both in dB, means over the strikes.
+
+    There is one only where there is something comparable; else `comparable` says `Incomparable`.
+    """
+
+    distance_db: float
+    floor_db: float
+
+    @property
+    def gap_db(self) -> float:
+        """What is open: distance over noise alone."""
+        return self.distance_db - self.floor_db
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Take:
     """A recorded strike: which of which body, its samples (n,) from the onset on, and the case's noise."""

@@ -3,7 +3,7 @@
     Family at (γ, ν) -> λ (m,), shapes on the skin and at every strike and the sensor, as last "vertices" of one ModalModel
 
 An effect on the modes then changes strikes and sensor along with the body. A sensor without a place (microphone, plain sum) is a last vertex
-whose x component is each mode's weight. Without a mesh the modes are the lines themselves, places as loud as they are heard.
+whose x component is each mode's weight. Without a mesh the modes are the lines themselves, places as loud as they were recorded.
 """
 
 from __future__ import annotations
@@ -29,10 +29,10 @@ from sonic_bullet.records import Array, ModalModel
 class Struck:
     """One object and all its strikes. model: undamped, uncorrected; its last s + 1 vertices are the strikes and the sensor.
 
-    way (s + 1, 3): directions there, zero for a strike of unknown place. impulse_n_s (s,): NaN where unknown. kind: `Case.sensor`.
+    direction (s + 1, 3): directions there, zero for a strike of unknown place. impulse_n_s (s,): NaN where unknown. kind: `Case.sensor`.
     family: for another elasticity, None without a mesh. correction (m,): relative, of each mode's frequency, learnt on its fitted strikes, else 0.
     line (m,): the fitted line a mode was paired with, or -1. recorded: its fitted lines and sounds, None for an object nobody fitted.
-    elastic: for tensors, see elastic.py. band_hz: nothing outside it is recorded, though its modes are in the model: a mesh may have put them there.
+    elastic: for tensors, see elastic_bodies.py. band_hz: nothing outside it is recorded, though its modes are in the model: a mesh may have put them there.
     other: ν -> the model there, of as many modes. poisson: the same, cheap, for a search.
     """
 
@@ -175,7 +175,7 @@ def inward(family: Family, position: tuple[float, float, float]) -> Array:
 
 
 def shapeless(found: CaseFit, recorded: Recorded) -> Struck:
-    """An object without a mesh: its lines are its modes. Strikes at one place, or at places not told, share the amplitudes per N·s (rms over them); each other place has its own.
+    """An object without a mesh: its lines are its modes. Strikes at one place, or at unknown places, share the amplitudes per N·s (rms over them); each other place has its own.
 
     What goes with the place is then nobody's to explain; a strike at a place that no fitted one was at is played as the rms over all.
     """

@@ -1,8 +1,12 @@
-"""A suspect after its trial, and whether it earns its keep.
+"""A candidate effect after cross-validation, and whether it is accepted.
 
-an effect earns its keep where its mean drop is over LEAST_DB (where nothing is found yet: FAINT_DB if that is MOST of the gap, CERTAIN_DB if lines are sure of it and
-    that is SAID of the gap) and LEAST_SHARE of the gap, SURE standard errors above zero and above the null effect's by as much; of more than MANY strikes that gain much
-    one may be odd; what goes with level may be told by the loudest alone
+Accepted is what gains, on strikes left out, in the mean, each by the record of thresholds (thresholds.py):
+
+    more than is needed                     least_drop_db, and least_drop_share of the gap; less where nothing is found yet and the gap is narrow
+    significantly more than nothing         standard_errors; or none of many_strikes loses, two of them gaining as much
+    significantly more than a control       an effect of as many numbers that means nothing
+
+Of more than many_strikes strikes that gain much one may be odd. What depends on amplitude may be shown by the loudest strikes alone.
 """
 
 from __future__ import annotations
@@ -14,25 +18,17 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis
+from sonic_bullet.diagnosis.selection.thresholds import RULES
 from sonic_bullet.effects.protocol import Effect
-
-LEAST_DB, LEAST_SHARE = 0.4, 0.08  # of a drop, and of it in the gap
-FAINT_DB, MOST = 0.2, 0.5  # of a drop that is as much of the gap: then less than LEAST_DB will do
-CERTAIN_DB, SAID = 0.1, 0.25  # of a drop that is as much of the gap, where lines have told of an effect, each by its own baseband
-LOUDEST = 2  # strikes, of which what goes with level must gain most
-LOST = 0.15  # of what the loudest gains: all that others may lose by what goes with level
-STANDARD_ERRORS, MANY = 2.0, 4  # standard errors; strikes of which none may lose, beside one
-NOISE_DB = 0.03  # of a distance, by noise alone
-CAPS = 60  # of what is open, tried
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Candidate:
-    """A suspect after its trial. effect: fitted to all evidence. drop_db (s,): of each left-out strike's distance, less what corrections learnt again would gain
-    alone where the suspect moves modes; of the FIRST alone where it could not earn its keep any more. whole_db: mean with that in it, which speaks for a name's turn. null_db: mean over strikes and draws.
+    """A candidate effect after cross-validation. effect: fitted to all evidence. drop_db (s,): of each left-out strike's distance, less what corrections learnt again would gain
+    alone where it moves modes; of the first_strikes alone where it could not be accepted any more. whole_db: mean with that in it, by which candidates are ordered. control_db: mean over strikes and draws.
 
-    Its axes of twins, if it has any, all fitted strikes told. spread: of each number in its parameters over the folds (jackknife). lines: by how much lines left
-    out are likelier with it (by_lines.py). impulse_n_s (s,): of the strikes.
+    Its axes of degenerate pairs, if it has any, are from all fitted strikes. spread: of each number in its parameters over the folds (jackknife). lines: by how much lines left
+    out are likelier with it (decay_test.py). impulse_n_s (s,): of the strikes.
     """
 
     id: str
@@ -40,7 +36,7 @@ class Candidate:
     hypothesis: Hypothesis
     drop_db: np.ndarray[Any, Any]
     whole_db: float
-    null_db: float
+    control_db: float
     spread: dict[str, Any]
     lines: float = 0.0
     impulse_n_s: np.ndarray[Any, Any] = field(default_factory=lambda: np.zeros(0))
@@ -51,13 +47,13 @@ class Candidate:
 
     @property
     def certain(self) -> bool:
-        """Whether its lines are sure of it (see needed)."""
+        """Whether lines agreed on it before it was proposed (see needed)."""
         return self.effect.traits.certain
 
     @property
     def loud(self) -> bool:
-        """Whether the strike that gains most is one of the LOUDEST."""
-        return len(self.impulse_n_s) == len(self.drop_db) and int(self.drop_db.argmax()) in np.argsort(-self.impulse_n_s)[:LOUDEST]
+        """Whether the strike that gains most is one of the loudest_strikes."""
+        return len(self.impulse_n_s) == len(self.drop_db) and int(self.drop_db.argmax()) in np.argsort(-self.impulse_n_s)[: RULES.loudest_strikes]
 
     @property
     def sd_db(self) -> float:
@@ -71,48 +67,52 @@ def mean(x: Sequence[float] | np.ndarray[Any, Any]) -> float:
 
 
 def needed(gap_db: float, *, first: bool, certain: bool = False) -> float:
-    """Of a drop, in dB: LEAST_DB; less where that is most of what has ever been open (first: nothing is found yet), more where much is.
+    """Of a drop, in dB: least_drop_db; less where that is most of what has ever been open (first: nothing is found yet), more where much is.
 
     certain: lines agreed on it, each by its own frames, before it was proposed; then strikes left out need only say the same.
 
-    What little a name leaves of a wide gap may be its own fit's.
+    What little an effect leaves of a wide gap may be its own fit's.
     """
-    faint, share = (CERTAIN_DB, SAID) if certain else (FAINT_DB, MOST)
-    return max(min(LEAST_DB, max(faint, share * gap_db)) if first else LEAST_DB, LEAST_SHARE * gap_db)
+    faint, share = (RULES.certain_drop_db, RULES.certain_share) if certain else (RULES.faint_drop_db, RULES.faint_share)
+    return max(min(RULES.least_drop_db, max(faint, share * gap_db)) if first else RULES.least_drop_db, RULES.least_drop_share * gap_db)
 
 
-def earns(c: Candidate, gap_db: float, *, first: bool) -> bool:
-    """Whether a suspect explains enough, surely enough, and more than chance. first: see needed."""
+def accepted(c: Candidate, gap_db: float, *, first: bool) -> bool:
+    """Whether a candidate explains enough, significantly, and more than chance. first: see needed."""
     if len(c.drop_db) == 0:
         return False
     need = needed(gap_db, first=first, certain=c.certain)
     if not (c.mean_db > need and np.isfinite(c.sd_db)):
         return False
-    more = c.whole_db - max(c.null_db, 0.0)  # a null effect is not held against corrections either
+    more = c.whole_db - max(c.control_db, 0.0)  # a control effect is not held against corrections either
     drop = np.sort(c.drop_db)
-    if c.certain and c.loud and -np.minimum(drop, 0).sum() < LOST * drop[-1]:
-        return more > 0.5 * need  # what goes with level is for the loudest to tell, which these others were fitted without
-    if len(drop) > MANY and drop[1:].mean() > 3 * max(need, needed(gap_db, first=first)):
-        drop = drop[1:]  # one strike may be odd: what it alone tells, none of the others did
+    if c.certain and c.loud and -np.minimum(drop, 0).sum() < RULES.lost_share * drop[-1]:
+        return more > RULES.chance_share * need  # what goes with level is for the loudest to show, which these others were fitted without
+    if len(drop) > RULES.many_strikes and drop[1:].mean() > RULES.odd_strike_factor * max(need, needed(gap_db, first=first)):
+        drop = drop[1:]  # one strike may be odd: what it alone shows, none of the others did
     sd = float(drop.std(ddof=1) / np.sqrt(len(drop)))
-    if len(drop) >= MANY and drop[0] > -max(0.1 * drop.mean(), NOISE_DB) and (drop[-2] > need or (first and c.certain and c.loud)):
-        return more > 0.5 * need  # no strike speaks against it, though loud ones may gain far more than soft ones
-    return bool(drop.mean() > STANDARD_ERRORS * sd) and more > max(STANDARD_ERRORS * sd, 0.5 * need)
+    if (
+        len(drop) >= RULES.many_strikes
+        and drop[0] > -max(RULES.loss_share * drop.mean(), RULES.noise_db)
+        and (drop[-2] > need or (first and c.certain and c.loud))
+    ):
+        return more > RULES.chance_share * need  # no strike speaks against it, though loud ones may gain far more than soft ones
+    return bool(drop.mean() > RULES.standard_errors * sd) and more > max(RULES.standard_errors * sd, RULES.chance_share * need)
 
 
-def may_earn(asked: Candidate, open_db: np.ndarray[Any, Any], gap_db: float) -> bool:
-    """Whether a suspect could still earn its keep that has been asked on the first few strikes alone.
+def may_be_accepted(asked: Candidate, open_db: np.ndarray[Any, Any], gap_db: float) -> bool:
+    """Whether a candidate could still be accepted that has been asked on the first few strikes alone.
 
     open_db (s,): the most it may gain on each; of those that it has not been asked on it may gain that, or less where that suits it: alike is surer than much.
-    Of drops at most m_i the mean over its standard error is largest at min(m_i, c) for some c, so CAPS of these are tried; loud strikes may gain most.
+    Of drops at most m_i the mean over its standard error is largest at min(m_i, c) for some c, so caps_tried of these are tried; loud strikes may gain most.
     asked.impulse_n_s (s,): of all.
     """
-    first, loud = len(asked.drop_db), np.isin(np.arange(len(open_db)), np.argsort(-asked.impulse_n_s)[:LOUDEST])
-    for cap in (np.inf, *np.linspace(0.0, max(float(open_db.max()), 0.0), CAPS)[1:]):
+    first, loud = len(asked.drop_db), np.isin(np.arange(len(open_db)), np.argsort(-asked.impulse_n_s)[: RULES.loudest_strikes])
+    for cap in (np.inf, *np.linspace(0.0, max(float(open_db.max()), 0.0), RULES.caps_tried)[1:]):
         for free in (np.zeros(len(open_db), bool), loud):
             drop = np.where(free, open_db, np.minimum(open_db, cap))
             drop[:first] = asked.drop_db
-            if earns(replace(asked, drop_db=drop, whole_db=gap_db, null_db=0.0), gap_db, first=True):
+            if accepted(replace(asked, drop_db=drop, whole_db=gap_db, control_db=0.0), gap_db, first=True):
                 return True
     return False
 

@@ -1,11 +1,11 @@
-"""Whether what is played is as loud as what was recorded, band by band: a mean distance over all cells blurs what one band lacks, and what is absent is nobody's line.
+"""Whether what is played is as loud as what was recorded, band by band: a mean distance over all cells blurs what one band lacks, and what is absent has no line.
 
-    d_sb = 10 lg Σ|R|² / Σ(|P|² + N)   over the cells of a band b, the first EARLY_S and the rest apart;   third octaves that overlap by half
-    off:  |mean_s d| > APART_DB  and  > SURE standard errors,   over the strikes s in which either stands ABOVE over the noise N
+    d_sb = 10 lg Σ|R|² / Σ(|P|² + N)   over the cells of a band b, the first early_s and the rest apart;   third octaves that overlap by half
+    off:  |mean_s d| > band_apart_db  and  > standard_errors standard errors,   over the strikes s in which either stands ABOVE over the noise N
 
-A correction may put a mode CORRECTION away, over a band's edge, and a window spreads it over LOBE cells to each side: recorded is more only where it is more than what is
+A correction may put a mode CORRECTION away, over a band's edge, and a window spreads it over lobe_cells cells to each side: recorded is more only where it is more than what is
 played so much beyond the band, too, and the other way round.
-Each band has the shortest window that keeps FINE cells in it. No effect is looked for here: it only takes away the comfort of a verdict `none`.
+Each band has the shortest window that keeps band_cells cells in it. No effect is looked for here: it only takes away the comfort of a verdict `none`.
 """
 
 from __future__ import annotations
@@ -18,24 +18,19 @@ import numpy as np
 from sonic_bullet.diagnosis.evidence.unmatched_modes import CORRECTION
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, play
 from sonic_bullet.diagnosis.prediction.score import Judged, Take
-from sonic_bullet.diagnosis.selection.acceptance import STANDARD_ERRORS
+from sonic_bullet.diagnosis.selection.thresholds import RULES
 from sonic_bullet.estimator.lines.log_spectral import ABOVE, Floor
 from sonic_bullet.records import Array
 
-EARLY_S = 0.05  # of the attack, which a long decay would outweigh
-APART_DB = 3.0  # a band half or twice as loud
-FINE = 4  # cells of a band at least
-LOBE = 2  # cells to each side in a Hann window's main lobe
 WINDOWS = (512, 1024, 2048, 4096, 8192)
 CENTRE_HZ = 1000 * 2.0 ** (np.arange(-24, 28) / 6)  # third octaves every sixth
 HALF = 2 ** (1 / 6)  # of a third octave, to each side
-FEWEST = 3  # strikes whose own scatter says how far their mean may be off; of fewer that of all bands does
 SHOWN = 4  # in words
 
 
 @dataclass(frozen=True, slots=True)
 class BandOff:
-    """A band, in the first EARLY_S or after, in which the mean over strikes of recorded over played is off. standard_error_db: of that mean."""
+    """A band, in the first early_s or after, in which the mean over strikes of recorded over played is off. standard_error_db: of that mean."""
 
     from_hz: float
     to_hz: float
@@ -46,7 +41,7 @@ class BandOff:
 
     def __str__(self) -> str:
         less = "less" if self.recorded_over_played_db < 0 else "more"
-        when = f"in the first {1000 * EARLY_S:.0f} ms" if self.early else f"after the first {1000 * EARLY_S:.0f} ms"
+        when = f"in the first {1000 * RULES.early_s:.0f} ms" if self.early else f"after the first {1000 * RULES.early_s:.0f} ms"
         where = f"between {self.from_hz / 1000:.2g} and {self.to_hz / 1000:.2g} kHz"
         strikes = "1 strike" if self.strikes == 1 else f"{self.strikes} strikes"
         return f"recorded {abs(self.recorded_over_played_db):.1f} dB {less} than played {where} {when}, {strikes}"
@@ -59,8 +54,8 @@ def bands_off(h: Hypothesis, takes: Sequence[Judged]) -> tuple[BandOff, ...]:
 
 
 def over_db(recorded: Array, played: Array, sr: int, floor: Floor, band_hz: tuple[float, float]) -> Array:
-    """Recorded over played (2, b) in dB, in the first EARLY_S and in the rest, of the bands around CENTRE_HZ; NaN where neither stands above the noise, or a band cannot be told."""
-    early = round(EARLY_S * sr)
+    """Recorded over played (2, b) in dB, in the first early_s and in the rest, of the bands around CENTRE_HZ; NaN where neither stands above the noise, or a band holds too few cells."""
+    early = round(RULES.early_s * sr)
     parts = [(x[:early], x[early:]) for x in (recorded, played)]
     return np.array([_over_db(a, b, sr, floor, band_hz) for a, b in zip(*parts, strict=True)])
 
@@ -70,11 +65,11 @@ def _over_db(recorded: Array, played: Array, sr: int, floor: Floor, band_hz: tup
     low, high = CENTRE_HZ / HALF, CENTRE_HZ * HALF
     inside = (low >= band_hz[0]) & (high <= min(band_hz[1], sr / 2))
     fits = [w for w in WINDOWS if w <= len(recorded)]
-    window = np.array([next((w for w in fits if FINE * sr / w <= wide), 0) for wide in high - low])
+    window = np.array([next((w for w in fits if RULES.band_cells * sr / w <= wide), 0) for wide in high - low])
     for w in np.unique(window[inside & (window > 0)]):
         who = np.flatnonzero(inside & (window == w))
         cell, mine = sr / w, (low[who], high[who])
-        edge = np.maximum(LOBE * cell, CORRECTION * CENTRE_HZ[who])
+        edge = np.maximum(RULES.lobe_cells * cell, CORRECTION * CENTRE_HZ[who])
         beyond = (mine[0] - edge, mine[1] + edge)
         (a, near_a), (b, near_b) = ((_within(p, *mine, cell), _within(p, *beyond, cell)) for p in (_power(recorded, w), _power(played, w)))
         n = _within(floor.at(w // 2 + 1) * (np.hanning(w) ** 2).sum() * _frames(len(recorded), w), *mine, cell)
@@ -101,14 +96,14 @@ def _within(power: Array, low_hz: Array, high_hz: Array, cell_hz: float) -> Arra
 
 
 def off_in(over: Array) -> tuple[BandOff, ...]:
-    """The bands that are off in recorded over played (s, 2, b) in dB, from low to high, the first EARLY_S first."""
+    """The bands that are off in recorded over played (s, 2, b) in dB, from low to high, the first early_s first."""
     count, usual = np.isfinite(over).sum(axis=0), _scatter_db(over)
     found = []
     for part, b in zip(*np.nonzero(count), strict=True):
         d = over[np.isfinite(over[:, part, b]), part, b]
         own = float(d.std(ddof=1)) if len(d) > 1 else 0.0
-        error = (own if len(d) >= FEWEST else max(own, usual)) / np.sqrt(len(d))
-        if abs(d.mean()) > max(APART_DB, STANDARD_ERRORS * error):
+        error = (own if len(d) >= RULES.own_scatter_strikes else max(own, usual)) / np.sqrt(len(d))
+        if abs(d.mean()) > max(RULES.band_apart_db, RULES.standard_errors * error):
             found.append(BandOff(float(CENTRE_HZ[b] / HALF), float(CENTRE_HZ[b] * HALF), part == 0, float(d.mean()), float(error), len(d)))
     return tuple(found)
 

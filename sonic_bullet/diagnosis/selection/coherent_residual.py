@@ -3,7 +3,7 @@
     A_ks = J_s Φ_k(x_s) |F̂_s| e^{iθ_k − 2πi f_k D_s}, but for its sign:    |Σ_s a²|/Σ_s |a|² = 1,   a = A e^{2πi f D_s}/|A_s|      [real modes: Ewins 2000, ch. 2]
 
 One phase a line and one delay a strike, the middle of its pulse. Whatever a mesh gets wrong, that stays so, wherever and however hard a body is struck once. A level that swings, a part that
-rattles or an echo that moves makes lines of its own, side by side with the modes', that the fit tells and that do not, and a mode that goes with its level is no line at all. Nor do pairs too near each other to be told apart, modes that dashpots
+rattles or an echo that moves makes lines of its own, side by side with the modes', that the fit identifies and that are out of phase, and a mode that goes with its level is no line at all. Nor do pairs too near each other to be told apart, modes that dashpots
 couple, and what a room rings at: a verdict asks here only before it puts down to a mesh what nothing explains.
 """
 
@@ -20,7 +20,7 @@ from sonic_bullet.estimator.lines.joint_lines import Lines, lines_of, noise_rms
 from sonic_bullet.records import Array
 
 IN_PHASE = 0.8  # of a line's energy, where 1 has one phase but for signs
-DELAY_S = np.linspace(-2.5e-4, 2.5e-4, 101)  # between the middles of a soft blow's pulse and a hard one's
+DELAY_S = np.linspace(-2.5e-4, 2.5e-4, 101)  # between the middles of a soft impact's pulse and a hard one's
 SWEEPS = 3
 
 
@@ -34,7 +34,7 @@ def out_of_phase(lines: Lines) -> Array:
 
 
 def _in_time(a: Array, freq_hz: Array) -> Array:
-    """Amplitudes (s, k) without one delay a strike, told by all lines together: each against the phases of the others, in turns."""
+    """Amplitudes (s, k) without one delay a strike, found by all lines together: each against the phases of the others, in turns."""
     turn = np.exp(4j * np.pi * np.outer(DELAY_S, freq_hz))  # of a²
     for _ in range(SWEEPS):
         for s in range(len(a)):
@@ -57,7 +57,7 @@ def of_no_body(h: Hypothesis, takes: Sequence[Judged]) -> float:
 
 
 def _played(g: Recorded) -> Array:
-    """What the lines that are in phase play (s, n), told without the others where there are others."""
+    """What the lines that are in phase play (s, n), identified without the others where there are others."""
     assert g.signals is not None
     odd = out_of_phase(g.lines)
     lines = lines_of(g.signals, noise_rms(g.signals, g.sr), g.lines.pole[~odd], g.sr, g.lines.signed) if odd.any() else g.lines

@@ -1,4 +1,4 @@
-"""The null effect: as many numbers as a suspect has, spent where nothing is known to act, so what they gain is chance.
+"""The control effect: as many numbers as a candidate effect has, spent where nothing is known to act, so what they gain is chance.
 
 ln d and ln level of every mode += Σ_i amount_i v_ik,   v random directions of the modes, amounts by least squares on the same evidence
 """
@@ -15,12 +15,12 @@ from sonic_bullet.records import ModalModel
 
 
 @dataclass(frozen=True)
-class Null:
+class ControlEffect:
     """A number per direction spent at random: ln d and ln level of every mode move along random vectors of the modes."""
 
     id: ClassVar[str] = "null"
     stage: ClassVar[Stage] = Stage.MODES
-    owner: ClassVar[Owner] = Owner.FIXTURE  # after whatever acts on modes, as a suspect may
+    owner: ClassVar[Owner] = Owner.FIXTURE  # after whatever acts on modes, as a candidate effect may
     reference: ClassVar[str] = "a control, not physics"
     traits: ClassVar[Traits] = Traits()
 

@@ -1,10 +1,10 @@
-"""Suspects on trial: each fitted without one strike and a part of the lines, judged on that strike; null effects alike.
+"""Candidate effects under cross-validation: each fitted without one strike and a part of the lines, judged on that strike; control effects alike.
 
-    for every strike s:  evidence − s − some lines (none, where a suspect has numbers of single lines) -> propose -> refit α, β, σ -> D(s)    against the same without the effect
-    null: as many numbers, spent on directions drawn at random in the modes' decays and levels, fitted to the same evidence
+    for every strike s:  evidence − s − some lines (none, where an effect has numbers of single lines) -> propose -> refit α, β, σ -> D(s)    against the same without the effect
+    control effect: as many numbers, spent on directions drawn at random in the modes' decays and levels, fitted to the same evidence
 
 Leaving out lines matters: decays and shapes belong to the body, so every strike shows them, and a pattern fitted to them by chance would pass.
-Corrections of frequencies, and the axes of twins that glide or choke, only mend what a mesh leaves to chance: all fitted strikes tell those, once, and the null has no numbers
+Corrections of frequencies, and the axes of amplitude-dependent pairs, only mend what a mesh leaves to chance: all fitted strikes determine those, once, and the control has no numbers
 for them.
 """
 
@@ -20,69 +20,55 @@ import numpy as np
 from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of, thinned
 from sonic_bullet.diagnosis.evidence.refit import refitted, reidentified
 from sonic_bullet.diagnosis.evidence.small_amplitude import at_rest
+from sonic_bullet.diagnosis.prediction.diagnosis_problem import DiagnosisProblem
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, bends, mixes_neighbours, moves
 from sonic_bullet.diagnosis.prediction.line_score import Listed
-from sonic_bullet.diagnosis.prediction.score import Comparable, Judged, Take
+from sonic_bullet.diagnosis.prediction.score import Judged, Take
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
-from sonic_bullet.diagnosis.selection.acceptance import Candidate, earns, jackknife, may_earn, mean
-from sonic_bullet.diagnosis.selection.control_effect import Null
+from sonic_bullet.diagnosis.selection.acceptance import Candidate, accepted, jackknife, may_be_accepted, mean
+from sonic_bullet.diagnosis.selection.control_effect import ControlEffect
 from sonic_bullet.diagnosis.selection.decay_test import likelier, tells
+from sonic_bullet.diagnosis.selection.thresholds import RULES
 from sonic_bullet.effects.protocol import Cost, Dereverberates, Effect, Evidence, RotatesPairs, Stage
 from sonic_bullet.parallel import parallel_map
 
-KEPT = 0.75  # of the lines, in every fold
-DRAWS = 2  # of the null effect
-FIRST = 2  # strikes left out, after which a suspect is let go that could not earn its keep any more (may_earn)
-ENOUGH = 2  # names: what little is left beside them is worth no search of half a minute
-PLAIN = 0.6  # of the gap: where a cheap suspect says as much, costly ones wait
 
-
-def trials(
-    h: Hypothesis,
-    bodies: tuple[Struck, ...],
-    takes: Comparable,
-    evidence: Evidence,
-    effects: Sequence[type[Effect]],
-    *,
-    seed: int,
-    say: Any,
-    costly: bool = True,
-) -> list[Candidate]:
-    """Every suspect that the whole evidence suggests, after its trial; best first. costly: whether those that take long are asked, and that search once ENOUGH have been found."""
+def cross_validated(h: Hypothesis, problem: DiagnosisProblem, evidence: Evidence, *, costly: bool = True) -> list[Candidate]:
+    """Every candidate of the problem that the whole evidence suggests, cross-validated; best first. costly: whether those that take long are asked, and that search once enough_effects have been found."""
     found: list[Candidate] = []
-    if len(takes) < 2:
+    if len(problem.takes) < 2:
         return found  # nothing can be left out
-    folds = _folds(h, bodies, takes, evidence, seed)
+    folds = _folds(h, problem, evidence)
     if not folds:
         return found
-    observed = any(isinstance(take, Take) for take in takes)  # else no lines are left out
-    whole_lines = cache(lambda: _folds(h, bodies, takes, evidence, seed, keep=1.0) if observed else folds)
-    anew = cache(lambda: refitted(h, bodies, anew=True) if observed else h)
+    observed = any(isinstance(take, Take) for take in problem.takes)  # else no lines are left out
+    whole_lines = cache(lambda: _folds(h, problem, evidence, keep=1.0) if observed else folds)
+    anew = cache(lambda: refitted(h, problem.bodies, anew=True) if observed else h)
     fair = cache(lambda by_line: _learnt_anew(anew(), whole_lines() if by_line else folds))
-    still = cache(lambda by_line: _rested(whole_lines() if by_line else folds))
+    still = cache(lambda by_line: _at_rest_folds(whole_lines() if by_line else folds))
     gap = mean([f.before - f.noise for f in folds])
-    idle = not costly and len(evidence.found) >= ENOUGH
+    idle = not costly and len(evidence.found) >= RULES.enough_effects
     dry = any(one.dry for one in evidence.observed)
-    kinds = [kind for kind in effects if kind.id not in evidence.found and not (idle and kind.traits.cost is Cost.SEARCHES)]
+    kinds = [kind for kind in problem.effects if kind.id not in evidence.found and not (idle and kind.traits.cost is Cost.SEARCHES)]
     for group in _groups(kinds, late=dry and costly):
-        if any(isinstance(c.effect, Dereverberates) and earns(c, gap, first=not evidence.found) for c in found):
-            break  # what others say of lines that a room has made is hearsay: in the next round they are told dry
+        if any(isinstance(c.effect, Dereverberates) and accepted(c, gap, first=not evidence.found) for c in found):
+            break  # what others say of lines that a room has made is hearsay: in the next round they are dereverberated
         if dry and mixes_neighbours(group[0]) and len(kinds) > len(group) and any(c.effect.stage is Stage.MATERIAL for c in found):
             continue  # lines that were paired with another material's modes tell little of what mixes these
-        if group[0].traits.cost is Cost.COSTLY and (not costly or any(c.mean_db > PLAIN * gap for c in found)):
+        if group[0].traits.cost is Cost.COSTLY and (not costly or any(c.mean_db > RULES.cheap_share * gap for c in found)):
             continue  # something cheap says most of it: what is left may ask for more in the next round
         if group[0].traits.cost is Cost.COSTLY:
-            say(f"searching for {group[0].id}")
+            problem.say(f"searching for {group[0].id}")
         proposed = _proposed(group, evidence)
         for kind in group:
             if (whole := proposed[kind]) is None:
                 continue
-            say(f"trying {kind.id}")
+            problem.say(f"trying {kind.id}")
             alone = replace(h, effects=(whole,))
             by_line = kind.traits.by_line
             plain = whole_lines() if by_line else folds
             known = fair(by_line) if moves(alone) and not moves(h) else still(by_line) if bends(alone) and not bends(h) else plain
-            found.append(_tried(kind, whole, h, bodies, evidence, known))
+            found.append(_cross_validated(kind, whole, h, problem.bodies, evidence, known))
     return sorted(found, key=lambda c: -c.whole_db)
 
 
@@ -95,7 +81,7 @@ def _proposed(group: list[type[Effect]], evidence: Evidence) -> dict[type[Effect
 
 
 def _groups(kinds: list[type[Effect]], *, late: bool) -> list[list[type[Effect]]]:
-    """Rooms, whose echoes others would be told of; what is cheap; and what takes long, one by one; then those that come last."""
+    """Rooms, whose echoes would mislead the others; what is cheap; and what takes long, one by one; then those that come last."""
     rooms: list[type[Effect]] = [k for k in kinds if issubclass(k, Dereverberates)]
     last = [k for k in kinds if late and mixes_neighbours(k)]
     dear = [k for k in kinds if k not in rooms + last and k.traits.cost is Cost.COSTLY]
@@ -120,18 +106,18 @@ class Fold:
     noise: float
 
 
-def _folds(h: Hypothesis, bodies: tuple[Struck, ...], takes: Comparable, evidence: Evidence, seed: int, keep: float = KEPT) -> list[Fold]:
-    """Without one strike each, and with a part of the lines, keep of them: all for an effect with numbers of single lines, which other lines cannot tell and other strikes can."""
-    rng = np.random.default_rng([seed, 1])
+def _folds(h: Hypothesis, problem: DiagnosisProblem, evidence: Evidence, *, keep: float = RULES.kept_lines_share) -> list[Fold]:
+    """Without one strike each, and with a part of the lines, keep of them: all for an effect with numbers of single lines, which other lines do not determine and other strikes do."""
+    rng = np.random.default_rng([problem.seed, 1])
     made = []
-    for take in takes:
+    for take in problem.takes:
         if isinstance(take, Listed):
-            mine, start = take.rest(bodies, h)
-            less = evidence_of(start, mine, evidence.band_hz, seed=seed)
+            mine, start = take.rest(problem.bodies, h)
+            less = evidence_of(start, mine, evidence.band_hz, seed=problem.seed)
             base = refitted(start, mine)
         elif isinstance(take, Take):
-            mine, less = bodies, thinned(evidence, take.place, keep, rng)
-            base = refitted(h, bodies, less.observed)
+            mine, less = problem.bodies, thinned(evidence, take.place, keep, rng)
+            base = refitted(h, problem.bodies, less.observed)
         before = take.distance(base)
         if np.isfinite(before):  # of the others alone a model may come that cannot be played
             made.append(Fold(take, mine, less, base, before, before, take.least(base)))
@@ -148,8 +134,8 @@ def _learnt_anew(every: Hypothesis, folds: list[Fold]) -> list[Fold]:
     return [replace(f, least=least(f)) for f in folds]
 
 
-def _rested(folds: list[Fold]) -> list[Fold]:
-    """Folds that know what is gained by corrections alone, learnt from what modes ring down to as they are beside whatever makes them glide."""
+def _at_rest_folds(folds: list[Fold]) -> list[Fold]:
+    """Folds that know what is gained by corrections alone, learnt from what modes ring down to as they are beside whatever makes them depend on amplitude."""
     return [
         replace(f, least=min(f.before, f.take.distance(at_rest(f.base, f.bodies, f.evidence.observed, every=True)))) if isinstance(f.take, Take) else f
         for f in folds
@@ -158,16 +144,16 @@ def _rested(folds: list[Fold]) -> list[Fold]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Gain:
-    """On one left-out strike, of an effect fitted without it, if any came of that: as Candidate has them; null_db (n,): of every draw."""
+    """On one left-out strike, of an effect fitted without it, if any came of that: as Candidate has them; control_db (n,): of every draw."""
 
     effect: Effect | None = None
     drop_db: float = 0.0
     whole_db: float = 0.0
-    null_db: tuple[float, ...] = ()
+    control_db: tuple[float, ...] = ()
     lines: float = 0.0
 
 
-def _tried(kind: type[Effect], whole: Effect, h: Hypothesis, bodies: tuple[Struck, ...], evidence: Evidence, folds: list[Fold]) -> Candidate:
+def _cross_validated(kind: type[Effect], whole: Effect, h: Hypothesis, bodies: tuple[Struck, ...], evidence: Evidence, folds: list[Fold]) -> Candidate:
     def judged(i: int) -> Gain:
         fold = folds[i]
         less = fold.evidence
@@ -175,31 +161,31 @@ def _tried(kind: type[Effect], whole: Effect, h: Hypothesis, bodies: tuple[Struc
         if effect is None:
             return Gain()
         free = effect.freedom() - (effect.angles() if isinstance(effect, RotatesPairs) else 0)  # such axes are whole's (Evidence.on_trial)
-        random = [Null.fitted(less, min(free, 8), 10 * i + draw) for draw in range(DRAWS)]
-        beside = _beside(fold, effect)
-        after = fold.take.distance(beside)
-        chance = tuple(fold.before - fold.take.distance(_beside(fold, none)) for none in random if none is not None)
-        lines = likelier(fold.base, beside, evidence, less, bodies) if isinstance(fold.take, Take) and tells(h, effect) else 0.0
+        random = [ControlEffect.fitted(less, min(free, RULES.control_numbers), 10 * i + draw) for draw in range(RULES.control_draws)]
+        augmented = _augmented(fold, effect)
+        after = fold.take.distance(augmented)
+        chance = tuple(fold.before - fold.take.distance(_augmented(fold, none)) for none in random if none is not None)
+        lines = likelier(fold.base, augmented, evidence, less, bodies) if isinstance(fold.take, Take) and tells(h, effect) else 0.0
         return Gain(effect, fold.least - after, fold.before - after, chance, lines)
 
-    found = parallel_map(judged, range(min(FIRST, len(folds))))
+    found = parallel_map(judged, range(min(RULES.first_strikes, len(folds))))
     asked = Candidate(kind.id, whole, h, np.array([g.drop_db for g in found]), 0.0, 0.0, {}, impulse_n_s=_levels(folds))
-    if may_earn(asked, np.array([f.least - f.noise for f in folds]), mean([f.before - f.noise for f in folds])) or tells(
+    if may_be_accepted(asked, np.array([f.least - f.noise for f in folds]), mean([f.before - f.noise for f in folds])) or tells(
         h, whole
     ):  # lines may speak for what strikes do not
         found += parallel_map(judged, range(len(found), len(folds)))
     added = refitted(replace(h, effects=(*h.effects, whole)), bodies, evidence.observed)
-    drop, whole_db, null_db = np.array([g.drop_db for g in found]), mean([g.whole_db for g in found]), mean([x for g in found for x in g.null_db])
-    lines = mean([g.lines for g in found]) / (1 - KEPT)  # each line is left out in so many of the folds
+    drop, whole_db, control_db = np.array([g.drop_db for g in found]), mean([g.whole_db for g in found]), mean([x for g in found for x in g.control_db])
+    lines = mean([g.lines for g in found]) / (1 - RULES.kept_lines_share)  # each line is left out in so many of the folds
     level = _levels(folds[: len(found)])
-    return Candidate(kind.id, whole, added, drop, whole_db, null_db, jackknife([g.effect.parameters() for g in found if g.effect is not None]), lines, level)
+    return Candidate(kind.id, whole, added, drop, whole_db, control_db, jackknife([g.effect.parameters() for g in found if g.effect is not None]), lines, level)
 
 
 def _levels(folds: Sequence[Fold]) -> np.ndarray[Any, Any]:
     return np.array([f.take.body.impulse_n_s[f.take.strike] if isinstance(f.take, Take) else np.nan for f in folds])
 
 
-def _beside(fold: Fold, effect: Effect) -> Hypothesis:
+def _augmented(fold: Fold, effect: Effect) -> Hypothesis:
     """A fold's hypothesis with one more effect, fitted to what it may learn from."""
     h = replace(fold.base, effects=(*fold.base.effects, effect))
     if isinstance(fold.take, Listed):

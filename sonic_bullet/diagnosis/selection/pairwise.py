@@ -1,9 +1,9 @@
-"""Two names at once, where one after another explains too little: each alone may leave, or even open, most of what only both close.
+"""Two effects at once, where one after another explains too little: each alone may leave, or even open, most of what only both close.
 
-    first round's suspects: A as it was found, B -> propose(evidence beside A)      -> least D(A, B) on all strikes, if it leaves little
+    first round's candidates: A as it was found, B -> propose(evidence beside A)      -> least D(A, B) on all strikes, if it leaves little
                             B moves no modes: what does is searched for all over a body, and that takes long
-    then each stands its trial beside the other: fitted without one strike at a time, against null effects, as in any round
-    in_a_room: B is a room that was found alone, A what moves modes; the room is heard anew beside A, and told again without it
+    then each is cross-validated beside the other: fitted without one strike at a time, against control effects, as in any round
+    in_a_room: B is a room that was found alone, A what moves modes; the room is identified anew beside A, and again without it
 
 What a dashpot does to decays hides what a long pulse leaves of the high modes: played with the right pulse and wrong decays, a body is as far from its recording
 as with neither. Coordinate steps stop there; a step along two coordinates does not [cf. forward selection of groups: Efroymson 1960; Yuan & Lin 2006].
@@ -11,29 +11,28 @@ as with neither. Coordinate steps stop there; a step along two coordinates does 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of
 from sonic_bullet.diagnosis.evidence.refit import refitted, reidentified, with_effects
+from sonic_bullet.diagnosis.prediction.diagnosis_problem import DiagnosisProblem
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, mixes_neighbours, moves, moves_itself
-from sonic_bullet.diagnosis.prediction.score import Comparable, Take, least_db, mean_db
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
-from sonic_bullet.diagnosis.selection.acceptance import Candidate, earns
-from sonic_bullet.diagnosis.selection.cross_validation import trials
+from sonic_bullet.diagnosis.selection.acceptance import Candidate, accepted
+from sonic_bullet.diagnosis.selection.cross_validation import cross_validated
 from sonic_bullet.diagnosis.selection.exchange import again
-from sonic_bullet.diagnosis.selection.phase_test import CLEAR, NEARLY, misfit
+from sonic_bullet.diagnosis.selection.phase_test import misfit
 from sonic_bullet.diagnosis.selection.simplest import helps
+from sonic_bullet.diagnosis.selection.thresholds import RULES
 from sonic_bullet.effects.protocol import Dereverberates
 from sonic_bullet.parallel import parallel_map
 
-LEFT = 0.25  # of the gap: two at once are twice as many choices, so they must say more than one after another
-
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Two:
+class Pair:
     """A hypothesis with two effects, the second fitted beside the first, and how far it is from the fitted strikes, in dB."""
 
     h: Hypothesis
@@ -43,106 +42,94 @@ class Two:
 def pairwise(
     start: Hypothesis,
     first: Sequence[Candidate],
-    bodies: tuple[Struck, ...],
-    takes: Comparable,
-    band_hz: tuple[float, float],
-    *,
-    seed: int,
-    say: Callable[[str], None],
+    problem: DiagnosisProblem,
 ) -> tuple[Hypothesis, list[Candidate]] | None:
-    """The two of a first round's suspects that explain nearly all together, each of which earns its keep beside the other; None where no two do."""
-    if len(first) < 2 or not all(isinstance(t, Take) for t in takes):
+    """The two of a first round's candidate effects that explain nearly all together, each accepted beside the other; None where no two do."""
+    if len(first) < 2 or not problem.has_audio:
         return None
     kinds = [type(c.effect) for c in first if not moves(c.hypothesis)]
-    say("trying two at once")
+    problem.say("trying two at once")
 
-    def beside(one: Candidate) -> list[Two]:
-        told = evidence_of(one.hypothesis, bodies, band_hz, seed=seed)
+    def augmented(one: Candidate) -> list[Pair]:
+        evidence = evidence_of(one.hypothesis, problem.bodies, problem.band_hz, seed=problem.seed)
         found = []
         for kind in kinds:
-            other = None if kind is type(one.effect) else kind.propose(told)
+            other = None if kind is type(one.effect) else kind.propose(evidence)
             if other is not None:
-                h = refitted(replace(one.hypothesis, effects=(*one.hypothesis.effects, other)), bodies, told.observed)
-                found.append(Two(h, mean_db(takes, h)))
+                h = refitted(replace(one.hypothesis, effects=(*one.hypothesis.effects, other)), problem.bodies, evidence.observed)
+                found.append(Pair(h, problem.distance_db(h)))
         return found
 
-    pairs = [two for some in parallel_map(beside, first) for two in some]
-    floor = least_db(takes, start)
-    gap = mean_db(takes, start) - floor
-    if not pairs or min(two.db for two in pairs) - floor > LEFT * gap:
+    pairs = [pair for some in parallel_map(augmented, first) for pair in some]
+    now = problem.score(start)
+    if not pairs or min(pair.db for pair in pairs) - now.floor_db > RULES.pair_leaves_share * now.gap_db:
         return None
-    h = _likeliest(pairs, floor + gap, bodies)
-    closer = again(again(h, 0, bodies, band_hz, afresh=True), 1, bodies, band_hz)  # what was found alone had the other's share to explain, too
-    h = closer if mean_db(takes, closer) < mean_db(takes, h) else h
-    return _stood(h, bodies, takes, band_hz, seed=seed, say=say)
+    h = _likeliest(pairs, now.floor_db + now.gap_db, problem.bodies)
+    closer = again(again(h, 0, problem, afresh=True), 1, problem)  # what was found alone had the other's share to explain, too
+    h = closer if problem.distance_db(closer) < problem.distance_db(h) else h
+    return _accepted_together(h, problem)
 
 
 def in_a_room(
     h: Hypothesis,
     found: Sequence[Candidate],
-    bodies: tuple[Struck, ...],
-    takes: Comparable,
-    band_hz: tuple[float, float],
-    *,
-    seed: int,
-    say: Callable[[str], None],
+    problem: DiagnosisProblem,
 ) -> tuple[Hypothesis, list[Candidate]] | None:
-    """A room that has been found alone, heard anew beside one of the suspects (found) that move modes; None where no two say nearly all.
+    """A room that has been found alone, identified anew beside one of the candidate effects (found) that move modes; None where no two say nearly all.
 
-    Outside the room lines lie where they lie, and tell of masses and tensors. But a response told from modes that lie elsewhere plays what these lack, so that every
-    other set of modes sounds worse with it: the suspect is tried with a response of its own.
+    Outside the room lines lie where they lie, and show masses and tensors. But a response identified from modes that lie elsewhere plays what these lack, so that every
+    other set of modes sounds worse with it: the candidate is tried with a response of its own.
     """
     rooms = [e for e in h.effects if isinstance(e, Dereverberates)]
     movers = [c for c in found if moves_itself(h, c.effect)]
-    if len(rooms) != 1 or len(h.effects) != 1 or not movers or not all(isinstance(t, Take) for t in takes):
+    if len(rooms) != 1 or len(h.effects) != 1 or not movers or not problem.has_audio:
         return None
-    say("hearing the room anew beside what moves modes")
+    problem.say("hearing the room anew beside what moves modes")
 
-    def beside(c: Candidate) -> Two | None:
-        alone = refitted(with_effects(h, (c.effect,), bodies), bodies)
-        told = evidence_of(alone, bodies, band_hz, seed=seed)
-        room = type(rooms[0]).propose(told)
+    def augmented(c: Candidate) -> Pair | None:
+        alone = refitted(with_effects(h, (c.effect,), problem.bodies), problem.bodies)
+        evidence = evidence_of(alone, problem.bodies, problem.band_hz, seed=problem.seed)
+        room = type(rooms[0]).propose(evidence)
         if room is None:
             return None
-        two = reidentified(refitted(replace(alone, effects=(c.effect, room)), bodies, told.observed), bodies, fully=True)
-        return Two(two, mean_db(takes, two))
+        pair = reidentified(refitted(replace(alone, effects=(c.effect, room)), problem.bodies, evidence.observed), problem.bodies, fully=True)
+        return Pair(pair, problem.distance_db(pair))
 
-    floor, left = least_db(takes, h), mean_db(takes, reidentified(h, bodies, fully=True))
+    floor, left = problem.score(h).floor_db, problem.distance_db(reidentified(h, problem.bodies, fully=True))
     for some in (
         [c for c in movers if not mixes_neighbours(c.effect)],
         [c for c in movers if mixes_neighbours(c.effect)],
     ):  # what hardly moves modes is asked where nothing else will do
-        best = min((two for two in parallel_map(beside, some) if two is not None), key=lambda two: two.db, default=None)
-        if best is not None and best.db - floor <= LEFT * (left - floor):
+        best = min((pair for pair in parallel_map(augmented, some) if pair is not None), key=lambda pair: pair.db, default=None)
+        if best is not None and best.db - floor <= RULES.pair_leaves_share * (left - floor):
             break
     else:
         return None
-    return _stood(best.h, bodies, takes, band_hz, seed=seed, say=say)
+    return _accepted_together(best.h, problem)
 
 
-def _stood(
-    h: Hypothesis, bodies: tuple[Struck, ...], takes: Comparable, band_hz: tuple[float, float], *, seed: int, say: Callable[[str], None]
-) -> tuple[Hypothesis, list[Candidate]] | None:
-    """The two, if each earns its keep beside the other."""
+def _accepted_together(h: Hypothesis, problem: DiagnosisProblem) -> tuple[Hypothesis, list[Candidate]] | None:
+    """The two, if each is accepted beside the other."""
     added: list[Candidate] = []
     for effect in h.effects[::-1]:
-        rest = refitted(with_effects(h, tuple(e for e in h.effects if e is not effect), bodies), bodies)
-        without = mean_db(takes, reidentified(rest, bodies))  # with a response of its own, too
-        told = replace(evidence_of(rest, bodies, band_hz, seed=seed), known=effect)
-        now, least = mean_db(takes, rest), least_db(takes, rest)
-        stood = trials(rest, bodies, takes, told, [type(effect)], seed=seed, say=say)
-        if not stood or not (earns(stood[0], max(now - least, 0.0), first=False) and helps(stood[0], bodies, takes, now, without, least, first=False)):
+        rest = refitted(with_effects(h, tuple(e for e in h.effects if e is not effect), problem.bodies), problem.bodies)
+        response = problem.distance_db(reidentified(rest, problem.bodies))  # with a response of its own, too
+        evidence = replace(evidence_of(rest, problem.bodies, problem.band_hz, seed=problem.seed), known=effect)
+        now = problem.score(rest)
+        full = replace(now, distance_db=response)
+        candidates = cross_validated(rest, problem.only(type(effect)), evidence)
+        if not candidates or not (accepted(candidates[0], max(now.gap_db, 0.0), first=False) and helps(candidates[0], problem, now, full, first=False)):
             return None
-        h, added = stood[0].hypothesis, [stood[0], *added]
+        h, added = candidates[0].hypothesis, [candidates[0], *added]
     return h, added
 
 
-def _likeliest(pairs: Sequence[Two], before_db: float, bodies: tuple[Struck, ...]) -> Hypothesis:
-    """The nearest to the strikes; or, of those that share the effect that moves modes, and say nearly as much, the one for which phases speak clearly (ties.py)."""
-    best = min(pairs, key=lambda two: two.db)
-    near = best.db + NEARLY * (before_db - best.db)
-    others = [two.h for two in pairs if two.db < near and _movers(two.h) == _movers(best.h)]
-    off = [misfit(h, bodies) + CLEAR for h in others]
+def _likeliest(pairs: Sequence[Pair], before_db: float, bodies: tuple[Struck, ...]) -> Hypothesis:
+    """The nearest to the strikes; or, of those that share the effect that moves modes, and say nearly as much, the one for which phases speak clearly (phase_test.py)."""
+    best = min(pairs, key=lambda pair: pair.db)
+    near = best.db + RULES.phases_decide_share * (before_db - best.db)
+    others = [pair.h for pair in pairs if pair.db < near and _movers(pair.h) == _movers(best.h)]
+    off = [misfit(h, bodies) + RULES.clear_phases for h in others]
     own = misfit(best.h, bodies)
     return others[int(np.argmin(off))] if np.isfinite(own) and min(off) < own else best.h
 

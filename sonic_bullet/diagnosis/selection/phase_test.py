@@ -1,4 +1,4 @@
-"""Which of two names that strikes cannot tell apart by what is observed: the one whose lines agree in phase, too.
+"""Which of two effects that strikes cannot tell apart: the one whose lines agree in phase, too.
 
     A_sk ≈ σ E_sk e^{−iω_k t₀}      E: onset amplitudes of the modes under a hypothesis, its pulse and sound path included; σ, t₀ free
 
@@ -19,8 +19,6 @@ from sonic_bullet.records import Array
 DELAYS_S = np.arange(-4e-4, 4.01e-4, 1e-5)
 FINER_S = np.linspace(-1e-5, 1e-5, 21)  # half a step of the coarse ones is a sixth of a radian at 5 kHz
 TURNS = 15
-NEARLY = 0.2  # of what a name says: between two that differ by less, phases may decide
-CLEAR, HINT = 25.0, 5.0  # twice the ln likelihood of phases that this takes; where the two are ALIKE (exchange.py), or to leave a name as it is
 
 
 def misfit(h: Hypothesis, bodies: tuple[Struck, ...]) -> float:
@@ -30,16 +28,16 @@ def misfit(h: Hypothesis, bodies: tuple[Struck, ...]) -> float:
 
 def _misfit(h: Hypothesis, body: Struck) -> float:
     one = object_evidence(h, body, sounds=False)
-    told, seen = one.expected, one.amplitude
+    expected, seen = one.expected, one.amplitude
     if any(len(impact_of(h, body, i).delay_s) > 1 for i in body.fitted):
         return np.inf  # a line's amplitude at the onset is of one hit
-    good = np.isfinite(seen) & np.isfinite(one.amplitude_sd)  # whatever is expected there, so that all names are held against the same
-    told = np.nan_to_num(told)
-    if not good.any() or not np.abs(told[good]).any():
+    good = np.isfinite(seen) & np.isfinite(one.amplitude_sd)  # whatever is expected there, so that all effects are held against the same
+    expected = np.nan_to_num(expected)
+    if not good.any() or not np.abs(expected[good]).any():
         return 0.0
-    rough = np.broadcast_to(ROUGH * np.abs(told).max(axis=0, keepdims=True), told.shape)[good]
-    omega = np.broadcast_to(one.omega, told.shape)[good]
-    x, y, sd = told[good], seen[good], one.amplitude_sd[good]
+    rough = np.broadcast_to(ROUGH * np.abs(expected).max(axis=0, keepdims=True), expected.shape)[good]
+    omega = np.broadcast_to(one.omega, expected.shape)[good]
+    x, y, sd = expected[good], seen[good], one.amplitude_sd[good]
     if not one.signed:
         return _cost(np.abs(x), np.abs(y), sd, rough)
 
@@ -51,12 +49,12 @@ def _misfit(h: Hypothesis, body: Struck) -> float:
     return min(at(t) for t in middle + FINER_S)
 
 
-def _cost(told: Array, seen: Array, sd: Array, rough: Array) -> float:
+def _cost(expected: Array, seen: Array, sd: Array, rough: Array) -> float:
     """At the best common gain; rough: the shapes' own error, which grows with it."""
-    gain, weight = 1.0, np.ones(len(told))
+    gain, weight = 1.0, np.ones(len(expected))
     for _ in range(TURNS):
         width = sd**2 + (gain * rough) ** 2
-        gain = max(float((weight * (told.conj() * seen).real / width).sum() / (weight * np.abs(told) ** 2 / width).sum()), 1e-3)
-        weight = 1 / (1 + np.abs(seen - gain * told) ** 2 / width / 9)
+        gain = max(float((weight * (expected.conj() * seen).real / width).sum() / (weight * np.abs(expected) ** 2 / width).sum()), 1e-3)
+        weight = 1 / (1 + np.abs(seen - gain * expected) ** 2 / width / 9)
     width = sd**2 + (gain * rough) ** 2
-    return float((np.log(width) + 9 * np.log1p(np.abs(seen - gain * told) ** 2 / width / 9)).sum())
+    return float((np.log(width) + 9 * np.log1p(np.abs(seen - gain * expected) ** 2 / width / 9)).sum())

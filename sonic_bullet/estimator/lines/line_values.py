@@ -40,10 +40,11 @@ class Features:
 
     def __post_init__(self) -> None:
         count = len(np.atleast_1d(self.freq_hz))
-        for name in ("freq_hz", "decay_per_s", "amplitude", "phase_rad"):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), np.float64, (count,), name))
-        for name in ("freq_sd_hz", "decay_sd_per_s", "amplitude_sd"):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), np.float64, (count,), name, finite=False))
+        values = (("freq_hz", self.freq_hz), ("decay_per_s", self.decay_per_s), ("amplitude", self.amplitude), ("phase_rad", self.phase_rad))
+        for name, value in values:
+            object.__setattr__(self, name, frozen_array(value, np.float64, (count,), name))
+        for name, value in (("freq_sd_hz", self.freq_sd_hz), ("decay_sd_per_s", self.decay_sd_per_s), ("amplitude_sd", self.amplitude_sd)):
+            object.__setattr__(self, name, frozen_array(value, np.float64, (count,), name, finite=False))
         if (self.freq_hz <= 0).any() or (self.decay_per_s < 0).any() or (self.amplitude <= 0).any():
             raise RecordError("features hold a frequency or amplitude of zero, or a negative decay", "keep only what was heard")
 
@@ -71,8 +72,8 @@ class MaterialFit:
 
     def __post_init__(self) -> None:
         count = len(np.atleast_1d(self.freq_hz))
-        for name in ("freq_hz", "decay_per_s", "amplitude"):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), np.float64, (count,), name))
+        for name, value in (("freq_hz", self.freq_hz), ("decay_per_s", self.decay_per_s), ("amplitude", self.amplitude)):
+            object.__setattr__(self, name, frozen_array(value, np.float64, (count,), name))
         object.__setattr__(self, "covariance", frozen_array(self.covariance, np.float64, (5, 5), "covariance", finite=False))
 
 

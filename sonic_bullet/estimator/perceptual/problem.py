@@ -40,8 +40,16 @@ class Problem:
 
     def __post_init__(self) -> None:
         count = len(np.atleast_1d(self.lambda_hat))
-        for name, shape in (("signal", None), ("lambda_hat", count), ("amplitude_hat", count), ("lower", 4), ("upper", 4)):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), np.float64, (shape,), name))
+        arrays: tuple[tuple[str, Array, int | None], ...] = (
+            ("signal", self.signal, None),
+            ("lambda_hat", self.lambda_hat, count),
+            ("amplitude_hat", self.amplitude_hat, count),
+            ("lower", self.lower, 4),
+            ("upper", self.upper, 4),
+        )
+        for name, value, shape in arrays:
+            bound = name in ("lower", "upper")  # no bound at all is a number beyond all others
+            object.__setattr__(self, name, frozen_array(value, np.float64, (shape,), name, finite=not bound))
         if not (self.lambda_hat > 0).all():
             raise RecordError("an eigenvalue of the body is not above zero", "leave its rigid modes out")
         if not self.amplitude_hat.any():
