@@ -157,7 +157,7 @@ class Listener:
         link: -1 is the base; a link's number or name; "all" every link with a collision shape, all of them or, where one fails, none. material: a preset's name, a preset file or a `Material`.
         mesh: a file (in metres) or shapes in the body frame, where the body's own collision shapes should not be used.
         model: modes computed before. roughness_m: rms height of its surface in place of the material's. fixed: clamped spheres
-        (x, y, z, radius) in m, body frame. thickness_m: wall of an open surface. to_hz, count: how many modes. progress: told now and then
+        (x, y, z, radius) in m, body frame. thickness_m: wall of an open surface. to_hz, count: how many modes. progress: called now and then with
         which link's modes are being computed, how far that is, and that it is their radiation next (seconds a link the first time, then
         the cache has both); without one, a terminal shows it.
         Warns (`errors.SizeWarning`) of a link larger than anything that is struck to sound. Raises SceneError (unknown body or link),
@@ -253,7 +253,7 @@ class Listener:
     def quench(self) -> None:
         """Stop everything that rings, as a hand would, now: where the last step taken in ends. What strikes from the next step on sounds again.
 
-        What was struck before is silent from then on, strikes that are still to be heard included, and so is what travels to the
+        What was struck before is silent from then on, strikes that are still to sound included, and so is what travels to the
         microphones; what rolls or slides goes on. `sound` and files fall silent at that very sample, `frame` as much later as it lags.
         It is an event of the log, so that a replay stops there too, at any rate.
         """

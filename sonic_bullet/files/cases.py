@@ -148,7 +148,7 @@ class Case:
     """A case. sensor: "velocity" (of the surface at sensor_m along sensor_direction, by object), "pressure" (a microphone), "sum" (of modes) or "unknown".
 
     onset_s: when the impulse arrives in every file, or None. support: as declared, in words; clamps stand with the objects. medium: what the object radiates
-    into, "air", "none" or "unknown": as declared, else air where a microphone or a vibrometer heard it. warnings: of fields that are not read, one line each.
+    into, "air", "none" or "unknown": as declared, else air where a microphone or a vibrometer listened. warnings: of fields that are not read, one line each.
     """
 
     name: str
