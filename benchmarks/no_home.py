@@ -76,7 +76,7 @@ def command(direction: str, scratch: Path, words: list[str]) -> list[str] | None
 
 def prepared(scratch: Path) -> Path:
     """A folder that everybody may write to, with a scene, a mesh, and a case in it."""
-    sys.path.insert(0, str(REPO / "tests" / "estimator"))
+    sys.path.insert(0, str(REPO))
     from sonic_bullet.records import Material
 
     work = scratch / "work"
@@ -86,7 +86,7 @@ def prepared(scratch: Path) -> Path:
     (scratch / "sealed").chmod(0o555)
     (work / "scene.py").write_text(SCENE)
     material = Material.isotropic("planted", youngs_pa=7e10, poisson=0.33, density_kg_m3=2700, alpha_per_s=5.0, beta_s=1e-7)
-    importlib.import_module("made_case").make(work, material, guess=(6.5e10, 2700, 0.3), strikes=3, seconds=0.4)
+    importlib.import_module("tests.made.case").make(work, material, guess=(6.5e10, 2700, 0.3), strikes=3, seconds=0.4)
     for path in (work, *work.iterdir()):
         path.chmod(0o777)
     return work

@@ -1,4 +1,4 @@
-"""How far are the pressure weights of `synth.radiation` from a boundary element solution of the same modes?
+"""How far are the pressure weights of `synth.far_field` from a boundary element solution of the same modes?
 
     python benchmarks/radiation_bem.py [--modes 14] [--only bar]
 

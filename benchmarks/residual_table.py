@@ -3,7 +3,7 @@
 Practice cases: fit and residual from the 'fit' strikes, judged on 'holdout' strikes, at the amplitudes that the fitted model predicts.
 Measured objects with two recordings or more have no mesh: their features stand in for modes. Modes are the damped sinusoids that the first half of the strikes
 share, with the mean of their amplitudes; a strike of the second half is predicted by them at the strike's own level (one gain a strike, the same with and without
-the residual). Distance: `estimator.distance.log_spectral_db` (dB, cells 10 dB above the recording's noise), each prediction given that noise; with the residual, the mean over
+the residual). Distance: `estimator.lines.log_spectral.log_spectral_db` (dB, cells 10 dB above the recording's noise), each prediction given that noise; with the residual, the mean over
 three grains of its noise.
 """
 

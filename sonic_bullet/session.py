@@ -253,7 +253,7 @@ class Listener:
     def quench(self) -> None:
         """Stop everything that rings, as a hand would, now: where the last step taken in ends. What strikes from the next step on sounds again.
 
-        What was struck before is silent from then on, strikes that have not sounded yet included, and so is what travels to the
+        What was struck before is silent from then on, strikes that are still to sound included, and so is what travels to the
         microphones; what rolls or slides goes on. `sound` and files fall silent at that very sample, `frame` as much later as it lags.
         It is an event of the log, so that a replay stops there too, at any rate.
         """

@@ -252,6 +252,9 @@ def case() -> None:
 )
 @click.option("--sensor-at", type=Numbers("X,Y,Z"), help="Where the surface was measured, in m, for --sensor velocity.")
 @click.option("--sensor-direction", type=Numbers("X,Y,Z"), help="Along which, for --sensor velocity. [default: out of the surface]")
+@click.option(
+    "--medium", type=click.Choice(["air", "none"]), help="What it rang in: 'none' loses nothing to radiation. [default: air; with --sensor sum unknown]"
+)
 def case_new(folder: str, more: tuple[str, ...], recordings: tuple[str, ...], **options: Any) -> None:
     """Write FOLDER/case.json for recordings of one object; files from elsewhere are copied into the folder."""
     from sonic_bullet.cli.case_command import run_case_new

@@ -1,7 +1,7 @@
 """`case`: a folder of recordings to a case.json that `fit` and `diagnose` read; and whether one can be read.
 
 new     FOLDER, mesh, recordings, guess -> FOLDER/case.json     files from elsewhere are copied beside it
-check   FOLDER -> what the case holds, or one line that says what is wrong
+check   FOLDER -> what the case holds, and what of it is not read; or one line that says what is wrong
 schema  JSON Schema of case.json
 """
 
@@ -15,11 +15,12 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from sonic_bullet.cli.output import table
+from sonic_bullet.cli.output import table, warn
 from sonic_bullet.files import read_audio, replacing
 from sonic_bullet.files.case_schema import case_schema
 from sonic_bullet.files.cases import FORMAT, UNITS, Case, read_case
-from sonic_bullet.records.errors import AudioError, FileError
+from sonic_bullet.files.channels import channel_of, channel_words
+from sonic_bullet.records.errors import FileError
 
 AUDIO = frozenset({".wav", ".flac", ".ogg", ".aif", ".aiff", ".caf", ".w64", ".rf64"})
 RESPONSES = {"sum": "sum of modes", "pressure": "pressure", "velocity": "velocity"}
@@ -36,6 +37,7 @@ def run_case_new(
     sensor: str,
     sensor_at: Point | None,
     sensor_direction: Point | None,
+    medium: str | None,
 ) -> None:
     """The `case new` command: case.json, and copies of files from elsewhere, whole or not at all; nothing is overwritten.
 
@@ -70,7 +72,7 @@ def run_case_new(
     _written(
         place,
         name_of,
-        _described(place, [name_of[s] for s in sounds], thing, RESPONSES[sensor], sensor_at, sensor_direction),
+        _described(place, [name_of[s] for s in sounds], thing, RESPONSES[sensor], sensor_at, sensor_direction, medium),
     )
     print(f"{place / 'case.json'}: {len(sounds)} recordings" + ("" if mesh is None else f" of {name_of[Path(mesh)]}"))
     print("now say where and how hard each strike was: strike.position in m, strike.impulse in N·s, or null")
@@ -118,6 +120,7 @@ def _described(
     response: str,
     sensor_at: Point | None,
     sensor_direction: Point | None,
+    medium: str | None,
 ) -> dict[str, Any]:
     """What case.json holds: every field one may want to fill, null where it is not known."""
     strike = {"position": None, "direction": None, "impulse": None}
@@ -128,9 +131,10 @@ def _described(
         "objects": {"object": thing} if thing else {},
         "support": {"fixed": []},
         "sensor": {"response": response, "position": sensor_at, "direction": sensor_direction},
+        "medium": medium,
         "band_hz": [20, 20_000],
         "onset": None,
-        "recordings": [{"file": name, **of, "split": "fit", "strike": strike} for name in sounds],
+        "recordings": [{"file": name, **of, "split": "fit", "channel": None, "strike": strike} for name in sounds],
     }
 
 
@@ -164,6 +168,7 @@ def _written(place: Path, name_of: dict[Path, str], case: dict[str, Any]) -> Non
 def run_case_check(folder: str) -> None:
     """The `case check` command: what a case holds. Raises SonicBulletError where `fit` would stop."""
     case = read_case(folder)
+    warn(case.warnings)
     rows = [_object_row(case, name) for name in case.objects]
     missing = 0
     for recording in case.recordings:
@@ -173,8 +178,9 @@ def run_case_check(folder: str) -> None:
             missing += 1
             continue
         sound, _ = read_audio(recording.file)
-        if (recording.channel or 0) >= len(sound):
-            raise AudioError(f"{recording.file} has no channel {recording.channel}", "name one it has")
+        channel_of(sound, recording.channel, recording.file.name)
+        which = channel_words(len(sound), recording.channel if recording.channel_named else None)
+        warn([f"{recording.file.name}: {which}"] if which else [])
     splits = [r.split for r in case.recordings]
     listed = ", ".join(f"{splits.count(name)} {name}" for name in dict.fromkeys(splits))
     print(f"{case.name}: {len(case.recordings)} strikes ({listed}), recorded as {case.sensor}")

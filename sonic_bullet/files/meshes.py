@@ -23,7 +23,7 @@ from sonic_bullet.records.errors import FileError, MeshError
 MeshSurface = tuple[Array, Array]
 REMEDY = "repair the mesh, or export it again"
 ARCHIVES = {"zip", "bz2", "tar.gz", "tar.bz2"}
-SPREAD_OVER_FILES = {"gltf", "dae"}  # formats whose numbers may lie in files beside them
+SEVERAL_FILES = {"gltf", "dae"}  # formats whose numbers may lie in files beside them
 
 
 def read_surfaces(path: Path) -> list[MeshSurface]:
@@ -113,7 +113,7 @@ def _other(path: Path) -> Iterator[MeshSurface]:
         _check_off(path)
     _check_counts(path, kind)
     try:
-        if kind in SPREAD_OVER_FILES:
+        if kind in SEVERAL_FILES:
             scene = trimesh.load_scene(path, process=False, maintain_order=True, skip_materials=True)
         else:
             content = io.BytesIO(path.read_bytes())  # a read of as many bytes as a header claims gives what there is, and takes no more memory

@@ -23,8 +23,8 @@ def reading(path: str | os.PathLike[str], thing: str, kind: type[SonicBulletErro
     try:
         yield
     except SonicBulletError as error:
-        named = _named(error, os.fspath(path), type(error) if isinstance(error, (kind, FileError)) else kind)
-        raise (error if named is None else named) from error.__cause__
+        renamed = _with_path(error, os.fspath(path), type(error) if isinstance(error, (kind, FileError)) else kind)
+        raise (error if renamed is None else renamed) from error.__cause__
     except OSError as error:
         raise cannot("read", path, error) from error
     except MemoryError:
@@ -34,7 +34,7 @@ def reading(path: str | os.PathLike[str], thing: str, kind: type[SonicBulletErro
         raise kind(f"{path} is cut or no {thing} ({excerpt(reason, WHAT)})", remedy) from error
 
 
-def _named(error: SonicBulletError, path: str, kind: type[SonicBulletError]) -> SonicBulletError | None:
+def _with_path(error: SonicBulletError, path: str, kind: type[SonicBulletError]) -> SonicBulletError | None:
     """The error as ``kind``, with the path and no more of the file than is allowed; None where it is all that already."""
     before, named, after = error.what.partition(path) if path else (error.what, " ", "")  # every text has the empty name in it
     if named and type(error) is kind and len(before) + len(after) + len(error.remedy) <= QUOTED:

@@ -15,9 +15,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from sonic_bullet.records.arrays import Array, frozen_array
-from sonic_bullet.records.arrays import require as _require
-from sonic_bullet.records.arrays import store as _store
+from sonic_bullet.records.arrays import Array, frozen_array, require, store
 from sonic_bullet.records.coerce import as_flag, as_items, as_kind, as_number, as_text, as_whole, check_options, nearest, shown
 from sonic_bullet.records.errors import RecordError
 from sonic_bullet.records.residual import Residual
@@ -81,18 +79,18 @@ class Material:
         as_text(self.name, "the name of a material", "give a text")
         where = f"material {shown(self.name)}"
         stiffness = frozen_array(self.stiffness_pa, float, (6, 6), f"{where}: stiffness_pa")
-        _store(self, stiffness_pa=stiffness, density_kg_m3=as_number(self.density_kg_m3, f"{where}: density_kg_m3", "give a density above zero", above=0))
-        _require(bool(np.allclose(stiffness, stiffness.T, rtol=1e-9)), f"{where}: stiffness_pa is not symmetric", "give a symmetric tensor")
-        _require(
+        store(self, stiffness_pa=stiffness, density_kg_m3=as_number(self.density_kg_m3, f"{where}: density_kg_m3", "give a density above zero", above=0))
+        require(bool(np.allclose(stiffness, stiffness.T, rtol=1e-9)), f"{where}: stiffness_pa is not symmetric", "give a symmetric tensor")
+        require(
             bool(np.linalg.eigvalsh(stiffness)[0] > 0),
             f"{where}: stiffness_pa is not positive definite",
             "Young's modulus must be above 0 and Poisson's ratio within -1 … 0.5",
         )
         for name in ("alpha_per_s", "beta_s"):
             if getattr(self, name) is not None:
-                _store(self, **{name: as_number(getattr(self, name), f"{where}: {name}", "damping must be zero or above", least=0)})
-        _require((self.alpha_per_s is None) == (self.beta_s is None), f"{where}: only one of alpha_per_s, beta_s is given", "give both or neither")
-        _store(
+                store(self, **{name: as_number(getattr(self, name), f"{where}: {name}", "damping must be zero or above", least=0)})
+        require((self.alpha_per_s is None) == (self.beta_s is None), f"{where}: only one of alpha_per_s, beta_s is given", "give both or neither")
+        store(
             self,
             roughness_m=as_number(self.roughness_m, f"{where}: roughness_m", "rms height must be zero or above", least=0),
             hurst=as_number(self.hurst, f"{where}: hurst", "the Hurst exponent lies between 0 and 1", above=0, below=1),
@@ -161,7 +159,7 @@ class Shape:
         kinds = get_args(ShapeKind)
         if as_text(self.kind, "kind of a shape", f"one of {', '.join(kinds)}") not in kinds:
             raise RecordError(f"kind of a shape is {shown(self.kind)}", nearest(self.kind, kinds))
-        _store(
+        store(
             self,
             size_m=frozen_array(self.size_m, float, (3,), "shape: size_m"),
             position_m=frozen_array(self.position_m, float, (3,), "shape: position_m"),
@@ -169,10 +167,10 @@ class Shape:
             vertex_m=frozen_array(self.vertex_m, float, (None, 3), "mesh: vertex_m"),
             face=frozen_array(self.face, np.int32, (None, 3), "mesh: face"),
         )
-        _require(bool((self.size_m >= 0).all()), f"{self.kind}: size_m {self.size_m} is negative", "give sizes above zero")
+        require(bool((self.size_m >= 0).all()), f"{self.kind}: size_m {self.size_m} is negative", "give sizes above zero")
         if self.kind == "mesh":
-            _require(len(self.face) > 0, "mesh without triangles", "give a triangle mesh")
-            _require(bool((self.face >= 0).all() and (self.face < len(self.vertex_m)).all()), "mesh faces point at missing vertices", "repair the mesh file")
+            require(len(self.face) > 0, "mesh without triangles", "give a triangle mesh")
+            require(bool((self.face >= 0).all() and (self.face < len(self.vertex_m)).all()), "mesh faces point at missing vertices", "repair the mesh file")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -211,7 +209,7 @@ class ModalModel:
         vertex = frozen_array(self.vertex_m, float, (None, 3), "vertex_m")
         face = frozen_array(self.face, np.int32, (None, 3), "face")
         decay = frozen_array(self.decay_per_s, float, (m,), "decay_per_s", finite=False)
-        _store(
+        store(
             self,
             freq_hz=freq,
             decay_per_s=decay,
@@ -224,19 +222,16 @@ class ModalModel:
             dropped=as_whole(self.dropped, "dropped", "give the number of modes left out", least=0),
             curvature_per_m=frozen_array(self.curvature_per_m, float, (len(face),), "curvature_per_m"),
         )
-        _require(
-            bool((freq > 0).all() and (np.diff(freq) >= 0).all()), "mode frequencies are not ascending and above zero", "build the model with modal.analyse"
-        )
-        _require(not np.isinf(decay).any() and not bool((decay < 0).any()), "mode decays are negative or infinite", "build the model with modal.analyse")
-        _require(
-            len(face) == 0 or bool((face >= 0).all() and (face < len(vertex)).all()), "faces point at missing vertices", "build the model with modal.analyse"
-        )
-        _require(self.damping_growth_power in (1.0, 2.0), f"decays that rise with power {self.damping_growth_power} of the level", "give 1 or 2")
+        anew = "build the model with modal.analyse"
+        require(bool((freq > 0).all() and (np.diff(freq) >= 0).all()), "mode frequencies are not ascending and above zero", anew)
+        require(not np.isinf(decay).any() and not bool((decay < 0).any()), "mode decays are negative or infinite", anew)
+        require(bool(((face >= 0) & (face < len(vertex))).all()), "faces point at missing vertices", anew)
+        require(self.damping_growth_power in (1.0, 2.0), f"decays that rise with power {self.damping_growth_power} of the level", "give 1 or 2")
         as_text(self.note, "note", "give a text")
         as_flag(self.includes_radiation, "includes_radiation")
         for name in ("bend_s2_m2", "damping_growth_s_m"):
             if getattr(self, name) is not None:
-                _store(self, **{name: frozen_array(getattr(self, name), float, (m,), name)})
+                store(self, **{name: frozen_array(getattr(self, name), float, (m,), name)})
 
     @property
     def mode_count(self) -> int:
@@ -280,9 +275,70 @@ class Body:
 
     def __post_init__(self) -> None:
         where = f"body {shown(self.body_id)} link {shown(self.link)}"
-        _store(
+        store(
             self,
             inertia_kg_m2=frozen_array(self.inertia_kg_m2, float, (3, 3), f"{where}: inertia_kg_m2"),
             mass_kg=as_number(self.mass_kg, f"{where}: mass_kg", "give it a finite mass with changeDynamics", least=0, below=1e12),
             volume_m3=as_number(self.volume_m3, f"{where}: volume_m3", "orient its mesh outward", least=0),
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Microphone:
+    """A point that hears pressure in Pa. position_m (3,): world frame, fixed."""
+
+    position_m: Array
+
+    def __post_init__(self) -> None:
+        store(self, position_m=frozen_array(self.position_m, float, (3,), "microphone: position_m"))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Vibrometer:
+    """Velocity in m/s of a body's surface at point_m (3,) along direction (3,), both in the body frame."""
+
+    body_id: int
+    point_m: Array
+    direction: Array
+    link: int = -1
+
+    def __post_init__(self) -> None:
+        direction = frozen_array(self.direction, float, (3,), "vibrometer: direction")
+        with np.errstate(over="ignore"):
+            length = float(np.linalg.norm(direction))
+        require(0 < length < np.inf, "vibrometer: direction is zero", "give the direction in which it looks")
+        store(
+            self,
+            body_id=as_whole(self.body_id, "vibrometer: body_id", "give the body's id"),
+            link=as_whole(self.link, "vibrometer: link", "give -1 (the base) or a link's number"),
+            point_m=frozen_array(self.point_m, float, (3,), "vibrometer: point_m"),
+            direction=frozen_array(direction / length, float, (3,), "vibrometer: direction"),
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ModalSum:
+    """The seed's observation: the plain sum Σ a·e^{-dt}·sin(2πft), a = scale·Uᵀj for an impulse j in N·s [Ren et al. 2013, eq. 11, 13]."""
+
+    scale: float = 1.0
+
+    def __post_init__(self) -> None:
+        store(self, scale=as_number(self.scale, "modal sum: scale", "give a number"))
+
+
+Sensor = Microphone | Vibrometer | ModalSum
+
+
+@dataclass(frozen=True, slots=True)
+class Air:
+    """The medium: density and speed of sound."""
+
+    density_kg_m3: float = 1.2
+    sound_speed_m_s: float = 343.0
+
+    def __post_init__(self) -> None:
+        store(
+            self,
+            density_kg_m3=as_number(self.density_kg_m3, "air: density_kg_m3", "give kg/m³, above zero", above=0, below=1e4),
+            sound_speed_m_s=as_number(self.sound_speed_m_s, "air: sound_speed_m_s", "give m/s, above zero", above=0, below=1e5),
         )

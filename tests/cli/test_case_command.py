@@ -126,6 +126,47 @@ def test_bad_input_is_one_line_and_no_file(place: Path, capfd: pytest.CaptureFix
     assert not (place / "mine").exists()
 
 
+@pytest.mark.parametrize(
+    ("words", "medium"), [([], "air"), (["--medium", "none"], "none"), (["--sensor", "sum"], "unknown"), (["--sensor", "sum", "--medium", "air"], "air")]
+)
+def test_new_writes_the_medium(place: Path, words: list[str], medium: str) -> None:
+    assert run("case", "new", "mine", "a.wav", *words) == 0
+    assert read_case(place / "mine").medium == medium
+    assert "medium" in json.loads((place / "mine" / "case.json").read_text())
+
+
+def test_check_names_what_is_not_read_and_refuses_nothing(place: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    assert run("case", "new", "mine", "a.wav") == 0
+    path = place / "mine" / "case.json"
+    case = json.loads(path.read_text())
+    assert not read_case(place / "mine").warnings
+    case["recordings"][0] |= {"chanel": 0, "note": "the good one"}
+    path.write_text(json.dumps(case | {"medium": "water"}))
+    capfd.readouterr()
+    assert run("case", "check", "mine") == 0
+    said = capfd.readouterr()
+    assert "1 fit" in said.out
+    assert "field 'chanel' is not known and not read: did you mean 'channel'?" in said.err
+    assert "medium 'water' is not known" in said.err
+    assert said.err.count("warning") == said.err.count("\n") == 2
+
+
+@pytest.mark.parametrize(("channel", "code", "words"), [(None, 0, "the first is used"), (1, 0, "channel 1 is used"), (2, 2, "has no channel 2")])
+def test_check_says_which_channel_is_used(place: Path, capfd: pytest.CaptureFixture[str], channel: int | None, code: int, words: str) -> None:
+    sound, sr = soundfile.read(place / "a.wav")
+    soundfile.write(place / "a.wav", np.stack([sound, 0.5 * sound], axis=1), sr, subtype="FLOAT")
+    assert run("case", "new", "mine", "a.wav") == 0
+    path = place / "mine" / "case.json"
+    case = json.loads(path.read_text())
+    case["recordings"][0]["channel"] = channel
+    path.write_text(json.dumps(case))
+    capfd.readouterr()
+    assert run("case", "check", "mine") == code
+    error = capfd.readouterr().err
+    assert words in error
+    assert error.count("\n") == 1
+
+
 def test_a_failed_write_leaves_nothing(place: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
     def full(*_: object, **__: object) -> None:
         raise OSError(28, "No space left on device")
@@ -133,7 +174,7 @@ def test_a_failed_write_leaves_nothing(place: Path, monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(json, "dumps", full)
     assert run("case", "new", "mine", "a.wav") == 2
     assert not (place / "mine").exists()
-    assert "No space left" in capfd.readouterr().err
+    assert "disk full" in capfd.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -162,8 +162,10 @@ def test_an_interrupted_write_leaves_a_valid_partial_file_and_names_it(tmp_path:
 
 FULL_DISK = """
 import resource, sys, numpy as np
-from sonic_bullet import errors, files
-from sonic_bullet.contacts import ContactLog, Contacts, Step
+from sonic_bullet import files
+from sonic_bullet.files.contact_log import ContactLog
+from sonic_bullet.records import errors
+from sonic_bullet.records.contacts import Contacts, Step
 sound = np.random.default_rng(0).normal(0, 0.1, (1, 200_000))
 step = Step(0.01, np.zeros((9999, 3)), np.zeros((9999, 4)), np.zeros(9999, bool), Contacts.none())
 log = object.__new__(ContactLog)

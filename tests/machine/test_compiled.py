@@ -17,7 +17,7 @@ from sonic_bullet.machine.user_folder import private_folder
 
 PACKAGE = Path(__file__).resolve().parents[2] / "sonic_bullet"
 KERNEL = """
-from sonic_bullet.compiled import njit
+from sonic_bullet.machine.compiled import njit
 
 @njit(nogil=True)
 def twice(x):

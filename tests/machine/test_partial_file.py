@@ -60,7 +60,8 @@ def test_a_disk_that_fills_up_never_ends_with_exit_0_and_a_bad_file() -> None:
 
 LIMITED = """
 import resource, sys, numpy as np
-from sonic_bullet import errors, files
+from sonic_bullet import files
+from sonic_bullet.records import errors
 sound = 0.3 * np.sin(np.arange(9600) * [[0.1], [0.2]])
 for name in sys.argv[1:]:
     files.write_audio(name, sound, 48000)

@@ -1,6 +1,6 @@
 """How far what is played is from what was recorded, over the noise that all recordings of a case share.
 
-D(recorded, played + noise), D of two noisy takes of what is played                       (estimator.distance)
+D(recorded, played + noise), D of two noisy takes of what is played                       (estimator.lines.log_spectral)
 
 comparable(takes, h) is the one door: what has no distance stays outside, by name and with its reason, and what is let in has one from any hypothesis, a plain float:
 

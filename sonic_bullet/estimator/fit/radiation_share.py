@@ -1,6 +1,6 @@
 """What an object's modes lose to the air, as the run time has it, so that a fit of the material leaves it out.
 
-    d_line = ½(α + βλ) + Δd        Δd: synth.radiation, in the air that the run time plays in, of the modes on the run time's own surface (render/sounder.py)
+    d_line = ½(α + βλ) + Δd        Δd: synth.far_field, in the air that the run time plays in, of the modes on the run time's own surface (render/resonator.py)
 
 The surface matters: what a mesh costs, about a decibel of pressure, is up to a third of Δd, and only the same mesh costs the same.
 Modes that count as one line: their mean, weighted by the squares of what the strikes let the sensor hear of each.
@@ -76,7 +76,7 @@ def _mean(value: Array, weight: Array) -> float:
 def into_air(
     family: Family, density_kg_m3: float, freq_hz: Array, vector: Array, surface: tuple[Array, Array] | None = None, air: Air | None = None
 ) -> tuple[Array, Array]:
-    """|w| (m,) in Pa·m per modal velocity and Δd (m,) in 1/s of modes (b, m) of the family, freq_hz (m,) ascending. Source: `synth.radiation`.
+    """|w| (m,) in Pa·m per modal velocity and Δd (m,) in 1/s of modes (b, m) of the family, freq_hz (m,) ascending. Source: `synth.far_field`.
 
     surface: vertex_m (v, 3) and face (f, 3) of another mesh of the body than the family's own.
     """

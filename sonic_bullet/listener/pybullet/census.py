@@ -13,7 +13,7 @@ import pybullet
 from sonic_bullet.listener.frames import NO_NUMBER, Motion, Roster, decode
 from sonic_bullet.listener.polling import Touches
 from sonic_bullet.listener.pybullet import body_facts as facts
-from sonic_bullet.listener.pybullet.left_out import NotSounding
+from sonic_bullet.listener.pybullet.left_out import BodiesLeftOut
 from sonic_bullet.listener.pybullet.poses import body_ids, check_connected, read_motion, read_roster
 from sonic_bullet.records import Body
 from sonic_bullet.records.errors import SceneError
@@ -34,7 +34,7 @@ class Census:
         self._client_id = client_id
         self._roster: Roster | None = None
         self._on_roster, self._on_mute = on_roster, on_mute
-        self.left_out = NotSounding()
+        self.left_out = BodiesLeftOut()
 
     def stale(self) -> None:
         """Read anew who is there, and who of them is static, before the next poses."""

@@ -117,14 +117,14 @@ class Hooks:
         below = self._below(client, name)
         of_body = name == "removeBody" or name in POSE_SETTERS
 
-        def announced(*args: Any, **kwargs: Any) -> Any:
+        def reporting(*args: Any, **kwargs: Any) -> Any:
             result = below(*args, **kwargs)
             body = body_argument(args, kwargs) if of_body else -1
             for one in self.listening[:]:
                 tell(one.world, body)
             return result
 
-        return announced
+        return reporting
 
 
 def install(world: Watcher, before: Callable[[], object], after: Callable[[], object]) -> Callable[[], None]:

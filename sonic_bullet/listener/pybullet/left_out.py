@@ -19,7 +19,7 @@ from sonic_bullet.records import Array
 from sonic_bullet.records.errors import SceneWarning
 
 
-class NotSounding:
+class BodiesLeftOut:
     """State of that for one world. notes: what was said, in order."""
 
     def __init__(self) -> None:

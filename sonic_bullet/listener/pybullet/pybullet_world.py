@@ -30,7 +30,7 @@ from sonic_bullet.listener.pybullet import body_facts as facts
 from sonic_bullet.listener.pybullet import collision_shapes as shapes
 from sonic_bullet.listener.pybullet import hooks
 from sonic_bullet.listener.pybullet.census import Census, ask
-from sonic_bullet.listener.pybullet.left_out import NotSounding
+from sonic_bullet.listener.pybullet.left_out import BodiesLeftOut
 from sonic_bullet.listener.pybullet.poses import check_connected
 from sonic_bullet.listener.pybullet.step_back import undone
 from sonic_bullet.listener.pybullet.substeps import SubstepLog, gather_substeps
@@ -77,7 +77,7 @@ class PyBulletWorld(World):
         return self._client()
 
     @property
-    def left_out(self) -> NotSounding:
+    def left_out(self) -> BodiesLeftOut:
         """Who of the world is left out, and what was said of it."""
         return self._census.left_out
 
