@@ -6,9 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sonic_bullet.records.arrays import Array, frozen_array
-from sonic_bullet.records.arrays import require as _require
-from sonic_bullet.records.arrays import store as _store
+from sonic_bullet.records.arrays import Array, frozen_array, require, store
 from sonic_bullet.records.coerce import as_number, as_whole
 
 
@@ -19,7 +17,7 @@ class Microphone:
     position_m: Array
 
     def __post_init__(self) -> None:
-        _store(self, position_m=frozen_array(self.position_m, float, (3,), "microphone: position_m"))
+        store(self, position_m=frozen_array(self.position_m, float, (3,), "microphone: position_m"))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -35,8 +33,8 @@ class Vibrometer:
         direction = frozen_array(self.direction, float, (3,), "vibrometer: direction")
         with np.errstate(over="ignore"):
             length = float(np.linalg.norm(direction))
-        _require(0 < length < np.inf, "vibrometer: direction is zero", "give the direction in which it looks")
-        _store(
+        require(0 < length < np.inf, "vibrometer: direction is zero", "give the direction in which it looks")
+        store(
             self,
             body_id=as_whole(self.body_id, "vibrometer: body_id", "give the body's id"),
             link=as_whole(self.link, "vibrometer: link", "give -1 (the base) or a link's number"),
@@ -52,7 +50,7 @@ class ModalSum:
     scale: float = 1.0
 
     def __post_init__(self) -> None:
-        _store(self, scale=as_number(self.scale, "modal sum: scale", "give a number"))
+        store(self, scale=as_number(self.scale, "modal sum: scale", "give a number"))
 
 
 Sensor = Microphone | Vibrometer | ModalSum
@@ -66,7 +64,7 @@ class Air:
     sound_speed_m_s: float = 343.0
 
     def __post_init__(self) -> None:
-        _store(
+        store(
             self,
             density_kg_m3=as_number(self.density_kg_m3, "air: density_kg_m3", "give kg/m³, above zero", above=0, below=1e4),
             sound_speed_m_s=as_number(self.sound_speed_m_s, "air: sound_speed_m_s", "give m/s, above zero", above=0, below=1e5),
