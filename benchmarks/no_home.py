@@ -117,7 +117,7 @@ def main() -> None:
     parser.add_argument("--json", action="store_true")
     asked = parser.parse_args()
     counts = {"good": 0, "bad": 0, "skipped": 0}
-    for direction in asked.directions.split(","):
+    for direction in asked.ways.split(","):
         with tempfile.TemporaryDirectory(prefix="no-home-") as place:
             work = prepared(Path(place))
             for name in asked.commands.split(","):

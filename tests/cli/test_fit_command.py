@@ -244,7 +244,7 @@ def test_channels_of_a_recording_alone(folder: Path, tmp_path: Path, capfd: pyte
 
 def test_a_residual_without_a_mesh_is_refused_at_once(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
     """Before a recording is opened, whatever the case holds."""
-    monkeypatch.setattr("sonic_bullet.estimator.fit.material_fit.observed.read_audio", lambda *_: pytest.fail("a recording was read"))
+    monkeypatch.setattr("sonic_bullet.estimator.fit.recorded.read_audio", lambda *_: pytest.fail("a recording was read"))
     case = json.loads((stereo(folder, tmp_path) / "case.json").read_text())
     lines = [{"object": "box", "features": [{"freq_hz": 1000.0, "decay_per_s": 3.0}]}]
     for change in ({"objects": {"box": {"material": "brass"}}}, {"objects": {}, "recordings": [{"file": "two.wav"}]}, {"recordings": lines}):
@@ -260,7 +260,7 @@ def test_a_mesh_that_is_not_there_is_said_at_once(
     folder: Path, tmp_path: Path, command: str, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     """Also where it is the last object's, or one that a diagnosis is only held against."""
-    monkeypatch.setattr("sonic_bullet.estimator.fit.material_fit.observed.read_audio", lambda *_: pytest.fail("a recording was read"))
+    monkeypatch.setattr("sonic_bullet.estimator.fit.recorded.read_audio", lambda *_: pytest.fail("a recording was read"))
     case = json.loads((stereo(folder, tmp_path) / "case.json").read_text())
     case["objects"]["other"] = {**case["objects"]["box"], "mesh": "none.obj"}
     split = "transfer" if command == "diagnose" else "fit"
