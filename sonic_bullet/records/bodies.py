@@ -216,7 +216,7 @@ class ModalModel:
             vertex_m=vertex,
             face=face,
             shape=frozen_array(self.shape, np.float32, (len(vertex), 3, m), "mode shape"),
-            damping_growth_power=as_number(self.damping_growth_power, "choke_power", "give 1 or 2"),
+            damping_growth_power=as_number(self.damping_growth_power, "damping_growth_power", "give 1 or 2"),
             volume_m3=as_number(self.volume_m3, "volume_m3", "orient the mesh outward", least=0),
             mass_kg=as_number(self.mass_kg, "mass_kg", "orient the mesh outward", least=0),
             dropped=as_whole(self.dropped, "dropped", "give the number of modes left out", least=0),
