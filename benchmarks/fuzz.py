@@ -5,7 +5,7 @@
 
 (seed, format, number) -> a file (fuzzing/) -> its reader and one step on, in a process of its own
     -> read, or refused by a SonicBulletError of at most 1 kB; anything else is a fault and its file is kept in DIR as FORMAT-NUMBER.SUFFIX
-A fault: another exception or a crash; more than 2 GB; more than 30 s; a text over 1 kB; a cache entry believed that is another.
+A fault: another exception or a crash; more than 2 GB; more than 30 s of processor time, or two minutes of waiting; a text over 1 kB; a cache entry believed that is another.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ KEPT_ALIKE = 2  # files kept of faults of one kind at one place
 
 
 class Overlong(BaseException):
-    """An input took longer than `SECONDS`."""
+    """An input took longer than `SECONDS` of processor time."""
 
 
 @dataclass
@@ -101,17 +101,17 @@ def _work(door: Door, seed: int, numbers: range, folder: Path, at: Any, answer: 
     limit = pages * resource.getpagesize() + MEMORY_BYTES
     resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    signal.signal(signal.SIGALRM, _overlong)
+    signal.signal(signal.SIGPROF, _overlong)
     own = Path(tempfile.mkdtemp(dir=folder))
     for number in numbers:
         at.value = number
         path = own / f"{door.name.replace(' ', '-')}-{number}{door.suffix}"
         path.write_bytes(mutated(door, seed, number))
-        signal.setitimer(signal.ITIMER_REAL, SECONDS)
-        start = time.perf_counter()
+        signal.setitimer(signal.ITIMER_PROF, SECONDS)
+        start = time.process_time()
         kind, text = enter(door, path)
-        signal.setitimer(signal.ITIMER_REAL, 0)
-        took = time.perf_counter() - start
+        signal.setitimer(signal.ITIMER_PROF, 0)
+        took = time.process_time() - start
         path.unlink(missing_ok=True)
         grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 > MEMORY_BYTES
         kind = "memory" if grown else kind
@@ -153,7 +153,7 @@ def run(
             process = context.Process(target=_work, args=(door, seed, numbers, folder, at, send))
             process.start()
             send.close()
-            running.append((process, receive, at, door, numbers, [-1.0, 0.0]))
+            running.append((process, receive, at, door, numbers, [-1.0, 0.0, 0.0]))
         if not running:
             break
         for entry in list(running):
@@ -166,7 +166,7 @@ def run(
                     process.kill()
                 process.join()
                 if stuck or process.exitcode:
-                    where = f"hung over {2 * SECONDS} s" if stuck else f"the process ended with {process.exitcode}"
+                    where = f"hung over {4 * SECONDS} s" if stuck else f"the process ended with {process.exitcode}"
                     told.append(Tally(1, faults=[("time" if stuck else "foreign", at.value, where)]))
                 if at.value + 1 < numbers.stop:
                     queue.insert(0, (door, range(at.value + 1, numbers.stop)))
@@ -188,11 +188,15 @@ def _told(receive: Any) -> tuple[list[Tally], bool]:
 
 
 def _stuck(entry: tuple[Any, Any, Any, Door, range, list[float]]) -> bool:
-    """Whether a process has been at one input for longer than its own alarm could let it: it sits in foreign code."""
+    """Whether a process has been at one input for far longer than its own alarm lets it: it sits in foreign code, or waits.
+
+    Counted in looks of a second at most: a machine that is put to sleep does not hang.
+    """
     at, since = entry[2].value, entry[5]
-    if since[0] != at:
-        since[:] = [at, time.monotonic()]
-    return time.monotonic() - since[1] > 2 * SECONDS
+    now = time.monotonic()
+    number, waited, last = since
+    since[:] = [at, waited + min(now - last, 1.0) if number == at else 0.0, now]
+    return since[1] > 4 * SECONDS
 
 
 def _keep(keep: Path | None, door: Door, seed: int, tally: Tally, known: Tally) -> None:

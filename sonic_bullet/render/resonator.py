@@ -114,9 +114,9 @@ def build_resonator(body: Body, sensors: tuple[Sensor, ...], sr: int, air: Air) 
 
 def _rigid(body: Body, sets: int, sr: int, air: Air) -> ModeSet | None:
     """The mode that each translation of a moving body is; its gain is the force along it, its weight Pa·m per N·s."""
-    if body.mass_kg <= 0 or body.volume_m3 <= 0 or body.material is None:
-        return None
     radius = (3 * body.volume_m3 / (4 * np.pi)) ** (1 / 3)
+    if body.mass_kg <= 0 or radius <= 0 or body.material is None:  # the least of volumes have a radius of none, too
+        return None
     rate = min(air.sound_speed_m_s / radius, FASTEST_RIGID * np.pi * sr)
     weight = np.zeros((sets, 1), complex)
     weight[0] = 2 * jerk_coefficient(body.volume_m3, air) * rate**2 / body.mass_kg

@@ -8,10 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sonic_bullet.records import Air
+from sonic_bullet.files.contact_log import ContactLog
+from sonic_bullet.records import Air, Microphone
 from sonic_bullet.render import radiated as room
 from sonic_bullet.synth import far_field as radiation
-from tests.made.models import STEEL, box_model
+from tests.made.models import STEEL, ball_body, box_model, step
 
 MODEL = box_model((0.2, 0.1, 0.01), (740.0, 1230.0, 2950.0), STEEL)
 
@@ -60,3 +61,12 @@ def test_a_broken_entry_is_computed_again(tmp_path: Path, harm: str) -> None:
     got = again(tmp_path)
     assert got[0].tobytes() == wanted[0].tobytes()
     assert entry.read_bytes() == whole  # mended
+
+
+def test_a_volume_too_small_for_a_radius_is_no_click() -> None:
+    """The least of floating-point volumes, as only a forged log has them."""
+    from sonic_bullet.render import render_log
+
+    body = replace(ball_body(0.02), volume_m3=5e-324)
+    log = ContactLog((body,), (step([[0, 0, 0]]),), (Microphone(np.array([0.0, -1.0, 0.5])),), 8000, 0)
+    assert not render_log(log).any()
