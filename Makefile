@@ -1,6 +1,7 @@
 # make demo    a virtual environment, then scenes/tabletop.py to out/: sound, contact log, picture
 # make test    a virtual environment with the tools, then style, types and tests
 # make bench   the benchmarks, each a question and its answer
+# make docs    the pages that are made of the code: API, commands, case.json and its schema, contact log
 # Python 3.11 is all that is needed: PyBullet has no wheel for a later one. PYTHON=/path/to/python3.11 names another.
 
 SHELL := /bin/bash
@@ -21,7 +22,7 @@ export NUMEXPR_NUM_THREADS := 1
 export PYTHONUNBUFFERED := 1
 export MPLBACKEND := Agg
 
-.PHONY: help demo test check bench clean
+.PHONY: help demo test check bench docs clean
 
 help:
 	@sed -n 's/^# \(make\)/\1/p' Makefile
@@ -40,6 +41,9 @@ check: .venv/dev.stamp
 
 bench: .venv/dev.stamp
 	@set -e; for file in benchmarks/*.py; do echo "== $$file"; $(BIN)/python $$file; done
+
+docs: .venv/dev.stamp
+	$(BIN)/python docs/make_reference.py
 
 clean:
 	rm -rf .venv out build

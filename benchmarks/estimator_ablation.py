@@ -17,10 +17,10 @@ from typing import Any
 import numpy as np
 from estimator_speed import problem  # type: ignore[import-not-found]
 
-from sonic_bullet.estimator.metric import Constants
-from sonic_bullet.estimator.optimise import fast, polish
-from sonic_bullet.estimator.problem import Problem, modes_of
-from sonic_bullet.estimator.values import Features
+from sonic_bullet.estimator.lines.line_values import Features
+from sonic_bullet.estimator.perceptual.metric import Constants
+from sonic_bullet.estimator.perceptual.optimise import fast, polish
+from sonic_bullet.estimator.perceptual.problem import Problem, modes_of
 from sonic_bullet.records import Array
 
 AWAY = np.array([1.1, 0.93, 1.01, 1.1])
@@ -55,10 +55,10 @@ def exact(asked: Problem, truth: Array) -> Problem:
     time = np.arange(int(1.2 * sr)) / sr
     parts = zip(freq_hz[there], decay[there], amplitude[there], strict=True)
     signal = np.asarray(sum(a * np.exp(-d * time) * np.sin(2 * np.pi * f * time) for f, d, a in parts))
-    heard = there & (np.abs(amplitude) > 1e-5 * np.abs(amplitude[there]).max())
-    none = np.full(int(heard.sum()), np.nan)
-    phase = np.where(amplitude[heard] < 0, np.pi, 0.0)
-    features = Features(freq_hz[heard], decay[heard], np.abs(amplitude[heard]), phase, none, none, none, 0.0, -240.0, sr)
+    observed = there & (np.abs(amplitude) > 1e-5 * np.abs(amplitude[there]).max())
+    none = np.full(int(observed.sum()), np.nan)
+    phase = np.where(amplitude[observed] < 0, np.pi, 0.0)
+    features = Features(freq_hz[observed], decay[observed], np.abs(amplitude[observed]), phase, none, none, none, 0.0, -240.0, sr)
     return dataclasses.replace(asked, features=features, signal=signal)
 
 

@@ -16,10 +16,10 @@ import time
 
 import numpy as np
 
-from sonic_bullet.estimator.metric import hybrid, target
-from sonic_bullet.estimator.optimise import fast, reference
-from sonic_bullet.estimator.problem import Problem, modes_of
-from sonic_bullet.estimator.values import Features
+from sonic_bullet.estimator.lines.line_values import Features
+from sonic_bullet.estimator.perceptual.metric import hybrid, target
+from sonic_bullet.estimator.perceptual.optimise import fast, reference
+from sonic_bullet.estimator.perceptual.problem import Problem, modes_of
 from sonic_bullet.modal import analyse
 from sonic_bullet.presets import load_material
 from sonic_bullet.records import Array, Material, Shape
@@ -62,13 +62,13 @@ def problem(name: str, seed: int = 0) -> tuple[Problem, Array]:
     # what an efficient estimator would hear: the modes above the noise, off by the Cramér-Rao bound
     spread = np.sqrt(8 * decay**3 / (SR * amplitude**2 / (2 * noise**2)))
     size_spread = np.abs(amplitude) * spread / decay
-    heard = amplitude**2 * SR / (4 * decay * noise**2) > 64
-    freq_sd, decay_sd, size_sd = spread[heard] / (2 * np.pi), spread[heard], size_spread[heard]
+    observed = amplitude**2 * SR / (4 * decay * noise**2) > 64
+    freq_sd, decay_sd, size_sd = spread[observed] / (2 * np.pi), spread[observed], size_spread[observed]
     features = Features(
-        freq_hz=freq_hz[heard] + freq_sd * rng.standard_normal(heard.sum()),
-        decay_per_s=np.abs(decay[heard] + decay_sd * rng.standard_normal(heard.sum())),
-        amplitude=np.abs(np.abs(amplitude[heard]) + size_sd * rng.standard_normal(heard.sum())),
-        phase_rad=np.where(amplitude[heard] < 0, np.pi, 0.0),
+        freq_hz=freq_hz[observed] + freq_sd * rng.standard_normal(observed.sum()),
+        decay_per_s=np.abs(decay[observed] + decay_sd * rng.standard_normal(observed.sum())),
+        amplitude=np.abs(np.abs(amplitude[observed]) + size_sd * rng.standard_normal(observed.sum())),
+        phase_rad=np.where(amplitude[observed] < 0, np.pi, 0.0),
         freq_sd_hz=freq_sd,
         decay_sd_per_s=decay_sd,
         amplitude_sd=size_sd,

@@ -15,11 +15,11 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from sonic_bullet.errors import AudioError
-from sonic_bullet.estimator import exact, likelihood, noise, subspace
-from sonic_bullet.estimator.features import BAND_HZ, FASTEST_PER_S, extract
-from sonic_bullet.estimator.greedy import greedy
+from sonic_bullet.estimator.lines import exact_modes, likelihood, noise_density, subspace
+from sonic_bullet.estimator.lines.extraction import BAND_HZ, FASTEST_PER_S, extract
+from sonic_bullet.estimator.perceptual.greedy import greedy
 from sonic_bullet.records import Array
+from sonic_bullet.records.errors import AudioError
 
 SR = 44_100
 
@@ -86,20 +86,22 @@ def steps() -> None:
             times.append(time.process_time() - start)
 
         begun = time.process_time()
-        density = np.maximum(noise.noise_density(x, tail=True), 1e-12)
+        density = np.maximum(noise_density.noise_density(x, tail=True), 1e-12)
         pole = subspace.poles(x, SR, density, (20, 21_600), BAND_HZ, FASTEST_PER_S)
         timed("poles by bands", pole, begun)
         if len(freq) == 100:
             begun = time.process_time()
-            raw = exact._poles(x[:1499], 500)
+            raw = exact_modes._poles(x[:1499], 500)
             assert raw is not None
             timed("poles by the rank of the whole", raw * SR, begun)
-            polished = exact.modes(x, SR)
+            polished = exact_modes.modes(x, SR)
             assert polished is not None
             timed("… polished jointly", polished.pole, begun)
         else:
             start = likelihood.amplitudes(x, pole, SR)
-            energy = likelihood.spreads(start, SR, len(x))[1] / noise.measured(likelihood.residual(x, start, SR), SR, 0.0).at(pole.imag / 2 / np.pi) ** 2
+            energy = (
+                likelihood.spreads(start, SR, len(x))[1] / noise_density.measured(likelihood.residual(x, start, SR), SR, 0.0).at(pole.imag / 2 / np.pi) ** 2
+            )
             kept = pole[energy > 26]
             timed("… the significant", kept, begun)
             band = (60.0, 2 * np.pi * 22_000)

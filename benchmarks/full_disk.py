@@ -48,11 +48,12 @@ def writers(folder: Path) -> dict[str, Callable[[Path], None]]:
 
     from sonic_bullet import presets
     from sonic_bullet.cli import main
-    from sonic_bullet.contacts import ContactLog, Contacts, Step
-    from sonic_bullet.errors import SonicBulletError
     from sonic_bullet.files import replacing, write_audio, write_log
-    from sonic_bullet.picture import render_picture
+    from sonic_bullet.files.contact_log import ContactLog
+    from sonic_bullet.plots.scene_plot import render_picture
     from sonic_bullet.records import Microphone
+    from sonic_bullet.records.contacts import Contacts, Step
+    from sonic_bullet.records.errors import SonicBulletError
 
     sound = np.random.default_rng(0).normal(0, 0.1, (2, FRAMES))
     ears = (Microphone(np.array([0.0, -1.0, 0.5])),)

@@ -1,8 +1,9 @@
 """Measured data on trial: each set fitted on one part and judged on another, baseline against baseline + effect, a null of as many numbers beside it.
 
-    python benchmarks/measured.py --data ../shared/measured [--out docs/measured.md] [SET ...]
+    python benchmarks/measured.py --data ../shared/measured [--out docs/measured/recordings-by-others.md] [SET ...]
 
-DATA/SET/case.json, dev/ -> measured_sets/ judge of that set, or plain.py's for a set of unknown kind, READINGS times (heard.py) -> OUT, and OUT without .md / SET.png
+DATA/SET/case.json, dev/ -> measured_sets/ judge of that set, or plain.py's for a set of unknown kind, READINGS times (observed.py)
+-> OUT, and pictures/SET.png beside it
 What is missing or cannot be read gives one line that names it, and the count of it is printed. Features are kept in SONIC_BULLET_MEASURED_CACHE.
 """
 
@@ -17,17 +18,17 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from benchmarks.measured_sets.heard import READINGS, reading
+from benchmarks.measured_sets.observed import READINGS, reading
 from benchmarks.measured_sets.page import Page, written
 from benchmarks.measured_sets.table import JUDGES, PLAIN
 from benchmarks.measured_sets.values import Judge, Row
-from sonic_bullet.side_by_side import one_thread, side_by_side
+from sonic_bullet.parallel import one_thread, parallel_map
 
 
 def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
     parser.add_argument("--data", type=Path, required=True)
-    parser.add_argument("--out", type=Path, default=Path("docs/measured.md"))
+    parser.add_argument("--out", type=Path, default=Path("docs/measured/recordings-by-others.md"))
     parser.add_argument("sets", nargs="*", metavar="SET", help="these alone; the page then holds them alone")
     asked = parser.parse_args(arguments)
     if not asked.data.is_dir():
@@ -64,7 +65,7 @@ def judged(folder: Path) -> Page | str:
         case = json.loads((folder / "case.json").read_text()) if (folder / "case.json").is_file() else {}
         case.setdefault("set", folder.name)
         judge = JUDGES.get(folder.name, PLAIN)
-        read = side_by_side(lambda number: _rows(judge, folder, case, number), range(READINGS))
+        read = parallel_map(lambda number: _rows(judge, folder, case, number), range(READINGS))
         with one_thread():
             found = judge(folder, case)  # its lines are kept by now
         return Page(folder.name, text, case, replace(found, rows=tuple(r.read_again(read[1:]) for r in found.rows)))

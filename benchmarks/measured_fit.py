@@ -29,9 +29,9 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.errors import SonicBulletError
-from sonic_bullet.estimator.fit import CaseFit, fit_case
+from sonic_bullet.estimator.fit.material_fit import CaseFit, fit_case
 from sonic_bullet.files.cases import read_case
+from sonic_bullet.records.errors import SonicBulletError
 
 BOX = [[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)]
 FACES = [[1, 2, 4], [1, 4, 3], [5, 7, 8], [5, 8, 6], [1, 5, 6], [1, 6, 2], [3, 4, 8], [3, 8, 7], [1, 3, 7], [1, 7, 5], [2, 6, 8], [2, 8, 4]]

@@ -37,9 +37,9 @@ def meshes(sample: int | None) -> list[tuple[str, float]]:
 
 def one(path: str, scale: float) -> None:
     """Child: analyse one mesh and print what came of it as JSON."""
-    from sonic_bullet.errors import SonicBulletError
     from sonic_bullet.modal import analyse, read_mesh
     from sonic_bullet.records import Material
+    from sonic_bullet.records.errors import SonicBulletError
 
     plastic = Material.isotropic("plastic", youngs_pa=2.4e9, poisson=0.37, density_kg_m3=1050.0, alpha_per_s=30.0, beta_s=1e-6)
     start = time.monotonic()

@@ -57,18 +57,18 @@ exec "$@"
 """
 
 
-def command(way: str, scratch: Path, words: list[str]) -> list[str] | None:
+def command(direction: str, scratch: Path, words: list[str]) -> list[str] | None:
     """``words`` run in that way, from ``scratch``, a folder of nobody's; None where this user cannot."""
-    home = {"user": ["HOME=/no/such/home"], "nameless": [], "read-only": [f"HOME={scratch / 'sealed'}"]}[way]
+    home = {"user": ["HOME=/no/such/home"], "nameless": [], "read-only": [f"HOME={scratch / 'sealed'}"]}[direction]
     plain = ["env", "-i", "PATH=/usr/bin:/bin", "OMP_NUM_THREADS=1", "OPENBLAS_NUM_THREADS=1", *home, *words]
-    if way in UIDS:
-        plain = ["setpriv", f"--reuid={UIDS[way]}", f"--regid={UIDS[way]}", "--clear-groups", *plain]
+    if direction in UIDS:
+        plain = ["setpriv", f"--reuid={UIDS[direction]}", f"--regid={UIDS[direction]}", "--clear-groups", *plain]
     if os.geteuid() != 0:
-        return plain if way == "read-only" else None
+        return plain if direction == "read-only" else None
     base = Path(sys.base_prefix)
     hidden = [place for place in reversed(base.parents) if not place.stat().st_mode & 0o001]
     inside = ["unshare", "-m", "sh", "-c", INSIDE, "sh", str(scratch / "interpreter"), str(hidden[0]) if hidden else "", str(base), str(REPO)]
-    if way == "read-only":  # root writes wherever it likes: to a home that is mounted read-only it does not
+    if direction == "read-only":  # root writes wherever it likes: to a home that is mounted read-only it does not
         seal = 'mount -t tmpfs -o ro,mode=755 none "$0" && exec "$@"'
         plain = ["sh", "-c", seal, str(scratch / "sealed"), *plain]
     return [*inside, *plain]
@@ -76,7 +76,7 @@ def command(way: str, scratch: Path, words: list[str]) -> list[str] | None:
 
 def prepared(scratch: Path) -> Path:
     """A folder that everybody may write to, with a scene, a mesh, and a case in it."""
-    sys.path.insert(0, str(REPO / "tests" / "estimator"))
+    sys.path.insert(0, str(REPO))
     from sonic_bullet.records import Material
 
     work = scratch / "work"
@@ -86,16 +86,16 @@ def prepared(scratch: Path) -> Path:
     (scratch / "sealed").chmod(0o555)
     (work / "scene.py").write_text(SCENE)
     material = Material.isotropic("planted", youngs_pa=7e10, poisson=0.33, density_kg_m3=2700, alpha_per_s=5.0, beta_s=1e-7)
-    importlib.import_module("made_case").make(work, material, guess=(6.5e10, 2700, 0.3), strikes=3, seconds=0.4)
+    importlib.import_module("tests.made.case").make(work, material, guess=(6.5e10, 2700, 0.3), strikes=3, seconds=0.4)
     for path in (work, *work.iterdir()):
         path.chmod(0o777)
     return work
 
 
-def good(way: str, name: str, scratch: Path, work: Path) -> tuple[bool | None, str]:
+def good(direction: str, name: str, scratch: Path, work: Path) -> tuple[bool | None, str]:
     """Whether a command runs in that way (None: it cannot be tried here), and what it said."""
     words, made = COMMANDS[name]
-    asked = command(way, scratch, [sys.executable, "-c", "from sonic_bullet.cli import main; main()", *words])
+    asked = command(direction, scratch, [sys.executable, "-c", "from sonic_bullet.cli import main; main()", *words])
     if asked is None:
         return None, "skipped"
     start = time.monotonic()
@@ -117,14 +117,14 @@ def main() -> None:
     parser.add_argument("--json", action="store_true")
     asked = parser.parse_args()
     counts = {"good": 0, "bad": 0, "skipped": 0}
-    for way in asked.ways.split(","):
+    for direction in asked.ways.split(","):
         with tempfile.TemporaryDirectory(prefix="no-home-") as place:
             work = prepared(Path(place))
             for name in asked.commands.split(","):
-                found, said = good(way, name, Path(place), work)
+                found, said = good(direction, name, Path(place), work)
                 counts["skipped" if found is None else "good" if found else "bad"] += 1
                 if not asked.json or found is False:
-                    print(f"{way:10} {name:10} {said}", file=sys.stderr if asked.json else sys.stdout, flush=True)
+                    print(f"{direction:10} {name:10} {said}", file=sys.stderr if asked.json else sys.stdout, flush=True)
     print(json.dumps(counts) if asked.json else ", ".join(f"{n} {what}" for what, n in counts.items()))
     sys.exit(counts["bad"] > 0)
 

@@ -27,10 +27,10 @@ from hypothesis import HealthCheck, given, seed, settings
 from hypothesis import strategies as st
 
 import sonic_bullet as sb
-from sonic_bullet.errors import SceneWarning, SonicBulletError
 from sonic_bullet.listener import direct_client, disconnect
 from sonic_bullet.listener.quiet import quiet_stdout
 from sonic_bullet.records import Array, Material, ModalModel
+from sonic_bullet.records.errors import SceneWarning, SonicBulletError
 
 STEEL = Material.isotropic("steel", youngs_pa=2e11, poisson=0.29, density_kg_m3=7850, alpha_per_s=4.0, beta_s=2e-9)
 WOOD = Material.isotropic("wood", youngs_pa=1.1e10, poisson=0.3, density_kg_m3=700, alpha_per_s=40.0, beta_s=2e-7)
@@ -52,8 +52,8 @@ def plate(material: Material, bent: bool) -> ModalModel:
     mass = volume * material.density_kg_m3
     shape = np.random.default_rng(0).normal(size=(8, 3, 3)) / np.sqrt(mass)
     decay = 0.5 * ((material.alpha_per_s or 0.0) + (material.beta_s or 0.0) * (2 * np.pi * freq) ** 2)
-    bend, choke = (np.full(3, 0.5), np.full(3, 1.0)) if bent else (None, None)
-    return ModalModel(freq, decay, shape, corner, face, np.zeros(len(face)), volume, mass, bend_s2_m2=bend, choke_s_m=choke)
+    bend, damping_growth = (np.full(3, 0.5), np.full(3, 1.0)) if bent else (None, None)
+    return ModalModel(freq, decay, shape, corner, face, np.zeros(len(face)), volume, mass, bend_s2_m2=bend, damping_growth_s_m=damping_growth)
 
 
 @dataclass
@@ -172,9 +172,9 @@ class Play:
         for ear in self.ears:
             ear.steady &= dt_s == self.dt_s
         for _ in range(1 + count + 4 * more):
-            heard = [ear.listener.time_s for ear in self.ears]
+            observed = [ear.listener.time_s for ear in self.ears]
             self.client.stepSimulation()
-            for ear, before_s in zip(self.ears, heard, strict=True):
+            for ear, before_s in zip(self.ears, observed, strict=True):
                 if ear.listener.time_s > before_s:
                     ear.frames.append(ear.listener.frame)
 

@@ -17,13 +17,13 @@ from sonic_bullet.residual.grains import SEEDS, faded, make_voice, placed, varie
 from sonic_bullet.residual.invert import ITERATIONS, OVERLAP, invert, magnitude_of, noise_phases
 from sonic_bullet.residual.player import SECTION, section_grain
 from sonic_bullet.residual.spectrogram import axes
-from sonic_bullet.residual.transfer import Modes, source_modes, source_power, transfer
+from sonic_bullet.residual.transfer import StruckModes, source_modes, source_power, transfer
 
 SR = 48_000
 SCRATCH_MS, CACHE_US = 5.0, 50.0
 
 
-def example(modes: int = 60, seed: int = 1) -> tuple[Residual, Modes]:
+def example(modes: int = 60, seed: int = 1) -> tuple[Residual, StruckModes]:
     """A residual of half a second over the whole band, and another body's modes."""
     random = np.random.default_rng(seed)
     freq, time_s = np.geomspace(20.0, 22_000.0, 50), np.linspace(0.0, 0.5, 60)
@@ -33,10 +33,10 @@ def example(modes: int = 60, seed: int = 1) -> tuple[Residual, Modes]:
     residual = Residual(
         hz, random.uniform(5.0, 60.0, modes), random.uniform(0.05, 1.0, modes), lines, np.full(20, 12.0), np.full(20, 0.05), freq, time_s, noise, 1.0
     )
-    return residual, Modes(np.sort(random.uniform(200.0, 16_000.0, modes)), random.uniform(5.0, 60.0, modes), random.uniform(0.05, 1.0, modes))
+    return residual, StruckModes(np.sort(random.uniform(200.0, 16_000.0, modes)), random.uniform(5.0, 60.0, modes), random.uniform(0.05, 1.0, modes))
 
 
-def once(residual: Residual, target: Modes, n: int = SR // 2) -> Array:
+def once(residual: Residual, target: StruckModes, n: int = SR // 2) -> Array:
     """The paper's algorithm 1 from end to end."""
     freq, time_s = axes(n, SR, overlap=OVERLAP)
     power = transfer(source_power(residual), source_modes(residual), target, freq, time_s)

@@ -3,7 +3,7 @@
 Practice cases: fit and residual from the 'fit' strikes, judged on 'holdout' strikes, at the amplitudes that the fitted model predicts.
 Measured objects with two recordings or more have no mesh: their features stand in for modes. Modes are the damped sinusoids that the first half of the strikes
 share, with the mean of their amplitudes; a strike of the second half is predicted by them at the strike's own level (one gain a strike, the same with and without
-the residual). Distance: `estimator.distance.log_spectral_db` (dB, cells 10 dB above the recording's noise), each prediction given that noise; with the residual, the mean over
+the residual). Distance: `estimator.lines.log_spectral.log_spectral_db` (dB, cells 10 dB above the recording's noise), each prediction given that noise; with the residual, the mean over
 three grains of its noise.
 """
 
@@ -18,16 +18,16 @@ from pathlib import Path
 
 import numpy as np
 
-from sonic_bullet.errors import SonicBulletError
-from sonic_bullet.estimator.distance import Floor, floor_of, log_spectral_db, noise_floor_db, with_noise
-from sonic_bullet.estimator.evidence import onset_sample
-from sonic_bullet.estimator.fit import CaseFit, fit_case
-from sonic_bullet.estimator.lines import joint_lines
-from sonic_bullet.estimator.predict import lines_sound
-from sonic_bullet.estimator.residual import Strikes, case_strikes, strike_modes, strikes_of
+from sonic_bullet.estimator.fit.material_fit import CaseFit, fit_case
+from sonic_bullet.estimator.fit.prediction_of_lines import lines_sound
+from sonic_bullet.estimator.fit.recorded import onset_sample
+from sonic_bullet.estimator.lines.joint_lines import joint_lines
+from sonic_bullet.estimator.lines.log_spectral import Floor, floor_of, log_spectral_db, noise_floor_db, with_noise
+from sonic_bullet.estimator.residual.recorded_strikes import Strikes, case_strikes, strike_modes, strikes_of
 from sonic_bullet.files import read_audio
 from sonic_bullet.files.cases import read_case
 from sonic_bullet.records import Array
+from sonic_bullet.records.errors import SonicBulletError
 from sonic_bullet.residual.compute import damped
 from sonic_bullet.residual.offline import residual_sound
 

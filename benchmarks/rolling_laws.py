@@ -18,7 +18,7 @@ import pybullet_utils.bullet_client as bc
 from scipy.signal import welch
 
 import sonic_bullet as sb
-from sonic_bullet.contacts import ContactLog
+from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.records import Array
 from sonic_bullet.render import render_log
 
@@ -61,7 +61,7 @@ def run(kind: str, speed_m_s: float, seconds: float, *, floor: str | None = "woo
     return listener.contacts
 
 
-def heard(log: ContactLog, roughness_m: float, seed: int = 0) -> Array:
+def observed(log: ContactLog, roughness_m: float, seed: int = 0) -> Array:
     """(n,) pressure in Pa after the start has died away; every sounding surface is that rough."""
     bodies = tuple(b if b.material is None else replace(b, material=replace(b.material, roughness_m=roughness_m)) for b in log.bodies)
     return np.asarray(render_log(replace(log, bodies=bodies, seed=seed))[0, round(SETTLED_S * log.sr) :])
@@ -94,7 +94,7 @@ def excess_db(pressure: Array, sr: int, upto_hz: float = 6000.0) -> Array:
 
 def table(kind: str, speeds: Array, roughness: Array, seconds: float, **options: float) -> Array:
     """(speeds, roughness) rms pressure in Pa."""
-    return np.array([[heard(log, h).std() for h in roughness] for log in (run(kind, v, seconds, count=60, **options) for v in speeds)])  # type: ignore[arg-type]
+    return np.array([[observed(log, h).std() for h in roughness] for log in (run(kind, v, seconds, count=60, **options) for v in speeds)])  # type: ignore[arg-type]
 
 
 if __name__ == "__main__":
@@ -107,8 +107,8 @@ if __name__ == "__main__":
         print(f"  m {np.round(m.exponent, 3)}, R² ≥ {m.least_r2:.4f};  n {np.round(n.exponent, 3)}, R² ≥ {n.least_r2:.4f}")
     for floor in (None, "wood"):
         log = run("ball", 0.15, 6.0, floor=floor, count=60)
-        loud = heard(log, 2e-6)
-        smooth = heard(log, 0.0)
+        loud = observed(log, 2e-6)
+        smooth = observed(log, 0.0)
         line = excess_db(loud, log.sr)
         above = 20 * np.log10(loud.std() / max(smooth.std(), 1e-300))
         print(f"step rate, floor {floor}: worst excess {line.max():+.2f} dB of {len(line)} multiples; {above:.0f} dB above the same scene with smooth surfaces")

@@ -22,18 +22,19 @@ from pathlib import Path
 import numpy as np
 
 from sonic_bullet import modal
-from sonic_bullet.contacts import ContactLog, Contacts, Step
-from sonic_bullet.errors import SonicBulletError
-from sonic_bullet.estimator.fit import fit_case
-from sonic_bullet.estimator.lines import joint_lines
-from sonic_bullet.estimator.preset import preset_of
-from sonic_bullet.estimator.values import Lines
+from sonic_bullet.estimator.fit.fitted_preset import preset_of
+from sonic_bullet.estimator.fit.material_fit import fit_case
+from sonic_bullet.estimator.lines.joint_lines import joint_lines
+from sonic_bullet.estimator.lines.line_values import Lines
 from sonic_bullet.files import write_audio
 from sonic_bullet.files.cases import Case, CaseObject, CaseRecording
+from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.presets import load_material, material_of
 from sonic_bullet.records import Air, Array, Body, Material, Microphone, ModalModel, Shape, Vibrometer
+from sonic_bullet.records.contacts import Contacts, Step
+from sonic_bullet.records.errors import SonicBulletError
 from sonic_bullet.render import render_log
-from sonic_bullet.render.sounder import build_sounder, touch_one, uplift
+from sonic_bullet.render.resonator import build_resonator, touch_one, uplift
 
 SR = 48_000
 STEP_S = 1 / 240
@@ -43,7 +44,7 @@ NOISE = 10 ** (-90 / 20)
 MICROPHONE_M = 0.5
 LIMIT_DECAY, LIMIT_THICK, LIMIT_DB = 0.03, 0.05, 0.5
 PUSH_S = 3e-3  # after the onset: while it is pushed, a body does not ring freely
-APART, TWINS = 3.0, 0.1  # widths d/π between modes: nearer ones ring as one line, whose decay is no mode's; but for twins, which decay alike
+APART, DEGENERATE = 3.0, 0.1  # widths d/π between modes: nearer ones ring as one line, whose decay is no mode's; but for twins, which decay alike
 NEAR = 0.3  # of a width: a line that is the mode
 KNOWN = 5e-3  # relative spread of a decay that is known
 ROOT = Path(__file__).parents[1]
@@ -80,15 +81,15 @@ def trials(data: Path | None, folder: Path) -> list[Trial]:
 
 def places(model: ModalModel) -> Places:
     """Where it is struck and where a vibrometer looks, (3,) each, with the outward normals there: two vertices far from each other, on faces that look alike."""
-    from sonic_bullet.effects.points import vertex_normals
+    from sonic_bullet.effects.common.points import vertex_normals
 
     normal = vertex_normals(model)
     flat = np.abs(np.einsum("fi,fci->fc", face_normals(model), normal[model.face])).min(axis=1) > 0.99  # edges and corners face nowhere
     inner = np.unique(model.face[flat])
     middle = model.vertex_m[inner].mean(axis=0)
-    way = np.linalg.svd(model.vertex_m[inner] - middle, full_matrices=False)[2]
-    along = (model.vertex_m[inner] - middle) @ (way[0] + 0.37 * way[1])
-    up = normal[inner] @ way[2] > 0.7
+    direction = np.linalg.svd(model.vertex_m[inner] - middle, full_matrices=False)[2]
+    along = (model.vertex_m[inner] - middle) @ (direction[0] + 0.37 * direction[1])
+    up = normal[inner] @ direction[2] > 0.7
     up = up if up.sum() > 8 else np.ones(len(inner), bool)
     order = np.flatnonzero(up)[np.argsort(along[up])]
     p, q = inner[order[round(0.97 * (len(order) - 1))]], inner[order[round(0.13 * (len(order) - 1))]]
@@ -122,7 +123,7 @@ def rendered(model: ModalModel, material: Material, sensor: str, at: Places) -> 
 
 def pushed(sound: Array) -> int:
     """The sample at which the push of a render is over: the same for every render of the same steps."""
-    from sonic_bullet.estimator.evidence import onset_sample
+    from sonic_bullet.estimator.fit.recorded import onset_sample
 
     return onset_sample(sound, SR) + round(PUSH_S * SR)
 
@@ -140,8 +141,8 @@ def fitted(trial: Trial, model: ModalModel, sound: Array, sensor: str, at: Place
     write_audio(str(folder / "strike.wav"), noisy[None] / np.abs(noisy).max() / 2, SR)
     strike = CaseRecording(folder / "strike.wav", None, "object", "fit", triple(place), triple(-out), IMPULSE_N_S)
     thing = CaseObject("object", trial.mesh, 1.0, trial.material)
-    at_m, way = ({"object": triple(look)}, {"object": triple(along)}) if sensor == "velocity" else (None, None)
-    case = Case(trial.name, folder, {"object": thing}, (strike,), sensor, at_m, way, medium="air")
+    at_m, direction = ({"object": triple(look)}, {"object": triple(along)}) if sensor == "velocity" else (None, None)
+    case = Case(trial.name, folder, {"object": thing}, (strike,), sensor, at_m, direction, medium="air")
     return material_of(preset_of(fit_case(case, check_mesh=False)))
 
 
@@ -160,7 +161,7 @@ def identified(lines: Lines, model: ModalModel, decay: Array) -> Array:
     found = np.full(len(freq), -1)
     known = np.flatnonzero(lines.decay_sd_per_s < KNOWN * lines.decay_per_s)
     step = np.diff(freq) / np.maximum(width[1:], width[:-1])
-    for who in np.split(np.arange(len(freq)), np.flatnonzero(step > TWINS) + 1) if len(known) else ():
+    for who in np.split(np.arange(len(freq)), np.flatnonzero(step > DEGENERATE) + 1) if len(known) else ():
         first, last = who[0], who[-1]
         apart = min(step[first - 1] if first else np.inf, step[last] if last < len(step) else np.inf)
         off = np.abs(lines.freq_hz[known] - freq[who].mean())
@@ -182,11 +183,11 @@ def compared(first: Lines, again: Lines, which: tuple[Array, Array]) -> tuple[in
 def played(model: ModalModel, material: Material, sensor: str = "pressure", at: Places | None = None) -> tuple[Array, Array]:
     """Decays (m,) that the run time plays, and what the strike starts each mode with at the sensor (m,)."""
     eye = (Vibrometer(0, at[2], at[3]),) if at is not None and sensor == "velocity" else ()
-    sounder = build_sounder(body_of(model, material), eye, 4 * SR, Air())
+    resonator = build_resonator(body_of(model, material), eye, 4 * SR, Air())
     if at is None:
-        return sounder.decay_per_s, np.ones(sounder.mode_count)
-    face, barycentric, _ = touch_one(sounder, at[0][None], at[1][None])
-    return sounder.decay_per_s, np.abs(uplift(sounder, face, barycentric, -at[1][None]) * sounder.weight[-1])
+        return resonator.decay_per_s, np.ones(resonator.mode_count)
+    face, barycentric, _ = touch_one(resonator, at[0][None], at[1][None])
+    return resonator.decay_per_s, np.abs(uplift(resonator, face, barycentric, -at[1][None]) * resonator.weight[-1])
 
 
 def off(a: Array, b: Array, to_hz: Array) -> float:

@@ -27,8 +27,8 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.contacts import ContactLog
-from sonic_bullet.picture import find_events
+from sonic_bullet.files.contact_log import ContactLog
+from sonic_bullet.plots.scene_plot import find_events
 from sonic_bullet.records import Array, Microphone
 from sonic_bullet.scene import RenderResult, render_scene
 

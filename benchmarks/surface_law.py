@@ -47,8 +47,8 @@ for name, (mass, modulus, radius, zeta) in CASES.items():
         out.append(force)
     force = np.concatenate(out, 1)
     line = f"{name:26s}"
-    for what, heard in (("force", force), ("sound", ring(force))):
-        level = np.log(heard[:, 4800:].std(1)).reshape(len(ROUGH), len(SPEED))
+    for what, observed in (("force", force), ("sound", ring(force))):
+        level = np.log(observed[:, 4800:].std(1)).reshape(len(ROUGH), len(SPEED))
         n = [np.polyfit(np.log(SPEED), row, 1)[0] for row in level]
         m = [np.polyfit(np.log(ROUGH), column, 1)[0] for column in level.T]
         fit = min([np.corrcoef(np.log(SPEED), row)[0, 1] ** 2 for row in level] + [np.corrcoef(np.log(ROUGH), c)[0, 1] ** 2 for c in level.T])

@@ -13,12 +13,13 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from sonic_bullet.contacts import ContactLog, Contacts, Step
-    from sonic_bullet.errors import SonicBulletError
     from sonic_bullet.files import read_audio, read_log, write_audio
+    from sonic_bullet.files.contact_log import ContactLog
     from sonic_bullet.listener import keep_restitution
     from sonic_bullet.presets import list_materials, load_material
     from sonic_bullet.records import Air, Material, Microphone, ModalModel, ModalSum, Shape, Vibrometer
+    from sonic_bullet.records.contacts import Contacts, Step
+    from sonic_bullet.records.errors import SonicBulletError
     from sonic_bullet.render import render_log
     from sonic_bullet.session import Listener, attach
 
@@ -26,16 +27,16 @@ __version__ = "0.1.0"
 
 _HOME = {
     "Air": "records",
-    "ContactLog": "contacts",
-    "Contacts": "contacts",
+    "ContactLog": "files",
+    "Contacts": "records.contacts",
     "Listener": "session",
     "Material": "records",
     "Microphone": "records",
     "ModalModel": "records",
     "ModalSum": "records",
     "Shape": "records",
-    "SonicBulletError": "errors",
-    "Step": "contacts",
+    "SonicBulletError": "records.errors",
+    "Step": "records.contacts",
     "Vibrometer": "records",
     "attach": "session",
     "keep_restitution": "listener",

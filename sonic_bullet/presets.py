@@ -5,8 +5,8 @@
 A file is UTF-8 JSON, format "sonic-bullet-preset/1": name, density_kg_m3, elasticity (youngs_pa and poisson, or stiffness_pa 6×6),
 damping, surface, impact, each group with the `source` of its numbers, an optional `note`, and how far they differ between objects of that
 material: `range`, `range_source`, `spread`. `provenance` says what a fitted preset was
-fitted from, and how sure it is; it changes no sound. `residual` is what the modes do not say (docs/residual.md), played with every contact. `effects` are what a
-diagnosis found to belong to material or object (sonic_bullet.effects.stored): they sound in every scene.
+fitted from, and how sure it is; it changes no sound. `residual` is what the modes do not say (docs/explanation/residual.md), played with every contact. `effects` are what a
+diagnosis found to belong to material or object (sonic_bullet.effects.presets_of_effects): they sound in every scene.
 
 Damping is Rayleigh's, d = ½(α + βλ) [Ren, Yeh, Lin 2013, eq. 6]: alpha_per_s and beta_s, or a loss factor η of the handbooks. η = 2d/ω
 independent of frequency is no Rayleigh damping; α and β are the pair that meets it at the two frequencies of `equal_at_hz`
@@ -21,21 +21,22 @@ from __future__ import annotations
 
 import math
 import os
+import warnings
 from contextlib import nullcontext
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import msgspec
 import numpy as np
 
-from sonic_bullet.coerce import as_path, nearest, shown
-from sonic_bullet.effects.stored import effect_of
-from sonic_bullet.effects.values import Effect
-from sonic_bullet.errors import MaterialError, RecordError
+from sonic_bullet.effects.presets_of_effects import effect_of
+from sonic_bullet.effects.protocol import Effect
 from sonic_bullet.files import replacing
 from sonic_bullet.files.reading import reading
 from sonic_bullet.records import Material
+from sonic_bullet.records.coerce import as_path, nearest, shown
+from sonic_bullet.records.errors import MaterialError, RecordError
 from sonic_bullet.residual.code import ResidualForm, residual_of
 
 FORMAT = "sonic-bullet-preset/1"
@@ -90,8 +91,8 @@ class Surface(_Part, frozen=True):
     hurst: Annotated[float, msgspec.Meta(gt=0, lt=1)]
 
 
-class Impact(_Part, frozen=True):
-    """restitution of an impact against a rigid wall."""
+class Restitution(_Part, frozen=True):
+    """restitution of an impact against a rigid wall: the file's group `impact`."""
 
     restitution: Fraction
 
@@ -120,11 +121,21 @@ class Preset(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     elasticity: Elasticity
     damping: Damping
     surface: Surface
-    impact: Impact
+    impact: Restitution
     note: str = ""
     effects: tuple[dict[str, Any], ...] = ()
     residual: ResidualForm | None = None
     provenance: Provenance | None = None
+
+
+if not TYPE_CHECKING:  # or a type checker would take any name for one of this module
+
+    def __getattr__(name: str) -> type:
+        """`Restitution` by the name that it had in earlier versions, with a DeprecationWarning."""
+        if name != "Impact":
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        warnings.warn("sonic_bullet.presets.Impact is now Restitution", DeprecationWarning, stacklevel=2)
+        return Restitution
 
 
 def load_material(name: str | os.PathLike[str]) -> Material:
@@ -135,7 +146,7 @@ def load_material(name: str | os.PathLike[str]) -> Material:
     text = as_path(name, "name", _REMEDY, error=MaterialError)
     filed = text.endswith(".json") or os.sep in text
     preset = named_preset(text)
-    with reading(text, "preset", MaterialError, "mend that field; docs/materials.md describes the file") if filed else nullcontext():
+    with reading(text, "preset", MaterialError, "mend that field; docs/reference/preset.md describes the file") if filed else nullcontext():
         return material_of(preset, text if filed else "")
 
 
@@ -164,7 +175,7 @@ def material_names() -> tuple[str, ...]:
 
 def read_preset(path: str | os.PathLike[str]) -> Preset:
     """The typed content of a preset file. Raises MaterialError naming file and field."""
-    with reading(path, "preset", MaterialError, "mend that field; docs/materials.md describes the file"):
+    with reading(path, "preset", MaterialError, "mend that field; docs/reference/preset.md describes the file"):
         try:
             with open(path, "rb") as file:
                 content = file.read(BYTES_MAX + 1)
@@ -175,7 +186,7 @@ def read_preset(path: str | os.PathLike[str]) -> Preset:
         try:
             preset = msgspec.json.decode(content, type=Preset)
         except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-            raise MaterialError(f"preset {path}: {error}", "mend that field; docs/materials.md describes the file") from error
+            raise MaterialError(f"preset {path}: {error}", "mend that field; docs/reference/preset.md describes the file") from error
         if preset.format != FORMAT:
             raise MaterialError(f"preset {path} has format '{preset.format}', wanted '{FORMAT}'", "use a sonic_bullet that knows that format")
         return preset

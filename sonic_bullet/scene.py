@@ -23,12 +23,12 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from sonic_bullet.coerce import as_call, as_flag, as_number, as_path, as_whole, shown
-from sonic_bullet.contacts import ContactLog
-from sonic_bullet.errors import SceneError, SceneWarning, SonicBulletError, interrupts
 from sonic_bullet.files import check_sr
+from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.listener import Finding, diagnose_world, direct_client, disconnect, links_with_shapes, run_script
 from sonic_bullet.records import Array, Material, Sensor
+from sonic_bullet.records.coerce import as_call, as_flag, as_number, as_path, as_whole, shown
+from sonic_bullet.records.errors import SceneError, SceneWarning, SonicBulletError, interrupts
 from sonic_bullet.render import render_log, silence_notes
 from sonic_bullet.session import Listener, MicrophoneLike, as_material, as_sensors, attach
 
@@ -63,7 +63,7 @@ def render_scene(
     """Run a scene for ``seconds`` of physics time and return its sound.
 
     seconds None: the scene's own SECONDS, or 4. microphones None: the scene's own, or (0, -1, 0.5). material: of the bodies of a
-    plain script. residual: whether what materials sound beside their modes is heard. progress is told the share done, say
+    plain script. residual: whether what materials sound beside their modes is sounded. progress is given the share done, say
     what is being computed before the first step (modes: seconds a body). Raises SonicBulletError; where the scene broke or was interrupted
     under way, the exception carries what was rendered so far as ``partial``.
     """
@@ -271,7 +271,7 @@ def _run_plain(stage: _Stage, seconds: float | None, progress: Progress | None, 
     def before(client: int) -> None:
         if stage.listener is None:
             stage.listener = attach(client, sr=stage.sr, microphone=places, seed=stage.seed)
-        for body, link in links_with_shapes(stage.listener.world):
+        for body, link in links_with_shapes(client):
             if (body, link) not in known:
                 known.add((body, link))
                 stage.listener.add(body, link, material=material, progress=say)

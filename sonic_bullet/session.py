@@ -9,7 +9,6 @@ A frame lags physics by `latency_steps`, because a strike spans steps and loads 
 from __future__ import annotations
 
 import inspect
-import numbers
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
@@ -20,15 +19,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sonic_bullet.coerce import as_call, as_items, as_kind, as_kinds, as_number, as_path, as_rows, as_whole, check_options
-from sonic_bullet.contacts import ContactLog, Event, Step
-from sonic_bullet.errors import AudioError, MaterialError, MeshError, ModalError, SceneError, SizeWarning
 from sonic_bullet.files import AudioReport, check_sr, write_audio
+from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.geometry import oversize
+from sonic_bullet.listener.world import World
+from sonic_bullet.machine.terminal import status
 from sonic_bullet.records import Air, Array, Material, Microphone, ModalModel, Sensor, Shape
+from sonic_bullet.records.coerce import as_call, as_items, as_kind, as_kinds, as_number, as_path, as_rows, as_whole, check_options
+from sonic_bullet.records.contacts import Event, Step
+from sonic_bullet.records.errors import AudioError, MaterialError, MeshError, ModalError, SceneError, SizeWarning
 from sonic_bullet.render import LATENCY_STEPS, Synthesizer
 from sonic_bullet.render.radiated import radiation_of
-from sonic_bullet.terminal import status
 
 if TYPE_CHECKING:
     from sonic_bullet.modal import ModalOptions
@@ -53,7 +54,7 @@ def as_sensors(microphone: MicrophoneLike, name: str = "microphone") -> tuple[Se
 
 def as_material(material: str | Path | Material) -> Material:
     """The material itself, or the preset of that name or path. Raises MaterialError where it has no damping: it would ring for ever."""
-    from sonic_bullet.effects.values import Effect
+    from sonic_bullet.effects.protocol import Effect
     from sonic_bullet.presets import load_material
 
     remedy = "give a name ('sonic-bullet materials' lists them), a preset file or a Material"
@@ -100,7 +101,7 @@ def attach(
     """Listen to a PyBullet world.
 
     client: a `BulletClient` (then `stepSimulation` is hooked and nothing else need be called), the `pybullet` module or a client id
-    (then call `listener.step()` after each `p.stepSimulation()`). sr: sample rate in Hz, 8000 … 384000. microphone: a point in the
+    (then call `listener.step()` after each `p.stepSimulation()`); or a `listener.World` of another simulator. sr: sample rate in Hz, 8000 … 384000. microphone: a point in the
     world in m, several points (one channel each), or sensors (`Microphone`, `Vibrometer`, `ModalSum`); none at all: contacts
     alone, no sound. seed: of the surfaces' roughness. air: the medium, 1.2 kg/m³ and 343 m/s by default. Raises SceneError for a client
     that is not connected, AudioError for a bad rate, RecordError for a microphone or a seed that is none.
@@ -108,8 +109,14 @@ def attach(
     return Listener(client, sr=sr, sensors=as_sensors(microphone), seed=seed, air=Air() if air is None else air)
 
 
+def _opened(client: Any) -> World:
+    from sonic_bullet.listener import open_world
+
+    return open_world(client)
+
+
 class Listener:
-    """A PyBullet world that sounds; made by `attach`.
+    """A simulated world that sounds; made by `attach`.
 
     frame: the sound of the latest step, float64 pascals, (channels, n); n sums to floor(sr·time) exactly. It lags physics by
     `latency_steps` steps. contacts: the log so far. Usable as a context manager: leaving it detaches.
@@ -118,20 +125,17 @@ class Listener:
     latency_steps = LATENCY_STEPS
 
     def __init__(self, client: Any, *, sr: int, sensors: tuple[Sensor, ...], seed: int, air: Air) -> None:
-        from sonic_bullet.listener import open_world
-
         self.sr, self.sensors = check_sr(sr), as_sensors(sensors, "sensors")
         self.seed = as_whole(seed, "seed", "give a whole number, 0 or more", least=0, most=2**63 - 1)
         self.air = as_kind(air, Air, "air", "give an Air(density_kg_m3=…, sound_speed_m_s=…), or leave it out")
-        self.world = open_world(client)
+        self.world = client if isinstance(client, World) else _opened(client)
         self._synth = Synthesizer(sr=self.sr, sensors=self.sensors, seed=self.seed, air=self.air)
         self._steps: list[Step] = []
         self._events: list[Event] = []
         self._unread: list[Array] = []
         self._attached = True
         self.frame: Array = np.zeros((len(self.sensors), 0))
-        if not isinstance(client, numbers.Integral) and not inspect.ismodule(client):
-            self.world.hook(self.world.before_step, self.step)
+        self.world.listen(self.step)
 
     def add(
         self,
@@ -153,14 +157,13 @@ class Listener:
         link: -1 is the base; a link's number or name; "all" every link with a collision shape, all of them or, where one fails, none. material: a preset's name, a preset file or a `Material`.
         mesh: a file (in metres) or shapes in the body frame, where the body's own collision shapes should not be used.
         model: modes computed before. roughness_m: rms height of its surface in place of the material's. fixed: clamped spheres
-        (x, y, z, radius) in m, body frame. thickness_m: wall of an open surface. to_hz, count: how many modes. progress: told now and then
+        (x, y, z, radius) in m, body frame. thickness_m: wall of an open surface. to_hz, count: how many modes. progress: called now and then with
         which link's modes are being computed, how far that is, and that it is their radiation next (seconds a link the first time, then
         the cache has both); without one, a terminal shows it.
         Warns (`errors.SizeWarning`) of a link larger than anything that is struck to sound. Raises SceneError (unknown body or link),
         MaterialError, MeshError, ModalError naming body and link, RecordError.
         """
-        from sonic_bullet.effects.stored import with_material
-        from sonic_bullet.listener import links_called
+        from sonic_bullet.effects.presets_of_effects import with_material
         from sonic_bullet.modal import ModalOptions
 
         made = as_material(material)
@@ -171,7 +174,7 @@ class Listener:
         if model is not None:
             as_kind(model, ModalModel, "model", "give a ModalModel, or leave it out", error=ModalError)
         as_call(progress, "progress")
-        body, links = links_called(self.world, body, link)
+        body, links = self.world.links_called(body, link)
         given = None if mesh is None else as_shapes(mesh)
         parts = []
         for one in links:
@@ -197,7 +200,7 @@ class Listener:
     ) -> list[ModalModel]:
         """The modal models of named links (name, shapes). What fails shall fail early: all are looked at first, and the most intricate is filled first."""
         from sonic_bullet import modal
-        from sonic_bullet.effects.stored import with_modes
+        from sonic_bullet.effects.presets_of_effects import with_modes
 
         triangles = [0] * len(parts)
         for i, (name, shapes) in enumerate(parts if len(parts) > 1 else ()):
@@ -250,7 +253,7 @@ class Listener:
     def quench(self) -> None:
         """Stop everything that rings, as a hand would, now: where the last step taken in ends. What strikes from the next step on sounds again.
 
-        What was struck before is silent from then on, strikes that are still to be heard included, and so is what travels to the
+        What was struck before is silent from then on, strikes that are still to sound included, and so is what travels to the
         microphones; what rolls or slides goes on. `sound` and files fall silent at that very sample, `frame` as much later as it lags.
         It is an event of the log, so that a replay stops there too, at any rate.
         """
@@ -265,11 +268,11 @@ class Listener:
     @property
     def notes(self) -> tuple[str, ...]:
         """What of the world is left out of the sound, and why; each was a `SceneWarning` when it happened."""
-        return tuple(self.world.left_out.notes)
+        return self.world.notes
 
     @property
     def time_s(self) -> float:
-        """Physics time heard so far."""
+        """Physics time so far."""
         return float(self._synth.time_s)
 
     def sound(self) -> Array:

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import os
-import sys
 from pathlib import Path
 
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
 from benchmarks import fuzz
 from benchmarks.fuzzing.doors import Door, doors
-from sonic_bullet.errors import SonicBulletError
-from sonic_bullet.side_by_side import one_thread
+from sonic_bullet.parallel import one_thread
+from sonic_bullet.records.errors import SonicBulletError
 
 INPUTS, LEAST = 1600, 800
 SECONDS = 20.0

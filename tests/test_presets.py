@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from sonic_bullet import presets
-from sonic_bullet.errors import MaterialError
+from sonic_bullet.records.errors import MaterialError
 
 TABLE_I = {
     "wood": (2.1364, 3.0828e-6),

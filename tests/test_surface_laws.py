@@ -27,7 +27,7 @@ def test_level_follows_speed_and_roughness_and_neither_law_hangs_on_the_other() 
     for i in range(5):
         for j in range(5):
             if {i, j} & {0, 4}:  # all speeds at the extreme roughnesses, all roughnesses at the extreme speeds
-                rms[i, j] = BENCH["heard"](logs[i], ROUGHNESS[j]).std()
+                rms[i, j] = BENCH["observed"](logs[i], ROUGHNESS[j]).std()
     speed, rough = BENCH["law"](SPEEDS, rms.T[[0, 4]]), BENCH["law"](ROUGHNESS, rms[[0, 4]])
     for law, (low, high) in ((speed, N), (rough, M)):
         assert law.least_r2 > 0.9
@@ -37,7 +37,7 @@ def test_level_follows_speed_and_roughness_and_neither_law_hangs_on_the_other() 
 
 def test_a_rolling_ball_has_no_line_at_the_step_rate() -> None:
     log = BENCH["run"]("ball", 0.15, 4.0, floor=None)  # the floor's modes would be lines of their own: what the steel ball radiates is smooth
-    rough = BENCH["heard"](log, 2e-6)
-    own_noise = BENCH["heard"](log, 0.0)
+    rough = BENCH["observed"](log, 2e-6)
+    own_noise = BENCH["observed"](log, 0.0)
     assert rough.std() > 100 * own_noise.std()  # 40 dB
     assert BENCH["excess_db"](rough, log.sr).max() <= 3.0

@@ -21,11 +21,12 @@ import numpy as np
 from benchmarks.fuzzing import containers, meshes, sounds
 from benchmarks.fuzzing.mutations import json_changed
 from sonic_bullet import files, presets
-from sonic_bullet.contacts import ContactLog, Contacts, Event, Step
-from sonic_bullet.effects.stored import with_material, with_modes
+from sonic_bullet.effects.presets_of_effects import with_material, with_modes
 from sonic_bullet.files.cases import read_case
+from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.geometry import is_closed, volume_m3
 from sonic_bullet.records import Air, Body, Material, Microphone, ModalModel, ModalSum, Residual, Vibrometer
+from sonic_bullet.records.contacts import Contacts, Event, Step
 from sonic_bullet.render import radiated, render_log
 
 SR = 8000
@@ -52,7 +53,9 @@ def box_model(modes: int = 3) -> ModalModel:
     face = np.array([t for q in quads for t in ((q[0], q[1], q[2]), (q[0], q[2], q[3]))])
     freq = np.array([900.0, 2100.0, 3900.0])[:modes]
     shape = np.random.default_rng(0).normal(size=(8, 3, modes))
-    return ModalModel(freq, 5 + 1e-6 * freq**2, shape, corner, face, np.zeros(12), 4e-4, 3.14, bend_s2_m2=np.full(modes, 1e-3), choke_s_m=np.zeros(modes))
+    return ModalModel(
+        freq, 5 + 1e-6 * freq**2, shape, corner, face, np.zeros(12), 4e-4, 3.14, bend_s2_m2=np.full(modes, 1e-3), damping_growth_s_m=np.zeros(modes)
+    )
 
 
 def small_log(model: ModalModel, material: Material = STEEL, *, microphone: bool = True) -> ContactLog:
@@ -141,7 +144,7 @@ def _enter_case(path: Path) -> None:
 
 
 def _enter_audio(path: Path) -> None:
-    from sonic_bullet.estimator.features import extract
+    from sonic_bullet.estimator.lines.extraction import extract
 
     sound, sr = files.read_audio(path)
     if sum(path.stem.encode()) & 3 == 0:  # a fit takes a hundred times as long as a read: a quarter of them
@@ -149,7 +152,7 @@ def _enter_audio(path: Path) -> None:
 
 
 def _enter_mesh(path: Path) -> None:
-    from sonic_bullet.listener.mesh_files import joined, read_surfaces
+    from sonic_bullet.listener.pybullet.urdf_meshes import joined, read_surfaces
     from sonic_bullet.modal import read_mesh
 
     try:

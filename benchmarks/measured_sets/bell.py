@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.measured_sets.heard import cut, lines
+from benchmarks.measured_sets.observed import cut, lines
 from benchmarks.measured_sets.values import Array, Outcome, Row, clear
 
 FITTED_S, HELD_S = 1.2, 2.4

@@ -15,7 +15,7 @@ import numpy as np
 
 from benchmarks.measured_sets.values import DRAWS, Array, Outcome, Row
 from sonic_bullet.diagnosis.diagnose import Diagnosis, diagnose
-from sonic_bullet.diagnosis.listed import CAP, off_by
+from sonic_bullet.diagnosis.prediction.line_score import CAP, off_by
 
 GUESS = {"youngs_modulus": 1.7e11, "poisson_ratio": 0.25}  # of any hard solid: E/ρ is sought over a factor of two to each side
 

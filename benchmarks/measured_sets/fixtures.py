@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.measured_sets.heard import lines
+from benchmarks.measured_sets.observed import lines
 from benchmarks.measured_sets.values import DRAWS, Array, Lines, Outcome, Row, clear
 
 PARTNER = "diffimpact-hammer"

@@ -16,10 +16,10 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.measured_sets.heard import cut, features, jittered, lines
+from benchmarks.measured_sets.observed import cut, features, jittered, lines
 from benchmarks.measured_sets.values import DRAWS, Array, Lines, Outcome, Row, clear
+from sonic_bullet.effects.common.pulses import magnitude
 from sonic_bullet.effects.contact_time import ContactTime
-from sonic_bullet.effects.pulses import magnitude
 
 HALF_SINE = 1 / (1 - 2 * np.arcsin(0.1) / np.pi)
 AFTER_S = 0.0015
@@ -88,7 +88,7 @@ def judge(folder: Path, case: dict[str, Any]) -> Outcome:
         )
     left = (
         "places of the hits are not given and vary, so a line's level per impulse moves by several dB from hit to hit, before and after alike; "
-        "with two to five hits an exponent of −1/5 is not told from 0"
+        "with two to five hits an exponent of −1/5 cannot be distinguished from 0"
     )
     return Outcome(tuple(rows), " ".join(texts), left, lambda figure: paint(figure, objects), tuple(skipped))
 

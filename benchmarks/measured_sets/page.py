@@ -3,26 +3,32 @@
 from __future__ import annotations
 
 import re
+import textwrap
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from benchmarks.measured_sets.heard import JITTER, READINGS
+from benchmarks.measured_sets.observed import JITTER, READINGS
 from benchmarks.measured_sets.values import CHANCE, DRAWS, EARNS, Outcome, Row
 
+MOST_WORDS, COLUMNS = 40, 150
+BAR = "\\|"  # inside a table's cell
 HEAD = f"""# Measured data: fitted on one part, judged on another
 
-Written by `python benchmarks/measured.py --data ../shared/measured`. Recordings and resonances by others, read where they lie; numbers and drawings here, no copy.
-Each set's source and licence stand under it.
+Written by `python benchmarks/measured.py --data ../shared/measured`. Recordings and resonances by others, read where they lie.
+Numbers and drawings stand here, no copy. Each set's source and licence stand under it.
 
-**Before** is the baseline, **after** the baseline with one effect of `sonic_bullet.effects`, each fitted on the one part and judged on the other, which it never saw.
-**Null** is the median error of {DRAWS} effects of as many numbers that mean nothing (each set says which); **chance** the share of them that do at least as well as the effect.
-An effect is *named* where it takes the error on the held-out part below {EARNS:.0%} of the baseline's and at most {CHANCE:.0%} of the null's draws do so; else the set's verdict
-is *unexplained*, and what is left is said. Errors of decays are in dB of d (20 lg d'/d: 6 dB are a factor of two), medians over the lines held out.
+**Before** is the baseline, **after** the baseline with one effect of `sonic_bullet.effects`.
+Each is fitted on the one part and judged on the other, which it never saw.
+**Null** is the median error of {DRAWS} effects of as many numbers that mean nothing (each set says which).
+**Chance** is the share of them that do at least as well as the effect.
+An effect is *named* where it takes the error on the held-out part below {EARNS:.0%} of the baseline's, and at most {CHANCE:.0%} of the null's draws do so.
+Else the set's verdict is *unexplained*, and what is left is said.
+Errors of decays are in dB of d (20 lg d'/d: 6 dB are a factor of two), medians over the lines held out.
 
-Every set is read {READINGS} times: as it was recorded, and with every sample off by {JITTER:g} of itself, which is far below the last bit. A rattling tap is no sum of a few
-decays, and a search for them may end elsewhere for as little (or on another processor): an effect is *named* only where it is in all readings. The range of *after*
-over them stands in brackets where they differ.
+Every set is read {READINGS} times: as it was recorded, and with every sample off by {JITTER:g} of itself, which is far below the last bit.
+A rattling tap is no sum of a few decays, and a search for them may end elsewhere for as little (or on another processor).
+So an effect is *named* only where it is in all readings. The range of *after* over them stands in brackets where they differ.
 """
 
 
@@ -37,8 +43,8 @@ class Page:
 
     @property
     def credit(self) -> str:
-        source = _after(self.readme, "Source") or str(self.case.get("source", "not told"))
-        licence = _after(self.readme, "Licence") or str(self.case.get("licence", "not told"))
+        source = _after(self.readme, "Source") or str(self.case.get("source", "not stated"))
+        licence = _after(self.readme, "Licence") or str(self.case.get("licence", "not stated"))
         return f"Source: {source.strip().rstrip('.')}. Licence: {licence.strip().rstrip('.')}."
 
 
@@ -53,8 +59,8 @@ def verdict(rows: tuple[Row, ...]) -> str:
 
 
 def written(out: Path, pages: list[Page], skipped: list[str]) -> None:
-    """The page at ``out``, figures in the folder beside it that is called as it is."""
-    place = out.with_suffix("")
+    """The page at ``out``, figures in the folder `pictures` beside it."""
+    place = out.parent / "pictures"
     place.mkdir(parents=True, exist_ok=True)
     parts = [HEAD, summary(pages)]
     for page in pages:
@@ -73,7 +79,7 @@ def summary(pages: list[Page]) -> str:
 def section(page: Page, figure: str) -> str:
     head = "| held out | items | unit | before | after | null | chance | effect |\n|---|---|---|---|---|---|---|---|"
     rows = [
-        f"| {r.what} | {r.count} | {r.unit} | {r.before:.3g} | {_after_all(r)} | {r.null:.3g} | {r.chance:.0%} | {r.effect or 'none proposed'}{_said(r)} |"
+        f"| {r.what} | {r.count} | {r.unit.replace('|', BAR)} | {r.before:.3g} | {_after_all(r)} | {r.null:.3g} | {r.chance:.0%} | {r.effect or 'none proposed'}{_said(r)} |"
         for r in page.found.rows
     ]
     what = str(page.case.get("type") or page.case.get("object") or "")
@@ -81,19 +87,27 @@ def section(page: Page, figure: str) -> str:
         [
             f"## {page.name}",
             "",
-            f"{what[:1].upper()}{what[1:]}. {page.credit}",
+            prose(f"{what[:1].upper()}{what[1:]}. {page.credit}" if what else page.credit),
             "",
             f"![{page.name}]({figure})",
             "",
             head,
             *rows,
             "",
-            page.found.text,
+            prose(page.found.text),
             "",
-            f"Verdict: {verdict(page.found.rows)}. Left: {page.found.unexplained}.",
+            prose(f"Verdict: {verdict(page.found.rows)}. Left: {page.found.unexplained}."),
             "",
         ]
     )
+
+
+def prose(text: str) -> str:
+    """A paragraph in lines of at most COLUMNS; a sentence of more than MOST_WORDS ends at its semicolons."""
+    sentences = re.split(r"(?<=[.!?])\s+(?=[^\sa-z])", text)
+    parts = [part for s in sentences for part in (s.split("; ") if len(s.split()) > MOST_WORDS else [s])]
+    short = [part if part.endswith((".", "!", "?")) else part + "." for part in parts]
+    return "\n".join(textwrap.wrap(" ".join(part[:1].upper() + part[1:] for part in short), COLUMNS, break_long_words=False, break_on_hyphens=False))
 
 
 def _after_all(r: Row) -> str:

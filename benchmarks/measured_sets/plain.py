@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.measured_sets.heard import lines
 from benchmarks.measured_sets.laws import draw, joined, trial
+from benchmarks.measured_sets.observed import lines
 from benchmarks.measured_sets.values import Lines, Outcome, clear
 
 MOST_FILES = 6

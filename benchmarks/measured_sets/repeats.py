@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.measured_sets.heard import lines
+from benchmarks.measured_sets.observed import lines
 from benchmarks.measured_sets.values import DRAWS, Array, Lines, Outcome, Row, clear
 
 TAPS = 16  # of a recording
@@ -56,7 +56,7 @@ def judge(folder: Path, case: dict[str, Any]) -> Outcome:
     spread, repeats = float(np.ptp(share)), float(np.median(1e6 * apart / first))
     alike = f"lines move by amounts that differ by {spread:.0f} ppm among themselves"
     why = "more than one stiffness, or another hanging" if spread > 2 * repeats else f"no more than they repeat from tap to tap ({repeats:.0f} ppm)"
-    left = f"{alike}: {why}; dimensions and mass are not given, E is not told"
+    left = f"{alike}: {why}; dimensions and mass are not given, E is not known"
     return Outcome(tuple(rows), text, left, lambda figure: paint(figure, freq, late, dates), tuple(skipped))
 
 

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.measured_sets.heard import lines
 from benchmarks.measured_sets.laws import Trial, draw, trial
+from benchmarks.measured_sets.observed import lines
 from benchmarks.measured_sets.values import Lines, Outcome, Row, clear
 
 BAND = {
@@ -57,7 +57,7 @@ def over_sizes(bodies: dict[str, Lines], skipped: list[str], label: str = "") ->
     return Outcome(
         tuple(rows),
         text,
-        f"a line of the size left out is wrong by {left:.1f} dB (a factor {10 ** (left / 20):.1f}) at the median at best, with a law or without: decays differ line by line "
+        f"a line of the size left out is wrong by {left:.1f} dB (a factor {10 ** (left / 20):.1f}) at the median at best, with a law or without. Decays differ line by line "
         "(hanging, radiation, tubes, close pairs), which frequency alone does not tell",
         lambda figure: draw(figure.subplots(), [one[0]], one[1], one[2], one[0].row.what),
         tuple(skipped),

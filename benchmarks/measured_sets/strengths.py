@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.measured_sets.heard import lines
+from benchmarks.measured_sets.observed import lines
 from benchmarks.measured_sets.values import DRAWS, Array, Lines, Outcome, Row, clear
+from sonic_bullet.effects.common.pulses import magnitude
 from sonic_bullet.effects.contact_time import ContactTime
-from sonic_bullet.effects.pulses import magnitude
 
 LATE_S = {"agogo-forzee": 0.0015, "ride-bja": 0.003}
 PART = {"agogo-forzee": (1.2, (500.0, 14000.0)), "ride-bja": (1.0, (300.0, 5000.0))}
@@ -61,7 +61,7 @@ def judge(folder: Path, case: dict[str, Any]) -> Outcome:
         tables.append(table)
     if not tables:
         raise ValueError("; ".join(skipped) or "no stroke has two strengths")
-    left = "decays and levels line by line differ between strikes by more than any law of level tells: where and with what was struck is not told"
+    left = "decays and levels line by line differ between strikes by more than any law of level explains: where and with what was struck is not given"
     return Outcome(tuple(rows), " ".join(texts), left, lambda figure: paint(figure, tables[0]), tuple(skipped))
 
 

@@ -50,7 +50,7 @@ def materials(folder: Path, case: dict[str, Any]) -> Outcome:
     if pictured is None:
         raise ValueError("no material with four lines")
     text = f"{len(tables)} distinct tables, the {MOST_LINES} strongest lines of each, T60 over {LONGEST_S:.0f} s left out. A size class of a material is predicted from its others."
-    left = "T60 against frequency scatters within a class by as much as between laws; which recording stands behind a table is not told, so a law here is a range, not a material's"
+    left = "T60 against frequency scatters within a class by as much as between laws; which recording stands behind a table is not known, so a law here is a range, not a material's"
     kind, one = pictured
     return Outcome(tuple(rows), text, left, lambda figure: draw(figure.subplots(), [one[0]], one[1], one[2], kind), tuple(skipped))
 
@@ -103,9 +103,9 @@ def _plate(modes: list[dict[str, Any]]) -> Lines:
     return told(f, 2 * np.pi * f * zeta, 0.1 * 2 * np.pi * f * zeta)
 
 
-def clamp(heard: Array, rigid: Array) -> Row:
+def clamp(observed: Array, rigid: Array) -> Row:
     """Odd modes fitted, even ones predicted: all lowered by one factor."""
-    y, fit = np.log(heard / rigid), np.arange(len(heard)) % 2 == 0
+    y, fit = np.log(observed / rigid), np.arange(len(observed)) % 2 == 0
     factor, held = float(np.median(y[fit])), y[~fit]
     rng = np.random.default_rng(0)
     nulls = np.array([np.median(np.abs(100 * (held - f))) for f in rng.choice([-1, 1], DRAWS) * abs(factor)])

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.effects import Evidence, Heard
-from sonic_bullet.estimator.values import Features
+from sonic_bullet.effects import Evidence, ObjectEvidence
+from sonic_bullet.estimator.lines.line_values import Features
 
 Array = np.ndarray[Any, Any]
 DRAWS = 200
@@ -23,7 +23,7 @@ CHANCE = 0.05  # of the null's draws, at most, may do as well
 class Row:
     """One number predicted for the held-out part (count items) by baseline and by baseline + effect, in unit; null: median error of the null, chance: its share as good.
 
-    effect: what was added, "" where nothing was proposed (after = before). again: the same of every other reading (heard.py), None where one came to nothing of the kind.
+    effect: what was added, "" where nothing was proposed (after = before). again: the same of every other reading (observed.py), None where one came to nothing of the kind.
     """
 
     what: str
@@ -109,11 +109,11 @@ def told(freq_hz: Array, decay_per_s: Array, decay_sd_per_s: Array | None = None
     return Lines(f[order], d[order], sd[order], size[order], np.full(len(f), 1e-4) * f[order])
 
 
-def heard(lines: Lines) -> Heard:
+def observed(lines: Lines) -> ObjectEvidence:
     """One body's lines as an effect is told them; without shape or sound."""
     k, none, flat = len(lines.freq_hz), np.zeros(0), np.zeros((1, 0))
     size = lines.amplitude[None, :].astype(complex)
-    return Heard(
+    return ObjectEvidence(
         impulse_n_s=np.ones(1),
         freq_hz=lines.freq_hz,
         decay_per_s=lines.decay_per_s,
@@ -132,9 +132,9 @@ def heard(lines: Lines) -> Heard:
         foreign_sd=flat,
         model=None,
         strike_vertex=np.zeros(1, int),
-        strike_way=np.array([[0.0, 0.0, 1.0]]),
+        strike_direction=np.array([[0.0, 0.0, 1.0]]),
         sensor_vertex=0,
-        sensor_way=np.array([0.0, 0.0, 1.0]),
+        sensor_direction=np.array([0.0, 0.0, 1.0]),
         signal=None,
         predicted=None,
         noise=np.zeros(1),
@@ -150,4 +150,4 @@ def heard(lines: Lines) -> Heard:
 def evidence(bodies: list[Lines]) -> Evidence:
     """Several bodies' lines, all that is known of them."""
     top = max(float(b.freq_hz.max(initial=1.0)) for b in bodies)
-    return Evidence(tuple(heard(b) for b in bodies), ALPHA, BETA, 1.0, (), (20.0, top), 0)
+    return Evidence(tuple(observed(b) for b in bodies), ALPHA, BETA, 1.0, (), (20.0, top), 0)

@@ -3,6 +3,7 @@
     render SCENE.py | LOG.npz -> RenderResult -> WAV, contact log, picture, JSON
     modes MESH                -> ModalModel   -> table, JSON, npz
     materials, doctor SCENE   -> table, JSON
+    case FOLDER               -> case.json, and whether it can be read
 
 Exit 0: done. 2: one line on stderr says what is wrong and how to mend it, and no file stands under its final name half-written.
 130 (Ctrl-C), 143 (terminated): what was rendered so far is closed as a valid file and named. With --json and no path only JSON goes to
@@ -19,59 +20,20 @@ from typing import Any
 
 import click
 
-from sonic_bullet.errors import SonicBulletError, interrupts
+from sonic_bullet.cli.examples import (
+    CASE_EPILOG,
+    DIAGNOSE_EPILOG,
+    FEATURES_EPILOG,
+    FIT_EPILOG,
+    GROUP_EPILOG,
+    MODES_EPILOG,
+    RENDER_EPILOG,
+    RESIDUAL_EPILOG,
+)
+from sonic_bullet.records.errors import SonicBulletError, interrupts
 
 DEFAULT_SR = 48_000
 DEFAULT_MODES_MATERIAL = "steel"
-
-RENDER_EPILOG = """\b
-Examples:
-  sonic-bullet render scenes/tabletop.py -o tabletop.wav --picture tabletop.png
-  sonic-bullet render my_sim.py -o out.flac --material wood --peak-dbfs -1
-  sonic-bullet render scenes/drop.py -o out.wav --contacts drop.npz --json
-  sonic-bullet render drop.npz -o again.wav      (the same bits, without PyBullet)
-  sonic-bullet render drop.npz -o stereo.wav --microphone 0,-1,0.5 --microphone 0,1,0.5"""
-
-MODES_EPILOG = """\b
-Examples:
-  sonic-bullet modes mug.obj --material porcelain --scale 0.001
-  sonic-bullet modes bar.stl --young 2.1e11 --poisson 0.3 --density 7850 --count 10
-  sonic-bullet modes tray.obj --material metal --thickness 0.002 --to-hz 5000 --json tray.json -o tray.npz
-  sonic-bullet modes fork.obj --material steel --fix 0,0,-0.1,0.01"""
-
-FIT_EPILOG = """\b
-Examples:
-  sonic-bullet fit tap.wav --mesh bar.obj --strike 0.05,0,0.003 --material steel -o bar.json --picture bar.png
-  sonic-bullet fit tap.wav --mesh mug.obj --scale 0.001 --strike 0,0.04,0 --sensor sum --material porcelain -o mug.json --json
-  sonic-bullet fit my_case/ -o preset.json       (several strikes, sizes, sensors: a folder with a case.json)
-The preset plays at once: listener.add(body, material="preset.json")."""
-
-RESIDUAL_EPILOG = """\b
-Examples:
-  sonic-bullet residual my_case/ -o preset.json --picture preset.png
-  sonic-bullet residual tap.wav --mesh bar.obj --strike 0.05,0,0.003 --material steel -o bar.json
-  sonic-bullet residual tap.wav --material wood -o wood.json     (no shape known: the recording's features stand in for modes)
-Hear a scene without: sonic-bullet render scene.py -o out.wav --no-residual"""
-
-FEATURES_EPILOG = """\b
-Examples:
-  sonic-bullet features tap.wav
-  sonic-bullet features tap.wav --json features.json --picture features.png
-  sonic-bullet features tap.flac --band 200,8000 --onset 0"""
-
-DIAGNOSE_EPILOG = """\b
-Examples:
-  sonic-bullet diagnose my_case/
-  sonic-bullet diagnose my_case/ --json verdict.json --predict predicted/ --report page.html
-  sonic-bullet diagnose my_case/ -o preset.json   (what belongs to material and object sounds in every scene)
-A verdict is none, explained or unexplained."""
-
-GROUP_EPILOG = """\b
-Examples:
-  sonic-bullet render scenes/tabletop.py -o tabletop.wav
-  sonic-bullet modes mug.obj --material porcelain
-  sonic-bullet doctor my_sim.py
-'sonic-bullet COMMAND --help' shows each command's options and examples."""
 
 
 class Numbers(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # generic since click 8.3
@@ -127,10 +89,10 @@ def cli() -> None:
 )
 @click.option("--seed", type=click.IntRange(0), help="Seed of the surfaces' roughness. [default: 0; a log's own]")
 @click.option("--material", metavar="M", help="Material of the bodies of a script that names none (a name or a preset file).")
-@click.option("--residual/--no-residual", default=True, help="What presets sound beside their modes. [default: heard]")
+@click.option("--residual/--no-residual", default=True, help="What presets sound beside their modes. [default: sounded]")
 def render(**options: Any) -> None:
     """Run a PyBullet scene, or replay a contact log, to a sound file."""
-    from sonic_bullet.cli.scenes import run_render
+    from sonic_bullet.cli.scene_commands import run_render
 
     run_render(**options)
 
@@ -152,7 +114,7 @@ def render(**options: Any) -> None:
 @click.option("-o", "--output", metavar="MODEL.npz", help="Also write the modal model: frequencies, decays, shapes on the surface.")
 def modes(**options: Any) -> None:
     """Vibration modes of a mesh: the elastic ones, ascending."""
-    from sonic_bullet.cli.solids import run_modes
+    from sonic_bullet.cli.solid_commands import run_modes
 
     run_modes(**options)
 
@@ -161,7 +123,7 @@ def modes(**options: Any) -> None:
 @json_option
 def materials(json_to: str | None) -> None:
     """List the materials that come with the package, with their sources."""
-    from sonic_bullet.cli.solids import run_materials
+    from sonic_bullet.cli.solid_commands import run_materials
 
     run_materials(json_to)
 
@@ -172,7 +134,7 @@ def materials(json_to: str | None) -> None:
 @json_option
 def doctor(scene: str, seconds: float, json_to: str | None) -> None:
     """Name the settings of a scene that would ruin its sound, and how to mend them."""
-    from sonic_bullet.cli.scenes import run_doctor
+    from sonic_bullet.cli.scene_commands import run_doctor
 
     run_doctor(scene, seconds, json_to)
 
@@ -191,13 +153,13 @@ channel_option = click.option(
 @json_option
 def features(**options: Any) -> None:
     """The damped sinusoids of a recorded impact: frequency, decay, amplitude, each with its spread."""
-    from sonic_bullet.cli.features import run_features
+    from sonic_bullet.cli.features_command import run_features
 
     run_features(**options)
 
 
 def strike_options(command: Any) -> Any:
-    """The options that say how one recording was struck and heard; a case says it itself."""
+    """The options that say how one recording was struck and recorded; a case says it itself."""
     for option in reversed(
         (
             click.option("--mesh", metavar="M", help="Mesh of what was struck."),
@@ -213,7 +175,7 @@ def strike_options(command: Any) -> Any:
                 type=click.Choice(["sum", "pressure", "velocity"]),
                 help="What was recorded: plain sum of modes, a microphone, a surface. [default: pressure]",
             ),
-            click.option("--sensor-at", type=Numbers("X,Y,Z"), help="Where the surface was heard, in m, for --sensor velocity."),
+            click.option("--sensor-at", type=Numbers("X,Y,Z"), help="Where the surface was measured, in m, for --sensor velocity."),
             click.option("--sensor-direction", type=Numbers("X,Y,Z"), help="Along which, for --sensor velocity. [default: out of the surface]"),
             click.option(
                 "--medium",
@@ -237,7 +199,7 @@ def strike_options(command: Any) -> Any:
 @json_option
 def fit(**options: Any) -> None:
     """Fit a material to recorded strikes: E/density, Poisson's ratio, damping, gain, with spreads and a verdict."""
-    from sonic_bullet.cli.fit import run_fit
+    from sonic_bullet.cli.fit_command import run_fit
 
     run_fit(**options)
 
@@ -250,7 +212,7 @@ def fit(**options: Any) -> None:
 @json_option
 def residual(**options: Any) -> None:
     """What the modes of recorded strikes leave unsaid, into a preset that sounds it with every contact."""
-    from sonic_bullet.cli.residual import run_residual
+    from sonic_bullet.cli.residual_command import run_residual
 
     run_residual(**options)
 
@@ -264,9 +226,57 @@ def residual(**options: Any) -> None:
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of what is left out in turn, and of the null effects.")
 def diagnose(**options: Any) -> None:
     """Say which physical effect the fitted model lacks, judged on strikes it was not fitted to."""
-    from sonic_bullet.cli.diagnose import run_diagnose
+    from sonic_bullet.cli.diagnose_command import run_diagnose
 
     run_diagnose(**options)
+
+
+@cli.group(epilog=CASE_EPILOG)
+def case() -> None:
+    """Make and check a case: a folder of recorded strikes with a case.json that says what was struck."""
+
+
+@case.command("new", epilog=CASE_EPILOG)
+@click.argument("folder")
+@click.argument("more", nargs=-1, metavar="[RECORDING]...")
+@click.option("--recordings", multiple=True, metavar="A.wav [B.wav]...", help="The strikes' recordings. [default: all in the folder]")
+@click.option("--mesh", metavar="M", help="Mesh of what was struck.")
+@click.option("--units", type=click.Choice(["m", "cm", "mm"]), default="m", show_default=True, help="Of the mesh.")
+@click.option("--material", metavar="GUESS", help="A name ('sonic-bullet materials') or a preset file: E and density good to 30 %.")
+@click.option(
+    "--sensor",
+    type=click.Choice(["sum", "pressure", "velocity"]),
+    default="pressure",
+    show_default=True,
+    help="What was recorded: plain sum of modes, a microphone, a surface.",
+)
+@click.option("--sensor-at", type=Numbers("X,Y,Z"), help="Where the surface was measured, in m, for --sensor velocity.")
+@click.option("--sensor-direction", type=Numbers("X,Y,Z"), help="Along which, for --sensor velocity. [default: out of the surface]")
+@click.option(
+    "--medium", type=click.Choice(["air", "none"]), help="What it rang in: 'none' loses nothing to radiation. [default: air; with --sensor sum unknown]"
+)
+def case_new(folder: str, more: tuple[str, ...], recordings: tuple[str, ...], **options: Any) -> None:
+    """Write FOLDER/case.json for recordings of one object; files from elsewhere are copied into the folder."""
+    from sonic_bullet.cli.case_command import run_case_new
+
+    run_case_new(folder, (*recordings, *more), **options)
+
+
+@case.command("check")
+@click.argument("folder", metavar="CASE_DIR")
+def case_check(folder: str) -> None:
+    """Say what a case holds, or the first thing that a fit would stop at."""
+    from sonic_bullet.cli.case_command import run_case_check
+
+    run_case_check(folder)
+
+
+@case.command("schema")
+def case_schema() -> None:
+    """Print the JSON Schema of case.json."""
+    from sonic_bullet.cli.case_command import run_case_schema
+
+    run_case_schema()
 
 
 def main() -> None:
@@ -326,7 +336,7 @@ def _terminated(*_: object) -> None:
 
 def _say_what_is_not_kept() -> None:
     """One note where there was no folder for compiled code and computed models: each run then takes a minute that the next could do without."""
-    folder = sys.modules.get("sonic_bullet.user_folder")
+    folder = sys.modules.get("sonic_bullet.machine.user_folder")
     if folder is not None and folder.NOTES:
         _say(f"note: compiled code and computed models are not kept for the next run: {folder.NOTES[0]}; XDG_CACHE_HOME names another folder")
 

@@ -16,8 +16,8 @@ from contextlib import contextmanager, redirect_stdout, suppress
 from pathlib import Path
 from typing import Any
 
-from sonic_bullet.errors import FileError
-from sonic_bullet.terminal import shown_by, status
+from sonic_bullet.machine.terminal import shown_by, status
+from sonic_bullet.records.errors import FileError
 
 __all__ = ["clean_stdout", "places", "progress_bar", "quiet_stderr", "status", "table", "write_json"]
 

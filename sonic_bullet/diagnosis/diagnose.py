@@ -1,8 +1,8 @@
 """`diagnose`: a case in, a Diagnosis out.
 
-    gather 'fit' strikes -> fit the baseline (baseline.py) -> loop (loop.py) -> verdict, errors on all splits, predictions
+    read the 'fit' strikes -> fit the baseline (baseline.py) -> select effects (stepwise.py) -> verdict, errors on all splits, predictions
 
-Nothing of 'holdout' and 'transfer' is opened before the loop has ended; where their audio is there, it is compared at the very end and changes nothing.
+Nothing of 'holdout' and 'transfer' is opened before the selection has ended; where their audio is there, it is compared at the very end and changes nothing.
 """
 
 from __future__ import annotations
@@ -15,23 +15,23 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.diagnosis.baseline import baseline
-from sonic_bullet.diagnosis.bodies import Struck
-from sonic_bullet.diagnosis.judge import Compared, LeftOut, Take, comparable, least_db, mean_db
-from sonic_bullet.diagnosis.listed import CAP, listed, off_by
-from sonic_bullet.diagnosis.loop import Closed, NothingCompared, closed
-from sonic_bullet.diagnosis.play import play
-from sonic_bullet.diagnosis.sone import sone_distance
-from sonic_bullet.diagnosis.unexplained import listing, remainder
+from sonic_bullet.diagnosis.evidence.baseline import baseline
+from sonic_bullet.diagnosis.prediction.hypothesis import play
+from sonic_bullet.diagnosis.prediction.line_score import CAP, listed, off_by
+from sonic_bullet.diagnosis.prediction.loudness_distance import sone_distance
+from sonic_bullet.diagnosis.prediction.score import Compared, LeftOut, Take, comparable, least_db, mean_db
+from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.diagnosis.remainder import listing, remainder
+from sonic_bullet.diagnosis.selection.stepwise import Closed, NothingCompared, closed
 from sonic_bullet.effects import EFFECTS
-from sonic_bullet.effects.values import Effect
-from sonic_bullet.estimator.evidence import check_meshes, gather, onset_sample, until_it_breaks_off
-from sonic_bullet.estimator.fitted import CaseFit
+from sonic_bullet.effects.protocol import Effect
+from sonic_bullet.estimator.fit.case_fit import CaseFit
+from sonic_bullet.estimator.fit.recorded import check_meshes, gather, onset_sample, until_it_breaks_off
 from sonic_bullet.files import channel_of, read_audio
 from sonic_bullet.files.cases import Case, CaseRecording, read_case
 from sonic_bullet.modal.cache import Place
+from sonic_bullet.parallel import one_thread
 from sonic_bullet.records import Array
-from sonic_bullet.side_by_side import one_thread
 
 SPLITS = ("fit", "holdout", "transfer")
 
@@ -70,7 +70,7 @@ def diagnose(
     cache: Place = "default",
     progress: Callable[[str], None] | None = None,
 ) -> Diagnosis:
-    """Say what the fitted model lacks, from the case's 'fit' strikes. effects: the suspects, your own beside the package's: ``EFFECTS + (Mine,)``.
+    """Say what the fitted model lacks, from the case's 'fit' strikes. effects: the candidates, your own beside the package's: ``EFFECTS + (Mine,)``.
 
     Raises SonicBulletError where a file, mesh or number makes a fit impossible.
     """
@@ -78,8 +78,8 @@ def diagnose(
         case = read_case(case)
     say = progress or (lambda _: None)
     check_meshes(case, (r.object for r in case.recordings))
-    gathered = gather(case, cache=cache, progress=progress, clipped=True)
-    start = baseline(case, gathered, cache=cache, progress=progress)
+    recorded = gather(case, cache=cache, progress=progress, clipped=True)
+    start = baseline(case, recorded, cache=cache, progress=progress)
     found, bodies, takes = start.found, start.bodies, start.takes
     end = closed(start.hypothesis, bodies, takes or listed(bodies), effects, case.band_hz, seed=seed, progress=progress)
     say("comparing with what was not fitted")
@@ -123,9 +123,9 @@ def _of_lines(case: Case, bodies: tuple[Struck, ...], end: Closed | NothingCompa
             decay = np.array([np.nan if line.decay_per_s is None else line.decay_per_s for line in rows])
             for name, h in (("before", end.before), ("after", end.after)):
                 off, lost = off_by(h, body, freq, decay)
-                told = {"frequency_rms": float(np.sqrt((off**2).mean())), "lines": len(rows), "unpaired": int((off >= CAP).sum())}
-                told |= {"decay_rms": float(np.sqrt(np.nanmean(lost**2)))} if np.isfinite(lost).any() else {}
-                found.setdefault(name, {})[split] = told
+                entry = {"frequency_rms": float(np.sqrt((off**2).mean())), "lines": len(rows), "unpaired": int((off >= CAP).sum())}
+                entry |= {"decay_rms": float(np.sqrt(np.nanmean(lost**2)))} if np.isfinite(lost).any() else {}
+                found.setdefault(name, {})[split] = entry
     return found
 
 
@@ -147,7 +147,7 @@ def onset_of(case: Case, bodies: tuple[Struck, ...], sr: int) -> int:
     if case.onset_s is not None:
         return round(case.onset_s * sr)
     files = [
-        (r.file, r.channel) for body in bodies if body.gathered is not None and body.gathered.signals is not None for r in body.gathered.recordings if r.file
+        (r.file, r.channel) for body in bodies if body.recorded is not None and body.recorded.signals is not None for r in body.recorded.recordings if r.file
     ]
     late = [onset_sample(channel_of(read_audio(file)[0], channel, file), sr) for file, channel in files]
     return int(np.median(late)) if late else 0
@@ -161,7 +161,7 @@ def length_of(recording: CaseRecording) -> tuple[int, int]:
 
 def predictions(d: Diagnosis) -> list[tuple[str, int, Array, Array]]:
     """(stem, sr, before (n,), after (n,)) of every strike that has a place, of every split: as long as the fitted recordings, in their units."""
-    known = [r for b in d.bodies if b.gathered is not None for r in b.gathered.recordings if r.file is not None]
+    known = [r for b in d.bodies if b.recorded is not None for r in b.recorded.recordings if r.file is not None]
     if not known:
         return []
     n, sr = length_of(known[0])
@@ -178,7 +178,7 @@ def predictions(d: Diagnosis) -> list[tuple[str, int, Array, Array]]:
 
 def described(d: Diagnosis) -> dict[str, Any]:
     """The diagnosis as JSON holds it: null for what is no number."""
-    from sonic_bullet.diagnosis.loop import described as tried
+    from sonic_bullet.diagnosis.selection.stepwise import described as tried
 
     whole = {
         "case": d.case.name,
@@ -207,7 +207,7 @@ def described(d: Diagnosis) -> dict[str, Any]:
             "gamma_m2_s2": d.found.fit.gamma_m2_s2,
             "poisson_ratio": d.found.fit.poisson_ratio,
             "gain": d.closed.before.gain,
-            "correction_rms": {b.name: float(np.sqrt((b.correction**2).mean())) if len(b.correction) else 0.0 for b in d.bodies if b.gathered is not None},
+            "correction_rms": {b.name: float(np.sqrt((b.correction**2).mean())) if len(b.correction) else 0.0 for b in d.bodies if b.recorded is not None},
         },
         "after": {"alpha_per_s": d.closed.after.alpha_per_s, "beta_s": d.closed.after.beta_s, "gain": d.closed.after.gain},
         "warnings": [*d.case.warnings, *d.warnings],

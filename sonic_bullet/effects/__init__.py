@@ -1,5 +1,10 @@
 """The family of physical effects a model may lack, one short file each. A third party's is passed beside these: `EFFECTS + (Mine,)`."""
 
+from __future__ import annotations
+
+import warnings
+from typing import TYPE_CHECKING
+
 from sonic_bullet.effects.added_mass import AddedMass
 from sonic_bullet.effects.amplitude_damping import AmplitudeDamping
 from sonic_bullet.effects.amplitude_pitch import AmplitudePitch
@@ -9,11 +14,11 @@ from sonic_bullet.effects.foreign_mode import ForeignMode
 from sonic_bullet.effects.measurement_chain import MeasurementChain
 from sonic_bullet.effects.mode_splitting import ModeSplitting
 from sonic_bullet.effects.orthotropy import Orthotropy
+from sonic_bullet.effects.protocol import Effect, Evidence, Impact, ObjectEvidence, Owner, Ring, Sound, Stage
 from sonic_bullet.effects.radiation import Radiation
 from sonic_bullet.effects.rebound import Rebound
 from sonic_bullet.effects.room import Room
 from sonic_bullet.effects.support_damping import SupportDamping
-from sonic_bullet.effects.values import Blow, Effect, Evidence, Heard, Owner, Ring, Sound, Stage
 
 EFFECTS: tuple[type[Effect], ...] = (
     DampingLaw,
@@ -31,4 +36,16 @@ EFFECTS: tuple[type[Effect], ...] = (
     MeasurementChain,
 )
 
-__all__ = ["EFFECTS", "Blow", "Effect", "Evidence", "Heard", "Owner", "Ring", "Sound", "Stage"]
+__all__ = ["EFFECTS", "Effect", "Evidence", "Impact", "ObjectEvidence", "Owner", "Ring", "Sound", "Stage"]
+
+FORMER_NAMES = {"Blow": Impact, "Heard": ObjectEvidence}
+"""Names of earlier versions, which others may still import."""
+
+if not TYPE_CHECKING:  # or a type checker would take any name for one of this module
+
+    def __getattr__(name: str) -> type:
+        """The class that had another name in earlier versions, with a DeprecationWarning."""
+        if name not in FORMER_NAMES:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        warnings.warn(f"sonic_bullet.effects.{name} is now {FORMER_NAMES[name].__name__}", DeprecationWarning, stacklevel=2)
+        return FORMER_NAMES[name]

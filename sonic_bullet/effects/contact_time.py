@@ -3,7 +3,7 @@
     A_k -> A_k F̂(f_k τ)/F̂(0),   τ = τ₀ (J/J₀)^{−1/5}   (Hertz), or τ₀ whatever J (flat faces)        [Hertz 1882; Hunter 1957; Johnson 1985, ch. 11]
 
 Read off the amplitudes: a roll-off common to all modes of a strike, with the pulse's zeros. Moments about the strike's own pattern. Phases, where they are
-true, only tell whether τ goes with J: a pulse's middle comes πfτ late, which is seen long before its roll-off differs. Where a long contact leaves two or three lines, modes that should be heard and are not tell it, too.
+true, only tell whether τ goes with J: a pulse's middle comes πfτ late, which is seen long before its roll-off differs. Where a long contact leaves two or three lines, modes that should be observed and are not tell it, too.
 """
 
 from __future__ import annotations
@@ -13,17 +13,17 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from sonic_bullet.effects.pulses import PULSES, magnitude
-from sonic_bullet.effects.values import Blow, Evidence, Heard, Owner, Stage
+from sonic_bullet.effects.common.pulses import PULSES, magnitude
+from sonic_bullet.effects.protocol import Evidence, Impact, ObjectEvidence, Owner, Stage, Traits
 from sonic_bullet.records import Array
 
 HERTZ = -0.2
 AGAIN = 1.29  # times shorter or longer, where it is fitted again: √(5/3), half the way from the half-sine's first zero to its second
 ROUGH = 0.03  # of a mode's strongest expected amplitude: the shapes' own error
-FEWEST, FEW = 2, 3  # lines to tell a roll-off from; with no more than FEW, modes that nobody hears tell it, too
+FEWEST_LINES, FEW = 2, 3  # lines to tell a roll-off from; with no more than FEW, modes that nobody hears tell it, too
 NEAR = 0.01  # of ln f: a line that near may be that mode
 COMMON, TURNS = 0.05, 15  # of how loud a mode is at the sensor, relative; of weights, gain and that
-STARTS = (0.05, 0.5, 0.95)  # of the ratios of what is heard to what is expected: gains to begin with
+STARTS = (0.05, 0.5, 0.95)  # of the ratios of what is observed to what is expected: gains to begin with
 DELAYS_S, FINER_S = np.arange(-4e-5, 4.01e-5, 2e-6), np.linspace(-2e-6, 2e-6, 9)  # of the files' onset
 SILENT, HIDDEN = 10.0, 0.02  # times what noise alone makes of an amplitude, and of the strongest: what lines may not be found under
 
@@ -36,6 +36,7 @@ class ContactTime:
     stage: ClassVar[Stage] = Stage.FORCE
     owner: ClassVar[Owner] = Owner.STRIKER
     reference: ClassVar[str] = "Hunter 1957; Johnson 1985, section 11.4"
+    traits: ClassVar[Traits] = Traits()
 
     tau_s: float
     impulse_n_s: float
@@ -45,8 +46,8 @@ class ContactTime:
     def duration_s(self, impulse_n_s: float) -> float:
         return float(self.tau_s * (impulse_n_s / self.impulse_n_s) ** self.exponent)
 
-    def apply(self, x: Blow) -> Blow:
-        """The blow with the effect in it."""
+    def apply(self, x: Impact) -> Impact:
+        """The impact with the effect in it."""
         return replace(x, tau_s=self.duration_s(x.impulse_n_s), pulse=self.pulse)
 
     def parameters(self) -> dict[str, Any]:
@@ -58,10 +59,10 @@ class ContactTime:
 
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
-        tables = [_table(h) for h in evidence.heard if len(h.freq_hz) >= FEWEST]
+        tables = [_table(h) for h in evidence.observed if len(h.freq_hz) >= FEWEST_LINES]
         if not tables:
             return None
-        freq, level, told, heard, sd, most = (np.concatenate([t[i] for t in tables]) for i in range(6))
+        freq, level, expected, observed, sd, most = (np.concatenate([t[i] for t in tables]) for i in range(6))
         thing = np.repeat(np.arange(len(tables)), [len(t[0]) for t in tables])
         mode = np.unique(freq + 1j * thing, return_inverse=True)[1]  # each object's own
         if len(freq) < 4:
@@ -71,8 +72,8 @@ class ContactTime:
         pulses: tuple[str, ...] = PULSES
         if isinstance(evidence.known, cls):  # part of the evidence may have another pulse nearly as good far away; it is this one that is fitted again
             grid, pulses = evidence.known.duration_s(reference) * np.geomspace(1 / AGAIN, AGAIN, 24), (evidence.known.pulse,)
-        plain = _cost(told, heard, sd, ROUGH * most, mode)
-        ways: list[tuple[float, float, Self]] = []
+        plain = _cost(expected, observed, sd, ROUGH * most, mode)
+        directions: list[tuple[float, float, Self]] = []
         for exponent in (HERTZ, 0.0):
             best: tuple[float, Self] | None = None
             for pulse in pulses:
@@ -81,7 +82,7 @@ class ContactTime:
                 def at(tau: float, share: Array = share, pulse: str = pulse) -> float:
                     h = np.abs(magnitude(pulse, freq * tau * share))
                     h = h / max(float(h.max()), 1e-300)  # the gain is free: a pulse so long that it leaves nothing must not pass for a small one
-                    return _cost(told * h, heard, sd, ROUGH * most * np.maximum(h, 0.02), mode)
+                    return _cost(expected * h, observed, sd, ROUGH * most * np.maximum(h, 0.02), mode)
 
                 costs = np.array([at(t) for t in grid])
                 i = int(costs.argmin())
@@ -90,64 +91,64 @@ class ContactTime:
                 if best is None or cost < best[0]:
                     best = (cost, cls(tau, reference, exponent, pulse))
             assert best is not None
-            ways.append((best[0] + sum(_late(h, best[1]) for h in evidence.heard), *best))
-        _, cost, found = min(ways, key=lambda way: way[0])
+            directions.append((best[0] + sum(_late(h, best[1]) for h in evidence.observed), *best))
+        _, cost, found = min(directions, key=lambda direction: direction[0])
         return found if evidence.known is not None or cost < plain - 4 * np.log(len(freq)) else None
 
 
-def _table(h: Heard) -> tuple[Array, Array, Array, Array, Array, Array]:
-    """Per strike and line, flat: frequency, impulse, expected and heard magnitude, spread, the line's strongest expected magnitude."""
-    told, heard = np.abs(h.expected), np.abs(h.amplitude)
+def _table(h: ObjectEvidence) -> tuple[Array, Array, Array, Array, Array, Array]:
+    """Per strike and line, flat: frequency, impulse, expected and observed magnitude, spread, the line's strongest expected magnitude."""
+    expected, observed = np.abs(h.expected), np.abs(h.amplitude)
     freq, sd = h.freq_hz, h.amplitude_sd
     if len(freq) <= FEW and h.model is not None and h.signal is not None:
-        high, quiet, least = _unheard(h)
-        freq, told, heard, sd = np.append(freq, high), np.hstack([told, quiet]), np.hstack([heard, np.zeros(quiet.shape)]), np.hstack([sd, least])
-    good = np.isfinite(told) & np.isfinite(heard) & np.isfinite(h.impulse_n_s)[:, None] & (told > 0)
-    most = np.broadcast_to(told.max(axis=0, keepdims=True), told.shape)
-    freq = np.broadcast_to(freq, told.shape)
-    level = np.broadcast_to(np.where(np.isfinite(h.impulse_n_s), h.impulse_n_s, 1.0)[:, None], told.shape)
-    return freq[good], level[good], told[good], heard[good], sd[good], most[good]
+        high, quiet, least = _unobserved(h)
+        freq, expected, observed, sd = np.append(freq, high), np.hstack([expected, quiet]), np.hstack([observed, np.zeros(quiet.shape)]), np.hstack([sd, least])
+    good = np.isfinite(expected) & np.isfinite(observed) & np.isfinite(h.impulse_n_s)[:, None] & (expected > 0)
+    most = np.broadcast_to(expected.max(axis=0, keepdims=True), expected.shape)
+    freq = np.broadcast_to(freq, expected.shape)
+    level = np.broadcast_to(np.where(np.isfinite(h.impulse_n_s), h.impulse_n_s, 1.0)[:, None], expected.shape)
+    return freq[good], level[good], expected[good], observed[good], sd[good], most[good]
 
 
-def _unheard(h: Heard) -> tuple[Array, Array, Array]:
+def _unobserved(h: ObjectEvidence) -> tuple[Array, Array, Array]:
     """Modes (u,) that no line stands for, what is expected of them (s, u), and what may hide (s, u) in the noise, where σ √(4d/sr) is an amplitude's spread, or under
     what is louder.
     """
     assert h.model is not None
-    heard = np.concatenate([h.freq_hz, h.foreign_hz])
+    observed = np.concatenate([h.freq_hz, h.foreign_hz])
     alone = np.setdiff1d(np.arange(len(h.all_hz)), np.concatenate([*h.mode, np.zeros(0, int)]))
-    alone = alone[np.abs(np.log(h.all_hz[alone, None] / heard)).min(axis=1) > NEAR]
+    alone = alone[np.abs(np.log(h.all_hz[alone, None] / observed)).min(axis=1) > NEAR]
     hidden = SILENT * h.noise[:, None] * np.sqrt(4 * h.model.decay_per_s[alone] / h.sr) + HIDDEN * np.abs(h.amplitude).max(axis=1)[:, None]
     return h.all_hz[alone], np.abs(h.push[:, alone]), hidden
 
 
-def _cost(told: Array, heard: Array, sd: Array, rough: Array, mode: Array) -> float:
+def _cost(expected: Array, observed: Array, sd: Array, rough: Array, mode: Array) -> float:
     """Twice the negative log likelihood under Cauchy's law at the best common gain; rough (·): the shapes' own error, which grows with the gain.
 
     mode (·): of each row; how loud the sensor hears a mode is off by COMMON at all strikes alike, integrated out by Laplace's method [Tierney & Kadane 1986].
     """
-    loud = (heard > 0) & (told > 0)
-    starts = np.quantile(heard[loud] / told[loud], STARTS) if loud.any() else np.ones(1)
-    return min(_from(float(gain), told, heard, sd, rough, mode) for gain in starts)
+    loud = (observed > 0) & (expected > 0)
+    starts = np.quantile(observed[loud] / expected[loud], STARTS) if loud.any() else np.ones(1)
+    return min(_from(float(gain), expected, observed, sd, rough, mode) for gain in starts)
 
 
-def _from(gain: float, told: Array, heard: Array, sd: Array, rough: Array, mode: Array) -> float:
+def _from(gain: float, expected: Array, observed: Array, sd: Array, rough: Array, mode: Array) -> float:
     """The same at the gain that one to begin with leads to."""
     own = np.zeros(int(mode.max()) + 1)
     for _ in range(TURNS):
         width = sd**2 + (gain * rough) ** 2
-        model = told * (1 + COMMON * own[mode])
-        weight = 1 / (1 + (heard - gain * model) ** 2 / width / 9) / width
-        gain = max(float((weight * model * heard).sum() / max(float((weight * model**2).sum()), 1e-300)), 1e-12)
-        slope = COMMON * gain * told
+        model = expected * (1 + COMMON * own[mode])
+        weight = 1 / (1 + (observed - gain * model) ** 2 / width / 9) / width
+        gain = max(float((weight * model * observed).sum() / max(float((weight * model**2).sum()), 1e-300)), 1e-12)
+        slope = COMMON * gain * expected
         stiff = np.bincount(mode, weight * slope**2, len(own))
-        own = np.bincount(mode, weight * slope * (heard - gain * told), len(own)) / (1 + stiff)
+        own = np.bincount(mode, weight * slope * (observed - gain * expected), len(own)) / (1 + stiff)
     width = sd**2 + (gain * rough) ** 2
-    off = heard - gain * told * (1 + COMMON * own[mode])
+    off = observed - gain * expected * (1 + COMMON * own[mode])
     return float((np.log(width) + 9 * np.log1p(off**2 / width / 9)).sum() + (own**2 + np.log1p(stiff)).sum())
 
 
-def _late(h: Heard, effect: ContactTime) -> float:
+def _late(h: ObjectEvidence, effect: ContactTime) -> float:
     """Twice the negative log likelihood under Cauchy's law of the phases (s, k) at the best common delay; 0 where they are not true."""
     if not h.signed or h.dry:
         return 0.0

@@ -15,8 +15,8 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from sonic_bullet.effects.proofs import finite, one_of
-from sonic_bullet.effects.values import Evidence, Owner, Stage, ascending
+from sonic_bullet.effects.common.proofs import finite, one_of
+from sonic_bullet.effects.protocol import Evidence, Owner, Stage, Traits, ascending
 from sonic_bullet.records import Array, ModalModel
 
 LAWS = {"constant-loss": 1, "power": 2, "relaxation": 3}
@@ -24,7 +24,7 @@ OMEGA_1 = 2000 * np.pi
 SCATTER = 0.02  # of a decay about its law, relative, that no law is asked to explain
 BETTER = 6.0  # in BIC, than Rayleigh's law
 TAKEN, MOST = 0.1, 0.95  # of what other effects take of a line's decay: how unsure it is; of the decay, at most
-FEWEST, AGAIN = 5, 4  # lines: to look for a law, and to fit it again to a part of them
+FEWEST_LINES, AGAIN = 5, 4  # lines: to look for a law, and to fit it again to a part of them
 
 
 @dataclass(frozen=True)
@@ -35,6 +35,7 @@ class DampingLaw:
     stage: ClassVar[Stage] = Stage.MODES
     owner: ClassVar[Owner] = Owner.MATERIAL
     reference: ClassVar[str] = "Cremer, Heckl, Petersson 2005, ch. 3; Nowick & Berry 1972, ch. 3"
+    traits: ClassVar[Traits] = Traits(replaces_rayleigh=True)
 
     law: str
     eta: float
@@ -45,8 +46,8 @@ class DampingLaw:
     def __post_init__(self) -> None:
         one_of("law", self.law, LAWS)
         finite("exponent", self.exponent)
-        for name in ("eta", "strength", "tau_s"):
-            finite(name, getattr(self, name), least=0.0)
+        for name, value in (("eta", self.eta), ("strength", self.strength), ("tau_s", self.tau_s)):
+            finite(name, value, least=0.0)
 
     def decay_per_s(self, omega_per_s: Array) -> Array:
         """d (k,) at undamped ω (k,)."""
@@ -75,14 +76,14 @@ class DampingLaw:
 
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
-        omega = np.concatenate([h.omega for h in evidence.heard])
-        decay = np.concatenate([h.decay_per_s for h in evidence.heard])
-        spread = np.concatenate([h.decay_sd_per_s for h in evidence.heard])
+        omega = np.concatenate([h.omega for h in evidence.observed])
+        decay = np.concatenate([h.decay_per_s for h in evidence.observed])
+        spread = np.concatenate([h.decay_sd_per_s for h in evidence.observed])
         rayleigh = 0.5 * (evidence.alpha_per_s + evidence.beta_s * omega**2)
-        extra = np.clip(np.concatenate([h.expected_decay_per_s for h in evidence.heard]) - rayleigh, 0.0, MOST * decay)  # what effects found so far take
+        extra = np.clip(np.concatenate([h.expected_decay_per_s for h in evidence.observed]) - rayleigh, 0.0, MOST * decay)  # what effects found so far take
         decay, spread = decay - extra, np.hypot(spread, TAKEN * extra)
         good = np.isfinite(decay) & (decay > 0) & ~np.isposinf(spread)  # in a room some lines tell no decay
-        if good.sum() < (FEWEST if evidence.known is None else AGAIN):
+        if good.sum() < (FEWEST_LINES if evidence.known is None else AGAIN):
             return None
         omega, decay = omega[good], decay[good]
         sd = np.hypot(np.nan_to_num(spread[good] / decay, nan=0.05), SCATTER)

@@ -12,9 +12,9 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from sonic_bullet.effects.ringing import sounded
-from sonic_bullet.effects.tails import FRAME_S
-from sonic_bullet.effects.values import Blow, Evidence, Heard, Owner, Ring, Sound, Stage
+from sonic_bullet.effects.common.reverberant_tail import FRAME_S
+from sonic_bullet.effects.common.ringing import sounded
+from sonic_bullet.effects.protocol import Evidence, Impact, ObjectEvidence, Owner, Ring, RingsAlong, Sound, Stage, Traits
 from sonic_bullet.records import Array
 
 STEADY = 0.12  # relative scatter of |A|/J over the strikes, rms
@@ -24,13 +24,14 @@ APART = 0.004  # from a mode of the body
 
 
 @dataclass(frozen=True)
-class ForeignMode:
+class ForeignMode(RingsAlong):
     """freq_hz, decay_per_s, amplitude per N·s, phase_rad of each line that is not the body's."""
 
     id: ClassVar[str] = "foreign-mode"
     stage: ClassVar[Stage] = Stage.SOUND
     owner: ClassVar[Owner] = Owner.STRIKER
     reference: ClassVar[str] = "physics of a second resonator driven by the same blow: Morse & Ingard 1968, ch. 2"
+    traits: ClassVar[Traits] = Traits()
 
     freq_hz: tuple[float, ...]
     decay_per_s: tuple[float, ...]
@@ -42,7 +43,11 @@ class ForeignMode:
         a = x.impulse_n_s * np.array(self.amplitude_per_n_s) * np.exp(1j * np.array(self.phase_rad))
         none = np.zeros(len(a))
         ring = Ring(np.array(self.freq_hz), np.array(self.decay_per_s), a, none, none, none)
-        return replace(x, sample=x.sample + sounded(ring, Blow(1.0, np.zeros(1), np.ones(1)), len(x.sample), x.sr))
+        return replace(x, sample=x.sample + sounded(ring, Impact(1.0, np.zeros(1), np.ones(1)), len(x.sample), x.sr))
+
+    def lines(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Frequencies and decays of what rings."""
+        return self.freq_hz, self.decay_per_s
 
     def parameters(self) -> dict[str, Any]:
         """What it says, for people and JSON, in SI units."""
@@ -53,7 +58,7 @@ class ForeignMode:
 
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
-        rows = [row for h in evidence.heard for row in _steady(h)]
+        rows = [row for h in evidence.observed for row in _steady(h)]
         rows.sort(key=lambda r: -r[2])
         if not rows:
             return None
@@ -61,7 +66,7 @@ class ForeignMode:
         return cls(*(tuple(float(r[i]) for r in kept) for i in range(4)))
 
 
-def _steady(h: Heard) -> list[tuple[float, float, float, float]]:
+def _steady(h: ObjectEvidence) -> list[tuple[float, float, float, float]]:
     """Lines (f, d, a, φ) that follow the impulse alone."""
     if len(h.foreign_hz) == 0 or len(h.impulse_n_s) < 2 or h.signal is None:
         return []

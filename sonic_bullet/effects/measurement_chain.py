@@ -14,14 +14,14 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from sonic_bullet.effects.hum import hum_of
-from sonic_bullet.effects.values import Evidence, Heard, Owner, Sound, Stage
+from sonic_bullet.effects.common.hum import hum_of
+from sonic_bullet.effects.protocol import Evidence, ObjectEvidence, Owner, Sound, Stage, Traits
 from sonic_bullet.records import Array
 
 ROUGH = 0.03
 BETTER = 16.0
 CORNERS, FINER, HIGHEST = 160, 21, 0.49  # tried, and again about the best; of the rate
-FEWEST, AGAIN = 5, 3  # lines: to look for a filter, and to fit it again to a part of them
+FEWEST_LINES, AGAIN = 5, 3  # lines: to look for a filter, and to fit it again to a part of them
 STUCK, OFTEN = 4, 12  # samples in a row at the limit, or in all
 SAME = 2e-3  # of a limit: how far peaks that it has made are apart
 
@@ -34,6 +34,7 @@ class MeasurementChain:
     stage: ClassVar[Stage] = Stage.SOUND
     owner: ClassVar[Owner] = Owner.CHAIN
     reference: ClassVar[str] = "Oppenheim & Schafer 2010, app. B"
+    traits: ClassVar[Traits] = Traits()
 
     high_pass_hz: float = 0.0
     high_order: int = 1
@@ -77,15 +78,15 @@ class MeasurementChain:
 
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
-        heard = [h for h in evidence.heard if h.signal is not None and h.predicted is not None]
-        if not heard:
+        observed = [h for h in evidence.observed if h.signal is not None and h.predicted is not None]
+        if not observed:
             return None
         parts: dict[str, Any] = {}
-        if limit := limit_of([h.signal for h in heard if h.signal is not None], evidence.known.limit if isinstance(evidence.known, cls) else 0.0):
+        if limit := limit_of([h.signal for h in observed if h.signal is not None], evidence.known.limit if isinstance(evidence.known, cls) else 0.0):
             parts["limit"] = limit
-        parts |= _hum(heard, evidence.known.hum_hz if isinstance(evidence.known, cls) else 0.0)
+        parts |= _hum(observed, evidence.known.hum_hz if isinstance(evidence.known, cls) else 0.0)
         if "limit" not in parts:
-            parts |= _filter(heard, BETTER, FEWEST) if evidence.known is None else _filter(heard, 0.0, AGAIN)
+            parts |= _filter(observed, BETTER, FEWEST_LINES) if evidence.known is None else _filter(observed, 0.0, AGAIN)
         return cls(**parts) if parts else None
 
 
@@ -117,23 +118,23 @@ def _stands(row: Array) -> bool:
     return bool(np.convolve(stuck, np.ones(STUCK), "valid").max(initial=0) >= STUCK or stuck.sum() > OFTEN)
 
 
-def _hum(heard: list[Heard], known_hz: float) -> dict[str, Any]:
+def _hum(observed: list[ObjectEvidence], known_hz: float) -> dict[str, Any]:
     """A tone at the mains and its multiples, of one amplitude in all recordings of the object that has most. known_hz: as all evidence had it."""
-    h = max(heard, key=lambda one: len(one.impulse_n_s))
+    h = max(observed, key=lambda one: len(one.impulse_n_s))
     assert h.signal is not None
     found = hum_of(h.signal, h.noise, h.sr, known_hz)
     return {} if found is None else {"hum_hz": found.hz, "hum_amplitude": found.amplitude, "hum_phase_rad": found.phase_rad}
 
 
-def _filter(heard: list[Heard], better: float, fewest: int) -> dict[str, Any]:
+def _filter(observed: list[ObjectEvidence], better: float, fewest: int) -> dict[str, Any]:
     """One high-pass or low-pass that all strikes share."""
-    rows = [_ratio(h) for h in heard if len(h.freq_hz) >= fewest]
+    rows = [_ratio(h) for h in observed if len(h.freq_hz) >= fewest]
     if not rows:
         return {}
     freq, ratio, sd = (np.concatenate([r[i] for r in rows]) for i in range(3))
     if len(freq) < fewest:
         return {}
-    sr = min(h.sr for h in heard)
+    sr = min(h.sr for h in observed)
     best: tuple[float, dict[str, Any]] = (_misfit(ratio, sd) - better - 2 * np.log(len(freq)), {})
     bottom, top = float(freq.min()), min(float(freq.max()), HIGHEST * sr)
     for name, ends in (("high", (0.3 * bottom, top)), ("low", (bottom, min(3 * top, HIGHEST * sr)))):  # beyond all lines it is a slope, which much else is
@@ -152,13 +153,13 @@ def _filter(heard: list[Heard], better: float, fewest: int) -> dict[str, Any]:
     return best[1]
 
 
-def _ratio(h: Heard) -> tuple[Array, Array, Array]:
-    """Per line: frequency, ln of heard over expected amplitude over the strikes, and its spread, which grows where the strikes disagree."""
-    told, seen = np.abs(h.expected), np.abs(h.amplitude)
-    width = np.hypot(h.amplitude_sd, ROUGH * told.max(axis=0, keepdims=True)) + 1e-300
-    gain = (told * seen / width**2).sum(axis=0) / np.maximum((told**2 / width**2).sum(axis=0), 1e-300)
-    left = np.sqrt((((seen - gain * told) / width) ** 2).mean(axis=0))
-    size = np.sqrt((told**2 / width**2).sum(axis=0))
+def _ratio(h: ObjectEvidence) -> tuple[Array, Array, Array]:
+    """Per line: frequency, ln of observed over expected amplitude over the strikes, and its spread, which grows where the strikes disagree."""
+    expected, seen = np.abs(h.expected), np.abs(h.amplitude)
+    width = np.hypot(h.amplitude_sd, ROUGH * expected.max(axis=0, keepdims=True)) + 1e-300
+    gain = (expected * seen / width**2).sum(axis=0) / np.maximum((expected**2 / width**2).sum(axis=0), 1e-300)
+    left = np.sqrt((((seen - gain * expected) / width) ** 2).mean(axis=0))
+    size = np.sqrt((expected**2 / width**2).sum(axis=0))
     good = (gain > 0) & (size > 3)
     sd = np.hypot(np.maximum(left, 1.0)[good] / (size[good] * np.maximum(gain[good], 1e-300)), ROUGH)
     return h.freq_hz[good], np.log(gain[good]), sd

@@ -13,31 +13,35 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from sonic_bullet.effects.axes import PAIR, about_axes, pair_at
-from sonic_bullet.effects.proofs import finite, side_by_side
-from sonic_bullet.effects.values import Evidence, Heard, Owner, Stage
+from sonic_bullet.effects.common.axes import PAIR, about_axes, pair_at
+from sonic_bullet.effects.common.proofs import finite, same_length
+from sonic_bullet.effects.protocol import Evidence, ObjectEvidence, Owner, SplitsPairs, Stage, Traits
 from sonic_bullet.records import Array, ModalModel
 
 SPLIT = (1e-4, 3e-2)
-HEARD = 0.12  # of a line's own width: pairs nearer than that sound as one
+OBSERVED = 0.12  # of a line's own width: pairs nearer than that sound as one
 REACH = 2e-2  # of a line from its pair's middle
 LOUD, CLEAR = 1e-3, 30.0  # of the strongest line; of a line's own spread
 MOST = 7
 ALIKE = 0.9
 SAME, TURNED = 1e-4, 0.3  # relative; sin 2ψ: what the mesh has apart, and nothing has turned, are neighbours by chance, which it has too near or too far
 MOSTLY = 0.5  # of the pairs must be more than that
-BESIDE, ALSO, STRIKES = 3, 0.8, 5  # pairs that make it plain that the body is split: how alike others then need to be, every strike as loud, of so many
+PLAINLY, ALSO, STRIKES = (
+    3,
+    0.8,
+    5,
+)  # pairs that make it plain that the body is split: how alike others then need to be, every strike as loud, of so many
 
 
 @dataclass(frozen=True)
-class ModeSplitting:
+class ModeSplitting(SplitsPairs):
     """freq_hz (p,) of the pairs, split (p,) relative, turn_rad (p,) from the pair's first mode in the mesh as it is solved."""
 
     id: ClassVar[str] = "mode-splitting"
     stage: ClassVar[Stage] = Stage.MODES
     owner: ClassVar[Owner] = Owner.OBJECT
-    by_line: ClassVar[bool] = True
     reference: ClassVar[str] = "Perrin & Charnley 1973"
+    traits: ClassVar[Traits] = Traits(moves_modes=True, by_line=True)
 
     freq_hz: tuple[float, ...]
     split: tuple[float, ...]
@@ -47,7 +51,7 @@ class ModeSplitting:
         finite("freq_hz", *self.freq_hz, least=1e-3)
         finite("split", *self.split, least=0.0, most=2.0)
         finite("turn_rad", *self.turn_rad)
-        side_by_side(freq_hz=self.freq_hz, split=self.split, turn_rad=self.turn_rad)
+        same_length(freq_hz=self.freq_hz, split=self.split, turn_rad=self.turn_rad)
 
     def apply(self, x: ModalModel) -> ModalModel:
         """The modes with the effect in them."""
@@ -64,8 +68,8 @@ class ModeSplitting:
         order = np.argsort(freq, kind="stable")
         return replace(x, freq_hz=freq[order], decay_per_s=x.decay_per_s[order], shape=shape[:, :, order])
 
-    def heard_at(self, freq_hz: Array) -> Array:
-        """How far off (m,), relative, modes at freq_hz (m,) are from the middles of the pairs that were heard; 0 for all others."""
+    def observed_correction(self, freq_hz: Array) -> Array:
+        """How far off (m,), relative, modes at freq_hz (m,) are from the middles of the pairs that were observed; 0 for all others."""
         off = np.zeros(len(freq_hz))
         for f in self.freq_hz:
             pair = list(pair_at(freq_hz, f))
@@ -83,7 +87,7 @@ class ModeSplitting:
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
         rows: list[tuple[float, ...]] = []
-        for h in (h for h in evidence.heard if h.plain is not None):
+        for h in (h for h in evidence.observed if h.plain is not None):
             if isinstance(evidence.known, cls):
                 rows += _again(h, evidence.known)
                 continue
@@ -94,7 +98,7 @@ class ModeSplitting:
         return cls(*(tuple(float(r[i]) for r in rows) for i in range(3))) if rows else None
 
 
-def _pairs(h: Heard, scale: float) -> list[tuple[float, ...]]:
+def _pairs(h: ObjectEvidence, scale: float) -> list[tuple[float, ...]]:
     """(f, ε, ψ, f over the mesh's) of every pair of modes, their frequencies times ``scale``, that two lines stand for.
 
     A line stands for one mode; the surest pairs choose first. What splits a body splits many: beside some that are plain, others may be less so.
@@ -114,7 +118,7 @@ def _pairs(h: Heard, scale: float) -> list[tuple[float, ...]]:
         for i, j in combinations(near.tolist(), 2):
             low, high = (int(i), int(j)) if every[i] < every[j] else (int(j), int(i))
             split = float(2 * (every[high] - every[low]) / (every[high] + every[low]))
-            if not SPLIT[0] < split < SPLIT[1] or split * middle < HEARD * min(decay[low], decay[high]) / np.pi:
+            if not SPLIT[0] < split < SPLIT[1] or split * middle < OBSERVED * min(decay[low], decay[high]) / np.pi:
                 continue
             turn, alike = _turn(strike[:, [a, a + 1]], sensor[[a, a + 1]], amplitude[:, [low, high]], h.signed)
             off = abs((every[low] + every[high]) / (2 * middle) - 1)
@@ -128,7 +132,7 @@ def _pairs(h: Heard, scale: float) -> list[tuple[float, ...]]:
     taken: set[int] = set()
     done: set[int] = set()
     for plain, _, mode, low, high, split, turn in sorted(trials, reverse=True):
-        if not plain and len(found) < BESIDE:
+        if not plain and len(found) < PLAINLY:
             break
         if low in taken or high in taken or mode in done or mode + 1 in done:
             continue
@@ -140,7 +144,7 @@ def _pairs(h: Heard, scale: float) -> list[tuple[float, ...]]:
     return sorted(found) if split_off and np.mean(split_off) >= MOSTLY else []
 
 
-def _again(h: Heard, known: ModeSplitting) -> list[tuple[float, ...]]:
+def _again(h: ObjectEvidence, known: ModeSplitting) -> list[tuple[float, ...]]:
     """(f, ε, ψ) of the pairs that are known, by fewer strikes: two lines that only the one left out showed loudly are no single mode because of that."""
     assert h.plain is not None
     every, _, amplitude, strike, sensor = _lines(h)
@@ -155,26 +159,26 @@ def _again(h: Heard, known: ModeSplitting) -> list[tuple[float, ...]]:
     return found
 
 
-def _lines(h: Heard) -> tuple[Array, Array, Array, Array, Array]:
+def _lines(h: ObjectEvidence) -> tuple[Array, Array, Array, Array, Array]:
     """All lines' frequencies and decays (k,) and amplitudes (s, k); what a strike gives to every mode (s, m), and how the sensor sees them (m,)."""
     assert h.plain is not None
     every = np.concatenate([h.freq_hz, h.foreign_hz])
     decay = np.concatenate([h.decay_per_s, h.foreign_decay_per_s])
     amplitude = np.concatenate([h.amplitude, h.foreign_amplitude], axis=1)
     level = np.where(np.isfinite(h.impulse_n_s), h.impulse_n_s, 1.0)
-    strike = np.einsum("sxm,sx->sm", h.plain.shape[h.strike_vertex].astype(float), h.strike_way) * level[:, None]
-    return every, decay, amplitude, strike, np.einsum("xm,x->m", h.plain.shape[h.sensor_vertex].astype(float), h.sensor_way)
+    strike = np.einsum("sxm,sx->sm", h.plain.shape[h.strike_vertex].astype(float), h.strike_direction) * level[:, None]
+    return every, decay, amplitude, strike, np.einsum("xm,x->m", h.plain.shape[h.sensor_vertex].astype(float), h.sensor_direction)
 
 
 def _turn(strike: Array, sensor: Array, amplitude: Array, signed: bool) -> tuple[float, float]:
     """ψ by the two lines' patterns (s, 2), and how alike they then are."""
-    heard = np.real(amplitude * np.exp(-1j * np.angle((amplitude**2).sum(axis=0)) / 2)) if signed else np.abs(amplitude)
+    observed = np.real(amplitude * np.exp(-1j * np.angle((amplitude**2).sum(axis=0)) / 2)) if signed else np.abs(amplitude)
     turn = np.linspace(0, np.pi, 181)[:-1]
-    way = np.stack([np.stack([np.cos(turn), np.sin(turn)]), np.stack([-np.sin(turn), np.cos(turn)])], axis=1)  # (2, line, turn)
-    told = np.einsum("sx,xlt->tsl", strike, way) * np.einsum("x,xlt->tl", sensor, way)[:, None, :]
-    told = told if signed else np.abs(told)
-    size, loud = np.linalg.norm(told, axis=1), np.linalg.norm(heard, axis=0)
-    fit = np.abs(np.einsum("tsl,sl->tl", told, heard)) / np.maximum(size * loud, 1e-300)
+    direction = np.stack([np.stack([np.cos(turn), np.sin(turn)]), np.stack([-np.sin(turn), np.cos(turn)])], axis=1)  # (2, line, turn)
+    participation = np.einsum("sx,xlt->tsl", strike, direction) * np.einsum("x,xlt->tl", sensor, direction)[:, None, :]
+    participation = participation if signed else np.abs(participation)
+    size, loud = np.linalg.norm(participation, axis=1), np.linalg.norm(observed, axis=0)
+    fit = np.abs(np.einsum("tsl,sl->tl", participation, observed)) / np.maximum(size * loud, 1e-300)
     ratio = (size @ loud) / np.maximum(np.linalg.norm(size, axis=1) * np.linalg.norm(loud), 1e-300)
     score = fit.mean(axis=1) * np.sqrt(np.maximum(ratio, 0.0))
     best = int(score.argmax())

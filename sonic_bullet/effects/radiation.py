@@ -15,22 +15,22 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from scipy.sparse import csr_array
 
-from sonic_bullet.effects.points import solved
-from sonic_bullet.effects.values import Evidence, Heard, Owner, Stage, ascending
+from sonic_bullet.effects.common.points import solved
+from sonic_bullet.effects.protocol import Alternatives, Evidence, ObjectEvidence, Owner, Stage, Traits, ascending
 from sonic_bullet.records import Array, ModalModel
 
 IMPEDANCE = 1.2 * 343.0  # ρ₀ c in kg/(m² s)
 SOUND = 343.0
 SCATTER = 0.03
 BETTER = 14.0
-FEWEST, FEW = 6, 4  # lines: to look for it, and to fit it again to a part of them
+FEWEST_LINES, FEWEST_LINES_AGAIN = 6, 4  # lines: to look for it, and to fit it again to a part of them
 AGAIN = 2.0  # times smaller or larger, where it is fitted again
 CLEARER = 0.45  # twice the ln likelihood, a line, that a tilt must be worth
 ORDERS: tuple[int, ...] = (2, 4)
 
 
 @dataclass(frozen=True)
-class Radiation:
+class Radiation(Alternatives):
     """Radius a of the equivalent source in m; strength s against the law's own 1; tilt: exponent of σ in the level at the sensor, 0 or ½.
 
     order: of ka where it is small, 2 (monopole) or 4 (dipole: no net flow of volume).
@@ -40,6 +40,7 @@ class Radiation:
     stage: ClassVar[Stage] = Stage.MODES
     owner: ClassVar[Owner] = Owner.OBJECT
     reference: ClassVar[str] = "Fahy & Gardonio 2007, ch. 3"
+    traits: ClassVar[Traits] = Traits()
 
     radius_m: float
     strength: float
@@ -75,23 +76,27 @@ class Radiation:
 
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
-        heard = max(evidence.heard, key=lambda h: len(h.freq_hz) if h.model is not None else 0)
-        told = int((~np.isposinf(heard.decay_sd_per_s)).sum())  # in a room some lines tell no decay
-        if heard.model is None or told < (FEWEST if evidence.known is None else FEW) or not np.isfinite(heard.decay_per_s).all():
+        observed = max(evidence.observed, key=lambda h: len(h.freq_hz) if h.model is not None else 0)
+        with_decay = int((~np.isposinf(observed.decay_sd_per_s)).sum())  # in a room some lines tell no decay
+        if (
+            observed.model is None
+            or with_decay < (FEWEST_LINES if evidence.known is None else FEWEST_LINES_AGAIN)
+            or not np.isfinite(observed.decay_per_s).all()
+        ):
             return None
-        area = areas(heard.model)
-        loud = (np.abs(heard.push) ** 2).sum(axis=0) + 1e-300  # of modes that share a line, the louder is heard: a plate's own plane hardly moves the air
-        mine = np.array([np.average(area[m], weights=loud[m]) for m in heard.mode])
-        decay, w2 = heard.decay_per_s, heard.omega**2
-        sd = np.hypot(heard.decay_sd_per_s, SCATTER * decay) + 1e-3
-        across = float(np.linalg.norm(np.ptp(heard.model.vertex_m[np.unique(heard.model.face)], axis=0)))
+        area = areas(observed.model)
+        loud = (np.abs(observed.push) ** 2).sum(axis=0) + 1e-300  # of modes that share a line, the louder is observed: a plate's own plane hardly moves the air
+        mine = np.array([np.average(area[m], weights=loud[m]) for m in observed.mode])
+        decay, w2 = observed.decay_per_s, observed.omega**2
+        sd = np.hypot(observed.decay_sd_per_s, SCATTER * decay) + 1e-3
+        across = float(np.linalg.norm(np.ptp(observed.model.vertex_m[np.unique(observed.model.face)], axis=0)))
         plain = _left(decay, sd, np.stack([np.full(len(w2), 0.5), 0.5 * w2], axis=1))[1]
         radii = np.geomspace(0.02 * across, across, 40)
         if isinstance(evidence.known, cls):  # a part of the lines may leave the knee anywhere below the band: it is this one that is fitted again
             radii = evidence.known.radius_m * np.geomspace(1 / AGAIN, AGAIN, 21)  # by either law: which one, a pulse or a filter may have hidden
         found = []
         for one in (cls(float(radius), 1.0, order=order) for order in ORDERS for radius in radii):
-            x, left = _left(decay, sd, np.stack([np.full(len(w2), 0.5), 0.5 * w2, 0.5 * IMPEDANCE * one.efficiency(heard.freq_hz) * mine], axis=1))
+            x, left = _left(decay, sd, np.stack([np.full(len(w2), 0.5), 0.5 * w2, 0.5 * IMPEDANCE * one.efficiency(observed.freq_hz) * mine], axis=1))
             if x[2] > 0:
                 found.append((left, replace(one, strength=float(x[2]))))
         if not found:
@@ -99,10 +104,10 @@ class Radiation:
         left, best = min(found, key=lambda one: one[0])
         if evidence.known is None and (not plain - left > BETTER + 2 * np.log(len(w2)) or left > 0.5 * plain):
             return None
-        tilted = [(left + _level_cost(heard, one, 0.5), one) for left, one in found]  # what radiates is heard: levels tell the knee, too
-        least, heard_so = min(tilted, key=lambda one: one[0])
-        plain_so = left + _level_cost(heard, best, 0.0) - CLEARER * len(w2)
-        return replace(heard_so, tilt=0.5) if least < plain_so else best
+        tilted = [(left + _level_cost(observed, one, 0.5), one) for left, one in found]  # what radiates is observed: levels tell the knee, too
+        least, observed_so = min(tilted, key=lambda one: one[0])
+        plain_so = left + _level_cost(observed, best, 0.0) - CLEARER * len(w2)
+        return replace(observed_so, tilt=0.5) if least < plain_so else best
 
 
 def areas(x: ModalModel) -> Array:
@@ -110,9 +115,11 @@ def areas(x: ModalModel) -> Array:
     corner = x.vertex_m[x.face]
     normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]) / 2
     size = np.linalg.norm(normal, axis=1)
-    way = np.broadcast_to((normal / np.maximum(3 * size, 1e-300)[:, None])[:, None], corner.shape)  # of a triangle's middle: a third of each corner's motion
+    direction = np.broadcast_to(
+        (normal / np.maximum(3 * size, 1e-300)[:, None])[:, None], corner.shape
+    )  # of a triangle's middle: a third of each corner's motion
     place = 3 * x.face[:, :, None] + np.arange(3)
-    normal_part = csr_array((way.ravel(), place.ravel(), np.arange(0, 9 * len(x.face) + 1, 9)), shape=(len(x.face), 3 * len(x.shape)))
+    normal_part = csr_array((direction.ravel(), place.ravel(), np.arange(0, 9 * len(x.face) + 1, 9)), shape=(len(x.face), 3 * len(x.shape)))
     along = normal_part @ x.shape.reshape(-1, x.mode_count)
     return np.asarray((along**2 * size[:, None]).sum(axis=0))
 
@@ -122,13 +129,13 @@ def _left(decay: Array, sd: Array, columns: Array) -> tuple[Array, float]:
     return value, float(left.sum())
 
 
-def _off(heard: Heard, made: Radiation, tilt: float) -> Array:
+def _off(observed: ObjectEvidence, made: Radiation, tilt: float) -> Array:
     """ln of every line's level (k,) over the expected one, as the strikes agree on, less the tilt and what is common."""
-    ratio = np.log(np.maximum(np.abs(heard.amplitude), 1e-300) / np.maximum(np.abs(heard.expected), 1e-300))
-    left = np.median(ratio, axis=0) - tilt * np.log(made.efficiency(heard.freq_hz))
+    ratio = np.log(np.maximum(np.abs(observed.amplitude), 1e-300) / np.maximum(np.abs(observed.expected), 1e-300))
+    left = np.median(ratio, axis=0) - tilt * np.log(made.efficiency(observed.freq_hz))
     return np.asarray(left - np.median(left))
 
 
-def _level_cost(heard: Heard, made: Radiation, tilt: float) -> float:
+def _level_cost(observed: ObjectEvidence, made: Radiation, tilt: float) -> float:
     """Twice the negative log likelihood of the levels' misfit under Cauchy's law: lines that stand for other modes are far off."""
-    return float(2 * np.log1p((_off(heard, made, tilt) / SCATTER) ** 2).sum())
+    return float(2 * np.log1p((_off(observed, made, tilt) / SCATTER) ** 2).sum())

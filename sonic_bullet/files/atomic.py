@@ -1,7 +1,7 @@
 """Write beside, then replace: under the final name there is either the old file or the whole new one.
 
     check_output: can a file of that name be made there? tried, before anything is computed
-    replacing:    partial file (locked, `sonic_bullet.partial_file`) -> write -> flush -> fsync -> os.replace -> NAME
+    replacing:    partial file (locked, `sonic_bullet.machine.partial_file`) -> write -> flush -> fsync -> os.replace -> NAME
 
 Two writers of one name never mix: each has its own partial file and the last to finish wins (POSIX rename(2)).
 """
@@ -16,8 +16,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
-from sonic_bullet.errors import FileError, SonicBulletError
-from sonic_bullet.partial_file import PartialFile
+from sonic_bullet.machine.partial_file import PartialFile
+from sonic_bullet.records.errors import FileError, SonicBulletError
 
 NAME_BYTES_MAX = 255  # NAME_MAX of POSIX file systems
 

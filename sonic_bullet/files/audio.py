@@ -22,12 +22,12 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.coerce import as_number, as_path, as_text, as_whole, brief, nearest, shown
-from sonic_bullet.errors import AudioError, FileError, SonicBulletError
 from sonic_bullet.files.atomic import cannot, check_output, kept_name
 from sonic_bullet.files.levels import as_sound, check_levels, gain_per_pa
-from sonic_bullet.partial_file import PartialFile
+from sonic_bullet.machine.partial_file import PartialFile
 from sonic_bullet.records import Array
+from sonic_bullet.records.coerce import as_number, as_path, as_text, as_whole, brief, nearest, shown
+from sonic_bullet.records.errors import AudioError, FileError, SonicBulletError
 
 FORMATS = {
     ".wav": ("WAV", "FLOAT"),

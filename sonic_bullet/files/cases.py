@@ -16,9 +16,9 @@ from typing import Annotated, Any
 
 import msgspec
 
-from sonic_bullet.errors import FileError, excerpt
 from sonic_bullet.files.reading import reading
 from sonic_bullet.files.unread import shown, unread_fields
+from sonic_bullet.records.errors import FileError, excerpt
 
 FORMAT = "sonic-bullet-case/1"
 BYTES_MAX = 1 << 24
@@ -148,7 +148,7 @@ class Case:
     """A case. sensor: "velocity" (of the surface at sensor_m along sensor_direction, by object), "pressure" (a microphone), "sum" (of modes) or "unknown".
 
     onset_s: when the impulse arrives in every file, or None. support: as declared, in words; clamps stand with the objects. medium: what the object radiates
-    into, "air", "none" or "unknown": as declared, else air where a microphone or a vibrometer heard it. warnings: of fields that are not read, one line each.
+    into, "air", "none" or "unknown": as declared, else air where a microphone or a vibrometer listened. warnings: of fields that are not read, one line each.
     """
 
     name: str
@@ -168,7 +168,7 @@ class Case:
 def read_case(folder: str | os.PathLike[str]) -> Case:
     """The case in a folder (or of a case.json). Raises FileError naming the file and what is wrong with it; audio may be missing."""
     path = Path(folder)
-    with reading(path, "case", FileError, "mend that field; docs/measurements-fit.md describes the file"):
+    with reading(path, "case", FileError, "mend that field; docs/reference/case.md describes the file"):
         if path.is_dir():
             path = path / "case.json"
         try:
@@ -182,7 +182,7 @@ def read_case(folder: str | os.PathLike[str]) -> Case:
             raw = msgspec.json.decode(content, type=_Raw)
             unread = unread_fields(msgspec.json.decode(content), _Raw, f"case {path}")
         except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-            raise FileError(f"case {path}: {error}", "mend that field; docs/measurements-fit.md describes the file") from error
+            raise FileError(f"case {path}: {error}", "mend that field; docs/reference/case.md describes the file") from error
         if raw.format != FORMAT:
             raise FileError(f"case {path} has format '{raw.format}', wanted '{FORMAT}'", "use a sonic_bullet that knows that format")
         if not raw.recordings:
@@ -206,11 +206,11 @@ def _case(raw: _Raw, path: Path, unread: tuple[str, ...]) -> Case:
     if not 0 <= low < high:
         raise FileError(f"case {path}: band_hz is {low:g} to {high:g}", "give a low and a high frequency")
     places, directions = (_by_object(value, objects) for value in (sensor.position, sensor.direction))
-    heard = _response(sensor)
+    observed = _response(sensor)
     if raw.medium is not None and raw.medium not in MEDIA:
         unread = (*unread, f"case {path}: medium '{shown(raw.medium)}' is not known (known: {', '.join(MEDIA)}): damping is fitted as a whole")
-    where = _onset(raw.onset), _said(raw.support), medium_of(raw.medium, heard)
-    return Case(raw.case or folder.name, folder, objects, recordings, heard, places, directions, (low, high), *where, unread)
+    where = _onset(raw.onset), _said(raw.support), medium_of(raw.medium, observed)
+    return Case(raw.case or folder.name, folder, objects, recordings, observed, places, directions, (low, high), *where, unread)
 
 
 def medium_of(declared: str | None, sensor: str) -> str:
@@ -260,8 +260,8 @@ def _recording(entry: _Recording, number: int, objects: dict[str, CaseObject], o
     force = strike.force
     kept = (inside(path.parent, force.file), force.channel, force.newton_per_unit) if force is not None else None
     file = inside(path.parent, entry.file) if entry.file is not None else None
-    heard = entry.channel or 0, kept, entry.channel is not None
-    return CaseRecording(file, entry.features, name, entry.split, strike.position, direction, strike.impulse, *heard)
+    observed = entry.channel or 0, kept, entry.channel is not None
+    return CaseRecording(file, entry.features, name, entry.split, strike.position, direction, strike.impulse, *observed)
 
 
 def inside(folder: Path, name: str) -> Path:

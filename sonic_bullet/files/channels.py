@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from sonic_bullet.arrays import Array
-from sonic_bullet.errors import FileError
+from sonic_bullet.records.arrays import Array
+from sonic_bullet.records.errors import FileError
 
 
 def channel_of(samples: Array, channel: int, name: object) -> Array:

@@ -22,10 +22,10 @@ from typing import Any, BinaryIO, TypeVar
 import msgspec
 import numpy as np
 
-from sonic_bullet.errors import FileError, LogError
 from sonic_bullet.files.atomic import replacing
 from sonic_bullet.files.reading import reading
 from sonic_bullet.records import Array
+from sonic_bullet.records.errors import FileError, LogError
 
 HEADER = "header"
 REMEDY = "use the file as sonic-bullet wrote it, or make it again"

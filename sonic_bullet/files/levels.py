@@ -11,9 +11,9 @@ import math
 
 import numpy as np
 
-from sonic_bullet.coerce import as_number, shown
-from sonic_bullet.errors import AudioError
 from sonic_bullet.records import Array
+from sonic_bullet.records.coerce import as_number, shown
+from sonic_bullet.records.errors import AudioError
 
 
 def gain_per_pa(sound: Array, sr: int, peak_dbfs: float | None, lufs: float | None, full_scale_pa: float) -> float:

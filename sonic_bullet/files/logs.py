@@ -29,14 +29,15 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from sonic_bullet.coerce import as_path
-from sonic_bullet.contacts import ROW_FIELDS, ContactLog, Contacts, Event, Step
-from sonic_bullet.errors import LogError
 from sonic_bullet.files.audio import check_sr
+from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.container import REMEDY, read_container, take, write_container
 from sonic_bullet.files.models import ModelEntry, as_json_text, model_arrays, model_key, pack_model, unpack_model
 from sonic_bullet.files.reading import reading
 from sonic_bullet.records import Air, Array, Body, Material, Microphone, ModalSum, Residual, Sensor, Vibrometer
+from sonic_bullet.records.coerce import as_path
+from sonic_bullet.records.contacts import ROW_FIELDS, Contacts, Event, Step
+from sonic_bullet.records.errors import LogError
 
 LOG_FORMATS = ("sonic-bullet-contacts/2", "sonic-bullet-contacts/1")
 """What is read; the first is what is written."""

@@ -16,17 +16,17 @@ from pathlib import Path
 
 import numpy as np
 
-from sonic_bullet.arrays import Array
-from sonic_bullet.errors import FileError, MeshError
 from sonic_bullet.files.reading import reading
+from sonic_bullet.records.arrays import Array
+from sonic_bullet.records.errors import FileError, MeshError
 
-Surface = tuple[Array, Array]
+MeshSurface = tuple[Array, Array]
 REMEDY = "repair the mesh, or export it again"
 ARCHIVES = {"zip", "bz2", "tar.gz", "tar.bz2"}
-BESIDE = {"gltf", "dae"}  # formats whose numbers may lie in files beside them
+SEVERAL_FILES = {"gltf", "dae"}  # formats whose numbers may lie in files beside them
 
 
-def read_surfaces(path: Path) -> list[Surface]:
+def read_surfaces(path: Path) -> list[MeshSurface]:
     """Objects of a mesh file, in its own unit: (vertices (v, 3), faces (f, 3)) each, polygons as fans, nothing merged or repaired.
 
     Raises FileError where it cannot be read, MeshError where it is of no known kind, broken, or a face names no vertex (line or number of the face).
@@ -47,7 +47,7 @@ def _check(path: Path, vertex: Array, face: Array) -> None:
         raise MeshError(f"mesh file {path}: triangle {triangle + 1} names vertex {face[triangle, corner]} of 0 to {len(vertex) - 1}", REMEDY)
 
 
-def _obj(path: Path) -> Iterator[Surface]:
+def _obj(path: Path) -> Iterator[MeshSurface]:
     """Wavefront OBJ: v, f, and o or g as the start of an object; texture and normals are skipped."""
     vertex: list[tuple[float, float, float]] = []
     objects: list[list[tuple[int, int, int]]] = [[]]  # of vertices as they are counted, from 1
@@ -102,7 +102,7 @@ def _corners(line: str, words: list[str], so_far: int) -> list[int]:
     return corner
 
 
-def _other(path: Path) -> Iterator[Surface]:
+def _other(path: Path) -> Iterator[MeshSurface]:
     import trimesh
 
     kind = path.suffix.lower().lstrip(".")
@@ -113,7 +113,7 @@ def _other(path: Path) -> Iterator[Surface]:
         _check_off(path)
     _check_counts(path, kind)
     try:
-        if kind in BESIDE:
+        if kind in SEVERAL_FILES:
             scene = trimesh.load_scene(path, process=False, maintain_order=True, skip_materials=True)
         else:
             content = io.BytesIO(path.read_bytes())  # a read of as many bytes as a header claims gives what there is, and takes no more memory

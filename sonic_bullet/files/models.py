@@ -12,10 +12,10 @@ from collections.abc import Mapping
 import msgspec
 import numpy as np
 
-from sonic_bullet.errors import LogError
 from sonic_bullet.files.container import REMEDY, read_container, take, write_container
 from sonic_bullet.files.reading import reading
 from sonic_bullet.records import Array, ModalModel
+from sonic_bullet.records.errors import LogError
 
 MODEL_FORMAT = "sonic-bullet-model/1"
 MODEL_ARRAYS: dict[str, tuple[type, tuple[int | None, ...]]] = {
@@ -26,8 +26,8 @@ MODEL_ARRAYS: dict[str, tuple[type, tuple[int | None, ...]]] = {
     "face": (np.int32, (None, 3)),
     "curvature_per_m": (float, (None,)),
 }
-BENT_ARRAYS = ("bend_s2_m2", "choke_s_m")
-"""Of models whose modes go with their level; others have none."""
+BENT_ARRAYS = {"bend_s2_m2": "bend_s2_m2", "choke_s_m": "damping_growth_s_m"}
+"""Array in the file -> field, of models whose modes go with their level; others have none."""
 
 
 class ModelEntry(msgspec.Struct, omit_defaults=True):
@@ -37,7 +37,7 @@ class ModelEntry(msgspec.Struct, omit_defaults=True):
     mass_kg: float
     dropped: int
     note: str
-    choke_power: float = 1.0
+    damping_growth_power: float = msgspec.field(default=1.0, name="choke_power")
     includes_radiation: bool = False
 
 
@@ -68,26 +68,26 @@ def model_key(model: ModalModel) -> bytes:
 
 def pack_model(x: ModalModel) -> ModelEntry:
     """The header's part of a model."""
-    return ModelEntry(float(x.volume_m3), float(x.mass_kg), int(x.dropped), as_json_text(x.note), float(x.choke_power), bool(x.includes_radiation))
+    return ModelEntry(float(x.volume_m3), float(x.mass_kg), int(x.dropped), as_json_text(x.note), float(x.damping_growth_power), bool(x.includes_radiation))
 
 
 def model_arrays(model: ModalModel, index: int) -> dict[str, Array]:
     """The arrays of a model, by their names in the file."""
-    names = (*MODEL_ARRAYS, *(name for name in BENT_ARRAYS if getattr(model, name) is not None))
-    return {f"model{index}_{name}": getattr(model, name) for name in names}
+    bent = {name: field for name, field in BENT_ARRAYS.items() if getattr(model, field) is not None}
+    return {f"model{index}_{name}": getattr(model, field) for name, field in ({name: name for name in MODEL_ARRAYS} | bent).items()}
 
 
 def unpack_model(header: ModelEntry, arrays: Mapping[str, Array], index: int, path: object) -> ModalModel:
     """The model that these were made of. Raises LogError, RecordError."""
     parts = {name: take(arrays, f"model{index}_{name}", dtype, shape, path) for name, (dtype, shape) in MODEL_ARRAYS.items()}
-    parts |= {name: take(arrays, f"model{index}_{name}", float, (None,), path) for name in BENT_ARRAYS if f"model{index}_{name}" in arrays}
+    parts |= {field: take(arrays, f"model{index}_{name}", float, (None,), path) for name, field in BENT_ARRAYS.items() if f"model{index}_{name}" in arrays}
     return ModalModel(
         **parts,
         volume_m3=header.volume_m3,
         mass_kg=header.mass_kg,
         dropped=header.dropped,
         note=header.note,
-        choke_power=header.choke_power,
+        damping_growth_power=header.damping_growth_power,
         includes_radiation=header.includes_radiation,
     )
 

@@ -11,8 +11,8 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from sonic_bullet.errors import FileError, SonicBulletError, excerpt
 from sonic_bullet.files.atomic import cannot
+from sonic_bullet.records.errors import FileError, SonicBulletError, excerpt
 
 QUOTED, WHAT, REMEDY = 200, 120, 80  # characters that may be a file's own: in all; of what is wrong and of the remedy, where it would be more
 
@@ -23,8 +23,8 @@ def reading(path: str | os.PathLike[str], thing: str, kind: type[SonicBulletErro
     try:
         yield
     except SonicBulletError as error:
-        told = _told(error, os.fspath(path), type(error) if isinstance(error, (kind, FileError)) else kind)
-        raise (error if told is None else told) from error.__cause__
+        renamed = _with_path(error, os.fspath(path), type(error) if isinstance(error, (kind, FileError)) else kind)
+        raise (error if renamed is None else renamed) from error.__cause__
     except OSError as error:
         raise cannot("read", path, error) from error
     except MemoryError:
@@ -34,7 +34,7 @@ def reading(path: str | os.PathLike[str], thing: str, kind: type[SonicBulletErro
         raise kind(f"{path} is cut or no {thing} ({excerpt(reason, WHAT)})", remedy) from error
 
 
-def _told(error: SonicBulletError, path: str, kind: type[SonicBulletError]) -> SonicBulletError | None:
+def _with_path(error: SonicBulletError, path: str, kind: type[SonicBulletError]) -> SonicBulletError | None:
     """The error as ``kind``, with the path and no more of the file than is allowed; None where it is all that already."""
     before, named, after = error.what.partition(path) if path else (error.what, " ", "")  # every text has the empty name in it
     if named and type(error) is kind and len(before) + len(after) + len(error.remedy) <= QUOTED:

@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.arrays import Array
-from sonic_bullet.coerce import as_path
-from sonic_bullet.errors import FileError
 from sonic_bullet.files.reading import reading
+from sonic_bullet.records.arrays import Array
+from sonic_bullet.records.coerce import as_path
+from sonic_bullet.records.errors import FileError
 
 READ_MIN_HZ, READ_MAX_HZ = 1000, 10_000_000  # from a slow accelerometer's to a fast vibrometer's
 MOST_SAMPLES, UNPACKED = 1 << 26, 64  # half a gibibyte as float64; or samples a byte of the file, which only packed silence passes

@@ -1,4 +1,6 @@
-"""listener: the room that hears PyBullet, and the only one that imports it. Everything is imported when first used.
+"""listener: what a simulator tells, as values. `world` says what that is; PyBullet, in a folder of its own, is the one there is.
+
+Everything is imported when first used.
 
 world = open_world(client)          BulletClient, the pybullet module, or a client id
 world.hook(before, after)           or, with the raw module, world.after_step() after each stepSimulation
@@ -11,13 +13,15 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from sonic_bullet.listener.clients import direct_client, disconnect, links_called, links_with_shapes
-    from sonic_bullet.listener.doctor import Finding, diagnose_world, keep_restitution
-    from sonic_bullet.listener.script import run_script
-    from sonic_bullet.listener.world import World, open_world
+    from sonic_bullet.listener.pybullet.clients import direct_client, disconnect, links_called, links_with_shapes, open_world
+    from sonic_bullet.listener.pybullet.doctor import Finding, diagnose_world, keep_restitution
+    from sonic_bullet.listener.pybullet.pybullet_world import PyBulletWorld
+    from sonic_bullet.listener.pybullet.script import run_script
+    from sonic_bullet.listener.world import World
 
 __all__ = [
     "Finding",
+    "PyBulletWorld",
     "World",
     "diagnose_world",
     "direct_client",
@@ -30,16 +34,17 @@ __all__ = [
 ]
 
 _HOME = {
-    "Finding": "doctor",
+    "Finding": "pybullet.doctor",
+    "PyBulletWorld": "pybullet.pybullet_world",
     "World": "world",
-    "diagnose_world": "doctor",
-    "direct_client": "clients",
-    "disconnect": "clients",
-    "keep_restitution": "doctor",
-    "links_called": "clients",
-    "links_with_shapes": "clients",
-    "open_world": "world",
-    "run_script": "script",
+    "diagnose_world": "pybullet.doctor",
+    "direct_client": "pybullet.clients",
+    "disconnect": "pybullet.clients",
+    "keep_restitution": "pybullet.doctor",
+    "links_called": "pybullet.clients",
+    "links_with_shapes": "pybullet.clients",
+    "open_world": "pybullet.clients",
+    "run_script": "pybullet.script",
 }
 
 

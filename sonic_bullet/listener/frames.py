@@ -1,24 +1,16 @@
-"""Where every link of every body is, and how fast: PyBullet's centre-of-mass frames as arrays.
+"""Where every link of every body is, and how fast: centre-of-mass frames as arrays, whatever simulator they come from.
 
-    getBasePositionAndOrientation, getBaseVelocity            base (link -1)
-    getLinkStates(computeLinkVelocity=1, computeForwardKinematics=1)[0, 1, 6, 7]   links
-
-Both give the inertial frame (origin at the centre of mass, axes along the principal inertia), the frame of `Body`.
-Bullet integrates semi-implicitly, x(n+1) = x(n) + v(n+1)·dt, so a pose that jumps farther than its speeds allow was
-moved by hand. n rows: one for each link of each body, ordered by (body id, link).
+Origin at the centre of mass, axes along the principal inertia: the frame of `Body`. A semi-implicit integrator has
+x(n+1) = x(n) + v(n+1)·dt, so a pose that jumps farther than its speeds allow was moved by hand.
+n rows: one for each link of each body, ordered by (body id, link).
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from dataclasses import dataclass, field
-from itertools import chain
 
 import numpy as np
-import pybullet
 
-from sonic_bullet.coerce import shown
-from sonic_bullet.errors import SceneError
 from sonic_bullet.listener.kinematics import jumps
 from sonic_bullet.records import Array
 
@@ -28,8 +20,6 @@ DRIVEN_SPEED_M_S = 10.0
 BEYOND = 1e9
 """Metres, m/s, rad/s, N·s: no scene of these sizes reaches it, and the products of such numbers are still numbers."""
 NO_NUMBER = "a pose or speed that is not a number, or beyond 1e9"
-SOFT = 3
-"""What getDynamicsInfo tells of a soft body as its last entry but one (Bullet's BT_SOFT_BODY)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -84,70 +74,6 @@ def encode(body: Array | int, link: Array | int) -> Array:
 def decode(code: int) -> tuple[int, int]:
     """(body, link) of a row code."""
     return int(code) // LINK_SPAN, int(code) % LINK_SPAN - 1
-
-
-def check_connected(client_id: int) -> None:
-    """Raise SceneError unless a physics server answers under this client id."""
-    if not 0 <= client_id < 2**31 or not pybullet.getConnectionInfo(physicsClientId=client_id)["isConnected"]:
-        raise SceneError(
-            f"PyBullet client {shown(client_id)} is not connected", "connect first, e.g. BulletClient(pybullet.DIRECT), and attach before disconnecting"
-        )
-
-
-def body_ids(client_id: int) -> list[int]:
-    """Ids of all bodies in the world, ascending."""
-    return sorted(pybullet.getBodyUniqueId(i, physicsClientId=client_id) for i in range(pybullet.getNumBodies(physicsClientId=client_id)))
-
-
-def is_soft(client_id: int, body: int) -> bool:
-    """Whether an existing body is a soft one."""
-    return bool(pybullet.getDynamicsInfo(body, -1, physicsClientId=client_id)[10] == SOFT)
-
-
-def read_roster(client_id: int, leave_out: Collection[int] = ()) -> Roster:
-    """List bodies, their links and which of them cannot move; without those to be left out and the soft ones."""
-    bodies: list[tuple[int, int, bool]] = []
-    codes: list[int] = []
-    static: list[bool] = []
-    soft: list[int] = []
-    everyone = body_ids(client_id)
-    for body in everyone:
-        if body in leave_out:
-            continue
-        info = pybullet.getDynamicsInfo(body, -1, physicsClientId=client_id)
-        if info[10] == SOFT:
-            soft.append(body)
-            continue
-        joints = pybullet.getNumJoints(body, physicsClientId=client_id)
-        fixed = info[0] == 0
-        bodies.append((body, joints, fixed))
-        codes.extend(int(encode(body, link)) for link in range(-1, joints))
-        static.extend([fixed] + [False] * joints)
-    return Roster(tuple(bodies), np.array(codes, np.int64), np.array(static, bool), len(everyone), tuple(soft))
-
-
-def read_motion(client_id: int, roster: Roster) -> Motion:
-    """Poses and twists now, numbers or not (`Motion.broken`). Raises pybullet.error where a body of the roster is gone or has other links."""
-    still = (0.0, 0.0, 0.0)
-    pose, twist, links = pybullet.getBasePositionAndOrientation, pybullet.getBaseVelocity, pybullet.getLinkStates
-    count = pybullet.getNumJoints
-    flat: list[tuple[float, ...]] = []
-    for body, joints, fixed in roster.bodies:
-        if count(body, client_id) != joints:  # another body has taken over the id: asking for a link that is not there would end the process
-            raise pybullet.error(f"body {body} has other links than before")
-        flat.extend(pose(body, client_id))
-        if fixed:
-            flat.append(still)
-            flat.append(still)
-        else:
-            flat.extend(twist(body, client_id))
-        if joints:
-            for state in links(body, range(joints), computeLinkVelocity=1, computeForwardKinematics=1, physicsClientId=client_id):
-                flat.extend((state[0], state[1], state[6], state[7]))
-    table = np.fromiter(chain.from_iterable(flat), float, 13 * len(roster.code)).reshape(-1, 13)
-    wild = ~(np.abs(table) < BEYOND)
-    broken = tuple(int(body) for body in np.unique(roster.code[wild.any(axis=1)] // LINK_SPAN)) if wild.any() else ()
-    return Motion(roster, *(np.ascontiguousarray(part) for part in (table[:, 0:3], table[:, 3:7], table[:, 7:10], table[:, 10:13])), broken=broken)
 
 
 def link_words(link: int) -> str:

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sonic_bullet.compiled import njit
+from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array
 
 Table = tuple[Array, Array, Array, Array]

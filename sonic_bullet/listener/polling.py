@@ -60,7 +60,7 @@ class Touches:
 def loaded(contacts: Iterable[RawContact], before: Iterable[RawContact] = ()) -> list[RawContact]:
     """Those that carry force: Bullet lists neighbours up to 2 cm apart too. NaN counts as force, to be caught.
 
-    before: what was told after the step before. A contact farther off than its contactProcessingThreshold is not solved and keeps the friction
+    before: what was polled after the step before. A contact farther off than its contactProcessingThreshold is not solved and keeps the friction
     of the step in which it last was, to the bit, beside no normal force: that acts on nobody. (Friction without normal force that is
     new does act: the solver ended between the two, and without it momentum does not balance.)
     """

@@ -6,14 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sonic_bullet.contacts import Contacts
-from sonic_bullet.errors import SceneError
 from sonic_bullet.listener.frames import Motion, rows_of
 from sonic_bullet.listener.kinematics import relative_motion
 from sonic_bullet.listener.polling import Touches
 from sonic_bullet.listener.start import Start
 from sonic_bullet.listener.sweep import Trace, place_and_match, remembered
 from sonic_bullet.records import Array
+from sonic_bullet.records.contacts import Contacts
+from sonic_bullet.records.errors import SceneError
 
 SPAWN_DEPTH_M = 1e-4
 

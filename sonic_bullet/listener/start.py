@@ -1,22 +1,22 @@
 """Poses and twists at the start of a step, and who was moved by hand or is new.
 
 Hooked, they were read before the step. Otherwise those left by the step before hold, but not for bodies that are new or were
-moved since: there Bullet's semi-implicit step is undone from what it left,
-
-    x = x' - v' dt,   v = v' - g dt - ΣJ/m,   ω = ω' - I⁻¹ Σ (p - x) × J        (single bodies; of links only the pose)
+moved since: there the simulator's own step is taken back (`Undo`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
 import numpy as np
-import pybullet
 
-from sonic_bullet.listener.frames import LINK_SPAN, Motion, Roster, advanced, decode, jumped, rows_of, with_driven_twists
+from sonic_bullet.listener.frames import LINK_SPAN, Motion, Roster, jumped, rows_of, with_driven_twists
 from sonic_bullet.listener.polling import Touches
 from sonic_bullet.records import Array
+
+Undo = Callable[[Motion, Array, Touches, float], Motion]
+"""(motion after the step, rows (n,) to take back, the step's contacts, its length) -> the motion one step earlier, right in those rows."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,8 +39,11 @@ def hooked_start(past: Motion | None, now: Motion, by_hand: Collection[int], dt_
     return Start(with_driven_twists(past, now, dt_s), moved, born)
 
 
-def polled_start(past: Motion, now: Motion, touches: Touches, dt_s: float, *, client_id: int, first: bool) -> Start:
-    """From the motions read after the last step and after this one. What stands still by mass 0 stands where it stands now."""
+def polled_start(past: Motion, now: Motion, touches: Touches, dt_s: float, *, undo: Undo, first: bool) -> Start:
+    """From the motions read after the last step and after this one. What stands still by mass 0 stands where it stands now.
+
+    undo: takes a step back where nothing was read before it.
+    """
     roster = now.roster
     old = rows_of(past.roster, roster.code)
     born, moved = old < 0, jumped(past, now, dt_s)
@@ -49,7 +52,7 @@ def polled_start(past: Motion, now: Motion, touches: Touches, dt_s: float, *, cl
     start = chosen(roster.static, driven, start)
     lost = born | moved
     if lost.any():
-        start = chosen(lost & ~roster.static, undone(now, lost, touches, dt_s, client_id), chosen(lost, now, start))
+        start = chosen(lost & ~roster.static, undo(now, lost, touches, dt_s), chosen(lost, now, start))
     if first:
         born, moved = np.ones_like(born), np.zeros_like(moved)
     return Start(start, moved, born)
@@ -63,28 +66,3 @@ def taken(motion: Motion, roster: Roster, rows: Array) -> Motion:
 def chosen(mask: Array, yes: Motion, no: Motion) -> Motion:
     """Rows of `yes` where mask (n,), else of `no`."""
     return Motion(yes.roster, *(np.where(mask[:, None], a, b) for a, b in zip(yes.table, no.table, strict=True)))
-
-
-def undone(now: Motion, which: Array, touches: Touches, dt_s: float, client_id: int) -> Motion:
-    """The motion one step earlier, right in the rows `which` (n,)."""
-    settings = pybullet.getPhysicsEngineParameters(physicsClientId=client_id)
-    gravity = np.array([settings[f"gravityAcceleration{axis}"] for axis in "XYZ"])
-    single = {body for body, joints, _ in now.roster.bodies if joints == 0}
-    back = advanced(now, -dt_s)
-    velocity, spin = back.velocity_m_s.copy(), back.spin_rad_s.copy()
-    for row in np.flatnonzero(which & ~now.roster.static):
-        code = now.roster.code[row]
-        body, link = decode(code)
-        info = pybullet.getDynamicsInfo(body, link, physicsClientId=client_id)
-        if body not in single or not 0 < info[0] < np.inf:
-            continue
-        sign = (touches.code_a == code).astype(float) - (touches.code_b == code)
-        own = sign != 0
-        impulse = sign[own, None] * touches.impulse_n_s[own]
-        point = np.where(touches.code_a[own, None] == code, touches.point_a_m[own], touches.point_b_m[own])
-        turn = np.array(pybullet.getMatrixFromQuaternion(back.quaternion_xyzw[row])).reshape(3, 3)
-        angular = np.cross(point - back.position_m[row], impulse).sum(axis=0)
-        inverse = np.array([1 / x if x > 0 else 0.0 for x in info[2]])
-        velocity[row] -= impulse.sum(axis=0) / info[0] + gravity * dt_s
-        spin[row] -= turn @ (inverse * (turn.T @ angular))
-    return Motion(now.roster, back.position_m, back.quaternion_xyzw, velocity, spin)

@@ -15,8 +15,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from sonic_bullet.compiled import njit
 from sonic_bullet.listener.kinematics import Table, pose_after, turn
+from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array
 
 MEMORY_STEPS = 5

@@ -1,100 +1,58 @@
-"""A PyBullet world as the sound sees it: bodies by value, and one `Step` for each physics step.
+"""What a simulator must tell a listener. PyBullet is one (listener/pybullet/), a contact log played back is another (tests).
 
-    before_step():  poses and twists                (with a hook; else those left by the previous step)
-    stepSimulation
-    after_step():   contacts, asked for once -> rows in body frames -> Step
+    the simulator steps -> after_step() -> Step (records.contacts)
 
-Contact positions belong to the pose at the start of the step, so that is the pose all rows use. No row is made of: pairs
-without force; islands asleep (speeds exactly 0, contacts bit-identical to the step before); a second poll without a step between
-(everything bit-identical); a body moved by hand since the last step; and the first step of a body that began its life
-inside another, for then the position correction leaks into the impulse; and whoever `left_out` names: one body whose numbers break
-takes nothing from the sound of the others.
+A second simulator derives from `World` and is handed to `sonic_bullet.attach` in place of a client.
 """
 
 from __future__ import annotations
 
-import numbers
-import weakref
-from collections.abc import Callable, Collection, Sequence
-from dataclasses import replace
-from typing import Any
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
 
-import numpy as np
-import pybullet
-
-from sonic_bullet.coerce import shown
-from sonic_bullet.contacts import Contacts, Step
-from sonic_bullet.errors import SceneError
-from sonic_bullet.listener import bodies as facts
-from sonic_bullet.listener import hooks, shapes
-from sonic_bullet.listener.census import Census, ask
-from sonic_bullet.listener.frames import LINK_SPAN, Motion, Roster, check_connected, encode, jumped, rows_of, same_motion
-from sonic_bullet.listener.left_out import LeftOut
-from sonic_bullet.listener.polling import Touches, gather, loaded
-from sonic_bullet.listener.rows import Meetings, contact_rows, meetings
-from sonic_bullet.listener.start import Start, hooked_start, polled_start, taken
-from sonic_bullet.listener.substeps import SubstepLog, gather_substeps
-from sonic_bullet.listener.sweep import NO_TRACES, Trace
-from sonic_bullet.records import Array, Body, Material, ModalModel, Shape
+from sonic_bullet.records import Body, Material, ModalModel, Shape
+from sonic_bullet.records.contacts import Step
 
 
-class World:
-    """State of listening to one client: who lives, what was last seen, what is remembered of contacts. Made by open_world."""
+class World(ABC):
+    """Bodies, poses, twists, contacts and step lengths of one simulated world."""
 
-    def __init__(self, client: Any, client_id: int) -> None:
-        self._client = weakref.ref(client) if hasattr(client, "__weakref__") else lambda: client  # a client that is dropped is to disconnect
-        self.client_id = client_id
-        self.epoch = 0
-        self.step_count = 0
-        self.stepped = False
-        self._bodies: list[Body] = []
-        self._live: dict[int, int] = {}
-        self._rows_known: tuple[Roster, Array] | None = None
-        self._position_m = np.zeros((0, 3))
-        self._quaternion_xyzw = np.zeros((0, 4))
-        self._time_s = 0.0
-        self._gravity_m_s2 = np.zeros(3)
-        self._census = Census(client_id, self._bury, self._end)
-        self._before: Motion | None = None
-        self._past_touches: Touches | None = None
-        self._told = self._told_before = ask(self.client_id, pybullet.getContactPoints)
-        self._moved: set[int] = set()
-        self._traces: tuple[Trace, ...] = NO_TRACES
-        self._log = SubstepLog(client_id)
-        self._uninstall: Callable[[], None] | None = None
-        if self._step_length()[1] > 1:
-            self._log.open()
-        self._past: Motion = self._census.read()
+    stepped: bool
+    """Whether the last `after_step` found a step: a second call without one between finds none."""
 
     @property
-    def client(self) -> Any:
-        """What is listened to; None once it was dropped."""
-        return self._client()
-
-    @property
-    def left_out(self) -> LeftOut:
-        """Who of the world is left out, and what was said of it."""
-        return self._census.left_out
-
-    @property
+    @abstractmethod
     def bodies(self) -> tuple[Body, ...]:
         """All bodies ever met, in the order that Contacts.a and Contacts.b count them."""
-        return tuple(self._bodies)
 
     @property
     def untouched(self) -> frozenset[int]:
-        """Ids of the bodies that were in the world at the last step and have met nobody yet."""
-        return frozenset(body for body, _, _ in self._past.roster.bodies) - {code // LINK_SPAN for code in self._live}
+        """Ids of the bodies that are in the world and have met nobody yet."""
+        return frozenset()
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What of the world is left out of the sound, and why."""
+        return ()
 
     @property
     def has_bodies(self) -> bool:
-        """Whether anybody was in the world at the last step."""
-        return bool(self._past.roster.bodies)
+        """Whether there is any body in the world."""
+        return bool(self.bodies)
 
-    def index_of(self, body: int, link: int = -1) -> int:
-        """Index into `bodies` of the living record of a link, or -1."""
-        return self._live.get(int(encode(body, link)), -1)
+    @abstractmethod
+    def links_called(self, body: object, link: object) -> tuple[int, tuple[int, ...]]:
+        """The body's id and its links of that number or name, "all" of them. Raises SceneError."""
 
+    @abstractmethod
+    def name_of(self, body: int, link: int = -1) -> str:
+        """What people call a link. Raises SceneError for an unknown one."""
+
+    @abstractmethod
+    def shapes_of(self, body: int, link: int = -1) -> tuple[Shape, ...]:
+        """Geometry of a link in its body frame. Raises SceneError for an unknown one, MeshError where it has none."""
+
+    @abstractmethod
     def add(
         self,
         body: int,
@@ -102,240 +60,18 @@ class World:
         *,
         material: Material | None = None,
         model: ModalModel | None = None,
-        volume_m3: float | None = None,
         shapes: Sequence[Shape] = (),
-        name: str | None = None,
     ) -> Body:
-        """Make a link known, with what it is made of; its record, which `bodies` holds from now on.
+        """Make a link known with what it is made of; its record, which `bodies` holds from now on. Raises SceneError."""
 
-        A record that exists already (a silent partner, or an earlier add) ends with this step and a new one begins.
-        volume_m3 None: the model's volume, or 0. shapes: its true geometry where that is not its collision shape; a lone sphere
-        tells its curvature. A body that was muted is listened to again. Raises SceneError for an unknown body or link, a soft body, or
-        a mass, pose or speed that is not one.
-        """
-        check_connected(self.client_id)
-        facts.check_exists(self.client_id, body, link)
-        facts.check_usable(self.client_id, body)
-        if body in self.left_out.muted:
-            self.left_out.forget(body)
-            self._census.stale()
-        self._census.read()
-        record = facts.describe(self.client_id, body, link, self.epoch)
-        volume = volume_m3 if volume_m3 is not None else (model.volume_m3 if model else 0.0)
-        record = replace(record, material=material, model=model, volume_m3=volume, since_step=self.step_count, name=name or record.name)
-        if shapes:
-            alone = shapes[0] if len(shapes) == 1 and shapes[0].kind == "sphere" else None
-            record = replace(record, curvature_per_m=1 / float(alone.size_m[0]) if alone is not None else float("nan"))
-        self._close([int(encode(body, link))])
-        self._append(int(encode(body, link)), record)
-        return record
-
-    def name_of(self, body: int, link: int = -1) -> str:
-        """What people call a link: its name and its body's id. Raises SceneError for an unknown one."""
-        check_connected(self.client_id)
-        facts.check_exists(self.client_id, body, link)
-        name = facts.link_name(self.client_id, body, link)
-        return name if name == f"body {body}" else f"{name} (body {body})"
-
-    def shapes_of(self, body: int, link: int = -1) -> tuple[Shape, ...]:
-        """Geometry of a link in its body frame. Raises SceneError for an unknown one, MeshError where it has none."""
-        check_connected(self.client_id)
-        facts.check_exists(self.client_id, body, link)
-        return shapes.shapes_of(self.client_id, body, link)
-
-    def forget(self, body: int | None = None) -> None:
-        """Say that a body was removed (None: all, by resetSimulation); its id may be given anew. With a hook, nobody need call this."""
-        self.epoch += 1
-        self.left_out.forget(body)
-        self._close([code for code in self._live if body is None or code // LINK_SPAN == body])
-        if body is None:
-            self._log.abandon()
-            self._traces, self._past_touches = NO_TRACES, None
-        past = self._past.roster
-        keep = np.flatnonzero(past.code // LINK_SPAN != body) if body is not None else np.zeros(0, int)
-        self._past = taken(
-            self._past,
-            replace(past, bodies=tuple(e for e in past.bodies if e[0] != body and body is not None), code=past.code[keep], static=past.static[keep]),
-            keep,
-        )
-        self._moved = {x for x in self._moved if body is not None and x != body}
-        self._census.stale()
-
-    def mark_moved(self, body: int | None) -> None:
-        """Note that a body (None: every body) was moved by hand before the coming step."""
-        self._moved.update([body] if body is not None else [entry[0] for entry in self._past.roster.bodies])
-
-    def mark_changed(self) -> None:
-        """Note that masses may have changed: who is static is read again."""
-        self._census.stale()
-
-    def hook(self, before: Callable[[], object], after: Callable[[], object]) -> None:
-        """Call `before` and `after` round every stepSimulation of a BulletClient; `before` is, or calls, `before_step`.
-
-        Raises SceneError for the pybullet module or a client id: they have no instance to hook.
-        """
-        self.unhook()
-        self._uninstall = hooks.install(self, before, after)
-
-    def unhook(self) -> None:
-        """Leave the client as it was and end the sub-step log; harmless when not hooked."""
-        if self._uninstall is not None:
-            self._uninstall()
-            self._uninstall = None
-        self._before = None
-        if self.client is None:
-            self._log.abandon()  # its id may be another's by now
-        else:
-            self._log.close()
-
-    def before_step(self) -> None:
-        """Read poses and twists at the start of the step. Raises SceneError (lost connection)."""
-        if self._step_length()[1] > 1 and not self._log.is_open:
-            self._log.open()
-        self._before = self._census.read()
-
+    @abstractmethod
     def after_step(self) -> Step:
-        """This step's record. Call once after each stepSimulation; a second call without a step between finds no contacts.
+        """The record of the step just made. Raises SceneError."""
 
-        `stepped` tells whether there was a step. Without a hook, a missing one is known by a world in motion that stands where it
-        stood, to the bit; where nothing moves at all, a second call passes for a step.
-        Raises SceneError: lost connection, sub-steps that cannot be heard.
-        """
-        dt, substeps = self._step_length()
-        self.stepped = self._uninstall is None or self._before is not None
-        if not self.stepped:
-            return self._again(dt)
-        touches = self._touches(dt, substeps)
-        first, past_touches = self.step_count == 0, self._past_touches
-        now = self._before if self._before is not None else self._census.read()
-        touches = self._census.usable(touches)
-        if self._before is not None:
-            start = hooked_start(None if first else self._past, now, self._moved, dt)
-        else:
-            frozen = not first and same_motion(self._past, now)
-            if frozen and now.would_move(dt) and past_touches is not None and touches.equals(past_touches):
-                self.stepped = False
-                return self._again(dt)
-            self._expose_impostors(now, dt)
-            start = polled_start(self._past, now, touches, dt, client_id=self.client_id, first=first)
-        self._past_touches, self._past, self._before = touches, now, None
-        meeting = meetings(touches, past_touches, start, dt)
-        of_row = self._of_row(now.roster, meeting)
-        meeting = meeting.kept((of_row[meeting.row_a] >= 0) & (of_row[meeting.row_b] >= 0))
-        contacts, self._traces = contact_rows(meeting, of_row[meeting.row_a], of_row[meeting.row_b], start.motion, self._time_s, self._traces)
-        step = self._step(dt, start, of_row, contacts)
-        self._moved.clear()
-        self._time_s += dt
-        self.step_count += 1
-        return step
+    def listen(self, after: Callable[[], object]) -> bool:
+        """Call ``after`` after every step from now on, if the simulator can; whether it does. Else somebody calls `Listener.step`."""
+        return False
 
-    def _again(self, dt: float) -> Step:
-        """A step in which nothing happens."""
-        return Step(dt, self._position_m, self._quaternion_xyzw, np.zeros(len(self._bodies), bool), Contacts.none(), self._gravity_m_s2)
-
-    def _step(self, dt: float, start: Start, of_row: Array, contacts: Contacts) -> Step:
-        row = np.flatnonzero(of_row >= 0)
-        index = of_row[row]
-        teleported = np.zeros(len(self._bodies), bool)
-        self._position_m[index] = start.motion.position_m[row]
-        self._quaternion_xyzw[index] = start.motion.quaternion_xyzw[row]
-        teleported[index] = start.moved[row]
-        return Step(dt, self._position_m, self._quaternion_xyzw, teleported, contacts, self._gravity_m_s2)
-
-    def _touches(self, dt: float, substeps: int) -> Touches:
-        last = ask(self.client_id, pybullet.getContactPoints)
-        if substeps == 1:
-            if self._log.is_open:
-                self._log.close()
-            if last != self._told:  # polled twice, it tells the same twice
-                self._told_before, self._told = self._told, last
-            return gather(loaded(last, self._told_before), dt)
-        if not self._log.is_open:
-            self._log.open()
-            raise SceneError(
-                f"numSubSteps was set to {substeps} after listening began", "set it before attaching, or attach to a BulletClient, whose steps are hooked"
-            )
-        touches, self._log.count = gather_substeps(self._log.records(), last, dt, substeps, self._log.count)
-        return touches
-
-    def _step_length(self) -> tuple[float, int]:
-        settings = ask(self.client_id, pybullet.getPhysicsEngineParameters)
-        self._gravity_m_s2 = np.array([settings[f"gravityAcceleration{axis}"] for axis in "XYZ"])
-        return settings["fixedTimeStep"], max(1, settings["numSubSteps"])
-
-    def _bury(self, roster: Roster) -> None:
-        """Close the records of bodies that have gone without a hook seeing it."""
-        codes = np.array(list(self._live), np.int64)
-        gone = codes[rows_of(roster, codes) < 0]
-        if len(gone):
-            self.epoch += 1
-            self._close(gone.tolist())
-
-    def _end(self, bodies: Collection[int]) -> None:
-        """Close the records of bodies."""
-        self._close([code for code in self._live if code // LINK_SPAN in bodies])
-
-    def _expose_impostors(self, now: Motion, dt: float) -> None:
-        """Where nobody saw removals: what jumped and has another name, mass or inertia has taken over an old id."""
-        for code in now.roster.code[jumped(self._past, now, dt)]:
-            index = self._live.get(int(code))
-            if index is not None:
-                known, seen = self._bodies[index], self._census.described(code, self.epoch)
-                if seen is None:
-                    continue
-                same = known.mass_kg == seen.mass_kg and np.array_equal(known.inertia_kg_m2, seen.inertia_kg_m2)
-                if not same or not np.array_equal(known.curvature_per_m, seen.curvature_per_m, equal_nan=True):
-                    self.epoch += 1
-                    self._close([int(code)])
-
-    def _of_row(self, roster: Roster, meeting: Meetings) -> Array:
-        """(n,) index into `bodies` of each row of the roster, -1 for who never met anybody; who meets the first time gets a silent record."""
-        of_row = self._index_of_row(roster)
-        met = np.unique(np.concatenate([meeting.row_a, meeting.row_b]))
-        strangers = met[of_row[met] < 0]
-        for code in roster.code[strangers]:
-            record = self._census.described(code, self.epoch)
-            if record is not None:
-                self._append(int(code), replace(record, since_step=self.step_count))
-        return self._index_of_row(roster) if len(strangers) else of_row
-
-    def _index_of_row(self, roster: Roster) -> Array:
-        if self._rows_known is None or self._rows_known[0] is not roster:
-            of_row = np.array([self._live.get(int(code), -1) for code in roster.code], np.int64)
-            self._rows_known = roster, of_row
-        return self._rows_known[1]
-
-    def _append(self, code: int, record: Body) -> None:
-        self._live[code] = len(self._bodies)
-        self._rows_known = None
-        self._bodies.append(record)
-        row = rows_of(self._past.roster, np.array([code]))[0]
-        pose = (self._past.position_m[row], self._past.quaternion_xyzw[row]) if row >= 0 else (np.zeros(3), np.array([0, 0, 0, 1.0]))
-        self._position_m = np.concatenate([self._position_m, pose[0][None]])
-        self._quaternion_xyzw = np.concatenate([self._quaternion_xyzw, pose[1][None]])
-
-    def _close(self, codes: list[int]) -> None:
-        for code in codes:
-            if code in self._live:
-                index = self._live.pop(code)
-                self._bodies[index] = replace(self._bodies[index], until_step=self.step_count)
-        self._rows_known = None
-
-
-def client_id_of(client: Any) -> int:
-    """The client id of a BulletClient, the pybullet module (its default client 0) or an id. Raises SceneError where nothing is connected."""
-    if client is pybullet:
-        client_id = 0
-    elif isinstance(client, numbers.Integral) and not isinstance(client, bool):
-        client_id = int(client)
-    elif isinstance(getattr(client, "_client", None), int):
-        client_id = client._client
-    else:
-        raise SceneError(f"client is {shown(client)}", "pass a BulletClient, the pybullet module or a client id")
-    check_connected(client_id)
-    return client_id
-
-
-def open_world(client: Any) -> World:
-    """Listen to a BulletClient, the pybullet module (its client 0) or a client id. Raises SceneError where nothing is connected there."""
-    return World(client, client_id_of(client))
+    @abstractmethod
+    def unhook(self) -> None:
+        """Leave the simulator as it was; harmless when nothing listens."""

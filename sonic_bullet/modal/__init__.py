@@ -3,10 +3,10 @@
 Shape -> solid.Solid (structured.py, tetrahedra.py) -> K, M (fem.py) -> λ, U (eigen.py) -> ModalModel (model.py), kept by cache.py
 """
 
-from sonic_bullet.modal.mesh_files import read_mesh
+from sonic_bullet.modal.meshing.mesh_files import read_mesh
+from sonic_bullet.modal.meshing.shape_meshes import check_fillable
+from sonic_bullet.modal.meshing.solid import COARSER
 from sonic_bullet.modal.model import analyse
 from sonic_bullet.modal.options import ModalOptions
-from sonic_bullet.modal.shapes import check_fillable
-from sonic_bullet.modal.solid import COARSER
 
 __all__ = ["COARSER", "ModalOptions", "analyse", "check_fillable", "read_mesh"]

@@ -4,7 +4,7 @@
 
 A file is written beside its name and moved there whole; a cut, foreign or unreadable file is a miss, and so is what is no file, one whose
 content is not what its SHA-256 says, or not what was asked for: names, dtypes, shapes, finite numbers, indices. A miss is computed anew and
-takes its place. Nothing is pickled. The user's cache folder is private (`sonic_bullet.user_folder`); without a home nothing is kept. Against
+takes its place. Nothing is pickled. The user's cache folder is private (`sonic_bullet.machine.user_folder`); without a home nothing is kept. Against
 an owner of the folder who forges the digest too there is no defence, and none is meant.
 """
 
@@ -22,9 +22,9 @@ from typing import Literal, NamedTuple
 import msgspec
 import numpy as np
 
-from sonic_bullet.errors import FileError, LogError
+from sonic_bullet.machine.user_folder import START, cache_folder
 from sonic_bullet.records import Array
-from sonic_bullet.user_folder import START, cache_folder
+from sonic_bullet.records.errors import FileError, LogError
 
 Place = Path | Literal["default"] | None
 FORMAT = "sonic-bullet-cache/2"  # 1 had no digest: a miss
@@ -76,7 +76,7 @@ def code_digest(files: tuple[Path, ...], packages: tuple[str, ...]) -> bytes:
 def _code() -> bytes:
     """Digest of all that turns a surface into modes: this room's source, the geometry below it, the solvers' versions."""
     here = Path(__file__).resolve().parent
-    return code_digest((*sorted(here.glob("*.py")), here.parent / "geometry.py", here.parent / "surface_index.py"), SOLVERS)
+    return code_digest((*sorted(here.rglob("*.py")), *sorted((here.parent / "geometry").glob("*.py"))), SOLVERS)
 
 
 def key(kind: str, *parts: Array | str | float | int | None, code: bytes | None = None) -> str:

@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from sonic_bullet.errors import ModalError
 from sonic_bullet.records import Array
+from sonic_bullet.records.errors import ModalError
 
-# ω a² √(ρh/D) of a thin free square plate, ν = 0.3, converged Ritz values with a twin's two entries each.
+# ω a² √(ρh/D) of a thin free square plate, ν = 0.3, converged Ritz values with a degenerate pair's two entries each.
 FREE_SQUARE_PLATE = (13.468, 19.596, 24.270, 34.801, 34.801, 61.093, 61.093, 63.69, 69.27, 77.17)
 
 

@@ -4,7 +4,7 @@
     harm                                                                          [Ericsson & Ruhe 1980, eq. 1.3-1.5]
     A V_j = V_{j-1} B_jᵀ + V_j A_j + V_{j+1} B_{j+1},  VᵀMV = 1                   [Grimes, Lewis, Simon 1994, eq. 3.1]
 
-The basis is kept orthogonal in full, so that twins of a symmetric body are found as twins, and grows until the last mode asked for
+The basis is kept orthogonal in full, so that degenerate modes of a symmetric body are found as such, and grows until the last mode asked for
 has converged: no restart. The factor is SuperLU's in symmetric mode; the start block is seeded: same body, same bits.
 """
 
@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.errors import ModalError
 from sonic_bullet.records import Array
+from sonic_bullet.records.errors import ModalError
 
 BLOCK = 8
 TOLERANCE = 1e-7  # of the residual bound, relative to θ

@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.errors import MeshError
-from sonic_bullet.modal.solid import Solid, corner_volume_m3
+from sonic_bullet.modal.meshing.solid import Solid, corner_volume_m3
 from sonic_bullet.records import Array
+from sonic_bullet.records.errors import MeshError
 
 CHUNK = 2000  # elements at a time: keeps the (t, 30, 30) blocks of a large body out of memory
 

@@ -15,14 +15,14 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from sonic_bullet.errors import MeshError, ModalError
 from sonic_bullet.geometry import oversize
 from sonic_bullet.modal import cache as store
 from sonic_bullet.modal.options import ModalOptions
 from sonic_bullet.records import Array, Material, ModalModel, Shape
+from sonic_bullet.records.errors import MeshError, ModalError
 
 if TYPE_CHECKING:
-    from sonic_bullet.modal.shapes import Filled
+    from sonic_bullet.modal.meshing.shape_meshes import Filled
 
 MOST_MODES = 200
 MODES = {
@@ -159,13 +159,13 @@ def damped(lambda_per_s2: Array, material: Material) -> tuple[Array, Array, Arra
 
 def _filled(shapes: tuple[Shape, ...], sizes: tuple[float | None, float | None], kept: tuple[store.Place, str], say: Callable[[str], None]) -> Filled:
     """The body's inside and skin, from the cache where it is there. sizes: edge_m, thickness_m."""
-    from sonic_bullet.modal.shapes import Filled, fill
-    from sonic_bullet.modal.solid import Solid, Surface
+    from sonic_bullet.modal.meshing.shape_meshes import Filled, fill
+    from sonic_bullet.modal.meshing.solid import Solid, SolidSurface
 
     found = store.load(*kept, SOLID)
     if found is not None:
         a, note = found
-        return Filled(Solid(a["node"], a["tet"], bool(a["affine"][0]), note), Surface(a["skin"], a["face"]), a["curvature"])
+        return Filled(Solid(a["node"], a["tet"], bool(a["affine"][0]), note), SolidSurface(a["skin"], a["face"]), a["curvature"])
     body = fill(shapes, *sizes, say)
     solid, skin = body.solid, body.skin
     arrays = {
@@ -193,7 +193,7 @@ def _solve(
 ) -> _Unit:
     """Fill (or fetch the filled body), assemble, clamp and solve, all without units."""
     from sonic_bullet.modal import eigen, fem, polynomials
-    from sonic_bullet.modal.solid import Solid
+    from sonic_bullet.modal.meshing.solid import Solid
 
     body = _filled(shapes, sizes, kept, say)
     unit = Solid(body.solid.node_m / length_m, body.solid.tet, body.solid.affine)

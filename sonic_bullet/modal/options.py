@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from sonic_bullet.arrays import store
-from sonic_bullet.coerce import as_number, as_rows, as_whole
-from sonic_bullet.errors import MeshError, ModalError
+from sonic_bullet.records.arrays import store
+from sonic_bullet.records.coerce import as_number, as_rows, as_whole
+from sonic_bullet.records.errors import MeshError, ModalError
 
 MOST_ASKED = 2000
 HIGHEST_HZ = 1e9

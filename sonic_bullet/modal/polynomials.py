@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet import geometry
-from sonic_bullet.modal import prisms
-from sonic_bullet.modal.shapes import rotation
+from sonic_bullet.modal.meshing import prisms
+from sonic_bullet.modal.meshing.shape_meshes import rotation
 from sonic_bullet.records import Array, Shape
 
 MOST_UNKNOWNS = 1800
@@ -151,7 +151,7 @@ def lowest(stiffness: Array, limit: float, rigid: int) -> tuple[Array, Array]:
         factor = cho_factor(stiffness - shift * np.eye(n), check_finite=False)
         inverse = LinearOperator((n, n), matvec=lambda x: cho_solve(factor, x, check_finite=False), dtype=float)
         value, vector = eigsh(stiffness, count, sigma=shift, OPinv=inverse, v0=np.random.default_rng(0).standard_normal(n), tol=1e-12)
-    if not value.max() <= limit:  # Lanczos took a twin for one
+    if not value.max() <= limit:  # Lanczos took a degenerate pair for one
         value, vector = eigh(stiffness, subset_by_index=(0, count - 1), check_finite=False)
     order = np.argsort(value)[rigid:]
     return value[order], vector[:, order]

@@ -16,11 +16,11 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.errors import MeshError, ModalError
+from sonic_bullet.geometry.nearest_point import closest_point
 from sonic_bullet.modal import cache as store
 from sonic_bullet.modal.model import MOST_MODES, SHIFT, _diagonal_m
 from sonic_bullet.records import Array, Shape
-from sonic_bullet.surface_index import closest_point
+from sonic_bullet.records.errors import MeshError, ModalError
 
 APART = 0.05  # of ν₁ and ν₂ from the guess
 POISSON = (-0.5, 0.485)
@@ -170,8 +170,9 @@ def _of_box(shape: Shape, length: float, limit: float, poisson: float, say: Call
     """The family of a free box, without elements; None where the shape is no box, or one of too many unknowns."""
     from scipy.linalg import block_diag
 
-    from sonic_bullet.modal import polynomials, structured
-    from sonic_bullet.modal.solid import surface
+    from sonic_bullet.modal import polynomials
+    from sonic_bullet.modal.meshing import structured
+    from sonic_bullet.modal.meshing.solid import surface
 
     box = polynomials.recognised(shape)
     if box is None:
@@ -256,9 +257,9 @@ def _of_revolution(shape: Shape, length: float, limit: float, poisson: float, sa
         return None
     cells = int(np.clip(AROUND * parts[-1][0], 24, 96))
     point, face = revolved.skin(section, cells)
-    twins = [(part, twin) for part in parts for twin in ((False, True) if part[0] else (False,))]
-    lame, shear = (block_diag(*(part[k] for part, _ in twins)) for k in (1, 2))
-    moved = np.concatenate([revolved.shapes_at(section, part[3], part[0], twin, cells).astype(np.float32) for part, twin in twins], axis=2)
+    degenerate = [(part, second) for part in parts for second in ((False, True) if part[0] else (False,))]
+    lame, shear = (block_diag(*(part[k] for part, _ in degenerate)) for k in (1, 2))
+    moved = np.concatenate([revolved.shapes_at(section, part[3], part[0], second, cells).astype(np.float32) for part, second in degenerate], axis=2)
     moved = np.ascontiguousarray(np.einsum("yx,vxb->vyb", body.axes.astype(np.float32), moved))
     note = f"body of revolution, section of {n} nodes, up to {parts[-1][0]} waves around; nu {low:g} and {high:g}"
     vertex_m = point * length @ body.axes.T + body.centre_m
@@ -273,8 +274,8 @@ def _mixed(poisson: float, lame: Any, shear: Any) -> Any:
 
 def _family(shape: Shape, length: float, limit: float, poisson: float, clamp: Array, edge_m: float | None, say: Callable[[str], None]) -> Family:
     from sonic_bullet.modal import eigen, fem
-    from sonic_bullet.modal.shapes import fill
-    from sonic_bullet.modal.solid import Solid
+    from sonic_bullet.modal.meshing.shape_meshes import fill
+    from sonic_bullet.modal.meshing.solid import Solid
 
     body = fill((shape,), edge_m, None, say)
     unit = Solid(body.solid.node_m / length, body.solid.tet, body.solid.affine)

@@ -3,7 +3,7 @@
     u_r = U cos mθ,  u_z = W cos mθ,  u_θ = V sin mθ     [Zienkiewicz & Taylor, The Finite Element Method (2000), vol. 2, ch. 9.4-9.5]
     ε_rr = U,r   ε_zz = W,z   ε_θθ = (U + mV)/r   γ_rz = U,z + W,r   γ_rθ = V,r − (V + mU)/r   γ_zθ = V,z − mW/r
 
-Each m is a small plane problem, each mode of m > 0 has a twin turned by π/2m, exactly. A surface is recognised by its rings: vertices of one radius
+Each m is a small plane problem, each mode of m > 0 has a degenerate partner turned by π/2m, exactly. A surface is recognised by its rings: vertices of one radius
 and height that go round evenly; the section is the polygon of the rings, so that the body is round where the mesh is faceted.
 """
 
@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet import geometry
-from sonic_bullet.modal.prisms import triangulated
-from sonic_bullet.modal.solid import QUARTERS
+from sonic_bullet.modal.meshing.prisms import triangulated
+from sonic_bullet.modal.meshing.solid import QUARTERS
 from sonic_bullet.records import Array
 
 ROUND = 2e-5  # of the diagonal: what a ring's vertices may differ by
@@ -96,15 +96,15 @@ def _outline(point: Array, face: Array) -> Array | None:
         return None
     edge = np.unique(np.sort(ring[np.concatenate([face[:, [0, 1]], face[:, [1, 2]], face[:, [2, 0]]])], axis=1), axis=0)
     edge = edge[edge[:, 0] != edge[:, 1]]
-    beside: list[set[int]] = [set() for _ in range(rings)]
+    neighbours: list[set[int]] = [set() for _ in range(rings)]
     for a, b in edge.tolist():
-        beside[a].add(b)
-        beside[b].add(a)
+        neighbours[a].add(b)
+        neighbours[b].add(a)
     # A diagonal may join a ring to the next but one: where a third lies on the way, it is no side.
     side: list[list[int]] = [[] for _ in range(rings)]
     for a, b in edge.tolist():
         direct = np.linalg.norm(middle[a] - middle[b])
-        over = any(np.linalg.norm(middle[a] - middle[c]) + np.linalg.norm(middle[c] - middle[b]) < 1.02 * direct for c in beside[a] & beside[b])
+        over = any(np.linalg.norm(middle[a] - middle[c]) + np.linalg.norm(middle[c] - middle[b]) < 1.02 * direct for c in neighbours[a] & neighbours[b])
         if not over:
             side[a].append(b)
             side[b].append(a)
@@ -243,7 +243,7 @@ def angles(cells: int) -> Array:
     return np.arange(2 * cells) * np.pi / cells
 
 
-def shapes_at(section: Section, vector: Array, m: int, twin: bool, cells: int) -> Array:
+def shapes_at(section: Section, vector: Array, m: int, second: bool, cells: int) -> Array:
     """Displacements (v, 3, b) at `skin`'s points of vectors (3n, b), in the body's frame; ∫|u|² over the body is one where vᵀMv is."""
     n = len(section.order)
     field = vector.reshape(3, n, -1)
@@ -253,7 +253,7 @@ def shapes_at(section: Section, vector: Array, m: int, twin: bool, cells: int) -
     )
     rim = np.stack([corner, middle], axis=2).reshape(3, 2 * len(section.rim), 1, -1)[:, section.shown] / np.sqrt(2 * np.pi if m == 0 else np.pi)
     angle = angles(cells)[:, None]
-    turned = m * angle - (np.pi / 2 if twin else 0)
+    turned = m * angle - (np.pi / 2 if second else 0)
     even, odd = np.cos(turned), np.sin(turned) if m else np.ones_like(angle)
     out, around, up = rim[0] * even, rim[1] * odd, rim[2] * even
     moved = np.stack([out * np.cos(angle) - around * np.sin(angle), out * np.sin(angle) + around * np.cos(angle), up], axis=2)

@@ -16,11 +16,11 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.errors import MeshError
 from sonic_bullet.modal import cache as store
 from sonic_bullet.modal.model import MOST_MODES, SHIFT, _diagonal_m
 from sonic_bullet.modal.reduced import Family
 from sonic_bullet.records import ORTHOTROPIC, Array, Shape
+from sonic_bullet.records.errors import MeshError
 
 ANCHORS: tuple[tuple[tuple[float, float, float], tuple[float, float, float]], ...] = (
     ((1, 1, 1), (1, 1, 1)),
@@ -162,8 +162,9 @@ def _spanning(vector: Array, gram: Array) -> Array:
 
 def _of_box(shape: Shape, length: float, count: int, poisson: float, say: Callable[[str], None]) -> TensorFamily | None:
     """Of a free box along the axes, without elements; None where the shape is no such box, or one of too many unknowns."""
-    from sonic_bullet.modal import polynomials, structured
-    from sonic_bullet.modal.solid import surface
+    from sonic_bullet.modal import polynomials
+    from sonic_bullet.modal.meshing import structured
+    from sonic_bullet.modal.meshing.solid import surface
 
     box = polynomials.recognised(shape)
     if box is None or not np.allclose(np.abs(box.axes).max(axis=0), 1, atol=1e-6):
@@ -231,8 +232,8 @@ def _lowest(stiffness: Array, count: int) -> tuple[Array, Array]:
 
 def _of_elements(shape: Shape, length: float, count: int, poisson: float, clamp: Array, edge_m: float | None, say: Callable[[str], None]) -> TensorFamily:
     from sonic_bullet.modal import eigen, fem
-    from sonic_bullet.modal.shapes import fill
-    from sonic_bullet.modal.solid import Solid
+    from sonic_bullet.modal.meshing.shape_meshes import fill
+    from sonic_bullet.modal.meshing.solid import Solid
 
     body = fill((shape,), edge_m, None, say)
     unit = Solid(body.solid.node_m / length, body.solid.tet, body.solid.affine)

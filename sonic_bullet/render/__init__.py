@@ -1,6 +1,7 @@
 """Forces become sound: the synthesizer of live steps, and the replay of a contact log.
 
-silence: why there is none | clock: which samples a step covers | sounder: a body as it is played | blows: strikes | rubbing: rolling and sliding | beside: residuals | synthesizer: all together
+silence: why there is none | clock: which samples a step covers | resonator: a body as it is played | impacts: strikes
+friction_voice: rolling and sliding | residual_voice: residuals | synthesizer: all together
 """
 
 from __future__ import annotations
@@ -10,10 +11,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from sonic_bullet.coerce import as_call, as_flag, as_kind
-from sonic_bullet.contacts import ContactLog
-from sonic_bullet.errors import LogError
+from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.records import Array
+from sonic_bullet.records.coerce import as_call, as_flag, as_kind
+from sonic_bullet.records.errors import LogError
 from sonic_bullet.render.radiated import radiation_of
 from sonic_bullet.render.silence import silence_notes, why_silent
 from sonic_bullet.render.synthesizer import LATENCY_STEPS, Synthesizer
@@ -29,11 +30,11 @@ def render_log(
     progress: Callable[[float], None] | None = None,
     say: Callable[[str], None] | None = None,
 ) -> Array:
-    """The sound of a contact log, (channels, floor(sr·time)) in pascals; with the log's own rate the same bits as were heard live.
+    """The sound of a contact log, (channels, floor(sr·time)) in pascals; with the log's own rate the same bits as live.
 
     Its events act where they did: at the first sample of the same step, at any rate.
 
-    residual False: without what materials sound beside their modes. progress is told the share done, say
+    residual False: without what materials sound beside their modes. progress is called with the share done, say with
     what is being computed before the first step. Raises AudioError for a rate that cannot be, LogError for what is no log.
     """
     from sonic_bullet.files import check_sr

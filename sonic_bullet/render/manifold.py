@@ -11,10 +11,10 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from sonic_bullet.contacts import Step
 from sonic_bullet.records import Array
+from sonic_bullet.records.contacts import Step
+from sonic_bullet.render.resonator import Resonator, Touch, touch_one, uplift
 from sonic_bullet.render.rotation import matrix
-from sonic_bullet.render.sounder import Sounder, Touch, touch_one, uplift
 from sonic_bullet.synth.strikes import pair_key
 
 STEEPEST = 10.0
@@ -70,19 +70,19 @@ def orient(step: Step) -> Rows:
     return Rows(pair_key(c), body, impulse, normal, load, point, outward, push, arm, np.take_along_axis(c.sweep_m_s, pick, axis=1), c.approach_m_s, c.gap_m)
 
 
-def touches(sounders: Sequence[Sounder], rows: Rows) -> tuple[Touch, Touch]:
+def touches(resonators: Sequence[Resonator], rows: Rows) -> tuple[Touch, Touch]:
     """Where the rows lie on the lower and on the higher body's true surface."""
     sides = []
     for side in (0, 1):
         face, barycentric, curvature = np.zeros(len(rows.key), np.int64), np.zeros((len(rows.key), 3)), np.zeros(len(rows.key))
         for body in np.unique(rows.body[:, side]):
             mine = np.flatnonzero(rows.body[:, side] == body)
-            face[mine], barycentric[mine], curvature[mine] = touch_one(sounders[body], rows.point_m[mine, side], rows.outward[mine, side])
+            face[mine], barycentric[mine], curvature[mine] = touch_one(resonators[body], rows.point_m[mine, side], rows.outward[mine, side])
         sides.append(Touch(face, barycentric, curvature))
     return sides[0], sides[1]
 
 
-def modal_pushes(sounders: Sequence[Sounder], rows: Rows, where: tuple[Touch, Touch], bounds: Array, scale: Array) -> list[tuple[Array, Array]]:
+def modal_pushes(resonators: Sequence[Resonator], rows: Rows, where: tuple[Touch, Touch], bounds: Array, scale: Array) -> list[tuple[Array, Array]]:
     """Uᵀ of groups of rows, summed within each: per group the vectors (m,) on the lower and the higher body's audible modes, in N·s/√kg.
 
     bounds (g+1,): group i has the rows bounds[i] … bounds[i+1]-1, all of one pair, one row at least. scale (k,): of each row's impulse.
@@ -91,7 +91,7 @@ def modal_pushes(sounders: Sequence[Sounder], rows: Rows, where: tuple[Touch, To
     out = []
     for start, stop in itertools.pairwise(bounds):
         low, high = (
-            uplift(sounders[rows.body[start, side]], where[side].face[start:stop], where[side].barycentric[start:stop], push[start:stop, side])
+            uplift(resonators[rows.body[start, side]], where[side].face[start:stop], where[side].barycentric[start:stop], push[start:stop, side])
             for side in (0, 1)
         )
         out.append((low, high))

@@ -10,11 +10,12 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from sonic_bullet.contacts import ContactLog, Contacts
+from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.records import Array, Body, Microphone, Vibrometer
-from sonic_bullet.render.sounder import Sounder, build_sounder
+from sonic_bullet.records.contacts import Contacts
+from sonic_bullet.records.units import REFERENCE_PRESSURE_PA
+from sonic_bullet.render.resonator import Resonator, build_resonator
 from sonic_bullet.synth.strikes import SPAN
-from sonic_bullet.units import REFERENCE_PRESSURE_PA
 
 BY_HAND = 0.5
 """Share of its steps in which a body was set elsewhere by hand, from which on that is what moves it."""
@@ -52,8 +53,8 @@ def why_silent(log: ContactLog) -> str | None:
     if not len(mine):
         return _untouched(log, rows, added)
     touched = np.unique(np.concatenate([rows.a[mine], rows.b[mine]]))
-    sounders = [build_sounder(log.bodies[i], log.sensors, log.sr, log.air) for i in touched if added[i]]
-    return _mute(log, sounders) or _at_rest(log, rows, mine) or _under_way(log, mine)
+    resonators = [build_resonator(log.bodies[i], log.sensors, log.sr, log.air) for i in touched if added[i]]
+    return _mute(log, resonators) or _at_rest(log, rows, mine) or _arrives_late(log, mine)
 
 
 def _untouched(log: ContactLog, rows: Contacts, added: Array) -> str:
@@ -76,23 +77,25 @@ def _untouched(log: ContactLog, rows: Contacts, added: Array) -> str:
     return f"nothing touched: {named} met nobody in {log.duration_s:.3g} s; run for longer, or let them meet"
 
 
-def _mute(log: ContactLog, sounders: list[Sounder]) -> str | None:
+def _mute(log: ContactLog, resonators: list[Resonator]) -> str | None:
     """Why no sensor can hear any of the bodies that were touched."""
     readers = [sensor for sensor in log.sensors if isinstance(sensor, Vibrometer)]
-    ringing = [sounder for sounder in sounders if sounder.mode_count]
+    ringing = [resonator for resonator in resonators if resonator.mode_count]
     if len(readers) == len(log.sensors):
-        there = {(sounder.body.body_id, sounder.body.link) for sounder in ringing}
+        there = {(resonator.body.body_id, resonator.body.link) for resonator in ringing}
         if ringing and not any((sensor.body_id, sensor.link) in there for sensor in readers):
             places = ", ".join(sorted({f"body {sensor.body_id} link {sensor.link}" for sensor in readers}))
             return f"the vibrometer reads {places}, and only {_names(s.body for s in ringing)} was touched; put it there"
     if ringing:
         return None
-    if any(isinstance(sensor, Microphone) for sensor in log.sensors) and any(sounder.rigid is not None for sounder in sounders):
+    if any(isinstance(sensor, Microphone) for sensor in log.sensors) and any(resonator.rigid is not None for resonator in resonators):
         return None  # it clicks
-    higher = [sounder.body for sounder in sounders if sounder.body.model is not None and sounder.body.model.mode_count]
+    higher = [resonator.body for resonator in resonators if resonator.body.model is not None and resonator.body.model.mode_count]
     if higher:
         return f"no audible mode: those of {_names(higher)} are at or above half the sample rate, {log.sr / 2:g} Hz, or overdamped; give a higher sr"
-    return f"no audible mode: {_names(sounder.body for sounder in sounders)} has none below 20 kHz and does not move freely; a larger or thinner body rings"
+    return (
+        f"no audible mode: {_names(resonator.body for resonator in resonators)} has none below 20 kHz and does not move freely; a larger or thinner body rings"
+    )
 
 
 def _at_rest(log: ContactLog, rows: Contacts, mine: Array) -> str | None:
@@ -107,7 +110,7 @@ def _at_rest(log: ContactLog, rows: Contacts, mine: Array) -> str | None:
     return f"all {len(mine)} contacts are support at rest: nothing approached faster than {max(fastest, 0.0):.2g} m/s and nothing slid; let something fall"
 
 
-def _under_way(log: ContactLog, mine: Array) -> str | None:
+def _arrives_late(log: ContactLog, mine: Array) -> str | None:
     """Whether the sound of the first contact would come to every microphone only after the end."""
     places = [sensor.position_m for sensor in log.sensors if isinstance(sensor, Microphone)]
     if len(places) < len(log.sensors):

@@ -1,8 +1,8 @@
 """The run time: physics steps in, frames of sound out, with one explicit state between.
 
-    Step -> loads (synth.strikes) -> blows, rubbing -> bank of modes and of rigid motions (synth.bank) + residual -> sound path (synth.path) -> frame
+    Step -> loads (synth.strikes) -> impacts, friction -> bank of modes and of rigid motions (synth.bank) + residual -> sound path (synth.path) -> frame
 
-Each body has five places in the bank: its modes, its three translations (see sounder.py), and the lines of its residual (see beside.py).
+Each body has five places in the bank: its modes, its three translations (see resonator.py), and the lines of its residual (see residual_voice.py).
 
 A step's sound is made when the `LOOKAHEAD` steps after it are known. Live listening, `sound` (which drains a copy of the state)
 and the replay of a log run the same code on the same numbers in the same order: the same bits.
@@ -15,15 +15,15 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from sonic_bullet.contacts import Contacts, Step
-from sonic_bullet.errors import AudioError
 from sonic_bullet.records import Air, Array, Body, Microphone, Sensor
-from sonic_bullet.render.beside import Beside, Rubs, blow_grains, build_beside, line_modes, rubbing_grains
-from sonic_bullet.render.blows import Blow, find_blows
+from sonic_bullet.records.contacts import Contacts, Step
+from sonic_bullet.records.errors import AudioError
 from sonic_bullet.render.clock import Clock, exact_step
+from sonic_bullet.render.friction_voice import Drive, FrictionVoice, advance_friction
+from sonic_bullet.render.impacts import ForcePulse, find_pulses
 from sonic_bullet.render.manifold import Rows, orient
-from sonic_bullet.render.rubbing import Drive, Rubbing, advance_rubbing
-from sonic_bullet.render.sounder import Sounder, build_sounder, weight_sets
+from sonic_bullet.render.residual_voice import ResidualVoice, Rubs, build_residual_voice, friction_grains, impact_grains, line_modes
+from sonic_bullet.render.resonator import Resonator, build_resonator, weight_sets
 from sonic_bullet.residual.player import Grain, add_grains
 from sonic_bullet.synth import bank, path
 from sonic_bullet.synth.bank import Bank, BankState
@@ -56,7 +56,7 @@ class Setup:
 @dataclass(frozen=True, slots=True, eq=False)
 class State:
     """All that the next frame hangs on. number: of the step to be rendered next; window: that step and those known after it, rows: their contacts.
-    placed (b,): step in which each body began or was last moved by hand. quenches: steps before which all is to stop ringing. beside (b): their residuals; grains, rubs: what of those is under way.
+    placed (b,): step in which each body began or was last moved by hand. quenches: steps before which all is to stop ringing. voices (b): their residuals; grains, rubs: what of those is under way.
     """
 
     number: int
@@ -64,14 +64,14 @@ class State:
     window: tuple[Step, ...]
     rows: tuple[Rows, ...]
     loads: LoadHistory
-    sounders: tuple[Sounder, ...]
+    resonators: tuple[Resonator, ...]
     bank: Bank
     ringing: BankState
     path: Path
     travelling: PathState
-    rubbing: Rubbing
+    friction: FrictionVoice
     placed: Array
-    beside: tuple[Beside | None, ...] = ()
+    voices: tuple[ResidualVoice | None, ...] = ()
     grains: tuple[Grain, ...] = ()
     rubs: Rubs = field(default_factory=dict)
     quenches: frozenset[int] = frozenset()
@@ -81,20 +81,20 @@ def start(setup: Setup) -> State:
     """Silence at time 0, nobody there."""
     instrument, ringing = bank.empty_bank(setup.sr, 1 + len(weight_sets(setup.sensors)))
     air, travelling = path.empty_path(setup.sr, setup.air, setup.microphone_m)
-    return State(0, Clock(), (), (), LoadHistory.empty(), (), instrument, ringing, air, travelling, Rubbing.none(), np.zeros(0, np.int64))
+    return State(0, Clock(), (), (), LoadHistory.empty(), (), instrument, ringing, air, travelling, FrictionVoice.none(), np.zeros(0, np.int64))
 
 
 def with_bodies(setup: Setup, state: State, bodies: Sequence[Body]) -> State:
     """The state with further bodies, silent at first."""
     if not bodies:
         return state
-    new = tuple(build_sounder(body, setup.sensors, setup.sr, setup.air) for body in bodies)
-    beside = tuple(build_beside(s, setup.sr, setup.air) if setup.residual else None for s in new)
+    new = tuple(build_resonator(body, setup.sensors, setup.sr, setup.air) for body in bodies)
+    voices = tuple(build_residual_voice(s, setup.sr, setup.air) if setup.residual else None for s in new)
     modes = [
         part
-        for s, more in zip(new, beside, strict=True)
+        for s, more in zip(new, voices, strict=True)
         for part in (
-            bank.ModeSet(s.omega_rad_s, s.decay_per_s, s.weight, bend=s.bend, choke=s.choke, choke_power=s.choke_power),
+            bank.ModeSet(s.omega_rad_s, s.decay_per_s, s.weight, bend=s.bend, damping_growth=s.damping_growth, damping_growth_power=s.damping_growth_power),
             *((s.rigid or _nothing(setup),) * 3),
             line_modes(more, len(s.weight)),
         )
@@ -103,13 +103,13 @@ def with_bodies(setup: Setup, state: State, bodies: Sequence[Body]) -> State:
     air, travelling = path.append_bodies(state.path, state.travelling, *_places(new))
     # a silent partner's record begins where it first touches, not where it was put
     placed = np.concatenate([state.placed, [body.since_step if body.material is not None else -SPAN for body in bodies]]).astype(np.int64)
-    sounders, both = state.sounders + new, state.beside + beside
-    return replace(state, placed=placed, sounders=sounders, beside=both, bank=instrument, ringing=ringing, path=air, travelling=travelling)
+    resonators, both = state.resonators + new, state.voices + voices
+    return replace(state, placed=placed, resonators=resonators, voices=both, bank=instrument, ringing=ringing, path=air, travelling=travelling)
 
 
-def _places(sounders: tuple[Sounder, ...]) -> tuple[Array, Array]:
+def _places(resonators: tuple[Resonator, ...]) -> tuple[Array, Array]:
     """Radius and jerk coefficient for the path: the bank has turned pushes into Pa·m already."""
-    return np.array([s.radius_m for s in sounders]), np.ones(len(sounders))
+    return np.array([s.radius_m for s in resonators]), np.ones(len(resonators))
 
 
 def _nothing(setup: Setup) -> bank.ModeSet:
@@ -152,7 +152,7 @@ def quenched(state: State) -> State:
     Loads, and what rubs, stay: a ball that rolls rolls on.
     """
     air, travelling = path.empty_path(state.path.sr, state.path.air, state.path.microphone_m, state.travelling.at)
-    air, travelling = path.append_bodies(air, travelling, *_places(state.sounders))
+    air, travelling = path.append_bodies(air, travelling, *_places(state.resonators))
     still_to_come = frozenset(number for number in state.quenches if number > state.number)
     return replace(state, ringing=bank.silence(state.ringing), path=air, travelling=travelling, grains=(), rubs={}, quenches=still_to_come)
 
@@ -161,7 +161,7 @@ def _render(setup: Setup, state: State) -> tuple[Array, State]:
     """The frame of window[0]."""
     if state.number in state.quenches:
         state = quenched(state)
-    window, rows, sounders, clock, sr = state.window, state.rows, state.sounders, state.clock, setup.sr
+    window, rows, resonators, clock, sr = state.window, state.rows, state.resonators, state.clock, setup.sr
     step = window[0]
     after = clock.after(step.dt_s)
     count = after.sample(sr) - clock.sample(sr)
@@ -170,56 +170,61 @@ def _render(setup: Setup, state: State) -> tuple[Array, State]:
     moved = np.flatnonzero(window[1].teleported)
     placed[moved] = state.number + 1
     parts, loads = split(state.loads, ahead=0)  # of the first step, and what was not sure a step ago
-    blows = [(float(clock.time_s), blow) for blow in find_blows(parts, rows, step, sounders, state.number - placed < SPAN, 0.0)]
+    pulses = [(float(clock.time_s), pulse) for pulse in find_pulses(parts, rows, step, resonators, state.number - placed < SPAN, 0.0)]
     parts, marked = split(loads)
     if state.number + 1 not in state.quenches:  # else what strikes after the quench would be dated back before it, and be lost: it waits for its own step
         loads = marked
-        blows += [(float(after.time_s), blow) for blow in find_blows(parts, rows[1:], window[1], sounders, state.number + 1 - placed < SPAN, -step.dt_s)]
-    drives, rubbing = advance_rubbing(state.rubbing, parts, step, window[1], rows[1], sounders, x, sr, setup.seed)
-    first, beside = clock.sample(sr), state.beside
-    strikes = [strike for begin_s, blow in blows for strike in _strikes(blow, begin_s, sounders, beside, sr, first)]
-    sound = bank.advance(state.bank, state.ringing, count, strikes, _forces(drives, sounders, beside, x), x)
-    more, rubs = rubbing_grains(state.rubs, drives, sounders, beside, first, count, setup.seed)
-    grains = (*state.grains, *(g for begin_s, blow in blows for g in blow_grains(blow, begin_s, sounders, beside, sr, first, setup.seed)), *more)
-    if any(more is not None for more in beside):
+        pulses += [(float(after.time_s), pulse) for pulse in find_pulses(parts, rows[1:], window[1], resonators, state.number + 1 - placed < SPAN, -step.dt_s)]
+    drives, friction = advance_friction(state.friction, parts, step, window[1], rows[1], resonators, x, sr, setup.seed)
+    first, voices = clock.sample(sr), state.voices
+    strikes = [strike for begin_s, pulse in pulses for strike in _strikes(pulse, begin_s, resonators, voices, sr, first)]
+    sound = bank.advance(state.bank, state.ringing, count, strikes, _forces(drives, resonators, voices, x), x)
+    more, rubs = friction_grains(state.rubs, drives, resonators, voices, first, count, setup.seed)
+    grains = (*state.grains, *(g for begin_s, pulse in pulses for g in impact_grains(pulse, begin_s, resonators, voices, sr, first, setup.seed)), *more)
+    if any(more is not None for more in voices):
         sound[:, 0::PLACES] += sound[:, 4::PLACES]
     grains = add_grains(sound[:, 0::PLACES], grains, first)
     frame = _at_sensors(setup, state, sound, x)
-    return frame, replace(state, number=state.number + 1, clock=after, loads=loads, rubbing=rubbing, placed=placed, grains=grains, rubs=rubs)
+    return frame, replace(state, number=state.number + 1, clock=after, loads=loads, friction=friction, placed=placed, grains=grains, rubs=rubs)
 
 
-def _strikes(blow: Blow, step_start_s: float, sounders: tuple[Sounder, ...], beside: tuple[Beside | None, ...], sr: int, earliest: int) -> list[bank.Strike]:
+def _strikes(
+    pulse: ForcePulse, step_start_s: float, resonators: tuple[Resonator, ...], voices: tuple[ResidualVoice | None, ...], sr: int, earliest: int
+) -> list[bank.Strike]:
     """The pulse on the modes, translations and residual lines of both bodies."""
-    offset_s, spacing_s, weight = pulse_nodes(blow.length_s, sr, flat=blow.flat)
-    start = max((step_start_s + blow.start_s) * sr, float(earliest))
+    offset_s, spacing_s, weight = pulse_nodes(pulse.length_s, sr, flat=pulse.flat)
+    start = max((step_start_s + pulse.start_s) * sr, float(earliest))
     strikes = []
-    sides = (blow.low, blow.share * blow.modes_low, blow.share * blow.impulse_n_s), (blow.high, blow.share * blow.modes_high, -blow.share * blow.impulse_n_s)
+    sides = (
+        (pulse.low, pulse.share * pulse.modes_low, pulse.share * pulse.impulse_n_s),
+        (pulse.high, pulse.share * pulse.modes_high, -pulse.share * pulse.impulse_n_s),
+    )
     for body, modes, shove in sides:
         if modes.any():
             strikes.append(bank.Strike(PLACES * body, start + offset_s * sr, spacing_s * sr, weight, modes))
-            more = beside[body]
+            more = voices[body]
             if more is not None and len(more.follows):
                 strikes.append(bank.Strike(PLACES * body + 4, start + offset_s * sr, spacing_s * sr, weight, modes[more.follows]))
-        rigid = sounders[body].rigid
+        rigid = resonators[body].rigid
         if rigid is not None:
-            cells = pulse_cells(start, blow.length_s, sr, int(np.ceil(CELLS_PER_RADIAN * rigid.decay_per_s[0] / sr)), flat=blow.flat)
+            cells = pulse_cells(start, pulse.length_s, sr, int(np.ceil(CELLS_PER_RADIAN * rigid.decay_per_s[0] / sr)), flat=pulse.flat)
             strikes += [bank.Strike(PLACES * body + 1 + int(axis), *cells, shove[axis : axis + 1]) for axis in np.flatnonzero(shove)]
     return strikes
 
 
-def _forces(drives: Sequence[Drive], sounders: tuple[Sounder, ...], beside: tuple[Beside | None, ...], x: Array) -> list[bank.Force]:
+def _forces(drives: Sequence[Drive], resonators: tuple[Resonator, ...], voices: tuple[ResidualVoice | None, ...], x: Array) -> list[bank.Force]:
     """Drives on modes and residual lines, each with its own gains, and on translations, where all forces on a body act as one."""
     forces = []
     pushes: dict[int, Array] = {}
     for drive in drives:
         push = drive.force_n * (drive.direction0[:, None] + (drive.direction1 - drive.direction0)[:, None] * x)
         for side, body in enumerate((drive.low, drive.high)):
-            if sounders[body].mode_count:
+            if resonators[body].mode_count:
                 forces.append(bank.Force(PLACES * body, drive.force_n, drive.gain0[side], drive.gain1[side]))
-                more = beside[body]
+                more = voices[body]
                 if more is not None and len(more.follows):
                     forces.append(bank.Force(PLACES * body + 4, drive.force_n, drive.gain0[side][more.follows], drive.gain1[side][more.follows]))
-            if sounders[body].rigid is not None:
+            if resonators[body].rigid is not None:
                 pushes[body] = pushes.get(body, 0.0) + (push if side == 0 else -push)
     one = np.ones(1)
     return forces + [bank.Force(PLACES * body + 1 + axis, push[axis], one, one) for body, push in pushes.items() for axis in range(3)]
@@ -235,9 +240,9 @@ def _at_sensors(setup: Setup, state: State, sound: Array, x: Array) -> Array:
     begin[: len(here.position_m)] = here.position_m
     teleported = np.zeros(len(end), bool)
     teleported[: len(there.teleported)] = there.teleported
-    heard = path.propagate(state.path, state.travelling, state.number, modal[0], pushed, begin, end, teleported, x)
+    observed = path.propagate(state.path, state.travelling, state.number, modal[0], pushed, begin, end, teleported, x)
     frame = np.zeros((len(setup.sensors), modal.shape[2]))
-    microphones, readers = iter(heard), iter(modal[1:])
+    microphones, readers = iter(observed), iter(modal[1:])
     for channel, sensor in enumerate(setup.sensors):
         frame[channel] = next(microphones) if isinstance(sensor, Microphone) else _summed(next(readers))
     if not np.isfinite(frame).all():
@@ -281,7 +286,7 @@ class Synthesizer:
         channels = len(self._setup.sensors)
         if channels == 0:
             return np.zeros((0, count))
-        self._state = with_bodies(self._setup, self._state, bodies[len(self._state.sounders) : len(step.position_m)])
+        self._state = with_bodies(self._setup, self._state, bodies[len(self._state.resonators) : len(step.position_m)])
         frame, self._state = take_step(self._setup, self._state, step)
         if frame is None:
             # where a step is no whole number of samples (44.1 kHz at 240 Hz), one more, so that uneven frames never run dry

@@ -15,8 +15,8 @@ from typing import Annotated
 import msgspec
 import numpy as np
 
-from sonic_bullet.errors import MaterialError, RecordError
 from sonic_bullet.records import Array, Residual
+from sonic_bullet.records.errors import MaterialError, RecordError
 
 STEP_DB = 0.5
 MOST = 4096

@@ -3,7 +3,7 @@
     represented(t) = Σ_i R_i φ_i(t)                 features φ_i, each with the share R_i that the modes have of it (its match ratio)
     P_residual = max(P_recorded - P_represented, 0)                                             pixel by pixel
 
-For a preset it is told in two parts. What is left of the features, √(1 - R_i²) of each, is lines: their frequencies are known far better than a spectrogram
+For a preset it is described in two parts. What is left of the features, √(1 - R_i²) of each, is lines: their frequencies are known far better than a spectrogram
 shows them. In no band more is left than recordings have beyond what is played: modes too close to be told apart make one feature that matches none of them.
 What is left beside all features is noise, of which bands and times keep the mean, less the recording's own floor, less what most strikes do not have, and
 less what is not noise: the foot of lines that are no pure damped sinusoids would else be spread over whole bands.
@@ -15,11 +15,11 @@ import itertools
 
 import numpy as np
 
-from sonic_bullet.compiled import njit
-from sonic_bullet.errors import AudioError
+from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array, Residual
+from sonic_bullet.records.errors import AudioError
 from sonic_bullet.residual.spectrogram import WINDOW, Power, checked, power, transform
-from sonic_bullet.residual.transfer import Modes
+from sonic_bullet.residual.transfer import StruckModes
 
 LONGEST_S = 1.0
 FINE_WINDOW = 4096
@@ -98,10 +98,10 @@ def cells(left: Power, floor_per_hz: Array) -> tuple[Array, Array, Array]:
     np.add.at(total, (band[:, None], frame[None]), left.per_hz[:, :last])
     np.add.at(quiet, band, floor_per_hz)
     mean, quiet = total / np.maximum(count, 1), quiet / np.maximum(np.bincount(band), 1)
-    heard = mean > quiet[:, None] * (ABOVE + 3 / np.sqrt(count + 1e-9))
+    observed = mean > quiet[:, None] * (ABOVE + 3 / np.sqrt(count + 1e-9))
     centre_hz = np.bincount(band, left.freq_hz) / np.maximum(np.bincount(band), 1)
     centre_s = np.bincount(frame, left.time_s[:last]) / np.bincount(frame)
-    return centre_hz[kept], centre_s, np.where(heard, mean - quiet[:, None], 0.0)[kept]
+    return centre_hz[kept], centre_s, np.where(observed, mean - quiet[:, None], 0.0)[kept]
 
 
 def shared_cells(left: list[Power]) -> tuple[Array, Array, Array]:
@@ -151,7 +151,7 @@ def line_room(recorded: list[Power], rest: list[Power], played: list[Power], lin
     return np.asarray(np.minimum(1.0, ROOM * room / np.maximum(wanted, 1e-300)))
 
 
-def residual_record(recorded: Array, left: Array, rest: Array, sr: int, modes: Modes, lines: tuple[Array, Array, Array], source: str) -> Residual:
+def residual_record(recorded: Array, left: Array, rest: Array, sr: int, modes: StruckModes, lines: tuple[Array, Array, Array], source: str) -> Residual:
     """The residual of strikes (s, n) from the onset on: ``left`` (s, n) beside all features, ``rest`` (s, n) beside the modes as the model plays them.
 
     lines: frequency, decay, amplitude (l,), mean square over the strikes, that the modes' share of the features leaves; neither they nor noise become more than

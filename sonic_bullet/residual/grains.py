@@ -17,11 +17,23 @@ from math import log2
 
 import numpy as np
 
-from sonic_bullet.compiled import njit
+from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array, Residual
 from sonic_bullet.residual.invert import OVERLAP, invert, magnitude_of, noise_phases
 from sonic_bullet.residual.spectrogram import WINDOW, axes
-from sonic_bullet.residual.transfer import Lines, Modes, Pairs, come_from, merged, moved, pair, scale, source_modes, source_power, transfer_lines
+from sonic_bullet.residual.transfer import (
+    ModePairs,
+    ResidualLines,
+    StruckModes,
+    come_from,
+    merged,
+    moved,
+    pair,
+    scale,
+    source_modes,
+    source_power,
+    transfer_lines,
+)
 
 LONGEST_S = 0.5
 FADE_IN_S = 1e-3
@@ -40,18 +52,18 @@ class Voice:
     """
 
     sr: int
-    pairs: Pairs
+    pairs: ModePairs
     here_hz: Array
     source_power: Array
     base: Array
     length: int
     size: int
-    lines: Lines
+    lines: ResidualLines
     silent: bool
     cache: dict[bytes, Array] = field(default_factory=dict)
 
 
-def make_voice(residual: Residual, target: Modes, sr: int, longest_s: float = LONGEST_S) -> Voice:
+def make_voice(residual: Residual, target: StruckModes, sr: int, longest_s: float = LONGEST_S) -> Voice:
     """A body's voice: ``target`` are its modes at a typical strike, which decide the pairs."""
     source = source_modes(residual)
     pairs = pair(source, target)
@@ -68,7 +80,7 @@ def make_voice(residual: Residual, target: Modes, sr: int, longest_s: float = LO
     )
 
 
-def duration(residual: Residual, pairs: Pairs, sr: int, longest_s: float) -> int:
+def duration(residual: Residual, pairs: ModePairs, sr: int, longest_s: float) -> int:
     """Samples until the last of a residual's noise has passed, when stretched onto the pairs; a window at least."""
     sounding = np.flatnonzero(residual.power_per_hz.any(axis=0))
     last = float(residual.time_s[min(int(sounding[-1]) + 1, len(residual.time_s) - 1)]) if len(sounding) else 0.0

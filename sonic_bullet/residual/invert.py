@@ -12,7 +12,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from sonic_bullet.compiled import njit
+from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array
 from sonic_bullet.residual.spectrogram import WINDOW, frame_count, hann, inverse, transform
 

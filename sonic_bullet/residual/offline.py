@@ -16,16 +16,16 @@ from sonic_bullet.residual.compute import clip_residual, damped
 from sonic_bullet.residual.grains import filtered, make_voice, mixed_number, response, varied
 from sonic_bullet.residual.invert import MOST_ITERATIONS, invert, magnitude_of
 from sonic_bullet.residual.spectrogram import WINDOW, axes
-from sonic_bullet.residual.transfer import Modes, come_from, pair, paired_power, transfer
+from sonic_bullet.residual.transfer import StruckModes, come_from, pair, paired_power, transfer
 
 LONGEST_S = 1.0
 LOOKING = 4
 """Frames a quarter of a window apart, as `clip_residual` sees a recording."""
 
 
-def transferred_clip(recorded: Array, represented: Array, sr: int, source: Modes, target: Modes, *, seconds: float | None = None) -> Array:
+def transferred_clip(recorded: Array, represented: Array, sr: int, source: StruckModes, target: StruckModes, *, seconds: float | None = None) -> Array:
     """(n,) float32: the residual of a recording (k,), of which ``represented`` (k,) is said by modes ``source``, beside modes ``target``; as long as the recording
-    or ``seconds``. Raises AudioError as `clip_residual` and `Modes` do.
+    or ``seconds``. Raises AudioError as `clip_residual` and `StruckModes` do.
     """
     left, start = clip_residual(recorded, represented, sr)
     pairs = pair(source, target)
@@ -47,7 +47,7 @@ def residual_sound(residual: Residual, freq_hz: Array, decay_per_s: Array, ampli
     freq, decay, start = freq_hz[order], decay_per_s[order], np.asarray(amplitude, complex)[order]
     if not len(freq) or not np.abs(start).max() > 0:
         return np.zeros(n)
-    target = Modes(freq, decay, np.abs(start))
+    target = StruckModes(freq, decay, np.abs(start))
     voice = make_voice(residual, target, sr, LONGEST_S)
     power = paired_power(voice.pairs, target)
     lead = np.zeros(len(power), complex)
@@ -55,9 +55,9 @@ def residual_sound(residual: Residual, freq_hz: Array, decay_per_s: Array, ampli
         if voice.pairs.group[k] >= 0:
             lead[voice.pairs.group[k]] = start[k] / max(abs(start[k]), 1e-300)
     lines = voice.lines
-    heard = lines.freq_hz < sr / 2
+    observed = lines.freq_hz < sr / 2
     turned = 1j * lead[lines.follows] * lines.ratio * np.sqrt(power[lines.follows])
-    out = damped(lines.freq_hz[heard], lines.decay_per_s[heard], turned[heard], n, sr)
+    out = damped(lines.freq_hz[observed], lines.decay_per_s[observed], turned[observed], n, sr)
     grain = varied(filtered(voice, response(voice, power)), 1.0, mixed_number(seed)) if not voice.silent else np.zeros(0)
     count = min(n, len(grain))
     out[:count] += grain[:count]

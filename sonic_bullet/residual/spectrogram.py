@@ -13,9 +13,9 @@ from functools import lru_cache
 
 import numpy as np
 
-from sonic_bullet.compiled import njit
-from sonic_bullet.errors import AudioError
+from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array, frozen_array
+from sonic_bullet.records.errors import AudioError
 
 WINDOW = 512
 

@@ -18,9 +18,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sonic_bullet.compiled import njit
-from sonic_bullet.errors import AudioError
+from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array, Residual, frozen_array
+from sonic_bullet.records.errors import AudioError
 from sonic_bullet.residual.spectrogram import Power
 
 DOMINANT = 24
@@ -38,7 +38,7 @@ TINY = 1e-300
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Modes:
+class StruckModes:
     """m modes as one strike starts them: freq_hz ascending, decay_per_s, amplitude ≥ 0 at the onset, in any one unit."""
 
     freq_hz: Array
@@ -61,7 +61,7 @@ class Modes:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Pairs:
+class ModePairs:
     """p pairs of modes, ascending on both sides: source_hz, target_hz (p,); rate (p,) = d_t/d_s; source, target (p,): which mode each is.
 
     natural: the bodies are one shape scaled, so the pairs are the same modes. group (m,): the target's pair each of its modes counts to, -1: none.
@@ -76,9 +76,9 @@ class Pairs:
     group: Array
 
 
-def source_modes(residual: Residual) -> Modes:
+def source_modes(residual: Residual) -> StruckModes:
     """The modes a residual was taken beside."""
-    return Modes(residual.mode_freq_hz, residual.mode_decay_per_s, residual.mode_amplitude)
+    return StruckModes(residual.mode_freq_hz, residual.mode_decay_per_s, residual.mode_amplitude)
 
 
 def source_power(residual: Residual) -> Power:
@@ -86,16 +86,16 @@ def source_power(residual: Residual) -> Power:
     return Power(residual.freq_hz, residual.time_s, residual.power_per_hz)
 
 
-def merged(modes: Modes) -> tuple[Modes, Array]:
+def merged(modes: StruckModes) -> tuple[StruckModes, Array]:
     """Modes closer than `ONE_MODE` as one: powers add, frequency and decay are the mean by power. And (m,) which of them each is."""
     group = np.concatenate([[0], np.cumsum(np.diff(modes.freq_hz) > ONE_MODE * modes.freq_hz[1:])]).astype(np.int64)
     weight = modes.amplitude**2 + 1e-12 * float((modes.amplitude**2).max()) + TINY
     total = np.bincount(group, weight)
     freq, decay = (np.bincount(group, weight * value) / total for value in (modes.freq_hz, modes.decay_per_s))
-    return Modes(freq, decay, np.sqrt(np.bincount(group, modes.amplitude**2))), group
+    return StruckModes(freq, decay, np.sqrt(np.bincount(group, modes.amplitude**2))), group
 
 
-def pair(source: Modes, target: Modes, dominant: int = DOMINANT) -> Pairs:
+def pair(source: StruckModes, target: StruckModes, dominant: int = DOMINANT) -> ModePairs:
     """Natural pairs where the target is the source's shape at some scale, else the ``dominant`` strongest of both sides, from low to high."""
     a, _ = merged(source)
     b, group = merged(target)
@@ -107,10 +107,10 @@ def pair(source: Modes, target: Modes, dominant: int = DOMINANT) -> Pairs:
     rate = np.clip(np.maximum(b.decay_per_s[j], LEAST_DECAY_PER_S) / np.maximum(a.decay_per_s[i], LEAST_DECAY_PER_S), 1 / FASTEST_TIME, FASTEST_TIME)
     of_pair = np.full(len(b.freq_hz), -1)
     of_pair[j] = np.arange(len(j))
-    return Pairs(a.freq_hz[i], b.freq_hz[j], rate, i, j, natural, of_pair[group])
+    return ModePairs(a.freq_hz[i], b.freq_hz[j], rate, i, j, natural, of_pair[group])
 
 
-def _natural(a: Modes, b: Modes) -> tuple[Array, Array]:
+def _natural(a: StruckModes, b: StruckModes) -> tuple[Array, Array]:
     """Modes of a and b that are the same of one scaled shape; none where the lowest do not agree. The scale is looked for among ratios of the lowest."""
     count = min(ALIKE_COUNT, len(a.freq_hz), len(b.freq_hz))
     none = np.zeros(0, np.int64)
@@ -148,12 +148,12 @@ def _knots(centre_hz: Array) -> Array:
     return np.concatenate([[0.0], inner, [1e3 * centre_hz[-1]]])
 
 
-def shifted_hz(pairs: Pairs, freq_hz: Array) -> Array:
+def shifted_hz(pairs: ModePairs, freq_hz: Array) -> Array:
     """Where source frequencies (k,) go."""
     return np.asarray(np.interp(freq_hz, _knots(pairs.source_hz), _knots(pairs.target_hz)))
 
 
-def come_from(pairs: Pairs, freq_hz: Array) -> tuple[Array, Array, Array]:
+def come_from(pairs: ModePairs, freq_hz: Array) -> tuple[Array, Array, Array]:
     """Source frequency, |df_s/df_t| and d_t/d_s (k,) of target frequencies (k,)."""
     there, here = _knots(pairs.target_hz), _knots(pairs.source_hz)
     piece = np.clip(np.searchsorted(there, freq_hz, "right") - 1, 0, len(there) - 2)
@@ -161,7 +161,7 @@ def come_from(pairs: Pairs, freq_hz: Array) -> tuple[Array, Array, Array]:
     return here[piece] + (freq_hz - there[piece]) * slope, slope, pairs.rate[neighbourhood(pairs.target_hz, freq_hz)]
 
 
-def scale(pairs: Pairs, source_power: Array, target_power: Array, freq_hz: Array) -> Array:
+def scale(pairs: ModePairs, source_power: Array, target_power: Array, freq_hz: Array) -> Array:
     """A (k,) at source frequencies (k,), from a² (p,) of both sides of the pairs."""
     edge = np.concatenate([[0.0], (pairs.source_hz[1:] + pairs.source_hz[:-1]) / 2])
     width = np.append(np.diff(edge), 2 * max(float(pairs.source_hz[-1] - edge[-1]), 1.0))
@@ -181,13 +181,13 @@ def _scale(freq: Array, centre: Array, half: Array, below: Array, above: Array, 
         out[k] = up / down
 
 
-def paired_power(pairs: Pairs, target: Modes) -> Array:
+def paired_power(pairs: ModePairs, target: StruckModes) -> Array:
     """a² (p,) of the target's modes, summed into its pairs."""
     mine = pairs.group >= 0
     return np.bincount(pairs.group[mine], target.amplitude[mine] ** 2, len(pairs.target_hz))
 
 
-def transfer(residual: Power, source: Modes, target: Modes, freq_hz: Array, time_s: Array, *, pairs: Pairs | None = None) -> Array:
+def transfer(residual: Power, source: StruckModes, target: StruckModes, freq_hz: Array, time_s: Array, *, pairs: ModePairs | None = None) -> Array:
     """P_t (k, n) at target frequencies (k,) and times (n,) from the onset on, of a residual taken beside ``source`` and now beside ``target``."""
     pairs = pairs or pair(source, target)
     merged_source, _ = merged(source)
@@ -226,7 +226,7 @@ def _moved(freq: Array, time: Array, power: Array, come_from: Array, level: Arra
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Lines:
+class ResidualLines:
     """l damped sinusoids of a transferred residual: freq_hz, decay_per_s, ratio (l,) of their amplitude to that of the mode they follow; follows (l,): its pair."""
 
     freq_hz: Array
@@ -235,10 +235,10 @@ class Lines:
     follows: Array
 
 
-def transfer_lines(residual: Residual, pairs: Pairs) -> Lines:
+def transfer_lines(residual: Residual, pairs: ModePairs) -> ResidualLines:
     """The residual's lines, moved, stretched and each struck as the mode is in whose neighbourhood it lies."""
     source, _ = merged(source_modes(residual))
     follows = neighbourhood(pairs.source_hz, residual.line_freq_hz)
     below = scale(pairs, np.ones(len(pairs.source)), source.amplitude[pairs.source] ** 2 + FAINT * float((source.amplitude**2).max()), residual.line_freq_hz)
     decay = residual.line_decay_per_s * pairs.rate[follows]
-    return Lines(shifted_hz(pairs, residual.line_freq_hz), decay, residual.line_amplitude / np.sqrt(below), follows)
+    return ResidualLines(shifted_hz(pairs, residual.line_freq_hz), decay, residual.line_amplitude / np.sqrt(below), follows)

@@ -1,4 +1,4 @@
 """Arrays in, arrays out, state explicit: loads become strikes and rubbing, forces become modal motion, motion becomes pressure.
 
-strikes, pulse: what a blow is | surface, profile: rolling and sliding | bank, tile, drive: the modes | radiation, path: to the microphone
+strikes, pulse: what an impact is | surface, profile: rolling and sliding | bank, tile, drive: the modes | radiation, path: to the microphone
 """

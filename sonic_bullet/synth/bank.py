@@ -20,8 +20,8 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.errors import AudioError
 from sonic_bullet.records import Array
+from sonic_bullet.records.errors import AudioError
 from sonic_bullet.synth import bank_kernel
 from sonic_bullet.synth.pending import Pending, Strike, flushed, padded_gains, with_strikes, without
 from sonic_bullet.synth.tile import BLOCK
@@ -42,7 +42,7 @@ class ModeSet:
 
     held: forces act evenly over the sample before each instant, (e^s - 1)/s, and strikes' impulses over their spacing, not at once: for modes
     that are gone within a few samples, of which a slow force must leave its slope alone.
-    bend, choke (m,): of level-dependent modes, ω (1 + bend·|z|²) and d (1 + (choke·|z|)^choke_power); None: linear. See `bank_kernel.bend_poles`.
+    bend, damping_growth (m,): of level-dependent modes, ω (1 + bend·|z|²) and d (1 + (damping_growth·|z|)^damping_growth_power); None: linear. See `bank_kernel.bend_poles`.
     """
 
     omega_rad_s: Array
@@ -50,8 +50,8 @@ class ModeSet:
     weight: Array
     held: bool = False
     bend: Array | None = None
-    choke: Array | None = None
-    choke_power: float = 1.0
+    damping_growth: Array | None = None
+    damping_growth_power: float = 1.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -72,8 +72,8 @@ class Bank:
     """The instrument. offset (b+1,): segments of the flat arrays (whole groups of 8 lanes); count (b,): modes in each.
 
     log_pole (2·modes,): s/sr, real parts first; pole = e^{s/sr}; block = e^{256 s/sr}; quadrature (modes,) = d/ω; weight (W, 2·modes);
-    heard (W, b): whether any weight of the body is not zero. held (modes,): of `ModeSet`; there 1 + i·quadrature is what (1 + i d/ω)(e^s - 1)/s
-    is to its real part, which is in the weight. bend, choke, power (modes,), bent (b,): of bodies whose poles go with their level.
+    observed (W, b): whether any weight of the body is not zero. held (modes,): of `ModeSet`; there 1 + i·quadrature is what (1 + i d/ω)(e^s - 1)/s
+    is to its real part, which is in the weight. bend, damping_growth, power (modes,), bent (b,): of bodies whose poles go with their level.
     """
 
     sr: int
@@ -84,10 +84,10 @@ class Bank:
     block: Array
     quadrature: Array
     weight: Array
-    heard: Array
+    observed: Array
     held: Array
     bend: Array
-    choke: Array
+    damping_growth: Array
     power: Array
     bent: Array
 
@@ -172,18 +172,20 @@ def append(bank: Bank, state: BankState, bodies: Sequence[ModeSet]) -> tuple[Ban
     s = np.zeros(total, complex)
     pole, block = np.zeros(total, complex), np.zeros(total, complex)
     quadrature, weight, held = np.zeros(total), np.zeros((sets, total), complex), np.zeros(total, bool)
-    bend, choke, power = np.zeros(total), np.zeros(total), np.ones(total)
+    bend, damping_growth, power = np.zeros(total), np.zeros(total), np.ones(total)
     if len(place):
         omega, decay = np.concatenate([x.omega_rad_s for x in bodies]), np.concatenate([x.decay_per_s for x in bodies])
         step = (-decay + 1j * omega) / bank.sr
         s[place], pole[place], block[place] = step, np.exp(step), np.exp(BLOCK * step)
         held[place] = np.repeat([x.held for x in bodies], sizes)
-        bend[place], choke[place] = (np.concatenate([_or_zero(getattr(x, name), m) for x, m in zip(bodies, sizes, strict=True)]) for name in ("bend", "choke"))
-        power[place] = np.repeat([x.choke_power for x in bodies], sizes)
+        bend[place], damping_growth[place] = (
+            np.concatenate([_or_zero(getattr(x, name), m) for x, m in zip(bodies, sizes, strict=True)]) for name in ("bend", "damping_growth")
+        )
+        power[place] = np.repeat([x.damping_growth_power for x in bodies], sizes)
         onset = (1 + 1j * decay / omega) * np.where(held[place], np.expm1(step) / step, 1.0)
         quadrature[place] = np.where(held[place], onset.imag / onset.real, decay / omega)
         weight[:, place] = flushed(np.concatenate([x.weight for x in bodies], axis=1) * np.where(held[place], onset.real, 1.0))
-    heard = np.array([[bool(np.any(x.weight[w])) for x in bodies] for w in range(sets)], bool).reshape(sets, len(bodies))
+    observed = np.array([[bool(np.any(x.weight[w])) for x in bodies] for w in range(sets)], bool).reshape(sets, len(bodies))
     grown = Bank(
         bank.sr,
         np.concatenate([bank.offset, bank.offset[-1] + starts[1:]]),
@@ -193,12 +195,12 @@ def append(bank: Bank, state: BankState, bodies: Sequence[ModeSet]) -> tuple[Ban
         _joined(bank.block, block),
         np.concatenate([bank.quadrature, quadrature]),
         np.stack([_joined(bank.weight[w], weight[w]) for w in range(sets)]).reshape(sets, -1),
-        np.concatenate([bank.heard, heard], axis=1),
+        np.concatenate([bank.observed, observed], axis=1),
         np.concatenate([bank.held, held]),
         np.concatenate([bank.bend, bend]),
-        np.concatenate([bank.choke, choke]),
+        np.concatenate([bank.damping_growth, damping_growth]),
         np.concatenate([bank.power, power]),
-        np.concatenate([bank.bent, np.array([x.bend is not None or x.choke is not None for x in bodies], bool)]),
+        np.concatenate([bank.bent, np.array([x.bend is not None or x.damping_growth is not None for x in bodies], bool)]),
     )
     state = state.copy()
     silent, flags = np.zeros(total, complex), np.zeros(len(bodies), bool)
@@ -240,7 +242,7 @@ def advance(bank: Bank, state: BankState, n: int, strikes: Sequence[Strike] = ()
     out = np.zeros((bank.weight.shape[0], bank.body_count, n))
     done = np.zeros(len(pending.body), bool)
     bank_kernel.advance(
-        state.at, out, bank.offset, bank.count, state.pole, state.block, bank.log_pole, bank.bend, bank.choke, bank.power, bank.bent, bank.quadrature, bank.weight, bank.heard,
+        state.at, out, bank.offset, bank.count, state.pole, state.block, bank.log_pole, bank.bend, bank.damping_growth, bank.power, bank.bent, bank.quadrature, bank.weight, bank.observed,
         state.z, state.driven, state.sound, state.ringing, state.is_driven, state.tiled, FLOOR**2,
         np.searchsorted(pending.body, np.arange(bank.body_count + 1)), pending.count, pending.whole, pending.delta, pending.phase,
         pending.upcoming, pending.first, pending.impulse, pending.impulse_at, pending.rows.reshape(-1), pending.rows_at, done,
@@ -255,7 +257,7 @@ def _or_zero(values: Array | None, m: int) -> Array:
     if values is None:
         return np.zeros(m)
     if np.shape(values) != (m,) or not np.isfinite(values).all():
-        raise AudioError(f"bend or choke of shape {np.shape(values)} for {m} modes", "give a finite number for each mode")
+        raise AudioError(f"bend or damping growth of shape {np.shape(values)} for {m} modes", "give a finite number for each mode")
     return np.asarray(values, float)
 
 

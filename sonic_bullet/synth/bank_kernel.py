@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sonic_bullet.compiled import njit
+from sonic_bullet.machine.compiled import njit
 from sonic_bullet.synth import drive, tile
 from sonic_bullet.synth.tile import BLOCK, CHUNK, ROW, ROWS
 from sonic_bullet.synth.vector import LANES
@@ -32,7 +32,7 @@ def _aligned(size):  # pragma: no cover - compiled
 
 
 @njit(nogil=True)
-def _ring(b, z, pole, block, weight, modes, start, stop, size, heard, floor, sound, now, powers, table, column):  # pragma: no cover - compiled
+def _ring(b, z, pole, block, weight, modes, start, stop, size, observed, floor, sound, now, powers, table, column):  # pragma: no cover - compiled
     """Tile of body b for the block that starts: sound (W, b, BLOCK). Turns z to the next block. False where all modes are below the floor."""
     ringing = False
     for lo in range(start, stop, CHUNK):
@@ -41,31 +41,31 @@ def _ring(b, z, pole, block, weight, modes, start, stop, size, heard, floor, sou
             continue
         if not ringing:
             ringing = True
-            for w in range(len(heard)):
-                if heard[w, b]:
+            for w in range(len(observed)):
+                if observed[w, b]:
                     sound[w, b, :] = 0.0
         real = min(count, start + size - lo)  # spare lanes need no table
         tile.rows(powers, real, table)
-        for w in range(len(heard)):
-            if heard[w, b]:
+        for w in range(len(observed)):
+            if observed[w, b]:
                 tile.columns(now, weight[w], modes, lo, powers, count, column)
                 tile.outer(column, table, real, sound[w, b])
     return ringing
 
 
 @njit(nogil=True)
-def bend_poles(z, driven, span, log_pole, bend, choke, power, modes, start, stop, pole, block):  # pragma: no cover - compiled
+def bend_poles(z, driven, span, log_pole, bend, damping_growth, power, modes, start, stop, pole, block):  # pragma: no cover - compiled
     """Poles of a level-dependent body for the ``span`` samples to come: means over them of what its modes do if nothing strikes them.
 
     a = |z|:  ȧ = −d a (1 + (ca)^p)  ->  a(T)/a = ((1 + (ca)^p) e^{pdT} − (ca)^p)^{−1/p};   ω <- ω (1 + b ⟨a²⟩),  ⟨a²⟩ = a² (1 − e^{−2d'T})/2d'T
     (Nayfeh & Mook 1979, eq. 2.3.35 and section 3.3), d' the block's mean decay; exact in amplitude, and in phase for c = 0.
     """
     for m in range(start, stop):
-        if bend[m] == 0.0 and choke[m] == 0.0:
+        if bend[m] == 0.0 and damping_growth[m] == 0.0:
             continue
         d, w = -log_pole[m] * span, log_pole[modes + m]
         level = np.sqrt(z[m] ** 2 + z[modes + m] ** 2 + driven[m] ** 2 + driven[modes + m] ** 2)
-        c = (choke[m] * level) ** power[m]
+        c = (damping_growth[m] * level) ** power[m]
         fall = np.log(max((1.0 + c) * np.exp(power[m] * d) - c, 1.0)) / power[m]
         mean = -np.expm1(-2.0 * fall) / (2.0 * fall) if fall > 1e-9 else 1.0
         turn = min(max(w * (1.0 + bend[m] * level * level * mean), 0.0), 3.141)
@@ -127,14 +127,14 @@ def _close_block(b, z, driven, pole, modes, start, stop, ringing, is_driven, til
 
 
 @njit(nogil=True)
-def _drive(at, i, end, place, b, out, z, driven, is_driven, tiled, pole, block, log_pole, bend, choke, power, bent, modes, start, stop, quadrature, weight_flat, heard,
+def _drive(at, i, end, place, b, out, z, driven, is_driven, tiled, pole, block, log_pole, bend, damping_growth, power, bent, modes, start, stop, quadrature, weight_flat, observed,
            sound, s0, s1, count, whole, delta, phase, upcoming, first, impulse, impulse_at, rows, rows_at, done, f0, f1, force, gain0, gain1, gain_at, progress, period):  # fmt: skip  # pragma: no cover - compiled
     """Samples i … end - 1 of body b, sample by sample: strikes and forces enter, free and driven part are heard together."""
     width = len(rows) // 8
     for k in range(i, end):
         sample = at + k
         if bent[b] and (not is_driven[b] or sample % DRIVEN == 0):  # what begins to be driven begins with the poles of what rings then
-            bend_poles(z, driven, DRIVEN, log_pole, bend, choke, power, modes, start, stop, pole, block)
+            bend_poles(z, driven, DRIVEN, log_pole, bend, damping_growth, power, modes, start, stop, pole, block)
         if is_driven[b]:
             drive.turn_driven(driven, pole, modes, start, stop - start)
         for j in range(s0, s1):
@@ -164,16 +164,16 @@ def _drive(at, i, end, place, b, out, z, driven, is_driven, tiled, pole, block, 
             if abs(push) >= FLUSH:
                 drive.push(driven, quadrature, modes, start, stop - start, gain0, gain1, gain_at[f], push * (1.0 - progress[k]), push * progress[k])
                 is_driven[b] = True
-        for w in range(len(heard)):
-            if heard[w, b]:
+        for w in range(len(observed)):
+            if observed[w, b]:
                 value = sound[w, b, place + k - i] if tiled[b] else 0.0
                 if is_driven[b]:
-                    value += drive.heard(driven, start, weight_flat, 2 * w * modes + start, modes, stop - start)
+                    value += drive.observed(driven, start, weight_flat, 2 * w * modes + start, modes, stop - start)
                 out[w, b, k] = value if abs(value) >= FLUSH else 0.0
 
 
 @njit(nogil=True)
-def advance(at, out, offset, size, pole, block, log_pole, bend, choke, power, bent, quadrature, weight, heard, z, driven, sound, ringing, is_driven, tiled, floor,
+def advance(at, out, offset, size, pole, block, log_pole, bend, damping_growth, power, bent, quadrature, weight, observed, z, driven, sound, ringing, is_driven, tiled, floor,
             strike_of, count, whole, delta, phase, upcoming, first, impulse, impulse_at, rows, rows_at, done,
             force_of, force, gain0, gain1, gain_at, progress, period):  # fmt: skip  # pragma: no cover - compiled
     """Samples at … at + n - 1 into out (W, b, n) (zeros). See bank.py for the arrays; all in place."""
@@ -197,18 +197,18 @@ def advance(at, out, offset, size, pole, block, log_pole, bend, choke, power, be
             end = min(n, i + BLOCK - place)
             if place == 0:
                 if bent[b] and ringing[b]:
-                    bend_poles(z, driven, BLOCK, log_pole, bend, choke, power, modes, start, stop, pole, block)
-                tiled[b] = ringing[b] and _ring(b, z, pole, block, weight, modes, start, stop, size[b], heard, floor, sound, now, powers, table, column)
+                    bend_poles(z, driven, BLOCK, log_pole, bend, damping_growth, power, modes, start, stop, pole, block)
+                tiled[b] = ringing[b] and _ring(b, z, pole, block, weight, modes, start, stop, size[b], observed, floor, sound, now, powers, table, column)
                 ringing[b] = tiled[b]
             if not (is_driven[b] or f1 > f0 or _begins(first, done, s0, s1, at + end)):
                 if tiled[b]:
-                    for w in range(len(heard)):
-                        if heard[w, b]:
+                    for w in range(len(observed)):
+                        if observed[w, b]:
                             _copy_flushed(sound[w, b, place : place + end - i], out[w, b, i:end])
                     tiled[b] = place + end - i < BLOCK
                 i = end
                 continue
-            _drive(at, i, end, place, b, out, z, driven, is_driven, tiled, pole, block, log_pole, bend, choke, power, bent, modes, start, stop, quadrature, weight_flat, heard,
+            _drive(at, i, end, place, b, out, z, driven, is_driven, tiled, pole, block, log_pole, bend, damping_growth, power, bent, modes, start, stop, quadrature, weight_flat, observed,
                    sound, s0, s1, count, whole, delta, phase, upcoming, first, impulse, impulse_at, rows, rows_at, done, f0, f1, force, gain0, gain1, gain_at, progress, period)  # fmt: skip
             if place + end - i == BLOCK:
                 _close_block(b, z, driven, pole, modes, start, stop, ringing, is_driven, tiled)

@@ -105,7 +105,7 @@ def strike_nodes(typingctx, state, modes, start, count, rows, at, width, multipl
 
 
 @intrinsic
-def heard(typingctx, state, start, weight, at, modes, count):
+def observed(typingctx, state, start, weight, at, modes, count):
     """Σ Re(weight·state), the body's weights from ``at`` on: lane by lane, then across lanes in pairs."""
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:

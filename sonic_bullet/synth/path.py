@@ -17,8 +17,8 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.errors import AudioError
 from sonic_bullet.records import Air, Array
+from sonic_bullet.records.errors import AudioError
 from sonic_bullet.synth import path_kernel
 
 FARTHEST_M = 1000.0
@@ -164,7 +164,7 @@ def _add_places(state: PathState, body: Array, channels: int) -> None:
 
 
 def _begin_fades(state: PathState, step: int, teleported: Array, loud: Array, channels: int) -> None:
-    """Give each body moved in this step a new place, once, and only if anything of it is heard: silence needs no fade."""
+    """Give each body moved in this step a new place, once, and only if anything of it is observed: silence needs no fade."""
     awake = _awake(state, channels)
     moved = np.flatnonzero(teleported & (state.left != step) & (loud | awake[state.main]))
     if not len(moved):
@@ -212,10 +212,10 @@ def _make_room(path: Path, state: PathState, from_m: Array, to_m: Array, loud: A
     channels = len(path.microphone_m)
     if not channels or not len(state.body):
         return
-    heard = loud[state.body] | _awake(state, channels)
+    observed = loud[state.body] | _awake(state, channels)
     away = np.zeros(len(state.body))
     path_kernel.farthest(from_m, to_m, path.microphone_m, away)
-    away *= heard
+    away *= observed
     need = away * (path.sr / path.air.sound_speed_m_s) + _MARGIN
     if not ((need > state.size) | (away > FARTHEST_M)).any():
         return

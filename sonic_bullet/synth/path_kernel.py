@@ -18,7 +18,7 @@ import numpy as np
 from numba import types
 from numba.extending import intrinsic
 
-from sonic_bullet.compiled import njit
+from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array
 from sonic_bullet.synth.vector import LANES, Emit
 
@@ -77,8 +77,8 @@ def _interpolate(typingctx, ring, at, taps, t):
 
 
 @njit(nogil=True, error_model="numpy")
-def _listen(line, at, emitted, delay, heard, ring, delays, awake, cursor, last, taps):  # pragma: no cover - compiled
-    """Run one line, its ring and delays (a power of two long, the ring TAPS longer), over emitted (n,), adding to heard (n,)."""
+def _listen(line, at, emitted, delay, observed, ring, delays, awake, cursor, last, taps):  # pragma: no cover - compiled
+    """Run one line, its ring and delays (a power of two long, the ring TAPS longer), over emitted (n,), adding to observed (n,)."""
     size = len(delays)
     mask = np.uintp(size - 1)  # unsigned indices: numba checks no wrap-around
     running, m, newest = awake[line], cursor[line], last[line]
@@ -119,7 +119,7 @@ def _listen(line, at, emitted, delay, heard, ring, delays, awake, cursor, last, 
             running = False
             continue
         fraction = ((n - m) - here) / (1.0 + there - here)
-        heard[i] += _interpolate(ring, np.int64(np.uintp(m - (AHEAD - 1)) & mask), taps, fraction - 0.5)
+        observed[i] += _interpolate(ring, np.int64(np.uintp(m - (AHEAD - 1)) & mask), taps, fraction - 0.5)
     awake[line], cursor[line], last[line] = running, m, newest
 
 

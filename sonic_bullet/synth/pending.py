@@ -14,9 +14,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sonic_bullet.compiled import njit
-from sonic_bullet.errors import AudioError
+from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array
+from sonic_bullet.records.errors import AudioError
 
 FLUSH = 1e-30
 LONGEST_SPACING = 16.0

@@ -19,9 +19,9 @@ from math import gamma, pi, sqrt
 
 import numpy as np
 
-from sonic_bullet.compiled import njit
-from sonic_bullet.errors import RecordError
+from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array
+from sonic_bullet.records.errors import RecordError
 
 SHORTEST_S, LONGEST_S = 20e-6, 50e-3
 """A pulse below 20 µs has its -3 dB point above 30 kHz and sounds like an impulse; above 50 ms nothing audible is struck."""

@@ -5,9 +5,9 @@
 A physics step tells only a force averaged over it. Fed to a mode as it is, a resting weight would be a comb at the step
 rate [van den Doel, Kry, Pai 2001, sec. 5 discuss the same of recorded forces]. The split is a morphological opening of the
 load over `SPAN` steps [Serra 1982, ch. II]: what lasts that long carries weight and is silent (it loads the surface
-model instead), what is shorter is a blow. Blows of up to SPAN - 1 steps become one strike: simulators spread one impact over 2-3 steps.
+model instead), what is shorter is an impact. Impacts of up to SPAN - 1 steps become one strike: simulators spread one impact over 2-3 steps.
 
-A blow needs a cause. A solver's flicker between the corners of a resting box looks like a blow but nothing approached:
+An impact needs a cause. A solver's flicker between the corners of a resting box looks like an impact but nothing approached:
 a pair's strike is bounded by 2·m*·v (an elastic impact at the approach speed v before the step), or by what a struck neighbour
 hands on (`accepted_impulse`). Where a mobile body of the pair carried load within the last SPAN - 1 steps, v counts above the
 speed that gravity gives along the normal in one step: below it, leaving and landing cannot be told from resting, nor a
@@ -15,7 +15,7 @@ roll from one support on to the next from a fall.
 
 Surfaces that overlap when a step starts have met in the step before (with `contactProcessingThreshold=0`, Bullet sees a contact only
 then): strikes are looked for one step ahead of the step being rendered, so that they can be dated back. What cannot be told from support
-that early (the last step of a blow of SPAN - 1 steps is the last one known) follows when the step itself is rendered.
+that early (the last step of an impact of SPAN - 1 steps is the last one known) follows when the step itself is rendered.
 
 p pairs; column `NOW` of the load history is the step being rendered, later columns are the look-ahead.
 """
@@ -26,8 +26,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sonic_bullet.contacts import Contacts
 from sonic_bullet.records import Array
+from sonic_bullet.records.contacts import Contacts
 
 SPAN = 4
 NOW = SPAN - 1
@@ -112,7 +112,7 @@ def split(history: LoadHistory, ahead: int = 1) -> tuple[Split, LoadHistory]:
     opening = np.stack([_opening(force, i) for i in range(NOW, stop)], axis=1).reshape(len(force), stop - NOW)
     load = force[:, column:stop]
     excess = np.maximum(load - opening[:, ahead:] - history.struck_n[:, column:stop], 0.0)
-    excess[excess <= 1e-9 * load] = 0.0  # rounding of the sums is no blow
+    excess[excess <= 1e-9 * load] = 0.0  # rounding of the sums is no impact
     strike = np.flatnonzero((excess[:, 0] > 0) & (force[:, column] > force[:, column - 1]))
     connected = np.cumprod(excess[strike] > 0, axis=1).astype(bool)
     used = np.where(connected, excess[strike], 0.0)
@@ -124,7 +124,7 @@ def split(history: LoadHistory, ahead: int = 1) -> tuple[Split, LoadHistory]:
 
 
 def causing_approach_m_s(approach_m_s: Array, a: Array, b: Array, normal: Array, steps: Array, fall_m_s: Array) -> Array:
-    """Approach speed (q,) that can cause a blow. normal (q, 3) of the pairs with bodies a, b (q,); steps (bodies,): for how many steps
+    """Approach speed (q,) that can cause an impact. normal (q, 3) of the pairs with bodies a, b (q,); steps (bodies,): for how many steps
     gravity may have moved each without its falling (`unheld_steps`); fall_m_s (3,): the velocity that it gives in one. A tenth is added for what a solver leaves over, and a
     hundredth of the whole in every direction: wedged bodies turn a little of it sideways (a settled pile creeps at 0.1 mm/s, 0.003 g·dt).
     """
@@ -146,8 +146,8 @@ def accepted_impulse(raw_n_s: Array, budget_n_s: Array, a: Array, b: Array, mobi
     """Strike impulses (q,) that a cause explains: the own budget, or that of a neighbour struck in the same step.
 
     raw_n_s, budget_n_s (q,): wanted and self-caused. a, b (q,): body indices. mobile (bodies,): False for what never moves:
-    a floor hands nothing on. The largest neighbour counts, not the sum: solver noise of a pile must not add up to a blow.
-    A blow travels at most ``rounds`` bodies far in one physics step.
+    a floor hands nothing on. The largest neighbour counts, not the sum: solver noise of a pile must not add up to an impact.
+    An impact travels at most ``rounds`` bodies far in one physics step.
     """
     accepted = np.minimum(raw_n_s, budget_n_s)
     for _ in range(rounds):

@@ -24,7 +24,7 @@ from dataclasses import Field, dataclass, field, fields
 
 import numpy as np
 
-from sonic_bullet.compiled import njit
+from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array, frozen_array
 from sonic_bullet.synth.profile import octave_gains, octave_heights, sweep
 

@@ -21,11 +21,12 @@ import soundfile
 import sonic_bullet.render
 import sonic_bullet.scene
 from sonic_bullet.cli import main
-from sonic_bullet.contacts import ContactLog, Contacts, Step
-from sonic_bullet.errors import SceneError
 from sonic_bullet.files import read_log, write_log
+from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.modal import COARSER
 from sonic_bullet.records import Body, Microphone, ModalModel
+from sonic_bullet.records.contacts import Contacts, Step
+from sonic_bullet.records.errors import SceneError
 from sonic_bullet.scene import RenderResult
 
 SR = 8000

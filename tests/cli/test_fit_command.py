@@ -11,12 +11,10 @@ import numpy as np
 import pytest
 import soundfile
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "estimator"))
-from made_case import make
-
 from sonic_bullet.cli import main
 from sonic_bullet.presets import load_material, read_preset
 from sonic_bullet.records import Material
+from tests.made.case import make
 
 KEYS = {"alpha_per_s", "beta_s", "gamma_m2_s2", "sigma", "poisson_ratio", "covariance", "verdict", "metric", "log_spectral_db", "modes"}
 BRASS = Material.isotropic("made", youngs_pa=1.0e11, poisson=0.36, density_kg_m3=8400, alpha_per_s=8.0, beta_s=4e-8)
@@ -65,19 +63,19 @@ def test_preset_plays_at_once(folder: Path, tmp_path: Path, capfd: pytest.Captur
     client.setGravity(0, 0, -9.81)
     client.createMultiBody(0, client.createCollisionShape(pybullet.GEOM_PLANE))
     box = client.createMultiBody(0.1, client.createCollisionShape(pybullet.GEOM_BOX, halfExtents=[0.06, 0.0125, 0.003]), basePosition=[0, 0, 0.05])
-    heard = []
+    observed = []
     with sonic_bullet.attach(client, microphone=(0, 0.3, 0.3)) as listener:
         listener.add(box, material=tmp_path / "p.json")
         for _ in range(60):
             client.stepSimulation()
-            heard.append(listener.frame)
-    assert max(float(np.abs(f).max()) for f in heard) > 1e-4
+            observed.append(listener.frame)
+    assert max(float(np.abs(f).max()) for f in observed) > 1e-4
     disconnect(client)  # its finaliser would end whoever has its id next
 
 
 def test_one_recording_of_undeclared_onset(folder: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    heard, sr = soundfile.read(folder / "s0.wav")
-    late = np.concatenate([3e-5 * np.random.default_rng(1).standard_normal(3000), heard])
+    observed, sr = soundfile.read(folder / "s0.wav")
+    late = np.concatenate([3e-5 * np.random.default_rng(1).standard_normal(3000), observed])
     soundfile.write(tmp_path / "late.wav", late, sr, subtype="FLOAT")
     case = json.loads((folder / "case.json").read_text())
     strike = ",".join(map(str, case["recordings"][0]["strike"]["position"]))
@@ -139,16 +137,16 @@ def test_bad_input_is_one_line_and_no_file(
 
 def spoiled(folder: Path, place: Path, how: str) -> Path:
     """The first strike of a case, spoiled in one way."""
-    heard, sr = soundfile.read(folder / "s0.wav")
-    t = np.arange(len(heard)) / sr
+    observed, sr = soundfile.read(folder / "s0.wav")
+    t = np.arange(len(observed)) / sr
     if how == "20 ms":
-        heard = heard[: int(0.02 * sr)]
+        observed = observed[: int(0.02 * sr)]
     elif how == "other rate":
         sr //= 2
     elif how == "tone":
-        heard = 0.3 * np.sin(2 * np.pi * 1000 * t)
+        observed = 0.3 * np.sin(2 * np.pi * 1000 * t)
     elif how == "stereo":
-        heard = np.stack([heard, 0.5 * heard], axis=1)
+        observed = np.stack([observed, 0.5 * observed], axis=1)
     elif how == "speech":  # pulses of a wavering pitch through three resonances, four syllables a second
         from scipy.signal import lfilter
 
@@ -157,8 +155,8 @@ def spoiled(folder: Path, place: Path, how: str) -> Path:
             r = np.exp(-np.pi * width / sr)
             voice = lfilter([1 - r], [1, -2 * r * np.cos(2 * np.pi * f / sr), r * r], voice)
         voice *= (0.5 + 0.5 * np.sin(2 * np.pi * 4 * t)) ** 2
-        heard = 0.5 * voice / np.abs(voice).max() + 1e-4 * np.random.default_rng(0).standard_normal(len(t))
-    soundfile.write(place / "spoiled.wav", heard[: sr // 2], sr, subtype="FLOAT")
+        observed = 0.5 * voice / np.abs(voice).max() + 1e-4 * np.random.default_rng(0).standard_normal(len(t))
+    soundfile.write(place / "spoiled.wav", observed[: sr // 2], sr, subtype="FLOAT")
     return place / "spoiled.wav"
 
 
@@ -183,8 +181,8 @@ def test_what_a_recording_does_not_say_is_not_claimed(folder: Path, tmp_path: Pa
 
 
 def test_clipped_recording_is_refused(folder: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    heard, sr = soundfile.read(folder / "s0.wav")
-    soundfile.write(tmp_path / "c.wav", np.clip(8 * heard, -0.5, 0.5), sr)
+    observed, sr = soundfile.read(folder / "s0.wav")
+    soundfile.write(tmp_path / "c.wav", np.clip(8 * observed, -0.5, 0.5), sr)
     assert run("fit", tmp_path / "c.wav", "--mesh", folder / "box.obj", "--strike", "0,0,0.003", "--material", "brass", "-o", tmp_path / "p.json") == 2
     assert "is clipped" in capfd.readouterr().err
 
@@ -200,9 +198,9 @@ def test_numbers_that_are_none_are_refused(folder: Path, tmp_path: Path, capfd: 
 
 def stereo(folder: Path, place: Path, **entry: Any) -> Path:
     """A case of the first strike in the second of two channels, noise in the first."""
-    heard, sr = soundfile.read(folder / "s0.wav")
-    noise = 1e-3 * np.random.default_rng(2).standard_normal(len(heard))
-    soundfile.write(place / "two.wav", np.stack([noise, heard], axis=1), sr, subtype="FLOAT")
+    observed, sr = soundfile.read(folder / "s0.wav")
+    noise = 1e-3 * np.random.default_rng(2).standard_normal(len(observed))
+    soundfile.write(place / "two.wav", np.stack([noise, observed], axis=1), sr, subtype="FLOAT")
     (place / "box.obj").write_text((folder / "box.obj").read_text())
     case = json.loads((folder / "case.json").read_text())
     case["recordings"] = [{**case["recordings"][0], "file": "two.wav", **entry}]
@@ -246,7 +244,7 @@ def test_channels_of_a_recording_alone(folder: Path, tmp_path: Path, capfd: pyte
 
 def test_a_residual_without_a_mesh_is_refused_at_once(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
     """Before a recording is opened, whatever the case holds."""
-    monkeypatch.setattr("sonic_bullet.estimator.evidence.read_audio", lambda *_: pytest.fail("a recording was read"))
+    monkeypatch.setattr("sonic_bullet.estimator.fit.recorded.read_audio", lambda *_: pytest.fail("a recording was read"))
     case = json.loads((stereo(folder, tmp_path) / "case.json").read_text())
     lines = [{"object": "box", "features": [{"freq_hz": 1000.0, "decay_per_s": 3.0}]}]
     for change in ({"objects": {"box": {"material": "brass"}}}, {"objects": {}, "recordings": [{"file": "two.wav"}]}, {"recordings": lines}):
@@ -262,7 +260,7 @@ def test_a_mesh_that_is_not_there_is_said_at_once(
     folder: Path, tmp_path: Path, command: str, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     """Also where it is the last object's, or one that a diagnosis is only held against."""
-    monkeypatch.setattr("sonic_bullet.estimator.evidence.read_audio", lambda *_: pytest.fail("a recording was read"))
+    monkeypatch.setattr("sonic_bullet.estimator.fit.recorded.read_audio", lambda *_: pytest.fail("a recording was read"))
     case = json.loads((stereo(folder, tmp_path) / "case.json").read_text())
     case["objects"]["other"] = {**case["objects"]["box"], "mesh": "none.obj"}
     split = "transfer" if command == "diagnose" else "fit"

@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from test_commands import error_of, model, restored, run  # noqa: F401
 
 from sonic_bullet import modal
 from sonic_bullet.files import read_model
 from sonic_bullet.records import ModalModel
+from tests.cli.test_commands import error_of, model, restored, run  # noqa: F401
 
 
 @pytest.fixture

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from sonic_bullet.errors import FileError
 from sonic_bullet.files import check_output, read_audio, write_audio
 from sonic_bullet.presets import named_preset, write_preset
+from sonic_bullet.records.errors import FileError
 
 MAIN = "from sonic_bullet.cli import main; main()"
 SCENE = """

@@ -7,25 +7,26 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_body import SR, plate, recorded, struck
-from test_found_again import BAND, fitted
 
-from sonic_bullet.diagnosis.bands import CENTRE_HZ, HALF, BandOff, in_words, off_in, over_db
-from sonic_bullet.diagnosis.baseline import takes_of
-from sonic_bullet.diagnosis.bodies import Struck
-from sonic_bullet.diagnosis.loop import SUFFICES_DB, Closed, closed
-from sonic_bullet.diagnosis.unexplained import remainder
+from sonic_bullet.diagnosis.evidence.baseline import takes_of
+from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.diagnosis.remainder import remainder
+from sonic_bullet.diagnosis.selection.band_levels import CENTRE_HZ, HALF, BandOff, in_words, off_in, over_db
+from sonic_bullet.diagnosis.selection.stepwise import Closed, closed
+from sonic_bullet.diagnosis.selection.thresholds import RULES
 from sonic_bullet.effects import EFFECTS
-from sonic_bullet.estimator.distance import white, with_noise
-from sonic_bullet.estimator.lines import Lines
+from sonic_bullet.estimator.lines.joint_lines import Lines
+from sonic_bullet.estimator.lines.log_spectral import white, with_noise
 from sonic_bullet.records import Array
+from tests.diagnosis.test_found_again import BAND, fitted
+from tests.made.body import SR, plate, recorded, struck
 
 LOUDER = 4  # of the plate's modes: 1320 Hz, alone in its third octave
 
 
 def lines_and_signals(body: Struck) -> tuple[Lines, Array]:
-    assert body.gathered is not None and body.gathered.signals is not None
-    return body.gathered.lines, body.gathered.signals
+    assert body.recorded is not None and body.recorded.signals is not None
+    return body.recorded.lines, body.recorded.signals
 
 
 def one_band_louder() -> Struck:
@@ -57,7 +58,7 @@ def test_what_a_mean_distance_blurs_is_no_comfort(made: Callable[[], Struck], fr
     takes = takes_of((body,))
     end = closed(fitted(body), (body,), takes, (), BAND)
     assert isinstance(end, Closed)
-    assert end.before_db - end.floor_db < SUFFICES_DB
+    assert end.before_db - end.floor_db < RULES.suffices_db
     assert end.verdict == "unexplained" and end.added == () and end.bands
     assert all(from_hz < b.from_hz < b.to_hz < to_hz and b.recorded_over_played_db > 3.0 and b.strikes == 5 for b in end.bands)
     words = remainder(end, takes)
@@ -73,12 +74,12 @@ def test_nothing_is_off_where_nothing_lacks(seed: int) -> None:
 
 
 def test_no_effect_is_looked_for_where_comfort_alone_is_taken_away(monkeypatch: pytest.MonkeyPatch) -> None:
-    from sonic_bullet.diagnosis import loop
+    from sonic_bullet.diagnosis.selection import stepwise as loop
 
     asked: list[int] = []
     body = one_mode_more()
-    monkeypatch.setattr(loop, "trials", lambda *_, **__: asked.append(1) or [])
-    monkeypatch.setattr(loop, "in_twos", lambda *_, **__: asked.append(2))
+    monkeypatch.setattr(loop, "cross_validated", lambda *_, **__: asked.append(1) or [])
+    monkeypatch.setattr(loop, "pairwise", lambda *_, **__: asked.append(2))
     end = closed(fitted(body), (body,), takes_of((body,)), EFFECTS, BAND)
     assert end.verdict == "unexplained"
     rounds = len(asked)

@@ -6,30 +6,36 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_body import SR, recorded, truth
 
-from sonic_bullet.diagnosis.candidate import Candidate
-from sonic_bullet.diagnosis.evidence import evidence_of, thinned
-from sonic_bullet.diagnosis.exchange import decays_against, exchanged, surely, together
-from sonic_bullet.diagnosis.judge import Take, mean_db
-from sonic_bullet.diagnosis.refit import refitted
+from sonic_bullet.diagnosis.evidence.baseline import takes_of
+from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of, thinned
+from sonic_bullet.diagnosis.evidence.refit import refitted
+from sonic_bullet.diagnosis.prediction.diagnosis_problem import DiagnosisProblem
+from sonic_bullet.diagnosis.prediction.score import mean_db
+from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.diagnosis.selection.acceptance import Candidate
+from sonic_bullet.diagnosis.selection.exchange import decays_against, exchanged, significant, together
 from sonic_bullet.effects.contact_time import ContactTime
 from sonic_bullet.effects.damping_law import DampingLaw
 from sonic_bullet.effects.measurement_chain import MeasurementChain
 from sonic_bullet.effects.radiation import Radiation
-from sonic_bullet.estimator.distance import floor_between
+from tests.made.body import recorded, truth
+from tests.made.problems import posed
 
 BAND = (50.0, 7_500.0)
 PULSE = ContactTime(9e-4, 0.02, 0.0)
 SOUNDING = Radiation(0.05, 3.0, 0.5)
 
 
+def problem_of(body: Struck) -> DiagnosisProblem:
+    return posed((body,), takes_of((body,)))
+
+
 def test_a_filter_that_came_first_goes_for_the_pulse_that_a_tilt_of_level_had_hidden() -> None:
     """√σ and the pulse together look like a gentler low-pass, until both are fitted at once."""
     body = recorded(PULSE, SOUNDING)
-    assert body.gathered is not None and body.gathered.signals is not None
-    floor = floor_between(list(body.gathered.signals))
-    takes = [Take(body, i, x, SR, floor) for i, x in zip(body.fitted, body.gathered.signals, strict=True)]
+    assert body.recorded is not None and body.recorded.signals is not None
+    takes = takes_of((body,))
     plain = refitted(truth(), (body,))
     told = evidence_of(plain, (body,), BAND)
     low, pulse = MeasurementChain.propose(told), ContactTime.propose(told)
@@ -38,7 +44,7 @@ def test_a_filter_that_came_first_goes_for_the_pulse_that_a_tilt_of_level_had_hi
     drop = np.full(len(takes), 2.0)
     chosen, passed = (Candidate(e.id, e, plain, drop, float(drop.mean()), 0.0, {}) for e in (low, pulse))
     other = Candidate("radiation", wrong.effects[1], plain, drop, float(drop.mean()), 0.0, {})
-    h, added = exchanged(wrong, [chosen, other], [(passed,), ()], (body,), takes, BAND, lambda _: None)
+    h, added = exchanged(wrong, [chosen, other], [(passed,), ()], posed((body,), takes))
     assert [c.id for c in added] == ["contact-time", "radiation"]
     found = {e.id: e for e in h.effects}
     assert found["contact-time"].parameters()["tau_s"] == pytest.approx(9e-4, rel=0.03)
@@ -50,7 +56,7 @@ def test_a_filter_that_came_first_goes_for_the_pulse_that_a_tilt_of_level_had_hi
 
 def test_effects_that_are_right_stay() -> None:
     body = recorded(PULSE, SOUNDING)
-    h = together(truth(PULSE, SOUNDING), (body,), BAND)
+    h = together(truth(PULSE, SOUNDING), problem_of(body))
     found = {e.id: e.parameters() for e in h.effects}
     assert found["contact-time"]["tau_s"] == pytest.approx(9e-4, rel=0.02)
     assert found["radiation"]["radius_m"] == pytest.approx(0.05, rel=0.2)
@@ -62,17 +68,17 @@ def test_a_part_of_the_evidence_fits_the_same_pulse_again() -> None:
     body = recorded(PULSE, SOUNDING)
     told = evidence_of(truth(SOUNDING), (body,), BAND)
     for seed in range(6):
-        less = replace(thinned(told, (told.heard[0].source, seed % 5), 0.4, np.random.default_rng(seed)), known=PULSE)
+        less = replace(thinned(told, (told.observed[0].source, seed % 5), 0.4, np.random.default_rng(seed)), known=PULSE)
         again = ContactTime.propose(less)
         assert again is not None and again.pulse == PULSE.pulse
         assert again.duration_s(0.02) == pytest.approx(9e-4, rel=0.3)
 
 
 def test_strikes_must_agree_before_a_name_is_changed() -> None:
-    assert surely(np.array([0.4, 0.3, 0.4, 2.5, 0.4]), 0.1)  # no strike speaks against it
-    assert not surely(np.array([0.4, -0.9, 0.4, 2.5, 0.4]), 0.1)
-    assert not surely(np.array([0.05, 0.04, 0.05, 0.06, 0.05]), 0.1)  # too alike
-    assert not surely(np.array([2.0]), 0.1)
+    assert significant(np.array([0.4, 0.3, 0.4, 2.5, 0.4]), 0.1)  # no strike speaks against it
+    assert not significant(np.array([0.4, -0.9, 0.4, 2.5, 0.4]), 0.1)
+    assert not significant(np.array([0.05, 0.04, 0.05, 0.06, 0.05]), 0.1)  # too alike
+    assert not significant(np.array([2.0]), 0.1)
 
 
 def test_strikes_alone_do_not_put_one_decay_for_another() -> None:
@@ -80,6 +86,6 @@ def test_strikes_alone_do_not_put_one_decay_for_another() -> None:
     law = DampingLaw("relaxation", 5e-3, strength=0.03, tau_s=8e-5)
     body = recorded(law)
     right, wrong = truth(law), refitted(truth(Radiation(0.05, 3.0)), (body,))
-    assert decays_against(wrong.effects[0], right, wrong, 0, (body,), BAND)
-    assert not decays_against(right.effects[0], wrong, right, 0, (body,), BAND)
-    assert not decays_against(PULSE, right, truth(PULSE), 0, (body,), BAND)
+    assert decays_against(wrong.effects[0], right, wrong, 0, problem_of(body))
+    assert not decays_against(right.effects[0], wrong, right, 0, problem_of(body))
+    assert not decays_against(PULSE, right, truth(PULSE), 0, problem_of(body))

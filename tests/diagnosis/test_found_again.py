@@ -13,15 +13,14 @@ from types import ModuleType
 
 import numpy as np
 import pytest
-from made_body import ALPHA, BETA, GAIN, plate, recorded
 
-from sonic_bullet.diagnosis.baseline import takes_of
-from sonic_bullet.diagnosis.bodies import Struck
-from sonic_bullet.diagnosis.evidence import evidence_of
-from sonic_bullet.diagnosis.judge import least_db, mean_db
-from sonic_bullet.diagnosis.loop import Closed, closed
-from sonic_bullet.diagnosis.play import Hypothesis
-from sonic_bullet.diagnosis.refit import refitted
+from sonic_bullet.diagnosis.evidence.baseline import takes_of
+from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of
+from sonic_bullet.diagnosis.evidence.refit import refitted
+from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis
+from sonic_bullet.diagnosis.prediction.score import least_db, mean_db
+from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.diagnosis.selection.stepwise import Closed, closed
 from sonic_bullet.effects import EFFECTS, Effect
 from sonic_bullet.effects.added_mass import AddedMass
 from sonic_bullet.effects.amplitude_damping import AmplitudeDamping
@@ -33,14 +32,15 @@ from sonic_bullet.effects.measurement_chain import MeasurementChain
 from sonic_bullet.effects.rebound import Rebound
 from sonic_bullet.effects.room import Room
 from sonic_bullet.effects.support_damping import SupportDamping
+from tests.made.body import ALPHA, BETA, GAIN, plate, recorded
 
 BAND = (50.0, 7_500.0)
 
 
 def fitted(body: Struck) -> Hypothesis:
     """The baseline as lines give it: Rayleigh's law by least squares on the decays."""
-    assert body.gathered is not None
-    lines = body.gathered.lines
+    assert body.recorded is not None
+    lines = body.recorded.lines
     w2 = (2 * np.pi * lines.freq_hz) ** 2
     a = np.stack([0.5 * np.ones(len(w2)), 0.5 * w2], axis=1)
     weight = 1 / lines.decay_per_s
@@ -96,7 +96,7 @@ def test_a_planted_effect_is_proposed(effect: Effect, within: dict[str, float]) 
     found = type(effect).propose(evidence)
     assert found is not None
     close(found, effect, within)
-    with_it = refitted(replace(base, effects=(found,)), (body,), evidence.heard)
+    with_it = refitted(replace(base, effects=(found,)), (body,), evidence.observed)
     before, after, floor = (mean_db(takes, base) or 0.0, mean_db(takes, with_it) or 0.0, least_db(takes, with_it) or 0.0)
     assert after - floor < 0.35 * (before - floor)
 
@@ -108,21 +108,36 @@ def test_a_planted_effect_is_named(number: int) -> None:
     assert [c.id for c in end.added] == [effect.id]
     assert end.verdict == "explained"
     close(end.added[0].effect, effect, within)
-    assert end.added[0].mean_db > 2 * max(end.added[0].null_db, 0.0)
+    assert end.added[0].mean_db > 2 * max(end.added[0].control_db, 0.0)
 
 
-def test_a_suspect_of_somebody_else_is_tried_and_named() -> None:
-    """The example of docs/diagnosis.md, run as it stands."""
-    source = re.findall(r"```python\n(.*?)```", (Path(__file__).parents[2] / "docs" / "diagnosis.md").read_text(), re.S)[0]
+def of_somebody_else() -> ModuleType:
+    """The examples of docs/how-to/add-an-effect.md, as they stand."""
+    page = Path(__file__).parents[2] / "docs" / "how-to" / "add-an-effect.md"
+    source = "".join(re.findall(r"```python\n(.*?)```", page.read_text(encoding="utf-8"), re.S))
     theirs = ModuleType("theirs")
     sys.modules["theirs"] = theirs  # dataclasses look their module up
-    exec(compile(source, "docs/diagnosis.md", "exec"), theirs.__dict__)
-    assert isinstance(theirs.SquareLaw(1.0), Effect)
+    exec(compile(source, "docs/how-to/add-an-effect.md", "exec"), theirs.__dict__)
+    assert {*EFFECTS, theirs.SquareLaw, theirs.GroundedSpring} == set(theirs.effects)
+    return theirs
+
+
+def test_an_effect_of_somebody_else_is_tried_and_named() -> None:
+    theirs = of_somebody_else()
     body = recorded(theirs.SquareLaw(20.0), seconds=0.5)
     end = closed(fitted(body), (body,), takes_of((body,)), (DampingLaw, ForeignMode, theirs.SquareLaw), BAND)
     assert [c.id for c in end.added] == ["square-law"]
     assert end.added[0].effect.parameters()["q"] == pytest.approx(20.0, rel=0.05)
-    assert set(EFFECTS) < set(theirs.suspects)
+
+
+def test_an_effect_of_somebody_else_may_move_and_mix_modes() -> None:
+    """Its traits are all that the host knows: modes are paired with lines anew, and corrections come after it."""
+    theirs = of_somebody_else()
+    body = recorded(theirs.GroundedSpring(124, 3e5))
+    end = closed(fitted(body), (body,), takes_of((body,)), (DampingLaw, ForeignMode, theirs.GroundedSpring), BAND)
+    assert [c.id for c in end.added] == ["grounded-spring"]
+    assert end.verdict == "explained"
+    assert end.added[0].effect.parameters()["stiffness_n_m"] == pytest.approx(3e5, rel=0.1)
 
 
 def test_proposals_depend_on_the_evidence_alone() -> None:
@@ -131,7 +146,7 @@ def test_proposals_depend_on_the_evidence_alone() -> None:
     evidence = evidence_of(fitted(body), (body,), BAND)
     once, again = DampingLaw.propose(evidence), DampingLaw.propose(evidence)
     assert once == again
-    louder = replace(evidence, heard=tuple(replace(h, amplitude=7 * h.amplitude, signal=7 * h.signal) for h in evidence.heard if h.signal is not None))
+    louder = replace(evidence, observed=tuple(replace(h, amplitude=7 * h.amplitude, signal=7 * h.signal) for h in evidence.observed if h.signal is not None))
     assert DampingLaw.propose(louder) == once
 
 

@@ -10,22 +10,23 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 import pytest
-from made_body import SR, recorded, truth
-from test_found_again import BAND, fitted
 
 import sonic_bullet
-from sonic_bullet.cli.diagnose import run_diagnose
-from sonic_bullet.diagnosis import loop
-from sonic_bullet.diagnosis.baseline import takes_of
+from sonic_bullet.cli.diagnose_command import run_diagnose
 from sonic_bullet.diagnosis.diagnose import _warnings
-from sonic_bullet.diagnosis.evidence import evidence_of
-from sonic_bullet.diagnosis.judge import EDGE_DB, Compared, Incomparable, Take, comparable, mean_db
-from sonic_bullet.diagnosis.loop import Closed, NothingCompared, closed
-from sonic_bullet.diagnosis.trial import trials
-from sonic_bullet.diagnosis.unexplained import remainder
+from sonic_bullet.diagnosis.evidence.baseline import takes_of
+from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of
+from sonic_bullet.diagnosis.prediction.score import EDGE_DB, Compared, Incomparable, Take, comparable, mean_db
+from sonic_bullet.diagnosis.remainder import remainder
+from sonic_bullet.diagnosis.selection import stepwise as loop
+from sonic_bullet.diagnosis.selection.cross_validation import cross_validated
+from sonic_bullet.diagnosis.selection.stepwise import Closed, NothingCompared, closed
 from sonic_bullet.effects import EFFECTS
-from sonic_bullet.effects.values import Evidence, Owner, Sound, Stage
-from sonic_bullet.estimator.distance import noise_floor_db, white
+from sonic_bullet.effects.protocol import Evidence, Owner, Sound, Stage, Traits
+from sonic_bullet.estimator.lines.log_spectral import noise_floor_db, white
+from tests.diagnosis.test_found_again import BAND, fitted
+from tests.made.body import SR, recorded, truth
+from tests.made.problems import posed
 
 SOURCE = Path(sonic_bullet.__file__).parent
 
@@ -86,14 +87,14 @@ def test_the_others_are_judged_and_those_that_could_not_be_are_named() -> None:
 
 def test_one_strike_of_no_numbers_does_not_spoil_the_noise_of_all() -> None:
     body = recorded()
-    assert body.gathered is not None and body.gathered.signals is not None
-    signals = body.gathered.signals.copy()
+    assert body.recorded is not None and body.recorded.signals is not None
+    signals = body.recorded.signals.copy()
     signals[2] = np.nan
-    some = replace(body, gathered=replace(body.gathered, signals=signals))
+    some = replace(body, recorded=replace(body.recorded, signals=signals))
     found = comparable(takes_of((some,)), fitted(body))
     assert isinstance(found, Compared) and len(found.takes) == 4 and [one.name for one in found.left_out] == ["strike-2.wav"]
     signals[:] = np.nan
-    none = comparable(takes_of((replace(some, gathered=replace(body.gathered, signals=signals)),)), fitted(body))
+    none = comparable(takes_of((replace(some, recorded=replace(body.recorded, signals=signals)),)), fitted(body))
     assert isinstance(none, Incomparable) and len(none.left_out) == 5
 
 
@@ -124,6 +125,7 @@ class Spoils:
     id: ClassVar[str] = "spoils"
     stage: ClassVar[Stage] = Stage.SOUND
     owner: ClassVar[Owner] = Owner.CHAIN
+    traits: ClassVar[Traits] = Traits()
     reference: ClassVar[str] = "none"
 
     def apply(self, x: Sound) -> Sound:
@@ -145,7 +147,7 @@ def test_what_cannot_be_played_is_rejected() -> None:
     body = recorded()
     takes, off = takes_of((body,)), replace(fitted(body), gain=0.05)
     assert mean_db(takes, replace(off, effects=(Spoils(),))) == np.inf
-    found = trials(off, (body,), takes, evidence_of(off, (body,), BAND), (Spoils,), seed=0, say=lambda _: None)
+    found = cross_validated(off, posed((body,), takes, Spoils), evidence_of(off, (body,), BAND))
     assert [c.id for c in found] == ["spoils"] and (found[0].drop_db == -np.inf).all()
     end = closed(fitted(body), (body,), takes, (Spoils,), BAND)
     assert isinstance(end, Closed) and end.added == () and end.verdict == "none"

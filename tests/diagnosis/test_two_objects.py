@@ -5,17 +5,18 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from made_body import SR, recorded, truth
 
-from sonic_bullet.diagnosis.bodies import Struck
-from sonic_bullet.diagnosis.candidate import earns
-from sonic_bullet.diagnosis.evidence import evidence_of, thinned
-from sonic_bullet.diagnosis.exchange import left_out_db
-from sonic_bullet.diagnosis.judge import Take
-from sonic_bullet.diagnosis.refit import refitted
-from sonic_bullet.diagnosis.trial import trials
+from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of, thinned
+from sonic_bullet.diagnosis.evidence.refit import refitted
+from sonic_bullet.diagnosis.prediction.score import Take
+from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.diagnosis.selection.acceptance import accepted
+from sonic_bullet.diagnosis.selection.cross_validation import cross_validated
+from sonic_bullet.diagnosis.selection.exchange import left_out_db
 from sonic_bullet.effects.damping_law import DampingLaw
-from sonic_bullet.estimator.distance import floor_between
+from sonic_bullet.estimator.lines.log_spectral import floor_between
+from tests.made.body import SR, recorded, truth
+from tests.made.problems import posed
 
 BAND = (50.0, 7_500.0)
 LAW = DampingLaw("power", 6e-3, 1.4)
@@ -23,39 +24,39 @@ LAW = DampingLaw("power", 6e-3, 1.4)
 
 def alone(body: Struck, strike: int) -> Struck:
     """The body as if but one of its strikes had been recorded."""
-    assert body.gathered is not None and body.gathered.signals is not None
-    lines = body.gathered.lines
+    assert body.recorded is not None and body.recorded.signals is not None
+    lines = body.recorded.lines
     one = replace(lines, amplitude=lines.amplitude[[strike]], amplitude_sd=lines.amplitude_sd[[strike]])
-    mine = replace(body.gathered, lines=one, recordings=(body.recordings[strike],), signals=body.gathered.signals[[strike]])
-    return replace(body, gathered=mine)
+    mine = replace(body.recorded, lines=one, recordings=(body.recordings[strike],), signals=body.recorded.signals[[strike]])
+    return replace(body, recorded=mine)
 
 
 def takes_of(*bodies: Struck) -> list[Take]:
     made = []
     for body in bodies:
-        assert body.gathered is not None and body.gathered.signals is not None
-        made += [Take(body, i, x, SR, floor_between(list(body.gathered.signals))) for i, x in zip(body.fitted, body.gathered.signals, strict=True)]
+        assert body.recorded is not None and body.recorded.signals is not None
+        made += [Take(body, i, x, SR, floor_between(list(body.recorded.signals))) for i, x in zip(body.fitted, body.recorded.signals, strict=True)]
     return made
 
 
 def test_a_strike_is_left_out_of_its_own_object_alone() -> None:
     bodies = (recorded(LAW), replace(recorded(LAW, seed=6), name="other"))
     told = evidence_of(truth(), bodies, BAND)
-    less = thinned(told, (bodies[1].gathered, 2), 1.0, np.random.default_rng(0))
-    assert [h.strike for h in less.heard] == [(0, 1, 2, 3, 4), (0, 1, 3, 4)]
-    assert less.heard[0].signal is not None and len(less.heard[0].signal) == 5
-    assert np.array_equal(less.heard[1].amplitude, told.heard[1].amplitude[[0, 1, 3, 4]])
+    less = thinned(told, (bodies[1].recorded, 2), 1.0, np.random.default_rng(0))
+    assert [h.strike for h in less.observed] == [(0, 1, 2, 3, 4), (0, 1, 3, 4)]
+    assert less.observed[0].signal is not None and len(less.observed[0].signal) == 5
+    assert np.array_equal(less.observed[1].amplitude, told.observed[1].amplitude[[0, 1, 3, 4]])
 
 
 def test_an_object_of_one_strike_is_left_out_whole() -> None:
     first = recorded(LAW)
     bodies = (first, alone(recorded(LAW, seed=6), 3))
     takes = takes_of(*bodies)
-    assert takes[-1].place == (bodies[1].gathered, 0) and takes[2].place == (first.gathered, 2)
+    assert takes[-1].place == (bodies[1].recorded, 0) and takes[2].place == (first.recorded, 2)
     told = evidence_of(truth(), bodies, BAND)
     less = thinned(told, takes[-1].place, 1.0, np.random.default_rng(0))
-    assert [h.source for h in less.heard] == [first.gathered]
-    by_rest, by_first = refitted(truth(), bodies, less.heard), refitted(truth(), (first,))
+    assert [h.source for h in less.observed] == [first.recorded]
+    by_rest, by_first = refitted(truth(), bodies, less.observed), refitted(truth(), (first,))
     assert (by_rest.alpha_per_s, by_rest.beta_s, by_rest.gain) == (by_first.alpha_per_s, by_first.beta_s, by_first.gain)
 
 
@@ -63,8 +64,8 @@ def test_objects_of_one_strike_stand_trial_with_the_others() -> None:
     bodies = (recorded(LAW), alone(recorded(LAW, seed=6), 3))
     takes = takes_of(*bodies)
     plain = refitted(truth(), bodies)
-    found = trials(plain, bodies, takes, evidence_of(plain, bodies, BAND), (DampingLaw,), seed=0, say=lambda _: None)
+    found = cross_validated(plain, posed(bodies, takes, DampingLaw), evidence_of(plain, bodies, BAND))
     assert [c.id for c in found] == ["damping-law"] and len(found[0].drop_db) == len(takes)
-    assert earns(found[0], 5.0, first=True) and found[0].drop_db.min() > 0
-    out = left_out_db(found[0].hypothesis, 0, bodies, takes, BAND)
+    assert accepted(found[0], 5.0, first=True) and found[0].drop_db.min() > 0
+    out = left_out_db(found[0].hypothesis, 0, posed(bodies, takes))
     assert len(out) == len(takes) and np.isfinite(out).all()

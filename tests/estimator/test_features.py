@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.optimize import linear_sum_assignment
 
-from sonic_bullet.estimator import exact, likelihood
-from sonic_bullet.estimator.features import extract
+from sonic_bullet.estimator.lines import exact_modes, likelihood
+from sonic_bullet.estimator.lines.extraction import extract
 
 SR = 44_100
 
@@ -31,15 +31,15 @@ def mixture(seed: int, db: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, f
 
 def test_residual_moments_and_information_agree_with_differences() -> None:
     """JᵀJ from geometric sums equals the product of differences of the sound itself."""
-    modes = likelihood.Modes(np.array([-30 + 4000j, -55 + 4100j, -3 + 9000j]), np.array([0.3 + 0.1j, -0.2 + 0.5j, 0.1j]))
+    modes = likelihood.Sinusoids(np.array([-30 + 4000j, -55 + 4100j, -3 + 9000j]), np.array([0.3 + 0.1j, -0.2 + 0.5j, 0.1j]))
     none = np.zeros(3000)
 
-    def heard(change: np.ndarray) -> np.ndarray:
-        turned = likelihood.Modes(modes.pole + 1j * change[0:3] - change[3:6], modes.amplitude + change[6:9] + 1j * change[9:12])
+    def observed(change: np.ndarray) -> np.ndarray:
+        turned = likelihood.Sinusoids(modes.pole + 1j * change[0:3] - change[3:6], modes.amplitude + change[6:9] + 1j * change[9:12])
         return -likelihood.residual(none, turned, SR)
 
     step = np.r_[np.full(6, 1e-3), np.full(6, 1e-4)]
-    jacobian = np.stack([(heard(step * unit) - heard(-step * unit)) / (2 * step[k]) for k, unit in enumerate(np.eye(12))], axis=1)
+    jacobian = np.stack([(observed(step * unit) - observed(-step * unit)) / (2 * step[k]) for k, unit in enumerate(np.eye(12))], axis=1)
     wanted = jacobian.T @ jacobian
     scale = np.sqrt(np.diag(wanted))
     assert np.abs((likelihood.information(modes, SR, 3000) - wanted) / scale / scale[:, None]).max() < 1e-6
@@ -64,10 +64,10 @@ def test_a_hundred_sinusoids_without_noise_come_back_exactly(law: str, phase: st
 def test_no_rank_is_claimed_where_there_is_noise_or_no_mode() -> None:
     rng = np.random.default_rng(2)
     hit = sound(np.array([900.0, 2300.0]), np.array([20.0, 350.0]), np.array([0.3, 0.2]), np.zeros(2), 4000)
-    assert exact.modes(hit, SR) is not None
-    assert exact.modes(hit + 1e-5 * rng.standard_normal(4000), SR) is None
-    assert exact.modes(hit / (1 + np.arange(4000)), SR) is None
-    assert exact.modes(np.sin(1e-4 * np.arange(4000.0) ** 2), SR) is None
+    assert exact_modes.modes(hit, SR) is not None
+    assert exact_modes.modes(hit + 1e-5 * rng.standard_normal(4000), SR) is None
+    assert exact_modes.modes(hit / (1 + np.arange(4000)), SR) is None
+    assert exact_modes.modes(np.sin(1e-4 * np.arange(4000.0) ** 2), SR) is None
 
 
 @pytest.mark.parametrize("noise", [0.0, 1e-5, 1e-3])
@@ -85,7 +85,7 @@ def test_onset_to_the_sample(noise: float, phase: float | None) -> None:
 @pytest.mark.parametrize(("db", "least"), [(20.0, 0.90), (40.0, 0.98), (60.0, 0.99)])
 def test_mixtures_in_noise_near_the_bound(db: float, least: float) -> None:
     """Found, false and error against the single mode's Cramér-Rao bound √(8d³/(fs·a²/2σ²)); pairs closer than their width are in it."""
-    heard, found_count, wrong, features, error, normalised = 0, 0, 0, 0, [], []
+    observed, found_count, wrong, features, error, normalised = 0, 0, 0, 0, [], []
     for seed in (11, 12):
         freq, decay, amplitude, sigma, x = mixture(seed, db)
         found = extract(x, SR, onset_s=0.0)
@@ -95,11 +95,11 @@ def test_mixtures_in_noise_near_the_bound(db: float, least: float) -> None:
         i, j = linear_sum_assignment(cost)
         i, j = i[cost[i, j] < 1], j[cost[i, j] < 1]
         audible = amplitude**2 * SR / (4 * decay * sigma**2) >= 16
-        heard, found_count = heard + audible.sum(), found_count + audible[j].sum()
+        observed, found_count = observed + audible.sum(), found_count + audible[j].sum()
         wrong, features = wrong + len(found.freq_hz) - len(i), features + len(found.freq_hz)
         error += list(np.abs(found.freq_hz[i] - freq[j]) * 2 * np.pi / bound[j])
         normalised += list((found.freq_hz[i] - freq[j]) / found.freq_sd_hz[i])
-    assert found_count >= least * heard
+    assert found_count >= least * observed
     assert wrong <= 0.01 * features + 1
     assert np.median(error) < 1.3
     assert np.quantile(error, 0.9) < 3.5

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sonic_bullet.errors import AudioError
-from sonic_bullet.estimator import onset
-from sonic_bullet.estimator.features import extract
+from sonic_bullet.estimator.lines import onset
+from sonic_bullet.estimator.lines.extraction import extract
+from sonic_bullet.records.errors import AudioError
 
 SR = 22_050
 

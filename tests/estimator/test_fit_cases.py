@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 import pytest
 import soundfile
-from made_case import Planted, make, write_box
 
 from sonic_bullet import modal
-from sonic_bullet.errors import AudioError, MeshError, SonicBulletError
-from sonic_bullet.estimator.evidence import gather, observed
-from sonic_bullet.estimator.fit import fit_case, fit_evidence
+from sonic_bullet.estimator.fit.material_fit import fit_case, fit_evidence
+from sonic_bullet.estimator.fit.recorded import gather, observed
 from sonic_bullet.files.cases import Case, read_case
 from sonic_bullet.records import Material
+from sonic_bullet.records.errors import AudioError, MeshError, SonicBulletError
+from tests.made.case import Planted, make, write_box
 
 BRASS = Material.isotropic("made", youngs_pa=1.04e11, poisson=0.345, density_kg_m3=8500, alpha_per_s=6.0, beta_s=3e-8)
 GUESS = (1.25e11, 8000.0, 0.31)

@@ -8,14 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 import soundfile
-from made_case import SR, Planted, make
 
-from sonic_bullet.errors import AudioError, FileError, MeshError
-from sonic_bullet.estimator.distance import floor_of, log_spectral_db, noise_floor_db, with_noise
-from sonic_bullet.estimator.fit import CaseFit, fit_case
-from sonic_bullet.estimator.predict import lines_sound, strike_sound
+from sonic_bullet.estimator.fit.material_fit import CaseFit, fit_case
+from sonic_bullet.estimator.fit.prediction_of_lines import lines_sound, strike_sound
+from sonic_bullet.estimator.lines.log_spectral import floor_of, log_spectral_db, noise_floor_db, with_noise
 from sonic_bullet.files.cases import read_case
 from sonic_bullet.records import Material
+from sonic_bullet.records.errors import AudioError, FileError, MeshError
+from tests.made.case import SR, Planted, make
 
 BRASS = Material.isotropic("made", youngs_pa=1.04e11, poisson=0.345, density_kg_m3=8500, alpha_per_s=6.0, beta_s=3e-8)
 GUESS = (1.25e11, 8000.0, 0.31)  # E and E/ρ off by 20 and 28 %, ν by 0.035
@@ -58,13 +58,13 @@ def test_modes_are_the_bodys(planted: tuple[Planted, CaseFit]) -> None:
 def test_held_out_strike_is_predicted_to_the_noise(planted: tuple[Planted, CaseFit]) -> None:
     _, found = planted
     held = next(r for r in found.case.recordings if r.split == "holdout")
-    heard, sr = soundfile.read(str(held.file))
-    made = strike_sound(found, held, len(heard), sr)
+    observed, sr = soundfile.read(str(held.file))
+    made = strike_sound(found, held, len(observed), sr)
     o = found.objects[0].evidence
     assert o.signals is not None
     floor = floor_of(o.signals[0] - lines_sound(o.lines, 0, o.signals.shape[1], o.sr))
-    assert log_spectral_db(heard, with_noise(made, floor, 7), floor) < noise_floor_db(made, floor) + 0.2
-    assert log_spectral_db(heard, with_noise(2 * made, floor, 7), floor) > noise_floor_db(made, floor) + 3
+    assert log_spectral_db(observed, with_noise(made, floor, 7), floor) < noise_floor_db(made, floor) + 0.2
+    assert log_spectral_db(observed, with_noise(2 * made, floor, 7), floor) > noise_floor_db(made, floor) + 3
 
 
 def test_constant_loss_is_no_rayleigh_damping(planted: tuple[Planted, CaseFit], tmp_path: Path) -> None:
@@ -79,8 +79,8 @@ def test_foreign_line_is_named(planted: tuple[Planted, CaseFit], tmp_path: Path)
     make(tmp_path, BRASS, guess=GUESS)
     t = np.arange(int(0.8 * SR)) / SR
     for path in tmp_path.glob("s*.wav"):
-        heard, _ = soundfile.read(path)
-        soundfile.write(path, heard + 0.1 * np.exp(-20 * t) * np.sin(2 * np.pi * 1733 * t), SR, subtype="FLOAT")
+        observed, _ = soundfile.read(path)
+        soundfile.write(path, observed + 0.1 * np.exp(-20 * t) * np.sin(2 * np.pi * 1733 * t), SR, subtype="FLOAT")
     found = fit_case(read_case(tmp_path), check_mesh=False)
     assert "belong to no mode (1733 Hz)" in found.fit.verdict
     assert found.fit.alpha_per_s == pytest.approx(6.0, rel=0.02)
@@ -171,7 +171,7 @@ def test_practice_01(shared_path: Path) -> None:
     held = [r for r in case.recordings if r.split == "holdout"]
     assert len(held) == 3
     for r in held:
-        heard, sr = soundfile.read(str(r.file))
-        made = strike_sound(found, r, len(heard), sr)
-        assert log_spectral_db(heard, with_noise(made, floor, 5), floor) < noise_floor_db(made, floor) + 0.5
+        observed, sr = soundfile.read(str(r.file))
+        made = strike_sound(found, r, len(observed), sr)
+        assert log_spectral_db(observed, with_noise(made, floor, 5), floor) < noise_floor_db(made, floor) + 0.5
     assert np.abs(found.objects[0].correction).max() <= 0.01

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sonic_bullet.estimator.mesh_error import halved
+from sonic_bullet.estimator.fit.mesh_error import halved
 
 
 @pytest.mark.parametrize("order", [2.0, 2.5, 3.0, 4.0])

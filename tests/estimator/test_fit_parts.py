@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sonic_bullet.estimator.distance import log_spectral_db, noise_floor_db, white, with_noise
-from sonic_bullet.estimator.lines import Lines, joint_lines
-from sonic_bullet.estimator.pairing import BRIEF, _rings, heaped
-from sonic_bullet.estimator.picture import circle
-from sonic_bullet.estimator.predict import damped_sum
-from sonic_bullet.estimator.rayleigh import rayleigh
+from sonic_bullet.estimator.fit.pairing import BRIEF, _rings, heaped
+from sonic_bullet.estimator.fit.prediction_of_lines import damped_sum
+from sonic_bullet.estimator.fit.rayleigh import rayleigh
+from sonic_bullet.estimator.lines.joint_lines import Lines, joint_lines
+from sonic_bullet.estimator.lines.log_spectral import log_spectral_db, noise_floor_db, white, with_noise
+from sonic_bullet.plots.fit_plot import circle
 
 
 def test_shared_lines_to_their_spreads() -> None:

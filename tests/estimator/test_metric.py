@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sonic_bullet.errors import RecordError
-from sonic_bullet.estimator.image import Image, distance, image, plain_distance
-from sonic_bullet.estimator.loudness import bark, bark_to_hz, level_of_phon, loudness, phon, sone
-from sonic_bullet.estimator.matching import match_ratio_product, points
-from sonic_bullet.estimator.metric import hybrid, match, residuals, target
-from sonic_bullet.estimator.problem import Problem, modes_of
-from sonic_bullet.estimator.values import Features
+from sonic_bullet.estimator.lines.line_values import Features
+from sonic_bullet.estimator.perceptual.image import Image, distance, image, plain_distance
+from sonic_bullet.estimator.perceptual.loudness import bark, bark_to_hz, level_of_phon, loudness, phon, sone
+from sonic_bullet.estimator.perceptual.matching import match_ratio_product, points
+from sonic_bullet.estimator.perceptual.metric import hybrid, match, residuals, target
+from sonic_bullet.estimator.perceptual.problem import Problem, modes_of
 from sonic_bullet.records import Array
+from sonic_bullet.records.errors import RecordError
 
 SR = 48000
 
@@ -28,7 +28,7 @@ def some_modes(count: int, seed: int = 0) -> tuple[Array, Array, Array]:
     return np.sort(rng.uniform(150, 16000, count)), 10 ** rng.uniform(0.5, 2.9, count), 10 ** rng.uniform(-3, -1, count) * signs
 
 
-def heard(freq_hz: Array, decay_per_s: Array, amplitude: Array) -> Features:
+def observed(freq_hz: Array, decay_per_s: Array, amplitude: Array) -> Features:
     none = np.full(len(freq_hz), np.nan)
     return Features(freq_hz, decay_per_s, np.abs(amplitude), np.where(amplitude < 0, np.pi, 0.0), none, none, none, 0.0, -200.0, SR)
 
@@ -112,7 +112,7 @@ def test_too_short_or_silent_recordings_are_refused() -> None:
 
 def test_match_ratio_product() -> None:
     modes = some_modes(40, 1)
-    known = points(heard(*modes))
+    known = points(observed(*modes))
     assert match_ratio_product(known, *modes) == pytest.approx(-1, abs=0.03)
     order = np.random.default_rng(0).permutation(40)
     assert match_ratio_product(known, *(part[order] for part in modes)) == pytest.approx(match_ratio_product(known, *modes), rel=1e-12)
@@ -134,7 +134,7 @@ def test_hybrid_is_the_ratio_and_the_sum_of_squares() -> None:
     amplitude_hat = np.cos(np.arange(12.0))
     truth = np.array([20.0, 1e-7, 1.0, 0.1])
     modes = modes_of(truth, lambda_hat, amplitude_hat)
-    aim = target(Problem(heard(*modes), sounding(*modes), lambda_hat, amplitude_hat))
+    aim = target(Problem(observed(*modes), sounding(*modes), lambda_hat, amplitude_hat))
     assert hybrid(aim, truth) < 1e-8
     away = truth * np.array([1.5, 0.8, 1.02, 1.3])
     there = modes_of(away, lambda_hat, amplitude_hat)

@@ -7,15 +7,15 @@ from functools import cache
 import numpy as np
 import pytest
 
-from sonic_bullet.errors import RecordError
-from sonic_bullet.estimator.features import extract
-from sonic_bullet.estimator.metric import Constants, hybrid, target
-from sonic_bullet.estimator.optimise import fast, polish, reference
-from sonic_bullet.estimator.problem import Problem, modes_of
-from sonic_bullet.estimator.starts import circle, feature_eigenvalues, seed_starts, undominated
-from sonic_bullet.estimator.values import Features
+from sonic_bullet.estimator.lines.extraction import extract
+from sonic_bullet.estimator.lines.line_values import Features
+from sonic_bullet.estimator.perceptual.metric import Constants, hybrid, target
+from sonic_bullet.estimator.perceptual.optimise import fast, polish, reference
+from sonic_bullet.estimator.perceptual.problem import Problem, modes_of
+from sonic_bullet.estimator.perceptual.starts import circle, feature_eigenvalues, seed_starts, undominated
 from sonic_bullet.modal import analyse
 from sonic_bullet.records import Array, Material, Shape
+from sonic_bullet.records.errors import RecordError
 
 SR = 48000
 FIGURE_9 = ((92.003, 1.8297e-7, 3.6791, 2.1873e-3), (3.9074, 3.3935e-8, 3.4186, 9.0013e-6), (31.425, 7.0658e-7, 7.3953, 3.5842e-9))  # γ in units of γ₀

@@ -3,25 +3,22 @@
 from __future__ import annotations
 
 import json
-import sys
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from made_case import write_box
 
-from sonic_bullet.diagnosis.keep import preset_of as kept_preset
-from sonic_bullet.diagnosis.play import Hypothesis
+from benchmarks import round_trip
+from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis
+from sonic_bullet.diagnosis.preset_export import preset_of as kept_preset
 from sonic_bullet.effects.radiation import Radiation
-from sonic_bullet.errors import FileError
-from sonic_bullet.estimator.fit import fit_case
-from sonic_bullet.estimator.preset import preset_of
+from sonic_bullet.estimator.fit.fitted_preset import preset_of
+from sonic_bullet.estimator.fit.material_fit import fit_case
 from sonic_bullet.files.cases import read_case
 from sonic_bullet.presets import total_damping
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
-from benchmarks import round_trip
+from sonic_bullet.records.errors import FileError
+from tests.made.case import write_box
 
 LINES = [{"freq_hz": f, "decay_per_s": 2.0 + 1e-8 * (6.28 * f) ** 2, "decay_sd_per_s": 0.02} for f in (988.0, 2704.0, 5240.0, 8540.0, 12550.0)]
 
@@ -71,8 +68,8 @@ def test_damping_says_what_it_includes(tmp_path: Path, more: dict[str, Any], med
 
 
 def test_a_diagnosis_counts_radiation_once(tmp_path: Path) -> None:
-    from sonic_bullet.estimator.evidence import gather
-    from sonic_bullet.estimator.fit import fit_evidence
+    from sonic_bullet.estimator.fit.material_fit import fit_evidence
+    from sonic_bullet.estimator.fit.recorded import gather
 
     def kept(found: Any, *effects: Any) -> bool:
         after = Hypothesis(found.fit.alpha_per_s, found.fit.beta_s, 1.0, effects)

@@ -11,10 +11,10 @@ import pybullet as p
 import pybullet_data
 import pytest
 
-from scenes import DUCK, floor, listen, thing
-from sonic_bullet.errors import SceneError
 from sonic_bullet.listener import diagnose_world, keep_restitution, open_world
 from sonic_bullet.records import Material
+from sonic_bullet.records.errors import SceneError
+from tests.made.scenes import DUCK, floor, listen, thing
 
 ASSETS = Path(__file__).parents[2] / "assets"
 WOOD = Material.isotropic("wood", youngs_pa=1e10, poisson=0.3, density_kg_m3=700, alpha_per_s=1.0, beta_s=1e-8)

@@ -9,11 +9,11 @@ import pybullet as p
 import pybullet_data
 import pytest
 
-from scenes import DUCK, floor, impulse_on, listen, thing, turned
 from sonic_bullet.listener import direct_client, disconnect, open_world
 from sonic_bullet.listener.frames import rotation_between
 from sonic_bullet.listener.frames import turned as turn_by
 from sonic_bullet.records import Material
+from tests.made.scenes import DUCK, floor, impulse_on, listen, thing, turned
 
 STEEL = Material.isotropic("steel", youngs_pa=2e11, poisson=0.3, density_kg_m3=7800, alpha_per_s=1.0, beta_s=1e-8)
 
@@ -104,14 +104,14 @@ def test_links_have_poses_speeds_and_rows_of_their_own(client: Any) -> None:
 def test_listening_changes_nothing(client: Any) -> None:
     """Robot, ball and mesh move bit for bit as they do unheard."""
 
-    def run(heard: bool) -> list[Any]:
+    def run(observed: bool) -> list[Any]:
         made = direct_client()
         made.setGravity(0, 0, -9.81)
         floor(made)
         robot = made.loadURDF(pybullet_data.getDataPath() + "/r2d2.urdf", [0, 0, 0.6])
         thing(made, "mesh", [0.1, 0, 1.5])
         thing(made, "sphere", [1, 0, 0.3])
-        if heard:
+        if observed:
             listen(made)
         for _ in range(240):
             made.stepSimulation()
@@ -209,11 +209,11 @@ def test_forget_serves_where_no_hook_can(client: Any) -> None:
     old = world.index_of(ball)
     client.removeBody(ball)
     world.forget(ball)
-    twin = thing(client, "sphere", [0, 0, 0.05])
+    second = thing(client, "sphere", [0, 0, 0.05])
     client.stepSimulation()
     world.after_step()
-    assert twin == ball
-    assert world.index_of(twin) not in (old, -1)
+    assert second == ball
+    assert world.index_of(second) not in (old, -1)
 
 
 def test_rotations_between_and_by_are_inverse() -> None:

@@ -9,9 +9,9 @@ from typing import Any
 import pybullet as p
 import pytest
 
-from scenes import floor, listen, thing
-from sonic_bullet.errors import SceneError
 from sonic_bullet.listener import open_world
+from sonic_bullet.records.errors import SceneError
+from tests.made.scenes import floor, listen, thing
 
 
 def test_unhook_restores_the_client_exactly(client: Any) -> None:
@@ -88,20 +88,20 @@ def test_unmodified_gym_environments_are_heard_to_the_last_step() -> None:
 
 @pytest.mark.parametrize("order", list(itertools.permutations(range(3))))
 def test_hooks_of_one_client_leave_in_any_order_without_a_trace(client: Any, order: tuple[int, ...]) -> None:
-    heard = [0, 0, 0]
+    observed = [0, 0, 0]
     before = dict(vars(client))
 
     def hear(which: int) -> None:
-        heard[which] += 1
+        observed[which] += 1
 
-    worlds = [open_world(client) for _ in heard]
+    worlds = [open_world(client) for _ in observed]
     for which, world in enumerate(worlds):
         world.hook(world.before_step, lambda which=which: hear(which))
     for which in order:
         client.stepSimulation()
         worlds[which].unhook()
     client.stepSimulation()
-    assert [heard[which] for which in order] == [1, 2, 3]
+    assert [observed[which] for which in order] == [1, 2, 3]
     assert dict(vars(client)) == before
 
 

@@ -11,10 +11,10 @@ import pybullet as p
 import pybullet_data
 import pytest
 
-from scenes import floor, listen, thing
-from sonic_bullet.contacts import ROW_FIELDS, Step
-from sonic_bullet.errors import SceneError, SceneWarning
 from sonic_bullet.listener import diagnose_world, direct_client, disconnect, links_with_shapes, open_world
+from sonic_bullet.records.contacts import ROW_FIELDS, Step
+from sonic_bullet.records.errors import SceneError, SceneWarning
+from tests.made.scenes import floor, listen, thing
 
 NAN_SPEED = [math.nan, 0, 0]
 
@@ -31,7 +31,7 @@ def rows_on(steps: list[Step], index: int) -> list[np.ndarray]:
 
 def test_a_body_that_is_no_number_is_named_once_and_the_others_go_on(client: Any) -> None:
     """To the bit as in a world where it is simply taken away."""
-    heard = []
+    observed = []
     for taken_away in (False, True):
         world_client = direct_client()
         world_client.setGravity(0, 0, -9.81)
@@ -50,9 +50,9 @@ def test_a_body_that_is_no_number_is_named_once_and_the_others_go_on(client: Any
         assert len(steps) == 70
         assert [w.category for w in said] == ([] if taken_away else [SceneWarning])
         assert len(world.left_out.notes) == len(said)
-        heard.append((steps, world.index_of(good), world.bodies))
+        observed.append((steps, world.index_of(good), world.bodies))
         disconnect(world_client)
-    broken, plain = heard
+    broken, plain = observed
     assert len(rows_on(broken[0][10:], broken[1])) > 10
     for one, other in zip(broken[0], plain[0], strict=True):
         for name in ROW_FIELDS:
@@ -232,7 +232,7 @@ def test_a_soft_body_is_left_out_and_named_once(client: Any, hooked: bool) -> No
     assert {record.body_id for record in world.bodies} <= {0, body, far}
     assert world.index_of(far) >= 0
     assert len(steps) == 200
-    assert (cloth, -1) not in links_with_shapes(world)
+    assert (cloth, -1) not in links_with_shapes(world.client_id)
     with pytest.raises(SceneError, match=f"body {cloth} .*soft"):
         world.add(cloth)
     assert "nan" not in {finding.id for finding in diagnose_world(client)}

@@ -9,8 +9,8 @@ import pybullet as p
 import pybullet_data
 import pytest
 
-from scenes import GRAVITY, MASS_KG, floor, impulse_on, listen, thing, turned
 from sonic_bullet.listener import open_world
+from tests.made.scenes import GRAVITY, MASS_KG, floor, impulse_on, listen, thing, turned
 
 SHAPES = ("sphere", "box", "capsule", "cylinder", "mesh", "compound")
 

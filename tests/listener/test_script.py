@@ -12,8 +12,8 @@ import pybullet as p
 import pytest
 from pybullet_utils.bullet_client import BulletClient
 
-from sonic_bullet.errors import SceneError
 from sonic_bullet.listener import run_script
+from sonic_bullet.records.errors import SceneError
 
 RAW = """
 import pybullet as p, time

@@ -10,12 +10,12 @@ import pybullet as p
 import pybullet_data
 import pytest
 
-from scenes import DUCK, collision, floor, thing, turned
-from sonic_bullet.errors import MeshError
 from sonic_bullet.geometry import is_closed, volume_m3
 from sonic_bullet.listener import links_with_shapes, open_world
-from sonic_bullet.listener.mesh_files import hull, lid_height_m, read_surfaces
+from sonic_bullet.listener.pybullet.urdf_meshes import hull, lid_height_m, read_surfaces
 from sonic_bullet.records import Shape
+from sonic_bullet.records.errors import MeshError
+from tests.made.scenes import DUCK, collision, floor, thing, turned
 
 DATA = Path(pybullet_data.getDataPath())
 MARGIN_M = 0.0045
@@ -68,7 +68,7 @@ def test_extents_by_the_body_pose_are_those_of_the_collision(client: Any, urdf: 
     """Links stand at right angles here, so Bullet's boxes round its hulls are tight but for its margins."""
     body = client.loadURDF(str(DATA / urdf), [1, 2, 3], useFixedBase=True)
     world = open_world(client)
-    links = links_with_shapes(world, body)
+    links = links_with_shapes(world.client_id, body)
     assert links
     for _, link in links:
         position, quaternion = client.getBasePositionAndOrientation(body) if link < 0 else client.getLinkState(body, link, computeForwardKinematics=1)[:2]

@@ -9,9 +9,9 @@ import numpy as np
 import pybullet as p
 import pytest
 
-from scenes import MASS_KG, floor, impulse_on, listen, thing
-from sonic_bullet.errors import SceneError, SceneWarning
 from sonic_bullet.listener import open_world
+from sonic_bullet.records.errors import SceneError, SceneWarning
+from tests.made.scenes import MASS_KG, floor, impulse_on, listen, thing
 
 
 def test_only_loaded_pairs_become_rows(client: Any) -> None:
@@ -172,8 +172,8 @@ def test_polling_twice_finds_nothing(client: Any, hooked: bool) -> None:
 
 def test_without_a_hook_rows_are_the_same(client: Any) -> None:
     """Poses left by the step before are the poses before the step: same rows, to the bit."""
-    from sonic_bullet.contacts import ROW_FIELDS
     from sonic_bullet.listener import direct_client, disconnect
+    from sonic_bullet.records.contacts import ROW_FIELDS
 
     def run(hooked: bool) -> Any:
         made = direct_client()

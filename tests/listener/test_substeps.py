@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from scenes import GRAVITY, MASS_KG, floor, impulse_on, listen, thing, turned
-from sonic_bullet.errors import SceneError
 from sonic_bullet.listener import open_world
+from sonic_bullet.records.errors import SceneError
+from tests.made.scenes import GRAVITY, MASS_KG, floor, impulse_on, listen, thing, turned
 
 
 @pytest.mark.parametrize("substeps", [2, 4, 10])

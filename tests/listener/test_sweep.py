@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from scenes import floor, listen, thing, turned
-from sonic_bullet.contacts import Step
 from sonic_bullet.listener import World
+from sonic_bullet.records.contacts import Step
+from tests.made.scenes import floor, listen, thing, turned
 
 
 def sweeps_of(world: World, steps: list[Step], body: int) -> np.ndarray:

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 import trimesh
 
-from sonic_bullet.errors import FileError, MeshError, ModalError
-from sonic_bullet.modal import COARSER, analyse, prisms, read_mesh, shapes, surfaces, tetrahedra
+from sonic_bullet.modal import COARSER, analyse, read_mesh
+from sonic_bullet.modal.meshing import prisms, shape_meshes, surfaces, tetrahedra
 from sonic_bullet.records import Material, Shape
+from sonic_bullet.records.errors import FileError, MeshError, ModalError
 
 
 def as_mesh(mesh: trimesh.Trimesh) -> Shape:
@@ -123,7 +124,7 @@ def test_a_hang_is_cut_and_named() -> None:
 
 
 def test_clamps_on_budget() -> None:
-    assert shapes.dof_budget(0.1, 0.5) < shapes.dof_budget(0.01, 0.5) < shapes.dof_budget(0.001, 0.5)
+    assert shape_meshes.dof_budget(0.1, 0.5) < shape_meshes.dof_budget(0.01, 0.5) < shape_meshes.dof_budget(0.001, 0.5)
 
 
 def test_mesh_files(tmp_path: Path) -> None:
@@ -162,7 +163,7 @@ def test_a_fill_that_time_made_coarser_says_so(monkeypatch: pytest.MonkeyPatch) 
     notes = [analyse((ball,), steel, count=1, cache=None).note]
 
     def slow_at_first(*given: object, passes: int, time_limit_s: float) -> object:
-        if time_limit_s == shapes.FILL_LIMITS_S[0]:
+        if time_limit_s == shape_meshes.FILL_LIMITS_S[0]:
             raise tetrahedra.TooSlow("filling took more than 28 s of processor time", "")
         return known(*given, passes=passes, time_limit_s=time_limit_s)  # type: ignore[arg-type]
 

@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sonic_bullet.errors import MeshError, ModalError
-from sonic_bullet.modal import analyse, read_mesh, shapes
+from sonic_bullet.modal import analyse, read_mesh
+from sonic_bullet.modal.meshing import shape_meshes as shapes
 from sonic_bullet.records import Material
+from sonic_bullet.records.errors import MeshError, ModalError
 
 # Poisson's ratio that the recorded object has, as far as its frequency ratios tell; the case's guess is off by up to 0.04.
 RECORDED = {"practice-01": 0.30, "practice-03": 0.22, "practice-04": 0.325}

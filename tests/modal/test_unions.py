@@ -8,8 +8,8 @@ import trimesh
 
 from sonic_bullet import geometry
 from sonic_bullet.modal import analyse
-from sonic_bullet.modal.surfaces import pieces_of_faces, prepared
-from sonic_bullet.modal.unions import joined
+from sonic_bullet.modal.meshing.surfaces import pieces_of_faces, prepared
+from sonic_bullet.modal.meshing.unions import joined
 from sonic_bullet.records import Material, Shape
 
 

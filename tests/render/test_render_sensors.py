@@ -6,15 +6,16 @@ from typing import Any
 
 import numpy as np
 import pytest
-from made_models import STEEL, ball_body, box_body, row, step, wall_body
 
-from sonic_bullet.contacts import ContactLog, Contacts, Step
+from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.records import Air, Microphone, ModalSum, Vibrometer
+from sonic_bullet.records.contacts import Contacts, Step
 from sonic_bullet.render import render_log, synthesizer
-from sonic_bullet.render.blows import Blow, find_blows
-from sonic_bullet.render.sounder import build_sounder
+from sonic_bullet.render.impacts import ForcePulse, find_pulses
+from sonic_bullet.render.resonator import build_resonator
 from sonic_bullet.synth import bank
-from sonic_bullet.synth.radiation import jerk_coefficient, radiation
+from sonic_bullet.synth.far_field import jerk_coefficient, radiation
+from tests.made.models import STEEL, ball_body, box_body, row, step, wall_body
 
 SR = 48_000
 EDGES_M = (0.2, 0.1, 0.01)
@@ -66,34 +67,34 @@ def test_the_level_is_the_radiation_law() -> None:
     body = box_body(EDGES_M, (1500.0,))
     (signal,) = struck_box((Microphone([0, 0, 2.0]),), steps=60)
     weight, extra = radiation(body.model, Air())
-    sounder = build_sounder(body, (Microphone([0, 0, 2.0]),), SR, Air())
+    resonator = build_resonator(body, (Microphone([0, 0, 2.0]),), SR, Air())
     from sonic_bullet.synth.pulse import pulse_spectrum
 
-    blow = only_blow(body, row(0, 1, (0, 0, -0.01), normal=(0, 0, -1), point_a=(0, 0, 0.005)))
-    spectrum = pulse_spectrum(np.array([1500.0 * blow.length_s]), flat=blow.flat)[0]
+    pulse = only_pulse(body, row(0, 1, (0, 0, -0.01), normal=(0, 0, -1), point_a=(0, 0, 0.005)))
+    spectrum = pulse_spectrum(np.array([1500.0 * pulse.length_s]), flat=pulse.flat)[0]
     start = 3000
-    decay = float(sounder.decay_per_s[0])
+    decay = float(resonator.decay_per_s[0])
     age = (start - 400) / SR - 2.0 / C
-    expected = abs(weight[0]) * blow.share * abs(blow.modes_low[0]) * spectrum / 2.0 * np.exp(-decay * age)
+    expected = abs(weight[0]) * pulse.share * abs(pulse.modes_low[0]) * spectrum / 2.0 * np.exp(-decay * age)
     measured = np.sqrt(2) * np.sqrt(np.mean(signal[start : start + 3200] ** 2)) / np.sqrt((1 - np.exp(-2 * decay * 3200 / SR)) / (2 * decay * 3200 / SR))
     assert measured == pytest.approx(expected, rel=0.01)
     assert extra[0] > 0
 
 
-def only_blow(body: Any, contacts: Contacts) -> Blow:
+def only_pulse(body: Any, contacts: Contacts) -> ForcePulse:
     """The blow that a lone strike is, of body 0 against a wall."""
-    found: list[Blow] = []
+    found: list[ForcePulse] = []
     with pytest.MonkeyPatch.context() as patch:
 
         def listening(*args: Any) -> Any:
-            blows = find_blows(*args)
-            found.extend(blows)
-            return blows
+            impacts = find_pulses(*args)
+            found.extend(impacts)
+            return impacts
 
-        patch.setattr(synthesizer, "find_blows", listening)
+        patch.setattr(synthesizer, "find_pulses", listening)
         rendered((body, wall_body()), one_strike((body, wall_body()), contacts, [(0, 0, 0), (0, 0, 0.01)], at=0, steps=5), (ModalSum(),))
-    (blow,) = found
-    return blow
+    (pulse,) = found
+    return pulse
 
 
 def test_the_plain_sum_is_the_seeds_sum() -> None:
@@ -101,18 +102,18 @@ def test_the_plain_sum_is_the_seeds_sum() -> None:
     body = box_body(EDGES_M, (900.0, 2100.0))
     contacts = row(0, 1, (0, 0, -0.01), normal=(0, 0, -1), point_a=(0.03, 0.01, 0.005))
     (signal,) = struck_box((ModalSum(2.0),), freq=(900.0, 2100.0), where=(0.03, 0.01, 0.005))
-    blow = only_blow(body, contacts)
-    sounder = build_sounder(body, (), SR, Air())
+    pulse = only_pulse(body, contacts)
+    resonator = build_resonator(body, (), SR, Air())
     from sonic_bullet.synth.pulse import pulse_spectrum
 
-    time = np.arange(signal.size) / SR - 2 / 240 - blow.start_s - blow.length_s / 2
+    time = np.arange(signal.size) / SR - 2 / 240 - pulse.start_s - pulse.length_s / 2
     expected = np.zeros(signal.size)
-    for omega, decay, gain in zip(sounder.omega_rad_s, sounder.decay_per_s, blow.modes_low, strict=True):
+    for omega, decay, gain in zip(resonator.omega_rad_s, resonator.decay_per_s, pulse.modes_low, strict=True):
         expected += (
             2.0
-            * blow.share
+            * pulse.share
             * gain
-            * pulse_spectrum(np.array([omega / (2 * np.pi) * blow.length_s]), flat=blow.flat)[0]
+            * pulse_spectrum(np.array([omega / (2 * np.pi) * pulse.length_s]), flat=pulse.flat)[0]
             * np.exp(-decay * time)
             * np.sin(omega * time)
         )
@@ -126,11 +127,11 @@ def test_a_vibrometer_reads_the_surfaces_velocity() -> None:
     contacts = row(0, 1, (0, 0, -0.01), normal=(0, 0, -1), point_a=(0.1, 0.05, 0.005))
     (signal,) = struck_box((Vibrometer(0, [0.1, 0.05, 0.005], [0, 0, -1]),), freq=(300.0,), where=(0.1, 0.05, 0.005))
     phi = float(body.model.shape[np.argmax(body.model.vertex_m.sum(axis=1)), 2, 0])
-    blow = only_blow(body, contacts)
-    assert blow.modes_low[0] == pytest.approx(-0.01 * phi, rel=1e-6)
-    sounder = build_sounder(body, (), SR, Air())
-    time = np.arange(signal.size) / SR - 2 / 240 - blow.start_s - blow.length_s / 2
-    expected = blow.share * 0.01 * phi**2 * np.exp(-sounder.decay_per_s[0] * time) * np.cos(sounder.omega_rad_s[0] * time)
+    pulse = only_pulse(body, contacts)
+    assert pulse.modes_low[0] == pytest.approx(-0.01 * phi, rel=1e-6)
+    resonator = build_resonator(body, (), SR, Air())
+    time = np.arange(signal.size) / SR - 2 / 240 - pulse.start_s - pulse.length_s / 2
+    expected = pulse.share * 0.01 * phi**2 * np.exp(-resonator.decay_per_s[0] * time) * np.cos(resonator.omega_rad_s[0] * time)
     late = slice(600, 4000)
     assert np.abs(signal[late] - expected[late]).max() < 0.01 * np.abs(expected).max()
     other = struck_box((Vibrometer(5, [0.1, 0.05, 0.005], [0, 0, -1]),))
@@ -149,7 +150,7 @@ def clicked(direction_deg: tuple[float, ...], *, radius: float, material: Any, i
 
 
 def click_blow(radius: float, material: Any, impulse: float) -> Any:
-    return only_blow(ball_body(radius, material), row(0, 1, (0, 0, impulse), normal=(0, 0, 1), point_a=(0, 0, -radius), approach=1.0))
+    return only_pulse(ball_body(radius, material), row(0, 1, (0, 0, impulse), normal=(0, 0, 1), point_a=(0, 0, -radius), approach=1.0))
 
 
 def test_a_rigid_click_has_a_dipoles_direction() -> None:
@@ -163,30 +164,29 @@ def test_a_rigid_click_has_a_dipoles_direction() -> None:
 
 def test_a_slow_compact_click_is_the_jerk_law() -> None:
     """p = K cosθ · da/dt(t - r/c) / r [Chadwick, Zheng, James 2012], where the blow is long against a/c: a soft 4 mm ball."""
-    from made_models import Material
-
     from sonic_bullet.synth.pulse import add_jerk
+    from tests.made.models import Material
 
     rubber = Material.isotropic("rubber", youngs_pa=3e6, poisson=0.45, density_kg_m3=1100, alpha_per_s=50.0, beta_s=1e-6)
     radius, impulse = 0.004, 1e-4
     ball = ball_body(radius, rubber)
-    blow = click_blow(radius, rubber, impulse)
-    assert blow.length_s * C / radius > 30
+    pulse = click_blow(radius, rubber, impulse)
+    assert pulse.length_s * C / radius > 30
     (sound,) = clicked((0,), radius=radius, material=rubber, impulse=impulse)
     rate = 16
     jerk = np.zeros((1, 3, sound.size * rate))
     add_jerk(
         jerk,
         np.array([0]),
-        np.array([2 / 240 + blow.start_s]),
-        np.array([blow.length_s]),
-        np.array([blow.flat]),
-        blow.impulse_n_s[None],
+        np.array([2 / 240 + pulse.start_s]),
+        np.array([pulse.length_s]),
+        np.array([pulse.flat]),
+        pulse.impulse_n_s[None],
         SR * rate,
         0,
     )
     expected = jerk_coefficient(ball.volume_m3, Air()) * jerk[0, 2] / ball.mass_kg
-    assert blow.impulse_n_s[2] == pytest.approx(impulse)
+    assert pulse.impulse_n_s[2] == pytest.approx(impulse)
     assert np.abs(sound).max() == pytest.approx(np.abs(expected).max(), rel=0.02)
     late = np.argmin(sound) / SR - np.argmin(expected) / (SR * rate)
     print(f"peak {np.abs(sound).max() / np.abs(expected).max():.4f} of the law, {(late - 1.0 / C) * SR:.2f} samples late")
@@ -197,22 +197,22 @@ def test_a_fast_click_is_kirchhoffs_sphere() -> None:
     """p = ρ₀ c U (a/r) e^{-wt}(cos wt - sin wt), w = c/a [Kirchhoff 1876; Koss, Alfredson 1973]: a 10 cm steel ball's blow is short against a/c."""
     radius, impulse = 0.10, 1.0
     ball = ball_body(radius)
-    blow = click_blow(radius, STEEL, impulse)
+    pulse = click_blow(radius, STEEL, impulse)
     rate = C / radius
-    print(f"blow {blow.length_s * 1e6:.0f} µs against a/c = {1e6 / rate:.0f} µs")
+    print(f"blow {pulse.length_s * 1e6:.0f} µs against a/c = {1e6 / rate:.0f} µs")
     (sound,) = clicked((0,), radius=radius, material=STEEL, impulse=impulse, r=2.0)
     speed = impulse / ball.mass_kg
-    begin = 2 / 240 + blow.start_s + 2.0 / C  # sound leaves from the centre (Kirchhoff's t counts from there plus a/c)
+    begin = 2 / 240 + pulse.start_s + 2.0 / C  # sound leaves from the centre (Kirchhoff's t counts from there plus a/c)
     time = np.arange(sound.size) / SR - begin
     sub = np.linspace(0, 1, 400, endpoint=False) + 1 / 800
     from sonic_bullet.synth.pulse import cumulated_force
 
-    share = np.diff(cumulated_force(np.linspace(0, 1, 401), flat=blow.flat))
+    share = np.diff(cumulated_force(np.linspace(0, 1, 401), flat=pulse.flat))
     expected = np.zeros(sound.size)
     for part, weight in zip(sub, share, strict=True):
-        t = time - part * blow.length_s
+        t = time - part * pulse.length_s
         expected += np.where(t > 0, weight * RHO * C * speed * radius / 2.0 * np.exp(-rate * t) * (np.cos(rate * t) - np.sin(rate * t)), 0.0)
-    clear = slice(int((begin + blow.length_s) * SR) + 12, None)
+    clear = slice(int((begin + pulse.length_s) * SR) + 12, None)
     assert np.abs(sound[clear] - expected[clear]).max() < 0.02 * np.abs(expected).max()
     assert np.abs(sound).max() == pytest.approx(np.abs(expected).max(), rel=0.05)
 
@@ -235,15 +235,15 @@ def test_static_bodies_ring() -> None:
 def test_a_force_that_swings_moves_a_rigid_body_as_the_sphere_law_says(radius: float, freq: float) -> None:
     """Steady force: p = 2K w² s/((s+w)² + w²) · F/m at 1 m, w = c/a: the transfer function of Kirchhoff's sphere."""
     body = ball_body(radius)
-    sounder = build_sounder(body, (), SR, Air())
-    assert sounder.rigid is not None
+    resonator = build_resonator(body, (), SR, Air())
+    assert resonator.rigid is not None
     instrument, ringing = bank.empty_bank(SR, 1)
-    instrument, ringing = bank.append(instrument, ringing, [sounder.rigid])
+    instrument, ringing = bank.append(instrument, ringing, [resonator.rigid])
     n = 9600
     one = np.ones(1)
     force = np.sin(2 * np.pi * freq * np.arange(n) / SR)
     out = bank.advance(instrument, ringing, n, (), [bank.Force(0, force, one, one)], np.zeros(n))[0, 0]
-    s, w = 2j * np.pi * freq, float(sounder.rigid.omega_rad_s[0])
+    s, w = 2j * np.pi * freq, float(resonator.rigid.omega_rad_s[0])
     law = abs(2 * jerk_coefficient(body.volume_m3, Air()) * w**2 * s / ((s + w) ** 2 + w**2)) / body.mass_kg
     error_db = 20 * np.log10(np.abs(out[4800:]).max() / law)
     print(f"{radius} m, {freq} Hz: {error_db:.2f} dB")

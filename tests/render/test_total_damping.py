@@ -8,18 +8,18 @@ from pathlib import Path
 import msgspec
 import numpy as np
 import pytest
-from made_models import STEEL, ball_body, box_body, row, step
 
 from sonic_bullet import presets
-from sonic_bullet.contacts import ContactLog
-from sonic_bullet.effects.stored import with_modes
+from sonic_bullet.effects.presets_of_effects import with_modes
 from sonic_bullet.files import read_log, read_model, write_log, write_model
+from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.modal import analyse
 from sonic_bullet.presets import Provenance, load_material, material_of, named_preset, total_damping, write_preset
 from sonic_bullet.records import Air, Body, Material, Microphone, Shape
 from sonic_bullet.render import render_log
-from sonic_bullet.render.sounder import build_sounder
-from sonic_bullet.synth.radiation import radiation
+from sonic_bullet.render.resonator import build_resonator
+from sonic_bullet.synth.far_field import radiation
+from tests.made.models import STEEL, ball_body, box_body, row, step
 
 FREQ_HZ = (740.0, 1230.0, 2950.0)
 TOTAL = replace(STEEL, name="total", includes_radiation=True)
@@ -36,11 +36,11 @@ def test_total_damping_is_played_as_it_is() -> None:
     assert own.model is not None and total.model is not None
     weight, extra = radiation(own.model, Air())
     assert (extra > 0.01 * own.model.decay_per_s).all()
-    one, two = (build_sounder(x, (), 48_000, Air()) for x in (own, total))
+    one, two = (build_resonator(x, (), 48_000, Air()) for x in (own, total))
     assert one.decay_per_s == pytest.approx(own.model.decay_per_s + extra, rel=1e-12)
     assert two.decay_per_s == pytest.approx(total.model.decay_per_s, rel=1e-12)
-    for sounder in (one, two):  # as loud, in air as ever
-        assert np.abs(sounder.weight[0]) == pytest.approx(np.abs(weight), rel=1e-12)
+    for resonator in (one, two):  # as loud, in air as ever
+        assert np.abs(resonator.weight[0]) == pytest.approx(np.abs(weight), rel=1e-12)
     assert two.omega_rad_s == pytest.approx(2 * np.pi * np.array(FREQ_HZ), rel=1e-12)
 
 

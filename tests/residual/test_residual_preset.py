@@ -10,23 +10,23 @@ from pathlib import Path
 import msgspec
 import numpy as np
 import pytest
-from made_models import box_body, row, step, wall_body
-from made_residuals import SR, modes, residual
 
 from sonic_bullet import presets
-from sonic_bullet.contacts import ContactLog
-from sonic_bullet.effects.stored import with_modes
-from sonic_bullet.errors import AudioError, MaterialError, RecordError
-from sonic_bullet.estimator.lines import joint_lines
-from sonic_bullet.estimator.predict import lines_sound
-from sonic_bullet.estimator.residual import recording_strikes, strikes_of
+from sonic_bullet.effects.presets_of_effects import with_modes
+from sonic_bullet.estimator.fit.prediction_of_lines import lines_sound
+from sonic_bullet.estimator.lines.joint_lines import joint_lines
+from sonic_bullet.estimator.residual.recorded_strikes import recording_strikes, strikes_of
 from sonic_bullet.files import read_log, write_audio
+from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.records import Air, Material, Microphone, Residual
+from sonic_bullet.records.errors import AudioError, MaterialError, RecordError
 from sonic_bullet.render import render_log
-from sonic_bullet.render.beside import build_beside
-from sonic_bullet.render.sounder import build_sounder
+from sonic_bullet.render.residual_voice import build_residual_voice
+from sonic_bullet.render.resonator import build_resonator
 from sonic_bullet.residual.code import form_of, residual_of
 from sonic_bullet.residual.compute import damped
+from tests.made.models import box_body, row, step, wall_body
+from tests.made.residuals import SR, modes, residual
 
 SOURCE = modes((400.0, 900.0, 1500.0, 2600.0), (8.0, 12.0, 20.0, 30.0), (1.0, 0.7, 0.5, 0.3))
 MADE = residual(SOURCE, lines=((1200.0, 8.0, 0.3),))
@@ -115,12 +115,18 @@ def test_a_preset_with_effects_and_a_residual_plays_both(tmp_path: Path) -> None
     assert all(
         np.abs(a - b).max() > 1e-3 * np.abs(a).max() for a, b in ((sound, plain), (sound, linear), (plain, straight), (sound - plain, linear - straight))
     )
-    sounder = build_sounder(whole.bodies[0], (), SR, Air())
-    beside = build_beside(sounder, SR, Air())
-    assert beside is not None and beside.lines.bend is not None and beside.lines.choke is not None and sounder.bend is not None and sounder.choke is not None
-    assert (beside.lines.bend == sounder.bend[beside.follows]).all() and beside.lines.bend.all()
-    assert (beside.lines.choke == sounder.choke[beside.follows]).all() and beside.lines.choke.all()
-    assert beside.lines.choke_power == sounder.choke_power == 2.0
+    resonator = build_resonator(whole.bodies[0], (), SR, Air())
+    beside = build_residual_voice(resonator, SR, Air())
+    assert (
+        beside is not None
+        and beside.lines.bend is not None
+        and beside.lines.damping_growth is not None
+        and resonator.bend is not None
+        and resonator.damping_growth is not None
+    )
+    assert (beside.lines.bend == resonator.bend[beside.follows]).all() and beside.lines.bend.all()
+    assert (beside.lines.damping_growth == resonator.damping_growth[beside.follows]).all() and beside.lines.damping_growth.all()
+    assert beside.lines.damping_growth_power == resonator.damping_growth_power == 2.0
     whole.save(tmp_path / "both.npz")
     assert (render_log(read_log(tmp_path / "both.npz")) == sound).all()
 

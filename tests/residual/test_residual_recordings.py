@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))
+from benchmarks import residual_table
 
 
 @pytest.mark.shared
 @pytest.mark.parametrize(("case", "farther"), [("practice-01", 0.1), ("practice-02", 0.0)])
 def test_held_out_strikes_of_a_case_are_nearer(shared_path: Path, case: str, farther: float) -> None:
     """Nothing is lacking in practice-01, so nothing may be spoilt; practice-02's damping is not Rayleigh's."""
-    import residual_table
-
     rows = list(residual_table.of_case(shared_path / "practice" / case))
     assert len(rows) == 3
     change = [beside - without for _, without, beside, _ in rows]
@@ -26,8 +23,6 @@ def test_held_out_strikes_of_a_case_are_nearer(shared_path: Path, case: str, far
 @pytest.mark.shared
 def test_a_measured_object_is_nearer(shared_path: Path) -> None:
     """Features of one strike for modes, the other strike judged."""
-    import residual_table
-
     residual_table.SHARED = shared_path
     name, sounds, sr = next(x for x in residual_table.measured() if "polycarbonate" in x[0])
     rows = list(residual_table.of_object(name, sounds, sr))

@@ -9,18 +9,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from made_models import STEEL, box_body, row, step, wall_body
-from made_residuals import SR, modes, residual
 
 from sonic_bullet.cli import cli
-from sonic_bullet.contacts import ContactLog, Contacts
 from sonic_bullet.files import read_audio, read_log
+from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.records import Air, Material, Microphone, ModalSum
+from sonic_bullet.records.contacts import Contacts
 from sonic_bullet.render import Synthesizer, render_log
-from sonic_bullet.render.beside import build_beside, struck_power
-from sonic_bullet.render.sounder import build_sounder, uplift
+from sonic_bullet.render.residual_voice import build_residual_voice, struck_power
+from sonic_bullet.render.resonator import build_resonator, uplift
 from sonic_bullet.residual.grains import faded, filtered, make_voice, mixed_number, placed, response, varied
 from sonic_bullet.residual.player import SECTION, Grain, Rubbed, add_grains, rubbed, section_grain, section_window
+from tests.made.models import STEEL, box_body, row, step, wall_body
+from tests.made.residuals import SR, modes, residual
 
 FREQ = (400.0, 900.0, 1500.0, 2600.0, 4100.0, 6000.0)
 IDLE_S = 0.02  # of the work in `slower`, nothing else running
@@ -103,13 +104,13 @@ def test_level_follows_the_impulse() -> None:
 
 def test_the_place_decides_as_it_does_for_the_modes() -> None:
     """A body's a² at two places differ by the modes' shapes; a grain of a place is that response, in steps of 2 dB."""
-    sounder = build_sounder(box_body(EDGES_M, FREQ, NOISY), (ModalSum(),), SR, Air())
-    beside = build_beside(sounder, SR, Air())
+    resonator = build_resonator(box_body(EDGES_M, FREQ, NOISY), (ModalSum(),), SR, Air())
+    beside = build_residual_voice(resonator, SR, Air())
     assert beside is not None
     for face in (0, 5):
-        push = uplift(sounder, np.array([face]), np.array([[0.2, 0.3, 0.5]]), np.array([[0.0, 0.0, 0.01]]))
-        power = struck_power(beside, sounder.weight[1], push)
-        assert power == pytest.approx(np.abs(sounder.weight[1] * push) ** 2, rel=1e-9)
+        push = uplift(resonator, np.array([face]), np.array([[0.2, 0.3, 0.5]]), np.array([[0.0, 0.0, 0.01]]))
+        power = struck_power(beside, resonator.weight[1], push)
+        assert power == pytest.approx(np.abs(resonator.weight[1] * push) ** 2, rel=1e-9)
         pair, level = placed(beside.voice, power, 20e-6, False, lambda f_tau, _: np.ones(len(f_tau)))
         exact = filtered(beside.voice, response(beside.voice, power))
         assert 10 * abs(np.log10((level**2 * (pair.astype(float) ** 2).sum()) / (exact.astype(float) ** 2).sum())) < 1.0

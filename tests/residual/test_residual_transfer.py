@@ -7,14 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_residuals import SR, banded, modes
 
-from sonic_bullet.errors import AudioError
+from sonic_bullet.records.errors import AudioError
 from sonic_bullet.residual.compute import clip_residual, damped
 from sonic_bullet.residual.invert import ITERATIONS, inconsistency, invert, magnitude_of, noise_phases
 from sonic_bullet.residual.offline import transferred_clip
 from sonic_bullet.residual.spectrogram import Power, inverse, power, transform
-from sonic_bullet.residual.transfer import Modes, come_from, merged, pair, shifted_hz, transfer
+from sonic_bullet.residual.transfer import StruckModes, come_from, merged, pair, shifted_hz, transfer
+from tests.made.residuals import SR, banded, modes
 
 REPO = Path(__file__).resolve().parents[2]
 PLATE = np.array([402.0, 611.0, 890.0, 1210.0, 1700.0, 2350.0, 3120.0, 4260.0, 6020.0, 8300.0])
@@ -24,7 +24,7 @@ def snr_db(wanted: np.ndarray, got: np.ndarray) -> float:
     return float(10 * np.log10((wanted**2).sum() / ((wanted - got) ** 2).sum()))
 
 
-def clip(seconds: float = 0.5, seed: int = 3) -> tuple[np.ndarray, np.ndarray, Modes]:
+def clip(seconds: float = 0.5, seed: int = 3) -> tuple[np.ndarray, np.ndarray, StruckModes]:
     """A recorded strike: modes, two foreign lines, a burst of noise; and what of it the modes represent."""
     n = round(seconds * SR)
     random = np.random.default_rng(seed)
@@ -40,7 +40,7 @@ def test_the_same_source_gives_its_residual_back(moved: float) -> None:
     """≥ 40 dB before inversion, for the same modes and for modes moved by a millionth: there is no shortcut to find."""
     recorded, represented, found = clip()
     left, _ = clip_residual(recorded, represented, SR)
-    there = Modes(found.freq_hz * (1 + moved), found.decay_per_s * (1 + moved), found.amplitude * (1 + moved))
+    there = StruckModes(found.freq_hz * (1 + moved), found.decay_per_s * (1 + moved), found.amplitude * (1 + moved))
     assert snr_db(left.per_hz, transfer(left, found, there, left.freq_hz, left.time_s)) >= 40.0
 
 
@@ -59,7 +59,7 @@ def test_a_recording_carried_onto_its_own_body_is_itself(moved: float) -> None:
     modes represented, what remains is nearer to recorded - represented than any other phases make it.
     """
     recorded, represented, found = clip()
-    there = Modes(found.freq_hz * (1 + moved), found.decay_per_s * (1 + moved), found.amplitude * (1 + moved))
+    there = StruckModes(found.freq_hz * (1 + moved), found.decay_per_s * (1 + moved), found.amplitude * (1 + moved))
     assert snr_db(recorded, transferred_clip(recorded, np.zeros(len(recorded)), SR, found, there)) >= 40.0
     rest = recorded - represented
     assert snr_db(rest, transferred_clip(recorded, represented, SR, found, there)) > 5.0
@@ -74,7 +74,7 @@ def test_a_recording_carried_to_twice_the_size_is_lower_and_longer() -> None:
     modal = clip()[2]
     represented = damped(modal.freq_hz, modal.decay_per_s, modal.amplitude, n, SR)
     foreign = damped(np.array([1450.0, 5100.0]), np.array([15.0, 25.0]), np.array([0.2, 0.3j]), n, SR)
-    got = transferred_clip(represented + foreign, represented, SR, modal, Modes(modal.freq_hz / 2, modal.decay_per_s / 2, modal.amplitude), seconds=1.0)
+    got = transferred_clip(represented + foreign, represented, SR, modal, StruckModes(modal.freq_hz / 2, modal.decay_per_s / 2, modal.amplitude), seconds=1.0)
     assert len(got) == SR
     level, freq = np.abs(np.fft.rfft(got * np.hanning(SR))), np.fft.rfftfreq(SR, 1 / SR)
     for low, high, wanted in ((600, 850, 725.0), (2300, 2800, 2550.0)):
@@ -127,8 +127,8 @@ def test_a_larger_body_sounds_lower_and_longer(band: float, size: float) -> None
     j = int(np.argmin(np.abs(PLATE - band)))
     rate = target.decay_per_s[j] / source.decay_per_s[j]
     row = got[int(np.argmax(got[:, 0]))]
-    heard = row > 1e-3 * row[0]
-    slope = -np.polyfit(time[heard], np.log(row[heard]), 1)[0] / 2
+    observed = row > 1e-3 * row[0]
+    slope = -np.polyfit(time[observed], np.log(row[observed]), 1)[0] / 2
     assert slope == pytest.approx(10.0 * rate, rel=0.02)
     energy = [np.trapezoid(np.trapezoid(p, t, axis=1), f) for p, t, f in ((left.per_hz, left.time_s, left.freq_hz), (got, time, freq))]
     between = band not in PLATE  # then the band's halves belong to two modes, whose rates differ
@@ -163,7 +163,7 @@ def test_neighbourhoods_meet_without_a_step() -> None:
 
 
 @pytest.fixture(scope="module")
-def bodies() -> tuple[Modes, Modes]:
+def bodies() -> tuple[StruckModes, StruckModes]:
     """A porcelain plate and a porcelain bunny, each struck somewhere: frequency, decay, |φ| at a vertex."""
     import pybullet_data
 
@@ -174,11 +174,11 @@ def bodies() -> tuple[Modes, Modes]:
     made = []
     for path, scale in ((REPO / "assets" / "plate.obj", 1.0), (Path(pybullet_data.getDataPath()) / "bunny.obj", 0.1)):
         model = analyse((read_mesh(str(path), scale),), porcelain, count=24)
-        made.append(Modes(model.freq_hz, model.decay_per_s, np.abs(model.shape[len(model.vertex_m) // 3, 2].astype(float))))
+        made.append(StruckModes(model.freq_hz, model.decay_per_s, np.abs(model.shape[len(model.vertex_m) // 3, 2].astype(float))))
     return made[0], made[1]
 
 
-def test_a_plates_residual_on_a_bunny_follows_its_modes(bodies: tuple[Modes, Modes]) -> None:
+def test_a_plates_residual_on_a_bunny_follows_its_modes(bodies: tuple[StruckModes, StruckModes]) -> None:
     """Other shapes: dominant modes in pairs from low to high; finite; in each neighbourhood the residual's energy is to the mode's as it was."""
     plate, bunny = bodies
     n = SR // 2
@@ -191,7 +191,7 @@ def test_a_plates_residual_on_a_bunny_follows_its_modes(bodies: tuple[Modes, Mod
     freq, time = np.linspace(0, 24_000, 3001), np.linspace(0, 4.0, 2000)
     got = transfer(left, plate, bunny, freq, time)
     assert np.isfinite(got).all() and (got >= 0).all() and got.any()
-    louder = Modes(bunny.freq_hz, bunny.decay_per_s, 3 * bunny.amplitude)
+    louder = StruckModes(bunny.freq_hz, bunny.decay_per_s, 3 * bunny.amplitude)
     assert np.allclose(transfer(left, plate, louder, freq, time), 9 * got, rtol=1e-9, atol=0)
     edge = np.concatenate([[0], (pairs.target_hz[1:] + pairs.target_hz[:-1]) / 2, [1e9]])
 
@@ -203,17 +203,17 @@ def test_a_plates_residual_on_a_bunny_follows_its_modes(bodies: tuple[Modes, Mod
     strong = np.flatnonzero(merged(bunny)[0].amplitude[pairs.target] > 0.3 * bunny.amplitude.max())
     for j in strong[:4]:
         amplitude = np.where(pairs.group == j, 2.0, 1.0) * bunny.amplitude
-        ratio = energy(transfer(left, plate, Modes(bunny.freq_hz, bunny.decay_per_s, amplitude), freq, time)) / np.maximum(before, 1e-300)
+        ratio = energy(transfer(left, plate, StruckModes(bunny.freq_hz, bunny.decay_per_s, amplitude), freq, time)) / np.maximum(before, 1e-300)
         away = np.delete(ratio, [k for k in (j - 1, j, j + 1) if 0 <= k < len(ratio)])
         followed += 2.0 < ratio[j] < 4.01 and np.median(away) < 1.1
     assert followed == len(strong[:4]) >= 3
 
 
-def test_a_plates_residual_on_other_sizes(bodies: tuple[Modes, Modes]) -> None:
+def test_a_plates_residual_on_other_sizes(bodies: tuple[StruckModes, StruckModes]) -> None:
     """The same plate at 0.6 … 1.5 of its size: natural pairs, all of them, and bands where the modes have gone."""
     plate, _ = bodies
     for size in (0.6, 1.5):
-        other = Modes(plate.freq_hz / size, plate.decay_per_s, plate.amplitude * size**-1.5)
+        other = StruckModes(plate.freq_hz / size, plate.decay_per_s, plate.amplitude * size**-1.5)
         pairs = pair(plate, other)
         assert pairs.natural
         assert pairs.target_hz == pytest.approx(pairs.source_hz / size, rel=1e-9)

@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 import pybullet
 import pytest
-from made_models import STEEL
-from made_worlds import box, plate_model
 
 import sonic_bullet as sb
 from sonic_bullet import scene
-from sonic_bullet.errors import AudioError, MaterialError, MeshError, ModalError, RecordError, SceneError, SonicBulletError
+from sonic_bullet.records.errors import AudioError, MaterialError, MeshError, ModalError, RecordError, SceneError, SonicBulletError
+from tests.made.models import STEEL
+from tests.made.worlds import box, plate_model
 
 LONGEST = 300
 Made = tuple[Callable[..., Any], dict[str, Any]]
@@ -74,8 +74,8 @@ MODEL = dict(
     dropped=0,
     note="",
     bend_s2_m2=None,
-    choke_s_m=None,
-    choke_power=1,
+    damping_growth_s_m=None,
+    damping_growth_power=1,
     includes_radiation=False,
 )
 LOG = {"bodies": (), "steps": (), "sensors": (), "sr": 48_000, "seed": 0, "air": sb.Air(), "untouched": frozenset(), "events": ()}
@@ -228,8 +228,8 @@ BAD: dict[str, dict[str, list[Any]]] = {
         **{name: [*NUMBER, -1] for name in ("volume_m3", "mass_kg")},
         "dropped": [*WHOLE, -1],
         "note": TEXT,
-        **{name: [value for value in ARRAY if value is not None] for name in ("bend_s2_m2", "choke_s_m")},
-        "choke_power": NUMBER,
+        **{name: [value for value in ARRAY if value is not None] for name in ("bend_s2_m2", "damping_growth_s_m")},
+        "damping_growth_power": NUMBER,
         "includes_radiation": FLAG,
     },
     "ModalSum": {"scale": NUMBER},

@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from made_models import STEEL
-from made_worlds import plate_model
 
 import sonic_bullet as sb
 from sonic_bullet import modal
-from sonic_bullet.errors import MeshError, ModalError, SceneError
+from sonic_bullet.records.errors import MeshError, ModalError, SceneError
+from tests.made.models import STEEL
+from tests.made.worlds import plate_model
 
 SHEET = "v 0 0 0\nv 0.1 0 0\nv 0.1 0.1 0\nv 0 0.1 0\nf 1 2 3\nf 1 3 4\n"
 LINK = """  <link name="{name}"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>
@@ -192,7 +192,7 @@ def test_a_terminal_shows_which_link_is_computed(
 
 def test_a_status_within_a_status_writes_into_it(monkeypatch: pytest.MonkeyPatch) -> None:
     """A script that `sonic-bullet render` runs adds bodies of its own: one line, not two that fight for it."""
-    from sonic_bullet.terminal import shown_by, status
+    from sonic_bullet.machine.terminal import shown_by, status
 
     monkeypatch.setattr("sys.stderr", Terminal())
     seen: list[str] = []

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from sonic_bullet.session import Listener
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
-
 from benchmarks.replay_orders import Tally, play, run
+from sonic_bullet.session import Listener
 
 
 def test_random_orders_replay_bit_for_bit() -> None:

@@ -11,16 +11,16 @@ from typing import Any
 import numpy as np
 import pybullet as p
 import pytest
-from made_models import STEEL
-from made_worlds import floor, plate_model, sounding_box
 from pybullet_utils.bullet_client import BulletClient
 
 import sonic_bullet as sb
-from sonic_bullet.errors import SceneError
+from sonic_bullet.records.errors import SceneError
 from sonic_bullet.render.clock import exact_step
+from tests.made.models import STEEL
+from tests.made.worlds import floor, plate_model, sounding_box
 
 
-def heard(client: Any, steps: int, **how: Any) -> tuple[Any, list[np.ndarray]]:
+def observed(client: Any, steps: int, **how: Any) -> tuple[Any, list[np.ndarray]]:
     """A box falls on the floor; the listener and all its frames."""
     floor(client)
     listener = sb.attach(client, **how)
@@ -36,7 +36,7 @@ def heard(client: Any, steps: int, **how: Any) -> tuple[Any, list[np.ndarray]]:
 @pytest.mark.parametrize("dt", [1 / 240, 1 / 1000, 1 / 60])
 def test_frames_fill_time_exactly_and_lag_by_a_constant(client: Any, sr: int, dt: float) -> None:
     client.setTimeStep(dt)
-    listener, frames = heard(client, round(0.5 / dt), sr=sr, microphone=[(0, -1, 0.5), (1, 0, 0.5)])
+    listener, frames = observed(client, round(0.5 / dt), sr=sr, microphone=[(0, -1, 0.5), (1, 0, 0.5)])
     lengths = np.cumsum([frame.shape[1] for frame in frames])
     exact = [whole((k + 1) * exact_step(dt) * sr) for k in range(len(frames))]
     assert lengths.tolist() == exact
@@ -69,7 +69,7 @@ def test_a_step_before_it_sounds_is_not_lost_in_the_lag(client: Any) -> None:
 
 
 def test_read_gathers_what_frames_gave(client: Any) -> None:
-    listener, frames = heard(client, 50)
+    listener, frames = observed(client, 50)
     np.testing.assert_array_equal(listener.read(), np.concatenate(frames, axis=1))
     assert listener.read().shape == (1, 0)
     client.stepSimulation()
@@ -77,7 +77,7 @@ def test_read_gathers_what_frames_gave(client: Any) -> None:
 
 
 def test_write_removes_the_lag_and_keeps_pascals(client: Any, tmp_path: Path) -> None:
-    listener, _ = heard(client, 120, microphone=[(0, -1, 0.5), (0, 1, 0.5)])
+    listener, _ = observed(client, 120, microphone=[(0, -1, 0.5), (0, 1, 0.5)])
     listener.write(tmp_path / "a.wav")
     samples, sr = sb.read_audio(str(tmp_path / "a.wav"))
     assert sr == 48_000
@@ -88,7 +88,7 @@ def test_write_removes_the_lag_and_keeps_pascals(client: Any, tmp_path: Path) ->
 
 def test_a_client_id_and_the_hook_hear_the_same(client: Any) -> None:
     """Without a hook the pose before the step is computed back from velocities, to rounding: so is the sound."""
-    hooked, _ = heard(client, 60)
+    hooked, _ = observed(client, 60)
     raw = BulletClient(p.DIRECT)
     raw.setGravity(0, 0, -9.81)
     floor(raw)
@@ -109,7 +109,7 @@ def test_the_raw_module_is_stepped_by_hand() -> None:
     script = """
 import pybullet as p, numpy as np, sonic_bullet as sb, sys
 sys.path[:0] = sys.argv[1:]
-from made_models import STEEL, box_model
+from tests.made.models import STEEL, box_model
 assert p.connect(p.DIRECT) == 0
 p.setGravity(0, 0, -9.81)
 p.createMultiBody(0, p.createCollisionShape(p.GEOM_PLANE))
@@ -130,7 +130,7 @@ listener.detach()
 
 def test_detach_leaves_the_client_as_it_was(client: Any) -> None:
     before = set(vars(client))
-    listener, _ = heard(client, 30)
+    listener, _ = observed(client, 30)
     assert "stepSimulation" in vars(client)
     listener.detach()
     listener.detach()
@@ -152,7 +152,7 @@ def test_leaving_the_context_detaches_even_on_an_error(client: Any) -> None:
 
 
 def test_a_second_poll_of_one_step_gives_no_samples(client: Any) -> None:
-    listener, _ = heard(client, 60)
+    listener, _ = observed(client, 60)
     n = listener.sound().shape[1]
     assert listener.step().shape == (1, 0)
     assert listener.sound().shape[1] == n
@@ -216,7 +216,7 @@ def test_gym_environments_that_hide_their_steps_are_heard() -> None:
 
 def test_how_the_sound_is_read_out_does_not_matter(client: Any) -> None:
     """Looking at `sound`, `contacts` and `read` under way, in any rhythm, leaves every bit as it is."""
-    quiet, frames = heard(client, 90)
+    quiet, frames = observed(client, 90)
     other = BulletClient(p.DIRECT)
     other.setGravity(0, 0, -9.81)
     floor(other)
@@ -238,7 +238,7 @@ def test_how_the_sound_is_read_out_does_not_matter(client: Any) -> None:
 
 
 def test_without_a_microphone_contacts_are_kept_and_nothing_is_computed(client: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    from sonic_bullet.synth import radiation
+    from sonic_bullet.synth import far_field as radiation
 
     monkeypatch.setattr(radiation, "radiation", lambda *_: pytest.fail("nobody hears it"))
     floor(client)

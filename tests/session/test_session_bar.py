@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import pybullet as p
 import pytest
-from made_models import STEEL, ball_body
 
 import sonic_bullet as sb
 from sonic_bullet.records import ModalModel
+from tests.made.models import STEEL, ball_body
 
 LENGTH_M, SIDE_M = 0.24, 0.01
 NODE_OF_FIRST = 0.2242  # of the free bar's length [Blevins 1979, table 8-1]

@@ -8,15 +8,16 @@ from typing import Any
 
 import numpy as np
 import pytest
-from made_models import STEEL, ball_body, box_body, row, step, wall_body
-from made_worlds import EDGES_M, TONES_HZ, ball, floor, plate_model, sounding_box
-from test_session_robust import steps
 
 import sonic_bullet as sb
 from sonic_bullet.cli import cli
-from sonic_bullet.contacts import ContactLog, Event
-from sonic_bullet.errors import LogError
+from sonic_bullet.files.contact_log import ContactLog
+from sonic_bullet.records.contacts import Event
+from sonic_bullet.records.errors import LogError
 from sonic_bullet.render import Synthesizer
+from tests.made.models import STEEL, ball_body, box_body, row, step, wall_body
+from tests.made.worlds import EDGES_M, TONES_HZ, ball, floor, plate_model, sounding_box
+from tests.session.test_session_robust import steps
 
 STEP = 200
 """Samples of a step of 1/240 s at 48 kHz."""
@@ -73,17 +74,17 @@ def test_what_strikes_in_the_step_after_a_quench_sounds() -> None:
     """A strike whose bodies overlap as its step starts is dated back into the step before: not before a quench, or it would be lost."""
     bodies = (box_body(EDGES_M, TONES_HZ), wall_body(body_id=1))
     hit = row(0, 1, [0, 0, 0.2], approach=1.0, gap=-1e-3)
-    heard = []
+    observed = []
     for quench in (False, True):
         synth = Synthesizer(sr=48_000, sensors=(sb.ModalSum(),), seed=0, air=sb.Air())
         for number in range(20):
             if quench and number == 10:
                 synth.quench()
             synth.feed(step([[0, 0, 0], [0, 0, -1]], hit if number == 10 else None), bodies)
-        heard.append(synth.sound()[0])
-    assert np.flatnonzero(heard[0])[0] < 10 * STEP, "without a quench it is dated back: the test tests something"
-    assert not heard[1][: 10 * STEP].any()
-    assert np.abs(heard[1]).max() == pytest.approx(np.abs(heard[0]).max(), rel=0.2)
+        observed.append(synth.sound()[0])
+    assert np.flatnonzero(observed[0])[0] < 10 * STEP, "without a quench it is dated back: the test tests something"
+    assert not observed[1][: 10 * STEP].any()
+    assert np.abs(observed[1]).max() == pytest.approx(np.abs(observed[0]).max(), rel=0.2)
 
 
 def test_a_live_quench_is_heard_after_the_lag(client: Any) -> None:

@@ -13,19 +13,19 @@ import numpy as np
 import pybullet as p
 import pybullet_data
 import pytest
-from made_worlds import box, floor, sounding_box
-from test_session_robust import steps
 
 import sonic_bullet as sb
-from sonic_bullet.contacts import ROW_FIELDS
-from sonic_bullet.errors import SceneWarning
 from sonic_bullet.listener import direct_client, disconnect
+from sonic_bullet.records.contacts import ROW_FIELDS
+from sonic_bullet.records.errors import SceneWarning
+from tests.made.worlds import box, floor, sounding_box
+from tests.session.test_session_robust import steps
 
 NAN_SPEED = [float("nan"), 0, 0]
 
 
 def test_the_others_sound_as_if_it_had_been_taken_away(tmp_path: Path) -> None:
-    heard = []
+    observed = []
     for taken_away in (True, False):
         client = direct_client()
         client.setGravity(0, 0, -9.81)
@@ -41,16 +41,16 @@ def test_the_others_sound_as_if_it_had_been_taken_away(tmp_path: Path) -> None:
         with warnings.catch_warnings():
             warnings.simplefilter("error" if taken_away else "ignore", SceneWarning)
             steps(client, 60)
-        heard.append(listener.sound())
+        observed.append(listener.sound())
         log = listener.contacts
         assert all(np.isfinite(getattr(one.contacts, name)).all() for one in log.steps for name in ROW_FIELDS)
         log.save(tmp_path / "log.npz")
-        np.testing.assert_array_equal(sb.render_log(sb.read_log(str(tmp_path / "log.npz"))), heard[-1])
+        np.testing.assert_array_equal(sb.render_log(sb.read_log(str(tmp_path / "log.npz"))), observed[-1])
         assert len(listener.notes) == (0 if taken_away else 1)
         disconnect(client)
-    assert np.abs(heard[0]).max() > 1e-3
-    assert heard[0].shape == (2, 70 * 200)
-    np.testing.assert_array_equal(heard[0], heard[1])
+    assert np.abs(observed[0]).max() > 1e-3
+    assert observed[0].shape == (2, 70 * 200)
+    np.testing.assert_array_equal(observed[0], observed[1])
 
 
 SCENE = """

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from made_worlds import ball, box, floor
 
 import sonic_bullet as sb
+from tests.made.worlds import ball, box, floor
 
 MASS_KG = 0.3
 

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 import pybullet as p
 import pytest
-from made_models import GLASS, STEEL, WOOD, ball_body, box_model
 
 import sonic_bullet as sb
-from sonic_bullet.contacts import ContactLog
+from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.listener import direct_client, disconnect
 from sonic_bullet.records import Microphone, ModalSum
 from sonic_bullet.render import Synthesizer, synthesizer
+from tests.made.models import GLASS, STEEL, WOOD, ball_body, box_model
 
 STRIKE_N_S = 1e-3
 DT = 1 / 240
@@ -59,7 +59,7 @@ class Pile:
 
     log: ContactLog
     sound: np.ndarray
-    blows: list[tuple[int, int, float]]
+    impacts: list[tuple[int, int, float]]
 
 
 @pytest.fixture(scope="module")
@@ -72,16 +72,16 @@ def pile() -> Any:
     for number in range(20):
         thrown_in(client, listener, number, rng)
     begun: list[tuple[int, int, float]] = []
-    real = synthesizer.find_blows
+    real = synthesizer.find_pulses
 
-    def listening(split: Any, rows: Any, step: Any, sounders: Any, placed: Any, earliest: float) -> Any:
-        blows = real(split, rows, step, sounders, placed, earliest)
+    def listening(split: Any, rows: Any, step: Any, resonators: Any, placed: Any, earliest: float) -> Any:
+        impacts = real(split, rows, step, resonators, placed, earliest)
         number = len(listener.contacts.steps) - 4 + (earliest < 0)
-        begun.extend((number, (blow.low << 16) | blow.high, float(np.linalg.norm(blow.impulse_n_s))) for blow in blows)
-        return blows
+        begun.extend((number, (impact.low << 16) | impact.high, float(np.linalg.norm(impact.impulse_n_s))) for impact in impacts)
+        return impacts
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(synthesizer, "find_blows", listening)
+        patch.setattr(synthesizer, "find_pulses", listening)
         for _ in range(round(SECONDS / DT)):
             client.stepSimulation()
     yield Pile(listener.contacts, listener.sound(), begun)
@@ -152,7 +152,7 @@ def test_a_settled_pile_is_silent(pile: Pile) -> None:
 def test_a_settled_pile_rings_out_with_nothing_but_decay(pile: Pile) -> None:
     """Without a quench: from one second after the last strike no blow begins, and energy falls from each fifth of a second to the next."""
     begin = last_strike_s(pile.log) + 1.0
-    assert not [blow for blow in pile.blows if blow[0] >= begin / DT]
+    assert not [impact for impact in pile.impacts if impact[0] >= begin / DT]
     tail = pile.sound[:, round(begin * SR) :]
     block = SR // 5
     energy = (tail[:, : tail.shape[1] // block * block].reshape(len(tail), -1, block) ** 2).sum(axis=2)
@@ -166,11 +166,11 @@ def test_every_impact_is_a_blow(pile: Pile) -> None:
     assert len(wanted) > 40
     missed, share = [], []
     for number, key, impulse in wanted:
-        mine = sum(j for at, pair, j in pile.blows if pair == key and abs(at - number) <= 2)
+        mine = sum(j for at, pair, j in pile.impacts if pair == key and abs(at - number) <= 2)
         share.append(mine / impulse)
         if mine < STRIKE_N_S:
             missed.append((number, key >> 16, key & 0xFFFF, impulse, mine))
-    print(f"{len(wanted)} impacts, {len(pile.blows)} blows, missed {missed}; share of the impulse: median {np.median(share):.2f}, least {min(share):.2f}")
+    print(f"{len(wanted)} impacts, {len(pile.impacts)} blows, missed {missed}; share of the impulse: median {np.median(share):.2f}, least {min(share):.2f}")
     assert not missed
     assert np.median(share) == pytest.approx(1.0, abs=0.1)
 
@@ -179,7 +179,7 @@ def played(setup: synthesizer.Setup, state: synthesizer.State, log: ContactLog, 
     """Frames (channels, n) of the steps three before the ``numbers``, which are fed, and the state after them."""
     frames = [np.zeros((len(setup.sensors), 0))]
     for step in log.steps[numbers.start : numbers.stop]:
-        state = synthesizer.with_bodies(setup, state, log.bodies[len(state.sounders) : len(step.position_m)])
+        state = synthesizer.with_bodies(setup, state, log.bodies[len(state.resonators) : len(step.position_m)])
         frame, state = synthesizer.take_step(setup, state, step)
         frames += [frame] if frame is not None else []
     return np.concatenate(frames, axis=1), state
@@ -191,7 +191,7 @@ def test_every_impact_is_an_onset_in_the_sound(pile: Pile, monkeypatch: pytest.M
     From then on means from one step before the impact's (where bodies overlap as a step starts, they met in the one before) to its end and
     3 ms of travel. How far an impact stands out of what rings already is physics: printed, and half of them are the loudest thing in some band.
     """
-    log, real = pile.log, synthesizer.find_blows
+    log, real = pile.log, synthesizer.find_pulses
     setup = synthesizer.Setup(log.sr, log.sensors, log.seed, log.air)
     state, at = synthesizer.start(setup), 0
     wanted = impacts(log)
@@ -200,7 +200,7 @@ def test_every_impact_is_an_onset_in_the_sound(pile: Pile, monkeypatch: pytest.M
         _, state = played(setup, state, log, range(at, number))
         at = number
         with monkeypatch.context() as patch:
-            patch.setattr(synthesizer, "find_blows", lambda *a, key=key: tuple(b for b in real(*a) if (b.low << 16) | b.high != key))
+            patch.setattr(synthesizer, "find_pulses", lambda *a, key=key: tuple(b for b in real(*a) if (b.low << 16) | b.high != key))
             without, _ = played(setup, synthesizer.copied(state), log, range(number, number + 7))
         first = int(np.floor((number - 3) * SR * DT + 1e-9))
         both = np.stack([pile.sound[0, first : first + without.shape[1]], without[0, : pile.sound.shape[1] - first]])
@@ -208,8 +208,8 @@ def test_every_impact_is_an_onset_in_the_sound(pile: Pile, monkeypatch: pytest.M
         assert len(changed), f"step {number}: no difference"
         begins.append((first + changed[0]) / SR / DT - number)
         window = slice(changed[0], changed[0] + 160)
-        blow, rest = np.abs(np.fft.rfft(np.hanning(160) * np.stack([both[0] - both[1], both[1]])[:, window], 512))
-        above_db.append(20 * np.log10(np.max(blow / np.maximum(rest, 1e-30))))
+        impact, rest = np.abs(np.fft.rfft(np.hanning(160) * np.stack([both[0] - both[1], both[1]])[:, window], 512))
+        above_db.append(20 * np.log10(np.max(impact / np.maximum(rest, 1e-30))))
     print(f"{len(wanted)} impacts begin {min(begins):.2f} … {max(begins):.2f} steps after their step's start")
     print(f"the blow over the rest, in the band where it is most: median {np.median(above_db):.1f} dB, a tenth below {np.percentile(above_db, 10):.1f} dB")
     assert len(wanted) > 40

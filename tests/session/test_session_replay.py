@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from made_models import GLASS, WOOD, ball_body, box_model
-from made_worlds import EDGES_M, ball, box, floor, plate_model, sounding_box
 
 import sonic_bullet as sb
 from sonic_bullet.listener import direct_client, disconnect
+from tests.made.models import GLASS, WOOD, ball_body, box_model
+from tests.made.worlds import EDGES_M, ball, box, floor, plate_model, sounding_box
 
 SENSORS = (sb.Microphone([0, -1, 0.5]), sb.Microphone([0.7, 0.2, 0.4]), sb.Vibrometer(1, [0.09, 0.04, 0.005], [0, 0, 1]), sb.ModalSum(0.5))
 

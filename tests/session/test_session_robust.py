@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 import pybullet as p
 import pytest
-from made_models import STEEL
-from made_worlds import box, floor, plate_model, sounding_box
 
 import sonic_bullet as sb
-from sonic_bullet.errors import AudioError, FileError, LogError, MaterialError, RecordError, SceneError, SonicBulletError
 from sonic_bullet.listener import disconnect
+from sonic_bullet.records.errors import AudioError, FileError, LogError, MaterialError, RecordError, SceneError, SonicBulletError
+from tests.made.models import STEEL
+from tests.made.worlds import box, floor, plate_model, sounding_box
 
 
 def steps(client: Any, count: int) -> None:

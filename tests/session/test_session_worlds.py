@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 import pybullet as p
 import pytest
-from made_models import STEEL, WOOD, ball_body, box_model
-from made_worlds import ball, box, floor, plate_model, sounding_box
-from test_session_robust import steps
 
 import sonic_bullet as sb
 from sonic_bullet.listener import direct_client, disconnect
+from tests.made.models import STEEL, WOOD, ball_body, box_model
+from tests.made.worlds import ball, box, floor, plate_model, sounding_box
+from tests.session.test_session_robust import steps
 
 
 def test_a_body_removed_while_it_rings_rings_on(client: Any) -> None:

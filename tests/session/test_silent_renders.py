@@ -9,19 +9,19 @@ from typing import Any
 import numpy as np
 import pybullet as p
 import pytest
-from made_worlds import floor
 
 import sonic_bullet as sb
 from sonic_bullet.cli import main
-from sonic_bullet.errors import AudioError
 from sonic_bullet.listener import diagnose_world
+from sonic_bullet.records.errors import AudioError
 from sonic_bullet.render import silence_notes, why_silent
 from sonic_bullet.scene import examine_scene, render_scene
+from tests.made.worlds import floor
 
 HEAD = """
 import pybullet as p
-from made_models import STEEL, box_model
-from made_worlds import EDGES_M, ball, box, floor, plate_model
+from tests.made.models import STEEL, box_model
+from tests.made.worlds import EDGES_M, ball, box, floor, plate_model
 from sonic_bullet import Vibrometer
 
 PLATE = {"material": STEEL, "model": plate_model()}

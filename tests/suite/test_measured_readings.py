@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from benchmarks import measured
-from benchmarks.measured_sets.heard import JITTER, READINGS, jittered, reading
+from benchmarks.measured_sets.observed import JITTER, READINGS, jittered, reading
 from benchmarks.measured_sets.page import section, verdict
 from benchmarks.measured_sets.values import Outcome, Row
 
@@ -47,7 +47,7 @@ def test_what_is_named_is_named_in_every_reading(monkeypatch: pytest.MonkeyPatch
         return Outcome((second if number == 1 else ROW,), "", "nothing", lambda _: None)
 
     monkeypatch.setitem(measured.JUDGES, tmp_path.name, judge)
-    monkeypatch.setattr("sonic_bullet.side_by_side._can_fork", lambda: False)
+    monkeypatch.setattr("sonic_bullet.parallel._can_fork", lambda: False)
     page = measured.judged(tmp_path)
     assert not isinstance(page, str)
     assert turn == [0, *range(1, READINGS), 0]

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sonic_bullet.errors import AudioError
 from sonic_bullet.records import Array
+from sonic_bullet.records.errors import AudioError
 from sonic_bullet.synth import bank as bank_module
 from sonic_bullet.synth.bank import Force, ModeSet, Strike, advance, append, audible, empty_bank, silence
 

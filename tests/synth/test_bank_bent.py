@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sonic_bullet.effects.ringing import sounded
-from sonic_bullet.effects.values import Blow, Ring
+from sonic_bullet.effects.common.ringing import sounded
+from sonic_bullet.effects.protocol import Impact, Ring
 from sonic_bullet.records import Array
 from sonic_bullet.synth.bank import ModeSet, Strike, advance, append, empty_bank, silence
 
@@ -14,33 +14,35 @@ SR = 48_000
 HZ, DECAY, GAIN = np.array([440.0, 1234.5, 3000.0]), np.array([3.0, 8.0, 20.0]), np.array([1.0, 0.6, 0.8])
 
 
-def modes(bend: float, choke: float, power: float = 1.0) -> ModeSet:
-    return ModeSet(2 * np.pi * HZ, DECAY, np.ones((1, 3), complex), bend=np.full(3, bend), choke=np.full(3, choke), choke_power=power)
+def modes(bend: float, damping_growth: float, power: float = 1.0) -> ModeSet:
+    return ModeSet(
+        2 * np.pi * HZ, DECAY, np.ones((1, 3), complex), bend=np.full(3, bend), damping_growth=np.full(3, damping_growth), damping_growth_power=power
+    )
 
 
-def played(bend: float, choke: float, cuts: list[int], start: float = 0.0, power: float = 1.0) -> Array:
-    bank, state = append(*empty_bank(SR), [modes(bend, choke, power)])
+def played(bend: float, damping_growth: float, cuts: list[int], start: float = 0.0, power: float = 1.0) -> Array:
+    bank, state = append(*empty_bank(SR), [modes(bend, damping_growth, power)])
     strike = [Strike(0, start, 1.0, np.ones(1), GAIN)]
     parts = [advance(bank, state, n, strike if i == 0 else ())[0, 0] for i, n in enumerate(cuts)]
     return np.concatenate(parts)
 
 
-def wanted(bend: float, choke: float, n: int, power: float = 1.0) -> Array:
+def wanted(bend: float, damping_growth: float, n: int, power: float = 1.0) -> Array:
     """The closed form with every mode from its start; |z| is GAIN there."""
     amplitude = (1 + 1j * DECAY / (2 * np.pi * HZ)) * GAIN
-    ring = Ring(HZ, DECAY, amplitude, np.abs(amplitude), np.full(3, bend), np.full(3, choke), choke_power=power)
-    return sounded(ring, Blow(1.0, np.zeros(1), np.ones(1)), n, SR)
+    ring = Ring(HZ, DECAY, amplitude, np.abs(amplitude), np.full(3, bend), np.full(3, damping_growth), damping_growth_power=power)
+    return sounded(ring, Impact(1.0, np.zeros(1), np.ones(1)), n, SR)
 
 
 @pytest.mark.parametrize(
-    ("bend", "choke", "power"), [(0.004, 0.0, 1.0), (-0.004, 0.0, 1.0), (0.0, 0.8, 1.0), (0.003, 0.8, 1.0), (0.0, 0.9, 2.0), (0.003, 0.9, 2.0)]
+    ("bend", "damping_growth", "power"), [(0.004, 0.0, 1.0), (-0.004, 0.0, 1.0), (0.0, 0.8, 1.0), (0.003, 0.8, 1.0), (0.0, 0.9, 2.0), (0.003, 0.9, 2.0)]
 )
-def test_bent_modes_follow_the_closed_form(bend: float, choke: float, power: float) -> None:
+def test_bent_modes_follow_the_closed_form(bend: float, damping_growth: float, power: float) -> None:
     """32 samples late at most: 2π f b a² · 0.67 ms of phase, c a d · 0.67 ms of level, and no drift after that."""
-    made, right = played(bend, choke, [SR], power=power), wanted(bend, choke, SR, power)
+    made, right = played(bend, damping_growth, [SR], power=power), wanted(bend, damping_growth, SR, power)
     linear = played(0.0, 0.0, [SR])
     late = 2 * 32 / SR  # the first are unbent, and a mean over the next stands for their course
-    allowed = float((GAIN * (2 * np.pi * HZ * abs(bend) * GAIN**2 + choke * GAIN * DECAY) * late).sum())
+    allowed = float((GAIN * (2 * np.pi * HZ * abs(bend) * GAIN**2 + damping_growth * GAIN * DECAY) * late).sum())
     error = np.abs(made - right).max()
     assert error < allowed * 1.05
     assert error < 0.1 * np.abs(linear - right).max()

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sonic_bullet.errors import AudioError
 from sonic_bullet.records import Air, Array
+from sonic_bullet.records.errors import AudioError
 from sonic_bullet.synth.path import Path, PathState, append_bodies, empty_path, propagate
 
 SR = 48_000
@@ -83,9 +83,9 @@ def test_doppler_shift_is_exact(speed: float) -> None:
     path, state = path_of(1)
     start = 60.0
     sound = moving(path, state, tone(freq, n), np.array([start, 0, 0.0]), np.array([speed, 0, 0.0]))
-    heard = sound[-4000:] * 1.0
-    crossing = np.flatnonzero((heard[:-1] < 0) & (heard[1:] >= 0))
-    exact = crossing - heard[crossing] / (heard[crossing + 1] - heard[crossing])
+    observed = sound[-4000:] * 1.0
+    crossing = np.flatnonzero((observed[:-1] < 0) & (observed[1:] >= 0))
+    exact = crossing - observed[crossing] / (observed[crossing + 1] - observed[crossing])
     got = SR * (len(exact) - 1) / (exact[-1] - exact[0])
     assert got == pytest.approx(freq / (1 + speed / C), rel=2e-5)
 

@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 import pytest
 
-from sonic_bullet.errors import RecordError
+from sonic_bullet.records.errors import RecordError
 from sonic_bullet.synth import pulse
 
 

@@ -5,19 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sonic_bullet.contacts import Contacts
-from sonic_bullet.synth.strikes import (
-    LOOKAHEAD,
-    SPAN,
-    LoadHistory,
-    accepted_impulse,
-    causing_approach_m_s,
-    key_bodies,
-    pair_key,
-    push,
-    split,
-    unheld_steps,
-)
+from sonic_bullet.records.contacts import Contacts
+from sonic_bullet.synth.strikes import LOOKAHEAD, SPAN, LoadHistory, accepted_impulse, causing_approach_m_s, key_bodies, pair_key, push, split, unheld_steps
 
 DT = 1 / 240
 

@@ -64,8 +64,8 @@ def test_level_follows_the_measured_laws(name: str) -> None:
     speed, rough = np.geomspace(0.1, 1.6, 5), np.geomspace(0.25e-6, 8e-6, 5)
     v, h = (a.ravel() for a in np.meshgrid(speed, rough))
     force = sounding(pairs_of(CASES[name], h), v, 1.2)
-    for heard in (force, rung(force)):
-        level = np.log(heard[:, SR // 10 :].std(1)).reshape(5, 5)
+    for observed in (force, rung(force)):
+        level = np.log(observed[:, SR // 10 :].std(1)).reshape(5, 5)
         n = np.array([np.polyfit(np.log(speed), level[i], 1)[0] for i in range(5)])
         m = np.array([np.polyfit(np.log(rough), level[:, i], 1)[0] for i in range(5)])
         fits = [np.corrcoef(np.log(speed), level[i])[0, 1] ** 2 for i in range(5)] + [np.corrcoef(np.log(rough), level[:, i])[0, 1] ** 2 for i in range(5)]

@@ -1,0 +1,225 @@
+"""`case`: a folder of recordings to a case.json that `fit` and `diagnose` read; and whether one can be read.
+
+new     FOLDER, mesh, recordings, guess -> FOLDER/case.json     files from elsewhere are copied beside it
+check   FOLDER -> what the case holds, and what of it is not read; or one line that says what is wrong
+schema  JSON Schema of case.json
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from sonic_bullet.cli.output import table, warn
+from sonic_bullet.files import read_audio, replacing
+from sonic_bullet.files.case_schema import case_schema
+from sonic_bullet.files.cases import FORMAT, UNITS, Case, read_case
+from sonic_bullet.files.channels import channel_of, channel_words
+from sonic_bullet.records.errors import FileError
+
+AUDIO = frozenset({".wav", ".flac", ".ogg", ".aif", ".aiff", ".caf", ".w64", ".rf64"})
+RESPONSES = {"sum": "sum of modes", "pressure": "pressure", "velocity": "velocity"}
+Point = tuple[float, float, float]
+
+
+def run_case_new(
+    folder: str,
+    recordings: Sequence[str],
+    *,
+    mesh: str | None,
+    units: str,
+    material: str | None,
+    sensor: str,
+    sensor_at: Point | None,
+    sensor_direction: Point | None,
+    medium: str | None,
+) -> None:
+    """The `case new` command: case.json, and copies of files from elsewhere, whole or not at all; nothing is overwritten.
+
+    Raises SonicBulletError.
+    """
+    place = Path(folder)
+    if place.exists() and not place.is_dir():
+        raise FileError(f"{folder} is no folder", "name the case's folder first, then its files")
+    if (place / "case.json").exists():
+        raise FileError(f"{place / 'case.json'} is there already", "name another folder, or move it away")
+    sounds = [Path(name) for name in recordings] or sorted(p for p in place.glob("*") if p.suffix.lower() in AUDIO)
+    if not sounds:
+        raise FileError(f"{folder} holds no recordings", "name them: --recordings a.wav b.wav")
+    if mesh is not None and material is None:
+        raise FileError("--material missing", "a shape needs a guess of what it is made of; 'sonic-bullet materials' lists names")
+    if sensor != "velocity" and (sensor_at is not None or sensor_direction is not None):
+        raise FileError(
+            f"--sensor-at or --sensor-direction is given, but --sensor is {sensor}",
+            "give --sensor velocity, or leave it out",
+        )
+    for sound in sounds:
+        read_audio(sound)
+    if mesh is not None:
+        from sonic_bullet.modal import read_mesh
+
+        read_mesh(mesh, UNITS[units])
+    thing = _object(mesh, units, material)
+    listed = [*sounds, *([Path(mesh)] if mesh is not None else [])]
+    name_of = _names(place, listed)
+    if mesh is not None:
+        thing["mesh"] = name_of[Path(mesh)]
+    _written(
+        place,
+        name_of,
+        _described(place, [name_of[s] for s in sounds], thing, RESPONSES[sensor], sensor_at, sensor_direction, medium),
+    )
+    print(f"{place / 'case.json'}: {len(sounds)} recordings" + ("" if mesh is None else f" of {name_of[Path(mesh)]}"))
+    print("now say where and how hard each strike was: strike.position in m, strike.impulse in N·s, or null")
+
+
+def _object(mesh: str | None, units: str, material: str | None) -> dict[str, Any]:
+    """What the case says of its object, the mesh's name aside; nothing where nothing is known. Raises MaterialError."""
+    if material is None:
+        return {}
+    from sonic_bullet.presets import load_material
+
+    guess = load_material(material)
+    constants = {"youngs_modulus": guess.youngs_pa, "density": guess.density_kg_m3, "poisson_ratio": guess.poisson}
+    return {
+        "mesh": None,
+        "units": units,
+        "material": guess.name,
+        "elastic_guess": {key: float(f"{value:.6g}") for key, value in constants.items()},
+    }
+
+
+def _names(place: Path, files: Sequence[Path]) -> dict[Path, str]:
+    """The name of each file inside the folder, its own or its copy's. Raises FileError where two would be one."""
+    inner = os.path.realpath(place)
+    named: dict[Path, str] = {}
+    for file in files:
+        whole = os.path.realpath(file)
+        at_home = whole.startswith(os.path.join(inner, ""))
+        name = Path(os.path.relpath(whole, inner)).as_posix() if at_home else file.name
+        if name in named.values() and named.get(file) != name:
+            raise FileError(f"two files would be called {name} in {place}", "give each a name of its own")
+        if not at_home and (place / name).exists():
+            raise FileError(
+                f"{place / name} is there already, and {file} is another file",
+                "name the one inside the folder, or rename one",
+            )
+        named[file] = name
+    return named
+
+
+def _described(
+    place: Path,
+    sounds: Sequence[str],
+    thing: dict[str, Any],
+    response: str,
+    sensor_at: Point | None,
+    sensor_direction: Point | None,
+    medium: str | None,
+) -> dict[str, Any]:
+    """What case.json holds: every field one may want to fill, null where it is not known."""
+    strike = {"position": None, "direction": None, "impulse": None}
+    of = {"object": "object"} if thing else {}
+    return {
+        "format": FORMAT,
+        "case": Path(os.path.realpath(place)).name,
+        "objects": {"object": thing} if thing else {},
+        "support": {"fixed": []},
+        "sensor": {"response": response, "position": sensor_at, "direction": sensor_direction},
+        "medium": medium,
+        "band_hz": [20, 20_000],
+        "onset": None,
+        "recordings": [{"file": name, **of, "split": "fit", "channel": None, "strike": strike} for name in sounds],
+    }
+
+
+def _written(place: Path, name_of: dict[Path, str], case: dict[str, Any]) -> None:
+    """Copies of what lies elsewhere, then case.json; with an error all of it vanishes again. Raises FileError."""
+    made: list[Path] = []
+    fresh = not place.exists()
+    try:
+        try:
+            place.mkdir(exist_ok=True)
+        except OSError as error:
+            raise FileError(f"cannot make the folder {place}: {error.strerror or error}", "choose another") from error
+        for file, name in name_of.items():
+            if not (place / name).exists():
+                made.append(place / name)
+                with file.open("rb") as source, replacing(place / name) as target:
+                    shutil.copyfileobj(source, target)
+        with replacing(place / "case.json") as target:
+            target.write((json.dumps(case, indent=2, ensure_ascii=False) + "\n").encode())
+        read_case(place)
+    except BaseException:
+        for path in (*made, place / "case.json"):
+            with suppress(OSError):
+                path.unlink(missing_ok=True)
+        if fresh:
+            with suppress(OSError):
+                place.rmdir()
+        raise
+
+
+def run_case_check(folder: str) -> None:
+    """The `case check` command: what a case holds. Raises SonicBulletError where `fit` would stop."""
+    case = read_case(folder)
+    warn(case.warnings)
+    rows = [_object_row(case, name) for name in case.objects]
+    missing = 0
+    for recording in case.recordings:
+        if recording.file is None:
+            continue
+        if not recording.file.is_file() and recording.split != "fit":
+            missing += 1
+            continue
+        sound, _ = read_audio(recording.file)
+        channel_of(sound, recording.channel, recording.file.name)
+        which = channel_words(len(sound), recording.channel if recording.channel_named else None)
+        warn([f"{recording.file.name}: {which}"] if which else [])
+    splits = [r.split for r in case.recordings]
+    listed = ", ".join(f"{splits.count(name)} {name}" for name in dict.fromkeys(splits))
+    print(f"{case.name}: {len(case.recordings)} strikes ({listed}), recorded as {case.sensor}")
+    if rows:
+        print(table(("object", "mesh", "size in mm", "guess", "strikes placed"), rows))
+    if missing:
+        print(f"{missing} recordings that are not fitted are not there: their sound can be predicted, not compared")
+
+
+def _object_row(case: Case, name: str) -> tuple[str, str, str, str, str]:
+    """An object's line of the table. Raises SonicBulletError."""
+    from sonic_bullet.presets import load_material, material_names
+
+    thing = case.objects[name]
+    size = "-"
+    if thing.mesh is not None:
+        from sonic_bullet.modal import read_mesh
+
+        vertex = read_mesh(thing.mesh, thing.scale).vertex_m
+        size = " × ".join(f"{1000 * side:.4g}" for side in vertex.max(axis=0) - vertex.min(axis=0))
+    whole = None not in (thing.youngs_pa, thing.density_kg_m3, thing.poisson)
+    if thing.material is not None and not (whole and thing.material.lower() not in material_names()):
+        load_material(thing.material)
+    elif not whole:
+        raise FileError(
+            f"object '{name}' has neither a material nor all of elastic_guess",
+            "name a guess; 'sonic-bullet materials' lists all",
+        )
+    mine = [r for r in case.recordings if r.object == name]
+    placed = sum(r.position_m is not None for r in mine)
+    return (
+        name,
+        "-" if thing.mesh is None else thing.mesh.name,
+        size,
+        thing.material or "elastic_guess",
+        f"{placed} of {len(mine)}",
+    )
+
+
+def run_case_schema() -> None:
+    """The `case schema` command."""
+    print(json.dumps(case_schema(), indent=2, ensure_ascii=False))

@@ -1,0 +1,109 @@
+"""`diagnose`: a case to what its model lacks."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+from sonic_bullet.cli.output import clean_stdout, folder_place, places, status, table, warn, write_json
+from sonic_bullet.files.cases import read_case
+from sonic_bullet.records.errors import FileError
+
+SIDES = ("before", "after")  # the folders of --predict
+
+
+def run_diagnose(source: str, *, output: str | None, json_to: str | None, predict: str | None, report: str | None, seed: int) -> None:
+    """The `diagnose` command. Raises SonicBulletError."""
+    if output is not None and not output.endswith(".json"):
+        raise FileError(f"cannot write {output}: presets are JSON files", "end the name with .json")
+    if report is not None and not report.endswith((".html", ".htm")):
+        raise FileError(f"cannot write {report}: a report is a page", "end the name with .html")
+    output, report, json_to = places(output, report, json_to)
+    folder = None if predict is None else folder_place(predict, *SIDES)
+    case = read_case(source)
+    warn(case.warnings)
+    with clean_stdout(json_to) as say:
+        from sonic_bullet.diagnosis.diagnose import described, diagnose
+
+        with status(source) as progress:
+            found = diagnose(case, seed=seed, progress=progress)
+            if folder is not None:
+                written = _predicted(found, folder)
+            if report is not None:
+                from sonic_bullet.report.diagnosis_page import write_report
+
+                progress("drawing the report")
+                write_report(report, found)
+        if output is not None:
+            from sonic_bullet.diagnosis.preset_export import preset_of
+            from sonic_bullet.presets import write_preset
+
+            write_preset(output, preset_of(found))
+        say(_summary(found))
+        if predict is not None:
+            say(f"{written} strikes predicted in {predict}")
+    warn(found.warnings)
+    write_json(json_to, described(found))
+
+
+def _predicted(found: Any, folder: str) -> int:
+    """Every strike's WAV before and after; how many strikes. Raises FileError."""
+    from sonic_bullet.diagnosis.diagnose import predictions
+    from sonic_bullet.files import write_audio
+
+    made = predictions(found)
+    for side in SIDES:
+        try:
+            os.makedirs(Path(folder) / side, exist_ok=True)
+        except OSError as error:
+            raise FileError(f"cannot make the folder {Path(folder) / side}: {error.strerror or error}", "choose another with --predict") from error
+    for stem, sr, before, after in made:
+        for side, sample in (("before", before), ("after", after)):
+            write_audio(Path(folder) / side / f"{stem}.wav", sample, sr)
+    return len(made)
+
+
+def _summary(found: Any) -> str:
+    """For people."""
+    from sonic_bullet.diagnosis.remainder import NOTHING
+    from sonic_bullet.diagnosis.selection.stepwise import NothingCompared
+
+    def missing(split: str) -> str:
+        return "not compared" if split in found.not_compared else "no audio"
+
+    words = {
+        "none": "the model suffices: no effect is accepted",
+        "explained": "the model lacks",
+        "unexplained": "something is left that no known effect explains",
+        "nothing": NOTHING,
+    }
+    nothing = isinstance(found.closed, NothingCompared)
+    text = [f"{found.case.name}: {found.verdict}: {words['nothing' if nothing else found.verdict]}"]
+    for c in found.closed.added:
+        numbers = ", ".join(f"{k} {_number(v)}" for k, v in c.effect.parameters().items())
+        text.append(f"  {c.id} ({c.effect.owner.value}): {numbers}; {c.mean_db:.2f} dB nearer on strikes left out, chance {c.control_db:.2f} dB")
+    rows = [
+        (split, *(f"{found.errors[side][split]:.2f} dB" if found.errors[side][split] is not None else missing(split) for side in ("before", "after")))
+        for split in ("fit", "holdout", "transfer")
+        if split in found.errors["before"]
+    ]
+    text.append(table(("log-spectral distance", "before", "after"), rows))
+    if found.errors["floor"] is not None:
+        text.append(f"noise alone: {found.errors['floor']:.2f} dB")
+    others = [c for c in found.closed.tried if c.id not in {a.id for a in found.closed.added}]
+    if others:
+        text.append("tried and not kept: " + "; ".join(f"{c.id} {c.mean_db:+.2f} dB (chance {c.control_db:+.2f})" for c in others))
+    if found.unexplained:
+        text.append(f"left: {found.unexplained['words']}")
+    return "\n".join(text)
+
+
+def _number(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:.4g}"
+    if isinstance(value, list):
+        return "[" + ", ".join(_number(v) for v in value) + "]"
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{k} {_number(v)}" for k, v in value.items()) + "}"
+    return str(value)

@@ -1,0 +1,56 @@
+"""The examples under each command's help."""
+
+RENDER_EPILOG = """\b
+Examples:
+  sonic-bullet render scenes/tabletop.py -o tabletop.wav --picture tabletop.png
+  sonic-bullet render my_sim.py -o out.flac --material wood --peak-dbfs -1
+  sonic-bullet render scenes/drop.py -o out.wav --contacts drop.npz --json
+  sonic-bullet render drop.npz -o again.wav      (the same bits, without PyBullet)
+  sonic-bullet render drop.npz -o stereo.wav --microphone 0,-1,0.5 --microphone 0,1,0.5"""
+
+MODES_EPILOG = """\b
+Examples:
+  sonic-bullet modes mug.obj --material porcelain --scale 0.001
+  sonic-bullet modes bar.stl --young 2.1e11 --poisson 0.3 --density 7850 --count 10
+  sonic-bullet modes tray.obj --material metal --thickness 0.002 --to-hz 5000 --json tray.json -o tray.npz
+  sonic-bullet modes fork.obj --material steel --fix 0,0,-0.1,0.01"""
+
+FIT_EPILOG = """\b
+Examples:
+  sonic-bullet fit tap.wav --mesh bar.obj --strike 0.05,0,0.003 --material steel -o bar.json --picture bar.png
+  sonic-bullet fit tap.wav --mesh mug.obj --scale 0.001 --strike 0,0.04,0 --sensor sum --material porcelain -o mug.json --json
+  sonic-bullet fit my_case/ -o preset.json       (several strikes, sizes, sensors: a folder with a case.json)
+The preset plays at once: listener.add(body, material="preset.json")."""
+
+RESIDUAL_EPILOG = """\b
+Examples:
+  sonic-bullet residual my_case/ -o preset.json --picture preset.png
+  sonic-bullet residual tap.wav --mesh bar.obj --strike 0.05,0,0.003 --material steel -o bar.json
+  sonic-bullet residual tap.wav --material wood -o wood.json     (no shape known: the recording's features stand in for modes)
+Hear a scene without: sonic-bullet render scene.py -o out.wav --no-residual"""
+
+FEATURES_EPILOG = """\b
+Examples:
+  sonic-bullet features tap.wav
+  sonic-bullet features tap.wav --json features.json --picture features.png
+  sonic-bullet features tap.flac --band 200,8000 --onset 0"""
+
+DIAGNOSE_EPILOG = """\b
+Examples:
+  sonic-bullet diagnose my_case/
+  sonic-bullet diagnose my_case/ --json verdict.json --predict predicted/ --report page.html
+  sonic-bullet diagnose my_case/ -o preset.json   (what belongs to material and object sounds in every scene)
+A verdict is none, explained or unexplained."""
+
+CASE_EPILOG = """\b
+Examples:
+  sonic-bullet case new my_case --mesh bar.obj --recordings taps/*.wav --material steel --sensor pressure
+  sonic-bullet case check my_case
+  sonic-bullet fit my_case -o preset.json"""
+
+GROUP_EPILOG = """\b
+Examples:
+  sonic-bullet render scenes/tabletop.py -o tabletop.wav
+  sonic-bullet modes mug.obj --material porcelain
+  sonic-bullet doctor my_sim.py
+'sonic-bullet COMMAND --help' shows each command's options and examples."""

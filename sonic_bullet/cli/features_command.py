@@ -1,0 +1,89 @@
+"""`features`: the damped sinusoids of a recording, each with its spread."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from sonic_bullet.cli.output import clean_stdout, places, status, table, warn, write_json
+from sonic_bullet.estimator.lines.line_values import Features
+from sonic_bullet.files import channel_of, channel_words, read_audio
+from sonic_bullet.records import Array
+from sonic_bullet.records.errors import FileError
+
+
+def run_features(
+    recording: str, *, onset_s: float | None, band: tuple[float, ...] | None, channel: int | None, json_to: str | None, picture: str | None
+) -> None:
+    """The `features` command. Raises SonicBulletError."""
+    if picture is not None and not picture.endswith((".png", ".pdf", ".svg")):
+        raise FileError(f"cannot write {picture}: pictures are .png, .pdf or .svg", "end the name with one of them")
+    picture, json_to = places(picture, json_to)
+    sound, sr = read_audio(recording)
+    observed, which = channel_of(sound, channel or 0, recording), channel_words(len(sound), channel)
+    warn(f"{recording}: {words}" for words in [which] if words)
+    with clean_stdout(json_to) as say:
+        from sonic_bullet.estimator.lines.extraction import extract
+
+        with status(recording) as progress:
+            progress("looking for modes")
+            found = extract(observed, sr, onset_s=onset_s, band_hz=(band[0], band[1]) if band else None)
+        notes = "; ".join(filter(None, (which, found.note)))
+        if picture is not None:
+            _draw(picture, observed, sr, found)
+        say(_summary(recording, found))
+    warn(f"{recording}: {note}" for note in [found.note] if note)
+    write_json(json_to, described(found, notes, doubtful=bool(found.note) or (len(sound) > 1 and channel is None)))
+
+
+def described(found: Features, notes: str, *, doubtful: bool) -> dict[str, Any]:
+    """Features as JSON-able values; null for a spread that is not known. doubtful: whether a note speaks against them."""
+    names = ("freq_hz", "decay_per_s", "amplitude", "freq_sd_hz", "decay_sd_per_s", "amplitude_sd")
+    columns = [getattr(found, name) for name in names]
+    rows = [{name: _number(column[k]) for name, column in zip(names, columns, strict=True)} for k in range(len(found.freq_hz))]
+    verdict = "features" if rows and not doubtful else "doubtful" if rows else "no features"
+    return {"features": rows, "onset_s": found.onset_s, "noise_dbfs": found.noise_dbfs, "sr": found.sr, "verdict": verdict, "note": notes}
+
+
+def _number(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
+
+
+def _summary(recording: str, found: Features) -> str:
+    order = np.argsort(found.freq_hz)
+    rows = [
+        (
+            f"{found.freq_hz[k]:.3f}",
+            f"{found.freq_sd_hz[k]:.2g}",
+            f"{found.decay_per_s[k]:.4g}",
+            f"{found.decay_sd_per_s[k]:.2g}",
+            f"{20 * np.log10(found.amplitude[k]):.1f}",
+        )
+        for k in order
+    ]
+    head = f"{recording}: {len(rows)} features, onset at {found.onset_s:.4f} s, noise {found.noise_dbfs:.1f} dBFS"
+    return "\n".join([head, table(("Hz", "±", "decay 1/s", "±", "dBFS"), rows)])
+
+
+def _draw(path: str, sound: Array, sr: int, found: Features) -> None:
+    """Spectrogram with a line a feature, as long as it takes to fall by 60 dB; the (f, d) plane beside it."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    from sonic_bullet.files import replacing
+    from sonic_bullet.plots.scene_plot import spectrogram_db
+
+    figure = Figure(figsize=(11, 5), layout="constrained")
+    FigureCanvasAgg(figure)
+    left, right = figure.subplots(1, 2, width_ratios=(3, 2))
+    freq, time, level = spectrogram_db(sound, sr)
+    left.pcolormesh(time, freq / 1000, level, vmin=level.max() - 90, vmax=level.max(), cmap="magma", shading="nearest", rasterized=True)
+    last = np.minimum(found.onset_s + 6.9 / np.maximum(found.decay_per_s, 1e-3), time[-1])
+    left.hlines(found.freq_hz / 1000, found.onset_s, last, colors="c", linewidth=0.7)
+    left.set(xlabel="time in s", ylabel="frequency in kHz", title="recording, features down to -60 dB")
+    right.errorbar(found.freq_hz / 1000, found.decay_per_s, yerr=found.decay_sd_per_s, fmt="o", markersize=3, linewidth=0.7)
+    right.set(xlabel="frequency in kHz", ylabel="decay in 1/s", yscale="log", title="decay over frequency")
+    with replacing(path) as file:
+        figure.savefig(file, format=path.rsplit(".", 1)[1], dpi=110)

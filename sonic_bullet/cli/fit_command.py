@@ -1,0 +1,139 @@
+"""`fit`: a recorded strike, or a case of them, to a preset."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sonic_bullet.cli.output import clean_stdout, places, status, table, warn, write_json
+from sonic_bullet.files.cases import LARGEST, Case, CaseObject, CaseRecording, medium_of, read_case
+from sonic_bullet.records import Array
+from sonic_bullet.records.errors import FileError
+
+Point = tuple[float, float, float]
+ONE = ("mesh", "strike", "direction", "impulse", "material", "scale", "sensor", "sensor_at", "sensor_direction", "onset_s", "fixed", "channel", "medium")
+
+
+def run_fit(source: str, *, output: str, picture: str | None, json_to: str | None, **one: Any) -> None:
+    """The `fit` command. Raises SonicBulletError."""
+    if not output.endswith(".json"):
+        raise FileError(f"cannot write {output}: presets are JSON files", "end the name with .json")
+    if picture is not None and not picture.endswith((".png", ".pdf", ".svg")):
+        raise FileError(f"cannot write {picture}: pictures are .png, .pdf or .svg", "end the name with one of them")
+    to, picture, json_to = places(output, picture, json_to)
+    case = as_case(source, one)
+    warn(case.warnings)
+    with clean_stdout(json_to) as say:
+        from sonic_bullet.estimator.fit.fitted_preset import preset_of
+        from sonic_bullet.estimator.fit.material_fit import fit_case
+        from sonic_bullet.presets import write_preset
+
+        with status(source) as progress:
+            found = fit_case(case, progress=progress)
+        write_preset(str(to), preset_of(found))
+        if picture is not None:
+            from sonic_bullet.plots.fit_plot import write_fit_picture
+
+            write_fit_picture(picture, found)
+        say(_summary(found))
+    warn(found.warnings)
+    write_json(json_to, described(found))
+
+
+def as_case(source: str, one: dict[str, Any]) -> Case:
+    """The case in a folder, or the one the options describe. Raises FileError."""
+    path = Path(source)
+    if path.is_dir() or path.name == "case.json":
+        given = [f"--{name.replace('_s', '').replace('_', '-')}" for name in ONE if one[name] not in (None, ())]
+        if given:
+            raise FileError(f"{' and '.join(given)} given beside a case", "a case says that itself; leave it out")
+        return read_case(path)
+    if not path.is_file():
+        raise FileError(f"cannot read {source}: no such file or folder", "give a recording, or a folder with a case.json")
+    for name in ("impulse", "scale", "onset_s"):
+        if one[name] is not None and not np.isfinite(one[name]):
+            raise FileError(f"--{name.replace('_s', '')} is {one[name]}", "give a finite number")
+    if one["impulse"] is not None and one["impulse"] > LARGEST:
+        raise FileError(f"--impulse is {one['impulse']:g} N·s", f"give it in N·s, at most {LARGEST:g}")
+    missing = [f"--{name}" for name in ("mesh", "strike", "material") if one[name] is None]
+    if missing:
+        raise FileError(f"{' and '.join(missing)} missing", "a recording alone has no shape; see 'sonic-bullet fit --help'")
+    from sonic_bullet.presets import load_material
+
+    if not Path(one["mesh"]).is_file():
+        raise FileError(f"mesh file '{one['mesh']}' does not exist", "check the path")
+    load_material(one["material"])
+    kind = one["sensor"] or "pressure"
+    if kind == "velocity" and one["sensor_at"] is None:
+        raise FileError("--sensor velocity needs a place", "give --sensor-at X,Y,Z")
+    if kind != "velocity" and one["sensor_direction"] is not None:
+        raise FileError(f"--sensor-direction is given, but --sensor is {kind}", "give --sensor velocity, or leave the direction out")
+    thing = CaseObject("object", Path(one["mesh"]), 1.0 if one["scale"] is None else one["scale"], one["material"], fixed=one["fixed"])
+    observed = one["channel"] or 0, None, one["channel"] is not None
+    recording = CaseRecording(path, None, "object", "fit", one["strike"], _unit("direction", one), one["impulse"], *observed)
+    at = {"object": one["sensor_at"]} if one["sensor_at"] is not None else None
+    along = _unit("sensor_direction", one)
+    direction = None if along is None else {"object": along}
+    medium = medium_of(one["medium"], kind)
+    return Case(path.stem, path.parent, {"object": thing}, (recording,), kind, at, direction, onset_s=one["onset_s"], medium=medium)
+
+
+def _unit(name: str, one: dict[str, Any]) -> Point | None:
+    """An option's direction, of length 1. Raises FileError."""
+    direction: Point | None = one[name]
+    if direction is None:
+        return None
+    length = float(np.linalg.norm(direction))
+    if not length > 0:
+        raise FileError(f"--{name.replace('_', '-')} is zero", "give a direction")
+    return (direction[0] / length, direction[1] / length, direction[2] / length)
+
+
+def described(found: Any) -> dict[str, Any]:
+    """What --json writes: the fit, no NaN (None where not identifiable)."""
+    fit = found.fit
+    return {
+        "alpha_per_s": fit.alpha_per_s,
+        "beta_s": fit.beta_s,
+        "gamma_m2_s2": fit.gamma_m2_s2,
+        "sigma": fit.sigma,
+        "poisson_ratio": fit.poisson_ratio,
+        "covariance": [[float(x) if np.isfinite(x) else None for x in row] for row in fit.covariance],
+        "verdict": fit.verdict,
+        "metric": fit.metric if fit.metric >= 0 else None,
+        "log_spectral_db": found.log_spectral_db if found.log_spectral_db >= 0 else None,
+        "modes": [
+            {"freq_hz": float(f), "decay_per_s": float(d), "amplitude": float(a)} for f, d, a in zip(fit.freq_hz, fit.decay_per_s, fit.amplitude, strict=True)
+        ],
+    }
+
+
+def _summary(found: Any) -> str:
+    fit = found.fit
+    sd = np.sqrt(np.diag(fit.covariance))
+
+    def shown(value: float, spread: float, relative: bool = True) -> tuple[str, str]:
+        return f"{value:.6g}", f"{spread * (value if relative else 1):.2g}" if np.isfinite(spread) else "not identifiable"
+
+    rows = [
+        ("alpha in 1/s", *shown(fit.alpha_per_s, sd[0])),
+        ("beta in s", *shown(fit.beta_s, sd[1])),
+        ("E/density in m²/s²", *shown(fit.gamma_m2_s2, sd[2])),
+        ("E in Pa", *shown(found.youngs_pa, sd[2])),
+        ("density in kg/m³", f"{found.density_kg_m3:.6g}", "the guess's"),
+        ("Poisson's ratio", *shown(fit.poisson_ratio, sd[4], False)),
+        ("sigma", *shown(fit.sigma, sd[3])),
+    ]
+    paired = sum(int((o.line >= 0).sum()) for o in found.objects)
+    lines = sum(len(o.evidence.lines.freq_hz) for o in found.objects)
+    correction: Array = np.concatenate([o.correction[o.line >= 0] for o in found.objects]) if found.objects else np.zeros(0)
+    text = [f"{found.case.name}: {fit.verdict}", table(("", "value", "spread"), rows), f"{paired} modes paired with {lines} observed lines"]
+    if len(correction):
+        text.append(f"corrections of single modes' frequencies: rms {np.sqrt((correction**2).mean()):.2%}, largest {np.abs(correction).max():.2%}")
+    if fit.metric >= 0:
+        text.append(f"hybrid metric of recording and synthesis: {fit.metric:.3g} (0 the same, 1 and more as far as silence)")
+    if found.log_spectral_db >= 0:
+        text.append(f"log-spectral distance of recording and synthesis: {found.log_spectral_db:.2f} dB")
+    return "\n".join(text)

@@ -1,0 +1,107 @@
+"""`residual`: recorded strikes to a preset that sounds what its modes do not say."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sonic_bullet.cli.fit_command import as_case
+from sonic_bullet.cli.output import clean_stdout, places, status, warn, write_json
+from sonic_bullet.files import channel_of, channel_words, read_audio
+from sonic_bullet.records import Residual
+from sonic_bullet.records.errors import AudioError, FileError
+
+UNSHAPED = ("strike", "direction", "impulse", "scale", "sensor", "sensor_at", "sensor_direction", "fixed", "medium")
+
+
+def run_residual(source: str, *, output: str, picture: str | None, json_to: str | None, **one: Any) -> None:
+    """The `residual` command. Raises SonicBulletError."""
+    if not output.endswith(".json"):
+        raise FileError(f"cannot write {output}: presets are JSON files", "end the name with .json")
+    if picture is not None and not picture.endswith((".png", ".pdf", ".svg")):
+        raise FileError(f"cannot write {picture}: pictures are .png, .pdf or .svg", "end the name with one of them")
+    to, picture, json_to = places(output, picture, json_to)
+    with clean_stdout(json_to) as say:
+        from sonic_bullet.presets import write_preset
+
+        whole = Path(source).is_dir() or Path(source).name == "case.json" or one["mesh"] is not None
+        with status(source) as progress:
+            preset, strikes = (_shaped if whole else _unshaped)(source, one, progress)
+        write_preset(str(to), preset)
+        if picture is not None:
+            from sonic_bullet.plots.residual_plot import write_residual_picture
+
+            write_residual_picture(picture, strikes)
+        say(_summary(source, strikes.residual))
+    write_json(json_to, described(strikes.residual))
+
+
+def _shaped(source: str, one: dict[str, Any], progress: Any) -> tuple[Any, Any]:
+    """Preset and strikes of a case, or of a recording of a known shape."""
+    import msgspec
+
+    from sonic_bullet.estimator.fit.fitted_preset import preset_of
+    from sonic_bullet.estimator.fit.material_fit import fit_case
+    from sonic_bullet.estimator.residual.recorded_strikes import case_strikes
+    from sonic_bullet.residual.code import form_of
+
+    case = as_case(source, one)
+    warn(case.warnings)
+    if not any(r.split == "fit" and r.file is not None and r.object in case.objects and case.objects[r.object].mesh is not None for r in case.recordings):
+        raise FileError(f"case {case.name} has no 'fit' recording of an object with a mesh", "a residual is what a recording has beside its object's modes")
+    found = fit_case(case, progress=progress)
+    warn(found.warnings)
+    progress("taking what is left")
+    strikes = case_strikes(found)
+    return msgspec.structs.replace(preset_of(found), residual=form_of(strikes.residual)), strikes
+
+
+def _unshaped(source: str, one: dict[str, Any], progress: Any) -> tuple[Any, Any]:
+    """Preset and strikes of a recording without a shape: a named material, the recording's features in place of modes."""
+    import msgspec
+
+    from sonic_bullet.estimator.residual.recorded_strikes import recording_strikes
+    from sonic_bullet.presets import named_preset
+    from sonic_bullet.residual.code import form_of
+
+    given = [f"--{name.replace('_', '-')}" for name in UNSHAPED if one[name]]
+    if given:
+        raise FileError(f"{' and '.join(given)} given without a shape", "give --mesh too, or leave it out")
+    if one["material"] is None:
+        raise FileError("--material missing", "without --mesh the residual joins a material that is known: name it")
+    if one["onset_s"] is not None and not np.isfinite(one["onset_s"]):
+        raise FileError(f"--onset is {one['onset_s']}", "give a finite number")
+    preset = named_preset(one["material"])
+    if not Path(source).is_file():
+        raise FileError(f"cannot read {source}: no such file or folder", "give a recording, or a folder with a case.json")
+    sound, sr = read_audio(source)
+    if not sound.size:
+        raise AudioError(f"{source} is empty", "give a recording of an impact")
+    observed = channel_of(sound, one["channel"] or 0, source)
+    warn(f"{source}: {words}" for words in [channel_words(len(sound), one["channel"])] if words)
+    progress("looking for modes")
+    strikes = recording_strikes(observed, sr, one["onset_s"], Path(source).name)
+    return msgspec.structs.replace(preset, residual=form_of(strikes.residual)), strikes
+
+
+def described(residual: Residual) -> dict[str, Any]:
+    """What --json writes: figures of the residual."""
+    lines = zip(residual.line_freq_hz, residual.line_decay_per_s, residual.line_amplitude, strict=True)
+    share = residual.share_of_clip
+    return {
+        "residual_of_clip_db": 10 * float(np.log10(share)) if share > 0 else None,
+        "modes": len(residual.mode_freq_hz),
+        "lines": [{"freq_hz": float(f), "decay_per_s": float(d), "amplitude": float(a)} for f, d, a in lines],
+        "noise_cells": int((residual.power_per_hz > 0).sum()),
+        "noise_s": float(residual.time_s[-1]) if residual.power_per_hz.any() else 0.0,
+        "source": residual.source,
+    }
+
+
+def _summary(source: str, residual: Residual) -> str:
+    shown = described(residual)
+    level = shown["residual_of_clip_db"]
+    loud = "nothing" if level is None else f"{level:.1f} dB of the recordings' energy"
+    return f"{source}: beside {shown['modes']} modes there is {loud}: {len(shown['lines'])} lines, and noise in {shown['noise_cells']} cells of band and time"

@@ -1,0 +1,274 @@
+"""`render` and `doctor`: check every output's place first, run, then write log, sound, picture and JSON, each whole or not at all."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from sonic_bullet.cli.output import clean_stdout, places, progress_bar, quiet_stderr, status, write_json
+from sonic_bullet.files import AudioReport, check_audio_output, check_levels, check_sr, kept_name, read_log, write_audio, write_log
+from sonic_bullet.records.errors import AudioError, FileError, SceneError, SonicBulletError
+
+if TYPE_CHECKING:
+    from sonic_bullet.files.contact_log import ContactLog
+    from sonic_bullet.records import Array
+    from sonic_bullet.scene import RenderResult
+
+DEFAULT_SR = 48_000
+
+
+def run_render(
+    scene: str,
+    *,
+    output: str,
+    seconds: float | None,
+    sr: float | None,
+    contacts: str | None,
+    picture: str | None,
+    json_to: str | None,
+    peak_dbfs: float | None,
+    lufs: float | None,
+    microphones: tuple[tuple[float, float, float], ...],
+    seed: int | None,
+    material: str | None,
+    residual: bool,
+) -> None:
+    """The `render` command. Raises SonicBulletError, and KeyboardInterrupt whose text names the file with what was rendered so far."""
+    rate = None if sr is None else check_sr(sr)
+    _check_request(scene, seconds, peak_dbfs, lufs, material)
+    to, contacts, picture, json_to = _check_places(output, contacts, picture, json_to)
+    with clean_stdout(json_to) as say:
+        try:
+            with progress_bar(Path(scene).name) as (progress, tell):
+                wish = _Wish(seconds, rate, microphones, seed, material, residual, progress, tell)
+                result: RenderResult | _Replay = _replayed(scene, wish) if _is_log(scene) else _simulated(scene, wish)
+        except (SonicBulletError, KeyboardInterrupt) as error:
+            raise _with_partial(error, to, output, peak_dbfs, lufs) from error
+        if contacts is not None:
+            write_log(contacts, result.log)
+        report = replace(_written(to, result, peak_dbfs, lufs), path=output)
+        if picture is not None:
+            from sonic_bullet.plots.scene_plot import render_picture
+
+            render_picture(picture, result.samples, result.sr, result.log, Path(scene).name)
+        notes = (*result.notes, *_coarse(result.log), *_oversized(result.log), *_warnings(report))
+        say(_summary(report, result.log))
+        for note in notes:
+            print(f"sonic-bullet: note: {note}", file=sys.stderr)
+    write_json(json_to, _described(result, report, notes))
+
+
+def run_doctor(scene: str, seconds: float, json_to: str | None) -> None:
+    """The `doctor` command. Raises SonicBulletError."""
+    (json_to,) = places(json_to)
+    if _is_log(scene):
+        raise SceneError(f"{scene} is a contact log, which has no settings", "give the scene it came from")
+    with clean_stdout(json_to) as say:
+        with quiet_stderr():
+            from sonic_bullet.scene import examine_scene
+
+        with status(Path(scene).name) as tell:
+            findings = examine_scene(scene, seconds, tell)
+        if findings:
+            for finding in findings:
+                say(f"{finding.severity}: {finding.id}: {finding.what}\n    {finding.remedy}")
+        else:
+            say(f"{scene}: nothing found that would spoil its sound")
+    write_json(json_to, {"scene": scene, "findings": [{"id": f.id, "severity": f.severity, "what": f.what, "remedy": f.remedy} for f in findings]})
+
+
+def _is_log(scene: str) -> bool:
+    return Path(scene).suffix.lower() == ".npz"
+
+
+def _check_request(scene: str, seconds: float | None, peak_dbfs: float | None, lufs: float | None, material: str | None) -> None:
+    if seconds is not None and not 0 < seconds < 1e6:
+        raise AudioError(f"{seconds} seconds cannot be rendered", "give --seconds above 0")
+    check_levels(peak_dbfs, lufs)
+    if not Path(scene).is_file():
+        raise FileError(f"cannot read {scene}: no such file", "give a scene (.py) or a contact log (.npz)")
+    if Path(scene).suffix.lower() not in (".py", ".npz"):
+        raise FileError(f"cannot render {scene}: neither a scene nor a contact log", "give a file that ends in .py or .npz")
+    if material is not None and _is_log(scene):
+        raise FileError("--material does not apply to a contact log, whose bodies bring theirs", "leave it out, or render the scene")
+    if material is not None:
+        from sonic_bullet.presets import load_material
+
+        load_material(material)
+
+
+def _check_places(output: str, contacts: str | None, picture: str | None, json_to: str | None) -> tuple[str, str | None, str | None, str | None]:
+    """Where all outputs go, absolute: each can be written, and no two are one file, before anything is simulated. Raises FileError."""
+    check_audio_output(output)
+    if contacts is not None and not contacts.endswith(".npz"):
+        raise FileError(f"cannot write {contacts}: contact logs are npz files", "end the name with .npz")
+    if picture is not None:
+        from sonic_bullet.plots.scene_plot import check_picture_output
+
+        check_picture_output(picture)
+    to, *others = places(output, contacts, picture, json_to)
+    return str(to), others[0], others[1], others[2]
+
+
+@dataclass(frozen=True, slots=True)
+class _Wish:
+    """What the user asked of a render; None and empty: as the scene or the log has it."""
+
+    seconds: float | None
+    rate: int | None
+    microphones: tuple[tuple[float, float, float], ...]
+    seed: int | None
+    material: str | None
+    residual: bool
+    progress: Callable[[float], None]
+    say: Callable[[str], None]
+
+
+def _simulated(scene: str, wish: _Wish) -> RenderResult:
+    with quiet_stderr():
+        from sonic_bullet.scene import render_scene
+
+    sr, places = wish.rate or DEFAULT_SR, wish.microphones or None
+    asked: dict[str, Any] = {
+        "seconds": wish.seconds,
+        "sr": sr,
+        "seed": wish.seed or 0,
+        "microphones": places,
+        "material": wish.material,
+        "residual": wish.residual,
+    }
+    return render_scene(scene, **asked, progress=wish.progress, say=wish.say)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Replay:
+    """A `RenderResult` of a log; that class lives beside PyBullet, which a replay does without."""
+
+    samples: Array
+    log: ContactLog
+    sr: int
+    notes: tuple[str, ...] = ()
+
+
+def _replayed(path: str, wish: _Wish) -> _Replay:
+    """A log's sound: bit for bit the render it came from, where no option changes it."""
+    import numpy as np
+
+    from sonic_bullet.records import Microphone
+    from sonic_bullet.render import render_log, silence_notes
+
+    log = read_log(path)
+    if wish.microphones:
+        log = replace(log, sensors=tuple(Microphone(np.array(place)) for place in wish.microphones))
+    if wish.seed is not None:
+        log = replace(log, seed=wish.seed)
+    if (seconds := wish.seconds) is not None:
+        if seconds > log.duration_s + 1e-9:
+            raise AudioError(f"{path} lasts {log.duration_s:.3f} s, shorter than {seconds} s", "give fewer seconds, or simulate the scene for longer")
+        log = log.first(int((log.start_s < seconds - 1e-9).sum()))
+    samples = render_log(log, sr=wish.rate, residual=wish.residual, progress=wish.progress, say=wish.say)
+    return _Replay(samples, log, wish.rate or log.sr, silence_notes(samples, log))
+
+
+def _written(output: str, result: RenderResult | _Replay, peak_dbfs: float | None, lufs: float | None) -> AudioReport:
+    """The sound as a file. Where silence keeps it from being one, the error says why it is silent."""
+    from sonic_bullet.render import why_silent
+
+    try:
+        return write_audio(output, result.samples, result.sr, peak_dbfs=peak_dbfs, lufs=lufs)
+    except AudioError as error:
+        reason = None if result.samples.any() else why_silent(result.log)
+        raise AudioError(error.what, reason) if reason else error from error
+
+
+def _with_partial(
+    error: SonicBulletError | KeyboardInterrupt, to: str, output: str, peak_dbfs: float | None, lufs: float | None
+) -> SonicBulletError | KeyboardInterrupt:
+    """The error, its text naming NAME.partial.EXT as the user would, where what was rendered before it is written as a valid file beside ``to``."""
+    result: RenderResult | None = getattr(error, "partial", None)
+    said = ""
+    if result is not None and result.samples.size:
+        partial = kept_name(Path(to))
+        said = f"the first {result.samples.shape[-1] / result.sr:.3f} s are in {kept_name(Path(output))}"
+        try:
+            try:
+                write_audio(partial, result.samples, result.sr, peak_dbfs=peak_dbfs, lufs=lufs)
+            except AudioError:
+                write_audio(partial, result.samples, result.sr)  # silent or too short for the level asked for: kept as it is
+        except FileError as failure:  # the error itself is what the user must read first
+            said = failure.what
+    if isinstance(error, SonicBulletError):
+        return type(error)(error.what, "; ".join(part for part in (error.remedy, said) if part))
+    return KeyboardInterrupt("; ".join(part for part in (str(error) or "stopped", said) if part))
+
+
+def _coarse(log: ContactLog) -> tuple[str, ...]:
+    from sonic_bullet.modal import COARSER
+
+    names = sorted({body.name for body in log.bodies if body.model is not None and COARSER in body.model.note})
+    return (f"the mesh of {', '.join(names)} is {COARSER}: a faster machine may compute slightly other modes",) if names else ()
+
+
+def _oversized(log: ContactLog) -> tuple[str, ...]:
+    from sonic_bullet.geometry import oversize
+
+    large = [(body, oversize(body.model.vertex_m, body.model.mass_kg)) for body in log.bodies if body.model is not None]
+    remedy = "load it with globalScaling=0.001, or give its mesh in metres, if its numbers are millimetres"
+    return tuple(f"body {body.body_id} link {body.link} ({body.name}) {words}; {remedy}" for body, words in large if words)
+
+
+def _warnings(report: AudioReport) -> tuple[str, ...]:
+    if report.clipped:
+        return (
+            f"{report.clipped} samples were clipped at full scale (peak {report.peak_pa:.3g} Pa); --peak-dbfs -1 avoids it, a float .wav needs no clipping",
+        )
+    if report.over:
+        return (f"{report.over} samples pass 1.0 (peak {report.peak_pa:.3g} Pa): the file is exact, but players clip it; --peak-dbfs -1 scales it",)
+    return ()
+
+
+def _summary(report: AudioReport, log: ContactLog) -> str:
+    from sonic_bullet.plots.scene_plot import quantity
+
+    channels = "1 channel" if report.channels == 1 else f"{report.channels} channels"
+    scale = "" if report.gain_per_pa == 1 else f", scaled by {report.gain_per_pa:.4g}"
+    units = {quantity(sensor)[1] for sensor in log.sensors}
+    unit = units.pop() if len(units) == 1 else "(mixed units)"
+    return f"{report.path}: {report.seconds:.3f} s, {channels}, {report.sr} Hz, peak {report.peak_pa:.4g} {unit}, rms {report.rms_pa:.4g} {unit}{scale}"
+
+
+def _described(result: RenderResult | _Replay, report: AudioReport, notes: tuple[str, ...]) -> dict[str, Any]:
+    return {
+        "output": report.path,
+        "format": report.format,
+        "subtype": report.subtype,
+        "sr": report.sr,
+        "channels": report.channels,
+        "frames": report.frames,
+        "seconds": report.seconds,
+        "peak_pa": report.peak_pa,
+        "rms_pa": report.rms_pa,
+        "gain_per_pa": report.gain_per_pa,
+        "clipped": report.clipped,
+        "steps": len(result.log.steps),
+        "contacts": len(result.log),
+        "bodies": _bodies(result.log),
+        "notes": list(notes),
+    }
+
+
+def _bodies(log: ContactLog) -> list[dict[str, Any]]:
+    return [
+        {
+            "body": body.body_id,
+            "link": body.link,
+            "name": body.name.encode("utf-8", "replace").decode(),
+            "material": None if body.material is None else body.material.name,
+            "modes": None if body.model is None else body.model.mode_count,
+            "dropped": None if body.model is None else body.model.dropped,
+        }
+        for body in log.bodies
+    ]

@@ -1,0 +1,139 @@
+"""`modes` and `materials`: a mesh's elastic modes, and what bodies can be made of."""
+
+from __future__ import annotations
+
+import math
+import sys
+from dataclasses import replace
+from typing import Any
+
+from sonic_bullet.cli.output import clean_stdout, places, status, table, write_json
+from sonic_bullet.files import write_model
+from sonic_bullet.geometry import oversize
+from sonic_bullet.records import Material, ModalModel
+from sonic_bullet.records.errors import FileError, MaterialError
+from sonic_bullet.records.units import HEARING_LIMIT_HZ
+
+DEFAULT_MATERIAL = "steel"
+
+
+def run_modes(
+    mesh: str,
+    *,
+    material: str | None,
+    youngs_pa: float | None,
+    poisson: float | None,
+    density_kg_m3: float | None,
+    count: int | None,
+    to_hz: float | None,
+    fixed: tuple[tuple[float, float, float, float], ...],
+    thickness_m: float | None,
+    scale: float,
+    json_to: str | None,
+    output: str | None,
+) -> None:
+    """The `modes` command. Raises SonicBulletError."""
+    if output is not None and not output.endswith(".npz"):
+        raise FileError(f"cannot write {output}: modal models are npz files", "end the name with .npz")
+    to, json_to = places(output, json_to)
+    if count is not None and to_hz is not None:
+        raise FileError("both --count and --to-hz are given", "give one of them")
+    made = chosen_material(material, youngs_pa, poisson, density_kg_m3)
+    with clean_stdout(json_to) as say:
+        from sonic_bullet import modal
+        from sonic_bullet.modal import read_mesh
+
+        with status(mesh) as progress:
+            shape = read_mesh(mesh, scale)
+            model = modal.analyse((shape,), made, count=count, fixed=fixed, thickness_m=thickness_m, progress=progress, to_hz=to_hz or HEARING_LIMIT_HZ)
+        if to is not None:
+            write_model(to, model)
+        say(_summary(mesh, made, model))
+    if large := oversize(model.vertex_m, model.mass_kg):
+        print(f"sonic-bullet: warning: {mesh} {large}; give --scale 0.001 if its numbers are millimetres", file=sys.stderr)
+    write_json(json_to, _described(mesh, made, model, output))
+
+
+def chosen_material(name: str | None, youngs_pa: float | None, poisson: float | None, density_kg_m3: float | None) -> Material:
+    """The named material with the given constants in place of its own; without a name all three or none (then steel).
+
+    A material of bare constants has no damping. Raises MaterialError.
+    """
+    from sonic_bullet.presets import load_material
+
+    given = {"youngs_pa": youngs_pa, "poisson": poisson, "density_kg_m3": density_kg_m3}
+    missing = [key for key, value in given.items() if value is None]
+    if name is None and 0 < len(missing) < 3:
+        options = {"youngs_pa": "--young", "poisson": "--poisson", "density_kg_m3": "--density"}
+        raise MaterialError(f"{' and '.join(options[key] for key in missing)} missing", "give all three of --young, --poisson, --density, or a --material too")
+    base = load_material(name or DEFAULT_MATERIAL)
+    if len(missing) == 3:
+        return base
+    rho = base.density_kg_m3 if density_kg_m3 is None else density_kg_m3
+    if youngs_pa is None and poisson is None:
+        return replace(base, density_kg_m3=rho)
+    elastic = (base.youngs_pa if youngs_pa is None else youngs_pa, base.poisson if poisson is None else poisson)
+    made = Material.isotropic(base.name if name else "constants", youngs_pa=elastic[0], poisson=elastic[1], density_kg_m3=rho)
+    return made if name is None else replace(made, alpha_per_s=base.alpha_per_s, beta_s=base.beta_s)
+
+
+def run_materials(json_to: str | None) -> None:
+    """The `materials` command. Raises FileError."""
+    from sonic_bullet.presets import list_materials
+
+    found = list_materials()
+    if json_to is None:
+        head = ("name", "kg/m³", "E in GPa", "ν", "α in 1/s", "β in s", "roughness in µm", "restitution")
+        rows = [
+            (
+                m.name,
+                f"{m.density_kg_m3:.0f}",
+                f"{m.youngs_pa / 1e9:.3g}",
+                f"{m.poisson:.3g}",
+                f"{m.alpha_per_s:.4g}",
+                f"{m.beta_s:.4g}",
+                f"{m.roughness_m * 1e6:.3g}",
+                f"{m.restitution:.2f}",
+            )
+            for m in found
+        ]
+        print(table(head, rows))
+        print("\nsources: 'sonic-bullet materials --json' and docs/explanation/materials.md")
+    write_json(json_to, {"materials": [_material(m) for m in found]})
+
+
+def _material(m: Material) -> dict[str, Any]:
+    return {
+        "name": m.name,
+        "density_kg_m3": m.density_kg_m3,
+        "youngs_pa": m.youngs_pa,
+        "poisson": m.poisson,
+        "alpha_per_s": m.alpha_per_s,
+        "beta_s": m.beta_s,
+        "roughness_m": m.roughness_m,
+        "hurst": m.hurst,
+        "restitution": m.restitution,
+        "source": m.source,
+    }
+
+
+def _described(mesh: str, material: Material, model: ModalModel, output: str | None) -> dict[str, Any]:
+    modes = [{"freq_hz": float(f), "decay_per_s": None if math.isnan(d) else float(d)} for f, d in zip(model.freq_hz, model.decay_per_s, strict=True)]
+    return {
+        "modes": modes,
+        "mesh": mesh,
+        "material": material.name,
+        "volume_m3": model.volume_m3,
+        "mass_kg": model.mass_kg,
+        "vertices": len(model.vertex_m),
+        "dropped": model.dropped,
+        "note": model.note,
+        "output": output,
+    }
+
+
+def _summary(mesh: str, material: Material, model: ModalModel) -> str:
+    rows = [(str(i), f"{f:.2f}", "-" if math.isnan(d) else f"{d:.3f}") for i, (f, d) in enumerate(zip(model.freq_hz, model.decay_per_s, strict=True), 1)]
+    dropped = f", {model.dropped} overdamped modes dropped" if model.dropped else ""
+    head = f"{mesh}: {material.name}, {model.volume_m3 * 1e6:.4g} cm³, {model.mass_kg:.4g} kg, {model.mode_count} modes{dropped}\n{model.note}"
+    return head.rstrip() + ("\n" + table(("mode", "Hz", "decay in 1/s"), rows) if rows else "")

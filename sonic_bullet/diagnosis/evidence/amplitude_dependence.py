@@ -1,0 +1,74 @@
+"""Modes whose frequency goes with their level: how far it shifts, and how fast they fall.
+
+A linear fit identifies such a mode as a chain of lines (recording_chain.py), none with its decay. But only its frequency bends: its level falls as the linear mode's does.
+Degenerate modes beat once each shifts by its own level, so their decay is identified by what is played: recorded over played falls as e^{−δt}, δ what their decay lacks.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, bends, impact_of, modes_of, play, ring_of
+from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.effects.common.envelope import Envelopes, alone, falls, shifted
+from sonic_bullet.effects.protocol import ObjectEvidence
+from sonic_bullet.records import Array
+
+TURNS_RAD = 0.2  # of phase, that a mode must gain or lose to count as amplitude-dependent
+SPREAD = 0.02  # of a level's own fall
+LEAST_FRAMES = 8  # frames
+LACKS = 0.5  # of a decay, at most
+
+
+def turns_rad(h: Hypothesis, body: Struck, one: ObjectEvidence) -> Array:
+    """By how much the effects turn the phases of each line's modes (s, k) until they have rung down."""
+    each = [(ring_of(h, body, body.fitted[i]), impact_of(h, body, body.fitted[i])) for i in one.strike]
+    level = [r.level * np.abs(b.spectrum(r.freq_hz)) for r, b in each]  # what a long pulse leaves of it
+    turned = np.stack([np.abs(r.bend) * a**2 * np.pi * r.freq_hz / np.maximum(r.decay_per_s, 1e-3) for (r, _), a in zip(each, level, strict=True)])
+    return np.stack([turned[:, who[who < turned.shape[1]]].max(axis=1, initial=0.0) for who in one.mode], axis=1)
+
+
+def amplitude_dependent(h: Hypothesis, body: Struck, one: ObjectEvidence) -> Array:
+    """Whether each line (k,) is of modes whose phases the effects turn by TURNS_RAD or more in the end, at the strike that moves them most."""
+    return np.asarray(turns_rad(h, body, one).max(axis=0) > TURNS_RAD)
+
+
+def fallen(h: Hypothesis, body: Struck, one: ObjectEvidence) -> ObjectEvidence:
+    """The evidence, the decays of amplitude-dependent lines identified by their levels' own fall, where they stand alone."""
+    if not bends(h) or one.signal is None or one.dry or not len(one.freq_hz):
+        return one  # in a room no line is one mode's alone
+    dependent = amplitude_dependent(h, body, one)
+    mine = [(k, width) for k, width in zip(*alone(one), strict=True) if dependent[k] and len(one.mode[k]) in (1, 2)]
+    if not mine:
+        return one
+    selected, window = [k for k, _ in mine], [width for _, width in mine]
+    e = shifted(one, one.signal if one.own is None else one.own, selected, window)
+    made = None
+    if any(len(one.mode[k]) == 2 for k in selected):
+        played = np.stack([play(h, body, body.fitted[i], one.signal.shape[1], one.sr) for i in one.strike])
+        made, mode = shifted(one, played, selected, window), modes_of(h, body)[0].decay_per_s
+    decay, sd = one.decay_per_s.copy(), one.decay_sd_per_s.copy()
+    for q, k in enumerate(selected):
+        if len(one.mode[k]) == 1:
+            decay[k] = falls(e, q, float(decay[k]))
+        elif made is not None and one.mode[k].max() < len(mode):
+            decay[k] = beats(e, made, q, float(mode[one.mode[k]].mean()))
+        sd[k] = SPREAD * decay[k]
+    return replace(one, decay_per_s=decay, decay_sd_per_s=sd)
+
+
+def beats(e: Envelopes, made: Envelopes, q: int, decay_per_s: float) -> float:
+    """The decay of a degenerate pair, in 1/s, by how what was recorded falls against what is played with one decay; that one where too little is clear in both."""
+    top = bottom = 0.0
+    for s in range(len(e.z)):
+        use = e.good[s, q] & made.good[s, q]
+        if use.sum() < LEAST_FRAMES:
+            continue
+        t, w = e.time_s[q, use], e.worth(s, q)[use]
+        left = np.log(np.abs(e.z[s, q, use]) / np.abs(made.z[s, q, use]))
+        t = t - np.average(t, weights=w)
+        top, bottom = top - float((w * t * left).sum()), bottom + float((w * t * t).sum())
+    lacks = top / bottom if bottom > 0 else 0.0
+    return decay_per_s + float(np.clip(lacks, -LACKS * decay_per_s, LACKS * decay_per_s))

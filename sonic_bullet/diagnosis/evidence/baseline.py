@@ -1,0 +1,137 @@
+"""The baseline of a case: the fitted model, its bodies, and the hypothesis that nothing is lacking.
+
+recorded lines -> estimator.fit -> bodies (groups separated, corrections learnt) -> Hypothesis
+lines in chains (recording_chain.py): the same with every chain as one line, where what that plays is nearer to the recordings, or most modes are chains and it is not clearly farther;
+    and with the lines of the softer strikes, whose modes are nearest to linear ones, or of those below a limit, at all strikes
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sonic_bullet.diagnosis.evidence.degenerate_pairs import separated
+from sonic_bullet.diagnosis.evidence.recording_chain import LINKS, share, unchained
+from sonic_bullet.diagnosis.evidence.refit import refitted
+from sonic_bullet.diagnosis.evidence.unmatched_modes import settled
+from sonic_bullet.diagnosis.prediction.elastic_bodies import with_elastic
+from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis
+from sonic_bullet.diagnosis.prediction.score import Compared, Take, comparable, mean_db
+from sonic_bullet.diagnosis.prediction.struck_bodies import Struck, shapeless, struck_bodies
+from sonic_bullet.effects.common.hum import without_hum
+from sonic_bullet.effects.measurement_chain import limit_of
+from sonic_bullet.estimator.fit.case_fit import CaseFit
+from sonic_bullet.estimator.fit.material_fit import fit_evidence
+from sonic_bullet.estimator.fit.recorded import RecordedObject as Recorded
+from sonic_bullet.estimator.lines.joint_lines import Lines, joint_lines, lines_of, noise_rms
+from sonic_bullet.estimator.lines.log_spectral import floor_between, white
+from sonic_bullet.files.cases import Case
+from sonic_bullet.modal.cache import Place
+from sonic_bullet.records import Array
+from sonic_bullet.records.errors import AudioError
+
+LEAST_LINES = 4  # of some strikes: fewer are no list
+NEARER = 0.9  # of the distance, where chains are one line each
+SOFTER = 0.6  # of the middle strike's impulse at most, of half the strikes: soft enough to differ from it
+BELOW, TOUCHES = 0.998, 3  # of a limit, and samples that may reach it in a strike that stays below
+OFTEN, MOSTLY = 0.4, 1.05  # chains, of all modes' lines: no linear body has so many, so one line each it is unless that is clearly worse
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Baseline:
+    """What the case's linear model is. found: the fit. bodies: every object, fitted ones first. takes: the fitted strikes that have audio."""
+
+    found: CaseFit
+    bodies: tuple[Struck, ...]
+    hypothesis: Hypothesis
+    takes: tuple[Take, ...]
+
+
+def baseline(case: Case, recorded: tuple[Recorded, ...], *, cache: Place = "default", progress: Callable[[str], None] | None = None) -> Baseline:
+    """Fit it to recorded evidence. Raises SonicBulletError."""
+    plain = _of(case, recorded, cache, progress)
+    directions = [tuple(_unchained(one, link) for one in recorded) for link in LINKS] if plain.takes else []
+    directions += [tuple(direction(one, case.band_hz) for one in recorded) for direction in (_soft, _unclipped)] if directions else []
+    directions = [faint for faint in directions if any(a is not b for a, b in zip(faint, recorded, strict=True))]
+    if not directions:
+        return plain
+    if progress is not None:
+        progress("modes that depend on their level, or a limit, leave lines that are no modes: fitting what is left without")
+    best = min((_of(case, faint, cache, None) for faint in directions), key=_off_db)
+    changed = [one for one, faint in zip(recorded, directions[0], strict=True) if faint is not one]
+    most = MOSTLY if all(share(one.lines, LINKS[0]) > OFTEN for one in changed) else NEARER
+    return best if _off_db(best) < most * _off_db(plain) else plain
+
+
+def _unchained(one: Recorded, link: tuple[float, float, bool]) -> Recorded:
+    lines = unchained(one.lines, link) if one.signals is not None else None
+    return one if lines is None else replace(one, lines=lines)
+
+
+def _soft(one: Recorded, band_hz: tuple[float, float]) -> Recorded:
+    """Evidence with the lines of its softer strikes alone, each chain of them as one; the same where chains are few or no strikes are much softer than the others."""
+    if one.signals is None or unchained(one.lines, LINKS[0]) is None:
+        return one
+    level = np.array([np.nan if r.impulse_n_s is None else r.impulse_n_s for r in one.recordings])
+    order = np.argsort(level)[: len(level) // 2]
+    if not (len(order) > 1 and np.isfinite(level).all() and level[order].max() < SOFTER * np.median(level)):
+        return one
+    lines = _lines_by(one, np.sort(order), band_hz)
+    return one if lines is None else replace(one, lines=unchained(lines, LINKS[0]) or lines)
+
+
+def _unclipped(one: Recorded, band_hz: tuple[float, float]) -> Recorded:
+    """Evidence with the lines of the strikes that stay below a limit, at all strikes; the same where there is no limit, or fewer than two stay below it."""
+    if one.signals is None or not (limit := limit_of([one.signals])):
+        return one
+    below = np.flatnonzero((np.abs(one.signals) > BELOW * limit).sum(axis=1) <= TOUCHES)
+    lines = _lines_by(one, below, band_hz) if 1 < len(below) < len(one.signals) else None
+    if lines is None:
+        return one
+    cut = np.setdiff1d(np.arange(len(one.signals)), below)
+    spread = lines.amplitude_sd.copy()
+    spread[cut] = np.maximum(spread, np.abs(lines.amplitude))[cut]  # what a limit has cut is no amplitude
+    return replace(one, lines=replace(lines, amplitude_sd=spread))
+
+
+def _lines_by(one: Recorded, strikes: Array, band_hz: tuple[float, float]) -> Lines | None:
+    """The lines of some strikes, by index, at all of them; None where those are too soft to tell."""
+    assert one.signals is not None
+    still = without_hum(one.signals, noise_rms(one.signals, one.sr), one.sr)
+    try:
+        some = joint_lines(still[strikes], one.sr, band_hz=band_hz, signed=one.lines.signed)
+        lines = lines_of(still, noise_rms(still, one.sr), some.pole, one.sr, some.signed)
+    except (AudioError, np.linalg.LinAlgError):
+        return None
+    return lines if len(lines.freq_hz) >= LEAST_LINES else None
+
+
+def _off_db(b: Baseline) -> float:
+    """How far its strikes are; ∞ where none can be compared: no way of fitting is nearer than another then."""
+    h = refitted(b.hypothesis, b.bodies)
+    found = comparable(b.takes, h)
+    return mean_db(found.takes, h) if isinstance(found, Compared) else np.inf
+
+
+def _of(case: Case, recorded: tuple[Recorded, ...], cache: Place, progress: Callable[[str], None] | None) -> Baseline:
+    found = fit_evidence(case, recorded, check_mesh=False, total=True, progress=progress)
+    bodies = struck_bodies(found, cache=cache, progress=progress) if found.objects else tuple(shapeless(found, g) for g in recorded)
+    bodies = with_elastic(found, tuple(separated(body) for body in bodies), cache=cache, progress=progress)
+    gain = found.fit.sigma if np.isfinite(found.fit.sigma) and found.fit.sigma > 0 else 1.0
+    base = Hypothesis(found.fit.alpha_per_s, found.fit.beta_s, gain, (), {b.name: b.correction for b in bodies})
+    bodies = settled(refitted(base, bodies), bodies)
+    return Baseline(found, bodies, replace(base, correction={b.name: b.correction for b in bodies}), takes_of(bodies))
+
+
+def takes_of(bodies: tuple[Struck, ...]) -> tuple[Take, ...]:
+    """The fitted strikes that have audio."""
+    takes: list[Take] = []
+    for body in bodies:
+        if body.recorded is None or body.recorded.signals is None:
+            continue
+        finite = [signal for signal in body.recorded.signals if np.isfinite(signal).all()]
+        floor = floor_between(finite) if finite else white(np.inf)  # over which nothing stands
+        takes += [Take(body, i, sample, body.recorded.sr, floor) for i, sample in zip(body.fitted, body.recorded.signals, strict=True)]
+    return tuple(takes)

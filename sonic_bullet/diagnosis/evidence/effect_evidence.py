@@ -1,0 +1,221 @@
+"""What effects propose from: fitted lines beside the hypothesis' own modes, and the sounds beside what it plays.
+
+    Struck + Lines + Hypothesis -> which modes each line stands for -> ObjectEvidence (effects.protocol), one per fitted object -> Evidence
+
+Strikes can be left out (their amplitudes and sounds), and lines: what an effect says must hold for those it never saw.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from sonic_bullet.diagnosis.evidence.amplitude_dependence import fallen
+from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, impact_of, in_band, modes_of, moves, pattern, play, start
+from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.effects.protocol import Dereverberates, Evidence, ObjectEvidence, RingsAlong, Sound, Stage
+from sonic_bullet.estimator.fit.pairing import DEGENERATE
+from sonic_bullet.estimator.fit.recorded import RecordedObject as Recorded
+from sonic_bullet.estimator.lines.joint_lines import Lines, noise_rms
+from sonic_bullet.records import Array, ModalModel
+
+REACH = 0.012  # of a line from its mode where effects have moved it
+LOSSY, TOGETHER = 0.06, 0.25  # price of (ln d)² of a line over its mode; ln d of modes that sound as one line
+OWN, ALIKE = 1e-4, 2.0  # of a frequency, beside its width; times its decay: a line so near a known residual voice is that voice's
+DIRECT_S = 0.008  # of the sound path: what comes later is an echo
+
+
+def evidence_of(h: Hypothesis, bodies: tuple[Struck, ...], band_hz: tuple[float, float], *, seed: int = 0) -> Evidence:
+    """All fitted objects' evidence under a hypothesis."""
+    observed = tuple(object_evidence(h, body) for body in bodies if body.recorded is not None)
+    return Evidence(observed, h.alpha_per_s, h.beta_s, h.gain, tuple(e.id for e in h.effects), band_hz, seed)
+
+
+def object_evidence(h: Hypothesis, body: Struck, *, sounds: bool = True, anew: bool = False) -> ObjectEvidence:
+    """One fitted object's. sounds: whether what it would sound like is wanted too, which takes longest. anew: lines paired as beside effects that move modes."""
+    recorded = body.recorded
+    assert recorded is not None
+    lines, model = recorded.lines, None
+    model, order = modes_of(h, body)
+    line, mode = paired(h, body, model, order, anew=anew)
+    mine = body.fitted[: len(lines.amplitude)]
+    rows = pattern(body, model)[mine]
+    push = rows * start(body.kind, model) * in_band(body, model)
+    direct = path_response(h, body, model.freq_hz, recorded.sr) if recorded.signals is not None else np.ones(model.mode_count)
+    pressed = np.stack([impact_of(h, body, i).spectrum(model.freq_hz) for i in mine])
+    spectrum = pressed * direct
+    expected = np.stack([(h.gain * push * spectrum)[:, m].sum(axis=1) for m in mode], axis=1) if mode else np.zeros((len(mine), 0), complex)
+    participation = np.stack([rows[:, m].sum(axis=1) for m in mode], axis=1) if mode else np.zeros((len(mine), 0))
+    uncorrected = replace(h, correction=None)
+    plain, plain_order = modes_of(uncorrected, body)
+    rank = {int(k): i for i, k in enumerate(plain_order)}
+    model_hz = np.array([np.mean([plain.freq_hz[rank[int(order[k])]] if int(order[k]) in rank else model.freq_hz[k] for k in m]) for m in mode])
+    gone = named(h, lines) & sounds  # else they are in the recordings, and neighbours
+    rest = np.setdiff1d(np.flatnonzero(~gone), line)
+    predicted = own = None
+    if sounds and recorded.signals is not None:
+        predicted, own = _played(h, body, mine, recorded.signals)
+    count = body.surface_count(model)
+    observed = ObjectEvidence(
+        impulse_n_s=body.impulse_n_s[mine],
+        freq_hz=lines.freq_hz[line],
+        decay_per_s=lines.decay_per_s[line],
+        freq_sd_hz=lines.freq_sd_hz[line],
+        decay_sd_per_s=lines.identified_sd_per_s[line],
+        amplitude=lines.amplitude[:, line],
+        amplitude_sd=lines.amplitude_sd[:, line],
+        mode=mode,
+        model_hz=model_hz,
+        expected_decay_per_s=np.array([model.decay_per_s[m].mean() for m in mode]),
+        expected=expected,
+        pattern=participation,
+        foreign_hz=lines.freq_hz[rest],
+        foreign_decay_per_s=lines.decay_per_s[rest],
+        foreign_amplitude=lines.amplitude[:, rest],
+        foreign_sd=lines.amplitude_sd[:, rest],
+        model=model if body.family is not None else None,
+        strike_vertex=count + np.array(mine, int),
+        strike_direction=body.direction[mine],
+        sensor_vertex=len(model.vertex_m) - 1,
+        sensor_direction=body.direction[-1],
+        signal=recorded.signals,
+        predicted=predicted,
+        own=own,
+        noise=noise_rms(recorded.signals, recorded.sr) if recorded.signals is not None else lines.noise,
+        sr=recorded.sr,
+        signed=lines.signed,
+        push=h.gain * push * spectrum,
+        pressed=np.abs(pressed),
+        all_hz=model.freq_hz,
+        plain=plain if body.family is not None else None,
+        strike=tuple(range(len(mine))),
+        source=recorded,
+        elastic=body.elastic,
+        poisson=None if moves(h) or plain.mode_count != body.model.mode_count else body.poisson,
+    )
+    return fallen(h, body, outside(h, observed))
+
+
+def _played(h: Hypothesis, body: Struck, strikes: list[int], signals: Array) -> tuple[Array, Array | None]:
+    """What strikes sound like (s, n), and the recordings without what rings beside the body, where the hypothesis knows of such."""
+
+    def played(one: Hypothesis) -> Array:
+        assert body.recorded is not None
+        return np.stack([play(one, body, i, signals.shape[1], body.recorded.sr) for i in strikes])
+
+    all_of_it, rest = played(h), tuple(e for e in h.effects if not isinstance(e, RingsAlong))
+    return all_of_it, None if len(rest) == len(h.effects) else signals - (all_of_it - played(replace(h, effects=rest)))
+
+
+def named(h: Hypothesis, lines: Lines) -> Array:
+    """Which lines (l,), one of each mode, are nearest to what the hypothesis knows to ring beside the body: no other effect sees these."""
+    voices = [np.array(e.lines(), float) for e in h.effects if isinstance(e, RingsAlong)]
+    freq, decay = np.concatenate(voices, axis=1) if voices else np.zeros((2, 0))
+    off, own = np.abs(lines.freq_hz[:, None] - freq), np.maximum(np.nan_to_num(lines.decay_per_s), 0.0)[:, None]
+    alike = (off < decay / (2 * np.pi) + OWN * freq) & (np.maximum(own, decay) <= ALIKE * np.minimum(own, decay))
+    off = np.where(alike, off, np.inf)
+    return np.asarray((alike & (off == off.min(axis=0, initial=np.inf))).any(axis=1))
+
+
+def outside(h: Hypothesis, observed: ObjectEvidence) -> ObjectEvidence:
+    """The evidence with its lines as they would be outside the room that the hypothesis has found."""
+    for effect in h.effects:
+        if isinstance(effect, Dereverberates):
+            observed = effect.dereverberated(observed)
+    return observed
+
+
+def paired(h: Hypothesis, body: Struck, model: ModalModel, order: Array, *, anew: bool = False) -> tuple[Array, tuple[Array, ...]]:
+    """Lines (p,) and the modes of ``model`` each stands for: as they were fitted, where no effect has moved the modes, else, or anew, by nearness and pattern."""
+    place = {int(k): i for i, k in enumerate(order)}
+    if not (anew or moves(h)):
+        line = np.unique(body.line[body.line >= 0])
+        mode = tuple(np.array(sorted(place[int(k)] for k in np.flatnonzero(body.line == one) if int(k) in place), int) for one in line)
+        good = [i for i, m in enumerate(mode) if len(m)]
+        return line[good], tuple(mode[i] for i in good)
+    assert body.recorded is not None
+    return _nearest(body, model, named(h, body.recorded.lines))
+
+
+def _nearest(body: Struck, model: ModalModel, known: Array) -> tuple[Array, tuple[Array, ...]]:
+    from scipy.optimize import linear_sum_assignment
+
+    assert body.recorded is not None
+    lines = body.recorded.lines
+    if not len(lines.freq_hz):
+        return np.zeros(0, int), ()
+    gap = np.log(lines.freq_hz)[:, None] - np.log(model.freq_hz)[None, :]
+    mine = body.fitted[: len(lines.amplitude)]
+    expected, observed = np.abs(pattern(body, model)[mine]), np.abs(lines.amplitude)
+    alike = (observed.T @ expected) / np.maximum(np.linalg.norm(observed, axis=0)[:, None] * np.linalg.norm(expected, axis=0)[None, :], 1e-300)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        worse = np.nan_to_num(np.log(lines.decay_per_s[:, None] / model.decay_per_s[None, :]), posinf=0.0, neginf=0.0)
+    price = np.minimum((gap / REACH) ** 2 + 0.5 * (1 - np.nan_to_num(alike)) + LOSSY * worse**2, 1.0) - 1.0
+    price[known] = 0.0
+    row, column = linear_sum_assignment(price)
+    good = price[row, column] < 0
+    row, column = row[good], column[good]
+    group = np.cumsum(np.diff(np.log(model.freq_hz), prepend=-np.inf) > DEGENERATE)  # degenerate modes that nothing has set apart are one line
+    taken, mode = set(column.tolist()), []
+    for c in column:
+        like = np.abs(np.log(np.maximum(model.decay_per_s, 1e-9) / max(float(model.decay_per_s[c]), 1e-9))) < TOGETHER
+        others = [int(k) for k in np.flatnonzero((group == group[c]) & like) if k == c or int(k) not in taken]
+        taken |= set(others)
+        mode.append(np.array(others))
+    return row, tuple(mode)
+
+
+def path_response(h: Hypothesis, body: Struck, freq_hz: Array, sr: int) -> Array:
+    """Complex response (f,) of the sound path's first milliseconds: its effects applied to a weak impulse less what they add to silence."""
+    effects = [e for e in h.at(Stage.SOUND, fitted=body.recorded is not None) if not isinstance(e, Dereverberates)]  # lines are dereverberated already
+    if not effects:
+        return np.ones(len(freq_hz), complex)
+    n = round(DIRECT_S * sr)
+    weak, silent = Sound(1e-6 * np.eye(1, n)[0], sr, 1.0), Sound(np.zeros(n), sr, 1.0)
+    for effect in effects:
+        weak, silent = effect.apply(weak), effect.apply(silent)
+    tap = (weak.sample - silent.sample) / 1e-6
+    return np.asarray(np.exp(-2j * np.pi * np.outer(freq_hz, np.arange(n)) / sr) @ tap)
+
+
+def thinned(evidence: Evidence, at: tuple[Recorded, int], keep: float, rng: np.random.Generator) -> Evidence:
+    """The same without one strike, at: whose, and which of those, and without a random part of all lines: ``keep`` of them stay.
+
+    An object of which nothing else was recorded is left out with it.
+    """
+    source, strike = at
+    rest = [h for h in evidence.observed if h.source is not source or len(h.impulse_n_s) > 1]
+    return replace(evidence, observed=tuple(_thin(h, strike if h.source is source else None, keep, rng) for h in rest))
+
+
+def _thin(h: ObjectEvidence, strike: int | None, keep: float, rng: np.random.Generator) -> ObjectEvidence:
+    s = np.array([i for i in range(len(h.impulse_n_s)) if i != strike], int)
+    k = np.sort(rng.permutation(len(h.freq_hz))[: max(3, round(keep * len(h.freq_hz)))]) if keep < 1 else np.arange(len(h.freq_hz))
+    k = k[k < len(h.freq_hz)]
+    return replace(
+        h,
+        impulse_n_s=h.impulse_n_s[s],
+        freq_hz=h.freq_hz[k],
+        decay_per_s=h.decay_per_s[k],
+        freq_sd_hz=h.freq_sd_hz[k],
+        decay_sd_per_s=h.decay_sd_per_s[k],
+        amplitude=h.amplitude[s][:, k],
+        amplitude_sd=h.amplitude_sd[s][:, k],
+        mode=tuple(h.mode[i] for i in k),
+        model_hz=h.model_hz[k],
+        expected_decay_per_s=h.expected_decay_per_s[k],
+        expected=h.expected[s][:, k],
+        pattern=h.pattern[s][:, k],
+        foreign_amplitude=h.foreign_amplitude[s],
+        foreign_sd=h.foreign_sd[s],
+        strike_vertex=h.strike_vertex[s],
+        strike_direction=h.strike_direction[s],
+        signal=h.signal[s] if h.signal is not None else None,
+        predicted=h.predicted[s] if h.predicted is not None else None,
+        own=h.own[s] if h.own is not None else None,
+        push=h.push[s],
+        pressed=h.pressed[s],
+        noise=h.noise[s] if len(h.noise) == len(h.impulse_n_s) else h.noise,
+        strike=tuple(h.strike[i] for i in s),
+    )

@@ -1,0 +1,123 @@
+"""What a mesh's errors make of the distance: how much of what nothing explains may be theirs.
+
+    modes moved at random as much as the others are off           -> what that adds                    (of_the_mesh)
+    lines of no mode, that have a mode's pattern and lie FAR from it at most, where waves are short:  the modes put there     -> what is left   (beyond)
+    modes FAR below the band's edge at most, of which nothing is recorded:                            the modes put outside   -> the same
+
+A correction is 1 % at most and part of the baseline; finite elements of a coarse mesh err by more in the upper modes, with h⁴ of quadratic ones [Hughes 2000, ch. 7].
+That is no effect and nothing that anybody would want named, so a verdict knows of it; what is played before and after does not.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from sonic_bullet.diagnosis.evidence.degenerate_pairs import LEAST_STRIKES, LIKE, like
+from sonic_bullet.diagnosis.evidence.refit import ROUGH, refitted
+from sonic_bullet.diagnosis.prediction.diagnosis_problem import DiagnosisProblem
+from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, modes_of, pattern, play
+from sonic_bullet.diagnosis.prediction.score import Comparable, Take, mean_db
+from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.estimator.fit.pairing import DEGENERATE
+from sonic_bullet.estimator.lines.log_spectral import with_noise
+from sonic_bullet.records import Array
+
+MESH = 1e-3  # of a frequency: what a good mesh gets wrong
+FAR = 0.03  # of a frequency: what a coarse one does, in modes of few elements a wavelength
+NEARER_DB = 0.05  # without a mode, that ought to be silent
+
+
+def beyond(h: Hypothesis, problem: DiagnosisProblem) -> tuple[Hypothesis, float]:
+    """The hypothesis with unmatched modes where lines of their pattern are, or outside the band; and how far the farthest was put, relative: 0 where none was."""
+    start, most = h, 0.0
+    mine = [b for b in problem.bodies if b.recorded is not None and b.family is not None and len(b.fitted) >= LEAST_STRIKES and b.name in (h.correction or {})]
+    for body in mine:
+        found, off = _put(h, body, (h.correction or {})[body.name])
+        if off:
+            h, most = replace(h, correction={**(h.correction or {}), body.name: found}), max(most, off)
+    h = refitted(h, problem.bodies) if most else h
+    for body in mine:
+        h, off = _outside(start, h, body, problem)
+        most = max(most, off)
+    return h, most
+
+
+def _outside(start: Hypothesis, h: Hypothesis, body: Struck, problem: DiagnosisProblem) -> tuple[Hypothesis, float]:
+    """The hypothesis with a body's modes near the band's upper edge outside it, one frequency after another from the top, where strikes are nearer so."""
+    model, order = modes_of(h, body)
+    old, most, top = (start.correction or {})[body.name], 0.0, body.band_hz[1]
+    group = np.cumsum(np.diff(np.log(model.freq_hz), prepend=-np.inf) > DEGENERATE)
+    free = (body.line[order] < 0) & (old[order] == (h.correction or {})[body.name][order])
+    near = free & (model.freq_hz <= top) & (model.freq_hz * (1 + FAR) > top)
+    if not near.any():
+        return h, most
+    now = problem.distance_db(h)
+    for g in np.unique(group[near])[::-1]:
+        who = np.flatnonzero((group == g) & near)
+        step = float(top / model.freq_hz[who].min() * (1 + MESH) - 1)
+        other = (h.correction or {})[body.name].copy()
+        other[order[who]] = (1 + other[order[who]]) * (1 + step) - 1
+        silent = replace(h, correction={**(h.correction or {}), body.name: other})
+        far = problem.distance_db(silent)
+        if far < now - NEARER_DB:
+            h, now, most = silent, far, max(most, step)
+    return h, most
+
+
+def _put(h: Hypothesis, body: Struck, correction: Array) -> tuple[Array, float]:
+    """Corrections (m,) of a body with such modes put to their lines, the loudest first, and the largest step."""
+    assert body.recorded is not None
+    lines, (model, order) = body.recorded.lines, modes_of(h, body)
+    observed = np.abs(lines.amplitude)
+    row = pattern(body, model)[body.fitted[: len(observed)]]
+    matched = body.line[order] >= 0
+    upper = np.median(model.freq_hz[matched]) if matched.any() else np.inf
+    group = np.cumsum(np.diff(np.log(model.freq_hz), prepend=-np.inf) > DEGENERATE)
+    found, most = correction.copy(), 0.0
+    for k in sorted(set(range(len(lines.freq_hz))) - set(body.line.tolist()), key=lambda k: -float(observed[:, k].max())):
+        if lines.freq_hz[k] < upper:
+            continue
+        near = np.unique(group[~matched & (np.abs(np.log(model.freq_hz / lines.freq_hz[k])) < FAR)])
+        members = [np.flatnonzero(group == g) for g in near]
+        alike = [like(lines.amplitude[:, k], row[:, who]) if not matched[who].any() else 0.0 for who in members]
+        if not alike or max(alike) < LIKE:
+            continue
+        who = members[int(np.argmax(alike))]
+        step = float(lines.freq_hz[k] / model.freq_hz[who].mean() - 1)
+        matched[who], most = True, max(most, abs(step))
+        found[order[who]] = (1 + found[order[who]]) * (1 + step) - 1
+    return found, most
+
+
+def of_the_mesh(h: Hypothesis, problem: DiagnosisProblem) -> float:
+    """What a mesh's errors would add to the distance, in dB: modes that no line could correct moved at random by as much as the others were
+    corrected, and every shape at the strikes by ROUGH of its strongest there."""
+    rng = np.random.default_rng([problem.seed, 5])
+    moved, other = dict(h.correction or {}), {}
+    for body in problem.bodies:
+        mine = moved.get(body.name)
+        if mine is None or body.recorded is None or len(mine) != len(body.line):
+            continue
+        paired = body.line >= 0
+        size = float(np.sqrt((mine[paired] ** 2).mean())) if paired.any() else 0.0
+        moved[body.name] = np.where(paired, mine, mine + max(size, MESH) * rng.standard_normal(len(mine)))
+        model = body.model if h.poisson is None or body.other is None else body.other(h.poisson)
+        other[body.name] = _roughened(replace(body, model=model, other=None), rng)
+    far = replace(h, correction=moved)
+    pairs = [(t, play(h, t.body, t.strike, len(t.sample), t.sr)) for t in problem.takes if isinstance(t, Take)]
+    if not pairs:
+        return 0.0  # lists of lines are held against frequencies alone, and corrected by them
+    twice = [replace(t, sample=with_noise(made, t.floor, 1000 + t.strike)) for t, made in pairs]
+    moved_db = mean_db(Comparable(tuple(replace(t, body=other.get(t.body.name, t.body)) for t in twice)), far)
+    return moved_db - mean_db(Comparable(tuple(twice)), h)
+
+
+def _roughened(body: Struck, rng: np.random.Generator) -> Struck:
+    """The body with shapes at its strikes off by ROUGH of each mode's strongest there."""
+    shape = body.model.shape.copy()
+    at = slice(body.surface_count(), len(shape) - 1)
+    most = np.abs(np.einsum("sxm,sx->sm", shape[at], body.direction[:-1])).max(axis=0)
+    shape[at] += (ROUGH * most * rng.standard_normal((body.strikes, 1, len(most))) * body.direction[:-1, :, None]).astype(np.float32)
+    return replace(body, model=replace(body.model, shape=shape))

@@ -1,0 +1,235 @@
+"""What the baseline's own numbers become once an effect is there: α, β, σ and the corrections, from the same lines.
+
+    d − Δd(effects) = ½(α + βλ)         (estimator.rayleigh)
+    |A_sk| = σ |J ψ F̂|                  least squares with Cauchy's weights, 2 % of a mode's strongest for the shapes' own error
+
+A correction is the mesh's error alone: a mode that an effect moves keeps only what is left of it, within 1 %.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from sonic_bullet.diagnosis.evidence.amplitude_dependence import TURNS_RAD, fallen, turns_rad
+from sonic_bullet.diagnosis.evidence.effect_evidence import object_evidence, outside, paired, path_response
+from sonic_bullet.diagnosis.evidence.small_amplitude import at_rest
+from sonic_bullet.diagnosis.evidence.unmatched_modes import CORRECTION, can_tell, sought
+from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, bends, modes_of, moves, pattern, play, undamped
+from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.effects.protocol import BaselineChange, ChangesBaseline, Dereverberates, Effect, Impact, ObjectEvidence, SplitsPairs, Stage
+from sonic_bullet.estimator.fit.pairing import DEGENERATE, MESHED
+from sonic_bullet.estimator.fit.rayleigh import rayleigh
+from sonic_bullet.estimator.lines.joint_lines import noise_rms
+from sonic_bullet.records import Array, ModalModel
+
+ROUGH = 0.02
+NEAR, ALIKE = 5e-3, 1.6  # of ln f and ln d: lines of one mode
+
+
+def refitted(h: Hypothesis, bodies: tuple[Struck, ...], observed: tuple[ObjectEvidence, ...] | None = None, *, anew: bool = False) -> Hypothesis:
+    """The hypothesis with α, β and σ fitted again beside its effects; ``observed``: evidence to fit them to, thinned or whole, of all bodies or some.
+
+    anew: with lines paired and corrections learnt again, too, as they are beside effects that move modes.
+    """
+    moved = anew or moves(h)
+    if moved:
+        h = corrected(h, bodies, anew=anew)
+    if observed is None or moved:
+        observed = tuple(
+            object_evidence(replace(h, effects=tuple(e for e in h.effects if e.stage is not Stage.SOUND)), b, sounds=False, anew=anew)
+            for b in bodies
+            if b.recorded is not None
+        )
+    observed = tuple(fallen(h, _whose(one, bodies), outside(h, one)) for one in observed)
+    h = _gained(_damped(h, bodies, observed), bodies, observed)
+    return at_rest(h, bodies, observed) if bends(h) else h
+
+
+def reidentified(h: Hypothesis, bodies: tuple[Struck, ...], observed: tuple[ObjectEvidence, ...] | None = None, *, fully: bool = False) -> Hypothesis:
+    """The hypothesis with a room's response identified again, beside all that has been found. observed: the strikes it is identified from; all where None. fully: to the end."""
+    fitted = [b for b in bodies if b.recorded is not None and b.recorded.signals is not None]  # lists of lines say nothing of a response
+    if observed is not None:
+        fitted = [b for b in fitted if any(one.source is b.recorded for one in observed)]
+    if not fitted:
+        return h
+    body = max(fitted, key=lambda b: len(np.unique(b.line[b.line >= 0])))  # most lines that are modes
+    for room in (e for e in h.effects if isinstance(e, Dereverberates)):
+        g = body.recorded
+        assert g is not None and g.signals is not None
+        mine = list(range(len(g.signals))) if observed is None else next(list(one.strike) for one in observed if one.source is g)
+        signal = g.signals[mine]
+        bare = replace(h, effects=tuple(e for e in h.effects if e is not room))
+        sound = np.stack([play(bare, body, body.fitted[i], signal.shape[1], g.sr) for i in mine])
+        again = room.identified_from(signal, sound, noise_rms(signal, g.sr), g.sr, fully=fully)
+        h = replace(h, effects=tuple(again if e is room else e for e in h.effects))
+    return h
+
+
+def baseline_changes(h: Hypothesis) -> list[BaselineChange]:
+    """What its effects have found of the baseline's own numbers, in their order."""
+    return [e.baseline_change() for e in h.effects if isinstance(e, ChangesBaseline)]
+
+
+def _whose(one: ObjectEvidence, bodies: tuple[Struck, ...]) -> Struck:
+    """The body that lines are of."""
+    return next(body for body in bodies if body.recorded is one.source)
+
+
+def with_effects(h: Hypothesis, effects: tuple[Effect, ...], bodies: tuple[Struck, ...]) -> Hypothesis:
+    """The hypothesis with other effects, not yet refitted; where none moves modes any more, or bends them otherwise, corrections are the baseline's again."""
+    made = replace(h, effects=effects)
+    return made if moves(made) or not (moves(h) or bends(h)) else replace(made, stretch=0.0, poisson=None, correction={b.name: b.correction for b in bodies})
+
+
+def corrected(h: Hypothesis, bodies: tuple[Struck, ...], *, anew: bool = False) -> Hypothesis:
+    """The hypothesis with E/ρ and corrections learnt on its own modes, from where its effects have found E/ρ and ν (``stretch``, ``poisson_ratio``). anew: see refitted."""
+    changes = baseline_changes(h)
+    known = [c.poisson_ratio for c in changes if c.poisson_ratio is not None]
+    h = replace(h, correction=None, stretch=float(sum(c.stretch for c in changes)), poisson=known[-1] if known else None)
+    for _ in range(3):
+        off = np.concatenate([_off(h, body, anew)[1] for body in bodies if body.recorded is not None] or [np.zeros(0)])
+        if len(off):
+            h = replace(h, stretch=h.stretch + float(np.median(off)))
+    found: dict[str, Array] = {}
+    for body in bodies:
+        if body.recorded is None:
+            continue
+        for e in (e for e in h.effects if isinstance(e, SplitsPairs)):  # lines of degenerate modes go to their own: half a split off, either would do
+            found[body.name] = np.clip(e.observed_correction(undamped(h, body).freq_hz * np.exp(h.stretch)), -CORRECTION, CORRECTION)
+        for _ in range(2):
+            place, off = _off(replace(h, correction=found), body, anew)
+            ratio = np.array(found.get(body.name, np.zeros(undamped(h, body).mode_count)), float)
+            step = np.zeros(len(ratio))
+            step[place] = np.expm1(off)
+            found[body.name] = np.clip((1 + ratio) * (1 + step) - 1, -CORRECTION, CORRECTION)
+            if not moves(h) or any(isinstance(e, SplitsPairs) for e in h.effects):
+                found[body.name] = _alike(undamped(h, body).freq_hz, found[body.name])
+        if can_tell(body):
+            now = replace(h, correction=found)
+            model, order = modes_of(now, body)
+            groups = [order[who] for who in paired(now, body, model, order, anew=anew)[1]]
+            lone = np.setdiff1d(np.arange(len(ratio)), np.concatenate([*groups, np.zeros(0, int)]))
+            shared = np.concatenate([*(g for g in groups if len(g) > 1), np.zeros(0, int)])
+            found[body.name] = sought(now, body, np.concatenate([lone, shared]), alone=np.isin(np.arange(len(ratio)), lone))
+    return replace(h, correction=found)
+
+
+def _alike(freq_hz: Array, correction: Array) -> Array:
+    """Corrections (m,), the mean of each run of modes that a mesh leaves side by side: what sets degenerate modes apart is an effect's, or they would change places."""
+    run = np.cumsum(np.diff(np.log(freq_hz), prepend=-np.inf) > DEGENERATE * MESHED)
+    return np.asarray((np.bincount(run, correction) / np.maximum(np.bincount(run), 1))[run])
+
+
+def _off(h: Hypothesis, body: Struck, anew: bool) -> tuple[Array, Array]:
+    """Uncorrected modes (p,) of a body and ln f of their lines over their own (p,)."""
+    assert body.recorded is not None
+    model, order = modes_of(h, body)
+    line, mode = paired(h, body, model, order, anew=anew)
+    place = np.concatenate([order[who] for who in mode]) if mode else np.zeros(0, int)
+    lines = body.recorded.lines.freq_hz
+    off = np.concatenate([np.full(len(who), np.log(lines[one] / model.freq_hz[who].mean())) for one, who in zip(line, mode, strict=True)] or [np.zeros(0)])
+    return place, off
+
+
+def _damped(h: Hypothesis, bodies: tuple[Struck, ...], observed: tuple[ObjectEvidence, ...]) -> Hypothesis:
+    """α and β beside the effects' own decay."""
+    if any(e.traits.replaces_rayleigh for e in h.effects):
+        return h
+    known = [(c.alpha_per_s, c.beta_s) for c in baseline_changes(h) if c.alpha_per_s is not None and c.beta_s is not None]
+    if known:
+        return replace(h, alpha_per_s=known[-1][0], beta_s=known[-1][1])
+    bare = replace(h, alpha_per_s=0.0, beta_s=0.0)
+    lam, left, sd, all_of_it = [], [], [], []
+    for one in observed:
+        if not len(one.freq_hz):
+            continue
+        model, _ = modes_of(bare, _whose(one, bodies))
+        extra = np.zeros(len(one.freq_hz))
+        if moves(h):  # ``one`` is of h itself, and its lines are paired anew
+            extra = np.maximum(one.expected_decay_per_s - (h.alpha_per_s + h.beta_s * one.omega**2) / 2, 0.0)
+        elif h.at(Stage.MODES):
+            extra = np.array([model.decay_per_s[who].mean() for who in _members(one, model)])
+        lam.append(one.omega**2)
+        left.append(np.maximum(one.decay_per_s - extra, 1e-3 * one.decay_per_s))
+        sd.append(np.hypot(one.decay_sd_per_s, 0.02 * extra))
+        all_of_it.append(one.decay_per_s)
+    if not lam:
+        return h
+    guess = (max(h.alpha_per_s, 1e-3), max(h.beta_s, 1e-12))
+    found = rayleigh(np.concatenate(lam), np.concatenate(left), np.concatenate(sd), guess, np.concatenate(all_of_it))
+    return replace(h, alpha_per_s=found.alpha_per_s, beta_s=found.beta_s)
+
+
+def _members(one: ObjectEvidence, model: ModalModel) -> list[Array]:
+    """The modes, by index, that each line stands for in a model whose modes have hardly moved: as many as before, about the one that is nearest."""
+    near = model.freq_hz[np.abs(np.subtract.outer(one.freq_hz, model.freq_hz)).argmin(axis=1)]
+    return [np.argsort(np.abs(model.freq_hz - f), kind="stable")[: len(who)] for f, who in zip(near, one.mode, strict=True)]
+
+
+def _participation(h: Hypothesis, body: Struck, one: ObjectEvidence) -> Array:
+    """Jψ (s, k) of the lines: the evidence's own, or, beside effects that leave modes where they were, as these have them sound."""
+    if moves(h) or not h.at(Stage.MODES):
+        return one.pattern
+    model, _ = modes_of(h, body)
+    row = pattern(body, model)[[body.fitted[i] for i in one.strike]]
+    return np.stack([row[:, who].sum(axis=1) for who in _members(one, model)], axis=1)
+
+
+def whole(one: ObjectEvidence) -> Array:
+    """Amplitudes (s, k) with those of lines so near that they may be the same mode, bent or split: at the onset they add up to what was struck."""
+    if one.dry or not len(one.foreign_hz) or not len(one.freq_hz):
+        return one.amplitude  # in a room what rings close by is mostly the room
+    gap = np.abs(np.log(one.foreign_hz[:, None] / one.freq_hz[None, :]))
+    alike = np.abs(np.log(np.maximum(one.foreign_decay_per_s[:, None], 1e-3) / np.maximum(one.decay_per_s, 1e-3))) < ALIKE  # clicks are no part of a mode
+    mine = (gap.argmin(axis=1)[:, None] == np.arange(len(one.freq_hz))) & (gap < NEAR) & alike
+    return np.asarray(one.amplitude + one.foreign_amplitude @ mine)
+
+
+def _middle(ratio: Array, weight: Array) -> float:
+    """Weighted median, no heavier than 100 to 1: where weights that fall off with the misfit may start from."""
+    order = np.argsort(ratio)
+    total = np.cumsum(np.clip(weight[order], weight.max() / 100, None))
+    return float(ratio[order][np.searchsorted(total, total[-1] / 2)])
+
+
+def _gained(h: Hypothesis, bodies: tuple[Struck, ...], observed: tuple[ObjectEvidence, ...]) -> Hypothesis:
+    """σ by the amplitudes, times what effects that hide them from the lines know better."""
+    louder = float(np.prod([c.onset_gain for c in baseline_changes(h)]))
+    modeled, seen, spread = [], [], []
+    for one in observed:
+        if not len(one.freq_hz) or one.signal is None:
+            continue
+        body = _whose(one, bodies)
+        direct = np.abs(path_response(h, body, one.freq_hz, one.sr))
+        factor = np.empty(one.pattern.shape)
+        for i, level in enumerate(one.impulse_n_s):
+            impact = Impact(float(level) if np.isfinite(level) else 1.0, np.zeros(1), np.ones(1))
+            for effect in h.at(Stage.FORCE):
+                impact = effect.apply(impact)
+            hits = np.abs((impact.share[:, None] * np.exp((one.decay_per_s - 2j * np.pi * one.freq_hz) * impact.delay_s[:, None])).sum(axis=0))
+            factor[i] = np.abs(impact.spectrum(one.freq_hz)) * direct * hits
+        expected = np.abs(_participation(h, body, one)) * factor
+        if bends(h) and not (dependent := turns_rad(h, body, one) > TURNS_RAD).all():
+            expected = np.where(dependent, np.nan, expected)  # of an amplitude-dependent mode a linear fit takes a part
+        modeled.append(expected.ravel())
+        seen.append(np.abs(whole(one)).ravel())
+        rough = np.broadcast_to(ROUGH * np.nan_to_num(expected).max(axis=0, keepdims=True), expected.shape)
+        spread.append(np.stack([one.amplitude_sd.ravel(), rough.ravel()]))
+    if not modeled:
+        return h
+    x, y, s = np.concatenate(modeled), np.concatenate(seen), np.concatenate(spread, axis=1)
+    good = np.isfinite(x) & np.isfinite(y) & np.isfinite(s).all(axis=0)
+    x, y, s = x[good], y[good], s[:, good]
+    if not (x > 0).any():
+        return h
+    if any(one.dry for one in observed):  # read through a room, a line is off by a factor of its own
+        usable = (x > 0) & (y > 0) & (s[0] > 0)
+        return replace(h, gain=_middle(y[usable] / x[usable], (y / np.maximum(s[0], 1e-300))[usable])) if usable.any() else h
+    gain, weight = _middle(y[x > 0] / x[x > 0], x[x > 0] / (s[0] + s[1])[x > 0]), np.ones(len(x))
+    for _ in range(30):
+        sd2 = (s[0] ** 2 + (gain * s[1]) ** 2) + 1e-300
+        gain = float((weight * x * y / sd2).sum() / max(float((weight * x**2 / sd2).sum()), 1e-300))
+        weight = 1 / (1 + ((y - gain * x) ** 2 / sd2) / 6.25)
+    return replace(h, gain=gain * louder) if gain > 0 and np.isfinite(gain) else h

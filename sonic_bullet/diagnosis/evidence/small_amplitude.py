@@ -1,0 +1,88 @@
+"""Where modes are at rest, beside an effect under which their frequency goes with their level.
+
+    line k of strike s, shifted to 0 Hz: recorded z(t), played z'(t)      δ_k -> argmax Σ_s |Σ_t w z z'* / |z z'| e^{−2πi δ t}|      f_k -> f_k + δ_k
+
+A linear fit puts such a mode where it is while it is loud, and the mesh's correction was learnt on that: beside the effect it would shift from the wrong end.
+Whether it hardens or softens, and how far, stays the effect's.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from sonic_bullet.diagnosis.evidence.amplitude_dependence import amplitude_dependent
+from sonic_bullet.diagnosis.evidence.effect_evidence import object_evidence
+from sonic_bullet.diagnosis.evidence.unmatched_modes import CORRECTION
+from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, modes_of, play, undamped
+from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.effects.common.envelope import Envelopes, alone, shifted
+from sonic_bullet.effects.protocol import ObjectEvidence
+from sonic_bullet.records import Array
+
+STEP = 0.1  # of 1/duration: steps of δ
+LEAST_FRAMES = 8  # frames
+HALFWAY = 0.5  # to the next mode
+AGREE = 0.5  # of all frames' worth, once shifted: what is played is what was recorded
+
+
+def at_rest(h: Hypothesis, bodies: tuple[Struck, ...], observed: tuple[ObjectEvidence, ...], *, every: bool = False) -> Hypothesis:
+    """The hypothesis with the corrections of amplitude-dependent modes learnt on what they ring down to, by the strikes in ``observed``. every: of all modes that stand alone."""
+    found = dict(h.correction or {})
+    for body in bodies:
+        mine = next((one for one in observed if body.recorded is not None and one.source is body.recorded), None)
+        if mine is not None and mine.signal is not None and not mine.dry:  # in a room no line is one mode's alone
+            found[body.name] = _rested(h, body, list(mine.strike), every)
+    return replace(h, correction=found)
+
+
+def _rested(h: Hypothesis, body: Struck, strikes: list[int], every: bool) -> Array:
+    """Corrections (m,) of a body."""
+    assert body.recorded is not None and body.recorded.signals is not None
+    count = undamped(h, body).mode_count
+    correction = np.array((h.correction or {}).get(body.name, np.zeros(count)), float)
+    one, (modes, order) = object_evidence(h, body, sounds=False), modes_of(h, body)
+    dependent = np.ones(len(one.freq_hz), bool) if every else amplitude_dependent(h, body, replace(one, strike=tuple(strikes)))
+    selected, window = alone(one)
+    kept = [q for q, k in enumerate(selected) if dependent[k] and len(one.mode[k]) == 1]  # degenerate modes shift each by its own level, and beat
+    if not kept or len(correction) != count:
+        return correction
+    selected, window = [selected[q] for q in kept], [window[q] for q in kept]
+    signal = body.recorded.signals[strikes]
+    played = np.stack([play(h, body, body.fitted[i], signal.shape[1], body.recorded.sr) for i in strikes])
+    rows = replace(one, noise=one.noise[strikes])
+    recorded, model = shifted(rows, signal, selected, window), shifted(rows, played, selected, window)
+    for q, k in enumerate(selected):
+        next_hz = np.abs(np.delete(modes.freq_hz, one.mode[k]) - modes.freq_hz[one.mode[k]]).min(initial=np.inf)  # or it would be taken for its neighbour
+        ratio = 1 + _off_hz(recorded, model, q, min(CORRECTION * float(one.freq_hz[k]), HALFWAY * float(next_hz))) / float(one.freq_hz[k])
+        who = order[one.mode[k]]
+        correction[who] = np.clip((1 + correction[who]) * ratio - 1, -CORRECTION, CORRECTION)
+    return correction
+
+
+def _off_hz(recorded: Envelopes, model: Envelopes, q: int, most_hz: float) -> float:
+    """δ of a line, in Hz."""
+    rows = []
+    for s in range(len(recorded.z)):
+        use = recorded.good[s, q] & (np.abs(model.z[s, q]) > 0)
+        if use.sum() < LEAST_FRAMES:
+            continue
+        both = recorded.z[s, q, use] * np.conj(model.z[s, q, use])
+        rows.append((recorded.time_s[q, use], recorded.worth(s, q)[use] * both / np.abs(both)))
+    if not rows:
+        return 0.0
+    longest = max(float(np.ptp(t)) for t, _ in rows)
+    frame = min(float(np.median(np.diff(t))) for t, _ in rows)
+    step, reach = STEP / longest, min(most_hz, 0.4 / frame)
+
+    def agree(delta: Array) -> Array:
+        return np.asarray(np.sum([np.abs(u @ np.exp(-2j * np.pi * np.outer(t, delta))) for t, u in rows], axis=0))
+
+    coarse = step * np.arange(-int(reach / step), int(reach / step) + 1)
+    score = agree(coarse)
+    best = int(score.argmax())
+    if best in (0, len(coarse) - 1) or score[best] < AGREE * sum(float(np.abs(u).sum()) for _, u in rows):
+        return 0.0  # its best is elsewhere, or nowhere
+    fine = coarse[best] + step * np.linspace(-1, 1, 41)
+    return float(fine[int(agree(fine).argmax())])

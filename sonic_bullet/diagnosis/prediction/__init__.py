@@ -1,0 +1,1 @@
+"""Hypothesis × body -> modes, impacts, ringing, sound, and how far that is from what was recorded."""

@@ -1,0 +1,98 @@
+"""One object under any elasticity: its tensor family (modal.tensor), struck and recorded as the case says.
+
+    C/ρ -> λ (m,), ∂ ln λ/∂(C_k/ρ), J ψ (s, m)      cheap, for a search
+        -> ModalModel, strikes and sensor last      as struck_bodies.modal_model makes them
+
+The family is computed, or fetched from the cache, when it is first asked for: most cases never ask.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+
+from sonic_bullet.diagnosis.prediction.struck_bodies import Struck, inward, modal_model
+from sonic_bullet.effects.protocol import Elastic
+from sonic_bullet.estimator.fit.case_fit import CaseFit
+from sonic_bullet.estimator.fit.recorded import guess_of
+from sonic_bullet.files.cases import Case, CaseRecording
+from sonic_bullet.modal import read_mesh
+from sonic_bullet.modal.cache import Place
+from sonic_bullet.modal.tensor import TensorFamily, tensor_family
+from sonic_bullet.records import Array, Material, ModalModel
+
+KEPT = 12  # solved tensors
+MODES = (30, 160)
+MORE = 1.6  # modes than the isotropic body has in the band: other tensors are softer somewhere
+
+
+def with_elastic(found: CaseFit, bodies: tuple[Struck, ...], *, cache: Place = "default", progress: Callable[[str], None] | None = None) -> tuple[Struck, ...]:
+    """The same bodies, those with a mesh able to be of any elasticity."""
+    made = []
+    for body in bodies:
+        if body.family is None:
+            made.append(body)
+            continue
+        density = guess_of(found.case.objects[body.name]).density_kg_m3
+        gamma, poisson = found.fit.gamma_m2_s2, found.fit.poisson_ratio
+        material = Material.isotropic("fitted", youngs_pa=gamma * density, poisson=poisson, density_kg_m3=density)
+        lines = len(body.recorded.lines.freq_hz) if body.recorded is not None else 0
+        count = max(int(MORE * body.model.mode_count), round(1.2 * lines) + 8)
+        made.append(replace(body, elastic=elastic_of(found.case, body.name, body.recordings, material, count, cache=cache, say=progress or (lambda _: None))))
+    return tuple(made)
+
+
+def elastic_of(
+    case: Case, name: str, recordings: tuple[CaseRecording, ...], material: Material, count: int, *, cache: Place = "default", say: Callable[[str], None]
+) -> Elastic:
+    """An object's. material: isotropic, as fitted; count: of modes wanted. Raises nothing now; SonicBulletError when first asked."""
+    thing = case.objects[name]
+
+    @lru_cache(maxsize=1)
+    def family() -> TensorFamily:
+        return tensor_family(
+            read_mesh(thing.mesh or "", thing.scale),
+            poisson=guess_of(thing).poisson,
+            count=int(np.clip(count, *MODES)),
+            fixed=thing.fixed,
+            cache=cache,
+            progress=say,
+        )
+
+    @lru_cache(maxsize=1)
+    def rows() -> tuple[Array, Array | None]:
+        """J φ·e of the strikes (s, 3b → b) and the sensor's row (b,), None where it has no place."""
+        body = family().body
+        strike = np.full((len(recordings), body.skin.shape[2]), np.nan)
+        for i, r in enumerate(recordings):
+            if r.position_m is not None:
+                direction = np.array(r.direction, float) if r.direction is not None else inward(body, r.position_m)
+                strike[i] = body.points(np.array([r.position_m]), direction[None])[0][0] * (1.0 if r.impulse_n_s is None else r.impulse_n_s)
+        at, along = (None if spots is None else spots.get(name) for spots in (case.sensor_m, case.sensor_direction))
+        if case.sensor != "velocity" or at is None:
+            return strike, None
+        direction = np.array(along, float) if along is not None else -inward(body, at)
+        return strike, body.points(np.array([at]), direction[None])[0][0]
+
+    def look(stiffness_m2_s2: Array) -> tuple[Array, Callable[[Array], Array], Array]:
+        value, vector = family().modes(stiffness_m2_s2)
+        strike, sensor = rows()
+        push = strike @ vector if np.isfinite(strike).any() else np.full((len(strike), len(value)), np.nan)
+        observed = push * (sensor @ vector if sensor is not None else 1.0)
+        return np.sqrt(value) / (2 * np.pi), lambda mode: family().slopes(vector[:, mode], value[mode]), observed
+
+    @lru_cache(maxsize=KEPT)
+    def solved(content: bytes) -> ModalModel:
+        value, vector = family().modes(np.frombuffer(content).reshape(6, 6))
+        low = np.sqrt(value) / (2 * np.pi) < 1.02 * case.band_hz[1]
+        return modal_model(case, name, recordings, family().body, material.density_kg_m3, value[low], vector[:, low])[0]
+
+    return Elastic(
+        material,
+        case.onset_s is not None and case.sensor in ("velocity", "sum"),
+        look,
+        lambda stiffness: solved(np.ascontiguousarray(stiffness, float).tobytes()),
+    )

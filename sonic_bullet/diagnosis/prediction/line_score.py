@@ -1,0 +1,109 @@
+"""Lines in place of recordings: how far the modes of a hypothesis are from a list of measured frequencies and decays.
+
+    D = 20 lg(1 + rms min(|ln f_k/f_j|, CAP)/MESH), its mean with 8.7 rms |ln d_k/d_j| where decays are known       in dB
+
+Lines and modes are paired at the least price. Every fourth line is left out in turn: what was learnt of the others must hold for it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, modes_of
+from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.estimator.lines.line_values import lines_at
+from sonic_bullet.records import Array
+
+FOLDS = 4
+CAP = 0.03
+MESH = 1e-3  # of a frequency: what a good mesh gets wrong
+DB = 20 / np.log(10)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Listed:
+    """Some lines (k,) of a body, by index, to be held against what a hypothesis says; the others are there to learn from."""
+
+    body: Struck
+    line: Array
+
+    @property
+    def name(self) -> str:
+        """Whose lines they are."""
+        return f"the list of lines of {self.body.name}"
+
+    def hindrance(self, h: Hypothesis) -> str:
+        """Why they have no distance from a hypothesis; empty where they have one."""
+        assert self.body.recorded is not None
+        count = len(self.body.recorded.lines.freq_hz)
+        return "" if count >= 2 * FOLDS else f"holds {count}, and {2 * FOLDS} are needed to leave some out in turn"
+
+    def distance(self, h: Hypothesis) -> float:
+        """D in dB."""
+        assert self.body.recorded is not None
+        lines = self.body.recorded.lines
+        return distance_db(*off_by(h, self.body, lines.freq_hz[self.line], lines.decay_per_s[self.line]))
+
+    def least(self, h: Hypothesis) -> float:
+        """D of the lines' own spreads."""
+        assert self.body.recorded is not None
+        lines = self.body.recorded.lines
+        sd, decay = np.nan_to_num(lines.freq_sd_hz[self.line]) / lines.freq_hz[self.line], lines.decay_per_s[self.line]
+        return distance_db(sd, np.where(np.isfinite(decay), np.nan_to_num(lines.decay_sd_per_s[self.line]) / np.maximum(decay, 1e-9), np.nan))
+
+    def rest(self, bodies: tuple[Struck, ...], h: Hypothesis) -> tuple[tuple[Struck, ...], Hypothesis]:
+        """Bodies without these lines, and the hypothesis without what it learnt of them."""
+        mine = _without(self.body, self.line)
+        correction = dict(h.correction or {})
+        old = correction.get(self.body.name)
+        if old is not None and len(old) == len(mine.line):
+            correction[self.body.name] = np.where(mine.line >= 0, old, 0.0)
+        return tuple(mine if b is self.body else b for b in bodies), replace(h, correction=correction)
+
+
+def listed(bodies: tuple[Struck, ...]) -> tuple[Listed, ...]:
+    """Every body's lines in turns; too few to leave some out as they are (`Listed.hindrance`)."""
+    made = []
+    for body in (b for b in bodies if b.recorded is not None):
+        count = len(body.recorded.lines.freq_hz) if body.recorded is not None else 0
+        made += [Listed(body, np.arange(i, count, FOLDS)) for i in range(FOLDS if count >= 2 * FOLDS else 1)]
+    return tuple(made)
+
+
+def off_by(h: Hypothesis, body: Struck, freq_hz: Array, decay_per_s: Array) -> tuple[Array, Array]:
+    """|ln f/f_j| (k,), at most CAP, of lines and the modes that fit them best, and |ln d/d_j|, NaN where unknown or unpaired."""
+    from scipy.optimize import linear_sum_assignment
+
+    model, _ = modes_of(h, body)
+    gap = np.minimum(np.abs(np.log(freq_hz)[:, None] - np.log(np.maximum(model.freq_hz, 1e-9))[None, :]), CAP)
+    row, column = linear_sum_assignment(gap)
+    off, lost = np.full(len(freq_hz), CAP), np.full(len(freq_hz), np.nan)
+    off[row] = gap[row, column]
+    near = off[row] < CAP
+    row, column = row[near], column[near]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        lost[row] = np.abs(np.log(decay_per_s[row] / model.decay_per_s[column]))
+    return off, np.where(np.isfinite(lost), lost, np.nan)
+
+
+def distance_db(off: Array, lost: Array) -> float:
+    """D of the two."""
+    if not len(off):
+        return float("nan")
+    found = [20 * np.log10(1 + np.sqrt((off**2).mean()) / MESH)]
+    if np.isfinite(lost).any():
+        found.append(DB * np.sqrt(np.nanmean(np.minimum(lost, 3.0) ** 2)))
+    return float(np.mean(found))
+
+
+def _without(body: Struck, line: Array) -> Struck:
+    assert body.recorded is not None
+    keep = np.setdiff1d(np.arange(len(body.recorded.lines.freq_hz)), line)
+    place = np.full(len(body.recorded.lines.freq_hz) + 1, -1)
+    place[keep] = np.arange(len(keep))
+    mine = place[body.line]
+    return replace(
+        body, recorded=replace(body.recorded, lines=lines_at(body.recorded.lines, keep)), line=mine, correction=np.where(mine >= 0, body.correction, 0.0)
+    )

@@ -1,0 +1,36 @@
+"""The psychoacoustic distance: how much louder or softer each band is, in sone, as an ear would have it.
+
+    Σ over bands |N'_recorded − N'_played|, mean over frames in which the recording is audible       [N': estimator.loudness, ISO 226; bands: Bark]
+
+Full scale stands for FULL_SCALE dB SPL: recordings have no level of their own.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, play
+from sonic_bullet.diagnosis.prediction.score import Comparable, Take
+from sonic_bullet.estimator.lines.log_spectral import with_noise
+from sonic_bullet.estimator.perceptual.image import image
+from sonic_bullet.records.errors import RecordError
+
+FULL_SCALE = 90.0
+LEVELS = 2
+OBSERVED = 0.05  # sone
+
+
+def sone_distance(takes: Comparable, h: Hypothesis) -> float | None:
+    """Mean over takes; None where none is audible."""
+    found = []
+    for take in (t for t in takes if isinstance(t, Take)):
+        made = with_noise(play(h, take.body, take.strike, len(take.sample), take.sr), take.floor, take.strike)
+        try:
+            a, b = (image(x, take.sr, 0.0, FULL_SCALE, levels=LEVELS, bark_step=1.0) for x in (take.sample, made))
+        except RecordError:
+            continue
+        for one, two in zip(a.levels, b.levels, strict=False):
+            observed = one.loud.sum(axis=1) > OBSERVED
+            if observed.any():
+                found.append(float(np.abs(one.loud - two.loud).sum(axis=1)[observed].mean()))
+    return float(np.mean(found)) if found else None

@@ -1,0 +1,166 @@
+"""How far what is played is from what was recorded, over the noise that all recordings of a case share.
+
+D(recorded, played + noise), D of two noisy takes of what is played                       (estimator.lines.log_spectral)
+
+comparable(takes, h) is the one door: what has no distance stays outside, by name and with its reason, and what is let in has one from any hypothesis, a plain float:
+
+    neither stands above the noise   -> EDGE_DB, what noise makes of a sound that just stands above it
+    what is played is not finite     -> ∞, farther than whatever can be played
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NewType, Protocol
+
+import numpy as np
+
+from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, play
+from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.estimator.fit.recorded import RecordedObject as Recorded
+from sonic_bullet.estimator.lines.log_spectral import ABOVE, WINDOWS, Floor, log_spectral_db, noise_floor_db, with_noise
+from sonic_bullet.records import Array
+
+EDGE_DB = float(20 / np.log(10) / np.sqrt(ABOVE))  # rms of two noisy takes of a cell with power over noise ABOVE: each is off by 20/ln 10/√(2 ABOVE)
+
+
+class Judged(Protocol):
+    """Something measured that a hypothesis is held against, in dB."""
+
+    @property
+    def name(self) -> str:
+        """What a person would call it."""
+        ...
+
+    def hindrance(self, h: Hypothesis) -> str:
+        """Why it has no distance from the hypothesis; empty where it has one."""
+        ...
+
+    def distance(self, h: Hypothesis) -> float:
+        """How far the hypothesis is from it; ∞ where that plays nothing finite."""
+        ...
+
+    def least(self, h: Hypothesis) -> float:
+        """How far it would be from itself, measured again."""
+        ...
+
+
+Comparable = NewType("Comparable", tuple[Judged, ...])  # one or more without a hindrance; `comparable` alone makes it
+
+
+@dataclass(frozen=True, slots=True)
+class LeftOut:
+    """Something measured that could not be compared, and why."""
+
+    name: str
+    why: str
+
+    def __str__(self) -> str:
+        return f"{self.name} {self.why}"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Compared:
+    """What a hypothesis can be held against, and what could not be compared."""
+
+    takes: Comparable
+    left_out: tuple[LeftOut, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Incomparable:
+    """Nothing can be compared, and why: empty where nothing was measured."""
+
+    left_out: tuple[LeftOut, ...]
+
+
+def comparable(takes: Sequence[Judged], h: Hypothesis) -> Compared | Incomparable:
+    """Which of the takes have a distance from the hypothesis, and from any other that is held against the same recordings."""
+    why = [take.hindrance(h) for take in takes]
+    out = tuple(LeftOut(take.name, reason) for take, reason in zip(takes, why, strict=True) if reason)
+    kept = tuple(take for take, reason in zip(takes, why, strict=True) if not reason)
+    return Compared(Comparable(kept), out) if kept else Incomparable(out)
+
+
+@dataclass(frozen=True, slots=True)
+class Score:
+    """How far a hypothesis is from what it was held against, and how far it would be from itself, measured again: both in dB, means over the strikes.
+
+    There is one only where there is something comparable; else `comparable` says `Incomparable`.
+    """
+
+    distance_db: float
+    floor_db: float
+
+    @property
+    def gap_db(self) -> float:
+        """What is open: distance over noise alone."""
+        return self.distance_db - self.floor_db
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Take:
+    """A recorded strike: which of which body, its samples (n,) from the onset on, and the case's noise."""
+
+    body: Struck
+    strike: int
+    sample: Array
+    sr: int
+    floor: Floor
+
+    @property
+    def place(self) -> tuple[Recorded, int]:
+        """Where it is in the evidence: among whose strikes, and which of those. Raises ValueError where it was not fitted."""
+        if self.body.recorded is None:
+            raise ValueError(f"{self.body.name} was not fitted")
+        return self.body.recorded, self.body.fitted.index(self.strike)
+
+    @property
+    def name(self) -> str:
+        """Its file's name, or its body's and its number."""
+        file = self.body.recordings[self.strike].file
+        return file.name if file is not None else f"{self.body.name}, strike {self.strike + 1}"
+
+    def hindrance(self, h: Hypothesis) -> str:
+        """Why it has no distance from the hypothesis; empty where it has one."""
+        if wrong := int((~np.isfinite(self.sample)).sum()):
+            return f"holds {wrong} samples that are no numbers"
+        if len(self.sample) < min(WINDOWS):
+            return f"holds {len(self.sample)} samples after the onset, and {min(WINDOWS)} are needed"
+        made = play(h, self.body, self.strike, len(self.sample), self.sr)
+        if not np.isfinite(made).all():
+            return "is played by the model with samples that are no numbers"
+        if not np.isfinite(self._apart(made)):
+            return f"does not stand {10 * np.log10(ABOVE):.0f} dB above the noise anywhere, nor does what the model plays of it"
+        return ""
+
+    def distance(self, h: Hypothesis) -> float:
+        """D in dB of the recording and what the hypothesis plays; see the module's head."""
+        return self.apart_db(play(h, self.body, self.strike, len(self.sample), self.sr))
+
+    def apart_db(self, made: Array) -> float:
+        """D in dB of the recording and whatever is played in its place (n,)."""
+        return _stated(self._apart(made)) if np.isfinite(made).all() else np.inf
+
+    def _apart(self, made: Array) -> float:
+        return log_spectral_db(self.sample, with_noise(made, self.floor, self.strike), self.floor)
+
+    def least(self, h: Hypothesis) -> float:
+        """D of two noisy takes of what the hypothesis plays."""
+        return _stated(noise_floor_db(play(h, self.body, self.strike, len(self.sample), self.sr), self.floor))
+
+
+def _stated(db: float) -> float:
+    """A distance of finite sounds; EDGE_DB where neither stands above the noise, and no cell tells."""
+    return EDGE_DB if np.isnan(db) else db
+
+
+def mean_db(takes: Comparable, h: Hypothesis) -> float:
+    """Mean distance over takes."""
+    return float(np.mean([take.distance(h) for take in takes]))
+
+
+def least_db(takes: Comparable, h: Hypothesis) -> float:
+    """Mean noise floor of the distance over takes."""
+    return float(np.mean([take.least(h) for take in takes]))

@@ -1,0 +1,205 @@
+"""Objects as the diagnosis strikes them: the mesh's own modes at the fitted material, at the strikes and the sensor.
+
+    Family at (γ, ν) -> λ (m,), shapes on the skin and at every strike and the sensor, as last "vertices" of one ModalModel
+
+An effect on the modes then changes strikes and sensor along with the body. A sensor without a place (microphone, plain sum) is a last vertex
+whose x component is each mode's weight. Without a mesh the modes are the lines themselves, places as loud as they were recorded.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from sonic_bullet.effects.protocol import Elastic, Poisson
+from sonic_bullet.estimator.fit.case_fit import POISSON_SD, CaseFit, ObjectFit
+from sonic_bullet.estimator.fit.radiation_share import into_air
+from sonic_bullet.estimator.fit.recorded import RecordedObject as Recorded
+from sonic_bullet.estimator.fit.recorded import body_family, guess_of
+from sonic_bullet.files.cases import Case, CaseRecording
+from sonic_bullet.modal.cache import Place
+from sonic_bullet.modal.reduced import Family
+from sonic_bullet.records import Array, ModalModel
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Struck:
+    """One object and all its strikes. model: undamped, uncorrected; its last s + 1 vertices are the strikes and the sensor.
+
+    direction (s + 1, 3): directions there, zero for a strike of unknown place. impulse_n_s (s,): NaN where unknown. kind: `Case.sensor`.
+    family: for another elasticity, None without a mesh. correction (m,): relative, of each mode's frequency, learnt on its fitted strikes, else 0.
+    line (m,): the fitted line a mode was paired with, or -1. recorded: its fitted lines and sounds, None for an object nobody fitted.
+    elastic: for tensors, see elastic_bodies.py. band_hz: nothing outside it is recorded, though its modes are in the model: a mesh may have put them there.
+    other: ν -> the model there, of as many modes. poisson: the same, cheap, for a search.
+    """
+
+    name: str
+    recordings: tuple[CaseRecording, ...]
+    model: ModalModel
+    direction: Array
+    impulse_n_s: Array
+    kind: str
+    family: Family | None
+    correction: Array
+    line: Array
+    recorded: Recorded | None
+    elastic: Elastic | None = None
+    band_hz: tuple[float, float] = (0.0, float("inf"))
+    other: Callable[[float], ModalModel] | None = None
+    poisson: Poisson | None = None
+
+    @property
+    def strikes(self) -> int:
+        return len(self.recordings)
+
+    @property
+    def fitted(self) -> list[int]:
+        """Which of the recordings its lines and sounds belong to, in their order: those of the split 'fit' that could be read."""
+        observed = self.recorded.recordings if self.recorded is not None else ()
+        return [i for one in observed for i, r in enumerate(self.recordings) if r is one or r == one]
+
+    def surface_count(self, model: ModalModel | None = None) -> int:
+        """How many of the vertices of its model, or of its model under another elasticity, are the body's."""
+        return len((model or self.model).vertex_m) - self.strikes - 1
+
+
+def struck_bodies(found: CaseFit, *, cache: Place = "default", progress: Callable[[str], None] | None = None) -> tuple[Struck, ...]:
+    """Every object of the case, fitted ones first. Raises SonicBulletError."""
+    case = found.case
+    say = progress or (lambda _: None)
+    by_name = {o.evidence.thing.name: o for o in found.objects}
+    made = [_fitted(found, o) for o in found.objects]
+    for name in dict.fromkeys(r.object for r in case.recordings):
+        if name in by_name or not case.objects:
+            continue
+        thing = case.objects[name]
+        guess = guess_of(thing)
+        if thing.mesh is None or not found.objects:
+            continue
+        family = body_family(case, thing, guess, cache, say)
+        made.append(_placed(found, name, family, guess.density_kg_m3, None))
+    return tuple(made)
+
+
+def _fitted(found: CaseFit, o: ObjectFit) -> Struck:
+    assert o.evidence.family is not None
+    return _placed(found, o.evidence.thing.name, o.evidence.family, o.evidence.guess.density_kg_m3, o)
+
+
+def _placed(found: CaseFit, name: str, family: Family, density: float, o: ObjectFit | None) -> Struck:
+    case = found.case
+    mine = tuple(r for r in case.recordings if r.object == name)
+    value, vector = family.modes(found.fit.gamma_m2_s2, found.fit.poisson_ratio)
+    keep = np.flatnonzero(np.sqrt(value) / (2 * np.pi) < 1.02 * case.band_hz[1])
+    value, vector = value[keep], vector[:, keep]
+    correction, line = np.zeros(len(keep)), np.full(len(keep), -1)
+    if o is not None:
+        for ratio, at, who in zip(o.correction, o.line, o.member, strict=True):
+            inside = who[who < len(keep)]
+            line[inside] = at
+            if at >= 0:  # modes that one line stands for are one frequency, whatever the mesh made of them
+                member = np.sqrt(value[inside])
+                correction[inside] = (1 + ratio) * np.exp(np.log(member).mean()) / member - 1
+    model, direction = modal_model(case, name, mine, family, density, value, vector)
+    impulse = np.array([np.nan if r.impulse_n_s is None else r.impulse_n_s for r in mine])
+
+    def lowest(poisson: float) -> tuple[Array, Array]:
+        lam, turned = family.modes(found.fit.gamma_m2_s2, poisson)
+        return lam[: len(keep)], turned[:, : len(keep)]
+
+    @lru_cache(maxsize=2)
+    def other(poisson: float) -> ModalModel:
+        return modal_model(case, name, mine, family, density, *lowest(poisson))[0]
+
+    def sums(poisson: float) -> tuple[Array, Array]:
+        lam, turned = lowest(poisson)
+        return np.sqrt(lam) / (2 * np.pi), vector.T @ turned
+
+    nu = Poisson(found.fit.poisson_ratio, guess_of(case.objects[name]).poisson, POISSON_SD, sums)
+    recorded = o.evidence if o is not None else None
+    return Struck(name, mine, model, direction, impulse, case.sensor, family, correction, line, recorded, band_hz=case.band_hz, other=other, poisson=nu)
+
+
+def modal_model(
+    case: Case, name: str, recordings: tuple[CaseRecording, ...], family: Family, density: float, value: Array, vector: Array
+) -> tuple[ModalModel, Array]:
+    """The undamped model of modes (b, m) with λ (m,), strikes and sensor as last vertices, and the directions there (s + 1, 3). Raises MeshError."""
+    scale = np.sqrt(density * family.length_m**3)
+    axes = np.eye(3)
+    extra, direction, place = [], [], []
+    at, normal = (None if spots is None else spots.get(name) for spots in (case.sensor_m, case.sensor_direction))
+    wanted = [(r.position_m, r.direction) for r in recordings] + ([(at, normal)] if case.sensor == "velocity" else [])
+    for position, along in wanted:
+        if position is None:
+            extra.append(np.zeros((3, len(value))))
+            direction.append(np.zeros(3))
+            place.append(np.zeros(3))
+            continue
+        rows, _ = family.points(np.tile(position, (3, 1)), axes)
+        extra.append(rows @ vector / scale)
+        direction.append(np.array(along, float) if along is not None else inward(family, position))
+        place.append(np.array(position, float))
+    freq = np.sqrt(value) / (2 * np.pi)
+    if case.sensor != "velocity":
+        weight = into_air(family, density, freq, vector)[0] if case.sensor == "pressure" else np.ones(len(freq))
+        extra.append(np.stack([weight, 0 * weight, 0 * weight]))
+        direction.append(axes[0])
+        place.append(family.vertex_m.mean(axis=0))
+    skin = np.einsum("vxb,bm->vxm", family.skin, vector.astype(np.float32)) / np.float32(scale)
+    flat = np.zeros(len(family.face))
+    mass = family.volume_m3 * density
+    model = ModalModel(
+        freq,
+        np.zeros(len(freq)),
+        np.concatenate([skin, np.array(extra, np.float32)]),
+        np.concatenate([family.vertex_m, np.array(place)]),
+        family.face,
+        flat,
+        family.volume_m3,
+        mass,
+        note=family.note,
+    )
+    return model, np.array(direction)
+
+
+def inward(family: Family, position: tuple[float, float, float]) -> Array:
+    """Unit vector (3,) into the body at a surface point."""
+    from sonic_bullet.geometry import outward_normals
+    from sonic_bullet.geometry.nearest_point import closest_point
+
+    face, _, _ = closest_point(family.vertex_m, family.face, np.array([position]))
+    return -np.asarray(outward_normals(family.vertex_m, family.face[face])[0])
+
+
+def shapeless(found: CaseFit, recorded: Recorded) -> Struck:
+    """An object without a mesh: its lines are its modes. Strikes at one place, or at unknown places, share the amplitudes per N·s (rms over them); each other place has its own.
+
+    What goes with the place is then nobody's to explain; a strike at a place that no fitted one was at is played as the rms over all.
+    """
+    lines = recorded.lines
+    mine = tuple(r for r in found.case.recordings if r.object == recorded.thing.name)
+    impulse = np.array([np.nan if r.impulse_n_s is None else r.impulse_n_s for r in mine])
+    weight = amplitude_per_impulse(recorded)
+    shape = np.zeros((len(mine) + 1, 3, len(lines.freq_hz)), np.float32)
+    shape[:, 0] = 1.0
+    shape[-1, 0] = weight
+    for place in {(r.position_m, r.direction) for r in recorded.recordings if r.position_m is not None}:
+        here = np.array([(r.position_m, r.direction) == place for r in recorded.recordings])
+        own = amplitude_per_impulse(recorded, here) * np.where(np.nansum(lines.amplitude[here].real, axis=0) < 0, -1, 1)
+        shape[[i for i, r in enumerate(mine) if (r.position_m, r.direction) == place], 0] = np.nan_to_num(own / np.maximum(weight, 1e-300))
+    direction = np.tile([1.0, 0, 0], (len(mine) + 1, 1))
+    undamped = np.hypot(2 * np.pi * lines.freq_hz, np.nan_to_num(lines.decay_per_s)) / (2 * np.pi)
+    order = np.argsort(undamped)
+    empty = np.zeros((0, 3))
+    model = ModalModel(undamped[order], np.zeros(len(order)), shape[:, :, order], np.zeros((len(shape), 3)), empty, np.zeros(0), 0.0, 0.0, note="no mesh")
+    return Struck(recorded.thing.name, mine, model, direction, impulse, "lines", None, np.zeros(len(order)), order, recorded)
+
+
+def amplitude_per_impulse(recorded: Recorded, of: Array | None = None) -> Array:
+    """Rms over the strikes, or over some (s,), of |A|/J (k,); J = 1 where it is not known."""
+    some = np.ones(len(recorded.recordings), bool) if of is None else of
+    level = np.array([r.impulse_n_s or 1.0 for r in recorded.recordings])[some]
+    return np.asarray(np.sqrt(np.nanmean(np.abs(recorded.lines.amplitude[some] / level[:, None]) ** 2, axis=0)))

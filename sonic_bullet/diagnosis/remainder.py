@@ -1,0 +1,122 @@
+"""What no candidate effect accounts for, in words by which a person can name it: when, where in frequency, how it goes with strength and place.
+
+e = |recorded − played|² in third octaves and thirds of the time, over the recording's own; slopes against ln J; lines that are no mode, or none that a linear body has (coherent_residual.py)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, play
+from sonic_bullet.diagnosis.prediction.score import LeftOut, Take
+from sonic_bullet.diagnosis.selection.band_levels import in_words
+from sonic_bullet.diagnosis.selection.coherent_residual import of_no_body
+from sonic_bullet.diagnosis.selection.stepwise import Closed, NothingCompared
+from sonic_bullet.diagnosis.selection.thresholds import RULES
+from sonic_bullet.effects.room.shifted_echo import copied
+from sonic_bullet.records import Array
+
+WINDOW = 1024
+SHOWN = 4
+NOTHING = "nothing could be compared"
+
+
+def remainder(end: Closed | NothingCompared, takes: Sequence[Take]) -> dict[str, Any]:
+    """Of the last hypothesis; empty where the verdict leaves nothing open or there is no audio."""
+    if isinstance(end, NothingCompared):
+        return {"left_db": None, "words": f"{NOTHING}: {listing(end.left_out) or 'nothing was measured'}"}
+    judged = {(t.body.name, t.strike) for t in end.judged if isinstance(t, Take)}
+    takes = [t for t in takes if (t.body.name, t.strike) in judged]
+    if end.verdict != "unexplained" or not takes:
+        return {}
+    share, band_hz, level = _shares(takes, end.after)
+    whole = share.mean(axis=0)  # (t, f)
+    order = np.argsort(-np.nan_to_num(whole.mean(axis=0)))[:SHOWN]
+    bands = [{"from_hz": float(band_hz[i]), "to_hz": float(band_hz[i + 1]), "share_of_energy_left": float(np.nanmean(whole[:, i]))} for i in sorted(order)]
+    when = [float(np.nanmean(row)) for row in whole]
+    total = np.nanmean(share, axis=(1, 2))
+    slope = _slope(np.log(level), np.log(np.maximum(total, 1e-9))) if np.ptp(np.log(level)) > 0.3 and len(total) > 2 else None
+    scatter = float(np.std(np.log(np.maximum(total, 1e-9))))
+    thirds = ["first", "second", "last"]
+    words = in_words(end.bands) + "; " if end.bands else ""
+    words += f"most of it in the {thirds[int(np.nanargmax(when))]} third of the recordings, around " + ", ".join(
+        f"{b['from_hz']:.0f} to {b['to_hz']:.0f} Hz" for b in bands[:2]
+    )
+    if slope is not None:
+        words += (
+            "; its share grows with the strike"
+            if slope > 0.3
+            else "; its share falls with the strike"
+            if slope < -0.3
+            else "; its share does not depend on the strike's strength"
+        )
+    if len(total) > 1:
+        words += "; it differs from place to place" if scatter > 0.5 else "; it is alike wherever the body is struck"
+    strange = of_no_body(end.after, takes)
+    if strange > RULES.no_body_share:
+        words += "; modes of one frequency, decay and phase each, whatever they are, do not play it: something goes with time or level, or is noise"
+    again = _again(takes)
+    if again is not None:
+        words += f"; many lines are heard again at {again:.4f} times their frequency, as loud against the first in every strike: an echo of something that moves does that"
+    return {
+        "left_db": end.after_db - end.floor_db,
+        "words": words,
+        "bands": bands,
+        "bands_off": [asdict(band) for band in end.bands],
+        "when": dict(zip(thirds, when, strict=True)),
+        "slope_against_impulse": slope,
+        "scatter_over_strikes": scatter,
+        "share_of_no_modes": strange,
+        "lines_again_at_ratio": again,
+    }
+
+
+def listing(left_out: Sequence[LeftOut]) -> str:
+    """The first SHOWN of what could not be compared, each with its reason."""
+    said = "; ".join(map(str, left_out[:SHOWN]))
+    return f"{said}; and {len(left_out) - SHOWN} more" if len(left_out) > SHOWN else said
+
+
+def _again(takes: Sequence[Take]) -> float | None:
+    """The ratio of frequencies at which a body's lines come again, if they do."""
+    recorded = [g for body in {id(t.body): t.body for t in takes}.values() if (g := body.recorded) is not None]
+    return next((r for g in recorded if (r := copied(g.lines.freq_hz, g.lines.decay_per_s, g.lines.amplitude)) is not None), None)
+
+
+def _shares(takes: Sequence[Take], h: Hypothesis) -> tuple[Array, Array, Array]:
+    """Energy left over the recording's (s, 3, f), band edges (f + 1,) in Hz, impulses (s,)."""
+    sr = takes[0].sr
+    edges = 1000 * 2.0 ** (np.arange(-17, 14) / 3)
+    edges = edges[edges < 0.5 * sr]
+    rows, level = [], []
+    shape = np.hanning(WINDOW)
+    for take in takes:
+        if take.sr != sr or len(take.sample) < 6 * WINDOW:
+            continue
+        made = play(h, take.body, take.strike, len(take.sample), take.sr)
+        bins = np.searchsorted(edges, np.fft.rfftfreq(WINDOW, 1 / sr)) - 1
+        table = []
+        for x in (take.sample - made, take.sample):
+            frames = np.lib.stride_tricks.sliding_window_view(x, WINDOW)[:: WINDOW // 2]
+            power = np.abs(np.fft.rfft(frames * shape, axis=1)) ** 2
+            thirds = [part.sum(axis=0) for part in np.array_split(power, 3)]
+            table.append([[row[bins == i].sum() for i in range(len(edges) - 1)] for row in thirds])
+        left, own = np.array(table)
+        noise = take.floor.at(WINDOW // 2 + 1) * (shape**2).sum() * (len(frames) / 3)
+        floor = np.array([noise[bins == i].sum() for i in range(len(edges) - 1)])
+        clear = own > 4 * floor
+        rows.append(np.where(clear, np.maximum(left - floor, 0) / np.maximum(own, 1e-300), 0.0))
+        j = take.body.impulse_n_s[take.strike]
+        level.append(float(j) if np.isfinite(j) else 1.0)
+    if not rows:
+        return np.zeros((1, 3, len(edges) - 1)), edges, np.ones(1)
+    return np.array(rows), edges, np.array(level)
+
+
+def _slope(x: Array, y: Array) -> float:
+    x = x - x.mean()
+    return float((x * (y - y.mean())).sum() / max(float((x * x).sum()), 1e-300))

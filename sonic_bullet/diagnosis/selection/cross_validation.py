@@ -1,0 +1,194 @@
+"""Candidate effects under cross-validation: each fitted without one strike and a part of the lines, judged on that strike; control effects alike.
+
+    for every strike s:  evidence − s − some lines (none, where an effect has numbers of single lines) -> propose -> refit α, β, σ -> D(s)    against the same without the effect
+    control effect: as many numbers, spent on directions drawn at random in the modes' decays and levels, fitted to the same evidence
+
+Leaving out lines matters: decays and shapes belong to the body, so every strike shows them, and a pattern fitted to them by chance would pass.
+Corrections of frequencies, and the axes of amplitude-dependent pairs, only mend what a mesh leaves to chance: all fitted strikes determine those, once, and the control has no numbers
+for them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of, thinned
+from sonic_bullet.diagnosis.evidence.refit import refitted, reidentified
+from sonic_bullet.diagnosis.evidence.small_amplitude import at_rest
+from sonic_bullet.diagnosis.prediction.diagnosis_problem import DiagnosisProblem
+from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, bends, mixes_neighbours, moves
+from sonic_bullet.diagnosis.prediction.line_score import Listed
+from sonic_bullet.diagnosis.prediction.score import Judged, Take
+from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.diagnosis.selection.acceptance import Candidate, accepted, jackknife, may_be_accepted, mean
+from sonic_bullet.diagnosis.selection.control_effect import ControlEffect
+from sonic_bullet.diagnosis.selection.decay_test import likelier, tells
+from sonic_bullet.diagnosis.selection.thresholds import RULES
+from sonic_bullet.effects.protocol import Cost, Dereverberates, Effect, Evidence, RotatesPairs, Stage
+from sonic_bullet.parallel import parallel_map
+
+
+def cross_validated(h: Hypothesis, problem: DiagnosisProblem, evidence: Evidence, *, costly: bool = True) -> list[Candidate]:
+    """Every candidate of the problem that the whole evidence suggests, cross-validated; best first. costly: whether those that take long are asked, and that search once enough_effects have been found."""
+    found: list[Candidate] = []
+    if len(problem.takes) < 2:
+        return found  # nothing can be left out
+    folds = _folds(h, problem, evidence)
+    if not folds:
+        return found
+    observed = any(isinstance(take, Take) for take in problem.takes)  # else no lines are left out
+    whole_lines = cache(lambda: _folds(h, problem, evidence, keep=1.0) if observed else folds)
+    anew = cache(lambda: refitted(h, problem.bodies, anew=True) if observed else h)
+    fair = cache(lambda by_line: _learnt_anew(anew(), whole_lines() if by_line else folds))
+    still = cache(lambda by_line: _at_rest_folds(whole_lines() if by_line else folds))
+    gap = mean([f.before - f.noise for f in folds])
+    idle = not costly and len(evidence.found) >= RULES.enough_effects
+    dry = any(one.dry for one in evidence.observed)
+    kinds = [kind for kind in problem.effects if kind.id not in evidence.found and not (idle and kind.traits.cost is Cost.SEARCHES)]
+    for group in _groups(kinds, late=dry and costly):
+        if any(isinstance(c.effect, Dereverberates) and accepted(c, gap, first=not evidence.found) for c in found):
+            break  # what others say of lines that a room has made is hearsay: in the next round they are dereverberated
+        if dry and mixes_neighbours(group[0]) and len(kinds) > len(group) and any(c.effect.stage is Stage.MATERIAL for c in found):
+            continue  # lines that were paired with another material's modes tell little of what mixes these
+        if group[0].traits.cost is Cost.COSTLY and (not costly or any(c.mean_db > RULES.cheap_share * gap for c in found)):
+            continue  # something cheap says most of it: what is left may ask for more in the next round
+        if group[0].traits.cost is Cost.COSTLY:
+            problem.say(f"searching for {group[0].id}")
+        proposed = _proposed(group, evidence)
+        for kind in group:
+            if (whole := proposed[kind]) is None:
+                continue
+            problem.say(f"trying {kind.id}")
+            alone = replace(h, effects=(whole,))
+            by_line = kind.traits.by_line
+            plain = whole_lines() if by_line else folds
+            known = fair(by_line) if moves(alone) and not moves(h) else still(by_line) if bends(alone) and not bends(h) else plain
+            found.append(_cross_validated(kind, whole, h, problem.bodies, evidence, known))
+    return sorted(found, key=lambda c: -c.whole_db)
+
+
+def _proposed(group: list[type[Effect]], evidence: Evidence) -> dict[type[Effect], Effect | None]:
+    """What each makes of the evidence; one that searches side by side would only do so in turn beside others."""
+    rest = [kind for kind in group if kind.traits.cost is not Cost.SEARCHES]
+    return {kind: kind.propose(evidence) for kind in group if kind not in rest} | dict(
+        zip(rest, parallel_map(lambda kind: kind.propose(evidence), rest), strict=True)
+    )
+
+
+def _groups(kinds: list[type[Effect]], *, late: bool) -> list[list[type[Effect]]]:
+    """Rooms, whose echoes would mislead the others; what is cheap; and what takes long, one by one; then those that come last."""
+    rooms: list[type[Effect]] = [k for k in kinds if issubclass(k, Dereverberates)]
+    last = [k for k in kinds if late and mixes_neighbours(k)]
+    dear = [k for k in kinds if k not in rooms + last and k.traits.cost is Cost.COSTLY]
+    plain = [k for k in kinds if k not in rooms + last + dear]
+    alone: list[list[type[Effect]]] = [[k] for k in (*dear, *last)]
+    return [group for group in (rooms, plain, *alone) if group]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Fold:
+    """What is left to learn from once ``take`` is left out: bodies, evidence, the hypothesis refitted to it, and its distance to the take.
+
+    least: the same distance, or a lesser one that corrections alone come to where they are learnt again. noise: what noise alone makes.
+    """
+
+    take: Judged
+    bodies: tuple[Struck, ...]
+    evidence: Evidence
+    base: Hypothesis
+    before: float
+    least: float
+    noise: float
+
+
+def _folds(h: Hypothesis, problem: DiagnosisProblem, evidence: Evidence, *, keep: float = RULES.kept_lines_share) -> list[Fold]:
+    """Without one strike each, and with a part of the lines, keep of them: all for an effect with numbers of single lines, which other lines do not determine and other strikes do."""
+    rng = np.random.default_rng([problem.seed, 1])
+    made = []
+    for take in problem.takes:
+        if isinstance(take, Listed):
+            mine, start = take.rest(problem.bodies, h)
+            less = evidence_of(start, mine, evidence.band_hz, seed=problem.seed)
+            base = refitted(start, mine)
+        elif isinstance(take, Take):
+            mine, less = problem.bodies, thinned(evidence, take.place, keep, rng)
+            base = refitted(h, problem.bodies, less.observed)
+        before = take.distance(base)
+        if np.isfinite(before):  # of the others alone a model may come that cannot be played
+            made.append(Fold(take, mine, less, base, before, before, take.least(base)))
+    return made
+
+
+def _learnt_anew(every: Hypothesis, folds: list[Fold]) -> list[Fold]:
+    """Folds that know what is gained by corrections alone, learnt again as they are beside whatever moves modes: that is no effect's gain. every: by all strikes."""
+
+    def least(f: Fold) -> float:
+        again = refitted(f.base, f.bodies, anew=True) if isinstance(f.take, Listed) else every
+        return min(f.before, f.take.distance(again))
+
+    return [replace(f, least=least(f)) for f in folds]
+
+
+def _at_rest_folds(folds: list[Fold]) -> list[Fold]:
+    """Folds that know what is gained by corrections alone, learnt from what modes ring down to as they are beside whatever makes them depend on amplitude."""
+    return [
+        replace(f, least=min(f.before, f.take.distance(at_rest(f.base, f.bodies, f.evidence.observed, every=True)))) if isinstance(f.take, Take) else f
+        for f in folds
+    ]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Gain:
+    """On one left-out strike, of an effect fitted without it, if any came of that: as Candidate has them; control_db (n,): of every draw."""
+
+    effect: Effect | None = None
+    drop_db: float = 0.0
+    whole_db: float = 0.0
+    control_db: tuple[float, ...] = ()
+    lines: float = 0.0
+
+
+def _cross_validated(kind: type[Effect], whole: Effect, h: Hypothesis, bodies: tuple[Struck, ...], evidence: Evidence, folds: list[Fold]) -> Candidate:
+    def judged(i: int) -> Gain:
+        fold = folds[i]
+        less = fold.evidence
+        effect = kind.propose(replace(less, known=whole, on_trial=True))
+        if effect is None:
+            return Gain()
+        free = effect.freedom() - (effect.angles() if isinstance(effect, RotatesPairs) else 0)  # such axes are whole's (Evidence.on_trial)
+        random = [ControlEffect.fitted(less, min(free, RULES.control_numbers), 10 * i + draw) for draw in range(RULES.control_draws)]
+        augmented = _augmented(fold, effect)
+        after = fold.take.distance(augmented)
+        chance = tuple(fold.before - fold.take.distance(_augmented(fold, none)) for none in random if none is not None)
+        lines = likelier(fold.base, augmented, evidence, less, bodies) if isinstance(fold.take, Take) and tells(h, effect) else 0.0
+        return Gain(effect, fold.least - after, fold.before - after, chance, lines)
+
+    found = parallel_map(judged, range(min(RULES.first_strikes, len(folds))))
+    asked = Candidate(kind.id, whole, h, np.array([g.drop_db for g in found]), 0.0, 0.0, {}, impulse_n_s=_levels(folds))
+    if may_be_accepted(asked, np.array([f.least - f.noise for f in folds]), mean([f.before - f.noise for f in folds])) or tells(
+        h, whole
+    ):  # lines may speak for what strikes do not
+        found += parallel_map(judged, range(len(found), len(folds)))
+    added = refitted(replace(h, effects=(*h.effects, whole)), bodies, evidence.observed)
+    drop, whole_db, control_db = np.array([g.drop_db for g in found]), mean([g.whole_db for g in found]), mean([x for g in found for x in g.control_db])
+    lines = mean([g.lines for g in found]) / (1 - RULES.kept_lines_share)  # each line is left out in so many of the folds
+    level = _levels(folds[: len(found)])
+    return Candidate(kind.id, whole, added, drop, whole_db, control_db, jackknife([g.effect.parameters() for g in found if g.effect is not None]), lines, level)
+
+
+def _levels(folds: Sequence[Fold]) -> np.ndarray[Any, Any]:
+    return np.array([f.take.body.impulse_n_s[f.take.strike] if isinstance(f.take, Take) else np.nan for f in folds])
+
+
+def _augmented(fold: Fold, effect: Effect) -> Hypothesis:
+    """A fold's hypothesis with one more effect, fitted to what it may learn from."""
+    h = replace(fold.base, effects=(*fold.base.effects, effect))
+    if isinstance(fold.take, Listed):
+        return refitted(h, fold.bodies)
+    fitted = refitted(h, fold.bodies, fold.evidence.observed)
+    return reidentified(fitted, fold.bodies, fold.evidence.observed) if isinstance(effect, Dereverberates) else fitted

@@ -1,0 +1,69 @@
+"""What lines' decays say of candidate effects where strikes say nothing: beside a room those left out, and of two that strikes cannot tell apart all of them.
+
+    2 Δ ln L = Σ_k ρ(z_k without) − ρ(z_k with),   z_k = ln(d_k / d of its modes) / spread,   ρ Cauchy's, over the lines that a fold had left out, each counted once
+
+A room's response has a tap for every sample. Identified from the strikes, it takes up what a law of damping does to every line, on strikes that it never saw as well: a line is as narrow as what a
+response can bend. But lines are dereverberated, each by its own baseband (effects/common/reverberant_tail.py), before there is any response; a law fitted to three lines in four must hold for the fourth.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, modes_of, moves_itself
+from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.diagnosis.selection.thresholds import RULES
+from sonic_bullet.effects.protocol import Dereverberates, Effect, Evidence, ObjectEvidence, Stage
+from sonic_bullet.records import Array
+
+
+def of_decays(h: Hypothesis, effect: Effect) -> bool:
+    """Whether it changes decays, and leaves modes where they are."""
+    return effect.stage is Stage.MODES and not moves_itself(h, effect)
+
+
+def numbers(effect: Effect) -> int:
+    """How many more a model has with an effect than without: a law in Rayleigh's place takes α and β away."""
+    return effect.freedom() - 2 * effect.traits.replaces_rayleigh
+
+
+def tells(h: Hypothesis, effect: Effect) -> bool:
+    """Whether lines are asked instead of strikes: of what changes decays, beside a room."""
+    return any(isinstance(e, Dereverberates) for e in h.effects) and of_decays(h, effect)
+
+
+def misfit(h: Hypothesis, effect: Effect, evidence: Evidence, bodies: tuple[Struck, ...]) -> float:
+    """Twice −ln likelihood of all lines' decays by a model with this effect, and its numbers at ln n each [Schwarz 1978]."""
+    total, count = 0.0, 0
+    for one in evidence.observed:
+        body = next(b for b in bodies if b.recorded is one.source)
+        good = _has_decay(one)
+        total += float(_cost(modes_of(h, body)[0].decay_per_s, one.mode, one.decay_per_s, one.decay_sd_per_s)[good].sum())
+        count += int(good.sum())
+    return total + numbers(effect) * float(np.log(max(count, 1)))
+
+
+def _has_decay(one: ObjectEvidence) -> Array:
+    """Which lines (k,) have a decay."""
+    return np.asarray(np.isfinite(one.decay_per_s) & (one.decay_per_s > 0) & ~np.isposinf(one.decay_sd_per_s))
+
+
+def likelier(without: Hypothesis, augmented: Hypothesis, every: Evidence, training: Evidence, bodies: tuple[Struck, ...]) -> float:
+    """Twice the gain in ln likelihood of the decays that are in ``every`` and not in ``training``, from which both hypotheses were fitted."""
+    total = 0.0
+    for one in every.observed:
+        seen = next((h.freq_hz for h in training.observed if h.source is one.source), one.freq_hz[:0])
+        out = ~np.isin(one.freq_hz, seen) & _has_decay(one)
+        body = next(b for b in bodies if b.recorded is one.source)
+        cost = [_cost(modes_of(h, body)[0].decay_per_s, one.mode, one.decay_per_s, one.decay_sd_per_s)[out].sum() for h in (without, augmented)]
+        total += float(cost[0] - cost[1])
+    return total
+
+
+def _cost(model_per_s: Array, mode: tuple[Array, ...], decay_per_s: Array, sd_per_s: Array) -> Array:
+    """ρ (k,) of lines' decays (k,) against those of the modes (m,) each stands for."""
+    model = np.array([model_per_s[m].mean() for m in mode])
+    sd = np.hypot(np.nan_to_num(sd_per_s / decay_per_s, nan=0.05, posinf=1e3), RULES.decay_scatter)
+    with np.errstate(divide="ignore"):
+        z = np.log(decay_per_s / np.maximum(model, 1e-9)) / sd
+    return np.asarray(RULES.cauchy_width**2 * np.log1p((z / RULES.cauchy_width) ** 2))

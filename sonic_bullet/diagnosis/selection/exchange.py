@@ -1,0 +1,161 @@
+"""Several effects at once: their numbers fitted to each other, and effects that came first though another, beside the rest, explains more.
+
+    e_i -> propose(evidence of the model without e_i, known = e_i), in turns                       (backfitting [Buja, Hastie & Tibshirani 1989])
+    exchange: for each added effect, what was accepted in the same round and was passed over stands in its place; both are judged on strikes left out
+
+A round adds what says most of the whole gap alone, and a filter may take up what a pulse and a tilt of level do together; beside the other effect it no longer does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of, thinned
+from sonic_bullet.diagnosis.evidence.refit import refitted, with_effects
+from sonic_bullet.diagnosis.prediction.diagnosis_problem import DiagnosisProblem
+from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, moves
+from sonic_bullet.diagnosis.prediction.score import Judged, Take
+from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.diagnosis.selection.acceptance import Candidate
+from sonic_bullet.diagnosis.selection.decay_test import misfit, of_decays
+from sonic_bullet.diagnosis.selection.phase_test import misfit as phases
+from sonic_bullet.diagnosis.selection.thresholds import RULES
+from sonic_bullet.effects.protocol import Alternatives, Dereverberates, Effect, Evidence
+from sonic_bullet.parallel import parallel_map
+from sonic_bullet.records import Array
+
+TURNS = 2
+
+Less = Callable[[Evidence], Evidence]
+
+
+def rivals(found: Sequence[Candidate], best: Candidate) -> tuple[Candidate, ...]:
+    """Of a round's accepted candidates, those that the best may stand before by chance, or by what else the model lacks."""
+    return tuple(c for c in found if c is not best and c.mean_db > RULES.rival_share * best.mean_db)
+
+
+def together(h: Hypothesis, problem: DiagnosisProblem, *, turns: int = TURNS, less: Less = lambda e: e) -> Hypothesis:
+    """The hypothesis, each effect fitted again beside the others. less: the part of the evidence to fit to."""
+    for _ in range(turns):
+        for i in range(len(h.effects)):
+            h = again(h, i, problem, less=less)
+    return h
+
+
+def again(h: Hypothesis, i: int, problem: DiagnosisProblem, *, less: Less = lambda e: e, afresh: bool = False) -> Hypothesis:
+    """The hypothesis, its i-th effect fitted again beside the others, or looked for anew."""
+    effect, before, after = h.effects[i], h.effects[:i], h.effects[i + 1 :]
+    rest = refitted(with_effects(h, (*before, *after), problem.bodies), problem.bodies)
+    evidence = less(evidence_of(rest, problem.bodies, problem.band_hz))
+    found = type(effect).propose(evidence if afresh else replace(evidence, known=effect))
+    return refitted(replace(rest, effects=(*before, found or effect, *after)), problem.bodies, evidence.observed)
+
+
+def starts(h: Hypothesis, problem: DiagnosisProblem) -> list[Hypothesis]:
+    """The hypothesis, and with each effect's choices that no step from one to the other leads to, where it knows of such (``others``).
+
+    Beside those the rest is looked for anew: what one takes up, another had taken.
+    """
+    found = [h]
+    for i, effect in enumerate(h.effects):
+        for other in effect.others() if isinstance(effect, Alternatives) else ():
+            start = replace(h, effects=(*h.effects[:i], other, *h.effects[i + 1 :]))
+            for j in range(len(h.effects)):
+                start = again(start, j, problem, afresh=True) if j != i else start
+            found.append(start)
+    return found
+
+
+def settled(h: Hypothesis, problem: DiagnosisProblem) -> Hypothesis:
+    """The best of `together` from all starts by the fitted strikes; as many numbers each."""
+    ends = parallel_map(lambda start: together(start, problem), starts(h, problem))
+    return min(ends, key=problem.distance_db)
+
+
+def chosen(h: Hypothesis, problem: DiagnosisProblem) -> Hypothesis:
+    """The hypothesis, settled where that is nearer to the fitted strikes."""
+    if not problem.has_audio:
+        return h
+    best = settled(h, problem)
+    return best if problem.distance_db(best) <= problem.distance_db(h) else h
+
+
+def left_out_db(h: Hypothesis, i: int, problem: DiagnosisProblem) -> Array:
+    """Distance (s,) of every strike from what is fitted to the others: the i-th effect, the rest as all strikes have it, for one effect as for the other.
+
+    No lines are left out here: each has been held against chance already, and of two effects that need as many numbers neither gains by it.
+    """
+
+    def without(take: Judged) -> Less:
+        assert isinstance(take, Take)
+        place = take.place
+        return lambda evidence: thinned(evidence, place, 1.0, np.random.default_rng(0))
+
+    return np.array(parallel_map(lambda take: take.distance(again(h, i, problem, less=without(take))), problem.takes))
+
+
+def exchanged(
+    h: Hypothesis,
+    added: list[Candidate],
+    passed: Sequence[Sequence[Candidate]],
+    problem: DiagnosisProblem,
+) -> tuple[Hypothesis, list[Candidate]]:
+    """The effects fitted to each other, and each left for a rival of its round (passed) with which strikes left out are significantly nearer."""
+    if not problem.has_audio:
+        return h, added
+    names = {c.id for c in added}
+    best = chosen(h, problem)
+    for i in range(len(added)):
+        far: Array | None = None
+        for rival in (c for c in passed[i] if c.id not in names):
+            own = added[i]
+            problem.say(f"trying {rival.id} in place of {own.id}")
+            effects = tuple(rival.effect if e.id == own.id else e for e in best.effects)
+            place = next(k for k, e in enumerate(effects) if e.id == rival.id)
+            other = again(refitted(with_effects(best, effects, problem.bodies), problem.bodies), place, problem)
+            if problem.distance_db(other) > problem.distance_db(best) + RULES.far_rival_db:
+                continue  # it would have to gain by strikes it never saw
+            other = settled(other, problem)
+            far = left_out_db(best, place, problem) if far is None else far
+            now = left_out_db(other, place, problem)
+            gain = far - now
+            if (
+                significant(gain, RULES.alike_share * rival.mean_db)
+                and not (np.nanmean(gain) < RULES.phases_decide_share * rival.mean_db and phases_against(best, other, problem.bodies))
+                and not decays_against(other.effects[place], best, other, place, problem)
+            ):
+                best, far, names = other, now, names - {own.id} | {rival.id}
+                added = [*added[:i], rival, *added[i + 1 :]]
+    return best, [replace(c, effect=next(e for e in best.effects if e.id == c.id)) for c in added]
+
+
+def decays_against(rival: Effect, best: Hypothesis, other: Hypothesis, i: int, problem: DiagnosisProblem) -> bool:
+    """Whether, of two that change nothing but decays, the lines' own decays speak for the one that is there: strikes hardly tell such two."""
+    own = best.effects[i]
+    if not (of_decays(best, own) and of_decays(other, rival)):
+        return False
+    evidence = evidence_of(best, problem.bodies, problem.band_hz)
+    return misfit(other, rival, evidence, problem.bodies) > misfit(best, own, evidence, problem.bodies)
+
+
+def phases_against(best: Hypothesis, other: Hypothesis, bodies: tuple[Struck, ...]) -> bool:
+    """Whether the lines' phases (phase_test.py) speak for the effect that is there: of two that strikes hardly tell apart, both must.
+
+    Phases are held against lines as they were fitted; of several hits they say nothing, and beside a room lines are others.
+    """
+    dry = [any(isinstance(e, Dereverberates) for e in h.effects) for h in (best, other)]
+    if moves(best) or moves(other) or dry[0] != dry[1]:
+        return False
+    mine, its = phases(best, bodies), phases(other, bodies)
+    return bool(np.isfinite([mine, its]).all() and its > mine + RULES.hint_of_phases)
+
+
+def significant(gain_db: Array, least_db: float) -> bool:
+    """Whether strikes agree that there is a gain (s,), and more than least_db."""
+    if len(gain_db) < 2 or gain_db.mean() <= least_db:
+        return False
+    none_loses = len(gain_db) >= RULES.many_strikes and gain_db.min() > -RULES.loss_share * gain_db.mean()
+    return bool(none_loses or gain_db.mean() > RULES.standard_errors * gain_db.std(ddof=1) / np.sqrt(len(gain_db)))

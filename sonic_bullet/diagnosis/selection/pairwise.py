@@ -1,0 +1,139 @@
+"""Two effects at once, where one after another explains too little: each alone may leave, or even open, most of what only both close.
+
+    first round's candidates: A as it was found, B -> propose(evidence beside A)      -> least D(A, B) on all strikes, if it leaves little
+                            B moves no modes: what does is searched for all over a body, and that takes long
+    then each is cross-validated beside the other: fitted without one strike at a time, against control effects, as in any round
+    in_a_room: B is a room that was found alone, A what moves modes; the room is identified anew beside A, and again without it
+
+What a dashpot does to decays hides what a long pulse leaves of the high modes: played with the right pulse and wrong decays, a body is as far from its recording
+as with neither. Coordinate steps stop there; a step along two coordinates does not [cf. forward selection of groups: Efroymson 1960; Yuan & Lin 2006].
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of
+from sonic_bullet.diagnosis.evidence.refit import refitted, reidentified, with_effects
+from sonic_bullet.diagnosis.prediction.diagnosis_problem import DiagnosisProblem
+from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, mixes_neighbours, moves, moves_itself
+from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.diagnosis.selection.acceptance import Candidate, accepted
+from sonic_bullet.diagnosis.selection.cross_validation import cross_validated
+from sonic_bullet.diagnosis.selection.exchange import again
+from sonic_bullet.diagnosis.selection.phase_test import misfit
+from sonic_bullet.diagnosis.selection.simplest import helps
+from sonic_bullet.diagnosis.selection.thresholds import RULES
+from sonic_bullet.effects.protocol import Dereverberates
+from sonic_bullet.parallel import parallel_map
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Pair:
+    """A hypothesis with two effects, the second fitted beside the first, and how far it is from the fitted strikes, in dB."""
+
+    h: Hypothesis
+    db: float
+
+
+def pairwise(
+    start: Hypothesis,
+    first: Sequence[Candidate],
+    problem: DiagnosisProblem,
+) -> tuple[Hypothesis, list[Candidate]] | None:
+    """The two of a first round's candidate effects that explain nearly all together, each accepted beside the other; None where no two do."""
+    if len(first) < 2 or not problem.has_audio:
+        return None
+    kinds = [type(c.effect) for c in first if not moves(c.hypothesis)]
+    problem.say("trying two at once")
+
+    def augmented(one: Candidate) -> list[Pair]:
+        evidence = evidence_of(one.hypothesis, problem.bodies, problem.band_hz, seed=problem.seed)
+        found = []
+        for kind in kinds:
+            other = None if kind is type(one.effect) else kind.propose(evidence)
+            if other is not None:
+                h = refitted(replace(one.hypothesis, effects=(*one.hypothesis.effects, other)), problem.bodies, evidence.observed)
+                found.append(Pair(h, problem.distance_db(h)))
+        return found
+
+    pairs = [pair for some in parallel_map(augmented, first) for pair in some]
+    now = problem.score(start)
+    if not pairs or min(pair.db for pair in pairs) - now.floor_db > RULES.pair_leaves_share * now.gap_db:
+        return None
+    h = _likeliest(pairs, now.floor_db + now.gap_db, problem.bodies)
+    closer = again(again(h, 0, problem, afresh=True), 1, problem)  # what was found alone had the other's share to explain, too
+    h = closer if problem.distance_db(closer) < problem.distance_db(h) else h
+    return _accepted_together(h, problem)
+
+
+def in_a_room(
+    h: Hypothesis,
+    found: Sequence[Candidate],
+    problem: DiagnosisProblem,
+) -> tuple[Hypothesis, list[Candidate]] | None:
+    """A room that has been found alone, identified anew beside one of the candidate effects (found) that move modes; None where no two say nearly all.
+
+    Outside the room lines lie where they lie, and show masses and tensors. But a response identified from modes that lie elsewhere plays what these lack, so that every
+    other set of modes sounds worse with it: the candidate is tried with a response of its own.
+    """
+    rooms = [e for e in h.effects if isinstance(e, Dereverberates)]
+    movers = [c for c in found if moves_itself(h, c.effect)]
+    if len(rooms) != 1 or len(h.effects) != 1 or not movers or not problem.has_audio:
+        return None
+    problem.say("hearing the room anew beside what moves modes")
+
+    def augmented(c: Candidate) -> Pair | None:
+        alone = refitted(with_effects(h, (c.effect,), problem.bodies), problem.bodies)
+        evidence = evidence_of(alone, problem.bodies, problem.band_hz, seed=problem.seed)
+        room = type(rooms[0]).propose(evidence)
+        if room is None:
+            return None
+        pair = reidentified(refitted(replace(alone, effects=(c.effect, room)), problem.bodies, evidence.observed), problem.bodies, fully=True)
+        return Pair(pair, problem.distance_db(pair))
+
+    floor, left = problem.score(h).floor_db, problem.distance_db(reidentified(h, problem.bodies, fully=True))
+    for some in (
+        [c for c in movers if not mixes_neighbours(c.effect)],
+        [c for c in movers if mixes_neighbours(c.effect)],
+    ):  # what hardly moves modes is asked where nothing else will do
+        best = min((pair for pair in parallel_map(augmented, some) if pair is not None), key=lambda pair: pair.db, default=None)
+        if best is not None and best.db - floor <= RULES.pair_leaves_share * (left - floor):
+            break
+    else:
+        return None
+    return _accepted_together(best.h, problem)
+
+
+def _accepted_together(h: Hypothesis, problem: DiagnosisProblem) -> tuple[Hypothesis, list[Candidate]] | None:
+    """The two, if each is accepted beside the other."""
+    added: list[Candidate] = []
+    for effect in h.effects[::-1]:
+        rest = refitted(with_effects(h, tuple(e for e in h.effects if e is not effect), problem.bodies), problem.bodies)
+        response = problem.distance_db(reidentified(rest, problem.bodies))  # with a response of its own, too
+        evidence = replace(evidence_of(rest, problem.bodies, problem.band_hz, seed=problem.seed), known=effect)
+        now = problem.score(rest)
+        full = replace(now, distance_db=response)
+        candidates = cross_validated(rest, problem.only(type(effect)), evidence)
+        if not candidates or not (accepted(candidates[0], max(now.gap_db, 0.0), first=False) and helps(candidates[0], problem, now, full, first=False)):
+            return None
+        h, added = candidates[0].hypothesis, [candidates[0], *added]
+    return h, added
+
+
+def _likeliest(pairs: Sequence[Pair], before_db: float, bodies: tuple[Struck, ...]) -> Hypothesis:
+    """The nearest to the strikes; or, of those that share the effect that moves modes, and say nearly as much, the one for which phases speak clearly (phase_test.py)."""
+    best = min(pairs, key=lambda pair: pair.db)
+    near = best.db + RULES.phases_decide_share * (before_db - best.db)
+    others = [pair.h for pair in pairs if pair.db < near and _movers(pair.h) == _movers(best.h)]
+    off = [misfit(h, bodies) + RULES.clear_phases for h in others]
+    own = misfit(best.h, bodies)
+    return others[int(np.argmin(off))] if np.isfinite(own) and min(off) < own else best.h
+
+
+def _movers(h: Hypothesis) -> set[str]:
+    """Which of its effects move modes."""
+    return {e.id for e in h.effects if moves_itself(h, e)}

@@ -1,0 +1,139 @@
+"""`added-mass`: a sensor, a blob of wax, water: a small mass that rides on one point.
+
+    (Λ − λ (1 + Φᵀ m' Φ)) q = 0,  Φ = (φ(p), √(λ_r R)) (3, n + 3)      to first order Δλ/λ = −m |φ(p)|²                [Rayleigh 1894, § 88-90; modal synthesis]
+
+R: what the modes above the band yield at the point, along its normal and across: residual attachment modes far above them [Rubin 1975]. Without it a
+point mass is held too stiffly, and its higher modes come out several per cent high.
+Read off frequencies and patterns together: for points all over the surface and masses up to a sixth of the body's, lines are paired with the loaded
+body's modes anew; the pairs that agree best stand, where they agree better than the bare body's. E/ρ was fitted to lines that the mass had lowered, so
+the common scale of all frequencies is looked for along with it, on the bare body as well: λ(Λ e^{2s}, R e^{−2s}) = e^{2s} λ(Λ, R). So was ν: what is twisted
+and what is bent had been lowered differently. A free body moves against the mass as a whole (free_body.py): m' in m's place.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from sonic_bullet.effects.added_mass.free_body import FreeBody
+from sonic_bullet.effects.added_mass.mass_loaded_modes import attached, loaded
+from sonic_bullet.effects.added_mass.mass_search import WIDTHS, MassFit, Scored, strict
+from sonic_bullet.effects.common.pairs import agreed, patterns
+from sonic_bullet.effects.common.points import nearest, spread_out, vertex_normals
+from sonic_bullet.effects.protocol import BaselineChange, ChangesBaseline, Cost, Evidence, Mixing, Owner, Stage, Traits
+from sonic_bullet.parallel import parallel_map
+from sonic_bullet.records import Array, ModalModel
+
+POINTS = 100
+SHARES = (0.002, 0.006, 0.015, 0.03, 0.055, 0.1, 0.16)  # of the body's mass
+YIELDS = (0.0, 1.0, 4.0)  # of what modes above the band may yield, to begin with
+LIGHTEST = 0.005  # of the body's: what is lighter moves no mode by 1 % (Δf/f = −2 m/M at a bar's end), so a mesh or the body's own imperfection may be what it stands for
+TRIES = 6
+MATCHED, MOVED = 0.8, 2.5e-3  # share of lines, and how far nine in ten of them may lie off: a mesh's error
+STAYED, DEGENERATE = 0.6, 1e-3  # of the lines' strength; of ln f, between modes of which a mass leaves one where it was
+FAR_OFF = 0.015  # of ln f: more than pairs alone find
+BETTER = (1.5, 0.12)  # in price: as much as a strong line and a half, paired well; and of the bare body's own
+
+
+@dataclass(frozen=True)
+class AddedMass(ChangesBaseline):
+    """mass_kg attached at position_m (3,) of the surface, in the mesh's frame. yield_m_n: along the normal and across it, of what the model's modes leave out.
+
+    stretch: ln of what all frequencies of the bare body are to the baseline's; poisson_ratio: its ν, None for the baseline's. The host takes them over.
+    """
+
+    id: ClassVar[str] = "added-mass"
+    stage: ClassVar[Stage] = Stage.MODES
+    owner: ClassVar[Owner] = Owner.FIXTURE
+    reference: ClassVar[str] = "Rayleigh 1894, § 88-90; Rubin 1975"
+    traits: ClassVar[Traits] = Traits(moves_modes=True, mixing=Mixing.ALL, cost=Cost.COSTLY)
+
+    position_m: tuple[float, float, float]
+    mass_kg: float
+    yield_m_n: tuple[float, float] = (0.0, 0.0)
+    stretch: float = 0.0
+    poisson_ratio: float | None = None
+
+    def apply(self, x: ModalModel) -> ModalModel:
+        """The modes with the effect in them."""
+        if not x.mode_count or self.mass_kg == 0:
+            return x
+        at = nearest(x, self.position_m)
+        return loaded(x, attached(x.shape[at].astype(float), vertex_normals(x)[at], self.yield_m_n, x), self.mass_kg, x.vertex_m[at], FreeBody.of(x))
+
+    def baseline_change(self) -> BaselineChange:
+        """E/ρ and ν of the bare body, found along with the mass."""
+        return BaselineChange(stretch=self.stretch, poisson_ratio=self.poisson_ratio)
+
+    def parameters(self) -> dict[str, Any]:
+        """What it says, for people and JSON, in SI units."""
+        place = {"mass_kg": self.mass_kg, "position_m": list(self.position_m), "yield_m_n": list(self.yield_m_n)}
+        return {**place, "stretch": self.stretch, "poisson_ratio": self.poisson_ratio}
+
+    def freedom(self) -> int:
+        return 8
+
+    @classmethod
+    def propose(cls, evidence: Evidence) -> Self | None:
+        observed = max(evidence.observed, key=lambda h: len(h.freq_hz) if h.plain is not None else 0)
+        if observed.plain is None or len(observed.freq_hz) + len(observed.foreign_hz) < 8 or not observed.plain.mass_kg:
+            return None
+        trial = MassFit.of(observed)
+        x = observed.plain
+        if isinstance(evidence.known, cls):
+            known = evidence.known
+            near = int(np.argmin(((x.vertex_m - known.position_m) ** 2).sum(axis=1)))
+            up, side = (float(y * np.exp(2 * known.stretch)) for y in known.yield_m_n)
+            ratio = known.poisson_ratio
+            if observed.poisson is None and ratio is not None:
+                return known  # beside what moves modes too, no other ν is at hand
+            start = (0.0, near, known.mass_kg, (up, side), known.stretch, trial.fitted if ratio is None else ratio)
+            return cls._at(x, trial.refined(start, WIDTHS[-1:]), observed.poisson is not None)
+        plain = patterns(observed, x)
+        none = min(
+            (agreed(trial.line, trial.size, x.freq_hz, plain, shift=s, width=WIDTHS[-1], strict=strict(WIDTHS[-1])) for s in trial.shifts(x.freq_hz, plain)),
+            key=lambda one: one[0],
+        )
+        if _in_place(trial.line, trial.size, x.freq_hz, none):
+            return None
+
+        def at(vertex: int) -> list[Scored]:
+            up, side = trial.rest(vertex)
+            return [one for s in SHARES for y in YIELDS for one in trial.sifted(vertex, s * x.mass_kg, (y * up, y * side), WIDTHS[0])]
+
+        found = sorted(one for some in parallel_map(at, spread_out(x, POINTS).tolist()) for one in some)
+        first: dict[bool, dict[tuple[int, bool], Scored]] = {False: {}, True: {}}
+        for one in found:  # one light and one heavy start a vertex, where the baseline's scale may be right and where it is wrong
+            first[abs(one[4]) > FAR_OFF].setdefault((one[1], one[2] > 0.02 * x.mass_kg), one)
+        best = min(parallel_map(trial.refined, [start for some in first.values() for start in list(some.values())[:TRIES]]))
+        again = sorted(trial.scored(int(v), *best[2:], WIDTHS[1]) for v in spread_out(x, 3 * POINTS))  # round bodies: as heavy, elsewhere
+        best = min(best, *parallel_map(lambda start: trial.refined(start, WIDTHS[1:]), again[: TRIES // 2]))
+        bare = none[0] + trial.unlikely(trial.fitted)
+        if best[0] > bare - max(BETTER[0], BETTER[1] * abs(bare)) or best[2] < LIGHTEST * x.mass_kg:
+            return None
+        return cls._at(x, best, observed.poisson is not None)
+
+    @classmethod
+    def _at(cls, x: ModalModel, found: Scored, poisson_identified: bool) -> Self:
+        """poisson_identified: whether ν is."""
+        _, vertex, mass_kg, along, shift, ratio = found
+        place = x.vertex_m[vertex]
+        up, side = (float(y * np.exp(-2 * shift)) for y in along)
+        return cls((float(place[0]), float(place[1]), float(place[2])), float(mass_kg), (up, side), float(shift), float(ratio) if poisson_identified else None)
+
+
+def _in_place(line_hz: Array, size: Array, mode_hz: Array, none: tuple[float, Array, Array, float]) -> bool:
+    """Whether the bare body's modes are where the lines are, or most of what sounds (s, k) is: a mass leaves few in place, and something else splits or bends the others.
+
+    Of degenerate modes a mass leaves one, which stands still under it: only modes without a degenerate partner are asked.
+    """
+    _, row, column, shift = none
+    off = np.abs(np.log(line_hz[row] / mode_hz[column]) - shift)
+    if len(row) > MATCHED * len(line_hz) and float(np.quantile(off, 0.9)) < MOVED:
+        return True
+    off = np.abs(np.log(line_hz)[:, None] - np.log(mode_hz) - shift)
+    gap = np.diff(np.log(mode_hz), prepend=-np.inf, append=np.inf)
+    loud = np.nan_to_num(size).max(axis=0) * (np.minimum(gap[1:], gap[:-1]) > DEGENERATE)[off.argmin(axis=1)]
+    return bool(loud[off.min(axis=1) < MOVED].sum() > STAYED * loud.sum() > 0)

@@ -1,0 +1,199 @@
+"""`amplitude-damping`: friction and plasticity take more of a loud mode than of a soft one.
+
+    ȧ = −d a (1 + (c a)^p)      ->      (a₀/a(t))^p = (1 + (c a₀)^p) e^{pdt} − (c a₀)^p       [Adhikari 2013, ch. 1; equivalent damping: Nayfeh & Mook 1979, § 3.3]
+
+p = 1: drag that goes with velocity²; p = 2: with velocity³. Read off the envelopes of single modes, or degenerate modes: early decay faster than late, the more so the
+harder the strike; d is the mode's, c of all, and degenerate modes have the axes that the envelopes tell (axes.py).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import product
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from sonic_bullet.effects.amplitude_damping.damped_lines import DecayFit, DecayFrames, fitted_decay, lines_under, onset, under, would
+from sonic_bullet.effects.amplitude_pitch import MEASURES, _per_velocity
+from sonic_bullet.effects.common.axes import ANGLES, PAIR, turned
+from sonic_bullet.effects.common.envelope import envelopes, levels
+from sonic_bullet.effects.common.proofs import finite, one_of, same_length
+from sonic_bullet.effects.protocol import BaselineChange, ChangesBaseline, Evidence, ObjectEvidence, Owner, Ring, RotatesPairs, Stage, Traits
+from sonic_bullet.records import Array, ModalModel
+
+BETTER = 3.0  # of ln variance of the envelopes' logarithms, all lines together
+SHARE, FEWEST_LINES = 0.5, 1.5  # of the misfit must go, in lines that a damping growth would bend; of such lines
+LEAST = 0.05  # of c a₀ at the loudest
+POWERS = (1.0, 2.0)
+GROWTHS = np.geomspace(0.02, 30, 28)  # of c a₀ at the loudest
+AGAIN = np.geomspace(0.4, 2.5, 9)  # of what all evidence said
+
+
+@dataclass(frozen=True)
+class AmplitudeDamping(RotatesPairs, ChangesBaseline):
+    """damping_growth: 1/level at which the decay has doubled; power: of the level, with which it rises, 1 or 2. measure: as in amplitude-pitch. alpha_per_s, beta_s: the material's, as the decays at low level tell them.
+
+    louder: modes at the onset over what the linear model plays, as its lines miss some of a fall that is no exponential. freq_hz, turn_rad: of degenerate modes, and how
+    far their axes are turned from the mesh's.
+    """
+
+    id: ClassVar[str] = "amplitude-damping"
+    stage: ClassVar[Stage] = Stage.BANK
+    owner: ClassVar[Owner] = Owner.OBJECT
+    reference: ClassVar[str] = "Nayfeh & Mook 1979, section 3.3"
+    traits: ClassVar[Traits] = Traits(by_line=True, certain=True)
+
+    damping_growth: float
+    measure: str = "velocity"
+    alpha_per_s: float = float("nan")
+    beta_s: float = float("nan")
+    louder: float = 1.0
+    freq_hz: tuple[float, ...] = ()
+    turn_rad: tuple[float, ...] = ()
+    power: float = 1.0
+
+    def __post_init__(self) -> None:
+        one_of("power", self.power, POWERS)  # of drag: others have no closed form
+        one_of("measure", self.measure, MEASURES)
+        finite("choke", self.damping_growth, least=0.0)
+        finite("louder", self.louder, least=1e-6)
+        finite("freq_hz", *self.freq_hz, least=1e-3)
+        finite("turn_rad", *self.turn_rad)
+        same_length(freq_hz=self.freq_hz, turn_rad=self.turn_rad)
+
+    def apply(self, x: Ring) -> Ring:
+        """The ringing with the effect in it."""
+        return replace(x, damping_growth=x.damping_growth + self.damping_growth * _per_velocity(x, self.measure), damping_growth_power=self.power)
+
+    def turned(self, x: ModalModel) -> ModalModel:
+        """The modes as they were, degenerate modes about their own axes."""
+        return turned(x, self.freq_hz, self.turn_rad)
+
+    def angles(self) -> int:
+        """How many of its numbers are axes of degenerate pairs."""
+        return len(self.turn_rad)
+
+    def baseline_change(self) -> BaselineChange:
+        """The material's α and β, as the decays at low level state them, and by how much lines miss the onset."""
+        if not np.isfinite(self.alpha_per_s):
+            return BaselineChange(onset_gain=self.louder)
+        return BaselineChange(self.alpha_per_s, self.beta_s, onset_gain=self.louder)
+
+    def parameters(self) -> dict[str, Any]:
+        """What it says, for people and JSON, in SI units."""
+        degenerate = [{"freq_hz": f, "turn_rad": t} for f, t in zip(self.freq_hz, self.turn_rad, strict=True)]
+        return {"choke": self.damping_growth, "measure": self.measure, "power": self.power} | ({"twins": degenerate} if degenerate else {})
+
+    def freedom(self) -> int:
+        return 2 + len(self.freq_hz)
+
+    @classmethod
+    def propose(cls, evidence: Evidence) -> Self | None:
+        best: tuple[float, Self] | None = None
+        known = evidence.known if isinstance(evidence.known, cls) else None
+        for h in evidence.observed:
+            e = envelopes(h)
+            if e is None:
+                continue
+            plain = {name: lines_under(e, h, name) for name in (levels(h) if known is None else (known.measure,))}
+            for name, power in product(plain, POWERS if known is None else (known.power,)):
+                lines = [replace(line, power=power) for line in plain[name]]
+                if evidence.on_trial and known is not None:
+                    lines = [_held(line, known) for line in lines]
+                found = _fitted(lines, known.damping_growth if known is not None else None)
+                if found is not None and (best is None or found.gain > best[0]):
+                    axes = (known.freq_hz, known.turn_rad) if evidence.on_trial and known is not None else _axes(lines, found)
+                    best = (found.gain, cls(found.damping_growth, name, *_rayleigh(h, lines, found.fits), _louder(h, lines, found), *axes, power))
+        return best[1] if best is not None else None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Fit:
+    """c, what it is worth in ln variance, and what every line says under it."""
+
+    damping_growth: float
+    gain: float
+    fits: tuple[DecayFit, ...]
+
+
+def _fitted(lines: list[DecayFrames], known: float | None) -> _Fit | None:
+    """The damping growth that all lines agree on; None where it is not one that they are sure of. known: what all evidence said, if this is a part of it."""
+    if len(lines) < 2:
+        return None
+    most = float(max(line.level.max() for line in lines))
+    plain = tuple(fitted_decay(line, 0.0) for line in lines)
+    grid = GROWTHS / most if known is None else known * AGAIN
+    rows = _along(lines, grid)
+    i = int(np.argmin([_cost(row) for row in rows]))
+    fine = np.geomspace(grid[max(i - 1, 0)], grid[min(i + 1, len(grid) - 1)], 9)
+    closer = _along(lines, fine)
+    j = int(np.argmin([_cost(row) for row in closer]))
+    damping_growth, row = float(fine[j]), closer[j]
+    gain = np.array([a.least - b.least for a, b in zip(plain, row, strict=True)])
+    if damping_growth * most < LEAST:
+        return None
+    if known is None and not (
+        gain.sum() > BETTER and -gain[gain < 0].sum() < 0.3 * gain[gain > 0].sum() and _supported_by_lines(lines, damping_growth, plain, row)
+    ):
+        return None
+    return _Fit(damping_growth, float(gain.sum()), row)
+
+
+def _held(line: DecayFrames, known: AmplitudeDamping) -> DecayFrames:
+    """The line under the one angle that its degenerate modes are known to have."""
+    turn = next((t for f, t in zip(known.freq_hz, known.turn_rad, strict=True) if abs(f / line.freq_hz - 1) < PAIR), 0.0)
+    return under(line, int(np.abs(ANGLES - turn).argmin())) if len(line.amplitude) > 1 else line
+
+
+def _along(lines: list[DecayFrames], growths: Array) -> list[tuple[DecayFit, ...]]:
+    """What every line says of each damping growth, every decay found from the one before."""
+    rows: list[tuple[DecayFit, ...]] = []
+    for damping_growth in growths.tolist():
+        rows.append(tuple(fitted_decay(line, damping_growth, rows[-1][k].decay_per_s if rows else None) for k, line in enumerate(lines)))
+    return rows
+
+
+def _cost(row: tuple[DecayFit, ...]) -> float:
+    return float(sum(one.least for one in row))
+
+
+def _supported_by_lines(lines: list[DecayFrames], damping_growth: float, plain: tuple[DecayFit, ...], row: tuple[DecayFit, ...]) -> bool:
+    """Whether the lines that a damping growth would bend are bent so: each counts by what a damping growth would be of its misfit, so one loud mode and a softer one will do."""
+    before = np.exp([one.spread[0] for one in plain])
+    after = np.exp([one.least for one in row])
+    bent = np.array([would(line, damping_growth, float(one.decay_per_s[one.best]), one.best) for line, one in zip(lines, row, strict=True)])
+    says = np.minimum(bent / before, 1.0)
+    gone = np.maximum(1 - after / before, -1.0)
+    many = float(says.sum() ** 2 / max((says**2).sum(), 1e-300))
+    return many >= FEWEST_LINES and float((says * gone).sum() / max(says.sum(), 1e-300)) > SHARE
+
+
+def _louder(h: ObjectEvidence, lines: list[DecayFrames], found: _Fit) -> float:
+    """The modes' levels at the onset over the linear model's: the middle one of all lines and strikes."""
+    level = [onset(line, found.damping_growth, float(one.decay_per_s[one.best]), one.best) for line, one in zip(lines, found.fits, strict=True)]
+    plain = [np.abs(h.push[:, h.mode[line.number]].sum(axis=1)) for line in lines]
+    ratio = np.stack(level, axis=1) / np.maximum(np.stack(plain, axis=1), 1e-300)
+    return float(np.nanmedian(ratio)) if np.isfinite(ratio).any() else 1.0
+
+
+def _axes(lines: list[DecayFrames], found: _Fit) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Frequencies and angles of the degenerate modes whose axes are observable."""
+    observed = [(line.freq_hz, float(ANGLES[one.best])) for line, one in zip(lines, found.fits, strict=True) if one.turned]
+    return tuple(f for f, _ in observed), tuple(t for _, t in observed)
+
+
+def _rayleigh(h: ObjectEvidence, lines: list[DecayFrames], row: tuple[DecayFit, ...]) -> tuple[float, float]:
+    """α, β >= 0 of the lines' decays at low level, by relative least squares with Huber's weights."""
+    from scipy.optimize import nnls
+
+    omega2 = np.array([h.omega[line.number] ** 2 for line in lines])
+    decay = np.array([one.decay_per_s[one.best] for one in row])
+    columns = np.stack([0.5 * np.ones(len(omega2)), 0.5 * omega2], axis=1) / decay[:, None]
+    scale = np.abs(columns).max(axis=0)
+    trust, x = np.ones(len(decay)), np.zeros(2)
+    for _ in range(10):
+        x = nnls(columns / scale * trust[:, None], trust)[0]
+        off = np.abs(columns / scale @ x - 1)
+        trust = np.sqrt(np.minimum(1, 0.1 / np.maximum(off, 1e-9)))
+    return float(x[0] / scale[0]), float(x[1] / scale[1])

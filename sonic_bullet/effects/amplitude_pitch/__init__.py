@@ -1,0 +1,195 @@
+"""`amplitude-pitch`: a body that moves far is stiffer, or softer: the frequency follows the square of its level down as it decays.
+
+    ω(t) = ω (1 + b a²(t))                                                    [Nayfeh & Mook 1979, eq. 2.3.35: the Duffing oscillator]
+
+Read off the phase of single modes: θ(t) = θ₀ + δ t + b a₀² ω (1 − e^{−2dt})/2d, θ₀ each strike's own, δ the mode's, b of all;
+by modes without a degenerate partner, where there are enough that are sure of it, else by all, pairs about their own axes (degenerate_pitch.py).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from sonic_bullet.effects.amplitude_pitch.degenerate_pitch import axes_of, bend_with_axes
+from sonic_bullet.effects.common.axes import degenerate, turned
+from sonic_bullet.effects.common.envelope import Envelopes, envelopes, falls, levels
+from sonic_bullet.effects.common.proofs import finite, one_of, same_length
+from sonic_bullet.effects.protocol import Evidence, ObjectEvidence, Owner, Ring, RotatesPairs, Stage, Traits
+from sonic_bullet.records import Array, ModalModel
+
+MEASURES = ("impulse", "velocity", "displacement")
+STANDARD_ERRORS = 5.0  # spreads that b must stand off zero
+BETTER = 0.5  # of the phases' misfit must go, in modes that b would move
+FEWEST_MODES = 1.5  # of such modes
+FAR = np.geomspace(0.6, 1.7, 12)  # times the bend that degenerate modes were identified with as if each pair were one mode
+NEAR = np.geomspace(0.93, 1.07, 5)  # about what that leads to
+ENOUGH = 3  # modes without a degenerate partner, to be asked alone
+
+
+@dataclass(frozen=True, slots=True)
+class Slope:
+    """b, its spread, the share of the phases' misfit that goes with it in modes it would move, and how many modes' misfit that is.
+
+    single: whether it is identified by modes without a degenerate partner alone.
+    """
+
+    bend: float
+    sd: float
+    share: float
+    modes: float
+    single: bool
+
+
+@dataclass(frozen=True)
+class AmplitudePitch(RotatesPairs):
+    """bend: relative rise of frequency per level². measure: of the level, one of MEASURES, in N·s, m/s or m. freq_hz, turn_rad: of degenerate modes, and how far their axes
+    are turned from the mesh's.
+    """
+
+    id: ClassVar[str] = "amplitude-pitch"
+    stage: ClassVar[Stage] = Stage.BANK
+    owner: ClassVar[Owner] = Owner.OBJECT
+    reference: ClassVar[str] = "Nayfeh & Mook 1979, section 2.3"
+    traits: ClassVar[Traits] = Traits(by_line=True, certain=True)
+
+    bend: float
+    measure: str = "velocity"
+    freq_hz: tuple[float, ...] = ()
+    turn_rad: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        one_of("measure", self.measure, MEASURES)
+        finite("bend", self.bend)
+        finite("freq_hz", *self.freq_hz, least=1e-3)
+        finite("turn_rad", *self.turn_rad)
+        same_length(freq_hz=self.freq_hz, turn_rad=self.turn_rad)
+
+    def apply(self, x: Ring) -> Ring:
+        """The ringing with the effect in it."""
+        return replace(x, bend=x.bend + self.bend * _per_velocity(x, self.measure) ** 2)
+
+    def turned(self, x: ModalModel) -> ModalModel:
+        """The modes as they were, degenerate modes about their own axes."""
+        return turned(x, self.freq_hz, self.turn_rad)
+
+    def angles(self) -> int:
+        """How many of its numbers are axes of degenerate pairs."""
+        return len(self.turn_rad)
+
+    def parameters(self) -> dict[str, Any]:
+        """What it says, for people and JSON, in SI units."""
+        pairs = [{"freq_hz": f, "turn_rad": t} for f, t in zip(self.freq_hz, self.turn_rad, strict=True)]
+        return {"bend": self.bend, "measure": self.measure} | ({"twins": pairs} if pairs else {})
+
+    def freedom(self) -> int:
+        return 1 + len(self.freq_hz)
+
+    @classmethod
+    def propose(cls, evidence: Evidence) -> Self | None:
+        best: tuple[float, Self] | None = None
+        known = evidence.known if isinstance(evidence.known, cls) else None
+        for h in evidence.observed:
+            e = envelopes(h)
+            for name, b in (_slopes(e, h, known) if e is not None else {}).items():
+                if best is None or b.modes > best[0]:
+                    assert e is not None
+                    best = (b.modes, cls._with_axes(e, h, name, b, known, evidence.on_trial))
+        return best[1] if best is not None else None
+
+    @classmethod
+    def _with_axes(cls, e: Envelopes, h: ObjectEvidence, measure: str, b: Slope, known: AmplitudePitch | None, held: bool) -> Self:
+        """The same with the axes of degenerate modes, known's if held; where hardly a mode is without its degenerate partner, their bend with it."""
+        if h.model is None or measure == "impulse":
+            return cls(b.bend, measure)
+        bend = b.bend
+        if not b.single:
+            bend = known.bend if known is not None else bend_with_axes(e, h, measure, bend, FAR)
+            bend = bend_with_axes(e, h, measure, bend, NEAR)
+        if held and known is not None:
+            return cls(bend, measure, known.freq_hz, known.turn_rad)
+        return cls(bend, measure, *axes_of(e, h, measure, bend))
+
+
+def _per_velocity(x: Ring, measure: str) -> Array:
+    """The measure over the ring's own level (peak velocity)."""
+    if measure == "displacement":
+        return np.asarray(1 / (2 * np.pi * x.freq_hz))
+    if measure == "impulse":
+        return np.asarray(x.impulse_n_s / np.maximum(x.level, 1e-300))
+    return np.ones(len(x.freq_hz))
+
+
+def _slopes(e: Envelopes, h: ObjectEvidence, known: AmplitudePitch | None) -> dict[str, Slope]:
+    """Of every measure that lines are sure of: modes without a degenerate partner where those are ENOUGH and sure of any, else all. known: what all evidence said."""
+    single = np.array([not degenerate(h, k) for k in e.line.tolist()], bool)  # the frequencies of degenerate modes drift each by its own level
+    rows = {
+        name: np.array([one or (0.0, 0.0, 0.0) for one in (_moments(e, h, level[:, e.line], q) for q in range(len(e.line)))]).reshape(-1, 3)
+        for name, level in levels(h).items()
+        if known is None or name == known.measure
+    }
+    for alone in (True, False):
+        found: dict[str, Slope] = {}
+        for name, row in rows.items():
+            good = (row[:, 0] > 0) & (row[:, 2] > 0) & (single if alone else True)
+            b = _agreed(row[good], alone)
+            if good.sum() >= (ENOUGH if alone else 1) and _significant(b, known):
+                found[name] = b
+        if found:
+            break
+    return found
+
+
+def _significant(b: Slope, known: AmplitudePitch | None) -> bool:
+    """Whether lines are sure of b; by fewer strikes, that it is no less than nothing of what all said (known)."""
+    if known is None:
+        return abs(b.bend) > STANDARD_ERRORS * b.sd and b.share > BETTER
+    return b.bend * np.sign(known.bend) > b.sd and b.share > 0
+
+
+def _agreed(table: Array, single: bool) -> Slope:
+    """b by the modes' own (n, 3), each as heavy as what a bend would be in its phase over what there is; its spread by their scatter [White 1980]."""
+    if not len(table):
+        return Slope(0.0, np.inf, 0.0, 0.0, single)
+    xx, xy, yy = table.T
+    value, weight = xy / xx, xx / yy
+    centre = _median(value, weight)
+    for _ in range(10):
+        off = np.abs(value - centre)
+        near = 1 / (1 + (off / (2 * _median(off, weight) + 1e-12 * abs(centre) + 1e-200)) ** 2)
+        centre = float((weight * near * value).sum() / (weight * near).sum())
+    says = np.minimum(centre**2 * weight, 1.0)  # of a mode's misfit, as much as a bend would be of it: the others have no say
+    gone = np.maximum((2 * centre * xy - centre**2 * xx) / yy, -1.0)
+    sd = float(np.sqrt(((says * (value - centre)) ** 2).sum()) / max(says.sum(), 1e-300))
+    alone = says.sum() ** 2 / max(float((says**2).sum()), 1e-300) < FEWEST_MODES
+    return Slope(centre, np.inf if alone else max(sd, 1e-300), float((says * gone).sum() / max(says.sum(), 1e-300)), float(gone.sum()), single)
+
+
+def _moments(e: Envelopes, h: ObjectEvidence, level: Array, q: int) -> tuple[float, float, float] | None:
+    """Σ x², Σ xy, Σ y² of a mode: y its strikes' phases without their means and the common slope, x what b = 1 would make of them; None where too little is clear."""
+    decay, omega = falls(e, q, float(h.decay_per_s[e.line[q]])), 2 * np.pi * float(h.freq_hz[e.line[q]])
+    rows, sides, weights, ramps = [], [], [], []
+    for s in range(len(e.z)):
+        use = e.good[s, q]
+        if use.sum() < 8:
+            continue
+        t, phase = e.time_s[q, use], e.phase[s, q, use]
+        w = e.worth(s, q)[use]
+        curve = level[s, q] ** 2 * omega * -np.expm1(-2 * decay * t) / (2 * decay)
+        rows.append(phase - np.average(phase, weights=w))
+        sides.append(curve - np.average(curve, weights=w))
+        ramps.append(t - np.average(t, weights=w))
+        weights.append(w)
+    if len(rows) < 2 and not (rows and len(rows[0]) > 30):
+        return None
+    y, x, t, w = (np.concatenate(part) for part in (rows, sides, ramps, weights))
+    y, x = y - t * (w * t * y).sum() / (w * t * t).sum(), x - t * (w * t * x).sum() / (w * t * t).sum()
+    return float((w * x * x).sum()), float((w * x * y).sum()), float((w * y * y).sum())
+
+
+def _median(value: Array, weight: Array) -> float:
+    order = np.argsort(value)
+    total = np.cumsum(weight[order])
+    return float(value[order][np.searchsorted(total, total[-1] / 2)])

@@ -1,0 +1,186 @@
+"""Single modes out of a recording: each line shifted to 0 Hz, low-passed and decimated.
+
+    z_k(t) = 2 (y e^{−iω_k t}) * w,   w a Hann window of length L, centred, sum 1:  nulls at ± 2/L and beyond   [Harris 1978, eq. 27]
+
+The window is a sum of three exponentials, 1/(L + 1) Σ_a c_a e^{iaθ(n − m)}, θ = 2π/(L + 1), c = ½, 1, ½: z at any sample m is a difference of running sums.
+
+Only lines that stand alone are worth it: no other of a twentieth of their strength nearer than 2/L, but for their own first, short part, which the window has to hold.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from sonic_bullet.effects.protocol import ObjectEvidence
+from sonic_bullet.machine.compiled import njit
+from sonic_bullet.records import Array
+
+WIDTH_HZ = (30.0, 400.0)
+MOST_LINES = 30
+FRAMES = 96
+MOST_SAID = 1e4  # by one frame
+NEPERS = 8.0  # of a line's decay are looked at
+SELF = 0.006  # relative: lines nearer than this may be one bent mode
+FAR, FASTER = 0.15, 5.0  # of a frequency; of a decay: a line that near and that short is what a mode was before its frequency had drifted down, or up
+LINK = 4.0  # of the shorter line's decay: how far in ω two lines of a chain are
+HELD = 0.8  # of 2/L to both sides, at most: what the window holds of a drifting frequency
+CLEAR = 12.0  # of |z| over the noise in it
+STEP = 1024  # samples between two exact phasors
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Envelopes:
+    """z (s, q, t) complex of q lines at times time_s (q, t), each line its own; good (s, q, t) where it stands clear; line (q,): which of the observed.
+
+    phase (s, q, t): of z, without jumps, however few the frames are. noise (s, q). window_s (q,): L.
+    """
+
+    time_s: Array
+    z: Array
+    good: Array
+    line: Array
+    noise: Array
+    phase: Array
+    window_s: Array
+
+    def worth(self, s: int, q: int) -> Array:
+        """What each frame (t,) of a line says: its level over the noise, squared, MOST_SAID at most."""
+        return np.asarray(np.minimum((np.abs(self.z[s, q]) / max(self.noise[s, q], 1e-12)) ** 2, MOST_SAID))
+
+
+@lru_cache(maxsize=2)
+def envelopes(h: ObjectEvidence) -> Envelopes | None:
+    """Of lines that stand alone and clear, spread over the frequencies; None where there are none."""
+    if h.signal is None or not len(h.freq_hz):
+        return None
+    selected, window = alone(h)
+    return shifted(h, h.signal if h.own is None else h.own, selected, window) if selected else None
+
+
+def shifted(h: ObjectEvidence, signal: Array, selected: list[int], window: list[int]) -> Envelopes:
+    """The lines picked by ``alone``, out of recordings or what is played in their place: signal (s, n)."""
+    n, sr = signal.shape[1], h.sr
+    z = np.zeros((len(signal), len(selected), FRAMES), complex)
+    good = np.zeros(z.shape, bool)
+    phase = np.zeros(z.shape)
+    noise = np.zeros(z.shape[:2])
+    time = np.zeros((len(selected), FRAMES))
+    floor = h.noise if len(h.noise) == len(signal) and np.isfinite(h.noise).all() else np.zeros(len(signal))
+    for q, (k, length) in enumerate(zip(selected, window, strict=True)):
+        shape = np.hanning(length + 2)[1:-1]
+        shape /= shape.sum()
+        last = min(n - length, int(NEPERS / max(h.decay_per_s[k], 1e-2) * sr) + length)
+        at = np.unique(np.linspace(length // 2, max(last, length // 2 + FRAMES), FRAMES).astype(int))
+        at = np.minimum(at, n - 1)
+        time[q, : len(at)] = at / sr
+        dense = np.arange(at[0], at[-1] + 1, max(length // 8, 1))
+        for s in range(len(signal)):
+            whole = windowed(signal[s], 2 * np.pi * h.freq_hz[k] / sr, length, np.concatenate([at, dense]))
+            row, between = whole[: len(at)], whole[len(at) :]  # centred: z(t) belongs to the time t
+            z[s, q, : len(at)] = row
+            angle = np.interp(at, dense, np.unwrap(np.angle(between)))
+            phase[s, q, : len(at)] = angle + (np.angle(row) - angle + np.pi) % (2 * np.pi) - np.pi
+            noise[s, q] = 2 * floor[s] * np.sqrt((shape**2).sum())
+            clear = np.abs(row) > CLEAR * max(noise[s, q], 1e-12)
+            if not clear.all():  # nothing after the first dip: what comes back is something else
+                clear[int(np.argmin(clear)) :] = False
+            good[s, q, : len(at)] = clear
+    return Envelopes(time, z, good, np.array(selected), noise, phase, np.array(window) / sr)
+
+
+def windowed(y: Array, omega: float, length: int, at: Array) -> Array:
+    """z of y (n,) at ω radians a sample, at samples ``at`` (t,) the window of an odd ``length`` is centred on; nothing is beyond the ends."""
+    half, theta = length // 2, 2 * np.pi / (length + 1)
+    first, last = np.clip(at - half, 0, len(y)), np.clip(at + half + 1, 0, len(y))
+    run = _running(np.asarray(y, float)[: int(last.max(initial=0))], omega, theta)
+    part = run[:, last] - run[:, first]
+    around = np.exp(1j * theta * at)
+    return np.asarray(2 / (length + 1) * (part[1] + 0.5 * (part[0] * around + part[2] / around)))
+
+
+@njit(nogil=True)
+def _running(y: Array, omega: float, theta: float) -> Array:
+    """Σ of y e^{−i(ω − aθ)n} before each sample (3, n + 1), a = −1, 0, 1."""
+    out = np.zeros((3, len(y) + 1), np.complex128)
+    for a in range(3):
+        step, total = omega - (a - 1) * theta, 0j
+        z = np.exp(-1j * step)
+        for block in range(0, len(y), STEP):
+            power = np.exp(-1j * step * block)
+            for n in range(block, min(block + STEP, len(y))):
+                total += y[n] * power
+                power *= z
+                out[a, n + 1] = total
+    return out
+
+
+def alone(h: ObjectEvidence) -> tuple[list[int], list[int]]:
+    """Lines with no strong neighbour, and the window for each; every so many of them, from low to high."""
+    if h.signal is None:
+        return [], []
+    n, sr = h.signal.shape[1], h.sr
+    every = np.concatenate([h.freq_hz, h.foreign_hz])
+    decay = np.nan_to_num(np.concatenate([h.decay_per_s, h.foreign_decay_per_s]))
+    strength = np.concatenate([np.abs(h.amplitude).max(axis=0), np.abs(h.foreign_amplitude).max(axis=0)])
+    chain, foreign = _chains(every, decay), np.arange(len(every)) >= len(h.freq_hz)
+    selected, window = [], []
+    for k in range(len(h.freq_hz)):
+        rival = np.abs(every - h.freq_hz[k])
+        pitch_fall = (chain == chain[k]) & foreign | (rival < FAR * h.freq_hz[k]) & (decay > FASTER * decay[k])  # its own beginning, while it was loud
+        near = (rival > 1e-9) & (strength > 0.05 * strength[k]) & (rival > SELF * h.freq_hz[k]) & ~pitch_fall
+        same = (rival < SELF * h.freq_hz[k]) & (strength > 3 * strength[k]) & ~pitch_fall  # the louder one of a bent mode's lines stands for it
+        gap = rival[near].min() if near.any() else np.inf
+        width = min(0.8 * gap, max([WIDTH_HZ[1], *(2 * rival + decay / np.pi)[pitch_fall & (strength > 0.05 * strength[k])]]))
+        if width >= max(WIDTH_HZ[0], 0.6 * h.decay_per_s[k]) and not same.any() and int(2 * sr / width) < n // 4:
+            selected.append(k)
+            window.append(int(2 * sr / width) | 1)
+    if len(selected) > MOST_LINES:
+        keep = np.unique(np.linspace(0, len(selected) - 1, MOST_LINES).astype(int))
+        selected, window = [selected[i] for i in keep], [window[i] for i in keep]
+    return selected, window
+
+
+def _chains(freq_hz: Array, decay_per_s: Array) -> Array:
+    """Which chain each line (k,) belongs to: lines so near each other, for their decays, that one mode of drifting frequency may have left them."""
+    from scipy.sparse import csr_array
+    from scipy.sparse.csgraph import connected_components
+
+    slow, fast = np.minimum.outer(decay_per_s, decay_per_s), np.maximum.outer(decay_per_s, decay_per_s)
+    gap = np.abs(np.subtract.outer(freq_hz, freq_hz))
+    linked = (2 * np.pi * gap < LINK * fast) & (fast < FASTER * slow) & (gap < FAR * freq_hz)
+    return np.asarray(connected_components(csr_array(linked), directed=False)[1])
+
+
+def levels(h: ObjectEvidence) -> dict[str, Array]:
+    """How hard each line (s, k) is driven, by three measures of what the pulse leaves of an impact: its impulse, and peak velocity and peak displacement at the body's surface."""
+    level = np.where(np.isfinite(h.impulse_n_s), h.impulse_n_s, 1.0)
+    found = {"impulse": level[:, None] * np.stack([h.pressed[:, m].max(axis=1) for m in h.mode], axis=1)}
+    if h.model is None:
+        return found
+    body = np.unique(h.model.face)
+    most = np.sqrt((h.model.shape[body].astype(float) ** 2).sum(axis=1)).max(axis=0)
+    push = np.abs(np.einsum("sxm,sx->sm", h.model.shape[h.strike_vertex].astype(float), h.strike_direction)) * most * h.pressed
+    velocity = level[:, None] * np.stack([push[:, m].max(axis=1) for m in h.mode], axis=1)
+    return found | {"velocity": velocity, "displacement": velocity / (2 * np.pi * h.freq_hz)}
+
+
+def falls(e: Envelopes, q: int, fitted: float) -> float:
+    """The decay of a line's own level, in 1/s: a mode of drifting frequency is several lines to a linear fit, none with its decay. fitted: by those; what comes back where too little is clear."""
+    top = bottom = 0.0
+    for s in range(len(e.z)):
+        use = e.good[s, q]
+        if use.sum() < 8:
+            continue
+        t, size = e.time_s[q, use], np.abs(e.z[s, q, use])
+        off = np.gradient(e.phase[s, q, use], t) / (2 * np.pi) * e.window_s[q]
+        w = e.worth(s, q)[use] * (np.abs(off) < HELD)
+        if (w > 0).sum() < 8:
+            continue
+        off = np.clip(off, -HELD, HELD)
+        level = np.log(size * (1 - off**2) / np.sinc(off))  # while its frequency drifts, it is observed through the window's skirt
+        t = t - np.average(t, weights=w)
+        top, bottom = top - float((w * t * level).sum()), bottom + float((w * t * t).sum())
+    return max(top / bottom if bottom > 0 else fitted, 1e-3)

@@ -1,0 +1,65 @@
+"""Which line is which mode of a body that an effect has changed: by nearness and by pattern over the strikes.
+
+    price_kj = ((ln f_k − ln f_j − s)/w)²/18 + κ (1 − c_kj),  at most 1;  Σ worth_k (price − 1) -> min over one-to-one pairs     [Kuhn 1955; Crouse 2016]
+
+c: cosine of the amplitudes' magnitudes over the strikes, κ: how strictly it is taken; s: the common shift ln f, found in turns with the pairs; worth: a line's strength, in logarithm.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sonic_bullet.effects.protocol import ObjectEvidence
+from sonic_bullet.records import Array, ModalModel
+
+WIDTH = 0.004
+MOST_LINES = 48
+
+
+def every_line(h: ObjectEvidence) -> tuple[Array, Array, Array, Array]:
+    """The strongest lines of an object, paired or not, ascending: f (k,), |A| (s, k), d (k,), and spread of f (k,)."""
+    freq = np.concatenate([h.freq_hz, h.foreign_hz])
+    size = np.abs(np.concatenate([h.amplitude, h.foreign_amplitude], axis=1))
+    decay = np.concatenate([h.decay_per_s, h.foreign_decay_per_s])
+    sd = np.concatenate([h.freq_sd_hz, np.zeros(len(h.foreign_hz))])
+    strong = np.argsort(-np.nan_to_num(size).max(axis=0))[:MOST_LINES]
+    strong = strong[np.argsort(freq[strong])]
+    return freq[strong], size[:, strong], decay[strong], sd[strong]
+
+
+def patterns(h: ObjectEvidence, model: ModalModel) -> Array:
+    """|J φ(p)·e φ(q)·n| (s, m) of the strikes."""
+    level = np.where(np.isfinite(h.impulse_n_s), h.impulse_n_s, 1.0)
+    push = np.einsum("sxm,sx->sm", model.shape[h.strike_vertex].astype(float), h.strike_direction) * level[:, None]
+    return np.asarray(np.abs(push * np.einsum("xm,x->m", model.shape[h.sensor_vertex].astype(float), h.sensor_direction)))
+
+
+def agreed(
+    line_hz: Array, size: Array, mode_hz: Array, pattern: Array, *, shift: float = 0.0, turns: int = 2, width: float = WIDTH, strict: float = 1.0
+) -> tuple[float, Array, Array, float]:
+    """(score, line (p,), mode (p,), shift): the least price, 0 where nothing pairs and −Σ worth where all do."""
+    from scipy.optimize import linear_sum_assignment
+
+    if not (np.isfinite(size).all() and size.any() and np.isfinite(pattern).all() and pattern.any()):  # lists of frequencies, or strikes of unknown place
+        size, pattern = np.ones((1, len(line_hz))), np.ones((1, len(mode_hz)))
+    strength = size.max(axis=0)
+    worth = np.clip(1 + 0.25 * np.log10(np.maximum(strength / strength.max(), 1e-6)), 0.1, 1)
+    participation = pattern.max(axis=0)
+    force = np.clip(1 + 0.25 * np.log10(np.maximum(participation / max(participation.max(), 1e-300), 1e-6)), 0.1, 1)
+    if len(size) > 1:
+        alike = (size.T @ pattern) / np.maximum(np.linalg.norm(size, axis=0)[:, None] * np.linalg.norm(pattern, axis=0)[None, :], 1e-300)
+    else:
+        alike = np.ones((size.shape[1], pattern.shape[1]))
+    x, y = np.log(line_hz)[:, None], np.log(mode_hz)[None, :]
+    row = column = np.zeros(0, int)
+    score = 0.0
+    for turn in range(turns + 1):
+        price = np.minimum(((x - y - shift) / width) ** 2 / 18 + strict * (1 - alike), 1.0) - 1.0
+        price = price * worth[:, None] * force[None, :]
+        row, column = linear_sum_assignment(price)
+        good = price[row, column] < 0
+        row, column = row[good], column[good]
+        score = float(price[row, column].sum())
+        if turn < turns and len(row):
+            shift += float(np.clip(np.median((x - y)[row, column] - shift), -0.01, 0.01))
+    return score, row, column, shift

@@ -1,0 +1,58 @@
+"""Points of a body's surface, and least squares that few outliers spoil."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sonic_bullet.records import Array, ModalModel
+
+
+def nearest(x: ModalModel, place: tuple[float, float, float]) -> int:
+    """The surface vertex nearest to a place."""
+    body: Array = np.unique(x.face)
+    return int(body[np.argmin(((x.vertex_m[body] - np.array(place)) ** 2).sum(axis=1))])
+
+
+def spread_out(x: ModalModel, count: int) -> Array:
+    """About ``count`` surface vertices (p,), each the farthest from those before it [Gonzalez 1985]."""
+    body = np.unique(x.face)
+    at = x.vertex_m[body]
+    selected = [0]
+    gap = ((at - at[0]) ** 2).sum(axis=1)
+    for _ in range(min(count, len(body)) - 1):
+        selected.append(int(gap.argmax()))
+        gap = np.minimum(gap, ((at - at[selected[-1]]) ** 2).sum(axis=1))
+    return np.asarray(body[selected])
+
+
+def vertex_normals(model: ModalModel) -> Array:
+    """Outward unit normals (v, 3), by the faces around a vertex weighted with their areas."""
+    v, f = model.vertex_m, model.face
+    corner = v[f]
+    cross = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    normal = np.zeros_like(v)
+    for i in range(3):
+        np.add.at(normal, f[:, i], cross)
+    return np.asarray(normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300))
+
+
+def solved(y: Array, sd: Array, columns: Array) -> tuple[Array, Array]:
+    """Coefficients (c,) >= 0 of columns (k, c), of any scale, that say y (k,) of spreads sd best, and twice Huber's losses (k,) left.
+
+    Huber's weights [Huber 1964] on least squares without negative numbers [Lawson & Hanson 1974].
+    """
+    from scipy.optimize import nnls
+
+    weight = 1 / sd
+    size = np.sqrt(((columns * weight[:, None]) ** 2).sum(axis=0))
+    scale = np.divide(1, size, out=np.zeros(len(size)), where=size > 0)  # of what nothing is known, nothing is said
+    a, b = columns * scale * weight[:, None], y * weight
+    trust, x = np.ones(len(y)), np.zeros(columns.shape[1])
+    for _ in range(8):
+        root = np.sqrt(trust)
+        x = nnls(a * root[:, None], b * root)[0]
+        before, trust = trust, np.minimum(1.0, 3.0 / np.maximum(np.abs(b - a @ x), 1e-12))
+        if np.abs(trust - before).max() < 1e-3:
+            break
+    off = np.abs(b - a @ x)
+    return x * scale, np.where(off <= 3, off**2, 6 * off - 9)

@@ -1,0 +1,122 @@
+"""`orthotropy`: stiffness that depends on direction: crystals, wood, rolled and laid-up sheets. Axes are the mesh's.
+
+    σ = C ε with C cubic (3 constants), hexagonal about x, y or z (5) or orthorhombic (9)      [Nye 1957, ch. VIII; Migliori et al. 1993]
+
+Read off all lines, whatever isotropic modes they were paired with (tensor_search.py); None where isotropy does as well. Density is the guess's:
+modes tell C/ρ alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from sonic_bullet.effects.orthotropy.tensor_lines import CAP, body_lines_of, ringing
+from sonic_bullet.effects.orthotropy.tensor_search import WIDTHS, Tensor, fitted, isotropic_p, search
+from sonic_bullet.effects.orthotropy.tensors import NAMES, SYMMETRIES, p_of
+from sonic_bullet.effects.protocol import Cost, Evidence, ObjectEvidence, Owner, Stage, Traits
+from sonic_bullet.records import ORTHOTROPIC, Array, Material
+
+BETTER = 10.0  # in BIC, than isotropy
+NEARER = 0.7  # of isotropy's rms of ln f, lines beyond the cap counted at the cap
+IN_A_ROOM = 30.0  # or in BIC, with a line more within the cap: half of those in a room are no modes, and beyond it whatever the tensor
+SUFFICES = 5e-3  # rms of ln f from the nearest isotropic mode that leaves nothing to look for: split pairs, corrected meshes
+LEAST = 0.03  # of ln E_i/E_j or ln of Zener's ratio: less is the mesh's
+
+
+@dataclass(frozen=True)
+class Orthotropy:
+    """constants_pa (9,): C11 C22 C33 C23 C13 C12 C44 C55 C66. symmetry: one of "cubic", "hexagonal-x" to "-z", "orthorhombic". held: identified by no mode."""
+
+    id: ClassVar[str] = "orthotropy"
+    stage: ClassVar[Stage] = Stage.MATERIAL
+    owner: ClassVar[Owner] = Owner.MATERIAL
+    reference: ClassVar[str] = "Nye 1957, ch. VIII; Migliori et al. 1993; Bodig & Jayne 1982, ch. 3"
+    traits: ClassVar[Traits] = Traits(moves_modes=True, cost=Cost.COSTLY)
+
+    constants_pa: tuple[float, ...]
+    symmetry: str = "orthorhombic"
+    held: tuple[str, ...] = ()
+
+    @property
+    def stiffness_pa(self) -> Array:
+        """(6, 6), Voigt."""
+        found = np.zeros((6, 6))
+        for (i, j), c in zip(ORTHOTROPIC, self.constants_pa, strict=True):
+            found[i, j] = found[j, i] = c
+        return found
+
+    def apply(self, x: Material) -> Material:
+        """The material with the effect in it."""
+        return replace(x, stiffness_pa=self.stiffness_pa)
+
+    def parameters(self) -> dict[str, Any]:
+        """What it says, for people and JSON, in SI units."""
+        compliance = np.linalg.inv(self.stiffness_pa)
+        youngs = 1 / np.diag(compliance)
+        c = dict(zip(("c11", "c22", "c33", "c23", "c13", "c12", "c44", "c55", "c66"), self.constants_pa, strict=True))
+        names = {"cubic": ("c11", "c12", "c44")}.get(self.symmetry, tuple(c))
+        values: dict[str, Any] = {"symmetry": self.symmetry} | {f"{name}_pa": float(c[name]) for name in names}
+        values |= {"youngs_ratio": [1.0, float(youngs[1] / youngs[0]), float(youngs[2] / youngs[0])], "youngs_x_pa": float(youngs[0])}
+        if self.symmetry == "cubic":
+            values["zener_ratio"] = float(2 * c["c44"] / (c["c11"] - c["c12"]))
+        return values | ({"held_near_isotropy": list(self.held)} if self.held else {})
+
+    def freedom(self) -> int:
+        return SYMMETRIES[self.symmetry]
+
+    @classmethod
+    def of(cls, tensor: Tensor, density_kg_m3: float) -> Self:
+        """A fitted tensor's."""
+        stiff = tensor.stiffness_m2_s2 * density_kg_m3
+        return cls(tuple(float(stiff[i, j]) for i, j in ORTHOTROPIC), tensor.symmetry, tensor.held)
+
+    @classmethod
+    def propose(cls, evidence: Evidence) -> Self | None:
+        bodies = body_lines_of(evidence)
+        if isinstance(evidence.known, cls) and bodies:
+            density = bodies[0].elastic.material.density_kg_m3
+            start = p_of(evidence.known.stiffness_pa / density)
+            return cls.of(fitted(bodies, evidence.known.symmetry, start, isotropic_p(bodies[0].elastic), WIDTHS[4:]), density)
+        lines = sum(len(t.log_hz) for t in bodies)
+        if lines < 6 or all(_fits(h) for h in evidence.observed):
+            return None
+        found = search(evidence)
+        if found is None:
+            return None
+        plain, best = found
+        gain, dry = plain.bic - best.bic, any(h.dry for h in evidence.observed)
+        anisotropic = gain > BETTER and best.off < NEARER * plain.off
+        anisotropic |= dry and gain > IN_A_ROOM and round(lines * (best.matched - plain.matched)) >= 1
+        if not anisotropic or departure(best) < LEAST:
+            return None
+        return cls.of(best, bodies[0].elastic.material.density_kg_m3)
+
+
+def departure(tensor: Tensor) -> float:
+    """How far from isotropy: the largest of |ln E_i/E_j| and |ln G_ij/(√(E_i E_j)/2(1+n_ij))|."""
+    p = tensor.p
+    goes = 0.5 * np.array([p[1] + p[2], p[0] + p[2], p[0] + p[1]]) - np.log(2 * (1 + p[3:6]))
+    return float(max(np.ptp(p[:3]), np.abs(p[6:] - goes).max()))
+
+
+def _fits(h: ObjectEvidence) -> bool:
+    """Whether the isotropic body's modes are where the lines are."""
+    if not len(h.freq_hz):
+        return False
+    off, own = np.log(h.freq_hz / h.model_hz), ringing(h)
+    shift = float(np.median(off))
+    left = np.minimum(np.abs(off - shift), CAP)
+    if own.any():
+        model = h.plain or h.model
+        modes = model.freq_hz if model is not None else h.all_hz
+        strange = np.abs(np.log(h.foreign_hz[own][:, None] / modes[None, :]) - shift).min(axis=1)
+        left = np.concatenate([left, np.minimum(strange, CAP)])
+    size = np.concatenate([np.linalg.norm(np.nan_to_num(a), axis=0) for a in (h.amplitude, h.foreign_amplitude[:, own])])
+    worth = np.clip(0.5 + 0.06 * np.log10(np.maximum(size / max(size.max(initial=0), 1e-300), 1e-12)), 0.05, 1) if size.any() else np.ones(len(left))
+    return bool(np.sqrt((worth * left**2).sum() / worth.sum()) < SUFFICES)
+
+
+__all__ = ["NAMES", "Orthotropy", "departure"]

@@ -1,0 +1,101 @@
+"""A body's lines, whatever they stand for, beside the modes that a tensor gives it, and which is which.
+
+ObjectEvidence -> BodyLines;   BodyLines, p -> Seen (`Elastic.look`);   BodyLines, Seen -> pairs at the least price      [Kuhn 1955]
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from sonic_bullet.effects.orthotropy.tensors import stiffness
+from sonic_bullet.effects.protocol import Elastic, Evidence, ObjectEvidence
+from sonic_bullet.records import Array
+
+CAP = 0.012  # of ln f: a line farther off is no such mode
+BRIEF = 10.0  # times the modes' usual decay
+SHORT = 2.0  # times its frequency a mode's decay at most: a loss factor of 0.64, more than soft rubber's
+REAL = 0.75  # of a line's energy in phase with the impact, where phases are true: a mode moves with it or against it, noise as it likes
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BodyLines:
+    """One body's lines: ln f and spread (k,), worth (k,), amplitude (s, k) or None where patterns say nothing, row (s,): which strikes of `Elastic.look`."""
+
+    log_hz: Array
+    sd: Array
+    worth: Array
+    amplitude: Array | None
+    row: Array
+    elastic: Elastic
+
+
+def body_lines_of(evidence: Evidence) -> list[BodyLines]:
+    """All lines, whatever they were paired with, of the objects that can be of any elasticity."""
+    return [_body_lines(h) for h in evidence.observed if h.elastic is not None and len(h.freq_hz) + len(h.foreign_hz) > 4]
+
+
+def ringing(h: ObjectEvidence) -> Array:
+    """Which foreign lines (f,) may be modes by their decay and phases; others are a click's, a filter's, a room's or noise."""
+    decay = np.nan_to_num(h.foreign_decay_per_s)
+    own = decay < SHORT * h.foreign_hz
+    if np.isfinite(h.decay_per_s).any():
+        own &= decay < BRIEF * max(float(np.nanmedian(h.decay_per_s)), 1.0)
+    if h.elastic is not None and h.elastic.phased and h.signed and len(h.foreign_amplitude) > 1:
+        a = np.nan_to_num(h.foreign_amplitude)
+        own &= (a.real**2).sum(axis=0) >= REAL * (np.abs(a) ** 2).sum(axis=0)
+    return np.asarray(own)
+
+
+def _body_lines(h: ObjectEvidence) -> BodyLines:
+    assert h.elastic is not None
+    own = ringing(h)
+    freq, decay = np.concatenate([h.freq_hz, h.foreign_hz[own]]), np.concatenate([h.decay_per_s, h.foreign_decay_per_s[own]])
+    sd = np.concatenate([h.freq_sd_hz / np.maximum(h.freq_hz, 1e-9), np.full(int(own.sum()), 1e-4)])
+    amplitude = np.concatenate([h.amplitude, h.foreign_amplitude[:, own]], axis=1)
+    order = np.argsort(freq)
+    amplitude = amplitude[:, order]
+    size = np.linalg.norm(np.nan_to_num(amplitude), axis=0)
+    worth = np.clip(0.5 + 0.06 * np.log10(np.maximum(size / max(size.max(initial=0), 1e-300), 1e-12)), 0.05, 1) if size.any() else np.full(len(freq), 0.5)
+    log_hz = np.log(np.hypot(2 * np.pi * freq, np.nan_to_num(decay)) / (2 * np.pi))[order]
+    wide = np.nan_to_num(decay)[order] / (2 * np.pi * np.exp(log_hz))
+    worth = worth / (1 + (wide / CAP) ** 2)  # a line broader than that stands for whatever is beside it, too
+    row = h.strike_vertex - h.sensor_vertex  # from the end: the sensor is the last
+    known = np.isfinite(amplitude).all() and len(row) > 1
+    return BodyLines(log_hz, np.nan_to_num(sd, nan=1e-4)[order], worth, amplitude if known else None, row, h.elastic)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Seen:
+    """A tensor's modes beside one body's lines: log_hz (m,), slope of ln λ by mode (k,) -> (9, k), alike (k, m)."""
+
+    log_hz: Array
+    slope: Callable[[Array], Array]
+    alike: Array
+
+
+def seen_by(lines: BodyLines, p: Array) -> Seen:
+    """The modes of p and how alike their patterns are to the lines'."""
+    freq, slope, psi = lines.elastic.look(stiffness(p))
+    alike = np.ones((len(lines.log_hz), len(freq)))
+    if lines.amplitude is not None:
+        psi = psi[len(psi) + lines.row]
+        if np.isfinite(psi).all():
+            a = lines.amplitude if lines.elastic.phased else np.abs(lines.amplitude)
+            psi = psi if lines.elastic.phased else np.abs(psi)
+            alike = np.abs(a.T @ psi) / np.maximum(np.linalg.norm(a, axis=0)[:, None] * np.linalg.norm(psi, axis=0), 1e-300)
+    return Seen(np.log(freq), slope, alike)
+
+
+def paired(lines: BodyLines, seen: Seen, width: float, lowest: int | None = None) -> tuple[Array, Array, float]:
+    """Lines and modes (k',) paired at the least price, and the price over the lines' worth. lowest: how many of the lines, all where None."""
+    from scipy.optimize import linear_sum_assignment
+
+    gap = (lines.log_hz[:lowest, None] - seen.log_hz[None, :]) / width
+    price = lines.worth[:lowest, None] * (np.minimum(gap**2 / 18 + 1 - seen.alike[:lowest], 1.0) - 1.0)
+    line, mode = linear_sum_assignment(price)
+    good = price[line, mode] < 0
+    line, mode = line[good], mode[good]
+    return line, mode, 1 + float(price[line, mode].sum() / lines.worth.sum())

@@ -1,0 +1,86 @@
+"""Effects in presets, and in the run time: what belongs to a material or an object sounds in every scene.
+
+{"id": …, fields} <-> Effect;   Material.effects -> MATERIAL before the modes are solved, MODES after, BANK as they ring
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from sonic_bullet.effects.amplitude_damping import AmplitudeDamping
+from sonic_bullet.effects.amplitude_pitch import AmplitudePitch
+from sonic_bullet.effects.damping_law import DampingLaw
+from sonic_bullet.effects.mode_splitting import ModeSplitting
+from sonic_bullet.effects.protocol import Effect, Ring, RotatesPairs, Stage
+from sonic_bullet.records import Material, ModalModel
+from sonic_bullet.records.errors import RecordError
+
+KEPT: tuple[type[Effect], ...] = (DampingLaw, ModeSplitting, AmplitudePitch, AmplitudeDamping)
+"""Effects that a preset may hold. A stiffness that depends on direction is the preset's own elasticity; radiation is the run time's own."""
+
+
+FILE_NAMES = {"damping_growth": "choke"}
+"""Fields whose name in a preset file is another: files written before keep their meaning."""
+
+
+def stored(effect: Effect) -> dict[str, Any]:
+    """What a preset file holds of an effect: all but what it does not say (NaN)."""
+    values = {FILE_NAMES.get(name, name): value for name, value in msgspec.to_builtins(effect).items()}
+    return {"id": effect.id} | {name: value for name, value in values.items() if not (isinstance(value, float) and np.isnan(value))}
+
+
+def effect_of(data: dict[str, Any]) -> Effect:
+    """The effect that `stored` made these of. Raises RecordError naming what is wrong."""
+    name = data.get("id")
+    kind = next((k for k in KEPT if k.id == name), None)
+    if kind is None:
+        raise RecordError(f"there is no effect '{name}' that a preset can hold", f"use one of {', '.join(k.id for k in KEPT)}")
+    field_of = {in_file: field for field, in_file in FILE_NAMES.items()}
+    try:
+        made: Effect = msgspec.convert({field_of.get(k, k): v for k, v in data.items() if k != "id"}, kind)
+    except msgspec.ValidationError as error:
+        raise RecordError(f"effect '{name}': {error}", "mend that field") from error
+    except RecordError as error:
+        raise RecordError(f"effect '{name}': {error.what}", error.remedy) from error
+    return made
+
+
+def with_material(material: Material) -> Material:
+    """The material with its effects on stiffness and density in it."""
+    for effect in of_stage(material, Stage.MATERIAL):
+        material = replace(effect.apply(material), effects=material.effects)
+    return material
+
+
+def with_modes(model: ModalModel, material: Material) -> ModalModel:
+    """A body's model with its material's effects on modes in it, and on how they ring: bend and damping growth per peak velocity at the surface.
+
+    Where a level was measured as an impulse, the velocity is what that impulse brings about at a typical place (rms over the surface).
+    """
+    if not model.mode_count:
+        return model
+    for effect in of_stage(material, Stage.MODES):
+        model = effect.apply(model)
+    effects = of_stage(material, Stage.BANK)
+    if not effects:
+        return model
+    for effect in effects:
+        if isinstance(effect, RotatesPairs):
+            model = effect.turned(model)
+    square = (model.shape.astype(float) ** 2).sum(axis=1)
+    level = np.sqrt(square.mean(axis=0) / 3 * square.max(axis=0))
+    none = np.zeros(model.mode_count)
+    ring = Ring(model.freq_hz, model.decay_per_s, none, level, none, none)
+    for effect in effects:
+        ring = effect.apply(ring)
+    return replace(model, bend_s2_m2=ring.bend, damping_growth_s_m=ring.damping_growth, damping_growth_power=ring.damping_growth_power)
+
+
+def of_stage(material: Material, stage: Stage) -> Sequence[Effect]:
+    """A material's effects of a stage."""
+    return [e for e in material.effects if e.stage is stage]

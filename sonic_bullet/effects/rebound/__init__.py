@@ -1,0 +1,223 @@
+"""`rebound`: the striker bounces and hits again.
+
+    f(t) = J Σ_i e^i δ(t − t_i),   t_{i+1} − t_i = g e^i       flight 2v/g' and impulse both fall by the restitution e at every bounce
+                                                                                  [Goldsmith 1960, ch. 1; Falcon et al. 1998, eq. 1]
+    g goes as the impulse (free flight), or is the arm's own, whatever J
+
+Read off the recordings: what remains of them beside the model is the model again, later and weaker.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from sonic_bullet.effects.common.ringing import direct_as_expected
+from sonic_bullet.effects.protocol import Evidence, Impact, ObjectEvidence, Owner, Stage, Traits
+from sonic_bullet.effects.rebound.later_hits import EXPONENTS, LEAST, MOST_HITS, SPAN_S, hits_by_strike, second_hit, third_hit
+from sonic_bullet.records import Array
+
+FAINT = 0.02  # of the first hit: weaker ones are not played
+NEAR = 0.03  # of ln t: delays that agree
+HELD = 0.999  # of the energy of what is played again
+MOST, FEW = (
+    0.6,
+    0.05,
+)  # of the strikes show it one by one; of all recordings' energy, that it must say together where fewer do: beating degenerate modes hide it
+FADE = 2.0  # nepers over what is looked at
+ALL, CLEARLY, HALF = 0.25, 1.35, 0.5  # of what one hit leaves of all strikes: said by a second one, over the next best exponent, and left by all hits
+APART = 1.3  # loudest over softest strike, for that
+RATIOS = (0.75, 0.9, 1.0)
+HITS = (3, 4, 5, MOST_HITS)
+RESTITUTIONS = (0.2, 0.35, 0.5, 0.65, 0.8)
+SOUGHT = 0.07  # of what is left, that a third hit looked for at every lag must take: some lag always takes something
+
+
+@dataclass(frozen=True)
+class Rebound:
+    """First gap in s at the impulse impulse_n_s, going as impulse^exponent; restitution: of each next hit and gap against the last; ratio of gaps."""
+
+    id: ClassVar[str] = "rebound"
+    stage: ClassVar[Stage] = Stage.FORCE
+    owner: ClassVar[Owner] = Owner.STRIKER
+    reference: ClassVar[str] = "Goldsmith 1960, ch. 1; Falcon et al. 1998"
+    traits: ClassVar[Traits] = Traits()
+
+    gap_s: float
+    impulse_n_s: float
+    restitution: float
+    exponent: float = 0.0
+    shrink: float | None = None  # of the gaps; the restitution where None
+    hits: int = MOST_HITS
+
+    def apply(self, x: Impact) -> Impact:
+        """The impact with the effect in it."""
+        gap = self.gap_s * (x.impulse_n_s / self.impulse_n_s) ** self.exponent
+        ratio = self.restitution if self.shrink is None else self.shrink
+        share = self.restitution ** np.arange(self.hits)
+        share = share[share > FAINT]
+        when = gap * np.concatenate([[0.0], np.cumsum(ratio ** np.arange(len(share) - 1))])
+        delay = (x.delay_s[:, None] + when).ravel()
+        return replace(x, delay_s=delay, share=(x.share[:, None] * share).ravel())
+
+    def parameters(self) -> dict[str, Any]:
+        """What it says, for people and JSON, in SI units."""
+        shrink = self.restitution if self.shrink is None else self.shrink
+        return {
+            "gap_s": self.gap_s,
+            "J0_n_s": self.impulse_n_s,
+            "restitution": self.restitution,
+            "gap_ratio": shrink,
+            "exponent": self.exponent,
+            "hits": self.hits,
+        }
+
+    def freedom(self) -> int:
+        return 3
+
+    @classmethod
+    def propose(cls, evidence: Evidence) -> Self | None:
+        h = max((h for h in evidence.observed if h.signal is not None), key=lambda h: len(h.freq_hz), default=None)
+        if h is None or len(h.freq_hz) < 3:
+            return None
+        if isinstance(evidence.known, cls):
+            again = _refined(evidence.known, h, known=True)[1]
+            return replace(evidence.known, **again) if again["restitution"] > LEAST else None
+        return cls._one_by_one(h) or cls._of_all(h)
+
+    @classmethod
+    def _of_all(cls, h: ObjectEvidence) -> Self | None:
+        """Read off all strikes at once: what rings for long is alike a whole number of turns later, so that one strike alone tells many a delay.
+
+        Strikes of one strength are of no use: there all exponents say the same, and nothing tells a hit from what beats.
+        """
+        level = np.array([j if np.isfinite(j) else 1.0 for j in h.impulse_n_s])
+        if len(level) < 2 or level.max() < APART * level.min():
+            return None
+        reference = float(np.exp(np.log(level).mean()))
+        (said, gap, exponent), (next_best, _, _), *_ = sorted(second_hit(h, level / reference), reverse=True)
+        if not (said > ALL and said > CLEARLY * next_best):
+            return None
+        start = cls(gap, reference, RESTITUTIONS[1], exponent, None, 2)
+        left, best = min((_refined(replace(start, hits=k), h) for k in (2, *HITS)), key=lambda end: end[0])
+        alone, count = _refined(replace(start, hits=1), h)[0], len(level)
+        return replace(start, **best) if best["restitution"] > LEAST and count + left < HALF * (count + alone) else None
+
+    @classmethod
+    def _one_by_one(cls, h: ObjectEvidence) -> Self | None:
+        """Read off each strike, and what they agree on."""
+        found = [(level, hits) for level, hits in zip(h.impulse_n_s, hits_by_strike(h), strict=True) if len(hits)]
+        need = max(2.0, MOST * len(h.impulse_n_s))
+        if len(found) < 2:
+            return None
+        level = np.array([j if np.isfinite(j) else 1.0 for j, _ in found])
+        reference = float(np.exp(np.log(level).mean()))
+        every = [np.array(hits) for _, hits in found]
+        agreed = [
+            (_agreed([np.log(t[:, 0]) - p * np.log(j / reference) for t, j in zip(every, level, strict=True)], [t[:, 1] for t in every]), p) for p in EXPONENTS
+        ]
+        (_, first, which), exponent = max(agreed, key=lambda a: a[0][0])
+        mine = [(t, i) for t, i in zip(every, which, strict=True) if i >= 0]
+        share = np.array([t[i, 1] for t, i in mine])
+        if len(mine) < 2 or _spread(np.log(share)) > 0.5:
+            return None
+        after = [t[t[:, 0] > 1.03 * t[i, 0]] for t, i in mine]
+        score, ratio, _ = _agreed([np.log(np.maximum(a[:, 0] / t[i, 0] - 1, 1e-3)) for a, (t, i) in zip(after, mine, strict=True)], [a[:, 1] for a in after])
+        shrink = float(np.clip(np.exp(ratio), 0.03, 1.0)) if score > 0 and sum(len(a) > 0 for a in after) >= 2 else None
+        e = float(np.clip(np.median(share), 0.03, 0.97))
+        count = 1 + round(float(np.median([len(t) - i for t, i in mine])))
+        start = cls(float(np.exp(first)), reference, e, exponent, shrink, count)
+        ends = [_refined(replace(start, hits=k), h) for k in ((2,) if count <= 2 or shrink is None else HITS)]
+        left, best = min(ends, key=lambda end: end[0])
+        if len(mine) < need and left > _refined(replace(start, hits=1), h)[0] - FEW * len(h.impulse_n_s):
+            return None
+        return replace(start, **best)
+
+
+def _refined(start: Rebound, h: ObjectEvidence, *, known: bool = False) -> tuple[float, dict[str, Any]]:
+    """What is left, up to a constant, and the restitution, gaps and their ratio that leave least of all strikes at once: Σ_s |<y, m>|²/<m, m> is most, m the sound of all its hits.
+
+    known: whether start is near what is looked for.
+    """
+    assert h.signal is not None
+    n = min(h.signal.shape[1], 3 * int(SPAN_S[1] * h.sr))
+    size = 2 * n
+    fade = FADE * h.sr / n  # in 1/s: x(t − τ) e^{−wt} = e^{−wτ} (x e^{−wt})(t − τ), so what is cut off at n, of either, counts for less
+    window = np.exp(-fade * np.arange(n) / h.sr)
+    sound = np.fft.rfft(direct_as_expected(h)[:, :n] * window, size)
+    both, own = np.conj(sound) * np.fft.rfft(h.signal[:, :n] * window, size), np.abs(sound) ** 2
+    loud = np.argsort(-own.sum(axis=0))
+    loud = np.sort(loud[: 1 + int(np.searchsorted(np.cumsum(own.sum(axis=0)[loud]), HELD * own.sum()))])  # the bins that hold the modes
+    both, own, cycles = both[:, loud], own[:, loud], np.fft.rfftfreq(size, 1 / h.sr)[loud]
+    level = np.where(np.isfinite(h.impulse_n_s), h.impulse_n_s, 1.0)
+    total = ((h.signal[:, :n] * window) ** 2).sum(axis=1) * size / 2
+
+    def of(x: Array) -> dict[str, Any]:
+        e = float(np.clip(x[0], 0.03, 0.97))
+        shrink = None if start.shrink is None else float(np.clip(x[2], 0.03, 1.0))
+        return {"gap_s": float(start.gap_s * np.exp(x[1])), "restitution": e, "shrink": shrink, "hits": start.hits}
+
+    def left(x: Array) -> float:
+        trial, gone = replace(start, **of(x)), 0.0
+        turns: dict[bytes, Array] = {}  # where gaps do not go with strength, all strikes have one
+        for s, j in enumerate(level):
+            impact = trial.apply(Impact(float(j), np.zeros(1), np.ones(1)))
+            turn = turns.get(impact.delay_s.tobytes())
+            if turn is None:
+                turn = _turned(impact, cycles, fade)
+                turns[impact.delay_s.tobytes()] = turn
+            gone += (
+                max(float((np.conj(turn) * both[s]).real.sum()), 0.0) ** 2
+                / max(float((np.abs(turn) ** 2 * own[s]).sum()), 1e-300)
+                / max(float(total[s]), 1e-300)
+            )
+        return -gone
+
+    first = np.array([start.restitution, 0.0, start.restitution if start.shrink is None else start.shrink])
+    tries = [np.array([e, 0.0, r]) for e in (first[0], *RESTITUTIONS) for r in (first[2:] if start.shrink is None else (first[2], e, *RATIOS))]
+    best = min(tries, key=left)
+    found = _nearby(left, best)
+    if start.hits > 2 and not known:
+        gap = start.gap_s * (level / start.impulse_n_s) ** start.exponent
+        whole = np.zeros((2, len(both), size // 2 + 1), complex)
+        whole[:, :, loud] = both, own
+        e = third_hit(gap, whole[0], whole[1], total, h.sr, fade)
+        other = _nearby(left, np.array([e, 0.0, e]))
+        found = other if found[0] - other[0] > SOUGHT * (len(level) + found[0]) else found
+    return found[0], of(found[1])
+
+
+def _nearby(left: Callable[[Array], float], start: Array) -> tuple[float, Array]:
+    """The least about a start."""
+    from scipy.optimize import minimize
+
+    simplex = start + np.array([[0, 0, 0], [0.1, 0, 0], [0, 2e-4, 0], [0, 0, 2e-3]])
+    found = minimize(left, start, method="Nelder-Mead", options={"initial_simplex": simplex, "xatol": 1e-4, "fatol": 1e-6, "maxfev": 120})
+    return float(found.fun), found.x
+
+
+def _turned(impact: Impact, freq_hz: Array, fade: float) -> Array:
+    """Σ_j share_j e^{−(fade + 2πif) delay_j} (f,), in half the usual digits: phases, turns taken off, are good to 4e-7, and all of a search's time goes here."""
+    phase = np.multiply.outer(impact.delay_s, freq_hz)
+    phase = (2 * np.pi * (phase - np.rint(phase))).astype(np.float32)
+    share = (impact.share * np.exp(-fade * impact.delay_s)).astype(np.float32)
+    return np.asarray(share @ np.cos(phase) - 1j * (share @ np.sin(phase)))
+
+
+def _agreed(value: list[Array], share: list[Array]) -> tuple[float, float, list[int]]:
+    """(share in all, value, which of each strike's or -1) of the value that the largest shares of the strikes agree on."""
+    best: tuple[float, float, list[int]] = (0.0, 0.0, [-1] * len(value))
+    for centre in np.concatenate([*value, np.zeros(0)]):
+        near = [np.where(np.abs(v - centre) < NEAR, s, 0.0) for v, s in zip(value, share, strict=True)]
+        total = float(sum(s.max(initial=0.0) for s in near))
+        if total > best[0]:
+            which = [int(s.argmax()) if s.any() else -1 for s in near]
+            best = (total, float(np.median([v[i] for v, i in zip(value, which, strict=True) if i >= 0])), which)
+    return best
+
+
+def _spread(y: Array) -> float:
+    return float(np.abs(y - np.median(y)).mean())

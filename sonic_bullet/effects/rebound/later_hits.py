@@ -1,0 +1,146 @@
+"""When did a strike hit again? By what the sound of one hit says of a recording, later.
+
+strike by strike: matching pursuit over delays                          [Mallat & Zhang 1993]
+all strikes at once, by the exponent with which gaps go with strength:   what a second hit says beside the first      [Pati, Rezaiifar & Krishnaprasad 1993]
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+from sonic_bullet.effects.common.ringing import direct_as_expected
+from sonic_bullet.effects.protocol import ObjectEvidence
+from sonic_bullet.records import Array
+
+FINER, LOWEST = 4, 0.15  # lags to a sample; restitution
+SPAN_S = (1.2e-3, 0.25)
+MOST_HITS = 8
+OWN = 0.02  # of the energy of a later hit: what the first does not say as well, at least
+LEAST = 0.06  # of the first hit's share
+GAIN = 0.02  # of what is left must go with another hit
+EXPONENTS = (0.0, 1.0, 0.5, -0.2)
+
+
+def second_hit(h: ObjectEvidence, level: Array) -> list[tuple[float, float, float]]:
+    """(said, gap in s at level 1, exponent) of the second hit that says most of what one hit leaves of the strikes, on average, by exponent.
+
+    <r, x_τ>²/(|x_τ|² − <x, x_τ>²/|x|²)/|r|², r what the best share of x leaves: what x_τ says beside x   [orthogonal matching pursuit: Pati, Rezaiifar & Krishnaprasad 1993]
+    """
+    assert h.signal is not None
+    sound = direct_as_expected(h)
+    n = min(h.signal.shape[1], 3 * int(SPAN_S[1] * h.sr))
+    reach, size = min(n, int(SPAN_S[1] * h.sr)), 2 * n
+    x, y = sound[:, :n], h.signal[:, :n]
+    energy = np.maximum((x**2).sum(axis=1, keepdims=True), 1e-300)
+    left = y - np.maximum((x * y).sum(axis=1, keepdims=True) / energy, 0.0) * x
+    spectrum = np.fft.rfft(x, size, axis=1)
+    both = np.fft.irfft(np.conj(spectrum) * np.fft.rfft(left, size, axis=1), size, axis=1)[:, :reach]
+    own = np.fft.irfft(np.abs(spectrum) ** 2, size, axis=1)[:, :reach]
+    inside = energy - np.concatenate([np.zeros((len(x), 1)), np.cumsum((x**2)[:, ::-1], axis=1)], axis=1)[:, :reach]
+    says = np.maximum(both, 0.0) ** 2 / np.maximum(inside - own**2 / energy, OWN * energy) / np.maximum((left**2).sum(axis=1, keepdims=True), 1e-300)
+    says[:, : int(SPAN_S[0] * h.sr)] = 0.0
+    lag, found = np.arange(reach), []
+    for exponent in EXPONENTS:
+        mean = np.mean([np.interp(lag * j**exponent, lag, np.minimum(one, 1.0), 0.0, 0.0) for one, j in zip(says, level, strict=True)], axis=0)
+        found.append((float(mean.max()), float(mean.argmax()) / h.sr, exponent))
+    return found
+
+
+def third_hit(gap_s: Array, both: Array, own: Array, total: Array, sr: int, fade: float) -> float:
+    """Restitution, which is the gaps' ratio too, of three hits that say most of all strikes: Σ_s |<y, m>|²/<m, m>, by correlations at every lag.
+
+    A ratio that is off by half a turn of the loudest modes leads nowhere, so all are looked at. gap_s, total (s,): first gaps, energies; both, own (s, f):
+    spectra of the recordings against one hit's sound, and of that; fade in 1/s: both are faded.
+    """
+    size = 2 * (both.shape[1] - 1)
+    cross, auto = (np.fft.irfft(x, FINER * size, axis=1) * (FINER * size / 2) for x in (both, own))
+    e = np.arange(LOWEST, 1.0, 1 / (FINER * sr * gap_s.max()))
+    said = np.zeros(len(e))
+    for c, a, g, energy in zip(cross, auto, gap_s, total, strict=True):
+        late = g * (1 + e)
+        second, third = e * np.exp(-fade * g), e**2 * np.exp(-fade * late)
+        c_2, c_3, a_2, a_3, a_23 = (_lagged(x, np.rint(t * sr * FINER).astype(int)) for x, t in ((c, g), (c, late), (a, g), (a, late), (a, late - g)))
+        product = c[0] + second * c_2 + third * c_3
+        cost = a[0] * (1 + second**2 + third**2) + 2 * (second * a_2 + third * a_3 + second * third * a_23)
+        said += np.maximum(product, 0.0) ** 2 / np.maximum(cost, 1e-300) / energy
+    return float(e[int(said.argmax())])
+
+
+def _lagged(x: Array, lag: Array) -> Array:
+    """A correlation at some lags; none beyond the recording, where the transform holds negative ones."""
+    return np.where(lag < len(x) // 2, x[np.minimum(lag, len(x) - 1)], 0.0)
+
+
+def hits_by_strike(h: ObjectEvidence) -> list[list[tuple[float, float]]]:
+    """Per strike: delays in s and shares of the hits after the first, by their time.
+
+    Matching pursuit [Mallat & Zhang 1993]: the sound of one hit, as the lines and the model have it, is sought later in what is left; after every
+    find all shares are solved together.
+    """
+    assert h.signal is not None
+    sound = direct_as_expected(h)
+    reach = int(SPAN_S[1] * h.sr)
+    n = min(h.signal.shape[1], 3 * reach)
+    found = []
+    for x, y in zip(sound[:, :n], h.signal[:, :n], strict=True):
+        lags = [0.0]
+        share, left = _solved(x, y, lags, h.sr)
+        for _ in range(MOST_HITS - 1):
+            lag, strength = _sought(x, y - left, h.sr, reach)
+            if lag is None or strength < LEAST * max(share[0], 1e-300):
+                break
+            trial = [*lags, lag]
+            new, made = _solved(x, y, trial, h.sr)
+            before, after = ((y - left) ** 2).sum(), ((y - made) ** 2).sum()
+            if after > (1 - GAIN) * before or new[-1] < LEAST * new[0]:
+                break
+            lags, share, left = trial, new, made
+        rest = sorted((t, r / share[0]) for t, r in zip(lags[1:], share[1:], strict=True) if share[0] > 0 and LEAST < r / share[0] < 1.0)
+        found.append(rest)
+    return found
+
+
+def _delayed(x: Array, lag_s: float, sr: int) -> Array:
+    """x (n,) later by lag_s, between samples too: a turn of the spectrum's phase."""
+    n = len(x)
+    size = 2 * n
+    turn = np.exp(-2j * np.pi * np.fft.rfftfreq(size, 1 / sr) * lag_s)
+    return np.asarray(np.fft.irfft(np.fft.rfft(x, size) * turn, size)[:n])
+
+
+def _solved(x: Array, y: Array, lags: list[float], sr: int) -> tuple[Array, Array]:
+    """Shares (h,) by least squares, and what they make (n,)."""
+    columns = np.stack([_delayed(x, lag, sr) for lag in lags], axis=1)
+    share = np.linalg.lstsq(columns, y, rcond=None)[0]
+    return share, columns @ share
+
+
+def _sought(x: Array, rest: Array, sr: int, reach: int) -> tuple[float | None, float]:
+    """The delay at which x explains most of what is left, to a sixteenth of a sample, and its strength."""
+    size = 2 * len(x)
+    both = np.conj(np.fft.rfft(x, size)) * np.fft.rfft(rest, size)
+    cross = np.fft.irfft(both, size)[:reach]
+    energy = np.cumsum((x**2)[::-1])[::-1]  # of what of x is still inside, once delayed
+    inside = energy[0] - np.concatenate([[0.0], np.cumsum((x**2)[::-1])])[:reach]
+    if not energy[0] > 0:
+        return None, 0.0
+    strength = cross / np.maximum(inside, 1e-3 * energy[0])
+    first = int(SPAN_S[0] * sr)
+    gain = np.where(strength > 0, strength**2 * inside, 0.0)
+    gain[:first] = 0.0
+    i = int(gain.argmax())
+    if gain[i] <= 0:
+        return None, 0.0
+    between, turn = _between(size)
+    fine = (turn @ (both * np.exp(2j * np.pi * np.arange(len(both)) * i / size))).real * 2 / size  # <x later by (i + between)/sr, rest>
+    at = int(fine.argmax())
+    return (i + float(between[at])) / sr, float(fine[at]) / max(float(inside[i]), 1e-300)
+
+
+@lru_cache(maxsize=1)
+def _between(size: int) -> tuple[Array, Array]:
+    """Fractions of a sample (33,), and what turns a spectrum's products by each (33, b)."""
+    between = np.linspace(-1, 1, 33)
+    return between, np.exp(2j * np.pi * np.outer(between, np.arange(size // 2 + 1)) / size)

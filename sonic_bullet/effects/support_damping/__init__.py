@@ -1,0 +1,85 @@
+"""`support-damping`: a fixture takes energy where it touches.
+
+    q̈ + (2d + Σ_j c_j Φ_jᵀΦ_j) q̇ + Λq = 0      c in N·s/m; Φ_j: φ(p_j)·n, or φ(p_j) in every direction        [Zheng & James 2011; Woodhouse 1998, eq. 12]
+
+to first order Δd_k = ½ Σ_j c_j |φ_k(p_j)|²; modes at one frequency turn to the dashpot, and strong ones couple: `dashpots`.
+Read off decays and patterns together: what dashpots all over the surface would make of the modes is held against the lines, beside a smooth law
+of the material; one after another the best stand, while each explains enough of what is left.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from sonic_bullet.effects.common.dashpots import damped
+from sonic_bullet.effects.common.points import nearest, vertex_normals
+from sonic_bullet.effects.protocol import Cost, Evidence, Mixing, Owner, Stage, Traits
+from sonic_bullet.effects.support_damping.dashpot_fit import Dashpot, DashpotFit
+from sonic_bullet.effects.support_damping.support_search import NEARER, refined, sought, tuned
+from sonic_bullet.records import Array, ModalModel
+
+FEWEST_LINES, AGAIN = 6, 4  # lines: to look for dashpots, and to fit them again to a part of them
+LEAST = 0.02  # of a decay: dashpots that add less to every one are none, though modes are identified anew with them
+
+
+@dataclass(frozen=True)
+class SupportDamping:
+    """Dashpots of strength (j,) in N·s/m at position_m (j, 3) on the surface, in the mesh's frame; along (j,): "normal" to it, or "every" direction; () all normal."""
+
+    id: ClassVar[str] = "support-damping"
+    stage: ClassVar[Stage] = Stage.MODES
+    owner: ClassVar[Owner] = Owner.FIXTURE
+    reference: ClassVar[str] = "Zheng & James 2011, section 5 (contact damping); Woodhouse 1998, eq. 12"
+    traits: ClassVar[Traits] = Traits(moves_modes=True, mixing=Mixing.NEIGHBOURS, cost=Cost.SEARCHES)
+
+    position_m: tuple[tuple[float, float, float], ...]
+    strength_n_s_m: tuple[float, ...]
+    along: tuple[str, ...] = ()
+
+    def apply(self, x: ModalModel) -> ModalModel:
+        """The modes with the effect in them."""
+        if not any(self.strength_n_s_m) or not x.mode_count:
+            return x
+        normal = vertex_normals(x)
+        rows: list[Array] = []
+        for place, c, direction in zip(self.position_m, self.strength_n_s_m, self.along or ("normal",) * len(self.position_m), strict=True):
+            at = nearest(x, place)
+            phi = x.shape[at].astype(float)
+            rows.append(np.sqrt(c) * (phi if direction == "every" else normal[at][None] @ phi))
+        return damped(x, np.concatenate(rows))
+
+    def parameters(self) -> dict[str, Any]:
+        """What it says, for people and JSON, in SI units."""
+        return {"position_m": [list(p) for p in self.position_m], "c_n_s_m": list(self.strength_n_s_m)}
+
+    def freedom(self) -> int:
+        return 3 * len(self.strength_n_s_m)
+
+    @classmethod
+    def propose(cls, evidence: Evidence) -> Self | None:
+        observed = max(evidence.observed, key=lambda h: len(h.freq_hz) if h.model is not None else 0)
+        if observed.model is None or len(observed.freq_hz) < (FEWEST_LINES if evidence.known is None else AGAIN) or not np.isfinite(observed.decay_per_s).all():
+            return None
+        trial = DashpotFit.of(observed)
+        if isinstance(evidence.known, cls):
+            return cls._of(trial, tuned(trial, refined(trial, evidence.known._on(observed.model), NEARER[-2:])[1]))
+        found = sought(trial)
+        return cls._of(trial, found) if found and _most(trial, found) > LEAST else None
+
+    @classmethod
+    def _of(cls, trial: DashpotFit, found: tuple[Dashpot, ...]) -> Self:
+        place = [trial.model.vertex_m[d.vertex] for d in found]
+        return cls(tuple((float(a), float(b), float(c)) for a, b, c in place), tuple(d.c for d in found), tuple(d.along for d in found))
+
+    def _on(self, x: ModalModel) -> tuple[Dashpot, ...]:
+        along = self.along or ("normal",) * len(self.position_m)
+        return tuple(Dashpot(nearest(x, p), c, direction) for p, c, direction in zip(self.position_m, self.strength_n_s_m, along, strict=True))
+
+
+def _most(trial: DashpotFit, found: tuple[Dashpot, ...]) -> float:
+    """The largest share that dashpots add to a mode's decay, to first order: ½ Σ_j c_j |Φ_j|²/d."""
+    added = (trial.rows([found])[0] ** 2).sum(axis=0) / 2
+    return float((added / np.maximum(trial.model.decay_per_s, 1e-9)).max(initial=0.0))

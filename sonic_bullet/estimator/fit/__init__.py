@@ -1,0 +1,1 @@
+"""From lines and a mesh to a material: pairing, Rayleigh damping, verdict, preset."""

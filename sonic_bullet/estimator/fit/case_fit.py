@@ -1,0 +1,70 @@
+"""What a fit hands on: one object under the fitted material, and the case with all its objects.
+
+material_fit.py makes them, fit_verdict.py judges, prediction_of_lines.py, fitted_preset.py and plots/fit_plot.py use them; none of those knows another.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from sonic_bullet.estimator.fit.recorded import RecordedObject
+from sonic_bullet.estimator.lines.line_values import MaterialFit
+from sonic_bullet.files.cases import Case
+from sonic_bullet.records import Array
+
+POISSON_SD = 0.04  # of a guess
+RadiationIn = Literal["nothing", "apart", "damping"]
+"""Where a fit has what the air takes: nowhere, as nothing is lost to a medium; beside the material's α and β; or in them, where it cannot be told from them."""
+POISSON_IDENTIFIED = 0.03  # a spread of ν above this says nothing that the guess did not
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ObjectFit:
+    """One object under the fitted material. m groups of modes in the band, ascending: freq_hz with, model_hz without their correction (m,); decay_per_s (m,).
+
+    pattern (s, m): J ψ; line (m,): the line that each is, or -1; measured_hz, measured_decay_per_s (m,) NaN where none. sensor_weight (m,): of a microphone, else 1.
+    """
+
+    evidence: RecordedObject
+    freq_hz: Array
+    model_hz: Array
+    decay_per_s: Array
+    pattern: Array
+    line: Array
+    measured_hz: Array
+    measured_decay_per_s: Array
+    sensor_weight: Array
+    member: tuple[Array, ...]
+
+    @property
+    def correction(self) -> Array:
+        """freq_hz/model_hz - 1 (m,): what the mesh's error was taken to be."""
+        return np.asarray(self.freq_hz / self.model_hz - 1)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CaseFit:
+    """A fit and what it rests on. youngs_pa = γρ with ρ of the guess. damping_scatter: relative, of decays about the law.
+
+    amplitude_scatter: relative, of amplitudes about σψ. foreign_hz: strong lines that are no mode. assumed: what was taken from the guess. warnings: one line each.
+    log_spectral_db: distance of recording and synthesis (distance.py), mean over the fitted strikes; -1 where there is nothing to compare.
+    radiation: what α and β are without, or with.
+    """
+
+    case: Case
+    fit: MaterialFit
+    objects: tuple[ObjectFit, ...]
+    youngs_pa: float
+    density_kg_m3: float
+    gain_sd: float
+    damping_scatter: float
+    frequency_scatter: float
+    amplitude_scatter: float
+    foreign_hz: Array
+    assumed: tuple[str, ...]
+    warnings: tuple[str, ...]
+    log_spectral_db: float = -1.0
+    radiation: RadiationIn = "damping"

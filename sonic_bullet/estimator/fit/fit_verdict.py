@@ -1,0 +1,144 @@
+"""What a fit may claim: covariance, what is not identifiable, where the model does not fit, and whether the mesh is fine enough.
+
+fitted | not identifiable: WHICH and why | misfit: WHAT does not hold      parts joined by "; ", "fitted" alone where nothing is amiss
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from sonic_bullet.estimator.fit.case_fit import POISSON_IDENTIFIED, POISSON_SD, CaseFit, ObjectFit, RadiationIn
+from sonic_bullet.estimator.fit.comparison import hybrid_of, log_spectral_of
+from sonic_bullet.estimator.fit.mesh_error import mesh_warning
+from sonic_bullet.estimator.fit.pairing import DEGENERATE
+from sonic_bullet.estimator.fit.rayleigh import RayleighFit
+from sonic_bullet.estimator.fit.recorded import RecordedObject
+from sonic_bullet.estimator.lines.line_values import MaterialFit
+from sonic_bullet.files.cases import Case
+from sonic_bullet.records import Array
+
+DAMPING_MISFIT = 0.03  # relative scatter of decays about the law beyond their spreads
+AMPLITUDE_MISFIT = 0.25
+FREQUENCY_MISFIT = 0.01
+FOREIGN = 1e-3  # of the strongest line's energy
+PAIRED = 0.6  # share of strong lines that must be modes
+CHANCE = 0.35  # and below this share, they may be by chance: nothing is known then
+
+
+def finished(
+    case: Case,
+    evidence: tuple[RecordedObject, ...],
+    objects: tuple[ObjectFit, ...],
+    elastic: tuple[float, float, Array, float],
+    damping: RayleighFit,
+    gain: tuple[float, float, float],
+    *,
+    radiation: RadiationIn,
+    check_mesh: bool,
+    progress: Callable[[str], None] | None,
+) -> CaseFit:
+    """The CaseFit of all that was found."""
+    log_gamma, poisson, information, scatter = elastic
+    guess = evidence[0].guess
+    covariance = np.full((5, 5), np.nan)
+    unsaid: list[str] = []
+    for name in damping.said:
+        unsaid.append(f"{name} (the decays of {_decays_seen(evidence)} lines do not tell it)")
+    covariance[:2, :2] = damping.covariance
+    _elastic(covariance, information, unsaid, bool(objects))
+    if np.isfinite(gain[0]):
+        covariance[3, 3] = (gain[1] / gain[0]) ** 2
+        unsaid_gain = [e for e in evidence if e.seen is not None and not e.seen.level.all()]
+        if unsaid_gain:
+            unsaid.append("sigma (no impulse declared: it stands for gain times impulse)")
+    else:
+        unsaid.append("sigma (no strike of known place)")
+    foreign, share = _foreign(evidence, objects)
+    if share < CHANCE:  # another object, another rate, no impact: nothing that rests on the pairs is known, nor whose decays these are
+        covariance[:] = np.nan
+        unsaid = ["alpha, beta, gamma, poisson_ratio, sigma (few lines are modes, maybe by chance)"]
+    identified = np.isfinite(np.diag(covariance))
+    covariance[np.outer(identified, identified) & np.isnan(covariance)] = 0.0  # frequencies, decays and amplitudes are found apart
+    amiss = _amiss(objects, damping, scatter, gain[2], foreign, share)
+    amplitude = gain[0] if np.isfinite(gain[0]) else 1.0
+    metric, decibels = hybrid_of(objects, amplitude), log_spectral_of(objects, amplitude)
+    verdict = "; ".join([f"misfit: {', '.join(amiss)}"] * bool(amiss) + [f"not identifiable: {', '.join(unsaid)}"] * bool(unsaid)) or "fitted"
+    freq, decay, size = _modes(evidence, objects, amplitude)
+    gamma = float(np.exp(log_gamma))
+    values = (damping.alpha_per_s, damping.beta_s, gamma, amplitude, poisson)
+    found = MaterialFit(*values, covariance, verdict, metric, freq, decay, size)
+    density = guess.density_kg_m3
+    assumed = ["density (from the guess: modes tell E/ρ alone, and the gain is unknown)"]
+    if np.isnan(covariance[4, 4]):
+        assumed.append("poisson_ratio (from the guess)")
+    if not objects:
+        assumed.append("gamma (from the guess: no mesh)")
+    warnings = [note for e in evidence for note in e.notes]
+    if check_mesh and objects and not np.isnan(covariance[2, 2]):
+        warnings += mesh_warning(objects[0], gamma * density, density, poisson, progress)
+    scatters = (damping.scatter, scatter, gain[2])
+    return CaseFit(case, found, objects, gamma * density, density, gain[1], *scatters, foreign, tuple(assumed), tuple(warnings), decibels, radiation)
+
+
+def _decays_seen(evidence: tuple[RecordedObject, ...]) -> int:
+    return int(sum(np.isfinite(e.lines.decay_per_s).sum() for e in evidence))
+
+
+def _elastic(covariance: Array, information: Array, unsaid: list[str], shaped: bool) -> None:
+    """Fill in ln γ and ν."""
+    if not shaped or information[0, 0] <= 0:
+        unsaid += ["gamma (no mode of a known shape)", "poisson_ratio"]
+        return
+    determinant = np.linalg.det(information)
+    own = np.linalg.inv(information) if determinant > 1e-12 * information[0, 0] * information[1, 1] else np.full((2, 2), np.inf)
+    if own[1, 1] < POISSON_IDENTIFIED**2:
+        covariance[np.ix_([2, 4], [2, 4])] = own
+        return
+    unsaid.append("poisson_ratio (the lines change with it as with gamma)")
+    covariance[2, 2] = np.linalg.inv(information + np.diag([0, POISSON_SD**-2]))[0, 0]
+
+
+def _foreign(evidence: tuple[RecordedObject, ...], objects: tuple[ObjectFit, ...]) -> tuple[Array, float]:
+    """Frequencies of strong lines that are no mode, and the share of strong lines' worth that are modes."""
+    hz: list[float] = []
+    good = total = 0.0
+    for o in objects:
+        lines = o.evidence.lines
+        strong = lines.energy >= FOREIGN * lines.energy.max(initial=0)
+        taken = np.isin(np.arange(len(lines.freq_hz)), o.line[o.line >= 0])
+        double = np.array([f for f, who in zip(o.freq_hz, o.member, strict=True) if len(who) > 1])
+        if len(double):  # two lines of modes that count as one
+            taken |= np.abs(np.log(lines.freq_hz[:, None] / double)).min(axis=1) < 2 * DEGENERATE
+        hz += list(lines.freq_hz[strong & ~taken])
+        good, total = good + float((strong & taken).sum()), total + float(strong.sum())
+    return np.array(sorted(hz)), good / total if total else np.nan
+
+
+def _amiss(objects: tuple[ObjectFit, ...], damping: RayleighFit, scatter: float, amplitude: float, foreign: Array, share: float) -> list[str]:
+    amiss = []
+    if objects and len(foreign):
+        shown = ", ".join(f"{f:.0f}" for f in foreign[:6]) + (" …" if len(foreign) > 6 else "")
+        amiss.append(f"{len(foreign)} strong lines belong to no mode ({shown} Hz)")
+    if np.isfinite(share) and share < PAIRED:
+        amiss.append(f"only {share:.0%} of the strong lines are modes of this mesh")
+    if np.isfinite(scatter) and scatter > FREQUENCY_MISFIT:
+        amiss.append(f"frequencies scatter by {scatter:.1%} about an isotropic body's")
+    if np.isfinite(damping.scatter) and damping.scatter > DAMPING_MISFIT:
+        amiss.append(f"decays scatter by {damping.scatter:.0%} about Rayleigh's law")
+    if np.isfinite(amplitude) and amplitude > AMPLITUDE_MISFIT:
+        amiss.append(f"amplitudes scatter by {amplitude:.0%} about the model's")
+    return amiss
+
+
+def _modes(evidence: tuple[RecordedObject, ...], objects: tuple[ObjectFit, ...], gain: float) -> tuple[Array, Array, Array]:
+    """Modes of the first object at its first strike; the lines themselves where there is no shape."""
+    if objects:
+        o = objects[0]
+        lines = o.evidence.lines
+        pattern = np.abs(o.pattern[0]) * gain
+        measured = np.abs(lines.amplitude[0][o.line]) if len(lines.freq_hz) else np.zeros(len(o.line))
+        return o.freq_hz, o.decay_per_s, np.nan_to_num(np.where(np.isfinite(pattern), pattern, np.where(o.line >= 0, measured, 0.0)))
+    lines = evidence[0].lines
+    return lines.freq_hz, np.nan_to_num(lines.decay_per_s), np.nan_to_num(np.abs(lines.amplitude[0]))

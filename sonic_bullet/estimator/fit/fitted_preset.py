@@ -1,0 +1,55 @@
+"""A fit as a preset: what the run time plays, with where it comes from."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sonic_bullet.estimator.fit.case_fit import CaseFit
+from sonic_bullet.presets import DAMPING_TAKEN, FORMAT, Damping, Elasticity, Preset, Provenance, Restitution, Surface, load_material, material_names
+
+NAMES = ("alpha_per_s", "beta_s", "gamma_m2_s2", "sigma", "poisson_ratio")
+
+
+def spreads(found: CaseFit) -> dict[str, float | None]:
+    """Standard errors in the parameters' own units, None where not identifiable."""
+    sd = np.sqrt(np.diag(found.fit.covariance))
+    value = (found.fit.alpha_per_s, found.fit.beta_s, found.fit.gamma_m2_s2, found.fit.sigma, 1.0)
+    return {name: float(s * v) if np.isfinite(s) else None for name, s, v in zip(NAMES, sd, value, strict=True)}
+
+
+def preset_of(found: CaseFit) -> Preset:
+    """The preset of a fit. Surface and impact are no part of what modes tell: they are the guess's, or steel's for a guess without a name."""
+    fit = found.fit
+    guess = found.case.objects[found.objects[0].evidence.thing.name].material if found.objects else None
+    sd = np.diag(fit.covariance)
+    youngs, poisson, assumed = found.youngs_pa, fit.poisson_ratio, found.assumed
+    if np.isnan(sd[2]) and found.objects:  # what the fit does not tell must not sound as if it did
+        own = found.objects[0].evidence.guess
+        youngs, poisson, assumed = own.youngs_pa, own.poisson, (*assumed, "youngs_pa and poisson (from the guess)")
+    known = guess is not None and guess.lower() in material_names()
+    base = load_material(guess.lower() if known and guess is not None else "steel")
+    alpha, beta, total = fit.alpha_per_s, fit.beta_s, found.radiation == "damping"
+    if np.isnan(sd[:2]).all() and base.alpha_per_s is not None and base.beta_s is not None:
+        alpha, beta, total, assumed = base.alpha_per_s, base.beta_s, base.includes_radiation, (*assumed, f"{DAMPING_TAKEN}{base.name}')")
+    source = f"fitted: {found.case.name}"
+    taken = f"taken from '{base.name}'"
+    used = {o.evidence.thing.name: o for o in found.objects}
+    recordings = [r.file.name if r.file is not None else "features" for r in found.case.recordings if r.split == "fit"]
+    return Preset(
+        format=FORMAT,
+        name=f"{guess or 'fitted'} ({found.case.name})"[:100],
+        density_kg_m3=found.density_kg_m3,
+        elasticity=Elasticity(youngs_pa=youngs, poisson=float(np.clip(poisson, -0.99, 0.499)), source=source, note="; ".join(assumed)),
+        damping=Damping(alpha_per_s=alpha, beta_s=beta, includes_radiation=total, source=source),
+        surface=Surface(roughness_m=base.roughness_m, hurst=base.hurst, source=taken),
+        impact=Restitution(restitution=base.restitution, source=taken),
+        provenance=Provenance(
+            method="modes paired with damped sinusoids of maximum likelihood; least squares",
+            recordings=tuple(recordings),
+            parameters=dict(zip(NAMES, (fit.alpha_per_s, fit.beta_s, fit.gamma_m2_s2, fit.sigma, fit.poisson_ratio), strict=True)),
+            spreads=spreads(found),
+            assumed=assumed,
+            verdict=fit.verdict,
+            correction={name: tuple(float(c) for c in np.round(o.correction, 7)) for name, o in used.items()},
+        ),
+    )

@@ -1,0 +1,69 @@
+"""A fitted material played on strikes, those fitted and those not: what the sensor would record, in the recording's units.
+
+x(t) = Re Σ_j σ J ψ_j s_j e^{(−d_j + iω_j)t}      ψ, s: observation.py; ω_j with the correction learnt on the fitted strikes
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sonic_bullet.records import Array
+
+if TYPE_CHECKING:
+    from sonic_bullet.estimator.fit.case_fit import CaseFit, ObjectFit
+    from sonic_bullet.estimator.lines.joint_lines import Lines
+    from sonic_bullet.files.cases import CaseRecording
+
+MOST_NEPERS = 40.0
+
+
+def damped_sum(freq_hz: Array, decay_per_s: Array, amplitude: Array, n: int, sr: int) -> Array:
+    """Re Σ A e^{(−d + iω)t} (n,) of modes (m,), A complex at t = 0."""
+    sound = np.zeros(n)
+    for f, d, a in zip(freq_hz, decay_per_s, amplitude, strict=True):
+        if a == 0:
+            continue
+        length = n if d <= 0 else min(n, int(MOST_NEPERS / d * sr) + 1)
+        sound[:length] += np.real(a * np.exp((-d + 2j * np.pi * f) / sr * np.arange(length)))
+    return sound
+
+
+def lines_sound(lines: Lines, i: int, n: int, sr: int) -> Array:
+    """What the lines of recording i add up to (n,): the recording less this is what no damped sinusoid explains."""
+    return damped_sum(lines.freq_hz, lines.decay_per_s, lines.amplitude[i], n, sr)
+
+
+def predicted(o: ObjectFit, pattern: Array, gain: float, n: int, sr: int) -> Array:
+    """Sound (n,) of an object's modes with pattern (m,) = J ψ from the onset on."""
+    assert o.evidence.seen is not None
+    start = o.evidence.seen.start(o.freq_hz, o.decay_per_s)
+    observed = o.freq_hz < 0.5 * sr
+    return damped_sum(o.freq_hz[observed], o.decay_per_s[observed], (gain * pattern * start)[observed], n, sr)
+
+
+def strike_sound(found: CaseFit, recording: CaseRecording, n: int, sr: int, *, corrected: bool = True) -> Array:
+    """What the fit predicts of any strike of a case (n,): of a fitted object with its corrections, of another object of the material without.
+
+    Raises FileError, MeshError where the object has no mesh or the strike no place.
+    """
+    from dataclasses import replace
+
+    from sonic_bullet.estimator.fit.object_fit import object_of
+    from sonic_bullet.estimator.fit.recorded import body_family, guess_of, observed
+    from sonic_bullet.records.errors import FileError
+
+    if recording.position_m is None:
+        raise FileError("a strike without a place cannot be predicted", "give its position")
+    thing = found.case.objects[recording.object]
+    same = [o for o in found.objects if o.evidence.thing.name == recording.object]
+    guess = guess_of(thing)
+    body = same[0].evidence.family if same else body_family(found.case, thing, guess, "default", lambda _: None)
+    if body is None:
+        raise FileError(f"object '{thing.name}' has no mesh", "a prediction needs its shape")
+    seen = observed(found.case, thing, guess, (recording,), body)
+    made = object_of(found, thing, guess, body, seen, same[0] if same else None)
+    if not corrected:
+        made = replace(made, freq_hz=made.model_hz)
+    return predicted(made, made.pattern[0], found.fit.sigma, n, sr)

@@ -1,0 +1,87 @@
+"""What an object's modes lose to the air, as the run time has it, so that a fit of the material leaves it out.
+
+    d_line = ½(α + βλ) + Δd        Δd: synth.far_field, in the air that the run time plays in, of the modes on the run time's own surface (render/resonator.py)
+
+The surface matters: what a mesh costs, about a decibel of pressure, is up to a third of Δd, and only the same mesh costs the same.
+Modes that count as one line: their mean, weighted by the squares of what the strikes let the sensor hear of each.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sonic_bullet.estimator.fit.case_fit import RadiationIn
+from sonic_bullet.estimator.fit.pairing import Group, grouped
+from sonic_bullet.estimator.fit.recorded import RecordedObject
+from sonic_bullet.files.cases import Case
+from sonic_bullet.modal import read_mesh
+from sonic_bullet.modal.cache import Place
+from sonic_bullet.modal.model import surface_of
+from sonic_bullet.modal.reduced import Family
+from sonic_bullet.records import Air, Array, ModalModel
+from sonic_bullet.synth.far_field import radiation
+
+KNOWN = 0.02  # relative: what radiation theory and mesh leave open of a mode's Δd
+BEYOND = 1.03  # of a band's end: modes that a line within it may be paired with
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Radiated:
+    """Of each group of an object's modes (m,), as `grouped` has them: |pressure| at 1 m per modal velocity, and radiation damping in 1/s. NaN above the band."""
+
+    weight: Array
+    extra_per_s: Array
+
+
+def nothing(group: Group) -> Radiated:
+    """Where neither the sensor nor the fit asks for the air."""
+    return Radiated(np.ones(len(group.freq_hz)), np.zeros(len(group.freq_hz)))
+
+
+def radiation_in(case: Case, evidence: tuple[RecordedObject, ...]) -> RadiationIn:
+    """Whether the material's own damping can be told from what the air takes: nothing is lost to a medium, or it is known, and so are all shapes."""
+    if case.medium == "none":
+        return "nothing"
+    return "apart" if case.medium == "air" and all(e.family is not None for e in evidence) else "damping"
+
+
+def in_air(e: RecordedObject, log_gamma: float, poisson: float, to_hz: float, apart: bool, cache: Place = "default") -> Radiated | None:
+    """What an object's modes at (γ, ν) and the guess's density, those up to to_hz, radiate; None where neither its sensor nor the fit asks for the air.
+
+    apart: radiation is no part of the material's damping. Raises MeshError where its surface cannot be made.
+    """
+    assert e.family is not None and e.seen is not None
+    if not apart and e.seen.kind != "pressure":
+        return None
+    group = grouped(e.family, e.seen, log_gamma, poisson)
+    value, vector = e.family.modes(float(np.exp(log_gamma)), poisson)
+    freq = np.sqrt(value) / (2 * np.pi)
+    m = int((freq < BEYOND * to_hz).sum())
+    surface = surface_of((read_mesh(e.thing.mesh or "", e.thing.scale),), cache=cache) if apart else None
+    weight, extra = np.full(len(freq), np.nan), np.full(len(freq), np.nan)
+    weight[:m], extra[:m] = into_air(e.family, e.guess.density_kg_m3, freq[:m], vector[:, :m], surface)
+    observed = np.nan_to_num((e.seen.transfer(vector) ** 2).sum(axis=0))
+    observed = observed * weight**2 if e.seen.kind == "pressure" else observed
+    first = np.array([who[0] for who in group.member], int)
+    mean = np.array([_mean(extra[who], observed[who]) for who in group.member])
+    return Radiated(weight[first], mean)
+
+
+def _mean(value: Array, weight: Array) -> float:
+    return float(np.average(value, weights=weight)) if weight.sum() > 0 else float(value.mean())
+
+
+def into_air(
+    family: Family, density_kg_m3: float, freq_hz: Array, vector: Array, surface: tuple[Array, Array] | None = None, air: Air | None = None
+) -> tuple[Array, Array]:
+    """|w| (m,) in Pa·m per modal velocity and Δd (m,) in 1/s of modes (b, m) of the family, freq_hz (m,) ascending. Source: `synth.far_field`.
+
+    surface: vertex_m (v, 3) and face (f, 3) of another mesh of the body than the family's own.
+    """
+    vertex_m, face = surface or (family.vertex_m, family.face)
+    shape = np.einsum("vxb,bm->vxm", family.skin_at(vertex_m), vector.astype(np.float32)) / np.float32(np.sqrt(density_kg_m3 * family.length_m**3))
+    mass = family.volume_m3 * density_kg_m3
+    weight, extra = radiation(ModalModel(freq_hz, np.zeros(len(freq_hz)), shape, vertex_m, face, np.zeros(len(face)), family.volume_m3, mass), air or Air())
+    return np.abs(weight), extra

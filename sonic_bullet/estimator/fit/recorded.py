@@ -1,0 +1,244 @@
+"""What a case's strikes of one object say, and the object's modes to hold it against.
+
+    CaseRecording's files -> onset cut -> hum taken out -> Lines (joint_lines.py)  \\
+                                                                                    RecordedObject, one per object
+    mesh + guess -> Family (modal.reduced) -> Observation                          /  (and one per list of features)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from sonic_bullet.effects.common.hum import without_hum
+from sonic_bullet.estimator.fit.observation import Observation, observation
+from sonic_bullet.estimator.lines.joint_lines import Lines, joint_lines, noise_rms
+from sonic_bullet.estimator.lines.onset import span
+from sonic_bullet.files import channel_of, channel_words, read_audio
+from sonic_bullet.files.cases import Case, CaseObject, CaseRecording, Line
+from sonic_bullet.modal import read_mesh
+from sonic_bullet.modal.cache import Place
+from sonic_bullet.modal.reduced import Family, family
+from sonic_bullet.records import Array, Material, Shape
+from sonic_bullet.records.errors import AudioError, FileError, MeshError
+
+MARGIN = 1.36  # √(1.3/0.7): how far the guess may put a mode too high
+MESH_M = (2e-4, 5.0)  # bodies smaller or larger than this are in another unit
+PLATE_DOF = 52_000  # unknowns: 36 ab/e² in one layer of cells
+CLIPPED = 8  # samples in a row at the file's peak
+LEAST_SAMPLES, LEAST_S, SHORTER = 256, 0.02, 0.5  # after an onset; of the usual length: that much shorter is worth a word
+SHUT_S, SHUT = 0.01, 1e-3  # of a gate: what lies before it, and behind it at least; of the peak (16 bits end at 3e-5)
+CLIPPED_RUNS = 4  # or as many rows of three: a sound that decays has one highest peak
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RecordedObject:
+    """One object's lines, its family and how its strikes are observed. family None: no mesh. signals (s, n) from the onset, None for features."""
+
+    thing: CaseObject
+    guess: Material
+    recordings: tuple[CaseRecording, ...]
+    lines: Lines
+    family: Family | None
+    seen: Observation | None
+    signals: Array | None
+    sr: int
+    notes: tuple[str, ...] = ()
+
+
+def guess_of(thing: CaseObject) -> Material:
+    """The object's guessed material: the declared constants, the named preset's for what is not declared. Raises MaterialError, FileError."""
+    from sonic_bullet.presets import load_material, material_names
+
+    given = (thing.youngs_pa, thing.poisson, thing.density_kg_m3)
+    name = (thing.material or "").lower()
+    if None not in given and name not in material_names():
+        return Material.isotropic(thing.material or "guess", youngs_pa=given[0] or 0, poisson=given[1] or 0, density_kg_m3=given[2] or 0)
+    if not name:
+        raise FileError(f"object '{thing.name}' has neither a material nor all of elastic_guess", "name a guess; 'sonic-bullet materials' lists all")
+    base = load_material(thing.material or "")
+    rest = {"alpha_per_s": base.alpha_per_s, "beta_s": base.beta_s, "roughness_m": base.roughness_m, "hurst": base.hurst, "restitution": base.restitution}
+    return Material.isotropic(
+        base.name,
+        youngs_pa=thing.youngs_pa or base.youngs_pa,
+        poisson=base.poisson if thing.poisson is None else thing.poisson,
+        density_kg_m3=thing.density_kg_m3 or base.density_kg_m3,
+        source=base.source,
+        **rest,
+    )
+
+
+def gather(
+    case: Case, *, split: str = "fit", cache: Place = "default", clipped: bool = False, progress: Callable[[str], None] | None = None
+) -> tuple[RecordedObject, ...]:
+    """RecordedObjects of all objects that have strikes of ``split`` with audio or features. clipped: let through what stands at its peak, and what holds several hits.
+
+    Raises SonicBulletError where there is none.
+    """
+    say = progress or (lambda _: None)
+    found: list[RecordedObject] = []
+    names = tuple(dict.fromkeys(r.object for r in case.recordings if r.split == split))
+    check_meshes(case, names)
+    for name in names:
+        thing = case.objects.get(name, CaseObject(name or "object", None, 1.0, None, 2e11, 7850.0, 0.3))
+        guess = guess_of(thing)
+        mine = tuple(r for r in case.recordings if r.object == name and r.split == split)
+        played = tuple(r for r in mine if r.file is not None and r.file.is_file())
+        listed = tuple(r for r in mine if r.file is None and r.lines)
+        gone = [str(r.file) for r in mine if r.file is not None and not r.file.is_file()]
+        if gone and not played and not listed:
+            raise FileError(f"cannot read {gone[0]}: no such file", "a fit needs the audio of its 'fit' strikes")
+        sounds = None
+        if played:  # before the modes, which take longer: a recording that will not do is reported at once
+            say(f"reading {len(played)} recordings of {name or 'the object'}")
+            sounds = _sounds(case, thing, played, clipped)
+        body = body_family(case, thing, guess, cache, say) if thing.mesh is not None else None
+        if sounds is not None:
+            signals, sr, remarks = sounds
+            seen = observed(case, thing, guess, played, body) if body is not None else None
+            say(f"listening to {len(played)} recordings of {name or 'the object'}")
+            modes = _modes_observed(body, guess, case.band_hz) if clipped and body is not None else None
+            still = without_hum(signals, noise_rms(signals, sr), sr)
+            lines = joint_lines(still, sr, band_hz=case.band_hz, signed=case.onset_s is not None, modes=modes)
+            notes = (*(f"{g} is missing" for g in gone), *remarks)
+            found.append(RecordedObject(thing, guess, played, lines, body, seen, signals, sr, notes))
+        found += [_listed(case, thing, guess, entry, body) for entry in listed]
+    if not found:
+        raise FileError(f"case {case.name} has no '{split}' strike with audio or features", "mark at least one recording with split 'fit'")
+    return tuple(found)
+
+
+def check_meshes(case: Case, names: Iterable[str]) -> None:
+    """Raise FileError where the mesh file of one of a case's objects is not there: before any of them is listened to, which takes long."""
+    for name in names:
+        mesh = case.objects[name].mesh if name in case.objects else None
+        if mesh is not None and not mesh.is_file():
+            raise FileError(f"mesh file '{mesh}' does not exist", "check the path")
+
+
+def _modes_observed(body: Family, guess: Material, band_hz: tuple[float, float]) -> int:
+    value, _ = body.modes(guess.youngs_pa / guess.density_kg_m3, guess.poisson)
+    return int((np.sqrt(value) / (2 * np.pi) < band_hz[1]).sum())
+
+
+def body_family(case: Case, thing: CaseObject, guess: Material, cache: Place, say: Callable[[str], None]) -> Family:
+    """The family of a case's object. Raises FileError, MeshError."""
+    shape = read_mesh(thing.mesh or "", thing.scale)
+    across = float(np.linalg.norm(np.ptp(shape.vertex_m, axis=0)))
+    if not MESH_M[0] < across < MESH_M[1]:
+        raise MeshError(f"object '{thing.name}' is {across:.3g} m across", "give the mesh in metres, or say its unit (units: mm in a case, --scale 0.001)")
+    gamma = guess.youngs_pa / guess.density_kg_m3
+    high = case.band_hz[1]
+    listed = [line.freq_hz for r in case.recordings if r.object == thing.name for line in r.lines or ()]
+    if listed and not any(r.file for r in case.recordings):
+        high = max(listed)
+    edge = mesh_edge_m(shape) if thing.fixed else None  # a free box takes polynomials, not elements
+    return family(shape, gamma_m2_s2=gamma, poisson=guess.poisson, to_hz=high * MARGIN, fixed=thing.fixed, edge_m=edge, cache=cache, progress=say)
+
+
+def mesh_edge_m(shape: Shape) -> float | None:
+    """A finer mesh for a clamped flat plate: with the usual one its higher modes are 1 to 2 % stiff, which γ and ν would be bent to. None: the usual one does."""
+    from sonic_bullet.geometry import is_closed
+    from sonic_bullet.modal.meshing.prisms import as_box
+
+    found = as_box(shape.vertex_m, shape.face) if is_closed(shape.face) else None
+    if found is None:
+        return None
+    thin, wide, long = np.sort(found[0])
+    return float(np.sqrt(36 * wide * long / PLATE_DOF)) if wide > long / 4 and thin < wide / 12 else None
+
+
+def _strikes(recordings: tuple[CaseRecording, ...]) -> list[tuple[tuple[float, float, float] | None, tuple[float, float, float] | None, float | None]]:
+    return [(r.position_m, r.direction, r.impulse_n_s) for r in recordings]
+
+
+def observed(case: Case, thing: CaseObject, guess: Material, recordings: tuple[CaseRecording, ...], body: Family) -> Observation:
+    """How strikes of an object are observed by the case's sensor. Raises MeshError where a point lies off the surface."""
+    at, along = (None if places is None else places.get(thing.name) for places in (case.sensor_m, case.sensor_direction))
+    return observation(body, guess.density_kg_m3, case.sensor, _strikes(recordings), at, along)
+
+
+def _sounds(case: Case, thing: CaseObject, recordings: tuple[CaseRecording, ...], clipped: bool) -> tuple[Array, int, list[str]]:
+    """Signals (s, n) of an object's strikes, each from its onset, their rate, and what is odd about them. Raises FileError, AudioError."""
+    sounds, rates, remarks = [], [], []
+    several: dict[str, list[str]] = {}
+    for r in recordings:
+        sound, sr = read_audio(r.file or "")
+        sounds.append(until_it_breaks_off(_checked(channel_of(sound, r.channel, r.file), str(r.file), clipped), sr))
+        if len(sounds[-1]) < sound.shape[1]:
+            remarks.append(f"{r.file} breaks off after {len(sounds[-1]) / sr:.3g} s: the digital silence behind is no decay, and is left out")
+        rates.append(sr)
+        several.setdefault(channel_words(len(sound), r.channel if r.channel_named else None), []).append(str(r.file))
+        if case.onset_s is None and (observed := span(sounds[-1], sr)).hits > 1:
+            remarks.append(f"{r.file} holds {observed.hits} hits: only what comes before the second is used")
+            sounds[-1] = sounds[-1][: observed.stop]
+    remarks += [f"{names[0]}{f' and {len(names) - 1} more' * (len(names) > 1)}: {words}" for words, names in several.items() if words]
+    if len(set(rates)) > 1:
+        raise AudioError(f"recordings of {thing.name} have rates {sorted(set(rates))} Hz", "give files of one rate")
+    sr = rates[0]
+    starts = [round(case.onset_s * sr) if case.onset_s is not None else onset_sample(sound, sr) for sound in sounds]
+    lengths = [len(sound) - start for sound, start in zip(sounds, starts, strict=True)]
+    length, which = min(lengths), str(recordings[int(np.argmin(lengths))].file)
+    if length < max(LEAST_SAMPLES, LEAST_S * sr):
+        raise AudioError(
+            f"{which} holds {1000 * max(length, 0) / sr:.0f} ms after the onset", "all are read as far as the shortest: leave it out, or give the whole"
+        )
+    if length < SHORTER * np.median(lengths):
+        remarks.append(f"all recordings of {thing.name} are read for {length / sr:.3g} s, as far as {which} goes")
+    return np.stack([sound[start : start + length] for sound, start in zip(sounds, starts, strict=True)]), sr, remarks
+
+
+def _checked(sound: Array, name: str, clipped: bool = False) -> Array:
+    """A channel that can be fitted: finite, not silent, not clipped. Raises AudioError."""
+    if not np.isfinite(sound).all():
+        raise AudioError(f"{name} holds NaN or infinite samples", "export it again")
+    peak = float(np.abs(sound).max(initial=0))
+    if not peak > 1e-7:
+        raise AudioError(f"{name} is silent", "leave it out")
+    runs = np.convolve(np.abs(sound) >= 0.9999 * peak, np.ones(CLIPPED), "valid")
+    rows = np.convolve(np.abs(sound) >= (1 - 1e-6) * peak, np.ones(3), "valid") > 2.5
+    flat = int((np.diff(rows.astype(np.int8), prepend=0) > 0).sum())
+    if not clipped and ((len(runs) and runs.max() >= CLIPPED) or flat >= CLIPPED_RUNS):
+        raise AudioError(f"{name} is clipped: rows of samples stand at its peak", "record at a lower level; a fit of it would be of the limiter")
+    return sound
+
+
+def until_it_breaks_off(sound: Array, sr: int) -> Array:
+    """A recording (n,) without the digital silence that it is filled up with: a decay ends in its last bit or in noise, not far above."""
+    observed = np.flatnonzero(sound)
+    last, short = int(observed[-1]) + 1 if len(observed) else 0, max(1, round(SHUT_S * sr))
+    end = sound[max(0, last - short) : last]
+    return sound[:last] if 0 < last < len(sound) - short and np.abs(end).max() > SHUT * np.abs(sound).max() else sound
+
+
+def onset_sample(sound: Array, sr: int) -> int:
+    """The sample after which energy has arrived: the first of the millisecond in which the power rises the most over all before it, then its peak.
+
+    A strike's pulse is over after its first peak, so lines are read from there.
+    """
+    block = max(1, sr // 1000)
+    power = (sound[: len(sound) // block * block].reshape(-1, block) ** 2).mean(axis=1) + 1e-20
+    peak = int(np.argmax(power))
+    before = np.minimum.accumulate(power[: peak + 1][::-1])[::-1] if peak else power[:1]
+    start = int(np.argmax(before > 0.05 * power[peak])) * block
+    return start + int(np.argmax(np.abs(sound[start : start + 4 * block])))
+
+
+def _listed(case: Case, thing: CaseObject, guess: Material, entry: CaseRecording, body: Family | None) -> RecordedObject:
+    """RecordedObject of a list of measured features: no phases, amplitudes where given."""
+    items: tuple[Line, ...] = tuple(sorted(entry.lines or (), key=lambda line: line.freq_hz))
+    freq = np.array([line.freq_hz for line in items])
+
+    def column(values: list[float | None], missing: Array) -> Array:
+        return np.array([m if v is None else v for v, m in zip(values, missing, strict=True)])
+
+    nothing = np.full(len(items), np.nan)
+    decay = column([line.decay_per_s for line in items], nothing)
+    amplitude = column([line.amplitude for line in items], nothing)[None, :]
+    freq_sd = column([line.freq_sd_hz for line in items], 1e-4 * freq)
+    decay_sd = column([line.decay_sd_per_s for line in items], 0.05 * decay)
+    lines = Lines(freq, decay, amplitude.astype(complex), freq_sd, decay_sd, np.abs(amplitude) * 0.1, np.array([np.nan]), np.full(len(items), 1e3), False)
+    seen = observed(case, thing, guess, (entry,), body) if body is not None else None
+    return RecordedObject(thing, guess, (entry,), lines, body, seen, None, 0)

@@ -1,0 +1,1 @@
+"""Modal identification: the damped sinusoids that strikes share, each with its spread."""

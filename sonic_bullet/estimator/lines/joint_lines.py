@@ -1,0 +1,296 @@
+"""Several recordings of one object -> the damped sinusoids they share: frequencies and decays common, amplitudes their own.
+
+    x_s(t) = Re Σ_k A_sk e^{(−d_k + iω_k) t} + noise
+    start:   shared_poles.py
+    refine:  maximum likelihood in white noise, A_sk linear and projected out              [Golub & Pereyra 1973; Kaufman 1975]
+    spread:  inverse of the information matrix at the end, so the Cramér-Rao bound          [Kay 1993, ch. 3.9]
+
+All inner products of damped sinusoids over N samples are geometric sums, closed in w = z_j z_k*: Σ wⁿ, Σ n wⁿ, Σ n² wⁿ.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from sonic_bullet.estimator.lines.likelihood import geometric, moments
+from sonic_bullet.estimator.lines.line_values import PINNED, Lines, lines_at
+from sonic_bullet.estimator.lines.log_spectral import floor_between
+from sonic_bullet.estimator.lines.pole_selection import apart, selected
+from sonic_bullet.estimator.lines.shared_poles import FASTEST_PER_S, start_poles
+from sonic_bullet.records import Array
+from sonic_bullet.records.errors import AudioError
+
+__all__ = ["PINNED", "Lines", "joint_lines", "lines_of", "noise_rms"]
+
+SIGNIFICANT = 60.0  # energy of a line over the noise's density, all recordings: a²·sr/(4dσ²) summed
+MOST_LINES = 160
+SECONDS_MAX = 8.0
+CROWD, FEWER = 2.5, 0.3  # starting lines over a body's modes; of the lines at the onset
+LATE_S = (0.03, 0.1)
+DEAD = 9.0  # of ln amplitude: 78 dB
+PLAINLY = 0.75  # of what other lines leave, in squares
+SILENT = 1e-9  # rms, of full scale 1
+FEWEST_LINES = 3  # lines that say what rings
+BEYOND = (10.0, 0.1)  # times a recording's peak; share of the lines that begin there: what no single hit leaves
+
+
+def joint_lines(signals: Array, sr: int, *, band_hz: tuple[float, float] = (20.0, 20_000.0), signed: bool = True, modes: int | None = None) -> Lines:
+    """Lines of signals (s, n), all starting at the onset of their strike. Raises AudioError where there is too little signal.
+
+    modes: about how many the body has, where more than one hit may be in a signal: several in a row make a crowd of lines, none of them a mode, or lines
+    that would have to begin far above all that was recorded. Where far fewer are left after LATE_S, or none such, lines are those, taken back to the onset:
+    A e^{(d − iω)t}, what a single hit there would have had to leave.
+    """
+    signals = np.asarray(signals, float)[:, : int(SECONDS_MAX * sr)]
+    if signals.shape[1] < 256 or not np.isfinite(signals).all():
+        raise AudioError(f"recordings of {signals.shape[1]} samples after the onset", "a fit needs at least 256 finite samples")
+    if not (np.sqrt((signals**2).mean(axis=1)) > SILENT).all():
+        raise AudioError("a recording is silent", "leave it out of the case")
+    low, high = max(band_hz[0], 5.0), min(band_hz[1], 0.485 * sr)
+    noise = noise_rms(signals, sr)
+    try:
+        return _identified(signals, noise, sr, (low, high), signed, modes, crowd=True)
+    except np.linalg.LinAlgError as error:
+        raise AudioError("lines of the recording cannot be told apart: no decaying sound", "give a recording of one impact") from error
+
+
+def _identified(signals: Array, noise: Array, sr: int, band_hz: tuple[float, float], signed: bool, modes: int | None, *, crowd: bool) -> Lines:
+    """Lines of one hit, or what is left after several; crowd: of more poles than lines those, too, that take most one after another, where these say plainly more."""
+    start = start_poles(signals / noise[:, None], sr, *band_hz)
+    few: Lines | None = None
+    for late in (round(t * sr) for t in LATE_S) if modes is not None and len(start) >= CROWD * modes else ():
+        if signals.shape[1] >= 8 * late and FEWEST_LINES <= len(start_poles(signals[:, late:] / noise[:, None], sr, *band_hz)) < FEWER * len(start):
+            after = _from(late, signals, sr, band_hz, signed)
+            few = few or after
+            if after is not None and _beyond(after, signals) < BEYOND[1]:  # else it still hits
+                return _struck(after, signals)
+    if few is not None:
+        return _struck(few, signals)
+    start = apart(start)
+    many = len(start) > MOST_LINES
+    loudest = np.argsort(-_solved(signals, noise, start, sr)[2])[:MOST_LINES] if many else np.arange(len(start))
+    found = lines_of(signals, noise, _significant(signals, noise, start[loudest], sr, *band_hz), sr, signed)
+    if many and crowd:
+        other = lines_of(signals, noise, _significant(signals, noise, start[selected(signals, noise, start, sr, MOST_LINES)], sr, *band_hz), sr, signed)
+        if ((other.noise / noise) ** 2).sum() < PLAINLY * ((found.noise / noise) ** 2).sum():
+            return other  # a room's: of hits one after another the loudest poles leave least
+    for late in (round(t * sr) for t in LATE_S) if modes is not None and _beyond(found, signals) > BEYOND[1] else ():
+        if signals.shape[1] < 8 * late:
+            break
+        after = _from(late, signals, sr, band_hz, signed)
+        if after is not None and len(after.freq_hz) >= FEWEST_LINES and _beyond(after, signals) < BEYOND[1]:
+            return _struck(after, signals)
+    return found
+
+
+def _significant(signals: Array, noise: Array, pole: Array, sr: int, low: float, high: float) -> Array:
+    """Poles polished, a full crowd twice, without those that stand out of the noise too little to be a line."""
+    colour = _colour(signals, noise, sr)
+    for turn in range(3):
+        before = len(pole)
+        pole = _polished(signals, noise, apart(pole) if turn else pole, sr, low, high)
+        _, _, energy, _ = _solved(signals, noise, pole, sr)
+        pole = pole[energy / colour(pole.imag / (2 * np.pi)) > SIGNIFICANT]
+        if (len(pole) == before and (turn or before < MOST_LINES)) or not len(pole):
+            break
+    return pole
+
+
+def _from(late: int, signals: Array, sr: int, band_hz: tuple[float, float], signed: bool) -> Lines | None:
+    """Lines from a sample on, as they would have begun at the onset; None where nothing can be identified from there, or a recording is over."""
+    rest = signals[:, late:]
+    if not (np.sqrt((rest**2).mean(axis=1)) > SILENT).all():
+        return None  # by a recording that a gate has shut nothing rang at the onset
+    try:
+        lines = _identified(rest, noise_rms(rest, sr), sr, band_hz, signed, None, crowd=False)
+    except np.linalg.LinAlgError:
+        return None
+    alive = lines.decay_per_s * late / sr < DEAD  # what would have been over by then began later
+    if not alive.all():
+        lines = lines_of(rest, lines.noise, lines.pole[alive], sr, signed)
+    if not len(lines.freq_hz):
+        return None
+    back = np.exp(-lines.pole * late / sr)
+    return replace(lines, amplitude=lines.amplitude * back, amplitude_sd=lines.amplitude_sd * np.abs(back))
+
+
+def _beyond(lines: Lines, signals: Array) -> float:
+    """Share of the lines that begin far above a recording's peak, in one of them."""
+    return float(_too_loud(lines, signals).mean()) if len(lines.freq_hz) else 0.0
+
+
+def _too_loud(lines: Lines, signals: Array) -> Array:
+    """Which lines (k,) begin far above a recording's peak, in one of them."""
+    peak = np.abs(signals).max(axis=1, keepdims=True)
+    return np.asarray((np.abs(lines.amplitude) > BEYOND[0] * peak).any(axis=0))
+
+
+def _struck(lines: Lines, signals: Array) -> Lines:
+    """The lines without those that no hit at the onset can have left: of echoes that arrive late some are over so soon that they would have begun far above all there is."""
+    return lines_at(lines, np.flatnonzero(~_too_loud(lines, signals)))
+
+
+def noise_rms(signals: Array, sr: int) -> Array:
+    """Rms (s,) of the stationary floor, white: from the lower quarter of the spectrum of each recording's last third."""
+    tail = signals[:, -signals.shape[1] // 3 :]
+    power = np.abs(np.fft.rfft(tail * np.hanning(tail.shape[1]), axis=1)) ** 2
+    density = np.quantile(power, 0.25, axis=1) / np.log(4 / 3)  # exponential law: its lower quartile is ln(4/3) of the mean
+    return np.asarray(np.maximum(np.sqrt(density / (np.hanning(tail.shape[1]) ** 2).sum()), 1e-9))
+
+
+def _colour(signals: Array, noise: Array, sr: int) -> Callable[[Array], Array]:
+    """Power of the floor at a frequency over the white noise's, which it is at least."""
+    level = np.maximum(floor_between(list(signals / noise[:, None])).variance, 1.0)
+    return lambda freq: np.asarray(np.interp(freq, np.linspace(0, sr / 2, len(level)), level))
+
+
+def _products(pole: Array, count: int) -> tuple[list[Array], list[Array]]:
+    """Geometric sums of z_j z_k* and z_j z_k, poles per sample."""
+    return list(geometric(pole, pole.conj(), count)), list(geometric(pole, pole, count))
+
+
+def _inner(a: Array, b: Array, even: Array, odd: Array) -> Array:
+    """<Re(a_j z_jⁿ), Re(b_k z_kⁿ)> (j, k)."""
+    return np.asarray(np.real(a[:, None] * b[None, :].conj() * even + a[:, None] * b[None, :] * odd) / 2)
+
+
+def _basis(even: Array, odd: Array) -> Array:
+    """Gram matrix (2k, 2k) of Re zⁿ and Re i zⁿ."""
+    one, turn = np.ones(len(even), complex), np.full(len(even), 1j)
+    return np.block([[_inner(one, one, even, odd), _inner(one, turn, even, odd)], [_inner(turn, one, even, odd), _inner(turn, turn, even, odd)]])
+
+
+def _factor(gram: Array) -> tuple[Array, Array]:
+    """Cholesky factor of a Gram matrix scaled to unit diagonal, slightly lifted, and the scale. Poles that all but coincide take a larger lift."""
+    from scipy.linalg import LinAlgError, cholesky
+
+    scale = 1 / np.sqrt(np.diag(gram))
+    unit = gram * scale[:, None] * scale
+    if not np.isfinite(unit).all():  # a tone without noise: poles that grow or stand
+        raise LinAlgError("poles out of range")
+    for lift in (1e-10, 1e-8, 1e-6):
+        try:
+            return cholesky(unit + lift * np.eye(len(gram)), lower=True), scale
+        except LinAlgError:
+            continue
+    return cholesky(unit + 1e-3 * np.eye(len(gram)), lower=True), scale
+
+
+def _solve(factor: tuple[Array, Array], right: Array) -> Array:
+    from scipy.linalg import cho_solve
+
+    lower, scale = factor
+    return np.asarray((scale * cho_solve((lower, True), (scale * right.T).T.T if right.ndim == 1 else scale[:, None] * right).T).T)
+
+
+def _solved(signals: Array, noise: Array, pole: Array, sr: int) -> tuple[Array, float, Array, Array]:
+    """amplitude (s, k), half the sum of squares over the noise, energy (k,), residual rms (s,)."""
+    z = pole / sr
+    n = signals.shape[1]
+    even, odd = _products(z, n)
+    factor = _factor(_basis(even[0], odd[0]))
+    k = len(pole)
+    amplitude = np.zeros((len(signals), k), complex)
+    residual = np.zeros(len(signals))
+    for s, signal in enumerate(signals):
+        first, _ = moments(signal, z)
+        right = np.concatenate([first.real, -first.imag])
+        a = _solve(factor, right)
+        amplitude[s] = a[:k] + 1j * a[k:]
+        residual[s] = max(float(signal @ signal - right @ a), 0.0)
+    power = np.real(np.diag(even[0])) / 2
+    energy = ((np.abs(amplitude) / noise[:, None]) ** 2).sum(axis=0) * power
+    return amplitude, float((residual / noise**2).sum() / 2), energy, np.sqrt(residual / n)
+
+
+def _normal(signals: Array, noise: Array, pole: Array, sr: int) -> tuple[Array, Array, float]:
+    """Gauss-Newton matrix (2k, 2k) and gradient (2k,) for (ω, d) with the amplitudes projected out, and half the sum of squares."""
+    z, n, k = pole / sr, signals.shape[1], len(pole)
+    even, odd = _products(z, n)
+    factor = _factor(_basis(even[0], odd[0]))
+    one, turn = np.ones(k, complex), np.full(k, 1j)
+    matrix, gradient, cost = np.zeros((2 * k, 2 * k)), np.zeros(2 * k), 0.0
+    for signal, sigma in zip(signals, noise, strict=True):
+        first, second = moments(signal, z)
+        right = np.concatenate([first.real, -first.imag])
+        a = _solve(factor, right)
+        amplitude = a[:k] + 1j * a[k:]
+        move = np.concatenate([1j * amplitude, -amplitude]) / sr  # ∂/∂ω, ∂/∂d in seconds
+        cross = np.zeros((2 * k, 2 * k))
+        square = np.zeros((2 * k, 2 * k))
+        for i in range(2):
+            here = slice(i * k, i * k + k)
+            cross[:k, here] = _inner(one, move[here], even[1], odd[1])
+            cross[k:, here] = _inner(turn, move[here], even[1], odd[1])
+            for j in range(2):
+                there = slice(j * k, j * k + k)
+                square[here, there] = _inner(move[here], move[there], even[2], odd[2])
+        matrix += (square - cross.T @ _solve(factor, cross)) / sigma**2
+        seen = np.concatenate([np.real(move[:k] * second), np.real(move[k:] * second)])
+        gradient += (seen - cross.T @ a) / sigma**2
+        cost += max(float(signal @ signal - right @ a), 0.0) / sigma**2 / 2
+    return matrix, gradient, cost
+
+
+def _polished(signals: Array, noise: Array, pole: Array, sr: int, low: float, high: float) -> Array:
+    """Poles at the maximum of the likelihood, from the k nearest start."""
+    if not len(pole):
+        return pole
+    damping = 1e-4
+    matrix, gradient, cost = _normal(signals, noise, pole, sr)
+    for _ in range(12):
+        k = len(pole)
+        scale = 1 / np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+        step = scale * np.linalg.solve(matrix * scale[:, None] * scale + damping * np.eye(2 * k), gradient * scale)
+        reach = 0.3 * -pole.real + 1.0
+        move = np.clip(step[:k], -reach, reach) * 1j - np.clip(step[k:], -reach, reach)
+        trial = pole + move
+        trial = np.clip(trial.real, -FASTEST_PER_S, -0.02) + 1j * np.clip(trial.imag, 2 * np.pi * low, 2 * np.pi * high)
+        found = _normal(signals, noise, trial, sr)
+        if found[2] <= cost:
+            done = cost - found[2] < 1e-3
+            pole, (matrix, gradient, cost) = trial, found
+            damping = max(damping / 10, 1e-9)
+            if done:
+                break
+        else:
+            damping *= 30
+            if damping > 1e4:
+                break
+    return pole
+
+
+def _roots(matrix: Array) -> Array:
+    """Spreads (n,) that go with an information matrix (n, n). Of two poles that all but coincide rounding may turn a variance's sign; it is as large for that."""
+    return np.asarray(np.sqrt(np.abs(np.diag(np.linalg.pinv(matrix)))))
+
+
+def lines_of(signals: Array, noise: Array, pole: Array, sr: int, signed: bool) -> Lines:
+    """Lines of signals (s, n) over white noise (s,) at poles (k,) in 1/s that are known already."""
+    k, none = len(pole), np.zeros(0)
+    if k == 0:
+        left = np.sqrt((signals**2).mean(axis=1))
+        return Lines(none, none, np.zeros((len(signals), 0), complex), none, none, np.zeros((len(signals), 0)), left, none, signed)
+    amplitude, _, energy, residual = _solved(signals, noise, pole, sr)
+    level = np.maximum(noise, residual)  # what the lines leave is noise too, to whoever asks how sure they are
+    matrix, _, _ = _normal(signals, level, pole, sr)
+    scale = 1 / np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+    spread = _roots(matrix * scale[:, None] * scale) * scale
+    even, odd = _products(pole / sr, signals.shape[1])
+    gram = _basis(even[0], odd[0])
+    width = 1 / np.sqrt(np.diag(gram))
+    root = _roots(gram * width[:, None] * width) * width
+    return Lines(
+        pole.imag / (2 * np.pi),
+        -pole.real,
+        amplitude,
+        spread[:k] / (2 * np.pi),
+        spread[k:],
+        level[:, None] * np.maximum(root[:k], root[k:]),
+        residual,
+        energy,
+        signed,
+    )

@@ -1,0 +1,123 @@
+"""How far apart two sounds are, in decibels, where they stand above the noise.
+
+    D = mean over windows of √<(10 log₁₀ (P_a + ε)/(P_b + ε))²> over cells with (P_a + P_b)/2 > m·N(f)      N: the noise's power in a cell
+
+P: power of a short-time spectrum under a Hann window. Multi-resolution, as one window favours either onsets or close pairs
+[Yamamoto et al. 2020, section 3.1]. Two takes of one sound differ by their noise: `noise_floor_db` is that distance.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import convolve1d
+
+from sonic_bullet.records import Array
+
+WINDOWS = (512, 2048, 8192)
+ABOVE = 10.0  # m: cells 10 dB above the noise count
+FEWEST_CELLS = 20  # cells of a window that may speak for itself
+FLOOR_WINDOW = 1024
+MOST = 8192  # of its window, where recordings are long: low noise needs narrow bins
+SIDE = 8  # bins of the short window to each side
+REACH = 2.5  # of a frequency, up and down: more than a strong hum and its skirt take up
+QUARTILE = float(np.log(4 / 3))  # of an exponential law over its mean
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Floor:
+    """A stationary noise: variance_per_bin (b,) of white noise that had this density at all frequencies, from 0 to half the rate."""
+
+    variance: Array
+
+    def at(self, bins: int) -> Array:
+        """The same at another number of bins (bins,): fewer are each what a Hann window of their width takes in, as noise may be steep."""
+        fine, wide = len(self.variance), (len(self.variance) - 1) / max(bins - 1, 1)
+        return np.asarray(np.interp(np.linspace(0, 1, bins), np.linspace(0, 1, fine), _taken_in(self.variance, wide) if wide > 1.5 else self.variance))
+
+
+def _taken_in(variance: Array, wide: float) -> Array:
+    """Means (b,) under the main lobe of a Hann window whose bins are ``wide`` of these apart."""
+    x = np.arange(-int(2 * wide), int(2 * wide) + 1) / wide
+    with np.errstate(divide="ignore", invalid="ignore"):
+        lobe = np.where(np.abs(np.abs(x) - 1) < 1e-9, 0.5, np.sinc(x) / (1 - x**2)) ** 2  # [Harris 1978, eq. 27]
+    return np.asarray(convolve1d(variance, lobe / lobe.sum(), mode="mirror"))
+
+
+def floor_of(residual: Array) -> Floor:
+    """The floor of what is left of a recording (n,) without its modes: medians over time, so that what still rings does not count."""
+    window = min(FLOOR_WINDOW, len(residual) // 4)
+    shape = np.hanning(window)
+    frames = np.lib.stride_tricks.sliding_window_view(residual, window)[:: window // 2]
+    power = np.abs(np.fft.rfft(frames * shape, axis=1)) ** 2 / (shape**2).sum()
+    return Floor(np.maximum(np.median(power, axis=0) / np.log(2), 1e-24))  # the median of an exponential law is ln 2 of its mean
+
+
+def floor_between(signals: list[Array]) -> Floor:
+    """The stationary noise that recordings (n,) share.
+
+    Per bin the lower quartile over the last third of every recording, and over neighbouring bins, as no noise is narrow (hum is no noise).
+    """
+    length = min(len(signal) for signal in signals)
+    window = max(FLOOR_WINDOW, 1 << int(np.log2(max(min(length // 6, MOST), 1))))
+    rows = []
+    shape = np.hanning(window)
+    for signal in signals:
+        tail = signal[-max(len(signal) // 3, min(len(signal), 2 * window)) :]
+        if len(tail) < window:
+            tail = np.pad(tail, (0, window - len(tail)))
+        frames = np.lib.stride_tricks.sliding_window_view(tail, window)[:: window // 2]
+        rows.append(np.abs(np.fft.rfft(frames * shape, axis=1)) ** 2 / (shape**2).sum())
+    level = np.quantile(np.concatenate(rows), 0.25, axis=0) / QUARTILE
+    return Floor(np.maximum(_broad(level, SIDE * window // FLOOR_WINDOW), 1e-24))
+
+
+def _broad(level: Array, side: int) -> Array:
+    """What neighbours (b,) agree on: ``side`` bins to each side, and no further than a factor, as a noise may fall steeply with frequency."""
+    count = len(level)
+    k = np.arange(count)
+    first = np.maximum(np.ceil(k / REACH).astype(int), k - side)
+    last = np.minimum(np.minimum(np.floor(k * REACH).astype(int), k + side), count - 1)
+    return np.array([np.quantile(level[a : b + 1], 0.4) for a, b in zip(first, last, strict=True)])
+
+
+def white(rms: float) -> Floor:
+    """White noise of an rms a sample."""
+    return Floor(np.full(2, rms**2))
+
+
+def log_spectral_db(a: Array, b: Array, floor: Floor, *, windows: tuple[int, ...] = WINDOWS, above: float = ABOVE) -> float:
+    """Distance D of two sounds (n,), each with a noise like ``floor`` in it; NaN where no cell stands above it.
+
+    A sound without noise (a prediction) must be given some, or its silence counts: see `with_noise`. Windows with FEWEST_CELLS cells speak, or, where none has so
+    many, all: of fewer, one in which noise happens to cancel a sound says more than all others.
+    """
+    found: list[float] = []
+    few: list[float] = []
+    for window in windows:
+        if window > len(a):
+            continue
+        power_a, power_b, cell = _power(a, window), _power(b, window), floor.at(window // 2 + 1) * (np.hanning(window) ** 2).sum()
+        observed = (power_a + power_b) / 2 > above * cell
+        if observed.any():
+            tiny = np.broadcast_to(1e-3 * cell, observed.shape)[observed]
+            off = float(np.sqrt(((10 * np.log10((power_a[observed] + tiny) / (power_b[observed] + tiny))) ** 2).mean()))
+            (found if observed.sum() >= FEWEST_CELLS else few).append(off)
+    return float(np.mean(found or few)) if found or few else float("nan")
+
+
+def with_noise(sound: Array, floor: Floor, seed: int) -> Array:
+    """The sound (n,) plus Gaussian noise like ``floor``."""
+    spectrum = np.fft.rfft(np.random.default_rng(seed).standard_normal(len(sound)))
+    return np.asarray(sound + np.fft.irfft(spectrum * np.sqrt(floor.at(len(spectrum))), len(sound)))
+
+
+def noise_floor_db(sound: Array, floor: Floor, *, seeds: tuple[int, int] = (1, 2), windows: tuple[int, ...] = WINDOWS, above: float = ABOVE) -> float:
+    """D of two noisy takes of one clean sound (n,)."""
+    return log_spectral_db(with_noise(sound, floor, seeds[0]), with_noise(sound, floor, seeds[1]), floor, windows=windows, above=above)
+
+
+def _power(sound: Array, window: int) -> Array:
+    frames = np.lib.stride_tricks.sliding_window_view(sound, window)[:: window // 4]
+    return np.asarray(np.abs(np.fft.rfft(frames * np.hanning(window), axis=1)) ** 2)

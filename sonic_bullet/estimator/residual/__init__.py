@@ -1,0 +1,1 @@
+"""Recorded strikes as the residual takes them."""

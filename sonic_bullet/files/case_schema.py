@@ -1,0 +1,129 @@
+"""What each field of case.json means, and the JSON Schema made of these words and of the classes that read it.
+
+    _Raw (cases.py) -> msgspec's schema + ABOUT -> JSON Schema -> `sonic-bullet case schema`, docs/reference/case.md
+
+A field that a class gets without words here is an error, so the page cannot fall behind.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import msgspec
+
+from sonic_bullet.files.cases import FORMAT, _Raw
+
+ABOUT: dict[str, tuple[str, dict[str, str]]] = {
+    "Case": (
+        "A case: recorded strikes of known objects. What is not declared is null or absent.",
+        {
+            "format": "`sonic-bullet-case/1`",
+            "recordings": "at least one",
+            "objects": "by name",
+            "case": "a name; absent: the folder's",
+            "support": "clamps, or words",
+            "sensor": "one for all recordings",
+            "band_hz": "Hz, what the recordings hold; absent: 20 to 20 000",
+            "medium": "`air`, or `none` where nothing takes sound away; absent: air for a microphone or a vibrometer",
+            "onset": "arrival of the impulse in every file: s, or words with `sample 0`; absent: found, phases not used",
+        },
+    ),
+    "Recording": (
+        "One strike, as an audio file or as a list of measured resonances.",
+        {
+            "file": "audio file inside the folder",
+            "features": "measured resonances, in place of a file",
+            "object": "name of a listed object; may be left out where there is one",
+            "split": "`fit`, `holdout` or `transfer`; only `fit` is opened before a verdict stands",
+            "strike": "where and how hard",
+            "channel": "of the file, from 0; absent: the first, and a line says so",
+        },
+    ),
+    "Line": (
+        "A measured resonance: freq_hz, and what else was measured of it.",
+        {
+            "freq_hz": "Hz, above zero",
+            "decay_per_s": "d in e^(−dt), 1/s",
+            "freq_sd_hz": "standard error, Hz; absent: 10⁻⁴ of the frequency",
+            "decay_sd_per_s": "standard error, 1/s; absent: 5 % of the decay",
+            "amplitude": "at the onset, any unit",
+        },
+    ),
+    "Strike": (
+        "Where and how hard an object was struck.",
+        {
+            "position": "m, mesh frame, on the surface",
+            "direction": "of the impulse, any length; absent: into the surface",
+            "impulse": "N·s, above zero; without any, σ stands for gain times impulse",
+            "force": "its recorded force",
+        },
+    ),
+    "Force": (
+        "The force of an instrumented hammer.",
+        {
+            "file": "audio file inside the folder",
+            "channel": "from 0",
+            "newton_per_unit": "N per unit of the file",
+        },
+    ),
+    "Object": (
+        "One object: its shape and what it is guessed to be made of.",
+        {
+            "mesh": "file inside the folder, any mesh that trimesh reads; without it nothing is known of the shape",
+            "units": "of the mesh: m, cm or mm",
+            "material": "a name that `sonic-bullet materials` lists, as a guess",
+            "elastic_guess": "in SI units, good to 30 %",
+        },
+    ),
+    "Elastic": (
+        "Guessed constants; what is absent is the named material's.",
+        {
+            "youngs_modulus": "Pa",
+            "density": "kg/m³; a fit cannot tell it from E, so it stays as given",
+            "poisson_ratio": "between -1 and 0.5",
+        },
+    ),
+    "Support": (
+        "How the objects were held.",
+        {
+            "fixed": "clamps; none: the objects are free",
+        },
+    ),
+    "Fixed": (
+        "A clamp: all vertices within a radius of a point stand still.",
+        {
+            "position": "m, mesh frame",
+            "radius": "m",
+            "object": "whose; absent: every object's",
+        },
+    ),
+    "Sensor": (
+        "What recorded the strikes. Places and directions are one for all objects, or one for each by its name.",
+        {
+            "type": "in words; read where `response` says nothing",
+            "response": "`velocity` of a surface, `pressure` or `sum of modes`, as a word in any text; else unknown",
+            "position": "m, mesh frame: where a surface's velocity was measured",
+            "direction": "along which; absent: out of the surface",
+        },
+    ),
+}
+"""A part of the file: what it is, and what each of its fields means."""
+
+
+def case_schema() -> dict[str, Any]:
+    """JSON Schema (draft 2020-12) of case.json. Raises KeyError where a field has no words in ABOUT."""
+    made = msgspec.json.schema(_Raw)
+    text = msgspec.json.encode(made).decode()
+    for name in made["$defs"]:  # the classes' own names are private, the schema's are not
+        text = text.replace(f'"#/$defs/{name}"', f'"#/$defs/{_public(name)}"').replace(f'"title":"{name}"', f'"title":"{_public(name)}"')
+    whole: dict[str, Any] = msgspec.json.decode(text)
+    parts = {_public(name): part for name, part in whole["$defs"].items()}
+    for name, part in parts.items():
+        what, fields = ABOUT[name]
+        part["description"] = what
+        part["properties"] = {field: {"description": fields[field], **form} for field, form in part["properties"].items()}
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": FORMAT, **whole, "$defs": parts}
+
+
+def _public(name: str) -> str:
+    return {"_Raw": "Case"}.get(name, name.lstrip("_"))

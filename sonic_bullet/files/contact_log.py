@@ -1,0 +1,124 @@
+"""The contact log: everything that a later render needs, by value.
+
+Step (records.contacts) one after another -> ContactLog -> npz (files.logs) -> ContactLog -> render
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from sonic_bullet.records import Air, Array, Body, Sensor
+from sonic_bullet.records.coerce import as_items, as_kind, as_kinds, as_path, as_whole, shown
+from sonic_bullet.records.contacts import Contacts, Event, Step
+from sonic_bullet.records.errors import LogError
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ContactLog:
+    """Everything a later render needs, by value: bodies with their models, steps, sensors, rate and seed.
+
+    untouched: ids of bodies that were in the world and touched nothing; known while listening, not kept in files.
+    events: whatever else changed the sound, in the order in which it happened.
+    """
+
+    bodies: tuple[Body, ...]
+    steps: tuple[Step, ...]
+    sensors: tuple[Sensor, ...]
+    sr: int
+    seed: int
+    air: Air = field(default_factory=Air)
+    untouched: frozenset[int] = frozenset()
+    events: tuple[Event, ...] = ()
+
+    def __post_init__(self) -> None:
+        ids = ("give ids of bodies",)
+        checked = {
+            "bodies": as_kinds(self.bodies, Body, "log: bodies", "give a tuple of Body", error=LogError),
+            "steps": as_kinds(self.steps, Step, "log: steps", "give a tuple of Step", error=LogError),
+            "events": as_kinds(self.events, Event, "log: events", "give a tuple of Event", error=LogError),
+            "sensors": as_kinds(self.sensors, Sensor, "log: sensors", "give a tuple of sensors", error=LogError),
+            "air": as_kind(self.air, Air, "log: air", "give an Air", error=LogError),
+            "seed": as_whole(self.seed, "log: seed", "give a whole number, 0 or more", least=0, error=LogError),
+            "untouched": frozenset(as_whole(x, "log: untouched", *ids) for x in as_items(self.untouched, "log: untouched", *ids)),
+            "sr": as_whole(self.sr, "log: sr", "give a sample rate in Hz", least=1, error=LogError),
+        }
+        for name, value in checked.items():
+            object.__setattr__(self, name, value)
+        if any(later.step < earlier.step for earlier, later in itertools.pairwise(self.events)):
+            raise LogError("events that are not in the order of their steps", "use an unbroken contact log")
+        for step in self.steps:
+            if len(step.position_m) > len(self.bodies):
+                raise LogError("a step has more poses than the log has bodies", "use an unbroken contact log")
+
+    def __len__(self) -> int:
+        """Rows in all: one per contact and step."""
+        return sum(len(step.contacts) for step in self.steps)
+
+    def __iter__(self) -> Iterator[Step]:
+        return iter(self.steps)
+
+    @property
+    def duration_s(self) -> float:
+        return float(np.sum([step.dt_s for step in self.steps])) if self.steps else 0.0
+
+    @property
+    def start_s(self) -> Array:
+        """(s,) time at which each step starts."""
+        return np.concatenate([[0.0], np.cumsum([step.dt_s for step in self.steps])])[: len(self.steps)]
+
+    @property
+    def rows(self) -> Contacts:
+        """All rows of all steps, in order."""
+        return Contacts.joined([step.contacts for step in self.steps])
+
+    @property
+    def step(self) -> Array:
+        """(k,) the step of each row."""
+        return np.repeat(np.arange(len(self.steps)), [len(step.contacts) for step in self.steps])
+
+    @property
+    def time_s(self) -> Array:
+        """(k,) start of the step of each row."""
+        return self.start_s[self.step]
+
+    def impulse_on(self, body: int, link: int | None = None) -> Array:
+        """(k, 3) world-frame impulses in N·s that acted on the body, friction included, one row per contact and step.
+
+        link None: all links of the body. Where ids were given anew (removal, reset), the newest bearer of the id counts.
+        Raises LogError where the log never saw the body.
+        """
+        rows = self.rows
+        sign, mask = self._side(rows, body, link)
+        return np.asarray((sign[:, None] * rows.impulse_n_s)[mask])
+
+    def rows_on(self, body: int, link: int | None = None) -> Array:
+        """(k,) row numbers (into `rows`, `step`, `time_s`) of the impulses that `impulse_on` lists, in the same order."""
+        return np.flatnonzero(self._side(self.rows, body, link)[1])
+
+    def _side(self, rows: Contacts, body: int, link: int | None) -> tuple[Array, Array]:
+        body = as_whole(body, "body", "give a body's id", error=LogError)
+        link = None if link is None else as_whole(link, "link", "give a link's number, -1 the base, or None for all", error=LogError)
+        bearers = [i for i, x in enumerate(self.bodies) if x.body_id == body and (link is None or x.link == link)]
+        if not bearers and body in self.untouched:
+            return np.zeros(len(rows)), np.zeros(len(rows), bool)
+        if not bearers:
+            known = sorted({x.body_id for x in self.bodies})
+            raise LogError(f"the log holds no body {shown(body)}" + ("" if link is None else f" link {shown(link)}"), f"known bodies: {shown(known)}")
+        epoch = max(self.bodies[i].epoch for i in bearers)
+        bearers = [i for i in bearers if self.bodies[i].epoch == epoch]
+        on_a, on_b = np.isin(rows.a, bearers), np.isin(rows.b, bearers)
+        return on_a.astype(float) - on_b.astype(float), on_a ^ on_b
+
+    def first(self, count: int) -> ContactLog:
+        """The log of the first ``count`` steps and of what happened up to their end."""
+        return replace(self, steps=self.steps[:count], events=tuple(event for event in self.events if event.step <= count))
+
+    def save(self, path: object) -> None:
+        """Write the log as npz (numpy arrays and JSON, no pickle), whole or not at all. Raises FileError."""
+        from sonic_bullet.files.logs import write_log
+
+        write_log(as_path(path, "path", "name a file, such as contacts.npz"), self)

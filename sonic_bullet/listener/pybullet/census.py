@@ -1,0 +1,97 @@
+"""Who is in a world and where: read from PyBullet before a step, and no other numbers than numbers are handed on.
+
+getNumBodies -> the roster, kept while nobody comes or goes -> poses and twists -> Motion; whose are no numbers is muted (left_out)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+from typing import Any
+
+import pybullet
+
+from sonic_bullet.listener.frames import NO_NUMBER, Motion, Roster, decode
+from sonic_bullet.listener.polling import Touches
+from sonic_bullet.listener.pybullet import body_facts as facts
+from sonic_bullet.listener.pybullet.left_out import BodiesLeftOut
+from sonic_bullet.listener.pybullet.poses import body_ids, check_connected, read_motion, read_roster
+from sonic_bullet.records import Body
+from sonic_bullet.records.errors import SceneError
+
+
+def ask(client_id: int, question: Callable[..., Any]) -> Any:
+    """What PyBullet answers. Raises SceneError where nobody does."""
+    try:
+        return question(physicsClientId=client_id)
+    except pybullet.error as error:
+        raise SceneError(f"PyBullet client {client_id} does not answer: {error}", "detach the listener before disconnecting") from None
+
+
+class Census:
+    """State of that for one client. on_roster is told each new roster, on_mute the bodies that are left out from now on."""
+
+    def __init__(self, client_id: int, on_roster: Callable[[Roster], None], on_mute: Callable[[Collection[int]], None]) -> None:
+        self._client_id = client_id
+        self._roster: Roster | None = None
+        self._on_roster, self._on_mute = on_roster, on_mute
+        self.left_out = BodiesLeftOut()
+
+    def stale(self) -> None:
+        """Read anew who is there, and who of them is static, before the next poses."""
+        self._roster = None
+
+    def read(self) -> Motion:
+        """Poses and twists now. Raises SceneError where the connection is lost."""
+        motion = self._read_raw()
+        while motion.broken:
+            self._mute(motion.broken, NO_NUMBER)
+            motion = self._read_raw()
+        return motion
+
+    def usable(self, touches: Touches) -> Touches:
+        """Those whose numbers are numbers, of bodies that are not left out."""
+        if not len(touches):
+            return touches
+        kept = touches.usable
+        if not kept.all():
+            self.read()  # names those whose poses this step has broken
+            self.left_out.name_pairs(touches.kept(~kept))
+        if self.left_out.muted or self.left_out.soft:
+            kept &= ~self.left_out.concerned(touches)
+        return touches if kept.all() else touches.kept(kept)
+
+    def described(self, code: int, epoch: int) -> Body | None:
+        """The silent record of a link, or None, and it is muted, where its mass or inertia is not one."""
+        body, link = decode(code)
+        if body in self.left_out.muted:
+            return None
+        try:
+            return facts.describe(self._client_id, body, link, epoch)
+        except SceneError:
+            self._mute([body], "a mass or inertia that cannot be")
+            return None
+
+    def _known_roster(self) -> Roster:
+        if self._roster is None or self._roster.count != ask(self._client_id, pybullet.getNumBodies):
+            self.left_out.muted.intersection_update(body_ids(self._client_id))
+            self._roster = read_roster(self._client_id, self.left_out.muted)
+            self.left_out.meet_soft({body: self._name(body) for body in self._roster.soft})
+            self._on_roster(self._roster)
+        return self._roster
+
+    def _read_raw(self) -> Motion:
+        roster = self._known_roster()
+        try:
+            return read_motion(self._client_id, roster)
+        except pybullet.error:
+            check_connected(self._client_id)
+            self._roster = None
+            return read_motion(self._client_id, self._known_roster())
+
+    def _mute(self, bodies: Collection[int], what: str) -> None:
+        self._roster = None
+        self._on_mute(bodies)
+        self.left_out.mute({body: self._name(body) for body in bodies}, what)
+
+    def _name(self, body: int) -> str:
+        return facts.link_name(self._client_id, body, -1)

@@ -1,0 +1,152 @@
+"""Geometry of a link in its body frame (centre of mass, axes of getBasePositionAndOrientation).
+
+    getCollisionShapeData[5, 6]   placement of a shape, body frame (measured: also through an inertial frame that is turned)
+    getMeshData                   vertices in the body frame, of a hull only; "?" and nothing for a triangle mesh
+
+Bullet collides with the convex hull of a mesh; the sound wants the surface itself. So for a mesh: the file named by the shape; or the
+visual mesh where it fills the same space (createMultiBody forgets the collision file's name); or the hull's vertices.
+URDF cylinders collide as hulls of 32-gons without a name: they are recognised and given back as cylinders.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pybullet
+
+from sonic_bullet.geometry import volume_m3
+from sonic_bullet.listener.frames import link_words
+from sonic_bullet.listener.pybullet.pieces import Piece, collision_pieces, turn_matrix, visual_pieces
+from sonic_bullet.listener.pybullet.urdf_meshes import MeshSurface, hull, joined, read_surfaces
+from sonic_bullet.listener.quiet import quiet_stdout
+from sonic_bullet.records import Array, Shape
+from sonic_bullet.records.errors import MeshError
+
+SAME_SPACE = 0.1
+
+
+def shapes_of(client_id: int, body: int, link: int) -> tuple[Shape, ...]:
+    """All pieces of a link's collision geometry. The link must exist. Raises MeshError where there are none or PyBullet keeps them to itself."""
+    pieces = collision_pieces(client_id, body, link)
+    if not pieces:
+        raise MeshError(f"body {body}{link_words(link)} has no collision shape, or one that PyBullet does not describe", "add another link, or pass mesh=")
+    shapes: list[Shape] = []
+    filed: set[Piece] = set()
+    hulls: list[tuple[Piece, Array]] = []
+    for i, piece in enumerate(pieces):
+        if piece.kind != pybullet.GEOM_MESH:
+            shapes.append(primitive(piece, f"body {body}{link_words(link)}"))
+        elif _file(piece) is None:
+            hulls.append((piece, hull_vertices(client_id, body, link, i)))
+        elif piece not in filed:  # Bullet may list a file of several hulls once for each
+            filed.add(piece)
+            shapes.append(_from_file(client_id, body, link, i, piece))
+    return (*shapes, *_unfiled(client_id, body, link, hulls))
+
+
+def _file(piece: Piece) -> Path | None:
+    return Path(piece.file) if piece.file and Path(piece.file).is_file() else None
+
+
+def primitive(piece: Piece, where: str) -> Shape:
+    """A sphere, box, capsule, cylinder or plane as getCollisionShapeData tells it. Raises MeshError for another kind."""
+    kind, size, _, position, quaternion = piece
+    if kind == pybullet.GEOM_SPHERE:
+        return Shape("sphere", np.array([size[0], 0, 0]), position, quaternion)
+    if kind == pybullet.GEOM_BOX:
+        return Shape("box", size, position, quaternion)
+    if kind in (pybullet.GEOM_CAPSULE, pybullet.GEOM_CYLINDER):
+        return Shape("capsule" if kind == pybullet.GEOM_CAPSULE else "cylinder", np.array([size[1], size[0], 0]), position, quaternion)
+    if kind == pybullet.GEOM_PLANE:
+        return Shape("plane", position_m=position, quaternion_xyzw=_up_to(np.array(size)))
+    raise MeshError(f"{where} has a collision shape of unknown kind {kind}", "pass mesh=")
+
+
+def _up_to(normal: Array) -> Array:
+    """Quaternion that turns +z to a unit normal (3,)."""
+    if normal[2] < -1 + 1e-12:
+        return np.array([1.0, 0, 0, 0])
+    q = np.array([-normal[1], normal[0], 0, 1 + normal[2]])
+    return np.asarray(q / np.linalg.norm(q))
+
+
+def outward(vertex_m: Array, face: Array) -> Shape:
+    """A mesh in the body frame, turned inside out where it encloses a negative volume."""
+    return Shape("mesh", vertex_m=vertex_m, face=face if volume_m3(vertex_m, face) >= 0 else face[:, ::-1])
+
+
+def _from_file(client_id: int, body: int, link: int, index: int, piece: Piece) -> Shape:
+    path = _file(piece)
+    assert path is not None
+    try:
+        vertex, face = joined(read_surfaces(path))
+    except MeshError:
+        vertices = hull_vertices(client_id, body, link, index)
+        if not len(vertices):
+            raise
+        return outward(*hull(vertices))
+    return outward((vertex * piece.size) @ turn_matrix(piece.quaternion).T + piece.position, face)
+
+
+def hull_vertices(client_id: int, body: int, link: int, index: int) -> Array:
+    """Vertices (v, 3) of a convex collision piece in the body frame; none of a triangle mesh."""
+    with quiet_stdout():
+        try:
+            _, vertices = pybullet.getMeshData(body, link, index, physicsClientId=client_id)
+        except pybullet.error:
+            vertices = ()
+    return np.array(vertices, float).reshape(-1, 3)
+
+
+def _unfiled(client_id: int, body: int, link: int, hulls: list[tuple[Piece, Array]]) -> tuple[Shape, ...]:
+    """Meshes whose file PyBullet forgot: cylinders by their vertices, else the visual mesh of the same extent, else hulls."""
+    if not hulls:
+        return ()
+    cylinders = [_as_cylinder(piece, vertices) for piece, vertices in hulls]
+    rest = [vertices for (_, vertices), cylinder in zip(hulls, cylinders, strict=True) if cylinder is None]
+    found = tuple(cylinder for cylinder in cylinders if cylinder is not None)
+    if not rest:
+        return found
+    visual = visual_surface(client_id, body, link)
+    known = np.concatenate(rest)
+    if visual is not None and len(known) and _same_space(visual[0], known):
+        return (*found, outward(*visual))
+    if all(len(vertices) for vertices in rest):
+        return (*found, *(outward(*hull(vertices)) for vertices in rest))
+    if visual is not None:
+        return (*found, outward(*visual))
+    raise MeshError(f"body {body}{link_words(link)} is a triangle mesh that PyBullet does not give back", "load it from a file, or pass mesh=")
+
+
+def _same_space(one: Array, other: Array) -> bool:
+    """Whether two point sets have the same bounding box within a tenth of its diagonal."""
+    size = np.linalg.norm(np.ptp(other, axis=0))
+    return bool(np.abs(one.min(0) - other.min(0)).max() < SAME_SPACE * size and np.abs(one.max(0) - other.max(0)).max() < SAME_SPACE * size)
+
+
+def _as_cylinder(piece: Piece, vertices: Array) -> Shape | None:
+    """The cylinder along z whose two rims the vertices are, or None."""
+    if len(vertices) < 24 or len(vertices) % 2:
+        return None
+    local = (vertices - piece.position) @ turn_matrix(piece.quaternion)
+    radius, half = np.hypot(local[:, 0], local[:, 1]), np.abs(local[:, 2])
+    tolerance = 1e-3 * (radius.max() + half.max())
+    if np.ptp(radius) > tolerance or np.ptp(half) > tolerance or not half.min() > tolerance:
+        return None
+    return Shape("cylinder", np.array([radius.max(), 2 * half.max(), 0]), piece.position, piece.quaternion)
+
+
+def visual_surface(client_id: int, body: int, link: int) -> MeshSurface | None:
+    """The link's visual mesh files together in the body frame, or None where there are none or they cannot be read."""
+    surfaces: list[MeshSurface] = []
+    for piece in visual_pieces(client_id, body, link):
+        path = _file(piece)
+        if piece.kind != pybullet.GEOM_MESH or path is None:
+            return None
+        try:
+            vertex, face = joined(read_surfaces(path))
+        except MeshError:
+            return None
+        surfaces.append(((vertex * piece.size) @ turn_matrix(piece.quaternion).T + piece.position, face))
+    return joined(surfaces) if surfaces else None

@@ -1,0 +1,291 @@
+"""Settings of a PyBullet world that spoil its sound, and how to mend them.
+
+Nothing here is a guess about taste: each finding names what was measured to go wrong. What PyBullet does not tell is left out:
+contactProcessingThreshold can be set but not read, so `keep_restitution` leaves a mark (user data) beside it, and
+damping and activation states cannot be read at all (sleep is recognised by bodies that bear load and stand exactly still).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import pybullet
+
+from sonic_bullet.geometry import LARGEST_M, oversize
+from sonic_bullet.listener.frames import NO_NUMBER
+from sonic_bullet.listener.polling import FORCE
+from sonic_bullet.listener.pybullet import collision_shapes
+from sonic_bullet.listener.pybullet.body_facts import checked_mass_kg, link_name
+from sonic_bullet.listener.pybullet.clients import client_id_of
+from sonic_bullet.listener.pybullet.pieces import collision_pieces
+from sonic_bullet.listener.pybullet.poses import read_motion, read_roster
+from sonic_bullet.listener.pybullet.pybullet_world import PyBulletWorld
+from sonic_bullet.listener.pybullet.urdf_meshes import MeshSurface, lid_height_m, read_surfaces
+from sonic_bullet.records.errors import MeshError, SceneError
+
+LONGEST_STEP_S = 1 / 120
+SMALLEST_M = 1e-3
+DENSITY_RATIO = 3.0
+LID_SHARE = 0.15
+KEPT = "sonic_bullet.contactProcessingThreshold"
+Severity = Literal["error", "warning", "info"]
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """id: of the kind. severity: "error" (no sound), "warning" (wrong sound), "info". what is so, and its remedy: one line each."""
+
+    id: str
+    severity: Severity
+    what: str
+    remedy: str
+
+
+def keep_restitution(client: Any) -> int:
+    """Let small steps bounce: contactProcessingThreshold = 0 on every link of every body loaded so far; how many links.
+
+    With the default, restitution 0.5 gives rebounds of 0.36–0.57 at 1/240 s and 0.000 at 1/4000 s; with 0, 0.51–0.59 at both
+    (bullet3 issues 3094, 1530, 4341). Call it after loading. Raises SceneError for a client that is not connected.
+    """
+    client_id = client_id_of(client)
+    links = _links(client_id)
+    for body, link in links:
+        pybullet.changeDynamics(body, link, contactProcessingThreshold=0, physicsClientId=client_id)
+        pybullet.addUserData(body, KEPT, "0", link, physicsClientId=client_id)
+    return len(links)
+
+
+def _links(client_id: int) -> list[tuple[int, int]]:
+    return [(body, link) for body, joints, _ in read_roster(client_id).bodies for link in range(-1, joints)]
+
+
+def diagnose_world(world: PyBulletWorld | Any, steps: int = 0) -> tuple[Finding, ...]:
+    """What in a world would spoil its sound. world: a PyBulletWorld, or what `open_world` takes.
+
+    steps: physics steps to look ahead, undone afterwards (saveState); 0 takes the world as it stands. Raises SceneError where
+    the client is not connected.
+    """
+    client_id = world.client_id if isinstance(world, PyBulletWorld) else client_id_of(world)
+    findings = [*_settings(client_id), *_empty(client_id), *_masses(client_id)]
+    if not any(finding.severity == "error" for finding in findings):
+        findings += [*_restitution(client_id), *_lids(client_id), *_scale(client_id, _sounding(world)), *_ahead(client_id, steps)]
+        if isinstance(world, PyBulletWorld):
+            findings += [*_densities(world), *_oversized(world)]
+    return tuple(findings)
+
+
+def _settings(client_id: int) -> list[Finding]:
+    found = []
+    settings = pybullet.getPhysicsEngineParameters(physicsClientId=client_id)
+    if settings["numSubSteps"] > 1:
+        found.append(
+            Finding(
+                "sub-steps",
+                "warning",
+                f"numSubSteps is {settings['numSubSteps']}: normal impulses come from the contact log, friction is only estimated from the last sub-step",
+                "set numSubSteps=0 and divide the time step instead",
+            )
+        )
+    if settings["fixedTimeStep"] > LONGEST_STEP_S * (1 + 1e-9):
+        found.append(
+            Finding(
+                "long-step",
+                "warning",
+                f"a time step of {settings['fixedTimeStep']:.4g} s smears impacts over several milliseconds",
+                "setTimeStep(1/240) or shorter",
+            )
+        )
+    if settings["useRealTimeSimulation"]:
+        found.append(
+            Finding(
+                "real-time",
+                "error",
+                "real-time simulation is on: PyBullet steps by itself and nobody sees the steps",
+                "setRealTimeSimulation(0) and call stepSimulation",
+            )
+        )
+    return found
+
+
+def _empty(client_id: int) -> list[Finding]:
+    """A world in which nothing can touch."""
+    links = _links(client_id)
+    if not links:
+        return [Finding("no-body", "error", "there is no body in this world", "load some before stepping, into the client that steps")]
+    if not any(collision_pieces(client_id, *link) for link in links):
+        what = f"no link of the {len({body for body, _ in links})} bodies has a collision shape that PyBullet describes: nothing can touch"
+        return [Finding("no-shape", "error", what, "give bodies collision shapes: createCollisionShape, or <collision> in their URDF")]
+    return []
+
+
+def _masses(client_id: int) -> list[Finding]:
+    found = []
+    for body, link in _links(client_id):
+        try:
+            checked_mass_kg(pybullet.getDynamicsInfo(body, link, physicsClientId=client_id), body, link)
+        except SceneError as error:
+            found.append(Finding("mass", "error", error.what, error.remedy))
+    for body in read_motion(client_id, read_roster(client_id)).broken:
+        remedy = "check its mass, inertia and what touches it; remove it or reset the scene"
+        found.append(Finding("nan", "error", f"body {body} has {NO_NUMBER}", remedy))
+    return found
+
+
+def _restitution(client_id: int) -> list[Finding]:
+    links = _links(client_id)
+    bouncy = {entry: pybullet.getDynamicsInfo(*entry, physicsClientId=client_id)[5] for entry in links}
+    movable = [(body, link) for body, link in links if pybullet.getDynamicsInfo(body, link, physicsClientId=client_id)[0] > 0]
+    springy = {body for (body, _), value in bouncy.items() if value > 0}
+    lost = [e for e in movable if bouncy[e] > 0 and springy - {e[0]} and pybullet.getUserDataId(e[0], KEPT, e[1], physicsClientId=client_id) < 0]
+    if not lost:
+        return []
+    dt = pybullet.getPhysicsEngineParameters(physicsClientId=client_id)["fixedTimeStep"]
+    names = _names(client_id, lost)
+    return [
+        Finding(
+            "restitution-lost",
+            "warning",
+            f"{names}: restitution {bouncy[lost[0]]:g} is asked for, but Bullet's default contact threshold loses some or all of it at a step of {dt:.4g} s",
+            "call sonic_bullet.keep_restitution(client) after loading",
+        )
+    ]
+
+
+def _names(client_id: int, links: list[tuple[int, int]]) -> str:
+    first = f"body {links[0][0]} ({link_name(client_id, *links[0])})"
+    return first if len(links) == 1 else f"{first} and {len(links) - 1} more"
+
+
+def _lids(client_id: int) -> list[Finding]:
+    """Moving meshes whose hull closes what is open: judged object by object, as Bullet makes a hull of each object of a file."""
+    found = []
+    for body, link in _links(client_id):
+        if pybullet.getDynamicsInfo(body, link, physicsClientId=client_id)[0] == 0:
+            continue
+        deep = 0.0
+        for vertex, face in _hulled(client_id, body, link):
+            size = float(np.prod(np.maximum(np.ptp(vertex, axis=0), 1e-9)) ** (1 / 3))
+            deep = max(deep, lid_height_m(vertex, face) / size)
+        if deep > LID_SHARE:
+            found.append(
+                Finding(
+                    "hull-lid",
+                    "warning",
+                    f"body {body} ({link_name(client_id, body, link)}) is hollow, but moving meshes collide as their convex hull: hits land on an invisible lid",
+                    "decompose it with pybullet.vhacd, build it of several shapes, or fix it with mass 0 and GEOM_FORCE_CONCAVE_TRIMESH",
+                )
+            )
+    return found
+
+
+def _hulled(client_id: int, body: int, link: int) -> list[MeshSurface]:
+    pieces = [piece for piece in collision_pieces(client_id, body, link) if piece.kind == pybullet.GEOM_MESH]
+    surfaces: list[MeshSurface] = []
+    for name, scale in {(piece.file, piece.size) for piece in pieces}:
+        if name:
+            try:
+                surfaces += [(vertex * scale, face) for vertex, face in read_surfaces(Path(name))]
+            except MeshError:
+                continue
+    if len(pieces) == 1 and not surfaces:
+        visual = collision_shapes.visual_surface(client_id, body, link)
+        if visual is not None:
+            surfaces.append(visual)
+    return surfaces
+
+
+def _sounding(world: PyBulletWorld | Any) -> set[tuple[int, int]]:
+    """Links that sound, whose size `_oversized` looks at."""
+    return {(body.body_id, body.link) for body in world.bodies if body.model is not None} if isinstance(world, PyBulletWorld) else set()
+
+
+def _scale(client_id: int, sounding: set[tuple[int, int]]) -> list[Finding]:
+    found = []
+    for body, link in _links(client_id):
+        if pybullet.getDynamicsInfo(body, link, physicsClientId=client_id)[0] == 0 or not collision_pieces(client_id, body, link):
+            continue
+        low, high = np.array(pybullet.getAABB(body, link, physicsClientId=client_id))
+        size = float((high - low).max())
+        if size < SMALLEST_M or (size > LARGEST_M and (body, link) not in sounding):
+            found.append(
+                Finding(
+                    "scale",
+                    "warning",
+                    f"body {body} ({link_name(client_id, body, link)}) is {size:.3g} m long",
+                    "PyBullet thinks in metres: load a mesh made in millimetres with scale 0.001",
+                )
+            )
+    return found
+
+
+def _ahead(client_id: int, steps: int) -> list[Finding]:
+    """Bodies that bear load and stand exactly still, now or within the next steps."""
+    if not steps:
+        return _sleepers(client_id)
+    state = pybullet.saveState(physicsClientId=client_id)
+    try:
+        found: list[Finding] = []
+        for _ in range(steps):
+            pybullet.stepSimulation(physicsClientId=client_id)
+            found = _sleepers(client_id)
+            if found:
+                break
+        return found
+    finally:
+        pybullet.restoreState(state, physicsClientId=client_id)
+        pybullet.removeState(state, physicsClientId=client_id)
+
+
+def _sleepers(client_id: int) -> list[Finding]:
+    loaded = {raw[side] for raw in pybullet.getContactPoints(physicsClientId=client_id) if raw[FORCE] > 0 for side in (1, 2)}
+    asleep = [
+        (body, -1)
+        for body, joints, fixed in read_roster(client_id).bodies
+        if body in loaded and joints == 0 and not fixed and not np.any(pybullet.getBaseVelocity(body, physicsClientId=client_id))
+    ]
+    if not asleep:
+        return []
+    return [
+        Finding(
+            "sleeping",
+            "info",
+            f"{_names(client_id, asleep)} sleeps: its contacts are frozen and make no sound until it wakes",
+            "changeDynamics(activationState=pybullet.ACTIVATION_STATE_DISABLE_SLEEPING)",
+        )
+    ]
+
+
+def _oversized(world: PyBulletWorld) -> list[Finding]:
+    """Bodies that sound, and are larger than anything that is struck to: planes and terrains among them."""
+    large = [(body, oversize(body.model.vertex_m, body.model.mass_kg)) for body in world.bodies if body.model is not None and body.until_step < 0]
+    return [
+        Finding(
+            "scale",
+            "warning",
+            f"body {body.body_id} ({body.name}) {words}",
+            "load it with globalScaling=0.001, or give its mesh in metres, if its numbers are millimetres; leave it out of the sound if it is the ground",
+        )
+        for body, words in large
+        if words
+    ]
+
+
+def _densities(world: PyBulletWorld) -> list[Finding]:
+    found = []
+    for body in world.bodies:
+        if body.material is None or body.until_step >= 0 or body.mass_kg == 0:
+            continue
+        expected = body.model.mass_kg if body.model is not None and body.model.mass_kg > 0 else body.material.density_kg_m3 * body.volume_m3
+        if expected > 0 and not 1 / DENSITY_RATIO <= body.mass_kg / expected <= DENSITY_RATIO:
+            found.append(
+                Finding(
+                    "density",
+                    "warning",
+                    f"body {body.body_id} ({body.name}) weighs {body.mass_kg:.3g} kg, but a solid of {body.material.name} of that size {expected:.3g} kg",
+                    "set its mass with changeDynamics, or check the mesh's scale",
+                )
+            )
+    return found

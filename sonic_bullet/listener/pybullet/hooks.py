@@ -1,0 +1,139 @@
+"""Catching steps and removals of a BulletClient without touching its class.
+
+BulletClient forwards unknown attributes to the module, so a function set on the instance takes its place: every
+stepSimulation of this client is caught, those hidden in a gym environment's step too, and no other client notices.
+`disconnect` must never be looked up on it: the look-up alone clears its client id.
+
+A client has one set of hooks however many listen (`Hooks`): the first to come puts it in place and the last to go takes it away, in whatever
+order they go. Nothing here holds the client: dropped, it disconnects at once and does not wait for the garbage collector.
+"""
+
+from __future__ import annotations
+
+import weakref
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import pybullet
+
+from sonic_bullet.records.errors import SceneError
+
+POSE_SETTERS = ("resetBasePositionAndOrientation", "resetJointState", "resetJointStateMultiDof", "resetJointStatesMultiDof")
+BODY_KEYWORDS = ("bodyUniqueId", "objectUniqueId", "multiBodyUniqueId")
+
+
+class Watcher(Protocol):
+    """What a hook tells: World."""
+
+    client_id: int
+
+    @property
+    def client(self) -> Any: ...
+    def forget(self, body: int | None = None) -> None: ...
+    def mark_moved(self, body: int | None) -> None: ...
+    def mark_changed(self) -> None: ...
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Listening:
+    """One of those who listen: called before and after each step, and told of what happens to bodies."""
+
+    world: Watcher
+    before: Callable[[], object]
+    after: Callable[[], object]
+
+
+def body_argument(args: tuple[Any, ...], kwargs: dict[str, Any]) -> int:
+    """The body id among a PyBullet function's arguments."""
+    if args:
+        return int(args[0])
+    return int(next(kwargs[name] for name in BODY_KEYWORDS if name in kwargs))
+
+
+class Hooks:
+    """The functions put in place of a client's own, and all who listen to them. Once nobody does, they only pass calls on."""
+
+    def __init__(self, client: Any, client_id: int) -> None:
+        self._client = weakref.ref(client)
+        self._client_id = client_id
+        self.listening: list[Listening] = []
+        self._ours: dict[str, Callable[..., Any]] = {
+            "stepSimulation": self._step(self._below(client, "stepSimulation")),
+            "removeBody": self._telling("removeBody", client, lambda world, body: world.forget(body)),
+            "resetSimulation": self._telling("resetSimulation", client, lambda world, _: world.forget()),
+            "restoreState": self._telling("restoreState", client, lambda world, _: world.mark_moved(None)),
+            "changeDynamics": self._telling("changeDynamics", client, lambda world, _: world.mark_changed()),
+            **{name: self._telling(name, client, lambda world, body: world.mark_moved(body)) for name in POSE_SETTERS},
+        }
+        self._kept = {name: vars(client)[name] for name in self._ours if name in vars(client)}
+        vars(client).update(self._ours)
+
+    @classmethod
+    def of(cls, client: Any, client_id: int) -> Hooks:
+        """Those in place on a client; new ones where there are none, or another's functions lie over one of them."""
+        found = getattr(vars(client).get("stepSimulation"), "hooks", None)
+        return found if isinstance(found, Hooks) and found._in_place(client) else cls(client, client_id)
+
+    def leave(self, one: Listening) -> None:
+        """Tell one no more; with the last the client's own functions come back, except under those that someone else put over ours."""
+        if one in self.listening:
+            self.listening.remove(one)
+        client = self._client()
+        if self.listening or client is None:
+            return
+        for name, function in self._ours.items():
+            if vars(client).get(name) is function:
+                del vars(client)[name]
+                if name in self._kept:
+                    vars(client)[name] = self._kept[name]
+
+    def _in_place(self, client: Any) -> bool:
+        return all(vars(client).get(name) is function for name, function in self._ours.items())
+
+    def _below(self, client: Any, name: str) -> Callable[..., Any]:
+        """What the client's function of that name was."""
+        if name in vars(client):
+            return vars(client)[name]  # type: ignore[no-any-return]
+
+        def forwarded(*args: Any, **kwargs: Any) -> Any:
+            return getattr(pybullet, name)(*args, **{"physicsClientId": self._client_id, **kwargs})
+
+        return forwarded
+
+    def _step(self, below: Callable[..., Any]) -> Callable[..., Any]:
+        def stepped(*args: Any, **kwargs: Any) -> Any:
+            for one in reversed(self.listening[:]):
+                one.before()
+            result = below(*args, **kwargs)
+            for one in self.listening[:]:
+                one.after()
+            return result
+
+        stepped.hooks = self  # type: ignore[attr-defined]
+        return stepped
+
+    def _telling(self, name: str, client: Any, tell: Callable[[Watcher, int], None]) -> Callable[..., Any]:
+        below = self._below(client, name)
+        of_body = name == "removeBody" or name in POSE_SETTERS
+
+        def reporting(*args: Any, **kwargs: Any) -> Any:
+            result = below(*args, **kwargs)
+            body = body_argument(args, kwargs) if of_body else -1
+            for one in self.listening[:]:
+                tell(one.world, body)
+            return result
+
+        return reporting
+
+
+def install(world: Watcher, before: Callable[[], object], after: Callable[[], object]) -> Callable[[], None]:
+    """Hook the world's client; a function that ends that. Raises SceneError where the client is no instance of a wrapper."""
+    client = world.client
+    if client is None or isinstance(client, (int, type(pybullet))):
+        raise SceneError(
+            "the pybullet module itself cannot be hooked", "call listener.step() after each stepSimulation, or use pybullet_utils.bullet_client.BulletClient"
+        )
+    hooks, one = Hooks.of(client, world.client_id), Listening(world, before, after)
+    hooks.listening.append(one)
+    return lambda: hooks.leave(one)

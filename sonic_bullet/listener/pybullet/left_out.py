@@ -1,0 +1,68 @@
+"""Who in a world is left out of the sound, and why; each is named once, as a warning and as a note.
+
+muted   a body whose pose, speed, mass or inertia ceased to be a number: its record ends, its contacts are dropped, what rings of it rings out.
+        It stays mute until it is removed or added anew, even where its numbers come back: what it is then, nobody has said.
+soft    a soft body: PyBullet tells neither its mass nor its speed (what it answers is memory that nobody wrote), so it neither sounds nor strikes.
+A contact whose force or place is not a number is dropped, and its pair named once.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+
+import numpy as np
+
+from sonic_bullet.listener.frames import LINK_SPAN
+from sonic_bullet.listener.polling import Touches
+from sonic_bullet.records import Array
+from sonic_bullet.records.errors import SceneWarning
+
+
+class BodiesLeftOut:
+    """State of that for one world. notes: what was said, in order."""
+
+    def __init__(self) -> None:
+        self.muted: set[int] = set()
+        self.soft: set[int] = set()
+        self.notes: list[str] = []
+        self._pairs: set[tuple[int, int]] = set()
+
+    def mute(self, bodies: Mapping[int, str], what: str) -> None:
+        """Leave bodies, with their names, out from now on. what: they have that is wrong."""
+        self.muted.update(bodies)
+        who = ", ".join(f"{body} ({name})" for body, name in bodies.items())
+        subject, be, them = (f"body {who} has", "it is", "it") if len(bodies) == 1 else (f"bodies {who} have", "they are", "them")
+        self._say(f"{subject} {what}: {be} mute until removed or added anew; check mass, inertia and what touches {them}")
+
+    def meet_soft(self, soft: Mapping[int, str]) -> None:
+        """Note the soft bodies of the world, by id and name."""
+        for body, name in soft.items():
+            if body not in self.soft:
+                self._say(f"body {body} ({name}) is soft: PyBullet tells neither its mass nor its speed, so it neither sounds nor strikes")
+        self.soft = set(soft)
+
+    def forget(self, body: int | None) -> None:
+        """A body was removed (None: all); its id may be given anew."""
+        for group in (self.muted, self.soft):
+            group.intersection_update(() if body is None else group - {body})
+        self._pairs = {pair for pair in self._pairs if body is not None and body not in pair}
+
+    def name_pairs(self, touches: Touches) -> None:
+        """Say which pairs these contacts belong to, except those of bodies left out already."""
+        for a, b in zip(touches.code_a // LINK_SPAN, touches.code_b // LINK_SPAN, strict=True):
+            pair = int(min(a, b)), int(max(a, b))
+            if pair not in self._pairs and not (self.muted | self.soft).intersection(pair):
+                self._pairs.add(pair)
+                self._say(
+                    f"a contact of bodies {pair[0]} and {pair[1]} holds a force or place that is not a number, or beyond 1e9: left out; check both masses"
+                )
+
+    def concerned(self, touches: Touches) -> Array:
+        """(k,) whether a contact is one of a body that is left out."""
+        out = list(self.muted | self.soft)
+        return np.isin(touches.code_a // LINK_SPAN, out) | np.isin(touches.code_b // LINK_SPAN, out)
+
+    def _say(self, text: str) -> None:
+        self.notes.append(text)
+        warnings.warn(text, SceneWarning, stacklevel=3)

@@ -1,0 +1,139 @@
+"""Contacts of every sub-step, from Bullet's contact log.
+
+With numSubSteps > 1 getContactPoints() tells only the last sub-step (a third of the impulse at 4). The file that
+startStateLogging(STATE_LOGGING_CONTACT_POINTS) writes gets one record for each contact and sub-step, and is flushed
+before stepSimulation returns, so it can be read step by step. Measured format: two text lines (names, type letters
+"IfIiiiifffffffffff"), then per record the mark 0xAA 0xBB and 18 little-endian 4-byte numbers. No friction, float32.
+
+    J = h N n,  h = dt / numSubSteps        + friction in the ratio f/N that the pair had in the last sub-step
+
+The ratio is exact for what slides (Coulomb) and a guess for what sticks; where no friction acts nothing is added.
+resetSimulation ends the log without a word: records that stop while contacts are reported raise SceneError.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from contextlib import suppress
+from dataclasses import dataclass, field
+
+import numpy as np
+import pybullet
+
+from sonic_bullet.listener.frames import encode
+from sonic_bullet.listener.polling import FORCE, FRICTION_1, FRICTION_2, RawContact, Touches, gather
+from sonic_bullet.records import Array
+from sonic_bullet.records.errors import SceneError
+
+REMEDY = "set numSubSteps to 0 and a smaller time step instead"
+RECORD = np.dtype(
+    {
+        "names": ["mark", "step", "time", "flag", "body", "link", "point_a", "point_b", "normal", "gap", "force"],
+        "formats": ["<u2", "<u4", "<f4", "<i4", ("<i4", 2), ("<i4", 2), ("<f4", 3), ("<f4", 3), ("<f4", 3), "<f4", "<f4"],
+    }
+)
+MARK = 0xBBAA
+LETTERS = b"IfIiiiifffffffffff"
+REWIND_BYTES = 1 << 26
+
+
+@dataclass(slots=True)
+class SubstepLog:
+    """An open contact log of one client: where it is read up to, and the sub-step count it stands at."""
+
+    client_id: int
+    path: str = ""
+    handle: int = -1
+    offset: int = 0
+    count: int = 0
+    folder: tempfile.TemporaryDirectory[str] | None = field(default=None, repr=False)
+
+    @property
+    def is_open(self) -> bool:
+        return self.handle >= 0
+
+    def open(self) -> None:
+        """Start logging into a temporary file. Raises SceneError where no log appears."""
+        self.close()
+        self.folder = tempfile.TemporaryDirectory(prefix="sonic-bullet-")
+        self.path = os.path.join(self.folder.name, "contacts.log")
+        self.handle = pybullet.startStateLogging(pybullet.STATE_LOGGING_CONTACT_POINTS, self.path, physicsClientId=self.client_id)
+        self.offset = self.count = 0
+        if self.handle < 0 or not os.path.exists(self.path):
+            self.abandon()
+            raise SceneError("numSubSteps is above 1 and Bullet's contact log cannot be written", REMEDY)
+
+    def close(self) -> None:
+        """Stop logging and remove the file; harmless when nothing is open."""
+        if self.handle >= 0:
+            with suppress(pybullet.error):  # the client may have gone and taken the log with it
+                pybullet.stopStateLogging(self.handle, physicsClientId=self.client_id)
+        self.abandon()
+
+    def abandon(self) -> None:
+        """Forget a log that Bullet has ended itself."""
+        self.handle = -1
+        if self.folder is not None:
+            self.folder.cleanup()
+            self.folder = None
+
+    def records(self) -> Array:
+        """Records (k,) of RECORD written since the last call. Raises SceneError where the file is not as measured."""
+        with open(self.path, "rb") as file:
+            if self.offset == 0:
+                header = file.readline() + file.readline()
+                if not header:
+                    return np.zeros(0, RECORD)
+                if header.split(b"\n")[1] != LETTERS:
+                    raise SceneError("numSubSteps is above 1 and this PyBullet writes an unknown contact log", REMEDY)
+                self.offset = len(header)
+            file.seek(self.offset)
+            data = file.read()
+        if len(data) % RECORD.itemsize:
+            raise SceneError("numSubSteps is above 1 and Bullet's contact log ends within a record", REMEDY)
+        rows = np.frombuffer(data, RECORD)
+        if (rows["mark"] != MARK).any():
+            raise SceneError("numSubSteps is above 1 and Bullet's contact log is damaged", REMEDY)
+        self.offset += len(data)
+        if self.offset > REWIND_BYTES:
+            self.open()
+        return rows
+
+
+def gather_substeps(records: Array, last: list[RawContact], dt_s: float, substeps: int, first: int) -> tuple[Touches, int]:
+    """Loaded contacts (k,) of all sub-steps of one step, and the number of the next sub-step.
+
+    last: what getContactPoints() tells after the step. first: number of the step's first sub-step, corrected where `last` shows
+    the log's newest records to be the step's last sub-step. Raises SceneError where the log lacks the sub-step that `last` reports.
+    """
+    number = records["step"].astype(np.int64)
+    if last:
+        newest = number.max(initial=-1)
+        if np.count_nonzero(number == newest) != len(last):
+            raise SceneError(f"numSubSteps is {substeps} and Bullet's contact log has stopped", "attach again after resetSimulation, or " + REMEDY)
+        first = int(newest) + 1 - substeps
+    h = dt_s / substeps
+    touched = records["force"] != 0
+    loaded = records[touched]
+    code_a, code_b = encode(loaded["body"][:, 0], loaded["link"][:, 0]), encode(loaded["body"][:, 1], loaded["link"][:, 1])
+    normal, force = loaded["normal"].astype(float), loaded["force"].astype(float)
+    impulse = h * force[:, None] * (normal + friction_ratio(code_a, code_b, last))
+    elapsed = h * np.clip(number[touched] - first, 0, substeps - 1)
+    points = loaded["point_a"].astype(float), loaded["point_b"].astype(float)
+    return Touches(code_a, code_b, *points, normal, loaded["gap"].astype(float), impulse, elapsed), first + substeps
+
+
+def friction_ratio(code_a: Array, code_b: Array, last: list[RawContact]) -> Array:
+    """Friction over normal force (k, 3), world frame, of each row's pair in the last sub-step; 0 where it says nothing."""
+    ratio = np.zeros((len(code_a), 3))
+    friction = [raw for raw in last if raw[FORCE] > 0 and (raw[FRICTION_1] or raw[FRICTION_2])]
+    if not friction:
+        return ratio
+    plain = gather([raw for raw in last if raw[FORCE] > 0], 1.0)
+    along = (plain.impulse_n_s * plain.normal).sum(axis=1)
+    for a, b in {(int(a), int(b)) for a, b in zip(plain.code_a, plain.code_b, strict=True)}:
+        own = (plain.code_a == a) & (plain.code_b == b)
+        tangent = (plain.impulse_n_s[own] - along[own, None] * plain.normal[own]).sum(axis=0) / along[own].sum()
+        ratio[(code_a == a) & (code_b == b)] = tangent
+    return ratio

@@ -1,0 +1,64 @@
+"""The mesh file behind a collision shape, in its own frame and unit, cut into objects as Bullet cuts it; hulls, and how far they close what is open."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from sonic_bullet.files import meshes
+from sonic_bullet.files.meshes import MeshSurface
+from sonic_bullet.geometry import closest_point, welded
+from sonic_bullet.records import Array
+from sonic_bullet.records.errors import MeshError
+
+__all__ = ["MeshSurface", "hull", "joined", "lid_height_m", "read_surfaces"]
+
+LID_GRID = 5
+
+
+def read_surfaces(path: Path) -> list[MeshSurface]:
+    """Objects of a mesh file: (vertices (v, 3), faces (f, 3)) each, identical vertices made one. Raises FileError, MeshError."""
+    whole = [welded(vertex, face) for vertex, face in meshes.read_surfaces(path) if len(face)]
+    whole = [(vertex, face) for vertex, face in whole if len(face) and np.isfinite(vertex).all()]
+    if not whole:
+        raise MeshError(f"mesh file '{path.name}' holds no triangle", "export it again")
+    return whole
+
+
+def joined(surfaces: list[MeshSurface]) -> MeshSurface:
+    """All surfaces as one: (v, 3), (f, 3)."""
+    offset = np.cumsum([0] + [len(vertex) for vertex, _ in surfaces])
+    return np.concatenate([v for v, _ in surfaces]), np.concatenate([f + o for (_, f), o in zip(surfaces, offset, strict=False)])
+
+
+def hull(vertex_m: Array) -> MeshSurface:
+    """Convex hull of points (v, 3), faces outward. Raises MeshError where they lie in a plane."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    try:
+        shell = ConvexHull(vertex_m)
+    except (QhullError, ValueError) as error:
+        raise MeshError("a collision mesh is flat or empty", "give it thickness, or pass mesh=") from error
+    face = shell.simplices.copy()
+    a, b, c = (vertex_m[face[:, k]] for k in range(3))
+    inward = (np.cross(b - a, c - a) * shell.equations[:, :3]).sum(axis=1) < 0
+    face[inward] = face[inward][:, ::-1]
+    used = np.unique(face)
+    return vertex_m[used], np.searchsorted(used, face)
+
+
+def lid_height_m(vertex_m: Array, face: Array) -> float:
+    """How far the convex hull's surface stands at most from the true one: the depth below the lid over a bowl, 0 for a convex body.
+
+    Looked at on a grid of LID_GRID points a side on each of the hull's triangles.
+    """
+    try:
+        shell_m, shell = hull(vertex_m)
+    except MeshError:
+        return 0.0
+    i, j = (part.ravel() for part in np.meshgrid(np.arange(LID_GRID), np.arange(LID_GRID)))
+    inside = i + j < LID_GRID
+    share = np.stack([i, j, LID_GRID - 1 - i - j], axis=1)[inside] / (LID_GRID - 1)
+    point = np.unique(np.einsum("gc,fcx->fgx", share, shell_m[shell]).reshape(-1, 3), axis=0)
+    return float(closest_point(vertex_m, face, point)[2].max())

@@ -1,0 +1,47 @@
+"""numba's njit for every kernel of this package, its machine code kept between processes where nobody else can put any.
+
+    @njit(...) -> kernel -> first call: kept? -> machine code
+                                      no      -> compiled, kept
+
+numba's own cache=True keeps code beside the source or in a shared folder, believes what it reads there, and ends the import where neither can
+be written. Here it lies in a folder of mode 0700 that belongs to this user (NUMBA_CACHE_DIR, else the user's cache folder), and what is not
+as it was written is compiled anew (`sonic_bullet.machine.kept_code`). Where no such folder can be had kernels are compiled in every process.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from contextlib import suppress
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numba
+
+from sonic_bullet.machine.user_folder import START, cache_folder, private_folder
+
+
+def njit(**options: Any) -> Callable[[Callable[..., Any]], Any]:
+    """numba.njit with these options; the machine code is kept as the module's head says."""
+
+    def compiled(function: Callable[..., Any]) -> Any:
+        kernel = numba.njit(**options)(function)
+        place = folder()
+        if place is not None:
+            with suppress(Exception):  # a numba whose inner parts moved: the kernel is compiled in every process
+                from sonic_bullet.machine.kept_code import KernelCache
+
+                kernel._cache = KernelCache(function, place)
+        return kernel
+
+    return compiled
+
+
+@cache
+def folder() -> Path | None:
+    """Where machine code is kept; None for nowhere."""
+    given = os.environ.get("NUMBA_CACHE_DIR")
+    if given:
+        return private_folder(START / given / "sonic_bullet")
+    return cache_folder("compiled")

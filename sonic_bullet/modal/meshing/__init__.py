@@ -1,0 +1,1 @@
+"""Shapes and mesh files -> closed solids filled with tetrahedra or prisms."""

@@ -1,0 +1,168 @@
+"""What a triangle mesh means as a solid: outside found, sheets given a wall, boxes and plates recognised.
+
+Choices, each told in the model's note:
+    closed surface: the solid inside; turned inside out where it looks inward; with thickness_m a hollow body, its wall inward
+    small holes (caps under `CAP_PART` of the area): filled, as if capped
+    open surface: a wall of thickness_m, half on either side, `SHEET_PART` of the diagonal by default; flat sheets need thickness_m
+    loose pieces: they stay; the solid keeps its largest piece (solid.largest_component)
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sonic_bullet import geometry
+from sonic_bullet.records import Array
+from sonic_bullet.records.errors import MeshError
+
+CAP_PART = 0.05
+SHEET_PART = 0.02
+FLAT_PART = 1e-4  # thickness 2V/A under this part of the diagonal is no volume but noise
+SIZE_M = (1e-5, 1e4)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Skin:
+    """A surface that means a solid: vertex_m (v, 3), face (f, 3) outward, thickness_m = 2V/A or the wall's. note: the choices."""
+
+    vertex_m: Array
+    face: Array
+    thickness_m: float
+    note: str = ""
+
+
+def _flips(face: Array) -> Array:
+    """Which faces (f,) to turn so that neighbours agree, each connected piece taken by its first face."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import breadth_first_order, connected_components
+
+    f = len(face)
+    edge = np.stack([face, np.roll(face, -1, axis=1)], axis=-1).reshape(-1, 2).astype(np.int64)
+    key = edge.min(axis=1) * (int(face.max()) + 1) + edge.max(axis=1)
+    order = np.argsort(key, kind="stable")
+    _, first, count = np.unique(key[order], return_index=True, return_counts=True)
+    first = first[count == 2]  # where three faces meet nobody knows which two are neighbours
+    one, two = order[first], order[first + 1]
+    against = (edge[one, 0] == edge[two, 0]).astype(np.int64)  # both run the same way: they disagree
+    graph = coo_array((np.concatenate([against, against]) + 1, (np.concatenate([one, two]) // 3, np.concatenate([two, one]) // 3)), shape=(f, f)).tocsr()
+    _, label = connected_components(graph, directed=False)
+    flip = np.zeros(f, bool)
+    disagree = {(int(a), int(b)): bool(d) for a, b, d in zip(one // 3, two // 3, against, strict=True)}
+    for root in np.unique(label, return_index=True)[1]:
+        walk, parent = breadth_first_order(graph, int(root), directed=False)
+        for node in walk[1:]:
+            up = int(parent[node])
+            flip[node] = flip[up] ^ disagree.get((up, int(node)), disagree.get((int(node), up), False))
+    return flip
+
+
+def pieces_of_faces(face: Array) -> Array:
+    """Label (f,) of the piece each face belongs to: faces that share a vertex hang together."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    n = int(face.max()) + 1
+    row, column = face[:, [0, 1]].T.ravel(), face[:, [1, 2]].T.ravel()
+    return np.asarray(connected_components(coo_array((np.ones(len(row)), (row, column)), shape=(n, n)), directed=False)[1][face[:, 0]])
+
+
+def _boundary(face: Array) -> Array:
+    """Directed edges (e, 2) that no face runs through the other way."""
+    edge = np.stack([face, np.roll(face, -1, axis=1)], axis=-1).reshape(-1, 2).astype(np.int64)
+    n = int(face.max()) + 1
+    return edge[~np.isin(edge[:, 0] * n + edge[:, 1], edge[:, 1] * n + edge[:, 0])]
+
+
+def _cap_area_m2(vertex_m: Array, boundary: Array) -> float:
+    """Area of the flat-as-can-be caps over the holes: half the sum of |∮ x × dx| over the loops."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    if len(boundary) == 0:
+        return 0.0
+    n = len(vertex_m)
+    _, label = connected_components(coo_array((np.ones(len(boundary)), (boundary[:, 0], boundary[:, 1])), shape=(n, n)), directed=False)
+    loop = np.unique(label[boundary[:, 0]], return_inverse=True)[1]
+    middle = vertex_m.mean(axis=0)
+    swept = np.cross(vertex_m[boundary[:, 0]] - middle, vertex_m[boundary[:, 1]] - middle) / 2
+    return float(np.linalg.norm(np.stack([np.bincount(loop, swept[:, x]) for x in range(3)], axis=1), axis=1).sum())
+
+
+def _vertex_normals(vertex_m: Array, face: Array) -> Array:
+    corner = geometry.corner_normals(vertex_m, face)
+    mean = np.zeros_like(vertex_m)
+    np.add.at(mean, face.ravel(), corner.reshape(-1, 3))
+    length = np.linalg.norm(mean, axis=1)
+    return np.asarray(mean / np.where(length > 0, length, 1)[:, None])
+
+
+def _walled(vertex_m: Array, face: Array, out_m: float, in_m: float) -> tuple[Array, Array]:
+    """Closed surface about an open one: moved out_m along the normals, a copy moved in_m against them, rims between."""
+    normal = _vertex_normals(vertex_m, face)
+    n = len(vertex_m)
+    rim = _boundary(face)
+    a, b = rim[:, 0], rim[:, 1]
+    sides = np.concatenate([np.stack([b, a, a + n], axis=1), np.stack([b, a + n, b + n], axis=1)])
+    return np.concatenate([vertex_m + out_m * normal, vertex_m - in_m * normal]), np.concatenate([face, face[:, ::-1] + n, sides])
+
+
+def _oriented(vertex_m: Array, face: Array) -> tuple[Array, str]:
+    """Faces (f, 3) turned so that neighbours agree and the solid is inside, and what was done."""
+    note = ""
+    if not geometry.is_closed(face):
+        flip = _flips(face)
+        if flip.any():
+            face = np.where(flip[:, None], face[:, ::-1], face)
+            note = f"; {int(flip.sum())} faces turned to agree with their neighbours"
+            label = pieces_of_faces(face)
+            for piece in range(int(label.max()) + 1):
+                mine = label == piece
+                if geometry.volume_m3(vertex_m, face[mine]) < 0:
+                    face[mine] = face[mine][:, ::-1]
+    if geometry.volume_m3(vertex_m, face) < 0:
+        face = face[:, ::-1]
+        note += "; turned inside out"
+    return face, note
+
+
+def prepared(vertex_m: Array, face: Array, thickness_m: float | None) -> Skin:
+    """The surface that fTetWild is to fill. Raises MeshError for no triangle, NaN, an absurd size, or a sheet it cannot thicken."""
+    if not np.isfinite(vertex_m[face]).all():
+        raise MeshError("mesh holds NaN or infinite vertices", "repair the mesh file")
+    if thickness_m is not None and not (np.isfinite(thickness_m) and thickness_m > 0):
+        raise MeshError(f"thickness_m is {thickness_m}", "give a wall thickness above zero")
+    used, face = np.unique(face, return_inverse=True)
+    vertex_m, face = geometry.welded(vertex_m[used], face.reshape(-1, 3))
+    if len(face) == 0:
+        raise MeshError("mesh has no triangle with three different corners", "repair the mesh file")
+    diagonal_m = float(np.linalg.norm(np.ptp(vertex_m, axis=0)))
+    if not SIZE_M[0] < diagonal_m < SIZE_M[1]:
+        raise MeshError(f"mesh is {diagonal_m:.3g} m across", "check its unit and scale: metres are expected")
+    area = geometry.face_areas_m2(vertex_m, face)
+    face = face[area > 1e-14 * diagonal_m**2]
+    if len(face) == 0:
+        raise MeshError("mesh has no area", "its vertices lie on one line: repair the mesh file")
+    total = float(geometry.face_areas_m2(vertex_m, face).sum())
+    face, note = _oriented(vertex_m, face)
+    volume = geometry.volume_m3(vertex_m, face)
+    cap = _cap_area_m2(vertex_m, _boundary(face))
+    if cap < CAP_PART * total and 2 * volume / total > FLAT_PART * diagonal_m:
+        if not geometry.is_closed(face):
+            note += "; holes filled"
+        if thickness_m is None:
+            return Skin(vertex_m, face, 2 * volume / total, note)
+        inner_v, inner_f = vertex_m - thickness_m * _vertex_normals(vertex_m, face), face[:, ::-1] + len(vertex_m)
+        return Skin(np.concatenate([vertex_m, inner_v]), np.concatenate([face, inner_f]), thickness_m, f"{note}; hollow, wall {thickness_m:.3g} m inward")
+    wall_m = thickness_m if thickness_m is not None else SHEET_PART * diagonal_m
+    flat = float(np.linalg.svd(vertex_m - vertex_m.mean(axis=0), compute_uv=False)[-1]) < 1e-9 * diagonal_m * len(vertex_m) ** 0.5
+    if thickness_m is None and flat:
+        raise MeshError("mesh is a flat sheet without volume", "give thickness_m to make it solid")
+    if geometry.is_closed(face):  # two coincident sides: one of them is the sheet
+        _, first = np.unique(np.sort(face, axis=1), axis=0, return_index=True)
+        if len(first) == len(face) or thickness_m is None:
+            raise MeshError(f"mesh encloses no volume ({volume:.2g} m³ in {total:.2g} m²)", "give thickness_m to make the sheet solid")
+        face = face[np.sort(first)]
+    vertex_m, face = _walled(vertex_m, face, wall_m / 2, wall_m / 2)
+    return Skin(vertex_m, face, wall_m, f"{note}; open surface given a wall of {wall_m:.3g} m")

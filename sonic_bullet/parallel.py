@@ -1,0 +1,118 @@
+"""Work on several things at once: a second process takes every next one from the same list.
+
+    items -> [do(item), …] in their order, whoever did them
+
+A fork, so that nothing has to be handed over but results; what the other process could not do or send is done here, and raises here. Where processes do not
+fork (Windows; macOS, whose libraries forbid it) or there is one core, all is done here. Work inside work stays where it is: here by _INSIDE, there because the
+helper is a daemon, which may have no children. Linear algebra has one thread in each: its own, waiting for each other on small matrices, had made two processes slower
+than one, and sums come in another order with every number of threads.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
+from contextvars import ContextVar
+from multiprocessing import current_process, get_context
+from multiprocessing.connection import Connection
+from multiprocessing.reduction import ForkingPickler
+from typing import Any, TypeVar
+
+Item = TypeVar("Item")
+Made = TypeVar("Made")
+
+_INSIDE: ContextVar[bool] = ContextVar("inside", default=False)  # a list that is being worked on
+
+
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """Linear algebra on one thread while this lasts: as fast on matrices of hundreds, and the same bits on every machine's number of cores."""
+    import scipy.linalg  # noqa: F401  its library has threads apart from numpy's, and must be there to be told
+    from threadpoolctl import threadpool_limits
+
+    with threadpool_limits(1, user_api="blas"):
+        yield
+
+
+def parallel_map(do: Callable[[Item], Made], items: Iterable[Item]) -> list[Made]:
+    """[do(item) for item in items], on two cores where there are two. ``do`` must not depend on what it did before.
+
+    Raises whatever do raises.
+    """
+    listed = list(items)
+    if _INSIDE.get():
+        return [do(item) for item in listed]
+    with one_thread():
+        return _shared(do, listed) if len(listed) > 1 and _can_fork() else [do(item) for item in listed]
+
+
+def _shared(do: Callable[[Item], Made], listed: list[Item]) -> list[Made]:
+    try:
+        other, ours, taken = _started(do, listed)
+    except OSError:  # no memory or no process to be had
+        return [do(item) for item in listed]
+    made: dict[int, Made] = {}
+    before = _INSIDE.set(True)
+    try:
+        while (i := _next(taken)) < len(listed):
+            made[i] = do(listed[i])
+        while (found := _received(ours)) is not None:
+            made[found[0]] = found[1]
+        return [made[i] if i in made else do(item) for i, item in enumerate(listed)]
+    finally:
+        _INSIDE.reset(before)
+        other.kill()
+        other.join()
+        ours.close()
+
+
+def _started(do: Callable[[Any], Any], items: list[Any]) -> tuple[Any, Connection, Any]:
+    """The other process, where its results come out, and the count of what is taken. Raises OSError."""
+    context: Any = get_context("fork")
+    taken = context.Value("i", 0)
+    ours, theirs = context.Pipe(duplex=False)
+    other = context.Process(target=_help, args=(do, items, taken, ours, theirs, os.getpid()), daemon=True)
+    try:
+        other.start()
+    except OSError:
+        ours.close()
+        raise
+    finally:
+        theirs.close()
+    return other, ours, taken
+
+
+def _can_fork() -> bool:
+    return sys.platform == "linux" and len(os.sched_getaffinity(0)) > 1 and not current_process().daemon  # nor may a pool's worker have children
+
+
+def _next(taken: Any) -> int:
+    with taken.get_lock():
+        taken.value += 1
+        return int(taken.value) - 1
+
+
+def _received(ours: Connection) -> tuple[int, Any] | None:
+    """What the other process has sent; None at its end, or where it cannot be read: what is missing is done here."""
+    try:
+        found: tuple[int, Any] | None = ours.recv()
+    except Exception:  # the other process is gone, or has sent what no one can put together
+        return None
+    return found
+
+
+def _help(do: Callable[[Any], Any], items: list[Any], taken: Any, ours: Connection, theirs: Connection, parent: int) -> None:
+    """The other process: results one by one, then None."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the first one stops, and ends this one
+    ours.close()
+    with suppress(OSError):  # nobody listens any more
+        while os.getppid() == parent and (i := _next(taken)) < len(items):
+            try:
+                message = ForkingPickler.dumps((i, do(items[i])))
+            except Exception:  # done again where it can be told, or sent nowhere
+                continue
+            theirs.send_bytes(message)
+        theirs.send(None)

@@ -1,0 +1,248 @@
+"""One picture of a render: what was heard above, what was touched below, on one time axis.
+
+    samples (channels, n) Pa -> pressure p(t)
+                             -> level of a short-time spectrum, dB re 20 µPa per bin: 20 log10(|P(f, t)|/√2/20 µPa), |P| the amplitude of a sine
+    ContactLog               -> per sounding body one lane: strikes (area ∝ impulse), sliding and rolling bars
+
+A pair of bodies strikes in a step where its impulse leaps above what it carried in the step before. Between strikes a pair that is loaded
+for five steps or more slides where its slip passes 1 mm/s, else rolls where its contact moves faster than 1 mm/s, else rests.
+"""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sonic_bullet.files import check_output, check_sr, replacing
+from sonic_bullet.files.contact_log import ContactLog
+from sonic_bullet.records import Array, Microphone, Sensor, Vibrometer
+from sonic_bullet.records.errors import AudioError, FileError
+from sonic_bullet.records.units import REFERENCE_PRESSURE_PA
+
+EXTENSIONS = (".png", ".pdf", ".svg")
+MOVING_M_S = 1e-3
+LASTING_STEPS = 5
+LEAP = 2.0  # a strike at least doubles the impulse of the step before
+WINDOW_S = 0.010
+COLUMNS_MAX = 1600
+DYNAMICS_DB = 90.0
+LANES_MAX = 24
+STRIKES_MAX = 400  # of a lane, the strongest
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Events:
+    """What the bodies of a log did. strike_* (s,): body index, time in s, impulse in N·s; bar_* (r,): body index, start, end in s, kind."""
+
+    strike_body: Array
+    strike_s: Array
+    strike_n_s: Array
+    bar_body: Array
+    bar_s: Array
+    bar_kind: tuple[str, ...]
+
+
+def find_events(log: ContactLog) -> Events:
+    """Strikes and lasting contacts of every body that sounds (those with a model), by the rules of the module's head."""
+    rows, step, start_s = log.rows, log.step, np.append(log.start_s, log.duration_s)
+    low, high = np.minimum(rows.a, rows.b), np.maximum(rows.a, rows.b)
+    pair, index = np.unique(np.stack([low, high], 1), axis=0, return_inverse=True)
+    strikes: list[tuple[int, float, float]] = []
+    bars: list[tuple[int, float, float, str]] = []
+    normal_n_s = np.abs(np.einsum("ki,ki->k", rows.impulse_n_s, rows.normal))
+    slip, sweep = np.linalg.norm(rows.slip_m_s, axis=1), rows.sweep_m_s.max(1, initial=0)
+    for number, (a, b) in enumerate(pair):
+        mine = np.flatnonzero(index.ravel() == number)
+        steps, at = np.unique(step[mine], return_inverse=True)
+        impulse = np.bincount(at, normal_n_s[mine])
+        before = np.where(np.diff(steps, prepend=-2) == 1, np.append(0.0, impulse[:-1]), 0.0)
+        hit = impulse > LEAP * before
+        hit &= ~np.append(False, hit[:-1] & (np.diff(steps) == 1))  # a strike that spans two steps is one
+        bodies = [int(i) for i in (a, b) if log.bodies[i].model is not None]
+        strikes += [(body, float(start_s[steps[i]]), float(impulse[i] - before[i])) for body in bodies for i in np.flatnonzero(hit)]
+        moving = [np.bincount(at, normal_n_s[mine] * speed[mine]) / np.maximum(impulse, 1e-300) for speed in (slip, sweep)]
+        kind = np.where(moving[0] > MOVING_M_S, 2, np.where(moving[1] > MOVING_M_S, 1, 0))
+        cuts = np.flatnonzero((np.diff(steps) != 1) | (np.diff(kind) != 0)) + 1
+        for run in np.split(np.arange(len(steps)), cuts):
+            if len(run) >= LASTING_STEPS:
+                span = (float(start_s[steps[run[0]]]), float(start_s[steps[run[-1]] + 1]), ("rests", "rolls", "slides")[kind[run[0]]])
+                bars += [(body, *span) for body in bodies]
+    return Events(
+        np.array([s[0] for s in strikes], int),
+        np.array([s[1] for s in strikes], float),
+        np.array([s[2] for s in strikes], float),
+        np.array([r[0] for r in bars], int),
+        np.array([r[1:3] for r in bars], float).reshape(-1, 2),
+        tuple(r[3] for r in bars),
+    )
+
+
+def spectrogram_db(samples: Array, sr: int) -> tuple[Array, Array, Array]:
+    """(frequencies (f,) Hz, times (t,) s, levels (f, t) dB re 20 µPa) of one channel (n,) of pascals.
+
+    A Hann window of 10 ms, scaled so that a sine of amplitude a reads 20 log10(a/√2/20 µPa) whatever the rate.
+    """
+    from scipy.signal import ShortTimeFFT
+    from scipy.signal.windows import hann
+
+    size = max(16, round(WINDOW_S * sr))
+    hop = max(size // 4, int(np.ceil(len(samples) / COLUMNS_MAX)))
+    transform = ShortTimeFFT(hann(size, sym=False), hop, sr, fft_mode="onesided", scale_to="magnitude", mfft=2 ** int(np.ceil(np.log2(size)) + 1))
+    padded = np.pad(samples, (0, max(0, size - len(samples))))
+    amplitude = 2 * np.abs(transform.stft(padded))
+    with np.errstate(divide="ignore"):
+        level = 20 * np.log10(amplitude / np.sqrt(2) / REFERENCE_PRESSURE_PA)
+    return transform.f, transform.t(len(padded)), level
+
+
+def quantity(sensor: Sensor) -> tuple[str, str]:
+    """What a sensor's samples are, and their unit."""
+    return {Microphone: ("pressure", "Pa"), Vibrometer: ("velocity", "m/s")}.get(type(sensor), ("modal sum", "1"))
+
+
+def check_picture_output(path: str | os.PathLike[str]) -> Path:
+    """The real path of a picture. Raises FileError where the extension is not .png, .pdf or .svg or the place cannot be written."""
+    if Path(path).suffix.lower() not in EXTENSIONS:
+        raise FileError(f"cannot draw {path}: unknown picture format", f"end the name with one of {' '.join(EXTENSIONS)}")
+    return check_output(path)
+
+
+def render_picture(path: str | os.PathLike[str], samples: Array, sr: int, log: ContactLog | None = None, title: str = "") -> None:
+    """Draw ``samples`` (channels, n) in Pa, and the events of ``log`` where there is one, to a PNG, PDF or SVG.
+
+    Of several channels the first is drawn, and the picture says so. Equal input gives equal bytes. Raises FileError (place, extension)
+    and AudioError (rate, shape, NaN).
+    """
+    check_picture_output(path)
+    rate, sound = check_sr(sr), np.asarray(samples, float)
+    if sound.ndim != 2 or sound.shape[0] == 0 or not np.isfinite(sound).all():
+        raise AudioError(f"samples of shape {sound.shape} cannot be drawn", "pass finite samples of shape (channels, n)")
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    events = None if log is None else find_events(log)
+    lanes = [] if log is None or events is None else _lanes(log, events)
+    heights = [1.6, 3.2] + ([0.45 + 0.24 * len(lanes)] if events is not None else [])
+    figure = Figure(figsize=(12, sum(heights) + 1.2), dpi=120, layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.subplots(len(heights), 1, sharex=True, height_ratios=heights)
+    what, unit = quantity(log.sensors[0]) if log is not None and log.sensors else ("pressure", "Pa")
+    _draw_samples(axes[0], sound[0], rate, what, unit)
+    image = _draw_spectrogram(axes[1], sound[0], rate)
+    if image is not None:
+        figure.colorbar(image, ax=axes[1], label="dB re 20 µPa" if unit == "Pa" else f"dB re 20·10⁻⁶ {unit}", pad=0.01, fraction=0.03)
+    if log is not None and events is not None:
+        _draw_events(axes[2], log, events, lanes)
+    axes[-1].set_xlabel("time in s")
+    axes[-1].set_xlim(0, max(sound.shape[1] / rate, log.duration_s if log is not None else 0, 1e-3))
+    observed = f"channel 1 of {sound.shape[0]}" if sound.shape[0] > 1 else ""
+    figure.suptitle(" · ".join(part for part in (title.replace("$", r"\$"), observed) if part), fontsize=11)
+    extension = Path(path).suffix.lower()[1:]
+    timeless = {"png": {"Software": None}, "pdf": {"CreationDate": None}, "svg": {"Date": None}}[extension]
+    with replacing(path) as file:
+        figure.savefig(file, format=extension, metadata=timeless)
+
+
+def _draw_samples(axis: Any, sound: Array, sr: int, what: str, unit: str) -> None:
+    """p(t), as the band between least and greatest value of each of at most 4000 stretches: no peak falls between pixels."""
+    stretch = max(1, len(sound) // 4000)
+    whole = sound[: len(sound) // stretch * stretch].reshape(-1, stretch)
+    if whole.size:
+        time_s = np.arange(len(whole)) * stretch / sr
+        axis.fill_between(time_s, whole.min(1), whole.max(1), color="#1f4e79", linewidth=0.4, edgecolor="#1f4e79")
+    peak = float(np.abs(sound).max(initial=0))
+    if peak > 0:
+        rms = float(np.sqrt(np.mean(sound**2)))
+        level = f", mean level {20 * np.log10(max(rms, 1e-300) / REFERENCE_PRESSURE_PA):.0f} dB" if unit == "Pa" else ""
+        axis.set_title(f"peak {peak:.3g} {unit}{level}", loc="right", fontsize=8)
+    else:
+        axis.set_title("silence", loc="right", fontsize=8)
+    axis.set_ylabel(f"{what} in {unit}")
+    axis.grid(alpha=0.25)
+
+
+def _draw_spectrogram(axis: Any, sound: Array, sr: int) -> Any:
+    frequency, time_s, level = spectrogram_db(sound, sr)
+    shown = frequency <= 20_000
+    frequency, level = frequency[shown], level[shown]
+    loudest = float(level.max(initial=-np.inf))
+    axis.set_ylabel("frequency in kHz")
+    axis.set_ylim(0, min(20.0, sr / 2000))
+    if not np.isfinite(loudest):
+        axis.text(0.5, 0.5, "silence", transform=axis.transAxes, ha="center", color="#777777")
+        return None
+    floor = loudest - DYNAMICS_DB
+    image = axis.imshow(
+        np.maximum(level, floor),
+        origin="lower",
+        aspect="auto",
+        interpolation="nearest",
+        cmap="magma",
+        vmin=floor,
+        vmax=loudest,
+        extent=(time_s[0], time_s[-1] + (time_s[-1] - time_s[0]) / max(1, len(time_s) - 1), 0, frequency[-1] / 1000),
+    )
+    return image
+
+
+def _lanes(log: ContactLog, events: Events) -> list[int]:
+    """The bodies to show: those that did something, the busiest first where there are too many, in the log's order."""
+    busy = np.bincount(np.append(events.strike_body, events.bar_body), minlength=len(log.bodies))
+    chosen = np.argsort(-busy, kind="stable")[:LANES_MAX]
+    return sorted(int(i) for i in chosen if busy[i] > 0)
+
+
+def _draw_events(axis: Any, log: ContactLog, events: Events, lanes: list[int]) -> None:
+    from matplotlib import colormaps
+    from matplotlib.lines import Line2D
+
+    colours, looks = colormaps["tab10"](np.arange(10)), {"rests": (0.8, 0.25), "rolls": (3.0, 0.6), "slides": (6.0, 0.9)}
+    largest = float(events.strike_n_s.max(initial=0))
+    for lane, body in enumerate(lanes):
+        colour = colours[lane % len(colours)]
+        for kind, (width, alpha) in looks.items():
+            spans = [span for span, owner, which in zip(events.bar_s, events.bar_body, events.bar_kind, strict=True) if owner == body and which == kind]
+            axis.hlines([lane] * len(spans), [s[0] for s in spans], [s[1] for s in spans], colors=[colour], linewidth=width, alpha=alpha)
+        mine = np.flatnonzero(events.strike_body == body)
+        mine = mine[np.argsort(-events.strike_n_s[mine], kind="stable")[:STRIKES_MAX]]
+        axis.scatter(
+            events.strike_s[mine],
+            np.full(len(mine), lane),
+            s=4 + 140 * events.strike_n_s[mine] / max(largest, 1e-300),
+            color=[colour],
+            marker="|",
+            linewidths=1.4,
+            zorder=3,
+        )
+        axis.scatter(
+            events.strike_s[mine],
+            np.full(len(mine), lane),
+            s=140 * events.strike_n_s[mine] / max(largest, 1e-300),
+            facecolors="none",
+            edgecolors=[colour],
+            linewidths=0.9,
+            zorder=3,
+        )
+    axis.set_yticks(range(len(lanes)), [_label(log, body) for body in lanes], fontsize=8)
+    axis.set_ylim(len(lanes) - 0.4, -0.6)
+    axis.grid(axis="x", alpha=0.25)
+    if not lanes:
+        axis.set_ylim(1, -1)
+        axis.text(0.5, 0.5, "no contacts", transform=axis.transAxes, ha="center", va="center", color="#777777")
+        return
+    handles = [Line2D([], [], color="#444444", linewidth=width, alpha=alpha, label=kind) for kind, (width, alpha) in looks.items()]
+    if largest > 0:
+        handles.append(Line2D([], [], color="#444444", marker="o", markerfacecolor="none", markersize=11, linestyle="", label=f"strike of {largest:.2g} N·s"))
+    axis.legend(handles=handles, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderpad=0.1, ncols=4, fontsize=7, frameon=False)
+
+
+def _label(log: ContactLog, index: int) -> str:
+    """Name and material of a body, as a lane's label."""
+    body = log.bodies[index]
+    name = body.name if len(body.name) <= 18 else body.name[:17] + "…"
+    name = name.encode("utf-8", "replace").decode().replace("$", r"\$")
+    return f"{name} ({body.material.name})" if body.material is not None else name

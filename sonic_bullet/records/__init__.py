@@ -1,0 +1,59 @@
+"""Values that prove themselves when built: read-only arrays of a stated shape, units in the names.
+
+bodies, contacts, residual: what one room hands another;  arrays: what records are built of;  units; errors
+
+Names are imported when first used: errors and units need no numpy, and neither does who prints a help text.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from sonic_bullet.records.arrays import Array, frozen_array
+    from sonic_bullet.records.bodies import ORTHOTROPIC, Body, Material, ModalModel, Shape, ShapeKind, isotropic_stiffness_pa
+    from sonic_bullet.records.residual import Residual
+    from sonic_bullet.records.sensors import Air, Microphone, ModalSum, Sensor, Vibrometer
+
+__all__ = [
+    "ORTHOTROPIC",
+    "Air",
+    "Array",
+    "Body",
+    "Material",
+    "Microphone",
+    "ModalModel",
+    "ModalSum",
+    "Residual",
+    "Sensor",
+    "Shape",
+    "ShapeKind",
+    "Vibrometer",
+    "frozen_array",
+    "isotropic_stiffness_pa",
+]
+
+_HOME = {
+    "Air": "sensors",
+    "Array": "arrays",
+    "Body": "bodies",
+    "Material": "bodies",
+    "Microphone": "sensors",
+    "ModalModel": "bodies",
+    "ModalSum": "sensors",
+    "ORTHOTROPIC": "bodies",
+    "Residual": "residual",
+    "Sensor": "sensors",
+    "Shape": "bodies",
+    "ShapeKind": "bodies",
+    "Vibrometer": "sensors",
+    "frozen_array": "arrays",
+    "isotropic_stiffness_pa": "bodies",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name in _HOME:
+        return getattr(importlib.import_module(f"sonic_bullet.records.{_HOME[name]}"), name)
+    raise AttributeError(f"module 'sonic_bullet.records' has no attribute '{name}'")

@@ -1,0 +1,62 @@
+"""What records are built of: read-only arrays of a stated shape, and conditions that name what is wrong."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sonic_bullet.records.coerce import shown
+from sonic_bullet.records.errors import RecordError
+
+Array = NDArray[Any]
+LARGEST = 1e30
+"""No length, force, stiffness or frequency in SI units is larger, and fourth powers of such numbers are still finite."""
+
+
+def frozen_array(value: object, dtype: Any, shape: tuple[int | None, ...], name: str, *, finite: bool = True) -> Array:
+    """Read-only C-contiguous copy of ``value`` with ``dtype`` and ``shape`` (None: any length); the same array where it is one already.
+
+    Raises RecordError where it holds no numbers, or none that ``dtype`` can hold (1.5 is no index), where the shape differs or, with
+    ``finite``, a number is NaN, infinite or beyond `LARGEST`.
+    """
+    kept = isinstance(value, np.ndarray) and not value.flags.writeable and value.base is None  # a record's own: read-only and nobody's view
+    try:
+        given = value if isinstance(value, np.ndarray) else np.asarray(value)
+        if given.dtype == dtype:
+            array = np.asarray(given, order="C") if kept else np.array(given, order="C")
+        elif given.dtype.kind in "biufO":  # no texts, complex numbers, dates
+            array = _converted(given, dtype)
+        else:
+            raise TypeError
+    except (TypeError, ValueError, OverflowError):
+        raise RecordError(f"{name} is {shown(value)}", f"pass {np.dtype(dtype).name} numbers of shape {shape}") from None
+    if array.ndim != len(shape) or any(want is not None and have != want for have, want in zip(array.shape, shape, strict=True)):
+        raise RecordError(f"{name} has shape {array.shape}, wanted {shape}", "pass an array of that shape")
+    if finite and array.dtype.kind == "f" and not (array.max(initial=0) <= LARGEST and array.min(initial=0) >= -LARGEST):  # False for NaN too
+        what = f"a number of {float(np.abs(array).max()):.3g}" if np.isfinite(array).all() else "NaN or infinite numbers"
+        raise RecordError(f"{name} holds {what}", "look for the step or file that produced them")
+    array.setflags(write=False)
+    return array
+
+
+def _converted(given: Array, dtype: Any) -> Array:
+    """A C-contiguous copy with ``dtype``. Raises ValueError where integers are asked for and that would change a number."""
+    with np.errstate(invalid="ignore", over="ignore"):
+        array: Array = np.array(given, dtype=dtype, order="C")
+    if array.dtype.kind == "i" and not (array == given).all():
+        raise ValueError
+    return array
+
+
+def store(record: object, **values: object) -> None:
+    """Set fields of a frozen record that is being built."""
+    for name, value in values.items():
+        object.__setattr__(record, name, value)
+
+
+def require(condition: bool, what: str, remedy: str) -> None:
+    """Raise RecordError unless the condition holds."""
+    if not condition:
+        raise RecordError(what, remedy)

@@ -1,0 +1,283 @@
+"""The values that travel between rooms: what a thing is, proven when it is built.
+
+    shapes (listener) + Material (presets) -> ModalModel (modal) -> Body -> Step, ContactLog (contacts.py) -> sound
+
+Every record is frozen, its arrays are read-only copies, units stand in the names and shapes in the comments:
+b bodies, m modes, v vertices, f faces. A record that exists is sound: inner code never asks again. Body frame always
+means the frame PyBullet calls inertial: origin at the centre of mass, axes as `getBasePositionAndOrientation` gives them.
+"""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass, field, fields
+from typing import Any, Literal, get_args
+
+import numpy as np
+
+from sonic_bullet.records.arrays import Array, frozen_array, require, store
+from sonic_bullet.records.coerce import as_flag, as_items, as_kind, as_number, as_text, as_whole, check_options, nearest, shown
+from sonic_bullet.records.errors import RecordError
+from sonic_bullet.records.residual import Residual
+
+__all__ = [
+    "Array",
+    "Body",
+    "Material",
+    "ModalModel",
+    "Residual",
+    "Shape",
+    "ShapeKind",
+    "frozen_array",
+    "isotropic_stiffness_pa",
+]
+
+
+def isotropic_stiffness_pa(youngs_pa: float, poisson: float) -> Array:
+    """Voigt stiffness (6, 6) in Pa, order xx yy zz yz xz xy with engineering shear strains.
+
+    Source: Lamé constants, e.g. Slaughter, The Linearized Theory of Elasticity (2002), ch. 5.
+    """
+    lame = youngs_pa * poisson / ((1 + poisson) * (1 - 2 * poisson))
+    shear = youngs_pa / (2 * (1 + poisson))
+    stiffness = np.zeros((6, 6))
+    stiffness[:3, :3] = lame
+    stiffness[range(3), range(3)] += 2 * shear
+    stiffness[range(3, 6), range(3, 6)] = shear
+    return stiffness
+
+
+ORTHOTROPIC = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1), (3, 3), (4, 4), (5, 5))
+"""Places in the Voigt tensor of C11 C22 C33 C23 C13 C12 C44 C55 C66, the constants that symmetry planes along the axes leave."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Material:
+    """What a body is made of.
+
+    stiffness_pa (6, 6): Voigt tensor, positive definite. alpha_per_s, beta_s: Rayleigh damping d = (alpha + beta·lambda)/2
+    [Ren, Yeh, Lin 2013, eq. 6], None where unknown. includes_radiation: they, and laws among the effects, are a body's total damping
+    as it was recorded, so the run time adds no radiation to it; else the material's own, to which it does. roughness_m: rms height of the surface profile; hurst: its Hurst
+    exponent (profile spectrum ∝ k^-(1+2·hurst)). restitution: of an impact against a rigid wall, for pulses only.
+    residual: what sounds beside the modes, None: nothing. effects: what else belongs to it (sonic_bullet.effects), in the order in which they act.
+    """
+
+    name: str
+    density_kg_m3: float
+    stiffness_pa: Array
+    alpha_per_s: float | None = None
+    beta_s: float | None = None
+    roughness_m: float = 1e-6
+    hurst: float = 0.7
+    restitution: float = 0.5
+    source: str = ""
+    residual: Residual | None = None
+    effects: tuple[Any, ...] = ()
+    includes_radiation: bool = False
+
+    def __post_init__(self) -> None:
+        as_text(self.name, "the name of a material", "give a text")
+        where = f"material {shown(self.name)}"
+        stiffness = frozen_array(self.stiffness_pa, float, (6, 6), f"{where}: stiffness_pa")
+        store(self, stiffness_pa=stiffness, density_kg_m3=as_number(self.density_kg_m3, f"{where}: density_kg_m3", "give a density above zero", above=0))
+        require(bool(np.allclose(stiffness, stiffness.T, rtol=1e-9)), f"{where}: stiffness_pa is not symmetric", "give a symmetric tensor")
+        require(
+            bool(np.linalg.eigvalsh(stiffness)[0] > 0),
+            f"{where}: stiffness_pa is not positive definite",
+            "Young's modulus must be above 0 and Poisson's ratio within -1 … 0.5",
+        )
+        for name in ("alpha_per_s", "beta_s"):
+            if getattr(self, name) is not None:
+                store(self, **{name: as_number(getattr(self, name), f"{where}: {name}", "damping must be zero or above", least=0)})
+        require((self.alpha_per_s is None) == (self.beta_s is None), f"{where}: only one of alpha_per_s, beta_s is given", "give both or neither")
+        store(
+            self,
+            roughness_m=as_number(self.roughness_m, f"{where}: roughness_m", "rms height must be zero or above", least=0),
+            hurst=as_number(self.hurst, f"{where}: hurst", "the Hurst exponent lies between 0 and 1", above=0, below=1),
+            restitution=as_number(self.restitution, f"{where}: restitution", "restitution lies between 0 and 1", least=0, most=1),
+            effects=as_items(self.effects, f"{where}: effects", "give effects of sonic_bullet.effects"),
+            includes_radiation=as_flag(self.includes_radiation, f"{where}: includes_radiation"),
+        )
+        as_text(self.source, f"{where}: source", "give a text")
+        if self.residual is not None:
+            as_kind(self.residual, Residual, f"{where}: residual", "give a Residual, or none")
+
+    @classmethod
+    def isotropic(cls, name: str, *, youngs_pa: float, poisson: float, density_kg_m3: float, **rest: Any) -> Material:
+        """Material with the same stiffness in every direction. Raises RecordError on unphysical constants."""
+        where = f"material {shown(name)}"
+        modulus = as_number(youngs_pa, f"{where}: youngs_pa", "give a Young's modulus above zero", above=0)
+        ratio = as_number(poisson, f"{where}: poisson", "Poisson's ratio lies between -1 and 0.5", above=-1, below=0.5)
+        check_options(rest, [f.name for f in fields(cls) if f.name not in ("name", "density_kg_m3", "stiffness_pa")], "Material.isotropic")
+        return cls(name=name, density_kg_m3=density_kg_m3, stiffness_pa=isotropic_stiffness_pa(modulus, ratio), **rest)
+
+    @property
+    def bulk_pa(self) -> float:
+        """Voigt average of the bulk modulus [Hill 1952, eq. 1]; exact for isotropic materials."""
+        return float(self.stiffness_pa[:3, :3].sum() / 9)
+
+    @property
+    def shear_pa(self) -> float:
+        """Voigt average of the shear modulus [Hill 1952, eq. 2]; exact for isotropic materials."""
+        c = self.stiffness_pa
+        return float((np.trace(c[:3, :3]) - (c[0, 1] + c[1, 2] + c[0, 2]) + 3 * np.trace(c[3:, 3:])) / 15)
+
+    @property
+    def youngs_pa(self) -> float:
+        return 9 * self.bulk_pa * self.shear_pa / (3 * self.bulk_pa + self.shear_pa)
+
+    @property
+    def poisson(self) -> float:
+        return (3 * self.bulk_pa - 2 * self.shear_pa) / (2 * (3 * self.bulk_pa + self.shear_pa))
+
+    @property
+    def plane_strain_pa(self) -> float:
+        """E/(1-ν²), the modulus that enters Hertz' law."""
+        return self.youngs_pa / (1 - self.poisson**2)
+
+
+ShapeKind = Literal["sphere", "box", "capsule", "cylinder", "mesh", "plane"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Shape:
+    """One piece of a body's geometry, placed in the body frame.
+
+    size_m (3,): sphere (r, 0, 0); box full edge lengths; capsule and cylinder (r, length along z without caps, 0); plane: normal
+    is +z, unused; mesh: unused. position_m (3,), quaternion_xyzw (4,): placement. vertex_m (v, 3), face (f, 3): meshes only,
+    already scaled, counter-clockwise seen from outside.
+    """
+
+    kind: ShapeKind
+    size_m: Array = field(default_factory=lambda: np.zeros(3))
+    position_m: Array = field(default_factory=lambda: np.zeros(3))
+    quaternion_xyzw: Array = field(default_factory=lambda: np.array([0.0, 0.0, 0.0, 1.0]))
+    vertex_m: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    face: Array = field(default_factory=lambda: np.zeros((0, 3), np.int32))
+
+    def __post_init__(self) -> None:
+        kinds = get_args(ShapeKind)
+        if as_text(self.kind, "kind of a shape", f"one of {', '.join(kinds)}") not in kinds:
+            raise RecordError(f"kind of a shape is {shown(self.kind)}", nearest(self.kind, kinds))
+        store(
+            self,
+            size_m=frozen_array(self.size_m, float, (3,), "shape: size_m"),
+            position_m=frozen_array(self.position_m, float, (3,), "shape: position_m"),
+            quaternion_xyzw=frozen_array(self.quaternion_xyzw, float, (4,), "shape: quaternion_xyzw"),
+            vertex_m=frozen_array(self.vertex_m, float, (None, 3), "mesh: vertex_m"),
+            face=frozen_array(self.face, np.int32, (None, 3), "mesh: face"),
+        )
+        require(bool((self.size_m >= 0).all()), f"{self.kind}: size_m {self.size_m} is negative", "give sizes above zero")
+        if self.kind == "mesh":
+            require(len(self.face) > 0, "mesh without triangles", "give a triangle mesh")
+            require(bool((self.face >= 0).all() and (self.face < len(self.vertex_m)).all()), "mesh faces point at missing vertices", "repair the mesh file")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ModalModel:
+    """A body's vibration modes on its surface, and the surface they live on.
+
+    freq_hz, decay_per_s (m,): of the damped modes, ascending; decay NaN where the material states no damping.
+    shape (v, 3, m) float32: mass-normalised displacement at the surface vertices, in 1/√kg (UᵀMU = I), body frame.
+    vertex_m (v, 3), face (f, 3): the surface, body frame, outward. curvature_per_m (f,): mean of the principal curvatures
+    of the smooth surface (0 flat, 1/r sphere, negative inside a bowl). volume_m3, mass_kg: of the meshed solid at the
+    material's density. dropped: modes left out as overdamped. note: how it was made (element size, order, choices).
+    bend_s2_m2, damping_growth_s_m (m,): relative rise of a mode's frequency per square of its peak velocity at the surface, of its decay
+    (damping_growth · that velocity)^damping_growth_power, 1 or 2; None: a linear body. includes_radiation: of decay_per_s, as the
+    material (see `Material`).
+    A body without audible modes has m = 0; a plane has v = f = 0 besides.
+    """
+
+    freq_hz: Array
+    decay_per_s: Array
+    shape: Array
+    vertex_m: Array
+    face: Array
+    curvature_per_m: Array
+    volume_m3: float
+    mass_kg: float
+    dropped: int = 0
+    note: str = ""
+    bend_s2_m2: Array | None = None
+    damping_growth_s_m: Array | None = None
+    damping_growth_power: float = 1.0
+    includes_radiation: bool = False
+
+    def __post_init__(self) -> None:
+        freq = frozen_array(self.freq_hz, float, (None,), "freq_hz")
+        m = len(freq)
+        vertex = frozen_array(self.vertex_m, float, (None, 3), "vertex_m")
+        face = frozen_array(self.face, np.int32, (None, 3), "face")
+        decay = frozen_array(self.decay_per_s, float, (m,), "decay_per_s", finite=False)
+        store(
+            self,
+            freq_hz=freq,
+            decay_per_s=decay,
+            vertex_m=vertex,
+            face=face,
+            shape=frozen_array(self.shape, np.float32, (len(vertex), 3, m), "mode shape"),
+            damping_growth_power=as_number(self.damping_growth_power, "damping_growth_power", "give 1 or 2"),
+            volume_m3=as_number(self.volume_m3, "volume_m3", "orient the mesh outward", least=0),
+            mass_kg=as_number(self.mass_kg, "mass_kg", "orient the mesh outward", least=0),
+            dropped=as_whole(self.dropped, "dropped", "give the number of modes left out", least=0),
+            curvature_per_m=frozen_array(self.curvature_per_m, float, (len(face),), "curvature_per_m"),
+        )
+        anew = "build the model with modal.analyse"
+        require(bool((freq > 0).all() and (np.diff(freq) >= 0).all()), "mode frequencies are not ascending and above zero", anew)
+        require(not np.isinf(decay).any() and not bool((decay < 0).any()), "mode decays are negative or infinite", anew)
+        require(bool(((face >= 0) & (face < len(vertex))).all()), "faces point at missing vertices", anew)
+        require(self.damping_growth_power in (1.0, 2.0), f"decays that rise with power {self.damping_growth_power} of the level", "give 1 or 2")
+        as_text(self.note, "note", "give a text")
+        as_flag(self.includes_radiation, "includes_radiation")
+        for name in ("bend_s2_m2", "damping_growth_s_m"):
+            if getattr(self, name) is not None:
+                store(self, **{name: frozen_array(getattr(self, name), float, (m,), name)})
+
+    @property
+    def mode_count(self) -> int:
+        return len(self.freq_hz)
+
+    @property
+    def omega0_squared_per_s2(self) -> Array:
+        """Eigenvalues λ = ω² + d² (m,), of the undamped body [Ren et al. 2013, eq. 7]; NaN decays count as zero."""
+        return np.asarray((2 * np.pi * self.freq_hz) ** 2 + np.nan_to_num(self.decay_per_s) ** 2)
+
+    @property
+    def choke_s_m(self) -> Array | None:
+        """Former name of `damping_growth_s_m`."""
+        warnings.warn("ModalModel.choke_s_m is now damping_growth_s_m", DeprecationWarning, stacklevel=2)
+        return self.damping_growth_s_m
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Body:
+    """One link of one PyBullet body as the sound needs it, by value, so that a log renders without PyBullet.
+
+    body_id, link: as the user knows them (base is link -1). epoch: grows whenever ids may have been given anew.
+    name: for people. mass_kg: the simulator's, 0 for what does not move. inertia_kg_m2 (3, 3): body frame, centre of mass.
+    volume_m3: of the displaced air. curvature_per_m: of a shape that has one everywhere (sphere 1/r), else NaN: then the model's
+    surface tells. material None: a silent, smooth and rigid partner. model None: nothing of it vibrates.
+    since_step: the first step in which it exists for the sound; until_step: the first in which it does not any more, or -1.
+    """
+
+    body_id: int
+    link: int
+    epoch: int
+    name: str
+    mass_kg: float
+    inertia_kg_m2: Array
+    volume_m3: float = 0.0
+    curvature_per_m: float = float("nan")
+    material: Material | None = None
+    model: ModalModel | None = None
+    since_step: int = 0
+    until_step: int = -1
+
+    def __post_init__(self) -> None:
+        where = f"body {shown(self.body_id)} link {shown(self.link)}"
+        store(
+            self,
+            inertia_kg_m2=frozen_array(self.inertia_kg_m2, float, (3, 3), f"{where}: inertia_kg_m2"),
+            mass_kg=as_number(self.mass_kg, f"{where}: mass_kg", "give it a finite mass with changeDynamics", least=0, below=1e12),
+            volume_m3=as_number(self.volume_m3, f"{where}: volume_m3", "orient its mesh outward", least=0),
+        )

@@ -1,0 +1,179 @@
+"""Arguments at the public doors: whatever a user passes becomes the one type that inner code takes, or one line that names it.
+
+    as_number(3, "to_hz", …) -> 3.0        as_number("x", "to_hz", …) -> "to_hz is 'x'; give a frequency in Hz, above zero"
+
+Each function takes the argument's name, the remedy, and the kind of error that belongs to it. bool is no number here: True is no body.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+import numbers
+import os
+import reprlib
+from collections.abc import Callable, Collection, Iterable
+from contextlib import suppress
+from typing import Any, TypeVar
+
+import numpy as np
+
+from sonic_bullet.records.errors import FileError, RecordError, SonicBulletError
+
+Kind = TypeVar("Kind")
+Call = TypeVar("Call", bound=Callable[..., Any])
+Error = type[SonicBulletError]
+
+_SHORT = reprlib.Repr()
+_SHORT.maxstring = _SHORT.maxother = _SHORT.maxlong = 60
+_SHORT.maxlevel = 3
+LONGEST_NAME = 255
+"""Bytes of a file's name that file systems take."""
+LISTED = 8
+"""Names that a message lists at most."""
+
+
+def shown(value: object) -> str:
+    """The value as a message quotes it: 80 characters at most, whatever it is."""
+    if isinstance(value, np.ndarray) and value.ndim:
+        return f"an array of shape {value.shape}"
+    try:
+        text = _SHORT.repr(value)
+    except Exception:  # a foreign object's own repr may raise anything, and an int of 5000 digits has none
+        text = f"a {type(value).__name__}"
+    return text if len(text) <= 80 else f"{text[:77]}..."
+
+
+def brief(text: object) -> str:
+    """A name as a message repeats it: its first 117 characters where it has over 120."""
+    name = str(text)
+    return name if len(name) <= 120 else f"{name[:117]}..."
+
+
+def as_number(
+    value: object,
+    name: str,
+    remedy: str,
+    *,
+    above: float = -math.inf,
+    below: float = math.inf,
+    least: float = -math.inf,
+    most: float = math.inf,
+    error: Error = RecordError,
+) -> float:
+    """A finite number with above < number < below and least <= number <= most. Raises ``error``."""
+    value = _scalar(value)
+    if isinstance(value, numbers.Real) and not isinstance(value, (bool, np.bool_)):
+        try:
+            number = float(value)
+        except (OverflowError, ValueError):
+            number = math.nan
+        if math.isfinite(number) and above < number < below and least <= number <= most:
+            return number
+    raise error(f"{name} is {shown(value)}", remedy)
+
+
+def as_whole(value: object, name: str, remedy: str, *, least: int = -(2**63), most: int = 2**63 - 1, error: Error = RecordError) -> int:
+    """A whole number of at most 64 bits between ``least`` and ``most``, of any numeric type. Raises ``error``."""
+    value = _scalar(value)
+    if isinstance(value, numbers.Integral) and not isinstance(value, (bool, np.bool_)):
+        whole = int(value)
+    else:
+        number = as_number(value, name, remedy, error=error)
+        whole = int(number)
+        if whole != number:
+            raise error(f"{name} is {shown(value)}", remedy)
+    if not least <= whole <= most:
+        raise error(f"{name} is {shown(value)}", remedy)
+    return whole
+
+
+def _scalar(value: object) -> object:
+    return value.item() if isinstance(value, np.ndarray) and value.ndim == 0 else value
+
+
+def as_flag(value: object, name: str) -> bool:
+    """True or False, and nothing that is merely true. Raises RecordError."""
+    if isinstance(value, (bool, np.bool_)):
+        return bool(value)
+    raise RecordError(f"{name} is {shown(value)}", "give True or False")
+
+
+def as_text(value: object, name: str, remedy: str, *, error: Error = RecordError) -> str:
+    """A text. Raises ``error``."""
+    if isinstance(value, str):
+        return value
+    raise error(f"{name} is {shown(value)}", remedy)
+
+
+def as_path(value: object, name: str, remedy: str, *, error: Error = FileError) -> str:
+    """The name of a file, as a text or as what has one (os.PathLike). Raises ``error``, also for names that no file can have."""
+    text = os.fspath(value) if isinstance(value, (str, os.PathLike)) else None
+    if not isinstance(text, str):
+        raise error(f"{name} is {shown(value)}", remedy)
+    reason = "no name that a file can have"
+    with suppress(UnicodeEncodeError):
+        if "\0" not in text:
+            if all(len(os.fsencode(part)) <= LONGEST_NAME for part in text.split(os.sep)):
+                return text
+            reason = f"too long: a file's name has at most {LONGEST_NAME} bytes"
+    raise error(f"cannot read or write {shown(text)}: {name} is {reason}", remedy)
+
+
+def as_call(value: Call | None, name: str) -> Call | None:
+    """A function, or None. Raises RecordError."""
+    if value is None or callable(value):
+        return value
+    raise RecordError(f"{name} is {shown(value)}", "give a function, or leave it out")
+
+
+def as_kind(value: object, kind: type[Kind], name: str, remedy: str, *, error: Error = RecordError) -> Kind:
+    """The value, which is of that type. Raises ``error``."""
+    if isinstance(value, kind):
+        return value
+    raise error(f"{name} is {shown(value)}", remedy)
+
+
+def as_kinds(value: object, kind: Any, name: str, remedy: str, *, error: Error = RecordError) -> tuple[Any, ...]:
+    """Several values, all of that type (a class, or a union of some). Raises ``error``."""
+    items = as_items(value, name, remedy, error=error)
+    for number, item in enumerate(items):
+        if not isinstance(item, kind):
+            raise error(f"{name}[{number}] is {shown(item)}", remedy)
+    return items
+
+
+def as_items(value: Any, name: str, remedy: str, *, error: Error = RecordError) -> tuple[Any, ...]:
+    """The items of a list, tuple, array or iterator; a text or a mapping is none. Raises ``error``."""
+    if isinstance(value, Iterable) and not isinstance(value, (str, bytes, dict)) and not (isinstance(value, np.ndarray) and value.ndim == 0):
+        return tuple(value)
+    raise error(f"{name} is {shown(value)}", remedy)
+
+
+def as_rows(value: Any, name: str, columns: int, remedy: str, *, error: Error = RecordError) -> tuple[tuple[float, ...], ...]:
+    """Rows of ``columns`` finite numbers each. Raises ``error`` naming the row."""
+    rows = as_items(value, name, remedy, error=error)
+    made = []
+    for number, row in enumerate(rows):
+        numbers_ = as_items(row, f"{name}[{number}]", remedy, error=error)
+        if len(numbers_) != columns:
+            raise error(f"{name}[{number}] is {shown(row)}", remedy)
+        made.append(tuple(as_number(x, f"{name}[{number}]", remedy, error=error) for x in numbers_))
+    return tuple(made)
+
+
+def nearest(word: str, known: Collection[str], otherwise: str = "") -> str:
+    """A remedy for a word that is none of ``known``: the nearest of them, or all where nothing is near, ``otherwise`` behind them."""
+    lower = {one.lower(): one for one in reversed(list(known))}
+    near = difflib.get_close_matches(word.lower()[:100], lower, n=3, cutoff=0.5)
+    if near:
+        return f"did you mean {' or '.join(lower[one] for one in near)}?"
+    listed = ", ".join(list(known)[:LISTED]) + (f" and {len(known) - LISTED} more" if len(known) > LISTED else "")
+    return f"one of {listed}{otherwise}" if known else f"there are none{otherwise}"
+
+
+def check_options(given: Iterable[str], known: Collection[str], name: str, *, error: Error = RecordError) -> None:
+    """Raise ``error`` where a keyword is none of ``known``, with the nearest that is."""
+    for word in given:
+        if word not in known:
+            raise error(f"{name} has no option {shown(word)}", nearest(word, known))

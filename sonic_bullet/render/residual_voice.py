@@ -1,0 +1,144 @@
+"""What sounds besides the modes of bodies whose material brings a residual: lines in the bank, grains of noise for strikes and rubbing.
+
+    Sounder + Residual -> Beside: lines as further modes (each struck as the mode it follows is), a voice for the noise (residual.grains)
+    ForcePulse -> a² of each pair of modes, at each sensor's weights -> Grain              level, place and pulse as the modes have them
+    Drive -> sections of force -> Grain
+
+Lines weigh i·c/a times what their mode weighs: a quarter turn away, so that at one frequency powers add, as a residual of powers says. Where a mode's
+frequency or decay hangs on its level, so do those of the lines that follow it.
+All is in the bank's units (Pa·m, or what another sensor reads), before the sound path; no gain of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+
+from sonic_bullet.records import Air, Array, Body, ModalModel, Residual
+from sonic_bullet.render.friction_voice import Drive
+from sonic_bullet.render.impacts import ForcePulse
+from sonic_bullet.render.resonator import Resonator, build_resonator
+from sonic_bullet.residual.grains import Voice, make_voice, mixed_number, placed, varied
+from sonic_bullet.residual.player import SECTION, Grain, Rubbed, rubbed, section_grain
+from sonic_bullet.residual.transfer import StruckModes
+from sonic_bullet.synth.bank import ModeSet, audible
+from sonic_bullet.synth.pulse import pulse_spectrum
+
+Rubs = Mapping[tuple[int, int, int], Rubbed]
+"""By lower body, higher body and side: the force so far."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ResidualVoice:
+    """One body's residual. lines: for the bank; follows (l,): the resonator's mode that each is struck as. group (m,): the voice's pair of each mode, or -1."""
+
+    voice: Voice
+    lines: ModeSet
+    follows: Array
+    group: Array
+
+
+def build_residual_voice(resonator: Resonator, sr: int, air: Air) -> ResidualVoice | None:
+    """A body's residual as it is played, or None where it has none, or no modes to follow."""
+    material, model = resonator.body.material, resonator.body.model
+    if material is None or material.residual is None or model is None or not resonator.mode_count or not resonator.weight.any():
+        return None
+    voice = _voice(material.residual, model, air, sr)
+    group = np.empty(resonator.mode_count, np.int64)
+    group[np.argsort(resonator.omega_rad_s, kind="stable")] = voice.pairs.group
+    line, mode = [], []
+    for i, pair in enumerate(voice.lines.follows):
+        members = np.flatnonzero(group == pair)
+        line += [i] * len(members)
+        mode += list(members)
+    at, follows = np.array(line, np.int64), np.array(mode, np.int64)
+    omega, decay = 2 * np.pi * voice.lines.freq_hz[at], voice.lines.decay_per_s[at]
+    keep = audible(omega, decay, sr)
+    at, follows = at[keep], follows[keep]
+    weight = 1j * voice.lines.ratio[at] * resonator.weight[:, follows]
+    bend, damping_growth = (None if x is None else x[follows] for x in (resonator.bend, resonator.damping_growth))
+    return ResidualVoice(
+        voice,
+        ModeSet(omega[keep], decay[keep], weight, bend=bend, damping_growth=damping_growth, damping_growth_power=resonator.damping_growth_power),
+        follows,
+        group,
+    )
+
+
+@lru_cache(maxsize=64)
+def _voice(residual: Residual, model: ModalModel, air: Air, sr: int) -> Voice:
+    """A voice, once for bodies that share residual and model (records are compared by identity); pairs by the modes' mean square over the surface."""
+    s = build_resonator(Body(0, -1, 0, "", 0.0, np.zeros((3, 3)), model=model), (), sr, air)
+    order = np.argsort(s.omega_rad_s, kind="stable")
+    shape = np.sqrt((s.shape.astype(float) ** 2).sum(axis=1).mean(axis=0)) if len(s.shape) else np.ones(s.mode_count)
+    loud = np.abs(s.weight[0]) if s.weight[0].any() else np.ones(s.mode_count)
+    return make_voice(residual, StruckModes(s.omega_rad_s[order] / (2 * np.pi), s.decay_per_s[order], (loud * shape)[order]), sr)
+
+
+@lru_cache(maxsize=2)
+def _pulse_table(flat: bool) -> tuple[Array, Array]:
+    f_tau = np.linspace(0.0, 32.0, 1281)
+    return f_tau, pulse_spectrum(f_tau, flat=flat)
+
+
+def pulse(f_tau: Array, flat: bool) -> Array:
+    """|F̂| of a force pulse at products fτ (k,), relative to 0 Hz."""
+    return np.asarray(np.interp(f_tau, *_pulse_table(flat), right=0.0))
+
+
+def struck_power(voice: ResidualVoice, weight: Array, push: Array) -> Array:
+    """a² (p,) at the onset of the pairs' modes, for Uᵀj (m,) of an impulse and the modes' weights (m,)."""
+    used = voice.group >= 0
+    return np.bincount(voice.group[used], (np.abs(weight * push) ** 2)[used], len(voice.voice.pairs.target_hz))
+
+
+def impact_grains(
+    impact: ForcePulse, step_start_s: float, resonators: Sequence[Resonator], voice: Sequence[ResidualVoice | None], sr: int, earliest: int, seed: int
+) -> list[Grain]:
+    """What one strike adds on both bodies."""
+    start = max((step_start_s + impact.start_s) * sr, float(earliest))
+    first, grains = int(np.ceil(start)), []
+    for body, push in ((impact.low, impact.modes_low), (impact.high, impact.modes_high)):
+        mine = voice[body]
+        if mine is None:
+            continue
+        who = resonators[body].body
+        number = mixed_number(seed, who.body_id, who.link + 1, who.epoch, int(start * 1048576))
+        for w, weight in enumerate(resonators[body].weight):
+            if weight.any():
+                pair, level = placed(mine.voice, struck_power(mine, weight, impact.share * push), impact.length_s, impact.flat, pulse)
+                if level > 0:
+                    grains.append(Grain(first, w, body, varied(pair, level, number)))
+    return grains
+
+
+def friction_grains(
+    rubs: Rubs, drives: Sequence[Drive], resonators: Sequence[Resonator], voice: Sequence[ResidualVoice | None], at: int, n: int, seed: int
+) -> tuple[list[Grain], Rubs]:
+    """Grains of the sections of rubbing that end within the n samples from ``at`` on, and what goes on afterwards."""
+    driven = {(d.low, d.high, side): d for d in drives for side in (0, 1) if voice[(d.low, d.high)[side]] is not None}
+    grains, kept = [], {}
+    for key in sorted(set(rubs) | set(driven)):
+        drive, body = driven.get(key), key[key[2]]
+        sections, state = rubbed(rubs.get(key), None if drive is None else drive.force_n, at, n)
+        mine, who = voice[body], resonators[body].body
+        if mine is None:
+            continue
+        gain = rubs[key].gain if drive is None else drive.gain1[key[2]]
+        if state is not None:
+            kept[key] = replace(state, gain=gain)
+        for number, force_n in sections:
+            own = mixed_number(seed, who.body_id, who.link + 1, who.epoch, key[1 - key[2]], number)
+            for w, weight in enumerate(resonators[body].weight):
+                sample = section_grain(mine.voice, force_n, struck_power(mine, weight, gain), own) if weight.any() else np.zeros(0)
+                if len(sample):
+                    grains.append(Grain((number + 2) * SECTION, w, body, sample))
+    return grains, kept
+
+
+def line_modes(voice: ResidualVoice | None, sets: int) -> ModeSet:
+    """What of a body's residual the bank plays."""
+    return voice.lines if voice is not None else ModeSet(np.zeros(0), np.zeros(0), np.zeros((sets, 0), complex))

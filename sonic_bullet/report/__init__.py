@@ -1,0 +1,1 @@
+"""Values -> one HTML page that opens offline."""

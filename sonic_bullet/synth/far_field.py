@@ -1,0 +1,239 @@
+"""From modal velocity to pressure: a far-field map of each mode, and what radiating costs it.
+
+    p(r̂) = (iωρ₀/4π) ∮ [v + ik (r̂·n) ψ] e^{ik r̂·x} dS             at 1 m, v = φ·n for unit modal velocity   [Pierce 1989, eq. 4-6.4, e^{iωt}]
+    near field p_s = iωρ₀ ψ:  ψ = Σ_j e_j (e_j·v)/q_j                e_j, t_j: eigenvectors and -values of the air moved at k = 0, `added_mass`
+    q_j(k) = 1/L + √(κ_j² + (1/L + ik)²),  q_j(0) = 1/t_j          its change with k; L the body's middle principal extent
+    |p| = √<|p(r̂)|²>,  Δd = 2π <|p|²>/ρ₀c                          mean over directions; power = 4π<|p|²>/2ρ₀c = 2 Δd · ½|z|²
+
+On a sphere (a = L/2) the e_j are the harmonics and q_j interpolates -k h_l'(ka)/h_l(ka): exact for l = 0, for every l at k → 0, where it is
+(l+1)/a, and to second order for k → ∞ (1/a + ik). On a wide flat face they are waves, and q = √(κ² - k²) [Cremer et al. 2005, eq. 6.26].
+
+The mean is a product Gauss rule in the body's principal frame, exact for bodies small by the wavelength; for large ones 512 directions spread evenly.
+The weight is complex: size the mean over directions, phase that of the direction of the strongest pressure, counted from the instant
+sound leaves the surface on that side. A shape and its negative sound the same.
+v vertices, f faces, m modes, s patches, n directions in pairs ±r̂.
+"""
+
+# mypy: disable-error-code="no-untyped-def"
+from __future__ import annotations
+
+import numpy as np
+
+from sonic_bullet.machine.compiled import njit
+from sonic_bullet.records import Air, Array, ModalModel
+from sonic_bullet.synth.entrained_mass import Moved, moved_air
+
+_MODES_AT_ONCE = 32
+MOST_PATCHES = 1800
+MOST_TRIANGLES = 700  # of the near field's mesh
+LEAST_RINGS, MOST_RINGS = 6, 12  # of directions between the poles
+SPREAD = 256  # directions, and their negatives, where even the most rings are too few
+
+
+def radiation(model: ModalModel, air: Air) -> tuple[Array, Array]:
+    """Pressure weight (m,) complex, in Pa·m per modal velocity (m/s·√kg), and radiation damping (m,) in 1/s.
+
+    Pressure at distance r is Re(weight·z)/r, z the modal state of `bank`. Zero for a model without a surface. Source: the module's equations.
+    """
+    m = model.mode_count
+    corner, face = _sound_faces(model)
+    if m == 0 or len(face) == 0:
+        return np.zeros(m, complex), np.zeros(m)
+    k = 2 * np.pi * model.freq_hz / air.sound_speed_m_s
+    corner, turn = _principal(corner, (model.shape**2).sum(axis=(1, 2), dtype=float)[face].mean(axis=1))
+    twice = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    area = np.linalg.norm(twice, axis=1) / 2
+    normal = twice / (2 * area[:, None])
+    extent = np.sort(np.ptp(corner.reshape(-1, 3), axis=0))
+    patch, place = _patches(corner, area, normal, MOST_PATCHES)
+    coarse, nearest = _near_mesh(corner, area, normal)
+    moved = moved_air(coarse)
+    moment = np.zeros((m, 7, len(place)))
+    for lo in range(0, m, _MODES_AT_ONCE):
+        some = slice(lo, min(lo + _MODES_AT_ONCE, m))
+        speed = np.einsum("fi,fcim->fcm", normal @ turn, model.shape[:, :, some].astype(float)[face])
+        level = _near_field(k[some], 1 / extent[1], moved, area[:, None] * speed.mean(axis=1), nearest)
+        _moments(speed, level, corner, area, normal, patch, place, moment[some])
+    point = corner.reshape(-1, 3)
+    rings = np.clip(np.ceil(k * np.linalg.norm(point, axis=1).max()) + 4, LEAST_RINGS, MOST_RINGS + 1).astype(int)
+    weight = np.zeros(m, complex)
+    for count in np.unique(rings):
+        now = np.flatnonzero(rings == count)
+        direction, share = directions(int(count)) if count <= MOST_RINGS else spread_directions(SPREAD)
+        ahead, behind = _map(k[now], moment[now], np.ascontiguousarray(place.T), direction)
+        pressure = np.concatenate([ahead, behind], axis=1) * (1j * k[now] * air.sound_speed_m_s * air.density_kg_m3 / (4 * np.pi))[:, None]
+        both = np.concatenate([direction, -direction])
+        mean = np.abs(pressure) ** 2 @ np.concatenate([share, share])
+        best = np.argmax(np.abs(pressure), axis=1)
+        lead = pressure[np.arange(len(now)), best] * np.exp(-1j * k[now] * np.array([(point @ both[b]).max() for b in best]))
+        size = np.abs(lead)
+        weight[now] = np.sqrt(mean) * np.where(size > 0, lead / np.where(size > 0, size, 1), 1)
+    impedance = air.density_kg_m3 * air.sound_speed_m_s
+    return weight, 2 * np.pi * np.abs(weight) ** 2 / impedance
+
+
+def directions(rings: int) -> tuple[Array, Array]:
+    """Unit vectors (n, 3) of the upper half sphere and shares (n,), ½ in all: with their negatives exact to degree 2·rings - 1 [Stroud 1971, sec. 2.7]."""
+    height, share = np.polynomial.legendre.leggauss(rings + rings % 2)
+    height, share = height[height > 0], share[height > 0]
+    turns = 4 * ((rings + 1) // 2)
+    angle = 2 * np.pi * (np.arange(turns) + 0.5) / turns
+    radius = np.sqrt(1 - height**2)[:, None]
+    vector = np.stack([radius * np.cos(angle), radius * np.sin(angle), np.broadcast_to(height[:, None], (len(height), turns))], axis=-1)
+    return np.ascontiguousarray(vector.reshape(-1, 3)), np.repeat(share / (2 * turns), turns)
+
+
+def spread_directions(count: int) -> tuple[Array, Array]:
+    """As `directions`, spread evenly along a spiral [Swinbank & Purser 2006, eq. 1-3]: no symmetry of a body makes any of them superfluous."""
+    height = (np.arange(count) + 0.5) / count
+    angle = np.pi * (np.sqrt(5) - 1) * np.arange(count)
+    radius = np.sqrt(1 - height**2)
+    return np.stack([radius * np.cos(angle), radius * np.sin(angle), height], axis=1), np.full(count, 0.5 / count)
+
+
+def _sound_faces(model: ModalModel) -> tuple[Array, Array]:
+    """Corners (f, 3, 3) and faces (f, 3) that have an area."""
+    corner = model.vertex_m[model.face]
+    twice = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=-1)
+    keep = twice > 1e-12 * twice.max(initial=0.0)
+    return corner[keep], model.face[keep]
+
+
+def _principal(corner: Array, motion: Array) -> tuple[Array, Array]:
+    """Corners about the surface's centroid along its principal axes, longest first, and the rows of that frame (3, 3).
+
+    Axes point to where there is more motion (f,), summed over modes; where there is as much on both sides their sense does not matter.
+    """
+    area = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1)
+    centre = corner.mean(axis=1)
+    middle = area @ centre / area.sum()
+    spread = np.einsum("f,fi,fj->ij", area, centre - middle, centre - middle)
+    turn = np.linalg.eigh(np.round(spread * (1e6 / np.trace(spread))))[1][:, ::-1].T  # rounded: equal moments leave the body's own axes
+    skew = (area * motion) @ (centre - middle) @ turn.T
+    turn[skew < 0] *= -1
+    turn[2] *= np.sign(np.linalg.det(turn))
+    return (corner - middle) @ turn.T, turn
+
+
+def _cells(point: Array, normal: Array, edge_m: float) -> Array:
+    """Number (p,) of the cell of edge edge_m and the side it faces (of six) in which each point lies."""
+    cell = np.floor((point - (point.min(axis=0) + point.max(axis=0)) / 2) / edge_m + 0.5).astype(np.int64)
+    bias = normal * [1.0, 0.93, 0.87]  # no ties between sides
+    axis = np.argmax(np.abs(bias), axis=1)
+    side = 2 * axis + (bias[np.arange(len(axis)), axis] > 0)
+    return np.unique(np.column_stack([cell, side]), axis=0, return_inverse=True)[1].ravel()
+
+
+def _patches(corner: Array, area: Array, normal: Array, most: int) -> tuple[Array, Array]:
+    """Patch (f,) of each face and place (s, 3) of each patch: its centroid. Neighbours that face the same side go together where there are too many."""
+    centre = corner.mean(axis=1)
+    patch = np.arange(len(area))
+    edge_m = np.sqrt(area.sum() / most)
+    while patch.max() >= most:
+        patch = _cells(centre, normal, edge_m)
+        edge_m *= 1.15
+    total = np.bincount(patch, area)
+    return patch, np.stack([np.bincount(patch, area * centre[:, i]) / total for i in range(3)], axis=1)
+
+
+def _near_mesh(corner: Array, area: Array, normal: Array) -> tuple[Array, Array]:
+    """Triangles (c, 3, 3) for the near field, at most `MOST_TRIANGLES`, and of each face (f,) the one that stands for it."""
+    if len(corner) <= MOST_TRIANGLES:
+        return corner, np.arange(len(corner))
+    from scipy.spatial import cKDTree
+
+    point, name = np.unique(np.round(corner.reshape(-1, 3) / (1e-7 * np.ptp(corner))), axis=0, return_inverse=True)
+    name = name.reshape(-1, 3)
+    point = point * (1e-7 * np.ptp(corner))
+    outward = np.stack([np.bincount(name.ravel(), np.repeat(area * normal[:, i], 3), len(point)) for i in range(3)], axis=1)
+    edge_m = np.sqrt(4 * area.sum() / MOST_TRIANGLES) / 1.5
+    while True:
+        cell = _cells(point, outward, edge_m)
+        size = np.bincount(cell)
+        middle = np.stack([np.bincount(cell, point[:, i]) / size for i in range(3)], axis=1)
+        direction = np.stack([np.bincount(cell, outward[:, i]) for i in range(3)], axis=1)
+        direction = direction / np.maximum(np.linalg.norm(direction, axis=1), 1e-300)[:, None]
+        reach = np.zeros(len(middle))
+        np.maximum.at(reach, cell, ((point - middle[cell]) * direction[cell]).sum(axis=1))
+        middle += reach[:, None] * direction  # else edges are planed off
+        triangle = cell[name]
+        triangle = triangle[(triangle[:, 0] != triangle[:, 1]) & (triangle[:, 1] != triangle[:, 2]) & (triangle[:, 2] != triangle[:, 0])]
+        _, first, alike = np.unique(np.sort(triangle, axis=1), axis=0, return_index=True, return_inverse=True)
+        odd = (triangle[:, 0] < triangle[:, 1]) ^ (triangle[:, 1] < triangle[:, 2]) ^ (triangle[:, 2] < triangle[:, 0])
+        odd_ones = np.bincount(alike.ravel(), odd)
+        triangle = triangle[first[(odd_ones == 0) | (odd_ones == np.bincount(alike.ravel()))]]  # folds cancel
+        coarse = middle[triangle]
+        twice = np.cross(coarse[:, 1] - coarse[:, 0], coarse[:, 2] - coarse[:, 0])
+        length = np.linalg.norm(twice, axis=1)
+        kept = length > 1e-3 * edge_m**2
+        if kept.sum() <= MOST_TRIANGLES:
+            break
+        edge_m *= 1.1
+    coarse, facing = coarse[kept], twice[kept] / length[kept, None]
+    tree = cKDTree(np.hstack([coarse.mean(axis=1), edge_m * facing]))
+    return coarse, tree.query(np.hstack([corner.mean(axis=1), edge_m * normal]))[1]
+
+
+def _near_field(k: Array, curved_per_m: float, moved: Moved, flow: Array, nearest: Array) -> Array:
+    """ψ (f, m) in m·(1/√kg), complex, on faces with volume flow (f, m), each served by triangle nearest (f,) of `moved`."""
+    speed = np.stack([np.bincount(nearest, one, len(moved.area_m2)) for one in flow.T], axis=1) / np.sqrt(moved.area_m2)[:, None]
+    curved = np.minimum(curved_per_m, 0.5 / moved.length_m)[:, None]
+    across = (1 / moved.length_m[:, None] - curved) ** 2 - curved**2
+    q = curved + np.sqrt(across + (curved + 1j * k) ** 2)
+    share: Array = moved.vector.T @ speed
+    return np.asarray((moved.vector @ np.divide(share, q) / np.sqrt(moved.area_m2)[:, None])[nearest])
+
+
+def _moments(speed: Array, level: Array, corner: Array, area: Array, normal: Array, patch: Array, place: Array, out: Array) -> None:
+    """Fill out (m, 7, s) with each patch's ∫ of v, v (x - place) + n Re ψ, n Im ψ; speed (f, 3, m) at corners, level ψ (f, m)."""
+    arm = corner - place[patch][:, None]
+    # ∫ v y over a triangle of linear v, y = area/12 (Σv Σy + Σvy)
+    lever = area[:, None, None] / 12 * (np.einsum("fm,fi->fim", speed.sum(axis=1), arm.sum(axis=1)) + np.einsum("fcm,fci->fim", speed, arm))
+    order = np.argsort(patch, kind="stable")
+    start = np.searchsorted(patch[order], np.arange(len(place)))
+    out[:, 0] = np.add.reduceat((area[:, None] * speed.mean(axis=1))[order], start).T
+    push = (area[:, None] * normal)[:, :, None] * level[:, None]
+    out[:, 1:4] = np.add.reduceat((lever + push.real)[order], start).transpose(2, 1, 0)
+    out[:, 4:7] = np.add.reduceat(push.imag[order], start).transpose(2, 1, 0)
+
+
+@njit(nogil=True, fastmath=True)
+def _map(k, moment, place, direction):
+    """Σ over patches [v + ik r̂·(v y + n ψ)] e^{ik r̂·x} (m, n), place (3, s), for directions (n, 3) and for their negatives. Sums run in vectors: no order to keep."""
+    m, n = len(k), len(direction)
+    ahead = np.empty((m, n), np.complex128)
+    behind = np.empty((m, n), np.complex128)
+    for i in range(m):
+        v, n0, n1, n2, m0, m1, m2 = moment[i]
+        half = 0.5 / np.pi * k[i]
+        for j in range(n):
+            x, y, z = direction[j]
+            a, b, c, d, e, f = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+            for s in range(place.shape[1]):
+                turns = half * (place[0, s] * x + place[1, s] * y + place[2, s] * z)
+                t = np.pi * (turns - (np.int32(turns + 1048576.5) - 1048576.0))
+                u = t * t
+                # sine and cosine of half the angle, |t| ≤ π/2: Taylor to 1e-9, without calls so that it runs in vectors
+                sn = t * (1 + u * (-1 / 6 + u * (1 / 120 + u * (-1 / 5040 + u * (1 / 362880 + u * (-1 / 39916800 + u / 6227020800))))))
+                cs = 1 + u * (-1 / 2 + u * (1 / 24 + u * (-1 / 720 + u * (1 / 40320 + u * (-1 / 3628800 + u * (1 / 479001600 - u / 87178291200))))))
+                sine, cosine = 2 * sn * cs, 1 - 2 * sn * sn
+                lever = n0[s] * x + n1[s] * y + n2[s] * z
+                late = m0[s] * x + m1[s] * y + m2[s] * z
+                a += v[s] * cosine
+                b += v[s] * sine
+                c += lever * cosine
+                d += lever * sine
+                e += late * cosine
+                f += late * sine
+            first, second, third = complex(a, b), complex(c, d), 1j * complex(e, f)
+            ahead[i, j] = first + 1j * k[i] * (second + third)
+            behind[i, j] = first.conjugate() - 1j * k[i] * (second.conjugate() - third.conjugate())
+    return ahead, behind
+
+
+def jerk_coefficient(volume_m3: float, air: Air) -> float:
+    """K = 3ρ₀V/(8πc) in Pa·m per m/s³: a rigid compact body's far pressure is K cosθ · jerk(t - r/c)/r [Chadwick, Zheng, James 2012, eq. 9].
+
+    θ from the jerk to the listener. The sphere's own law at small ka: displaced air and half as much again as added mass [Pierce 1989, sec. 4-2].
+    """
+    return 3 * air.density_kg_m3 * volume_m3 / (8 * np.pi * air.sound_speed_m_s)

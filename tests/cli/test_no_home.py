@@ -1,0 +1,79 @@
+"""Commands as another user, without a home, on a read-only install; benchmarks/no_home.py has all of them."""
+
+from __future__ import annotations
+
+import json
+import os
+import stat
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sonic_bullet.machine import user_folder
+from sonic_bullet.modal import cache
+
+REPO = Path(__file__).resolve().parents[2]
+
+LAYOUT = {"shape": cache.Kept("f8", (3,))}
+
+
+def test_commands_run_as_another_user_without_a_home_on_a_read_only_install() -> None:
+    words = [sys.executable, REPO / "benchmarks" / "no_home.py", "--json", "--commands", "modes"]
+    done = subprocess.run(words, check=False, capture_output=True, text=True, timeout=280)
+    assert done.returncode == 0, done.stderr + done.stdout
+    counts = json.loads(done.stdout)
+    assert (counts["bad"], counts["good"] + counts["skipped"]) == (0, 3)
+    if counts["skipped"]:
+        pytest.skip(f"not root: {counts['skipped']} of 3 ways not tried")
+
+
+@pytest.fixture
+def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.delenv("SONIC_BULLET_CACHE", raising=False)
+    monkeypatch.setattr(user_folder, "NOTES", [])
+    return tmp_path
+
+
+def test_the_folder_of_models_is_private_and_made_so(home: Path) -> None:
+    (home / "sonic_bullet").mkdir(mode=0o755)
+    cache.save("default", "modes-0", {"shape": np.arange(3.0)}, "")
+    assert cache.load("default", "modes-0", LAYOUT) is not None
+    assert [stat.S_IMODE(path.stat().st_mode) for path in (home / "sonic_bullet", home / "sonic_bullet" / "modal")] == [0o700] * 2
+    assert user_folder.NOTES == []
+
+
+def test_another_users_folder_is_not_believed(home: Path) -> None:
+    if os.geteuid() != 0:
+        pytest.skip("only root can give a folder away")
+    cache.save("default", "modes-0", {"shape": np.arange(3.0)}, "")
+    os.chown(home / "sonic_bullet", 54321, 54321)
+    assert cache.load("default", "modes-0", LAYOUT) is None
+    cache.save("default", "modes-1", {"shape": np.arange(3.0)}, "")
+    assert not (home / "sonic_bullet" / "modal" / "modes-1.npz").exists()
+    assert len(user_folder.NOTES) == 1  # said once
+
+
+@pytest.mark.parametrize("what", [os.mkfifo, os.mkdir, lambda path: os.symlink("/dev/zero", path)])
+@pytest.mark.timeout(20)
+def test_what_is_no_file_in_the_cache_is_a_miss_and_does_not_hang(tmp_path: Path, what: object) -> None:
+    what(tmp_path / "modes-0.npz")  # type: ignore[operator]
+    assert cache.load(tmp_path, "modes-0", LAYOUT) is None
+    cache.save(tmp_path, "modes-0", {"shape": np.arange(3.0)}, "")
+    assert cache.load(tmp_path, "modes-0", LAYOUT) is None
+
+
+def test_a_home_that_is_missing_is_not_made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, home: Path) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "no" / "home"))
+    cache.save("default", "modes-0", {"shape": np.arange(3.0)}, "")
+    assert cache.load("default", "modes-0", LAYOUT) is None
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_relative_cache_means_the_folder_the_run_began_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SONIC_BULLET_CACHE", "models")
+    monkeypatch.chdir(tmp_path)
+    assert cache.folder("default") == user_folder.START / "models"

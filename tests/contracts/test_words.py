@@ -1,0 +1,166 @@
+"""The words of the house: identifiers in the field's own, one meaning a name, rooms that one sees at a glance."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections import defaultdict
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sonic_bullet import effects, presets
+from tests.made.models import box_model
+
+PACKAGE = Path(__file__).resolve().parents[2] / "sonic_bullet"
+MODULES = sorted(path for path in PACKAGE.rglob("*.py") if "__pycache__" not in path.parts)
+
+PRIVATE_WORDS = frozenset(
+    [
+        "told",
+        "untold",
+        "retold",
+        "heard",
+        "unheard",
+        "twin",
+        "twins",
+        "choked",
+        "choke",
+        "parted",
+        "torn",
+        "laid",
+        "twos",
+        "beside",
+        "dried",
+        "wet",
+        "tails",
+        "blow",
+        "sounder",
+        "suspect",
+        "suspects",
+        "sure",
+        "stilled",
+        "riding",
+        "rubbing",
+        "glided",
+        "glide",
+        "copies",
+        "picked",
+        "sift",
+        "gathered",
+        "way",
+    ]
+)
+"""Words that an identifier has no part of, between underscores or capitals. Strings are no identifiers: effect ids, and the
+names in JSON, npz and command lines, stay what files and scripts know."""
+
+FORMER_NAMES = {"records/bodies.py": {"choke_s_m"}}
+"""Deprecated public aliases, by file."""
+
+MOST_FILES = 16
+"""Python files that a folder holds at most."""
+
+MOST_EFFECTS = 18
+"""Entries of effects/ at most: one a physical effect, and what they share."""
+
+
+def parts(name: str) -> set[str]:
+    """The words of an identifier: `told_by` and `ToldBy` hold told, `noise_floor` does not hold floors."""
+    return {word.lower() for part in name.split("_") for word in re.findall(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+", part)}
+
+
+def identifiers(tree: ast.AST) -> Iterator[str]:
+    """All names that a module gives or uses, those inside f-strings too."""
+    for node in ast.walk(tree):
+        match node:
+            case ast.Name(id=name) | ast.arg(arg=name) | ast.Attribute(attr=name):
+                yield name
+            case ast.FunctionDef(name=name) | ast.AsyncFunctionDef(name=name) | ast.ClassDef(name=name):
+                yield name
+            case ast.keyword(arg=str(name)) | ast.ExceptHandler(name=str(name)):
+                yield name
+            case ast.MatchAs(name=str(name)) | ast.MatchStar(name=str(name)) | ast.MatchMapping(rest=str(name)):
+                yield name
+            case ast.MatchClass(kwd_attrs=names) | ast.Global(names=names) | ast.Nonlocal(names=names):
+                yield from names
+            case ast.alias(name=name, asname=given):
+                yield from name.split(".")
+                yield given or ""
+            case ast.ImportFrom(module=str(name)):
+                yield from name.split(".")
+
+
+def private_words(path: Path) -> set[str]:
+    """The identifiers of a file that hold a private word, its own name among them."""
+    former = FORMER_NAMES.get(path.relative_to(PACKAGE).as_posix(), set())
+    return {name for name in (*identifiers(ast.parse(path.read_text())), path.stem) if parts(name) & PRIVATE_WORDS} - former
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [("told_by", {"told", "by"}), ("noise_floor", {"noise", "floor"}), ("ToldBy", {"told", "by"}), ("_HTMLPage2", {"html", "page"}), ("TOLD", {"told"})],
+)
+def test_parts_are_what_stands_between_underscores_and_capitals(name: str, words: set[str]) -> None:
+    assert parts(name) == words
+
+
+def test_identifiers_are_seen_wherever_they_stand() -> None:
+    source = 'import a as told\nfrom b.heard import c\ndef f(wet, *, dried=1):\n    return f"{x.choke:.1f}{twin}"\nf(beside=2)\nclass Blow: ...\n'
+    assert {"told", "heard", "wet", "dried", "choke", "twin", "beside", "Blow"} <= set(identifiers(ast.parse(source)))
+
+
+def test_identifiers_hold_no_private_word() -> None:
+    found = {path.relative_to(PACKAGE).as_posix(): sorted(names) for path in MODULES if (names := private_words(path))}
+    print(f"{len(MODULES)} files looked at")
+    assert len(MODULES) > 100
+    assert found == {}
+
+
+def test_former_names_are_defined_where_they_are_listed() -> None:
+    for file, names in FORMER_NAMES.items():
+        assert names <= set(identifiers(ast.parse((PACKAGE / file).read_text())))
+
+
+def test_no_two_public_classes_have_one_name() -> None:
+    places = defaultdict(list)
+    for path in MODULES:
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                places[node.name].append(path.relative_to(PACKAGE).as_posix())
+    assert len(places) > 100
+    assert {name: where for name, where in places.items() if len(where) > 1} == {}
+
+
+def test_no_file_name_stands_in_two_rooms() -> None:
+    places = defaultdict(list)
+    for path in MODULES:
+        if path.name != "__init__.py":
+            places[path.name].append(path.relative_to(PACKAGE).as_posix())
+    assert {name: where for name, where in places.items() if len(where) > 1} == {}
+
+
+def test_a_folder_is_seen_at_a_glance() -> None:
+    count = defaultdict(int)
+    for path in MODULES:
+        count[path.parent] += 1
+    assert {folder.relative_to(PACKAGE).as_posix(): n for folder, n in count.items() if n > MOST_FILES} == {}
+    shown = [entry.name for entry in (PACKAGE / "effects").iterdir() if entry.name != "__pycache__"]
+    assert len(shown) <= MOST_EFFECTS, sorted(shown)
+
+
+@pytest.mark.parametrize(("module", "former", "name"), [(effects, "Heard", "ObjectEvidence"), (effects, "Blow", "Impact"), (presets, "Impact", "Restitution")])
+def test_former_public_classes_are_still_found(module: object, former: str, name: str) -> None:
+    with pytest.warns(DeprecationWarning, match=name):
+        found = getattr(module, former)
+    assert found is getattr(module, name)
+    with pytest.raises(AttributeError, match="no attribute 'Nobody'"):
+        getattr(module, "Nobody")  # noqa: B009  as an importer asks
+
+
+def test_a_model_still_answers_to_its_former_field() -> None:
+    model = replace(box_model((0.1, 0.05, 0.01), (900.0, 2100.0)), damping_growth_s_m=np.array([0.5, 0.7]))
+    with pytest.warns(DeprecationWarning, match="damping_growth_s_m"):
+        assert model.choke_s_m is model.damping_growth_s_m
