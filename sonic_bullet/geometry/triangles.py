@@ -1,4 +1,4 @@
-"""Triangle surfaces: volume, inertia, normals, curvature (the nearest point is in nearest_point.py, and offered here too).
+"""Triangle surfaces: volume, inertia, normals, curvature (the nearest point is in nearest_point.py).
 
     V = ⅙ Σ a·(b×c),   ∫x xᵀ dV by signed tetrahedra about the origin             [Tonon 2004, eq. 9; Eberly 2002]
     second fundamental form of a face from its corner normals: II·e = Δn on each edge       [Rusinkiewicz 2004, eq. 3]
@@ -10,24 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sonic_bullet.geometry.nearest_point import SurfaceIndex, closest_point, nearest, surface_index
 from sonic_bullet.records import Array
-
-__all__ = [
-    "SurfaceIndex",
-    "closest_point",
-    "corner_normals",
-    "face_areas_m2",
-    "face_curvature",
-    "inertia",
-    "is_closed",
-    "nearest",
-    "outward_normals",
-    "oversize",
-    "surface_index",
-    "volume_m3",
-    "welded",
-]
 
 LARGEST_M, HEAVIEST_KG = 10.0, 202e3
 """Of what is struck to sound: the largest bell ever cast, the Tsar Bell, is 6.6 m wide and weighs 202 t. A mesh in millimetres is a thousand times its size,
