@@ -2,9 +2,10 @@
 
     python benchmarks/bank_speed.py [--modes 2000 20000 150000] [--peers]
 
-48 kHz, frames of 200 samples (physics at 240 Hz), double precision. Prints modes sustained in real time and ratios to the plain ways to
-write the same bank, measured in the same run: scipy's lfilter a mode, numpy's exp of an outer product, and the textbook numba loop.
-Best of several repeats, CPU time of this thread: other work on the machine disturbs it less.
+48 kHz, frames of 200 samples (physics at 240 Hz), double precision. Prints modes sustained in real time and ratios to
+the plain ways to write the same bank, measured in the same run: scipy's lfilter a mode, numpy's exp of an outer
+product, and the textbook numba loop. Best of several repeats, CPU time of this thread: other work on the machine
+disturbs it less.
 """
 
 from __future__ import annotations
@@ -47,12 +48,25 @@ def ours(sizes: list[int], strikes_per_s: float = 0.0, forced: bool = False, rep
     advance(bank, state, 512, [Strike(b, 1.3, 0.2, pulse, rng.normal(size=size)) for b, size in enumerate(sizes)])
     gains = [rng.normal(size=size) for size in sizes]
     signal, progress = rng.normal(size=FRAME), np.linspace(0, 1, FRAME)
-    plan = [[(int(rng.integers(len(sizes))), rng.uniform(0, FRAME - 1)) for _ in range(rng.poisson(strikes_per_s * FRAME / SR))] for _ in range(FRAMES)]
+    plan = [
+        [
+            (int(rng.integers(len(sizes))), rng.uniform(0, FRAME - 1))
+            for _ in range(rng.poisson(strikes_per_s * FRAME / SR))
+        ]
+        for _ in range(FRAMES)
+    ]
 
     def run() -> None:
         for hits in plan:
             strikes = [Strike(b, state.at + late, 0.2, pulse, gains[b]) for b, late in hits]
-            advance(bank, state, FRAME, strikes, [Force(b, signal, g, g) for b, g in enumerate(gains)] if forced else (), progress)
+            advance(
+                bank,
+                state,
+                FRAME,
+                strikes,
+                [Force(b, signal, g, g) for b, g in enumerate(gains)] if forced else (),
+                progress,
+            )
 
     return best_s(run, repeats)
 

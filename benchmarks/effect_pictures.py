@@ -76,7 +76,9 @@ class Chain:
         push = -impulse_n_s * shape[strike, 2]
         none = np.zeros(model.mode_count)
         level = np.abs(push) * np.linalg.norm(shape, axis=1).max(axis=0)
-        ring = Ring(model.freq_hz, model.decay_per_s, (push * shape[sensor, 2]).astype(complex), level, none, none, impulse_n_s)
+        ring = Ring(
+            model.freq_hz, model.decay_per_s, (push * shape[sensor, 2]).astype(complex), level, none, none, impulse_n_s
+        )
         for effect in self.at(Stage.BANK):
             ring = effect.apply(ring)
         return ring

@@ -2,10 +2,11 @@
 
     python benchmarks/estimator_ablation.py [MATERIAL ...]
 
-The problems are those of estimator_speed.py: no parameters fit them exactly. Each row changes one constant and prints by how many percent the fast
-search's answer moves from that of the constants as shipped; "truth" says how far the shipped answer itself is from what was planted. The last row of each
-go down Π from a start off in all four, on a recording that the model can make exactly, features playing no part but in Π_MRP: its minimum is where the
-truth is, whatever the constants.
+The problems are those of estimator_speed.py: no parameters fit them exactly. Each row changes one constant and prints
+by how many percent the fast search's answer moves from that of the constants as shipped; "truth" says how far the
+shipped answer itself is from what was planted. The last row of each go down Π from a start off in all four, on a
+recording that the model can make exactly, features playing no part but in Π_MRP: its minimum is where the truth is,
+whatever the constants.
 """
 
 from __future__ import annotations
@@ -58,7 +59,9 @@ def exact(asked: Problem, truth: Array) -> Problem:
     observed = there & (np.abs(amplitude) > 1e-5 * np.abs(amplitude[there]).max())
     none = np.full(int(observed.sum()), np.nan)
     phase = np.where(amplitude[observed] < 0, np.pi, 0.0)
-    features = Features(freq_hz[observed], decay[observed], np.abs(amplitude[observed]), phase, none, none, none, 0.0, -240.0, sr)
+    features = Features(
+        freq_hz[observed], decay[observed], np.abs(amplitude[observed]), phase, none, none, none, 0.0, -240.0, sr
+    )
     return dataclasses.replace(asked, features=features, signal=signal)
 
 
@@ -76,11 +79,19 @@ def main(names: tuple[str, ...]) -> int:
         for db in (-20.0, 20.0):
             line(f"full scale {db:+.0f} dB", fast(at_level(asked, 94.0 + db)).parameters / base - 1)
         for field, value in ROWS:
-            line(f"{field} {value:g}", fast(asked, dataclasses.replace(Constants(), **{field: value})).parameters / base - 1)
+            line(
+                f"{field} {value:g}",
+                fast(asked, dataclasses.replace(Constants(), **{field: value})).parameters / base - 1,
+            )
         clean = exact(asked, truth)
         away = truth * AWAY
-        clean_errors = [np.abs(polish(at_level(clean, 94.0 + db), away).parameters / truth - 1) for db in (-20.0, 0.0, 20.0)]
-        clean_errors += [np.abs(polish(clean, away, dataclasses.replace(Constants(), **{field: value})).parameters / truth - 1) for field, value in ROWS]
+        clean_errors = [
+            np.abs(polish(at_level(clean, 94.0 + db), away).parameters / truth - 1) for db in (-20.0, 0.0, 20.0)
+        ]
+        clean_errors += [
+            np.abs(polish(clean, away, dataclasses.replace(Constants(), **{field: value})).parameters / truth - 1)
+            for field, value in ROWS
+        ]
         errors = np.max(clean_errors, axis=0)
         worst = max(worst, float(errors.max()))
         print(

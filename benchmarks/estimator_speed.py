@@ -1,11 +1,14 @@
-"""How much sooner does the fast optimiser reach what the paper's finds? One run, both on the same fused metric, a row per material.
-The ratio of times is of processor time: other work on the machine disturbs it less.
+"""How much sooner does the fast optimiser reach what the paper's finds?
+
+One run, both on the same fused metric, a row per material. The ratio of times is of processor time: other work on the
+machine disturbs it less.
 
     python benchmarks/estimator_speed.py [MATERIAL ...]
 
-The recordings are synthetic, one for each preset: a plate 36 × 26 × 1.2 cm struck off its middle, sounding with the preset's
-E, ρ, ν, α, β, every mode's decay off Rayleigh's law by 10 % (one sigma), white noise 60 dB under the peak. The model does not know that plate: its
-Poisson's ratio is 0.05 off, its mesh coarser, so no parameters fit exactly, as with a real recording. The table is the seed's Table II plus the fast search.
+The recordings are synthetic, one for each preset: a plate 36 × 26 × 1.2 cm struck off its middle, sounding with the
+preset's E, ρ, ν, α, β, every mode's decay off Rayleigh's law by 10 % (one sigma), white noise 60 dB under the peak. The
+model does not know that plate: its Poisson's ratio is 0.05 off, its mesh coarser, so no parameters fit exactly, as with
+a real recording. The table is the seed's Table II plus the fast search.
 """
 
 from __future__ import annotations
@@ -34,7 +37,12 @@ ROUNDING = 1e-12
 
 def struck(what: Material, *, edge_m: float | None, count: int) -> tuple[Array, Array]:
     """λ̂ at γ = 1 and the signed amplitudes (m,) of the plate struck off its middle."""
-    model = analyse((Shape("box", np.array([0.36, 0.26, 0.012])),), dataclasses.replace(what, alpha_per_s=0.0, beta_s=0.0), count=count, edge_m=edge_m)
+    model = analyse(
+        (Shape("box", np.array([0.36, 0.26, 0.012])),),
+        dataclasses.replace(what, alpha_per_s=0.0, beta_s=0.0),
+        count=count,
+        edge_m=edge_m,
+    )
     vertex = np.argmin(((model.vertex_m - np.array([0.11, 0.07, 0.006])) ** 2).sum(1))
     return (2 * np.pi * model.freq_hz) ** 2 * what.density_kg_m3 / what.youngs_pa, model.shape[vertex, 2].astype(float)
 
@@ -45,7 +53,9 @@ def problem(name: str, seed: int = 0) -> tuple[Problem, Array]:
     what = load_material(name)
     gamma = what.youngs_pa / what.density_kg_m3
     lambda_true, amplitude_true = struck(what, edge_m=None, count=60)
-    rough = Material.isotropic(name, youngs_pa=what.youngs_pa, poisson=what.poisson + 0.05, density_kg_m3=what.density_kg_m3)
+    rough = Material.isotropic(
+        name, youngs_pa=what.youngs_pa, poisson=what.poisson + 0.05, density_kg_m3=what.density_kg_m3
+    )
     lambda_hat, amplitude_hat = struck(rough, edge_m=0.02, count=60)
     alpha, beta = what.alpha_per_s or 0.0, what.beta_s or 0.0
     sigma = 0.1 / np.abs(amplitude_true).max()
@@ -55,7 +65,10 @@ def problem(name: str, seed: int = 0) -> tuple[Problem, Array]:
     there = (freq_hz > 20) & (freq_hz < 0.45 * SR)
     freq_hz, decay, amplitude = freq_hz[there], decay[there], amplitude[there]
     time_s = np.arange(int(1.2 * SR)) / SR
-    signal = sum(a * np.exp(-d * time_s) * np.sin(2 * np.pi * f * time_s) for f, d, a in zip(freq_hz, decay, amplitude, strict=True))
+    signal = sum(
+        a * np.exp(-d * time_s) * np.sin(2 * np.pi * f * time_s)
+        for f, d, a in zip(freq_hz, decay, amplitude, strict=True)
+    )
     signal = np.concatenate([np.zeros(int(ONSET_S * SR)), signal])
     noise = np.abs(signal).max() * 10 ** (-PEAK_OVER_NOISE_DB / 20)
     signal = signal + noise * rng.standard_normal(len(signal))
@@ -110,9 +123,14 @@ def main(names: tuple[str, ...]) -> int:
             flush=True,
         )
     aim = target(asked)
-    fused, plain = milliseconds(aim, quick.parameters, plain=False, times=50), milliseconds(aim, quick.parameters, plain=True, times=2)
+    fused, plain = (
+        milliseconds(aim, quick.parameters, plain=False, times=50),
+        milliseconds(aim, quick.parameters, plain=True, times=2),
+    )
     print(f"one evaluation, last row: fused {fused:.2f} ms, plain {plain:.0f} ms, ratio {plain / fused:.0f}")
-    print(f"smallest ratio of times {worst:.0f}, asked {WITHIN:.0f}; behind the reference's metric: {', '.join(behind) or 'none'}")
+    print(
+        f"smallest ratio of times {worst:.0f}, asked {WITHIN:.0f}; behind the reference's metric: {', '.join(behind) or 'none'}"
+    )
     return 0 if worst >= WITHIN and not behind else 1
 
 

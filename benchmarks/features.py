@@ -1,9 +1,13 @@
 """Feature extraction measured: the paper's own test, mixtures in noise, real recordings.
 
-.venv/bin/python benchmarks/features.py paper [DRAWS]        100 damped sinusoids without noise: worst errors over draws, rates, laws of d, phases
-.venv/bin/python benchmarks/features.py steps                what each step buys, on one draw of that test and one mixture
-.venv/bin/python benchmarks/features.py mixtures [SEEDS]     20, 40, 60 dB: found, false, error over the Cramér-Rao bound, truth of the spreads
-.venv/bin/python benchmarks/features.py real FOLDER          every .flac, .wav and hits.npz below: count, strongest modes, processor time
+.venv/bin/python benchmarks/features.py paper [DRAWS]
+    100 damped sinusoids without noise: worst errors over draws, rates, laws of d, phases
+.venv/bin/python benchmarks/features.py steps
+    what each step buys, on one draw of that test and one mixture
+.venv/bin/python benchmarks/features.py mixtures [SEEDS]
+    20, 40, 60 dB: found, false, error over the Cramér-Rao bound, truth of the spreads
+.venv/bin/python benchmarks/features.py real FOLDER
+    every .flac, .wav and hits.npz below: count, strongest modes, processor time
 """
 
 from __future__ import annotations
@@ -32,7 +36,9 @@ def sound(freq: Array, decay: Array, amplitude: Array, phase: Array, count: int,
     return found
 
 
-def hundred(seed: int, law: str = "uniform", phase: str = "any", sr: int = SR, seconds: float = 1.0, count: int = 100) -> tuple[Array, Array, Array, Array]:
+def hundred(
+    seed: int, law: str = "uniform", phase: str = "any", sr: int = SR, seconds: float = 1.0, count: int = 100
+) -> tuple[Array, Array, Array, Array]:
     """The paper's test: f uniform in 20 … 21 500 Hz, d in 0.1 … 1000 1/s."""
     rng = np.random.default_rng(seed)
     freq = rng.uniform(20, 21_500, count)
@@ -65,7 +71,13 @@ def paper(draws: int) -> None:
                     found = extract(x, sr)
                     near = np.abs(found.freq_hz[:, None] - freq).argmin(axis=0)
                     counts.add(len(found.freq_hz))
-                    worst = np.maximum(worst, [np.abs(found.freq_hz[near] / freq - 1).max(), np.abs(found.decay_per_s[near] / decay - 1).max()])
+                    worst = np.maximum(
+                        worst,
+                        [
+                            np.abs(found.freq_hz[near] / freq - 1).max(),
+                            np.abs(found.decay_per_s[near] / decay - 1).max(),
+                        ],
+                    )
                 print(
                     f"| {sr} | {law} | {phase} | {draws} | {counts} | {worst[0]:.1e} | {worst[1]:.1e} | {(time.process_time() - start) / draws:.1f} |",
                     flush=True,
@@ -75,13 +87,17 @@ def paper(draws: int) -> None:
 def steps() -> None:
     full, noisy = hundred(0), mixture(1, 40.0)
     cases = {"100 sinusoids, no noise": (full[0], full[1], full[3]), "40 modes, 40 dB": (noisy[0], noisy[1], noisy[4])}
-    print(f"| recording | step | features | of the modes | false | f: mean, median, worst | d: mean, median, worst | s |\n{'|---' * 8}|")
+    print(
+        f"| recording | step | features | of the modes | false | f: mean, median, worst | d: mean, median, worst | s |\n{'|---' * 8}|"
+    )
     for name, (freq, decay, x) in cases.items():
         begun = time.process_time()
         rows = [("the paper's, greedy", greedy(x, SR, len(freq))[:, :2])]
         times = [time.process_time() - begun]
 
-        def timed(label: str, pole: Array, start: float, rows: list[tuple[str, Array]] = rows, times: list[float] = times) -> None:
+        def timed(
+            label: str, pole: Array, start: float, rows: list[tuple[str, Array]] = rows, times: list[float] = times
+        ) -> None:
             rows.append((label, np.stack([pole.imag / (2 * np.pi), -pole.real], axis=1)))
             times.append(time.process_time() - start)
 
@@ -100,12 +116,15 @@ def steps() -> None:
         else:
             start = likelihood.amplitudes(x, pole, SR)
             energy = (
-                likelihood.spreads(start, SR, len(x))[1] / noise_density.measured(likelihood.residual(x, start, SR), SR, 0.0).at(pole.imag / 2 / np.pi) ** 2
+                likelihood.spreads(start, SR, len(x))[1]
+                / noise_density.measured(likelihood.residual(x, start, SR), SR, 0.0).at(pole.imag / 2 / np.pi) ** 2
             )
             kept = pole[energy > 26]
             timed("… the significant", kept, begun)
             band = (60.0, 2 * np.pi * 22_000)
-            fitted = likelihood.fitted(x, likelihood.amplitudes(x, kept, SR), SR, band=band, fastest_per_s=FASTEST_PER_S, tolerance=1e-6)
+            fitted = likelihood.fitted(
+                x, likelihood.amplitudes(x, kept, SR), SR, band=band, fastest_per_s=FASTEST_PER_S, tolerance=1e-6
+            )
             timed("… refined jointly", fitted.pole, begun)
         begun = time.process_time()
         found = extract(x, SR)
@@ -118,7 +137,10 @@ def steps() -> None:
             i, j = i[cost[i, j] < 1], j[cost[i, j] < 1]
             f, d = np.abs(got[i, 0] / freq[j] - 1), np.abs(got[i, 1] / decay[j] - 1)
             said = " | ".join(f"{e.mean():.1e}, {np.median(e):.1e}, {e.max():.1e}" for e in (f, d))
-            print(f"| {name} | {label} | {len(got)} | {len(i)} of {len(freq)} | {len(got) - len(i)} | {said} | {spent:.1f} |", flush=True)
+            print(
+                f"| {name} | {label} | {len(got)} | {len(i)} of {len(freq)} | {len(got) - len(i)} | {said} | {spent:.1f} |",
+                flush=True,
+            )
 
 
 def mixtures(seeds: int) -> None:
@@ -155,7 +177,9 @@ def mixtures(seeds: int) -> None:
 def real(folder: str) -> None:
     from sonic_bullet.files import read_audio
 
-    print(f"| recording | s | features | the three of most energy: Hz ± sd (d ± sd 1/s) | noise dBFS | processor s | note |\n{'|---' * 7}|")
+    print(
+        f"| recording | s | features | the three of most energy: Hz ± sd (d ± sd 1/s) | noise dBFS | processor s | note |\n{'|---' * 7}|"
+    )
     for path in sorted(p for p in Path(folder).rglob("*") if p.suffix in (".flac", ".wav") or p.name == "hits.npz"):
         if path.suffix == ".npz":
             held = np.load(path)
@@ -167,13 +191,22 @@ def real(folder: str) -> None:
         try:
             r = extract(x, sr)
         except AudioError as error:
-            print(f"| {path.relative_to(folder)} | {len(x) / sr:.1f} | error | {error} |  | {time.process_time() - start:.1f} | |", flush=True)
+            print(
+                f"| {path.relative_to(folder)} | {len(x) / sr:.1f} | error | {error} |  | {time.process_time() - start:.1f} | |",
+                flush=True,
+            )
             continue
         top = np.argsort(-(r.amplitude**2) / np.maximum(r.decay_per_s, 1e-3), kind="stable")[:3]
-        said = ", ".join(f"{r.freq_hz[k]:.1f} ± {r.freq_sd_hz[k]:.2g} ({r.decay_per_s[k]:.3g} ± {r.decay_sd_per_s[k]:.2g})" for k in top)
+        said = ", ".join(
+            f"{r.freq_hz[k]:.1f} ± {r.freq_sd_hz[k]:.2g} ({r.decay_per_s[k]:.3g} ± {r.decay_sd_per_s[k]:.2g})"
+            for k in top
+        )
         name = str(path.relative_to(folder)).replace("/dev/", "/")
         spent = time.process_time() - start
-        print(f"| {name} | {len(x) / sr:.1f} | {len(r.freq_hz)} | {said} | {r.noise_dbfs:.1f} | {spent:.1f} | {r.note[:90]} |", flush=True)
+        print(
+            f"| {name} | {len(x) / sr:.1f} | {len(r.freq_hz)} | {said} | {r.noise_dbfs:.1f} | {spent:.1f} | {r.note[:90]} |",
+            flush=True,
+        )
 
 
 if __name__ == "__main__":

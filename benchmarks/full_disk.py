@@ -2,11 +2,12 @@
 
     python benchmarks/full_disk.py [--levels 40] [--kinds .wav,.flac,…] [--json]
 
-A tmpfs of 4 MiB is mounted in a mount namespace of its own (unshare; as root, or as a user where user namespaces are allowed) and filled until
-so many bytes are left: half of the levels are spread over the file's size, half lie page by page below it, where a format's last bytes go.
-Each write is the command line's (`render LOG -o …`, `materials --json …`) in a forked process. Counted: exit 0 with the whole file, another
-exit without one, and bad: exit 0 without the whole file, anything that cannot be read under the final name, a line that does not say
-"disk full" where the disk was full, litter. Where nothing can be mounted all is counted as skipped. Exit 1 where anything is bad.
+A tmpfs of 4 MiB is mounted in a mount namespace of its own (unshare; as root, or as a user where user namespaces are
+allowed) and filled until so many bytes are left: half of the levels are spread over the file's size, half lie page by
+page below it, where a format's last bytes go. Each write is the command line's (`render LOG -o …`, `materials --json
+…`) in a forked process. Counted: exit 0 with the whole file, another exit without one, and bad: exit 0 without the
+whole file, anything that cannot be read under the final name, a line that does not say "disk full" where the disk was
+full, litter. Where nothing can be mounted all is counted as skipped. Exit 1 where anything is bad.
 """
 
 from __future__ import annotations
@@ -189,9 +190,16 @@ def main() -> None:
             shutil.rmtree(scratch)
         return
     with tempfile.TemporaryDirectory(prefix="small-disk-") as disk:
-        command = mounted([sys.executable, __file__, "--levels", str(asked.levels), "--kinds", asked.kinds, "--disk", disk], Path(disk))
+        command = mounted(
+            [sys.executable, __file__, "--levels", str(asked.levels), "--kinds", asked.kinds, "--disk", disk],
+            Path(disk),
+        )
         if command is None:
-            print(json.dumps({"skipped": len(kinds) * asked.levels}) if asked.json else f"{len(kinds) * asked.levels} skipped: nothing can be mounted here")
+            print(
+                json.dumps({"skipped": len(kinds) * asked.levels})
+                if asked.json
+                else f"{len(kinds) * asked.levels} skipped: nothing can be mounted here"
+            )
             return
         done = subprocess.run(command, check=False, stdout=subprocess.PIPE, text=True)
     if done.returncode:
@@ -201,7 +209,9 @@ def main() -> None:
         print(json.dumps(found))
     else:
         for kind, counts in found.items():
-            print(f"{kind:7} {counts['levels']} fill levels: {counts['whole']} whole, {counts['refused']} refused, {len(counts['bad'])} bad")
+            print(
+                f"{kind:7} {counts['levels']} fill levels: {counts['whole']} whole, {counts['refused']} refused, {len(counts['bad'])} bad"
+            )
             for line in counts["bad"]:
                 print(f"        {line}")
     sys.exit(any(counts["bad"] for counts in found.values()))

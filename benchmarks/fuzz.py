@@ -1,11 +1,14 @@
-"""Every reader against mutated files whose checksums are right: only the project's own errors, in bounded memory, time and text.
+"""Every reader against mutated files whose checksums are right: only the project's own errors, in bounded memory, time
+and text.
 
     python benchmarks/fuzz.py [--inputs 300000] [--seed 0] [--workers 2] [--keep DIR] [--doors log,flac,…]
     python benchmarks/fuzz.py --again flac:1234 [--seed 0]        one input, with its traceback
 
 (seed, format, number) -> a file (fuzzing/) -> its reader and one step on, in a process of its own
-    -> read, or refused by a SonicBulletError of at most 1 kB; anything else is a fault and its file is kept in DIR as FORMAT-NUMBER.SUFFIX
-A fault: another exception or a crash; more than 2 GB; more than 30 s of processor time, or two minutes of waiting; a text over 1 kB; a cache entry believed that is another.
+    -> read, or refused by a SonicBulletError of at most 1 kB; anything else is a fault and its file is kept in DIR as
+        FORMAT-NUMBER.SUFFIX
+A fault: another exception or a crash; more than 2 GB; more than 30 s of processor time, or two minutes of waiting; a
+text over 1 kB; a cache entry believed that is another.
 """
 
 from __future__ import annotations
@@ -44,7 +47,10 @@ class Overlong(BaseException):
 
 @dataclass
 class Tally:
-    """What became of a door's inputs. slowest_s: of one input; longest: text in bytes; faults: (kind, number, where and what)."""
+    """What became of a door's inputs.
+
+    slowest_s: of one input; longest: text in bytes; faults: (kind, number, where and what).
+    """
 
     inputs: int = 0
     read: int = 0
@@ -115,7 +121,14 @@ def _work(door: Door, seed: int, numbers: range, folder: Path, at: Any, answer: 
         path.unlink(missing_ok=True)
         grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 > MEMORY_BYTES
         kind = "memory" if grown else kind
-        tally = Tally(1, kind == "read", kind == "refused", took, len(text.encode("utf-8", "replace")) if kind in ("refused", "text") else 0, took)
+        tally = Tally(
+            1,
+            kind == "read",
+            kind == "refused",
+            took,
+            len(text.encode("utf-8", "replace")) if kind in ("refused", "text") else 0,
+            took,
+        )
         if kind not in ("read", "refused"):
             tally.faults.append((kind, number, text))
         answer.send(tally)  # one by one: should the next end this process, nothing is lost
@@ -134,7 +147,11 @@ def run(
     keep: Path | None = None,
     seconds: float = float("inf"),
 ) -> dict[str, Tally]:
-    """Tallies by door. inputs: in all, shared out by the doors' shares. chosen: None for all doors. seconds: after which no further chunk is begun."""
+    """Tallies by door.
+
+    inputs: in all, shared out by the doors' shares. chosen: None for all doors. seconds: after which no further chunk
+    is begun.
+    """
     chosen = doors() if chosen is None else chosen
     whole = sum(door.share for door in chosen)
     tasks, chunk = [], CHUNK if seconds == float("inf") else QUICK_CHUNK
@@ -188,7 +205,8 @@ def _told(receive: Any) -> tuple[list[Tally], bool]:
 
 
 def _stuck(entry: tuple[Any, Any, Any, Door, range, list[float]]) -> bool:
-    """Whether a process has been at one input for far longer than its own alarm lets it: it sits in foreign code, or waits.
+    """Whether a process has been at one input for far longer than its own alarm lets it: it sits in foreign code, or
+    waits.
 
     Counted in looks of a second at most: a machine that is put to sleep does not hang.
     """
@@ -214,7 +232,19 @@ def _keep(keep: Path | None, door: Door, seed: int, tally: Tally, known: Tally) 
 
 def table(tallies: dict[str, Tally]) -> str:
     """One line a format, faults by kind, and the sum."""
-    head = ("format", "inputs", "read", "refused", "foreign", "memory", "time", "text", "slowest s", "longest text", "ms each")
+    head = (
+        "format",
+        "inputs",
+        "read",
+        "refused",
+        "foreign",
+        "memory",
+        "time",
+        "text",
+        "slowest s",
+        "longest text",
+        "ms each",
+    )
     rows: list[tuple[str, ...]] = [head]
     total = Tally()
     for tally in tallies.values():
@@ -222,9 +252,23 @@ def table(tallies: dict[str, Tally]) -> str:
     for name, t in [*tallies.items(), ("all", total)]:
         kinds = Counter(kind for kind, *_ in t.faults)
         numbers = (t.inputs, t.read, t.refused, *(kinds[k] for k in ("foreign", "memory", "time", "text")))
-        rows.append((name, *map(str, numbers), f"{t.slowest_s:.2f}", str(t.longest), f"{1000 * t.seconds / max(t.inputs, 1):.1f}"))
+        rows.append(
+            (
+                name,
+                *map(str, numbers),
+                f"{t.slowest_s:.2f}",
+                str(t.longest),
+                f"{1000 * t.seconds / max(t.inputs, 1):.1f}",
+            )
+        )
     widths = [max(len(row[i]) for row in rows) for i in range(len(head))]
-    return "\n".join("  ".join(cell.rjust(width) if i else cell.ljust(width) for i, (cell, width) in enumerate(zip(row, widths, strict=True))) for row in rows)
+    return "\n".join(
+        "  ".join(
+            cell.rjust(width) if i else cell.ljust(width)
+            for i, (cell, width) in enumerate(zip(row, widths, strict=True))
+        )
+        for row in rows
+    )
 
 
 def main(arguments: list[str] | None = None) -> int:

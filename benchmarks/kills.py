@@ -1,10 +1,13 @@
-"""Does a killed run ever leave half a file under a name, or litter that outlives the next run? 300 kills aimed at writes.
+"""Does a killed run ever leave half a file under a name, or litter that outlives the next run?
+
+300 kills aimed at writes.
 
     python benchmarks/kills.py [--kills 300] [--kinds .wav,.flac,…] [--seed 0] [--json]
 
-A forked process writes one file over and over, each time with other content; at a random moment of its second or third write it is killed
-(SIGKILL). Counted: whole (the name holds one of the versions, entire), in a write (the kill left an unfinished file behind: it hit), litter
-(anything but the name there after the next write into that folder). Exit 1 where anything is not whole or left.
+A forked process writes one file over and over, each time with other content; at a random moment of its second or third
+write it is killed (SIGKILL). Counted: whole (the name holds one of the versions, entire), in a write (the kill left an
+unfinished file behind: it hit), litter (anything but the name there after the next write into that folder). Exit 1
+where anything is not whole or left.
 """
 
 from __future__ import annotations
@@ -30,7 +33,9 @@ KINDS = (".wav", ".flac", ".ogg", ".aiff", ".caf", ".npz", "preset", ".png", "ca
 
 @dataclass(frozen=True)
 class Kind:
-    """name: of the file; write(folder, version): the file again; version(folder): which it holds, None where it is not entire."""
+    """name: of the file; write(folder, version): the file again; version(folder): which it holds, None where it is not
+    entire.
+    """
 
     name: str
     write: Callable[[Path, int], Any]
@@ -56,7 +61,9 @@ def kinds() -> dict[str, Kind]:
             near = found.shape == sound.shape and np.abs(found - sound).max() < (0.03 if extension == ".ogg" else 1e-6)
             return round(sr / 1000) - 40 if near else None
 
-        return Kind(f"a{extension}", lambda folder, v: write_audio(folder / f"a{extension}", sound, (40 + v) * 1000), version)
+        return Kind(
+            f"a{extension}", lambda folder, v: write_audio(folder / f"a{extension}", sound, (40 + v) * 1000), version
+        )
 
     @cache_result
     def log_of(v: int) -> ContactLog:
@@ -69,7 +76,11 @@ def kinds() -> dict[str, Kind]:
 
     def cache_version(folder: Path) -> int | None:
         found = cache.load(folder, "modes-0", {"shape": cache.Kept("f8", (400, 300))})
-        return None if found is None or (found[0]["shape"] != found[0]["shape"].flat[0]).any() else int(found[0]["shape"].flat[0])
+        return (
+            None
+            if found is None or (found[0]["shape"] != found[0]["shape"].flat[0]).any()
+            else int(found[0]["shape"].flat[0])
+        )
 
     def picture_version(folder: Path) -> int | None:
         from matplotlib.image import imread
@@ -86,13 +97,23 @@ def kinds() -> dict[str, Kind]:
     made[".npz"] = Kind("a.npz", lambda folder, v: write_log(folder / "a.npz", log_of(v)), log_version)
     made["preset"] = Kind(
         "a.json",
-        lambda folder, v: presets.write_preset(folder / "a.json", msgspec.structs.replace(steel, density_kg_m3=float(v + 1))),
+        lambda folder, v: presets.write_preset(
+            folder / "a.json", msgspec.structs.replace(steel, density_kg_m3=float(v + 1))
+        ),
         lambda folder: int(presets.read_preset(folder / "a.json").density_kg_m3) - 1,
     )
-    made[".png"] = Kind("a.png", lambda folder, v: render_picture(folder / "a.png", sound[:, :4000], SR), picture_version)
-    made["cache"] = Kind("modes-0.npz", lambda folder, v: cache.save(folder, "modes-0", {"shape": np.full((400, 300), float(v))}, ""), cache_version)
+    made[".png"] = Kind(
+        "a.png", lambda folder, v: render_picture(folder / "a.png", sound[:, :4000], SR), picture_version
+    )
+    made["cache"] = Kind(
+        "modes-0.npz",
+        lambda folder, v: cache.save(folder, "modes-0", {"shape": np.full((400, 300), float(v))}, ""),
+        cache_version,
+    )
     made["compiled"] = Kind(
-        "kernel.1.nbc", lambda folder, v: files(folder).save("key", np.full(100_000, v)), lambda folder: _constant(files(folder).load("key"))
+        "kernel.1.nbc",
+        lambda folder, v: files(folder).save("key", np.full(100_000, v)),
+        lambda folder: _constant(files(folder).load("key")),
     )
     return made
 

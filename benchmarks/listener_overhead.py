@@ -1,4 +1,5 @@
-"""What listening costs: time round each stepSimulation (poses, contacts, rows) over stepSimulation itself, on piles of boxes.
+"""What listening costs: time round each stepSimulation (poses, contacts, rows) over stepSimulation itself, on piles of
+boxes.
 
     python benchmarks/listener_overhead.py [BOXES ...]
 
@@ -17,10 +18,14 @@ from sonic_bullet.listener import direct_client, disconnect, open_world
 
 
 def measure(boxes: int, warm: int = 240, steps: int = 200) -> tuple[float, float, float, float]:
-    """Tenth percentiles (a busy machine only adds) in µs: stepSimulation, before_step, after_step; and contacts per step."""
+    """Tenth percentiles (a busy machine only adds) in µs: stepSimulation, before_step, after_step; and contacts per
+    step.
+    """
     client = direct_client()
     client.setGravity(0, 0, -9.81)
-    client.createMultiBody(0, client.createCollisionShape(p.GEOM_BOX, halfExtents=[5, 5, 0.5]), basePosition=[0, 0, -0.5])
+    client.createMultiBody(
+        0, client.createCollisionShape(p.GEOM_BOX, halfExtents=[5, 5, 0.5]), basePosition=[0, 0, -0.5]
+    )
     box = client.createCollisionShape(p.GEOM_BOX, halfExtents=[0.05] * 3)
     rng = np.random.default_rng(0)
     for i in range(boxes):
@@ -48,4 +53,7 @@ if __name__ == "__main__":
     print("boxes  contacts  stepSimulation  before   after   ratio")
     for count in [int(word) for word in sys.argv[1:]] or [1, 20, 100, 300]:
         step_us, before_us, after_us, touching = measure(count)
-        print(f"{count:5d}  {touching:8d}  {step_us:11.0f} µs  {before_us:6.0f}  {after_us:6.0f}  {(before_us + after_us) / step_us:6.2f}", flush=True)
+        print(
+            f"{count:5d}  {touching:8d}  {step_us:11.0f} µs  {before_us:6.0f}  {after_us:6.0f}  {(before_us + after_us) / step_us:6.2f}",
+            flush=True,
+        )

@@ -1,10 +1,11 @@
-"""Measured data on trial: each set fitted on one part and judged on another, baseline against baseline + effect, a null of as many numbers beside it.
+"""Measured data on trial: each set fitted on one part and judged on another, baseline against baseline + effect, a null
+of as many numbers beside it.
 
     python benchmarks/measured.py --data ../shared/measured [--out docs/measured/recordings-by-others.md] [SET ...]
 
-DATA/SET/case.json, dev/ -> measured_sets/ judge of that set, or plain.py's for a set of unknown kind, READINGS times (observed.py)
--> OUT, and pictures/SET.png beside it
-What is missing or cannot be read gives one line that names it, and the count of it is printed. Features are kept in SONIC_BULLET_MEASURED_CACHE.
+DATA/SET/case.json, dev/ -> measured_sets/ judge of that set, or plain.py's for a set of unknown kind, READINGS times
+(observed.py) -> OUT, and pictures/SET.png beside it What is missing or cannot be read gives one line that names it, and
+the count of it is printed. Features are kept in SONIC_BULLET_MEASURED_CACHE.
 """
 
 from __future__ import annotations
@@ -47,7 +48,8 @@ def main(arguments: list[str] | None = None) -> int:
         skipped += [f"{name}: {line}" for line in page.found.skipped]
         for row in page.found.rows:
             print(
-                f"  {row.what}: {row.before:.3g} -> {row.after:.3g} {row.unit} (null {row.null:.3g}) {row.effect}{' earned' if row.earned else ''}", flush=True
+                f"  {row.what}: {row.before:.3g} -> {row.after:.3g} {row.unit} (null {row.null:.3g}) {row.effect}{' earned' if row.earned else ''}",
+                flush=True,
             )
     written(asked.out, pages, skipped)
     for line in skipped:

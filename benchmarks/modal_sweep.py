@@ -2,8 +2,9 @@
 
     python benchmarks/modal_sweep.py [--sample N] [--workers W] [--rows OUT.jsonl]
 
-Each mesh is analysed in a process of its own, without the cache; prints a row each that is slow or fails, then the counts, and exits 1
-where a mesh hung, grew or failed without a name. --rows keeps a line of JSON a mesh as it is done, and skips those that the file has.
+Each mesh is analysed in a process of its own, without the cache; prints a row each that is slow or fails, then the
+counts, and exits 1 where a mesh hung, grew or failed without a name. --rows keeps a line of JSON a mesh as it is done,
+and skips those that the file has.
 """
 
 from __future__ import annotations
@@ -41,11 +42,17 @@ def one(path: str, scale: float) -> None:
     from sonic_bullet.records import Material
     from sonic_bullet.records.errors import SonicBulletError
 
-    plastic = Material.isotropic("plastic", youngs_pa=2.4e9, poisson=0.37, density_kg_m3=1050.0, alpha_per_s=30.0, beta_s=1e-6)
+    plastic = Material.isotropic(
+        "plastic", youngs_pa=2.4e9, poisson=0.37, density_kg_m3=1050.0, alpha_per_s=30.0, beta_s=1e-6
+    )
     start = time.monotonic()
     try:
         model = analyse((read_mesh(path, scale),), plastic, cache=None)
-        said = {"modes": model.mode_count, "first_hz": float(model.freq_hz[0]) if model.mode_count else None, "note": model.note}
+        said = {
+            "modes": model.mode_count,
+            "first_hz": float(model.freq_hz[0]) if model.mode_count else None,
+            "note": model.note,
+        }
     except SonicBulletError as error:
         said = {"error": f"{type(error).__name__}: {error}"}
     usage = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
@@ -59,7 +66,9 @@ def run(job: tuple[str, float]) -> dict[str, object]:
     command = [sys.executable, __file__, "--one", job[0], "--scale", str(job[1])]
     try:
         ended = subprocess.run(command, capture_output=True, text=True, timeout=3 * LIMIT_S, check=False)
-        answer: dict[str, object] = json.loads(ended.stdout.splitlines()[-1]) if ended.returncode == 0 else {"crash": ended.stderr[-300:]}
+        answer: dict[str, object] = (
+            json.loads(ended.stdout.splitlines()[-1]) if ended.returncode == 0 else {"crash": ended.stderr[-300:]}
+        )
     except subprocess.TimeoutExpired:
         answer = {"crash": "hung"}
     return {"mesh": _label(job[0]), **answer}
@@ -80,7 +89,9 @@ def main() -> int:
     if given.one:
         one(given.one, given.scale)
         return 0
-    rows = [json.loads(line) for line in given.rows.read_text().splitlines()] if given.rows and given.rows.exists() else []
+    rows = (
+        [json.loads(line) for line in given.rows.read_text().splitlines()] if given.rows and given.rows.exists() else []
+    )
     known = {row["mesh"] for row in rows}
     with ThreadPoolExecutor(given.workers) as pool:
         for row in pool.map(run, [job for job in meshes(given.sample) if _label(job[0]) not in known]):

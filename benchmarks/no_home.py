@@ -6,9 +6,10 @@ user        uid 65534, HOME a folder that is not there
 nameless    a uid that no passwd entry knows, no HOME, an empty environment
 read-only   this user, HOME a folder that takes nothing
 
-In all three the package is mounted read-only, in a mount namespace of its own (unshare, as root), and where this user's own home hides the
-interpreter it is opened. Outputs go to a folder that may be written. Good: exit 0, what was asked for is there, and nothing on stderr but
-notes. Where nothing can be mounted, "read-only" runs without a mount and the rest is counted as skipped. Exit 1 where one is not good.
+In all three the package is mounted read-only, in a mount namespace of its own (unshare, as root), and where this user's
+own home hides the interpreter it is opened. Outputs go to a folder that may be written. Good: exit 0, what was asked
+for is there, and nothing on stderr but notes. Where nothing can be mounted, "read-only" runs without a mount and the
+rest is counted as skipped. Exit 1 where one is not good.
 """
 
 from __future__ import annotations
@@ -31,12 +32,18 @@ COMMANDS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "materials": (("materials", "--json", "m.json"), ("m.json",)),
     "modes": (("modes", "box.obj", "--count", "3", "-o", "m.npz"), ("m.npz",)),
     "doctor": (("doctor", "scene.py", "--seconds", "0.05"), ()),
-    "render": (("render", "scene.py", "-o", "a.flac", "--contacts", "a.npz", "--picture", "a.png"), ("a.flac", "a.npz", "a.png")),
+    "render": (
+        ("render", "scene.py", "-o", "a.flac", "--contacts", "a.npz", "--picture", "a.png"),
+        ("a.flac", "a.npz", "a.png"),
+    ),
     "replay": (("render", "a.npz", "-o", "b.ogg"), ("b.ogg",)),
     "features": (("features", "s0.wav", "--picture", "f.png"), ("f.png",)),
     "fit": (("fit", ".", "-o", "p.json", "--picture", "p.png"), ("p.json", "p.png")),
     "residual": (("residual", "s0.wav", "--material", "steel", "-o", "r.json"), ("r.json",)),
-    "diagnose": (("diagnose", ".", "-o", "d.json", "--predict", "predicted", "--report", "page.html"), ("d.json", "predicted/after", "page.html")),
+    "diagnose": (
+        ("diagnose", ".", "-o", "d.json", "--predict", "predicted", "--report", "page.html"),
+        ("d.json", "predicted/after", "page.html"),
+    ),
 }
 SCENE = """
 SECONDS = 0.1
@@ -46,7 +53,8 @@ def build(client):
     bar = client.createMultiBody(0.5, client.createCollisionShape(client.GEOM_BOX, halfExtents=[0.1, 0.01, 0.01]), basePosition=[0, 0, 0.011])
     return {bar: {"material": "steel", "count": 5}}
 """
-# $1 another place for the interpreter, $2 the folder that hides it ("" where none does), $3 the interpreter's, $4 the repository
+# $1 another place for the interpreter, $2 the folder that hides it ("" where none does), $3 the interpreter's, $4 the
+# repository
 INSIDE = """set -e
 if [ -n "$2" ]; then
     mount --bind "$3" "$1"; mount -t tmpfs -o mode=755 none "$2"; mkdir -p "$3"; mount --bind "$1" "$3"
@@ -67,7 +75,18 @@ def command(direction: str, scratch: Path, words: list[str]) -> list[str] | None
         return plain if direction == "read-only" else None
     base = Path(sys.base_prefix)
     hidden = [place for place in reversed(base.parents) if not place.stat().st_mode & 0o001]
-    inside = ["unshare", "-m", "sh", "-c", INSIDE, "sh", str(scratch / "interpreter"), str(hidden[0]) if hidden else "", str(base), str(REPO)]
+    inside = [
+        "unshare",
+        "-m",
+        "sh",
+        "-c",
+        INSIDE,
+        "sh",
+        str(scratch / "interpreter"),
+        str(hidden[0]) if hidden else "",
+        str(base),
+        str(REPO),
+    ]
     if direction == "read-only":  # root writes wherever it likes: to a home that is mounted read-only it does not
         seal = 'mount -t tmpfs -o ro,mode=755 none "$0" && exec "$@"'
         plain = ["sh", "-c", seal, str(scratch / "sealed"), *plain]
@@ -85,7 +104,9 @@ def prepared(scratch: Path) -> Path:
     scratch.chmod(0o755)
     (scratch / "sealed").chmod(0o555)
     (work / "scene.py").write_text(SCENE)
-    material = Material.isotropic("planted", youngs_pa=7e10, poisson=0.33, density_kg_m3=2700, alpha_per_s=5.0, beta_s=1e-7)
+    material = Material.isotropic(
+        "planted", youngs_pa=7e10, poisson=0.33, density_kg_m3=2700, alpha_per_s=5.0, beta_s=1e-7
+    )
     importlib.import_module("tests.made.case").make(work, material, guess=(6.5e10, 2700, 0.3), strikes=3, seconds=0.4)
     for path in (work, *work.iterdir()):
         path.chmod(0o777)
@@ -100,7 +121,9 @@ def good(direction: str, name: str, scratch: Path, work: Path) -> tuple[bool | N
         return None, "skipped"
     start = time.monotonic()
     done = subprocess.run(asked, cwd=work, check=False, capture_output=True, text=True, timeout=3000)
-    lines = [line for line in done.stderr.splitlines() if not line.startswith(("sonic-bullet: note:", "pybullet build time"))]
+    lines = [
+        line for line in done.stderr.splitlines() if not line.startswith(("sonic-bullet: note:", "pybullet build time"))
+    ]
     if name in ("fit", "residual", "diagnose"):
         lines = [line for line in lines if not line.startswith("sonic-bullet: warning:")]
     lines += [line for line in done.stderr.splitlines() if "are not kept" in line][1:]  # said once at most

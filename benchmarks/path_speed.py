@@ -2,8 +2,8 @@
 
     python benchmarks/path_speed.py
 
-Prints shares of real time on one core (CPU time of this thread, best of several seconds), sounding and silent, and the ratio to the plain way:
-scipy's cubic interpolation of each body's history at the retarded times.
+Prints shares of real time on one core (CPU time of this thread, best of several seconds), sounding and silent, and the
+ratio to the plain way: scipy's cubic interpolation of each body's history at the retarded times.
 """
 
 from __future__ import annotations

@@ -2,8 +2,9 @@
 
     python benchmarks/practice.py --data ../shared/practice [CASE ...]
 
-Each case is diagnosed in a copy without truth.json. share = (after − floor)/(before − floor) of the log-spectral distance; what must hold is share <= 0.2 on
-`holdout` (0.5 where the truth is a room) and <= 0.35 on `transfer`, and nothing added where nothing lacks.
+Each case is diagnosed in a copy without truth.json. share = (after − floor)/(before − floor) of the log-spectral
+distance; what must hold is share <= 0.2 on `holdout` (0.5 where the truth is a room) and <= 0.35 on `transfer`, and
+nothing added where nothing lacks.
 """
 
 from __future__ import annotations
@@ -27,11 +28,15 @@ def main() -> int:
     parser.add_argument("--data", type=Path, required=True)
     parser.add_argument("cases", nargs="*", metavar="CASE")
     asked = parser.parse_args()
-    folders = sorted(p.parent for p in asked.data.glob("*/truth.json") if not asked.cases or p.parent.name in asked.cases)
+    folders = sorted(
+        p.parent for p in asked.data.glob("*/truth.json") if not asked.cases or p.parent.name in asked.cases
+    )
     if not folders:
         print(f"{asked.data}: no cases with a truth.json; give the folder that holds them", file=sys.stderr)
         return 2
-    print("| case | truth | verdict | split | before dB | after dB | floor dB | share | | wall s |\n|---|---|---|---|---|---|---|---|---|---|")
+    print(
+        "| case | truth | verdict | split | before dB | after dB | floor dB | share | | wall s |\n|---|---|---|---|---|---|---|---|---|---|"
+    )
     missed = 0
     for folder in folders:
         truth = sorted(e["id"] for e in json.loads((folder / "truth.json").read_text())["effects"])

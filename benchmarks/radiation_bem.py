@@ -2,11 +2,13 @@
 
     python benchmarks/radiation_bem.py [--modes 14] [--only bar]
 
-Dense Helmholtz boundary elements, constant on triangles, collocated at centroids, coupled after Burton & Miller 1971 (no irregular frequencies):
+Dense Helmholtz boundary elements, constant on triangles, collocated at centroids, coupled after Burton & Miller 1971
+(no irregular frequencies):
     (½ - K) φ - βDφ = S v + β(½ + K') v,   β = -i/max(k, 1/a),   p = iωρφ,   G = e^{-ikr}/4πr
-Static kernels in closed form, the rest by 7 points a triangle. Prints, a line a mode: frequency, ka (a of the sphere of equal area), σ, level error
-in dB of the law, and of the plain law of multipoles of that sphere (monopole, dipole, rest) that it replaced. A body's line "power" compares the
-solution's own two powers, far field and surface: how good the yardstick is.
+Static kernels in closed form, the rest by 7 points a triangle. Prints, a line a mode: frequency, ka (a of the sphere of
+equal area), σ, level error in dB of the law, and of the plain law of multipoles of that sphere (monopole, dipole, rest)
+that it replaced. A body's line "power" compares the solution's own two powers, far field and surface: how good the
+yardstick is.
 """
 
 from __future__ import annotations
@@ -55,7 +57,9 @@ def static_kernels(corner: Array, normal: Array) -> tuple[Array, Array, Array, A
         potential += dot(out, p) * near
         gradient -= out * near[..., None]
         loop += np.cross(p, q) * ((rp + rq) / (rp * rq * (rp * rq + dot(p, q))))[..., None]
-    return tuple(m / (4 * np.pi) for m in (potential, solid, dot(normal[:, None], gradient), -dot(normal[:, None], loop)))
+    return tuple(
+        m / (4 * np.pi) for m in (potential, solid, dot(normal[:, None], gradient), -dot(normal[:, None], loop))
+    )
 
 
 @njit(cache=True, nogil=True)
@@ -70,9 +74,24 @@ def add_waves(k, corner, normal, area, points, shares, s, kk, ks, d):  # type: i
                 s[i, j] += -1j * k * area[j] / (4 * np.pi)
                 continue
             for g in range(7):
-                r0 = x[0] - points[g, 0] * corner[j, 0, 0] - points[g, 1] * corner[j, 1, 0] - points[g, 2] * corner[j, 2, 0]
-                r1 = x[1] - points[g, 0] * corner[j, 0, 1] - points[g, 1] * corner[j, 1, 1] - points[g, 2] * corner[j, 2, 1]
-                r2 = x[2] - points[g, 0] * corner[j, 0, 2] - points[g, 1] * corner[j, 1, 2] - points[g, 2] * corner[j, 2, 2]
+                r0 = (
+                    x[0]
+                    - points[g, 0] * corner[j, 0, 0]
+                    - points[g, 1] * corner[j, 1, 0]
+                    - points[g, 2] * corner[j, 2, 0]
+                )
+                r1 = (
+                    x[1]
+                    - points[g, 0] * corner[j, 0, 1]
+                    - points[g, 1] * corner[j, 1, 1]
+                    - points[g, 2] * corner[j, 2, 1]
+                )
+                r2 = (
+                    x[2]
+                    - points[g, 0] * corner[j, 0, 2]
+                    - points[g, 1] * corner[j, 1, 2]
+                    - points[g, 2] * corner[j, 2, 2]
+                )
                 r = np.sqrt(r0 * r0 + r1 * r1 + r2 * r2)
                 w = shares[g] * area[j] / (4 * np.pi)
                 rx = (r0 * normal[i, 0] + r1 * normal[i, 1] + r2 * normal[i, 2]) / r
@@ -131,14 +150,19 @@ def multipoles(vertex: Array, face: Array, shape: Array, freq_hz: Array) -> tupl
     square = area @ (9 * mean**2 + (speed**2).sum(axis=1)) / 12
     monopole = (area @ mean) ** 2 / area.sum()
     shift = normal.T @ (area[:, None] * mean)
-    dipole = np.minimum(np.einsum("im,ij,jm->m", shift, np.linalg.pinv(np.einsum("f,fi,fj->ij", area, normal, normal)), shift), square - monopole)
+    dipole = np.minimum(
+        np.einsum("im,ij,jm->m", shift, np.linalg.pinv(np.einsum("f,fi,fj->ij", area, normal, normal)), shift),
+        square - monopole,
+    )
     x = 2 * np.pi * freq_hz / AIR.sound_speed_m_s * np.sqrt(area.sum() / (4 * np.pi))
     efficiency = np.stack([x**2 / (1 + x**2), x**4 / (4 + x**4), x**6 / (81 + 9 * x**2 - 2 * x**4 + x**6)])
     power = (efficiency * np.stack([monopole, dipole, np.maximum(square - monopole - dipole, 0)])).sum(axis=0)
     return RHO_C * np.sqrt(power / (4 * np.pi)), x, square
 
 
-def compare(name: str, model: ModalModel, mesh: tuple[Array, Array, Array] | None = None, exact: Array | None = None) -> Array:
+def compare(
+    name: str, model: ModalModel, mesh: tuple[Array, Array, Array] | None = None, exact: Array | None = None
+) -> Array:
     """Print a body's table; return the law's errors in dB (m,)."""
     vertex, face, shape = mesh or (model.vertex_m, model.face, model.shape)
     truth, check = solve(vertex, face, shape, model.freq_hz)
@@ -147,10 +171,15 @@ def compare(name: str, model: ModalModel, mesh: tuple[Array, Array, Array] | Non
     sigma = 4 * np.pi * truth**2 / RHO_C**2 / square
     error, old = 20 * np.log10(ours / truth), 20 * np.log10(plain / truth)
     print(f"\n{name}: {len(model.face)} triangles of the model, {len(face)} of the yardstick")
-    print("     Hz      ka         σ   map dB  multipoles dB  power dB" + ("  yardstick - exact dB" if exact is not None else ""))
+    print(
+        "     Hz      ka         σ   map dB  multipoles dB  power dB"
+        + ("  yardstick - exact dB" if exact is not None else "")
+    )
     for m in range(len(ka)):
         tail = f"  {20 * np.log10(truth[m] / exact[m]):+8.2f}" if exact is not None else ""
-        print(f"{model.freq_hz[m]:8.1f} {ka[m]:6.2f} {sigma[m]:9.2e} {error[m]:+8.2f} {old[m]:+14.1f} {check[m]:+9.2f}{tail}")
+        print(
+            f"{model.freq_hz[m]:8.1f} {ka[m]:6.2f} {sigma[m]:9.2e} {error[m]:+8.2f} {old[m]:+14.1f} {check[m]:+9.2f}{tail}"
+        )
     print(
         f"   map: median |{np.median(np.abs(error)):.2f}|, worst {np.abs(error).max():.2f} dB;  multipoles: median |{np.median(np.abs(old)):.1f}|, worst {np.abs(old).max():.1f} dB",
         flush=True,
@@ -163,21 +192,47 @@ def sphere(radius: float, degree: int) -> tuple[ModalModel, Array]:
     vertex, face = np.array(ball.vertices), np.array(ball.faces)
     ka = np.array([0.1, 0.5, 1.0, 2.0, 4.0, 8.0])
     cosine = vertex[:, 2]
-    shape = np.repeat((vertex * np.polynomial.legendre.legval(cosine, np.eye(4)[degree])[:, None])[:, :, None], len(ka), axis=2)
+    shape = np.repeat(
+        (vertex * np.polynomial.legendre.legval(cosine, np.eye(4)[degree])[:, None])[:, :, None], len(ka), axis=2
+    )
     hankel = spherical_jn(degree, ka, True) - 1j * spherical_yn(degree, ka, True)
     exact = RHO_C * radius / (ka * np.abs(hankel)) / np.sqrt(2 * degree + 1)
-    return ModalModel(ka * AIR.sound_speed_m_s / radius / (2 * np.pi), np.ones(6), shape, radius * vertex, face, np.zeros(len(face)), 1.0, 1.0), exact
+    return ModalModel(
+        ka * AIR.sound_speed_m_s / radius / (2 * np.pi),
+        np.ones(6),
+        shape,
+        radius * vertex,
+        face,
+        np.zeros(len(face)),
+        1.0,
+        1.0,
+    ), exact
 
 
 def bowl() -> ModalModel:
-    """The bowl of assets with the motion of rim modes, u = (r/R)^n (cos nθ e_r - sin nθ/n e_θ) [Rayleigh 1894, sec. 235], at pitches of porcelain."""
+    """The bowl of assets with the motion of rim modes, u = (r/R)^n (cos nθ e_r - sin nθ/n e_θ) [Rayleigh 1894, sec.
+
+    235], at pitches of porcelain.
+    """
     file = trimesh.load(Path(__file__).parent.parent / "assets" / "bowl.obj", process=False)
     vertex, face = np.array(file.vertices), np.array(file.faces)
     order = np.array([2, 3, 4, 5])
     radius, angle = np.hypot(vertex[:, 0], vertex[:, 1])[:, None], np.arctan2(vertex[:, 1], vertex[:, 0])[:, None]
-    outward, around = (radius / 0.075) ** order * np.cos(order * angle), -((radius / 0.075) ** order) * np.sin(order * angle) / order
-    shape = np.stack([outward * np.cos(angle) - around * np.sin(angle), outward * np.sin(angle) + around * np.cos(angle), 0 * outward], axis=1)
-    return ModalModel(np.array([2000.0, 5000.0, 8500.0, 12000.0]), np.ones(4), shape, vertex, face, np.zeros(len(face)), 1.0, 1.0)
+    outward, around = (
+        (radius / 0.075) ** order * np.cos(order * angle),
+        -((radius / 0.075) ** order) * np.sin(order * angle) / order,
+    )
+    shape = np.stack(
+        [
+            outward * np.cos(angle) - around * np.sin(angle),
+            outward * np.sin(angle) + around * np.cos(angle),
+            0 * outward,
+        ],
+        axis=1,
+    )
+    return ModalModel(
+        np.array([2000.0, 5000.0, 8500.0, 12000.0]), np.ones(4), shape, vertex, face, np.zeros(len(face)), 1.0, 1.0
+    )
 
 
 def box_shape(*size: float) -> tuple[Shape, ...]:
@@ -225,16 +280,33 @@ def main() -> None:
             model, exact = sphere(0.1, degree)
             errors.append(compare(f"sphere, l = {degree}", model, exact=exact))
     bodies = {
-        "bar 0.24 x 0.01 x 0.01, steel": (box_shape(0.24, 0.01, 0.01), STEEL, box_mesh((0.24, 0.01, 0.01), (60, 2, 2)), 20e3),
-        "plate 0.2 x 0.2 x 0.004, steel": (box_shape(0.2, 0.2, 0.004), STEEL, box_mesh((0.2, 0.2, 0.004), (16, 16, 1)), 8e3),
-        "block 0.1 x 0.06 x 0.04, steel": (box_shape(0.1, 0.06, 0.04), STEEL, box_mesh((0.1, 0.06, 0.04), (15, 9, 6)), 20e3),
+        "bar 0.24 x 0.01 x 0.01, steel": (
+            box_shape(0.24, 0.01, 0.01),
+            STEEL,
+            box_mesh((0.24, 0.01, 0.01), (60, 2, 2)),
+            20e3,
+        ),
+        "plate 0.2 x 0.2 x 0.004, steel": (
+            box_shape(0.2, 0.2, 0.004),
+            STEEL,
+            box_mesh((0.2, 0.2, 0.004), (16, 16, 1)),
+            8e3,
+        ),
+        "block 0.1 x 0.06 x 0.04, steel": (
+            box_shape(0.1, 0.06, 0.04),
+            STEEL,
+            box_mesh((0.1, 0.06, 0.04), (15, 9, 6)),
+            20e3,
+        ),
     }
     for name, (shapes, material, (vertex, face), to_hz) in bodies.items():
         if args.only not in name:
             continue
         model = analyse(shapes, material, to_hz=to_hz)
         chosen = (
-            np.unique(np.round(np.geomspace(1, model.mode_count, args.modes)).astype(int) - 1) if model.mode_count > args.modes else np.arange(model.mode_count)
+            np.unique(np.round(np.geomspace(1, model.mode_count, args.modes)).astype(int) - 1)
+            if model.mode_count > args.modes
+            else np.arange(model.mode_count)
         )
         model = some_modes(model, list(chosen))
         hit, barycentric, _ = nearest(surface_index(model.vertex_m, model.face), vertex, None)

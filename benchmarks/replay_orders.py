@@ -1,12 +1,15 @@
-"""Is a replay what was heard? Random orders of what users do to a world, each played live and replayed from its log, compared bit by bit.
+"""Is a replay what was heard?
+
+Random orders of what users do to a world, each played live and replayed from its log, compared bit by bit.
 
     python benchmarks/replay_orders.py [ORDERS] [SEED]
 
-An order is a list of operations: add, add again, a silent partner, remove, resetSimulation, saveState, restoreState, a body moved by hand, a speed
-that is not a number, a second listener, detach, quench, another time step, steps, a look at the sound under way, disconnect. After each order (and before
-each disconnect) every listener's `sound()` is held against `render_log` of its log in memory and read from a file, its `write` against
-that sound, and its joined frames against the sound they lag behind. Errors of this project and of PyBullet itself may come; any other ends the run.
-Where hypothesis finds an order that differs, it prints the shortest.
+An order is a list of operations: add, add again, a silent partner, remove, resetSimulation, saveState, restoreState, a
+body moved by hand, a speed that is not a number, a second listener, detach, quench, another time step, steps, a look at
+the sound under way, disconnect. After each order (and before each disconnect) every listener's `sound()` is held
+against `render_log` of its log in memory and read from a file, its `write` against that sound, and its joined frames
+against the sound they lag behind. Errors of this project and of PyBullet itself may come; any other ends the run. Where
+hypothesis finds an order that differs, it prints the shortest.
 """
 
 from __future__ import annotations
@@ -43,7 +46,10 @@ Operation = tuple[str, int, int]
 
 @cache
 def plate(material: Material, bent: bool) -> ModalModel:
-    """A box whose corners move as seeded directions say: sounds at once, no finite elements. bent: its modes go with their level."""
+    """A box whose corners move as seeded directions say: sounds at once, no finite elements.
+
+    bent: its modes go with their level.
+    """
     corner = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * np.array(EDGES_M) / 2
     quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
     face = np.array([t for q in quads for t in ((q[0], q[1], q[2]), (q[0], q[2], q[3]))], np.int32)
@@ -53,12 +59,26 @@ def plate(material: Material, bent: bool) -> ModalModel:
     shape = np.random.default_rng(0).normal(size=(8, 3, 3)) / np.sqrt(mass)
     decay = 0.5 * ((material.alpha_per_s or 0.0) + (material.beta_s or 0.0) * (2 * np.pi * freq) ** 2)
     bend, damping_growth = (np.full(3, 0.5), np.full(3, 1.0)) if bent else (None, None)
-    return ModalModel(freq, decay, shape, corner, face, np.zeros(len(face)), volume, mass, bend_s2_m2=bend, damping_growth_s_m=damping_growth)
+    return ModalModel(
+        freq,
+        decay,
+        shape,
+        corner,
+        face,
+        np.zeros(len(face)),
+        volume,
+        mass,
+        bend_s2_m2=bend,
+        damping_growth_s_m=damping_growth,
+    )
 
 
 @dataclass
 class Tally:
-    """What was compared: listeners, those that sounded, with events in their logs, and how far their replay would be off without those (Pa)."""
+    """What was compared:
+
+    listeners, those that sounded, with events in their logs, and how far their replay would be off without those (Pa).
+    """
 
     orders: int = 0
     listeners: int = 0
@@ -108,7 +128,12 @@ class Play:
     def box(self, where: int, speed: int) -> int:
         shape = self.client.createCollisionShape(p.GEOM_BOX, halfExtents=[e / 2 for e in EDGES_M])
         body = int(
-            self.client.createMultiBody(0.4, shape, basePosition=[0.15 * (where % 3), 0, 0.03 + 0.04 * (where // 3)], baseOrientation=[0.1, 0, 0, 0.995])
+            self.client.createMultiBody(
+                0.4,
+                shape,
+                basePosition=[0.15 * (where % 3), 0, 0.03 + 0.04 * (where // 3)],
+                baseOrientation=[0.1, 0, 0, 0.995],
+            )
         )
         self.client.resetBaseVelocity(body, [0.4 * (speed % 3 - 1), 0, -0.3 * speed])
         self.bodies.append(body)
@@ -213,11 +238,16 @@ OPERATIONS: dict[str, Callable[[Play, int, int], None]] = {
 
 
 def orders(most: int = 24) -> st.SearchStrategy[list[Operation]]:
-    """Lists of operations, each with two small numbers. They begin with a fall, and a third are steps of physics, or nothing would sound."""
+    """Lists of operations, each with two small numbers.
+
+    They begin with a fall, and a third are steps of physics, or nothing would sound.
+    """
     small = st.integers(0, 5)
     step = st.tuples(st.just("steps"), small, small)
     other = st.tuples(st.sampled_from([*OPERATIONS, "quench"]), small, small)
-    return st.lists(st.one_of(step, other, other), min_size=6, max_size=most).map(lambda rest: [("add", rest[0][1], 3), ("steps", 5, 1), *rest])
+    return st.lists(st.one_of(step, other, other), min_size=6, max_size=most).map(
+        lambda rest: [("add", rest[0][1], 3), ("steps", 5, 1), *rest]
+    )
 
 
 def compare(ear: Ear, tally: Tally, folder: Path) -> None:
@@ -230,7 +260,9 @@ def compare(ear: Ear, tally: Tally, folder: Path) -> None:
     same(sb.render_log(sb.read_log(str(folder / "log.npz"))), sound, "the replay from a file")
     if sound.shape[1]:
         listener.write(folder / "sound.wav")
-        same(sb.read_audio(str(folder / "sound.wav"))[0].astype(np.float32), sound.astype(np.float32), "the written file")
+        same(
+            sb.read_audio(str(folder / "sound.wav"))[0].astype(np.float32), sound.astype(np.float32), "the written file"
+        )
     if ear.steady and len(ear.frames) > LAG:
         joined = np.concatenate(ear.frames, axis=1)
         lag = sum(frame.shape[1] for frame in ear.frames[:LAG])
@@ -253,7 +285,10 @@ def same(one: Array, other: Array, what: str) -> None:
 
 
 def play(order: Sequence[Operation], tally: Tally, folder: Path) -> None:
-    """Play one order and compare. Raises AssertionError, and what neither this project nor PyBullet raises on purpose."""
+    """Play one order and compare.
+
+    Raises AssertionError, and what neither this project nor PyBullet raises on purpose.
+    """
     tally.orders += 1
     with quiet_stdout(), warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -294,7 +329,9 @@ def main(words: Sequence[str]) -> None:
     print(
         f"{tally.orders} random orders, {tally.listeners} listeners compared ({tally.framed} with their frames), {tally.sounding} of them sounded: replay bit-equal to live"
     )
-    print(f"{tally.eventful} had events in their logs; without those {tally.off_without_events} replays would be off, by up to {tally.most_off_pa:.3g}")
+    print(
+        f"{tally.eventful} had events in their logs; without those {tally.off_without_events} replays would be off, by up to {tally.most_off_pa:.3g}"
+    )
     print(f"{tally.muted} had a body muted; errors of our own and of PyBullet: {tally.errors}")
 
 

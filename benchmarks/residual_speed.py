@@ -1,7 +1,10 @@
-"""How long does a residual's transfer take? `python benchmarks/residual_speed.py`: one core, one run, everything counted.
+"""How long does a residual's transfer take?
 
-From scratch: pairs of modes, shift, stretch and scale of the spectrogram, phases, `ITERATIONS` turns of the inversion, fade: a grain of 0.5 s at 48 kHz for one body and place.
-From the cache: which place it is, the grain found, a fresh variation of it at the strike's level. Between them lies what a new place on a known body costs.
+`python benchmarks/residual_speed.py`: one core, one run, everything counted.
+
+From scratch: pairs of modes, shift, stretch and scale of the spectrogram, phases, `ITERATIONS` turns of the inversion,
+fade: a grain of 0.5 s at 48 kHz for one body and place. From the cache: which place it is, the grain found, a fresh
+variation of it at the strike's level. Between them lies what a new place on a known body costs.
 """
 
 from __future__ import annotations
@@ -31,9 +34,22 @@ def example(modes: int = 60, seed: int = 1) -> tuple[Residual, StruckModes]:
     noise = 1e-7 * np.exp(-8.0 * time_s)[None] * np.ones((50, 1))
     lines = np.sort(random.uniform(300.0, 9000.0, 20))
     residual = Residual(
-        hz, random.uniform(5.0, 60.0, modes), random.uniform(0.05, 1.0, modes), lines, np.full(20, 12.0), np.full(20, 0.05), freq, time_s, noise, 1.0
+        hz,
+        random.uniform(5.0, 60.0, modes),
+        random.uniform(0.05, 1.0, modes),
+        lines,
+        np.full(20, 12.0),
+        np.full(20, 0.05),
+        freq,
+        time_s,
+        noise,
+        1.0,
     )
-    return residual, StruckModes(np.sort(random.uniform(200.0, 16_000.0, modes)), random.uniform(5.0, 60.0, modes), random.uniform(0.05, 1.0, modes))
+    return residual, StruckModes(
+        np.sort(random.uniform(200.0, 16_000.0, modes)),
+        random.uniform(5.0, 60.0, modes),
+        random.uniform(0.05, 1.0, modes),
+    )
 
 
 def once(residual: Residual, target: StruckModes, n: int = SR // 2) -> Array:
@@ -70,7 +86,11 @@ def main() -> int:
     force = np.random.default_rng(2).normal(size=2 * SECTION)
     section_grain(voice, force, power[0], 0)
     rows = [
-        (f"from scratch: transfer and {ITERATIONS} turns of inversion", best(lambda _: once(residual, target), 60), SCRATCH_MS * 1e-3),
+        (
+            f"from scratch: transfer and {ITERATIONS} turns of inversion",
+            best(lambda _: once(residual, target), 60),
+            SCRATCH_MS * 1e-3,
+        ),
         ("a body's voice: two grains and their spectra", best(lambda _: make_voice(residual, target, SR), 20), np.inf),
         ("a new place on a known body", best(lambda k: placed(voice, power[k + 1], 1e-4, False, flat), 200), np.inf),
         ("from the cache: place, grain, fresh variation", best(strike, 2000), CACHE_US * 1e-6),
@@ -78,7 +98,10 @@ def main() -> int:
     ]
     print(f"{'0.5 s at 48 kHz, 60 modes':58s} {'least':>10s} {'median':>10s} {'allowed':>9s}")
     for name, (least, median), most in rows:
-        print(f"{name:58s} {1e6 * least:8.0f} µs {1e6 * median:8.0f} µs " + (f"{1e6 * most:6.0f} µs" if np.isfinite(most) else ""))
+        print(
+            f"{name:58s} {1e6 * least:8.0f} µs {1e6 * median:8.0f} µs "
+            + (f"{1e6 * most:6.0f} µs" if np.isfinite(most) else "")
+        )
     return int(any(median > most for _, (_, median), most in rows))
 
 

@@ -1,10 +1,13 @@
-"""Does the residual bring the sound nearer to recordings that were not fitted? `python benchmarks/residual_table.py [practice] [measured] [NAME …]`
+"""Does the residual bring the sound nearer to recordings that were not fitted?
 
-Practice cases: fit and residual from the 'fit' strikes, judged on 'holdout' strikes, at the amplitudes that the fitted model predicts.
-Measured objects with two recordings or more have no mesh: their features stand in for modes. Modes are the damped sinusoids that the first half of the strikes
-share, with the mean of their amplitudes; a strike of the second half is predicted by them at the strike's own level (one gain a strike, the same with and without
-the residual). Distance: `estimator.lines.log_spectral.log_spectral_db` (dB, cells 10 dB above the recording's noise), each prediction given that noise; with the residual, the mean over
-three grains of its noise.
+`python benchmarks/residual_table.py [practice] [measured] [NAME …]`
+
+Practice cases: fit and residual from the 'fit' strikes, judged on 'holdout' strikes, at the amplitudes that the fitted
+model predicts. Measured objects with two recordings or more have no mesh: their features stand in for modes. Modes are
+the damped sinusoids that the first half of the strikes share, with the mean of their amplitudes; a strike of the second
+half is predicted by them at the strike's own level (one gain a strike, the same with and without the residual).
+Distance: `estimator.lines.log_spectral.log_spectral_db` (dB, cells 10 dB above the recording's noise), each prediction
+given that noise; with the residual, the mean over three grains of its noise.
 """
 
 from __future__ import annotations
@@ -45,7 +48,9 @@ def judged(name: str, sound: Array, sr: int, modes: tuple[Array, Array, Array], 
     """Distances without and with the residual, and of the noise alone."""
     plain = damped(*modes, len(sound), sr)
     grains = [residual_sound(strikes.residual, *modes, len(sound), sr, seed) for seed in range(GRAINS)]
-    without, *beside = (log_spectral_db(sound, with_noise(plain + x, floor, 1), floor) for x in (np.zeros(len(sound)), *grains))
+    without, *beside = (
+        log_spectral_db(sound, with_noise(plain + x, floor, 1), floor) for x in (np.zeros(len(sound)), *grains)
+    )
     return name, without, float(np.mean(beside)), noise_floor_db(plain, floor)
 
 
@@ -55,9 +60,20 @@ def of_case(folder: Path) -> Iterator[Row]:
     strikes = case_strikes(found)
     floor = Floor(np.mean([floor_of(x).variance for x in strikes.left], axis=0))
     for recording in found.case.recordings:
-        if recording.split == "holdout" and recording.file is not None and recording.object == found.objects[0].evidence.thing.name:
+        if (
+            recording.split == "holdout"
+            and recording.file is not None
+            and recording.object == found.objects[0].evidence.thing.name
+        ):
             sound, sr = read_audio(recording.file)
-            yield judged(f"{folder.name} {recording.file.stem}", sound[recording.channel], sr, strike_modes(found, recording, sr), strikes, floor)
+            yield judged(
+                f"{folder.name} {recording.file.stem}",
+                sound[recording.channel],
+                sr,
+                strike_modes(found, recording, sr),
+                strikes,
+                floor,
+            )
 
 
 def of_object(name: str, sounds: list[Array], sr: int) -> Iterator[Row]:
@@ -70,7 +86,9 @@ def of_object(name: str, sounds: list[Array], sr: int) -> Iterator[Row]:
     decay, size = np.nan_to_num(lines.decay_per_s), np.abs(lines.amplitude)
     level = np.sqrt((size**2).sum(axis=1))
     mean = np.sqrt(((size / level[:, None]) ** 2).mean(axis=0)) * np.exp(1j * np.angle(lines.amplitude[0]))
-    strikes = strikes_of(signals, left, sr, (lines.freq_hz, decay, lines.amplitude), (lines.freq_hz, decay, level[:, None] * mean), name)
+    strikes = strikes_of(
+        signals, left, sr, (lines.freq_hz, decay, lines.amplitude), (lines.freq_hz, decay, level[:, None] * mean), name
+    )
     floor = Floor(np.mean([floor_of(x).variance for x in left], axis=0))
     base = damped(lines.freq_hz, decay, mean, count, sr)
     noise = float(floor.variance.mean()) * count
@@ -86,13 +104,22 @@ def measured() -> Iterator[tuple[str, list[Array], int]]:
         groups: dict[str, list[Array]] = {}
         rate = 0
         for entry in json.loads((folder / "case.json").read_text()).get("files", []):
-            if not isinstance(entry, dict) or not entry.get("file", "").endswith((".flac", ".npz")) or not (folder / entry["file"]).is_file():
+            if (
+                not isinstance(entry, dict)
+                or not entry.get("file", "").endswith((".flac", ".npz"))
+                or not (folder / entry["file"]).is_file()
+            ):
                 continue
-            name = next((str(entry[key]) for key in ("object", "specimen", "bell", "stroke", "bar") if key in entry), entry["file"])
+            name = next(
+                (str(entry[key]) for key in ("object", "specimen", "bell", "stroke", "bar") if key in entry),
+                entry["file"],
+            )
             name = f"{folder.name}: {name.split('(')[0].strip()}" + (f", {entry['tool']}" if "tool" in entry else "")
             if entry["file"].endswith(".npz"):
                 with np.load(folder / entry["file"]) as data:
-                    groups.setdefault(f"{folder.name}: part", []).extend(_from_onset(x - x.mean(), 25600) for x in data["accel"])
+                    groups.setdefault(f"{folder.name}: part", []).extend(
+                        _from_onset(x - x.mean(), 25600) for x in data["accel"]
+                    )
                 rate = 25600
                 continue
             sound, rate = read_audio(folder / entry["file"])
@@ -125,7 +152,9 @@ def main(words: list[str]) -> int:
             print(f"{name:48s} {without:7.2f} {beside:10.2f} {without - beside:7.2f} {noise:6.2f}")
         change = float(np.mean([beside - without for _, without, beside, _ in got]))
         count, bad = count + 1, bad + (not change < most)
-        print(f"{'':14s}mean {-change:.2f} dB nearer; {time.process_time() - begun:.1f} s of processor time", flush=True)
+        print(
+            f"{'':14s}mean {-change:.2f} dB nearer; {time.process_time() - begun:.1f} s of processor time", flush=True
+        )
 
     if "practice" in kinds:
         for folder in sorted((SHARED / "practice").glob("practice-*")):

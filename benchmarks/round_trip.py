@@ -2,11 +2,12 @@
 
     python benchmarks/round_trip.py --data ../shared/practice [OBJECT ...]
 
-Each object is played at a microphone and at a vibrometer, with noise 90 dB below the peak. Lines of both renders that are the same mode are compared: their
-decays must agree within 3 %, their levels within 0.5 dB. A mode is identified where it stands three widths apart from its neighbours and a line lies on it whose
-decay is known to 0.5 %; of a bowl, whose twins its mesh tears, there are few. Beside that, decays and levels that the run time plays are compared of all modes,
-heard or not, in levels those nearer than a width as one. `thick` fits a plate and plays the preset on one
-twice as thick, beside the true material there: 5 %.
+Each object is played at a microphone and at a vibrometer, with noise 90 dB below the peak. Lines of both renders that
+are the same mode are compared: their decays must agree within 3 %, their levels within 0.5 dB. A mode is identified
+where it stands three widths apart from its neighbours and a line lies on it whose decay is known to 0.5 %; of a bowl,
+whose twins its mesh tears, there are few. Beside that, decays and levels that the run time plays are compared of all
+modes, heard or not, in levels those nearer than a width as one. `thick` fits a plate and plays the preset on one twice
+as thick, beside the true material there: 5 %.
 """
 
 from __future__ import annotations
@@ -44,7 +45,8 @@ NOISE = 10 ** (-90 / 20)
 MICROPHONE_M = 0.5
 LIMIT_DECAY, LIMIT_THICK, LIMIT_DB = 0.03, 0.05, 0.5
 PUSH_S = 3e-3  # after the onset: while it is pushed, a body does not ring freely
-APART, DEGENERATE = 3.0, 0.1  # widths d/π between modes: nearer ones ring as one line, whose decay is no mode's; but for twins, which decay alike
+# widths d/π between modes: nearer ones ring as one line, whose decay is no mode's; but for twins, which decay alike
+APART, DEGENERATE = 3.0, 0.1
 NEAR = 0.3  # of a width: a line that is the mode
 KNOWN = 5e-3  # relative spread of a decay that is known
 ROOT = Path(__file__).parents[1]
@@ -64,7 +66,22 @@ class Trial:
 def box_obj(path: Path, size_m: tuple[float, float, float]) -> Path:
     """A box as an OBJ file."""
     corner = (np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], float) - 0.5) * size_m
-    face = np.array([[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]])
+    face = np.array(
+        [
+            [0, 1, 3],
+            [0, 3, 2],
+            [4, 6, 7],
+            [4, 7, 5],
+            [0, 4, 5],
+            [0, 5, 1],
+            [2, 3, 7],
+            [2, 7, 6],
+            [0, 2, 6],
+            [0, 6, 4],
+            [1, 5, 7],
+            [1, 7, 3],
+        ]
+    )
     rows = [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in corner] + [f"f {a} {b} {c}" for a, b, c in face + 1]
     path.write_text("\n".join(rows) + "\n")
     return path
@@ -72,7 +89,10 @@ def box_obj(path: Path, size_m: tuple[float, float, float]) -> Path:
 
 def trials(data: Path | None, folder: Path) -> list[Trial]:
     """The bar of scenes/bar.py, the bowl of assets, and the first object of each practice case that is there."""
-    made = [Trial("bar", box_obj(folder / "bar.obj", (0.24, 0.01, 0.01)), "steel"), Trial("bowl", ROOT / "assets" / "bowl.obj", "porcelain")]
+    made = [
+        Trial("bar", box_obj(folder / "bar.obj", (0.24, 0.01, 0.01)), "steel"),
+        Trial("bowl", ROOT / "assets" / "bowl.obj", "porcelain"),
+    ]
     for case in sorted(data.glob("practice-*/case.json")) if data else ():
         name, thing = next(iter(json.loads(case.read_text())["objects"].items()))
         made.append(Trial(f"{case.parent.name} {name}", case.parent / thing["mesh"], thing["material"]))
@@ -80,11 +100,14 @@ def trials(data: Path | None, folder: Path) -> list[Trial]:
 
 
 def places(model: ModalModel) -> Places:
-    """Where it is struck and where a vibrometer looks, (3,) each, with the outward normals there: two vertices far from each other, on faces that look alike."""
+    """Where it is struck and where a vibrometer looks, (3,) each, with the outward normals there: two vertices far from
+    each other, on faces that look alike.
+    """
     from sonic_bullet.effects.common.points import vertex_normals
 
     normal = vertex_normals(model)
-    flat = np.abs(np.einsum("fi,fci->fc", face_normals(model), normal[model.face])).min(axis=1) > 0.99  # edges and corners face nowhere
+    # edges and corners face nowhere
+    flat = np.abs(np.einsum("fi,fci->fc", face_normals(model), normal[model.face])).min(axis=1) > 0.99
     inner = np.unique(model.face[flat])
     middle = model.vertex_m[inner].mean(axis=0)
     direction = np.linalg.svd(model.vertex_m[inner] - middle, full_matrices=False)[2]
@@ -112,11 +135,27 @@ def rendered(model: ModalModel, material: Material, sensor: str, at: Places) -> 
     """The strike's sound (n,) at the sensor: a silent partner pushes once, into the surface."""
     place, out, look, along = at
     striker = Body(1, -1, 0, "striker", 0.0, np.zeros((3, 3)))
-    eye: Microphone | Vibrometer = Vibrometer(0, look, along) if sensor == "velocity" else Microphone(MICROPHONE_M * np.array([0.36, 0.48, 0.8]))
+    eye: Microphone | Vibrometer = (
+        Vibrometer(0, look, along) if sensor == "velocity" else Microphone(MICROPHONE_M * np.array([0.36, 0.48, 0.8]))
+    )
     poses, upright = np.zeros((2, 3)), np.tile([0.0, 0.0, 0.0, 1.0], (2, 1))
     still, touching = np.zeros((1, 3)), np.zeros(1)
-    hit = Contacts(np.array([0]), np.array([1]), place[None], place[None], -out[None], -IMPULSE_N_S * out[None], still, np.zeros((1, 2)), np.ones(1), touching)
-    steps = [Step(STEP_S, poses, upright, np.zeros(2, bool), hit if i == 4 else Contacts.none()) for i in range(round(SECONDS / STEP_S))]
+    hit = Contacts(
+        np.array([0]),
+        np.array([1]),
+        place[None],
+        place[None],
+        -out[None],
+        -IMPULSE_N_S * out[None],
+        still,
+        np.zeros((1, 2)),
+        np.ones(1),
+        touching,
+    )
+    steps = [
+        Step(STEP_S, poses, upright, np.zeros(2, bool), hit if i == 4 else Contacts.none())
+        for i in range(round(SECONDS / STEP_S))
+    ]
     (sound,) = render_log(ContactLog((body_of(model, material), striker), tuple(steps), (eye,), SR, 0))
     return np.asarray(sound)
 
@@ -153,7 +192,8 @@ def triple(vector: Array) -> tuple[float, float, float]:
 
 
 def identified(lines: Lines, model: ModalModel, decay: Array) -> Array:
-    """The line (m,) that each mode of a model is, -1 where none is: of modes, or twins, that stand apart from their neighbours, lines of known decay.
+    """The line (m,) that each mode of a model is, -1 where none is: of modes, or twins, that stand apart from their
+    neighbours, lines of known decay.
 
     Apart by their frequencies and widths alone, so that what is compared, decays and levels, has no say in it.
     """
@@ -171,7 +211,9 @@ def identified(lines: Lines, model: ModalModel, decay: Array) -> Array:
 
 
 def compared(first: Lines, again: Lines, which: tuple[Array, Array]) -> tuple[int, float, float]:
-    """Modes that lines of both renders are, which (m,) each: how many, and the worst of their decays (relative) and levels (dB)."""
+    """Modes that lines of both renders are, which (m,) each: how many, and the worst of their decays (relative) and
+    levels (dB).
+    """
     m = min(len(x) for x in which)
     both = np.flatnonzero((which[0][:m] >= 0) & (which[1][:m] >= 0))
     one, two = (x[both] for x in which)
@@ -180,7 +222,9 @@ def compared(first: Lines, again: Lines, which: tuple[Array, Array]) -> tuple[in
     return len(both), float(decay.max(initial=0.0)), float(level.max(initial=0.0))
 
 
-def played(model: ModalModel, material: Material, sensor: str = "pressure", at: Places | None = None) -> tuple[Array, Array]:
+def played(
+    model: ModalModel, material: Material, sensor: str = "pressure", at: Places | None = None
+) -> tuple[Array, Array]:
     """Decays (m,) that the run time plays, and what the strike starts each mode with at the sensor (m,)."""
     eye = (Vibrometer(0, at[2], at[3]),) if at is not None and sensor == "velocity" else ()
     resonator = build_resonator(body_of(model, material), eye, 4 * SR, Air())
@@ -197,7 +241,9 @@ def off(a: Array, b: Array, to_hz: Array) -> float:
 
 
 def off_db(a: Array, b: Array, freq_hz: Array, decay: Array) -> float:
-    """Largest difference of levels, of modes nearer than a width taken together, from the strongest down to 60 dB below."""
+    """Largest difference of levels, of modes nearer than a width taken together, from the strongest down to 60 dB
+    below.
+    """
     m = min(len(a), len(b), int((freq_hz < 20_000).sum()))
     step = np.diff(freq_hz[:m]) / (np.maximum(decay[1:m], decay[: m - 1]) / np.pi)
     start = np.concatenate([[0], np.flatnonzero(step > 1) + 1])
@@ -207,7 +253,9 @@ def off_db(a: Array, b: Array, freq_hz: Array, decay: Array) -> float:
 
 
 def around(trial: Trial, sensor: str, folder: Path) -> tuple[int, float, float, float, float]:
-    """Modes identified in both, their worst decay and level, and the worst decay and level of all modes that are played."""
+    """Modes identified in both, their worst decay and level, and the worst decay and level of all modes that are
+    played.
+    """
     shape = modal.read_mesh(trial.mesh)
     truth = load_material(trial.material)
     model = modal.analyse((shape,), truth)
@@ -223,7 +271,9 @@ def around(trial: Trial, sensor: str, folder: Path) -> tuple[int, float, float, 
     return *compared(*lines, which), off(one, two, model.freq_hz), off_db(first, second, model.freq_hz, one)
 
 
-def thicker(folder: Path, sensor: str, name: str = "glass", size_m: tuple[float, float, float] = (0.2, 0.15, 0.004)) -> float:
+def thicker(
+    folder: Path, sensor: str, name: str = "glass", size_m: tuple[float, float, float] = (0.2, 0.15, 0.004)
+) -> float:
     """Worst decay of a plate twice as thick, played with what was fitted on the thin one."""
     thin = Trial("plate", box_obj(folder / "thin.obj", size_m), name)
     truth, shape = load_material(name), modal.read_mesh(thin.mesh)
@@ -241,7 +291,9 @@ def main() -> int:
     parser.add_argument("objects", nargs="*", metavar="OBJECT", help="parts of names; 'thick' for the plates")
     asked = parser.parse_args()
     missed = 0
-    print("| object | sensor | modes | decay % | level dB | all modes' decay % | level dB | | wall s |\n|---|---|---|---|---|---|---|---|---|")
+    print(
+        "| object | sensor | modes | decay % | level dB | all modes' decay % | level dB | | wall s |\n|---|---|---|---|---|---|---|---|---|"
+    )
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
         for trial in trials(asked.data, folder):
@@ -266,7 +318,10 @@ def main() -> int:
             for sensor in ("pressure", "velocity"):
                 worst = thicker(folder, sensor, name)
                 missed += not worst <= LIMIT_THICK
-                print(f"| {name} plate, twice as thick | {sensor} | | | | {100 * worst:.2f} | | {'met' if worst <= LIMIT_THICK else 'missed'} | |", flush=True)
+                print(
+                    f"| {name} plate, twice as thick | {sensor} | | | | {100 * worst:.2f} | | {'met' if worst <= LIMIT_THICK else 'missed'} | |",
+                    flush=True,
+                )
     print(f"\n{missed} missed")
     return 1 if missed else 0
 

@@ -2,14 +2,17 @@
 
     python benchmarks/scene_all.py [NAME …]
 
-scenes/NAME.json -> `claims` -> (claim, measured, low, high). Each measurement is a range [low, high] under its name; "why" says where it comes from.
+scenes/NAME.json -> `claims` -> (claim, measured, low, high). Each measurement is a range [low, high] under its name;
+    "why" says where it comes from.
 
     first_strike_s, strikes         of all sounding bodies, as `picture.find_events` finds them
     peak_db_spl                     20 log10(peak / 20 µPa) over all channels
-    sound_j                         Σp² 4πr²/(ρ₀c sr): energy that left as sound, r from the origin to the first microphone
+    sound_j
+        Σp² 4πr²/(ρ₀c sr): energy that left as sound, r from the origin to the first microphone
     moves_m: {body: range}          how far it got from its first place
     lowest_m                        the lowest place of any body: what falls off the table falls far
-    silent_bodies                   sounding bodies that nothing ever touched after the first 0.1 s, or without a contact at all
+    silent_bodies
+        sounding bodies that nothing ever touched after the first 0.1 s, or without a contact at all
     end_below_db                    how far the last 0.1 s lies below the loudest 0.1 s
     strongest_hz                    the highest line of the whole spectrum
     line_below_db: {hz: range}      how far the highest line within 2 % of hz lies below the strongest
@@ -74,7 +77,10 @@ def claims(result: RenderResult, told: dict[str, Any]) -> Iterator[Claim]:
         "sound_j": lambda: _sound_j(result),
         "lowest_m": lambda: float(places(log)[..., 2].min()),
         "silent_bodies": lambda: float(untouched(log)),
-        "end_below_db": lambda: max(rms_db(samples, sr, t, t + 0.1) for t in np.arange(0, seconds - 0.1, 0.05)) - rms_db(samples, sr, seconds - 0.1, seconds),
+        "end_below_db": lambda: (
+            max(rms_db(samples, sr, t, t + 0.1) for t in np.arange(0, seconds - 0.1, 0.05))
+            - rms_db(samples, sr, seconds - 0.1, seconds)
+        ),
         "strongest_hz": lambda: float(freq[np.argmax(size)]),
     }
     for name, measure in simple.items():
@@ -113,7 +119,9 @@ def main(names: list[str]) -> int:
         begin = time.perf_counter()
         found = list(claims(render_scene(SCENES / f"{name}.py"), expected(name)))
         for claim in found:
-            print(f"{'ok  ' if holds(claim) else 'FAIL'} {name:10s} {claim[0]:22s} {claim[1]:12.4g}   in {claim[2]:g} … {claim[3]:g}")
+            print(
+                f"{'ok  ' if holds(claim) else 'FAIL'} {name:10s} {claim[0]:22s} {claim[1]:12.4g}   in {claim[2]:g} … {claim[3]:g}"
+            )
         failed += sum(not holds(claim) for claim in found)
         print(f"     {name:10s} {len(found)} claims in {time.perf_counter() - begin:.1f} s")
     return int(failed > 0)

@@ -2,8 +2,9 @@
 
     python benchmarks/surface_law.py
 
-Exponents n (level against speed, 0.05 … 2 m/s) and m (against roughness, 0.1 … 20 µm), smallest and largest over the other quantity,
-and how much they drift from its smallest to its largest value; of the force and of the sound of a body with 12 modes.
+Exponents n (level against speed, 0.05 … 2 m/s) and m (against roughness, 0.1 … 20 µm), smallest and largest over the
+other quantity, and how much they drift from its smallest to its largest value; of the force and of the sound of a body
+with 12 modes.
 """
 
 from __future__ import annotations
@@ -40,7 +41,15 @@ for name, (mass, modulus, radius, zeta) in CASES.items():
     p = len(v)
     rough = np.stack([0 * h, h], 1)
     each = np.ones(p)
-    pairs = SurfacePairs(mass * each, modulus * each, radius * each, zeta * each, rough, np.full((p, 2), 0.75), np.arange(2 * p).reshape(p, 2))
+    pairs = SurfacePairs(
+        mass * each,
+        modulus * each,
+        radius * each,
+        zeta * each,
+        rough,
+        np.full((p, 2), 0.75),
+        np.arange(2 * p).reshape(p, 2),
+    )
     loads, state, out = SurfaceLoads(9.81 * pairs.mass_kg, np.stack([v, v], 1)), SurfaceState.at_rest(p), []
     for _ in range(60):
         force, state = advance(pairs, state, loads, loads, np.arange(960) / 960, SR)
@@ -51,6 +60,9 @@ for name, (mass, modulus, radius, zeta) in CASES.items():
         level = np.log(observed[:, 4800:].std(1)).reshape(len(ROUGH), len(SPEED))
         n = [np.polyfit(np.log(SPEED), row, 1)[0] for row in level]
         m = [np.polyfit(np.log(ROUGH), column, 1)[0] for column in level.T]
-        fit = min([np.corrcoef(np.log(SPEED), row)[0, 1] ** 2 for row in level] + [np.corrcoef(np.log(ROUGH), c)[0, 1] ** 2 for c in level.T])
+        fit = min(
+            [np.corrcoef(np.log(SPEED), row)[0, 1] ** 2 for row in level]
+            + [np.corrcoef(np.log(ROUGH), c)[0, 1] ** 2 for c in level.T]
+        )
         line += f" | {what} n {min(n):.2f}…{max(n):.2f} drift {n[-1] - n[0]:+.2f}, m {min(m):.2f}…{max(m):.2f} drift {m[-1] - m[0]:+.2f}, R² ≥ {fit:.3f}"
     print(line)

@@ -13,7 +13,15 @@ from sonic_bullet.synth.surface import SurfaceLoads, SurfacePairs, SurfaceState,
 
 P, SR, STEP = 100, 48000, 200
 ONE = np.ones(P)
-PAIRS = SurfacePairs(0.033 * ONE, 5e10 * ONE, 0.01 * ONE, 0.25 * ONE, np.full((P, 2), 1e-6), np.full((P, 2), 0.75), np.arange(2 * P).reshape(P, 2))
+PAIRS = SurfacePairs(
+    0.033 * ONE,
+    5e10 * ONE,
+    0.01 * ONE,
+    0.25 * ONE,
+    np.full((P, 2), 1e-6),
+    np.full((P, 2), 0.75),
+    np.arange(2 * P).reshape(P, 2),
+)
 
 
 def share(sides: int, speed_m_s: float) -> float:
@@ -31,5 +39,7 @@ def share(sides: int, speed_m_s: float) -> float:
 
 share(1, 0.1)
 for speed in (0.05, 0.5, 2.0):
-    print(f"{speed:4.2f} m/s: rolling (two surfaces) {share(2, speed):.2f}, sliding (one surface) {share(1, speed):.2f} of real time")
+    print(
+        f"{speed:4.2f} m/s: rolling (two surfaces) {share(2, speed):.2f}, sliding (one surface) {share(1, speed):.2f} of real time"
+    )
 print(f"at rest: {share(2, 0.0):.3f}")

@@ -27,7 +27,9 @@ if str(REPO) not in sys.path:
 PLACE = REPO / "docs" / "reference"
 MADE = "<!-- Made by `make docs` of the code; change it there. -->"
 WIDTH = 100
-FIELD = re.compile(r"(?<=[.;])\s+(?=[a-z_]\w*\*?(?:(?:, | and )[a-z_]\w*)*(?: \([^)]*\))*[^.:]{0,40}: )")  # where a docstring goes on to its next field
+FIELD = re.compile(
+    r"(?<=[.;])\s+(?=[a-z_]\w*\*?(?:(?:, | and )[a-z_]\w*)*(?: \([^)]*\))*[^.:]{0,40}: )"
+)  # where a docstring goes on to its next field
 
 API = (
     ("sonic_bullet", "What `import sonic_bullet` offers.", None),
@@ -60,7 +62,9 @@ def api_page() -> str:
 
 def classes_of(module: ModuleType) -> list[str]:
     """The public classes that a module defines, in its order."""
-    own = (name for name, thing in vars(module).items() if inspect.isclass(thing) and thing.__module__ == module.__name__)
+    own = (
+        name for name, thing in vars(module).items() if inspect.isclass(thing) and thing.__module__ == module.__name__
+    )
     return [name for name in own if not name.startswith("_")]
 
 
@@ -77,7 +81,13 @@ def entry(name: str, thing: Any, depth: int) -> Iterator[str]:
     yield from described(thing)
     if inspect.isclass(thing) and not issubclass(thing, enum.Enum | BaseException):
         for part, method in vars(thing).items():
-            plain = method.__func__ if isinstance(method, classmethod | staticmethod) else method.fget if isinstance(method, property) else method
+            plain = (
+                method.__func__
+                if isinstance(method, classmethod | staticmethod)
+                else method.fget
+                if isinstance(method, property)
+                else method
+            )
             if part.startswith("_") or not inspect.isfunction(plain) or not plain.__doc__:
                 continue
             yield ""
@@ -132,12 +142,18 @@ def signature_of(name: str, thing: Any) -> list[str]:
         return []
     arguments = [argument(p) for p in source.parameters.values() if p.name not in ("self", "cls")]
     starred, seen = [], False
-    for p, text in zip([p for p in source.parameters.values() if p.name not in ("self", "cls")], arguments, strict=True):
+    for p, text in zip(
+        [p for p in source.parameters.values() if p.name not in ("self", "cls")], arguments, strict=True
+    ):
         if p.kind is p.KEYWORD_ONLY and not seen:
             starred.append("*")
             seen = True
         starred.append(text)
-    back = "" if inspect.isclass(thing) or source.return_annotation is source.empty else f" -> {plain(source.return_annotation)}"
+    back = (
+        ""
+        if inspect.isclass(thing) or source.return_annotation is source.empty
+        else f" -> {plain(source.return_annotation)}"
+    )
     whole = f"{name}({', '.join(starred)}){back}"
     return [whole] if len(whole) <= WIDTH else [f"{name}(", *(f"    {text}," for text in starred), f"){back}"]
 
@@ -168,7 +184,9 @@ def commands_page() -> str:
         "",
         "`sonic-bullet COMMAND --help` says the same. Exit codes: 0 done; 2 one line on stderr says what is wrong;",
     ]
-    parts += ["130 or 143 stopped, with what was rendered so far closed as a valid file. `--json` alone writes JSON to stdout."]
+    parts += [
+        "130 or 143 stopped, with what was rendered so far closed as a valid file. `--json` alone writes JSON to stdout."
+    ]
     for path, command in walked("sonic-bullet", cli):
         context = click.Context(command, info_name=path, terminal_width=WIDTH, max_content_width=WIDTH)
         text = "\n".join(line.rstrip() for line in command.get_help(context).splitlines())
@@ -207,7 +225,13 @@ def case_fields() -> str:
         ]
         required = part.get("required", ())
         for field, about in part["properties"].items():
-            default = "required" if field in required else f"`{json.dumps(about.get('default'))}`" if about.get("default") not in ({}, []) else "empty"
+            default = (
+                "required"
+                if field in required
+                else f"`{json.dumps(about.get('default'))}`"
+                if about.get("default") not in ({}, [])
+                else "empty"
+            )
             parts.append(f"| `{field}` | {kind_of(about)} | {default} | {about.get('description', '')} |")
         parts.append("")
     return "\n".join(parts).strip()
@@ -227,7 +251,9 @@ def kind_of(about: dict[str, Any]) -> str:
     if "anyOf" in about:
         return " or ".join(kind_of(one) for one in about["anyOf"])
     if about.get("type") == "array":
-        return f"{len(about['prefixItems'])} numbers" if "prefixItems" in about else f"list of {kind_of(about['items'])}"
+        return (
+            f"{len(about['prefixItems'])} numbers" if "prefixItems" in about else f"list of {kind_of(about['items'])}"
+        )
     if about.get("type") == "object":
         inner = about.get("additionalProperties")
         return f"object of {kind_of(inner)}" if isinstance(inner, dict) else "object"
@@ -236,7 +262,9 @@ def kind_of(about: dict[str, Any]) -> str:
 
 def between(page: str, mark: str, text: str) -> str:
     """A page with another text between `<!-- mark -->` and `<!-- end -->`. Raises ValueError where it has no such place."""
-    found, count = re.subn(rf"(<!-- {mark} -->\n).*?(<!-- end -->)", lambda m: f"{m[1]}\n{text}\n\n{m[2]}", page, count=1, flags=re.S)
+    found, count = re.subn(
+        rf"(<!-- {mark} -->\n).*?(<!-- end -->)", lambda m: f"{m[1]}\n{text}\n\n{m[2]}", page, count=1, flags=re.S
+    )
     if not count:
         raise ValueError(f"no place <!-- {mark} --> … <!-- end -->")
     return found

@@ -1,6 +1,8 @@
-"""A KUKA arm of pybullet_data sweeps low over a table: it knocks a row of dominoes over, then pushes a mug into a rubber duck.
+"""A KUKA arm of pybullet_data sweeps low over a table: it knocks a row of dominoes over, then pushes a mug into a
+rubber duck.
 
-The flange that meets the dominoes is silent (its mesh, link_7.stl, has no tetrahedra yet); the wrist that meets the mug sounds.
+The flange that meets the dominoes is silent (its mesh, link_7.stl, has no tetrahedra yet); the wrist that meets the mug
+sounds.
 """
 
 import math
@@ -12,21 +14,29 @@ import sonic_bullet as sb
 SECONDS = 4.0
 MICROPHONE = (0.6, -0.8, 0.5)
 WRIST = 5
-REST = [-0.6, 1.22, 0.0, -1.383, 0.0, 0.538, 0.0]  # flange 0.6 m from the base, pointing down, its rim 3 to 9 cm above the table
+# flange 0.6 m from the base, pointing down, its rim 3 to 9 cm above the table
+REST = [-0.6, 1.22, 0.0, -1.383, 0.0, 0.538, 0.0]
 SWEEP_RAD, BEGIN_S, SWEEP_S = 1.1, 0.2, 1.8
 
 
 def build(client):
     client.setGravity(0, 0, -9.81)
     client.setAdditionalSearchPath(pybullet_data.getDataPath())
-    table = client.createMultiBody(0, client.createCollisionShape(client.GEOM_BOX, halfExtents=[0.35, 0.5, 0.015]), basePosition=[0.6, 0, -0.015])
+    table = client.createMultiBody(
+        0, client.createCollisionShape(client.GEOM_BOX, halfExtents=[0.35, 0.5, 0.015]), basePosition=[0.6, 0, -0.015]
+    )
     arm = client.loadURDF("kuka_iiwa/model.urdf", [0, 0, 0], useFixedBase=True)
     for joint, angle in enumerate(REST):
         client.resetJointState(arm, joint, angle)
     cast = {table: {"material": "wood", "count": 80}, (arm, WRIST): "aluminium"}
     for i in range(8):
-        domino = client.loadURDF("domino/domino.urdf", [0.6 - 0.003 * i, -0.05 + 0.028 * i, 0.0254], client.getQuaternionFromEuler([0, 0, math.pi / 2]))
-        client.changeDynamics(domino, -1, mass=0.0098, localInertiaDiagonal=[2.6e-6, 2.1e-6, 5.6e-7])  # plastic; the file says 1 kg·m²
+        domino = client.loadURDF(
+            "domino/domino.urdf",
+            [0.6 - 0.003 * i, -0.05 + 0.028 * i, 0.0254],
+            client.getQuaternionFromEuler([0, 0, math.pi / 2]),
+        )
+        # plastic; the file says 1 kg·m²
+        client.changeDynamics(domino, -1, mass=0.0098, localInertiaDiagonal=[2.6e-6, 2.1e-6, 5.6e-7])
         cast[domino] = "plastic"
     mug = client.loadURDF("objects/mug.urdf", [0.51, 0.31, 0.003])
     client.changeDynamics(mug, -1, mass=0.35, localInertiaDiagonal=[5e-4, 5e-4, 5e-4])

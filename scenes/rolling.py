@@ -1,4 +1,7 @@
-"""A steel ball rolls along two boards: the first is smooth, the second, from x = 0 on, is forty times rougher. The seam is level."""
+"""A steel ball rolls along two boards: the first is smooth, the second, from x = 0 on, is forty times rougher.
+
+The seam is level.
+"""
 
 import math
 
@@ -17,7 +20,9 @@ def build(client):
     smooth = client.createMultiBody(0, shape, basePosition=[-half[0], 0, -half[2]])
     rough = client.createMultiBody(0, shape, basePosition=[half[0], 0, -half[2]])
     mass = 7850 * 4 / 3 * math.pi * RADIUS_M**3
-    ball = client.createMultiBody(mass, client.createCollisionShape(client.GEOM_SPHERE, radius=RADIUS_M), basePosition=[-1.0, 0, RADIUS_M])
+    ball = client.createMultiBody(
+        mass, client.createCollisionShape(client.GEOM_SPHERE, radius=RADIUS_M), basePosition=[-1.0, 0, RADIUS_M]
+    )
     for body in (smooth, rough, ball):
         client.changeDynamics(body, -1, lateralFriction=0.6, linearDamping=0, angularDamping=0)
     client.resetBaseVelocity(ball, [SPEED_M_S, 0, 0], [0, SPEED_M_S / RADIUS_M, 0])

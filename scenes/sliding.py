@@ -9,9 +9,15 @@ HALF_M = [0.04, 0.03, 0.02]
 
 def build(client):
     client.setGravity(0, 0, -9.81)
-    board = client.createMultiBody(0, client.createCollisionShape(client.GEOM_BOX, halfExtents=[0.8, 0.2, 0.01]), basePosition=[0, 0, -0.01])
+    board = client.createMultiBody(
+        0, client.createCollisionShape(client.GEOM_BOX, halfExtents=[0.8, 0.2, 0.01]), basePosition=[0, 0, -0.01]
+    )
     volume = 8 * HALF_M[0] * HALF_M[1] * HALF_M[2]
-    box = client.createMultiBody(700 * volume, client.createCollisionShape(client.GEOM_BOX, halfExtents=HALF_M), basePosition=[-0.5, 0, HALF_M[2]])
+    box = client.createMultiBody(
+        700 * volume,
+        client.createCollisionShape(client.GEOM_BOX, halfExtents=HALF_M),
+        basePosition=[-0.5, 0, HALF_M[2]],
+    )
     client.changeDynamics(board, -1, lateralFriction=0.6)
     client.changeDynamics(box, -1, lateralFriction=0.5)
     client.resetBaseVelocity(box, [1.5, 0, 0])

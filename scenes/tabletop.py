@@ -1,4 +1,5 @@
-"""A table-top with porcelain, metal, glass and wood that collide, roll and slide (after Figure 14 of Ren, Yeh and Lin 2013).
+"""A table-top with porcelain, metal, glass and wood that collide, roll and slide (after Figure 14 of Ren, Yeh and Lin
+2013).
 
 Plate, bowl and tumbler are meshes of this project, the wooden toy is one of PyBullet's random_urdfs.
 """
@@ -19,12 +20,16 @@ VOLUME_M3 = {"plate": 206.8e-6, "bowl": 75.1e-6, "tumbler": 67.4e-6}
 
 def build(client):
     client.setGravity(0, 0, -9.81)
-    table = client.createMultiBody(0, client.createCollisionShape(client.GEOM_BOX, halfExtents=[0.45, 0.3, 0.012]), basePosition=[0, 0, -0.012])
+    table = client.createMultiBody(
+        0, client.createCollisionShape(client.GEOM_BOX, halfExtents=[0.45, 0.3, 0.012]), basePosition=[0, 0, -0.012]
+    )
     cast = {table: {"material": "wood", "count": 120}}
 
     def place(material, volume, shape, position, euler=(0, 0, 0), velocity=(0, 0, 0), spin=(0, 0, 0)):
         mass = DENSITY_KG_M3[material] * volume
-        body = client.createMultiBody(mass, shape, basePosition=position, baseOrientation=client.getQuaternionFromEuler(euler))
+        body = client.createMultiBody(
+            mass, shape, basePosition=position, baseOrientation=client.getQuaternionFromEuler(euler)
+        )
         client.resetBaseVelocity(body, velocity, spin)
         cast[body] = material
         return body
@@ -37,8 +42,16 @@ def build(client):
     place("porcelain", VOLUME_M3["plate"], mesh("plate"), [-0.18, 0.08, 0.16], (0.25, 0.1, 0))
     place("steel", VOLUME_M3["bowl"], mesh("bowl"), [0.2, 0.1, 0.22], (0.5, 0.2, 0))
     place("glass", VOLUME_M3["tumbler"], mesh("tumbler"), [0.02, 0.05, 0.052])
-    place("steel", 4 / 3 * math.pi * ball**3, sphere, [-0.4, -0.12, ball], velocity=(0.5, 0, 0), spin=(0, 0.5 / ball, 0))
-    place("wood", 8 * math.prod(block), client.createCollisionShape(client.GEOM_BOX, halfExtents=block), [0.38, 0.05, 0.02], velocity=(-1.6, 0, 0))
+    place(
+        "steel", 4 / 3 * math.pi * ball**3, sphere, [-0.4, -0.12, ball], velocity=(0.5, 0, 0), spin=(0, 0.5 / ball, 0)
+    )
+    place(
+        "wood",
+        8 * math.prod(block),
+        client.createCollisionShape(client.GEOM_BOX, halfExtents=block),
+        [0.38, 0.05, 0.02],
+        velocity=(-1.6, 0, 0),
+    )
     place(
         "steel",
         math.pi * rod[0] ** 2 * rod[1],
@@ -48,13 +61,23 @@ def build(client):
     )
     for i in range(3):
         shape = client.createCollisionShape(client.GEOM_SPHERE, radius=marble)
-        place("glass", 4 / 3 * math.pi * marble**3, shape, [0.1 + 0.05 * i, -0.1, 0.35 + 0.12 * i], velocity=(0.1, 0.05, 0))
+        place(
+            "glass",
+            4 / 3 * math.pi * marble**3,
+            shape,
+            [0.1 + 0.05 * i, -0.1, 0.35 + 0.12 * i],
+            velocity=(0.1, 0.05, 0),
+        )
     toy = client.loadURDF(
-        str(Path(pybullet_data.getDataPath()) / "random_urdfs/000/000.urdf"), [0.33, -0.2, 0.12], client.getQuaternionFromEuler((0.4, 0.2, 0))
+        str(Path(pybullet_data.getDataPath()) / "random_urdfs/000/000.urdf"),
+        [0.33, -0.2, 0.12],
+        client.getQuaternionFromEuler((0.4, 0.2, 0)),
     )
     client.changeDynamics(toy, -1, mass=700 * 86.9e-6, localInertiaDiagonal=[6e-5, 4e-5, 8e-5])  # the file says 1 kg·m²
     cast[toy] = "wood"
     for body in cast:
-        client.changeDynamics(body, -1, restitution=0.75, lateralFriction=0.5, rollingFriction=1e-4, spinningFriction=2e-5)
+        client.changeDynamics(
+            body, -1, restitution=0.75, lateralFriction=0.5, rollingFriction=1e-4, spinningFriction=2e-5
+        )
     sb.keep_restitution(client)
     return cast

@@ -2,10 +2,11 @@
 
     items -> [do(item), …] in their order, whoever did them
 
-A fork, so that nothing has to be handed over but results; what the other process could not do or send is done here, and raises here. Where processes do not
-fork (Windows; macOS, whose libraries forbid it) or there is one core, all is done here. Work inside work stays where it is: here by _INSIDE, there because the
-helper is a daemon, which may have no children. Linear algebra has one thread in each: its own, waiting for each other on small matrices, had made two processes slower
-than one, and sums come in another order with every number of threads.
+A fork, so that nothing has to be handed over but results; what the other process could not do or send is done here, and
+raises here. Where processes do not fork (Windows; macOS, whose libraries forbid it) or there is one core, all is done
+here. Work inside work stays where it is: here by _INSIDE, there because the helper is a daemon, which may have no
+children. Linear algebra has one thread in each: its own, waiting for each other on small matrices, had made two
+processes slower than one, and sums come in another order with every number of threads.
 """
 
 from __future__ import annotations
@@ -29,7 +30,9 @@ _INSIDE: ContextVar[bool] = ContextVar("inside", default=False)  # a list that i
 
 @contextmanager
 def one_thread() -> Iterator[None]:
-    """Linear algebra on one thread while this lasts: as fast on matrices of hundreds, and the same bits on every machine's number of cores."""
+    """Linear algebra on one thread while this lasts: as fast on matrices of hundreds, and the same bits on every
+    machine's number of cores.
+    """
     import scipy.linalg  # noqa: F401  its library has threads apart from numpy's, and must be there to be told
     from threadpoolctl import threadpool_limits
 
@@ -86,7 +89,8 @@ def _started(do: Callable[[Any], Any], items: list[Any]) -> tuple[Any, Connectio
 
 
 def _can_fork() -> bool:
-    return sys.platform == "linux" and len(os.sched_getaffinity(0)) > 1 and not current_process().daemon  # nor may a pool's worker have children
+    # nor may a pool's worker have children
+    return sys.platform == "linux" and len(os.sched_getaffinity(0)) > 1 and not current_process().daemon
 
 
 def _next(taken: Any) -> int:
@@ -104,7 +108,9 @@ def _received(ours: Connection) -> tuple[int, Any] | None:
     return found
 
 
-def _help(do: Callable[[Any], Any], items: list[Any], taken: Any, ours: Connection, theirs: Connection, parent: int) -> None:
+def _help(
+    do: Callable[[Any], Any], items: list[Any], taken: Any, ours: Connection, theirs: Connection, parent: int
+) -> None:
     """The other process: results one by one, then None."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the first one stops, and ends this one
     ours.close()

@@ -2,15 +2,16 @@
 
     NAME.json -> Preset (typed, every field checked) -> Material
 
-A file is UTF-8 JSON, format "sonic-bullet-preset/1": name, density_kg_m3, elasticity (youngs_pa and poisson, or stiffness_pa 6×6),
-damping, surface, impact, each group with the `source` of its numbers, an optional `note`, and how far they differ between objects of that
-material: `range`, `range_source`, `spread`. `provenance` says what a fitted preset was
-fitted from, and how sure it is; it changes no sound. `residual` is what the modes do not say (docs/explanation/residual.md), played with every contact. `effects` are what a
-diagnosis found to belong to material or object (sonic_bullet.effects.presets_of_effects): they sound in every scene.
+A file is UTF-8 JSON, format "sonic-bullet-preset/1": name, density_kg_m3, elasticity (youngs_pa and poisson, or
+stiffness_pa 6×6), damping, surface, impact, each group with the `source` of its numbers, an optional `note`, and how
+far they differ between objects of that material: `range`, `range_source`, `spread`. `provenance` says what a fitted
+preset was fitted from, and how sure it is; it changes no sound. `residual` is what the modes do not say
+(docs/explanation/residual.md), played with every contact. `effects` are what a diagnosis found to belong to material or
+object (sonic_bullet.effects.presets_of_effects): they sound in every scene.
 
-Damping is Rayleigh's, d = ½(α + βλ) [Ren, Yeh, Lin 2013, eq. 6]: alpha_per_s and beta_s, or a loss factor η of the handbooks. η = 2d/ω
-independent of frequency is no Rayleigh damping; α and β are the pair that meets it at the two frequencies of `equal_at_hz`
-[Chopra, Dynamics of Structures, 4th ed. 2012, eq. 11.4.9 and 11.4.10 with ζ = η/2]:
+Damping is Rayleigh's, d = ½(α + βλ) [Ren, Yeh, Lin 2013, eq. 6]: alpha_per_s and beta_s, or a loss factor η of the
+handbooks. η = 2d/ω independent of frequency is no Rayleigh damping; α and β are the pair that meets it at the two
+frequencies of `equal_at_hz` [Chopra, Dynamics of Structures, 4th ed. 2012, eq. 11.4.9 and 11.4.10 with ζ = η/2]:
 
     α = η ω₁ω₂/(ω₁+ω₂),  β = η/(ω₁+ω₂)
 
@@ -53,7 +54,10 @@ Row = tuple[float, float, float, float, float, float]
 
 
 class _Part(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, omit_defaults=True):
-    """range: by field, the values that materials of that name have; spread: standard deviation of their logarithm. Neither changes a sound."""
+    """range: by field, the values that materials of that name have;
+
+    spread: standard deviation of their logarithm. Neither changes a sound.
+    """
 
     source: Annotated[str, msgspec.Meta(min_length=1)]
     note: str = ""
@@ -73,8 +77,8 @@ class Elasticity(_Part, frozen=True):
 class Damping(_Part, frozen=True):
     """Rayleigh's alpha_per_s and beta_s, or a loss_factor and the two frequencies at which it is met.
 
-    includes_radiation: these numbers, and laws among the effects, are total damping as recorded, and the run time adds no radiation. Absent: false, but for
-    presets that an older `fit` made of recordings.
+    includes_radiation: these numbers, and laws among the effects, are total damping as recorded, and the run time adds
+    no radiation. Absent: false, but for presets that an older `fit` made of recordings.
     """
 
     alpha_per_s: NotNegative | None = None
@@ -98,9 +102,12 @@ class Restitution(_Part, frozen=True):
 
 
 class Provenance(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, omit_defaults=True):
-    """Where a fitted preset comes from. parameters: α 1/s, β s, γ m²/s², σ, ν by name; spreads: standard errors in the same units, where known.
+    """Where a fitted preset comes from. parameters:
 
-    assumed: what was taken from the guess. verdict: the fit's own. correction: relative, of each mode's frequency against the mesh's.
+    α 1/s, β s, γ m²/s², σ, ν by name; spreads: standard errors in the same units, where known.
+
+    assumed: what was taken from the guess. verdict: the fit's own. correction: relative, of each mode's frequency
+    against the mesh's.
     """
 
     method: str
@@ -141,17 +148,25 @@ if not TYPE_CHECKING:  # or a type checker would take any name for one of this m
 def load_material(name: str | os.PathLike[str]) -> Material:
     """The material of that name (`list_materials`), or of a preset file where ``name`` is a path or ends in .json.
 
-    Raises MaterialError: unknown name (listing the near ones), unreadable file, a wrong field (named), unphysical numbers.
+    Raises MaterialError: unknown name (listing the near ones), unreadable file, a wrong field (named), unphysical
+    numbers.
     """
     text = as_path(name, "name", _REMEDY, error=MaterialError)
     filed = text.endswith(".json") or os.sep in text
     preset = named_preset(text)
-    with reading(text, "preset", MaterialError, "mend that field; docs/reference/preset.md describes the file") if filed else nullcontext():
+    with (
+        reading(text, "preset", MaterialError, "mend that field; docs/reference/preset.md describes the file")
+        if filed
+        else nullcontext()
+    ):
         return material_of(preset, text if filed else "")
 
 
 def named_preset(name: str | os.PathLike[str]) -> Preset:
-    """The preset of that name, or of a file where ``name`` is a path or ends in .json. Raises MaterialError as `load_material` does."""
+    """The preset of that name, or of a file where ``name`` is a path or ends in .json.
+
+    Raises MaterialError as `load_material` does.
+    """
     text = as_path(name, "name", _REMEDY, error=MaterialError)
     if text.endswith(".json") or os.sep in text:
         return read_preset(text)
@@ -180,15 +195,22 @@ def read_preset(path: str | os.PathLike[str]) -> Preset:
             with open(path, "rb") as file:
                 content = file.read(BYTES_MAX + 1)
         except (OSError, ValueError) as error:
-            raise MaterialError(f"cannot read preset {path}: {getattr(error, 'strerror', None) or error}", "check the path") from error
+            raise MaterialError(
+                f"cannot read preset {path}: {getattr(error, 'strerror', None) or error}", "check the path"
+            ) from error
         if len(content) > BYTES_MAX:
             raise MaterialError(f"preset {path} is over 1 MiB", "give a preset file")
         try:
             preset = msgspec.json.decode(content, type=Preset)
         except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-            raise MaterialError(f"preset {path}: {error}", "mend that field; docs/reference/preset.md describes the file") from error
+            raise MaterialError(
+                f"preset {path}: {error}", "mend that field; docs/reference/preset.md describes the file"
+            ) from error
         if preset.format != FORMAT:
-            raise MaterialError(f"preset {path} has format '{preset.format}', wanted '{FORMAT}'", "use a sonic_bullet that knows that format")
+            raise MaterialError(
+                f"preset {path} has format '{preset.format}', wanted '{FORMAT}'",
+                "use a sonic_bullet that knows that format",
+            )
         return preset
 
 
@@ -199,7 +221,10 @@ def write_preset(path: str | os.PathLike[str], preset: Preset) -> None:
 
 
 def material_of(preset: Preset, where: str = "") -> Material:
-    """The material a preset describes. Raises MaterialError naming preset and field where its numbers contradict each other."""
+    """The material a preset describes.
+
+    Raises MaterialError naming preset and field where its numbers contradict each other.
+    """
     label = where or preset.name
     alpha, beta = _rayleigh(preset.damping, label)
     elastic = preset.elasticity
@@ -218,14 +243,25 @@ def material_of(preset: Preset, where: str = "") -> Material:
         if elastic.stiffness_pa is not None and elastic.youngs_pa is None and elastic.poisson is None:
             return Material(preset.name, preset.density_kg_m3, np.array(elastic.stiffness_pa), **rest)
         if elastic.stiffness_pa is None and elastic.youngs_pa is not None and elastic.poisson is not None:
-            return Material.isotropic(preset.name, youngs_pa=elastic.youngs_pa, poisson=elastic.poisson, density_kg_m3=preset.density_kg_m3, **rest)
+            return Material.isotropic(
+                preset.name,
+                youngs_pa=elastic.youngs_pa,
+                poisson=elastic.poisson,
+                density_kg_m3=preset.density_kg_m3,
+                **rest,
+            )
     except RecordError as error:
         raise MaterialError(f"preset {label}: {error.what}", error.remedy) from error
-    raise MaterialError(f"preset {label}: elasticity is neither isotropic nor a tensor", "give youngs_pa and poisson, or stiffness_pa alone")
+    raise MaterialError(
+        f"preset {label}: elasticity is neither isotropic nor a tensor",
+        "give youngs_pa and poisson, or stiffness_pa alone",
+    )
 
 
 def total_damping(preset: Preset) -> bool:
-    """Whether a preset's damping has radiation in it: as it says, else where it was fitted, as `fit` read total decays before it said so."""
+    """Whether a preset's damping has radiation in it: as it says, else where it was fitted, as `fit` read total decays
+    before it said so.
+    """
     if preset.damping.includes_radiation is not None:
         return preset.damping.includes_radiation
     fitted = preset.provenance
@@ -249,6 +285,14 @@ def _rayleigh(damping: Damping, label: str) -> tuple[float, float]:
     match damping:
         case Damping(alpha_per_s=float() as alpha, beta_s=float() as beta, loss_factor=None, equal_at_hz=None):
             return alpha, beta
-        case Damping(alpha_per_s=None, beta_s=None, loss_factor=float() as eta, equal_at_hz=(float() as low_hz, float() as high_hz)):
+        case Damping(
+            alpha_per_s=None,
+            beta_s=None,
+            loss_factor=float() as eta,
+            equal_at_hz=(float() as low_hz, float() as high_hz),
+        ):
             return rayleigh_of_loss_factor(eta, low_hz, high_hz)
-    raise MaterialError(f"preset {label}: damping is neither Rayleigh's pair nor a loss factor", "give alpha_per_s and beta_s, or loss_factor and equal_at_hz")
+    raise MaterialError(
+        f"preset {label}: damping is neither Rayleigh's pair nor a loss factor",
+        "give alpha_per_s and beta_s, or loss_factor and equal_at_hz",
+    )

@@ -2,11 +2,12 @@
 
     scenes/NAME.py -> (build(client) -> cast | plain script) -> Listener -> RenderResult
 
-A scene is an ordinary Python file of one of two kinds; nothing is inherited from.
-`build(client)` sets a world up and returns its cast, a dictionary from a body (or (body, link), or (body, "all")) to its material, or to
-the keywords of `Listener.add`. Beside it there may be `SECONDS`, `MICROPHONE` and `act(client, time_s)`, called before every step.
-A plain script connects, loads and steps as any PyBullet script does; windows become DIRECT, sleeps are skipped. Where it attaches a
-listener of its own (kept in a top-level name), that one is heard; otherwise every body that it loads sounds as ``material``.
+A scene is an ordinary Python file of one of two kinds; nothing is inherited from. `build(client)` sets a world up and
+returns its cast, a dictionary from a body (or (body, link), or (body, "all")) to its material, or to the keywords of
+`Listener.add`. Beside it there may be `SECONDS`, `MICROPHONE` and `act(client, time_s)`, called before every step. A
+plain script connects, loads and steps as any PyBullet script does; windows become DIRECT, sleeps are skipped. Where it
+attaches a listener of its own (kept in a top-level name), that one is heard; otherwise every body that it loads sounds
+as ``material``.
 """
 
 from __future__ import annotations
@@ -62,10 +63,10 @@ def render_scene(
 ) -> RenderResult:
     """Run a scene for ``seconds`` of physics time and return its sound.
 
-    seconds None: the scene's own SECONDS, or 4. microphones None: the scene's own, or (0, -1, 0.5). material: of the bodies of a
-    plain script. residual: whether what materials sound beside their modes is sounded. progress is given the share done, say
-    what is being computed before the first step (modes: seconds a body). Raises SonicBulletError; where the scene broke or was interrupted
-    under way, the exception carries what was rendered so far as ``partial``.
+    seconds None: the scene's own SECONDS, or 4. microphones None: the scene's own, or (0, -1, 0.5). material: of the
+    bodies of a plain script. residual: whether what materials sound beside their modes is sounded. progress is given
+    the share done, say what is being computed before the first step (modes: seconds a body). Raises SonicBulletError;
+    where the scene broke or was interrupted under way, the exception carries what was rendered so far as ``partial``.
     """
     asked: dict[str, Any] = {
         "sr": check_sr(sr),
@@ -87,7 +88,9 @@ def render_scene(
 
 
 def examine_scene(path: str | Path, seconds: float = 1.0, say: Say | None = None) -> tuple[Finding, ...]:
-    """What in a scene would spoil its sound, and how to mend it. Runs it for ``seconds`` of physics time; say is told what is being computed.
+    """What in a scene would spoil its sound, and how to mend it.
+
+    Runs it for ``seconds`` of physics time; say is told what is being computed.
 
     Raises SonicBulletError.
     """
@@ -101,7 +104,14 @@ def examine_scene(path: str | Path, seconds: float = 1.0, say: Say | None = None
 def _nothing_added(listener: Listener) -> tuple[Finding, ...]:
     if not listener.world.has_bodies or any(body.material is not None for body in listener.contacts.bodies):
         return ()
-    return (Finding("nothing-added", "error", "no body has a material: all are silent partners", "add(body, material=…), or return it in build's cast"),)
+    return (
+        Finding(
+            "nothing-added",
+            "error",
+            "no body has a material: all are silent partners",
+            "add(body, material=…), or return it in build's cast",
+        ),
+    )
 
 
 def as_seconds(seconds: object, name: str) -> float:
@@ -164,7 +174,11 @@ class _Stage:
         listener = self.need_listener()
         notes = (*notes, *listener.notes)
         log = listener.contacts
-        if listener.sr == self.sr and self.microphones is None and (self.residual or not any(b.material and b.material.residual for b in log.bodies)):
+        if (
+            listener.sr == self.sr
+            and self.microphones is None
+            and (self.residual or not any(b.material and b.material.residual for b in log.bodies))
+        ):
             samples = listener.sound()
             return RenderResult(samples, log, self.sr, (*notes, *silence_notes(samples, log)))
         log = replace(log, sr=self.sr, sensors=log.sensors if self.microphones is None else self.microphones)
@@ -227,13 +241,20 @@ def _run_built(stage: _Stage, seconds: float | None, progress: Progress | None, 
     stage.client = client = direct_client()
     cast = _user_code(stage.path, module.build, client)
     if not isinstance(cast, dict):
-        raise SceneError(f"scene '{stage.path.name}': build(client) returned {type(cast).__name__}", "return a dictionary from bodies to materials")
+        raise SceneError(
+            f"scene '{stage.path.name}': build(client) returned {type(cast).__name__}",
+            "return a dictionary from bodies to materials",
+        )
     places = stage.microphones if stage.microphones is not None else getattr(module, "MICROPHONE", (0.0, -1.0, 0.5))
     stage.listener = listener = attach(client, sr=stage.sr, microphone=places, seed=stage.seed)
     stage.microphones = None
     _user_code(stage.path, _add_cast, listener, cast, say)
     act = getattr(module, "act", None)
-    total = seconds if seconds is not None else as_seconds(getattr(module, "SECONDS", DEFAULT_SECONDS), f"SECONDS of scene '{stage.path.name}'")
+    total = (
+        seconds
+        if seconds is not None
+        else as_seconds(getattr(module, "SECONDS", DEFAULT_SECONDS), f"SECONDS of scene '{stage.path.name}'")
+    )
     while listener.time_s < total - 1e-9:
         if act is not None:
             _user_code(stage.path, act, client, listener.time_s)
@@ -260,7 +281,8 @@ def _run_plain(stage: _Stage, seconds: float | None, progress: Progress | None, 
             stage.listener = next((value for value in names.values() if isinstance(value, Listener)), None)
         if stage.listener is None:
             raise SceneError(
-                f"scene '{stage.path.name}' imports sonic_bullet but keeps no listener in a top-level name", "write listener = sonic_bullet.attach(...)"
+                f"scene '{stage.path.name}' imports sonic_bullet but keeps no listener in a top-level name",
+                "write listener = sonic_bullet.attach(...)",
             )
         return notes
     material = stage.material or as_material(DEFAULT_MATERIAL)

@@ -3,7 +3,8 @@
     stepSimulation (hooked) -> World.after_step -> Step -> Synthesizer.feed -> frame
                                                      \\-> ContactLog -> save / write
 
-A frame lags physics by `latency_steps`, because a strike spans steps and loads are interpolated between them; files do not.
+A frame lags physics by `latency_steps`, because a strike spans steps and loads are interpolated between them; files do
+not.
 """
 
 from __future__ import annotations
@@ -25,7 +26,17 @@ from sonic_bullet.geometry import oversize
 from sonic_bullet.listener.world import World
 from sonic_bullet.machine.terminal import status
 from sonic_bullet.records import Air, Array, Material, Microphone, ModalModel, Sensor, Shape
-from sonic_bullet.records.coerce import as_call, as_items, as_kind, as_kinds, as_number, as_path, as_rows, as_whole, check_options
+from sonic_bullet.records.coerce import (
+    as_call,
+    as_items,
+    as_kind,
+    as_kinds,
+    as_number,
+    as_path,
+    as_rows,
+    as_whole,
+    check_options,
+)
 from sonic_bullet.records.contacts import Event, Step
 from sonic_bullet.records.errors import AudioError, MaterialError, MeshError, ModalError, SceneError, SizeWarning
 from sonic_bullet.render import LATENCY_STEPS, Synthesizer
@@ -53,15 +64,28 @@ def as_sensors(microphone: MicrophoneLike, name: str = "microphone") -> tuple[Se
 
 
 def as_material(material: str | Path | Material) -> Material:
-    """The material itself, or the preset of that name or path. Raises MaterialError where it has no damping: it would ring for ever."""
+    """The material itself, or the preset of that name or path.
+
+    Raises MaterialError where it has no damping: it would ring for ever.
+    """
     from sonic_bullet.effects.protocol import Effect
     from sonic_bullet.presets import load_material
 
     remedy = "give a name ('sonic-bullet materials' lists them), a preset file or a Material"
-    made = material if isinstance(material, Material) else load_material(as_path(material, "material", remedy, error=MaterialError))
+    made = (
+        material
+        if isinstance(material, Material)
+        else load_material(as_path(material, "material", remedy, error=MaterialError))
+    )
     if made.alpha_per_s is None:
         raise MaterialError(f"material '{made.name}' states no damping", "give alpha_per_s and beta_s")
-    as_kinds(made.effects, Effect, f"material '{made.name}': effects", "give effects of sonic_bullet.effects", error=MaterialError)
+    as_kinds(
+        made.effects,
+        Effect,
+        f"material '{made.name}': effects",
+        "give effects of sonic_bullet.effects",
+        error=MaterialError,
+    )
     return made
 
 
@@ -82,7 +106,9 @@ def _naming(link: str, of: int) -> Iterator[None]:
     try:
         yield
     except (MeshError, ModalError) as error:
-        rest = "; or give another shape with mesh=" + (", or add the other links one by one, by their names" if of > 1 else "")
+        rest = "; or give another shape with mesh=" + (
+            ", or add the other links one by one, by their names" if of > 1 else ""
+        )
         raise type(error)(f"{link}: {error.what}", error.remedy + rest) from error
 
 
@@ -100,11 +126,12 @@ def attach(
 ) -> Listener:
     """Listen to a PyBullet world.
 
-    client: a `BulletClient` (then `stepSimulation` is hooked and nothing else need be called), the `pybullet` module or a client id
-    (then call `listener.step()` after each `p.stepSimulation()`); or a `listener.World` of another simulator. sr: sample rate in Hz, 8000 … 384000. microphone: a point in the
-    world in m, several points (one channel each), or sensors (`Microphone`, `Vibrometer`, `ModalSum`); none at all: contacts
-    alone, no sound. seed: of the surfaces' roughness. air: the medium, 1.2 kg/m³ and 343 m/s by default. Raises SceneError for a client
-    that is not connected, AudioError for a bad rate, RecordError for a microphone or a seed that is none.
+    client: a `BulletClient` (then `stepSimulation` is hooked and nothing else need be called), the `pybullet` module or
+    a client id (then call `listener.step()` after each `p.stepSimulation()`); or a `listener.World` of another
+    simulator. sr: sample rate in Hz, 8000 … 384000. microphone: a point in the world in m, several points (one channel
+    each), or sensors (`Microphone`, `Vibrometer`, `ModalSum`); none at all: contacts alone, no sound. seed: of the
+    surfaces' roughness. air: the medium, 1.2 kg/m³ and 343 m/s by default. Raises SceneError for a client that is not
+    connected, AudioError for a bad rate, RecordError for a microphone or a seed that is none.
     """
     return Listener(client, sr=sr, sensors=as_sensors(microphone), seed=seed, air=Air() if air is None else air)
 
@@ -118,8 +145,8 @@ def _opened(client: Any) -> World:
 class Listener:
     """A simulated world that sounds; made by `attach`.
 
-    frame: the sound of the latest step, float64 pascals, (channels, n); n sums to floor(sr·time) exactly. It lags physics by
-    `latency_steps` steps. contacts: the log so far. Usable as a context manager: leaving it detaches.
+    frame: the sound of the latest step, float64 pascals, (channels, n); n sums to floor(sr·time) exactly. It lags
+    physics by `latency_steps` steps. contacts: the log so far. Usable as a context manager: leaving it detaches.
     """
 
     latency_steps = LATENCY_STEPS
@@ -154,21 +181,25 @@ class Listener:
     ) -> tuple[ModalModel, ...]:
         """Let a body sound; returns the modal models of its links.
 
-        link: -1 is the base; a link's number or name; "all" every link with a collision shape, all of them or, where one fails, none. material: a preset's name, a preset file or a `Material`.
-        mesh: a file (in metres) or shapes in the body frame, where the body's own collision shapes should not be used.
-        model: modes computed before. roughness_m: rms height of its surface in place of the material's. fixed: clamped spheres
-        (x, y, z, radius) in m, body frame. thickness_m: wall of an open surface. to_hz, count: how many modes. progress: called now and then with
-        which link's modes are being computed, how far that is, and that it is their radiation next (seconds a link the first time, then
-        the cache has both); without one, a terminal shows it.
-        Warns (`errors.SizeWarning`) of a link larger than anything that is struck to sound. Raises SceneError (unknown body or link),
-        MaterialError, MeshError, ModalError naming body and link, RecordError.
+        link: -1 is the base; a link's number or name; "all" every link with a collision shape, all of them or, where
+        one fails, none. material: a preset's name, a preset file or a `Material`. mesh: a file (in metres) or shapes in
+        the body frame, where the body's own collision shapes should not be used. model: modes computed before.
+        roughness_m: rms height of its surface in place of the material's. fixed: clamped spheres (x, y, z, radius) in
+        m, body frame. thickness_m: wall of an open surface. to_hz, count: how many modes. progress: called now and then
+        with which link's modes are being computed, how far that is, and that it is their radiation next (seconds a link
+        the first time, then the cache has both); without one, a terminal shows it. Warns (`errors.SizeWarning`) of a
+        link larger than anything that is struck to sound. Raises SceneError (unknown body or link), MaterialError,
+        MeshError, ModalError naming body and link, RecordError.
         """
         from sonic_bullet.effects.presets_of_effects import with_material
         from sonic_bullet.modal import ModalOptions
 
         made = as_material(material)
         if roughness_m is not None:
-            made = replace(made, roughness_m=as_number(roughness_m, "roughness_m", "give an rms height in m, zero or above", least=0))
+            made = replace(
+                made,
+                roughness_m=as_number(roughness_m, "roughness_m", "give an rms height in m, zero or above", least=0),
+            )
         made = with_material(made)
         options = ModalOptions(to_hz=to_hz, count=count, fixed=fixed, thickness_m=thickness_m)
         if model is not None:
@@ -196,9 +227,16 @@ class Listener:
         return tuple(models)
 
     def _solved(
-        self, parts: Sequence[tuple[str, tuple[Shape, ...]]], material: Material, options: ModalOptions, say: Callable[[str], None]
+        self,
+        parts: Sequence[tuple[str, tuple[Shape, ...]]],
+        material: Material,
+        options: ModalOptions,
+        say: Callable[[str], None],
     ) -> list[ModalModel]:
-        """The modal models of named links (name, shapes). What fails shall fail early: all are looked at first, and the most intricate is filled first."""
+        """The modal models of named links (name, shapes).
+
+        What fails shall fail early: all are looked at first, and the most intricate is filled first.
+        """
         from sonic_bullet import modal
         from sonic_bullet.effects.presets_of_effects import with_modes
 
@@ -218,21 +256,28 @@ class Listener:
         return [models[i] for i in range(len(parts))]
 
     def _shared(self, model: ModalModel, fresh: Iterable[ModalModel]) -> ModalModel:
-        """The model itself, or the same one that a body has already or is about to have: equal bodies then share memory and what is derived from it."""
+        """The model itself, or the same one that a body has already or is about to have: equal bodies then share memory
+        and what is derived from it.
+        """
         known = (*(body.model for body in self.world.bodies if body.model is not None), *fresh)
         same = (
             other
             for other in known
             if other.includes_radiation == model.includes_radiation
-            and all(np.array_equal(getattr(other, name), getattr(model, name)) for name in ("freq_hz", "decay_per_s", "vertex_m", "face", "shape"))
+            and all(
+                np.array_equal(getattr(other, name), getattr(model, name))
+                for name in ("freq_hz", "decay_per_s", "vertex_m", "face", "shape")
+            )
         )
         return next(same, model)
 
     def step(self) -> Array:
-        """Take in the physics step just made; returns `frame`. Called by the hook of a `BulletClient`, by hand otherwise.
+        """Take in the physics step just made; returns `frame`.
 
-        A second call without a physics step between gives a frame of no length. A body whose numbers cease to be numbers is left out from
-        then on and named (`notes`). Raises SceneError for a lost connection.
+        Called by the hook of a `BulletClient`, by hand otherwise.
+
+        A second call without a physics step between gives a frame of no length. A body whose numbers cease to be
+        numbers is left out from then on and named (`notes`). Raises SceneError for a lost connection.
         """
         if not self._attached:
             raise SceneError("the listener is detached", "attach a new one")
@@ -251,11 +296,13 @@ class Listener:
         return np.concatenate(frames, axis=1) if frames else np.zeros((len(self.sensors), 0))
 
     def quench(self) -> None:
-        """Stop everything that rings, as a hand would, now: where the last step taken in ends. What strikes from the next step on sounds again.
+        """Stop everything that rings, as a hand would, now: where the last step taken in ends.
 
-        What was struck before is silent from then on, strikes that are still to sound included, and so is what travels to the
-        microphones; what rolls or slides goes on. `sound` and files fall silent at that very sample, `frame` as much later as it lags.
-        It is an event of the log, so that a replay stops there too, at any rate.
+        What strikes from the next step on sounds again.
+
+        What was struck before is silent from then on, strikes that are still to sound included, and so is what travels
+        to the microphones; what rolls or slides goes on. `sound` and files fall silent at that very sample, `frame` as
+        much later as it lags. It is an event of the log, so that a replay stops there too, at any rate.
         """
         self._events.append(Event("quench", len(self._steps)))
         self._synth.quench()
@@ -263,7 +310,16 @@ class Listener:
     @property
     def contacts(self) -> ContactLog:
         """The contact log so far: all that a later render needs."""
-        return ContactLog(tuple(self.world.bodies), tuple(self._steps), self.sensors, self.sr, self.seed, self.air, self.world.untouched, tuple(self._events))
+        return ContactLog(
+            tuple(self.world.bodies),
+            tuple(self._steps),
+            self.sensors,
+            self.sr,
+            self.seed,
+            self.air,
+            self.world.untouched,
+            tuple(self._events),
+        )
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -280,15 +336,22 @@ class Listener:
         return self._synth.sound()
 
     def write(self, path: str | Path, **options: Any) -> AudioReport:
-        """Write the sound so far without the lag: float32 with 1.0 = 1 Pa, or scaled by ``peak_dbfs=`` or ``lufs=`` (see `files.write_audio`).
+        """Write the sound so far without the lag: float32 with 1.0 = 1 Pa, or scaled by ``peak_dbfs=`` or ``lufs=``
+        (see `files.write_audio`).
 
         Raises FileError, AudioError.
         """
-        levels = [name for name, one in inspect.signature(write_audio).parameters.items() if one.kind is inspect.Parameter.KEYWORD_ONLY]
+        levels = [
+            name
+            for name, one in inspect.signature(write_audio).parameters.items()
+            if one.kind is inspect.Parameter.KEYWORD_ONLY
+        ]
         check_options(options, levels, "write", error=AudioError)
         place = as_path(path, "path", "name a file, such as out.wav")
         if not self.sensors:
-            raise AudioError("there is no microphone, so there is no sound to write", "attach with microphone=(x, y, z)")
+            raise AudioError(
+                "there is no microphone, so there is no sound to write", "attach with microphone=(x, y, z)"
+            )
         return write_audio(place, self.sound(), self.sr, **options)
 
     def detach(self) -> None:
@@ -300,5 +363,7 @@ class Listener:
     def __enter__(self) -> Listener:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
         self.detach()

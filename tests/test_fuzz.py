@@ -1,4 +1,6 @@
-"""A short run of `benchmarks/fuzz.py`: mutated files of every format end in what they hold or in one short line of ours."""
+"""A short run of `benchmarks/fuzz.py`: mutated files of every format end in what they hold or in one short line of
+ours.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,10 @@ SECONDS = 20.0
 
 
 def test_every_seed_goes_through_its_door(tmp_path: Path) -> None:
-    """Unchanged, each file is read: so that what is refused is refused for its change. And each number gives one file, always the same."""
+    """Unchanged, each file is read: so that what is refused is refused for its change.
+
+    And each number gives one file, always the same.
+    """
     for door in doors():
         path = tmp_path / f"seed{door.suffix}"
         path.write_bytes(door.seed())
@@ -61,4 +66,7 @@ def test_the_fuzzer_finds_what_it_looks_for(tmp_path: Path) -> None:
 
     door = Door("wrong", ".x", 1.0, lambda: b"", lambda draw: bytes([draw.randrange(256)]), wrong)
     tally = fuzz.run(8, 0, tmp_path, chosen=(door,))["wrong"]
-    assert (tally.inputs, sorted((number, kind) for kind, number, _ in tally.faults)) == (8, [(1, "foreign"), (2, "text"), (3, "memory"), (4, "foreign")])
+    assert (tally.inputs, sorted((number, kind) for kind, number, _ in tally.faults)) == (
+        8,
+        [(1, "foreign"), (2, "text"), (3, "memory"), (4, "foreign")],
+    )

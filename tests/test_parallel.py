@@ -1,4 +1,6 @@
-"""Two processes do what one would have done: the same results in the same order, the same errors, and nothing left behind."""
+"""Two processes do what one would have done: the same results in the same order, the same errors, and nothing left
+behind.
+"""
 
 from __future__ import annotations
 

@@ -20,7 +20,14 @@ TABLE_I = {
     "porcelain": (0.037388, 8.4142e-8),
 }
 # longitudinal sound speed of a thin rod, m/s: handbooks agree within these bounds whatever the grade
-ROD_SPEED_M_S = {"wood": (3500, 5000), "metal": (5000, 5300), "steel": (5000, 5300), "aluminium": (4900, 5200), "brass": (3200, 3600), "glass": (5000, 5600)}
+ROD_SPEED_M_S = {
+    "wood": (3500, 5000),
+    "metal": (5000, 5300),
+    "steel": (5000, 5300),
+    "aluminium": (4900, 5200),
+    "brass": (3200, 3600),
+    "glass": (5000, 5600),
+}
 
 
 @pytest.mark.parametrize("name", TABLE_I)
@@ -38,7 +45,9 @@ def test_density_and_stiffness_give_the_rod_speed_of_the_handbooks(name: str) ->
 
 def test_every_material_rings_and_says_where_its_numbers_come_from() -> None:
     materials = presets.list_materials()
-    assert {"wood", "plastic", "metal", "glass", "porcelain", "steel", "aluminium", "brass", "rubber", "concrete"} <= {m.name for m in materials}
+    assert {"wood", "plastic", "metal", "glass", "porcelain", "steel", "aluminium", "brass", "rubber", "concrete"} <= {
+        m.name for m in materials
+    }
     for material in materials:
         preset = presets.read_preset(presets.FOLDER / f"{material.name}.json")
         assert preset.name == material.name
@@ -54,7 +63,9 @@ def test_every_shipped_number_has_a_range_that_holds_it_and_a_spread(name: str) 
     preset = presets.read_preset(presets.FOLDER / f"{name}.json")
     density = {"density_kg_m3": preset.density_kg_m3}
     for group, more in ((preset.elasticity, density), (preset.damping, {}), (preset.surface, {}), (preset.impact, {})):
-        numbers = {key: getattr(group, key) for key in group.__struct_fields__ if isinstance(getattr(group, key), float)} | more
+        numbers = {
+            key: getattr(group, key) for key in group.__struct_fields__ if isinstance(getattr(group, key), float)
+        } | more
         if (tensor := getattr(group, "stiffness_pa", None)) is not None:
             numbers["stiffness_pa"] = max(max(row) for row in tensor)
         assert set(group.range) == set(group.spread) == set(numbers), name
@@ -96,11 +107,16 @@ def test_a_loss_factor_is_met_at_its_two_frequencies_and_undercut_between() -> N
 def test_spruce_is_the_tensor_of_its_engineering_constants() -> None:
     compliance = np.linalg.inv(presets.load_material("spruce").stiffness_pa)
     e_l = 1.1 * 10.8e9
-    np.testing.assert_allclose(1 / np.diag(compliance), e_l * np.array([1, 0.078, 0.043, 0.003, 0.061, 0.064]), rtol=1e-3)
+    np.testing.assert_allclose(
+        1 / np.diag(compliance), e_l * np.array([1, 0.078, 0.043, 0.003, 0.061, 0.064]), rtol=1e-3
+    )
     assert -compliance[1, 0] / compliance[0, 0] == pytest.approx(0.372, rel=1e-3)
 
 
-@pytest.mark.parametrize(("name", "near"), [("wod", "wood"), ("porcelin", "porcelain"), ("GLAS", "glass"), ("xyzzy", "one of"), ("", "one of")])
+@pytest.mark.parametrize(
+    ("name", "near"),
+    [("wod", "wood"), ("porcelin", "porcelain"), ("GLAS", "glass"), ("xyzzy", "one of"), ("", "one of")],
+)
 def test_an_unknown_name_lists_the_near_ones(name: str, near: str) -> None:
     with pytest.raises(MaterialError, match=near) as caught:
         presets.load_material(name)
@@ -146,7 +162,10 @@ def test_a_preset_file_comes_back(tmp_path: Path) -> None:
         ({"elasticity__poisson": 0.5}, "poisson"),
         ({"elasticity__poisson": None}, "neither isotropic nor a tensor"),
         ({"elasticity__stiffness_pa": [[1.0] * 6] * 6}, "neither isotropic nor a tensor"),
-        ({"elasticity__youngs_pa": None, "elasticity__poisson": None, "elasticity__stiffness_pa": [[1.0] * 6] * 6}, "positive definite"),
+        (
+            {"elasticity__youngs_pa": None, "elasticity__poisson": None, "elasticity__stiffness_pa": [[1.0] * 6] * 6},
+            "positive definite",
+        ),
         ({"elasticity__stiffness_pa": [[1.0] * 6] * 5}, "stiffness_pa"),
         ({"elasticity__source": ""}, "source"),
         ({"damping__beta_s": None}, "neither Rayleigh"),

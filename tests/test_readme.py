@@ -27,7 +27,12 @@ def blocks(language: str) -> list[str]:
 
 def commands() -> list[list[str]]:
     """Each line of the shell block that begins with sonic-bullet, in order."""
-    return [shlex.split(line, comments=True)[1:] for block in blocks("sh") for line in block.splitlines() if line.startswith("sonic-bullet ")]
+    return [
+        shlex.split(line, comments=True)[1:]
+        for block in blocks("sh")
+        for line in block.splitlines()
+        if line.startswith("sonic-bullet ")
+    ]
 
 
 def run_block(source: str, folder: Path) -> dict[str, Any]:
@@ -82,18 +87,27 @@ def test_the_shell_block_names_what_there_is() -> None:
 
 
 def test_every_line_of_the_shell_block_runs(tmp_path: Path) -> None:
-    """In the README's order and one folder; the table-top, which is long, is replaced by the bar, and each run is short."""
+    """In the README's order and one folder; the table-top, which is long, is replaced by the bar, and each run is
+    short.
+    """
     for name in ("scenes", "assets"):
         (tmp_path / name).symlink_to(REPO / name)
     told = []
     for command in commands():
         words = [word.replace("scenes/tabletop.py", "scenes/bar.py") for word in command]
         if words[0] == "doctor" or words[-1:] == ["0,0,0,0.02"] or "assets/bowl.obj" in words:
-            words += {"doctor": ["--seconds", "0.05"], "modes": ["--count", "5"] if "--to-hz" not in words else []}[words[0]]
+            words += {"doctor": ["--seconds", "0.05"], "modes": ["--count", "5"] if "--to-hz" not in words else []}[
+                words[0]
+            ]
         if words[:2] == ["render", "scenes/bar.py"]:
             words += ["--seconds", "0.2"]
         done = subprocess.run(
-            [sys.executable, "-c", "from sonic_bullet.cli import main; main()", *words], cwd=tmp_path, check=False, capture_output=True, text=True, timeout=200
+            [sys.executable, "-c", "from sonic_bullet.cli import main; main()", *words],
+            cwd=tmp_path,
+            check=False,
+            capture_output=True,
+            text=True,
+            timeout=200,
         )
         assert done.returncode == 0, (words, done.stderr)
         assert "Traceback" not in done.stderr

@@ -1,10 +1,10 @@
 """A rolling ball keeps the measured laws through the whole chain; `benchmarks/rolling_laws.py` prints the full tables.
 
-Held here: 0.1 … 0.8 m/s, a board of 60 modes. n is not one number: the contact's patch takes what is shorter than itself, so where the
-heard modes lie above v/a (1 kHz at 0.1 m/s) the level grows faster, as v^(H + ½) at most, and where they lie below as v^H, H = 0.75. Six
-seeds: 0.93 … 0.99 over 0.1 … 0.4 m/s, at the band's edge, and 0.77 … 0.89 over 0.2 … 0.8 m/s. Known to fail and not tested: with the
-lowest 25 modes alone n is 1.00 over the slow half; a sliding box has n = 1.0 … 1.1 where Bullet slides it calmly, and from 0.28 m/s on
-Bullet's chatter drowns the rubbing.
+Held here: 0.1 … 0.8 m/s, a board of 60 modes. n is not one number: the contact's patch takes what is shorter than
+itself, so where the heard modes lie above v/a (1 kHz at 0.1 m/s) the level grows faster, as v^(H + ½) at most, and
+where they lie below as v^H, H = 0.75. Six seeds: 0.93 … 0.99 over 0.1 … 0.4 m/s, at the band's edge, and 0.77 … 0.89
+over 0.2 … 0.8 m/s. Known to fail and not tested: with the lowest 25 modes alone n is 1.00 over the slow half; a sliding
+box has n = 1.0 … 1.1 where Bullet slides it calmly, and from 0.28 m/s on Bullet's chatter drowns the rubbing.
 """
 
 from __future__ import annotations
@@ -36,7 +36,8 @@ def test_level_follows_speed_and_roughness_and_neither_law_hangs_on_the_other() 
 
 
 def test_a_rolling_ball_has_no_line_at_the_step_rate() -> None:
-    log = BENCH["run"]("ball", 0.15, 4.0, floor=None)  # the floor's modes would be lines of their own: what the steel ball radiates is smooth
+    # the floor's modes would be lines of their own: what the steel ball radiates is smooth
+    log = BENCH["run"]("ball", 0.15, 4.0, floor=None)
     rough = BENCH["observed"](log, 2e-6)
     own_noise = BENCH["observed"](log, 0.0)
     assert rough.std() > 100 * own_noise.std()  # 40 dB

@@ -1,4 +1,6 @@
-"""npz containers, taken apart and put together again: changed arrays, headers and directories with the right CRC and sizes."""
+"""npz containers, taken apart and put together again: changed arrays, headers and directories with the right CRC and
+sizes.
+"""
 
 from __future__ import annotations
 
@@ -70,7 +72,10 @@ def raw_npy(header: bytes, body: bytes, version: tuple[int, int] = (1, 0)) -> by
 
 
 def container_changed(entries: Entries, draw: random.Random, seal: Callable[[Entries], Entries] | None = None) -> bytes:
-    """A container with its arrays, its header, an npy header, its directory or its bytes changed. seal: puts a digest right again."""
+    """A container with its arrays, its header, an npy header, its directory or its bytes changed.
+
+    seal: puts a digest right again.
+    """
     kind = draw.randrange(10)
     if kind < 5:
         for _ in range(draw.choice((1, 1, 2))):
@@ -96,14 +101,27 @@ def _other_array(entries: Entries, draw: random.Random) -> Entries:
     if kind == 0:
         return entries[:at] + entries[at + 1 :]
     if kind == 1:
-        return [*entries[:at], (draw.choice(("x" * 4000 + ".npy", "other.npy", name + ".npy", "../a.npy", "a")), content), *entries[at + 1 :]]
+        return [
+            *entries[:at],
+            (draw.choice(("x" * 4000 + ".npy", "other.npy", name + ".npy", "../a.npy", "a")), content),
+            *entries[at + 1 :],
+        ]
     if kind == 2:
         return [*entries[:at], (name, draw.choice(entries)[1]), *entries[at + 1 :]]
     array = np.array(array_of(content))
     if kind == 3:
         array = array.astype(draw.choice(("<f4", "<f8", "<i4", "<i8", "|b1", ">f8", "<f2", "|u1", "<u8")))
     elif kind == 4:
-        array = draw.choice((array.ravel(), array[None], array[:0], array[:1], np.concatenate([array, array]) if array.ndim else array, array.T))
+        array = draw.choice(
+            (
+                array.ravel(),
+                array[None],
+                array[:0],
+                array[:1],
+                np.concatenate([array, array]) if array.ndim else array,
+                array.T,
+            )
+        )
     elif array.size and array.dtype.kind in "iuf":
         array = _other_numbers(array.ravel(), kind, draw).reshape(array.shape)
     elif array.size:
@@ -114,7 +132,26 @@ def _other_array(entries: Entries, draw: random.Random) -> Entries:
 def _other_numbers(flat: Array, kind: int, draw: random.Random) -> Array:
     """One number of (n,) or all replaced, scaled or moved along."""
     if flat.dtype.kind == "f":
-        value = draw.choice((np.nan, np.inf, -np.inf, 0.0, -0.0, -1.0, 1e-320, 1e-200, 1e-30, 1e15, 1e30, 1e38, 1e150, 1e200, 1e308, flat[0]))
+        value = draw.choice(
+            (
+                np.nan,
+                np.inf,
+                -np.inf,
+                0.0,
+                -0.0,
+                -1.0,
+                1e-320,
+                1e-200,
+                1e-30,
+                1e15,
+                1e30,
+                1e38,
+                1e150,
+                1e200,
+                1e308,
+                flat[0],
+            )
+        )
     else:
         low, high = np.iinfo(flat.dtype).min, np.iinfo(flat.dtype).max
         value = draw.choice([x for x in (0, 1, 2, -1, 99, 10**6, low, high) if low <= x <= high])
@@ -134,7 +171,9 @@ def _other_header(entries: Entries, draw: random.Random) -> Entries:
     """The JSON entry restructured."""
     known = json.loads(array_of(dict(entries)["header.npy"]).tobytes())
     text = json_changed(known, draw)
-    return [(name, npy(np.frombuffer(text, np.uint8)) if name == "header.npy" else content) for name, content in entries]
+    return [
+        (name, npy(np.frombuffer(text, np.uint8)) if name == "header.npy" else content) for name, content in entries
+    ]
 
 
 def _other_npy(entries: Entries, draw: random.Random) -> Entries:

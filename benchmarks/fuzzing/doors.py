@@ -1,4 +1,5 @@
-"""Every format that the project reads: a seed file, how it is changed, the reader it goes through, and one step beyond that reader.
+"""Every format that the project reads: a seed file, how it is changed, the reader it goes through, and one step beyond
+that reader.
 
 log -> rendered for two steps     model -> struck once     preset -> material -> struck once     case -> loaded
 cache -> believed only where it is what was kept     audio -> features     mesh -> surface, volume, closed or not
@@ -30,13 +31,19 @@ from sonic_bullet.records.contacts import Contacts, Event, Step
 from sonic_bullet.render import radiated, render_log
 
 SR = 8000
-STEEL = Material.isotropic("steel", youngs_pa=2e11, poisson=0.29, density_kg_m3=7850, alpha_per_s=4.0, beta_s=2e-9, restitution=0.6)
+STEEL = Material.isotropic(
+    "steel", youngs_pa=2e11, poisson=0.29, density_kg_m3=7850, alpha_per_s=4.0, beta_s=2e-9, restitution=0.6
+)
 FEATURES_SAMPLES = 560
 
 
 @dataclass(frozen=True)
 class Door:
-    """name: of the format. suffix: of its files. share: of all inputs. seed: the file unchanged; change: mutated. enter: reads it and goes one step on."""
+    """name: of the format.
+
+    suffix: of its files. share: of all inputs. seed: the file unchanged; change: mutated. enter: reads it and goes one
+    step on.
+    """
 
     name: str
     suffix: str
@@ -54,20 +61,54 @@ def box_model(modes: int = 3) -> ModalModel:
     freq = np.array([900.0, 2100.0, 3900.0])[:modes]
     shape = np.random.default_rng(0).normal(size=(8, 3, modes))
     return ModalModel(
-        freq, 5 + 1e-6 * freq**2, shape, corner, face, np.zeros(12), 4e-4, 3.14, bend_s2_m2=np.full(modes, 1e-3), damping_growth_s_m=np.zeros(modes)
+        freq,
+        5 + 1e-6 * freq**2,
+        shape,
+        corner,
+        face,
+        np.zeros(12),
+        4e-4,
+        3.14,
+        bend_s2_m2=np.full(modes, 1e-3),
+        damping_growth_s_m=np.zeros(modes),
     )
 
 
 def small_log(model: ModalModel, material: Material = STEEL, *, microphone: bool = True) -> ContactLog:
     """A box struck once by a wall, three steps long."""
     inertia = np.diag([0.002, 0.003, 0.004])
-    bodies = (Body(0, -1, 0, "box", 3.14, inertia, 4e-4, material=material, model=model), Body(3, -1, 0, "wall", 0.0, np.zeros((3, 3))))
-    one: dict[str, Any] = {"a": [0], "b": [1], "point_a_m": [[0.05, 0.04, -0.025]], "point_b_m": [[0, 0, 0]], "normal": [[0, 0, 1]]}
-    one |= {"impulse_n_s": [[0, 0, 0.01]], "slip_m_s": [[0.1, 0, 0]], "sweep_m_s": [[0.1, 0]], "approach_m_s": [1.0], "gap_m": [0.0]}
+    bodies = (
+        Body(0, -1, 0, "box", 3.14, inertia, 4e-4, material=material, model=model),
+        Body(3, -1, 0, "wall", 0.0, np.zeros((3, 3))),
+    )
+    one: dict[str, Any] = {
+        "a": [0],
+        "b": [1],
+        "point_a_m": [[0.05, 0.04, -0.025]],
+        "point_b_m": [[0, 0, 0]],
+        "normal": [[0, 0, 1]],
+    }
+    one |= {
+        "impulse_n_s": [[0, 0, 0.01]],
+        "slip_m_s": [[0.1, 0, 0]],
+        "sweep_m_s": [[0.1, 0]],
+        "approach_m_s": [1.0],
+        "gap_m": [0.0],
+    }
     place, upright = [[0, 0, 0.1], [0, 0, 0]], [[0, 0, 0, 1.0]] * 2
-    steps = [Step(1 / 240, place, upright, [False, False], Contacts(**one) if i != 1 else Contacts.none(), [0, 0, -9.81]) for i in range(3)]  # type: ignore[arg-type]
+    steps = [
+        Step(1 / 240, place, upright, [False, False], Contacts(**one) if i != 1 else Contacts.none(), [0, 0, -9.81])
+        for i in range(3)
+    ]  # type: ignore[arg-type]
     sensors = (Microphone([0, -1, 0.5]), Vibrometer(0, [0, 0, 0.025], [0, 0, 1]), ModalSum(1.0))  # type: ignore[arg-type]
-    return ContactLog(bodies, tuple(steps), sensors if microphone else sensors[2:], SR, 0, events=(Event("quench", 1), Event("quench", 2)))
+    return ContactLog(
+        bodies,
+        tuple(steps),
+        sensors if microphone else sensors[2:],
+        SR,
+        0,
+        events=(Event("quench", 1), Event("quench", 2)),
+    )
 
 
 def struck(model: ModalModel, material: Material = STEEL) -> None:
@@ -77,7 +118,19 @@ def struck(model: ModalModel, material: Material = STEEL) -> None:
 
 def residual() -> Residual:
     line = np.array([500.0, 1500.0])
-    return Residual(line, line / 100, line / 1e6, line, line / 50, line / 1e6, np.array([100.0, 1e3]), np.array([0.0, 0.1]), np.ones((2, 2)) * 1e-9, 0.1, "x")
+    return Residual(
+        line,
+        line / 100,
+        line / 1e6,
+        line,
+        line / 50,
+        line / 1e6,
+        np.array([100.0, 1e3]),
+        np.array([0.0, 0.1]),
+        np.ones((2, 2)) * 1e-9,
+        0.1,
+        "x",
+    )
 
 
 def preset_seed() -> dict[str, Any]:
@@ -106,19 +159,33 @@ def preset_seed() -> dict[str, Any]:
 
 def case_seed() -> dict[str, Any]:
     """A case that declares all there is to declare."""
-    strike = {"position": [0, 0, 0.1], "direction": [0, 0, -2], "impulse": 0.01, "force": {"file": "f.wav", "channel": 0, "newton_per_unit": 2.0}}
+    strike = {
+        "position": [0, 0, 0.1],
+        "direction": [0, 0, -2],
+        "impulse": 0.01,
+        "force": {"file": "f.wav", "channel": 0, "newton_per_unit": 2.0},
+    }
     guess = {"youngs_modulus": 2e11, "density": 7850, "poisson_ratio": 0.3}
     return {
         "format": "sonic-bullet-case/1",
         "case": "bar",
         "objects": {"bar": {"mesh": "bar.obj", "units": "mm", "material": "steel", "elastic_guess": guess}},
         "support": {"fixed": [{"position": [1, 2, 3], "radius": 0.5, "object": "bar"}]},
-        "sensor": {"type": "microphone", "response": "sound pressure", "position": {"bar": [0, 0, 0]}, "direction": [0, 0, 1]},
+        "sensor": {
+            "type": "microphone",
+            "response": "sound pressure",
+            "position": {"bar": [0, 0, 0]},
+            "direction": [0, 0, 1],
+        },
         "band_hz": [20, 20000],
         "onset": 0.0,
         "recordings": [
             {"file": "a.wav", "object": "bar", "split": "fit", "strike": strike, "channel": 0},
-            {"object": "bar", "split": "holdout", "features": [{"freq_hz": 100.0, "decay_per_s": 1.0, "freq_sd_hz": 0.1, "amplitude": 1.0}]},
+            {
+                "object": "bar",
+                "split": "holdout",
+                "features": [{"freq_hz": 100.0, "decay_per_s": 1.0, "freq_sd_hz": 0.1, "amplitude": 1.0}],
+            },
         ],
     }
 
@@ -235,11 +302,22 @@ def doors() -> tuple[Door, ...]:
     )
     preset, case = preset_seed(), case_seed()
 
-    def packed(name: str, share: float, entries: containers.Entries, enter: Callable[[Path], object], seal: Any = None) -> Door:
-        return Door(name, ".npz", share, lambda: containers.put_together(entries), lambda draw: containers.container_changed(entries, draw, seal), enter)
+    def packed(
+        name: str, share: float, entries: containers.Entries, enter: Callable[[Path], object], seal: Any = None
+    ) -> Door:
+        return Door(
+            name,
+            ".npz",
+            share,
+            lambda: containers.put_together(entries),
+            lambda draw: containers.container_changed(entries, draw, seal),
+            enter,
+        )
 
     def written(name: str, share: float, seed: dict[str, Any], enter: Callable[[Path], object]) -> Door:
-        return Door(name, ".json", share, lambda: json.dumps(seed).encode(), lambda draw: json_changed(seed, draw), enter)
+        return Door(
+            name, ".json", share, lambda: json.dumps(seed).encode(), lambda draw: json_changed(seed, draw), enter
+        )
 
     def sound(suffix: str, share: float) -> Door:
         data = sounds.seed(suffix)
@@ -248,7 +326,14 @@ def doors() -> tuple[Door, ...]:
 
     def mesh(kind: str, share: float) -> Door:
         data = meshes.seed(kind)
-        return Door(f"mesh {kind}", "." + kind.split("_", maxsplit=1)[0], share, lambda: data, lambda draw: meshes.mesh_changed(kind, data, draw), _enter_mesh)
+        return Door(
+            f"mesh {kind}",
+            "." + kind.split("_", maxsplit=1)[0],
+            share,
+            lambda: data,
+            lambda draw: meshes.mesh_changed(kind, data, draw),
+            _enter_mesh,
+        )
 
     return (
         packed("log", 0.12, log, _enter_log),

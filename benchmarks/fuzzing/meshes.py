@@ -30,7 +30,9 @@ def seed(kind: str) -> bytes:
         tree = json.loads(whole[20 : 20 + size])
         import base64
 
-        tree["buffers"][0]["uri"] = "data:application/octet-stream;base64," + base64.b64encode(whole[28 + size :]).decode()
+        tree["buffers"][0]["uri"] = (
+            "data:application/octet-stream;base64," + base64.b64encode(whole[28 + size :]).decode()
+        )
         return json.dumps(tree).encode()
     made = box.export(file_type=kind)
     return made.encode() if isinstance(made, str) else bytes(made)
@@ -89,7 +91,9 @@ def _glb_changed(data: bytes, draw: random.Random) -> bytes:
     elif draw.random() < 0.5:
         numbers = np.frombuffer(binary, np.uint8).copy()
         at = draw.randrange(len(numbers) - 4)
-        numbers[at : at + 4] = np.frombuffer(struct.pack("<I", draw.choice([i for i in INDICES if 0 <= i < 2**32])), np.uint8)
+        numbers[at : at + 4] = np.frombuffer(
+            struct.pack("<I", draw.choice([i for i in INDICES if 0 <= i < 2**32])), np.uint8
+        )
         binary = numbers.tobytes()
     else:
         binary = changed(binary, draw)

@@ -1,4 +1,6 @@
-"""Changes to bytes, to JSON and to the words of a text, drawn from a `random.Random`: the same draw gives the same file."""
+"""Changes to bytes, to JSON and to the words of a text, drawn from a `random.Random`: the same draw gives the same
+file.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +11,26 @@ import struct
 from collections.abc import Callable
 from typing import Any
 
-NUMBERS: tuple[Any, ...] = (0, -1, 1, -0.0, 1e-320, 5e-324, 1e-9, 1e9, 1e39, 1e300, 1e308, -1e308, 2**31 - 1, -(2**31), 2**32, 2**63, 2**64, 10**30)
+NUMBERS: tuple[Any, ...] = (
+    0,
+    -1,
+    1,
+    -0.0,
+    1e-320,
+    5e-324,
+    1e-9,
+    1e9,
+    1e39,
+    1e300,
+    1e308,
+    -1e308,
+    2**31 - 1,
+    -(2**31),
+    2**32,
+    2**63,
+    2**64,
+    10**30,
+)
 LONG = "x" * 5000
 NODES: tuple[Any, ...] = (
     *NUMBERS,
@@ -31,7 +52,24 @@ NODES: tuple[Any, ...] = (
     float("inf"),
 )
 WORDS: tuple[bytes, ...] = tuple(
-    str(x).encode() for x in (*NUMBERS, "nan", "inf", "-inf", "0x10", "1e999", "9" * 400, "", "x" * 3000, "1/2/3/4", "//", "-1/-1", "1,5", "1_0", "٣")
+    str(x).encode()
+    for x in (
+        *NUMBERS,
+        "nan",
+        "inf",
+        "-inf",
+        "0x10",
+        "1e999",
+        "9" * 400,
+        "",
+        "x" * 3000,
+        "1/2/3/4",
+        "//",
+        "-1/-1",
+        "1,5",
+        "1_0",
+        "٣",
+    )
 )
 FIELDS: tuple[bytes, ...] = (
     *(struct.pack("<I", x) for x in (0, 1, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFF, 0xFFFFFFFE, 1 << 20, 1 << 28)),
@@ -105,7 +143,9 @@ def reworded(data: bytes, draw: random.Random) -> bytes:
         words = lines[row].split(b" ")
         kind = draw.randrange(8)
         if kind < 5:
-            words[draw.randrange(len(words))] = draw.choice(WORDS) if draw.random() < 0.7 else draw.choice(b" ".join(lines).split() or [b""])
+            words[draw.randrange(len(words))] = (
+                draw.choice(WORDS) if draw.random() < 0.7 else draw.choice(b" ".join(lines).split() or [b""])
+            )
         elif kind == 5:
             words.append(draw.choice(WORDS))
         elif kind == 6:

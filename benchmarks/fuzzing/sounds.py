@@ -1,6 +1,7 @@
 """Small audio files of every format, and changes after which their checksums are right again.
 
-FLAC: CRC-8 of each frame's header, CRC-16 of each frame [RFC 9639, 9.1.8 and 9.3]. Ogg: CRC-32 of each page, polynomial 04C11DB7 [RFC 3533, 6].
+FLAC: CRC-8 of each frame's header, CRC-16 of each frame [RFC 9639, 9.1.8 and 9.3]. Ogg: CRC-32 of each page, polynomial
+04C11DB7 [RFC 3533, 6].
 """
 
 from __future__ import annotations
@@ -62,10 +63,17 @@ def _crc(data: bytes, bits: int, table: list[int]) -> int:
 
 
 def flac_frames(data: bytes) -> list[int]:
-    """Where the frames start: a sync code whose header's CRC-8 is right. A header of these seeds is 6 to 10 bytes long."""
+    """Where the frames start: a sync code whose header's CRC-8 is right.
+
+    A header of these seeds is 6 to 10 bytes long.
+    """
     found = []
     for at in range(len(data) - 10):
-        if data[at] == 0xFF and data[at + 1] & 0xFE == 0xF8 and any(_crc(data[at : at + n], 8, CRC8) == data[at + n] for n in range(5, 10)):
+        if (
+            data[at] == 0xFF
+            and data[at + 1] & 0xFE == 0xF8
+            and any(_crc(data[at : at + n], 8, CRC8) == data[at + n] for n in range(5, 10))
+        ):
             found.append(at)
     return found
 
@@ -89,7 +97,11 @@ def flac_changed(data: bytes, draw: random.Random) -> bytes:
     low, high = starts[k], starts[k + 1] if k + 1 < len(starts) else len(data)
     size = next(n for n in range(5, 10) if _crc(data[low : low + n], 8, CRC8) == data[low + n])
     frame = data[low:high]
-    frame = flipped(frame, draw, 2, size) if draw.random() < 0.4 else draw.choice((flipped, overwritten))(frame, draw, size + 1, len(frame) - 2)
+    frame = (
+        flipped(frame, draw, 2, size)
+        if draw.random() < 0.4
+        else draw.choice((flipped, overwritten))(frame, draw, size + 1, len(frame) - 2)
+    )
     frame = frame[:size] + bytes([_crc(frame[:size], 8, CRC8)]) + frame[size + 1 : -2]
     frame += _crc(frame, 16, CRC16).to_bytes(2, "big")
     return data[:low] + frame * draw.choice((1, 1, 1, 3)) + data[high:]
@@ -121,7 +133,9 @@ def ogg_changed(data: bytes, draw: random.Random) -> bytes:
         page = draw.choice((flipped, overwritten))(page, draw, 4, 22)
     elif kind < 4:
         low = body if at else 0
-        page = draw.choice((flipped, overwritten))(page, draw, max(low, 27), min(len(page), max(low, 27) + draw.choice((40, 400, 5000))))
+        page = draw.choice((flipped, overwritten))(
+            page, draw, max(low, 27), min(len(page), max(low, 27) + draw.choice((40, 400, 5000)))
+        )
     pages[at] = page
     if kind == 4:
         pages = draw.choice((pages[:at] + pages[at + 1 :], pages[: at + 1] + pages[at:], pages[::-1]))

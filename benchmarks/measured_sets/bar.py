@@ -1,7 +1,10 @@
-"""The steel bar: size and mass known, one tap. Lines below 8 kHz fitted, those above predicted: frequencies by the body's own modes, decays by a law.
+"""The steel bar: size and mass known, one tap.
+
+Lines below 8 kHz fitted, those above predicted: frequencies by the body's own modes, decays by a law.
 
 lines (f, d, A) --pairing--> bar's modes at (γ, ν): γ = E/ρ, ν by least squares on the strong lines below 8 kHz
-frequencies    steel's table values for γ, ν -> fitted γ, ν                      error: median |Δf|/f of the strong lines above
+frequencies    steel's table values for γ, ν -> fitted γ, ν
+    error: median |Δf|/f of the strong lines above
 decays         Rayleigh -> damping-law, on strong lines that are modes           error: median |20 lg d'/d|
 """
 
@@ -37,7 +40,8 @@ def judge(folder: Path, case: dict[str, Any]) -> Outcome:
     line, mode = nearest(better, tone_hz[~below], 0.03)
     wide = tone_hz[~below][line]
     before, after = (100 * np.abs(m[mode] / wide - 1) for m in (plain, better))
-    rng = np.random.default_rng(0)  # null: a body of other shape, its modes anywhere with the same density; lines pair with what lies nearest
+    # null: a body of other shape, its modes anywhere with the same density; lines pair with what lies nearest
+    rng = np.random.default_rng(0)
     inside = better[(better > SPLIT_HZ) & (better < 11500)]
     chance = []
     for _ in range(DRAWS):
@@ -58,7 +62,10 @@ def judge(folder: Path, case: dict[str, Any]) -> Outcome:
     text = (
         f"{len(tone_hz)} peaks of the spectrum within {STRONG_DB:.0f} dB of the strongest, {int(below.sum())} below 8 kHz. γ = E/ρ = {gamma:.4g} m²/s² (E = {gamma * density / 1e9:.1f} GPa), "
         f"ν = {nu:.3f} from {', '.join(f'{f:.1f}' for f in mine)} Hz. Above 8 kHz "
-        + "; ".join(f"{h:.1f} Hz is observed where {m:.1f} is predicted ({100 * (m / h - 1):+.2f} %)" for h, m in zip(wide, better[mode], strict=True))
+        + "; ".join(
+            f"{h:.1f} Hz is observed where {m:.1f} is predicted ({100 * (m / h - 1):+.2f} %)"
+            for h, m in zip(wide, better[mode], strict=True)
+        )
         + ". A table's steel (E = 200 GPa, ν = 0.29) is the frequencies' `before`; their null draws the modes above 8 kHz anywhere."
     )
     return _decays(rows, text, every)
@@ -97,7 +104,9 @@ def nearest(mode_hz: Array, line_hz: Array, near: float = NEAR) -> tuple[Array, 
 
 
 def peaks(signal: Array, sr: int, *, low_hz: float = 1000.0, apart: float = 0.01) -> tuple[Array, Array]:
-    """Frequencies, by a parabola through three bins, and heights of the spectrum's strongest peaks, ascending; a Blackman-Harris window keeps leakage 90 dB down."""
+    """Frequencies, by a parabola through three bins, and heights of the spectrum's strongest peaks, ascending; a
+    Blackman-Harris window keeps leakage 90 dB down.
+    """
     from scipy.signal.windows import blackmanharris
 
     size = 8 * len(signal)

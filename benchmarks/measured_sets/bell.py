@@ -1,6 +1,9 @@
-"""One stroke of a bell: is a line one mode or two? The first part of each line's course fitted, the later part predicted.
+"""One stroke of a bell: is a line one mode or two?
 
-z(t) of a line, shifted to 0 Hz    before: a e^{(−d + iδ)t}     after: mode-splitting, two such      null: the second one's δ drawn by lot
+The first part of each line's course fitted, the later part predicted.
+
+z(t) of a line, shifted to 0 Hz    before: a e^{(−d + iδ)t}     after: mode-splitting, two such
+    null: the second one's δ drawn by lot
 error: median |20 lg |z'|/|z|| over the held-out part, where the line stands clear of the noise
 """
 
@@ -26,7 +29,17 @@ def judge(folder: Path, case: dict[str, Any]) -> Outcome:
     rows, drawn, said = [], [], []
     rng = np.random.default_rng(0)
     for channel in range(min(int(entry.get("channels", 1)), 2)):
-        found = clear(lines(folder / entry["file"], channel=channel, start_s=0.003, seconds=1.5, onset_s=0.0, band_hz=(1000.0, 12000.0)), apart=0.004)
+        found = clear(
+            lines(
+                folder / entry["file"],
+                channel=channel,
+                start_s=0.003,
+                seconds=1.5,
+                onset_s=0.0,
+                band_hz=(1000.0, 12000.0),
+            ),
+            apart=0.004,
+        )
         strong = np.argsort(-(found.amplitude**2) / found.decay_per_s)[:MOST]
         signal, sr = cut(folder / entry["file"], channel, 0.05, HELD_S)
         for k in strong[np.argsort(found.freq_hz[strong])]:
@@ -36,21 +49,44 @@ def judge(folder: Path, case: dict[str, Any]) -> Outcome:
             t, z, fit = made
             one, two = modes(t[fit], z[fit], 1), modes(t[fit], z[fit], 2)
             before, after = off(one, t, z, ~fit), off(two, t, z, ~fit)
-            nulls = np.array([off(np.array([one[0], one[0] + 2j * np.pi * rng.uniform(-12, 12)]), t, z, ~fit, (t[fit], z[fit])) for _ in range(NULLS)])
+            nulls = np.array(
+                [
+                    off(np.array([one[0], one[0] + 2j * np.pi * rng.uniform(-12, 12)]), t, z, ~fit, (t[fit], z[fit]))
+                    for _ in range(NULLS)
+                ]
+            )
             apart = abs((two[0] - two[1]).imag) / (2 * np.pi)
             name = f"channel {channel}, {found.freq_hz[k]:.0f} Hz"
-            rows.append(Row(name, int((~fit).sum()), "dB of |z|", before, after, float(np.median(nulls)), float((nulls <= after).mean()), "mode-splitting"))
+            rows.append(
+                Row(
+                    name,
+                    int((~fit).sum()),
+                    "dB of |z|",
+                    before,
+                    after,
+                    float(np.median(nulls)),
+                    float((nulls <= after).mean()),
+                    "mode-splitting",
+                )
+            )
             said.append(f"{name}: {apart:.2f} Hz apart ({100 * apart / found.freq_hz[k]:.3f} %)")
             drawn.append((name, t, z, one, two, fit))
     if not rows:
         raise ValueError("no line stands clear of the noise for long enough")
-    text = f"The first {FITTED_S} s of each line fitted, the next {HELD_S - FITTED_S:.1f} s predicted. " + "; ".join(said) + "."
+    text = (
+        f"The first {FITTED_S} s of each line fitted, the next {HELD_S - FITTED_S:.1f} s predicted. "
+        + "; ".join(said)
+        + "."
+    )
     left = "one stroke at one place: which way the pairs lie on the rim, and which imperfection parts them, needs strokes round the rim"
     return Outcome(tuple(rows), text, left, lambda figure: paint(figure, drawn[0]))
 
 
 def course(signal: Array, sr: int, freq_hz: float) -> tuple[Array, Array, Array] | None:
-    """t, z and which of them is fitted, at 4 values a bandwidth; None where the line is lost in noise before half of the held-out part."""
+    """t, z and which of them is fitted, at 4 values a bandwidth;
+
+    None where the line is lost in noise before half of the held-out part.
+    """
     n = int(2 * sr / BANDWIDTH_HZ) | 1
     window = np.hanning(n + 2)[1:-1]
     window /= window.sum()

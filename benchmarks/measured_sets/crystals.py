@@ -1,7 +1,12 @@
-"""Small crystals by resonant ultrasound: lists of frequencies of blocks of known size. Every second one fitted, the others predicted, by the package's own diagnosis.
+"""Small crystals by resonant ultrasound: lists of frequencies of blocks of known size.
 
-f₁ f₃ f₅ … -> case.json with `features`, split fit; f₂ f₄ … split holdout -> diagnose -> rms ln f of the holdout list, isotropic -> with orthotropy
-null    as many modes drawn anywhere between the lowest and the highest line: rms of the distance to the nearest, one line a mode
+Every second one fitted, the others predicted, by the package's own diagnosis.
+
+f₁ f₃ f₅ … -> case.json with `features`, split fit; f₂ f₄ … split holdout -> diagnose -> rms ln f of the holdout list,
+isotropic -> with orthotropy
+null
+    as many modes drawn anywhere between the lowest and the highest line: rms of the distance to the nearest, one line a
+    mode
 """
 
 from __future__ import annotations
@@ -17,7 +22,8 @@ from benchmarks.measured_sets.values import DRAWS, Array, Outcome, Row
 from sonic_bullet.diagnosis.diagnose import Diagnosis, diagnose
 from sonic_bullet.diagnosis.prediction.line_score import CAP, off_by
 
-GUESS = {"youngs_modulus": 1.7e11, "poisson_ratio": 0.25}  # of any hard solid: E/ρ is sought over a factor of two to each side
+# of any hard solid: E/ρ is sought over a factor of two to each side
+GUESS = {"youngs_modulus": 1.7e11, "poisson_ratio": 0.25}
 
 
 def judge(folder: Path, case: dict[str, Any]) -> Outcome:
@@ -50,7 +56,10 @@ def judge(folder: Path, case: dict[str, Any]) -> Outcome:
             left.append(f"{name}: no symmetry that is known here accounts for the lines")
     if not rows:
         raise ValueError("; ".join(skipped) or "it lists no crystal")
-    rest = "; ".join(left) or "what is left is some parts in a thousand, as edges a few micrometres off and the transducers' touch would make it"
+    rest = (
+        "; ".join(left)
+        or "what is left is some parts in a thousand, as edges a few micrometres off and the transducers' touch would make it"
+    )
     return Outcome(tuple(rows), " ".join(texts), rest, lambda figure: _paint(figure, found), tuple(skipped))
 
 
@@ -66,7 +75,10 @@ def diagnosed(folder: Path, entry: dict[str, Any]) -> Diagnosis:
             "material": "crystal",
             "elastic_guess": GUESS | {"density": entry["density_kg_m3"]},
         }
-        takes = [{"object": "block", "split": split, "features": [{"freq_hz": f} for f in lines[first::2]]} for first, split in ((0, "fit"), (1, "holdout"))]
+        takes = [
+            {"object": "block", "split": split, "features": [{"freq_hz": f} for f in lines[first::2]]}
+            for first, split in ((0, "fit"), (1, "holdout"))
+        ]
         told = {
             "format": "sonic-bullet-case/1",
             "case": entry["id"],
@@ -80,7 +92,9 @@ def diagnosed(folder: Path, entry: dict[str, Any]) -> Diagnosis:
 
 
 def _held(d: Diagnosis) -> Array:
-    return np.array([line.freq_hz for r in d.bodies[0].recordings if r.split == "holdout" and r.lines for line in r.lines])
+    return np.array(
+        [line.freq_hz for r in d.bodies[0].recordings if r.split == "holdout" and r.lines for line in r.lines]
+    )
 
 
 def _nulls(d: Diagnosis) -> Array:
@@ -101,7 +115,8 @@ def _constants(d: Diagnosis) -> str:
         names = [n for n in told if n.startswith("c") and n.endswith("_pa")]
         spread = {n: c.spread.get(n, float("nan")) for n in names}
         return (
-            ", ".join(f"{n[:-3]} {told[n] / 1e9:.1f} ± {spread[n] / 1e9:.1f} GPa" for n in names) + f" ({told['symmetry']}), from {len(_held(d))} lines or so."
+            ", ".join(f"{n[:-3]} {told[n] / 1e9:.1f} ± {spread[n] / 1e9:.1f} GPa" for n in names)
+            + f" ({told['symmetry']}), from {len(_held(d))} lines or so."
         )
     return "No effect was added."
 

@@ -1,8 +1,11 @@
 """One object on two fixtures (a hammer's table, a robot's hold), and two tools on two objects.
 
 frequencies  lines of the robot's takes -> the hammer's                             error: median |Δf|/f
-decays       d_hammer = d_robot  ->  d_robot + c (a support that takes alike from all lines), c on every second line, judged on the others
-strikers     a line that a tool brings on one object and the other tool does not, looked for on the other object: the tool's own, or not
+decays       d_hammer = d_robot  ->
+    d_robot + c (a support that takes alike from all lines), c on every second line, judged on the others
+strikers
+    a line that a tool brings on one object and the other tool does not, looked for on the other object: the tool's own,
+    or not
 null         c on shuffled lines; frequencies at random in the band
 """
 
@@ -36,7 +39,9 @@ def judge(folder: Path, case: dict[str, Any]) -> Outcome:
         if count[key] > TAKES:
             continue
         try:
-            found = lines(folder / entry["file"], start_s=entry["t_hit_s"] + 0.003, seconds=0.8, onset_s=0.0, band_hz=BAND)
+            found = lines(
+                folder / entry["file"], start_s=entry["t_hit_s"] + 0.003, seconds=0.8, onset_s=0.0, band_hz=BAND
+            )
             takes.setdefault(key, []).append(clear(found, sure=0.3))
         except Exception as error:  # one take less: the others are judged
             skipped.append(f"{entry['file']}: {error}")
@@ -56,9 +61,7 @@ def judge(folder: Path, case: dict[str, Any]) -> Outcome:
         texts.append(text)
         pairs[thing] = pair
     more, text = strikers(takes)
-    left = (
-        "what a hold takes from a line goes with the line's shape where it is held; neither shape nor place is given, so the difference of decays stays a list"
-    )
+    left = "what a hold takes from a line goes with the line's shape where it is held; neither shape nor place is given, so the difference of decays stays a list"
     return Outcome((*rows, *more), " ".join([*texts, text]), left, lambda figure: paint(figure, pairs), tuple(skipped))
 
 
@@ -75,7 +78,10 @@ def hammered(folder: Path, material: str) -> list[Lines]:
 
 def merged(bodies: list[Lines], least: int) -> Lines:
     """Lines that `least` takes share, each number the median over them."""
-    every = [np.concatenate([getattr(b, n) for b in bodies]) for n in ("freq_hz", "decay_per_s", "decay_sd_per_s", "amplitude", "freq_sd_hz")]
+    every = [
+        np.concatenate([getattr(b, n) for b in bodies])
+        for n in ("freq_hz", "decay_per_s", "decay_sd_per_s", "amplitude", "freq_sd_hz")
+    ]
     order = np.argsort(every[0])
     rows, f = [], every[0][order]
     for group in np.split(order, np.flatnonzero(np.diff(np.log(f)) > NEAR / 2) + 1):
@@ -87,13 +93,23 @@ def merged(bodies: list[Lines], least: int) -> Lines:
 def fixtures(thing: str, robot: Lines, hammer: Lines) -> tuple[list[Row], str, tuple[Array, Array, Array]]:
     """Rows, what they say, and the common lines' f, d on either."""
     both = _common(robot.freq_hz, hammer.freq_hz)
-    f, g, d, e = robot.freq_hz[both[0]], hammer.freq_hz[both[1]], robot.decay_per_s[both[0]], hammer.decay_per_s[both[1]]
+    f, g, d, e = (
+        robot.freq_hz[both[0]],
+        hammer.freq_hz[both[1]],
+        robot.decay_per_s[both[0]],
+        hammer.decay_per_s[both[1]],
+    )
     text = f"{thing}: {len(robot.freq_hz)} lines under the robot, {len(hammer.freq_hz)} under the hammer, {len(f)} in common"
     if len(f) < 4:
         return [], text + ": too few to judge.", (f, d, e)
     rng = np.random.default_rng(0)
     span = np.log(BAND[1] / BAND[0])
-    wide = [float(np.mean(np.abs(np.log(rng.uniform(*BAND, len(robot.freq_hz))[:, None] / hammer.freq_hz)).min(axis=1) < NEAR)) for _ in range(DRAWS)]
+    wide = [
+        float(
+            np.mean(np.abs(np.log(rng.uniform(*BAND, len(robot.freq_hz))[:, None] / hammer.freq_hz)).min(axis=1) < NEAR)
+        )
+        for _ in range(DRAWS)
+    ]
     text += f" (by chance {np.mean(wide) * len(robot.freq_hz):.1f}, over {span:.1f} e-folds)"
     worst = float(np.median(np.abs(100 * (g / f - 1))))
     fit, held = np.arange(len(f)) % 2 == 0, np.arange(len(f)) % 2 == 1
@@ -143,7 +159,13 @@ def strikers(takes: dict[tuple[str, str], list[Lines]]) -> tuple[list[Row], str]
         others = [seen[k] for k in seen if k[0] != tool and k[1] == things[0]]
         if here is None or there is None or not others or not len(there.freq_hz):
             continue
-        alone = np.array([f for f in here.freq_hz if all(not len(o.freq_hz) or np.abs(o.freq_hz / f - 1).min() > NEAR for o in others)])
+        alone = np.array(
+            [
+                f
+                for f in here.freq_hz
+                if all(not len(o.freq_hz) or np.abs(o.freq_hz / f - 1).min() > NEAR for o in others)
+            ]
+        )
         if not len(alone):
             said.append(f"{tool}: no line of its own")
             continue

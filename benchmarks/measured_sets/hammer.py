@@ -1,7 +1,9 @@
 """Hits of an instrumented hammer: the softer ones fitted, the louder ones predicted, force known.
 
-    contact time   τ of the soft hits' mean   -> contact-time  τ₀ (J/J₀)^{−1/5}                 error: median |τ'/τ − 1|; null: J^x, x drawn from −½ to ½
-    lines          |A_k| = g_k J              -> contact-time  g_k J |F̂(f_k τ(J))|/|F̂(0)|       g_k, τ₀ by the soft hits
+    contact time   τ of the soft hits' mean   -> contact-time  τ₀ (J/J₀)^{−1/5}
+        error: median |τ'/τ − 1|; null: J^x, x drawn from −½ to ½
+    lines          |A_k| = g_k J              -> contact-time  g_k J |F̂(f_k τ(J))|/|F̂(0)|
+        g_k, τ₀ by the soft hits
                                               -> the measured pulse's own spectrum |F(f_k)|
     null           τ₀ and exponent at random (τ₀ in 0.2 to 5 of it, x as above)
 
@@ -54,7 +56,8 @@ def pulse(force: Array, sr: int, at_s: float) -> tuple[float, float, Array]:
     over = part > 0.1 * part[top]
     begin = top - int(np.argmin(over[: top + 1][::-1])) + 1 if not over[: top + 1].all() else 0
     end = top + int(np.argmin(over[top:])) if not over[top:].all() else len(part)
-    left = (part[begin] - 0.1 * part[top]) / max(part[begin] - part[max(begin - 1, 0)], 1e-12)  # where the straight line crosses a tenth
+    # where the straight line crosses a tenth
+    left = (part[begin] - 0.1 * part[top]) / max(part[begin] - part[max(begin - 1, 0)], 1e-12)
     right = (part[end - 1] - 0.1 * part[top]) / max(part[end - 1] - part[min(end, len(part) - 1)], 1e-12)
     width = (end - 1 - begin + min(left, 1.0) + min(right, 1.0)) / sr
     shape = np.maximum(part[max(begin - 2, 0) : end + 2], 0.0)
@@ -68,7 +71,9 @@ def judge(folder: Path, case: dict[str, Any]) -> Outcome:
         try:
             path = folder / entry["file"]
             name = entry.get("object", case.get("object", path.stem)).split(" (")[0]
-            objects[name] = _measured(path, float(entry["fs_hz"])) if path.suffix == ".npz" else _hits(path, entry["hits"])
+            objects[name] = (
+                _measured(path, float(entry["fs_hz"])) if path.suffix == ".npz" else _hits(path, entry["hits"])
+            )
         except Exception as error:  # one object less: the others are judged
             skipped.append(f"{entry['file']}: {error}")
     if not objects:
@@ -99,9 +104,18 @@ def _hits(path: Path, told: list[dict[str, Any]]) -> list[Hit]:
     for h in told:
         impulse, tau, shape = pulse(force, sr, h["t_hit_s"])
         seconds = min(h["ring_window_s"] - 0.01, 0.5)
-        mine = clear(lines(path, start_s=h["t_hit_s"] + AFTER_S, seconds=seconds, onset_s=0.0, band_hz=(200.0, 14000.0)), sure=0.3)
+        mine = clear(
+            lines(path, start_s=h["t_hit_s"] + AFTER_S, seconds=seconds, onset_s=0.0, band_hz=(200.0, 14000.0)),
+            sure=0.3,
+        )
         sound, _ = cut(path, 0, h["t_hit_s"], seconds)
-        mine = Lines(mine.freq_hz, mine.decay_per_s, mine.decay_sd_per_s, mine.amplitude * np.exp(mine.decay_per_s * AFTER_S), mine.freq_sd_hz)
+        mine = Lines(
+            mine.freq_hz,
+            mine.decay_per_s,
+            mine.decay_sd_per_s,
+            mine.amplitude * np.exp(mine.decay_per_s * AFTER_S),
+            mine.freq_sd_hz,
+        )
         found.append(Hit(impulse, tau, shape, sr, mine, int((np.abs(sound) > FULL).sum())))
     return found
 
@@ -116,9 +130,21 @@ def _measured(path: Path, fs_hz: float) -> list[Hit]:
         impulse, tau, shape = pulse(np.asarray(force, float), sr, at)
         first = round((at + AFTER_S) * fs_hz)
         mine = clear(
-            features(jittered(np.ascontiguousarray(sound[first : first + round(0.5 * fs_hz)], float)), sr, onset_s=0.0, band_hz=(200.0, 0.45 * fs_hz)), sure=0.3
+            features(
+                jittered(np.ascontiguousarray(sound[first : first + round(0.5 * fs_hz)], float)),
+                sr,
+                onset_s=0.0,
+                band_hz=(200.0, 0.45 * fs_hz),
+            ),
+            sure=0.3,
         )
-        mine = Lines(mine.freq_hz, mine.decay_per_s, mine.decay_sd_per_s, mine.amplitude * np.exp(mine.decay_per_s * AFTER_S), mine.freq_sd_hz)
+        mine = Lines(
+            mine.freq_hz,
+            mine.decay_per_s,
+            mine.decay_sd_per_s,
+            mine.amplitude * np.exp(mine.decay_per_s * AFTER_S),
+            mine.freq_sd_hz,
+        )
         found.append(Hit(impulse, tau, shape, sr, mine, 0))
     return found
 
@@ -161,11 +187,23 @@ def judged(name: str, soft: list[Hit], loud: list[Hit], seed: int = 0) -> list[R
 def levels(name: str, soft: list[Hit], loud: list[Hit], seed: int = 0) -> list[Row]:
     """The loud hits' lines, by the soft hits' lines per impulse."""
     found = [
-        (h, k, [(s, int(i)) for s in soft if len(s.lines.freq_hz) for i in [np.argmin(np.abs(s.lines.freq_hz / h.lines.freq_hz[k] - 1))]])
+        (
+            h,
+            k,
+            [
+                (s, int(i))
+                for s in soft
+                if len(s.lines.freq_hz)
+                for i in [np.argmin(np.abs(s.lines.freq_hz / h.lines.freq_hz[k] - 1))]
+            ],
+        )
         for h in loud
         for k in range(len(h.lines.freq_hz))
     ]
-    pairs = [(h, k, [(s, i) for s, i in near if abs(s.lines.freq_hz[i] / h.lines.freq_hz[k] - 1) < SAME]) for h, k, near in found]
+    pairs = [
+        (h, k, [(s, i) for s, i in near if abs(s.lines.freq_hz[i] / h.lines.freq_hz[k] - 1) < SAME])
+        for h, k, near in found
+    ]
     pairs = [p for p in pairs if p[2]]
     if len(pairs) < 3:
         return []
@@ -178,16 +216,26 @@ def levels(name: str, soft: list[Hit], loud: list[Hit], seed: int = 0) -> list[R
         return float(np.median(off))
 
     def by(made: ContactTime) -> float:
-        return error(lambda h, f: max(abs(float(magnitude("half-sine", np.array([f * made.duration_s(h.impulse)]))[0])), 0.02))
+        return error(
+            lambda h, f: max(abs(float(magnitude("half-sine", np.array([f * made.duration_s(h.impulse)]))[0])), 0.02)
+        )
 
     rng = np.random.default_rng(seed)
     before, after = error(lambda h, f: 1.0), by(law(soft))
-    nulls = np.array([by(law(soft, x, c)) for x, c in zip(rng.uniform(-0.5, 0.5, 60), np.exp(rng.uniform(np.log(0.2), np.log(5), 60)), strict=True)])
+    nulls = np.array(
+        [
+            by(law(soft, x, c))
+            for x, c in zip(rng.uniform(-0.5, 0.5, 60), np.exp(rng.uniform(np.log(0.2), np.log(5), 60)), strict=True)
+        ]
+    )
     own = error(lambda h, f: max(float(h.spectrum(np.array([f]))[0]), 0.02))
     chance = [float((nulls <= e).mean()) for e in (after, own)]
     middle = float(np.median(nulls))
     kinds = ((after, "contact-time (half-sine, τ ~ J^-1/5)"), (own, "contact-time (measured pulse)"))
-    return [Row(f"{name}: level of lines", len(pairs), "dB", before, e, middle, c, what) for (e, what), c in zip(kinds, chance, strict=True)]
+    return [
+        Row(f"{name}: level of lines", len(pairs), "dB", before, e, middle, c, what)
+        for (e, what), c in zip(kinds, chance, strict=True)
+    ]
 
 
 def paint(figure: Any, objects: dict[str, list[Hit]]) -> None:
@@ -196,7 +244,13 @@ def paint(figure: Any, objects: dict[str, list[Hit]]) -> None:
         hits.sort(key=lambda h: h.impulse)
         left.loglog([h.impulse for h in hits], [1e3 * h.tau_s for h in hits], "o", ms=4, label=name[:16])
         made = law(hits[: (len(hits) + 1) // 2])
-        left.loglog([h.impulse for h in hits], [1e3 * made.duration_s(h.impulse) for h in hits], "-", lw=0.8, color=left.lines[-1].get_color())
+        left.loglog(
+            [h.impulse for h in hits],
+            [1e3 * made.duration_s(h.impulse) for h in hits],
+            "-",
+            lw=0.8,
+            color=left.lines[-1].get_color(),
+        )
         f = np.linspace(100, 8000, 160)
         right.plot(f / 1e3, 20 * np.log10(np.maximum(hits[-1].spectrum(f), 1e-3)), lw=1)
     left.set_xlabel("J in full scale · s")

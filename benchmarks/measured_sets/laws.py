@@ -1,6 +1,7 @@
 """Which law decays follow, told on some lines and judged on others.
 
-baseline  d = ½(α + βω²), ln d by least squares under Cauchy's loss        [Rayleigh; physics of ../sonic_bullet/effects/damping_law.py]
+baseline  d = ½(α + βω²), ln d by least squares under Cauchy's loss
+    [Rayleigh; physics of ../sonic_bullet/effects/damping_law.py]
 effect    DampingLaw.propose on the fitted lines
 null      baseline · exp Σ c_i cos(q_i ln f + φ_i), q, φ at random, c fitted, as many as the effect has numbers
 error     median |20 lg d'/d| over the lines held out
@@ -48,10 +49,20 @@ def rayleigh(lines: Lines) -> tuple[float, float]:
 
     w, y = lines.omega, np.log(lines.decay_per_s)
     sd = np.hypot(np.minimum(lines.decay_sd_per_s / lines.decay_per_s, 1.0), SCATTER)
-    starts = [np.log([2 * lines.decay_per_s.min(), 2 * np.median(lines.decay_per_s / w**2)]), np.log([1e-3, 2 * np.median(lines.decay_per_s / w**2)])]
+    starts = [
+        np.log([2 * lines.decay_per_s.min(), 2 * np.median(lines.decay_per_s / w**2)]),
+        np.log([1e-3, 2 * np.median(lines.decay_per_s / w**2)]),
+    ]
     starts.append(np.log([2 * np.median(lines.decay_per_s), 1e-12]))
     found = [
-        least_squares(lambda p: (np.log(0.5 * (np.exp(p[0]) + np.exp(p[1]) * w**2)) - y) / sd, s, loss="cauchy", f_scale=2.0, bounds=(-40, 40)) for s in starts
+        least_squares(
+            lambda p: (np.log(0.5 * (np.exp(p[0]) + np.exp(p[1]) * w**2)) - y) / sd,
+            s,
+            loss="cauchy",
+            f_scale=2.0,
+            bounds=(-40, 40),
+        )
+        for s in starts
     ]
     best = min(found, key=lambda f: f.cost).x
     return float(np.exp(best[0])), float(np.exp(best[1]))
@@ -74,7 +85,11 @@ def null_errors(fit: Lines, base: Array, held: Lines, held_base: Array, numbers:
         c = np.zeros(numbers)
         for _ in range(4):
             root = np.sqrt(weight)[:, None]
-            c = np.linalg.lstsq(np.vstack([columns * root, 0.05 * np.eye(numbers)]), np.concatenate([left * root[:, 0], np.zeros(numbers)]), rcond=None)[0]
+            c = np.linalg.lstsq(
+                np.vstack([columns * root, 0.05 * np.eye(numbers)]),
+                np.concatenate([left * root[:, 0], np.zeros(numbers)]),
+                rcond=None,
+            )[0]
             weight = 1 / (1 + ((left - columns @ c) / 0.2) ** 2)
         found[i] = error_db(held_base * np.exp(ahead @ c), held.decay_per_s)
     return found
@@ -84,7 +99,9 @@ def trial(what: str, fit: list[Lines], held: list[Lines], *, seed: int = 0) -> T
     """The law of the fitted bodies on the held-out lines. Raises ValueError where there are too few lines."""
     mine, other = joined(fit), joined(held)
     if len(mine.freq_hz) < 2 or len(other.freq_hz) < 1:
-        raise ValueError(f"{len(mine.freq_hz)} lines to fit and {len(other.freq_hz)} to predict: too few for a law of decay")
+        raise ValueError(
+            f"{len(mine.freq_hz)} lines to fit and {len(other.freq_hz)} to predict: too few for a law of decay"
+        )
     alpha, beta = rayleigh(mine)
     law = DampingLaw.propose(evidence(fit))
     base, ahead = (0.5 * (alpha + beta * x.omega**2) for x in (mine, other))
@@ -92,11 +109,30 @@ def trial(what: str, fit: list[Lines], held: list[Lines], *, seed: int = 0) -> T
     after = error_db(law.decay_per_s(other.omega), other.decay_per_s) if law is not None else before
     nulls = null_errors(mine, base, other, ahead, law.freedom() if law is not None else 2, seed)
     effect = f"damping-law ({law.law})" if law is not None else ""
-    return Trial(alpha, beta, law, Row(what, len(other.freq_hz), "dB of d", before, after, float(np.median(nulls)), float((nulls <= after).mean()), effect))
+    return Trial(
+        alpha,
+        beta,
+        law,
+        Row(
+            what,
+            len(other.freq_hz),
+            "dB of d",
+            before,
+            after,
+            float(np.median(nulls)),
+            float((nulls <= after).mean()),
+            effect,
+        ),
+    )
 
 
 def joined(bodies: list[Lines]) -> Lines:
-    return Lines(*(np.concatenate([getattr(b, n) for b in bodies]) for n in ("freq_hz", "decay_per_s", "decay_sd_per_s", "amplitude", "freq_sd_hz")))
+    return Lines(
+        *(
+            np.concatenate([getattr(b, n) for b in bodies])
+            for n in ("freq_hz", "decay_per_s", "decay_sd_per_s", "amplitude", "freq_sd_hz")
+        )
+    )
 
 
 def draw(axes: Any, trials: list[Trial], fit: list[Lines], held: list[Lines], title: str = "") -> None:

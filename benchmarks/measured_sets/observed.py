@@ -1,9 +1,11 @@
 """Files of a set -> their damped sinusoids, found once and kept: the extraction is what costs.
 
-channel c of seconds s after t -> jittered, in all readings but the first -> sonic_bullet.estimator.features.extract -> Features, in CACHE/<digest of samples, arguments and code>.npz
+channel c of seconds s after t -> jittered, in all readings but the first -> sonic_bullet.estimator.features.extract ->
+Features, in CACHE/<digest of samples, arguments and code>.npz
 
-The code that finds them is part of the name: lines that an older version found were once taken for today's. Where a recording is not a sum of a few decays, a search
-for them may end elsewhere for an error in the last bit, on another processor say: what is said of a set must stand in all READINGS.
+The code that finds them is part of the name: lines that an older version found were once taken for today's. Where a
+recording is not a sum of a few decays, a search for them may end elsewhere for an error in the last bit, on another
+processor say: what is said of a set must stand in all READINGS.
 """
 
 from __future__ import annotations
@@ -27,7 +29,8 @@ from sonic_bullet.modal.cache import code_digest, key
 
 Array = np.ndarray[Any, Any]
 READINGS = 3
-JITTER = 1e-9  # of each sample: a hundredth of the last bit of 24 at full scale, and millions of times what rounding does
+# of each sample: a hundredth of the last bit of 24 at full scale, and millions of times what rounding does
+JITTER = 1e-9
 ARRAYS = tuple(f.name for f in fields(Features) if f.name not in ("onset_s", "noise_dbfs", "sr", "note"))
 
 
@@ -76,17 +79,31 @@ def _code() -> bytes:
     return code_digest(tuple(sorted(Path(estimator.__file__).parent.glob("*.py"))), ("numpy", "scipy", "numba"))
 
 
-def features(signal: Array, sr: int, *, onset_s: float | None = None, band_hz: tuple[float, float] | None = None) -> Features:
+def features(
+    signal: Array, sr: int, *, onset_s: float | None = None, band_hz: tuple[float, float] | None = None
+) -> Features:
     """`extract`, once. Raises AudioError."""
     text = key("lines", np.ascontiguousarray(signal), sr, onset_s, repr(band_hz), code=_code())
     place = cache() / f"{text}.npz"
     if place.is_file():
         with np.load(place, allow_pickle=False) as kept:
-            return Features(**{n: kept[n] for n in ARRAYS}, onset_s=float(kept["onset_s"]), noise_dbfs=float(kept["noise_dbfs"]), sr=sr, note=str(kept["note"]))
+            return Features(
+                **{n: kept[n] for n in ARRAYS},
+                onset_s=float(kept["onset_s"]),
+                noise_dbfs=float(kept["noise_dbfs"]),
+                sr=sr,
+                note=str(kept["note"]),
+            )
     found = extract(signal, sr, onset_s=onset_s, band_hz=band_hz)
     place.parent.mkdir(parents=True, exist_ok=True)
     part = place.with_name(f"{text}-{os.getpid()}.npz")
-    np.savez(part, **{n: getattr(found, n) for n in ARRAYS}, onset_s=found.onset_s, noise_dbfs=found.noise_dbfs, note=np.array(found.note))
+    np.savez(
+        part,
+        **{n: getattr(found, n) for n in ARRAYS},
+        onset_s=found.onset_s,
+        noise_dbfs=found.noise_dbfs,
+        note=np.array(found.note),
+    )
     part.replace(place)
     return found
 

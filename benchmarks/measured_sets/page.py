@@ -67,7 +67,11 @@ def written(out: Path, pages: list[Page], skipped: list[str]) -> None:
         _figure(page, place / f"{page.name}.png")
         parts.append(section(page, f"{place.name}/{page.name}.png"))
     if skipped:
-        parts.append(f"## Skipped\n\n{len(skipped)} sets or files were not judged:\n\n" + "\n".join(f"- {line}" for line in skipped) + "\n")
+        parts.append(
+            f"## Skipped\n\n{len(skipped)} sets or files were not judged:\n\n"
+            + "\n".join(f"- {line}" for line in skipped)
+            + "\n"
+        )
     out.write_text("\n".join(parts))
 
 
@@ -107,7 +111,14 @@ def prose(text: str) -> str:
     sentences = re.split(r"(?<=[.!?])\s+(?=[^\sa-z])", text)
     parts = [part for s in sentences for part in (s.split("; ") if len(s.split()) > MOST_WORDS else [s])]
     short = [part if part.endswith((".", "!", "?")) else part + "." for part in parts]
-    return "\n".join(textwrap.wrap(" ".join(part[:1].upper() + part[1:] for part in short), COLUMNS, break_long_words=False, break_on_hyphens=False))
+    return "\n".join(
+        textwrap.wrap(
+            " ".join(part[:1].upper() + part[1:] for part in short),
+            COLUMNS,
+            break_long_words=False,
+            break_on_hyphens=False,
+        )
+    )
 
 
 def _after_all(r: Row) -> str:

@@ -1,4 +1,6 @@
-"""A set of unknown kind: every second line of each file is fitted, the others predicted, and the files among themselves."""
+"""A set of unknown kind: every second line of each file is fitted, the others predicted, and the files among
+themselves.
+"""
 
 from __future__ import annotations
 
@@ -38,5 +40,9 @@ def alternate(bodies: dict[str, Lines], skipped: list[str]) -> Outcome:
     held = [b.part(np.arange(len(b.freq_hz)) % 2 == 1) for b in kept]
     found = trial("every second line", fit, held)
     text = f"{len(joined(kept).freq_hz)} lines of {len(kept)} files; every second one fitted, the others predicted. {found.said}."
-    left = f"{found.row.after:.1f} dB of decay at the median line are left" if not found.row.earned else "what is left is the scatter of single lines"
+    left = (
+        f"{found.row.after:.1f} dB of decay at the median line are left"
+        if not found.row.earned
+        else "what is left is the scatter of single lines"
+    )
     return Outcome((found.row,), text, left, lambda figure: draw(figure.subplots(), [found], fit, held), tuple(skipped))

@@ -1,6 +1,9 @@
-"""Taps of one piece at two dates: repeatability, and what a month did. Every second tap of each date fitted, the others predicted.
+"""Taps of one piece at two dates: repeatability, and what a month did.
 
-frequency  f_k of all fitted taps -> one factor of all lines a date: √(E/ρ) has changed                error: median |Δf|/f, ppm
+Every second tap of each date fitted, the others predicted.
+
+frequency  f_k of all fitted taps -> one factor of all lines a date: √(E/ρ) has changed
+    error: median |Δf|/f, ppm
 decay      d_k of all fitted taps -> one factor of all lines a date
            each line by the factor of the others: one that is every line's own tells nothing of the next
 null       the same with the dates of the fitted taps drawn by lot
@@ -30,7 +33,13 @@ def judge(folder: Path, case: dict[str, Any]) -> Outcome:
         for hit in entry["hits"][:TAPS]:
             try:
                 seconds = min(hit["ring_window_s"] - 0.01, 0.3)
-                found = lines(folder / entry["file"], start_s=hit["t_hit_s"] + 0.003, seconds=seconds, onset_s=0.0, band_hz=(500.0, 8000.0))
+                found = lines(
+                    folder / entry["file"],
+                    start_s=hit["t_hit_s"] + 0.003,
+                    seconds=seconds,
+                    onset_s=0.0,
+                    band_hz=(500.0, 8000.0),
+                )
                 taps.append((entry["date"], clear(found, sure=0.2)))
             except Exception as error:  # one tap less: the others are judged
                 skipped.append(f"{entry['file']} at {hit.get('t_hit_s')} s: {error}")
@@ -50,12 +59,19 @@ def judge(folder: Path, case: dict[str, Any]) -> Outcome:
     share = [1e6 * (b / a - 1) for a, b in zip(first, last, strict=True)]
     text = (
         f"{int((~late).sum())} taps on {dates[0]}, {int(late.sum())} on {dates[1]}. Lines: "
-        + "; ".join(f"{f:.0f} Hz (repeats to {1e6 * r / f:.0f} ppm, moved by {s:+.0f} ppm)" for f, r, s in zip(first, apart, share, strict=True))
+        + "; ".join(
+            f"{f:.0f} Hz (repeats to {1e6 * r / f:.0f} ppm, moved by {s:+.0f} ppm)"
+            for f, r, s in zip(first, apart, share, strict=True)
+        )
         + ". A drift of stiffness is no member of the effects' family: it belongs to the piece's moisture and age; one factor for all lines is the physics of E/ρ alone."
     )
     spread, repeats = float(np.ptp(share)), float(np.median(1e6 * apart / first))
     alike = f"lines move by amounts that differ by {spread:.0f} ppm among themselves"
-    why = "more than one stiffness, or another hanging" if spread > 2 * repeats else f"no more than they repeat from tap to tap ({repeats:.0f} ppm)"
+    why = (
+        "more than one stiffness, or another hanging"
+        if spread > 2 * repeats
+        else f"no more than they repeat from tap to tap ({repeats:.0f} ppm)"
+    )
     left = f"{alike}: {why}; dimensions and mass are not given, E is not known"
     return Outcome(tuple(rows), text, left, lambda figure: paint(figure, freq, late, dates), tuple(skipped))
 
@@ -63,11 +79,16 @@ def judge(folder: Path, case: dict[str, Any]) -> Outcome:
 def table(taps: list[Lines], late: Array) -> tuple[Array, Array]:
     """f and d (taps, k) of the lines that most taps of either date have; NaN where a tap lacks one.
 
-    A month may move a piece by more than its neighbouring lines are apart from tap to tap: lines are found date by date, and two dates'
-    are one where each is the other's nearest, within MOVED.
+    A month may move a piece by more than its neighbouring lines are apart from tap to tap: lines are found date by
+    date, and two dates' are one where each is the other's nearest, within MOVED.
     """
     first, last = (often([t for t, x in zip(taps, late, strict=True) if x == side]) for side in (False, True))
-    pairs = [(a, b) for a in first for b in last if abs(b / a - 1) < MOVED and b == _nearest(last, a) and a == _nearest(first, b)]
+    pairs = [
+        (a, b)
+        for a in first
+        for b in last
+        if abs(b / a - 1) < MOVED and b == _nearest(last, a) and a == _nearest(first, b)
+    ]
     if not pairs:
         raise ValueError("no line that most taps of both dates have")
     rows = np.full((2, len(taps), len(pairs)), np.nan)
@@ -85,7 +106,9 @@ def often(taps: list[Lines]) -> list[float]:
     found: list[float] = []
     for group in np.split(every, np.flatnonzero(np.diff(np.log(every)) > NEAR / 3) + 1):
         m = float(np.median(group))
-        if np.mean([bool((np.abs(t.freq_hz / m - 1) < NEAR).any()) for t in taps]) > MOST and (not found or m / found[-1] > 1 + NEAR):
+        if np.mean([bool((np.abs(t.freq_hz / m - 1) < NEAR).any()) for t in taps]) > MOST and (
+            not found or m / found[-1] > 1 + NEAR
+        ):
             found.append(m)  # what lies nearer is the same line of every tap
     return found
 
@@ -102,7 +125,9 @@ def judged(what: str, unit: str, scale: float, value: Array, late: Array, effect
     def error(date: Array, told: Array) -> float:
         middle = np.stack([np.nanmedian(y[fit & (date == side)], axis=0) for side in (False, True)])
         moved = middle[1] - middle[0]
-        factor = np.array([np.nanmedian(np.delete(moved, k)) for k in range(len(moved))]) if len(moved) > 1 else np.zeros(1)
+        factor = (
+            np.array([np.nanmedian(np.delete(moved, k)) for k in range(len(moved))]) if len(moved) > 1 else np.zeros(1)
+        )
         base = np.nanmedian(np.where(date[fit][:, None], y[fit] - factor, y[fit]), axis=0)
         return float(np.nanmedian(np.abs(scale * (y[held] - base - factor * told[held][:, None]))))
 
@@ -113,7 +138,16 @@ def judged(what: str, unit: str, scale: float, value: Array, late: Array, effect
         lot = late.copy()
         lot[fit] = rng.permutation(late[fit])
         nulls.append(error(lot, late))
-    return Row(what, int(np.isfinite(y[held]).sum()), unit, before, after, float(np.median(nulls)), float((np.array(nulls) <= after).mean()), effect)
+    return Row(
+        what,
+        int(np.isfinite(y[held]).sum()),
+        unit,
+        before,
+        after,
+        float(np.median(nulls)),
+        float((np.array(nulls) <= after).mean()),
+        effect,
+    )
 
 
 def paint(figure: Any, freq: Array, late: Array, dates: list[str]) -> None:

@@ -1,4 +1,7 @@
-"""One material in several sizes: two sizes fitted, a third predicted, each size in its turn. A law of the material must carry over; what hangs on the size must not."""
+"""One material in several sizes: two sizes fitted, a third predicted, each size in its turn.
+
+A law of the material must carry over; what hangs on the size must not.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +26,10 @@ def judge(folder: Path, case: dict[str, Any]) -> Outcome:
     bodies, skipped = {}, []
     for entry in case["files"]:
         try:
-            found = clear(lines(folder / entry["file"], start_s=entry["t_hit_s"], seconds=seconds, onset_s=0.0, band_hz=band), loss=loss)
+            found = clear(
+                lines(folder / entry["file"], start_s=entry["t_hit_s"], seconds=seconds, onset_s=0.0, band_hz=band),
+                loss=loss,
+            )
             bodies[str(entry.get("bar", entry["file"]))] = found
         except Exception as error:  # one file less: the others are judged
             skipped.append(f"{entry['file']}: {error}")
@@ -44,7 +50,13 @@ def over_sizes(bodies: dict[str, Lines], skipped: list[str], label: str = "") ->
     for i, name in enumerate(order):
         others = sorted((j for j in range(len(order)) if j != i), key=lambda j: abs(j - i))[:2]
         fit = [bodies[order[j]] for j in others]
-        made.append((trial(f"{label}{name} from {order[others[0]]} and {order[others[1]]}", fit, [bodies[name]], seed=i), fit, [bodies[name]]))
+        made.append(
+            (
+                trial(f"{label}{name} from {order[others[0]]} and {order[others[1]]}", fit, [bodies[name]], seed=i),
+                fit,
+                [bodies[name]],
+            )
+        )
     rows = [m[0].row for m in made]
     rows.append(total(f"{label}all sizes, median", rows))
     laws = [m[0].said for m in made if m[0].law is not None]
@@ -68,5 +80,7 @@ def total(what: str, rows: list[Row]) -> Row:
     """Median over rows; chance: the median one's."""
     named = [r.effect for r in rows if r.effect]
     effect = max(set(named), key=named.count) if len(named) * 2 > len(rows) else ""
-    before, after, null, chance = (float(np.median([getattr(r, n) for r in rows])) for n in ("before", "after", "null", "chance"))
+    before, after, null, chance = (
+        float(np.median([getattr(r, n) for r in rows])) for n in ("before", "after", "null", "chance")
+    )
     return Row(what, sum(r.count for r in rows), rows[0].unit, before, after, null, chance, effect)

@@ -1,4 +1,6 @@
-"""One body at several strengths: all but the loudest fitted, the loudest predicted, line by line. J: the strikes' relative strength, by the body's own lowest strong lines.
+"""One body at several strengths: all but the loudest fitted, the loudest predicted, line by line.
+
+J: the strikes' relative strength, by the body's own lowest strong lines.
 
 frequency  f_k             -> amplitude-pitch    f_k (1 + b J²)                          b: one number of all lines
 decay      d_k             -> amplitude-damping  d_k (1 + c J)                           c: one number
@@ -44,8 +46,16 @@ def judge(folder: Path, case: dict[str, Any]) -> Outcome:
     skipped = []
     for entry in case["files"]:
         try:
-            found = clear(lines(folder / entry["file"], start_s=entry["t_hit_s"] + late, seconds=seconds, onset_s=0.0, band_hz=band), sure=0.3, apart=0.003)
-            groups.setdefault(str(entry.get("stroke", entry.get("bell", ""))), []).append((entry["strength_layer"], Path(entry["file"]).stem, found))
+            found = clear(
+                lines(
+                    folder / entry["file"], start_s=entry["t_hit_s"] + late, seconds=seconds, onset_s=0.0, band_hz=band
+                ),
+                sure=0.3,
+                apart=0.003,
+            )
+            groups.setdefault(str(entry.get("stroke", entry.get("bell", ""))), []).append(
+                (entry["strength_layer"], Path(entry["file"]).stem, found)
+            )
         except Exception as error:  # one file less: the others are judged
             skipped.append(f"{entry['file']}: {error}")
     rows, texts, tables = [], [], []
@@ -75,7 +85,10 @@ def common(strikes: list[Lines], names: list[str]) -> Table | None:
     if len(found) < LEAST:
         return None
     index = np.array(found).T
-    freq, decay, size = (np.stack([getattr(s, n)[i] for s, i in zip(strikes, index, strict=True)]) for n in ("freq_hz", "decay_per_s", "amplitude"))
+    freq, decay, size = (
+        np.stack([getattr(s, n)[i] for s, i in zip(strikes, index, strict=True)])
+        for n in ("freq_hz", "decay_per_s", "amplitude")
+    )
     low = np.argsort(freq[0])[: max(3, freq.shape[1] // 4)]
     return Table(freq, decay, size, np.exp(np.log(size[:, low] / size[0, low]).mean(axis=1)), tuple(names))
 
@@ -88,12 +101,41 @@ def judged(t: Table, stroke: str) -> tuple[list[Row], str]:
     rows = []
     if len(soft) > 1:  # one soft strike tells no law of level
         y = np.log(t.freq_hz[:-1] / t.freq_hz[0])
-        rows.append(_power(f"{label}frequency of {ends}", "ppm of f", 1e6, y, np.log(t.freq_hz[-1] / t.freq_hz[0]), soft, loud, 2, "amplitude-pitch", rng))
+        rows.append(
+            _power(
+                f"{label}frequency of {ends}",
+                "ppm of f",
+                1e6,
+                y,
+                np.log(t.freq_hz[-1] / t.freq_hz[0]),
+                soft,
+                loud,
+                2,
+                "amplitude-pitch",
+                rng,
+            )
+        )
         y = np.log(t.decay_per_s[:-1] / t.decay_per_s[0])
-        rows.append(_power(f"{label}decay of {ends}", "dB of d", DB, y, np.log(t.decay_per_s[-1] / t.decay_per_s[0]), soft, loud, 1, "amplitude-damping", rng))
+        rows.append(
+            _power(
+                f"{label}decay of {ends}",
+                "dB of d",
+                DB,
+                y,
+                np.log(t.decay_per_s[-1] / t.decay_per_s[0]),
+                soft,
+                loud,
+                1,
+                "amplitude-damping",
+                rng,
+            )
+        )
         rows.append(_levels(t, f"{label}level of {ends}", rng))
     else:
-        for what, unit, scale, values in (("frequency", "ppm of f", 1e6, t.freq_hz), ("decay", "dB of d", DB, t.decay_per_s)):
+        for what, unit, scale, values in (
+            ("frequency", "ppm of f", 1e6, t.freq_hz),
+            ("decay", "dB of d", DB, t.decay_per_s),
+        ):
             error = float(np.median(np.abs(scale * np.log(values[-1] / values[0]))))
             rows.append(Row(f"{label}{what} of {ends}", values.shape[1], unit, error, error, np.nan, 1.0, ""))
     shift = 1e6 * np.log(t.freq_hz[-1] / t.freq_hz[0])
@@ -105,8 +147,21 @@ def judged(t: Table, stroke: str) -> tuple[list[Row], str]:
     return rows, text
 
 
-def _power(what: str, unit: str, scale: float, y: Array, told: Array, soft: Array, loud: float, power: int, effect: str, rng: np.random.Generator) -> Row:
-    """ln of a line's number over the first strike's goes as c (J^p − J₀^p): c on the soft ones, by the median slope of lines."""
+def _power(
+    what: str,
+    unit: str,
+    scale: float,
+    y: Array,
+    told: Array,
+    soft: Array,
+    loud: float,
+    power: int,
+    effect: str,
+    rng: np.random.Generator,
+) -> Row:
+    """ln of a line's number over the first strike's goes as c (J^p − J₀^p): c on the soft ones, by the median slope of
+    lines.
+    """
 
     def error(level: Array, top: float) -> float:
         x = level**power - level[0] ** power
@@ -139,7 +194,9 @@ def _levels(t: Table, what: str, rng: np.random.Generator) -> Row:
     freq = t.freq_hz[0]
     before, after = float(misfit(y[-1])), error(freq)
     nulls = np.array([error(rng.permutation(freq)) for _ in range(40)])
-    return Row(what, len(freq), "dB", before, after, float(np.median(nulls)), float((nulls <= after).mean()), "contact-time")
+    return Row(
+        what, len(freq), "dB", before, after, float(np.median(nulls)), float((nulls <= after).mean()), "contact-time"
+    )
 
 
 def paint(figure: Any, t: Table) -> None:

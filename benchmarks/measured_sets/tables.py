@@ -1,4 +1,6 @@
-"""Sets that are numbers alone: resonances per material and size, plates, bowls, a blade; and hammer hits with acceleration in frf.py."""
+"""Sets that are numbers alone: resonances per material and size, plates, bowls, a blade; and hammer hits with
+acceleration in frf.py.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,9 @@ FIRST = ("metal", "glass", "wood", "ceramic", "plastic", "stone", "rubber")
 
 
 def materials(folder: Path, case: dict[str, Any]) -> Outcome:
-    """T60(f) per material: one size class left out and predicted from the others; where there is one class, every second line."""
+    """T60(f) per material: one size class left out and predicted from the others; where there is one class, every
+    second line.
+    """
     tables, skipped = {}, []
     for entry in case["index"]:
         if "same_as" in entry:
@@ -52,7 +56,9 @@ def materials(folder: Path, case: dict[str, Any]) -> Outcome:
     text = f"{len(tables)} distinct tables, the {MOST_LINES} strongest lines of each, T60 over {LONGEST_S:.0f} s left out. A size class of a material is predicted from its others."
     left = "T60 against frequency scatters within a class by as much as between laws; which recording stands behind a table is not known, so a law here is a range, not a material's"
     kind, one = pictured
-    return Outcome(tuple(rows), text, left, lambda figure: draw(figure.subplots(), [one[0]], one[1], one[2], kind), tuple(skipped))
+    return Outcome(
+        tuple(rows), text, left, lambda figure: draw(figure.subplots(), [one[0]], one[1], one[2], kind), tuple(skipped)
+    )
 
 
 def _table(data: dict[str, Any]) -> Lines:
@@ -63,12 +69,23 @@ def _table(data: dict[str, Any]) -> Lines:
 
 
 def derived(folder: Path, case: dict[str, Any]) -> Outcome:
-    """Spruce plates: two predict the third's damping; the fan blade: a clamp that gives; bowls: nothing that can be judged."""
+    """Spruce plates: two predict the third's damping; the fan blade: a clamp that gives;
+
+    bowls: nothing that can be judged.
+    """
     rows, texts, skipped, pictured = [], [], [], None
     try:
         plates = json.loads((folder / "dev" / "spruce_plates_1-3.json").read_text())["plates"]
         bodies = {p["plate"]: _plate(p["modes"]) for p in plates}
-        made = [(trial(f"spruce {n}, from the other plates", [b for m, b in bodies.items() if m != n], [bodies[n]], seed=i), n) for i, n in enumerate(bodies)]
+        made = [
+            (
+                trial(
+                    f"spruce {n}, from the other plates", [b for m, b in bodies.items() if m != n], [bodies[n]], seed=i
+                ),
+                n,
+            )
+            for i, n in enumerate(bodies)
+        ]
         rows.append(total(f"spruce: damping of each of {len(bodies)} plates from the others", [m[0].row for m in made]))
         one, name = made[0]
         pictured = (one, [b for m, b in bodies.items() if m != name], [bodies[name]])
@@ -93,7 +110,11 @@ def derived(folder: Path, case: dict[str, Any]) -> Outcome:
         raise ValueError("; ".join(skipped))
     left = "damping of single plate modes scatters about any law of frequency (bending along and across the grain lose differently); the blade's clamp acts on some modes and not on others"
     return Outcome(
-        tuple(rows), " ".join(texts), left, lambda figure: draw(figure.subplots(), [pictured[0]], *pictured[1:]) if pictured else None, tuple(skipped)
+        tuple(rows),
+        " ".join(texts),
+        left,
+        lambda figure: draw(figure.subplots(), [pictured[0]], *pictured[1:]) if pictured else None,
+        tuple(skipped),
     )
 
 

@@ -1,4 +1,6 @@
-"""What a set's trial says: rows of errors before and after, a verdict in words, a figure; and the null every row stands beside."""
+"""What a set's trial says: rows of errors before and after, a verdict in words, a figure; and the null every row stands
+beside.
+"""
 
 from __future__ import annotations
 
@@ -14,16 +16,19 @@ from sonic_bullet.estimator.lines.line_values import Features
 
 Array = np.ndarray[Any, Any]
 DRAWS = 200
-ALPHA, BETA = 1.0, 1e-9  # of the model so far, in 1/s and s: lines in a table come with none, and nothing is yet taken from their decays
+# of the model so far, in 1/s and s: lines in a table come with none, and nothing is yet taken from their decays
+ALPHA, BETA = 1.0, 1e-9
 EARNS = 0.9  # an effect's error on what it was not fitted to must fall below this share of the baseline's
 CHANCE = 0.05  # of the null's draws, at most, may do as well
 
 
 @dataclass(frozen=True)
 class Row:
-    """One number predicted for the held-out part (count items) by baseline and by baseline + effect, in unit; null: median error of the null, chance: its share as good.
+    """One number predicted for the held-out part (count items) by baseline and by baseline + effect, in unit; null:
+    median error of the null, chance: its share as good.
 
-    effect: what was added, "" where nothing was proposed (after = before). again: the same of every other reading (observed.py), None where one came to nothing of the kind.
+    effect: what was added, "" where nothing was proposed (after = before). again: the same of every other reading
+    (observed.py), None where one came to nothing of the kind.
     """
 
     what: str
@@ -38,7 +43,12 @@ class Row:
 
     def read_again(self, others: Sequence[Sequence[Row]]) -> Row:
         """With what other readings' rows say of the same."""
-        return replace(self, again=tuple(next((r for r in rows if (r.what, r.effect) == (self.what, self.effect)), None) for rows in others))
+        return replace(
+            self,
+            again=tuple(
+                next((r for r in rows if (r.what, r.effect) == (self.what, self.effect)), None) for rows in others
+            ),
+        )
 
     @property
     def earned(self) -> bool:
@@ -48,12 +58,21 @@ class Row:
     @property
     def earns(self) -> bool:
         """Whether it does in this one."""
-        return bool(self.effect and "no effect" not in self.effect and self.after < EARNS * self.before and self.chance <= CHANCE)
+        return bool(
+            self.effect
+            and "no effect" not in self.effect
+            and self.after < EARNS * self.before
+            and self.chance <= CHANCE
+        )
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """A set's trial. text: a paragraph; unexplained: what is left, in words; draw: paints the set's figure on a matplotlib Figure; skipped: one line each."""
+    """A set's trial.
+
+    text: a paragraph; unexplained: what is left, in words; draw: paints the set's figure on a matplotlib Figure;
+    skipped: one line each.
+    """
 
     rows: tuple[Row, ...]
     text: str
@@ -63,7 +82,10 @@ class Outcome:
 
 
 Judge = Callable[[Path, dict[str, Any]], Outcome]
-"""Folder of a set, its case.json -> what was found. May raise anything: the set is then named and counted as skipped."""
+"""Folder of a set, its case.json -> what was found.
+
+May raise anything: the set is then named and counted as skipped.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,30 +99,43 @@ class Lines:
     freq_sd_hz: Array
 
     def part(self, keep: Array) -> Lines:
-        return Lines(*(x[keep] for x in (self.freq_hz, self.decay_per_s, self.decay_sd_per_s, self.amplitude, self.freq_sd_hz)))
+        return Lines(
+            *(x[keep] for x in (self.freq_hz, self.decay_per_s, self.decay_sd_per_s, self.amplitude, self.freq_sd_hz))
+        )
 
     @property
     def omega(self) -> Array:
         return np.asarray(np.hypot(2 * np.pi * self.freq_hz, self.decay_per_s))
 
 
-def clear(found: Features, *, down_db: float = 45.0, sure: float = 0.15, loss: float = 0.03, apart: float = 0.01) -> Lines:
-    """Lines that ring, by frequency: energy a²/d within down_db of the strongest's, d known to sure, 2d/ω < loss, the strongest within ± apart.
+def clear(
+    found: Features, *, down_db: float = 45.0, sure: float = 0.15, loss: float = 0.03, apart: float = 0.01
+) -> Lines:
+    """Lines that ring, by frequency: energy a²/d within down_db of the strongest's, d known to sure, 2d/ω < loss, the
+    strongest within ± apart.
 
     What is over in a few periods is the click; what lies beside a stronger line is its beating.
     """
     sd = np.where(np.isfinite(found.decay_sd_per_s), found.decay_sd_per_s, np.inf)
-    ring = (found.decay_per_s > 0) & (sd < np.maximum(sure * found.decay_per_s, 0.1)) & (found.decay_per_s < loss * np.pi * found.freq_hz)
+    ring = (
+        (found.decay_per_s > 0)
+        & (sd < np.maximum(sure * found.decay_per_s, 0.1))
+        & (found.decay_per_s < loss * np.pi * found.freq_hz)
+    )
     energy = np.where(ring, found.amplitude**2 / np.maximum(found.decay_per_s, 1e-3), 0.0)
     kept: list[int] = []
     for i in np.argsort(-energy):
-        if energy[i] > 10 ** (-down_db / 10) * energy.max() and all(abs(found.freq_hz[i] / found.freq_hz[j] - 1) > apart for j in kept):
+        if energy[i] > 10 ** (-down_db / 10) * energy.max() and all(
+            abs(found.freq_hz[i] / found.freq_hz[j] - 1) > apart for j in kept
+        ):
             kept.append(int(i))
     order = np.array(kept, int)[np.argsort(found.freq_hz[kept])] if kept else np.zeros(0, int)
     return Lines(*(x[order] for x in (found.freq_hz, found.decay_per_s, sd, found.amplitude, found.freq_sd_hz)))
 
 
-def told(freq_hz: Array, decay_per_s: Array, decay_sd_per_s: Array | None = None, amplitude: Array | None = None) -> Lines:
+def told(
+    freq_hz: Array, decay_per_s: Array, decay_sd_per_s: Array | None = None, amplitude: Array | None = None
+) -> Lines:
     """Lines out of a table."""
     f, d = np.asarray(freq_hz, float), np.asarray(decay_per_s, float)
     order = np.argsort(f)

@@ -1,7 +1,8 @@
 """Does the diagnosis name what a case lacks, and only that?
 
 python -m benchmarks.suite make --out DIR [--quick]           cases into DIR/cases, modes kept in DIR/modes
-python -m benchmarks.suite run --out DIR [--quick] [--only PART] [--workers N] [--rows FILE]     diagnoses what lacks a row, then reports
+python -m benchmarks.suite run --out DIR [--quick] [--only PART] [--workers N] [--rows FILE]
+    diagnoses what lacks a row, then reports
 python -m benchmarks.suite report --out DIR [--rows FILE]
 
 Plan -> make_case -> DIR/cases/NAME -> `sonic-bullet diagnose` in a copy without its truth -> a row of JSON -> tables
@@ -23,11 +24,15 @@ from benchmarks.suite.tables import report
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.suite", description=__doc__.splitlines()[0] if __doc__ else "")
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.suite", description=__doc__.splitlines()[0] if __doc__ else ""
+    )
     parser.add_argument("what", choices=["make", "run", "report"])
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--quick", action="store_true", help="20 cases in place of 166")
-    parser.add_argument("--draw", type=int, default=0, help="other cases of the same kinds: other numbers and bodies; a folder each")
+    parser.add_argument(
+        "--draw", type=int, default=0, help="other cases of the same kinds: other numbers and bodies; a folder each"
+    )
     parser.add_argument("--only", default="", help="cases whose name holds this")
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--rows", type=Path, default=None, help="results, one JSON a line; DIR/rows.jsonl by default")
@@ -45,7 +50,10 @@ def main() -> int:
                 continue
             start = time.monotonic()
             made = make_case(args.out / "cases", plan, args.out / "modes")
-            print(f"{k + 1}/{len(chosen)} {plan.name}: {made['distance_db']} dB, {time.monotonic() - start:.1f} s", flush=True)
+            print(
+                f"{k + 1}/{len(chosen)} {plan.name}: {made['distance_db']} dB, {time.monotonic() - start:.1f} s",
+                flush=True,
+            )
     if args.what == "run":
         done = {row["case"] for row in rows(file)}
         todo = [p.name for p in chosen if p.name not in done]

@@ -1,6 +1,7 @@
 """Bodies laid out as bent boxes of bricks with 20 nodes, and their vibration modes.
 
-    x(ξ) = Σ N_i(ξ) x_i,   K = ∫ Bᵀ C B |J| dξ,   M = ∫ ρ Nᵀ N |J| dξ        [Zienkiewicz & Taylor, The Finite Element Method, ch. 8.6-8.7]
+    x(ξ) = Σ N_i(ξ) x_i,   K = ∫ Bᵀ C B |J| dξ,   M = ∫ ρ Nᵀ N |J| dξ
+        [Zienkiewicz & Taylor, The Finite Element Method, ch. 8.6-8.7]
     corner  N = (1+ξξ_i)(1+ηη_i)(1+ζζ_i)(ξξ_i+ηη_i+ζζ_i−2)/8,   edge  N = (1−ξ²)(1+ηη_i)(1+ζζ_i)/4
     K u = λ M u,  uᵀMu = 1, by shift and invert below zero
 
@@ -27,7 +28,10 @@ _RING = [(0, 0), (1, 0), (2, 0), (2, 1), (2, 2), (1, 2), (0, 2), (0, 1)]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Bricks:
-    """node_m (n, 3), cell (c, 20) of nodes, skin (v,) nodes on the surface, face (f, 3) into skin, outward. centre (c, 3): of the cells, in the grid's 0..1."""
+    """node_m (n, 3), cell (c, 20) of nodes, skin (v,) nodes on the surface, face (f, 3) into skin, outward.
+
+    centre (c, 3): of the cells, in the grid's 0..1.
+    """
 
     node_m: Array
     cell: Array
@@ -38,7 +42,11 @@ class Bricks:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Modes:
-    """A body's modes: value (m,) = ω² in 1/s², shape (v, 3, m) on its surface vertex_m (v, 3), face (f, 3); rigid (v, 3, 6); mass_kg. All mass-normalised."""
+    """A body's modes:
+
+    value (m,) = ω² in 1/s², shape (v, 3, m) on its surface vertex_m (v, 3), face (f, 3); rigid (v, 3, 6); mass_kg. All
+    mass-normalised.
+    """
 
     value: Array
     shape: Array
@@ -52,8 +60,17 @@ class Modes:
         return np.asarray(np.sqrt(self.value) / (2 * np.pi))
 
 
-def grid(cells: tuple[int, int, int], place: Callable[[Array], Array], *, closed: bool = False, keep: Callable[[Array], Array] | None = None) -> Bricks:
-    """A grid of bricks, its points of 0..1 along each axis put where ``place`` says; closed: the first axis runs round; keep: which cells, by centre, stay."""
+def grid(
+    cells: tuple[int, int, int],
+    place: Callable[[Array], Array],
+    *,
+    closed: bool = False,
+    keep: Callable[[Array], Array] | None = None,
+) -> Bricks:
+    """A grid of bricks, its points of 0..1 along each axis put where ``place`` says;
+
+    closed: the first axis runs round; keep: which cells, by centre, stay.
+    """
     n = np.array(cells)
     first = np.stack(np.meshgrid(*(np.arange(c) for c in n), indexing="ij"), axis=-1).reshape(-1, 3)
     centre = (first + 0.5) / n
@@ -72,7 +89,10 @@ def grid(cells: tuple[int, int, int], place: Callable[[Array], Array], *, closed
     sides = []
     for axis in range(3):
         for side in (0, 2):
-            around = [number[_inserted(a, b, axis, side)] for a, b in (_RING if (side == 2) == (axis != 1) else _RING[:1] + _RING[:0:-1])]
+            around = [
+                number[_inserted(a, b, axis, side)]
+                for a, b in (_RING if (side == 2) == (axis != 1) else _RING[:1] + _RING[:0:-1])
+            ]
             sides.append(cell[:, around])
     ring = np.concatenate(sides)
     key = np.sort(ring, axis=1)
@@ -138,7 +158,8 @@ def _strain(gradient: Array) -> Array:
 def matrices(body: Bricks, stiffness_pa: Array, density_kg_m3: float, softer: Array | None = None) -> tuple[Any, Any]:
     """K and M, scipy CSC, of a body of stiffness (6, 6); softer (c,) multiplies the stiffness of each cell.
 
-    K is integrated at 2³ points, M at 3³: five times nearer in thin plates than K at 3³ [Zienkiewicz, Taylor & Too 1971].
+    K is integrated at 2³ points, M at 3³: five times nearer in thin plates than K at 3³ [Zienkiewicz, Taylor & Too
+    1971].
     """
     from scipy.sparse import coo_array
 
@@ -161,9 +182,17 @@ def matrices(body: Bricks, stiffness_pa: Array, density_kg_m3: float, softer: Ar
         stiff *= softer[:, None, None]
     dof = (3 * body.cell[:, :, None] + np.arange(3)).reshape(c, 60)
     size = 3 * len(body.node_m)
-    k_matrix = coo_array((stiff.ravel(), (np.repeat(dof, 60, axis=1).ravel(), np.tile(dof, (1, 60)).ravel())), shape=(size, size)).tocsc()
+    k_matrix = coo_array(
+        (stiff.ravel(), (np.repeat(dof, 60, axis=1).ravel(), np.tile(dof, (1, 60)).ravel())), shape=(size, size)
+    ).tocsc()
     entries = [
-        coo_array((mass.ravel(), (3 * np.repeat(body.cell, 20, axis=1).ravel() + a, 3 * np.tile(body.cell, (1, 20)).ravel() + a)), shape=(size, size))
+        coo_array(
+            (
+                mass.ravel(),
+                (3 * np.repeat(body.cell, 20, axis=1).ravel() + a, 3 * np.tile(body.cell, (1, 20)).ravel() + a),
+            ),
+            shape=(size, size),
+        )
         for a in range(3)
     ]
     return (k_matrix + k_matrix.T) / 2, (entries[0] + entries[1] + entries[2]).tocsc()
@@ -178,8 +207,12 @@ def isotropic(youngs_pa: float, poisson: float) -> Array:
     return tensor
 
 
-def orthotropic(youngs_pa: tuple[float, float, float], shear_pa: tuple[float, float, float], poisson: tuple[float, float, float]) -> Array:
-    """Stiffness (6, 6) from E_x E_y E_z, G_yz G_xz G_xy and ν_yz ν_xz ν_xy: the compliance inverted [Bodig & Jayne 1982, ch. 3]."""
+def orthotropic(
+    youngs_pa: tuple[float, float, float], shear_pa: tuple[float, float, float], poisson: tuple[float, float, float]
+) -> Array:
+    """Stiffness (6, 6) from E_x E_y E_z, G_yz G_xz G_xy and ν_yz ν_xz ν_xy: the compliance inverted [Bodig & Jayne
+    1982, ch. 3].
+    """
     ex, ey, ez = youngs_pa
     yz, xz, xy = poisson
     give = np.diag([1 / ex, 1 / ey, 1 / ez, *(1 / np.array(shear_pa))])
@@ -210,7 +243,9 @@ def modes(
     mass = float(m_matrix[::3, ::3].sum()) * density_kg_m3
     for vertex, kilogram in (load_kg or {}).items():
         dof = 3 * body.skin[vertex] + np.arange(3)
-        m_matrix = m_matrix + coo_array((np.full(3, kilogram / density_kg_m3), (dof, dof)), shape=m_matrix.shape).tocsc()
+        m_matrix = (
+            m_matrix + coo_array((np.full(3, kilogram / density_kg_m3), (dof, dof)), shape=m_matrix.shape).tocsc()
+        )
     order = dissection(body.node_m, body.cell)
     dof = (3 * order[:, None] + np.arange(3)).ravel()
     corner = body.node_m[body.skin][body.face]
@@ -218,7 +253,9 @@ def modes(
     length = np.linalg.norm(np.ptp(body.node_m, axis=0))
     shift = -20 / length**2 * (2 * mass / density_kg_m3 / area / length) ** 2
     limit = (2 * np.pi * to_hz) ** 2 / rate
-    found = eigen.solve(k_matrix[dof][:, dof], m_matrix[dof][:, dof], shift, rigid=6, enough=lambda v: bool(v[-1] > limit), most=300)
+    found = eigen.solve(
+        k_matrix[dof][:, dof], m_matrix[dof][:, dof], shift, rigid=6, enough=lambda v: bool(v[-1] > limit), most=300
+    )
     keep = found.lambda_per_s2 <= limit
     vector = np.empty((k_matrix.shape[0], int(keep.sum())))
     vector[dof] = found.vector[:, keep]

@@ -2,7 +2,8 @@
 
     recipe + material (as it is, not as guessed) -> Body -> strikes -> effects -> files
 
-Guesses are wrong by up to 25 % in E and ρ (18 % together) and 0.03 in ν; strikes and sensors sit on vertices; one gain a case.
+Guesses are wrong by up to 25 % in E and ρ (18 % together) and 0.03 in ν; strikes and sensors sit on vertices; one gain
+a case.
 """
 
 from __future__ import annotations
@@ -20,7 +21,17 @@ from benchmarks.suite import objects, physics
 from benchmarks.suite.effects import CARRIED, LISTED, UNLISTED, Effect, Scene
 from benchmarks.suite.objects import MATERIALS, RECIPES, Body, Material, Recipe
 from benchmarks.suite.physics import Strike
-from benchmarks.suite.sounding import HELD_OUT, apart, as_it_acts, as_recorded, damping_of, each_beside, paired, short_of, strike_sound
+from benchmarks.suite.sounding import (
+    HELD_OUT,
+    apart,
+    as_it_acts,
+    as_recorded,
+    damping_of,
+    each_beside,
+    paired,
+    short_of,
+    strike_sound,
+)
 from sonic_bullet.records import Array
 
 PEAK = 0.5
@@ -30,7 +41,10 @@ NU_OFF = (-0.03, 0.02)
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """One case to be made: effects as (id, strength 0-2); transfer: with another object; noise_db: below the peak of 0.5; form: audio, features or no-mesh."""
+    """One case to be made: effects as (id, strength 0-2);
+
+    transfer: with another object; noise_db: below the peak of 0.5; form: audio, features or no-mesh.
+    """
 
     name: str
     recipe: str
@@ -64,7 +78,8 @@ class Take:
 def make_case(folder: Path, plan: Plan, cache: Path) -> dict[str, Any]:
     """Writes folder/plan.name whole (case.json last, by rename) and gives its truth.
 
-    Effects that cannot be heard, alone or beside each other, are drawn again, up to TRIES times; then the draw is kept that comes nearest.
+    Effects that cannot be heard, alone or beside each other, are drawn again, up to TRIES times; then the draw is kept
+    that comes nearest.
     """
     short: list[float] = []
     take: Take | float = 0.0
@@ -117,7 +132,11 @@ def _take(plan: Plan, rng: np.random.Generator, cache: Path, lacking: float) -> 
     distance = apart(without, heard, sd)
     own = rng.spawn(1)[0]  # its own, so that a single's bytes do not hang on it
     another = partial(physics.noise, own, n, sd, plan.colour)
-    beside = each_beside(scene, material, unit, effects, [judged[i] for i in HELD_OUT], sd, another) if len(effects) > 1 else []
+    beside = (
+        each_beside(scene, material, unit, effects, [judged[i] for i in HELD_OUT], sd, another)
+        if len(effects) > 1
+        else []
+    )
     if (short := short_of(tuple(s for _, s in plan.effects), distance, beside)) > lacking:
         return short
     clean = [judged[i] if i in judged else sound(i) for i in range(len(all_strikes))]
@@ -151,13 +170,17 @@ def _save(where: Path, plan: Plan, take: Take) -> None:
         for name, x in zip(files, take.heard, strict=True):
             _write(where / name, x, plan.rate)
         splits = ["fit"] * 5 + ["holdout"] * 3 + ["transfer"] * (len(files) - 8)
-        entries = [_entry(f, take.bodies[o], s, p) for f, o, s, p in zip(files, take.owner, take.strikes, splits, strict=True)]
+        entries = [
+            _entry(f, take.bodies[o], s, p) for f, o, s, p in zip(files, take.owner, take.strikes, splits, strict=True)
+        ]
     if plan.form != "no-mesh":
         for b in take.bodies:
             objects.write_obj(where / f"{b.name}.obj", b)
     (where / "truth.json").write_text(json.dumps(take.truth, indent=1, default=float))
     unfinished = where / "case.json.partial"
-    unfinished.write_text(json.dumps(_declared(plan, take.bodies, RECIPES[plan.recipe], take.sensors, entries), indent=1, default=float))
+    unfinished.write_text(
+        json.dumps(_declared(plan, take.bodies, RECIPES[plan.recipe], take.sensors, entries), indent=1, default=float)
+    )
     os.replace(unfinished, where / "case.json")
 
 
@@ -166,7 +189,14 @@ def _as_it_is(guess: Material, rng: np.random.Generator) -> Material:
     ratio, both = rng.uniform(-0.18, 0.18), rng.uniform(-0.1, 0.1)
     young, density = guess.youngs_pa * np.exp(both + ratio / 2), guess.density * np.exp(both - ratio / 2)
     nu = round(guess.poisson + float(rng.choice(NU_OFF)), 4)
-    return Material(guess.name, young, density, nu, guess.alpha * np.exp(rng.uniform(-0.5, 0.5)), guess.beta * np.exp(rng.uniform(-0.5, 0.5)))
+    return Material(
+        guess.name,
+        young,
+        density,
+        nu,
+        guess.alpha * np.exp(rng.uniform(-0.5, 0.5)),
+        guess.beta * np.exp(rng.uniform(-0.5, 0.5)),
+    )
 
 
 def _sensor(body: Body, rng: np.random.Generator) -> tuple[int, Array]:
@@ -185,11 +215,19 @@ def _strikes(body: Body, rng: np.random.Generator, count: int) -> tuple[Strike, 
     for v, step in zip(vertices, STEPS[:count], strict=True):
         way = -body.normal[v] + tilt * rng.standard_normal(3)
         way = np.round(way / np.linalg.norm(way), 6)
-        out.append(Strike(int(v), (float(way[0]), float(way[1]), float(way[2])), round(float(step * np.exp(rng.uniform(-0.15, 0.15))), 6)))
+        out.append(
+            Strike(
+                int(v),
+                (float(way[0]), float(way[1]), float(way[2])),
+                round(float(step * np.exp(rng.uniform(-0.15, 0.15))), 6),
+            )
+        )
     return tuple(out)
 
 
-def _other(recipe: Recipe, material: Material, effects: tuple[Effect, ...], rng: np.random.Generator, plan: Plan, cache: Path) -> Body:
+def _other(
+    recipe: Recipe, material: Material, effects: tuple[Effect, ...], rng: np.random.Generator, plan: Plan, cache: Path
+) -> Body:
     """Another body of the same material: another recipe, or a scaled copy. Effects of the material act on it too."""
     second = RECIPES[recipe.other] if recipe.other else recipe
     scale = 1.0 if recipe.other else float(rng.choice([0.7, 0.85]))
@@ -203,15 +241,25 @@ def _measured(ringing: physics.Ring, name: str, rng: np.random.Generator) -> lis
     """Lines in place of audio: frequencies to 10⁻⁵, every second one for the fit."""
     freq = np.sort(np.abs(ringing.pole.imag) / (2 * np.pi)) * (1 + 1e-5 * rng.standard_normal(len(ringing.pole)))
     halves = (("fit", freq[::2]), ("holdout", freq[1::2]))
-    return [{"object": name, "split": split, "features": [{"freq_hz": round(float(f), 4)} for f in part]} for split, part in halves]
+    return [
+        {"object": name, "split": split, "features": [{"freq_hz": round(float(f), 4)} for f in part]}
+        for split, part in halves
+    ]
 
 
 def _entry(file: str, body: Body, strike: Strike, split: str) -> dict[str, Any]:
     where = np.round(body.modes.vertex_m[strike.vertex], 6).tolist()
-    return {"file": file, "object": body.name, "split": split, "strike": {"position": where, "direction": list(strike.direction), "impulse": strike.impulse}}
+    return {
+        "file": file,
+        "object": body.name,
+        "split": split,
+        "strike": {"position": where, "direction": list(strike.direction), "impulse": strike.impulse},
+    }
 
 
-def _declared(plan: Plan, bodies: list[Body], recipe: Recipe, sensors: list[tuple[int, Array]], entries: list[dict[str, Any]]) -> dict[str, Any]:
+def _declared(
+    plan: Plan, bodies: list[Body], recipe: Recipe, sensors: list[tuple[int, Array]], entries: list[dict[str, Any]]
+) -> dict[str, Any]:
     guess = MATERIALS[recipe.material]
     elastic = {"youngs_modulus": guess.youngs_pa, "density": guess.density, "poisson_ratio": guess.poisson}
     things = {}
@@ -227,7 +275,9 @@ def _declared(plan: Plan, bodies: list[Body], recipe: Recipe, sensors: list[tupl
         "sensor": {
             "type": "near-field microphone",
             "response": "gain * normal surface velocity at the position; gain common to the case, unknown",
-            "position": {b.name: np.round(b.modes.vertex_m[q], 6).tolist() for b, (q, _) in zip(bodies, sensors, strict=True)},
+            "position": {
+                b.name: np.round(b.modes.vertex_m[q], 6).tolist() for b, (q, _) in zip(bodies, sensors, strict=True)
+            },
             "direction": {b.name: np.round(way, 6).tolist() for b, (_, way) in zip(bodies, sensors, strict=True)},
         },
         "band_hz": [20, 20000],

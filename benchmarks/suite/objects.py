@@ -1,7 +1,8 @@
 """What is struck: ten bodies laid out as bent grids, seven materials, and their modes, solved once and kept.
 
     Recipe (grid of bricks, a place for each of its points) + Material (as it is) -> Modes
-    γ = E/ρ scales λ, ρ scales shapes by ρ^{−1/2}, size s: λ s^{−2}, shapes s^{−3/2}        [physics of linear elasticity; exact]
+    γ = E/ρ scales λ, ρ scales shapes by ρ^{−1/2}, size s: λ s^{−2}, shapes s^{−3/2}
+        [physics of linear elasticity; exact]
 
 so one solve a recipe, ν and mesh serves every E, ρ and size. A case's guess is not what the object is made of.
 """
@@ -50,7 +51,10 @@ MATERIALS = {
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Recipe:
-    """A body by name: cells of its grid, place of the grid's points (0..1 along each axis) in m, what it is made of. closed: the first axis runs round."""
+    """A body by name: cells of its grid, place of the grid's points (0..1 along each axis) in m, what it is made of.
+
+    closed: the first axis runs round.
+    """
 
     name: str
     material: str
@@ -73,7 +77,9 @@ def _tapered(u: Array) -> Array:
 def _slab(u: Array) -> Array:
     x = (u - 0.5) * np.array([0.14, 0.1, 0.008])
     bump = 1 + 0.08 * np.sin(7 * u[:, 0] + 1) * np.cos(5 * u[:, 1])
-    return np.stack([x[:, 0] + 0.15 * x[:, 1], x[:, 1] + 0.06 * x[:, 0], x[:, 2] * bump + 0.002 * (u[:, 0] - 0.5) ** 2], axis=1)
+    return np.stack(
+        [x[:, 0] + 0.15 * x[:, 1], x[:, 1] + 0.06 * x[:, 0], x[:, 2] * bump + 0.002 * (u[:, 0] - 0.5) ** 2], axis=1
+    )
 
 
 def _revolved(profile: Array, thickness: float) -> Callable[[Array], Array]:
@@ -118,10 +124,22 @@ RECIPES = {
         Recipe("bowl_porcelain", "porcelain", (32, 11, 1), _revolved(_arc(0.07, 0.15, 1.4, 0.8), 0.005), closed=True),
         Recipe("cup_glass", "glass", (30, 14, 1), _revolved(_cup(), 0.0045), closed=True),
         Recipe("ring_brass", "brass", (32, 4, 1), _revolved(np.array([[0.02, 0.0], [0.065, 0.0]]), 0.006), closed=True),
-        Recipe("tube_alu", "aluminium", (24, 14, 1), _revolved(np.array([[0.018, -0.07], [0.018, 0.07]]), 0.0025), closed=True),
+        Recipe(
+            "tube_alu",
+            "aluminium",
+            (24, 14, 1),
+            _revolved(np.array([[0.018, -0.07], [0.018, 0.07]]), 0.0025),
+            closed=True,
+        ),
         Recipe("tapered_steel", "steel", (22, 4, 2), _tapered),
         Recipe("plank_wood", "wood", (22, 7, 1), _box(0.24, 0.07, 0.012)),
-        Recipe("angle_plastic", "plastic", (14, 10, 1), _box(0.14, 0.1, 0.012), keep=lambda c: (c[:, 0] < 0.35) | (c[:, 1] < 0.4)),
+        Recipe(
+            "angle_plastic",
+            "plastic",
+            (14, 10, 1),
+            _box(0.14, 0.1, 0.012),
+            keep=lambda c: (c[:, 0] < 0.35) | (c[:, 1] < 0.4),
+        ),
     )
 }
 
@@ -138,7 +156,12 @@ class Body:
 def laid(recipe: Recipe, fineness: float = 1.0) -> Bricks:
     """The recipe's grid, its cells along the two long axes multiplied."""
     a, b, c = recipe.cells
-    return grid((max(4, round(a * fineness)), max(3, round(b * fineness)), c), recipe.place, closed=recipe.closed, keep=recipe.keep)
+    return grid(
+        (max(4, round(a * fineness)), max(3, round(b * fineness)), c),
+        recipe.place,
+        closed=recipe.closed,
+        keep=recipe.keep,
+    )
 
 
 def solved(
@@ -152,7 +175,8 @@ def solved(
     load: dict[int, float] | None = None,
     tag: str = "",
 ) -> Modes:
-    """Modes at E = 1 Pa (tensor (6, 6) in units of E where given), ρ = 1 kg/m³, kept in folder. load: vertex -> mass in units of the body's own.
+    """Modes at E = 1 Pa (tensor (6, 6) in units of E where given), ρ = 1 kg/m³, kept in folder. load: vertex -> mass in
+    units of the body's own.
 
     tag: names ``tensor``, ``softer`` and ``load`` among the kept files.
     """
@@ -161,7 +185,14 @@ def solved(
     body = laid(recipe, fineness)
     if path.exists():
         with np.load(path) as kept:
-            return Modes(kept["value"], kept["shape"].astype(float), kept["rigid"], body.node_m[body.skin], body.face, float(kept["mass"]))
+            return Modes(
+                kept["value"],
+                kept["shape"].astype(float),
+                kept["rigid"],
+                body.node_m[body.skin],
+                body.face,
+                float(kept["mass"]),
+            )
     made = MATERIALS[recipe.material]
     speed2 = made.youngs_pa / made.density
     stiffness = isotropic(1.0, poisson) if tensor is None else tensor
@@ -191,7 +222,14 @@ def as_made(unit: Modes, material: Material, scale: float = 1.0) -> Modes:
     value = unit.value * material.youngs_pa / material.density / scale**2
     keep = value < (2 * np.pi * 20_000) ** 2
     root = 1 / np.sqrt(material.density * scale**3)
-    return Modes(value[keep], unit.shape[:, :, keep] * root, unit.rigid * root, unit.vertex_m * scale, unit.face, unit.mass_kg * material.density * scale**3)
+    return Modes(
+        value[keep],
+        unit.shape[:, :, keep] * root,
+        unit.rigid * root,
+        unit.vertex_m * scale,
+        unit.face,
+        unit.mass_kg * material.density * scale**3,
+    )
 
 
 def body(name: str, modes_: Modes) -> Body:

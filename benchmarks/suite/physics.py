@@ -1,6 +1,7 @@
 """One strike as a case's sensor records it.
 
-v(t) = g J cᵀ e^{At} b,  A = [[0, 1], [−Λ, −D]],  b = (0, φ(p)·e),  c = (0, φ(q)·n)          [state space of q̈ + D q̇ + Λ q = b f]
+v(t) = g J cᵀ e^{At} b,  A = [[0, 1], [−Λ, −D]],  b = (0, φ(p)·e),  c = (0, φ(q)·n)
+    [state space of q̈ + D q̇ + Λ q = b f]
 D diagonal: Σ g J (φ(p)·e)(φ(q)·n) e^{−dt}(cos ωt − (d/ω) sin ωt),  ω = √(λ − d²)
 x = noise + chain(room(pulse * v + what else rings))
 """
@@ -26,7 +27,10 @@ class Strike:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Ring:
-    """What rings after a unit impulse: poles s (m,) in 1/s, residues r (m,): Re Σ r e^{st}. level (m,): the mode's displacement in m at its antinode."""
+    """What rings after a unit impulse: poles s (m,) in 1/s, residues r (m,):
+
+    Re Σ r e^{st}. level (m,): the mode's displacement in m at its antinode.
+    """
 
     pole: Array
     residue: Array
@@ -87,7 +91,9 @@ def noise(rng: np.random.Generator, n: int, sd: float, colour: str) -> Array:
 
 
 def spectral_distance_db(one: Array, two: Array, floor_sd: float) -> float:
-    """Log-spectral distance, mean over three resolutions, of cells where either stands 10 dB above a white floor: this suite's own measure."""
+    """Log-spectral distance, mean over three resolutions, of cells where either stands 10 dB above a white floor: this
+    suite's own measure.
+    """
     total = []
     for size in (512, 2048, 8192):
         window = np.hanning(size)

@@ -1,6 +1,7 @@
 """Which cases the suite holds: singles, pairs, nulls, effects on no list, and cases that lack audio or a mesh.
 
-draw: 0 is the one whose cases were looked at while the diagnosis was written; any other has other numbers everywhere and other bodies for each effect, so it says what the first no longer can.
+draw: 0 is the one whose cases were looked at while the diagnosis was written; any other has other numbers everywhere
+and other bodies for each effect, so it says what the first no longer can.
 """
 
 from __future__ import annotations
@@ -24,7 +25,14 @@ STRUCK = {  # on what an effect is told from others: two places a strength
     "amplitude-pitch": ("square_alu", "ring_brass", "plate_glass", "bar_steel_170", "plate_alu", "cup_glass"),
     "amplitude-damping": ("plate_alu", "bar_steel_170", "square_alu", "ring_brass", "bowl_porcelain", "tapered_steel"),
     "room": ("cup_glass", "plate_glass", "slab_porcelain", "bar_steel_170", "plank_wood", "ring_brass"),
-    "foreign-mode": ("tapered_steel", "bowl_porcelain", "slab_porcelain", "plate_glass", "angle_plastic", "bar_steel_170"),
+    "foreign-mode": (
+        "tapered_steel",
+        "bowl_porcelain",
+        "slab_porcelain",
+        "plate_glass",
+        "angle_plastic",
+        "bar_steel_170",
+    ),
     "orthotropy": ("plank_wood", "plate_alu", "slab_porcelain", "plank_wood", "square_alu", "plate_glass"),
     "added-mass": ("plate_glass", "bar_steel_170", "square_alu", "ring_brass", "slab_porcelain", "plate_alu"),
     "rebound": ("ring_brass", "plate_glass", "bar_steel_170", "slab_porcelain", "angle_plastic", "tube_alu"),
@@ -73,7 +81,16 @@ def singles(draw: int = 0) -> list[Plan]:
         for strength in range(3):
             for k in range(2):
                 seed = _seed(draw, "single", name, strength, k)
-                out.append(Plan(f"single-{name}-{NAMES[strength]}-{k}", next(places), ((name, strength),), seed, transfer=seed % 2 == 0, **_recorded(seed)))
+                out.append(
+                    Plan(
+                        f"single-{name}-{NAMES[strength]}-{k}",
+                        next(places),
+                        ((name, strength),),
+                        seed,
+                        transfer=seed % 2 == 0,
+                        **_recorded(seed),
+                    )
+                )
     return out
 
 
@@ -107,14 +124,27 @@ def pairs(draw: int = 0) -> list[Plan]:
     out = []
     for a, b, place in PAIRS:
         seed = _seed(draw, "pair", a, b)
-        out.append(Plan(f"pair-{a}+{b}", place, ((a, 1 + seed % 2), (b, 1 + seed // 2 % 2)), seed, transfer=seed // 4 % 2 == 0, **_recorded(seed)))
+        out.append(
+            Plan(
+                f"pair-{a}+{b}",
+                place,
+                ((a, 1 + seed % 2), (b, 1 + seed // 2 % 2)),
+                seed,
+                transfer=seed // 4 % 2 == 0,
+                **_recorded(seed),
+            )
+        )
     return out
 
 
 def unlisted(draw: int = 0) -> list[Plan]:
     """What no effect explains, medium and strong."""
     places = _turned(("plate_glass", "bar_steel_170", "slab_porcelain", "square_alu", "ring_brass"), draw)
-    return [Plan(f"unlisted-{name}-{NAMES[s]}", next(places), ((name, s),), _seed(draw, "unlisted", name, s)) for name in UNLISTED for s in (1, 2)]
+    return [
+        Plan(f"unlisted-{name}-{NAMES[s]}", next(places), ((name, s),), _seed(draw, "unlisted", name, s))
+        for name in UNLISTED
+        for s in (1, 2)
+    ]
 
 
 def poor(draw: int = 0) -> list[Plan]:
@@ -138,7 +168,11 @@ def quick(draw: int = 0) -> list[Plan]:
 def whole(draw: int = 0) -> list[Plan]:
     """All of it, the kinds interleaved so that a part of it says something already."""
     kinds = [singles(draw), nulls(draw=draw), pairs(draw), unlisted(draw), poor(draw)]
-    order = [((i + 0.5) / len(kind), j, plan) for j, kind in enumerate(kinds) for i, plan in enumerate(_mixed(kind) if j == 0 else kind)]
+    order = [
+        ((i + 0.5) / len(kind), j, plan)
+        for j, kind in enumerate(kinds)
+        for i, plan in enumerate(_mixed(kind) if j == 0 else kind)
+    ]
     return [plan for _, _, plan in sorted(order, key=lambda o: o[:2])]
 
 

@@ -16,9 +16,17 @@ LIMIT_S = 900
 
 
 def diagnose(case: Path, command: str) -> dict[str, Any]:
-    """Row: case, true ids, verdict, found ids, errors, cpu_s, wall_s; verdict "failed" and the last line of what it said where it broke."""
+    """Row:
+
+    case, true ids, verdict, found ids, errors, cpu_s, wall_s; verdict "failed" and the last line of what it said where
+    it broke.
+    """
     truth = json.loads((case / "truth.json").read_text())
-    row: dict[str, Any] = {"case": case.name, "true": sorted(e["id"] for e in truth["effects"]), "distance_db": truth["distance_db"]}
+    row: dict[str, Any] = {
+        "case": case.name,
+        "true": sorted(e["id"] for e in truth["effects"]),
+        "distance_db": truth["distance_db"],
+    }
     with tempfile.TemporaryDirectory() as folder:
         blind = Path(folder) / case.name
         shutil.copytree(case, blind, ignore=shutil.ignore_patterns("truth.json"))
@@ -30,7 +38,12 @@ def diagnose(case: Path, command: str) -> dict[str, Any]:
             out.seek(0)
             err.seek(0)
             said, told = out.read(), err.read()
-    row |= {"wall_s": round(time.monotonic() - start, 2), "cpu_s": round(usage.ru_utime + usage.ru_stime, 2), "found": [], "verdict": "failed"}
+    row |= {
+        "wall_s": round(time.monotonic() - start, 2),
+        "cpu_s": round(usage.ru_utime + usage.ru_stime, 2),
+        "found": [],
+        "verdict": "failed",
+    }
     try:
         answer = json.loads(said[said.index("{") :])
         found = sorted(e["id"] for e in answer["effects"])

@@ -1,4 +1,6 @@
-"""What is recorded of a blow under a case's effects, and how far each of them moves it: nothing fitted, by the suite's own measure."""
+"""What is recorded of a blow under a case's effects, and how far each of them moves it: nothing fitted, by the suite's
+own measure.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,9 @@ from benchmarks.suite.objects import Body, Material
 from benchmarks.suite.physics import Strike
 from sonic_bullet.records import Array
 
-LEAST = (1.0, 1.8, 3.0)  # dB beyond the floor, in squares, that a weak, medium, strong effect must move the holdout strikes, alone or beside another
+# dB beyond the floor, in squares, that a weak, medium, strong effect must move the holdout strikes, alone or beside
+# another
+LEAST = (1.0, 1.8, 3.0)
 HELD_OUT = (5, 6, 7)
 
 
@@ -43,7 +47,9 @@ def damping_of(body: Body, material: Material, effects: tuple[Effect, ...]) -> A
     return damping
 
 
-def strike_sound(scene: Scene, body: Body, strike: Strike, sensor: tuple[int, Array], effects: tuple[Effect, ...], which: int) -> Array:
+def strike_sound(
+    scene: Scene, body: Body, strike: Strike, sensor: tuple[int, Array], effects: tuple[Effect, ...], which: int
+) -> Array:
     """What is recorded of one blow, without noise."""
     ringing = physics.ring(paired(body, effects), damping_of(body, scene.material, effects), strike, sensor)
     for e in effects:
@@ -78,21 +84,35 @@ def beyond(distance: dict[str, float]) -> float:
 
 
 def short_of(strengths: tuple[int, ...], distance: dict[str, float], beside: list[dict[str, float]]) -> float:
-    """By how many dB the effects together, or one of them beside the others, are heard less than they must be; 0 where they are heard."""
+    """By how many dB the effects together, or one of them beside the others, are heard less than they must be;
+
+    0 where they are heard.
+    """
     least = [LEAST[s] for s in strengths]
     together = [min(least) - beyond(distance)] if least else []
     return max([0.0, *together, *(o - beyond(d) for o, d in zip(least, beside, strict=False))])
 
 
 def apart(without: list[list[Array]], heard: list[Array], sd: float) -> dict[str, float]:
-    """How far the effects move the strikes from those without them (nothing fitted), and two takes of the latter from each other."""
+    """How far the effects move the strikes from those without them (nothing fitted), and two takes of the latter from
+    each other.
+    """
     pairs = zip(*without, heard, strict=True)
     both = [(physics.spectral_distance_db(a, h, sd), physics.spectral_distance_db(a, b, sd)) for a, b, h in pairs]
-    return {"effect": round(float(np.mean([a for a, _ in both])), 3), "floor": round(float(np.mean([b for _, b in both])), 3)}
+    return {
+        "effect": round(float(np.mean([a for a, _ in both])), 3),
+        "floor": round(float(np.mean([b for _, b in both])), 3),
+    }
 
 
 def each_beside(
-    scene: Scene, material: Material, unit: Modes, effects: tuple[Effect, ...], heard: list[Array], sd: float, noise: Callable[[], Array]
+    scene: Scene,
+    material: Material,
+    unit: Modes,
+    effects: tuple[Effect, ...],
+    heard: list[Array],
+    sd: float,
+    noise: Callable[[], Array],
 ) -> list[dict[str, float]]:
     """How far each effect moves the holdout strikes from what the others alone would give."""
     out = []

@@ -31,7 +31,11 @@ def confusion(rows: list[Row]) -> str:
         if not mine:
             continue
         said = Counter("+".join(r["found"]) if r["found"] else r["verdict"] for r in mine)
-        by = [f"{sum(map(_named, part))}/{len(part)}" for s in ("weak", "medium", "strong") if (part := [r for r in mine if f"-{s}-" in r["case"]]) is not None]
+        by = [
+            f"{sum(map(_named, part))}/{len(part)}"
+            for s in ("weak", "medium", "strong")
+            if (part := [r for r in mine if f"-{s}-" in r["case"]]) is not None
+        ]
         lines.append(f"  {name:18s} {'  '.join(by)}   " + ", ".join(f"{what} {n}" for what, n in said.most_common()))
     return "\n".join(lines)
 
@@ -52,7 +56,10 @@ def errors(rows: list[Row]) -> str:
             full = full[np.isfinite(full).all(axis=1)]
             if len(full):
                 b, a, f = full.mean(axis=0)
-                parts.append(f"{split} {b:.2f} -> {a:.2f} ({f:.2f})" + (f", {100 * (b - a) / (b - f):.0f} %" if b - f > 0.1 else ""))
+                parts.append(
+                    f"{split} {b:.2f} -> {a:.2f} ({f:.2f})"
+                    + (f", {100 * (b - a) / (b - f):.0f} %" if b - f > 0.1 else "")
+                )
         if parts:
             lines.append(f"  {name or 'nothing':18s} " + "   ".join(parts))
     return "\n".join(lines)
@@ -66,7 +73,9 @@ def _number(value: Any, split: str = "") -> float:
 
 def report(rows: list[Row], planned: int) -> str:
     """The whole report; counts are of cases that were judged, and those that were not are said."""
-    singles, nulls, pairs, unlisted, poor = (_of(rows, *k.split()) for k in ("single-", "null-", "pair-", "unlisted-", "features- no-mesh-"))
+    singles, nulls, pairs, unlisted, poor = (
+        _of(rows, *k.split()) for k in ("single-", "null-", "pair-", "unlisted-", "features- no-mesh-")
+    )
     failed = [r for r in rows if r["verdict"] == "failed"]
     alarms = [r for r in nulls if r["found"] or r["verdict"] != "none"]
     wrong = [r for r in singles + pairs if set(r["found"]) - set(r["true"])]
@@ -75,13 +84,18 @@ def report(rows: list[Row], planned: int) -> str:
     lucky = [r for r in unlisted if r["found"]]
     cpu = np.array([r["cpu_s"] for r in rows] or [0.0])
     lines = [
-        f"{len(rows)} of {planned} cases judged, {len(failed)} failed" + "".join(f"\n  {r['case']}: {r.get('why', '')}" for r in failed),
+        f"{len(rows)} of {planned} cases judged, {len(failed)} failed"
+        + "".join(f"\n  {r['case']}: {r.get('why', '')}" for r in failed),
         confusion(singles),
         f"singles named: {sum(map(_named, singles))} of {len(singles)}; a wrong name in {len(wrong)} of {len(singles) + len(pairs)} singles and pairs",
-        f"false alarms: {len(alarms)} of {len(nulls)} nulls" + "".join(f"\n  {r['case']}: {r['verdict']} {'+'.join(r['found'])}" for r in alarms),
+        f"false alarms: {len(alarms)} of {len(nulls)} nulls"
+        + "".join(f"\n  {r['case']}: {r['verdict']} {'+'.join(r['found'])}" for r in alarms),
         f"pairs: both found {both} of {len(pairs)}, exactly {exact}"
-        + "".join(f"\n  {'+'.join(r['true'])} -> {'+'.join(r['found']) or r['verdict']}" for r in pairs if not _named(r)),
-        f"unlisted: named wrongly {len(lucky)} of {len(unlisted)}" + "".join(f"\n  {r['case']}: {'+'.join(r['found']) or r['verdict']}" for r in unlisted),
+        + "".join(
+            f"\n  {'+'.join(r['true'])} -> {'+'.join(r['found']) or r['verdict']}" for r in pairs if not _named(r)
+        ),
+        f"unlisted: named wrongly {len(lucky)} of {len(unlisted)}"
+        + "".join(f"\n  {r['case']}: {'+'.join(r['found']) or r['verdict']}" for r in unlisted),
         "without audio or mesh:" + "".join(f"\n  {r['case']}: {'+'.join(r['found']) or r['verdict']}" for r in poor),
         errors(singles + nulls),
         f"CPU: median {np.median(cpu):.0f} s a case, worst {cpu.max():.0f} s",

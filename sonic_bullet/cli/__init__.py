@@ -5,9 +5,10 @@
     materials, doctor SCENE   -> table, JSON
     case FOLDER               -> case.json, and whether it can be read
 
-Exit 0: done. 2: one line on stderr says what is wrong and how to mend it, and no file stands under its final name half-written.
-130 (Ctrl-C), 143 (terminated): what was rendered so far is closed as a valid file and named. With --json and no path only JSON goes to
-stdout, whatever a scene prints. SONIC_BULLET_DEBUG=1 shows tracebacks. Everything heavy is imported by the command that needs it.
+Exit 0: done. 2: one line on stderr says what is wrong and how to mend it, and no file stands under its final name
+half-written. 130 (Ctrl-C), 143 (terminated): what was rendered so far is closed as a valid file and named. With --json
+and no path only JSON goes to stdout, whatever a scene prints. SONIC_BULLET_DEBUG=1 shows tracebacks. Everything heavy
+is imported by the command that needs it.
 """
 
 from __future__ import annotations
@@ -60,7 +61,12 @@ class Numbers(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # gener
 
 
 json_option = click.option(
-    "--json", "json_to", is_flag=False, flag_value="-", metavar="[PATH.json]", help="Write the result as JSON to PATH.json, or alone to stdout."
+    "--json",
+    "json_to",
+    is_flag=False,
+    flag_value="-",
+    metavar="[PATH.json]",
+    help="Write the result as JSON to PATH.json, or alone to stdout.",
 )
 
 
@@ -72,10 +78,25 @@ def cli() -> None:
 
 @cli.command(epilog=RENDER_EPILOG)
 @click.argument("scene", metavar="SCENE.py|LOG.npz")
-@click.option("-o", "--output", required=True, metavar="NAME.wav", help="Sound file: .wav .flac .ogg .aiff .caf .w64 .rf64; float formats hold 1.0 = 1 Pa.")
-@click.option("--seconds", type=float, metavar="S", help="How long to simulate; of a log, how much of it. [default: the scene's own, else 4]")
-@click.option("--sr", type=float, metavar="HZ", help=f"Sample rate, 8000 … 384000. [default: {DEFAULT_SR}; a log's own]")
-@click.option("--contacts", metavar="NAME.npz", help="Also write the contact log, which renders again without PyBullet.")
+@click.option(
+    "-o",
+    "--output",
+    required=True,
+    metavar="NAME.wav",
+    help="Sound file: .wav .flac .ogg .aiff .caf .w64 .rf64; float formats hold 1.0 = 1 Pa.",
+)
+@click.option(
+    "--seconds",
+    type=float,
+    metavar="S",
+    help="How long to simulate; of a log, how much of it. [default: the scene's own, else 4]",
+)
+@click.option(
+    "--sr", type=float, metavar="HZ", help=f"Sample rate, 8000 … 384000. [default: {DEFAULT_SR}; a log's own]"
+)
+@click.option(
+    "--contacts", metavar="NAME.npz", help="Also write the contact log, which renders again without PyBullet."
+)
 @click.option("--picture", metavar="NAME.png", help="Also draw pressure, spectrogram and events.")
 @json_option
 @click.option("--peak-dbfs", type=float, metavar="DB", help="Scale so that the peak is DB below full scale (say -1).")
@@ -88,8 +109,12 @@ def cli() -> None:
     help="A microphone in the world, in m; repeat for more channels. [default: the scene's own]",
 )
 @click.option("--seed", type=click.IntRange(0), help="Seed of the surfaces' roughness. [default: 0; a log's own]")
-@click.option("--material", metavar="M", help="Material of the bodies of a script that names none (a name or a preset file).")
-@click.option("--residual/--no-residual", default=True, help="What presets sound beside their modes. [default: sounded]")
+@click.option(
+    "--material", metavar="M", help="Material of the bodies of a script that names none (a name or a preset file)."
+)
+@click.option(
+    "--residual/--no-residual", default=True, help="What presets sound beside their modes. [default: sounded]"
+)
 def render(**options: Any) -> None:
     """Run a PyBullet scene, or replay a contact log, to a sound file."""
     from sonic_bullet.cli.scene_commands import run_render
@@ -100,18 +125,44 @@ def render(**options: Any) -> None:
 @cli.command(epilog=MODES_EPILOG)
 @click.argument("mesh", metavar="MESH")
 @click.option(
-    "--material", metavar="M", help=f"A name ('sonic-bullet materials') or a preset file. [default: {DEFAULT_MODES_MATERIAL}, if no constants are given]"
+    "--material",
+    metavar="M",
+    help=f"A name ('sonic-bullet materials') or a preset file. [default: {DEFAULT_MODES_MATERIAL}, if no constants are given]",
 )
-@click.option("--young", "youngs_pa", type=float, metavar="E", help="Young's modulus in Pa, in place of the material's.")
+@click.option(
+    "--young", "youngs_pa", type=float, metavar="E", help="Young's modulus in Pa, in place of the material's."
+)
 @click.option("--poisson", type=float, metavar="N", help="Poisson's ratio, in place of the material's.")
-@click.option("--density", "density_kg_m3", type=float, metavar="R", help="Density in kg/m³, in place of the material's.")
+@click.option(
+    "--density", "density_kg_m3", type=float, metavar="R", help="Density in kg/m³, in place of the material's."
+)
 @click.option("--count", type=click.IntRange(1, 1000), metavar="K", help="The lowest K elastic modes.")
-@click.option("--to-hz", type=click.FloatRange(0, min_open=True), metavar="F", help="All elastic modes up to F. [default: 20000]")
-@click.option("--fix", "fixed", type=Numbers("X,Y,Z,R"), multiple=True, help="Clamp all within R of a point, in m, mesh frame; repeatable.")
+@click.option(
+    "--to-hz", type=click.FloatRange(0, min_open=True), metavar="F", help="All elastic modes up to F. [default: 20000]"
+)
+@click.option(
+    "--fix",
+    "fixed",
+    type=Numbers("X,Y,Z,R"),
+    multiple=True,
+    help="Clamp all within R of a point, in m, mesh frame; repeatable.",
+)
 @click.option("--thickness", "thickness_m", type=float, metavar="T", help="Wall thickness in m of an open surface.")
-@click.option("--scale", type=float, default=1.0, show_default=True, metavar="S", help="Metres per mesh unit: 0.001 for a mesh in millimetres.")
+@click.option(
+    "--scale",
+    type=float,
+    default=1.0,
+    show_default=True,
+    metavar="S",
+    help="Metres per mesh unit: 0.001 for a mesh in millimetres.",
+)
 @json_option
-@click.option("-o", "--output", metavar="MODEL.npz", help="Also write the modal model: frequencies, decays, shapes on the surface.")
+@click.option(
+    "-o",
+    "--output",
+    metavar="MODEL.npz",
+    help="Also write the modal model: frequencies, decays, shapes on the surface.",
+)
 def modes(**options: Any) -> None:
     """Vibration modes of a mesh: the elastic ones, ascending."""
     from sonic_bullet.cli.solid_commands import run_modes
@@ -130,7 +181,14 @@ def materials(json_to: str | None) -> None:
 
 @cli.command()
 @click.argument("scene", metavar="SCENE.py")
-@click.option("--seconds", type=click.FloatRange(0, min_open=True), default=1.0, show_default=True, metavar="S", help="How long to watch the scene run.")
+@click.option(
+    "--seconds",
+    type=click.FloatRange(0, min_open=True),
+    default=1.0,
+    show_default=True,
+    metavar="S",
+    help="How long to watch the scene run.",
+)
 @json_option
 def doctor(scene: str, seconds: float, json_to: str | None) -> None:
     """Name the settings of a scene that would ruin its sound, and how to mend them."""
@@ -140,16 +198,23 @@ def doctor(scene: str, seconds: float, json_to: str | None) -> None:
 
 
 channel_option = click.option(
-    "--channel", type=click.IntRange(0), metavar="N", help="Which channel of a file of several, counted from 0. [default: the first, 0]"
+    "--channel",
+    type=click.IntRange(0),
+    metavar="N",
+    help="Which channel of a file of several, counted from 0. [default: the first, 0]",
 )
 
 
 @cli.command(epilog=FEATURES_EPILOG)
 @click.argument("recording")
-@click.option("--onset", "onset_s", type=click.FloatRange(0), metavar="S", help="When the impact starts. [default: found]")
+@click.option(
+    "--onset", "onset_s", type=click.FloatRange(0), metavar="S", help="When the impact starts. [default: found]"
+)
 @click.option("--band", type=Numbers("LO,HI"), help="Look between these frequencies in Hz. [default: 20,20000]")
 @channel_option
-@click.option("--picture", metavar="NAME.png", help="Also draw the spectrogram with the features on it, and decay over frequency.")
+@click.option(
+    "--picture", metavar="NAME.png", help="Also draw the spectrogram with the features on it, and decay over frequency."
+)
 @json_option
 def features(**options: Any) -> None:
     """The damped sinusoids of a recorded impact: frequency, decay, amplitude, each with its spread."""
@@ -164,27 +229,61 @@ def strike_options(command: Any) -> Any:
         (
             click.option("--mesh", metavar="M", help="Mesh of what was struck."),
             click.option("--strike", type=Numbers("X,Y,Z"), help="Where it was struck, in m, mesh frame."),
-            click.option("--direction", type=Numbers("X,Y,Z"), help="Direction of the impulse. [default: into the surface]"),
             click.option(
-                "--impulse", type=click.FloatRange(0, min_open=True), metavar="J", help="Impulse in N·s; without it sigma stands for gain times impulse."
+                "--direction", type=Numbers("X,Y,Z"), help="Direction of the impulse. [default: into the surface]"
             ),
-            click.option("--material", metavar="GUESS", help="A name ('sonic-bullet materials') or a preset file: E and density good to 30 %."),
-            click.option("--scale", type=float, metavar="S", help="Metres per mesh unit: 0.001 for a mesh in millimetres. [default: 1]"),
+            click.option(
+                "--impulse",
+                type=click.FloatRange(0, min_open=True),
+                metavar="J",
+                help="Impulse in N·s; without it sigma stands for gain times impulse.",
+            ),
+            click.option(
+                "--material",
+                metavar="GUESS",
+                help="A name ('sonic-bullet materials') or a preset file: E and density good to 30 %.",
+            ),
+            click.option(
+                "--scale",
+                type=float,
+                metavar="S",
+                help="Metres per mesh unit: 0.001 for a mesh in millimetres. [default: 1]",
+            ),
             click.option(
                 "--sensor",
                 type=click.Choice(["sum", "pressure", "velocity"]),
                 help="What was recorded: plain sum of modes, a microphone, a surface. [default: pressure]",
             ),
-            click.option("--sensor-at", type=Numbers("X,Y,Z"), help="Where the surface was measured, in m, for --sensor velocity."),
-            click.option("--sensor-direction", type=Numbers("X,Y,Z"), help="Along which, for --sensor velocity. [default: out of the surface]"),
+            click.option(
+                "--sensor-at",
+                type=Numbers("X,Y,Z"),
+                help="Where the surface was measured, in m, for --sensor velocity.",
+            ),
+            click.option(
+                "--sensor-direction",
+                type=Numbers("X,Y,Z"),
+                help="Along which, for --sensor velocity. [default: out of the surface]",
+            ),
             click.option(
                 "--medium",
                 type=click.Choice(["air", "none"]),
                 help="What it rang in: 'none' loses nothing to radiation. [default: air; with --sensor sum unknown]",
             ),
-            click.option("--onset", "onset_s", type=click.FloatRange(0), metavar="S", help="When the impulse arrives. [default: found]"),
+            click.option(
+                "--onset",
+                "onset_s",
+                type=click.FloatRange(0),
+                metavar="S",
+                help="When the impulse arrives. [default: found]",
+            ),
             channel_option,
-            click.option("--fix", "fixed", type=Numbers("X,Y,Z,R"), multiple=True, help="Clamp all within R of a point, in m, mesh frame; repeatable."),
+            click.option(
+                "--fix",
+                "fixed",
+                type=Numbers("X,Y,Z,R"),
+                multiple=True,
+                help="Clamp all within R of a point, in m, mesh frame; repeatable.",
+            ),
         )
     ):
         command = option(command)
@@ -206,9 +305,19 @@ def fit(**options: Any) -> None:
 
 @cli.command(epilog=RESIDUAL_EPILOG)
 @click.argument("source", metavar="RECORDING|CASE_DIR")
-@click.option("-o", "--output", required=True, metavar="PRESET.json", help="The material, fitted where there is a shape, with its residual as a preset file.")
+@click.option(
+    "-o",
+    "--output",
+    required=True,
+    metavar="PRESET.json",
+    help="The material, fitted where there is a shape, with its residual as a preset file.",
+)
 @strike_options
-@click.option("--picture", metavar="NAME.png", help="Also draw what was recorded, features, what is synthesised, represented, and left.")
+@click.option(
+    "--picture",
+    metavar="NAME.png",
+    help="Also draw what was recorded, features, what is synthesised, represented, and left.",
+)
 @json_option
 def residual(**options: Any) -> None:
     """What the modes of recorded strikes leave unsaid, into a preset that sounds it with every contact."""
@@ -219,11 +328,30 @@ def residual(**options: Any) -> None:
 
 @cli.command(epilog=DIAGNOSE_EPILOG)
 @click.argument("source", metavar="CASE_DIR")
-@click.option("-o", "--output", metavar="PRESET.json", help="The fitted material, with the effects that belong to it and its object, as a preset file.")
+@click.option(
+    "-o",
+    "--output",
+    metavar="PRESET.json",
+    help="The fitted material, with the effects that belong to it and its object, as a preset file.",
+)
 @json_option
-@click.option("--predict", metavar="DIR", help="Also write every strike as it is predicted, to DIR/before and DIR/after, whether its audio is there or not.")
-@click.option("--report", metavar="OUT.html", help="Also write one page that opens offline: players, spectrograms, evidence, the verdict in words.")
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of what is left out in turn, and of the null effects.")
+@click.option(
+    "--predict",
+    metavar="DIR",
+    help="Also write every strike as it is predicted, to DIR/before and DIR/after, whether its audio is there or not.",
+)
+@click.option(
+    "--report",
+    metavar="OUT.html",
+    help="Also write one page that opens offline: players, spectrograms, evidence, the verdict in words.",
+)
+@click.option(
+    "--seed",
+    type=click.IntRange(0),
+    default=0,
+    show_default=True,
+    help="Seed of what is left out in turn, and of the null effects.",
+)
 def diagnose(**options: Any) -> None:
     """Say which physical effect the fitted model lacks, judged on strikes it was not fitted to."""
     from sonic_bullet.cli.diagnose_command import run_diagnose
@@ -239,10 +367,19 @@ def case() -> None:
 @case.command("new", epilog=CASE_EPILOG)
 @click.argument("folder")
 @click.argument("more", nargs=-1, metavar="[RECORDING]...")
-@click.option("--recordings", multiple=True, metavar="A.wav [B.wav]...", help="The strikes' recordings. [default: all in the folder]")
+@click.option(
+    "--recordings",
+    multiple=True,
+    metavar="A.wav [B.wav]...",
+    help="The strikes' recordings. [default: all in the folder]",
+)
 @click.option("--mesh", metavar="M", help="Mesh of what was struck.")
 @click.option("--units", type=click.Choice(["m", "cm", "mm"]), default="m", show_default=True, help="Of the mesh.")
-@click.option("--material", metavar="GUESS", help="A name ('sonic-bullet materials') or a preset file: E and density good to 30 %.")
+@click.option(
+    "--material",
+    metavar="GUESS",
+    help="A name ('sonic-bullet materials') or a preset file: E and density good to 30 %.",
+)
 @click.option(
     "--sensor",
     type=click.Choice(["sum", "pressure", "velocity"]),
@@ -251,9 +388,15 @@ def case() -> None:
     help="What was recorded: plain sum of modes, a microphone, a surface.",
 )
 @click.option("--sensor-at", type=Numbers("X,Y,Z"), help="Where the surface was measured, in m, for --sensor velocity.")
-@click.option("--sensor-direction", type=Numbers("X,Y,Z"), help="Along which, for --sensor velocity. [default: out of the surface]")
 @click.option(
-    "--medium", type=click.Choice(["air", "none"]), help="What it rang in: 'none' loses nothing to radiation. [default: air; with --sensor sum unknown]"
+    "--sensor-direction",
+    type=Numbers("X,Y,Z"),
+    help="Along which, for --sensor velocity. [default: out of the surface]",
+)
+@click.option(
+    "--medium",
+    type=click.Choice(["air", "none"]),
+    help="What it rang in: 'none' loses nothing to radiation. [default: air; with --sensor sum unknown]",
 )
 def case_new(folder: str, more: tuple[str, ...], recordings: tuple[str, ...], **options: Any) -> None:
     """Write FOLDER/case.json for recordings of one object; files from elsewhere are copied into the folder."""
@@ -293,7 +436,8 @@ def main() -> None:
             stream.reconfigure(errors="replace")  # a terminal without Greek letters still gets its table
     signal.signal(signal.SIGTERM, _terminated)
     try:
-        with interrupts(), cli.make_context("sonic-bullet", _settled(sys.argv[1:]) or ["--help"]) as context:  # cli.main() would swallow what an interrupt says
+        # cli.main() would swallow what an interrupt says
+        with interrupts(), cli.make_context("sonic-bullet", _settled(sys.argv[1:]) or ["--help"]) as context:
             cli.invoke(context)
         _say_what_is_not_kept()
         sys.stdout.flush()
@@ -320,14 +464,23 @@ def main() -> None:
             raise
         code = 2
         notes = "; ".join(getattr(error, "__notes__", []))
-        _say(f"{type(error).__name__}: {error}" + (f"; {notes}" if notes else "") + "; set SONIC_BULLET_DEBUG=1 to see where")
+        _say(
+            f"{type(error).__name__}: {error}"
+            + (f"; {notes}" if notes else "")
+            + "; set SONIC_BULLET_DEBUG=1 to see where"
+        )
     sys.exit(code)
 
 
 def _settled(words: list[str]) -> list[str]:
-    """The command line with every --json that no name ending in .json follows as --json=-: what follows is another argument then."""
+    """The command line with every --json that no name ending in .json follows as --json=-: what follows is another
+    argument then.
+    """
     follows = [*words[1:], ""]
-    return ["--json=-" if word == "--json" and not after.lower().endswith(".json") else word for word, after in zip(words, follows, strict=True)]
+    return [
+        "--json=-" if word == "--json" and not after.lower().endswith(".json") else word
+        for word, after in zip(words, follows, strict=True)
+    ]
 
 
 def _terminated(*_: object) -> None:
@@ -335,10 +488,14 @@ def _terminated(*_: object) -> None:
 
 
 def _say_what_is_not_kept() -> None:
-    """One note where there was no folder for compiled code and computed models: each run then takes a minute that the next could do without."""
+    """One note where there was no folder for compiled code and computed models: each run then takes a minute that the
+    next could do without.
+    """
     folder = sys.modules.get("sonic_bullet.machine.user_folder")
     if folder is not None and folder.NOTES:
-        _say(f"note: compiled code and computed models are not kept for the next run: {folder.NOTES[0]}; XDG_CACHE_HOME names another folder")
+        _say(
+            f"note: compiled code and computed models are not kept for the next run: {folder.NOTES[0]}; XDG_CACHE_HOME names another folder"
+        )
 
 
 def _say(text: str) -> None:

@@ -39,7 +39,8 @@ def run_case_new(
     sensor_direction: Point | None,
     medium: str | None,
 ) -> None:
-    """The `case new` command: case.json, and copies of files from elsewhere, whole or not at all; nothing is overwritten.
+    """The `case new` command: case.json, and copies of files from elsewhere, whole or not at all; nothing is
+    overwritten.
 
     Raises SonicBulletError.
     """
@@ -52,7 +53,9 @@ def run_case_new(
     if not sounds:
         raise FileError(f"{folder} holds no recordings", "name them: --recordings a.wav b.wav")
     if mesh is not None and material is None:
-        raise FileError("--material missing", "a shape needs a guess of what it is made of; 'sonic-bullet materials' lists names")
+        raise FileError(
+            "--material missing", "a shape needs a guess of what it is made of; 'sonic-bullet materials' lists names"
+        )
     if sensor != "velocity" and (sensor_at is not None or sensor_direction is not None):
         raise FileError(
             f"--sensor-at or --sensor-direction is given, but --sensor is {sensor}",

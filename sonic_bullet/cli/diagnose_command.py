@@ -13,7 +13,9 @@ from sonic_bullet.records.errors import FileError
 SIDES = ("before", "after")  # the folders of --predict
 
 
-def run_diagnose(source: str, *, output: str | None, json_to: str | None, predict: str | None, report: str | None, seed: int) -> None:
+def run_diagnose(
+    source: str, *, output: str | None, json_to: str | None, predict: str | None, report: str | None, seed: int
+) -> None:
     """The `diagnose` command. Raises SonicBulletError."""
     if output is not None and not output.endswith(".json"):
         raise FileError(f"cannot write {output}: presets are JSON files", "end the name with .json")
@@ -57,7 +59,10 @@ def _predicted(found: Any, folder: str) -> int:
         try:
             os.makedirs(Path(folder) / side, exist_ok=True)
         except OSError as error:
-            raise FileError(f"cannot make the folder {Path(folder) / side}: {error.strerror or error}", "choose another with --predict") from error
+            raise FileError(
+                f"cannot make the folder {Path(folder) / side}: {error.strerror or error}",
+                "choose another with --predict",
+            ) from error
     for stem, sr, before, after in made:
         for side, sample in (("before", before), ("after", after)):
             write_audio(Path(folder) / side / f"{stem}.wav", sample, sr)
@@ -82,9 +87,17 @@ def _summary(found: Any) -> str:
     text = [f"{found.case.name}: {found.verdict}: {words['nothing' if nothing else found.verdict]}"]
     for c in found.closed.added:
         numbers = ", ".join(f"{k} {_number(v)}" for k, v in c.effect.parameters().items())
-        text.append(f"  {c.id} ({c.effect.owner.value}): {numbers}; {c.mean_db:.2f} dB nearer on strikes left out, chance {c.control_db:.2f} dB")
+        text.append(
+            f"  {c.id} ({c.effect.owner.value}): {numbers}; {c.mean_db:.2f} dB nearer on strikes left out, chance {c.control_db:.2f} dB"
+        )
     rows = [
-        (split, *(f"{found.errors[side][split]:.2f} dB" if found.errors[side][split] is not None else missing(split) for side in ("before", "after")))
+        (
+            split,
+            *(
+                f"{found.errors[side][split]:.2f} dB" if found.errors[side][split] is not None else missing(split)
+                for side in ("before", "after")
+            ),
+        )
         for split in ("fit", "holdout", "transfer")
         if split in found.errors["before"]
     ]
@@ -93,7 +106,10 @@ def _summary(found: Any) -> str:
         text.append(f"noise alone: {found.errors['floor']:.2f} dB")
     others = [c for c in found.closed.tried if c.id not in {a.id for a in found.closed.added}]
     if others:
-        text.append("tried and not kept: " + "; ".join(f"{c.id} {c.mean_db:+.2f} dB (chance {c.control_db:+.2f})" for c in others))
+        text.append(
+            "tried and not kept: "
+            + "; ".join(f"{c.id} {c.mean_db:+.2f} dB (chance {c.control_db:+.2f})" for c in others)
+        )
     if found.unexplained:
         text.append(f"left: {found.unexplained['words']}")
     return "\n".join(text)

@@ -15,7 +15,13 @@ from sonic_bullet.records.errors import FileError
 
 
 def run_features(
-    recording: str, *, onset_s: float | None, band: tuple[float, ...] | None, channel: int | None, json_to: str | None, picture: str | None
+    recording: str,
+    *,
+    onset_s: float | None,
+    band: tuple[float, ...] | None,
+    channel: int | None,
+    json_to: str | None,
+    picture: str | None,
 ) -> None:
     """The `features` command. Raises SonicBulletError."""
     if picture is not None and not picture.endswith((".png", ".pdf", ".svg")):
@@ -39,12 +45,25 @@ def run_features(
 
 
 def described(found: Features, notes: str, *, doubtful: bool) -> dict[str, Any]:
-    """Features as JSON-able values; null for a spread that is not known. doubtful: whether a note speaks against them."""
+    """Features as JSON-able values; null for a spread that is not known.
+
+    doubtful: whether a note speaks against them.
+    """
     names = ("freq_hz", "decay_per_s", "amplitude", "freq_sd_hz", "decay_sd_per_s", "amplitude_sd")
     columns = [getattr(found, name) for name in names]
-    rows = [{name: _number(column[k]) for name, column in zip(names, columns, strict=True)} for k in range(len(found.freq_hz))]
+    rows = [
+        {name: _number(column[k]) for name, column in zip(names, columns, strict=True)}
+        for k in range(len(found.freq_hz))
+    ]
     verdict = "features" if rows and not doubtful else "doubtful" if rows else "no features"
-    return {"features": rows, "onset_s": found.onset_s, "noise_dbfs": found.noise_dbfs, "sr": found.sr, "verdict": verdict, "note": notes}
+    return {
+        "features": rows,
+        "onset_s": found.onset_s,
+        "noise_dbfs": found.noise_dbfs,
+        "sr": found.sr,
+        "verdict": verdict,
+        "note": notes,
+    }
 
 
 def _number(value: float) -> float | None:
@@ -79,11 +98,22 @@ def _draw(path: str, sound: Array, sr: int, found: Features) -> None:
     FigureCanvasAgg(figure)
     left, right = figure.subplots(1, 2, width_ratios=(3, 2))
     freq, time, level = spectrogram_db(sound, sr)
-    left.pcolormesh(time, freq / 1000, level, vmin=level.max() - 90, vmax=level.max(), cmap="magma", shading="nearest", rasterized=True)
+    left.pcolormesh(
+        time,
+        freq / 1000,
+        level,
+        vmin=level.max() - 90,
+        vmax=level.max(),
+        cmap="magma",
+        shading="nearest",
+        rasterized=True,
+    )
     last = np.minimum(found.onset_s + 6.9 / np.maximum(found.decay_per_s, 1e-3), time[-1])
     left.hlines(found.freq_hz / 1000, found.onset_s, last, colors="c", linewidth=0.7)
     left.set(xlabel="time in s", ylabel="frequency in kHz", title="recording, features down to -60 dB")
-    right.errorbar(found.freq_hz / 1000, found.decay_per_s, yerr=found.decay_sd_per_s, fmt="o", markersize=3, linewidth=0.7)
+    right.errorbar(
+        found.freq_hz / 1000, found.decay_per_s, yerr=found.decay_sd_per_s, fmt="o", markersize=3, linewidth=0.7
+    )
     right.set(xlabel="frequency in kHz", ylabel="decay in 1/s", yscale="log", title="decay over frequency")
     with replacing(path) as file:
         figure.savefig(file, format=path.rsplit(".", 1)[1], dpi=110)

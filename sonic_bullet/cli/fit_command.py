@@ -13,7 +13,21 @@ from sonic_bullet.records import Array
 from sonic_bullet.records.errors import FileError
 
 Point = tuple[float, float, float]
-ONE = ("mesh", "strike", "direction", "impulse", "material", "scale", "sensor", "sensor_at", "sensor_direction", "onset_s", "fixed", "channel", "medium")
+ONE = (
+    "mesh",
+    "strike",
+    "direction",
+    "impulse",
+    "material",
+    "scale",
+    "sensor",
+    "sensor_at",
+    "sensor_direction",
+    "onset_s",
+    "fixed",
+    "channel",
+    "medium",
+)
 
 
 def run_fit(source: str, *, output: str, picture: str | None, json_to: str | None, **one: Any) -> None:
@@ -51,7 +65,9 @@ def as_case(source: str, one: dict[str, Any]) -> Case:
             raise FileError(f"{' and '.join(given)} given beside a case", "a case says that itself; leave it out")
         return read_case(path)
     if not path.is_file():
-        raise FileError(f"cannot read {source}: no such file or folder", "give a recording, or a folder with a case.json")
+        raise FileError(
+            f"cannot read {source}: no such file or folder", "give a recording, or a folder with a case.json"
+        )
     for name in ("impulse", "scale", "onset_s"):
         if one[name] is not None and not np.isfinite(one[name]):
             raise FileError(f"--{name.replace('_s', '')} is {one[name]}", "give a finite number")
@@ -59,7 +75,9 @@ def as_case(source: str, one: dict[str, Any]) -> Case:
         raise FileError(f"--impulse is {one['impulse']:g} N·s", f"give it in N·s, at most {LARGEST:g}")
     missing = [f"--{name}" for name in ("mesh", "strike", "material") if one[name] is None]
     if missing:
-        raise FileError(f"{' and '.join(missing)} missing", "a recording alone has no shape; see 'sonic-bullet fit --help'")
+        raise FileError(
+            f"{' and '.join(missing)} missing", "a recording alone has no shape; see 'sonic-bullet fit --help'"
+        )
     from sonic_bullet.presets import load_material
 
     if not Path(one["mesh"]).is_file():
@@ -69,15 +87,31 @@ def as_case(source: str, one: dict[str, Any]) -> Case:
     if kind == "velocity" and one["sensor_at"] is None:
         raise FileError("--sensor velocity needs a place", "give --sensor-at X,Y,Z")
     if kind != "velocity" and one["sensor_direction"] is not None:
-        raise FileError(f"--sensor-direction is given, but --sensor is {kind}", "give --sensor velocity, or leave the direction out")
-    thing = CaseObject("object", Path(one["mesh"]), 1.0 if one["scale"] is None else one["scale"], one["material"], fixed=one["fixed"])
+        raise FileError(
+            f"--sensor-direction is given, but --sensor is {kind}", "give --sensor velocity, or leave the direction out"
+        )
+    thing = CaseObject(
+        "object", Path(one["mesh"]), 1.0 if one["scale"] is None else one["scale"], one["material"], fixed=one["fixed"]
+    )
     observed = one["channel"] or 0, None, one["channel"] is not None
-    recording = CaseRecording(path, None, "object", "fit", one["strike"], _unit("direction", one), one["impulse"], *observed)
+    recording = CaseRecording(
+        path, None, "object", "fit", one["strike"], _unit("direction", one), one["impulse"], *observed
+    )
     at = {"object": one["sensor_at"]} if one["sensor_at"] is not None else None
     along = _unit("sensor_direction", one)
     direction = None if along is None else {"object": along}
     medium = medium_of(one["medium"], kind)
-    return Case(path.stem, path.parent, {"object": thing}, (recording,), kind, at, direction, onset_s=one["onset_s"], medium=medium)
+    return Case(
+        path.stem,
+        path.parent,
+        {"object": thing},
+        (recording,),
+        kind,
+        at,
+        direction,
+        onset_s=one["onset_s"],
+        medium=medium,
+    )
 
 
 def _unit(name: str, one: dict[str, Any]) -> Point | None:
@@ -105,7 +139,8 @@ def described(found: Any) -> dict[str, Any]:
         "metric": fit.metric if fit.metric >= 0 else None,
         "log_spectral_db": found.log_spectral_db if found.log_spectral_db >= 0 else None,
         "modes": [
-            {"freq_hz": float(f), "decay_per_s": float(d), "amplitude": float(a)} for f, d, a in zip(fit.freq_hz, fit.decay_per_s, fit.amplitude, strict=True)
+            {"freq_hz": float(f), "decay_per_s": float(d), "amplitude": float(a)}
+            for f, d, a in zip(fit.freq_hz, fit.decay_per_s, fit.amplitude, strict=True)
         ],
     }
 
@@ -115,7 +150,9 @@ def _summary(found: Any) -> str:
     sd = np.sqrt(np.diag(fit.covariance))
 
     def shown(value: float, spread: float, relative: bool = True) -> tuple[str, str]:
-        return f"{value:.6g}", f"{spread * (value if relative else 1):.2g}" if np.isfinite(spread) else "not identifiable"
+        return f"{value:.6g}", f"{spread * (value if relative else 1):.2g}" if np.isfinite(
+            spread
+        ) else "not identifiable"
 
     rows = [
         ("alpha in 1/s", *shown(fit.alpha_per_s, sd[0])),
@@ -128,12 +165,22 @@ def _summary(found: Any) -> str:
     ]
     paired = sum(int((o.line >= 0).sum()) for o in found.objects)
     lines = sum(len(o.evidence.lines.freq_hz) for o in found.objects)
-    correction: Array = np.concatenate([o.correction[o.line >= 0] for o in found.objects]) if found.objects else np.zeros(0)
-    text = [f"{found.case.name}: {fit.verdict}", table(("", "value", "spread"), rows), f"{paired} modes paired with {lines} observed lines"]
+    correction: Array = (
+        np.concatenate([o.correction[o.line >= 0] for o in found.objects]) if found.objects else np.zeros(0)
+    )
+    text = [
+        f"{found.case.name}: {fit.verdict}",
+        table(("", "value", "spread"), rows),
+        f"{paired} modes paired with {lines} observed lines",
+    ]
     if len(correction):
-        text.append(f"corrections of single modes' frequencies: rms {np.sqrt((correction**2).mean()):.2%}, largest {np.abs(correction).max():.2%}")
+        text.append(
+            f"corrections of single modes' frequencies: rms {np.sqrt((correction**2).mean()):.2%}, largest {np.abs(correction).max():.2%}"
+        )
     if fit.metric >= 0:
-        text.append(f"hybrid metric of recording and synthesis: {fit.metric:.3g} (0 the same, 1 and more as far as silence)")
+        text.append(
+            f"hybrid metric of recording and synthesis: {fit.metric:.3g} (0 the same, 1 and more as far as silence)"
+        )
     if found.log_spectral_db >= 0:
         text.append(f"log-spectral distance of recording and synthesis: {found.log_spectral_db:.2f} dB")
     return "\n".join(text)

@@ -24,7 +24,9 @@ __all__ = ["clean_stdout", "places", "progress_bar", "quiet_stderr", "status", "
 
 @contextmanager
 def clean_stdout(json_to: str | None) -> Iterator[Callable[[str], None]]:
-    """A printer to stdout; with JSON to stdout, what anything else prints meanwhile (a scene, a C library) goes to stderr."""
+    """A printer to stdout; with JSON to stdout, what anything else prints meanwhile (a scene, a C library) goes to
+    stderr.
+    """
     if json_to != "-":
         yield print
         return
@@ -62,7 +64,8 @@ def quiet_stderr() -> Iterator[None]:
 def places(*asked: str | None) -> tuple[str | None, ...]:
     """Each output's absolute path, resolved once and tried before anything runs: what is run may change the folder.
 
-    None (not asked for) and "-" (stdout) stay as they are. Raises FileError where one cannot be written or two are one file.
+    None (not asked for) and "-" (stdout) stay as they are. Raises FileError where one cannot be written or two are one
+    file.
     """
     from sonic_bullet.files import check_output
 
@@ -73,14 +76,18 @@ def places(*asked: str | None) -> tuple[str | None, ...]:
 
 
 def folder_place(asked: str, *inside: str) -> str:
-    """The absolute path of a folder for outputs, tried: it and the folders ``inside`` can be made and take files. Nothing of that is left.
+    """The absolute path of a folder for outputs, tried: it and the folders ``inside`` can be made and take files.
+
+    Nothing of that is left.
 
     Raises FileError.
     """
     from sonic_bullet.files import cannot, check_output
 
     folder = Path(os.path.join(os.getcwd(), asked))
-    missing = [place for place in (*(folder / name for name in inside), folder, *folder.parents) if not os.path.lexists(place)]
+    missing = [
+        place for place in (*(folder / name for name in inside), folder, *folder.parents) if not os.path.lexists(place)
+    ]
     try:
         for name in inside:
             (folder / name).mkdir(parents=True, exist_ok=True)
@@ -111,13 +118,23 @@ def write_json(json_to: str | None, value: Any) -> None:
 
 @contextmanager
 def progress_bar(label: str) -> Iterator[tuple[Callable[[float], None], Callable[[str], None]]]:
-    """A function of the share done and one of what is being done before that, drawn on a terminal's stderr; in a pipe they do nothing."""
+    """A function of the share done and one of what is being done before that, drawn on a terminal's stderr; in a pipe
+    they do nothing.
+    """
     if not sys.stderr.isatty():
         yield (lambda share: None), (lambda text: None)
         return
     from rich.console import Console
     from rich.markup import escape
-    from rich.progress import BarColumn, Progress, SpinnerColumn, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+    from rich.progress import (
+        BarColumn,
+        Progress,
+        SpinnerColumn,
+        TaskProgressColumn,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
 
     columns = (
         SpinnerColumn(),
@@ -140,7 +157,10 @@ def table(head: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> str:
     last = len(head) - 1
 
     def line(row: tuple[str, ...]) -> str:
-        cells = [cell if i == last and i > 0 else cell.ljust(widths[i]) if i == 0 else cell.rjust(widths[i]) for i, cell in enumerate(row)]
+        cells = [
+            cell if i == last and i > 0 else cell.ljust(widths[i]) if i == 0 else cell.rjust(widths[i])
+            for i, cell in enumerate(row)
+        ]
         return "  ".join(cells).rstrip()
 
     return "\n".join(line(row) for row in [head, *rows])

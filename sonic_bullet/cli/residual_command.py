@@ -49,8 +49,14 @@ def _shaped(source: str, one: dict[str, Any], progress: Any) -> tuple[Any, Any]:
 
     case = as_case(source, one)
     warn(case.warnings)
-    if not any(r.split == "fit" and r.file is not None and r.object in case.objects and case.objects[r.object].mesh is not None for r in case.recordings):
-        raise FileError(f"case {case.name} has no 'fit' recording of an object with a mesh", "a residual is what a recording has beside its object's modes")
+    if not any(
+        r.split == "fit" and r.file is not None and r.object in case.objects and case.objects[r.object].mesh is not None
+        for r in case.recordings
+    ):
+        raise FileError(
+            f"case {case.name} has no 'fit' recording of an object with a mesh",
+            "a residual is what a recording has beside its object's modes",
+        )
     found = fit_case(case, progress=progress)
     warn(found.warnings)
     progress("taking what is left")
@@ -75,7 +81,9 @@ def _unshaped(source: str, one: dict[str, Any], progress: Any) -> tuple[Any, Any
         raise FileError(f"--onset is {one['onset_s']}", "give a finite number")
     preset = named_preset(one["material"])
     if not Path(source).is_file():
-        raise FileError(f"cannot read {source}: no such file or folder", "give a recording, or a folder with a case.json")
+        raise FileError(
+            f"cannot read {source}: no such file or folder", "give a recording, or a folder with a case.json"
+        )
     sound, sr = read_audio(source)
     if not sound.size:
         raise AudioError(f"{source} is empty", "give a recording of an impact")

@@ -1,4 +1,6 @@
-"""`render` and `doctor`: check every output's place first, run, then write log, sound, picture and JSON, each whole or not at all."""
+"""`render` and `doctor`: check every output's place first, run, then write log, sound, picture and JSON, each whole or
+not at all.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +11,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sonic_bullet.cli.output import clean_stdout, places, progress_bar, quiet_stderr, status, write_json
-from sonic_bullet.files import AudioReport, check_audio_output, check_levels, check_sr, kept_name, read_log, write_audio, write_log
+from sonic_bullet.files import (
+    AudioReport,
+    check_audio_output,
+    check_levels,
+    check_sr,
+    kept_name,
+    read_log,
+    write_audio,
+    write_log,
+)
 from sonic_bullet.records.errors import AudioError, FileError, SceneError, SonicBulletError
 
 if TYPE_CHECKING:
@@ -36,7 +47,10 @@ def run_render(
     material: str | None,
     residual: bool,
 ) -> None:
-    """The `render` command. Raises SonicBulletError, and KeyboardInterrupt whose text names the file with what was rendered so far."""
+    """The `render` command.
+
+    Raises SonicBulletError, and KeyboardInterrupt whose text names the file with what was rendered so far.
+    """
     rate = None if sr is None else check_sr(sr)
     _check_request(scene, seconds, peak_dbfs, lufs, material)
     to, contacts, picture, json_to = _check_places(output, contacts, picture, json_to)
@@ -77,31 +91,48 @@ def run_doctor(scene: str, seconds: float, json_to: str | None) -> None:
                 say(f"{finding.severity}: {finding.id}: {finding.what}\n    {finding.remedy}")
         else:
             say(f"{scene}: nothing found that would spoil its sound")
-    write_json(json_to, {"scene": scene, "findings": [{"id": f.id, "severity": f.severity, "what": f.what, "remedy": f.remedy} for f in findings]})
+    write_json(
+        json_to,
+        {
+            "scene": scene,
+            "findings": [{"id": f.id, "severity": f.severity, "what": f.what, "remedy": f.remedy} for f in findings],
+        },
+    )
 
 
 def _is_log(scene: str) -> bool:
     return Path(scene).suffix.lower() == ".npz"
 
 
-def _check_request(scene: str, seconds: float | None, peak_dbfs: float | None, lufs: float | None, material: str | None) -> None:
+def _check_request(
+    scene: str, seconds: float | None, peak_dbfs: float | None, lufs: float | None, material: str | None
+) -> None:
     if seconds is not None and not 0 < seconds < 1e6:
         raise AudioError(f"{seconds} seconds cannot be rendered", "give --seconds above 0")
     check_levels(peak_dbfs, lufs)
     if not Path(scene).is_file():
         raise FileError(f"cannot read {scene}: no such file", "give a scene (.py) or a contact log (.npz)")
     if Path(scene).suffix.lower() not in (".py", ".npz"):
-        raise FileError(f"cannot render {scene}: neither a scene nor a contact log", "give a file that ends in .py or .npz")
+        raise FileError(
+            f"cannot render {scene}: neither a scene nor a contact log", "give a file that ends in .py or .npz"
+        )
     if material is not None and _is_log(scene):
-        raise FileError("--material does not apply to a contact log, whose bodies bring theirs", "leave it out, or render the scene")
+        raise FileError(
+            "--material does not apply to a contact log, whose bodies bring theirs", "leave it out, or render the scene"
+        )
     if material is not None:
         from sonic_bullet.presets import load_material
 
         load_material(material)
 
 
-def _check_places(output: str, contacts: str | None, picture: str | None, json_to: str | None) -> tuple[str, str | None, str | None, str | None]:
-    """Where all outputs go, absolute: each can be written, and no two are one file, before anything is simulated. Raises FileError."""
+def _check_places(
+    output: str, contacts: str | None, picture: str | None, json_to: str | None
+) -> tuple[str, str | None, str | None, str | None]:
+    """Where all outputs go, absolute: each can be written, and no two are one file, before anything is simulated.
+
+    Raises FileError.
+    """
     check_audio_output(output)
     if contacts is not None and not contacts.endswith(".npz"):
         raise FileError(f"cannot write {contacts}: contact logs are npz files", "end the name with .npz")
@@ -167,7 +198,10 @@ def _replayed(path: str, wish: _Wish) -> _Replay:
         log = replace(log, seed=wish.seed)
     if (seconds := wish.seconds) is not None:
         if seconds > log.duration_s + 1e-9:
-            raise AudioError(f"{path} lasts {log.duration_s:.3f} s, shorter than {seconds} s", "give fewer seconds, or simulate the scene for longer")
+            raise AudioError(
+                f"{path} lasts {log.duration_s:.3f} s, shorter than {seconds} s",
+                "give fewer seconds, or simulate the scene for longer",
+            )
         log = log.first(int((log.start_s < seconds - 1e-9).sum()))
     samples = render_log(log, sr=wish.rate, residual=wish.residual, progress=wish.progress, say=wish.say)
     return _Replay(samples, log, wish.rate or log.sr, silence_notes(samples, log))
@@ -187,7 +221,9 @@ def _written(output: str, result: RenderResult | _Replay, peak_dbfs: float | Non
 def _with_partial(
     error: SonicBulletError | KeyboardInterrupt, to: str, output: str, peak_dbfs: float | None, lufs: float | None
 ) -> SonicBulletError | KeyboardInterrupt:
-    """The error, its text naming NAME.partial.EXT as the user would, where what was rendered before it is written as a valid file beside ``to``."""
+    """The error, its text naming NAME.partial.EXT as the user would, where what was rendered before it is written as a
+    valid file beside ``to``.
+    """
     result: RenderResult | None = getattr(error, "partial", None)
     said = ""
     if result is not None and result.samples.size:
@@ -197,7 +233,8 @@ def _with_partial(
             try:
                 write_audio(partial, result.samples, result.sr, peak_dbfs=peak_dbfs, lufs=lufs)
             except AudioError:
-                write_audio(partial, result.samples, result.sr)  # silent or too short for the level asked for: kept as it is
+                # silent or too short for the level asked for: kept as it is
+                write_audio(partial, result.samples, result.sr)
         except FileError as failure:  # the error itself is what the user must read first
             said = failure.what
     if isinstance(error, SonicBulletError):
@@ -209,7 +246,11 @@ def _coarse(log: ContactLog) -> tuple[str, ...]:
     from sonic_bullet.modal import COARSER
 
     names = sorted({body.name for body in log.bodies if body.model is not None and COARSER in body.model.note})
-    return (f"the mesh of {', '.join(names)} is {COARSER}: a faster machine may compute slightly other modes",) if names else ()
+    return (
+        (f"the mesh of {', '.join(names)} is {COARSER}: a faster machine may compute slightly other modes",)
+        if names
+        else ()
+    )
 
 
 def _oversized(log: ContactLog) -> tuple[str, ...]:
@@ -217,7 +258,9 @@ def _oversized(log: ContactLog) -> tuple[str, ...]:
 
     large = [(body, oversize(body.model.vertex_m, body.model.mass_kg)) for body in log.bodies if body.model is not None]
     remedy = "load it with globalScaling=0.001, or give its mesh in metres, if its numbers are millimetres"
-    return tuple(f"body {body.body_id} link {body.link} ({body.name}) {words}; {remedy}" for body, words in large if words)
+    return tuple(
+        f"body {body.body_id} link {body.link} ({body.name}) {words}; {remedy}" for body, words in large if words
+    )
 
 
 def _warnings(report: AudioReport) -> tuple[str, ...]:
@@ -226,7 +269,9 @@ def _warnings(report: AudioReport) -> tuple[str, ...]:
             f"{report.clipped} samples were clipped at full scale (peak {report.peak_pa:.3g} Pa); --peak-dbfs -1 avoids it, a float .wav needs no clipping",
         )
     if report.over:
-        return (f"{report.over} samples pass 1.0 (peak {report.peak_pa:.3g} Pa): the file is exact, but players clip it; --peak-dbfs -1 scales it",)
+        return (
+            f"{report.over} samples pass 1.0 (peak {report.peak_pa:.3g} Pa): the file is exact, but players clip it; --peak-dbfs -1 scales it",
+        )
     return ()
 
 

@@ -45,16 +45,28 @@ def run_modes(
 
         with status(mesh) as progress:
             shape = read_mesh(mesh, scale)
-            model = modal.analyse((shape,), made, count=count, fixed=fixed, thickness_m=thickness_m, progress=progress, to_hz=to_hz or HEARING_LIMIT_HZ)
+            model = modal.analyse(
+                (shape,),
+                made,
+                count=count,
+                fixed=fixed,
+                thickness_m=thickness_m,
+                progress=progress,
+                to_hz=to_hz or HEARING_LIMIT_HZ,
+            )
         if to is not None:
             write_model(to, model)
         say(_summary(mesh, made, model))
     if large := oversize(model.vertex_m, model.mass_kg):
-        print(f"sonic-bullet: warning: {mesh} {large}; give --scale 0.001 if its numbers are millimetres", file=sys.stderr)
+        print(
+            f"sonic-bullet: warning: {mesh} {large}; give --scale 0.001 if its numbers are millimetres", file=sys.stderr
+        )
     write_json(json_to, _described(mesh, made, model, output))
 
 
-def chosen_material(name: str | None, youngs_pa: float | None, poisson: float | None, density_kg_m3: float | None) -> Material:
+def chosen_material(
+    name: str | None, youngs_pa: float | None, poisson: float | None, density_kg_m3: float | None
+) -> Material:
     """The named material with the given constants in place of its own; without a name all three or none (then steel).
 
     A material of bare constants has no damping. Raises MaterialError.
@@ -65,7 +77,10 @@ def chosen_material(name: str | None, youngs_pa: float | None, poisson: float | 
     missing = [key for key, value in given.items() if value is None]
     if name is None and 0 < len(missing) < 3:
         options = {"youngs_pa": "--young", "poisson": "--poisson", "density_kg_m3": "--density"}
-        raise MaterialError(f"{' and '.join(options[key] for key in missing)} missing", "give all three of --young, --poisson, --density, or a --material too")
+        raise MaterialError(
+            f"{' and '.join(options[key] for key in missing)} missing",
+            "give all three of --young, --poisson, --density, or a --material too",
+        )
     base = load_material(name or DEFAULT_MATERIAL)
     if len(missing) == 3:
         return base
@@ -73,7 +88,9 @@ def chosen_material(name: str | None, youngs_pa: float | None, poisson: float | 
     if youngs_pa is None and poisson is None:
         return replace(base, density_kg_m3=rho)
     elastic = (base.youngs_pa if youngs_pa is None else youngs_pa, base.poisson if poisson is None else poisson)
-    made = Material.isotropic(base.name if name else "constants", youngs_pa=elastic[0], poisson=elastic[1], density_kg_m3=rho)
+    made = Material.isotropic(
+        base.name if name else "constants", youngs_pa=elastic[0], poisson=elastic[1], density_kg_m3=rho
+    )
     return made if name is None else replace(made, alpha_per_s=base.alpha_per_s, beta_s=base.beta_s)
 
 
@@ -118,7 +135,10 @@ def _material(m: Material) -> dict[str, Any]:
 
 
 def _described(mesh: str, material: Material, model: ModalModel, output: str | None) -> dict[str, Any]:
-    modes = [{"freq_hz": float(f), "decay_per_s": None if math.isnan(d) else float(d)} for f, d in zip(model.freq_hz, model.decay_per_s, strict=True)]
+    modes = [
+        {"freq_hz": float(f), "decay_per_s": None if math.isnan(d) else float(d)}
+        for f, d in zip(model.freq_hz, model.decay_per_s, strict=True)
+    ]
     return {
         "modes": modes,
         "mesh": mesh,
@@ -133,7 +153,10 @@ def _described(mesh: str, material: Material, model: ModalModel, output: str | N
 
 
 def _summary(mesh: str, material: Material, model: ModalModel) -> str:
-    rows = [(str(i), f"{f:.2f}", "-" if math.isnan(d) else f"{d:.3f}") for i, (f, d) in enumerate(zip(model.freq_hz, model.decay_per_s, strict=True), 1)]
+    rows = [
+        (str(i), f"{f:.2f}", "-" if math.isnan(d) else f"{d:.3f}")
+        for i, (f, d) in enumerate(zip(model.freq_hz, model.decay_per_s, strict=True), 1)
+    ]
     dropped = f", {model.dropped} overdamped modes dropped" if model.dropped else ""
     head = f"{mesh}: {material.name}, {model.volume_m3 * 1e6:.4g} cm³, {model.mass_kg:.4g} kg, {model.mode_count} modes{dropped}\n{model.note}"
     return head.rstrip() + ("\n" + table(("mode", "Hz", "decay in 1/s"), rows) if rows else "")

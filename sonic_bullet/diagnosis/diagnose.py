@@ -1,8 +1,10 @@
 """`diagnose`: a case in, a Diagnosis out.
 
-    read the 'fit' strikes -> fit the baseline (baseline.py) -> select effects (stepwise.py) -> verdict, errors on all splits, predictions
+    read the 'fit' strikes -> fit the baseline (baseline.py) -> select effects (stepwise.py) -> verdict, errors on all
+        splits, predictions
 
-Nothing of 'holdout' and 'transfer' is opened before the selection has ended; where their audio is there, it is compared at the very end and changes nothing.
+Nothing of 'holdout' and 'transfer' is opened before the selection has ended; where their audio is there, it is compared
+at the very end and changes nothing.
 """
 
 from __future__ import annotations
@@ -38,10 +40,13 @@ SPLITS = ("fit", "holdout", "transfer")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Diagnosis:
-    """What the model lacks. errors, errors_sone: {"before": {split: …}, "after": {split: …}, "floor": …}, None where there is no audio,
-    or none of it could be compared. not_compared: by split, what could not be; empty where all could.
+    """What the model lacks. errors, errors_sone: {"before": {split:
 
-    errors_lines: likewise for measured lines in place of audio, of ln f and ln d. unexplained: what is left, in words and numbers; empty where nothing is. warnings: one line each, the fit's among them.
+    …}, "after": {split: …}, "floor": …}, None where there is no audio, or none of it could be compared. not_compared:
+    by split, what could not be; empty where all could.
+
+    errors_lines: likewise for measured lines in place of audio, of ln f and ln d. unexplained: what is left, in words
+    and numbers; empty where nothing is. warnings: one line each, the fit's among them.
     """
 
     case: Case
@@ -70,7 +75,8 @@ def diagnose(
     cache: Place = "default",
     progress: Callable[[str], None] | None = None,
 ) -> Diagnosis:
-    """Say what the fitted model lacks, from the case's 'fit' strikes. effects: the candidates, your own beside the package's: ``EFFECTS + (Mine,)``.
+    """Say what the fitted model lacks, from the case's 'fit' strikes. effects: the candidates, your own beside the
+    package's: ``EFFECTS + (Mine,)``.
 
     Raises SonicBulletError where a file, mesh or number makes a fit impossible.
     """
@@ -107,12 +113,16 @@ def _warnings(end: Closed | NothingCompared, out: dict[str, tuple[LeftOut, ...]]
     if len(end.judged) == 1:
         said.append("one strike alone: nothing can be left out, so no effect can be named; record more strikes")
     if end.mesh_off:
-        said.append(f"upper modes are up to {100 * end.mesh_off:.1f} % off, more than is corrected: what is left open is the mesh's; a finer one closes it")
+        said.append(
+            f"upper modes are up to {100 * end.mesh_off:.1f} % off, more than is corrected: what is left open is the mesh's; a finer one closes it"
+        )
     return said
 
 
 def _of_lines(case: Case, bodies: tuple[Struck, ...], end: Closed | NothingCompared) -> dict[str, Any]:
-    """Rms of ln f and of ln d of measured lines that came in place of audio, before and after, by split; empty where there are none."""
+    """Rms of ln f and of ln d of measured lines that came in place of audio, before and after, by split; empty where
+    there are none.
+    """
     found: dict[str, Any] = {}
     for body in bodies:
         for split in SPLITS:
@@ -123,7 +133,11 @@ def _of_lines(case: Case, bodies: tuple[Struck, ...], end: Closed | NothingCompa
             decay = np.array([np.nan if line.decay_per_s is None else line.decay_per_s for line in rows])
             for name, h in (("before", end.before), ("after", end.after)):
                 off, lost = off_by(h, body, freq, decay)
-                entry = {"frequency_rms": float(np.sqrt((off**2).mean())), "lines": len(rows), "unpaired": int((off >= CAP).sum())}
+                entry = {
+                    "frequency_rms": float(np.sqrt((off**2).mean())),
+                    "lines": len(rows),
+                    "unpaired": int((off >= CAP).sum()),
+                }
                 entry |= {"decay_rms": float(np.sqrt(np.nanmean(lost**2)))} if np.isfinite(lost).any() else {}
                 found.setdefault(name, {})[split] = entry
     return found
@@ -138,7 +152,11 @@ def _others(case: Case, bodies: tuple[Struck, ...], takes: tuple[Take, ...], spl
                 continue
             sample, sr = read_audio(r.file)
             start = onset_of(case, bodies, sr)
-            found.append(Take(body, i, until_it_breaks_off(channel_of(sample, r.channel, r.file), sr)[start:], sr, takes[0].floor))
+            found.append(
+                Take(
+                    body, i, until_it_breaks_off(channel_of(sample, r.channel, r.file), sr)[start:], sr, takes[0].floor
+                )
+            )
     return tuple(found)
 
 
@@ -147,7 +165,11 @@ def onset_of(case: Case, bodies: tuple[Struck, ...], sr: int) -> int:
     if case.onset_s is not None:
         return round(case.onset_s * sr)
     files = [
-        (r.file, r.channel) for body in bodies if body.recorded is not None and body.recorded.signals is not None for r in body.recorded.recordings if r.file
+        (r.file, r.channel)
+        for body in bodies
+        if body.recorded is not None and body.recorded.signals is not None
+        for r in body.recorded.recordings
+        if r.file
     ]
     late = [onset_sample(channel_of(read_audio(file)[0], channel, file), sr) for file, channel in files]
     return int(np.median(late)) if late else 0
@@ -160,7 +182,9 @@ def length_of(recording: CaseRecording) -> tuple[int, int]:
 
 
 def predictions(d: Diagnosis) -> list[tuple[str, int, Array, Array]]:
-    """(stem, sr, before (n,), after (n,)) of every strike that has a place, of every split: as long as the fitted recordings, in their units."""
+    """(stem, sr, before (n,), after (n,)) of every strike that has a place, of every split: as long as the fitted
+    recordings, in their units.
+    """
     known = [r for b in d.bodies if b.recorded is not None for r in b.recorded.recordings if r.file is not None]
     if not known:
         return []
@@ -171,7 +195,10 @@ def predictions(d: Diagnosis) -> list[tuple[str, int, Array, Array]]:
         for i, r in enumerate(body.recordings):
             if r.file is None or (body.family is not None and r.position_m is None):
                 continue
-            pair = [np.concatenate([np.zeros(start), play(h, body, i, n - start, sr)]) for h in (d.closed.before, d.closed.after)]
+            pair = [
+                np.concatenate([np.zeros(start), play(h, body, i, n - start, sr)])
+                for h in (d.closed.before, d.closed.after)
+            ]
             made.append((Path(r.file).stem, sr, pair[0], pair[1]))
     return made
 
@@ -200,16 +227,26 @@ def described(d: Diagnosis) -> dict[str, Any]:
         "errors_sone": d.errors_sone,
         **({"errors_lines": d.errors_lines} if d.errors_lines else {}),
         "unexplained": d.unexplained,
-        "not_compared": [{"split": split, "name": one.name, "why": one.why} for split, left in d.not_compared.items() for one in left],
+        "not_compared": [
+            {"split": split, "name": one.name, "why": one.why} for split, left in d.not_compared.items() for one in left
+        ],
         "baseline": {
             "alpha_per_s": d.closed.before.alpha_per_s,
             "beta_s": d.closed.before.beta_s,
             "gamma_m2_s2": d.found.fit.gamma_m2_s2,
             "poisson_ratio": d.found.fit.poisson_ratio,
             "gain": d.closed.before.gain,
-            "correction_rms": {b.name: float(np.sqrt((b.correction**2).mean())) if len(b.correction) else 0.0 for b in d.bodies if b.recorded is not None},
+            "correction_rms": {
+                b.name: float(np.sqrt((b.correction**2).mean())) if len(b.correction) else 0.0
+                for b in d.bodies
+                if b.recorded is not None
+            },
         },
-        "after": {"alpha_per_s": d.closed.after.alpha_per_s, "beta_s": d.closed.after.beta_s, "gain": d.closed.after.gain},
+        "after": {
+            "alpha_per_s": d.closed.after.alpha_per_s,
+            "beta_s": d.closed.after.beta_s,
+            "gain": d.closed.after.gain,
+        },
         "warnings": [*d.case.warnings, *d.warnings],
     }
     return {name: _finite(value) for name, value in whole.items()}

@@ -1,7 +1,8 @@
 """What a diagnosis leaves behind in a preset: the fitted material, with the effects that belong to it and its object.
 
-Stiffness that depends on direction becomes the preset's elasticity; what belongs to fixture, striker, room and chain stays with the case.
-A diagnosis plays total decays, until it names radiation: then α and β, or the law in their place, are what is left beside it, and the run time's own takes its part.
+Stiffness that depends on direction becomes the preset's elasticity; what belongs to fixture, striker, room and chain
+stays with the case. A diagnosis plays total decays, until it names radiation: then α and β, or the law in their place,
+are what is left beside it, and the run time's own takes its part.
 """
 
 from __future__ import annotations
@@ -21,13 +22,18 @@ def preset_of(d: Diagnosis) -> Preset:
     base = fitted_preset(d.found)
     after = d.closed.after
     total = d.found.radiation == "damping" and not any(isinstance(e, Radiation) for e in after.effects)
-    damping = msgspec.structs.replace(base.damping, alpha_per_s=max(after.alpha_per_s, 0.0), beta_s=max(after.beta_s, 0.0), includes_radiation=total)
+    damping = msgspec.structs.replace(
+        base.damping, alpha_per_s=max(after.alpha_per_s, 0.0), beta_s=max(after.beta_s, 0.0), includes_radiation=total
+    )
     made = msgspec.structs.replace(base, damping=damping, effects=tuple(stored(e) for e in after.effects if kept(e)))
     for effect in after.effects:
         if effect.stage is Stage.MATERIAL:
             stiffness = effect.apply(material_of(base)).stiffness_pa
             rows = tuple(tuple(float(x) for x in row) for row in stiffness)
-            made = msgspec.structs.replace(made, elasticity=Elasticity(stiffness_pa=rows, source=base.elasticity.source, note="diagnosed: " + effect.id))  # type: ignore[arg-type]
+            made = msgspec.structs.replace(
+                made,
+                elasticity=Elasticity(stiffness_pa=rows, source=base.elasticity.source, note="diagnosed: " + effect.id),
+            )  # type: ignore[arg-type]
     return made
 
 

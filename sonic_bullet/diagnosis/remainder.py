@@ -1,6 +1,8 @@
-"""What no candidate effect accounts for, in words by which a person can name it: when, where in frequency, how it goes with strength and place.
+"""What no candidate effect accounts for, in words by which a person can name it: when, where in frequency, how it goes
+with strength and place.
 
-e = |recorded − played|² in third octaves and thirds of the time, over the recording's own; slopes against ln J; lines that are no mode, or none that a linear body has (coherent_residual.py)
+e = |recorded − played|² in third octaves and thirds of the time, over the recording's own; slopes against ln J; lines
+that are no mode, or none that a linear body has (coherent_residual.py)
 """
 
 from __future__ import annotations
@@ -36,10 +38,21 @@ def remainder(end: Closed | NothingCompared, takes: Sequence[Take]) -> dict[str,
     share, band_hz, level = _shares(takes, end.after)
     whole = share.mean(axis=0)  # (t, f)
     order = np.argsort(-np.nan_to_num(whole.mean(axis=0)))[:SHOWN]
-    bands = [{"from_hz": float(band_hz[i]), "to_hz": float(band_hz[i + 1]), "share_of_energy_left": float(np.nanmean(whole[:, i]))} for i in sorted(order)]
+    bands = [
+        {
+            "from_hz": float(band_hz[i]),
+            "to_hz": float(band_hz[i + 1]),
+            "share_of_energy_left": float(np.nanmean(whole[:, i])),
+        }
+        for i in sorted(order)
+    ]
     when = [float(np.nanmean(row)) for row in whole]
     total = np.nanmean(share, axis=(1, 2))
-    slope = _slope(np.log(level), np.log(np.maximum(total, 1e-9))) if np.ptp(np.log(level)) > 0.3 and len(total) > 2 else None
+    slope = (
+        _slope(np.log(level), np.log(np.maximum(total, 1e-9)))
+        if np.ptp(np.log(level)) > 0.3 and len(total) > 2
+        else None
+    )
     scatter = float(np.std(np.log(np.maximum(total, 1e-9))))
     thirds = ["first", "second", "last"]
     words = in_words(end.bands) + "; " if end.bands else ""
@@ -84,7 +97,10 @@ def listing(left_out: Sequence[LeftOut]) -> str:
 def _again(takes: Sequence[Take]) -> float | None:
     """The ratio of frequencies at which a body's lines come again, if they do."""
     recorded = [g for body in {id(t.body): t.body for t in takes}.values() if (g := body.recorded) is not None]
-    return next((r for g in recorded if (r := copied(g.lines.freq_hz, g.lines.decay_per_s, g.lines.amplitude)) is not None), None)
+    return next(
+        (r for g in recorded if (r := copied(g.lines.freq_hz, g.lines.decay_per_s, g.lines.amplitude)) is not None),
+        None,
+    )
 
 
 def _shares(takes: Sequence[Take], h: Hypothesis) -> tuple[Array, Array, Array]:

@@ -1,4 +1,7 @@
-"""The family of physical effects a model may lack, one short file each. A third party's is passed beside these: `EFFECTS + (Mine,)`."""
+"""The family of physical effects a model may lack, one short file each.
+
+A third party's is passed beside these: `EFFECTS + (Mine,)`.
+"""
 
 from __future__ import annotations
 
@@ -47,5 +50,7 @@ if not TYPE_CHECKING:  # or a type checker would take any name for one of this m
         """The class that had another name in earlier versions, with a DeprecationWarning."""
         if name not in FORMER_NAMES:
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-        warnings.warn(f"sonic_bullet.effects.{name} is now {FORMER_NAMES[name].__name__}", DeprecationWarning, stacklevel=2)
+        warnings.warn(
+            f"sonic_bullet.effects.{name} is now {FORMER_NAMES[name].__name__}", DeprecationWarning, stacklevel=2
+        )
         return FORMER_NAMES[name]

@@ -1,9 +1,12 @@
 """`contact-time`: a strike is a force pulse of finite length, so high modes take less of it.
 
-    A_k -> A_k F̂(f_k τ)/F̂(0),   τ = τ₀ (J/J₀)^{−1/5}   (Hertz), or τ₀ whatever J (flat faces)        [Hertz 1882; Hunter 1957; Johnson 1985, ch. 11]
+    A_k -> A_k F̂(f_k τ)/F̂(0),   τ = τ₀ (J/J₀)^{−1/5}   (Hertz), or τ₀ whatever J (flat faces)
+        [Hertz 1882; Hunter 1957; Johnson 1985, ch. 11]
 
-Read off the amplitudes: a roll-off common to all modes of a strike, with the pulse's zeros. Moments about the strike's own pattern. Phases, where they are
-true, only tell whether τ goes with J: a pulse's middle comes πfτ late, which is seen long before its roll-off differs. Where a long contact leaves two or three lines, modes that should be observed and are not tell it, too.
+Read off the amplitudes: a roll-off common to all modes of a strike, with the pulse's zeros. Moments about the strike's
+own pattern. Phases, where they are true, only tell whether τ goes with J: a pulse's middle comes πfτ late, which is
+seen long before its roll-off differs. Where a long contact leaves two or three lines, modes that should be observed and
+are not tell it, too.
 """
 
 from __future__ import annotations
@@ -18,14 +21,16 @@ from sonic_bullet.effects.protocol import Evidence, Impact, ObjectEvidence, Owne
 from sonic_bullet.records import Array
 
 HERTZ = -0.2
-AGAIN = 1.29  # times shorter or longer, where it is fitted again: √(5/3), half the way from the half-sine's first zero to its second
+# times shorter or longer, where it is fitted again: √(5/3), half the way from the half-sine's first zero to its second
+AGAIN = 1.29
 ROUGH = 0.03  # of a mode's strongest expected amplitude: the shapes' own error
 FEWEST_LINES, FEW = 2, 3  # lines to tell a roll-off from; with no more than FEW, modes that nobody hears tell it, too
 NEAR = 0.01  # of ln f: a line that near may be that mode
 COMMON, TURNS = 0.05, 15  # of how loud a mode is at the sensor, relative; of weights, gain and that
 STARTS = (0.05, 0.5, 0.95)  # of the ratios of what is observed to what is expected: gains to begin with
 DELAYS_S, FINER_S = np.arange(-4e-5, 4.01e-5, 2e-6), np.linspace(-2e-6, 2e-6, 9)  # of the files' onset
-SILENT, HIDDEN = 10.0, 0.02  # times what noise alone makes of an amplitude, and of the strongest: what lines may not be found under
+# times what noise alone makes of an amplitude, and of the strongest: what lines may not be found under
+SILENT, HIDDEN = 10.0, 0.02
 
 
 @dataclass(frozen=True)
@@ -70,8 +75,12 @@ class ContactTime:
         reference = float(np.exp(np.log(level).mean()))
         grid = np.geomspace(0.15 / freq.max(), min(1.2 / freq.min(), 0.05), 90)
         pulses: tuple[str, ...] = PULSES
-        if isinstance(evidence.known, cls):  # part of the evidence may have another pulse nearly as good far away; it is this one that is fitted again
-            grid, pulses = evidence.known.duration_s(reference) * np.geomspace(1 / AGAIN, AGAIN, 24), (evidence.known.pulse,)
+        # part of the evidence may have another pulse nearly as good far away; it is this one that is fitted again
+        if isinstance(evidence.known, cls):
+            grid, pulses = (
+                evidence.known.duration_s(reference) * np.geomspace(1 / AGAIN, AGAIN, 24),
+                (evidence.known.pulse,),
+            )
         plain = _cost(expected, observed, sd, ROUGH * most, mode)
         directions: list[tuple[float, float, Self]] = []
         for exponent in (HERTZ, 0.0):
@@ -81,7 +90,8 @@ class ContactTime:
 
                 def at(tau: float, share: Array = share, pulse: str = pulse) -> float:
                     h = np.abs(magnitude(pulse, freq * tau * share))
-                    h = h / max(float(h.max()), 1e-300)  # the gain is free: a pulse so long that it leaves nothing must not pass for a small one
+                    # the gain is free: a pulse so long that it leaves nothing must not pass for a small one
+                    h = h / max(float(h.max()), 1e-300)
                     return _cost(expected * h, observed, sd, ROUGH * most * np.maximum(h, 0.02), mode)
 
                 costs = np.array([at(t) for t in grid])
@@ -97,12 +107,20 @@ class ContactTime:
 
 
 def _table(h: ObjectEvidence) -> tuple[Array, Array, Array, Array, Array, Array]:
-    """Per strike and line, flat: frequency, impulse, expected and observed magnitude, spread, the line's strongest expected magnitude."""
+    """Per strike and line, flat:
+
+    frequency, impulse, expected and observed magnitude, spread, the line's strongest expected magnitude.
+    """
     expected, observed = np.abs(h.expected), np.abs(h.amplitude)
     freq, sd = h.freq_hz, h.amplitude_sd
     if len(freq) <= FEW and h.model is not None and h.signal is not None:
         high, quiet, least = _unobserved(h)
-        freq, expected, observed, sd = np.append(freq, high), np.hstack([expected, quiet]), np.hstack([observed, np.zeros(quiet.shape)]), np.hstack([sd, least])
+        freq, expected, observed, sd = (
+            np.append(freq, high),
+            np.hstack([expected, quiet]),
+            np.hstack([observed, np.zeros(quiet.shape)]),
+            np.hstack([sd, least]),
+        )
     good = np.isfinite(expected) & np.isfinite(observed) & np.isfinite(h.impulse_n_s)[:, None] & (expected > 0)
     most = np.broadcast_to(expected.max(axis=0, keepdims=True), expected.shape)
     freq = np.broadcast_to(freq, expected.shape)
@@ -111,21 +129,26 @@ def _table(h: ObjectEvidence) -> tuple[Array, Array, Array, Array, Array, Array]
 
 
 def _unobserved(h: ObjectEvidence) -> tuple[Array, Array, Array]:
-    """Modes (u,) that no line stands for, what is expected of them (s, u), and what may hide (s, u) in the noise, where σ √(4d/sr) is an amplitude's spread, or under
-    what is louder.
+    """Modes (u,) that no line stands for, what is expected of them (s, u), and what may hide (s, u) in the noise, where
+    σ √(4d/sr) is an amplitude's spread, or under what is louder.
     """
     assert h.model is not None
     observed = np.concatenate([h.freq_hz, h.foreign_hz])
     alone = np.setdiff1d(np.arange(len(h.all_hz)), np.concatenate([*h.mode, np.zeros(0, int)]))
     alone = alone[np.abs(np.log(h.all_hz[alone, None] / observed)).min(axis=1) > NEAR]
-    hidden = SILENT * h.noise[:, None] * np.sqrt(4 * h.model.decay_per_s[alone] / h.sr) + HIDDEN * np.abs(h.amplitude).max(axis=1)[:, None]
+    hidden = (
+        SILENT * h.noise[:, None] * np.sqrt(4 * h.model.decay_per_s[alone] / h.sr)
+        + HIDDEN * np.abs(h.amplitude).max(axis=1)[:, None]
+    )
     return h.all_hz[alone], np.abs(h.push[:, alone]), hidden
 
 
 def _cost(expected: Array, observed: Array, sd: Array, rough: Array, mode: Array) -> float:
-    """Twice the negative log likelihood under Cauchy's law at the best common gain; rough (·): the shapes' own error, which grows with the gain.
+    """Twice the negative log likelihood under Cauchy's law at the best common gain; rough (·): the shapes' own error,
+    which grows with the gain.
 
-    mode (·): of each row; how loud the sensor hears a mode is off by COMMON at all strikes alike, integrated out by Laplace's method [Tierney & Kadane 1986].
+    mode (·): of each row; how loud the sensor hears a mode is off by COMMON at all strikes alike, integrated out by
+    Laplace's method [Tierney & Kadane 1986].
     """
     loud = (observed > 0) & (expected > 0)
     starts = np.quantile(observed[loud] / expected[loud], STARTS) if loud.any() else np.ones(1)
@@ -149,7 +172,10 @@ def _from(gain: float, expected: Array, observed: Array, sd: Array, rough: Array
 
 
 def _late(h: ObjectEvidence, effect: ContactTime) -> float:
-    """Twice the negative log likelihood under Cauchy's law of the phases (s, k) at the best common delay; 0 where they are not true."""
+    """Twice the negative log likelihood under Cauchy's law of the phases (s, k) at the best common delay;
+
+    0 where they are not true.
+    """
     if not h.signed or h.dry:
         return 0.0
     tau = np.array([effect.duration_s(float(j)) if np.isfinite(j) else np.nan for j in h.impulse_n_s])[:, None]

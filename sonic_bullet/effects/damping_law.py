@@ -1,11 +1,13 @@
 """`damping-law`: a material's loss that is not Rayleigh's.
 
     constant-loss  d = ηω/2                                                   [Cremer, Heckl, Petersson 2005, ch. 3.2]
-    power          d = ½ η ω₁ (ω/ω₁)^p,  ω₁ = 2π·1000/s                        (a loss factor that goes as a power of frequency)
-    relaxation     d = ½ ω [η + Δ ωτ/(1 + (ωτ)²)]                              [Zener 1948, ch. 5; Nowick & Berry 1972, eq. 3.5-2]
+    power          d = ½ η ω₁ (ω/ω₁)^p,  ω₁ = 2π·1000/s
+        (a loss factor that goes as a power of frequency)
+    relaxation     d = ½ ω [η + Δ ωτ/(1 + (ωτ)²)]
+        [Zener 1948, ch. 5; Nowick & Berry 1972, eq. 3.5-2]
 
-Read off the decays of all modes, of every object: smooth in frequency, the same for all strikes and sizes. The law with the least Bayes information
-criterion is proposed, where it beats Rayleigh's own.
+Read off the decays of all modes, of every object: smooth in frequency, the same for all strikes and sizes. The law with
+the least Bayes information criterion is proposed, where it beats Rayleigh's own.
 """
 
 from __future__ import annotations
@@ -29,7 +31,10 @@ FEWEST_LINES, AGAIN = 5, 4  # lines: to look for a law, and to fit it again to a
 
 @dataclass(frozen=True)
 class DampingLaw:
-    """law: one of LAWS. eta: loss factor (at 1 kHz for a power). exponent: of d against ω. strength Δ and tau_s: of the relaxation."""
+    """law: one of LAWS.
+
+    eta: loss factor (at 1 kHz for a power). exponent: of d against ω. strength Δ and tau_s: of the relaxation.
+    """
 
     id: ClassVar[str] = "damping-law"
     stage: ClassVar[Stage] = Stage.MODES
@@ -80,7 +85,10 @@ class DampingLaw:
         decay = np.concatenate([h.decay_per_s for h in evidence.observed])
         spread = np.concatenate([h.decay_sd_per_s for h in evidence.observed])
         rayleigh = 0.5 * (evidence.alpha_per_s + evidence.beta_s * omega**2)
-        extra = np.clip(np.concatenate([h.expected_decay_per_s for h in evidence.observed]) - rayleigh, 0.0, MOST * decay)  # what effects found so far take
+        # what effects found so far take
+        extra = np.clip(
+            np.concatenate([h.expected_decay_per_s for h in evidence.observed]) - rayleigh, 0.0, MOST * decay
+        )
         decay, spread = decay - extra, np.hypot(spread, TAKEN * extra)
         good = np.isfinite(decay) & (decay > 0) & ~np.isposinf(spread)  # in a room some lines tell no decay
         if good.sum() < (FEWEST_LINES if evidence.known is None else AGAIN):
@@ -93,10 +101,15 @@ class DampingLaw:
             return np.asarray((np.log(np.maximum(model, 1e-9)) - y) / sd)
 
         trials = [(bic, cls(*values)) for bic, values in _fits(omega, cost)]
-        if isinstance(evidence.known, cls):  # a part of the lines may like another law as well; it is this one that is fitted again
+        # a part of the lines may like another law as well; it is this one that is fitted again
+        if isinstance(evidence.known, cls):
             trials = [t for t in trials if t[1].law == evidence.known.law]
         bic, best = min(trials, key=lambda t: t[0])
-        return best if evidence.known is not None or bic < _least(omega, cost, _rayleigh, [_start(omega, decay)], 2)[0] - BETTER else None
+        return (
+            best
+            if evidence.known is not None or bic < _least(omega, cost, _rayleigh, [_start(omega, decay)], 2)[0] - BETTER
+            else None
+        )
 
 
 def _rayleigh(p: Array, w: Array) -> Array:
@@ -120,7 +133,9 @@ def _fits(omega: Array, cost: Any) -> list[tuple[float, tuple[str, float, float,
 
     loss, eta = _least(omega, cost, lambda p, w: 0.5 * np.exp(p[0]) * w, [np.array([-7.0])], 1)
     bent, pair = _least(omega, cost, power, [np.array([eta[0], s]) for s in (0.5, 1.0, 1.6)], 2)
-    peak, three = _least(omega, cost, relax, [np.array([eta[0] - 1.5, eta[0] + 1, -middle + s]) for s in (-2.5, -1.0, 0.0, 1.0, 2.5)], 3)
+    peak, three = _least(
+        omega, cost, relax, [np.array([eta[0] - 1.5, eta[0] + 1, -middle + s]) for s in (-2.5, -1.0, 0.0, 1.0, 2.5)], 3
+    )
     return [
         (loss, ("constant-loss", float(np.exp(eta[0])), 1.0, 0.0, 0.0)),
         (bent, ("power", float(np.exp(pair[0])), float(pair[1]), 0.0, 0.0)),
@@ -132,6 +147,9 @@ def _least(omega: Array, cost: Any, law: Any, starts: list[Array], count: int) -
     """(BIC, parameters) of a law under Cauchy's loss."""
     from scipy.optimize import least_squares
 
-    found = [least_squares(lambda p: cost(law(p, omega)), start, loss="cauchy", f_scale=2.0, bounds=(-40, 40)) for start in starts]
+    found = [
+        least_squares(lambda p: cost(law(p, omega)), start, loss="cauchy", f_scale=2.0, bounds=(-40, 40))
+        for start in starts
+    ]
     best = min(found, key=lambda f: f.cost)
     return float(2 * best.cost + count * np.log(len(omega))), best.x

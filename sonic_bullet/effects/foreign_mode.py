@@ -1,6 +1,7 @@
 """`foreign-mode`: the striker, the stand or a neighbour rings along.
 
-    y(t) = J Σ_k a_k e^{−d_k t} cos(2πf_k t + φ_k)      the same f, d wherever the object is struck, a in units of the file per N·s
+    y(t) = J Σ_k a_k e^{−d_k t} cos(2πf_k t + φ_k)
+        the same f, d wherever the object is struck, a in units of the file per N·s
 
 Read off lines that belong to no mode and whose amplitude goes with the impulse, not with a mode shape.
 """
@@ -14,7 +15,17 @@ import numpy as np
 
 from sonic_bullet.effects.common.reverberant_tail import FRAME_S
 from sonic_bullet.effects.common.ringing import sounded
-from sonic_bullet.effects.protocol import Evidence, Impact, ObjectEvidence, Owner, Ring, RingsAlong, Sound, Stage, Traits
+from sonic_bullet.effects.protocol import (
+    Evidence,
+    Impact,
+    ObjectEvidence,
+    Owner,
+    Ring,
+    RingsAlong,
+    Sound,
+    Stage,
+    Traits,
+)
 from sonic_bullet.records import Array
 
 STEADY = 0.12  # relative scatter of |A|/J over the strikes, rms
@@ -51,7 +62,9 @@ class ForeignMode(RingsAlong):
 
     def parameters(self) -> dict[str, Any]:
         """What it says, for people and JSON, in SI units."""
-        return {"modes": [list(row) for row in zip(self.freq_hz, self.decay_per_s, self.amplitude_per_n_s, strict=True)]}
+        return {
+            "modes": [list(row) for row in zip(self.freq_hz, self.decay_per_s, self.amplitude_per_n_s, strict=True)]
+        }
 
     def freedom(self) -> int:
         return 3 * len(self.freq_hz)
@@ -76,11 +89,17 @@ def _steady(h: ObjectEvidence) -> list[tuple[float, float, float, float]]:
     weight = (level[:, None] / np.maximum(h.foreign_sd, 1e-12)) ** 2
     mean = (weight * size).sum(axis=0) / weight.sum(axis=0)
     sd = h.foreign_sd / level[:, None]
-    loose = np.sqrt((np.maximum((size - mean) ** 2 - 9 * sd**2, 0) * weight).sum(axis=0) / weight.sum(axis=0)) / np.maximum(mean, 1e-300)
+    loose = np.sqrt(
+        (np.maximum((size - mean) ** 2 - 9 * sd**2, 0) * weight).sum(axis=0) / weight.sum(axis=0)
+    ) / np.maximum(mean, 1e-300)
     lean = _against_level(size, sd, level)
     strongest = max(float(np.abs(h.amplitude).max(initial=0.0)), 1e-300)
     loud = (mean * level.max() > LOUD * strongest) & (mean * level.max() > 30 * np.median(h.foreign_sd))
-    coherent = np.abs((weight * per).sum(axis=0)) / np.maximum((weight * size).sum(axis=0), 1e-300) if h.signed else np.ones(len(mean))
+    coherent = (
+        np.abs((weight * per).sum(axis=0)) / np.maximum((weight * size).sum(axis=0), 1e-300)
+        if h.signed
+        else np.ones(len(mean))
+    )
     apart = np.ones(len(mean), bool)
     if h.model is not None and len(h.freq_hz):
         apart = np.abs(np.log(h.foreign_hz[:, None] / h.freq_hz)).min(axis=1) > APART
@@ -108,4 +127,6 @@ def _against_level(size: Array, sd: Array, level: Array) -> Array:
     w = 1 / (np.maximum(sd / np.maximum(size, 1e-300), 0.01) ** 2)
     xm = (w * x[:, None]).sum(axis=0) / w.sum(axis=0)
     ym = (w * y).sum(axis=0) / w.sum(axis=0)
-    return np.asarray((w * (x[:, None] - xm) * (y - ym)).sum(axis=0) / np.maximum((w * (x[:, None] - xm) ** 2).sum(axis=0), 1e-300))
+    return np.asarray(
+        (w * (x[:, None] - xm) * (y - ym)).sum(axis=0) / np.maximum((w * (x[:, None] - xm) ** 2).sum(axis=0), 1e-300)
+    )

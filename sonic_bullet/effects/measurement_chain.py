@@ -1,10 +1,12 @@
 """`measurement-chain`: one filter, limit or tone common to everything recorded.
 
-    high-pass, low-pass: Butterworth of order 1 to 4, |H|² = 1/(1 + (f/f_c)^{±2n})            [Oppenheim & Schafer 2010, app. B]
+    high-pass, low-pass: Butterworth of order 1 to 4, |H|² = 1/(1 + (f/f_c)^{±2n})
+        [Oppenheim & Schafer 2010, app. B]
     limit: samples beyond ± L stand at it
     hum: Σ_i a_i cos(2π i f₀ t + φ_i) that is there before, during and after, however hard the strike
 
-Read off the amplitudes (one factor a frequency for all strikes), the samples at the peak, and the last third of every recording.
+Read off the amplitudes (one factor a frequency for all strikes), the samples at the peak, and the last third of every
+recording.
 """
 
 from __future__ import annotations
@@ -28,7 +30,9 @@ SAME = 2e-3  # of a limit: how far peaks that it has made are apart
 
 @dataclass(frozen=True)
 class MeasurementChain:
-    """high_pass_hz, low_pass_hz with their orders, 0 for none; limit in units of the file, 0 for none; hum_hz and its harmonics' amplitudes."""
+    """high_pass_hz, low_pass_hz with their orders, 0 for none; limit in units of the file, 0 for none; hum_hz and its
+    harmonics' amplitudes.
+    """
 
     id: ClassVar[str] = "measurement-chain"
     stage: ClassVar[Stage] = Stage.SOUND
@@ -50,7 +54,10 @@ class MeasurementChain:
         from scipy.signal import butter, sosfilt
 
         y = x.sample
-        for kind, corner, order in (("highpass", self.high_pass_hz, self.high_order), ("lowpass", self.low_pass_hz, self.low_order)):
+        for kind, corner, order in (
+            ("highpass", self.high_pass_hz, self.high_order),
+            ("lowpass", self.low_pass_hz, self.low_order),
+        ):
             if 0 < corner < 0.5 * x.sr:
                 y = sosfilt(butter(order, corner, kind, fs=x.sr, output="sos"), y)
         if self.hum_hz:
@@ -74,7 +81,12 @@ class MeasurementChain:
         return found
 
     def freedom(self) -> int:
-        return 2 * bool(self.high_pass_hz) + 2 * bool(self.low_pass_hz) + bool(self.limit) + (1 + len(self.hum_amplitude)) * bool(self.hum_hz)
+        return (
+            2 * bool(self.high_pass_hz)
+            + 2 * bool(self.low_pass_hz)
+            + bool(self.limit)
+            + (1 + len(self.hum_amplitude)) * bool(self.hum_hz)
+        )
 
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
@@ -82,24 +94,34 @@ class MeasurementChain:
         if not observed:
             return None
         parts: dict[str, Any] = {}
-        if limit := limit_of([h.signal for h in observed if h.signal is not None], evidence.known.limit if isinstance(evidence.known, cls) else 0.0):
+        if limit := limit_of(
+            [h.signal for h in observed if h.signal is not None],
+            evidence.known.limit if isinstance(evidence.known, cls) else 0.0,
+        ):
             parts["limit"] = limit
         parts |= _hum(observed, evidence.known.hum_hz if isinstance(evidence.known, cls) else 0.0)
         if "limit" not in parts:
-            parts |= _filter(observed, BETTER, FEWEST_LINES) if evidence.known is None else _filter(observed, 0.0, AGAIN)
+            parts |= (
+                _filter(observed, BETTER, FEWEST_LINES) if evidence.known is None else _filter(observed, 0.0, AGAIN)
+            )
         return cls(**parts) if parts else None
 
 
 def butterworth(freq_hz: Array, corner_hz: float, order: int, high: bool, sr: int) -> Array:
-    """|H| (f,) of the filter at a rate: the bilinear transform bends frequencies. Source: Oppenheim & Schafer 2010, eq. 7.28."""
+    """|H| (f,) of the filter at a rate: the bilinear transform bends frequencies.
+
+    Source: Oppenheim & Schafer 2010, eq. 7.28.
+    """
     x = np.tan(np.pi * np.asarray(freq_hz) / sr) / np.tan(np.pi * corner_hz / sr)
     return np.asarray(1 / np.sqrt(1 + x ** (-2 * order if high else 2 * order)))
 
 
 def limit_of(signals: list[Array], known: float = 0.0) -> float:
-    """The level at which several samples in a row stand in one recording or more, and that the peak of another is: no two strikes are as loud to SAME. 0 where there is none.
+    """The level at which several samples in a row stand in one recording or more, and that the peak of another is: no
+    two strikes are as loud to SAME. 0 where there is none.
 
-    signals: by object, recordings (s, n). known: as the whole evidence has it; then one recording that reaches it will do.
+    signals: by object, recordings (s, n). known: as the whole evidence has it; then one recording that reaches it will
+    do.
     """
     peak = np.concatenate([np.abs(signal).max(axis=1) for signal in signals])
     if known:
@@ -119,11 +141,18 @@ def _stands(row: Array) -> bool:
 
 
 def _hum(observed: list[ObjectEvidence], known_hz: float) -> dict[str, Any]:
-    """A tone at the mains and its multiples, of one amplitude in all recordings of the object that has most. known_hz: as all evidence had it."""
+    """A tone at the mains and its multiples, of one amplitude in all recordings of the object that has most.
+
+    known_hz: as all evidence had it.
+    """
     h = max(observed, key=lambda one: len(one.impulse_n_s))
     assert h.signal is not None
     found = hum_of(h.signal, h.noise, h.sr, known_hz)
-    return {} if found is None else {"hum_hz": found.hz, "hum_amplitude": found.amplitude, "hum_phase_rad": found.phase_rad}
+    return (
+        {}
+        if found is None
+        else {"hum_hz": found.hz, "hum_amplitude": found.amplitude, "hum_phase_rad": found.phase_rad}
+    )
 
 
 def _filter(observed: list[ObjectEvidence], better: float, fewest: int) -> dict[str, Any]:
@@ -137,7 +166,8 @@ def _filter(observed: list[ObjectEvidence], better: float, fewest: int) -> dict[
     sr = min(h.sr for h in observed)
     best: tuple[float, dict[str, Any]] = (_misfit(ratio, sd) - better - 2 * np.log(len(freq)), {})
     bottom, top = float(freq.min()), min(float(freq.max()), HIGHEST * sr)
-    for name, ends in (("high", (0.3 * bottom, top)), ("low", (bottom, min(3 * top, HIGHEST * sr)))):  # beyond all lines it is a slope, which much else is
+    # beyond all lines it is a slope, which much else is
+    for name, ends in (("high", (0.3 * bottom, top)), ("low", (bottom, min(3 * top, HIGHEST * sr)))):
         grid = np.geomspace(*ends, CORNERS)
         for order in (1, 2, 3, 4):
 
@@ -154,7 +184,11 @@ def _filter(observed: list[ObjectEvidence], better: float, fewest: int) -> dict[
 
 
 def _ratio(h: ObjectEvidence) -> tuple[Array, Array, Array]:
-    """Per line: frequency, ln of observed over expected amplitude over the strikes, and its spread, which grows where the strikes disagree."""
+    """Per line:
+
+    frequency, ln of observed over expected amplitude over the strikes, and its spread, which grows where the strikes
+    disagree.
+    """
     expected, seen = np.abs(h.expected), np.abs(h.amplitude)
     width = np.hypot(h.amplitude_sd, ROUGH * expected.max(axis=0, keepdims=True)) + 1e-300
     gain = (expected * seen / width**2).sum(axis=0) / np.maximum((expected**2 / width**2).sum(axis=0), 1e-300)

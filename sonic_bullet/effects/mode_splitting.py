@@ -1,8 +1,11 @@
-"""`mode-splitting`: what is symmetric has modes in pairs of one frequency; an imperfection sets them apart and turns them to itself.
+"""`mode-splitting`: what is symmetric has modes in pairs of one frequency; an imperfection sets them apart and turns
+them to itself.
 
-    pair (a, b) at f  ->  cos ψ a + sin ψ b at f(1 − ε/2),  −sin ψ a + cos ψ b at f(1 + ε/2)          [Perrin & Charnley 1973; Rayleigh 1894, § 221]
+    pair (a, b) at f  ->  cos ψ a + sin ψ b at f(1 − ε/2),  −sin ψ a + cos ψ b at f(1 + ε/2)
+        [Perrin & Charnley 1973; Rayleigh 1894, § 221]
 
-Read off two lines 0.1 to 1 % apart where the mesh has a pair: their amplitudes over the strikes give ψ, their distance ε.
+Read off two lines 0.1 to 1 % apart where the mesh has a pair: their amplitudes over the strikes give ψ, their distance
+ε.
 """
 
 from __future__ import annotations
@@ -24,7 +27,9 @@ REACH = 2e-2  # of a line from its pair's middle
 LOUD, CLEAR = 1e-3, 30.0  # of the strongest line; of a line's own spread
 MOST = 7
 ALIKE = 0.9
-SAME, TURNED = 1e-4, 0.3  # relative; sin 2ψ: what the mesh has apart, and nothing has turned, are neighbours by chance, which it has too near or too far
+# relative; sin 2ψ: what the mesh has apart, and nothing has turned, are neighbours by chance, which it has too near or
+# too far
+SAME, TURNED = 1e-4, 0.3
 MOSTLY = 0.5  # of the pairs must be more than that
 PLAINLY, ALSO, STRIKES = (
     3,
@@ -35,7 +40,9 @@ PLAINLY, ALSO, STRIKES = (
 
 @dataclass(frozen=True)
 class ModeSplitting(SplitsPairs):
-    """freq_hz (p,) of the pairs, split (p,) relative, turn_rad (p,) from the pair's first mode in the mesh as it is solved."""
+    """freq_hz (p,) of the pairs, split (p,) relative, turn_rad (p,) from the pair's first mode in the mesh as it is
+    solved.
+    """
 
     id: ClassVar[str] = "mode-splitting"
     stage: ClassVar[Stage] = Stage.MODES
@@ -69,7 +76,10 @@ class ModeSplitting(SplitsPairs):
         return replace(x, freq_hz=freq[order], decay_per_s=x.decay_per_s[order], shape=shape[:, :, order])
 
     def observed_correction(self, freq_hz: Array) -> Array:
-        """How far off (m,), relative, modes at freq_hz (m,) are from the middles of the pairs that were observed; 0 for all others."""
+        """How far off (m,), relative, modes at freq_hz (m,) are from the middles of the pairs that were observed;
+
+        0 for all others.
+        """
         off = np.zeros(len(freq_hz))
         for f in self.freq_hz:
             pair = list(pair_at(freq_hz, f))
@@ -79,7 +89,12 @@ class ModeSplitting(SplitsPairs):
 
     def parameters(self) -> dict[str, Any]:
         """What it says, for people and JSON, in SI units."""
-        return {"pairs": [{"freq_hz": f, "split": s, "turn_rad": t} for f, s, t in zip(self.freq_hz, self.split, self.turn_rad, strict=True)]}
+        return {
+            "pairs": [
+                {"freq_hz": f, "split": s, "turn_rad": t}
+                for f, s, t in zip(self.freq_hz, self.split, self.turn_rad, strict=True)
+            ]
+        }
 
     def freedom(self) -> int:
         return 2 * len(self.freq_hz)
@@ -101,7 +116,8 @@ class ModeSplitting(SplitsPairs):
 def _pairs(h: ObjectEvidence, scale: float) -> list[tuple[float, ...]]:
     """(f, ε, ψ, f over the mesh's) of every pair of modes, their frequencies times ``scale``, that two lines stand for.
 
-    A line stands for one mode; the surest pairs choose first. What splits a body splits many: beside some that are plain, others may be less so.
+    A line stands for one mode; the surest pairs choose first. What splits a body splits many: beside some that are
+    plain, others may be less so.
     """
     assert h.plain is not None  # the mesh's own order: corrections may have turned a pair's about
     every, decay, amplitude, strike, sensor = _lines(h)
@@ -109,7 +125,9 @@ def _pairs(h: ObjectEvidence, scale: float) -> list[tuple[float, ...]]:
     even, evenly = strike / level, amplitude / level  # one loud strike is alike with anything
     model_hz = h.plain.freq_hz
     size = np.abs(amplitude).max(axis=0)
-    clear = size > np.maximum(LOUD * size.max(), CLEAR * np.concatenate([h.amplitude_sd, h.foreign_sd], axis=1).max(axis=0))
+    clear = size > np.maximum(
+        LOUD * size.max(), CLEAR * np.concatenate([h.amplitude_sd, h.foreign_sd], axis=1).max(axis=0)
+    )
     trials: list[tuple[bool, float, int, int, int, float, float]] = []
     for a in np.flatnonzero(np.diff(model_hz) < PAIR * model_hz[:-1]):
         middle = scale * (model_hz[a] + model_hz[a + 1]) / 2
@@ -126,7 +144,9 @@ def _pairs(h: ObjectEvidence, scale: float) -> list[tuple[float, ...]]:
             if not plain and alike > ALSO and len(strike) >= STRIKES:
                 alike = min(alike, _turn(even[:, [a, a + 1]], sensor[[a, a + 1]], evenly[:, [low, high]], h.signed)[1])
             if plain or (alike > ALSO and len(strike) >= STRIKES):
-                trials.append((plain, float(alike - off / REACH * (1 - ALIKE)), int(a), int(low), int(high), split, turn))
+                trials.append(
+                    (plain, float(alike - off / REACH * (1 - ALIKE)), int(a), int(low), int(high), split, turn)
+                )
     found: list[tuple[float, ...]] = []
     split_off: list[bool] = []
     taken: set[int] = set()
@@ -145,14 +165,20 @@ def _pairs(h: ObjectEvidence, scale: float) -> list[tuple[float, ...]]:
 
 
 def _again(h: ObjectEvidence, known: ModeSplitting) -> list[tuple[float, ...]]:
-    """(f, ε, ψ) of the pairs that are known, by fewer strikes: two lines that only the one left out showed loudly are no single mode because of that."""
+    """(f, ε, ψ) of the pairs that are known, by fewer strikes: two lines that only the one left out showed loudly are
+    no single mode because of that.
+    """
     assert h.plain is not None
     every, _, amplitude, strike, sensor = _lines(h)
     found: list[tuple[float, ...]] = []
     for f, split in zip(known.freq_hz, known.split, strict=True):
         a, b = pair_at(h.plain.freq_hz, f)
         line = [int(np.abs(every - f * (1 + side * split / 2)).argmin()) for side in (-1, 1)]
-        if a < 0 or line[0] == line[1] or (np.abs(every[line] / (f * (1 + np.array([-1, 1]) * split / 2)) - 1) > split / 4).any():
+        if (
+            a < 0
+            or line[0] == line[1]
+            or (np.abs(every[line] / (f * (1 + np.array([-1, 1]) * split / 2)) - 1) > split / 4).any()
+        ):
             continue
         turn, _ = _turn(strike[:, [a, b]], sensor[[a, b]], amplitude[:, line], h.signed)
         found.append((float(every[line].mean()), float(np.ptp(every[line]) / every[line].mean()), turn))
@@ -160,21 +186,32 @@ def _again(h: ObjectEvidence, known: ModeSplitting) -> list[tuple[float, ...]]:
 
 
 def _lines(h: ObjectEvidence) -> tuple[Array, Array, Array, Array, Array]:
-    """All lines' frequencies and decays (k,) and amplitudes (s, k); what a strike gives to every mode (s, m), and how the sensor sees them (m,)."""
+    """All lines' frequencies and decays (k,) and amplitudes (s, k); what a strike gives to every mode (s, m), and how
+    the sensor sees them (m,).
+    """
     assert h.plain is not None
     every = np.concatenate([h.freq_hz, h.foreign_hz])
     decay = np.concatenate([h.decay_per_s, h.foreign_decay_per_s])
     amplitude = np.concatenate([h.amplitude, h.foreign_amplitude], axis=1)
     level = np.where(np.isfinite(h.impulse_n_s), h.impulse_n_s, 1.0)
     strike = np.einsum("sxm,sx->sm", h.plain.shape[h.strike_vertex].astype(float), h.strike_direction) * level[:, None]
-    return every, decay, amplitude, strike, np.einsum("xm,x->m", h.plain.shape[h.sensor_vertex].astype(float), h.sensor_direction)
+    return (
+        every,
+        decay,
+        amplitude,
+        strike,
+        np.einsum("xm,x->m", h.plain.shape[h.sensor_vertex].astype(float), h.sensor_direction),
+    )
 
 
 def _turn(strike: Array, sensor: Array, amplitude: Array, signed: bool) -> tuple[float, float]:
     """ψ by the two lines' patterns (s, 2), and how alike they then are."""
-    observed = np.real(amplitude * np.exp(-1j * np.angle((amplitude**2).sum(axis=0)) / 2)) if signed else np.abs(amplitude)
+    observed = (
+        np.real(amplitude * np.exp(-1j * np.angle((amplitude**2).sum(axis=0)) / 2)) if signed else np.abs(amplitude)
+    )
     turn = np.linspace(0, np.pi, 181)[:-1]
-    direction = np.stack([np.stack([np.cos(turn), np.sin(turn)]), np.stack([-np.sin(turn), np.cos(turn)])], axis=1)  # (2, line, turn)
+    # (2, line, turn)
+    direction = np.stack([np.stack([np.cos(turn), np.sin(turn)]), np.stack([-np.sin(turn), np.cos(turn)])], axis=1)
     participation = np.einsum("sx,xlt->tsl", strike, direction) * np.einsum("x,xlt->tl", sensor, direction)[:, None, :]
     participation = participation if signed else np.abs(participation)
     size, loud = np.linalg.norm(participation, axis=1), np.linalg.norm(observed, axis=0)

@@ -21,7 +21,10 @@ from sonic_bullet.records import Material, ModalModel
 from sonic_bullet.records.errors import RecordError
 
 KEPT: tuple[type[Effect], ...] = (DampingLaw, ModeSplitting, AmplitudePitch, AmplitudeDamping)
-"""Effects that a preset may hold. A stiffness that depends on direction is the preset's own elasticity; radiation is the run time's own."""
+"""Effects that a preset may hold.
+
+A stiffness that depends on direction is the preset's own elasticity; radiation is the run time's own.
+"""
 
 
 FILE_NAMES = {"damping_growth": "choke"}
@@ -31,7 +34,9 @@ FILE_NAMES = {"damping_growth": "choke"}
 def stored(effect: Effect) -> dict[str, Any]:
     """What a preset file holds of an effect: all but what it does not say (NaN)."""
     values = {FILE_NAMES.get(name, name): value for name, value in msgspec.to_builtins(effect).items()}
-    return {"id": effect.id} | {name: value for name, value in values.items() if not (isinstance(value, float) and np.isnan(value))}
+    return {"id": effect.id} | {
+        name: value for name, value in values.items() if not (isinstance(value, float) and np.isnan(value))
+    }
 
 
 def effect_of(data: dict[str, Any]) -> Effect:
@@ -39,7 +44,9 @@ def effect_of(data: dict[str, Any]) -> Effect:
     name = data.get("id")
     kind = next((k for k in KEPT if k.id == name), None)
     if kind is None:
-        raise RecordError(f"there is no effect '{name}' that a preset can hold", f"use one of {', '.join(k.id for k in KEPT)}")
+        raise RecordError(
+            f"there is no effect '{name}' that a preset can hold", f"use one of {', '.join(k.id for k in KEPT)}"
+        )
     field_of = {in_file: field for field, in_file in FILE_NAMES.items()}
     try:
         made: Effect = msgspec.convert({field_of.get(k, k): v for k, v in data.items() if k != "id"}, kind)
@@ -58,9 +65,11 @@ def with_material(material: Material) -> Material:
 
 
 def with_modes(model: ModalModel, material: Material) -> ModalModel:
-    """A body's model with its material's effects on modes in it, and on how they ring: bend and damping growth per peak velocity at the surface.
+    """A body's model with its material's effects on modes in it, and on how they ring: bend and damping growth per peak
+    velocity at the surface.
 
-    Where a level was measured as an impulse, the velocity is what that impulse brings about at a typical place (rms over the surface).
+    Where a level was measured as an impulse, the velocity is what that impulse brings about at a typical place (rms
+    over the surface).
     """
     if not model.mode_count:
         return model
@@ -78,7 +87,12 @@ def with_modes(model: ModalModel, material: Material) -> ModalModel:
     ring = Ring(model.freq_hz, model.decay_per_s, none, level, none, none)
     for effect in effects:
         ring = effect.apply(ring)
-    return replace(model, bend_s2_m2=ring.bend, damping_growth_s_m=ring.damping_growth, damping_growth_power=ring.damping_growth_power)
+    return replace(
+        model,
+        bend_s2_m2=ring.bend,
+        damping_growth_s_m=ring.damping_growth,
+        damping_growth_power=ring.damping_growth_power,
+    )
 
 
 def of_stage(material: Material, stage: Stage) -> Sequence[Effect]:

@@ -6,9 +6,10 @@
     BANK      Ring       -> Ring          how a ringing mode depends on its own level
     SOUND     Sound      -> Sound         what happens on the way to the file
 
-An effect is physics with few parameters. `propose` reads them off the evidence, or says None; it never scores itself: the diagnosis
-renders strikes that were not fitted, with and without it. What a host must know beforehand stands in its `Traits`; what only some can do
-(a room is taken out of the lines, pairs are turned or split, something rings beside the body) in small classes that they derive from.
+An effect is physics with few parameters. `propose` reads them off the evidence, or says None; it never scores itself:
+the diagnosis renders strikes that were not fitted, with and without it. What a host must know beforehand stands in its
+`Traits`; what only some can do (a room is taken out of the lines, pairs are turned or split, something rings beside the
+body) in small classes that they derive from.
 """
 
 from __future__ import annotations
@@ -35,7 +36,10 @@ class Stage(Enum):
 
 
 class Owner(Enum):
-    """Whose an effect is. What belongs to material and object goes into a preset; to material, room and chain, to other objects too."""
+    """Whose an effect is.
+
+    What belongs to material and object goes into a preset; to material, room and chain, to other objects too.
+    """
 
     MATERIAL = "material"
     OBJECT = "object"
@@ -50,7 +54,9 @@ CARRIES = frozenset({Owner.MATERIAL, Owner.STRIKER, Owner.ROOM, Owner.CHAIN})  #
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Impact:
-    """A strike of impulse_n_s: h hits after delay_s (h,), each with share (h,) of it, each a pulse of the duration tau_s, 0 for none. pulse: see `pulses`."""
+    """A strike of impulse_n_s: h hits after delay_s (h,), each with share (h,) of it, each a pulse of the duration
+    tau_s, 0 for none. pulse: see `pulses`.
+    """
 
     impulse_n_s: float
     delay_s: Array
@@ -67,9 +73,11 @@ class Impact:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Ring:
-    """m modes as one strike starts them: freq_hz, decay_per_s (m,), amplitude (m,) complex at the sensor; level (m,): peak velocity at the surface in m/s.
+    """m modes as one strike starts them: freq_hz, decay_per_s (m,), amplitude (m,) complex at the sensor; level (m,):
+    peak velocity at the surface in m/s.
 
-    bend, damping_growth (m,): relative change of frequency bend·level², of decay (damping_growth·level)^damping_growth_power, 1 or 2; 0 in a linear body.
+    bend, damping_growth (m,): relative change of frequency bend·level², of decay
+    (damping_growth·level)^damping_growth_power, 1 or 2; 0 in a linear body.
     """
 
     freq_hz: Array
@@ -84,7 +92,10 @@ class Ring:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sound:
-    """A strike's sound (n,) in units of the file, from the onset on, and what made it. impulse_n_s: 1 where unknown. direct (n,): the first sound, untouched."""
+    """A strike's sound (n,) in units of the file, from the onset on, and what made it.
+
+    impulse_n_s: 1 where unknown. direct (n,): the first sound, untouched.
+    """
 
     sample: Array
     sr: int
@@ -94,11 +105,12 @@ class Sound:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Elastic:
-    """A body under any orthotropic elasticity, its axes the mesh's. material: isotropic, as the baseline has it, with the guessed density.
-    phased: whether the signs of lines' amplitudes can be held against J ψ.
+    """A body under any orthotropic elasticity, its axes the mesh's. material: isotropic, as the baseline has it, with
+    the guessed density. phased: whether the signs of lines' amplitudes can be held against J ψ.
 
-    look: C/ρ (6, 6) in m²/s² -> undamped freq_hz (m,). Of modes (k,), ∂ ln λ/∂(C_i/ρ) (9, k) of the constants C11 C22 C33 C23 C13 C12 C44 C55 C66; and J ψ (s, m)
-    up to a factor, NaN for strikes of unknown place. solve: the same tensor -> undamped ModalModel, strikes and sensor as last vertices.
+    look: C/ρ (6, 6) in m²/s² -> undamped freq_hz (m,). Of modes (k,), ∂ ln λ/∂(C_i/ρ) (9, k) of the constants C11 C22
+    C33 C23 C13 C12 C44 C55 C66; and J ψ (s, m) up to a factor, NaN for strikes of unknown place. solve: the same tensor
+    -> undamped ModalModel, strikes and sensor as last vertices.
     """
 
     material: Material
@@ -109,7 +121,8 @@ class Elastic:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Poisson:
-    """A body at any ratio ν of Poisson's, its E/ρ the baseline's. fitted: the baseline's ν; guess, sd: what was known of it before.
+    """A body at any ratio ν of Poisson's, its E/ρ the baseline's. fitted: the baseline's ν; guess, sd: what was known
+    of it before.
 
     at: ν -> undamped freq_hz (m,), and the modes there as sums (m, m) of the baseline's own, a column a mode.
     """
@@ -122,13 +135,16 @@ class Poisson:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ObjectEvidence:
-    """One object's strikes: k lines that are modes, beside what the model so far expects, and what it leaves. source: what they were recorded from, the host's own.
+    """One object's strikes: k lines that are modes, beside what the model so far expects, and what it leaves. source:
+    what they were recorded from, the host's own.
 
-    freq_hz, decay_per_s and their spreads (k,); amplitude (s, k) complex at the onset and its spread. mode: the modes of `model` each line stands for.
-    model_hz (k,): the mesh's own, without corrections; expected_decay_per_s (k,), expected (s, k): of the model with the effects found so far.
-    pattern (s, k): J ψ, real. foreign_*: lines that are no mode, amplitudes (s, f). model: the body with its strikes and sensor as last vertices,
-    strike_vertex (s,), strike_direction (s, 3), sensor_vertex, sensor_direction (3,). signal, predicted (s, n) from the onset on, None for lists of features.
-    noise (s,): rms. signed: phases are true. poisson: of `plain`, where nothing has moved its modes yet.
+    freq_hz, decay_per_s and their spreads (k,); amplitude (s, k) complex at the onset and its spread. mode: the modes
+    of `model` each line stands for. model_hz (k,): the mesh's own, without corrections; expected_decay_per_s (k,),
+    expected (s, k): of the model with the effects found so far. pattern (s, k): J ψ, real. foreign_*: lines that are no
+    mode, amplitudes (s, f). model: the body with its strikes and sensor as last vertices, strike_vertex (s,),
+    strike_direction (s, 3), sensor_vertex, sensor_direction (3,). signal, predicted (s, n) from the onset on, None for
+    lists of features. noise (s,): rms. signed: phases are true. poisson: of `plain`, where nothing has moved its modes
+    yet.
     """
 
     impulse_n_s: Array
@@ -165,7 +181,8 @@ class ObjectEvidence:
     source: Any = None
     elastic: Elastic | None = None
     poisson: Poisson | None = None
-    own: Array | None = None  # (s, n) signal without what the model so far knows to ring beside the body, where there is such
+    # (s, n) signal without what the model so far knows to ring beside the body, where there is such
+    own: Array | None = None
     dry: bool = False  # whether lines are identified as they would be without the room they were recorded in
 
     @property
@@ -182,10 +199,12 @@ class ObjectEvidence:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Evidence:
-    """All that an effect may read: the objects' strikes, the material's α and β and the case's gain so far, effects found so far by id, band and seed.
+    """All that an effect may read: the objects' strikes, the material's α and β and the case's gain so far, effects
+    found so far by id, band and seed.
 
-    known: what the effect said of the whole evidence, or beside other effects: it is there to be fitted again, not to be looked for.
-    on_trial: whether this is the evidence without a strike, known's numbers to be estimated again; axes of degenerate pairs, which a linear body has no part of, stand as known has them.
+    known: what the effect said of the whole evidence, or beside other effects: it is there to be fitted again, not to
+    be looked for. on_trial: whether this is the evidence without a strike, known's numbers to be estimated again; axes
+    of degenerate pairs, which a linear body has no part of, stand as known has them.
     """
 
     observed: tuple[ObjectEvidence, ...]
@@ -219,11 +238,12 @@ class Mixing(Enum):
 class Traits:
     """What a host must know of a kind of effect before it asks it anything.
 
-    moves_modes: modes are no longer where, or what, they were: lines are paired and corrections learnt anew. What acts on the MATERIAL always does.
-    mixing: what becomes of their shapes then. replaces_rayleigh: it is a law of its own in the place of α and β, and has these two numbers less than it states.
-    cost: when it is asked. by_line: its numbers are of single lines, which no other line states, or it may be observed in one: in cross-validation it
-    is given all lines, of the other strikes. certain: it is proposed where lines agree on it, each by its own baseband, and nowhere else, and goes with level: a smaller
-    drop will do on strikes left out, of which a loud one gains most.
+    moves_modes: modes are no longer where, or what, they were: lines are paired and corrections learnt anew. What acts
+    on the MATERIAL always does. mixing: what becomes of their shapes then. replaces_rayleigh: it is a law of its own in
+    the place of α and β, and has these two numbers less than it states. cost: when it is asked. by_line: its numbers
+    are of single lines, which no other line states, or it may be observed in one: in cross-validation it is given all
+    lines, of the other strikes. certain: it is proposed where lines agree on it, each by its own baseband, and nowhere
+    else, and goes with level: a smaller drop will do on strikes left out, of which a loud one gains most.
     """
 
     moves_modes: bool = False
@@ -238,8 +258,8 @@ class Traits:
 class BaselineChange:
     """What an effect has found of the baseline's own numbers beside its own; None, 0 and 1 where it leaves them.
 
-    alpha_per_s, beta_s: Rayleigh's, both or neither. stretch: ln of what all frequencies of the bare body are to the baseline's. poisson_ratio: ν.
-    onset_gain: modes at the onset over what their lines say.
+    alpha_per_s, beta_s: Rayleigh's, both or neither. stretch: ln of what all frequencies of the bare body are to the
+    baseline's. poisson_ratio: ν. onset_gain: modes at the onset over what their lines say.
     """
 
     alpha_per_s: float | None = None
@@ -266,7 +286,10 @@ class Dereverberates(ABC):
 
     @abstractmethod
     def identified_from(self, signal: Array, sound: Array, noise: Array, sr: int, *, fully: bool = False) -> Self:
-        """The effect with its response identified from recordings (s, n) and what is played without it (s, n); noise (s,): rms. fully: to the end."""
+        """The effect with its response identified from recordings (s, n) and what is played without it (s, n);
+
+        noise (s,): rms. fully: to the end.
+        """
 
 
 class RotatesPairs(ABC):
@@ -306,9 +329,12 @@ class Alternatives(ABC):
 
 
 class Effect(Protocol):
-    """One physical effect: a frozen dataclass of its parameters. Every member also has a docstring that gives its equation.
+    """One physical effect: a frozen dataclass of its parameters.
 
-    What only some effects can do they say by deriving from one of the small classes above; a host asks for those, never for a name.
+    Every member also has a docstring that gives its equation.
+
+    What only some effects can do they say by deriving from one of the small classes above; a host asks for those, never
+    for a name.
     """
 
     id: ClassVar[str]

@@ -1,10 +1,12 @@
 """`radiation`: a mode loses energy to the air as it radiates, and is heard as it does.
 
-    Δd = s ½ ρ₀ c σ A,  A = ∮(φ·n)² dS,  σ = (ka)²/(1 + (ka)²) with a net flow of volume, (ka)⁴/(4 + (ka)⁴) without      [k = ω/c; Kinsler et al. 2000, ch. 7;
+    Δd = s ½ ρ₀ c σ A,  A = ∮(φ·n)² dS,  σ = (ka)²/(1 + (ka)²) with a net flow of volume, (ka)⁴/(4 + (ka)⁴) without
+        [k = ω/c; Kinsler et al. 2000, ch. 7;
     Fahy & Gardonio 2007, ch. 3: the pulsating and the oscillating sphere]
     level tilts as √σ where the sensor hears the far field
 
-Read off the decays beside Rayleigh's: what is left grows with ka, then flattens, and goes with each mode's own area A. How steeply it grows, decays say too.
+Read off the decays beside Rayleigh's: what is left grows with ka, then flattens, and goes with each mode's own area A.
+How steeply it grows, decays say too.
 """
 
 from __future__ import annotations
@@ -31,7 +33,8 @@ ORDERS: tuple[int, ...] = (2, 4)
 
 @dataclass(frozen=True)
 class Radiation(Alternatives):
-    """Radius a of the equivalent source in m; strength s against the law's own 1; tilt: exponent of σ in the level at the sensor, 0 or ½.
+    """Radius a of the equivalent source in m; strength s against the law's own 1; tilt: exponent of σ in the level at
+    the sensor, 0 or ½.
 
     order: of ka where it is small, 2 (monopole) or 4 (dipole: no net flow of volume).
     """
@@ -85,18 +88,27 @@ class Radiation(Alternatives):
         ):
             return None
         area = areas(observed.model)
-        loud = (np.abs(observed.push) ** 2).sum(axis=0) + 1e-300  # of modes that share a line, the louder is observed: a plate's own plane hardly moves the air
+        # of modes that share a line, the louder is observed: a plate's own plane hardly moves the air
+        loud = (np.abs(observed.push) ** 2).sum(axis=0) + 1e-300
         mine = np.array([np.average(area[m], weights=loud[m]) for m in observed.mode])
         decay, w2 = observed.decay_per_s, observed.omega**2
         sd = np.hypot(observed.decay_sd_per_s, SCATTER * decay) + 1e-3
         across = float(np.linalg.norm(np.ptp(observed.model.vertex_m[np.unique(observed.model.face)], axis=0)))
         plain = _left(decay, sd, np.stack([np.full(len(w2), 0.5), 0.5 * w2], axis=1))[1]
         radii = np.geomspace(0.02 * across, across, 40)
-        if isinstance(evidence.known, cls):  # a part of the lines may leave the knee anywhere below the band: it is this one that is fitted again
-            radii = evidence.known.radius_m * np.geomspace(1 / AGAIN, AGAIN, 21)  # by either law: which one, a pulse or a filter may have hidden
+        # a part of the lines may leave the knee anywhere below the band: it is this one that is fitted again
+        if isinstance(evidence.known, cls):
+            # by either law: which one, a pulse or a filter may have hidden
+            radii = evidence.known.radius_m * np.geomspace(1 / AGAIN, AGAIN, 21)
         found = []
         for one in (cls(float(radius), 1.0, order=order) for order in ORDERS for radius in radii):
-            x, left = _left(decay, sd, np.stack([np.full(len(w2), 0.5), 0.5 * w2, 0.5 * IMPEDANCE * one.efficiency(observed.freq_hz) * mine], axis=1))
+            x, left = _left(
+                decay,
+                sd,
+                np.stack(
+                    [np.full(len(w2), 0.5), 0.5 * w2, 0.5 * IMPEDANCE * one.efficiency(observed.freq_hz) * mine], axis=1
+                ),
+            )
             if x[2] > 0:
                 found.append((left, replace(one, strength=float(x[2]))))
         if not found:
@@ -104,7 +116,8 @@ class Radiation(Alternatives):
         left, best = min(found, key=lambda one: one[0])
         if evidence.known is None and (not plain - left > BETTER + 2 * np.log(len(w2)) or left > 0.5 * plain):
             return None
-        tilted = [(left + _level_cost(observed, one, 0.5), one) for left, one in found]  # what radiates is observed: levels tell the knee, too
+        # what radiates is observed: levels tell the knee, too
+        tilted = [(left + _level_cost(observed, one, 0.5), one) for left, one in found]
         least, observed_so = min(tilted, key=lambda one: one[0])
         plain_so = left + _level_cost(observed, best, 0.0) - CLEARER * len(w2)
         return replace(observed_so, tilt=0.5) if least < plain_so else best
@@ -119,7 +132,9 @@ def areas(x: ModalModel) -> Array:
         (normal / np.maximum(3 * size, 1e-300)[:, None])[:, None], corner.shape
     )  # of a triangle's middle: a third of each corner's motion
     place = 3 * x.face[:, :, None] + np.arange(3)
-    normal_part = csr_array((direction.ravel(), place.ravel(), np.arange(0, 9 * len(x.face) + 1, 9)), shape=(len(x.face), 3 * len(x.shape)))
+    normal_part = csr_array(
+        (direction.ravel(), place.ravel(), np.arange(0, 9 * len(x.face) + 1, 9)), shape=(len(x.face), 3 * len(x.shape))
+    )
     along = normal_part @ x.shape.reshape(-1, x.mode_count)
     return np.asarray((along**2 * size[:, None]).sum(axis=0))
 
@@ -137,5 +152,7 @@ def _off(observed: ObjectEvidence, made: Radiation, tilt: float) -> Array:
 
 
 def _level_cost(observed: ObjectEvidence, made: Radiation, tilt: float) -> float:
-    """Twice the negative log likelihood of the levels' misfit under Cauchy's law: lines that stand for other modes are far off."""
+    """Twice the negative log likelihood of the levels' misfit under Cauchy's law: lines that stand for other modes are
+    far off.
+    """
     return float(2 * np.log1p((_off(observed, made, tilt) / SCATTER) ** 2).sum())

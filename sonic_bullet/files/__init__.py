@@ -3,9 +3,9 @@
     samples (channels, n) Pa -> scale -> check -> clip and count -> partial file -> read back -> fsync -> NAME.EXT
     ContactLog | ModalModel  -> arrays + one JSON entry, no pickle -> partial file -> fsync -> NAME.EXT
 
-`audio` writes sound, as loud as `levels` says, `recordings` reads it, `logs` and `models` write contact logs and modal models (`logs` describes
-both), `container` is the npz beneath them, `meshes` and `cases` read what they are named after, `reading` is the boundary of all readers,
-`atomic` the replacing.
+`audio` writes sound, as loud as `levels` says, `recordings` reads it, `logs` and `models` write contact logs and modal
+models (`logs` describes both), `container` is the npz beneath them, `meshes` and `cases` read what they are named
+after, `reading` is the boundary of all readers, `atomic` the replacing.
 """
 
 from sonic_bullet.files.atomic import cannot, check_output, kept_name, replacing

@@ -1,7 +1,8 @@
 """Write beside, then replace: under the final name there is either the old file or the whole new one.
 
     check_output: can a file of that name be made there? tried, before anything is computed
-    replacing:    partial file (locked, `sonic_bullet.machine.partial_file`) -> write -> flush -> fsync -> os.replace -> NAME
+    replacing:
+        partial file (locked, `sonic_bullet.machine.partial_file`) -> write -> flush -> fsync -> os.replace -> NAME
 
 Two writers of one name never mix: each has its own partial file and the last to finish wins (POSIX rename(2)).
 """
@@ -23,10 +24,11 @@ NAME_BYTES_MAX = 255  # NAME_MAX of POSIX file systems
 
 
 def check_output(path: str | os.PathLike[str]) -> Path:
-    """The real, absolute path (links followed) that a file called ``path`` would be written to; a file is made beside it and removed.
+    """The real, absolute path (links followed) that a file called ``path`` would be written to; a file is made beside
+    it and removed.
 
-    Raises FileError where it could not be written: the folder is missing or takes no file, the name is too long or no Unicode, or it
-    belongs to a folder, a device or, in a folder like /tmp, to somebody else.
+    Raises FileError where it could not be written: the folder is missing or takes no file, the name is too long or no
+    Unicode, or it belongs to a folder, a device or, in a folder like /tmp, to somebody else.
     """
     target = _target(path)
     try:
@@ -41,7 +43,8 @@ def _target(path: str | os.PathLike[str]) -> Path:
     name = os.fspath(path)
     if not name or "\0" in name:
         raise FileError(f"{name!r} is no file name", "name a file")
-    if any("\ud800" <= letter <= "\udfff" for letter in name):  # no UTF-8: neither JSON nor a report could say where the file is
+    # no UTF-8: neither JSON nor a report could say where the file is
+    if any("\ud800" <= letter <= "\udfff" for letter in name):
         raise FileError(f"{name!r} is no file name: it is not valid Unicode", "name a file in UTF-8")
     try:
         target = Path(os.path.realpath(name))
@@ -49,7 +52,9 @@ def _target(path: str | os.PathLike[str]) -> Path:
     except OSError as error:
         raise cannot("write", name, error) from error
     if folder is None or not stat.S_ISDIR(folder.st_mode):
-        raise FileError(f"cannot write {name}: there is no folder {target.parent}", f"make it first: mkdir -p {target.parent}")
+        raise FileError(
+            f"cannot write {name}: there is no folder {target.parent}", f"make it first: mkdir -p {target.parent}"
+        )
     if found is not None and stat.S_ISDIR(found.st_mode):
         raise FileError(f"cannot write {name}: it is a folder", "name a file inside it")
     if found is not None and not stat.S_ISREG(found.st_mode):
@@ -82,7 +87,9 @@ def cannot(verb: str, path: object, error: OSError) -> FileError:
 
 
 def kept_name(target: Path) -> Path:
-    """NAME.partial.EXT beside NAME.EXT, for what an interrupted run leaves to be used; the stem is cut where the whole would be too long."""
+    """NAME.partial.EXT beside NAME.EXT, for what an interrupted run leaves to be used; the stem is cut where the whole
+    would be too long.
+    """
     ending = f".partial{target.suffix}"
     stem = os.fsencode(target.stem)[: NAME_BYTES_MAX - len(os.fsencode(ending))]
     return target.with_name(stem.decode("utf-8", "ignore") + ending)
@@ -92,7 +99,8 @@ def kept_name(target: Path) -> Path:
 def replacing(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
     """A binary file that takes the place of ``path`` when the block ends without an error, and vanishes with one.
 
-    Raises FileError where the path cannot be written. A library that hides why its writes failed is asked again: the disk says.
+    Raises FileError where the path cannot be written. A library that hides why its writes failed is asked again: the
+    disk says.
     """
     target = _target(path)
     try:

@@ -2,12 +2,14 @@
 
     y = g·x,  g of `levels`: 1 by default, so that 1.0 in the file is 1 Pa
 
-Float files hold y as it is, above full scale too. Every other format holds |y| ≤ 1: what is beyond is clipped and counted in
-`AudioReport.clipped`. float32 subnormals are flushed to zero (decaying tails are full of them, and they slow every player), NaN and
-infinities are refused. The same samples give the same bytes, except in OGG, whose streams carry a random serial number.
+Float files hold y as it is, above full scale too. Every other format holds |y| ≤ 1: what is beyond is clipped and
+counted in `AudioReport.clipped`. float32 subnormals are flushed to zero (decaying tails are full of them, and they slow
+every player), NaN and infinities are refused. The same samples give the same bytes, except in OGG, whose streams carry
+a random serial number.
 
-libsndfile says neither why a write failed nor, when it closes, whether one did: before a file gets its name it is read to its end and its
-rate, channels and frames are compared with what was written; where they differ the disk itself is asked why.
+libsndfile says neither why a write failed nor, when it closes, whether one did: before a file gets its name it is read
+to its end and its rate, channels and frames are compared with what was written; where they differ the disk itself is
+asked why.
 """
 
 from __future__ import annotations
@@ -53,8 +55,9 @@ SR_MIN_HZ, SR_MAX_HZ = 8000, 384_000
 class AudioReport:
     """What was written: where, how much, how loud.
 
-    gain_per_pa: file units for one pascal. peak_pa, rms_pa: before the gain, over all channels. clipped: samples that were cut
-    at full scale. over: samples beyond full scale in all (equal to clipped except in float files, where it is the player that clips).
+    gain_per_pa: file units for one pascal. peak_pa, rms_pa: before the gain, over all channels. clipped: samples that
+    were cut at full scale. over: samples beyond full scale in all (equal to clipped except in float files, where it is
+    the player that clips).
     """
 
     path: str
@@ -92,26 +95,35 @@ def check_audio_output(path: str | os.PathLike[str], subtype: str | None = None)
     path = as_path(path, "path", "name a sound file, such as out.wav")
     extension = Path(path).suffix.lower()
     if extension not in FORMATS:
-        raise FileError(f"cannot write {brief(path)}: {shown(extension)} is no audio format known here", f"end the name with one of {' '.join(FORMATS)}")
+        raise FileError(
+            f"cannot write {brief(path)}: {shown(extension)} is no audio format known here",
+            f"end the name with one of {' '.join(FORMATS)}",
+        )
     target = check_output(path)
     container, default = FORMATS[extension]
-    wanted = default if subtype is None else as_text(subtype, "subtype", "give one of libsndfile's names, PCM_16 say", error=FileError).upper()
+    wanted = (
+        default
+        if subtype is None
+        else as_text(subtype, "subtype", "give one of libsndfile's names, PCM_16 say", error=FileError).upper()
+    )
     if wanted != default:
         import soundfile
 
         if not soundfile.check_format(container, wanted):
             known = list(soundfile.available_subtypes(container))
-            raise FileError(f"cannot write {brief(path)}: {container} holds no subtype {shown(wanted)}", nearest(wanted, known))
+            raise FileError(
+                f"cannot write {brief(path)}: {container} holds no subtype {shown(wanted)}", nearest(wanted, known)
+            )
     return target, container, wanted
 
 
 class AudioWriter:
     """An audio file that grows block by block; a context manager.
 
-    `write` takes (channels, n) pascals, into a partial file; leaving the block gives that the name NAME.EXT, once it has been read back.
-    Leaving it with an error, or with Ctrl-C, keeps what was written as a valid file NAME.partial.EXT and says so in the error; NAME.EXT is
-    untouched.
-    gain_per_pa: file units for one pascal. expected_frames: chooses RF64 over WAV where the file will pass 4 GiB.
+    `write` takes (channels, n) pascals, into a partial file; leaving the block gives that the name NAME.EXT, once it
+    has been read back. Leaving it with an error, or with Ctrl-C, keeps what was written as a valid file
+    NAME.partial.EXT and says so in the error; NAME.EXT is untouched. gain_per_pa: file units for one pascal.
+    expected_frames: chooses RF64 over WAV where the file will pass 4 GiB.
     """
 
     def __init__(
@@ -124,7 +136,10 @@ class AudioWriter:
         subtype: str | None = None,
         expected_frames: int = 0,
     ) -> None:
-        """Opens the partial file. Raises FileError (place, extension, subtype) and AudioError (rate, channels, gain, size)."""
+        """Opens the partial file.
+
+        Raises FileError (place, extension, subtype) and AudioError (rate, channels, gain, size).
+        """
         import soundfile
 
         self.path = os.fspath(path)
@@ -142,27 +157,37 @@ class AudioWriter:
         except OSError as error:
             raise cannot("write", path, error) from error
         try:
-            self.file: Any = soundfile.SoundFile(self.partial.fd, "w", self.sr, channels, self.subtype, format=self.format, closefd=False)
+            self.file: Any = soundfile.SoundFile(
+                self.partial.fd, "w", self.sr, channels, self.subtype, format=self.format, closefd=False
+            )
         except soundfile.LibsndfileError as error:
             reason = self.partial.refusal()
             self.partial.close()
             if reason is not None:
                 raise cannot("write", path, reason) from error
-            raise AudioError(f"cannot write {channels} channels at {self.sr} Hz to {path}: {error.error_string}", "write .wav, or fewer channels") from error
+            raise AudioError(
+                f"cannot write {channels} channels at {self.sr} Hz to {path}: {error.error_string}",
+                "write .wav, or fewer channels",
+            ) from error
 
     @property
     def is_float(self) -> bool:
         return self.subtype in ("FLOAT", "DOUBLE")
 
     def write(self, samples: Array) -> None:
-        """Append (channels, n) samples in Pa. Raises AudioError (not finite, shape, over 4 GiB) and FileError (disk)."""
+        """Append (channels, n) samples in Pa.
+
+        Raises AudioError (not finite, shape, over 4 GiB) and FileError (disk).
+        """
         import soundfile
 
         block = np.asarray(samples, float)
         if block.ndim != 2 or block.shape[0] != self.channels:
             raise AudioError(f"samples of shape {block.shape} for {self.channels} channels", "pass (channels, n)")
         if self.format in ("WAV", "AIFF") and (self.frames + block.shape[1]) * self.frame_bytes > CHUNK_LIMIT_BYTES:
-            raise AudioError(f"{self.path} would pass 4 GiB, which {self.format} cannot hold", "write .w64, .rf64 or .flac")
+            raise AudioError(
+                f"{self.path} would pass 4 GiB, which {self.format} cannot hold", "write .w64, .rf64 or .flac"
+            )
         scaled = block * self.gain_per_pa
         if not (np.abs(scaled) < 3.4e38).all():  # False for NaN too
             channel, frame = (int(i[0]) for i in np.nonzero(~(np.abs(scaled) < 3.4e38)))
@@ -182,7 +207,8 @@ class AudioWriter:
             scaled[np.abs(scaled) < np.finfo(float).tiny] = 0
         try:
             self.file.write(scaled.T)
-        except (soundfile.LibsndfileError, AssertionError) as error:  # soundfile asserts that all was written: a full disk
+        # soundfile asserts that all was written: a full disk
+        except (soundfile.LibsndfileError, AssertionError) as error:
             raise self._refused() from error
         self.frames += block.shape[1]
         if block.size:
@@ -193,13 +219,25 @@ class AudioWriter:
         """What has been written so far."""
         rms = math.sqrt(self.energy_pa2 / (self.frames * self.channels)) if self.frames else 0.0
         return AudioReport(
-            self.path, self.format, self.subtype, self.sr, self.channels, self.frames, self.gain_per_pa, self.peak_pa, rms, self.clipped, self.over
+            self.path,
+            self.format,
+            self.subtype,
+            self.sr,
+            self.channels,
+            self.frames,
+            self.gain_per_pa,
+            self.peak_pa,
+            rms,
+            self.clipped,
+            self.over,
         )
 
     def __enter__(self) -> AudioWriter:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
         try:
             with suppress(RuntimeError):  # LibsndfileError: what became of the file is seen when it is read back
                 self.file.close()
@@ -240,7 +278,9 @@ class AudioWriter:
         return cannot("write", self.path, reason)
 
     def _read_back(self) -> int:
-        """How many frames the closed file holds, decoded to its end; -1 where it is of another rate or number of channels, 0 where it cannot be read."""
+        """How many frames the closed file holds, decoded to its end; -1 where it is of another rate or number of
+        channels, 0 where it cannot be read.
+        """
         import soundfile
 
         os.lseek(self.partial.fd, 0, os.SEEK_SET)
@@ -257,7 +297,9 @@ class AudioWriter:
 
 
 def _forget_time(fd: int) -> None:
-    """Zero the time of day that libsndfile puts into the PEAK chunk (id, size, version, time) of float files: equal sound, equal bytes."""
+    """Zero the time of day that libsndfile puts into the PEAK chunk (id, size, version, time) of float files: equal
+    sound, equal bytes.
+    """
     os.lseek(fd, 0, os.SEEK_SET)
     head = os.read(fd, 512)
     found = head.split(b"data")[0].split(b"SSND")[0].find(b"PEAK")
@@ -278,20 +320,25 @@ def write_audio(
 ) -> AudioReport:
     """Write ``samples`` (channels, n) or (n,), float64 pascals, whole or not at all.
 
-    The extension chooses the format (`FORMATS`), ``subtype`` the sample format in libsndfile's names. At most one of ``peak_dbfs``
-    (dB re full scale) and ``lufs`` scales; else full_scale_pa is 1.0 in the file. Over 4 GiB a .wav is written as RF64.
-    Raises AudioError (rate, NaN, silence or under 0.4 s where loudness is asked, both levels given) and FileError (place, format).
+    The extension chooses the format (`FORMATS`), ``subtype`` the sample format in libsndfile's names. At most one of
+    ``peak_dbfs`` (dB re full scale) and ``lufs`` scales; else full_scale_pa is 1.0 in the file. Over 4 GiB a .wav is
+    written as RF64. Raises AudioError (rate, NaN, silence or under 0.4 s where loudness is asked, both levels given)
+    and FileError (place, format).
     """
     rate = check_sr(sr)
     check_audio_output(path, subtype)
     check_levels(peak_dbfs, lufs)
-    full_scale_pa = as_number(full_scale_pa, "full_scale_pa", "give a full scale in Pa, above zero", above=0, error=AudioError)
+    full_scale_pa = as_number(
+        full_scale_pa, "full_scale_pa", "give a full scale in Pa, above zero", above=0, error=AudioError
+    )
     sound = as_sound(samples)
     sound = sound[None, :] if sound.ndim == 1 else sound
     if sound.ndim != 2 or sound.shape[0] == 0:
         raise AudioError(f"samples of shape {sound.shape}", "pass (channels, n)")
     gain = gain_per_pa(sound, rate, peak_dbfs, lufs, full_scale_pa)
-    with AudioWriter(path, rate, sound.shape[0], gain_per_pa=gain, subtype=subtype, expected_frames=sound.shape[1]) as writer:
+    with AudioWriter(
+        path, rate, sound.shape[0], gain_per_pa=gain, subtype=subtype, expected_frames=sound.shape[1]
+    ) as writer:
         for start in range(0, sound.shape[1], BLOCK_FRAMES):
             writer.write(sound[:, start : start + BLOCK_FRAMES])
     return writer.report()

@@ -115,13 +115,17 @@ def case_schema() -> dict[str, Any]:
     made = msgspec.json.schema(_Raw)
     text = msgspec.json.encode(made).decode()
     for name in made["$defs"]:  # the classes' own names are private, the schema's are not
-        text = text.replace(f'"#/$defs/{name}"', f'"#/$defs/{_public(name)}"').replace(f'"title":"{name}"', f'"title":"{_public(name)}"')
+        text = text.replace(f'"#/$defs/{name}"', f'"#/$defs/{_public(name)}"').replace(
+            f'"title":"{name}"', f'"title":"{_public(name)}"'
+        )
     whole: dict[str, Any] = msgspec.json.decode(text)
     parts = {_public(name): part for name, part in whole["$defs"].items()}
     for name, part in parts.items():
         what, fields = ABOUT[name]
         part["description"] = what
-        part["properties"] = {field: {"description": fields[field], **form} for field, form in part["properties"].items()}
+        part["properties"] = {
+            field: {"description": fields[field], **form} for field, form in part["properties"].items()
+        }
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": FORMAT, **whole, "$defs": parts}
 
 

@@ -2,8 +2,9 @@
 
     FOLDER/case.json ("sonic-bullet-case/1") -> typed, every path inside the folder -> Case
 
-A case may lack a mesh, positions, impulses, a sensor, or give measured `features` in place of a file; what it does not declare is None and is
-found by the fit, or said to be unknown. Fields that this version does not know are left alone, and named (`unread.py`). Nothing in a case is ever executed.
+A case may lack a mesh, positions, impulses, a sensor, or give measured `features` in place of a file; what it does not
+declare is None and is found by the fit, or said to be unknown. Fields that this version does not know are left alone,
+and named (`unread.py`). Nothing in a case is ever executed.
 """
 
 from __future__ import annotations
@@ -112,7 +113,9 @@ class _Raw(msgspec.Struct, frozen=True):
 
 @dataclass(frozen=True, slots=True)
 class CaseObject:
-    """One object: its mesh file and metres per unit, the name of the guessed material, and guessed constants in SI units."""
+    """One object: its mesh file and metres per unit, the name of the guessed material, and guessed constants in SI
+    units.
+    """
 
     name: str
     mesh: Path | None
@@ -126,7 +129,9 @@ class CaseObject:
 
 @dataclass(frozen=True, slots=True)
 class CaseRecording:
-    """One strike: an audio file or measured lines, on which object, for what use, and where and how hard; None where not declared.
+    """One strike: an audio file or measured lines, on which object, for what use, and where and how hard;
+
+    None where not declared.
 
     channel: counted from 0; channel_named: whether the case says so, else it is the first.
     """
@@ -145,10 +150,12 @@ class CaseRecording:
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """A case. sensor: "velocity" (of the surface at sensor_m along sensor_direction, by object), "pressure" (a microphone), "sum" (of modes) or "unknown".
+    """A case. sensor: "velocity" (of the surface at sensor_m along sensor_direction, by object), "pressure" (a
+    microphone), "sum" (of modes) or "unknown".
 
-    onset_s: when the impulse arrives in every file, or None. support: as declared, in words; clamps stand with the objects. medium: what the object radiates
-    into, "air", "none" or "unknown": as declared, else air where a microphone or a vibrometer listened. warnings: of fields that are not read, one line each.
+    onset_s: when the impulse arrives in every file, or None. support: as declared, in words; clamps stand with the
+    objects. medium: what the object radiates into, "air", "none" or "unknown": as declared, else air where a microphone
+    or a vibrometer listened. warnings: of fields that are not read, one line each.
     """
 
     name: str
@@ -166,7 +173,10 @@ class Case:
 
 
 def read_case(folder: str | os.PathLike[str]) -> Case:
-    """The case in a folder (or of a case.json). Raises FileError naming the file and what is wrong with it; audio may be missing."""
+    """The case in a folder (or of a case.json).
+
+    Raises FileError naming the file and what is wrong with it; audio may be missing.
+    """
     path = Path(folder)
     with reading(path, "case", FileError, "mend that field; docs/reference/case.md describes the file"):
         if path.is_dir():
@@ -175,16 +185,23 @@ def read_case(folder: str | os.PathLike[str]) -> Case:
             with path.open("rb") as file:
                 content = file.read(BYTES_MAX + 1)
         except (OSError, ValueError) as error:
-            raise FileError(f"cannot read case {path}: {getattr(error, 'strerror', None) or error}", "give a folder with a case.json") from error
+            raise FileError(
+                f"cannot read case {path}: {getattr(error, 'strerror', None) or error}",
+                "give a folder with a case.json",
+            ) from error
         if len(content) > BYTES_MAX:
             raise FileError(f"case {path} is over 16 MiB", "give a case.json")
         try:
             raw = msgspec.json.decode(content, type=_Raw)
             unread = unread_fields(msgspec.json.decode(content), _Raw, f"case {path}")
         except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-            raise FileError(f"case {path}: {error}", "mend that field; docs/reference/case.md describes the file") from error
+            raise FileError(
+                f"case {path}: {error}", "mend that field; docs/reference/case.md describes the file"
+            ) from error
         if raw.format != FORMAT:
-            raise FileError(f"case {path} has format '{raw.format}', wanted '{FORMAT}'", "use a sonic_bullet that knows that format")
+            raise FileError(
+                f"case {path} has format '{raw.format}', wanted '{FORMAT}'", "use a sonic_bullet that knows that format"
+            )
         if not raw.recordings:
             raise FileError(f"case {path} has no recordings", "list at least one strike")
         return _case(raw, path, unread)
@@ -196,7 +213,8 @@ def _case(raw: _Raw, path: Path, unread: tuple[str, ...]) -> Case:
     for clamp in clamps:
         if clamp.radius < 0 or (clamp.object is not None and clamp.object not in raw.objects):
             raise FileError(
-                f"case {path}: a clamp has radius {clamp.radius:g} m on object '{clamp.object}'", "give a radius of at least 0, and a listed object"
+                f"case {path}: a clamp has radius {clamp.radius:g} m on object '{clamp.object}'",
+                "give a radius of at least 0, and a listed object",
             )
     objects = {name: _object(name, thing, folder, clamps) for name, thing in raw.objects.items()}
     only = next(iter(objects)) if len(objects) == 1 else None
@@ -208,9 +226,14 @@ def _case(raw: _Raw, path: Path, unread: tuple[str, ...]) -> Case:
     places, directions = (_by_object(value, objects) for value in (sensor.position, sensor.direction))
     observed = _response(sensor)
     if raw.medium is not None and raw.medium not in MEDIA:
-        unread = (*unread, f"case {path}: medium '{shown(raw.medium)}' is not known (known: {', '.join(MEDIA)}): damping is fitted as a whole")
+        unread = (
+            *unread,
+            f"case {path}: medium '{shown(raw.medium)}' is not known (known: {', '.join(MEDIA)}): damping is fitted as a whole",
+        )
     where = _onset(raw.onset), _said(raw.support), medium_of(raw.medium, observed)
-    return Case(raw.case or folder.name, folder, objects, recordings, observed, places, directions, (low, high), *where, unread)
+    return Case(
+        raw.case or folder.name, folder, objects, recordings, observed, places, directions, (low, high), *where, unread
+    )
 
 
 def medium_of(declared: str | None, sensor: str) -> str:
@@ -228,17 +251,25 @@ def _object(name: str, thing: _Object, folder: Path, clamps: tuple[_Fixed, ...])
         if value is not None and not 0 < value < 1e16:
             raise FileError(f"object '{name}': {key} is {value:g}", "give SI units, above zero")
     if guess.poisson_ratio is not None and not -0.99 < guess.poisson_ratio < 0.5:
-        raise FileError(f"object '{name}': poisson_ratio is {guess.poisson_ratio:g}", "Poisson's ratio lies between -1 and 0.5")
+        raise FileError(
+            f"object '{name}': poisson_ratio is {guess.poisson_ratio:g}", "Poisson's ratio lies between -1 and 0.5"
+        )
     fixed = tuple((*clamp.position, clamp.radius) for clamp in clamps if clamp.object in (None, name))
     mesh = inside(folder, thing.mesh) if thing.mesh is not None else None
-    return CaseObject(name, mesh, UNITS[thing.units], thing.material, guess.youngs_modulus, guess.density, guess.poisson_ratio, fixed)
+    return CaseObject(
+        name, mesh, UNITS[thing.units], thing.material, guess.youngs_modulus, guess.density, guess.poisson_ratio, fixed
+    )
 
 
-def _recording(entry: _Recording, number: int, objects: dict[str, CaseObject], only: str | None, path: Path) -> CaseRecording:
+def _recording(
+    entry: _Recording, number: int, objects: dict[str, CaseObject], only: str | None, path: Path
+) -> CaseRecording:
     where = f"case {path}: recording {number + 1}"
     name = entry.object or only or ("" if not objects else None)
     if name is None or (objects and name not in objects):
-        raise FileError(f"{where} is of object '{entry.object}', which is not listed", f"use one of {', '.join(objects)}")
+        raise FileError(
+            f"{where} is of object '{entry.object}', which is not listed", f"use one of {', '.join(objects)}"
+        )
     if entry.split not in SPLITS:
         raise FileError(f"{where} has split '{entry.split}'", f"use one of {', '.join(SPLITS)}")
     if entry.file is None and entry.features is None:
@@ -246,7 +277,8 @@ def _recording(entry: _Recording, number: int, objects: dict[str, CaseObject], o
     for line in entry.features or ():
         if not line.freq_hz > 0 or (line.decay_per_s or 0) < 0:
             raise FileError(
-                f"{where}: a feature of {line.freq_hz:g} Hz and decay {line.decay_per_s}", "give frequencies above zero and decays of at least zero"
+                f"{where}: a feature of {line.freq_hz:g} Hz and decay {line.decay_per_s}",
+                "give frequencies above zero and decays of at least zero",
             )
     if entry.channel is not None and entry.channel < 0:
         raise FileError(f"{where} has channel {entry.channel}", "channels are counted from 0")
@@ -268,11 +300,19 @@ def inside(folder: Path, name: str) -> Path:
     """The path of a file a case names. Raises FileError where it leads out of the folder, by name or by link."""
     if not name or "\0" in name or os.path.isabs(name) or "\\" in name:
         raise FileError(f"case names the file {name!r}", "name files inside the case's folder")
-    if max(len(part) for part in os.fsencode(name).split(b"/")) > NAME_BYTES or len(os.fsencode(folder / name)) > PATH_BYTES:
-        raise FileError(f"case names the file '{excerpt(name, 80)}' of {len(name)} characters", "give it a name that a disk can hold")
+    if (
+        max(len(part) for part in os.fsencode(name).split(b"/")) > NAME_BYTES
+        or len(os.fsencode(folder / name)) > PATH_BYTES
+    ):
+        raise FileError(
+            f"case names the file '{excerpt(name, 80)}' of {len(name)} characters",
+            "give it a name that a disk can hold",
+        )
     whole = os.path.realpath(folder / name)
     if not whole.startswith(os.path.join(os.path.realpath(folder), "")):
-        raise FileError(f"case names the file '{name}', which lies outside its folder", "name files inside the case's folder")
+        raise FileError(
+            f"case names the file '{name}', which lies outside its folder", "name files inside the case's folder"
+        )
     return folder / name
 
 

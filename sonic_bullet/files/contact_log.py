@@ -43,7 +43,9 @@ class ContactLog:
             "sensors": as_kinds(self.sensors, Sensor, "log: sensors", "give a tuple of sensors", error=LogError),
             "air": as_kind(self.air, Air, "log: air", "give an Air", error=LogError),
             "seed": as_whole(self.seed, "log: seed", "give a whole number, 0 or more", least=0, error=LogError),
-            "untouched": frozenset(as_whole(x, "log: untouched", *ids) for x in as_items(self.untouched, "log: untouched", *ids)),
+            "untouched": frozenset(
+                as_whole(x, "log: untouched", *ids) for x in as_items(self.untouched, "log: untouched", *ids)
+            ),
             "sr": as_whole(self.sr, "log: sr", "give a sample rate in Hz", least=1, error=LogError),
         }
         for name, value in checked.items():
@@ -88,8 +90,8 @@ class ContactLog:
     def impulse_on(self, body: int, link: int | None = None) -> Array:
         """(k, 3) world-frame impulses in N·s that acted on the body, friction included, one row per contact and step.
 
-        link None: all links of the body. Where ids were given anew (removal, reset), the newest bearer of the id counts.
-        Raises LogError where the log never saw the body.
+        link None: all links of the body. Where ids were given anew (removal, reset), the newest bearer of the id
+        counts. Raises LogError where the log never saw the body.
         """
         rows = self.rows
         sign, mask = self._side(rows, body, link)
@@ -101,13 +103,20 @@ class ContactLog:
 
     def _side(self, rows: Contacts, body: int, link: int | None) -> tuple[Array, Array]:
         body = as_whole(body, "body", "give a body's id", error=LogError)
-        link = None if link is None else as_whole(link, "link", "give a link's number, -1 the base, or None for all", error=LogError)
+        link = (
+            None
+            if link is None
+            else as_whole(link, "link", "give a link's number, -1 the base, or None for all", error=LogError)
+        )
         bearers = [i for i, x in enumerate(self.bodies) if x.body_id == body and (link is None or x.link == link)]
         if not bearers and body in self.untouched:
             return np.zeros(len(rows)), np.zeros(len(rows), bool)
         if not bearers:
             known = sorted({x.body_id for x in self.bodies})
-            raise LogError(f"the log holds no body {shown(body)}" + ("" if link is None else f" link {shown(link)}"), f"known bodies: {shown(known)}")
+            raise LogError(
+                f"the log holds no body {shown(body)}" + ("" if link is None else f" link {shown(link)}"),
+                f"known bodies: {shown(known)}",
+            )
         epoch = max(self.bodies[i].epoch for i in bearers)
         bearers = [i for i in bearers if self.bodies[i].epoch == epoch]
         on_a, on_b = np.isin(rows.a, bearers), np.isin(rows.b, bearers)
@@ -115,7 +124,9 @@ class ContactLog:
 
     def first(self, count: int) -> ContactLog:
         """The log of the first ``count`` steps and of what happened up to their end."""
-        return replace(self, steps=self.steps[:count], events=tuple(event for event in self.events if event.step <= count))
+        return replace(
+            self, steps=self.steps[:count], events=tuple(event for event in self.events if event.step <= count)
+        )
 
     def save(self, path: object) -> None:
         """Write the log as npz (numpy arrays and JSON, no pickle), whole or not at all. Raises FileError."""

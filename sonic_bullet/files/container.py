@@ -1,11 +1,12 @@
-"""npz without its holes: arrays and one JSON entry in an uncompressed zip, opened only after every claim has been checked.
+"""npz without its holes: arrays and one JSON entry in an uncompressed zip, opened only after every claim has been
+checked.
 
     header.npy  (n,) uint8: UTF-8 JSON, first key "format"
     NAME.npy    one array each, little-endian bool, integer or float
 
-Entries are stored, not deflated: floats hardly shrink, and no entry can then be larger than the file it lies in (no zip bombs). An npy
-header's shape is compared with the entry's true length before anything is allocated. The entries fill the file, each once and as the
-directory says, so that no part of it can hide. ``numpy.load(path)`` reads the file too.
+Entries are stored, not deflated: floats hardly shrink, and no entry can then be larger than the file it lies in (no zip
+bombs). An npy header's shape is compared with the entry's true length before anything is allocated. The entries fill
+the file, each once and as the directory says, so that no part of it can hide. ``numpy.load(path)`` reads the file too.
 """
 
 from __future__ import annotations
@@ -53,11 +54,14 @@ def write_container(path: str | os.PathLike[str], header: msgspec.Struct, arrays
                 np.lib.format.write_array(entry, np.ascontiguousarray(array), version=(1, 0), allow_pickle=False)
 
 
-def read_container(path: str | os.PathLike[str], kind: type[Header], form: str | tuple[str, ...], what: str) -> tuple[Header, dict[str, Array]]:
+def read_container(
+    path: str | os.PathLike[str], kind: type[Header], form: str | tuple[str, ...], what: str
+) -> tuple[Header, dict[str, Array]]:
     """The header as ``kind`` and all arrays, by name, read-only.
 
     form: the format id asked for, or several that will do, the newest first; what: the thing, in words, for messages
-    ("contact log"). Raises FileError where there is no readable file, LogError where it is cut, foreign, compressed, pickled, holds an entry twice or beside its directory, or lies about a size.
+    ("contact log"). Raises FileError where there is no readable file, LogError where it is cut, foreign, compressed,
+    pickled, holds an entry twice or beside its directory, or lies about a size.
     """
     with reading(path, what, LogError, REMEDY):
         status = os.stat(path)
@@ -93,15 +97,19 @@ def take(arrays: Mapping[str, Array], name: str, dtype: Any, shape: tuple[int | 
     array = arrays[name]
     if array.dtype != np.dtype(dtype):
         raise LogError(f"{path}: array '{name}' holds {array.dtype}, wanted {np.dtype(dtype)}", REMEDY)
-    if array.ndim != len(shape) or any(want is not None and want != have for have, want in zip(array.shape, shape, strict=True)):
+    if array.ndim != len(shape) or any(
+        want is not None and want != have for have, want in zip(array.shape, shape, strict=True)
+    ):
         raise LogError(f"{path}: array '{name}' has shape {array.shape}, wanted {shape}", REMEDY)
     return array
 
 
 def _entries(archive: zipfile.ZipFile, file: BinaryIO, file_bytes: int) -> Iterator[zipfile.ZipInfo]:
-    """The entries in the file's order, once it is known that they fill it: from its first byte to the directory, and that to its end.
+    """The entries in the file's order, once it is known that they fill it: from its first byte to the directory, and
+    that to its end.
 
-    So nothing lies where the directory does not tell of it, and each entry is what its own local header says it is. Raises LogError.
+    So nothing lies where the directory does not tell of it, and each entry is what its own local header says it is.
+    Raises LogError.
     """
     infos = sorted(archive.infolist(), key=lambda info: info.header_offset)
     at = 0
@@ -119,7 +127,15 @@ def _entries(archive: zipfile.ZipFile, file: BinaryIO, file_bytes: int) -> Itera
         if packed == size == ZIP64 and len(extra) == EXTRA.size:
             *_, size, packed = EXTRA.unpack(extra)
         said = (magic, flags & ~UTF8, method, crc, packed, size, name)
-        if said != (b"PK\x03\x04", 0, zipfile.ZIP_STORED, info.CRC, info.file_size, info.file_size, info.filename.encode()):
+        if said != (
+            b"PK\x03\x04",
+            0,
+            zipfile.ZIP_STORED,
+            info.CRC,
+            info.file_size,
+            info.file_size,
+            info.filename.encode(),
+        ):
             raise LogError(f"entry '{info.filename}' is another in the directory", REMEDY)
         at += LOCAL.size + name_bytes + extra_bytes + info.file_size
     file.seek(max(file_bytes - END.size, 0))
@@ -136,7 +152,9 @@ def _entry_name(info: zipfile.ZipInfo) -> str:
 
 
 def _array(raw: bytes, where: str, file_bytes: int) -> Array:
-    """The array of an npy file, nothing of it evaluated: a header says descr, order and shape as numpy writes them, or it is none."""
+    """The array of an npy file, nothing of it evaluated: a header says descr, order and shape as numpy writes them, or
+    it is none.
+    """
     size_bytes = {b"\x93NUMPY\x01\x00": 2, b"\x93NUMPY\x02\x00": 4}.get(raw[:8], 0)
     start = 8 + size_bytes
     stop = start + int.from_bytes(raw[8:start], "little")

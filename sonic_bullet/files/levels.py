@@ -22,9 +22,15 @@ def gain_per_pa(sound: Array, sr: int, peak_dbfs: float | None, lufs: float | No
         return 1 / full_scale_pa
     peak = float(np.abs(sound).max()) if sound.size else 0.0
     if not math.isfinite(peak):
-        raise AudioError("the samples hold NaN or infinite numbers", "sound must be finite: examine the scene with 'sonic-bullet doctor'")
+        raise AudioError(
+            "the samples hold NaN or infinite numbers",
+            "sound must be finite: examine the scene with 'sonic-bullet doctor'",
+        )
     if peak < 1e-300:
-        raise AudioError("the sound is silent, so no level can be given to it", "leave out --peak-dbfs and --lufs, or make something collide")
+        raise AudioError(
+            "the sound is silent, so no level can be given to it",
+            "leave out --peak-dbfs and --lufs, or make something collide",
+        )
     if peak_dbfs is not None:
         return float(10 ** (peak_dbfs / 20)) / peak
     assert lufs is not None
@@ -47,9 +53,23 @@ def check_levels(peak_dbfs: float | None, lufs: float | None) -> None:
     if peak_dbfs is not None and lufs is not None:
         raise AudioError("both peak_dbfs and lufs are given", "give one of a peak and a loudness")
     if peak_dbfs is not None:
-        as_number(peak_dbfs, "peak_dbfs, a level re full scale,", "give one between -200 and 0 dB, -1 say", least=-200, most=0, error=AudioError)
+        as_number(
+            peak_dbfs,
+            "peak_dbfs, a level re full scale,",
+            "give one between -200 and 0 dB, -1 say",
+            least=-200,
+            most=0,
+            error=AudioError,
+        )
     if lufs is not None:
-        as_number(lufs, "lufs, a loudness level,", "give one between -200 and 200, -23 say", least=-200, most=200, error=AudioError)
+        as_number(
+            lufs,
+            "lufs, a loudness level,",
+            "give one between -200 and 200, -23 say",
+            least=-200,
+            most=200,
+            error=AudioError,
+        )
 
 
 def _loudness_lufs(sound: Array, sr: int) -> float:
@@ -59,7 +79,9 @@ def _loudness_lufs(sound: Array, sr: int) -> float:
     if sound.shape[0] > 5:
         raise AudioError(f"loudness is defined for up to 5 channels, not {sound.shape[0]}", "use --peak-dbfs")
     if sound.shape[1] < math.ceil(0.4 * sr):
-        raise AudioError(f"loudness needs 0.4 s of sound, here are {sound.shape[1] / sr:.3f} s", "use --peak-dbfs, or render longer")
+        raise AudioError(
+            f"loudness needs 0.4 s of sound, here are {sound.shape[1] / sr:.3f} s", "use --peak-dbfs, or render longer"
+        )
     loudness = float(pyloudnorm.Meter(sr).integrated_loudness(sound.T))
     if not math.isfinite(loudness):
         raise AudioError("the sound has no measurable loudness (a click under the gate of BS.1770)", "use --peak-dbfs")

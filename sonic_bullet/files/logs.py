@@ -1,23 +1,28 @@
 """Contact logs on disk: every number bit for bit, no pickle.
 
-The container is `container`'s npz. Scalars, names and references are JSON (`header.npy`), all arrays are entries of their own:
+The container is `container`'s npz. Scalars, names and references are JSON (`header.npy`), all arrays are entries of
+their own:
 
     format "sonic-bullet-contacts/2"; b bodies, s steps, p = Σ bodies known at each step, k = Σ contacts of each step
       step_dt_s (s,) f8                     length of each step
       step_gravity_m_s2 (s, 3) f8            gravity in the world
       step_body_count, step_contact_count (s,) i8   how many of the p and k rows are each step's, in order
       pose_position_m (p, 3) f8, pose_quaternion_xyzw (p, 4) f8, pose_teleported (p,) bool
-      contact_<field> (k, …)                the fields of `Contacts`: a, b i4; point_a_m, point_b_m, normal, impulse_n_s, slip_m_s,
+      contact_<field> (k, …)
+          the fields of `Contacts`: a, b i4; point_a_m, point_b_m, normal, impulse_n_s, slip_m_s,
                                             sweep_m_s, approach_m_s, gap_m f8
       body_inertia_kg_m2 (b, 3, 3) f8, body_curvature_per_m (b,) f8 (NaN: by the model's surface)
       material_stiffness_pa (n, 6, 6) f8    materials and models are stored once each, however many bodies share them
       residual<i>_<field> f8                 of material i, where it has one: the arrays of `Residual`
-      model<i>_freq_hz, _decay_per_s (m,) f8, _shape (v, 3, m) f4, _vertex_m (v, 3) f8, _face (f, 3) i4, _curvature_per_m (f,) f8
+      model<i>_freq_hz, _decay_per_s (m,) f8, _shape (v, 3, m) f4, _vertex_m (v, 3) f8, _face (f, 3) i4,
+          _curvature_per_m (f,) f8
       model<i>_bend_s2_m2, _choke_s_m (m,) f8  only where its modes go with their level
-      events (in the header)                 in order: {"kind": "quench", "step": the step before which it happened, "body": index, or null: all}
+      events (in the header)
+          in order: {"kind": "quench", "step": the step before which it happened, "body": index, or null: all}
     format "sonic-bullet-contacts/1"        the same without events
 
-A reader checks sizes before it allocates and records check their invariants, so a cut, foreign or forged file is one line of LogError.
+A reader checks sizes before it allocates and records check their invariants, so a cut, foreign or forged file is one
+line of LogError.
 """
 
 from __future__ import annotations
@@ -137,7 +142,9 @@ def write_log(path: str | os.PathLike[str], log: ContactLog) -> None:
         "pose_teleported": np.concatenate([np.zeros(0, bool), *(step.teleported for step in steps)]),
         "body_inertia_kg_m2": np.reshape([body.inertia_kg_m2 for body in log.bodies], (-1, 3, 3)).astype(float),
         "body_curvature_per_m": np.array([body.curvature_per_m for body in log.bodies], float),
-        "material_stiffness_pa": np.reshape([material.stiffness_pa for material in materials], (-1, 6, 6)).astype(float),
+        "material_stiffness_pa": np.reshape([material.stiffness_pa for material in materials], (-1, 6, 6)).astype(
+            float
+        ),
     }
     arrays |= {f"contact_{name}": getattr(rows, name) for name in ROW_FIELDS}
     for i, model in enumerate(models):
@@ -149,7 +156,10 @@ def write_log(path: str | os.PathLike[str], log: ContactLog) -> None:
 
 
 def read_log(path: str | os.PathLike[str]) -> ContactLog:
-    """The contact log that `write_log` wrote. Raises FileError (no such file) and LogError (cut, foreign, forged, inconsistent)."""
+    """The contact log that `write_log` wrote.
+
+    Raises FileError (no such file) and LogError (cut, foreign, forged, inconsistent).
+    """
     path = as_path(path, "path", "name a contact log (.npz)")
     header, arrays = read_container(path, _LogHeader, LOG_FORMATS, "contact log")
     with reading(path, "contact log", LogError, REMEDY):
@@ -167,7 +177,11 @@ def _distinct(things: list[Any], key: Any) -> tuple[list[Any], list[int | None]]
 
 
 def _material_key(material: Material) -> bytes:
-    more = b"".join(getattr(material.residual, name).tobytes() for name in RESIDUAL_ARRAYS) if material.residual is not None else b""
+    more = (
+        b"".join(getattr(material.residual, name).tobytes() for name in RESIDUAL_ARRAYS)
+        if material.residual is not None
+        else b""
+    )
     return msgspec.json.encode(_pack_material(material)) + material.stiffness_pa.tobytes() + more
 
 
@@ -181,14 +195,25 @@ def _pack_material(x: Material) -> _Material:
         hurst=float(x.hurst),
         restitution=float(x.restitution),
         source=as_json_text(x.source),
-        residual=None if x.residual is None else _Residual(float(x.residual.clip_energy), as_json_text(x.residual.source)),
+        residual=None
+        if x.residual is None
+        else _Residual(float(x.residual.clip_energy), as_json_text(x.residual.source)),
         includes_radiation=bool(x.includes_radiation),
     )
 
 
 def _pack_body(x: Body, material: int | None, model: int | None) -> _Body:
     numbers = (int(x.body_id), int(x.link), int(x.epoch))
-    return _Body(*numbers, as_json_text(x.name), float(x.mass_kg), float(x.volume_m3), int(x.since_step), int(x.until_step), material, model)
+    return _Body(
+        *numbers,
+        as_json_text(x.name),
+        float(x.mass_kg),
+        float(x.volume_m3),
+        int(x.since_step),
+        int(x.until_step),
+        material,
+        model,
+    )
 
 
 def _pack_sensor(sensor: Sensor) -> _Microphone | _Vibrometer | _ModalSum:
@@ -204,10 +229,14 @@ def _vector(array: Array) -> Vector:
     return x, y, z
 
 
-def _unpack_residual(header: _Residual | None, arrays: Mapping[str, Array], index: int, path: object) -> Residual | None:
+def _unpack_residual(
+    header: _Residual | None, arrays: Mapping[str, Array], index: int, path: object
+) -> Residual | None:
     if header is None:
         return None
-    parts = {name: take(arrays, f"residual{index}_{name}", float, shape, path) for name, shape in RESIDUAL_ARRAYS.items()}
+    parts = {
+        name: take(arrays, f"residual{index}_{name}", float, shape, path) for name, shape in RESIDUAL_ARRAYS.items()
+    }
     return Residual(**parts, clip_energy=header.clip_energy, source=header.source)
 
 
@@ -216,7 +245,8 @@ def _unpack_sensor(sensor: _Microphone | _Vibrometer | _ModalSum) -> Sensor:
         return Microphone(np.array(sensor.position_m))
     if isinstance(sensor, _Vibrometer):
         made = Vibrometer(sensor.body_id, np.array(sensor.point_m), np.array(sensor.direction), sensor.link)
-        object.__setattr__(made, "direction", np.array(sensor.direction))  # already of unit length: dividing again would move its last bit
+        # already of unit length: dividing again would move its last bit
+        object.__setattr__(made, "direction", np.array(sensor.direction))
         made.direction.setflags(write=False)
         return made
     return ModalSum(sensor.scale)
@@ -228,13 +258,20 @@ def _unpack_log(header: _LogHeader, arrays: Mapping[str, Array], path: object) -
     curvature = take(arrays, "body_curvature_per_m", float, (b,), path)
     stiffness = take(arrays, "material_stiffness_pa", float, (n, 6, 6), path)
     materials = [
-        Material(stiffness_pa=stiffness[i], **{**msgspec.structs.asdict(x), "residual": _unpack_residual(x.residual, arrays, i, path)})
+        Material(
+            stiffness_pa=stiffness[i],
+            **{**msgspec.structs.asdict(x), "residual": _unpack_residual(x.residual, arrays, i, path)},
+        )
         for i, x in enumerate(header.materials)
     ]
     models = [unpack_model(x, arrays, i, path) for i, x in enumerate(header.models)]
     bodies = [
         Body(
-            **{**msgspec.structs.asdict(x), "material": _pick(materials, x.material, path), "model": _pick(models, x.model, path)},
+            **{
+                **msgspec.structs.asdict(x),
+                "material": _pick(materials, x.material, path),
+                "model": _pick(models, x.model, path),
+            },
             inertia_kg_m2=inertia[i],
             curvature_per_m=float(curvature[i]),
         )
@@ -271,7 +308,9 @@ def _unpack_steps(arrays: Mapping[str, Array], path: object) -> tuple[Step, ...]
     quaternion = take(arrays, "pose_quaternion_xyzw", float, (p, 4), path)
     gravity = take(arrays, "step_gravity_m_s2", float, (len(dt), 3), path)
     teleported = take(arrays, "pose_teleported", bool, (p,), path)
-    rows = Contacts(**{name: take(arrays, f"contact_{name}", dtype, (k, *tail), path) for name, (dtype, tail) in ROW_FIELDS.items()})
+    rows = Contacts(
+        **{name: take(arrays, f"contact_{name}", dtype, (k, *tail), path) for name, (dtype, tail) in ROW_FIELDS.items()}
+    )
     if k and min(rows.a.min(), rows.b.min()) < 0:
         raise LogError(f"{path}: a contact names a body below zero", REMEDY)
     return tuple(

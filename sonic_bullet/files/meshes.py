@@ -27,9 +27,12 @@ SEVERAL_FILES = {"gltf", "dae"}  # formats whose numbers may lie in files beside
 
 
 def read_surfaces(path: Path) -> list[MeshSurface]:
-    """Objects of a mesh file, in its own unit: (vertices (v, 3), faces (f, 3)) each, polygons as fans, nothing merged or repaired.
+    """Objects of a mesh file, in its own unit:
 
-    Raises FileError where it cannot be read, MeshError where it is of no known kind, broken, or a face names no vertex (line or number of the face).
+    (vertices (v, 3), faces (f, 3)) each, polygons as fans, nothing merged or repaired.
+
+    Raises FileError where it cannot be read, MeshError where it is of no known kind, broken, or a face names no vertex
+    (line or number of the face).
     """
     with reading(path, "mesh", MeshError, REMEDY):
         if not path.is_file():
@@ -44,7 +47,10 @@ def _check(path: Path, vertex: Array, face: Array) -> None:
     wrong = np.argwhere((face < 0) | (face >= len(vertex)))
     if len(wrong):
         triangle, corner = (int(i) for i in wrong[0])
-        raise MeshError(f"mesh file {path}: triangle {triangle + 1} names vertex {face[triangle, corner]} of 0 to {len(vertex) - 1}", REMEDY)
+        raise MeshError(
+            f"mesh file {path}: triangle {triangle + 1} names vertex {face[triangle, corner]} of 0 to {len(vertex) - 1}",
+            REMEDY,
+        )
 
 
 def _obj(path: Path) -> Iterator[MeshSurface]:
@@ -74,7 +80,9 @@ def _obj(path: Path) -> Iterator[MeshSurface]:
             except ValueError as error:
                 raise MeshError(f"mesh file {path}, line {number}: {error}", REMEDY) from error
     if largest > len(vertex):  # known at the end only: a face may come before its vertices
-        raise MeshError(f"mesh file {path}, line {largest_line}: a face names vertex {largest} of {len(vertex)}", REMEDY)
+        raise MeshError(
+            f"mesh file {path}, line {largest_line}: a face names vertex {largest} of {len(vertex)}", REMEDY
+        )
     points = np.array(vertex, float).reshape(-1, 3)
     for faces in objects:
         if faces:
@@ -97,7 +105,9 @@ def _corners(line: str, words: list[str], so_far: int) -> list[int]:
     if corner and min(corner) < 1:
         wrong = next((index for index in corner if index == 0 or index < -so_far), None)
         if wrong is not None:
-            raise ValueError(f"a face names vertex {wrong}, but they count from 1, or from -1 backwards to {-so_far} here")
+            raise ValueError(
+                f"a face names vertex {wrong}, but they count from 1, or from -1 backwards to {-so_far} here"
+            )
         corner = [index if index > 0 else so_far + index + 1 for index in corner]
     return corner
 
@@ -116,7 +126,8 @@ def _other(path: Path) -> Iterator[MeshSurface]:
         if kind in SEVERAL_FILES:
             scene = trimesh.load_scene(path, process=False, maintain_order=True, skip_materials=True)
         else:
-            content = io.BytesIO(path.read_bytes())  # a read of as many bytes as a header claims gives what there is, and takes no more memory
+            # a read of as many bytes as a header claims gives what there is, and takes no more memory
+            content = io.BytesIO(path.read_bytes())
             scene = trimesh.load_scene(content, file_type=kind, process=False, maintain_order=True, skip_materials=True)
     except ImportError:  # a parser of text asks for a package to guess its encoding: the file is not of its kind
         raise MeshError(f"mesh file {path} is no {kind} file", REMEDY) from None
@@ -130,7 +141,10 @@ def _other(path: Path) -> Iterator[MeshSurface]:
 
 def _check_off(path: Path) -> None:
     """An OFF's faces by their lines: trimesh refuses them too, and does not say which. Raises MeshError."""
-    lines = [(number, line.split("#")[0].split()) for number, line in enumerate(path.read_text(errors="replace").splitlines(), 1)]
+    lines = [
+        (number, line.split("#")[0].split())
+        for number, line in enumerate(path.read_text(errors="replace").splitlines(), 1)
+    ]
     lines = [(number, words) for number, words in lines if words and words != ["OFF"]]
     if not lines or len(lines[0][1]) < 2 or not all(word.isdigit() for word in lines[0][1]):
         return  # of another kind, or none: for trimesh to say
@@ -138,11 +152,16 @@ def _check_off(path: Path) -> None:
     for number, words in lines[1 + vertices : 1 + vertices + faces]:
         for word in words[1 : 1 + int(words[0])]:
             if not 0 <= int(word) < vertices:
-                raise MeshError(f"mesh file {path}, line {number}: a face names vertex {word} of 0 to {vertices - 1}", REMEDY)
+                raise MeshError(
+                    f"mesh file {path}, line {number}: a face names vertex {word} of 0 to {vertices - 1}", REMEDY
+                )
 
 
 def _check_counts(path: Path, kind: str) -> None:
-    """A glTF accessor without a buffer stands for as many zeros as it says: no more than the file has bytes. Raises MeshError."""
+    """A glTF accessor without a buffer stands for as many zeros as it says: no more than the file has bytes.
+
+    Raises MeshError.
+    """
     if kind not in ("glb", "gltf"):
         return
     content = path.read_bytes()

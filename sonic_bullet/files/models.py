@@ -52,7 +52,10 @@ def write_model(path: str | os.PathLike[str], model: ModalModel) -> None:
 
 
 def read_model(path: str | os.PathLike[str]) -> ModalModel:
-    """The modal model that `write_model` wrote. Raises FileError (no such file) and LogError (cut, foreign, forged, inconsistent)."""
+    """The modal model that `write_model` wrote.
+
+    Raises FileError (no such file) and LogError (cut, foreign, forged, inconsistent).
+    """
     header, arrays = read_container(path, _ModelHeader, MODEL_FORMAT, "modal model")
     with reading(path, "modal model", LogError, REMEDY):
         return unpack_model(header.model, arrays, 0, path)
@@ -68,19 +71,35 @@ def model_key(model: ModalModel) -> bytes:
 
 def pack_model(x: ModalModel) -> ModelEntry:
     """The header's part of a model."""
-    return ModelEntry(float(x.volume_m3), float(x.mass_kg), int(x.dropped), as_json_text(x.note), float(x.damping_growth_power), bool(x.includes_radiation))
+    return ModelEntry(
+        float(x.volume_m3),
+        float(x.mass_kg),
+        int(x.dropped),
+        as_json_text(x.note),
+        float(x.damping_growth_power),
+        bool(x.includes_radiation),
+    )
 
 
 def model_arrays(model: ModalModel, index: int) -> dict[str, Array]:
     """The arrays of a model, by their names in the file."""
     bent = {name: field for name, field in BENT_ARRAYS.items() if getattr(model, field) is not None}
-    return {f"model{index}_{name}": getattr(model, field) for name, field in ({name: name for name in MODEL_ARRAYS} | bent).items()}
+    return {
+        f"model{index}_{name}": getattr(model, field)
+        for name, field in ({name: name for name in MODEL_ARRAYS} | bent).items()
+    }
 
 
 def unpack_model(header: ModelEntry, arrays: Mapping[str, Array], index: int, path: object) -> ModalModel:
     """The model that these were made of. Raises LogError, RecordError."""
-    parts = {name: take(arrays, f"model{index}_{name}", dtype, shape, path) for name, (dtype, shape) in MODEL_ARRAYS.items()}
-    parts |= {field: take(arrays, f"model{index}_{name}", float, (None,), path) for name, field in BENT_ARRAYS.items() if f"model{index}_{name}" in arrays}
+    parts = {
+        name: take(arrays, f"model{index}_{name}", dtype, shape, path) for name, (dtype, shape) in MODEL_ARRAYS.items()
+    }
+    parts |= {
+        field: take(arrays, f"model{index}_{name}", float, (None,), path)
+        for name, field in BENT_ARRAYS.items()
+        if f"model{index}_{name}" in arrays
+    }
     return ModalModel(
         **parts,
         volume_m3=header.volume_m3,

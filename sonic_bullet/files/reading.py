@@ -1,8 +1,10 @@
 """The boundary of every reader: what a foreign file makes a parser throw leaves as one error of ours.
 
-    open, zip, npy, JSON, libsndfile, trimesh -> any exception -> kind("PATH …", remedy), at most 200 characters of it the file's own
+    open, zip, npy, JSON, libsndfile, trimesh -> any exception -> kind("PATH …", remedy), at most 200 characters of it
+        the file's own
 
-A lie about a size is no matter for this boundary: MemoryError passes, and readers compare claims with a file's true length first.
+A lie about a size is no matter for this boundary: MemoryError passes, and readers compare claims with a file's true
+length first.
 """
 
 from __future__ import annotations
@@ -14,12 +16,16 @@ from contextlib import contextmanager
 from sonic_bullet.files.atomic import cannot
 from sonic_bullet.records.errors import FileError, SonicBulletError, excerpt
 
-QUOTED, WHAT, REMEDY = 200, 120, 80  # characters that may be a file's own: in all; of what is wrong and of the remedy, where it would be more
+# characters that may be a file's own: in all; of what is wrong and of the remedy, where it would be more
+QUOTED, WHAT, REMEDY = 200, 120, 80
 
 
 @contextmanager
 def reading(path: str | os.PathLike[str], thing: str, kind: type[SonicBulletError], remedy: str) -> Iterator[None]:
-    """Raises FileError where the system cannot read ``path``, else ``kind``, naming the path. thing: what should be there, in words."""
+    """Raises FileError where the system cannot read ``path``, else ``kind``, naming the path.
+
+    thing: what should be there, in words.
+    """
     try:
         yield
     except SonicBulletError as error:
@@ -35,12 +41,25 @@ def reading(path: str | os.PathLike[str], thing: str, kind: type[SonicBulletErro
 
 
 def _with_path(error: SonicBulletError, path: str, kind: type[SonicBulletError]) -> SonicBulletError | None:
-    """The error as ``kind``, with the path and no more of the file than is allowed; None where it is all that already."""
-    before, named, after = error.what.partition(path) if path else (error.what, " ", "")  # every text has the empty name in it
+    """The error as ``kind``, with the path and no more of the file than is allowed;
+
+    None where it is all that already.
+    """
+    # every text has the empty name in it
+    before, named, after = error.what.partition(path) if path else (error.what, " ", "")
     if named and type(error) is kind and len(before) + len(after) + len(error.remedy) <= QUOTED:
         return None
     if not named:
         before, after = "", f": {error.what}"
     short = len(before) + len(after) <= WHAT or len(before) + len(after) + len(error.remedy) <= QUOTED
-    what = f"{before}{path}{after}" if short else f"{excerpt(before, WHAT // 2)}{path}{excerpt(after, WHAT // 2 if before else WHAT)}"
-    return kind(what, error.remedy if len(error.remedy) <= max(REMEDY, QUOTED - len(before) - len(after)) else excerpt(error.remedy, REMEDY))
+    what = (
+        f"{before}{path}{after}"
+        if short
+        else f"{excerpt(before, WHAT // 2)}{path}{excerpt(after, WHAT // 2 if before else WHAT)}"
+    )
+    return kind(
+        what,
+        error.remedy
+        if len(error.remedy) <= max(REMEDY, QUOTED - len(before) - len(after))
+        else excerpt(error.remedy, REMEDY),
+    )

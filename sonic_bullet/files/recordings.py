@@ -20,7 +20,8 @@ from sonic_bullet.records.coerce import as_path
 from sonic_bullet.records.errors import FileError
 
 READ_MIN_HZ, READ_MAX_HZ = 1000, 10_000_000  # from a slow accelerometer's to a fast vibrometer's
-MOST_SAMPLES, UNPACKED = 1 << 26, 64  # half a gibibyte as float64; or samples a byte of the file, which only packed silence passes
+# half a gibibyte as float64; or samples a byte of the file, which only packed silence passes
+MOST_SAMPLES, UNPACKED = 1 << 26, 64
 UNKNOWN_LENGTH = 1 << 62  # libsndfile's count for a stream that does not state its length, and more
 BLOCK_SAMPLES = 1 << 18
 UNBROKEN = "give an unbroken audio file"
@@ -29,7 +30,8 @@ UNBROKEN = "give an unbroken audio file"
 def read_audio(path: str | os.PathLike[str]) -> tuple[Array, int]:
     """Samples (channels, n) float64 in file units (pascals where written with full scale 1 Pa) and the rate in Hz.
 
-    Raises FileError where the file is missing, cut, no audio, of a rate that no recording has, or unpacks to more than memory is for.
+    Raises FileError where the file is missing, cut, no audio, of a rate that no recording has, or unpacks to more than
+    memory is for.
     """
     import soundfile
 
@@ -38,7 +40,8 @@ def read_audio(path: str | os.PathLike[str]) -> tuple[Array, int]:
         if not Path(path).is_file():
             raise FileError(f"cannot read {path}: no such file", "check the path")
     with reading(path, "audio file", FileError, UNBROKEN), open(path, "rb") as file:
-        try:  # by its descriptor: what it is stands in its bytes, and a name that ends in .raw would have libsndfile guess
+        # by its descriptor: what it is stands in its bytes, and a name that ends in .raw would have libsndfile guess
+        try:
             with _forward()(file.fileno(), "r", closefd=False) as sound:
                 return _samples(sound, path, os.fstat(file.fileno()).st_size), int(sound.samplerate)
         except soundfile.LibsndfileError as error:
@@ -60,7 +63,10 @@ def _forward() -> Any:
 def _samples(sound: Any, path: object, file_bytes: int) -> Array:
     """All samples (channels, n) of an open file. Raises FileError."""
     if not READ_MIN_HZ <= sound.samplerate <= READ_MAX_HZ:
-        raise FileError(f"cannot read {path}: sampled at {sound.samplerate} Hz", f"give a recording of {READ_MIN_HZ} to {READ_MAX_HZ} Hz")
+        raise FileError(
+            f"cannot read {path}: sampled at {sound.samplerate} Hz",
+            f"give a recording of {READ_MIN_HZ} to {READ_MAX_HZ} Hz",
+        )
     most = max(MOST_SAMPLES, UNPACKED * file_bytes)
     size = max(1, BLOCK_SAMPLES // sound.channels)
     blocks, frames = [], 0
@@ -68,7 +74,9 @@ def _samples(sound: Any, path: object, file_bytes: int) -> Array:
         block = sound.read(size, dtype="float64", always_2d=True)
         frames += len(block)
         if frames * sound.channels > most:
-            raise FileError(f"cannot read {path}: it unpacks to more than {most} samples", "cut out the part that matters")
+            raise FileError(
+                f"cannot read {path}: it unpacks to more than {most} samples", "cut out the part that matters"
+            )
         blocks.append(block)
         if len(block) < size:
             break

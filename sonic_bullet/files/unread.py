@@ -1,6 +1,7 @@
 """Fields of a JSON file that its typed form does not read: a name mistyped is said, not passed over.
 
-decoded JSON, msgspec.Struct -> one line for each field that no struct at that place has, with the nearest one that it has
+decoded JSON, msgspec.Struct -> one line for each field that no struct at that place has, with the nearest one that it
+has
 """
 
 from __future__ import annotations
@@ -18,7 +19,9 @@ QUOTED = 60  # characters of a name from a file
 
 
 def unread_fields(value: Any, form: type[msgspec.Struct], where: str) -> tuple[str, ...]:
-    """A line for each field of a decoded value that ``form`` and the structs inside it do not have, `MOST` at most and how many more."""
+    """A line for each field of a decoded value that ``form`` and the structs inside it do not have, `MOST` at most and
+    how many more.
+    """
     lines = list(_unread(value, msgspec.inspect.type_info(form), where))
     more = len(lines) - MOST
     return tuple(lines[:MOST] + ([f"{where}: {more} more fields are not known"] if more > 0 else []))

@@ -3,9 +3,9 @@
     nearest in a triangle by its Voronoi regions       [Ericson, Real-Time Collision Detection (2005), ch. 5.1.5]
     depth-first search of a binary tree of bounding boxes, nearer child first          [ibid., ch. 6.3]
 
-PyBullet collides a mesh as its convex hull, and a thin wall has two sides a hair apart: of the faces nearly as near as the
-nearest, one that looks the same way as the contact's normal is preferred. On an edge faces are equally near but for rounding: the one
-that looks most that way is taken, so that the answer does not hang on how the world is turned.
+PyBullet collides a mesh as its convex hull, and a thin wall has two sides a hair apart: of the faces nearly as near as
+the nearest, one that looks the same way as the contact's normal is preferred. On an edge faces are equally near but for
+rounding: the one that looks most that way is taken, so that the answer does not hang on how the world is turned.
 """
 
 from __future__ import annotations
@@ -19,8 +19,10 @@ from sonic_bullet.records import Array
 from sonic_bullet.records.errors import MeshError
 
 LEAF = 4
-# A face that looks the right way may be this much farther than the nearest: twice as far, plus a wall's thickness 2V/A, at
-# most this part of the surface's diagonal (a point on the lid of a bowl is far from both, one in a thin wall near both).
+# A face that looks the right way may be this much farther than the nearest: twice as far, plus a wall's thickness 2V/A,
+# at
+# most this part of the surface's diagonal (a point on the lid of a bowl is far from both, one in a thin wall near
+# both).
 WALL_PART = 0.03
 # Faces whose distances differ by less than this part of the surface's diagonal are equally near.
 TIE_PART = 1e-7
@@ -30,8 +32,9 @@ LOOKS = 1e-6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SurfaceIndex:
-    """A surface ready for `nearest`: corner_m (f, 3, 3) and normal (f, 3) in tree order, ``order`` (f,) the faces' own numbers,
-    low_m, high_m (k, 3) boxes of the nodes, child (k, 2): both children, or (−start−1, end) of a leaf. wall_m: see WALL_PART."""
+    """A surface ready for `nearest`: corner_m (f, 3, 3) and normal (f, 3) in tree order, ``order`` (f,) the faces' own
+    numbers, low_m, high_m (k, 3) boxes of the nodes, child (k, 2): both children, or (−start−1, end) of a leaf. wall_m:
+    see WALL_PART."""
 
     corner_m: Array
     normal: Array
@@ -50,25 +53,41 @@ def surface_index(vertex_m: Array, face: Array) -> SurfaceIndex:
     order, low, high, child = _grow(corner.min(axis=1), corner.max(axis=1), corner.mean(axis=1))
     vector = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     length = np.linalg.norm(vector, axis=1)
-    volume = abs(float(np.einsum("ij,ij->", corner[:, 0] - corner[0, 0], np.cross(corner[:, 1] - corner[0, 0], corner[:, 2] - corner[0, 0]))) / 6)
+    volume = abs(
+        float(
+            np.einsum(
+                "ij,ij->",
+                corner[:, 0] - corner[0, 0],
+                np.cross(corner[:, 1] - corner[0, 0], corner[:, 2] - corner[0, 0]),
+            )
+        )
+        / 6
+    )
     wall = min(4 * volume / max(float(length.sum()), 1e-300), WALL_PART * float(np.linalg.norm(high[0] - low[0])))
     normal = vector / np.where(length > 0, length, 1)[:, None]
-    return SurfaceIndex(np.ascontiguousarray(corner[order]), np.ascontiguousarray(normal[order]), order, low, high, child, wall)
+    return SurfaceIndex(
+        np.ascontiguousarray(corner[order]), np.ascontiguousarray(normal[order]), order, low, high, child, wall
+    )
 
 
 def nearest(index: SurfaceIndex, points_m: Array, normals: Array | None = None) -> tuple[Array, Array, Array]:
-    """Face (k,), barycentric coordinates (k, 3) and distance (k,) in m of the surface point nearest to each of points_m (k, 3).
+    """Face (k,), barycentric coordinates (k, 3) and distance (k,) in m of the surface point nearest to each of points_m
+    (k, 3).
 
-    normals (k, 3): the outward normal the surface should have there, or None; a face with normal·n > 0 is taken if it is at most
-    twice as far as the nearest one plus a wall's thickness.
+    normals (k, 3): the outward normal the surface should have there, or None; a face with normal·n > 0 is taken if it
+    is at most twice as far as the nearest one plus a wall's thickness.
     """
     points = np.ascontiguousarray(points_m, float).reshape(-1, 3)
     wanted = np.zeros_like(points) if normals is None else np.ascontiguousarray(normals, float).reshape(-1, 3)
-    face, barycentric, distance = _search(index.corner_m, index.normal, index.low_m, index.high_m, index.child, index.wall_m, points, wanted)
+    face, barycentric, distance = _search(
+        index.corner_m, index.normal, index.low_m, index.high_m, index.child, index.wall_m, points, wanted
+    )
     return index.order[face], barycentric, distance
 
 
-def closest_point(vertex_m: Array, face: Array, points: Array, normals: Array | None = None) -> tuple[Array, Array, Array]:
+def closest_point(
+    vertex_m: Array, face: Array, points: Array, normals: Array | None = None
+) -> tuple[Array, Array, Array]:
     """`nearest` on a surface given plainly: builds the tree for this one call."""
     return nearest(surface_index(vertex_m, face), points, normals)
 
@@ -156,7 +175,9 @@ def _box_gap(p: Array, low: Array, high: Array) -> float:
 
 
 @njit(nogil=True)
-def _search(corner: Array, normal: Array, low: Array, high: Array, child: Array, wall: float, points: Array, wanted: Array) -> tuple[Array, Array, Array]:
+def _search(
+    corner: Array, normal: Array, low: Array, high: Array, child: Array, wall: float, points: Array, wanted: Array
+) -> tuple[Array, Array, Array]:
     count = len(points)
     face, barycentric, distance = np.empty(count, np.int64), np.empty((count, 3)), np.empty(count)
     stack, gaps = np.empty(128, np.int64), np.empty(128)
@@ -164,7 +185,8 @@ def _search(corner: Array, normal: Array, low: Array, high: Array, child: Array,
     for k in range(count):
         p, n = points[k], wanted[k]
         any_face, any2 = 0, np.inf  # nearest of all
-        same_face, same, along, least = -1, np.inf, 0.0, np.inf  # of those that look along n: the chosen one, its distance, n·normal; the least distance
+        # of those that look along n: the chosen one, its distance, n·normal; the least distance
+        same_face, same, along, least = -1, np.inf, 0.0, np.inf
         ask = n[0] != 0 or n[1] != 0 or n[2] != 0
         top = 1
         stack[0], gaps[0] = 0, 0.0

@@ -13,8 +13,10 @@ import numpy as np
 from sonic_bullet.records import Array
 
 LARGEST_M, HEAVIEST_KG = 10.0, 202e3
-"""Of what is struck to sound: the largest bell ever cast, the Tsar Bell, is 6.6 m wide and weighs 202 t. A mesh in millimetres is a thousand times its size,
-so that all but what is under a centimetre passes the first, and a steel ball of 4 mm the second."""
+"""Of what is struck to sound: the largest bell ever cast, the Tsar Bell, is 6.6 m wide and weighs 202 t.
+
+A mesh in millimetres is a thousand times its size, so that all but what is under a centimetre passes the first, and a
+steel ball of 4 mm the second."""
 CREASE_RAD = np.deg2rad(30.0)
 
 
@@ -69,7 +71,8 @@ def welded(vertex_m: Array, face: Array) -> tuple[Array, Array]:
 def oversize(vertex_m: Array, mass_kg: float) -> str:
     """How large a body is that is larger than anything that is struck to sound, in words; "" for all others.
 
-    Most such bodies are meshes in millimetres, grounds or terrains: their modes are no mistake, but hardly what was meant.
+    Most such bodies are meshes in millimetres, grounds or terrains: their modes are no mistake, but hardly what was
+    meant.
     """
     long_m = float(np.ptp(vertex_m, axis=0).max()) if len(vertex_m) else 0.0
     if long_m <= LARGEST_M and mass_kg <= HEAVIEST_KG:
@@ -83,7 +86,10 @@ def _edges(face: Array) -> Array:
 
 
 def is_closed(face: Array) -> bool:
-    """Every edge is run through as often one way as the other: no hole, neighbours agree on the outside. ``welded`` first."""
+    """Every edge is run through as often one way as the other: no hole, neighbours agree on the outside.
+
+    ``welded`` first.
+    """
     edge = _edges(face)
     n = int(face.max()) + 1 if len(face) else 1
     forward = np.sort(edge[:, 0] * n + edge[:, 1])
@@ -105,19 +111,24 @@ def _smooth_neighbours(face: Array, normal: Array) -> tuple[Array, Array]:
 
 
 def corner_normals(vertex_m: Array, face: Array) -> Array:
-    """Unit normals (f, 3, 3) at the corners of each face, averaged by angle over the faces that join there without a crease."""
+    """Unit normals (f, 3, 3) at the corners of each face, averaged by angle over the faces that join there without a
+    crease.
+    """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
     normal = outward_normals(vertex_m, face)
     edge = _edges(face)
     one, two = _smooth_neighbours(face, normal)
-    # A directed edge 3i+k starts at corner 3i+k and ends at corner 3i+(k+1)%3; match the corners of both faces by vertex.
+    # A directed edge 3i+k starts at corner 3i+k and ends at corner 3i+(k+1)%3; match the corners of both faces by
+    # vertex.
     end = 3 * (np.arange(len(edge)) // 3) + (np.arange(len(edge)) + 1) % 3
     turned = edge[one, 0] == edge[two, 1]
     joins_a = np.concatenate([one, end[one]])
     joins_b = np.concatenate([np.where(turned, end[two], two), np.where(turned, two, end[two])])
-    _, label = connected_components(coo_array((np.ones(len(joins_a)), (joins_a, joins_b)), shape=(len(edge), len(edge))), directed=False)
+    _, label = connected_components(
+        coo_array((np.ones(len(joins_a)), (joins_a, joins_b)), shape=(len(edge), len(edge))), directed=False
+    )
     corner = vertex_m[face]
     to_next, to_last = np.roll(corner, -1, axis=1) - corner, np.roll(corner, 1, axis=1) - corner
     lengths = np.linalg.norm(to_next, axis=2) * np.linalg.norm(to_last, axis=2)
@@ -146,7 +157,8 @@ def face_curvature(vertex_m: Array, face: Array) -> Array:
     u, v = np.einsum("fkx,fx->fk", edge, first), np.einsum("fkx,fx->fk", edge, second)
     nu, nv = np.einsum("fkx,fx->fk", change, first), np.einsum("fkx,fx->fk", change, second)
     zero = np.zeros_like(u)
-    system = np.concatenate([np.stack([u, v, zero], axis=-1), np.stack([zero, u, v], axis=-1)], axis=1)  # (f, 6, 3): e f g of II
+    # (f, 6, 3): e f g of II
+    system = np.concatenate([np.stack([u, v, zero], axis=-1), np.stack([zero, u, v], axis=-1)], axis=1)
     right = np.concatenate([nu, nv], axis=1)
     good = face_areas_m2(unique, face) > 1e-6 * (edge**2).sum(axis=(1, 2))
     curvature = np.zeros(len(face))

@@ -1,4 +1,6 @@
-"""listener: what a simulator tells, as values. `world` says what that is; PyBullet, in a folder of its own, is the one there is.
+"""listener: what a simulator tells, as values.
+
+`world` says what that is; PyBullet, in a folder of its own, is the one there is.
 
 Everything is imported when first used.
 
@@ -13,7 +15,13 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from sonic_bullet.listener.pybullet.clients import direct_client, disconnect, links_called, links_with_shapes, open_world
+    from sonic_bullet.listener.pybullet.clients import (
+        direct_client,
+        disconnect,
+        links_called,
+        links_with_shapes,
+        open_world,
+    )
     from sonic_bullet.listener.pybullet.doctor import Finding, diagnose_world, keep_restitution
     from sonic_bullet.listener.pybullet.pybullet_world import PyBulletWorld
     from sonic_bullet.listener.pybullet.script import run_script

@@ -26,7 +26,8 @@ NO_NUMBER = "a pose or speed that is not a number, or beyond 1e9"
 class Roster:
     """Who is in the world. code (n,) = body · LINK_SPAN + link + 1, ascending; static (n,): mass 0.
 
-    count: of all bodies there when it was made, also those that it leaves out. soft: ids of soft bodies, which it leaves out.
+    count: of all bodies there when it was made, also those that it leaves out. soft: ids of soft bodies, which it
+    leaves out.
     """
 
     bodies: tuple[tuple[int, int, bool], ...]
@@ -40,8 +41,8 @@ class Roster:
 class Motion:
     """Poses and twists of a roster at one instant.
 
-    position_m (n, 3), quaternion_xyzw (n, 4), velocity_m_s (n, 3) of the centre of mass, spin_rad_s (n, 3): world frame.
-    broken: ids of the bodies of which a number is NaN or `BEYOND`, as read.
+    position_m (n, 3), quaternion_xyzw (n, 4), velocity_m_s (n, 3) of the centre of mass, spin_rad_s (n, 3): world
+    frame. broken: ids of the bodies of which a number is NaN or `BEYOND`, as read.
     """
 
     roster: Roster
@@ -56,14 +57,18 @@ class Motion:
         return self.position_m, self.quaternion_xyzw, self.velocity_m_s, self.spin_rad_s
 
     def would_move(self, dt_s: float) -> bool:
-        """Whether a step must change some number: a body may rest on a fixed point of Bullet's arithmetic and keep every bit."""
+        """Whether a step must change some number: a body may rest on a fixed point of Bullet's arithmetic and keep
+        every bit.
+        """
         steps = self.position_m + dt_s * self.velocity_m_s != self.position_m
         return bool(steps.any() or (np.abs(self.spin_rad_s) * dt_s > 1e-12).any())
 
 
 def same_motion(first: Motion, second: Motion) -> bool:
     """Whether every number is the same, bit for bit."""
-    return first.roster.bodies == second.roster.bodies and all(np.array_equal(a, b) for a, b in zip(first.table, second.table, strict=True))
+    return first.roster.bodies == second.roster.bodies and all(
+        np.array_equal(a, b) for a, b in zip(first.table, second.table, strict=True)
+    )
 
 
 def encode(body: Array | int, link: Array | int) -> Array:
@@ -92,9 +97,14 @@ def rows_of(roster: Roster, code: Array) -> Array:
 def jumped(earlier: Motion, later: Motion, dt_s: float) -> Array:
     """(n,) of `later`: moved farther in one step than both speeds together explain, so by hand.
 
-    What has mass 0 may be driven by resetting its pose each step: up to DRIVEN_SPEED_M_S that is motion, beyond it a jump.
+    What has mass 0 may be driven by resetting its pose each step: up to DRIVEN_SPEED_M_S that is motion, beyond it a
+    jump.
     """
-    old = np.arange(len(later.roster.code)) if earlier.roster is later.roster else rows_of(earlier.roster, later.roster.code)
+    old = (
+        np.arange(len(later.roster.code))
+        if earlier.roster is later.roster
+        else rows_of(earlier.roster, later.roster.code)
+    )
     return np.asarray(jumps(earlier.table, later.table, old, later.roster.static, dt_s, DRIVEN_SPEED_M_S, JUMP_FLOOR_M))
 
 
@@ -104,7 +114,8 @@ def with_driven_twists(earlier: Motion, later: Motion, dt_s: float) -> Motion:
         return later
     static = np.flatnonzero(later.roster.static)
     driven = static[
-        (later.position_m[static] != earlier.position_m[static]).any(axis=1) | (later.quaternion_xyzw[static] != earlier.quaternion_xyzw[static]).any(axis=1)
+        (later.position_m[static] != earlier.position_m[static]).any(axis=1)
+        | (later.quaternion_xyzw[static] != earlier.quaternion_xyzw[static]).any(axis=1)
     ]
     if not len(driven):
         return later

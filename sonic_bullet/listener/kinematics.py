@@ -28,7 +28,9 @@ def turn(qx: float, qy: float, qz: float, qw: float, x: float, y: float, z: floa
 
 @njit(fastmath=False, nogil=True)
 def pose_after(table: Table, row: int, elapsed: float, position: Array, quaternion: Array) -> None:
-    """Position (3,) and orientation (4,) of a body `elapsed` seconds into the step, by its twist before it, written in place."""
+    """Position (3,) and orientation (4,) of a body `elapsed` seconds into the step, by its twist before it, written in
+    place.
+    """
     x, q, v, w = table[0][row], table[1][row], table[2][row], table[3][row]
     for i in range(3):
         position[i] = x[i] + elapsed * v[i]
@@ -45,7 +47,9 @@ def pose_after(table: Table, row: int, elapsed: float, position: Array, quaterni
 
 
 @njit(fastmath=False, nogil=True)
-def relative_motion(point_a: Array, point_b: Array, normal: Array, table: Table, row_a: Array, row_b: Array) -> tuple[Array, Array]:
+def relative_motion(
+    point_a: Array, point_b: Array, normal: Array, table: Table, row_a: Array, row_b: Array
+) -> tuple[Array, Array]:
     """slip (k, 3) and approach (k,) in m/s at points (k, 3) of the bodies in rows row_a, row_b (k,)."""
     position, _, velocity, spin = table
     slip, approach = np.empty((len(normal), 3)), np.empty(len(normal))
@@ -70,13 +74,18 @@ def impulses(dt: float, normal: Array, tangent_1: Array, tangent_2: Array, force
     result = np.empty_like(normal)
     for i in range(len(normal)):
         for x in range(3):
-            result[i, x] = dt * (force[0, i] * normal[i, x] + force[1, i] * tangent_1[i, x] + force[2, i] * tangent_2[i, x])
+            result[i, x] = dt * (
+                force[0, i] * normal[i, x] + force[1, i] * tangent_1[i, x] + force[2, i] * tangent_2[i, x]
+            )
     return result
 
 
 @njit(fastmath=False, nogil=True)
 def jumps(earlier: Table, later: Table, old: Array, static: Array, dt: float, driven: float, floor: float) -> Array:
-    """(n,) of `later`: farther from its row `old` (n,) of `earlier` than 1.5 × both speeds (static: `driven`) · dt + floor; never where old < 0."""
+    """(n,) of `later`: farther from its row `old` (n,) of `earlier` than 1.5 × both speeds (static:
+
+    `driven`) · dt + floor; never where old < 0.
+    """
     result = np.zeros(len(old), np.bool_)
     for i in range(len(old)):
         j = old[i]

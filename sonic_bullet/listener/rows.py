@@ -20,7 +20,9 @@ SPAWN_DEPTH_M = 1e-4
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Meetings:
-    """Touches that count, with rows row_a, row_b (k,) of the motion and slip (k, 3), approach (k,) in m/s before the step."""
+    """Touches that count, with rows row_a, row_b (k,) of the motion and slip (k, 3), approach (k,) in m/s before the
+    step.
+    """
 
     touches: Touches
     row_a: Array
@@ -30,18 +32,23 @@ class Meetings:
 
     def kept(self, mask: Array) -> Meetings:
         """Only the touches where mask (k,) is True."""
-        return Meetings(self.touches.kept(mask), self.row_a[mask], self.row_b[mask], self.slip_m_s[mask], self.approach_m_s[mask])
+        return Meetings(
+            self.touches.kept(mask), self.row_a[mask], self.row_b[mask], self.slip_m_s[mask], self.approach_m_s[mask]
+        )
 
 
 def meetings(touches: Touches, past: Touches | None, start: Start, dt_s: float) -> Meetings:
-    """Touches without those asleep, moved by hand, or of a body in its first step and deeper inside its partner than its speed explains.
+    """Touches without those asleep, moved by hand, or of a body in its first step and deeper inside its partner than
+    its speed explains.
 
     past: the touches of the step before. Raises SceneError for a touch of a body that the motion does not hold.
     """
     motion = start.motion
     row_a, row_b = rows_of(motion.roster, touches.code_a), rows_of(motion.roster, touches.code_b)
     if len(touches) and min(row_a.min(), row_b.min()) < 0:
-        raise SceneError("a contact names a body that is not in the world", "step the simulation once before listening on")
+        raise SceneError(
+            "a contact names a body that is not in the world", "step the simulation once before listening on"
+        )
     slip, approach = relative_motion(touches.point_a_m, touches.point_b_m, touches.normal, motion.table, row_a, row_b)
     drop = _asleep(touches, past, motion, row_a, row_b)
     if start.moved.any():
@@ -67,11 +74,16 @@ def _asleep(touches: Touches, past: Touches | None, motion: Motion, row_a: Array
 
 
 def _fingerprints(touches: Touches, rows: Array) -> list[bytes]:
-    columns = np.concatenate([touches.point_a_m[rows], touches.impulse_n_s[rows], touches.code_a[rows, None], touches.code_b[rows, None]], axis=1)
+    columns = np.concatenate(
+        [touches.point_a_m[rows], touches.impulse_n_s[rows], touches.code_a[rows, None], touches.code_b[rows, None]],
+        axis=1,
+    )
     return [row.tobytes() for row in columns]
 
 
-def contact_rows(meeting: Meetings, a: Array, b: Array, motion: Motion, time_s: float, traces: tuple[Trace, ...]) -> tuple[Contacts, tuple[Trace, ...]]:
+def contact_rows(
+    meeting: Meetings, a: Array, b: Array, motion: Motion, time_s: float, traces: tuple[Trace, ...]
+) -> tuple[Contacts, tuple[Trace, ...]]:
     """Contacts of the bodies a, b (k,) (indices), and the traces that the next step will look for them in."""
     touches, slip = meeting.touches, meeting.slip_m_s
     pair = a.astype(np.int64) << 32 | b
@@ -90,5 +102,7 @@ def contact_rows(meeting: Meetings, a: Array, b: Array, motion: Motion, time_s: 
         meeting.row_b,
     )
     gap = touches.gap_m + np.maximum(meeting.approach_m_s, 0) * touches.elapsed_s
-    contacts = Contacts(a, b, rows[:, 1:4], rows[:, 4:7], touches.normal, touches.impulse_n_s, slip, speed, meeting.approach_m_s, gap)
+    contacts = Contacts(
+        a, b, rows[:, 1:4], rows[:, 4:7], touches.normal, touches.impulse_n_s, slip, speed, meeting.approach_m_s, gap
+    )
     return contacts, remembered(traces, pair, rows)

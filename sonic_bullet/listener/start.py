@@ -1,7 +1,7 @@
 """Poses and twists at the start of a step, and who was moved by hand or is new.
 
-Hooked, they were read before the step. Otherwise those left by the step before hold, but not for bodies that are new or were
-moved since: there the simulator's own step is taken back (`Undo`).
+Hooked, they were read before the step. Otherwise those left by the step before hold, but not for bodies that are new or
+were moved since: there the simulator's own step is taken back (`Undo`).
 """
 
 from __future__ import annotations
@@ -16,12 +16,17 @@ from sonic_bullet.listener.polling import Touches
 from sonic_bullet.records import Array
 
 Undo = Callable[[Motion, Array, Touches, float], Motion]
-"""(motion after the step, rows (n,) to take back, the step's contacts, its length) -> the motion one step earlier, right in those rows."""
+"""(motion after the step, rows (n,) to take back, the step's contacts, its length) -> the motion one step earlier,
+right in those rows.
+"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Start:
-    """motion: at the start of the step. moved (n,): set elsewhere by hand since the step before. born (n,): in its first step."""
+    """motion: at the start of the step.
+
+    moved (n,): set elsewhere by hand since the step before. born (n,): in its first step.
+    """
 
     motion: Motion
     moved: Array
@@ -29,10 +34,15 @@ class Start:
 
 
 def hooked_start(past: Motion | None, now: Motion, by_hand: Collection[int], dt_s: float) -> Start:
-    """From the motion read before this step and the one read before the last (None: no step yet); by_hand: bodies known to be moved."""
+    """From the motion read before this step and the one read before the last (None: no step yet);
+
+    by_hand: bodies known to be moved.
+    """
     if past is None:
         return Start(now, np.zeros(len(now.roster.code), bool), np.ones(len(now.roster.code), bool))
-    born = np.zeros(len(now.roster.code), bool) if past.roster is now.roster else rows_of(past.roster, now.roster.code) < 0
+    born = (
+        np.zeros(len(now.roster.code), bool) if past.roster is now.roster else rows_of(past.roster, now.roster.code) < 0
+    )
     moved = jumped(past, now, dt_s)
     if by_hand:
         moved |= np.isin(now.roster.code // LINK_SPAN, list(by_hand)) & ~born & ~now.roster.static
@@ -40,7 +50,9 @@ def hooked_start(past: Motion | None, now: Motion, by_hand: Collection[int], dt_
 
 
 def polled_start(past: Motion, now: Motion, touches: Touches, dt_s: float, *, undo: Undo, first: bool) -> Start:
-    """From the motions read after the last step and after this one. What stands still by mass 0 stands where it stands now.
+    """From the motions read after the last step and after this one.
+
+    What stands still by mass 0 stands where it stands now.
 
     undo: takes a step back where nothing was read before it.
     """

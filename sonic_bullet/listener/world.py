@@ -1,4 +1,6 @@
-"""What a simulator must tell a listener. PyBullet is one (listener/pybullet/), a contact log played back is another (tests).
+"""What a simulator must tell a listener.
+
+PyBullet is one (listener/pybullet/), a contact log played back is another (tests).
 
     the simulator steps -> after_step() -> Step (records.contacts)
 
@@ -62,14 +64,20 @@ class World(ABC):
         model: ModalModel | None = None,
         shapes: Sequence[Shape] = (),
     ) -> Body:
-        """Make a link known with what it is made of; its record, which `bodies` holds from now on. Raises SceneError."""
+        """Make a link known with what it is made of; its record, which `bodies` holds from now on.
+
+        Raises SceneError.
+        """
 
     @abstractmethod
     def after_step(self) -> Step:
         """The record of the step just made. Raises SceneError."""
 
     def listen(self, after: Callable[[], object]) -> bool:
-        """Call ``after`` after every step from now on, if the simulator can; whether it does. Else somebody calls `Listener.step`."""
+        """Call ``after`` after every step from now on, if the simulator can; whether it does.
+
+        Else somebody calls `Listener.step`.
+        """
         return False
 
     @abstractmethod

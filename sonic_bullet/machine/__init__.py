@@ -1,1 +1,3 @@
-"""What the machine under us asks for: private folders, locked files that are not finished, compiled code, a terminal's line."""
+"""What the machine under us asks for: private folders, locked files that are not finished, compiled code, a terminal's
+line.
+"""

@@ -1,9 +1,11 @@
-"""A cache for one numba kernel in a folder of this user's own; it stands on inner parts of numba, and `sonic_bullet.machine.compiled` does without where they moved.
+"""A cache for one numba kernel in a folder of this user's own; it stands on inner parts of numba, and
+`sonic_bullet.machine.compiled` does without where they moved.
 
     index (signature -> file) | machine code, each: numba's bytes + their sha256, written beside and replaced
 
-numba's own reader believes what it finds, and unpickles it. Here a file is opened only where it is a regular one of this user, and read only
-where the digest behind it is right; anything else is a miss, and so is any error while it is loaded or kept.
+numba's own reader believes what it finds, and unpickles it. Here a file is opened only where it is a regular one of
+this user, and read only where the digest behind it is right; anything else is a miss, and so is any error while it is
+loaded or kept.
 """
 
 from __future__ import annotations
@@ -37,7 +39,9 @@ def _as_written(path: str) -> bool:
 
 
 class KeptFiles(IndexDataCacheFile):  # type: ignore[misc]
-    """numba's files, each with its digest behind it, where numba's reader, which stops at the end of its data, does not look."""
+    """numba's files, each with its digest behind it, where numba's reader, which stops at the end of its data, does not
+    look.
+    """
 
     def _load_index(self) -> Any:
         try:
@@ -113,7 +117,9 @@ class KernelCache(FunctionCache):  # type: ignore[misc]
         locator = self._impl.locator
         if not isinstance(locator, _Locator):  # NUMBA_CACHE_LOCATOR_CLASSES names another, that is not private
             raise TypeError("another locator")
-        self._cache_file: Any = KeptFiles(locator.get_cache_path(), self._impl.filename_base, locator.get_source_stamp())
+        self._cache_file: Any = KeptFiles(
+            locator.get_cache_path(), self._impl.filename_base, locator.get_source_stamp()
+        )
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """The kept code for a signature, None for a miss."""

@@ -1,11 +1,13 @@
-"""A file that is being written: under a name of its own, locked, and swept by the next writer where its own writer was killed.
+"""A file that is being written: under a name of its own, locked, and swept by the next writer where its own writer was
+killed.
 
     sweep the folder -> create (O_EXCL) -> flock -> still linked? -> write -> fsync -> os.replace -> NAME
 
-The name is the same length whatever it will become, so a NAME as long as the file system takes is written too. The lock is the file's own
-(flock(2)): it ends with the process, however that ends. Whoever writes into a folder first removes what is left of killed runs: regular
-files of exactly this pattern, of this user, whose lock is free. Creating and sweeping do not race: the sweeper removes a file only while it
-holds its lock, and a writer that then finds its file locked or without a name takes another. Where a file system knows no locks nothing is swept.
+The name is the same length whatever it will become, so a NAME as long as the file system takes is written too. The lock
+is the file's own (flock(2)): it ends with the process, however that ends. Whoever writes into a folder first removes
+what is left of killed runs: regular files of exactly this pattern, of this user, whose lock is free. Creating and
+sweeping do not race: the sweeper removes a file only while it holds its lock, and a writer that then finds its file
+locked or without a name takes another. Where a file system knows no locks nothing is swept.
 """
 
 from __future__ import annotations
@@ -28,7 +30,9 @@ OPEN_FLAGS = os.O_RDWR | getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_NOFOLLOW",
 
 
 class PartialFile:
-    """A new, empty, locked file in ``folder``. `replace` gives it its name, `close` removes it where it has none. Raises OSError.
+    """A new, empty, locked file in ``folder``.
+
+    `replace` gives it its name, `close` removes it where it has none. Raises OSError.
 
     fd: open for reading and writing, for as long as this object is.
     """
@@ -77,7 +81,9 @@ class PartialFile:
 
 
 def sweep(folder: Path) -> None:
-    """Remove what killed runs of this user left unfinished in ``folder``; a file whose lock is held stays, and so does everything else."""
+    """Remove what killed runs of this user left unfinished in ``folder``; a file whose lock is held stays, and so does
+    everything else.
+    """
     if fcntl is None:
         return
     with suppress(OSError), os.scandir(folder) as entries:

@@ -36,5 +36,8 @@ def status(label: str) -> Iterator[Say]:
     from rich.console import Console
     from rich.markup import escape
 
-    with Console(stderr=True).status(escape(label)) as line, shown_by(lambda text: line.update(escape(f"{label}: {text}"))) as say:
+    with (
+        Console(stderr=True).status(escape(label)) as line,
+        shown_by(lambda text: line.update(escape(f"{label}: {text}"))) as say,
+    ):
         yield say

@@ -1,9 +1,11 @@
 """The user's own folder for what is kept between runs: nobody else can put anything into it.
 
-    platformdirs' cache folder / sonic_bullet, mode 0700, owner checked -> "modal" (computed models), "compiled" (machine code)
+    platformdirs' cache folder / sonic_bullet, mode 0700, owner checked -> "modal" (computed models), "compiled"
+        (machine code)
 
-Machine code read from a file is run, and a computed model is believed: both come from a folder of this user that no other may write to.
-Without a home, on a disk that takes nothing, or where the folder belongs to somebody else there is none, and everything is computed anew.
+Machine code read from a file is run, and a computed model is believed: both come from a folder of this user that no
+other may write to. Without a home, on a disk that takes nothing, or where the folder belongs to somebody else there is
+none, and everything is computed anew.
 """
 
 from __future__ import annotations
@@ -24,11 +26,15 @@ def _start() -> Path:
 
 
 START = _start()
-"""Where the process was when this module came: a scene may change the folder, and a relative path of the environment means this one."""
+"""Where the process was when this module came: a scene may change the folder, and a relative path of the environment
+means this one.
+"""
 
 
 def cache_folder(name: str) -> Path | None:
-    """The folder ``name`` in the user's cache folder, made where it is missing, or None where there can be none of this user's own."""
+    """The folder ``name`` in the user's cache folder, made where it is missing, or None where there can be none of this
+    user's own.
+    """
     root = _root()
     return None if root is None else private_folder(root / name)
 

@@ -2,10 +2,11 @@
 
     sha256(numbers, options, source text that computes it) -> KEY.npz in SONIC_BULLET_CACHE, or the user's cache folder
 
-A file is written beside its name and moved there whole; a cut, foreign or unreadable file is a miss, and so is what is no file, one whose
-content is not what its SHA-256 says, or not what was asked for: names, dtypes, shapes, finite numbers, indices. A miss is computed anew and
-takes its place. Nothing is pickled. The user's cache folder is private (`sonic_bullet.machine.user_folder`); without a home nothing is kept. Against
-an owner of the folder who forges the digest too there is no defence, and none is meant.
+A file is written beside its name and moved there whole; a cut, foreign or unreadable file is a miss, and so is what is
+no file, one whose content is not what its SHA-256 says, or not what was asked for: names, dtypes, shapes, finite
+numbers, indices. A miss is computed anew and takes its place. Nothing is pickled. The user's cache folder is private
+(`sonic_bullet.machine.user_folder`); without a home nothing is kept. Against an owner of the folder who forges the
+digest too there is no defence, and none is meant.
 """
 
 from __future__ import annotations
@@ -38,7 +39,8 @@ class _Header(msgspec.Struct):
 
 
 class Kept(NamedTuple):
-    """What an array of an entry must be. kind: "f8", "f4", "b1", or "i" for whole numbers; shape: lengths, a name for one that arrays share, None for any.
+    """What an array of an entry must be. kind: "f8", "f4", "b1", or "i" for whole numbers; shape: lengths, a name for
+    one that arrays share, None for any.
 
     below: the name of a length; the numbers are indices into it.
     """
@@ -52,7 +54,10 @@ Layout = Mapping[str, Kept]
 
 
 def folder(place: Place) -> Path | None:
-    """The cache's folder: ``place``, or for "default" SONIC_BULLET_CACHE or the user's cache folder; None for no cache."""
+    """The cache's folder:
+
+    ``place``, or for "default" SONIC_BULLET_CACHE or the user's cache folder; None for no cache.
+    """
     if place is None:
         return None
     if place != "default":
@@ -80,7 +85,10 @@ def _code() -> bytes:
 
 
 def key(kind: str, *parts: Array | str | float | int | None, code: bytes | None = None) -> str:
-    """Name of a result: ``kind`` and a digest of the parts (arrays by dtype, shape and bytes) and of the code, by default this room's."""
+    """Name of a result:
+
+    ``kind`` and a digest of the parts (arrays by dtype, shape and bytes) and of the code, by default this room's.
+    """
     digest = hashlib.sha256(_code() if code is None else code)
     for part in parts:
         if isinstance(part, np.ndarray):
@@ -92,7 +100,9 @@ def key(kind: str, *parts: Array | str | float | int | None, code: bytes | None 
 
 
 def load(place: Place, name: str, layout: Layout) -> tuple[dict[str, Array], str] | None:
-    """Arrays and note kept under ``name``, or None where there is no such entry, or not the one that was kept, or none of that layout."""
+    """Arrays and note kept under ``name``, or None where there is no such entry, or not the one that was kept, or none
+    of that layout.
+    """
     from sonic_bullet.files.container import read_container
 
     where = folder(place)
@@ -122,7 +132,9 @@ def _fits(arrays: Mapping[str, Array], layout: Layout) -> bool:
     length: dict[str, int] = {}
     for name, kept in layout.items():
         array = arrays[name]
-        if array.ndim != len(kept.shape) or (array.dtype.kind != "i" if kept.kind == "i" else array.dtype != np.dtype(kept.kind)):
+        if array.ndim != len(kept.shape) or (
+            array.dtype.kind != "i" if kept.kind == "i" else array.dtype != np.dtype(kept.kind)
+        ):
             return False
         for want, have in zip(kept.shape, array.shape, strict=True):
             if (length.setdefault(want, have) if isinstance(want, str) else want) not in (have, None):

@@ -1,8 +1,12 @@
-"""Yardsticks: natural frequencies of bodies simple enough for pencil and paper. All isotropic, free, SI units, Hz ascending.
+"""Yardsticks: natural frequencies of bodies simple enough for pencil and paper.
+
+All isotropic, free, SI units, Hz ascending.
 
 beam    Timoshenko: EI w'''' + ρA ẅ − ρI(1 + E/κG) ẅ'' + ρ²I/(κG) w⁗ = 0     [Timoshenko 1921, eq. 11; ends: Huang 1961]
-plate   f = λ/(2πa²) √(D/ρh), λ by Ritz' method                                [Leissa 1969, NASA SP-160, table 4.64; here converged]
-sphere  torsional and spheroidal multiplets                                    [Lamb 1882; Eringen & Suhubi 1975, ch. 8.13-8.14]
+plate   f = λ/(2πa²) √(D/ρh), λ by Ritz' method
+    [Leissa 1969, NASA SP-160, table 4.64; here converged]
+sphere  torsional and spheroidal multiplets
+    [Lamb 1882; Eringen & Suhubi 1975, ch. 8.13-8.14]
 """
 
 from __future__ import annotations
@@ -16,11 +20,13 @@ from sonic_bullet.records.errors import ModalError
 FREE_SQUARE_PLATE = (13.468, 19.596, 24.270, 34.801, 34.801, 61.093, 61.093, 63.69, 69.27, 77.17)
 
 
-def bar_bending_hz(length_m: float, width_m: float, depth_m: float, youngs_pa: float, poisson: float, density_kg_m3: float, count: int) -> Array:
+def bar_bending_hz(
+    length_m: float, width_m: float, depth_m: float, youngs_pa: float, poisson: float, density_kg_m3: float, count: int
+) -> Array:
     """Bending frequencies (count,) of a free rectangular Timoshenko bar that bends along depth_m.
 
-    κ = 10(1+ν)/(12+11ν) [Cowper 1966]. Solved exactly: a sign change of the free ends' determinant for each mode. Valid below
-    the shear cutoff, √(κGA/ρI)/2π. Raises ModalError where count reaches beyond it.
+    κ = 10(1+ν)/(12+11ν) [Cowper 1966]. Solved exactly: a sign change of the free ends' determinant for each mode. Valid
+    below the shear cutoff, √(κGA/ρI)/2π. Raises ModalError where count reaches beyond it.
     """
     from scipy.optimize import brentq
 
@@ -50,15 +56,22 @@ def bar_bending_hz(length_m: float, width_m: float, depth_m: float, youngs_pa: f
     return np.asarray(np.array(roots) / (2 * np.pi))
 
 
-def bar_longitudinal_hz(length_m: float, width_m: float, depth_m: float, youngs_pa: float, poisson: float, density_kg_m3: float, count: int) -> Array:
+def bar_longitudinal_hz(
+    length_m: float, width_m: float, depth_m: float, youngs_pa: float, poisson: float, density_kg_m3: float, count: int
+) -> Array:
     """Longitudinal frequencies (count,) n c/2L with Rayleigh's correction for lateral inertia [Rayleigh 1894, § 157]."""
     k = np.arange(1, count + 1) * np.pi / length_m
     polar = (width_m**2 + depth_m**2) / 12
     return np.asarray(k * np.sqrt(youngs_pa / density_kg_m3) / (2 * np.pi * np.sqrt(1 + poisson**2 * polar * k**2)))
 
 
-def square_bar_torsion_hz(length_m: float, side_m: float, youngs_pa: float, poisson: float, density_kg_m3: float, count: int) -> Array:
-    """Torsional frequencies (count,) n/2L √(GJ/ρI_p) of a square bar, J = 0.140577 a⁴ [Timoshenko & Goodier 1970, art. 109]."""
+def square_bar_torsion_hz(
+    length_m: float, side_m: float, youngs_pa: float, poisson: float, density_kg_m3: float, count: int
+) -> Array:
+    """Torsional frequencies (count,) n/2L √(GJ/ρI_p) of a square bar, J = 0.140577 a⁴ [Timoshenko & Goodier 1970, art.
+
+    109].
+    """
     speed = np.sqrt(youngs_pa / (2 * (1 + poisson)) * 0.1405770 * 6 / density_kg_m3)
     return np.asarray(np.arange(1, count + 1) * speed / (2 * length_m))
 
@@ -70,7 +83,9 @@ def free_square_plate_hz(side_m: float, thickness_m: float, youngs_pa: float, de
     return hz
 
 
-def sphere_multiplets_hz(radius_m: float, youngs_pa: float, poisson: float, density_kg_m3: float, count: int) -> list[tuple[float, int, str]]:
+def sphere_multiplets_hz(
+    radius_m: float, youngs_pa: float, poisson: float, density_kg_m3: float, count: int
+) -> list[tuple[float, int, str]]:
     """First multiplets of a free ball: (Hz, how many modes = 2l+1, name such as "S2" or "T2"), ascending.
 
     With η = ωa/c_s, ξ = ηc_s/c_p, j the spherical Bessel functions:
@@ -88,7 +103,12 @@ def sphere_multiplets_hz(radius_m: float, youngs_pa: float, poisson: float, dens
 
     def spheroidal(eta: Array, order: int) -> Array:
         xi = eta * ratio
-        jp, jp1, js, js1 = spherical_jn(order, xi), spherical_jn(order + 1, xi), spherical_jn(order, eta), spherical_jn(order + 1, eta)
+        jp, jp1, js, js1 = (
+            spherical_jn(order, xi),
+            spherical_jn(order + 1, xi),
+            spherical_jn(order, eta),
+            spherical_jn(order + 1, eta),
+        )
         n, n1 = order, order * (order + 1)
         # tractions σ_rr, σ_rθ times r²/2G at r = a
         rr_p, rr_s = (n * n - n - eta**2 / 2) * jp + 2 * xi * jp1, n1 * ((n - 1) * js - eta * js1)

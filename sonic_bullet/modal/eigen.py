@@ -1,11 +1,13 @@
 """Modes of a free or clamped body: K u = λ M u by shift, invert and block Lanczos.
 
-    A = (K − σM)⁻¹ M,  A u = θ u,  λ = σ + 1/θ,  σ < 0, so that K − σM is positive definite and the rigid modes (λ = 0) do no
+    A = (K − σM)⁻¹ M,  A u = θ u,  λ = σ + 1/θ,
+        σ < 0, so that K − σM is positive definite and the rigid modes (λ = 0) do no
     harm                                                                          [Ericsson & Ruhe 1980, eq. 1.3-1.5]
     A V_j = V_{j-1} B_jᵀ + V_j A_j + V_{j+1} B_{j+1},  VᵀMV = 1                   [Grimes, Lewis, Simon 1994, eq. 3.1]
 
-The basis is kept orthogonal in full, so that degenerate modes of a symmetric body are found as such, and grows until the last mode asked for
-has converged: no restart. The factor is SuperLU's in symmetric mode; the start block is seeded: same body, same bits.
+The basis is kept orthogonal in full, so that degenerate modes of a symmetric body are found as such, and grows until
+the last mode asked for has converged: no restart. The factor is SuperLU's in symmetric mode; the start block is seeded:
+same body, same bits.
 """
 
 from __future__ import annotations
@@ -26,7 +28,10 @@ RIGID_TOLERANCE = 1e-6  # of the first elastic λ
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Modes:
-    """lambda_per_s2 (m,) ascending, elastic only; vector (dof, m) with UᵀMU = 1; rigid_per_s2 (r,) the rigid modes' own."""
+    """lambda_per_s2 (m,) ascending, elastic only;
+
+    vector (dof, m) with UᵀMU = 1; rigid_per_s2 (r,) the rigid modes' own.
+    """
 
     lambda_per_s2: Array
     vector: Array
@@ -34,13 +39,17 @@ class Modes:
 
 
 def factorised(matrix: Any) -> Any:
-    """SuperLU factor of a symmetric positive definite matrix in the order it comes in (ordering.py), pivots on the diagonal."""
+    """SuperLU factor of a symmetric positive definite matrix in the order it comes in (ordering.py), pivots on the
+    diagonal.
+    """
     from scipy.sparse.linalg import splu
 
     try:
         return splu(matrix.tocsc(), permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
     except (RuntimeError, MemoryError) as error:
-        raise ModalError(f"stiffness of {matrix.shape[0]} unknowns cannot be factorised ({error})", "give a simpler mesh") from error
+        raise ModalError(
+            f"stiffness of {matrix.shape[0]} unknowns cannot be factorised ({error})", "give a simpler mesh"
+        ) from error
 
 
 def _orthonormal(block: Array, mass: Any) -> tuple[Array, Array, Array]:
@@ -59,7 +68,14 @@ def _orthonormal(block: Array, mass: Any) -> tuple[Array, Array, Array]:
 
 
 def solve(
-    stiffness: Any, mass: Any, shift: float, *, rigid: int, enough: Callable[[Array], bool], most: int, say: Callable[[str], None] | None = None
+    stiffness: Any,
+    mass: Any,
+    shift: float,
+    *,
+    rigid: int,
+    enough: Callable[[Array], bool],
+    most: int,
+    say: Callable[[str], None] | None = None,
 ) -> Modes:
     """Lowest elastic modes until ``enough(their eigenvalues)``, at most ``most`` of them; scipy sparse (n, n) both.
 
@@ -105,5 +121,8 @@ def _checked(value: Array, vector: Array, rigid: int) -> Modes:
     elastic = value[rigid:]
     if elastic[0] <= 0 or (rigid and np.abs(value[:rigid]).max() > RIGID_TOLERANCE * elastic[0]):
         shown = ", ".join(f"{v:.3g}" for v in value[: rigid + 2])
-        raise ModalError(f"body has not {rigid} rigid modes: eigenvalues start {shown}", "its parts must hang together: repair the mesh")
+        raise ModalError(
+            f"body has not {rigid} rigid modes: eigenvalues start {shown}",
+            "its parts must hang together: repair the mesh",
+        )
     return Modes(np.array(elastic), vector[:, rigid:], np.array(value[:rigid]))

@@ -2,9 +2,9 @@
 
     K_ij = ∫ Bᵢᵀ C Bⱼ dV,   M_ij = ∫ ρ Nᵢ Nⱼ dV · 1₃          [Hughes, The Finite Element Method (1987), ch. 3.10, 7.2]
 
-N are scikit-fem's `ElementTetP2` shape functions at its Gauss points, mapped isoparametrically (curved bodies keep their volume),
-B the engineering strains in Voigt order xx yy zz yz xz xy, C any symmetric positive (6, 6) tensor. Blocks are gathered per
-pair of nodes, so that assembly is a few dense products and one sort.
+N are scikit-fem's `ElementTetP2` shape functions at its Gauss points, mapped isoparametrically (curved bodies keep
+their volume), B the engineering strains in Voigt order xx yy zz yz xz xy, C any symmetric positive (6, 6) tensor.
+Blocks are gathered per pair of nodes, so that assembly is a few dense products and one sort.
 """
 
 from __future__ import annotations
@@ -99,7 +99,12 @@ def volume_m3(solid: Solid) -> float:
     if solid.affine:
         return float(np.abs(corner_volume_m3(solid.node_m, solid.tet)).sum())
     _, gradient, weight = _element(6)
-    return float(sum(_geometry(solid, solid.tet[s : s + CHUNK], gradient, weight)[0].sum() for s in range(0, len(solid.tet), CHUNK)))
+    return float(
+        sum(
+            _geometry(solid, solid.tet[s : s + CHUNK], gradient, weight)[0].sum()
+            for s in range(0, len(solid.tet), CHUNK)
+        )
+    )
 
 
 def rigid_modes(node_m: Array) -> Array:
@@ -114,7 +119,8 @@ def rigid_modes(node_m: Array) -> Array:
 
 
 def clamped(solid: Solid, clamp: Array) -> Array:
-    """Which nodes (n,) the spheres clamp (k, 4) of (x, y, z, radius) in m hold; a sphere between nodes holds the nearest.
+    """Which nodes (n,) the spheres clamp (k, 4) of (x, y, z, radius) in m hold; a sphere between nodes holds the
+    nearest.
 
     Raises MeshError where a sphere is farther from the body than an element.
     """
@@ -125,7 +131,10 @@ def clamped(solid: Solid, clamp: Array) -> Array:
         if not inside.any():
             edge = float(np.linalg.norm(solid.node_m[solid.tet[:, 0]] - solid.node_m[solid.tet[:, 1]], axis=1).max())
             if distance.min() > radius + edge:
-                raise MeshError(f"clamp at ({x:g}, {y:g}, {z:g}) m, radius {radius:g} m, does not touch the body", "give its place in the body frame")
+                raise MeshError(
+                    f"clamp at ({x:g}, {y:g}, {z:g}) m, radius {radius:g} m, does not touch the body",
+                    "give its place in the body frame",
+                )
             inside = distance == distance.min()
         fixed |= inside
     return fixed

@@ -46,7 +46,10 @@ SHIFT = 20.0  # × (2V/A)²/L²: a third of the first elastic λ' of plates and 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Unit:
-    """A solved body without units: value (m,), vector (v, 3, m) float32 on its skin, volume; vertex_m, face, curvature with units."""
+    """A solved body without units:
+
+    value (m,), vector (v, 3, m) float32 on its skin, volume; vertex_m, face, curvature with units.
+    """
 
     value: Array
     vector: Array
@@ -69,13 +72,15 @@ def analyse(
     cache: Path | Literal["default"] | None = "default",
     progress: Callable[[str], None] | None = None,
 ) -> ModalModel:
-    """Vibration modes of a body up to to_hz (at most `MOST_MODES`; the note says when that cut them), or its lowest ``count``.
+    """Vibration modes of a body up to to_hz (at most `MOST_MODES`; the note says when that cut them), or its lowest
+    ``count``.
 
-    shapes: together one solid, in the body frame. fixed: clamped where (x, y, z, radius) in m, body frame, reach; a clamp between
-    nodes takes the nearest. thickness_m: wall of open surfaces (see surfaces.py); it makes closed ones hollow. edge_m: element size,
-    by default from a budget of unknowns. cache: folder, "default" or None. progress: called with a line now and then.
-    A body all of whose modes lie above to_hz has none; so has a plane. Pieces that do not hang together: the largest is kept and noted.
-    Raises MeshError (broken, empty, flat, absurd or too slow mesh), ModalError (no usable modes).
+    shapes: together one solid, in the body frame. fixed: clamped where (x, y, z, radius) in m, body frame, reach; a
+    clamp between nodes takes the nearest. thickness_m: wall of open surfaces (see surfaces.py); it makes closed ones
+    hollow. edge_m: element size, by default from a budget of unknowns. cache: folder, "default" or None. progress:
+    called with a line now and then. A body all of whose modes lie above to_hz has none; so has a plane. Pieces that do
+    not hang together: the largest is kept and noted. Raises MeshError (broken, empty, flat, absurd or too slow mesh),
+    ModalError (no usable modes).
     """
     say = progress or (lambda _: None)
     asked = ModalOptions(to_hz, count, fixed, thickness_m)
@@ -84,7 +89,17 @@ def analyse(
         raise MeshError("body has no shape", "give it a collision or visual shape, or pass mesh=")
     if any(shape.kind == "plane" for shape in shapes):
         none = np.zeros(0)
-        return ModalModel(none, none, np.zeros((0, 3, 0)), np.zeros((0, 3)), np.zeros((0, 3)), none, 0.0, 0.0, note="plane: unbounded, no modes")
+        return ModalModel(
+            none,
+            none,
+            np.zeros((0, 3, 0)),
+            np.zeros((0, 3)),
+            np.zeros((0, 3)),
+            none,
+            0.0,
+            0.0,
+            note="plane: unbounded, no modes",
+        )
     solid_key = _solid_key(shapes, thickness_m, edge_m)
     length_m = _diagonal_m(shapes)
     pascal = float(np.abs(material.stiffness_pa).max())
@@ -95,7 +110,9 @@ def analyse(
     name = store.key("modes", solid_key, unit_stiffness, clamp, count if count is not None else limit)
     unit = _recall(store.load(cache, name, MODES))
     if unit is None:
-        unit = _solve(shapes, (edge_m, thickness_m), (cache, solid_key), length_m, unit_stiffness, clamp, count, limit, say)
+        unit = _solve(
+            shapes, (edge_m, thickness_m), (cache, solid_key), length_m, unit_stiffness, clamp, count, limit, say
+        )
         store.save(cache, name, _arrays(unit), unit.note)
     lam = unit.value * per_s2
     freq, decay, alive = damped(lam, material)
@@ -125,8 +142,12 @@ def analyse(
     )
 
 
-def surface_of(shapes: tuple[Shape, ...], *, cache: store.Place = "default", progress: Callable[[str], None] | None = None) -> tuple[Array, Array]:
-    """vertex_m (v, 3) and face (f, 3) of the surface on which `analyse` gives the modes of these shapes, without solving for them. Raises MeshError."""
+def surface_of(
+    shapes: tuple[Shape, ...], *, cache: store.Place = "default", progress: Callable[[str], None] | None = None
+) -> tuple[Array, Array]:
+    """vertex_m (v, 3) and face (f, 3) of the surface on which `analyse` gives the modes of these shapes, without
+    solving for them. Raises MeshError.
+    """
     _diagonal_m(shapes)
     body = _filled(shapes, (None, None), (cache, _solid_key(shapes, None, None)), progress or (lambda _: None))
     return body.solid.node_m[body.skin.node], body.skin.face
@@ -139,7 +160,10 @@ def _solid_key(shapes: tuple[Shape, ...], thickness_m: float | None, edge_m: flo
 
 def _diagonal_m(shapes: tuple[Shape, ...]) -> float:
     """A length that belongs to the shapes alone: what all is divided by. Raises MeshError where there is none."""
-    sizes = [np.linalg.norm(np.ptp(s.vertex_m[np.unique(s.face)], axis=0)) if s.kind == "mesh" else np.linalg.norm(s.size_m) for s in shapes]
+    sizes = [
+        np.linalg.norm(np.ptp(s.vertex_m[np.unique(s.face)], axis=0)) if s.kind == "mesh" else np.linalg.norm(s.size_m)
+        for s in shapes
+    ]
     length = float(max(sizes))
     if not (np.isfinite(length) and length > 0):
         raise MeshError("body has no extent", "give shapes with sizes above zero")
@@ -147,7 +171,9 @@ def _diagonal_m(shapes: tuple[Shape, ...]) -> float:
 
 
 def damped(lambda_per_s2: Array, material: Material) -> tuple[Array, Array, Array]:
-    """Frequencies, ascending, and decays of the modes that oscillate, and their indices; decays NaN without alpha [Ren et al. 2013, eq. 7]."""
+    """Frequencies, ascending, and decays of the modes that oscillate, and their indices; decays NaN without alpha [Ren
+    et al. 2013, eq. 7].
+    """
     if material.alpha_per_s is None or material.beta_s is None:
         return np.sqrt(lambda_per_s2) / (2 * np.pi), np.full(len(lambda_per_s2), np.nan), np.arange(len(lambda_per_s2))
     decay = (material.alpha_per_s + material.beta_s * lambda_per_s2) / 2
@@ -157,7 +183,12 @@ def damped(lambda_per_s2: Array, material: Material) -> tuple[Array, Array, Arra
     return freq[order], decay[alive[order]], alive[order]
 
 
-def _filled(shapes: tuple[Shape, ...], sizes: tuple[float | None, float | None], kept: tuple[store.Place, str], say: Callable[[str], None]) -> Filled:
+def _filled(
+    shapes: tuple[Shape, ...],
+    sizes: tuple[float | None, float | None],
+    kept: tuple[store.Place, str],
+    say: Callable[[str], None],
+) -> Filled:
     """The body's inside and skin, from the cache where it is there. sizes: edge_m, thickness_m."""
     from sonic_bullet.modal.meshing.shape_meshes import Filled, fill
     from sonic_bullet.modal.meshing.solid import Solid, SolidSurface
@@ -165,7 +196,9 @@ def _filled(shapes: tuple[Shape, ...], sizes: tuple[float | None, float | None],
     found = store.load(*kept, SOLID)
     if found is not None:
         a, note = found
-        return Filled(Solid(a["node"], a["tet"], bool(a["affine"][0]), note), SolidSurface(a["skin"], a["face"]), a["curvature"])
+        return Filled(
+            Solid(a["node"], a["tet"], bool(a["affine"][0]), note), SolidSurface(a["skin"], a["face"]), a["curvature"]
+        )
     body = fill(shapes, *sizes, say)
     solid, skin = body.solid, body.skin
     arrays = {
@@ -202,20 +235,36 @@ def _solve(
     area = float(np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1).sum() / 2)
     volume = fem.volume_m3(unit)
     box = polynomials.recognised(shapes[0]) if len(shapes) == 1 and sizes == (None, None) and not len(clamp) else None
-    exact = polynomials.free(box, length_m, stiffness, body.solid.node_m[body.skin.node], limit, count, MOST_MODES) if box is not None else None
+    exact = (
+        polynomials.free(box, length_m, stiffness, body.solid.node_m[body.skin.node], limit, count, MOST_MODES)
+        if box is not None
+        else None
+    )
     if exact is not None:
         value, moved = exact
         below = slice(None) if count is not None else value <= limit
         said = f"{body.solid.note}, its modes by polynomials"
         where = body.solid.node_m[body.skin.node]
-        return _Unit(value[below], np.ascontiguousarray(moved[:, :, below], np.float32), volume, where, body.skin.face, body.curvature_per_m, said)
+        return _Unit(
+            value[below],
+            np.ascontiguousarray(moved[:, :, below], np.float32),
+            volume,
+            where,
+            body.skin.face,
+            body.curvature_per_m,
+            said,
+        )
     say(f"assembling {3 * len(unit.node_m)} unknowns")
     k_matrix, m_matrix = fem.assemble(unit, stiffness, 1.0)
     fixed = fem.clamped(body.solid, clamp)
     if fixed.all():
         raise ModalError("the clamps hold the whole body", "give a smaller radius")
     free = np.flatnonzero(np.repeat(~fixed, 3))
-    rigid = 6 - (int(np.linalg.matrix_rank(fem.rigid_modes(unit.node_m)[~np.isin(np.arange(3 * len(fixed)), free)], tol=1e-9)) if fixed.any() else 0)
+    rigid = 6 - (
+        int(np.linalg.matrix_rank(fem.rigid_modes(unit.node_m)[~np.isin(np.arange(3 * len(fixed)), free)], tol=1e-9))
+        if fixed.any()
+        else 0
+    )
     if fixed.any():
         k_matrix, m_matrix = k_matrix[free][:, free], m_matrix[free][:, free]
     most = min(count or MOST_MODES, max(1, len(free) // 3 - rigid))
@@ -227,7 +276,15 @@ def _solve(
     vector[free] = modes.vector[:, keep]
     note = body.solid.note + f"; {len(free)} unknowns" + (f"; {int(fixed.sum())} nodes clamped" if fixed.any() else "")
     shape = np.ascontiguousarray(vector.reshape(len(fixed), 3, -1)[body.skin.node])
-    return _Unit(modes.lambda_per_s2[keep], shape, volume, body.solid.node_m[body.skin.node], body.skin.face, body.curvature_per_m, note)
+    return _Unit(
+        modes.lambda_per_s2[keep],
+        shape,
+        volume,
+        body.solid.node_m[body.skin.node],
+        body.skin.face,
+        body.curvature_per_m,
+        note,
+    )
 
 
 def _arrays(unit: _Unit) -> dict[str, Array]:

@@ -16,7 +16,8 @@ THICKEST_M = 1e4
 
 @dataclass(frozen=True, slots=True)
 class ModalOptions:
-    """to_hz, or the lowest ``count``: which modes. fixed: clamped where (x, y, z, radius) in m, body frame, reach. thickness_m: wall of open surfaces.
+    """to_hz, or the lowest ``count``: which modes. fixed: clamped where (x, y, z, radius) in m, body frame, reach.
+    thickness_m: wall of open surfaces.
 
     Raises ModalError (to_hz, count, fixed) and MeshError (thickness_m), naming the argument.
     """
@@ -33,11 +34,25 @@ class ModalOptions:
             as_number(row[3], f"the radius of fixed[{number}]", remedy, least=0, error=ModalError)
         store(
             self,
-            to_hz=as_number(self.to_hz, "to_hz", "give a frequency above zero, in Hz", above=0, most=HIGHEST_HZ, error=ModalError),
+            to_hz=as_number(
+                self.to_hz, "to_hz", "give a frequency above zero, in Hz", above=0, most=HIGHEST_HZ, error=ModalError
+            ),
             fixed=fixed,
         )
         if self.count is not None:
-            store(self, count=as_whole(self.count, "count", f"ask for 1 to {MOST_ASKED} modes", least=1, most=MOST_ASKED, error=ModalError))
+            store(
+                self,
+                count=as_whole(
+                    self.count, "count", f"ask for 1 to {MOST_ASKED} modes", least=1, most=MOST_ASKED, error=ModalError
+                ),
+            )
         if self.thickness_m is not None:
-            wall = as_number(self.thickness_m, "thickness_m", "give a wall thickness above zero, in m", above=0, most=THICKEST_M, error=MeshError)
+            wall = as_number(
+                self.thickness_m,
+                "thickness_m",
+                "give a wall thickness above zero, in m",
+                above=0,
+                most=THICKEST_M,
+                error=MeshError,
+            )
             store(self, thickness_m=wall)

@@ -1,9 +1,11 @@
 """The order in which unknowns are eliminated: nested dissection by geometry.
 
     cut the nodes in two by a plane, number both halves first and the nodes that part them last, and so on in each half
-                                                                                        [George 1973; Davis 2006, ch. 7.6]
+                                                                                        [George 1973; Davis 2006, ch.
+                                                                                            7.6]
 
-Against minimum degree it halves the time of the factor on chunky bodies and costs a few tenths of a second. Deterministic.
+Against minimum degree it halves the time of the factor on chunky bodies and costs a few tenths of a second.
+Deterministic.
 """
 
 from __future__ import annotations
@@ -64,5 +66,6 @@ def dissection(node_m: Array, tet: Array) -> Array:
         if best is None or len(best[1]) == 0:
             order.append(nodes)
             continue
-        todo += [(best[3], True), (best[2], False), (best[1], False)]  # taken from the end: both halves, then what parts them
+        # taken from the end: both halves, then what parts them
+        todo += [(best[3], True), (best[2], False), (best[1], False)]
     return np.concatenate(order)

@@ -1,9 +1,11 @@
 """Modes of a free box by Rayleigh and Ritz in Legendre's polynomials: all but exact, and quicker than elements.
 
-    u_i = Σ c_ilmn P_l(x/a) P_m(y/b) P_n(z/c),  ∫ P_l P_m = δ_lm,  K = Σ_pq C_pq E_pᵀ E_q,  M = 1           [Demarest 1971, eq. 8-12; Visscher et al. 1991]
+    u_i = Σ c_ilmn P_l(x/a) P_m(y/b) P_n(z/c),  ∫ P_l P_m = δ_lm,  K = Σ_pq C_pq E_pᵀ E_q,  M = 1
+        [Demarest 1971, eq. 8-12; Visscher et al. 1991]
 
-E_p are the strains in Voigt order xx yy zz yz xz xy. P_l' is a sum of lower P_m, so that E_p are products of small tables and K is exact. A material
-whose axes are the box's own keeps the three mirrors: eight small problems, one for each parity. Errors fall exponentially with the degree.
+E_p are the strains in Voigt order xx yy zz yz xz xy. P_l' is a sum of lower P_m, so that E_p are products of small
+tables and K is exact. A material whose axes are the box's own keeps the three mirrors: eight small problems, one for
+each parity. Errors fall exponentially with the degree.
 """
 
 from __future__ import annotations
@@ -37,7 +39,8 @@ class Box:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Parity:
-    """One of the eight problems: degree (3 components) of (k, 3) the polynomials of each, strain: for each of the six strains its map (n, columns).
+    """One of the eight problems: degree (3 components) of (k, 3) the polynomials of each, strain: for each of the six
+    strains its map (n, columns).
 
     rigid: how many rigid motions it holds, one shift or one turn or none.
     """
@@ -57,8 +60,14 @@ class Parity:
 def recognised(shape: Shape) -> Box | None:
     """The box that a shape is, by name or by its mesh, else None."""
     if shape.kind == "box":
-        return Box(np.asarray(shape.size_m, float), rotation(shape.quaternion_xyzw), np.asarray(shape.position_m, float))
-    if shape.kind != "mesh" or not geometry.is_closed(shape.face) or not geometry.volume_m3(shape.vertex_m, shape.face) > 0:
+        return Box(
+            np.asarray(shape.size_m, float), rotation(shape.quaternion_xyzw), np.asarray(shape.position_m, float)
+        )
+    if (
+        shape.kind != "mesh"
+        or not geometry.is_closed(shape.face)
+        or not geometry.volume_m3(shape.vertex_m, shape.face) > 0
+    ):
         return None
     found = prisms.as_box(shape.vertex_m, shape.face)
     if found is None:
@@ -77,7 +86,9 @@ def mirrored(stiffness: Array) -> bool:
 
 
 def wave_number(omega2: float, thickness: float, stiffness: Array) -> float:
-    """The largest wave number (1/length) of a plate at ω², density one: bending with shear and rotary inertia [Mindlin 1951, eq. 37], in the softest direction."""
+    """The largest wave number (1/length) of a plate at ω², density one: bending with shear and rotary inertia [Mindlin
+    1951, eq. 37], in the softest direction.
+    """
     compliance = np.linalg.inv(stiffness)
     plate, shear = float(1 / np.diag(compliance)[:3].max()), 5 / 6 * float(np.diag(stiffness)[3:].min())
     fast, slow = omega2 / plate, omega2 / shear
@@ -85,13 +96,18 @@ def wave_number(omega2: float, thickness: float, stiffness: Array) -> float:
 
 
 def wave_number_of(count: int, size: Array) -> float:
-    """A wave number (1/length) below which a box has at least ``count`` modes: bending ones of its length, or of its face [Courant & Hilbert 1924, ch. VI.4]."""
+    """A wave number (1/length) below which a box has at least ``count`` modes: bending ones of its length, or of its
+    face [Courant & Hilbert 1924, ch. VI.4].
+    """
     _, wide, long = np.sort(size)
     return float(min((count + 1.5) * np.pi / long, np.sqrt(4 * np.pi * (count + 8) / (wide * long))))
 
 
 def degrees(size: Array, wave: float) -> tuple[int, int, int]:
-    """How many polynomials along each axis a box of size (3,) takes for waves up to ``wave``: π a wave length and a margin (λ then to 1e-5)."""
+    """How many polynomials along each axis a box of size (3,) takes for waves up to ``wave``:
+
+    π a wave length and a margin (λ then to 1e-5).
+    """
     reach = wave * np.asarray(size) / 2
     x, y, z = np.ceil(reach + 4 + 4 * np.minimum(1, reach / 4)).astype(int)
     return int(x), int(y), int(z)
@@ -108,11 +124,16 @@ def parities(size: Array, terms: tuple[int, int, int]) -> Iterator[Parity]:
 
     steps = []
     for axis in range(3):
-        table = [_slopes(terms[k]) * (2 / size[k]) if k == axis else eye_array(terms[k], format="csr") for k in range(3)]
+        table = [
+            _slopes(terms[k]) * (2 / size[k]) if k == axis else eye_array(terms[k], format="csr") for k in range(3)
+        ]
         steps.append(csr_array(kron(kron(table[0], table[1]), table[2])).tocsc())
     degree = np.stack(np.meshgrid(*[np.arange(n) for n in terms], indexing="ij"), axis=-1).reshape(-1, 3)
     for parity in product((0, 1), repeat=3):
-        mine = [np.flatnonzero((degree % 2 == (np.array(parity) + np.eye(3, dtype=int)[k]) % 2).all(axis=1)) for k in range(3)]
+        mine = [
+            np.flatnonzero((degree % 2 == (np.array(parity) + np.eye(3, dtype=int)[k]) % 2).all(axis=1))
+            for k in range(3)
+        ]
         ends = np.cumsum([0, *(len(m) for m in mine)])
 
         def of(axis: int, k: int, mine: list[Array] = mine, ends: Array = ends) -> Any:
@@ -125,7 +146,10 @@ def parities(size: Array, terms: tuple[int, int, int]) -> Iterator[Parity]:
 
 
 def _slopes(n: int) -> Any:
-    """The table (n, n) of P_m' = Σ_l table[l, m] P_l on -1..1, orthonormal: P_m' = Σ (2l+1) P_l over l = m-1, m-3, … [Abramowitz & Stegun 8.5.3, summed]."""
+    """The table (n, n) of P_m' = Σ_l table[l, m] P_l on -1..1, orthonormal:
+
+    P_m' = Σ (2l+1) P_l over l = m-1, m-3, … [Abramowitz & Stegun 8.5.3, summed].
+    """
     from scipy.sparse import csr_array
 
     low, m = np.arange(n)[:, None], np.arange(n)
@@ -135,14 +159,17 @@ def _slopes(n: int) -> Any:
 def lowest(stiffness: Array, limit: float, rigid: int) -> tuple[Array, Array]:
     """λ (m,) up to limit and vectors (n, m) of a dense K (n, n), M = 1, without the first ``rigid``.
 
-    Their number is that of the negative pivots of K − limit [Sylvester's inertia; Parlett 1980, ch. 3.3], so none is missed; then shift, invert, Lanczos.
+    Their number is that of the negative pivots of K − limit [Sylvester's inertia; Parlett 1980, ch. 3.3], so none is
+    missed; then shift, invert, Lanczos.
     """
     from scipy.linalg import cho_factor, cho_solve, eigh, ldl
     from scipy.sparse.linalg import LinearOperator, eigsh
 
     n = len(stiffness)
     pivots = ldl(stiffness - limit * np.eye(n), check_finite=False)[1]
-    count = int((np.linalg.eigvalsh(pivots) < 0).sum()) if np.diag(pivots, 1).any() else int((np.diag(pivots) < 0).sum())
+    count = (
+        int((np.linalg.eigvalsh(pivots) < 0).sum()) if np.diag(pivots, 1).any() else int((np.diag(pivots) < 0).sum())
+    )
     if count <= rigid:
         return np.zeros(0), np.zeros((n, 0))
     value, vector = np.full(count, np.inf), np.zeros((n, count))
@@ -150,15 +177,20 @@ def lowest(stiffness: Array, limit: float, rigid: int) -> tuple[Array, Array]:
         shift = -1e-3 * limit
         factor = cho_factor(stiffness - shift * np.eye(n), check_finite=False)
         inverse = LinearOperator((n, n), matvec=lambda x: cho_solve(factor, x, check_finite=False), dtype=float)
-        value, vector = eigsh(stiffness, count, sigma=shift, OPinv=inverse, v0=np.random.default_rng(0).standard_normal(n), tol=1e-12)
+        value, vector = eigsh(
+            stiffness, count, sigma=shift, OPinv=inverse, v0=np.random.default_rng(0).standard_normal(n), tol=1e-12
+        )
     if not value.max() <= limit:  # Lanczos took a degenerate pair for one
         value, vector = eigh(stiffness, subset_by_index=(0, count - 1), check_finite=False)
     order = np.argsort(value)[rigid:]
     return value[order], vector[:, order]
 
 
-def free(box: Box, length: float, stiffness: Array, point_m: Array, limit: float, count: int | None, most: int) -> tuple[Array, Array] | None:
-    """λ (m,) of a free box, up to limit and at most ``most``, or its lowest ``count``; and its modes (v, 3, m) at point_m (v, 3), all in lengths of ``length``.
+def free(
+    box: Box, length: float, stiffness: Array, point_m: Array, limit: float, count: int | None, most: int
+) -> tuple[Array, Array] | None:
+    """λ (m,) of a free box, up to limit and at most ``most``, or its lowest ``count``; and its modes (v, 3, m) at
+    point_m (v, 3), all in lengths of ``length``.
 
     None where its material's axes are not its own, or where it takes too many unknowns.
     """
@@ -170,9 +202,15 @@ def free(box: Box, length: float, stiffness: Array, point_m: Array, limit: float
     high = limit
     if count is not None:  # ω² at which the plate's waves are as short as ``count`` modes may take
         tries = np.geomspace(1e-12, 1e12, 400)
-        high = float(tries[int(np.argmax([wave_number(w, thin, stiffness) > wave_number_of(count, size) for w in tries]))])
+        high = float(
+            tries[int(np.argmax([wave_number(w, thin, stiffness) > wave_number_of(count, size) for w in tries]))]
+        )
     for _ in range(8):
-        wave = wave_number(high, thin, stiffness) if count is not None else min(wave_number(high, thin, stiffness), wave_number_of(most, size))
+        wave = (
+            wave_number(high, thin, stiffness)
+            if count is not None
+            else min(wave_number(high, thin, stiffness), wave_number_of(most, size))
+        )
         terms = degrees(size, wave)
         if unknowns(terms) > MOST_UNKNOWNS:
             return None
@@ -198,10 +236,13 @@ def _isotropic(stiffness: Array) -> Array:
 
 
 def shapes_at(point: Array, size: Array, parity: Parity, vector: Array) -> Array:
-    """Displacements (v, 3, b) at points (v, 3) of the box about its centre, of coefficients (columns, b), in the box's frame; ∫|u|² over the box is one."""
+    """Displacements (v, 3, b) at points (v, 3) of the box about its centre, of coefficients (columns, b), in the box's
+    frame; ∫|u|² over the box is one.
+    """
     top = [max(int(d[:, axis].max(initial=0)) for d in parity.degree) for axis in range(3)]
     table = [
-        np.polynomial.legendre.legvander(np.clip(2 * point[:, k] / size[k], -1, 1), top[k]) * np.sqrt((2 * np.arange(top[k] + 1) + 1) / size[k])
+        np.polynomial.legendre.legvander(np.clip(2 * point[:, k] / size[k], -1, 1), top[k])
+        * np.sqrt((2 * np.arange(top[k] + 1) + 1) / size[k])
         for k in range(3)
     ]
     made = np.empty((len(point), 3, vector.shape[1]))

@@ -1,11 +1,13 @@
-"""All isotropic materials of one body at once: its modes at two Poisson's ratios span those between, and a little beyond.
+"""All isotropic materials of one body at once: its modes at two Poisson's ratios span those between, and a little
+beyond.
 
-    K(E, ν) = E [ l(ν) K_l + s(ν) K_s ],   l = ν/((1+ν)(1−2ν)),  s = 1/(2(1+ν))                    [Hughes 1987, ch. 2.7]
+    K(E, ν) = E [ l(ν) K_l + s(ν) K_s ],   l = ν/((1+ν)(1−2ν)),  s = 1/(2(1+ν))
+        [Hughes 1987, ch. 2.7]
     V: modes at ν₁ and ν₂ together, VᵀMV = 1;   (l VᵀK_lV + s VᵀK_sV) q = θ q,  λ = γ θ/L²,  γ = E/ρ     [Rayleigh-Ritz]
 
 The error of λ is of the fourth order in the distances from ν₁ and ν₂. Lengths by the body's diagonal L, as in model.py.
-A free box takes polynomials in place of elements (polynomials.py), a free body of revolution a Fourier series around its axis (revolved.py): their λ are
-good to 2e-4, where elements within the same time are 1e-2 too stiff.
+A free box takes polynomials in place of elements (polynomials.py), a free body of revolution a Fourier series around
+its axis (revolved.py): their λ are good to 2e-4, where elements within the same time are 1e-2 too stiff.
 """
 
 from __future__ import annotations
@@ -37,10 +39,11 @@ KEPT = {
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Family:
-    """A body's modes for every γ = E/ρ and ν. lame, shear (b, b): reduced stiffness. skin (v, 3, b) float32: the basis on the surface at ρL³ = 1 kg.
+    """A body's modes for every γ = E/ρ and ν. lame, shear (b, b): reduced stiffness. skin (v, 3, b) float32: the basis
+    on the surface at ρL³ = 1 kg.
 
-    vertex_m (v, 3), face (4t, 3): the surface, each element's face cut in four. count: how many of the lowest modes are true.
-    meshed: False where no element's error is in λ.
+    vertex_m (v, 3), face (4t, 3): the surface, each element's face cut in four. count: how many of the lowest modes are
+    true. meshed: False where no element's error is in λ.
     """
 
     lame: Array
@@ -67,7 +70,8 @@ class Family:
         return np.asarray(bent / np.einsum("bm,bc,cm->m", vector, _stiffness(self, poisson), vector))
 
     def points(self, position_m: Array, direction: Array) -> tuple[Array, Array]:
-        """Basis (k, b) at the surface points nearest to position_m (k, 3), along direction (k, 3), and how far off (k,) in m they lie.
+        """Basis (k, b) at the surface points nearest to position_m (k, 3), along direction (k, 3), and how far off (k,)
+        in m they lie.
 
         Divide by √(ρL³) for shapes per √kg. Quadratic over each element's face, as the elements themselves are.
         """
@@ -75,7 +79,9 @@ class Family:
         return np.einsum("kxb,kx->kb", moved.astype(float), direction), distance
 
     def skin_at(self, position_m: Array) -> Array:
-        """The basis (k, 3, b) float32, as `skin`, at the surface points nearest to position_m (k, 3): on another mesh of the same surface."""
+        """The basis (k, 3, b) float32, as `skin`, at the surface points nearest to position_m (k, 3): on another mesh
+        of the same surface.
+        """
         if position_m.shape == self.vertex_m.shape and (position_m == self.vertex_m).all():
             return self.skin
         return self._moved(position_m)[0].astype(np.float32)
@@ -95,10 +101,13 @@ def _stiffness(family: Family, poisson: float) -> Array:
 
 
 def _quadratic(quarters: Array, which: int, weight: Array) -> tuple[Array, Array]:
-    """The six nodes of an element's face and their shape functions at barycentric ``weight`` of one of its quarters (see solid.QUARTERS)."""
+    """The six nodes of an element's face and their shape functions at barycentric ``weight`` of one of its quarters
+    (see solid.QUARTERS).
+    """
     middle = quarters[3]
     node = np.array([quarters[0, 0], quarters[1, 1], quarters[2, 2], *middle])
-    corner = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [0.5, 0.5, 0], [0, 0.5, 0.5], [0.5, 0, 0.5]])  # of nodes 0-2, then edges 01, 12, 20
+    # of nodes 0-2, then edges 01, 12, 20
+    corner = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [0.5, 0.5, 0], [0, 0.5, 0.5], [0.5, 0, 0.5]])
     place = {int(n): corner[k] for k, n in enumerate(node)}
     a, b, c = weight @ np.array([place[int(n)] for n in quarters[which]])
     return node, np.array([a * (2 * a - 1), b * (2 * b - 1), c * (2 * c - 1), 4 * a * b, 4 * b * c, 4 * c * a])
@@ -115,7 +124,8 @@ def family(
     cache: store.Place = "default",
     progress: Callable[[str], None] | None = None,
 ) -> Family:
-    """The family of one body about a guess, its modes true up to to_hz at the guessed γ. fixed, edge_m, cache, progress: as in `analyse`.
+    """The family of one body about a guess, its modes true up to to_hz at the guessed γ. fixed, edge_m, cache,
+    progress: as in `analyse`.
 
     Raises MeshError, ModalError.
     """
@@ -128,14 +138,32 @@ def family(
     if found is not None:
         a, note = found
         volume, count, meshed = a["numbers"]
-        return Family(a["lame"], a["shear"], a["skin"], a["vertex"], a["face"], length, float(volume), int(count), note, bool(meshed))
+        return Family(
+            a["lame"],
+            a["shear"],
+            a["skin"],
+            a["vertex"],
+            a["face"],
+            length,
+            float(volume),
+            int(count),
+            note,
+            bool(meshed),
+        )
     made = None
     if edge_m is None and not len(clamp):
         made = _of_box(shape, length, limit, poisson, say) or _of_revolution(shape, length, limit, poisson, say)
     if made is None:
         made = _family(shape, length, limit, poisson, clamp, edge_m, say)
     numbers = np.array([made.volume_m3, made.count, made.meshed])
-    arrays = {"lame": made.lame, "shear": made.shear, "skin": made.skin, "vertex": made.vertex_m, "face": made.face, "numbers": numbers}
+    arrays = {
+        "lame": made.lame,
+        "shear": made.shear,
+        "skin": made.skin,
+        "vertex": made.vertex_m,
+        "face": made.face,
+        "numbers": numbers,
+    }
     store.save(cache, name, arrays, made.note)
     return made
 
@@ -204,10 +232,23 @@ def _of_box(shape: Shape, length: float, limit: float, poisson: float, say: Call
     note = f"box of {' x '.join(str(n) for n in terms)} polynomials; nu {low:g} and {high:g}"
     vertex_m = shell.node_m[skin.node] @ box.axes.T + box.centre_m
     count = min(MOST_MODES, int(counts.min()))
-    return Family((lame + lame.T) / 2, (shear + shear.T) / 2, basis_skin, vertex_m, skin.face, length, float(np.prod(box.size_m)), count, note, meshed=False)
+    return Family(
+        (lame + lame.T) / 2,
+        (shear + shear.T) / 2,
+        basis_skin,
+        vertex_m,
+        skin.face,
+        length,
+        float(np.prod(box.size_m)),
+        count,
+        note,
+        meshed=False,
+    )
 
 
-def _of_revolution(shape: Shape, length: float, limit: float, poisson: float, say: Callable[[str], None]) -> Family | None:
+def _of_revolution(
+    shape: Shape, length: float, limit: float, poisson: float, say: Callable[[str], None]
+) -> Family | None:
     """The family of a free body of revolution; None where the shape is none."""
     from scipy.linalg import block_diag
     from scipy.sparse import block_diag as diagonal
@@ -224,7 +265,9 @@ def _of_revolution(shape: Shape, length: float, limit: float, poisson: float, sa
     tensors = _lame_shear()
     wave = polynomials.wave_number(limit, thick / length, _mixed(max(low, high), *tensors))
     long = 2 * np.pi / wave
-    section = revolved.sectioned(unit, float(min(SECTION_EDGE * thick / length, SECTION_WAVE * long)), long / polynomials.PER_WAVE)
+    section = revolved.sectioned(
+        unit, float(min(SECTION_EDGE * thick / length, SECTION_WAVE * long)), long / polynomials.PER_WAVE
+    )
     if section is None:
         return None
     n = len(section.order)
@@ -241,7 +284,12 @@ def _of_revolution(shape: Shape, length: float, limit: float, poisson: float, sa
         kept = []
         for k, nu in enumerate((low, high)):
             modes = eigen.solve(
-                _mixed(nu, k_lame, k_shear), mass, shift, rigid=2 if m < 2 else 0, enough=lambda value: bool(value[-1] > BEYOND * limit), most=MOST_MODES
+                _mixed(nu, k_lame, k_shear),
+                mass,
+                shift,
+                rigid=2 if m < 2 else 0,
+                enough=lambda value: bool(value[-1] > BEYOND * limit),
+                most=MOST_MODES,
             )
             counts[k] += (1 if m == 0 else 2) * int((modes.lambda_per_s2 <= limit).sum())
             kept.append(modes.vector[:, modes.lambda_per_s2 <= BEYOND * limit])
@@ -259,12 +307,29 @@ def _of_revolution(shape: Shape, length: float, limit: float, poisson: float, sa
     point, face = revolved.skin(section, cells)
     degenerate = [(part, second) for part in parts for second in ((False, True) if part[0] else (False,))]
     lame, shear = (block_diag(*(part[k] for part, _ in degenerate)) for k in (1, 2))
-    moved = np.concatenate([revolved.shapes_at(section, part[3], part[0], second, cells).astype(np.float32) for part, second in degenerate], axis=2)
+    moved = np.concatenate(
+        [
+            revolved.shapes_at(section, part[3], part[0], second, cells).astype(np.float32)
+            for part, second in degenerate
+        ],
+        axis=2,
+    )
     moved = np.ascontiguousarray(np.einsum("yx,vxb->vyb", body.axes.astype(np.float32), moved))
     note = f"body of revolution, section of {n} nodes, up to {parts[-1][0]} waves around; nu {low:g} and {high:g}"
     vertex_m = point * length @ body.axes.T + body.centre_m
     count = min(MOST_MODES, int(counts.min()))
-    return Family((lame + lame.T) / 2, (shear + shear.T) / 2, moved, vertex_m, face, length, body.volume_m3, count, note, meshed=False)
+    return Family(
+        (lame + lame.T) / 2,
+        (shear + shear.T) / 2,
+        moved,
+        vertex_m,
+        face,
+        length,
+        body.volume_m3,
+        count,
+        note,
+        meshed=False,
+    )
 
 
 def _mixed(poisson: float, lame: Any, shear: Any) -> Any:
@@ -272,7 +337,15 @@ def _mixed(poisson: float, lame: Any, shear: Any) -> Any:
     return poisson / ((1 + poisson) * (1 - 2 * poisson)) * lame + shear / (2 * (1 + poisson))
 
 
-def _family(shape: Shape, length: float, limit: float, poisson: float, clamp: Array, edge_m: float | None, say: Callable[[str], None]) -> Family:
+def _family(
+    shape: Shape,
+    length: float,
+    limit: float,
+    poisson: float,
+    clamp: Array,
+    edge_m: float | None,
+    say: Callable[[str], None],
+) -> Family:
     from sonic_bullet.modal import eigen, fem
     from sonic_bullet.modal.meshing.shape_meshes import fill
     from sonic_bullet.modal.meshing.solid import Solid
@@ -297,7 +370,15 @@ def _family(shape: Shape, length: float, limit: float, poisson: float, clamp: Ar
     vectors, counts = [], []
     low, high = _poissons(poisson)
     for nu in (low, high):
-        modes = eigen.solve(_mixed(nu, k_lame, k_shear), mass, shift, rigid=rigid, enough=lambda value: bool(value[-1] > limit), most=most, say=say)
+        modes = eigen.solve(
+            _mixed(nu, k_lame, k_shear),
+            mass,
+            shift,
+            rigid=rigid,
+            enough=lambda value: bool(value[-1] > limit),
+            most=most,
+            say=say,
+        )
         vectors.append(modes.vector)
         counts.append(len(modes.lambda_per_s2))
     basis = _together(vectors[0], vectors[1], lambda v: mass @ v)
@@ -306,7 +387,19 @@ def _family(shape: Shape, length: float, limit: float, poisson: float, clamp: Ar
     if not len(basis):
         raise MeshError("body has no unknowns", "clamp less of it")
     reduced = [basis.T @ (matrix @ basis) for matrix in (k_lame, k_shear)]
-    note = f"{body.solid.note}; {len(free)} unknowns; nu {low:g} and {high:g}" + (f"; {int(held.sum())} nodes clamped" if held.any() else "")
+    note = f"{body.solid.note}; {len(free)} unknowns; nu {low:g} and {high:g}" + (
+        f"; {int(held.sum())} nodes clamped" if held.any() else ""
+    )
     skin = np.ascontiguousarray(vector.reshape(len(held), 3, -1)[body.skin.node])
     lame_r, shear_r = ((matrix + matrix.T) / 2 for matrix in reduced)
-    return Family(lame_r, shear_r, skin, body.solid.node_m[body.skin.node], body.skin.face, length, volume * length**3, min(counts), note)
+    return Family(
+        lame_r,
+        shear_r,
+        skin,
+        body.solid.node_m[body.skin.node],
+        body.skin.face,
+        length,
+        volume * length**3,
+        min(counts),
+        note,
+    )

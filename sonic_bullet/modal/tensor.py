@@ -1,10 +1,13 @@
-"""All orthotropic materials of one body at once, axes along the mesh's: its modes at several anchors span those between.
+"""All orthotropic materials of one body at once, axes along the mesh's: its modes at several anchors span those
+between.
 
     K(C) = Σ_k C_k K_k over the nine constants of `ORTHOTROPIC`;  V: modes at the anchors together, VᵀMV = 1
-    (Σ_k (C_k/ρ) VᵀK_kV) q = λL² q,   ∂ ln λ/∂C_k = qᵀK_kq / qᵀKq,  qᵀq = 1                  [Rayleigh-Ritz; Hellmann-Feynman]
+    (Σ_k (C_k/ρ) VᵀK_kV) q = λL² q,   ∂ ln λ/∂C_k = qᵀK_kq / qᵀKq,  qᵀq = 1
+        [Rayleigh-Ritz; Hellmann-Feynman]
 
-C_k/ρ in m²/s². A box whose sides lie along the axes takes polynomials (polynomials.py) and keeps its three mirrors: eight small problems.
-The reduced modes lie above the true ones, the most by less than 1e-3 in f for ratios of 3:1 (tests/modal/test_tensor.py).
+C_k/ρ in m²/s². A box whose sides lie along the axes takes polynomials (polynomials.py) and keeps its three mirrors:
+eight small problems. The reduced modes lie above the true ones, the most by less than 1e-3 in f for ratios of 3:1
+(tests/modal/test_tensor.py).
 """
 
 from __future__ import annotations
@@ -55,9 +58,11 @@ KEPT = {
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TensorFamily:
-    """A body's modes for every orthotropic tensor. body: its surface and basis, as of `reduced.Family`, the isotropic family in this basis.
+    """A body's modes for every orthotropic tensor. body: its surface and basis, as of `reduced.Family`, the isotropic
+    family in this basis.
 
-    part (9, b, b): reduced stiffness of each constant of `ORTHOTROPIC`. ends (p + 1,): the basis falls into p pieces that no such tensor couples.
+    part (9, b, b): reduced stiffness of each constant of `ORTHOTROPIC`. ends (p + 1,): the basis falls into p pieces
+    that no such tensor couples.
     """
 
     body: Family
@@ -65,7 +70,9 @@ class TensorFamily:
     ends: Array
 
     def modes(self, stiffness_m2_s2: Array) -> tuple[Array, Array]:
-        """λ (m,) in 1/s² ascending, and the modes (b, m) in the basis, of C/ρ (6, 6), of which only the constants of `ORTHOTROPIC` count."""
+        """λ (m,) in 1/s² ascending, and the modes (b, m) in the basis, of C/ρ (6, 6), of which only the constants of
+        `ORTHOTROPIC` count.
+        """
         constant = constants_of(stiffness_m2_s2)
         values, vectors = [], []
         for a, b in pairwise(self.ends):
@@ -102,7 +109,10 @@ def unit_tensors() -> Array:
 
 
 def anchored(youngs: tuple[float, float, float], shear: tuple[float, float, float], poisson: float) -> Array:
-    """The tensor (6, 6) of an anchor; ν_ij √(E_j/E_i) = ν for all pairs. Source: compliance of orthotropic bodies [Bodig & Jayne 1982, eq. 3.8]."""
+    """The tensor (6, 6) of an anchor;
+
+    ν_ij √(E_j/E_i) = ν for all pairs. Source: compliance of orthotropic bodies [Bodig & Jayne 1982, eq. 3.8].
+    """
     root = np.sqrt(np.array(youngs, float))
     compliance = np.zeros((6, 6))
     compliance[:3, :3] = ((1 + poisson) * np.eye(3) - poisson) / np.outer(root, root)
@@ -121,7 +131,8 @@ def tensor_family(
     cache: store.Place = "default",
     progress: Callable[[str], None] | None = None,
 ) -> TensorFamily:
-    """The orthotropic family of one body: its lowest ``count`` modes. poisson: about that of the anchors. fixed, edge_m, cache, progress: as in `analyse`.
+    """The orthotropic family of one body: its lowest ``count`` modes. poisson: about that of the anchors. fixed,
+    edge_m, cache, progress: as in `analyse`.
 
     Raises MeshError, ModalError.
     """
@@ -129,24 +140,56 @@ def tensor_family(
     length = _diagonal_m((shape,))
     count = min(count, MOST_MODES)
     clamp = np.array(fixed, float).reshape(-1, 4)
-    name = store.key("tensor", shape.kind, shape.size_m, shape.vertex_m, shape.face, edge_m, clamp, poisson, count, repr(ANCHORS), repr(FEWER))
+    name = store.key(
+        "tensor",
+        shape.kind,
+        shape.size_m,
+        shape.vertex_m,
+        shape.face,
+        edge_m,
+        clamp,
+        poisson,
+        count,
+        repr(ANCHORS),
+        repr(FEWER),
+    )
     found = store.load(cache, name, KEPT)
     if found is not None:
         a, note = found
         volume, meshed = a["numbers"]
-        return _joined(a["part"], a["ends"], a["skin"], a["vertex"], a["face"], (length, float(volume), count, bool(meshed)), note)
+        return _joined(
+            a["part"], a["ends"], a["skin"], a["vertex"], a["face"], (length, float(volume), count, bool(meshed)), note
+        )
     made = _of_box(shape, length, count, poisson, say) if edge_m is None and not len(clamp) else None
     if made is None:
         made = _of_elements(shape, length, count, poisson, clamp, edge_m, say)
     body = made.body
     numbers = np.array([body.volume_m3, body.meshed])
     store.save(
-        cache, name, {"part": made.part, "ends": made.ends, "skin": body.skin, "vertex": body.vertex_m, "face": body.face, "numbers": numbers}, body.note
+        cache,
+        name,
+        {
+            "part": made.part,
+            "ends": made.ends,
+            "skin": body.skin,
+            "vertex": body.vertex_m,
+            "face": body.face,
+            "numbers": numbers,
+        },
+        body.note,
     )
     return made
 
 
-def _joined(part: Array, ends: Array, skin: Array, vertex_m: Array, face: Array, numbers: tuple[float, float, int, bool], note: str) -> TensorFamily:
+def _joined(
+    part: Array,
+    ends: Array,
+    skin: Array,
+    vertex_m: Array,
+    face: Array,
+    numbers: tuple[float, float, int, bool],
+    note: str,
+) -> TensorFamily:
     length, volume, count, meshed = numbers
     lame = part[0] + part[1] + part[2] + part[3] + part[4] + part[5]
     shear = 2 * (part[0] + part[1] + part[2]) + part[6] + part[7] + part[8]
@@ -161,7 +204,10 @@ def _spanning(vector: Array, gram: Array) -> Array:
 
 
 def _of_box(shape: Shape, length: float, count: int, poisson: float, say: Callable[[str], None]) -> TensorFamily | None:
-    """Of a free box along the axes, without elements; None where the shape is no such box, or one of too many unknowns."""
+    """Of a free box along the axes, without elements;
+
+    None where the shape is no such box, or one of too many unknowns.
+    """
     from sonic_bullet.modal import polynomials
     from sonic_bullet.modal.meshing import structured
     from sonic_bullet.modal.meshing.solid import surface
@@ -173,7 +219,8 @@ def _of_box(shape: Shape, length: float, count: int, poisson: float, say: Callab
     voigt = np.concatenate([turned, 3 + turned])  # of the box's own, in the mesh's order
     size = box.size_m / length
     tensors = unit_tensors()[:, voigt][:, :, voigt]
-    bulk = (3 * np.pi**2 * count / np.prod(size)) ** (1 / 3)  # shear waves in a volume [Weyl 1912]; bending ones are fewer where it is thick
+    # shear waves in a volume [Weyl 1912]; bending ones are fewer where it is thick
+    bulk = (3 * np.pi**2 * count / np.prod(size)) ** (1 / 3)
     wave = SHORTER * min(polynomials.wave_number_of(count, size), float(bulk))
     x, y, z = np.ceil(wave * size / 2 + 3 + 2 * np.minimum(1, wave * size / 8)).astype(int)
     terms = (int(x), int(y), int(z))
@@ -199,7 +246,9 @@ def _of_box(shape: Shape, length: float, count: int, poisson: float, say: Callab
             continue
         basis = _spanning(every, every.T @ every)
         parts.append(basis.T @ k @ basis)
-        moved.append((polynomials.shapes_at(point, size, parity, basis).transpose(0, 2, 1) @ box.axes.T).astype(np.float32))
+        moved.append(
+            (polynomials.shapes_at(point, size, parity, basis).transpose(0, 2, 1) @ box.axes.T).astype(np.float32)
+        )
         ends.append(ends[-1] + basis.shape[1])
     part = np.zeros((len(tensors), ends[-1], ends[-1]))
     for piece, a in zip(parts, ends[:-1], strict=True):
@@ -207,7 +256,9 @@ def _of_box(shape: Shape, length: float, count: int, poisson: float, say: Callab
     note = f"box of {' x '.join(str(n) for n in terms)} polynomials; {len(ANCHORS)} tensors about nu {poisson:g}"
     basis_skin = np.ascontiguousarray(np.concatenate(moved, axis=1).transpose(0, 2, 1))
     vertex_m = shell.node_m[skin.node] @ box.axes.T + box.centre_m
-    return _joined(part, np.array(ends), basis_skin, vertex_m, skin.face, (length, float(np.prod(box.size_m)), count, False), note)
+    return _joined(
+        part, np.array(ends), basis_skin, vertex_m, skin.face, (length, float(np.prod(box.size_m)), count, False), note
+    )
 
 
 def _lowest(stiffness: Array, count: int) -> tuple[Array, Array]:
@@ -223,14 +274,24 @@ def _lowest(stiffness: Array, count: int) -> tuple[Array, Array]:
         shift = -1e-5 * float(np.trace(stiffness)) / n
         factor = cho_factor(stiffness - shift * np.eye(n), check_finite=False)
         inverse = LinearOperator((n, n), matvec=lambda x: cho_solve(factor, x, check_finite=False), dtype=float)
-        value, vector = eigsh(stiffness, count, sigma=shift, OPinv=inverse, v0=np.random.default_rng(0).standard_normal(n), tol=1e-9)
+        value, vector = eigsh(
+            stiffness, count, sigma=shift, OPinv=inverse, v0=np.random.default_rng(0).standard_normal(n), tol=1e-9
+        )
         order = np.argsort(value)
         value, vector = value[order], vector[:, order]
     elastic = value > 1e-9 * float(np.abs(stiffness).max())
     return value[elastic], vector[:, elastic]
 
 
-def _of_elements(shape: Shape, length: float, count: int, poisson: float, clamp: Array, edge_m: float | None, say: Callable[[str], None]) -> TensorFamily:
+def _of_elements(
+    shape: Shape,
+    length: float,
+    count: int,
+    poisson: float,
+    clamp: Array,
+    edge_m: float | None,
+    say: Callable[[str], None],
+) -> TensorFamily:
     from sonic_bullet.modal import eigen, fem
     from sonic_bullet.modal.meshing.shape_meshes import fill
     from sonic_bullet.modal.meshing.solid import Solid
@@ -244,7 +305,9 @@ def _of_elements(shape: Shape, length: float, count: int, poisson: float, clamp:
     free = np.flatnonzero(np.repeat(~held, 3))
     if not len(free):
         raise MeshError("body has no unknowns", "clamp less of it")
-    rigid = 6 - (int(np.linalg.matrix_rank(fem.rigid_modes(unit.node_m)[np.repeat(held, 3)], tol=1e-9)) if held.any() else 0)
+    rigid = 6 - (
+        int(np.linalg.matrix_rank(fem.rigid_modes(unit.node_m)[np.repeat(held, 3)], tol=1e-9)) if held.any() else 0
+    )
     say(f"assembling {len(free)} unknowns for {len(ORTHOTROPIC)} constants")
     stiff: list[Any] = []
     mass: Any = None
@@ -270,4 +333,12 @@ def _of_elements(shape: Shape, length: float, count: int, poisson: float, clamp:
     note = f"{body.solid.note}; {len(free)} unknowns; {len(FEWER)} tensors about nu {poisson:g}"
     numbers = (length, volume * length**3, min(count, wanted), True)
     ends = np.array([0, basis.shape[1]])
-    return _joined((part + part.transpose(0, 2, 1)) / 2, ends, skin, body.solid.node_m[body.skin.node], body.skin.face, numbers, note)
+    return _joined(
+        (part + part.transpose(0, 2, 1)) / 2,
+        ends,
+        skin,
+        body.solid.node_m[body.skin.node],
+        body.skin.face,
+        numbers,
+        note,
+    )

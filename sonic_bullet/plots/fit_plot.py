@@ -1,4 +1,5 @@
-"""One picture of a fit: recording and synthesis as spectrograms above, features and the fitted circle in the (f, d) plane below [Ren, Yeh, Lin 2013, Fig. 10, 11].
+"""One picture of a fit: recording and synthesis as spectrograms above, features and the fitted circle in the (f, d)
+plane below [Ren, Yeh, Lin 2013, Fig. 10, 11].
 
 (ω² + (d − 1/β)²) = 1/β² − α/β, the circle of eq. 8, drawn as d(f)
 """
@@ -41,9 +42,19 @@ def write_fit_picture(path: str | os.PathLike[str], found: CaseFit) -> None:
         made = predicted(o, np.nan_to_num(o.pattern[0]), found.fit.sigma, len(sound), sr)
         top = _levels(sound).max()
         both = [figure.add_subplot(grid[0, i]) for i in (0, 1)]
-        for axes, title, samples in zip(both, ("recording, first strike", "synthesis of that strike, modes alone"), (sound, made), strict=True):
+        for axes, title, samples in zip(
+            both, ("recording, first strike", "synthesis of that strike, modes alone"), (sound, made), strict=True
+        ):
             extent = (0, len(sound) / sr, 0, sr / 2000)
-            image = axes.imshow(_levels(samples) - top, origin="lower", aspect="auto", extent=extent, vmin=-DYNAMICS_DB, vmax=0, cmap="magma")
+            image = axes.imshow(
+                _levels(samples) - top,
+                origin="lower",
+                aspect="auto",
+                extent=extent,
+                vmin=-DYNAMICS_DB,
+                vmax=0,
+                cmap="magma",
+            )
             axes.set(title=title, xlabel="time in s", ylabel="frequency in kHz")
         figure.colorbar(image, ax=both, label="dB below the recording's strongest", pad=0.01)
     axes = figure.add_subplot(grid[1, :])
@@ -63,9 +74,20 @@ def _plane(axes: Axes, found: CaseFit) -> None:
         foreign = ~np.isin(np.arange(len(lines.freq_hz)), each.line[each.line >= 0])
         label = each.evidence.thing.name if len(found.objects) > 1 else "lines that are modes, ± standard error"
         known = ~foreign
-        axes.errorbar(lines.freq_hz[known] / 1000, lines.decay_per_s[known], lines.decay_sd_per_s[known], fmt="o", ms=4, capsize=2, color=f"C{k}", label=label)
+        axes.errorbar(
+            lines.freq_hz[known] / 1000,
+            lines.decay_per_s[known],
+            lines.decay_sd_per_s[known],
+            fmt="o",
+            ms=4,
+            capsize=2,
+            color=f"C{k}",
+            label=label,
+        )
         others.append(np.stack([lines.freq_hz[foreign] / 1000, lines.decay_per_s[foreign]]))
-        axes.plot(each.freq_hz[each.line < 0] / 1000, each.decay_per_s[each.line < 0], "o", ms=5, mfc="none", color=f"C{k}")
+        axes.plot(
+            each.freq_hz[each.line < 0] / 1000, each.decay_per_s[each.line < 0], "o", ms=5, mfc="none", color=f"C{k}"
+        )
     if others and np.concatenate(others, axis=1).size:
         axes.plot(*np.concatenate(others, axis=1), "x", color="0.5", label="lines that are no mode")
     if any((each.line < 0).any() for each in found.objects):
@@ -73,7 +95,13 @@ def _plane(axes: Axes, found: CaseFit) -> None:
     if not found.objects:
         axes.plot(fit.freq_hz / 1000, fit.decay_per_s, "o", ms=4, label="lines")
     freq = np.linspace(0, 1.05 * fit.freq_hz.max(initial=1000.0), 600)
-    axes.plot(freq / 1000, circle(freq, fit.alpha_per_s, fit.beta_s), "k-", lw=1, label=f"circle: α = {fit.alpha_per_s:.4g} 1/s, β = {fit.beta_s:.4g} s")
+    axes.plot(
+        freq / 1000,
+        circle(freq, fit.alpha_per_s, fit.beta_s),
+        "k-",
+        lw=1,
+        label=f"circle: α = {fit.alpha_per_s:.4g} 1/s, β = {fit.beta_s:.4g} s",
+    )
     axes.set(xlabel="frequency in kHz", ylabel="decay in 1/s", yscale="log", xlim=(0, freq[-1] / 1000))
     axes.set_title(fill(f"{found.case.name}: {fit.verdict}", 130, max_lines=3, placeholder=" …"), fontsize=10)
     axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
@@ -90,7 +118,9 @@ def circle(freq_hz: Array, alpha_per_s: float, beta_s: float) -> Array:
         return np.full(len(freq_hz), alpha_per_s / 2)
     inside = 1 - beta_s * (alpha_per_s + beta_s * square)
     # 1/β − √(1/β² − α/β − ω²), without the difference of near equals
-    return np.asarray(np.where(inside >= 0, (alpha_per_s + beta_s * square) / (1 + np.sqrt(np.maximum(inside, 0))), np.nan))
+    return np.asarray(
+        np.where(inside >= 0, (alpha_per_s + beta_s * square) / (1 + np.sqrt(np.maximum(inside, 0))), np.nan)
+    )
 
 
 def _levels(sound: Array) -> Array:

@@ -1,6 +1,8 @@
-"""One picture of a residual: what was recorded, its features, what is synthesised, represented, and left [Ren, Yeh, Lin 2013, Fig. 7].
+"""One picture of a residual: what was recorded, its features, what is synthesised, represented, and left [Ren, Yeh, Lin
+2013, Fig. 7].
 
-above: spectrograms of one strike;  below: features and modes in the (f, d) plane, features filled by the share of them that is represented
+above: spectrograms of one strike;
+    below: features and modes in the (f, d) plane, features filled by the share of them that is represented
 """
 
 from __future__ import annotations
@@ -59,10 +61,28 @@ def _spectrogram(axes: Any, one: Power, top: float) -> None:
 
 
 def _plane(axes: Any, strikes: Strikes, amplitude: Array, share: Array) -> None:
-    size = 20 + 6 * np.clip(20 * np.log10(amplitude / amplitude.max() + 1e-9) + 60, 0, 60) if len(amplitude) else amplitude
-    drawn = axes.scatter(strikes.freq_hz / 1000, strikes.decay_per_s, size, share, cmap="Blues", vmin=0, vmax=1, edgecolors="b", label="features")
+    size = (
+        20 + 6 * np.clip(20 * np.log10(amplitude / amplitude.max() + 1e-9) + 60, 0, 60) if len(amplitude) else amplitude
+    )
+    drawn = axes.scatter(
+        strikes.freq_hz / 1000,
+        strikes.decay_per_s,
+        size,
+        share,
+        cmap="Blues",
+        vmin=0,
+        vmax=1,
+        edgecolors="b",
+        label="features",
+    )
     axes.plot(strikes.mode_hz / 1000, strikes.mode_decay_per_s, "r+", label="modes played")
-    axes.plot(strikes.residual.line_freq_hz / 1000, strikes.residual.line_decay_per_s, "k.", ms=4, label="lines of the residual")
+    axes.plot(
+        strikes.residual.line_freq_hz / 1000,
+        strikes.residual.line_decay_per_s,
+        "k.",
+        ms=4,
+        label="lines of the residual",
+    )
     axes.figure.colorbar(drawn, ax=axes, label="share represented")
     axes.set(xlabel="kHz", ylabel="decay in 1/s", yscale="log", title=strikes.residual.source[:140])
     axes.legend(fontsize=8)

@@ -1,11 +1,13 @@
 """One picture of a render: what was heard above, what was touched below, on one time axis.
 
     samples (channels, n) Pa -> pressure p(t)
-                             -> level of a short-time spectrum, dB re 20 µPa per bin: 20 log10(|P(f, t)|/√2/20 µPa), |P| the amplitude of a sine
+                             -> level of a short-time spectrum, dB re 20 µPa per bin: 20 log10(|P(f, t)|/√2/20 µPa), |P|
+                                 the amplitude of a sine
     ContactLog               -> per sounding body one lane: strikes (area ∝ impulse), sliding and rolling bars
 
-A pair of bodies strikes in a step where its impulse leaps above what it carried in the step before. Between strikes a pair that is loaded
-for five steps or more slides where its slip passes 1 mm/s, else rolls where its contact moves faster than 1 mm/s, else rests.
+A pair of bodies strikes in a step where its impulse leaps above what it carried in the step before. Between strikes a
+pair that is loaded for five steps or more slides where its slip passes 1 mm/s, else rolls where its contact moves
+faster than 1 mm/s, else rests.
 """
 
 from __future__ import annotations
@@ -36,7 +38,9 @@ STRIKES_MAX = 400  # of a lane, the strongest
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Events:
-    """What the bodies of a log did. strike_* (s,): body index, time in s, impulse in N·s; bar_* (r,): body index, start, end in s, kind."""
+    """What the bodies of a log did. strike_* (s,): body index, time in s, impulse in N·s; bar_* (r,): body index,
+    start, end in s, kind.
+    """
 
     strike_body: Array
     strike_s: Array
@@ -63,13 +67,23 @@ def find_events(log: ContactLog) -> Events:
         hit = impulse > LEAP * before
         hit &= ~np.append(False, hit[:-1] & (np.diff(steps) == 1))  # a strike that spans two steps is one
         bodies = [int(i) for i in (a, b) if log.bodies[i].model is not None]
-        strikes += [(body, float(start_s[steps[i]]), float(impulse[i] - before[i])) for body in bodies for i in np.flatnonzero(hit)]
-        moving = [np.bincount(at, normal_n_s[mine] * speed[mine]) / np.maximum(impulse, 1e-300) for speed in (slip, sweep)]
+        strikes += [
+            (body, float(start_s[steps[i]]), float(impulse[i] - before[i]))
+            for body in bodies
+            for i in np.flatnonzero(hit)
+        ]
+        moving = [
+            np.bincount(at, normal_n_s[mine] * speed[mine]) / np.maximum(impulse, 1e-300) for speed in (slip, sweep)
+        ]
         kind = np.where(moving[0] > MOVING_M_S, 2, np.where(moving[1] > MOVING_M_S, 1, 0))
         cuts = np.flatnonzero((np.diff(steps) != 1) | (np.diff(kind) != 0)) + 1
         for run in np.split(np.arange(len(steps)), cuts):
             if len(run) >= LASTING_STEPS:
-                span = (float(start_s[steps[run[0]]]), float(start_s[steps[run[-1]] + 1]), ("rests", "rolls", "slides")[kind[run[0]]])
+                span = (
+                    float(start_s[steps[run[0]]]),
+                    float(start_s[steps[run[-1]] + 1]),
+                    ("rests", "rolls", "slides")[kind[run[0]]],
+                )
                 bars += [(body, *span) for body in bodies]
     return Events(
         np.array([s[0] for s in strikes], int),
@@ -91,7 +105,14 @@ def spectrogram_db(samples: Array, sr: int) -> tuple[Array, Array, Array]:
 
     size = max(16, round(WINDOW_S * sr))
     hop = max(size // 4, int(np.ceil(len(samples) / COLUMNS_MAX)))
-    transform = ShortTimeFFT(hann(size, sym=False), hop, sr, fft_mode="onesided", scale_to="magnitude", mfft=2 ** int(np.ceil(np.log2(size)) + 1))
+    transform = ShortTimeFFT(
+        hann(size, sym=False),
+        hop,
+        sr,
+        fft_mode="onesided",
+        scale_to="magnitude",
+        mfft=2 ** int(np.ceil(np.log2(size)) + 1),
+    )
     padded = np.pad(samples, (0, max(0, size - len(samples))))
     amplitude = 2 * np.abs(transform.stft(padded))
     with np.errstate(divide="ignore"):
@@ -105,22 +126,31 @@ def quantity(sensor: Sensor) -> tuple[str, str]:
 
 
 def check_picture_output(path: str | os.PathLike[str]) -> Path:
-    """The real path of a picture. Raises FileError where the extension is not .png, .pdf or .svg or the place cannot be written."""
+    """The real path of a picture.
+
+    Raises FileError where the extension is not .png, .pdf or .svg or the place cannot be written.
+    """
     if Path(path).suffix.lower() not in EXTENSIONS:
-        raise FileError(f"cannot draw {path}: unknown picture format", f"end the name with one of {' '.join(EXTENSIONS)}")
+        raise FileError(
+            f"cannot draw {path}: unknown picture format", f"end the name with one of {' '.join(EXTENSIONS)}"
+        )
     return check_output(path)
 
 
-def render_picture(path: str | os.PathLike[str], samples: Array, sr: int, log: ContactLog | None = None, title: str = "") -> None:
+def render_picture(
+    path: str | os.PathLike[str], samples: Array, sr: int, log: ContactLog | None = None, title: str = ""
+) -> None:
     """Draw ``samples`` (channels, n) in Pa, and the events of ``log`` where there is one, to a PNG, PDF or SVG.
 
-    Of several channels the first is drawn, and the picture says so. Equal input gives equal bytes. Raises FileError (place, extension)
-    and AudioError (rate, shape, NaN).
+    Of several channels the first is drawn, and the picture says so. Equal input gives equal bytes. Raises FileError
+    (place, extension) and AudioError (rate, shape, NaN).
     """
     check_picture_output(path)
     rate, sound = check_sr(sr), np.asarray(samples, float)
     if sound.ndim != 2 or sound.shape[0] == 0 or not np.isfinite(sound).all():
-        raise AudioError(f"samples of shape {sound.shape} cannot be drawn", "pass finite samples of shape (channels, n)")
+        raise AudioError(
+            f"samples of shape {sound.shape} cannot be drawn", "pass finite samples of shape (channels, n)"
+        )
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -134,7 +164,13 @@ def render_picture(path: str | os.PathLike[str], samples: Array, sr: int, log: C
     _draw_samples(axes[0], sound[0], rate, what, unit)
     image = _draw_spectrogram(axes[1], sound[0], rate)
     if image is not None:
-        figure.colorbar(image, ax=axes[1], label="dB re 20 µPa" if unit == "Pa" else f"dB re 20·10⁻⁶ {unit}", pad=0.01, fraction=0.03)
+        figure.colorbar(
+            image,
+            ax=axes[1],
+            label="dB re 20 µPa" if unit == "Pa" else f"dB re 20·10⁻⁶ {unit}",
+            pad=0.01,
+            fraction=0.03,
+        )
     if log is not None and events is not None:
         _draw_events(axes[2], log, events, lanes)
     axes[-1].set_xlabel("time in s")
@@ -148,7 +184,9 @@ def render_picture(path: str | os.PathLike[str], samples: Array, sr: int, log: C
 
 
 def _draw_samples(axis: Any, sound: Array, sr: int, what: str, unit: str) -> None:
-    """p(t), as the band between least and greatest value of each of at most 4000 stretches: no peak falls between pixels."""
+    """p(t), as the band between least and greatest value of each of at most 4000 stretches: no peak falls between
+    pixels.
+    """
     stretch = max(1, len(sound) // 4000)
     whole = sound[: len(sound) // stretch * stretch].reshape(-1, stretch)
     if whole.size:
@@ -200,13 +238,27 @@ def _draw_events(axis: Any, log: ContactLog, events: Events, lanes: list[int]) -
     from matplotlib import colormaps
     from matplotlib.lines import Line2D
 
-    colours, looks = colormaps["tab10"](np.arange(10)), {"rests": (0.8, 0.25), "rolls": (3.0, 0.6), "slides": (6.0, 0.9)}
+    colours, looks = (
+        colormaps["tab10"](np.arange(10)),
+        {"rests": (0.8, 0.25), "rolls": (3.0, 0.6), "slides": (6.0, 0.9)},
+    )
     largest = float(events.strike_n_s.max(initial=0))
     for lane, body in enumerate(lanes):
         colour = colours[lane % len(colours)]
         for kind, (width, alpha) in looks.items():
-            spans = [span for span, owner, which in zip(events.bar_s, events.bar_body, events.bar_kind, strict=True) if owner == body and which == kind]
-            axis.hlines([lane] * len(spans), [s[0] for s in spans], [s[1] for s in spans], colors=[colour], linewidth=width, alpha=alpha)
+            spans = [
+                span
+                for span, owner, which in zip(events.bar_s, events.bar_body, events.bar_kind, strict=True)
+                if owner == body and which == kind
+            ]
+            axis.hlines(
+                [lane] * len(spans),
+                [s[0] for s in spans],
+                [s[1] for s in spans],
+                colors=[colour],
+                linewidth=width,
+                alpha=alpha,
+            )
         mine = np.flatnonzero(events.strike_body == body)
         mine = mine[np.argsort(-events.strike_n_s[mine], kind="stable")[:STRIKES_MAX]]
         axis.scatter(
@@ -234,10 +286,26 @@ def _draw_events(axis: Any, log: ContactLog, events: Events, lanes: list[int]) -
         axis.set_ylim(1, -1)
         axis.text(0.5, 0.5, "no contacts", transform=axis.transAxes, ha="center", va="center", color="#777777")
         return
-    handles = [Line2D([], [], color="#444444", linewidth=width, alpha=alpha, label=kind) for kind, (width, alpha) in looks.items()]
+    handles = [
+        Line2D([], [], color="#444444", linewidth=width, alpha=alpha, label=kind)
+        for kind, (width, alpha) in looks.items()
+    ]
     if largest > 0:
-        handles.append(Line2D([], [], color="#444444", marker="o", markerfacecolor="none", markersize=11, linestyle="", label=f"strike of {largest:.2g} N·s"))
-    axis.legend(handles=handles, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderpad=0.1, ncols=4, fontsize=7, frameon=False)
+        handles.append(
+            Line2D(
+                [],
+                [],
+                color="#444444",
+                marker="o",
+                markerfacecolor="none",
+                markersize=11,
+                linestyle="",
+                label=f"strike of {largest:.2g} N·s",
+            )
+        )
+    axis.legend(
+        handles=handles, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderpad=0.1, ncols=4, fontsize=7, frameon=False
+    )
 
 
 def _label(log: ContactLog, index: int) -> str:

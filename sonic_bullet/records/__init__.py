@@ -12,7 +12,15 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from sonic_bullet.records.arrays import Array, frozen_array
-    from sonic_bullet.records.bodies import ORTHOTROPIC, Body, Material, ModalModel, Shape, ShapeKind, isotropic_stiffness_pa
+    from sonic_bullet.records.bodies import (
+        ORTHOTROPIC,
+        Body,
+        Material,
+        ModalModel,
+        Shape,
+        ShapeKind,
+        isotropic_stiffness_pa,
+    )
     from sonic_bullet.records.residual import Residual
     from sonic_bullet.records.sensors import Air, Microphone, ModalSum, Sensor, Vibrometer
 

@@ -12,16 +12,19 @@ from sonic_bullet.records.errors import RecordError
 
 Array = NDArray[Any]
 LARGEST = 1e30
-"""No length, force, stiffness or frequency in SI units is larger, and fourth powers of such numbers are still finite."""
+"""No length, force, stiffness or frequency in SI units is larger, and fourth powers of such numbers are still finite.
+"""
 
 
 def frozen_array(value: object, dtype: Any, shape: tuple[int | None, ...], name: str, *, finite: bool = True) -> Array:
-    """Read-only C-contiguous copy of ``value`` with ``dtype`` and ``shape`` (None: any length); the same array where it is one already.
+    """Read-only C-contiguous copy of ``value`` with ``dtype`` and ``shape`` (None: any length); the same array where it
+    is one already.
 
-    Raises RecordError where it holds no numbers, or none that ``dtype`` can hold (1.5 is no index), where the shape differs or, with
-    ``finite``, a number is NaN, infinite or beyond `LARGEST`.
+    Raises RecordError where it holds no numbers, or none that ``dtype`` can hold (1.5 is no index), where the shape
+    differs or, with ``finite``, a number is NaN, infinite or beyond `LARGEST`.
     """
-    kept = isinstance(value, np.ndarray) and not value.flags.writeable and value.base is None  # a record's own: read-only and nobody's view
+    # a record's own: read-only and nobody's view
+    kept = isinstance(value, np.ndarray) and not value.flags.writeable and value.base is None
     try:
         given = value if isinstance(value, np.ndarray) else np.asarray(value)
         if given.dtype == dtype:
@@ -31,18 +34,32 @@ def frozen_array(value: object, dtype: Any, shape: tuple[int | None, ...], name:
         else:
             raise TypeError
     except (TypeError, ValueError, OverflowError):
-        raise RecordError(f"{name} is {shown(value)}", f"pass {np.dtype(dtype).name} numbers of shape {shape}") from None
-    if array.ndim != len(shape) or any(want is not None and have != want for have, want in zip(array.shape, shape, strict=True)):
+        raise RecordError(
+            f"{name} is {shown(value)}", f"pass {np.dtype(dtype).name} numbers of shape {shape}"
+        ) from None
+    if array.ndim != len(shape) or any(
+        want is not None and have != want for have, want in zip(array.shape, shape, strict=True)
+    ):
         raise RecordError(f"{name} has shape {array.shape}, wanted {shape}", "pass an array of that shape")
-    if finite and array.dtype.kind == "f" and not (array.max(initial=0) <= LARGEST and array.min(initial=0) >= -LARGEST):  # False for NaN too
-        what = f"a number of {float(np.abs(array).max()):.3g}" if np.isfinite(array).all() else "NaN or infinite numbers"
+    # False for NaN too
+    if (
+        finite
+        and array.dtype.kind == "f"
+        and not (array.max(initial=0) <= LARGEST and array.min(initial=0) >= -LARGEST)
+    ):
+        what = (
+            f"a number of {float(np.abs(array).max()):.3g}" if np.isfinite(array).all() else "NaN or infinite numbers"
+        )
         raise RecordError(f"{name} holds {what}", "look for the step or file that produced them")
     array.setflags(write=False)
     return array
 
 
 def _converted(given: Array, dtype: Any) -> Array:
-    """A C-contiguous copy with ``dtype``. Raises ValueError where integers are asked for and that would change a number."""
+    """A C-contiguous copy with ``dtype``.
+
+    Raises ValueError where integers are asked for and that would change a number.
+    """
     with np.errstate(invalid="ignore", over="ignore"):
         array: Array = np.array(given, dtype=dtype, order="C")
     if array.dtype.kind == "i" and not (array == given).all():

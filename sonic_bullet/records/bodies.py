@@ -2,9 +2,9 @@
 
     shapes (listener) + Material (presets) -> ModalModel (modal) -> Body -> Step, ContactLog (contacts.py) -> sound
 
-Every record is frozen, its arrays are read-only copies, units stand in the names and shapes in the comments:
-b bodies, m modes, v vertices, f faces. A record that exists is sound: inner code never asks again. Body frame always
-means the frame PyBullet calls inertial: origin at the centre of mass, axes as `getBasePositionAndOrientation` gives them.
+Every record is frozen, its arrays are read-only copies, units stand in the names and shapes in the comments: b bodies,
+m modes, v vertices, f faces. A record that exists is sound: inner code never asks again. Body frame always means the
+frame PyBullet calls inertial: origin at the centre of mass, axes as `getBasePositionAndOrientation` gives them.
 """
 
 from __future__ import annotations
@@ -16,7 +16,17 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from sonic_bullet.records.arrays import Array, frozen_array, require, store
-from sonic_bullet.records.coerce import as_flag, as_items, as_kind, as_number, as_text, as_whole, check_options, nearest, shown
+from sonic_bullet.records.coerce import (
+    as_flag,
+    as_items,
+    as_kind,
+    as_number,
+    as_text,
+    as_whole,
+    check_options,
+    nearest,
+    shown,
+)
 from sonic_bullet.records.errors import RecordError
 from sonic_bullet.records.residual import Residual
 
@@ -48,18 +58,21 @@ def isotropic_stiffness_pa(youngs_pa: float, poisson: float) -> Array:
 
 
 ORTHOTROPIC = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1), (3, 3), (4, 4), (5, 5))
-"""Places in the Voigt tensor of C11 C22 C33 C23 C13 C12 C44 C55 C66, the constants that symmetry planes along the axes leave."""
+"""Places in the Voigt tensor of C11 C22 C33 C23 C13 C12 C44 C55 C66, the constants that symmetry planes along the axes
+leave.
+"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Material:
     """What a body is made of.
 
-    stiffness_pa (6, 6): Voigt tensor, positive definite. alpha_per_s, beta_s: Rayleigh damping d = (alpha + beta·lambda)/2
-    [Ren, Yeh, Lin 2013, eq. 6], None where unknown. includes_radiation: they, and laws among the effects, are a body's total damping
-    as it was recorded, so the run time adds no radiation to it; else the material's own, to which it does. roughness_m: rms height of the surface profile; hurst: its Hurst
-    exponent (profile spectrum ∝ k^-(1+2·hurst)). restitution: of an impact against a rigid wall, for pulses only.
-    residual: what sounds beside the modes, None: nothing. effects: what else belongs to it (sonic_bullet.effects), in the order in which they act.
+    stiffness_pa (6, 6): Voigt tensor, positive definite. alpha_per_s, beta_s: Rayleigh damping d = (alpha +
+    beta·lambda)/2 [Ren, Yeh, Lin 2013, eq. 6], None where unknown. includes_radiation: they, and laws among the
+    effects, are a body's total damping as it was recorded, so the run time adds no radiation to it; else the material's
+    own, to which it does. roughness_m: rms height of the surface profile; hurst: its Hurst exponent (profile spectrum ∝
+    k^-(1+2·hurst)). restitution: of an impact against a rigid wall, for pulses only. residual: what sounds beside the
+    modes, None: nothing. effects: what else belongs to it (sonic_bullet.effects), in the order in which they act.
     """
 
     name: str
@@ -79,8 +92,18 @@ class Material:
         as_text(self.name, "the name of a material", "give a text")
         where = f"material {shown(self.name)}"
         stiffness = frozen_array(self.stiffness_pa, float, (6, 6), f"{where}: stiffness_pa")
-        store(self, stiffness_pa=stiffness, density_kg_m3=as_number(self.density_kg_m3, f"{where}: density_kg_m3", "give a density above zero", above=0))
-        require(bool(np.allclose(stiffness, stiffness.T, rtol=1e-9)), f"{where}: stiffness_pa is not symmetric", "give a symmetric tensor")
+        store(
+            self,
+            stiffness_pa=stiffness,
+            density_kg_m3=as_number(
+                self.density_kg_m3, f"{where}: density_kg_m3", "give a density above zero", above=0
+            ),
+        )
+        require(
+            bool(np.allclose(stiffness, stiffness.T, rtol=1e-9)),
+            f"{where}: stiffness_pa is not symmetric",
+            "give a symmetric tensor",
+        )
         require(
             bool(np.linalg.eigvalsh(stiffness)[0] > 0),
             f"{where}: stiffness_pa is not positive definite",
@@ -88,13 +111,28 @@ class Material:
         )
         for name in ("alpha_per_s", "beta_s"):
             if getattr(self, name) is not None:
-                store(self, **{name: as_number(getattr(self, name), f"{where}: {name}", "damping must be zero or above", least=0)})
-        require((self.alpha_per_s is None) == (self.beta_s is None), f"{where}: only one of alpha_per_s, beta_s is given", "give both or neither")
+                store(
+                    self,
+                    **{
+                        name: as_number(
+                            getattr(self, name), f"{where}: {name}", "damping must be zero or above", least=0
+                        )
+                    },
+                )
+        require(
+            (self.alpha_per_s is None) == (self.beta_s is None),
+            f"{where}: only one of alpha_per_s, beta_s is given",
+            "give both or neither",
+        )
         store(
             self,
-            roughness_m=as_number(self.roughness_m, f"{where}: roughness_m", "rms height must be zero or above", least=0),
+            roughness_m=as_number(
+                self.roughness_m, f"{where}: roughness_m", "rms height must be zero or above", least=0
+            ),
             hurst=as_number(self.hurst, f"{where}: hurst", "the Hurst exponent lies between 0 and 1", above=0, below=1),
-            restitution=as_number(self.restitution, f"{where}: restitution", "restitution lies between 0 and 1", least=0, most=1),
+            restitution=as_number(
+                self.restitution, f"{where}: restitution", "restitution lies between 0 and 1", least=0, most=1
+            ),
             effects=as_items(self.effects, f"{where}: effects", "give effects of sonic_bullet.effects"),
             includes_radiation=as_flag(self.includes_radiation, f"{where}: includes_radiation"),
         )
@@ -108,7 +146,11 @@ class Material:
         where = f"material {shown(name)}"
         modulus = as_number(youngs_pa, f"{where}: youngs_pa", "give a Young's modulus above zero", above=0)
         ratio = as_number(poisson, f"{where}: poisson", "Poisson's ratio lies between -1 and 0.5", above=-1, below=0.5)
-        check_options(rest, [f.name for f in fields(cls) if f.name not in ("name", "density_kg_m3", "stiffness_pa")], "Material.isotropic")
+        check_options(
+            rest,
+            [f.name for f in fields(cls) if f.name not in ("name", "density_kg_m3", "stiffness_pa")],
+            "Material.isotropic",
+        )
         return cls(name=name, density_kg_m3=density_kg_m3, stiffness_pa=isotropic_stiffness_pa(modulus, ratio), **rest)
 
     @property
@@ -143,9 +185,9 @@ ShapeKind = Literal["sphere", "box", "capsule", "cylinder", "mesh", "plane"]
 class Shape:
     """One piece of a body's geometry, placed in the body frame.
 
-    size_m (3,): sphere (r, 0, 0); box full edge lengths; capsule and cylinder (r, length along z without caps, 0); plane: normal
-    is +z, unused; mesh: unused. position_m (3,), quaternion_xyzw (4,): placement. vertex_m (v, 3), face (f, 3): meshes only,
-    already scaled, counter-clockwise seen from outside.
+    size_m (3,): sphere (r, 0, 0); box full edge lengths; capsule and cylinder (r, length along z without caps, 0);
+    plane: normal is +z, unused; mesh: unused. position_m (3,), quaternion_xyzw (4,): placement. vertex_m (v, 3), face
+    (f, 3): meshes only, already scaled, counter-clockwise seen from outside.
     """
 
     kind: ShapeKind
@@ -167,25 +209,31 @@ class Shape:
             vertex_m=frozen_array(self.vertex_m, float, (None, 3), "mesh: vertex_m"),
             face=frozen_array(self.face, np.int32, (None, 3), "mesh: face"),
         )
-        require(bool((self.size_m >= 0).all()), f"{self.kind}: size_m {self.size_m} is negative", "give sizes above zero")
+        require(
+            bool((self.size_m >= 0).all()), f"{self.kind}: size_m {self.size_m} is negative", "give sizes above zero"
+        )
         if self.kind == "mesh":
             require(len(self.face) > 0, "mesh without triangles", "give a triangle mesh")
-            require(bool((self.face >= 0).all() and (self.face < len(self.vertex_m)).all()), "mesh faces point at missing vertices", "repair the mesh file")
+            require(
+                bool((self.face >= 0).all() and (self.face < len(self.vertex_m)).all()),
+                "mesh faces point at missing vertices",
+                "repair the mesh file",
+            )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ModalModel:
     """A body's vibration modes on its surface, and the surface they live on.
 
-    freq_hz, decay_per_s (m,): of the damped modes, ascending; decay NaN where the material states no damping.
-    shape (v, 3, m) float32: mass-normalised displacement at the surface vertices, in 1/√kg (UᵀMU = I), body frame.
-    vertex_m (v, 3), face (f, 3): the surface, body frame, outward. curvature_per_m (f,): mean of the principal curvatures
-    of the smooth surface (0 flat, 1/r sphere, negative inside a bowl). volume_m3, mass_kg: of the meshed solid at the
+    freq_hz, decay_per_s (m,): of the damped modes, ascending; decay NaN where the material states no damping. shape (v,
+    3, m) float32: mass-normalised displacement at the surface vertices, in 1/√kg (UᵀMU = I), body frame. vertex_m (v,
+    3), face (f, 3): the surface, body frame, outward. curvature_per_m (f,): mean of the principal curvatures of the
+    smooth surface (0 flat, 1/r sphere, negative inside a bowl). volume_m3, mass_kg: of the meshed solid at the
     material's density. dropped: modes left out as overdamped. note: how it was made (element size, order, choices).
-    bend_s2_m2, damping_growth_s_m (m,): relative rise of a mode's frequency per square of its peak velocity at the surface, of its decay
-    (damping_growth · that velocity)^damping_growth_power, 1 or 2; None: a linear body. includes_radiation: of decay_per_s, as the
-    material (see `Material`).
-    A body without audible modes has m = 0; a plane has v = f = 0 besides.
+    bend_s2_m2, damping_growth_s_m (m,): relative rise of a mode's frequency per square of its peak velocity at the
+    surface, of its decay (damping_growth · that velocity)^damping_growth_power, 1 or 2; None: a linear body.
+    includes_radiation: of decay_per_s, as the material (see `Material`). A body without audible modes has m = 0; a
+    plane has v = f = 0 besides.
     """
 
     freq_hz: Array
@@ -223,10 +271,18 @@ class ModalModel:
             curvature_per_m=frozen_array(self.curvature_per_m, float, (len(face),), "curvature_per_m"),
         )
         anew = "build the model with modal.analyse"
-        require(bool((freq > 0).all() and (np.diff(freq) >= 0).all()), "mode frequencies are not ascending and above zero", anew)
+        require(
+            bool((freq > 0).all() and (np.diff(freq) >= 0).all()),
+            "mode frequencies are not ascending and above zero",
+            anew,
+        )
         require(not np.isinf(decay).any() and not bool((decay < 0).any()), "mode decays are negative or infinite", anew)
         require(bool(((face >= 0) & (face < len(vertex))).all()), "faces point at missing vertices", anew)
-        require(self.damping_growth_power in (1.0, 2.0), f"decays that rise with power {self.damping_growth_power} of the level", "give 1 or 2")
+        require(
+            self.damping_growth_power in (1.0, 2.0),
+            f"decays that rise with power {self.damping_growth_power} of the level",
+            "give 1 or 2",
+        )
         as_text(self.note, "note", "give a text")
         as_flag(self.includes_radiation, "includes_radiation")
         for name in ("bend_s2_m2", "damping_growth_s_m"):
@@ -253,11 +309,12 @@ class ModalModel:
 class Body:
     """One link of one PyBullet body as the sound needs it, by value, so that a log renders without PyBullet.
 
-    body_id, link: as the user knows them (base is link -1). epoch: grows whenever ids may have been given anew.
-    name: for people. mass_kg: the simulator's, 0 for what does not move. inertia_kg_m2 (3, 3): body frame, centre of mass.
-    volume_m3: of the displaced air. curvature_per_m: of a shape that has one everywhere (sphere 1/r), else NaN: then the model's
-    surface tells. material None: a silent, smooth and rigid partner. model None: nothing of it vibrates.
-    since_step: the first step in which it exists for the sound; until_step: the first in which it does not any more, or -1.
+    body_id, link: as the user knows them (base is link -1). epoch: grows whenever ids may have been given anew. name:
+    for people. mass_kg: the simulator's, 0 for what does not move. inertia_kg_m2 (3, 3): body frame, centre of mass.
+    volume_m3: of the displaced air. curvature_per_m: of a shape that has one everywhere (sphere 1/r), else NaN: then
+    the model's surface tells. material None: a silent, smooth and rigid partner. model None: nothing of it vibrates.
+    since_step: the first step in which it exists for the sound; until_step: the first in which it does not any more, or
+    -1.
     """
 
     body_id: int
@@ -278,6 +335,8 @@ class Body:
         store(
             self,
             inertia_kg_m2=frozen_array(self.inertia_kg_m2, float, (3, 3), f"{where}: inertia_kg_m2"),
-            mass_kg=as_number(self.mass_kg, f"{where}: mass_kg", "give it a finite mass with changeDynamics", least=0, below=1e12),
+            mass_kg=as_number(
+                self.mass_kg, f"{where}: mass_kg", "give it a finite mass with changeDynamics", least=0, below=1e12
+            ),
             volume_m3=as_number(self.volume_m3, f"{where}: volume_m3", "orient its mesh outward", least=0),
         )

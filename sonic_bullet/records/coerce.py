@@ -1,8 +1,11 @@
-"""Arguments at the public doors: whatever a user passes becomes the one type that inner code takes, or one line that names it.
+"""Arguments at the public doors: whatever a user passes becomes the one type that inner code takes, or one line that
+names it.
 
-    as_number(3, "to_hz", …) -> 3.0        as_number("x", "to_hz", …) -> "to_hz is 'x'; give a frequency in Hz, above zero"
+    as_number(3, "to_hz", …) -> 3.0
+        as_number("x", "to_hz", …) -> "to_hz is 'x'; give a frequency in Hz, above zero"
 
-Each function takes the argument's name, the remedy, and the kind of error that belongs to it. bool is no number here: True is no body.
+Each function takes the argument's name, the remedy, and the kind of error that belongs to it. bool is no number here:
+True is no body.
 """
 
 from __future__ import annotations
@@ -73,7 +76,9 @@ def as_number(
     raise error(f"{name} is {shown(value)}", remedy)
 
 
-def as_whole(value: object, name: str, remedy: str, *, least: int = -(2**63), most: int = 2**63 - 1, error: Error = RecordError) -> int:
+def as_whole(
+    value: object, name: str, remedy: str, *, least: int = -(2**63), most: int = 2**63 - 1, error: Error = RecordError
+) -> int:
     """A whole number of at most 64 bits between ``least`` and ``most``, of any numeric type. Raises ``error``."""
     value = _scalar(value)
     if isinstance(value, numbers.Integral) and not isinstance(value, (bool, np.bool_)):
@@ -107,7 +112,10 @@ def as_text(value: object, name: str, remedy: str, *, error: Error = RecordError
 
 
 def as_path(value: object, name: str, remedy: str, *, error: Error = FileError) -> str:
-    """The name of a file, as a text or as what has one (os.PathLike). Raises ``error``, also for names that no file can have."""
+    """The name of a file, as a text or as what has one (os.PathLike).
+
+    Raises ``error``, also for names that no file can have.
+    """
     text = os.fspath(value) if isinstance(value, (str, os.PathLike)) else None
     if not isinstance(text, str):
         raise error(f"{name} is {shown(value)}", remedy)
@@ -145,12 +153,18 @@ def as_kinds(value: object, kind: Any, name: str, remedy: str, *, error: Error =
 
 def as_items(value: Any, name: str, remedy: str, *, error: Error = RecordError) -> tuple[Any, ...]:
     """The items of a list, tuple, array or iterator; a text or a mapping is none. Raises ``error``."""
-    if isinstance(value, Iterable) and not isinstance(value, (str, bytes, dict)) and not (isinstance(value, np.ndarray) and value.ndim == 0):
+    if (
+        isinstance(value, Iterable)
+        and not isinstance(value, (str, bytes, dict))
+        and not (isinstance(value, np.ndarray) and value.ndim == 0)
+    ):
         return tuple(value)
     raise error(f"{name} is {shown(value)}", remedy)
 
 
-def as_rows(value: Any, name: str, columns: int, remedy: str, *, error: Error = RecordError) -> tuple[tuple[float, ...], ...]:
+def as_rows(
+    value: Any, name: str, columns: int, remedy: str, *, error: Error = RecordError
+) -> tuple[tuple[float, ...], ...]:
     """Rows of ``columns`` finite numbers each. Raises ``error`` naming the row."""
     rows = as_items(value, name, remedy, error=error)
     made = []
@@ -163,7 +177,9 @@ def as_rows(value: Any, name: str, columns: int, remedy: str, *, error: Error = 
 
 
 def nearest(word: str, known: Collection[str], otherwise: str = "") -> str:
-    """A remedy for a word that is none of ``known``: the nearest of them, or all where nothing is near, ``otherwise`` behind them."""
+    """A remedy for a word that is none of ``known``: the nearest of them, or all where nothing is near, ``otherwise``
+    behind them.
+    """
     lower = {one.lower(): one for one in reversed(list(known))}
     near = difflib.get_close_matches(word.lower()[:100], lower, n=3, cutoff=0.5)
     if near:

@@ -16,7 +16,8 @@ REMEDY_BYTES = 350  # of those, where both parts are long
 class SonicBulletError(Exception):
     """Base of all errors raised on purpose: ``what`` is wrong, and the ``remedy``.
 
-    Both are single lines; ``str(error)`` is ``"what; remedy"``, at most `TEXT_BYTES` in UTF-8: what is longer loses its middle.
+    Both are single lines; ``str(error)`` is ``"what; remedy"``, at most `TEXT_BYTES` in UTF-8: what is longer loses its
+    middle.
     """
 
     def __init__(self, what: str, remedy: str = "") -> None:
@@ -85,10 +86,14 @@ class FileError(SonicBulletError):
 
 @contextmanager
 def interrupts() -> Iterator[None]:
-    """An interrupt that meets compiled code on its way out arrives as SystemError, caused by it: here it is a KeyboardInterrupt again, with whatever was noted."""
+    """An interrupt that meets compiled code on its way out arrives as SystemError, caused by it: here it is a
+    KeyboardInterrupt again, with whatever was noted.
+    """
     try:
         yield
     except SystemError as error:
         if not isinstance(error.__cause__, KeyboardInterrupt):
             raise
-        raise KeyboardInterrupt("; ".join([str(error.__cause__) or "stopped", *getattr(error, "__notes__", [])])) from error
+        raise KeyboardInterrupt(
+            "; ".join([str(error.__cause__) or "stopped", *getattr(error, "__notes__", [])])
+        ) from error

@@ -18,12 +18,16 @@ FAINTEST = 1e-6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Residual:
-    """What the modal sound of recorded strikes lacks, beside that sound [Ren, Yeh, Lin 2013, sec. 6]: all levels are relative to its modes.
+    """What the modal sound of recorded strikes lacks, beside that sound [Ren, Yeh, Lin 2013, sec.
 
-    mode_* (m,), ascending: the source's modes, amplitudes at the onset, mean square over the strikes. line_* (l,): what features add that modes do not.
-    freq_hz (b,), time_s (n,) ascending from the onset on: centres of the cells of power_per_hz (b, n), noise power per Hz (two-sided), bilinear between them.
-    clip_energy: of the recordings, in amplitude² · s: what is left of them is no more. source: what it was taken from. No unit but Hz and s is left in it.
-    Raises RecordError where that cannot be: arrays that do not fit, NaN, no modes, modes 60 dB below the recordings, more left than there was.
+    6]: all levels are relative to its modes.
+
+    mode_* (m,), ascending: the source's modes, amplitudes at the onset, mean square over the strikes. line_* (l,): what
+    features add that modes do not. freq_hz (b,), time_s (n,) ascending from the onset on: centres of the cells of
+    power_per_hz (b, n), noise power per Hz (two-sided), bilinear between them. clip_energy: of the recordings, in
+    amplitude² · s: what is left of them is no more. source: what it was taken from. No unit but Hz and s is left in it.
+    Raises RecordError where that cannot be: arrays that do not fit, NaN, no modes, modes 60 dB below the recordings,
+    more left than there was.
     """
 
     mode_freq_hz: Array
@@ -44,26 +48,56 @@ class Residual:
         shapes: dict[str, tuple[int, ...]] = {"freq_hz": (b,), "time_s": (n,), "power_per_hz": (b, n)}
         for part, size in (("mode", m), ("line", count)):
             shapes |= {f"{part}_{name}": (size,) for name in ("freq_hz", "decay_per_s", "amplitude")}
-        store(self, **{name: frozen_array(getattr(self, name), float, shape, f"residual {name}") for name, shape in shapes.items()})
-        require(m > 0 and bool((self.mode_amplitude > 0).any()), "a residual without modes to follow", "take it from a recording that has some")
-        require(b > 1 and n > 1, "a residual whose spectrogram is empty", "take it from a recording that holds an impact")
+        store(
+            self,
+            **{
+                name: frozen_array(getattr(self, name), float, shape, f"residual {name}")
+                for name, shape in shapes.items()
+            },
+        )
+        require(
+            m > 0 and bool((self.mode_amplitude > 0).any()),
+            "a residual without modes to follow",
+            "take it from a recording that has some",
+        )
+        require(
+            b > 1 and n > 1, "a residual whose spectrogram is empty", "take it from a recording that holds an impact"
+        )
         for name in ("mode_freq_hz", "freq_hz", "time_s"):
             value = getattr(self, name)
-            require(bool((value >= 0).all() and (np.diff(value) > 0).all() and value[-1] > 0), f"residual {name} does not ascend", "take the residual anew")
+            require(
+                bool((value >= 0).all() and (np.diff(value) > 0).all() and value[-1] > 0),
+                f"residual {name} does not ascend",
+                "take the residual anew",
+            )
         low = min(float(getattr(self, name).min(initial=0.0)) for name in shapes)
         slow = min(float(self.mode_freq_hz[0]), float(self.line_freq_hz.min(initial=1.0)))
         require(low >= 0 and slow > 0, "a residual with numbers below zero", "take it anew")
         require(slow >= SLOWEST_HZ, f"a residual's line at {slow:.3g} Hz", "take it anew: nothing rings there")
         for name in shapes:
-            value, most = float(getattr(self, name).max(initial=0.0)), next(top for part, top in MOST.items() if name.endswith(part))
-            require(value <= most, f"residual {name} of {value:.3g}", f"take it anew: nothing of a sound is above {most:.0e}")
-        energy, modal = self.energy, float((self.mode_amplitude**2 / (4 * np.maximum(self.mode_decay_per_s, 0.1))).sum())
+            value, most = (
+                float(getattr(self, name).max(initial=0.0)),
+                next(top for part, top in MOST.items() if name.endswith(part)),
+            )
+            require(
+                value <= most,
+                f"residual {name} of {value:.3g}",
+                f"take it anew: nothing of a sound is above {most:.0e}",
+            )
+        energy, modal = (
+            self.energy,
+            float((self.mode_amplitude**2 / (4 * np.maximum(self.mode_decay_per_s, 0.1))).sum()),
+        )
         require(
             energy <= LOUDER * self.clip_energy < np.inf,
             "a residual louder than the recordings it was taken from",
             "take it anew: what is left of a sound is less",
         )
-        require(modal >= FAINTEST * energy and modal > FAINTEST**2, "a residual beside modes too faint to follow", "take it from a strike that excites them")
+        require(
+            modal >= FAINTEST * energy and modal > FAINTEST**2,
+            "a residual beside modes too faint to follow",
+            "take it from a strike that excites them",
+        )
 
     @property
     def share_of_clip(self) -> float:

@@ -45,7 +45,10 @@ class Vibrometer:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ModalSum:
-    """The seed's observation: the plain sum Σ a·e^{-dt}·sin(2πft), a = scale·Uᵀj for an impulse j in N·s [Ren et al. 2013, eq. 11, 13]."""
+    """The seed's observation: the plain sum Σ a·e^{-dt}·sin(2πft), a = scale·Uᵀj for an impulse j in N·s [Ren et al.
+
+    2013, eq. 11, 13].
+    """
 
     scale: float = 1.0
 
@@ -66,6 +69,10 @@ class Air:
     def __post_init__(self) -> None:
         store(
             self,
-            density_kg_m3=as_number(self.density_kg_m3, "air: density_kg_m3", "give kg/m³, above zero", above=0, below=1e4),
-            sound_speed_m_s=as_number(self.sound_speed_m_s, "air: sound_speed_m_s", "give m/s, above zero", above=0, below=1e5),
+            density_kg_m3=as_number(
+                self.density_kg_m3, "air: density_kg_m3", "give kg/m³, above zero", above=0, below=1e4
+            ),
+            sound_speed_m_s=as_number(
+                self.sound_speed_m_s, "air: sound_speed_m_s", "give m/s, above zero", above=0, below=1e5
+            ),
         )

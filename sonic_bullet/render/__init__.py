@@ -35,7 +35,8 @@ def render_log(
     Its events act where they did: at the first sample of the same step, at any rate.
 
     residual False: without what materials sound beside their modes. progress is called with the share done, say with
-    what is being computed before the first step. Raises AudioError for a rate that cannot be, LogError for what is no log.
+    what is being computed before the first step. Raises AudioError for a rate that cannot be, LogError for what is no
+    log.
     """
     from sonic_bullet.files import check_sr
 

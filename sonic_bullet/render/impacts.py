@@ -2,9 +2,9 @@
 
     Split (synth.strikes) + rows of the step and the next ones -> ForcePulse: time, length, impulse, Uᵀf on either body
 
-One `Impact` is one pulse: rows of up to three steps, several points each, share its time history, so that the manifold's
-sum and moment, which are all that is reliable, are kept: Uᵀf is summed over the rows, each at its own point with its own
-direction, friction included.
+One `Impact` is one pulse: rows of up to three steps, several points each, share its time history, so that the
+manifold's sum and moment, which are all that is reliable, are kept: Uᵀf is summed over the rows, each at its own point
+with its own direction, friction included.
 """
 
 from __future__ import annotations
@@ -28,12 +28,15 @@ STRUCK_FLAT = 0.02
 FLAT_CURVATURE = 0.1
 """Curvature times size below which a contact is flat: a cap of ten times the body's size."""
 LEAST_JUMP_M_S = 1e-6
-"""An impact that changes the speed of its effective mass by less is passed over: a body of 10 cm sends 0 dB SPL to 1 m then."""
+"""An impact that changes the speed of its effective mass by less is passed over: a body of 10 cm sends 0 dB SPL to 1 m
+then.
+"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ForcePulse:
-    """One strike. low, high: body indices. start_s: after its step's start, or before it. length_s: of the pulse. flat: half-sine, not Hertz'.
+    """One strike. low, high: body indices. start_s: after its step's start, or before it. length_s: of the pulse. flat:
+    half-sine, not Hertz'.
 
     impulse_n_s (3,): world, on low. modes_low, modes_high (m,): Uᵀj of the whole impulse in N·s/√kg.
     share: of all these, what the pulse hands over (`compliant_share`).
@@ -51,7 +54,8 @@ class ForcePulse:
 
 
 def _gather(split: Split, oriented: Sequence[Rows]) -> tuple[Rows, Array, Array]:
-    """Rows of struck pairs in the step and its followers, impulses scaled to the part that is strike; strike number and delay of each (r,).
+    """Rows of struck pairs in the step and its followers, impulses scaled to the part that is strike; strike number and
+    delay of each (r,).
 
     Sorted by strike.
     """
@@ -64,7 +68,12 @@ def _gather(split: Split, oriented: Sequence[Rows]) -> tuple[Rows, Array, Array]
         if len(mine):
             part, scale = rows.take(mine), share[mine]
             parts.append(
-                replace(part, impulse_n_s=part.impulse_n_s * scale[:, None], load_n_s=part.load_n_s * scale, push_n_s=part.push_n_s * scale[:, None, None])
+                replace(
+                    part,
+                    impulse_n_s=part.impulse_n_s * scale[:, None],
+                    load_n_s=part.load_n_s * scale,
+                    push_n_s=part.push_n_s * scale[:, None, None],
+                )
             )
             strikes.append(at[mine])
             delays.append(np.full(len(mine), delay))
@@ -74,12 +83,19 @@ def _gather(split: Split, oriented: Sequence[Rows]) -> tuple[Rows, Array, Array]
 
 
 def find_pulses(
-    split: Split, oriented: Sequence[Rows], step: Step, resonators: tuple[Resonator, ...], placed: Array, earliest_s: float
+    split: Split,
+    oriented: Sequence[Rows],
+    step: Step,
+    resonators: tuple[Resonator, ...],
+    placed: Array,
+    earliest_s: float,
 ) -> tuple[ForcePulse, ...]:
-    """The strikes that the rows of ``step`` begin; oriented: the rows of that step and of the known ones after it. placed (bodies,): just put there.
+    """The strikes that the rows of ``step`` begin; oriented: the rows of that step and of the known ones after it.
+    placed (bodies,): just put there.
 
-    earliest_s: not after 0; a strike is dated back that far at most, where the bodies overlap as the step starts.
-    Pairs of which nothing can sound (no modes, no moving volume) are passed over, and those of which neither moves (links without mass).
+    earliest_s: not after 0; a strike is dated back that far at most, where the bodies overlap as the step starts. Pairs
+    of which nothing can sound (no modes, no moving volume) are passed over, and those of which neither moves (links
+    without mass).
     """
     if not len(split.strike):
         return ()
@@ -93,19 +109,42 @@ def find_pulses(
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
     arm = group_sum(strike, share[:, None, None] * rows.arm_m, count)
     mass = effective_mass(
-        [bodies[i] for i in low], [bodies[i] for i in high], matrix(step.quaternion_xyzw[low]), matrix(step.quaternion_xyzw[high]), arm, normal
+        [bodies[i] for i in low],
+        [bodies[i] for i in high],
+        matrix(step.quaternion_xyzw[low]),
+        matrix(step.quaternion_xyzw[high]),
+        arm,
+        normal,
     )
     approach = np.zeros(count)
     np.maximum.at(approach, strike, rows.approach_m_s)
     mobile = np.array([body.mass_kg > 0 for body in bodies])
-    caused = causing_approach_m_s(approach, low, high, normal, unheld_steps(split, mobile, placed), step.gravity_m_s2 * step.dt_s)
+    caused = causing_approach_m_s(
+        approach, low, high, normal, unheld_steps(split, mobile, placed), step.gravity_m_s2 * step.dt_s
+    )
     accepted = accepted_impulse(raw, 2.0 * mass * caused, low, high, mobile)
     impulse = group_sum(strike, rows.impulse_n_s, count)
     audible = np.array([_can_sound(resonators[i]) or _can_sound(resonators[j]) for i, j in zip(low, high, strict=True)])
-    observed = np.flatnonzero((mass > 0) & (accepted > LEAST_JUMP_M_S * mass) & (raw * STEEPEST >= np.linalg.norm(impulse, axis=1)) & audible)
+    observed = np.flatnonzero(
+        (mass > 0) & (accepted > LEAST_JUMP_M_S * mass) & (raw * STEEPEST >= np.linalg.norm(impulse, axis=1)) & audible
+    )
     if not len(observed):
         return ()
-    return _blows(rows, strike, delay, observed, resonators, (low, high), mass, raw, accepted, approach, impulse, earliest_s, step.dt_s)
+    return _blows(
+        rows,
+        strike,
+        delay,
+        observed,
+        resonators,
+        (low, high),
+        mass,
+        raw,
+        accepted,
+        approach,
+        impulse,
+        earliest_s,
+        step.dt_s,
+    )
 
 
 def _blows(
@@ -125,7 +164,13 @@ def _blows(
     sides = [(resonators[pair[0][q]], resonators[pair[1][q]]) for q in observed]
     speed = np.where(approach[observed] > 0, approach[observed], accepted[observed] / (1.5 * mass[observed]))
     area = [
-        flat_area_m2(rows.point_m[bounds[i] : bounds[i + 1], 0], rows.load_n_s[bounds[i] : bounds[i + 1]], sides[i], float(bent[strongest[i]]), STRUCK_FLAT)
+        flat_area_m2(
+            rows.point_m[bounds[i] : bounds[i + 1], 0],
+            rows.load_n_s[bounds[i] : bounds[i + 1]],
+            sides[i],
+            float(bent[strongest[i]]),
+            STRUCK_FLAT,
+        )
         for i in range(len(observed))
     ]
     modulus = contact_modulus_pa(*(np.array([modulus_pa(side[i].body) for side in sides]) for i in (0, 1)))
@@ -134,7 +179,18 @@ def _blows(
     for i, q in enumerate(observed):
         pushed = [(side.omega_rad_s / (2 * np.pi), push) for side, push in zip(sides[i], pushes[i], strict=True)]
         share = compliant_share(float(mass[q]), float(accepted[q]), pushed, float(length[i]), bool(flat[i]))
-        pulses.append(ForcePulse(int(pair[0][q]), int(pair[1][q]), float(start[q]), float(length[i]), bool(flat[i]), scale[i] * impulse[q], *pushes[i], share))
+        pulses.append(
+            ForcePulse(
+                int(pair[0][q]),
+                int(pair[1][q]),
+                float(start[q]),
+                float(length[i]),
+                bool(flat[i]),
+                scale[i] * impulse[q],
+                *pushes[i],
+                share,
+            )
+        )
     return tuple(pulses)
 
 
@@ -147,11 +203,17 @@ def modulus_pa(body: Body) -> float:
     return body.material.plane_strain_pa if body.material is not None else np.inf
 
 
-def effective_mass(low: Sequence[Body], high: Sequence[Body], turn_low: Array, turn_high: Array, arm_m: Array, normal: Array) -> Array:
-    """m* (q,) in kg of pairs [synth.pulse]: orientations (q, 3, 3), levers (q, 2, 3) and normals (q, 3) in the world. 0 where neither can move."""
+def effective_mass(
+    low: Sequence[Body], high: Sequence[Body], turn_low: Array, turn_high: Array, arm_m: Array, normal: Array
+) -> Array:
+    """m* (q,) in kg of pairs [synth.pulse]:
+
+    orientations (q, 3, 3), levers (q, 2, 3) and normals (q, 3) in the world. 0 where neither can move.
+    """
     mass_low, mass_high = (np.array([body.mass_kg for body in bodies]) for bodies in (low, high))
     inertia_low, inertia_high = (
-        np.einsum("kij,kjl,kml->kim", turn, np.array([body.inertia_kg_m2 for body in bodies]), turn) for bodies, turn in ((low, turn_low), (high, turn_high))
+        np.einsum("kij,kjl,kml->kim", turn, np.array([body.inertia_kg_m2 for body in bodies]), turn)
+        for bodies, turn in ((low, turn_low), (high, turn_high))
     )
     moves = (mass_low > 0) | (mass_high > 0)
     columns = (mass_low, inertia_low, arm_m[:, 0], mass_high, inertia_high, arm_m[:, 1], normal)
@@ -168,8 +230,11 @@ def _start_s(rows: Rows, strike: Array, delay: Array, count: int, earliest_s: fl
     return np.clip(np.where(np.isfinite(meet), meet, 0.0), earliest_s, dt_s)
 
 
-def flat_area_m2(point_m: Array, load: Array, pair: tuple[Resonator, Resonator], curvature_per_m: float, least_share: float) -> float:
-    """Area of a flat contact, 0 where it is curved: the disc with the spread of the manifold's points (r, 3) under loads (r,).
+def flat_area_m2(
+    point_m: Array, load: Array, pair: tuple[Resonator, Resonator], curvature_per_m: float, least_share: float
+) -> float:
+    """Area of a flat contact, 0 where it is curved: the disc with the spread of the manifold's points (r, 3) under
+    loads (r,).
 
     least_share: of the smaller body's size, below which no flat contact's radius is taken to be.
     """

@@ -1,6 +1,8 @@
-"""How a body's modes radiate, computed once: the first scene with a model waits a second or two for it, the next ones do not.
+"""How a body's modes radiate, computed once: the first scene with a model waits a second or two for it, the next ones
+do not.
 
-sha256(frequencies, shapes, surface, air, source text of synth.far_field) -> weight, Δd in the cache that keeps the models themselves
+sha256(frequencies, shapes, surface, air, source text of synth.far_field) -> weight, Δd in the cache that keeps the
+models themselves
 """
 
 from __future__ import annotations
@@ -18,7 +20,10 @@ from sonic_bullet.synth import far_field as radiation
 
 SOURCES = tuple(Path(str(room.__file__)).resolve() for room in (radiation, added_mass))
 PACKAGES = ("numpy", "scipy", "numba")
-NO_SURFACE = ("a body's surface crosses itself or has no extent: how it radiates cannot be said", "build the model anew from a closed mesh")
+NO_SURFACE = (
+    "a body's surface crosses itself or has no extent: how it radiates cannot be said",
+    "build the model anew from a closed mesh",
+)
 LAYOUT = {name: store.Kept("f8", ("m",)) for name in ("real", "imag", "damping")}
 
 
@@ -32,7 +37,16 @@ def radiation_of(model: ModalModel, air: Air, cache: store.Place = "default") ->
     if m == 0 or len(model.face) == 0:
         return radiation.radiation(model, air)
     code = store.code_digest(SOURCES, PACKAGES)
-    name = store.key("radiation", model.freq_hz, model.shape, model.vertex_m, model.face, air.density_kg_m3, air.sound_speed_m_s, code=code)
+    name = store.key(
+        "radiation",
+        model.freq_hz,
+        model.shape,
+        model.vertex_m,
+        model.face,
+        air.density_kg_m3,
+        air.sound_speed_m_s,
+        code=code,
+    )
     known = _recall(store.load(cache, name, LAYOUT), m)
     if known is None:
         known = _solved(model, air)
@@ -41,7 +55,10 @@ def radiation_of(model: ModalModel, air: Air, cache: store.Place = "default") ->
 
 
 def _solved(model: ModalModel, air: Air) -> tuple[Array, Array]:
-    """`radiation` of a surface that has one. Raises ModalError where it has not: triangles that cross or meet themselves, or lie in one point."""
+    """`radiation` of a surface that has one.
+
+    Raises ModalError where it has not: triangles that cross or meet themselves, or lie in one point.
+    """
     try:
         weight, damping = radiation.radiation(model, air)
     except (ZeroDivisionError, np.linalg.LinAlgError) as error:

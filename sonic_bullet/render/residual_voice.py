@@ -1,12 +1,15 @@
-"""What sounds besides the modes of bodies whose material brings a residual: lines in the bank, grains of noise for strikes and rubbing.
+"""What sounds besides the modes of bodies whose material brings a residual: lines in the bank, grains of noise for
+strikes and rubbing.
 
-    Sounder + Residual -> Beside: lines as further modes (each struck as the mode it follows is), a voice for the noise (residual.grains)
-    ForcePulse -> a² of each pair of modes, at each sensor's weights -> Grain              level, place and pulse as the modes have them
+    Sounder + Residual -> Beside: lines as further modes (each struck as the mode it follows is), a voice for the noise
+        (residual.grains)
+    ForcePulse -> a² of each pair of modes, at each sensor's weights -> Grain
+        level, place and pulse as the modes have them
     Drive -> sections of force -> Grain
 
-Lines weigh i·c/a times what their mode weighs: a quarter turn away, so that at one frequency powers add, as a residual of powers says. Where a mode's
-frequency or decay hangs on its level, so do those of the lines that follow it.
-All is in the bank's units (Pa·m, or what another sensor reads), before the sound path; no gain of its own.
+Lines weigh i·c/a times what their mode weighs: a quarter turn away, so that at one frequency powers add, as a residual
+of powers says. Where a mode's frequency or decay hangs on its level, so do those of the lines that follow it. All is in
+the bank's units (Pa·m, or what another sensor reads), before the sound path; no gain of its own.
 """
 
 from __future__ import annotations
@@ -33,7 +36,11 @@ Rubs = Mapping[tuple[int, int, int], Rubbed]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ResidualVoice:
-    """One body's residual. lines: for the bank; follows (l,): the resonator's mode that each is struck as. group (m,): the voice's pair of each mode, or -1."""
+    """One body's residual.
+
+    lines: for the bank; follows (l,): the resonator's mode that each is struck as. group (m,): the voice's pair of each
+    mode, or -1.
+    """
 
     voice: Voice
     lines: ModeSet
@@ -44,7 +51,13 @@ class ResidualVoice:
 def build_residual_voice(resonator: Resonator, sr: int, air: Air) -> ResidualVoice | None:
     """A body's residual as it is played, or None where it has none, or no modes to follow."""
     material, model = resonator.body.material, resonator.body.model
-    if material is None or material.residual is None or model is None or not resonator.mode_count or not resonator.weight.any():
+    if (
+        material is None
+        or material.residual is None
+        or model is None
+        or not resonator.mode_count
+        or not resonator.weight.any()
+    ):
         return None
     voice = _voice(material.residual, model, air, sr)
     group = np.empty(resonator.mode_count, np.int64)
@@ -62,7 +75,14 @@ def build_residual_voice(resonator: Resonator, sr: int, air: Air) -> ResidualVoi
     bend, damping_growth = (None if x is None else x[follows] for x in (resonator.bend, resonator.damping_growth))
     return ResidualVoice(
         voice,
-        ModeSet(omega[keep], decay[keep], weight, bend=bend, damping_growth=damping_growth, damping_growth_power=resonator.damping_growth_power),
+        ModeSet(
+            omega[keep],
+            decay[keep],
+            weight,
+            bend=bend,
+            damping_growth=damping_growth,
+            damping_growth_power=resonator.damping_growth_power,
+        ),
         follows,
         group,
     )
@@ -70,12 +90,16 @@ def build_residual_voice(resonator: Resonator, sr: int, air: Air) -> ResidualVoi
 
 @lru_cache(maxsize=64)
 def _voice(residual: Residual, model: ModalModel, air: Air, sr: int) -> Voice:
-    """A voice, once for bodies that share residual and model (records are compared by identity); pairs by the modes' mean square over the surface."""
+    """A voice, once for bodies that share residual and model (records are compared by identity); pairs by the modes'
+    mean square over the surface.
+    """
     s = build_resonator(Body(0, -1, 0, "", 0.0, np.zeros((3, 3)), model=model), (), sr, air)
     order = np.argsort(s.omega_rad_s, kind="stable")
     shape = np.sqrt((s.shape.astype(float) ** 2).sum(axis=1).mean(axis=0)) if len(s.shape) else np.ones(s.mode_count)
     loud = np.abs(s.weight[0]) if s.weight[0].any() else np.ones(s.mode_count)
-    return make_voice(residual, StruckModes(s.omega_rad_s[order] / (2 * np.pi), s.decay_per_s[order], (loud * shape)[order]), sr)
+    return make_voice(
+        residual, StruckModes(s.omega_rad_s[order] / (2 * np.pi), s.decay_per_s[order], (loud * shape)[order]), sr
+    )
 
 
 @lru_cache(maxsize=2)
@@ -96,7 +120,13 @@ def struck_power(voice: ResidualVoice, weight: Array, push: Array) -> Array:
 
 
 def impact_grains(
-    impact: ForcePulse, step_start_s: float, resonators: Sequence[Resonator], voice: Sequence[ResidualVoice | None], sr: int, earliest: int, seed: int
+    impact: ForcePulse,
+    step_start_s: float,
+    resonators: Sequence[Resonator],
+    voice: Sequence[ResidualVoice | None],
+    sr: int,
+    earliest: int,
+    seed: int,
 ) -> list[Grain]:
     """What one strike adds on both bodies."""
     start = max((step_start_s + impact.start_s) * sr, float(earliest))
@@ -109,14 +139,22 @@ def impact_grains(
         number = mixed_number(seed, who.body_id, who.link + 1, who.epoch, int(start * 1048576))
         for w, weight in enumerate(resonators[body].weight):
             if weight.any():
-                pair, level = placed(mine.voice, struck_power(mine, weight, impact.share * push), impact.length_s, impact.flat, pulse)
+                pair, level = placed(
+                    mine.voice, struck_power(mine, weight, impact.share * push), impact.length_s, impact.flat, pulse
+                )
                 if level > 0:
                     grains.append(Grain(first, w, body, varied(pair, level, number)))
     return grains
 
 
 def friction_grains(
-    rubs: Rubs, drives: Sequence[Drive], resonators: Sequence[Resonator], voice: Sequence[ResidualVoice | None], at: int, n: int, seed: int
+    rubs: Rubs,
+    drives: Sequence[Drive],
+    resonators: Sequence[Resonator],
+    voice: Sequence[ResidualVoice | None],
+    at: int,
+    n: int,
+    seed: int,
 ) -> tuple[list[Grain], Rubs]:
     """Grains of the sections of rubbing that end within the n samples from ``at`` on, and what goes on afterwards."""
     driven = {(d.low, d.high, side): d for d in drives for side in (0, 1) if voice[(d.low, d.high)[side]] is not None}
@@ -133,7 +171,11 @@ def friction_grains(
         for number, force_n in sections:
             own = mixed_number(seed, who.body_id, who.link + 1, who.epoch, key[1 - key[2]], number)
             for w, weight in enumerate(resonators[body].weight):
-                sample = section_grain(mine.voice, force_n, struck_power(mine, weight, gain), own) if weight.any() else np.zeros(0)
+                sample = (
+                    section_grain(mine.voice, force_n, struck_power(mine, weight, gain), own)
+                    if weight.any()
+                    else np.zeros(0)
+                )
                 if len(sample):
                     grains.append(Grain((number + 2) * SECTION, w, body, sample))
     return grains, kept

@@ -1,12 +1,14 @@
-"""A body as the synthesizer plays it: its audible modes, their weights at each sensor, and where on its surface a contact lies.
+"""A body as the synthesizer plays it: its audible modes, their weights at each sensor, and where on its surface a
+contact lies.
 
     Body (records) + sensors + rate + air -> Sounder;  contact points -> Touch -> Uᵀf (participation)
 
-A rigid body that is pushed sounds too: acceleration noise. A sphere of radius a whose velocity jumps by U is heard as
-p = ρ₀c U (a/r) cosθ e^{-wt}(cos wt - sin wt), w = c/a [Kirchhoff 1876; Koss, Alfredson 1973, eq. 9]. That is the impulse response of a
-mode with decay w and frequency w, to the letter (synth.bank), so the three translations of a body are three more modes of the
-bank: strikes are exact there too. At low frequency it is the compact law p = 3ρ₀V cosθ/(8πcr)·da/dt [Chadwick, Zheng, James 2012],
-whose coefficient K makes ρ₀ca = 2Kw²; unlike it, it does not grow without bound where the body is no longer small.
+A rigid body that is pushed sounds too: acceleration noise. A sphere of radius a whose velocity jumps by U is heard as p
+= ρ₀c U (a/r) cosθ e^{-wt}(cos wt - sin wt), w = c/a [Kirchhoff 1876; Koss, Alfredson 1973, eq. 9]. That is the impulse
+response of a mode with decay w and frequency w, to the letter (synth.bank), so the three translations of a body are
+three more modes of the bank: strikes are exact there too. At low frequency it is the compact law p = 3ρ₀V
+cosθ/(8πcr)·da/dt [Chadwick, Zheng, James 2012], whose coefficient K makes ρ₀ca = 2Kw²; unlike it, it does not grow
+without bound where the body is no longer small.
 """
 
 from __future__ import annotations
@@ -31,8 +33,9 @@ FASTEST_RIGID = 0.6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Resonator:
-    """omega_rad_s, decay_per_s (m,): with the air's damping, once. weight (w, m): complex, one row a weight set (row 0: pressure at 1 m).
-    bend, damping_growth (m,): of frequency per |z|², of decay by (damping_growth·|z|)^damping_growth_power, None in a linear body. shape (v, 3, m) float32: audible modes only.
+    """omega_rad_s, decay_per_s (m,): with the air's damping, once. weight (w, m): complex, one row a weight set (row 0:
+    pressure at 1 m). bend, damping_growth (m,): of frequency per |z|², of decay by
+    (damping_growth·|z|)^damping_growth_power, None in a linear body. shape (v, 3, m) float32: audible modes only.
     size_m: cube root of the volume. jerk_pa_s3: dipole coefficient [Chadwick 2012]. dropped: modes not played.
     """
 
@@ -73,15 +76,25 @@ def weight_sets(sensors: tuple[Sensor, ...]) -> tuple[Sensor, ...]:
 def build_resonator(body: Body, sensors: tuple[Sensor, ...], sr: int, air: Air) -> Resonator:
     """Prepare one body. Modes at or above sr/2 and overdamped ones are dropped and counted.
 
-    The pressure weight of mode and microphone is the far-field map of `synth.far_field`; a vibrometer reads (φ(q)·n); the
-    seed's plain sum reads a·sin(ωt) for each mode [Ren et al. 2013, eq. 13], hence the turn by -i/(1 + i d/ω).
+    The pressure weight of mode and microphone is the far-field map of `synth.far_field`; a vibrometer reads (φ(q)·n);
+    the seed's plain sum reads a·sin(ωt) for each mode [Ren et al. 2013, eq. 13], hence the turn by -i/(1 + i d/ω).
     """
     model = body.model
     readers = weight_sets(sensors)
     if model is None:
         none = np.zeros(0)
         return Resonator(
-            body, none, none, np.zeros((1 + len(readers), 0), complex), np.zeros((0, 3, 0), np.float32), None, np.zeros((0, 3)), _size(body), 0.0, None, 0
+            body,
+            none,
+            none,
+            np.zeros((1 + len(readers), 0), complex),
+            np.zeros((0, 3, 0), np.float32),
+            None,
+            np.zeros((0, 3)),
+            _size(body),
+            0.0,
+            None,
+            0,
         )
     pressure, extra = radiation_of(model, air)
     omega0_squared = model.omega0_squared_per_s2
@@ -97,7 +110,11 @@ def build_resonator(body: Body, sensors: tuple[Sensor, ...], sr: int, air: Air) 
     for row, sensor in enumerate(readers, start=1):
         if isinstance(sensor, ModalSum):
             weight[row] = sensor.scale * -1j / (1 + 1j * decay / omega)
-        elif isinstance(sensor, Vibrometer) and (sensor.body_id, sensor.link) == (body.body_id, body.link) and index is not None:
+        elif (
+            isinstance(sensor, Vibrometer)
+            and (sensor.body_id, sensor.link) == (body.body_id, body.link)
+            and index is not None
+        ):
             face, barycentric, _ = nearest(index, sensor.point_m[None], None)
             weight[row] = participation(shape, model.face, face, barycentric, sensor.direction[None])
     corner = model.vertex_m[model.face]
@@ -106,10 +123,26 @@ def build_resonator(body: Body, sensors: tuple[Sensor, ...], sr: int, air: Air) 
     radius = float(np.linalg.norm(model.vertex_m, axis=1).max(initial=0.0))
     dropped = model.dropped + int(np.sum(~keep))
     rigid = _rigid(body, 1 + len(readers), sr, air)
-    most = np.sqrt((shape.astype(float) ** 2).sum(axis=1)).max(axis=0, initial=0.0)  # velocity at the surface of a mode with |z| = 1
+    # velocity at the surface of a mode with |z| = 1
+    most = np.sqrt((shape.astype(float) ** 2).sum(axis=1)).max(axis=0, initial=0.0)
     bend = None if model.bend_s2_m2 is None else model.bend_s2_m2[keep] * most**2
     damping_growth = None if model.damping_growth_s_m is None else model.damping_growth_s_m[keep] * most
-    return Resonator(body, omega, decay, weight, shape, index, normal, _size(body), radius, rigid, dropped, bend, damping_growth, model.damping_growth_power)
+    return Resonator(
+        body,
+        omega,
+        decay,
+        weight,
+        shape,
+        index,
+        normal,
+        _size(body),
+        radius,
+        rigid,
+        dropped,
+        bend,
+        damping_growth,
+        model.damping_growth_power,
+    )
 
 
 def _rigid(body: Body, sets: int, sr: int, air: Air) -> ModeSet | None:
@@ -128,7 +161,8 @@ def _size(body: Body) -> float:
 
 
 def touch_one(resonator: Resonator, point_m: Array, outward: Array) -> tuple[Array, Array, Array]:
-    """Face (k,), barycentric (k, 3) and curvature (k,) where contacts (k, 3) in the body frame, outward normals (k, 3), lie on the true surface.
+    """Face (k,), barycentric (k, 3) and curvature (k,) where contacts (k, 3) in the body frame, outward normals (k, 3),
+    lie on the true surface.
 
     Where the contact's normal leans more than 20° from the face's, an edge or corner is touched: its radius is taken as
     0.5 % of the body's size, at least 0.2 mm (a broken edge, as made things have).
@@ -150,12 +184,19 @@ def uplift(resonator: Resonator, face: Array, barycentric: Array, force: Array) 
     """Uᵀf (m,): forces (k, 3) in the body frame at contacts, onto the body's audible modes, summed."""
     if resonator.body.model is None or resonator.mode_count == 0:
         return np.zeros(resonator.mode_count)
-    return np.asarray(participation(resonator.shape, resonator.body.model.face, face, barycentric, np.ascontiguousarray(force)))
+    return np.asarray(
+        participation(resonator.shape, resonator.body.model.face, face, barycentric, np.ascontiguousarray(force))
+    )
 
 
 @njit(nogil=True)
-def participation(shape: Array, face: Array, at_face: Array, barycentric: Array, force: Array) -> Array:  # pragma: no cover - compiled
-    """Σ over contacts of the shapes, linear in the triangle, times the force: (v, 3, m), (f, 3), (k,), (k, 3), (k, 3) -> (m,)."""
+def participation(
+    shape: Array, face: Array, at_face: Array, barycentric: Array, force: Array
+) -> Array:  # pragma: no cover - compiled
+    """Σ over contacts of the shapes, linear in the triangle, times the force:
+
+    (v, 3, m), (f, 3), (k,), (k, 3), (k, 3) -> (m,).
+    """
     modes = shape.shape[2]
     total = np.zeros(modes)
     for k in range(len(at_face)):

@@ -1,4 +1,6 @@
-"""Rotation matrices of quaternions (x, y, z, w), vectorised over rows [Kuipers, Quaternions and Rotation Sequences, 1999, sec. 5.15]."""
+"""Rotation matrices of quaternions (x, y, z, w), vectorised over rows [Kuipers, Quaternions and Rotation Sequences,
+1999, sec. 5.15].
+"""
 
 from __future__ import annotations
 

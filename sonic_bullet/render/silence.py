@@ -1,6 +1,7 @@
 """Why a render is silent, read off its log: what a user would otherwise look for with a debugger.
 
-samples + ContactLog -> silent? -> the first of: no microphone, no step, nothing added, moved by hand, nothing touched, only others touched,
+samples + ContactLog -> silent? -> the first of: no microphone, no step, nothing added, moved by hand, nothing touched,
+only others touched,
                                    no audible mode, a vibrometer elsewhere, support at rest, not there yet
 """
 
@@ -20,7 +21,9 @@ from sonic_bullet.synth.strikes import SPAN
 BY_HAND = 0.5
 """Share of its steps in which a body was set elsewhere by hand, from which on that is what moves it."""
 SLIDES_M_S = 1e-3
-"""Speed of a contact over a surface below which nothing rolls or slides: a settled pile creeps at a tenth of it (synth.strikes)."""
+"""Speed of a contact over a surface below which nothing rolls or slides: a settled pile creeps at a tenth of it
+(synth.strikes).
+"""
 NAMED = 3
 
 
@@ -85,26 +88,38 @@ def _mute(log: ContactLog, resonators: list[Resonator]) -> str | None:
         there = {(resonator.body.body_id, resonator.body.link) for resonator in ringing}
         if ringing and not any((sensor.body_id, sensor.link) in there for sensor in readers):
             places = ", ".join(sorted({f"body {sensor.body_id} link {sensor.link}" for sensor in readers}))
-            return f"the vibrometer reads {places}, and only {_names(s.body for s in ringing)} was touched; put it there"
+            return (
+                f"the vibrometer reads {places}, and only {_names(s.body for s in ringing)} was touched; put it there"
+            )
     if ringing:
         return None
-    if any(isinstance(sensor, Microphone) for sensor in log.sensors) and any(resonator.rigid is not None for resonator in resonators):
+    if any(isinstance(sensor, Microphone) for sensor in log.sensors) and any(
+        resonator.rigid is not None for resonator in resonators
+    ):
         return None  # it clicks
-    higher = [resonator.body for resonator in resonators if resonator.body.model is not None and resonator.body.model.mode_count]
+    higher = [
+        resonator.body
+        for resonator in resonators
+        if resonator.body.model is not None and resonator.body.model.mode_count
+    ]
     if higher:
         return f"no audible mode: those of {_names(higher)} are at or above half the sample rate, {log.sr / 2:g} Hz, or overdamped; give a higher sr"
-    return (
-        f"no audible mode: {_names(resonator.body for resonator in resonators)} has none below 20 kHz and does not move freely; a larger or thinner body rings"
-    )
+    return f"no audible mode: {_names(resonator.body for resonator in resonators)} has none below 20 kHz and does not move freely; a larger or thinner body rings"
 
 
 def _at_rest(log: ContactLog, rows: Contacts, mine: Array) -> str | None:
-    """Whether all that happens is that bodies lie: nothing came faster than gravity brings it while it settles, nothing slid or rolled."""
+    """Whether all that happens is that bodies lie: nothing came faster than gravity brings it while it settles, nothing
+    slid or rolled.
+    """
     step = log.step[mine]
     fall = np.array([one.gravity_m_s2 * one.dt_s for one in log.steps])[step]
-    settling = SPAN * (1.1 * np.abs(np.einsum("ki,ki->k", fall, rows.normal[mine])) + 0.01 * np.linalg.norm(fall, axis=1))  # as synth.strikes has it
+    # as synth.strikes has it
+    settling = SPAN * (
+        1.1 * np.abs(np.einsum("ki,ki->k", fall, rows.normal[mine])) + 0.01 * np.linalg.norm(fall, axis=1)
+    )
     slides = np.unique(step[(rows.sweep_m_s[mine] > SLIDES_M_S).any(axis=1)])
-    if (rows.approach_m_s[mine] > settling).any() or len(slides) > SPAN:  # what is shorter is no support yet, but settling
+    # what is shorter is no support yet, but settling
+    if (rows.approach_m_s[mine] > settling).any() or len(slides) > SPAN:
         return None
     fastest = float(rows.approach_m_s[mine].max())
     return f"all {len(mine)} contacts are support at rest: nothing approached faster than {max(fastest, 0.0):.2g} m/s and nothing slid; let something fall"
@@ -124,5 +139,7 @@ def _arrives_late(log: ContactLog, mine: Array) -> str | None:
 
 
 def _names(bodies: Iterable[Body]) -> str:
-    names = [body.name if body.name == f"body {body.body_id}" else f"{body.name} (body {body.body_id})" for body in bodies]
+    names = [
+        body.name if body.name == f"body {body.body_id}" else f"{body.name} (body {body.body_id})" for body in bodies
+    ]
     return ", ".join(names[:NAMED]) + (f" and {len(names) - NAMED} more" if len(names) > NAMED else "")

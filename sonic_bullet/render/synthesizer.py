@@ -1,11 +1,13 @@
 """The run time: physics steps in, frames of sound out, with one explicit state between.
 
-    Step -> loads (synth.strikes) -> impacts, friction -> bank of modes and of rigid motions (synth.bank) + residual -> sound path (synth.path) -> frame
+    Step -> loads (synth.strikes) -> impacts, friction -> bank of modes and of rigid motions (synth.bank) + residual ->
+        sound path (synth.path) -> frame
 
-Each body has five places in the bank: its modes, its three translations (see resonator.py), and the lines of its residual (see residual_voice.py).
+Each body has five places in the bank: its modes, its three translations (see resonator.py), and the lines of its
+residual (see residual_voice.py).
 
-A step's sound is made when the `LOOKAHEAD` steps after it are known. Live listening, `sound` (which drains a copy of the state)
-and the replay of a log run the same code on the same numbers in the same order: the same bits.
+A step's sound is made when the `LOOKAHEAD` steps after it are known. Live listening, `sound` (which drains a copy of
+the state) and the replay of a log run the same code on the same numbers in the same order: the same bits.
 """
 
 from __future__ import annotations
@@ -22,7 +24,14 @@ from sonic_bullet.render.clock import Clock, exact_step
 from sonic_bullet.render.friction_voice import Drive, FrictionVoice, advance_friction
 from sonic_bullet.render.impacts import ForcePulse, find_pulses
 from sonic_bullet.render.manifold import Rows, orient
-from sonic_bullet.render.residual_voice import ResidualVoice, Rubs, build_residual_voice, friction_grains, impact_grains, line_modes
+from sonic_bullet.render.residual_voice import (
+    ResidualVoice,
+    Rubs,
+    build_residual_voice,
+    friction_grains,
+    impact_grains,
+    line_modes,
+)
 from sonic_bullet.render.resonator import Resonator, build_resonator, weight_sets
 from sonic_bullet.residual.player import Grain, add_grains
 from sonic_bullet.synth import bank, path
@@ -39,7 +48,10 @@ CELLS_PER_RADIAN = 4.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Setup:
-    """What does not change while listening: rate in Hz, sensors (a channel each), seed and medium; residual: whether those of materials are heard."""
+    """What does not change while listening: rate in Hz, sensors (a channel each), seed and medium;
+
+    residual: whether those of materials are heard.
+    """
 
     sr: int
     sensors: tuple[Sensor, ...]
@@ -55,8 +67,9 @@ class Setup:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class State:
-    """All that the next frame hangs on. number: of the step to be rendered next; window: that step and those known after it, rows: their contacts.
-    placed (b,): step in which each body began or was last moved by hand. quenches: steps before which all is to stop ringing. voices (b): their residuals; grains, rubs: what of those is under way.
+    """All that the next frame hangs on. number: of the step to be rendered next; window: that step and those known
+    after it, rows: their contacts. placed (b,): step in which each body began or was last moved by hand. quenches:
+    steps before which all is to stop ringing. voices (b): their residuals; grains, rubs: what of those is under way.
     """
 
     number: int
@@ -81,7 +94,20 @@ def start(setup: Setup) -> State:
     """Silence at time 0, nobody there."""
     instrument, ringing = bank.empty_bank(setup.sr, 1 + len(weight_sets(setup.sensors)))
     air, travelling = path.empty_path(setup.sr, setup.air, setup.microphone_m)
-    return State(0, Clock(), (), (), LoadHistory.empty(), (), instrument, ringing, air, travelling, FrictionVoice.none(), np.zeros(0, np.int64))
+    return State(
+        0,
+        Clock(),
+        (),
+        (),
+        LoadHistory.empty(),
+        (),
+        instrument,
+        ringing,
+        air,
+        travelling,
+        FrictionVoice.none(),
+        np.zeros(0, np.int64),
+    )
 
 
 def with_bodies(setup: Setup, state: State, bodies: Sequence[Body]) -> State:
@@ -94,7 +120,14 @@ def with_bodies(setup: Setup, state: State, bodies: Sequence[Body]) -> State:
         part
         for s, more in zip(new, voices, strict=True)
         for part in (
-            bank.ModeSet(s.omega_rad_s, s.decay_per_s, s.weight, bend=s.bend, damping_growth=s.damping_growth, damping_growth_power=s.damping_growth_power),
+            bank.ModeSet(
+                s.omega_rad_s,
+                s.decay_per_s,
+                s.weight,
+                bend=s.bend,
+                damping_growth=s.damping_growth,
+                damping_growth_power=s.damping_growth_power,
+            ),
             *((s.rigid or _nothing(setup),) * 3),
             line_modes(more, len(s.weight)),
         )
@@ -102,9 +135,20 @@ def with_bodies(setup: Setup, state: State, bodies: Sequence[Body]) -> State:
     instrument, ringing = bank.append(state.bank, state.ringing, modes)
     air, travelling = path.append_bodies(state.path, state.travelling, *_places(new))
     # a silent partner's record begins where it first touches, not where it was put
-    placed = np.concatenate([state.placed, [body.since_step if body.material is not None else -SPAN for body in bodies]]).astype(np.int64)
+    placed = np.concatenate(
+        [state.placed, [body.since_step if body.material is not None else -SPAN for body in bodies]]
+    ).astype(np.int64)
     resonators, both = state.resonators + new, state.voices + voices
-    return replace(state, placed=placed, resonators=resonators, voices=both, bank=instrument, ringing=ringing, path=air, travelling=travelling)
+    return replace(
+        state,
+        placed=placed,
+        resonators=resonators,
+        voices=both,
+        bank=instrument,
+        ringing=ringing,
+        path=air,
+        travelling=travelling,
+    )
 
 
 def _places(resonators: tuple[Resonator, ...]) -> tuple[Array, Array]:
@@ -121,7 +165,12 @@ def take_step(setup: Setup, state: State, step: Step) -> tuple[Array | None, Sta
 
     The bank's and the path's arrays change in place: `copied` a state first to come back to it.
     """
-    state = replace(state, window=(*state.window, step), rows=(*state.rows, orient(step)), loads=push(state.loads, step.contacts, step.dt_s))
+    state = replace(
+        state,
+        window=(*state.window, step),
+        rows=(*state.rows, orient(step)),
+        loads=push(state.loads, step.contacts, step.dt_s),
+    )
     if len(state.window) <= LOOKAHEAD:
         return None, state
     frame, state = _render(setup, state)
@@ -134,27 +183,41 @@ def copied(state: State) -> State:
 
 
 def drained(setup: Setup, state: State) -> Array:
-    """(channels, n) sound of the steps taken in but not yet rendered, as if nothing touched any more afterwards. ``state`` stays."""
+    """(channels, n) sound of the steps taken in but not yet rendered, as if nothing touched any more afterwards.
+
+    ``state`` stays.
+    """
     state = copied(state)
     frames = [np.zeros((len(setup.sensors), 0))]
     missing = len(state.window)
     for _ in range(LOOKAHEAD if missing else 0):
         last = state.window[-1]
-        frame, state = take_step(setup, state, replace(last, contacts=Contacts.none(), teleported=np.zeros(len(last.teleported), bool)))
+        frame, state = take_step(
+            setup, state, replace(last, contacts=Contacts.none(), teleported=np.zeros(len(last.teleported), bool))
+        )
         if frame is not None and len(frames) <= missing:
             frames.append(frame)
     return np.concatenate(frames, axis=1)
 
 
 def quenched(state: State) -> State:
-    """Nothing rings from the next sample on; strikes under way and the sound still travelling to the microphones are gone too.
+    """Nothing rings from the next sample on; strikes under way and the sound still travelling to the microphones are
+    gone too.
 
     Loads, and what rubs, stay: a ball that rolls rolls on.
     """
     air, travelling = path.empty_path(state.path.sr, state.path.air, state.path.microphone_m, state.travelling.at)
     air, travelling = path.append_bodies(air, travelling, *_places(state.resonators))
     still_to_come = frozenset(number for number in state.quenches if number > state.number)
-    return replace(state, ringing=bank.silence(state.ringing), path=air, travelling=travelling, grains=(), rubs={}, quenches=still_to_come)
+    return replace(
+        state,
+        ringing=bank.silence(state.ringing),
+        path=air,
+        travelling=travelling,
+        grains=(),
+        rubs={},
+        quenches=still_to_come,
+    )
 
 
 def _render(setup: Setup, state: State) -> tuple[Array, State]:
@@ -170,26 +233,59 @@ def _render(setup: Setup, state: State) -> tuple[Array, State]:
     moved = np.flatnonzero(window[1].teleported)
     placed[moved] = state.number + 1
     parts, loads = split(state.loads, ahead=0)  # of the first step, and what was not sure a step ago
-    pulses = [(float(clock.time_s), pulse) for pulse in find_pulses(parts, rows, step, resonators, state.number - placed < SPAN, 0.0)]
+    pulses = [
+        (float(clock.time_s), pulse)
+        for pulse in find_pulses(parts, rows, step, resonators, state.number - placed < SPAN, 0.0)
+    ]
     parts, marked = split(loads)
-    if state.number + 1 not in state.quenches:  # else what strikes after the quench would be dated back before it, and be lost: it waits for its own step
+    # else what strikes after the quench would be dated back before it, and be lost: it waits for its own step
+    if state.number + 1 not in state.quenches:
         loads = marked
-        pulses += [(float(after.time_s), pulse) for pulse in find_pulses(parts, rows[1:], window[1], resonators, state.number + 1 - placed < SPAN, -step.dt_s)]
+        pulses += [
+            (float(after.time_s), pulse)
+            for pulse in find_pulses(
+                parts, rows[1:], window[1], resonators, state.number + 1 - placed < SPAN, -step.dt_s
+            )
+        ]
     drives, friction = advance_friction(state.friction, parts, step, window[1], rows[1], resonators, x, sr, setup.seed)
     first, voices = clock.sample(sr), state.voices
-    strikes = [strike for begin_s, pulse in pulses for strike in _strikes(pulse, begin_s, resonators, voices, sr, first)]
+    strikes = [
+        strike for begin_s, pulse in pulses for strike in _strikes(pulse, begin_s, resonators, voices, sr, first)
+    ]
     sound = bank.advance(state.bank, state.ringing, count, strikes, _forces(drives, resonators, voices, x), x)
     more, rubs = friction_grains(state.rubs, drives, resonators, voices, first, count, setup.seed)
-    grains = (*state.grains, *(g for begin_s, pulse in pulses for g in impact_grains(pulse, begin_s, resonators, voices, sr, first, setup.seed)), *more)
+    grains = (
+        *state.grains,
+        *(
+            g
+            for begin_s, pulse in pulses
+            for g in impact_grains(pulse, begin_s, resonators, voices, sr, first, setup.seed)
+        ),
+        *more,
+    )
     if any(more is not None for more in voices):
         sound[:, 0::PLACES] += sound[:, 4::PLACES]
     grains = add_grains(sound[:, 0::PLACES], grains, first)
     frame = _at_sensors(setup, state, sound, x)
-    return frame, replace(state, number=state.number + 1, clock=after, loads=loads, friction=friction, placed=placed, grains=grains, rubs=rubs)
+    return frame, replace(
+        state,
+        number=state.number + 1,
+        clock=after,
+        loads=loads,
+        friction=friction,
+        placed=placed,
+        grains=grains,
+        rubs=rubs,
+    )
 
 
 def _strikes(
-    pulse: ForcePulse, step_start_s: float, resonators: tuple[Resonator, ...], voices: tuple[ResidualVoice | None, ...], sr: int, earliest: int
+    pulse: ForcePulse,
+    step_start_s: float,
+    resonators: tuple[Resonator, ...],
+    voices: tuple[ResidualVoice | None, ...],
+    sr: int,
+    earliest: int,
 ) -> list[bank.Strike]:
     """The pulse on the modes, translations and residual lines of both bodies."""
     offset_s, spacing_s, weight = pulse_nodes(pulse.length_s, sr, flat=pulse.flat)
@@ -204,16 +300,27 @@ def _strikes(
             strikes.append(bank.Strike(PLACES * body, start + offset_s * sr, spacing_s * sr, weight, modes))
             more = voices[body]
             if more is not None and len(more.follows):
-                strikes.append(bank.Strike(PLACES * body + 4, start + offset_s * sr, spacing_s * sr, weight, modes[more.follows]))
+                strikes.append(
+                    bank.Strike(PLACES * body + 4, start + offset_s * sr, spacing_s * sr, weight, modes[more.follows])
+                )
         rigid = resonators[body].rigid
         if rigid is not None:
-            cells = pulse_cells(start, pulse.length_s, sr, int(np.ceil(CELLS_PER_RADIAN * rigid.decay_per_s[0] / sr)), flat=pulse.flat)
-            strikes += [bank.Strike(PLACES * body + 1 + int(axis), *cells, shove[axis : axis + 1]) for axis in np.flatnonzero(shove)]
+            cells = pulse_cells(
+                start, pulse.length_s, sr, int(np.ceil(CELLS_PER_RADIAN * rigid.decay_per_s[0] / sr)), flat=pulse.flat
+            )
+            strikes += [
+                bank.Strike(PLACES * body + 1 + int(axis), *cells, shove[axis : axis + 1])
+                for axis in np.flatnonzero(shove)
+            ]
     return strikes
 
 
-def _forces(drives: Sequence[Drive], resonators: tuple[Resonator, ...], voices: tuple[ResidualVoice | None, ...], x: Array) -> list[bank.Force]:
-    """Drives on modes and residual lines, each with its own gains, and on translations, where all forces on a body act as one."""
+def _forces(
+    drives: Sequence[Drive], resonators: tuple[Resonator, ...], voices: tuple[ResidualVoice | None, ...], x: Array
+) -> list[bank.Force]:
+    """Drives on modes and residual lines, each with its own gains, and on translations, where all forces on a body act
+    as one.
+    """
     forces = []
     pushes: dict[int, Array] = {}
     for drive in drives:
@@ -223,15 +330,26 @@ def _forces(drives: Sequence[Drive], resonators: tuple[Resonator, ...], voices: 
                 forces.append(bank.Force(PLACES * body, drive.force_n, drive.gain0[side], drive.gain1[side]))
                 more = voices[body]
                 if more is not None and len(more.follows):
-                    forces.append(bank.Force(PLACES * body + 4, drive.force_n, drive.gain0[side][more.follows], drive.gain1[side][more.follows]))
+                    forces.append(
+                        bank.Force(
+                            PLACES * body + 4,
+                            drive.force_n,
+                            drive.gain0[side][more.follows],
+                            drive.gain1[side][more.follows],
+                        )
+                    )
             if resonators[body].rigid is not None:
                 pushes[body] = pushes.get(body, 0.0) + (push if side == 0 else -push)
     one = np.ones(1)
-    return forces + [bank.Force(PLACES * body + 1 + axis, push[axis], one, one) for body, push in pushes.items() for axis in range(3)]
+    return forces + [
+        bank.Force(PLACES * body + 1 + axis, push[axis], one, one) for body, push in pushes.items() for axis in range(3)
+    ]
 
 
 def _at_sensors(setup: Setup, state: State, sound: Array, x: Array) -> Array:
-    """(channels, n) of the bank's sound (W, PLACES·b, n): microphones hear through the air, the others sum their weight set over the bodies."""
+    """(channels, n) of the bank's sound (W, PLACES·b, n): microphones hear through the air, the others sum their weight
+    set over the bodies.
+    """
     modal, pushed = sound[:, 0::PLACES], np.stack([sound[0, part::PLACES] for part in (1, 2, 3)], axis=1)
     here, there, newest = state.window[0], state.window[1], state.window[-1]
     end = newest.position_m.copy()  # of bodies that came later than this step: where they came
@@ -275,7 +393,8 @@ class Synthesizer:
         return float(self._clock.time_s)
 
     def feed(self, step: Step, bodies: tuple[Body, ...]) -> Array:
-        """Take in a step; the frame (channels, n) as long as the step, LATENCY_STEPS late. bodies: all that are known by now.
+        """Take in a step; the frame (channels, n) as long as the step, LATENCY_STEPS late. bodies: all that are known
+        by now.
 
         Without a sensor nothing is computed but the time.
         """
@@ -289,7 +408,8 @@ class Synthesizer:
         self._state = with_bodies(self._setup, self._state, bodies[len(self._state.resonators) : len(step.position_m)])
         frame, self._state = take_step(self._setup, self._state, step)
         if frame is None:
-            # where a step is no whole number of samples (44.1 kHz at 240 Hz), one more, so that uneven frames never run dry
+            # where a step is no whole number of samples (44.1 kHz at 240 Hz), one more, so that uneven frames never run
+            # dry
             uneven = (exact_step(step.dt_s) * self._setup.sr).denominator != 1
             fresh = np.zeros((channels, count + (uneven and self._steps == 1)))
         else:
@@ -305,9 +425,13 @@ class Synthesizer:
         """(channels, floor(sr·time)) all sound so far, without lag."""
         if not self._setup.sensors:
             return np.zeros((0, self._clock.sample(self._setup.sr)))
-        return np.concatenate([np.zeros((len(self._setup.sensors), 0)), *self._frames, drained(self._setup, self._state)], axis=1)
+        return np.concatenate(
+            [np.zeros((len(self._setup.sensors), 0)), *self._frames, drained(self._setup, self._state)], axis=1
+        )
 
     def quench(self) -> None:
-        """Stop all that rings where the steps taken in so far end, exactly there at any rate: in frames that is LATENCY_STEPS later."""
+        """Stop all that rings where the steps taken in so far end, exactly there at any rate: in frames that is
+        LATENCY_STEPS later.
+        """
         if self._setup.sensors:
             self._state = replace(self._state, quenches=self._state.quenches | {self._steps})

@@ -1,6 +1,7 @@
 """One page that opens offline: the verdict in words, what to hear, what to see, and each candidate effect's evidence.
 
-    Diagnosis -> players (WAV, 16 bit, one scale for all three sounds of a strike), spectrograms, (f, d) plane, table of candidate effects -> one HTML file
+    Diagnosis -> players (WAV, 16 bit, one scale for all three sounds of a strike), spectrograms, (f, d) plane, table of
+        candidate effects -> one HTML file
 
 Sounds and pictures stand in the page itself as data; nothing is fetched, nothing runs.
 """
@@ -72,13 +73,20 @@ def _effects(d: Diagnosis) -> str:
         )
         for c in d.closed.added
     ]
-    return "<h2>What was added</h2>" + _table(("effect", "belongs to", "parameters", "nearer on strikes left out", "chance", "source"), rows) if rows else ""
+    return (
+        "<h2>What was added</h2>"
+        + _table(("effect", "belongs to", "parameters", "nearer on strikes left out", "chance", "source"), rows)
+        if rows
+        else ""
+    )
 
 
 def _errors(d: Diagnosis) -> str:
     rows = []
     for split in ("fit", "holdout", "transfer"):
-        values = [d.errors[side].get(split) for side in ("before", "after")] + [d.errors_sone[side].get(split) for side in ("before", "after")]
+        values = [d.errors[side].get(split) for side in ("before", "after")] + [
+            d.errors_sone[side].get(split) for side in ("before", "after")
+        ]
         if any(v is not None for v in values) or split in d.not_compared:
             rows.append((split, *(f"{v:.2f}" if v is not None else _why_none(d, split) for v in values)))
     floor = f"Two noisy takes of one sound: {d.errors['floor']:.2f} dB." if d.errors["floor"] is not None else ""
@@ -92,10 +100,14 @@ def _why_none(d: Diagnosis, split: str) -> str:
 def _players(d: Diagnosis) -> str:
     parts = []
     for take in [t for t in d.takes if np.isfinite(t.sample).all()][:SHOWN]:
-        before, after = (play(h, take.body, take.strike, len(take.sample), take.sr) for h in (d.closed.before, d.closed.after))
+        before, after = (
+            play(h, take.body, take.strike, len(take.sample), take.sr) for h in (d.closed.before, d.closed.after)
+        )
         peak = max(float(np.abs(x).max()) for x in (take.sample, before, after)) or 1.0
         sounds = (("recorded", take.sample), ("before", before), ("after", after))
-        row = "".join(f"<p>{label} <audio controls src='{_wav(x / peak * PEAK, take.sr)}'></audio></p>" for label, x in sounds)
+        row = "".join(
+            f"<p>{label} <audio controls src='{_wav(x / peak * PEAK, take.sr)}'></audio></p>" for label, x in sounds
+        )
         file = take.body.recordings[take.strike].file
         parts.append(
             f"<h3>{html.escape(file.name if file else 'strike')}</h3>{row}{_figure(_spectrograms(sounds, take.sr), 'recorded, before, after; dB below the loudest')}"
@@ -111,20 +123,37 @@ def _plane(d: Diagnosis) -> str:
     figure, axis = plt.subplots(figsize=(9, 4.5))
     before, after = object_evidence(d.closed.before, body), object_evidence(d.closed.after, body)
     axis.plot(before.freq_hz, before.decay_per_s, "k.", label="observed lines")
-    axis.vlines(before.freq_hz, before.expected_decay_per_s, before.decay_per_s, color="0.7", lw=1, label="residual before")
+    axis.vlines(
+        before.freq_hz, before.expected_decay_per_s, before.decay_per_s, color="0.7", lw=1, label="residual before"
+    )
     axis.plot(before.freq_hz, before.expected_decay_per_s, "x", color="#c33", label="model before")
     axis.plot(after.freq_hz, after.expected_decay_per_s, "+", color="#28c", label="model after")
     if len(before.foreign_hz):
-        axis.plot(before.foreign_hz, np.maximum(before.foreign_decay_per_s, 0.02), "o", mfc="none", color="#888", label="lines that are no mode")
+        axis.plot(
+            before.foreign_hz,
+            np.maximum(before.foreign_decay_per_s, 0.02),
+            "o",
+            mfc="none",
+            color="#888",
+            label="lines that are no mode",
+        )
     axis.set(xlabel="frequency in Hz", ylabel="decay in 1/s", yscale="log")
     axis.legend(frameon=False)
-    return "<h2>Frequencies and decays</h2>" + _figure(_png(figure), "each observed line, and where the model has its mode")
+    return "<h2>Frequencies and decays</h2>" + _figure(
+        _png(figure), "each observed line, and where the model has its mode"
+    )
 
 
 def _candidates(d: Diagnosis) -> str:
     kept = {c.id for c in d.closed.added}
     rows = [
-        (c.id, "added" if c.id in kept else "no", f"{c.mean_db:+.2f}", f"{c.control_db:+.2f}", " ".join(f"{x:+.2f}" for x in c.drop_db))
+        (
+            c.id,
+            "added" if c.id in kept else "no",
+            f"{c.mean_db:+.2f}",
+            f"{c.control_db:+.2f}",
+            " ".join(f"{x:+.2f}" for x in c.drop_db),
+        )
         for c in sorted(d.closed.tried, key=lambda c: -c.mean_db)
     ]
     head = ("candidate", "kept", "nearer, dB", "chance, dB", "strike by strike, each left out in turn")
@@ -174,7 +203,15 @@ def _spectrograms(sounds: Any, sr: int) -> str:
         tables.append(10 * np.log10(np.abs(np.fft.rfft(frames * shape, axis=1)).T ** 2 + 1e-20))
     top = max(float(t.max()) for t in tables)
     for axis, (label, x), table in zip(axes, sounds, tables, strict=True):
-        image = axis.imshow(table - top, origin="lower", aspect="auto", extent=(0, len(x) / sr, 0, sr / 2000), vmin=-90, vmax=0, cmap="magma")
+        image = axis.imshow(
+            table - top,
+            origin="lower",
+            aspect="auto",
+            extent=(0, len(x) / sr, 0, sr / 2000),
+            vmin=-90,
+            vmax=0,
+            cmap="magma",
+        )
         axis.set(title=label, xlabel="time in s")
     axes[0].set_ylabel("frequency in kHz")
     figure.colorbar(image, ax=axes, label="dB")

@@ -1,9 +1,10 @@
 """A residual in a preset file: numbers about a sound, no sound.
 
-    modes, lines: f, d, a as lists;   noise: centres of bands and times, levels in half decibels below the loudest, a byte each, base64
+    modes, lines: f, d, a as lists;
+        noise: centres of bands and times, levels in half decibels below the loudest, a byte each, base64
 
-Byte 0 is silence, byte q stands for ½(q - 255) dB. Levels are of powers per Hz over bands a sixth of an octave wide or wider, frames that grow with
-time: no phase, no waveform.
+Byte 0 is silence, byte q stands for ½(q - 255) dB. Levels are of powers per Hz over bands a sixth of an octave wide or
+wider, frames that grow with time: no phase, no waveform.
 """
 
 from __future__ import annotations
@@ -46,10 +47,18 @@ def form_of(residual: Residual) -> ResidualForm:
     """The compact form; `residual_of` gives the same back to a quarter of a decibel."""
     loudest = float(residual.power_per_hz.max(initial=0.0))
     with np.errstate(divide="ignore"):
-        level = 10 * np.log10(residual.power_per_hz / loudest) if loudest > 0 else np.full(residual.power_per_hz.shape, -np.inf)
+        level = (
+            10 * np.log10(residual.power_per_hz / loudest)
+            if loudest > 0
+            else np.full(residual.power_per_hz.shape, -np.inf)
+        )
     level = np.where(np.isfinite(level), level, -1e9)
     byte = np.clip(np.round(255 + level / STEP_DB), 0, 255).astype(np.uint8)
-    parts = {f"{part}_{name}": _short(getattr(residual, f"{part}_{name}")) for part in ("mode", "line") for name in ("freq_hz", "decay_per_s", "amplitude")}
+    parts = {
+        f"{part}_{name}": _short(getattr(residual, f"{part}_{name}"))
+        for part in ("mode", "line")
+        for name in ("freq_hz", "decay_per_s", "amplitude")
+    }
     return ResidualForm(
         source=residual.source, **parts, freq_hz=_short(residual.freq_hz), time_s=_short(residual.time_s), loudest_per_hz=loudest,
         levels=base64.b64encode(byte.tobytes()).decode(), clip_energy=residual.clip_energy,
@@ -64,12 +73,29 @@ def residual_of(form: ResidualForm, where: str = "preset") -> Residual:
     except (binascii.Error, ValueError) as error:
         raise MaterialError(f"{where}: residual levels are not base64", "take the residual anew") from error
     if len(content) != shape[0] * shape[1] or len(content) > MOST_CELLS:
-        raise MaterialError(f"{where}: residual holds {len(content)} levels for {shape[0]} bands and {shape[1]} times", "take the residual anew")
+        raise MaterialError(
+            f"{where}: residual holds {len(content)} levels for {shape[0]} bands and {shape[1]} times",
+            "take the residual anew",
+        )
     byte = np.frombuffer(content, np.uint8).reshape(shape).astype(float)
     power = np.where(byte > 0, form.loudest_per_hz * 10 ** (STEP_DB * (byte - 255) / 10), 0.0)
-    names = ("mode_freq_hz", "mode_decay_per_s", "mode_amplitude", "line_freq_hz", "line_decay_per_s", "line_amplitude", "freq_hz", "time_s")
+    names = (
+        "mode_freq_hz",
+        "mode_decay_per_s",
+        "mode_amplitude",
+        "line_freq_hz",
+        "line_decay_per_s",
+        "line_amplitude",
+        "freq_hz",
+        "time_s",
+    )
     try:
-        return Residual(**{name: np.array(getattr(form, name)) for name in names}, power_per_hz=power, clip_energy=form.clip_energy, source=form.source)
+        return Residual(
+            **{name: np.array(getattr(form, name)) for name in names},
+            power_per_hz=power,
+            clip_energy=form.clip_energy,
+            source=form.source,
+        )
     except RecordError as error:
         raise MaterialError(f"{where}: {error.what}", error.remedy) from error
 

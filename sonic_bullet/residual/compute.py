@@ -1,12 +1,15 @@
-"""The residual of a recording: what is left of its power when what the modes represent is taken off [Ren, Yeh, Lin 2013, sec. 6.1].
+"""The residual of a recording: what is left of its power when what the modes represent is taken off [Ren, Yeh, Lin
+2013, sec. 6.1].
 
-    represented(t) = Σ_i R_i φ_i(t)                 features φ_i, each with the share R_i that the modes have of it (its match ratio)
+    represented(t) = Σ_i R_i φ_i(t)
+        features φ_i, each with the share R_i that the modes have of it (its match ratio)
     P_residual = max(P_recorded - P_represented, 0)                                             pixel by pixel
 
-For a preset it is described in two parts. What is left of the features, √(1 - R_i²) of each, is lines: their frequencies are known far better than a spectrogram
-shows them. In no band more is left than recordings have beyond what is played: modes too close to be told apart make one feature that matches none of them.
-What is left beside all features is noise, of which bands and times keep the mean, less the recording's own floor, less what most strikes do not have, and
-less what is not noise: the foot of lines that are no pure damped sinusoids would else be spread over whole bands.
+For a preset it is described in two parts. What is left of the features, √(1 - R_i²) of each, is lines: their
+frequencies are known far better than a spectrogram shows them. In no band more is left than recordings have beyond what
+is played: modes too close to be told apart make one feature that matches none of them. What is left beside all features
+is noise, of which bands and times keep the mean, less the recording's own floor, less what most strikes do not have,
+and less what is not noise: the foot of lines that are no pure damped sinusoids would else be spread over whole bands.
 """
 
 from __future__ import annotations
@@ -57,8 +60,11 @@ def _damped(pole: Array, amplitude: Array, length: Array, out: Array) -> None:  
                 z *= p
 
 
-def clip_residual(recorded: Array, represented: Array, sr: int, represented_sr: int | None = None, window: int = WINDOW) -> tuple[Power, Array]:
-    """P_residual of a recording (n,) and the complex transform of recorded - represented (m, k), whose phases its inversion starts from.
+def clip_residual(
+    recorded: Array, represented: Array, sr: int, represented_sr: int | None = None, window: int = WINDOW
+) -> tuple[Power, Array]:
+    """P_residual of a recording (n,) and the complex transform of recorded - represented (m, k), whose phases its
+    inversion starts from.
 
     Raises AudioError: empty, NaN, other lengths, or another rate.
     """
@@ -79,7 +85,9 @@ def noise_floor_per_hz(left: Power) -> Array:
 
 
 def cells(left: Power, floor_per_hz: Array) -> tuple[Array, Array, Array]:
-    """Bands (b,) in Hz, times (n,) in s and mean power per Hz (b, n) less the floor: a sixth of an octave or a bin, frames of 1, 1, … then ever more."""
+    """Bands (b,) in Hz, times (n,) in s and mean power per Hz (b, n) less the floor: a sixth of an octave or a bin,
+    frames of 1, 1, … then ever more.
+    """
     width = left.freq_hz[1]
     edge = [0.0]
     while edge[-1] < left.freq_hz[-1]:
@@ -105,7 +113,8 @@ def cells(left: Power, floor_per_hz: Array) -> tuple[Array, Array, Array]:
 
 
 def shared_cells(left: list[Power]) -> tuple[Array, Array, Array]:
-    """`cells` of the mean over strikes, where most strikes have some for themselves: what one of two has and the other has not is no property of the body.
+    """`cells` of the mean over strikes, where most strikes have some for themselves: what one of two has and the other
+    has not is no property of the body.
 
     Nothing below `LOWEST_BINS`.
     """
@@ -116,7 +125,9 @@ def shared_cells(left: list[Power]) -> tuple[Array, Array, Array]:
 
 
 def noisiness(fine: Power, freq_hz: Array, time_s: Array) -> Array:
-    """(b, n) share of the power in bands about freq_hz (b,) that is noise: median over mean across a band's fine bins, ln 2 for noise, little where lines remain."""
+    """(b, n) share of the power in bands about freq_hz (b,) that is noise: median over mean across a band's fine bins,
+    ln 2 for noise, little where lines remain.
+    """
     edge = np.concatenate([[0.0], (freq_hz[1:] + freq_hz[:-1]) / 2, [np.inf]])
     bounds = np.searchsorted(fine.freq_hz, edge)
     frame = np.clip(np.searchsorted(fine.time_s, time_s), 0, len(fine.time_s) - 1)
@@ -128,9 +139,12 @@ def noisiness(fine: Power, freq_hz: Array, time_s: Array) -> Array:
     return np.minimum(share, 1.0)
 
 
-def line_room(recorded: list[Power], rest: list[Power], played: list[Power], lines: tuple[Array, Array, Array], seconds: float) -> Array:
-    """Share (l,) of lines' energies for which there is room: all lines in a band together have no more than what recordings have there beyond what is played,
-    or what recorded - played has, if that is more (a line missing beside a mode that is played too loud). Energies are means over strikes.
+def line_room(
+    recorded: list[Power], rest: list[Power], played: list[Power], lines: tuple[Array, Array, Array], seconds: float
+) -> Array:
+    """Share (l,) of lines' energies for which there is room: all lines in a band together have no more than what
+    recordings have there beyond what is played, or what recorded - played has, if that is more (a line missing beside a
+    mode that is played too loud). Energies are means over strikes.
 
     A line's band: `LINE_WIDTHS` of its half width either way, and three bins at least.
     """
@@ -142,7 +156,9 @@ def line_room(recorded: list[Power], rest: list[Power], played: list[Power], lin
     def within(sounds: list[Power]) -> Array:
         energy_per_hz = 2 * sounds[0].time_s[1] * np.mean([p.per_hz.sum(axis=1) for p in sounds], axis=0)
         below = np.append(0.0, np.cumsum(energy_per_hz) * step)
-        return np.asarray(np.maximum(np.interp(freq_hz + half, edge, below) - np.interp(freq_hz - half, edge, below), 0.0))
+        return np.asarray(
+            np.maximum(np.interp(freq_hz + half, edge, below) - np.interp(freq_hz - half, edge, below), 0.0)
+        )
 
     room = np.maximum(within(recorded) - within(played), within(rest))
     decay = np.maximum(decay_per_s, 1e-3)
@@ -151,14 +167,27 @@ def line_room(recorded: list[Power], rest: list[Power], played: list[Power], lin
     return np.asarray(np.minimum(1.0, ROOM * room / np.maximum(wanted, 1e-300)))
 
 
-def residual_record(recorded: Array, left: Array, rest: Array, sr: int, modes: StruckModes, lines: tuple[Array, Array, Array], source: str) -> Residual:
-    """The residual of strikes (s, n) from the onset on: ``left`` (s, n) beside all features, ``rest`` (s, n) beside the modes as the model plays them.
+def residual_record(
+    recorded: Array,
+    left: Array,
+    rest: Array,
+    sr: int,
+    modes: StruckModes,
+    lines: tuple[Array, Array, Array],
+    source: str,
+) -> Residual:
+    """The residual of strikes (s, n) from the onset on:
 
-    lines: frequency, decay, amplitude (l,), mean square over the strikes, that the modes' share of the features leaves; neither they nor noise become more than
-    there is in ``rest``. Levels come out relative to the strongest mode. Raises AudioError on empty clips and NaN, RecordError where nothing can follow.
+    ``left`` (s, n) beside all features, ``rest`` (s, n) beside the modes as the model plays them.
+
+    lines: frequency, decay, amplitude (l,), mean square over the strikes, that the modes' share of the features leaves;
+    neither they nor noise become more than there is in ``rest``. Levels come out relative to the strongest mode. Raises
+    AudioError on empty clips and NaN, RecordError where nothing can follow.
     """
     if not len(recorded) or recorded.shape != left.shape or recorded.shape != rest.shape:
-        raise AudioError(f"recordings of shape {recorded.shape}, of which {left.shape} is left", "give strikes of one length")
+        raise AudioError(
+            f"recordings of shape {recorded.shape}, of which {left.shape} is left", "give strikes of one length"
+        )
     freq, time, per_hz = shared_cells([power(x, sr) for x in left])
     per_hz = np.minimum(per_hz, shared_cells([power(x, sr) for x in rest])[2])
     per_hz = per_hz * np.mean([noisiness(power(x, sr, FINE_WINDOW), freq, time) for x in left], axis=0)

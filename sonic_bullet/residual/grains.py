@@ -1,11 +1,14 @@
 """What a strike adds beside its modes: a grain of shaped noise, cut once a body and then filtered to each place.
 
-    once a body:     P(f, t) shifted and stretched onto its modes -> magnitudes -> invert -> base_v(t), v = 0, 1 from two seeds
-    once a place:    g_v = T⁻¹(T(base_v) √A(f) |F̂(fτ)|)        A: `transfer.scale` of the modes as they are struck there, F̂: the force pulse
+    once a body:
+        P(f, t) shifted and stretched onto its modes -> magnitudes -> invert -> base_v(t), v = 0, 1 from two seeds
+    once a place:    g_v = T⁻¹(T(base_v) √A(f) |F̂(fτ)|)
+        A: `transfer.scale` of the modes as they are struck there, F̂: the force pulse
     each strike:     J-level · (cos θ g_0 + sin θ g_1), θ seeded: as loud, of the same spectrogram, and no two alike
 
-A does not hang on time, so the order (transfer, then invert) or (invert, then scale) is one up to the window's length. Places are told apart by A itself,
-in steps of 2 dB at each pair of modes, and pulses in eighths of an octave: whoever comes first, a cached grain has the same bits.
+A does not hang on time, so the order (transfer, then invert) or (invert, then scale) is one up to the window's length.
+Places are told apart by A itself, in steps of 2 dB at each pair of modes, and pulses in eighths of an octave: whoever
+comes first, a cached grain has the same bits.
 """
 
 from __future__ import annotations
@@ -47,8 +50,9 @@ SEEDS = (0x5EED, 0xF00D)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Voice:
-    """A body's residual. pairs; here_hz (k,): source frequency of each bin; source_power (p,) of the pairs' modes; base (2, F) complex64: spectra of the base
-    grains of ``length`` samples at FFT size ``size``; lines. silent: the noise is none. cache: of `placed`, by key; a pure function's, so it may be shared.
+    """A body's residual. pairs; here_hz (k,): source frequency of each bin; source_power (p,) of the pairs' modes; base
+    (2, F) complex64: spectra of the base grains of ``length`` samples at FFT size ``size``; lines. silent: the noise is
+    none. cache: of `placed`, by key; a pure function's, so it may be shared.
     """
 
     sr: int
@@ -74,9 +78,21 @@ def make_voice(residual: Residual, target: StruckModes, sr: int, longest_s: floa
     magnitude = magnitude_of(moved(source_power(residual), here, slope, rate, time), sr)
     size = 1 << int(np.ceil(np.log2(n + 4 * WINDOW)))
     shape = faded(n, sr)
-    base = [np.fft.rfft(shape * invert(magnitude, noise_phases(n, seed), n), size) for seed in SEEDS] if magnitude.any() else [np.zeros(size // 2 + 1)] * 2
+    base = (
+        [np.fft.rfft(shape * invert(magnitude, noise_phases(n, seed), n), size) for seed in SEEDS]
+        if magnitude.any()
+        else [np.zeros(size // 2 + 1)] * 2
+    )
     return Voice(
-        sr, pairs, here, joined.amplitude[pairs.source] ** 2, np.array(base, np.complex64), n, size, transfer_lines(residual, pairs), not bool(magnitude.any())
+        sr,
+        pairs,
+        here,
+        joined.amplitude[pairs.source] ** 2,
+        np.array(base, np.complex64),
+        n,
+        size,
+        transfer_lines(residual, pairs),
+        not bool(magnitude.any()),
     )
 
 
@@ -100,7 +116,9 @@ def faded(n: int, sr: int) -> Array:
 
 def response(voice: Voice, struck_power: Array, pulse: Array | None = None) -> Array:
     """(k,) by which the base grains' bins are multiplied: √A for modes struck to a² (p,), times a pulse's |F̂| (k,)."""
-    return np.asarray(np.sqrt(scale(voice.pairs, voice.source_power, struck_power, voice.here_hz)) * (1.0 if pulse is None else pulse))
+    return np.asarray(
+        np.sqrt(scale(voice.pairs, voice.source_power, struck_power, voice.here_hz)) * (1.0 if pulse is None else pulse)
+    )
 
 
 def filtered(voice: Voice, gain: Array) -> Array:
@@ -116,7 +134,8 @@ Pulse = Callable[[Array, bool], Array]
 
 
 def placed(voice: Voice, struck_power: Array, tau_s: float, flat: bool, pulse: Pulse) -> tuple[Array, float]:
-    """The two grains (2, length) of a place and a pulse, and the level by which they are to be multiplied. struck_power (p,): a² of the pairs.
+    """The two grains (2, length) of a place and a pulse, and the level by which they are to be multiplied. struck_power
+    (p,): a² of the pairs.
 
     pulse: |F̂| (k,) of a force pulse at products fτ (k,), flat or not, relative to 0 Hz.
     """
@@ -188,7 +207,9 @@ def _filter(base: Array, gain: Array, out: Array) -> None:  # pragma: no cover -
 
 
 def angles(number: int) -> Array:
-    """(k,) an angle for each bin, wandering at random over `KNOTS` bands: two numbers' grains have next to nothing in common."""
+    """(k,) an angle for each bin, wandering at random over `KNOTS` bands: two numbers' grains have next to nothing in
+    common.
+    """
     state = np.uint64(mixed_number(number)) + np.arange(KNOTS, dtype=np.uint64) * np.uint64(0x9E3779B97F4A7C15)
     state = (state ^ (state >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
     state = (state ^ (state >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)

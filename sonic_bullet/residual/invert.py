@@ -1,7 +1,9 @@
 """From a power spectrogram back to samples: the iterative inverse short-time transform, ten turns at most.
 
-    S ← A·C/|C|,  C = T(T⁻¹(S))                                 magnitudes kept, phases made consistent     [Griffin & Lim 1984, eq. 8]
-    S ← A·Q/|Q|,  Q = C + μ (C - C before)                       with momentum                              [Perraudin et al. 2013, algorithm 2]
+    S ← A·C/|C|,  C = T(T⁻¹(S))                                 magnitudes kept, phases made consistent
+        [Griffin & Lim 1984, eq. 8]
+    S ← A·Q/|Q|,  Q = C + μ (C - C before)                       with momentum
+        [Perraudin et al. 2013, algorithm 2]
 
 A = √P. It starts from phases that are given: the source's, where there is a source, those of seeded noise else.
 """
@@ -20,14 +22,26 @@ ITERATIONS = 4
 MOST_ITERATIONS = 10
 MOMENTUM = 0.99
 OVERLAP = 2
-"""With frames half a window apart four turns leave 10 % inconsistent, where a quarter apart ten leave 20 % (noise with a decay, momentum 0.99)."""
+"""With frames half a window apart four turns leave 10 % inconsistent, where a quarter apart ten leave 20 % (noise with
+a decay, momentum 0.99).
+"""
 LONGEST_NOISE = 1 << 18
 
 
 def invert(
-    magnitude: Array, start: Array, n: int, *, iterations: int = ITERATIONS, momentum: float = MOMENTUM, window: int = WINDOW, overlap: int = OVERLAP
+    magnitude: Array,
+    start: Array,
+    n: int,
+    *,
+    iterations: int = ITERATIONS,
+    momentum: float = MOMENTUM,
+    window: int = WINDOW,
+    overlap: int = OVERLAP,
 ) -> Array:
-    """Samples (n,) float32 of magnitudes |S| (m, k), from complex ``start`` (m, k) whose phases alone count. iterations: 0 … 10."""
+    """Samples (n,) float32 of magnitudes |S| (m, k), from complex ``start`` (m, k) whose phases alone count.
+
+    iterations: 0 … 10.
+    """
     if not 0 <= iterations <= MOST_ITERATIONS:
         raise ValueError(f"{iterations} iterations: 0 to {MOST_ITERATIONS}")
     wanted = np.ascontiguousarray(magnitude, np.float32)
@@ -41,7 +55,9 @@ def invert(
 
 
 def noise_phases(n: int, seed: int, window: int = WINDOW, overlap: int = OVERLAP) -> Array:
-    """(m, k) complex64: the transform of white noise, whose phases are consistent with each other; the same for a longer grain, as far as both go."""
+    """(m, k) complex64: the transform of white noise, whose phases are consistent with each other; the same for a
+    longer grain, as far as both go.
+    """
     frames = frame_count(n, window, overlap)
     longest = max(LONGEST_NOISE, 1 << int(np.ceil(np.log2(n + window))))
     return _noise(longest, seed, window, overlap)[:frames]
@@ -61,12 +77,20 @@ def magnitude_of(per_hz: Array, sr: int, window: int = WINDOW) -> Array:
 
 def inconsistency(magnitude: Array, sample: Array, window: int = WINDOW, overlap: int = OVERLAP) -> float:
     """‖|T(x)| - A‖/‖A‖: how far samples are from having the magnitudes asked for."""
-    return float(np.linalg.norm(np.abs(transform(sample, window, overlap)) - magnitude) / max(float(np.linalg.norm(magnitude)), 1e-300))
+    return float(
+        np.linalg.norm(np.abs(transform(sample, window, overlap)) - magnitude)
+        / max(float(np.linalg.norm(magnitude)), 1e-300)
+    )
 
 
 @njit(nogil=True, fastmath={"contract", "nnan", "ninf"})
-def _phased(spectrum: Array, before: Array, magnitude: Array, momentum: np.float32) -> None:  # pragma: no cover - compiled
-    """spectrum ← magnitude·Q/|Q|, Q = spectrum + momentum (spectrum - before); before ← spectrum as it came. Real and imaginary parts in turn."""
+def _phased(
+    spectrum: Array, before: Array, magnitude: Array, momentum: np.float32
+) -> None:  # pragma: no cover - compiled
+    """spectrum ← magnitude·Q/|Q|, Q = spectrum + momentum (spectrum - before); before ← spectrum as it came.
+
+    Real and imaginary parts in turn.
+    """
     tiny, more = np.float32(1e-30), np.float32(1.0) + momentum
     for m in range(magnitude.shape[0]):
         for k in range(magnitude.shape[1]):

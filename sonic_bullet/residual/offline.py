@@ -1,10 +1,12 @@
 """A transferred residual as one clip, without a scene.
 
-recorded, represented + Modes of source and target -> transfer -> invert, from the source's phases -> samples             the paper's algorithm 1, on a recording
-Residual + Modes (a complex) -> Voice -> lines, each a quarter turn from the mode it follows; a grain of noise -> samples   what the run time plays of one strike
+recorded, represented + Modes of source and target -> transfer -> invert, from the source's phases -> samples
+    the paper's algorithm 1, on a recording
+Residual + Modes (a complex) -> Voice -> lines, each a quarter turn from the mode it follows; a grain of noise ->
+    samples   what the run time plays of one strike
 
-Phases: a sinusoid of f_s seen at t_s stands at f_s t_s turns; carried to f_t and t_t it stands at f_t t_t. So each pixel takes the phase of the pixel it comes
-from, turned by f_t t_t - f_s t_s. A body carried onto itself turns nothing.
+Phases: a sinusoid of f_s seen at t_s stands at f_s t_s turns; carried to f_t and t_t it stands at f_t t_t. So each
+pixel takes the phase of the pixel it comes from, turned by f_t t_t - f_s t_s. A body carried onto itself turns nothing.
 """
 
 from __future__ import annotations
@@ -23,9 +25,18 @@ LOOKING = 4
 """Frames a quarter of a window apart, as `clip_residual` sees a recording."""
 
 
-def transferred_clip(recorded: Array, represented: Array, sr: int, source: StruckModes, target: StruckModes, *, seconds: float | None = None) -> Array:
-    """(n,) float32: the residual of a recording (k,), of which ``represented`` (k,) is said by modes ``source``, beside modes ``target``; as long as the recording
-    or ``seconds``. Raises AudioError as `clip_residual` and `StruckModes` do.
+def transferred_clip(
+    recorded: Array,
+    represented: Array,
+    sr: int,
+    source: StruckModes,
+    target: StruckModes,
+    *,
+    seconds: float | None = None,
+) -> Array:
+    """(n,) float32: the residual of a recording (k,), of which ``represented`` (k,) is said by modes ``source``, beside
+    modes ``target``; as long as the recording or ``seconds``. Raises AudioError as `clip_residual` and `StruckModes`
+    do.
     """
     left, start = clip_residual(recorded, represented, sr)
     pairs = pair(source, target)
@@ -35,13 +46,16 @@ def transferred_clip(recorded: Array, represented: Array, sr: int, source: Struc
     there_s = np.minimum(rate * time[:, None], left.time_s[-1])
     row = np.round(there_s * sr * LOOKING / WINDOW).astype(np.int64)
     column = np.clip(np.round(here * WINDOW / sr).astype(np.int64), 0, WINDOW // 2)
-    flip = 1 - 2 * ((column + np.arange(len(freq))) % 2)  # phases are counted from a frame's beginning, half a window before its time
+    # phases are counted from a frame's beginning, half a window before its time
+    flip = 1 - 2 * ((column + np.arange(len(freq))) % 2)
     turned = np.exp(2j * np.pi * (freq * time[:, None] - here * there_s)) * flip
     magnitude = magnitude_of(transfer(left, source, target, freq, time, pairs=pairs), sr)
     return invert(magnitude, start[row, column] * turned, n, iterations=MOST_ITERATIONS, overlap=LOOKING)
 
 
-def residual_sound(residual: Residual, freq_hz: Array, decay_per_s: Array, amplitude: Array, n: int, sr: int, seed: int = 0) -> Array:
+def residual_sound(
+    residual: Residual, freq_hz: Array, decay_per_s: Array, amplitude: Array, n: int, sr: int, seed: int = 0
+) -> Array:
     """(n,) what the residual adds to modes (m,) of complex amplitude at the onset, in their unit."""
     order = np.argsort(freq_hz, kind="stable")
     freq, decay, start = freq_hz[order], decay_per_s[order], np.asarray(amplitude, complex)[order]
@@ -58,7 +72,9 @@ def residual_sound(residual: Residual, freq_hz: Array, decay_per_s: Array, ampli
     observed = lines.freq_hz < sr / 2
     turned = 1j * lead[lines.follows] * lines.ratio * np.sqrt(power[lines.follows])
     out = damped(lines.freq_hz[observed], lines.decay_per_s[observed], turned[observed], n, sr)
-    grain = varied(filtered(voice, response(voice, power)), 1.0, mixed_number(seed)) if not voice.silent else np.zeros(0)
+    grain = (
+        varied(filtered(voice, response(voice, power)), 1.0, mixed_number(seed)) if not voice.silent else np.zeros(0)
+    )
     count = min(n, len(grain))
     out[:count] += grain[:count]
     return out

@@ -1,11 +1,14 @@
 """Grains under way, and rubbing as a row of micro-collisions: state in, samples and state out.
 
     strike:    grain from sample n_0 on
-    rubbing:   force f on the sections [jG, jG + 2G) of absolute time, under w² + w'² = 1:   grain_j = T⁻¹(T(f w) √A (cos θ_j T(base_0) + sin θ_j T(base_1))), θ_j(f) seeded
+    rubbing:   force f on the sections [jG, jG + 2G) of absolute time, under w² + w'² = 1:
+        grain_j = T⁻¹(T(f w) √A (cos θ_j T(base_0) + sin θ_j T(base_1))), θ_j(f) seeded
 
-A section's force is carried as it is, every micro-collision of it at its own time; sections overlap by half with windows whose squares add to one, and as no
-two have the same noise their powers add: steady rubbing is steady. A section is known when it is over, so its sound comes 2G samples late, 21 ms at 48 kHz.
-Sections lie on the grid of absolute samples, grains are added in the order in which they became known: any way of cutting the calls gives the same bits.
+A section's force is carried as it is, every micro-collision of it at its own time; sections overlap by half with
+windows whose squares add to one, and as no two have the same noise their powers add: steady rubbing is steady. A
+section is known when it is over, so its sound comes 2G samples late, 21 ms at 48 kHz. Sections lie on the grid of
+absolute samples, grains are added in the order in which they became known: any way of cutting the calls gives the same
+bits.
 """
 
 from __future__ import annotations
@@ -38,13 +41,16 @@ def add_grains(out: Array, grains: tuple[Grain, ...], at: int) -> tuple[Grain, .
     for grain in grains:
         low, high = max(grain.start, at), min(grain.start + len(grain.sample), end)
         if low < high:
-            out[grain.weight_set, grain.body, low - at : high - at] += grain.sample[low - grain.start : high - grain.start]
+            out[grain.weight_set, grain.body, low - at : high - at] += grain.sample[
+                low - grain.start : high - grain.start
+            ]
     return tuple(grain for grain in grains if grain.start + len(grain.sample) > end)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rubbed:
-    """The force of one pair on one side so far: samples (n,) in newton from absolute sample ``start``, a multiple of `SECTION`.
+    """The force of one pair on one side so far: samples (n,) in newton from absolute sample ``start``, a multiple of
+    `SECTION`.
 
     gain (m,): Uᵀ per newton on the side's modes, as it was last.
     """
@@ -59,8 +65,11 @@ def section_window() -> Array:
     return np.asarray(np.sin(np.pi / 2 * np.sin(np.pi * (np.arange(2 * SECTION) + 0.5) / (2 * SECTION)) ** 2))
 
 
-def rubbed(state: Rubbed | None, force_n: Array | None, at: int, n: int) -> tuple[list[tuple[int, Array]], Rubbed | None]:
-    """Sections (number j, force under the window (2G,)) that are complete with the n samples from ``at`` on, and the state after them.
+def rubbed(
+    state: Rubbed | None, force_n: Array | None, at: int, n: int
+) -> tuple[list[tuple[int, Array]], Rubbed | None]:
+    """Sections (number j, force under the window (2G,)) that are complete with the n samples from ``at`` on, and the
+    state after them.
 
     force_n None: the pair does not rub; the state is None when nothing of it is left.
     """

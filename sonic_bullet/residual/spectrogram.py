@@ -1,7 +1,9 @@
 """Power spectrograms with their axes, and the short-time transform they come from.
 
-    S[m, k] = Σ_n w[n] x[mH + n - N/2] e^{-2πikn/N},  P = |S|²/(sr Σw²)        two-sided power per Hz: white noise of variance σ² has P = σ²/sr
-    x[n] = Σ_m w[n - mH] x_m[n - mH] / Σ_m w²[n - mH]                         nearest in squares       [Griffin & Lim 1984, eq. 6]
+    S[m, k] = Σ_n w[n] x[mH + n - N/2] e^{-2πikn/N},  P = |S|²/(sr Σw²)
+        two-sided power per Hz: white noise of variance σ² has P = σ²/sr
+    x[n] = Σ_m w[n - mH] x_m[n - mH] / Σ_m w²[n - mH]                         nearest in squares
+        [Griffin & Lim 1984, eq. 6]
 
 w: Hann, periodic; H = N/4 for looking at a sound, N/2 for making one: phases then settle sooner. m frames, k bins.
 """
@@ -22,14 +24,20 @@ WINDOW = 512
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Power:
-    """Power per Hz (b, n) over freq_hz (b,) and time_s (n,), both ascending; between the points it is bilinear, above and after them zero."""
+    """Power per Hz (b, n) over freq_hz (b,) and time_s (n,), both ascending; between the points it is bilinear, above
+    and after them zero.
+    """
 
     freq_hz: Array
     time_s: Array
     per_hz: Array
 
     def __post_init__(self) -> None:
-        for name, shape in (("freq_hz", (None,)), ("time_s", (None,)), ("per_hz", (len(self.freq_hz), len(self.time_s)))):
+        for name, shape in (
+            ("freq_hz", (None,)),
+            ("time_s", (None,)),
+            ("per_hz", (len(self.freq_hz), len(self.time_s))),
+        ):
             object.__setattr__(self, name, frozen_array(getattr(self, name), np.float64, shape, f"power {name}"))
         if len(self.freq_hz) < 2 or len(self.time_s) < 2:
             raise AudioError("a spectrogram of fewer than two frames or bands", "give a longer recording")
@@ -52,11 +60,15 @@ def frame_count(n: int, window: int = WINDOW, overlap: int = 4) -> int:
 
 def axes(n: int, sr: int, window: int = WINDOW, overlap: int = 4) -> tuple[Array, Array]:
     """Frequencies (window/2 + 1,) in Hz and times (m,) in s of `transform`."""
-    return np.arange(window // 2 + 1) * sr / window, np.arange(frame_count(n, window, overlap)) * (window // overlap) / sr
+    return np.arange(window // 2 + 1) * sr / window, np.arange(frame_count(n, window, overlap)) * (
+        window // overlap
+    ) / sr
 
 
 def transform(sample: Array, window: int = WINDOW, overlap: int = 4) -> Array:
-    """S (m, window/2 + 1) complex64 of samples (n,); frame m lies about sample m·window/overlap, zeros stand before and after."""
+    """S (m, window/2 + 1) complex64 of samples (n,); frame m lies about sample m·window/overlap, zeros stand before and
+    after.
+    """
     from scipy.fft import rfft  # several frames at once in vector registers, which numpy's does not
 
     frames = np.empty((frame_count(len(sample), window, overlap), window), np.float32)
@@ -98,7 +110,11 @@ def power(sample: Array, sr: int, window: int = WINDOW) -> Power:
     """The power spectrogram of samples (n,) at sr Hz. Raises AudioError on nothing, NaN or a bad rate."""
     sample = checked(sample, sr)
     frequency, time = axes(len(sample), sr, window)
-    return Power(frequency, time, (np.abs(transform(sample, window)) ** 2).T / (sr * float((hann(window).astype(float) ** 2).sum())))
+    return Power(
+        frequency,
+        time,
+        (np.abs(transform(sample, window)) ** 2).T / (sr * float((hann(window).astype(float) ** 2).sum())),
+    )
 
 
 def checked(sample: Array, sr: int) -> Array:

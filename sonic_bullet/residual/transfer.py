@@ -1,15 +1,18 @@
-"""A residual follows the modes: what turns the source's modal spectrogram into the target's is done to the residual [Ren, Yeh, Lin 2013, eq. 28-29, algorithm 1].
+"""A residual follows the modes: what turns the source's modal spectrogram into the target's is done to the residual
+[Ren, Yeh, Lin 2013, eq. 28-29, algorithm 1].
 
-    (1) shift     the pixel at f_s goes to f_t:  f_s^i -> f_t^j, and midpoints between modes -> midpoints, linear between
+    (1) shift     the pixel at f_s goes to f_t:
+        f_s^i -> f_t^j, and midpoints between modes -> midpoints, linear between
     (2) stretch   P''(t) = P(t d_t/d_s)                                       within the neighbourhood of each pair
     (3) scale     A(f) = Σ_k a_t,k² h_k(f) / Σ_k a_s,k² h_k(f),  h_k = 1/(1 + (f - f_s,k)²/b_k²)
     P_t(f_t, t) = A(f_s) P_s(f_s, t d_t/d_s) |df_s/df_t|
 
-At a mode the shift is the paper's Δf. Towards the midpoints the paper shifts by the same Δf and cuts or doubles what does not fit; here a neighbourhood fills
-its new one, so bands of a body twice the size lie at half the frequencies, and |df_s/df_t| keeps their energy relative to the modes'. After (2) source and
-target mode decay alike, so the ratio of their spectrograms, pixel by pixel, no longer hangs on time. h_k is a mode's skirt, b_k 7 % of its neighbourhood:
-a mode that is not struck takes its neighbourhood down by 20 dB, and its neighbours' skirts meet without a step.
-Below the lowest and above the highest pair frequencies keep their ratio to that pair's. m, p modes, pairs; b bands, n frames.
+At a mode the shift is the paper's Δf. Towards the midpoints the paper shifts by the same Δf and cuts or doubles what
+does not fit; here a neighbourhood fills its new one, so bands of a body twice the size lie at half the frequencies, and
+|df_s/df_t| keeps their energy relative to the modes'. After (2) source and target mode decay alike, so the ratio of
+their spectrograms, pixel by pixel, no longer hangs on time. h_k is a mode's skirt, b_k 7 % of its neighbourhood: a mode
+that is not struck takes its neighbourhood down by 20 dB, and its neighbours' skirts meet without a step. Below the
+lowest and above the highest pair frequencies keep their ratio to that pair's. m, p modes, pairs; b bands, n frames.
 """
 
 from __future__ import annotations
@@ -49,9 +52,16 @@ class StruckModes:
         m = len(np.atleast_1d(self.freq_hz))
         for name in ("freq_hz", "decay_per_s", "amplitude"):
             object.__setattr__(self, name, frozen_array(getattr(self, name), np.float64, (m,), f"modes' {name}"))
-        if m == 0 or not (self.freq_hz > 0).all() or (np.diff(self.freq_hz) < 0).any() or (self.amplitude < 0).any() or (self.decay_per_s < 0).any():
+        if (
+            m == 0
+            or not (self.freq_hz > 0).all()
+            or (np.diff(self.freq_hz) < 0).any()
+            or (self.amplitude < 0).any()
+            or (self.decay_per_s < 0).any()
+        ):
             raise AudioError(
-                "modes that are none, do not ascend or are below zero", "give frequencies in ascending order, decays and amplitudes of at least zero"
+                "modes that are none, do not ascend or are below zero",
+                "give frequencies in ascending order, decays and amplitudes of at least zero",
             )
 
     @property
@@ -62,9 +72,11 @@ class StruckModes:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ModePairs:
-    """p pairs of modes, ascending on both sides: source_hz, target_hz (p,); rate (p,) = d_t/d_s; source, target (p,): which mode each is.
+    """p pairs of modes, ascending on both sides: source_hz, target_hz (p,); rate (p,) = d_t/d_s; source, target (p,):
+    which mode each is.
 
-    natural: the bodies are one shape scaled, so the pairs are the same modes. group (m,): the target's pair each of its modes counts to, -1: none.
+    natural: the bodies are one shape scaled, so the pairs are the same modes. group (m,): the target's pair each of its
+    modes counts to, -1: none.
     """
 
     source_hz: Array
@@ -87,7 +99,10 @@ def source_power(residual: Residual) -> Power:
 
 
 def merged(modes: StruckModes) -> tuple[StruckModes, Array]:
-    """Modes closer than `ONE_MODE` as one: powers add, frequency and decay are the mean by power. And (m,) which of them each is."""
+    """Modes closer than `ONE_MODE` as one: powers add, frequency and decay are the mean by power.
+
+    And (m,) which of them each is.
+    """
     group = np.concatenate([[0], np.cumsum(np.diff(modes.freq_hz) > ONE_MODE * modes.freq_hz[1:])]).astype(np.int64)
     weight = modes.amplitude**2 + 1e-12 * float((modes.amplitude**2).max()) + TINY
     total = np.bincount(group, weight)
@@ -96,7 +111,9 @@ def merged(modes: StruckModes) -> tuple[StruckModes, Array]:
 
 
 def pair(source: StruckModes, target: StruckModes, dominant: int = DOMINANT) -> ModePairs:
-    """Natural pairs where the target is the source's shape at some scale, else the ``dominant`` strongest of both sides, from low to high."""
+    """Natural pairs where the target is the source's shape at some scale, else the ``dominant`` strongest of both
+    sides, from low to high.
+    """
     a, _ = merged(source)
     b, group = merged(target)
     i, j = _natural(a, b)
@@ -104,14 +121,21 @@ def pair(source: StruckModes, target: StruckModes, dominant: int = DOMINANT) -> 
     if not natural:
         count = min(dominant, int((a.amplitude > 0).sum()), max(int((b.amplitude > 0).sum()), 1))
         i, j = (np.sort(np.argsort(-x.energy, kind="stable")[: max(count, 1)]) for x in (a, b))
-    rate = np.clip(np.maximum(b.decay_per_s[j], LEAST_DECAY_PER_S) / np.maximum(a.decay_per_s[i], LEAST_DECAY_PER_S), 1 / FASTEST_TIME, FASTEST_TIME)
+    rate = np.clip(
+        np.maximum(b.decay_per_s[j], LEAST_DECAY_PER_S) / np.maximum(a.decay_per_s[i], LEAST_DECAY_PER_S),
+        1 / FASTEST_TIME,
+        FASTEST_TIME,
+    )
     of_pair = np.full(len(b.freq_hz), -1)
     of_pair[j] = np.arange(len(j))
     return ModePairs(a.freq_hz[i], b.freq_hz[j], rate, i, j, natural, of_pair[group])
 
 
 def _natural(a: StruckModes, b: StruckModes) -> tuple[Array, Array]:
-    """Modes of a and b that are the same of one scaled shape; none where the lowest do not agree. The scale is looked for among ratios of the lowest."""
+    """Modes of a and b that are the same of one scaled shape; none where the lowest do not agree.
+
+    The scale is looked for among ratios of the lowest.
+    """
     count = min(ALIKE_COUNT, len(a.freq_hz), len(b.freq_hz))
     none = np.zeros(0, np.int64)
     if count < min(3, len(a.freq_hz)):
@@ -166,12 +190,21 @@ def scale(pairs: ModePairs, source_power: Array, target_power: Array, freq_hz: A
     edge = np.concatenate([[0.0], (pairs.source_hz[1:] + pairs.source_hz[:-1]) / 2])
     width = np.append(np.diff(edge), 2 * max(float(pairs.source_hz[-1] - edge[-1]), 1.0))
     out = np.empty(len(freq_hz))
-    _scale(np.asarray(freq_hz, float), pairs.source_hz, SKIRT * width, source_power + FAINT * float(source_power.max()) + TINY, target_power, out)
+    _scale(
+        np.asarray(freq_hz, float),
+        pairs.source_hz,
+        SKIRT * width,
+        source_power + FAINT * float(source_power.max()) + TINY,
+        target_power,
+        out,
+    )
     return out
 
 
 @njit(nogil=True)
-def _scale(freq: Array, centre: Array, half: Array, below: Array, above: Array, out: Array) -> None:  # pragma: no cover - compiled
+def _scale(
+    freq: Array, centre: Array, half: Array, below: Array, above: Array, out: Array
+) -> None:  # pragma: no cover - compiled
     for k in range(len(freq)):
         up, down = 0.0, 0.0
         for p in range(len(centre)):
@@ -187,8 +220,18 @@ def paired_power(pairs: ModePairs, target: StruckModes) -> Array:
     return np.bincount(pairs.group[mine], target.amplitude[mine] ** 2, len(pairs.target_hz))
 
 
-def transfer(residual: Power, source: StruckModes, target: StruckModes, freq_hz: Array, time_s: Array, *, pairs: ModePairs | None = None) -> Array:
-    """P_t (k, n) at target frequencies (k,) and times (n,) from the onset on, of a residual taken beside ``source`` and now beside ``target``."""
+def transfer(
+    residual: Power,
+    source: StruckModes,
+    target: StruckModes,
+    freq_hz: Array,
+    time_s: Array,
+    *,
+    pairs: ModePairs | None = None,
+) -> Array:
+    """P_t (k, n) at target frequencies (k,) and times (n,) from the onset on, of a residual taken beside ``source`` and
+    now beside ``target``.
+    """
     pairs = pairs or pair(source, target)
     merged_source, _ = merged(source)
     here, slope, rate = come_from(pairs, freq_hz)
@@ -199,12 +242,16 @@ def transfer(residual: Power, source: StruckModes, target: StruckModes, freq_hz:
 def moved(residual: Power, come_from_hz: Array, level: Array, rate: Array, time_s: Array) -> Array:
     """level·P(come_from_hz, rate·t) (k, n)."""
     out = np.zeros((len(come_from_hz), len(time_s)))
-    _moved(residual.freq_hz, residual.time_s, residual.per_hz, come_from_hz, level, rate, np.asarray(time_s, float), out)
+    _moved(
+        residual.freq_hz, residual.time_s, residual.per_hz, come_from_hz, level, rate, np.asarray(time_s, float), out
+    )
     return out
 
 
 @njit(nogil=True)
-def _moved(freq: Array, time: Array, power: Array, come_from: Array, level: Array, rate: Array, at: Array, out: Array) -> None:  # pragma: no cover - compiled
+def _moved(
+    freq: Array, time: Array, power: Array, come_from: Array, level: Array, rate: Array, at: Array, out: Array
+) -> None:  # pragma: no cover - compiled
     row = np.empty(len(time))
     for k in range(len(come_from)):
         f = come_from[k]
@@ -227,7 +274,10 @@ def _moved(freq: Array, time: Array, power: Array, come_from: Array, level: Arra
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ResidualLines:
-    """l damped sinusoids of a transferred residual: freq_hz, decay_per_s, ratio (l,) of their amplitude to that of the mode they follow; follows (l,): its pair."""
+    """l damped sinusoids of a transferred residual:
+
+    freq_hz, decay_per_s, ratio (l,) of their amplitude to that of the mode they follow; follows (l,): its pair.
+    """
 
     freq_hz: Array
     decay_per_s: Array
@@ -239,6 +289,13 @@ def transfer_lines(residual: Residual, pairs: ModePairs) -> ResidualLines:
     """The residual's lines, moved, stretched and each struck as the mode is in whose neighbourhood it lies."""
     source, _ = merged(source_modes(residual))
     follows = neighbourhood(pairs.source_hz, residual.line_freq_hz)
-    below = scale(pairs, np.ones(len(pairs.source)), source.amplitude[pairs.source] ** 2 + FAINT * float((source.amplitude**2).max()), residual.line_freq_hz)
+    below = scale(
+        pairs,
+        np.ones(len(pairs.source)),
+        source.amplitude[pairs.source] ** 2 + FAINT * float((source.amplitude**2).max()),
+        residual.line_freq_hz,
+    )
     decay = residual.line_decay_per_s * pairs.rate[follows]
-    return ResidualLines(shifted_hz(pairs, residual.line_freq_hz), decay, residual.line_amplitude / np.sqrt(below), follows)
+    return ResidualLines(
+        shifted_hz(pairs, residual.line_freq_hz), decay, residual.line_amplitude / np.sqrt(below), follows
+    )

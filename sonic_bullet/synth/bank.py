@@ -1,15 +1,17 @@
 """A bank of damped sinusoids with explicit state: forces on modes in, velocities weighted for sensors out.
 
-    mass-normalised mode  q̈ + 2d q̇ + (ω² + d²) q = f(t) = φᵀF(t)          [physics of any vibration text, e.g. Meirovitch 2001, eq. 7.113]
+    mass-normalised mode  q̈ + 2d q̇ + (ω² + d²) q = f(t) = φᵀF(t)
+        [physics of any vibration text, e.g. Meirovitch 2001, eq. 7.113]
     pole s = -d + iω, state z, velocity q̇ = Re z;   an impulse j at u:   z += (1 + i d/ω) φᵀĵ j e^{s(t-u)}
     output of weight set w and body b:   y[w, b, n] = Σ_modes Re(weight[w] z[n])
 
-(that is q̇ = e^{-dt}(cos ωt - (d/ω) sin ωt): the continuous-time response, sampled; strikes are exact at any sub-sample time, and nothing aliases.)
+(that is q̇ = e^{-dt}(cos ωt - (d/ω) sin ωt): the continuous-time response, sampled; strikes are exact at any sub-sample
+time, and nothing aliases.)
 
-Modes of all bodies lie in one flat array, a body's in whole groups of 8 (spare lanes are zero). A body below the floor costs nothing.
-Time is counted in absolute samples; blocks of 256 lie on that grid, so any way of cutting the calls gives the same bits
-(`bank_kernel`). `advance` works in place: `copy()` a state first to look ahead and come back.
-b bodies, m modes of one body, W weight sets, n samples.
+Modes of all bodies lie in one flat array, a body's in whole groups of 8 (spare lanes are zero). A body below the floor
+costs nothing. Time is counted in absolute samples; blocks of 256 lie on that grid, so any way of cutting the calls
+gives the same bits (`bank_kernel`). `advance` works in place: `copy()` a state first to look ahead and come back. b
+bodies, m modes of one body, W weight sets, n samples.
 """
 
 from __future__ import annotations
@@ -30,7 +32,9 @@ from sonic_bullet.synth.vector import LANES
 __all__ = ["Bank", "BankState", "Force", "ModeSet", "Strike", "advance", "append", "audible", "empty_bank", "silence"]
 
 FLOOR = 1e-15
-"""Modes with |z| below this (in √J·√2) are set to zero: ½|z|² = 5e-31 J is 1e-10 of the mode's thermal energy kT at 300 K."""
+"""Modes with |z| below this (in √J·√2) are set to zero: ½|z|² = 5e-31 J is 1e-10 of the mode's thermal energy kT at 300
+K.
+"""
 
 FASTEST_DECAY_PER_SAMPLE = 2.0
 SLOWEST_TURN = 1e-3
@@ -38,11 +42,14 @@ SLOWEST_TURN = 1e-3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ModeSet:
-    """One body's modes for the bank: omega_rad_s (m,) of the damped modes, decay_per_s (m,), weight (W, m) complex. All `audible`.
+    """One body's modes for the bank: omega_rad_s (m,) of the damped modes, decay_per_s (m,), weight (W, m) complex.
 
-    held: forces act evenly over the sample before each instant, (e^s - 1)/s, and strikes' impulses over their spacing, not at once: for modes
-    that are gone within a few samples, of which a slow force must leave its slope alone.
-    bend, damping_growth (m,): of level-dependent modes, ω (1 + bend·|z|²) and d (1 + (damping_growth·|z|)^damping_growth_power); None: linear. See `bank_kernel.bend_poles`.
+    All `audible`.
+
+    held: forces act evenly over the sample before each instant, (e^s - 1)/s, and strikes' impulses over their spacing,
+    not at once: for modes that are gone within a few samples, of which a slow force must leave its slope alone. bend,
+    damping_growth (m,): of level-dependent modes, ω (1 + bend·|z|²) and d (1 +
+    (damping_growth·|z|)^damping_growth_power); None: linear. See `bank_kernel.bend_poles`.
     """
 
     omega_rad_s: Array
@@ -71,9 +78,10 @@ class Force:
 class Bank:
     """The instrument. offset (b+1,): segments of the flat arrays (whole groups of 8 lanes); count (b,): modes in each.
 
-    log_pole (2·modes,): s/sr, real parts first; pole = e^{s/sr}; block = e^{256 s/sr}; quadrature (modes,) = d/ω; weight (W, 2·modes);
-    observed (W, b): whether any weight of the body is not zero. held (modes,): of `ModeSet`; there 1 + i·quadrature is what (1 + i d/ω)(e^s - 1)/s
-    is to its real part, which is in the weight. bend, damping_growth, power (modes,), bent (b,): of bodies whose poles go with their level.
+    log_pole (2·modes,): s/sr, real parts first; pole = e^{s/sr}; block = e^{256 s/sr}; quadrature (modes,) = d/ω;
+    weight (W, 2·modes); observed (W, b): whether any weight of the body is not zero. held (modes,): of `ModeSet`; there
+    1 + i·quadrature is what (1 + i d/ω)(e^s - 1)/s is to its real part, which is in the weight. bend, damping_growth,
+    power (modes,), bent (b,): of bodies whose poles go with their level.
     """
 
     sr: int
@@ -102,9 +110,10 @@ class Bank:
 
 @dataclass(slots=True, eq=False)
 class BankState:
-    """What the bank remembers. at: the next sample. z, driven (2·modes,): free state at the next block's start, and what was driven since
-    this block's. sound (W, b, 256): the block's free ringing. ringing, is_driven, tiled (b,): what of it is in use. pending: strikes under way.
-    pole, block (2·modes,): the bank's own, bent by level where a body is.
+    """What the bank remembers. at: the next sample. z, driven (2·modes,): free state at the next block's start, and
+    what was driven since this block's. sound (W, b, 256): the block's free ringing. ringing, is_driven, tiled (b,):
+    what of it is in use. pending: strikes under way. pole, block (2·modes,): the bank's own, bent by level where a body
+    is.
     """
 
     at: int
@@ -120,18 +129,28 @@ class BankState:
 
     def copy(self) -> BankState:
         """A state of its own: advancing one leaves the other."""
-        arrays: dict[str, Any] = {name: getattr(self, name).copy() for name in ("z", "driven", "sound", "ringing", "is_driven", "tiled", "pole", "block")}
+        arrays: dict[str, Any] = {
+            name: getattr(self, name).copy()
+            for name in ("z", "driven", "sound", "ringing", "is_driven", "tiled", "pole", "block")
+        }
         return BankState(at=self.at, pending=self.pending.copy(), **arrays)
 
 
 def audible(omega_rad_s: Array, decay_per_s: Array, sr: int) -> Array:
     """(m,) bool: modes the bank can play at the rate ``sr``; count the others with ``~``.
 
-    Dropped: at or above sr/2, overdamped or all but critically so (ω ≤ d/1000), or gone within a sample (d ≥ 2 sr), or not finite.
+    Dropped: at or above sr/2, overdamped or all but critically so (ω ≤ d/1000), or gone within a sample (d ≥ 2 sr), or
+    not finite.
     """
     omega, decay = np.asarray(omega_rad_s, float), np.asarray(decay_per_s, float)
     with np.errstate(invalid="ignore"):
-        return np.asarray((omega < np.pi * sr) & (omega > SLOWEST_TURN * decay) & (omega > 0) & (decay >= 0) & (decay < FASTEST_DECAY_PER_SAMPLE * sr))
+        return np.asarray(
+            (omega < np.pi * sr)
+            & (omega > SLOWEST_TURN * decay)
+            & (omega > 0)
+            & (decay >= 0)
+            & (decay < FASTEST_DECAY_PER_SAMPLE * sr)
+        )
 
 
 def empty_bank(sr: int, weight_sets: int = 1, at: int = 0) -> tuple[Bank, BankState]:
@@ -148,7 +167,9 @@ def empty_bank(sr: int, weight_sets: int = 1, at: int = 0) -> tuple[Bank, BankSt
 
 
 def append(bank: Bank, state: BankState, bodies: Sequence[ModeSet]) -> tuple[Bank, BankState]:
-    """Bank and state with further bodies, silent at first; those already there go on unchanged, bit by bit. The old pair stays usable.
+    """Bank and state with further bodies, silent at first; those already there go on unchanged, bit by bit.
+
+    The old pair stays usable.
 
     Raises AudioError where a mode is not `audible`, or shapes or numbers are wrong.
     """
@@ -162,7 +183,9 @@ def append(bank: Bank, state: BankState, bodies: Sequence[ModeSet]) -> tuple[Ban
                 "give finite (m,), (m,), (W, m)",
             )
         if not audible(body.omega_rad_s, body.decay_per_s, bank.sr).all():
-            raise AudioError("a mode beyond half the sample rate, overdamped or not finite", "keep the modes that `audible` names")
+            raise AudioError(
+                "a mode beyond half the sample rate, overdamped or not finite", "keep the modes that `audible` names"
+            )
         sizes.append(m)
     padded = [-(-m // LANES) * LANES for m in sizes]
     starts = np.concatenate([[0], np.cumsum(padded)]).astype(np.int64)
@@ -179,13 +202,18 @@ def append(bank: Bank, state: BankState, bodies: Sequence[ModeSet]) -> tuple[Ban
         s[place], pole[place], block[place] = step, np.exp(step), np.exp(BLOCK * step)
         held[place] = np.repeat([x.held for x in bodies], sizes)
         bend[place], damping_growth[place] = (
-            np.concatenate([_or_zero(getattr(x, name), m) for x, m in zip(bodies, sizes, strict=True)]) for name in ("bend", "damping_growth")
+            np.concatenate([_or_zero(getattr(x, name), m) for x, m in zip(bodies, sizes, strict=True)])
+            for name in ("bend", "damping_growth")
         )
         power[place] = np.repeat([x.damping_growth_power for x in bodies], sizes)
         onset = (1 + 1j * decay / omega) * np.where(held[place], np.expm1(step) / step, 1.0)
         quadrature[place] = np.where(held[place], onset.imag / onset.real, decay / omega)
-        weight[:, place] = flushed(np.concatenate([x.weight for x in bodies], axis=1) * np.where(held[place], onset.real, 1.0))
-    observed = np.array([[bool(np.any(x.weight[w])) for x in bodies] for w in range(sets)], bool).reshape(sets, len(bodies))
+        weight[:, place] = flushed(
+            np.concatenate([x.weight for x in bodies], axis=1) * np.where(held[place], onset.real, 1.0)
+        )
+    observed = np.array([[bool(np.any(x.weight[w])) for x in bodies] for w in range(sets)], bool).reshape(
+        sets, len(bodies)
+    )
     grown = Bank(
         bank.sr,
         np.concatenate([bank.offset, bank.offset[-1] + starts[1:]]),
@@ -200,7 +228,9 @@ def append(bank: Bank, state: BankState, bodies: Sequence[ModeSet]) -> tuple[Ban
         np.concatenate([bank.bend, bend]),
         np.concatenate([bank.damping_growth, damping_growth]),
         np.concatenate([bank.power, power]),
-        np.concatenate([bank.bent, np.array([x.bend is not None or x.damping_growth is not None for x in bodies], bool)]),
+        np.concatenate(
+            [bank.bent, np.array([x.bend is not None or x.damping_growth is not None for x in bodies], bool)]
+        ),
     )
     state = state.copy()
     silent, flags = np.zeros(total, complex), np.zeros(len(bodies), bool)
@@ -225,16 +255,29 @@ def silence(state: BankState) -> BankState:
     return replace(state, pending=Pending.none())
 
 
-def advance(bank: Bank, state: BankState, n: int, strikes: Sequence[Strike] = (), forces: Sequence[Force] = (), progress: Array | None = None) -> Array:
+def advance(
+    bank: Bank,
+    state: BankState,
+    n: int,
+    strikes: Sequence[Strike] = (),
+    forces: Sequence[Force] = (),
+    progress: Array | None = None,
+) -> Array:
     """The next n samples: y (W, b, n). Changes ``state`` in place.
 
-    strikes: those that become known now; each starts after the previous call's last sample, in any call before or at which it sounds.
-    forces: for exactly these n samples; progress (n,): where between gain0 and gain1 each sample lies. Strikes and forces of a
-    body are added in order of start and of the list. Samples below 1e-30 are 0. Raises AudioError on wrong shapes, NaN, or a strike in the past.
+    strikes: those that become known now; each starts after the previous call's last sample, in any call before or at
+    which it sounds. forces: for exactly these n samples; progress (n,): where between gain0 and gain1 each sample lies.
+    Strikes and forces of a body are added in order of start and of the list. Samples below 1e-30 are 0. Raises
+    AudioError on wrong shapes, NaN, or a strike in the past.
     """
     if n < 0 or len(state.ringing) != bank.body_count or len(state.z) != 2 * len(bank.quadrature):
-        raise AudioError(f"{n} samples for a state of {len(state.ringing)} bodies and a bank of {bank.body_count}", "advance the state that `append` returned")
-    pending = with_strikes(state.pending, strikes, state.at, bank.offset, bank.count, bank.log_pole, bank.quadrature, bank.held)
+        raise AudioError(
+            f"{n} samples for a state of {len(state.ringing)} bodies and a bank of {bank.body_count}",
+            "advance the state that `append` returned",
+        )
+    pending = with_strikes(
+        state.pending, strikes, state.at, bank.offset, bank.count, bank.log_pole, bank.quadrature, bank.held
+    )
     force_of, force, gain0, gain1, gain_at = _flat_forces(bank, n, forces)
     along = np.zeros(n) if progress is None else np.ascontiguousarray(progress, float)
     if along.shape != (n,) or not np.isfinite(along).all():
@@ -257,7 +300,9 @@ def _or_zero(values: Array | None, m: int) -> Array:
     if values is None:
         return np.zeros(m)
     if np.shape(values) != (m,) or not np.isfinite(values).all():
-        raise AudioError(f"bend or damping growth of shape {np.shape(values)} for {m} modes", "give a finite number for each mode")
+        raise AudioError(
+            f"bend or damping growth of shape {np.shape(values)} for {m} modes", "give a finite number for each mode"
+        )
     return np.asarray(values, float)
 
 
@@ -268,7 +313,10 @@ def _joined(flat: Array, more: Array) -> Array:
 
 
 def _flat_forces(bank: Bank, n: int, forces: Sequence[Force]) -> tuple[Array, Array, Array, Array, Array]:
-    """Forces sorted by body (stable): segments (b+1,), signals (p, n), flat gains at both ends, and where each begins (p,)."""
+    """Forces sorted by body (stable):
+
+    segments (b+1,), signals (p, n), flat gains at both ends, and where each begins (p,).
+    """
     if not forces:
         none = np.zeros(0)
         return np.zeros(bank.body_count + 1, np.int64), np.zeros((0, n)), none, none, np.zeros(0, np.int64)

@@ -1,4 +1,6 @@
-"""The modal bank's compiled loops. Strict IEEE arithmetic, and stated multiply-adds in `tile` and `drive`: one set of bits.
+"""The modal bank's compiled loops.
+
+Strict IEEE arithmetic, and stated multiply-adds in `tile` and `drive`: one set of bits.
 
     block start:  tile[n] = Σ Re(w z p^n),  z <- z p^256           all modes of a ringing body at once (tile.py)
     each sample:  f <- f p + (strikes + forces) (1 + i d/ω),  y = tile[n] + Σ Re(w f)      driven bodies only
@@ -32,8 +34,13 @@ def _aligned(size):  # pragma: no cover - compiled
 
 
 @njit(nogil=True)
-def _ring(b, z, pole, block, weight, modes, start, stop, size, observed, floor, sound, now, powers, table, column):  # pragma: no cover - compiled
-    """Tile of body b for the block that starts: sound (W, b, BLOCK). Turns z to the next block. False where all modes are below the floor."""
+def _ring(
+    b, z, pole, block, weight, modes, start, stop, size, observed, floor, sound, now, powers, table, column
+):  # pragma: no cover - compiled
+    """Tile of body b for the block that starts:
+
+    sound (W, b, BLOCK). Turns z to the next block. False where all modes are below the floor.
+    """
     ringing = False
     for lo in range(start, stop, CHUNK):
         count = min(CHUNK, stop - lo)
@@ -54,11 +61,16 @@ def _ring(b, z, pole, block, weight, modes, start, stop, size, observed, floor, 
 
 
 @njit(nogil=True)
-def bend_poles(z, driven, span, log_pole, bend, damping_growth, power, modes, start, stop, pole, block):  # pragma: no cover - compiled
-    """Poles of a level-dependent body for the ``span`` samples to come: means over them of what its modes do if nothing strikes them.
+def bend_poles(
+    z, driven, span, log_pole, bend, damping_growth, power, modes, start, stop, pole, block
+):  # pragma: no cover - compiled
+    """Poles of a level-dependent body for the ``span`` samples to come: means over them of what its modes do if nothing
+    strikes them.
 
-    a = |z|:  ȧ = −d a (1 + (ca)^p)  ->  a(T)/a = ((1 + (ca)^p) e^{pdT} − (ca)^p)^{−1/p};   ω <- ω (1 + b ⟨a²⟩),  ⟨a²⟩ = a² (1 − e^{−2d'T})/2d'T
-    (Nayfeh & Mook 1979, eq. 2.3.35 and section 3.3), d' the block's mean decay; exact in amplitude, and in phase for c = 0.
+    a = |z|:  ȧ = −d a (1 + (ca)^p)  ->  a(T)/a = ((1 + (ca)^p) e^{pdT} − (ca)^p)^{−1/p};   ω <- ω (1 + b ⟨a²⟩),
+        ⟨a²⟩ = a² (1 − e^{−2d'T})/2d'T
+    (Nayfeh & Mook 1979, eq. 2.3.35 and section 3.3), d' the block's mean decay; exact in amplitude, and in phase for c
+    = 0.
     """
     for m in range(start, stop):
         if bend[m] == 0.0 and damping_growth[m] == 0.0:
@@ -78,7 +90,23 @@ def bend_poles(z, driven, span, log_pole, bend, damping_growth, power, modes, st
 
 @njit(nogil=True)
 def _strike(
-    j, n, state, modes, start, lanes, count, whole, delta, phase, upcoming, first, impulse, impulse_at, rows, rows_at, width
+    j,
+    n,
+    state,
+    modes,
+    start,
+    lanes,
+    count,
+    whole,
+    delta,
+    phase,
+    upcoming,
+    first,
+    impulse,
+    impulse_at,
+    rows,
+    rows_at,
+    width,
 ):  # pragma: no cover - compiled
     """Add strike j's nodes in (n-1, n] to the driven state. True when it was the last of them."""
     multiplier = -1
@@ -90,7 +118,10 @@ def _strike(
         phase[j] += 1.0 - nodes * delta[j]
         multiplier = nodes - whole[j]
     upcoming[j] = (
-        drive.strike_nodes(state, modes, start, lanes, rows, rows_at[j], width, multiplier, impulse, impulse_at[j] + upcoming[j], nodes) - impulse_at[j]
+        drive.strike_nodes(
+            state, modes, start, lanes, rows, rows_at[j], width, multiplier, impulse, impulse_at[j] + upcoming[j], nodes
+        )
+        - impulse_at[j]
     )
     return upcoming[j] >= count[j]
 
@@ -129,11 +160,14 @@ def _close_block(b, z, driven, pole, modes, start, stop, ringing, is_driven, til
 @njit(nogil=True)
 def _drive(at, i, end, place, b, out, z, driven, is_driven, tiled, pole, block, log_pole, bend, damping_growth, power, bent, modes, start, stop, quadrature, weight_flat, observed,
            sound, s0, s1, count, whole, delta, phase, upcoming, first, impulse, impulse_at, rows, rows_at, done, f0, f1, force, gain0, gain1, gain_at, progress, period):  # fmt: skip  # pragma: no cover - compiled
-    """Samples i … end - 1 of body b, sample by sample: strikes and forces enter, free and driven part are heard together."""
+    """Samples i … end - 1 of body b, sample by sample: strikes and forces enter, free and driven part are heard
+    together.
+    """
     width = len(rows) // 8
     for k in range(i, end):
         sample = at + k
-        if bent[b] and (not is_driven[b] or sample % DRIVEN == 0):  # what begins to be driven begins with the poles of what rings then
+        # what begins to be driven begins with the poles of what rings then
+        if bent[b] and (not is_driven[b] or sample % DRIVEN == 0):
             bend_poles(z, driven, DRIVEN, log_pole, bend, damping_growth, power, modes, start, stop, pole, block)
         if is_driven[b]:
             drive.turn_driven(driven, pole, modes, start, stop - start)
@@ -162,7 +196,18 @@ def _drive(at, i, end, place, b, out, z, driven, is_driven, tiled, pole, block, 
         for f in range(f0, f1):
             push = force[f, k] * period
             if abs(push) >= FLUSH:
-                drive.push(driven, quadrature, modes, start, stop - start, gain0, gain1, gain_at[f], push * (1.0 - progress[k]), push * progress[k])
+                drive.push(
+                    driven,
+                    quadrature,
+                    modes,
+                    start,
+                    stop - start,
+                    gain0,
+                    gain1,
+                    gain_at[f],
+                    push * (1.0 - progress[k]),
+                    push * progress[k],
+                )
                 is_driven[b] = True
         for w in range(len(observed)):
             if observed[w, b]:
@@ -179,7 +224,12 @@ def advance(at, out, offset, size, pole, block, log_pole, bend, damping_growth, 
     """Samples at … at + n - 1 into out (W, b, n) (zeros). See bank.py for the arrays; all in place."""
     n = out.shape[2]
     modes = len(quadrature)
-    now, powers, table, column = _aligned(2 * CHUNK), _aligned(10 * CHUNK), _aligned(2 * ROW * CHUNK), _aligned(2 * ROWS * CHUNK)
+    now, powers, table, column = (
+        _aligned(2 * CHUNK),
+        _aligned(10 * CHUNK),
+        _aligned(2 * ROW * CHUNK),
+        _aligned(2 * ROWS * CHUNK),
+    )
     weight_flat = weight.reshape(-1)
     for b in range(len(offset) - 1):
         start, stop = offset[b], offset[b + 1]
@@ -198,7 +248,24 @@ def advance(at, out, offset, size, pole, block, log_pole, bend, damping_growth, 
             if place == 0:
                 if bent[b] and ringing[b]:
                     bend_poles(z, driven, BLOCK, log_pole, bend, damping_growth, power, modes, start, stop, pole, block)
-                tiled[b] = ringing[b] and _ring(b, z, pole, block, weight, modes, start, stop, size[b], observed, floor, sound, now, powers, table, column)
+                tiled[b] = ringing[b] and _ring(
+                    b,
+                    z,
+                    pole,
+                    block,
+                    weight,
+                    modes,
+                    start,
+                    stop,
+                    size[b],
+                    observed,
+                    floor,
+                    sound,
+                    now,
+                    powers,
+                    table,
+                    column,
+                )
                 ringing[b] = tiled[b]
             if not (is_driven[b] or f1 > f0 or _begins(first, done, s0, s1, at + end)):
                 if tiled[b]:

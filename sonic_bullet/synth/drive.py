@@ -2,7 +2,8 @@
 
     f <- f p;   f <- f + (1 + i d/ω) (a0 g0 + a1 g1);   f <- f + r Σ_k J_k D^(K-k);   Σ Re(w f)
 
-State, poles and weights are flat (2·modes), real parts first; ``start`` and ``count`` name a body's lanes, whole groups of 8.
+State, poles and weights are flat (2·modes), real parts first; ``start`` and ``count`` name a body's lanes, whole groups
+of 8.
 """
 
 # mypy: disable-error-code="no-untyped-def"
@@ -40,7 +41,9 @@ def turn_driven(typingctx, state, pole, modes, start, count):
 
 @intrinsic
 def push(typingctx, state, quadrature, modes, start, count, gain0, gain1, at, a0, a1):
-    """A force's impulse at the sample: a0·gain0 + a1·gain1 (from ``at`` on) onto the real part, times d/ω onto the imaginary."""
+    """A force's impulse at the sample: a0·gain0 + a1·gain1 (from ``at`` on) onto the real part, times d/ω onto the
+    imaginary.
+    """
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         e = Emit(context, builder, signature, args)
@@ -65,21 +68,27 @@ def push(typingctx, state, quadrature, modes, start, count, gain0, gain1, at, a0
 def strike_nodes(typingctx, state, modes, start, count, rows, at, width, multiplier, impulse, node, nodes):
     """A strike's ``nodes`` impulses since the last sample: r <- r·E, state += r·Horner(impulse, D).
 
-    rows: flat (8, width), phasors r, D, E0, E1 from column ``at`` on, real and imaginary rows in turn; multiplier: 0 for E0, 1 for E1, -1 for none.
+    rows: flat (8, width), phasors r, D, E0, E1 from column ``at`` on, real and imaginary rows in turn; multiplier: 0
+    for E0, 1 for E1, -1 for none.
     """
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         e = Emit(context, builder, signature, args)
         state, modes, start, count, rows, at, width, multiplier, impulse, node, nodes = e.args
         stay = builder.icmp_signed("<", multiplier, e.index(0))
-        chosen = builder.mul(width, builder.add(e.index(4), builder.mul(e.index(2), builder.select(stay, e.index(0), multiplier))))
+        chosen = builder.mul(
+            width, builder.add(e.index(4), builder.mul(e.index(2), builder.select(stay, e.index(0), multiplier)))
+        )
         last = builder.add(node, nodes)
 
         def body(k: Value, carried: list[Value]) -> list[Value]:
             here = builder.add(at, k)
             below = builder.add(here, width)
             spot = builder.add(here, chosen)
-            factor = builder.select(stay, constant(1), e.load(rows, spot)), builder.select(stay, constant(0), e.load(rows, builder.add(spot, width)))
+            factor = (
+                builder.select(stay, constant(1), e.load(rows, spot)),
+                builder.select(stay, constant(0), e.load(rows, builder.add(spot, width))),
+            )
             r = e.product((e.load(rows, here), e.load(rows, below)), factor)
             e.store(r[0], rows, here)
             e.store(r[1], rows, below)
@@ -115,7 +124,10 @@ def observed(typingctx, state, start, weight, at, modes, count):
         def body(k: Value, total: list[Value]) -> list[Value]:
             re, here = builder.add(start, k), builder.add(at, k)
             real = e.fma(e.load(state, re), e.load(weight, here), total[0])
-            return [real, e.fma(e.load(state, builder.add(re, modes)), e.load(weight, builder.add(here, modes)), total[1])]
+            return [
+                real,
+                e.fma(e.load(state, builder.add(re, modes)), e.load(weight, builder.add(here, modes)), total[1]),
+            ]
 
         real, imag = e.loop(count, LANES, [constant(0), constant(0)], body)
         return e.total(builder.fsub(real, imag))

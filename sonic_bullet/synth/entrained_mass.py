@@ -1,14 +1,16 @@
-"""How far the air beside a vibrating surface goes along with it: the exterior Laplace problem, once a body, for all its modes.
+"""How far the air beside a vibrating surface goes along with it: the exterior Laplace problem, once a body, for all its
+modes.
 
-    Δφ = 0 outside, ∂φ/∂n = -v on the surface, φ → 0 far away;   near field p = iωρ₀φ: φ is the length of air moved, times v
+    Δφ = 0 outside, ∂φ/∂n = -v on the surface, φ → 0 far away;
+        near field p = iωρ₀φ: φ is the length of air moved, times v
 
     (½ - K) φ = S v          S v = ∮ v/4πr dS,  K φ = ∮ φ ∂(1/4πr)/∂n_y dS            [Kress 1989, eq. 6.23]
     -D φ = (½ + K') v        their derivatives along n_x                              [Burton & Miller 1971, eq. 3.5]
 
-First plus β times second, β = √(S/4π): the first fixes the constant, the second what two sides of a thin wall do to each other,
-which the first alone loses. Triangles of constant φ and v, collocated at their centroids; all integrals in closed form:
-potential of a triangle [Wilton et al. 1984, eq. 5], solid angle [van Oosterom & Strackee 1983, eq. 8], loop [Katz & Plotkin 2001, eq. 10.115].
-f triangles, m modes.
+First plus β times second, β = √(S/4π): the first fixes the constant, the second what two sides of a thin wall do to
+each other, which the first alone loses. Triangles of constant φ and v, collocated at their centroids; all integrals in
+closed form: potential of a triangle [Wilton et al. 1984, eq. 5], solid angle [van Oosterom & Strackee 1983, eq. 8],
+loop [Katz & Plotkin 2001, eq. 10.115]. f triangles, m modes.
 """
 
 # mypy: disable-error-code="no-untyped-def"
@@ -26,7 +28,8 @@ from sonic_bullet.records import Array
 class Moved:
     """The map v → φ of one surface, symmetric in √area: φ = Σ_j vector_j length_j (vector_j·v).
 
-    area_m2 (f,) of its triangles; length_m (f,) > 0: eigenvalues, ascending; vector (f, f): columns are eigenvectors, of √area·v.
+    area_m2 (f,) of its triangles; length_m (f,) > 0: eigenvalues, ascending; vector (f, f): columns are eigenvectors,
+    of √area·v.
     """
 
     area_m2: Array
@@ -43,7 +46,9 @@ def moved_air(corner_m: Array) -> Moved:
     length = np.linalg.norm(twice, axis=1)
     normal = twice / length[:, None]
     area = length / 2
-    left, right = _matrices(np.ascontiguousarray(corner_m, dtype=float), normal, float(np.sqrt(area.sum() / (4 * np.pi))))
+    left, right = _matrices(
+        np.ascontiguousarray(corner_m, dtype=float), normal, float(np.sqrt(area.sum() / (4 * np.pi)))
+    )
     root = np.sqrt(area)
     even = root[:, None] * np.linalg.solve(left, right) / root
     value, vector = np.linalg.eigh((even + even.T) / 2)

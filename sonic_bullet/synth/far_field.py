@@ -1,17 +1,22 @@
 """From modal velocity to pressure: a far-field map of each mode, and what radiating costs it.
 
-    p(r̂) = (iωρ₀/4π) ∮ [v + ik (r̂·n) ψ] e^{ik r̂·x} dS             at 1 m, v = φ·n for unit modal velocity   [Pierce 1989, eq. 4-6.4, e^{iωt}]
-    near field p_s = iωρ₀ ψ:  ψ = Σ_j e_j (e_j·v)/q_j                e_j, t_j: eigenvectors and -values of the air moved at k = 0, `added_mass`
-    q_j(k) = 1/L + √(κ_j² + (1/L + ik)²),  q_j(0) = 1/t_j          its change with k; L the body's middle principal extent
-    |p| = √<|p(r̂)|²>,  Δd = 2π <|p|²>/ρ₀c                          mean over directions; power = 4π<|p|²>/2ρ₀c = 2 Δd · ½|z|²
+    p(r̂) = (iωρ₀/4π) ∮ [v + ik (r̂·n) ψ] e^{ik r̂·x} dS             at 1 m, v = φ·n for unit modal velocity
+        [Pierce 1989, eq. 4-6.4, e^{iωt}]
+    near field p_s = iωρ₀ ψ:  ψ = Σ_j e_j (e_j·v)/q_j
+        e_j, t_j: eigenvectors and -values of the air moved at k = 0, `added_mass`
+    q_j(k) = 1/L + √(κ_j² + (1/L + ik)²),  q_j(0) = 1/t_j
+        its change with k; L the body's middle principal extent
+    |p| = √<|p(r̂)|²>,  Δd = 2π <|p|²>/ρ₀c
+        mean over directions; power = 4π<|p|²>/2ρ₀c = 2 Δd · ½|z|²
 
-On a sphere (a = L/2) the e_j are the harmonics and q_j interpolates -k h_l'(ka)/h_l(ka): exact for l = 0, for every l at k → 0, where it is
-(l+1)/a, and to second order for k → ∞ (1/a + ik). On a wide flat face they are waves, and q = √(κ² - k²) [Cremer et al. 2005, eq. 6.26].
+On a sphere (a = L/2) the e_j are the harmonics and q_j interpolates -k h_l'(ka)/h_l(ka): exact for l = 0, for every l
+at k → 0, where it is (l+1)/a, and to second order for k → ∞ (1/a + ik). On a wide flat face they are waves, and q =
+√(κ² - k²) [Cremer et al. 2005, eq. 6.26].
 
-The mean is a product Gauss rule in the body's principal frame, exact for bodies small by the wavelength; for large ones 512 directions spread evenly.
-The weight is complex: size the mean over directions, phase that of the direction of the strongest pressure, counted from the instant
-sound leaves the surface on that side. A shape and its negative sound the same.
-v vertices, f faces, m modes, s patches, n directions in pairs ±r̂.
+The mean is a product Gauss rule in the body's principal frame, exact for bodies small by the wavelength; for large ones
+512 directions spread evenly. The weight is complex: size the mean over directions, phase that of the direction of the
+strongest pressure, counted from the instant sound leaves the surface on that side. A shape and its negative sound the
+same. v vertices, f faces, m modes, s patches, n directions in pairs ±r̂.
 """
 
 # mypy: disable-error-code="no-untyped-def"
@@ -33,7 +38,8 @@ SPREAD = 256  # directions, and their negatives, where even the most rings are t
 def radiation(model: ModalModel, air: Air) -> tuple[Array, Array]:
     """Pressure weight (m,) complex, in Pa·m per modal velocity (m/s·√kg), and radiation damping (m,) in 1/s.
 
-    Pressure at distance r is Re(weight·z)/r, z the modal state of `bank`. Zero for a model without a surface. Source: the module's equations.
+    Pressure at distance r is Re(weight·z)/r, z the modal state of `bank`. Zero for a model without a surface. Source:
+    the module's equations.
     """
     m = model.mode_count
     corner, face = _sound_faces(model)
@@ -61,11 +67,16 @@ def radiation(model: ModalModel, air: Air) -> tuple[Array, Array]:
         now = np.flatnonzero(rings == count)
         direction, share = directions(int(count)) if count <= MOST_RINGS else spread_directions(SPREAD)
         ahead, behind = _map(k[now], moment[now], np.ascontiguousarray(place.T), direction)
-        pressure = np.concatenate([ahead, behind], axis=1) * (1j * k[now] * air.sound_speed_m_s * air.density_kg_m3 / (4 * np.pi))[:, None]
+        pressure = (
+            np.concatenate([ahead, behind], axis=1)
+            * (1j * k[now] * air.sound_speed_m_s * air.density_kg_m3 / (4 * np.pi))[:, None]
+        )
         both = np.concatenate([direction, -direction])
         mean = np.abs(pressure) ** 2 @ np.concatenate([share, share])
         best = np.argmax(np.abs(pressure), axis=1)
-        lead = pressure[np.arange(len(now)), best] * np.exp(-1j * k[now] * np.array([(point @ both[b]).max() for b in best]))
+        lead = pressure[np.arange(len(now)), best] * np.exp(
+            -1j * k[now] * np.array([(point @ both[b]).max() for b in best])
+        )
         size = np.abs(lead)
         weight[now] = np.sqrt(mean) * np.where(size > 0, lead / np.where(size > 0, size, 1), 1)
     impedance = air.density_kg_m3 * air.sound_speed_m_s
@@ -73,18 +84,26 @@ def radiation(model: ModalModel, air: Air) -> tuple[Array, Array]:
 
 
 def directions(rings: int) -> tuple[Array, Array]:
-    """Unit vectors (n, 3) of the upper half sphere and shares (n,), ½ in all: with their negatives exact to degree 2·rings - 1 [Stroud 1971, sec. 2.7]."""
+    """Unit vectors (n, 3) of the upper half sphere and shares (n,), ½ in all: with their negatives exact to degree
+    2·rings - 1 [Stroud 1971, sec. 2.7].
+    """
     height, share = np.polynomial.legendre.leggauss(rings + rings % 2)
     height, share = height[height > 0], share[height > 0]
     turns = 4 * ((rings + 1) // 2)
     angle = 2 * np.pi * (np.arange(turns) + 0.5) / turns
     radius = np.sqrt(1 - height**2)[:, None]
-    vector = np.stack([radius * np.cos(angle), radius * np.sin(angle), np.broadcast_to(height[:, None], (len(height), turns))], axis=-1)
+    vector = np.stack(
+        [radius * np.cos(angle), radius * np.sin(angle), np.broadcast_to(height[:, None], (len(height), turns))],
+        axis=-1,
+    )
     return np.ascontiguousarray(vector.reshape(-1, 3)), np.repeat(share / (2 * turns), turns)
 
 
 def spread_directions(count: int) -> tuple[Array, Array]:
-    """As `directions`, spread evenly along a spiral [Swinbank & Purser 2006, eq. 1-3]: no symmetry of a body makes any of them superfluous."""
+    """As `directions`, spread evenly along a spiral [Swinbank & Purser 2006, eq.
+
+    1-3]: no symmetry of a body makes any of them superfluous.
+    """
     height = (np.arange(count) + 0.5) / count
     angle = np.pi * (np.sqrt(5) - 1) * np.arange(count)
     radius = np.sqrt(1 - height**2)
@@ -102,13 +121,15 @@ def _sound_faces(model: ModalModel) -> tuple[Array, Array]:
 def _principal(corner: Array, motion: Array) -> tuple[Array, Array]:
     """Corners about the surface's centroid along its principal axes, longest first, and the rows of that frame (3, 3).
 
-    Axes point to where there is more motion (f,), summed over modes; where there is as much on both sides their sense does not matter.
+    Axes point to where there is more motion (f,), summed over modes; where there is as much on both sides their sense
+    does not matter.
     """
     area = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1)
     centre = corner.mean(axis=1)
     middle = area @ centre / area.sum()
     spread = np.einsum("f,fi,fj->ij", area, centre - middle, centre - middle)
-    turn = np.linalg.eigh(np.round(spread * (1e6 / np.trace(spread))))[1][:, ::-1].T  # rounded: equal moments leave the body's own axes
+    # rounded: equal moments leave the body's own axes
+    turn = np.linalg.eigh(np.round(spread * (1e6 / np.trace(spread))))[1][:, ::-1].T
     skew = (area * motion) @ (centre - middle) @ turn.T
     turn[skew < 0] *= -1
     turn[2] *= np.sign(np.linalg.det(turn))
@@ -125,7 +146,10 @@ def _cells(point: Array, normal: Array, edge_m: float) -> Array:
 
 
 def _patches(corner: Array, area: Array, normal: Array, most: int) -> tuple[Array, Array]:
-    """Patch (f,) of each face and place (s, 3) of each patch: its centroid. Neighbours that face the same side go together where there are too many."""
+    """Patch (f,) of each face and place (s, 3) of each patch: its centroid.
+
+    Neighbours that face the same side go together where there are too many.
+    """
     centre = corner.mean(axis=1)
     patch = np.arange(len(area))
     edge_m = np.sqrt(area.sum() / most)
@@ -137,7 +161,9 @@ def _patches(corner: Array, area: Array, normal: Array, most: int) -> tuple[Arra
 
 
 def _near_mesh(corner: Array, area: Array, normal: Array) -> tuple[Array, Array]:
-    """Triangles (c, 3, 3) for the near field, at most `MOST_TRIANGLES`, and of each face (f,) the one that stands for it."""
+    """Triangles (c, 3, 3) for the near field, at most `MOST_TRIANGLES`, and of each face (f,) the one that stands for
+    it.
+    """
     if len(corner) <= MOST_TRIANGLES:
         return corner, np.arange(len(corner))
     from scipy.spatial import cKDTree
@@ -145,7 +171,9 @@ def _near_mesh(corner: Array, area: Array, normal: Array) -> tuple[Array, Array]
     point, name = np.unique(np.round(corner.reshape(-1, 3) / (1e-7 * np.ptp(corner))), axis=0, return_inverse=True)
     name = name.reshape(-1, 3)
     point = point * (1e-7 * np.ptp(corner))
-    outward = np.stack([np.bincount(name.ravel(), np.repeat(area * normal[:, i], 3), len(point)) for i in range(3)], axis=1)
+    outward = np.stack(
+        [np.bincount(name.ravel(), np.repeat(area * normal[:, i], 3), len(point)) for i in range(3)], axis=1
+    )
     edge_m = np.sqrt(4 * area.sum() / MOST_TRIANGLES) / 1.5
     while True:
         cell = _cells(point, outward, edge_m)
@@ -157,7 +185,9 @@ def _near_mesh(corner: Array, area: Array, normal: Array) -> tuple[Array, Array]
         np.maximum.at(reach, cell, ((point - middle[cell]) * direction[cell]).sum(axis=1))
         middle += reach[:, None] * direction  # else edges are planed off
         triangle = cell[name]
-        triangle = triangle[(triangle[:, 0] != triangle[:, 1]) & (triangle[:, 1] != triangle[:, 2]) & (triangle[:, 2] != triangle[:, 0])]
+        triangle = triangle[
+            (triangle[:, 0] != triangle[:, 1]) & (triangle[:, 1] != triangle[:, 2]) & (triangle[:, 2] != triangle[:, 0])
+        ]
         _, first, alike = np.unique(np.sort(triangle, axis=1), axis=0, return_index=True, return_inverse=True)
         odd = (triangle[:, 0] < triangle[:, 1]) ^ (triangle[:, 1] < triangle[:, 2]) ^ (triangle[:, 2] < triangle[:, 0])
         odd_ones = np.bincount(alike.ravel(), odd)
@@ -175,8 +205,13 @@ def _near_mesh(corner: Array, area: Array, normal: Array) -> tuple[Array, Array]
 
 
 def _near_field(k: Array, curved_per_m: float, moved: Moved, flow: Array, nearest: Array) -> Array:
-    """ψ (f, m) in m·(1/√kg), complex, on faces with volume flow (f, m), each served by triangle nearest (f,) of `moved`."""
-    speed = np.stack([np.bincount(nearest, one, len(moved.area_m2)) for one in flow.T], axis=1) / np.sqrt(moved.area_m2)[:, None]
+    """ψ (f, m) in m·(1/√kg), complex, on faces with volume flow (f, m), each served by triangle nearest (f,) of
+    `moved`.
+    """
+    speed = (
+        np.stack([np.bincount(nearest, one, len(moved.area_m2)) for one in flow.T], axis=1)
+        / np.sqrt(moved.area_m2)[:, None]
+    )
     curved = np.minimum(curved_per_m, 0.5 / moved.length_m)[:, None]
     across = (1 / moved.length_m[:, None] - curved) ** 2 - curved**2
     q = curved + np.sqrt(across + (curved + 1j * k) ** 2)
@@ -184,11 +219,20 @@ def _near_field(k: Array, curved_per_m: float, moved: Moved, flow: Array, neares
     return np.asarray((moved.vector @ np.divide(share, q) / np.sqrt(moved.area_m2)[:, None])[nearest])
 
 
-def _moments(speed: Array, level: Array, corner: Array, area: Array, normal: Array, patch: Array, place: Array, out: Array) -> None:
-    """Fill out (m, 7, s) with each patch's ∫ of v, v (x - place) + n Re ψ, n Im ψ; speed (f, 3, m) at corners, level ψ (f, m)."""
+def _moments(
+    speed: Array, level: Array, corner: Array, area: Array, normal: Array, patch: Array, place: Array, out: Array
+) -> None:
+    """Fill out (m, 7, s) with each patch's ∫ of v, v (x - place) + n Re ψ, n Im ψ;
+
+    speed (f, 3, m) at corners, level ψ (f, m).
+    """
     arm = corner - place[patch][:, None]
     # ∫ v y over a triangle of linear v, y = area/12 (Σv Σy + Σvy)
-    lever = area[:, None, None] / 12 * (np.einsum("fm,fi->fim", speed.sum(axis=1), arm.sum(axis=1)) + np.einsum("fcm,fci->fim", speed, arm))
+    lever = (
+        area[:, None, None]
+        / 12
+        * (np.einsum("fm,fi->fim", speed.sum(axis=1), arm.sum(axis=1)) + np.einsum("fcm,fci->fim", speed, arm))
+    )
     order = np.argsort(patch, kind="stable")
     start = np.searchsorted(patch[order], np.arange(len(place)))
     out[:, 0] = np.add.reduceat((area[:, None] * speed.mean(axis=1))[order], start).T
@@ -199,7 +243,9 @@ def _moments(speed: Array, level: Array, corner: Array, area: Array, normal: Arr
 
 @njit(nogil=True, fastmath=True)
 def _map(k, moment, place, direction):
-    """Σ over patches [v + ik r̂·(v y + n ψ)] e^{ik r̂·x} (m, n), place (3, s), for directions (n, 3) and for their negatives. Sums run in vectors: no order to keep."""
+    """Σ over patches [v + ik r̂·(v y + n ψ)] e^{ik r̂·x} (m, n), place (3, s), for directions (n, 3) and for their
+    negatives. Sums run in vectors: no order to keep.
+    """
     m, n = len(k), len(direction)
     ahead = np.empty((m, n), np.complex128)
     behind = np.empty((m, n), np.complex128)
@@ -214,8 +260,22 @@ def _map(k, moment, place, direction):
                 t = np.pi * (turns - (np.int32(turns + 1048576.5) - 1048576.0))
                 u = t * t
                 # sine and cosine of half the angle, |t| ≤ π/2: Taylor to 1e-9, without calls so that it runs in vectors
-                sn = t * (1 + u * (-1 / 6 + u * (1 / 120 + u * (-1 / 5040 + u * (1 / 362880 + u * (-1 / 39916800 + u / 6227020800))))))
-                cs = 1 + u * (-1 / 2 + u * (1 / 24 + u * (-1 / 720 + u * (1 / 40320 + u * (-1 / 3628800 + u * (1 / 479001600 - u / 87178291200))))))
+                sn = t * (
+                    1
+                    + u
+                    * (
+                        -1 / 6
+                        + u * (1 / 120 + u * (-1 / 5040 + u * (1 / 362880 + u * (-1 / 39916800 + u / 6227020800))))
+                    )
+                )
+                cs = 1 + u * (
+                    -1 / 2
+                    + u
+                    * (
+                        1 / 24
+                        + u * (-1 / 720 + u * (1 / 40320 + u * (-1 / 3628800 + u * (1 / 479001600 - u / 87178291200))))
+                    )
+                )
                 sine, cosine = 2 * sn * cs, 1 - 2 * sn * sn
                 lever = n0[s] * x + n1[s] * y + n2[s] * z
                 late = m0[s] * x + m1[s] * y + m2[s] * z
@@ -232,8 +292,10 @@ def _map(k, moment, place, direction):
 
 
 def jerk_coefficient(volume_m3: float, air: Air) -> float:
-    """K = 3ρ₀V/(8πc) in Pa·m per m/s³: a rigid compact body's far pressure is K cosθ · jerk(t - r/c)/r [Chadwick, Zheng, James 2012, eq. 9].
+    """K = 3ρ₀V/(8πc) in Pa·m per m/s³: a rigid compact body's far pressure is K cosθ · jerk(t - r/c)/r [Chadwick,
+    Zheng, James 2012, eq. 9].
 
-    θ from the jerk to the listener. The sphere's own law at small ka: displaced air and half as much again as added mass [Pierce 1989, sec. 4-2].
+    θ from the jerk to the listener. The sphere's own law at small ka: displaced air and half as much again as added
+    mass [Pierce 1989, sec. 4-2].
     """
     return 3 * air.density_kg_m3 * volume_m3 / (8 * np.pi * air.sound_speed_m_s)

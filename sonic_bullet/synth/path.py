@@ -1,13 +1,15 @@
 """From bodies to microphones through free air: travel time, 1/r, and the direction of a rigid body's push.
 
-    p[c](t) = Σ_b (s_b + K_b n̂·j_b)(t_e) / r,   t_e + r(t_e)/c = t     [Pierce 1989, sec. 4-3 (monopole), Chadwick, Zheng, James 2012, eq. 9]
+    p[c](t) = Σ_b (s_b + K_b n̂·j_b)(t_e) / r,   t_e + r(t_e)/c = t
+        [Pierce 1989, sec. 4-3 (monopole), Chadwick, Zheng, James 2012, eq. 9]
 
-s_b: pressure at 1 m (Pa·m) of the body's modes, j_b: jerk of the rigid body, n̂ and r from the body to the microphone when the sound
-left (t_e), so a moving body's Doppler shift is exact: 1/(1 + v/c). r is never below the body's radius, and the travel time never below
-8 samples (5.7 cm at 48 kHz), half the interpolation's length. Flat to 0.02 dB up to 18 kHz at 48 kHz.
-Every sample depends on absolute time alone: any way of cutting the calls gives the same bits (`path_kernel`).
-A body moved by hand emits from its old place and its new one, fading over the step: no click and no chirp.
-`propagate` works in place: `copy()` a state first to look ahead and come back. b bodies, c microphones, n samples, t places.
+s_b: pressure at 1 m (Pa·m) of the body's modes, j_b: jerk of the rigid body, n̂ and r from the body to the microphone
+when the sound left (t_e), so a moving body's Doppler shift is exact: 1/(1 + v/c). r is never below the body's radius,
+and the travel time never below 8 samples (5.7 cm at 48 kHz), half the interpolation's length. Flat to 0.02 dB up to 18
+kHz at 48 kHz. Every sample depends on absolute time alone: any way of cutting the calls gives the same bits
+(`path_kernel`). A body moved by hand emits from its old place and its new one, fading over the step: no click and no
+chirp. `propagate` works in place: `copy()` a state first to look ahead and come back. b bodies, c microphones, n
+samples, t places.
 """
 
 from __future__ import annotations
@@ -28,7 +30,10 @@ _SHORTEST = 1024
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Path:
-    """What does not change: microphone_m (c, 3), and of each body radius_m (b,) and jerk_coefficient (b,) (`radiation.jerk_coefficient`)."""
+    """What does not change:
+
+    microphone_m (c, 3), and of each body radius_m (b,) and jerk_coefficient (b,) (`radiation.jerk_coefficient`).
+    """
 
     sr: int
     air: Air
@@ -41,9 +46,9 @@ class Path:
 class PathState:
     """Sound under way. at: the next sample. A place is a body's present position or one that it was moved away from.
 
-    body (t,), rest_m (t, 3): of each place. main (b,): each body's present place; left (b,): step in which it was last moved by hand;
-    leaving (b,): the place it then left. size (t,): samples remembered, a power of two. ring, delays: flat histories of all lines (t·c).
-    awake, cursor, last (t·c,): see path_kernel.
+    body (t,), rest_m (t, 3): of each place. main (b,): each body's present place; left (b,): step in which it was last
+    moved by hand; leaving (b,): the place it then left. size (t,): samples remembered, a power of two. ring, delays:
+    flat histories of all lines (t·c). awake, cursor, last (t·c,): see path_kernel.
     """
 
     at: int
@@ -61,17 +66,26 @@ class PathState:
 
     def copy(self) -> PathState:
         """A state of its own: propagating one leaves the other."""
-        arrays: dict[str, Any] = {field.name: getattr(self, field.name).copy() for field in fields(self) if field.name != "at"}
+        arrays: dict[str, Any] = {
+            field.name: getattr(self, field.name).copy() for field in fields(self) if field.name != "at"
+        }
         return PathState(at=self.at, **arrays)
 
 
 def empty_path(sr: int, air: Air, microphone_m: Array, at: int = 0) -> tuple[Path, PathState]:
-    """A path without bodies to microphones (c, 3), and its state at absolute sample ``at``. Raises AudioError on a bad rate or place."""
+    """A path without bodies to microphones (c, 3), and its state at absolute sample ``at``.
+
+    Raises AudioError on a bad rate or place.
+    """
     place = np.array(microphone_m, float).reshape(-1, 3)
     if not (0 < sr <= 10_000_000) or not np.isfinite(place).all():
-        raise AudioError(f"sample rate {sr} and microphones at {place.tolist()}", "give a rate in Hz and finite positions")
+        raise AudioError(
+            f"sample rate {sr} and microphones at {place.tolist()}", "give a rate in Hz and finite positions"
+        )
     ints, floats = np.zeros(0, np.int64), np.zeros(0)
-    state = PathState(int(at), ints, np.zeros((0, 3)), ints, ints, ints, ints, floats, floats, np.zeros(0, bool), ints, ints)
+    state = PathState(
+        int(at), ints, np.zeros((0, 3)), ints, ints, ints, ints, floats, floats, np.zeros(0, bool), ints, ints
+    )
     return Path(int(sr), air, place, floats, floats), state.copy()
 
 
@@ -79,9 +93,16 @@ def append_bodies(path: Path, state: PathState, radius_m: Array, jerk_coefficien
     """Path and state with further bodies (k,), (k,); what is under way goes on unchanged. The old pair stays usable."""
     radius, jerk = np.array(radius_m, float).ravel(), np.array(jerk_coefficient, float).ravel()
     if radius.shape != jerk.shape or not (np.isfinite(radius).all() and np.isfinite(jerk).all()):
-        raise AudioError("bodies with radii or jerk coefficients that are not finite", "give one finite number of each for every body")
+        raise AudioError(
+            "bodies with radii or jerk coefficients that are not finite",
+            "give one finite number of each for every body",
+        )
     count, known = len(radius), len(path.radius_m)
-    grown = replace(path, radius_m=np.concatenate([path.radius_m, radius]), jerk_coefficient=np.concatenate([path.jerk_coefficient, jerk]))
+    grown = replace(
+        path,
+        radius_m=np.concatenate([path.radius_m, radius]),
+        jerk_coefficient=np.concatenate([path.jerk_coefficient, jerk]),
+    )
     state = state.copy()
     first = len(state.body)
     _add_places(state, np.arange(known, known + count), len(path.microphone_m))
@@ -104,10 +125,11 @@ def propagate(
 ) -> Array:
     """Pressure (c, n) in Pa at the next n samples. Changes ``state`` in place.
 
-    step ≥ 0: number of the physics step that these samples are (part of). source (b, n) in Pa·m; jerk (b, 3, n) in m/s³, world frame.
-    position0_m, position1_m (b, 3): at the step's start and end; progress (n,): where between them each sample lies, 0 … 1.
-    teleported (b,): moved by hand, so both places sound and fade over the step. Bodies are summed in order. Below 1e-30 Pa: 0.
-    Raises AudioError on wrong shapes, numbers that are not finite, or a sounding body more than 1 km from a microphone.
+    step ≥ 0: number of the physics step that these samples are (part of). source (b, n) in Pa·m; jerk (b, 3, n) in
+    m/s³, world frame. position0_m, position1_m (b, 3): at the step's start and end; progress (n,): where between them
+    each sample lies, 0 … 1. teleported (b,): moved by hand, so both places sound and fade over the step. Bodies are
+    summed in order. Below 1e-30 Pa: 0. Raises AudioError on wrong shapes, numbers that are not finite, or a sounding
+    body more than 1 km from a microphone.
     """
     count, channels = len(path.radius_m), len(path.microphone_m)
     n = len(progress)
@@ -164,7 +186,9 @@ def _add_places(state: PathState, body: Array, channels: int) -> None:
 
 
 def _begin_fades(state: PathState, step: int, teleported: Array, loud: Array, channels: int) -> None:
-    """Give each body moved in this step a new place, once, and only if anything of it is observed: silence needs no fade."""
+    """Give each body moved in this step a new place, once, and only if anything of it is observed: silence needs no
+    fade.
+    """
     awake = _awake(state, channels)
     moved = np.flatnonzero(teleported & (state.left != step) & (loud | awake[state.main]))
     if not len(moved):
@@ -222,7 +246,8 @@ def _make_room(path: Path, state: PathState, from_m: Array, to_m: Array, loud: A
     far = np.flatnonzero(away > FARTHEST_M)
     if len(far):
         raise AudioError(
-            f"body {state.body[far[0]]} sounds {away[far[0]]:.0f} m from a microphone", f"keep what sounds within {FARTHEST_M:.0f} m, or remove it"
+            f"body {state.body[far[0]]} sounds {away[far[0]]:.0f} m from a microphone",
+            f"keep what sounds within {FARTHEST_M:.0f} m, or remove it",
         )
     size = np.maximum(state.size, 2 ** np.ceil(np.log2(need)).astype(np.int64))
     lines, new_lines = state.size.repeat(channels), size.repeat(channels)

@@ -1,8 +1,11 @@
-"""The sound path's compiled loop: what each body emits, delayed by r/c and divided by r, read off by a moving fractional delay.
+"""The sound path's compiled loop: what each body emits, delayed by r/c and divided by r, read off by a moving
+fractional delay.
 
     emitted at sample m:   a[m] = (s[m] + K n̂·j[m])/r[m],  arriving at m + D[m], D = r sr/c
-    heard at sample n:     a(u), where u + D(u) = n, D linear between samples     (retarded time: Doppler shift is exact)
-    a(u) = Σ_k a[k] h(u - k),  h: 16 taps of a Kaiser-windowed sinc               [Laakso et al. 1996, IEEE SPM 13(1), sec. 3.2]
+    heard at sample n:     a(u), where u + D(u) = n, D linear between samples
+        (retarded time: Doppler shift is exact)
+    a(u) = Σ_k a[k] h(u - k),  h: 16 taps of a Kaiser-windowed sinc
+        [Laakso et al. 1996, IEEE SPM 13(1), sec. 3.2]
 
 A line is one body, one place and one microphone. It sleeps until something is emitted and again when the last of it has
 arrived; that is decided sample by sample, so frames do not matter. Taps as polynomials in the fraction [Farrow 1988].
@@ -29,14 +32,17 @@ HALF_DEGREE = 4
 KAISER_BETA = 6.0
 FLUSH = 1e-30
 LEAST_ADVANCE = 1.0 / 16.0
-"""Sound emitted one sample later arrives at least this much later: a source at or above the speed of sound is not overtaken by its own sound."""
+"""Sound emitted one sample later arrives at least this much later: a source at or above the speed of sound is not
+overtaken by its own sound.
+"""
 
 _HISTORY = 3 * AHEAD
 
 
 @lru_cache(maxsize=1)
 def tap_polynomials() -> Array:
-    """(HALF_DEGREE + 1, 2, 8): of taps 0 … 7 the even and the odd part in t = fraction - ½, as polynomials in t², lowest power first.
+    """(HALF_DEGREE + 1, 2, 8): of taps 0 … 7 the even and the odd part in t = fraction - ½, as polynomials in t²,
+    lowest power first.
 
     Tap k weighs sample floor(u) - 7 + k; tap 15 - k at t is tap k at -t: h = even ± t·odd serves both. Fitted to 1e-8.
     """
@@ -78,7 +84,9 @@ def _interpolate(typingctx, ring, at, taps, t):
 
 @njit(nogil=True, error_model="numpy")
 def _listen(line, at, emitted, delay, observed, ring, delays, awake, cursor, last, taps):  # pragma: no cover - compiled
-    """Run one line, its ring and delays (a power of two long, the ring TAPS longer), over emitted (n,), adding to observed (n,)."""
+    """Run one line, its ring and delays (a power of two long, the ring TAPS longer), over emitted (n,), adding to
+    observed (n,).
+    """
     size = len(delays)
     mask = np.uintp(size - 1)  # unsigned indices: numba checks no wrap-around
     running, m, newest = awake[line], cursor[line], last[line]
@@ -124,8 +132,13 @@ def _listen(line, at, emitted, delay, observed, ring, delays, awake, cursor, las
 
 
 @njit(nogil=True, error_model="numpy")
-def _emit(source, jerk, coefficient, radius, from_m, to_m, fade, progress, microphone, samples_per_m, emitted, delay):  # pragma: no cover - compiled
-    """a and D of the module's equations for one body, place and microphone. fade: 0 none, 1 in, -1 out, 2 nothing any more."""
+def _emit(
+    source, jerk, coefficient, radius, from_m, to_m, fade, progress, microphone, samples_per_m, emitted, delay
+):  # pragma: no cover - compiled
+    """a and D of the module's equations for one body, place and microphone.
+
+    fade: 0 none, 1 in, -1 out, 2 nothing any more.
+    """
     for i in range(len(progress)):
         x = progress[i]
         d0 = microphone[0] - (from_m[0] + (to_m[0] - from_m[0]) * x)
@@ -196,7 +209,18 @@ def propagate(at, out, source, jerk, coefficient, radius, order, body, from_m, t
             if not awake[line] and (fade[place] == 2 or not loud[b]):
                 continue
             _emit(
-                source[b], jerk[b], coefficient[b], radius[b], from_m[place], to_m[place], fade[place], progress, microphone[c], samples_per_m, emitted, delay
+                source[b],
+                jerk[b],
+                coefficient[b],
+                radius[b],
+                from_m[place],
+                to_m[place],
+                fade[place],
+                progress,
+                microphone[c],
+                samples_per_m,
+                emitted,
+                delay,
             )
             history = ring[ring_at[line] : ring_at[line] + size[line] + TAPS]
             late = delays[delays_at[line] : delays_at[line] + size[line]]

@@ -1,14 +1,16 @@
 """A strike is a finite force pulse: how long it lasts, and its shape as micro-impulses and as rigid-body jerk.
 
-    1/m* = Σ [1/m + (r×n)·I⁻¹(r×n)]            effective mass at the contact       [Johnson 1985, Contact Mechanics, sec. 11.1]
+    1/m* = Σ [1/m + (r×n)·I⁻¹(r×n)]            effective mass at the contact
+        [Johnson 1985, Contact Mechanics, sec. 11.1]
     1/E* = Σ (1-ν²)/E,  1/R* = κ1 + κ2         Hertz                               [Johnson 1985, eq. 4.24]
-    τ = 2.868 (m*²/(E*² R* v))^(1/5)           curved faces, approach speed v      [Johnson 1985, eq. 11.24; = 2.94 δmax/v]
-    τ = π √(m*/k),  k = 2 E* √(A/π)            flat faces of area A, any speed     [Sneddon 1965; Johnson 1985, eq. 3.36]
+    τ = 2.868 (m*²/(E*² R* v))^(1/5)           curved faces, approach speed v
+        [Johnson 1985, eq. 11.24; = 2.94 δmax/v]
+    τ = π √(m*/k),  k = 2 E* √(A/π)            flat faces of area A, any speed
+        [Sneddon 1965; Johnson 1985, eq. 3.36]
     δ'' = -δ^(3/2),  F ∝ δ^(3/2)               the Hertz pulse's own shape; flat: F ∝ sin(πt/τ)
 
-The cumulated force Q(s) = ∫F over the pulse's share s in [0, 1] (Q(1) = 1) is the table everything reads: for the Hertz pulse
-Q = (1 - δ'/v)/2, because the force is what changes the velocity.
-k strikes, b bodies, n samples.
+The cumulated force Q(s) = ∫F over the pulse's share s in [0, 1] (Q(1) = 1) is the table everything reads: for the Hertz
+pulse Q = (1 - δ'/v)/2, because the force is what changes the velocity. k strikes, b bodies, n samples.
 """
 
 from __future__ import annotations
@@ -24,17 +26,21 @@ from sonic_bullet.records import Array
 from sonic_bullet.records.errors import RecordError
 
 SHORTEST_S, LONGEST_S = 20e-6, 50e-3
-"""A pulse below 20 µs has its -3 dB point above 30 kHz and sounds like an impulse; above 50 ms nothing audible is struck."""
+"""A pulse below 20 µs has its -3 dB point above 30 kHz and sounds like an impulse; above 50 ms nothing audible is
+struck.
+"""
 
 _CELLS = 1024
 _NODES_PER_PULSE = 24
 
 
-def effective_mass_kg(mass_a: Array, inertia_a: Array, r_a: Array, mass_b: Array, inertia_b: Array, r_b: Array, normal: Array) -> Array:
+def effective_mass_kg(
+    mass_a: Array, inertia_a: Array, r_a: Array, mass_b: Array, inertia_b: Array, r_b: Array, normal: Array
+) -> Array:
     """Mass (k,) in kg that a strike along ``normal`` (k, 3) feels; mass 0 (k,) means immovable and adds nothing.
 
-    inertia (k, 3, 3) in kg·m² about the centre of mass, r (k, 3) from there to the contact in m, all in the world frame.
-    Raises RecordError where both partners are immovable. Source: the module's first equation.
+    inertia (k, 3, 3) in kg·m² about the centre of mass, r (k, 3) from there to the contact in m, all in the world
+    frame. Raises RecordError where both partners are immovable. Source: the module's first equation.
     """
     inverse = np.zeros(len(normal))
     for mass, inertia, r in ((mass_a, inertia_a, r_a), (mass_b, inertia_b, r_b)):
@@ -44,7 +50,9 @@ def effective_mass_kg(mass_a: Array, inertia_a: Array, r_a: Array, mass_b: Array
             turn = _solve_inertia(np.asarray(inertia, float)[moves], arm)
             inverse[moves] += 1 / np.asarray(mass, float)[moves] + np.einsum("ki,ki->k", arm, turn)
     if (inverse <= 0).any():
-        raise RecordError("a strike between two bodies that cannot move", "give one of them a mass, or drop the contact")
+        raise RecordError(
+            "a strike between two bodies that cannot move", "give one of them a mass, or drop the contact"
+        )
     return np.asarray(1 / inverse)
 
 
@@ -63,19 +71,25 @@ def contact_modulus_pa(plane_strain_a: Array, plane_strain_b: Array) -> Array:
         return np.asarray(1 / (1 / np.asarray(plane_strain_a, float) + 1 / np.asarray(plane_strain_b, float)))
 
 
-def contact_time_s(mass_kg: Array, modulus_pa: Array, relative_curvature_per_m: Array, flat_area_m2: Array, approach_m_s: Array) -> tuple[Array, Array]:
-    """Length τ (k,) in s of each pulse, and whether it is flat (k,) bool: flat pulses are half-sines, the others Hertz'.
+def contact_time_s(
+    mass_kg: Array, modulus_pa: Array, relative_curvature_per_m: Array, flat_area_m2: Array, approach_m_s: Array
+) -> tuple[Array, Array]:
+    """Length τ (k,) in s of each pulse, and whether it is flat (k,) bool: flat pulses are half-sines, the others
+    Hertz'.
 
-    relative_curvature κ1+κ2 in 1/m: zero or below where the faces conform. flat_area_m2: nominal area of touching, 0 where
-    none is known. A contact is never stiffer than the flat punch that its area allows, so the longer of both τ wins;
-    without area Hertz decides alone, without curvature the punch; with neither, with infinite mass or at no speed τ is LONGEST_S.
-    Clamped to SHORTEST_S … LONGEST_S. Source: the module's τ equations.
+    relative_curvature κ1+κ2 in 1/m: zero or below where the faces conform. flat_area_m2: nominal area of touching, 0
+    where none is known. A contact is never stiffer than the flat punch that its area allows, so the longer of both τ
+    wins; without area Hertz decides alone, without curvature the punch; with neither, with infinite mass or at no speed
+    τ is LONGEST_S. Clamped to SHORTEST_S … LONGEST_S. Source: the module's τ equations.
     """
     mass, modulus, curvature, area, speed = (
-        np.asarray(x, float) for x in np.broadcast_arrays(mass_kg, modulus_pa, relative_curvature_per_m, flat_area_m2, approach_m_s)
+        np.asarray(x, float)
+        for x in np.broadcast_arrays(mass_kg, modulus_pa, relative_curvature_per_m, flat_area_m2, approach_m_s)
     )
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        hertz = np.where(curvature > 0, 2.868 * (mass**2 * np.maximum(curvature, 0) / (modulus**2 * np.maximum(speed, 0))) ** 0.2, 0)
+        hertz = np.where(
+            curvature > 0, 2.868 * (mass**2 * np.maximum(curvature, 0) / (modulus**2 * np.maximum(speed, 0))) ** 0.2, 0
+        )
         punch = np.where(area > 0, np.pi * np.sqrt(mass / (2 * modulus * np.sqrt(np.maximum(area, 0) / np.pi))), 0)
     neither = ~(curvature > 0) & ~(area > 0)
     tau = np.where(neither, LONGEST_S, np.fmax(hertz, punch))
@@ -83,10 +97,12 @@ def contact_time_s(mass_kg: Array, modulus_pa: Array, relative_curvature_per_m: 
 
 
 def pulse_nodes(tau_s: float, sr: int, *, flat: bool = False) -> tuple[float, float, Array]:
-    """The pulse as equidistant micro-impulses: time of the first after the strike's start in s, spacing in s, weights (count,), sum 1.
+    """The pulse as equidistant micro-impulses: time of the first after the strike's start in s, spacing in s, weights
+    (count,), sum 1.
 
-    A mode then gets Σ w·e^{-su} for ∫F e^{-su} du. Midpoints of at least 24 cells, none longer than half a sample: what the
-    sum folds down from beyond 1/spacing stays below 1e-3 of the impulse at every f ≤ 20 kHz (measured in the tests).
+    A mode then gets Σ w·e^{-su} for ∫F e^{-su} du. Midpoints of at least 24 cells, none longer than half a sample: what
+    the sum folds down from beyond 1/spacing stays below 1e-3 of the impulse at every f ≤ 20 kHz (measured in the
+    tests).
     """
     count = max(_NODES_PER_PULSE, int(np.ceil(2 * sr * tau_s)))
     s = (np.arange(count) + 0.5) / count
@@ -95,10 +111,12 @@ def pulse_nodes(tau_s: float, sr: int, *, flat: bool = False) -> tuple[float, fl
 
 
 def pulse_cells(start: float, tau_s: float, sr: int, least: int, *, flat: bool = False) -> tuple[float, float, Array]:
-    """The pulse as forces that are even over cells of the sample grid: centre of the first and spacing in samples, impulses (count,), sum 1.
+    """The pulse as forces that are even over cells of the sample grid: centre of the first and spacing in samples,
+    impulses (count,), sum 1.
 
-    start: of the pulse, in samples, any fraction. least: cells a sample, more where the pulse is short. For modes that decay within a
-    sample or so: what they hear of a slow pulse is its slope, and cells that no sample cuts through keep that exact.
+    start: of the pulse, in samples, any fraction. least: cells a sample, more where the pulse is short. For modes that
+    decay within a sample or so: what they hear of a slow pulse is its slope, and cells that no sample cuts through keep
+    that exact.
     """
     cells = max(least, int(np.ceil(_NODES_PER_PULSE / (sr * tau_s))))
     first = int(np.floor(start * cells))
@@ -110,7 +128,9 @@ def pulse_spectrum(f_tau: Array, *, flat: bool = False) -> Array:
     """|F̂(f)/F̂(0)| at the products f·τ, by fine quadrature (flat: |cos(πfτ)/(1-4f²τ²)|)."""
     s = (np.arange(4096) + 0.5) / 4096
     force = _force(s, flat)
-    return np.asarray(np.abs(np.exp(-2j * np.pi * np.multiply.outer(np.asarray(f_tau, float), s)) @ force) / force.sum())
+    return np.asarray(
+        np.abs(np.exp(-2j * np.pi * np.multiply.outer(np.asarray(f_tau, float), s)) @ force) / force.sum()
+    )
 
 
 @lru_cache(maxsize=2)
@@ -119,19 +139,26 @@ def _spectrum_table(flat: bool) -> tuple[Array, Array]:
     return f_tau, pulse_spectrum(f_tau, flat=flat)
 
 
-def compliant_share(mass_kg: float, impulse_n_s: float, pushed: Sequence[tuple[Array, Array]], tau_s: float, flat: bool) -> float:
-    """Which share of a rigid body's impulse a first contact can hand over where the bodies give way: 1/(1 + m*·Σ g²|F̂(fτ)|²).
+def compliant_share(
+    mass_kg: float, impulse_n_s: float, pushed: Sequence[tuple[Array, Array]], tau_s: float, flat: bool
+) -> float:
+    """Which share of a rigid body's impulse a first contact can hand over where the bodies give way:
 
-    pushed: per body the frequencies (m,) in Hz and Uᵀj (m,) of the whole impulse, so that g = Uᵀj/impulse_n_s. What a mode moves within the
-    pulse it takes from the approach, as if its 1/g² were one more mass in series with m* [1/m = 1/m* + Σ g²: the module's first equation, with
-    the modes as further motions of the bodies, e.g. Stronge 2000, Impact Mechanics, sec. 7.1]. The modes' energy is then at most
-    m*v²/2·((1+e)/2)², and not without bound. The rest of the simulator's impulse comes later, softly: it is heard as support.
+    1/(1 + m*·Σ g²|F̂(fτ)|²).
+
+    pushed: per body the frequencies (m,) in Hz and Uᵀj (m,) of the whole impulse, so that g = Uᵀj/impulse_n_s. What a
+    mode moves within the pulse it takes from the approach, as if its 1/g² were one more mass in series with m* [1/m =
+    1/m* + Σ g²: the module's first equation, with the modes as further motions of the bodies, e.g. Stronge 2000, Impact
+    Mechanics, sec. 7.1]. The modes' energy is then at most m*v²/2·((1+e)/2)², and not without bound. The rest of the
+    simulator's impulse comes later, softly: it is heard as support.
     """
     square = impulse_n_s**2
     if square == 0:  # an impulse below 1e-162 N·s, which only a forged log has: nothing of it is heard
         return 1.0
     f_tau, power = _spectrum_table(flat)
-    given = sum(float(np.sum((push * np.interp(freq_hz * tau_s, f_tau, power, right=0.0)) ** 2)) for freq_hz, push in pushed)
+    given = sum(
+        float(np.sum((push * np.interp(freq_hz * tau_s, f_tau, power, right=0.0)) ** 2)) for freq_hz, push in pushed
+    )
     return 1.0 / (1.0 + mass_kg * given / square)
 
 
@@ -140,12 +167,16 @@ def cumulated_force(s: Array, *, flat: bool = False) -> Array:
     return np.asarray(_cumulated_many(np.ascontiguousarray(s, float), _table(), flat))
 
 
-def add_jerk(out: Array, body: Array, t0_s: Array, tau_s: Array, flat: Array, impulse_n_s: Array, sr: int, first_sample: int) -> None:
-    """Add dF/dt of k pulses to ``out`` (b, 3, n) in N/s, at absolute samples first_sample … first_sample + n - 1 (time = sample/sr).
+def add_jerk(
+    out: Array, body: Array, t0_s: Array, tau_s: Array, flat: Array, impulse_n_s: Array, sr: int, first_sample: int
+) -> None:
+    """Add dF/dt of k pulses to ``out`` (b, 3, n) in N/s, at absolute samples first_sample … first_sample + n - 1 (time
+    = sample/sr).
 
-    body (k,) row of out; t0_s (k,) start, absolute; tau_s, flat (k,); impulse_n_s (k, 3). Each sample holds the mean of dF/dt
-    under a triangle one sample to either side, (Q(t+h) - 2Q(t) + Q(t-h))/h²: no pulse is too short to be seen, and the sum over
-    all samples is exactly 0, the sum of its sum J·sr. Each value hangs on the absolute sample only: any split gives the same bits.
+    body (k,) row of out; t0_s (k,) start, absolute; tau_s, flat (k,); impulse_n_s (k, 3). Each sample holds the mean of
+    dF/dt under a triangle one sample to either side, (Q(t+h) - 2Q(t) + Q(t-h))/h²: no pulse is too short to be seen,
+    and the sum over all samples is exactly 0, the sum of its sum J·sr. Each value hangs on the absolute sample only:
+    any split gives the same bits.
     """
     _add_jerk(
         out,
@@ -170,7 +201,10 @@ def _force(s: Array, flat: bool) -> Array:
 
 @lru_cache(maxsize=1)
 def _table() -> Array:
-    """(2, cells + 1): Q and F of the Hertz pulse at equidistant shares. δ'' = -δ^(3/2) from δ = 0, δ' = 1, by the classical Runge-Kutta method.
+    """(2, cells + 1):
+
+    Q and F of the Hertz pulse at equidistant shares. δ'' = -δ^(3/2) from δ = 0, δ' = 1, by the classical Runge-Kutta
+    method.
 
     The pulse is symmetric, so half of it is solved (to δ' = 0) and mirrored: Q(s) + Q(1-s) = 1.
     """

@@ -1,21 +1,24 @@
 """Loads of touching pairs, split into what is silent, what strikes and what rubs.
 
-    impulses of each step -> load F (pairs, steps) -> support N = opening of F -> strike = top-hat F - N over a rising edge
+    impulses of each step -> load F (pairs, steps) -> support N = opening of F -> strike = top-hat F - N over a rising
+        edge
 
 A physics step tells only a force averaged over it. Fed to a mode as it is, a resting weight would be a comb at the step
-rate [van den Doel, Kry, Pai 2001, sec. 5 discuss the same of recorded forces]. The split is a morphological opening of the
-load over `SPAN` steps [Serra 1982, ch. II]: what lasts that long carries weight and is silent (it loads the surface
-model instead), what is shorter is an impact. Impacts of up to SPAN - 1 steps become one strike: simulators spread one impact over 2-3 steps.
+rate [van den Doel, Kry, Pai 2001, sec. 5 discuss the same of recorded forces]. The split is a morphological opening of
+the load over `SPAN` steps [Serra 1982, ch. II]: what lasts that long carries weight and is silent (it loads the surface
+model instead), what is shorter is an impact. Impacts of up to SPAN - 1 steps become one strike: simulators spread one
+impact over 2-3 steps.
 
-An impact needs a cause. A solver's flicker between the corners of a resting box looks like an impact but nothing approached:
-a pair's strike is bounded by 2·m*·v (an elastic impact at the approach speed v before the step), or by what a struck neighbour
-hands on (`accepted_impulse`). Where a mobile body of the pair carried load within the last SPAN - 1 steps, v counts above the
-speed that gravity gives along the normal in one step: below it, leaving and landing cannot be told from resting, nor a
-roll from one support on to the next from a fall.
+An impact needs a cause. A solver's flicker between the corners of a resting box looks like an impact but nothing
+approached: a pair's strike is bounded by 2·m*·v (an elastic impact at the approach speed v before the step), or by what
+a struck neighbour hands on (`accepted_impulse`). Where a mobile body of the pair carried load within the last SPAN - 1
+steps, v counts above the speed that gravity gives along the normal in one step: below it, leaving and landing cannot be
+told from resting, nor a roll from one support on to the next from a fall.
 
-Surfaces that overlap when a step starts have met in the step before (with `contactProcessingThreshold=0`, Bullet sees a contact only
-then): strikes are looked for one step ahead of the step being rendered, so that they can be dated back. What cannot be told from support
-that early (the last step of an impact of SPAN - 1 steps is the last one known) follows when the step itself is rendered.
+Surfaces that overlap when a step starts have met in the step before (with `contactProcessingThreshold=0`, Bullet sees a
+contact only then): strikes are looked for one step ahead of the step being rendered, so that they can be dated back.
+What cannot be told from support that early (the last step of an impact of SPAN - 1 steps is the last one known) follows
+when the step itself is rendered.
 
 p pairs; column `NOW` of the load history is the step being rendered, later columns are the look-ahead.
 """
@@ -36,7 +39,10 @@ LOOKAHEAD = SPAN - 1
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LoadHistory:
-    """key (p,) sorted pair keys; force_n (p, 2·SPAN-1) their normal loads; struck_n (p, 2·SPAN-1) what of them strikes have used up."""
+    """key (p,) sorted pair keys;
+
+    force_n (p, 2·SPAN-1) their normal loads; struck_n (p, 2·SPAN-1) what of them strikes have used up.
+    """
 
     key: Array
     force_n: Array
@@ -51,9 +57,9 @@ class LoadHistory:
 class Split:
     """The loads of one step, told apart.
 
-    key (p,). support_n (p, 2): silent load at the step's start and end. strike (q,): rows of the pairs that are struck in the step that was
-    asked for. share (q, j): part of the normal impulse of that and the next known steps, SPAN - 1 at most, that belongs to each strike.
-    loaded (p,): whether each pair carried load within the SPAN - 1 steps before.
+    key (p,). support_n (p, 2): silent load at the step's start and end. strike (q,): rows of the pairs that are struck
+    in the step that was asked for. share (q, j): part of the normal impulse of that and the next known steps, SPAN - 1
+    at most, that belongs to each strike. loaded (p,): whether each pair carried load within the SPAN - 1 steps before.
     """
 
     key: Array
@@ -95,17 +101,20 @@ def push(history: LoadHistory, contacts: Contacts, dt_s: float) -> LoadHistory:
 
 
 def _opening(force: Array, column: int) -> Array:
-    """Opening of the load at a column: the best of the windows of SPAN steps around it, cut where the future is not known."""
+    """Opening of the load at a column: the best of the windows of SPAN steps around it, cut where the future is not
+    known.
+    """
     last = force.shape[1]
     windows = [force[:, i : min(i + SPAN, last)].min(axis=1) for i in range(max(column - SPAN + 1, 0), column + 1)]
     return np.max(windows, axis=0) if len(force) else np.zeros(0)
 
 
 def split(history: LoadHistory, ahead: int = 1) -> tuple[Split, LoadHistory]:
-    """Support of the step in column NOW and strikes of the one ``ahead`` steps after it, and the history with those marked as used.
+    """Support of the step in column NOW and strikes of the one ``ahead`` steps after it, and the history with those
+    marked as used.
 
-    Ask with ahead = 0 first. An opening that the future could still lower is taken as high as it may be, so nothing is struck that may be
-    support; asked again when more is known, a strike gives what it lacked.
+    Ask with ahead = 0 first. An opening that the future could still lower is taken as high as it may be, so nothing is
+    struck that may be support; asked again when more is known, a strike gives what it lacked.
     """
     force, column = history.force_n, NOW + ahead
     stop = min(column + SPAN - 1, force.shape[1])
@@ -123,18 +132,23 @@ def split(history: LoadHistory, ahead: int = 1) -> tuple[Split, LoadHistory]:
     return Split(history.key, opening[:, :2], strike, share, loaded), LoadHistory(history.key, force, struck)
 
 
-def causing_approach_m_s(approach_m_s: Array, a: Array, b: Array, normal: Array, steps: Array, fall_m_s: Array) -> Array:
-    """Approach speed (q,) that can cause an impact. normal (q, 3) of the pairs with bodies a, b (q,); steps (bodies,): for how many steps
-    gravity may have moved each without its falling (`unheld_steps`); fall_m_s (3,): the velocity that it gives in one. A tenth is added for what a solver leaves over, and a
-    hundredth of the whole in every direction: wedged bodies turn a little of it sideways (a settled pile creeps at 0.1 mm/s, 0.003 g·dt).
+def causing_approach_m_s(
+    approach_m_s: Array, a: Array, b: Array, normal: Array, steps: Array, fall_m_s: Array
+) -> Array:
+    """Approach speed (q,) that can cause an impact. normal (q, 3) of the pairs with bodies a, b (q,); steps (bodies,):
+    for how many steps gravity may have moved each without its falling (`unheld_steps`); fall_m_s (3,): the velocity
+    that it gives in one. A tenth is added for what a solver leaves over, and a hundredth of the whole in every
+    direction: wedged bodies turn a little of it sideways (a settled pile creeps at 0.1 mm/s, 0.003 g·dt).
     """
     fall = 1.1 * np.abs(normal @ fall_m_s) + 0.01 * np.linalg.norm(fall_m_s)
     return np.asarray(np.maximum(approach_m_s - np.maximum(steps[a], steps[b]) * fall, 0.0))
 
 
 def unheld_steps(split_: Split, mobile: Array, placed: Array) -> Array:
-    """(bodies,) steps for which gravity may have moved each mobile body although it rests: 1 where it carried load on any pair within the last
-    steps, SPAN where it was just put where it is (placed): Bullet finds the corners on which a box stands one a step, and it tilts meanwhile.
+    """(bodies,) steps for which gravity may have moved each mobile body although it rests:
+
+    1 where it carried load on any pair within the last steps, SPAN where it was just put where it is (placed): Bullet
+    finds the corners on which a box stands one a step, and it tilts meanwhile.
     """
     low, high = key_bodies(split_.key[split_.loaded])
     out = np.zeros(len(mobile))
@@ -145,9 +159,9 @@ def unheld_steps(split_: Split, mobile: Array, placed: Array) -> Array:
 def accepted_impulse(raw_n_s: Array, budget_n_s: Array, a: Array, b: Array, mobile: Array, rounds: int = 8) -> Array:
     """Strike impulses (q,) that a cause explains: the own budget, or that of a neighbour struck in the same step.
 
-    raw_n_s, budget_n_s (q,): wanted and self-caused. a, b (q,): body indices. mobile (bodies,): False for what never moves:
-    a floor hands nothing on. The largest neighbour counts, not the sum: solver noise of a pile must not add up to an impact.
-    An impact travels at most ``rounds`` bodies far in one physics step.
+    raw_n_s, budget_n_s (q,): wanted and self-caused. a, b (q,): body indices. mobile (bodies,): False for what never
+    moves: a floor hands nothing on. The largest neighbour counts, not the sum: solver noise of a pile must not add up
+    to an impact. An impact travels at most ``rounds`` bodies far in one physics step.
     """
     accepted = np.minimum(raw_n_s, budget_n_s)
     for _ in range(rounds):

@@ -1,21 +1,24 @@
 """Rolling and sliding: one voice a touching pair, excited by the height profiles its two surfaces sweep.
 
-    dz/dt = dh_a/dt + dh_b/dt - u                    z: penetration beyond the resting one, u: how fast the body is lifted
+    dz/dt = dh_a/dt + dh_b/dt - u
+        z: penetration beyond the resting one, u: how fast the body is lifted
     m* du/dt = f - N
-    δ = δ0(N) + z,   f = k δ^(3/2) (1 + c(dh/dt - u)),  never below 0      [Hunt & Crossley 1975, eq. 12; clamped: micro-collisions]
+    δ = δ0(N) + z,   f = k δ^(3/2) (1 + c(dh/dt - u)),  never below 0
+        [Hunt & Crossley 1975, eq. 12; clamped: micro-collisions]
     k = (4/3) E* √R*,   N = k δ0^(3/2),   a = (3 N R*/4E*)^(1/3)            [Johnson 1985, eq. 4.22-4.24]
     c = 2ζ √(m* dN/dδ0)/N                                                   ζ: damping ratio of the resting contact
 
-The voice gives f - N in newton: along the normal as it is; times the friction direction and coefficient for slip. Rolling (both
-surfaces sweep), sliding (one does) and anything between differ in the two sweep speeds only: no switch. A contact at rest is an
-exact equilibrium (z = u = 0 gives f = N to the bit) whatever N does, so support at rest and a load that drifts are silent; a new pair
-starts there, without a click. Within a step δ0, c, speeds and gains run linearly from the step's start to its end.
+The voice gives f - N in newton: along the normal as it is; times the friction direction and coefficient for slip.
+Rolling (both surfaces sweep), sliding (one does) and anything between differ in the two sweep speeds only: no switch. A
+contact at rest is an exact equilibrium (z = u = 0 gives f = N to the bit) whatever N does, so support at rest and a
+load that drifts are silent; a new pair starts there, without a click. Within a step δ0, c, speeds and gains run
+linearly from the step's start to its end.
 
-Time: semi-implicit Euler, the damping implicit, 1 … 8 substeps a sample by the contact's resonance at the step's loads. Beyond the
-penetration at which the contact's own stiffness would pass m*/h² (substep h: a resonance of sr·substeps/2π) the law goes on as a
-straight line, so ωh ≤ 1 everywhere and the scheme is stable for any stiffness, mass and load [Hairer, Lubich, Wanner 2006, I.1.4].
-All that a sample needs hangs on the sample before it and on its step: any split into blocks gives the same bits.
-p pairs, sides 0 = a and 1 = b, n samples.
+Time: semi-implicit Euler, the damping implicit, 1 … 8 substeps a sample by the contact's resonance at the step's loads.
+Beyond the penetration at which the contact's own stiffness would pass m*/h² (substep h: a resonance of sr·substeps/2π)
+the law goes on as a straight line, so ωh ≤ 1 everywhere and the scheme is stable for any stiffness, mass and load
+[Hairer, Lubich, Wanner 2006, I.1.4]. All that a sample needs hangs on the sample before it and on its step: any split
+into blocks gives the same bits. p pairs, sides 0 = a and 1 = b, n samples.
 """
 
 from __future__ import annotations
@@ -56,7 +59,13 @@ class SurfacePairs:
         p = len(np.atleast_1d(self.mass_kg))
         for x in _given(self):
             shape = (p, 2) if x.name in ("roughness_m", "hurst", "seed") else (p,)
-            object.__setattr__(self, x.name, frozen_array(getattr(self, x.name), np.int64 if x.name == "seed" else float, shape, f"surface {x.name}"))
+            object.__setattr__(
+                self,
+                x.name,
+                frozen_array(
+                    getattr(self, x.name), np.int64 if x.name == "seed" else float, shape, f"surface {x.name}"
+                ),
+            )
         object.__setattr__(self, "height_m", octave_heights(self.roughness_m, self.hurst))
 
     def __len__(self) -> int:
@@ -68,7 +77,9 @@ class SurfacePairs:
 
     def append(self, other: SurfacePairs) -> SurfacePairs:
         """These pairs, then the other's."""
-        return SurfacePairs(**{x.name: np.concatenate([getattr(self, x.name), getattr(other, x.name)]) for x in _given(self)})
+        return SurfacePairs(
+            **{x.name: np.concatenate([getattr(self, x.name), getattr(other, x.name)]) for x in _given(self)}
+        )
 
 
 def _given(pairs: SurfacePairs) -> list[Field[Array]]:
@@ -77,9 +88,11 @@ def _given(pairs: SurfacePairs) -> list[Field[Array]]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SurfaceState:
-    """Where p pairs are: depth z and lift u in units of the last step's scheme, swept_m (p, 2) distance each surface has swept.
+    """Where p pairs are: depth z and lift u in units of the last step's scheme, swept_m (p, 2) distance each surface
+    has swept.
 
-    substeps (p,): of that step, 0 before the first. The units are δ_lim and δ_lim/h (see `_oscillate`); they follow the substeps, and nothing is rounded twice.
+    substeps (p,): of that step, 0 before the first. The units are δ_lim and δ_lim/h (see `_oscillate`); they follow the
+    substeps, and nothing is rounded twice.
     """
 
     depth: Array
@@ -89,7 +102,12 @@ class SurfaceState:
 
     def __post_init__(self) -> None:
         p = len(np.atleast_1d(self.depth))
-        for name, dtype, shape in (("depth", float, (p,)), ("lift", float, (p,)), ("substeps", np.int64, (p,)), ("swept_m", float, (p, 2))):
+        for name, dtype, shape in (
+            ("depth", float, (p,)),
+            ("lift", float, (p,)),
+            ("substeps", np.int64, (p,)),
+            ("swept_m", float, (p, 2)),
+        ):
             object.__setattr__(self, name, frozen_array(getattr(self, name), dtype, shape, f"surface state {name}"))
 
     @classmethod
@@ -108,7 +126,8 @@ class SurfaceState:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SurfaceLoads:
-    """What drives the pairs at one instant: support load_n N (p,) in newton, sweep_m_s (p, 2) over a's and over b's surface.
+    """What drives the pairs at one instant: support load_n N (p,) in newton, sweep_m_s (p, 2) over a's and over b's
+    surface.
 
     Loads below zero count as 0, speeds by their amount, none above FASTEST_M_S.
     """
@@ -119,14 +138,20 @@ class SurfaceLoads:
     def __post_init__(self) -> None:
         p = len(np.atleast_1d(self.load_n))
         object.__setattr__(self, "load_n", np.maximum(frozen_array(self.load_n, float, (p,), "surface load"), 0))
-        object.__setattr__(self, "sweep_m_s", np.minimum(np.abs(frozen_array(self.sweep_m_s, float, (p, 2), "surface sweep")), FASTEST_M_S))
+        object.__setattr__(
+            self,
+            "sweep_m_s",
+            np.minimum(np.abs(frozen_array(self.sweep_m_s, float, (p, 2), "surface sweep")), FASTEST_M_S),
+        )
 
 
 def damping_ratio(restitution: Array) -> Array:
-    """ζ (p,) of the linear oscillator that rebounds with this coefficient of restitution: -ln e/√(π² + ln² e), within 0.25 … 1.
+    """ζ (p,) of the linear oscillator that rebounds with this coefficient of restitution: -ln e/√(π² + ln² e), within
+    0.25 … 1.
 
-    The floor is a model's choice: a rolling contact also sends waves into both bodies, which restitution of whole-body impacts
-    (e = 0.95 would ring ten times) does not tell. Below it the level laws of rough, stiff, fast pairs bend (benchmarks/surface_law.py).
+    The floor is a model's choice: a rolling contact also sends waves into both bodies, which restitution of whole-body
+    impacts (e = 0.95 would ring ten times) does not tell. Below it the level laws of rough, stiff, fast pairs bend
+    (benchmarks/surface_law.py).
     """
     log = np.log(np.clip(np.asarray(restitution, float), 1e-9, 1))
     return np.asarray(np.clip(-log / np.sqrt(np.pi**2 + log**2), 0.25, 1))
@@ -143,8 +168,11 @@ def contact_radius_m(relative_curvature_per_m: Array, flat_area_m2: Array) -> Ar
     return np.asarray(np.where(curvature > 0, np.minimum(1 / np.where(curvature > 0, curvature, 1), blunt), blunt))
 
 
-def advance(pairs: SurfacePairs, state: SurfaceState, start: SurfaceLoads, end: SurfaceLoads, x: Array, sr: int) -> tuple[Array, SurfaceState]:
-    """Force f - N (p, n) in newton at the n samples that lie at the shares ``x`` (n,) in [0, 1) of one physics step, and the state after them.
+def advance(
+    pairs: SurfacePairs, state: SurfaceState, start: SurfaceLoads, end: SurfaceLoads, x: Array, sr: int
+) -> tuple[Array, SurfaceState]:
+    """Force f - N (p, n) in newton at the n samples that lie at the shares ``x`` (n,) in [0, 1) of one physics step,
+    and the state after them.
 
     start, end: loads and speeds at the step's ends. Call again with the rest of the step's x for its other samples.
     """
@@ -152,17 +180,31 @@ def advance(pairs: SurfacePairs, state: SurfaceState, start: SurfaceLoads, end: 
     out = np.zeros((len(pairs), len(x)))
     loaded = (start.load_n > 0) | (end.load_n > 0)
     moving = (start.sweep_m_s != 0).any(1) | (end.sweep_m_s != 0).any(1) | (state.depth != 0) | (state.lift != 0)
-    depth, lift, steps, swept = np.where(loaded, state.depth, 0), np.where(loaded, state.lift, 0), np.where(loaded, state.substeps, 0), state.swept_m.copy()
+    depth, lift, steps, swept = (
+        np.where(loaded, state.depth, 0),
+        np.where(loaded, state.lift, 0),
+        np.where(loaded, state.substeps, 0),
+        state.swept_m.copy(),
+    )
     rows = np.flatnonzero(moving & loaded)
     if len(rows) and len(x):
         k = 4 / 3 * pairs.modulus_pa[rows] * np.sqrt(pairs.radius_m[rows])
-        mass, load, speed = pairs.mass_kg[rows], np.stack([start.load_n[rows], end.load_n[rows]]), np.stack([start.sweep_m_s[rows], end.sweep_m_s[rows]])
+        mass, load, speed = (
+            pairs.mass_kg[rows],
+            np.stack([start.load_n[rows], end.load_n[rows]]),
+            np.stack([start.sweep_m_s[rows], end.sweep_m_s[rows]]),
+        )
         substeps, limit, depth0 = _law(k, mass, load, sr)
         h, change = 1 / (sr * substeps), steps[rows] / substeps
         depth[rows] *= change**4
         lift[rows] *= change**5
         steps[rows] = substeps
-        damping = 2 * pairs.damping_ratio[rows] * np.sqrt(mass * 1.5 * k ** (2 / 3)) * np.maximum(load, 1e-3 * 9.81 * mass) ** (-5 / 6)
+        damping = (
+            2
+            * pairs.damping_ratio[rows]
+            * np.sqrt(mass * 1.5 * k ** (2 / 3))
+            * np.maximum(load, 1e-3 * 9.81 * mass) ** (-5 / 6)
+        )
         radius = np.cbrt(0.75 * load * pairs.radius_m[rows] / pairs.modulus_pa[rows])
         height = pairs.height_m[rows] * octave_gains(speed, radius[..., None], sr)
         rate = _rates(swept, rows, speed, x, pairs.seed, height, float(sr))
@@ -172,7 +214,21 @@ def advance(pairs: SurfacePairs, state: SurfaceState, start: SurfaceLoads, end: 
         rest, loss = _line(depth0 / limit), _line(damping * limit / h)
         for count in np.unique(substeps):
             g = np.flatnonzero(substeps == count)
-            _oscillate(depth, lift, rows[g], g, rate, h / limit, k * limit**1.5, rest[:, g], loss[:, g], x, int(count), still[g], out)
+            _oscillate(
+                depth,
+                lift,
+                rows[g],
+                g,
+                rate,
+                h / limit,
+                k * limit**1.5,
+                rest[:, g],
+                loss[:, g],
+                x,
+                int(count),
+                still[g],
+                out,
+            )
     return out, SurfaceState(depth, lift, steps, swept)
 
 
@@ -182,7 +238,9 @@ def _line(ends: Array) -> Array:
 
 
 def _law(k: Array, mass: Array, load: Array, sr: int) -> tuple[Array, Array, Array]:
-    """Substeps (p,), the penetration (p,) at which the law becomes a straight line, and the resting penetrations (2, p)."""
+    """Substeps (p,), the penetration (p,) at which the law becomes a straight line, and the resting penetrations (2,
+    p).
+    """
     resonance = np.sqrt(1.5 * k ** (2 / 3) * np.cbrt(load.max(0)) / mass)
     # half a radian a substep at rest leaves room for collisions four times (√δ twice) as stiff
     substeps = np.clip(np.ceil(2 * resonance / sr), 1, MOST_SUBSTEPS).astype(np.int64)
@@ -201,20 +259,38 @@ def _rates(swept, rows, speed, x, seed, height, sr):  # type: ignore[no-untyped-
         row = rows[r]
         for side in range(2):
             if speed[0, r, side] != 0.0 or speed[1, r, side] != 0.0:
-                swept[row, side] = sweep(swept[row, side], speed[:, r, side], x, seed[row, side], height[0, r, side], height[1, r, side], sr, rate[r])
+                swept[row, side] = sweep(
+                    swept[row, side],
+                    speed[:, r, side],
+                    x,
+                    seed[row, side],
+                    height[0, r, side],
+                    height[1, r, side],
+                    sr,
+                    rate[r],
+                )
     return rate
 
 
 @njit(nogil=True, error_model="numpy")
 def _oscillate(depth, lift, rows, g, rate, rate_unit, force_unit, rest, damping, x, substeps, still, out):  # type: ignore[no-untyped-def]
-    """f - N of the pairs ``rows`` (r of p), all with equal substeps, into out (p, n); depth and lift (p,) move on. g: their rows in rate.
+    """f - N of the pairs ``rows`` (r of p), all with equal substeps, into out (p, n); depth and lift (p,) move on. g:
+    their rows in rate.
 
-    Lengths in δ_lim, forces in k·δ_lim^(3/2), u and dh/dt in δ_lim/h, damping in h/δ_lim. Then for every pair
-    f = min(δ, 1)^(3/2) + 1.5(δ - 1)₊, and one substep adds (h²/m*)·k·√δ_lim = 2/3 of the force to u. Pairs innermost and one array a
-    quantity: so the compiler takes four or eight of them at once.
+    Lengths in δ_lim, forces in k·δ_lim^(3/2), u and dh/dt in δ_lim/h, damping in h/δ_lim. Then for every pair f =
+    min(δ, 1)^(3/2) + 1.5(δ - 1)₊, and one substep adds (h²/m*)·k·√δ_lim = 2/3 of the force to u. Pairs innermost and
+    one array a quantity: so the compiler takes four or eight of them at once.
     """
     pairs, share = len(rows), 1.0 / substeps
-    z, u, dh, d0, c, load, total = np.empty(pairs), np.empty(pairs), np.empty(pairs), np.empty(pairs), np.empty(pairs), np.empty(pairs), np.empty(pairs)
+    z, u, dh, d0, c, load, total = (
+        np.empty(pairs),
+        np.empty(pairs),
+        np.empty(pairs),
+        np.empty(pairs),
+        np.empty(pairs),
+        np.empty(pairs),
+        np.empty(pairs),
+    )
     for r in range(pairs):
         z[r], u[r] = depth[rows[r]], lift[rows[r]]
     for i in range(len(x)):
@@ -250,7 +326,8 @@ def _substep(z, u, dh, d0, c, load, total):  # type: ignore[no-untyped-def]
         low = min(d, 1.0)
         elastic = low * np.sqrt(low) + 1.5 * (d - low)
         loss = elastic * c[r]
-        # f - N with the damping implicit in u: f = elastic·(1 + c(dh/dt - u_new)), u_new = u + 2/3 (f - N); exactly 0 at rest
+        # f - N with the damping implicit in u: f = elastic·(1 + c(dh/dt - u_new)), u_new = u + 2/3 (f - N); exactly 0
+        # at rest
         f = max((elastic - load[r] + loss * (dh[r] - u[r])) / (1.0 + 2.0 / 3.0 * loss), -load[r])
         u[r] += 2.0 / 3.0 * f
         total[r] += f

@@ -1,11 +1,12 @@
 """The bank's inner loop as vector instructions: free ringing of a chunk of modes over one block of 256 samples.
 
-    y[16 q + r] = Σ_modes Re(u p^(16 q) p^r) = Σ Re(u s^q)·Re(p^r) - Im(u s^q)·Im(p^r),    u = w z,  s = p^16,  q, r in 0 … 15
+    y[16 q + r] = Σ_modes Re(u p^(16 q) p^r) = Σ Re(u s^q)·Re(p^r) - Im(u s^q)·Im(p^r),    u = w z,  s = p^16,
+        q, r in 0 … 15
 
-an outer product of two short geometric rows per mode: two multiply-adds a sample, accumulators in registers. numba has no
-vector type and its loop vectoriser keeps accumulators in memory, so these four functions are written in LLVM's own
-language; all sums have a fixed order and every multiply-add is stated, so the bits are the same on every call.
-Arrays are float64, contiguous; a body's modes fill whole groups of LANES (spare lanes are zero).
+an outer product of two short geometric rows per mode: two multiply-adds a sample, accumulators in registers. numba has
+no vector type and its loop vectoriser keeps accumulators in memory, so these four functions are written in LLVM's own
+language; all sums have a fixed order and every multiply-add is stated, so the bits are the same on every call. Arrays
+are float64, contiguous; a body's modes fill whole groups of LANES (spare lanes are zero).
 """
 
 from __future__ import annotations
@@ -28,9 +29,12 @@ _TILE_ROWS = 8 if binding.get_host_cpu_features().get("avx512f", False) else 2  
 
 @intrinsic
 def turn(typingctx, z, pole, block, modes, start, count, floor, now, powers):  # type: ignore[no-untyped-def]
-    """Take the state at a block's start: now = z (0 where |z|² < floor), z <- now·p^256, powers = p, p², p⁴, p⁸, p¹⁶. Returns lanes alive.
+    """Take the state at a block's start: now = z (0 where |z|² < floor), z <- now·p^256, powers = p, p², p⁴, p⁸, p¹⁶.
 
-    z, pole, block: flat (2·modes), real parts first; now (2·CHUNK); powers (10·CHUNK). start, count: the chunk, count a multiple of LANES.
+    Returns lanes alive.
+
+    z, pole, block: flat (2·modes), real parts first; now (2·CHUNK); powers (10·CHUNK). start, count: the chunk, count a
+    multiple of LANES.
     """
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
@@ -64,7 +68,10 @@ def turn(typingctx, z, pole, block, modes, start, count, floor, now, powers):  #
 
 @intrinsic
 def rows(typingctx, powers, count, table):  # type: ignore[no-untyped-def]
-    """table (CHUNK, 2·ROW): Re p^r, then Im p^r, r = 0 … 15, of each mode: p^r as the product of p, p², p⁴, p⁸ where r has that bit."""
+    """table (CHUNK, 2·ROW):
+
+    Re p^r, then Im p^r, r = 0 … 15, of each mode: p^r as the product of p, p², p⁴, p⁸ where r has that bit.
+    """
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         e = Emit(context, builder, signature, args)
@@ -72,7 +79,13 @@ def rows(typingctx, powers, count, table):  # type: ignore[no-untyped-def]
         one, zero = constant(1), constant(0)
 
         def body(k: Value, carried: list[Value]) -> list[Value]:
-            power = [(e.broadcast(powers, e.shifted(k, 2 * i * CHUNK)), e.broadcast(powers, e.shifted(k, (2 * i + 1) * CHUNK))) for i in range(4)]
+            power = [
+                (
+                    e.broadcast(powers, e.shifted(k, 2 * i * CHUNK)),
+                    e.broadcast(powers, e.shifted(k, (2 * i + 1) * CHUNK)),
+                )
+                for i in range(4)
+            ]
             low: Pair | None = None
             for bit in range(3):
                 mask = ir.Constant(BITS, [(lane >> bit) & 1 for lane in range(LANES)])
@@ -137,11 +150,18 @@ def outer(typingctx, column, table, count, sound):  # type: ignore[no-untyped-de
                 imag = [e.load(table, e.shifted(base, ROW + half * LANES)) for half in range(halves)]
                 new = []
                 for q in range(_TILE_ROWS):
-                    x, y = e.broadcast(column, e.shifted(k, (first + q) * CHUNK)), e.broadcast(column, e.shifted(k, (ROWS + first + q) * CHUNK))
-                    new += [e.fma(y, imag[half], e.fma(x, real[half], total[q * halves + half])) for half in range(halves)]
+                    x, y = (
+                        e.broadcast(column, e.shifted(k, (first + q) * CHUNK)),
+                        e.broadcast(column, e.shifted(k, (ROWS + first + q) * CHUNK)),
+                    )
+                    new += [
+                        e.fma(y, imag[half], e.fma(x, real[half], total[q * halves + half])) for half in range(halves)
+                    ]
                 return new
 
-            for value, place in zip(e.loop(count, 1, [e.load(sound, place) for place in places], body), places, strict=True):
+            for value, place in zip(
+                e.loop(count, 1, [e.load(sound, place) for place in places], body), places, strict=True
+            ):
                 e.store(value, sound, place)
         return context.get_dummy_value()
 

@@ -1,8 +1,9 @@
 """Vector instructions for numba kernels, which have no vector type of their own: a thin writer of LLVM's language.
 
-Every multiply-add is stated and every sum has a fixed order: the bits are the same on each call, whatever the caller's loops.
-Vectors are eight doubles (two or four registers where the machine has narrower ones; the bits are the same).
-numba's cache watches only the file of the compiled function: after a change here, in tile.py or in drive.py, remove synth/__pycache__.
+Every multiply-add is stated and every sum has a fixed order: the bits are the same on each call, whatever the caller's
+loops. Vectors are eight doubles (two or four registers where the machine has narrower ones; the bits are the same).
+numba's cache watches only the file of the compiled function: after a change here, in tile.py or in drive.py, remove
+synth/__pycache__.
 """
 
 from __future__ import annotations
@@ -29,7 +30,9 @@ class Emit:
     def __init__(self, context: Any, builder: Any, signature: Any, args: Any) -> None:
         self.builder = builder
         self.args = [
-            cgutils.create_struct_proxy(kind)(context, builder, value=arg).data if isinstance(kind, types.Array) else arg
+            cgutils.create_struct_proxy(kind)(context, builder, value=arg).data
+            if isinstance(kind, types.Array)
+            else arg
             for kind, arg in zip(signature.args, args, strict=True)
         ]
         self._fma = cgutils.get_or_insert_function(builder.module, ir.FunctionType(VEC, [VEC] * 3), "llvm.fma.v8f64")
@@ -60,7 +63,9 @@ class Emit:
 
     def reversed(self, vector: Value) -> Value:
         """The lanes in opposite order."""
-        return self.builder.shuffle_vector(vector, ir.Constant(VEC, ir.Undefined), ir.Constant(ir.VectorType(I32, LANES), list(range(LANES))[::-1]))
+        return self.builder.shuffle_vector(
+            vector, ir.Constant(VEC, ir.Undefined), ir.Constant(ir.VectorType(I32, LANES), list(range(LANES))[::-1])
+        )
 
     def fma(self, a: Value, b: Value, c: Value) -> Value:
         return self.builder.call(self._fma, [a, b, c])
@@ -103,8 +108,12 @@ class Emit:
         while width > 1:
             width //= 2
             none = ir.Constant(vector.type, ir.Undefined)
-            low, high = (ir.Constant(ir.VectorType(I32, width), list(range(first, first + width))) for first in (0, width))
-            vector = self.builder.fadd(self.builder.shuffle_vector(vector, none, low), self.builder.shuffle_vector(vector, none, high))
+            low, high = (
+                ir.Constant(ir.VectorType(I32, width), list(range(first, first + width))) for first in (0, width)
+            )
+            vector = self.builder.fadd(
+                self.builder.shuffle_vector(vector, none, low), self.builder.shuffle_vector(vector, none, high)
+            )
         return self.builder.extract_element(vector, ir.Constant(I32, 0))
 
 

@@ -111,7 +111,9 @@ def test_the_sensor_is_read_as_it_was_given(place: Path, sensor: str) -> None:
         (["other", "a.wav"], "is another file"),
     ],
 )
-def test_bad_input_is_one_line_and_no_file(place: Path, capfd: pytest.CaptureFixture[str], words: list[str], said: str) -> None:
+def test_bad_input_is_one_line_and_no_file(
+    place: Path, capfd: pytest.CaptureFixture[str], words: list[str], said: str
+) -> None:
     for folder in ("deep", "there", "other"):
         (place / folder).mkdir()
     (place / "there" / "case.json").write_text("{}")
@@ -127,7 +129,13 @@ def test_bad_input_is_one_line_and_no_file(place: Path, capfd: pytest.CaptureFix
 
 
 @pytest.mark.parametrize(
-    ("words", "medium"), [([], "air"), (["--medium", "none"], "none"), (["--sensor", "sum"], "unknown"), (["--sensor", "sum", "--medium", "air"], "air")]
+    ("words", "medium"),
+    [
+        ([], "air"),
+        (["--medium", "none"], "none"),
+        (["--sensor", "sum"], "unknown"),
+        (["--sensor", "sum", "--medium", "air"], "air"),
+    ],
 )
 def test_new_writes_the_medium(place: Path, words: list[str], medium: str) -> None:
     assert run("case", "new", "mine", "a.wav", *words) == 0
@@ -151,8 +159,13 @@ def test_check_names_what_is_not_read_and_refuses_nothing(place: Path, capfd: py
     assert said.err.count("warning") == said.err.count("\n") == 2
 
 
-@pytest.mark.parametrize(("channel", "code", "words"), [(None, 0, "the first is used"), (1, 0, "channel 1 is used"), (2, 2, "has no channel 2")])
-def test_check_says_which_channel_is_used(place: Path, capfd: pytest.CaptureFixture[str], channel: int | None, code: int, words: str) -> None:
+@pytest.mark.parametrize(
+    ("channel", "code", "words"),
+    [(None, 0, "the first is used"), (1, 0, "channel 1 is used"), (2, 2, "has no channel 2")],
+)
+def test_check_says_which_channel_is_used(
+    place: Path, capfd: pytest.CaptureFixture[str], channel: int | None, code: int, words: str
+) -> None:
     sound, sr = soundfile.read(place / "a.wav")
     soundfile.write(place / "a.wav", np.stack([sound, 0.5 * sound], axis=1), sr, subtype="FLOAT")
     assert run("case", "new", "mine", "a.wav") == 0
@@ -167,7 +180,9 @@ def test_check_says_which_channel_is_used(place: Path, capfd: pytest.CaptureFixt
     assert error.count("\n") == 1
 
 
-def test_a_failed_write_leaves_nothing(place: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
+def test_a_failed_write_leaves_nothing(
+    place: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
     def full(*_: object, **__: object) -> None:
         raise OSError(28, "No space left on device")
 
@@ -186,7 +201,9 @@ def test_a_failed_write_leaves_nothing(place: Path, monkeypatch: pytest.MonkeyPa
         ({"format": "x"}, "format 'x'"),
     ],
 )
-def test_check_names_what_is_wrong(place: Path, capfd: pytest.CaptureFixture[str], change: dict[str, object], said: str) -> None:
+def test_check_names_what_is_wrong(
+    place: Path, capfd: pytest.CaptureFixture[str], change: dict[str, object], said: str
+) -> None:
     assert run("case", "new", "mine", "a.wav") == 0
     path = place / "mine" / "case.json"
     path.write_text(json.dumps(json.loads(path.read_text()) | change))
@@ -213,5 +230,7 @@ def test_the_schema_names_every_field(capfd: pytest.CaptureFixture[str]) -> None
         "Line",
         "Recording",
     }
-    checked = [name for part in parts.values() for name, field in part["properties"].items() if field.get("description")]
+    checked = [
+        name for part in parts.values() for name, field in part["properties"].items() if field.get("description")
+    ]
     assert len(checked) == sum(len(part["properties"]) for part in parts.values()) > 30

@@ -1,4 +1,7 @@
-"""The command line around the run time: what it passes on, writes, says, and how it ends. The run time itself is replaced by a stub."""
+"""The command line around the run time: what it passes on, writes, says, and how it ends.
+
+The run time itself is replaced by a stub.
+"""
 
 from __future__ import annotations
 
@@ -33,14 +36,33 @@ SR = 8000
 
 
 def model() -> ModalModel:
-    return ModalModel([100.0, 200.0], [1.0, np.nan], np.zeros((3, 3, 2)), np.eye(3), [[0, 1, 2]], [0.0], 1e-3, 0.5, dropped=4, note="stub")
+    return ModalModel(
+        [100.0, 200.0],
+        [1.0, np.nan],
+        np.zeros((3, 3, 2)),
+        np.eye(3),
+        [[0, 1, 2]],
+        [0.0],
+        1e-3,
+        0.5,
+        dropped=4,
+        note="stub",
+    )
 
 
 def log(steps: int = 10) -> ContactLog:
     bodies = (Body(3, 1, 0, "cup", 0.1, np.eye(3), model=model()), Body(0, -1, 0, "floor", 0.0, np.zeros((3, 3))))
-    one = Contacts([0], [1], *[np.zeros((1, 3))] * 2, [[0, 0, 1]], [[0, 0, 0.1]], np.zeros((1, 3)), np.zeros((1, 2)), [1.0], [0.0])
+    one = Contacts(
+        [0], [1], *[np.zeros((1, 3))] * 2, [[0, 0, 1]], [[0, 0, 0.1]], np.zeros((1, 3)), np.zeros((1, 2)), [1.0], [0.0]
+    )
     still = (np.zeros((2, 3)), np.tile([0, 0, 0, 1.0], (2, 1)), np.zeros(2, bool))
-    return ContactLog(bodies, tuple(Step(0.1, *still, one if i == 2 else Contacts.none()) for i in range(steps)), (Microphone([0, 0, 1]),), SR, 5)
+    return ContactLog(
+        bodies,
+        tuple(Step(0.1, *still, one if i == 2 else Contacts.none()) for i in range(steps)),
+        (Microphone([0, 0, 1]),),
+        SR,
+        5,
+    )
 
 
 def sound(seconds: float = 1.0, sr: int = SR) -> np.ndarray:
@@ -65,7 +87,9 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
         os.write(1, b"a C library prints\n")
         return RenderResult(sound(sr=options["sr"]), log(), options["sr"], ("a note",))
 
-    def render_log(given: ContactLog, *, sr: int | None = None, residual: bool = True, progress: Any = None, say: Any = None) -> np.ndarray:
+    def render_log(
+        given: ContactLog, *, sr: int | None = None, residual: bool = True, progress: Any = None, say: Any = None
+    ) -> np.ndarray:
         kept.update(log=given, sr=sr)
         return sound(given.duration_s, sr or given.sr)
 
@@ -106,23 +130,56 @@ def error_of(capfd: pytest.CaptureFixture[str], *words: object) -> str:
 # ---- render
 
 
-def test_render_writes_all_it_was_asked_for(scene: Path, asked: dict[str, Any], capfd: pytest.CaptureFixture[str]) -> None:
-    code = run("render", "scene.py", "-o", "a.wav", "--contacts", "a.npz", "--picture", "a.png", "--json", "a.json", "--seconds", 2, "--sr", 16000, "--seed", 7)
+def test_render_writes_all_it_was_asked_for(
+    scene: Path, asked: dict[str, Any], capfd: pytest.CaptureFixture[str]
+) -> None:
+    code = run(
+        "render",
+        "scene.py",
+        "-o",
+        "a.wav",
+        "--contacts",
+        "a.npz",
+        "--picture",
+        "a.png",
+        "--json",
+        "a.json",
+        "--seconds",
+        2,
+        "--sr",
+        16000,
+        "--seed",
+        7,
+    )
     said = capfd.readouterr()
     assert code == 0
     assert sorted(p.name for p in scene.parent.iterdir()) == ["a.json", "a.npz", "a.png", "a.wav", "scene.py"]
-    assert (asked["seconds"], asked["sr"], asked["seed"], asked["microphones"], asked["material"]) == (2.0, 16000, 7, None, None)
+    assert (asked["seconds"], asked["sr"], asked["seed"], asked["microphones"], asked["material"]) == (
+        2.0,
+        16000,
+        7,
+        None,
+        None,
+    )
     assert "a.wav: 1.000 s, 1 channel, 16000 Hz" in said.out
     assert said.err == "sonic-bullet: note: a note\n"  # no progress in a pipe
     described = json.loads((scene.parent / "a.json").read_text())
-    assert (described["output"], described["sr"], described["channels"], described["frames"], described["contacts"]) == ("a.wav", 16000, 1, 16000, 1)
+    assert (
+        described["output"],
+        described["sr"],
+        described["channels"],
+        described["frames"],
+        described["contacts"],
+    ) == ("a.wav", 16000, 1, 16000, 1)
     assert described["bodies"][0] == {"body": 3, "link": 1, "name": "cup", "material": None, "modes": 2, "dropped": 4}
     assert described["notes"] == ["a note"]
     assert described["peak_pa"] == pytest.approx(0.1, rel=1e-3)
     assert len(read_log("a.npz")) == 1
 
 
-def test_json_alone_on_stdout_whatever_the_scene_prints(scene: Path, asked: dict[str, Any], capfd: pytest.CaptureFixture[str]) -> None:
+def test_json_alone_on_stdout_whatever_the_scene_prints(
+    scene: Path, asked: dict[str, Any], capfd: pytest.CaptureFixture[str]
+) -> None:
     assert run("render", "scene.py", "-o", "a.wav", "--json") == 0
     said = capfd.readouterr()
     assert json.loads(said.out)["output"] == "a.wav"
@@ -130,15 +187,38 @@ def test_json_alone_on_stdout_whatever_the_scene_prints(scene: Path, asked: dict
     assert "a C library prints" in said.err
 
 
-@pytest.mark.parametrize("words", [["--json", "scene.py", "-o", "a.wav"], ["scene.py", "--json", "-o", "a.wav"], ["scene.py", "-o", "a.wav", "--json=-"]])
-def test_json_takes_a_path_only_where_one_stands(scene: Path, asked: dict[str, Any], capfd: pytest.CaptureFixture[str], words: list[str]) -> None:
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["--json", "scene.py", "-o", "a.wav"],
+        ["scene.py", "--json", "-o", "a.wav"],
+        ["scene.py", "-o", "a.wav", "--json=-"],
+    ],
+)
+def test_json_takes_a_path_only_where_one_stands(
+    scene: Path, asked: dict[str, Any], capfd: pytest.CaptureFixture[str], words: list[str]
+) -> None:
     assert run("render", *words) == 0
     assert json.loads(capfd.readouterr().out)["output"] == "a.wav"
     assert scene.read_text() == ""
 
 
 def test_defaults_and_microphones(scene: Path, asked: dict[str, Any]) -> None:
-    assert run("render", "scene.py", "-o", "a.wav", "--microphone", "0,-1,0.5", "--microphone", "1e-1,2,-3", "--material", "wood") == 0
+    assert (
+        run(
+            "render",
+            "scene.py",
+            "-o",
+            "a.wav",
+            "--microphone",
+            "0,-1,0.5",
+            "--microphone",
+            "1e-1,2,-3",
+            "--material",
+            "wood",
+        )
+        == 0
+    )
     assert (asked["sr"], asked["seed"], asked["seconds"]) == (48_000, 0, None)
     assert asked["microphones"] == ((0, -1, 0.5), (0.1, 2, -3))
     assert asked["material"] == "wood"
@@ -151,7 +231,9 @@ def test_peak_is_scaled(scene: Path, asked: dict[str, Any], options: list[str], 
 
 
 def test_clipping_is_reported(scene: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
-    monkeypatch.setattr(sonic_bullet.scene, "render_scene", lambda path, **options: RenderResult(sound() * 30, log(), SR))
+    monkeypatch.setattr(
+        sonic_bullet.scene, "render_scene", lambda path, **options: RenderResult(sound() * 30, log(), SR)
+    )
     assert run("render", "scene.py", "-o", "a.flac", "--json", "a.json") == 0
     clipped = json.loads(Path("a.json").read_text())["clipped"]
     assert clipped > 1000
@@ -161,10 +243,16 @@ def test_clipping_is_reported(scene: Path, monkeypatch: pytest.MonkeyPatch, capf
     assert "the file is exact" in capfd.readouterr().err
 
 
-def test_a_mesh_that_time_made_coarser_is_told(scene: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
+def test_a_mesh_that_time_made_coarser_is_told(
+    scene: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
     made = log()
     body = replace(made.bodies[0], model=replace(model(), note=f"fTetWild; {COARSER}: filling took long"))
-    monkeypatch.setattr(sonic_bullet.scene, "render_scene", lambda path, **options: RenderResult(sound(), replace(made, bodies=(body, made.bodies[1])), SR))
+    monkeypatch.setattr(
+        sonic_bullet.scene,
+        "render_scene",
+        lambda path, **options: RenderResult(sound(), replace(made, bodies=(body, made.bodies[1])), SR),
+    )
     assert run("render", "scene.py", "-o", "a.wav") == 0
     assert f"the mesh of cup is {COARSER}" in capfd.readouterr().err
 
@@ -179,7 +267,10 @@ def test_a_log_renders_again_with_its_own_rate_and_seed(scene: Path, asked: dict
 
 def test_a_log_with_wishes(scene: Path, asked: dict[str, Any]) -> None:
     write_log("a.npz", log())
-    assert run("render", "a.npz", "-o", "a.wav", "--sr", 16000, "--seed", 9, "--seconds", 0.5, "--microphone", "1,2,3") == 0
+    assert (
+        run("render", "a.npz", "-o", "a.wav", "--sr", 16000, "--seed", 9, "--seconds", 0.5, "--microphone", "1,2,3")
+        == 0
+    )
     assert (asked["sr"], asked["log"].seed, len(asked["log"].steps), len(asked["log"].sensors)) == (16000, 9, 5, 1)
     np.testing.assert_array_equal(asked["log"].sensors[0].position_m, [1, 2, 3])
 
@@ -232,7 +323,11 @@ def test_what_is_wrong_is_one_line_and_nothing_is_written(
 @pytest.mark.parametrize("error", [SceneError("body 3 has mass nan", "mend it"), KeyboardInterrupt()])
 @pytest.mark.parametrize("level", [[], ["--peak-dbfs", "-1"], ["--lufs", "-20"]])
 def test_what_was_rendered_before_an_error_is_a_valid_named_file(
-    scene: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], error: BaseException, level: list[str]
+    scene: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+    error: BaseException,
+    level: list[str],
 ) -> None:
     def render_scene(path: object, **options: Any) -> RenderResult:
         error.partial = RenderResult(sound(0.25), log(), SR)  # type: ignore[attr-defined]
@@ -240,7 +335,9 @@ def test_what_was_rendered_before_an_error_is_a_valid_named_file(
 
     monkeypatch.setattr(sonic_bullet.scene, "render_scene", render_scene)
     Path("a.wav").write_bytes(b"old")
-    assert run("render", "scene.py", "-o", "a.wav", "--contacts", "a.npz", *level) == (130 if isinstance(error, KeyboardInterrupt) else 2)
+    assert run("render", "scene.py", "-o", "a.wav", "--contacts", "a.npz", *level) == (
+        130 if isinstance(error, KeyboardInterrupt) else 2
+    )
     lines = capfd.readouterr().err.splitlines()
     assert len(lines) == 1
     assert "the first 0.250 s are in a.partial.wav" in lines[0]
@@ -260,7 +357,9 @@ def test_an_error_is_said_where_what_was_rendered_before_it_cannot_be_kept_eithe
 
     monkeypatch.setattr(sonic_bullet.scene, "render_scene", render_scene)
     Path("a.partial.wav").mkdir()
-    assert error_of(capfd, "render", "scene.py", "-o", "a.wav").startswith("sonic-bullet: body 3 has mass nan; mend it; cannot write")
+    assert error_of(capfd, "render", "scene.py", "-o", "a.wav").startswith(
+        "sonic-bullet: body 3 has mass nan; mend it; cannot write"
+    )
 
 
 @pytest.mark.parametrize("partial", [None, RenderResult(np.zeros((1, 0)), log(), SR)])
@@ -278,7 +377,9 @@ def test_an_error_before_any_sound_leaves_nothing(
 
 
 @pytest.mark.parametrize("error", [OSError(28, "No space left on device"), MemoryError(), ZeroDivisionError("x\ny")])
-def test_the_unexpected_is_one_line_too(scene: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], error: Exception) -> None:
+def test_the_unexpected_is_one_line_too(
+    scene: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], error: Exception
+) -> None:
     def render_scene(path: object, **options: Any) -> RenderResult:
         raise error
 
@@ -289,7 +390,9 @@ def test_the_unexpected_is_one_line_too(scene: Path, monkeypatch: pytest.MonkeyP
 # ---- doctor
 
 
-def test_doctor_prints_findings_with_remedies(scene: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
+def test_doctor_prints_findings_with_remedies(
+    scene: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
     finding = sonic_bullet.scene.Finding("sub-steps", "error", "numSubSteps is 4", "set it to 1")
     monkeypatch.setattr(sonic_bullet.scene, "examine_scene", lambda path, seconds, say: (finding,))
     assert run("doctor", "scene.py") == 0
@@ -297,7 +400,9 @@ def test_doctor_prints_findings_with_remedies(scene: Path, monkeypatch: pytest.M
     assert "error: sub-steps: numSubSteps is 4" in said
     assert "set it to 1" in said
     assert run("doctor", "scene.py", "--json") == 0
-    assert json.loads(capfd.readouterr().out)["findings"] == [{"id": "sub-steps", "severity": "error", "what": "numSubSteps is 4", "remedy": "set it to 1"}]
+    assert json.loads(capfd.readouterr().out)["findings"] == [
+        {"id": "sub-steps", "severity": "error", "what": "numSubSteps is 4", "remedy": "set it to 1"}
+    ]
     assert "contact log" in error_of(capfd, "doctor", "a.npz")
 
 
@@ -307,7 +412,9 @@ class Terminal(io.StringIO):
 
 
 @pytest.mark.parametrize("stream", [Terminal, io.StringIO])
-def test_a_terminal_is_told_which_body_is_analysed_and_a_pipe_nothing(scene: Path, monkeypatch: pytest.MonkeyPatch, stream: type[io.StringIO]) -> None:
+def test_a_terminal_is_told_which_body_is_analysed_and_a_pipe_nothing(
+    scene: Path, monkeypatch: pytest.MonkeyPatch, stream: type[io.StringIO]
+) -> None:
     told = stream()
 
     def render_scene(path: object, **options: Any) -> RenderResult:
@@ -328,11 +435,18 @@ def test_a_terminal_is_told_which_body_is_analysed_and_a_pipe_nothing(scene: Pat
 
 def sonic_bullet_process(*words: str, **options: Any) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        [sys.executable, "-c", "from sonic_bullet.cli import main; main()", *words], check=False, capture_output=True, text=True, timeout=120, **options
+        [sys.executable, "-c", "from sonic_bullet.cli import main; main()", *words],
+        check=False,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        **options,
     )
 
 
-@pytest.mark.parametrize("words", [["--help"], ["render", "--help"], ["modes", "-h"], ["doctor", "--help"], ["materials", "--help"]])
+@pytest.mark.parametrize(
+    "words", [["--help"], ["render", "--help"], ["modes", "-h"], ["doctor", "--help"], ["materials", "--help"]]
+)
 def test_help_teaches_by_example(words: list[str]) -> None:
     done = sonic_bullet_process(*words)
     assert (done.returncode, done.stderr) == (0, "")
@@ -359,5 +473,7 @@ def test_a_terminal_without_greek_and_a_reader_that_leaves() -> None:
 
 
 def test_debug_shows_where(tmp_path: Path) -> None:
-    done = sonic_bullet_process("render", "none.py", "-o", "a.wav", cwd=tmp_path, env={**os.environ, "SONIC_BULLET_DEBUG": "1"})
+    done = sonic_bullet_process(
+        "render", "none.py", "-o", "a.wav", cwd=tmp_path, env={**os.environ, "SONIC_BULLET_DEBUG": "1"}
+    )
     assert "Traceback" in done.stderr

@@ -1,4 +1,7 @@
-"""The command line on the real run time: what it makes, and how it ends where the input is bad. One process a call, as a shell does it."""
+"""The command line on the real run time: what it makes, and how it ends where the input is bad.
+
+One process a call, as a shell does it.
+"""
 
 from __future__ import annotations
 
@@ -57,7 +60,9 @@ f 4 5 8
 """
 
 
-def scene(mass: str = "0.5", how: str = '{"material": "steel", "count": 10}', act: str = "pass", more: str = "pass") -> str:
+def scene(
+    mass: str = "0.5", how: str = '{"material": "steel", "count": 10}', act: str = "pass", more: str = "pass"
+) -> str:
     return BUILT.format(mass=mass, how=how, act=act, more=more)
 
 
@@ -69,13 +74,19 @@ def folder(tmp_path: Path) -> Path:
 
 
 def call(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([sys.executable, "-c", MAIN, *words], cwd=folder, check=False, capture_output=True, text=True, timeout=200)
+    return subprocess.run(
+        [sys.executable, "-c", MAIN, *words], cwd=folder, check=False, capture_output=True, text=True, timeout=200
+    )
 
 
 def good(folder: Path, *words: str) -> str:
     done = call(folder, *words)
     assert done.returncode == 0, done.stderr
-    said = [line for line in done.stderr.splitlines() if not line.startswith(("sonic-bullet: note:", "a scene may print", "pybullet build time"))]
+    said = [
+        line
+        for line in done.stderr.splitlines()
+        if not line.startswith(("sonic-bullet: note:", "a scene may print", "pybullet build time"))
+    ]
     assert said == []  # no progress in a pipe
     return done.stdout
 
@@ -99,7 +110,9 @@ def refused(folder: Path, *words: str, names: str) -> None:
 
 def test_a_scene_gives_sound_log_picture_and_json_and_its_log_gives_the_same_sound(folder: Path) -> None:
     (folder / "scene.py").write_text(scene(more="print('a scene may print')"))
-    told = json.loads(good(folder, "render", "scene.py", "-o", "a.wav", "--contacts", "a.npz", "--picture", "a.png", "--json"))
+    told = json.loads(
+        good(folder, "render", "scene.py", "-o", "a.wav", "--contacts", "a.npz", "--picture", "a.png", "--json")
+    )
     sound, sr = read_audio(folder / "a.wav")
     assert (sound.shape, sr, told["frames"]) == ((1, 9600), 48_000, 9600)
     assert told["peak_pa"] == pytest.approx(np.abs(sound).max(), rel=1e-6)
@@ -109,7 +122,21 @@ def test_a_scene_gives_sound_log_picture_and_json_and_its_log_gives_the_same_sou
     good(folder, "render", "a.npz", "-o", "b.wav", "--json", "b.json")
     assert (folder / "b.wav").read_bytes() == (folder / "a.wav").read_bytes()
     assert json.loads((folder / "b.json").read_text())["frames"] == 9600
-    good(folder, "render", "a.npz", "-o", "c.flac", "--sr", "44100", "--peak-dbfs", "-6", "--microphone", "0,-2,0.5", "--microphone", "0,2,0.5")
+    good(
+        folder,
+        "render",
+        "a.npz",
+        "-o",
+        "c.flac",
+        "--sr",
+        "44100",
+        "--peak-dbfs",
+        "-6",
+        "--microphone",
+        "0,-2,0.5",
+        "--microphone",
+        "0,2,0.5",
+    )
     other, rate = read_audio(folder / "c.flac")
     assert (other.shape, rate) == ((2, 8820), 44_100)
     assert np.abs(other).max() == pytest.approx(10 ** (-6 / 20), rel=1e-3)
@@ -138,11 +165,27 @@ def test_modes_of_a_mesh(folder: Path) -> None:
     assert (np.diff(hz(free)) > 0).all()
     assert all(mode["decay_per_s"] is None for mode in free)
     # Euler-Bernoulli in the thin direction, lowered by shear by less than 2 % [22.373 / 2πL² · √(EI/ρA)]
-    assert hz(free)[0] == pytest.approx(22.373 / (2 * np.pi * 0.2**2) * np.sqrt(2e11 / 8000) * 0.01 / np.sqrt(12), rel=0.02)
+    assert hz(free)[0] == pytest.approx(
+        22.373 / (2 * np.pi * 0.2**2) * np.sqrt(2e11 / 8000) * 0.01 / np.sqrt(12), rel=0.02
+    )
     soft = modes("--young", "0.5e11", "--poisson", "0.3", "--density", "8000", "--count", "6")
     assert hz(soft) == pytest.approx(hz(free) / 2, rel=1e-6)
-    clamped = modes("--young", "2e11", "--poisson", "0.3", "--density", "8000", "--fix", "0,0.01,0.005,0.012", "--to-hz", "2000", "-o", "model.npz")
-    assert hz(clamped)[0] == pytest.approx(3.516 / 22.373 * (0.2 / 0.19) ** 2 * hz(free)[0], rel=0.03)  # a cantilever: 1 cm of 20 is held
+    clamped = modes(
+        "--young",
+        "2e11",
+        "--poisson",
+        "0.3",
+        "--density",
+        "8000",
+        "--fix",
+        "0,0.01,0.005,0.012",
+        "--to-hz",
+        "2000",
+        "-o",
+        "model.npz",
+    )
+    # a cantilever: 1 cm of 20 is held
+    assert hz(clamped)[0] == pytest.approx(3.516 / 22.373 * (0.2 / 0.19) ** 2 * hz(free)[0], rel=0.03)
     assert hz(clamped).max() <= 2000
     assert read_model(folder / "model.npz").mode_count == len(clamped)
     half = modes("--young", "2e11", "--poisson", "0.3", "--density", "8000", "--count", "6", "--scale", "0.5")
@@ -184,7 +227,12 @@ def test_a_bad_request_is_one_line(folder: Path, words: tuple[str, ...], names: 
 
 @pytest.mark.parametrize(
     ("name", "content"),
-    [("empty.obj", ""), ("cut.obj", BLOCK[:90]), ("nan.obj", BLOCK.replace("0.2", "nan")), ("point.obj", "v 0 0 0\nv 0 0 0\nv 0 0 0\nf 1 2 3\n")],
+    [
+        ("empty.obj", ""),
+        ("cut.obj", BLOCK[:90]),
+        ("nan.obj", BLOCK.replace("0.2", "nan")),
+        ("point.obj", "v 0 0 0\nv 0 0 0\nv 0 0 0\nf 1 2 3\n"),
+    ],
 )
 def test_a_broken_mesh_is_one_line(folder: Path, name: str, content: str) -> None:
     (folder / name).write_text(content)

@@ -12,22 +12,37 @@ import soundfile
 
 
 def features(*words: str | Path) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([str(Path(sys.executable).with_name("sonic-bullet")), "features", *map(str, words)], capture_output=True, text=True, check=False)
+    return subprocess.run(
+        [str(Path(sys.executable).with_name("sonic-bullet")), "features", *map(str, words)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
 
 
 def test_a_tap_in_stereo(tmp_path: Path) -> None:
     time = np.arange(24_000) / 48_000
-    tap = 0.3 * np.exp(-12 * time) * np.sin(2 * np.pi * 700 * time) + 1e-5 * np.random.default_rng(0).standard_normal(len(time))
+    tap = 0.3 * np.exp(-12 * time) * np.sin(2 * np.pi * 700 * time) + 1e-5 * np.random.default_rng(0).standard_normal(
+        len(time)
+    )
     soundfile.write(tmp_path / "tap.wav", np.stack([0.1 * tap, tap], axis=1), 48_000, subtype="FLOAT")
     done = features(tmp_path / "tap.wav", "--channel", "1", "--json", "--picture", tmp_path / "tap.png")
     assert done.returncode == 0, done.stderr
     said = json.loads(done.stdout)
     (one,) = said["features"]
-    assert abs(one["freq_hz"] - 700) < 5 * one["freq_sd_hz"] and abs(one["decay_per_s"] - 12) < 5 * one["decay_sd_per_s"]
+    assert (
+        abs(one["freq_hz"] - 700) < 5 * one["freq_sd_hz"] and abs(one["decay_per_s"] - 12) < 5 * one["decay_sd_per_s"]
+    )
     assert abs(one["amplitude"] - 0.3) < 5 * one["amplitude_sd"]
     assert "2 channels: channel 1 is used" in said["note"] and "2 channels: channel 1 is used" in done.stderr
     assert said["verdict"] == "features"  # asked for, so no doubt
-    assert set(said) >= {"features", "onset_s", "noise_dbfs"} and {"freq_hz", "decay_per_s", "amplitude", "freq_sd_hz", "decay_sd_per_s"} <= set(one)
+    assert set(said) >= {"features", "onset_s", "noise_dbfs"} and {
+        "freq_hz",
+        "decay_per_s",
+        "amplitude",
+        "freq_sd_hz",
+        "decay_sd_per_s",
+    } <= set(one)
     assert (tmp_path / "tap.png").stat().st_size > 10_000
 
 
@@ -46,14 +61,23 @@ def test_the_first_channel_is_used_and_said(tmp_path: Path) -> None:
         assert len(done.stderr.splitlines()) == 1 and said in done.stderr
     done = features(tmp_path / "two.wav", "--channel", "2")
     assert done.returncode == 2
-    assert done.stderr.splitlines() == [f"sonic-bullet: {tmp_path / 'two.wav'} has no channel 2; it has 2 channels, 0 to 1"]
+    assert done.stderr.splitlines() == [
+        f"sonic-bullet: {tmp_path / 'two.wav'} has no channel 2; it has 2 channels, 0 to 1"
+    ]
 
 
 def test_what_is_no_recording_gets_one_line(tmp_path: Path) -> None:
     (tmp_path / "text.wav").write_text("not audio")
     soundfile.write(tmp_path / "silent.wav", np.zeros(48_000), 48_000)
     soundfile.write(tmp_path / "short.wav", np.ones(100), 48_000)
-    for words in (["text.wav"], ["silent.wav"], ["short.wav"], ["missing.wav"], ["silent.wav", "--band", "8000,200"], ["silent.wav", "--picture", "x.gif"]):
+    for words in (
+        ["text.wav"],
+        ["silent.wav"],
+        ["short.wav"],
+        ["missing.wav"],
+        ["silent.wav", "--band", "8000,200"],
+        ["silent.wav", "--picture", "x.gif"],
+    ):
         done = features(tmp_path / words[0], *words[1:])
         assert done.returncode == 2, words
         assert len(done.stderr.strip().splitlines()) == 1 and "Traceback" not in done.stderr

@@ -16,7 +16,18 @@ from sonic_bullet.presets import load_material, read_preset
 from sonic_bullet.records import Material
 from tests.made.case import make
 
-KEYS = {"alpha_per_s", "beta_s", "gamma_m2_s2", "sigma", "poisson_ratio", "covariance", "verdict", "metric", "log_spectral_db", "modes"}
+KEYS = {
+    "alpha_per_s",
+    "beta_s",
+    "gamma_m2_s2",
+    "sigma",
+    "poisson_ratio",
+    "covariance",
+    "verdict",
+    "metric",
+    "log_spectral_db",
+    "modes",
+}
 BRASS = Material.isotropic("made", youngs_pa=1.0e11, poisson=0.36, density_kg_m3=8400, alpha_per_s=8.0, beta_s=4e-8)
 
 
@@ -62,7 +73,11 @@ def test_preset_plays_at_once(folder: Path, tmp_path: Path, capfd: pytest.Captur
     client = BulletClient(pybullet.DIRECT)
     client.setGravity(0, 0, -9.81)
     client.createMultiBody(0, client.createCollisionShape(pybullet.GEOM_PLANE))
-    box = client.createMultiBody(0.1, client.createCollisionShape(pybullet.GEOM_BOX, halfExtents=[0.06, 0.0125, 0.003]), basePosition=[0, 0, 0.05])
+    box = client.createMultiBody(
+        0.1,
+        client.createCollisionShape(pybullet.GEOM_BOX, halfExtents=[0.06, 0.0125, 0.003]),
+        basePosition=[0, 0, 0.05],
+    )
     observed = []
     with sonic_bullet.attach(client, microphone=(0, 0.3, 0.3)) as listener:
         listener.add(box, material=tmp_path / "p.json")
@@ -80,7 +95,20 @@ def test_one_recording_of_undeclared_onset(folder: Path, tmp_path: Path, capfd: 
     case = json.loads((folder / "case.json").read_text())
     strike = ",".join(map(str, case["recordings"][0]["strike"]["position"]))
     at = ",".join(map(str, case["sensor"]["position"]["box"]))
-    words = ["--mesh", folder / "box.obj", "--strike", strike, "--sensor", "velocity", "--sensor-at", at, "--sensor-direction", "0,0,2", "--material", "brass"]
+    words = [
+        "--mesh",
+        folder / "box.obj",
+        "--strike",
+        strike,
+        "--sensor",
+        "velocity",
+        "--sensor-at",
+        at,
+        "--sensor-direction",
+        "0,0,2",
+        "--material",
+        "brass",
+    ]
     words += ["--medium", "none"]
     assert run("fit", tmp_path / "late.wav", *words, "-o", tmp_path / "p.json", "--json", tmp_path / "f.json") == 0
     told = json.loads((tmp_path / "f.json").read_text())
@@ -101,7 +129,20 @@ def test_one_recording_of_undeclared_onset(folder: Path, tmp_path: Path, capfd: 
         (["s0.wav", "--mesh", "box.obj", "--strike", "0,0,0.003", "--material", "brass", "--scale", "1000"], "across"),
         (["box.obj", "--mesh", "box.obj", "--strike", "0,0,0.003", "--material", "brass"], "cannot read"),
         (["s0.wav", "--mesh", "box.obj", "--strike", "0,nan,0", "--material", "brass"], "finite"),
-        (["s0.wav", "--mesh", "box.obj", "--strike", "0,0,0.003", "--material", "brass", "--sensor-direction", "0,0,1"], "--sensor is pressure"),
+        (
+            [
+                "s0.wav",
+                "--mesh",
+                "box.obj",
+                "--strike",
+                "0,0,0.003",
+                "--material",
+                "brass",
+                "--sensor-direction",
+                "0,0,1",
+            ],
+            "--sensor is pressure",
+        ),
         (
             [
                 "s0.wav",
@@ -124,7 +165,12 @@ def test_one_recording_of_undeclared_onset(folder: Path, tmp_path: Path, capfd: 
     ],
 )
 def test_bad_input_is_one_line_and_no_file(
-    folder: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, words: list[str], said: str
+    folder: Path,
+    tmp_path: Path,
+    capfd: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    words: list[str],
+    said: str,
 ) -> None:
     monkeypatch.chdir(folder)
     output = tmp_path / ("out.txt" if said == "out.txt" else "out.json")
@@ -160,11 +206,28 @@ def spoiled(folder: Path, place: Path, how: str) -> Path:
     return place / "spoiled.wav"
 
 
-@pytest.mark.parametrize(("how", "surest"), [("20 ms", 0), ("other rate", 0), ("tone", 0), ("speech", 0), ("stereo", 2)])
-def test_what_a_recording_does_not_say_is_not_claimed(folder: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str], how: str, surest: int) -> None:
+@pytest.mark.parametrize(
+    ("how", "surest"), [("20 ms", 0), ("other rate", 0), ("tone", 0), ("speech", 0), ("stereo", 2)]
+)
+def test_what_a_recording_does_not_say_is_not_claimed(
+    folder: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str], how: str, surest: int
+) -> None:
     strike = ",".join(map(str, json.loads((folder / "case.json").read_text())["recordings"][0]["strike"]["position"]))
     path = spoiled(folder, tmp_path, how)
-    code = run("fit", path, "--mesh", folder / "box.obj", "--strike", strike, "--material", "brass", "-o", tmp_path / "p.json", "--json", tmp_path / "f.json")
+    code = run(
+        "fit",
+        path,
+        "--mesh",
+        folder / "box.obj",
+        "--strike",
+        strike,
+        "--material",
+        "brass",
+        "-o",
+        tmp_path / "p.json",
+        "--json",
+        tmp_path / "f.json",
+    )
     shown = capfd.readouterr()
     if code == 2:
         assert shown.err.count("\n") == 1
@@ -183,13 +246,42 @@ def test_what_a_recording_does_not_say_is_not_claimed(folder: Path, tmp_path: Pa
 def test_clipped_recording_is_refused(folder: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     observed, sr = soundfile.read(folder / "s0.wav")
     soundfile.write(tmp_path / "c.wav", np.clip(8 * observed, -0.5, 0.5), sr)
-    assert run("fit", tmp_path / "c.wav", "--mesh", folder / "box.obj", "--strike", "0,0,0.003", "--material", "brass", "-o", tmp_path / "p.json") == 2
+    assert (
+        run(
+            "fit",
+            tmp_path / "c.wav",
+            "--mesh",
+            folder / "box.obj",
+            "--strike",
+            "0,0,0.003",
+            "--material",
+            "brass",
+            "-o",
+            tmp_path / "p.json",
+        )
+        == 2
+    )
     assert "is clipped" in capfd.readouterr().err
 
 
 @pytest.mark.parametrize("name", ["--impulse", "--scale", "--onset"])
-def test_numbers_that_are_none_are_refused(folder: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str], name: str) -> None:
-    words = ["fit", folder / "s0.wav", "--mesh", folder / "box.obj", "--strike", "0,0,0.003", "--material", "brass", name, "nan", "-o", tmp_path / "p.json"]
+def test_numbers_that_are_none_are_refused(
+    folder: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str], name: str
+) -> None:
+    words = [
+        "fit",
+        folder / "s0.wav",
+        "--mesh",
+        folder / "box.obj",
+        "--strike",
+        "0,0,0.003",
+        "--material",
+        "brass",
+        name,
+        "nan",
+        "-o",
+        tmp_path / "p.json",
+    ]
     assert run(*words) == 2
     error = capfd.readouterr().err
     assert error.count("\n") == 1
@@ -219,7 +311,9 @@ def test_the_entrys_channel_is_fitted_and_said(folder: Path, tmp_path: Path, cap
 
 
 @pytest.mark.parametrize("command", ["fit", "residual", "diagnose"])
-def test_the_first_channel_unless_another_is_named(folder: Path, tmp_path: Path, command: str, capfd: pytest.CaptureFixture[str]) -> None:
+def test_the_first_channel_unless_another_is_named(
+    folder: Path, tmp_path: Path, command: str, capfd: pytest.CaptureFixture[str]
+) -> None:
     assert run(command, stereo(folder, tmp_path), "-o", tmp_path / "p.json") == 2  # noise alone
     assert "no damped sinusoid" in capfd.readouterr().err
     assert run(command, stereo(folder, tmp_path, channel=2), "-o", tmp_path / "p.json") == 2
@@ -242,12 +336,20 @@ def test_channels_of_a_recording_alone(folder: Path, tmp_path: Path, capfd: pyte
     assert "2 channels: the first is used" in capfd.readouterr().err
 
 
-def test_a_residual_without_a_mesh_is_refused_at_once(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
+def test_a_residual_without_a_mesh_is_refused_at_once(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
     """Before a recording is opened, whatever the case holds."""
-    monkeypatch.setattr("sonic_bullet.estimator.fit.recorded.read_audio", lambda *_: pytest.fail("a recording was read"))
+    monkeypatch.setattr(
+        "sonic_bullet.estimator.fit.recorded.read_audio", lambda *_: pytest.fail("a recording was read")
+    )
     case = json.loads((stereo(folder, tmp_path) / "case.json").read_text())
     lines = [{"object": "box", "features": [{"freq_hz": 1000.0, "decay_per_s": 3.0}]}]
-    for change in ({"objects": {"box": {"material": "brass"}}}, {"objects": {}, "recordings": [{"file": "two.wav"}]}, {"recordings": lines}):
+    for change in (
+        {"objects": {"box": {"material": "brass"}}},
+        {"objects": {}, "recordings": [{"file": "two.wav"}]},
+        {"recordings": lines},
+    ):
         (tmp_path / "case.json").write_text(json.dumps(case | change))
         assert run("residual", tmp_path, "-o", tmp_path / "p.json") == 2
         (line,) = capfd.readouterr().err.splitlines()
@@ -260,7 +362,9 @@ def test_a_mesh_that_is_not_there_is_said_at_once(
     folder: Path, tmp_path: Path, command: str, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     """Also where it is the last object's, or one that a diagnosis is only held against."""
-    monkeypatch.setattr("sonic_bullet.estimator.fit.recorded.read_audio", lambda *_: pytest.fail("a recording was read"))
+    monkeypatch.setattr(
+        "sonic_bullet.estimator.fit.recorded.read_audio", lambda *_: pytest.fail("a recording was read")
+    )
     case = json.loads((stereo(folder, tmp_path) / "case.json").read_text())
     case["objects"]["other"] = {**case["objects"]["box"], "mesh": "none.obj"}
     split = "transfer" if command == "diagnose" else "fit"

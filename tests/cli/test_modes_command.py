@@ -34,11 +34,42 @@ def mesh(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_modes_writes_json_and_model(mesh: Path, solved: dict[str, Any], capfd: pytest.CaptureFixture[str]) -> None:
-    assert run("modes", "t.obj", "--material", "glass", "--count", 2, "--fix", "0,0,0,0.1", "--thickness", 0.01, "--scale", 0.1, "-o", "m.npz", "--json") == 0
+    assert (
+        run(
+            "modes",
+            "t.obj",
+            "--material",
+            "glass",
+            "--count",
+            2,
+            "--fix",
+            "0,0,0,0.1",
+            "--thickness",
+            0.01,
+            "--scale",
+            0.1,
+            "-o",
+            "m.npz",
+            "--json",
+        )
+        == 0
+    )
     found = json.loads(capfd.readouterr().out)
     assert found["modes"] == [{"freq_hz": 100.0, "decay_per_s": 1.0}, {"freq_hz": 200.0, "decay_per_s": None}]
-    assert (found["mesh"], found["material"], found["volume_m3"], found["mass_kg"], found["dropped"], found["note"]) == ("t.obj", "glass", 1e-3, 0.5, 4, "stub")
-    assert (solved["count"], solved["fixed"], solved["thickness_m"], solved["material"].name) == (2, ((0, 0, 0, 0.1),), 0.01, "glass")
+    assert (
+        found["mesh"],
+        found["material"],
+        found["volume_m3"],
+        found["mass_kg"],
+        found["dropped"],
+        found["note"],
+    ) == ("t.obj", "glass", 1e-3, 0.5, 4, "stub")
+    assert (solved["count"], solved["fixed"], solved["thickness_m"], solved["material"].name) == (
+        2,
+        ((0, 0, 0, 0.1),),
+        0.01,
+        "glass",
+    )
     assert solved["shapes"][0].vertex_m.max() == 0.1
     assert read_model("m.npz").mode_count == 2
 
@@ -58,7 +89,9 @@ def test_constants_make_an_undamped_material_and_override_a_named_one(mesh: Path
     assert (bare.alpha_per_s, bare.density_kg_m3) == (None, 2700)
     assert (bare.youngs_pa, bare.poisson) == pytest.approx((7e10, 0.3))
     assert run("modes", "t.obj", "--material", "wood", "--young", 9e9) == 0
-    assert (solved["material"].youngs_pa, solved["material"].poisson, solved["material"].alpha_per_s) == pytest.approx((9e9, 0.35, 2.1364))
+    assert (solved["material"].youngs_pa, solved["material"].poisson, solved["material"].alpha_per_s) == pytest.approx(
+        (9e9, 0.35, 2.1364)
+    )
     assert run("modes", "t.obj", "--material", "spruce", "--density", 500) == 0
     assert solved["material"].density_kg_m3 == 500
     assert solved["material"].stiffness_pa[0, 0] > 5 * solved["material"].stiffness_pa[1, 1]
@@ -84,7 +117,9 @@ def test_constants_make_an_undamped_material_and_override_a_named_one(mesh: Path
         (["bad.obj"], "bad.obj"),
     ],
 )
-def test_modes_says_what_is_wrong(mesh: Path, solved: dict[str, Any], capfd: pytest.CaptureFixture[str], words: list[str], said: str) -> None:
+def test_modes_says_what_is_wrong(
+    mesh: Path, solved: dict[str, Any], capfd: pytest.CaptureFixture[str], words: list[str], said: str
+) -> None:
     Path("bad.obj").write_text("no mesh at all")
     before = sorted(mesh.parent.iterdir())
     assert said in error_of(capfd, "modes", *words)

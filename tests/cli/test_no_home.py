@@ -42,7 +42,9 @@ def test_the_folder_of_models_is_private_and_made_so(home: Path) -> None:
     (home / "sonic_bullet").mkdir(mode=0o755)
     cache.save("default", "modes-0", {"shape": np.arange(3.0)}, "")
     assert cache.load("default", "modes-0", LAYOUT) is not None
-    assert [stat.S_IMODE(path.stat().st_mode) for path in (home / "sonic_bullet", home / "sonic_bullet" / "modal")] == [0o700] * 2
+    assert [stat.S_IMODE(path.stat().st_mode) for path in (home / "sonic_bullet", home / "sonic_bullet" / "modal")] == [
+        0o700
+    ] * 2
     assert user_folder.NOTES == []
 
 

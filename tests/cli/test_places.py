@@ -1,4 +1,6 @@
-"""Where outputs go: the place that was named when the command began, tried before anything runs, whatever a scene does meanwhile."""
+"""Where outputs go: the place that was named when the command began, tried before anything runs, whatever a scene does
+meanwhile.
+"""
 
 from __future__ import annotations
 
@@ -45,7 +47,15 @@ def folder(tmp_path: Path) -> Path:
 
 
 def call(folder: Path, *words: str | bytes) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([sys.executable, "-c", MAIN, *words], cwd=folder, check=False, capture_output=True, text=True, errors="replace", timeout=250)
+    return subprocess.run(
+        [sys.executable, "-c", MAIN, *words],
+        cwd=folder,
+        check=False,
+        capture_output=True,
+        text=True,
+        errors="replace",
+        timeout=250,
+    )
 
 
 def write_scene(folder: Path, act: str = "") -> None:
@@ -54,7 +64,9 @@ def write_scene(folder: Path, act: str = "") -> None:
 
 def test_a_scene_that_changes_the_folder_does_not_move_its_outputs(folder: Path) -> None:
     write_scene(folder)
-    done = call(folder, "render", "scene.py", "-o", "a.wav", "--contacts", "a.npz", "--picture", "a.png", "--json", "a.json")
+    done = call(
+        folder, "render", "scene.py", "-o", "a.wav", "--contacts", "a.npz", "--picture", "a.png", "--json", "a.json"
+    )
     assert done.returncode == 0, done.stderr
     assert done.stdout.startswith("a.wav: ")
     assert read_audio(folder / "a.wav")[0].shape == (1, 2400)
@@ -71,7 +83,9 @@ def test_what_an_error_leaves_stays_where_it_was_asked_for(folder: Path) -> None
     assert {path.read_text() for path in (folder / "elsewhere").iterdir()} == {"another's"}
 
 
-def test_a_preset_named_by_a_path_is_read_before_the_script_changes_the_folder(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_preset_named_by_a_path_is_read_before_the_script_changes_the_folder(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     from sonic_bullet.scene import render_scene
 
     monkeypatch.chdir(folder)
@@ -96,10 +110,23 @@ NO_UNICODE = b"a\xff.wav"
         (("-o", "a.wav", "--json", b"\xff.json"), "Unicode"),
         (("-o", "a.wav", "--json", "no/such/a.json"), "no folder"),
         (("-o", "a.wav", "--contacts", "/proc/a.npz"), "cannot write"),
-        (("-o", "a.wav", "--picture", "elsewhere/b.png", "--contacts", "elsewhere/../elsewhere/b.npz", "--json=elsewhere/b.npz"), "one name"),
+        (
+            (
+                "-o",
+                "a.wav",
+                "--picture",
+                "elsewhere/b.png",
+                "--contacts",
+                "elsewhere/../elsewhere/b.npz",
+                "--json=elsewhere/b.npz",
+            ),
+            "one name",
+        ),
     ],
 )
-def test_a_name_that_cannot_be_written_ends_before_the_scene_runs(folder: Path, words: tuple[str | bytes, ...], says: str) -> None:
+def test_a_name_that_cannot_be_written_ends_before_the_scene_runs(
+    folder: Path, words: tuple[str | bytes, ...], says: str
+) -> None:
     write_scene(folder)
     done = call(folder, "render", "scene.py", *words)
     assert done.returncode == 2

@@ -35,7 +35,9 @@ def write_scene(folder: Path, seconds: float = 0.25, mass: str = "0.6", act: str
 
 
 def process(folder: Path, *words: str, code: str = MAIN) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([sys.executable, "-c", code, *words], cwd=folder, check=False, capture_output=True, text=True, timeout=250)
+    return subprocess.run(
+        [sys.executable, "-c", code, *words], cwd=folder, check=False, capture_output=True, text=True, timeout=250
+    )
 
 
 def test_a_scene_renders_and_its_log_renders_the_same_bits_without_pybullet(tmp_path: Path) -> None:
@@ -57,9 +59,19 @@ def test_a_scene_renders_and_its_log_renders_the_same_bits_without_pybullet(tmp_
 
 @pytest.mark.parametrize(("word", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_an_interrupted_render_is_a_valid_named_file(tmp_path: Path, word: signal.Signals, code: int) -> None:
-    write_scene(tmp_path, seconds=1000, act="open('stepping', 'w').close() if time_s > 0.2 else None; import time; time.sleep(0.001)")
-    awake = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "  # a shell's background jobs are started deaf to SIGINT
-    running = subprocess.Popen([sys.executable, "-c", awake + MAIN, "render", "scene.py", "-o", "a.wav"], cwd=tmp_path, stderr=subprocess.PIPE, text=True)
+    write_scene(
+        tmp_path,
+        seconds=1000,
+        act="open('stepping', 'w').close() if time_s > 0.2 else None; import time; time.sleep(0.001)",
+    )
+    # a shell's background jobs are started deaf to SIGINT
+    awake = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
+    running = subprocess.Popen(
+        [sys.executable, "-c", awake + MAIN, "render", "scene.py", "-o", "a.wav"],
+        cwd=tmp_path,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
     try:
         end = time.monotonic() + 200
         while not (tmp_path / "stepping").exists() and running.poll() is None and time.monotonic() < end:
@@ -78,7 +90,10 @@ def test_an_interrupted_render_is_a_valid_named_file(tmp_path: Path, word: signa
 
 
 def test_an_interrupt_that_compiled_code_met_is_an_interrupt(tmp_path: Path) -> None:
-    write_scene(tmp_path, act="if time_s > 0.2: raise SystemError('a result with an exception set') from KeyboardInterrupt('terminated')")
+    write_scene(
+        tmp_path,
+        act="if time_s > 0.2: raise SystemError('a result with an exception set') from KeyboardInterrupt('terminated')",
+    )
     done = process(tmp_path, "render", "scene.py", "-o", "a.wav")
     assert done.returncode == 143, done.stderr
     assert done.stderr.rstrip().endswith("a.partial.wav")

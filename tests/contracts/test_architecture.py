@@ -28,7 +28,8 @@ TEXTS = sorted(
 LONGEST_LINES = 350
 
 IMPORT_S, HELP_S = 0.6, 0.3
-NUMPY_S = 0.15  # importing numpy takes about that on the machine the limits are meant for; a slower or busier one gets the same ratio
+# importing numpy takes about that on the machine the limits are meant for; a slower or busier one gets the same ratio
+NUMPY_S = 0.15
 
 
 def best_s(code: str, runs: int = 3) -> float:
@@ -49,7 +50,14 @@ def slack() -> float:
 
 def test_imports_point_down_and_rooms_keep_to_themselves() -> None:
     tool = Path(sys.executable).with_name("lint-imports")
-    done = subprocess.run([tool, "--no-cache", "--config", REPO / "pyproject.toml"], check=False, capture_output=True, text=True, cwd=REPO, timeout=120)
+    done = subprocess.run(
+        [tool, "--no-cache", "--config", REPO / "pyproject.toml"],
+        check=False,
+        capture_output=True,
+        text=True,
+        cwd=REPO,
+        timeout=120,
+    )
     assert done.returncode == 0, done.stdout + done.stderr
     assert re.search(r"Contracts: [1-9]\d* kept, 0 broken", done.stdout), done.stdout
 
@@ -57,7 +65,11 @@ def test_imports_point_down_and_rooms_keep_to_themselves() -> None:
 def test_every_module_is_on_a_floor() -> None:
     text = (REPO / "pyproject.toml").read_text()
     known = set(re.findall(r"sonic_bullet\.(\w+)", text))
-    rooms = {path.stem if path.is_file() else path.name for path in PACKAGE.iterdir() if path.suffix == ".py" or (path.is_dir() and any(path.glob("*.py")))}
+    rooms = {
+        path.stem if path.is_file() else path.name
+        for path in PACKAGE.iterdir()
+        if path.suffix == ".py" or (path.is_dir() and any(path.glob("*.py")))
+    }
     assert rooms - known - {"__init__"} == set()
 
 
@@ -68,22 +80,46 @@ def test_importing_is_quick() -> None:
 
 def test_help_is_quick() -> None:
     assert (
-        best_s("import sys; sys.argv = ['sonic-bullet', '--help']; from sonic_bullet.cli import main\ntry: main()\nexcept SystemExit: pass") < HELP_S * slack()
+        best_s(
+            "import sys; sys.argv = ['sonic-bullet', '--help']; from sonic_bullet.cli import main\ntry: main()\nexcept SystemExit: pass"
+        )
+        < HELP_S * slack()
     )
 
 
 @pytest.mark.parametrize(
-    "module", ["sonic_bullet", "sonic_bullet.cli", "sonic_bullet.files", "sonic_bullet.presets", "sonic_bullet.plots.scene_plot", "sonic_bullet.render"]
+    "module",
+    [
+        "sonic_bullet",
+        "sonic_bullet.cli",
+        "sonic_bullet.files",
+        "sonic_bullet.presets",
+        "sonic_bullet.plots.scene_plot",
+        "sonic_bullet.render",
+    ],
 )
 def test_importing_brings_nothing_heavy(module: str) -> None:
-    heavy = ["pybullet", "skfem", "matplotlib", "trimesh", "soundfile", "pytetwild", "pyloudnorm", "scipy.sparse.linalg", "rich"]
+    heavy = [
+        "pybullet",
+        "skfem",
+        "matplotlib",
+        "trimesh",
+        "soundfile",
+        "pytetwild",
+        "pyloudnorm",
+        "scipy.sparse.linalg",
+        "rich",
+    ]
     heavy += ["numpy", "numba"] if module in ("sonic_bullet", "sonic_bullet.cli") else []
     code = f"import sys, {module}; found = [m for m in {heavy} if m in sys.modules]; assert not found, found"
     done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True, timeout=120)
     assert done.returncode == 0, done.stderr
 
 
-@pytest.mark.parametrize("module", ["modal", "synth", "render", "files", "presets", "plots.scene_plot", "cli", "files.contact_log", "records"])
+@pytest.mark.parametrize(
+    "module",
+    ["modal", "synth", "render", "files", "presets", "plots.scene_plot", "cli", "files.contact_log", "records"],
+)
 def test_everything_but_the_listener_lives_without_pybullet(module: str) -> None:
     code = f"import sys; sys.modules['pybullet'] = sys.modules['pybullet_utils'] = sys.modules['pybullet_data'] = None; import sonic_bullet.{module}"
     done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True, timeout=120)
@@ -91,7 +127,9 @@ def test_everything_but_the_listener_lives_without_pybullet(module: str) -> None
 
 
 def public_parts(tree: ast.Module) -> list[ast.FunctionDef | ast.ClassDef]:
-    """Public functions and classes of a module, and the public methods of those classes (properties and single expressions aside; a protocol's docstring speaks for its words)."""
+    """Public functions and classes of a module, and the public methods of those classes (properties and single
+    expressions aside; a protocol's docstring speaks for its words).
+    """
     found: list[ast.FunctionDef | ast.ClassDef] = []
     for node in tree.body:
         if isinstance(node, (ast.FunctionDef, ast.ClassDef)) and not node.name.startswith("_"):
@@ -100,7 +138,10 @@ def public_parts(tree: ast.Module) -> list[ast.FunctionDef | ast.ClassDef]:
                 found += [
                     part
                     for part in node.body
-                    if isinstance(part, ast.FunctionDef) and not part.name.startswith("_") and not part.decorator_list and len(part.body) > 1
+                    if isinstance(part, ast.FunctionDef)
+                    and not part.name.startswith("_")
+                    and not part.decorator_list
+                    and len(part.body) > 1
                 ]
     return found
 
@@ -121,7 +162,11 @@ def test_everything_public_is_described_and_typed() -> None:
             if isinstance(part, ast.FunctionDef) and not any(
                 re.search("jit|intrinsic", ast.unparse(mark)) for mark in part.decorator_list
             ):  # numba types its kernels
-                arguments = [a for a in (*part.args.posonlyargs, *part.args.args, *part.args.kwonlyargs) if a.arg not in ("self", "cls")]
+                arguments = [
+                    a
+                    for a in (*part.args.posonlyargs, *part.args.args, *part.args.kwonlyargs)
+                    if a.arg not in ("self", "cls")
+                ]
                 if part.returns is None or any(a.annotation is None for a in arguments):
                     missing.append(f"{name}:{part.lineno} {part.name}: not typed")
     assert not missing, "\n".join(missing)
@@ -129,7 +174,9 @@ def test_everything_public_is_described_and_typed() -> None:
 
 
 def test_files_stay_short() -> None:
-    long = {str(path.relative_to(REPO)): n for path in MODULES if (n := len(path.read_text().splitlines())) > LONGEST_LINES}
+    long = {
+        str(path.relative_to(REPO)): n for path in MODULES if (n := len(path.read_text().splitlines())) > LONGEST_LINES
+    }
     assert not long
 
 

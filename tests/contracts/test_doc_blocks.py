@@ -39,7 +39,11 @@ def blocks(page: Path) -> list[tuple[str, str, str]]:
 
 
 def commands(source: str) -> list[list[str]]:
-    return [shlex.split(line, comments=True) for line in source.replace("\\\n", " ").splitlines() if line.strip() and not line.startswith("#")]
+    return [
+        shlex.split(line, comments=True)
+        for line in source.replace("\\\n", " ").splitlines()
+        if line.strip() and not line.startswith("#")
+    ]
 
 
 WITH_BLOCKS = [page for page in PAGES if blocks(page)]

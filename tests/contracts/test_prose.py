@@ -105,7 +105,11 @@ def test_words_are_the_fields() -> None:
     for page in PAGES:
         text = re.sub(r"`[^`\n]*`", "", outside_code(page.read_text(encoding="utf-8")))
         text = re.sub(r"\]\([^)]*\)", "]", text)
-        found += [f"{name_of(page)}:{number}: {m[0]}" for number, line in enumerate(text.splitlines(), 1) for m in WORDS.finditer(line)]
+        found += [
+            f"{name_of(page)}:{number}: {m[0]}"
+            for number, line in enumerate(text.splitlines(), 1)
+            for m in WORDS.finditer(line)
+        ]
     assert not found, f"{len(found)} words\n" + "\n".join(found)
 
 
@@ -119,7 +123,9 @@ def test_readme_is_short() -> None:
 
 def anchors(page: Path) -> set[str]:
     """The headings' anchors as a forge makes them."""
-    heads = re.findall(r"(?m)^#+ (.*)$", re.sub(r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.S | re.M))
+    heads = re.findall(
+        r"(?m)^#+ (.*)$", re.sub(r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.S | re.M)
+    )
     return {re.sub(r"[^\w\- ]", "", head.lower()).replace(" ", "-") for head in heads}
 
 
@@ -162,7 +168,9 @@ def test_named_files_exist() -> None:
                 if not (REPO / name).exists():
                     gone.append(f"{name_of(path)}: {name}")
     tails = {
-        path.relative_to(REPO).as_posix() for folder in ("sonic_bullet", "benchmarks", "tests", "scenes", "docs") for path in (REPO / folder).rglob("*.py")
+        path.relative_to(REPO).as_posix()
+        for folder in ("sonic_bullet", "benchmarks", "tests", "scenes", "docs")
+        for path in (REPO / folder).rglob("*.py")
     }
     for page in PAGES:
         for name in re.findall(r"`([\w/]+\.py)`", page.read_text(encoding="utf-8")):
@@ -226,7 +234,11 @@ def test_every_field_of_a_preset_is_described() -> None:
     page = (REPO / "docs" / "reference" / "preset.md").read_text(encoding="utf-8")
     fields = [
         *presets.Preset.__struct_fields__,
-        *(f for part in (presets.Elasticity, presets.Damping, presets.Surface, presets.Restitution) for f in part.__struct_fields__),
+        *(
+            f
+            for part in (presets.Elasticity, presets.Damping, presets.Surface, presets.Restitution)
+            for f in part.__struct_fields__
+        ),
     ]
     assert len(fields) > 20
     assert not [field for field in fields if not re.search(rf"[`.]{field}[`.]", page)]
@@ -236,6 +248,8 @@ def test_changelog_has_its_form() -> None:
     """keepachangelog.com: unreleased first, then versions; entries under a kind of change."""
     heads = re.findall(r"^(##+) (.*)$", (REPO / "CHANGELOG.md").read_text(encoding="utf-8"), re.M)
     assert heads[0] == ("##", "[Unreleased]")
-    assert all(re.fullmatch(r"\[\d+\.\d+\.\d+\](?: - \d{4}-\d\d-\d\d)?", head) for depth, head in heads[1:] if depth == "##")
+    assert all(
+        re.fullmatch(r"\[\d+\.\d+\.\d+\](?: - \d{4}-\d\d-\d\d)?", head) for depth, head in heads[1:] if depth == "##"
+    )
     kinds = "Added|Changed|Deprecated|Removed|Fixed|Security"
     assert all(re.fullmatch(rf"(?:{kinds})(?:: .+|, .+)?", head) for depth, head in heads if depth == "###")

@@ -29,9 +29,17 @@ def trees() -> Iterator[tuple[str, ast.AST]]:
 
 def probes(tree: ast.AST) -> list[int]:
     """Lines that ask for an attribute by its name, or for a protocol at run time."""
-    names = ((node, node.id if isinstance(node, ast.Name) else node.attr) for node in ast.walk(tree) if isinstance(node, ast.Name | ast.Attribute))
+    names = (
+        (node, node.id if isinstance(node, ast.Name) else node.attr)
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Name | ast.Attribute)
+    )
     called = [node.lineno for node, name in names if name in PROBES]
-    return called + [node.lineno for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and PROBES & {one.name for one in node.names}]
+    return called + [
+        node.lineno
+        for node in ast.walk(tree)
+        if isinstance(node, ast.ImportFrom) and PROBES & {one.name for one in node.names}
+    ]
 
 
 def texts(tree: ast.AST) -> Iterator[tuple[int, str]]:
@@ -52,7 +60,13 @@ def homes() -> dict[str, str]:
 
 @pytest.mark.parametrize(
     "source",
-    ["hasattr(x, 'a')", "y = getattr(x, 'a', None)", "operator.attrgetter('a')", "from typing import runtime_checkable", "@runtime_checkable\nclass A: ..."],
+    [
+        "hasattr(x, 'a')",
+        "y = getattr(x, 'a', None)",
+        "operator.attrgetter('a')",
+        "from typing import runtime_checkable",
+        "@runtime_checkable\nclass A: ...",
+    ],
 )
 def test_probes_are_seen(source: str) -> None:
     assert probes(ast.parse(source))
@@ -89,7 +103,11 @@ def test_no_optional_word_is_a_runtime_protocol() -> None:
     """What an effect may do beside is a base class, which a type checker sees."""
     from sonic_bullet.effects import protocol
 
-    optional = [thing for _, thing in inspect.getmembers(protocol, inspect.isclass) if inspect.isabstract(thing) and thing.__module__ == protocol.__name__]
+    optional = [
+        thing
+        for _, thing in inspect.getmembers(protocol, inspect.isclass)
+        if inspect.isabstract(thing) and thing.__module__ == protocol.__name__
+    ]
     assert len(optional) >= 6
     for thing in optional:
         assert not vars(thing).get("_is_runtime_protocol", False), thing.__name__

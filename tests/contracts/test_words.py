@@ -54,8 +54,10 @@ PRIVATE_WORDS = frozenset(
         "way",
     ]
 )
-"""Words that an identifier has no part of, between underscores or capitals. Strings are no identifiers: effect ids, and the
-names in JSON, npz and command lines, stay what files and scripts know."""
+"""Words that an identifier has no part of, between underscores or capitals.
+
+Strings are no identifiers: effect ids, and the names in JSON, npz and command lines, stay what files and scripts know.
+"""
 
 FORMER_NAMES = {"records/bodies.py": {"choke_s_m"}}
 """Deprecated public aliases, by file."""
@@ -69,7 +71,11 @@ MOST_EFFECTS = 18
 
 def parts(name: str) -> set[str]:
     """The words of an identifier: `told_by` and `ToldBy` hold told, `noise_floor` does not hold floors."""
-    return {word.lower() for part in name.split("_") for word in re.findall(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+", part)}
+    return {
+        word.lower()
+        for part in name.split("_")
+        for word in re.findall(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+", part)
+    }
 
 
 def identifiers(tree: ast.AST) -> Iterator[str]:
@@ -96,12 +102,20 @@ def identifiers(tree: ast.AST) -> Iterator[str]:
 def private_words(path: Path) -> set[str]:
     """The identifiers of a file that hold a private word, its own name among them."""
     former = FORMER_NAMES.get(path.relative_to(PACKAGE).as_posix(), set())
-    return {name for name in (*identifiers(ast.parse(path.read_text())), path.stem) if parts(name) & PRIVATE_WORDS} - former
+    return {
+        name for name in (*identifiers(ast.parse(path.read_text())), path.stem) if parts(name) & PRIVATE_WORDS
+    } - former
 
 
 @pytest.mark.parametrize(
     ("name", "words"),
-    [("told_by", {"told", "by"}), ("noise_floor", {"noise", "floor"}), ("ToldBy", {"told", "by"}), ("_HTMLPage2", {"html", "page"}), ("TOLD", {"told"})],
+    [
+        ("told_by", {"told", "by"}),
+        ("noise_floor", {"noise", "floor"}),
+        ("ToldBy", {"told", "by"}),
+        ("_HTMLPage2", {"html", "page"}),
+        ("TOLD", {"told"}),
+    ],
 )
 def test_parts_are_what_stands_between_underscores_and_capitals(name: str, words: set[str]) -> None:
     assert parts(name) == words
@@ -151,7 +165,10 @@ def test_a_folder_is_seen_at_a_glance() -> None:
     assert len(shown) <= MOST_EFFECTS, sorted(shown)
 
 
-@pytest.mark.parametrize(("module", "former", "name"), [(effects, "Heard", "ObjectEvidence"), (effects, "Blow", "Impact"), (presets, "Impact", "Restitution")])
+@pytest.mark.parametrize(
+    ("module", "former", "name"),
+    [(effects, "Heard", "ObjectEvidence"), (effects, "Blow", "Impact"), (presets, "Impact", "Restitution")],
+)
 def test_former_public_classes_are_still_found(module: object, former: str, name: str) -> None:
     with pytest.warns(DeprecationWarning, match=name):
         found = getattr(module, former)

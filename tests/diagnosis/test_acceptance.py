@@ -1,4 +1,6 @@
-"""Which candidate effect is accepted, by what it gained on each strike left out; and which still may, that has been asked on some of them."""
+"""Which candidate effect is accepted, by what it gained on each strike left out; and which still may, that has been
+asked on some of them.
+"""
 
 from __future__ import annotations
 
@@ -20,9 +22,13 @@ def candidate(*drop_db: float, control_db: float = 0.0) -> Candidate:
 def test_less_will_do_where_it_is_most_of_what_is_open() -> None:
     told = [needed(gap, first=True) for gap in (10.0, 2.0, 0.5, 0.1)]
     assert told == pytest.approx([0.8, RULES.least_drop_db, 0.25, 0.2])
-    assert [needed(gap, first=False) for gap in (10.0, 2.0, 0.5, 0.1)] == pytest.approx([0.8, RULES.least_drop_db, RULES.least_drop_db, RULES.least_drop_db])
+    assert [needed(gap, first=False) for gap in (10.0, 2.0, 0.5, 0.1)] == pytest.approx(
+        [0.8, RULES.least_drop_db, RULES.least_drop_db, RULES.least_drop_db]
+    )
     assert accepted(candidate(0.3, 0.31, 0.29, 0.3, 0.3), 0.5, first=True)
-    assert not accepted(candidate(0.3, 0.31, 0.29, 0.3, 0.3), 0.5, first=False), "what a name leaves may be its own fit's"
+    assert not accepted(candidate(0.3, 0.31, 0.29, 0.3, 0.3), 0.5, first=False), (
+        "what a name leaves may be its own fit's"
+    )
     assert not accepted(candidate(0.3, 0.31, 0.29, 0.3, 0.3), 2.0, first=True), "a drop of a seventh is a mesh's"
     assert not accepted(candidate(0.15, 0.15, 0.14, 0.16, 0.15), 0.2, first=True), "as little as chance gains"
 
@@ -44,17 +50,23 @@ def test_of_what_lines_are_sure_of_one_loud_strike_will_do() -> None:
     assert not accepted(replace(sure, impulse_n_s=level[::-1]), 0.4, first=True), "the softest gains"
     assert not accepted(sure, 0.4, first=False)
     assert not accepted(sure, 1.2, first=True), "a seventh of the gap"
-    assert not accepted(replace(sure, drop_db=np.array([-0.9, 0.4, 0.4, 0.4, 0.41])), 1.0, first=True), "one speaks against it"
+    assert not accepted(replace(sure, drop_db=np.array([-0.9, 0.4, 0.4, 0.4, 0.41])), 1.0, first=True), (
+        "one speaks against it"
+    )
 
 
 def test_beside_another_name_the_loudest_may_speak_for_what_goes_with_level() -> None:
-    """It was left out, and the bend found from the softer ones plays it; these hardly sound otherwise, and may lose a little by it."""
+    """It was left out, and the bend found from the softer ones plays it; these hardly sound otherwise, and may lose a
+    little by it.
+    """
     level = np.array([1.0, 2.0, 3.0, 4.0, 9.0])
     sure = replace(candidate(-0.01, -0.13, -0.07, -0.11, 2.9), effect=AmplitudePitch(0.1), impulse_n_s=level)
     assert accepted(sure, 0.9, first=False)
     assert not accepted(replace(sure, effect=Radiation(0.1, 1.0)), 0.9, first=False), "its lines were not asked"
     assert not accepted(replace(sure, impulse_n_s=level[::-1]), 0.9, first=False), "the softest gains"
-    assert not accepted(replace(sure, drop_db=np.array([-0.2, -0.13, -0.07, -0.11, 2.9])), 0.9, first=False), "the others lose too much"
+    assert not accepted(replace(sure, drop_db=np.array([-0.2, -0.13, -0.07, -0.11, 2.9])), 0.9, first=False), (
+        "the others lose too much"
+    )
     assert not accepted(replace(sure, control_db=2.0), 0.9, first=False), "as good as chance"
 
 
@@ -66,20 +78,31 @@ def test_one_odd_strike_does_not_outvote_four_that_gain_much() -> None:
 
 
 @pytest.mark.parametrize(
-    ("drop", "gap", "hopeful"), [((-3.1, -3.1), 2.0, False), ((-3.1, -3.1), 12.0, True), ((-0.1, 0.3), 3.0, True), ((0.0, 0.0), 0.1, False)]
+    ("drop", "gap", "hopeful"),
+    [((-3.1, -3.1), 2.0, False), ((-3.1, -3.1), 12.0, True), ((-0.1, 0.3), 3.0, True), ((0.0, 0.0), 0.1, False)],
 )
-def test_a_suspect_has_hope_as_long_as_the_rest_may_make_up_for_it(drop: tuple[float, ...], gap: float, hopeful: bool) -> None:
+def test_a_suspect_has_hope_as_long_as_the_rest_may_make_up_for_it(
+    drop: tuple[float, ...], gap: float, hopeful: bool
+) -> None:
     assert may_be_accepted(replace(candidate(*drop), impulse_n_s=np.full(8, np.nan)), np.full(8, gap), gap) == hopeful
 
 
 @pytest.mark.parametrize("certain", [False, True])
 @pytest.mark.parametrize("strikes", [3, 4, 5, 8])
 def test_whatever_is_accepted_had_hope(strikes: int, certain: bool) -> None:
-    """Gains drawn at random below what is open, on strikes of which some have far more open than others: to gain all of that on one would make the mean unsure."""
+    """Gains drawn at random below what is open, on strikes of which some have far more open than others: to gain all of
+    that on one would make the mean unsure.
+    """
     rng, kept = np.random.default_rng(strikes), 0
     for _ in range(1500):
         open_db = 3 * np.exp(1.2 * rng.standard_normal(strikes))
-        one = candidate(*(open_db * rng.uniform(-0.2, 1, strikes) if rng.random() < 0.5 else np.minimum(open_db, rng.uniform(0.3, 4))))
+        one = candidate(
+            *(
+                open_db * rng.uniform(-0.2, 1, strikes)
+                if rng.random() < 0.5
+                else np.minimum(open_db, rng.uniform(0.3, 4))
+            )
+        )
         if certain:
             one = replace(one, effect=AmplitudePitch(0.1, "velocity"))
         one = replace(one, impulse_n_s=rng.permutation(np.arange(1.0, strikes + 1)))

@@ -1,4 +1,6 @@
-"""A small mean distance is no comfort where one band is off: what stands above the noise is compared band by band before a verdict `none`."""
+"""A small mean distance is no comfort where one band is off: what stands above the noise is compared band by band
+before a verdict `none`.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +32,9 @@ def lines_and_signals(body: Struck) -> tuple[Lines, Array]:
 
 
 def one_band_louder() -> Struck:
-    """The plate, recorded where a band's modes are twice as loud as the mesh says at every strike: an error of the sensor's response, say."""
+    """The plate, recorded where a band's modes are twice as loud as the mesh says at every strike: an error of the
+    sensor's response, say.
+    """
     model = plate()
     shape = model.shape.copy()
     shape[-1, :, LOUDER] *= 2.0
@@ -60,7 +64,9 @@ def test_what_a_mean_distance_blurs_is_no_comfort(made: Callable[[], Struck], fr
     assert isinstance(end, Closed)
     assert end.before_db - end.floor_db < RULES.suffices_db
     assert end.verdict == "unexplained" and end.added == () and end.bands
-    assert all(from_hz < b.from_hz < b.to_hz < to_hz and b.recorded_over_played_db > 3.0 and b.strikes == 5 for b in end.bands)
+    assert all(
+        from_hz < b.from_hz < b.to_hz < to_hz and b.recorded_over_played_db > 3.0 and b.strikes == 5 for b in end.bands
+    )
     words = remainder(end, takes)
     assert words["words"].startswith("recorded ") and " dB more than played between " in words["words"]
     assert words["bands_off"][0]["strikes"] == 5
@@ -124,7 +130,9 @@ def test_a_tone_on_a_bands_edge_belongs_to_either_side() -> None:
 
 def test_below_the_noise_nothing_is_compared() -> None:
     floor = white(1.0)
-    quiet = np.array([over_db(with_noise(tone(2000, 0.02), floor, s), tone(2000, 0.01), SR, floor, BAND) for s in range(40)])
+    quiet = np.array(
+        [over_db(with_noise(tone(2000, 0.02), floor, s), tone(2000, 0.01), SR, floor, BAND) for s in range(40)]
+    )
     assert np.isnan(quiet).mean() > 0.99 and off_in(quiet) == ()
 
 
@@ -132,7 +140,16 @@ def test_noise_alone_takes_no_comfort_away() -> None:
     """A tone 13 dB above the noise in its bands at most, and five strikes: of 12 draws none is off."""
     floor = white(1.0)
     draws = [
-        [over_db(with_noise(tone(2000, 1.5, decay_per_s=4), floor, 100 * k + s), tone(2000, 1.5, decay_per_s=4), SR, floor, BAND) for s in range(5)]
+        [
+            over_db(
+                with_noise(tone(2000, 1.5, decay_per_s=4), floor, 100 * k + s),
+                tone(2000, 1.5, decay_per_s=4),
+                SR,
+                floor,
+                BAND,
+            )
+            for s in range(5)
+        ]
         for k in range(12)
     ]
     told = np.array(draws)

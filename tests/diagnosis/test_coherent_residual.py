@@ -1,4 +1,6 @@
-"""A mode's line has one phase but for signs, wherever a body is struck; what swings, each strike in its own time, makes lines that have not."""
+"""A mode's line has one phase but for signs, wherever a body is struck; what swings, each strike in its own time, makes
+lines that have not.
+"""
 
 from __future__ import annotations
 
@@ -46,7 +48,11 @@ def test_modes_are_in_phase_and_sidebands_are_not() -> None:
 
 @pytest.mark.parametrize(
     "effect",
-    [ContactTime(2.6e-4, 0.016, -0.2, "hertz"), ContactTime(1.5e-4, 0.016, 0.5, "hertz"), DampingLaw("constant-loss", 6e-3)],
+    [
+        ContactTime(2.6e-4, 0.016, -0.2, "hertz"),
+        ContactTime(1.5e-4, 0.016, 0.5, "hertz"),
+        DampingLaw("constant-loss", 6e-3),
+    ],
     ids=["pulse", "pulses of many lengths", "law"],
 )
 def test_what_leaves_modes_real_leaves_them_in_phase(effect: Effect) -> None:
@@ -66,7 +72,13 @@ def test_every_strike_has_as_much_to_say() -> None:
     assert observed is not None
     amplitude = loud * np.concatenate([turn, np.ones((5, 14))], axis=1)
     count = amplitude.shape[1]
-    lines = replace(observed.lines, freq_hz=np.linspace(300, 7000, count), amplitude=amplitude, amplitude_sd=1e-6 * np.ones((5, count)), signed=True)
+    lines = replace(
+        observed.lines,
+        freq_hz=np.linspace(300, 7000, count),
+        amplitude=amplitude,
+        amplitude_sd=1e-6 * np.ones((5, count)),
+        signed=True,
+    )
     assert out_of_phase(lines).tolist() == [True] + [False] * (count - 1)
 
 
@@ -77,7 +89,9 @@ def test_phases_are_not_asked_where_no_onset_is_known() -> None:
 
 
 @pytest.mark.parametrize(("depth", "verdict"), [(0.0, "none"), (0.8, "unexplained")])
-def test_a_swing_is_no_meshs_however_wrong_a_mesh_is(monkeypatch: pytest.MonkeyPatch, depth: float, verdict: str) -> None:
+def test_a_swing_is_no_meshs_however_wrong_a_mesh_is(
+    monkeypatch: pytest.MonkeyPatch, depth: float, verdict: str
+) -> None:
     """Either plate is played 0.1 % too high, and what a mesh may get wrong is without limit: phases alone decide."""
     monkeypatch.setattr(loop, "of_the_mesh", lambda *_: np.inf)
     body = swung(depth)
@@ -92,10 +106,15 @@ def test_a_swing_is_no_meshs_however_wrong_a_mesh_is(monkeypatch: pytest.MonkeyP
 
 
 @pytest.mark.parametrize(
-    ("left_db", "gain_db", "verdict"), [(5.0, None, "explained"), (9.0, None, "unexplained"), (5.0, 4.0, "explained"), (9.0, 4.0, "unexplained")]
+    ("left_db", "gain_db", "verdict"),
+    [(5.0, None, "explained"), (9.0, None, "unexplained"), (5.0, 4.0, "explained"), (9.0, 4.0, "unexplained")],
 )
-def test_a_room_leaves_little_whatever_is_beside_it(monkeypatch: pytest.MonkeyPatch, left_db: float, gain_db: float | None, verdict: str) -> None:
-    """Its response takes more than half of a rattle's noise, too; with much left beside it, the other name would be a guess, and no mesh is to blame: a response takes up its errors."""
+def test_a_room_leaves_little_whatever_is_beside_it(
+    monkeypatch: pytest.MonkeyPatch, left_db: float, gain_db: float | None, verdict: str
+) -> None:
+    """Its response takes more than half of a rattle's noise, too; with much left beside it, the other name would be a
+    guess, and no mesh is to blame: a response takes up its errors.
+    """
     monkeypatch.setattr(loop, "of_the_mesh", lambda *_: np.inf)
     body, room, law = recorded(), Room(0.5, 0.4, 1), DampingLaw("constant-loss", 6e-3)
     named: list[tuple[Effect, float]] = [(room, 10.0)] + ([(law, gain_db)] if gain_db is not None else [])
@@ -103,6 +122,7 @@ def test_a_room_leaves_little_whatever_is_beside_it(monkeypatch: pytest.MonkeyPa
     added = [Candidate(e.id, e, h, np.full(5, gain), gain, 0.0, {}) for e, gain in named]
     assert loop._verdict(h, added, 20.0, Score(left_db + 1.0, 1.0), posed((body,), takes_of((body,)))) == verdict
     dry = replace(h, effects=(law,))
-    assert loop._verdict(dry, added[1:] or added, 20.0, Score(left_db + 1.0, 1.0), posed((body,), takes_of((body,)))) == "explained", (
-        "where there is no room, a mesh may be to blame"
-    )
+    assert (
+        loop._verdict(dry, added[1:] or added, 20.0, Score(left_db + 1.0, 1.0), posed((body,), takes_of((body,))))
+        == "explained"
+    ), "where there is no room, a mesh may be to blame"

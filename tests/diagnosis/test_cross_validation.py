@@ -40,7 +40,10 @@ WEAK = ((0.0477, 0.0371, 0.0), (0.0955, 0.0186, 0.0), (0.1432, 0.0464, 0.0))
 
 
 def test_what_is_no_number_is_null_in_json() -> None:
-    assert _finite({"a": [1.0, np.nan, {"b": np.float64(np.inf)}], "c": ("x", 2, None)}) == {"a": [1.0, None, {"b": None}], "c": ["x", 2, None]}
+    assert _finite({"a": [1.0, np.nan, {"b": np.float64(np.inf)}], "c": ("x", 2, None)}) == {
+        "a": [1.0, None, {"b": None}],
+        "c": ["x", 2, None],
+    }
 
 
 @dataclass(frozen=True)
@@ -68,7 +71,9 @@ class Idle:
 
 
 def test_what_corrections_alone_would_gain_is_no_effects() -> None:
-    """Corrections that are three per mille off cost decibels; learnt again beside an effect that does nothing, they are not its gain."""
+    """Corrections that are three per mille off cost decibels; learnt again beside an effect that does nothing, they are
+    not its gain.
+    """
     body = recorded()
     rng = np.random.default_rng(3)
     h = fitted(body)
@@ -85,7 +90,9 @@ def test_what_corrections_alone_would_gain_is_no_effects() -> None:
 
 @pytest.mark.parametrize(("spoils", "asked"), [((0, 1, 2, 3, 4), 2), ((0, 1), 2), ((), 2)], ids=["all", "two", "none"])
 def test_what_could_not_earn_its_keep_any_more_is_asked_no_further(spoils: tuple[int, ...], asked: int) -> None:
-    """Fitted without the first two, it says nothing of them, or plays them far worse, and there is nothing open on the others that would make up for it."""
+    """Fitted without the first two, it says nothing of them, or plays them far worse, and there is nothing open on the
+    others that would make up for it.
+    """
 
     class Mutes(Idle):
         id: ClassVar[str] = "mutes"
@@ -107,12 +114,18 @@ def test_two_processes_find_what_one_finds(monkeypatch: pytest.MonkeyPatch) -> N
     """Number for number."""
     body = recorded(AmplitudeDamping(5.0, "velocity"))
     h = refitted(fitted(body), (body,))
-    takes, evidence, kinds = takes_of((body,)), evidence_of(h, (body,), BAND), (AmplitudeDamping, Radiation, SupportDamping, Idle)
+    takes, evidence, kinds = (
+        takes_of((body,)),
+        evidence_of(h, (body,), BAND),
+        (AmplitudeDamping, Radiation, SupportDamping, Idle),
+    )
     two = cross_validated(h, posed((body,), takes, *kinds, seed=3), evidence)
     monkeypatch.setattr("sonic_bullet.parallel._can_fork", lambda: False)
     one = cross_validated(h, posed((body,), takes, *kinds, seed=3), evidence)
     assert len(one) >= 2
-    assert [(c.id, c.effect.parameters(), c.control_db, c.spread) for c in two] == [(c.id, c.effect.parameters(), c.control_db, c.spread) for c in one]
+    assert [(c.id, c.effect.parameters(), c.control_db, c.spread) for c in two] == [
+        (c.id, c.effect.parameters(), c.control_db, c.spread) for c in one
+    ]
     assert all(np.array_equal(a.drop_db, b.drop_db) for a, b in zip(two, one, strict=True))
 
 
@@ -140,7 +153,9 @@ def test_the_best_pairs_are_those_that_counting_through_finds() -> None:
     column, y = np.abs(rng.standard_normal((9, 14))), np.abs(rng.standard_normal(14))
     every = np.array(list(combinations(range(9), 2)))
     sets, strength, gain = _best(column @ column.T, column @ y, every)
-    cost = {tuple(s): float(np.linalg.norm(y - column[list(s)].T @ nnls(column[list(s)].T, y)[0])) for s in every.tolist()}
+    cost = {
+        tuple(s): float(np.linalg.norm(y - column[list(s)].T @ nnls(column[list(s)].T, y)[0])) for s in every.tolist()
+    }
     both = {s: c for s, c in cost.items() if (nnls(column[list(s)].T, y)[0] > 1e-9).all()}
     assert tuple(sets[0]) == min(both, key=both.__getitem__)
     assert gain[0] == pytest.approx(float(y @ y) - min(both.values()) ** 2)
@@ -159,7 +174,8 @@ def test_three_weak_dashpots_are_told_together() -> None:
     assert least[1] < 0.5 * least[0] < 0.5 * trial.left(())
     told = SupportDamping._of(trial, min((s for s in found if len(s) == 3), key=trial.left))
     bare = replace(struck().model, decay_per_s=np.full(18, 5.0))
-    law = np.linalg.qr(np.stack([np.ones(18), bare.freq_hz**2], axis=1))[0]  # which takes up what a law of the material may
+    # which takes up what a law of the material may
+    law = np.linalg.qr(np.stack([np.ones(18), bare.freq_hz**2], axis=1))[0]
     true, made = (x.apply(bare).decay_per_s - 5.0 for x in (fixture, told))
     own, missed = (y - law @ (law.T @ y) for y in (true, made - true))
     assert np.linalg.norm(missed) < 0.5 * np.linalg.norm(own)
@@ -196,15 +212,22 @@ def test_trials_tell_what_has_numbers_of_single_lines_all_lines(monkeypatch: pyt
     assert {n for who, n in asked if who in ("listens", "searches")} == {count}
     assert {n for who, n in asked if who == "part"} == {count, round(RULES.kept_lines_share * count)}
     asked.clear()
-    cross_validated(h, posed((body,), takes, Listens, Searches), replace(told, found=("room", "radiation")), costly=False)
+    cross_validated(
+        h, posed((body,), takes, Listens, Searches), replace(told, found=("room", "radiation")), costly=False
+    )
     assert {who for who, _ in asked} == {"listens"}
 
 
 @pytest.mark.parametrize(
-    ("dry", "costly", "asked"), [(True, True, ["tensor"]), (False, True, ["support-damping", "tensor"]), (True, False, ["support-damping"])]
+    ("dry", "costly", "asked"),
+    [(True, True, ["tensor"]), (False, True, ["support-damping", "tensor"]), (True, False, ["support-damping"])],
 )
-def test_in_a_room_dashpots_wait_for_a_tensor(dry: bool, costly: bool, asked: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    """Lines that are paired with another material's modes tell little of what mixes these; asked alone, dashpots are sought."""
+def test_in_a_room_dashpots_wait_for_a_tensor(
+    dry: bool, costly: bool, asked: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Lines that are paired with another material's modes tell little of what mixes these; asked alone, dashpots are
+    sought.
+    """
     monkeypatch.setattr("sonic_bullet.parallel._can_fork", lambda: False)
     seen: list[str] = []
 
@@ -259,7 +282,8 @@ def test_dashpots_are_asked_after_a_tensor_that_came_to_nothing(monkeypatch: pyt
     anew: list[list[str]] = []
     monkeypatch.setattr(loop, "in_a_room", lambda _, found, *__, **___: anew.append([c.id for c in found]))
     monkeypatch.setattr(loop, "pairwise", lambda *_, **__: None)
-    monkeypatch.setattr(loop, "RULES", replace(RULES, costly_open_share=RULES.costly_open_share.at(1e-9)))  # however little the room leaves
+    # however little the room leaves
+    monkeypatch.setattr(loop, "RULES", replace(RULES, costly_open_share=RULES.costly_open_share.at(1e-9)))
     monkeypatch.setattr(loop, "reidentified", lambda h, *_, **__: h)  # which leaves less than noise does
     end = loop.closed(fitted(body), (body,), takes, EFFECTS, BAND)
     every = [kind.id for kind in EFFECTS]

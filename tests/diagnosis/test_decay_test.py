@@ -1,4 +1,6 @@
-"""Beside a room, whose response says what a law does to every line as well, lines left out speak for the law, or do not."""
+"""Beside a room, whose response says what a law does to every line as well, lines left out speak for the law, or do
+not.
+"""
 
 from __future__ import annotations
 
@@ -41,7 +43,9 @@ def tried(*effects: DampingLaw) -> tuple[list[Candidate], bool]:
     far = Score(100.0, now.floor_db)
     for c in found:
         assert helps(c, problem, far, far, first=False), "much nearer than nothing, whatever it is"
-        assert not (helps(c, shapeless, far, far, first=False) or by_lines(c, shapeless, now)), "without a mesh, of a room's lines none is known to be a mode"
+        assert not (helps(c, shapeless, far, far, first=False) or by_lines(c, shapeless, now)), (
+            "without a mesh, of a room's lines none is known to be a mode"
+        )
     return found, any(by_lines(c, problem, now) for c in found)
 
 
@@ -66,7 +70,9 @@ def test_only_what_changes_decays_and_moves_nothing_is_asked_of_lines() -> None:
 
 
 def test_lines_that_were_fitted_to_say_nothing() -> None:
-    """And those that were not count by Cauchy's loss: with the decays' own law each gains what the other law has it miss."""
+    """And those that were not count by Cauchy's loss: with the decays' own law each gains what the other law has it
+    miss.
+    """
     body = recorded(LAW)
     assert body.recorded is not None
     wrong, right = refitted(truth(), (body,)), truth(LAW)

@@ -24,7 +24,9 @@ def beside(apart: float) -> ModalModel:
 
 
 def meshed(apart: float) -> Struck:
-    """Recorded where the lone mode is ``apart`` from the pair, told by a mesh that leaves it 1e-4 from it: one line for all three."""
+    """Recorded where the lone mode is ``apart`` from the pair, told by a mesh that leaves it 1e-4 from it: one line for
+    all three.
+    """
     body = recorded(model=beside(apart), seconds=1.2)
     assert body.recorded is not None
     line = body.line.copy()
@@ -56,7 +58,10 @@ def test_lines_unlike_the_modes_part_nothing() -> None:
     assert body.recorded is not None
     lines = body.recorded.lines
     turned = np.roll(lines.amplitude, 1, axis=0)
-    assert separated(replace(body, recorded=replace(body.recorded, lines=replace(lines, amplitude=turned)))).line.tolist() == body.line.tolist()
+    assert (
+        separated(replace(body, recorded=replace(body.recorded, lines=replace(lines, amplitude=turned)))).line.tolist()
+        == body.line.tolist()
+    )
 
 
 def test_of_two_alone_nobody_can_say() -> None:

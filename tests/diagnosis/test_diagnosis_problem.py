@@ -1,4 +1,6 @@
-"""What stays the same during a diagnosis is one record; a score is where there is something to compare, and says what is open."""
+"""What stays the same during a diagnosis is one record; a score is where there is something to compare, and says what
+is open.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +10,15 @@ import pytest
 
 from sonic_bullet.diagnosis.evidence.baseline import takes_of
 from sonic_bullet.diagnosis.prediction.diagnosis_problem import DiagnosisProblem
-from sonic_bullet.diagnosis.prediction.score import Comparable, Compared, Incomparable, Score, comparable, least_db, mean_db
+from sonic_bullet.diagnosis.prediction.score import (
+    Comparable,
+    Compared,
+    Incomparable,
+    Score,
+    comparable,
+    least_db,
+    mean_db,
+)
 from sonic_bullet.effects.contact_time import ContactTime
 from sonic_bullet.effects.damping_law import DampingLaw
 from tests.diagnosis.test_found_again import BAND, fitted

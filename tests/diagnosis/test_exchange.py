@@ -68,7 +68,9 @@ def test_a_part_of_the_evidence_fits_the_same_pulse_again() -> None:
     body = recorded(PULSE, SOUNDING)
     told = evidence_of(truth(SOUNDING), (body,), BAND)
     for seed in range(6):
-        less = replace(thinned(told, (told.observed[0].source, seed % 5), 0.4, np.random.default_rng(seed)), known=PULSE)
+        less = replace(
+            thinned(told, (told.observed[0].source, seed % 5), 0.4, np.random.default_rng(seed)), known=PULSE
+        )
         again = ContactTime.propose(less)
         assert again is not None and again.pulse == PULSE.pulse
         assert again.duration_s(0.02) == pytest.approx(9e-4, rel=0.3)
@@ -82,7 +84,9 @@ def test_strikes_must_agree_before_a_name_is_changed() -> None:
 
 
 def test_strikes_alone_do_not_put_one_decay_for_another() -> None:
-    """A law and a radiation fitted in its place: the decays of lines know which, and are not asked of what says more than decays."""
+    """A law and a radiation fitted in its place: the decays of lines know which, and are not asked of what says more
+    than decays.
+    """
     law = DampingLaw("relaxation", 5e-3, strength=0.03, tau_s=8e-5)
     body = recorded(law)
     right, wrong = truth(law), refitted(truth(Radiation(0.05, 3.0)), (body,))

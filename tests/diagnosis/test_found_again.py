@@ -1,6 +1,8 @@
-"""Every effect, played into recordings with noise, is proposed again with its own parameters; a body that lacks nothing is left in peace.
+"""Every effect, played into recordings with noise, is proposed again with its own parameters; a body that lacks nothing
+is left in peace.
 
-The recordings are the same forward code's (the independent ones are in benchmarks/suite); what is tested here is the way back.
+The recordings are the same forward code's (the independent ones are in benchmarks/suite); what is tested here is the
+way back.
 """
 
 from __future__ import annotations
@@ -48,7 +50,9 @@ def fitted(body: Struck) -> Hypothesis:
     correction = np.zeros(body.model.mode_count)
     good = body.line >= 0
     correction[good] = lines.freq_hz[body.line[good]] / body.model.freq_hz[good] - 1
-    return Hypothesis(max(float(alpha), 1e-3), max(float(beta), 1e-12), GAIN, (), {"plate": np.clip(correction, -0.01, 0.01)})
+    return Hypothesis(
+        max(float(alpha), 1e-3), max(float(beta), 1e-12), GAIN, (), {"plate": np.clip(correction, -0.01, 0.01)}
+    )
 
 
 def ended(body: Struck) -> Closed:
@@ -97,7 +101,11 @@ def test_a_planted_effect_is_proposed(effect: Effect, within: dict[str, float]) 
     assert found is not None
     close(found, effect, within)
     with_it = refitted(replace(base, effects=(found,)), (body,), evidence.observed)
-    before, after, floor = (mean_db(takes, base) or 0.0, mean_db(takes, with_it) or 0.0, least_db(takes, with_it) or 0.0)
+    before, after, floor = (
+        mean_db(takes, base) or 0.0,
+        mean_db(takes, with_it) or 0.0,
+        least_db(takes, with_it) or 0.0,
+    )
     assert after - floor < 0.35 * (before - floor)
 
 
@@ -146,7 +154,14 @@ def test_proposals_depend_on_the_evidence_alone() -> None:
     evidence = evidence_of(fitted(body), (body,), BAND)
     once, again = DampingLaw.propose(evidence), DampingLaw.propose(evidence)
     assert once == again
-    louder = replace(evidence, observed=tuple(replace(h, amplitude=7 * h.amplitude, signal=7 * h.signal) for h in evidence.observed if h.signal is not None))
+    louder = replace(
+        evidence,
+        observed=tuple(
+            replace(h, amplitude=7 * h.amplitude, signal=7 * h.signal)
+            for h in evidence.observed
+            if h.signal is not None
+        ),
+    )
     assert DampingLaw.propose(louder) == once
 
 

@@ -24,7 +24,9 @@ BAND = (50.0, 7_500.0)
 
 
 def misjudged(off: np.ndarray, *effects: Effect) -> tuple[Struck, Hypothesis, tuple[Take, ...]]:
-    """The plate as its mesh has it, recorded with effects where modes are off (m,) from there, relative; nothing is corrected."""
+    """The plate as its mesh has it, recorded with effects where modes are off (m,) from there, relative; nothing is
+    corrected.
+    """
     mesh = plate()
     observed = recorded(*effects, model=ordered(mesh, mesh.freq_hz * (1 + off), mesh.decay_per_s)[0]).recorded
     assert observed is not None and observed.signals is not None
@@ -36,7 +38,10 @@ def misjudged(off: np.ndarray, *effects: Effect) -> tuple[Struck, Hypothesis, tu
 
 
 def upper(off: float) -> np.ndarray:
-    """Three of the upper modes off, the farther the higher: 2970, 3240 and 3909 Hz, which have no neighbours within 5 %."""
+    """Three of the upper modes off, the farther the higher:
+
+    2970, 3240 and 3909 Hz, which have no neighbours within 5 %.
+    """
     found = np.zeros(18)
     found[[11, 12, 15]] = np.array([0.7, 0.8, 1.0]) * off
     return found
@@ -77,7 +82,10 @@ def test_a_mode_below_the_bands_edge_that_nobody_hears_is_the_meshs(reach: float
     assert observed is not None and observed.signals is not None
     edge = float(model.freq_hz[-1]) * reach
     body = replace(struck(model, observed.lines, observed.signals), band_hz=(50.0, edge))
-    takes = tuple(Take(body, i, x, SR, floor_between(list(observed.signals))) for i, x in zip(body.fitted, observed.signals, strict=True))
+    takes = tuple(
+        Take(body, i, x, SR, floor_between(list(observed.signals)))
+        for i, x in zip(body.fitted, observed.signals, strict=True)
+    )
     h = refitted(replace(truth(), correction={body.name: np.zeros(model.mode_count)}), (body,))
     far, most = beyond(h, posed((body,), takes))
     assert (most > 0) == outside
@@ -87,7 +95,9 @@ def test_a_mode_below_the_bands_edge_that_nobody_hears_is_the_meshs(reach: float
 
 
 def test_a_name_is_judged_by_what_a_finer_mesh_would_leave() -> None:
-    """More than half of what is open is the mesh's: a name that closes the rest is the right one; not where something else is open beside it."""
+    """More than half of what is open is the mesh's: a name that closes the rest is the right one; not where something
+    else is open beside it.
+    """
     off, bent = np.where(np.arange(18) == 12, 0.02, 0.0), AmplitudePitch(0.35, "velocity")
     body, h, takes = misjudged(off, bent)
     end = closed(h, (body,), takes, (AmplitudePitch,), BAND)

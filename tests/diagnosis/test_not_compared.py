@@ -92,17 +92,26 @@ def test_one_strike_of_no_numbers_does_not_spoil_the_noise_of_all() -> None:
     signals[2] = np.nan
     some = replace(body, recorded=replace(body.recorded, signals=signals))
     found = comparable(takes_of((some,)), fitted(body))
-    assert isinstance(found, Compared) and len(found.takes) == 4 and [one.name for one in found.left_out] == ["strike-2.wav"]
+    assert (
+        isinstance(found, Compared)
+        and len(found.takes) == 4
+        and [one.name for one in found.left_out] == ["strike-2.wav"]
+    )
     signals[:] = np.nan
     none = comparable(takes_of((replace(some, recorded=replace(body.recorded, signals=signals)),)), fitted(body))
     assert isinstance(none, Incomparable) and len(none.left_out) == 5
 
 
 def test_a_strike_that_neither_plays_above_the_noise_is_as_far_off_as_noise_makes() -> None:
-    """Recorded silence is comparable with a model that plays it loud; one that plays it as silent is as near as noise lets anyone tell."""
+    """Recorded silence is comparable with a model that plays it loud; one that plays it as silent is as near as noise
+    lets anyone tell.
+    """
     body = recorded()
     take = takes_of((body,))[0]
-    quiet = replace(take, sample=1e-3 * np.sqrt(take.floor.variance.mean()) * np.random.default_rng(1).standard_normal(len(take.sample)))
+    quiet = replace(
+        take,
+        sample=1e-3 * np.sqrt(take.floor.variance.mean()) * np.random.default_rng(1).standard_normal(len(take.sample)),
+    )
     loud, silent = fitted(body), replace(fitted(body), gain=1e-12)
     assert isinstance(comparable((quiet,), loud), Compared) and isinstance(comparable((quiet,), silent), Incomparable)
     assert quiet.distance(loud) > 10.0
@@ -161,7 +170,9 @@ def test_a_model_that_cannot_be_played_compares_with_nothing(monkeypatch: pytest
     assert str(end.left_out[0]) == "strike-0.wav is played by the model with samples that are no numbers"
 
 
-def test_the_command_says_it_on_the_console_in_json_and_on_the_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_says_it_on_the_console_in_json_and_on_the_page(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     """A list of five lines and no mesh: none can be left out, so nothing is known."""
     lines = [{"freq_hz": f, "decay_per_s": 5.0, "amplitude": 1.0} for f in (310.0, 702.0, 1233.0, 1999.0, 2871.0)]
     guess = {"youngs_modulus": 7e10, "density": 2500, "poisson_ratio": 0.24}
@@ -180,7 +191,9 @@ def test_the_command_says_it_on_the_console_in_json_and_on_the_page(tmp_path: Pa
     why = "the list of lines of bar holds 5, and 8 are needed to leave some out in turn"
     assert "few: unexplained: nothing could be compared" in said and f"left: nothing could be compared: {why}" in said
     assert answer["verdict"] == "unexplained" and answer["unexplained"]["words"] == f"nothing could be compared: {why}"
-    assert answer["not_compared"] == [{"split": "fit", "name": "the list of lines of bar", "why": why.removeprefix("the list of lines of bar ")}]
+    assert answer["not_compared"] == [
+        {"split": "fit", "name": "the list of lines of bar", "why": why.removeprefix("the list of lines of bar ")}
+    ]
     assert answer["errors"]["before"]["fit"] is None and answer["errors"]["floor"] is None
     assert "Nothing could be compared" in page.read_text() and why in page.read_text()
 

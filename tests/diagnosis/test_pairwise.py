@@ -32,7 +32,9 @@ ROOM = Room(1.2, 0.8, seed=4)
 MASS = AddedMass((0.0477, 0.0371, 0.0), 0.06)
 
 
-def tried(*effects: Effect, kinds: tuple[type[Effect], ...]) -> tuple[list[Candidate], tuple[Hypothesis, list[Candidate]] | None]:
+def tried(
+    *effects: Effect, kinds: tuple[type[Effect], ...]
+) -> tuple[list[Candidate], tuple[Hypothesis, list[Candidate]] | None]:
     """A first round of candidates that were not cross-validated, and what two at once make of them."""
     body = recorded(*effects)
     assert body.recorded is not None and body.recorded.signals is not None
@@ -50,7 +52,9 @@ def tried(*effects: Effect, kinds: tuple[type[Effect], ...]) -> tuple[list[Candi
 
 
 def test_a_law_and_a_pulse_are_found_at_once_whatever_each_says_alone() -> None:
-    """None of the first round's drops are looked at: they are zero here; and the pulse is not taken for the filter, which phases tell from it."""
+    """None of the first round's drops are looked at: they are zero here; and the pulse is not taken for the filter,
+    which phases tell from it.
+    """
     first, two = tried(PULSE, LAW, kinds=(DampingLaw, ContactTime, MeasurementChain))
     assert len(first) == 3
     assert two is not None
@@ -100,7 +104,9 @@ def test_a_mass_in_a_room_is_heard_with_a_response_of_its_own() -> None:
 
 
 def test_a_room_alone_needs_no_mass(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Nor by cross-validation alone, were any two that leave less than all let through to it: the room identified again without the mass says more."""
+    """Nor by cross-validation alone, were any two that leave less than all let through to it: the room identified again
+    without the mass says more.
+    """
     assert room_anew((ROOM,), MASS) is None
     monkeypatch.setattr(pairs, "RULES", replace(RULES, pair_leaves_share=RULES.pair_leaves_share.at(1.0)))
     assert room_anew((ROOM,), MASS) is None

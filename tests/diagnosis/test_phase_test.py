@@ -53,23 +53,42 @@ def test_a_pulse_and_a_low_pass_are_told_apart(effect: Effect) -> None:
 
 @pytest.mark.parametrize("effect", [ContactTime(1.2e-4, 0.016, -0.2, "half-sine"), LOW], ids=lambda e: e.id)
 def test_phases_speak_though_every_strike_says_a_little_more_for_the_other(effect: Effect) -> None:
-    """A pulse in few samples, or a filter between two, has magnitudes that are off by a little at all strikes alike; phases are off by a turn."""
+    """A pulse in few samples, or a filter between two, has magnitudes that are off by a little at all strikes alike;
+    phases are off by a turn.
+    """
     body = recorded(effect)
     both = [replace(c, drop_db=c.drop_db * (0.9 if c.id == effect.id else 1.0)) for c in identified_from(effect)]
-    assert simplest(sorted(both, key=lambda c: -c.mean_db), (body,), evidence_of(truth(), (body,), BAND)).id == effect.id
+    assert (
+        simplest(sorted(both, key=lambda c: -c.mean_db), (body,), evidence_of(truth(), (body,), BAND)).id == effect.id
+    )
 
 
-@pytest.mark.parametrize("effect", [Radiation(0.03, 9.0), DampingLaw("relaxation", 5e-3, strength=0.045, tau_s=1.2e-4)], ids=lambda e: e.id)
+@pytest.mark.parametrize(
+    "effect", [Radiation(0.03, 9.0), DampingLaw("relaxation", 5e-3, strength=0.045, tau_s=1.2e-4)], ids=lambda e: e.id
+)
 def test_of_two_that_only_change_decays_the_decays_tell(effect: Effect) -> None:
     """Strikes say a little more for the other one; the law asks for fewer numbers."""
     body = recorded(effect)
     plain = refitted(truth(), (body,))
     evidence = evidence_of(plain, (body,), BAND)
     both = []
-    for kind, other in ((Radiation, Radiation(0.03, 2.0)), (DampingLaw, DampingLaw("relaxation", 5e-3, strength=0.045, tau_s=4e-5))):
+    for kind, other in (
+        (Radiation, Radiation(0.03, 2.0)),
+        (DampingLaw, DampingLaw("relaxation", 5e-3, strength=0.045, tau_s=4e-5)),
+    ):
         found = kind.propose(evidence) or other
         h = refitted(replace(plain, effects=(found,)), (body,), evidence.observed)
-        both.append(Candidate(kind.id, found, h, np.array([2.0, 2.1, 1.9, 2.0, 2.05]) * (0.95 if kind.id == effect.id else 1.0), 2.0, 0.0, {}))
+        both.append(
+            Candidate(
+                kind.id,
+                found,
+                h,
+                np.array([2.0, 2.1, 1.9, 2.0, 2.05]) * (0.95 if kind.id == effect.id else 1.0),
+                2.0,
+                0.0,
+                {},
+            )
+        )
     assert simplest(sorted(both, key=lambda c: -c.mean_db), (body,), evidence).id == effect.id
 
 
@@ -81,7 +100,9 @@ def test_what_lines_alone_have_named_needs_no_strike_to_speak_for_it() -> None:
 
 @pytest.mark.parametrize("exponent", [-0.2, 0.0])
 def test_whether_a_pulse_goes_with_the_blow_is_told_by_its_middle(exponent: float) -> None:
-    """Of a pulse so short that hardly anything rolls off: longer for a soft blow, or not; and files may begin a little late, all alike."""
+    """Of a pulse so short that hardly anything rolls off: longer for a soft blow, or not; and files may begin a little
+    late, all alike.
+    """
     body = recorded(ContactTime(1.4e-4, 0.016, exponent, "raised-cosine"))
     h = refitted(truth(), (body,))
     observed = evidence_of(h, (body,), BAND).observed[0]

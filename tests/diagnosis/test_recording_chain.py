@@ -59,16 +59,21 @@ def test_chains_add_up_to_what_was_struck() -> None:
     assert body.recorded is not None and plain.recorded is not None
     one, own = unchained(body.recorded.lines, LINKS[1]), plain.recorded.lines
     assert one is not None
-    apart = np.array([np.sort(np.abs(own.freq_hz / f - 1))[1] > 0.02 for f in own.freq_hz])  # nearer ones lend each other lines
+    # nearer ones lend each other lines
+    apart = np.array([np.sort(np.abs(own.freq_hz / f - 1))[1] > 0.02 for f in own.freq_hz])
     assert apart.sum() >= 12
     for k in np.flatnonzero(apart):
         near = int(np.argmin(np.abs(one.freq_hz / own.freq_hz[k] - 1)))
         struck_with = np.abs(own.amplitude[:, k])
-        assert np.abs(one.amplitude[:, near]) == pytest.approx(struck_with, rel=0.03, abs=0.01 * float(struck_with.max()))
+        assert np.abs(one.amplitude[:, near]) == pytest.approx(
+            struck_with, rel=0.03, abs=0.01 * float(struck_with.max())
+        )
 
 
 def test_no_chains_where_no_level_counts() -> None:
-    """In a room the wider links find some; what they play is farther from the recordings, which is for the baseline to see."""
+    """In a room the wider links find some; what they play is farther from the recordings, which is for the baseline to
+    see.
+    """
     assert all(unchained(lines_of(), link) is None for link in LINKS)
     assert unchained(lines_of(Room(0.9, 0.8, 11)), LINKS[0]) is None
 
@@ -95,22 +100,36 @@ def test_the_bend_and_its_measure_are_read_off_the_modes_that_show_it(measure: s
 
 
 def test_two_slow_lines_are_two_modes_though_a_chain_lies_between() -> None:
-    """A pair that hardens passes its neighbour; as one group it would lose that line, and a mode would be put on the other."""
+    """A pair that hardens passes its neighbour; as one group it would lose that line, and a mode would be put on the
+    other.
+    """
     freq = np.array([3430.4, 3430.9, 3436.0, 3444.7, 3450.0])
     decay = np.array([4.8, 5.0, 12.0, 4.9, 20.0])
     amplitude, sd, n = np.ones((3, 5), complex), np.full(5, 0.01), np.full(3, 1e-5)
-    groups = chains(Lines(freq, decay, amplitude, sd, sd, np.full(amplitude.shape, 1e-3), n, np.full(5, 1e3), True), LINKS[1])
+    groups = chains(
+        Lines(freq, decay, amplitude, sd, sd, np.full(amplitude.shape, 1e-3), n, np.full(5, 1e3), True), LINKS[1]
+    )
     assert sorted(sorted(g.tolist()) for g in groups) == [[0, 1, 2], [3, 4]]
 
 
-@pytest.mark.parametrize(("links", "louder", "step", "one"), [(2, 2, 1, False), (3, 2, 1, False), (4, 0.5, 1, False), (4, 2, -1, False), (4, 2, 1, True)])
+@pytest.mark.parametrize(
+    ("links", "louder", "step", "one"),
+    [(2, 2, 1, False), (3, 2, 1, False), (4, 0.5, 1, False), (4, 2, -1, False), (4, 2, 1, True)],
+)
 def test_one_long_chain_will_do(links: int, louder: float, step: int, one: bool) -> None:
-    """Of a body of which only the lowest mode is struck hard enough to bend; two or three lines together may be neighbours, a room has many that are soft,
-    and a chain's links go one way. Neighbours elsewhere stay two."""
+    """Of a body of which only the lowest mode is struck hard enough to bend; two or three lines together may be
+    neighbours, a room has many that are soft, and a chain's links go one way. Neighbours elsewhere stay two."""
     freq = np.concatenate([900.0 + step ** np.arange(links) * np.arange(links), [2100.0, 2101.0, 3300.0, 4700.0]])
     decay = np.concatenate([6.0 * 1.9 ** np.arange(links), [10.0, 20.0, 40.0, 70.0]])
-    amplitude, sd, n = np.where(freq < 1000, louder, 1.0) * np.ones((3, 1), complex), np.full(len(freq), 0.01), np.full(3, 1e-5)
-    found = unchained(Lines(freq, decay, amplitude, sd, sd, np.full(amplitude.shape, 1e-3), n, np.full(len(freq), 1e3), True), LINKS[0])
+    amplitude, sd, n = (
+        np.where(freq < 1000, louder, 1.0) * np.ones((3, 1), complex),
+        np.full(len(freq), 0.01),
+        np.full(3, 1e-5),
+    )
+    found = unchained(
+        Lines(freq, decay, amplitude, sd, sd, np.full(amplitude.shape, 1e-3), n, np.full(len(freq), 1e3), True),
+        LINKS[0],
+    )
     assert (found is not None) == one
     if found is not None:
         assert found.freq_hz == pytest.approx([900.0, 2100.0, 2101.0, 3300.0, 4700.0])

@@ -21,7 +21,11 @@ def made(change: Any = lambda r, i: r, more: tuple[CaseRecording, ...] = ()) -> 
     assert g is not None
     g = replace(g, recordings=tuple(change(r, i) for i, r in enumerate(g.recordings)))
     found = SimpleNamespace(case=SimpleNamespace(recordings=(*g.recordings, *more)))
-    return shapeless(cast(Any, found), g), g.lines.freq_hz, g.lines.amplitude / np.array([r.impulse_n_s for r in g.recordings])[:, None]
+    return (
+        shapeless(cast(Any, found), g),
+        g.lines.freq_hz,
+        g.lines.amplitude / np.array([r.impulse_n_s for r in g.recordings])[:, None],
+    )
 
 
 def told(body: Struck, freq_hz: Array) -> Array:

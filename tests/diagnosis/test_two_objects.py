@@ -1,4 +1,6 @@
-"""Several objects of one material: a strike left out is left out of its own object alone, and what is learnt of the rest holds for it."""
+"""Several objects of one material: a strike left out is left out of its own object alone, and what is learnt of the
+rest holds for it.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +29,9 @@ def alone(body: Struck, strike: int) -> Struck:
     assert body.recorded is not None and body.recorded.signals is not None
     lines = body.recorded.lines
     one = replace(lines, amplitude=lines.amplitude[[strike]], amplitude_sd=lines.amplitude_sd[[strike]])
-    mine = replace(body.recorded, lines=one, recordings=(body.recordings[strike],), signals=body.recorded.signals[[strike]])
+    mine = replace(
+        body.recorded, lines=one, recordings=(body.recordings[strike],), signals=body.recorded.signals[[strike]]
+    )
     return replace(body, recorded=mine)
 
 
@@ -35,7 +39,10 @@ def takes_of(*bodies: Struck) -> list[Take]:
     made = []
     for body in bodies:
         assert body.recorded is not None and body.recorded.signals is not None
-        made += [Take(body, i, x, SR, floor_between(list(body.recorded.signals))) for i, x in zip(body.fitted, body.recorded.signals, strict=True)]
+        made += [
+            Take(body, i, x, SR, floor_between(list(body.recorded.signals)))
+            for i, x in zip(body.fitted, body.recorded.signals, strict=True)
+        ]
     return made
 
 

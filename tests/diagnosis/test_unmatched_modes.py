@@ -16,7 +16,9 @@ from tests.made.body import plate, recorded, struck, truth
 
 @pytest.mark.parametrize("off", [0.004, -0.007])
 def test_a_mode_without_a_line_is_put_where_it_sounds(off: float) -> None:
-    """The mesh has the fourth mode elsewhere, and its line is missing: it comes back to a hundredth of its half width; modes with lines stay."""
+    """The mesh has the fourth mode elsewhere, and its line is missing: it comes back to a hundredth of its half width;
+    modes with lines stay.
+    """
     body = recorded()
     freq = body.model.freq_hz.copy()
     freq[3] *= 1 + off
@@ -53,14 +55,18 @@ def test_what_the_recordings_do_not_want_elsewhere_stays() -> None:
     line = body.line.copy()
     line[2] = line[-1] = -1
     wrong = replace(body, model=replace(body.model, freq_hz=freq), line=line)
-    (right,) = settled(replace(truth(ContactTime(1.2e-3, 0.016, 0.0, "half-sine")), correction={"plate": wrong.correction}), (wrong,))
+    (right,) = settled(
+        replace(truth(ContactTime(1.2e-3, 0.016, 0.0, "half-sine")), correction={"plate": wrong.correction}), (wrong,)
+    )
     assert right.correction[2] == 0
     assert right.correction[-1] == 0
 
 
 @pytest.mark.parametrize(("reach", "outside"), [(1.004, True), (1.03, False)])
 def test_a_mode_at_the_bands_edge_that_nobody_hears_lies_outside(reach: float, outside: bool) -> None:
-    """The mesh has the highest mode inside the band by less than its error; one farther inside is not silenced so, whatever is not heard of it."""
+    """The mesh has the highest mode inside the band by less than its error; one farther inside is not silenced so,
+    whatever is not heard of it.
+    """
     model = plate()
     shape = model.shape.copy()
     shape[:, :, -1] = 0.0

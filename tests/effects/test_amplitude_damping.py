@@ -35,10 +35,15 @@ def with_twins() -> ModalModel:
     return replace(model, freq_hz=freq)
 
 
-def assert_nearer_than_the_meshs(found: AmplitudeDamping | AmplitudePitch, base: Hypothesis, body: Struck, evidence: Evidence) -> None:
+def assert_nearer_than_the_meshs(
+    found: AmplitudeDamping | AmplitudePitch, base: Hypothesis, body: Struck, evidence: Evidence
+) -> None:
     """The axes that were found play nearer to the recordings than the mesh's."""
     takes = takes_of((body,))
-    own, mesh = (mean_db(takes, refitted(replace(base, effects=(e,)), (body,), evidence.observed)) for e in (found, replace(found, freq_hz=(), turn_rad=())))
+    own, mesh = (
+        mean_db(takes, refitted(replace(base, effects=(e,)), (body,), evidence.observed))
+        for e in (found, replace(found, freq_hz=(), turn_rad=()))
+    )
     assert own is not None and mesh is not None and own < mesh
 
 
@@ -72,13 +77,19 @@ def test_twins_have_the_axes_that_their_envelopes_tell() -> None:
     held, learnt = (AmplitudeDamping.propose(replace(less, known=other, on_trial=trial)) for trial in (True, False))
     assert held is not None and learnt is not None
     assert held.turn_rad == (1.2,) and learnt.turn_rad[0] == pytest.approx(0.6, abs=0.1)
-    assert abs(held.alpha_per_s / learnt.alpha_per_s - 1) > 1e-3, "decays are told under the axes that they are played with"
+    assert abs(held.alpha_per_s / learnt.alpha_per_s - 1) > 1e-3, (
+        "decays are told under the axes that they are played with"
+    )
 
 
 def test_levels_from_strike_to_strike_tell_the_axes_too() -> None:
-    """Strikes an octave apart: the louder, the sooner choked; and where nobody hears the line, no angle is likely under which it would be loud."""
+    """Strikes an octave apart: the louder, the sooner choked; and where nobody hears the line, no angle is likely under
+    which it would be loud.
+    """
     model = with_twins()
-    body = recorded(AmplitudeDamping(5.0, "velocity", freq_hz=(float(model.freq_hz[PAIR[0]]),), turn_rad=(0.6,)), model=model)
+    body = recorded(
+        AmplitudeDamping(5.0, "velocity", freq_hz=(float(model.freq_hz[PAIR[0]]),), turn_rad=(0.6,)), model=model
+    )
     observed = evidence_of(refitted(fitted(body), (body,)), (body,), BAND).observed[0]
     e = envelopes(observed)
     assert e is not None
@@ -87,7 +98,11 @@ def test_levels_from_strike_to_strike_tell_the_axes_too() -> None:
     assert ANGLES[int(found.between.argmin())] == pytest.approx(0.6, abs=0.1)
     assert np.ptp(found.between) > 1.0
     loud = np.abs(line.amplitude.sum(axis=2)[0] * line.level.max(axis=2)[0]).argmax()
-    silent = replace(line, weight=np.where(np.arange(5)[:, None] == loud, 0.0, line.weight), log=np.where(np.arange(5)[:, None] == loud, -30.0, line.log))
+    silent = replace(
+        line,
+        weight=np.where(np.arange(5)[:, None] == loud, 0.0, line.weight),
+        log=np.where(np.arange(5)[:, None] == loud, -30.0, line.log),
+    )
     assert (fitted_decay(silent, 5.0).between > found.between.min() + 1.0).all()
 
 
@@ -115,7 +130,9 @@ def test_what_is_known_to_ring_beside_the_body_is_taken_out_of_its_lines() -> No
 def test_turned_twins_sound_as_before_where_nothing_is_choked() -> None:
     model = with_twins()
     other = turned(model, (float(model.freq_hz[PAIR[0]]),), (0.6,))
-    one, two = (np.einsum("vxj,wyj->vwxy", m.shape[-6:, :, list(PAIR)], m.shape[-6:, :, list(PAIR)]) for m in (model, other))
+    one, two = (
+        np.einsum("vxj,wyj->vwxy", m.shape[-6:, :, list(PAIR)], m.shape[-6:, :, list(PAIR)]) for m in (model, other)
+    )
     assert np.abs(model.shape - other.shape).max() > 0.1
     assert np.allclose(one, two, atol=1e-5)
     assert turned(model, (123.0,), (0.6,)).shape == pytest.approx(model.shape)

@@ -36,7 +36,9 @@ def made(bend: float) -> Struck:
 
 
 def test_modes_ring_down_to_where_they_are_at_rest() -> None:
-    """Corrections that are off come back to the plate's own frequencies beside the true bend, of all modes that stand alone."""
+    """Corrections that are off come back to the plate's own frequencies beside the true bend, of all modes that stand
+    alone.
+    """
     body = made(BENT.bend)
     h = fitted(body)
     told = evidence_of(h, (body,), BAND).observed[0]
@@ -49,7 +51,9 @@ def test_modes_ring_down_to_where_they_are_at_rest() -> None:
     assert np.abs(rested["plate"][mine]).max() < 0.1 * FAR
     assert rested["plate"][others] == pytest.approx(FAR)
     back = with_effects(replace(wrong, correction=rested), (), (body,)).correction
-    assert back is not None and (back["plate"] == body.correction).all(), "without the effect they are the baseline's again"
+    assert back is not None and (back["plate"] == body.correction).all(), (
+        "without the effect they are the baseline's again"
+    )
 
 
 def test_what_does_not_glide_stays_where_it_is() -> None:
@@ -107,7 +111,9 @@ def test_a_gain_is_told_by_what_does_not_glide() -> None:
 
 
 def test_gliding_twins_have_their_own_axes() -> None:
-    """One of two twins may be loud, and glide away, where the other has hardly been struck; with the mesh's axes both would."""
+    """One of two twins may be loud, and glide away, where the other has hardly been struck; with the mesh's axes both
+    would.
+    """
     model = with_twins()
     middle = float(model.freq_hz[PAIR[0]])
     bent = AmplitudePitch(0.7, "velocity", (middle,), (0.6,))
@@ -122,7 +128,9 @@ def test_gliding_twins_have_their_own_axes() -> None:
 
 
 def test_axes_of_twins_are_held_on_trial_and_learnt_again_beside_other_effects() -> None:
-    """By all fitted strikes, once; but where another effect has moved modes meanwhile, what were twins may be two lines, and have no axes to turn."""
+    """By all fitted strikes, once; but where another effect has moved modes meanwhile, what were twins may be two
+    lines, and have no axes to turn.
+    """
     model = with_twins()
     body = recorded(AmplitudePitch(0.7, "velocity", (float(model.freq_hz[PAIR[0]]),), (0.6,)), model=model)
     told = evidence_of(refitted(fitted(body), (body,)), (body,), BAND)
@@ -130,14 +138,19 @@ def test_axes_of_twins_are_held_on_trial_and_learnt_again_beside_other_effects()
     held, learnt = (AmplitudePitch.propose(replace(told, known=wrong, on_trial=trial)) for trial in (True, False))
     assert held is not None and held.turn_rad == (1.2,)
     assert learnt is not None and learnt.turn_rad[0] == pytest.approx(0.6, abs=0.06)
-    apart = replace(told.observed[0], plain=replace(model, freq_hz=np.sort(model.freq_hz * np.linspace(1, 1.05, len(model.freq_hz)))))
+    apart = replace(
+        told.observed[0],
+        plain=replace(model, freq_hz=np.sort(model.freq_hz * np.linspace(1, 1.05, len(model.freq_hz)))),
+    )
     split = AmplitudePitch.propose(replace(told, observed=(apart,), known=wrong))
     assert split is not None and split.turn_rad == ()
 
 
 @pytest.mark.parametrize("off_per_s", [-5.0, 5.0])
 def test_twins_that_glide_and_beat_fall_as_what_is_played_does(off_per_s: float) -> None:
-    """By what it is played with that is a third off, their decay is told to 5 %, and by that to 2 %; the line itself is farther off."""
+    """By what it is played with that is a third off, their decay is told to 5 %, and by that to 2 %; the line itself is
+    farther off.
+    """
     model = with_twins()
     middle = float(model.freq_hz[PAIR[0]])
     bent = AmplitudePitch(2.0, "velocity", (middle,), (0.6,))
@@ -156,7 +169,9 @@ def test_twins_that_glide_and_beat_fall_as_what_is_played_does(off_per_s: float)
 
 
 def test_twins_that_are_played_as_two_are_not_turned() -> None:
-    """Two modes that corrections have left apart are no pair of one frequency: about other axes they would be two others."""
+    """Two modes that corrections have left apart are no pair of one frequency: about other axes they would be two
+    others.
+    """
     model = with_twins()
     body = recorded(AmplitudePitch(0.7, "velocity", (float(model.freq_hz[PAIR[0]]),), (0.6,)), model=model)
     told = evidence_of(refitted(fitted(body), (body,)), (body,), BAND)
@@ -212,11 +227,17 @@ def test_phases_are_whole_turns_apart_however_few_the_frames_are() -> None:
 
 @pytest.mark.parametrize(("reach_hz", "off_hz"), [(7.5, 0.0), (20.0, 15.0)])
 def test_a_mode_at_rest_is_not_taken_for_its_neighbour(reach_hz: float, off_hz: float) -> None:
-    """What is played there may be the neighbour's alone, 15 Hz away: with less than that in reach nothing is moved, nor to the end of the reach."""
+    """What is played there may be the neighbour's alone, 15 Hz away: with less than that in reach nothing is moved, nor
+    to the end of the reach.
+    """
     t = np.linspace(0.01, 0.5, 96)[None]
     observed, good = np.exp(2j * np.pi * 15 * t)[None], np.ones((1, 1, 96), bool)
-    recording = Envelopes(t, observed, good, np.zeros(1, int), np.full((1, 1), 1e-3), np.angle(observed), np.full(1, 0.02))
-    assert _off_hz(recording, replace(recording, z=np.ones_like(observed)), 0, reach_hz) == pytest.approx(off_hz, abs=0.02)
+    recording = Envelopes(
+        t, observed, good, np.zeros(1, int), np.full((1, 1), 1e-3), np.angle(observed), np.full(1, 0.02)
+    )
+    assert _off_hz(recording, replace(recording, z=np.ones_like(observed)), 0, reach_hz) == pytest.approx(
+        off_hz, abs=0.02
+    )
 
 
 def test_a_bend_that_one_lone_mode_alone_tells_is_told_by_all(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -242,7 +263,9 @@ def test_a_bend_that_one_lone_mode_alone_tells_is_told_by_all(monkeypatch: pytes
 
 
 def test_a_bend_is_told_by_the_levels_that_the_pulse_leaves() -> None:
-    """A long contact hardly drives high modes: it is their own velocity they bend with, not what the impulse alone would give them."""
+    """A long contact hardly drives high modes: it is their own velocity they bend with, not what the impulse alone
+    would give them.
+    """
     pulse, bent = ContactTime(6e-4, 0.016, 0.0), AmplitudePitch(0.7, "velocity")
     body = recorded(pulse, bent, noise=2e-6)
     told = evidence_of(refitted(replace(fitted(body), effects=(pulse,)), (body,)), (body,), BAND)
@@ -254,12 +277,19 @@ def test_a_bend_is_told_by_the_levels_that_the_pulse_leaves() -> None:
 
 @pytest.mark.parametrize("length", [5, 401, 1_999])
 def test_a_mode_shifted_to_zero_is_what_the_window_says(length: int) -> None:
-    """Running sums of three exponentials are the window's sum, sample by sample, at both ends too, whatever came before."""
+    """Running sums of three exponentials are the window's sum, sample by sample, at both ends too, whatever came
+    before.
+    """
     rng = np.random.default_rng(length)
     n, omega = 6_000, 0.37
     y = rng.standard_normal(n) * np.exp(-np.arange(n) / 300.0)
     at = np.array([0, 1, length // 2, 1_500, 3_300, n - 2, n - 1])
     window = np.hanning(length + 2)[1:-1]
     padded = np.concatenate([np.zeros(length), y * np.exp(-1j * omega * np.arange(n)), np.zeros(length)])
-    direct = np.array([2 * (padded[length + m - length // 2 : length + m + length // 2 + 1] * window).sum() / window.sum() for m in at])
+    direct = np.array(
+        [
+            2 * (padded[length + m - length // 2 : length + m + length // 2 + 1] * window).sum() / window.sum()
+            for m in at
+        ]
+    )
     assert np.allclose(windowed(y, omega, length, at), direct, rtol=1e-6, atol=1e-12 * np.abs(direct).max())

@@ -1,4 +1,6 @@
-"""Dashpots beyond first order: pairs that turn, neighbours that mix, points that are held; and the way back from lines to the dashpots."""
+"""Dashpots beyond first order: pairs that turn, neighbours that mix, points that are held; and the way back from lines
+to the dashpots.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +29,14 @@ def test_a_mode_that_should_be_heard_and_is_not_costs_something() -> None:
     t = DashpotFit.of(evidence_of(truth(), (body,), BAND).observed[0])
     loud = 1 + int(np.argmax(np.abs(t.size[:, 1:-1]).max(axis=0)))  # between two others: beyond them nobody listens
     rest = np.delete(np.arange(len(t.freq_hz)), loud)
-    fewer = replace(t, freq_hz=t.freq_hz[rest], decay_per_s=t.decay_per_s[rest], sd=t.sd[rest], size=t.size[:, rest], worth=t.worth[rest])
+    fewer = replace(
+        t,
+        freq_hz=t.freq_hz[rest],
+        decay_per_s=t.decay_per_s[rest],
+        sd=t.sd[rest],
+        size=t.size[:, rest],
+        worth=t.worth[rest],
+    )
     keep = np.abs(t.observed_hz - t.freq_hz[loud]) > 1e-6
     deaf = replace(fewer, observed_hz=t.observed_hz[keep], rings_per_s=t.rings_per_s[keep])
     # the two differ in whether a line is there, one that is held against no mode
@@ -38,7 +47,9 @@ def test_a_mode_that_should_be_heard_and_is_not_costs_something() -> None:
     def missed(**what: object) -> float:
         return replace(deaf, **what).left(()) - replace(fewer, **what).left(())  # type: ignore[arg-type]
 
-    assert missed(through=np.where(np.abs(deaf.model.freq_hz - t.freq_hz[loud]) < 1, 1e-3, deaf.through)) == 0, "the pulse leaves nothing of it"
+    assert missed(through=np.where(np.abs(deaf.model.freq_hz - t.freq_hz[loud]) < 1, 1e-3, deaf.through)) == 0, (
+        "the pulse leaves nothing of it"
+    )
     quick = deaf.model.decay_per_s.copy()
     quick[np.abs(deaf.model.freq_hz - t.freq_hz[loud]).argmin()] *= 100
     assert missed(model=replace(deaf.model, decay_per_s=quick)) == 0, "what dies at once is not missed"
@@ -50,7 +61,10 @@ def test_a_faint_line_far_above_does_not_hide_a_dashpot() -> None:
     low = observed.freq_hz < 3_500
     one = replace(
         observed,
-        **{name: getattr(observed, name)[low] for name in ("freq_hz", "decay_per_s", "freq_sd_hz", "decay_sd_per_s", "model_hz", "expected_decay_per_s")},
+        **{
+            name: getattr(observed, name)[low]
+            for name in ("freq_hz", "decay_per_s", "freq_sd_hz", "decay_sd_per_s", "model_hz", "expected_decay_per_s")
+        },
         **{name: getattr(observed, name)[:, low] for name in ("amplitude", "amplitude_sd", "expected", "pattern")},
         mode=tuple(m for m, there in zip(observed.mode, low, strict=True) if there),
         foreign_hz=np.array([7_000.0]),
@@ -63,7 +77,10 @@ def test_a_faint_line_far_above_does_not_hide_a_dashpot() -> None:
 
 
 def test_a_line_louder_than_its_mode_counts_as_one_of_another_decay_does() -> None:
-    """All strikes alike: a pattern's cosine sees nothing of it. What is common to all lines is a gain, and says nothing."""
+    """All strikes alike: a pattern's cosine sees nothing of it.
+
+    What is common to all lines is a gain, and says nothing.
+    """
     t = DashpotFit.of(evidence_of(truth(), (recorded(),), BAND).observed[0])
     one = np.where(np.arange(len(t.freq_hz)) == 3, 10.0, 1.0)
     by_hand = MISSED * np.log1p((np.log(10) / LEVEL) ** 2 / MISSED)
@@ -148,10 +165,18 @@ def test_runs_are_cut_where_frequencies_lie_apart() -> None:
     assert max(len(run) for run in apart(np.linspace(1, 2, 57), 10)) <= 10
 
 
-@pytest.mark.parametrize("law", [DampingLaw("constant-loss", 6e-3), DampingLaw("relaxation", 5e-4, strength=0.03, tau_s=3e-5)], ids=lambda e: str(e.law))
+@pytest.mark.parametrize(
+    "law",
+    [DampingLaw("constant-loss", 6e-3), DampingLaw("relaxation", 5e-4, strength=0.03, tau_s=3e-5)],
+    ids=lambda e: str(e.law),
+)
 def test_two_dashpots_are_read_off_pairs_beside_a_law_that_is_not_rayleighs(law: DampingLaw) -> None:
-    """Their places, but for the plate's own mirrors, and strengths within a fifth; a relaxation's decays level off, which no power series of ω above zero does."""
-    body = recorded(law, SupportDamping((SPOT, OTHER), (7.0, 7.0)), model=replace(paired_plate(), decay_per_s=np.zeros(18)))
+    """Their places, but for the plate's own mirrors, and strengths within a fifth; a relaxation's decays level off,
+    which no power series of ω above zero does.
+    """
+    body = recorded(
+        law, SupportDamping((SPOT, OTHER), (7.0, 7.0)), model=replace(paired_plate(), decay_per_s=np.zeros(18))
+    )
     found = SupportDamping.propose(evidence_of(replace(truth(), gain=GAIN), (body,), BAND))
     assert found is not None
     assert len(found.position_m) == 2
@@ -174,7 +199,9 @@ def test_a_law_of_the_material_is_read_beside_dashpots_and_acts_under_them() -> 
 
 
 def test_a_dashpot_that_does_nothing_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Beside whatever moves modes twins keep corrections of their own, which gains something where a mesh is off: that is no dashpot's."""
+    """Beside whatever moves modes twins keep corrections of their own, which gains something where a mesh is off: that
+    is no dashpot's.
+    """
     told = evidence_of(truth(), (recorded(),), BAND)
     x = told.observed[0].model
     assert x is not None
@@ -183,5 +210,7 @@ def test_a_dashpot_that_does_nothing_is_none(monkeypatch: pytest.MonkeyPatch) ->
         c = (
             2 * share * float((x.decay_per_s / np.maximum(x.shape[vertex, 2].astype(float) ** 2, 1e-30)).min())
         )  # ½ c φ² = share · d, of the mode it takes most of
-        monkeypatch.setattr("sonic_bullet.effects.support_damping.sought", lambda _, c=c: (Dashpot(vertex, c, "every"),))
+        monkeypatch.setattr(
+            "sonic_bullet.effects.support_damping.sought", lambda _, c=c: (Dashpot(vertex, c, "every"),)
+        )
         assert (SupportDamping.propose(told) is not None) is named

@@ -64,17 +64,26 @@ def given(stage: Stage) -> Any:
 
 def arrays(x: Any) -> dict[str, Any]:
     """A value's fields by name; arrays copied."""
-    return {f.name: np.array(getattr(x, f.name)) if isinstance(getattr(x, f.name), np.ndarray) else getattr(x, f.name) for f in fields(x)}
+    return {
+        f.name: np.array(getattr(x, f.name)) if isinstance(getattr(x, f.name), np.ndarray) else getattr(x, f.name)
+        for f in fields(x)
+    }
 
 
 def same(a: Any, b: Any, rtol: float = 1e-6) -> bool:
     """Whether two stage values agree."""
     one, two = arrays(a), arrays(b)
-    return all(np.allclose(one[k], two[k], rtol=rtol, atol=1e-9) if isinstance(one[k], np.ndarray) else one[k] == two[k] or k == "pulse" for k in one)
+    return all(
+        np.allclose(one[k], two[k], rtol=rtol, atol=1e-9)
+        if isinstance(one[k], np.ndarray)
+        else one[k] == two[k] or k == "pulse"
+        for k in one
+    )
 
 
 def test_every_member_has_its_example() -> None:
-    missing = {kind.id for kind in EFFECTS} - {kind.id for kind in STRONG} - {"orthotropy"}  # that one has a file of its own
+    # that one has a file of its own
+    missing = {kind.id for kind in EFFECTS} - {kind.id for kind in STRONG} - {"orthotropy"}
     assert missing == set()
     assert len(MEMBERS) == 12
 
@@ -86,7 +95,10 @@ def test_contract(kind: type[Effect]) -> None:
     before = arrays(x)
     once, twice = strong.apply(x), strong.apply(x)
     assert same(x, type(x)(**before)), "the input is left alone"
-    assert all(np.array_equal(arrays(once)[k], arrays(twice)[k]) if isinstance(v, np.ndarray) else arrays(twice)[k] == v for k, v in arrays(once).items())
+    assert all(
+        np.array_equal(arrays(once)[k], arrays(twice)[k]) if isinstance(v, np.ndarray) else arrays(twice)[k] == v
+        for k, v in arrays(once).items()
+    )
     assert not same(x, once), "an effect of some strength does something"
     assert same(x, none.apply(x)), "one of none does nothing"
     assert kind.reference and kind.__doc__ and strong.freedom() >= 1
@@ -107,14 +119,19 @@ def test_sound_effects_agree_between_rates(kind: type[Effect]) -> None:
         x = np.exp(-20 * t) * np.sin(2 * np.pi * 900 * t)
         y = strong.apply(Sound(x, sr, 0.02)).sample
         levels.append((np.sqrt((y**2).mean()), np.sqrt((y[sr // 4 :] ** 2).mean())))
-    assert np.allclose(levels[0], levels[1], rtol=0.35 if kind is Room else 5e-3)  # a room's noise is another at another rate; its law is the same
+    # a room's noise is another at another rate; its law is the same
+    assert np.allclose(levels[0], levels[1], rtol=0.35 if kind is Room else 5e-3)
 
 
 @pytest.mark.parametrize("pulse", PULSES)
 def test_a_pulse_is_its_own_integral(pulse: str) -> None:
     tau, count = 3e-4, 20_001
     x = (np.arange(count) + 0.5) / count
-    wave = {"half-sine": np.sin(np.pi * x), "hertz": np.sin(np.pi * x) ** 1.5, "raised-cosine": 1 - np.cos(2 * np.pi * x)}[pulse]
+    wave = {
+        "half-sine": np.sin(np.pi * x),
+        "hertz": np.sin(np.pi * x) ** 1.5,
+        "raised-cosine": 1 - np.cos(2 * np.pi * x),
+    }[pulse]
     wave /= wave.sum()
     freq = np.array([0.0, 500.0, 2000.0, 5000.0, 9000.0])
     told = np.array([(wave * np.exp(-2j * np.pi * f * tau * x)).sum() for f in freq])
@@ -126,7 +143,15 @@ def test_a_bent_mode_is_the_equation_solved(power: float) -> None:
     """Against 4th-order Runge-Kutta of ȧ = −d a(1 + (c a)^p), θ̇ = ω(1 + b a²)."""
     f, d, level, bend, damping_growth, sr, n = 300.0, 8.0, 0.4, 0.05, 1.7, 8000, 4000
     one = np.ones(1)
-    ring = Ring(f * one, d * one, 0.7 * one.astype(complex), level * one, bend * one, damping_growth * one, damping_growth_power=power)
+    ring = Ring(
+        f * one,
+        d * one,
+        0.7 * one.astype(complex),
+        level * one,
+        bend * one,
+        damping_growth * one,
+        damping_growth_power=power,
+    )
     got = sounded(ring, Impact(1.0, np.zeros(1), one), n, sr)
 
     def slope(state: Any) -> Any:

@@ -19,7 +19,8 @@ from sonic_bullet.records import Array, Material
 from tests.made.body import recorded, truth
 
 BAND = (50.0, 7_500.0)
-WIDTH = {"half-sine": 1.0, "hertz": 0.9, "raised-cosine": 0.76}  # of pulses that are as long by their second moments, times the half-sine's
+# of pulses that are as long by their second moments, times the half-sine's
+WIDTH = {"half-sine": 1.0, "hertz": 0.9, "raised-cosine": 0.76}
 MATERIAL = Material.isotropic("wood", youngs_pa=1e10, poisson=0.3, density_kg_m3=600)
 
 
@@ -66,7 +67,9 @@ LONG = (
 
 @pytest.mark.parametrize(("pulse", "lines"), LONG)
 def test_modes_that_nobody_hears_tell_a_long_contact(pulse: ContactTime, lines: int) -> None:
-    """A soft hammer leaves two or three lines: a pulse far longer would say as much of those, and one far shorter as much of the silence above."""
+    """A soft hammer leaves two or three lines: a pulse far longer would say as much of those, and one far shorter as
+    much of the silence above.
+    """
     told = evidence_of(truth(), (recorded(pulse),), BAND)
     found = ContactTime.propose(replace(told, observed=(only(told.observed[0], lines),)))
     assert found is not None
@@ -101,7 +104,9 @@ def test_patterns_speak_where_frequencies_agree() -> None:
     hz, shape = np.geomspace(800, 3000, 5), rng.standard_normal((5, 5))
 
     def judged(pattern: Array) -> Tensor:
-        told = BodyLines(np.log(hz), np.full(5, 1e-4), np.full(5, 0.5), shape + 0j, np.arange(-5, 0), elastic(hz, pattern))
+        told = BodyLines(
+            np.log(hz), np.full(5, 1e-4), np.full(5, 0.5), shape + 0j, np.arange(-5, 0), elastic(hz, pattern)
+        )
         start = isotropic_p(told.elastic)
         return _judged([told], "isotropic", reduced("isotropic", start), start)
 
@@ -113,7 +118,9 @@ def test_a_part_of_the_lines_fits_the_same_law_again() -> None:
     law = DampingLaw("power", 6e-3, 1.4)
     told = evidence_of(truth(), (recorded(law),), BAND)
     for seed in range(4):
-        again = DampingLaw.propose(replace(thinned(told, (told.observed[0].source, seed), 0.4, np.random.default_rng(seed)), known=law))
+        again = DampingLaw.propose(
+            replace(thinned(told, (told.observed[0].source, seed), 0.4, np.random.default_rng(seed)), known=law)
+        )
         assert again is not None and again.law == "power"
         assert again.exponent == pytest.approx(1.4, abs=0.15)
 
@@ -121,7 +128,8 @@ def test_a_part_of_the_lines_fits_the_same_law_again() -> None:
 @pytest.mark.parametrize(("gain", "matched", "off", "dry", "named"), [
     (150.0, 0.51, 0.0079, True, True),  # a slab in a room: half of its lines are no modes, whatever the tensor
     (150.0, 0.51, 0.0079, False, False),  # outside a room lines that stay off are another effect's
-    (64.0, 0.40, 0.0097, True, True),  # a line more, and all the others' patterns: whether it sounds nearer, too, is for its trial to tell
+    # a line more, and all the others' patterns: whether it sounds nearer, too, is for its trial to tell
+    (64.0, 0.40, 0.0097, True, True),
     (64.0, 0.27, 0.0097, True, False),  # patterns alone, without a line more
     (20.0, 0.51, 0.0079, True, False),
     (150.0, 0.95, 0.0010, False, True),
@@ -131,11 +139,17 @@ def test_in_a_room_a_tensor_must_place_a_line_more_and_need_not_place_all(
 ) -> None:
     hz = [410.0, 700.0, 1110.0, 1630.0, 2410.0, 3050.0, 4100.0]
     one = replace(observed(hz, [30.0] * len(hz), np.ones((5, len(hz)), complex)), dry=dry)
-    plain = Tensor("isotropic", isotropic_p(elastic(np.array(hz), np.ones((5, len(hz))))), -600.0, 0.004, 0.27, (), 0.0105)
+    plain = Tensor(
+        "isotropic", isotropic_p(elastic(np.array(hz), np.ones((5, len(hz))))), -600.0, 0.004, 0.27, (), 0.0105
+    )
     stiff = plain.p + np.array([0.5, -0.5, 0, 0, 0, 0, 0, 0, 0])
-    monkeypatch.setattr(orthotropy, "search", lambda _: (plain, Tensor("orthorhombic", stiff, -600.0 - gain, 0.003, matched, (), off)))
+    monkeypatch.setattr(
+        orthotropy, "search", lambda _: (plain, Tensor("orthorhombic", stiff, -600.0 - gain, 0.003, matched, (), off))
+    )
     monkeypatch.setattr(orthotropy, "_fits", lambda _: False)
-    assert (orthotropy.Orthotropy.propose(replace(evidence_of(truth(), (), BAND), observed=(one,))) is not None) == named
+    assert (
+        orthotropy.Orthotropy.propose(replace(evidence_of(truth(), (), BAND), observed=(one,))) is not None
+    ) == named
 
 
 def test_lines_and_shifted_modes_have_in_common_what_counting_through_finds() -> None:

@@ -26,7 +26,10 @@ def test_the_response_is_the_digital_filters(kind: str, order: int) -> None:
         assert butterworth(freq, corner, order, kind == "highpass", SR) == pytest.approx(np.abs(told), rel=1e-6)
 
 
-@pytest.mark.parametrize("planted", [MeasurementChain(high_pass_hz=4_200.0, high_order=2), MeasurementChain(low_pass_hz=3_500.0, low_order=2)])
+@pytest.mark.parametrize(
+    "planted",
+    [MeasurementChain(high_pass_hz=4_200.0, high_order=2), MeasurementChain(low_pass_hz=3_500.0, low_order=2)],
+)
 def test_a_corner_near_nyquist_is_found_where_it_is(planted: MeasurementChain) -> None:
     body = recorded(planted)
     found = MeasurementChain.propose(evidence_of(refitted(fitted(body), (body,)), (body,), BAND))
@@ -71,8 +74,12 @@ def test_a_mode_near_a_multiple_of_the_mains_is_no_hum(decay_per_s: float) -> No
 
 
 @pytest.mark.parametrize(("strength", "decay_per_s"), [((1, 1, 1, 1), 0.5), ((1, 2, 4, 8), 0.5), ((1, 1, 1, 1), 0.0)])
-def test_a_lone_tone_that_hardly_fades_is_no_hum_in_strikes_of_one_strength(strength: tuple[float, ...], decay_per_s: float) -> None:
-    """A bell's lowest mode may ring for ten seconds, and lie near the eighth multiple as near anything; with strength it goes, where there are several."""
+def test_a_lone_tone_that_hardly_fades_is_no_hum_in_strikes_of_one_strength(
+    strength: tuple[float, ...], decay_per_s: float
+) -> None:
+    """A bell's lowest mode may ring for ten seconds, and lie near the eighth multiple as near anything; with strength
+    it goes, where there are several.
+    """
     sound = np.array(strength)[:, None] * ringing(401.0, decay_per_s, 4, 1.5)
     assert hum_of(sound, np.full(4, 1e-5), SR) is None
 

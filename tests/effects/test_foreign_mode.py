@@ -17,14 +17,18 @@ OTHER = ForeignMode((4000.0,), (15.0,), (1.0,), (0.0,))
 
 def test_lines_that_are_named_are_no_other_effects() -> None:
     body = recorded(STAND, OTHER)
-    before, after = (evidence_of(replace(fitted(body), effects=effects), (body,), BAND).observed[0] for effects in ((), (STAND,)))
+    before, after = (
+        evidence_of(replace(fitted(body), effects=effects), (body,), BAND).observed[0] for effects in ((), (STAND,))
+    )
 
     def near(freq_hz: np.ndarray, effect: ForeignMode) -> list[bool]:
         return [bool((np.abs(freq_hz / f - 1) < 1e-3).any()) for f in effect.freq_hz]
 
     assert near(before.foreign_hz, STAND) == [True, True]
     assert near(after.foreign_hz, STAND) == [False, False]
-    assert near(before.foreign_hz, OTHER) == near(after.foreign_hz, OTHER) == [True], "what nobody has named is still to be told"
+    assert near(before.foreign_hz, OTHER) == near(after.foreign_hz, OTHER) == [True], (
+        "what nobody has named is still to be told"
+    )
     assert (after.freq_hz == before.freq_hz).all()
     again = ForeignMode.propose(evidence_of(replace(fitted(body), effects=(STAND,)), (body,), BAND))
     assert again is not None and near(np.array(again.freq_hz), STAND) == [False, False]

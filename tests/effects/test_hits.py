@@ -1,4 +1,6 @@
-"""Strikes that bounce: how often and how hard is told by all strikes at once, and lines are what is left once it is over."""
+"""Strikes that bounce: how often and how hard is told by all strikes at once, and lines are what is left once it is
+over.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +32,8 @@ def test_restitution_gap_and_hits_are_told(hits: int) -> None:
     assert found.restitution == pytest.approx(0.6, rel=0.03)
     assert found.gap_s == pytest.approx(0.0131, abs=0.2 / SR)
     share = 0.6 ** np.arange(found.hits)
-    assert (share[hits:] < 0.14).all() and found.hits >= min(hits, 4)  # what is weaker than the model's own error is not counted
+    # what is weaker than the model's own error is not counted
+    assert (share[hits:] < 0.14).all() and found.hits >= min(hits, 4)
 
 
 @pytest.mark.parametrize("exponent", [0.0, 0.5, 1.0, -0.2])
@@ -65,7 +68,9 @@ def test_strikes_of_one_strength_tell_no_hit_from_what_beats() -> None:
 def test_a_restitution_between_the_tried_ones_is_found_by_the_third_hits_phases(e: float) -> None:
     n, gap = 6_000, np.array([0.0131, 0.0262])
     t = np.arange(n) / SR
-    sound = sum(a * np.exp(-20 * t) * np.cos(2 * np.pi * f * t) for f, a in ((1_130.0, 1.0), (2_710.0, 0.8), (3_890.0, 0.6)))
+    sound = sum(
+        a * np.exp(-20 * t) * np.cos(2 * np.pi * f * t) for f, a in ((1_130.0, 1.0), (2_710.0, 0.8), (3_890.0, 0.6))
+    )
     x = np.stack([sound, 2 * sound])
     freq, hit = np.fft.rfftfreq(2 * n, 1 / SR), np.fft.rfft(x, 2 * n)
     late = np.stack([np.zeros(2), gap, gap * (1 + e)], axis=1)
@@ -90,7 +95,9 @@ def test_a_bounce_that_is_not_there_is_not_found_again() -> None:
 
 
 def test_lines_of_a_bouncing_strike_are_no_louder_than_the_strike(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Hits that come after the onset take lines that would have begun far above it; they are none, and the modes are told once all is over."""
+    """Hits that come after the onset take lines that would have begun far above it; they are none, and the modes are
+    told once all is over.
+    """
     monkeypatch.setattr(line_fit, "CROWD", np.inf)  # too few to be a crowd
     rng = np.random.default_rng(3)
     freq, t = np.array([952.0, 1310.0, 2093.0, 2740.0, 4095.0, 5410.0]), np.arange(2 * SR) / SR
@@ -100,7 +107,9 @@ def test_lines_of_a_bouncing_strike_are_no_louder_than_the_strike(monkeypatch: p
         size, out = rng.uniform(0.3, 1.0, len(freq)) * impulse, np.zeros(len(t))
         for share, delay in ((1.0, 0.0), (0.25, 0.855 * impulse), (0.06, 1.06 * impulse)):
             late = np.maximum(t - delay, 0)
-            out += share * ((t >= delay) * (size @ (np.exp(-decay[:, None] * late) * np.sin(2 * np.pi * freq[:, None] * late))))
+            out += share * (
+                (t >= delay) * (size @ (np.exp(-decay[:, None] * late) * np.sin(2 * np.pi * freq[:, None] * late)))
+            )
         signals.append(out + 2e-6 * rng.standard_normal(len(t)))
     found = line_fit.joint_lines(np.stack(signals), SR, band_hz=(50.0, 7_500.0), modes=8)
     assert len(found.freq_hz) < 2 * len(freq)
@@ -112,7 +121,9 @@ def test_lines_of_a_bouncing_strike_are_no_louder_than_the_strike(monkeypatch: p
 
 
 def test_what_began_late_is_not_taken_back_to_the_onset(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Lines told once a crowd is over: one that would have died long before is a late burst's, and at the onset it would have been louder than anything."""
+    """Lines told once a crowd is over: one that would have died long before is a late burst's, and at the onset it
+    would have been louder than anything.
+    """
     monkeypatch.setattr(line_fit, "CROWD", 0.0)
     monkeypatch.setattr(line_fit, "FEWER", np.inf)
     t = np.arange(2 * SR) / SR
@@ -120,7 +131,9 @@ def test_what_began_late_is_not_taken_back_to_the_onset(monkeypatch: pytest.Monk
     ring = np.exp(-np.array([[6.0], [11.0], [20.0]]) * t) * np.sin(2 * np.pi * freq[:, None] * t)
     burst = (t >= late) * np.exp(-900 * np.maximum(t - late, 0)) * np.sin(2 * np.pi * 3000 * t)
     rng = np.random.default_rng(4)
-    signals = np.stack([size @ ring + 0.05 * burst + 1e-5 * rng.standard_normal(len(t)) for size in rng.uniform(0.05, 0.2, (4, 3))])
+    signals = np.stack(
+        [size @ ring + 0.05 * burst + 1e-5 * rng.standard_normal(len(t)) for size in rng.uniform(0.05, 0.2, (4, 3))]
+    )
     found = line_fit.joint_lines(signals, SR, band_hz=(50.0, 7_500.0), modes=3)
     assert found.freq_hz == pytest.approx(freq, rel=1e-4)
     assert (np.abs(found.amplitude) < 1).all()
@@ -135,7 +148,9 @@ def test_turns_in_half_the_digits_are_the_sum_of_the_hits() -> None:
 
 
 def test_no_line_begins_far_above_all_there_is() -> None:
-    """Of an echo that arrives late and is soon over, a hit at the onset would have had to be thousands of times louder than all that was recorded."""
+    """Of an echo that arrives late and is soon over, a hit at the onset would have had to be thousands of times louder
+    than all that was recorded.
+    """
     late, time = round(0.03 * SR), np.arange(SR) / SR
     after = np.maximum(time - late / SR, 0)
     ring = np.exp(-9 * time) * np.cos(2 * np.pi * 700 * time)

@@ -26,7 +26,9 @@ def test_a_mass_is_found_beside_the_wrong_elasticity(monkeypatch: pytest.MonkeyP
     low = 0.9
     body = recorded(MASS)
     assert body.recorded is not None and body.recorded.signals is not None
-    off = replace(body, model=replace(body.model, freq_hz=low * body.model.freq_hz), line=np.full(body.model.mode_count, -1))
+    off = replace(
+        body, model=replace(body.model, freq_hz=low * body.model.freq_hz), line=np.full(body.model.mode_count, -1)
+    )
     base = truth()
     found = AddedMass.propose(evidence_of(base, (off,), BAND))
     assert found is not None
@@ -45,13 +47,18 @@ def test_a_mass_is_found_beside_the_wrong_elasticity(monkeypatch: pytest.MonkeyP
 def test_a_stiffer_body_yields_less_and_all_its_loaded_modes_are_as_much_higher() -> None:
     x = plate()
     high = replace(x, freq_hz=1.2 * x.freq_hz)
-    slow, fast = replace(MASS, yield_m_n=(2e-8, 1e-8)).apply(x), replace(MASS, yield_m_n=(2e-8 / 1.44, 1e-8 / 1.44)).apply(high)
+    slow, fast = (
+        replace(MASS, yield_m_n=(2e-8, 1e-8)).apply(x),
+        replace(MASS, yield_m_n=(2e-8 / 1.44, 1e-8 / 1.44)).apply(high),
+    )
     assert np.allclose(fast.freq_hz, 1.2 * slow.freq_hz, rtol=1e-9)
 
 
 def test_no_mass_is_told_where_only_the_scale_is_wrong() -> None:
     body = recorded()
-    off = replace(body, model=replace(body.model, freq_hz=0.93 * body.model.freq_hz), line=np.full(body.model.mode_count, -1))
+    off = replace(
+        body, model=replace(body.model, freq_hz=0.93 * body.model.freq_hz), line=np.full(body.model.mode_count, -1)
+    )
     assert AddedMass.propose(evidence_of(truth(), (off,), BAND)) is None
 
 
@@ -86,5 +93,6 @@ def test_of_twins_one_stays_under_a_mass() -> None:
     loud = np.where(np.isin(line, pair), 2.0, 1.0)[None, :]
     none = (0.0, row, column, 0.0)
     assert not _in_place(line, loud, mode, none)
-    apart = np.sort(np.concatenate([pair, pair * 1.02]))  # no twins: whatever made those lines left the louder half alone
+    # no twins: whatever made those lines left the louder half alone
+    apart = np.sort(np.concatenate([pair, pair * 1.02]))
     assert _in_place(line, loud, apart, none)

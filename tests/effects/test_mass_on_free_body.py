@@ -23,7 +23,9 @@ MASS = AddedMass((0.0477, 0.0371, 0.0), 0.03)
 
 
 def bar() -> ModalModel:
-    """A thin free bar of 1 m and 1 kg along x, its bending modes along z alone; the last vertex is a weight without a place."""
+    """A thin free bar of 1 m and 1 kg along x, its bending modes along z alone; the last vertex is a weight without a
+    place.
+    """
     x = np.linspace(0, 1, 81)
     ring = 0.001 * np.array([[0, -1], [1, 0], [0, 1], [-1, 0]])
     vertex = np.concatenate([np.column_stack([np.full(4, at), ring]) for at in x])
@@ -34,7 +36,11 @@ def bar() -> ModalModel:
     k = FREE[:, None]
     share = np.where(np.arange(len(FREE))[:, None] % 2, 1, -1)  # odd and even modes about the middle
     y = k * (x - 0.5)
-    motion = np.where(share > 0, np.cos(y) / np.cos(k / 2) + np.cosh(y) / np.cosh(k / 2), np.sin(y) / np.sin(k / 2) + np.sinh(y) / np.sinh(k / 2))
+    motion = np.where(
+        share > 0,
+        np.cos(y) / np.cos(k / 2) + np.cosh(y) / np.cosh(k / 2),
+        np.sin(y) / np.sin(k / 2) + np.sinh(y) / np.sinh(k / 2),
+    )
     motion *= 2 / np.abs(motion[:, -1:])  # unit mass: 2 at the ends
     shape = np.zeros((len(vertex) + 1, 3, len(FREE)))
     shape[:-1, 2] = np.repeat(motion.T, 4, axis=0)
@@ -42,7 +48,16 @@ def bar() -> ModalModel:
     inside = np.einsum("fi,fi->", vertex[turned[:, 0]], np.cross(vertex[turned[:, 1]], vertex[turned[:, 2]])) / 6
     turned = turned if inside > 0 else turned[:, ::-1]
     none = np.zeros(len(FREE))
-    return ModalModel(100 * (FREE / FREE[0]) ** 2, none, shape, np.concatenate([vertex, [[0.5, 0, 0]]]), turned, np.zeros(len(turned)), abs(inside), 1.0)
+    return ModalModel(
+        100 * (FREE / FREE[0]) ** 2,
+        none,
+        shape,
+        np.concatenate([vertex, [[0.5, 0, 0]]]),
+        turned,
+        np.zeros(len(turned)),
+        abs(inside),
+        1.0,
+    )
 
 
 def test_a_free_bar_gives_four_times_as_much_at_its_end_as_in_its_middle() -> None:
@@ -55,7 +70,9 @@ def test_a_free_bar_gives_four_times_as_much_at_its_end_as_in_its_middle() -> No
 
 
 def test_a_bar_with_a_heavy_end_is_hinged_there() -> None:
-    """Pinned by a mass of a hundred bars, it swings and bends as a hinged and free one: only with its rigid motions does it."""
+    """Pinned by a mass of a hundred bars, it swings and bends as a hinged and free one: only with its rigid motions
+    does it.
+    """
     x = bar()
     heavy = AddedMass((1.0, 0.0, 0.001), 100.0).apply(x)
     assert heavy.freq_hz[0] == pytest.approx(100 * (HINGED / FREE[0]) ** 2, rel=0.02)

@@ -61,7 +61,9 @@ def test_pairs_are_found_where_elasticity_was_fitted_to_one_line_of_each() -> No
 
 
 def test_no_correction_sets_twins_apart() -> None:
-    """What a mesh leaves together shares the mesh's error: corrections learnt again would else pass for the splitting itself, and a true one earn nothing."""
+    """What a mesh leaves together shares the mesh's error: corrections learnt again would else pass for the splitting
+    itself, and a true one earn nothing.
+    """
     body = recorded(split(), model=degenerate(), seconds=1.0)
     again = refitted(truth(), (body,), anew=True).correction
     assert again is not None
@@ -82,7 +84,9 @@ def test_a_split_pair_sounds_as_two_modes_that_fill_the_same_space() -> None:
 
 
 def test_a_pair_that_one_strike_shows_is_no_single_mode_without_it() -> None:
-    """Left out of the evidence, that strike leaves one line of the pair under the noise: the lines are there all the same, and the other strikes tell the turn."""
+    """Left out of the evidence, that strike leaves one line of the pair under the noise: the lines are there all the
+    same, and the other strikes tell the turn.
+    """
     body = recorded(split(), model=degenerate())
     whole = ModeSplitting.propose(evidence_of(truth(), (body,), BAND))
     assert whole is not None
@@ -121,20 +125,29 @@ def rough(body: Struck, f: float, gain: list[float]) -> Evidence:
     every = evidence_of(replace(truth(), correction={"plate": np.zeros(body.model.mode_count)}), (body,), BAND)
     one, by = every.observed[0], np.array(gain)[:, None]
     near, strange = (np.abs(x / f - 1) < 0.01 for x in (one.freq_hz, one.foreign_hz))
-    amplitude, foreign = np.where(near, by * one.amplitude, one.amplitude), np.where(strange, by * one.foreign_amplitude, one.foreign_amplitude)
+    amplitude, foreign = (
+        np.where(near, by * one.amplitude, one.amplitude),
+        np.where(strange, by * one.foreign_amplitude, one.foreign_amplitude),
+    )
     return replace(every, observed=(replace(one, amplitude=amplitude, foreign_amplitude=foreign),))
 
 
 @pytest.mark.parametrize("plain", [1, 3])
 def test_beside_three_plain_pairs_another_may_be_less_so(plain: int) -> None:
-    """The plate with two or four pairs, of which the second's patterns are its modes' but for a factor of 0.35 at one strike and 1.7 at another."""
+    """The plate with two or four pairs, of which the second's patterns are its modes' but for a factor of 0.35 at one
+    strike and 1.7 at another.
+    """
     places = ((9, 10), (3, 4), (6, 7), (14, 15))[: plain + 1]
     model = plate()
     freq = model.freq_hz.copy()
     for a, b in places:
         freq[b] = freq[a]
     model = replace(model, freq_hz=freq)
-    apart = ModeSplitting(tuple(float(freq[a]) for a, _ in places), (0.012, 0.009, 0.01, 0.008)[: plain + 1], (0.5, 2.0, 1.0, 2.5)[: plain + 1])
+    apart = ModeSplitting(
+        tuple(float(freq[a]) for a, _ in places),
+        (0.012, 0.009, 0.01, 0.008)[: plain + 1],
+        (0.5, 2.0, 1.0, 2.5)[: plain + 1],
+    )
     body = recorded(apart, model=model, seconds=1.0)
     less = apart.freq_hz[1]
     found = ModeSplitting.propose(rough(body, less, [1.0, 1.0, 1.0, 0.35, 1.7]))
@@ -144,7 +157,10 @@ def test_beside_three_plain_pairs_another_may_be_less_so(plain: int) -> None:
 
 
 def test_neighbours_by_chance_that_the_mesh_has_too_near_are_no_split_pair() -> None:
-    """Two modes 0.4 % apart in the mesh and 0.9 % in truth swing about the mesh's own axes; turned, or twins of the mesh, they are a pair."""
+    """Two modes 0.4 % apart in the mesh and 0.9 % in truth swing about the mesh's own axes;
+
+    turned, or twins of the mesh, they are a pair.
+    """
     model = plate()
     freq = model.freq_hz.copy()
     for a, b in PAIRS:
@@ -154,7 +170,9 @@ def test_neighbours_by_chance_that_the_mesh_has_too_near_are_no_split_pair() -> 
 
     def found(turn: float) -> ModeSplitting | None:
         body = recorded(ModeSplitting(middle, (0.009, 0.009), (turn, turn)), model=mesh, seconds=1.0)
-        return ModeSplitting.propose(evidence_of(replace(truth(), correction={"plate": np.zeros(model.mode_count)}), (body,), BAND))
+        return ModeSplitting.propose(
+            evidence_of(replace(truth(), correction={"plate": np.zeros(model.mode_count)}), (body,), BAND)
+        )
 
     assert found(0.0) is None
     turned = found(0.6)

@@ -26,7 +26,15 @@ def test_efficiency_is_the_pulsating_and_the_oscillating_spheres(degree: int, or
     assert told == pytest.approx(1 / (x**2 * np.abs(slope) ** 2), rel=1e-9)
 
 
-@pytest.mark.parametrize("planted", [Radiation(0.04, 4.0, 0.0, 2), Radiation(0.04, 4.0, 0.0, 4), Radiation(0.05, 3.0, 0.5, 4), Radiation(0.04, 6.0, 0.5, 2)])
+@pytest.mark.parametrize(
+    "planted",
+    [
+        Radiation(0.04, 4.0, 0.0, 2),
+        Radiation(0.04, 4.0, 0.0, 4),
+        Radiation(0.05, 3.0, 0.5, 4),
+        Radiation(0.04, 6.0, 0.5, 2),
+    ],
+)
 def test_how_steeply_a_body_radiates_is_read_off_its_decays(planted: Radiation) -> None:
     body = recorded(planted)
     h = refitted(fitted(body), (body,))

@@ -54,7 +54,9 @@ def test_modes_read_through_a_room() -> None:
 
 
 def test_what_outlasts_a_room_is_left_as_it_was_heard() -> None:
-    """By lines and by what they are read to be: a faint line of a mode that dies sooner may beat with the tail, and be heard to ring on."""
+    """By lines and by what they are read to be: a faint line of a mode that dies sooner may beat with the tail, and be
+    heard to ring on.
+    """
     observed = object_evidence(truth(), recorded(Room(0.15, 0.3, 4), seconds=1.2))
     own, delta = 0.5 * (ALPHA + BETA * observed.omega**2), RT60 / 0.15
     slow = own < 0.4 * delta
@@ -65,7 +67,9 @@ def test_what_outlasts_a_room_is_left_as_it_was_heard() -> None:
     assert np.array_equal(dry.freq_hz[slow], observed.freq_hz[slow])
     fast = recorded(Room(0.9, 0.9, 4), seconds=1.2)
     beats = object_evidence(truth(), fast)
-    beats = replace(beats, decay_per_s=np.full(len(beats.freq_hz), 2.0), decay_sd_per_s=np.full(len(beats.freq_hz), 0.02))
+    beats = replace(
+        beats, decay_per_s=np.full(len(beats.freq_hz), 2.0), decay_sd_per_s=np.full(len(beats.freq_hz), 0.02)
+    )
     assert (tails.dereverberated(beats, RT60 / 0.9).decay_per_s > 4.0).all()
 
 
@@ -74,26 +78,48 @@ def test_what_is_gone_at_once_or_is_not_like_its_mode_tells_no_decay() -> None:
     observed = object_evidence(truth(), recorded(Room(0.9, 0.9, 4), seconds=1.2))
     assert np.isfinite(tails.dereverberated(observed, RT60 / 0.9).decay_sd_per_s).all()
     other = observed.amplitude.copy()
-    other[:, 2] = np.array([1.0, -1.0, 1.0, -1.0, 1.0]) * np.abs(other[:, 2]).mean() * np.sign(observed.expected[:, 2].real) * np.array([1, 1, 1, 1, -1])
-    other[:, 2] -= (np.conj(observed.expected[:, 2]) @ other[:, 2]) / (np.abs(observed.expected[:, 2]) ** 2).sum() * observed.expected[:, 2]
+    other[:, 2] = (
+        np.array([1.0, -1.0, 1.0, -1.0, 1.0])
+        * np.abs(other[:, 2]).mean()
+        * np.sign(observed.expected[:, 2].real)
+        * np.array([1, 1, 1, 1, -1])
+    )
+    other[:, 2] -= (
+        (np.conj(observed.expected[:, 2]) @ other[:, 2])
+        / (np.abs(observed.expected[:, 2]) ** 2).sum()
+        * observed.expected[:, 2]
+    )
     told = tails.dereverberated(replace(observed, amplitude=other), RT60 / 0.9).decay_sd_per_s
     assert np.isinf(told[2]) and np.isfinite(np.delete(told, 2)).all()
     lossy = recorded(Room(0.9, 0.9, 4), DampingLaw("constant-loss", eta=0.05), seconds=1.2)
     dry = tails.dereverberated(object_evidence(truth(), lossy), RT60 / 0.9)
-    assert (np.isinf(dry.decay_sd_per_s) >= (dry.decay_per_s > tails.FASTEST)).all() and np.isinf(dry.decay_sd_per_s).any()
+    assert (np.isinf(dry.decay_sd_per_s) >= (dry.decay_per_s > tails.FASTEST)).all() and np.isinf(
+        dry.decay_sd_per_s
+    ).any()
 
 
 @pytest.mark.parametrize(
-    ("gain", "room"), [((20.0,) * 5, True), ((20.0,) * 4, False), ((150.0,) * 3, True), ((600.0, 12.0, 14.0), False), ((150.0,) * 2, False)]
+    ("gain", "room"),
+    [
+        ((20.0,) * 5, True),
+        ((20.0,) * 4, False),
+        ((150.0,) * 3, True),
+        ((600.0, 12.0, 14.0), False),
+        ((150.0,) * 2, False),
+    ],
 )
 def test_fewer_lines_will_do_that_tell_a_tail_more_plainly(gain: tuple[float, ...], room: bool) -> None:
-    """Of ten or twelve that ring: a long-lived body has few that die sooner than the room; radiation above its knee makes a few alike, but hardly like a tail."""
+    """Of ten or twelve that ring: a long-lived body has few that die sooner than the room; radiation above its knee
+    makes a few alike, but hardly like a tail.
+    """
     count = 10 if len(gain) == 3 else 12
     told = np.zeros((3, count))
     told[1, : len(gain)] = gain
     decay = np.where(np.arange(count) < len(gain), 60.0, 4.0)
     none = np.zeros((3, count))
-    read = tails.Read(np.array([15.0, 20.0, 27.0]), told, np.zeros(count), np.tile(decay, (3, 1)), none, none, none, none, none)
+    read = tails.Read(
+        np.array([15.0, 20.0, 27.0]), told, np.zeros(count), np.tile(decay, (3, 1)), none, none, none, none, none
+    )
     assert _one(read, 1) == room
 
 
@@ -104,7 +130,9 @@ def test_the_rate_of_a_room(rt60: float) -> None:
     assert all(one is not None for one in found)
     for delta, _ in (one for one in found if one):
         assert RT60 / delta == pytest.approx(rt60, rel=0.12)
-    assert np.median([reverberant_level for _, reverberant_level in (one for one in found if one)]) == pytest.approx(0.5, rel=0.25)
+    assert np.median([reverberant_level for _, reverberant_level in (one for one in found if one)]) == pytest.approx(
+        0.5, rel=0.25
+    )
 
 
 @pytest.mark.parametrize(
@@ -141,7 +169,11 @@ def test_another_effect_is_told_beside_a_room(other: ContactTime | DampingLaw, p
 
 def test_what_rings_along_is_heard_in_the_room_and_both_through_the_chain() -> None:
     """However they were found: a sound takes its own way."""
-    chain, room, lodger = MeasurementChain(high_pass_hz=900.0), Room(0.5, 0.5, 3), ForeignMode((1000.0,), (9.0,), (1.0,), (0.0,))
+    chain, room, lodger = (
+        MeasurementChain(high_pass_hz=900.0),
+        Room(0.5, 0.5, 3),
+        ForeignMode((1000.0,), (9.0,), (1.0,), (0.0,)),
+    )
     assert [e.id for e in truth(chain, room, lodger).at(Stage.SOUND)] == ["foreign-mode", "room", "measurement-chain"]
 
 
@@ -239,7 +271,10 @@ def test_a_mode_that_dies_as_the_room_does() -> None:
 
 
 def test_a_response_is_told_to_the_end_and_sought_on_from_where_it_was() -> None:
-    """By what no strike had told: another sound in the same room. White sounds hold all frequencies, so the response itself is told, within the noise."""
+    """By what no strike had told: another sound in the same room.
+
+    White sounds hold all frequencies, so the response itself is told, within the noise.
+    """
     rng = np.random.default_rng(8)
     n, sr, noise = 8_000, 8_000, 1e-3
     fade = np.exp(-3.0 * np.arange(n) / sr)
@@ -256,4 +291,6 @@ def test_a_response_is_told_to_the_end_and_sought_on_from_where_it_was() -> None
     assert off(once) < 0.05
     assert off(again) <= off(once) * 1.01  # nothing is lost, though it takes a quarter of the steps
     elsewhere = replace(once, response=once.response[: n // 2])  # of another length: from the beginning
-    assert np.array_equal(elsewhere.identified_from(signal[:3], sound[:3], np.full(3, noise), sr).response, once.response)
+    assert np.array_equal(
+        elsewhere.identified_from(signal[:3], sound[:3], np.full(3, noise), sr).response, once.response
+    )

@@ -32,7 +32,9 @@ class Moving:
     def apply(self, x: Sound) -> Sound:
         n = len(x.sample)
         when = np.arange(n) * (1 - 2 * self.speed_m_s / 343) - 0.01 * x.sr
-        return replace(x, sample=x.sample + 0.6 * np.interp(when, np.arange(16 * n) / 16, resample(x.sample, 16 * n), left=0.0))
+        return replace(
+            x, sample=x.sample + 0.6 * np.interp(when, np.arange(16 * n) / 16, resample(x.sample, 16 * n), left=0.0)
+        )
 
     def parameters(self) -> dict[str, Any]:
         return {"speed_m_s": self.speed_m_s}
@@ -72,17 +74,28 @@ def test_copies_are_those_of_one_ratio_of_frequency_and_decay_and_of_one_pattern
         rng = np.random.default_rng(1)
         apart = ratio * np.exp(scatter * rng.standard_normal(9))
         like = a + other * np.abs(a).mean() * rng.standard_normal(a.shape)
-        return copied(np.concatenate([f, f * apart]), np.concatenate([d, d * slower]), np.concatenate([a, 0.3j * like], axis=1))
+        return copied(
+            np.concatenate([f, f * apart]), np.concatenate([d, d * slower]), np.concatenate([a, 0.3j * like], axis=1)
+        )
 
     assert twice() == pytest.approx(1.03, rel=1e-6)
-    assert twice(slower=1.5) is None and twice(other=1.0) is None and twice(scatter=0.01) is None and twice(ratio=1.0005) is None
+    assert (
+        twice(slower=1.5) is None
+        and twice(other=1.0) is None
+        and twice(scatter=0.01) is None
+        and twice(ratio=1.0005) is None
+    )
 
 
 @pytest.mark.parametrize(("lines", "copies"), [(40, FEWEST_PAIRS - 1), (90, FEWEST_PAIRS + 2)])
 def test_few_copies_or_few_among_many_lines_are_chance(lines: int, copies: int) -> None:
     f, d, a = some(lines)
     few = slice(0, copies)
-    again = np.concatenate([f, 1.03 * f[few]]), np.concatenate([d, 1.03 * d[few]]), np.concatenate([a, a[:, few]], axis=1)
+    again = (
+        np.concatenate([f, 1.03 * f[few]]),
+        np.concatenate([d, 1.03 * d[few]]),
+        np.concatenate([a, a[:, few]], axis=1),
+    )
     assert copied(*again) is None
 
 

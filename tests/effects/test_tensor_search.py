@@ -1,4 +1,6 @@
-"""A tensor far from isotropy, sought among the lines of a made body whose λ are sums of its constants, as any body's are."""
+"""A tensor far from isotropy, sought among the lines of a made body whose λ are sums of its constants, as any body's
+are.
+"""
 
 from __future__ import annotations
 
@@ -47,7 +49,9 @@ def lines(seed: int) -> BodyLines:
     freq, _, pattern = body.look(stiffness(far(seed)))
     log_hz = np.log(freq[:LINES]) + 1e-3 * rng.standard_normal(LINES)
     amplitude = pattern[:STRIKES, :LINES] * (1 + 0.05 * rng.standard_normal((STRIKES, LINES)))
-    return BodyLines(log_hz, np.full(LINES, 1e-4), np.full(LINES, 0.5), amplitude + 0j, np.arange(STRIKES) - (STRIKES + 1), body)
+    return BodyLines(
+        log_hz, np.full(LINES, 1e-4), np.full(LINES, 0.5), amplitude + 0j, np.arange(STRIKES) - (STRIKES + 1), body
+    )
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -62,9 +66,20 @@ def test_a_wood_is_told_from_an_isotropic_start(seed: int, monkeypatch: pytest.M
 def test_steps_to_either_side_lead_out_of_an_end_whose_upper_pairs_are_wrong(seed: int) -> None:
     told, guess = [lines(seed)], isotropic_p(plank(seed))
     rng = np.random.default_rng(seed)
-    ends = [fitted(told, "orthorhombic", far(seed) + STEP * rng.choice([-1.5, 1.5], 9) * (np.arange(9) // 3 != 1), guess, WIDTHS[4:]) for _ in range(5)]
+    ends = [
+        fitted(
+            told,
+            "orthorhombic",
+            far(seed) + STEP * rng.choice([-1.5, 1.5], 9) * (np.arange(9) // 3 != 1),
+            guess,
+            WIDTHS[4:],
+        )
+        for _ in range(5)
+    ]
     wrong = [end for end in ends if end.off > 0.3 * CAP]
     assert wrong
     near = [_hopped(told, end, guess) for end in wrong]
     assert all(b.bic <= a.bic for a, b in zip(wrong, near, strict=True))
-    assert sum(end.off < 2e-3 for end in near) >= 2, "as near as the lines are told, from some; those are the ones that are taken"
+    assert sum(end.off < 2e-3 for end in near) >= 2, (
+        "as near as the lines are told, from some; those are the ones that are taken"
+    )

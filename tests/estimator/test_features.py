@@ -12,16 +12,25 @@ from sonic_bullet.estimator.lines.extraction import extract
 SR = 44_100
 
 
-def sound(freq_hz: np.ndarray, decay_per_s: np.ndarray, amplitude: np.ndarray, phase: np.ndarray, count: int = SR) -> np.ndarray:
+def sound(
+    freq_hz: np.ndarray, decay_per_s: np.ndarray, amplitude: np.ndarray, phase: np.ndarray, count: int = SR
+) -> np.ndarray:
     """Σ a e^{−dt} cos(2πft + φ), written out."""
     time = np.arange(count) / SR
-    return sum(a * np.exp(-d * time) * np.cos(2 * np.pi * f * time + p) for f, d, a, p in zip(freq_hz, decay_per_s, amplitude, phase, strict=True))
+    return sum(
+        a * np.exp(-d * time) * np.cos(2 * np.pi * f * time + p)
+        for f, d, a, p in zip(freq_hz, decay_per_s, amplitude, phase, strict=True)
+    )
 
 
 def mixture(seed: int, db: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, float, np.ndarray]:
-    """Twenty pairs of modes 0.3 to 5 % apart in white noise db below the sound: frequencies, decays, amplitudes, noise rms, recording."""
+    """Twenty pairs of modes 0.3 to 5 % apart in white noise db below the sound:
+
+    frequencies, decays, amplitudes, noise rms, recording.
+    """
     rng = np.random.default_rng(seed)
-    lower = 100 * 120 ** ((np.arange(20) + rng.uniform(0, 0.7, 20)) / 20)  # each pair has its own twentieth of 100 Hz to 12 kHz
+    # each pair has its own twentieth of 100 Hz to 12 kHz
+    lower = 100 * 120 ** ((np.arange(20) + rng.uniform(0, 0.7, 20)) / 20)
     freq = np.concatenate([lower, lower * (1 + np.exp(rng.uniform(np.log(0.003), np.log(0.05), 20)))])
     decay, amplitude = np.exp(rng.uniform(np.log(1), np.log(100), 40)), 0.05 * np.exp(rng.normal(0, 0.7, 40))
     clean = sound(freq, decay, amplitude, rng.uniform(0, 2 * np.pi, 40))
@@ -31,15 +40,21 @@ def mixture(seed: int, db: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, f
 
 def test_residual_moments_and_information_agree_with_differences() -> None:
     """JᵀJ from geometric sums equals the product of differences of the sound itself."""
-    modes = likelihood.Sinusoids(np.array([-30 + 4000j, -55 + 4100j, -3 + 9000j]), np.array([0.3 + 0.1j, -0.2 + 0.5j, 0.1j]))
+    modes = likelihood.Sinusoids(
+        np.array([-30 + 4000j, -55 + 4100j, -3 + 9000j]), np.array([0.3 + 0.1j, -0.2 + 0.5j, 0.1j])
+    )
     none = np.zeros(3000)
 
     def observed(change: np.ndarray) -> np.ndarray:
-        turned = likelihood.Sinusoids(modes.pole + 1j * change[0:3] - change[3:6], modes.amplitude + change[6:9] + 1j * change[9:12])
+        turned = likelihood.Sinusoids(
+            modes.pole + 1j * change[0:3] - change[3:6], modes.amplitude + change[6:9] + 1j * change[9:12]
+        )
         return -likelihood.residual(none, turned, SR)
 
     step = np.r_[np.full(6, 1e-3), np.full(6, 1e-4)]
-    jacobian = np.stack([(observed(step * unit) - observed(-step * unit)) / (2 * step[k]) for k, unit in enumerate(np.eye(12))], axis=1)
+    jacobian = np.stack(
+        [(observed(step * unit) - observed(-step * unit)) / (2 * step[k]) for k, unit in enumerate(np.eye(12))], axis=1
+    )
     wanted = jacobian.T @ jacobian
     scale = np.sqrt(np.diag(wanted))
     assert np.abs((likelihood.information(modes, SR, 3000) - wanted) / scale / scale[:, None]).max() < 1e-6
@@ -77,14 +92,22 @@ def test_onset_to_the_sample(noise: float, phase: float | None) -> None:
     rng = np.random.default_rng(4)
     for before in (0, 1, 17, 4801):
         turn = rng.uniform(0, 6, 4) if phase is None else np.full(4, phase)
-        hit = sound(np.array([450.0, 1270.0, 3300.0, 9100.0]), np.array([12.0, 25.0, 90.0, 400.0]), rng.uniform(0.2, 0.5, 4), turn, SR // 4)
+        hit = sound(
+            np.array([450.0, 1270.0, 3300.0, 9100.0]),
+            np.array([12.0, 25.0, 90.0, 400.0]),
+            rng.uniform(0.2, 0.5, 4),
+            turn,
+            SR // 4,
+        )
         x = np.concatenate([np.zeros(before), hit])
         assert round(extract(x + noise * rng.standard_normal(len(x)), SR).onset_s * SR) == before
 
 
 @pytest.mark.parametrize(("db", "least"), [(20.0, 0.90), (40.0, 0.98), (60.0, 0.99)])
 def test_mixtures_in_noise_near_the_bound(db: float, least: float) -> None:
-    """Found, false and error against the single mode's Cramér-Rao bound √(8d³/(fs·a²/2σ²)); pairs closer than their width are in it."""
+    """Found, false and error against the single mode's Cramér-Rao bound √(8d³/(fs·a²/2σ²)); pairs closer than their
+    width are in it.
+    """
     observed, found_count, wrong, features, error, normalised = 0, 0, 0, 0, [], []
     for seed in (11, 12):
         freq, decay, amplitude, sigma, x = mixture(seed, db)

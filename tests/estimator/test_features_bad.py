@@ -35,7 +35,9 @@ def speech(seconds: float = 1.2) -> np.ndarray:
 
 
 def test_speech_gives_no_feature() -> None:
-    x = np.concatenate([np.zeros(SR // 5), speech()]) + 1e-4 * np.random.default_rng(1).standard_normal(SR // 5 + int(1.2 * SR))
+    x = np.concatenate([np.zeros(SR // 5), speech()]) + 1e-4 * np.random.default_rng(1).standard_normal(
+        SR // 5 + int(1.2 * SR)
+    )
     said = extract(x, SR)
     assert "not an impact" in said.note and len(said.freq_hz) == 0
 
@@ -46,7 +48,9 @@ def test_noise_gives_no_feature() -> None:
 
 
 def test_a_short_clip_claims_no_more_than_it_holds() -> None:
-    """28 ms: a decay of 2 1/s comes with a spread that covers what noise makes of it, or not at all; one of 400 1/s is told."""
+    """28 ms: a decay of 2 1/s comes with a spread that covers what noise makes of it, or not at all; one of 400 1/s is
+    told.
+    """
     rng = np.random.default_rng(2)
     for decay, noise in ((2.0, 0.1), (400.0, 3e-4), (400.0, 3e-3)):
         said = extract(struck(decay_per_s=decay)[: SR // 36] + noise * rng.standard_normal(SR // 36), SR)
@@ -63,7 +67,9 @@ def test_clipping_is_told() -> None:
 
 def test_low_rate_is_told() -> None:
     time = np.arange(8000) / 8000
-    x = 0.3 * np.exp(-20 * time) * np.cos(2 * np.pi * 900 * time) + 1e-4 * np.random.default_rng(4).standard_normal(8000)
+    x = 0.3 * np.exp(-20 * time) * np.cos(2 * np.pi * 900 * time) + 1e-4 * np.random.default_rng(4).standard_normal(
+        8000
+    )
     said = extract(x, 8000)
     assert "nothing above 3920 Hz" in said.note
     assert said.freq_hz == pytest.approx([900], abs=0.05)
@@ -81,13 +87,17 @@ def test_beats_are_no_second_hit_and_a_second_hit_is() -> None:
 
 
 def test_a_sound_that_grows_is_told() -> None:
-    x = np.concatenate([0.1 * struck(900, 1.0), 0.6 * struck(900, 3.0)]) + 1e-5 * np.random.default_rng(6).standard_normal(SR)
+    x = np.concatenate([0.1 * struck(900, 1.0), 0.6 * struck(900, 3.0)]) + 1e-5 * np.random.default_rng(
+        6
+    ).standard_normal(SR)
     said = extract(x, SR, onset_s=0.0)
     assert "grows" in said.note
 
 
 @pytest.mark.parametrize(
-    "broken", [np.zeros(SR), np.full(SR, np.nan), np.zeros((2, SR)), struck()[:300], np.zeros(0)], ids=["silent", "nan", "two", "short", "empty"]
+    "broken",
+    [np.zeros(SR), np.full(SR, np.nan), np.zeros((2, SR)), struck()[:300], np.zeros(0)],
+    ids=["silent", "nan", "two", "short", "empty"],
 )
 def test_what_cannot_be_read_is_an_error(broken: np.ndarray) -> None:
     with pytest.raises(AudioError):

@@ -1,4 +1,6 @@
-"""Cases as people hand them in: several objects of one material, meshes in millimetres, one strike, files that contradict one another."""
+"""Cases as people hand them in: several objects of one material, meshes in millimetres, one strike, files that
+contradict one another.
+"""
 
 from __future__ import annotations
 
@@ -42,24 +44,44 @@ def described(folder: Path, names: tuple[str, ...], *, units: str, to_hz: float 
         objects[name] = {"mesh": f"{name}.obj", "units": units, "material": "brass", "elastic_guess": guess}
         write_box(folder / f"{name}_m.obj", size)
         model = modal.analyse((modal.read_mesh(folder / f"{name}_m.obj"),), BRASS, to_hz=to_hz)
-        f, d = model.freq_hz * (1 + 1e-4 * rng.standard_normal(len(model.freq_hz))), model.decay_per_s * (1 + 0.01 * rng.standard_normal(len(model.freq_hz)))
+        f, d = (
+            model.freq_hz * (1 + 1e-4 * rng.standard_normal(len(model.freq_hz))),
+            model.decay_per_s * (1 + 0.01 * rng.standard_normal(len(model.freq_hz))),
+        )
         lines = [
-            {"freq_hz": float(x), "freq_sd_hz": 1e-4 * float(x), "decay_per_s": float(y), "decay_sd_per_s": 0.01 * float(y)} for x, y in zip(f, d, strict=True)
+            {
+                "freq_hz": float(x),
+                "freq_sd_hz": 1e-4 * float(x),
+                "decay_per_s": float(y),
+                "decay_sd_per_s": 0.01 * float(y),
+            }
+            for x, y in zip(f, d, strict=True)
         ]
         recordings.append({"features": lines, "object": name, "split": "fit"})
-    (folder / "case.json").write_text(json.dumps({"format": "sonic-bullet-case/1", "objects": objects, "recordings": recordings}))
+    (folder / "case.json").write_text(
+        json.dumps({"format": "sonic-bullet-case/1", "objects": objects, "recordings": recordings})
+    )
     return read_case(folder)
 
 
 def test_two_objects_of_one_material_tell_more_than_either(tmp_path: Path) -> None:
-    """Meshes in millimetres and said to be; one γ, ν, α, β for both, each within four of its spreads, and the spreads smaller than one object's."""
+    """Meshes in millimetres and said to be; one γ, ν, α, β for both, each within four of its spreads, and the spreads
+    smaller than one object's.
+    """
     (tmp_path / "one").mkdir()
     both = fit_case(described(tmp_path, ("bar", "plate"), units="mm"), check_mesh=False)
     one = fit_case(described(tmp_path / "one", ("plate",), units="m"), check_mesh=False)
     assert [(o.line >= 0).sum() for o in both.objects] == [len(o.evidence.lines.freq_hz) for o in both.objects]
     sd, alone = (np.sqrt(np.diag(found.fit.covariance)) for found in (both, one))
     gamma = BRASS.youngs_pa / BRASS.density_kg_m3
-    found = np.array([np.log(both.fit.alpha_per_s / 6.0), np.log(both.fit.beta_s / 3e-8), np.log(both.fit.gamma_m2_s2 / gamma), both.fit.poisson_ratio - 0.345])
+    found = np.array(
+        [
+            np.log(both.fit.alpha_per_s / 6.0),
+            np.log(both.fit.beta_s / 3e-8),
+            np.log(both.fit.gamma_m2_s2 / gamma),
+            both.fit.poisson_ratio - 0.345,
+        ]
+    )
     which = [0, 1, 2, 4]
     assert (np.abs(found) < 4 * sd[which]).all()
     assert (sd[which] < 0.05).all() and (sd[[0, 2]] < alone[[0, 2]]).all()
@@ -76,12 +98,17 @@ def test_one_strike_is_enough_for_a_box(planted: Planted, tmp_path: Path) -> Non
 def test_impulses_that_contradict_the_sounds_are_told(planted: Planted) -> None:
     """One strike's impulse in mN·s beside another's in N·s: the shapes do not explain a factor of a thousand."""
     case = read_case(planted.folder)
-    told = tuple(replace(r, impulse_n_s=1e3 * (r.impulse_n_s or 0) if i == 0 else r.impulse_n_s) for i, r in enumerate(case.recordings))
+    told = tuple(
+        replace(r, impulse_n_s=1e3 * (r.impulse_n_s or 0) if i == 0 else r.impulse_n_s)
+        for i, r in enumerate(case.recordings)
+    )
     wrong = replace(case, recordings=told)
     (e,) = gather(case)
     assert e.family is not None
     mine = tuple(r for r in told if r.split == "fit")
-    found = fit_evidence(wrong, (replace(e, recordings=mine, seen=observed(wrong, e.thing, e.guess, mine, e.family)),), check_mesh=False)
+    found = fit_evidence(
+        wrong, (replace(e, recordings=mine, seen=observed(wrong, e.thing, e.guess, mine, e.family)),), check_mesh=False
+    )
     assert "amplitudes scatter" in found.fit.verdict
 
 
@@ -91,7 +118,14 @@ def test_only_what_precedes_a_second_hit_is_listened_to(planted: Planted, tmp_pa
     again = np.concatenate([np.zeros(500), sound, sound])
     soundfile.write(tmp_path / "twice.wav", again, sr, subtype="FLOAT")
     thing = replace(case.objects["box"], mesh=None)
-    (e,) = gather(replace(case, onset_s=None, objects={"box": thing}, recordings=(replace(case.recordings[0], file=tmp_path / "twice.wav"),)))
+    (e,) = gather(
+        replace(
+            case,
+            onset_s=None,
+            objects={"box": thing},
+            recordings=(replace(case.recordings[0], file=tmp_path / "twice.wav"),),
+        )
+    )
     assert e.signals is not None and 0.9 * len(sound) < e.signals.shape[1] <= len(sound) + 20
     assert any("2 hits" in note for note in e.notes)
 
@@ -104,7 +138,9 @@ def test_what_breaks_off_ends_there_and_is_named(planted: Planted, tmp_path: Pat
     soundfile.write(tmp_path / "cut.wav", np.where(np.arange(len(sound)) < end, sound, 0.0), sr, subtype="FLOAT")
     thing = replace(case.objects["box"], mesh=None)
     first, *others = case.recordings
-    (e,) = gather(replace(case, objects={"box": thing}, recordings=(replace(first, file=tmp_path / "cut.wav"), *others)))
+    (e,) = gather(
+        replace(case, objects={"box": thing}, recordings=(replace(first, file=tmp_path / "cut.wav"), *others))
+    )
     assert e.signals is not None and e.signals.shape[1] <= end
     assert any("cut.wav breaks off after" in note for note in e.notes)
     assert any("as far as" in note and "cut.wav" in note for note in e.notes)
@@ -159,7 +195,9 @@ def _two_materials(case: dict[str, Any], folder: Path) -> None:
         (_two_materials, SonicBulletError, "several materials"),
     ],
 )
-def test_what_contradicts_itself_is_one_line(planted: Planted, tmp_path: Path, edit: Any, error: type[Exception], word: str) -> None:
+def test_what_contradicts_itself_is_one_line(
+    planted: Planted, tmp_path: Path, edit: Any, error: type[Exception], word: str
+) -> None:
     case = json.loads((planted.folder / "case.json").read_text())
     for name in ("box.obj", "s0.wav", "s1.wav", "s2.wav"):
         (tmp_path / name).write_bytes((planted.folder / name).read_bytes())

@@ -34,7 +34,8 @@ def test_planted_material_comes_back(planted: tuple[Planted, CaseFit]) -> None:
     gamma = BRASS.youngs_pa / BRASS.density_kg_m3
     sd = np.sqrt(np.diag(fit.covariance))
     assert abs(fit.gamma_m2_s2 / gamma - 1) < 1e-4
-    assert abs(fit.poisson_ratio - 0.345) < 5e-4 < sd[4]  # the polynomials of truth and fit differ in number: torsion by 1.1e-4
+    # the polynomials of truth and fit differ in number: torsion by 1.1e-4
+    assert abs(fit.poisson_ratio - 0.345) < 5e-4 < sd[4]
     for value, truth, spread in ((fit.alpha_per_s, 6.0, sd[0]), (fit.beta_s, 3e-8, sd[1])):
         assert abs(np.log(value / truth)) < 4 * spread < 0.02  # within what the noise allows, and that is little
     assert not found.warnings
@@ -89,7 +90,9 @@ def test_foreign_line_is_named(planted: tuple[Planted, CaseFit], tmp_path: Path)
 def test_one_line_tells_neither_alpha_nor_beta_nor_poisson(planted: tuple[Planted, CaseFit], tmp_path: Path) -> None:
     made, _ = planted
     case = json.loads((made.folder / "case.json").read_text())
-    case["recordings"] = [{"features": [{"freq_hz": float(made.model.freq_hz[0]), "decay_per_s": 4.0}], "object": "box", "split": "fit"}]
+    case["recordings"] = [
+        {"features": [{"freq_hz": float(made.model.freq_hz[0]), "decay_per_s": 4.0}], "object": "box", "split": "fit"}
+    ]
     (tmp_path / "box.obj").write_text((made.folder / "box.obj").read_text())
     (tmp_path / "case.json").write_text(json.dumps(case))
     found = fit_case(read_case(tmp_path), check_mesh=False)
@@ -102,8 +105,13 @@ def test_one_line_tells_neither_alpha_nor_beta_nor_poisson(planted: tuple[Plante
 def test_without_a_mesh_decays_alone_are_told(planted: tuple[Planted, CaseFit], tmp_path: Path) -> None:
     made, _ = planted
     model = made.model
-    lines = [{"freq_hz": float(f), "decay_per_s": float(d), "decay_sd_per_s": 0.01 * float(d)} for f, d in zip(model.freq_hz, model.decay_per_s, strict=True)]
-    (tmp_path / "case.json").write_text(json.dumps({"format": "sonic-bullet-case/1", "recordings": [{"features": lines}]}))
+    lines = [
+        {"freq_hz": float(f), "decay_per_s": float(d), "decay_sd_per_s": 0.01 * float(d)}
+        for f, d in zip(model.freq_hz, model.decay_per_s, strict=True)
+    ]
+    (tmp_path / "case.json").write_text(
+        json.dumps({"format": "sonic-bullet-case/1", "recordings": [{"features": lines}]})
+    )
     found = fit_case(read_case(tmp_path))
     assert found.fit.alpha_per_s == pytest.approx(6.0, rel=1e-3)
     assert found.fit.beta_s == pytest.approx(3e-8, rel=1e-3)
@@ -130,12 +138,18 @@ def test_clamped_body_is_fitted_clamped(tmp_path: Path) -> None:
         (lambda c: c.update(recordings=[{"file": "quiet.wav", "object": "box"}]), AudioError, "silent"),
         (lambda c: c.update(recordings=[{"file": "clipped.wav", "object": "box"}]), AudioError, "clipped"),
         (lambda c: c.update(recordings=[{"file": "nan.wav", "object": "box"}]), AudioError, "NaN"),
-        (lambda c: c.update(recordings=[{"file": "short.wav", "object": "box"}]), AudioError, "short.wav holds 1 ms after the onset"),
+        (
+            lambda c: c.update(recordings=[{"file": "short.wav", "object": "box"}]),
+            AudioError,
+            "short.wav holds 1 ms after the onset",
+        ),
         (lambda c: c.update(recordings=[{"file": "noise.wav", "object": "box"}]), AudioError, "no damped sinusoid"),
         (lambda c: c.update(recordings=[{"file": "text.wav", "object": "box"}]), FileError, "cannot read"),
     ],
 )
-def test_bad_evidence_is_one_line(planted: tuple[Planted, CaseFit], tmp_path: Path, edit: object, error: type[Exception], word: str) -> None:
+def test_bad_evidence_is_one_line(
+    planted: tuple[Planted, CaseFit], tmp_path: Path, edit: object, error: type[Exception], word: str
+) -> None:
     made, _ = planted
     case = json.loads((made.folder / "case.json").read_text())
     edit(case)  # type: ignore[operator]

@@ -25,7 +25,9 @@ def test_meshes_that_are_alike_tell_nothing() -> None:
 
 @pytest.mark.shared
 @pytest.mark.parametrize(("name", "words"), [("pyrfda-main-lines", "8909 Hz"), ("spruce-plates", "Rayleigh's law")])
-def test_measured_objects_get_a_verdict(shared_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, words: str) -> None:
+def test_measured_objects_get_a_verdict(
+    shared_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, words: str
+) -> None:
     monkeypatch.syspath_prepend(str(Path(__file__).parents[2] / "benchmarks"))
     sys.modules.pop("measured_fit", None)
     from measured_fit import fitted

@@ -20,7 +20,9 @@ def test_shared_lines_to_their_spreads() -> None:
     z = []
     for _ in range(4):
         amplitude = rng.normal(size=(3, 8)) + 1j * rng.normal(size=(3, 8))
-        signals = np.array([damped_sum(freq, decay, a, 22_050, 22_050) + 0.02 * rng.standard_normal(22_050) for a in amplitude])
+        signals = np.array(
+            [damped_sum(freq, decay, a, 22_050, 22_050) + 0.02 * rng.standard_normal(22_050) for a in amplitude]
+        )
         found = joint_lines(signals, 22_050, band_hz=(20, 10_000))
         assert len(found.freq_hz) == 8  # each found, none invented
         z += [(found.freq_hz - freq) / found.freq_sd_hz, (found.decay_per_s - decay) / found.decay_sd_per_s]
@@ -50,7 +52,9 @@ def test_scatter_is_told_from_spread() -> None:
 
 
 def test_what_a_fixture_has_left_of_decays_is_as_sure_as_the_decays() -> None:
-    """A fixture takes ten times the law's part of every second line, and is known to 5 %: nothing may be left of a line, which says nothing of the law."""
+    """A fixture takes ten times the law's part of every second line, and is known to 5 %: nothing may be left of a
+    line, which says nothing of the law.
+    """
     lam = np.geomspace(1e7, 1e10, 24)
     law = (20.0 + 1e-8 * lam) / 2
     part = np.where(np.arange(24) % 2, 10 * law, 0.05 * law)
@@ -61,11 +65,16 @@ def test_what_a_fixture_has_left_of_decays_is_as_sure_as_the_decays() -> None:
     assert found.alpha_per_s == pytest.approx(20.0, rel=0.1)
     assert found.beta_s == pytest.approx(1e-8, rel=0.1)
     pulled = rayleigh(lam, left, sd, (20.0, 1e-8))
-    assert abs(pulled.alpha_per_s / 20.0 - 1) > 3 * abs(found.alpha_per_s / 20.0 - 1), "a hundredth that is left is no hundredfold certainty"
+    assert abs(pulled.alpha_per_s / 20.0 - 1) > 3 * abs(found.alpha_per_s / 20.0 - 1), (
+        "a hundredth that is left is no hundredfold certainty"
+    )
 
 
 def test_a_law_that_most_lines_obey_is_told_whatever_the_others_do() -> None:
-    """Three of eleven fall far too slowly: the law that is nearest to all of them, by a third, is no one's. Where no law is anyone's, all lines tell one."""
+    """Three of eleven fall far too slowly: the law that is nearest to all of them, by a third, is no one's.
+
+    Where no law is anyone's, all lines tell one.
+    """
     lam = (2 * np.pi * np.array([1346, 3676, 4352, 5133, 7108, 8000, 9200, 10885, 11542, 15693, 16889.0])) ** 2
     decay = 0.5 * (1.45 + 1.34e-8 * lam) * (1 + 0.004 * np.array([1, -1, 1, 1, -1, -1, 1, -1, 0, 0, 0]))
     decay[8:] = [22.0, 27.0, 23.0]
@@ -78,12 +87,24 @@ def test_a_law_that_most_lines_obey_is_told_whatever_the_others_do() -> None:
 
 
 def test_what_loses_as_much_a_cycle_is_no_click() -> None:
-    """A bar's low mode rings for seconds: at ten times its frequency a mode with its loss factor may end ten times sooner, a click a hundred times."""
+    """A bar's low mode rings for seconds: at ten times its frequency a mode with its loss factor may end ten times
+    sooner, a click a hundred times.
+    """
     freq = np.array([1300.0, 13000.0, 13100.0])
     none = np.zeros(3)
 
     def worth(decay: float) -> list[float]:
-        lines = Lines(freq, np.array([1.2, decay, 1.2]), np.ones((2, 3)) + 0j, none, none, np.zeros((2, 3)), np.ones(2), np.array([1.0, 0.01, 0.01]), True)
+        lines = Lines(
+            freq,
+            np.array([1.2, decay, 1.2]),
+            np.ones((2, 3)) + 0j,
+            none,
+            none,
+            np.zeros((2, 3)),
+            np.ones(2),
+            np.array([1.0, 0.01, 0.01]),
+            True,
+        )
         return _rings(lines).tolist()
 
     assert worth(1.2 * BRIEF * 9) == [1.0, 1.0, 1.0]
@@ -100,7 +121,9 @@ def test_distance_of_a_gain_and_of_nothing() -> None:
 
 
 def test_few_cells_do_not_speak_for_a_window() -> None:
-    """A sound that hardly stands above the noise: by the widest window in a handful of cells, in one of which noise may cancel it."""
+    """A sound that hardly stands above the noise: by the widest window in a handful of cells, in one of which noise may
+    cancel it.
+    """
     t = np.arange(48_000) / 48_000
     sound, floor = 2e-3 * np.exp(-100 * t) * np.sin(2 * np.pi * 3000 * t), white(1e-4)
     least = [noise_floor_db(sound, floor, seeds=(2 * k, 2 * k + 1)) for k in range(12)]
@@ -112,7 +135,10 @@ def test_few_cells_do_not_speak_for_a_window() -> None:
 
 def test_lines_that_cancel_one_another_hold_more_than_all_do() -> None:
     """A burst that no damped sinusoid is takes several, each far above it; twins that beat are what they are."""
-    freq, decay = np.array([400.0, 900.0, 900.4, 3000.0, 3004.0, 3008.0]), np.array([5.0, 8.0, 8.0, 900.0, 940.0, 980.0])
+    freq, decay = (
+        np.array([400.0, 900.0, 900.4, 3000.0, 3004.0, 3008.0]),
+        np.array([5.0, 8.0, 8.0, 900.0, 940.0, 980.0]),
+    )
     amplitude = np.array([[1.0, 1.0, -0.9, 500.0, -1000.0, 500.2], [0.3, 0.5, 0.6, 200.0, -400.0, 200.1]]) + 0j
     none = np.zeros(6)
     lines = Lines(freq, decay, amplitude, none, none, np.zeros((2, 6)), np.ones(2), np.ones(6), True)

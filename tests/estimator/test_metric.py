@@ -1,4 +1,6 @@
-"""Loudness against the standard's own numbers, the closed-form image against Fourier transforms, the match ratio product's invariances."""
+"""Loudness against the standard's own numbers, the closed-form image against Fourier transforms, the match ratio
+product's invariances.
+"""
 
 from __future__ import annotations
 
@@ -19,18 +21,29 @@ SR = 48000
 
 def sounding(freq_hz: Array, decay_per_s: Array, amplitude: Array, seconds: float = 0.6) -> Array:
     time = np.arange(int(seconds * SR)) / SR
-    return np.asarray(sum(a * np.exp(-d * time) * np.sin(2 * np.pi * f * time) for f, d, a in zip(freq_hz, decay_per_s, amplitude, strict=True)))
+    return np.asarray(
+        sum(
+            a * np.exp(-d * time) * np.sin(2 * np.pi * f * time)
+            for f, d, a in zip(freq_hz, decay_per_s, amplitude, strict=True)
+        )
+    )
 
 
 def some_modes(count: int, seed: int = 0) -> tuple[Array, Array, Array]:
     rng = np.random.default_rng(seed)
     signs = rng.choice([-1.0, 1.0], count)
-    return np.sort(rng.uniform(150, 16000, count)), 10 ** rng.uniform(0.5, 2.9, count), 10 ** rng.uniform(-3, -1, count) * signs
+    return (
+        np.sort(rng.uniform(150, 16000, count)),
+        10 ** rng.uniform(0.5, 2.9, count),
+        10 ** rng.uniform(-3, -1, count) * signs,
+    )
 
 
 def observed(freq_hz: Array, decay_per_s: Array, amplitude: Array) -> Features:
     none = np.full(len(freq_hz), np.nan)
-    return Features(freq_hz, decay_per_s, np.abs(amplitude), np.where(amplitude < 0, np.pi, 0.0), none, none, none, 0.0, -200.0, SR)
+    return Features(
+        freq_hz, decay_per_s, np.abs(amplitude), np.where(amplitude < 0, np.pi, 0.0), none, none, none, 0.0, -200.0, SR
+    )
 
 
 def image_of(modes: tuple[Array, Array, Array], full_scale_db_spl: float = 94.0) -> Image:
@@ -87,7 +100,11 @@ def test_close_pairs_beat() -> None:
 
 
 def test_modes_that_ring_in_a_sample_or_never_are_no_trouble() -> None:
-    freq_hz, decay, amplitude = np.array([50.0, 500.0, 0.0, 23000.0, 6000.0]), np.array([0.0, 3e4, 10.0, 5.0, 900.0]), np.array([0.1, 0.1, 0.0, 0.1, 0.1])
+    freq_hz, decay, amplitude = (
+        np.array([50.0, 500.0, 0.0, 23000.0, 6000.0]),
+        np.array([0.0, 3e4, 10.0, 5.0, 900.0]),
+        np.array([0.1, 0.1, 0.0, 0.1, 0.1]),
+    )
     seen = image_of((freq_hz, decay, amplitude))
     assert distance(seen, freq_hz, decay, amplitude) < 1e-6
     silent = distance(seen, freq_hz, decay, 0 * amplitude)
@@ -115,9 +132,13 @@ def test_match_ratio_product() -> None:
     known = points(observed(*modes))
     assert match_ratio_product(known, *modes) == pytest.approx(-1, abs=0.03)
     order = np.random.default_rng(0).permutation(40)
-    assert match_ratio_product(known, *(part[order] for part in modes)) == pytest.approx(match_ratio_product(known, *modes), rel=1e-12)
+    assert match_ratio_product(known, *(part[order] for part in modes)) == pytest.approx(
+        match_ratio_product(known, *modes), rel=1e-12
+    )
     # one common factor on the amplitudes tells nothing of the material
-    assert match_ratio_product(known, modes[0], modes[1], 7 * modes[2]) == pytest.approx(match_ratio_product(known, *modes), rel=1e-12)
+    assert match_ratio_product(known, modes[0], modes[1], 7 * modes[2]) == pytest.approx(
+        match_ratio_product(known, *modes), rel=1e-12
+    )
     scores = [match_ratio_product(known, modes[0] * factor, modes[1], modes[2]) for factor in (1.0, 1.005, 1.02)]
     assert scores == sorted(scores)
     inaudible = [np.append(part, extra) for part, extra in zip(modes, (21000.0, 5.0, 1.0), strict=True)]

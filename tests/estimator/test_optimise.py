@@ -18,7 +18,12 @@ from sonic_bullet.records import Array, Material, Shape
 from sonic_bullet.records.errors import RecordError
 
 SR = 48000
-FIGURE_9 = ((92.003, 1.8297e-7, 3.6791, 2.1873e-3), (3.9074, 3.3935e-8, 3.4186, 9.0013e-6), (31.425, 7.0658e-7, 7.3953, 3.5842e-9))  # γ in units of γ₀
+# γ in units of γ₀
+FIGURE_9 = (
+    (92.003, 1.8297e-7, 3.6791, 2.1873e-3),
+    (3.9074, 3.3935e-8, 3.4186, 9.0013e-6),
+    (31.425, 7.0658e-7, 7.3953, 3.5842e-9),
+)
 GAMMA_0 = 70e9 / 2500
 
 
@@ -33,24 +38,44 @@ def plate() -> tuple[Array, Array]:
 
 
 def recorded(
-    truth: Array, lambda_hat: Array, amplitude_hat: Array, *, seconds: float, noise: float = 0.0, decay_off: float = 0.0, freq_off: float = 0.0
+    truth: Array,
+    lambda_hat: Array,
+    amplitude_hat: Array,
+    *,
+    seconds: float,
+    noise: float = 0.0,
+    decay_off: float = 0.0,
+    freq_off: float = 0.0,
 ) -> Problem:
-    """What a plate with these parameters sounds like, and its features, off by as much as the noise makes the best of estimators."""
+    """What a plate with these parameters sounds like, and its features, off by as much as the noise makes the best of
+    estimators.
+    """
     rng = np.random.default_rng(5)
     freq_hz, decay, amplitude = modes_of(truth, lambda_hat, amplitude_hat)
-    freq_hz, decay = freq_hz * np.exp(freq_off * rng.standard_normal(len(freq_hz))), decay * np.exp(decay_off * rng.standard_normal(len(decay)))
+    freq_hz, decay = (
+        freq_hz * np.exp(freq_off * rng.standard_normal(len(freq_hz))),
+        decay * np.exp(decay_off * rng.standard_normal(len(decay))),
+    )
     there = (freq_hz > 20) & (freq_hz < 0.45 * SR)
     time = np.arange(int(seconds * SR)) / SR
     parts = zip(freq_hz[there], decay[there], amplitude[there], strict=True)
-    signal = sum(a * np.exp(-d * time) * np.sin(2 * np.pi * f * time) for f, d, a in parts) + noise * rng.standard_normal(len(time))
+    signal = sum(
+        a * np.exp(-d * time) * np.sin(2 * np.pi * f * time) for f, d, a in parts
+    ) + noise * rng.standard_normal(len(time))
     clear = there & (amplitude**2 * SR / (4 * decay * max(noise, 1e-7) ** 2) > 100)
     freq_hz, decay, amplitude = freq_hz[clear], decay[clear], amplitude[clear]
     spread = np.sqrt(16 * decay**3 * noise**2 / (SR * amplitude**2))
     off = spread * rng.standard_normal((2, len(decay)))
     sizes = np.abs(amplitude) * (1 + spread / decay * rng.standard_normal(len(decay)))
-    known = (spread / (2 * np.pi), spread, np.abs(amplitude) * spread / decay) if noise else (np.full(len(decay), np.nan),) * 3
+    known = (
+        (spread / (2 * np.pi), spread, np.abs(amplitude) * spread / decay)
+        if noise
+        else (np.full(len(decay), np.nan),) * 3
+    )
     phase = np.where(amplitude < 0, np.pi, 0.0)
-    features = Features(freq_hz + off[0] / (2 * np.pi), decay + off[1], sizes, phase, *known, 0.0, 20 * np.log10(noise + 1e-12), SR)
+    features = Features(
+        freq_hz + off[0] / (2 * np.pi), decay + off[1], sizes, phase, *known, 0.0, 20 * np.log10(noise + 1e-12), SR
+    )
     return Problem(features, np.asarray(signal), lambda_hat, amplitude_hat)
 
 
@@ -84,7 +109,9 @@ def test_planted_material_under_noise() -> None:
     assert found.gamma_m2_s2 == pytest.approx(truth[2], rel=2e-4)
 
 
-@pytest.mark.parametrize("constants", [Constants(), Constants(bark_step=1.0, levels=3), Constants(per_bark=1.0, power=0.6)])
+@pytest.mark.parametrize(
+    "constants", [Constants(), Constants(bark_step=1.0, levels=3), Constants(per_bark=1.0, power=0.6)]
+)
 def test_the_metric_alone_leads_to_the_planted_material(constants: Constants) -> None:
     """The minimum of Π is the truth whatever its constants: a start off in all four numbers, features only in Π_MRP."""
     lambda_hat, amplitude_hat = plate()
@@ -110,7 +137,15 @@ def test_few_features_of_many_modes() -> None:
 def test_fast_reaches_the_reference_on_a_fiftieth() -> None:
     """A plate that no parameters fit: decays 10 %, frequencies 0.3 % off the model. Both searches share one metric."""
     lambda_hat, amplitude_hat = plate()
-    asked = recorded(np.array([20.0, 1e-7, GAMMA_0, 0.1]), lambda_hat, amplitude_hat, seconds=0.3, noise=1e-4, decay_off=0.1, freq_off=3e-3)
+    asked = recorded(
+        np.array([20.0, 1e-7, GAMMA_0, 0.1]),
+        lambda_hat,
+        amplitude_hat,
+        seconds=0.3,
+        noise=1e-4,
+        decay_off=0.1,
+        freq_off=3e-3,
+    )
     cheap = Constants(levels=3)
     quick, seed = fast(asked, cheap), reference(asked, cheap)
     assert seed.starts == 10 * len(undominated(lambda_hat, amplitude_hat))
@@ -144,7 +179,9 @@ def test_circles_stay_within_bounds() -> None:
             if first != second:
                 alpha, beta = circle(asked.features, first, second, asked.lower, asked.upper)
                 assert alpha >= asked.lower[0] and beta >= asked.lower[1]
-                assert 0.5 * (alpha + beta * feature_eigenvalues(asked.features)[first]) == pytest.approx(asked.features.decay_per_s[first], rel=1e-6)
+                assert 0.5 * (alpha + beta * feature_eigenvalues(asked.features)[first]) == pytest.approx(
+                    asked.features.decay_per_s[first], rel=1e-6
+                )
 
 
 def test_bounds_hold() -> None:

@@ -41,7 +41,9 @@ def test_each_takes_of_what_is_left_and_the_true_ones_leave_nothing() -> None:
 
 
 def test_low_lines_of_a_reverberant_recording_are_still_lines() -> None:
-    """Forty modes in a room of 0.6 s: hundreds of starting poles, of which too few had been low ones' (none below 3 kHz in a case like this)."""
+    """Forty modes in a room of 0.6 s: hundreds of starting poles, of which too few had been low ones' (none below 3 kHz
+    in a case like this).
+    """
     rng = np.random.default_rng(1)
     freq = np.geomspace(300, 16_000, 40)
     decay = 8 + 3e-3 * freq
@@ -60,11 +62,15 @@ def test_of_no_pole_none_is_picked_and_what_no_line_takes_is_left() -> None:
     none = np.zeros(0, complex)
     signals = rings(TRUE, DECAY, SIZE)
     assert len(selected(signals, np.ones(2), none, SR, 10)) == 0
-    assert lines_of(signals, np.full(2, 1e-6), none, SR, True).noise == pytest.approx(np.sqrt((signals**2).mean(axis=1)))
+    assert lines_of(signals, np.full(2, 1e-6), none, SR, True).noise == pytest.approx(
+        np.sqrt((signals**2).mean(axis=1))
+    )
 
 
 def test_a_strike_that_a_gate_has_shut_is_no_silent_one() -> None:
-    """Ten hits within 29 ms make a crowd; what is left after them is read back to the onset, but not where one recording is over by then."""
+    """Ten hits within 29 ms make a crowd; what is left after them is read back to the onset, but not where one
+    recording is over by then.
+    """
     rng = np.random.default_rng(3)
     freq, decay = np.geomspace(300, 9000, 8), np.full(8, 25.0)
     late = np.zeros(N)

@@ -1,4 +1,7 @@
-"""A fitted preset sounds as recorded: rendered, fitted, and rendered again. All objects and sensors: benchmarks/round_trip.py."""
+"""A fitted preset sounds as recorded:
+
+rendered, fitted, and rendered again. All objects and sensors: benchmarks/round_trip.py.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +23,10 @@ from sonic_bullet.presets import total_damping
 from sonic_bullet.records.errors import FileError
 from tests.made.case import write_box
 
-LINES = [{"freq_hz": f, "decay_per_s": 2.0 + 1e-8 * (6.28 * f) ** 2, "decay_sd_per_s": 0.02} for f in (988.0, 2704.0, 5240.0, 8540.0, 12550.0)]
+LINES = [
+    {"freq_hz": f, "decay_per_s": 2.0 + 1e-8 * (6.28 * f) ** 2, "decay_sd_per_s": 0.02}
+    for f in (988.0, 2704.0, 5240.0, 8540.0, 12550.0)
+]
 
 
 @pytest.mark.parametrize("sensor", ["pressure", "velocity"])
@@ -41,7 +47,12 @@ def fitted_lines(folder: Path, *, mesh: bool = True, **more: Any) -> Any:
     """The fit of a case of measured lines of a steel bar."""
     write_box(folder / "bar.obj", (0.18, 0.025, 0.006))
     thing = {"material": "steel"} | ({"mesh": "bar.obj"} if mesh else {})
-    case = {"format": "sonic-bullet-case/1", "objects": {"bar": thing}, "recordings": [{"features": LINES}], "band_hz": [20, 14000]} | more
+    case = {
+        "format": "sonic-bullet-case/1",
+        "objects": {"bar": thing},
+        "recordings": [{"features": LINES}],
+        "band_hz": [20, 14000],
+    } | more
     (folder / "case.json").write_text(json.dumps(case))
     return fit_case(read_case(folder), check_mesh=False)
 
@@ -59,7 +70,10 @@ def fitted_lines(folder: Path, *, mesh: bool = True, **more: Any) -> Any:
     ],
 )
 def test_damping_says_what_it_includes(tmp_path: Path, more: dict[str, Any], medium: str, radiation: str) -> None:
-    """Taken off where mesh and medium are known; else the preset says that damping is total. A diagnosis plays total decays until it names radiation."""
+    """Taken off where mesh and medium are known; else the preset says that damping is total.
+
+    A diagnosis plays total decays until it names radiation.
+    """
     found = fitted_lines(tmp_path, **more)
     assert (found.case.medium, found.radiation) == (medium, radiation)
     preset = preset_of(found)

@@ -83,7 +83,9 @@ def test_loudness_is_what_was_asked_however_quiet_the_sound(tmp_path: Path, gain
     import pyloudnorm
 
     files.write_audio(tmp_path / "a.wav", noise() * gain, SR, lufs=-23.0)
-    assert pyloudnorm.Meter(SR).integrated_loudness(files.read_audio(tmp_path / "a.wav")[0].T) == pytest.approx(-23, abs=1e-3)
+    assert pyloudnorm.Meter(SR).integrated_loudness(files.read_audio(tmp_path / "a.wav")[0].T) == pytest.approx(
+        -23, abs=1e-3
+    )
 
 
 def test_full_scale_divides(tmp_path: Path) -> None:
@@ -108,7 +110,9 @@ def test_full_scale_divides(tmp_path: Path) -> None:
         (np.zeros((0, 5)), {}, "shape"),
     ],
 )
-def test_what_cannot_be_written_is_one_error_and_no_file(tmp_path: Path, sound: np.ndarray, options: dict[str, float], words: str) -> None:
+def test_what_cannot_be_written_is_one_error_and_no_file(
+    tmp_path: Path, sound: np.ndarray, options: dict[str, float], words: str
+) -> None:
     with pytest.raises(AudioError, match=words):
         files.write_audio(tmp_path / "a.wav", sound, SR, **options)
     assert listing(tmp_path) == []
@@ -181,8 +185,14 @@ for call in (lambda: files.write_audio("a.wav", sound, 48000), lambda: files.wri
 
 
 def test_a_full_disk_is_one_error_each_and_no_file_under_its_name(tmp_path: Path) -> None:
-    done = subprocess.run([sys.executable, "-c", FULL_DISK], cwd=tmp_path, check=False, capture_output=True, text=True, timeout=120)
-    assert [line[:18] for line in done.stdout.splitlines()] == ["cannot write a.wav", "cannot write b.fla", "cannot write c.npz"], done.stderr
+    done = subprocess.run(
+        [sys.executable, "-c", FULL_DISK], cwd=tmp_path, check=False, capture_output=True, text=True, timeout=120
+    )
+    assert [line[:18] for line in done.stdout.splitlines()] == [
+        "cannot write a.wav",
+        "cannot write b.fla",
+        "cannot write c.npz",
+    ], done.stderr
     assert set(listing(tmp_path)) <= {"a.partial.wav", "b.partial.flac"}
 
 
@@ -194,13 +204,20 @@ def test_two_writers_of_one_name_do_not_mix(tmp_path: Path) -> None:
             first.write(sounds[0][:, start : start + 1000])
             second.write(sounds[1][:, start : start + 1000])
     assert listing(tmp_path) == ["a.wav"]
-    np.testing.assert_array_equal(files.read_audio(tmp_path / "a.wav")[0], sounds[0].astype(np.float32).astype(float))  # closed last
+    # closed last
+    np.testing.assert_array_equal(files.read_audio(tmp_path / "a.wav")[0], sounds[0].astype(np.float32).astype(float))
 
 
-def test_over_four_gibibytes_wav_becomes_rf64_and_a_stream_stops_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_over_four_gibibytes_wav_becomes_rf64_and_a_stream_stops_whole(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(audio, "CHUNK_LIMIT_BYTES", 4000)
     report = files.write_audio(tmp_path / "a.wav", noise(channels=1, frames=1001), SR)
-    assert (report.format, soundfile.info(tmp_path / "a.wav").format, (tmp_path / "a.wav").read_bytes()[:4]) == ("RF64", "RF64", b"RF64")
+    assert (report.format, soundfile.info(tmp_path / "a.wav").format, (tmp_path / "a.wav").read_bytes()[:4]) == (
+        "RF64",
+        "RF64",
+        b"RF64",
+    )
     assert files.read_audio(tmp_path / "a.wav")[0].shape == (1, 1001)
     assert files.write_audio(tmp_path / "b.w64", noise(channels=1, frames=1001), SR).format == "W64"
     with pytest.raises(AudioError, match="4 GiB"), files.AudioWriter(tmp_path / "c.wav", SR, 1) as writer:

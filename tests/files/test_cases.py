@@ -17,7 +17,14 @@ STRIKE = {"position": [0, 0, 0.1], "direction": [0, 0, -2], "impulse": 0.01}
 def written(folder: Path, **changes: Any) -> Path:
     case = {
         "format": "sonic-bullet-case/1",
-        "objects": {"bar": {"mesh": "bar.obj", "units": "mm", "material": "steel", "elastic_guess": {"youngs_modulus": 2e11, "density": 7850}}},
+        "objects": {
+            "bar": {
+                "mesh": "bar.obj",
+                "units": "mm",
+                "material": "steel",
+                "elastic_guess": {"youngs_modulus": 2e11, "density": 7850},
+            }
+        },
         "recordings": [{"file": "a.wav", "object": "bar", "split": "fit", "strike": STRIKE}],
     } | changes
     (folder / "case.json").write_text(json.dumps(case))
@@ -25,10 +32,21 @@ def written(folder: Path, **changes: Any) -> Path:
 
 
 def test_declared_is_read(tmp_path: Path) -> None:
-    sensor = {"type": "near-field microphone", "response": "normal surface velocity", "position": {"bar": [0, 0, 0]}, "direction": {"bar": [0, 0, 1]}}
+    sensor = {
+        "type": "near-field microphone",
+        "response": "normal surface velocity",
+        "position": {"bar": [0, 0, 0]},
+        "direction": {"bar": [0, 0, 1]},
+    }
     support = {"fixed": [{"position": [1, 2, 3], "radius": 0.5}]}
     case = read_case(
-        written(tmp_path, sensor=sensor, support=support, onset="the impulse arrives at sample 0 of every file", later="unknown fields are left alone")
+        written(
+            tmp_path,
+            sensor=sensor,
+            support=support,
+            onset="the impulse arrives at sample 0 of every file",
+            later="unknown fields are left alone",
+        )
     )
     assert case.objects["bar"].scale == 1e-3
     assert case.objects["bar"].poisson is None
@@ -41,18 +59,32 @@ def test_declared_is_read(tmp_path: Path) -> None:
 def test_undeclared_stays_unknown(tmp_path: Path) -> None:
     case = read_case(written(tmp_path, objects={}, recordings=[{"features": [{"freq_hz": 100.0}]}]))
     strike = case.recordings[0]
-    assert (case.sensor, case.onset_s, strike.position_m, strike.impulse_n_s, strike.file) == ("unknown", None, None, None, None)
+    assert (case.sensor, case.onset_s, strike.position_m, strike.impulse_n_s, strike.file) == (
+        "unknown",
+        None,
+        None,
+        None,
+        None,
+    )
     assert strike.split == "fit"
 
 
 @pytest.mark.parametrize(
-    ("said", "kind"), [("plain sum of modes", "sum"), ("sound pressure at 1 m", "pressure"), ("laser vibrometer", "velocity"), ("mystery", "unknown")]
+    ("said", "kind"),
+    [
+        ("plain sum of modes", "sum"),
+        ("sound pressure at 1 m", "pressure"),
+        ("laser vibrometer", "velocity"),
+        ("mystery", "unknown"),
+    ],
 )
 def test_sensor_by_its_response(tmp_path: Path, said: str, kind: str) -> None:
     assert read_case(written(tmp_path, sensor={"response": said})).sensor == kind
 
 
-@pytest.mark.parametrize("name", ["../a.wav", "/etc/passwd", "x/../../a.wav", "link/a.wav", "", "a\u0000b", "..\\a.wav"])
+@pytest.mark.parametrize(
+    "name", ["../a.wav", "/etc/passwd", "x/../../a.wav", "link/a.wav", "", "a\u0000b", "..\\a.wav"]
+)
 @pytest.mark.parametrize("field", ["file", "mesh", "force"])
 def test_paths_stay_inside(tmp_path: Path, name: str, field: str) -> None:
     folder = tmp_path / "case"
@@ -119,25 +151,49 @@ def test_missing_folder(tmp_path: Path) -> None:
 
 def test_fields_that_are_not_read_are_named_with_the_nearest(tmp_path: Path) -> None:
     """At every level, a line each; nothing is refused."""
-    bar = {"mesh": "bar.obj", "unit": "mm", "material": "steel", "elastic_guess": {"youngs_modulus": 2e11, "dens": 7850}}
+    bar = {
+        "mesh": "bar.obj",
+        "unit": "mm",
+        "material": "steel",
+        "elastic_guess": {"youngs_modulus": 2e11, "dens": 7850},
+    }
     strike = {"position": [0, 0, 0.1], "impuls": 0.01, "force": {"file": "f.wav", "chanel": 1}}
     entry = {"file": "a.wav", "chanel": 1, "strike": strike, "features": [{"freq_hz": 100.0, "decay": 3.0}]}
     fixed = {"position": [0, 0, 0], "raduis": 0.1}
     case = read_case(
-        written(tmp_path, band=[20, 5000], objects={"bar": bar}, recordings=[entry], support={"fixed": [fixed]}, sensor={"respons": "velocity"}, qwxz=1)
+        written(
+            tmp_path,
+            band=[20, 5000],
+            objects={"bar": bar},
+            recordings=[entry],
+            support={"fixed": [fixed]},
+            sensor={"respons": "velocity"},
+            qwxz=1,
+        )
     )
     assert case.band_hz == (20.0, 20_000.0)
     said = {line.split("field '")[1].split("'")[0]: line for line in case.warnings}
-    meant = {"band": "band_hz", "unit": "units", "dens": "density", "impuls": "impulse", "decay": "decay_per_s", "raduis": "radius", "respons": "response"}
+    meant = {
+        "band": "band_hz",
+        "unit": "units",
+        "dens": "density",
+        "impuls": "impulse",
+        "decay": "decay_per_s",
+        "raduis": "radius",
+        "respons": "response",
+    }
     assert {name: line.split("did you mean '")[1].rstrip("'?") for name, line in said.items() if name in meant} == meant
-    assert sum("'chanel'" in line and "'channel'" in line for line in case.warnings) == 2  # of the recording and of its force
+    # of the recording and of its force
+    assert sum("'chanel'" in line and "'channel'" in line for line in case.warnings) == 2
     assert "known here: format, recordings" in said["qwxz"]
     assert len(case.warnings) == len(meant) + 3
     assert "recordings 1: strike: force: field 'chanel'" in " ".join(case.warnings)
 
 
 def test_words_for_people_and_what_is_documented_are_no_warning(tmp_path: Path) -> None:
-    assert not read_case(written(tmp_path, note="a tap", source="mine", medium="air", onset=0.0, sensor={"type": "microphone"})).warnings
+    assert not read_case(
+        written(tmp_path, note="a tap", source="mine", medium="air", onset=0.0, sensor={"type": "microphone"})
+    ).warnings
     assert read_case(tmp_path).medium == "air"
 
 
@@ -161,13 +217,18 @@ def test_a_channel_below_zero_is_refused(tmp_path: Path) -> None:
         read_case(written(tmp_path, recordings=[{"file": "a.wav", "channel": -1}]))
 
 
-def test_an_impulse_beyond_physics_is_one_line_of_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
+def test_an_impulse_beyond_physics_is_one_line_of_the_command(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
     import sys
 
     from sonic_bullet.cli import main
 
     (tmp_path / "a.wav").write_bytes(b"RIFF")
-    for words in (["a.wav", "--mesh", "a.wav", "--strike", "0,0,0", "--material", "steel", "--impulse", "1e308"], [str(written(tmp_path, onset=1e308))]):
+    for words in (
+        ["a.wav", "--mesh", "a.wav", "--strike", "0,0,0", "--material", "steel", "--impulse", "1e308"],
+        [str(written(tmp_path, onset=1e308))],
+    ):
         monkeypatch.chdir(tmp_path)
         monkeypatch.setattr(sys, "argv", ["sonic-bullet", "fit", *words, "-o", "p.json"])
         with pytest.raises(SystemExit, match="2"):

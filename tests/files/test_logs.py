@@ -1,4 +1,6 @@
-"""Contact logs and models on a disk: they come back bit for bit, and what was cut, forged or never one is refused by name."""
+"""Contact logs and models on a disk: they come back bit for bit, and what was cut, forged or never one is refused by
+name.
+"""
 
 from __future__ import annotations
 
@@ -39,7 +41,9 @@ def model(seed: int = 0, modes: int = 3) -> ModalModel:
 
 def log(seed: int = 0, steps: int = 5) -> ContactLog:
     rng = np.random.default_rng(seed)
-    wood = Material.isotropic("wood", youngs_pa=1.1e10 / 3, poisson=0.3, density_kg_m3=700.1, alpha_per_s=0.1, beta_s=1 / 3e7, source="x")
+    wood = Material.isotropic(
+        "wood", youngs_pa=1.1e10 / 3, poisson=0.3, density_kg_m3=700.1, alpha_per_s=0.1, beta_s=1 / 3e7, source="x"
+    )
     bare = Material.isotropic("bare", youngs_pa=1e9, poisson=0.1, density_kg_m3=1.0)
     bodies = (
         Body(0, -1, 0, "plane", 0.0, np.zeros((3, 3)), material=bare),
@@ -52,11 +56,19 @@ def log(seed: int = 0, steps: int = 5) -> ContactLog:
         b, k = min(2 + i, 4), int(rng.integers(0, 4))
         rows = {name: rng.normal(size=(k, *tail)) for name, (_, tail) in ROW_FIELDS.items()}
         rows["a"], rows["b"] = rng.integers(0, b, k), rng.integers(0, b, k)
-        return Step(1 / (240 + i), rng.normal(size=(b, 3)) / 3, rng.normal(size=(b, 4)) / 7, rng.random(b) < 0.3, Contacts(**rows))
+        return Step(
+            1 / (240 + i),
+            rng.normal(size=(b, 3)) / 3,
+            rng.normal(size=(b, 4)) / 7,
+            rng.random(b) < 0.3,
+            Contacts(**rows),
+        )
 
     sensors = (Microphone([0.1, -1 / 3, 1e-300]), Vibrometer(1, [1 / 3, 2 / 3, 0], [1, 2, 3 / 7], 0), ModalSum(1 / 7))
     events = (Event("quench", 0), Event("quench", 3), Event("quench", 3))
-    return ContactLog(bodies, tuple(step(i) for i in range(steps)), sensors, 44_100, 2**40 + 1, Air(1.19, 340.1 / 3), events=events)
+    return ContactLog(
+        bodies, tuple(step(i) for i in range(steps)), sensors, 44_100, 2**40 + 1, Air(1.19, 340.1 / 3), events=events
+    )
 
 
 def same(x: object, y: object) -> bool:
@@ -189,7 +201,9 @@ def header_with(folder: Path, old: bytes, new: bytes) -> np.ndarray:
         ("header", np.frombuffer(b'{"format":"sonic-bullet-contacts/1"}', np.uint8), "missing required field"),
     ],
 )
-def test_forged_logs_are_refused_by_name(tmp_path: Path, entry: str, value: bytes | np.ndarray | None, words: str) -> None:
+def test_forged_logs_are_refused_by_name(
+    tmp_path: Path, entry: str, value: bytes | np.ndarray | None, words: str
+) -> None:
     with pytest.raises(LogError, match=words) as caught:
         files.read_log(forged(tmp_path, **{entry: value}))
     assert "bad.npz" in str(caught.value)
@@ -227,7 +241,9 @@ def test_forged_headers_are_refused_by_name(tmp_path: Path, old: bytes, new: byt
         b"{'descr': '<f99', 'fortran_order': False, 'shape': (5,), }",
     ],
 )
-def test_an_npy_header_that_is_none_is_one_line_for_logs_and_models_and_a_miss_for_caches(tmp_path: Path, text: bytes) -> None:
+def test_an_npy_header_that_is_none_is_one_line_for_logs_and_models_and_a_miss_for_caches(
+    tmp_path: Path, text: bytes
+) -> None:
     from sonic_bullet.modal import cache
 
     raw = b"\x93NUMPY\x01\x00" + struct.pack("<H", len(text) + 1) + text + b"\n" + bytes(40)
@@ -257,7 +273,9 @@ def without_one(whole: bytes, lost: str) -> bytes:
         if whole[at + 46 : at + 46 + name] == lost.encode():
             break
         at = stop
-    tail = whole[end : end + 8] + struct.pack("<HHII", count - 1, count - 1, size - (stop - at), start) + whole[end + 20 :]
+    tail = (
+        whole[end : end + 8] + struct.pack("<HHII", count - 1, count - 1, size - (stop - at), start) + whole[end + 20 :]
+    )
     return whole[:at] + whole[stop:end] + tail
 
 
@@ -273,7 +291,9 @@ def test_an_entry_that_the_directory_hides_is_refused(tmp_path: Path) -> None:
             files.read_model(tmp_path / "m.npz")
 
 
-@pytest.mark.parametrize(("before", "after"), [(b"x", b""), (b"", b"x"), (bytes(22), b""), (b"", bytes(22)), (b"", b"PK\x05\x06")])
+@pytest.mark.parametrize(
+    ("before", "after"), [(b"x", b""), (b"", b"x"), (bytes(22), b""), (b"", bytes(22)), (b"", b"PK\x05\x06")]
+)
 def test_bytes_around_a_log_are_refused(tmp_path: Path, before: bytes, after: bytes) -> None:
     files.write_log(tmp_path / "a.npz", log())
     (tmp_path / "a.npz").write_bytes(before + (tmp_path / "a.npz").read_bytes() + after)
@@ -290,7 +310,9 @@ def test_a_name_twice_and_a_header_that_contradicts_the_directory_are_refused(tm
         files.read_model(tmp_path / "m.npz")
     at = whole.index(b"PK\x03\x04", 1)
     for offset in (6, 14, 18, 22):  # flags, CRC, packed size, size
-        (tmp_path / "m.npz").write_bytes(whole[: at + offset] + bytes([whole[at + offset] ^ 1]) + whole[at + offset + 1 :])
+        (tmp_path / "m.npz").write_bytes(
+            whole[: at + offset] + bytes([whole[at + offset] ^ 1]) + whole[at + offset + 1 :]
+        )
         with pytest.raises(LogError, match=r"m\.npz"):
             files.read_model(tmp_path / "m.npz")
 
@@ -303,17 +325,31 @@ def test_what_numpy_saves_is_read_too(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("scale", "roll", "refused"), [((1, 1, 1), 0, False), ((1, 1, 1), -1, True), ((0, 0, 0), 0, False), ((1, 0, 0), 0, False), ((1e-200,) * 3, 0, False)]
+    ("scale", "roll", "refused"),
+    [
+        ((1, 1, 1), 0, False),
+        ((1, 1, 1), -1, True),
+        ((0, 0, 0), 0, False),
+        ((1, 0, 0), 0, False),
+        ((1e-200,) * 3, 0, False),
+    ],
 )
-def test_degenerate_vertices_of_a_model_end_in_sound_or_in_our_own_error(tmp_path: Path, scale: tuple[float, float, float], roll: int, refused: bool) -> None:
-    """Triangles that meet themselves have no near field; a surface without area radiates nothing. Once, the first ended in ZeroDivisionError."""
+def test_degenerate_vertices_of_a_model_end_in_sound_or_in_our_own_error(
+    tmp_path: Path, scale: tuple[float, float, float], roll: int, refused: bool
+) -> None:
+    """Triangles that meet themselves have no near field; a surface without area radiates nothing.
+
+    Once, the first ended in ZeroDivisionError.
+    """
     from sonic_bullet.render import render_log
 
     corner = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * 0.05
     quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
     face = np.array([t for q in quads for t in ((q[0], q[1], q[2]), (q[0], q[2], q[3]))])
     shape = np.random.default_rng(0).normal(size=(8, 3, 1))
-    made = ModalModel(np.array([900.0]), np.array([5.0]), shape, np.roll(corner * scale, roll, axis=0), face, np.zeros(12), 1e-3, 1.0)
+    made = ModalModel(
+        np.array([900.0]), np.array([5.0]), shape, np.roll(corner * scale, roll, axis=0), face, np.zeros(12), 1e-3, 1.0
+    )
     wood = Material.isotropic("wood", youngs_pa=1e9, poisson=0.3, density_kg_m3=1e3, alpha_per_s=1.0, beta_s=1e-7)
     body = Body(0, -1, 0, "box", 1.0, np.eye(3), 1e-3, material=wood, model=made)
     step = Step(1 / 240, np.zeros((1, 3)), np.array([[0, 0, 0, 1.0]]), np.zeros(1, bool), Contacts.none())

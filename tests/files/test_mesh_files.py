@@ -1,4 +1,6 @@
-"""A mesh file is the mesh it says or none: a face that names no vertex is refused with its file and line, by both rooms that read meshes."""
+"""A mesh file is the mesh it says or none: a face that names no vertex is refused with its file and line, by both rooms
+that read meshes.
+"""
 
 from __future__ import annotations
 
@@ -52,7 +54,13 @@ def glb(folder: Path, index: int) -> Path:
     data = box().export(file_type="glb")
     size = struct.unpack("<I", data[12:16])[0]
     tree = json.loads(data[20 : 20 + size])
-    start = 28 + size + tree["bufferViews"][tree["accessors"][tree["meshes"][0]["primitives"][0]["indices"]]["bufferView"]].get("byteOffset", 0)
+    start = (
+        28
+        + size
+        + tree["bufferViews"][tree["accessors"][tree["meshes"][0]["primitives"][0]["indices"]]["bufferView"]].get(
+            "byteOffset", 0
+        )
+    )
     assert struct.unpack("<I", data[start : start + 4])[0] < 8
     (folder / "a.glb").write_bytes(data[:start] + struct.pack("<I", index & 0xFFFFFFFF) + data[start + 4 :])
     return folder / "a.glb"
@@ -76,7 +84,9 @@ def glb(folder: Path, index: int) -> Path:
     ],
 )
 @pytest.mark.parametrize("read", READERS)
-def test_a_face_of_no_vertex_is_refused_by_file_and_place(tmp_path: Path, make: Callable[[Path, int], Path], index: int, words: str, read: Callable) -> None:  # type: ignore[type-arg]
+def test_a_face_of_no_vertex_is_refused_by_file_and_place(
+    tmp_path: Path, make: Callable[[Path, int], Path], index: int, words: str, read: Callable
+) -> None:  # type: ignore[type-arg]
     path = make(tmp_path, index)
     with pytest.raises(MeshError, match=words) as caught:
         read(path)
@@ -91,11 +101,17 @@ def test_the_same_files_are_read_where_the_vertex_is_there(tmp_path: Path, make:
 
 
 def test_obj_counts_backwards_from_the_vertices_so_far(tmp_path: Path) -> None:
-    """-1 is the last vertex so far, whatever follows [Wavefront, appendix B1]; a face may name a vertex that comes later by its number."""
+    """-1 is the last vertex so far, whatever follows [Wavefront, appendix B1]; a face may name a vertex that comes
+    later by its number.
+    """
     (tmp_path / "plain.obj").write_text(f"{CORNERS}f 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n")
-    (tmp_path / "back.obj").write_text("f 1 3 2\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf -4 -3 -1\nf -3/7/1 -2//2 -1\nf 1 4 \\\n3\nv 9 9 9\n")
+    (tmp_path / "back.obj").write_text(
+        "f 1 3 2\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf -4 -3 -1\nf -3/7/1 -2//2 -1\nf 1 4 \\\n3\nv 9 9 9\n"
+    )
     plain, back = (read_mesh(tmp_path / name) for name in ("plain.obj", "back.obj"))
-    assert sorted(map(tuple, plain.vertex_m[plain.face].reshape(-1, 9))) == sorted(map(tuple, back.vertex_m[back.face].reshape(-1, 9)))
+    assert sorted(map(tuple, plain.vertex_m[plain.face].reshape(-1, 9))) == sorted(
+        map(tuple, back.vertex_m[back.face].reshape(-1, 9))
+    )
 
 
 @pytest.mark.parametrize(
@@ -135,7 +151,9 @@ def test_counts_that_a_file_does_not_hold_take_no_memory(tmp_path: Path) -> None
     text = json.dumps(tree).encode()
     text += b" " * (-len(text) % 4)
     rest = data[20 + size :]
-    (tmp_path / "a.glb").write_bytes(struct.pack("<4sIII4s", b"glTF", 2, 20 + len(text) + len(rest), len(text), b"JSON") + text + rest)
+    (tmp_path / "a.glb").write_bytes(
+        struct.pack("<4sIII4s", b"glTF", 2, 20 + len(text) + len(rest), len(text), b"JSON") + text + rest
+    )
     (tmp_path / "b.glb").write_bytes(data[:12] + struct.pack("<I", 2**32 - 4) + data[16:])
     head = b"ply\nformat binary_little_endian 1.0\nelement vertex 4000000000\nproperty float x\nproperty float y\nproperty float z\nend_header\n"
     (tmp_path / "a.ply").write_bytes(head + bytes(120))

@@ -13,7 +13,15 @@ from sonic_bullet import files, presets
 from sonic_bullet.files.cases import read_case
 from sonic_bullet.files.reading import QUOTED, reading
 from sonic_bullet.modal import read_mesh
-from sonic_bullet.records.errors import TEXT_BYTES, FileError, LogError, MaterialError, MeshError, SonicBulletError, excerpt
+from sonic_bullet.records.errors import (
+    TEXT_BYTES,
+    FileError,
+    LogError,
+    MaterialError,
+    MeshError,
+    SonicBulletError,
+    excerpt,
+)
 
 LONG = "Q" * 185_000
 WORDS = "Q QQ " * 40_000
@@ -57,7 +65,9 @@ CASES = [
 
 
 @pytest.mark.parametrize(("name", "read", "content"), CASES)
-def test_texts_quote_at_most_200_characters_of_a_file(tmp_path: Path, name: str, read: Callable[[Path], object], content: bytes) -> None:
+def test_texts_quote_at_most_200_characters_of_a_file(
+    tmp_path: Path, name: str, read: Callable[[Path], object], content: bytes
+) -> None:
     (tmp_path / name).write_bytes(content)
     with pytest.raises(SonicBulletError) as caught:
         read(tmp_path / name)
@@ -78,7 +88,9 @@ def test_zip_names_are_quoted_short(tmp_path: Path) -> None:
     assert str(caught.value).count("Q") <= QUOTED
 
 
-@pytest.mark.parametrize("what", ["x" * 10, "x" * 5000, "é" * 5000, "\U0001f514" * 5000, "a b " * 5000, "\ud800" * 5000])
+@pytest.mark.parametrize(
+    "what", ["x" * 10, "x" * 5000, "é" * 5000, "\U0001f514" * 5000, "a b " * 5000, "\ud800" * 5000]
+)
 @pytest.mark.parametrize("remedy", ["", "y" * 300, "é" * 5000])
 def test_no_error_of_ours_is_longer_than_a_kilobyte(what: str, remedy: str) -> None:
     error = SonicBulletError(what, remedy)
@@ -94,9 +106,21 @@ def test_an_excerpt_keeps_both_ends() -> None:
     assert len(excerpt("x" * 1000, 200)) in (199, 200)
 
 
-@pytest.mark.parametrize("error", [ValueError("x" * 500), RecursionError(), KeyError("k"), EOFError(), UnicodeDecodeError("utf-8", b"\xff", 0, 1, "x")])
+@pytest.mark.parametrize(
+    "error",
+    [
+        ValueError("x" * 500),
+        RecursionError(),
+        KeyError("k"),
+        EOFError(),
+        UnicodeDecodeError("utf-8", b"\xff", 0, 1, "x"),
+    ],
+)
 def test_whatever_a_parser_throws_leaves_as_the_readers_own(error: Exception) -> None:
-    with pytest.raises(MeshError, match=r"^/a/b\.obj is cut or no mesh \(.*\); mend it$") as caught, reading("/a/b.obj", "mesh", MeshError, "mend it"):
+    with (
+        pytest.raises(MeshError, match=r"^/a/b\.obj is cut or no mesh \(.*\); mend it$") as caught,
+        reading("/a/b.obj", "mesh", MeshError, "mend it"),
+    ):
         raise error
     assert caught.value.__cause__ is error
 

@@ -45,12 +45,15 @@ def test_silence_that_unpacks_beyond_memory_is_refused(tmp_path: Path, monkeypat
     assert (tmp_path / "a.flac").stat().st_size * recordings.UNPACKED < 1 << 20
     with pytest.raises(FileError, match="unpacks to more than 1048576 samples"):
         files.read_audio(tmp_path / "a.flac")
-    soundfile.write(tmp_path / "a.wav", np.zeros((1 << 20) + 1), 48_000, "PCM_16")  # as long, and no longer than its bytes
+    # as long, and no longer than its bytes
+    soundfile.write(tmp_path / "a.wav", np.zeros((1 << 20) + 1), 48_000, "PCM_16")
     assert files.read_audio(tmp_path / "a.wav")[0].shape == (1, (1 << 20) + 1)
 
 
 @pytest.mark.parametrize("rate", [1, 100, 999, 10_000_001, 2**31 - 1])
-def test_a_rate_that_no_recording_has_is_refused(tmp_path: Path, rate: int, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
+def test_a_rate_that_no_recording_has_is_refused(
+    tmp_path: Path, rate: int, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
     soundfile.write(tmp_path / "a.wav", SOUND[0, :5000], rate)
     with pytest.raises(FileError, match=f"sampled at {rate} Hz"):
         files.read_audio(tmp_path / "a.wav")
@@ -78,4 +81,6 @@ def test_names_that_no_disk_holds_are_one_line(tmp_path: Path, name: str) -> Non
 @pytest.mark.parametrize("extension", [".wav", ".rf64", ".w64", ".flac", ".ogg", ".aiff", ".caf"])
 def test_samples_are_those_of_libsndfile(tmp_path: Path, extension: str) -> None:
     files.write_audio(tmp_path / f"a{extension}", SOUND, 48_000)
-    np.testing.assert_array_equal(files.read_audio(tmp_path / f"a{extension}")[0], soundfile.read(tmp_path / f"a{extension}", always_2d=True)[0].T)
+    np.testing.assert_array_equal(
+        files.read_audio(tmp_path / f"a{extension}")[0], soundfile.read(tmp_path / f"a{extension}", always_2d=True)[0].T
+    )

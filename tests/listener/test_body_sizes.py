@@ -1,4 +1,6 @@
-"""A body larger than anything that is struck to sound is told of every time: a mesh in millimetres, a ground, a terrain. Others are not."""
+"""A body larger than anything that is struck to sound is told of every time: a mesh in millimetres, a ground, a
+terrain. Others are not.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +27,9 @@ from sonic_bullet.records.errors import MeshError, SizeWarning
 
 DATA = Path(pybullet_data.getDataPath())
 GROUNDS = {"plane.urdf", "plane100.urdf", "plane_transparent.urdf", "samurai.urdf"}
-"""Models that come with PyBullet, and are grounds or terrains: blocks of 30 to 200 m, and the yard of a monastery, 177 m across."""
+"""Models that come with PyBullet, and are grounds or terrains: blocks of 30 to 200 m, and the yard of a monastery, 177
+m across.
+"""
 UNREADABLE = {"kuka_iiwa/model_for_sdf.urdf", "toys/concave_box.urdf", "torus_deform.urdf", "random_urdfs/168/168.urdf"}
 """Models that PyBullet itself does not load, and one all of whose vertices are NaN."""
 BAR = "v 0 0 0\nv 120 0 0\nv 120 20 0\nv 0 20 0\nv 0 0 6\nv 120 0 6\nv 120 20 6\nv 0 20 6\n"
@@ -46,7 +50,9 @@ def command(monkeypatch: pytest.MonkeyPatch, *words: str) -> int:
     return int(done.value.code or 0)
 
 
-def test_modes_tells_of_a_mesh_in_millimetres_every_time(bar: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
+def test_modes_tells_of_a_mesh_in_millimetres_every_time(
+    bar: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
     for _ in range(2):
         assert command(monkeypatch, "modes", str(bar), "--count", "1", "--json") == 0
         said = capfd.readouterr()
@@ -89,7 +95,18 @@ def test_listener_doctor_and_render_tell_of_a_block_of_400_000_cubic_metres(
     scene = "SECONDS = 0.02\ndef build(c):\n    c.setAdditionalSearchPath(r'%s')\n    b = c.loadURDF('plane.urdf')\n    return {b: {'material': 'steel', 'count': 1}}\n"
     (tmp_path / "s.py").write_text(scene % DATA)
     for _ in range(2):
-        assert command(monkeypatch, "render", str(tmp_path / "s.py"), "-o", str(tmp_path / "a.wav"), "--contacts", str(tmp_path / "a.npz")) == 0
+        assert (
+            command(
+                monkeypatch,
+                "render",
+                str(tmp_path / "s.py"),
+                "-o",
+                str(tmp_path / "a.wav"),
+                "--contacts",
+                str(tmp_path / "a.npz"),
+            )
+            == 0
+        )
         assert "note: body 0" in capfd.readouterr().err
     assert command(monkeypatch, "render", str(tmp_path / "a.npz"), "-o", str(tmp_path / "b.wav")) == 0
     assert "200 m long" in capfd.readouterr().err
@@ -104,7 +121,11 @@ def _surface(path: Path) -> tuple[np.ndarray, np.ndarray]:
 
 def _file(name: str, folder: Path) -> Path:
     name = name.rsplit("package://", maxsplit=1)[-1]
-    places = [folder / name, DATA / name, *(parent / name for parent in folder.parents if DATA in (parent, *parent.parents))]
+    places = [
+        folder / name,
+        DATA / name,
+        *(parent / name for parent in folder.parents if DATA in (parent, *parent.parents)),
+    ]
     return next(place for place in places if place.is_file())
 
 

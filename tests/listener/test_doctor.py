@@ -82,9 +82,13 @@ def test_hull_lids_are_named(client: Any) -> None:
     floor(client)
     mug = client.loadURDF(pybullet_data.getDataPath() + "/objects/mug.urdf", [0, 0, 0.2])
     assert client.getDynamicsInfo(mug, -1)[0] > 0
-    duck = client.createMultiBody(1, client.createCollisionShape(p.GEOM_MESH, fileName=DUCK, meshScale=[0.1] * 3), basePosition=[1, 0, 1])
+    duck = client.createMultiBody(
+        1, client.createCollisionShape(p.GEOM_MESH, fileName=DUCK, meshScale=[0.1] * 3), basePosition=[1, 0, 1]
+    )
     hollow = [
-        client.createMultiBody(1, client.createCollisionShape(p.GEOM_MESH, fileName=str(ASSETS / f"{name}.obj")), basePosition=[2, 0, k])
+        client.createMultiBody(
+            1, client.createCollisionShape(p.GEOM_MESH, fileName=str(ASSETS / f"{name}.obj")), basePosition=[2, 0, k]
+        )
         for k, name in enumerate(("bowl", "tumbler"))
     ]
     found = [f for f in diagnose_world(client) if f.id == "hull-lid"]

@@ -1,4 +1,6 @@
-"""Poses, frames and records: contacts sit on the surface by the pose before the step; inertia belongs to the body frame; ids are reused."""
+"""Poses, frames and records: contacts sit on the surface by the pose before the step; inertia belongs to the body
+frame; ids are reused.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,9 @@ STEEL = Material.isotropic("steel", youngs_pa=2e11, poisson=0.3, density_kg_m3=7
 
 @pytest.mark.parametrize("hooked", [True, False])
 def test_contacts_lie_on_the_surface_by_the_pose_before_the_step(client: Any, hooked: bool) -> None:
-    """A box thrown with spin through an offset, turned inertial frame: every contact is on its surface within the overlap."""
+    """A box thrown with spin through an offset, turned inertial frame: every contact is on its surface within the
+    overlap.
+    """
     floor(client)
     body = client.createMultiBody(
         0.3,
@@ -88,7 +92,12 @@ def test_links_have_poses_speeds_and_rows_of_their_own(client: Any) -> None:
     for _ in range(200):
         before.append([state[0] for state in client.getLinkStates(robot, range(7), computeForwardKinematics=1)])
         client.stepSimulation()
-        after.append([state[6] for state in client.getLinkStates(robot, range(7), computeLinkVelocity=1, computeForwardKinematics=1)])
+        after.append(
+            [
+                state[6]
+                for state in client.getLinkStates(robot, range(7), computeLinkVelocity=1, computeForwardKinematics=1)
+            ]
+        )
     links = {(x.body_id, x.link) for x in world.bodies}
     assert (ball, -1) in links
     assert any(body == robot and link >= 0 for body, link in links)
@@ -115,7 +124,9 @@ def test_listening_changes_nothing(client: Any) -> None:
             listen(made)
         for _ in range(240):
             made.stepSimulation()
-        result = [made.getBasePositionAndOrientation(i) for i in range(4)] + [made.getJointState(robot, j)[:2] for j in range(15)]
+        result = [made.getBasePositionAndOrientation(i) for i in range(4)] + [
+            made.getJointState(robot, j)[:2] for j in range(15)
+        ]
         disconnect(made)
         return result
 
@@ -230,14 +241,20 @@ def test_mesh_frames_follow_offset_and_turned_inertial_frames(client: Any) -> No
     body = client.createMultiBody(
         1,
         client.createCollisionShape(
-            p.GEOM_MESH, fileName=DUCK, meshScale=[0.1, 0.2, 0.1], collisionFramePosition=[1, 0, 0], collisionFrameOrientation=turned(0, 0, 1)
+            p.GEOM_MESH,
+            fileName=DUCK,
+            meshScale=[0.1, 0.2, 0.1],
+            collisionFramePosition=[1, 0, 0],
+            collisionFrameOrientation=turned(0, 0, 1),
         ),
         baseInertialFramePosition=[0.1, 0.2, 0.3],
         baseInertialFrameOrientation=turned(0.2, 0, 0),
     )
     (shape,) = open_world(client).shapes_of(body)
     hull = np.array(client.getMeshData(body, -1, 0)[1])
-    placed = shape.vertex_m @ np.array(p.getMatrixFromQuaternion(shape.quaternion_xyzw)).reshape(3, 3).T + shape.position_m
+    placed = (
+        shape.vertex_m @ np.array(p.getMatrixFromQuaternion(shape.quaternion_xyzw)).reshape(3, 3).T + shape.position_m
+    )
     nearest = np.array([np.linalg.norm(placed - v, axis=1).min() for v in hull])
     assert nearest.max() < 1e-3
     assert len(shape.face) > 4000

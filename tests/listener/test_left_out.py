@@ -1,4 +1,6 @@
-"""One body whose numbers break, or a soft one, takes nothing from the sound of the others: it is named once and left out."""
+"""One body whose numbers break, or a soft one, takes nothing from the sound of the others: it is named once and left
+out.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,9 @@ NAN_SPEED = [math.nan, 0, 0]
 
 
 def two_balls(client: Any) -> tuple[int, int]:
-    """One about to land, one in the air: what touches a body that is no number becomes none too, for Bullet's solver hands it on."""
+    """One about to land, one in the air: what touches a body that is no number becomes none too, for Bullet's solver
+    hands it on.
+    """
     floor(client)
     return thing(client, "sphere", [0, 0, 0.06]), thing(client, "sphere", [1, 0, 3])
 
@@ -76,7 +80,9 @@ def test_its_record_ends_and_the_note_names_it(client: Any, hooked: bool) -> Non
 
     step()
     client.resetBaseVelocity(bad, NAN_SPEED)
-    with pytest.warns(SceneWarning, match=rf"body {bad} \(.+\) has a pose or speed that is not a number, or beyond 1e9: it is mute") as said:
+    with pytest.warns(
+        SceneWarning, match=rf"body {bad} \(.+\) has a pose or speed that is not a number, or beyond 1e9: it is mute"
+    ) as said:
         for _ in range(30):
             step()
     assert len(said) == 1
@@ -121,7 +127,9 @@ def test_a_partner_of_absurd_mass_is_muted(client: Any, hooked: bool) -> None:
     """Nobody added it, so nobody refused it: found when it first touches."""
     client.setGravity(0, 0, 0)
     good, _ = two_balls(client)
-    bad = client.createMultiBody(2e12, client.createCollisionShape(p.GEOM_SPHERE, radius=0.05), basePosition=[2, 0, 0.05001])
+    bad = client.createMultiBody(
+        2e12, client.createCollisionShape(p.GEOM_SPHERE, radius=0.05), basePosition=[2, 0, 0.05001]
+    )
     client.resetBaseVelocity(good, [0, 0, -1])
     client.resetBaseVelocity(bad, [0, 0, -1e-4])
     world = open_world(client if hooked else client._client)
@@ -133,13 +141,17 @@ def test_a_partner_of_absurd_mass_is_muted(client: Any, hooked: bool) -> None:
             client.stepSimulation()
             if not hooked:
                 world.after_step()
-    assert [w.category for w in said if f"body {bad} (link0) has a mass or inertia" in str(w.message)] == [SceneWarning], [str(w.message) for w in said]
+    assert [w.category for w in said if f"body {bad} (link0) has a mass or inertia" in str(w.message)] == [
+        SceneWarning
+    ], [str(w.message) for w in said]
     assert world.step_count == 60
     assert world.index_of(good) >= 0
 
 
 def test_bodies_that_break_each_other_are_all_named(client: Any) -> None:
-    """A ball without a number touches the floor: the solver makes none of the floor either, and the rows between them are none."""
+    """A ball without a number touches the floor: the solver makes none of the floor either, and the rows between them
+    are none.
+    """
     good, bad = two_balls(client)
     world, steps = listen(client)
     for _ in range(20):
@@ -205,7 +217,14 @@ def cloth_world(client: Any) -> tuple[int, int]:
     client.setGravity(0, 0, -9.81)
     client.setAdditionalSearchPath(pybullet_data.getDataPath())
     floor(client)
-    how = {"useMassSpring": 1, "useBendingSprings": 1, "springElasticStiffness": 40, "springDampingStiffness": 0.1, "frictionCoeff": 0.5, "useFaceContact": 1}
+    how = {
+        "useMassSpring": 1,
+        "useBendingSprings": 1,
+        "springElasticStiffness": 40,
+        "springDampingStiffness": 0.1,
+        "frictionCoeff": 0.5,
+        "useFaceContact": 1,
+    }
     cloth = client.loadSoftBody("cloth_z_up.obj", basePosition=[0, 0, 0.3], mass=1.0, **how)
     return cloth, thing(client, "box", [0, 0, 0.6])
 

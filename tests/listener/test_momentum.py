@@ -15,7 +15,9 @@ from tests.made.scenes import GRAVITY, MASS_KG, floor, impulse_on, listen, thing
 SHAPES = ("sphere", "box", "capsule", "cylinder", "mesh", "compound")
 
 
-def worst_error(client: Any, shape: str, dt: float, floor_first: bool, *, hooked: bool = True, seconds: float = 0.6, **how: Any) -> tuple[float, int]:
+def worst_error(
+    client: Any, shape: str, dt: float, floor_first: bool, *, hooked: bool = True, seconds: float = 0.6, **how: Any
+) -> tuple[float, int]:
     """Largest |ΣJ - (mΔv - mg dt)| over the largest momentum at hand, and how many steps carried a load."""
     client.setTimeStep(dt)
     if floor_first:
@@ -96,7 +98,13 @@ def articulated_error(client: Any, urdf: str, position: Any) -> tuple[float, flo
     world, steps = listen(client)
 
     def momentum() -> np.ndarray:
-        links = [client.getBaseVelocity(body)[0], *(client.getLinkState(body, j, computeLinkVelocity=1, computeForwardKinematics=1)[6] for j in range(joints))]
+        links = [
+            client.getBaseVelocity(body)[0],
+            *(
+                client.getLinkState(body, j, computeLinkVelocity=1, computeForwardKinematics=1)[6]
+                for j in range(joints)
+            ),
+        ]
         return np.array(masses) @ np.array(links)
 
     errors = []
@@ -105,14 +113,20 @@ def articulated_error(client: Any, urdf: str, position: Any) -> tuple[float, flo
         client.stepSimulation()
         wanted = momentum() - before - sum(masses) * GRAVITY * dt
         if len(steps[-1].contacts):
-            impulse = sum(impulse_on(world, steps[-1], body, link) for link in range(-1, joints) if world.index_of(body, link) >= 0)
+            impulse = sum(
+                impulse_on(world, steps[-1], body, link)
+                for link in range(-1, joints)
+                if world.index_of(body, link) >= 0
+            )
             errors.append(np.linalg.norm(impulse - wanted) / (sum(masses) * 9.81 * dt))
     return float(np.median(errors)), float(np.max(errors)), len(errors)
 
 
 def test_articulated_bodies_keep_momentum_as_well_as_bullet_does(client: Any) -> None:
-    """A tumbling r2d2 with free joints, in units of its weight times the step. (Measured 2.6e-10 and 4.9e-6; humanoids and dogs with
-    tight joint limits 1e-3 and 0.2: Bullet's articulated step does not conserve momentum exactly there.)"""
+    """A tumbling r2d2 with free joints, in units of its weight times the step.
+
+    (Measured 2.6e-10 and 4.9e-6; humanoids and dogs with tight joint limits 1e-3 and 0.2: Bullet's articulated step
+    does not conserve momentum exactly there.)"""
     median, largest, loaded = articulated_error(client, pybullet_data.getDataPath() + "/r2d2.urdf", [0, 0, 0.7])
     assert loaded > 100
     assert median < 1e-6

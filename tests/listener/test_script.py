@@ -62,26 +62,45 @@ def test_endless_scripts_end_on_time(script: Any, text: str) -> None:
     assert len(seen) == 120
     assert names["count"] == 119
     assert time.perf_counter() - start < 5
-    assert functions == (p.connect, p.stepSimulation, p.disconnect, time.sleep, BulletClient.__getattr__, p.setRealTimeSimulation)
+    assert functions == (
+        p.connect,
+        p.stepSimulation,
+        p.disconnect,
+        time.sleep,
+        BulletClient.__getattr__,
+        p.setRealTimeSimulation,
+    )
     assert p.isConnected(seen[0])
     assert p.getConnectionInfo(seen[0])["connectionMethod"] == p.DIRECT
 
 
 def test_short_scripts_end_where_they_end(script: Any) -> None:
     seen: list[int] = []
-    names = script("import pybullet as p\nc = p.connect(p.DIRECT)\nfor _ in range(10):\n    p.stepSimulation()\np.disconnect()\nx = 3\n", 5, after=seen.append)
+    names = script(
+        "import pybullet as p\nc = p.connect(p.DIRECT)\nfor _ in range(10):\n    p.stepSimulation()\np.disconnect()\nx = 3\n",
+        5,
+        after=seen.append,
+    )
     assert len(seen) == 10 and names["x"] == 3
 
 
 def test_time_steps_are_added_as_they_are(script: Any) -> None:
     seen: list[int] = []
-    script("import pybullet as p\np.connect(p.DIRECT)\np.setTimeStep(0.01)\nwhile True: p.stepSimulation()\n", 0.3, after=seen.append)
+    script(
+        "import pybullet as p\np.connect(p.DIRECT)\np.setTimeStep(0.01)\nwhile True: p.stepSimulation()\n",
+        0.3,
+        after=seen.append,
+    )
     assert len(seen) == 30
 
 
 def test_real_time_scripts_step_while_they_sleep(script: Any) -> None:
     seen: list[int] = []
-    script("import pybullet as p, time\np.connect(p.GUI)\np.setRealTimeSimulation(1)\nwhile True: time.sleep(0.1)\n", 0.5, after=seen.append)
+    script(
+        "import pybullet as p, time\np.connect(p.GUI)\np.setRealTimeSimulation(1)\nwhile True: time.sleep(0.1)\n",
+        0.5,
+        after=seen.append,
+    )
     assert len(seen) == 120
 
 

@@ -1,4 +1,7 @@
-"""The door for another simulator: whoever says what `World` asks for is heard, PyBullet or not. Here a contact log plays the simulator."""
+"""The door for another simulator: whoever says what `World` asks for is heard, PyBullet or not.
+
+Here a contact log plays the simulator.
+"""
 
 from __future__ import annotations
 
@@ -37,7 +40,15 @@ class Recorded(World):
     def shapes_of(self, body: int, link: int = -1) -> tuple[Shape, ...]:
         return ()
 
-    def add(self, body: int, link: int = -1, *, material: Material | None = None, model: ModalModel | None = None, shapes: Sequence[Shape] = ()) -> Body:
+    def add(
+        self,
+        body: int,
+        link: int = -1,
+        *,
+        material: Material | None = None,
+        model: ModalModel | None = None,
+        shapes: Sequence[Shape] = (),
+    ) -> Body:
         raise SceneError("a log takes no bodies", "record another")
 
     def after_step(self) -> Step:

@@ -71,13 +71,21 @@ def test_extents_by_the_body_pose_are_those_of_the_collision(client: Any, urdf: 
     links = links_with_shapes(world.client_id, body)
     assert links
     for _, link in links:
-        position, quaternion = client.getBasePositionAndOrientation(body) if link < 0 else client.getLinkState(body, link, computeForwardKinematics=1)[:2]
+        position, quaternion = (
+            client.getBasePositionAndOrientation(body)
+            if link < 0
+            else client.getLinkState(body, link, computeForwardKinematics=1)[:2]
+        )
         if np.abs(matrix(quaternion)).max(axis=1).min() < 0.999:
             continue
         shapes = world.shapes_of(body, link)
         points = np.concatenate([hull_points(shape) for shape in shapes]) @ matrix(quaternion).T + position
         low, high = np.array(client.getAABB(body, link))
-        spread = 0.01 * (high - low).max() if any(s.kind == "box" and np.abs(matrix(s.quaternion_xyzw)).max(axis=1).min() < 0.999 for s in shapes) else 0.0
+        spread = (
+            0.01 * (high - low).max()
+            if any(s.kind == "box" and np.abs(matrix(s.quaternion_xyzw)).max(axis=1).min() < 0.999 for s in shapes)
+            else 0.0
+        )
         assert np.abs(points.min(axis=0) - low).max() < MARGIN_M + spread, (urdf, link)
         assert np.abs(points.max(axis=0) - high).max() < MARGIN_M + spread, (urdf, link)
 
@@ -88,7 +96,13 @@ def test_every_kind_comes_back_as_itself(client: Any, shape: str, maximal: bool)
     body = thing(client, shape, [0, 0, 1], useMaximalCoordinates=maximal)
     (piece,) = open_world(client).shapes_of(body)
     assert piece.kind == shape
-    sizes = {"sphere": (0.05, 0, 0), "box": (0.2, 0.1, 0.06), "capsule": (0.03, 0.1, 0), "cylinder": (0.03, 0.1, 0), "mesh": (0, 0, 0)}
+    sizes = {
+        "sphere": (0.05, 0, 0),
+        "box": (0.2, 0.1, 0.06),
+        "capsule": (0.03, 0.1, 0),
+        "cylinder": (0.03, 0.1, 0),
+        "mesh": (0, 0, 0),
+    }
     np.testing.assert_allclose(piece.size_m, sizes[shape], atol=1e-12)
 
 
@@ -125,7 +139,12 @@ def test_the_file_is_preferred_to_its_hull(client: Any) -> None:
 
 def test_concave_statics_and_bare_vertices(client: Any) -> None:
     world = open_world(client)
-    concave = client.createMultiBody(0, client.createCollisionShape(p.GEOM_MESH, fileName=DUCK, meshScale=[0.1] * 3, flags=p.GEOM_FORCE_CONCAVE_TRIMESH))
+    concave = client.createMultiBody(
+        0,
+        client.createCollisionShape(
+            p.GEOM_MESH, fileName=DUCK, meshScale=[0.1] * 3, flags=p.GEOM_FORCE_CONCAVE_TRIMESH
+        ),
+    )
     (duck,) = world.shapes_of(concave)
     assert len(duck.face) > 4000
     corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
@@ -133,7 +152,9 @@ def test_concave_statics_and_bare_vertices(client: Any) -> None:
     (tetrahedron,) = world.shapes_of(hulled)
     assert is_closed(tetrahedron.face)
     assert volume_m3(tetrahedron.vertex_m, tetrahedron.face) == pytest.approx(0.5**3 / 6, rel=1e-3)
-    indexed = client.createMultiBody(1, client.createCollisionShape(p.GEOM_MESH, vertices=corners, indices=[0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3]))
+    indexed = client.createMultiBody(
+        1, client.createCollisionShape(p.GEOM_MESH, vertices=corners, indices=[0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3])
+    )
     with pytest.raises(MeshError, match="pass mesh="):
         world.shapes_of(indexed)
     empty = client.createMultiBody(1)
@@ -161,7 +182,10 @@ def test_the_lid_over_a_bowl_stands_as_high_as_the_bowl_is_deep(wall: float) -> 
     import trimesh
 
     turned = np.concatenate(
-        [r * np.stack([np.cos(t), np.sin(t)], axis=1) for r, t in ((1, np.linspace(-np.pi / 2, 0, 9)), (1 - wall, np.linspace(0, -np.pi / 2, 9)))]
+        [
+            r * np.stack([np.cos(t), np.sin(t)], axis=1)
+            for r, t in ((1, np.linspace(-np.pi / 2, 0, 9)), (1 - wall, np.linspace(0, -np.pi / 2, 9)))
+        ]
     )
     bowl = trimesh.creation.revolve(turned, sections=48)
     assert lid_height_m(np.array(bowl.vertices), np.array(bowl.faces)) == pytest.approx(1 - wall, rel=0.03)

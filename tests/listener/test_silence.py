@@ -1,4 +1,6 @@
-"""What must not become a row: neighbours without force, sleep, hand moves, spawns inside, second polls; and bad numbers are named."""
+"""What must not become a row: neighbours without force, sleep, hand moves, spawns inside, second polls; and bad numbers
+are named.
+"""
 
 from __future__ import annotations
 
@@ -213,7 +215,8 @@ def test_a_pose_that_is_no_number_is_named(client: Any) -> None:
     listen(client)
     client.stepSimulation()
     client.resetBaseVelocity(bad, [math.nan, 0, 0])
-    with pytest.warns(SceneWarning, match=rf"body {bad} \(.*\) has a pose or speed that is not a number"):  # the others go on: test_left_out
+    # the others go on: test_left_out
+    with pytest.warns(SceneWarning, match=rf"body {bad} \(.*\) has a pose or speed that is not a number"):
         for _ in range(3):
             client.stepSimulation()
 

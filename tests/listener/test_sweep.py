@@ -15,7 +15,9 @@ from tests.made.scenes import floor, listen, thing, turned
 def sweeps_of(world: World, steps: list[Step], body: int) -> np.ndarray:
     """(rows, 2): speed over the body, over its partner."""
     index = world.index_of(body)
-    return np.concatenate([np.where((s.contacts.a == index)[:, None], s.contacts.sweep_m_s, s.contacts.sweep_m_s[:, ::-1]) for s in steps])
+    return np.concatenate(
+        [np.where((s.contacts.a == index)[:, None], s.contacts.sweep_m_s, s.contacts.sweep_m_s[:, ::-1]) for s in steps]
+    )
 
 
 @pytest.mark.parametrize("dt", [1 / 60, 1 / 240, 1 / 1000])
@@ -73,7 +75,9 @@ def test_slip_is_the_difference_of_both_sweeps(client: Any) -> None:
     """u_b - u_a = slip holds for every row: no sweep is smaller than the other less the slip."""
     floor(client)
     for i in range(4):
-        body = thing(client, ["cylinder", "capsule", "box", "mesh"][i], [0.3 * i, 0, 0.15], orientation=turned(0.4, 0.3 * i, 0.1))
+        body = thing(
+            client, ["cylinder", "capsule", "box", "mesh"][i], [0.3 * i, 0, 0.15], orientation=turned(0.4, 0.3 * i, 0.1)
+        )
         client.resetBaseVelocity(body, [0.5, 0.3, 0], [3, 4, 5])
     _, steps = listen(client)
     for _ in range(240):

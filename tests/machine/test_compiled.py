@@ -1,4 +1,6 @@
-"""Machine code kept between processes: nobody else can put any there, nothing broken there ends a run, and nowhere to keep it is no error."""
+"""Machine code kept between processes: nobody else can put any there, nothing broken there ends a run, and nowhere to
+keep it is no error.
+"""
 
 from __future__ import annotations
 
@@ -47,9 +49,19 @@ def folder(tmp_path: Path) -> Path:
 
 def hits(folder: Path, **environment: str) -> int:
     """How many kernels another process found compiled; it computes with them all the same."""
-    known = {name: value for name, value in os.environ.items() if name not in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME", "HOME")}
+    known = {
+        name: value for name, value in os.environ.items() if name not in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME", "HOME")
+    }
     where = environment or {"NUMBA_CACHE_DIR": str(folder / "cache")}
-    done = subprocess.run([sys.executable, "-c", MAIN, folder], cwd=folder, env=known | where, check=False, capture_output=True, text=True, timeout=120)
+    done = subprocess.run(
+        [sys.executable, "-c", MAIN, folder],
+        cwd=folder,
+        env=known | where,
+        check=False,
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
     return int(done.stdout)
@@ -86,13 +98,22 @@ def test_a_second_process_does_not_compile(folder: Path) -> None:
 
 
 @pytest.mark.parametrize("ending", [".nbi", ".nbc"])
-def test_a_kept_file_that_is_not_as_it_was_written_is_compiled_anew(place: Path, monkeypatch: pytest.MonkeyPatch, ending: str) -> None:
+def test_a_kept_file_that_is_not_as_it_was_written_is_compiled_anew(
+    place: Path, monkeypatch: pytest.MonkeyPatch, ending: str
+) -> None:
     monkeypatch.chdir(place)
     assert found_here() == 0
     path = kept(place, ending)
     whole = path.read_bytes()
     middle = len(whole) // 2
-    for broken in (whole[:middle], b"", whole[:middle] + bytes([whole[middle] ^ 1]) + whole[middle + 1 :], FORGED, FORGED + whole, whole[:-32]):
+    for broken in (
+        whole[:middle],
+        b"",
+        whole[:middle] + bytes([whole[middle] ^ 1]) + whole[middle + 1 :],
+        FORGED,
+        FORGED + whole,
+        whole[:-32],
+    ):
         path.write_bytes(broken)
         assert found_here() == 0
         assert found_here() == 1  # and kept again
@@ -161,4 +182,6 @@ def test_every_kernel_is_compiled_in_the_one_place() -> None:
     found = {path.name: path.read_text() for path in PACKAGE.rglob("*.py") if path.name != "compiled.py"}
     kernels = sum(len(re.findall(r"^@njit\(", text, re.M)) for text in found.values())
     assert kernels > 60
-    assert [name for name, text in found.items() if re.search(r"from numba import .*jit|numba\.\w*jit|cache=True", text)] == []
+    assert [
+        name for name, text in found.items() if re.search(r"from numba import .*jit|numba\.\w*jit|cache=True", text)
+    ] == []

@@ -1,4 +1,6 @@
-"""Under a name there is the old file or the whole new one: on a disk that fills up, and after a kill; what a killed run leaves is swept."""
+"""Under a name there is the old file or the whole new one: on a disk that fills up, and after a kill; what a killed run
+leaves is swept.
+"""
 
 from __future__ import annotations
 
@@ -38,7 +40,13 @@ def names(folder: Path) -> set[str]:
 
 
 def benchmark(name: str, *words: str) -> Any:
-    done = subprocess.run([sys.executable, REPO / "benchmarks" / f"{name}.py", "--json", *words], check=False, capture_output=True, text=True, timeout=280)
+    done = subprocess.run(
+        [sys.executable, REPO / "benchmarks" / f"{name}.py", "--json", *words],
+        check=False,
+        capture_output=True,
+        text=True,
+        timeout=280,
+    )
     assert done.stdout, done.stderr
     found = json.loads(done.stdout)
     if "skipped" not in found:
@@ -50,12 +58,17 @@ def benchmark(name: str, *words: str) -> Any:
 
 
 def test_a_disk_that_fills_up_never_ends_with_exit_0_and_a_bad_file() -> None:
-    """The benchmark has every format at 40 fill levels; here are the compressed ones, whose last bytes are written at close, and an npz."""
+    """The benchmark has every format at 40 fill levels; here are the compressed ones, whose last bytes are written at
+    close, and an npz.
+    """
     found = benchmark("full_disk", "--levels", "8", "--kinds", ".flac,.ogg,.wav,.npz,preset")
     if "skipped" in found:
         pytest.skip(f"no small disk can be mounted here: {found['skipped']} fill levels not tried")
     assert [counts["levels"] for counts in found.values()] == [8] * 5
-    assert all(counts["whole"] + counts["refused"] == 8 and not counts["bad"] and counts["refused"] >= 2 for counts in found.values()), found
+    assert all(
+        counts["whole"] + counts["refused"] == 8 and not counts["bad"] and counts["refused"] >= 2
+        for counts in found.values()
+    ), found
 
 
 LIMITED = """
@@ -91,7 +104,9 @@ for name in sys.argv[1:]:
 def test_a_file_that_may_not_grow_is_refused_at_every_size_in_every_format(tmp_path: Path) -> None:
     """RLIMIT_FSIZE stands for a full disk where none can be mounted."""
     wanted = [f"a{extension}" for extension in audio.FORMATS]
-    done = subprocess.run([sys.executable, "-c", LIMITED, *wanted], cwd=tmp_path, check=False, capture_output=True, text=True, timeout=250)
+    done = subprocess.run(
+        [sys.executable, "-c", LIMITED, *wanted], cwd=tmp_path, check=False, capture_output=True, text=True, timeout=250
+    )
     assert done.returncode == 0, done.stderr
     lines = done.stdout.splitlines()
     assert len(lines) == 8 * len(wanted)
@@ -99,7 +114,9 @@ def test_a_file_that_may_not_grow_is_refused_at_every_size_in_every_format(tmp_p
     assert {name for name in names(tmp_path) if "sonic-bullet" in name} == set()
 
 
-def test_what_libsndfile_loses_silently_is_seen_when_it_is_read_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_libsndfile_loses_silently_is_seen_when_it_is_read_back(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     (tmp_path / "a.wav").write_bytes(b"old")
     real = soundfile.SoundFile.write
     monkeypatch.setattr(soundfile.SoundFile, "write", lambda self, data: real(self, data[:-1]))

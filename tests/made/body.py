@@ -1,6 +1,7 @@
 """A plate whose modes are known in closed form, struck at five places and heard at one, as the diagnosis takes a body.
 
-simply supported, a × b:  φ_mn = (2/√M) sin(mπx/a) sin(nπy/b),  f = (π/2) √(D/ρh) (m²/a² + n²/b²)        [Leissa 1969, eq. 4.20]
+simply supported, a × b:  φ_mn = (2/√M) sin(mπx/a) sin(nπy/b),  f = (π/2) √(D/ρh) (m²/a² + n²/b²)
+    [Leissa 1969, eq. 4.20]
 """
 
 from __future__ import annotations
@@ -53,7 +54,15 @@ def struck(model: ModalModel | None = None, lines: Any = None, signals: Array | 
     """The plate as a body; with lines and signals one that was fitted."""
     model = model or plate()
     recordings = tuple(
-        CaseRecording(Path(f"strike-{i}.wav"), None, "plate", "fit", (p[0] * SIDE_M[0], p[1] * SIDE_M[1], 0.0), (0.0, 0.0, -1.0), j)
+        CaseRecording(
+            Path(f"strike-{i}.wav"),
+            None,
+            "plate",
+            "fit",
+            (p[0] * SIDE_M[0], p[1] * SIDE_M[1], 0.0),
+            (0.0, 0.0, -1.0),
+            j,
+        )
         for i, (p, j) in enumerate(zip(STRIKES, IMPULSE, strict=True))
     )
     direction = np.array([[0.0, 0.0, -1.0]] * len(STRIKES) + [[0.0, 0.0, 1.0]])
@@ -66,7 +75,18 @@ def struck(model: ModalModel | None = None, lines: Any = None, signals: Array | 
             near = np.abs(lines.freq_hz / f - 1)
             if len(near) and near.min() < 0.006:
                 line[k] = int(near.argmin())
-    return Struck("plate", recordings, model, direction, np.array(IMPULSE), "velocity", cast(Family, object()), np.zeros(model.mode_count), line, recorded)
+    return Struck(
+        "plate",
+        recordings,
+        model,
+        direction,
+        np.array(IMPULSE),
+        "velocity",
+        cast(Family, object()),
+        np.zeros(model.mode_count),
+        line,
+        recorded,
+    )
 
 
 def truth(*effects: Effect) -> Hypothesis:
@@ -74,14 +94,24 @@ def truth(*effects: Effect) -> Hypothesis:
     return Hypothesis(ALPHA, BETA, GAIN, effects)
 
 
-def recorded(*effects: Effect, seconds: float = 0.7, noise: float = 2e-5, seed: int = 5, model: ModalModel | None = None) -> Struck:
+def recorded(
+    *effects: Effect, seconds: float = 0.7, noise: float = 2e-5, seed: int = 5, model: ModalModel | None = None
+) -> Struck:
     """The body with the effects as a recording shows it: played, noise added, lines found."""
     plain = struck(model)
     n = int(seconds * SR)
     observed = replace(
-        plain, recorded=cast(Recorded, Recorded(CaseObject("plate", None, 1.0, None), cast(Material, None), plain.recordings, None, None, None, None, SR))
+        plain,
+        recorded=cast(
+            Recorded,
+            Recorded(
+                CaseObject("plate", None, 1.0, None), cast(Material, None), plain.recordings, None, None, None, None, SR
+            ),
+        ),
     )  # type: ignore[arg-type]
     rng = np.random.default_rng(seed)
-    signals = np.stack([play(truth(*effects), observed, i, n, SR) + noise * rng.standard_normal(n) for i in range(len(STRIKES))])
+    signals = np.stack(
+        [play(truth(*effects), observed, i, n, SR) + noise * rng.standard_normal(n) for i in range(len(STRIKES))]
+    )
     lines = joint_lines(signals, SR, band_hz=(50.0, 7_500.0))
     return struck(model, lines, signals)

@@ -9,9 +9,15 @@ import numpy as np
 from sonic_bullet.records import Body, Material, ModalModel
 from sonic_bullet.records.contacts import Contacts, Step
 
-STEEL = Material.isotropic("steel", youngs_pa=2e11, poisson=0.29, density_kg_m3=7850, alpha_per_s=4.0, beta_s=2e-9, restitution=0.6)
-WOOD = Material.isotropic("wood", youngs_pa=1.1e10, poisson=0.3, density_kg_m3=700, alpha_per_s=40.0, beta_s=2e-7, restitution=0.4)
-GLASS = Material.isotropic("glass", youngs_pa=7e10, poisson=0.22, density_kg_m3=2500, alpha_per_s=8.0, beta_s=1e-8, restitution=0.6)
+STEEL = Material.isotropic(
+    "steel", youngs_pa=2e11, poisson=0.29, density_kg_m3=7850, alpha_per_s=4.0, beta_s=2e-9, restitution=0.6
+)
+WOOD = Material.isotropic(
+    "wood", youngs_pa=1.1e10, poisson=0.3, density_kg_m3=700, alpha_per_s=40.0, beta_s=2e-7, restitution=0.4
+)
+GLASS = Material.isotropic(
+    "glass", youngs_pa=7e10, poisson=0.22, density_kg_m3=2500, alpha_per_s=8.0, beta_s=1e-8, restitution=0.6
+)
 GRAVITY_M_S2 = np.array([0.0, 0.0, -9.81])
 UPRIGHT = np.array([0.0, 0.0, 0.0, 1.0])
 
@@ -23,8 +29,12 @@ def box_surface(edges_m: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
     return corner, np.array([t for q in quads for t in ((q[0], q[1], q[2]), (q[0], q[2], q[3]))], np.int32)
 
 
-def box_model(edges_m: Sequence[float], freq_hz: Sequence[float], material: Material = STEEL, *, seed: int = 0) -> ModalModel:
-    """A box of that size whose corners move as seeded directions say, a mode for each frequency, of about unit modal mass."""
+def box_model(
+    edges_m: Sequence[float], freq_hz: Sequence[float], material: Material = STEEL, *, seed: int = 0
+) -> ModalModel:
+    """A box of that size whose corners move as seeded directions say, a mode for each frequency, of about unit modal
+    mass.
+    """
     vertex, face = box_surface(edges_m)
     volume = float(np.prod(edges_m))
     mass = volume * material.density_kg_m3
@@ -34,7 +44,14 @@ def box_model(edges_m: Sequence[float], freq_hz: Sequence[float], material: Mate
     return ModalModel(freq, decay, shape, vertex, face, np.zeros(len(face)), volume, mass)
 
 
-def box_body(edges_m: Sequence[float], freq_hz: Sequence[float], material: Material = STEEL, *, body_id: int = 0, mass_kg: float | None = None) -> Body:
+def box_body(
+    edges_m: Sequence[float],
+    freq_hz: Sequence[float],
+    material: Material = STEEL,
+    *,
+    body_id: int = 0,
+    mass_kg: float | None = None,
+) -> Body:
     """The body of `box_model`. mass_kg None: as the model; 0: it does not move."""
     model = box_model(edges_m, freq_hz, material, seed=body_id)
     mass = model.mass_kg if mass_kg is None else mass_kg
@@ -49,8 +66,21 @@ def ball_body(radius_m: float, material: Material = STEEL, *, body_id: int = 0, 
     mass = volume * material.density_kg_m3 if mass_kg is None else mass_kg
     vertex, face = box_surface([2 * radius_m / np.sqrt(3)] * 3)
     none = np.zeros(0)
-    model = ModalModel(none, none, np.zeros((len(vertex), 3, 0)), vertex, face, np.full(len(face), 1 / radius_m), volume, mass)
-    return Body(body_id, -1, 0, f"ball{body_id}", mass, 0.4 * mass * radius_m**2 * np.eye(3), volume, 1 / radius_m, material, model)
+    model = ModalModel(
+        none, none, np.zeros((len(vertex), 3, 0)), vertex, face, np.full(len(face), 1 / radius_m), volume, mass
+    )
+    return Body(
+        body_id,
+        -1,
+        0,
+        f"ball{body_id}",
+        mass,
+        0.4 * mass * radius_m**2 * np.eye(3),
+        volume,
+        1 / radius_m,
+        material,
+        model,
+    )
 
 
 def wall_body(*, body_id: int = 9) -> Body:
@@ -76,7 +106,20 @@ def row(
     return Contacts(np.array([a]), np.array([b]), *one, np.array([approach]), np.array([gap]))
 
 
-def step(position_m: Sequence[Sequence[float]], contacts: Contacts | None = None, *, dt_s: float = 1 / 240, gravity: object = (0, 0, 0)) -> Step:
+def step(
+    position_m: Sequence[Sequence[float]],
+    contacts: Contacts | None = None,
+    *,
+    dt_s: float = 1 / 240,
+    gravity: object = (0, 0, 0),
+) -> Step:
     """A step with all bodies upright."""
     b = len(position_m)
-    return Step(dt_s, np.asarray(position_m, float), np.tile(UPRIGHT, (b, 1)), np.zeros(b, bool), contacts or Contacts.none(), np.asarray(gravity, float))
+    return Step(
+        dt_s,
+        np.asarray(position_m, float),
+        np.tile(UPRIGHT, (b, 1)),
+        np.zeros(b, bool),
+        contacts or Contacts.none(),
+        np.asarray(gravity, float),
+    )

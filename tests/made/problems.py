@@ -12,6 +12,8 @@ from sonic_bullet.effects.protocol import Effect
 BAND = (50.0, 7_500.0)
 
 
-def posed(bodies: tuple[Struck, ...], takes: Sequence[Judged], *effects: type[Effect], seed: int = 0) -> DiagnosisProblem:
+def posed(
+    bodies: tuple[Struck, ...], takes: Sequence[Judged], *effects: type[Effect], seed: int = 0
+) -> DiagnosisProblem:
     """The problem of these strikes, all of which are known to be comparable."""
     return DiagnosisProblem(bodies, Comparable(tuple(takes)), BAND, effects, seed)

@@ -45,11 +45,17 @@ def collision(client: Any, shape: str) -> int:
 def floor(client: Any, kind: str = "box") -> int:
     if kind == "plane":
         return client.createMultiBody(0, client.createCollisionShape(p.GEOM_PLANE))
-    return client.createMultiBody(0, client.createCollisionShape(p.GEOM_BOX, halfExtents=[5, 5, 0.5]), basePosition=[0, 0, -0.5])
+    return client.createMultiBody(
+        0, client.createCollisionShape(p.GEOM_BOX, halfExtents=[5, 5, 0.5]), basePosition=[0, 0, -0.5]
+    )
 
 
-def thing(client: Any, shape: str, position: Any, *, orientation: Any = (0, 0, 0, 1), friction: float = 0.5, **how: Any) -> int:
-    body = client.createMultiBody(MASS_KG, collision(client, shape), basePosition=position, baseOrientation=orientation, **how)
+def thing(
+    client: Any, shape: str, position: Any, *, orientation: Any = (0, 0, 0, 1), friction: float = 0.5, **how: Any
+) -> int:
+    body = client.createMultiBody(
+        MASS_KG, collision(client, shape), basePosition=position, baseOrientation=orientation, **how
+    )
     client.changeDynamics(body, -1, linearDamping=0, angularDamping=0, lateralFriction=friction)
     return body
 

@@ -22,7 +22,14 @@ def floor(client: Any, restitution: float = 0.6) -> int:
     return int(body)
 
 
-def box(client: Any, position: Sequence[float], *, edges: Sequence[float] = EDGES_M, mass: float = 0.4, turn: Sequence[float] = (0.3, 0.2, 0.1)) -> int:
+def box(
+    client: Any,
+    position: Sequence[float],
+    *,
+    edges: Sequence[float] = EDGES_M,
+    mass: float = 0.4,
+    turn: Sequence[float] = (0.3, 0.2, 0.1),
+) -> int:
     shape = client.createCollisionShape(p.GEOM_BOX, halfExtents=[e / 2 for e in edges])
     body = client.createMultiBody(mass, shape, basePosition=position, baseOrientation=p.getQuaternionFromEuler(turn))
     client.changeDynamics(body, -1, restitution=0.6, contactProcessingThreshold=0, linearDamping=0, angularDamping=0)
@@ -30,7 +37,9 @@ def box(client: Any, position: Sequence[float], *, edges: Sequence[float] = EDGE
 
 
 def ball(client: Any, position: Sequence[float], *, radius: float = 0.02, mass: float = 0.1) -> int:
-    body = client.createMultiBody(mass, client.createCollisionShape(p.GEOM_SPHERE, radius=radius), basePosition=position)
+    body = client.createMultiBody(
+        mass, client.createCollisionShape(p.GEOM_SPHERE, radius=radius), basePosition=position
+    )
     client.changeDynamics(body, -1, restitution=0.6, contactProcessingThreshold=0, linearDamping=0, angularDamping=0)
     return int(body)
 

@@ -1,4 +1,7 @@
-"""A cache entry is what was kept or nothing: flipped, forged, cut, of another name or form, it is a miss, computed anew and replaced."""
+"""A cache entry is what was kept or nothing:
+
+flipped, forged, cut, of another name or form, it is a miss, computed anew and replaced.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +33,9 @@ def skin() -> Shape:
 def model() -> ModalModel:
     box = trimesh.creation.box((0.1, 0.08, 0.05))
     shape = np.random.default_rng(0).normal(size=(8, 3, 2))
-    return ModalModel(np.array([900.0, 2100.0]), np.array([5.0, 9.0]), shape, box.vertices, box.faces, np.zeros(12), 4e-4, 3.14)
+    return ModalModel(
+        np.array([900.0, 2100.0]), np.array([5.0, 9.0]), shape, box.vertices, box.faces, np.zeros(12), 4e-4, 3.14
+    )
 
 
 def of_modes(folder: Path) -> list[np.ndarray]:
@@ -77,13 +82,22 @@ def test_float32_in_place_of_float64_is_a_miss_and_is_replaced(
     kept = {path: path.read_bytes() for path in tmp_path.glob("*.npz")}
     for path in kept:
         parts = entries(path)
-        wide = {name: npy(array.astype(np.float32)) for name, content in parts.items() if (array := np.load(io.BytesIO(content))).dtype == np.float64}
+        wide = {
+            name: npy(array.astype(np.float32))
+            for name, content in parts.items()
+            if (array := np.load(io.BytesIO(content))).dtype == np.float64
+        }
         assert wide
         rewritten(path, parts | wide)
     again = make(tmp_path)
     assert all(one.tobytes() == other.tobytes() for one, other in zip(fresh, again, strict=True))
     assert {path: path.read_bytes() for path in tmp_path.glob("*.npz")} == kept
-    for room, name in ((eigen, "solve"), (reduced, "_family"), (tensor, "_of_elements"), (radiated.radiation, "radiation")):
+    for room, name in (
+        (eigen, "solve"),
+        (reduced, "_family"),
+        (tensor, "_of_elements"),
+        (radiated.radiation, "radiation"),
+    ):
         monkeypatch.setattr(room, name, lambda *_, **__: pytest.fail("computed again"))
     assert all(one.tobytes() == other.tobytes() for one, other in zip(fresh, make(tmp_path), strict=True))
 
@@ -103,7 +117,9 @@ def test_flipped_bits_are_a_miss_or_change_nothing(tmp_path: Path) -> None:
         path.write_bytes(whole[:position] + bytes([whole[position] ^ 1 << position % 8]) + whole[position + 1 :])
         found = cache.load(tmp_path, "k", LAYOUT)
         missed += found is None
-        assert found is None or (found[1] == "note" and all(found[0][name].tobytes() == ARRAYS[name].tobytes() for name in ARRAYS))
+        assert found is None or (
+            found[1] == "note" and all(found[0][name].tobytes() == ARRAYS[name].tobytes() for name in ARRAYS)
+        )
     assert missed > 0.8 * len(positions)
 
 
@@ -124,7 +140,9 @@ def test_flipped_bits_are_a_miss_or_change_nothing(tmp_path: Path) -> None:
         {"b": None},
     ],
 )
-def test_an_entry_of_another_form_is_a_miss_though_its_digest_is_right(tmp_path: Path, other: dict[str, np.ndarray | None]) -> None:
+def test_an_entry_of_another_form_is_a_miss_though_its_digest_is_right(
+    tmp_path: Path, other: dict[str, np.ndarray | None]
+) -> None:
     made = {name: array for name, array in (ARRAYS | other).items() if array is not None}
     cache.save(tmp_path, "k", made, "note")  # type: ignore[arg-type]
     assert cache.load(tmp_path, "k", LAYOUT) is None

@@ -1,4 +1,6 @@
-"""Named shapes and the same shapes as meshes against pencil and paper; the order of convergence; the yardsticks themselves."""
+"""Named shapes and the same shapes as meshes against pencil and paper; the order of convergence; the yardsticks
+themselves.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,10 @@ def as_mesh(mesh: trimesh.Trimesh) -> Shape:
 
 def bar_hz() -> np.ndarray:
     bending = exact.bar_bending_hz(LENGTH, SIDE, SIDE, E, NU, RHO, 6)
-    rest = exact.bar_longitudinal_hz(LENGTH, SIDE, SIDE, E, NU, RHO, 3), exact.square_bar_torsion_hz(LENGTH, SIDE, E, NU, RHO, 4)
+    rest = (
+        exact.bar_longitudinal_hz(LENGTH, SIDE, SIDE, E, NU, RHO, 3),
+        exact.square_bar_torsion_hz(LENGTH, SIDE, E, NU, RHO, 4),
+    )
     return np.sort(np.concatenate([bending, bending, *rest]))[:10]
 
 
@@ -52,7 +57,11 @@ def test_ten_modes_of_a_slender_bar(steel: Material, made: str) -> None:
 
 @pytest.mark.parametrize("ratio", [0.01, 0.005])
 def test_ten_modes_of_a_thin_plate(steel: Material, ratio: float) -> None:
-    shape = as_mesh(trimesh.creation.box((0.2, 0.2, 0.2 * ratio))) if ratio == 0.01 else Shape("box", [0.2, 0.2, 0.2 * ratio])
+    shape = (
+        as_mesh(trimesh.creation.box((0.2, 0.2, 0.2 * ratio)))
+        if ratio == 0.01
+        else Shape("box", [0.2, 0.2, 0.2 * ratio])
+    )
     found = analyse((shape,), steel, count=10, cache=None).freq_hz
     assert np.abs(found / exact.free_square_plate_hz(0.2, 0.2 * ratio, E, RHO) - 1).max() < 5e-3
 
@@ -75,7 +84,10 @@ def test_first_multiplets_of_a_ball_from_a_mesh(steel: Material) -> None:
 
 
 def test_eigenvalues_converge_with_the_fourth_power_of_the_element(steel: Material) -> None:
-    """λ_h = λ + c h^(2p), p = 2 [Strang & Fix 1973, ch. 6], fitted on the first six modes of the slender bar under uniform refinement."""
+    """λ_h = λ + c h^(2p), p = 2 [Strang & Fix 1973, ch.
+
+    6], fitted on the first six modes of the slender bar under uniform refinement.
+    """
     from scipy.optimize import brentq
 
     cuts = np.array([2.0, 3.0, 4.0])

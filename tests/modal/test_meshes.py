@@ -43,14 +43,20 @@ def test_a_box_is_recognised_however_it_lies() -> None:
     assert found is not None
     assert sorted(found[0]) == pytest.approx([0.02, 0.05, 0.1])
     assert found[2] == pytest.approx([1, 2, 3])
-    assert prisms.as_box(*(np.array(x) for x in (trimesh.creation.cylinder(1, 1).vertices, trimesh.creation.cylinder(1, 1).faces))) is None
+    assert (
+        prisms.as_box(
+            *(np.array(x) for x in (trimesh.creation.cylinder(1, 1).vertices, trimesh.creation.cylinder(1, 1).faces))
+        )
+        is None
+    )
 
 
 def test_a_box_of_polygons_with_nodes_along_their_edges_is_one() -> None:
     corner = np.array([[x, y, z] for x in (0, 1) for y in (0, 2) for z in (0, 3)], float)
     middle = np.array([[0, 0, 1.5]])
     polygon = [[0, 8, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1, 8], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
-    fan = np.array([[p[0], p[k], p[k + 1]] for p in polygon for k in range(1, len(p) - 1)])  # (0, 8, 1) lies on one edge
+    # (0, 8, 1) lies on one edge
+    fan = np.array([[p[0], p[k], p[k + 1]] for p in polygon for k in range(1, len(p) - 1)])
     found = prisms.as_box(np.concatenate([corner, middle]), fan)
     assert found is not None and sorted(found[0]) == pytest.approx([1, 2, 3])
 
@@ -108,7 +114,12 @@ def test_broken_meshes_are_named(steel: Material) -> None:
     def shape(vertex: list[list[float]]) -> Shape:
         return Shape("mesh", vertex_m=vertex, face=[[0, 1, 2]])
 
-    for vertex in ([[0, 0, 0]] * 3, [[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 0, 0], [1e9, 0, 0], [0, 1e9, 0]], [[0, 0, 0], [1e-9, 0, 0], [0, 1e-9, 0]]):
+    for vertex in (
+        [[0, 0, 0]] * 3,
+        [[0, 0, 0], [1, 0, 0], [2, 0, 0]],
+        [[0, 0, 0], [1e9, 0, 0], [0, 1e9, 0]],
+        [[0, 0, 0], [1e-9, 0, 0], [0, 1e-9, 0]],
+    ):
         with pytest.raises(MeshError):
             analyse((shape(vertex),), steel, cache=None)
     with pytest.raises(MeshError):
@@ -134,7 +145,9 @@ def test_mesh_files(tmp_path: Path) -> None:
         found = read_mesh(tmp_path / name, 0.001)
         assert (len(found.vertex_m), len(found.face)) == (8, 12)
         assert np.ptp(found.vertex_m, axis=0) == pytest.approx([0.001, 0.002, 0.003])
-    (tmp_path / "quad.obj").write_text("o one\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\no two\nv 0 0 1\nv 1 0 1\nv 0 1 1\nf 5 6 7\n")
+    (tmp_path / "quad.obj").write_text(
+        "o one\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\no two\nv 0 0 1\nv 1 0 1\nv 0 1 1\nf 5 6 7\n"
+    )
     assert len(read_mesh(tmp_path / "quad.obj").face) == 3
     whole = (tmp_path / "a.stl").read_bytes()
     (tmp_path / "lies.stl").write_bytes(whole[:80] + (10**6).to_bytes(4, "little") + whole[84:])
@@ -149,11 +162,18 @@ def test_mesh_files(tmp_path: Path) -> None:
 
 
 def test_a_fill_that_loses_its_volume_is_refused_by_name(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A shell thinner than the envelope may fill as crumbs: no modes are better than theirs. The error tells of all attempts."""
+    """A shell thinner than the envelope may fill as crumbs: no modes are better than theirs.
+
+    The error tells of all attempts.
+    """
     crumb = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]]) * 0.02
     monkeypatch.setattr(tetrahedra, "tetrahedra", lambda *_, **__: (crumb, np.array([[0, 1, 2, 3]])))
     with pytest.raises(MeshError, match="volume to 0%, the last of 3 attempts, each coarser, within 42 s in all"):
-        analyse((as_mesh(trimesh.creation.icosphere(2, 0.05)),), Material.isotropic("x", youngs_pa=1e9, poisson=0.3, density_kg_m3=1e3), cache=None)
+        analyse(
+            (as_mesh(trimesh.creation.icosphere(2, 0.05)),),
+            Material.isotropic("x", youngs_pa=1e9, poisson=0.3, density_kg_m3=1e3),
+            cache=None,
+        )
 
 
 def test_a_fill_that_time_made_coarser_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -176,5 +196,8 @@ def test_a_fill_that_time_made_coarser_says_so(monkeypatch: pytest.MonkeyPatch) 
 def test_clamps_that_hold_everything_are_refused() -> None:
     with pytest.raises(ModalError, match="hold the whole body"):
         analyse(
-            (Shape("box", size_m=[0.1, 0.05, 0.02]),), Material.isotropic("x", youngs_pa=1e9, poisson=0.3, density_kg_m3=1e3), fixed=((0, 0, 0, 9),), cache=None
+            (Shape("box", size_m=[0.1, 0.05, 0.02]),),
+            Material.isotropic("x", youngs_pa=1e9, poisson=0.3, density_kg_m3=1e3),
+            fixed=((0, 0, 0, 9),),
+            cache=None,
         )

@@ -46,13 +46,23 @@ def test_no_mode_is_missed() -> None:
 
 @pytest.mark.parametrize(
     "shape",
-    [Shape("sphere", [0.03, 0, 0]), Shape("box", [0.1, 0.05, 0.02]), Shape("cylinder", [0.02, 0.1, 0]), Shape("capsule", [0.02, 0.06, 0])],
+    [
+        Shape("sphere", [0.03, 0, 0]),
+        Shape("box", [0.1, 0.05, 0.02]),
+        Shape("cylinder", [0.02, 0.1, 0]),
+        Shape("capsule", [0.02, 0.06, 0]),
+    ],
     ids=lambda s: s.kind,
 )
 def test_named_shapes_have_their_volume_and_mass(shape: Shape, steel: Material) -> None:
     r, length = float(shape.size_m[0]), float(shape.size_m[1])
     ball = 4 / 3 * np.pi * r**3
-    volume = {"sphere": ball, "box": float(np.prod(shape.size_m)), "cylinder": np.pi * r**2 * length, "capsule": ball + np.pi * r**2 * length}[shape.kind]
+    volume = {
+        "sphere": ball,
+        "box": float(np.prod(shape.size_m)),
+        "cylinder": np.pi * r**2 * length,
+        "capsule": ball + np.pi * r**2 * length,
+    }[shape.kind]
     model = quick(shape, steel, count=3, edge_m=0.01)
     assert model.volume_m3 == pytest.approx(volume, rel=5e-3)
     assert model.mass_kg == pytest.approx(model.volume_m3 * 7850.0, rel=1e-12)
@@ -87,8 +97,12 @@ def test_stiffness_is_a_tensor(steel: Material) -> None:
 
 def test_clamped_bar_is_a_cantilever(steel: Material) -> None:
     """f₁ = 1.8751²/(2πL²)√(EI/ρA) [Rayleigh 1894, § 173]; nothing moves where it is held."""
-    model = analyse((Shape("box", [0.2, 0.01, 0.01]),), steel, count=2, edge_m=0.005, fixed=((-0.1, 0, 0, 0.0072),), cache=None)
-    longest, shortest = (1.8751**2 / (2 * np.pi * free**2) * np.sqrt(200e9 * 0.01**2 / 12 / 7850) for free in (0.2, 0.2 - 0.0072))
+    model = analyse(
+        (Shape("box", [0.2, 0.01, 0.01]),), steel, count=2, edge_m=0.005, fixed=((-0.1, 0, 0, 0.0072),), cache=None
+    )
+    longest, shortest = (
+        1.8751**2 / (2 * np.pi * free**2) * np.sqrt(200e9 * 0.01**2 / 12 / 7850) for free in (0.2, 0.2 - 0.0072)
+    )
     assert longest < model.freq_hz[0] < shortest
     held = np.linalg.norm(model.vertex_m - [-0.1, 0, 0], axis=1) <= 0.0072
     assert held.any() and np.abs(model.shape[held]).max() == 0.0
@@ -124,7 +138,9 @@ def test_same_body_same_bytes_without_a_cache(steel: Material) -> None:
     assert one.shape.tobytes() == two.shape.tobytes() and one.freq_hz.tobytes() == two.freq_hz.tobytes()
 
 
-def test_cache_gives_the_same_bits_and_survives_damage(steel: Material, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_cache_gives_the_same_bits_and_survives_damage(
+    steel: Material, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     fresh = quick(BAR, steel, cache=tmp_path)
     files = sorted(tmp_path.glob("*.npz"))
     assert len(files) == 2 and not list(tmp_path.glob("*partial*"))

@@ -1,4 +1,6 @@
-"""Families of boxes and of bodies of revolution against closed forms and against elements, turned and shifted; slopes against differences."""
+"""Families of boxes and of bodies of revolution against closed forms and against elements, turned and shifted; slopes
+against differences.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +32,9 @@ def hz(value: Array) -> Array:
 def test_a_square_plate_by_polynomials_is_the_published_one() -> None:
     side, thick = 0.2, 0.0005
     wanted = exact.free_square_plate_hz(side, thick, GAMMA, 1.0)
-    found = family(Shape("box", np.array([side, side, thick])), gamma_m2_s2=GAMMA, poisson=NU, to_hz=1.02 * wanted[-1], cache=None)
+    found = family(
+        Shape("box", np.array([side, side, thick])), gamma_m2_s2=GAMMA, poisson=NU, to_hz=1.02 * wanted[-1], cache=None
+    )
     assert not found.meshed
     assert hz(found.modes(GAMMA, NU)[0][: len(wanted)]) == pytest.approx(wanted, rel=1e-3)
 
@@ -40,7 +44,9 @@ def test_a_slender_bar_by_polynomials_bends_as_timoshenko_says() -> None:
     wanted = exact.bar_bending_hz(length, side, side, GAMMA, NU, 1.0, 6)
     found = family(box_mesh((length, side, side)), gamma_m2_s2=GAMMA, poisson=NU, to_hz=1.05 * wanted[-1], cache=None)
     near = hz(found.modes(GAMMA, NU)[0])
-    assert np.array([near[np.argsort(np.abs(near / f - 1))[:2]] for f in wanted]) == pytest.approx(np.stack([wanted, wanted], axis=1), rel=3e-4)
+    assert np.array([near[np.argsort(np.abs(near / f - 1))[:2]] for f in wanted]) == pytest.approx(
+        np.stack([wanted, wanted], axis=1), rel=3e-4
+    )
 
 
 @pytest.mark.parametrize("size", [(0.2, 0.13, 0.01), (0.1, 0.02, 0.006), (0.05, 0.05, 0.05), (0.08, 0.06, 0.025)])
@@ -103,7 +109,9 @@ def ring_mesh(inner: float, outer: float, height: float, turn: Array | None = No
 def test_a_thin_ring_bends_in_its_plane_as_love_says() -> None:
     """ω² = E I m²(m²−1)²/(ρ A R⁴ (m²+1)), a twin each [Love 1927, art. 293]."""
     radius, thick, tall = 0.1, 0.001, 0.001
-    found = family(ring_mesh(radius - thick / 2, radius + thick / 2, tall), gamma_m2_s2=GAMMA, poisson=NU, to_hz=1500, cache=None)
+    found = family(
+        ring_mesh(radius - thick / 2, radius + thick / 2, tall), gamma_m2_s2=GAMMA, poisson=NU, to_hz=1500, cache=None
+    )
     assert not found.meshed
     near = hz(found.modes(GAMMA, NU)[0])
     for m in (2, 3, 4, 5):

@@ -14,7 +14,8 @@ from sonic_bullet.modal.meshing import shape_meshes as shapes
 from sonic_bullet.records import Material
 from sonic_bullet.records.errors import MeshError, ModalError
 
-# Poisson's ratio that the recorded object has, as far as its frequency ratios tell; the case's guess is off by up to 0.04.
+# Poisson's ratio that the recorded object has, as far as its frequency ratios tell; the case's guess is off by up to
+# 0.04.
 RECORDED = {"practice-01": 0.30, "practice-03": 0.22, "practice-04": 0.325}
 
 
@@ -26,14 +27,18 @@ def test_ratios_of_the_independent_solver(case: str, shared_path: Path) -> None:
     truth = np.array(json.loads((place / "truth.json").read_text())["modes_hz"])[:15]
     guess = body["elastic_guess"]
     assert abs(RECORDED[case] - guess["poisson_ratio"]) <= 0.04
-    material = Material.isotropic("guess", youngs_pa=guess["youngs_modulus"], poisson=RECORDED[case], density_kg_m3=guess["density"])
+    material = Material.isotropic(
+        "guess", youngs_pa=guess["youngs_modulus"], poisson=RECORDED[case], density_kg_m3=guess["density"]
+    )
     found = analyse((read_mesh(place / body["mesh"]),), material, count=len(truth), cache=None).freq_hz
     assert np.abs(found / found[0] / (truth / truth[0]) - 1).max() < 0.01
 
 
 @pytest.mark.timeout(600)  # of wall time, which a busy machine multiplies
 def test_twenty_of_the_thousand_have_modes_or_a_name(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Coarse: a wide envelope and two passes, or the twenty would take two minutes (`benchmarks/modal_sweep.py` does it all with the defaults)."""
+    """Coarse: a wide envelope and two passes, or the twenty would take two minutes (`benchmarks/modal_sweep.py` does it
+    all with the defaults).
+    """
     import pybullet_data
 
     monkeypatch.setattr(shapes, "MOST_PASSES", shapes.LUMP_PASSES)

@@ -17,7 +17,9 @@ def two_boxes(gap_m: float) -> tuple[np.ndarray, np.ndarray]:
     """Boxes 0.1 × 0.02 × 0.01 m end to end, gap_m between them (negative: they overlap)."""
     left, right = trimesh.creation.box((0.1, 0.02, 0.01)), trimesh.creation.box((0.1, 0.02, 0.01))
     right.apply_translation([0.1 + gap_m, 0, 0])
-    return np.concatenate([left.vertices, right.vertices]), np.concatenate([left.faces, right.faces + len(left.vertices)])
+    return np.concatenate([left.vertices, right.vertices]), np.concatenate(
+        [left.faces, right.faces + len(left.vertices)]
+    )
 
 
 def united(vertex: np.ndarray, face: np.ndarray) -> tuple[np.ndarray, np.ndarray, str]:
@@ -57,7 +59,9 @@ def test_a_cavity_stays_a_cavity() -> None:
 
 def test_a_bar_in_two_pieces_rings_as_one_bar() -> None:
     """The union of the halves of a bar, a hair apart, has the bar's own modes, not the half's (four times as high)."""
-    plastic = Material.isotropic("plastic", youngs_pa=2.4e9, poisson=0.37, density_kg_m3=1050.0, alpha_per_s=30.0, beta_s=1e-6)
+    plastic = Material.isotropic(
+        "plastic", youngs_pa=2.4e9, poisson=0.37, density_kg_m3=1050.0, alpha_per_s=30.0, beta_s=1e-6
+    )
     vertex, face = two_boxes(5e-5)
     whole = analyse((Shape("box", size_m=np.array((0.20005, 0.02, 0.01))),), plastic, count=4, cache=None)
     halves = analyse((Shape("mesh", vertex_m=vertex, face=face),), plastic, count=4, edge_m=0.006, cache=None)

@@ -17,21 +17,39 @@ SR = 48_000
 DT = 1 / 240
 
 
-def rows(a: int, b: int, impulse_n_s: float, *, slip_m_s: float = 0.0, sweep_m_s: float = 0.0, points: int = 2) -> Contacts:
+def rows(
+    a: int, b: int, impulse_n_s: float, *, slip_m_s: float = 0.0, sweep_m_s: float = 0.0, points: int = 2
+) -> Contacts:
     """A pair's contact of one step, shared by some points; friction rides along."""
     k = points
     zero, up = np.zeros((k, 3)), np.tile([0.0, 0.0, 1.0], (k, 1))
     impulse = up * impulse_n_s / k + [0.001, 0, 0]
-    return Contacts([a] * k, [b] * k, zero, zero, up, impulse, np.tile([slip_m_s, 0, 0], (k, 1)), np.full((k, 2), sweep_m_s), np.zeros(k), np.zeros(k))
+    return Contacts(
+        [a] * k,
+        [b] * k,
+        zero,
+        zero,
+        up,
+        impulse,
+        np.tile([slip_m_s, 0, 0], (k, 1)),
+        np.full((k, 2), sweep_m_s),
+        np.zeros(k),
+        np.zeros(k),
+    )
 
 
 def log_of(steps: list[list[Contacts]], bodies: int = 3, silent: tuple[int, ...] = (0,)) -> ContactLog:
     none = np.zeros(0)
     model = ModalModel(none, none, np.zeros((0, 3, 0)), np.zeros((0, 3)), np.zeros((0, 3)), none, 0, 0)
     wood = Material.isotropic("wood", youngs_pa=1e10, poisson=0.3, density_kg_m3=700)
-    made = tuple(Body(i, -1, 0, f"body {i} $", 0.1, np.eye(3), material=wood, model=None if i in silent else model) for i in range(bodies))
+    made = tuple(
+        Body(i, -1, 0, f"body {i} $", 0.1, np.eye(3), material=wood, model=None if i in silent else model)
+        for i in range(bodies)
+    )
     still = (np.zeros((bodies, 3)), np.tile([0, 0, 0, 1.0], (bodies, 1)), np.zeros(bodies, bool))
-    return ContactLog(made, tuple(Step(DT, *still, Contacts.joined(parts)) for parts in steps), (Microphone([0, 0, 1]),), SR, 0)
+    return ContactLog(
+        made, tuple(Step(DT, *still, Contacts.joined(parts)) for parts in steps), (Microphone([0, 0, 1]),), SR, 0
+    )
 
 
 def test_a_strike_is_one_event_at_its_step_with_its_impulse() -> None:
@@ -51,7 +69,9 @@ def test_both_sounding_bodies_of_a_pair_are_struck() -> None:
     assert sorted(events.strike_body) == [1, 2]
 
 
-@pytest.mark.parametrize(("slip", "sweep", "kind"), [(0.0, 0.0, "rests"), (0.0, 0.2, "rolls"), (0.2, 0.2, "slides"), (0.2, 0.0, "slides")])
+@pytest.mark.parametrize(
+    ("slip", "sweep", "kind"), [(0.0, 0.0, "rests"), (0.0, 0.2, "rolls"), (0.2, 0.2, "slides"), (0.2, 0.0, "slides")]
+)
 def test_lasting_contacts_are_bars_of_their_kind(slip: float, sweep: float, kind: str) -> None:
     steps: list[list[Contacts]] = [[] for _ in range(40)]
     for i in range(10, 30):

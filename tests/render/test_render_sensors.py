@@ -26,11 +26,20 @@ def rendered(bodies: tuple[Any, ...], steps: list[Step], sensors: tuple[Any, ...
     return render_log(ContactLog(bodies, tuple(steps), sensors, sr, 0))
 
 
-def one_strike(bodies: tuple[Any, Any], contacts: Contacts, positions: Any, *, steps: int = 24, at: int = 2) -> list[Step]:
+def one_strike(
+    bodies: tuple[Any, Any], contacts: Contacts, positions: Any, *, steps: int = 24, at: int = 2
+) -> list[Step]:
     return [step(positions, contacts if i == at else None) for i in range(steps)]
 
 
-def struck_box(sensors: tuple[Any, ...], *, freq: tuple[float, ...] = (1500.0,), impulse: float = 0.01, where: Any = (0, 0, 0.005), **how: Any) -> np.ndarray:
+def struck_box(
+    sensors: tuple[Any, ...],
+    *,
+    freq: tuple[float, ...] = (1500.0,),
+    impulse: float = 0.01,
+    where: Any = (0, 0, 0.005),
+    **how: Any,
+) -> np.ndarray:
     """A floating box struck from above by a silent wall."""
     bodies = box_body(EDGES_M, freq), wall_body()
     contacts = row(0, 1, (0, 0, -impulse), normal=(0, 0, -1), point_a=where, approach=how.pop("approach", 1.0))
@@ -76,7 +85,11 @@ def test_the_level_is_the_radiation_law() -> None:
     decay = float(resonator.decay_per_s[0])
     age = (start - 400) / SR - 2.0 / C
     expected = abs(weight[0]) * pulse.share * abs(pulse.modes_low[0]) * spectrum / 2.0 * np.exp(-decay * age)
-    measured = np.sqrt(2) * np.sqrt(np.mean(signal[start : start + 3200] ** 2)) / np.sqrt((1 - np.exp(-2 * decay * 3200 / SR)) / (2 * decay * 3200 / SR))
+    measured = (
+        np.sqrt(2)
+        * np.sqrt(np.mean(signal[start : start + 3200] ** 2))
+        / np.sqrt((1 - np.exp(-2 * decay * 3200 / SR)) / (2 * decay * 3200 / SR))
+    )
     assert measured == pytest.approx(expected, rel=0.01)
     assert extra[0] > 0
 
@@ -92,7 +105,11 @@ def only_pulse(body: Any, contacts: Contacts) -> ForcePulse:
             return impacts
 
         patch.setattr(synthesizer, "find_pulses", listening)
-        rendered((body, wall_body()), one_strike((body, wall_body()), contacts, [(0, 0, 0), (0, 0, 0.01)], at=0, steps=5), (ModalSum(),))
+        rendered(
+            (body, wall_body()),
+            one_strike((body, wall_body()), contacts, [(0, 0, 0), (0, 0, 0.01)], at=0, steps=5),
+            (ModalSum(),),
+        )
     (pulse,) = found
     return pulse
 
@@ -131,7 +148,9 @@ def test_a_vibrometer_reads_the_surfaces_velocity() -> None:
     assert pulse.modes_low[0] == pytest.approx(-0.01 * phi, rel=1e-6)
     resonator = build_resonator(body, (), SR, Air())
     time = np.arange(signal.size) / SR - 2 / 240 - pulse.start_s - pulse.length_s / 2
-    expected = pulse.share * 0.01 * phi**2 * np.exp(-resonator.decay_per_s[0] * time) * np.cos(resonator.omega_rad_s[0] * time)
+    expected = (
+        pulse.share * 0.01 * phi**2 * np.exp(-resonator.decay_per_s[0] * time) * np.cos(resonator.omega_rad_s[0] * time)
+    )
     late = slice(600, 4000)
     assert np.abs(signal[late] - expected[late]).max() < 0.01 * np.abs(expected).max()
     other = struck_box((Vibrometer(5, [0.1, 0.05, 0.005], [0, 0, -1]),))
@@ -141,7 +160,15 @@ def test_a_vibrometer_reads_the_surfaces_velocity() -> None:
 # --- the click of a rigid body
 
 
-def clicked(direction_deg: tuple[float, ...], *, radius: float, material: Any, impulse: float = 0.001, mass: float | None = None, r: float = 1.0) -> np.ndarray:
+def clicked(
+    direction_deg: tuple[float, ...],
+    *,
+    radius: float,
+    material: Any,
+    impulse: float = 0.001,
+    mass: float | None = None,
+    r: float = 1.0,
+) -> np.ndarray:
     """A ball struck along +z, heard at angles from that direction, (channels, n)."""
     ball = ball_body(radius, material, mass_kg=mass)
     contacts = row(0, 1, (0, 0, impulse), normal=(0, 0, 1), point_a=(0, 0, -radius), approach=1.0)
@@ -150,7 +177,9 @@ def clicked(direction_deg: tuple[float, ...], *, radius: float, material: Any, i
 
 
 def click_blow(radius: float, material: Any, impulse: float) -> Any:
-    return only_pulse(ball_body(radius, material), row(0, 1, (0, 0, impulse), normal=(0, 0, 1), point_a=(0, 0, -radius), approach=1.0))
+    return only_pulse(
+        ball_body(radius, material), row(0, 1, (0, 0, impulse), normal=(0, 0, 1), point_a=(0, 0, -radius), approach=1.0)
+    )
 
 
 def test_a_rigid_click_has_a_dipoles_direction() -> None:
@@ -163,11 +192,15 @@ def test_a_rigid_click_has_a_dipoles_direction() -> None:
 
 
 def test_a_slow_compact_click_is_the_jerk_law() -> None:
-    """p = K cosθ · da/dt(t - r/c) / r [Chadwick, Zheng, James 2012], where the blow is long against a/c: a soft 4 mm ball."""
+    """p = K cosθ · da/dt(t - r/c) / r [Chadwick, Zheng, James 2012], where the blow is long against a/c: a soft 4 mm
+    ball.
+    """
     from sonic_bullet.synth.pulse import add_jerk
     from tests.made.models import Material
 
-    rubber = Material.isotropic("rubber", youngs_pa=3e6, poisson=0.45, density_kg_m3=1100, alpha_per_s=50.0, beta_s=1e-6)
+    rubber = Material.isotropic(
+        "rubber", youngs_pa=3e6, poisson=0.45, density_kg_m3=1100, alpha_per_s=50.0, beta_s=1e-6
+    )
     radius, impulse = 0.004, 1e-4
     ball = ball_body(radius, rubber)
     pulse = click_blow(radius, rubber, impulse)
@@ -189,12 +222,17 @@ def test_a_slow_compact_click_is_the_jerk_law() -> None:
     assert pulse.impulse_n_s[2] == pytest.approx(impulse)
     assert np.abs(sound).max() == pytest.approx(np.abs(expected).max(), rel=0.02)
     late = np.argmin(sound) / SR - np.argmin(expected) / (SR * rate)
-    print(f"peak {np.abs(sound).max() / np.abs(expected).max():.4f} of the law, {(late - 1.0 / C) * SR:.2f} samples late")
+    print(
+        f"peak {np.abs(sound).max() / np.abs(expected).max():.4f} of the law, {(late - 1.0 / C) * SR:.2f} samples late"
+    )
     assert late == pytest.approx(1.0 / C, abs=2 / SR)
 
 
 def test_a_fast_click_is_kirchhoffs_sphere() -> None:
-    """p = ρ₀ c U (a/r) e^{-wt}(cos wt - sin wt), w = c/a [Kirchhoff 1876; Koss, Alfredson 1973]: a 10 cm steel ball's blow is short against a/c."""
+    """p = ρ₀ c U (a/r) e^{-wt}(cos wt - sin wt), w = c/a [Kirchhoff 1876;
+
+    Koss, Alfredson 1973]: a 10 cm steel ball's blow is short against a/c.
+    """
     radius, impulse = 0.10, 1.0
     ball = ball_body(radius)
     pulse = click_blow(radius, STEEL, impulse)
@@ -211,7 +249,11 @@ def test_a_fast_click_is_kirchhoffs_sphere() -> None:
     expected = np.zeros(sound.size)
     for part, weight in zip(sub, share, strict=True):
         t = time - part * pulse.length_s
-        expected += np.where(t > 0, weight * RHO * C * speed * radius / 2.0 * np.exp(-rate * t) * (np.cos(rate * t) - np.sin(rate * t)), 0.0)
+        expected += np.where(
+            t > 0,
+            weight * RHO * C * speed * radius / 2.0 * np.exp(-rate * t) * (np.cos(rate * t) - np.sin(rate * t)),
+            0.0,
+        )
     clear = slice(int((begin + pulse.length_s) * SR) + 12, None)
     assert np.abs(sound[clear] - expected[clear]).max() < 0.02 * np.abs(expected).max()
     assert np.abs(sound).max() == pytest.approx(np.abs(expected).max(), rel=0.05)
@@ -225,8 +267,14 @@ def test_a_body_that_does_not_move_does_not_click() -> None:
 def test_static_bodies_ring() -> None:
     body = box_body(EDGES_M, (800.0,), mass_kg=0.0)
     ball = ball_body(0.02, body_id=1)
-    contacts = row(1, 0, (0, 0, 0.05), normal=(0, 0, 1), point_a=(0, 0, -0.02), point_b=(0.02, 0.01, 0.005), approach=1.0)
-    sound = rendered((body, ball), one_strike((body, ball), contacts, [(0, 0, 0), (0.02, 0.01, 0.025)]), (Vibrometer(0, [0, 0, 0.005], [0, 0, 1]),))
+    contacts = row(
+        1, 0, (0, 0, 0.05), normal=(0, 0, 1), point_a=(0, 0, -0.02), point_b=(0.02, 0.01, 0.005), approach=1.0
+    )
+    sound = rendered(
+        (body, ball),
+        one_strike((body, ball), contacts, [(0, 0, 0), (0.02, 0.01, 0.025)]),
+        (Vibrometer(0, [0, 0, 0.005], [0, 0, 1]),),
+    )
     assert np.abs(sound).max() > 1e-4
 
 

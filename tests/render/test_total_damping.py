@@ -1,4 +1,6 @@
-"""What a mode loses to the air is played once: on top of a material's own damping, not on top of one that was recorded with it."""
+"""What a mode loses to the air is played once: on top of a material's own damping, not on top of one that was recorded
+with it.
+"""
 
 from __future__ import annotations
 
@@ -46,9 +48,14 @@ def test_total_damping_is_played_as_it_is() -> None:
 
 def test_it_travels_from_the_preset_to_the_modes(tmp_path: Path) -> None:
     steel = named_preset("steel")
-    write_preset(tmp_path / "total.json", msgspec.structs.replace(steel, damping=msgspec.structs.replace(steel.damping, includes_radiation=True)))
+    write_preset(
+        tmp_path / "total.json",
+        msgspec.structs.replace(steel, damping=msgspec.structs.replace(steel.damping, includes_radiation=True)),
+    )
     shape = (Shape("box", np.array([0.1, 0.02, 0.004])),)
-    models = [analyse(shape, load_material(name), count=3, cache=None) for name in ("steel", str(tmp_path / "total.json"))]
+    models = [
+        analyse(shape, load_material(name), count=3, cache=None) for name in ("steel", str(tmp_path / "total.json"))
+    ]
     assert [m.includes_radiation for m in models] == [False, True]
     law = presets.effect_of({"id": "damping-law", "law": "constant-loss", "eta": 1e-3})
     assert with_modes(models[1], replace(load_material(tmp_path / "total.json"), effects=(law,))).includes_radiation
@@ -69,10 +76,15 @@ def test_a_log_keeps_it_and_older_logs_are_as_they_were(tmp_path: Path) -> None:
         write_log(tmp_path / "log.npz", log)
         again = read_log(tmp_path / "log.npz")
         assert again.bodies[0].model is not None and again.bodies[0].material is not None
-        assert again.bodies[0].model.includes_radiation == again.bodies[0].material.includes_radiation == material.includes_radiation
+        assert (
+            again.bodies[0].model.includes_radiation
+            == again.bodies[0].material.includes_radiation
+            == material.includes_radiation
+        )
         sounds.append(render_log(log))
         assert render_log(again).tobytes() == sounds[-1].tobytes()
-        assert (b"includes_radiation" in (tmp_path / "log.npz").read_bytes()) == material.includes_radiation  # a log without it is the older one's bytes
+        # a log without it is the older one's bytes
+        assert (b"includes_radiation" in (tmp_path / "log.npz").read_bytes()) == material.includes_radiation
     late = slice(-480, None)
     assert np.abs(sounds[1][0, late]).max() > np.abs(sounds[0][0, late]).max()
 
@@ -89,8 +101,14 @@ def test_a_log_keeps_it_and_older_logs_are_as_they_were(tmp_path: Path) -> None:
 )
 def test_what_a_preset_means(says: bool | None, fitted: bool, assumed: tuple[str, ...], total: bool) -> None:
     steel = named_preset("steel")
-    origin = Provenance(method="modes paired with damped sinusoids of maximum likelihood; least squares", assumed=assumed) if fitted else None
-    preset = msgspec.structs.replace(steel, damping=msgspec.structs.replace(steel.damping, includes_radiation=says), provenance=origin)
+    origin = (
+        Provenance(method="modes paired with damped sinusoids of maximum likelihood; least squares", assumed=assumed)
+        if fitted
+        else None
+    )
+    preset = msgspec.structs.replace(
+        steel, damping=msgspec.structs.replace(steel.damping, includes_radiation=says), provenance=origin
+    )
     assert total_damping(preset) is material_of(preset).includes_radiation is total
 
 

@@ -1,4 +1,7 @@
-"""A residual in a preset file: small, exact to a quarter of a decibel, refused in one line where it cannot be; and the command that makes it."""
+"""A residual in a preset file:
+
+small, exact to a quarter of a decibel, refused in one line where it cannot be; and the command that makes it.
+"""
 
 from __future__ import annotations
 
@@ -47,7 +50,15 @@ def test_a_residual_comes_back_from_its_preset(tmp_path: Path) -> None:
     got = material.residual
     assert got is not None
     assert 10 * np.abs(np.log10(got.power_per_hz / MADE.power_per_hz)).max() <= 0.2501
-    for name in ("mode_freq_hz", "mode_decay_per_s", "mode_amplitude", "line_freq_hz", "line_amplitude", "freq_hz", "time_s"):
+    for name in (
+        "mode_freq_hz",
+        "mode_decay_per_s",
+        "mode_amplitude",
+        "line_freq_hz",
+        "line_amplitude",
+        "freq_hz",
+        "time_s",
+    ):
         assert getattr(got, name) == pytest.approx(getattr(MADE, name), rel=1e-8)
     assert presets.load_material("wood").residual is None
     assert residual_of(form_of(got)).power_per_hz == pytest.approx(got.power_per_hz, rel=1e-12)
@@ -78,7 +89,9 @@ def test_a_residual_comes_back_from_its_preset(tmp_path: Path) -> None:
         ({"time_s": "long"}, "time_s"),
     ],
 )
-def test_a_wrong_residual_is_one_line_that_names_the_file(tmp_path: Path, changes: dict[str, object], words: str) -> None:
+def test_a_wrong_residual_is_one_line_that_names_the_file(
+    tmp_path: Path, changes: dict[str, object], words: str
+) -> None:
     with pytest.raises(MaterialError, match=words) as caught:
         presets.load_material(saved(tmp_path, **changes))
     assert "mine.json" in str(caught.value)
@@ -93,7 +106,9 @@ EFFECTS = [
 
 
 def test_a_preset_with_effects_and_a_residual_plays_both(tmp_path: Path) -> None:
-    """Modes bend and choke by the effects, and the residual's lines do as the modes they follow; other than with either alone; the log keeps both."""
+    """Modes bend and choke by the effects, and the residual's lines do as the modes they follow; other than with either
+    alone; the log keeps both.
+    """
     path = Path(saved(tmp_path))
     content = json.loads(path.read_text())
     path.write_text(json.dumps(content | {"effects": EFFECTS}))
@@ -110,10 +125,14 @@ def test_a_preset_with_effects_and_a_residual_plays_both(tmp_path: Path) -> None
 
     whole = log(both)
     sound, plain = render_log(whole), render_log(whole, residual=False)
-    linear, straight = render_log(log(replace(both, effects=()))), render_log(log(replace(both, effects=())), residual=False)
+    linear, straight = (
+        render_log(log(replace(both, effects=()))),
+        render_log(log(replace(both, effects=())), residual=False),
+    )
     assert np.isfinite(sound).all()
     assert all(
-        np.abs(a - b).max() > 1e-3 * np.abs(a).max() for a, b in ((sound, plain), (sound, linear), (plain, straight), (sound - plain, linear - straight))
+        np.abs(a - b).max() > 1e-3 * np.abs(a).max()
+        for a, b in ((sound, plain), (sound, linear), (plain, straight), (sound - plain, linear - straight))
     )
     resonator = build_resonator(whole.bodies[0], (), SR, Air())
     beside = build_residual_voice(resonator, SR, Air())
@@ -125,7 +144,9 @@ def test_a_preset_with_effects_and_a_residual_plays_both(tmp_path: Path) -> None
         and resonator.damping_growth is not None
     )
     assert (beside.lines.bend == resonator.bend[beside.follows]).all() and beside.lines.bend.all()
-    assert (beside.lines.damping_growth == resonator.damping_growth[beside.follows]).all() and beside.lines.damping_growth.all()
+    assert (
+        beside.lines.damping_growth == resonator.damping_growth[beside.follows]
+    ).all() and beside.lines.damping_growth.all()
     assert beside.lines.damping_growth_power == resonator.damping_growth_power == 2.0
     whole.save(tmp_path / "both.npz")
     assert (render_log(read_log(tmp_path / "both.npz")) == sound).all()
@@ -143,7 +164,9 @@ def clip(seconds: float = 1.0) -> np.ndarray:
 
 
 def test_a_purely_modal_clip_of_the_model_leaves_nothing() -> None:
-    """Residual energy at most -40 dB of the clip's, features found, not given: 24 modes with six pairs too close to be told apart, noise 80 dB below the peak.
+    """Residual energy at most -40 dB of the clip's, features found, not given:
+
+    24 modes with six pairs too close to be told apart, noise 80 dB below the peak.
 
     A line that the model lacks, 20 dB below the clip, is left all the same.
     """
@@ -160,7 +183,14 @@ def test_a_purely_modal_clip_of_the_model_leaves_nothing() -> None:
         signals = modal + level * foreign + 1e-4 * np.abs(modal).max() * random.normal(size=modal.shape)
         lines = joint_lines(signals, SR)
         left = signals - np.stack([lines_sound(lines, i, n, SR) for i in range(2)])
-        found = strikes_of(signals, left, SR, (lines.freq_hz, np.nan_to_num(lines.decay_per_s), lines.amplitude), (freq, decay, -1j * played), "made").residual
+        found = strikes_of(
+            signals,
+            left,
+            SR,
+            (lines.freq_hz, np.nan_to_num(lines.decay_per_s), lines.amplitude),
+            (freq, decay, -1j * played),
+            "made",
+        ).residual
         shares.append(found.share_of_clip)
         line_hz.append(found.line_freq_hz[np.argmax(found.line_amplitude)] if len(found.line_freq_hz) else 0.0)
     assert shares[0] <= 1e-4
@@ -169,10 +199,16 @@ def test_a_purely_modal_clip_of_the_model_leaves_nothing() -> None:
 
 
 def test_what_modes_lack_is_left_and_what_they_have_is_not() -> None:
-    """A foreign line stays, at its level; a mode of half the level leaves √¾ of the feature; one of twice the level leaves nothing; a burst of noise is cells."""
+    """A foreign line stays, at its level; a mode of half the level leaves √¾ of the feature; one of twice the level
+    leaves nothing; a burst of noise is cells.
+    """
     random = np.random.default_rng(1)
     n = SR
-    features = np.array([400.0, 900.0, 1500.0, 2000.0]), np.array([8.0, 12.0, 20.0, 15.0]), np.array([[1.0, 0.7, 0.5, 0.25]])
+    features = (
+        np.array([400.0, 900.0, 1500.0, 2000.0]),
+        np.array([8.0, 12.0, 20.0, 15.0]),
+        np.array([[1.0, 0.7, 0.5, 0.25]]),
+    )
     burst = 0.2 * random.normal(size=n) * np.exp(-100 * np.arange(n) / SR)
     sound = damped(features[0], features[1], features[2][0], n, SR) + burst + 1e-4 * random.normal(size=n)
     model = features[0][:3], features[1][:3], np.array([[0.5, 1.4, 0.5]])
@@ -185,7 +221,11 @@ def test_what_modes_lack_is_left_and_what_they_have_is_not() -> None:
 
 
 def test_a_recording_without_shape_has_its_features_for_modes(tmp_path: Path) -> None:
-    sound = clip() + 0.05 * np.random.default_rng(2).normal(size=SR) * np.exp(-80 * np.arange(SR) / SR) + 1e-4 * np.random.default_rng(5).normal(size=SR)
+    sound = (
+        clip()
+        + 0.05 * np.random.default_rng(2).normal(size=SR) * np.exp(-80 * np.arange(SR) / SR)
+        + 1e-4 * np.random.default_rng(5).normal(size=SR)
+    )
     strikes = recording_strikes(np.concatenate([np.zeros(2400), sound]), SR, 0.05, "tap.wav")
     assert len(strikes.mode_hz) >= 4
     assert (strikes.residual.power_per_hz > 0).sum() > 20
@@ -200,12 +240,27 @@ def test_the_command_writes_a_preset_that_plays(tmp_path: Path) -> None:
 
     from sonic_bullet.cli import cli
 
-    sound = clip(0.6) + 0.05 * np.random.default_rng(2).normal(size=round(0.6 * SR)) * np.exp(-80 * np.arange(round(0.6 * SR)) / SR)
+    sound = clip(0.6) + 0.05 * np.random.default_rng(2).normal(size=round(0.6 * SR)) * np.exp(
+        -80 * np.arange(round(0.6 * SR)) / SR
+    )
     write_audio(str(tmp_path / "tap.wav"), sound[None], SR)
     preset, picture = tmp_path / "tap.json", tmp_path / "tap.png"
     run = CliRunner()
     done = run.invoke(
-        cli, ["residual", str(tmp_path / "tap.wav"), "--material", "wood", "--onset", "0", "-o", str(preset), "--picture", str(picture), "--json"]
+        cli,
+        [
+            "residual",
+            str(tmp_path / "tap.wav"),
+            "--material",
+            "wood",
+            "--onset",
+            "0",
+            "-o",
+            str(preset),
+            "--picture",
+            str(picture),
+            "--json",
+        ],
     )
     assert done.exit_code == 0, done.output
     assert presets.load_material(str(preset)).residual is not None
@@ -214,9 +269,15 @@ def test_the_command_writes_a_preset_that_plays(tmp_path: Path) -> None:
     for words, message in (
         (["residual", str(tmp_path / "tap.wav"), "-o", str(preset)], "--material missing"),
         (["residual", str(tmp_path / "no.wav"), "--material", "wood", "-o", str(preset)], "no.wav"),
-        (["residual", str(tmp_path / "tap.wav"), "--material", "wood", "--strike", "0,0,0", "-o", str(preset)], "without a shape"),
+        (
+            ["residual", str(tmp_path / "tap.wav"), "--material", "wood", "--strike", "0,0,0", "-o", str(preset)],
+            "without a shape",
+        ),
         (["residual", str(tmp_path / "tap.wav"), "--material", "wood", "-o", "preset.txt"], "json"),
-        (["residual", str(tmp_path / "tap.wav"), "--material", "wood", "--onset", "nan", "-o", str(preset)], "--onset is nan"),
+        (
+            ["residual", str(tmp_path / "tap.wav"), "--material", "wood", "--onset", "nan", "-o", str(preset)],
+            "--onset is nan",
+        ),
     ):
         failed = run.invoke(cli, words)
         assert failed.exit_code != 0

@@ -1,4 +1,7 @@
-"""Modal sound with its residual is nearer to recordings that were not fitted. The whole table: benchmarks/residual_table.py."""
+"""Modal sound with its residual is nearer to recordings that were not fitted.
+
+The whole table: benchmarks/residual_table.py.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Residuals in the run time: levels, places, seeds, blocks, joins, a thousand strikes, and what happens where there is none."""
+"""Residuals in the run time:
+
+levels, places, seeds, blocks, joins, a thousand strikes, and what happens where there is none.
+"""
 
 from __future__ import annotations
 
@@ -31,7 +34,15 @@ NOISY = replace(STEEL, residual=residual(SOURCE, lines=((1200.0, 8.0, 0.3), (260
 HERE, THERE = (0.03, 0.02, 0.005), (-0.08, 0.04, 0.005)
 
 
-def struck(material: Material, impulses: dict[int, float], *, steps: int = 60, where: object = HERE, seed: int = 0, rubs: range = range(0)) -> ContactLog:
+def struck(
+    material: Material,
+    impulses: dict[int, float],
+    *,
+    steps: int = 60,
+    where: object = HERE,
+    seed: int = 0,
+    rubs: range = range(0),
+) -> ContactLog:
     """A floating box struck by a silent wall in the steps named, and rubbed in others."""
     bodies = box_body(EDGES_M, FREQ, material), wall_body()
 
@@ -66,12 +77,17 @@ def test_same_seed_same_bytes_other_seed_other_grains() -> None:
     assert (first == render_log(log)).all()
     other = render_log(replace(log, seed=1), residual=True)
     assert not (first == other).all()
-    levels = [np.sqrt((beside_sound(one)[1, :8000] ** 2).mean()) for one in (struck(NOISY, {2: 0.01}), struck(NOISY, {2: 0.01}, seed=1))]
+    levels = [
+        np.sqrt((beside_sound(one)[1, :8000] ** 2).mean())
+        for one in (struck(NOISY, {2: 0.01}), struck(NOISY, {2: 0.01}, seed=1))
+    ]
     assert levels[0] == pytest.approx(levels[1], rel=0.3)
 
 
 def test_live_frames_a_sound_in_between_and_a_replay_are_the_same_bits(tmp_path: Path) -> None:
-    """Asking for the sound midway changes nothing; the log brings its residual to disk and back; the whole is the frames."""
+    """Asking for the sound midway changes nothing; the log brings its residual to disk and back; the whole is the
+    frames.
+    """
     log = struck(NOISY, {2: 0.01, 20: 0.02}, rubs=range(30, 50))
     live = Synthesizer(sr=log.sr, sensors=log.sensors, seed=log.seed, air=log.air)
     halfway = None
@@ -87,14 +103,19 @@ def test_live_frames_a_sound_in_between_and_a_replay_are_the_same_bits(tmp_path:
     assert kept is not None and kept.residual is not None
     assert (kept.residual.power_per_hz == NOISY.residual.power_per_hz).all()
     assert (render_log(again) == render_log(log)).all()
-    for name, words, wanted in (("with.wav", [], render_log(log)), ("without.wav", ["--no-residual"], render_log(log, residual=False))):
+    for name, words, wanted in (
+        ("with.wav", [], render_log(log)),
+        ("without.wav", ["--no-residual"], render_log(log, residual=False)),
+    ):
         done = CliRunner().invoke(cli, ["render", str(tmp_path / "log.npz"), "-o", str(tmp_path / name), *words])
         assert done.exit_code == 0, done.output
         assert read_audio(str(tmp_path / name))[0] == pytest.approx(wanted, rel=1e-6, abs=1e-12)
 
 
 def test_level_follows_the_impulse() -> None:
-    """The residual at twice the impulse is as much louder as the modes are (softer blows press longer: both fall alike)."""
+    """The residual at twice the impulse is as much louder as the modes are (softer blows press longer: both fall
+    alike).
+    """
     soft, loud = (struck(NOISY, {2: j}, where=HERE) for j in (0.01, 0.02))
     modal = [np.sqrt((render_log(log, residual=False)[1] ** 2).mean()) for log in (soft, loud)]
     more = [np.sqrt((beside_sound(log)[1] ** 2).mean()) for log in (soft, loud)]
@@ -114,7 +135,8 @@ def test_the_place_decides_as_it_does_for_the_modes() -> None:
         pair, level = placed(beside.voice, power, 20e-6, False, lambda f_tau, _: np.ones(len(f_tau)))
         exact = filtered(beside.voice, response(beside.voice, power))
         assert 10 * abs(np.log10((level**2 * (pair.astype(float) ** 2).sum()) / (exact.astype(float) ** 2).sum())) < 1.0
-        assert (placed(beside.voice, 4 * power, 20e-6, False, lambda f_tau, _: 0 * f_tau)[0] == pair).all()  # from the cache: the pulse is not asked again
+        # from the cache: the pulse is not asked again
+        assert (placed(beside.voice, 4 * power, 20e-6, False, lambda f_tau, _: 0 * f_tau)[0] == pair).all()
 
 
 def test_any_cut_of_the_calls_gives_the_same_bits() -> None:
@@ -131,7 +153,10 @@ def test_any_cut_of_the_calls_gives_the_same_bits() -> None:
         for cut in cuts:
             size = min(cut, n - at)
             sections, state = rubbed(state, force[at : at + size], at, size)
-            grains = (*grains, *(Grain((j + 2) * SECTION, 0, 0, section_grain(voice, f, power, j)) for j, f in sections))
+            grains = (
+                *grains,
+                *(Grain((j + 2) * SECTION, 0, 0, section_grain(voice, f, power, j)) for j, f in sections),
+            )
             grains = add_grains(out[:, :, at : at + size], grains, at)
             at += size
         outs.append(out)
@@ -140,7 +165,9 @@ def test_any_cut_of_the_calls_gives_the_same_bits() -> None:
 
 
 def test_rubbing_is_carried_by_grains_of_which_no_two_are_alike() -> None:
-    """Sections add to the force in power; their grains are as loud, and differ, and a force that ends is played to its end."""
+    """Sections add to the force in power; their grains are as loud, and differ, and a force that ends is played to its
+    end.
+    """
     assert section_window()[:SECTION] ** 2 + section_window()[SECTION:] ** 2 == pytest.approx(1.0, abs=1e-12)
     voice = make_voice(residual(SOURCE, per_hz=1e-6), SOURCE, SR)
     force = np.random.default_rng(4).normal(size=2 * SECTION) * section_window()
@@ -162,7 +189,8 @@ def second_difference(x: np.ndarray) -> np.ndarray:
 
 
 def test_no_click_where_grains_join() -> None:
-    """Steady rubbing: the second difference at the joins of sections is, root mean square over 4000 joins, at most 1.01 times that elsewhere.
+    """Steady rubbing: the second difference at the joins of sections is, root mean square over 4000 joins, at most 1.01
+    times that elsewhere.
 
     Strikes: a steady residual begins and ends without a larger second difference than it has in its middle.
     """
@@ -193,14 +221,21 @@ def test_no_click_where_grains_join() -> None:
 
 
 def test_a_thousand_strikes_stay_real_time() -> None:
-    """1000 strikes at many places within 4.2 s of sound take less processor time than that, all in, the residual's share below a half of it."""
+    """1000 strikes at many places within 4.2 s of sound take less processor time than that, all in, the residual's
+    share below a half of it.
+    """
     random = np.random.default_rng(2)
     bodies = box_body(EDGES_M, FREQ, NOISY), wall_body()
     silent = box_body(EDGES_M, FREQ, STEEL), wall_body()
     steps = []
     for i in range(1010):
         place = (*random.uniform((-0.09, -0.045), (0.09, 0.045)), 0.005)
-        steps.append(step([(0, 0, 0), (0, 0, 0.01)], row(0, 1, (0, 0, -0.01), normal=(0, 0, -1), point_a=place) if i % 6 == 2 else None))
+        steps.append(
+            step(
+                [(0, 0, 0), (0, 0, 0.01)],
+                row(0, 1, (0, 0, -0.01), normal=(0, 0, -1), point_a=place) if i % 6 == 2 else None,
+            )
+        )
     log = ContactLog(bodies, tuple(steps), (Microphone([0, 0, 1.0]),), SR, 0)
     render_log(struck(NOISY, {2: 0.01}))
 

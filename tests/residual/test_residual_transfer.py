@@ -45,7 +45,9 @@ def test_the_same_source_gives_its_residual_back(moved: float) -> None:
 
 
 def test_the_inversion_starts_from_the_sources_phase() -> None:
-    """Where nothing is represented, magnitudes and phases are those of the recording, and it comes back; the ten turns keep it."""
+    """Where nothing is represented, magnitudes and phases are those of the recording, and it comes back; the ten turns
+    keep it.
+    """
     recorded, _, found = clip()
     left, start = clip_residual(recorded, np.zeros(len(recorded)), SR)
     magnitude = magnitude_of(transfer(left, found, found, left.freq_hz, left.time_s), SR)
@@ -55,8 +57,9 @@ def test_the_inversion_starts_from_the_sources_phase() -> None:
 
 @pytest.mark.parametrize("moved", [0.0, 1e-6])
 def test_a_recording_carried_onto_its_own_body_is_itself(moved: float) -> None:
-    """Algorithm 1 from end to end: with nothing represented ten turns of inversion give the recording back, also beside modes moved by a millionth. With its
-    modes represented, what remains is nearer to recorded - represented than any other phases make it.
+    """Algorithm 1 from end to end: with nothing represented ten turns of inversion give the recording back, also beside
+    modes moved by a millionth. With its modes represented, what remains is nearer to recorded - represented than any
+    other phases make it.
     """
     recorded, represented, found = clip()
     there = StruckModes(found.freq_hz * (1 + moved), found.decay_per_s * (1 + moved), found.amplitude * (1 + moved))
@@ -64,17 +67,28 @@ def test_a_recording_carried_onto_its_own_body_is_itself(moved: float) -> None:
     rest = recorded - represented
     assert snr_db(rest, transferred_clip(recorded, represented, SR, found, there)) > 5.0
     left, _ = clip_residual(recorded, represented, SR)
-    blind = invert(magnitude_of(left.per_hz, SR), noise_phases(len(rest), 1, overlap=4), len(rest), iterations=10, overlap=4)
+    blind = invert(
+        magnitude_of(left.per_hz, SR), noise_phases(len(rest), 1, overlap=4), len(rest), iterations=10, overlap=4
+    )
     assert snr_db(rest, blind) < 0.0
 
 
 def test_a_recording_carried_to_twice_the_size_is_lower_and_longer() -> None:
-    """Two lines that no mode represents come out at half their frequencies, and with half the decay, so with twice the energy to as loud modes."""
+    """Two lines that no mode represents come out at half their frequencies, and with half the decay, so with twice the
+    energy to as loud modes.
+    """
     n = SR // 2
     modal = clip()[2]
     represented = damped(modal.freq_hz, modal.decay_per_s, modal.amplitude, n, SR)
     foreign = damped(np.array([1450.0, 5100.0]), np.array([15.0, 25.0]), np.array([0.2, 0.3j]), n, SR)
-    got = transferred_clip(represented + foreign, represented, SR, modal, StruckModes(modal.freq_hz / 2, modal.decay_per_s / 2, modal.amplitude), seconds=1.0)
+    got = transferred_clip(
+        represented + foreign,
+        represented,
+        SR,
+        modal,
+        StruckModes(modal.freq_hz / 2, modal.decay_per_s / 2, modal.amplitude),
+        seconds=1.0,
+    )
     assert len(got) == SR
     level, freq = np.abs(np.fft.rfft(got * np.hanning(SR))), np.fft.rfftfreq(SR, 1 / SR)
     for low, high, wanted in ((600, 850, 725.0), (2300, 2800, 2550.0)):
@@ -84,7 +98,9 @@ def test_a_recording_carried_to_twice_the_size_is_lower_and_longer() -> None:
 
 
 def test_what_is_represented_is_taken_off() -> None:
-    """Represented in full: what is left is the power of the rest, in its bands; in part: in between; more than all: never below zero."""
+    """Represented in full: what is left is the power of the rest, in its bands; in part: in between; more than all:
+    never below zero.
+    """
     recorded, represented, _ = clip()
     rest = power(recorded - represented, SR).per_hz.sum()
     levels = [clip_residual(recorded, share * represented, SR)[0].per_hz for share in (0.0, 0.5, 1.0, 2.0)]
@@ -103,7 +119,9 @@ def test_what_is_represented_is_taken_off() -> None:
         ("represented", np.ones(4096), np.ones(4000), SR),
     ],
 )
-def test_clips_that_do_not_fit_are_one_line(words: str, recorded: np.ndarray, represented: np.ndarray, rate: int) -> None:
+def test_clips_that_do_not_fit_are_one_line(
+    words: str, recorded: np.ndarray, represented: np.ndarray, rate: int
+) -> None:
     with pytest.raises(AudioError, match=words) as caught:
         clip_residual(recorded, represented, SR, rate)
     assert "\n" not in str(caught.value)
@@ -117,7 +135,9 @@ def centroid_hz(per_hz: np.ndarray, freq_hz: np.ndarray) -> float:
 @pytest.mark.parametrize("band", [1210.0, 1450.0, 2350.0, 3700.0])
 @pytest.mark.parametrize("size", [2.0, 0.5])
 def test_a_larger_body_sounds_lower_and_longer(band: float, size: float) -> None:
-    """Bands at or between modes go to f/s; they last as the modes' decays say; residual and modes keep the ratio of their energies."""
+    """Bands at or between modes go to f/s; they last as the modes' decays say; residual and modes keep the ratio of
+    their energies.
+    """
     source = modes(PLATE, 0.5 * (6 + 4e-8 * (2 * np.pi * PLATE) ** 2), np.linspace(1, 0.3, len(PLATE)))
     target = modes(PLATE / size, 0.5 * (6 + 4e-8 * (2 * np.pi * PLATE / size) ** 2), source.amplitude)
     left = banded(band, 30.0, 10.0)
@@ -130,13 +150,18 @@ def test_a_larger_body_sounds_lower_and_longer(band: float, size: float) -> None
     observed = row > 1e-3 * row[0]
     slope = -np.polyfit(time[observed], np.log(row[observed]), 1)[0] / 2
     assert slope == pytest.approx(10.0 * rate, rel=0.02)
-    energy = [np.trapezoid(np.trapezoid(p, t, axis=1), f) for p, t, f in ((left.per_hz, left.time_s, left.freq_hz), (got, time, freq))]
+    energy = [
+        np.trapezoid(np.trapezoid(p, t, axis=1), f)
+        for p, t, f in ((left.per_hz, left.time_s, left.freq_hz), (got, time, freq))
+    ]
     between = band not in PLATE  # then the band's halves belong to two modes, whose rates differ
     assert energy[1] / energy[0] == pytest.approx(1 / rate, rel=0.15 if between else 0.02)  # a²/4d grows as much
 
 
 def test_a_strike_at_a_node_takes_its_neighbourhood_down() -> None:
-    """One mode's amplitude at zero: its neighbourhood falls by 17 dB or more at the mode; the others stay within half a decibel at theirs."""
+    """One mode's amplitude at zero: its neighbourhood falls by 17 dB or more at the mode; the others stay within half a
+    decibel at theirs.
+    """
     source = modes(PLATE)
     still = np.ones(len(PLATE))
     still[5] = 0.0
@@ -152,7 +177,9 @@ def test_a_strike_at_a_node_takes_its_neighbourhood_down() -> None:
 def test_neighbourhoods_meet_without_a_step() -> None:
     """The map of frequencies and the scale are continuous, and the map ascends, for pairs as unlike as can be."""
     random = np.random.default_rng(5)
-    source, target = (modes(np.sort(random.uniform(100, 15_000, 40)), 20.0, random.uniform(0.1, 1, 40)) for _ in range(2))
+    source, target = (
+        modes(np.sort(random.uniform(100, 15_000, 40)), 20.0, random.uniform(0.1, 1, 40)) for _ in range(2)
+    )
     pairs = pair(source, target)
     freq = np.linspace(1.0, 20_000.0, 20_001)
     here, slope, _ = come_from(pairs, freq)
@@ -174,16 +201,24 @@ def bodies() -> tuple[StruckModes, StruckModes]:
     made = []
     for path, scale in ((REPO / "assets" / "plate.obj", 1.0), (Path(pybullet_data.getDataPath()) / "bunny.obj", 0.1)):
         model = analyse((read_mesh(str(path), scale),), porcelain, count=24)
-        made.append(StruckModes(model.freq_hz, model.decay_per_s, np.abs(model.shape[len(model.vertex_m) // 3, 2].astype(float))))
+        made.append(
+            StruckModes(
+                model.freq_hz, model.decay_per_s, np.abs(model.shape[len(model.vertex_m) // 3, 2].astype(float))
+            )
+        )
     return made[0], made[1]
 
 
 def test_a_plates_residual_on_a_bunny_follows_its_modes(bodies: tuple[StruckModes, StruckModes]) -> None:
-    """Other shapes: dominant modes in pairs from low to high; finite; in each neighbourhood the residual's energy is to the mode's as it was."""
+    """Other shapes: dominant modes in pairs from low to high; finite; in each neighbourhood the residual's energy is to
+    the mode's as it was.
+    """
     plate, bunny = bodies
     n = SR // 2
     recorded = damped(plate.freq_hz, plate.decay_per_s, plate.amplitude, n, SR)
-    left, _ = clip_residual(recorded + 0.02 * np.random.default_rng(1).normal(size=n) * np.exp(-20 * np.arange(n) / SR), recorded, SR)
+    left, _ = clip_residual(
+        recorded + 0.02 * np.random.default_rng(1).normal(size=n) * np.exp(-20 * np.arange(n) / SR), recorded, SR
+    )
     pairs = pair(plate, bunny)
     assert not pairs.natural
     assert (np.diff(pairs.source_hz) > 0).all() and (np.diff(pairs.target_hz) > 0).all()
@@ -203,7 +238,9 @@ def test_a_plates_residual_on_a_bunny_follows_its_modes(bodies: tuple[StruckMode
     strong = np.flatnonzero(merged(bunny)[0].amplitude[pairs.target] > 0.3 * bunny.amplitude.max())
     for j in strong[:4]:
         amplitude = np.where(pairs.group == j, 2.0, 1.0) * bunny.amplitude
-        ratio = energy(transfer(left, plate, StruckModes(bunny.freq_hz, bunny.decay_per_s, amplitude), freq, time)) / np.maximum(before, 1e-300)
+        ratio = energy(
+            transfer(left, plate, StruckModes(bunny.freq_hz, bunny.decay_per_s, amplitude), freq, time)
+        ) / np.maximum(before, 1e-300)
         away = np.delete(ratio, [k for k in (j - 1, j, j + 1) if 0 <= k < len(ratio)])
         followed += 2.0 < ratio[j] < 4.01 and np.median(away) < 1.1
     assert followed == len(strong[:4]) >= 3

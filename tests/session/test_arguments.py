@@ -14,7 +14,15 @@ import pytest
 
 import sonic_bullet as sb
 from sonic_bullet import scene
-from sonic_bullet.records.errors import AudioError, MaterialError, MeshError, ModalError, RecordError, SceneError, SonicBulletError
+from sonic_bullet.records.errors import (
+    AudioError,
+    MaterialError,
+    MeshError,
+    ModalError,
+    RecordError,
+    SceneError,
+    SonicBulletError,
+)
 from tests.made.models import STEEL
 from tests.made.worlds import box, plate_model
 
@@ -28,7 +36,10 @@ SHAPE = {
     "vertex_m": np.zeros((0, 3)),
     "face": np.zeros((0, 3), np.int32),
 }
-TETRAHEDRON = {"vertex_m": [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], "face": [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]}
+TETRAHEDRON = {
+    "vertex_m": [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]],
+    "face": [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]],
+}
 ROW = {
     "a": [0],
     "b": [1],
@@ -78,7 +89,16 @@ MODEL = dict(
     damping_growth_power=1,
     includes_radiation=False,
 )
-LOG = {"bodies": (), "steps": (), "sensors": (), "sr": 48_000, "seed": 0, "air": sb.Air(), "untouched": frozenset(), "events": ()}
+LOG = {
+    "bodies": (),
+    "steps": (),
+    "sensors": (),
+    "sr": 48_000,
+    "seed": 0,
+    "air": sb.Air(),
+    "untouched": frozenset(),
+    "events": (),
+}
 BUILT = "import pybullet as p\nSECONDS = 0.01\n\ndef build(client):\n    client.createMultiBody(0, client.createCollisionShape(p.GEOM_PLANE))\n    return {}\n"
 
 
@@ -89,19 +109,42 @@ def listener_of(client: Any) -> tuple[sb.Listener, int]:
 
 def adding(client: Any, _: Path) -> Made:
     listener, body = listener_of(client)
-    rest = {"mesh": None, "roughness_m": 0, "fixed": (), "thickness_m": None, "to_hz": 20_000, "count": None, "progress": None}
+    rest = {
+        "mesh": None,
+        "roughness_m": 0,
+        "fixed": (),
+        "thickness_m": None,
+        "to_hz": 20_000,
+        "count": None,
+        "progress": None,
+    }
     return listener.add, {"body": body, "link": -1, "material": STEEL, "model": plate_model(), **rest}
 
 
 def writing(client: Any, folder: Path) -> Made:
     listener, _ = listener_of(client)
     client.stepSimulation()
-    return listener.write, {"path": folder / "a.wav", "peak_dbfs": None, "lufs": None, "full_scale_pa": 1, "subtype": None}
+    return listener.write, {
+        "path": folder / "a.wav",
+        "peak_dbfs": None,
+        "lufs": None,
+        "full_scale_pa": 1,
+        "subtype": None,
+    }
 
 
 def scene_file(_: Any, folder: Path) -> Made:
     (folder / "scene.py").write_text(BUILT)
-    rest = {"seconds": None, "sr": 8000, "seed": 0, "microphones": None, "material": None, "residual": True, "progress": None, "say": None}
+    rest = {
+        "seconds": None,
+        "sr": 8000,
+        "seed": 0,
+        "microphones": None,
+        "material": None,
+        "residual": True,
+        "progress": None,
+        "say": None,
+    }
     return scene.render_scene, {"path": folder / "scene.py", **rest}
 
 
@@ -131,27 +174,47 @@ DOORS: dict[str, Callable[[Any, Path], Made]] = {
     "ContactLog.rows_on": of_log("rows_on"),
     "ContactLog.save": lambda _, folder: (sb.ContactLog(**LOG).save, {"path": folder / "a.npz"}),
     "Contacts": lambda *_: (sb.Contacts, ROW),
-    "Listener": lambda client, _: (sb.Listener, {"client": client, "sr": 48_000, "sensors": (), "seed": 0, "air": sb.Air()}),
+    "Listener": lambda client, _: (
+        sb.Listener,
+        {"client": client, "sr": 48_000, "sensors": (), "seed": 0, "air": sb.Air()},
+    ),
     "Listener.add": adding,
     "Listener.write": writing,
     "Material": lambda *_: (sb.Material, MATERIAL),
-    "Material.isotropic": lambda *_: (sb.Material.isotropic, {"name": "m", "youngs_pa": 1e9, "poisson": 0.3, "density_kg_m3": 1000}),
+    "Material.isotropic": lambda *_: (
+        sb.Material.isotropic,
+        {"name": "m", "youngs_pa": 1e9, "poisson": 0.3, "density_kg_m3": 1000},
+    ),
     "Microphone": lambda *_: (sb.Microphone, {"position_m": [0, 0, 0]}),
     "ModalModel": lambda *_: (sb.ModalModel, MODEL),
     "ModalSum": lambda *_: (sb.ModalSum, {"scale": 1}),
     "Shape": lambda *_: (sb.Shape, SHAPE),
     "Step": lambda *_: (sb.Step, STEP),
     "Vibrometer": lambda *_: (sb.Vibrometer, {"body_id": 0, "point_m": [0, 0, 0], "direction": [0, 0, 1], "link": -1}),
-    "attach": lambda client, _: (sb.attach, {"client": client, "sr": 48_000, "microphone": (0, 0, 1), "seed": 0, "air": None}),
+    "attach": lambda client, _: (
+        sb.attach,
+        {"client": client, "sr": 48_000, "microphone": (0, 0, 1), "seed": 0, "air": None},
+    ),
     "keep_restitution": lambda client, _: (sb.keep_restitution, {"client": client}),
     "load_material": lambda *_: (sb.load_material, {"name": "steel"}),
     "read_audio": reading_audio,
     "read_log": reading_log,
-    "render_log": lambda *_: (sb.render_log, {"log": sb.ContactLog(**LOG), "sr": None, "residual": True, "progress": None, "say": None}),
+    "render_log": lambda *_: (
+        sb.render_log,
+        {"log": sb.ContactLog(**LOG), "sr": None, "residual": True, "progress": None, "say": None},
+    ),
     "render_scene": scene_file,
     "write_audio": lambda _, folder: (
         sb.write_audio,
-        {"path": folder / "a.wav", "samples": np.ones((1, 8000)), "sr": 8000, "peak_dbfs": None, "lufs": None, "full_scale_pa": 1, "subtype": None},
+        {
+            "path": folder / "a.wav",
+            "samples": np.ones((1, 8000)),
+            "sr": 8000,
+            "peak_dbfs": None,
+            "lufs": None,
+            "full_scale_pa": 1,
+            "subtype": None,
+        },
     ),
 }
 WITHOUT_ARGUMENTS = {"list_materials", "SonicBulletError"}
@@ -183,8 +246,15 @@ BAD: dict[str, dict[str, list[Any]]] = {
     "ContactLog.impulse_on": {"body": WHOLE, "link": [*OPTIONAL, 1.5]},
     "ContactLog.rows_on": {"body": WHOLE, "link": [*OPTIONAL, 1.5]},
     "ContactLog.save": {"path": PATH},
-    "Contacts": {name: [*ARRAY, 5, [0, 1, 2, 3]] for name in ROW} | {"a": ["x", object(), {}, 1j, None, 5, [0.5], [2**40], [math.nan]]},
-    "Listener": {"client": CLIENT, "sr": [*NUMBER, 0], "sensors": ["x", 5, [3], None, object()], "seed": [*WHOLE, -1], "air": [*RECORD, None]},
+    "Contacts": {name: [*ARRAY, 5, [0, 1, 2, 3]] for name in ROW}
+    | {"a": ["x", object(), {}, 1j, None, 5, [0.5], [2**40], [math.nan]]},
+    "Listener": {
+        "client": CLIENT,
+        "sr": [*NUMBER, 0],
+        "sensors": ["x", 5, [3], None, object()],
+        "seed": [*WHOLE, -1],
+        "air": [*RECORD, None],
+    },
     "Listener.add": {
         "body": [*WHOLE, -5, 10**12],
         "link": [*[value for value in WHOLE if value != "x"], -2, 7, "arm", b"arm", (0, 1)],
@@ -192,7 +262,19 @@ BAD: dict[str, dict[str, list[Any]]] = {
         "mesh": [5, object(), {}, True, [5], ["a.obj"], b"a.obj", pybullet],
         "model": [*RECORD],
         "roughness_m": [*OPTIONAL, -1],
-        "fixed": ["x", 5, None, [(0, 0, 0)], (0, 0, 0, 0.1), [(0, 0, 0, "r")], [(0, 0, 0, math.nan)], [(0, 0, 0, -1)], {}, [5], object()],
+        "fixed": [
+            "x",
+            5,
+            None,
+            [(0, 0, 0)],
+            (0, 0, 0, 0.1),
+            [(0, 0, 0, "r")],
+            [(0, 0, 0, math.nan)],
+            [(0, 0, 0, -1)],
+            {},
+            [5],
+            object(),
+        ],
         "thickness_m": [*OPTIONAL, 0, -1, 1e308],
         "to_hz": [*NUMBER, 0, -1, 1e308],
         "count": [*OPTIONAL, 0, -1, 2.5, 10**9],
@@ -219,7 +301,12 @@ BAD: dict[str, dict[str, list[Any]]] = {
         "effects": ["x", 5, None, object(), {}],
         "includes_radiation": FLAG,
     },
-    "Material.isotropic": {"name": TEXT, "youngs_pa": [*NUMBER, 0], "poisson": [*NUMBER, 0.5, -1], "density_kg_m3": [*NUMBER, 0]},
+    "Material.isotropic": {
+        "name": TEXT,
+        "youngs_pa": [*NUMBER, 0],
+        "poisson": [*NUMBER, 0.5, -1],
+        "density_kg_m3": [*NUMBER, 0],
+    },
     "Microphone": {"position_m": [*ARRAY, [0, 0]]},
     "ModalModel": {
         **{name: [*ARRAY, 5] for name in ("freq_hz", "shape", "vertex_m", "face", "curvature_per_m")},
@@ -245,11 +332,29 @@ BAD: dict[str, dict[str, list[Any]]] = {
         "contacts": [*RECORD, None],
         "gravity_m_s2": [*ARRAY, 5],
     },
-    "Vibrometer": {"body_id": WHOLE, "point_m": [*ARRAY, [0, 0]], "direction": [*ARRAY, [0, 0], [0, 0, 0]], "link": WHOLE},
+    "Vibrometer": {
+        "body_id": WHOLE,
+        "point_m": [*ARRAY, [0, 0]],
+        "direction": [*ARRAY, [0, 0], [0, 0, 0]],
+        "link": WHOLE,
+    },
     "attach": {
         "client": CLIENT,
         "sr": [*NUMBER, 0, 10**9, 44_100.5],
-        "microphone": ["here", 5, None, object(), {}, [(0, 0)], (0, 0), (0, 0, "z"), [(0, 0, 1), (2,)], ["a", "b", "c"], (0, math.nan, 0), sb.Microphone],
+        "microphone": [
+            "here",
+            5,
+            None,
+            object(),
+            {},
+            [(0, 0)],
+            (0, 0),
+            (0, 0, "z"),
+            [(0, 0, 1), (2,)],
+            ["a", "b", "c"],
+            (0, math.nan, 0),
+            sb.Microphone,
+        ],
         "seed": [*WHOLE, -1, 10**30],
         "air": RECORD,
     },
@@ -280,10 +385,57 @@ BAD: dict[str, dict[str, list[Any]]] = {
     },
 }
 MENU: list[Any] = [
-    *(None, True, 0, -1, 1, 2**31, 10**400, 0.5, -0.0, math.nan, math.inf, -math.inf, 1e308, 5e-324, 1j, np.float32(1), np.int8(-1), np.bool_(True)),
-    *("", "x", "all", "0", "a\0b", "\ud800", "y" * 400, b"", b"x", bytearray(3), [], [[]], [0], [0, 0, 0], [[0, 0, 0]], [[1], [2, 3]], [None] * 3, ["a"] * 3),
+    *(
+        None,
+        True,
+        0,
+        -1,
+        1,
+        2**31,
+        10**400,
+        0.5,
+        -0.0,
+        math.nan,
+        math.inf,
+        -math.inf,
+        1e308,
+        5e-324,
+        1j,
+        np.float32(1),
+        np.int8(-1),
+        np.bool_(True),
+    ),
+    *(
+        "",
+        "x",
+        "all",
+        "0",
+        "a\0b",
+        "\ud800",
+        "y" * 400,
+        b"",
+        b"x",
+        bytearray(3),
+        [],
+        [[]],
+        [0],
+        [0, 0, 0],
+        [[0, 0, 0]],
+        [[1], [2, 3]],
+        [None] * 3,
+        ["a"] * 3,
+    ),
     *((), {}, {1: 2}, {1}, range(3), object(), object, print, Exception("e"), math, Ellipsis, lambda: 0),
-    *(np.zeros(0), np.zeros((2, 3)), np.array(1.0), np.array(["a"]), np.array([None]), np.full(3, 1e308), np.zeros(3, complex), np.datetime64("2020")),
+    *(
+        np.zeros(0),
+        np.zeros((2, 3)),
+        np.array(1.0),
+        np.array(["a"]),
+        np.array([None]),
+        np.full(3, 1e308),
+        np.zeros(3, complex),
+        np.datetime64("2020"),
+    ),
     *(STEEL, sb.Air(), sb.Contacts.none(), sb.Microphone([0, 0, 0])),
 ]
 
@@ -295,7 +447,11 @@ def test_every_argument_of_everything_public_is_looked_at(client: Any, tmp_path:
     for door, make in DOORS.items():
         call, good = make(client, tmp_path)
         kinds = inspect.Parameter
-        named = {name for name, one in inspect.signature(call).parameters.items() if one.kind not in (kinds.VAR_KEYWORD, kinds.VAR_POSITIONAL)}
+        named = {
+            name
+            for name, one in inspect.signature(call).parameters.items()
+            if one.kind not in (kinds.VAR_KEYWORD, kinds.VAR_POSITIONAL)
+        }
         assert named <= set(BAD[door]) <= set(good), door
         call(**good)
         looked_at += sum(map(len, BAD[door].values()))
@@ -327,7 +483,9 @@ def test_a_wrong_value_is_refused_by_name(client: Any, tmp_path: Path, door: str
 
 
 @pytest.mark.parametrize("door", DOORS)
-def test_whatever_is_passed_is_taken_or_refused(client: Any, tmp_path: Path, door: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_whatever_is_passed_is_taken_or_refused(
+    client: Any, tmp_path: Path, door: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """A menu of everything at every argument: a result, or our own error."""
     monkeypatch.chdir(tmp_path)
     call, good = DOORS[door](client, tmp_path)
@@ -356,7 +514,9 @@ def test_whatever_is_passed_is_taken_or_refused(client: Any, tmp_path: Path, doo
         ("body", "box", SceneError),
     ],
 )
-def test_errors_are_of_the_kind_that_the_argument_is_of(client: Any, argument: str, value: Any, kind: type[SonicBulletError]) -> None:
+def test_errors_are_of_the_kind_that_the_argument_is_of(
+    client: Any, argument: str, value: Any, kind: type[SonicBulletError]
+) -> None:
     listener, body = listener_of(client)
     with pytest.raises(kind, match=argument):
         listener.add(**{"body": body, "material": STEEL, argument: value})
@@ -364,7 +524,13 @@ def test_errors_are_of_the_kind_that_the_argument_is_of(client: Any, argument: s
 
 
 @pytest.mark.parametrize(
-    ("options", "words"), [({"peak_dbfs": "x"}, "peak_dbfs"), ({"peak_dbfs": 3}, "full scale"), ({"peak_db": -1}, "peak_dbfs"), ({"colour": 1}, "subtype")]
+    ("options", "words"),
+    [
+        ({"peak_dbfs": "x"}, "peak_dbfs"),
+        ({"peak_dbfs": 3}, "full scale"),
+        ({"peak_db": -1}, "peak_dbfs"),
+        ({"colour": 1}, "subtype"),
+    ],
 )
 def test_options_of_write(client: Any, tmp_path: Path, options: dict[str, Any], words: str) -> None:
     """A misspelt option names the near one; a peak above full scale cannot be written."""
@@ -381,7 +547,17 @@ def test_a_misspelt_constant_names_the_near_one() -> None:
 
 def test_numbers_of_every_type_are_taken(client: Any) -> None:
     listener, body = listener_of(client)
-    (model,) = listener.add(np.int64(body), np.int32(-1), material=STEEL, model=plate_model(), roughness_m=np.float32(1e-6), to_hz=np.float64(2e4), count=5.0)
+    (model,) = listener.add(
+        np.int64(body),
+        np.int32(-1),
+        material=STEEL,
+        model=plate_model(),
+        roughness_m=np.float32(1e-6),
+        to_hz=np.float64(2e4),
+        count=5.0,
+    )
     assert model.mode_count > 0
     assert type(listener.world.bodies[0].body_id) is int
-    assert sb.attach(np.int64(client._client), sr=np.float64(44_100), seed=np.uint8(3), microphone=np.array([[0, 0, 1], [1, 0, 1]])).frame.shape == (2, 0)
+    assert sb.attach(
+        np.int64(client._client), sr=np.float64(44_100), seed=np.uint8(3), microphone=np.array([[0, 0, 1], [1, 0, 1]])
+    ).frame.shape == (2, 0)

@@ -1,4 +1,6 @@
-"""Links by name, and all links of a body: all of them or none, what cannot be filled first, and a line that says which is being computed."""
+"""Links by name, and all links of a body: all of them or none, what cannot be filled first, and a line that says which
+is being computed.
+"""
 
 from __future__ import annotations
 
@@ -38,13 +40,17 @@ def boxes(client: Any, folder: Path, tip: str = ARM) -> int:
 
 
 class Solver:
-    """In place of `modal.analyse`: the same plate for every body, slowly where asked, or the error that a body is meant to end in."""
+    """In place of `modal.analyse`: the same plate for every body, slowly where asked, or the error that a body is meant
+    to end in.
+    """
 
     def __init__(self, fails_at_m: float = -1.0, pause_s: float = 0.0) -> None:
         self.fails_at_m, self.pause_s = fails_at_m, pause_s
         self.solved_m: list[float] = []
 
-    def __call__(self, shapes: tuple[sb.Shape, ...], *_: Any, progress: Callable[[str], None], **__: Any) -> sb.ModalModel:
+    def __call__(
+        self, shapes: tuple[sb.Shape, ...], *_: Any, progress: Callable[[str], None], **__: Any
+    ) -> sb.ModalModel:
         progress("filling")
         time.sleep(self.pause_s)
         size_m = round(float(shapes[0].size_m.max()), 6)
@@ -73,7 +79,13 @@ def test_a_link_is_named(client: Any, tmp_path: Path, link: int | str, number: i
 
 
 @pytest.mark.parametrize(
-    ("link", "words"), [("arn", "did you mean arm"), ("TIP", "did you mean tip"), ("wheel", "one of foot, arm, tip"), ("0", "foot, arm, tip")]
+    ("link", "words"),
+    [
+        ("arn", "did you mean arm"),
+        ("TIP", "did you mean tip"),
+        ("wheel", "one of foot, arm, tip"),
+        ("0", "foot, arm, tip"),
+    ],
 )
 def test_an_unknown_link_lists_the_nearest_names(client: Any, tmp_path: Path, link: str, words: str) -> None:
     body = boxes(client, tmp_path)
@@ -92,8 +104,13 @@ def test_all_links_are_added_with_a_model_each(client: Any, tmp_path: Path) -> N
     assert models[0].freq_hz[0] != models[1].freq_hz[0]
 
 
-def test_a_link_that_cannot_be_filled_fails_before_anything_is_solved(client: Any, tmp_path: Path, solver: Callable[..., Solver]) -> None:
-    """The first two links would do; the third is a sheet without a wall. Nothing is added, the link and the body are named, and the remedies exist."""
+def test_a_link_that_cannot_be_filled_fails_before_anything_is_solved(
+    client: Any, tmp_path: Path, solver: Callable[..., Solver]
+) -> None:
+    """The first two links would do; the third is a sheet without a wall.
+
+    Nothing is added, the link and the body are named, and the remedies exist.
+    """
     (tmp_path / "sheet.obj").write_text(SHEET)
     body = boxes(client, tmp_path, tip=f'<mesh filename="{tmp_path}/sheet.obj"/>')
     listener, made = sb.attach(client, microphone=()), solver()
@@ -109,7 +126,9 @@ def test_a_link_that_cannot_be_filled_fails_before_anything_is_solved(client: An
     assert len(listener.world.bodies) == len(made.solved_m) == 3
 
 
-def test_a_link_whose_modes_fail_leaves_nothing_added(client: Any, tmp_path: Path, solver: Callable[..., Solver]) -> None:
+def test_a_link_whose_modes_fail_leaves_nothing_added(
+    client: Any, tmp_path: Path, solver: Callable[..., Solver]
+) -> None:
     """What cannot be seen beforehand."""
     body = boxes(client, tmp_path, tip='<box size="0.02 0.01 0.002"/>')
     listener, made = sb.attach(client, microphone=()), solver(fails_at_m=0.02)
@@ -123,7 +142,10 @@ def test_a_link_whose_modes_fail_leaves_nothing_added(client: Any, tmp_path: Pat
 
 
 def test_the_most_intricate_link_is_solved_first(client: Any, tmp_path: Path, solver: Callable[..., Solver]) -> None:
-    """Its filling is the likeliest to fail, and the slowest: KUKA's hand fails after three attempts, the other links before it were in vain."""
+    """Its filling is the likeliest to fail, and the slowest:
+
+    KUKA's hand fails after three attempts, the other links before it were in vain.
+    """
     bar = Path(__file__).parents[2] / "assets" / "bowl.obj"
     body = boxes(client, tmp_path, tip=f'<mesh filename="{bar}"/>')
     made = solver()
@@ -145,7 +167,12 @@ def test_an_absurd_mass_of_one_link_leaves_nothing_added(client: Any, tmp_path: 
 def test_no_remedy_names_an_option_that_is_none(client: Any) -> None:
     """`edge_m` is an option of the solver's own, not of `Listener.add` or of `sonic-bullet modes`."""
     package = Path(sb.__file__).parent
-    remedies = [line for path in package.rglob("*.py") for line in path.read_text().splitlines() if "Error(" in line and "edge_m" in line]
+    remedies = [
+        line
+        for path in package.rglob("*.py")
+        for line in path.read_text().splitlines()
+        if "Error(" in line and "edge_m" in line
+    ]
     assert [line.strip() for line in remedies if "edge_m is" not in line] == []
     assert len(remedies) == 1
 
@@ -156,7 +183,9 @@ def test_all_links_of_a_body_without_shapes(client: Any) -> None:
         sb.attach(client, microphone=()).add(body, link="all", material=STEEL)
 
 
-def test_progress_names_each_link_and_how_many_there_are(client: Any, tmp_path: Path, solver: Callable[..., Solver]) -> None:
+def test_progress_names_each_link_and_how_many_there_are(
+    client: Any, tmp_path: Path, solver: Callable[..., Solver]
+) -> None:
     body = boxes(client, tmp_path)
     solver()
     seen: list[str] = []
@@ -173,7 +202,12 @@ class Terminal(io.StringIO):
 
 @pytest.mark.parametrize(("stream", "shown"), [(Terminal, True), (io.StringIO, False)])
 def test_a_terminal_shows_which_link_is_computed(
-    client: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, solver: Callable[..., Solver], stream: type[io.StringIO], shown: bool
+    client: Any,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    solver: Callable[..., Solver],
+    stream: type[io.StringIO],
+    shown: bool,
 ) -> None:
     """Without `progress`: one rewritten line on a terminal's stderr, nothing in a pipe."""
     monkeypatch.setenv("TERM", "xterm")

@@ -1,4 +1,7 @@
-"""Random orders of add, remove, reset, save, restore, quench, disconnect …: the replay is what was heard. A thousand: benchmarks/replay_orders.py."""
+"""Random orders of add, remove, reset, save, restore, quench, disconnect …: the replay is what was heard.
+
+A thousand: benchmarks/replay_orders.py.
+"""
 
 from __future__ import annotations
 

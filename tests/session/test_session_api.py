@@ -229,7 +229,9 @@ def test_how_the_sound_is_read_out_does_not_matter(client: Any) -> None:
         if rng.random() < 0.4:
             pieces.append(listener.read())
         if number % 13 == 0:
-            np.testing.assert_array_equal(listener.sound()[:, : max(number - 2, 0) * 200], quiet.sound()[:, : max(number - 2, 0) * 200])
+            np.testing.assert_array_equal(
+                listener.sound()[:, : max(number - 2, 0) * 200], quiet.sound()[:, : max(number - 2, 0) * 200]
+            )
             assert len(listener.contacts.steps) == number + 1
     pieces.append(listener.read())
     np.testing.assert_array_equal(np.concatenate(pieces, axis=1), np.concatenate(frames, axis=1))
@@ -237,7 +239,9 @@ def test_how_the_sound_is_read_out_does_not_matter(client: Any) -> None:
     listener.detach()
 
 
-def test_without_a_microphone_contacts_are_kept_and_nothing_is_computed(client: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_a_microphone_contacts_are_kept_and_nothing_is_computed(
+    client: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
     from sonic_bullet.synth import far_field as radiation
 
     monkeypatch.setattr(radiation, "radiation", lambda *_: pytest.fail("nobody hears it"))

@@ -18,10 +18,17 @@ NODE_OF_FIRST = 0.2242  # of the free bar's length [Blevins 1979, table 8-1]
 
 def struck_bar(client: Any, at_m: float) -> tuple[sb.Listener, ModalModel]:
     client.setGravity(0, 0, 0)
-    bar = client.createMultiBody(7850 * LENGTH_M * SIDE_M**2, client.createCollisionShape(p.GEOM_BOX, halfExtents=[LENGTH_M / 2, SIDE_M / 2, SIDE_M / 2]))
-    hammer = client.createMultiBody(0.004, client.createCollisionShape(p.GEOM_SPHERE, radius=0.005), basePosition=[at_m, 0, 0.012])
+    bar = client.createMultiBody(
+        7850 * LENGTH_M * SIDE_M**2,
+        client.createCollisionShape(p.GEOM_BOX, halfExtents=[LENGTH_M / 2, SIDE_M / 2, SIDE_M / 2]),
+    )
+    hammer = client.createMultiBody(
+        0.004, client.createCollisionShape(p.GEOM_SPHERE, radius=0.005), basePosition=[at_m, 0, 0.012]
+    )
     for body in (bar, hammer):
-        client.changeDynamics(body, -1, restitution=0.9, contactProcessingThreshold=0, linearDamping=0, angularDamping=0)
+        client.changeDynamics(
+            body, -1, restitution=0.9, contactProcessingThreshold=0, linearDamping=0, angularDamping=0
+        )
     client.resetBaseVelocity(hammer, [0, 0, -1.0])
     ear = sb.Vibrometer(bar, [0.93 * LENGTH_M / 2, 0.0, SIDE_M / 2], [0, 0, 1])
     listener = sb.attach(client, microphone=[sb.Microphone([0, -0.4, 0.3]), ear, sb.ModalSum()])
@@ -33,7 +40,9 @@ def struck_bar(client: Any, at_m: float) -> tuple[sb.Listener, ModalModel]:
 
 
 def bending_pairs(model: ModalModel) -> list[list[int]]:
-    """Bending modes in order, each with its twin across: those in which the end section moves sideways as a whole (torsion's mean is 0)."""
+    """Bending modes in order, each with its twin across: those in which the end section moves sideways as a whole
+    (torsion's mean is 0).
+    """
     end = np.flatnonzero(model.vertex_m[:, 0] > 0.4999 * LENGTH_M)
     corners = end[np.argsort(-np.abs(model.vertex_m[end, 1:]).sum(axis=1))[:4]]
     mean = np.abs(model.shape[corners].astype(float).mean(axis=0))  # (3, m)
@@ -52,7 +61,10 @@ def bending_levels_db(listener: sb.Listener, model: ModalModel, channel: int) ->
     sound = listener.sound()[channel, -33_600:]
     windowed = np.blackman(len(sound)) * sound
     time = np.arange(len(sound)) / listener.sr
-    level = [max(abs(np.sum(windowed * np.exp(-2j * np.pi * model.freq_hz[m] * time))) for m in pair) for pair in bending_pairs(model)]
+    level = [
+        max(abs(np.sum(windowed * np.exp(-2j * np.pi * model.freq_hz[m] * time))) for m in pair)
+        for pair in bending_pairs(model)
+    ]
     return 20 * np.log10(np.array(level) / max(level))
 
 

@@ -51,7 +51,9 @@ def test_a_quench_is_in_the_log_and_its_replay_is_the_same_bits(client: Any, tmp
 
 
 def test_a_quench_acts_at_its_sample_and_takes_what_was_struck_just_before(client: Any) -> None:
-    """The last steps before it are known but not yet sounded: a strike among them is not to ring on after the hand has come."""
+    """The last steps before it are known but not yet sounded: a strike among them is not to ring on after the hand has
+    come.
+    """
     floor(client)
     listener = sb.attach(client, microphone=sb.ModalSum())
     body = ball(client, (0, 0, 0.021))
@@ -71,7 +73,9 @@ def test_a_quench_acts_at_its_sample_and_takes_what_was_struck_just_before(clien
 
 
 def test_what_strikes_in_the_step_after_a_quench_sounds() -> None:
-    """A strike whose bodies overlap as its step starts is dated back into the step before: not before a quench, or it would be lost."""
+    """A strike whose bodies overlap as its step starts is dated back into the step before: not before a quench, or it
+    would be lost.
+    """
     bodies = (box_body(EDGES_M, TONES_HZ), wall_body(body_id=1))
     hit = row(0, 1, [0, 0, 0.2], approach=1.0, gap=-1e-3)
     observed = []
@@ -116,7 +120,16 @@ def test_seconds_cut_a_log_before_or_after_its_quench(client: Any, tmp_path: Pat
     listener.contacts.save(tmp_path / "log.npz")
     whole = listener.sound().astype(np.float32)
     for seconds, events in ((0.2, 0), (0.25, 1), (0.3, 1)):
-        said = ["render", str(tmp_path / "log.npz"), "-o", str(tmp_path / "a.wav"), "--contacts", str(tmp_path / "cut.npz"), "--seconds", str(seconds)]
+        said = [
+            "render",
+            str(tmp_path / "log.npz"),
+            "-o",
+            str(tmp_path / "a.wav"),
+            "--contacts",
+            str(tmp_path / "cut.npz"),
+            "--seconds",
+            str(seconds),
+        ]
         cli.main(said, standalone_mode=False)
         cut = sb.read_log(str(tmp_path / "cut.npz"))
         assert len(cut.events) == events
@@ -150,13 +163,16 @@ def test_what_rolls_goes_on_through_a_quench(client: Any) -> None:
     listener.quench()
     steps(client, 60)
     sound = listener.sound()[0]
-    before, after = (float(np.sqrt((part**2).mean())) for part in (sound[40 * STEP : 60 * STEP], sound[80 * STEP : 100 * STEP]))
+    before, after = (
+        float(np.sqrt((part**2).mean())) for part in (sound[40 * STEP : 60 * STEP], sound[80 * STEP : 100 * STEP])
+    )
     assert before > 0
     assert after == pytest.approx(before, rel=0.9)
 
 
 def test_a_log_of_the_first_format_replays_as_before() -> None:
-    """tests/data/contacts-1.npz and its sound are from the last version that wrote format 1 (a box and a ball that fall, the ball is removed).
+    """tests/data/contacts-1.npz and its sound are from the last version that wrote format 1 (a box and a ball that
+    fall, the ball is removed).
 
     The same bits on the machine that made them; elsewhere compilers round otherwise.
     """

@@ -1,4 +1,6 @@
-"""What is left out of a world is left out of its sound alone: the others are heard, logged and written; nothing that is no number gets in."""
+"""What is left out of a world is left out of its sound alone: the others are heard, logged and written; nothing that is
+no number gets in.
+"""
 
 from __future__ import annotations
 
@@ -95,7 +97,14 @@ def test_what_falls_on_cloth_overflows_nowhere(client: Any) -> None:
     client.setGravity(0, 0, -9.81)
     client.setAdditionalSearchPath(pybullet_data.getDataPath())
     floor(client)
-    cloth = client.loadSoftBody("cloth_z_up.obj", basePosition=[0, 0, 0.3], mass=1.0, useMassSpring=1, springElasticStiffness=40, useFaceContact=1)
+    cloth = client.loadSoftBody(
+        "cloth_z_up.obj",
+        basePosition=[0, 0, 0.3],
+        mass=1.0,
+        useMassSpring=1,
+        springElasticStiffness=40,
+        useFaceContact=1,
+    )
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         with pytest.warns(SceneWarning, match=f"body {cloth} .*soft"):

@@ -28,7 +28,10 @@ def walled_box(client: Any) -> list[int]:
         *(([0.02, 0.3, 0.3], [x, 0, 0.3]) for x in (-0.2, 0.2)),
         *(([0.3, 0.02, 0.3], [0, y, 0.3]) for y in (-0.2, 0.2)),
     ]
-    made = [client.createMultiBody(0, client.createCollisionShape(p.GEOM_BOX, halfExtents=half), basePosition=where) for half, where in planks]
+    made = [
+        client.createMultiBody(0, client.createCollisionShape(p.GEOM_BOX, halfExtents=half), basePosition=where)
+        for half, where in planks
+    ]
     for plank in made:
         client.changeDynamics(plank, -1, restitution=0.3, contactProcessingThreshold=0)
     return made
@@ -39,7 +42,11 @@ def thrown_in(client: Any, listener: sb.Listener, number: int, rng: np.random.Ge
     position = [*rng.uniform(-0.1, 0.1, 2), 0.12 + 0.09 * number]
     turn = p.getQuaternionFromEuler(list(rng.uniform(-1, 1, 3)))
     if number % 4 == 3:
-        shape, model, mass = client.createCollisionShape(p.GEOM_SPHERE, radius=0.025), ball_body(0.025, material).model, 0.15
+        shape, model, mass = (
+            client.createCollisionShape(p.GEOM_SPHERE, radius=0.025),
+            ball_body(0.025, material).model,
+            0.15,
+        )
     elif number % 4 == 2:
         shape, mass = client.createCollisionShape(p.GEOM_CYLINDER, radius=0.025, height=0.06), 0.12
         model = box_model((0.05, 0.05, 0.06), (1900.0 + 70 * number, 4100.0), material, seed=number)
@@ -48,7 +55,9 @@ def thrown_in(client: Any, listener: sb.Listener, number: int, rng: np.random.Ge
         shape, mass = client.createCollisionShape(p.GEOM_BOX, halfExtents=[e / 2 for e in edges]), 0.1 + 0.02 * number
         model = box_model(edges, (800.0 + 50 * number, 2100.0, 3300.0 + 40 * number), material, seed=number)
     body = client.createMultiBody(mass, shape, basePosition=position, baseOrientation=turn)
-    client.changeDynamics(body, -1, restitution=0.3, contactProcessingThreshold=0, rollingFriction=1e-3, spinningFriction=1e-3)
+    client.changeDynamics(
+        body, -1, restitution=0.3, contactProcessingThreshold=0, rollingFriction=1e-3, spinningFriction=1e-3
+    )
     listener.add(body, material=material, model=model)
     return int(body)
 
@@ -77,7 +86,9 @@ def pile() -> Any:
     def listening(split: Any, rows: Any, step: Any, resonators: Any, placed: Any, earliest: float) -> Any:
         impacts = real(split, rows, step, resonators, placed, earliest)
         number = len(listener.contacts.steps) - 4 + (earliest < 0)
-        begun.extend((number, (impact.low << 16) | impact.high, float(np.linalg.norm(impact.impulse_n_s))) for impact in impacts)
+        begun.extend(
+            (number, (impact.low << 16) | impact.high, float(np.linalg.norm(impact.impulse_n_s))) for impact in impacts
+        )
         return impacts
 
     with pytest.MonkeyPatch.context() as patch:
@@ -89,13 +100,15 @@ def pile() -> Any:
 
 
 def impacts(log: ContactLog) -> list[tuple[int, int, float]]:
-    """(step, pair, impulse) of what any user would call an impact, from the rows alone: a pair that touched nothing for four steps meets at
-    more than 5 cm/s, and its impulse, less what it carries afterwards, is above 1 mN·s."""
+    """(step, pair, impulse) of what any user would call an impact, from the rows alone: a pair that touched nothing for
+    four steps meets at more than 5 cm/s, and its impulse, less what it carries afterwards, is above 1 mN·s."""
     loads: dict[int, np.ndarray] = {}
     speed: dict[int, np.ndarray] = {}
     for number, step in enumerate(log.steps):
         rows = step.contacts
-        for a, b, push, fast in zip(rows.a, rows.b, np.einsum("ki,ki->k", rows.impulse_n_s, rows.normal), rows.approach_m_s, strict=True):
+        for a, b, push, fast in zip(
+            rows.a, rows.b, np.einsum("ki,ki->k", rows.impulse_n_s, rows.normal), rows.approach_m_s, strict=True
+        ):
             key = (min(a, b) << 16) | max(a, b)
             loads.setdefault(key, np.zeros(len(log.steps) + 4))[number] += push
             speed.setdefault(key, np.zeros(len(log.steps) + 4))
@@ -118,7 +131,9 @@ def last_strike_s(log: ContactLog) -> float:
         rows = step.contacts
         now: dict[tuple[int, int], float] = {}
         fast: dict[tuple[int, int], float] = {}
-        for a, b, push, speed in zip(rows.a, rows.b, np.einsum("ki,ki->k", rows.impulse_n_s, rows.normal), rows.approach_m_s, strict=True):
+        for a, b, push, speed in zip(
+            rows.a, rows.b, np.einsum("ki,ki->k", rows.impulse_n_s, rows.normal), rows.approach_m_s, strict=True
+        ):
             pair = (min(a, b), max(a, b))
             now[pair] = now.get(pair, 0.0) + push
             fast[pair] = max(fast.get(pair, 0.0), speed)
@@ -150,7 +165,9 @@ def test_a_settled_pile_is_silent(pile: Pile) -> None:
 
 
 def test_a_settled_pile_rings_out_with_nothing_but_decay(pile: Pile) -> None:
-    """Without a quench: from one second after the last strike no blow begins, and energy falls from each fifth of a second to the next."""
+    """Without a quench: from one second after the last strike no blow begins, and energy falls from each fifth of a
+    second to the next.
+    """
     begin = last_strike_s(pile.log) + 1.0
     assert not [impact for impact in pile.impacts if impact[0] >= begin / DT]
     tail = pile.sound[:, round(begin * SR) :]
@@ -170,12 +187,16 @@ def test_every_impact_is_a_blow(pile: Pile) -> None:
         share.append(mine / impulse)
         if mine < STRIKE_N_S:
             missed.append((number, key >> 16, key & 0xFFFF, impulse, mine))
-    print(f"{len(wanted)} impacts, {len(pile.impacts)} blows, missed {missed}; share of the impulse: median {np.median(share):.2f}, least {min(share):.2f}")
+    print(
+        f"{len(wanted)} impacts, {len(pile.impacts)} blows, missed {missed}; share of the impulse: median {np.median(share):.2f}, least {min(share):.2f}"
+    )
     assert not missed
     assert np.median(share) == pytest.approx(1.0, abs=0.1)
 
 
-def played(setup: synthesizer.Setup, state: synthesizer.State, log: ContactLog, numbers: range) -> tuple[np.ndarray, synthesizer.State]:
+def played(
+    setup: synthesizer.Setup, state: synthesizer.State, log: ContactLog, numbers: range
+) -> tuple[np.ndarray, synthesizer.State]:
     """Frames (channels, n) of the steps three before the ``numbers``, which are fed, and the state after them."""
     frames = [np.zeros((len(setup.sensors), 0))]
     for step in log.steps[numbers.start : numbers.stop]:
@@ -188,8 +209,9 @@ def played(setup: synthesizer.Setup, state: synthesizer.State, log: ContactLog, 
 def test_every_impact_is_an_onset_in_the_sound(pile: Pile, monkeypatch: pytest.MonkeyPatch) -> None:
     """At the microphone: without its blow the sound is the same to the bit until an impact, and another from then on.
 
-    From then on means from one step before the impact's (where bodies overlap as a step starts, they met in the one before) to its end and
-    3 ms of travel. How far an impact stands out of what rings already is physics: printed, and half of them are the loudest thing in some band.
+    From then on means from one step before the impact's (where bodies overlap as a step starts, they met in the one
+    before) to its end and 3 ms of travel. How far an impact stands out of what rings already is physics: printed, and
+    half of them are the loudest thing in some band.
     """
     log, real = pile.log, synthesizer.find_pulses
     setup = synthesizer.Setup(log.sr, log.sensors, log.seed, log.air)
@@ -200,7 +222,11 @@ def test_every_impact_is_an_onset_in_the_sound(pile: Pile, monkeypatch: pytest.M
         _, state = played(setup, state, log, range(at, number))
         at = number
         with monkeypatch.context() as patch:
-            patch.setattr(synthesizer, "find_pulses", lambda *a, key=key: tuple(b for b in real(*a) if (b.low << 16) | b.high != key))
+            patch.setattr(
+                synthesizer,
+                "find_pulses",
+                lambda *a, key=key: tuple(b for b in real(*a) if (b.low << 16) | b.high != key),
+            )
             without, _ = played(setup, synthesizer.copied(state), log, range(number, number + 7))
         first = int(np.floor((number - 3) * SR * DT + 1e-9))
         both = np.stack([pile.sound[0, first : first + without.shape[1]], without[0, : pile.sound.shape[1] - first]])
@@ -211,7 +237,9 @@ def test_every_impact_is_an_onset_in_the_sound(pile: Pile, monkeypatch: pytest.M
         impact, rest = np.abs(np.fft.rfft(np.hanning(160) * np.stack([both[0] - both[1], both[1]])[:, window], 512))
         above_db.append(20 * np.log10(np.max(impact / np.maximum(rest, 1e-30))))
     print(f"{len(wanted)} impacts begin {min(begins):.2f} … {max(begins):.2f} steps after their step's start")
-    print(f"the blow over the rest, in the band where it is most: median {np.median(above_db):.1f} dB, a tenth below {np.percentile(above_db, 10):.1f} dB")
+    print(
+        f"the blow over the rest, in the band where it is most: median {np.median(above_db):.1f} dB, a tenth below {np.percentile(above_db, 10):.1f} dB"
+    )
     assert len(wanted) > 40
     assert min(begins) >= -1
     assert max(begins) <= 1 + 3e-3 / DT

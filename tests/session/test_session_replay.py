@@ -16,7 +16,12 @@ from sonic_bullet.listener import direct_client, disconnect
 from tests.made.models import GLASS, WOOD, ball_body, box_model
 from tests.made.worlds import EDGES_M, ball, box, floor, plate_model, sounding_box
 
-SENSORS = (sb.Microphone([0, -1, 0.5]), sb.Microphone([0.7, 0.2, 0.4]), sb.Vibrometer(1, [0.09, 0.04, 0.005], [0, 0, 1]), sb.ModalSum(0.5))
+SENSORS = (
+    sb.Microphone([0, -1, 0.5]),
+    sb.Microphone([0.7, 0.2, 0.4]),
+    sb.Vibrometer(1, [0.09, 0.04, 0.005], [0, 0, 1]),
+    sb.ModalSum(0.5),
+)
 
 
 def eventful(client: Any) -> sb.Listener:
@@ -32,7 +37,9 @@ def eventful(client: Any) -> sb.Listener:
     for number in range(160):
         if number == 40:
             late = box(client, (0, 0, 0.35))
-            listener.add(late, material=GLASS, model=box_model(EDGES_M, (1010.0, 2222.0), GLASS, seed=7), roughness_m=2e-6)
+            listener.add(
+                late, material=GLASS, model=box_model(EDGES_M, (1010.0, 2222.0), GLASS, seed=7), roughness_m=2e-6
+            )
         if number == 70:
             client.resetBasePositionAndOrientation(first, [0.5, 0.5, 0.1], [0, 0, 0, 1])
         if number == 90:
@@ -75,11 +82,15 @@ sys.meta_path.insert(0, Blocker())
 import hashlib, sonic_bullet as sb
 print(hashlib.sha256(sb.render_log(sb.read_log(sys.argv[1])).tobytes()).hexdigest())
 """
-    said = subprocess.run([sys.executable, "-c", script, str(path)], check=True, timeout=200, capture_output=True, text=True).stdout
+    said = subprocess.run(
+        [sys.executable, "-c", script, str(path)], check=True, timeout=200, capture_output=True, text=True
+    ).stdout
     assert said.split() == [hashlib.sha256(np.ascontiguousarray(sound).tobytes()).hexdigest()]
 
 
-def test_the_same_scene_twice_is_the_same_bytes(client: Any, log_and_sound: tuple[Path, np.ndarray], tmp_path: Path) -> None:
+def test_the_same_scene_twice_is_the_same_bytes(
+    client: Any, log_and_sound: tuple[Path, np.ndarray], tmp_path: Path
+) -> None:
     path, sound = log_and_sound
     listener = eventful(client)
     listener.contacts.save(tmp_path / "again.npz")
@@ -116,7 +127,9 @@ def test_plate_model_is_heard_by_the_vibrometer_alone_where_it_looks(log_and_sou
 
     path, sound = log_and_sound
     log = sb.read_log(str(path))
-    bodies = tuple(replace(b, model=replace_modes(b.model)) if b.body_id == 1 and b.model is not None else b for b in log.bodies)
+    bodies = tuple(
+        replace(b, model=replace_modes(b.model)) if b.body_id == 1 and b.model is not None else b for b in log.bodies
+    )
     silent = sb.render_log(replace(log, bodies=bodies, steps=log.steps[:60]))
     assert not silent[2].any()
     assert np.abs(sound[2, : 60 * 200]).max() > 0
@@ -153,13 +166,20 @@ def test_a_log_turned_as_a_whole_sounds_the_same(log_and_sound: tuple[Path, np.n
         replace(
             step,
             position_m=turned(step.position_m) + shift,
-            quaternion_xyzw=(turn * Rotation.from_quat(step.quaternion_xyzw.copy())).as_quat() if len(step.quaternion_xyzw) else step.quaternion_xyzw,
+            quaternion_xyzw=(turn * Rotation.from_quat(step.quaternion_xyzw.copy())).as_quat()
+            if len(step.quaternion_xyzw)
+            else step.quaternion_xyzw,
             gravity_m_s2=turned(step.gravity_m_s2),
-            contacts=replace(step.contacts, **{name: turned(getattr(step.contacts, name)) for name in ("normal", "impulse_n_s", "slip_m_s")}),
+            contacts=replace(
+                step.contacts,
+                **{name: turned(getattr(step.contacts, name)) for name in ("normal", "impulse_n_s", "slip_m_s")},
+            ),
         )
         for step in log.steps
     )
-    sensors = tuple(sb.Microphone(turned(s.position_m) + shift) if isinstance(s, sb.Microphone) else s for s in log.sensors)
+    sensors = tuple(
+        sb.Microphone(turned(s.position_m) + shift) if isinstance(s, sb.Microphone) else s for s in log.sensors
+    )
     other = sb.render_log(replace(log, steps=steps, sensors=sensors))
     error = np.abs(other - sound).max(axis=1) / np.abs(sound).max(axis=1)
     print("turned:", error)

@@ -11,7 +11,15 @@ import pytest
 
 import sonic_bullet as sb
 from sonic_bullet.listener import disconnect
-from sonic_bullet.records.errors import AudioError, FileError, LogError, MaterialError, RecordError, SceneError, SonicBulletError
+from sonic_bullet.records.errors import (
+    AudioError,
+    FileError,
+    LogError,
+    MaterialError,
+    RecordError,
+    SceneError,
+    SonicBulletError,
+)
 from tests.made.models import STEEL
 from tests.made.worlds import box, floor, plate_model, sounding_box
 
@@ -36,7 +44,9 @@ def test_sample_rates_that_cannot_be(client: Any, sr: Any) -> None:
     one_line(error)
 
 
-@pytest.mark.parametrize("place", [(0, float("nan"), 0), (0, 0), [(0, 0, 0), (0, float("inf"), 1)], "here", None, [(0, 0, 1), (2,)]])
+@pytest.mark.parametrize(
+    "place", [(0, float("nan"), 0), (0, 0), [(0, 0, 0), (0, float("inf"), 1)], "here", None, [(0, 0, 1), (2,)]]
+)
 def test_microphones_that_are_no_points(client: Any, place: Any) -> None:
     with pytest.raises(RecordError) as error:
         sb.attach(client, microphone=place)
@@ -57,7 +67,11 @@ def test_materials_that_are_unknown_or_never_stop_ringing(client: Any) -> None:
         listener.add(body, material="unobtainium", model=plate_model())
     one_line(error)
     with pytest.raises(MaterialError, match="no damping") as error:
-        listener.add(body, material=sb.Material.isotropic("ideal", youngs_pa=1e9, poisson=0.3, density_kg_m3=1000), model=plate_model())
+        listener.add(
+            body,
+            material=sb.Material.isotropic("ideal", youngs_pa=1e9, poisson=0.3, density_kg_m3=1000),
+            model=plate_model(),
+        )
     one_line(error)
 
 
@@ -130,7 +144,9 @@ def test_seeds_that_are_none(client: Any, seed: Any) -> None:
     one_line(error)
 
 
-def test_adding_tells_which_body_is_analysed_and_an_unknown_body_before_any_work(client: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_adding_tells_which_body_is_analysed_and_an_unknown_body_before_any_work(
+    client: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
     from sonic_bullet import modal
 
     def analyse(shapes: Any, material: Any, *, progress: Any, **_: Any) -> Any:
@@ -170,12 +186,16 @@ def test_a_script_with_its_own_listener_that_breaks_keeps_what_was_heard(tmp_pat
     assert shares[-1] == pytest.approx(0.1)
 
 
-@pytest.mark.parametrize("cast", ['{0: {"material": "steel", "nonsense": 3}}', "{0: 3.0}", '{"x": "steel"}', '{(0, 1, 2): "steel"}'])
+@pytest.mark.parametrize(
+    "cast", ['{0: {"material": "steel", "nonsense": 3}}', "{0: 3.0}", '{"x": "steel"}', '{(0, 1, 2): "steel"}']
+)
 def test_casts_that_make_no_sense_are_one_line(tmp_path: Path, cast: str) -> None:
     from sonic_bullet.scene import render_scene
 
     scene = tmp_path / "cast.py"
-    scene.write_text(f"def build(client):\n    client.createMultiBody(1, client.createCollisionShape(client.GEOM_SPHERE, radius=0.01))\n    return {cast}\n")
+    scene.write_text(
+        f"def build(client):\n    client.createMultiBody(1, client.createCollisionShape(client.GEOM_SPHERE, radius=0.01))\n    return {cast}\n"
+    )
     with pytest.raises(SonicBulletError) as error:
         render_scene(scene, seconds=0.1)
     one_line(error)

@@ -181,7 +181,10 @@ def test_no_frame_or_file_holds_nan_inf_or_subnormals(client: Any, tmp_path: Pat
         client.stepSimulation()
         frames.append(listener.frame)
     listener.write(tmp_path / "tail.wav")
-    for samples, least in ((np.concatenate(frames, axis=1), np.finfo(float).tiny), (sb.read_audio(str(tmp_path / "tail.wav"))[0], np.finfo(np.float32).tiny)):
+    for samples, least in (
+        (np.concatenate(frames, axis=1), np.finfo(float).tiny),
+        (sb.read_audio(str(tmp_path / "tail.wav"))[0], np.finfo(np.float32).tiny),
+    ):
         assert np.isfinite(samples).all()
         size = np.abs(samples[samples != 0])
         assert size.min() >= least
@@ -190,7 +193,10 @@ def test_no_frame_or_file_holds_nan_inf_or_subnormals(client: Any, tmp_path: Pat
 
 
 def test_a_body_put_down_at_rest_is_silent_and_a_silent_hammer_is_heard(client: Any) -> None:
-    """Bullet finds the corners of a box one a step and lets it tilt: that is no blow. A partner without material strikes as any other."""
+    """Bullet finds the corners of a box one a step and lets it tilt: that is no blow.
+
+    A partner without material strikes as any other.
+    """
     floor(client)
     listener = sb.attach(client, microphone=sb.ModalSum())
     body = box(client, (0, 0, 0.005), turn=(0, 0, 0))

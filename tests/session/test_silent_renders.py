@@ -96,7 +96,9 @@ def test_a_log_without_steps_and_a_faint_sound(tmp_path: Path) -> None:
     assert "does not say why" in unknown
 
 
-def test_the_command_line_says_why(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
+def test_the_command_line_says_why(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
     """Of a scene, of a log, and where silence leaves nothing to write."""
     monkeypatch.chdir(tmp_path)
     scene(tmp_path, SCENES["nothing touched"])
@@ -147,12 +149,17 @@ def test_a_world_whose_bodies_cannot_touch_is_not_well(client: Any) -> None:
     assert ids(diagnose_world(client)) == []
 
 
-@pytest.mark.parametrize(("text", "found"), [("def build(client):\n    return {}\n", "no-body"), (SCENES["nothing was added"], "nothing-added"), (LOUD, None)])
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [("def build(client):\n    return {}\n", "no-body"), (SCENES["nothing was added"], "nothing-added"), (LOUD, None)],
+)
 def test_doctor_of_a_scene_that_cannot_sound(tmp_path: Path, text: str, found: str | None) -> None:
     errors = [one for one in ids(examine_scene(scene(tmp_path, text), 0.05)) if one[1] == "error"]
     assert errors == ([(found, "error")] if found else [])
 
 
 def test_doctor_of_a_script_without_bodies(tmp_path: Path) -> None:
-    (tmp_path / "plain.py").write_text("import pybullet as p\nme = p.connect(p.GUI)\nfor _ in range(9):\n    p.stepSimulation(physicsClientId=me)\n")
+    (tmp_path / "plain.py").write_text(
+        "import pybullet as p\nme = p.connect(p.GUI)\nfor _ in range(9):\n    p.stepSimulation(physicsClientId=me)\n"
+    )
     assert ids(examine_scene(tmp_path / "plain.py", 0.1)) == [("no-body", "error")]

@@ -38,7 +38,9 @@ def test_the_first_reading_is_the_recording_and_the_others_lie_beside_it() -> No
     ],
     ids=["alike", "as good", "worse", "gone"],
 )
-def test_what_is_named_is_named_in_every_reading(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, second: Row, earned: bool, said: str) -> None:
+def test_what_is_named_is_named_in_every_reading(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, second: Row, earned: bool, said: str
+) -> None:
     turn: list[int] = []
 
     def judge(folder: Path, case: dict[str, object]) -> Outcome:

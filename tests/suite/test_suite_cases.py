@@ -35,7 +35,10 @@ def test_a_case_reads_and_says_nothing_of_its_truth(small: str, tmp_path: Path) 
     assert "foreign" not in text
     assert "tau" not in text
     assert [e["id"] for e in truth["effects"]] == ["foreign-mode", "contact-time"]
-    vertex = np.array([line.split()[1:] for line in (tmp_path / "one" / "small.obj").read_text().splitlines() if line[0] == "v"], float)
+    vertex = np.array(
+        [line.split()[1:] for line in (tmp_path / "one" / "small.obj").read_text().splitlines() if line[0] == "v"],
+        float,
+    )
     for r in case.recordings[:8]:
         assert np.linalg.norm(vertex - np.array(r.position_m), axis=1).min() < 2e-6
         assert r.file is not None
@@ -53,7 +56,9 @@ def test_the_same_plan_gives_the_same_bytes(small: str, tmp_path: Path) -> None:
 def test_a_null_lies_at_its_floor_and_an_effect_beyond_it(small: str, tmp_path: Path) -> None:
     null = make_case(tmp_path, Plan("null", small, (), 5, seconds=0.5), tmp_path / "modes")["distance_db"]
     assert null["effect"] == pytest.approx(null["floor"], abs=0.5)
-    moved = make_case(tmp_path, Plan("law", small, (("damping-law", 2),), 5, seconds=0.5), tmp_path / "modes")["distance_db"]
+    moved = make_case(tmp_path, Plan("law", small, (("damping-law", 2),), 5, seconds=0.5), tmp_path / "modes")[
+        "distance_db"
+    ]
     assert moved["effect"] > moved["floor"] + 1
 
 
@@ -65,8 +70,18 @@ def test_each_of_a_pair_is_heard_beside_the_other(small: str, tmp_path: Path) ->
     assert sounding.beyond(heard["foreign-mode"]) > 1.8
     assert sounding.beyond(heard["contact-time"]) > 3
     # one that the other hides makes no pair, however loud both are together
-    assert sounding.short_of((1, 2), {"effect": 9.0, "floor": 1.0}, [{"effect": 9.0, "floor": 1.0}, {"effect": 1.0, "floor": 1.0}]) == 3.0
-    assert sounding.short_of((1, 2), {"effect": 9.0, "floor": 1.0}, [{"effect": 9.0, "floor": 1.0}, {"effect": 4.0, "floor": 1.0}]) == 0.0
+    assert (
+        sounding.short_of(
+            (1, 2), {"effect": 9.0, "floor": 1.0}, [{"effect": 9.0, "floor": 1.0}, {"effect": 1.0, "floor": 1.0}]
+        )
+        == 3.0
+    )
+    assert (
+        sounding.short_of(
+            (1, 2), {"effect": 9.0, "floor": 1.0}, [{"effect": 9.0, "floor": 1.0}, {"effect": 4.0, "floor": 1.0}]
+        )
+        == 0.0
+    )
 
 
 def test_lines_and_cases_without_a_mesh_read(small: str, tmp_path: Path) -> None:
@@ -114,7 +129,11 @@ def test_the_command_sees_no_truth_and_a_broken_answer_is_a_failure(small: str, 
 
 
 def test_the_report_counts_names_alarms_and_pairs() -> None:
-    base = {"verdict": "explained", "cpu_s": 1.0, "errors": {"before": {"holdout": 4.0}, "after": {"holdout": 2.0}, "floor": 2.0}}
+    base = {
+        "verdict": "explained",
+        "cpu_s": 1.0,
+        "errors": {"before": {"holdout": 4.0}, "after": {"holdout": 2.0}, "floor": 2.0},
+    }
     made = [
         {**base, "case": "single-room-weak-0", "true": ["room"], "found": ["room"]},
         {**base, "case": "single-room-weak-1", "true": ["room"], "found": ["rebound"]},

@@ -38,9 +38,12 @@ def test_bar_of_bricks_has_the_frequencies_of_a_beam_and_of_the_other_solver(fol
     from sonic_bullet.records import Material, Shape
 
     bar = objects.as_made(objects.solved(replace(BAR, cells=(20, 4, 2)), STEEL.poisson, folder), STEEL)
-    first = 22.373 / (2 * np.pi * 0.16**2) * np.sqrt(STEEL.youngs_pa / STEEL.density) * 0.008 / np.sqrt(12)  # Euler and Bernoulli, along z
+    # Euler and Bernoulli, along z
+    first = 22.373 / (2 * np.pi * 0.16**2) * np.sqrt(STEEL.youngs_pa / STEEL.density) * 0.008 / np.sqrt(12)
     assert bar.freq_hz[0] == pytest.approx(first, rel=0.015)
-    same = Material.isotropic("steel", youngs_pa=STEEL.youngs_pa, poisson=STEEL.poisson, density_kg_m3=STEEL.density, alpha_per_s=0, beta_s=0)
+    same = Material.isotropic(
+        "steel", youngs_pa=STEEL.youngs_pa, poisson=STEEL.poisson, density_kg_m3=STEEL.density, alpha_per_s=0, beta_s=0
+    )
     other = analyse((Shape("box", np.array([0.16, 0.02, 0.008])),), same, cache=None, edge_m=0.004, to_hz=9000)
     assert len(other.freq_hz) >= 5
     assert np.abs(bar.freq_hz[: len(other.freq_hz)] / other.freq_hz - 1).max() < 0.005
@@ -100,8 +103,12 @@ def test_rates_agree(bar: objects.Body, folder: Path) -> None:
             assert sent[0] == pytest.approx(sent[1], abs=0.01)
 
 
-@pytest.mark.parametrize("name", ["amplitude-pitch", "amplitude-damping", "foreign-mode", "room", "support-damping", "mode-splitting"])
-def test_zero_strength_is_the_plain_case(name: str, bar: objects.Body, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(
+    "name", ["amplitude-pitch", "amplitude-damping", "foreign-mode", "room", "support-damping", "mode-splitting"]
+)
+def test_zero_strength_is_the_plain_case(
+    name: str, bar: objects.Body, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     for module in (blow, body, sound):
         monkeypatch.setattr(module, "jitter", lambda *_: 0.0)
     s = scene(bar, BAR, folder)
@@ -142,7 +149,10 @@ def test_split_twins_stay_twins_of_the_same_space(folder: Path) -> None:
     apart = np.sqrt(split.value[twins + 1] / split.value[twins]) - 1
     assert (apart > 0.3 * effect.truth["split"]).all()
     for k in twins[:3]:
-        before, after = (np.einsum("vxm,wym->vxwy", m.shape[:20, :, k : k + 2], m.shape[:20, :, k : k + 2]) for m in (ring.modes, split))
+        before, after = (
+            np.einsum("vxm,wym->vxwy", m.shape[:20, :, k : k + 2], m.shape[:20, :, k : k + 2])
+            for m in (ring.modes, split)
+        )
         assert np.abs(before - after).max() < 1e-9 * np.abs(before).max()
 
 
@@ -165,7 +175,10 @@ def test_surfaces_are_closed_without_degenerate_faces_and_face_outward(name: str
     assert np.array_equal(once, np.unique(directed[:, ::-1], axis=0))
     assert np.einsum("fi,fi->", vertex[face[:, 0]], area) / 3 > 0
     assert np.isfinite(
-        objects.body(name, bricks.Modes(np.ones(1), np.zeros((len(vertex), 3, 1)), np.zeros((len(vertex), 3, 6)), vertex, face, 1.0)).normal
+        objects.body(
+            name,
+            bricks.Modes(np.ones(1), np.zeros((len(vertex), 3, 1)), np.zeros((len(vertex), 3, 6)), vertex, face, 1.0),
+        ).normal
     ).all()
 
 
@@ -184,4 +197,6 @@ def test_a_mode_bends_by_the_level_that_a_half_sine_leaves(bar: objects.Body, fo
         strike_sound(where, bar, where.strikes[0], where.sensor, effects, 0)
     f = np.sqrt(bar.modes.value) / (2 * np.pi)
     low = f < 6000
-    assert np.allclose((levels[1] / levels[0])[low], np.abs(np.cos(np.pi * f * tau) / (1 - (2 * f * tau) ** 2))[low], atol=0.01)
+    assert np.allclose(
+        (levels[1] / levels[0])[low], np.abs(np.cos(np.pi * f * tau) / (1 - (2 * f * tau) ** 2))[low], atol=0.01
+    )

@@ -1,4 +1,6 @@
-"""The bank against closed forms: the oscillator's own solution, exact strikes, forces, and what it does with what it cannot play."""
+"""The bank against closed forms: the oscillator's own solution, exact strikes, forces, and what it does with what it
+cannot play.
+"""
 
 from __future__ import annotations
 
@@ -13,9 +15,13 @@ from sonic_bullet.synth.bank import Force, ModeSet, Strike, advance, append, aud
 SR = 48_000
 
 
-def random_modes(rng: np.random.Generator, count: int, sets: int = 1, decay: tuple[float, float] = (0.5, 300.0)) -> ModeSet:
+def random_modes(
+    rng: np.random.Generator, count: int, sets: int = 1, decay: tuple[float, float] = (0.5, 300.0)
+) -> ModeSet:
     omega = 2 * np.pi * np.sort(np.exp(rng.uniform(np.log(40.0), np.log(20_000.0), count)))
-    return ModeSet(omega, rng.uniform(*decay, count), rng.normal(size=(sets, count)) + 1j * rng.normal(size=(sets, count)))
+    return ModeSet(
+        omega, rng.uniform(*decay, count), rng.normal(size=(sets, count)) + 1j * rng.normal(size=(sets, count))
+    )
 
 
 def pole(modes: ModeSet) -> Array:
@@ -28,7 +34,9 @@ def struck(modes: ModeSet, strike: Strike, sample: Array) -> Array:
     for j, impulse in enumerate(strike.impulse_n_s):
         late = sample - (strike.start + j * strike.spacing)
         response = np.exp(np.multiply.outer(pole(modes), np.maximum(late, 0.0))) * (late >= 0)
-        out += ((modes.weight * ((1 + 1j * modes.decay_per_s / modes.omega_rad_s) * strike.gain * impulse)) @ response).real
+        out += (
+            (modes.weight * ((1 + 1j * modes.decay_per_s / modes.omega_rad_s) * strike.gain * impulse)) @ response
+        ).real
     return out
 
 
@@ -36,7 +44,9 @@ def test_free_ringing_keeps_pitch_and_decay_to_1e9_of_the_envelope_over_ten_seco
     freq, t60 = (grid.ravel() for grid in np.meshgrid(np.geomspace(20, 20_000, 9), np.geomspace(0.05, 20, 6)))
     omega, decay = 2 * np.pi * freq, np.log(1000.0) / t60
     bank, state = empty_bank(SR)
-    bank, state = append(bank, state, [ModeSet(omega[i : i + 1], decay[i : i + 1], np.ones((1, 1), complex)) for i in range(len(freq))])
+    bank, state = append(
+        bank, state, [ModeSet(omega[i : i + 1], decay[i : i + 1], np.ones((1, 1), complex)) for i in range(len(freq))]
+    )
     strikes = [Strike(i, 0.0, 1.0, np.ones(1), np.ones(1)) for i in range(len(freq))]
     worst, compared = 0.0, 0
     for second in range(10):
@@ -57,9 +67,19 @@ def test_free_ringing_keeps_pitch_and_decay_to_1e9_of_the_envelope_over_ten_seco
 
 @pytest.mark.parametrize(
     ("start", "spacing", "nodes"),
-    [(100.0, 1.0, 1), (100.3, 0.04, 24), (137.71, 0.37, 200), (100.5, 0.5, 100), (355.2, 1.7, 61), (255.9, 0.5, 900), (100.1, 7.3, 9)],
+    [
+        (100.0, 1.0, 1),
+        (100.3, 0.04, 24),
+        (137.71, 0.37, 200),
+        (100.5, 0.5, 100),
+        (355.2, 1.7, 61),
+        (255.9, 0.5, 900),
+        (100.1, 7.3, 9),
+    ],
 )
-def test_strikes_are_the_sampled_continuous_response_wherever_their_nodes_fall(start: float, spacing: float, nodes: int) -> None:
+def test_strikes_are_the_sampled_continuous_response_wherever_their_nodes_fall(
+    start: float, spacing: float, nodes: int
+) -> None:
     rng = np.random.default_rng(nodes)
     modes = random_modes(rng, 21, sets=2)
     bank, state = empty_bank(SR, 2, at=100)
@@ -96,11 +116,15 @@ def test_forces_push_with_gains_that_move_over_the_call_and_pairs_add_up() -> No
 
 
 def test_the_energy_an_impulse_leaves_is_that_of_a_struck_mass() -> None:
-    """A mode of participation g struck by J at rest has kinetic energy (gJ)²/2 at once; a lasting sine at resonance grows as F/2·t."""
+    """A mode of participation g struck by J at rest has kinetic energy (gJ)²/2 at once; a lasting sine at resonance
+    grows as F/2·t.
+    """
     modes = ModeSet(np.array([2 * np.pi * 1000.0]), np.array([0.0]), np.ones((1, 1), complex))
     bank, state = empty_bank(SR)
     bank, state = append(bank, state, [modes])
-    assert advance(bank, state.copy(), 1, [Strike(0, 0.0, 1.0, np.array([0.02]), np.array([3.0]))])[0, 0, 0] == pytest.approx(0.06, rel=1e-14)
+    assert advance(bank, state.copy(), 1, [Strike(0, 0.0, 1.0, np.array([0.02]), np.array([3.0]))])[
+        0, 0, 0
+    ] == pytest.approx(0.06, rel=1e-14)
     n = SR // 2
     drive = np.cos(2 * np.pi * 1000 * np.arange(n) / SR)
     sound = advance(bank, state, n, forces=[Force(0, drive, np.ones(1), np.ones(1))])[0, 0]
@@ -142,7 +166,9 @@ def test_a_state_copied_plays_the_same_future_twice() -> None:
 
 
 def test_tails_end_in_zeros_and_never_in_subnormals() -> None:
-    """Fast and slow decays, tiny strikes: every sample is 0 or normal in single precision, state included, and silence is reached."""
+    """Fast and slow decays, tiny strikes: every sample is 0 or normal in single precision, state included, and silence
+    is reached.
+    """
     rng = np.random.default_rng(2)
     omega = 2 * np.pi * np.geomspace(30, 20_000, 12)
     decay = np.geomspace(15, 1.9 * SR, 12)
@@ -152,7 +178,11 @@ def test_tails_end_in_zeros_and_never_in_subnormals() -> None:
     bank, state = append(bank, state, [modes])
     sounds = []
     for second in range(6):
-        strikes = [Strike(0, second * SR + 11.3, 0.1, 10.0 ** rng.uniform(-320, -3, 30), np.ones(int(keep.sum())))] if second < 2 else ()
+        strikes = (
+            [Strike(0, second * SR + 11.3, 0.1, 10.0 ** rng.uniform(-320, -3, 30), np.ones(int(keep.sum())))]
+            if second < 2
+            else ()
+        )
         sounds.append(advance(bank, state, SR, strikes))
         live = np.abs(np.concatenate([state.z, state.driven]))
         assert not ((live > 0) & (live < np.finfo(float).tiny)).any()
@@ -215,5 +245,11 @@ def test_nothing_to_play_is_legal() -> None:
     bank, state = append(bank, state, [])
     bank, state = append(bank, state, [ModeSet(np.zeros(0), np.zeros(0), np.zeros((2, 0), complex))])
     assert advance(bank, state, 0).shape == (2, 1, 0)
-    assert not advance(bank, state, 10, [Strike(0, 20.0, 1.0, np.ones(3), np.zeros(0))], [Force(0, np.ones(10), np.zeros(0), np.zeros(0))]).any()
+    assert not advance(
+        bank,
+        state,
+        10,
+        [Strike(0, 20.0, 1.0, np.ones(3), np.zeros(0))],
+        [Force(0, np.ones(10), np.zeros(0), np.zeros(0))],
+    ).any()
     assert state.at == 20

@@ -1,4 +1,6 @@
-"""Modes that bend with their level: the bank beside the closed form, blocks beside each other, and a linear body untouched."""
+"""Modes that bend with their level: the bank beside the closed form, blocks beside each other, and a linear body
+untouched.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +18,12 @@ HZ, DECAY, GAIN = np.array([440.0, 1234.5, 3000.0]), np.array([3.0, 8.0, 20.0]),
 
 def modes(bend: float, damping_growth: float, power: float = 1.0) -> ModeSet:
     return ModeSet(
-        2 * np.pi * HZ, DECAY, np.ones((1, 3), complex), bend=np.full(3, bend), damping_growth=np.full(3, damping_growth), damping_growth_power=power
+        2 * np.pi * HZ,
+        DECAY,
+        np.ones((1, 3), complex),
+        bend=np.full(3, bend),
+        damping_growth=np.full(3, damping_growth),
+        damping_growth_power=power,
     )
 
 
@@ -30,12 +37,21 @@ def played(bend: float, damping_growth: float, cuts: list[int], start: float = 0
 def wanted(bend: float, damping_growth: float, n: int, power: float = 1.0) -> Array:
     """The closed form with every mode from its start; |z| is GAIN there."""
     amplitude = (1 + 1j * DECAY / (2 * np.pi * HZ)) * GAIN
-    ring = Ring(HZ, DECAY, amplitude, np.abs(amplitude), np.full(3, bend), np.full(3, damping_growth), damping_growth_power=power)
+    ring = Ring(
+        HZ,
+        DECAY,
+        amplitude,
+        np.abs(amplitude),
+        np.full(3, bend),
+        np.full(3, damping_growth),
+        damping_growth_power=power,
+    )
     return sounded(ring, Impact(1.0, np.zeros(1), np.ones(1)), n, SR)
 
 
 @pytest.mark.parametrize(
-    ("bend", "damping_growth", "power"), [(0.004, 0.0, 1.0), (-0.004, 0.0, 1.0), (0.0, 0.8, 1.0), (0.003, 0.8, 1.0), (0.0, 0.9, 2.0), (0.003, 0.9, 2.0)]
+    ("bend", "damping_growth", "power"),
+    [(0.004, 0.0, 1.0), (-0.004, 0.0, 1.0), (0.0, 0.8, 1.0), (0.003, 0.8, 1.0), (0.0, 0.9, 2.0), (0.003, 0.9, 2.0)],
 )
 def test_bent_modes_follow_the_closed_form(bend: float, damping_growth: float, power: float) -> None:
     """32 samples late at most: 2π f b a² · 0.67 ms of phase, c a d · 0.67 ms of level, and no drift after that."""

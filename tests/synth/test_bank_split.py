@@ -16,11 +16,17 @@ FIRST = 1000
 
 
 def scene(seed: int, length: int) -> tuple[Bank, BankState, list[Strike], dict[int, tuple[Array, Array, Array]], Array]:
-    """Bodies of unequal size, strikes short and long, several on one body at once, and forces on two of them for a while."""
+    """Bodies of unequal size, strikes short and long, several on one body at once, and forces on two of them for a
+    while.
+    """
     rng = np.random.default_rng(seed)
     bank, state = empty_bank(SR, 2, at=FIRST)
     bodies = [
-        ModeSet(2 * np.pi * np.sort(rng.uniform(30, 23_000, m)), 10.0 ** rng.uniform(-1, 4.5, m), rng.normal(size=(2, m)) + 1j * rng.normal(size=(2, m)))
+        ModeSet(
+            2 * np.pi * np.sort(rng.uniform(30, 23_000, m)),
+            10.0 ** rng.uniform(-1, 4.5, m),
+            rng.normal(size=(2, m)) + 1j * rng.normal(size=(2, m)),
+        )
         for m in SIZES
     ]
     bodies[4] = ModeSet(bodies[4].omega_rad_s, bodies[4].decay_per_s, bodies[4].weight * np.array([[1.0], [0.0]]))
@@ -29,7 +35,15 @@ def scene(seed: int, length: int) -> tuple[Bank, BankState, list[Strike], dict[i
     for _ in range(int(rng.integers(1, 25))):
         body, nodes = int(rng.integers(len(SIZES))), int(rng.choice([1, 2, 24, 300]))
         start = FIRST + rng.choice([rng.uniform(0, length - 1), float(rng.integers(length)), 0.0])
-        strikes.append(Strike(body, start, float(rng.choice([0.04, 0.1, 0.5, 1.0, 1.37, 3.0])), rng.normal(size=nodes), rng.normal(size=SIZES[body])))
+        strikes.append(
+            Strike(
+                body,
+                start,
+                float(rng.choice([0.04, 0.1, 0.5, 1.0, 1.37, 3.0])),
+                rng.normal(size=nodes),
+                rng.normal(size=SIZES[body]),
+            )
+        )
     strikes.append(strikes[0])
     forces = {}
     for body in (2, 4, 4 if seed % 2 else 3):

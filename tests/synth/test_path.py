@@ -1,4 +1,7 @@
-"""Free air: distance, travel time, Doppler shift, direction, moves by hand, and the same bits however the calls are cut."""
+"""Free air:
+
+distance, travel time, Doppler shift, direction, moves by hand, and the same bits however the calls are cut.
+"""
 
 from __future__ import annotations
 
@@ -16,18 +19,32 @@ AIR = Air()
 C = AIR.sound_speed_m_s
 
 
-def path_of(bodies: int, microphones: object = ((0.0, 0.0, 0.0),), radius: float = 0.01, jerk: float = 0.0, at: int = 0) -> tuple[Path, PathState]:
+def path_of(
+    bodies: int, microphones: object = ((0.0, 0.0, 0.0),), radius: float = 0.01, jerk: float = 0.0, at: int = 0
+) -> tuple[Path, PathState]:
     path, state = empty_path(SR, AIR, np.array(microphones), at)
     return append_bodies(path, state, np.full(bodies, radius), np.full(bodies, jerk))
 
 
-def still(path: Path, state: PathState, source: Array, place: object, jerk: Array | None = None, step: int = 0) -> Array:
+def still(
+    path: Path, state: PathState, source: Array, place: object, jerk: Array | None = None, step: int = 0
+) -> Array:
     """One body that stays."""
     n = source.shape[-1]
     here = np.atleast_2d(np.array(place, float))
     count = len(here)
     source = np.broadcast_to(source, (count, n))
-    return propagate(path, state, step, source, np.zeros((count, 3, n)) if jerk is None else jerk, here, here, np.zeros(count, bool), np.zeros(n))
+    return propagate(
+        path,
+        state,
+        step,
+        source,
+        np.zeros((count, 3, n)) if jerk is None else jerk,
+        here,
+        here,
+        np.zeros(count, bool),
+        np.zeros(n),
+    )
 
 
 def moving(path: Path, state: PathState, source: Array, place: Array, velocity: Array, dt_s: float = 1 / 240) -> Array:
@@ -37,7 +54,19 @@ def moving(path: Path, state: PathState, source: Array, place: Array, velocity: 
     for step in range(source.shape[-1] // per):
         start = place + velocity * dt_s * step
         some = source[None, step * per : (step + 1) * per]
-        parts.append(propagate(path, state, step, some, np.zeros((1, 3, per)), start[None], (start + velocity * dt_s)[None], np.zeros(1, bool), progress))
+        parts.append(
+            propagate(
+                path,
+                state,
+                step,
+                some,
+                np.zeros((1, 3, per)),
+                start[None],
+                (start + velocity * dt_s)[None],
+                np.zeros(1, bool),
+                progress,
+            )
+        )
     return np.concatenate(parts, axis=1)[0]
 
 
@@ -72,7 +101,9 @@ def test_the_passband_is_flat_within_a_tenth_of_a_db_to_18_khz() -> None:
         for fraction in (0.0, 0.13, 0.5, 0.77):
             path, state = path_of(1)
             distance = (100 + fraction) / SR * C
-            level = 20 * np.log10(abs(fitted(still(path, state, tone(freq, 3000), [distance, 0, 0])[0], freq, 400)) * distance)
+            level = 20 * np.log10(
+                abs(fitted(still(path, state, tone(freq, 3000), [distance, 0, 0])[0], freq, 400)) * distance
+            )
             assert abs(level) < 0.1
 
 
@@ -128,7 +159,12 @@ def random_steps(seed: int, bodies: int, steps: int, n: int) -> list[tuple[Array
     return out
 
 
-def play(steps: list[tuple[Array, Array, Array, Array, Array]], cuts: list[list[int]], microphones: Array, turn: Array | None = None) -> Array:
+def play(
+    steps: list[tuple[Array, Array, Array, Array, Array]],
+    cuts: list[list[int]],
+    microphones: Array,
+    turn: Array | None = None,
+) -> Array:
     path, state = path_of(len(steps[0][0]), microphones, radius=0.05, jerk=0.2)
     n = steps[0][0].shape[1]
     progress = (np.arange(n) + 0.3) / n
@@ -137,7 +173,19 @@ def play(steps: list[tuple[Array, Array, Array, Array, Array]], cuts: list[list[
     for number, ((source, jerk, before, after, by_hand), cut) in enumerate(zip(steps, cuts, strict=True)):
         for lo, hi in zip([0, *cut], [*cut, n], strict=True):
             jerk_now = np.einsum("ij,bjn->bin", turn, jerk[:, :, lo:hi])
-            parts.append(propagate(path, state, number, source[:, lo:hi], jerk_now, before @ turn.T, after @ turn.T, by_hand, progress[lo:hi]))
+            parts.append(
+                propagate(
+                    path,
+                    state,
+                    number,
+                    source[:, lo:hi],
+                    jerk_now,
+                    before @ turn.T,
+                    after @ turn.T,
+                    by_hand,
+                    progress[lo:hi],
+                )
+            )
     return np.concatenate(parts, axis=1)
 
 
@@ -154,7 +202,9 @@ def test_any_cuts_give_the_same_bits(seed: int, data: st.DataObject) -> None:
 
 def test_single_samples_give_the_same_bits() -> None:
     steps = random_steps(3, 5, 20, 97)
-    assert play(steps, [list(range(1, 97))] * 20, MICROPHONES).tobytes() == play(steps, [[]] * 20, MICROPHONES).tobytes()
+    assert (
+        play(steps, [list(range(1, 97))] * 20, MICROPHONES).tobytes() == play(steps, [[]] * 20, MICROPHONES).tobytes()
+    )
 
 
 def test_several_microphones_are_separate_runs() -> None:
@@ -173,7 +223,9 @@ def test_turning_the_whole_scene_changes_nothing() -> None:
 
 
 def test_a_body_moved_by_hand_fades_without_click_or_chirp() -> None:
-    """A low tone moved 20 m: nothing of it above the tone's own band, during and after the move, and both ends at their own level."""
+    """A low tone moved 20 m: nothing of it above the tone's own band, during and after the move, and both ends at their
+    own level.
+    """
     freq, n = 200.0, 480
     path, state = path_of(1)
     source = tone(freq, 40 * n).reshape(40, 1, n)
@@ -182,13 +234,16 @@ def test_a_body_moved_by_hand_fades_without_click_or_chirp() -> None:
     for step in range(40):
         moved = step == 15
         before, after = (near, far) if moved else ((near, near) if step < 15 else (far, far))
-        parts.append(propagate(path, state, step, source[step], np.zeros((1, 3, n)), before, after, np.array([moved]), progress))
+        parts.append(
+            propagate(path, state, step, source[step], np.zeros((1, 3, n)), before, after, np.array([moved]), progress)
+        )
     sound = np.concatenate(parts, axis=1)[0]
     assert abs(fitted(sound[10 * n : 15 * n], freq, 0)) == pytest.approx(1 / 2, rel=1e-3)
     assert abs(fitted(sound[30 * n :], freq, 0)) == pytest.approx(1 / 22, rel=1e-3)
     body = sound[1000:]  # behind the onset, which is a corner of its own
     second = np.abs(np.diff(body, 2)).max()
-    assert second < 1.1 * (2 * np.pi * freq / SR) ** 2 / 2 + 2 * (2 * np.pi * freq / SR) / n  # curvature of the tone, and the fade's corners
+    # curvature of the tone, and the fade's corners
+    assert second < 1.1 * (2 * np.pi * freq / SR) ** 2 / 2 + 2 * (2 * np.pi * freq / SR) / n
     assert len(state.body) == 2
 
 
@@ -196,10 +251,22 @@ def test_moving_a_silent_body_costs_no_place() -> None:
     path, state = path_of(1)
     here = np.zeros((1, 3))
     for step in range(50):
-        propagate(path, state, step, np.zeros((1, 100)), np.zeros((1, 3, 100)), here + step, here + step + 1, np.ones(1, bool), np.zeros(100))
+        propagate(
+            path,
+            state,
+            step,
+            np.zeros((1, 100)),
+            np.zeros((1, 3, 100)),
+            here + step,
+            here + step + 1,
+            np.ones(1, bool),
+            np.zeros(100),
+        )
     assert len(state.body) == 1
     for step in range(50, 400):
-        propagate(path, state, step, np.ones((1, 100)), np.zeros((1, 3, 100)), here, here + 1, np.ones(1, bool), np.zeros(100))
+        propagate(
+            path, state, step, np.ones((1, 100)), np.zeros((1, 3, 100)), here, here + 1, np.ones(1, bool), np.zeros(100)
+        )
     assert len(state.body) < 12
 
 
@@ -243,7 +310,17 @@ def test_what_cannot_be_is_named() -> None:
     with pytest.raises(AudioError, match="not finite"):
         still(path, state, np.full(10, np.nan), [1.0, 0, 0])
     with pytest.raises(AudioError, match="jerk of shape"):
-        propagate(path, state, 0, np.ones((1, 5)), np.zeros((1, 5)), np.zeros((1, 3)), np.zeros((1, 3)), np.zeros(1, bool), np.zeros(5))
+        propagate(
+            path,
+            state,
+            0,
+            np.ones((1, 5)),
+            np.zeros((1, 5)),
+            np.zeros((1, 3)),
+            np.zeros((1, 3)),
+            np.zeros(1, bool),
+            np.zeros(5),
+        )
     with pytest.raises(AudioError, match="sample rate"):
         empty_path(0, AIR, np.zeros((1, 3)))
     with pytest.raises(AudioError, match="finite"):
@@ -253,6 +330,8 @@ def test_what_cannot_be_is_named() -> None:
 def test_nobody_and_no_microphone_are_legal() -> None:
     path, state = empty_path(SR, AIR, np.zeros((1, 3)))
     none = np.zeros((0, 3))
-    assert not propagate(path, state, 0, np.zeros((0, 7)), np.zeros((0, 3, 7)), none, none, np.zeros(0, bool), np.zeros(7)).any()
+    assert not propagate(
+        path, state, 0, np.zeros((0, 7)), np.zeros((0, 3, 7)), none, none, np.zeros(0, bool), np.zeros(7)
+    ).any()
     path, state = path_of(2, np.zeros((0, 3)))
     assert still(path, state, np.ones(7), np.zeros((2, 3))).shape == (0, 7)

@@ -17,7 +17,9 @@ def test_effective_mass_of_closed_forms() -> None:
     up, across = np.array([[0.0, 0.0, 1.0]]), np.array([[0.0, 1.0, 0.0]])
 
     def mass(normal: np.ndarray, r: np.ndarray, mass_b: float) -> float:
-        return float(pulse.effective_mass_kg(np.array([2.0]), ball[None], r, np.array([mass_b]), ball[None], zero, normal)[0])
+        return float(
+            pulse.effective_mass_kg(np.array([2.0]), ball[None], r, np.array([mass_b]), ball[None], zero, normal)[0]
+        )
 
     assert mass(across, arm, 0.0) == pytest.approx(2.0)  # through the centre, against a wall
     assert mass(across, arm, 2.0) == pytest.approx(1.0)  # two equal masses
@@ -27,7 +29,9 @@ def test_effective_mass_of_closed_forms() -> None:
 
 
 def test_contact_times_of_closed_forms() -> None:
-    tau, flat = pulse.contact_time_s(np.array([0.0329]), np.array([4.98e10]), np.array([100.0]), np.array([0.0]), np.array([1.0]))
+    tau, flat = pulse.contact_time_s(
+        np.array([0.0329]), np.array([4.98e10]), np.array([100.0]), np.array([0.0]), np.array([1.0])
+    )
     assert tau[0] == pytest.approx(96.7e-6, rel=1e-3)
     assert not flat[0]
     assert pulse.contact_modulus_pa(np.array([1e11]), np.array([np.inf]))[0] == pytest.approx(1e11)
@@ -40,7 +44,9 @@ def test_contact_times_of_closed_forms() -> None:
 
 
 def test_contact_times_stay_finite_at_every_edge() -> None:
-    grid = np.array(np.meshgrid([1e-9, 1.0, np.inf], [1e-3, 1e11, np.inf], [-1.0, 0.0, 1e3], [0.0, 1e-4], [-1.0, 0.0, 1e-300, 1e3])).reshape(5, -1)
+    grid = np.array(
+        np.meshgrid([1e-9, 1.0, np.inf], [1e-3, 1e11, np.inf], [-1.0, 0.0, 1e3], [0.0, 1e-4], [-1.0, 0.0, 1e-300, 1e3])
+    ).reshape(5, -1)
     tau, _ = pulse.contact_time_s(*grid)
     assert np.isfinite(tau).all()
     assert tau.min() >= pulse.SHORTEST_S
@@ -60,7 +66,10 @@ def test_spectrum_has_its_half_power_point_and_first_zero(flat: bool, half_power
 
 
 def test_hertz_pulse_solves_its_equation() -> None:
-    """Half the contact time in units of (δmax, v): τ = 2.9432 δmax/v [Johnson 1985, eq. 11.24], and Q(s) + Q(1-s) = 1."""
+    """Half the contact time in units of (δmax, v):
+
+    τ = 2.9432 δmax/v [Johnson 1985, eq. 11.24], and Q(s) + Q(1-s) = 1.
+    """
     s = np.linspace(0, 1, 501)
     q = pulse.cumulated_force(s)
     assert np.abs(q + q[::-1] - 1).max() < 1e-12
@@ -115,7 +124,9 @@ def test_jerk_misses_no_pulse_and_any_split_gives_the_same_bits() -> None:
 
 @pytest.mark.parametrize("flat", [False, True])
 def test_a_blow_gives_modes_no_more_energy_than_it_has(flat: bool) -> None:
-    """E = Σ (g s j |F̂|)²/2 stays below m*v²/2·((1+e)/2)² however many and light the modes are; without modes the whole impulse acts."""
+    """E = Σ (g s j |F̂|)²/2 stays below m*v²/2·((1+e)/2)² however many and light the modes are; without modes the whole
+    impulse acts.
+    """
     rng = np.random.default_rng(3)
     mass, speed, bounce, tau = 0.2, 1.5, 0.6, 4e-4
     impulse = (1 + bounce) * mass * speed

@@ -30,7 +30,12 @@ def icosphere(levels: int) -> tuple[Array, Array]:
                 points.append((points[a] + points[b]) / np.linalg.norm(points[a] + points[b]))
             return middle[key]
 
-        face = [t for a, b, c in face for ab, bc, ca in [(half(a, b), half(b, c), half(c, a))] for t in ((a, ab, ca), (b, bc, ab), (c, ca, bc), (ab, bc, ca))]
+        face = [
+            t
+            for a, b, c in face
+            for ab, bc, ca in [(half(a, b), half(b, c), half(c, a))]
+            for t in ((a, ab, ca), (b, bc, ab), (c, ca, bc), (ab, bc, ca))
+        ]
     return np.array(points), np.array(face, np.int32)
 
 
@@ -54,7 +59,16 @@ def box(size: tuple[float, float, float], cells: tuple[int, int, int] = (6, 6, 6
 def model(vertex: Array, face: Array, shape: Array, freq_hz: Array | float) -> ModalModel:
     """shape (v, 3, m) at frequencies (m,) or one for all."""
     m = shape.shape[2]
-    return ModalModel(np.broadcast_to(np.asarray(freq_hz, float), (m,)), np.ones(m), shape, vertex, face, np.zeros(len(face)), 1.0, 1.0)
+    return ModalModel(
+        np.broadcast_to(np.asarray(freq_hz, float), (m,)),
+        np.ones(m),
+        shape,
+        vertex,
+        face,
+        np.zeros(len(face)),
+        1.0,
+        1.0,
+    )
 
 
 SPHERE, SPHERE_FACE = icosphere(4)
@@ -69,14 +83,20 @@ def frequency_of(ka: Array | float, radius_m: float) -> Array:
 @pytest.mark.parametrize("degree", [0, 1, 2])
 @pytest.mark.parametrize("radius", [0.02, 0.3])
 def test_sphere_harmonics_radiate_their_exact_power_and_pressure(degree: int, radius: float) -> None:
-    """Far pressure of radial motion U·P_l: ρ₀cU P_l(cosθ) (-i) i^{l+1} e^{-ika}/(ka h_l'(ka)) a/r [Williams 1999, eq. 6.122, e^{iωt}]."""
+    """Far pressure of radial motion U·P_l:
+
+    ρ₀cU P_l(cosθ) (-i) i^{l+1} e^{-ika}/(ka h_l'(ka)) a/r [Williams 1999, eq. 6.122, e^{iωt}].
+    """
     ka = np.array([0.05, 0.2, 1.0, 3.0, 8.0])
     shape = 0.7 * np.repeat((SPHERE * HARMONIC[degree][:, None])[:, :, None], len(ka), axis=2)
     weight, extra = radiation(model(radius * SPHERE, SPHERE_FACE, shape, frequency_of(ka, radius)), AIR)
     hankel = spherical_jn(degree, ka, True) - 1j * spherical_yn(degree, ka, True)
-    pressure = RHO_C * 0.7 * radius * -1j * 1j ** (degree + 1) * np.exp(-1j * ka) / (ka * hankel) / np.sqrt(2 * degree + 1)
+    pressure = (
+        RHO_C * 0.7 * radius * -1j * 1j ** (degree + 1) * np.exp(-1j * ka) / (ka * hankel) / np.sqrt(2 * degree + 1)
+    )
     assert np.abs(20 * np.log10(np.abs(weight / pressure))).max() < 0.5
-    either = np.angle(weight / pressure) if degree % 2 == 0 else np.angle((weight / pressure) ** 2) / 2  # which of two equal lobes leads is open
+    # which of two equal lobes leads is open
+    either = np.angle(weight / pressure) if degree % 2 == 0 else np.angle((weight / pressure) ** 2) / 2
     assert np.abs(either)[ka > 0.1].max() < 0.15
     power = 4 * np.pi * np.abs(weight) ** 2 / RHO_C / 2
     assert 2 * extra * 0.5 == pytest.approx(power, rel=1e-9)  # modal energy ½|z|², |z| = 1
@@ -94,9 +114,14 @@ def efficiency(shape: Array, vertex: Array, face: Array, ka: Array) -> Array:
 
 @pytest.mark.parametrize(("motion", "order"), [("breathes", 2), ("shifts", 4), ("stretches", 6)])
 def test_orders_at_low_frequency_are_two_four_and_six(motion: str, order: int) -> None:
-    """Net volume flow (ka)², none (ka)⁴, neither flow nor dipole (ka)⁶ [Pierce 1989, sec. 4-1 to 4-4], on a box, where nothing is exact by construction."""
+    """Net volume flow (ka)², none (ka)⁴, neither flow nor dipole (ka)⁶ [Pierce 1989, sec.
+
+    4-1 to 4-4], on a box, where nothing is exact by construction.
+    """
     vertex, face = box((0.3, 0.2, 0.1))
-    shape = {"breathes": vertex, "shifts": vertex * 0 + [0.2, 0.3, 1.0], "stretches": vertex * [1.0, -1.0, 0.0]}[motion][:, :, None]
+    shape = {"breathes": vertex, "shifts": vertex * 0 + [0.2, 0.3, 1.0], "stretches": vertex * [1.0, -1.0, 0.0]}[
+        motion
+    ][:, :, None]
     ka = np.array([0.02, 0.04])
     low = efficiency(shape, vertex, face, ka)
     assert np.log2(low[1] / low[0]) == pytest.approx(order, abs=0.02)
@@ -113,7 +138,10 @@ def test_high_above_all_waves_of_the_body_it_radiates_as_a_plane_wave() -> None:
 
 
 def test_a_disc_that_shifts_has_the_air_of_lamb() -> None:
-    """Thin disc: added mass 8/3 ρa³ [Lamb 1932, art. 102], so |p| = ρωk (8/3)a³/4π · cosθ; the square of equal area is within 1.5 dB."""
+    """Thin disc: added mass 8/3 ρa³ [Lamb 1932, art.
+
+    102], so |p| = ρωk (8/3)a³/4π · cosθ; the square of equal area is within 1.5 dB.
+    """
     vertex, face = box((1.0, 1.0, 0.002))
     shape = np.zeros((len(vertex), 3, 1))
     shape[:, 2] = 1.0
@@ -124,7 +152,9 @@ def test_a_disc_that_shifts_has_the_air_of_lamb() -> None:
 
 
 def test_a_bars_fundamental_is_heard() -> None:
-    """0.24 m of steel, 1 cm square: its ends and its middle are a third of a wavelength apart, not a multipole; per velocity the first three rise gently."""
+    """0.24 m of steel, 1 cm square: its ends and its middle are a third of a wavelength apart, not a multipole; per
+    velocity the first three rise gently.
+    """
     vertex, face = box((0.24, 0.01, 0.01), (48, 2, 2))
     beta = np.array([4.7300, 7.8532, 10.9956])
     place = (vertex[:, 0, None] / 0.24 + 0.5) * beta
@@ -137,7 +167,9 @@ def test_a_bars_fundamental_is_heard() -> None:
 
 
 def test_rigid_oscillation_is_all_dipole_and_matches_acceleration_noise() -> None:
-    """Shifted as a whole, the weight's mean over directions is that of K·jerk: |p| = K ω² cosθ per velocity, <cos²> = 1/3 [Chadwick et al. 2012]."""
+    """Shifted as a whole, the weight's mean over directions is that of K·jerk: |p| = K ω² cosθ per velocity, <cos²> =
+    1/3 [Chadwick et al. 2012].
+    """
     radius, freq = 0.04, 40.0
     shape = np.repeat(np.eye(3)[None], len(SPHERE), axis=0)
     weight, _ = radiation(model(radius * SPHERE, SPHERE_FACE, shape, freq), AIR)
@@ -149,7 +181,11 @@ def random_case(seed: int) -> ModalModel:
     rng = np.random.default_rng(seed)
     vertex, face = box((0.3, 0.2, 0.1))
     slopes = rng.normal(size=(3, 4, 5))
-    shape = np.einsum("vi,iam->vam", np.concatenate([np.ones((len(vertex), 1)), vertex * 5, vertex**2 * 20], axis=1)[:, :4], slopes.transpose(1, 0, 2))
+    shape = np.einsum(
+        "vi,iam->vam",
+        np.concatenate([np.ones((len(vertex), 1)), vertex * 5, vertex**2 * 20], axis=1)[:, :4],
+        slopes.transpose(1, 0, 2),
+    )
     return model(vertex, face, shape, np.sort(rng.uniform(50, 8000, 5)))
 
 
@@ -158,29 +194,54 @@ def test_turning_the_body_changes_nothing_and_a_negative_shape_sounds_the_same()
     turn = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
     turn *= np.linalg.det(turn)
     turned = ModalModel(
-        case.freq_hz, case.decay_per_s, np.einsum("ij,vjm->vim", turn, case.shape), case.vertex_m @ turn.T, case.face, case.curvature_per_m, 1.0, 1.0
+        case.freq_hz,
+        case.decay_per_s,
+        np.einsum("ij,vjm->vim", turn, case.shape),
+        case.vertex_m @ turn.T,
+        case.face,
+        case.curvature_per_m,
+        1.0,
+        1.0,
     )
-    assert radiation(turned, AIR)[0] == pytest.approx(radiation(case, AIR)[0], rel=1e-4)  # shapes are stored in single precision
-    negative = ModalModel(case.freq_hz, case.decay_per_s, -case.shape, case.vertex_m, case.face, case.curvature_per_m, 1.0, 1.0)
+    # shapes are stored in single precision
+    assert radiation(turned, AIR)[0] == pytest.approx(radiation(case, AIR)[0], rel=1e-4)
+    negative = ModalModel(
+        case.freq_hz, case.decay_per_s, -case.shape, case.vertex_m, case.face, case.curvature_per_m, 1.0, 1.0
+    )
     assert radiation(negative, AIR)[0] == pytest.approx(-radiation(case, AIR)[0], rel=1e-12)
 
 
 def test_a_body_twice_as_large_radiates_as_scaling_says() -> None:
-    """Size s: f/s, shapes s^{-3/2}, ka the same, so the weight scales as s^{-1/2}, damping as 1/s [physics of similar bodies]."""
+    """Size s: f/s, shapes s^{-3/2}, ka the same, so the weight scales as s^{-1/2}, damping as 1/s [physics of similar
+    bodies].
+    """
     case = random_case(9)
-    large = ModalModel(case.freq_hz / 2, case.decay_per_s, case.shape * 2**-1.5, case.vertex_m * 2, case.face, case.curvature_per_m, 1.0, 1.0)
+    large = ModalModel(
+        case.freq_hz / 2,
+        case.decay_per_s,
+        case.shape * 2**-1.5,
+        case.vertex_m * 2,
+        case.face,
+        case.curvature_per_m,
+        1.0,
+        1.0,
+    )
     for got, was, power in zip(radiation(large, AIR), radiation(case, AIR), (-0.5, -1.0), strict=True):
         assert got == pytest.approx(was * 2.0**power, rel=1e-5)
 
 
 def test_denser_and_faster_air() -> None:
-    """At the same k all pressures per velocity go as ρ₀c: the same body in air twice as dense, and with frequencies and c doubled."""
+    """At the same k all pressures per velocity go as ρ₀c: the same body in air twice as dense, and with frequencies and
+    c doubled.
+    """
     case = random_case(3)
     dense = Air(2.4, AIR.sound_speed_m_s)
     assert radiation(case, dense)[0] == pytest.approx(2 * radiation(case, AIR)[0], rel=1e-9)
     assert radiation(case, dense)[1] == pytest.approx(2 * radiation(case, AIR)[1], rel=1e-9)
     quick = model(case.vertex_m, case.face, case.shape, 2 * case.freq_hz)
-    assert radiation(quick, Air(1.2, 2 * AIR.sound_speed_m_s))[0] == pytest.approx(2 * radiation(case, AIR)[0], rel=1e-9)
+    assert radiation(quick, Air(1.2, 2 * AIR.sound_speed_m_s))[0] == pytest.approx(
+        2 * radiation(case, AIR)[0], rel=1e-9
+    )
 
 
 def test_moved_air_of_a_sphere_and_of_a_thin_disc() -> None:
@@ -190,10 +251,14 @@ def test_moved_air_of_a_sphere_and_of_a_thin_disc() -> None:
     assert moved.length_m[::-1][:9] == pytest.approx(np.repeat([0.5, 0.25, 0.5 / 3], [1, 3, 5]), rel=0.08)
     ring = np.linspace(0, 1, 9)[1:]
     angle = 2 * np.pi * np.arange(24) / 24
-    flat = np.concatenate([[[0, 0]], (ring[:, None, None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)).reshape(-1, 2)])
+    flat = np.concatenate(
+        [[[0, 0]], (ring[:, None, None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)).reshape(-1, 2)]
+    )
     fan = [(0, 1 + i, 1 + (i + 1) % 24) for i in range(24)]
     band = [(1 + 24 * r + i, 25 + 24 * r + i, 25 + 24 * r + (i + 1) % 24) for r in range(7) for i in range(24)]
-    band += [(1 + 24 * r + i, 25 + 24 * r + (i + 1) % 24, 1 + 24 * r + (i + 1) % 24) for r in range(7) for i in range(24)]
+    band += [
+        (1 + 24 * r + i, 25 + 24 * r + (i + 1) % 24, 1 + 24 * r + (i + 1) % 24) for r in range(7) for i in range(24)
+    ]
     top = np.array(fan + band)
     n = len(flat)
     rim = [t for i in range(169, 193) for j in [169 + (i - 168) % 24] for t in ((n + i, n + j, j), (n + i, j, i))]
@@ -207,7 +272,11 @@ def test_moved_air_of_a_sphere_and_of_a_thin_disc() -> None:
 
 def test_directions_integrate_polynomials() -> None:
     """<x⁴> = 1/5, <x²y²z²> = 1/105, <1> = 1, over the directions and their negatives."""
-    for vector, share, tolerance in ((*directions(6), 1e-12), (*directions(11), 1e-12), (*spread_directions(256), 1e-2)):
+    for vector, share, tolerance in (
+        (*directions(6), 1e-12),
+        (*directions(11), 1e-12),
+        (*spread_directions(256), 1e-2),
+    ):
         assert np.linalg.norm(vector, axis=1) == pytest.approx(np.ones(len(vector)))
         assert 2 * share.sum() == pytest.approx(1)
         assert 2 * share @ vector**4 == pytest.approx(np.full(3, 0.2), rel=tolerance)
@@ -237,5 +306,7 @@ def test_a_model_without_modes_or_surface_is_legal() -> None:
     vertex, face = box((1, 1, 1))
     weight, extra = radiation(model(vertex, face, np.zeros((len(vertex), 3, 0)), np.zeros(0)), AIR)
     assert weight.shape == extra.shape == (0,)
-    plane = ModalModel(np.zeros(0), np.zeros(0), np.zeros((0, 3, 0)), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), 0.0, 0.0)
+    plane = ModalModel(
+        np.zeros(0), np.zeros(0), np.zeros((0, 3, 0)), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), 0.0, 0.0
+    )
     assert radiation(plane, AIR)[0].shape == (0,)

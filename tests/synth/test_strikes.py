@@ -6,7 +6,18 @@ import numpy as np
 import pytest
 
 from sonic_bullet.records.contacts import Contacts
-from sonic_bullet.synth.strikes import LOOKAHEAD, SPAN, LoadHistory, accepted_impulse, causing_approach_m_s, key_bodies, pair_key, push, split, unheld_steps
+from sonic_bullet.synth.strikes import (
+    LOOKAHEAD,
+    SPAN,
+    LoadHistory,
+    accepted_impulse,
+    causing_approach_m_s,
+    key_bodies,
+    pair_key,
+    push,
+    split,
+    unheld_steps,
+)
 
 DT = 1 / 240
 
@@ -19,13 +30,22 @@ def contacts(load_n: dict[tuple[int, int], float], *, points: int = 1) -> Contac
     normal = np.tile([0.0, 0.0, 1.0], (k, 1))
     zero = np.zeros((k, 3))
     a, b = np.array(pairs, np.int32).reshape(k, 2).T
-    return Contacts(a, b, zero, zero, normal, normal * force.reshape(k, 1) * DT, zero, np.zeros((k, 2)), np.zeros(k), np.zeros(k))
+    return Contacts(
+        a, b, zero, zero, normal, normal * force.reshape(k, 1) * DT, zero, np.zeros((k, 2)), np.zeros(k), np.zeros(k)
+    )
 
 
-def told_apart(loads: dict[tuple[int, int], list[float]], **how: int) -> tuple[list[tuple[int, int, float]], dict[int, list[float]]]:
-    """Strikes (step, key, impulse) in the order that the synthesizer asks for them, and each pair's support at the end of each step."""
+def told_apart(
+    loads: dict[tuple[int, int], list[float]], **how: int
+) -> tuple[list[tuple[int, int, float]], dict[int, list[float]]]:
+    """Strikes (step, key, impulse) in the order that the synthesizer asks for them, and each pair's support at the end
+    of each step.
+    """
     long = max(map(len, loads.values()))
-    steps = [contacts({pair: column[i] if i < len(column) else 0.0 for pair, column in loads.items()}, **how) for i in range(long)]
+    steps = [
+        contacts({pair: column[i] if i < len(column) else 0.0 for pair, column in loads.items()}, **how)
+        for i in range(long)
+    ]
     steps += [Contacts.none()] * LOOKAHEAD
     history = LoadHistory.empty()
     found: list[tuple[int, int, float]] = []
@@ -72,7 +92,9 @@ def test_a_ramp_is_silent(slope: float) -> None:
 
 
 def test_a_slow_swing_is_silent() -> None:
-    """A load that swings over many steps keeps below its opening's resolution: what is left is the tips, under 1 % of it."""
+    """A load that swings over many steps keeps below its opening's resolution: what is left is the tips, under 1 % of
+    it.
+    """
     swing = list(10 + 5 * np.sin(2 * np.pi * np.arange(400) / 100))
     found, _ = told_apart({(0, 1): swing})
     assert sum(j for _, _, j in found) < 1e-3 * sum(swing) * DT
@@ -86,7 +108,9 @@ def test_impacts_of_one_and_two_steps_are_found_whole(shape: list[float], start:
     assert found[0][2] == pytest.approx(sum(shape) * DT, rel=1e-12)
 
 
-@pytest.mark.parametrize("shape", [[9.0, 5.0, 0.5], [1.0, 9.0, 0.2], [3.0, 3.0, 3.0], [1.2, 1.0, 1.0], [1.0, 2.0, 4.0], [5.0, 0.1, 2.0]])
+@pytest.mark.parametrize(
+    "shape", [[9.0, 5.0, 0.5], [1.0, 9.0, 0.2], [3.0, 3.0, 3.0], [1.2, 1.0, 1.0], [1.0, 2.0, 4.0], [5.0, 0.1, 2.0]]
+)
 @pytest.mark.parametrize("start", [0, 3])
 def test_impacts_of_three_steps_are_found_whole(shape: list[float], start: int) -> None:
     found, _ = told_apart({(0, 1): [0.0] * start + shape + [0.0] * 8})
@@ -183,7 +207,9 @@ def test_what_gravity_gives_in_one_step_is_no_cause_for_what_rests() -> None:
     assert causing_approach_m_s(np.array([3.9 * speed]), low, high, up, placed, fall)[0] == 0
     assert causing_approach_m_s(np.array([1.0]), low, high, up, placed, fall)[0] > 0.8
     sideways = np.array([[1.0, 0.0, 0.0]])  # a wall: gravity approaches nothing there
-    assert causing_approach_m_s(np.array([speed]), low, high, sideways, resting, fall)[0] == pytest.approx(speed, rel=0.011)
+    assert causing_approach_m_s(np.array([speed]), low, high, sideways, resting, fall)[0] == pytest.approx(
+        speed, rel=0.011
+    )
     assert causing_approach_m_s(np.array([1e-4]), low, high, up, resting, np.zeros(3))[0] == pytest.approx(1e-4)
 
 

@@ -26,11 +26,15 @@ def pairs_of(case: tuple[float, float, float, float], roughness_m: Array) -> Sur
     p = len(roughness_m)
     mass, modulus, radius, zeta = (np.full(p, value) for value in case)
     rough = np.stack([np.zeros(p), roughness_m], 1)
-    return SurfacePairs(mass, modulus, radius, zeta, rough, np.full((p, 2), 0.75), 1 + 7919 * np.arange(2 * p).reshape(p, 2))
+    return SurfacePairs(
+        mass, modulus, radius, zeta, rough, np.full((p, 2), 0.75), 1 + 7919 * np.arange(2 * p).reshape(p, 2)
+    )
 
 
 def sounding(pairs: SurfacePairs, speed_m_s: Array, seconds: float, jitter: float = 0.0) -> Array:
-    """Forces (p, n) of pairs that bear their weight while both surfaces sweep; loads and speeds jitter from step to step."""
+    """Forces (p, n) of pairs that bear their weight while both surfaces sweep; loads and speeds jitter from step to
+    step.
+    """
     rng = np.random.default_rng(5)
 
     def loads() -> SurfaceLoads:
@@ -68,7 +72,9 @@ def test_level_follows_the_measured_laws(name: str) -> None:
         level = np.log(observed[:, SR // 10 :].std(1)).reshape(5, 5)
         n = np.array([np.polyfit(np.log(speed), level[i], 1)[0] for i in range(5)])
         m = np.array([np.polyfit(np.log(rough), level[:, i], 1)[0] for i in range(5)])
-        fits = [np.corrcoef(np.log(speed), level[i])[0, 1] ** 2 for i in range(5)] + [np.corrcoef(np.log(rough), level[:, i])[0, 1] ** 2 for i in range(5)]
+        fits = [np.corrcoef(np.log(speed), level[i])[0, 1] ** 2 for i in range(5)] + [
+            np.corrcoef(np.log(rough), level[:, i])[0, 1] ** 2 for i in range(5)
+        ]
         assert n.min() >= 0.5 and n.max() <= 0.98, n  # 0.96 + the spread of 1.2 s of noise
         assert m.min() >= 0.63 and m.max() <= 1.16, m
         assert abs(n[0] - n[-1]) < 0.15, n
@@ -82,13 +88,18 @@ def test_nothing_sounds_at_rest_whatever_the_load_does() -> None:
     load = rng.uniform(0, 1, (40, 3))
     load[10:12] = 0
     for before, after in itertools.pairwise(load):
-        force, state = advance(pairs, state, SurfaceLoads(before, np.zeros((3, 2))), SurfaceLoads(after, np.zeros((3, 2))), x, SR)
+        force, state = advance(
+            pairs, state, SurfaceLoads(before, np.zeros((3, 2))), SurfaceLoads(after, np.zeros((3, 2))), x, SR
+        )
         assert not force.any()
 
 
 def test_a_ball_that_stops_falls_silent_to_exact_zero_and_starts_without_a_click() -> None:
     pairs = pairs_of(CASES["1 cm steel ball on stone"], np.full(1, 2e-6))
-    loads = [SurfaceLoads(9.81 * pairs.mass_kg, np.full((1, 2), v)) for v in [0.4] * 60 + list(np.linspace(0.4, 0, 60)) + [0.0] * 60]
+    loads = [
+        SurfaceLoads(9.81 * pairs.mass_kg, np.full((1, 2), v))
+        for v in [0.4] * 60 + list(np.linspace(0.4, 0, 60)) + [0.0] * 60
+    ]
     state, x, steps = SurfaceState.at_rest(1), np.arange(STEP) / STEP, []
     for before, after in itertools.pairwise(loads):
         force, state = advance(pairs, state, before, after, x, SR)
@@ -106,7 +117,9 @@ def test_a_ball_that_stops_falls_silent_to_exact_zero_and_starts_without_a_click
 
 
 def test_any_split_gives_the_same_bits() -> None:
-    pairs = pairs_of(CASES["3 cm steel ball on stone"], np.array([1e-6, 2e-5, 0.0])).append(pairs_of((1e-5, 1e11, 1e-3, 0.3), np.full(2, 1e-6)))
+    pairs = pairs_of(CASES["3 cm steel ball on stone"], np.array([1e-6, 2e-5, 0.0])).append(
+        pairs_of((1e-5, 1e11, 1e-3, 0.3), np.full(2, 1e-6))
+    )
     rng = np.random.default_rng(3)
     loads = [SurfaceLoads(9.81 * pairs.mass_kg * rng.uniform(0, 4, 5), rng.uniform(0, 2, (5, 2))) for _ in range(13)]
 
@@ -135,10 +148,14 @@ def test_a_pair_sounds_the_same_alone_and_among_others() -> None:
 
 
 def test_rolling_and_sliding_differ_in_sweep_alone() -> None:
-    """Two surfaces of equal roughness that both sweep are √2 as loud as one; a fading sweep of one leads from the one to the other."""
+    """Two surfaces of equal roughness that both sweep are √2 as loud as one; a fading sweep of one leads from the one
+    to the other.
+    """
     p = 24
     one = pairs_of(CASES["2 cm steel ball on wood"], np.full(p, 1e-6))
-    pairs = SurfacePairs(one.mass_kg, one.modulus_pa, one.radius_m, one.damping_ratio, np.full((p, 2), 1e-6), one.hurst, one.seed)
+    pairs = SurfacePairs(
+        one.mass_kg, one.modulus_pa, one.radius_m, one.damping_ratio, np.full((p, 2), 1e-6), one.hurst, one.seed
+    )
     share, x = np.repeat([1.0, 0.3, 0.03, 0.0], 6), np.arange(STEP) / STEP
     loads = SurfaceLoads(9.81 * pairs.mass_kg, np.stack([0.5 * share, np.full(p, 0.5)], 1))
     state, out = SurfaceState.at_rest(p), []
@@ -152,9 +169,13 @@ def test_rolling_and_sliding_differ_in_sweep_alone() -> None:
 
 
 def test_no_buzz_of_the_physics_steps() -> None:
-    """Loads and speeds that jitter by 1 % at 240 Hz: within 5 Hz of 240 Hz and its multiples at most 3 dB above the neighbourhood."""
+    """Loads and speeds that jitter by 1 % at 240 Hz: within 5 Hz of 240 Hz and its multiples at most 3 dB above the
+    neighbourhood.
+    """
     p = 12
-    force = sounding(pairs_of(CASES["2 cm steel ball on wood"], np.full(p, 2e-6)), np.full(p, 0.5), 3.0, jitter=0.01)[:, 4800:]
+    force = sounding(pairs_of(CASES["2 cm steel ball on wood"], np.full(p, 2e-6)), np.full(p, 0.5), 3.0, jitter=0.01)[
+        :, 4800:
+    ]
     power = (np.abs(np.fft.rfft(force * np.hanning(force.shape[1]), axis=1)) ** 2).mean(0)
     f = np.arange(len(power)) * SR / force.shape[1]
     for line in range(240, 10000, 240):
@@ -164,7 +185,9 @@ def test_no_buzz_of_the_physics_steps() -> None:
 
 
 def test_contact_neither_gains_energy_nor_blows_up() -> None:
-    """Free oscillation of a standing contact only loses energy; absurd stiffness, mass, load, speed and roughness stay bounded."""
+    """Free oscillation of a standing contact only loses energy; absurd stiffness, mass, load, speed and roughness stay
+    bounded.
+    """
     pairs = pairs_of((0.033, 5e10, 0.01, 0.02), np.zeros(1))
     load = SurfaceLoads(9.81 * pairs.mass_kg, np.zeros((1, 2)))
     state = SurfaceState(np.full(1, 1e-3), np.zeros(1), np.ones(1, np.int64), np.zeros((1, 2)))
@@ -175,11 +198,15 @@ def test_contact_neither_gains_energy_nor_blows_up() -> None:
     assert all(b <= a for a, b in itertools.pairwise(peaks))
     grid = np.array(np.meshgrid([1e-6, 1e4], [1e4, 1e13], [1e-5, 10.0], [0.02, 1.0], [0.0, 1e-3])).reshape(5, -1)
     p = grid.shape[1]
-    wild = SurfacePairs(*grid[:4], np.stack([grid[4], grid[4]], 1), np.full((p, 2), 0.1), np.arange(2 * p).reshape(p, 2))
+    wild = SurfacePairs(
+        *grid[:4], np.stack([grid[4], grid[4]], 1), np.full((p, 2), 0.1), np.arange(2 * p).reshape(p, 2)
+    )
     state, total = SurfaceState.at_rest(p), np.zeros(p)
     rng = np.random.default_rng(0)
     for _ in range(60):
-        ends = [SurfaceLoads(rng.choice([0, 1e-9, 1.0, 1e5], p), rng.choice([0, 1e-6, 1.0, 1e9], (p, 2))) for _ in range(2)]
+        ends = [
+            SurfaceLoads(rng.choice([0, 1e-9, 1.0, 1e5], p), rng.choice([0, 1e-6, 1.0, 1e9], (p, 2))) for _ in range(2)
+        ]
         force, state = advance(wild, state, ends[0], ends[1], x, SR)
         assert np.isfinite(force).all()
         total = np.maximum(total, np.abs(force).max(1))
@@ -200,7 +227,9 @@ def test_profile_is_self_affine_with_the_stated_rms() -> None:
     height = np.repeat(octave_heights(np.array([[1e-6, 0.0]]), np.array([[hurst, hurst]])), rows, 0)
     speed, seed = np.zeros((2, rows, 2)), np.arange(2 * rows).reshape(rows, 2)
     speed[:, :, 0] = v
-    rate = surface._rates(np.zeros((rows, 2)), np.arange(rows), speed, np.zeros(n), seed, np.stack([height, height]), float(sr))
+    rate = surface._rates(
+        np.zeros((rows, 2)), np.arange(rows), speed, np.zeros(n), seed, np.stack([height, height]), float(sr)
+    )
     h = np.cumsum(rate, 1) / sr
     assert np.sqrt(h.var(1).mean()) == pytest.approx(1e-6, rel=0.1)
     power = (np.abs(np.fft.rfft(h * np.hanning(n), axis=1)) ** 2).mean(0)
@@ -222,4 +251,6 @@ def test_gains_fall_with_contact_and_alias_and_slowness() -> None:
 
 def test_helpers_at_their_edges() -> None:
     assert surface.damping_ratio(np.array([0.0, 1.0])) == pytest.approx([1.0, 0.25], rel=0.02)
-    assert surface.contact_radius_m(np.array([100.0, 0.0, -5.0, 0.0]), np.array([0.0, np.pi * 0.04, 0.0, 0.0])) == pytest.approx([0.01, 0.2, 1.0, 1.0])
+    assert surface.contact_radius_m(
+        np.array([100.0, 0.0, -5.0, 0.0]), np.array([0.0, np.pi * 0.04, 0.0, 0.0])
+    ) == pytest.approx([0.01, 0.2, 1.0, 1.0])

@@ -1,4 +1,7 @@
-"""The thirteen effects by id, and those on no list. Each makes an Effect of a strength (0 weak, 1 medium, 2 strong), drawing its form by chance."""
+"""The thirteen effects by id, and those on no list.
+
+Each makes an Effect of a strength (0 weak, 1 medium, 2 strong), drawing its form by chance.
+"""
 
 from benchmarks.suite.effects import blow, body, sound, unlisted
 from benchmarks.suite.effects.base import CARRIED, Effect, Maker, Scene

@@ -37,8 +37,9 @@ class Scene:
 class Effect:
     """One effect with its truth. Each stage is None where it does nothing.
 
-    modes(unit, poisson, recipe) -> unit modes; pairs(modes) -> modes; damping(modes, D) -> D; ring(ring, impulse, n, rate, own) -> samples at gain 1;
-    pulse(impulse, rate) -> taps; sound(samples, impulse, rate, which) -> samples, in units of the file; last(samples) the same, after the noise.
+    modes(unit, poisson, recipe) -> unit modes; pairs(modes) -> modes; damping(modes, D) -> D; ring(ring, impulse, n,
+    rate, own) -> samples at gain 1; pulse(impulse, rate) -> taps; sound(samples, impulse, rate, which) -> samples, in
+    units of the file; last(samples) the same, after the noise.
     """
 
     id: str

@@ -1,8 +1,11 @@
 """Effects of level and of the blow itself.
 
-amplitude-pitch    ω(a) = ω₀ (1 + κ a²),  a = a₀ e^{−dt}:  phase ω₀ (t + κ a₀² (1 − e^{−2dt})/2d)           [Duffing; Fletcher & Rossing, ch. 1.11]
-amplitude-damping  ȧ = −d a (1 + (a/a₁)^p):  a = a₀ e^{−dt} (1 + (a₀/a₁)^p (1 − e^{−pdt}))^{−1/p}           [Bernoulli's equation]
-contact-time       pulse of length τ = τ₀ (J/J₀)^{−1/5}: sin^{3/2} (Hertz), sin, or sin²                     [Johnson, Contact mechanics, ch. 11.4]
+amplitude-pitch    ω(a) = ω₀ (1 + κ a²),  a = a₀ e^{−dt}:  phase ω₀ (t + κ a₀² (1 − e^{−2dt})/2d)
+    [Duffing; Fletcher & Rossing, ch. 1.11]
+amplitude-damping  ȧ = −d a (1 + (a/a₁)^p):  a = a₀ e^{−dt} (1 + (a₀/a₁)^p (1 − e^{−pdt}))^{−1/p}
+    [Bernoulli's equation]
+contact-time       pulse of length τ = τ₀ (J/J₀)^{−1/5}: sin^{3/2} (Hertz), sin, or sin²
+    [Johnson, Contact mechanics, ch. 11.4]
 rebound            the blow again after gaps that fall by r, weaker by r each
 """
 
@@ -21,7 +24,10 @@ POWERS = {"half-sine": 1.0, "hertz": 1.5, "raised-cosine": 2.0}
 
 
 def _reference(rng: np.random.Generator, scene: Scene) -> tuple[float, float]:
-    """The strongest mode's level at a loud strike, and the power of ω by which levels are weighed: displacement (0) or velocity (1)."""
+    """The strongest mode's level at a loud strike, and the power of ω by which levels are weighed:
+
+    displacement (0) or velocity (1).
+    """
     power = float(rng.integers(2))
     damping = np.diag(0 * scene.body.modes.value + 1.0)
     rings = [ring(scene.body, damping, s, scene.sensor) for s in scene.strikes]
@@ -29,7 +35,9 @@ def _reference(rng: np.random.Generator, scene: Scene) -> tuple[float, float]:
 
 
 def _summed(r: Ring, n: int, rate: float, shape: Callable[[int, Array], tuple[Array, Array]]) -> Array:
-    """Σ Re r a(t) e^{iθ(t)}; shape(k, t) gives envelope and phase of mode k, which is followed until it has died away (140 dB)."""
+    """Σ Re r a(t) e^{iθ(t)}; shape(k, t) gives envelope and phase of mode k, which is followed until it has died away
+    (140 dB).
+    """
     out = np.zeros(n)
     for k, d in enumerate(-r.pole.real):
         last = min(n, int(16 * rate / max(d, 1e-3)) + 1)
@@ -39,7 +47,9 @@ def _summed(r: Ring, n: int, rate: float, shape: Callable[[int, Array], tuple[Ar
 
 
 def amplitude_pitch(strength: int, rng: np.random.Generator, scene: Scene) -> Effect:
-    """The strongest mode of the loudest strikes shifts by 0.4, 1.5 or 5 % (twice that where only displacement, so few modes, counts); once in four down."""
+    """The strongest mode of the loudest strikes shifts by 0.4, 1.5 or 5 % (twice that where only displacement, so few
+    modes, counts); once in four down.
+    """
     top, power = _reference(rng, scene)
     kappa = jitter(rng, pick(strength, 0.004, 0.015, 0.05) * (2 - power)) * (1 if rng.random() < 0.75 else -1)
 
@@ -105,7 +115,10 @@ def rebound(strength: int, rng: np.random.Generator, scene: Scene) -> Effect:
         out = np.zeros(int(when[-1]) + REACH)
         for k, w in enumerate(when):
             at = np.arange(max(int(w) - REACH + 1, 0), int(w) + REACH)
-            out[at] += r**k * np.sinc(at - w) * np.cos(np.pi * (at - w) / (2 * REACH)) ** 2  # between samples: a bounce is no softer there
+            # between samples: a bounce is no softer there
+            out[at] += r**k * np.sinc(at - w) * np.cos(np.pi * (at - w) / (2 * REACH)) ** 2
         return out
 
-    return Effect("rebound", "striker", {"restitution": r, "gap": gap, "J0": 0.02, "exponent": power, "hits": hits}, pulse=taps)
+    return Effect(
+        "rebound", "striker", {"restitution": r, "gap": gap, "J0": 0.02, "exponent": power, "hits": hits}, pulse=taps
+    )

@@ -1,11 +1,14 @@
 """Effects of material, object and fixture: they change modes or damping.
 
 damping-law      d = ηω/2  |  d₁ (f/1 kHz)^p  |  ½Δω ωτ/(1+(ωτ)²) + d₀                           [Zener 1948, ch. 5]
-support-damping  D += Φᵀ C Φ,  C = c n nᵀ (or c 1₃) at the fixture                                 [Woodhouse 1998, eq. 12]
-radiation        D += ρ₀ c_air σ ∮(φ·n)² dS,  σ = (ka)^p/(1+(ka)^p)                                [Cremer & Heckl, ch. 6]
+support-damping  D += Φᵀ C Φ,  C = c n nᵀ (or c 1₃) at the fixture
+    [Woodhouse 1998, eq. 12]
+radiation        D += ρ₀ c_air σ ∮(φ·n)² dS,  σ = (ka)^p/(1+(ka)^p)
+    [Cremer & Heckl, ch. 6]
 orthotropy       K with E_x ≠ E_y ≠ E_z                                                           [Bodig & Jayne 1982]
 added-mass       M += m at one point
-mode-splitting   each pair of twins turned to the imperfection and pulled apart, or K softer on one side    [Rayleigh 1894, §233]
+mode-splitting   each pair of twins turned to the imperfection and pulled apart, or K softer on one side
+    [Rayleigh 1894, §233]
 """
 
 from __future__ import annotations
@@ -49,7 +52,12 @@ def damping_law(strength: int, rng: np.random.Generator, scene: Scene) -> Effect
             x = omega / peak
             return omega * (2 * eta * x / (1 + x**2) + 0.1 * eta)
 
-    return Effect("damping-law", "material", truth, damping=lambda modes, d: d - np.diag(np.diag(d)) + np.diag(loss(np.sqrt(modes.value))))
+    return Effect(
+        "damping-law",
+        "material",
+        truth,
+        damping=lambda modes, d: d - np.diag(np.diag(d)) + np.diag(loss(np.sqrt(modes.value))),
+    )
 
 
 def support_damping(strength: int, rng: np.random.Generator, scene: Scene) -> Effect:
@@ -71,7 +79,9 @@ def support_damping(strength: int, rng: np.random.Generator, scene: Scene) -> Ef
 
 
 def radiation(strength: int, rng: np.random.Generator, scene: Scene) -> Effect:
-    """Each mode loses 0.3, 3 or 10 times what it radiates into air; half the stronger cases also hear it: levels tilted by √σ."""
+    """Each mode loses 0.3, 3 or 10 times what it radiates into air; half the stronger cases also hear it: levels tilted
+    by √σ.
+    """
     order = float(rng.choice([2, 4]))
     size = np.sqrt(_area(scene.body.modes) / 8 / np.pi) * float(rng.uniform(0.5, 1))
     times = jitter(rng, pick(strength, 0.3, 3, 10))
@@ -82,7 +92,8 @@ def radiation(strength: int, rng: np.random.Generator, scene: Scene) -> Effect:
         return np.asarray(ka**order / (1 + ka**order))
 
     def damping(modes: Modes, d: Array) -> Array:
-        moved = _flow(modes) / (np.sqrt(sigma(modes)) if tilted else 1.0)  # the shapes come tilted as they are heard: the surface moves as before
+        # the shapes come tilted as they are heard: the surface moves as before
+        moved = _flow(modes) / (np.sqrt(sigma(modes)) if tilted else 1.0)
         return d + np.diag(times * 1.2 * 343 * sigma(modes) * moved)
 
     def pairs(modes: Modes) -> Modes:
@@ -117,7 +128,12 @@ def orthotropy(strength: int, rng: np.random.Generator, scene: Scene) -> Effect:
     tensor = orthotropic((e[0], e[1], e[2]), (g[0], g[1], g[2]), (nu * 0.8, nu, nu))
     tag = f"orthotropy {np.round(tensor, 6).tolist()}"
     truth = {"youngs_ratio": [1.0, 1 / ratio, third / ratio], "shear_ratio": g.tolist(), "poisson": [nu * 0.8, nu, nu]}
-    return Effect("orthotropy", "material", truth, modes=lambda recipe, poisson, folder: solved(recipe, poisson, folder, tensor=tensor, tag=tag))
+    return Effect(
+        "orthotropy",
+        "material",
+        truth,
+        modes=lambda recipe, poisson, folder: solved(recipe, poisson, folder, tensor=tensor, tag=tag),
+    )
 
 
 def added_mass(strength: int, rng: np.random.Generator, scene: Scene) -> Effect:
@@ -135,7 +151,9 @@ def added_mass(strength: int, rng: np.random.Generator, scene: Scene) -> Effect:
 
 
 def mode_splitting(strength: int, rng: np.random.Generator, scene: Scene) -> Effect:
-    """Twins pulled apart by 0.15, 0.5 or 1.2 %: by a wall softer on one side (every pair differently), or all pairs alike."""
+    """Twins pulled apart by 0.15, 0.5 or 1.2 %: by a wall softer on one side (every pair differently), or all pairs
+    alike.
+    """
     split = jitter(rng, pick(strength, 0.0015, 0.005, 0.012), 0.15)
     azimuth = float(rng.uniform(0, np.pi))
     if rng.random() < 0.5:
@@ -148,7 +166,12 @@ def mode_splitting(strength: int, rng: np.random.Generator, scene: Scene) -> Eff
 
         tag = f"softer {split:.6f} {azimuth:.4f}"
         truth = {"split": split, "azimuth": azimuth, "form": "stiffness"}
-        return Effect("mode-splitting", "object", truth, modes=lambda recipe, poisson, folder: solved(recipe, poisson, folder, softer=softer, tag=tag))
+        return Effect(
+            "mode-splitting",
+            "object",
+            truth,
+            modes=lambda recipe, poisson, folder: solved(recipe, poisson, folder, softer=softer, tag=tag),
+        )
     spread = np.exp(rng.uniform(-0.5, 0.5, 200)) if rng.random() < 0.5 else np.ones(200)
 
     def pairs(modes: Modes) -> Modes:
@@ -160,7 +183,10 @@ def mode_splitting(strength: int, rng: np.random.Generator, scene: Scene) -> Eff
                 k += 1
                 continue
             # turn the pair until its second twin does not move at the imperfection
-            here = np.argmin(np.abs(np.angle(np.exp(1j * (angle - azimuth)))) + np.abs(modes.vertex_m[:, 2] - np.median(modes.vertex_m[:, 2])))
+            here = np.argmin(
+                np.abs(np.angle(np.exp(1j * (angle - azimuth))))
+                + np.abs(modes.vertex_m[:, 2] - np.median(modes.vertex_m[:, 2]))
+            )
             across = scene.body.normal[here] @ modes.shape[here][:, k : k + 2]
             c, s = across / max(np.linalg.norm(across), 1e-30)
             shape[:, :, k] = c * modes.shape[:, :, k] + s * modes.shape[:, :, k + 1]

@@ -1,7 +1,8 @@
 """Modes whose frequency goes with their level: how far it shifts, and how fast they fall.
 
-A linear fit identifies such a mode as a chain of lines (recording_chain.py), none with its decay. But only its frequency bends: its level falls as the linear mode's does.
-Degenerate modes beat once each shifts by its own level, so their decay is identified by what is played: recorded over played falls as e^{−δt}, δ what their decay lacks.
+A linear fit identifies such a mode as a chain of lines (recording_chain.py), none with its decay. But only its
+frequency bends: its level falls as the linear mode's does. Degenerate modes beat once each shifts by its own level, so
+their decay is identified by what is played: recorded over played falls as e^{−δt}, δ what their decay lacks.
 """
 
 from __future__ import annotations
@@ -26,17 +27,26 @@ def turns_rad(h: Hypothesis, body: Struck, one: ObjectEvidence) -> Array:
     """By how much the effects turn the phases of each line's modes (s, k) until they have rung down."""
     each = [(ring_of(h, body, body.fitted[i]), impact_of(h, body, body.fitted[i])) for i in one.strike]
     level = [r.level * np.abs(b.spectrum(r.freq_hz)) for r, b in each]  # what a long pulse leaves of it
-    turned = np.stack([np.abs(r.bend) * a**2 * np.pi * r.freq_hz / np.maximum(r.decay_per_s, 1e-3) for (r, _), a in zip(each, level, strict=True)])
+    turned = np.stack(
+        [
+            np.abs(r.bend) * a**2 * np.pi * r.freq_hz / np.maximum(r.decay_per_s, 1e-3)
+            for (r, _), a in zip(each, level, strict=True)
+        ]
+    )
     return np.stack([turned[:, who[who < turned.shape[1]]].max(axis=1, initial=0.0) for who in one.mode], axis=1)
 
 
 def amplitude_dependent(h: Hypothesis, body: Struck, one: ObjectEvidence) -> Array:
-    """Whether each line (k,) is of modes whose phases the effects turn by TURNS_RAD or more in the end, at the strike that moves them most."""
+    """Whether each line (k,) is of modes whose phases the effects turn by TURNS_RAD or more in the end, at the strike
+    that moves them most.
+    """
     return np.asarray(turns_rad(h, body, one).max(axis=0) > TURNS_RAD)
 
 
 def fallen(h: Hypothesis, body: Struck, one: ObjectEvidence) -> ObjectEvidence:
-    """The evidence, the decays of amplitude-dependent lines identified by their levels' own fall, where they stand alone."""
+    """The evidence, the decays of amplitude-dependent lines identified by their levels' own fall, where they stand
+    alone.
+    """
     if not bends(h) or one.signal is None or one.dry or not len(one.freq_hz):
         return one  # in a room no line is one mode's alone
     dependent = amplitude_dependent(h, body, one)
@@ -60,7 +70,9 @@ def fallen(h: Hypothesis, body: Struck, one: ObjectEvidence) -> ObjectEvidence:
 
 
 def beats(e: Envelopes, made: Envelopes, q: int, decay_per_s: float) -> float:
-    """The decay of a degenerate pair, in 1/s, by how what was recorded falls against what is played with one decay; that one where too little is clear in both."""
+    """The decay of a degenerate pair, in 1/s, by how what was recorded falls against what is played with one decay;
+    that one where too little is clear in both.
+    """
     top = bottom = 0.0
     for s in range(len(e.z)):
         use = e.good[s, q] & made.good[s, q]

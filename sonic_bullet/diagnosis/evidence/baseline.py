@@ -1,8 +1,10 @@
 """The baseline of a case: the fitted model, its bodies, and the hypothesis that nothing is lacking.
 
-recorded lines -> estimator.fit -> bodies (groups separated, corrections learnt) -> Hypothesis
-lines in chains (recording_chain.py): the same with every chain as one line, where what that plays is nearer to the recordings, or most modes are chains and it is not clearly farther;
-    and with the lines of the softer strikes, whose modes are nearest to linear ones, or of those below a limit, at all strikes
+recorded lines -> estimator.fit -> bodies (groups separated, corrections learnt) -> Hypothesis lines in chains
+(recording_chain.py): the same with every chain as one line, where what that plays is nearer to the recordings, or most
+modes are chains and it is not clearly farther;
+    and with the lines of the softer strikes, whose modes are nearest to linear ones, or of those below a limit, at all
+        strikes
 """
 
 from __future__ import annotations
@@ -36,12 +38,16 @@ LEAST_LINES = 4  # of some strikes: fewer are no list
 NEARER = 0.9  # of the distance, where chains are one line each
 SOFTER = 0.6  # of the middle strike's impulse at most, of half the strikes: soft enough to differ from it
 BELOW, TOUCHES = 0.998, 3  # of a limit, and samples that may reach it in a strike that stays below
-OFTEN, MOSTLY = 0.4, 1.05  # chains, of all modes' lines: no linear body has so many, so one line each it is unless that is clearly worse
+# chains, of all modes' lines: no linear body has so many, so one line each it is unless that is clearly worse
+OFTEN, MOSTLY = 0.4, 1.05
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Baseline:
-    """What the case's linear model is. found: the fit. bodies: every object, fitted ones first. takes: the fitted strikes that have audio."""
+    """What the case's linear model is.
+
+    found: the fit. bodies: every object, fitted ones first. takes: the fitted strikes that have audio.
+    """
 
     found: CaseFit
     bodies: tuple[Struck, ...]
@@ -49,16 +55,28 @@ class Baseline:
     takes: tuple[Take, ...]
 
 
-def baseline(case: Case, recorded: tuple[Recorded, ...], *, cache: Place = "default", progress: Callable[[str], None] | None = None) -> Baseline:
+def baseline(
+    case: Case,
+    recorded: tuple[Recorded, ...],
+    *,
+    cache: Place = "default",
+    progress: Callable[[str], None] | None = None,
+) -> Baseline:
     """Fit it to recorded evidence. Raises SonicBulletError."""
     plain = _of(case, recorded, cache, progress)
     directions = [tuple(_unchained(one, link) for one in recorded) for link in LINKS] if plain.takes else []
-    directions += [tuple(direction(one, case.band_hz) for one in recorded) for direction in (_soft, _unclipped)] if directions else []
+    directions += (
+        [tuple(direction(one, case.band_hz) for one in recorded) for direction in (_soft, _unclipped)]
+        if directions
+        else []
+    )
     directions = [faint for faint in directions if any(a is not b for a, b in zip(faint, recorded, strict=True))]
     if not directions:
         return plain
     if progress is not None:
-        progress("modes that depend on their level, or a limit, leave lines that are no modes: fitting what is left without")
+        progress(
+            "modes that depend on their level, or a limit, leave lines that are no modes: fitting what is left without"
+        )
     best = min((_of(case, faint, cache, None) for faint in directions), key=_off_db)
     changed = [one for one, faint in zip(recorded, directions[0], strict=True) if faint is not one]
     most = MOSTLY if all(share(one.lines, LINKS[0]) > OFTEN for one in changed) else NEARER
@@ -71,7 +89,9 @@ def _unchained(one: Recorded, link: tuple[float, float, bool]) -> Recorded:
 
 
 def _soft(one: Recorded, band_hz: tuple[float, float]) -> Recorded:
-    """Evidence with the lines of its softer strikes alone, each chain of them as one; the same where chains are few or no strikes are much softer than the others."""
+    """Evidence with the lines of its softer strikes alone, each chain of them as one; the same where chains are few or
+    no strikes are much softer than the others.
+    """
     if one.signals is None or unchained(one.lines, LINKS[0]) is None:
         return one
     level = np.array([np.nan if r.impulse_n_s is None else r.impulse_n_s for r in one.recordings])
@@ -83,7 +103,9 @@ def _soft(one: Recorded, band_hz: tuple[float, float]) -> Recorded:
 
 
 def _unclipped(one: Recorded, band_hz: tuple[float, float]) -> Recorded:
-    """Evidence with the lines of the strikes that stay below a limit, at all strikes; the same where there is no limit, or fewer than two stay below it."""
+    """Evidence with the lines of the strikes that stay below a limit, at all strikes; the same where there is no limit,
+    or fewer than two stay below it.
+    """
     if one.signals is None or not (limit := limit_of([one.signals])):
         return one
     below = np.flatnonzero((np.abs(one.signals) > BELOW * limit).sum(axis=1) <= TOUCHES)
@@ -117,7 +139,11 @@ def _off_db(b: Baseline) -> float:
 
 def _of(case: Case, recorded: tuple[Recorded, ...], cache: Place, progress: Callable[[str], None] | None) -> Baseline:
     found = fit_evidence(case, recorded, check_mesh=False, total=True, progress=progress)
-    bodies = struck_bodies(found, cache=cache, progress=progress) if found.objects else tuple(shapeless(found, g) for g in recorded)
+    bodies = (
+        struck_bodies(found, cache=cache, progress=progress)
+        if found.objects
+        else tuple(shapeless(found, g) for g in recorded)
+    )
     bodies = with_elastic(found, tuple(separated(body) for body in bodies), cache=cache, progress=progress)
     gain = found.fit.sigma if np.isfinite(found.fit.sigma) and found.fit.sigma > 0 else 1.0
     base = Hypothesis(found.fit.alpha_per_s, found.fit.beta_s, gain, (), {b.name: b.correction for b in bodies})
@@ -133,5 +159,8 @@ def takes_of(bodies: tuple[Struck, ...]) -> tuple[Take, ...]:
             continue
         finite = [signal for signal in body.recorded.signals if np.isfinite(signal).all()]
         floor = floor_between(finite) if finite else white(np.inf)  # over which nothing stands
-        takes += [Take(body, i, sample, body.recorded.sr, floor) for i, sample in zip(body.fitted, body.recorded.signals, strict=True)]
+        takes += [
+            Take(body, i, sample, body.recorded.sr, floor)
+            for i, sample in zip(body.fitted, body.recorded.signals, strict=True)
+        ]
     return tuple(takes)

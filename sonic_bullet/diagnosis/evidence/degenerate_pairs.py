@@ -1,9 +1,11 @@
 """Modes that a mesh leaves side by side by accident, and that two lines show to be two.
 
-    a group of three modes or more, cut at its widest gap -> two lines near it, one no mode's so far, like the one part and the other  ->  each its own line
+    a group of three modes or more, cut at its widest gap -> two lines near it, one no mode's so far, like the one part
+        and the other  ->  each its own line
 
-A plate has pairs of modes for its symmetry, and now and then a lone mode beside a pair: as one group they would be one line, and the other line foreign.
-Of two modes alone nobody can say whether a mesh or an imperfection sets them apart: they stay together.
+A plate has pairs of modes for its symmetry, and now and then a lone mode beside a pair: as one group they would be one
+line, and the other line foreign. Of two modes alone nobody can say whether a mesh or an imperfection sets them apart:
+they stay together.
 """
 
 from __future__ import annotations
@@ -33,9 +35,16 @@ def separated(body: Struck) -> Struck:
         if len(group) < LEAST_MEMBERS:
             continue
         cut = 1 + int(np.diff(freq[group]).argmax())
-        free = [k for k in range(len(lines.freq_hz)) if k not in line and abs(lines.freq_hz[k] / freq[group].mean() - 1) < CORRECTION]
+        free = [
+            k
+            for k in range(len(lines.freq_hz))
+            if k not in line and abs(lines.freq_hz[k] / freq[group].mean() - 1) < CORRECTION
+        ]
         directions = [(low, high) for k in free for low, high in ((one, k), (k, one))]
-        fits = [min(like(lines.amplitude[:, a], row[:, group[:cut]]), like(lines.amplitude[:, b], row[:, group[cut:]])) for a, b in directions]
+        fits = [
+            min(like(lines.amplitude[:, a], row[:, group[:cut]]), like(lines.amplitude[:, b], row[:, group[cut:]]))
+            for a, b in directions
+        ]
         if not fits or max(fits) < LIKE:
             continue
         for k, part in zip(directions[int(np.argmax(fits))], (group[:cut], group[cut:]), strict=True):

@@ -1,6 +1,7 @@
 """What effects propose from: fitted lines beside the hypothesis' own modes, and the sounds beside what it plays.
 
-    Struck + Lines + Hypothesis -> which modes each line stands for -> ObjectEvidence (effects.protocol), one per fitted object -> Evidence
+    Struck + Lines + Hypothesis -> which modes each line stands for -> ObjectEvidence (effects.protocol), one per fitted
+        object -> Evidence
 
 Strikes can be left out (their amplitudes and sounds), and lines: what an effect says must hold for those it never saw.
 """
@@ -12,7 +13,16 @@ from dataclasses import replace
 import numpy as np
 
 from sonic_bullet.diagnosis.evidence.amplitude_dependence import fallen
-from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, impact_of, in_band, modes_of, moves, pattern, play, start
+from sonic_bullet.diagnosis.prediction.hypothesis import (
+    Hypothesis,
+    impact_of,
+    in_band,
+    modes_of,
+    moves,
+    pattern,
+    play,
+    start,
+)
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.effects.protocol import Dereverberates, Evidence, ObjectEvidence, RingsAlong, Sound, Stage
 from sonic_bullet.estimator.fit.pairing import DEGENERATE
@@ -22,7 +32,8 @@ from sonic_bullet.records import Array, ModalModel
 
 REACH = 0.012  # of a line from its mode where effects have moved it
 LOSSY, TOGETHER = 0.06, 0.25  # price of (ln d)² of a line over its mode; ln d of modes that sound as one line
-OWN, ALIKE = 1e-4, 2.0  # of a frequency, beside its width; times its decay: a line so near a known residual voice is that voice's
+# of a frequency, beside its width; times its decay: a line so near a known residual voice is that voice's
+OWN, ALIKE = 1e-4, 2.0
 DIRECT_S = 0.008  # of the sound path: what comes later is an echo
 
 
@@ -33,7 +44,11 @@ def evidence_of(h: Hypothesis, bodies: tuple[Struck, ...], band_hz: tuple[float,
 
 
 def object_evidence(h: Hypothesis, body: Struck, *, sounds: bool = True, anew: bool = False) -> ObjectEvidence:
-    """One fitted object's. sounds: whether what it would sound like is wanted too, which takes longest. anew: lines paired as beside effects that move modes."""
+    """One fitted object's.
+
+    sounds: whether what it would sound like is wanted too, which takes longest. anew: lines paired as beside effects
+    that move modes.
+    """
     recorded = body.recorded
     assert recorded is not None
     lines, model = recorded.lines, None
@@ -42,15 +57,28 @@ def object_evidence(h: Hypothesis, body: Struck, *, sounds: bool = True, anew: b
     mine = body.fitted[: len(lines.amplitude)]
     rows = pattern(body, model)[mine]
     push = rows * start(body.kind, model) * in_band(body, model)
-    direct = path_response(h, body, model.freq_hz, recorded.sr) if recorded.signals is not None else np.ones(model.mode_count)
+    direct = (
+        path_response(h, body, model.freq_hz, recorded.sr)
+        if recorded.signals is not None
+        else np.ones(model.mode_count)
+    )
     pressed = np.stack([impact_of(h, body, i).spectrum(model.freq_hz) for i in mine])
     spectrum = pressed * direct
-    expected = np.stack([(h.gain * push * spectrum)[:, m].sum(axis=1) for m in mode], axis=1) if mode else np.zeros((len(mine), 0), complex)
+    expected = (
+        np.stack([(h.gain * push * spectrum)[:, m].sum(axis=1) for m in mode], axis=1)
+        if mode
+        else np.zeros((len(mine), 0), complex)
+    )
     participation = np.stack([rows[:, m].sum(axis=1) for m in mode], axis=1) if mode else np.zeros((len(mine), 0))
     uncorrected = replace(h, correction=None)
     plain, plain_order = modes_of(uncorrected, body)
     rank = {int(k): i for i, k in enumerate(plain_order)}
-    model_hz = np.array([np.mean([plain.freq_hz[rank[int(order[k])]] if int(order[k]) in rank else model.freq_hz[k] for k in m]) for m in mode])
+    model_hz = np.array(
+        [
+            np.mean([plain.freq_hz[rank[int(order[k])]] if int(order[k]) in rank else model.freq_hz[k] for k in m])
+            for m in mode
+        ]
+    )
     gone = named(h, lines) & sounds  # else they are in the recordings, and neighbours
     rest = np.setdiff1d(np.flatnonzero(~gone), line)
     predicted = own = None
@@ -98,7 +126,9 @@ def object_evidence(h: Hypothesis, body: Struck, *, sounds: bool = True, anew: b
 
 
 def _played(h: Hypothesis, body: Struck, strikes: list[int], signals: Array) -> tuple[Array, Array | None]:
-    """What strikes sound like (s, n), and the recordings without what rings beside the body, where the hypothesis knows of such."""
+    """What strikes sound like (s, n), and the recordings without what rings beside the body, where the hypothesis knows
+    of such.
+    """
 
     def played(one: Hypothesis) -> Array:
         assert body.recorded is not None
@@ -109,7 +139,9 @@ def _played(h: Hypothesis, body: Struck, strikes: list[int], signals: Array) -> 
 
 
 def named(h: Hypothesis, lines: Lines) -> Array:
-    """Which lines (l,), one of each mode, are nearest to what the hypothesis knows to ring beside the body: no other effect sees these."""
+    """Which lines (l,), one of each mode, are nearest to what the hypothesis knows to ring beside the body: no other
+    effect sees these.
+    """
     voices = [np.array(e.lines(), float) for e in h.effects if isinstance(e, RingsAlong)]
     freq, decay = np.concatenate(voices, axis=1) if voices else np.zeros((2, 0))
     off, own = np.abs(lines.freq_hz[:, None] - freq), np.maximum(np.nan_to_num(lines.decay_per_s), 0.0)[:, None]
@@ -126,12 +158,19 @@ def outside(h: Hypothesis, observed: ObjectEvidence) -> ObjectEvidence:
     return observed
 
 
-def paired(h: Hypothesis, body: Struck, model: ModalModel, order: Array, *, anew: bool = False) -> tuple[Array, tuple[Array, ...]]:
-    """Lines (p,) and the modes of ``model`` each stands for: as they were fitted, where no effect has moved the modes, else, or anew, by nearness and pattern."""
+def paired(
+    h: Hypothesis, body: Struck, model: ModalModel, order: Array, *, anew: bool = False
+) -> tuple[Array, tuple[Array, ...]]:
+    """Lines (p,) and the modes of ``model`` each stands for: as they were fitted, where no effect has moved the modes,
+    else, or anew, by nearness and pattern.
+    """
     place = {int(k): i for i, k in enumerate(order)}
     if not (anew or moves(h)):
         line = np.unique(body.line[body.line >= 0])
-        mode = tuple(np.array(sorted(place[int(k)] for k in np.flatnonzero(body.line == one) if int(k) in place), int) for one in line)
+        mode = tuple(
+            np.array(sorted(place[int(k)] for k in np.flatnonzero(body.line == one) if int(k) in place), int)
+            for one in line
+        )
         good = [i for i, m in enumerate(mode) if len(m)]
         return line[good], tuple(mode[i] for i in good)
     assert body.recorded is not None
@@ -148,7 +187,9 @@ def _nearest(body: Struck, model: ModalModel, known: Array) -> tuple[Array, tupl
     gap = np.log(lines.freq_hz)[:, None] - np.log(model.freq_hz)[None, :]
     mine = body.fitted[: len(lines.amplitude)]
     expected, observed = np.abs(pattern(body, model)[mine]), np.abs(lines.amplitude)
-    alike = (observed.T @ expected) / np.maximum(np.linalg.norm(observed, axis=0)[:, None] * np.linalg.norm(expected, axis=0)[None, :], 1e-300)
+    alike = (observed.T @ expected) / np.maximum(
+        np.linalg.norm(observed, axis=0)[:, None] * np.linalg.norm(expected, axis=0)[None, :], 1e-300
+    )
     with np.errstate(divide="ignore", invalid="ignore"):
         worse = np.nan_to_num(np.log(lines.decay_per_s[:, None] / model.decay_per_s[None, :]), posinf=0.0, neginf=0.0)
     price = np.minimum((gap / REACH) ** 2 + 0.5 * (1 - np.nan_to_num(alike)) + LOSSY * worse**2, 1.0) - 1.0
@@ -156,7 +197,8 @@ def _nearest(body: Struck, model: ModalModel, known: Array) -> tuple[Array, tupl
     row, column = linear_sum_assignment(price)
     good = price[row, column] < 0
     row, column = row[good], column[good]
-    group = np.cumsum(np.diff(np.log(model.freq_hz), prepend=-np.inf) > DEGENERATE)  # degenerate modes that nothing has set apart are one line
+    # degenerate modes that nothing has set apart are one line
+    group = np.cumsum(np.diff(np.log(model.freq_hz), prepend=-np.inf) > DEGENERATE)
     taken, mode = set(column.tolist()), []
     for c in column:
         like = np.abs(np.log(np.maximum(model.decay_per_s, 1e-9) / max(float(model.decay_per_s[c]), 1e-9))) < TOGETHER
@@ -167,8 +209,11 @@ def _nearest(body: Struck, model: ModalModel, known: Array) -> tuple[Array, tupl
 
 
 def path_response(h: Hypothesis, body: Struck, freq_hz: Array, sr: int) -> Array:
-    """Complex response (f,) of the sound path's first milliseconds: its effects applied to a weak impulse less what they add to silence."""
-    effects = [e for e in h.at(Stage.SOUND, fitted=body.recorded is not None) if not isinstance(e, Dereverberates)]  # lines are dereverberated already
+    """Complex response (f,) of the sound path's first milliseconds: its effects applied to a weak impulse less what
+    they add to silence.
+    """
+    # lines are dereverberated already
+    effects = [e for e in h.at(Stage.SOUND, fitted=body.recorded is not None) if not isinstance(e, Dereverberates)]
     if not effects:
         return np.ones(len(freq_hz), complex)
     n = round(DIRECT_S * sr)
@@ -180,7 +225,9 @@ def path_response(h: Hypothesis, body: Struck, freq_hz: Array, sr: int) -> Array
 
 
 def thinned(evidence: Evidence, at: tuple[Recorded, int], keep: float, rng: np.random.Generator) -> Evidence:
-    """The same without one strike, at: whose, and which of those, and without a random part of all lines: ``keep`` of them stay.
+    """The same without one strike, at: whose, and which of those, and without a random part of all lines:
+
+    ``keep`` of them stay.
 
     An object of which nothing else was recorded is left out with it.
     """
@@ -191,7 +238,11 @@ def thinned(evidence: Evidence, at: tuple[Recorded, int], keep: float, rng: np.r
 
 def _thin(h: ObjectEvidence, strike: int | None, keep: float, rng: np.random.Generator) -> ObjectEvidence:
     s = np.array([i for i in range(len(h.impulse_n_s)) if i != strike], int)
-    k = np.sort(rng.permutation(len(h.freq_hz))[: max(3, round(keep * len(h.freq_hz)))]) if keep < 1 else np.arange(len(h.freq_hz))
+    k = (
+        np.sort(rng.permutation(len(h.freq_hz))[: max(3, round(keep * len(h.freq_hz)))])
+        if keep < 1
+        else np.arange(len(h.freq_hz))
+    )
     k = k[k < len(h.freq_hz)]
     return replace(
         h,

@@ -1,11 +1,14 @@
 """What a mesh's errors make of the distance: how much of what nothing explains may be theirs.
 
     modes moved at random as much as the others are off           -> what that adds                    (of_the_mesh)
-    lines of no mode, that have a mode's pattern and lie FAR from it at most, where waves are short:  the modes put there     -> what is left   (beyond)
-    modes FAR below the band's edge at most, of which nothing is recorded:                            the modes put outside   -> the same
+    lines of no mode, that have a mode's pattern and lie FAR from it at most, where waves are short:  the modes put
+        there     -> what is left   (beyond)
+    modes FAR below the band's edge at most, of which nothing is recorded:                            the modes put
+        outside   -> the same
 
-A correction is 1 % at most and part of the baseline; finite elements of a coarse mesh err by more in the upper modes, with h⁴ of quadratic ones [Hughes 2000, ch. 7].
-That is no effect and nothing that anybody would want named, so a verdict knows of it; what is played before and after does not.
+A correction is 1 % at most and part of the baseline; finite elements of a coarse mesh err by more in the upper modes,
+with h⁴ of quadratic ones [Hughes 2000, ch. 7]. That is no effect and nothing that anybody would want named, so a
+verdict knows of it; what is played before and after does not.
 """
 
 from __future__ import annotations
@@ -30,9 +33,18 @@ NEARER_DB = 0.05  # without a mode, that ought to be silent
 
 
 def beyond(h: Hypothesis, problem: DiagnosisProblem) -> tuple[Hypothesis, float]:
-    """The hypothesis with unmatched modes where lines of their pattern are, or outside the band; and how far the farthest was put, relative: 0 where none was."""
+    """The hypothesis with unmatched modes where lines of their pattern are, or outside the band; and how far the
+    farthest was put, relative: 0 where none was.
+    """
     start, most = h, 0.0
-    mine = [b for b in problem.bodies if b.recorded is not None and b.family is not None and len(b.fitted) >= LEAST_STRIKES and b.name in (h.correction or {})]
+    mine = [
+        b
+        for b in problem.bodies
+        if b.recorded is not None
+        and b.family is not None
+        and len(b.fitted) >= LEAST_STRIKES
+        and b.name in (h.correction or {})
+    ]
     for body in mine:
         found, off = _put(h, body, (h.correction or {})[body.name])
         if off:
@@ -45,7 +57,9 @@ def beyond(h: Hypothesis, problem: DiagnosisProblem) -> tuple[Hypothesis, float]
 
 
 def _outside(start: Hypothesis, h: Hypothesis, body: Struck, problem: DiagnosisProblem) -> tuple[Hypothesis, float]:
-    """The hypothesis with a body's modes near the band's upper edge outside it, one frequency after another from the top, where strikes are nearer so."""
+    """The hypothesis with a body's modes near the band's upper edge outside it, one frequency after another from the
+    top, where strikes are nearer so.
+    """
     model, order = modes_of(h, body)
     old, most, top = (start.correction or {})[body.name], 0.0, body.band_hz[1]
     group = np.cumsum(np.diff(np.log(model.freq_hz), prepend=-np.inf) > DEGENERATE)
@@ -76,7 +90,9 @@ def _put(h: Hypothesis, body: Struck, correction: Array) -> tuple[Array, float]:
     upper = np.median(model.freq_hz[matched]) if matched.any() else np.inf
     group = np.cumsum(np.diff(np.log(model.freq_hz), prepend=-np.inf) > DEGENERATE)
     found, most = correction.copy(), 0.0
-    for k in sorted(set(range(len(lines.freq_hz))) - set(body.line.tolist()), key=lambda k: -float(observed[:, k].max())):
+    for k in sorted(
+        set(range(len(lines.freq_hz))) - set(body.line.tolist()), key=lambda k: -float(observed[:, k].max())
+    ):
         if lines.freq_hz[k] < upper:
             continue
         near = np.unique(group[~matched & (np.abs(np.log(model.freq_hz / lines.freq_hz[k])) < FAR)])
@@ -92,8 +108,8 @@ def _put(h: Hypothesis, body: Struck, correction: Array) -> tuple[Array, float]:
 
 
 def of_the_mesh(h: Hypothesis, problem: DiagnosisProblem) -> float:
-    """What a mesh's errors would add to the distance, in dB: modes that no line could correct moved at random by as much as the others were
-    corrected, and every shape at the strikes by ROUGH of its strongest there."""
+    """What a mesh's errors would add to the distance, in dB: modes that no line could correct moved at random by as
+    much as the others were corrected, and every shape at the strikes by ROUGH of its strongest there."""
     rng = np.random.default_rng([problem.seed, 5])
     moved, other = dict(h.correction or {}), {}
     for body in problem.bodies:
@@ -119,5 +135,7 @@ def _roughened(body: Struck, rng: np.random.Generator) -> Struck:
     shape = body.model.shape.copy()
     at = slice(body.surface_count(), len(shape) - 1)
     most = np.abs(np.einsum("sxm,sx->sm", shape[at], body.direction[:-1])).max(axis=0)
-    shape[at] += (ROUGH * most * rng.standard_normal((body.strikes, 1, len(most))) * body.direction[:-1, :, None]).astype(np.float32)
+    shape[at] += (
+        ROUGH * most * rng.standard_normal((body.strikes, 1, len(most))) * body.direction[:-1, :, None]
+    ).astype(np.float32)
     return replace(body, model=replace(body.model, shape=shape))

@@ -1,11 +1,14 @@
-"""What a mode that depends on its own level leaves among the lines: a chain of them; and the one line it rings as when it is faint.
+"""What a mode that depends on its own level leaves among the lines: a chain of them; and the one line it rings as when
+it is faint.
 
-    a e^{−dt} e^{iβ(1 − e^{−2dt})} = a e^{−dt} [e^{iβ} − iβ e^{iβ} e^{−2dt} + …]      decays d, 3d, 5d, …      frequency goes with level²     (effects.amplitude_pitch)
-    a/((1 + c)e^{dt} − c)          = a/(1 + c) [e^{−dt} + c/(1 + c) e^{−2dt} + …]      decays d, 2d, 3d, …      decay goes with level; with its square: d, 3d, 5d, …   (effects.amplitude_damping)
+    a e^{−dt} e^{iβ(1 − e^{−2dt})} = a e^{−dt} [e^{iβ} − iβ e^{iβ} e^{−2dt} + …]      decays d, 3d, 5d, …      frequency
+        goes with level²     (effects.amplitude_pitch)
+    a/((1 + c)e^{dt} − c)          = a/(1 + c) [e^{−dt} + c/(1 + c) e^{−2dt} + …]      decays d, 2d, 3d, …      decay
+        goes with level; with its square: d, 3d, 5d, …   (effects.amplitude_damping)
 
-Least squares fit such a mode by a few lines, each shorter than the one before and hardly beside it. The slowest is the linear mode, the body's and the material's
-own, and of a mode that is only bent the whole chain's level falls as it does; at the onset all lines add up to what was struck. A baseline fitted to the loudest
-line of each chain has neither.
+Least squares fit such a mode by a few lines, each shorter than the one before and hardly beside it. The slowest is the
+linear mode, the body's and the material's own, and of a mode that is only bent the whole chain's level falls as it
+does; at the onset all lines add up to what was struck. A baseline fitted to the loudest line of each chain has neither.
 """
 
 from __future__ import annotations
@@ -20,17 +23,20 @@ from sonic_bullet.records import Array
 LINKS = (
     (1.25, 1.0, False),
     (1.1, 3.0, True),
-)  # a chain's next line is so much shorter at least, and as near as that many times its decay; whether modes are only bent
+    # a chain's next line is so much shorter at least, and as near as that many times its decay; whether modes are only bent
+)
 SHORTER = 5.0  # at most
 NEAR = 0.012  # of a frequency
 ONE = 2.0  # decays: slow lines that lie nearer are one mode's
 LONG, FRAMES, FAINT = 3.0, 120, 0.03  # of 1/d; of the strongest level
 LEAST_CHAINS, LEAST_SHARE_OF_CHAINS = 4, 0.1  # chains, and of all modes' lines: fewer are neighbours, hits or a room's
-PLAIN = 4  # links of the loudest line's chain, which bends most, the shorter the farther off: neighbours are two or three
+# links of the loudest line's chain, which bends most, the shorter the farther off: neighbours are two or three
+PLAIN = 4
 
 
 def unchained(lines: Lines, link: tuple[float, float, bool]) -> Lines | None:
-    """Every chain of such links as one line: the slowest's frequency, the slowest's decay or the chain's own, the amplitudes' sum.
+    """Every chain of such links as one line: the slowest's frequency, the slowest's decay or the chain's own, the
+    amplitudes' sum.
 
     Where there are too few chains to speak of, those alone that are plain, if the loudest line is in one; None if not.
     """
@@ -70,7 +76,9 @@ def share(lines: Lines, link: tuple[float, float, bool]) -> float:
 
 
 def _falls(lines: Lines, group: Array) -> float:
-    """The decay at which a chain's level falls, in 1/s: bent or not, a mode's level does as e^{−dt}, and no line of many is as certain."""
+    """The decay at which a chain's level falls, in 1/s: bent or not, a mode's level does as e^{−dt}, and no line of
+    many is as certain.
+    """
     pole = -lines.decay_per_s[group] + 2j * np.pi * (lines.freq_hz[group] - lines.freq_hz[group[0]])
     time = np.linspace(0, LONG / lines.decay_per_s[group[0]], FRAMES)
     level = np.abs(lines.amplitude[:, group] @ np.exp(pole[:, None] * time))
@@ -80,13 +88,15 @@ def _falls(lines: Lines, group: Array) -> float:
     weight = 1 / (1 + (FAINT * level.max() / np.maximum(level, 1e-300)) ** 2)
     ramp = time - (weight * time).sum(axis=1, keepdims=True) / np.maximum(weight.sum(axis=1, keepdims=True), 1e-300)
     falls = -(weight * ramp * np.log(np.maximum(level, 1e-300))).sum() / (weight * ramp**2).sum()
-    return float(np.clip(falls, lines.decay_per_s[group[0]], lines.decay_per_s[group[-1]]))  # lines that beat are no chain
+    # lines that beat are no chain
+    return float(np.clip(falls, lines.decay_per_s[group[0]], lines.decay_per_s[group[-1]]))
 
 
 def chains(lines: Lines, link: tuple[float, float, bool]) -> list[Array]:
     """The lines in groups, by index, the slowest first; most stand alone.
 
-    A line follows the nearest one that it may; two that follow none are two modes though others lie between, unless they are one on the other.
+    A line follows the nearest one that it may; two that follow none are two modes though others lie between, unless
+    they are one on the other.
     """
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import connected_components
@@ -94,7 +104,13 @@ def chains(lines: Lines, link: tuple[float, float, bool]) -> list[Array]:
     omega, decay = 2 * np.pi * lines.freq_hz, np.nan_to_num(lines.decay_per_s)
     ratio = decay[None, :] / np.maximum(decay[:, None], 1e-12)
     gap = np.abs(omega[:, None] - omega[None, :])
-    linked = (ratio > link[0]) & (ratio < SHORTER) & (gap < link[1] * decay[None, :]) & (gap < NEAR * omega[:, None]) & (decay[:, None] > 0)
+    linked = (
+        (ratio > link[0])
+        & (ratio < SHORTER)
+        & (gap < link[1] * decay[None, :])
+        & (gap < NEAR * omega[:, None])
+        & (decay[:, None] > 0)
+    )
     first = ~linked.any(axis=0)
     parent = np.where(linked, gap, np.inf).argmin(axis=0) if len(omega) else np.zeros(0, int)
     follows = np.zeros_like(linked)
@@ -103,4 +119,7 @@ def chains(lines: Lines, link: tuple[float, float, bool]) -> list[Array]:
     same = shared & (gap < ONE * np.maximum(decay[:, None], decay[None, :]))[np.ix_(first, first)]
     follows[np.ix_(first, first)] |= same
     group = connected_components(csr_array(follows), directed=False)[1]
-    return [who[np.argsort(decay[who], kind="stable")] for who in (np.flatnonzero(group == g) for g in range(group.max(initial=-1) + 1))]
+    return [
+        who[np.argsort(decay[who], kind="stable")]
+        for who in (np.flatnonzero(group == g) for g in range(group.max(initial=-1) + 1))
+    ]

@@ -1,7 +1,8 @@
 """What the baseline's own numbers become once an effect is there: α, β, σ and the corrections, from the same lines.
 
     d − Δd(effects) = ½(α + βλ)         (estimator.rayleigh)
-    |A_sk| = σ |J ψ F̂|                  least squares with Cauchy's weights, 2 % of a mode's strongest for the shapes' own error
+    |A_sk| = σ |J ψ F̂|
+        least squares with Cauchy's weights, 2 % of a mode's strongest for the shapes' own error
 
 A correction is the mesh's error alone: a mode that an effect moves keeps only what is left of it, within 1 %.
 """
@@ -18,7 +19,16 @@ from sonic_bullet.diagnosis.evidence.small_amplitude import at_rest
 from sonic_bullet.diagnosis.evidence.unmatched_modes import CORRECTION, can_tell, sought
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, bends, modes_of, moves, pattern, play, undamped
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
-from sonic_bullet.effects.protocol import BaselineChange, ChangesBaseline, Dereverberates, Effect, Impact, ObjectEvidence, SplitsPairs, Stage
+from sonic_bullet.effects.protocol import (
+    BaselineChange,
+    ChangesBaseline,
+    Dereverberates,
+    Effect,
+    Impact,
+    ObjectEvidence,
+    SplitsPairs,
+    Stage,
+)
 from sonic_bullet.estimator.fit.pairing import DEGENERATE, MESHED
 from sonic_bullet.estimator.fit.rayleigh import rayleigh
 from sonic_bullet.estimator.lines.joint_lines import noise_rms
@@ -28,8 +38,12 @@ ROUGH = 0.02
 NEAR, ALIKE = 5e-3, 1.6  # of ln f and ln d: lines of one mode
 
 
-def refitted(h: Hypothesis, bodies: tuple[Struck, ...], observed: tuple[ObjectEvidence, ...] | None = None, *, anew: bool = False) -> Hypothesis:
-    """The hypothesis with α, β and σ fitted again beside its effects; ``observed``: evidence to fit them to, thinned or whole, of all bodies or some.
+def refitted(
+    h: Hypothesis, bodies: tuple[Struck, ...], observed: tuple[ObjectEvidence, ...] | None = None, *, anew: bool = False
+) -> Hypothesis:
+    """The hypothesis with α, β and σ fitted again beside its effects;
+
+    ``observed``: evidence to fit them to, thinned or whole, of all bodies or some.
 
     anew: with lines paired and corrections learnt again, too, as they are beside effects that move modes.
     """
@@ -38,7 +52,12 @@ def refitted(h: Hypothesis, bodies: tuple[Struck, ...], observed: tuple[ObjectEv
         h = corrected(h, bodies, anew=anew)
     if observed is None or moved:
         observed = tuple(
-            object_evidence(replace(h, effects=tuple(e for e in h.effects if e.stage is not Stage.SOUND)), b, sounds=False, anew=anew)
+            object_evidence(
+                replace(h, effects=tuple(e for e in h.effects if e.stage is not Stage.SOUND)),
+                b,
+                sounds=False,
+                anew=anew,
+            )
             for b in bodies
             if b.recorded is not None
         )
@@ -47,9 +66,19 @@ def refitted(h: Hypothesis, bodies: tuple[Struck, ...], observed: tuple[ObjectEv
     return at_rest(h, bodies, observed) if bends(h) else h
 
 
-def reidentified(h: Hypothesis, bodies: tuple[Struck, ...], observed: tuple[ObjectEvidence, ...] | None = None, *, fully: bool = False) -> Hypothesis:
-    """The hypothesis with a room's response identified again, beside all that has been found. observed: the strikes it is identified from; all where None. fully: to the end."""
-    fitted = [b for b in bodies if b.recorded is not None and b.recorded.signals is not None]  # lists of lines say nothing of a response
+def reidentified(
+    h: Hypothesis,
+    bodies: tuple[Struck, ...],
+    observed: tuple[ObjectEvidence, ...] | None = None,
+    *,
+    fully: bool = False,
+) -> Hypothesis:
+    """The hypothesis with a room's response identified again, beside all that has been found.
+
+    observed: the strikes it is identified from; all where None. fully: to the end.
+    """
+    # lists of lines say nothing of a response
+    fitted = [b for b in bodies if b.recorded is not None and b.recorded.signals is not None]
     if observed is not None:
         fitted = [b for b in fitted if any(one.source is b.recorded for one in observed)]
     if not fitted:
@@ -58,7 +87,11 @@ def reidentified(h: Hypothesis, bodies: tuple[Struck, ...], observed: tuple[Obje
     for room in (e for e in h.effects if isinstance(e, Dereverberates)):
         g = body.recorded
         assert g is not None and g.signals is not None
-        mine = list(range(len(g.signals))) if observed is None else next(list(one.strike) for one in observed if one.source is g)
+        mine = (
+            list(range(len(g.signals)))
+            if observed is None
+            else next(list(one.strike) for one in observed if one.source is g)
+        )
         signal = g.signals[mine]
         bare = replace(h, effects=tuple(e for e in h.effects if e is not room))
         sound = np.stack([play(bare, body, body.fitted[i], signal.shape[1], g.sr) for i in mine])
@@ -78,16 +111,26 @@ def _whose(one: ObjectEvidence, bodies: tuple[Struck, ...]) -> Struck:
 
 
 def with_effects(h: Hypothesis, effects: tuple[Effect, ...], bodies: tuple[Struck, ...]) -> Hypothesis:
-    """The hypothesis with other effects, not yet refitted; where none moves modes any more, or bends them otherwise, corrections are the baseline's again."""
+    """The hypothesis with other effects, not yet refitted; where none moves modes any more, or bends them otherwise,
+    corrections are the baseline's again.
+    """
     made = replace(h, effects=effects)
-    return made if moves(made) or not (moves(h) or bends(h)) else replace(made, stretch=0.0, poisson=None, correction={b.name: b.correction for b in bodies})
+    return (
+        made
+        if moves(made) or not (moves(h) or bends(h))
+        else replace(made, stretch=0.0, poisson=None, correction={b.name: b.correction for b in bodies})
+    )
 
 
 def corrected(h: Hypothesis, bodies: tuple[Struck, ...], *, anew: bool = False) -> Hypothesis:
-    """The hypothesis with E/ρ and corrections learnt on its own modes, from where its effects have found E/ρ and ν (``stretch``, ``poisson_ratio``). anew: see refitted."""
+    """The hypothesis with E/ρ and corrections learnt on its own modes, from where its effects have found E/ρ and ν
+    (``stretch``, ``poisson_ratio``). anew: see refitted.
+    """
     changes = baseline_changes(h)
     known = [c.poisson_ratio for c in changes if c.poisson_ratio is not None]
-    h = replace(h, correction=None, stretch=float(sum(c.stretch for c in changes)), poisson=known[-1] if known else None)
+    h = replace(
+        h, correction=None, stretch=float(sum(c.stretch for c in changes)), poisson=known[-1] if known else None
+    )
     for _ in range(3):
         off = np.concatenate([_off(h, body, anew)[1] for body in bodies if body.recorded is not None] or [np.zeros(0)])
         if len(off):
@@ -96,8 +139,11 @@ def corrected(h: Hypothesis, bodies: tuple[Struck, ...], *, anew: bool = False) 
     for body in bodies:
         if body.recorded is None:
             continue
-        for e in (e for e in h.effects if isinstance(e, SplitsPairs)):  # lines of degenerate modes go to their own: half a split off, either would do
-            found[body.name] = np.clip(e.observed_correction(undamped(h, body).freq_hz * np.exp(h.stretch)), -CORRECTION, CORRECTION)
+        # lines of degenerate modes go to their own: half a split off, either would do
+        for e in (e for e in h.effects if isinstance(e, SplitsPairs)):
+            found[body.name] = np.clip(
+                e.observed_correction(undamped(h, body).freq_hz * np.exp(h.stretch)), -CORRECTION, CORRECTION
+            )
         for _ in range(2):
             place, off = _off(replace(h, correction=found), body, anew)
             ratio = np.array(found.get(body.name, np.zeros(undamped(h, body).mode_count)), float)
@@ -112,12 +158,16 @@ def corrected(h: Hypothesis, bodies: tuple[Struck, ...], *, anew: bool = False) 
             groups = [order[who] for who in paired(now, body, model, order, anew=anew)[1]]
             lone = np.setdiff1d(np.arange(len(ratio)), np.concatenate([*groups, np.zeros(0, int)]))
             shared = np.concatenate([*(g for g in groups if len(g) > 1), np.zeros(0, int)])
-            found[body.name] = sought(now, body, np.concatenate([lone, shared]), alone=np.isin(np.arange(len(ratio)), lone))
+            found[body.name] = sought(
+                now, body, np.concatenate([lone, shared]), alone=np.isin(np.arange(len(ratio)), lone)
+            )
     return replace(h, correction=found)
 
 
 def _alike(freq_hz: Array, correction: Array) -> Array:
-    """Corrections (m,), the mean of each run of modes that a mesh leaves side by side: what sets degenerate modes apart is an effect's, or they would change places."""
+    """Corrections (m,), the mean of each run of modes that a mesh leaves side by side: what sets degenerate modes apart
+    is an effect's, or they would change places.
+    """
     run = np.cumsum(np.diff(np.log(freq_hz), prepend=-np.inf) > DEGENERATE * MESHED)
     return np.asarray((np.bincount(run, correction) / np.maximum(np.bincount(run), 1))[run])
 
@@ -129,7 +179,10 @@ def _off(h: Hypothesis, body: Struck, anew: bool) -> tuple[Array, Array]:
     line, mode = paired(h, body, model, order, anew=anew)
     place = np.concatenate([order[who] for who in mode]) if mode else np.zeros(0, int)
     lines = body.recorded.lines.freq_hz
-    off = np.concatenate([np.full(len(who), np.log(lines[one] / model.freq_hz[who].mean())) for one, who in zip(line, mode, strict=True)] or [np.zeros(0)])
+    off = np.concatenate(
+        [np.full(len(who), np.log(lines[one] / model.freq_hz[who].mean())) for one, who in zip(line, mode, strict=True)]
+        or [np.zeros(0)]
+    )
     return place, off
 
 
@@ -137,7 +190,9 @@ def _damped(h: Hypothesis, bodies: tuple[Struck, ...], observed: tuple[ObjectEvi
     """α and β beside the effects' own decay."""
     if any(e.traits.replaces_rayleigh for e in h.effects):
         return h
-    known = [(c.alpha_per_s, c.beta_s) for c in baseline_changes(h) if c.alpha_per_s is not None and c.beta_s is not None]
+    known = [
+        (c.alpha_per_s, c.beta_s) for c in baseline_changes(h) if c.alpha_per_s is not None and c.beta_s is not None
+    ]
     if known:
         return replace(h, alpha_per_s=known[-1][0], beta_s=known[-1][1])
     bare = replace(h, alpha_per_s=0.0, beta_s=0.0)
@@ -163,13 +218,19 @@ def _damped(h: Hypothesis, bodies: tuple[Struck, ...], observed: tuple[ObjectEvi
 
 
 def _members(one: ObjectEvidence, model: ModalModel) -> list[Array]:
-    """The modes, by index, that each line stands for in a model whose modes have hardly moved: as many as before, about the one that is nearest."""
+    """The modes, by index, that each line stands for in a model whose modes have hardly moved: as many as before, about
+    the one that is nearest.
+    """
     near = model.freq_hz[np.abs(np.subtract.outer(one.freq_hz, model.freq_hz)).argmin(axis=1)]
-    return [np.argsort(np.abs(model.freq_hz - f), kind="stable")[: len(who)] for f, who in zip(near, one.mode, strict=True)]
+    return [
+        np.argsort(np.abs(model.freq_hz - f), kind="stable")[: len(who)] for f, who in zip(near, one.mode, strict=True)
+    ]
 
 
 def _participation(h: Hypothesis, body: Struck, one: ObjectEvidence) -> Array:
-    """Jψ (s, k) of the lines: the evidence's own, or, beside effects that leave modes where they were, as these have them sound."""
+    """Jψ (s, k) of the lines: the evidence's own, or, beside effects that leave modes where they were, as these have
+    them sound.
+    """
     if moves(h) or not h.at(Stage.MODES):
         return one.pattern
     model, _ = modes_of(h, body)
@@ -178,11 +239,16 @@ def _participation(h: Hypothesis, body: Struck, one: ObjectEvidence) -> Array:
 
 
 def whole(one: ObjectEvidence) -> Array:
-    """Amplitudes (s, k) with those of lines so near that they may be the same mode, bent or split: at the onset they add up to what was struck."""
+    """Amplitudes (s, k) with those of lines so near that they may be the same mode, bent or split: at the onset they
+    add up to what was struck.
+    """
     if one.dry or not len(one.foreign_hz) or not len(one.freq_hz):
         return one.amplitude  # in a room what rings close by is mostly the room
     gap = np.abs(np.log(one.foreign_hz[:, None] / one.freq_hz[None, :]))
-    alike = np.abs(np.log(np.maximum(one.foreign_decay_per_s[:, None], 1e-3) / np.maximum(one.decay_per_s, 1e-3))) < ALIKE  # clicks are no part of a mode
+    # clicks are no part of a mode
+    alike = (
+        np.abs(np.log(np.maximum(one.foreign_decay_per_s[:, None], 1e-3) / np.maximum(one.decay_per_s, 1e-3))) < ALIKE
+    )
     mine = (gap.argmin(axis=1)[:, None] == np.arange(len(one.freq_hz))) & (gap < NEAR) & alike
     return np.asarray(one.amplitude + one.foreign_amplitude @ mine)
 
@@ -208,7 +274,12 @@ def _gained(h: Hypothesis, bodies: tuple[Struck, ...], observed: tuple[ObjectEvi
             impact = Impact(float(level) if np.isfinite(level) else 1.0, np.zeros(1), np.ones(1))
             for effect in h.at(Stage.FORCE):
                 impact = effect.apply(impact)
-            hits = np.abs((impact.share[:, None] * np.exp((one.decay_per_s - 2j * np.pi * one.freq_hz) * impact.delay_s[:, None])).sum(axis=0))
+            hits = np.abs(
+                (
+                    impact.share[:, None]
+                    * np.exp((one.decay_per_s - 2j * np.pi * one.freq_hz) * impact.delay_s[:, None])
+                ).sum(axis=0)
+            )
             factor[i] = np.abs(impact.spectrum(one.freq_hz)) * direct * hits
         expected = np.abs(_participation(h, body, one)) * factor
         if bends(h) and not (dependent := turns_rad(h, body, one) > TURNS_RAD).all():
@@ -226,7 +297,11 @@ def _gained(h: Hypothesis, bodies: tuple[Struck, ...], observed: tuple[ObjectEvi
         return h
     if any(one.dry for one in observed):  # read through a room, a line is off by a factor of its own
         usable = (x > 0) & (y > 0) & (s[0] > 0)
-        return replace(h, gain=_middle(y[usable] / x[usable], (y / np.maximum(s[0], 1e-300))[usable])) if usable.any() else h
+        return (
+            replace(h, gain=_middle(y[usable] / x[usable], (y / np.maximum(s[0], 1e-300))[usable]))
+            if usable.any()
+            else h
+        )
     gain, weight = _middle(y[x > 0] / x[x > 0], x[x > 0] / (s[0] + s[1])[x > 0]), np.ones(len(x))
     for _ in range(30):
         sd2 = (s[0] ** 2 + (gain * s[1]) ** 2) + 1e-300

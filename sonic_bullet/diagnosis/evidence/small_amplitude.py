@@ -1,9 +1,10 @@
 """Where modes are at rest, beside an effect under which their frequency goes with their level.
 
-    line k of strike s, shifted to 0 Hz: recorded z(t), played z'(t)      δ_k -> argmax Σ_s |Σ_t w z z'* / |z z'| e^{−2πi δ t}|      f_k -> f_k + δ_k
+    line k of strike s, shifted to 0 Hz: recorded z(t), played z'(t)      δ_k -> argmax Σ_s |Σ_t w z z'* / |z z'|
+        e^{−2πi δ t}|      f_k -> f_k + δ_k
 
-A linear fit puts such a mode where it is while it is loud, and the mesh's correction was learnt on that: beside the effect it would shift from the wrong end.
-Whether it hardens or softens, and how far, stays the effect's.
+A linear fit puts such a mode where it is while it is loud, and the mesh's correction was learnt on that: beside the
+effect it would shift from the wrong end. Whether it hardens or softens, and how far, stays the effect's.
 """
 
 from __future__ import annotations
@@ -27,8 +28,12 @@ HALFWAY = 0.5  # to the next mode
 AGREE = 0.5  # of all frames' worth, once shifted: what is played is what was recorded
 
 
-def at_rest(h: Hypothesis, bodies: tuple[Struck, ...], observed: tuple[ObjectEvidence, ...], *, every: bool = False) -> Hypothesis:
-    """The hypothesis with the corrections of amplitude-dependent modes learnt on what they ring down to, by the strikes in ``observed``. every: of all modes that stand alone."""
+def at_rest(
+    h: Hypothesis, bodies: tuple[Struck, ...], observed: tuple[ObjectEvidence, ...], *, every: bool = False
+) -> Hypothesis:
+    """The hypothesis with the corrections of amplitude-dependent modes learnt on what they ring down to, by the strikes
+    in ``observed``. every: of all modes that stand alone.
+    """
     found = dict(h.correction or {})
     for body in bodies:
         mine = next((one for one in observed if body.recorded is not None and one.source is body.recorded), None)
@@ -43,9 +48,12 @@ def _rested(h: Hypothesis, body: Struck, strikes: list[int], every: bool) -> Arr
     count = undamped(h, body).mode_count
     correction = np.array((h.correction or {}).get(body.name, np.zeros(count)), float)
     one, (modes, order) = object_evidence(h, body, sounds=False), modes_of(h, body)
-    dependent = np.ones(len(one.freq_hz), bool) if every else amplitude_dependent(h, body, replace(one, strike=tuple(strikes)))
+    dependent = (
+        np.ones(len(one.freq_hz), bool) if every else amplitude_dependent(h, body, replace(one, strike=tuple(strikes)))
+    )
     selected, window = alone(one)
-    kept = [q for q, k in enumerate(selected) if dependent[k] and len(one.mode[k]) == 1]  # degenerate modes shift each by its own level, and beat
+    # degenerate modes shift each by its own level, and beat
+    kept = [q for q, k in enumerate(selected) if dependent[k] and len(one.mode[k]) == 1]
     if not kept or len(correction) != count:
         return correction
     selected, window = [selected[q] for q in kept], [window[q] for q in kept]
@@ -54,8 +62,11 @@ def _rested(h: Hypothesis, body: Struck, strikes: list[int], every: bool) -> Arr
     rows = replace(one, noise=one.noise[strikes])
     recorded, model = shifted(rows, signal, selected, window), shifted(rows, played, selected, window)
     for q, k in enumerate(selected):
-        next_hz = np.abs(np.delete(modes.freq_hz, one.mode[k]) - modes.freq_hz[one.mode[k]]).min(initial=np.inf)  # or it would be taken for its neighbour
-        ratio = 1 + _off_hz(recorded, model, q, min(CORRECTION * float(one.freq_hz[k]), HALFWAY * float(next_hz))) / float(one.freq_hz[k])
+        # or it would be taken for its neighbour
+        next_hz = np.abs(np.delete(modes.freq_hz, one.mode[k]) - modes.freq_hz[one.mode[k]]).min(initial=np.inf)
+        ratio = 1 + _off_hz(
+            recorded, model, q, min(CORRECTION * float(one.freq_hz[k]), HALFWAY * float(next_hz))
+        ) / float(one.freq_hz[k])
         who = order[one.mode[k]]
         correction[who] = np.clip((1 + correction[who]) * ratio - 1, -CORRECTION, CORRECTION)
     return correction

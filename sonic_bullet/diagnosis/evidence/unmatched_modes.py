@@ -1,9 +1,11 @@
 """Unmatched modes, those without a line: what their frequencies are, by the recordings themselves.
 
-    T_s = recording − all other modes;   r_j -> argmin Σ_s ∫ |T_s(f) − A_sj L(f; f_j (1 + r_j), d_j)|² df,   |r_j| <= 1 %,   L(f) = ½ Σ_t e^{(−d + iω)t} e^{−2πi f t}
+    T_s = recording − all other modes;   r_j -> argmin Σ_s ∫ |T_s(f) − A_sj L(f; f_j (1 + r_j), d_j)|² df,   |r_j| <= 1
+        %,   L(f) = ½ Σ_t e^{(−d + iω)t} e^{−2πi f t}
 
-Degenerate modes that a mesh has set apart, modes it has put together, modes in each other's skirts and short ones stand in no list of lines, but the model knows
-their amplitudes at every strike, so their place shows. The baseline's correction of a mesh's error, for those of its modes; one that the recordings do not clearly want elsewhere stays.
+Degenerate modes that a mesh has set apart, modes it has put together, modes in each other's skirts and short ones stand
+in no list of lines, but the model knows their amplitudes at every strike, so their place shows. The baseline's
+correction of a mesh's error, for those of its modes; one that the recordings do not clearly want elsewhere stays.
 Beyond the band's edges L is 0: a mode that the mesh has just inside, and that nobody hears, may lie just outside.
 """
 
@@ -27,20 +29,29 @@ FINE = 0.25  # of a mode's half width, or of a bin: steps of the search
 
 
 def settled(h: Hypothesis, bodies: tuple[Struck, ...]) -> tuple[Struck, ...]:
-    """The bodies, modes without a line corrected where their sounds say so; a mode that has come to a line's frequency belongs to it."""
+    """The bodies, modes without a line corrected where their sounds say so; a mode that has come to a line's frequency
+    belongs to it.
+    """
     return tuple(_settled(h, body) if can_tell(body) else body for body in bodies)
 
 
 def can_tell(body: Struck) -> bool:
     """Whether amplitudes are known with their signs, and there are sounds to hold them against."""
     g = body.recorded
-    return g is not None and g.signals is not None and body.family is not None and g.lines.signed and body.kind in ("velocity", "sum")
+    return (
+        g is not None
+        and g.signals is not None
+        and body.family is not None
+        and g.lines.signed
+        and body.kind in ("velocity", "sum")
+    )
 
 
 def _settled(h: Hypothesis, body: Struck) -> Struck:
     assert body.recorded is not None
     shared = np.bincount(body.line[body.line >= 0], minlength=1)[np.maximum(body.line, 0)] > 1
-    free = (body.line < 0) | shared  # modes that a mesh has put side by side may have taken one line where there are two
+    # modes that a mesh has put side by side may have taken one line where there are two
+    free = (body.line < 0) | shared
     correction = sought(h, body, np.flatnonzero(free), alone=body.line < 0)
     lines, line = body.recorded.lines.freq_hz, body.line.copy()
     for j in np.flatnonzero(correction != body.correction) if len(lines) else ():
@@ -52,9 +63,11 @@ def _settled(h: Hypothesis, body: Struck) -> Struck:
 
 
 def sought(h: Hypothesis, body: Struck, which: Array, *, alone: Array | None = None) -> Array:
-    """The hypothesis' corrections (m,) of a body, those of ``which`` modes searched for anew, the loudest first. alone (m,): without a line; all where None.
+    """The hypothesis' corrections (m,) of a body, those of ``which`` modes searched for anew, the loudest first. alone
+    (m,): without a line; all where None.
 
-    One that shares a line goes elsewhere only if nothing but itself, as the mesh has it, is there: degenerate modes that an imperfection has turned are not the mesh's.
+    One that shares a line goes elsewhere only if nothing but itself, as the mesh has it, is there: degenerate modes
+    that an imperfection has turned are not the mesh's.
     """
     assert body.recorded is not None and body.recorded.signals is not None
     observed, (model, order) = object_evidence(h, body), modes_of(h, body)
@@ -64,7 +77,11 @@ def sought(h: Hypothesis, body: Struck, which: Array, *, alone: Array | None = N
     own, rank = np.full(count, np.nan), np.full(count, -1)  # overdamped modes are in neither
     own[plain_order], rank[order] = plain.freq_hz, np.arange(len(order))
     energy = (np.abs(observed.push) ** 2).sum(axis=0) / np.maximum(model.decay_per_s, 1e-3)
-    loud = [int(j) for j in which if rank[j] >= 0 and np.isfinite(own[j]) and energy[rank[j]] > 2 * (observed.noise**2).sum() / observed.sr]
+    loud = [
+        int(j)
+        for j in which
+        if rank[j] >= 0 and np.isfinite(own[j]) and energy[rank[j]] > 2 * (observed.noise**2).sum() / observed.sr
+    ]
     loud.sort(key=lambda j: -energy[rank[j]])
     left, n = np.fft.rfft(observed.residual, axis=1), body.recorded.signals.shape[1]
     for _ in range(TURNS):
@@ -76,7 +93,9 @@ def sought(h: Hypothesis, body: Struck, which: Array, *, alone: Array | None = N
             if ratio != correction[j]:
                 half = 2 * CORRECTION * own[j] + WIDE * (decay / (2 * np.pi) + observed.sr / n)
                 bins = _bins(own[j], half, n, observed.sr)
-                was, will = (_line(own[j] * (1 + r), decay, bins, n, observed.sr, body.band_hz) for r in (correction[j], ratio))
+                was, will = (
+                    _line(own[j] * (1 + r), decay, bins, n, observed.sr, body.band_hz) for r in (correction[j], ratio)
+                )
                 left[:, bins] += push[:, None] * (was - will)
                 correction[j] = ratio
         if (correction == before).all():
@@ -84,8 +103,20 @@ def sought(h: Hypothesis, body: Struck, which: Array, *, alone: Array | None = N
     return correction
 
 
-def _best(left: Array, push: Array, decay: float, own: float, now: float, n: int, sr: int, most: float, band_hz: tuple[float, float]) -> float:
-    """The correction of a mode of amplitudes push (s,) that leaves least around it, if it is clearly better than the one it has and leaves no more than ``most``."""
+def _best(
+    left: Array,
+    push: Array,
+    decay: float,
+    own: float,
+    now: float,
+    n: int,
+    sr: int,
+    most: float,
+    band_hz: tuple[float, float],
+) -> float:
+    """The correction of a mode of amplitudes push (s,) that leaves least around it, if it is clearly better than the
+    one it has and leaves no more than ``most``.
+    """
     step = FINE * max(decay / (2 * np.pi), sr / n) / own
     grid = np.concatenate([[now], np.linspace(-CORRECTION, CORRECTION, 2 * int(np.ceil(CORRECTION / step)) + 1)])
     bins = _bins(own, CORRECTION * own + SKIRT * decay / (2 * np.pi) + 2 * sr / n, n, sr)

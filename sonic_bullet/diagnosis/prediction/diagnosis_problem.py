@@ -1,9 +1,10 @@
 """What stays the same while effects are selected, and what a hypothesis scores on it.
 
-    Struck bodies + comparable strikes + band + candidate effects + seed -> DiagnosisProblem;   DiagnosisProblem × Hypothesis -> Score
+    Struck bodies + comparable strikes + band + candidate effects + seed -> DiagnosisProblem;
+        DiagnosisProblem × Hypothesis -> Score
 
-Strikes are `Comparable`, so a problem can only be posed once somebody has asked `comparable` and seen to what it said: where nothing can be compared
-there is no problem, and no score.
+Strikes are `Comparable`, so a problem can only be posed once somebody has asked `comparable` and seen to what it said:
+where nothing can be compared there is no problem, and no score.
 """
 
 from __future__ import annotations
@@ -23,7 +24,8 @@ def silent(_: str) -> None:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DiagnosisProblem:
-    """bodies: every object. takes: what a hypothesis is held against. band_hz: of the recordings. effects: the candidates.
+    """bodies: every object. takes: what a hypothesis is held against. band_hz: of the recordings. effects: the
+    candidates.
 
     seed: of all that is drawn. say: where progress goes. Raises ValueError where there is no strike, or no band.
     """

@@ -29,7 +29,13 @@ MODES = (30, 160)
 MORE = 1.6  # modes than the isotropic body has in the band: other tensors are softer somewhere
 
 
-def with_elastic(found: CaseFit, bodies: tuple[Struck, ...], *, cache: Place = "default", progress: Callable[[str], None] | None = None) -> tuple[Struck, ...]:
+def with_elastic(
+    found: CaseFit,
+    bodies: tuple[Struck, ...],
+    *,
+    cache: Place = "default",
+    progress: Callable[[str], None] | None = None,
+) -> tuple[Struck, ...]:
     """The same bodies, those with a mesh able to be of any elasticity."""
     made = []
     for body in bodies:
@@ -41,14 +47,37 @@ def with_elastic(found: CaseFit, bodies: tuple[Struck, ...], *, cache: Place = "
         material = Material.isotropic("fitted", youngs_pa=gamma * density, poisson=poisson, density_kg_m3=density)
         lines = len(body.recorded.lines.freq_hz) if body.recorded is not None else 0
         count = max(int(MORE * body.model.mode_count), round(1.2 * lines) + 8)
-        made.append(replace(body, elastic=elastic_of(found.case, body.name, body.recordings, material, count, cache=cache, say=progress or (lambda _: None))))
+        made.append(
+            replace(
+                body,
+                elastic=elastic_of(
+                    found.case,
+                    body.name,
+                    body.recordings,
+                    material,
+                    count,
+                    cache=cache,
+                    say=progress or (lambda _: None),
+                ),
+            )
+        )
     return tuple(made)
 
 
 def elastic_of(
-    case: Case, name: str, recordings: tuple[CaseRecording, ...], material: Material, count: int, *, cache: Place = "default", say: Callable[[str], None]
+    case: Case,
+    name: str,
+    recordings: tuple[CaseRecording, ...],
+    material: Material,
+    count: int,
+    *,
+    cache: Place = "default",
+    say: Callable[[str], None],
 ) -> Elastic:
-    """An object's. material: isotropic, as fitted; count: of modes wanted. Raises nothing now; SonicBulletError when first asked."""
+    """An object's.
+
+    material: isotropic, as fitted; count: of modes wanted. Raises nothing now; SonicBulletError when first asked.
+    """
     thing = case.objects[name]
 
     @lru_cache(maxsize=1)
@@ -70,7 +99,9 @@ def elastic_of(
         for i, r in enumerate(recordings):
             if r.position_m is not None:
                 direction = np.array(r.direction, float) if r.direction is not None else inward(body, r.position_m)
-                strike[i] = body.points(np.array([r.position_m]), direction[None])[0][0] * (1.0 if r.impulse_n_s is None else r.impulse_n_s)
+                strike[i] = body.points(np.array([r.position_m]), direction[None])[0][0] * (
+                    1.0 if r.impulse_n_s is None else r.impulse_n_s
+                )
         at, along = (None if spots is None else spots.get(name) for spots in (case.sensor_m, case.sensor_direction))
         if case.sensor != "velocity" or at is None:
             return strike, None

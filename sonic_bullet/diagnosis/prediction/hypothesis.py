@@ -1,9 +1,10 @@
 """The model with its effects, played on any strike.
 
-    λ -> corrections -> d = ½(α + βλ) -> MODES -> A = g J (φ(p)·e)(φ(q)·n) · start -> Ring -> BANK -> hits and pulses -> SOUND -> samples
+    λ -> corrections -> d = ½(α + βλ) -> MODES -> A = g J (φ(p)·e)(φ(q)·n) · start -> Ring -> BANK -> hits and pulses ->
+        SOUND -> samples
 
-Every stage hands a value to the next, and effects of a stage act in the order in which they were found, those on a sound in that of its path: what
-rings along with the body sounds in the room, and both through the chain.
+Every stage hands a value to the next, and effects of a stage act in the order in which they were found, those on a
+sound in that of its path: what rings along with the body sounds in the room, and both through the chain.
 """
 
 from __future__ import annotations
@@ -25,9 +26,11 @@ KEPT = 4  # hypotheses and bodies whose modes are remembered
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Hypothesis:
-    """α, β and gain σ of the case, and the effects in it. correction: by object, (m,) relative; absent: the mesh's own frequencies.
+    """α, β and gain σ of the case, and the effects in it. correction: by object, (m,) relative; absent: the mesh's own
+    frequencies.
 
-    stretch: ln of what all frequencies are multiplied with, as E/ρ is fitted again beside effects that move modes; poisson: ν, where it is; else the baseline's.
+    stretch: ln of what all frequencies are multiplied with, as E/ρ is fitted again beside effects that move modes;
+    poisson: ν, where it is; else the baseline's.
     """
 
     alpha_per_s: float
@@ -44,7 +47,9 @@ class Hypothesis:
         return tuple(sorted(mine, key=lambda e: OWNER_ORDER.index(e.owner)) if stage is Stage.SOUND else mine)
 
 
-def ordered(model: ModalModel, freq_hz: Array, decay_per_s: Array, shape: Array | None = None) -> tuple[ModalModel, Array]:
+def ordered(
+    model: ModalModel, freq_hz: Array, decay_per_s: Array, shape: Array | None = None
+) -> tuple[ModalModel, Array]:
     """The model with other modes, ascending, and which mode (m,) went where; overdamped ones are gone."""
     good = np.flatnonzero((freq_hz > 0) & np.isfinite(freq_hz))
     order = good[np.argsort(freq_hz[good], kind="stable")]
@@ -92,7 +97,9 @@ def mixes(h: Hypothesis) -> bool:
 
 @lru_cache(maxsize=KEPT)
 def modes_of(h: Hypothesis, body: Struck) -> tuple[ModalModel, Array]:
-    """The body's damped modes under the hypothesis, and which uncorrected mode each was (m,). Remembered: every strike of a body asks.
+    """The body's damped modes under the hypothesis, and which uncorrected mode each was (m,).
+
+    Remembered: every strike of a body asks.
 
     Corrections come before the effects; where these mix modes, after them, as they were learnt on what came of it.
     """
@@ -114,7 +121,11 @@ def modes_of(h: Hypothesis, body: Struck) -> tuple[ModalModel, Array]:
     for effect in h.at(Stage.BANK, fitted=body.recorded is not None):
         if isinstance(effect, RotatesPairs):  # axes of degenerate pairs
             model = effect.turned(model)
-    return ordered(model, model.freq_hz * (1 + correction[: model.mode_count]), model.decay_per_s) if last else (model, order)
+    return (
+        ordered(model, model.freq_hz * (1 + correction[: model.mode_count]), model.decay_per_s)
+        if last
+        else (model, order)
+    )
 
 
 def came_from(old: ModalModel, new: ModalModel) -> Array:
@@ -166,7 +177,13 @@ def ring_of(h: Hypothesis, body: Struck, strike: int) -> Ring:
     impact = impact_of(h, body, strike)
     none = np.zeros(len(row))
     ring = Ring(
-        model.freq_hz, model.decay_per_s, h.gain * row * start(body.kind, model), np.abs(impact.impulse_n_s * push) * most, none, none, impact.impulse_n_s
+        model.freq_hz,
+        model.decay_per_s,
+        h.gain * row * start(body.kind, model),
+        np.abs(impact.impulse_n_s * push) * most,
+        none,
+        none,
+        impact.impulse_n_s,
     )
     for effect in h.at(Stage.BANK, fitted=body.recorded is not None):
         ring = effect.apply(ring)

@@ -1,8 +1,10 @@
 """Lines in place of recordings: how far the modes of a hypothesis are from a list of measured frequencies and decays.
 
-    D = 20 lg(1 + rms min(|ln f_k/f_j|, CAP)/MESH), its mean with 8.7 rms |ln d_k/d_j| where decays are known       in dB
+    D = 20 lg(1 + rms min(|ln f_k/f_j|, CAP)/MESH), its mean with 8.7 rms |ln d_k/d_j| where decays are known
+        in dB
 
-Lines and modes are paired at the least price. Every fourth line is left out in turn: what was learnt of the others must hold for it.
+Lines and modes are paired at the least price. Every fourth line is left out in turn: what was learnt of the others must
+hold for it.
 """
 
 from __future__ import annotations
@@ -24,7 +26,9 @@ DB = 20 / np.log(10)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Listed:
-    """Some lines (k,) of a body, by index, to be held against what a hypothesis says; the others are there to learn from."""
+    """Some lines (k,) of a body, by index, to be held against what a hypothesis says; the others are there to learn
+    from.
+    """
 
     body: Struck
     line: Array
@@ -51,7 +55,12 @@ class Listed:
         assert self.body.recorded is not None
         lines = self.body.recorded.lines
         sd, decay = np.nan_to_num(lines.freq_sd_hz[self.line]) / lines.freq_hz[self.line], lines.decay_per_s[self.line]
-        return distance_db(sd, np.where(np.isfinite(decay), np.nan_to_num(lines.decay_sd_per_s[self.line]) / np.maximum(decay, 1e-9), np.nan))
+        return distance_db(
+            sd,
+            np.where(
+                np.isfinite(decay), np.nan_to_num(lines.decay_sd_per_s[self.line]) / np.maximum(decay, 1e-9), np.nan
+            ),
+        )
 
     def rest(self, bodies: tuple[Struck, ...], h: Hypothesis) -> tuple[tuple[Struck, ...], Hypothesis]:
         """Bodies without these lines, and the hypothesis without what it learnt of them."""
@@ -73,7 +82,9 @@ def listed(bodies: tuple[Struck, ...]) -> tuple[Listed, ...]:
 
 
 def off_by(h: Hypothesis, body: Struck, freq_hz: Array, decay_per_s: Array) -> tuple[Array, Array]:
-    """|ln f/f_j| (k,), at most CAP, of lines and the modes that fit them best, and |ln d/d_j|, NaN where unknown or unpaired."""
+    """|ln f/f_j| (k,), at most CAP, of lines and the modes that fit them best, and |ln d/d_j|, NaN where unknown or
+    unpaired.
+    """
     from scipy.optimize import linear_sum_assignment
 
     model, _ = modes_of(h, body)
@@ -105,5 +116,8 @@ def _without(body: Struck, line: Array) -> Struck:
     place[keep] = np.arange(len(keep))
     mine = place[body.line]
     return replace(
-        body, recorded=replace(body.recorded, lines=lines_at(body.recorded.lines, keep)), line=mine, correction=np.where(mine >= 0, body.correction, 0.0)
+        body,
+        recorded=replace(body.recorded, lines=lines_at(body.recorded.lines, keep)),
+        line=mine,
+        correction=np.where(mine >= 0, body.correction, 0.0),
     )

@@ -1,6 +1,7 @@
 """The psychoacoustic distance: how much louder or softer each band is, in sone, as an ear would have it.
 
-    Σ over bands |N'_recorded − N'_played|, mean over frames in which the recording is audible       [N': estimator.loudness, ISO 226; bands: Bark]
+    Σ over bands |N'_recorded − N'_played|, mean over frames in which the recording is audible
+        [N': estimator.loudness, ISO 226; bands: Bark]
 
 Full scale stands for FULL_SCALE dB SPL: recordings have no level of their own.
 """

@@ -2,7 +2,8 @@
 
 D(recorded, played + noise), D of two noisy takes of what is played                       (estimator.lines.log_spectral)
 
-comparable(takes, h) is the one door: what has no distance stays outside, by name and with its reason, and what is let in has one from any hypothesis, a plain float:
+comparable(takes, h) is the one door: what has no distance stays outside, by name and with its reason, and what is let
+in has one from any hypothesis, a plain float:
 
     neither stands above the noise   -> EDGE_DB, what noise makes of a sound that just stands above it
     what is played is not finite     -> ∞, farther than whatever can be played
@@ -22,7 +23,8 @@ from sonic_bullet.estimator.fit.recorded import RecordedObject as Recorded
 from sonic_bullet.estimator.lines.log_spectral import ABOVE, WINDOWS, Floor, log_spectral_db, noise_floor_db, with_noise
 from sonic_bullet.records import Array
 
-EDGE_DB = float(20 / np.log(10) / np.sqrt(ABOVE))  # rms of two noisy takes of a cell with power over noise ABOVE: each is off by 20/ln 10/√(2 ABOVE)
+# rms of two noisy takes of a cell with power over noise ABOVE: each is off by 20/ln 10/√(2 ABOVE)
+EDGE_DB = float(20 / np.log(10) / np.sqrt(ABOVE))
 
 
 class Judged(Protocol):
@@ -76,7 +78,9 @@ class Incomparable:
 
 
 def comparable(takes: Sequence[Judged], h: Hypothesis) -> Compared | Incomparable:
-    """Which of the takes have a distance from the hypothesis, and from any other that is held against the same recordings."""
+    """Which of the takes have a distance from the hypothesis, and from any other that is held against the same
+    recordings.
+    """
     why = [take.hindrance(h) for take in takes]
     out = tuple(LeftOut(take.name, reason) for take, reason in zip(takes, why, strict=True) if reason)
     kept = tuple(take for take, reason in zip(takes, why, strict=True) if not reason)
@@ -85,7 +89,8 @@ def comparable(takes: Sequence[Judged], h: Hypothesis) -> Compared | Incomparabl
 
 @dataclass(frozen=True, slots=True)
 class Score:
-    """How far a hypothesis is from what it was held against, and how far it would be from itself, measured again: both in dB, means over the strikes.
+    """How far a hypothesis is from what it was held against, and how far it would be from itself, measured again: both
+    in dB, means over the strikes.
 
     There is one only where there is something comparable; else `comparable` says `Incomparable`.
     """
@@ -111,7 +116,10 @@ class Take:
 
     @property
     def place(self) -> tuple[Recorded, int]:
-        """Where it is in the evidence: among whose strikes, and which of those. Raises ValueError where it was not fitted."""
+        """Where it is in the evidence: among whose strikes, and which of those.
+
+        Raises ValueError where it was not fitted.
+        """
         if self.body.recorded is None:
             raise ValueError(f"{self.body.name} was not fitted")
         return self.body.recorded, self.body.fitted.index(self.strike)

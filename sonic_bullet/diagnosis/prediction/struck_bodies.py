@@ -1,9 +1,11 @@
 """Objects as the diagnosis strikes them: the mesh's own modes at the fitted material, at the strikes and the sensor.
 
-    Family at (γ, ν) -> λ (m,), shapes on the skin and at every strike and the sensor, as last "vertices" of one ModalModel
+    Family at (γ, ν) -> λ (m,), shapes on the skin and at every strike and the sensor, as last "vertices" of one
+        ModalModel
 
-An effect on the modes then changes strikes and sensor along with the body. A sensor without a place (microphone, plain sum) is a last vertex
-whose x component is each mode's weight. Without a mesh the modes are the lines themselves, places as loud as they were recorded.
+An effect on the modes then changes strikes and sensor along with the body. A sensor without a place (microphone, plain
+sum) is a last vertex whose x component is each mode's weight. Without a mesh the modes are the lines themselves, places
+as loud as they were recorded.
 """
 
 from __future__ import annotations
@@ -27,13 +29,15 @@ from sonic_bullet.records import Array, ModalModel
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Struck:
-    """One object and all its strikes. model: undamped, uncorrected; its last s + 1 vertices are the strikes and the sensor.
+    """One object and all its strikes. model: undamped, uncorrected; its last s + 1 vertices are the strikes and the
+    sensor.
 
-    direction (s + 1, 3): directions there, zero for a strike of unknown place. impulse_n_s (s,): NaN where unknown. kind: `Case.sensor`.
-    family: for another elasticity, None without a mesh. correction (m,): relative, of each mode's frequency, learnt on its fitted strikes, else 0.
-    line (m,): the fitted line a mode was paired with, or -1. recorded: its fitted lines and sounds, None for an object nobody fitted.
-    elastic: for tensors, see elastic_bodies.py. band_hz: nothing outside it is recorded, though its modes are in the model: a mesh may have put them there.
-    other: ν -> the model there, of as many modes. poisson: the same, cheap, for a search.
+    direction (s + 1, 3): directions there, zero for a strike of unknown place. impulse_n_s (s,): NaN where unknown.
+    kind: `Case.sensor`. family: for another elasticity, None without a mesh. correction (m,): relative, of each mode's
+    frequency, learnt on its fitted strikes, else 0. line (m,): the fitted line a mode was paired with, or -1. recorded:
+    its fitted lines and sounds, None for an object nobody fitted. elastic: for tensors, see elastic_bodies.py. band_hz:
+    nothing outside it is recorded, though its modes are in the model: a mesh may have put them there. other: ν -> the
+    model there, of as many modes. poisson: the same, cheap, for a search.
     """
 
     name: str
@@ -57,7 +61,9 @@ class Struck:
 
     @property
     def fitted(self) -> list[int]:
-        """Which of the recordings its lines and sounds belong to, in their order: those of the split 'fit' that could be read."""
+        """Which of the recordings its lines and sounds belong to, in their order: those of the split 'fit' that could
+        be read.
+        """
         observed = self.recorded.recordings if self.recorded is not None else ()
         return [i for one in observed for i, r in enumerate(self.recordings) if r is one or r == one]
 
@@ -66,7 +72,9 @@ class Struck:
         return len((model or self.model).vertex_m) - self.strikes - 1
 
 
-def struck_bodies(found: CaseFit, *, cache: Place = "default", progress: Callable[[str], None] | None = None) -> tuple[Struck, ...]:
+def struck_bodies(
+    found: CaseFit, *, cache: Place = "default", progress: Callable[[str], None] | None = None
+) -> tuple[Struck, ...]:
     """Every object of the case, fitted ones first. Raises SonicBulletError."""
     case = found.case
     say = progress or (lambda _: None)
@@ -120,13 +128,35 @@ def _placed(found: CaseFit, name: str, family: Family, density: float, o: Object
 
     nu = Poisson(found.fit.poisson_ratio, guess_of(case.objects[name]).poisson, POISSON_SD, sums)
     recorded = o.evidence if o is not None else None
-    return Struck(name, mine, model, direction, impulse, case.sensor, family, correction, line, recorded, band_hz=case.band_hz, other=other, poisson=nu)
+    return Struck(
+        name,
+        mine,
+        model,
+        direction,
+        impulse,
+        case.sensor,
+        family,
+        correction,
+        line,
+        recorded,
+        band_hz=case.band_hz,
+        other=other,
+        poisson=nu,
+    )
 
 
 def modal_model(
-    case: Case, name: str, recordings: tuple[CaseRecording, ...], family: Family, density: float, value: Array, vector: Array
+    case: Case,
+    name: str,
+    recordings: tuple[CaseRecording, ...],
+    family: Family,
+    density: float,
+    value: Array,
+    vector: Array,
 ) -> tuple[ModalModel, Array]:
-    """The undamped model of modes (b, m) with λ (m,), strikes and sensor as last vertices, and the directions there (s + 1, 3). Raises MeshError."""
+    """The undamped model of modes (b, m) with λ (m,), strikes and sensor as last vertices, and the directions there (s
+    + 1, 3). Raises MeshError.
+    """
     scale = np.sqrt(density * family.length_m**3)
     axes = np.eye(3)
     extra, direction, place = [], [], []
@@ -175,9 +205,13 @@ def inward(family: Family, position: tuple[float, float, float]) -> Array:
 
 
 def shapeless(found: CaseFit, recorded: Recorded) -> Struck:
-    """An object without a mesh: its lines are its modes. Strikes at one place, or at unknown places, share the amplitudes per N·s (rms over them); each other place has its own.
+    """An object without a mesh: its lines are its modes.
 
-    What goes with the place is then nobody's to explain; a strike at a place that no fitted one was at is played as the rms over all.
+    Strikes at one place, or at unknown places, share the amplitudes per N·s (rms over them); each other place has its
+    own.
+
+    What goes with the place is then nobody's to explain; a strike at a place that no fitted one was at is played as the
+    rms over all.
     """
     lines = recorded.lines
     mine = tuple(r for r in found.case.recordings if r.object == recorded.thing.name)
@@ -189,13 +223,27 @@ def shapeless(found: CaseFit, recorded: Recorded) -> Struck:
     for place in {(r.position_m, r.direction) for r in recorded.recordings if r.position_m is not None}:
         here = np.array([(r.position_m, r.direction) == place for r in recorded.recordings])
         own = amplitude_per_impulse(recorded, here) * np.where(np.nansum(lines.amplitude[here].real, axis=0) < 0, -1, 1)
-        shape[[i for i, r in enumerate(mine) if (r.position_m, r.direction) == place], 0] = np.nan_to_num(own / np.maximum(weight, 1e-300))
+        shape[[i for i, r in enumerate(mine) if (r.position_m, r.direction) == place], 0] = np.nan_to_num(
+            own / np.maximum(weight, 1e-300)
+        )
     direction = np.tile([1.0, 0, 0], (len(mine) + 1, 1))
     undamped = np.hypot(2 * np.pi * lines.freq_hz, np.nan_to_num(lines.decay_per_s)) / (2 * np.pi)
     order = np.argsort(undamped)
     empty = np.zeros((0, 3))
-    model = ModalModel(undamped[order], np.zeros(len(order)), shape[:, :, order], np.zeros((len(shape), 3)), empty, np.zeros(0), 0.0, 0.0, note="no mesh")
-    return Struck(recorded.thing.name, mine, model, direction, impulse, "lines", None, np.zeros(len(order)), order, recorded)
+    model = ModalModel(
+        undamped[order],
+        np.zeros(len(order)),
+        shape[:, :, order],
+        np.zeros((len(shape), 3)),
+        empty,
+        np.zeros(0),
+        0.0,
+        0.0,
+        note="no mesh",
+    )
+    return Struck(
+        recorded.thing.name, mine, model, direction, impulse, "lines", None, np.zeros(len(order)), order, recorded
+    )
 
 
 def amplitude_per_impulse(recorded: Recorded, of: Array | None = None) -> Array:

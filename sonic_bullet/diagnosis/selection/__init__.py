@@ -1,1 +1,3 @@
-"""Which effects are accepted: stepwise and pairwise selection, cross-validation against control effects, tests by phase and decay."""
+"""Which effects are accepted: stepwise and pairwise selection, cross-validation against control effects, tests by phase
+and decay.
+"""

@@ -2,11 +2,13 @@
 
 Accepted is what gains, on strikes left out, in the mean, each by the record of thresholds (thresholds.py):
 
-    more than is needed                     least_drop_db, and least_drop_share of the gap; less where nothing is found yet and the gap is narrow
+    more than is needed
+        least_drop_db, and least_drop_share of the gap; less where nothing is found yet and the gap is narrow
     significantly more than nothing         standard_errors; or none of many_strikes loses, two of them gaining as much
     significantly more than a control       an effect of as many numbers that means nothing
 
-Of more than many_strikes strikes that gain much one may be odd. What depends on amplitude may be shown by the loudest strikes alone.
+Of more than many_strikes strikes that gain much one may be odd. What depends on amplitude may be shown by the loudest
+strikes alone.
 """
 
 from __future__ import annotations
@@ -24,11 +26,14 @@ from sonic_bullet.effects.protocol import Effect
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Candidate:
-    """A candidate effect after cross-validation. effect: fitted to all evidence. drop_db (s,): of each left-out strike's distance, less what corrections learnt again would gain
-    alone where it moves modes; of the first_strikes alone where it could not be accepted any more. whole_db: mean with that in it, by which candidates are ordered. control_db: mean over strikes and draws.
+    """A candidate effect after cross-validation. effect: fitted to all evidence. drop_db (s,): of each left-out
+    strike's distance, less what corrections learnt again would gain alone where it moves modes; of the first_strikes
+    alone where it could not be accepted any more. whole_db: mean with that in it, by which candidates are ordered.
+    control_db: mean over strikes and draws.
 
-    Its axes of degenerate pairs, if it has any, are from all fitted strikes. spread: of each number in its parameters over the folds (jackknife). lines: by how much lines left
-    out are likelier with it (decay_test.py). impulse_n_s (s,): of the strikes.
+    Its axes of degenerate pairs, if it has any, are from all fitted strikes. spread: of each number in its parameters
+    over the folds (jackknife). lines: by how much lines left out are likelier with it (decay_test.py). impulse_n_s
+    (s,): of the strikes.
     """
 
     id: str
@@ -53,7 +58,10 @@ class Candidate:
     @property
     def loud(self) -> bool:
         """Whether the strike that gains most is one of the loudest_strikes."""
-        return len(self.impulse_n_s) == len(self.drop_db) and int(self.drop_db.argmax()) in np.argsort(-self.impulse_n_s)[: RULES.loudest_strikes]
+        return (
+            len(self.impulse_n_s) == len(self.drop_db)
+            and int(self.drop_db.argmax()) in np.argsort(-self.impulse_n_s)[: RULES.loudest_strikes]
+        )
 
     @property
     def sd_db(self) -> float:
@@ -67,14 +75,19 @@ def mean(x: Sequence[float] | np.ndarray[Any, Any]) -> float:
 
 
 def needed(gap_db: float, *, first: bool, certain: bool = False) -> float:
-    """Of a drop, in dB: least_drop_db; less where that is most of what has ever been open (first: nothing is found yet), more where much is.
+    """Of a drop, in dB: least_drop_db; less where that is most of what has ever been open (first: nothing is found
+    yet), more where much is.
 
-    certain: lines agreed on it, each by its own frames, before it was proposed; then strikes left out need only say the same.
+    certain: lines agreed on it, each by its own frames, before it was proposed; then strikes left out need only say the
+    same.
 
     What little an effect leaves of a wide gap may be its own fit's.
     """
     faint, share = (RULES.certain_drop_db, RULES.certain_share) if certain else (RULES.faint_drop_db, RULES.faint_share)
-    return max(min(RULES.least_drop_db, max(faint, share * gap_db)) if first else RULES.least_drop_db, RULES.least_drop_share * gap_db)
+    return max(
+        min(RULES.least_drop_db, max(faint, share * gap_db)) if first else RULES.least_drop_db,
+        RULES.least_drop_share * gap_db,
+    )
 
 
 def accepted(c: Candidate, gap_db: float, *, first: bool) -> bool:
@@ -87,8 +100,11 @@ def accepted(c: Candidate, gap_db: float, *, first: bool) -> bool:
     more = c.whole_db - max(c.control_db, 0.0)  # a control effect is not held against corrections either
     drop = np.sort(c.drop_db)
     if c.certain and c.loud and -np.minimum(drop, 0).sum() < RULES.lost_share * drop[-1]:
-        return more > RULES.chance_share * need  # what goes with level is for the loudest to show, which these others were fitted without
-    if len(drop) > RULES.many_strikes and drop[1:].mean() > RULES.odd_strike_factor * max(need, needed(gap_db, first=first)):
+        # what goes with level is for the loudest to show, which these others were fitted without
+        return more > RULES.chance_share * need
+    if len(drop) > RULES.many_strikes and drop[1:].mean() > RULES.odd_strike_factor * max(
+        need, needed(gap_db, first=first)
+    ):
         drop = drop[1:]  # one strike may be odd: what it alone shows, none of the others did
     sd = float(drop.std(ddof=1) / np.sqrt(len(drop)))
     if (
@@ -96,18 +112,25 @@ def accepted(c: Candidate, gap_db: float, *, first: bool) -> bool:
         and drop[0] > -max(RULES.loss_share * drop.mean(), RULES.noise_db)
         and (drop[-2] > need or (first and c.certain and c.loud))
     ):
-        return more > RULES.chance_share * need  # no strike speaks against it, though loud ones may gain far more than soft ones
-    return bool(drop.mean() > RULES.standard_errors * sd) and more > max(RULES.standard_errors * sd, RULES.chance_share * need)
+        # no strike speaks against it, though loud ones may gain far more than soft ones
+        return more > RULES.chance_share * need
+    return bool(drop.mean() > RULES.standard_errors * sd) and more > max(
+        RULES.standard_errors * sd, RULES.chance_share * need
+    )
 
 
 def may_be_accepted(asked: Candidate, open_db: np.ndarray[Any, Any], gap_db: float) -> bool:
     """Whether a candidate could still be accepted that has been asked on the first few strikes alone.
 
-    open_db (s,): the most it may gain on each; of those that it has not been asked on it may gain that, or less where that suits it: alike is surer than much.
-    Of drops at most m_i the mean over its standard error is largest at min(m_i, c) for some c, so caps_tried of these are tried; loud strikes may gain most.
-    asked.impulse_n_s (s,): of all.
+    open_db (s,): the most it may gain on each; of those that it has not been asked on it may gain that, or less where
+    that suits it: alike is surer than much. Of drops at most m_i the mean over its standard error is largest at
+    min(m_i, c) for some c, so caps_tried of these are tried; loud strikes may gain most. asked.impulse_n_s (s,): of
+    all.
     """
-    first, loud = len(asked.drop_db), np.isin(np.arange(len(open_db)), np.argsort(-asked.impulse_n_s)[: RULES.loudest_strikes])
+    first, loud = (
+        len(asked.drop_db),
+        np.isin(np.arange(len(open_db)), np.argsort(-asked.impulse_n_s)[: RULES.loudest_strikes]),
+    )
     for cap in (np.inf, *np.linspace(0.0, max(float(open_db.max()), 0.0), RULES.caps_tried)[1:]):
         for free in (np.zeros(len(open_db), bool), loud):
             drop = np.where(free, open_db, np.minimum(open_db, cap))
@@ -118,7 +141,10 @@ def may_be_accepted(asked: Candidate, open_db: np.ndarray[Any, Any], gap_db: flo
 
 
 def jackknife(rows: list[dict[str, Any]]) -> dict[str, Any]:
-    """Standard errors of every number that all folds give [Efron & Tibshirani 1993, eq. 11.5]; numbers in lists of one length each their own."""
+    """Standard errors of every number that all folds give [Efron & Tibshirani 1993, eq.
+
+    11.5]; numbers in lists of one length each their own.
+    """
     if len(rows) < 2:
         return {}
     found: dict[str, Any] = {}

@@ -1,11 +1,15 @@
-"""Whether what is played is as loud as what was recorded, band by band: a mean distance over all cells blurs what one band lacks, and what is absent has no line.
+"""Whether what is played is as loud as what was recorded, band by band: a mean distance over all cells blurs what one
+band lacks, and what is absent has no line.
 
-    d_sb = 10 lg Σ|R|² / Σ(|P|² + N)   over the cells of a band b, the first early_s and the rest apart;   third octaves that overlap by half
-    off:  |mean_s d| > band_apart_db  and  > standard_errors standard errors,   over the strikes s in which either stands ABOVE over the noise N
+    d_sb = 10 lg Σ|R|² / Σ(|P|² + N)   over the cells of a band b, the first early_s and the rest apart;
+        third octaves that overlap by half
+    off:  |mean_s d| > band_apart_db  and  > standard_errors standard errors,
+        over the strikes s in which either stands ABOVE over the noise N
 
-A correction may put a mode CORRECTION away, over a band's edge, and a window spreads it over lobe_cells cells to each side: recorded is more only where it is more than what is
-played so much beyond the band, too, and the other way round.
-Each band has the shortest window that keeps band_cells cells in it. No effect is looked for here: it only takes away the comfort of a verdict `none`.
+A correction may put a mode CORRECTION away, over a band's edge, and a window spreads it over lobe_cells cells to each
+side: recorded is more only where it is more than what is played so much beyond the band, too, and the other way round.
+Each band has the shortest window that keeps band_cells cells in it. No effect is looked for here: it only takes away
+the comfort of a verdict `none`.
 """
 
 from __future__ import annotations
@@ -30,7 +34,10 @@ SHOWN = 4  # in words
 
 @dataclass(frozen=True, slots=True)
 class BandOff:
-    """A band, in the first early_s or after, in which the mean over strikes of recorded over played is off. standard_error_db: of that mean."""
+    """A band, in the first early_s or after, in which the mean over strikes of recorded over played is off.
+
+    standard_error_db: of that mean.
+    """
 
     from_hz: float
     to_hz: float
@@ -41,20 +48,34 @@ class BandOff:
 
     def __str__(self) -> str:
         less = "less" if self.recorded_over_played_db < 0 else "more"
-        when = f"in the first {1000 * RULES.early_s:.0f} ms" if self.early else f"after the first {1000 * RULES.early_s:.0f} ms"
+        when = (
+            f"in the first {1000 * RULES.early_s:.0f} ms"
+            if self.early
+            else f"after the first {1000 * RULES.early_s:.0f} ms"
+        )
         where = f"between {self.from_hz / 1000:.2g} and {self.to_hz / 1000:.2g} kHz"
         strikes = "1 strike" if self.strikes == 1 else f"{self.strikes} strikes"
         return f"recorded {abs(self.recorded_over_played_db):.1f} dB {less} than played {where} {when}, {strikes}"
 
 
 def bands_off(h: Hypothesis, takes: Sequence[Judged]) -> tuple[BandOff, ...]:
-    """The bands in which what the hypothesis plays is not as loud as what was recorded. Lists of lines have no levels."""
-    rows = [over_db(t.sample, play(h, t.body, t.strike, len(t.sample), t.sr), t.sr, t.floor, t.body.band_hz) for t in takes if isinstance(t, Take)]
+    """The bands in which what the hypothesis plays is not as loud as what was recorded.
+
+    Lists of lines have no levels.
+    """
+    rows = [
+        over_db(t.sample, play(h, t.body, t.strike, len(t.sample), t.sr), t.sr, t.floor, t.body.band_hz)
+        for t in takes
+        if isinstance(t, Take)
+    ]
     return off_in(np.array(rows)) if rows else ()
 
 
 def over_db(recorded: Array, played: Array, sr: int, floor: Floor, band_hz: tuple[float, float]) -> Array:
-    """Recorded over played (2, b) in dB, in the first early_s and in the rest, of the bands around CENTRE_HZ; NaN where neither stands above the noise, or a band holds too few cells."""
+    """Recorded over played (2, b) in dB, in the first early_s and in the rest, of the bands around CENTRE_HZ;
+
+    NaN where neither stands above the noise, or a band holds too few cells.
+    """
     early = round(RULES.early_s * sr)
     parts = [(x[:early], x[early:]) for x in (recorded, played)]
     return np.array([_over_db(a, b, sr, floor, band_hz) for a, b in zip(*parts, strict=True)])
@@ -71,7 +92,9 @@ def _over_db(recorded: Array, played: Array, sr: int, floor: Floor, band_hz: tup
         cell, mine = sr / w, (low[who], high[who])
         edge = np.maximum(RULES.lobe_cells * cell, CORRECTION * CENTRE_HZ[who])
         beyond = (mine[0] - edge, mine[1] + edge)
-        (a, near_a), (b, near_b) = ((_within(p, *mine, cell), _within(p, *beyond, cell)) for p in (_power(recorded, w), _power(played, w)))
+        (a, near_a), (b, near_b) = (
+            (_within(p, *mine, cell), _within(p, *beyond, cell)) for p in (_power(recorded, w), _power(played, w))
+        )
         n = _within(floor.at(w // 2 + 1) * (np.hanning(w) ** 2).sum() * _frames(len(recorded), w), *mine, cell)
         more, less = 10 * np.log10(np.maximum(a, n) / (near_b + n)), 10 * np.log10(np.maximum(near_a, n) / (b + n))
         found[who] = np.where((a > ABOVE * n) | (b > ABOVE * n), np.maximum(more, 0) + np.minimum(less, 0), np.nan)
@@ -104,12 +127,23 @@ def off_in(over: Array) -> tuple[BandOff, ...]:
         own = float(d.std(ddof=1)) if len(d) > 1 else 0.0
         error = (own if len(d) >= RULES.own_scatter_strikes else max(own, usual)) / np.sqrt(len(d))
         if abs(d.mean()) > max(RULES.band_apart_db, RULES.standard_errors * error):
-            found.append(BandOff(float(CENTRE_HZ[b] / HALF), float(CENTRE_HZ[b] * HALF), part == 0, float(d.mean()), float(error), len(d)))
+            found.append(
+                BandOff(
+                    float(CENTRE_HZ[b] / HALF),
+                    float(CENTRE_HZ[b] * HALF),
+                    part == 0,
+                    float(d.mean()),
+                    float(error),
+                    len(d),
+                )
+            )
     return tuple(found)
 
 
 def _scatter_db(over: Array) -> float:
-    """How far one strike is from a band's mean, over all bands (s, 2, b); of one strike alone how far its bands are from each other; ∞ of one band of one strike."""
+    """How far one strike is from a band's mean, over all bands (s, 2, b); of one strike alone how far its bands are
+    from each other; ∞ of one band of one strike.
+    """
     seen = np.isfinite(over)
     count = seen.sum(axis=0)
     free = int(np.maximum(count - 1, 0).sum())
@@ -124,7 +158,12 @@ def in_words(bands: Sequence[BandOff]) -> str:
     runs: list[list[BandOff]] = []
     for band in bands:
         last = runs[-1][-1] if runs else None
-        one = last is not None and last.early == band.early and last.to_hz > band.from_hz and last.recorded_over_played_db * band.recorded_over_played_db > 0
+        one = (
+            last is not None
+            and last.early == band.early
+            and last.to_hz > band.from_hz
+            and last.recorded_over_played_db * band.recorded_over_played_db > 0
+        )
         runs = [*runs[:-1], [*runs[-1], band]] if one else [*runs, [band]]
     runs = sorted(runs, key=lambda run: -max(abs(band.recorded_over_played_db) for band in run))
     said = [_said(run) for run in runs[:SHOWN]]

@@ -1,10 +1,13 @@
 """How much of what is open no body of real modes plays: no sum of lines whose phases are the same at every strike.
 
-    A_ks = J_s Φ_k(x_s) |F̂_s| e^{iθ_k − 2πi f_k D_s}, but for its sign:    |Σ_s a²|/Σ_s |a|² = 1,   a = A e^{2πi f D_s}/|A_s|      [real modes: Ewins 2000, ch. 2]
+    A_ks = J_s Φ_k(x_s) |F̂_s| e^{iθ_k − 2πi f_k D_s}, but for its sign:    |Σ_s a²|/Σ_s |a|² = 1,   a = A e^{2πi f
+        D_s}/|A_s|      [real modes: Ewins 2000, ch. 2]
 
-One phase a line and one delay a strike, the middle of its pulse. Whatever a mesh gets wrong, that stays so, wherever and however hard a body is struck once. A level that swings, a part that
-rattles or an echo that moves makes lines of its own, side by side with the modes', that the fit identifies and that are out of phase, and a mode that goes with its level is no line at all. Nor do pairs too near each other to be told apart, modes that dashpots
-couple, and what a room rings at: a verdict asks here only before it puts down to a mesh what nothing explains.
+One phase a line and one delay a strike, the middle of its pulse. Whatever a mesh gets wrong, that stays so, wherever
+and however hard a body is struck once. A level that swings, a part that rattles or an echo that moves makes lines of
+its own, side by side with the modes', that the fit identifies and that are out of phase, and a mode that goes with its
+level is no line at all. Nor do pairs too near each other to be told apart, modes that dashpots couple, and what a room
+rings at: a verdict asks here only before it puts down to a mesh what nothing explains.
 """
 
 from __future__ import annotations
@@ -25,7 +28,9 @@ SWEEPS = 3
 
 
 def out_of_phase(lines: Lines) -> Array:
-    """Which lines (k,) have phases that differ between strikes by more than a sign and a delay; none where onsets are not known, or of one strike."""
+    """Which lines (k,) have phases that differ between strikes by more than a sign and a delay; none where onsets are
+    not known, or of one strike.
+    """
     loud = np.linalg.norm(lines.amplitude, axis=1, keepdims=True)
     a = lines.amplitude / np.maximum(loud, 1e-300)  # every strike has as much to say, however soft
     noise = 2 * ((lines.amplitude_sd / np.maximum(loud, 1e-300)) ** 2).sum(axis=0)
@@ -34,7 +39,9 @@ def out_of_phase(lines: Lines) -> Array:
 
 
 def _in_time(a: Array, freq_hz: Array) -> Array:
-    """Amplitudes (s, k) without one delay a strike, found by all lines together: each against the phases of the others, in turns."""
+    """Amplitudes (s, k) without one delay a strike, found by all lines together: each against the phases of the others,
+    in turns.
+    """
     turn = np.exp(4j * np.pi * np.outer(DELAY_S, freq_hz))  # of a²
     for _ in range(SWEEPS):
         for s in range(len(a)):
@@ -45,7 +52,9 @@ def _in_time(a: Array, freq_hz: Array) -> Array:
 
 
 def of_no_body(h: Hypothesis, takes: Sequence[Judged]) -> float:
-    """Of the squared distance between strikes and h, over noise alone, the share that the strikes' own lines leave, those that are in phase: 0 to 1."""
+    """Of the squared distance between strikes and h, over noise alone, the share that the strikes' own lines leave,
+    those that are in phase: 0 to 1.
+    """
     observed = [take for take in takes if isinstance(take, Take)]
     played = {id(g): _played(g) for g in {id(t.place[0]): t.place[0] for t in observed}.values()}
     left, gap = 0.0, 0.0
@@ -60,7 +69,11 @@ def _played(g: Recorded) -> Array:
     """What the lines that are in phase play (s, n), identified without the others where there are others."""
     assert g.signals is not None
     odd = out_of_phase(g.lines)
-    lines = lines_of(g.signals, noise_rms(g.signals, g.sr), g.lines.pole[~odd], g.sr, g.lines.signed) if odd.any() else g.lines
+    lines = (
+        lines_of(g.signals, noise_rms(g.signals, g.sr), g.lines.pole[~odd], g.sr, g.lines.signed)
+        if odd.any()
+        else g.lines
+    )
     return _sum(lines, g.signals.shape[1], g.sr)
 
 

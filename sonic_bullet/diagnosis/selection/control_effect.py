@@ -1,6 +1,8 @@
-"""The control effect: as many numbers as a candidate effect has, spent where nothing is known to act, so what they gain is chance.
+"""The control effect: as many numbers as a candidate effect has, spent where nothing is known to act, so what they gain
+is chance.
 
-ln d and ln level of every mode += Σ_i amount_i v_ik,   v random directions of the modes, amounts by least squares on the same evidence
+ln d and ln level of every mode += Σ_i amount_i v_ik,
+    v random directions of the modes, amounts by least squares on the same evidence
 """
 
 from __future__ import annotations
@@ -33,7 +35,11 @@ class ControlEffect:
         half = (len(self.amount) + 1) // 2
         decay = x.decay_per_s * np.exp(np.clip(np.array(self.amount[:half]) @ direction[:half], -3, 3))
         shape = x.shape.copy()
-        shape[-1] *= np.exp(np.clip(np.array(self.amount[half:]) @ direction[half:], -3, 3)).astype(np.float32) if len(direction) > half else np.float32(1)
+        shape[-1] *= (
+            np.exp(np.clip(np.array(self.amount[half:]) @ direction[half:], -3, 3)).astype(np.float32)
+            if len(direction) > half
+            else np.float32(1)
+        )
         return replace(x, decay_per_s=decay, shape=shape)
 
     def parameters(self) -> dict[str, Any]:
@@ -61,7 +67,11 @@ class ControlEffect:
         size = np.log(np.maximum(np.abs(h.amplitude), 1e-12) / np.maximum(np.abs(h.expected), 1e-12))
         z = np.nan_to_num(np.median(size, axis=0))
         a = np.linalg.lstsq(direction[:half, member].T, np.nan_to_num(y), rcond=None)[0]
-        b = np.linalg.lstsq(direction[half:, member].T, z - np.median(z), rcond=None)[0] if freedom > half else np.zeros(0)
+        b = (
+            np.linalg.lstsq(direction[half:, member].T, z - np.median(z), rcond=None)[0]
+            if freedom > half
+            else np.zeros(0)
+        )
         return cls(tuple(float(v) for v in np.concatenate([a, b])), seed)
 
 

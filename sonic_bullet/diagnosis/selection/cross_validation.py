@@ -1,11 +1,14 @@
-"""Candidate effects under cross-validation: each fitted without one strike and a part of the lines, judged on that strike; control effects alike.
+"""Candidate effects under cross-validation: each fitted without one strike and a part of the lines, judged on that
+strike; control effects alike.
 
-    for every strike s:  evidence − s − some lines (none, where an effect has numbers of single lines) -> propose -> refit α, β, σ -> D(s)    against the same without the effect
-    control effect: as many numbers, spent on directions drawn at random in the modes' decays and levels, fitted to the same evidence
+    for every strike s:  evidence − s − some lines (none, where an effect has numbers of single lines) -> propose ->
+        refit α, β, σ -> D(s)    against the same without the effect
+    control effect: as many numbers, spent on directions drawn at random in the modes' decays and levels, fitted to the
+        same evidence
 
-Leaving out lines matters: decays and shapes belong to the body, so every strike shows them, and a pattern fitted to them by chance would pass.
-Corrections of frequencies, and the axes of amplitude-dependent pairs, only mend what a mesh leaves to chance: all fitted strikes determine those, once, and the control has no numbers
-for them.
+Leaving out lines matters: decays and shapes belong to the body, so every strike shows them, and a pattern fitted to
+them by chance would pass. Corrections of frequencies, and the axes of amplitude-dependent pairs, only mend what a mesh
+leaves to chance: all fitted strikes determine those, once, and the control has no numbers for them.
 """
 
 from __future__ import annotations
@@ -33,8 +36,13 @@ from sonic_bullet.effects.protocol import Cost, Dereverberates, Effect, Evidence
 from sonic_bullet.parallel import parallel_map
 
 
-def cross_validated(h: Hypothesis, problem: DiagnosisProblem, evidence: Evidence, *, costly: bool = True) -> list[Candidate]:
-    """Every candidate of the problem that the whole evidence suggests, cross-validated; best first. costly: whether those that take long are asked, and that search once enough_effects have been found."""
+def cross_validated(
+    h: Hypothesis, problem: DiagnosisProblem, evidence: Evidence, *, costly: bool = True
+) -> list[Candidate]:
+    """Every candidate of the problem that the whole evidence suggests, cross-validated; best first.
+
+    costly: whether those that take long are asked, and that search once enough_effects have been found.
+    """
     found: list[Candidate] = []
     if len(problem.takes) < 2:
         return found  # nothing can be left out
@@ -49,13 +57,24 @@ def cross_validated(h: Hypothesis, problem: DiagnosisProblem, evidence: Evidence
     gap = mean([f.before - f.noise for f in folds])
     idle = not costly and len(evidence.found) >= RULES.enough_effects
     dry = any(one.dry for one in evidence.observed)
-    kinds = [kind for kind in problem.effects if kind.id not in evidence.found and not (idle and kind.traits.cost is Cost.SEARCHES)]
+    kinds = [
+        kind
+        for kind in problem.effects
+        if kind.id not in evidence.found and not (idle and kind.traits.cost is Cost.SEARCHES)
+    ]
     for group in _groups(kinds, late=dry and costly):
         if any(isinstance(c.effect, Dereverberates) and accepted(c, gap, first=not evidence.found) for c in found):
             break  # what others say of lines that a room has made is hearsay: in the next round they are dereverberated
-        if dry and mixes_neighbours(group[0]) and len(kinds) > len(group) and any(c.effect.stage is Stage.MATERIAL for c in found):
+        if (
+            dry
+            and mixes_neighbours(group[0])
+            and len(kinds) > len(group)
+            and any(c.effect.stage is Stage.MATERIAL for c in found)
+        ):
             continue  # lines that were paired with another material's modes tell little of what mixes these
-        if group[0].traits.cost is Cost.COSTLY and (not costly or any(c.mean_db > RULES.cheap_share * gap for c in found)):
+        if group[0].traits.cost is Cost.COSTLY and (
+            not costly or any(c.mean_db > RULES.cheap_share * gap for c in found)
+        ):
             continue  # something cheap says most of it: what is left may ask for more in the next round
         if group[0].traits.cost is Cost.COSTLY:
             problem.say(f"searching for {group[0].id}")
@@ -67,7 +86,13 @@ def cross_validated(h: Hypothesis, problem: DiagnosisProblem, evidence: Evidence
             alone = replace(h, effects=(whole,))
             by_line = kind.traits.by_line
             plain = whole_lines() if by_line else folds
-            known = fair(by_line) if moves(alone) and not moves(h) else still(by_line) if bends(alone) and not bends(h) else plain
+            known = (
+                fair(by_line)
+                if moves(alone) and not moves(h)
+                else still(by_line)
+                if bends(alone) and not bends(h)
+                else plain
+            )
             found.append(_cross_validated(kind, whole, h, problem.bodies, evidence, known))
     return sorted(found, key=lambda c: -c.whole_db)
 
@@ -81,7 +106,9 @@ def _proposed(group: list[type[Effect]], evidence: Evidence) -> dict[type[Effect
 
 
 def _groups(kinds: list[type[Effect]], *, late: bool) -> list[list[type[Effect]]]:
-    """Rooms, whose echoes would mislead the others; what is cheap; and what takes long, one by one; then those that come last."""
+    """Rooms, whose echoes would mislead the others; what is cheap; and what takes long, one by one; then those that
+    come last.
+    """
     rooms: list[type[Effect]] = [k for k in kinds if issubclass(k, Dereverberates)]
     last = [k for k in kinds if late and mixes_neighbours(k)]
     dear = [k for k in kinds if k not in rooms + last and k.traits.cost is Cost.COSTLY]
@@ -92,9 +119,11 @@ def _groups(kinds: list[type[Effect]], *, late: bool) -> list[list[type[Effect]]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Fold:
-    """What is left to learn from once ``take`` is left out: bodies, evidence, the hypothesis refitted to it, and its distance to the take.
+    """What is left to learn from once ``take`` is left out: bodies, evidence, the hypothesis refitted to it, and its
+    distance to the take.
 
-    least: the same distance, or a lesser one that corrections alone come to where they are learnt again. noise: what noise alone makes.
+    least: the same distance, or a lesser one that corrections alone come to where they are learnt again. noise: what
+    noise alone makes.
     """
 
     take: Judged
@@ -106,8 +135,12 @@ class Fold:
     noise: float
 
 
-def _folds(h: Hypothesis, problem: DiagnosisProblem, evidence: Evidence, *, keep: float = RULES.kept_lines_share) -> list[Fold]:
-    """Without one strike each, and with a part of the lines, keep of them: all for an effect with numbers of single lines, which other lines do not determine and other strikes do."""
+def _folds(
+    h: Hypothesis, problem: DiagnosisProblem, evidence: Evidence, *, keep: float = RULES.kept_lines_share
+) -> list[Fold]:
+    """Without one strike each, and with a part of the lines, keep of them: all for an effect with numbers of single
+    lines, which other lines do not determine and other strikes do.
+    """
     rng = np.random.default_rng([problem.seed, 1])
     made = []
     for take in problem.takes:
@@ -125,7 +158,9 @@ def _folds(h: Hypothesis, problem: DiagnosisProblem, evidence: Evidence, *, keep
 
 
 def _learnt_anew(every: Hypothesis, folds: list[Fold]) -> list[Fold]:
-    """Folds that know what is gained by corrections alone, learnt again as they are beside whatever moves modes: that is no effect's gain. every: by all strikes."""
+    """Folds that know what is gained by corrections alone, learnt again as they are beside whatever moves modes: that
+    is no effect's gain. every: by all strikes.
+    """
 
     def least(f: Fold) -> float:
         again = refitted(f.base, f.bodies, anew=True) if isinstance(f.take, Listed) else every
@@ -135,16 +170,23 @@ def _learnt_anew(every: Hypothesis, folds: list[Fold]) -> list[Fold]:
 
 
 def _at_rest_folds(folds: list[Fold]) -> list[Fold]:
-    """Folds that know what is gained by corrections alone, learnt from what modes ring down to as they are beside whatever makes them depend on amplitude."""
+    """Folds that know what is gained by corrections alone, learnt from what modes ring down to as they are beside
+    whatever makes them depend on amplitude.
+    """
     return [
-        replace(f, least=min(f.before, f.take.distance(at_rest(f.base, f.bodies, f.evidence.observed, every=True)))) if isinstance(f.take, Take) else f
+        replace(f, least=min(f.before, f.take.distance(at_rest(f.base, f.bodies, f.evidence.observed, every=True))))
+        if isinstance(f.take, Take)
+        else f
         for f in folds
     ]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Gain:
-    """On one left-out strike, of an effect fitted without it, if any came of that: as Candidate has them; control_db (n,): of every draw."""
+    """On one left-out strike, of an effect fitted without it, if any came of that: as Candidate has them;
+
+    control_db (n,): of every draw.
+    """
 
     effect: Effect | None = None
     drop_db: float = 0.0
@@ -153,32 +195,57 @@ class Gain:
     lines: float = 0.0
 
 
-def _cross_validated(kind: type[Effect], whole: Effect, h: Hypothesis, bodies: tuple[Struck, ...], evidence: Evidence, folds: list[Fold]) -> Candidate:
+def _cross_validated(
+    kind: type[Effect], whole: Effect, h: Hypothesis, bodies: tuple[Struck, ...], evidence: Evidence, folds: list[Fold]
+) -> Candidate:
     def judged(i: int) -> Gain:
         fold = folds[i]
         less = fold.evidence
         effect = kind.propose(replace(less, known=whole, on_trial=True))
         if effect is None:
             return Gain()
-        free = effect.freedom() - (effect.angles() if isinstance(effect, RotatesPairs) else 0)  # such axes are whole's (Evidence.on_trial)
-        random = [ControlEffect.fitted(less, min(free, RULES.control_numbers), 10 * i + draw) for draw in range(RULES.control_draws)]
+        # such axes are whole's (Evidence.on_trial)
+        free = effect.freedom() - (effect.angles() if isinstance(effect, RotatesPairs) else 0)
+        random = [
+            ControlEffect.fitted(less, min(free, RULES.control_numbers), 10 * i + draw)
+            for draw in range(RULES.control_draws)
+        ]
         augmented = _augmented(fold, effect)
         after = fold.take.distance(augmented)
         chance = tuple(fold.before - fold.take.distance(_augmented(fold, none)) for none in random if none is not None)
-        lines = likelier(fold.base, augmented, evidence, less, bodies) if isinstance(fold.take, Take) and tells(h, effect) else 0.0
+        lines = (
+            likelier(fold.base, augmented, evidence, less, bodies)
+            if isinstance(fold.take, Take) and tells(h, effect)
+            else 0.0
+        )
         return Gain(effect, fold.least - after, fold.before - after, chance, lines)
 
     found = parallel_map(judged, range(min(RULES.first_strikes, len(folds))))
     asked = Candidate(kind.id, whole, h, np.array([g.drop_db for g in found]), 0.0, 0.0, {}, impulse_n_s=_levels(folds))
-    if may_be_accepted(asked, np.array([f.least - f.noise for f in folds]), mean([f.before - f.noise for f in folds])) or tells(
-        h, whole
-    ):  # lines may speak for what strikes do not
+    if may_be_accepted(
+        asked, np.array([f.least - f.noise for f in folds]), mean([f.before - f.noise for f in folds])
+    ) or tells(h, whole):  # lines may speak for what strikes do not
         found += parallel_map(judged, range(len(found), len(folds)))
     added = refitted(replace(h, effects=(*h.effects, whole)), bodies, evidence.observed)
-    drop, whole_db, control_db = np.array([g.drop_db for g in found]), mean([g.whole_db for g in found]), mean([x for g in found for x in g.control_db])
-    lines = mean([g.lines for g in found]) / (1 - RULES.kept_lines_share)  # each line is left out in so many of the folds
+    drop, whole_db, control_db = (
+        np.array([g.drop_db for g in found]),
+        mean([g.whole_db for g in found]),
+        mean([x for g in found for x in g.control_db]),
+    )
+    # each line is left out in so many of the folds
+    lines = mean([g.lines for g in found]) / (1 - RULES.kept_lines_share)
     level = _levels(folds[: len(found)])
-    return Candidate(kind.id, whole, added, drop, whole_db, control_db, jackknife([g.effect.parameters() for g in found if g.effect is not None]), lines, level)
+    return Candidate(
+        kind.id,
+        whole,
+        added,
+        drop,
+        whole_db,
+        control_db,
+        jackknife([g.effect.parameters() for g in found if g.effect is not None]),
+        lines,
+        level,
+    )
 
 
 def _levels(folds: Sequence[Fold]) -> np.ndarray[Any, Any]:

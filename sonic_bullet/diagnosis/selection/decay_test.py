@@ -1,9 +1,13 @@
-"""What lines' decays say of candidate effects where strikes say nothing: beside a room those left out, and of two that strikes cannot tell apart all of them.
+"""What lines' decays say of candidate effects where strikes say nothing: beside a room those left out, and of two that
+strikes cannot tell apart all of them.
 
-    2 Δ ln L = Σ_k ρ(z_k without) − ρ(z_k with),   z_k = ln(d_k / d of its modes) / spread,   ρ Cauchy's, over the lines that a fold had left out, each counted once
+    2 Δ ln L = Σ_k ρ(z_k without) − ρ(z_k with),   z_k = ln(d_k / d of its modes) / spread,
+        ρ Cauchy's, over the lines that a fold had left out, each counted once
 
-A room's response has a tap for every sample. Identified from the strikes, it takes up what a law of damping does to every line, on strikes that it never saw as well: a line is as narrow as what a
-response can bend. But lines are dereverberated, each by its own baseband (effects/common/reverberant_tail.py), before there is any response; a law fitted to three lines in four must hold for the fourth.
+A room's response has a tap for every sample. Identified from the strikes, it takes up what a law of damping does to
+every line, on strikes that it never saw as well: a line is as narrow as what a response can bend. But lines are
+dereverberated, each by its own baseband (effects/common/reverberant_tail.py), before there is any response; a law
+fitted to three lines in four must hold for the fourth.
 """
 
 from __future__ import annotations
@@ -33,12 +37,16 @@ def tells(h: Hypothesis, effect: Effect) -> bool:
 
 
 def misfit(h: Hypothesis, effect: Effect, evidence: Evidence, bodies: tuple[Struck, ...]) -> float:
-    """Twice −ln likelihood of all lines' decays by a model with this effect, and its numbers at ln n each [Schwarz 1978]."""
+    """Twice −ln likelihood of all lines' decays by a model with this effect, and its numbers at ln n each [Schwarz
+    1978].
+    """
     total, count = 0.0, 0
     for one in evidence.observed:
         body = next(b for b in bodies if b.recorded is one.source)
         good = _has_decay(one)
-        total += float(_cost(modes_of(h, body)[0].decay_per_s, one.mode, one.decay_per_s, one.decay_sd_per_s)[good].sum())
+        total += float(
+            _cost(modes_of(h, body)[0].decay_per_s, one.mode, one.decay_per_s, one.decay_sd_per_s)[good].sum()
+        )
         count += int(good.sum())
     return total + numbers(effect) * float(np.log(max(count, 1)))
 
@@ -48,14 +56,21 @@ def _has_decay(one: ObjectEvidence) -> Array:
     return np.asarray(np.isfinite(one.decay_per_s) & (one.decay_per_s > 0) & ~np.isposinf(one.decay_sd_per_s))
 
 
-def likelier(without: Hypothesis, augmented: Hypothesis, every: Evidence, training: Evidence, bodies: tuple[Struck, ...]) -> float:
-    """Twice the gain in ln likelihood of the decays that are in ``every`` and not in ``training``, from which both hypotheses were fitted."""
+def likelier(
+    without: Hypothesis, augmented: Hypothesis, every: Evidence, training: Evidence, bodies: tuple[Struck, ...]
+) -> float:
+    """Twice the gain in ln likelihood of the decays that are in ``every`` and not in ``training``, from which both
+    hypotheses were fitted.
+    """
     total = 0.0
     for one in every.observed:
         seen = next((h.freq_hz for h in training.observed if h.source is one.source), one.freq_hz[:0])
         out = ~np.isin(one.freq_hz, seen) & _has_decay(one)
         body = next(b for b in bodies if b.recorded is one.source)
-        cost = [_cost(modes_of(h, body)[0].decay_per_s, one.mode, one.decay_per_s, one.decay_sd_per_s)[out].sum() for h in (without, augmented)]
+        cost = [
+            _cost(modes_of(h, body)[0].decay_per_s, one.mode, one.decay_per_s, one.decay_sd_per_s)[out].sum()
+            for h in (without, augmented)
+        ]
         total += float(cost[0] - cost[1])
     return total
 

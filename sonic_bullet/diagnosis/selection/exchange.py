@@ -1,9 +1,13 @@
-"""Several effects at once: their numbers fitted to each other, and effects that came first though another, beside the rest, explains more.
+"""Several effects at once: their numbers fitted to each other, and effects that came first though another, beside the
+rest, explains more.
 
-    e_i -> propose(evidence of the model without e_i, known = e_i), in turns                       (backfitting [Buja, Hastie & Tibshirani 1989])
-    exchange: for each added effect, what was accepted in the same round and was passed over stands in its place; both are judged on strikes left out
+    e_i -> propose(evidence of the model without e_i, known = e_i), in turns
+        (backfitting [Buja, Hastie & Tibshirani 1989])
+    exchange: for each added effect, what was accepted in the same round and was passed over stands in its place; both
+        are judged on strikes left out
 
-A round adds what says most of the whole gap alone, and a filter may take up what a pulse and a tilt of level do together; beside the other effect it no longer does.
+A round adds what says most of the whole gap alone, and a filter may take up what a pulse and a tilt of level do
+together; beside the other effect it no longer does.
 """
 
 from __future__ import annotations
@@ -33,7 +37,9 @@ Less = Callable[[Evidence], Evidence]
 
 
 def rivals(found: Sequence[Candidate], best: Candidate) -> tuple[Candidate, ...]:
-    """Of a round's accepted candidates, those that the best may stand before by chance, or by what else the model lacks."""
+    """Of a round's accepted candidates, those that the best may stand before by chance, or by what else the model
+    lacks.
+    """
     return tuple(c for c in found if c is not best and c.mean_db > RULES.rival_share * best.mean_db)
 
 
@@ -45,7 +51,9 @@ def together(h: Hypothesis, problem: DiagnosisProblem, *, turns: int = TURNS, le
     return h
 
 
-def again(h: Hypothesis, i: int, problem: DiagnosisProblem, *, less: Less = lambda e: e, afresh: bool = False) -> Hypothesis:
+def again(
+    h: Hypothesis, i: int, problem: DiagnosisProblem, *, less: Less = lambda e: e, afresh: bool = False
+) -> Hypothesis:
     """The hypothesis, its i-th effect fitted again beside the others, or looked for anew."""
     effect, before, after = h.effects[i], h.effects[:i], h.effects[i + 1 :]
     rest = refitted(with_effects(h, (*before, *after), problem.bodies), problem.bodies)
@@ -55,7 +63,8 @@ def again(h: Hypothesis, i: int, problem: DiagnosisProblem, *, less: Less = lamb
 
 
 def starts(h: Hypothesis, problem: DiagnosisProblem) -> list[Hypothesis]:
-    """The hypothesis, and with each effect's choices that no step from one to the other leads to, where it knows of such (``others``).
+    """The hypothesis, and with each effect's choices that no step from one to the other leads to, where it knows of
+    such (``others``).
 
     Beside those the rest is looked for anew: what one takes up, another had taken.
     """
@@ -84,9 +93,11 @@ def chosen(h: Hypothesis, problem: DiagnosisProblem) -> Hypothesis:
 
 
 def left_out_db(h: Hypothesis, i: int, problem: DiagnosisProblem) -> Array:
-    """Distance (s,) of every strike from what is fitted to the others: the i-th effect, the rest as all strikes have it, for one effect as for the other.
+    """Distance (s,) of every strike from what is fitted to the others: the i-th effect, the rest as all strikes have
+    it, for one effect as for the other.
 
-    No lines are left out here: each has been held against chance already, and of two effects that need as many numbers neither gains by it.
+    No lines are left out here: each has been held against chance already, and of two effects that need as many numbers
+    neither gains by it.
     """
 
     def without(take: Judged) -> Less:
@@ -103,7 +114,9 @@ def exchanged(
     passed: Sequence[Sequence[Candidate]],
     problem: DiagnosisProblem,
 ) -> tuple[Hypothesis, list[Candidate]]:
-    """The effects fitted to each other, and each left for a rival of its round (passed) with which strikes left out are significantly nearer."""
+    """The effects fitted to each other, and each left for a rival of its round (passed) with which strikes left out are
+    significantly nearer.
+    """
     if not problem.has_audio:
         return h, added
     names = {c.id for c in added}
@@ -124,7 +137,10 @@ def exchanged(
             gain = far - now
             if (
                 significant(gain, RULES.alike_share * rival.mean_db)
-                and not (np.nanmean(gain) < RULES.phases_decide_share * rival.mean_db and phases_against(best, other, problem.bodies))
+                and not (
+                    np.nanmean(gain) < RULES.phases_decide_share * rival.mean_db
+                    and phases_against(best, other, problem.bodies)
+                )
                 and not decays_against(other.effects[place], best, other, place, problem)
             ):
                 best, far, names = other, now, names - {own.id} | {rival.id}
@@ -133,7 +149,9 @@ def exchanged(
 
 
 def decays_against(rival: Effect, best: Hypothesis, other: Hypothesis, i: int, problem: DiagnosisProblem) -> bool:
-    """Whether, of two that change nothing but decays, the lines' own decays speak for the one that is there: strikes hardly tell such two."""
+    """Whether, of two that change nothing but decays, the lines' own decays speak for the one that is there: strikes
+    hardly tell such two.
+    """
     own = best.effects[i]
     if not (of_decays(best, own) and of_decays(other, rival)):
         return False
@@ -142,9 +160,11 @@ def decays_against(rival: Effect, best: Hypothesis, other: Hypothesis, i: int, p
 
 
 def phases_against(best: Hypothesis, other: Hypothesis, bodies: tuple[Struck, ...]) -> bool:
-    """Whether the lines' phases (phase_test.py) speak for the effect that is there: of two that strikes hardly tell apart, both must.
+    """Whether the lines' phases (phase_test.py) speak for the effect that is there: of two that strikes hardly tell
+    apart, both must.
 
-    Phases are held against lines as they were fitted; of several hits they say nothing, and beside a room lines are others.
+    Phases are held against lines as they were fitted; of several hits they say nothing, and beside a room lines are
+    others.
     """
     dry = [any(isinstance(e, Dereverberates) for e in h.effects) for h in (best, other)]
     if moves(best) or moves(other) or dry[0] != dry[1]:

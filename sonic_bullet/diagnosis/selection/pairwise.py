@@ -1,12 +1,17 @@
-"""Two effects at once, where one after another explains too little: each alone may leave, or even open, most of what only both close.
+"""Two effects at once, where one after another explains too little: each alone may leave, or even open, most of what
+only both close.
 
-    first round's candidates: A as it was found, B -> propose(evidence beside A)      -> least D(A, B) on all strikes, if it leaves little
+    first round's candidates: A as it was found, B -> propose(evidence beside A)
+        -> least D(A, B) on all strikes, if it leaves little
                             B moves no modes: what does is searched for all over a body, and that takes long
-    then each is cross-validated beside the other: fitted without one strike at a time, against control effects, as in any round
-    in_a_room: B is a room that was found alone, A what moves modes; the room is identified anew beside A, and again without it
+    then each is cross-validated beside the other: fitted without one strike at a time, against control effects, as in
+        any round
+    in_a_room: B is a room that was found alone, A what moves modes; the room is identified anew beside A, and again
+        without it
 
-What a dashpot does to decays hides what a long pulse leaves of the high modes: played with the right pulse and wrong decays, a body is as far from its recording
-as with neither. Coordinate steps stop there; a step along two coordinates does not [cf. forward selection of groups: Efroymson 1960; Yuan & Lin 2006].
+What a dashpot does to decays hides what a long pulse leaves of the high modes: played with the right pulse and wrong
+decays, a body is as far from its recording as with neither. Coordinate steps stop there; a step along two coordinates
+does not [cf. forward selection of groups: Efroymson 1960; Yuan & Lin 2006].
 """
 
 from __future__ import annotations
@@ -33,7 +38,9 @@ from sonic_bullet.parallel import parallel_map
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pair:
-    """A hypothesis with two effects, the second fitted beside the first, and how far it is from the fitted strikes, in dB."""
+    """A hypothesis with two effects, the second fitted beside the first, and how far it is from the fitted strikes, in
+    dB.
+    """
 
     h: Hypothesis
     db: float
@@ -44,7 +51,10 @@ def pairwise(
     first: Sequence[Candidate],
     problem: DiagnosisProblem,
 ) -> tuple[Hypothesis, list[Candidate]] | None:
-    """The two of a first round's candidate effects that explain nearly all together, each accepted beside the other; None where no two do."""
+    """The two of a first round's candidate effects that explain nearly all together, each accepted beside the other;
+
+    None where no two do.
+    """
     if len(first) < 2 or not problem.has_audio:
         return None
     kinds = [type(c.effect) for c in first if not moves(c.hypothesis)]
@@ -56,7 +66,9 @@ def pairwise(
         for kind in kinds:
             other = None if kind is type(one.effect) else kind.propose(evidence)
             if other is not None:
-                h = refitted(replace(one.hypothesis, effects=(*one.hypothesis.effects, other)), problem.bodies, evidence.observed)
+                h = refitted(
+                    replace(one.hypothesis, effects=(*one.hypothesis.effects, other)), problem.bodies, evidence.observed
+                )
                 found.append(Pair(h, problem.distance_db(h)))
         return found
 
@@ -65,7 +77,8 @@ def pairwise(
     if not pairs or min(pair.db for pair in pairs) - now.floor_db > RULES.pair_leaves_share * now.gap_db:
         return None
     h = _likeliest(pairs, now.floor_db + now.gap_db, problem.bodies)
-    closer = again(again(h, 0, problem, afresh=True), 1, problem)  # what was found alone had the other's share to explain, too
+    # what was found alone had the other's share to explain, too
+    closer = again(again(h, 0, problem, afresh=True), 1, problem)
     h = closer if problem.distance_db(closer) < problem.distance_db(h) else h
     return _accepted_together(h, problem)
 
@@ -75,10 +88,13 @@ def in_a_room(
     found: Sequence[Candidate],
     problem: DiagnosisProblem,
 ) -> tuple[Hypothesis, list[Candidate]] | None:
-    """A room that has been found alone, identified anew beside one of the candidate effects (found) that move modes; None where no two say nearly all.
+    """A room that has been found alone, identified anew beside one of the candidate effects (found) that move modes;
 
-    Outside the room lines lie where they lie, and show masses and tensors. But a response identified from modes that lie elsewhere plays what these lack, so that every
-    other set of modes sounds worse with it: the candidate is tried with a response of its own.
+    None where no two say nearly all.
+
+    Outside the room lines lie where they lie, and show masses and tensors. But a response identified from modes that
+    lie elsewhere plays what these lack, so that every other set of modes sounds worse with it: the candidate is tried
+    with a response of its own.
     """
     rooms = [e for e in h.effects if isinstance(e, Dereverberates)]
     movers = [c for c in found if moves_itself(h, c.effect)]
@@ -92,7 +108,11 @@ def in_a_room(
         room = type(rooms[0]).propose(evidence)
         if room is None:
             return None
-        pair = reidentified(refitted(replace(alone, effects=(c.effect, room)), problem.bodies, evidence.observed), problem.bodies, fully=True)
+        pair = reidentified(
+            refitted(replace(alone, effects=(c.effect, room)), problem.bodies, evidence.observed),
+            problem.bodies,
+            fully=True,
+        )
         return Pair(pair, problem.distance_db(pair))
 
     floor, left = problem.score(h).floor_db, problem.distance_db(reidentified(h, problem.bodies, fully=True))
@@ -100,7 +120,9 @@ def in_a_room(
         [c for c in movers if not mixes_neighbours(c.effect)],
         [c for c in movers if mixes_neighbours(c.effect)],
     ):  # what hardly moves modes is asked where nothing else will do
-        best = min((pair for pair in parallel_map(augmented, some) if pair is not None), key=lambda pair: pair.db, default=None)
+        best = min(
+            (pair for pair in parallel_map(augmented, some) if pair is not None), key=lambda pair: pair.db, default=None
+        )
         if best is not None and best.db - floor <= RULES.pair_leaves_share * (left - floor):
             break
     else:
@@ -118,14 +140,21 @@ def _accepted_together(h: Hypothesis, problem: DiagnosisProblem) -> tuple[Hypoth
         now = problem.score(rest)
         full = replace(now, distance_db=response)
         candidates = cross_validated(rest, problem.only(type(effect)), evidence)
-        if not candidates or not (accepted(candidates[0], max(now.gap_db, 0.0), first=False) and helps(candidates[0], problem, now, full, first=False)):
+        if not candidates or not (
+            accepted(candidates[0], max(now.gap_db, 0.0), first=False)
+            and helps(candidates[0], problem, now, full, first=False)
+        ):
             return None
         h, added = candidates[0].hypothesis, [candidates[0], *added]
     return h, added
 
 
 def _likeliest(pairs: Sequence[Pair], before_db: float, bodies: tuple[Struck, ...]) -> Hypothesis:
-    """The nearest to the strikes; or, of those that share the effect that moves modes, and say nearly as much, the one for which phases speak clearly (phase_test.py)."""
+    """The nearest to the strikes;
+
+    or, of those that share the effect that moves modes, and say nearly as much, the one for which phases speak clearly
+    (phase_test.py).
+    """
     best = min(pairs, key=lambda pair: pair.db)
     near = best.db + RULES.phases_decide_share * (before_db - best.db)
     others = [pair.h for pair in pairs if pair.db < near and _movers(pair.h) == _movers(best.h)]

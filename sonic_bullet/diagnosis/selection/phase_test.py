@@ -1,9 +1,11 @@
 """Which of two effects that strikes cannot tell apart: the one whose lines agree in phase, too.
 
-    A_sk ≈ σ E_sk e^{−iω_k t₀}      E: onset amplitudes of the modes under a hypothesis, its pulse and sound path included; σ, t₀ free
+    A_sk ≈ σ E_sk e^{−iω_k t₀}
+        E: onset amplitudes of the modes under a hypothesis, its pulse and sound path included; σ, t₀ free
 
-A distance of spectra in dB does not see phases, and a pulse and a low-pass filter of its width have the same magnitudes below its first zero. But a pulse is symmetric
-about its middle, so all it does to phases is a delay, and a filter's phase bends [Oppenheim & Schafer 2010, ch. 5.1: generalized linear phase].
+A distance of spectra in dB does not see phases, and a pulse and a low-pass filter of its width have the same magnitudes
+below its first zero. But a pulse is symmetric about its middle, so all it does to phases is a delay, and a filter's
+phase bends [Oppenheim & Schafer 2010, ch. 5.1: generalized linear phase].
 """
 
 from __future__ import annotations
@@ -22,7 +24,9 @@ TURNS = 15
 
 
 def misfit(h: Hypothesis, bodies: tuple[Struck, ...]) -> float:
-    """Twice the negative log likelihood of all objects' onset amplitudes under Cauchy's law, phases counted where they are true; infinite where a strike hits more than once."""
+    """Twice the negative log likelihood of all objects' onset amplitudes under Cauchy's law, phases counted where they
+    are true; infinite where a strike hits more than once.
+    """
     return sum(_misfit(h, body) for body in bodies if body.recorded is not None)
 
 
@@ -31,7 +35,8 @@ def _misfit(h: Hypothesis, body: Struck) -> float:
     expected, seen = one.expected, one.amplitude
     if any(len(impact_of(h, body, i).delay_s) > 1 for i in body.fitted):
         return np.inf  # a line's amplitude at the onset is of one hit
-    good = np.isfinite(seen) & np.isfinite(one.amplitude_sd)  # whatever is expected there, so that all effects are held against the same
+    # whatever is expected there, so that all effects are held against the same
+    good = np.isfinite(seen) & np.isfinite(one.amplitude_sd)
     expected = np.nan_to_num(expected)
     if not good.any() or not np.abs(expected[good]).any():
         return 0.0
@@ -54,7 +59,12 @@ def _cost(expected: Array, seen: Array, sd: Array, rough: Array) -> float:
     gain, weight = 1.0, np.ones(len(expected))
     for _ in range(TURNS):
         width = sd**2 + (gain * rough) ** 2
-        gain = max(float((weight * (expected.conj() * seen).real / width).sum() / (weight * np.abs(expected) ** 2 / width).sum()), 1e-3)
+        gain = max(
+            float(
+                (weight * (expected.conj() * seen).real / width).sum() / (weight * np.abs(expected) ** 2 / width).sum()
+            ),
+            1e-3,
+        )
         weight = 1 / (1 + np.abs(seen - gain * expected) ** 2 / width / 9)
     width = sd**2 + (gain * rough) ** 2
     return float((np.log(width) + 9 * np.log1p(np.abs(seen - gain * expected) ** 2 / width / 9)).sum())

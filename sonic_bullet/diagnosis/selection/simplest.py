@@ -1,6 +1,7 @@
 """Which of the accepted candidates is added, and which of the added ones are still needed at the end.
 
-able -> on all strikes together it helps, too -> the best, or the simplest of those that strikes cannot tell from it -> phases, where two say nearly the same
+able -> on all strikes together it helps, too -> the best, or the simplest of those that strikes cannot tell from it ->
+    phases, where two say nearly the same
 """
 
 from __future__ import annotations
@@ -23,56 +24,87 @@ from sonic_bullet.effects.protocol import Evidence
 
 
 def helps(c: Candidate, problem: DiagnosisProblem, now: Score, full: Score, *, first: bool) -> bool:
-    """Whether all strikes together gain, and lose nothing of what a room's response, identified again without it, says as well (full): that takes up echoes, and
-    some of what stray modes leave, so what moves modes must gain on that. A filter or a slow law it takes up whole: then both say the same.
-    Without a mesh nothing tells which of a room's lines are modes, and what changes decays would be fitted to all of them."""
+    """Whether all strikes together gain, and lose nothing of what a room's response, identified again without it, says
+    as well (full): that takes up echoes, and some of what stray modes leave, so what moves modes must gain on that. A
+    filter or a slow law it takes up whole: then both say the same. Without a mesh nothing tells which of a room's lines
+    are modes, and what changes decays would be fitted to all of them."""
     if tells(c.hypothesis, c.effect) and not problem.has_meshes:
         return False
-    before, after = full if moves(c.hypothesis) else now, problem.distance_db(reidentified(c.hypothesis, problem.bodies))
+    before, after = (
+        full if moves(c.hypothesis) else now,
+        problem.distance_db(reidentified(c.hypothesis, problem.bodies)),
+    )
     if after >= full.distance_db + RULES.same_share * max(full.gap_db, 0.0):
         return False
-    return before.distance_db - after > RULES.helps_share * needed(max(before.gap_db, 0.0), first=first, certain=c.certain)
+    return before.distance_db - after > RULES.helps_share * needed(
+        max(before.gap_db, 0.0), first=first, certain=c.certain
+    )
 
 
 def by_lines(c: Candidate, problem: DiagnosisProblem, full: Score) -> bool:
-    """Whether lines left out speak for it (decay_test.py), and a room's response, identified again beside it, says no less than without it (full). Without a mesh nothing tells which of a room's lines are modes."""
+    """Whether lines left out speak for it (decay_test.py), and a room's response, identified again beside it, says no
+    less than without it (full). Without a mesh nothing tells which of a room's lines are modes.
+    """
     if not (problem.has_meshes and c.lines > RULES.line_gain):
         return False
-    return problem.distance_db(reidentified(c.hypothesis, problem.bodies)) < full.distance_db + RULES.same_share * max(full.gap_db, 0.0)
+    return problem.distance_db(reidentified(c.hypothesis, problem.bodies)) < full.distance_db + RULES.same_share * max(
+        full.gap_db, 0.0
+    )
 
 
 def simplest(able: Sequence[Candidate], bodies: tuple[Struck, ...], evidence: Evidence) -> Candidate:
-    """The best, or the one with the fewest numbers of those that strikes cannot tell from it: two standard errors of the difference, alike_share of what it says.
+    """The best, or the one with the fewest numbers of those that strikes cannot tell from it: two standard errors of
+    the difference, alike_share of what it says.
 
-    Where another with no more numbers says nearly as much (phases_decide_share), the lines' phases may speak for that one (phase_test.py): by clear_phases, or by hint_of_phases where it is alike_share.
-    Of two that only change decays the lines' own decays tell, by BIC. Effects that move modes stand aside: corrections are learnt anew beside them, and are numbers too.
+    Where another with no more numbers says nearly as much (phases_decide_share), the lines' phases may speak for that
+    one (phase_test.py): by clear_phases, or by hint_of_phases where it is alike_share. Of two that only change decays
+    the lines' own decays tell, by BIC. Effects that move modes stand aside: corrections are learnt anew beside them,
+    and are numbers too.
     """
     best = able[0]
-    if moves_itself(best.hypothesis, best.effect) or len(able) == 1:  # by lines alone one may be accepted that strikes speak against
+    # by lines alone one may be accepted that strikes speak against
+    if moves_itself(best.hypothesis, best.effect) or len(able) == 1:
         return best
 
     def close(c: Candidate, share: float) -> bool:
         more = best.drop_db - c.drop_db
-        return bool(more.mean() <= RULES.standard_errors * more.std(ddof=1) / np.sqrt(len(more)) and more.mean() < share * best.mean_db)
+        return bool(
+            more.mean() <= RULES.standard_errors * more.std(ddof=1) / np.sqrt(len(more))
+            and more.mean() < share * best.mean_db
+        )
 
     rivals = [c for c in able if not moves_itself(c.hypothesis, c.effect)]
     first = min((c for c in rivals if close(c, RULES.alike_share)), key=lambda c: (numbers(c.effect), -c.mean_db))
     if of_decays(first.hypothesis, first.effect):
-        alike = [c for c in rivals if of_decays(c.hypothesis, c.effect) and (best.drop_db - c.drop_db).mean() < RULES.phases_decide_share * best.mean_db]
+        alike = [
+            c
+            for c in rivals
+            if of_decays(c.hypothesis, c.effect)
+            and (best.drop_db - c.drop_db).mean() < RULES.phases_decide_share * best.mean_db
+        ]
         first = min(alike, key=lambda c: decays(c.hypothesis, c.effect, evidence, bodies))
     others = [
         c
         for c in rivals
-        if c is not first and numbers(c.effect) <= numbers(first.effect) and (best.drop_db - c.drop_db).mean() < RULES.phases_decide_share * best.mean_db
+        if c is not first
+        and numbers(c.effect) <= numbers(first.effect)
+        and (best.drop_db - c.drop_db).mean() < RULES.phases_decide_share * best.mean_db
     ]
     if not others or moves(best.hypothesis):
         return first  # phases are held against lines as they were fitted
     own = misfit(first.hypothesis, bodies)  # the less strikes say, the less phases need to
-    off = np.array([misfit(c.hypothesis, bodies) + (RULES.hint_of_phases if close(c, RULES.alike_share) else RULES.clear_phases) for c in others])
+    off = np.array(
+        [
+            misfit(c.hypothesis, bodies) + (RULES.hint_of_phases if close(c, RULES.alike_share) else RULES.clear_phases)
+            for c in others
+        ]
+    )
     return others[int(off.argmin())] if np.isfinite(own) and off.min() < own else first
 
 
-def pruned(h: Hypothesis, added: list[Candidate], problem: DiagnosisProblem, gap_db: float) -> tuple[Hypothesis, list[Candidate]]:
+def pruned(
+    h: Hypothesis, added: list[Candidate], problem: DiagnosisProblem, gap_db: float
+) -> tuple[Hypothesis, list[Candidate]]:
     """Without the effects that those found after them have made needless."""
     for candidate in added[:-1]:
         if candidate.lines > RULES.line_gain:

@@ -1,7 +1,9 @@
-"""Stepwise selection: try all candidate effects, add the best that is accepted, look again; fit them to each other; then say what is known and what is not.
+"""Stepwise selection: try all candidate effects, add the best that is accepted, look again; fit them to each other;
+then say what is known and what is not.
 
     one by one -> fitted to each other, exchanged, pruned -> verdict
-    two at once (pairwise.py) where every one leaves most of the gap open, or all of them did at the end; a room identified anew beside what moves modes
+    two at once (pairwise.py) where every one leaves most of the gap open, or all of them did at the end; a room
+        identified anew beside what moves modes
 
 gap = before − floor on left-out strikes; which effect is accepted is said in acceptance.py
 """
@@ -32,11 +34,12 @@ from sonic_bullet.effects.protocol import Alternatives, Dereverberates, Effect, 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Closed:
-    """How the selection ended. added: the candidate of each round that is still there at the end. tried: every candidate effect in the last round in
-    which it was asked and had something to say. mesh_off: of a frequency, what the mesh is off by where that is why the verdict stands.
+    """How the selection ended. added: the candidate of each round that is still there at the end. tried: every
+    candidate effect in the last round in which it was asked and had something to say. mesh_off: of a frequency, what
+    the mesh is off by where that is why the verdict stands.
 
-    bands: where what is played is not as loud as what was recorded, which is why the verdict is not `none`. judged, left_out: what the
-    hypotheses were held against, and what could not be compared.
+    bands: where what is played is not as loud as what was recorded, which is why the verdict is not `none`. judged,
+    left_out: what the hypotheses were held against, and what could not be compared.
     """
 
     before: Hypothesis
@@ -55,7 +58,10 @@ class Closed:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NothingCompared:
-    """A selection that never began: no distance is known, so nothing is. left_out: what could not be compared, and why; empty where nothing was measured."""
+    """A selection that never began: no distance is known, so nothing is.
+
+    left_out: what could not be compared, and why; empty where nothing was measured.
+    """
 
     before: Hypothesis
     left_out: tuple[LeftOut, ...]
@@ -83,7 +89,9 @@ def closed(
     found = comparable(takes, start)
     if isinstance(found, Incomparable):
         return NothingCompared(start, found.left_out)
-    return _closed(start, DiagnosisProblem(bodies, found.takes, band_hz, tuple(effects), seed, progress or silent), found.left_out)
+    return _closed(
+        start, DiagnosisProblem(bodies, found.takes, band_hz, tuple(effects), seed, progress or silent), found.left_out
+    )
 
 
 def _closed(start: Hypothesis, problem: DiagnosisProblem, left_out: tuple[LeftOut, ...]) -> Closed:
@@ -106,12 +114,29 @@ def _closed(start: Hypothesis, problem: DiagnosisProblem, left_out: tuple[LeftOu
     if verdict != "explained":
         h, now, added = start, replace(now, distance_db=before), []
     tried = tuple(last.values())
-    return Closed(start, h, tuple(added), tried, verdict, before, now.distance_db, now.floor_db, off, bands, problem.takes, left_out)
+    return Closed(
+        start,
+        h,
+        tuple(added),
+        tried,
+        verdict,
+        before,
+        now.distance_db,
+        now.floor_db,
+        off,
+        bands,
+        problem.takes,
+        left_out,
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rounds:
-    """Where round after round came to. first, last: all candidates of the first round, and each as it was when asked last. pairwise: whether pairs were tried."""
+    """Where round after round came to.
+
+    first, last: all candidates of the first round, and each as it was when asked last. pairwise: whether pairs were
+    tried.
+    """
 
     h: Hypothesis
     added: list[Candidate]
@@ -132,19 +157,28 @@ def _one_by_one(start: Hypothesis, problem: DiagnosisProblem) -> Rounds:
     last: dict[str, Candidate] = {}
     weak = False
     for turn in range(RULES.rounds):
-        problem.say(f"round {turn + 1}: {now.distance_db:.2f} dB from the recordings, noise alone {now.floor_db:.2f} dB")
+        problem.say(
+            f"round {turn + 1}: {now.distance_db:.2f} dB from the recordings, noise alone {now.floor_db:.2f} dB"
+        )
         if now.gap_db < (RULES.least_drop_db if added else RULES.faint_drop_db):
             break  # so little is what a mesh gets wrong
         drawn = replace(problem, seed=problem.seed + turn)
         evidence = evidence_of(h, problem.bodies, problem.band_hz, seed=problem.seed)
-        other = reidentified(h, problem.bodies)  # a room's response is the lines' so far, which leaves open more than there is
+        # a room's response is the lines' so far, which leaves open more than there is
+        other = reidentified(h, problem.bodies)
         full = now if other is h else replace(now, distance_db=problem.distance_db(other))
         costly = full.gap_db > RULES.costly_open_share * (before_db - now.floor_db)
         found = cross_validated(h, drawn, evidence, costly=costly)
         last |= {c.id: c for c in found}
         pair, acceptable = None, _acceptable(found, problem, now, full, first=not added)
         if not added:
-            first, weak = found, all(problem.distance_db(c.hypothesis) - now.floor_db > RULES.weak_share * max(now.gap_db, 0.0) for c in found)
+            first, weak = (
+                found,
+                all(
+                    problem.distance_db(c.hypothesis) - now.floor_db > RULES.weak_share * max(now.gap_db, 0.0)
+                    for c in found
+                ),
+            )
             pair = pairwise(start, found, problem) if weak else None
         pair = pair or _room_anew(h, acceptable, found, problem)
         if not (pair or acceptable) and costly and (late := _deferred(found, evidence, problem.effects)):
@@ -175,16 +209,25 @@ def _one_by_one(start: Hypothesis, problem: DiagnosisProblem) -> Rounds:
     return Rounds(again if nearer else h, added, first, last, now.floor_db, weak)
 
 
-def _acceptable(found: Sequence[Candidate], problem: DiagnosisProblem, now: Score, full: Score, *, first: bool) -> list[Candidate]:
-    """Those that strikes left out speak for; or, where they speak for none, the one that lines do. full: with a room's response identified again."""
-    able = [c for c in found if accepted(c, max(now.gap_db, 0.0), first=first) and helps(c, problem, now, full, first=first)]
+def _acceptable(
+    found: Sequence[Candidate], problem: DiagnosisProblem, now: Score, full: Score, *, first: bool
+) -> list[Candidate]:
+    """Those that strikes left out speak for;
+
+    or, where they speak for none, the one that lines do. full: with a room's response identified again.
+    """
+    able = [
+        c for c in found if accepted(c, max(now.gap_db, 0.0), first=first) and helps(c, problem, now, full, first=first)
+    ]
     return able or sorted((c for c in found if by_lines(c, problem, full)), key=lambda c: -c.lines)[:1]
 
 
 def _room_anew(
     h: Hypothesis, acceptable: Sequence[Candidate], found: Sequence[Candidate], problem: DiagnosisProblem
 ) -> tuple[Hypothesis, list[Candidate]] | None:
-    """A room that stands alone identified anew beside what moves modes (pairwise.py), unless something else is accepted."""
+    """A room that stands alone identified anew beside what moves modes (pairwise.py), unless something else is
+    accepted.
+    """
     alone = len(h.effects) == 1 and all(moves_itself(h, c.effect) for c in acceptable)
     return in_a_room(h, found, problem) if alone else None
 
@@ -196,12 +239,17 @@ def _deferred(found: Sequence[Candidate], evidence: Evidence, effects: Sequence[
 
 
 def _verdict(h: Hypothesis, added: Sequence[Candidate], before_db: float, now: Score, problem: DiagnosisProblem) -> str:
-    """What is known: an effect that closes less than explained_share of the gap would be a guess, unless what is left is what a mesh gets wrong."""
+    """What is known: an effect that closes less than explained_share of the gap would be a guess, unless what is left
+    is what a mesh gets wrong.
+    """
     gap, left = before_db - now.floor_db, now.gap_db
     if not added:
-        excused = gap < RULES.suffices_db or (gap < of_the_mesh(h, problem) and of_no_body(h, problem.takes) < RULES.no_body_share)
+        excused = gap < RULES.suffices_db or (
+            gap < of_the_mesh(h, problem) and of_no_body(h, problem.takes) < RULES.no_body_share
+        )
         return "none" if excused else "unexplained"
-    room = any(isinstance(e, Dereverberates) for e in h.effects)  # whose response takes up what a mesh gets wrong, too: that is no excuse
+    # whose response takes up what a mesh gets wrong, too: that is no excuse
+    room = any(isinstance(e, Dereverberates) for e in h.effects)
     most = max((1 - (RULES.explained_by_room_share if room else RULES.explained_share)) * gap, RULES.suffices_db)
     return "explained" if left <= most or (not room and left <= of_the_mesh(h, problem)) else "unexplained"
 
@@ -209,7 +257,9 @@ def _verdict(h: Hypothesis, added: Sequence[Candidate], before_db: float, now: S
 def _by_a_finer_mesh(
     start: Hypothesis, h: Hypothesis, added: Sequence[Candidate], before_db: float, problem: DiagnosisProblem
 ) -> tuple[str, float, Hypothesis]:
-    """What would be known with upper modes where their lines are, how far off the mesh has them, and with them there; unexplained and 0 where that helps nobody."""
+    """What would be known with upper modes where their lines are, how far off the mesh has them, and with them there;
+    unexplained and 0 where that helps nobody.
+    """
     verdict, (far, off) = "unexplained", beyond(start, problem)
     if not off:
         return verdict, 0.0, start
@@ -219,10 +269,15 @@ def _by_a_finer_mesh(
         verdict = "none"
     elif added:
         both, _ = beyond(h, problem)
-        verdict = _verdict(both, added, ideal.distance_db, replace(ideal, distance_db=problem.distance_db(both)), problem)
+        verdict = _verdict(
+            both, added, ideal.distance_db, replace(ideal, distance_db=problem.distance_db(both)), problem
+        )
     return verdict, off if verdict != "unexplained" else 0.0, far
 
 
 def described(candidates: Sequence[Candidate]) -> list[dict[str, Any]]:
     """For JSON."""
-    return [{"id": c.id, "cv_error_drop_db": c.mean_db, "null_drop_db": c.control_db, "parameters": c.effect.parameters()} for c in candidates]
+    return [
+        {"id": c.id, "cv_error_drop_db": c.mean_db, "null_drop_db": c.control_db, "parameters": c.effect.parameters()}
+        for c in candidates
+    ]

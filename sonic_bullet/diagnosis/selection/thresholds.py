@@ -1,9 +1,10 @@
-"""The numbers that decide which effect is accepted, and what the verdict is: each with its unit, its reason and where it came from.
+"""The numbers that decide which effect is accepted, and what the verdict is: each with its unit, its reason and where
+it came from.
 
     RULES.least_drop_db       a float like any other, with .unit, .reason, .provenance
 
-provenance is a source, a derivation or a convention; "unknown" says that nobody wrote down which cases set it, and names the change that brought it.
-What is unknown stands first in line for removal.
+provenance is a source, a derivation or a convention; "unknown" says that nobody wrote down which cases set it, and
+names the change that brought it. What is unknown stands first in line for removal.
 """
 
 # ruff: noqa: RUF009  the defaults are frozen values
@@ -70,61 +71,139 @@ class Thresholds:
     # acceptance
     least_drop_db: Threshold = T(0.4, "dB", "mean gain on strikes left out, at least", FIRST_DIAGNOSIS)
     least_drop_share: Threshold = T(0.08, "of the gap", "the same, where the gap is wide", _since("5e45792"))
-    faint_drop_db: Threshold = T(0.2, "dB", "in place of the least drop while nothing is found, if the gain is most of the gap", _since("0d18b91"))
+    faint_drop_db: Threshold = T(
+        0.2,
+        "dB",
+        "in place of the least drop while nothing is found, if the gain is most of the gap",
+        _since("0d18b91"),
+    )
     faint_share: Threshold = T(0.5, "of the gap", "what counts as most of it for a faint drop", _since("0d18b91"))
-    certain_drop_db: Threshold = T(0.1, "dB", "in place of the faint drop, where lines agreed on the effect before it was proposed", _since("58d84bf"))
+    certain_drop_db: Threshold = T(
+        0.1,
+        "dB",
+        "in place of the faint drop, where lines agreed on the effect before it was proposed",
+        _since("58d84bf"),
+    )
     certain_share: Threshold = T(0.25, "of the gap", "in place of the faint share, likewise", _since("ca2b773"))
-    chance_share: Threshold = T(0.5, "of the drop needed", "by how much an effect must gain more than a control effect", FIRST_DIAGNOSIS)
-    standard_errors: Threshold = T(2.0, "standard errors", "a mean over strikes differs from zero", "convention: 95 % of a normal mean")
-    loudest_strikes: Count = C(2, "strikes", "one of these must gain most by what depends on amplitude", _since("ca2b773"))
-    lost_share: Threshold = T(0.15, "of the loudest strike's gain", "all that the others may lose by what depends on amplitude", _since("2b1b956"))
-    many_strikes: Count = C(4, "strikes", "of as many, none losing speaks as well as standard errors; of more, one may be odd", _since("b840359"))
-    odd_strike_factor: Threshold = T(3.0, "times the drop needed", "what the rest must gain before one strike counts as odd", _since("3e49a55"))
-    loss_share: Threshold = T(0.1, "of the mean gain", "what a strike may lose and still not speak against an effect", _since("b840359"))
+    chance_share: Threshold = T(
+        0.5, "of the drop needed", "by how much an effect must gain more than a control effect", FIRST_DIAGNOSIS
+    )
+    standard_errors: Threshold = T(
+        2.0, "standard errors", "a mean over strikes differs from zero", "convention: 95 % of a normal mean"
+    )
+    loudest_strikes: Count = C(
+        2, "strikes", "one of these must gain most by what depends on amplitude", _since("ca2b773")
+    )
+    lost_share: Threshold = T(
+        0.15,
+        "of the loudest strike's gain",
+        "all that the others may lose by what depends on amplitude",
+        _since("2b1b956"),
+    )
+    many_strikes: Count = C(
+        4,
+        "strikes",
+        "of as many, none losing speaks as well as standard errors; of more, one may be odd",
+        _since("b840359"),
+    )
+    odd_strike_factor: Threshold = T(
+        3.0, "times the drop needed", "what the rest must gain before one strike counts as odd", _since("3e49a55")
+    )
+    loss_share: Threshold = T(
+        0.1, "of the mean gain", "what a strike may lose and still not speak against an effect", _since("b840359")
+    )
     noise_db: Threshold = T(0.03, "dB", "the same at least, for noise alone moves a distance as far", _since("0e9159a"))
-    caps_tried: Count = C(60, "levels", "gains tried on strikes not yet played, before a candidate is dropped", _since("60c4492"))
+    caps_tried: Count = C(
+        60, "levels", "gains tried on strikes not yet played, before a candidate is dropped", _since("60c4492")
+    )
     # simplest
-    helps_share: Threshold = T(0.5, "of the drop needed", "gain on all strikes together, for one of few lines may be chance", _since("8138e87"))
-    line_gain: Threshold = T(6.0, "2 Δ ln L", "likelihood of decays left out, where a room's response says the same of the strikes", _since("8d31fbf"))
-    same_share: Threshold = T(0.1, "of what a room's response leaves open", "two that differ by less say the same", _since("bb1e1b4"))
+    helps_share: Threshold = T(
+        0.5, "of the drop needed", "gain on all strikes together, for one of few lines may be chance", _since("8138e87")
+    )
+    line_gain: Threshold = T(
+        6.0,
+        "2 Δ ln L",
+        "likelihood of decays left out, where a room's response says the same of the strikes",
+        _since("8d31fbf"),
+    )
+    same_share: Threshold = T(
+        0.1, "of what a room's response leaves open", "two that differ by less say the same", _since("bb1e1b4")
+    )
     # stepwise
     rounds: Count = C(4, "rounds", "effects added one by one, at most", FIRST_DIAGNOSIS)
     suffices_db: Threshold = T(1.5, "dB", "a smaller gap is the mesh's and the shapes' own", FIRST_DIAGNOSIS)
     explained_share: Threshold = T(0.5, "of the gap", "what accepted effects must close to be named", FIRST_DIAGNOSIS)
     explained_by_room_share: Threshold = T(
-        0.7, "of the gap", "the same with a room, whose response has a tap for every sample and takes up much", _since("8b6cb3e")
+        0.7,
+        "of the gap",
+        "the same with a room, whose response has a tap for every sample and takes up much",
+        _since("8b6cb3e"),
     )
-    no_body_share: Threshold = T(0.5, "of what is open", "with more left by lines in phase, it is no mesh's error", _since("8b6cb3e"))
-    weak_share: Threshold = T(0.5, "of the gap", "where every candidate leaves more, two are tried at once", _since("08f1067"))
-    costly_open_share: Threshold = T(0.3, "of the first gap", "with less left, no costly candidate is tried", _since("af918d8"))
+    no_body_share: Threshold = T(
+        0.5, "of what is open", "with more left by lines in phase, it is no mesh's error", _since("8b6cb3e")
+    )
+    weak_share: Threshold = T(
+        0.5, "of the gap", "where every candidate leaves more, two are tried at once", _since("08f1067")
+    )
+    costly_open_share: Threshold = T(
+        0.3, "of the first gap", "with less left, no costly candidate is tried", _since("af918d8")
+    )
     # pairwise
     pair_leaves_share: Threshold = T(
-        0.25, "of the gap", "two at once are twice as many choices, so they must close more than one after another", _since("08f1067")
+        0.25,
+        "of the gap",
+        "two at once are twice as many choices, so they must close more than one after another",
+        _since("08f1067"),
     )
     # phase test
-    phases_decide_share: Threshold = T(0.2, "of the gain", "between two that differ by less, phases or decays may decide", _since("5245b93"))
+    phases_decide_share: Threshold = T(
+        0.2, "of the gain", "between two that differ by less, phases or decays may decide", _since("5245b93")
+    )
     clear_phases: Threshold = T(25.0, "2 Δ ln L", "phases decide against what strikes prefer", _since("5245b93"))
-    hint_of_phases: Threshold = T(5.0, "2 Δ ln L", "phases decide where strikes prefer neither, or to keep an effect", _since("951b71d"))
+    hint_of_phases: Threshold = T(
+        5.0, "2 Δ ln L", "phases decide where strikes prefer neither, or to keep an effect", _since("951b71d")
+    )
     # exchange
-    rival_share: Threshold = T(0.5, "of the best candidate's gain", "an accepted candidate with as much may replace it later", _since("62e487b"))
-    far_rival_db: Threshold = T(1.0, "dB", "a rival farther from the fitted strikes is not fitted through", _since("9002cdf"))
+    rival_share: Threshold = T(
+        0.5,
+        "of the best candidate's gain",
+        "an accepted candidate with as much may replace it later",
+        _since("62e487b"),
+    )
+    far_rival_db: Threshold = T(
+        1.0, "dB", "a rival farther from the fitted strikes is not fitted through", _since("9002cdf")
+    )
     alike_share: Threshold = T(0.03, "of the gain", "two that differ by less are alike", _since("f039c9b"))
     # cross-validation
     kept_lines_share: Threshold = T(0.75, "of the lines", "kept in every fold, the others left out", FIRST_DIAGNOSIS)
     control_draws: Count = C(2, "draws", "of the control effect, for every strike left out", FIRST_DIAGNOSIS)
     first_strikes: Count = C(2, "strikes", "left out before a candidate without hope is dropped", _since("802019b"))
     control_numbers: Count = C(8, "numbers", "of a control effect, at most", FIRST_DIAGNOSIS)
-    enough_effects: Count = C(2, "effects", "with as many found and little open, no long search is begun", _since("879e402"))
-    cheap_share: Threshold = T(0.6, "of the gap", "where a cheap candidate closes as much, costly ones wait", _since("5e45792"))
+    enough_effects: Count = C(
+        2, "effects", "with as many found and little open, no long search is begun", _since("879e402")
+    )
+    cheap_share: Threshold = T(
+        0.6, "of the gap", "where a cheap candidate closes as much, costly ones wait", _since("5e45792")
+    )
     # decay test
     decay_scatter: Threshold = T(0.02, "of a decay", "how far decays scatter about their law", _since("8d31fbf"))
-    cauchy_width: Threshold = T(2.0, "standard errors", "within them the loss of decays is quadratic", _since("8d31fbf"))
+    cauchy_width: Threshold = T(
+        2.0, "standard errors", "within them the loss of decays is quadratic", _since("8d31fbf")
+    )
     # levels by band
-    early_s: Threshold = T(0.05, "s", "the attack is looked at by itself, for a long decay would outweigh it", _since("3a31221"))
-    band_apart_db: Threshold = T(3.0, "dB", "a band is half or twice as loud as it should be", "derivation: 10 lg 2 of power")
+    early_s: Threshold = T(
+        0.05, "s", "the attack is looked at by itself, for a long decay would outweigh it", _since("3a31221")
+    )
+    band_apart_db: Threshold = T(
+        3.0, "dB", "a band is half or twice as loud as it should be", "derivation: 10 lg 2 of power"
+    )
     band_cells: Count = C(4, "cells", "of a spectrum in every band, at least", _since("3a31221"))
-    lobe_cells: Count = C(2, "cells", "to each side in a Hann window's main lobe", "derivation: the window's first zeros")
-    own_scatter_strikes: Count = C(3, "strikes", "of fewer, the scatter of all bands says how far a mean may be off", _since("3a31221"))
+    lobe_cells: Count = C(
+        2, "cells", "to each side in a Hann window's main lobe", "derivation: the window's first zeros"
+    )
+    own_scatter_strikes: Count = C(
+        3, "strikes", "of fewer, the scatter of all bands says how far a mean may be off", _since("3a31221")
+    )
 
     def __post_init__(self) -> None:
         if wrong := [name for name, rule in rows(self) if not (rule.unit and rule.reason and rule.provenance)]:
@@ -134,7 +213,9 @@ class Thresholds:
         if wrong := [name for name, rule in rows(self) if name.endswith("_share") and rule > 1]:
             raise ValueError(f"shares must be 1 at most: {', '.join(wrong)}")
         if not self.certain_drop_db <= self.faint_drop_db <= self.least_drop_db:
-            raise ValueError("what lines agree on needs no larger drop than what is faint, and that none larger than any other")
+            raise ValueError(
+                "what lines agree on needs no larger drop than what is faint, and that none larger than any other"
+            )
         if not self.explained_share <= self.explained_by_room_share:
             raise ValueError("a room must close no less of the gap than another effect")
 
@@ -147,7 +228,15 @@ def rows(rules: Thresholds) -> list[tuple[str, Threshold | Count]]:
 def table(rules: Thresholds) -> str:
     """Markdown: name, value, unit, reason, provenance."""
     head = ["| threshold | value | unit | why | where from |", "|---|---|---|---|---|"]
-    return "\n".join([*head, *(f"| `{name}` | {rule:g} | {rule.unit} | {rule.reason} | {rule.provenance} |" for name, rule in rows(rules))])
+    return "\n".join(
+        [
+            *head,
+            *(
+                f"| `{name}` | {rule:g} | {rule.unit} | {rule.reason} | {rule.provenance} |"
+                for name, rule in rows(rules)
+            ),
+        ]
+    )
 
 
 RULES = Thresholds()

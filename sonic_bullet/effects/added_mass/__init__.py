@@ -1,13 +1,15 @@
 """`added-mass`: a sensor, a blob of wax, water: a small mass that rides on one point.
 
-    (Λ − λ (1 + Φᵀ m' Φ)) q = 0,  Φ = (φ(p), √(λ_r R)) (3, n + 3)      to first order Δλ/λ = −m |φ(p)|²                [Rayleigh 1894, § 88-90; modal synthesis]
+    (Λ − λ (1 + Φᵀ m' Φ)) q = 0,  Φ = (φ(p), √(λ_r R)) (3, n + 3)      to first order Δλ/λ = −m |φ(p)|²
+        [Rayleigh 1894, § 88-90; modal synthesis]
 
-R: what the modes above the band yield at the point, along its normal and across: residual attachment modes far above them [Rubin 1975]. Without it a
-point mass is held too stiffly, and its higher modes come out several per cent high.
-Read off frequencies and patterns together: for points all over the surface and masses up to a sixth of the body's, lines are paired with the loaded
-body's modes anew; the pairs that agree best stand, where they agree better than the bare body's. E/ρ was fitted to lines that the mass had lowered, so
-the common scale of all frequencies is looked for along with it, on the bare body as well: λ(Λ e^{2s}, R e^{−2s}) = e^{2s} λ(Λ, R). So was ν: what is twisted
-and what is bent had been lowered differently. A free body moves against the mass as a whole (free_body.py): m' in m's place.
+R: what the modes above the band yield at the point, along its normal and across: residual attachment modes far above
+them [Rubin 1975]. Without it a point mass is held too stiffly, and its higher modes come out several per cent high.
+Read off frequencies and patterns together: for points all over the surface and masses up to a sixth of the body's,
+lines are paired with the loaded body's modes anew; the pairs that agree best stand, where they agree better than the
+bare body's. E/ρ was fitted to lines that the mass had lowered, so the common scale of all frequencies is looked for
+along with it, on the bare body as well: λ(Λ e^{2s}, R e^{−2s}) = e^{2s} λ(Λ, R). So was ν: what is twisted and what is
+bent had been lowered differently. A free body moves against the mass as a whole (free_body.py): m' in m's place.
 """
 
 from __future__ import annotations
@@ -29,7 +31,9 @@ from sonic_bullet.records import Array, ModalModel
 POINTS = 100
 SHARES = (0.002, 0.006, 0.015, 0.03, 0.055, 0.1, 0.16)  # of the body's mass
 YIELDS = (0.0, 1.0, 4.0)  # of what modes above the band may yield, to begin with
-LIGHTEST = 0.005  # of the body's: what is lighter moves no mode by 1 % (Δf/f = −2 m/M at a bar's end), so a mesh or the body's own imperfection may be what it stands for
+# of the body's: what is lighter moves no mode by 1 % (Δf/f = −2 m/M at a bar's end), so a mesh or the body's own
+# imperfection may be what it stands for
+LIGHTEST = 0.005
 TRIES = 6
 MATCHED, MOVED = 0.8, 2.5e-3  # share of lines, and how far nine in ten of them may lie off: a mesh's error
 STAYED, DEGENERATE = 0.6, 1e-3  # of the lines' strength; of ln f, between modes of which a mass leaves one where it was
@@ -39,9 +43,11 @@ BETTER = (1.5, 0.12)  # in price: as much as a strong line and a half, paired we
 
 @dataclass(frozen=True)
 class AddedMass(ChangesBaseline):
-    """mass_kg attached at position_m (3,) of the surface, in the mesh's frame. yield_m_n: along the normal and across it, of what the model's modes leave out.
+    """mass_kg attached at position_m (3,) of the surface, in the mesh's frame. yield_m_n: along the normal and across
+    it, of what the model's modes leave out.
 
-    stretch: ln of what all frequencies of the bare body are to the baseline's; poisson_ratio: its ν, None for the baseline's. The host takes them over.
+    stretch: ln of what all frequencies of the bare body are to the baseline's; poisson_ratio: its ν, None for the
+    baseline's. The host takes them over.
     """
 
     id: ClassVar[str] = "added-mass"
@@ -61,7 +67,13 @@ class AddedMass(ChangesBaseline):
         if not x.mode_count or self.mass_kg == 0:
             return x
         at = nearest(x, self.position_m)
-        return loaded(x, attached(x.shape[at].astype(float), vertex_normals(x)[at], self.yield_m_n, x), self.mass_kg, x.vertex_m[at], FreeBody.of(x))
+        return loaded(
+            x,
+            attached(x.shape[at].astype(float), vertex_normals(x)[at], self.yield_m_n, x),
+            self.mass_kg,
+            x.vertex_m[at],
+            FreeBody.of(x),
+        )
 
     def baseline_change(self) -> BaselineChange:
         """E/ρ and ν of the bare body, found along with the mass."""
@@ -93,7 +105,10 @@ class AddedMass(ChangesBaseline):
             return cls._at(x, trial.refined(start, WIDTHS[-1:]), observed.poisson is not None)
         plain = patterns(observed, x)
         none = min(
-            (agreed(trial.line, trial.size, x.freq_hz, plain, shift=s, width=WIDTHS[-1], strict=strict(WIDTHS[-1])) for s in trial.shifts(x.freq_hz, plain)),
+            (
+                agreed(trial.line, trial.size, x.freq_hz, plain, shift=s, width=WIDTHS[-1], strict=strict(WIDTHS[-1]))
+                for s in trial.shifts(x.freq_hz, plain)
+            ),
             key=lambda one: one[0],
         )
         if _in_place(trial.line, trial.size, x.freq_hz, none):
@@ -101,14 +116,23 @@ class AddedMass(ChangesBaseline):
 
         def at(vertex: int) -> list[Scored]:
             up, side = trial.rest(vertex)
-            return [one for s in SHARES for y in YIELDS for one in trial.sifted(vertex, s * x.mass_kg, (y * up, y * side), WIDTHS[0])]
+            return [
+                one
+                for s in SHARES
+                for y in YIELDS
+                for one in trial.sifted(vertex, s * x.mass_kg, (y * up, y * side), WIDTHS[0])
+            ]
 
         found = sorted(one for some in parallel_map(at, spread_out(x, POINTS).tolist()) for one in some)
         first: dict[bool, dict[tuple[int, bool], Scored]] = {False: {}, True: {}}
-        for one in found:  # one light and one heavy start a vertex, where the baseline's scale may be right and where it is wrong
+        # one light and one heavy start a vertex, where the baseline's scale may be right and where it is wrong
+        for one in found:
             first[abs(one[4]) > FAR_OFF].setdefault((one[1], one[2] > 0.02 * x.mass_kg), one)
-        best = min(parallel_map(trial.refined, [start for some in first.values() for start in list(some.values())[:TRIES]]))
-        again = sorted(trial.scored(int(v), *best[2:], WIDTHS[1]) for v in spread_out(x, 3 * POINTS))  # round bodies: as heavy, elsewhere
+        best = min(
+            parallel_map(trial.refined, [start for some in first.values() for start in list(some.values())[:TRIES]])
+        )
+        # round bodies: as heavy, elsewhere
+        again = sorted(trial.scored(int(v), *best[2:], WIDTHS[1]) for v in spread_out(x, 3 * POINTS))
         best = min(best, *parallel_map(lambda start: trial.refined(start, WIDTHS[1:]), again[: TRIES // 2]))
         bare = none[0] + trial.unlikely(trial.fitted)
         if best[0] > bare - max(BETTER[0], BETTER[1] * abs(bare)) or best[2] < LIGHTEST * x.mass_kg:
@@ -121,13 +145,21 @@ class AddedMass(ChangesBaseline):
         _, vertex, mass_kg, along, shift, ratio = found
         place = x.vertex_m[vertex]
         up, side = (float(y * np.exp(-2 * shift)) for y in along)
-        return cls((float(place[0]), float(place[1]), float(place[2])), float(mass_kg), (up, side), float(shift), float(ratio) if poisson_identified else None)
+        return cls(
+            (float(place[0]), float(place[1]), float(place[2])),
+            float(mass_kg),
+            (up, side),
+            float(shift),
+            float(ratio) if poisson_identified else None,
+        )
 
 
 def _in_place(line_hz: Array, size: Array, mode_hz: Array, none: tuple[float, Array, Array, float]) -> bool:
-    """Whether the bare body's modes are where the lines are, or most of what sounds (s, k) is: a mass leaves few in place, and something else splits or bends the others.
+    """Whether the bare body's modes are where the lines are, or most of what sounds (s, k) is: a mass leaves few in
+    place, and something else splits or bends the others.
 
-    Of degenerate modes a mass leaves one, which stands still under it: only modes without a degenerate partner are asked.
+    Of degenerate modes a mass leaves one, which stands still under it: only modes without a degenerate partner are
+    asked.
     """
     _, row, column, shift = none
     off = np.abs(np.log(line_hz[row] / mode_hz[column]) - shift)

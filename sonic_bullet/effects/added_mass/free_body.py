@@ -1,10 +1,12 @@
 """How a free body gives way as a whole: what a mass that rides on it drags along, and the body moves against it.
 
-    G(v, p) = 1/M + [r_v×]ᵀ J⁻¹ [r_p×]      ∂²u(v)/∂t² = G(v, p) f(p),   r about the centre of mass             [Newton, Euler]
+    G(v, p) = 1/M + [r_v×]ᵀ J⁻¹ [r_p×]      ∂²u(v)/∂t² = G(v, p) f(p),   r about the centre of mass
+        [Newton, Euler]
 
 A free body's six rigid motions are modes of λ = 0: no sound, but a mass at p mixes them into the others. Eliminated,
 
-    u_rigid(v) = −G(v, p) m' φ(p) q,   m' = (1/m + G(p, p))⁻¹ (3, 3)      from M̈ q_r + m φ_rᵀ(φ_r q̈_r + φ q̈) = 0        [Guyan 1965, of no stiffness]
+    u_rigid(v) = −G(v, p) m' φ(p) q,   m' = (1/m + G(p, p))⁻¹ (3, 3)      from M̈ q_r + m φ_rᵀ(φ_r q̈_r + φ q̈) = 0
+        [Guyan 1965, of no stiffness]
 
 so the mass acts as less than it is: at the end of a bar, m/(1 + 4 m/M). A held body has none of this.
 """

@@ -1,7 +1,8 @@
 """Search for the mass that makes of a body's modes the lines that were observed: its price, and the best near a start.
 
 price(vertex, m, R, s, ν) = Σ pairs (pairs.py) + ((ν − ν_guess)/σ_ν)²/18       as much as a line so many widths off
-places in turns, each with Gauss and Newton's steps of (ln m, ln R, s, ν) on the pairs' ln f, Cauchy's weights     [Besl & McKay 1992; Holland & Welsch 1977]
+places in turns, each with Gauss and Newton's steps of (ln m, ln R, s, ν) on the pairs' ln f, Cauchy's weights
+    [Besl & McKay 1992; Holland & Welsch 1977]
 """
 
 from __future__ import annotations
@@ -20,32 +21,41 @@ from sonic_bullet.records import Array, ModalModel
 STEPS = (0.5, 0.8, 1.25, 2.0)
 RATIOS = (-0.03, 0.03)  # steps of ν
 PLACES, POLISH = 2, 4  # of a turn's best, and steps from each
-SMALL, MOST = (0.01, 0.1, 0.1, 0.004), (0.4, 1.0, 1.0, 0.03, 0.02)  # of ln m, ln R along and across, ν, and s: for slopes, and at once
+# of ln m, ln R along and across, ν, and s: for slopes, and at once
+SMALL, MOST = (0.01, 0.1, 0.1, 0.004), (0.4, 1.0, 1.0, 0.03, 0.02)
 LEAST, FINE = 0.1, 1e-3  # of what the rest of the modes may yield; of ν
 MOST_SD, SOLID = 2.0, 0.48  # of the guess' spread; of ν
 NEAR, TURNS = 16, 5  # vertices and turns of the search about one of them
 WIDTHS = (0.016, 0.008, 0.004)  # of ln f: lines and modes are paired ever more closely
-REACH, BINS = (-0.1, 0.25), 0.008  # of ln f: common shifts of the baseline's modes that are looked at; a mass lowers lines, so up above all
+# of ln f: common shifts of the baseline's modes that are looked at; a mass lowers lines, so up above all
+REACH, BINS = (-0.1, 0.25), 0.008
 PEAKS = 2  # of those shifts, tried further
 
 
 def strict(width: float) -> float:
-    """κ of `pairs`: angles between patterns are held as much more closely as frequencies; in the end a mode may sound at a strike as 8 % of its strongest does, not more."""
+    """κ of `pairs`: angles between patterns are held as much more closely as frequencies; in the end a mode may sound
+    at a strike as 8 % of its strongest does, not more.
+    """
     return (WIDTHS[0] / width) ** 2
 
 
 def _at_points(x: ModalModel, observed: ObjectEvidence) -> ModalModel:
     """The model at its strikes and sensor alone: what a trial needs."""
     rows = np.append(observed.strike_vertex, observed.sensor_vertex)
-    return replace(x, shape=x.shape[rows], vertex_m=x.vertex_m[rows], face=np.zeros((0, 3), np.int32), curvature_per_m=np.zeros(0))
+    return replace(
+        x, shape=x.shape[rows], vertex_m=x.vertex_m[rows], face=np.zeros((0, 3), np.int32), curvature_per_m=np.zeros(0)
+    )
 
 
-Scored = tuple[float, int, float, tuple[float, float], float, float]  # price, vertex, mass in kg, yields in m/N of the baseline's stiffness, ln of the scale, ν
+# price, vertex, mass in kg, yields in m/N of the baseline's stiffness, ln of the scale, ν
+Scored = tuple[float, int, float, tuple[float, float], float, float]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MassFit:
-    """Prices of masses on one object: its lines and sizes, its bare model, that at strikes and sensor alone, and its normals."""
+    """Prices of masses on one object: its lines and sizes, its bare model, that at strikes and sensor alone, and its
+    normals.
+    """
 
     observed: ObjectEvidence
     line: Array
@@ -60,10 +70,20 @@ class MassFit:
     def of(cls, observed: ObjectEvidence) -> MassFit:
         assert observed.plain is not None
         line, size, _, _ = every_line(observed)
-        return cls(observed, line, size, observed.plain, _at_points(observed.plain, observed), vertex_normals(observed.plain), FreeBody.of(observed.plain))
+        return cls(
+            observed,
+            line,
+            size,
+            observed.plain,
+            _at_points(observed.plain, observed),
+            vertex_normals(observed.plain),
+            FreeBody.of(observed.plain),
+        )
 
     def rest(self, vertex: int) -> tuple[float, float]:
-        """What modes above the band may yield at a vertex, along its normal and across, in m/N: Σ φ²/λ where as many go on moving as much with every hertz."""
+        """What modes above the band may yield at a vertex, along its normal and across, in m/N: Σ φ²/λ where as many go
+        on moving as much with every hertz.
+        """
         motion = (self.bare.shape[vertex].astype(float) ** 2).sum(axis=0)
         up = (self.normal[vertex] @ self.bare.shape[vertex].astype(float)) ** 2
         top = self.bare.omega0_squared_per_s2.max()
@@ -80,7 +100,9 @@ class MassFit:
         return 0.0 if poisson_range is None else ((ratio - poisson_range.guess) / poisson_range.sd) ** 2 / 18
 
     def at(self, ratio: float) -> tuple[ModalModel, Array | None]:
-        """The bare model at strikes and sensor at a ν, and its modes as sums (m, m) of the baseline's, None where they are those."""
+        """The bare model at strikes and sensor at a ν, and its modes as sums (m, m) of the baseline's, None where they
+        are those.
+        """
         poisson_range = self.observed.poisson
         if poisson_range is None or ratio == poisson_range.fitted:
             return self.small, None
@@ -89,7 +111,10 @@ class MassFit:
             freq, sums = poisson_range.at(ratio)
             freq = np.sqrt(np.maximum(freq**2 - (x.decay_per_s / (2 * np.pi)) ** 2, (0.1 * freq) ** 2))
             order = np.argsort(freq, kind="stable")
-            self.kept[ratio] = replace(x, freq_hz=freq[order], shape=x.shape @ sums[:, order].astype(np.float32)), sums[:, order]
+            self.kept[ratio] = (
+                replace(x, freq_hz=freq[order], shape=x.shape @ sums[:, order].astype(np.float32)),
+                sums[:, order],
+            )
         return self.kept[ratio]
 
     def loaded(self, vertex: int, mass: float, along: tuple[float, float], ratio: float) -> tuple[Array, Array]:
@@ -104,7 +129,9 @@ class MassFit:
         return x.freq_hz, np.abs(push * np.einsum("xm,x->m", x.shape[s].astype(float), observed.sensor_direction))
 
     def shifts(self, freq_hz: Array, pattern: Array) -> list[float]:
-        """None, and the common shifts of modes that most lines of their patterns (s, m) agree on, as two spectra on a logarithmic axis."""
+        """None, and the common shifts of modes that most lines of their patterns (s, m) agree on, as two spectra on a
+        logarithmic axis.
+        """
         alike = 1.0
         if len(self.size) > 1 and np.isfinite(self.size).all() and np.isfinite(pattern).all():
             long = np.linalg.norm(self.size, axis=0)[:, None] * np.linalg.norm(pattern, axis=0)
@@ -122,12 +149,25 @@ class MassFit:
         made = self.loaded(vertex, mass, along, self.fitted)
         return [self._scored(made, vertex, mass, along, shift, self.fitted, width) for shift in self.shifts(*made)]
 
-    def scored(self, vertex: int, mass: float, along: tuple[float, float], shift: float, ratio: float, width: float) -> Scored:
+    def scored(
+        self, vertex: int, mass: float, along: tuple[float, float], shift: float, ratio: float, width: float
+    ) -> Scored:
         """The price of the best pairs first; near a shift."""
         return self._scored(self.loaded(vertex, mass, along, ratio), vertex, mass, along, shift, ratio, width)
 
-    def _scored(self, made: tuple[Array, Array], vertex: int, mass: float, along: tuple[float, float], shift: float, ratio: float, width: float) -> Scored:
-        price, _, _, found = agreed(self.line, self.size, *made, shift=shift, turns=1, width=width, strict=strict(width))
+    def _scored(
+        self,
+        made: tuple[Array, Array],
+        vertex: int,
+        mass: float,
+        along: tuple[float, float],
+        shift: float,
+        ratio: float,
+        width: float,
+    ) -> Scored:
+        price, _, _, found = agreed(
+            self.line, self.size, *made, shift=shift, turns=1, width=width, strict=strict(width)
+        )
         return price + self.unlikely(ratio), vertex, mass, along, found, ratio
 
     def refined(self, best: Scored, widths: tuple[float, ...] = WIDTHS) -> Scored:
@@ -154,7 +194,9 @@ class MassFit:
         least = [LEAST * y for y in self.rest(vertex)]
         trials = [(int(v), mass, (up, side)) for v in near[:: max(1, len(near) // NEAR)]]
         trials += [(vertex, mass * f, (up, side)) for f in STEPS]
-        trials += [(vertex, mass, (max(up, least[0]) * f, side)) for f in (0, *STEPS)] + [(vertex, mass, (up, max(side, least[1]) * f)) for f in (0, *STEPS)]
+        trials += [(vertex, mass, (max(up, least[0]) * f, side)) for f in (0, *STEPS)] + [
+            (vertex, mass, (up, max(side, least[1]) * f)) for f in (0, *STEPS)
+        ]
         found = [self.scored(*one, shift, ratio, width) for one in trials]
         other = [] if self.observed.poisson is None else [self._solid(ratio + s) for s in RATIOS]
         return found + [self.scored(vertex, mass, (up, side), shift, r, width) for r in other]
@@ -165,7 +207,11 @@ class MassFit:
         if poisson_range is None:
             return ratio
         return float(
-            np.clip(round(ratio / FINE) * FINE, poisson_range.guess - MOST_SD * poisson_range.sd, min(poisson_range.guess + MOST_SD * poisson_range.sd, SOLID))
+            np.clip(
+                round(ratio / FINE) * FINE,
+                poisson_range.guess - MOST_SD * poisson_range.sd,
+                min(poisson_range.guess + MOST_SD * poisson_range.sd, SOLID),
+            )
         )
 
     def polished(self, best: Scored, width: float) -> Scored:
@@ -186,13 +232,21 @@ class MassFit:
         """By ln m, ln R along and across, ν and s."""
         _, vertex, mass, along, shift, ratio = best
         up, side = (max(y, LEAST * r) * np.exp(d) for y, r, d in zip(along, self.rest(vertex), step[1:3], strict=True))
-        return vertex, mass * float(np.exp(step[0])), (float(up), float(side)), shift + float(step[4]), self._solid(ratio + step[3])
+        return (
+            vertex,
+            mass * float(np.exp(step[0])),
+            (float(up), float(side)),
+            shift + float(step[4]),
+            self._solid(ratio + step[3]),
+        )
 
     def _step(self, best: Scored, width: float) -> Array:
         """Gauss and Newton's (5,), as little as MOST at once; where lines say nothing of a number it stays."""
         _, _, _, _, shift, ratio = best
         made = self.loaded(best[1], best[2], best[3], ratio)
-        _, row, column, shift = agreed(self.line, self.size, *made, shift=shift, turns=1, width=width, strict=strict(width))
+        _, row, column, shift = agreed(
+            self.line, self.size, *made, shift=shift, turns=1, width=width, strict=strict(width)
+        )
         off = np.log(self.line[row] / made[0][column]) - shift
         slope = np.zeros((len(row), 5))
         slope[:, 4] = 1.0
@@ -202,7 +256,9 @@ class MassFit:
                 continue
             slope[:, k] = np.log(self.loaded(vertex, mass, along, other)[0][column] / made[0][column]) / SMALL[k]
         poisson_range = self.observed.poisson
-        pull = np.array([0, 0, 0, (poisson_range.guess - ratio) / poisson_range.sd**2 if poisson_range is not None else 0.0, 0])
+        pull = np.array(
+            [0, 0, 0, (poisson_range.guess - ratio) / poisson_range.sd**2 if poisson_range is not None else 0.0, 0]
+        )
         weight = 1 / (1 + (off / width) ** 2) / width**2
         held = np.diag(np.array([1.0, 1.0, 1.0, poisson_range.sd if poisson_range is not None else 1.0, 1.0]) ** -2)
         step = np.linalg.solve((slope.T * weight) @ slope + held, (slope.T * weight) @ off + pull)

@@ -1,9 +1,11 @@
 """`amplitude-damping`: friction and plasticity take more of a loud mode than of a soft one.
 
-    ȧ = −d a (1 + (c a)^p)      ->      (a₀/a(t))^p = (1 + (c a₀)^p) e^{pdt} − (c a₀)^p       [Adhikari 2013, ch. 1; equivalent damping: Nayfeh & Mook 1979, § 3.3]
+    ȧ = −d a (1 + (c a)^p)      ->      (a₀/a(t))^p = (1 + (c a₀)^p) e^{pdt} − (c a₀)^p
+        [Adhikari 2013, ch. 1; equivalent damping: Nayfeh & Mook 1979, § 3.3]
 
-p = 1: drag that goes with velocity²; p = 2: with velocity³. Read off the envelopes of single modes, or degenerate modes: early decay faster than late, the more so the
-harder the strike; d is the mode's, c of all, and degenerate modes have the axes that the envelopes tell (axes.py).
+p = 1: drag that goes with velocity²; p = 2: with velocity³. Read off the envelopes of single modes, or degenerate
+modes: early decay faster than late, the more so the harder the strike; d is the mode's, c of all, and degenerate modes
+have the axes that the envelopes tell (axes.py).
 """
 
 from __future__ import annotations
@@ -14,12 +16,30 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from sonic_bullet.effects.amplitude_damping.damped_lines import DecayFit, DecayFrames, fitted_decay, lines_under, onset, under, would
+from sonic_bullet.effects.amplitude_damping.damped_lines import (
+    DecayFit,
+    DecayFrames,
+    fitted_decay,
+    lines_under,
+    onset,
+    under,
+    would,
+)
 from sonic_bullet.effects.amplitude_pitch import MEASURES, _per_velocity
 from sonic_bullet.effects.common.axes import ANGLES, PAIR, turned
 from sonic_bullet.effects.common.envelope import envelopes, levels
 from sonic_bullet.effects.common.proofs import finite, one_of, same_length
-from sonic_bullet.effects.protocol import BaselineChange, ChangesBaseline, Evidence, ObjectEvidence, Owner, Ring, RotatesPairs, Stage, Traits
+from sonic_bullet.effects.protocol import (
+    BaselineChange,
+    ChangesBaseline,
+    Evidence,
+    ObjectEvidence,
+    Owner,
+    Ring,
+    RotatesPairs,
+    Stage,
+    Traits,
+)
 from sonic_bullet.records import Array, ModalModel
 
 BETTER = 3.0  # of ln variance of the envelopes' logarithms, all lines together
@@ -32,10 +52,13 @@ AGAIN = np.geomspace(0.4, 2.5, 9)  # of what all evidence said
 
 @dataclass(frozen=True)
 class AmplitudeDamping(RotatesPairs, ChangesBaseline):
-    """damping_growth: 1/level at which the decay has doubled; power: of the level, with which it rises, 1 or 2. measure: as in amplitude-pitch. alpha_per_s, beta_s: the material's, as the decays at low level tell them.
+    """damping_growth:
 
-    louder: modes at the onset over what the linear model plays, as its lines miss some of a fall that is no exponential. freq_hz, turn_rad: of degenerate modes, and how
-    far their axes are turned from the mesh's.
+    1/level at which the decay has doubled; power: of the level, with which it rises, 1 or 2. measure: as in
+    amplitude-pitch. alpha_per_s, beta_s: the material's, as the decays at low level tell them.
+
+    louder: modes at the onset over what the linear model plays, as its lines miss some of a fall that is no
+    exponential. freq_hz, turn_rad: of degenerate modes, and how far their axes are turned from the mesh's.
     """
 
     id: ClassVar[str] = "amplitude-damping"
@@ -64,7 +87,11 @@ class AmplitudeDamping(RotatesPairs, ChangesBaseline):
 
     def apply(self, x: Ring) -> Ring:
         """The ringing with the effect in it."""
-        return replace(x, damping_growth=x.damping_growth + self.damping_growth * _per_velocity(x, self.measure), damping_growth_power=self.power)
+        return replace(
+            x,
+            damping_growth=x.damping_growth + self.damping_growth * _per_velocity(x, self.measure),
+            damping_growth_power=self.power,
+        )
 
     def turned(self, x: ModalModel) -> ModalModel:
         """The modes as they were, degenerate modes about their own axes."""
@@ -83,7 +110,9 @@ class AmplitudeDamping(RotatesPairs, ChangesBaseline):
     def parameters(self) -> dict[str, Any]:
         """What it says, for people and JSON, in SI units."""
         degenerate = [{"freq_hz": f, "turn_rad": t} for f, t in zip(self.freq_hz, self.turn_rad, strict=True)]
-        return {"choke": self.damping_growth, "measure": self.measure, "power": self.power} | ({"twins": degenerate} if degenerate else {})
+        return {"choke": self.damping_growth, "measure": self.measure, "power": self.power} | (
+            {"twins": degenerate} if degenerate else {}
+        )
 
     def freedom(self) -> int:
         return 2 + len(self.freq_hz)
@@ -103,8 +132,22 @@ class AmplitudeDamping(RotatesPairs, ChangesBaseline):
                     lines = [_held(line, known) for line in lines]
                 found = _fitted(lines, known.damping_growth if known is not None else None)
                 if found is not None and (best is None or found.gain > best[0]):
-                    axes = (known.freq_hz, known.turn_rad) if evidence.on_trial and known is not None else _axes(lines, found)
-                    best = (found.gain, cls(found.damping_growth, name, *_rayleigh(h, lines, found.fits), _louder(h, lines, found), *axes, power))
+                    axes = (
+                        (known.freq_hz, known.turn_rad)
+                        if evidence.on_trial and known is not None
+                        else _axes(lines, found)
+                    )
+                    best = (
+                        found.gain,
+                        cls(
+                            found.damping_growth,
+                            name,
+                            *_rayleigh(h, lines, found.fits),
+                            _louder(h, lines, found),
+                            *axes,
+                            power,
+                        ),
+                    )
         return best[1] if best is not None else None
 
 
@@ -118,7 +161,10 @@ class _Fit:
 
 
 def _fitted(lines: list[DecayFrames], known: float | None) -> _Fit | None:
-    """The damping growth that all lines agree on; None where it is not one that they are sure of. known: what all evidence said, if this is a part of it."""
+    """The damping growth that all lines agree on;
+
+    None where it is not one that they are sure of. known: what all evidence said, if this is a part of it.
+    """
     if len(lines) < 2:
         return None
     most = float(max(line.level.max() for line in lines))
@@ -134,7 +180,9 @@ def _fitted(lines: list[DecayFrames], known: float | None) -> _Fit | None:
     if damping_growth * most < LEAST:
         return None
     if known is None and not (
-        gain.sum() > BETTER and -gain[gain < 0].sum() < 0.3 * gain[gain > 0].sum() and _supported_by_lines(lines, damping_growth, plain, row)
+        gain.sum() > BETTER
+        and -gain[gain < 0].sum() < 0.3 * gain[gain > 0].sum()
+        and _supported_by_lines(lines, damping_growth, plain, row)
     ):
         return None
     return _Fit(damping_growth, float(gain.sum()), row)
@@ -142,7 +190,9 @@ def _fitted(lines: list[DecayFrames], known: float | None) -> _Fit | None:
 
 def _held(line: DecayFrames, known: AmplitudeDamping) -> DecayFrames:
     """The line under the one angle that its degenerate modes are known to have."""
-    turn = next((t for f, t in zip(known.freq_hz, known.turn_rad, strict=True) if abs(f / line.freq_hz - 1) < PAIR), 0.0)
+    turn = next(
+        (t for f, t in zip(known.freq_hz, known.turn_rad, strict=True) if abs(f / line.freq_hz - 1) < PAIR), 0.0
+    )
     return under(line, int(np.abs(ANGLES - turn).argmin())) if len(line.amplitude) > 1 else line
 
 
@@ -150,7 +200,12 @@ def _along(lines: list[DecayFrames], growths: Array) -> list[tuple[DecayFit, ...
     """What every line says of each damping growth, every decay found from the one before."""
     rows: list[tuple[DecayFit, ...]] = []
     for damping_growth in growths.tolist():
-        rows.append(tuple(fitted_decay(line, damping_growth, rows[-1][k].decay_per_s if rows else None) for k, line in enumerate(lines)))
+        rows.append(
+            tuple(
+                fitted_decay(line, damping_growth, rows[-1][k].decay_per_s if rows else None)
+                for k, line in enumerate(lines)
+            )
+        )
     return rows
 
 
@@ -158,11 +213,20 @@ def _cost(row: tuple[DecayFit, ...]) -> float:
     return float(sum(one.least for one in row))
 
 
-def _supported_by_lines(lines: list[DecayFrames], damping_growth: float, plain: tuple[DecayFit, ...], row: tuple[DecayFit, ...]) -> bool:
-    """Whether the lines that a damping growth would bend are bent so: each counts by what a damping growth would be of its misfit, so one loud mode and a softer one will do."""
+def _supported_by_lines(
+    lines: list[DecayFrames], damping_growth: float, plain: tuple[DecayFit, ...], row: tuple[DecayFit, ...]
+) -> bool:
+    """Whether the lines that a damping growth would bend are bent so: each counts by what a damping growth would be of
+    its misfit, so one loud mode and a softer one will do.
+    """
     before = np.exp([one.spread[0] for one in plain])
     after = np.exp([one.least for one in row])
-    bent = np.array([would(line, damping_growth, float(one.decay_per_s[one.best]), one.best) for line, one in zip(lines, row, strict=True)])
+    bent = np.array(
+        [
+            would(line, damping_growth, float(one.decay_per_s[one.best]), one.best)
+            for line, one in zip(lines, row, strict=True)
+        ]
+    )
     says = np.minimum(bent / before, 1.0)
     gone = np.maximum(1 - after / before, -1.0)
     many = float(says.sum() ** 2 / max((says**2).sum(), 1e-300))
@@ -171,7 +235,10 @@ def _supported_by_lines(lines: list[DecayFrames], damping_growth: float, plain: 
 
 def _louder(h: ObjectEvidence, lines: list[DecayFrames], found: _Fit) -> float:
     """The modes' levels at the onset over the linear model's: the middle one of all lines and strikes."""
-    level = [onset(line, found.damping_growth, float(one.decay_per_s[one.best]), one.best) for line, one in zip(lines, found.fits, strict=True)]
+    level = [
+        onset(line, found.damping_growth, float(one.decay_per_s[one.best]), one.best)
+        for line, one in zip(lines, found.fits, strict=True)
+    ]
     plain = [np.abs(h.push[:, h.mode[line.number]].sum(axis=1)) for line in lines]
     ratio = np.stack(level, axis=1) / np.maximum(np.stack(plain, axis=1), 1e-300)
     return float(np.nanmedian(ratio)) if np.isfinite(ratio).any() else 1.0
@@ -179,7 +246,9 @@ def _louder(h: ObjectEvidence, lines: list[DecayFrames], found: _Fit) -> float:
 
 def _axes(lines: list[DecayFrames], found: _Fit) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Frequencies and angles of the degenerate modes whose axes are observable."""
-    observed = [(line.freq_hz, float(ANGLES[one.best])) for line, one in zip(lines, found.fits, strict=True) if one.turned]
+    observed = [
+        (line.freq_hz, float(ANGLES[one.best])) for line, one in zip(lines, found.fits, strict=True) if one.turned
+    ]
     return tuple(f for f, _ in observed), tuple(t for _, t in observed)
 
 

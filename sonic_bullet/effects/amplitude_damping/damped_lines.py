@@ -1,10 +1,14 @@
-"""Lines whose decay goes with the level of the modes they stand for: d and what is left, for a given damping growth c; and the axes of degenerate modes.
+"""Lines whose decay goes with the level of the modes they stand for: d and what is left, for a given damping growth c;
+and the axes of degenerate modes.
 
-    ln |z_s(t)| = const_s + ln |Σ_m A_sm e/(1 + x_sm (1 − e^p))^{1/p}|,   e = e^{−dt},  x_sm = (c a_sm)^p            [effects.amplitude_damping]
-    d by Gauss and Newton; const_s of each strike alone, so no gain is needed; how far these differ from strike to strike tells angles alone
+    ln |z_s(t)| = const_s + ln |Σ_m A_sm e/(1 + x_sm (1 − e^p))^{1/p}|,   e = e^{−dt},  x_sm = (c a_sm)^p
+        [effects.amplitude_damping]
+    d by Gauss and Newton; const_s of each strike alone, so no gain is needed; how far these differ from strike to
+        strike tells angles alone
 
-Two degenerate modes are one line, and each is damped by its own level: how loud each is depends on where the pair's axes lie, which in a linear body nobody
-hears, and which a mesh leaves to chance (axes.py). ψ is tried all round, line by line.
+Two degenerate modes are one line, and each is damped by its own level: how loud each is depends on where the pair's
+axes lie, which in a linear body nobody hears, and which a mesh leaves to chance (axes.py). ψ is tried all round, line
+by line.
 """
 
 from __future__ import annotations
@@ -30,7 +34,8 @@ FAINT = 1e-3  # of Σ|A|: degenerate modes may cancel, not vanish
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DecayFrames:
-    """A line's frames: time_s (t,), logarithm (s, t) and weight (s, t) of |z|; amplitude and level (p, s, j) of its j modes under p angles of their axes.
+    """A line's frames: time_s (t,), logarithm (s, t) and weight (s, t) of |z|; amplitude and level (p, s, j) of its j
+    modes under p angles of their axes.
 
     freq_hz: the modes' middle in the model; decay_per_s: as observed. number: which of the observed. power: p.
     """
@@ -48,7 +53,9 @@ class DecayFrames:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DecayFit:
-    """Of a line under a damping_growth: ln of the variance (p,) it leaves within strikes, ln of that between them, and its decay (p,) under every angle."""
+    """Of a line under a damping_growth: ln of the variance (p,) it leaves within strikes, ln of that between them, and
+    its decay (p,) under every angle.
+    """
 
     spread: Array
     between: Array
@@ -84,7 +91,18 @@ def lines_under(e: Envelopes, h: ObjectEvidence, measure: str) -> list[DecayFram
         size = np.maximum(np.abs(e.z[:, q]), 1e-300)
         weight = np.where(good, 1 / (ROUGH**2 + (e.noise[:, q, None] / size) ** 2), 0.0)[:, thin]
         freq = float(h.model.freq_hz[h.mode[k]].mean()) if h.model is not None else float(h.freq_hz[k])
-        found.append(DecayFrames(k, freq, max(float(h.decay_per_s[k]), 1e-2), e.time_s[q, thin], np.log(size)[:, thin], weight, amplitude, level))
+        found.append(
+            DecayFrames(
+                k,
+                freq,
+                max(float(h.decay_per_s[k]), 1e-2),
+                e.time_s[q, thin],
+                np.log(size)[:, thin],
+                weight,
+                amplitude,
+                level,
+            )
+        )
     return found
 
 
@@ -97,7 +115,9 @@ def fitted_decay(line: DecayFrames, damping_growth: float, start: Array | None =
     low, high = RANGE[0] * line.decay_per_s, RANGE[1] * line.decay_per_s
     for _ in range(STEPS):
         left, slope = _left(line, damping_growth, decay)
-        step = (line.weight * left * slope).sum(axis=(1, 2)) / np.maximum((line.weight * slope**2).sum(axis=(1, 2)), 1e-300)
+        step = (line.weight * left * slope).sum(axis=(1, 2)) / np.maximum(
+            (line.weight * slope**2).sum(axis=(1, 2)), 1e-300
+        )
         decay = np.clip(decay - step, low, high)
     left, _ = _left(line, damping_growth, decay)
     within = np.log((line.weight * left**2).sum(axis=(1, 2)) / line.weight.sum() + ROUGH**2)
@@ -105,18 +125,23 @@ def fitted_decay(line: DecayFrames, damping_growth: float, start: Array | None =
 
 
 def _between(line: DecayFrames, damping_growth: float, decay: Array) -> Array:
-    """ln of the variance (p,) of the levels that the model gives strikes over those observed; one in which the line is not observed may not be modelled louder."""
+    """ln of the variance (p,) of the levels that the model gives strikes over those observed; one in which the line is
+    not observed may not be modelled louder.
+    """
     observed = line.weight.sum(axis=1) > 0
     early = line.time_s < line.time_s[0] + EARLY / line.decay_per_s
     weight = np.where(observed[:, None], line.weight, early.astype(float))
-    off = (weight / weight.sum(axis=1, keepdims=True) * (line.log - _model(line, damping_growth, decay)[0])).sum(axis=2)  # (p, s)
+    # (p, s)
+    off = (weight / weight.sum(axis=1, keepdims=True) * (line.log - _model(line, damping_growth, decay)[0])).sum(axis=2)
     off = off - np.median(off[:, observed], axis=1, keepdims=True)
     off = np.clip(np.where(observed, off, np.minimum(off, 0.0)), -MOST, MOST)
     return np.asarray(np.log((off**2).mean(axis=1) + LEVEL**2))
 
 
 def would(line: DecayFrames, damping_growth: float, decay_per_s: float, angle: int) -> float:
-    """The variance that no damping growth would leave of a line that is just what a damping growth makes it: what that is of its misfit."""
+    """The variance that no damping growth would leave of a line that is just what a damping growth makes it: what that
+    is of its misfit.
+    """
     one = under(line, angle)
     model = _model(one, damping_growth, np.array([decay_per_s]))[0][0]
     plain = fitted_decay(replace(one, log=model), 0.0)
@@ -129,7 +154,9 @@ def onset(line: DecayFrames, damping_growth: float, decay_per_s: float, angle: i
     model = _model(one, damping_growth, np.array([decay_per_s]))[0][0]
     total = line.weight.sum(axis=1)
     mean = (line.weight * (line.log - model)).sum(axis=1) / np.where(total > 0, total, np.nan)
-    return np.asarray(np.exp(mean) * np.maximum(np.abs(one.amplitude[0].sum(axis=1)), FAINT * np.abs(one.amplitude[0]).sum(axis=1)))
+    return np.asarray(
+        np.exp(mean) * np.maximum(np.abs(one.amplitude[0].sum(axis=1)), FAINT * np.abs(one.amplitude[0]).sum(axis=1))
+    )
 
 
 def under(line: DecayFrames, angle: int = 0) -> DecayFrames:

@@ -1,9 +1,12 @@
-"""`amplitude-pitch`: a body that moves far is stiffer, or softer: the frequency follows the square of its level down as it decays.
+"""`amplitude-pitch`: a body that moves far is stiffer, or softer: the frequency follows the square of its level down as
+it decays.
 
-    ω(t) = ω (1 + b a²(t))                                                    [Nayfeh & Mook 1979, eq. 2.3.35: the Duffing oscillator]
+    ω(t) = ω (1 + b a²(t))
+        [Nayfeh & Mook 1979, eq. 2.3.35: the Duffing oscillator]
 
-Read off the phase of single modes: θ(t) = θ₀ + δ t + b a₀² ω (1 − e^{−2dt})/2d, θ₀ each strike's own, δ the mode's, b of all;
-by modes without a degenerate partner, where there are enough that are sure of it, else by all, pairs about their own axes (degenerate_pitch.py).
+Read off the phase of single modes: θ(t) = θ₀ + δ t + b a₀² ω (1 − e^{−2dt})/2d, θ₀ each strike's own, δ the mode's, b
+of all; by modes without a degenerate partner, where there are enough that are sure of it, else by all, pairs about
+their own axes (degenerate_pitch.py).
 """
 
 from __future__ import annotations
@@ -24,14 +27,16 @@ MEASURES = ("impulse", "velocity", "displacement")
 STANDARD_ERRORS = 5.0  # spreads that b must stand off zero
 BETTER = 0.5  # of the phases' misfit must go, in modes that b would move
 FEWEST_MODES = 1.5  # of such modes
-FAR = np.geomspace(0.6, 1.7, 12)  # times the bend that degenerate modes were identified with as if each pair were one mode
+# times the bend that degenerate modes were identified with as if each pair were one mode
+FAR = np.geomspace(0.6, 1.7, 12)
 NEAR = np.geomspace(0.93, 1.07, 5)  # about what that leads to
 ENOUGH = 3  # modes without a degenerate partner, to be asked alone
 
 
 @dataclass(frozen=True, slots=True)
 class Slope:
-    """b, its spread, the share of the phases' misfit that goes with it in modes it would move, and how many modes' misfit that is.
+    """b, its spread, the share of the phases' misfit that goes with it in modes it would move, and how many modes'
+    misfit that is.
 
     single: whether it is identified by modes without a degenerate partner alone.
     """
@@ -45,8 +50,8 @@ class Slope:
 
 @dataclass(frozen=True)
 class AmplitudePitch(RotatesPairs):
-    """bend: relative rise of frequency per level². measure: of the level, one of MEASURES, in N·s, m/s or m. freq_hz, turn_rad: of degenerate modes, and how far their axes
-    are turned from the mesh's.
+    """bend: relative rise of frequency per level². measure: of the level, one of MEASURES, in N·s, m/s or m. freq_hz,
+    turn_rad: of degenerate modes, and how far their axes are turned from the mesh's.
     """
 
     id: ClassVar[str] = "amplitude-pitch"
@@ -100,8 +105,12 @@ class AmplitudePitch(RotatesPairs):
         return best[1] if best is not None else None
 
     @classmethod
-    def _with_axes(cls, e: Envelopes, h: ObjectEvidence, measure: str, b: Slope, known: AmplitudePitch | None, held: bool) -> Self:
-        """The same with the axes of degenerate modes, known's if held; where hardly a mode is without its degenerate partner, their bend with it."""
+    def _with_axes(
+        cls, e: Envelopes, h: ObjectEvidence, measure: str, b: Slope, known: AmplitudePitch | None, held: bool
+    ) -> Self:
+        """The same with the axes of degenerate modes, known's if held; where hardly a mode is without its degenerate
+        partner, their bend with it.
+        """
         if h.model is None or measure == "impulse":
             return cls(b.bend, measure)
         bend = b.bend
@@ -123,10 +132,15 @@ def _per_velocity(x: Ring, measure: str) -> Array:
 
 
 def _slopes(e: Envelopes, h: ObjectEvidence, known: AmplitudePitch | None) -> dict[str, Slope]:
-    """Of every measure that lines are sure of: modes without a degenerate partner where those are ENOUGH and sure of any, else all. known: what all evidence said."""
-    single = np.array([not degenerate(h, k) for k in e.line.tolist()], bool)  # the frequencies of degenerate modes drift each by its own level
+    """Of every measure that lines are sure of: modes without a degenerate partner where those are ENOUGH and sure of
+    any, else all. known: what all evidence said.
+    """
+    # the frequencies of degenerate modes drift each by its own level
+    single = np.array([not degenerate(h, k) for k in e.line.tolist()], bool)
     rows = {
-        name: np.array([one or (0.0, 0.0, 0.0) for one in (_moments(e, h, level[:, e.line], q) for q in range(len(e.line)))]).reshape(-1, 3)
+        name: np.array(
+            [one or (0.0, 0.0, 0.0) for one in (_moments(e, h, level[:, e.line], q) for q in range(len(e.line)))]
+        ).reshape(-1, 3)
         for name, level in levels(h).items()
         if known is None or name == known.measure
     }
@@ -150,7 +164,9 @@ def _significant(b: Slope, known: AmplitudePitch | None) -> bool:
 
 
 def _agreed(table: Array, single: bool) -> Slope:
-    """b by the modes' own (n, 3), each as heavy as what a bend would be in its phase over what there is; its spread by their scatter [White 1980]."""
+    """b by the modes' own (n, 3), each as heavy as what a bend would be in its phase over what there is; its spread by
+    their scatter [White 1980].
+    """
     if not len(table):
         return Slope(0.0, np.inf, 0.0, 0.0, single)
     xx, xy, yy = table.T
@@ -160,15 +176,24 @@ def _agreed(table: Array, single: bool) -> Slope:
         off = np.abs(value - centre)
         near = 1 / (1 + (off / (2 * _median(off, weight) + 1e-12 * abs(centre) + 1e-200)) ** 2)
         centre = float((weight * near * value).sum() / (weight * near).sum())
-    says = np.minimum(centre**2 * weight, 1.0)  # of a mode's misfit, as much as a bend would be of it: the others have no say
+    # of a mode's misfit, as much as a bend would be of it: the others have no say
+    says = np.minimum(centre**2 * weight, 1.0)
     gone = np.maximum((2 * centre * xy - centre**2 * xx) / yy, -1.0)
     sd = float(np.sqrt(((says * (value - centre)) ** 2).sum()) / max(says.sum(), 1e-300))
     alone = says.sum() ** 2 / max(float((says**2).sum()), 1e-300) < FEWEST_MODES
-    return Slope(centre, np.inf if alone else max(sd, 1e-300), float((says * gone).sum() / max(says.sum(), 1e-300)), float(gone.sum()), single)
+    return Slope(
+        centre,
+        np.inf if alone else max(sd, 1e-300),
+        float((says * gone).sum() / max(says.sum(), 1e-300)),
+        float(gone.sum()),
+        single,
+    )
 
 
 def _moments(e: Envelopes, h: ObjectEvidence, level: Array, q: int) -> tuple[float, float, float] | None:
-    """Σ x², Σ xy, Σ y² of a mode: y its strikes' phases without their means and the common slope, x what b = 1 would make of them; None where too little is clear."""
+    """Σ x², Σ xy, Σ y² of a mode: y its strikes' phases without their means and the common slope, x what b = 1 would
+    make of them; None where too little is clear.
+    """
     decay, omega = falls(e, q, float(h.decay_per_s[e.line[q]])), 2 * np.pi * float(h.freq_hz[e.line[q]])
     rows, sides, weights, ramps = [], [], [], []
     for s in range(len(e.z)):

@@ -1,9 +1,12 @@
 """Degenerate modes whose frequencies go with their own levels: where the pair's axes lie, for a given bend b.
 
-    z_s(t) = Σ_m A_sm e^{−dt + iθ_sm(t)},   θ = b a_sm² ω (1 − e^{−2dt})/2d,   a_sm and A_sm of axes turned by ψ         [effects.amplitude_pitch]
-    u_s(t) = z_s(t + L)/z_s(t) modelled and observed agree in phase but for δL, whatever the strike's own phase and the line's own frequency: ψ -> max
+    z_s(t) = Σ_m A_sm e^{−dt + iθ_sm(t)},   θ = b a_sm² ω (1 − e^{−2dt})/2d,   a_sm and A_sm of axes turned by ψ
+        [effects.amplitude_pitch]
+    u_s(t) = z_s(t + L)/z_s(t) modelled and observed agree in phase but for δL, whatever the strike's own phase and the
+        line's own frequency: ψ -> max
 
-Two degenerate modes are one line until they are loud: then one of them may have drifted away, while the other has hardly been struck. A mesh leaves their axes to chance (axes.py).
+Two degenerate modes are one line until they are loud: then one of them may have drifted away, while the other has
+hardly been struck. A mesh leaves their axes to chance (axes.py).
 """
 
 from __future__ import annotations
@@ -23,7 +26,9 @@ TURNS = 0.1  # of a line's ln variance, that its degenerate modes' axes must be 
 
 
 def bend_with_axes(e: Envelopes, h: ObjectEvidence, measure: str, bend: float, factor: Array) -> float:
-    """The bend, some factors (n,) about one that was identified as if every line were one mode's, that lines agree on best, degenerate modes about their own axes."""
+    """The bend, some factors (n,) about one that was identified as if every line were one mode's, that lines agree on
+    best, degenerate modes about their own axes.
+    """
     lines = [q for q in range(len(e.line)) if e.good[:, q].any()]
     cost = np.zeros(len(factor))
     for q in lines:
@@ -49,7 +54,10 @@ def axes_of(e: Envelopes, h: ObjectEvidence, measure: str, bend: float) -> tuple
 
 
 def spread(e: Envelopes, h: ObjectEvidence, q: int, bend: float, amplitude: Array, level: Array) -> Array:
-    """Ln of the variances (p,) that levels, beside one factor, and gains of phase leave of a line. amplitude, level (p, s, j): of its modes under p angles of their axes."""
+    """Ln of the variances (p,) that levels, beside one factor, and gains of phase leave of a line.
+
+    amplitude, level (p, s, j): of its modes under p angles of their axes.
+    """
     k = int(e.line[q])
     decay, omega, t = max(float(h.decay_per_s[k]), 1e-2), 2 * np.pi * float(h.freq_hz[k]), e.time_s[q]
     turn = bend * omega * level[..., None] ** 2 * -np.expm1(-2 * decay * t) / (2 * decay)  # (p, s, j, t)

@@ -1,1 +1,3 @@
-"""What several effects share: axes of degenerate pairs, envelopes, patterns, points on surfaces, pulses, ringing, hum, reverberant tails, dashpots."""
+"""What several effects share: axes of degenerate pairs, envelopes, patterns, points on surfaces, pulses, ringing, hum,
+reverberant tails, dashpots.
+"""

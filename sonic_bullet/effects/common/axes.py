@@ -1,8 +1,10 @@
-"""Axes of degenerate modes: two modes of one frequency swing about whatever axes an imperfection gives them, and a mesh gives them any.
+"""Axes of degenerate modes: two modes of one frequency swing about whatever axes an imperfection gives them, and a mesh
+gives them any.
 
     (a, b) -> (cos ψ a + sin ψ b, −sin ψ a + cos ψ b)          [Rayleigh 1894, § 221]
 
-Their sum is the same under every ψ as long as both are linear. Not so where each goes with its own level: then ψ is observable.
+Their sum is the same under every ψ as long as both are linear. Not so where each goes with its own level: then ψ is
+observable.
 """
 
 from __future__ import annotations
@@ -17,7 +19,9 @@ from sonic_bullet.records import Array, ModalModel
 
 PAIR = 6e-3  # relative: modes of a mesh nearer than this may be a pair
 MESHED = 1.5e-3  # relative: modes that a mesh leaves nearer to each other are degenerate modes that it split apart
-ONE = 1e-4  # relative: degenerate modes that corrections have not brought nearer than this are played as two, and turned they would be two others
+# relative: degenerate modes that corrections have not brought nearer than this are played as two, and turned they would
+# be two others
+ONE = 1e-4
 ANGLES = np.arange(18) * np.pi / 36  # a quarter turn changes the degenerate modes about, and no more
 
 
@@ -53,7 +57,9 @@ def split_apart(h: ObjectEvidence, k: int) -> bool:
 
 
 def about(h: ObjectEvidence, k: int, measure: str, angle: Array) -> tuple[Array, Array]:
-    """Amplitudes at the sensor, but for one factor, and levels (p, s, j) of the modes a line stands for, with degenerate modes turned by p angles. measure: see envelope.levels."""
+    """Amplitudes at the sensor, but for one factor, and levels (p, s, j) of the modes a line stands for, with
+    degenerate modes turned by p angles. measure: see envelope.levels.
+    """
     impulse = np.where(np.isfinite(h.impulse_n_s), h.impulse_n_s, 1.0)[:, None]
     if h.model is None:
         pressed = h.pressed[:, h.mode[k]].max(axis=1)[None, :, None]

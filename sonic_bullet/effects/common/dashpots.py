@@ -1,10 +1,12 @@
 """Modes under dashpots, at any strength.
 
-    (s² + s (2d + ΦᵀcΦ) + Λ) q = 0,   qᵀ(2s + 2d + ΦᵀcΦ) q = 2i Im s      [Tisseur & Meerbergen 2001, § 3; Woodhouse 1998, eq. 12; Adhikari 1999 for the norm]
+    (s² + s (2d + ΦᵀcΦ) + Λ) q = 0,   qᵀ(2s + 2d + ΦᵀcΦ) q = 2i Im s
+        [Tisseur & Meerbergen 2001, § 3; Woodhouse 1998, eq. 12; Adhikari 1999 for the norm]
 
-To first order a lone mode's decay grows by ½ Σ c φ². Of modes at one frequency (a ring's, a bowl's) one dashpot makes a mode that takes all, and others that stand
-still there and take nothing; neighbours whose distance in ω is not far above ½ΦᵀcΦ mix; a strong dashpot holds its point, and decays fall again.
-With this norm Σ (φ(p)·q)(φ(x)·q)(1 + id/ω) e^{st} is the velocity after a unit impulse: of q, the real part is kept; the imaginary is a per cent of the sound.
+To first order a lone mode's decay grows by ½ Σ c φ². Of modes at one frequency (a ring's, a bowl's) one dashpot makes a
+mode that takes all, and others that stand still there and take nothing; neighbours whose distance in ω is not far above
+½ΦᵀcΦ mix; a strong dashpot holds its point, and decays fall again. With this norm Σ (φ(p)·q)(φ(x)·q)(1 + id/ω) e^{st}
+is the velocity after a unit impulse: of q, the real part is kept; the imaginary is a per cent of the sound.
 """
 
 from __future__ import annotations
@@ -22,7 +24,10 @@ STILL = 1e-6  # of ω: what swings slower does not swing
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Coupled:
-    """pole s (…, m) in 1/s, by rising frequency; turn (…, m, m) complex: old modes in a new one, by columns. One that no longer swings is NaN, with zeros."""
+    """pole s (…, m) in 1/s, by rising frequency;
+
+    turn (…, m, m) complex: old modes in a new one, by columns. One that no longer swings is NaN, with zeros.
+    """
 
     pole: Array
     turn: Array
@@ -39,7 +44,10 @@ def coupled(lam: Array, decay_per_s: Array, phi: Array) -> Coupled:
     state[..., m:, m:] = -loss
     s, vector = np.linalg.eig(state)
     order = np.argsort(-s.imag, axis=-1, kind="stable")[..., :m][..., ::-1]
-    s, q = np.take_along_axis(s, order, -1), np.take_along_axis(vector[..., :m, :], order[..., None, :], -1) / omega[:, None]
+    s, q = (
+        np.take_along_axis(s, order, -1),
+        np.take_along_axis(vector[..., :m, :], order[..., None, :], -1) / omega[:, None],
+    )
     alive = s.imag > STILL * omega[0]
     norm = 2 * s * (q * q).sum(axis=-2) + (q * (loss @ q)).sum(axis=-2)
     turn = q * np.sqrt(2j * s.imag / np.where(norm == 0, 1, norm))[..., None, :]
@@ -68,7 +76,9 @@ def _kin(found: Coupled) -> Array:
 
 
 def apart(omega: Array, most: int) -> list[Array]:
-    """Runs of neighbouring modes, at most so many in each, cut where frequencies (m,) lie farthest apart: what couples does so within them, nearly."""
+    """Runs of neighbouring modes, at most so many in each, cut where frequencies (m,) lie farthest apart: what couples
+    does so within them, nearly.
+    """
     runs, done = [np.arange(len(omega))], []
     while runs:
         run = runs.pop()

@@ -1,10 +1,13 @@
 """Single modes out of a recording: each line shifted to 0 Hz, low-passed and decimated.
 
-    z_k(t) = 2 (y e^{−iω_k t}) * w,   w a Hann window of length L, centred, sum 1:  nulls at ± 2/L and beyond   [Harris 1978, eq. 27]
+    z_k(t) = 2 (y e^{−iω_k t}) * w,   w a Hann window of length L, centred, sum 1:  nulls at ± 2/L and beyond
+        [Harris 1978, eq. 27]
 
-The window is a sum of three exponentials, 1/(L + 1) Σ_a c_a e^{iaθ(n − m)}, θ = 2π/(L + 1), c = ½, 1, ½: z at any sample m is a difference of running sums.
+The window is a sum of three exponentials, 1/(L + 1) Σ_a c_a e^{iaθ(n − m)}, θ = 2π/(L + 1), c = ½, 1, ½: z at any
+sample m is a difference of running sums.
 
-Only lines that stand alone are worth it: no other of a twentieth of their strength nearer than 2/L, but for their own first, short part, which the window has to hold.
+Only lines that stand alone are worth it: no other of a twentieth of their strength nearer than 2/L, but for their own
+first, short part, which the window has to hold.
 """
 
 from __future__ import annotations
@@ -24,7 +27,9 @@ FRAMES = 96
 MOST_SAID = 1e4  # by one frame
 NEPERS = 8.0  # of a line's decay are looked at
 SELF = 0.006  # relative: lines nearer than this may be one bent mode
-FAR, FASTER = 0.15, 5.0  # of a frequency; of a decay: a line that near and that short is what a mode was before its frequency had drifted down, or up
+# of a frequency; of a decay: a line that near and that short is what a mode was before its frequency had drifted down,
+# or up
+FAR, FASTER = 0.15, 5.0
 LINK = 4.0  # of the shorter line's decay: how far in ω two lines of a chain are
 HELD = 0.8  # of 2/L to both sides, at most: what the window holds of a drifting frequency
 CLEAR = 12.0  # of |z| over the noise in it
@@ -33,7 +38,8 @@ STEP = 1024  # samples between two exact phasors
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Envelopes:
-    """z (s, q, t) complex of q lines at times time_s (q, t), each line its own; good (s, q, t) where it stands clear; line (q,): which of the observed.
+    """z (s, q, t) complex of q lines at times time_s (q, t), each line its own; good (s, q, t) where it stands clear;
+    line (q,): which of the observed.
 
     phase (s, q, t): of z, without jumps, however few the frames are. noise (s, q). window_s (q,): L.
     """
@@ -92,7 +98,9 @@ def shifted(h: ObjectEvidence, signal: Array, selected: list[int], window: list[
 
 
 def windowed(y: Array, omega: float, length: int, at: Array) -> Array:
-    """z of y (n,) at ω radians a sample, at samples ``at`` (t,) the window of an odd ``length`` is centred on; nothing is beyond the ends."""
+    """z of y (n,) at ω radians a sample, at samples ``at`` (t,) the window of an odd ``length`` is centred on; nothing
+    is beyond the ends.
+    """
     half, theta = length // 2, 2 * np.pi / (length + 1)
     first, last = np.clip(at - half, 0, len(y)), np.clip(at + half + 1, 0, len(y))
     run = _running(np.asarray(y, float)[: int(last.max(initial=0))], omega, theta)
@@ -129,11 +137,15 @@ def alone(h: ObjectEvidence) -> tuple[list[int], list[int]]:
     selected, window = [], []
     for k in range(len(h.freq_hz)):
         rival = np.abs(every - h.freq_hz[k])
-        pitch_fall = (chain == chain[k]) & foreign | (rival < FAR * h.freq_hz[k]) & (decay > FASTER * decay[k])  # its own beginning, while it was loud
+        # its own beginning, while it was loud
+        pitch_fall = (chain == chain[k]) & foreign | (rival < FAR * h.freq_hz[k]) & (decay > FASTER * decay[k])
         near = (rival > 1e-9) & (strength > 0.05 * strength[k]) & (rival > SELF * h.freq_hz[k]) & ~pitch_fall
-        same = (rival < SELF * h.freq_hz[k]) & (strength > 3 * strength[k]) & ~pitch_fall  # the louder one of a bent mode's lines stands for it
+        # the louder one of a bent mode's lines stands for it
+        same = (rival < SELF * h.freq_hz[k]) & (strength > 3 * strength[k]) & ~pitch_fall
         gap = rival[near].min() if near.any() else np.inf
-        width = min(0.8 * gap, max([WIDTH_HZ[1], *(2 * rival + decay / np.pi)[pitch_fall & (strength > 0.05 * strength[k])]]))
+        width = min(
+            0.8 * gap, max([WIDTH_HZ[1], *(2 * rival + decay / np.pi)[pitch_fall & (strength > 0.05 * strength[k])]])
+        )
         if width >= max(WIDTH_HZ[0], 0.6 * h.decay_per_s[k]) and not same.any() and int(2 * sr / width) < n // 4:
             selected.append(k)
             window.append(int(2 * sr / width) | 1)
@@ -144,7 +156,9 @@ def alone(h: ObjectEvidence) -> tuple[list[int], list[int]]:
 
 
 def _chains(freq_hz: Array, decay_per_s: Array) -> Array:
-    """Which chain each line (k,) belongs to: lines so near each other, for their decays, that one mode of drifting frequency may have left them."""
+    """Which chain each line (k,) belongs to: lines so near each other, for their decays, that one mode of drifting
+    frequency may have left them.
+    """
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import connected_components
 
@@ -155,20 +169,28 @@ def _chains(freq_hz: Array, decay_per_s: Array) -> Array:
 
 
 def levels(h: ObjectEvidence) -> dict[str, Array]:
-    """How hard each line (s, k) is driven, by three measures of what the pulse leaves of an impact: its impulse, and peak velocity and peak displacement at the body's surface."""
+    """How hard each line (s, k) is driven, by three measures of what the pulse leaves of an impact: its impulse, and
+    peak velocity and peak displacement at the body's surface.
+    """
     level = np.where(np.isfinite(h.impulse_n_s), h.impulse_n_s, 1.0)
     found = {"impulse": level[:, None] * np.stack([h.pressed[:, m].max(axis=1) for m in h.mode], axis=1)}
     if h.model is None:
         return found
     body = np.unique(h.model.face)
     most = np.sqrt((h.model.shape[body].astype(float) ** 2).sum(axis=1)).max(axis=0)
-    push = np.abs(np.einsum("sxm,sx->sm", h.model.shape[h.strike_vertex].astype(float), h.strike_direction)) * most * h.pressed
+    push = (
+        np.abs(np.einsum("sxm,sx->sm", h.model.shape[h.strike_vertex].astype(float), h.strike_direction))
+        * most
+        * h.pressed
+    )
     velocity = level[:, None] * np.stack([push[:, m].max(axis=1) for m in h.mode], axis=1)
     return found | {"velocity": velocity, "displacement": velocity / (2 * np.pi * h.freq_hz)}
 
 
 def falls(e: Envelopes, q: int, fitted: float) -> float:
-    """The decay of a line's own level, in 1/s: a mode of drifting frequency is several lines to a linear fit, none with its decay. fitted: by those; what comes back where too little is clear."""
+    """The decay of a line's own level, in 1/s: a mode of drifting frequency is several lines to a linear fit, none with
+    its decay. fitted: by those; what comes back where too little is clear.
+    """
     top = bottom = 0.0
     for s in range(len(e.z)):
         use = e.good[s, q]
@@ -180,7 +202,8 @@ def falls(e: Envelopes, q: int, fitted: float) -> float:
         if (w > 0).sum() < 8:
             continue
         off = np.clip(off, -HELD, HELD)
-        level = np.log(size * (1 - off**2) / np.sinc(off))  # while its frequency drifts, it is observed through the window's skirt
+        # while its frequency drifts, it is observed through the window's skirt
+        level = np.log(size * (1 - off**2) / np.sinc(off))
         t = t - np.average(t, weights=w)
         top, bottom = top - float((w * t * level).sum()), bottom + float((w * t * t).sum())
     return max(top / bottom if bottom > 0 else fitted, 1e-3)

@@ -1,9 +1,10 @@
 """Hum: a tone at the mains and its multiples that is there before, during and after, however hard the strike.
 
-Σ_i a_i cos(2π i f₀ t + φ_i),   f₀ about 50 or 60 Hz: read off the last third of every recording, where least else is left
+Σ_i a_i cos(2π i f₀ t + φ_i),
+    f₀ about 50 or 60 Hz: read off the last third of every recording, where least else is left
 
-One recording tells no hum from a mode that rings for long; nor do strikes of one strength, unless several multiples sound, as modes are not in tune with the mains, or one so
-low that no mode is to be expected there.
+One recording tells no hum from a mode that rings for long; nor do strikes of one strength, unless several multiples
+sound, as modes are not in tune with the mains, or one so low that no mode is to be expected there.
 """
 
 from __future__ import annotations
@@ -20,7 +21,8 @@ ABOVE = 30.0  # times the power beside it
 STEADY = 1.6  # loudest over softest recording
 STILL = 0.2  # ln of its amplitude in the second half of the tails over that in the first, at most: modes fade
 FEWEST_RECORDINGS, LEAST_S = 2, 0.2  # recordings, and the length of their tails
-LOW, UNLIKE = 2, 2.0  # multiples where no mode is to be expected; loudest over softest peak of strikes, with which a mode would go
+# multiples where no mode is to be expected; loudest over softest peak of strikes, with which a mode would go
+LOW, UNLIKE = 2, 2.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,7 +35,9 @@ class Hum:
 
 
 def hum_of(signals: Array, noise: Array, sr: int, known_hz: float = 0.0) -> Hum | None:
-    """What hums in recordings (s, n) over a noise (s,); None where no tone has one amplitude in all of them, and from first to last.
+    """What hums in recordings (s, n) over a noise (s,);
+
+    None where no tone has one amplitude in all of them, and from first to last.
 
     known_hz: as other recordings gave it; then one will do.
     """
@@ -54,9 +58,14 @@ def hum_of(signals: Array, noise: Array, sr: int, known_hz: float = 0.0) -> Hum 
         near = np.flatnonzero(np.abs(hz - mains) < (hz[1] if known_hz else 1.2 * mains / 50))
         if not len(near):
             continue
-        background = np.array([np.median(power[:, np.abs(np.abs(hz - i * mains) - 0.3 * mains) < 0.15 * mains], axis=1) for i in multiple])  # pink rooms
+        # pink rooms
+        background = np.array(
+            [np.median(power[:, np.abs(np.abs(hz - i * mains) - 0.3 * mains) < 0.15 * mains], axis=1) for i in multiple]
+        )
         least = np.maximum(background / np.log(2), floor)  # (i, s)
-        tone = np.array([(power[:, np.minimum(i * near, len(hz) - 1)] / least[i - 1][:, None]).min(axis=0) for i in multiple])
+        tone = np.array(
+            [(power[:, np.minimum(i * near, len(hz) - 1)] / least[i - 1][:, None]).min(axis=0) for i in multiple]
+        )
         score = np.log1p(tone / ABOVE).sum(axis=0)
         at = int(score.argmax())
         if score[at] > (1.0 if best is None else best[0]):
@@ -72,21 +81,34 @@ def hum_of(signals: Array, noise: Array, sr: int, known_hz: float = 0.0) -> Hum 
     def quiet(f: float) -> float:
         return -float((np.abs(waves(f)) ** 2).sum())
 
-    exact = float(minimize_scalar(quiet, bounds=(hz[line] - step, hz[line] + step), method="bounded", options={"xatol": 1e-4 * step}).x)  # between the steps
+    # between the steps
+    exact = float(
+        minimize_scalar(
+            quiet, bounds=(hz[line] - step, hz[line] + step), method="bounded", options={"xatol": 1e-4 * step}
+        ).x
+    )
     wave = waves(exact)
     size = 2 * np.abs(wave) / shape.sum()
     half = n // 2
     parts = np.stack([np.hanning(half) * tail[:, i * half : (i + 1) * half] for i in (0, 1)])
     turn = np.exp(-2j * np.pi * exact * np.outer(np.arange(half) / sr, multiple))
     fades = np.diff(np.log(np.abs(parts @ turn) + 1e-300), axis=0)[0].mean(axis=0)  # (i,)
-    steady = (size.max(axis=0) < STEADY * size.min(axis=0)) & (np.abs(wave) ** 2 > ABOVE * least.T).all(axis=0) & (np.abs(fades) < STILL)
+    steady = (
+        (size.max(axis=0) < STEADY * size.min(axis=0))
+        & (np.abs(wave) ** 2 > ABOVE * least.T).all(axis=0)
+        & (np.abs(fades) < STILL)
+    )
     peak = np.abs(signals).max(axis=1)
     alone = steady.sum() == 1 and not steady[:LOW].any() and peak.max() < UNLIKE * peak.min()
     if not steady.any() or (alone and not known_hz):
         return None
     last = int(np.flatnonzero(steady).max()) + 1
     mean, phase = np.exp(np.log(size).mean(axis=0)), np.angle((wave / np.abs(wave)).sum(axis=0))
-    return Hum(exact, tuple(float(a) if s else 0.0 for a, s in zip(mean[:last], steady[:last], strict=True)), tuple(map(float, phase[:last])))
+    return Hum(
+        exact,
+        tuple(float(a) if s else 0.0 for a, s in zip(mean[:last], steady[:last], strict=True)),
+        tuple(map(float, phase[:last])),
+    )
 
 
 def without(signals: Array, sr: int, hum: Hum) -> Array:

@@ -1,8 +1,10 @@
 """Which line is which mode of a body that an effect has changed: by nearness and by pattern over the strikes.
 
-    price_kj = ((ln f_k − ln f_j − s)/w)²/18 + κ (1 − c_kj),  at most 1;  Σ worth_k (price − 1) -> min over one-to-one pairs     [Kuhn 1955; Crouse 2016]
+    price_kj = ((ln f_k − ln f_j − s)/w)²/18 + κ (1 − c_kj),  at most 1;  Σ worth_k (price − 1) -> min over one-to-one
+        pairs     [Kuhn 1955; Crouse 2016]
 
-c: cosine of the amplitudes' magnitudes over the strikes, κ: how strictly it is taken; s: the common shift ln f, found in turns with the pairs; worth: a line's strength, in logarithm.
+c: cosine of the amplitudes' magnitudes over the strikes, κ: how strictly it is taken; s: the common shift ln f, found
+in turns with the pairs; worth: a line's strength, in logarithm.
 """
 
 from __future__ import annotations
@@ -31,23 +33,36 @@ def patterns(h: ObjectEvidence, model: ModalModel) -> Array:
     """|J φ(p)·e φ(q)·n| (s, m) of the strikes."""
     level = np.where(np.isfinite(h.impulse_n_s), h.impulse_n_s, 1.0)
     push = np.einsum("sxm,sx->sm", model.shape[h.strike_vertex].astype(float), h.strike_direction) * level[:, None]
-    return np.asarray(np.abs(push * np.einsum("xm,x->m", model.shape[h.sensor_vertex].astype(float), h.sensor_direction)))
+    return np.asarray(
+        np.abs(push * np.einsum("xm,x->m", model.shape[h.sensor_vertex].astype(float), h.sensor_direction))
+    )
 
 
 def agreed(
-    line_hz: Array, size: Array, mode_hz: Array, pattern: Array, *, shift: float = 0.0, turns: int = 2, width: float = WIDTH, strict: float = 1.0
+    line_hz: Array,
+    size: Array,
+    mode_hz: Array,
+    pattern: Array,
+    *,
+    shift: float = 0.0,
+    turns: int = 2,
+    width: float = WIDTH,
+    strict: float = 1.0,
 ) -> tuple[float, Array, Array, float]:
     """(score, line (p,), mode (p,), shift): the least price, 0 where nothing pairs and −Σ worth where all do."""
     from scipy.optimize import linear_sum_assignment
 
-    if not (np.isfinite(size).all() and size.any() and np.isfinite(pattern).all() and pattern.any()):  # lists of frequencies, or strikes of unknown place
+    # lists of frequencies, or strikes of unknown place
+    if not (np.isfinite(size).all() and size.any() and np.isfinite(pattern).all() and pattern.any()):
         size, pattern = np.ones((1, len(line_hz))), np.ones((1, len(mode_hz)))
     strength = size.max(axis=0)
     worth = np.clip(1 + 0.25 * np.log10(np.maximum(strength / strength.max(), 1e-6)), 0.1, 1)
     participation = pattern.max(axis=0)
     force = np.clip(1 + 0.25 * np.log10(np.maximum(participation / max(participation.max(), 1e-300), 1e-6)), 0.1, 1)
     if len(size) > 1:
-        alike = (size.T @ pattern) / np.maximum(np.linalg.norm(size, axis=0)[:, None] * np.linalg.norm(pattern, axis=0)[None, :], 1e-300)
+        alike = (size.T @ pattern) / np.maximum(
+            np.linalg.norm(size, axis=0)[:, None] * np.linalg.norm(pattern, axis=0)[None, :], 1e-300
+        )
     else:
         alike = np.ones((size.shape[1], pattern.shape[1]))
     x, y = np.log(line_hz)[:, None], np.log(mode_hz)[None, :]

@@ -37,7 +37,8 @@ def vertex_normals(model: ModalModel) -> Array:
 
 
 def solved(y: Array, sd: Array, columns: Array) -> tuple[Array, Array]:
-    """Coefficients (c,) >= 0 of columns (k, c), of any scale, that say y (k,) of spreads sd best, and twice Huber's losses (k,) left.
+    """Coefficients (c,) >= 0 of columns (k, c), of any scale, that say y (k,) of spreads sd best, and twice Huber's
+    losses (k,) left.
 
     Huber's weights [Huber 1964] on least squares without negative numbers [Lawson & Hanson 1974].
     """

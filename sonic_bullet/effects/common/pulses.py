@@ -1,9 +1,11 @@
 """Force pulses of finite length: what share of an impulse a mode takes.
 
-    F̂(f)/F̂(0) = ∫ s(t/τ) e^{−2πift} dt / ∫ s dt,   s(x) on 0 ≤ x ≤ 1:   half-sine sin πx · hertz sin^{3/2} πx · raised-cosine 1 − cos 2πx
+    F̂(f)/F̂(0) = ∫ s(t/τ) e^{−2πift} dt / ∫ s dt,   s(x) on 0 ≤ x ≤ 1:
+        half-sine sin πx · hertz sin^{3/2} πx · raised-cosine 1 − cos 2πx
 
-Half-sine in closed form: |cos(πfτ)/(1 − 4f²τ²)|; raised cosine: |sinc(fτ)/(1 − f²τ²)|; the Hertz pulse by quadrature. The phase is the delay of
-the pulse's centre, −πfτ. [Hunter 1957; physics of the half-sine: Graff, Wave Motion in Elastic Solids 1975, ch. 2]
+Half-sine in closed form: |cos(πfτ)/(1 − 4f²τ²)|; raised cosine: |sinc(fτ)/(1 − f²τ²)|; the Hertz pulse by quadrature.
+The phase is the delay of the pulse's centre, −πfτ. [Hunter 1957; physics of the half-sine: Graff, Wave Motion in
+Elastic Solids 1975, ch. 2]
 """
 
 from __future__ import annotations

@@ -1,10 +1,15 @@
-"""What a line is of itself, and what a diffuse tail makes of it: its own decay, amplitude and frequency, read through a reverberation of the rate δ.
+"""What a line is of itself, and what a diffuse tail makes of it: its own decay, amplitude and frequency, read through a
+reverberation of the rate δ.
 
-    z(t) = A (e^{pt} + r(t)),  p = −d + iΔω;   dr = p r dt + noise of power w² 2δ e^{−2δt}: what the tail's taps drive the mode with   [Polack 1988; Kuttruff 2009, ch. 4]
-    Cov(r(t), r(t')) = w² 2δ e^{−d|t − t'|} (e^{−2δm} − e^{−2dm})/(2d − 2δ),   m = min(t, t')              [Ornstein & Uhlenbeck 1930, with fading noise]
-    ln L = −ln det V − |z − A e^{pt}|² in V⁻¹,   V = |A|² w² C + noise;  A in closed form, d and w summed over grids, Δω at its best
+    z(t) = A (e^{pt} + r(t)),  p = −d + iΔω;   dr = p r dt + noise of power w² 2δ e^{−2δt}: what the tail's taps drive
+        the mode with   [Polack 1988; Kuttruff 2009, ch. 4]
+    Cov(r(t), r(t')) = w² 2δ e^{−d|t − t'|} (e^{−2δm} − e^{−2dm})/(2d − 2δ),   m = min(t, t')
+        [Ornstein & Uhlenbeck 1930, with fading noise]
+    ln L = −ln det V − |z − A e^{pt}|² in V⁻¹,   V = |A|² w² C + noise;
+        A in closed form, d and w summed over grids, Δω at its best
 
-z is the line's baseband over all strikes at once, in short frames: weighted with the model's pattern, so that what is near in frequency and not alike cancels.
+z is the line's baseband over all strikes at once, in short frames: weighted with the model's pattern, so that what is
+near in frequency and not alike cancels.
 """
 
 from __future__ import annotations
@@ -29,15 +34,18 @@ SHIFTS = 21
 FAINT = 1e-25  # of the direct sound's power
 PATTERN = 0.03  # of a line's strongest: what shapes are wrong by
 FASTEST = 300.0  # 1/s: what dies sooner is gone within a frame or two, and how soon is not identifiable
-LIKE = 0.7  # squared cosine of amplitudes over the strikes and what the model says: a line less like its mode is the room's own
-OWNS = 8.0  # times longer than it is observed to ring: no line's own, though a tail makes several of one, which end sooner
+# squared cosine of amplitudes over the strikes and what the model says: a line less like its mode is the room's own
+LIKE = 0.7
+# times longer than it is observed to ring: no line's own, though a tail makes several of one, which end sooner
+OWNS = 8.0
 OUTLASTS = 0.5  # of the tail's decay: what falls slower has the recording to itself in the end
 STANDARD_ERRORS = 0.1  # of a decay and of an amplitude: the tail's early echoes are no noise
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Read:
-    """k lines at each δ of t: ln_likelihood, decay_per_s and its ln_sd, shift_hz, amplitude (over the model's so far) with amplitude_sd, reverberant_level: all (t, k).
+    """k lines at each δ of t: ln_likelihood, decay_per_s and its ln_sd, shift_hz, amplitude (over the model's so far)
+    with amplitude_sd, reverberant_level: all (t, k).
 
     plain (k,): ln likelihood of the line without a tail, at the same decays.
     """
@@ -53,8 +61,11 @@ class Read:
     reverberant_level: Array
 
 
-def read(h: ObjectEvidence, delta: Array, freq_hz: Array, own: Array, members: Sequence[Array], *, every: int = 1) -> Read:
-    """Lines at freq_hz (k,) at some δ (t,). own (s, k): what A is in units of, complex; members: the modes that each is, so that others are its neighbours.
+def read(
+    h: ObjectEvidence, delta: Array, freq_hz: Array, own: Array, members: Sequence[Array], *, every: int = 1
+) -> Read:
+    """Lines at freq_hz (k,) at some δ (t,). own (s, k): what A is in units of, complex; members: the modes that each
+    is, so that others are its neighbours.
 
     every: of the decays how many are looked at, for a first look.
     """
@@ -78,10 +89,15 @@ def expected_amplitude(h: ObjectEvidence) -> Array:
 
 @lru_cache(maxsize=4)
 def through(h: ObjectEvidence, delta: float) -> Read:
-    """All lines of an object at one δ; remembered, as evidence is asked for it more than once. What outlasts the tail is left as it was observed: late, it rings alone."""
+    """All lines of an object at one δ;
+
+    remembered, as evidence is asked for it more than once. What outlasts the tail is left as it was observed: late, it
+    rings alone.
+    """
     r = modes(h, np.array([delta]), np.arange(len(h.freq_hz)))
     sd = h.decay_sd_per_s / np.maximum(h.decay_per_s, 1e-9)
-    alone = (h.decay_per_s < OUTLASTS * delta) & (r.decay_per_s < delta) & (sd < STANDARD_ERRORS)  # by both: a faint line may beat with the tail's own
+    # by both: a faint line may beat with the tail's own
+    alone = (h.decay_per_s < OUTLASTS * delta) & (r.decay_per_s < delta) & (sd < STANDARD_ERRORS)
     return replace(
         r,
         decay_per_s=np.where(alone, h.decay_per_s, r.decay_per_s),
@@ -91,13 +107,17 @@ def through(h: ObjectEvidence, delta: float) -> Read:
 
 
 def dereverberated(h: ObjectEvidence, delta: float) -> ObjectEvidence:
-    """The same with frequencies, decays and amplitudes of all lines as they would be without the tail; those that are no mode go with the impulse."""
+    """The same with frequencies, decays and amplitudes of all lines as they would be without the tail; those that are
+    no mode go with the impulse.
+    """
     if h.dry or h.signal is None or not len(h.freq_hz) or h.signal.shape[1] < LEAST * FRAME_S * h.sr:
         return h
     r = through(h, delta)
     own, decay = expected_amplitude(h), r.decay_per_s[0]
     amplitude, spread = _rescaled(r, own, h.amplitude, h.amplitude_sd)
-    like = np.abs((np.conj(own) * h.amplitude).sum(axis=0)) ** 2 / np.maximum((np.abs(own) ** 2).sum(axis=0) * (np.abs(h.amplitude) ** 2).sum(axis=0), 1e-300)
+    like = np.abs((np.conj(own) * h.amplitude).sum(axis=0)) ** 2 / np.maximum(
+        (np.abs(own) ** 2).sum(axis=0) * (np.abs(h.amplitude) ** 2).sum(axis=0), 1e-300
+    )
     ln_sd = np.where((decay > FASTEST) | (like < LIKE), np.inf, np.hypot(r.ln_sd[0], STANDARD_ERRORS))
     dry = replace(
         h,
@@ -115,8 +135,10 @@ def dereverberated(h: ObjectEvidence, delta: float) -> ObjectEvidence:
     alone = np.repeat(level[:, None], len(h.foreign_hz), axis=1).astype(complex)
     r = read(h, np.array([delta]), h.foreign_hz, alone, [np.zeros(0, int)] * len(h.foreign_hz))
     amplitude, _ = _rescaled(r, alone, h.foreign_amplitude, h.foreign_sd)
-    strange = h.foreign_sd * np.abs(amplitude) / np.maximum(np.abs(h.foreign_amplitude), 1e-300)  # what strikes have in common says nothing of how they differ
-    other = r.decay_per_s[0] * OWNS < h.foreign_decay_per_s  # a tail prolongs: what is read to ring longer than it is observed to is a neighbour's
+    # what strikes have in common says nothing of how they differ
+    strange = h.foreign_sd * np.abs(amplitude) / np.maximum(np.abs(h.foreign_amplitude), 1e-300)
+    # a tail prolongs: what is read to ring longer than it is observed to is a neighbour's
+    other = r.decay_per_s[0] * OWNS < h.foreign_decay_per_s
     return replace(
         dry,
         foreign_hz=h.foreign_hz + np.where(other, 0, r.shift_hz[0]),
@@ -129,15 +151,19 @@ def dereverberated(h: ObjectEvidence, delta: float) -> ObjectEvidence:
 def _rescaled(r: Read, own: Array, amplitude: Array, sd: Array) -> tuple[Array, Array]:
     """Amplitudes and spreads (s, k) with what all strikes have in common read anew."""
     now = (np.conj(own) * amplitude).sum(axis=0) / np.maximum((np.abs(own) ** 2).sum(axis=0), 1e-300)
-    silent = (np.abs(own).sum(axis=0) == 0) | (now == 0)  # the model says nothing of them: they stay as they were observed
+    # the model says nothing of them: they stay as they were observed
+    silent = (np.abs(own).sum(axis=0) == 0) | (now == 0)
     factor = np.where(silent, 1, r.amplitude[0] / np.where(silent, 1, now))
     common = np.abs(own) * np.hypot(r.amplitude_sd[0], STANDARD_ERRORS * np.abs(r.amplitude[0]))
-    common = np.maximum(common, STANDARD_ERRORS * np.abs(amplitude * factor))  # where a mode is hardly struck, more is observed of it than the model says
+    # where a mode is hardly struck, more is observed of it than the model says
+    common = np.maximum(common, STANDARD_ERRORS * np.abs(amplitude * factor))
     return amplitude * factor, np.hypot(sd * np.abs(factor), common)
 
 
 def direct(h: ObjectEvidence, delta: float) -> Array:
-    """What the strikes (s, n) would sound like without the tail: the lines' modes as they are read, the others as the nearest of those."""
+    """What the strikes (s, n) would sound like without the tail: the lines' modes as they are read, the others as the
+    nearest of those.
+    """
     assert h.signal is not None
     r = through(h, delta)
     near = np.abs(np.log(h.all_hz[:, None] / h.freq_hz)).argmin(axis=1)
@@ -146,7 +172,9 @@ def direct(h: ObjectEvidence, delta: float) -> Array:
         near[members], shift[members] = k, h.freq_hz[k] + r.shift_hz[0, k] - h.all_hz[members]
     none = np.zeros(len(near))
     once = Impact(1.0, np.zeros(1), np.ones(1))
-    rings = (Ring(h.all_hz + shift, r.decay_per_s[0, near], row * r.amplitude[0, near], none, none, none) for row in h.push)
+    rings = (
+        Ring(h.all_hz + shift, r.decay_per_s[0, near], row * r.amplitude[0, near], none, none, none) for row in h.push
+    )
     return np.stack([sounded(ring, once, h.signal.shape[1], h.sr) for ring in rings])
 
 
@@ -161,7 +189,9 @@ def _frames(h: ObjectEvidence) -> tuple[Array, Array]:
     return hop * np.unique(np.concatenate([dense, sparse])), window / window.sum()
 
 
-def _basebands(h: ObjectEvidence, freq: Array, own: Array, members: Sequence[Array], start: Array, window: Array) -> tuple[Array, Array]:
+def _basebands(
+    h: ObjectEvidence, freq: Array, own: Array, members: Sequence[Array], start: Array, window: Array
+) -> tuple[Array, Array]:
     """Frames (k, n) of every line in units of its own, and the noise's variance there (k,)."""
     assert h.signal is not None
     at = np.arange(len(window)) / h.sr
@@ -190,22 +220,27 @@ def _whitener(time: tuple[float, ...]) -> Array:
 
 
 def _overlap(time: Array) -> Array:
-    """Correlation (n, n) of white noise in two frames: of Hann windows at a distance u of their length, (1 − u)(2 + cos 2πu)/3 + sin 2πu/2π [Harris 1978, eq. 9]."""
+    """Correlation (n, n) of white noise in two frames: of Hann windows at a distance u of their length, (1 − u)(2 + cos
+    2πu)/3 + sin 2πu/2π [Harris 1978, eq. 9].
+    """
     u = np.minimum(np.abs(time[:, None] - time[None, :]) / FRAME_S, 1.0)
     return np.asarray(((1 - u) * (2 + np.cos(2 * np.pi * u)) + 1.5 / np.pi * np.sin(2 * np.pi * u)) / 3)
 
 
 @lru_cache(maxsize=1500)
 def _tail(time: tuple[float, ...], decay: float, delta: float) -> tuple[Array, Array, Array]:
-    """What a decay and a rate say of frames (n,), whatever the line: their first mean, variances (n,) of a tail of unit reverberant level along uncorrelated
-    directions, for white noise of unit variance, and the frames' means and directions there (n, 1 + n)."""
+    """What a decay and a rate say of frames (n,), whatever the line: their first mean, variances (n,) of a tail of unit
+    reverberant level along uncorrelated directions, for white noise of unit variance, and the frames' means and
+    directions there (n, 1 + n)."""
     at = np.array(time)
     node, weight = (np.arange(NODES) + 0.5) / NODES * FRAME_S, np.hanning(NODES + 2)[1:-1]
     weight = weight / weight.sum()
     t = (at[:, None] + node).ravel()
     gap = 2 * (decay - delta)
     var = 2 * delta * np.exp(-2 * delta * t) * (-np.expm1(-gap * t) / gap if gap else t)
-    both = np.exp(-decay * np.abs(t[:, None] - t[None, :])) * np.where(t[:, None] < t[None, :], var[:, None], var[None, :])
+    both = np.exp(-decay * np.abs(t[:, None] - t[None, :])) * np.where(
+        t[:, None] < t[None, :], var[:, None], var[None, :]
+    )
     both = weight @ both.reshape(len(at), NODES, -1)
     both = both.reshape(len(at), len(at), NODES) @ weight
     both[both < FAINT] = 0.0  # or the solver works on numbers that processors are a hundred times slower with
@@ -223,7 +258,8 @@ def _at(z: Array, noise: Array, time: tuple[float, ...], decay: float, delta: fl
     half = min(max(2 * max(decay, delta) / np.pi, 2.0), 0.4 / (at[1] - at[0]))
     shift = np.linspace(-half, half, SHIFTS)
     moved = z[:, :, None] * np.exp(-2j * np.pi * at[:, None] * shift)
-    m, b = turn[:, 0], turn[:, 1:] @ moved.view(float).reshape(len(z), len(at), -1)  # (n,), (k, n, Δ) real and imaginary side by side
+    # (n,), (k, n, Δ) real and imaginary side by side
+    m, b = turn[:, 0], turn[:, 1:] @ moved.view(float).reshape(len(z), len(at), -1)
     b = b.view(complex)
     scale = (np.abs(z[:, 0] / mean) ** 2)[:, None] * SHARES  # (k, w): |A|² w²
     over = 1 / (scale[:, :, None] * value + noise[:, None, None])  # (k, w, n)
@@ -239,7 +275,10 @@ def _at(z: Array, noise: Array, time: tuple[float, ...], decay: float, delta: fl
 
 def _summed(delta: Array, decays: Array, rows: list[list[tuple[Array, ...]]]) -> Read:
     """Over decays and reverberant levels: means of ln d and ln w, the rest at the likeliest."""
-    like, amplitude, sd, shift, reverberant_level = (np.array([[one[i] for one in row] for row in rows]) for i in range(5))  # (t, d, k, w)
+    # (t, d, k, w)
+    like, amplitude, sd, shift, reverberant_level = (
+        np.array([[one[i] for one in row] for row in rows]) for i in range(5)
+    )
     t, _, k, _ = like.shape
     top = like.max(axis=(1, 3), keepdims=True)
     share = np.exp(like - top)
@@ -249,7 +288,10 @@ def _summed(delta: Array, decays: Array, rows: list[list[tuple[Array, ...]]]) ->
     square = np.einsum("tdk,d->tk", by_decay, np.log(decays) ** 2) / total
     flat = like.transpose(0, 2, 1, 3).reshape(t, k, -1)
     best = flat.argmax(axis=2)[:, :, None]
-    at = [np.take_along_axis(x.transpose(0, 2, 1, 3).reshape(t, k, -1), best, axis=2)[:, :, 0] for x in (amplitude, sd, shift)]
+    at = [
+        np.take_along_axis(x.transpose(0, 2, 1, 3).reshape(t, k, -1), best, axis=2)[:, :, 0]
+        for x in (amplitude, sd, shift)
+    ]
     mean_level = np.exp((share * np.log(np.maximum(reverberant_level, 1e-300))).sum(axis=(1, 3)) / total)
     plain = like[:, :, :, 0].max(axis=(0, 1))
     step = np.log(decays[1] / decays[0])

@@ -1,11 +1,14 @@
 """Modes that ring, sample by sample: linear ones by recursion, level-dependent ones in closed form.
 
     linear             x_m(t) = Re A e^{(−d + iω)t}
-    growth c           ȧ = −d a (1 + c (a/a₀)^p)      ->  a(t)/a₀ = ((1 + c) e^{pdt} − c)^{−1/p}, p = 1, 2   (Bernoulli's equation)
+    growth c           ȧ = −d a (1 + c (a/a₀)^p)      ->  a(t)/a₀ = ((1 + c) e^{pdt} − c)^{−1/p}, p = 1, 2
+        (Bernoulli's equation)
     bend b             ω(t) = ω (1 + b a²(t))         ->  phase ω(t + b ∫a²dt)
 
-a is the mode's level (peak velocity at the surface); ∫a² dt = a₀² (1 − e^{−2dt})/2d without damping growth; a₀² ln(1 + c − c e^{−2dt})/2dc with p = 2; and with p = 1,
-u = e^{dt}, k = c/(1 + c):   ∫ a² dt = a₀²/(d (1 + c)²) ∫₁ᵘ dv/(v (v − k)²) = a₀²/(d (1 + c)²) [ln(v/(v − k))/k² − 1/(k (v − k))]₁ᵘ.
+a is the mode's level (peak velocity at the surface); ∫a² dt = a₀² (1 − e^{−2dt})/2d without damping growth; a₀² ln(1 +
+c − c e^{−2dt})/2dc with p = 2; and with p = 1,
+u = e^{dt}, k = c/(1 + c):
+    ∫ a² dt = a₀²/(d (1 + c)²) ∫₁ᵘ dv/(v (v − k)²) = a₀²/(d (1 + c)²) [ln(v/(v − k))/k² − 1/(k (v − k))]₁ᵘ.
 """
 
 # mypy: disable-error-code="no-untyped-def"
@@ -37,7 +40,9 @@ def _linear(out, start, pole, amplitude, length):
 
 @njit(nogil=True)
 def _level(out, start, sr, omega, decay, amplitude, bend, damping_growth, power, length):
-    """The same with ω(t) and d(t) that depend on the mode's level; bend and damping growth at the level the mode starts with, (damping_growth·level)^power."""
+    """The same with ω(t) and d(t) that depend on the mode's level; bend and damping growth at the level the mode starts
+    with, (damping_growth·level)^power.
+    """
     for k in range(len(omega)):
         first = int(np.ceil(start))
         last = min(len(out), first + length[k])
@@ -58,9 +63,11 @@ def _level(out, start, sr, omega, decay, amplitude, bend, damping_growth, power,
                 else:
                     u = 1.0 / fall
                     level = 1.0 / ((1.0 + c) * u - c)
-                    area = (np.log(u * (1.0 - share) / (u - share)) / share**2 - 1.0 / (share * (u - share)) + 1.0 / (share * (1.0 - share))) / (
-                        d * (1.0 + c) ** 2
-                    )
+                    area = (
+                        np.log(u * (1.0 - share) / (u - share)) / share**2
+                        - 1.0 / (share * (u - share))
+                        + 1.0 / (share * (1.0 - share))
+                    ) / (d * (1.0 + c) ** 2)
                 out[n] += size * level * np.cos(angle + omega[k] * (t + bend[k] * area))
                 fall *= step
 
@@ -82,7 +89,10 @@ def sounded(ring: Ring, impact: Impact, n: int, sr: int) -> Array:
             _linear(out, delay * sr, pole[~bent], (share * a)[~bent].astype(complex), length[~bent])
         if bent.any():
             level = (ring.level[use] * share * np.abs(impact.spectrum(f)))[bent]
-            bend, damping_growth = ring.bend[use][bent] * level**2, (ring.damping_growth[use][bent] * level) ** ring.damping_growth_power
+            bend, damping_growth = (
+                ring.bend[use][bent] * level**2,
+                (ring.damping_growth[use][bent] * level) ** ring.damping_growth_power,
+            )
             _level(
                 out,
                 delay * sr,
@@ -103,5 +113,7 @@ def direct_as_expected(observed: ObjectEvidence) -> Array:
     assert observed.signal is not None
     none = np.zeros(len(observed.freq_hz))
     once = Impact(1.0, np.zeros(1), np.ones(1))
-    rings = (Ring(observed.freq_hz, np.nan_to_num(observed.decay_per_s), row, none, none, none) for row in observed.expected)
+    rings = (
+        Ring(observed.freq_hz, np.nan_to_num(observed.decay_per_s), row, none, none, none) for row in observed.expected
+    )
     return np.stack([sounded(ring, once, observed.signal.shape[1], observed.sr) for ring in rings])

@@ -1,9 +1,10 @@
 """`orthotropy`: stiffness that depends on direction: crystals, wood, rolled and laid-up sheets. Axes are the mesh's.
 
-    σ = C ε with C cubic (3 constants), hexagonal about x, y or z (5) or orthorhombic (9)      [Nye 1957, ch. VIII; Migliori et al. 1993]
+    σ = C ε with C cubic (3 constants), hexagonal about x, y or z (5) or orthorhombic (9)
+        [Nye 1957, ch. VIII; Migliori et al. 1993]
 
-Read off all lines, whatever isotropic modes they were paired with (tensor_search.py); None where isotropy does as well. Density is the guess's:
-modes tell C/ρ alone.
+Read off all lines, whatever isotropic modes they were paired with (tensor_search.py); None where isotropy does as well.
+Density is the guess's: modes tell C/ρ alone.
 """
 
 from __future__ import annotations
@@ -21,14 +22,20 @@ from sonic_bullet.records import ORTHOTROPIC, Array, Material
 
 BETTER = 10.0  # in BIC, than isotropy
 NEARER = 0.7  # of isotropy's rms of ln f, lines beyond the cap counted at the cap
-IN_A_ROOM = 30.0  # or in BIC, with a line more within the cap: half of those in a room are no modes, and beyond it whatever the tensor
-SUFFICES = 5e-3  # rms of ln f from the nearest isotropic mode that leaves nothing to look for: split pairs, corrected meshes
+# or in BIC, with a line more within the cap: half of those in a room are no modes, and beyond it whatever the tensor
+IN_A_ROOM = 30.0
+# rms of ln f from the nearest isotropic mode that leaves nothing to look for: split pairs, corrected meshes
+SUFFICES = 5e-3
 LEAST = 0.03  # of ln E_i/E_j or ln of Zener's ratio: less is the mesh's
 
 
 @dataclass(frozen=True)
 class Orthotropy:
-    """constants_pa (9,): C11 C22 C33 C23 C13 C12 C44 C55 C66. symmetry: one of "cubic", "hexagonal-x" to "-z", "orthorhombic". held: identified by no mode."""
+    """constants_pa (9,):
+
+    C11 C22 C33 C23 C13 C12 C44 C55 C66. symmetry: one of "cubic", "hexagonal-x" to "-z", "orthorhombic". held:
+    identified by no mode.
+    """
 
     id: ClassVar[str] = "orthotropy"
     stage: ClassVar[Stage] = Stage.MATERIAL
@@ -59,7 +66,10 @@ class Orthotropy:
         c = dict(zip(("c11", "c22", "c33", "c23", "c13", "c12", "c44", "c55", "c66"), self.constants_pa, strict=True))
         names = {"cubic": ("c11", "c12", "c44")}.get(self.symmetry, tuple(c))
         values: dict[str, Any] = {"symmetry": self.symmetry} | {f"{name}_pa": float(c[name]) for name in names}
-        values |= {"youngs_ratio": [1.0, float(youngs[1] / youngs[0]), float(youngs[2] / youngs[0])], "youngs_x_pa": float(youngs[0])}
+        values |= {
+            "youngs_ratio": [1.0, float(youngs[1] / youngs[0]), float(youngs[2] / youngs[0])],
+            "youngs_x_pa": float(youngs[0]),
+        }
         if self.symmetry == "cubic":
             values["zener_ratio"] = float(2 * c["c44"] / (c["c11"] - c["c12"]))
         return values | ({"held_near_isotropy": list(self.held)} if self.held else {})
@@ -79,7 +89,9 @@ class Orthotropy:
         if isinstance(evidence.known, cls) and bodies:
             density = bodies[0].elastic.material.density_kg_m3
             start = p_of(evidence.known.stiffness_pa / density)
-            return cls.of(fitted(bodies, evidence.known.symmetry, start, isotropic_p(bodies[0].elastic), WIDTHS[4:]), density)
+            return cls.of(
+                fitted(bodies, evidence.known.symmetry, start, isotropic_p(bodies[0].elastic), WIDTHS[4:]), density
+            )
         lines = sum(len(t.log_hz) for t in bodies)
         if lines < 6 or all(_fits(h) for h in evidence.observed):
             return None
@@ -114,8 +126,14 @@ def _fits(h: ObjectEvidence) -> bool:
         modes = model.freq_hz if model is not None else h.all_hz
         strange = np.abs(np.log(h.foreign_hz[own][:, None] / modes[None, :]) - shift).min(axis=1)
         left = np.concatenate([left, np.minimum(strange, CAP)])
-    size = np.concatenate([np.linalg.norm(np.nan_to_num(a), axis=0) for a in (h.amplitude, h.foreign_amplitude[:, own])])
-    worth = np.clip(0.5 + 0.06 * np.log10(np.maximum(size / max(size.max(initial=0), 1e-300), 1e-12)), 0.05, 1) if size.any() else np.ones(len(left))
+    size = np.concatenate(
+        [np.linalg.norm(np.nan_to_num(a), axis=0) for a in (h.amplitude, h.foreign_amplitude[:, own])]
+    )
+    worth = (
+        np.clip(0.5 + 0.06 * np.log10(np.maximum(size / max(size.max(initial=0), 1e-300), 1e-12)), 0.05, 1)
+        if size.any()
+        else np.ones(len(left))
+    )
     return bool(np.sqrt((worth * left**2).sum() / worth.sum()) < SUFFICES)
 
 

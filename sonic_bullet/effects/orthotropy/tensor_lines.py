@@ -1,6 +1,7 @@
 """A body's lines, whatever they stand for, beside the modes that a tensor gives it, and which is which.
 
-ObjectEvidence -> BodyLines;   BodyLines, p -> Seen (`Elastic.look`);   BodyLines, Seen -> pairs at the least price      [Kuhn 1955]
+ObjectEvidence -> BodyLines;   BodyLines, p -> Seen (`Elastic.look`);   BodyLines, Seen -> pairs at the least price
+    [Kuhn 1955]
 """
 
 from __future__ import annotations
@@ -17,12 +18,16 @@ from sonic_bullet.records import Array
 CAP = 0.012  # of ln f: a line farther off is no such mode
 BRIEF = 10.0  # times the modes' usual decay
 SHORT = 2.0  # times its frequency a mode's decay at most: a loss factor of 0.64, more than soft rubber's
-REAL = 0.75  # of a line's energy in phase with the impact, where phases are true: a mode moves with it or against it, noise as it likes
+# of a line's energy in phase with the impact, where phases are true: a mode moves with it or against it, noise as it
+# likes
+REAL = 0.75
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BodyLines:
-    """One body's lines: ln f and spread (k,), worth (k,), amplitude (s, k) or None where patterns say nothing, row (s,): which strikes of `Elastic.look`."""
+    """One body's lines: ln f and spread (k,), worth (k,), amplitude (s, k) or None where patterns say nothing, row
+    (s,): which strikes of `Elastic.look`.
+    """
 
     log_hz: Array
     sd: Array
@@ -34,11 +39,15 @@ class BodyLines:
 
 def body_lines_of(evidence: Evidence) -> list[BodyLines]:
     """All lines, whatever they were paired with, of the objects that can be of any elasticity."""
-    return [_body_lines(h) for h in evidence.observed if h.elastic is not None and len(h.freq_hz) + len(h.foreign_hz) > 4]
+    return [
+        _body_lines(h) for h in evidence.observed if h.elastic is not None and len(h.freq_hz) + len(h.foreign_hz) > 4
+    ]
 
 
 def ringing(h: ObjectEvidence) -> Array:
-    """Which foreign lines (f,) may be modes by their decay and phases; others are a click's, a filter's, a room's or noise."""
+    """Which foreign lines (f,) may be modes by their decay and phases; others are a click's, a filter's, a room's or
+    noise.
+    """
     decay = np.nan_to_num(h.foreign_decay_per_s)
     own = decay < SHORT * h.foreign_hz
     if np.isfinite(h.decay_per_s).any():
@@ -52,13 +61,20 @@ def ringing(h: ObjectEvidence) -> Array:
 def _body_lines(h: ObjectEvidence) -> BodyLines:
     assert h.elastic is not None
     own = ringing(h)
-    freq, decay = np.concatenate([h.freq_hz, h.foreign_hz[own]]), np.concatenate([h.decay_per_s, h.foreign_decay_per_s[own]])
+    freq, decay = (
+        np.concatenate([h.freq_hz, h.foreign_hz[own]]),
+        np.concatenate([h.decay_per_s, h.foreign_decay_per_s[own]]),
+    )
     sd = np.concatenate([h.freq_sd_hz / np.maximum(h.freq_hz, 1e-9), np.full(int(own.sum()), 1e-4)])
     amplitude = np.concatenate([h.amplitude, h.foreign_amplitude[:, own]], axis=1)
     order = np.argsort(freq)
     amplitude = amplitude[:, order]
     size = np.linalg.norm(np.nan_to_num(amplitude), axis=0)
-    worth = np.clip(0.5 + 0.06 * np.log10(np.maximum(size / max(size.max(initial=0), 1e-300), 1e-12)), 0.05, 1) if size.any() else np.full(len(freq), 0.5)
+    worth = (
+        np.clip(0.5 + 0.06 * np.log10(np.maximum(size / max(size.max(initial=0), 1e-300), 1e-12)), 0.05, 1)
+        if size.any()
+        else np.full(len(freq), 0.5)
+    )
     log_hz = np.log(np.hypot(2 * np.pi * freq, np.nan_to_num(decay)) / (2 * np.pi))[order]
     wide = np.nan_to_num(decay)[order] / (2 * np.pi * np.exp(log_hz))
     worth = worth / (1 + (wide / CAP) ** 2)  # a line broader than that stands for whatever is beside it, too
@@ -85,12 +101,17 @@ def seen_by(lines: BodyLines, p: Array) -> Seen:
         if np.isfinite(psi).all():
             a = lines.amplitude if lines.elastic.phased else np.abs(lines.amplitude)
             psi = psi if lines.elastic.phased else np.abs(psi)
-            alike = np.abs(a.T @ psi) / np.maximum(np.linalg.norm(a, axis=0)[:, None] * np.linalg.norm(psi, axis=0), 1e-300)
+            alike = np.abs(a.T @ psi) / np.maximum(
+                np.linalg.norm(a, axis=0)[:, None] * np.linalg.norm(psi, axis=0), 1e-300
+            )
     return Seen(np.log(freq), slope, alike)
 
 
 def paired(lines: BodyLines, seen: Seen, width: float, lowest: int | None = None) -> tuple[Array, Array, float]:
-    """Lines and modes (k',) paired at the least price, and the price over the lines' worth. lowest: how many of the lines, all where None."""
+    """Lines and modes (k',) paired at the least price, and the price over the lines' worth.
+
+    lowest: how many of the lines, all where None.
+    """
     from scipy.optimize import linear_sum_assignment
 
     gap = (lines.log_hz[:lowest, None] - seen.log_hz[None, :]) / width

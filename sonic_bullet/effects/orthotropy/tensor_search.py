@@ -1,11 +1,17 @@
 """Which tensor do the lines tell? Search over elastic symmetries, starts, and pairs of lines and modes.
 
-    p = (ln E₁₂₃, n₂₃ n₁₃ n₁₂, ln G₂₃ G₁₃ G₁₂), per density;  n_ij = ν_ij √(E_j/E_i),  S = D^{-1/2} (n) D^{-1/2}       [Bodig & Jayne 1982, eq. 3.8]
-    pairs: Σ worth·(min((ln f_k − ln f_j)²/18w² + 1 − c_kj, 1) − 1) → min               [Kuhn 1955], c: likeness of patterns over the strikes
-    step:  least squares on ln f, ∂ ln λ/∂C by Hellmann-Feynman, Cauchy's weights, a weak prior about isotropy, w from 5 % down
-    BIC = n ln(mean min((ln f_k − ln f_j)², CAP²)) + n(s − 1) ln(mean min(1 − c², 1 − 1/s)) + q ln n, means by worth     [Schwarz 1978]
+    p = (ln E₁₂₃, n₂₃ n₁₃ n₁₂, ln G₂₃ G₁₃ G₁₂), per density;  n_ij = ν_ij √(E_j/E_i),  S = D^{-1/2} (n) D^{-1/2}
+        [Bodig & Jayne 1982, eq. 3.8]
+    pairs: Σ worth·(min((ln f_k − ln f_j)²/18w² + 1 − c_kj, 1) − 1) → min
+        [Kuhn 1955], c: likeness of patterns over the strikes
+    step:
+        least squares on ln f, ∂ ln λ/∂C by Hellmann-Feynman, Cauchy's weights, a weak prior about isotropy, w from 5 %
+        down
+    BIC = n ln(mean min((ln f_k − ln f_j)², CAP²)) + n(s − 1) ln(mean min(1 − c², 1 − 1/s)) + q ln n, means by worth
+        [Schwarz 1978]
 
-q: 2 isotropic, 3 cubic, 5 hexagonal about x, y or z (transversely isotropic), 9 orthorhombic (orthotropic). Axes are the mesh's.
+q: 2 isotropic, 3 cubic, 5 hexagonal about x, y or z (transversely isotropic), 9 orthorhombic (orthotropic). Axes are
+the mesh's.
 """
 
 from __future__ import annotations
@@ -16,7 +22,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from sonic_bullet.effects.orthotropy.tensor_lines import CAP, BodyLines, Seen, body_lines_of, paired, seen_by
-from sonic_bullet.effects.orthotropy.tensors import MILD, NAMES, RATIOS, SYMMETRIES, bricks, constants, cubes, expanded, reduced, sound, stiffness
+from sonic_bullet.effects.orthotropy.tensors import (
+    MILD,
+    NAMES,
+    RATIOS,
+    SYMMETRIES,
+    bricks,
+    constants,
+    cubes,
+    expanded,
+    reduced,
+    sound,
+    stiffness,
+)
 from sonic_bullet.effects.protocol import Elastic, Evidence
 from sonic_bullet.parallel import parallel_map
 from sonic_bullet.records import Array
@@ -28,18 +46,21 @@ PRIOR_N, PRIOR_G = 0.1, 0.7  # of n about the guess' ν, of ln G about √(E_i E
 STEP = np.array([0.3] * 3 + [0.08] * 3 + [0.3] * 3)
 LARGEST_N = 0.46
 STARTS, BLIND = 24, 12  # of those sifted, taken further; without patterns
-HINTED, HOP = 10.0, 2.0  # in BIC: over isotropy, so that a nearer end is looked for; over the last end, so that it is gone on from
+# in BIC: over isotropy, so that a nearer end is looked for; over the last end, so that it is gone on from
+HINTED, HOP = 10.0, 2.0
 HOPPERS, HOPS = 3, 6  # ends that are gone on from, and how often
 FIRST = 10  # lines that decide where no pattern does
 PEAKS = 2
 FREED = (0, 1, 3)  # WIDTHS from which on what a symmetry ties is freed: pairing wide, less so, and near
 NIL = 5.0  # of WIDE: farther off nothing is in common
-REACH, WIDE = 2.0, 0.014  # of ln E/ρ in the sieve: an isotropic body may have been fitted to what goes along a plank, or across; of ln f
+# of ln E/ρ in the sieve: an isotropic body may have been fitted to what goes along a plank, or across; of ln f
+REACH, WIDE = 2.0, 0.014
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tensor:
-    """A fitted elasticity. p (9,); bic; scatter: rms of ln f of the lines that fit; matched: their share; held: names of `NAMES` that the prior holds.
+    """A fitted elasticity. p (9,); bic; scatter: rms of ln f of the lines that fit; matched: their share; held: names
+    of `NAMES` that the prior holds.
 
     off: rms of ln f of all lines, those beyond CAP counted at it.
     """
@@ -67,28 +88,42 @@ def search(evidence: Evidence) -> tuple[Tensor, Tensor] | None:
     blind = all(
         t.amplitude is None for t in bodies
     )  # without patterns some start or other says more by chance, the likelier the softer it is: modes are denser there
-    sifted = [("cubic", s) for s in _sifted(bodies, cubes(start))] + [("orthorhombic", s) for s in _sifted(bodies, bricks(start, MILD if blind else RATIOS))]
+    sifted = [("cubic", s) for s in _sifted(bodies, cubes(start))] + [
+        ("orthorhombic", s) for s in _sifted(bodies, bricks(start, MILD if blind else RATIOS))
+    ]
     ends = parallel_map(lambda one: fitted(bodies, *one, start), sifted)
     best = min((e for e in ends if e.symmetry == "orthorhombic"), key=lambda e: e.bic)
     round_axes = ("hexagonal-x", "hexagonal-y", "hexagonal-z")
     ends += parallel_map(lambda symmetry: fitted(bodies, symmetry, best.p, start, WIDTHS[3:]), ("cubic", *round_axes))
     cube = min((e for e in ends if e.symmetry == "cubic"), key=lambda e: e.bic)
-    ends += parallel_map(lambda symmetry: fitted(bodies, symmetry, cube.p, start, WIDTHS[4:]), (*round_axes, "orthorhombic"))
+    ends += parallel_map(
+        lambda symmetry: fitted(bodies, symmetry, cube.p, start, WIDTHS[4:]), (*round_axes, "orthorhombic")
+    )
     near = min(ends, key=lambda e: e.bic)
     ends += parallel_map(lambda k: fitted(bodies, "orthorhombic", near.p, start, WIDTHS[k:]), FREED)
     if plain.bic - min(e.bic for e in ends) > HINTED and not blind:
-        ends += [_hopped(bodies, e, start) for e in sorted((e for e in ends if e.symmetry == "orthorhombic"), key=lambda e: e.bic)[:HOPPERS]]
+        ends += [
+            _hopped(bodies, e, start)
+            for e in sorted((e for e in ends if e.symmetry == "orthorhombic"), key=lambda e: e.bic)[:HOPPERS]
+        ]
         near = min(ends, key=lambda e: e.bic)
-        ends += parallel_map(lambda symmetry: fitted(bodies, symmetry, near.p, start, WIDTHS[4:]), ("cubic", *round_axes))
+        ends += parallel_map(
+            lambda symmetry: fitted(bodies, symmetry, near.p, start, WIDTHS[4:]), ("cubic", *round_axes)
+        )
     return plain, min(ends, key=lambda e: e.bic)
 
 
 def _hopped(bodies: Sequence[BodyLines], best: Tensor, guess: Array) -> Tensor:
-    """From an orthorhombic end, each of its numbers a step to either side and fitted again, as long as one of those ends says more: wrong pairs of upper
-    lines and modes hold one another where the low ones hardly tell.                                          [iterated local search: Lourenço, Martin & Stützle 2003]"""
+    """From an orthorhombic end, each of its numbers a step to either side and fitted again, as long as one of those
+    ends says more: wrong pairs of upper
+    lines and modes hold one another where the low ones hardly tell.
+        [iterated local search: Lourenço, Martin & Stützle 2003]"""
     for _ in range(HOPS):
         sides = [p for p in (best.p + sign * one for one in np.diag(STEP) for sign in (-1, 1)) if sound(p)]
-        end = min(parallel_map(lambda p: fitted(bodies, "orthorhombic", p, guess, WIDTHS[FREED[-1] :]), sides), key=lambda e: e.bic)
+        end = min(
+            parallel_map(lambda p: fitted(bodies, "orthorhombic", p, guess, WIDTHS[FREED[-1] :]), sides),
+            key=lambda e: e.bic,
+        )
         if end.bic > best.bic - HOP:
             break
         best = end
@@ -102,7 +137,9 @@ def isotropic_p(elastic: Elastic) -> Array:
 
 
 def _sifted(bodies: Sequence[BodyLines], starts: list[Array]) -> list[Array]:
-    """The best few, each with all its moduli scaled so that its modes agree best with the lines, as two spectra on a logarithmic axis (see pairing.py)."""
+    """The best few, each with all its moduli scaled so that its modes agree best with the lines, as two spectra on a
+    logarithmic axis (see pairing.py).
+    """
     shift = np.arange(-REACH, REACH + 1e-9, WIDE / 2)
     most = max(bodies, key=lambda t: float(t.worth.sum()))
     blind = most.amplitude is None
@@ -124,7 +161,10 @@ def _agreement(lines: BodyLines, seen: Seen, first: Array, shift: Array) -> Arra
     weight = lines.worth[:, None] * first[:, None] * seen.alike**2
     gap = lines.log_hz[:, None] - seen.log_hz[None, :]
     step = (shift[1] - shift[0]) / 2
-    at = np.rint((gap - shift[0] / 2) / step).astype(int)[..., None] + np.arange(-round(NIL * WIDE / step), round(NIL * WIDE / step) + 1)  # (k, m, a few)
+    # (k, m, a few)
+    at = np.rint((gap - shift[0] / 2) / step).astype(int)[..., None] + np.arange(
+        -round(NIL * WIDE / step), round(NIL * WIDE / step) + 1
+    )
     near = weight[..., None] * np.exp(-0.5 * ((gap[..., None] - shift[0] / 2 - at * step) / WIDE) ** 2)
     here = (at >= 0) & (at < len(shift))
     cell = (at * len(seen.log_hz) + np.arange(len(seen.log_hz))[:, None])[here]
@@ -139,7 +179,9 @@ def _peaks(score: Array) -> list[int]:
     return [int(i) for i in inner[np.argsort(-score[inner])]] or [int(np.argmax(score))]
 
 
-def fitted(bodies: Sequence[BodyLines], symmetry: str, start: Array, guess: Array, widths: Sequence[float] = WIDTHS) -> Tensor:
+def fitted(
+    bodies: Sequence[BodyLines], symmetry: str, start: Array, guess: Array, widths: Sequence[float] = WIDTHS
+) -> Tensor:
     """The best tensor of a symmetry from a start; guess: isotropic, what the prior leans to."""
     q = reduced(symmetry, start)
     p = expanded(symmetry, q)
@@ -159,14 +201,23 @@ def fitted(bodies: Sequence[BodyLines], symmetry: str, start: Array, guess: Arra
 
 
 def _few(lines: BodyLines, width: float) -> int | None:
-    """How many of the lowest lines to begin with where no pattern tells modes apart: low modes lie farther apart than a start is wrong."""
-    return None if lines.amplitude is not None or width <= WIDTHS[-1] else max(FIRST, round(len(lines.log_hz) * WIDTHS[-1] / width * 2))
+    """How many of the lowest lines to begin with where no pattern tells modes apart: low modes lie farther apart than a
+    start is wrong.
+    """
+    return (
+        None
+        if lines.amplitude is not None or width <= WIDTHS[-1]
+        else max(FIRST, round(len(lines.log_hz) * WIDTHS[-1] / width * 2))
+    )
 
 
 def _jacobian(symmetry: str, q: Array, of: Callable[[Array], Array]) -> Array:
     """∂ of(p(q))/∂q (n, q), by central differences."""
     h = 1e-5
-    return np.stack([(of(expanded(symmetry, q + h * e)) - of(expanded(symmetry, q - h * e))) / (2 * h) for e in np.eye(len(q))], axis=1)
+    return np.stack(
+        [(of(expanded(symmetry, q + h * e)) - of(expanded(symmetry, q - h * e))) / (2 * h) for e in np.eye(len(q))],
+        axis=1,
+    )
 
 
 def _prior(guess: Array) -> Callable[[Array], Array]:
@@ -180,7 +231,9 @@ def _prior(guess: Array) -> Callable[[Array], Array]:
     return of
 
 
-def _step(pairs: list[tuple[BodyLines, Seen, Array, Array]], symmetry: str, q: Array, guess: Array, width: float) -> Array:
+def _step(
+    pairs: list[tuple[BodyLines, Seen, Array, Array]], symmetry: str, q: Array, guess: Array, width: float
+) -> Array:
     prior = _prior(guess)
     own, bent = prior(expanded(symmetry, q)), _jacobian(symmetry, q, prior)
     turn = _jacobian(symmetry, q, constants)
@@ -192,7 +245,10 @@ def _step(pairs: list[tuple[BodyLines, Seen, Array, Array]], symmetry: str, q: A
     step, weight = np.zeros(len(q)), worth
     for _ in range(4):
         normal = slope.T @ (slope * weight[:, None]) / (width / 2) ** 2 + bent.T @ bent
-        step = np.linalg.solve(normal + 1e-9 * np.eye(len(q)) * np.trace(normal), slope.T @ (weight * off) / (width / 2) ** 2 - bent.T @ own)
+        step = np.linalg.solve(
+            normal + 1e-9 * np.eye(len(q)) * np.trace(normal),
+            slope.T @ (weight * off) / (width / 2) ** 2 - bent.T @ own,
+        )
         weight = worth / (1 + ((off - slope @ step) / width) ** 2)
     most = np.abs(expanded(symmetry, q + step) - expanded(symmetry, q)) / STEP
     return np.asarray(step / max(1.0, float(most.max())))
@@ -218,7 +274,11 @@ def _judged(bodies: Sequence[BodyLines], symmetry: str, q: Array, guess: Array) 
     left, worth = np.concatenate(off), np.concatenate([t.worth for t in bodies])
     inside, n = left < CAP, len(left)
     square = float(np.average(np.maximum(left, FLOOR) ** 2, weights=worth))
-    bic = n * np.log(square) + numbers * np.log(np.average(np.concatenate(unlike), weights=worth)) + SYMMETRIES[symmetry] * np.log(n)
+    bic = (
+        n * np.log(square)
+        + numbers * np.log(np.average(np.concatenate(unlike), weights=worth))
+        + SYMMETRIES[symmetry] * np.log(n)
+    )
     scatter = float(np.sqrt(np.mean(left[inside] ** 2))) if inside.any() else CAP
     held = _held(np.concatenate(slopes), symmetry, q, guess, max(scatter, FLOOR))
     return Tensor(symmetry, p, float(bic), scatter, float(inside.mean()), held, float(np.sqrt(square)))

@@ -1,8 +1,10 @@
 """A stiffness with axes along the mesh's, by numbers that a search can move: p (9,), and fewer under a symmetry.
 
-    p = (ln E₁₂₃, n₂₃ n₁₃ n₁₂, ln G₂₃ G₁₃ G₁₂), per density;  n_ij = ν_ij √(E_j/E_i),  S = D^{-1/2} (n) D^{-1/2}       [Bodig & Jayne 1982, eq. 3.8]
+    p = (ln E₁₂₃, n₂₃ n₁₃ n₁₂, ln G₂₃ G₁₃ G₁₂), per density;  n_ij = ν_ij √(E_j/E_i),  S = D^{-1/2} (n) D^{-1/2}
+        [Bodig & Jayne 1982, eq. 3.8]
 
-Isotropic 2, cubic 3, hexagonal about x, y or z (transversely isotropic) 5, orthorhombic (orthotropic) 9                            [Nye 1957, ch. VIII]
+Isotropic 2, cubic 3, hexagonal about x, y or z (transversely isotropic) 5, orthorhombic (orthotropic) 9
+    [Nye 1957, ch. VIII]
 """
 
 from __future__ import annotations
@@ -42,7 +44,10 @@ def constants(p: Array) -> Array:
 
 
 def expanded(symmetry: str, q: Array) -> Array:
-    """p (9,) of a symmetry's own numbers: (ln E, n), (ln E, n, ln G), (ln E_along, ln E_across, n_along, n_across, ln G_along), or p itself."""
+    """p (9,) of a symmetry's own numbers:
+
+    (ln E, n), (ln E, n, ln G), (ln E_along, ln E_across, n_along, n_across, ln G_along), or p itself.
+    """
     if symmetry == "isotropic":
         return np.concatenate([np.full(3, q[0]), np.full(3, q[1]), np.full(3, q[0] - np.log(2 * (1 + q[1])))])
     if symmetry == "cubic":
@@ -97,6 +102,10 @@ def bricks(start: Array, ratios: tuple[float, ...] = RATIOS) -> list[Array]:
                 e = np.log(np.array([1.0, y, z]))
                 p = np.array(start)
                 p[:3] += e - e.mean()
-                p[6:] = 0.5 * np.array([p[1] + p[2], p[0] + p[2], p[0] + p[1]]) - np.log(2 * (1 + start[3:6])) + np.log(soft)
+                p[6:] = (
+                    0.5 * np.array([p[1] + p[2], p[0] + p[2], p[0] + p[1]])
+                    - np.log(2 * (1 + start[3:6]))
+                    + np.log(soft)
+                )
                 found.append(p)
     return found

@@ -1,7 +1,9 @@
 """`rebound`: the striker bounces and hits again.
 
-    f(t) = J Σ_i e^i δ(t − t_i),   t_{i+1} − t_i = g e^i       flight 2v/g' and impulse both fall by the restitution e at every bounce
-                                                                                  [Goldsmith 1960, ch. 1; Falcon et al. 1998, eq. 1]
+    f(t) = J Σ_i e^i δ(t − t_i),   t_{i+1} − t_i = g e^i
+        flight 2v/g' and impulse both fall by the restitution e at every bounce
+                                                                                  [Goldsmith 1960, ch. 1; Falcon et al.
+                                                                                      1998, eq. 1]
     g goes as the impulse (free flight), or is the arm's own, whatever J
 
 Read off the recordings: what remains of them beside the model is the model again, later and weaker.
@@ -17,7 +19,15 @@ import numpy as np
 
 from sonic_bullet.effects.common.ringing import direct_as_expected
 from sonic_bullet.effects.protocol import Evidence, Impact, ObjectEvidence, Owner, Stage, Traits
-from sonic_bullet.effects.rebound.later_hits import EXPONENTS, LEAST, MOST_HITS, SPAN_S, hits_by_strike, second_hit, third_hit
+from sonic_bullet.effects.rebound.later_hits import (
+    EXPONENTS,
+    LEAST,
+    MOST_HITS,
+    SPAN_S,
+    hits_by_strike,
+    second_hit,
+    third_hit,
+)
 from sonic_bullet.records import Array
 
 FAINT = 0.02  # of the first hit: weaker ones are not played
@@ -26,9 +36,12 @@ HELD = 0.999  # of the energy of what is played again
 MOST, FEW = (
     0.6,
     0.05,
-)  # of the strikes show it one by one; of all recordings' energy, that it must say together where fewer do: beating degenerate modes hide it
+    # of the strikes show it one by one; of all recordings' energy, that it must say together where fewer do: beating
+    # degenerate modes hide it
+)
 FADE = 2.0  # nepers over what is looked at
-ALL, CLEARLY, HALF = 0.25, 1.35, 0.5  # of what one hit leaves of all strikes: said by a second one, over the next best exponent, and left by all hits
+# of what one hit leaves of all strikes: said by a second one, over the next best exponent, and left by all hits
+ALL, CLEARLY, HALF = 0.25, 1.35, 0.5
 APART = 1.3  # loudest over softest strike, for that
 RATIOS = (0.75, 0.9, 1.0)
 HITS = (3, 4, 5, MOST_HITS)
@@ -38,7 +51,10 @@ SOUGHT = 0.07  # of what is left, that a third hit looked for at every lag must 
 
 @dataclass(frozen=True)
 class Rebound:
-    """First gap in s at the impulse impulse_n_s, going as impulse^exponent; restitution: of each next hit and gap against the last; ratio of gaps."""
+    """First gap in s at the impulse impulse_n_s, going as impulse^exponent;
+
+    restitution: of each next hit and gap against the last; ratio of gaps.
+    """
 
     id: ClassVar[str] = "rebound"
     stage: ClassVar[Stage] = Stage.FORCE
@@ -90,9 +106,11 @@ class Rebound:
 
     @classmethod
     def _of_all(cls, h: ObjectEvidence) -> Self | None:
-        """Read off all strikes at once: what rings for long is alike a whole number of turns later, so that one strike alone tells many a delay.
+        """Read off all strikes at once: what rings for long is alike a whole number of turns later, so that one strike
+        alone tells many a delay.
 
-        Strikes of one strength are of no use: there all exponents say the same, and nothing tells a hit from what beats.
+        Strikes of one strength are of no use: there all exponents say the same, and nothing tells a hit from what
+        beats.
         """
         level = np.array([j if np.isfinite(j) else 1.0 for j in h.impulse_n_s])
         if len(level) < 2 or level.max() < APART * level.min():
@@ -117,7 +135,14 @@ class Rebound:
         reference = float(np.exp(np.log(level).mean()))
         every = [np.array(hits) for _, hits in found]
         agreed = [
-            (_agreed([np.log(t[:, 0]) - p * np.log(j / reference) for t, j in zip(every, level, strict=True)], [t[:, 1] for t in every]), p) for p in EXPONENTS
+            (
+                _agreed(
+                    [np.log(t[:, 0]) - p * np.log(j / reference) for t, j in zip(every, level, strict=True)],
+                    [t[:, 1] for t in every],
+                ),
+                p,
+            )
+            for p in EXPONENTS
         ]
         (_, first, which), exponent = max(agreed, key=lambda a: a[0][0])
         mine = [(t, i) for t, i in zip(every, which, strict=True) if i >= 0]
@@ -125,7 +150,10 @@ class Rebound:
         if len(mine) < 2 or _spread(np.log(share)) > 0.5:
             return None
         after = [t[t[:, 0] > 1.03 * t[i, 0]] for t, i in mine]
-        score, ratio, _ = _agreed([np.log(np.maximum(a[:, 0] / t[i, 0] - 1, 1e-3)) for a, (t, i) in zip(after, mine, strict=True)], [a[:, 1] for a in after])
+        score, ratio, _ = _agreed(
+            [np.log(np.maximum(a[:, 0] / t[i, 0] - 1, 1e-3)) for a, (t, i) in zip(after, mine, strict=True)],
+            [a[:, 1] for a in after],
+        )
         shrink = float(np.clip(np.exp(ratio), 0.03, 1.0)) if score > 0 and sum(len(a) > 0 for a in after) >= 2 else None
         e = float(np.clip(np.median(share), 0.03, 0.97))
         count = 1 + round(float(np.median([len(t) - i for t, i in mine])))
@@ -138,19 +166,22 @@ class Rebound:
 
 
 def _refined(start: Rebound, h: ObjectEvidence, *, known: bool = False) -> tuple[float, dict[str, Any]]:
-    """What is left, up to a constant, and the restitution, gaps and their ratio that leave least of all strikes at once: Σ_s |<y, m>|²/<m, m> is most, m the sound of all its hits.
+    """What is left, up to a constant, and the restitution, gaps and their ratio that leave least of all strikes at
+    once: Σ_s |<y, m>|²/<m, m> is most, m the sound of all its hits.
 
     known: whether start is near what is looked for.
     """
     assert h.signal is not None
     n = min(h.signal.shape[1], 3 * int(SPAN_S[1] * h.sr))
     size = 2 * n
-    fade = FADE * h.sr / n  # in 1/s: x(t − τ) e^{−wt} = e^{−wτ} (x e^{−wt})(t − τ), so what is cut off at n, of either, counts for less
+    # in 1/s: x(t − τ) e^{−wt} = e^{−wτ} (x e^{−wt})(t − τ), so what is cut off at n, of either, counts for less
+    fade = FADE * h.sr / n
     window = np.exp(-fade * np.arange(n) / h.sr)
     sound = np.fft.rfft(direct_as_expected(h)[:, :n] * window, size)
     both, own = np.conj(sound) * np.fft.rfft(h.signal[:, :n] * window, size), np.abs(sound) ** 2
     loud = np.argsort(-own.sum(axis=0))
-    loud = np.sort(loud[: 1 + int(np.searchsorted(np.cumsum(own.sum(axis=0)[loud]), HELD * own.sum()))])  # the bins that hold the modes
+    # the bins that hold the modes
+    loud = np.sort(loud[: 1 + int(np.searchsorted(np.cumsum(own.sum(axis=0)[loud]), HELD * own.sum()))])
     both, own, cycles = both[:, loud], own[:, loud], np.fft.rfftfreq(size, 1 / h.sr)[loud]
     level = np.where(np.isfinite(h.impulse_n_s), h.impulse_n_s, 1.0)
     total = ((h.signal[:, :n] * window) ** 2).sum(axis=1) * size / 2
@@ -177,7 +208,11 @@ def _refined(start: Rebound, h: ObjectEvidence, *, known: bool = False) -> tuple
         return -gone
 
     first = np.array([start.restitution, 0.0, start.restitution if start.shrink is None else start.shrink])
-    tries = [np.array([e, 0.0, r]) for e in (first[0], *RESTITUTIONS) for r in (first[2:] if start.shrink is None else (first[2], e, *RATIOS))]
+    tries = [
+        np.array([e, 0.0, r])
+        for e in (first[0], *RESTITUTIONS)
+        for r in (first[2:] if start.shrink is None else (first[2], e, *RATIOS))
+    ]
     best = min(tries, key=left)
     found = _nearby(left, best)
     if start.hits > 2 and not known:
@@ -195,12 +230,20 @@ def _nearby(left: Callable[[Array], float], start: Array) -> tuple[float, Array]
     from scipy.optimize import minimize
 
     simplex = start + np.array([[0, 0, 0], [0.1, 0, 0], [0, 2e-4, 0], [0, 0, 2e-3]])
-    found = minimize(left, start, method="Nelder-Mead", options={"initial_simplex": simplex, "xatol": 1e-4, "fatol": 1e-6, "maxfev": 120})
+    found = minimize(
+        left,
+        start,
+        method="Nelder-Mead",
+        options={"initial_simplex": simplex, "xatol": 1e-4, "fatol": 1e-6, "maxfev": 120},
+    )
     return float(found.fun), found.x
 
 
 def _turned(impact: Impact, freq_hz: Array, fade: float) -> Array:
-    """Σ_j share_j e^{−(fade + 2πif) delay_j} (f,), in half the usual digits: phases, turns taken off, are good to 4e-7, and all of a search's time goes here."""
+    """Σ_j share_j e^{−(fade + 2πif) delay_j} (f,), in half the usual digits:
+
+    phases, turns taken off, are good to 4e-7, and all of a search's time goes here.
+    """
     phase = np.multiply.outer(impact.delay_s, freq_hz)
     phase = (2 * np.pi * (phase - np.rint(phase))).astype(np.float32)
     share = (impact.share * np.exp(-fade * impact.delay_s)).astype(np.float32)

@@ -1,7 +1,8 @@
 """When did a strike hit again? By what the sound of one hit says of a recording, later.
 
 strike by strike: matching pursuit over delays                          [Mallat & Zhang 1993]
-all strikes at once, by the exponent with which gaps go with strength:   what a second hit says beside the first      [Pati, Rezaiifar & Krishnaprasad 1993]
+all strikes at once, by the exponent with which gaps go with strength:   what a second hit says beside the first
+    [Pati, Rezaiifar & Krishnaprasad 1993]
 """
 
 from __future__ import annotations
@@ -24,9 +25,11 @@ EXPONENTS = (0.0, 1.0, 0.5, -0.2)
 
 
 def second_hit(h: ObjectEvidence, level: Array) -> list[tuple[float, float, float]]:
-    """(said, gap in s at level 1, exponent) of the second hit that says most of what one hit leaves of the strikes, on average, by exponent.
+    """(said, gap in s at level 1, exponent) of the second hit that says most of what one hit leaves of the strikes, on
+    average, by exponent.
 
-    <r, x_τ>²/(|x_τ|² − <x, x_τ>²/|x|²)/|r|², r what the best share of x leaves: what x_τ says beside x   [orthogonal matching pursuit: Pati, Rezaiifar & Krishnaprasad 1993]
+    <r, x_τ>²/(|x_τ|² − <x, x_τ>²/|x|²)/|r|², r what the best share of x leaves: what x_τ says beside x
+        [orthogonal matching pursuit: Pati, Rezaiifar & Krishnaprasad 1993]
     """
     assert h.signal is not None
     sound = direct_as_expected(h)
@@ -39,20 +42,32 @@ def second_hit(h: ObjectEvidence, level: Array) -> list[tuple[float, float, floa
     both = np.fft.irfft(np.conj(spectrum) * np.fft.rfft(left, size, axis=1), size, axis=1)[:, :reach]
     own = np.fft.irfft(np.abs(spectrum) ** 2, size, axis=1)[:, :reach]
     inside = energy - np.concatenate([np.zeros((len(x), 1)), np.cumsum((x**2)[:, ::-1], axis=1)], axis=1)[:, :reach]
-    says = np.maximum(both, 0.0) ** 2 / np.maximum(inside - own**2 / energy, OWN * energy) / np.maximum((left**2).sum(axis=1, keepdims=True), 1e-300)
+    says = (
+        np.maximum(both, 0.0) ** 2
+        / np.maximum(inside - own**2 / energy, OWN * energy)
+        / np.maximum((left**2).sum(axis=1, keepdims=True), 1e-300)
+    )
     says[:, : int(SPAN_S[0] * h.sr)] = 0.0
     lag, found = np.arange(reach), []
     for exponent in EXPONENTS:
-        mean = np.mean([np.interp(lag * j**exponent, lag, np.minimum(one, 1.0), 0.0, 0.0) for one, j in zip(says, level, strict=True)], axis=0)
+        mean = np.mean(
+            [
+                np.interp(lag * j**exponent, lag, np.minimum(one, 1.0), 0.0, 0.0)
+                for one, j in zip(says, level, strict=True)
+            ],
+            axis=0,
+        )
         found.append((float(mean.max()), float(mean.argmax()) / h.sr, exponent))
     return found
 
 
 def third_hit(gap_s: Array, both: Array, own: Array, total: Array, sr: int, fade: float) -> float:
-    """Restitution, which is the gaps' ratio too, of three hits that say most of all strikes: Σ_s |<y, m>|²/<m, m>, by correlations at every lag.
+    """Restitution, which is the gaps' ratio too, of three hits that say most of all strikes: Σ_s |<y, m>|²/<m, m>, by
+    correlations at every lag.
 
-    A ratio that is off by half a turn of the loudest modes leads nowhere, so all are looked at. gap_s, total (s,): first gaps, energies; both, own (s, f):
-    spectra of the recordings against one hit's sound, and of that; fade in 1/s: both are faded.
+    A ratio that is off by half a turn of the loudest modes leads nowhere, so all are looked at. gap_s, total (s,):
+    first gaps, energies; both, own (s, f): spectra of the recordings against one hit's sound, and of that; fade in 1/s:
+    both are faded.
     """
     size = 2 * (both.shape[1] - 1)
     cross, auto = (np.fft.irfft(x, FINER * size, axis=1) * (FINER * size / 2) for x in (both, own))
@@ -61,7 +76,10 @@ def third_hit(gap_s: Array, both: Array, own: Array, total: Array, sr: int, fade
     for c, a, g, energy in zip(cross, auto, gap_s, total, strict=True):
         late = g * (1 + e)
         second, third = e * np.exp(-fade * g), e**2 * np.exp(-fade * late)
-        c_2, c_3, a_2, a_3, a_23 = (_lagged(x, np.rint(t * sr * FINER).astype(int)) for x, t in ((c, g), (c, late), (a, g), (a, late), (a, late - g)))
+        c_2, c_3, a_2, a_3, a_23 = (
+            _lagged(x, np.rint(t * sr * FINER).astype(int))
+            for x, t in ((c, g), (c, late), (a, g), (a, late), (a, late - g))
+        )
         product = c[0] + second * c_2 + third * c_3
         cost = a[0] * (1 + second**2 + third**2) + 2 * (second * a_2 + third * a_3 + second * third * a_23)
         said += np.maximum(product, 0.0) ** 2 / np.maximum(cost, 1e-300) / energy
@@ -76,8 +94,8 @@ def _lagged(x: Array, lag: Array) -> Array:
 def hits_by_strike(h: ObjectEvidence) -> list[list[tuple[float, float]]]:
     """Per strike: delays in s and shares of the hits after the first, by their time.
 
-    Matching pursuit [Mallat & Zhang 1993]: the sound of one hit, as the lines and the model have it, is sought later in what is left; after every
-    find all shares are solved together.
+    Matching pursuit [Mallat & Zhang 1993]: the sound of one hit, as the lines and the model have it, is sought later in
+    what is left; after every find all shares are solved together.
     """
     assert h.signal is not None
     sound = direct_as_expected(h)
@@ -97,7 +115,11 @@ def hits_by_strike(h: ObjectEvidence) -> list[list[tuple[float, float]]]:
             if after > (1 - GAIN) * before or new[-1] < LEAST * new[0]:
                 break
             lags, share, left = trial, new, made
-        rest = sorted((t, r / share[0]) for t, r in zip(lags[1:], share[1:], strict=True) if share[0] > 0 and LEAST < r / share[0] < 1.0)
+        rest = sorted(
+            (t, r / share[0])
+            for t, r in zip(lags[1:], share[1:], strict=True)
+            if share[0] > 0 and LEAST < r / share[0] < 1.0
+        )
         found.append(rest)
     return found
 
@@ -134,7 +156,8 @@ def _sought(x: Array, rest: Array, sr: int, reach: int) -> tuple[float | None, f
     if gain[i] <= 0:
         return None, 0.0
     between, turn = _between(size)
-    fine = (turn @ (both * np.exp(2j * np.pi * np.arange(len(both)) * i / size))).real * 2 / size  # <x later by (i + between)/sr, rest>
+    # <x later by (i + between)/sr, rest>
+    fine = (turn @ (both * np.exp(2j * np.pi * np.arange(len(both)) * i / size))).real * 2 / size
     at = int(fine.argmax())
     return (i + float(between[at])) / sr, float(fine[at]) / max(float(inside[i]), 1e-300)
 

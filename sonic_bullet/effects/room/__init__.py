@@ -1,11 +1,14 @@
 """`room`: reflections and reverberation: the same late decay in every band, whatever rings.
 
-    y = x + h * x,   h(t) Gaussian with variance w² 2δ e^{−2δt},   rt60 = ln(10³)/δ, reverberant level w = energy of h over the direct sound's 1, rooted
-                                                                     [Schroeder 1965; statistics of the tail: Polack 1988; Kuttruff 2009, ch. 4]
+    y = x + h * x,   h(t) Gaussian with variance w² 2δ e^{−2δt},
+        rt60 = ln(10³)/δ, reverberant level w = energy of h over the direct sound's 1, rooted
+                                                                     [Schroeder 1965; statistics of the tail: Polack
+                                                                         1988; Kuttruff 2009, ch. 4]
 
-δ is the one rate that makes all lines likeliest as modes that ring on in such a tail (reverberant_tail.py), each with a decay and a share of its own; lines that of
-themselves die sooner than the room must agree on it: what no body does and every room. h, if several strikes tell it, by least squares with that
-variance as its prior [Wiener 1949]. With a room, lines are identified as they would be without it (`dereverberated`).
+δ is the one rate that makes all lines likeliest as modes that ring on in such a tail (reverberant_tail.py), each with a
+decay and a share of its own; lines that of themselves die sooner than the room must agree on it: what no body does and
+every room. h, if several strikes tell it, by least squares with that variance as its prior [Wiener 1949]. With a room,
+lines are identified as they would be without it (`dereverberated`).
 """
 
 from __future__ import annotations
@@ -27,15 +30,22 @@ FINE = np.linspace(-0.25, 0.25, 9)  # of ln δ about the best of these
 LINES = 24  # the strongest
 CAP = 20.0  # of ln likelihood: what one line can speak against a rate
 FASTER, FEWEST_LINES, SHARE = 1.25, 3, 0.35  # than the room; lines that are, and of all: who they must be to tell it
-PLAINLY, LESS = 100.0, 0.25  # ln likelihood a line gains; of all lines: so few will do where FEWEST_LINES tell it as plainly as that
-TELLS, ALIKE = 10.0, 0.3  # ln likelihood a line gains with a tail; of ln δ: how far lines may lie from one another, by the middle
+# ln likelihood a line gains; of all lines: so few will do where FEWEST_LINES tell it as plainly as that
+PLAINLY, LESS = 100.0, 0.25
+# ln likelihood a line gains with a tail; of ln δ: how far lines may lie from one another, by the middle
+TELLS, ALIKE = 10.0, 0.3
 MODEL_ERROR = 0.03  # of the direct sound's spectrum, relative: what shapes and pulses get wrong
-TURNS, AGAIN, FULLY = 150, 40, 400  # what is heard between the loudest modes comes last; from a response that is nearly right there is less to do; for good
+# what is heard between the loudest modes comes last; from a response that is nearly right there is less to do; for good
+TURNS, AGAIN, FULLY = 150, 40, 400
 
 
 @dataclass(frozen=True)
 class Room(Dereverberates):
-    """rt60_s, reverberant_level. response (t,): the tail's taps at rate sr, the first at the direct sound itself; empty: noise of that law from ``seed``."""
+    """rt60_s, reverberant_level.
+
+    response (t,): the tail's taps at rate sr, the first at the direct sound itself; empty: noise of that law from
+    ``seed``.
+    """
 
     id: ClassVar[str] = "room"
     stage: ClassVar[Stage] = Stage.SOUND
@@ -56,10 +66,21 @@ class Room(Dereverberates):
         if len(self.response):
             from scipy.signal import resample_poly
 
-            return Room(self.rt60_s, self.reverberant_level, self.seed, np.asarray(resample_poly(self.response, sr, self.sr)) * self.sr / sr, sr).taps(sr, n)
+            return Room(
+                self.rt60_s,
+                self.reverberant_level,
+                self.seed,
+                np.asarray(resample_poly(self.response, sr, self.sr)) * self.sr / sr,
+                sr,
+            ).taps(sr, n)
         delta = RT60 / self.rt60_s
         t = np.arange(n) / sr
-        return np.asarray(self.reverberant_level * np.sqrt(2 * delta / sr) * np.exp(-delta * t) * np.random.default_rng(self.seed).standard_normal(n))
+        return np.asarray(
+            self.reverberant_level
+            * np.sqrt(2 * delta / sr)
+            * np.exp(-delta * t)
+            * np.random.default_rng(self.seed).standard_normal(n)
+        )
 
     def apply(self, x: Sound) -> Sound:
         """The sound with the effect in it."""
@@ -75,10 +96,16 @@ class Room(Dereverberates):
         return reverberant_tail.dereverberated(observed, RT60 / self.rt60_s)
 
     def identified_from(self, signal: Array, sound: Array, noise: Array, sr: int, *, fully: bool = False) -> Self:
-        """The same room, its response by what strikes (s, n) were recorded as, and what they would sound like without it; sought from the one it has. fully: to the end."""
+        """The same room, its response by what strikes (s, n) were recorded as, and what they would sound like without
+        it; sought from the one it has. fully: to the end.
+        """
         start = self.response if self.sr == sr and len(self.response) == signal.shape[1] else None
         turns = FULLY if fully else TURNS if start is None else AGAIN
-        return replace(self, response=identified(signal, sound, noise, sr, RT60 / self.rt60_s, self.reverberant_level, start, turns), sr=sr)
+        return replace(
+            self,
+            response=identified(signal, sound, noise, sr, RT60 / self.rt60_s, self.reverberant_level, start, turns),
+            sr=sr,
+        )
 
     def parameters(self) -> dict[str, Any]:
         """What it says, for people and JSON, in SI units."""
@@ -99,7 +126,11 @@ class Room(Dereverberates):
             return None
         sizes = np.concatenate([observed.amplitude, observed.foreign_amplitude], axis=1)
         if (
-            copied(np.concatenate([observed.freq_hz, observed.foreign_hz]), np.concatenate([observed.decay_per_s, observed.foreign_decay_per_s]), sizes)
+            copied(
+                np.concatenate([observed.freq_hz, observed.foreign_hz]),
+                np.concatenate([observed.decay_per_s, observed.foreign_decay_per_s]),
+                sizes,
+            )
             is not None
         ):
             return None  # something moves
@@ -113,12 +144,18 @@ class Room(Dereverberates):
         )
         if along is not None:  # what rings along is heard in the room too
             level = np.where(np.isfinite(observed.impulse_n_s), observed.impulse_n_s, 1.0)
-            sound = np.stack([along.apply(Sound(x, observed.sr, float(j))).sample for x, j in zip(sound, level, strict=True)])
+            sound = np.stack(
+                [along.apply(Sound(x, observed.sr, float(j))).sample for x, j in zip(sound, level, strict=True)]
+            )
         return cls(RT60 / delta, reverberant_level).identified_from(observed.signal, sound, observed.noise, observed.sr)
 
 
 def late(h: ObjectEvidence, known: float | None = None) -> tuple[float, float] | None:
-    """δ, w; None where the lines' late decays are not one. known: δ as the whole evidence has it, to be identified again near by."""
+    """δ, w;
+
+    None where the lines' late decays are not one. known: δ as the whole evidence has it, to be identified again near
+    by.
+    """
     lines = np.sort(np.argsort(-np.abs(h.amplitude).max(axis=0))[:LINES])
     rates = known * np.exp(2 * FINE[::2]) if known else RATES
     r = reverberant_tail.modes(h, rates, lines, every=1 if known else 2)
@@ -129,7 +166,9 @@ def late(h: ObjectEvidence, known: float | None = None) -> tuple[float, float] |
         r = reverberant_tail.modes(h, rates[best] * np.exp(FINE), lines)
         best = int(_agreed(r).argmax())
     mine = r.decay_per_s[best] > FASTER * r.delta[best]
-    return float(r.delta[best]), float(np.median(r.reverberant_level[best][mine] if mine.any() else r.reverberant_level[best]))
+    return float(r.delta[best]), float(
+        np.median(r.reverberant_level[best][mine] if mine.any() else r.reverberant_level[best])
+    )
 
 
 def _agreed(r: reverberant_tail.Read) -> Array:
@@ -147,9 +186,18 @@ def _one(r: reverberant_tail.Read, best: int) -> bool:
 
 
 def identified(
-    signal: Array, sound: Array, noise: Array, sr: int, delta: float, reverberant_level: float, start: Array | None = None, turns: int = TURNS
+    signal: Array,
+    sound: Array,
+    noise: Array,
+    sr: int,
+    delta: float,
+    reverberant_level: float,
+    start: Array | None = None,
+    turns: int = TURNS,
 ) -> Array:
-    """The tail (n,) that makes the direct sounds (s, n) the recorded ones, by conjugate gradients on the normal equations under its prior, from none or from start (n,)."""
+    """The tail (n,) that makes the direct sounds (s, n) the recorded ones, by conjugate gradients on the normal
+    equations under its prior, from none or from start (n,).
+    """
     from scipy.fft import irfft, next_fast_len, rfft
 
     n = signal.shape[1]
@@ -159,7 +207,8 @@ def identified(
     power = (np.abs(x) ** 2).sum(axis=0)
     smooth = np.convolve(power, np.ones(9) / 9, "same")
     trust = 1 / (level + MODEL_ERROR**2 * smooth + 1e-12 * smooth.max())
-    root = reverberant_level * np.sqrt(2 * delta / sr) * np.exp(-delta * np.arange(n) / sr)  # h = root · g, g of unit variance
+    # h = root · g, g of unit variance
+    root = reverberant_level * np.sqrt(2 * delta / sr) * np.exp(-delta * np.arange(n) / sr)
 
     def forward(g: Array) -> Array:
         return np.asarray(rfft(root * g, size))

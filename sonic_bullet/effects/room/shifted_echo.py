@@ -1,9 +1,10 @@
 """What is observed twice at one ratio of frequencies: an echo of something that moves.
 
-    x(t) + r x((1 + ε)t − T):  every line (f, d) again at ((1 + ε)f, (1 + ε)d), and as loud against the first in every strike    [Doppler; Pierce 1989, ch. 9]
+    x(t) + r x((1 + ε)t − T):  every line (f, d) again at ((1 + ε)f, (1 + ε)d), and as loud against the first in every
+        strike    [Doppler; Pierce 1989, ch. 9]
 
-No room does that: what is linear and stands still brings no frequency of its own. No body does, where its modes' patterns differ: struck at one place alone all lines are
-alike, and pairs split by one share would pass for echoes.
+No room does that: what is linear and stands still brings no frequency of its own. No body does, where its modes'
+patterns differ: struck at one place alone all lines are alike, and pairs split by one share would pass for echoes.
 """
 
 from __future__ import annotations
@@ -15,13 +16,16 @@ from sonic_bullet.records import Array
 LEAST, MOST = 2e-3, 0.08  # of |ln(1 + ε)|: closer ones are degenerate modes; 14 m/s of a reflector
 NEAR = 3e-4  # of ln f: echoes that agree
 ALIKE, DECAY = 0.97, 0.1  # cosine over the strikes; of ln d
-FEWEST_PAIRS, SHARE = 5, 0.2  # pairs; of all lines, in pairs: what comes late is no sum of modes, and leaves other lines besides
+# pairs; of all lines, in pairs: what comes late is no sum of modes, and leaves other lines besides
+FEWEST_PAIRS, SHARE = 5, 0.2
 ALL = 0.5  # of all two lines alike: then strikes tell none apart
 CHANCE = 1e-6  # that so many agree on any ratio, of pairs that fall anywhere
 
 
 def copied(freq_hz: Array, decay_per_s: Array, amplitude: Array) -> float | None:
-    """The ratio 1 + ε > 1 at which many lines (k,), SHARE of all or more, are observed again, by amplitudes (s, k) of two strikes or more; None where they are not."""
+    """The ratio 1 + ε > 1 at which many lines (k,), SHARE of all or more, are observed again, by amplitudes (s, k) of
+    two strikes or more; None where they are not.
+    """
     from scipy.stats import poisson
 
     good = np.isfinite(amplitude).all(axis=0) & (decay_per_s > 0)
@@ -39,6 +43,10 @@ def copied(freq_hz: Array, decay_per_s: Array, amplitude: Array) -> float | None
     pairs = [min(len(np.unique(lower[row])), len(np.unique(upper[row]))) for row in near]
     many = max(pairs, default=0)
     wide = 2 * NEAR / (MOST - LEAST)
-    if many < FEWEST_PAIRS or 2 * many < SHARE * len(f) or poisson.sf(many - 1, (len(ratio) - many) * wide) > CHANCE * wide:
+    if (
+        many < FEWEST_PAIRS
+        or 2 * many < SHARE * len(f)
+        or poisson.sf(many - 1, (len(ratio) - many) * wide) > CHANCE * wide
+    ):
         return None
     return float(np.exp(np.median(ratio[near[int(np.argmax(pairs))]])))

@@ -1,10 +1,12 @@
 """`support-damping`: a fixture takes energy where it touches.
 
-    q̈ + (2d + Σ_j c_j Φ_jᵀΦ_j) q̇ + Λq = 0      c in N·s/m; Φ_j: φ(p_j)·n, or φ(p_j) in every direction        [Zheng & James 2011; Woodhouse 1998, eq. 12]
+    q̈ + (2d + Σ_j c_j Φ_jᵀΦ_j) q̇ + Λq = 0      c in N·s/m; Φ_j: φ(p_j)·n, or φ(p_j) in every direction
+        [Zheng & James 2011; Woodhouse 1998, eq. 12]
 
-to first order Δd_k = ½ Σ_j c_j |φ_k(p_j)|²; modes at one frequency turn to the dashpot, and strong ones couple: `dashpots`.
-Read off decays and patterns together: what dashpots all over the surface would make of the modes is held against the lines, beside a smooth law
-of the material; one after another the best stand, while each explains enough of what is left.
+to first order Δd_k = ½ Σ_j c_j |φ_k(p_j)|²; modes at one frequency turn to the dashpot, and strong ones couple:
+`dashpots`. Read off decays and patterns together: what dashpots all over the surface would make of the modes is held
+against the lines, beside a smooth law of the material; one after another the best stand, while each explains enough of
+what is left.
 """
 
 from __future__ import annotations
@@ -27,7 +29,10 @@ LEAST = 0.02  # of a decay: dashpots that add less to every one are none, though
 
 @dataclass(frozen=True)
 class SupportDamping:
-    """Dashpots of strength (j,) in N·s/m at position_m (j, 3) on the surface, in the mesh's frame; along (j,): "normal" to it, or "every" direction; () all normal."""
+    """Dashpots of strength (j,) in N·s/m at position_m (j, 3) on the surface, in the mesh's frame;
+
+    along (j,): "normal" to it, or "every" direction; () all normal.
+    """
 
     id: ClassVar[str] = "support-damping"
     stage: ClassVar[Stage] = Stage.MODES
@@ -45,7 +50,9 @@ class SupportDamping:
             return x
         normal = vertex_normals(x)
         rows: list[Array] = []
-        for place, c, direction in zip(self.position_m, self.strength_n_s_m, self.along or ("normal",) * len(self.position_m), strict=True):
+        for place, c, direction in zip(
+            self.position_m, self.strength_n_s_m, self.along or ("normal",) * len(self.position_m), strict=True
+        ):
             at = nearest(x, place)
             phi = x.shape[at].astype(float)
             rows.append(np.sqrt(c) * (phi if direction == "every" else normal[at][None] @ phi))
@@ -61,7 +68,11 @@ class SupportDamping:
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
         observed = max(evidence.observed, key=lambda h: len(h.freq_hz) if h.model is not None else 0)
-        if observed.model is None or len(observed.freq_hz) < (FEWEST_LINES if evidence.known is None else AGAIN) or not np.isfinite(observed.decay_per_s).all():
+        if (
+            observed.model is None
+            or len(observed.freq_hz) < (FEWEST_LINES if evidence.known is None else AGAIN)
+            or not np.isfinite(observed.decay_per_s).all()
+        ):
             return None
         trial = DashpotFit.of(observed)
         if isinstance(evidence.known, cls):
@@ -72,11 +83,18 @@ class SupportDamping:
     @classmethod
     def _of(cls, trial: DashpotFit, found: tuple[Dashpot, ...]) -> Self:
         place = [trial.model.vertex_m[d.vertex] for d in found]
-        return cls(tuple((float(a), float(b), float(c)) for a, b, c in place), tuple(d.c for d in found), tuple(d.along for d in found))
+        return cls(
+            tuple((float(a), float(b), float(c)) for a, b, c in place),
+            tuple(d.c for d in found),
+            tuple(d.along for d in found),
+        )
 
     def _on(self, x: ModalModel) -> tuple[Dashpot, ...]:
         along = self.along or ("normal",) * len(self.position_m)
-        return tuple(Dashpot(nearest(x, p), c, direction) for p, c, direction in zip(self.position_m, self.strength_n_s_m, along, strict=True))
+        return tuple(
+            Dashpot(nearest(x, p), c, direction)
+            for p, c, direction in zip(self.position_m, self.strength_n_s_m, along, strict=True)
+        )
 
 
 def _most(trial: DashpotFit, found: tuple[Dashpot, ...]) -> float:

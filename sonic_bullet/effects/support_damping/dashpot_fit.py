@@ -1,15 +1,19 @@
 """Dashpots on trial: how far the lines are from the modes that they would make.
 
-    price_kj = (Δln f/w)²/18 + (Δln d/e)²/18 + 1 − c_kj, at most 1;   Σ worth_k (price − 1) -> min over one-to-one pairs       [Kuhn 1955; Crouse 2016]
-    d_k = Δ_k(dashpots) + law(ω_k),  law = ½[a + bω + cω² + Σ_j e_j (ωτ_j)²/(1 + (ωτ_j)²)] or as it is, a, b, c, e >= 0, refitted beside every trial
+    price_kj = (Δln f/w)²/18 + (Δln d/e)²/18 + 1 − c_kj, at most 1;   Σ worth_k (price − 1) -> min over one-to-one pairs
+        [Kuhn 1955; Crouse 2016]
+    d_k = Δ_k(dashpots) + law(ω_k),
+        law = ½[a + bω + cω² + Σ_j e_j (ωτ_j)²/(1 + (ωτ_j)²)] or as it is, a, b, c, e >= 0, refitted beside every trial
         by Huber's loss: a discrete spectrum of relaxations, as of a passive solid [Nowick & Berry 1972, ch. 3]
-    left = Σ_k worth_k [ρ((d_k − Δ_k − law)/√(sd_k² + (SCATTER Δ_k)² + (LAW d_k)²)) + (1 − C_k²)/ROUGH² + ρ(l_k/LEVEL)], each bounded, ρ Cauchy's;
+    left = Σ_k worth_k [ρ((d_k − Δ_k − law)/√(sd_k² + (SCATTER Δ_k)² + (LAW d_k)²)) + (1 − C_k²)/ROUGH² + ρ(l_k/LEVEL)],
+        each bounded, ρ Cauchy's;
         lines that no mode explains count as outliers, and so do modes that would be observable and that no line shows
 
-c_kj: cosine of a line's amplitudes over the strikes with what one exponential at the mode's pole would take of all modes,
-Σ_i a_i 2d_j/((d_i + d_j) − i(ω_i − ω_j)), or with the mode's own. C_k: with what exponentials at the lines' poles take of all modes together
-(variable projection's linear half [Golub & Pereyra 1973]): modes that sound as one line are one, those that a dashpot has told apart are not. l_k: ln of a
-line's level over that, less what is common to all: of degenerate modes that a dashpot has turned, which one the sensor hears, all strikes show alike, so C_k does not.
+c_kj: cosine of a line's amplitudes over the strikes with what one exponential at the mode's pole would take of all
+modes, Σ_i a_i 2d_j/((d_i + d_j) − i(ω_i − ω_j)), or with the mode's own. C_k: with what exponentials at the lines'
+poles take of all modes together (variable projection's linear half [Golub & Pereyra 1973]): modes that sound as one
+line are one, those that a dashpot has told apart are not. l_k: ln of a line's level over that, less what is common to
+all: of degenerate modes that a dashpot has turned, which one the sensor hears, all strikes show alike, so C_k does not.
 """
 
 from __future__ import annotations
@@ -25,19 +29,27 @@ from sonic_bullet.effects.common.points import solved, vertex_normals
 from sonic_bullet.effects.protocol import ObjectEvidence
 from sonic_bullet.records import Array, ModalModel
 
-SCATTER, LAW, ROUGH = 0.05, 0.02, 0.15  # of what dashpots add to a decay, of the decay, and of a pattern, relative: shapes err, and laws
+# of what dashpots add to a decay, of the decay, and of a pattern, relative: shapes err, and laws
+SCATTER, LAW, ROUGH = 0.05, 0.02, 0.15
 WIDTH, DECADE = 0.004, 0.4  # of ln f and ln d, of a pair
 LEVEL = 0.3  # of ln of a line's level
-MISSED = 9.0  # squared spreads from where on a decay's misfit costs less, and that a pattern costs which nothing explains
+# squared spreads from where on a decay's misfit costs less, and that a pattern costs which nothing explains
+MISSED = 9.0
 GROSS = 4 * MISSED  # that a decay costs at most: a few spreads may be a shape's error, half or twice is none
 LOST = 2 * GROSS + MISSED  # that a line costs at most
 AT_ONCE = 100  # trials whose poles are found together: (100, m, m) complex, 64 MB of 200 modes
 MUTE = MISSED  # that a mode costs that no line shows: a mesh may have it elsewhere
-WEAK, HALF = 0.05, 0.5  # of the worth of a line that the model does not expect: it may be a click or another body's; near a mode, its degenerate partner
-CLEAR, LONGER = 0.25, 2.0  # quantile of the energy of modes that are observed, for one that would be; times a line's decay, for one that it hides
+# of the worth of a line that the model does not expect: it may be a click or another body's; near a mode, its
+# degenerate partner
+WEAK, HALF = 0.05, 0.5
+# quantile of the energy of modes that are observed, for one that would be; times a line's decay, for one that it hides
+CLEAR, LONGER = 0.25, 2.0
 LOW = 0.3  # of a line's spread where it lies under the least law
-TAU_S = (1e-5, 3e-5, 1e-4)  # of relaxations that peak in what is heard, between slow ones, whose decay is a constant, and fast ones, whose goes as ω²
-RUN, WIDE = 10, 20  # modes whose coupling is reckoned with in a first look, and in a closer one: what eigenvalues cost goes with the cube
+# of relaxations that peak in what is heard, between slow ones, whose decay is a constant, and fast ones, whose goes as
+# ω²
+TAU_S = (1e-5, 3e-5, 1e-4)
+# modes whose coupling is reckoned with in a first look, and in a closer one: what eigenvalues cost goes with the cube
+RUN, WIDE = 10, 20
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,10 +66,14 @@ Dashpots = tuple[Dashpot, ...]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DashpotFit:
-    """An object's lines (k,) and modes (m,). size (s, k) complex, worth (k,); into (s, m): J φ(p)·e of the strikes; out (m,): φ(q)·n of the sensor.
+    """An object's lines (k,) and modes (m,). size (s, k) complex, worth (k,); into (s, m):
 
-    observed_hz, rings_per_s (l,): of every line, those too that are not held against modes; through (m,): what pulse and path leave of a mode, relative.
-    normal (v, 3) of all vertices, body: those of the surface. runs, wide: neighbours that may couple, RUN and WIDE; least (c,): the law that most lines lie above; untied (k, k): of the lines' exponentials.
+    J φ(p)·e of the strikes; out (m,): φ(q)·n of the sensor.
+
+    observed_hz, rings_per_s (l,): of every line, those too that are not held against modes; through (m,): what pulse
+    and path leave of a mode, relative. normal (v, 3) of all vertices, body: those of the surface. runs, wide:
+    neighbours that may couple, RUN and WIDE; least (c,): the law that most lines lie above; untied (k, k): of the
+    lines' exponentials.
     """
 
     freq_hz: Array
@@ -96,9 +112,9 @@ class DashpotFit:
         is_mode = index < len(h.freq_hz)
         at_home = np.abs(np.log(freq[:, None] / x.freq_hz)).min(axis=1) < WIDTH
         strength = np.nan_to_num(size).max(axis=0)
-        worth = np.clip(1 + 0.25 * np.log10(np.maximum(strength / max(strength.max(initial=0.0), 1e-300), 1e-6)), 0.1, 1) * np.where(
-            is_mode, 1, np.where(at_home, HALF, WEAK)
-        )
+        worth = np.clip(
+            1 + 0.25 * np.log10(np.maximum(strength / max(strength.max(initial=0.0), 1e-300), 1e-6)), 0.1, 1
+        ) * np.where(is_mode, 1, np.where(at_home, HALF, WEAK))
         amplitude = np.concatenate([h.amplitude, h.foreign_amplitude], axis=1)[:, index]
         level = np.where(np.isfinite(h.impulse_n_s), h.impulse_n_s, 1.0)
         into = np.einsum("sxm,sx->sm", x.shape[h.strike_vertex].astype(float), h.strike_direction) * level[:, None]
@@ -127,7 +143,10 @@ class DashpotFit:
         )
 
     def left(self, dashpots: Dashpots, runs: tuple[Array, ...] | None = None) -> float:
-        """Of the lines' decays, patterns and levels, in squared spreads, beside the law that suits them best. runs: modes that couple; every one with every other where None."""
+        """Of the lines' decays, patterns and levels, in squared spreads, beside the law that suits them best.
+
+        runs: modes that couple; every one with every other where None.
+        """
         x = self.model
         if not dashpots:
             return self.misfit(-x.decay_per_s + 2j * np.pi * x.freq_hz, np.eye(x.mode_count, dtype=complex), 2)
@@ -139,7 +158,10 @@ class DashpotFit:
         return self._pairs(omega, x.decay_per_s, self._alike(omega, x.decay_per_s, self.into * self.out))[:2]
 
     def poles(self, trials: list[Dashpots], runs: tuple[Array, ...]) -> Iterator[tuple[Array, Array]]:
-        """Poles (m,) and turns (m, m) of many, one after another, modes coupling within runs only. AT_ONCE are held: of thousands, turns fill the memory."""
+        """Poles (m,) and turns (m, m) of many, one after another, modes coupling within runs only.
+
+        AT_ONCE are held: of thousands, turns fill the memory.
+        """
         for first in range(0, len(trials), AT_ONCE):
             yield from self._poles(trials[first : first + AT_ONCE], runs)
 
@@ -160,7 +182,11 @@ class DashpotFit:
         every = np.array([[d.along == "every" for d in t] for t in trials])
         along = np.zeros_like(moved)
         along[:, :, 0] = np.einsum("tjx,tjxm->tjm", self.normal[vertex], moved)
-        return np.asarray((root[:, :, None, None] * np.where(every[:, :, None, None], moved, along)).reshape(len(trials), -1, moved.shape[-1]))
+        return np.asarray(
+            (root[:, :, None, None] * np.where(every[:, :, None, None], moved, along)).reshape(
+                len(trials), -1, moved.shape[-1]
+            )
+        )
 
     def price(self, pole: Array, turn: Array) -> float:
         """Of the pairs of lines and modes beside the least law: a first look."""
@@ -175,7 +201,10 @@ class DashpotFit:
         return np.asarray((share * self.model.decay_per_s[:, None]).sum(axis=0) / share.sum(axis=0))
 
     def misfit(self, pole: Array, turn: Array, turns: int) -> float:
-        """The same of poles (m,) and turns (m, m) that are at hand; turns: of pairing and the law, and how many laws to begin with."""
+        """The same of poles (m,) and turns (m, m) that are at hand;
+
+        turns: of pairing and the law, and how many laws to begin with.
+        """
         pole, turn = _alive(pole, turn)
         own = self._own(turn)
         column = np.column_stack([_smooth(pole.imag), own])
@@ -191,50 +220,77 @@ class DashpotFit:
             line, mode, _ = self._pairs(omega, extra + law, alike)
             if not len(line):
                 return 2 * nothing  # nor is any mode heard
-            worth, sd = self.worth[line], np.hypot(self.sd[line], SCATTER * np.minimum(extra[mode], self.decay_per_s[line]))
+            worth, sd = (
+                self.worth[line],
+                np.hypot(self.sd[line], SCATTER * np.minimum(extra[mode], self.decay_per_s[line])),
+            )
             law = column @ solved(self.decay_per_s[line] - extra[mode], sd / np.sqrt(worth), column[mode])[0]
         off = np.abs(self.decay_per_s[line] - (extra + law)[mode]) / sd
         decays = np.minimum(MISSED * np.log1p(off**2 / MISSED), GROSS)
-        observed, modelled = self._seen(self.size), self._seen(self._amplitudes_at_lines(line, omega[mode], omega, extra + law, push))
+        observed, modelled = (
+            self._seen(self.size),
+            self._seen(self._amplitudes_at_lines(line, omega[mode], omega, extra + law, push)),
+        )
         patterns = np.minimum((1 - _cosine(observed, modelled)[line] ** 2) / ROUGH**2, MISSED)
         level = _level(observed[:, line], modelled[:, line] * self._through(self.freq_hz[line])) / LEVEL
         levels = np.minimum(MISSED * np.log1p(level**2 / MISSED), GROSS)
-        return nothing + float((worth * (decays + patterns + levels - LOST)).sum()) + self._unobserved(mode, omega, extra + law, push)
+        return (
+            nothing
+            + float((worth * (decays + patterns + levels - LOST)).sum())
+            + self._unobserved(mode, omega, extra + law, push)
+        )
 
     def _through(self, freq_hz: Array) -> Array:
         """What pulse and path leave (k,), relative."""
         return np.interp(freq_hz, self.model.freq_hz, self.through)
 
     def _unobserved(self, mode: Array, omega: Array, decay: Array, push: Array) -> float:
-        """What modes (m,) cost that would be observable and are not observed: of a line's strength there, and no line near that rings as long. mode (p,): those that lines stand for."""
+        """What modes (m,) cost that would be observable and are not observed: of a line's strength there, and no line
+        near that rings as long. mode (p,): those that lines stand for.
+        """
         freq = omega / (2 * np.pi)
         level = np.abs(push).max(axis=0) * self._through(freq)
         paired = np.bincount(mode, minlength=len(omega)) > 0
         energy = level**2 / np.maximum(decay, 1e-3)
-        loud = ~paired & (energy > np.quantile(energy[paired], CLEAR)) & (freq > freq[paired].min()) & (freq < freq[paired].max())
+        loud = (
+            ~paired
+            & (energy > np.quantile(energy[paired], CLEAR))
+            & (freq > freq[paired].min())
+            & (freq < freq[paired].max())
+        )
         near = np.abs(np.log(self.observed_hz[:, None] / freq[loud])) < 2 * WIDTH
-        hidden = (near & ~(self.rings_per_s[:, None] > LONGER * decay[loud])).any(axis=0)  # a line of unknown decay may be any
+        # a line of unknown decay may be any
+        hidden = (near & ~(self.rings_per_s[:, None] > LONGER * decay[loud])).any(axis=0)
         worth = np.clip(1 + 0.25 * np.log10(np.maximum(level[loud] / max(level[paired].max(), 1e-300), 1e-6)), 0.1, 1)
         return float(MUTE * worth[~hidden].sum())
 
     def _amplitudes_at_lines(self, line: Array, at: Array, omega: Array, decay: Array, push: Array) -> Array:
-        """Amplitudes (s, k) that exponentials at the lines' poles take of all modes together: Σ_l <e_k, e_l> A_l = Σ_i <e_k, e_i> a_i.
+        """Amplitudes (s, k) that exponentials at the lines' poles take of all modes together: Σ_l <e_k, e_l> A_l = Σ_i
+        <e_k, e_i> a_i.
 
         Lines (p,) are at modes at (p,) in 1/s; what the mesh has wrong there is taken out, of their neighbours too.
         """
         mine = np.sort(at)
         near = np.clip(np.searchsorted(mine, omega), 1, max(len(mine) - 1, 1))
-        near = np.where(np.abs(mine[near - 1] - omega) < np.abs(mine[np.minimum(near, len(mine) - 1)] - omega), near - 1, np.minimum(near, len(mine) - 1))
+        near = np.where(
+            np.abs(mine[near - 1] - omega) < np.abs(mine[np.minimum(near, len(mine) - 1)] - omega),
+            near - 1,
+            np.minimum(near, len(mine) - 1),
+        )
         shift = np.log(2 * np.pi * self.freq_hz[line] / at)[np.argsort(at)][near]
         z, size = _poles_of(self.freq_hz, self.decay_per_s)
         y = -decay + 1j * omega * np.exp(shift)
         return np.asarray((self.untied @ ((-size[:, None] / (z.conj()[:, None] + y)) @ push.T)).T * size)
 
     def _alike(self, omega: Array, decay: Array, push: Array) -> Array:
-        """Cosines (k, m) of the lines' amplitudes over the strikes and what one exponential at each mode's pole takes of all, or the mode's own."""
+        """Cosines (k, m) of the lines' amplitudes over the strikes and what one exponential at each mode's pole takes
+        of all, or the mode's own.
+        """
         share = 2 * decay[None, :] / (decay[:, None] + decay[None, :] - 1j * (omega[:, None] - omega[None, :]))
         observed = self._seen(self.size)
-        return np.maximum(_cosine(observed, self._seen(push @ share), every=True), _cosine(observed, self._seen(push), every=True))
+        return np.maximum(
+            _cosine(observed, self._seen(push @ share), every=True), _cosine(observed, self._seen(push), every=True)
+        )
 
     def _seen(self, amplitude: Array) -> Array:
         return amplitude if self.signed else np.abs(amplitude)
@@ -278,10 +334,15 @@ def _cosine(a: Array, b: Array, *, every: bool = False) -> Array:
 
 
 def _level(observed: Array, modelled: Array) -> Array:
-    """ln of the level (k,) of columns (s, k) over that of others, less their median; 0 where there is nothing to tell."""
+    """ln of the level (k,) of columns (s, k) over that of others, less their median;
+
+    0 where there is nothing to tell.
+    """
     if not (np.isfinite(observed).all() and np.isfinite(modelled).all() and modelled.any()):
         return np.zeros(observed.shape[1])
-    ratio = np.log(np.maximum(np.linalg.norm(observed, axis=0), 1e-300)) - np.log(np.maximum(np.linalg.norm(modelled, axis=0), 1e-300))
+    ratio = np.log(np.maximum(np.linalg.norm(observed, axis=0), 1e-300)) - np.log(
+        np.maximum(np.linalg.norm(modelled, axis=0), 1e-300)
+    )
     return np.asarray(ratio - np.median(ratio))
 
 

@@ -1,6 +1,7 @@
 """Where dashpots may be: all over the surface in a first look, then about the best, one after another.
 
-data · ln left + j (3 ln data + BETTER) -> min over the number j of dashpots; each step: grid, the best few of it, refined       [Schwarz 1978]
+data · ln left + j (3 ln data + BETTER) -> min over the number j of dashpots; each step: grid, the best few of it,
+    refined       [Schwarz 1978]
 """
 
 from __future__ import annotations
@@ -18,7 +19,8 @@ from sonic_bullet.records import Array
 POINTS, SPOTS = 90, 500  # vertices where another dashpot is looked for; and where the first is, or one that is moved
 STEPS = (0.06, 0.25, 1.0, 4.0, 16.0)  # of the strength that doubles the typical decay
 FINER, COARSER = (0.6, 0.8, 0.92, 1.08, 1.25, 1.6), (0.1, 0.3, 3.0, 10.0)  # times stronger, in turns
-LOOKED, STARTS, NEAR, FEW = 40, 4, 28, 10  # of the grid, looked at closer; refined; vertices of a turn about one; spots enough to stand for all there
+# of the grid, looked at closer; refined; vertices of a turn about one; spots enough to stand for all there
+LOOKED, STARTS, NEAR, FEW = 40, 4, 28, 10
 NEARER = (0.12, 0.07, 0.04, 0.02)  # turns, in sizes of the body
 TUNED = 0.15  # of ln c
 MOST = 4
@@ -28,7 +30,9 @@ BETTER, HALF = 6.0, 0.5  # in BIC, for another dashpot; of what one costs: one t
 
 
 def sought(t: DashpotFit) -> Dashpots:
-    """The dashpots that are accepted, one after another; the least Bayes information criterion says how many, with BETTER for each on top."""
+    """The dashpots that are accepted, one after another; the least Bayes information criterion says how many, with
+    BETTER for each on top.
+    """
     data = 3 * len(t.freq_hz)  # a decay, a pattern and a level each
     apiece = 3 * np.log(data) + BETTER
     least = float(t.worth.sum())  # what is left within the spreads asks for nothing
@@ -61,11 +65,18 @@ def sought(t: DashpotFit) -> Dashpots:
 
 
 def _grid(t: DashpotFit, vertices: Array) -> list[Dashpot]:
-    return [Dashpot(int(v), c, direction) for v in vertices for c in _strengths(t).tolist() for direction in ("normal", "every")]
+    return [
+        Dashpot(int(v), c, direction)
+        for v in vertices
+        for c in _strengths(t).tolist()
+        for direction in ("normal", "every")
+    ]
 
 
 def _elsewhere(t: DashpotFit, found: Dashpots, spots: Array) -> Dashpots:
-    """The same number of dashpots, or a better set that some of them being far from where they are lead to: on round bodies a search may end on the wrong side."""
+    """The same number of dashpots, or a better set that some of them being far from where they are lead to: on round
+    bodies a search may end on the wrong side.
+    """
     best = (t.left(found), found)
     for i in range(len(found)):
         moved = [(*found[:i], replace(found[i], vertex=int(v)), *found[i + 1 :]) for v in spots]
@@ -79,14 +90,25 @@ def _cost(pair: tuple[float, Dashpots]) -> float:
     return pair[0]
 
 
-def _with_one_more(t: DashpotFit, starts: list[Dashpots], grid: list[Dashpot], spots: Array) -> tuple[Dashpots, list[Dashpots]]:
-    """The best set that a search finds from some sets of as many and one of the grid; and the sets to go on from: one dashpot alone may stand best where neither of two is."""
+def _with_one_more(
+    t: DashpotFit, starts: list[Dashpots], grid: list[Dashpot], spots: Array
+) -> tuple[Dashpots, list[Dashpots]]:
+    """The best set that a search finds from some sets of as many and one of the grid; and the sets to go on from: one
+    dashpot alone may stand best where neither of two is.
+    """
     few: list[Dashpots] = []
     for chosen in starts:
         trials = [(*chosen, d) for d in grid]
-        few += _best(_of_each(lambda part: [t.price(*modes) for modes in t.poles(part, t.runs)], trials), trials, LOOKED)
+        few += _best(
+            _of_each(lambda part: [t.price(*modes) for modes in t.poles(part, t.runs)], trials), trials, LOOKED
+        )
     few = _best(_left(t, few), few, STARTS)
-    found, *others = (one for _, one in sorted(parallel_map(lambda one: refined(t, one, NEARER[:2], spots), few), key=lambda pair: pair[0]))
+    found, *others = (
+        one
+        for _, one in sorted(
+            parallel_map(lambda one: refined(t, one, NEARER[:2], spots), few), key=lambda pair: pair[0]
+        )
+    )
     for _ in range(min(len(found), 2)):  # once all are where they should be, one may be seen to stand at a mirror image
         found = refined(t, found, (np.inf, *NEARER), spots)[1]
     found = tuned(t, min(found, refined(t, found, NEARER[-1:], whole=True)[1], key=t.left))
@@ -113,7 +135,9 @@ def _best(price: list[float], trials: list[Dashpots], count: int) -> list[Dashpo
 
 
 def _spread(t: DashpotFit, count: int) -> Array:
-    """Surface vertices (p,) where a dashpot would do different things: each the farthest, in n·φ of all modes, from those before it [Gonzalez 1985]."""
+    """Surface vertices (p,) where a dashpot would do different things: each the farthest, in n·φ of all modes, from
+    those before it [Gonzalez 1985].
+    """
     body = t.body
     motion = np.einsum("vxm,vx->vm", t.model.shape[body].astype(float), t.normal[body])
     motion /= np.maximum(np.sqrt((motion**2).mean(axis=0)), 1e-300)
@@ -133,8 +157,11 @@ def _strengths(t: DashpotFit) -> Array:
     return np.array(STEPS) * 2 * float(np.median(t.decay_per_s)) / max(square, 1e-300)
 
 
-def refined(t: DashpotFit, start: Dashpots, reaches: tuple[float, ...], spots: Array | None = None, *, whole: bool = False) -> tuple[float, Dashpots]:
-    """What is left, and the best of strengths, directions and places, one dashpot after another, in turns that reach so far, in sizes of the body.
+def refined(
+    t: DashpotFit, start: Dashpots, reaches: tuple[float, ...], spots: Array | None = None, *, whole: bool = False
+) -> tuple[float, Dashpots]:
+    """What is left, and the best of strengths, directions and places, one dashpot after another, in turns that reach so
+    far, in sizes of the body.
 
     spots (p,): vertices spread over the surface, for turns that reach far.
     """
@@ -150,10 +177,17 @@ def refined(t: DashpotFit, start: Dashpots, reaches: tuple[float, ...], spots: A
 
 
 def _around(t: DashpotFit, d: Dashpot, reach_m: float, spots: Array) -> list[Dashpot]:
-    """Others instead of one: elsewhere, as strong or taking as much, or near it, and stronger, weaker or along the other direction."""
+    """Others instead of one:
+
+    elsewhere, as strong or taking as much, or near it, and stronger, weaker or along the other direction.
+    """
     if not np.isfinite(reach_m):
         some = spots[: 2 * POINTS].tolist()
-        return [_moved(t, d, v) for v in some] + [replace(d, vertex=v) for v in some] + [replace(d, c=d.c * f) for f in COARSER]
+        return (
+            [_moved(t, d, v) for v in some]
+            + [replace(d, vertex=v) for v in some]
+            + [replace(d, c=d.c * f) for f in COARSER]
+        )
     near = _within(t, d, reach_m, spots)
     near = near[:NEAR] if len(near) >= FEW else _within(t, d, reach_m, t.body)
     found = [replace(d, c=d.c * f) for f in FINER]
@@ -182,6 +216,11 @@ def tuned(t: DashpotFit, found: Dashpots) -> Dashpots:
         def with_one(x: float, i: int = i, found: Dashpots = found) -> Dashpots:
             return (*found[:i], replace(found[i], c=float(found[i].c * np.exp(x))), *found[i + 1 :])
 
-        best = minimize_scalar(lambda x, of=with_one: t.left(of(x), t.wide), bounds=(-TUNED, TUNED), method="bounded", options={"maxiter": 10, "xatol": 2e-3})
+        best = minimize_scalar(
+            lambda x, of=with_one: t.left(of(x), t.wide),
+            bounds=(-TUNED, TUNED),
+            method="bounded",
+            options={"maxiter": 10, "xatol": 2e-3},
+        )
         found = min(found, with_one(float(best.x)), key=t.left)
     return found

@@ -1,6 +1,7 @@
 """What a fit hands on: one object under the fitted material, and the case with all its objects.
 
-material_fit.py makes them, fit_verdict.py judges, prediction_of_lines.py, fitted_preset.py and plots/fit_plot.py use them; none of those knows another.
+material_fit.py makes them, fit_verdict.py judges, prediction_of_lines.py, fitted_preset.py and plots/fit_plot.py use
+them; none of those knows another.
 """
 
 from __future__ import annotations
@@ -17,15 +18,20 @@ from sonic_bullet.records import Array
 
 POISSON_SD = 0.04  # of a guess
 RadiationIn = Literal["nothing", "apart", "damping"]
-"""Where a fit has what the air takes: nowhere, as nothing is lost to a medium; beside the material's α and β; or in them, where it cannot be told from them."""
+"""Where a fit has what the air takes:
+
+nowhere, as nothing is lost to a medium; beside the material's α and β; or in them, where it cannot be told from them.
+"""
 POISSON_IDENTIFIED = 0.03  # a spread of ν above this says nothing that the guess did not
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ObjectFit:
-    """One object under the fitted material. m groups of modes in the band, ascending: freq_hz with, model_hz without their correction (m,); decay_per_s (m,).
+    """One object under the fitted material. m groups of modes in the band, ascending: freq_hz with, model_hz without
+    their correction (m,); decay_per_s (m,).
 
-    pattern (s, m): J ψ; line (m,): the line that each is, or -1; measured_hz, measured_decay_per_s (m,) NaN where none. sensor_weight (m,): of a microphone, else 1.
+    pattern (s, m): J ψ; line (m,): the line that each is, or -1; measured_hz, measured_decay_per_s (m,) NaN where none.
+    sensor_weight (m,): of a microphone, else 1.
     """
 
     evidence: RecordedObject
@@ -47,11 +53,12 @@ class ObjectFit:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CaseFit:
-    """A fit and what it rests on. youngs_pa = γρ with ρ of the guess. damping_scatter: relative, of decays about the law.
+    """A fit and what it rests on. youngs_pa = γρ with ρ of the guess. damping_scatter: relative, of decays about the
+    law.
 
-    amplitude_scatter: relative, of amplitudes about σψ. foreign_hz: strong lines that are no mode. assumed: what was taken from the guess. warnings: one line each.
-    log_spectral_db: distance of recording and synthesis (distance.py), mean over the fitted strikes; -1 where there is nothing to compare.
-    radiation: what α and β are without, or with.
+    amplitude_scatter: relative, of amplitudes about σψ. foreign_hz: strong lines that are no mode. assumed: what was
+    taken from the guess. warnings: one line each. log_spectral_db: distance of recording and synthesis (distance.py),
+    mean over the fitted strikes; -1 where there is nothing to compare. radiation: what α and β are without, or with.
     """
 
     case: Case

@@ -1,9 +1,11 @@
-"""Recording and synthesis at the fitted parameters, compared over the fitted strikes: by the paper's hybrid metric and by log spectra.
+"""Recording and synthesis at the fitted parameters, compared over the fitted strikes: by the paper's hybrid metric and
+by log spectra.
 
     Π = Π_psycho/|Π_MRP|                                                    [Ren, Yeh, Lin 2013, eq. 27; metric.py]
     D in dB, where either stands above the noise                            [log_spectral.py]
 
-Π here is taken with everything the fit found: modes corrected for the mesh, in the phase that the sensor starts them with.
+Π here is taken with everything the fit found: modes corrected for the mesh, in the phase that the sensor starts them
+with.
 """
 
 from __future__ import annotations
@@ -21,7 +23,9 @@ from sonic_bullet.records.errors import RecordError
 
 
 def hybrid_of(objects: tuple[ObjectFit, ...], gain: float) -> float:
-    """Mean Π over the fitted strikes of known place, full scale standing for 94 dB SPL; -1 where there is nothing to compare."""
+    """Mean Π over the fitted strikes of known place, full scale standing for 94 dB SPL; -1 where there is nothing to
+    compare.
+    """
     found = []
     for o in objects:
         e = o.evidence
@@ -30,7 +34,9 @@ def hybrid_of(objects: tuple[ObjectFit, ...], gain: float) -> float:
         start = e.seen.start(o.freq_hz, o.decay_per_s)
         for i in np.flatnonzero(e.seen.known):
             try:
-                aim = target(Problem(lines_features(e.lines, int(i), e.sr), e.signals[i], o.freq_hz**2, np.ones(len(o.freq_hz))))
+                aim = target(
+                    Problem(lines_features(e.lines, int(i), e.sr), e.signals[i], o.freq_hz**2, np.ones(len(o.freq_hz)))
+                )
             except RecordError:  # too quiet or too short for an image
                 continue
             # Re A e^{iωt} = Im iA e^{iωt}, and the metric's modes are sines
@@ -58,7 +64,9 @@ def lines_features(lines: Lines, i: int, sr: int) -> Features:
 
 
 def log_spectral_of(objects: tuple[ObjectFit, ...], gain: float) -> float:
-    """Mean log-spectral distance in dB of recording and synthesis over the fitted strikes; -1 where there is nothing to compare."""
+    """Mean log-spectral distance in dB of recording and synthesis over the fitted strikes; -1 where there is nothing to
+    compare.
+    """
     found = []
     for o in objects:
         e = o.evidence

@@ -1,6 +1,8 @@
-"""What a fit may claim: covariance, what is not identifiable, where the model does not fit, and whether the mesh is fine enough.
+"""What a fit may claim: covariance, what is not identifiable, where the model does not fit, and whether the mesh is
+fine enough.
 
-fitted | not identifiable: WHICH and why | misfit: WHAT does not hold      parts joined by "; ", "fitted" alone where nothing is amiss
+fitted | not identifiable: WHICH and why | misfit: WHAT does not hold
+    parts joined by "; ", "fitted" alone where nothing is amiss
 """
 
 from __future__ import annotations
@@ -56,15 +58,22 @@ def finished(
     else:
         unsaid.append("sigma (no strike of known place)")
     foreign, share = _foreign(evidence, objects)
-    if share < CHANCE:  # another object, another rate, no impact: nothing that rests on the pairs is known, nor whose decays these are
+    # another object, another rate, no impact: nothing that rests on the pairs is known, nor whose decays these are
+    if share < CHANCE:
         covariance[:] = np.nan
         unsaid = ["alpha, beta, gamma, poisson_ratio, sigma (few lines are modes, maybe by chance)"]
     identified = np.isfinite(np.diag(covariance))
-    covariance[np.outer(identified, identified) & np.isnan(covariance)] = 0.0  # frequencies, decays and amplitudes are found apart
+    # frequencies, decays and amplitudes are found apart
+    covariance[np.outer(identified, identified) & np.isnan(covariance)] = 0.0
     amiss = _amiss(objects, damping, scatter, gain[2], foreign, share)
     amplitude = gain[0] if np.isfinite(gain[0]) else 1.0
     metric, decibels = hybrid_of(objects, amplitude), log_spectral_of(objects, amplitude)
-    verdict = "; ".join([f"misfit: {', '.join(amiss)}"] * bool(amiss) + [f"not identifiable: {', '.join(unsaid)}"] * bool(unsaid)) or "fitted"
+    verdict = (
+        "; ".join(
+            [f"misfit: {', '.join(amiss)}"] * bool(amiss) + [f"not identifiable: {', '.join(unsaid)}"] * bool(unsaid)
+        )
+        or "fitted"
+    )
     freq, decay, size = _modes(evidence, objects, amplitude)
     gamma = float(np.exp(log_gamma))
     values = (damping.alpha_per_s, damping.beta_s, gamma, amplitude, poisson)
@@ -79,7 +88,20 @@ def finished(
     if check_mesh and objects and not np.isnan(covariance[2, 2]):
         warnings += mesh_warning(objects[0], gamma * density, density, poisson, progress)
     scatters = (damping.scatter, scatter, gain[2])
-    return CaseFit(case, found, objects, gamma * density, density, gain[1], *scatters, foreign, tuple(assumed), tuple(warnings), decibels, radiation)
+    return CaseFit(
+        case,
+        found,
+        objects,
+        gamma * density,
+        density,
+        gain[1],
+        *scatters,
+        foreign,
+        tuple(assumed),
+        tuple(warnings),
+        decibels,
+        radiation,
+    )
 
 
 def _decays_seen(evidence: tuple[RecordedObject, ...]) -> int:
@@ -92,7 +114,11 @@ def _elastic(covariance: Array, information: Array, unsaid: list[str], shaped: b
         unsaid += ["gamma (no mode of a known shape)", "poisson_ratio"]
         return
     determinant = np.linalg.det(information)
-    own = np.linalg.inv(information) if determinant > 1e-12 * information[0, 0] * information[1, 1] else np.full((2, 2), np.inf)
+    own = (
+        np.linalg.inv(information)
+        if determinant > 1e-12 * information[0, 0] * information[1, 1]
+        else np.full((2, 2), np.inf)
+    )
     if own[1, 1] < POISSON_IDENTIFIED**2:
         covariance[np.ix_([2, 4], [2, 4])] = own
         return
@@ -116,7 +142,9 @@ def _foreign(evidence: tuple[RecordedObject, ...], objects: tuple[ObjectFit, ...
     return np.array(sorted(hz)), good / total if total else np.nan
 
 
-def _amiss(objects: tuple[ObjectFit, ...], damping: RayleighFit, scatter: float, amplitude: float, foreign: Array, share: float) -> list[str]:
+def _amiss(
+    objects: tuple[ObjectFit, ...], damping: RayleighFit, scatter: float, amplitude: float, foreign: Array, share: float
+) -> list[str]:
     amiss = []
     if objects and len(foreign):
         shown = ", ".join(f"{f:.0f}" for f in foreign[:6]) + (" …" if len(foreign) > 6 else "")
@@ -132,13 +160,19 @@ def _amiss(objects: tuple[ObjectFit, ...], damping: RayleighFit, scatter: float,
     return amiss
 
 
-def _modes(evidence: tuple[RecordedObject, ...], objects: tuple[ObjectFit, ...], gain: float) -> tuple[Array, Array, Array]:
+def _modes(
+    evidence: tuple[RecordedObject, ...], objects: tuple[ObjectFit, ...], gain: float
+) -> tuple[Array, Array, Array]:
     """Modes of the first object at its first strike; the lines themselves where there is no shape."""
     if objects:
         o = objects[0]
         lines = o.evidence.lines
         pattern = np.abs(o.pattern[0]) * gain
         measured = np.abs(lines.amplitude[0][o.line]) if len(lines.freq_hz) else np.zeros(len(o.line))
-        return o.freq_hz, o.decay_per_s, np.nan_to_num(np.where(np.isfinite(pattern), pattern, np.where(o.line >= 0, measured, 0.0)))
+        return (
+            o.freq_hz,
+            o.decay_per_s,
+            np.nan_to_num(np.where(np.isfinite(pattern), pattern, np.where(o.line >= 0, measured, 0.0))),
+        )
     lines = evidence[0].lines
     return lines.freq_hz, np.nan_to_num(lines.decay_per_s), np.nan_to_num(np.abs(lines.amplitude[0]))

@@ -5,7 +5,18 @@ from __future__ import annotations
 import numpy as np
 
 from sonic_bullet.estimator.fit.case_fit import CaseFit
-from sonic_bullet.presets import DAMPING_TAKEN, FORMAT, Damping, Elasticity, Preset, Provenance, Restitution, Surface, load_material, material_names
+from sonic_bullet.presets import (
+    DAMPING_TAKEN,
+    FORMAT,
+    Damping,
+    Elasticity,
+    Preset,
+    Provenance,
+    Restitution,
+    Surface,
+    load_material,
+    material_names,
+)
 
 NAMES = ("alpha_per_s", "beta_s", "gamma_m2_s2", "sigma", "poisson_ratio")
 
@@ -18,7 +29,10 @@ def spreads(found: CaseFit) -> dict[str, float | None]:
 
 
 def preset_of(found: CaseFit) -> Preset:
-    """The preset of a fit. Surface and impact are no part of what modes tell: they are the guess's, or steel's for a guess without a name."""
+    """The preset of a fit.
+
+    Surface and impact are no part of what modes tell: they are the guess's, or steel's for a guess without a name.
+    """
     fit = found.fit
     guess = found.case.objects[found.objects[0].evidence.thing.name].material if found.objects else None
     sd = np.diag(fit.covariance)
@@ -30,7 +44,12 @@ def preset_of(found: CaseFit) -> Preset:
     base = load_material(guess.lower() if known and guess is not None else "steel")
     alpha, beta, total = fit.alpha_per_s, fit.beta_s, found.radiation == "damping"
     if np.isnan(sd[:2]).all() and base.alpha_per_s is not None and base.beta_s is not None:
-        alpha, beta, total, assumed = base.alpha_per_s, base.beta_s, base.includes_radiation, (*assumed, f"{DAMPING_TAKEN}{base.name}')")
+        alpha, beta, total, assumed = (
+            base.alpha_per_s,
+            base.beta_s,
+            base.includes_radiation,
+            (*assumed, f"{DAMPING_TAKEN}{base.name}')"),
+        )
     source = f"fitted: {found.case.name}"
     taken = f"taken from '{base.name}'"
     used = {o.evidence.thing.name: o for o in found.objects}
@@ -39,14 +58,18 @@ def preset_of(found: CaseFit) -> Preset:
         format=FORMAT,
         name=f"{guess or 'fitted'} ({found.case.name})"[:100],
         density_kg_m3=found.density_kg_m3,
-        elasticity=Elasticity(youngs_pa=youngs, poisson=float(np.clip(poisson, -0.99, 0.499)), source=source, note="; ".join(assumed)),
+        elasticity=Elasticity(
+            youngs_pa=youngs, poisson=float(np.clip(poisson, -0.99, 0.499)), source=source, note="; ".join(assumed)
+        ),
         damping=Damping(alpha_per_s=alpha, beta_s=beta, includes_radiation=total, source=source),
         surface=Surface(roughness_m=base.roughness_m, hurst=base.hurst, source=taken),
         impact=Restitution(restitution=base.restitution, source=taken),
         provenance=Provenance(
             method="modes paired with damped sinusoids of maximum likelihood; least squares",
             recordings=tuple(recordings),
-            parameters=dict(zip(NAMES, (fit.alpha_per_s, fit.beta_s, fit.gamma_m2_s2, fit.sigma, fit.poisson_ratio), strict=True)),
+            parameters=dict(
+                zip(NAMES, (fit.alpha_per_s, fit.beta_s, fit.gamma_m2_s2, fit.sigma, fit.poisson_ratio), strict=True)
+            ),
             spreads=spreads(found),
             assumed=assumed,
             verdict=fit.verdict,

@@ -5,8 +5,8 @@
                         -> A_sj = σ J_s ψ_sj             [eq. 11, 13; observation.py]
     -> MaterialFit, one correction a mode (the mesh's error, at most 1 %), and a verdict
 
-The lines are maximum-likelihood estimates with their Cramér-Rao spreads, so least squares on them loses nothing against a fit of the samples.
-E and ρ come apart only by a mass or a known gain: ρ is the guess's, E = γρ.
+The lines are maximum-likelihood estimates with their Cramér-Rao spreads, so least squares on them loses nothing against
+a fit of the samples. E and ρ come apart only by a mass or a known gain: ρ is the guess's, E = γρ.
 """
 
 from __future__ import annotations
@@ -28,13 +28,26 @@ from sonic_bullet.modal.cache import Place
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import AudioError, FileError
 
-__all__ = ["CORRECTION", "POISSON_IDENTIFIED", "POISSON_SD", "CaseFit", "ObjectFit", "fit_case", "fit_evidence", "gain_of", "object_of"]
+__all__ = [
+    "CORRECTION",
+    "POISSON_IDENTIFIED",
+    "POISSON_SD",
+    "CaseFit",
+    "ObjectFit",
+    "fit_case",
+    "fit_evidence",
+    "gain_of",
+    "object_of",
+]
 
 
-def fit_case(case: Case, *, cache: Place = "default", check_mesh: bool = True, progress: Callable[[str], None] | None = None) -> CaseFit:
+def fit_case(
+    case: Case, *, cache: Place = "default", check_mesh: bool = True, progress: Callable[[str], None] | None = None
+) -> CaseFit:
     """The material of a case, from its 'fit' strikes alone.
 
-    Raises SonicBulletError where a file, mesh or number makes a fit impossible; what the recordings do not say stands in the verdict instead.
+    Raises SonicBulletError where a file, mesh or number makes a fit impossible; what the recordings do not say stands
+    in the verdict instead.
     """
     evidence = gather(case, cache=cache, progress=progress)
     return fit_evidence(case, evidence, cache=cache, check_mesh=check_mesh, progress=progress)
@@ -49,11 +62,16 @@ def fit_evidence(
     total: bool = False,
     progress: Callable[[str], None] | None = None,
 ) -> CaseFit:
-    """`fit_case` on evidence already gathered. total: α and β of the decays as they are, whatever the air takes of them. Raises SonicBulletError."""
+    """`fit_case` on evidence already gathered.
+
+    total: α and β of the decays as they are, whatever the air takes of them. Raises SonicBulletError.
+    """
     if len({e.guess.name for e in evidence}) > 1:
         raise FileError("the 'fit' strikes are of objects of several materials", "give a case for each material")
     if not any(len(e.lines.freq_hz) for e in evidence):
-        raise AudioError("no damped sinusoid stands above the noise", "record a louder strike, nearer, in a quieter place")
+        raise AudioError(
+            "no damped sinusoid stands above the noise", "record a louder strike, nearer, in a quieter place"
+        )
     shaped = tuple(e for e in evidence if e.family is not None)
     guess = evidence[0].guess
     if shaped:
@@ -71,7 +89,10 @@ def fit_evidence(
     lam, decay, decay_sd, extra = _decays(evidence, pairs, air if apart else (None,) * len(air))
     start = (guess.alpha_per_s or 1.0, guess.beta_s or 1.0 / (float(np.median(lam)) if len(lam) else 1e8))
     damping = rayleigh(lam, decay - extra, np.hypot(decay_sd, KNOWN * extra), start, decay)
-    objects = tuple(fitted_object(e, p, a, damping, case.band_hz, taken_off=apart) for e, p, a in zip(shaped, pairs, air, strict=True))
+    objects = tuple(
+        fitted_object(e, p, a, damping, case.band_hz, taken_off=apart)
+        for e, p, a in zip(shaped, pairs, air, strict=True)
+    )
     gain, gain_sd, amplitude_scatter = gain_of(objects)
     return finished(
         case,
@@ -87,7 +108,9 @@ def fit_evidence(
 
 
 def _placed(shaped: tuple[RecordedObject, ...], band_hz: tuple[float, float]) -> tuple[tuple[Pairs, ...], Array, float]:
-    """Pairs of every object at one common (ln γ, ν), information (2, 2) of the lines on it, relative scatter of frequencies."""
+    """Pairs of every object at one common (ln γ, ν), information (2, 2) of the lines on it, relative scatter of
+    frequencies.
+    """
     guess = shaped[0].guess
     centre = float(np.log(guess.youngs_pa / guess.density_kg_m3))
     starts = []
@@ -107,8 +130,12 @@ def _placed(shaped: tuple[RecordedObject, ...], band_hz: tuple[float, float]) ->
     return min(ends, key=lambda end: end[0])[1]
 
 
-def _together(shaped: tuple[RecordedObject, ...], start: tuple[float, float], guess_poisson: float) -> tuple[tuple[Pairs, ...], Array, float]:
-    """Assign and solve for all objects at once until nothing moves; what the modes scatter is then learnt, in place of `MESH_SD`."""
+def _together(
+    shaped: tuple[RecordedObject, ...], start: tuple[float, float], guess_poisson: float
+) -> tuple[tuple[Pairs, ...], Array, float]:
+    """Assign and solve for all objects at once until nothing moves; what the modes scatter is then learnt, in place of
+    `MESH_SD`.
+    """
     log_gamma, poisson = start
     information, scatter, mesh_sd = np.zeros((2, 2)), np.nan, MESH_SD
     pairs: list[Pairs] = []
@@ -144,10 +171,14 @@ def _together(shaped: tuple[RecordedObject, ...], start: tuple[float, float], gu
 
 
 def _undamped_hz(e: RecordedObject, line: Array) -> Array:
-    return np.asarray(np.hypot(2 * np.pi * e.lines.freq_hz[line], np.nan_to_num(e.lines.decay_per_s[line])) / (2 * np.pi))
+    return np.asarray(
+        np.hypot(2 * np.pi * e.lines.freq_hz[line], np.nan_to_num(e.lines.decay_per_s[line])) / (2 * np.pi)
+    )
 
 
-def _decays(evidence: tuple[RecordedObject, ...], pairs: tuple[Pairs, ...], air: tuple[Radiated | None, ...]) -> tuple[Array, Array, Array, Array]:
+def _decays(
+    evidence: tuple[RecordedObject, ...], pairs: tuple[Pairs, ...], air: tuple[Radiated | None, ...]
+) -> tuple[Array, Array, Array, Array]:
     """λ, d, its spread and what of it is radiation, of the lines that are modes; of all lines where there is no shape."""
     found, at = [], 0
     for e in evidence:
@@ -158,6 +189,15 @@ def _decays(evidence: tuple[RecordedObject, ...], pairs: tuple[Pairs, ...], air:
             extra = np.zeros(len(which)) if mine is None else mine.extra_per_s[pairs[at].mode]
             at += 1
         d = e.lines.decay_per_s[which]
-        found.append(np.stack([(2 * np.pi * e.lines.freq_hz[which]) ** 2 + np.nan_to_num(d) ** 2, d, e.lines.identified_sd_per_s[which], extra]))
+        found.append(
+            np.stack(
+                [
+                    (2 * np.pi * e.lines.freq_hz[which]) ** 2 + np.nan_to_num(d) ** 2,
+                    d,
+                    e.lines.identified_sd_per_s[which],
+                    extra,
+                ]
+            )
+        )
     lam, decay, decay_sd, radiated = np.concatenate(found, axis=1)
     return lam, decay, decay_sd, radiated

@@ -1,9 +1,11 @@
 """How far the mesh itself bends γ: what halving its elements would do, estimated from what doubling them twice does.
 
-    ln λ(h) = ln λ + C h^p       h, r₁h, r₁r₂h solved: p, then  ln λ(h) − ln λ(h/2) = Δ₁ (1 − 2^−p)/(r₁^p − 1)       [Richardson 1911]
+    ln λ(h) = ln λ + C h^p       h, r₁h, r₁r₂h solved: p, then  ln λ(h) − ln λ(h/2) = Δ₁ (1 − 2^−p)/(r₁^p − 1)
+        [Richardson 1911]
 
-Quadratic elements have p = 4 once h is small against everything [Strang & Fix 1973, ch. 6.3]; bars and plates one to four cells thick are not there
-yet, and show 2 to 3: p is kept to 2 … 4. A mesh of half the size has eight times the unknowns and takes a minute, so it is not made.
+Quadratic elements have p = 4 once h is small against everything [Strang & Fix 1973, ch. 6.3]; bars and plates one to
+four cells thick are not there yet, and show 2 to 3: p is kept to 2 … 4. A mesh of half the size has eight times the
+unknowns and takes a minute, so it is not made.
 """
 
 from __future__ import annotations
@@ -24,8 +26,12 @@ LEAST_RATIO = 1.2  # of edges: meshes more alike than this tell nothing
 MOST_TIMES = 12.0
 
 
-def mesh_warning(o: ObjectFit, youngs_pa: float, density: float, poisson: float, progress: Callable[[str], None] | None) -> list[str]:
-    """A warning where halving the elements would move γ by over 1 %, or where that cannot be estimated; none for one solved without them (polynomials.py, revolved.py)."""
+def mesh_warning(
+    o: ObjectFit, youngs_pa: float, density: float, poisson: float, progress: Callable[[str], None] | None
+) -> list[str]:
+    """A warning where halving the elements would move γ by over 1 %, or where that cannot be estimated; none for one
+    solved without them (polynomials.py, revolved.py).
+    """
     if o.evidence.family is not None and not o.evidence.family.meshed:
         return []
     try:
@@ -34,11 +40,18 @@ def mesh_warning(o: ObjectFit, youngs_pa: float, density: float, poisson: float,
         return [f"mesh error not known: a coarser mesh fails ({error.what})"]
     if not np.isfinite(moved):
         return ["mesh error not known: no coarser mesh could be made"]
-    return [f"halving the mesh size would move gamma by about {moved:.1%}: its frequencies are that uncertain"] if abs(moved) > MESH_MOVES else []
+    return (
+        [f"halving the mesh size would move gamma by about {moved:.1%}: its frequencies are that uncertain"]
+        if abs(moved) > MESH_MOVES
+        else []
+    )
 
 
-def halving_moves(o: ObjectFit, youngs_pa: float, density: float, poisson: float, progress: Callable[[str], None] | None = None) -> float:
-    """Relative change of γ (the mean over the observed modes, the lowest 40 at most) that halving the elements would bring; NaN where it cannot be estimated.
+def halving_moves(
+    o: ObjectFit, youngs_pa: float, density: float, poisson: float, progress: Callable[[str], None] | None = None
+) -> float:
+    """Relative change of γ (the mean over the observed modes, the lowest 40 at most) that halving the elements would
+    bring; NaN where it cannot be estimated.
 
     Raises MeshError, ModalError where a coarser mesh fails.
     """
@@ -54,7 +67,8 @@ def halving_moves(o: ObjectFit, youngs_pa: float, density: float, poisson: float
     say, times = progress or (lambda _: None), 2.0
     for _ in range(2):
         coarse, edge = _coarser(o, material, times, edges[0], count, say)
-        while edge < LEAST_RATIO * edges[-1] and times < MOST_TIMES:  # fTetWild keeps to the surface, whatever edge it is asked for
+        # fTetWild keeps to the surface, whatever edge it is asked for
+        while edge < LEAST_RATIO * edges[-1] and times < MOST_TIMES:
             times *= 1.6
             coarse, edge = _coarser(o, material, times, edges[0], count, say)
         times *= 2
@@ -67,7 +81,8 @@ def halving_moves(o: ObjectFit, youngs_pa: float, density: float, poisson: float
 
 
 def halved(edges: list[float], shifts: list[float]) -> float:
-    """What halving brings to a logarithm, from its shifts (2,) between the first mesh and two coarser ones; edges (3,) of all three.
+    """What halving brings to a logarithm, from its shifts (2,) between the first mesh and two coarser ones; edges (3,)
+    of all three.
 
     Shifts that do not grow as a power would are judged with order 2. NaN where the first two meshes are alike.
     """
@@ -89,7 +104,9 @@ def _edge_m(vertex_m: Array, face: Array) -> float:
     return float(np.sqrt(np.median(face_areas_m2(vertex_m, face)) * 16 / np.sqrt(3)))
 
 
-def _coarser(o: ObjectFit, material: Material, times: float, edge_m: float, count: int, say: Callable[[str], None]) -> tuple[Array, float]:
+def _coarser(
+    o: ObjectFit, material: Material, times: float, edge_m: float, count: int, say: Callable[[str], None]
+) -> tuple[Array, float]:
     """ln λ (c,) of the body with elements ``times`` as large, and what their edge came out as."""
     from sonic_bullet.modal import eigen, fem
     from sonic_bullet.modal.meshing.solid import surface
@@ -107,9 +124,19 @@ def _coarser(o: ObjectFit, material: Material, times: float, edge_m: float, coun
         stiffness, mass = stiffness[free][:, free], mass[free][:, free]
     most = min(count, max(1, stiffness.shape[0] // 3 - rigid))
     thin = float(np.ptp(body.node_m, axis=0).min()) / length
-    found = eigen.solve(stiffness, mass, -(thin**2) / 3, rigid=rigid, enough=lambda value: len(value) >= most + rigid, most=most, say=say)
+    found = eigen.solve(
+        stiffness,
+        mass,
+        -(thin**2) / 3,
+        rigid=rigid,
+        enough=lambda value: len(value) >= most + rigid,
+        most=most,
+        say=say,
+    )
     gamma = material.youngs_pa / material.density_kg_m3
-    return np.asarray(np.log(found.lambda_per_s2[:most] * gamma / length**2)), _edge_m(body.node_m[skin.node], skin.face)
+    return np.asarray(np.log(found.lambda_per_s2[:most] * gamma / length**2)), _edge_m(
+        body.node_m[skin.node], skin.face
+    )
 
 
 def _filled(o: ObjectFit, times: float, edge_m: float, say: Callable[[str], None]) -> Solid:

@@ -1,10 +1,12 @@
 """What a sensor hears of each mode: the model of observation that a case declares.
 
-    sum       Σ J (φ(p)·e) e^{−dt} sin ωt                                                  [Ren, Yeh, Lin 2013, eq. 11, 13]
+    sum       Σ J (φ(p)·e) e^{−dt} sin ωt
+        [Ren, Yeh, Lin 2013, eq. 11, 13]
     velocity  Σ J (φ(p)·e)(φ(q)·n) e^{−dt} (cos ωt − (d/ω) sin ωt)       an impulse J at p along e, seen at q along n
     pressure  Σ J (φ(p)·e) |w| e^{−dt} cos ωt, w the radiation weight of the mode          [synth.far_field]
 
-All as Re[A e^{(−d+iω)t}]: A = g·J·ψ·(−i | 1 + i d/ω | 1), with ψ the real transfer of the mode and g the gain, one number for the case.
+All as Re[A e^{(−d+iω)t}]: A = g·J·ψ·(−i | 1 + i d/ω | 1), with ψ the real transfer of the mode and g the gain, one
+number for the case.
 """
 
 from __future__ import annotations
@@ -22,7 +24,9 @@ OFF = 0.02  # of the body's diagonal: farther from the surface a point is not on
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Observation:
-    """How s strikes of one body are observed, in the family's basis. strike (s, b): J φ(p)·e; sensor (b,): φ(q)·n, or None for what has no place.
+    """How s strikes of one body are observed, in the family's basis. strike (s, b):
+
+    J φ(p)·e; sensor (b,): φ(q)·n, or None for what has no place.
 
     known (s,): whether a strike's place is declared. level (s,): whether its impulse is. kind: as `Case.sensor`.
     """
@@ -35,8 +39,17 @@ class Observation:
     scale_per_kg: float
 
     def transfer(self, vector: Array, weight: Array | None = None) -> Array:
-        """Real ψ (s, m), J included, of modes (b, m) in the basis; weight (m,) of the sensor where it has no place. NaN for strikes unknown."""
-        at_sensor = self.sensor @ vector if self.sensor is not None else weight if weight is not None else np.ones(vector.shape[1])
+        """Real ψ (s, m), J included, of modes (b, m) in the basis;
+
+        weight (m,) of the sensor where it has no place. NaN for strikes unknown.
+        """
+        at_sensor = (
+            self.sensor @ vector
+            if self.sensor is not None
+            else weight
+            if weight is not None
+            else np.ones(vector.shape[1])
+        )
         power = 1.0 if self.sensor is not None else 0.5
         psi = (self.strike @ vector) * at_sensor * self.scale_per_kg**power
         return np.where(self.known[:, None], psi, np.nan)
@@ -56,7 +69,9 @@ def observation(
     sensor_m: tuple[float, float, float] | None = None,
     sensor_direction: tuple[float, float, float] | None = None,
 ) -> Observation:
-    """Strikes (position in m, direction, impulse in N·s; None where not known) of a body, observed by a sensor. A direction not given is the inward normal.
+    """Strikes (position in m, direction, impulse in N·s;
+
+    None where not known) of a body, observed by a sensor. A direction not given is the inward normal.
 
     Raises MeshError where a point lies off the surface.
     """
@@ -80,7 +95,8 @@ def _row(family: Family, position: tuple[float, float, float], direction: Array,
     if not distance[0] <= OFF * family.length_m:
         place = ", ".join(f"{x:g}" for x in position)
         raise MeshError(
-            f"{what} at ({place}) m lies {distance[0]:.3g} m off the surface", "give its place in the mesh's frame, in metres; check the mesh's unit"
+            f"{what} at ({place}) m lies {distance[0]:.3g} m off the surface",
+            "give its place in the mesh's frame, in metres; check the mesh's unit",
         )
     return np.asarray(rows[0])
 

@@ -1,9 +1,12 @@
 """Which line is which mode, with E wrong by a third and ν by a twentieth.
 
     sift     every (γ, ν) of a grid: agreement of the lines with the modes, as two spectra on a logarithmic axis
-             Q = Σ_kj K(ln f_k − ln f_j) c_kj √(|A_k||p_j|) / √(Σ_kk' … Σ_jj' …),  c = |<A_k, p_j>|/(|A_k||p_j|) over the strikes
-    assign   Σ (ln f_k − ln f_j)²/2s² + (1 − c_kj)/w → min                              [Kuhn 1955; Crouse 2016], unpaired at a price
-    solve    ln γ and ν by least squares on ln λ, outliers down-weighted                [Cauchy's weight: Holland & Welsch 1977]
+             Q = Σ_kj K(ln f_k − ln f_j) c_kj √(|A_k||p_j|) / √(Σ_kk' … Σ_jj' …),
+                 c = |<A_k, p_j>|/(|A_k||p_j|) over the strikes
+    assign   Σ (ln f_k − ln f_j)²/2s² + (1 − c_kj)/w → min
+        [Kuhn 1955; Crouse 2016], unpaired at a price
+    solve    ln γ and ν by least squares on ln λ, outliers down-weighted
+        [Cauchy's weight: Holland & Welsch 1977]
 
 Modes closer than TWINS are one: their shapes within the pair are anyone's, the sum over the pair is not.
 """
@@ -30,12 +33,17 @@ CANDIDATES = 8
 MISSED = 0.3
 NEVER = 0.02
 HEAPED = 10.0  # times the energy of all lines: what none can hold that is not cancelled
-BRIEF = 25.0  # times the decay that holds half of the energy, higher up times its loss factor: clicks, filters' and rooms' first milliseconds are made of such lines, bodies' modes seldom
+# times the decay that holds half of the energy, higher up times its loss factor: clicks, filters' and rooms' first
+# milliseconds are made of such lines, bodies' modes seldom
+BRIEF = 25.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Group:
-    """Modes of a family at (γ, ν), degenerate modes as one. freq_hz (m,) undamped, pattern (s, m) real, share (m,) ∂ ln λ/∂ν; member: each group's modes."""
+    """Modes of a family at (γ, ν), degenerate modes as one.
+
+    freq_hz (m,) undamped, pattern (s, m) real, share (m,) ∂ ln λ/∂ν; member: each group's modes.
+    """
 
     freq_hz: Array
     pattern: Array
@@ -70,7 +78,9 @@ def grouped(family: Family, seen: Observation, log_gamma: float, poisson: float)
 
 
 def _observed(lines: Lines, seen: Observation) -> Array:
-    """Line patterns (s, k): complex where phases are true, but for one common phase a mode, which a finite contact turns; else magnitudes."""
+    """Line patterns (s, k): complex where phases are true, but for one common phase a mode, which a finite contact
+    turns; else magnitudes.
+    """
     return lines.amplitude if phased(lines, seen) else np.abs(lines.amplitude)
 
 
@@ -81,7 +91,11 @@ def phased(lines: Lines, seen: Observation) -> bool:
 
 def _usable(lines: Lines, seen: Observation) -> Array:
     """The strikes (s,) whose place is known; all-false where patterns say nothing."""
-    return np.asarray(seen.known & np.isfinite(lines.amplitude).all(axis=1)) if lines.amplitude.shape[1] else seen.known & False
+    return (
+        np.asarray(seen.known & np.isfinite(lines.amplitude).all(axis=1))
+        if lines.amplitude.shape[1]
+        else seen.known & False
+    )
 
 
 def _patterns(lines: Lines, seen: Observation, modes: Array) -> tuple[Array, Array, Array]:
@@ -94,14 +108,19 @@ def _patterns(lines: Lines, seen: Observation, modes: Array) -> tuple[Array, Arr
     if not phased(lines, seen):
         p = np.abs(p)
     size, strength = np.linalg.norm(a, axis=0), np.linalg.norm(p, axis=0)
-    alike = np.abs(a.T @ p) / np.maximum(size[:, None] * strength[None, :], 1e-300) if use.sum() > 1 else np.ones((k, m))
+    alike = (
+        np.abs(a.T @ p) / np.maximum(size[:, None] * strength[None, :], 1e-300) if use.sum() > 1 else np.ones((k, m))
+    )
     return size / size.max(initial=1e-300), strength / strength.max(initial=1e-300), alike
 
 
 def _rings(lines: Lines) -> Array:
-    """How much each line (k,) may be a mode by its decay: 1, less where it is over far sooner than what holds the energy.
+    """How much each line (k,) may be a mode by its decay:
 
-    Lines at the fastest decay there is come in heaps that cancel one another, so their strengths say nothing; no more do those of other heaps.
+    1, less where it is over far sooner than what holds the energy.
+
+    Lines at the fastest decay there is come in heaps that cancel one another, so their strengths say nothing; no more
+    do those of other heaps.
     """
     decay, energy = np.nan_to_num(lines.decay_per_s), np.nan_to_num(lines.energy)
     piled = heaped(lines)
@@ -111,13 +130,15 @@ def _rings(lines: Lines) -> Array:
     order = np.argsort(decay)
     share = np.cumsum(energy[order])
     middle = order[np.searchsorted(share, share[-1] / 2)]
-    typical = max(float(decay[middle]), 1.0) * np.maximum(lines.freq_hz / lines.freq_hz[middle], 1.0)  # what loses as much a cycle ends sooner
+    # what loses as much a cycle ends sooner
+    typical = max(float(decay[middle]), 1.0) * np.maximum(lines.freq_hz / lines.freq_hz[middle], 1.0)
     rings = np.clip(BRIEF * typical / np.maximum(decay, 1e-9), NEVER, 1.0)
     return np.asarray(np.where(piled, 0.0, np.where(decay > PINNED * FASTEST_PER_S, np.minimum(rings, NEVER), rings)))
 
 
 def heaped(lines: Lines) -> Array:
-    """Which lines (k,) are mostly cancelled by their neighbours: alone they would hold HEAPED times the energy of all lines together.
+    """Which lines (k,) are mostly cancelled by their neighbours: alone they would hold HEAPED times the energy of all
+    lines together.
 
     ∫ |Σ A e^{pt}|² dt = −Σ_jk A_j Ā_k/(p_j + p̄_k)
     """
@@ -135,7 +156,13 @@ def _overlap(a: Array, b: Array, width: float) -> Array:
 
 
 def best_pairs(
-    family: Family, lines: Lines, seen: Observation, log_gamma: float, poisson: float, band_hz: tuple[float, float], reach: float
+    family: Family,
+    lines: Lines,
+    seen: Observation,
+    log_gamma: float,
+    poisson: float,
+    band_hz: tuple[float, float],
+    reach: float,
 ) -> list[tuple[float, float]]:
     """The best few (ln γ, ν) of the grid, best first."""
     width = 0.006
@@ -154,7 +181,11 @@ def best_pairs(
         for i, g in enumerate(grid):
             inside = (place + g / 2 > np.log(band_hz[0])) & (place + g / 2 < np.log(band_hz[1]))
             total = np.sqrt(both[inside][:, inside].sum())
-            score[i] = (weight[:, inside] * _overlap(observed, place[inside] + g / 2, width)).sum() / (own * total) if total > 0 else 0.0
+            score[i] = (
+                (weight[:, inside] * _overlap(observed, place[inside] + g / 2, width)).sum() / (own * total)
+                if total > 0
+                else 0.0
+            )
         peak = np.flatnonzero((score[1:-1] >= score[:-2]) & (score[1:-1] > score[2:])) + 1
         found += [(float(score[i]), float(grid[i]), float(nu)) for i in peak]
     found.sort(reverse=True)
@@ -173,20 +204,24 @@ def assign(group: Group, lines: Lines, seen: Observation, width: float) -> tuple
 
     size, strength, alike = _patterns(lines, seen, group.pattern)
     gap = (np.log(lines.freq_hz)[:, None] - np.log(group.freq_hz)[None, :]) / width
-    line_worth = np.clip(0.5 + 0.06 * np.log10(np.maximum(size, 1e-12)), 0.05, 1) * _rings(lines)  # what a line is worth
+    # what a line is worth
+    line_worth = np.clip(0.5 + 0.06 * np.log10(np.maximum(size, 1e-12)), 0.05, 1) * _rings(lines)
     worth = line_worth[:, None] * np.clip(0.6 + 0.1 * np.log10(np.maximum(strength, 1e-12)), 0.05, 1)
     price = np.minimum(gap**2 / 18 + 1.0 * (1 - alike), 1.0)  # 3 widths off, or another pattern: no pair
     row, column = linear_sum_assignment(worth * (price - 1.0))
     paired = price[row, column] < 1.0
     row, column = row[paired], column[paired]
     missed = 0.0
-    if not _usable(lines, seen).any():  # where no pattern tells modes apart, those between the lines that nobody observed count against
+    # where no pattern tells modes apart, those between the lines that nobody observed count against
+    if not _usable(lines, seen).any():
         between = (group.freq_hz > lines.freq_hz.min() * 0.98) & (group.freq_hz < lines.freq_hz.max() * 1.02)
         missed = MISSED * float((between & ~np.isin(np.arange(len(between)), column)).sum())
     return row, column, float(line_worth.sum() + (worth * (price - 1.0))[row, column].sum()) + missed
 
 
-def paired(family: Family, lines: Lines, seen: Observation, start: tuple[float, float], guess_poisson: float, poisson_sd: float) -> Pairs:
+def paired(
+    family: Family, lines: Lines, seen: Observation, start: tuple[float, float], guess_poisson: float, poisson_sd: float
+) -> Pairs:
     """Pairs from a start, narrowing down from 1.2 % to three times the mesh's error."""
     log_gamma, poisson = start
     best = Pairs(log_gamma, poisson, np.zeros(0, int), np.zeros(0, int), np.inf)
@@ -202,11 +237,23 @@ def paired(family: Family, lines: Lines, seen: Observation, start: tuple[float, 
     return best
 
 
-def solve(lines: Lines, group: Group, line: Array, mode: Array, poisson_off: float, poisson_sd: float, mesh_sd: float = MESH_SD) -> tuple[Array, Array, Array]:
-    """Step (2,) of ln γ and ν, information (2, 2) of the lines alone, and the weights (p,) left by outliers. poisson_sd: of the guess."""
+def solve(
+    lines: Lines,
+    group: Group,
+    line: Array,
+    mode: Array,
+    poisson_off: float,
+    poisson_sd: float,
+    mesh_sd: float = MESH_SD,
+) -> tuple[Array, Array, Array]:
+    """Step (2,) of ln γ and ν, information (2, 2) of the lines alone, and the weights (p,) left by outliers.
+
+    poisson_sd: of the guess.
+    """
     freq, decay = lines.freq_hz[line], lines.decay_per_s[line]
     off = np.log((2 * np.pi * freq) ** 2 + np.nan_to_num(decay) ** 2) - 2 * np.log(2 * np.pi * group.freq_hz[mode])
-    rough = np.hypot(LOWEST, freq / freq.max(initial=1e-9))  # a mesh's error grows with the modes: the low ones tell γ and ν best
+    # a mesh's error grows with the modes: the low ones tell γ and ν best
+    rough = np.hypot(LOWEST, freq / freq.max(initial=1e-9))
     sd = 2 * np.hypot(np.nan_to_num(lines.freq_sd_hz[line]) / freq, mesh_sd * rough)
     slope = np.stack([np.ones(len(line)), group.slope[mode]], axis=1)
     weight = np.ones(len(line))
@@ -214,7 +261,10 @@ def solve(lines: Lines, group: Group, line: Array, mode: Array, poisson_off: flo
     step = np.zeros(2)
     for _ in range(8):
         information = (slope * (weight / sd**2)[:, None]).T @ slope
-        held = information + prior + 1e-12 * np.diag(np.diag(information))  # one pair tells one of the two: the least step is taken
-        step = np.linalg.solve(held, (slope * (weight / sd**2)[:, None]).T @ off - np.array([0, poisson_off / poisson_sd**2]))
+        # one pair tells one of the two: the least step is taken
+        held = information + prior + 1e-12 * np.diag(np.diag(information))
+        step = np.linalg.solve(
+            held, (slope * (weight / sd**2)[:, None]).T @ off - np.array([0, poisson_off / poisson_sd**2])
+        )
         weight = 1 / (1 + ((off - slope @ step) / sd / 2.5) ** 2)
     return step, information, weight

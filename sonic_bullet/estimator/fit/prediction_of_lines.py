@@ -1,6 +1,8 @@
-"""A fitted material played on strikes, those fitted and those not: what the sensor would record, in the recording's units.
+"""A fitted material played on strikes, those fitted and those not: what the sensor would record, in the recording's
+units.
 
-x(t) = Re Σ_j σ J ψ_j s_j e^{(−d_j + iω_j)t}      ψ, s: observation.py; ω_j with the correction learnt on the fitted strikes
+x(t) = Re Σ_j σ J ψ_j s_j e^{(−d_j + iω_j)t}
+    ψ, s: observation.py; ω_j with the correction learnt on the fitted strikes
 """
 
 from __future__ import annotations
@@ -44,7 +46,8 @@ def predicted(o: ObjectFit, pattern: Array, gain: float, n: int, sr: int) -> Arr
 
 
 def strike_sound(found: CaseFit, recording: CaseRecording, n: int, sr: int, *, corrected: bool = True) -> Array:
-    """What the fit predicts of any strike of a case (n,): of a fitted object with its corrections, of another object of the material without.
+    """What the fit predicts of any strike of a case (n,): of a fitted object with its corrections, of another object of
+    the material without.
 
     Raises FileError, MeshError where the object has no mesh or the strike no place.
     """

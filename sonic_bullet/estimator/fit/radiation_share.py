@@ -1,9 +1,12 @@
 """What an object's modes lose to the air, as the run time has it, so that a fit of the material leaves it out.
 
-    d_line = ½(α + βλ) + Δd        Δd: synth.far_field, in the air that the run time plays in, of the modes on the run time's own surface (render/resonator.py)
+    d_line = ½(α + βλ) + Δd
+        Δd: synth.far_field, in the air that the run time plays in, of the modes on the run time's own surface
+        (render/resonator.py)
 
-The surface matters: what a mesh costs, about a decibel of pressure, is up to a third of Δd, and only the same mesh costs the same.
-Modes that count as one line: their mean, weighted by the squares of what the strikes let the sensor hear of each.
+The surface matters: what a mesh costs, about a decibel of pressure, is up to a third of Δd, and only the same mesh
+costs the same. Modes that count as one line: their mean, weighted by the squares of what the strikes let the sensor
+hear of each.
 """
 
 from __future__ import annotations
@@ -29,7 +32,9 @@ BEYOND = 1.03  # of a band's end: modes that a line within it may be paired with
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Radiated:
-    """Of each group of an object's modes (m,), as `grouped` has them: |pressure| at 1 m per modal velocity, and radiation damping in 1/s. NaN above the band."""
+    """Of each group of an object's modes (m,), as `grouped` has them: |pressure| at 1 m per modal velocity, and
+    radiation damping in 1/s. NaN above the band.
+    """
 
     weight: Array
     extra_per_s: Array
@@ -41,14 +46,20 @@ def nothing(group: Group) -> Radiated:
 
 
 def radiation_in(case: Case, evidence: tuple[RecordedObject, ...]) -> RadiationIn:
-    """Whether the material's own damping can be told from what the air takes: nothing is lost to a medium, or it is known, and so are all shapes."""
+    """Whether the material's own damping can be told from what the air takes: nothing is lost to a medium, or it is
+    known, and so are all shapes.
+    """
     if case.medium == "none":
         return "nothing"
     return "apart" if case.medium == "air" and all(e.family is not None for e in evidence) else "damping"
 
 
-def in_air(e: RecordedObject, log_gamma: float, poisson: float, to_hz: float, apart: bool, cache: Place = "default") -> Radiated | None:
-    """What an object's modes at (γ, ν) and the guess's density, those up to to_hz, radiate; None where neither its sensor nor the fit asks for the air.
+def in_air(
+    e: RecordedObject, log_gamma: float, poisson: float, to_hz: float, apart: bool, cache: Place = "default"
+) -> Radiated | None:
+    """What an object's modes at (γ, ν) and the guess's density, those up to to_hz, radiate;
+
+    None where neither its sensor nor the fit asks for the air.
 
     apart: radiation is no part of the material's damping. Raises MeshError where its surface cannot be made.
     """
@@ -74,14 +85,26 @@ def _mean(value: Array, weight: Array) -> float:
 
 
 def into_air(
-    family: Family, density_kg_m3: float, freq_hz: Array, vector: Array, surface: tuple[Array, Array] | None = None, air: Air | None = None
+    family: Family,
+    density_kg_m3: float,
+    freq_hz: Array,
+    vector: Array,
+    surface: tuple[Array, Array] | None = None,
+    air: Air | None = None,
 ) -> tuple[Array, Array]:
-    """|w| (m,) in Pa·m per modal velocity and Δd (m,) in 1/s of modes (b, m) of the family, freq_hz (m,) ascending. Source: `synth.far_field`.
+    """|w| (m,) in Pa·m per modal velocity and Δd (m,) in 1/s of modes (b, m) of the family, freq_hz (m,) ascending.
+
+    Source: `synth.far_field`.
 
     surface: vertex_m (v, 3) and face (f, 3) of another mesh of the body than the family's own.
     """
     vertex_m, face = surface or (family.vertex_m, family.face)
-    shape = np.einsum("vxb,bm->vxm", family.skin_at(vertex_m), vector.astype(np.float32)) / np.float32(np.sqrt(density_kg_m3 * family.length_m**3))
+    shape = np.einsum("vxb,bm->vxm", family.skin_at(vertex_m), vector.astype(np.float32)) / np.float32(
+        np.sqrt(density_kg_m3 * family.length_m**3)
+    )
     mass = family.volume_m3 * density_kg_m3
-    weight, extra = radiation(ModalModel(freq_hz, np.zeros(len(freq_hz)), shape, vertex_m, face, np.zeros(len(face)), family.volume_m3, mass), air or Air())
+    weight, extra = radiation(
+        ModalModel(freq_hz, np.zeros(len(freq_hz)), shape, vertex_m, face, np.zeros(len(face)), family.volume_m3, mass),
+        air or Air(),
+    )
     return np.abs(weight), extra

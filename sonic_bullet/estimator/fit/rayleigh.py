@@ -1,9 +1,12 @@
 """Lines -> α and β: d = ½(α + βλ), λ = ω² + d² [Ren, Yeh, Lin 2013, eq. 6-8], by least squares that notices where the law does not hold.
 
-Σ w (d − ½α − ½βλ)² → min,  w = c/(s² + (τd)²),  τ: the least relative scatter that makes the residuals as large as their spreads
-                                                                                    [Paule & Mandel 1982], c: Cauchy's weight of outliers
-Where that τ is large, it may be a few lines that obey no law (clicks, other bodies' modes, fixtures): values then come with the τ of which half of
-the lines fall within their spreads, reached from above [least median of squares: Rousseeuw 1984].
+Σ w (d − ½α − ½βλ)² → min,  w = c/(s² + (τd)²),
+    τ: the least relative scatter that makes the residuals as large as their spreads
+                                                                                    [Paule & Mandel 1982], c: Cauchy's
+                                                                                        weight of outliers
+Where that τ is large, it may be a few lines that obey no law (clicks, other bodies' modes, fixtures): values then come
+with the τ of which half of the lines fall within their spreads, reached from above [least median of squares: Rousseeuw
+1984].
 """
 
 from __future__ import annotations
@@ -23,7 +26,11 @@ STANDARD_ERRORS = 0.5  # a parameter whose logarithm is surer than this is ident
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RayleighFit:
-    """alpha_per_s, beta_s; covariance (2, 2) of their logarithms, NaN where the lines do not say; scatter: τ of all lines; said: what is not identifiable."""
+    """alpha_per_s, beta_s;
+
+    covariance (2, 2) of their logarithms, NaN where the lines do not say; scatter: τ of all lines; said: what is not
+    identifiable.
+    """
 
     alpha_per_s: float
     beta_s: float
@@ -32,13 +39,26 @@ class RayleighFit:
     said: tuple[str, ...]
 
 
-def rayleigh(lambda_per_s2: Array, decay_per_s: Array, decay_sd_per_s: Array, guess: tuple[float, float], whole_per_s: Array | None = None) -> RayleighFit:
-    """α and β of lines (k,). guess: (α, β) whose ratio stands in for what one line cannot tell. A spread that is infinite: no value; NaN: 5 %.
+def rayleigh(
+    lambda_per_s2: Array,
+    decay_per_s: Array,
+    decay_sd_per_s: Array,
+    guess: tuple[float, float],
+    whole_per_s: Array | None = None,
+) -> RayleighFit:
+    """α and β of lines (k,). guess:
 
-    whole_per_s (k,): what was measured, where decays are what something else has left of it: scatter is relative to that, or what is hardly there would be sure.
-    What is left may then be below zero: leaving that out would bend the law upwards.
+    (α, β) whose ratio stands in for what one line cannot tell. A spread that is infinite: no value; NaN: 5 %.
+
+    whole_per_s (k,): what was measured, where decays are what something else has left of it: scatter is relative to
+    that, or what is hardly there would be sure. What is left may then be below zero: leaving that out would bend the
+    law upwards.
     """
-    good = np.isfinite(decay_per_s) & ((decay_per_s if whole_per_s is None else whole_per_s) > 0) & ~np.isposinf(decay_sd_per_s)
+    good = (
+        np.isfinite(decay_per_s)
+        & ((decay_per_s if whole_per_s is None else whole_per_s) > 0)
+        & ~np.isposinf(decay_sd_per_s)
+    )
     lam, decay = lambda_per_s2[good], decay_per_s[good]
     size = decay if whole_per_s is None else whole_per_s[good]
     spread = np.where(np.isfinite(decay_sd_per_s[good]), decay_sd_per_s[good], 0.05 * size)
@@ -83,7 +103,9 @@ def _scattered(lam: Array, decay: Array, spread: Array, size: Array) -> tuple[Ar
 
 
 def _by_most(lam: Array, decay: Array, spread: Array, size: Array, freedom: int) -> tuple[Array, Array]:
-    """Values and information that most of the lines agree on; where a law through two of them leaves far less of that, those it leads to."""
+    """Values and information that most of the lines agree on; where a law through two of them leaves far less of that,
+    those it leads to.
+    """
     best = _descended(lam, decay, spread, size, freedom, 1.0, np.ones(len(lam)))
     law, off = _through_two(lam, decay, size)
     if off > MET or off > NEARER * _middle_off(best[0], lam, decay, size):
@@ -94,7 +116,9 @@ def _by_most(lam: Array, decay: Array, spread: Array, size: Array, freedom: int)
 
 
 def _through_two(lam: Array, decay: Array, size: Array) -> tuple[Array, float]:
-    """Of the laws through two lines the one that is nearest to most of them, and how far that is: elemental sets [Rousseeuw 1984, sec. 5]."""
+    """Of the laws through two lines the one that is nearest to most of them, and how far that is: elemental sets
+    [Rousseeuw 1984, sec. 5].
+    """
     i, j = np.triu_indices(len(lam), 1)
     apart = np.abs(np.log(lam[i] / lam[j])) > 0.05
     i, j = i[apart], j[apart]
@@ -112,8 +136,12 @@ def _middle_off(law: Array, lam: Array, decay: Array, size: Array) -> float:
     return float(np.median(np.abs(decay - 0.5 * (law[0] + law[1] * lam)) / size))
 
 
-def _descended(lam: Array, decay: Array, spread: Array, size: Array, freedom: int, tau: float, weight: Array) -> tuple[Array, Array]:
-    """Values and information, from a relative scatter τ and weights (k,) down to that of which half of the lines fall within their spreads."""
+def _descended(
+    lam: Array, decay: Array, spread: Array, size: Array, freedom: int, tau: float, weight: Array
+) -> tuple[Array, Array]:
+    """Values and information, from a relative scatter τ and weights (k,) down to that of which half of the lines fall
+    within their spreads.
+    """
     value, information, _, weight, _ = _weighted(lam, decay, np.hypot(spread, tau * size), weight)
     while tau > 1e-5:
         tau *= 0.8
@@ -124,8 +152,12 @@ def _descended(lam: Array, decay: Array, spread: Array, size: Array, freedom: in
     return value, information
 
 
-def _weighted(lam: Array, decay: Array, sd: Array, start: Array | None = None) -> tuple[Array, Array, float, Array, Array]:
-    """Values (2,) >= 0, information (2, 2), Σ of squared residuals, each cut at 9; the weights (k,) that outliers are left with, squares (k,)."""
+def _weighted(
+    lam: Array, decay: Array, sd: Array, start: Array | None = None
+) -> tuple[Array, Array, float, Array, Array]:
+    """Values (2,) >= 0, information (2, 2), Σ of squared residuals, each cut at 9; the weights (k,) that outliers are
+    left with, squares (k,).
+    """
     slope = np.stack([np.full(len(lam), 0.5), 0.5 * lam], axis=1) / sd[:, None]
     scale = 1 / np.sqrt((slope**2).sum(axis=0))
     weight = np.ones(len(lam)) if start is None else start

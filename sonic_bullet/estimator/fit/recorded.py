@@ -28,14 +28,18 @@ MARGIN = 1.36  # √(1.3/0.7): how far the guess may put a mode too high
 MESH_M = (2e-4, 5.0)  # bodies smaller or larger than this are in another unit
 PLATE_DOF = 52_000  # unknowns: 36 ab/e² in one layer of cells
 CLIPPED = 8  # samples in a row at the file's peak
-LEAST_SAMPLES, LEAST_S, SHORTER = 256, 0.02, 0.5  # after an onset; of the usual length: that much shorter is worth a word
+# after an onset; of the usual length: that much shorter is worth a word
+LEAST_SAMPLES, LEAST_S, SHORTER = 256, 0.02, 0.5
 SHUT_S, SHUT = 0.01, 1e-3  # of a gate: what lies before it, and behind it at least; of the peak (16 bits end at 3e-5)
 CLIPPED_RUNS = 4  # or as many rows of three: a sound that decays has one highest peak
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RecordedObject:
-    """One object's lines, its family and how its strikes are observed. family None: no mesh. signals (s, n) from the onset, None for features."""
+    """One object's lines, its family and how its strikes are observed. family None: no mesh.
+
+    signals (s, n) from the onset, None for features.
+    """
 
     thing: CaseObject
     guess: Material
@@ -49,17 +53,31 @@ class RecordedObject:
 
 
 def guess_of(thing: CaseObject) -> Material:
-    """The object's guessed material: the declared constants, the named preset's for what is not declared. Raises MaterialError, FileError."""
+    """The object's guessed material: the declared constants, the named preset's for what is not declared.
+
+    Raises MaterialError, FileError.
+    """
     from sonic_bullet.presets import load_material, material_names
 
     given = (thing.youngs_pa, thing.poisson, thing.density_kg_m3)
     name = (thing.material or "").lower()
     if None not in given and name not in material_names():
-        return Material.isotropic(thing.material or "guess", youngs_pa=given[0] or 0, poisson=given[1] or 0, density_kg_m3=given[2] or 0)
+        return Material.isotropic(
+            thing.material or "guess", youngs_pa=given[0] or 0, poisson=given[1] or 0, density_kg_m3=given[2] or 0
+        )
     if not name:
-        raise FileError(f"object '{thing.name}' has neither a material nor all of elastic_guess", "name a guess; 'sonic-bullet materials' lists all")
+        raise FileError(
+            f"object '{thing.name}' has neither a material nor all of elastic_guess",
+            "name a guess; 'sonic-bullet materials' lists all",
+        )
     base = load_material(thing.material or "")
-    rest = {"alpha_per_s": base.alpha_per_s, "beta_s": base.beta_s, "roughness_m": base.roughness_m, "hurst": base.hurst, "restitution": base.restitution}
+    rest = {
+        "alpha_per_s": base.alpha_per_s,
+        "beta_s": base.beta_s,
+        "roughness_m": base.roughness_m,
+        "hurst": base.hurst,
+        "restitution": base.restitution,
+    }
     return Material.isotropic(
         base.name,
         youngs_pa=thing.youngs_pa or base.youngs_pa,
@@ -71,9 +89,15 @@ def guess_of(thing: CaseObject) -> Material:
 
 
 def gather(
-    case: Case, *, split: str = "fit", cache: Place = "default", clipped: bool = False, progress: Callable[[str], None] | None = None
+    case: Case,
+    *,
+    split: str = "fit",
+    cache: Place = "default",
+    clipped: bool = False,
+    progress: Callable[[str], None] | None = None,
 ) -> tuple[RecordedObject, ...]:
-    """RecordedObjects of all objects that have strikes of ``split`` with audio or features. clipped: let through what stands at its peak, and what holds several hits.
+    """RecordedObjects of all objects that have strikes of ``split`` with audio or features. clipped: let through what
+    stands at its peak, and what holds several hits.
 
     Raises SonicBulletError where there is none.
     """
@@ -106,12 +130,17 @@ def gather(
             found.append(RecordedObject(thing, guess, played, lines, body, seen, signals, sr, notes))
         found += [_listed(case, thing, guess, entry, body) for entry in listed]
     if not found:
-        raise FileError(f"case {case.name} has no '{split}' strike with audio or features", "mark at least one recording with split 'fit'")
+        raise FileError(
+            f"case {case.name} has no '{split}' strike with audio or features",
+            "mark at least one recording with split 'fit'",
+        )
     return tuple(found)
 
 
 def check_meshes(case: Case, names: Iterable[str]) -> None:
-    """Raise FileError where the mesh file of one of a case's objects is not there: before any of them is listened to, which takes long."""
+    """Raise FileError where the mesh file of one of a case's objects is not there: before any of them is listened to,
+    which takes long.
+    """
     for name in names:
         mesh = case.objects[name].mesh if name in case.objects else None
         if mesh is not None and not mesh.is_file():
@@ -128,18 +157,32 @@ def body_family(case: Case, thing: CaseObject, guess: Material, cache: Place, sa
     shape = read_mesh(thing.mesh or "", thing.scale)
     across = float(np.linalg.norm(np.ptp(shape.vertex_m, axis=0)))
     if not MESH_M[0] < across < MESH_M[1]:
-        raise MeshError(f"object '{thing.name}' is {across:.3g} m across", "give the mesh in metres, or say its unit (units: mm in a case, --scale 0.001)")
+        raise MeshError(
+            f"object '{thing.name}' is {across:.3g} m across",
+            "give the mesh in metres, or say its unit (units: mm in a case, --scale 0.001)",
+        )
     gamma = guess.youngs_pa / guess.density_kg_m3
     high = case.band_hz[1]
     listed = [line.freq_hz for r in case.recordings if r.object == thing.name for line in r.lines or ()]
     if listed and not any(r.file for r in case.recordings):
         high = max(listed)
     edge = mesh_edge_m(shape) if thing.fixed else None  # a free box takes polynomials, not elements
-    return family(shape, gamma_m2_s2=gamma, poisson=guess.poisson, to_hz=high * MARGIN, fixed=thing.fixed, edge_m=edge, cache=cache, progress=say)
+    return family(
+        shape,
+        gamma_m2_s2=gamma,
+        poisson=guess.poisson,
+        to_hz=high * MARGIN,
+        fixed=thing.fixed,
+        edge_m=edge,
+        cache=cache,
+        progress=say,
+    )
 
 
 def mesh_edge_m(shape: Shape) -> float | None:
-    """A finer mesh for a clamped flat plate: with the usual one its higher modes are 1 to 2 % stiff, which γ and ν would be bent to. None: the usual one does."""
+    """A finer mesh for a clamped flat plate: with the usual one its higher modes are 1 to 2 % stiff, which γ and ν
+    would be bent to. None: the usual one does.
+    """
     from sonic_bullet.geometry import is_closed
     from sonic_bullet.modal.meshing.prisms import as_box
 
@@ -150,31 +193,51 @@ def mesh_edge_m(shape: Shape) -> float | None:
     return float(np.sqrt(36 * wide * long / PLATE_DOF)) if wide > long / 4 and thin < wide / 12 else None
 
 
-def _strikes(recordings: tuple[CaseRecording, ...]) -> list[tuple[tuple[float, float, float] | None, tuple[float, float, float] | None, float | None]]:
+def _strikes(
+    recordings: tuple[CaseRecording, ...],
+) -> list[tuple[tuple[float, float, float] | None, tuple[float, float, float] | None, float | None]]:
     return [(r.position_m, r.direction, r.impulse_n_s) for r in recordings]
 
 
-def observed(case: Case, thing: CaseObject, guess: Material, recordings: tuple[CaseRecording, ...], body: Family) -> Observation:
-    """How strikes of an object are observed by the case's sensor. Raises MeshError where a point lies off the surface."""
-    at, along = (None if places is None else places.get(thing.name) for places in (case.sensor_m, case.sensor_direction))
+def observed(
+    case: Case, thing: CaseObject, guess: Material, recordings: tuple[CaseRecording, ...], body: Family
+) -> Observation:
+    """How strikes of an object are observed by the case's sensor.
+
+    Raises MeshError where a point lies off the surface.
+    """
+    at, along = (
+        None if places is None else places.get(thing.name) for places in (case.sensor_m, case.sensor_direction)
+    )
     return observation(body, guess.density_kg_m3, case.sensor, _strikes(recordings), at, along)
 
 
-def _sounds(case: Case, thing: CaseObject, recordings: tuple[CaseRecording, ...], clipped: bool) -> tuple[Array, int, list[str]]:
-    """Signals (s, n) of an object's strikes, each from its onset, their rate, and what is odd about them. Raises FileError, AudioError."""
+def _sounds(
+    case: Case, thing: CaseObject, recordings: tuple[CaseRecording, ...], clipped: bool
+) -> tuple[Array, int, list[str]]:
+    """Signals (s, n) of an object's strikes, each from its onset, their rate, and what is odd about them.
+
+    Raises FileError, AudioError.
+    """
     sounds, rates, remarks = [], [], []
     several: dict[str, list[str]] = {}
     for r in recordings:
         sound, sr = read_audio(r.file or "")
         sounds.append(until_it_breaks_off(_checked(channel_of(sound, r.channel, r.file), str(r.file), clipped), sr))
         if len(sounds[-1]) < sound.shape[1]:
-            remarks.append(f"{r.file} breaks off after {len(sounds[-1]) / sr:.3g} s: the digital silence behind is no decay, and is left out")
+            remarks.append(
+                f"{r.file} breaks off after {len(sounds[-1]) / sr:.3g} s: the digital silence behind is no decay, and is left out"
+            )
         rates.append(sr)
         several.setdefault(channel_words(len(sound), r.channel if r.channel_named else None), []).append(str(r.file))
         if case.onset_s is None and (observed := span(sounds[-1], sr)).hits > 1:
             remarks.append(f"{r.file} holds {observed.hits} hits: only what comes before the second is used")
             sounds[-1] = sounds[-1][: observed.stop]
-    remarks += [f"{names[0]}{f' and {len(names) - 1} more' * (len(names) > 1)}: {words}" for words, names in several.items() if words]
+    remarks += [
+        f"{names[0]}{f' and {len(names) - 1} more' * (len(names) > 1)}: {words}"
+        for words, names in several.items()
+        if words
+    ]
     if len(set(rates)) > 1:
         raise AudioError(f"recordings of {thing.name} have rates {sorted(set(rates))} Hz", "give files of one rate")
     sr = rates[0]
@@ -183,7 +246,8 @@ def _sounds(case: Case, thing: CaseObject, recordings: tuple[CaseRecording, ...]
     length, which = min(lengths), str(recordings[int(np.argmin(lengths))].file)
     if length < max(LEAST_SAMPLES, LEAST_S * sr):
         raise AudioError(
-            f"{which} holds {1000 * max(length, 0) / sr:.0f} ms after the onset", "all are read as far as the shortest: leave it out, or give the whole"
+            f"{which} holds {1000 * max(length, 0) / sr:.0f} ms after the onset",
+            "all are read as far as the shortest: leave it out, or give the whole",
         )
     if length < SHORTER * np.median(lengths):
         remarks.append(f"all recordings of {thing.name} are read for {length / sr:.3g} s, as far as {which} goes")
@@ -201,12 +265,17 @@ def _checked(sound: Array, name: str, clipped: bool = False) -> Array:
     rows = np.convolve(np.abs(sound) >= (1 - 1e-6) * peak, np.ones(3), "valid") > 2.5
     flat = int((np.diff(rows.astype(np.int8), prepend=0) > 0).sum())
     if not clipped and ((len(runs) and runs.max() >= CLIPPED) or flat >= CLIPPED_RUNS):
-        raise AudioError(f"{name} is clipped: rows of samples stand at its peak", "record at a lower level; a fit of it would be of the limiter")
+        raise AudioError(
+            f"{name} is clipped: rows of samples stand at its peak",
+            "record at a lower level; a fit of it would be of the limiter",
+        )
     return sound
 
 
 def until_it_breaks_off(sound: Array, sr: int) -> Array:
-    """A recording (n,) without the digital silence that it is filled up with: a decay ends in its last bit or in noise, not far above."""
+    """A recording (n,) without the digital silence that it is filled up with: a decay ends in its last bit or in noise,
+    not far above.
+    """
     observed = np.flatnonzero(sound)
     last, short = int(observed[-1]) + 1 if len(observed) else 0, max(1, round(SHUT_S * sr))
     end = sound[max(0, last - short) : last]
@@ -214,7 +283,8 @@ def until_it_breaks_off(sound: Array, sr: int) -> Array:
 
 
 def onset_sample(sound: Array, sr: int) -> int:
-    """The sample after which energy has arrived: the first of the millisecond in which the power rises the most over all before it, then its peak.
+    """The sample after which energy has arrived: the first of the millisecond in which the power rises the most over
+    all before it, then its peak.
 
     A strike's pulse is over after its first peak, so lines are read from there.
     """
@@ -226,7 +296,9 @@ def onset_sample(sound: Array, sr: int) -> int:
     return start + int(np.argmax(np.abs(sound[start : start + 4 * block])))
 
 
-def _listed(case: Case, thing: CaseObject, guess: Material, entry: CaseRecording, body: Family | None) -> RecordedObject:
+def _listed(
+    case: Case, thing: CaseObject, guess: Material, entry: CaseRecording, body: Family | None
+) -> RecordedObject:
     """RecordedObject of a list of measured features: no phases, amplitudes where given."""
     items: tuple[Line, ...] = tuple(sorted(entry.lines or (), key=lambda line: line.freq_hz))
     freq = np.array([line.freq_hz for line in items])
@@ -239,6 +311,16 @@ def _listed(case: Case, thing: CaseObject, guess: Material, entry: CaseRecording
     amplitude = column([line.amplitude for line in items], nothing)[None, :]
     freq_sd = column([line.freq_sd_hz for line in items], 1e-4 * freq)
     decay_sd = column([line.decay_sd_per_s for line in items], 0.05 * decay)
-    lines = Lines(freq, decay, amplitude.astype(complex), freq_sd, decay_sd, np.abs(amplitude) * 0.1, np.array([np.nan]), np.full(len(items), 1e3), False)
+    lines = Lines(
+        freq,
+        decay,
+        amplitude.astype(complex),
+        freq_sd,
+        decay_sd,
+        np.abs(amplitude) * 0.1,
+        np.array([np.nan]),
+        np.full(len(items), 1e3),
+        False,
+    )
     seen = observed(case, thing, guess, (entry,), body) if body is not None else None
     return RecordedObject(thing, guess, (entry,), lines, body, seen, None, 0)

@@ -1,12 +1,17 @@
-"""Modes of a recording without noise, or with no more than float32 rounds off: its Hankel matrix has a rank, and the rank has the poles.
+"""Modes of a recording without noise, or with no more than float32 rounds off: its Hankel matrix has a rank, and the
+rank has the poles.
 
-    H (L, M), H_ij = x(i + j) = Σ_k c_k z_k^{i+j}  =>  rank H = 2 × modes, whatever lies close to what     [Kronecker 1881]
-    the singular values fall to the floor of rounding after that many: the last fall by `FALL` and more, below `EDGE` of the first
-    z = eigenvalues of the shift between rows of the left vectors                                          [Kung 1978; Roy & Kailath 1989]
+    H (L, M), H_ij = x(i + j) = Σ_k c_k z_k^{i+j}  =>  rank H = 2 × modes, whatever lies close to what
+        [Kronecker 1881]
+    the singular values fall to the floor of rounding after that many: the last fall by `FALL` and more, below `EDGE` of
+        the first
+    z = eigenvalues of the shift between rows of the left vectors
+        [Kung 1978; Roy & Kailath 1989]
     then Gauss and Newton by QR of the Jacobian itself, never of its normal equations: the condition is not squared
 
-Only the first thousands of samples are looked at: without noise a tenth of a second says more than the rounding of 2πft does later
-(at 20 kHz and one second that is 1e-11 of the sound). What the modes leave of the whole recording decides whether they are its modes.
+Only the first thousands of samples are looked at: without noise a tenth of a second says more than the rounding of 2πft
+does later (at 20 kHz and one second that is 1e-11 of the sound). What the modes leave of the whole recording decides
+whether they are its modes.
 """
 
 from __future__ import annotations
@@ -96,7 +101,9 @@ def _polished(signal: Array, start: Sinusoids, sr: int) -> Sinusoids:
         step = _solved(_jacobian(start.pole, start.amplitude, sr, len(signal)), left)
         if (np.abs(step[: 2 * k]).reshape(2, k) > 1e3 + np.abs(start.pole)).any():
             break
-        moved = Sinusoids(start.pole - step[k : 2 * k] + 1j * step[:k], start.amplitude + step[2 * k : 3 * k] + 1j * step[3 * k :])
+        moved = Sinusoids(
+            start.pole - step[k : 2 * k] + 1j * step[:k], start.amplitude + step[2 * k : 3 * k] + 1j * step[3 * k :]
+        )
         rest = likelihood.residual(signal, moved, sr)
         if not float(rest @ rest) < float(left @ left):
             break

@@ -1,16 +1,19 @@
-"""One recorded impact -> its damped sinusoids, each with its spread [Ren, Yeh, Lin 2013, section 4; and what has been learnt since].
+"""One recorded impact -> its damped sinusoids, each with its spread [Ren, Yeh, Lin 2013, section 4; and what has been
+learnt since].
 
     recording -> onset.py (which part is one impact)
     -> exact_modes.py     where there is no noise: the rank of the Hankel matrix tells all modes at once
     -> noise_density.py   density over frequency, course over time
-    -> subspace.py (poles, band by band)       every frequency resolution at once, where the paper goes from level to level
+    -> subspace.py (poles, band by band)
+        every frequency resolution at once, where the paper goes from level to level
     -> likelihood.py (all modes jointly)       the paper's "everything found so far subtracted", to the optimum
     -> the residual's matched filter adds poles while they are significant; what is not, goes
     -> onset.py   the modes, run backwards, tell the sample of the onset
     -> Features
 
-A mode is significant where its energy over the noise density exceeds what the strongest of as many noise cells as the recording holds
-reaches once in twenty recordings: T > 2 ln(1.5 n / 0.05) [Kay 1998, Detection Theory, ch. 7.6]. No number is tuned to a recording.
+A mode is significant where its energy over the noise density exceeds what the strongest of as many noise cells as the
+recording holds reaches once in twenty recordings: T > 2 ln(1.5 n / 0.05) [Kay 1998, Detection Theory, ch. 7.6]. No
+number is tuned to a recording.
 """
 
 from __future__ import annotations
@@ -38,7 +41,8 @@ SECONDS_MAX = 8.0
 LEAST_SAMPLES = 512
 LEAST_SAMPLES_A_MODE = 24
 FLOOR = 1e-12  # of the recording's rms: rounding, where there is no noise
-EXPLAINED, TRUSTED = 0.8, 0.5  # shares of the energy: below the one it is said, below the other no feature of a sound that is not over soon
+# shares of the energy: below the one it is said, below the other no feature of a sound that is not over soon
+EXPLAINED, TRUSTED = 0.8, 0.5
 FRONT, FRONT_SHARE = 0.3, 0.75
 SWELLS = 3.0  # times its first 50 ms: two modes that start against one another do not come to that
 SHORT_S, LOW_RATE, GROWS_S = 0.1, 30_000, 0.4
@@ -49,10 +53,13 @@ NEAR = 4.0  # decays within which one mode can do another's work
 STEADY = 0.02  # a decay of less than this over the whole recording, or within two of its spreads of none, is a tone
 
 
-def extract(signal: Array, sr: int, *, onset_s: float | None = None, band_hz: tuple[float, float] | None = None) -> Features:
+def extract(
+    signal: Array, sr: int, *, onset_s: float | None = None, band_hz: tuple[float, float] | None = None
+) -> Features:
     """Features of a recording (n,), full scale 1, at sr Hz. onset_s: where it is known; else it is found.
 
-    What makes the numbers doubtful stands in the note. Raises AudioError: silence, NaN, fewer than 512 samples of sound.
+    What makes the numbers doubtful stands in the note. Raises AudioError: silence, NaN, fewer than 512 samples of
+    sound.
     """
     signal = np.ascontiguousarray(signal, np.float64)
     if signal.ndim != 1:
@@ -70,7 +77,11 @@ def extract(signal: Array, sr: int, *, onset_s: float | None = None, band_hz: tu
     if len(x) < LEAST_SAMPLES:
         raise AudioError(f"{len(x)} samples follow the onset", f"an impact needs {LEAST_SAMPLES} at least")
     notes, hopeless = _doubts(signal, x, part.hits, sr)
-    modes, noise = (Sinusoids(np.zeros(0, complex), np.zeros(0, complex)), white(_rms(x), sr)) if hopeless else _modes(x, sr, (low, high))
+    modes, noise = (
+        (Sinusoids(np.zeros(0, complex), np.zeros(0, complex)), white(_rms(x), sr))
+        if hopeless
+        else _modes(x, sr, (low, high))
+    )
     start = part.start
     if onset_s is None and len(modes.pole):
         start = onset.by_modes(signal, part.start, modes, sr, _rms(likelihood.residual(x, modes, sr)))
@@ -88,13 +99,17 @@ def _doubts(signal: Array, x: Array, hits: int, sr: int) -> tuple[list[str], boo
     if clipped:
         notes.append(f"{clipped} samples are clipped: amplitudes and early decays are not to be trusted")
     if len(x) < SHORT_S * sr:
-        notes.append(f"only {1000 * len(x) / sr:.0f} ms of sound: what lies closer than about {sr / len(x):.0f} Hz may pass for one line")
+        notes.append(
+            f"only {1000 * len(x) / sr:.0f} ms of sound: what lies closer than about {sr / len(x):.0f} Hz may pass for one line"
+        )
     if sr < LOW_RATE:
         notes.append(f"{sr} samples a second: nothing above {0.49 * sr:.0f} Hz is seen")
     if len(x) > GROWS_S * sr:
         level = np.sqrt((x[: len(x) // (sr // 20) * (sr // 20)].reshape(-1, sr // 20) ** 2).mean(axis=1))
         if level[3:].max() > 1.5 * level[0]:
-            notes.append(f"the sound grows until {np.argmax(level) / 20:.2g} s after its onset: one impact alone does not")
+            notes.append(
+                f"the sound grows until {np.argmax(level) / 20:.2g} s after its onset: one impact alone does not"
+            )
             hopeless = bool(level[3:].max() > SWELLS * level[0])
     return notes, hopeless
 
@@ -107,8 +122,12 @@ def _reach(band_hz: tuple[float, float], sr: int) -> tuple[float, float]:
     return 2 * np.pi * 0.5 * band_hz[0], 2 * np.pi * min(1.02 * band_hz[1], 0.4999 * sr)
 
 
-def _fit(signal: Array, start: Sinusoids, sr: int, band_hz: tuple[float, float], effort: tuple[int, float] = QUICK) -> Sinusoids:
-    return likelihood.fitted(signal, start, sr, band=_reach(band_hz, sr), fastest_per_s=FASTEST_PER_S, steps=effort[0], tolerance=effort[1])
+def _fit(
+    signal: Array, start: Sinusoids, sr: int, band_hz: tuple[float, float], effort: tuple[int, float] = QUICK
+) -> Sinusoids:
+    return likelihood.fitted(
+        signal, start, sr, band=_reach(band_hz, sr), fastest_per_s=FASTEST_PER_S, steps=effort[0], tolerance=effort[1]
+    )
 
 
 def _modes(x: Array, sr: int, band_hz: tuple[float, float]) -> tuple[Sinusoids, Noise]:
@@ -125,7 +144,13 @@ def _modes(x: Array, sr: int, band_hz: tuple[float, float]) -> tuple[Sinusoids, 
         more = more[: max(0, min(MANY, most - len(modes.pole)))]
         if not len(more):
             break
-        trial = _pruned(x, band_hz, _fit(x, likelihood.amplitudes(x, np.concatenate([modes.pole, more]), sr), sr, band_hz), noise, least)
+        trial = _pruned(
+            x,
+            band_hz,
+            _fit(x, likelihood.amplitudes(x, np.concatenate([modes.pole, more]), sr), sr, band_hz),
+            noise,
+            least,
+        )
         if len(trial.pole) <= len(modes.pole):
             break
         modes, noise = trial, measured(likelihood.residual(x, trial, sr), sr, floor, len(trial.pole))
@@ -134,7 +159,9 @@ def _modes(x: Array, sr: int, band_hz: tuple[float, float]) -> tuple[Sinusoids, 
 
 
 def _least_of_a_second(modes: int, least: float) -> float:
-    """Least energy of a second mode in a line: it has the few cells beside the lines to chance upon, not the whole recording."""
+    """Least energy of a second mode in a line: it has the few cells beside the lines to chance upon, not the whole
+    recording.
+    """
     return float(min(least, 2 * np.log(1.5 * 2 * NEAR * max(modes, 1) / FALSE_ALARMS)))
 
 
@@ -144,7 +171,9 @@ def _needed(pole: Array, least: float) -> Callable[[Array], Array]:
 
     def at(freq_hz: Array) -> Array:
         need = np.full(len(freq_hz), least)
-        for first, last in zip(np.searchsorted(freq_hz, centre - reach), np.searchsorted(freq_hz, centre + reach), strict=True):
+        for first, last in zip(
+            np.searchsorted(freq_hz, centre - reach), np.searchsorted(freq_hz, centre + reach), strict=True
+        ):
             need[first:last] = _least_of_a_second(len(pole), least)
         return need
 
@@ -152,7 +181,9 @@ def _needed(pole: Array, least: float) -> Callable[[Array], Array]:
 
 
 def _first(x: Array, sr: int, band_hz: tuple[float, float], least: float, floor: float) -> tuple[Sinusoids, Noise]:
-    """The significant ones of the bands' poles, fitted; the strongest alone where there are more than can be identified."""
+    """The significant ones of the bands' poles, fitted; the strongest alone where there are more than can be
+    identified.
+    """
     density = np.maximum(noise_density(x, tail=True), floor)
     slow = subspace.poles(x, sr, density, band_hz, BAND_HZ, FASTEST_PER_S)
     fast = subspace.early_poles(x, sr, density, band_hz, FASTEST_PER_S)
@@ -174,21 +205,31 @@ def _first(x: Array, sr: int, band_hz: tuple[float, float], least: float, floor:
 
 
 def _pruned(x: Array, band_hz: tuple[float, float], modes: Sinusoids, noise: Noise, least: float) -> Sinusoids:
-    """Without the modes that are not significant, or share a line with others so that no decay is identified, the weakest first, the rest fitted again."""
+    """Without the modes that are not significant, or share a line with others so that no decay is identified, the
+    weakest first, the rest fitted again.
+    """
     while len(modes.pole):
         met = noise.rms(modes.pole.imag / (2 * np.pi), -modes.pole.real)
         spread, energy = likelihood.spreads(modes, noise.sr, len(x))
         energy = energy / met**2
-        outside = (modes.pole.real <= -PINNED * FASTEST_PER_S) | (modes.pole.imag < 2 * np.pi * band_hz[0]) | (modes.pole.imag > 2 * np.pi * band_hz[1])
+        outside = (
+            (modes.pole.real <= -PINNED * FASTEST_PER_S)
+            | (modes.pole.imag < 2 * np.pi * band_hz[0])
+            | (modes.pole.imag > 2 * np.pi * band_hz[1])
+        )
         energy[outside | (np.abs(modes.amplitude) > CANCELLING * np.abs(x).max())] *= 1e-9
         far, fade = np.abs(modes.pole.imag[:, None] - modes.pole.imag), -modes.pole.real
         near = far < NEAR * np.maximum(fade[:, None], fade)
         vague = (fade < DECAY_IDENTIFIED * spread[1] * met) & (near.sum(axis=1) > 1)
-        weak = np.flatnonzero((energy <= np.where(near.sum(axis=1) > 1, _least_of_a_second(len(fade), least), least)) | vague)
+        weak = np.flatnonzero(
+            (energy <= np.where(near.sum(axis=1) > 1, _least_of_a_second(len(fade), least), least)) | vague
+        )
         if not len(weak):
             break
         rival = near[np.ix_(weak, weak)] & (energy[weak] < energy[weak, None])  # two that share one line: one may stay
-        gone = np.union1d(weak[~rival.any(axis=1)], weak[np.argsort(energy[weak], kind="stable")[: (len(weak) + 1) // 2]])
+        gone = np.union1d(
+            weak[~rival.any(axis=1)], weak[np.argsort(energy[weak], kind="stable")[: (len(weak) + 1) // 2]]
+        )
         modes = likelihood.amplitudes(x, np.delete(modes.pole, gone), noise.sr)
         modes = _fit(x, modes, noise.sr, band_hz, ROUGH if len(gone) > FEW else QUICK)
     return modes
@@ -202,7 +243,9 @@ def _moved(x: Array, modes: Sinusoids, noise: Noise, band_hz: tuple[float, float
     return turned if len(noise.density) == 2 else _fit(x, turned, noise.sr, band_hz, (QUICK[0], THOROUGH[1]))
 
 
-def _features(x: Array, modes: Sinusoids, noise: Noise, band_hz: tuple[float, float], start: int, notes: list[str]) -> Features:
+def _features(
+    x: Array, modes: Sinusoids, noise: Noise, band_hz: tuple[float, float], start: int, notes: list[str]
+) -> Features:
     k, sr = len(modes.pole), noise.sr
     left = likelihood.residual(x, modes, sr)
     explained = 1 - float(left @ left) / float(x @ x)
@@ -214,10 +257,13 @@ def _features(x: Array, modes: Sinusoids, noise: Noise, band_hz: tuple[float, fl
             shown = ", ".join(f"{f:.1f}" for f in np.sort(freq[which])[:8])
             notes.append(f"{int(which.sum())} lines {said} and are left out: {shown} Hz")
     front = x[: int(FRONT * len(x))]
-    modal = explained >= TRUSTED or float(front @ front) >= FRONT_SHARE * float(x @ x)  # a rattle starts with its most; speech, noise, music do not
+    # a rattle starts with its most; speech, noise, music do not
+    modal = explained >= TRUSTED or float(front @ front) >= FRONT_SHARE * float(x @ x)
     if explained < EXPLAINED:
         given = "" if modal else "; no feature is given"
-        notes.append(f"not an impact, or not modal: damped sinusoids explain {100 * explained:.0f} % of the energy{given}")
+        notes.append(
+            f"not an impact, or not modal: damped sinusoids explain {100 * explained:.0f} % of the energy{given}"
+        )
     amplitude, turn = np.abs(modes.amplitude), np.angle(modes.amplitude)
     pinned = (sd[1] > 0) & (np.abs(decay / FASTEST_PER_S - PINNED) < 1.001 * (1 - PINNED)) & (len(noise.density) > 2)
     keep = np.flatnonzero(~(tone | vague | pinned) & (freq >= band_hz[0]) & (freq <= band_hz[1]) & modal)

@@ -1,8 +1,10 @@
-"""Several recordings of one object -> the damped sinusoids they share: frequencies and decays common, amplitudes their own.
+"""Several recordings of one object -> the damped sinusoids they share: frequencies and decays common, amplitudes their
+own.
 
     x_s(t) = Re Σ_k A_sk e^{(−d_k + iω_k) t} + noise
     start:   shared_poles.py
-    refine:  maximum likelihood in white noise, A_sk linear and projected out              [Golub & Pereyra 1973; Kaufman 1975]
+    refine:  maximum likelihood in white noise, A_sk linear and projected out
+        [Golub & Pereyra 1973; Kaufman 1975]
     spread:  inverse of the information matrix at the end, so the Cramér-Rao bound          [Kay 1993, ch. 3.9]
 
 All inner products of damped sinusoids over N samples are geometric sums, closed in w = z_j z_k*: Σ wⁿ, Σ n wⁿ, Σ n² wⁿ.
@@ -37,16 +39,28 @@ FEWEST_LINES = 3  # lines that say what rings
 BEYOND = (10.0, 0.1)  # times a recording's peak; share of the lines that begin there: what no single hit leaves
 
 
-def joint_lines(signals: Array, sr: int, *, band_hz: tuple[float, float] = (20.0, 20_000.0), signed: bool = True, modes: int | None = None) -> Lines:
-    """Lines of signals (s, n), all starting at the onset of their strike. Raises AudioError where there is too little signal.
+def joint_lines(
+    signals: Array,
+    sr: int,
+    *,
+    band_hz: tuple[float, float] = (20.0, 20_000.0),
+    signed: bool = True,
+    modes: int | None = None,
+) -> Lines:
+    """Lines of signals (s, n), all starting at the onset of their strike.
 
-    modes: about how many the body has, where more than one hit may be in a signal: several in a row make a crowd of lines, none of them a mode, or lines
-    that would have to begin far above all that was recorded. Where far fewer are left after LATE_S, or none such, lines are those, taken back to the onset:
-    A e^{(d − iω)t}, what a single hit there would have had to leave.
+    Raises AudioError where there is too little signal.
+
+    modes: about how many the body has, where more than one hit may be in a signal: several in a row make a crowd of
+    lines, none of them a mode, or lines that would have to begin far above all that was recorded. Where far fewer are
+    left after LATE_S, or none such, lines are those, taken back to the onset: A e^{(d − iω)t}, what a single hit there
+    would have had to leave.
     """
     signals = np.asarray(signals, float)[:, : int(SECONDS_MAX * sr)]
     if signals.shape[1] < 256 or not np.isfinite(signals).all():
-        raise AudioError(f"recordings of {signals.shape[1]} samples after the onset", "a fit needs at least 256 finite samples")
+        raise AudioError(
+            f"recordings of {signals.shape[1]} samples after the onset", "a fit needs at least 256 finite samples"
+        )
     if not (np.sqrt((signals**2).mean(axis=1)) > SILENT).all():
         raise AudioError("a recording is silent", "leave it out of the case")
     low, high = max(band_hz[0], 5.0), min(band_hz[1], 0.485 * sr)
@@ -54,15 +68,24 @@ def joint_lines(signals: Array, sr: int, *, band_hz: tuple[float, float] = (20.0
     try:
         return _identified(signals, noise, sr, (low, high), signed, modes, crowd=True)
     except np.linalg.LinAlgError as error:
-        raise AudioError("lines of the recording cannot be told apart: no decaying sound", "give a recording of one impact") from error
+        raise AudioError(
+            "lines of the recording cannot be told apart: no decaying sound", "give a recording of one impact"
+        ) from error
 
 
-def _identified(signals: Array, noise: Array, sr: int, band_hz: tuple[float, float], signed: bool, modes: int | None, *, crowd: bool) -> Lines:
-    """Lines of one hit, or what is left after several; crowd: of more poles than lines those, too, that take most one after another, where these say plainly more."""
+def _identified(
+    signals: Array, noise: Array, sr: int, band_hz: tuple[float, float], signed: bool, modes: int | None, *, crowd: bool
+) -> Lines:
+    """Lines of one hit, or what is left after several;
+
+    crowd: of more poles than lines those, too, that take most one after another, where these say plainly more.
+    """
     start = start_poles(signals / noise[:, None], sr, *band_hz)
     few: Lines | None = None
     for late in (round(t * sr) for t in LATE_S) if modes is not None and len(start) >= CROWD * modes else ():
-        if signals.shape[1] >= 8 * late and FEWEST_LINES <= len(start_poles(signals[:, late:] / noise[:, None], sr, *band_hz)) < FEWER * len(start):
+        if signals.shape[1] >= 8 * late and FEWEST_LINES <= len(
+            start_poles(signals[:, late:] / noise[:, None], sr, *band_hz)
+        ) < FEWER * len(start):
             after = _from(late, signals, sr, band_hz, signed)
             few = few or after
             if after is not None and _beyond(after, signals) < BEYOND[1]:  # else it still hits
@@ -74,7 +97,13 @@ def _identified(signals: Array, noise: Array, sr: int, band_hz: tuple[float, flo
     loudest = np.argsort(-_solved(signals, noise, start, sr)[2])[:MOST_LINES] if many else np.arange(len(start))
     found = lines_of(signals, noise, _significant(signals, noise, start[loudest], sr, *band_hz), sr, signed)
     if many and crowd:
-        other = lines_of(signals, noise, _significant(signals, noise, start[selected(signals, noise, start, sr, MOST_LINES)], sr, *band_hz), sr, signed)
+        other = lines_of(
+            signals,
+            noise,
+            _significant(signals, noise, start[selected(signals, noise, start, sr, MOST_LINES)], sr, *band_hz),
+            sr,
+            signed,
+        )
         if ((other.noise / noise) ** 2).sum() < PLAINLY * ((found.noise / noise) ** 2).sum():
             return other  # a room's: of hits one after another the loudest poles leave least
     for late in (round(t * sr) for t in LATE_S) if modes is not None and _beyond(found, signals) > BEYOND[1] else ():
@@ -100,7 +129,10 @@ def _significant(signals: Array, noise: Array, pole: Array, sr: int, low: float,
 
 
 def _from(late: int, signals: Array, sr: int, band_hz: tuple[float, float], signed: bool) -> Lines | None:
-    """Lines from a sample on, as they would have begun at the onset; None where nothing can be identified from there, or a recording is over."""
+    """Lines from a sample on, as they would have begun at the onset;
+
+    None where nothing can be identified from there, or a recording is over.
+    """
     rest = signals[:, late:]
     if not (np.sqrt((rest**2).mean(axis=1)) > SILENT).all():
         return None  # by a recording that a gate has shut nothing rang at the onset
@@ -129,7 +161,9 @@ def _too_loud(lines: Lines, signals: Array) -> Array:
 
 
 def _struck(lines: Lines, signals: Array) -> Lines:
-    """The lines without those that no hit at the onset can have left: of echoes that arrive late some are over so soon that they would have begun far above all there is."""
+    """The lines without those that no hit at the onset can have left: of echoes that arrive late some are over so soon
+    that they would have begun far above all there is.
+    """
     return lines_at(lines, np.flatnonzero(~_too_loud(lines, signals)))
 
 
@@ -137,7 +171,8 @@ def noise_rms(signals: Array, sr: int) -> Array:
     """Rms (s,) of the stationary floor, white: from the lower quarter of the spectrum of each recording's last third."""
     tail = signals[:, -signals.shape[1] // 3 :]
     power = np.abs(np.fft.rfft(tail * np.hanning(tail.shape[1]), axis=1)) ** 2
-    density = np.quantile(power, 0.25, axis=1) / np.log(4 / 3)  # exponential law: its lower quartile is ln(4/3) of the mean
+    # exponential law: its lower quartile is ln(4/3) of the mean
+    density = np.quantile(power, 0.25, axis=1) / np.log(4 / 3)
     return np.asarray(np.maximum(np.sqrt(density / (np.hanning(tail.shape[1]) ** 2).sum()), 1e-9))
 
 
@@ -160,11 +195,19 @@ def _inner(a: Array, b: Array, even: Array, odd: Array) -> Array:
 def _basis(even: Array, odd: Array) -> Array:
     """Gram matrix (2k, 2k) of Re zⁿ and Re i zⁿ."""
     one, turn = np.ones(len(even), complex), np.full(len(even), 1j)
-    return np.block([[_inner(one, one, even, odd), _inner(one, turn, even, odd)], [_inner(turn, one, even, odd), _inner(turn, turn, even, odd)]])
+    return np.block(
+        [
+            [_inner(one, one, even, odd), _inner(one, turn, even, odd)],
+            [_inner(turn, one, even, odd), _inner(turn, turn, even, odd)],
+        ]
+    )
 
 
 def _factor(gram: Array) -> tuple[Array, Array]:
-    """Cholesky factor of a Gram matrix scaled to unit diagonal, slightly lifted, and the scale. Poles that all but coincide take a larger lift."""
+    """Cholesky factor of a Gram matrix scaled to unit diagonal, slightly lifted, and the scale.
+
+    Poles that all but coincide take a larger lift.
+    """
     from scipy.linalg import LinAlgError, cholesky
 
     scale = 1 / np.sqrt(np.diag(gram))
@@ -183,7 +226,9 @@ def _solve(factor: tuple[Array, Array], right: Array) -> Array:
     from scipy.linalg import cho_solve
 
     lower, scale = factor
-    return np.asarray((scale * cho_solve((lower, True), (scale * right.T).T.T if right.ndim == 1 else scale[:, None] * right).T).T)
+    return np.asarray(
+        (scale * cho_solve((lower, True), (scale * right.T).T.T if right.ndim == 1 else scale[:, None] * right).T).T
+    )
 
 
 def _solved(signals: Array, noise: Array, pole: Array, sr: int) -> tuple[Array, float, Array, Array]:
@@ -207,7 +252,9 @@ def _solved(signals: Array, noise: Array, pole: Array, sr: int) -> tuple[Array, 
 
 
 def _normal(signals: Array, noise: Array, pole: Array, sr: int) -> tuple[Array, Array, float]:
-    """Gauss-Newton matrix (2k, 2k) and gradient (2k,) for (ω, d) with the amplitudes projected out, and half the sum of squares."""
+    """Gauss-Newton matrix (2k, 2k) and gradient (2k,) for (ω, d) with the amplitudes projected out, and half the sum of
+    squares.
+    """
     z, n, k = pole / sr, signals.shape[1], len(pole)
     even, odd = _products(z, n)
     factor = _factor(_basis(even[0], odd[0]))
@@ -264,7 +311,10 @@ def _polished(signals: Array, noise: Array, pole: Array, sr: int, low: float, hi
 
 
 def _roots(matrix: Array) -> Array:
-    """Spreads (n,) that go with an information matrix (n, n). Of two poles that all but coincide rounding may turn a variance's sign; it is as large for that."""
+    """Spreads (n,) that go with an information matrix (n, n).
+
+    Of two poles that all but coincide rounding may turn a variance's sign; it is as large for that.
+    """
     return np.asarray(np.sqrt(np.abs(np.diag(np.linalg.pinv(matrix)))))
 
 
@@ -273,7 +323,17 @@ def lines_of(signals: Array, noise: Array, pole: Array, sr: int, signed: bool) -
     k, none = len(pole), np.zeros(0)
     if k == 0:
         left = np.sqrt((signals**2).mean(axis=1))
-        return Lines(none, none, np.zeros((len(signals), 0), complex), none, none, np.zeros((len(signals), 0)), left, none, signed)
+        return Lines(
+            none,
+            none,
+            np.zeros((len(signals), 0), complex),
+            none,
+            none,
+            np.zeros((len(signals), 0)),
+            left,
+            none,
+            signed,
+        )
     amplitude, _, energy, residual = _solved(signals, noise, pole, sr)
     level = np.maximum(noise, residual)  # what the lines leave is noise too, to whoever asks how sure they are
     matrix, _, _ = _normal(signals, level, pole, sr)

@@ -2,10 +2,12 @@
 
     x(n) = Re Σ_k A_k e^{p_k n} + noise,   p = (−d + iω)/sr,   unknowns (ω, d, Re A, Im A) of every mode
     (JᵀJ + μ diag JᵀJ) δ = Jᵀ r                                                      [Levenberg 1944; Marquardt 1963]
-    columns of J are Re(c n^q e^{pn}), q = 0 or 1, so JᵀJ is made of geometric sums Σ w^n, Σ n w^n, Σ n² w^n; only Jᵀr looks at samples
+    columns of J are Re(c n^q e^{pn}), q = 0 or 1, so JᵀJ is made of geometric sums Σ w^n, Σ n w^n, Σ n² w^n; only Jᵀr
+        looks at samples
     spread: √diag of N/2·(JᵀJ)⁻¹ at the end, the Cramér-Rao bound                    [Kay 1993, ch. 3.9]
 
-Since r is the true residual, rounding in JᵀJ costs steps and no accuracy: noise-free modes come back to 1e-9 and better.
+Since r is the true residual, rounding in JᵀJ costs steps and no accuracy: noise-free modes come back to 1e-9 and
+better.
 """
 
 from __future__ import annotations
@@ -37,7 +39,10 @@ class Sinusoids:
 def _powers(pole: Array, step: int, count: int) -> Array:
     """e^{pole·step·m} (count, k), zero once below e^-GONE: no subnormal numbers."""
     outer = -(-count // FINE)
-    above, below = (np.exp(np.maximum(e.real, -GONE) + 1j * e.imag) for e in (pole * (step * m)[:, None] for m in (FINE * np.arange(outer), np.arange(FINE))))
+    above, below = (
+        np.exp(np.maximum(e.real, -GONE) + 1j * e.imag)
+        for e in (pole * (step * m)[:, None] for m in (FINE * np.arange(outer), np.arange(FINE)))
+    )
     power = (above[:, None] * below).reshape(outer * FINE, len(pole))[:count]
     last = np.minimum(GONE / np.maximum(-pole.real * step, 1e-12), count).astype(int)
     for k in np.flatnonzero(last < count):
@@ -61,7 +66,10 @@ def moments(signal: Array, pole: Array) -> tuple[Array, Array]:
     coarse, fine = _powers(pole, BLOCK, blocks), _powers(pole, 1, BLOCK)
     slope = np.arange(BLOCK)[:, None] * fine
     sums = padded @ np.concatenate([fine.real, fine.imag, slope.real, slope.imag], axis=1)
-    plain, sloped = coarse * (sums[:, :k] + 1j * sums[:, k : 2 * k]), coarse * (sums[:, 2 * k : 3 * k] + 1j * sums[:, 3 * k :])
+    plain, sloped = (
+        coarse * (sums[:, :k] + 1j * sums[:, k : 2 * k]),
+        coarse * (sums[:, 2 * k : 3 * k] + 1j * sums[:, 3 * k :]),
+    )
     return plain.sum(axis=0), (BLOCK * np.arange(blocks)) @ plain + sloped.sum(axis=0)
 
 
@@ -120,9 +128,19 @@ def alone(signal: Array, pole: Array, sr: int) -> Array:
 
 
 def fitted(
-    signal: Array, start: Sinusoids, sr: int, *, band: tuple[float, float], fastest_per_s: float, steps: int = STEPS_MOST, tolerance: float = 1e-4
+    signal: Array,
+    start: Sinusoids,
+    sr: int,
+    *,
+    band: tuple[float, float],
+    fastest_per_s: float,
+    steps: int = STEPS_MOST,
+    tolerance: float = 1e-4,
 ) -> Sinusoids:
-    """Modes at the least sum of squares near ``start``; band in rad/s. tolerance: relative fall of the sum of squares that ends it."""
+    """Modes at the least sum of squares near ``start``; band in rad/s.
+
+    tolerance: relative fall of the sum of squares that ends it.
+    """
     modes, k = start, len(start.pole)
     if not k:
         return modes
@@ -133,7 +151,9 @@ def fitted(
         scale = 1 / np.sqrt(np.maximum(np.diag(matrix), 1e-300))
         matrix = matrix * scale[:, None] * scale
         first, second = moments(left, modes.pole / sr)
-        gradient = np.concatenate([(1j * modes.amplitude * second).real / sr, (-modes.amplitude * second).real / sr, first.real, -first.imag])
+        gradient = np.concatenate(
+            [(1j * modes.amplitude * second).real / sr, (-modes.amplitude * second).real / sr, first.real, -first.imag]
+        )
         before = cost
         while lift < 1e6:
             step = scale * np.linalg.solve(matrix + (lift + 1e-14) * np.eye(4 * k), scale * gradient)
@@ -155,7 +175,8 @@ def fitted(
 
 
 def spreads(modes: Sinusoids, sr: int, count: int) -> tuple[Array, Array]:
-    """Standard errors (4, k) of ω, d, Re A, Im A in white noise of unit rms, and energies (k,) of each mode given the others.
+    """Standard errors (4, k) of ω, d, Re A, Im A in white noise of unit rms, and energies (k,) of each mode given the
+    others.
 
     The energy is |A|² in the metric of A's own covariance at fixed poles [Kay 1998, eq. 7.36].
     """
@@ -172,4 +193,6 @@ def spreads(modes: Sinusoids, sr: int, count: int) -> tuple[Array, Array]:
 def _inverse(matrix: Array) -> Array:
     """Of a positive matrix, scaled to a diagonal of one and lifted by what rounding has taken."""
     scale = 1 / np.sqrt(np.maximum(np.diag(matrix), 1e-300))
-    return np.asarray(np.linalg.inv(matrix * scale[:, None] * scale + 1e-13 * np.eye(len(matrix))) * scale[:, None] * scale)
+    return np.asarray(
+        np.linalg.inv(matrix * scale[:, None] * scale + 1e-13 * np.eye(len(matrix))) * scale[:, None] * scale
+    )

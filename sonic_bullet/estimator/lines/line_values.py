@@ -21,9 +21,11 @@ PINNED = 0.98  # of the fastest decay there is
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Features:
-    """Damped sinusoids of one recording, strongest first; amplitude in units of the recording (full scale 1) at the onset.
+    """Damped sinusoids of one recording, strongest first; amplitude in units of the recording (full scale 1) at the
+    onset.
 
-    Spreads are standard errors; a feature without one has NaN there. noise_dbfs: level of what is no feature, rms, per sample.
+    Spreads are standard errors; a feature without one has NaN there. noise_dbfs: level of what is no feature, rms, per
+    sample.
     """
 
     freq_hz: Array  # (k,) > 0
@@ -40,22 +42,35 @@ class Features:
 
     def __post_init__(self) -> None:
         count = len(np.atleast_1d(self.freq_hz))
-        values = (("freq_hz", self.freq_hz), ("decay_per_s", self.decay_per_s), ("amplitude", self.amplitude), ("phase_rad", self.phase_rad))
+        values = (
+            ("freq_hz", self.freq_hz),
+            ("decay_per_s", self.decay_per_s),
+            ("amplitude", self.amplitude),
+            ("phase_rad", self.phase_rad),
+        )
         for name, value in values:
             object.__setattr__(self, name, frozen_array(value, np.float64, (count,), name))
-        for name, value in (("freq_sd_hz", self.freq_sd_hz), ("decay_sd_per_s", self.decay_sd_per_s), ("amplitude_sd", self.amplitude_sd)):
+        for name, value in (
+            ("freq_sd_hz", self.freq_sd_hz),
+            ("decay_sd_per_s", self.decay_sd_per_s),
+            ("amplitude_sd", self.amplitude_sd),
+        ):
             object.__setattr__(self, name, frozen_array(value, np.float64, (count,), name, finite=False))
         if (self.freq_hz <= 0).any() or (self.decay_per_s < 0).any() or (self.amplitude <= 0).any():
-            raise RecordError("features hold a frequency or amplitude of zero, or a negative decay", "keep only what was heard")
+            raise RecordError(
+                "features hold a frequency or amplitude of zero, or a negative decay", "keep only what was heard"
+            )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MaterialFit:
-    """What recordings say of a material. parameters: (α 1/s, β s, γ m²/s², σ, ν), γ = E/ρ; covariance (5, 5) of ln α, ln β, ln γ, ln σ, ν.
+    """What recordings say of a material. parameters:
 
-    A row and column of NaN: that parameter is not identifiable, and the verdict says so. verdict: "fitted", or why not, one line.
-    metric: the hybrid metric Π there (metric.py), mean over the fitted strikes, -1 where there is nothing to compare.
-    modes: per mode freq_hz, decay_per_s, amplitude (m,) of the fitted model at the first strike.
+    (α 1/s, β s, γ m²/s², σ, ν), γ = E/ρ; covariance (5, 5) of ln α, ln β, ln γ, ln σ, ν.
+
+    A row and column of NaN: that parameter is not identifiable, and the verdict says so. verdict: "fitted", or why not,
+    one line. metric: the hybrid metric Π there (metric.py), mean over the fitted strikes, -1 where there is nothing to
+    compare. modes: per mode freq_hz, decay_per_s, amplitude (m,) of the fitted model at the first strike.
     """
 
     alpha_per_s: float
@@ -72,16 +87,23 @@ class MaterialFit:
 
     def __post_init__(self) -> None:
         count = len(np.atleast_1d(self.freq_hz))
-        for name, value in (("freq_hz", self.freq_hz), ("decay_per_s", self.decay_per_s), ("amplitude", self.amplitude)):
+        for name, value in (
+            ("freq_hz", self.freq_hz),
+            ("decay_per_s", self.decay_per_s),
+            ("amplitude", self.amplitude),
+        ):
             object.__setattr__(self, name, frozen_array(value, np.float64, (count,), name))
-        object.__setattr__(self, "covariance", frozen_array(self.covariance, np.float64, (5, 5), "covariance", finite=False))
+        object.__setattr__(
+            self, "covariance", frozen_array(self.covariance, np.float64, (5, 5), "covariance", finite=False)
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Lines:
     """k lines of s recordings of one object, by frequency. amplitude (s, k) complex at the onset.
 
-    noise (s,): rms of what is no line. energy (k,): of a line over the noise's density. signed: phases are true, the onset being known.
+    noise (s,): rms of what is no line. energy (k,): of a line over the noise's density. signed: phases are true, the
+    onset being known.
     """
 
     freq_hz: Array
@@ -102,7 +124,9 @@ class Lines:
     @property
     def identified_sd_per_s(self) -> Array:
         """Spreads of the decays (k,), infinite at the fastest there is: a bound, no value."""
-        return np.asarray(np.where(np.nan_to_num(self.decay_per_s) > PINNED * FASTEST_PER_S, np.inf, self.decay_sd_per_s))
+        return np.asarray(
+            np.where(np.nan_to_num(self.decay_per_s) > PINNED * FASTEST_PER_S, np.inf, self.decay_sd_per_s)
+        )
 
 
 def lines_at(lines: Lines, keep: Array) -> Lines:

@@ -1,9 +1,11 @@
 """How far apart two sounds are, in decibels, where they stand above the noise.
 
-    D = mean over windows of √<(10 log₁₀ (P_a + ε)/(P_b + ε))²> over cells with (P_a + P_b)/2 > m·N(f)      N: the noise's power in a cell
+    D = mean over windows of √<(10 log₁₀ (P_a + ε)/(P_b + ε))²> over cells with (P_a + P_b)/2 > m·N(f)
+        N: the noise's power in a cell
 
-P: power of a short-time spectrum under a Hann window. Multi-resolution, as one window favours either onsets or close pairs
-[Yamamoto et al. 2020, section 3.1]. Two takes of one sound differ by their noise: `noise_floor_db` is that distance.
+P: power of a short-time spectrum under a Hann window. Multi-resolution, as one window favours either onsets or close
+pairs [Yamamoto et al. 2020, section 3.1]. Two takes of one sound differ by their noise: `noise_floor_db` is that
+distance.
 """
 
 from __future__ import annotations
@@ -27,14 +29,25 @@ QUARTILE = float(np.log(4 / 3))  # of an exponential law over its mean
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Floor:
-    """A stationary noise: variance_per_bin (b,) of white noise that had this density at all frequencies, from 0 to half the rate."""
+    """A stationary noise:
+
+    variance_per_bin (b,) of white noise that had this density at all frequencies, from 0 to half the rate.
+    """
 
     variance: Array
 
     def at(self, bins: int) -> Array:
-        """The same at another number of bins (bins,): fewer are each what a Hann window of their width takes in, as noise may be steep."""
+        """The same at another number of bins (bins,): fewer are each what a Hann window of their width takes in, as
+        noise may be steep.
+        """
         fine, wide = len(self.variance), (len(self.variance) - 1) / max(bins - 1, 1)
-        return np.asarray(np.interp(np.linspace(0, 1, bins), np.linspace(0, 1, fine), _taken_in(self.variance, wide) if wide > 1.5 else self.variance))
+        return np.asarray(
+            np.interp(
+                np.linspace(0, 1, bins),
+                np.linspace(0, 1, fine),
+                _taken_in(self.variance, wide) if wide > 1.5 else self.variance,
+            )
+        )
 
 
 def _taken_in(variance: Array, wide: float) -> Array:
@@ -46,18 +59,22 @@ def _taken_in(variance: Array, wide: float) -> Array:
 
 
 def floor_of(residual: Array) -> Floor:
-    """The floor of what is left of a recording (n,) without its modes: medians over time, so that what still rings does not count."""
+    """The floor of what is left of a recording (n,) without its modes: medians over time, so that what still rings does
+    not count.
+    """
     window = min(FLOOR_WINDOW, len(residual) // 4)
     shape = np.hanning(window)
     frames = np.lib.stride_tricks.sliding_window_view(residual, window)[:: window // 2]
     power = np.abs(np.fft.rfft(frames * shape, axis=1)) ** 2 / (shape**2).sum()
-    return Floor(np.maximum(np.median(power, axis=0) / np.log(2), 1e-24))  # the median of an exponential law is ln 2 of its mean
+    # the median of an exponential law is ln 2 of its mean
+    return Floor(np.maximum(np.median(power, axis=0) / np.log(2), 1e-24))
 
 
 def floor_between(signals: list[Array]) -> Floor:
     """The stationary noise that recordings (n,) share.
 
-    Per bin the lower quartile over the last third of every recording, and over neighbouring bins, as no noise is narrow (hum is no noise).
+    Per bin the lower quartile over the last third of every recording, and over neighbouring bins, as no noise is narrow
+    (hum is no noise).
     """
     length = min(len(signal) for signal in signals)
     window = max(FLOOR_WINDOW, 1 << int(np.log2(max(min(length // 6, MOST), 1))))
@@ -74,7 +91,10 @@ def floor_between(signals: list[Array]) -> Floor:
 
 
 def _broad(level: Array, side: int) -> Array:
-    """What neighbours (b,) agree on: ``side`` bins to each side, and no further than a factor, as a noise may fall steeply with frequency."""
+    """What neighbours (b,) agree on:
+
+    ``side`` bins to each side, and no further than a factor, as a noise may fall steeply with frequency.
+    """
     count = len(level)
     k = np.arange(count)
     first = np.maximum(np.ceil(k / REACH).astype(int), k - side)
@@ -87,18 +107,25 @@ def white(rms: float) -> Floor:
     return Floor(np.full(2, rms**2))
 
 
-def log_spectral_db(a: Array, b: Array, floor: Floor, *, windows: tuple[int, ...] = WINDOWS, above: float = ABOVE) -> float:
+def log_spectral_db(
+    a: Array, b: Array, floor: Floor, *, windows: tuple[int, ...] = WINDOWS, above: float = ABOVE
+) -> float:
     """Distance D of two sounds (n,), each with a noise like ``floor`` in it; NaN where no cell stands above it.
 
-    A sound without noise (a prediction) must be given some, or its silence counts: see `with_noise`. Windows with FEWEST_CELLS cells speak, or, where none has so
-    many, all: of fewer, one in which noise happens to cancel a sound says more than all others.
+    A sound without noise (a prediction) must be given some, or its silence counts: see `with_noise`. Windows with
+    FEWEST_CELLS cells speak, or, where none has so many, all: of fewer, one in which noise happens to cancel a sound
+    says more than all others.
     """
     found: list[float] = []
     few: list[float] = []
     for window in windows:
         if window > len(a):
             continue
-        power_a, power_b, cell = _power(a, window), _power(b, window), floor.at(window // 2 + 1) * (np.hanning(window) ** 2).sum()
+        power_a, power_b, cell = (
+            _power(a, window),
+            _power(b, window),
+            floor.at(window // 2 + 1) * (np.hanning(window) ** 2).sum(),
+        )
         observed = (power_a + power_b) / 2 > above * cell
         if observed.any():
             tiny = np.broadcast_to(1e-3 * cell, observed.shape)[observed]
@@ -113,9 +140,18 @@ def with_noise(sound: Array, floor: Floor, seed: int) -> Array:
     return np.asarray(sound + np.fft.irfft(spectrum * np.sqrt(floor.at(len(spectrum))), len(sound)))
 
 
-def noise_floor_db(sound: Array, floor: Floor, *, seeds: tuple[int, int] = (1, 2), windows: tuple[int, ...] = WINDOWS, above: float = ABOVE) -> float:
+def noise_floor_db(
+    sound: Array,
+    floor: Floor,
+    *,
+    seeds: tuple[int, int] = (1, 2),
+    windows: tuple[int, ...] = WINDOWS,
+    above: float = ABOVE,
+) -> float:
     """D of two noisy takes of one clean sound (n,)."""
-    return log_spectral_db(with_noise(sound, floor, seeds[0]), with_noise(sound, floor, seeds[1]), floor, windows=windows, above=above)
+    return log_spectral_db(
+        with_noise(sound, floor, seeds[0]), with_noise(sound, floor, seeds[1]), floor, windows=windows, above=above
+    )
 
 
 def _power(sound: Array, window: int) -> Array:

@@ -1,12 +1,15 @@
 """What in a recording is no mode: its density over frequency and its course over time, both blind to lines.
 
-    σ(f): rms per sample as if white at the level of f, from a neighbourhood's |X|², whose law is exponential: its lower quartile is ln(4/3) of the
-          mean; once the modes are gone, the lower half, σ² = (Σ_{i≤r} x_(i) + (N − r) x_(r))/r, r = N/2, scatters less    [Epstein & Sobel 1953]
-    e(t): power over time in frames, the median over frequency of |X_m(f)|²/σ²(f), ln 2 of the mean; 1 throughout where noise is steady
+    σ(f): rms per sample as if white at the level of f, from a neighbourhood's |X|², whose law is exponential: its lower
+        quartile is ln(4/3) of the
+          mean; once the modes are gone, the lower half, σ² = (Σ_{i≤r} x_(i) + (N − r) x_(r))/r, r = N/2, scatters less
+              [Epstein & Sobel 1953]
+    e(t): power over time in frames, the median over frequency of |X_m(f)|²/σ²(f), ln 2 of the mean; 1 throughout where
+        noise is steady
     a mode of decay d meets σ²(f) Σ e(t) e^{−2dt} / Σ e^{−2dt}
 
-A struck thing's first milliseconds hold what no mode explains (the striker, slaps from near walls); without e(t) every one of them would be taken
-for many fast modes, and the spreads of the fast ones would be too small.
+A struck thing's first milliseconds hold what no mode explains (the striker, slaps from near walls); without e(t) every
+one of them would be taken for many fast modes, and the spreads of the fast ones would be too small.
 """
 
 from __future__ import annotations
@@ -23,7 +26,9 @@ FRAME = 256
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Noise:
-    """density (n_f,) rms per sample over 0 … sr/2, course (m,) of the power in frames of FRAME samples, in units of its density."""
+    """density (n_f,) rms per sample over 0 … sr/2, course (m,) of the power in frames of FRAME samples, in units of its
+    density.
+    """
 
     density: Array
     course: Array
@@ -39,7 +44,9 @@ class Noise:
 
     def share(self, decay_per_s: Array) -> Array:
         """Noise power (k,) under modes of these decays, over the mean."""
-        fade = np.exp(np.maximum(-2 * np.asarray(decay_per_s)[:, None] * (FRAME / self.sr) * np.arange(len(self.course)), -80))
+        fade = np.exp(
+            np.maximum(-2 * np.asarray(decay_per_s)[:, None] * (FRAME / self.sr) * np.arange(len(self.course)), -80)
+        )
         return np.asarray(fade @ self.course / fade.sum(axis=1))
 
 
@@ -72,7 +79,10 @@ def _lower_half(left: Array) -> Array:
 
 
 def noise_density(signal: Array, *, tail: bool = False) -> Array:
-    """Rms per sample (n_f,) over frequency 0 … sr/2, as if white at that level; tail: from the last third, else from all."""
+    """Rms per sample (n_f,) over frequency 0 … sr/2, as if white at that level;
+
+    tail: from the last third, else from all.
+    """
     from scipy.ndimage import percentile_filter
 
     part = signal[-len(signal) // 3 :] if tail else signal
@@ -90,10 +100,14 @@ def noise_density(signal: Array, *, tail: bool = False) -> Array:
     return np.asarray(np.sqrt(smooth / np.log(4 / 3)))
 
 
-def matched(left: Array, noise: Noise, band_hz: tuple[float, float], needed: Callable[[Array], Array], fastest_per_s: float) -> Array:
-    """Poles (k,) whose matched filter on what is left (n,) answers with T > needed(Hz), each the peak of its neighbourhood.
+def matched(
+    left: Array, noise: Noise, band_hz: tuple[float, float], needed: Callable[[Array], Array], fastest_per_s: float
+) -> Array:
+    """Poles (k,) whose matched filter on what is left (n,) answers with T > needed(Hz), each the peak of its
+    neighbourhood.
 
-    T(ω, d) = 2|Σ x e^{−(d+iω)t}|² / (σ² Σ e^{−2dt}) [Kay 1998, eq. 7.29 with an exponential envelope], d in octaves: every resolution.
+    T(ω, d) = 2|Σ x e^{−(d+iω)t}|² / (σ² Σ e^{−2dt}) [Kay 1998, eq. 7.29 with an exponential envelope], d in octaves:
+    every resolution.
     """
     n, sr = len(left), noise.sr
     size = 1 << int(np.ceil(np.log2(2 * n)))

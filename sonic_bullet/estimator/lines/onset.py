@@ -1,9 +1,10 @@
-"""Where an impact starts in a recording, where the next one interrupts it, and what in the recording is no honest signal.
+"""Where an impact starts in a recording, where the next one interrupts it, and what in the recording is no honest
+signal.
 
-energy in blocks of 1 ms -> the first block within 20 dB of the loudest -> first sample above the noise in that block -> about the onset
-the modes observed after it, run backwards, against silence: the sample where the sound takes over from silence -> the onset
-a later rise of half of all bands by `AGAIN_DB` above what they held the 30 ms before: another hit; what follows it is left out. Beats are no hit:
-they swell in their own bands only
+energy in blocks of 1 ms -> the first block within 20 dB of the loudest -> first sample above the noise in that block ->
+about the onset the modes observed after it, run backwards, against silence: the sample where the sound takes over from
+silence -> the onset a later rise of half of all bands by `AGAIN_DB` above what they held the 30 ms before: another hit;
+what follows it is left out. Beats are no hit: they swell in their own bands only
 """
 
 from __future__ import annotations
@@ -25,7 +26,10 @@ REACH = 64  # samples that the first guess may be off
 
 @dataclass(frozen=True, slots=True)
 class Span:
-    """Samples from the onset to the end or the next hit; hits: how many onsets there are; before: samples that precede it."""
+    """Samples from the onset to the end or the next hit;
+
+    hits: how many onsets there are; before: samples that precede it.
+    """
 
     start: int
     stop: int
@@ -84,10 +88,11 @@ def _hits(signal: Array, sr: int, loudest: float) -> Array:
 
 
 def by_modes(signal: Array, start: int, modes: Sinusoids, sr: int, noise: float) -> int:
-    """The sample at which the modes, of amplitudes at sample ``start``, take over from silence: the earliest of the likeliest.
+    """The sample at which the modes, of amplitudes at sample ``start``, take over from silence: the earliest of the
+    likeliest.
 
-    Σ_{n<t} x² + Σ_{n≥t} (x − m)² is least at the true t; a sine begins with a zero, which silence explains as well: hence the earliest
-    within (3 noise)² of the least. Nothing is assumed of the phases.
+    Σ_{n<t} x² + Σ_{n≥t} (x − m)² is least at the true t; a sine begins with a zero, which silence explains as well:
+    hence the earliest within (3 noise)² of the least. Nothing is assumed of the phases.
     """
     first, last = max(0, start - REACH), min(len(signal), start + REACH)
     n = np.arange(first, last)

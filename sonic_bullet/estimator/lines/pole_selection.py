@@ -1,6 +1,8 @@
-"""Which of many poles are worth a line: those without near doubles, and of a crowd those that take most of the recordings one after another.
+"""Which of many poles are worth a line: those without near doubles, and of a crowd those that take most of the
+recordings one after another.
 
-left_k = <e_k, x − what the picked ones take of x>;   next: max Σ_s |left_k|²/<e_k, e_k>            (orthogonal matching pursuit) [Pati, Rezaiifar & Krishnaprasad 1993]
+left_k = <e_k, x − what the picked ones take of x>;   next: max Σ_s |left_k|²/<e_k, e_k>
+    (orthogonal matching pursuit) [Pati, Rezaiifar & Krishnaprasad 1993]
 """
 
 from __future__ import annotations
@@ -27,18 +29,24 @@ def apart(pole: Array) -> Array:
 
 
 def selected(signals: Array, noise: Array, pole: Array, sr: int, count: int) -> Array:
-    """Which poles (at most count,) take most of the signals (s, n) one after another, each of what those before it have left.
+    """Which poles (at most count,) take most of the signals (s, n) one after another, each of what those before it have
+    left.
 
-    All at once, poles of a crowd (a reverberation's) cancel each other at amplitudes that say nothing. A line's other half, at −ω, is taken to be far away.
+    All at once, poles of a crowd (a reverberation's) cancel each other at amplitudes that say nothing. A line's other
+    half, at −ω, is taken to be far away.
     """
     if not len(pole):
         return np.zeros(0, int)
     z = pole / sr
     gap = z[:, None].conj() + z[None, :]
     gram = np.expm1(gap * signals.shape[1]) / np.expm1(gap)
-    left = np.stack([moments(signal, z)[0].conj() / sigma for signal, sigma in zip(signals, noise, strict=True)], axis=1)  # (k, s)
+    # (k, s)
+    left = np.stack(
+        [moments(signal, z)[0].conj() / sigma for signal, sigma in zip(signals, noise, strict=True)], axis=1
+    )
     own = np.real(np.diag(gram))
-    basis, new, found = np.zeros((len(pole), count), complex), own.copy(), []  # <e_k, the n-th direction>; of own, what is apart from those picked
+    # <e_k, the n-th direction>; of own, what is apart from those picked
+    basis, new, found = np.zeros((len(pole), count), complex), own.copy(), []
     for n in range(count):
         energy = np.where(new > SAME * own, (np.abs(left) ** 2).sum(axis=1) / own, -1.0)
         k = int(energy.argmax())

@@ -1,7 +1,9 @@
-"""Several recordings of one object -> rough poles that they share, band by band: where the likelihood of joint_lines.py starts.
+"""Several recordings of one object -> rough poles that they share, band by band: where the likelihood of joint_lines.py
+starts.
 
 bands, decimated; poles = eigenvalues of the shift between the rows of the signal subspace of all recordings at once
-                                                                         (ESPRIT)       [Roy & Kailath 1989, eq. 3.12-3.17]
+                                                                         (ESPRIT)
+                                                                             [Roy & Kailath 1989, eq. 3.12-3.17]
 """
 
 from __future__ import annotations
@@ -30,7 +32,9 @@ def start_poles(signals: Array, sr: int, low: float, high: float) -> Array:
         centre = bin_number * sr / whole
         step = max(1, int(sr / (2.2 * width)))
         taps = _low_pass(min(2 * int(1.9 * sr / width) + 1, n // 3), 0.85 * width / sr) if step > 1 else np.ones(1)
-        band = np.fft.ifft(np.roll(spectrum, -bin_number, axis=1) * np.fft.fft(taps, whole), axis=1)[:, len(taps) - 1 : n : step]
+        band = np.fft.ifft(np.roll(spectrum, -bin_number, axis=1) * np.fft.fft(taps, whole), axis=1)[
+            :, len(taps) - 1 : n : step
+        ]
         band /= np.sqrt((taps**2).sum())
         found = _subspace(band, step / sr)
         freq = centre + found.imag / (2 * np.pi)
@@ -53,12 +57,15 @@ def _low_pass(taps: int, cutoff: float) -> Array:
 
 
 def _subspace(band: Array, dt: float) -> Array:
-    """Poles of complex series band (s, n) of unit noise at step dt: signal subspace of all of them at once, then the shift."""
+    """Poles of complex series band (s, n) of unit noise at step dt: signal subspace of all of them at once, then the
+    shift.
+    """
     s, n = band.shape
     window = min(MOST_WINDOW, n // 3)
     if window < 8:
         return np.zeros(0, complex)
-    first = np.arange(0, n - window + 1, 1 + (n - window) // MOST_COLUMNS)  # any columns will do: the shift is between rows
+    # any columns will do: the shift is between rows
+    first = np.arange(0, n - window + 1, 1 + (n - window) // MOST_COLUMNS)
     gram = np.zeros((window, window), complex)
     for row in band:
         data = row[first[:, None] + np.arange(window)]

@@ -1,8 +1,11 @@
 """Poles of a recording band by band: where the joint fit starts.
 
-    shift the band to zero, low-pass, keep every s-th sample: damped sinusoids stay damped sinusoids, exactly, once the filter is full
-    Hankel matrix H of the band = U S Vᴴ, as many columns of U as stand above the noise: pole = eigenvalue of the shift between their rows
-                                                                        [Roy & Kailath 1989, eq. 3.12-3.17; Hua & Sarkar 1990]
+    shift the band to zero, low-pass, keep every s-th sample: damped sinusoids stay damped sinusoids, exactly, once the
+        filter is full
+    Hankel matrix H of the band = U S Vᴴ, as many columns of U as stand above the noise: pole = eigenvalue of the shift
+        between their rows
+                                                                        [Roy & Kailath 1989, eq. 3.12-3.17; Hua & Sarkar
+                                                                            1990]
     noise: singular values of white noise end at σ(√rows + √columns)    [Marchenko & Pastur 1967]
 
 The stop band lies below any converter's noise; recordings without noise are exact_modes.py's.
@@ -15,16 +18,21 @@ import numpy as np
 from sonic_bullet.records import Array
 
 STOP_DB = 160.0
-ROUNDING = 1e-7  # of the largest singular value, by way of H Hᴴ: enough for what a converter writes; exact_modes.py is for the rest
+# of the largest singular value, by way of H Hᴴ: enough for what a converter writes; exact_modes.py is for the rest
+ROUNDING = 1e-7
 OVERSAMPLED = 2.5
 COLUMNS_MOST = 1200
 EARLY = 1500  # samples
 
 
-def poles(signal: Array, sr: int, noise: Array, band_hz: tuple[float, float], width_hz: float, fastest_per_s: float) -> Array:
-    """Poles −d + iω (k,) of a signal (n,), 1/s, in bands of width_hz. noise (n_f,): rms density per sample at `rfft`'s frequencies of 0 … sr/2.
+def poles(
+    signal: Array, sr: int, noise: Array, band_hz: tuple[float, float], width_hz: float, fastest_per_s: float
+) -> Array:
+    """Poles −d + iω (k,) of a signal (n,), 1/s, in bands of width_hz. noise (n_f,): rms density per sample at `rfft`'s
+    frequencies of 0 … sr/2.
 
-    A band is a slice of the whole recording's transform, times the filter's, turned back at the lower rate: the same linear convolution.
+    A band is a slice of the whole recording's transform, times the filter's, turned back at the lower rate: the same
+    linear convolution.
     """
     from scipy.fft import fft, ifft, next_fast_len
     from scipy.signal import firwin, kaiser_beta
@@ -55,7 +63,9 @@ def poles(signal: Array, sr: int, noise: Array, band_hz: tuple[float, float], wi
 
 
 def early_poles(signal: Array, sr: int, noise: Array, band_hz: tuple[float, float], fastest_per_s: float) -> Array:
-    """Poles (k,) of the first `EARLY` samples, no filter before them: the fast ones, which a band's filter would outlast."""
+    """Poles (k,) of the first `EARLY` samples, no filter before them: the fast ones, which a band's filter would
+    outlast.
+    """
     pole = _shift_poles(signal[:EARLY], float(np.median(noise)), EARLY // 3, EARLY // 9) * sr
     freq = pole.imag / (2 * np.pi)
     return np.asarray(pole[(freq >= band_hz[0]) & (freq < band_hz[1]) & (pole.real < 0) & (pole.real > -fastest_per_s)])
@@ -67,7 +77,8 @@ def _shift_poles(band: Array, noise: float, widest: int = 140, most: int = 40) -
     window = min(widest, n // 3)
     if window < 6:
         return np.zeros(0, complex)
-    first = np.arange(0, n - window + 1, 1 + (n - window) // COLUMNS_MOST)  # the shift is between rows: any columns will do
+    # the shift is between rows: any columns will do
+    first = np.arange(0, n - window + 1, 1 + (n - window) // COLUMNS_MOST)
     hankel = band[first[None, :] + np.arange(window)[:, None]]
     power, left = np.linalg.eigh(hankel @ hankel.conj().T)
     size, left = np.sqrt(np.maximum(power[::-1], 0)), left[:, ::-1]

@@ -5,11 +5,11 @@
     Σ_n w[n] z^n e^{−iω_k n} = a₀D_k − ½a₁(D_{k−1} + D_{k+1}) + ½a₂(D_{k−2} + D_{k+2}) − ½a₃(D_{k−3} + D_{k+3}),
     D_k = (1 − z^N)/(1 − z e^{−iω_k})                  (a geometric sum; frame m is frame 0 times z^{mH})
 
-w is Nuttall's window of four cosines with a continuous first derivative [Nuttall 1981, table II], side lobes below −93 dB, so a mode lives in
-few bins; modes that share a bin add as waves do, beats and all. Powers of bins go to triangles every `bark_step` on the Bark axis and each
-triangle to sone at its middle. Each sine counts at f and −f. Neglected are bins beyond
-a mode's main lobe and three of its half widths (skirts fall as (d/offset)³) and what has sunk under −30 dB SPL: about 1e-9 of Π's scale.
-Every level doubles the window; a level weighs its hop, so that all levels count alike.
+w is Nuttall's window of four cosines with a continuous first derivative [Nuttall 1981, table II], side lobes below −93
+dB, so a mode lives in few bins; modes that share a bin add as waves do, beats and all. Powers of bins go to triangles
+every `bark_step` on the Bark axis and each triangle to sone at its middle. Each sine counts at f and −f. Neglected are
+bins beyond a mode's main lobe and three of its half widths (skirts fall as (d/offset)³) and what has sunk under −30 dB
+SPL: about 1e-9 of Π's scale. Every level doubles the window; a level weighs its hop, so that all levels count alike.
 """
 
 from __future__ import annotations
@@ -42,7 +42,10 @@ class Level:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Image:
-    """A recording's loudness in time, Bark and resolution, from its onset on. late_s: from the onset to the first sample."""
+    """A recording's loudness in time, Bark and resolution, from its onset on.
+
+    late_s: from the onset to the first sample.
+    """
 
     levels: tuple[Level, ...]
     sr: int
@@ -95,7 +98,8 @@ def image(
     shortest_s: float = 0.0107,
     seconds: float = 1.0,
 ) -> Image:
-    """Image of ``seconds`` of a recording (n,) from its onset; windows double from about ``shortest_s``, as many as fit.
+    """Image of ``seconds`` of a recording (n,) from its onset; windows double from about ``shortest_s``, as many as
+    fit.
 
     Raises RecordError where less than one window follows the onset, or nothing there is loud enough to be heard.
     """
@@ -117,12 +121,16 @@ def image(
         made.append(Level(length, length // 2, band, share, scale, loudness(power, middle_hz, full_scale_db_spl)))
     norm = float(sum(level.hop * (level.loud**2).sum() for level in made))
     if norm <= 0:
-        raise RecordError(f"nothing is heard at {full_scale_db_spl:g} dB SPL full scale", "raise the level that full scale stands for")
+        raise RecordError(
+            f"nothing is heard at {full_scale_db_spl:g} dB SPL full scale", "raise the level that full scale stands for"
+        )
     return Image(tuple(made), sr, first / sr - onset_s, middle_hz, _table(middle_hz), full_scale_db_spl, norm)
 
 
 def _table(middle_hz: Array) -> Array:
-    """Sone, and its slope, at powers 2^e(1 + i/8) of the reference's: what a float's own leading bits point at, no logarithm needed."""
+    """Sone, and its slope, at powers 2^e(1 + i/8) of the reference's: what a float's own leading bits point at, no
+    logarithm needed.
+    """
     node = (2.0 ** np.arange(TABLE_FROM, TABLE_TO)[:, None] * (1 + np.arange(NODES) / NODES)).ravel()
     cell = np.repeat(2.0 ** np.arange(TABLE_FROM, TABLE_TO), NODES) / NODES
 
@@ -134,26 +142,43 @@ def _table(middle_hz: Array) -> Array:
 
 
 def plain_distance(target: Image, freq_hz: Array, decay_per_s: Array, amplitude: Array) -> float:
-    """Π_psycho [eq. 19] over its value for silence, by synthesis and Fourier transforms: what `distance` must equal. (m,) each."""
-    time = np.arange(max(level.window + level.hop * (len(level.loud) - 1) for level in target.levels)) / target.sr + target.late_s
+    """Π_psycho [eq.
+
+    19] over its value for silence, by synthesis and Fourier transforms: what `distance` must equal. (m,) each.
+    """
+    time = (
+        np.arange(max(level.window + level.hop * (len(level.loud) - 1) for level in target.levels)) / target.sr
+        + target.late_s
+    )
     signal = np.zeros(len(time))
     for freq, decay, size in zip(freq_hz, decay_per_s, amplitude, strict=True):
         signal += size * np.exp(-decay * time) * np.sin(2 * np.pi * freq * time)
     total = 0.0
     for level in target.levels:
         power = np.abs(spectra(signal, level.window, level.hop)) ** 2 * level.scale
-        loud = loudness(_pool(power, level.band, level.share, len(target.middle_hz)), target.middle_hz, target.full_scale_db_spl)
+        loud = loudness(
+            _pool(power, level.band, level.share, len(target.middle_hz)), target.middle_hz, target.full_scale_db_spl
+        )
         total += level.hop * float(((loud[: len(level.loud)] - level.loud) ** 2).sum())
     return total / target.norm
 
 
-def distance(target: Image, freq_hz: Array, decay_per_s: Array, amplitude: Array, differences: Array | None = None) -> float:
-    """Π_psycho [eq. 19] over its value for silence: 0 the same image, 1 as far as silence. (m,) each, modes at 0 Hz are mute.
+def distance(
+    target: Image, freq_hz: Array, decay_per_s: Array, amplitude: Array, differences: Array | None = None
+) -> float:
+    """Π_psycho [eq.
 
-    differences, where given, takes every √hop·ΔT, level after level, frame after frame, so that their squares sum to the answer.
+    19] over its value for silence: 0 the same image, 1 as far as silence. (m,) each, modes at 0 Hz are mute.
+
+    differences, where given, takes every √hop·ΔT, level after level, frame after frame, so that their squares sum to
+    the answer.
     """
     # a sine is two spirals, and the one at −f reaches low bins: Im A e^{iωt} = Im(−A*) e^{−iωt}
-    freq_hz, decay_per_s, amplitude = np.concatenate([freq_hz, -freq_hz]), np.tile(decay_per_s, 2), np.concatenate([amplitude, -np.conj(amplitude)])
+    freq_hz, decay_per_s, amplitude = (
+        np.concatenate([freq_hz, -freq_hz]),
+        np.tile(decay_per_s, 2),
+        np.concatenate([amplitude, -np.conj(amplitude)]),
+    )
     total, at = 0.0, 0
     unit = 10 ** (target.full_scale_db_spl / 20)
     floor = 10 ** ((FLOOR_DB_SPL - target.full_scale_db_spl) / 20)
@@ -161,10 +186,25 @@ def distance(target: Image, freq_hz: Array, decay_per_s: Array, amplitude: Array
         cells = level.loud.size if differences is not None else 0
         reach = kernel.reach(freq_hz, decay_per_s, amplitude, float(target.sr), level.window, floor)
         slot, used = kernel.slots(reach, level.band)
-        shapes, state, turn = kernel.frame(freq_hz, decay_per_s, amplitude * unit, reach, float(target.sr), target.late_s, level.window, level.hop)
+        shapes, state, turn = kernel.frame(
+            freq_hz, decay_per_s, amplitude * unit, reach, float(target.sr), target.late_s, level.window, level.hop
+        )
         out = np.empty(0) if differences is None else differences[at : at + cells]
         total += kernel.compare(
-            reach, slot, used, shapes, state, turn, floor * unit, level.band, level.share, level.scale, level.loud, target.table, out, level.hop / target.norm
+            reach,
+            slot,
+            used,
+            shapes,
+            state,
+            turn,
+            floor * unit,
+            level.band,
+            level.share,
+            level.scale,
+            level.loud,
+            target.table,
+            out,
+            level.hop / target.norm,
         )
         at += cells
     return total

@@ -1,6 +1,8 @@
-"""The compiled half of image.py: closed-form spectra of damped sinusoids, summed as waves, pooled, made loud and compared.
+"""The compiled half of image.py: closed-form spectra of damped sinusoids, summed as waves, pooled, made loud and
+compared.
 
-reach -> slots -> frame -> compare, one level at a time; the equations stand in image.py. Sums are reassociated for vector code; the order
+reach -> slots -> frame -> compare, one level at a time; the equations stand in image.py. Sums are reassociated for
+    vector code; the order
 depends on the arguments' lengths alone, so the same call gives the same bits.
 """
 
@@ -26,8 +28,9 @@ def centre_and_radius(freq_hz, decay_per_s, sr, length):  # type: ignore[no-unty
 def reach(freq_hz, decay_per_s, amplitude, sr, length, floor):  # type: ignore[no-untyped-def]
     """(m, 3) first bin, bin after the last, place of the first among all.
 
-    The main lobe is 8 bins wide, the skirt falls as (decay/offset)³; the last bin each side fades, so that Π does not jump as a mode moves. What decays within x⁻¹ of a window is over where the window, ∝ n² at its
-    edges, has hardly begun: its peak is below 3/x³ of an undamped mode's.
+    The main lobe is 8 bins wide, the skirt falls as (decay/offset)³; the last bin each side fades, so that Π does not
+    jump as a mode moves. What decays within x⁻¹ of a window is over where the window, ∝ n² at its edges, has hardly
+    begun: its peak is below 3/x³ of an undamped mode's.
     """
     reach = np.zeros((len(freq_hz), 3), np.int64)
     room = 0
@@ -36,7 +39,10 @@ def reach(freq_hz, decay_per_s, amplitude, sr, length, floor):  # type: ignore[n
         short = decay_per_s[j] * length / sr
         if 0 < abs(freq_hz[j]) < sr / 2 and abs(amplitude[j]) * min(1.0, 3 / short**3) > floor:
             centre, radius = centre_and_radius(freq_hz[j], decay_per_s[j], sr, length)
-            reach[j, 0], reach[j, 1] = max(1, int(np.ceil(centre - radius))), min(length // 2 + 1, int(np.floor(centre + radius)) + 1)
+            reach[j, 0], reach[j, 1] = (
+                max(1, int(np.ceil(centre - radius))),
+                min(length // 2 + 1, int(np.floor(centre + radius)) + 1),
+            )
             room += max(reach[j, 1] - reach[j, 0], 0)
     return reach
 
@@ -63,7 +69,10 @@ def slots(reach, band):  # type: ignore[no-untyped-def]
 
 @njit(nogil=True, error_model="numpy")
 def frame(freq_hz, decay_per_s, amplitude, reach, sr, late_s, length, hop):  # type: ignore[no-untyped-def]
-    """Frame 0 of every mode in closed form: shapes (2, room) real and imaginary, state and turn (m,): its factor, and what a hop makes of it."""
+    """Frame 0 of every mode in closed form:
+
+    shapes (2, room) real and imaginary, state and turn (m,): its factor, and what a hop makes of it.
+    """
     modes = len(freq_hz)
     shapes = np.empty((2, reach[-1, 2] + max(reach[-1, 1] - reach[-1, 0], 0)))
     state, turn = np.zeros(modes, np.complex128), np.zeros(modes, np.complex128)
@@ -81,7 +90,9 @@ def frame(freq_hz, decay_per_s, amplitude, reach, sr, late_s, length, hop):  # t
         turned = np.exp(rate / sr) * np.exp(complex(0.0, -2 * np.pi * (reach[j, 0] - 3) / length))
         for k in range(count + 6):
             bottom_re, bottom_im = 1 - turned.real, -turned.imag
-            geometric[k] = top * complex(bottom_re, -bottom_im) / (bottom_re * bottom_re + bottom_im * bottom_im + 1e-300)
+            geometric[k] = (
+                top * complex(bottom_re, -bottom_im) / (bottom_re * bottom_re + bottom_im * bottom_im + 1e-300)
+            )
             turned *= step
         for k in range(count):
             value = (
@@ -97,7 +108,9 @@ def frame(freq_hz, decay_per_s, amplitude, reach, sr, late_s, length, hop):  # t
 
 @njit(nogil=True)
 def runs_of(used, band):  # type: ignore[no-untyped-def]
-    """(r, 3) runs of used bins that feed one triangle: first slot, slot after the last, the lower triangle; those outside are left out."""
+    """(r, 3) runs of used bins that feed one triangle: first slot, slot after the last, the lower triangle; those
+    outside are left out.
+    """
     runs = np.zeros((len(used), 3), np.int64)
     count = 0
     for i in range(len(used)):

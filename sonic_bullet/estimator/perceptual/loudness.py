@@ -6,9 +6,10 @@
     N = 2^((L_N − 40)/10) sone from 40 phon on [ISO 532-1:2017, eq. 1; Stevens 1955],
     N = (L_N/40)^2.642 below                                                          [Bladon, Lindblom 1981, eq. 3]
 
-α, L_U, T: exponent, gain at 1 kHz and threshold of hearing of ISO 226's table at a frequency. The standard vouches for 20 to 90 phon
-(80 above 4 kHz) and 20 Hz to 12.5 kHz; elsewhere the formula is carried on, α and L_U held, T led on to 18.4 dB at 14 kHz and 40.2 dB at
-16 kHz [ISO 389-7:2005, table 1, free field] and held there. L_N below 0 is silence. The two laws of N meet at 40 phon with slopes 5 % apart.
+α, L_U, T: exponent, gain at 1 kHz and threshold of hearing of ISO 226's table at a frequency. The standard vouches for
+20 to 90 phon (80 above 4 kHz) and 20 Hz to 12.5 kHz; elsewhere the formula is carried on, α and L_U held, T led on to
+18.4 dB at 14 kHz and 40.2 dB at 16 kHz [ISO 389-7:2005, table 1, free field] and held there. L_N below 0 is silence.
+The two laws of N meet at 40 phon with slopes 5 % apart.
 """
 
 from __future__ import annotations
@@ -17,8 +18,10 @@ import numpy as np
 
 from sonic_bullet.records import Array
 
-# ISO 226:2003, table 1: f in Hz, α, L_U in dB, T in dB; the last two rows are ISO 389-7's. The standard is not free: all rows agree, digit by digit,
-# with public implementations that hold a copy (Tackett 2005, iso226.m; Callegari 2013, PyDSM; openMHA's MHAUtils::spl2hl for 14 and 16 kHz).
+# ISO 226:2003, table 1: f in Hz, α, L_U in dB, T in dB; the last two rows are ISO 389-7's. The standard is not free:
+# all rows agree, digit by digit,
+# with public implementations that hold a copy (Tackett 2005, iso226.m; Callegari 2013, PyDSM; openMHA's
+# MHAUtils::spl2hl for 14 and 16 kHz).
 _TABLE = np.array(
     [
         (20, 0.532, -31.6, 78.5),
@@ -74,7 +77,10 @@ def _row(freq_hz: Array | float) -> tuple[Array, Array, Array]:
 
 
 def phon(level_db_spl: Array | float, freq_hz: Array | float) -> Array:
-    """Loudness level in phon, not below 0, of a tone of that level; arguments broadcast. Source: ISO 226:2003, eq. 2."""
+    """Loudness level in phon, not below 0, of a tone of that level; arguments broadcast.
+
+    Source: ISO 226:2003, eq. 2.
+    """
     exponent, gain, threshold = _row(freq_hz)
     level = (0.4 * 10 ** ((np.asarray(level_db_spl) + gain) / 10 - 9)) ** exponent
     quiet = (0.4 * 10 ** ((threshold + gain) / 10 - 9)) ** exponent
@@ -84,7 +90,10 @@ def phon(level_db_spl: Array | float, freq_hz: Array | float) -> Array:
 def level_of_phon(loudness_level_phon: Array | float, freq_hz: Array | float) -> Array:
     """Level in dB SPL of a tone that loud: an equal-loudness contour. Source: ISO 226:2003, eq. 1."""
     exponent, gain, threshold = _row(freq_hz)
-    force = 4.47e-3 * (10 ** (0.025 * np.asarray(loudness_level_phon)) - 1.15) + (0.4 * 10 ** ((threshold + gain) / 10 - 9)) ** exponent
+    force = (
+        4.47e-3 * (10 ** (0.025 * np.asarray(loudness_level_phon)) - 1.15)
+        + (0.4 * 10 ** ((threshold + gain) / 10 - 9)) ** exponent
+    )
     return np.asarray(10 / exponent * np.log10(force) - gain + 94)
 
 

@@ -3,13 +3,14 @@
     X(f) = c_z Z(f),  Y(d) = c_d/d,  D² = (X_i − X_j)² + (Y_i − Y_j)²                  [Ren, Yeh, Lin 2013, eq. 20-22]
     R(φ_i, Φ̃) = Σ_j u_ij k_ij / Σ_j u_ij,   R(Φ, Φ̃) = Σ_i w_i R(φ_i, Φ̃) / Σ_i w_i,   Π_MRP = −R R̃       [eq. 23-26]
 
-The paper's appendix B with the forms of k, w, u and the constants is not to be had. Here, and not to be mistaken for theirs:
+The paper's appendix B with the forms of k, w, u and the constants is not to be had. Here, and not to be mistaken for
+theirs:
 
     k = 1/(1 + D²),   u_ij = w_j/(D² + δ²)²,   w = (a²/4d)^p
 
-k is 1 for coincidence and has a slope far away, where a search starts; u lets the nearest decide without a switch, so that R is 1 to about
-δ⁴ where a point is met exactly; w is the mode's energy to Stevens' exponent of loudness. c_d is in units of the recording's own energy-weighted
-median decay rate: one unit of Y is one of its typical durations.
+k is 1 for coincidence and has a slope far away, where a search starts; u lets the nearest decide without a switch, so
+that R is 1 to about δ⁴ where a point is met exactly; w is the mode's energy to Stevens' exponent of loudness. c_d is in
+units of the recording's own energy-weighted median decay rate: one unit of Y is one of its typical durations.
 """
 
 from __future__ import annotations
@@ -44,7 +45,9 @@ def energy(decay_per_s: Array, amplitude: Array) -> Array:
     return np.asarray(amplitude**2 / (4 * np.maximum(decay_per_s, 1e-3)))
 
 
-def points(features: Features, *, per_bark: float = 4.0, per_duration: float = 1.0, near: float = 0.1, power: float = 0.3) -> Points:
+def points(
+    features: Features, *, per_bark: float = 4.0, per_duration: float = 1.0, near: float = 0.1, power: float = 0.3
+) -> Points:
     """The recording's features in the plane of X and Y, for `match_ratio_product`."""
     weight = energy(features.decay_per_s, features.amplitude)
     order = np.argsort(features.decay_per_s)
@@ -55,17 +58,39 @@ def points(features: Features, *, per_bark: float = 4.0, per_duration: float = 1
 
 
 def match_ratio_product(reference: Points, freq_hz: Array, decay_per_s: Array, amplitude: Array) -> float:
-    """Π_MRP in −1 … 0 [eq. 26]; modes (m,) that are mute or outside 20 Hz … 20 kHz take no part; 0 where none is left."""
+    """Π_MRP in −1 … 0 [eq.
+
+    26]; modes (m,) that are mute or outside 20 Hz … 20 kHz take no part; 0 where none is left.
+    """
     return float(
         _product(
-            reference.x, reference.y, reference.weight, reference.per_bark, reference.per_s, reference.near**2, reference.power, freq_hz, decay_per_s, amplitude
+            reference.x,
+            reference.y,
+            reference.weight,
+            reference.per_bark,
+            reference.per_s,
+            reference.near**2,
+            reference.power,
+            freq_hz,
+            decay_per_s,
+            amplitude,
         )
     )
 
 
-def best_pairs(reference: Points, lambda_hat: Array, amplitude_hat: Array, alpha_per_s: float, beta_s: float, gamma_m2_s2: Array) -> Array:
+def best_pairs(
+    reference: Points, lambda_hat: Array, amplitude_hat: Array, alpha_per_s: float, beta_s: float, gamma_m2_s2: Array
+) -> Array:
     """(g,) Π_MRP at each γ with α, β held."""
-    known = (reference.x, reference.y, reference.weight, reference.per_bark, reference.per_s, reference.near**2, reference.power)
+    known = (
+        reference.x,
+        reference.y,
+        reference.weight,
+        reference.per_bark,
+        reference.per_s,
+        reference.near**2,
+        reference.power,
+    )
     return np.asarray(_best_pairs(known, lambda_hat, amplitude_hat, alpha_per_s, beta_s, gamma_m2_s2))
 
 

@@ -2,8 +2,9 @@
 
     Π = Π_psycho/|Π_MRP|                                                              [Ren, Yeh, Lin 2013, eq. 27]
 
-Π_psycho is divided by its value for silence (image.py), so that Π has no unit and its minimum stays where it was.
-The constants the paper's lost appendix held are the fields of `Constants`; docs/measured/estimator.md shows what hangs on them.
+Π_psycho is divided by its value for silence (image.py), so that Π has no unit and its minimum stays where it was. The
+constants the paper's lost appendix held are the fields of `Constants`; docs/measured/estimator.md shows what hangs on
+them.
 """
 
 from __future__ import annotations
@@ -50,7 +51,11 @@ def target(problem: Problem, constants: Constants | None = None) -> Target:
         problem.signal, problem.features.sr, problem.features.onset_s, problem.full_scale_db_spl,
         bark_step=c.bark_step, levels=c.levels, shortest_s=c.shortest_s, seconds=c.seconds,
     )  # fmt: skip
-    return Target(problem, made, points(problem.features, per_bark=c.per_bark, per_duration=c.per_duration, near=c.near, power=c.power))
+    return Target(
+        problem,
+        made,
+        points(problem.features, per_bark=c.per_bark, per_duration=c.per_duration, near=c.near, power=c.power),
+    )
 
 
 def hybrid(target: Target, parameters: Array, *, plain: bool = False) -> float:
@@ -59,8 +64,13 @@ def hybrid(target: Target, parameters: Array, *, plain: bool = False) -> float:
     return hybrid_of_modes(target, *modes, plain=plain)
 
 
-def hybrid_of_modes(target: Target, freq_hz: Array, decay_per_s: Array, amplitude: Array, *, plain: bool = False) -> float:
-    """Π of damped sinusoids (m,) Im A e^{(−d + iω)t}, whatever made them. A real: sines; complex (not with ``plain``): of any phase."""
+def hybrid_of_modes(
+    target: Target, freq_hz: Array, decay_per_s: Array, amplitude: Array, *, plain: bool = False
+) -> float:
+    """Π of damped sinusoids (m,) Im A e^{(−d + iω)t}, whatever made them.
+
+    A real: sines; complex (not with ``plain``): of any phase.
+    """
     match = match_ratio_product(target.points, freq_hz, decay_per_s, np.abs(amplitude))
     measure = plain_distance if plain else distance
     return measure(target.image, freq_hz, decay_per_s, amplitude) / max(-match, MATCH_FLOOR)
@@ -68,7 +78,9 @@ def hybrid_of_modes(target: Target, freq_hz: Array, decay_per_s: Array, amplitud
 
 def match(target: Target, parameters: Array) -> float:
     """Π_MRP at α, β, γ, σ (4,); σ makes no difference to it."""
-    return match_ratio_product(target.points, *modes_of(parameters, target.problem.lambda_hat, target.problem.amplitude_hat))
+    return match_ratio_product(
+        target.points, *modes_of(parameters, target.problem.lambda_hat, target.problem.amplitude_hat)
+    )
 
 
 def residuals(target: Target, parameters: Array) -> Array:

@@ -1,8 +1,12 @@
 """Two searches for α, β, γ, σ: the paper's, kept as the yardstick, and one that spends its evaluations where they tell.
 
-reference   every start of `seed_starts` walked down Π by Nelder and Mead in the logarithms, the best wins    [Ren, Yeh, Lin 2013, section 5.3]
-fast        1. Π_MRP alone (some tens of µs, blind to σ) sifts γ's from laying every feature on every mode; α, β from all features at once
-            2. the best few are matched feature to mode and solved as least squares, each residual by its spread (partners.py); Π ranks them
+reference   every start of `seed_starts` walked down Π by Nelder and Mead in the logarithms, the best wins
+    [Ren, Yeh, Lin 2013, section 5.3]
+fast
+    1. Π_MRP alone (some tens of µs, blind to σ) sifts γ's from laying every feature on every mode; α, β from all
+    features at once
+            2. the best few are matched feature to mode and solved as least squares, each residual by its spread
+                (partners.py); Π ranks them
             3. the best is walked down Π, a sum of squares, by Levenberg and Marquardt, then by Newton's method
 
 What the features say is kept where Π below it says that the images agree (EXACT): there they know better.
@@ -21,7 +25,9 @@ from sonic_bullet.estimator.perceptual.problem import Found, Problem
 from sonic_bullet.estimator.perceptual.starts import feature_eigenvalues, seed_starts
 from sonic_bullet.records import Array
 
-STEP = 0.05  # first simplex, in the logarithms: what the paper's source of the method does [Lagarias et al. 1999; MATLAB's fminsearch]
+# first simplex, in the logarithms: what the paper's source of the method does [Lagarias et al. 1999; MATLAB's
+# fminsearch]
+STEP = 0.05
 STEP_TOLERANCE = 1e-4  # section 7, below Table II
 METRIC_TOLERANCE = 1e-8
 EXACT = 1e-5  # a third of a percent of the image, rms; an onset found one sample late costs a tenth of that
@@ -63,7 +69,10 @@ def _found(aim: Target, logs: Array, metric: float, evaluations: int, begun: flo
 
 
 def reference(problem: Problem, constants: Constants | None = None) -> Found:
-    """The paper's optimiser [section 5.3]. Raises RecordError where the recording is too short or too quiet for an image."""
+    """The paper's optimiser [section 5.3].
+
+    Raises RecordError where the recording is too short or too quiet for an image.
+    """
     begun = time.perf_counter()
     aim = target(problem, constants)
     count = _Counted(aim)
@@ -97,9 +106,11 @@ def polish(problem: Problem, start: Array, constants: Constants | None = None) -
 
 
 def _polish(aim: Target, count: _Counted, start: Array) -> tuple[float, Array]:
-    """Π as the sum of squares it is, by Levenberg and Marquardt with Broyden's slopes; then by Newton in axes along which Π rises alike.
+    """Π as the sum of squares it is, by Levenberg and Marquardt with Broyden's slopes; then by Newton in axes along
+    which Π rises alike.
 
-    α and β enter the logarithm with a tenth of the typical decay added, so that one too small to be heard is no long flat valley.
+    α and β enter the logarithm with a tenth of the typical decay added, so that one too small to be heard is no long
+    flat valley.
     """
     problem = aim.problem
     decay = 0.1 * float(np.median(problem.features.decay_per_s))
@@ -145,7 +156,9 @@ def _polish(aim: Target, count: _Counted, start: Array) -> tuple[float, Array]:
 
 
 def _settle(function: Callable[[Array], float], here: float) -> tuple[float, Array]:
-    """Newton's method from 0 on a function of four numbers that is about here + Σu² near it, by differences: value and place."""
+    """Newton's method from 0 on a function of four numbers that is about here + Σu² near it, by differences: value and
+    place.
+    """
     place, reach = np.zeros(4), 1.0
     unit = np.eye(4)
     cross: Array = np.zeros((4, 4))
@@ -163,7 +176,11 @@ def _settle(function: Callable[[Array], float], here: float) -> tuple[float, Arr
         tries = [place + step * min(1.0, 50 / max(float(np.linalg.norm(step)), 1e-12))]
         found = min(
             [(function(tries[0]), tries[0])]
-            + [(float(value), place + sign * reach * e) for sign, values in ((1, ahead), (-1, behind)) for value, e in zip(values, unit, strict=True)],
+            + [
+                (float(value), place + sign * reach * e)
+                for sign, values in ((1, ahead), (-1, behind))
+                for value, e in zip(values, unit, strict=True)
+            ],
             key=lambda end: end[0],
         )
         if found[0] >= here:

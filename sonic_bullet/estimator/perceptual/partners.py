@@ -1,10 +1,11 @@
 """Features paired with modes: which belongs to which, and the four numbers by least squares once that is known.
 
-    ln λ_i = ln γ + ln λ̂_j,   d_i = ½(α + βλ_i),   ln a_i = ln σ + ln |â_j|,   λ_i = ω_i² + d_i²       [Ren, Yeh, Lin 2013, eq. 6, 10-12]
+    ln λ_i = ln γ + ln λ̂_j,   d_i = ½(α + βλ_i),   ln a_i = ln σ + ln |â_j|,   λ_i = ω_i² + d_i²
+        [Ren, Yeh, Lin 2013, eq. 6, 10-12]
 
-The first and third are means, the second a straight line with neither number below its bound. Each residual counts by its
-feature's spread and by the misfit all of them share (a mesh's error, a merged pair), and one far out counts by its distance, not its
-square [Huber 1964]. Where everything fits, the answer is exact to rounding, whatever the weights.
+The first and third are means, the second a straight line with neither number below its bound. Each residual counts by
+its feature's spread and by the misfit all of them share (a mesh's error, a merged pair), and one far out counts by its
+distance, not its square [Huber 1964]. Where everything fits, the answer is exact to rounding, whatever the weights.
 """
 
 from __future__ import annotations
@@ -54,7 +55,10 @@ def rayleigh(features: Features, trust: Array, lower: Array, upper: Array) -> tu
 
 @njit(nogil=True, error_model="numpy")
 def _rayleigh(eigen, decay, spread, trust):  # type: ignore[no-untyped-def]
-    """Robust non-negative α, β; spread (k,) relative. The misfit shared by all starts at all of it and shrinks to what is left."""
+    """Robust non-negative α, β;
+
+    spread (k,) relative. The misfit shared by all starts at all of it and shrinks to what is left.
+    """
     unit = np.median(eigen)
     alpha, beta, misfit = 2 * np.median(decay), 0.0, 1.0
     for _ in range(REWEIGHTED):
@@ -70,14 +74,18 @@ def _rayleigh(eigen, decay, spread, trust):  # type: ignore[no-untyped-def]
         if not (determinant > 1e-14 * a * c and alpha >= 0 and beta >= 0):
             alone_alpha, alone_beta = p / a, q / c
             alpha, beta = (alone_alpha, 0.0) if alone_alpha * p > alone_beta * q else (0.0, alone_beta)
-        misfit = max(1.4826 * np.median(np.abs(decay / np.maximum(0.5 * (alpha + beta * eigen / unit), 1e-9) - 1)), 1e-9)
+        misfit = max(
+            1.4826 * np.median(np.abs(decay / np.maximum(0.5 * (alpha + beta * eigen / unit), 1e-9) - 1)), 1e-9
+        )
     return alpha, beta / unit
 
 
 def partners(problem: Problem, parameters: Array, tolerance: float) -> tuple[Array, Array]:
-    """For each feature the mode that fits it best, (k,) indices, and whether λ lies within e^±tolerance of it, (k,) bool.
+    """For each feature the mode that fits it best, (k,) indices, and whether λ lies within e^±tolerance of it, (k,)
+    bool.
 
-    A mode goes to one feature, the best served. Far off in loudness costs as being off in λ does: a factor e is half the tolerance.
+    A mode goes to one feature, the best served. Far off in loudness costs as being off in λ does: a factor e is half
+    the tolerance.
     """
     eigen = np.log(feature_eigenvalues(problem.features))
     freq_hz, _, amplitude = modes_of(parameters, problem.lambda_hat, problem.amplitude_hat)
@@ -109,7 +117,11 @@ def all_partners(problem: Problem, start: Array) -> Array:
         if not now.any():
             break
         log_gamma, misfit = _mean((eigen - np.log(problem.lambda_hat[mode]))[now], eigen_spread[now], trust[now])
-        log_sigma, _ = _mean(np.log(features.amplitude[now]) - np.log(np.abs(problem.amplitude_hat[mode[now]])), size_spread[now], trust[now])
+        log_sigma, _ = _mean(
+            np.log(features.amplitude[now]) - np.log(np.abs(problem.amplitude_hat[mode[now]])),
+            size_spread[now],
+            trust[now],
+        )
         still = abs(log_gamma - np.log(gamma)) < 1e-12 and (now == matched).all()
         gamma, sigma, matched = np.exp(log_gamma), np.exp(log_sigma), now
         alpha, beta = rayleigh(_only(features, now), trust[now], problem.lower, problem.upper)
@@ -135,9 +147,11 @@ def _only(features: Features, which: Array) -> Features:
 
 
 def candidates(aim: Target, most: int) -> Array:
-    """(s, 4) starts: every strong feature on every audible mode gives a γ; alike ones are one; Π_MRP keeps the best ``most``.
+    """(s, 4) starts: every strong feature on every audible mode gives a γ; alike ones are one; Π_MRP keeps the best
+    ``most``.
 
-    The paper's own γ's, each undominated mode on the most dominant feature, come with them: one of those is always near [section 5.3].
+    The paper's own γ's, each undominated mode on the most dominant feature, come with them: one of those is always near
+    [section 5.3].
     """
     problem, features = aim.problem, aim.problem.features
     strong = by_energy(features)[:STRONGEST]
@@ -152,17 +166,29 @@ def candidates(aim: Target, most: int) -> Array:
     group = np.concatenate([[0], np.cumsum(np.diff(guess) > APART)])
     guess = np.bincount(group, guess) / np.bincount(group)
     score = best_pairs(aim.points, problem.lambda_hat, problem.amplitude_hat, alpha, beta, np.exp(guess))
-    surest = np.log(eigen[strong[0]] / problem.lambda_hat[undominated(problem.lambda_hat, problem.amplitude_hat)[-UNDOMINATED:]])
+    surest = np.log(
+        eigen[strong[0]] / problem.lambda_hat[undominated(problem.lambda_hat, problem.amplitude_hat)[-UNDOMINATED:]]
+    )
     kept: list[float] = []
-    for log_gamma in (*guess[np.argsort(score, kind="stable")], *np.clip(surest, *np.log([problem.lower[2], problem.upper[2]]))):
-        # the last ones come whatever Π_MRP says of them: where few of many modes were observed it likes a γ that hides the rest under those
+    for log_gamma in (
+        *guess[np.argsort(score, kind="stable")],
+        *np.clip(surest, *np.log([problem.lower[2], problem.upper[2]])),
+    ):
+        # the last ones come whatever Π_MRP says of them: where few of many modes were observed it likes a γ that hides
+        # the rest under those
         if (len(kept) < most or log_gamma in surest) and all(abs(log_gamma - other) > DISTINCT for other in kept):
             kept.append(float(log_gamma))
     rows = []
     for gamma in np.exp(kept):
-        freq_hz, decay, amplitude = modes_of(np.array([alpha, beta, gamma, 1.0]), problem.lambda_hat, problem.amplitude_hat)
+        freq_hz, decay, amplitude = modes_of(
+            np.array([alpha, beta, gamma, 1.0]), problem.lambda_hat, problem.amplitude_hat
+        )
         observed = (freq_hz > 0) & (freq_hz < features.sr / 2)
         total = energy(decay, amplitude)[observed].sum()
-        sigma = np.sqrt(energy(features.decay_per_s, features.amplitude).sum() / total) if total > 0 else problem.features.amplitude.max() / size.max()
+        sigma = (
+            np.sqrt(energy(features.decay_per_s, features.amplitude).sum() / total)
+            if total > 0
+            else problem.features.amplitude.max() / size.max()
+        )
         rows.append((alpha, beta, gamma, sigma))
     return np.asarray(np.clip(np.array(rows), problem.lower, problem.upper))

@@ -1,9 +1,10 @@
 """What the optimisers are asked and what they answer: one recording against one body whose four numbers are unknown.
 
-    (λ̂_j, â_j)  --{α, β, γ, σ}-->  λ = γ λ̂,  d = ½(α + βλ),  ω = √(λ − d²),  a = σ â         [Ren, Yeh, Lin 2013, eq. 6, 7, 10-12]
+    (λ̂_j, â_j)  --{α, β, γ, σ}-->  λ = γ λ̂,  d = ½(α + βλ),  ω = √(λ − d²),  a = σ â
+        [Ren, Yeh, Lin 2013, eq. 6, 7, 10-12]
 
-λ̂ are the eigenvalues of the body at γ = E/ρ = 1 m²/s² and the assumed Poisson's ratio, â the amplitudes its sensor would
-hear after the strike at σ = 1. Order of the four everywhere: α 1/s, β s, γ m²/s², σ.
+λ̂ are the eigenvalues of the body at γ = E/ρ = 1 m²/s² and the assumed Poisson's ratio, â the amplitudes its sensor
+would hear after the strike at σ = 1. Order of the four everywhere: α 1/s, β s, γ m²/s², σ.
 """
 
 from __future__ import annotations
@@ -24,10 +25,10 @@ UPPER = (1e6, 1.0, 1e300, 1e300)
 class Problem:
     """One recording and one body. m modes, n samples.
 
-    signal (n,): the recording, full scale 1, at features.sr. amplitude_hat (m,) is signed: modes of one strike share the
-    sign of their sine at the onset, which decides how close pairs beat; pass magnitudes where it is not known.
-    full_scale_db_spl: the level an rms of 1 stands for; 94 reads samples as pascals. lower, upper (4,): bounds of α, β, γ, σ.
-    Raises RecordError where lengths differ, an eigenvalue is not above zero, all modes are mute, or bounds cross.
+    signal (n,): the recording, full scale 1, at features.sr. amplitude_hat (m,) is signed: modes of one strike share
+    the sign of their sine at the onset, which decides how close pairs beat; pass magnitudes where it is not known.
+    full_scale_db_spl: the level an rms of 1 stands for; 94 reads samples as pascals. lower, upper (4,): bounds of α, β,
+    γ, σ. Raises RecordError where lengths differ, an eigenvalue is not above zero, all modes are mute, or bounds cross.
     """
 
     features: Features
@@ -80,10 +81,17 @@ class Found:
 
 
 def modes_of(parameters: Array, lambda_hat: Array, amplitude_hat: Array) -> tuple[Array, Array, Array]:
-    """freq_hz, decay_per_s, amplitude (m,) of every mode; an overdamped one has freq_hz 0 and amplitude 0. Source: eq. 6, 7, 12."""
+    """freq_hz, decay_per_s, amplitude (m,) of every mode; an overdamped one has freq_hz 0 and amplitude 0.
+
+    Source: eq. 6, 7, 12.
+    """
     alpha, beta, gamma, sigma = parameters
     eigen = gamma * lambda_hat
     decay = 0.5 * (alpha + beta * eigen)
     square = eigen - decay**2
     rings = square > 0
-    return np.where(rings, np.sqrt(np.where(rings, square, 0.0)) / (2 * np.pi), 0.0), decay, np.where(rings, sigma * amplitude_hat, 0.0)
+    return (
+        np.where(rings, np.sqrt(np.where(rings, square, 0.0)) / (2 * np.pi), 0.0),
+        decay,
+        np.where(rings, sigma * amplitude_hat, 0.0),
+    )

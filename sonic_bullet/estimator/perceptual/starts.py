@@ -1,10 +1,12 @@
 """Where a search for α, β, γ, σ begins.
 
     d_i = ½(α + βλ_i),  λ_i = ω_i² + d_i²       two features make a circle: β = 2(d₁ − d₂)/(λ₁ − λ₂), α = 2d₁ − βλ₁
-    γ = λ₁/λ̂_j,  σ = a₁/|â_j|                    one mode placed on the most dominant feature           [Ren, Yeh, Lin 2013, eq. 8, section 5.3]
+    γ = λ₁/λ̂_j,  σ = a₁/|â_j|                    one mode placed on the most dominant feature
+        [Ren, Yeh, Lin 2013, eq. 8, section 5.3]
 
-The paper draws pairs from N_dominant features (its Table II counts ten pairs a mode, so five) and modes no other undoes: none of lower
-λ̂ has a larger |â|. A pair whose circle has α or β below its bound is moved to the bound, the other fitted to the stronger feature of the two.
+The paper draws pairs from N_dominant features (its Table II counts ten pairs a mode, so five) and modes no other
+undoes: none of lower λ̂ has a larger |â|. A pair whose circle has α or β below its bound is moved to the bound, the
+other fitted to the stronger feature of the two.
 """
 
 from __future__ import annotations
@@ -32,7 +34,10 @@ def by_energy(features: Features) -> Array:
 
 
 def circle(features: Features, first: int, second: int, lower: Array, upper: Array) -> tuple[float, float]:
-    """α, β of the Rayleigh circle through two features, ``first`` the stronger one, kept within bounds. Source: eq. 8."""
+    """α, β of the Rayleigh circle through two features, ``first`` the stronger one, kept within bounds.
+
+    Source: eq. 8.
+    """
     eigen, decay = feature_eigenvalues(features)[[first, second]], features.decay_per_s[[first, second]]
     beta = 2 * (decay[0] - decay[1]) / (eigen[0] - eigen[1]) if eigen[0] != eigen[1] else 0.0
     alpha = 2 * decay[0] - beta * eigen[0]

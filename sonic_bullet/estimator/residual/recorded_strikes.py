@@ -1,12 +1,16 @@
-"""Recordings and what was found of them -> the residual: what the modes leave unsaid of the features, and what the features leave of the sound.
+"""Recordings and what was found of them -> the residual: what the modes leave unsaid of the features, and what the
+features leave of the sound.
 
-    CaseFit -> Features and modes of each strike -> match ratios R_i -> lines √(1 - w_i²) φ_i, leftover -> Residual      [Ren, Yeh, Lin 2013, sec. 6.1]
+    CaseFit -> Features and modes of each strike -> match ratios R_i -> lines √(1 - w_i²) φ_i, leftover -> Residual
+        [Ren, Yeh, Lin 2013, sec. 6.1]
 
-    R(φ_i, Φ̃) = Σ_j u_ij k_ij / Σ_j u_ij,   k = 1/(1 + D²),  u_ij = w_j/(D² + δ²)²                                      [eq. 23-25; matching.py]
+    R(φ_i, Φ̃) = Σ_j u_ij k_ij / Σ_j u_ij,   k = 1/(1 + D²),  u_ij = w_j/(D² + δ²)²
+        [eq. 23-25; matching.py]
     w_i = min(R_i, √(Σ_j k_ij² a_j²)/a_i)
 
-D is stricter than in a search for the material, as frequencies have been corrected by then. What is left is to be added, so it differs in two ways more: a mode
-that rings longer than the feature leaves nothing to add (D counts Y one way only), and a feature is not represented further than the modes are loud there.
+D is stricter than in a search for the material, as frequencies have been corrected by then. What is left is to be
+added, so it differs in two ways more: a mode that rings longer than the feature leaves nothing to add (D counts Y one
+way only), and a feature is not represented further than the modes are loud there.
 """
 
 from __future__ import annotations
@@ -33,22 +37,29 @@ ALIKE = 0.02
 """A feature whose power is represented but for less than this, a tenth of a decibel, leaves nothing."""
 
 
-def match_ratios(freq_hz: Array, decay_per_s: Array, mode_hz: Array, mode_decay_per_s: Array, mode_amplitude: Array) -> tuple[Array, Array]:
+def match_ratios(
+    freq_hz: Array, decay_per_s: Array, mode_hz: Array, mode_decay_per_s: Array, mode_amplitude: Array
+) -> tuple[Array, Array]:
     """R (k,) of features (k,) beside modes (m,), and the amplitude √Σ k²a² (k,) that the modes have there."""
     if not len(mode_hz) or not len(freq_hz):
         return np.zeros(len(freq_hz)), np.zeros(len(freq_hz))
     loud = energy(mode_decay_per_s, mode_amplitude)
     per_s = PER_DURATION * float(np.average(mode_decay_per_s, weights=loud + 1e-300))
     across = PER_BARK * (bark(freq_hz)[:, None] - bark(mode_hz)[None])
-    along = np.maximum(per_s / np.maximum(decay_per_s, 1e-3)[:, None] - per_s / np.maximum(mode_decay_per_s, 1e-3)[None], 0.0)
+    along = np.maximum(
+        per_s / np.maximum(decay_per_s, 1e-3)[:, None] - per_s / np.maximum(mode_decay_per_s, 1e-3)[None], 0.0
+    )
     apart = across**2 + along**2
     score, near = 1 / (1 + apart), (loud**POWER) / (apart + NEAR**2) ** 2
     ratio = (near * score).sum(axis=1) / np.maximum(near.sum(axis=1), 1e-300)
     return ratio, np.sqrt(((score * mode_amplitude) ** 2).sum(axis=1))
 
 
-def represented_share(freq_hz: Array, decay_per_s: Array, amplitude: Array, mode_hz: Array, mode_decay_per_s: Array, mode_amplitude: Array) -> Array:
-    """Share w (k,) of each feature's amplitude that modes (m,) represent. amplitude (s, k), mode_amplitude (s, m): at s strikes, taken together by power.
+def represented_share(
+    freq_hz: Array, decay_per_s: Array, amplitude: Array, mode_hz: Array, mode_decay_per_s: Array, mode_amplitude: Array
+) -> Array:
+    """Share w (k,) of each feature's amplitude that modes (m,) represent. amplitude (s, k), mode_amplitude (s, m): at s
+    strikes, taken together by power.
 
     A strike louder than the model says and another softer are no residual: what is left is left on the average.
     """
@@ -59,9 +70,11 @@ def represented_share(freq_hz: Array, decay_per_s: Array, amplitude: Array, mode
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Strikes:
-    """s strikes of one body from the onset on, and what they leave. signals, left (s, n): recorded, beside all features.
+    """s strikes of one body from the onset on, and what they leave. signals, left (s, n): recorded, beside all
+    features.
 
-    freq_hz, decay_per_s (k,), amplitude (s, k) complex: features; share (k,): what of each the modes represent. mode_* (m,), mode_amplitude (s, m) complex.
+    freq_hz, decay_per_s (k,), amplitude (s, k) complex: features; share (k,): what of each the modes represent. mode_*
+    (m,), mode_amplitude (s, m) complex.
     """
 
     signals: Array
@@ -77,8 +90,16 @@ class Strikes:
     residual: Residual
 
 
-def strikes_of(signals: Array, left: Array, sr: int, lines: tuple[Array, Array, Array], modes: tuple[Array, Array, Array], source: str) -> Strikes:
-    """The residual of strikes (s, n) from the onset on. lines: freq_hz, decay_per_s (k,), amplitude (s, k) of the features, without which ``left`` (s, n) remains.
+def strikes_of(
+    signals: Array,
+    left: Array,
+    sr: int,
+    lines: tuple[Array, Array, Array],
+    modes: tuple[Array, Array, Array],
+    source: str,
+) -> Strikes:
+    """The residual of strikes (s, n) from the onset on. lines: freq_hz, decay_per_s (k,), amplitude (s, k) of the
+    features, without which ``left`` (s, n) remains.
 
     modes: freq_hz, decay_per_s (m,), amplitude (s, m) complex of what the model plays. Raises AudioError, RecordError.
     """
@@ -95,40 +116,66 @@ def strikes_of(signals: Array, left: Array, sr: int, lines: tuple[Array, Array, 
 
 
 def case_strikes(found: CaseFit) -> Strikes:
-    """The residual of a fitted case, of the object with the most strikes. Raises AudioError where no recording can be used."""
+    """The residual of a fitted case, of the object with the most strikes.
+
+    Raises AudioError where no recording can be used.
+    """
     observed = [o for o in found.objects if o.evidence.signals is not None and len(o.freq_hz)]
     if not observed:
-        raise AudioError(f"case {found.case.name} has no recording of a body with a mesh", "a residual is what a recording has beside its modes")
+        raise AudioError(
+            f"case {found.case.name} has no recording of a body with a mesh",
+            "a residual is what a recording has beside its modes",
+        )
     o = max(observed, key=lambda x: len(x.evidence.recordings))
     e = o.evidence
     assert e.signals is not None and e.seen is not None
     sr, n = e.sr, e.signals.shape[1]
     left = np.stack([signal - lines_sound(e.lines, i, n, sr) for i, signal in enumerate(e.signals)])
     use = o.freq_hz < sr / 2
-    measured = np.where(o.line >= 0, e.lines.amplitude[:, o.line], 0.0) if len(e.lines.freq_hz) else np.zeros((len(e.signals), len(o.line)))
+    measured = (
+        np.where(o.line >= 0, e.lines.amplitude[:, o.line], 0.0)
+        if len(e.lines.freq_hz)
+        else np.zeros((len(e.signals), len(o.line)))
+    )
     predicted = found.fit.sigma * o.pattern * e.seen.start(o.freq_hz, o.decay_per_s)
     amplitude = np.where(np.isfinite(predicted), predicted, measured)
     lines = e.lines.freq_hz, np.nan_to_num(e.lines.decay_per_s), np.nan_to_num(e.lines.amplitude)
     names = ", ".join(r.file.name for r in e.recordings if r.file is not None)
-    return strikes_of(e.signals, left, sr, lines, (o.freq_hz[use], o.decay_per_s[use], amplitude[:, use]), f"{found.case.name}: {names}"[:400])
+    return strikes_of(
+        e.signals,
+        left,
+        sr,
+        lines,
+        (o.freq_hz[use], o.decay_per_s[use], amplitude[:, use]),
+        f"{found.case.name}: {names}"[:400],
+    )
 
 
 def recording_strikes(sample: Array, sr: int, onset_s: float | None, name: str) -> Strikes:
-    """The residual of one recording (n,) whose shape is not known: its features stand in for modes. Raises AudioError."""
+    """The residual of one recording (n,) whose shape is not known: its features stand in for modes.
+
+    Raises AudioError.
+    """
     from sonic_bullet.estimator.lines.extraction import extract
 
     found = extract(sample, sr, onset_s=onset_s)
     if not len(found.freq_hz):
-        raise AudioError(f"{name} has no damped sinusoid above its noise", "record a louder strike, nearer, in a quieter place")
+        raise AudioError(
+            f"{name} has no damped sinusoid above its noise", "record a louder strike, nearer, in a quieter place"
+        )
     signal = np.asarray(sample, float)[round(found.onset_s * sr) :]
-    amplitude = found.amplitude * np.exp(1j * (found.phase_rad - np.pi / 2))  # a sin(ωt + φ) = Re a e^{i(φ - π/2)} e^{iωt}
+    # a sin(ωt + φ) = Re a e^{i(φ - π/2)} e^{iωt}
+    amplitude = found.amplitude * np.exp(1j * (found.phase_rad - np.pi / 2))
     observed = damped(found.freq_hz, found.decay_per_s, amplitude, len(signal), sr)
     modes = found.freq_hz, found.decay_per_s, amplitude[None]
     return strikes_of(signal[None], (signal - observed)[None], sr, modes, modes, name)
 
 
 def strike_modes(found: CaseFit, recording: CaseRecording, sr: int) -> tuple[Array, Array, Array]:
-    """Frequency, decay (m,) and complex amplitude (m,) that a fit predicts of any strike of its case at rate ``sr``. Raises FileError, MeshError."""
+    """Frequency, decay (m,) and complex amplitude (m,) that a fit predicts of any strike of its case at rate ``sr``.
+
+    Raises FileError, MeshError.
+    """
     from sonic_bullet.estimator.fit.object_fit import object_of
     from sonic_bullet.estimator.fit.recorded import body_family, guess_of, observed
 
@@ -137,10 +184,16 @@ def strike_modes(found: CaseFit, recording: CaseRecording, sr: int) -> tuple[Arr
     thing = found.case.objects[recording.object]
     same = next((o for o in found.objects if o.evidence.thing.name == recording.object), None)
     guess = guess_of(thing)
-    body = same.evidence.family if same is not None else body_family(found.case, thing, guess, "default", lambda _: None)
+    body = (
+        same.evidence.family if same is not None else body_family(found.case, thing, guess, "default", lambda _: None)
+    )
     if body is None:
         raise FileError(f"object '{thing.name}' has no mesh", "a prediction needs its shape")
     seen = observed(found.case, thing, guess, (recording,), body)
     made = object_of(found, thing, guess, body, seen, same)
     use = made.freq_hz < sr / 2
-    return made.freq_hz[use], made.decay_per_s[use], (found.fit.sigma * made.pattern[0] * seen.start(made.freq_hz, made.decay_per_s))[use]
+    return (
+        made.freq_hz[use],
+        made.decay_per_s[use],
+        (found.fit.sigma * made.pattern[0] * seen.start(made.freq_hz, made.decay_per_s))[use],
+    )

@@ -1,6 +1,7 @@
 """Who is in a world and where: read from PyBullet before a step, and no other numbers than numbers are handed on.
 
-getNumBodies -> the roster, kept while nobody comes or goes -> poses and twists -> Motion; whose are no numbers is muted (left_out)
+getNumBodies -> the roster, kept while nobody comes or goes -> poses and twists -> Motion; whose are no numbers is muted
+    (left_out)
 """
 
 from __future__ import annotations
@@ -24,13 +25,19 @@ def ask(client_id: int, question: Callable[..., Any]) -> Any:
     try:
         return question(physicsClientId=client_id)
     except pybullet.error as error:
-        raise SceneError(f"PyBullet client {client_id} does not answer: {error}", "detach the listener before disconnecting") from None
+        raise SceneError(
+            f"PyBullet client {client_id} does not answer: {error}", "detach the listener before disconnecting"
+        ) from None
 
 
 class Census:
-    """State of that for one client. on_roster is told each new roster, on_mute the bodies that are left out from now on."""
+    """State of that for one client. on_roster is told each new roster, on_mute the bodies that are left out from now
+    on.
+    """
 
-    def __init__(self, client_id: int, on_roster: Callable[[Roster], None], on_mute: Callable[[Collection[int]], None]) -> None:
+    def __init__(
+        self, client_id: int, on_roster: Callable[[Roster], None], on_mute: Callable[[Collection[int]], None]
+    ) -> None:
         self._client_id = client_id
         self._roster: Roster | None = None
         self._on_roster, self._on_mute = on_roster, on_mute

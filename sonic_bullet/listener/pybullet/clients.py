@@ -18,7 +18,10 @@ from sonic_bullet.records.errors import MeshError, SceneError
 
 
 def direct_client() -> BulletClient:
-    """A fresh PyBullet world without a window, connected without a word on stdout. Raises SceneError where PyBullet gives no more."""
+    """A fresh PyBullet world without a window, connected without a word on stdout.
+
+    Raises SceneError where PyBullet gives no more.
+    """
     with quiet_stdout():
         client = BulletClient(pybullet.DIRECT)
     if client._client < 0:
@@ -27,17 +30,26 @@ def direct_client() -> BulletClient:
 
 
 def disconnect(client: BulletClient) -> None:
-    """End a client; one that has ended already is left alone. Its id is cleared, for BulletClient's finaliser would end whoever has it next."""
+    """End a client; one that has ended already is left alone.
+
+    Its id is cleared, for BulletClient's finaliser would end whoever has it next.
+    """
     client_id, client._client = client._client, -1
     if client_id >= 0 and pybullet.isConnected(client_id):
         pybullet.disconnect(client_id)
 
 
 def links_with_shapes(client_id: int, body: int | None = None) -> tuple[tuple[int, int], ...]:
-    """(body, link) of every link, or those of one body, that has a collision shape; soft bodies have none that could sound."""
+    """(body, link) of every link, or those of one body, that has a collision shape; soft bodies have none that could
+    sound.
+    """
     ask: Any = pybullet
     cid = client_id
-    bodies = [ask.getBodyUniqueId(i, physicsClientId=cid) for i in range(ask.getNumBodies(physicsClientId=cid))] if body is None else [body]
+    bodies = (
+        [ask.getBodyUniqueId(i, physicsClientId=cid) for i in range(ask.getNumBodies(physicsClientId=cid))]
+        if body is None
+        else [body]
+    )
     return tuple(
         (one, link)
         for one in bodies
@@ -48,9 +60,12 @@ def links_with_shapes(client_id: int, body: int | None = None) -> tuple[tuple[in
 
 
 def links_called(world: PyBulletWorld, body: Any, link: Any) -> tuple[int, tuple[int, ...]]:
-    """The body's id and its links of that number or name; "all": every link that has a collision shape. All have a mass and an inertia that are some.
+    """The body's id and its links of that number or name; "all": every link that has a collision shape.
 
-    Raises SceneError (no such body or link, a soft body, an absurd mass, a pose that is no number), and MeshError where "all" are none.
+    All have a mass and an inertia that are some.
+
+    Raises SceneError (no such body or link, a soft body, an absurd mass, a pose that is no number), and MeshError where
+    "all" are none.
     """
     cid = world.client_id
     check_connected(cid)
@@ -60,7 +75,10 @@ def links_called(world: PyBulletWorld, body: Any, link: Any) -> tuple[int, tuple
     if isinstance(link, str) and link == "all":
         links = tuple(one for _, one in links_with_shapes(cid, number))
         if not links:
-            raise MeshError(f"link is 'all', but no link of body {number} has a collision shape", "give it one, or add a link with mesh=")
+            raise MeshError(
+                f"link is 'all', but no link of body {number} has a collision shape",
+                "give it one, or add a link with mesh=",
+            )
     elif isinstance(link, str):
         links = (_link_named(cid, number, link),)
     else:
@@ -75,12 +93,17 @@ def _link_named(client_id: int, body: int, name: str) -> int:
     """The link of that name, by PyBullet; the base has one too. Raises SceneError listing the nearest names."""
     names = facts.link_names(client_id, body)
     if name not in names:
-        raise SceneError(f"link is {shown(name)}, and body {body} has none of that name", nearest(name, names, ', or "all"'))
+        raise SceneError(
+            f"link is {shown(name)}, and body {body} has none of that name", nearest(name, names, ', or "all"')
+        )
     return names.index(name) - 1
 
 
 def client_id_of(client: Any) -> int:
-    """The client id of a BulletClient, the pybullet module (its default client 0) or an id. Raises SceneError where nothing is connected."""
+    """The client id of a BulletClient, the pybullet module (its default client 0) or an id.
+
+    Raises SceneError where nothing is connected.
+    """
     if client is pybullet:
         client_id = 0
     elif isinstance(client, numbers.Integral) and not isinstance(client, bool):
@@ -94,5 +117,8 @@ def client_id_of(client: Any) -> int:
 
 
 def open_world(client: Any) -> PyBulletWorld:
-    """Listen to a BulletClient, the pybullet module (its client 0) or a client id. Raises SceneError where nothing is connected there."""
+    """Listen to a BulletClient, the pybullet module (its client 0) or a client id.
+
+    Raises SceneError where nothing is connected there.
+    """
     return PyBulletWorld(client, client_id_of(client))

@@ -1,11 +1,13 @@
 """Geometry of a link in its body frame (centre of mass, axes of getBasePositionAndOrientation).
 
-    getCollisionShapeData[5, 6]   placement of a shape, body frame (measured: also through an inertial frame that is turned)
+    getCollisionShapeData[5, 6]
+        placement of a shape, body frame (measured: also through an inertial frame that is turned)
     getMeshData                   vertices in the body frame, of a hull only; "?" and nothing for a triangle mesh
 
-Bullet collides with the convex hull of a mesh; the sound wants the surface itself. So for a mesh: the file named by the shape; or the
-visual mesh where it fills the same space (createMultiBody forgets the collision file's name); or the hull's vertices.
-URDF cylinders collide as hulls of 32-gons without a name: they are recognised and given back as cylinders.
+Bullet collides with the convex hull of a mesh; the sound wants the surface itself. So for a mesh: the file named by the
+shape; or the visual mesh where it fills the same space (createMultiBody forgets the collision file's name); or the
+hull's vertices. URDF cylinders collide as hulls of 32-gons without a name: they are recognised and given back as
+cylinders.
 """
 
 from __future__ import annotations
@@ -27,10 +29,16 @@ SAME_SPACE = 0.1
 
 
 def shapes_of(client_id: int, body: int, link: int) -> tuple[Shape, ...]:
-    """All pieces of a link's collision geometry. The link must exist. Raises MeshError where there are none or PyBullet keeps them to itself."""
+    """All pieces of a link's collision geometry.
+
+    The link must exist. Raises MeshError where there are none or PyBullet keeps them to itself.
+    """
     pieces = collision_pieces(client_id, body, link)
     if not pieces:
-        raise MeshError(f"body {body}{link_words(link)} has no collision shape, or one that PyBullet does not describe", "add another link, or pass mesh=")
+        raise MeshError(
+            f"body {body}{link_words(link)} has no collision shape, or one that PyBullet does not describe",
+            "add another link, or pass mesh=",
+        )
     shapes: list[Shape] = []
     filed: set[Piece] = set()
     hulls: list[tuple[Piece, Array]] = []
@@ -50,14 +58,22 @@ def _file(piece: Piece) -> Path | None:
 
 
 def primitive(piece: Piece, where: str) -> Shape:
-    """A sphere, box, capsule, cylinder or plane as getCollisionShapeData tells it. Raises MeshError for another kind."""
+    """A sphere, box, capsule, cylinder or plane as getCollisionShapeData tells it.
+
+    Raises MeshError for another kind.
+    """
     kind, size, _, position, quaternion = piece
     if kind == pybullet.GEOM_SPHERE:
         return Shape("sphere", np.array([size[0], 0, 0]), position, quaternion)
     if kind == pybullet.GEOM_BOX:
         return Shape("box", size, position, quaternion)
     if kind in (pybullet.GEOM_CAPSULE, pybullet.GEOM_CYLINDER):
-        return Shape("capsule" if kind == pybullet.GEOM_CAPSULE else "cylinder", np.array([size[1], size[0], 0]), position, quaternion)
+        return Shape(
+            "capsule" if kind == pybullet.GEOM_CAPSULE else "cylinder",
+            np.array([size[1], size[0], 0]),
+            position,
+            quaternion,
+        )
     if kind == pybullet.GEOM_PLANE:
         return Shape("plane", position_m=position, quaternion_xyzw=_up_to(np.array(size)))
     raise MeshError(f"{where} has a collision shape of unknown kind {kind}", "pass mesh=")
@@ -100,7 +116,9 @@ def hull_vertices(client_id: int, body: int, link: int, index: int) -> Array:
 
 
 def _unfiled(client_id: int, body: int, link: int, hulls: list[tuple[Piece, Array]]) -> tuple[Shape, ...]:
-    """Meshes whose file PyBullet forgot: cylinders by their vertices, else the visual mesh of the same extent, else hulls."""
+    """Meshes whose file PyBullet forgot: cylinders by their vertices, else the visual mesh of the same extent, else
+    hulls.
+    """
     if not hulls:
         return ()
     cylinders = [_as_cylinder(piece, vertices) for piece, vertices in hulls]
@@ -116,13 +134,19 @@ def _unfiled(client_id: int, body: int, link: int, hulls: list[tuple[Piece, Arra
         return (*found, *(outward(*hull(vertices)) for vertices in rest))
     if visual is not None:
         return (*found, outward(*visual))
-    raise MeshError(f"body {body}{link_words(link)} is a triangle mesh that PyBullet does not give back", "load it from a file, or pass mesh=")
+    raise MeshError(
+        f"body {body}{link_words(link)} is a triangle mesh that PyBullet does not give back",
+        "load it from a file, or pass mesh=",
+    )
 
 
 def _same_space(one: Array, other: Array) -> bool:
     """Whether two point sets have the same bounding box within a tenth of its diagonal."""
     size = np.linalg.norm(np.ptp(other, axis=0))
-    return bool(np.abs(one.min(0) - other.min(0)).max() < SAME_SPACE * size and np.abs(one.max(0) - other.max(0)).max() < SAME_SPACE * size)
+    return bool(
+        np.abs(one.min(0) - other.min(0)).max() < SAME_SPACE * size
+        and np.abs(one.max(0) - other.max(0)).max() < SAME_SPACE * size
+    )
 
 
 def _as_cylinder(piece: Piece, vertices: Array) -> Shape | None:

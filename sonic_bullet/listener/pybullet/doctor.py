@@ -1,8 +1,9 @@
 """Settings of a PyBullet world that spoil its sound, and how to mend them.
 
-Nothing here is a guess about taste: each finding names what was measured to go wrong. What PyBullet does not tell is left out:
-contactProcessingThreshold can be set but not read, so `keep_restitution` leaves a mark (user data) beside it, and
-damping and activation states cannot be read at all (sleep is recognised by bodies that bear load and stand exactly still).
+Nothing here is a guess about taste: each finding names what was measured to go wrong. What PyBullet does not tell is
+left out: contactProcessingThreshold can be set but not read, so `keep_restitution` leaves a mark (user data) beside it,
+and damping and activation states cannot be read at all (sleep is recognised by bodies that bear load and stand exactly
+still).
 """
 
 from __future__ import annotations
@@ -36,7 +37,10 @@ Severity = Literal["error", "warning", "info"]
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """id: of the kind. severity: "error" (no sound), "warning" (wrong sound), "info". what is so, and its remedy: one line each."""
+    """id: of the kind.
+
+    severity: "error" (no sound), "warning" (wrong sound), "info". what is so, and its remedy: one line each.
+    """
 
     id: str
     severity: Severity
@@ -47,8 +51,8 @@ class Finding:
 def keep_restitution(client: Any) -> int:
     """Let small steps bounce: contactProcessingThreshold = 0 on every link of every body loaded so far; how many links.
 
-    With the default, restitution 0.5 gives rebounds of 0.36–0.57 at 1/240 s and 0.000 at 1/4000 s; with 0, 0.51–0.59 at both
-    (bullet3 issues 3094, 1530, 4341). Call it after loading. Raises SceneError for a client that is not connected.
+    With the default, restitution 0.5 gives rebounds of 0.36–0.57 at 1/240 s and 0.000 at 1/4000 s; with 0, 0.51–0.59 at
+    both (bullet3 issues 3094, 1530, 4341). Call it after loading. Raises SceneError for a client that is not connected.
     """
     client_id = client_id_of(client)
     links = _links(client_id)
@@ -65,13 +69,18 @@ def _links(client_id: int) -> list[tuple[int, int]]:
 def diagnose_world(world: PyBulletWorld | Any, steps: int = 0) -> tuple[Finding, ...]:
     """What in a world would spoil its sound. world: a PyBulletWorld, or what `open_world` takes.
 
-    steps: physics steps to look ahead, undone afterwards (saveState); 0 takes the world as it stands. Raises SceneError where
-    the client is not connected.
+    steps: physics steps to look ahead, undone afterwards (saveState); 0 takes the world as it stands. Raises SceneError
+    where the client is not connected.
     """
     client_id = world.client_id if isinstance(world, PyBulletWorld) else client_id_of(world)
     findings = [*_settings(client_id), *_empty(client_id), *_masses(client_id)]
     if not any(finding.severity == "error" for finding in findings):
-        findings += [*_restitution(client_id), *_lids(client_id), *_scale(client_id, _sounding(world)), *_ahead(client_id, steps)]
+        findings += [
+            *_restitution(client_id),
+            *_lids(client_id),
+            *_scale(client_id, _sounding(world)),
+            *_ahead(client_id, steps),
+        ]
         if isinstance(world, PyBulletWorld):
             findings += [*_densities(world), *_oversized(world)]
     return tuple(findings)
@@ -114,10 +123,24 @@ def _empty(client_id: int) -> list[Finding]:
     """A world in which nothing can touch."""
     links = _links(client_id)
     if not links:
-        return [Finding("no-body", "error", "there is no body in this world", "load some before stepping, into the client that steps")]
+        return [
+            Finding(
+                "no-body",
+                "error",
+                "there is no body in this world",
+                "load some before stepping, into the client that steps",
+            )
+        ]
     if not any(collision_pieces(client_id, *link) for link in links):
         what = f"no link of the {len({body for body, _ in links})} bodies has a collision shape that PyBullet describes: nothing can touch"
-        return [Finding("no-shape", "error", what, "give bodies collision shapes: createCollisionShape, or <collision> in their URDF")]
+        return [
+            Finding(
+                "no-shape",
+                "error",
+                what,
+                "give bodies collision shapes: createCollisionShape, or <collision> in their URDF",
+            )
+        ]
     return []
 
 
@@ -137,9 +160,17 @@ def _masses(client_id: int) -> list[Finding]:
 def _restitution(client_id: int) -> list[Finding]:
     links = _links(client_id)
     bouncy = {entry: pybullet.getDynamicsInfo(*entry, physicsClientId=client_id)[5] for entry in links}
-    movable = [(body, link) for body, link in links if pybullet.getDynamicsInfo(body, link, physicsClientId=client_id)[0] > 0]
+    movable = [
+        (body, link) for body, link in links if pybullet.getDynamicsInfo(body, link, physicsClientId=client_id)[0] > 0
+    ]
     springy = {body for (body, _), value in bouncy.items() if value > 0}
-    lost = [e for e in movable if bouncy[e] > 0 and springy - {e[0]} and pybullet.getUserDataId(e[0], KEPT, e[1], physicsClientId=client_id) < 0]
+    lost = [
+        e
+        for e in movable
+        if bouncy[e] > 0
+        and springy - {e[0]}
+        and pybullet.getUserDataId(e[0], KEPT, e[1], physicsClientId=client_id) < 0
+    ]
     if not lost:
         return []
     dt = pybullet.getPhysicsEngineParameters(physicsClientId=client_id)["fixedTimeStep"]
@@ -160,7 +191,9 @@ def _names(client_id: int, links: list[tuple[int, int]]) -> str:
 
 
 def _lids(client_id: int) -> list[Finding]:
-    """Moving meshes whose hull closes what is open: judged object by object, as Bullet makes a hull of each object of a file."""
+    """Moving meshes whose hull closes what is open: judged object by object, as Bullet makes a hull of each object of a
+    file.
+    """
     found = []
     for body, link in _links(client_id):
         if pybullet.getDynamicsInfo(body, link, physicsClientId=client_id)[0] == 0:
@@ -199,13 +232,19 @@ def _hulled(client_id: int, body: int, link: int) -> list[MeshSurface]:
 
 def _sounding(world: PyBulletWorld | Any) -> set[tuple[int, int]]:
     """Links that sound, whose size `_oversized` looks at."""
-    return {(body.body_id, body.link) for body in world.bodies if body.model is not None} if isinstance(world, PyBulletWorld) else set()
+    return (
+        {(body.body_id, body.link) for body in world.bodies if body.model is not None}
+        if isinstance(world, PyBulletWorld)
+        else set()
+    )
 
 
 def _scale(client_id: int, sounding: set[tuple[int, int]]) -> list[Finding]:
     found = []
     for body, link in _links(client_id):
-        if pybullet.getDynamicsInfo(body, link, physicsClientId=client_id)[0] == 0 or not collision_pieces(client_id, body, link):
+        if pybullet.getDynamicsInfo(body, link, physicsClientId=client_id)[0] == 0 or not collision_pieces(
+            client_id, body, link
+        ):
             continue
         low, high = np.array(pybullet.getAABB(body, link, physicsClientId=client_id))
         size = float((high - low).max())
@@ -240,11 +279,16 @@ def _ahead(client_id: int, steps: int) -> list[Finding]:
 
 
 def _sleepers(client_id: int) -> list[Finding]:
-    loaded = {raw[side] for raw in pybullet.getContactPoints(physicsClientId=client_id) if raw[FORCE] > 0 for side in (1, 2)}
+    loaded = {
+        raw[side] for raw in pybullet.getContactPoints(physicsClientId=client_id) if raw[FORCE] > 0 for side in (1, 2)
+    }
     asleep = [
         (body, -1)
         for body, joints, fixed in read_roster(client_id).bodies
-        if body in loaded and joints == 0 and not fixed and not np.any(pybullet.getBaseVelocity(body, physicsClientId=client_id))
+        if body in loaded
+        and joints == 0
+        and not fixed
+        and not np.any(pybullet.getBaseVelocity(body, physicsClientId=client_id))
     ]
     if not asleep:
         return []
@@ -260,7 +304,11 @@ def _sleepers(client_id: int) -> list[Finding]:
 
 def _oversized(world: PyBulletWorld) -> list[Finding]:
     """Bodies that sound, and are larger than anything that is struck to: planes and terrains among them."""
-    large = [(body, oversize(body.model.vertex_m, body.model.mass_kg)) for body in world.bodies if body.model is not None and body.until_step < 0]
+    large = [
+        (body, oversize(body.model.vertex_m, body.model.mass_kg))
+        for body in world.bodies
+        if body.model is not None and body.until_step < 0
+    ]
     return [
         Finding(
             "scale",
@@ -278,7 +326,11 @@ def _densities(world: PyBulletWorld) -> list[Finding]:
     for body in world.bodies:
         if body.material is None or body.until_step >= 0 or body.mass_kg == 0:
             continue
-        expected = body.model.mass_kg if body.model is not None and body.model.mass_kg > 0 else body.material.density_kg_m3 * body.volume_m3
+        expected = (
+            body.model.mass_kg
+            if body.model is not None and body.model.mass_kg > 0
+            else body.material.density_kg_m3 * body.volume_m3
+        )
         if expected > 0 and not 1 / DENSITY_RATIO <= body.mass_kg / expected <= DENSITY_RATIO:
             found.append(
                 Finding(

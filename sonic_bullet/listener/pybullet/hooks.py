@@ -4,8 +4,9 @@ BulletClient forwards unknown attributes to the module, so a function set on the
 stepSimulation of this client is caught, those hidden in a gym environment's step too, and no other client notices.
 `disconnect` must never be looked up on it: the look-up alone clears its client id.
 
-A client has one set of hooks however many listen (`Hooks`): the first to come puts it in place and the last to go takes it away, in whatever
-order they go. Nothing here holds the client: dropped, it disconnects at once and does not wait for the garbage collector.
+A client has one set of hooks however many listen (`Hooks`): the first to come puts it in place and the last to go takes
+it away, in whatever order they go. Nothing here holds the client: dropped, it disconnects at once and does not wait for
+the garbage collector.
 """
 
 from __future__ import annotations
@@ -19,7 +20,12 @@ import pybullet
 
 from sonic_bullet.records.errors import SceneError
 
-POSE_SETTERS = ("resetBasePositionAndOrientation", "resetJointState", "resetJointStateMultiDof", "resetJointStatesMultiDof")
+POSE_SETTERS = (
+    "resetBasePositionAndOrientation",
+    "resetJointState",
+    "resetJointStateMultiDof",
+    "resetJointStatesMultiDof",
+)
 BODY_KEYWORDS = ("bodyUniqueId", "objectUniqueId", "multiBodyUniqueId")
 
 
@@ -52,7 +58,10 @@ def body_argument(args: tuple[Any, ...], kwargs: dict[str, Any]) -> int:
 
 
 class Hooks:
-    """The functions put in place of a client's own, and all who listen to them. Once nobody does, they only pass calls on."""
+    """The functions put in place of a client's own, and all who listen to them.
+
+    Once nobody does, they only pass calls on.
+    """
 
     def __init__(self, client: Any, client_id: int) -> None:
         self._client = weakref.ref(client)
@@ -76,7 +85,9 @@ class Hooks:
         return found if isinstance(found, Hooks) and found._in_place(client) else cls(client, client_id)
 
     def leave(self, one: Listening) -> None:
-        """Tell one no more; with the last the client's own functions come back, except under those that someone else put over ours."""
+        """Tell one no more; with the last the client's own functions come back, except under those that someone else
+        put over ours.
+        """
         if one in self.listening:
             self.listening.remove(one)
         client = self._client()
@@ -128,11 +139,15 @@ class Hooks:
 
 
 def install(world: Watcher, before: Callable[[], object], after: Callable[[], object]) -> Callable[[], None]:
-    """Hook the world's client; a function that ends that. Raises SceneError where the client is no instance of a wrapper."""
+    """Hook the world's client; a function that ends that.
+
+    Raises SceneError where the client is no instance of a wrapper.
+    """
     client = world.client
     if client is None or isinstance(client, (int, type(pybullet))):
         raise SceneError(
-            "the pybullet module itself cannot be hooked", "call listener.step() after each stepSimulation, or use pybullet_utils.bullet_client.BulletClient"
+            "the pybullet module itself cannot be hooked",
+            "call listener.step() after each stepSimulation, or use pybullet_utils.bullet_client.BulletClient",
         )
     hooks, one = Hooks.of(client, world.client_id), Listening(world, before, after)
     hooks.listening.append(one)

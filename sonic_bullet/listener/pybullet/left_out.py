@@ -1,8 +1,13 @@
 """Who in a world is left out of the sound, and why; each is named once, as a warning and as a note.
 
-muted   a body whose pose, speed, mass or inertia ceased to be a number: its record ends, its contacts are dropped, what rings of it rings out.
-        It stays mute until it is removed or added anew, even where its numbers come back: what it is then, nobody has said.
-soft    a soft body: PyBullet tells neither its mass nor its speed (what it answers is memory that nobody wrote), so it neither sounds nor strikes.
+muted
+    a body whose pose, speed, mass or inertia ceased to be a number: its record ends, its contacts are dropped, what
+    rings of it rings out.
+        It stays mute until it is removed or added anew, even where its numbers come back: what it is then, nobody has
+            said.
+soft
+    a soft body: PyBullet tells neither its mass nor its speed (what it answers is memory that nobody wrote), so it
+    neither sounds nor strikes.
 A contact whose force or place is not a number is dropped, and its pair named once.
 """
 
@@ -32,14 +37,20 @@ class BodiesLeftOut:
         """Leave bodies, with their names, out from now on. what: they have that is wrong."""
         self.muted.update(bodies)
         who = ", ".join(f"{body} ({name})" for body, name in bodies.items())
-        subject, be, them = (f"body {who} has", "it is", "it") if len(bodies) == 1 else (f"bodies {who} have", "they are", "them")
-        self._say(f"{subject} {what}: {be} mute until removed or added anew; check mass, inertia and what touches {them}")
+        subject, be, them = (
+            (f"body {who} has", "it is", "it") if len(bodies) == 1 else (f"bodies {who} have", "they are", "them")
+        )
+        self._say(
+            f"{subject} {what}: {be} mute until removed or added anew; check mass, inertia and what touches {them}"
+        )
 
     def meet_soft(self, soft: Mapping[int, str]) -> None:
         """Note the soft bodies of the world, by id and name."""
         for body, name in soft.items():
             if body not in self.soft:
-                self._say(f"body {body} ({name}) is soft: PyBullet tells neither its mass nor its speed, so it neither sounds nor strikes")
+                self._say(
+                    f"body {body} ({name}) is soft: PyBullet tells neither its mass nor its speed, so it neither sounds nor strikes"
+                )
         self.soft = set(soft)
 
     def forget(self, body: int | None) -> None:

@@ -24,13 +24,17 @@ def check_connected(client_id: int) -> None:
     """Raise SceneError unless a physics server answers under this client id."""
     if not 0 <= client_id < 2**31 or not pybullet.getConnectionInfo(physicsClientId=client_id)["isConnected"]:
         raise SceneError(
-            f"PyBullet client {shown(client_id)} is not connected", "connect first, e.g. BulletClient(pybullet.DIRECT), and attach before disconnecting"
+            f"PyBullet client {shown(client_id)} is not connected",
+            "connect first, e.g. BulletClient(pybullet.DIRECT), and attach before disconnecting",
         )
 
 
 def body_ids(client_id: int) -> list[int]:
     """Ids of all bodies in the world, ascending."""
-    return sorted(pybullet.getBodyUniqueId(i, physicsClientId=client_id) for i in range(pybullet.getNumBodies(physicsClientId=client_id)))
+    return sorted(
+        pybullet.getBodyUniqueId(i, physicsClientId=client_id)
+        for i in range(pybullet.getNumBodies(physicsClientId=client_id))
+    )
 
 
 def is_soft(client_id: int, body: int) -> bool:
@@ -61,13 +65,17 @@ def read_roster(client_id: int, leave_out: Collection[int] = ()) -> Roster:
 
 
 def read_motion(client_id: int, roster: Roster) -> Motion:
-    """Poses and twists now, numbers or not (`Motion.broken`). Raises pybullet.error where a body of the roster is gone or has other links."""
+    """Poses and twists now, numbers or not (`Motion.broken`).
+
+    Raises pybullet.error where a body of the roster is gone or has other links.
+    """
     still = (0.0, 0.0, 0.0)
     pose, twist, links = pybullet.getBasePositionAndOrientation, pybullet.getBaseVelocity, pybullet.getLinkStates
     count = pybullet.getNumJoints
     flat: list[tuple[float, ...]] = []
     for body, joints, fixed in roster.bodies:
-        if count(body, client_id) != joints:  # another body has taken over the id: asking for a link that is not there would end the process
+        # another body has taken over the id: asking for a link that is not there would end the process
+        if count(body, client_id) != joints:
             raise pybullet.error(f"body {body} has other links than before")
         flat.extend(pose(body, client_id))
         if fixed:
@@ -76,9 +84,15 @@ def read_motion(client_id: int, roster: Roster) -> Motion:
         else:
             flat.extend(twist(body, client_id))
         if joints:
-            for state in links(body, range(joints), computeLinkVelocity=1, computeForwardKinematics=1, physicsClientId=client_id):
+            for state in links(
+                body, range(joints), computeLinkVelocity=1, computeForwardKinematics=1, physicsClientId=client_id
+            ):
                 flat.extend((state[0], state[1], state[6], state[7]))
     table = np.fromiter(chain.from_iterable(flat), float, 13 * len(roster.code)).reshape(-1, 13)
     wild = ~(np.abs(table) < BEYOND)
     broken = tuple(int(body) for body in np.unique(roster.code[wild.any(axis=1)] // LINK_SPAN)) if wild.any() else ()
-    return Motion(roster, *(np.ascontiguousarray(part) for part in (table[:, 0:3], table[:, 3:7], table[:, 7:10], table[:, 10:13])), broken=broken)
+    return Motion(
+        roster,
+        *(np.ascontiguousarray(part) for part in (table[:, 0:3], table[:, 3:7], table[:, 7:10], table[:, 10:13])),
+        broken=broken,
+    )

@@ -4,11 +4,11 @@
     stepSimulation
     after_step():   contacts, asked for once -> rows in body frames -> Step
 
-Contact positions belong to the pose at the start of the step, so that is the pose all rows use. No row is made of: pairs
-without force; islands asleep (speeds exactly 0, contacts bit-identical to the step before); a second poll without a step between
-(everything bit-identical); a body moved by hand since the last step; and the first step of a body that began its life
-inside another, for then the position correction leaks into the impulse; and whoever `left_out` names: one body whose numbers break
-takes nothing from the sound of the others.
+Contact positions belong to the pose at the start of the step, so that is the pose all rows use. No row is made of:
+pairs without force; islands asleep (speeds exactly 0, contacts bit-identical to the step before); a second poll without
+a step between (everything bit-identical); a body moved by hand since the last step; and the first step of a body that
+began its life inside another, for then the position correction leaks into the impulse; and whoever `left_out` names:
+one body whose numbers break takes nothing from the sound of the others.
 """
 
 from __future__ import annotations
@@ -44,10 +44,14 @@ from sonic_bullet.records.errors import SceneError
 
 
 class PyBulletWorld(World):
-    """State of listening to one client: who lives, what was last seen, what is remembered of contacts. Made by open_world."""
+    """State of listening to one client: who lives, what was last seen, what is remembered of contacts.
+
+    Made by open_world.
+    """
 
     def __init__(self, client: Any, client_id: int) -> None:
-        self._client = weakref.ref(client) if hasattr(client, "__weakref__") else lambda: client  # a client that is dropped is to disconnect
+        # a client that is dropped is to disconnect
+        self._client = weakref.ref(client) if hasattr(client, "__weakref__") else lambda: client
         self.client_id = client_id
         self.epoch = 0
         self.step_count = 0
@@ -132,9 +136,9 @@ class PyBulletWorld(World):
         """Make a link known, with what it is made of; its record, which `bodies` holds from now on.
 
         A record that exists already (a silent partner, or an earlier add) ends with this step and a new one begins.
-        volume_m3 None: the model's volume, or 0. shapes: its true geometry where that is not its collision shape; a lone sphere
-        tells its curvature. A body that was muted is listened to again. Raises SceneError for an unknown body or link, a soft body, or
-        a mass, pose or speed that is not one.
+        volume_m3 None: the model's volume, or 0. shapes: its true geometry where that is not its collision shape; a
+        lone sphere tells its curvature. A body that was muted is listened to again. Raises SceneError for an unknown
+        body or link, a soft body, or a mass, pose or speed that is not one.
         """
         check_connected(self.client_id)
         facts.check_exists(self.client_id, body, link)
@@ -145,7 +149,14 @@ class PyBulletWorld(World):
         self._census.read()
         record = facts.describe(self.client_id, body, link, self.epoch)
         volume = volume_m3 if volume_m3 is not None else (model.volume_m3 if model else 0.0)
-        record = replace(record, material=material, model=model, volume_m3=volume, since_step=self.step_count, name=name or record.name)
+        record = replace(
+            record,
+            material=material,
+            model=model,
+            volume_m3=volume,
+            since_step=self.step_count,
+            name=name or record.name,
+        )
         if shapes:
             alone = shapes[0] if len(shapes) == 1 and shapes[0].kind == "sphere" else None
             record = replace(record, curvature_per_m=1 / float(alone.size_m[0]) if alone is not None else float("nan"))
@@ -167,7 +178,10 @@ class PyBulletWorld(World):
         return shapes.shapes_of(self.client_id, body, link)
 
     def forget(self, body: int | None = None) -> None:
-        """Say that a body was removed (None: all, by resetSimulation); its id may be given anew. With a hook, nobody need call this."""
+        """Say that a body was removed (None:
+
+        all, by resetSimulation); its id may be given anew. With a hook, nobody need call this.
+        """
         self.epoch += 1
         self.left_out.forget(body)
         self._close([code for code in self._live if body is None or code // LINK_SPAN == body])
@@ -178,7 +192,12 @@ class PyBulletWorld(World):
         keep = np.flatnonzero(past.code // LINK_SPAN != body) if body is not None else np.zeros(0, int)
         self._past = taken(
             self._past,
-            replace(past, bodies=tuple(e for e in past.bodies if e[0] != body and body is not None), code=past.code[keep], static=past.static[keep]),
+            replace(
+                past,
+                bodies=tuple(e for e in past.bodies if e[0] != body and body is not None),
+                code=past.code[keep],
+                static=past.static[keep],
+            ),
             keep,
         )
         self._moved = {x for x in self._moved if body is not None and x != body}
@@ -218,11 +237,13 @@ class PyBulletWorld(World):
         self._before = self._census.read()
 
     def after_step(self) -> Step:
-        """This step's record. Call once after each stepSimulation; a second call without a step between finds no contacts.
+        """This step's record.
 
-        `stepped` tells whether there was a step. Without a hook, a missing one is known by a world in motion that stands where it
-        stood, to the bit; where nothing moves at all, a second call passes for a step.
-        Raises SceneError: lost connection, sub-steps that cannot be heard.
+        Call once after each stepSimulation; a second call without a step between finds no contacts.
+
+        `stepped` tells whether there was a step. Without a hook, a missing one is known by a world in motion that
+        stands where it stood, to the bit; where nothing moves at all, a second call passes for a step. Raises
+        SceneError: lost connection, sub-steps that cannot be heard.
         """
         dt, substeps = self._step_length()
         self.stepped = self._uninstall is None or self._before is not None
@@ -240,12 +261,16 @@ class PyBulletWorld(World):
                 self.stepped = False
                 return self._again(dt)
             self._expose_impostors(now, dt)
-            start = polled_start(self._past, now, touches, dt, undo=partial(undone, client_id=self.client_id), first=first)
+            start = polled_start(
+                self._past, now, touches, dt, undo=partial(undone, client_id=self.client_id), first=first
+            )
         self._past_touches, self._past, self._before = touches, now, None
         meeting = meetings(touches, past_touches, start, dt)
         of_row = self._of_row(now.roster, meeting)
         meeting = meeting.kept((of_row[meeting.row_a] >= 0) & (of_row[meeting.row_b] >= 0))
-        contacts, self._traces = contact_rows(meeting, of_row[meeting.row_a], of_row[meeting.row_b], start.motion, self._time_s, self._traces)
+        contacts, self._traces = contact_rows(
+            meeting, of_row[meeting.row_a], of_row[meeting.row_b], start.motion, self._time_s, self._traces
+        )
         step = self._step(dt, start, of_row, contacts)
         self._moved.clear()
         self._time_s += dt
@@ -254,7 +279,14 @@ class PyBulletWorld(World):
 
     def _again(self, dt: float) -> Step:
         """A step in which nothing happens."""
-        return Step(dt, self._position_m, self._quaternion_xyzw, np.zeros(len(self._bodies), bool), Contacts.none(), self._gravity_m_s2)
+        return Step(
+            dt,
+            self._position_m,
+            self._quaternion_xyzw,
+            np.zeros(len(self._bodies), bool),
+            Contacts.none(),
+            self._gravity_m_s2,
+        )
 
     def _step(self, dt: float, start: Start, of_row: Array, contacts: Contacts) -> Step:
         row = np.flatnonzero(of_row >= 0)
@@ -276,7 +308,8 @@ class PyBulletWorld(World):
         if not self._log.is_open:
             self._log.open()
             raise SceneError(
-                f"numSubSteps was set to {substeps} after listening began", "set it before attaching, or attach to a BulletClient, whose steps are hooked"
+                f"numSubSteps was set to {substeps} after listening began",
+                "set it before attaching, or attach to a BulletClient, whose steps are hooked",
             )
         touches, self._log.count = gather_substeps(self._log.records(), last, dt, substeps, self._log.count)
         return touches
@@ -312,7 +345,9 @@ class PyBulletWorld(World):
                     self._close([int(code)])
 
     def _of_row(self, roster: Roster, meeting: Meetings) -> Array:
-        """(n,) index into `bodies` of each row of the roster, -1 for who never met anybody; who meets the first time gets a silent record."""
+        """(n,) index into `bodies` of each row of the roster, -1 for who never met anybody; who meets the first time
+        gets a silent record.
+        """
         of_row = self._index_of_row(roster)
         met = np.unique(np.concatenate([meeting.row_a, meeting.row_b]))
         strangers = met[of_row[met] < 0]
@@ -333,7 +368,11 @@ class PyBulletWorld(World):
         self._rows_known = None
         self._bodies.append(record)
         row = rows_of(self._past.roster, np.array([code]))[0]
-        pose = (self._past.position_m[row], self._past.quaternion_xyzw[row]) if row >= 0 else (np.zeros(3), np.array([0, 0, 0, 1.0]))
+        pose = (
+            (self._past.position_m[row], self._past.quaternion_xyzw[row])
+            if row >= 0
+            else (np.zeros(3), np.array([0, 0, 0, 1.0]))
+        )
         self._position_m = np.concatenate([self._position_m, pose[0][None]])
         self._quaternion_xyzw = np.concatenate([self._quaternion_xyzw, pose[1][None]])
 

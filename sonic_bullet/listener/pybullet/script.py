@@ -1,8 +1,8 @@
 """Run an ordinary PyBullet script as it stands, with ears and without a window.
 
-While it runs, pybullet.connect turns every window into DIRECT, stepSimulation tells the hooks and counts physics time, disconnect
-waits, and time.sleep returns at once (with real-time simulation on, it steps for as long as it would have slept). The
-script ends where it ends, or at the step that completes ``seconds``. Everything is put back afterwards.
+While it runs, pybullet.connect turns every window into DIRECT, stepSimulation tells the hooks and counts physics time,
+disconnect waits, and time.sleep returns at once (with real-time simulation on, it steps for as long as it would have
+slept). The script ends where it ends, or at the step that completes ``seconds``. Everything is put back afterwards.
 """
 
 from __future__ import annotations
@@ -40,10 +40,11 @@ def run_script(
 ) -> dict[str, Any]:
     """Run a script for at most ``seconds`` of physics time; its top-level names.
 
-    hooks: (before, after) each step, or after alone, called with the client id of the first client that steps. Clients that the
-    script opened stay connected, so that what it built can be looked at. names: a dictionary that its top-level names go into, there
-    also when it breaks. progress: told the share of ``seconds`` that is done. Raises SceneError that names the line where the script
-    breaks, what the hooks raise, and SceneError where the file cannot be read.
+    hooks: (before, after) each step, or after alone, called with the client id of the first client that steps. Clients
+    that the script opened stay connected, so that what it built can be looked at. names: a dictionary that its
+    top-level names go into, there also when it breaks. progress: told the share of ``seconds`` that is done. Raises
+    SceneError that names the line where the script breaks, what the hooks raise, and SceneError where the file cannot
+    be read.
     """
     path = Path(path)
     try:
@@ -51,11 +52,17 @@ def run_script(
     except OSError as error:
         raise SceneError(f"scene '{path}' cannot be read: {error.strerror}", "give the path of a Python file") from None
     except (SyntaxError, ValueError) as error:
-        raise SceneError(f"scene '{path.name}' line {getattr(error, 'lineno', None) or 1}: {error}", "mend the scene") from None
+        raise SceneError(
+            f"scene '{path.name}' line {getattr(error, 'lineno', None) or 1}: {error}", "mend the scene"
+        ) from None
     before, after = hooks if isinstance(hooks, tuple) else (None, hooks)
     names = {} if names is None else names
     names |= {"__name__": "__main__", "__file__": str(path), "__builtins__": __builtins__}
-    with _stage(before, after, seconds, progress), patch.object(sys, "argv", [str(path)]), patch.object(sys, "path", [str(path.resolve().parent), *sys.path]):
+    with (
+        _stage(before, after, seconds, progress),
+        patch.object(sys, "argv", [str(path)]),
+        patch.object(sys, "path", [str(path.resolve().parent), *sys.path]),
+    ):
         try:
             exec(code, names)
         except (_TimeIsUp, SystemExit):
@@ -64,12 +71,17 @@ def run_script(
             raise
         except Exception as error:
             lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(path)]
-            raise SceneError(f"scene '{path.name}' line {lines[-1] if lines else 1}: {type(error).__name__}: {error}", "mend the scene") from error
+            raise SceneError(
+                f"scene '{path.name}' line {lines[-1] if lines else 1}: {type(error).__name__}: {error}",
+                "mend the scene",
+            ) from error
     return names
 
 
 @contextmanager
-def _stage(before: ClientHook | None, after: ClientHook | None, seconds: float, progress: Callable[[float], None] | None) -> Iterator[None]:
+def _stage(
+    before: ClientHook | None, after: ClientHook | None, seconds: float, progress: Callable[[float], None] | None
+) -> Iterator[None]:
     real_connect, real_step = pybullet.connect, pybullet.stepSimulation
     observed: list[int] = []
     real_time: set[int] = set()
@@ -113,7 +125,9 @@ def _stage(before: ClientHook | None, after: ClientHook | None, seconds: float, 
             for _ in range(max(1, round(duration / dt))):
                 step(client)
 
-    def add_slider(paramName: str = "", rangeMin: float = 0, rangeMax: float = 1, startValue: float = 0, physicsClientId: int = 0) -> int:
+    def add_slider(
+        paramName: str = "", rangeMin: float = 0, rangeMax: float = 1, startValue: float = 0, physicsClientId: int = 0
+    ) -> int:
         sliders.append(float(startValue))
         return len(sliders) - 1
 
@@ -136,5 +150,9 @@ def _stage(before: ClientHook | None, after: ClientHook | None, seconds: float, 
             return functools.partial(stand_ins[name], physicsClientId=self._client)
         return forward(self, name)
 
-    with patch.dict(vars(pybullet), stand_ins), patch.object(bullet_client.BulletClient, "__getattr__", forward_stand_ins), patch.object(time, "sleep", sleep):
+    with (
+        patch.dict(vars(pybullet), stand_ins),
+        patch.object(bullet_client.BulletClient, "__getattr__", forward_stand_ins),
+        patch.object(time, "sleep", sleep),
+    ):
         yield

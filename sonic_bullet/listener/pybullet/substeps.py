@@ -30,7 +30,19 @@ REMEDY = "set numSubSteps to 0 and a smaller time step instead"
 RECORD = np.dtype(
     {
         "names": ["mark", "step", "time", "flag", "body", "link", "point_a", "point_b", "normal", "gap", "force"],
-        "formats": ["<u2", "<u4", "<f4", "<i4", ("<i4", 2), ("<i4", 2), ("<f4", 3), ("<f4", 3), ("<f4", 3), "<f4", "<f4"],
+        "formats": [
+            "<u2",
+            "<u4",
+            "<f4",
+            "<i4",
+            ("<i4", 2),
+            ("<i4", 2),
+            ("<f4", 3),
+            ("<f4", 3),
+            ("<f4", 3),
+            "<f4",
+            "<f4",
+        ],
     }
 )
 MARK = 0xBBAA
@@ -58,7 +70,9 @@ class SubstepLog:
         self.close()
         self.folder = tempfile.TemporaryDirectory(prefix="sonic-bullet-")
         self.path = os.path.join(self.folder.name, "contacts.log")
-        self.handle = pybullet.startStateLogging(pybullet.STATE_LOGGING_CONTACT_POINTS, self.path, physicsClientId=self.client_id)
+        self.handle = pybullet.startStateLogging(
+            pybullet.STATE_LOGGING_CONTACT_POINTS, self.path, physicsClientId=self.client_id
+        )
         self.offset = self.count = 0
         if self.handle < 0 or not os.path.exists(self.path):
             self.abandon()
@@ -101,22 +115,31 @@ class SubstepLog:
         return rows
 
 
-def gather_substeps(records: Array, last: list[RawContact], dt_s: float, substeps: int, first: int) -> tuple[Touches, int]:
+def gather_substeps(
+    records: Array, last: list[RawContact], dt_s: float, substeps: int, first: int
+) -> tuple[Touches, int]:
     """Loaded contacts (k,) of all sub-steps of one step, and the number of the next sub-step.
 
-    last: what getContactPoints() tells after the step. first: number of the step's first sub-step, corrected where `last` shows
-    the log's newest records to be the step's last sub-step. Raises SceneError where the log lacks the sub-step that `last` reports.
+    last: what getContactPoints() tells after the step. first: number of the step's first sub-step, corrected where
+    `last` shows the log's newest records to be the step's last sub-step. Raises SceneError where the log lacks the
+    sub-step that `last` reports.
     """
     number = records["step"].astype(np.int64)
     if last:
         newest = number.max(initial=-1)
         if np.count_nonzero(number == newest) != len(last):
-            raise SceneError(f"numSubSteps is {substeps} and Bullet's contact log has stopped", "attach again after resetSimulation, or " + REMEDY)
+            raise SceneError(
+                f"numSubSteps is {substeps} and Bullet's contact log has stopped",
+                "attach again after resetSimulation, or " + REMEDY,
+            )
         first = int(newest) + 1 - substeps
     h = dt_s / substeps
     touched = records["force"] != 0
     loaded = records[touched]
-    code_a, code_b = encode(loaded["body"][:, 0], loaded["link"][:, 0]), encode(loaded["body"][:, 1], loaded["link"][:, 1])
+    code_a, code_b = (
+        encode(loaded["body"][:, 0], loaded["link"][:, 0]),
+        encode(loaded["body"][:, 1], loaded["link"][:, 1]),
+    )
     normal, force = loaded["normal"].astype(float), loaded["force"].astype(float)
     impulse = h * force[:, None] * (normal + friction_ratio(code_a, code_b, last))
     elapsed = h * np.clip(number[touched] - first, 0, substeps - 1)
@@ -125,7 +148,10 @@ def gather_substeps(records: Array, last: list[RawContact], dt_s: float, substep
 
 
 def friction_ratio(code_a: Array, code_b: Array, last: list[RawContact]) -> Array:
-    """Friction over normal force (k, 3), world frame, of each row's pair in the last sub-step; 0 where it says nothing."""
+    """Friction over normal force (k, 3), world frame, of each row's pair in the last sub-step;
+
+    0 where it says nothing.
+    """
     ratio = np.zeros((len(code_a), 3))
     friction = [raw for raw in last if raw[FORCE] > 0 and (raw[FRICTION_1] or raw[FRICTION_2])]
     if not friction:

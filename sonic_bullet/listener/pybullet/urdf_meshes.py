@@ -1,4 +1,7 @@
-"""The mesh file behind a collision shape, in its own frame and unit, cut into objects as Bullet cuts it; hulls, and how far they close what is open."""
+"""The mesh file behind a collision shape, in its own frame and unit, cut into objects as Bullet cuts it;
+
+hulls, and how far they close what is open.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +21,10 @@ LID_GRID = 5
 
 
 def read_surfaces(path: Path) -> list[MeshSurface]:
-    """Objects of a mesh file: (vertices (v, 3), faces (f, 3)) each, identical vertices made one. Raises FileError, MeshError."""
+    """Objects of a mesh file:
+
+    (vertices (v, 3), faces (f, 3)) each, identical vertices made one. Raises FileError, MeshError.
+    """
     whole = [welded(vertex, face) for vertex, face in meshes.read_surfaces(path) if len(face)]
     whole = [(vertex, face) for vertex, face in whole if len(face) and np.isfinite(vertex).all()]
     if not whole:
@@ -29,7 +35,9 @@ def read_surfaces(path: Path) -> list[MeshSurface]:
 def joined(surfaces: list[MeshSurface]) -> MeshSurface:
     """All surfaces as one: (v, 3), (f, 3)."""
     offset = np.cumsum([0] + [len(vertex) for vertex, _ in surfaces])
-    return np.concatenate([v for v, _ in surfaces]), np.concatenate([f + o for (_, f), o in zip(surfaces, offset, strict=False)])
+    return np.concatenate([v for v, _ in surfaces]), np.concatenate(
+        [f + o for (_, f), o in zip(surfaces, offset, strict=False)]
+    )
 
 
 def hull(vertex_m: Array) -> MeshSurface:
@@ -49,7 +57,8 @@ def hull(vertex_m: Array) -> MeshSurface:
 
 
 def lid_height_m(vertex_m: Array, face: Array) -> float:
-    """How far the convex hull's surface stands at most from the true one: the depth below the lid over a bowl, 0 for a convex body.
+    """How far the convex hull's surface stands at most from the true one: the depth below the lid over a bowl, 0 for a
+    convex body.
 
     Looked at on a grid of LID_GRID points a side on each of the hull's triangles.
     """

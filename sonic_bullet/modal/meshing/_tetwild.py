@@ -2,9 +2,10 @@
 
     python _tetwild.py IN.npz OUT.npz     IN: vertex, face, edge, envelope, passes, memory (bytes), seconds
 
-fTetWild shuffles with a seed from `std::random_device`, so two runs differ by 0.1 % in the modes. On ELF systems the slot of
-the extension's procedure table that points at `random_device::_M_getval` is turned to a counter of our own: same surface,
-same tetrahedra. Elsewhere the cache must keep the mesh. Stands alone (numpy only) so that starting it is cheap.
+fTetWild shuffles with a seed from `std::random_device`, so two runs differ by 0.1 % in the modes. On ELF systems the
+slot of the extension's procedure table that points at `random_device::_M_getval` is turned to a counter of our own:
+same surface, same tetrahedra. Elsewhere the cache must keep the mesh. Stands alone (numpy only) so that starting it is
+cheap.
 """
 
 from __future__ import annotations
@@ -30,8 +31,12 @@ def load() -> tuple[ModuleType, Path]:
     if spec is None or not spec.submodule_search_locations:
         raise ImportError("pytetwild is not installed")
     folder = Path(next(iter(spec.submodule_search_locations)))
-    file = next(f for f in sorted(folder.iterdir()) if f.name.startswith("PyfTetWildWrapper") and f.suffix in (".so", ".pyd"))
-    found = importlib.util.spec_from_file_location("PyfTetWildWrapper", file, loader=ExtensionFileLoader("PyfTetWildWrapper", str(file)))
+    file = next(
+        f for f in sorted(folder.iterdir()) if f.name.startswith("PyfTetWildWrapper") and f.suffix in (".so", ".pyd")
+    )
+    found = importlib.util.spec_from_file_location(
+        "PyfTetWildWrapper", file, loader=ExtensionFileLoader("PyfTetWildWrapper", str(file))
+    )
     assert found is not None and found.loader is not None
     module = importlib.util.module_from_spec(found)
     found.loader.exec_module(module)
@@ -47,7 +52,14 @@ def seed(file: Path) -> bool:
     section_at = struct.unpack_from("<Q", data, 40)[0]
     entry, count = struct.unpack_from("<HH", data, 58)
     sections = [struct.unpack_from("<IIQQQQIIQQ", data, section_at + k * entry) for k in range(count)]
-    base = next((int(line.split("-")[0], 16) for line in Path("/proc/self/maps").read_text().splitlines() if line.endswith(str(file))), None)
+    base = next(
+        (
+            int(line.split("-")[0], 16)
+            for line in Path("/proc/self/maps").read_text().splitlines()
+            if line.endswith(str(file))
+        ),
+        None,
+    )
     if base is None or machine not in JUMP_SLOT:
         return False
     state = np.array([12345], np.uint32)
@@ -89,8 +101,12 @@ def main() -> None:
     module, file = load()
     seeded = seed(file)
     none = np.zeros((0, 3)), np.zeros((0, 4), np.int32), np.zeros(0)
-    vertex, face = np.ascontiguousarray(arguments["vertex"], np.float64), np.ascontiguousarray(arguments["face"], np.uint32)
-    # optimize, skip_simplify, edge (relative, absolute), envelope (relative), stop_energy, coarsen, threads, iterations, log level,
+    vertex, face = (
+        np.ascontiguousarray(arguments["vertex"], np.float64),
+        np.ascontiguousarray(arguments["face"], np.uint32),
+    )
+    # optimize, skip_simplify, edge (relative, absolute), envelope (relative), stop_energy, coarsen, threads,
+    # iterations, log level,
     # quiet, vtk_ordering, disable_filtering, sizing field
     node, tet = module.tetrahedralize_mesh(
         vertex,

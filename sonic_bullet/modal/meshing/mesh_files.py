@@ -1,4 +1,7 @@
-"""Mesh files -> Shape: OBJ, STL, PLY, GLB and what else `files.meshes` reads, with nothing repaired or merged on the way in."""
+"""Mesh files -> Shape:
+
+OBJ, STL, PLY, GLB and what else `files.meshes` reads, with nothing repaired or merged on the way in.
+"""
 
 from __future__ import annotations
 
@@ -15,15 +18,18 @@ from sonic_bullet.records.errors import MeshError
 def read_mesh(path: Path | str, scale: float = 1.0) -> Shape:
     """All triangles of a mesh file as one Shape of kind "mesh", times ``scale`` (0.001 for a file in millimetres).
 
-    Objects of a scene are placed and put together, polygons cut into triangles, identical vertices made one; orientation stays as
-    it is. Raises FileError where the file cannot be read, MeshError where it holds no triangle, a NaN or a face of no vertex.
+    Objects of a scene are placed and put together, polygons cut into triangles, identical vertices made one;
+    orientation stays as it is. Raises FileError where the file cannot be read, MeshError where it holds no triangle, a
+    NaN or a face of no vertex.
     """
     path = Path(path)
     if not (np.isfinite(scale) and scale > 0):
         raise MeshError(f"mesh scale is {scale}", "give a scale above zero")
     parts = read_surfaces(path)
     if not parts:
-        raise MeshError(f"'{path.name}' holds no triangle", "the file is empty or lies about its length: export it again")
+        raise MeshError(
+            f"'{path.name}' holds no triangle", "the file is empty or lies about its length: export it again"
+        )
     offsets = np.cumsum([0] + [len(vertex) for vertex, _ in parts[:-1]])
     vertex = np.concatenate([vertex for vertex, _ in parts]) * scale
     face = np.concatenate([face + offset for (_, face), offset in zip(parts, offsets, strict=True)])

@@ -1,7 +1,9 @@
-"""Boxes and extruded outlines recognised in a mesh, and filled by rule: thin plates need flat elements, fTetWild's are round.
+"""Boxes and extruded outlines recognised in a mesh, and filled by rule: thin plates need flat elements, fTetWild's are
+round.
 
     all faces look along three right axes, and the volume is that of their extents         -> a box
-    two parallel flat sides, all else at right angles to them, volume = area x thickness    -> outline -> triangles -> prisms -> tetrahedra
+    two parallel flat sides, all else at right angles to them, volume = area x thickness
+        -> outline -> triangles -> prisms -> tetrahedra
 The outline is cut by a Delaunay triangulation of its own resampled edge and a hexagonal lattice inside.
 """
 
@@ -57,7 +59,8 @@ def as_box(vertex_m: Array, face: Array) -> tuple[Array, Array, Array] | None:
     axes = axes * np.where(axes[range(3), range(3)] < 0, -1.0, 1.0)
     if np.linalg.det(axes) < 0:
         axes[:, 2] *= -1
-    whole = face[geometry.face_areas_m2(vertex_m, face) > 0]  # fans of polygons with nodes along their edges hold triangles without area
+    # fans of polygons with nodes along their edges hold triangles without area
+    whole = face[geometry.face_areas_m2(vertex_m, face) > 0]
     if (np.abs(geometry.outward_normals(vertex_m, whole) @ axes).max(axis=1) < 1 - RIGHT**2).any():
         return None
     along = vertex_m[np.unique(face)] @ axes
@@ -113,7 +116,10 @@ def _gap(point: Array, sides: Array) -> Array:
 
 
 def triangulated(loops: list[Array], area_m2: float, edge_m: float) -> tuple[Array, Array] | None:
-    """Points (p, 2) and triangles (t, 3) of about edge_m filling polygons (holes too) of area_m2; None where an edge is missed."""
+    """Points (p, 2) and triangles (t, 3) of about edge_m filling polygons (holes too) of area_m2;
+
+    None where an edge is missed.
+    """
     from scipy.spatial import Delaunay, QhullError
 
     for finer in (1.0, 0.5, 0.25):
@@ -123,7 +129,10 @@ def triangulated(loops: list[Array], area_m2: float, edge_m: float) -> tuple[Arr
         rows = max(1, int(np.ceil((high[1] - low[1]) / (edge_m * 0.75**0.5))))
         columns = max(1, int(np.ceil((high[0] - low[0]) / edge_m)))
         i, j = np.meshgrid(np.arange(columns + 1), np.arange(rows + 1))
-        lattice = np.stack([low[0] + (i + 0.5 * (j % 2)) * (high[0] - low[0]) / columns, low[1] + j * (high[1] - low[1]) / rows], axis=-1).reshape(-1, 2)
+        lattice = np.stack(
+            [low[0] + (i + 0.5 * (j % 2)) * (high[0] - low[0]) / columns, low[1] + j * (high[1] - low[1]) / rows],
+            axis=-1,
+        ).reshape(-1, 2)
         lattice = lattice[_inside(lattice, sides)]
         if len(lattice) * len(sides) > 20_000_000:
             return None
@@ -143,7 +152,9 @@ def triangulated(loops: list[Array], area_m2: float, edge_m: float) -> tuple[Arr
 
 
 def as_prism(vertex_m: Array, face: Array, edge_m: float | None, dof_budget: int) -> Solid | None:
-    """Solid of prisms where a closed surface is an extruded outline, else None. edge_m None: the finest within dof_budget unknowns."""
+    """Solid of prisms where a closed surface is an extruded outline, else None. edge_m None: the finest within
+    dof_budget unknowns.
+    """
     normal, area = geometry.outward_normals(vertex_m, face), geometry.face_areas_m2(vertex_m, face)
     volume = geometry.volume_m3(vertex_m, face)
     diagonal = float(np.linalg.norm(np.ptp(vertex_m[np.unique(face)], axis=0)))
@@ -154,7 +165,11 @@ def as_prism(vertex_m: Array, face: Array, edge_m: float | None, dof_budget: int
             continue
         high, low = vertex_m[face[top]] @ n, vertex_m[face[bottom]] @ n
         thickness = float(high.mean() - low.mean())
-        if max(np.ptp(high), np.ptp(low)) > SAME * diagonal or thickness <= 0 or abs(area[top].sum() * thickness / volume - 1) > SAME:
+        if (
+            max(np.ptp(high), np.ptp(low)) > SAME * diagonal
+            or thickness <= 0
+            or abs(area[top].sum() * thickness / volume - 1) > SAME
+        ):
             continue
         edge = np.stack([face[top], np.roll(face[top], -1, axis=1)], axis=-1).reshape(-1, 2)
         code = edge[:, 0].astype(np.int64) * len(vertex_m) + edge[:, 1]
@@ -175,5 +190,9 @@ def as_prism(vertex_m: Array, face: Array, edge_m: float | None, dof_budget: int
             continue
         layers = max(1, round(thickness / edge_m))
         points, tet = stacked(plane[0], plane[1], np.linspace(low.mean(), high.mean(), layers + 1))
-        return quadratic(points @ frame, tet, note=f"outline of {len(plane[1])} triangles in {layers} layers, 3 tetrahedra a prism, edge {edge_m:.3g} m")
+        return quadratic(
+            points @ frame,
+            tet,
+            note=f"outline of {len(plane[1])} triangles in {layers} layers, 3 tetrahedra a prism, edge {edge_m:.3g} m",
+        )
     return None

@@ -14,7 +14,15 @@ import numpy as np
 
 from sonic_bullet import geometry
 from sonic_bullet.modal.meshing import prisms, structured
-from sonic_bullet.modal.meshing.solid import COARSER, Solid, SolidSurface, corner_volume_m3, largest_component, quadratic, surface
+from sonic_bullet.modal.meshing.solid import (
+    COARSER,
+    Solid,
+    SolidSurface,
+    corner_volume_m3,
+    largest_component,
+    quadratic,
+    surface,
+)
 from sonic_bullet.modal.meshing.surfaces import SIZE_M, Skin, pieces_of_faces, prepared
 from sonic_bullet.modal.ordering import dissection
 from sonic_bullet.records import Array, Shape
@@ -24,14 +32,22 @@ THIN_DOF, CHUNKY_DOF = 26_000, 10_000  # unknowns by default: a plate's factor s
 DOF_PER_TET = 5.6  # measured on fTetWild's meshes of bars, slabs and bowls
 MOST_TETS = 7_000
 LUMP_PASSES, MOST_PASSES = 2, 80
-"""Of fTetWild's optimisation. It makes elements finer until the worst is good; two passes and a lesser edge give lumps the same modes in half the time."""
+"""Of fTetWild's optimisation.
+
+It makes elements finer until the worst is good; two passes and a lesser edge give lumps the same modes in half the
+time.
+"""
 FILL_LIMITS_S = (28.0, 8.0, 6.0)
-"""Processor seconds of each attempt, the next coarser than the last; a bowl of 14 400 triangles takes 15, on a busy machine 22.
-A slower machine may come to a coarser one: the note says so (`solid.COARSER`)."""
+"""Processor seconds of each attempt, the next coarser than the last; a bowl of 14 400 triangles takes 15, on a busy
+machine 22. A slower machine may come to a coarser one: the note says so (`solid.COARSER`)."""
 FILLED = (0.6, 1.7)
-"""Of the enclosed volume: what a fill may hold. Wide, for a surface that passes through itself encloses some of it twice."""
+"""Of the enclosed volume: what a fill may hold.
+
+Wide, for a surface that passes through itself encloses some of it twice.
+"""
 ENVELOPE_OF_EDGE = 0.035  # a finer surface than its elements costs time and tells nothing
-ENVELOPE = (0.04, 0.006)  # of the thickness and of the diagonal: how far fTetWild may move the surface, the lesser counts
+# of the thickness and of the diagonal: how far fTetWild may move the surface, the lesser counts
+ENVELOPE = (0.04, 0.006)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,7 +62,8 @@ class Filled:
 def dof_budget(thickness_m: float, diagonal_m: float) -> int:
     """Unknowns spent by default on a body of thickness 2V/A: fewer the chunkier, more for very thin plates.
 
-    A quadratic element of edge e bends true while e² « thickness x wavelength, so the number of elements in a plate grows as 1/thickness.
+    A quadratic element of edge e bends true while e² « thickness x wavelength, so the number of elements in a plate
+    grows as 1/thickness.
     """
     more = np.clip(0.007 * diagonal_m / thickness_m, 1, 3)
     return int((THIN_DOF + (CHUNKY_DOF - THIN_DOF) * chunkiness(thickness_m, diagonal_m)) * more)
@@ -86,7 +103,8 @@ def box_cells(size_m: Array, edge_m: float | None) -> tuple[int, int, int]:
         cells = np.maximum(1, np.round(size_m / edge_m)).astype(int)
         long = int(np.argmax(size_m))
         across = [k for k in range(3) if k != long]
-        if size_m[across].max() < size_m[long] / 4:  # a bar: its twist warps the section, which takes four cells either way
+        # a bar: its twist warps the section, which takes four cells either way
+        if size_m[across].max() < size_m[long] / 4:
             cells[across] = np.maximum(cells[across], 4)
             cells[long] = max(8, int((budget / (3 * np.prod(2 * cells[across] + 1)) - 1) / 2))
         return int(cells[0]), int(cells[1]), int(cells[2])
@@ -106,11 +124,14 @@ def _named(shape: Shape, edge_m: float | None) -> Solid:
         return _box(shape.size_m, edge_m)
     radius, length = float(shape.size_m[0]), float(shape.size_m[1])
     if not radius > 0 or (shape.kind == "cylinder" and not length > 0):
-        raise MeshError(f"{shape.kind} of radius {radius} m and length {length} m has no volume", "give sizes above zero")
+        raise MeshError(
+            f"{shape.kind} of radius {radius} m and length {length} m has no volume", "give sizes above zero"
+        )
     if shape.kind == "sphere" or (shape.kind == "capsule" and length <= 0):
         return structured.sphere(radius, 5 if edge_m is None else max(2, round(radius / edge_m)))
     if edge_m is None:
-        # A disc of n rings has 12 n² quadratic nodes on 2 l + 1 heights (the caps of a capsule count as one more radius).
+        # A disc of n rings has 12 n² quadratic nodes on 2 l + 1 heights (the caps of a capsule count as one more
+        # radius).
         whole = length + (radius if shape.kind == "capsule" else 0)
         thickness = 2 / (2 / radius + 2 / whole)
         budget = dof_budget(thickness, float(np.hypot(2 * radius, whole)))
@@ -162,7 +183,9 @@ def _united(skin: Skin) -> Skin:
 
 
 def _meshed(skin: Skin, edge_m: float | None, say: Callable[[str], None]) -> Solid:
-    """Solid of a prepared surface: by rule where a rule is known, else by fTetWild, coarser where that is too slow or too fine."""
+    """Solid of a prepared surface: by rule where a rule is known, else by fTetWild, coarser where that is too slow or
+    too fine.
+    """
     from sonic_bullet.modal.meshing.tetrahedra import TooSlow, tetrahedra
 
     vertex, face, thickness = skin.vertex_m, skin.face, skin.thickness_m
@@ -177,7 +200,8 @@ def _meshed(skin: Skin, edge_m: float | None, say: Callable[[str], None]) -> Sol
         prism = prisms.as_prism(vertex, face, edge_m, budget)
         if prism is not None:
             return Solid(prism.node_m, prism.tet, note=prism.note + skin.note)
-    # a curved shell takes a third more than a slab laid out by rule, a lump little more than half, for fTetWild makes it finer than asked
+    # a curved shell takes a third more than a slab laid out by rule, a lump little more than half, for fTetWild makes
+    # it finer than asked
     lump = chunkiness(thickness, diagonal)
     spent = int(budget * (1.35 - 0.77 * lump))
     passes = LUMP_PASSES if lump > 0.5 else MOST_PASSES
@@ -197,25 +221,37 @@ def _meshed(skin: Skin, edge_m: float | None, say: Callable[[str], None]) -> Sol
             tet, pieces = largest_component(node, tet)
             if len(tet) <= MOST_TETS or edge_m is not None:
                 note = f"fTetWild, {len(tet)} tetrahedra, edge {edge:.3g} m, envelope {envelope:.2g} m{skin.note}{said}"
-                return quadratic(node, tet, note=note + (f"; largest of {pieces} separate pieces kept" if pieces > 1 else ""))
+                return quadratic(
+                    node, tet, note=note + (f"; largest of {pieces} separate pieces kept" if pieces > 1 else "")
+                )
             failure, coarsening = too_fine, "coarser"
         said = said if COARSER in said else f"; {coarsening}: {failure.what}"
         edge, envelope, passes = 1.6 * edge, 2.5 * envelope, LUMP_PASSES
     if len(limits_s) > 1:
-        failure = MeshError(f"{failure.what}, the last of {len(limits_s)} attempts, each coarser, within {sum(limits_s):.0f} s in all", failure.remedy)
+        failure = MeshError(
+            f"{failure.what}, the last of {len(limits_s)} attempts, each coarser, within {sum(limits_s):.0f} s in all",
+            failure.remedy,
+        )
     raise failure
 
 
 def _check_filled(vertex: Array, face: Array, node: Array, tet: Array) -> None:
-    """Raise MeshError where tetrahedra do not hold what a closed surface of one piece encloses: its walls are thinner than the envelope."""
+    """Raise MeshError where tetrahedra do not hold what a closed surface of one piece encloses: its walls are thinner
+    than the envelope.
+    """
     if not geometry.is_closed(face) or pieces_of_faces(face).max() > 0:
         return
     kept = float(np.abs(corner_volume_m3(node, tet)).sum()) / geometry.volume_m3(vertex, face)
     if not FILLED[0] < kept < FILLED[1]:
-        raise MeshError(f"filling the mesh with tetrahedra turns its volume to {kept:.0%}", "give a mesh with thicker walls, or a simpler one")
+        raise MeshError(
+            f"filling the mesh with tetrahedra turns its volume to {kept:.0%}",
+            "give a mesh with thicker walls, or a simpler one",
+        )
 
 
-def fill(shapes: tuple[Shape, ...], edge_m: float | None, thickness_m: float | None, say: Callable[[str], None]) -> Filled:
+def fill(
+    shapes: tuple[Shape, ...], edge_m: float | None, thickness_m: float | None, say: Callable[[str], None]
+) -> Filled:
     """One solid, the union of ``shapes``, in the body frame, its nodes in elimination order. Raises MeshError."""
     if edge_m is not None and not (np.isfinite(edge_m) and edge_m > 0):
         raise MeshError(f"edge_m is {edge_m}", "give an element size above zero")
@@ -237,7 +273,8 @@ def fill(shapes: tuple[Shape, ...], edge_m: float | None, thickness_m: float | N
 
 
 def check_fillable(shapes: tuple[Shape, ...], thickness_m: float | None) -> int:
-    """Raise MeshError where `fill` would for what can be seen at once: no extent, no volume, a sheet without a wall; the triangles to be filled.
+    """Raise MeshError where `fill` would for what can be seen at once: no extent, no volume, a sheet without a wall;
+    the triangles to be filled.
 
     Whether a surface that passes through itself can be filled is known only when it is.
     """
@@ -253,17 +290,24 @@ def check_fillable(shapes: tuple[Shape, ...], thickness_m: float | None) -> int:
 
 
 def _alone(shapes: tuple[Shape, ...], thickness_m: float | None) -> Shape | None:
-    """The one solid box, ball, cylinder or capsule that the shapes are, else None. Raises MeshError where its size is absurd."""
+    """The one solid box, ball, cylinder or capsule that the shapes are, else None.
+
+    Raises MeshError where its size is absurd.
+    """
     if len(shapes) > 1 or shapes[0].kind == "mesh" or thickness_m is not None:
         return None
     one = shapes[0]
     if not SIZE_M[0] < one.size_m.max() < SIZE_M[1]:
-        raise MeshError(f"{one.kind} is {one.size_m.max():.3g} m across", "check its unit and scale: metres are expected")
+        raise MeshError(
+            f"{one.kind} is {one.size_m.max():.3g} m across", "check its unit and scale: metres are expected"
+        )
     return one
 
 
 def _curvature(one: Shape | None, vertex_m: Array, face: Array, skin_m: Array, skin_face: Array) -> Array:
-    """Curvature of the skin's faces: known of a ball and a box, estimated of other named shapes, else the given mesh's own nearby."""
+    """Curvature of the skin's faces: known of a ball and a box, estimated of other named shapes, else the given mesh's
+    own nearby.
+    """
     if one is not None and one.kind == "sphere":
         return np.full(len(skin_face), 1 / float(one.size_m[0]))
     if one is not None:
@@ -271,5 +315,7 @@ def _curvature(one: Shape | None, vertex_m: Array, face: Array, skin_m: Array, s
     given = geometry.face_curvature(vertex_m, face)
     if not given.any():
         return np.zeros(len(skin_face))
-    nearest, _, _ = geometry.closest_point(vertex_m, face, skin_m[skin_face].mean(axis=1), geometry.outward_normals(skin_m, skin_face))
+    nearest, _, _ = geometry.closest_point(
+        vertex_m, face, skin_m[skin_face].mean(axis=1), geometry.outward_normals(skin_m, skin_face)
+    )
     return np.asarray(given[nearest])

@@ -1,6 +1,7 @@
 """A body filled with quadratic tetrahedra, and the surface it shows.
 
-    corners and tetrahedra -> Solid (corner nodes, then one node in the middle of each edge) -> Surface (its boundary, each
+    corners and tetrahedra -> Solid (corner nodes, then one node in the middle of each edge) -> Surface (its boundary,
+        each
     quadratic face cut into four flat triangles, so that interpolating in a triangle follows the quadratic field)
 
 Local node order is scikit-fem's `ElementTetP2`: corners 0 1 2 3, then the edges 01 12 02 03 13 23.
@@ -17,7 +18,9 @@ from sonic_bullet.records import Array
 from sonic_bullet.records.errors import MeshError
 
 COARSER = "coarser than wanted for want of time"
-"""In a model's note: its elements are larger than wanted because this machine was too slow; another's modes may differ in the last per cent."""
+"""In a model's note: its elements are larger than wanted because this machine was too slow; another's modes may differ
+in the last per cent.
+"""
 TET_EDGE = np.array([[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]])
 # Faces of a positively oriented tetrahedron seen from outside: three corners, then the nodes on their edges 01, 12, 20.
 TET_FACE = np.array([[0, 2, 1, 6, 5, 4], [0, 1, 3, 4, 8, 7], [1, 2, 3, 5, 9, 8], [0, 3, 2, 7, 9, 6]])
@@ -27,7 +30,10 @@ QUARTERS = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Solid:
-    """node_m (n, 3): corners first. tet (t, 10): indices into node_m. affine: all middles lie halfway. note: how it was made."""
+    """node_m (n, 3): corners first.
+
+    tet (t, 10): indices into node_m. affine: all middles lie halfway. note: how it was made.
+    """
 
     node_m: Array
     tet: Array
@@ -50,7 +56,8 @@ def corner_volume_m3(corner_m: Array, tet: Array) -> Array:
 
 
 def quadratic(corner_m: Array, tet: Array, place: Callable[[Array], Array] | None = None, note: str = "") -> Solid:
-    """Solid over tetrahedra tet (t, 4): orients them, drops unused corners and flat elements, adds the nodes in the middle of the edges.
+    """Solid over tetrahedra tet (t, 4): orients them, drops unused corners and flat elements, adds the nodes in the
+    middle of the edges.
 
     ``place`` maps all nodes (n, 3) to where they really are (curved bodies are meshed straight and then placed).
     Raises MeshError where no element has a volume.

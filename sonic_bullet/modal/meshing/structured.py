@@ -2,9 +2,11 @@
 
     box: a grid of cells, each cut into Kuhn's six tetrahedra, neighbours mirrored
     sphere: the icosahedron's twenty cones, cut n³-fold [Freudenthal 1942], pushed radially onto shells
-    cylinder: a hexagonal disc pushed onto circles, times layers;   capsule: that cylinder between two hexagonal half balls
+    cylinder: a hexagonal disc pushed onto circles, times layers;
+        capsule: that cylinder between two hexagonal half balls
 
-Curved bodies are meshed straight and placed with all their quadratic nodes, so that the surface is a piecewise parabola.
+Curved bodies are meshed straight and placed with all their quadratic nodes, so that the surface is a piecewise
+parabola.
 """
 
 from __future__ import annotations
@@ -24,8 +26,14 @@ def box(size_m: Array, cells: tuple[int, int, int]) -> Solid:
     corner = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     stride = np.array([(ny + 1) * (nz + 1), nz + 1, 1])
     cell = np.stack(np.meshgrid(np.arange(nx), np.arange(ny), np.arange(nz), indexing="ij"), axis=-1).reshape(-1, 3)
-    path = np.array([np.concatenate([np.zeros((1, 3), int), np.cumsum(np.eye(3, dtype=int)[list(p)], axis=0)]) for p in permutations(range(3))])
-    # Every other cell is its neighbour's mirror image: faces still match, and no diagonal of the box is stiffer than another.
+    path = np.array(
+        [
+            np.concatenate([np.zeros((1, 3), int), np.cumsum(np.eye(3, dtype=int)[list(p)], axis=0)])
+            for p in permutations(range(3))
+        ]
+    )
+    # Every other cell is its neighbour's mirror image: faces still match, and no diagonal of the box is stiffer than
+    # another.
     step = path[None] ^ (cell % 2)[:, None, None, :]
     tet = ((cell[:, None, None, :] + step) @ stride).reshape(-1, 4)
     return quadratic(corner, tet, note=f"box of {nx} x {ny} x {nz} cells, 6 tetrahedra each")
@@ -38,7 +46,10 @@ def _lattice(n: int, dimension: int) -> Array:
 
 
 def _refined(corner: Array, simplex: Array, n: int) -> tuple[Array, Array]:
-    """Simplices (s, d+1) over corner (c, 3), each edge cut into n: Freudenthal's subdivision, matching across shared faces."""
+    """Simplices (s, d+1) over corner (c, 3), each edge cut into n:
+
+    Freudenthal's subdivision, matching across shared faces.
+    """
     d = simplex.shape[1] - 1
     simplex = np.sort(simplex, axis=1)  # one order for all: neighbours then cut their shared face alike
     cells = _lattice(n, d)
@@ -46,7 +57,11 @@ def _refined(corner: Array, simplex: Array, n: int) -> tuple[Array, Array]:
     for path in permutations(range(d)):
         steps = np.concatenate([np.zeros((1, d), int), np.cumsum(np.eye(d, dtype=int)[list(path)], axis=0)])
         piece = cells[:, None, :] + steps
-        inside = (piece[..., 0] <= n).all(axis=1) & (np.diff(piece, axis=2) <= 0).all(axis=(1, 2)) & (piece[..., -1] >= 0).all(axis=1)
+        inside = (
+            (piece[..., 0] <= n).all(axis=1)
+            & (np.diff(piece, axis=2) <= 0).all(axis=(1, 2))
+            & (piece[..., -1] >= 0).all(axis=1)
+        )
         pieces.append(piece[inside])
     lattice = np.concatenate(pieces)  # (n^d, d+1, d)
     weight = np.concatenate([n - lattice[..., :1], lattice[..., :-1] - lattice[..., 1:], lattice[..., -1:]], axis=-1)
@@ -79,10 +94,16 @@ def sphere(radius_m: float, n: int) -> Solid:
     base = np.array([[0, s, t * golden] for s in (-1, 1) for t in (-1, 1)])
     corner = np.concatenate([np.roll(base, k, axis=1) for k in range(3)])
     near = np.linalg.norm(corner[:, None] - corner[None], axis=2) < 2.1
-    face = np.array([(i, j, k) for i in range(12) for j in range(i) for k in range(j) if near[i, j] and near[j, k] and near[i, k]])
+    face = np.array(
+        [(i, j, k) for i in range(12) for j in range(i) for k in range(j) if near[i, j] and near[j, k] and near[i, k]]
+    )
     normal = _face_normals(corner, face)
-    points, tet = _refined(np.concatenate([np.zeros((1, 3)), corner]), np.concatenate([np.zeros((20, 1), int), face + 1], axis=1), n)
-    return quadratic(points, tet, lambda p: radius_m * _onto_ball(p, normal), f"sphere of 20 cones cut {n}-fold, curved")
+    points, tet = _refined(
+        np.concatenate([np.zeros((1, 3)), corner]), np.concatenate([np.zeros((20, 1), int), face + 1], axis=1), n
+    )
+    return quadratic(
+        points, tet, lambda p: radius_m * _onto_ball(p, normal), f"sphere of 20 cones cut {n}-fold, curved"
+    )
 
 
 _HEXAGON = np.array([[np.cos(a), np.sin(a), 0.0] for a in np.arange(6) * np.pi / 3])
@@ -97,12 +118,18 @@ def _onto_disc(point: Array) -> Array:
 
 
 def _prisms(triangle: Array, offset: int, layers: int) -> Array:
-    """Tetrahedra of triangle (k, 3) stacked ``layers`` high, vertex i of layer l being i + l·offset; cut by index order."""
+    """Tetrahedra of triangle (k, 3) stacked ``layers`` high, vertex i of layer l being i + l·offset; cut by index
+    order.
+    """
     a, b, c = np.sort(triangle, axis=1).T
     tets = []
     for layer in range(layers):
         low, high = layer * offset, (layer + 1) * offset
-        tets += [(a + low, b + low, c + low, c + high), (a + low, b + low, b + high, c + high), (a + low, a + high, b + high, c + high)]
+        tets += [
+            (a + low, b + low, c + low, c + high),
+            (a + low, b + low, b + high, c + high),
+            (a + low, a + high, b + high, c + high),
+        ]
     return np.concatenate([np.stack(t, axis=1) for t in tets])
 
 
@@ -132,12 +159,17 @@ def capsule(radius_m: float, length_m: float, n: int, layers: int) -> Solid:
     apex = np.array([0, 0, 1.0])
     ring = [[0, 1 + k, 1 + (k + 1) % 6, 7] for k in range(6)]
     cap, cap_tet = _refined(np.concatenate([np.zeros((1, 3)), _HEXAGON, apex[None]]), np.array(ring), n)
-    normal = _face_normals(np.concatenate([_HEXAGON, apex[None], -apex[None]]), np.array([[k, (k + 1) % 6, e] for k in range(6) for e in (6, 7)]))
+    normal = _face_normals(
+        np.concatenate([_HEXAGON, apex[None], -apex[None]]),
+        np.array([[k, (k + 1) % 6, e] for k in range(6) for e in (6, 7)]),
+    )
     tube, tube_tet = stacked(disc[:, :2], triangle, np.linspace(-half, half, layers + 1))
     shift = np.array([0, 0, half])
     points = np.concatenate([tube, cap + shift, cap * [1, 1, -1] - shift])
     tet = np.concatenate([tube_tet, cap_tet + len(tube), cap_tet + len(tube) + len(cap)])
-    _, first, inverse = np.unique(np.round(points * 4 * 720720).astype(np.int64), axis=0, return_index=True, return_inverse=True)
+    _, first, inverse = np.unique(
+        np.round(points * 4 * 720720).astype(np.int64), axis=0, return_index=True, return_inverse=True
+    )
 
     def place(p: Array) -> Array:
         inside = np.clip(p[:, 2], -half, half)

@@ -1,9 +1,11 @@
 """What a triangle mesh means as a solid: outside found, sheets given a wall, boxes and plates recognised.
 
 Choices, each told in the model's note:
-    closed surface: the solid inside; turned inside out where it looks inward; with thickness_m a hollow body, its wall inward
+    closed surface: the solid inside; turned inside out where it looks inward; with thickness_m a hollow body, its wall
+        inward
     small holes (caps under `CAP_PART` of the area): filled, as if capped
-    open surface: a wall of thickness_m, half on either side, `SHEET_PART` of the diagonal by default; flat sheets need thickness_m
+    open surface: a wall of thickness_m, half on either side, `SHEET_PART` of the diagonal by default; flat sheets need
+        thickness_m
     loose pieces: they stay; the solid keeps its largest piece (solid.largest_component)
 """
 
@@ -25,7 +27,10 @@ SIZE_M = (1e-5, 1e4)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Skin:
-    """A surface that means a solid: vertex_m (v, 3), face (f, 3) outward, thickness_m = 2V/A or the wall's. note: the choices."""
+    """A surface that means a solid:
+
+    vertex_m (v, 3), face (f, 3) outward, thickness_m = 2V/A or the wall's. note: the choices.
+    """
 
     vertex_m: Array
     face: Array
@@ -46,7 +51,10 @@ def _flips(face: Array) -> Array:
     first = first[count == 2]  # where three faces meet nobody knows which two are neighbours
     one, two = order[first], order[first + 1]
     against = (edge[one, 0] == edge[two, 0]).astype(np.int64)  # both run the same way: they disagree
-    graph = coo_array((np.concatenate([against, against]) + 1, (np.concatenate([one, two]) // 3, np.concatenate([two, one]) // 3)), shape=(f, f)).tocsr()
+    graph = coo_array(
+        (np.concatenate([against, against]) + 1, (np.concatenate([one, two]) // 3, np.concatenate([two, one]) // 3)),
+        shape=(f, f),
+    ).tocsr()
     _, label = connected_components(graph, directed=False)
     flip = np.zeros(f, bool)
     disagree = {(int(a), int(b)): bool(d) for a, b, d in zip(one // 3, two // 3, against, strict=True)}
@@ -65,7 +73,9 @@ def pieces_of_faces(face: Array) -> Array:
 
     n = int(face.max()) + 1
     row, column = face[:, [0, 1]].T.ravel(), face[:, [1, 2]].T.ravel()
-    return np.asarray(connected_components(coo_array((np.ones(len(row)), (row, column)), shape=(n, n)), directed=False)[1][face[:, 0]])
+    return np.asarray(
+        connected_components(coo_array((np.ones(len(row)), (row, column)), shape=(n, n)), directed=False)[1][face[:, 0]]
+    )
 
 
 def _boundary(face: Array) -> Array:
@@ -83,7 +93,9 @@ def _cap_area_m2(vertex_m: Array, boundary: Array) -> float:
     if len(boundary) == 0:
         return 0.0
     n = len(vertex_m)
-    _, label = connected_components(coo_array((np.ones(len(boundary)), (boundary[:, 0], boundary[:, 1])), shape=(n, n)), directed=False)
+    _, label = connected_components(
+        coo_array((np.ones(len(boundary)), (boundary[:, 0], boundary[:, 1])), shape=(n, n)), directed=False
+    )
     loop = np.unique(label[boundary[:, 0]], return_inverse=True)[1]
     middle = vertex_m.mean(axis=0)
     swept = np.cross(vertex_m[boundary[:, 0]] - middle, vertex_m[boundary[:, 1]] - middle) / 2
@@ -105,7 +117,9 @@ def _walled(vertex_m: Array, face: Array, out_m: float, in_m: float) -> tuple[Ar
     rim = _boundary(face)
     a, b = rim[:, 0], rim[:, 1]
     sides = np.concatenate([np.stack([b, a, a + n], axis=1), np.stack([b, a + n, b + n], axis=1)])
-    return np.concatenate([vertex_m + out_m * normal, vertex_m - in_m * normal]), np.concatenate([face, face[:, ::-1] + n, sides])
+    return np.concatenate([vertex_m + out_m * normal, vertex_m - in_m * normal]), np.concatenate(
+        [face, face[:, ::-1] + n, sides]
+    )
 
 
 def _oriented(vertex_m: Array, face: Array) -> tuple[Array, str]:
@@ -128,7 +142,10 @@ def _oriented(vertex_m: Array, face: Array) -> tuple[Array, str]:
 
 
 def prepared(vertex_m: Array, face: Array, thickness_m: float | None) -> Skin:
-    """The surface that fTetWild is to fill. Raises MeshError for no triangle, NaN, an absurd size, or a sheet it cannot thicken."""
+    """The surface that fTetWild is to fill.
+
+    Raises MeshError for no triangle, NaN, an absurd size, or a sheet it cannot thicken.
+    """
     if not np.isfinite(vertex_m[face]).all():
         raise MeshError("mesh holds NaN or infinite vertices", "repair the mesh file")
     if thickness_m is not None and not (np.isfinite(thickness_m) and thickness_m > 0):
@@ -154,15 +171,26 @@ def prepared(vertex_m: Array, face: Array, thickness_m: float | None) -> Skin:
         if thickness_m is None:
             return Skin(vertex_m, face, 2 * volume / total, note)
         inner_v, inner_f = vertex_m - thickness_m * _vertex_normals(vertex_m, face), face[:, ::-1] + len(vertex_m)
-        return Skin(np.concatenate([vertex_m, inner_v]), np.concatenate([face, inner_f]), thickness_m, f"{note}; hollow, wall {thickness_m:.3g} m inward")
+        return Skin(
+            np.concatenate([vertex_m, inner_v]),
+            np.concatenate([face, inner_f]),
+            thickness_m,
+            f"{note}; hollow, wall {thickness_m:.3g} m inward",
+        )
     wall_m = thickness_m if thickness_m is not None else SHEET_PART * diagonal_m
-    flat = float(np.linalg.svd(vertex_m - vertex_m.mean(axis=0), compute_uv=False)[-1]) < 1e-9 * diagonal_m * len(vertex_m) ** 0.5
+    flat = (
+        float(np.linalg.svd(vertex_m - vertex_m.mean(axis=0), compute_uv=False)[-1])
+        < 1e-9 * diagonal_m * len(vertex_m) ** 0.5
+    )
     if thickness_m is None and flat:
         raise MeshError("mesh is a flat sheet without volume", "give thickness_m to make it solid")
     if geometry.is_closed(face):  # two coincident sides: one of them is the sheet
         _, first = np.unique(np.sort(face, axis=1), axis=0, return_index=True)
         if len(first) == len(face) or thickness_m is None:
-            raise MeshError(f"mesh encloses no volume ({volume:.2g} m³ in {total:.2g} m²)", "give thickness_m to make the sheet solid")
+            raise MeshError(
+                f"mesh encloses no volume ({volume:.2g} m³ in {total:.2g} m²)",
+                "give thickness_m to make the sheet solid",
+            )
         face = face[np.sort(first)]
     vertex_m, face = _walled(vertex_m, face, wall_m / 2, wall_m / 2)
     return Skin(vertex_m, face, wall_m, f"{note}; open surface given a wall of {wall_m:.3g} m")

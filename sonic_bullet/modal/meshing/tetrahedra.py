@@ -1,6 +1,7 @@
 """Surface -> tetrahedra by fTetWild [Hu, Schneider, Wang, Zorin, Panozzo 2020], in a child process with a time and a memory limit.
 
-fTetWild takes soup, holes and overlaps and fills where the winding number says inside; the surface may move by the envelope.
+fTetWild takes soup, holes and overlaps and fills where the winding number says inside; the surface may move by the
+envelope.
 """
 
 from __future__ import annotations
@@ -26,11 +27,19 @@ class TooSlow(MeshError):
     """Filling took longer than it may: on another machine it might not."""
 
 
-def tetrahedra(vertex_m: Array, face: Array, edge_m: float, envelope_m: float, *, passes: int = 80, time_limit_s: float = TIME_LIMIT_S) -> tuple[Array, Array]:
+def tetrahedra(
+    vertex_m: Array,
+    face: Array,
+    edge_m: float,
+    envelope_m: float,
+    *,
+    passes: int = 80,
+    time_limit_s: float = TIME_LIMIT_S,
+) -> tuple[Array, Array]:
     """Corners (n, 3) and tetrahedra (t, 4) filling a surface vertex_m (v, 3), face (f, 3).
 
-    edge_m: wanted edge; envelope_m: how far the surface may move; passes: of optimisation, at most. Raises MeshError where fTetWild fails, fills nothing,
-    or takes more than time_limit_s of processor time or 2 GiB.
+    edge_m: wanted edge; envelope_m: how far the surface may move; passes: of optimisation, at most. Raises MeshError
+    where fTetWild fails, fills nothing, or takes more than time_limit_s of processor time or 2 GiB.
     """
     low, high = vertex_m[face].reshape(-1, 3).min(axis=0), vertex_m[face].reshape(-1, 3).max(axis=0)
     diagonal_m = float(np.linalg.norm(high - low))
@@ -56,10 +65,16 @@ def tetrahedra(vertex_m: Array, face: Array, edge_m: float, envelope_m: float, *
         except subprocess.TimeoutExpired:
             ended = None
         if ended is None or -ended.returncode in CUT_OFF:
-            raise TooSlow(f"filling the mesh with tetrahedra took more than {time_limit_s:.0f} s of processor time", "give a simpler mesh")
+            raise TooSlow(
+                f"filling the mesh with tetrahedra took more than {time_limit_s:.0f} s of processor time",
+                "give a simpler mesh",
+            )
         if ended.returncode != 0 or not target.exists():
             said = (ended.stderr.strip().splitlines() or ["no message"])[-1]
-            raise MeshError(f"fTetWild failed on the mesh (exit {ended.returncode}: {said[:200]})", "repair the mesh, or give a simpler one")
+            raise MeshError(
+                f"fTetWild failed on the mesh (exit {ended.returncode}: {said[:200]})",
+                "repair the mesh, or give a simpler one",
+            )
         with np.load(target, allow_pickle=False) as result:
             node, tet = result["node"], result["tet"]
     if len(tet) == 0:

@@ -3,7 +3,8 @@
 Simulators' meshes are often convex pieces laid side by side (V-HACD). They overlap, touch, or leave gaps far below what
 matters for sound, and a solid of separate pieces would ring as its largest one alone.
 
-    pieces, each closed and positive -> exact union (Manifold)  -> one piece?  else the pieces grown by `GROWTH` and united again
+    pieces, each closed and positive -> exact union (Manifold)  -> one piece?
+        else the pieces grown by `GROWTH` and united again
 
 A piece with negative volume is a cavity: then nothing is united, and the filler's winding number decides.
 """
@@ -23,7 +24,9 @@ ONE = 0.99  # of the volume in the largest piece: the rest is crumbs
 
 
 def joined(vertex_m: Array, face: Array, piece: Array) -> tuple[Array, Array, str]:
-    """Vertices, faces of the union of a closed surface's pieces, piece (f,) their labels, and what was done ("" : nothing)."""
+    """Vertices, faces of the union of a closed surface's pieces, piece (f,) their labels, and what was done ("" :
+    nothing).
+    """
     import manifold3d
 
     count = int(piece.max()) + 1
@@ -54,9 +57,11 @@ def joined(vertex_m: Array, face: Array, piece: Array) -> tuple[Array, Array, st
 
 
 def _outward(vertex_m: Array, face: Array) -> Array:
-    """How the vertices (v, 3) move when every face moves outward by one: the u with n·u = 1 on the faces around, by least squares.
+    """How the vertices (v, 3) move when every face moves outward by one: the u with n·u = 1 on the faces around, by
+    least squares.
 
-    Directions that the normals hardly span (a flat or gently bent neighbourhood) are left alone, a spike moves by three at most.
+    Directions that the normals hardly span (a flat or gently bent neighbourhood) are left alone, a spike moves by three
+    at most.
     """
     corner = vertex_m[face]
     normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
@@ -73,7 +78,9 @@ def _outward(vertex_m: Array, face: Array) -> Array:
 def _solid(vertex_m: Array, face: Array) -> Any:
     import manifold3d
 
-    return manifold3d.Manifold(manifold3d.Mesh64(np.ascontiguousarray(vertex_m, np.float64), np.ascontiguousarray(face, np.uint64)))
+    return manifold3d.Manifold(
+        manifold3d.Mesh64(np.ascontiguousarray(vertex_m, np.float64), np.ascontiguousarray(face, np.uint64))
+    )
 
 
 def _arrays(solid: Any) -> tuple[Array, Array]:
