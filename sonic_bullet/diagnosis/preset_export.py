@@ -30,10 +30,12 @@ def preset_of(d: Diagnosis) -> Preset:
         if effect.stage is Stage.MATERIAL:
             stiffness = effect.apply(material_of(base)).stiffness_pa
             rows = tuple(tuple(float(x) for x in row) for row in stiffness)
-            made = msgspec.structs.replace(
-                made,
-                elasticity=Elasticity(stiffness_pa=rows, source=base.elasticity.source, note="diagnosed: " + effect.id),
-            )  # type: ignore[arg-type]
+            stated = Elasticity(
+                stiffness_pa=rows,  # type: ignore[arg-type]
+                source=base.elasticity.source,
+                note="diagnosed: " + effect.id,
+            )
+            made = msgspec.structs.replace(made, elasticity=stated)
     return made
 
 
