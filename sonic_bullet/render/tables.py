@@ -1,0 +1,136 @@
+"""What the run time's compiled stages work on: one table a kind of thing, each in a fixed place, rows by number.
+
+    Body -> BODY row + FACE, NODE rows and a slice of the shapes       once, when it is added
+    contact rows of a step -> ROW (turned onto the pair's lower body)  four steps at a time: the step and its look-ahead
+    pair of touching bodies -> PAIR, as long as it touches             load history, voice of friction
+    strike -> PULSE                                                    one step
+
+Records stand at the doors (what a user passes, what a file holds); these tables are what goes round inside, checked in
+bulk when they are filled. Sides are 0 = the pair's lower body and 1 = the higher. b bodies, m modes.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sonic_bullet.synth.profile import OCTAVES
+from sonic_bullet.synth.strikes import SPAN
+
+HISTORY = 2 * SPAN - 1
+"""Steps of load that are remembered of a pair; column SPAN - 1 is the step being rendered."""
+
+BODY = np.dtype(
+    [
+        ("mass_kg", "f8"),  # 0 for what does not move
+        ("inertia_kg_m2", "f8", (3, 3)),  # body frame
+        ("modulus_pa", "f8"),  # E/(1-ν²), infinite where it is a rigid partner
+        ("restitution", "f8"),  # infinite where it has no material
+        ("roughness_m", "f8"),
+        ("hurst", "f8"),
+        ("size_m", "f8"),  # cube root of the volume
+        ("volume_m3", "f8"),
+        ("curvature_per_m", "f8"),  # of a shape that has one everywhere; NaN: its faces tell
+        ("edge_per_m", "f8"),  # curvature of its edges
+        ("wall_m", "f8"),  # see geometry.nearest_point
+        ("tie_m", "f8"),
+        ("surface_seed", "i8"),
+        ("rigid", "i8"),  # 1 where its translations sound
+        ("modes", "i8"),  # audible modes
+        ("columns", "i8"),  # the same and the lines of its residual: what shapes and gains are given for
+        ("frequency_at", "i8"),  # of mode 0 in the flat array of frequencies in Hz (m,)
+        ("shape_at", "i8"),  # of vertex 0, axis 0, column 0 in the flat shapes: + (3·vertex + axis)·columns + column
+        ("face_at", "i8"),
+        ("faces", "i8"),  # 0: no surface
+        ("node_at", "i8"),
+        ("placed", "i8"),  # step in which it began or was last moved by hand
+    ],
+    align=True,
+)
+
+FACE = np.dtype(
+    [("corner_m", "f8", (3, 3)), ("normal", "f8", (3,)), ("curvature_per_m", "f8"), ("vertex", "i8", (3,))],
+    align=True,
+)
+"""A triangle, in the order of its body's tree. vertex: the body's own numbers."""
+
+NODE = np.dtype([("low_m", "f8", (3,)), ("high_m", "f8", (3,)), ("child", "i8", (2,))], align=True)
+"""A box of a body's tree. child: both children, or (-start - 1, end) of a leaf, counted from the body's own first."""
+
+CONTACT = np.dtype(
+    [
+        ("a", "i4"),
+        ("b", "i4"),
+        ("point_a_m", "f8", (3,)),
+        ("point_b_m", "f8", (3,)),
+        ("normal", "f8", (3,)),
+        ("impulse_n_s", "f8", (3,)),
+        ("slip_m_s", "f8", (3,)),
+        ("sweep_m_s", "f8", (2,)),
+        ("approach_m_s", "f8"),
+        ("gap_m", "f8"),
+    ],
+    align=True,
+)
+"""A contact as it is logged; see records.contacts."""
+
+ROW = np.dtype(
+    [
+        ("key", "i8"),  # of the pair: lower body << 32 | higher
+        ("body", "i8", (2,)),
+        ("impulse_n_s", "f8", (3,)),  # on the lower body, world frame
+        ("normal", "f8", (3,)),  # towards the lower body, world frame
+        ("load_n_s", "f8"),  # normal part of the impulse
+        ("point_m", "f8", (2, 3)),  # in either body's frame
+        ("outward", "f8", (2, 3)),  # the surface's normal there, body frame
+        ("push_n_s", "f8", (2, 3)),  # impulse on that body, body frame
+        ("arm_m", "f8", (2, 3)),  # from its centre, world frame
+        ("sweep_m_s", "f8", (2,)),
+        ("approach_m_s", "f8"),
+        ("gap_m", "f8"),
+        ("touched", "i8"),  # 1 once what follows is known
+        ("face", "i8", (2,)),  # of the body's own faces, in tree order; -1: it has no surface
+        ("barycentric", "f8", (2, 3)),
+        ("curvature_per_m", "f8", (2,)),
+    ],
+    align=True,
+)
+
+PAIR = np.dtype(
+    [
+        ("key", "i8"),
+        ("body", "i8", (2,)),
+        ("force_n", "f8", (HISTORY,)),  # normal load of each step
+        ("struck_n", "f8", (HISTORY,)),  # what of it strikes have used up
+        ("support_n", "f8", (2,)),  # silent load at the rendered step's start and end
+        ("rubs", "i8"),  # 1 while it has a voice: what follows holds
+        ("load_n", "f8"),  # at the end of the step before
+        ("sweep_m_s", "f8", (2,)),
+        ("direction", "f8", (3,)),  # force on the lower body per newton of load, world; 0: not yet known
+        ("gains", "i8"),  # 1 once its row of the gains is known
+        ("mass_kg", "f8"),  # from here: SurfacePairs
+        ("modulus_pa", "f8"),
+        ("radius_m", "f8"),
+        ("damping_ratio", "f8"),
+        ("seed", "i8", (2,)),
+        ("height_m", "f8", (2, OCTAVES)),
+        ("depth", "f8"),  # from here: SurfaceState
+        ("lift", "f8"),
+        ("substeps", "i8"),
+        ("swept_m", "f8", (2,)),
+    ],
+    align=True,
+)
+
+PULSE = np.dtype(
+    [
+        ("body", "i8", (2,)),
+        ("start_s", "f8"),  # after the start of the step it was found in; before it, where negative
+        ("length_s", "f8"),
+        ("flat", "i8"),  # half-sine, not Hertz'
+        ("share", "f8"),  # of the impulse that the contact hands over (synth.pulse.compliant_share)
+        ("impulse_n_s", "f8", (3,)),  # on the lower body, world frame
+        ("ahead", "i8"),  # 0: found in the step being rendered, 1: in the one after it
+    ],
+    align=True,
+)
+"""One strike. Its Uᵀj on both bodies' columns stands beside it in an array (pulses, 2, columns)."""
