@@ -95,7 +95,8 @@ def main(names: tuple[str, ...]) -> int:
         errors = np.max(clean_errors, axis=0)
         worst = max(worst, float(errors.max()))
         print(
-            f"  exact recording, Π alone from a start up to 10 % off, largest errors of {len(clean_errors)}: {' '.join(f'{error:.1e}' for error in errors)}\n",
+            f"  exact recording, Π alone from a start up to 10 % off, largest errors of {len(clean_errors)}: "
+            f"{' '.join(f'{error:.1e}' for error in errors)}\n",
             flush=True,
         )
     return 0 if worst < 1e-4 else 1

@@ -48,7 +48,9 @@ def struck(what: Material, *, edge_m: float | None, count: int) -> tuple[Array, 
 
 
 def problem(name: str, seed: int = 0) -> tuple[Problem, Array]:
-    """A recording of the plate made of a preset, against a model that knows it only roughly; and the true α, β, γ, σ."""
+    """A recording of the plate made of a preset, against a model that knows it only roughly; and the true α,
+    β, γ, σ.
+    """
     rng = np.random.default_rng(seed)
     what = load_material(name)
     gamma = what.youngs_pa / what.density_kg_m3
@@ -102,7 +104,8 @@ def milliseconds(aim: object, parameters: Array, *, plain: bool, times: int) -> 
 def main(names: tuple[str, ...]) -> int:
     fast(problem("glass")[0])  # compiled before the clock runs
     print(
-        "material   feat modes | starts  eval/start   s/start      s       Π      | eval     s        Π      | lower by | evals  time   | α, β, γ, σ: reference over fast"
+        "material   feat modes | starts  eval/start   s/start      s       Π      | eval     s        Π      "
+        "| lower by | evals  time   | α, β, γ, σ: reference over fast"
     )
     worst = np.inf
     behind = []
@@ -117,8 +120,11 @@ def main(names: tuple[str, ...]) -> int:
         if quick.metric > seed.metric * (1 + ROUNDING):
             behind.append(name)
         print(
-            f"{name:10} {len(asked.features.freq_hz):4d} {len(asked.lambda_hat):5d} | {seed.starts:6d} {seed.evaluations / seed.starts:9.0f} {seed.seconds / seed.starts:11.3f}"
-            f" {seed.seconds:8.2f} {seed.metric:10.7f} | {quick.evaluations:4d} {quick.seconds:7.3f} {quick.metric:10.7f} | {seed.metric - quick.metric:8.1e} | {seed.evaluations / quick.evaluations:5.0f} {ratio:6.0f}"
+            f"{name:10} {len(asked.features.freq_hz):4d} {len(asked.lambda_hat):5d} | {seed.starts:6d} "
+            f"{seed.evaluations / seed.starts:9.0f} {seed.seconds / seed.starts:11.3f}"
+            f" {seed.seconds:8.2f} {seed.metric:10.7f} | {quick.evaluations:4d} {quick.seconds:7.3f} "
+            f"{quick.metric:10.7f} | {seed.metric - quick.metric:8.1e} | "
+            f"{seed.evaluations / quick.evaluations:5.0f} {ratio:6.0f}"
             f"  | {' '.join(f'{value:.5f}' for value in seed.parameters / quick.parameters)}",
             flush=True,
         )
@@ -129,7 +135,8 @@ def main(names: tuple[str, ...]) -> int:
     )
     print(f"one evaluation, last row: fused {fused:.2f} ms, plain {plain:.0f} ms, ratio {plain / fused:.0f}")
     print(
-        f"smallest ratio of times {worst:.0f}, asked {WITHIN:.0f}; behind the reference's metric: {', '.join(behind) or 'none'}"
+        f"smallest ratio of times {worst:.0f}, asked {WITHIN:.0f}; behind the reference's metric: "
+        f"{', '.join(behind) or 'none'}"
     )
     return 0 if worst >= WITHIN and not behind else 1
 

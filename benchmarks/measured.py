@@ -48,7 +48,8 @@ def main(arguments: list[str] | None = None) -> int:
         skipped += [f"{name}: {line}" for line in page.found.skipped]
         for row in page.found.rows:
             print(
-                f"  {row.what}: {row.before:.3g} -> {row.after:.3g} {row.unit} (null {row.null:.3g}) {row.effect}{' earned' if row.earned else ''}",
+                f"  {row.what}: {row.before:.3g} -> {row.after:.3g} {row.unit} (null {row.null:.3g}) "
+                f"{row.effect}{' earned' if row.earned else ''}",
                 flush=True,
             )
     written(asked.out, pages, skipped)

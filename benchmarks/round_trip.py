@@ -292,7 +292,8 @@ def main() -> int:
     asked = parser.parse_args()
     missed = 0
     print(
-        "| object | sensor | modes | decay % | level dB | all modes' decay % | level dB | | wall s |\n|---|---|---|---|---|---|---|---|---|"
+        "| object | sensor | modes | decay % | level dB | all modes' decay % | level dB | | wall s |\n"
+        "|---|---|---|---|---|---|---|---|---|"
     )
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
@@ -311,7 +312,8 @@ def main() -> int:
                 missed += not held
                 spent = time.monotonic() - begun
                 print(
-                    f"| {trial.name} | {sensor} | {count} | {100 * decay:.2f} | {level:.3f} | {100 * every:.2f} | {every_db:.3f} | {'met' if held else 'missed'} | {spent:.0f} |",
+                    f"| {trial.name} | {sensor} | {count} | {100 * decay:.2f} | {level:.3f} | "
+                    f"{100 * every:.2f} | {every_db:.3f} | {'met' if held else 'missed'} | {spent:.0f} |",
                     flush=True,
                 )
         for name in ("glass", "steel") if not asked.objects or "thick" in asked.objects else ():
@@ -319,7 +321,8 @@ def main() -> int:
                 worst = thicker(folder, sensor, name)
                 missed += not worst <= LIMIT_THICK
                 print(
-                    f"| {name} plate, twice as thick | {sensor} | | | | {100 * worst:.2f} | | {'met' if worst <= LIMIT_THICK else 'missed'} | |",
+                    f"| {name} plate, twice as thick | {sensor} | | | | {100 * worst:.2f} | | "
+                    f"{'met' if worst <= LIMIT_THICK else 'missed'} | |",
                     flush=True,
                 )
     print(f"\n{missed} missed")

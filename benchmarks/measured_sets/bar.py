@@ -60,13 +60,15 @@ def judge(folder: Path, case: dict[str, Any]) -> Outcome:
         )
     ]
     text = (
-        f"{len(tone_hz)} peaks of the spectrum within {STRONG_DB:.0f} dB of the strongest, {int(below.sum())} below 8 kHz. γ = E/ρ = {gamma:.4g} m²/s² (E = {gamma * density / 1e9:.1f} GPa), "
+        f"{len(tone_hz)} peaks of the spectrum within {STRONG_DB:.0f} dB of the strongest, "
+        f"{int(below.sum())} below 8 kHz. γ = E/ρ = {gamma:.4g} m²/s² (E = {gamma * density / 1e9:.1f} GPa), "
         f"ν = {nu:.3f} from {', '.join(f'{f:.1f}' for f in mine)} Hz. Above 8 kHz "
         + "; ".join(
             f"{h:.1f} Hz is observed where {m:.1f} is predicted ({100 * (m / h - 1):+.2f} %)"
             for h, m in zip(wide, better[mode], strict=True)
         )
-        + ". A table's steel (E = 200 GPa, ν = 0.29) is the frequencies' `before`; their null draws the modes above 8 kHz anywhere."
+        + ". A table's steel (E = 200 GPa, ν = 0.29) is the frequencies' `before`; their null draws the modes "
+        "above 8 kHz anywhere."
     )
     return _decays(rows, text, every)
 
@@ -80,8 +82,10 @@ def _decays(rows: list[Row], text: str, every: Lines) -> Outcome:
         draw(figure.subplots(), [by_all], [low], [high], "steel bar: below and above 8 kHz")
 
     left = (
-        "bending lines at 1.28, 3.52, 7.02 and 8.91 kHz outlast the take while 6.88 kHz dies in 0.4 s: neighbours in frequency differ tenfold in decay, so no law of frequency alone, "
-        "Rayleigh`s or other, holds. A support acts mode by mode so; where the wires touched is not known, and one tap cannot say"
+        "bending lines at 1.28, 3.52, 7.02 and 8.91 kHz outlast the take while 6.88 kHz dies in 0.4 s: "
+        "neighbours in frequency differ tenfold in decay, so no law of frequency alone, "
+        "Rayleigh`s or other, holds. A support acts mode by mode so; where the wires touched is not known, "
+        "and one tap cannot say"
     )
     return Outcome(tuple(rows), text, left, paint)
 

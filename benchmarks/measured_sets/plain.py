@@ -39,7 +39,10 @@ def alternate(bodies: dict[str, Lines], skipped: list[str]) -> Outcome:
     fit = [b.part(np.arange(len(b.freq_hz)) % 2 == 0) for b in kept]
     held = [b.part(np.arange(len(b.freq_hz)) % 2 == 1) for b in kept]
     found = trial("every second line", fit, held)
-    text = f"{len(joined(kept).freq_hz)} lines of {len(kept)} files; every second one fitted, the others predicted. {found.said}."
+    text = (
+        f"{len(joined(kept).freq_hz)} lines of {len(kept)} files; every second one fitted, the others predicted. "
+        f"{found.said}."
+    )
     left = (
         f"{found.row.after:.1f} dB of decay at the median line are left"
         if not found.row.earned

@@ -127,7 +127,8 @@ def render(**options: Any) -> None:
 @click.option(
     "--material",
     metavar="M",
-    help=f"A name ('sonic-bullet materials') or a preset file. [default: {DEFAULT_MODES_MATERIAL}, if no constants are given]",
+    help=f"A name ('sonic-bullet materials') or a preset file. [default: {DEFAULT_MODES_MATERIAL}, if no "
+    "constants are given]",
 )
 @click.option(
     "--young", "youngs_pa", type=float, metavar="E", help="Young's modulus in Pa, in place of the material's."
@@ -494,7 +495,8 @@ def _say_what_is_not_kept() -> None:
     folder = sys.modules.get("sonic_bullet.machine.user_folder")
     if folder is not None and folder.NOTES:
         _say(
-            f"note: compiled code and computed models are not kept for the next run: {folder.NOTES[0]}; XDG_CACHE_HOME names another folder"
+            f"note: compiled code and computed models are not kept for the next run: {folder.NOTES[0]}; "
+            "XDG_CACHE_HOME names another folder"
         )
 
 

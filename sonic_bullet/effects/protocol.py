@@ -278,7 +278,9 @@ class ChangesBaseline(ABC):
 
 
 class Dereverberates(ABC):
-    """An effect that hides the modes' own decays and levels from the lines, and can take itself out of them (a room)."""
+    """An effect that hides the modes' own decays and levels from the lines, and can take itself out of them
+    (a room).
+    """
 
     @abstractmethod
     def dereverberated(self, observed: ObjectEvidence) -> ObjectEvidence:
@@ -286,9 +288,8 @@ class Dereverberates(ABC):
 
     @abstractmethod
     def identified_from(self, signal: Array, sound: Array, noise: Array, sr: int, *, fully: bool = False) -> Self:
-        """The effect with its response identified from recordings (s, n) and what is played without it (s, n);
-
-        noise (s,): rms. fully: to the end.
+        """The effect with its response identified from recordings (s, n) and what is played without it (s, n); noise
+        (s,): rms. fully: to the end.
         """
 
 

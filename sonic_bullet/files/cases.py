@@ -129,9 +129,8 @@ class CaseObject:
 
 @dataclass(frozen=True, slots=True)
 class CaseRecording:
-    """One strike: an audio file or measured lines, on which object, for what use, and where and how hard;
-
-    None where not declared.
+    """One strike: an audio file or measured lines, on which object, for what use, and where and how hard; None where
+    not declared.
 
     channel: counted from 0; channel_named: whether the case says so, else it is the first.
     """
@@ -228,7 +227,8 @@ def _case(raw: _Raw, path: Path, unread: tuple[str, ...]) -> Case:
     if raw.medium is not None and raw.medium not in MEDIA:
         unread = (
             *unread,
-            f"case {path}: medium '{shown(raw.medium)}' is not known (known: {', '.join(MEDIA)}): damping is fitted as a whole",
+            f"case {path}: medium '{shown(raw.medium)}' is not known (known: {', '.join(MEDIA)}): damping is "
+            "fitted as a whole",
         )
     where = _onset(raw.onset), _said(raw.support), medium_of(raw.medium, observed)
     return Case(

@@ -109,9 +109,8 @@ def unit_tensors() -> Array:
 
 
 def anchored(youngs: tuple[float, float, float], shear: tuple[float, float, float], poisson: float) -> Array:
-    """The tensor (6, 6) of an anchor;
-
-    ν_ij √(E_j/E_i) = ν for all pairs. Source: compliance of orthotropic bodies [Bodig & Jayne 1982, eq. 3.8].
+    """The tensor (6, 6) of an anchor; ν_ij √(E_j/E_i) = ν for all pairs. Source: compliance of orthotropic bodies
+    [Bodig & Jayne 1982, eq. 3.8].
     """
     root = np.sqrt(np.array(youngs, float))
     compliance = np.zeros((6, 6))
@@ -204,9 +203,8 @@ def _spanning(vector: Array, gram: Array) -> Array:
 
 
 def _of_box(shape: Shape, length: float, count: int, poisson: float, say: Callable[[str], None]) -> TensorFamily | None:
-    """Of a free box along the axes, without elements;
-
-    None where the shape is no such box, or one of too many unknowns.
+    """Of a free box along the axes, without elements; None where the shape is no such box, or one of too many
+    unknowns.
     """
     from sonic_bullet.modal import polynomials
     from sonic_bullet.modal.meshing import structured

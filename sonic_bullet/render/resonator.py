@@ -193,9 +193,8 @@ def uplift(resonator: Resonator, face: Array, barycentric: Array, force: Array) 
 def participation(
     shape: Array, face: Array, at_face: Array, barycentric: Array, force: Array
 ) -> Array:  # pragma: no cover - compiled
-    """Σ over contacts of the shapes, linear in the triangle, times the force:
-
-    (v, 3, m), (f, 3), (k,), (k, 3), (k, 3) -> (m,).
+    """Σ over contacts of the shapes, linear in the triangle, times the force: (v, 3, m), (f, 3), (k,), (k, 3), (k, 3)
+    -> (m,).
     """
     modes = shape.shape[2]
     total = np.zeros(modes)

@@ -48,9 +48,8 @@ CELLS_PER_RADIAN = 4.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Setup:
-    """What does not change while listening: rate in Hz, sensors (a channel each), seed and medium;
-
-    residual: whether those of materials are heard.
+    """What does not change while listening: rate in Hz, sensors (a channel each), seed and medium; residual: whether
+    those of materials are heard.
     """
 
     sr: int

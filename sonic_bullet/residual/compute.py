@@ -176,9 +176,8 @@ def residual_record(
     lines: tuple[Array, Array, Array],
     source: str,
 ) -> Residual:
-    """The residual of strikes (s, n) from the onset on:
-
-    ``left`` (s, n) beside all features, ``rest`` (s, n) beside the modes as the model plays them.
+    """The residual of strikes (s, n) from the onset on: ``left`` (s, n) beside all features, ``rest`` (s, n) beside
+    the modes as the model plays them.
 
     lines: frequency, decay, amplitude (l,), mean square over the strikes, that the modes' share of the features leaves;
     neither they nor noise become more than there is in ``rest``. Levels come out relative to the strongest mode. Raises
@@ -207,6 +206,7 @@ def residual_record(
         order, per_hz = order[:0], np.zeros_like(per_hz)  # 80 dB below the clip: rounding, no residual
     clip = max(clip, whole)  # lines that outlast the clip
     return Residual(
-        modes.freq_hz, modes.decay_per_s, modes.amplitude / unit, line_hz[order], line_decay[order], line_amplitude[order] / unit,
+        modes.freq_hz, modes.decay_per_s, modes.amplitude / unit,
+        line_hz[order], line_decay[order], line_amplitude[order] / unit,
         freq, time, per_hz / unit**2, clip / unit**2, source,
     )  # fmt: skip

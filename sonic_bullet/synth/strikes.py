@@ -39,9 +39,8 @@ LOOKAHEAD = SPAN - 1
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LoadHistory:
-    """key (p,) sorted pair keys;
-
-    force_n (p, 2·SPAN-1) their normal loads; struck_n (p, 2·SPAN-1) what of them strikes have used up.
+    """key (p,) sorted pair keys; force_n (p, 2·SPAN-1) their normal loads; struck_n (p, 2·SPAN-1) what of them
+    strikes have used up.
     """
 
     key: Array
@@ -145,10 +144,9 @@ def causing_approach_m_s(
 
 
 def unheld_steps(split_: Split, mobile: Array, placed: Array) -> Array:
-    """(bodies,) steps for which gravity may have moved each mobile body although it rests:
-
-    1 where it carried load on any pair within the last steps, SPAN where it was just put where it is (placed): Bullet
-    finds the corners on which a box stands one a step, and it tilts meanwhile.
+    """(bodies,) steps for which gravity may have moved each mobile body although it rests: 1 where it carried load on
+    any pair within the last steps, SPAN where it was just put where it is (placed): Bullet finds the corners on which
+    a box stands one a step, and it tilts meanwhile.
     """
     low, high = key_bodies(split_.key[split_.loaded])
     out = np.zeros(len(mobile))

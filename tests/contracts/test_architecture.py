@@ -81,7 +81,8 @@ def test_importing_is_quick() -> None:
 def test_help_is_quick() -> None:
     assert (
         best_s(
-            "import sys; sys.argv = ['sonic-bullet', '--help']; from sonic_bullet.cli import main\ntry: main()\nexcept SystemExit: pass"
+            "import sys; sys.argv = ['sonic-bullet', '--help']; from sonic_bullet.cli import main\n"
+            "try: main()\nexcept SystemExit: pass"
         )
         < HELP_S * slack()
     )
@@ -121,7 +122,10 @@ def test_importing_brings_nothing_heavy(module: str) -> None:
     ["modal", "synth", "render", "files", "presets", "plots.scene_plot", "cli", "files.contact_log", "records"],
 )
 def test_everything_but_the_listener_lives_without_pybullet(module: str) -> None:
-    code = f"import sys; sys.modules['pybullet'] = sys.modules['pybullet_utils'] = sys.modules['pybullet_data'] = None; import sonic_bullet.{module}"
+    code = (
+        "import sys; sys.modules['pybullet'] = sys.modules['pybullet_utils'] = sys.modules['pybullet_data'] = "
+        f"None; import sonic_bullet.{module}"
+    )
     done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True, timeout=120)
     assert done.returncode == 0, done.stderr
 

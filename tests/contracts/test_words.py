@@ -122,7 +122,10 @@ def test_parts_are_what_stands_between_underscores_and_capitals(name: str, words
 
 
 def test_identifiers_are_seen_wherever_they_stand() -> None:
-    source = 'import a as told\nfrom b.heard import c\ndef f(wet, *, dried=1):\n    return f"{x.choke:.1f}{twin}"\nf(beside=2)\nclass Blow: ...\n'
+    source = (
+        'import a as told\nfrom b.heard import c\ndef f(wet, *, dried=1):\n    return f"{x.choke:.1f}{twin}"\n'
+        "f(beside=2)\nclass Blow: ...\n"
+    )
     assert {"told", "heard", "wet", "dried", "choke", "twin", "beside", "Blow"} <= set(identifiers(ast.parse(source)))
 
 

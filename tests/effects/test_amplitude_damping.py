@@ -107,7 +107,9 @@ def test_levels_from_strike_to_strike_tell_the_axes_too() -> None:
 
 
 def test_what_is_known_to_ring_beside_the_body_is_taken_out_of_its_lines() -> None:
-    """A stand that rings just beside every mode hides how these fall; once it is named, its sound is no part of theirs."""
+    """A stand that rings just beside every mode hides how these fall; once it is named, its sound is no part
+    of theirs.
+    """
     freq = plate().freq_hz
     apart = np.array([np.abs(np.delete(freq, k) - f).min() for k, f in enumerate(freq)])
     beside = tuple(float(f) - 45.0 for f in freq[apart > 150])

@@ -1,6 +1,5 @@
-"""A fitted preset sounds as recorded:
-
-rendered, fitted, and rendered again. All objects and sensors: benchmarks/round_trip.py.
+"""A fitted preset sounds as recorded: rendered, fitted, and rendered again. All objects and sensors:
+benchmarks/round_trip.py.
 """
 
 from __future__ import annotations

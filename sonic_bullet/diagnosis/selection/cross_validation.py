@@ -183,9 +183,8 @@ def _at_rest_folds(folds: list[Fold]) -> list[Fold]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Gain:
-    """On one left-out strike, of an effect fitted without it, if any came of that: as Candidate has them;
-
-    control_db (n,): of every draw.
+    """On one left-out strike, of an effect fitted without it, if any came of that: as Candidate has them; control_db
+    (n,): of every draw.
     """
 
     effect: Effect | None = None

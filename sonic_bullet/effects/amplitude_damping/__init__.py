@@ -52,10 +52,8 @@ AGAIN = np.geomspace(0.4, 2.5, 9)  # of what all evidence said
 
 @dataclass(frozen=True)
 class AmplitudeDamping(RotatesPairs, ChangesBaseline):
-    """damping_growth:
-
-    1/level at which the decay has doubled; power: of the level, with which it rises, 1 or 2. measure: as in
-    amplitude-pitch. alpha_per_s, beta_s: the material's, as the decays at low level tell them.
+    """damping_growth: 1/level at which the decay has doubled; power: of the level, with which it rises, 1 or 2.
+    measure: as in amplitude-pitch. alpha_per_s, beta_s: the material's, as the decays at low level tell them.
 
     louder: modes at the onset over what the linear model plays, as its lines miss some of a fall that is no
     exponential. freq_hz, turn_rad: of degenerate modes, and how far their axes are turned from the mesh's.
@@ -161,9 +159,8 @@ class _Fit:
 
 
 def _fitted(lines: list[DecayFrames], known: float | None) -> _Fit | None:
-    """The damping growth that all lines agree on;
-
-    None where it is not one that they are sure of. known: what all evidence said, if this is a part of it.
+    """The damping growth that all lines agree on; None where it is not one that they are sure of. known: what all
+    evidence said, if this is a part of it.
     """
     if len(lines) < 2:
         return None

@@ -66,9 +66,8 @@ Dashpots = tuple[Dashpot, ...]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DashpotFit:
-    """An object's lines (k,) and modes (m,). size (s, k) complex, worth (k,); into (s, m):
-
-    J φ(p)·e of the strikes; out (m,): φ(q)·n of the sensor.
+    """An object's lines (k,) and modes (m,). size (s, k) complex, worth (k,); into (s, m): J φ(p)·e of the strikes;
+    out (m,): φ(q)·n of the sensor.
 
     observed_hz, rings_per_s (l,): of every line, those too that are not held against modes; through (m,): what pulse
     and path leave of a mode, relative. normal (v, 3) of all vertices, body: those of the surface. runs, wide:
@@ -201,9 +200,8 @@ class DashpotFit:
         return np.asarray((share * self.model.decay_per_s[:, None]).sum(axis=0) / share.sum(axis=0))
 
     def misfit(self, pole: Array, turn: Array, turns: int) -> float:
-        """The same of poles (m,) and turns (m, m) that are at hand;
-
-        turns: of pairing and the law, and how many laws to begin with.
+        """The same of poles (m,) and turns (m, m) that are at hand; turns: of pairing and the law, and how many laws
+        to begin with.
         """
         pole, turn = _alive(pole, turn)
         own = self._own(turn)
@@ -334,9 +332,8 @@ def _cosine(a: Array, b: Array, *, every: bool = False) -> Array:
 
 
 def _level(observed: Array, modelled: Array) -> Array:
-    """ln of the level (k,) of columns (s, k) over that of others, less their median;
-
-    0 where there is nothing to tell.
+    """ln of the level (k,) of columns (s, k) over that of others, less their median; 0 where there is nothing to
+    tell.
     """
     if not (np.isfinite(observed).all() and np.isfinite(modelled).all() and modelled.any()):
         return np.zeros(observed.shape[1])

@@ -72,9 +72,8 @@ def fitted_object(
 
 
 def gain_of(objects: tuple[ObjectFit, ...]) -> tuple[float, float, float]:
-    """σ, its spread and the relative scatter of amplitudes about σψ, over all strikes whose place is known;
-
-    NaN where none is.
+    """σ, its spread and the relative scatter of amplitudes about σψ, over all strikes whose place is known; NaN where
+    none is.
 
     Least squares with Cauchy's weights; an amplitude counts as known to its spread and to 2 % of the mode's strongest
     ψ, the shapes' own error.

@@ -115,9 +115,8 @@ def _patterns(lines: Lines, seen: Observation, modes: Array) -> tuple[Array, Arr
 
 
 def _rings(lines: Lines) -> Array:
-    """How much each line (k,) may be a mode by its decay:
-
-    1, less where it is over far sooner than what holds the energy.
+    """How much each line (k,) may be a mode by its decay: 1, less where it is over far sooner than what holds the
+    energy.
 
     Lines at the fastest decay there is come in heaps that cancel one another, so their strengths say nothing; no more
     do those of other heaps.

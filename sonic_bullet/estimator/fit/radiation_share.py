@@ -57,9 +57,8 @@ def radiation_in(case: Case, evidence: tuple[RecordedObject, ...]) -> RadiationI
 def in_air(
     e: RecordedObject, log_gamma: float, poisson: float, to_hz: float, apart: bool, cache: Place = "default"
 ) -> Radiated | None:
-    """What an object's modes at (γ, ν) and the guess's density, those up to to_hz, radiate;
-
-    None where neither its sensor nor the fit asks for the air.
+    """What an object's modes at (γ, ν) and the guess's density, those up to to_hz, radiate; None where neither its
+    sensor nor the fit asks for the air.
 
     apart: radiation is no part of the material's damping. Raises MeshError where its surface cannot be made.
     """

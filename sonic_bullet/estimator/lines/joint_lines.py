@@ -76,9 +76,8 @@ def joint_lines(
 def _identified(
     signals: Array, noise: Array, sr: int, band_hz: tuple[float, float], signed: bool, modes: int | None, *, crowd: bool
 ) -> Lines:
-    """Lines of one hit, or what is left after several;
-
-    crowd: of more poles than lines those, too, that take most one after another, where these say plainly more.
+    """Lines of one hit, or what is left after several; crowd: of more poles than lines those, too, that take most one
+    after another, where these say plainly more.
     """
     start = start_poles(signals / noise[:, None], sr, *band_hz)
     few: Lines | None = None
@@ -129,9 +128,8 @@ def _significant(signals: Array, noise: Array, pole: Array, sr: int, low: float,
 
 
 def _from(late: int, signals: Array, sr: int, band_hz: tuple[float, float], signed: bool) -> Lines | None:
-    """Lines from a sample on, as they would have begun at the onset;
-
-    None where nothing can be identified from there, or a recording is over.
+    """Lines from a sample on, as they would have begun at the onset; None where nothing can be identified from there,
+    or a recording is over.
     """
     rest = signals[:, late:]
     if not (np.sqrt((rest**2).mean(axis=1)) > SILENT).all():
@@ -168,7 +166,9 @@ def _struck(lines: Lines, signals: Array) -> Lines:
 
 
 def noise_rms(signals: Array, sr: int) -> Array:
-    """Rms (s,) of the stationary floor, white: from the lower quarter of the spectrum of each recording's last third."""
+    """Rms (s,) of the stationary floor, white: from the lower quarter of the spectrum of each recording's
+    last third.
+    """
     tail = signals[:, -signals.shape[1] // 3 :]
     power = np.abs(np.fft.rfft(tail * np.hanning(tail.shape[1]), axis=1)) ** 2
     # exponential law: its lower quartile is ln(4/3) of the mean

@@ -64,9 +64,8 @@ class Features:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MaterialFit:
-    """What recordings say of a material. parameters:
-
-    (α 1/s, β s, γ m²/s², σ, ν), γ = E/ρ; covariance (5, 5) of ln α, ln β, ln γ, ln σ, ν.
+    """What recordings say of a material. parameters: (α 1/s, β s, γ m²/s², σ, ν), γ = E/ρ; covariance (5, 5) of ln α,
+    ln β, ln γ, ln σ, ν.
 
     A row and column of NaN: that parameter is not identifiable, and the verdict says so. verdict: "fitted", or why not,
     one line. metric: the hybrid metric Π there (metric.py), mean over the fitted strikes, -1 where there is nothing to

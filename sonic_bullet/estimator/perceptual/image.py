@@ -142,9 +142,8 @@ def _table(middle_hz: Array) -> Array:
 
 
 def plain_distance(target: Image, freq_hz: Array, decay_per_s: Array, amplitude: Array) -> float:
-    """Π_psycho [eq.
-
-    19] over its value for silence, by synthesis and Fourier transforms: what `distance` must equal. (m,) each.
+    """Π_psycho [eq. 19] over its value for silence, by synthesis and Fourier transforms: what `distance` must
+    equal. (m,) each.
     """
     time = (
         np.arange(max(level.window + level.hop * (len(level.loud) - 1) for level in target.levels)) / target.sr
@@ -166,9 +165,8 @@ def plain_distance(target: Image, freq_hz: Array, decay_per_s: Array, amplitude:
 def distance(
     target: Image, freq_hz: Array, decay_per_s: Array, amplitude: Array, differences: Array | None = None
 ) -> float:
-    """Π_psycho [eq.
-
-    19] over its value for silence: 0 the same image, 1 as far as silence. (m,) each, modes at 0 Hz are mute.
+    """Π_psycho [eq. 19] over its value for silence: 0 the same image, 1 as far as silence. (m,) each, modes at
+    0 Hz are mute.
 
     differences, where given, takes every √hop·ΔT, level after level, frame after frame, so that their squares sum to
     the answer.

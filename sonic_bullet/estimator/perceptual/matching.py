@@ -58,9 +58,8 @@ def points(
 
 
 def match_ratio_product(reference: Points, freq_hz: Array, decay_per_s: Array, amplitude: Array) -> float:
-    """Π_MRP in −1 … 0 [eq.
-
-    26]; modes (m,) that are mute or outside 20 Hz … 20 kHz take no part; 0 where none is left.
+    """Π_MRP in −1 … 0 [eq. 26]; modes (m,) that are mute or outside 20 Hz … 20 kHz take no part; 0 where none
+    is left.
     """
     return float(
         _product(

@@ -23,7 +23,9 @@ MATCH_FLOOR = 1e-6  # a match ratio product of zero would make Π infinite
 
 @dataclass(frozen=True, slots=True)
 class Constants:
-    """What the metric leaves free: the image's grid (image.py) and the plane of the match ratio product (matching.py)."""
+    """What the metric leaves free: the image's grid (image.py) and the plane of the match ratio product
+    (matching.py).
+    """
 
     bark_step: float = 0.5
     levels: int = 5

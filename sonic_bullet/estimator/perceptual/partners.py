@@ -55,9 +55,8 @@ def rayleigh(features: Features, trust: Array, lower: Array, upper: Array) -> tu
 
 @njit(nogil=True, error_model="numpy")
 def _rayleigh(eigen, decay, spread, trust):  # type: ignore[no-untyped-def]
-    """Robust non-negative α, β;
-
-    spread (k,) relative. The misfit shared by all starts at all of it and shrinks to what is left.
+    """Robust non-negative α, β; spread (k,) relative. The misfit shared by all starts at all of it and shrinks to
+    what is left.
     """
     unit = np.median(eigen)
     alpha, beta, misfit = 2 * np.median(decay), 0.0, 1.0

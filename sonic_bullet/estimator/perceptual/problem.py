@@ -63,7 +63,9 @@ class Problem:
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """The best parameters, their hybrid metric Π, and what the search cost: metric evaluations, wall seconds, starts."""
+    """The best parameters, their hybrid metric Π, and what the search cost: metric evaluations, wall seconds,
+    starts.
+    """
 
     alpha_per_s: float
     beta_s: float
