@@ -18,8 +18,9 @@ import numpy as np
 from benchmarks.measured_sets.laws import draw, trial
 from benchmarks.measured_sets.observed import cut, lines
 from benchmarks.measured_sets.values import DRAWS, Array, Lines, Outcome, Row, clear
+from sonic_bullet.modal.isotropic_family import Family
 from sonic_bullet.modal.meshing.mesh_files import read_mesh
-from sonic_bullet.modal.reduced import Family, family
+from sonic_bullet.modal.reduced import family
 
 SPLIT_HZ = 8000.0
 TABLE = (2.0e11, 0.29)  # E in Pa, ν of mild steel

@@ -20,8 +20,8 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet.modal import cache as store
+from sonic_bullet.modal.isotropic_family import Family
 from sonic_bullet.modal.model import MOST_MODES, SHIFT, _diagonal_m
-from sonic_bullet.modal.reduced import Family
 from sonic_bullet.records import ORTHOTROPIC, Array, Shape
 from sonic_bullet.records.errors import MeshError
 
@@ -58,8 +58,9 @@ KEPT = {
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TensorFamily:
-    """A body's modes for every orthotropic tensor. body: its surface and basis, as of `reduced.Family`, the isotropic
-    family in this basis.
+    """A body's modes for every orthotropic tensor.
+
+    body: its surface and basis, as of `Family`, the isotropic family in this basis.
 
     part (9, b, b): reduced stiffness of each constant of `ORTHOTROPIC`. ends (p + 1,): the basis falls into p pieces
     that no such tensor couples.

@@ -18,7 +18,7 @@ from sonic_bullet.estimator.fit.rayleigh import RayleighFit
 from sonic_bullet.estimator.fit.recorded import RecordedObject
 from sonic_bullet.estimator.lines.joint_lines import Lines
 from sonic_bullet.files.cases import CaseObject
-from sonic_bullet.modal.reduced import Family
+from sonic_bullet.modal.isotropic_family import Family
 from sonic_bullet.records import Material
 
 CORRECTION = 0.01

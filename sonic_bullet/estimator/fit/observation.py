@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sonic_bullet.modal.reduced import Family
+from sonic_bullet.modal.isotropic_family import Family
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import MeshError
 

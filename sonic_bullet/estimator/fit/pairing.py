@@ -20,7 +20,7 @@ import numpy as np
 from sonic_bullet.estimator.fit.observation import Observation
 from sonic_bullet.estimator.lines.joint_lines import PINNED, Lines
 from sonic_bullet.estimator.lines.shared_poles import FASTEST_PER_S
-from sonic_bullet.modal.reduced import Family
+from sonic_bullet.modal.isotropic_family import Family
 from sonic_bullet.records import Array
 
 DEGENERATE = 6e-4

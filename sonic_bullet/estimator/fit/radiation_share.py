@@ -21,8 +21,8 @@ from sonic_bullet.estimator.fit.recorded import RecordedObject
 from sonic_bullet.files.cases import Case
 from sonic_bullet.modal import read_mesh
 from sonic_bullet.modal.cache import Place
+from sonic_bullet.modal.isotropic_family import Family
 from sonic_bullet.modal.model import surface_of
-from sonic_bullet.modal.reduced import Family
 from sonic_bullet.records import Air, Array, ModalModel
 from sonic_bullet.synth.far_field import radiation
 

@@ -20,7 +20,8 @@ from sonic_bullet.files import channel_of, channel_words, read_audio
 from sonic_bullet.files.cases import Case, CaseObject, CaseRecording, Line
 from sonic_bullet.modal import read_mesh
 from sonic_bullet.modal.cache import Place
-from sonic_bullet.modal.reduced import Family, family
+from sonic_bullet.modal.isotropic_family import Family
+from sonic_bullet.modal.reduced import family
 from sonic_bullet.records import Array, Material, Shape
 from sonic_bullet.records.errors import AudioError, FileError, MeshError
 
