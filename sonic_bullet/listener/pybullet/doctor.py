@@ -124,27 +124,15 @@ def _empty(client_id: int) -> list[Finding]:
     """A world in which nothing can touch."""
     links = _links(client_id)
     if not links:
-        return [
-            Finding(
-                "no-body",
-                "error",
-                "there is no body in this world",
-                "load some before stepping, into the client that steps",
-            )
-        ]
+        what, remedy = "there is no body in this world", "load some before stepping, into the client that steps"
+        return [Finding("no-body", "error", what, remedy)]
     if not any(collision_pieces(client_id, *link) for link in links):
         what = (
             f"no link of the {len({body for body, _ in links})} bodies has a collision shape that PyBullet "
             "describes: nothing can touch"
         )
-        return [
-            Finding(
-                "no-shape",
-                "error",
-                what,
-                "give bodies collision shapes: createCollisionShape, or <collision> in their URDF",
-            )
-        ]
+        remedy = "give bodies collision shapes: createCollisionShape, or <collision> in their URDF"
+        return [Finding("no-shape", "error", what, remedy)]
     return []
 
 
