@@ -125,7 +125,9 @@ def runs_of(used, band):  # type: ignore[no-untyped-def]
 
 
 @njit(nogil=True, fastmath={"reassoc", "contract"}, error_model="numpy")
-def compare(reach, slot, used, shapes, state, turn, floor, band, share, scale, loud, table, out, weight):  # type: ignore[no-untyped-def]
+def compare(  # type: ignore[no-untyped-def]
+    reach, slot, used, shapes, state, turn, floor, band, share, scale, loud, table, out, weight
+):
     """Σ weight·ΔT² of one level; state is used up."""
     frames, bands = loud.shape
     sum_re, sum_im, power = np.zeros(len(used)), np.zeros(len(used)), np.zeros(bands + 2)

@@ -104,7 +104,9 @@ def _best_pairs(known, lambda_hat, amplitude_hat, alpha, beta, gammas):  # type:
 
 
 @njit(nogil=True, error_model="numpy")
-def _product(x, y, weight, per_bark, per_s, near_square, power, freq_hz, decay_per_s, amplitude):  # type: ignore[no-untyped-def]
+def _product(  # type: ignore[no-untyped-def]
+    x, y, weight, per_bark, per_s, near_square, power, freq_hz, decay_per_s, amplitude
+):
     known, modes = len(x), len(freq_hz)
     top, bottom = np.zeros(known), np.zeros(known)
     there_sum, there_weight = 0.0, 0.0
