@@ -1,4 +1,4 @@
-"""How far are the pressure weights of `synth.far_field` from a boundary element solution of the same modes?
+"""How far are the pressure weights of `radiation.far_field` from a boundary element solution of the same modes?
 
     python benchmarks/radiation_bem.py [--modes 14] [--only bar]
 
@@ -23,8 +23,8 @@ from scipy.special import spherical_jn, spherical_yn
 
 from sonic_bullet.geometry import nearest, surface_index
 from sonic_bullet.modal import analyse
+from sonic_bullet.radiation.far_field import directions, radiation
 from sonic_bullet.records import Air, Array, Material, ModalModel, Shape
-from sonic_bullet.synth.far_field import directions, radiation
 
 AIR = Air()
 RHO_C = AIR.density_kg_m3 * AIR.sound_speed_m_s

@@ -26,9 +26,10 @@ from sonic_bullet.effects.presets_of_effects import with_material, with_modes
 from sonic_bullet.files.cases import read_case
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.geometry import is_closed, volume_m3
+from sonic_bullet.radiation import radiated
 from sonic_bullet.records import Air, Body, Material, Microphone, ModalModel, ModalSum, Residual, Vibrometer
 from sonic_bullet.records.contacts import Contacts, Event, Step
-from sonic_bullet.render import radiated, render_log
+from sonic_bullet.render import render_log
 
 SR = 8000
 STEEL = Material.isotropic(

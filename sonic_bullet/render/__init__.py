@@ -13,10 +13,10 @@ from dataclasses import replace
 import numpy as np
 
 from sonic_bullet.files.contact_log import ContactLog
+from sonic_bullet.radiation.radiated import radiation_of
 from sonic_bullet.records import Array
 from sonic_bullet.records.coerce import as_call, as_flag, as_kind
 from sonic_bullet.records.errors import LogError
-from sonic_bullet.render.radiated import radiation_of
 from sonic_bullet.render.silence import silence_notes, why_silent
 from sonic_bullet.render.synthesizer import LATENCY_STEPS, Synthesizer
 

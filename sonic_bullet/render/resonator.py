@@ -19,10 +19,10 @@ import numpy as np
 
 from sonic_bullet.geometry.nearest_point import SurfaceIndex, nearest, surface_index
 from sonic_bullet.machine.compiled import njit
+from sonic_bullet.radiation.far_field import jerk_coefficient
+from sonic_bullet.radiation.radiated import radiation_of
 from sonic_bullet.records import Air, Array, Body, Microphone, ModalSum, Sensor, Vibrometer
-from sonic_bullet.render.radiated import radiation_of
 from sonic_bullet.synth.bank import ModeSet, audible
-from sonic_bullet.synth.far_field import jerk_coefficient
 
 CREASE_COS = np.cos(np.radians(20.0))
 EDGE_RADIUS_SHARE = 0.005
@@ -76,8 +76,8 @@ def weight_sets(sensors: tuple[Sensor, ...]) -> tuple[Sensor, ...]:
 def build_resonator(body: Body, sensors: tuple[Sensor, ...], sr: int, air: Air) -> Resonator:
     """Prepare one body. Modes at or above sr/2 and overdamped ones are dropped and counted.
 
-    The pressure weight of mode and microphone is the far-field map of `synth.far_field`; a vibrometer reads (φ(q)·n);
-    the seed's plain sum reads a·sin(ωt) for each mode [Ren et al. 2013, eq. 13], hence the turn by -i/(1 + i d/ω).
+    The pressure weight of mode and microphone is the far-field map of `radiation.far_field`; a vibrometer reads
+    (φ(q)·n); the seed's plain sum reads a·sin(ωt) for each mode [Ren et al. 2013, eq. 13], hence the turn by -i/(1 + i d/ω).
     """
     model = body.model
     readers = weight_sets(sensors)

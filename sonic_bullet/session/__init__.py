@@ -25,6 +25,7 @@ from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.geometry import oversize
 from sonic_bullet.listener.world import World
 from sonic_bullet.machine.terminal import status
+from sonic_bullet.radiation.radiated import radiation_of
 from sonic_bullet.records import Air, Array, Material, ModalModel, Sensor, Shape
 from sonic_bullet.records.coerce import (
     as_call,
@@ -37,7 +38,6 @@ from sonic_bullet.records.coerce import (
 from sonic_bullet.records.contacts import Event, Step
 from sonic_bullet.records.errors import AudioError, MeshError, ModalError, SceneError, SizeWarning
 from sonic_bullet.render import LATENCY_STEPS, Synthesizer
-from sonic_bullet.render.radiated import radiation_of
 from sonic_bullet.session.arguments import MicrophoneLike, as_material, as_sensors, as_shapes
 
 if TYPE_CHECKING:

@@ -15,8 +15,8 @@ import pytest
 import trimesh
 
 from sonic_bullet.modal import analyse, cache, eigen, reduced, tensor
+from sonic_bullet.radiation import radiated
 from sonic_bullet.records import Air, Material, ModalModel, Shape
-from sonic_bullet.render import radiated
 
 STEEL = Material.isotropic("steel", youngs_pa=2e11, poisson=0.29, density_kg_m3=7850, alpha_per_s=4.0, beta_s=2e-9)
 LAYOUT = {"x": cache.Kept("f8", ("n", 3)), "i": cache.Kept("i", ("m",), "n"), "b": cache.Kept("b1", (1,))}

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from sonic_bullet.files.contact_log import ContactLog
+from sonic_bullet.radiation.far_field import jerk_coefficient, radiation
 from sonic_bullet.records import Air, Microphone, ModalSum, Vibrometer
 from sonic_bullet.records.contacts import Contacts, Step
 from sonic_bullet.render import render_log, synthesizer
 from sonic_bullet.render.impacts import ForcePulse, find_pulses
 from sonic_bullet.render.resonator import build_resonator
 from sonic_bullet.synth import bank
-from sonic_bullet.synth.far_field import jerk_coefficient, radiation
 from tests.made.models import STEEL, ball_body, box_body, row, step, wall_body
 
 SR = 48_000

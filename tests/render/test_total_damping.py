@@ -17,10 +17,10 @@ from sonic_bullet.files import read_log, read_model, write_log, write_model
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.modal import analyse
 from sonic_bullet.presets import Provenance, load_material, material_of, named_preset, total_damping, write_preset
+from sonic_bullet.radiation.far_field import radiation
 from sonic_bullet.records import Air, Body, Material, Microphone, Shape
 from sonic_bullet.render import render_log
 from sonic_bullet.render.resonator import build_resonator
-from sonic_bullet.synth.far_field import radiation
 from tests.made.models import STEEL, ball_body, box_body, row, step
 
 FREQ_HZ = (740.0, 1230.0, 2950.0)

@@ -243,7 +243,7 @@ def test_how_the_sound_is_read_out_does_not_matter(client: Any) -> None:
 def test_without_a_microphone_contacts_are_kept_and_nothing_is_computed(
     client: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from sonic_bullet.synth import far_field as radiation
+    from sonic_bullet.radiation import far_field as radiation
 
     monkeypatch.setattr(radiation, "radiation", lambda *_: pytest.fail("nobody hears it"))
     floor(client)

@@ -3,7 +3,7 @@
     sum       Σ J (φ(p)·e) e^{−dt} sin ωt
         [Ren, Yeh, Lin 2013, eq. 11, 13]
     velocity  Σ J (φ(p)·e)(φ(q)·n) e^{−dt} (cos ωt − (d/ω) sin ωt)       an impulse J at p along e, seen at q along n
-    pressure  Σ J (φ(p)·e) |w| e^{−dt} cos ωt, w the radiation weight of the mode          [synth.far_field]
+    pressure  Σ J (φ(p)·e) |w| e^{−dt} cos ωt, w the radiation weight of the mode          [radiation.far_field]
 
 All as Re[A e^{(−d+iω)t}]: A = g·J·ψ·(−i | 1 + i d/ω | 1), with ψ the real transfer of the mode and g the gain, one
 number for the case.

@@ -1,7 +1,7 @@
 """What an object's modes lose to the air, as the run time has it, so that a fit of the material leaves it out.
 
     d_line = ½(α + βλ) + Δd
-        Δd: synth.far_field, in the air that the run time plays in, of the modes on the run time's own surface
+        Δd: radiation.far_field, in the air that the run time plays in, of the modes on the run time's own surface
         (render/resonator.py)
 
 The surface matters: what a mesh costs, about a decibel of pressure, is up to a third of Δd, and only the same mesh
@@ -23,8 +23,8 @@ from sonic_bullet.modal import read_mesh
 from sonic_bullet.modal.cache import Place
 from sonic_bullet.modal.isotropic_family import Family
 from sonic_bullet.modal.model import surface_of
+from sonic_bullet.radiation.far_field import radiation
 from sonic_bullet.records import Air, Array, ModalModel
-from sonic_bullet.synth.far_field import radiation
 
 KNOWN = 0.02  # relative: what radiation theory and mesh leave open of a mode's Δd
 BEYOND = 1.03  # of a band's end: modes that a line within it may be paired with
@@ -93,7 +93,7 @@ def into_air(
 ) -> tuple[Array, Array]:
     """|w| (m,) in Pa·m per modal velocity and Δd (m,) in 1/s of modes (b, m) of the family, freq_hz (m,) ascending.
 
-    Source: `synth.far_field`.
+    Source: `radiation.far_field`.
 
     surface: vertex_m (v, 3) and face (f, 3) of another mesh of the body than the family's own.
     """

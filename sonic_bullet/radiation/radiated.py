@@ -1,7 +1,7 @@
 """How a body's modes radiate, computed once: the first scene with a model waits a second or two for it, the next ones
 do not.
 
-sha256(frequencies, shapes, surface, air, source text of synth.far_field) -> weight, Δd in the cache that keeps the
+sha256(frequencies, shapes, surface, air, source text of radiation.far_field) -> weight, Δd in the cache that keeps the
 models themselves
 """
 
@@ -13,10 +13,10 @@ from pathlib import Path
 import numpy as np
 
 from sonic_bullet.modal import cache as store
+from sonic_bullet.radiation import entrained_mass as added_mass
+from sonic_bullet.radiation import far_field as radiation
 from sonic_bullet.records import Air, Array, ModalModel
 from sonic_bullet.records.errors import ModalError
-from sonic_bullet.synth import entrained_mass as added_mass
-from sonic_bullet.synth import far_field as radiation
 
 SOURCES = tuple(Path(str(room.__file__)).resolve() for room in (radiation, added_mass))
 PACKAGES = ("numpy", "scipy", "numba")
@@ -29,7 +29,7 @@ LAYOUT = {name: store.Kept("f8", ("m",)) for name in ("real", "imag", "damping")
 
 @lru_cache(maxsize=64)
 def radiation_of(model: ModalModel, air: Air, cache: store.Place = "default") -> tuple[Array, Array]:
-    """`synth.far_field.radiation` of a model: pressure weight (m,) complex and radiation damping (m,).
+    """`radiation.far_field.radiation` of a model: pressure weight (m,) complex and radiation damping (m,).
 
     Bodies that share a model share it (models are compared by identity). cache: folder, "default" or None.
     """

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.special import spherical_jn, spherical_yn
 
+from sonic_bullet.radiation.entrained_mass import moved_air
+from sonic_bullet.radiation.far_field import directions, jerk_coefficient, radiation, spread_directions
 from sonic_bullet.records import Air, Array, ModalModel
-from sonic_bullet.synth.entrained_mass import moved_air
-from sonic_bullet.synth.far_field import directions, jerk_coefficient, radiation, spread_directions
 
 AIR = Air()
 RHO_C = AIR.density_kg_m3 * AIR.sound_speed_m_s

@@ -25,8 +25,8 @@ from __future__ import annotations
 import numpy as np
 
 from sonic_bullet.machine.compiled import njit
+from sonic_bullet.radiation.entrained_mass import Moved, moved_air
 from sonic_bullet.records import Air, Array, ModalModel
-from sonic_bullet.synth.entrained_mass import Moved, moved_air
 
 _MODES_AT_ONCE = 32
 MOST_PATCHES = 1800

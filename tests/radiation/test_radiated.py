@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from sonic_bullet.files.contact_log import ContactLog
+from sonic_bullet.radiation import far_field as radiation
+from sonic_bullet.radiation import radiated as room
 from sonic_bullet.records import Air, Microphone
-from sonic_bullet.render import radiated as room
-from sonic_bullet.synth import far_field as radiation
 from tests.made.models import STEEL, ball_body, box_model, step
 
 MODEL = box_model((0.2, 0.1, 0.01), (740.0, 1230.0, 2950.0), STEEL)
