@@ -77,7 +77,8 @@ def build_resonator(body: Body, sensors: tuple[Sensor, ...], sr: int, air: Air) 
     """Prepare one body. Modes at or above sr/2 and overdamped ones are dropped and counted.
 
     The pressure weight of mode and microphone is the far-field map of `radiation.far_field`; a vibrometer reads
-    (φ(q)·n); the seed's plain sum reads a·sin(ωt) for each mode [Ren et al. 2013, eq. 13], hence the turn by -i/(1 + i d/ω).
+    (φ(q)·n); the seed's plain sum reads a·sin(ωt) for each mode [Ren et al. 2013, eq. 13], hence the turn by
+    -i/(1 + i d/ω).
     """
     model = body.model
     readers = weight_sets(sensors)
