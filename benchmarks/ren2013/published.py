@@ -1,7 +1,7 @@
 """The figures that the paper gives [Ren, Yeh, Lin 2013, Tables I and II]: what was estimated, and what it took.
 
-α and β are in 1/s and s. γ and σ are in units that the paper does not name: γ of metal is a fiftieth of any metal's
-E/ρ in m²/s², and the ratio differs by material. Times are of one 2.8 GHz core of a Xeon X5560 of 2009.
+α and β are in 1/s and s. γ and σ are in units that the paper does not name: γ of metal lies below any
+metal's E/ρ in m²/s², and the ratio differs by material. Times are of one 2.8 GHz core of a Xeon X5560 of 2009.
 """
 
 from __future__ import annotations

@@ -203,7 +203,7 @@ class Evidence:
     found so far by id, band and seed.
 
     known: what the effect said of the whole evidence, or beside other effects: it is there to be fitted again, not to
-    be looked for. on_trial: whether this is the evidence without a strike, known's numbers to be estimated again; axes
+    be looked for. held_out: whether this is the evidence without a strike, known's numbers to be estimated again; axes
     of degenerate pairs, which a linear body has no part of, stand as known has them.
     """
 
@@ -215,7 +215,7 @@ class Evidence:
     band_hz: tuple[float, float]
     seed: int = 0
     known: Effect | None = None
-    on_trial: bool = False
+    held_out: bool = False
 
 
 class Cost(Enum):
