@@ -99,8 +99,9 @@ def recorded(folder: Path) -> Recorded:
         raise FileError(
             "it has no mesh, no audio, or no strike of known place", "the paper's procedure needs all three"
         )
-    truth = folder / "truth.json"
-    said = json.loads(truth.read_text()) if truth.is_file() else {}
+    truth = folder / "truth.json"  # of the case's first object
+    known = truth.is_file() and thing.thing.name == next(iter(case.objects), "")
+    said = json.loads(truth.read_text()) if known else {}
     return Recorded(case, thing, int(np.flatnonzero(thing.seen.known)[0]), said)
 
 

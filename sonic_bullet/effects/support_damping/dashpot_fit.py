@@ -12,7 +12,7 @@
 c_kj: cosine of a line's amplitudes over the strikes with what one exponential at the mode's pole would take of all
 modes, Σ_i a_i 2d_j/((d_i + d_j) − i(ω_i − ω_j)), or with the mode's own. C_k: with what exponentials at the lines'
 poles take of all modes together (variable projection's linear half [Golub & Pereyra 1973]): modes that sound as one
-line are one, those that a dashpot has told apart are not. l_k: ln of a line's level over that, less what is common to
+line are one, those that a dashpot has split are not. l_k: ln of a line's level over that, less what is common to
 all: of degenerate modes that a dashpot has turned, which one the sensor hears, all strikes show alike, so C_k does not.
 """
 
@@ -45,8 +45,8 @@ WEAK, HALF = 0.05, 0.5
 # quantile of the energy of modes that are observed, for one that would be; times a line's decay, for one that it hides
 CLEAR, LONGER = 0.25, 2.0
 LOW = 0.3  # of a line's spread where it lies under the least law
-# of relaxations that peak in what is heard, between slow ones, whose decay is a constant, and fast ones, whose goes as
-# ω²
+# of relaxations that peak in what is observed, between slow ones, whose decay is a constant, and fast ones, whose goes
+# as ω²
 TAU_S = (1e-5, 3e-5, 1e-4)
 # modes whose coupling is reckoned with in a first look, and in a closer one: what eigenvalues cost goes with the cube
 RUN, WIDE = 10, 20
@@ -219,7 +219,7 @@ class DashpotFit:
             alike = self._alike(omega, extra + law, push)
             line, mode, _ = self._pairs(omega, extra + law, alike)
             if not len(line):
-                return 2 * nothing  # nor is any mode heard
+                return 2 * nothing  # nor is any mode observed
             worth, sd = (
                 self.worth[line],
                 np.hypot(self.sd[line], SCATTER * np.minimum(extra[mode], self.decay_per_s[line])),
