@@ -14,6 +14,7 @@ body) in small classes that they derive from.
 
 from __future__ import annotations
 
+import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -216,6 +217,12 @@ class Evidence:
     seed: int = 0
     known: Effect | None = None
     held_out: bool = False
+
+    @property
+    def on_trial(self) -> bool:
+        """Former name of `held_out`."""
+        warnings.warn("Evidence.on_trial is now held_out", DeprecationWarning, stacklevel=2)
+        return self.held_out
 
 
 class Cost(Enum):
