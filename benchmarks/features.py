@@ -21,7 +21,6 @@ from scipy.optimize import linear_sum_assignment
 
 from sonic_bullet.estimator.lines import exact_modes, likelihood, noise_density, subspace
 from sonic_bullet.estimator.lines.extraction import BAND_HZ, FASTEST_PER_S, extract
-from sonic_bullet.estimator.perceptual.greedy import greedy
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import AudioError
 
@@ -85,6 +84,18 @@ def paper(draws: int) -> None:
                 )
 
 
+def matched(got: Array, freq: Array, decay: Array) -> tuple[int, str]:
+    """Found (k, 2) of f and d within a decay's width of the modes (m,), and relative errors of both: mean, median,
+    worst.
+    """
+    width = np.maximum(decay / (2 * np.pi), 0.5)
+    cost = np.minimum(np.abs(got[:, :1] - freq) / width, 10)
+    i, j = linear_sum_assignment(cost)
+    i, j = i[cost[i, j] < 1], j[cost[i, j] < 1]
+    f, d = np.abs(got[i, 0] / freq[j] - 1), np.abs(got[i, 1] / decay[j] - 1)
+    return len(i), " | ".join(f"{e.mean():.1e}, {np.median(e):.1e}, {e.max():.1e}" for e in (f, d))
+
+
 def steps() -> None:
     full, noisy = hundred(0), mixture(1, 40.0)
     cases = {"100 sinusoids, no noise": (full[0], full[1], full[3]), "40 modes, 40 dB": (noisy[0], noisy[1], noisy[4])}
@@ -93,9 +104,8 @@ def steps() -> None:
         f"worst | s |\n{'|---' * 8}|"
     )
     for name, (freq, decay, x) in cases.items():
-        begun = time.process_time()
-        rows = [("the paper's, greedy", greedy(x, SR, len(freq))[:, :2])]
-        times = [time.process_time() - begun]
+        rows: list[tuple[str, Array]] = []
+        times: list[float] = []
 
         def timed(
             label: str, pole: Array, start: float, rows: list[tuple[str, Array]] = rows, times: list[float] = times
@@ -133,15 +143,9 @@ def steps() -> None:
         rows.append(("the whole of `extract`", np.stack([found.freq_hz, found.decay_per_s], axis=1)))
         times.append(time.process_time() - begun)
         for (label, got), spent in zip(rows, times, strict=True):
-            width = np.maximum(decay / (2 * np.pi), 0.5)
-            cost = np.minimum(np.abs(got[:, :1] - freq) / width, 10)
-            i, j = linear_sum_assignment(cost)
-            i, j = i[cost[i, j] < 1], j[cost[i, j] < 1]
-            f, d = np.abs(got[i, 0] / freq[j] - 1), np.abs(got[i, 1] / decay[j] - 1)
-            said = " | ".join(f"{e.mean():.1e}, {np.median(e):.1e}, {e.max():.1e}" for e in (f, d))
+            hits, said = matched(got, freq, decay)
             print(
-                f"| {name} | {label} | {len(got)} | {len(i)} of {len(freq)} | {len(got) - len(i)} | {said} | "
-                f"{spent:.1f} |",
+                f"| {name} | {label} | {len(got)} | {hits} of {len(freq)} | {len(got) - hits} | {said} | {spent:.1f} |",
                 flush=True,
             )
 

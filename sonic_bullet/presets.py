@@ -45,7 +45,7 @@ FOLDER = Path(__file__).parent / "materials"
 BYTES_MAX = 1 << 20
 _REMEDY = "give a material's name, or the path of a preset file"
 DAMPING_TAKEN = "damping (from '"
-"""How a provenance begins to say whose damping it is where recordings told none: a table's, without radiation."""
+"""How a provenance begins to say whose damping it is where recordings identified none: a table's, without radiation."""
 
 Positive = Annotated[float, msgspec.Meta(gt=0)]
 NotNegative = Annotated[float, msgspec.Meta(ge=0)]

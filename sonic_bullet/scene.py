@@ -91,7 +91,7 @@ def render_scene(
 def examine_scene(path: str | Path, seconds: float = 1.0, say: Say | None = None) -> tuple[Finding, ...]:
     """What in a scene would spoil its sound, and how to mend it.
 
-    Runs it for ``seconds`` of physics time; say is told what is being computed.
+    Runs it for ``seconds`` of physics time; say is given what is being computed.
 
     Raises SonicBulletError.
     """

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.measured_sets.laws import draw, trial
+from benchmarks.measured_sets.laws import draw, validated
 from benchmarks.measured_sets.observed import cut, lines
 from benchmarks.measured_sets.values import DRAWS, Array, Lines, Outcome, Row, clear
 from sonic_bullet.modal.isotropic_family import Family
@@ -76,7 +76,7 @@ def judge(folder: Path, case: dict[str, Any]) -> Outcome:
 
 def _decays(rows: list[Row], text: str, every: Lines) -> Outcome:
     low, high = every.part(every.freq_hz < SPLIT_HZ), every.part(every.freq_hz >= SPLIT_HZ)
-    by_all = trial("decays above 8 kHz", [low], [high], seed=1)
+    by_all = validated("decays above 8 kHz", [low], [high], seed=1)
     rows.append(by_all.row)
 
     def paint(figure: Any) -> None:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.measured_sets.laws import Trial, draw, trial
+from benchmarks.measured_sets.laws import Validation, draw, validated
 from benchmarks.measured_sets.observed import lines
 from benchmarks.measured_sets.values import Lines, Outcome, Row, clear
 
@@ -46,13 +46,13 @@ def over_sizes(bodies: dict[str, Lines], skipped: list[str], label: str = "") ->
         energy = b.amplitude**2 / b.decay_per_s
         pitch[name] = float(b.freq_hz[energy > 0.01 * energy.max()].min())
     order = sorted(bodies, key=pitch.__getitem__)
-    made: list[tuple[Trial, list[Lines], list[Lines]]] = []
+    made: list[tuple[Validation, list[Lines], list[Lines]]] = []
     for i, name in enumerate(order):
         others = sorted((j for j in range(len(order)) if j != i), key=lambda j: abs(j - i))[:2]
         fit = [bodies[order[j]] for j in others]
         made.append(
             (
-                trial(f"{label}{name} from {order[others[0]]} and {order[others[1]]}", fit, [bodies[name]], seed=i),
+                validated(f"{label}{name} from {order[others[0]]} and {order[others[1]]}", fit, [bodies[name]], seed=i),
                 fit,
                 [bodies[name]],
             )

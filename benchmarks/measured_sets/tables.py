@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.measured_sets.laws import draw, trial
+from benchmarks.measured_sets.laws import draw, validated
 from benchmarks.measured_sets.sizes import total
 from benchmarks.measured_sets.values import DRAWS, Array, Lines, Outcome, Row, told
 
@@ -43,12 +43,12 @@ def materials(folder: Path, case: dict[str, Any]) -> Outcome:
         if len(mine) >= 3:
             for i, name in enumerate(sorted(mine)):
                 rest = [t for n, t in mine.items() if n != name]
-                made.append((trial(name, rest, [mine[name]], seed=i), rest, [mine[name]]))
+                made.append((validated(name, rest, [mine[name]], seed=i), rest, [mine[name]]))
             rows.append(total(f"{kind}: each of {len(made)} classes from the others", [m[0].row for m in made]))
         else:
             fit = [t.part(np.arange(len(t.freq_hz)) % 2 == 0) for t in mine.values()]
             held = [t.part(np.arange(len(t.freq_hz)) % 2 == 1) for t in mine.values()]
-            made.append((trial(f"{kind}: every second line", fit, held), fit, held))
+            made.append((validated(f"{kind}: every second line", fit, held), fit, held))
             rows.append(made[0][0].row)
         pictured = pictured or (kind, made[0])
     if pictured is None:
@@ -84,7 +84,7 @@ def derived(folder: Path, case: dict[str, Any]) -> Outcome:
         bodies = {p["plate"]: _plate(p["modes"]) for p in plates}
         made = [
             (
-                trial(
+                validated(
                     f"spruce {n}, from the other plates", [b for m, b in bodies.items() if m != n], [bodies[n]], seed=i
                 ),
                 n,

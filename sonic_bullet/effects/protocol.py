@@ -8,6 +8,7 @@ body) in small classes that they derive from.
 
 from __future__ import annotations
 
+import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -162,7 +163,7 @@ class Evidence:
     found so far by id, band and seed.
 
     known: what the effect said of the whole evidence, or beside other effects: it is there to be fitted again, not to
-    be looked for. on_trial: whether this is the evidence without a strike, known's numbers to be estimated again; axes
+    be looked for. held_out: whether this is the evidence without a strike, known's numbers to be estimated again; axes
     of degenerate pairs, which a linear body has no part of, stand as known has them.
     """
 
@@ -174,7 +175,13 @@ class Evidence:
     band_hz: tuple[float, float]
     seed: int = 0
     known: Effect | None = None
-    on_trial: bool = False
+    held_out: bool = False
+
+    @property
+    def on_trial(self) -> bool:
+        """Former name of `held_out`."""
+        warnings.warn("Evidence.on_trial is now held_out", DeprecationWarning, stacklevel=2)
+        return self.held_out
 
 
 class Cost(Enum):

@@ -74,7 +74,7 @@ class Radiation(Alternatives):
         return 2
 
     def others(self) -> tuple[Radiation, ...]:
-        """The same energy, heard otherwise: another effect's roll-off may have taken up the tilt, or left it."""
+        """The same energy, observed otherwise: another effect's roll-off may have taken up the tilt, or left it."""
         return (replace(self, tilt=0.5 - self.tilt),)
 
     @classmethod

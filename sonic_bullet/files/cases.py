@@ -29,7 +29,7 @@ SPLITS = ("fit", "holdout", "transfer")
 MEDIA = ("air", "none")
 IN_AIR = ("velocity", "pressure")
 """Sensors of real things: what they recorded was in air where a case does not say otherwise."""
-LARGEST = 1e6  # metres, or N·s: no place, size or blow of a strike is larger, and squares of such numbers stay finite
+LARGEST = 1e6  # metres, or N·s: no place, size or impulse is larger, and squares of such numbers stay finite
 Number = Annotated[float, msgspec.Meta(ge=-LARGEST, le=LARGEST)]
 Magnitude = Annotated[float, msgspec.Meta(ge=-1e12, le=1e12)]
 Hertz = Annotated[float, msgspec.Meta(le=1e7)]

@@ -1,5 +1,6 @@
-"""What a simulation told us, step by step: `Contacts` (rows of one step), `Step`, `Event`, and the `ContactLog` they
-add up to.
+"""What a simulation reports, step by step:
+
+`Contacts` (rows of one step), `Step`, `Event`, and the `ContactLog` they add up to.
 
     getContactPoints -> Contacts -> Step -> synthesizer (live)      -> frame
                                       \\-> ContactLog -> npz -> Step -> the same synthesizer (replay) -> the same bits

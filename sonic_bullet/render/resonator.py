@@ -1,7 +1,7 @@
 """A body as the synthesizer plays it: its audible modes, their weights at each sensor, and where on its surface a
 contact lies.
 
-    Body (records) + sensors + rate + air -> Sounder;  contact points -> Touch -> Uᵀf (participation)
+    Body (records) + sensors + rate + air -> Resonator;  contact points -> Touch -> Uᵀf (participation)
 
 A rigid body that is pushed sounds too: acceleration noise. A sphere of radius a whose velocity jumps by U is heard as p
 = ρ₀c U (a/r) cosθ e^{-wt}(cos wt - sin wt), w = c/a [Kirchhoff 1876; Koss, Alfredson 1973, eq. 9]. That is the impulse

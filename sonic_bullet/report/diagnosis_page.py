@@ -163,7 +163,7 @@ def _candidates(d: Diagnosis) -> str:
         for c in sorted(d.closed.tried, key=lambda c: -c.mean_db)
     ]
     head = ("candidate", "kept", "nearer, dB", "chance, dB", "strike by strike, each left out in turn")
-    silent = "<p>Suspects that do not stand here found nothing of theirs in the recordings.</p>"
+    silent = "<p>Candidates that do not stand here found nothing of theirs in the recordings.</p>"
     return "<h2>Candidate effects</h2>" + (_table(head, rows) if rows else "") + silent
 
 

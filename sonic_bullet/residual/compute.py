@@ -7,7 +7,7 @@
 
 For a preset it is described in two parts. What is left of the features, √(1 - R_i²) of each, is lines: their
 frequencies are known far better than a spectrogram shows them. In no band more is left than recordings have beyond what
-is played: modes too close to be told apart make one feature that matches none of them. What is left beside all features
+is played: modes too close to be resolved make one feature that matches none of them. What is left beside all features
 is noise, of which bands and times keep the mean, less the recording's own floor, less what most strikes do not have,
 and less what is not noise: the foot of lines that are no pure damped sinusoids would else be spread over whole bands.
 """

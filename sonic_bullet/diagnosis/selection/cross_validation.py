@@ -200,10 +200,10 @@ def _cross_validated(
     def judged(i: int) -> Gain:
         fold = folds[i]
         less = fold.evidence
-        effect = kind.propose(replace(less, known=whole, on_trial=True))
+        effect = kind.propose(replace(less, known=whole, held_out=True))
         if effect is None:
             return Gain()
-        # such axes are whole's (Evidence.on_trial)
+        # such axes are whole's (Evidence.held_out)
         free = effect.freedom() - (effect.angles() if isinstance(effect, RotatesPairs) else 0)
         random = [
             ControlEffect.fitted(less, min(free, RULES.control_numbers), 10 * i + draw)

@@ -126,13 +126,13 @@ class AmplitudeDamping(RotatesPairs, ChangesBaseline):
             plain = {name: lines_under(e, h, name) for name in (levels(h) if known is None else (known.measure,))}
             for name, power in product(plain, POWERS if known is None else (known.power,)):
                 lines = [replace(line, power=power) for line in plain[name]]
-                if evidence.on_trial and known is not None:
+                if evidence.held_out and known is not None:
                     lines = [_held(line, known) for line in lines]
                 found = _fitted(lines, known.damping_growth if known is not None else None)
                 if found is not None and (best is None or found.gain > best[0]):
                     axes = (
                         (known.freq_hz, known.turn_rad)
-                        if evidence.on_trial and known is not None
+                        if evidence.held_out and known is not None
                         else _axes(lines, found)
                     )
                     best = (

@@ -12,7 +12,7 @@
 c_kj: cosine of a line's amplitudes over the strikes with what one exponential at the mode's pole would take of all
 modes, Σ_i a_i 2d_j/((d_i + d_j) − i(ω_i − ω_j)), or with the mode's own. C_k: with what exponentials at the lines'
 poles take of all modes together (variable projection's linear half [Golub & Pereyra 1973]): modes that sound as one
-line are one, those that a dashpot has told apart are not. l_k: ln of a line's level over that, less what is common to
+line are one, those that a dashpot has split are not. l_k: ln of a line's level over that, less what is common to
 all: of degenerate modes that a dashpot has turned, which one the sensor hears, all strikes show alike, so C_k does not.
 """
 
@@ -214,7 +214,7 @@ class DashpotFit:
             alike = self._alike(omega, extra + law, push)
             line, mode, _ = self._pairs(omega, extra + law, alike)
             if not len(line):
-                return 2 * nothing  # nor is any mode heard
+                return 2 * nothing  # nor is any mode observed
             worth, sd = (
                 self.worth[line],
                 np.hypot(self.sd[line], SCATTER * np.minimum(extra[mode], self.decay_per_s[line])),

@@ -8,7 +8,7 @@
     solve    ln γ and ν by least squares on ln λ, outliers down-weighted
         [Cauchy's weight: Holland & Welsch 1977]
 
-Modes closer than TWINS are one: their shapes within the pair are anyone's, the sum over the pair is not.
+Modes closer than DEGENERATE are one: their shapes within the pair are anyone's, the sum over the pair is not.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from sonic_bullet.modal.isotropic_family import Family
 from sonic_bullet.records import Array
 
 DEGENERATE = 6e-4
-MESHED = 2.5  # times as far apart where elements have torn them from each other
+MESHED = 2.5  # times as far apart where elements have split them
 MESH_SD = 2.5e-3  # of a mode's frequency, the mesh's and the shape's own error
 LOWEST = 0.2  # of that, in the lowest modes
 GAMMA_REACH = 0.65  # of ln γ: E and ρ both wrong by 30 %

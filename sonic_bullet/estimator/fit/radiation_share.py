@@ -46,8 +46,8 @@ def nothing(group: Group) -> Radiated:
 
 
 def radiation_in(case: Case, evidence: tuple[RecordedObject, ...]) -> RadiationIn:
-    """Whether the material's own damping can be told from what the air takes: nothing is lost to a medium, or it is
-    known, and so are all shapes.
+    """Whether the material's own damping can be separated from what the air takes: nothing is lost to a medium, or it
+    is known, and so are all shapes.
     """
     if case.medium == "none":
         return "nothing"

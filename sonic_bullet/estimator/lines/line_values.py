@@ -58,7 +58,7 @@ class Features:
             object.__setattr__(self, name, frozen_array(value, np.float64, (count,), name, finite=False))
         if (self.freq_hz <= 0).any() or (self.decay_per_s < 0).any() or (self.amplitude <= 0).any():
             raise RecordError(
-                "features hold a frequency or amplitude of zero, or a negative decay", "keep only what was heard"
+                "features hold a frequency or amplitude of zero, or a negative decay", "keep only what was observed"
             )
 
 
