@@ -41,6 +41,7 @@ check: .venv/dev.stamp
 
 bench: .venv/dev.stamp
 	@set -e; for file in benchmarks/*.py; do echo "== $$file"; $(BIN)/python $$file; done
+	@set -e; for asked in speed ablation features; do echo "== ren2013 $$asked"; $(BIN)/python -m benchmarks.ren2013 --question $$asked; done
 
 docs: .venv/dev.stamp
 	$(BIN)/python docs/make_reference.py

@@ -1,6 +1,7 @@
 """The recipe of the meshes in this folder: run `python assets/make_meshes.py` to make them again, byte for byte.
 
-Solids of revolution about z, in metres, centre of the bounding box at the origin, walls of a thickness that tableware has.
+Solids of revolution about z, in metres, centre of the bounding box at the origin, walls of a thickness that tableware
+has.
 """
 
 from __future__ import annotations

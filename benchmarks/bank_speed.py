@@ -138,10 +138,12 @@ def main() -> None:
     free, hit, pushed = ours(sizes), ours(sizes, strikes_per_s=1000), ours(sizes, forced=True)
     second = FRAMES * FRAME / SR
     print(
-        f"20 bodies of 300 modes: ringing {free / second:.1%} of real time; with 1000 strikes/s {hit / second:.1%}; with a force on each {pushed / second:.1%}"
+        f"20 bodies of 300 modes: ringing {free / second:.1%} of real time; with 1000 strikes/s "
+        f"{hit / second:.1%}; with a force on each {pushed / second:.1%}"
     )
     print(
-        f"one strike on 300 modes, all in: {(hit - free) / (1000 * second) * 1e6:.0f} us; one sample of one forced mode: {(pushed - free) / (6000 * FRAMES * FRAME) * 1e9:.2f} ns"
+        f"one strike on 300 modes, all in: {(hit - free) / (1000 * second) * 1e6:.0f} us; one sample of one "
+        f"forced mode: {(pushed - free) / (6000 * FRAMES * FRAME) * 1e9:.2f} ns"
     )
     rng = np.random.default_rng(1)
     uneven = [int(size) for size in rng.integers(5, 301, 1000)]

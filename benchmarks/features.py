@@ -21,7 +21,6 @@ from scipy.optimize import linear_sum_assignment
 
 from sonic_bullet.estimator.lines import exact_modes, likelihood, noise_density, subspace
 from sonic_bullet.estimator.lines.extraction import BAND_HZ, FASTEST_PER_S, extract
-from sonic_bullet.estimator.perceptual.greedy import greedy
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import AudioError
 
@@ -79,21 +78,34 @@ def paper(draws: int) -> None:
                         ],
                     )
                 print(
-                    f"| {sr} | {law} | {phase} | {draws} | {counts} | {worst[0]:.1e} | {worst[1]:.1e} | {(time.process_time() - start) / draws:.1f} |",
+                    f"| {sr} | {law} | {phase} | {draws} | {counts} | {worst[0]:.1e} | {worst[1]:.1e} | "
+                    f"{(time.process_time() - start) / draws:.1f} |",
                     flush=True,
                 )
+
+
+def matched(got: Array, freq: Array, decay: Array) -> tuple[int, str]:
+    """Found (k, 2) of f and d within a decay's width of the modes (m,), and relative errors of both: mean, median,
+    worst.
+    """
+    width = np.maximum(decay / (2 * np.pi), 0.5)
+    cost = np.minimum(np.abs(got[:, :1] - freq) / width, 10)
+    i, j = linear_sum_assignment(cost)
+    i, j = i[cost[i, j] < 1], j[cost[i, j] < 1]
+    f, d = np.abs(got[i, 0] / freq[j] - 1), np.abs(got[i, 1] / decay[j] - 1)
+    return len(i), " | ".join(f"{e.mean():.1e}, {np.median(e):.1e}, {e.max():.1e}" for e in (f, d))
 
 
 def steps() -> None:
     full, noisy = hundred(0), mixture(1, 40.0)
     cases = {"100 sinusoids, no noise": (full[0], full[1], full[3]), "40 modes, 40 dB": (noisy[0], noisy[1], noisy[4])}
     print(
-        f"| recording | step | features | of the modes | false | f: mean, median, worst | d: mean, median, worst | s |\n{'|---' * 8}|"
+        "| recording | step | features | of the modes | false | f: mean, median, worst | d: mean, median, "
+        f"worst | s |\n{'|---' * 8}|"
     )
     for name, (freq, decay, x) in cases.items():
-        begun = time.process_time()
-        rows = [("the paper's, greedy", greedy(x, SR, len(freq))[:, :2])]
-        times = [time.process_time() - begun]
+        rows: list[tuple[str, Array]] = []
+        times: list[float] = []
 
         def timed(
             label: str, pole: Array, start: float, rows: list[tuple[str, Array]] = rows, times: list[float] = times
@@ -131,21 +143,17 @@ def steps() -> None:
         rows.append(("the whole of `extract`", np.stack([found.freq_hz, found.decay_per_s], axis=1)))
         times.append(time.process_time() - begun)
         for (label, got), spent in zip(rows, times, strict=True):
-            width = np.maximum(decay / (2 * np.pi), 0.5)
-            cost = np.minimum(np.abs(got[:, :1] - freq) / width, 10)
-            i, j = linear_sum_assignment(cost)
-            i, j = i[cost[i, j] < 1], j[cost[i, j] < 1]
-            f, d = np.abs(got[i, 0] / freq[j] - 1), np.abs(got[i, 1] / decay[j] - 1)
-            said = " | ".join(f"{e.mean():.1e}, {np.median(e):.1e}, {e.max():.1e}" for e in (f, d))
+            hits, said = matched(got, freq, decay)
             print(
-                f"| {name} | {label} | {len(got)} | {len(i)} of {len(freq)} | {len(got) - len(i)} | {said} | {spent:.1f} |",
+                f"| {name} | {label} | {len(got)} | {hits} of {len(freq)} | {len(got) - hits} | {said} | {spent:.1f} |",
                 flush=True,
             )
 
 
 def mixtures(seeds: int) -> None:
     print(
-        f"| noise | found | false | f: median, 90 % over the bound | d | spread of normalised errors f, d | s of processor a second of sound |\n{'|---' * 7}|"
+        "| noise | found | false | f: median, 90 % over the bound | d | spread of normalised errors f, d | "
+        f"s of processor a second of sound |\n{'|---' * 7}|"
     )
     for db in (20.0, 40.0, 60.0):
         errors: tuple[list[float], list[float]] = ([], [])
@@ -168,7 +176,8 @@ def mixtures(seeds: int) -> None:
         said = " | ".join(f"{np.median(e):.2f}, {np.quantile(e, 0.9):.2f}" for e in errors)
         spread = ", ".join(f"{np.std(np.clip(v, -6, 6)):.2f}" for v in normal)
         print(
-            f"| {db:.0f} dB | {tally[1]} of {tally[0]} ({100 * tally[1] / tally[0]:.1f} %) | {tally[3]} of {tally[2]} ({100 * tally[3] / tally[2]:.1f} %)"
+            f"| {db:.0f} dB | {tally[1]} of {tally[0]} ({100 * tally[1] / tally[0]:.1f} %) | {tally[3]} of "
+            f"{tally[2]} ({100 * tally[3] / tally[2]:.1f} %)"
             f" | {said} | {spread} | {(time.process_time() - start) / seeds:.1f} |",
             flush=True,
         )
@@ -178,7 +187,8 @@ def real(folder: str) -> None:
     from sonic_bullet.files import read_audio
 
     print(
-        f"| recording | s | features | the three of most energy: Hz ± sd (d ± sd 1/s) | noise dBFS | processor s | note |\n{'|---' * 7}|"
+        "| recording | s | features | the three of most energy: Hz ± sd (d ± sd 1/s) | noise dBFS | "
+        f"processor s | note |\n{'|---' * 7}|"
     )
     for path in sorted(p for p in Path(folder).rglob("*") if p.suffix in (".flac", ".wav") or p.name == "hits.npz"):
         if path.suffix == ".npz":
@@ -192,7 +202,8 @@ def real(folder: str) -> None:
             r = extract(x, sr)
         except AudioError as error:
             print(
-                f"| {path.relative_to(folder)} | {len(x) / sr:.1f} | error | {error} |  | {time.process_time() - start:.1f} | |",
+                f"| {path.relative_to(folder)} | {len(x) / sr:.1f} | error | {error} |  | "
+                f"{time.process_time() - start:.1f} | |",
                 flush=True,
             )
             continue
@@ -204,7 +215,8 @@ def real(folder: str) -> None:
         name = str(path.relative_to(folder)).replace("/dev/", "/")
         spent = time.process_time() - start
         print(
-            f"| {name} | {len(x) / sr:.1f} | {len(r.freq_hz)} | {said} | {r.noise_dbfs:.1f} | {spent:.1f} | {r.note[:90]} |",
+            f"| {name} | {len(x) / sr:.1f} | {len(r.freq_hz)} | {said} | {r.noise_dbfs:.1f} | {spent:.1f} | "
+            f"{r.note[:90]} |",
             flush=True,
         )
 

@@ -210,7 +210,8 @@ def main() -> None:
     else:
         for kind, counts in found.items():
             print(
-                f"{kind:7} {counts['levels']} fill levels: {counts['whole']} whole, {counts['refused']} refused, {len(counts['bad'])} bad"
+                f"{kind:7} {counts['levels']} fill levels: {counts['whole']} whole, {counts['refused']} "
+                f"refused, {len(counts['bad'])} bad"
             )
             for line in counts["bad"]:
                 print(f"        {line}")

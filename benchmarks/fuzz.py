@@ -304,7 +304,9 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def warm(folder: Path) -> None:
-    """Each door once with an unchanged draw, so that what is compiled or imported once is not counted against an input."""
+    """Each door once with an unchanged draw, so that what is compiled or imported once is not counted against
+    an input.
+    """
     for door in doors():
         for number in range(3):
             path = folder / f"warm{door.suffix}"

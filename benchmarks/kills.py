@@ -182,7 +182,8 @@ def main() -> None:
     else:
         for name, counts in {**found, "all": total}.items():
             print(
-                f"{name:9} {counts['kills']} kills: {counts['whole']} whole, {counts['in a write']} in a write, {counts['litter']} with litter after the next"
+                f"{name:9} {counts['kills']} kills: {counts['whole']} whole, {counts['in a write']} in a "
+                f"write, {counts['litter']} with litter after the next"
             )
     sys.exit(total["whole"] != total["kills"] or total["litter"] > 0)
 

@@ -54,6 +54,7 @@ if __name__ == "__main__":
     for count in [int(word) for word in sys.argv[1:]] or [1, 20, 100, 300]:
         step_us, before_us, after_us, touching = measure(count)
         print(
-            f"{count:5d}  {touching:8d}  {step_us:11.0f} µs  {before_us:6.0f}  {after_us:6.0f}  {(before_us + after_us) / step_us:6.2f}",
+            f"{count:5d}  {touching:8d}  {step_us:11.0f} µs  {before_us:6.0f}  {after_us:6.0f}  "
+            f"{(before_us + after_us) / step_us:6.2f}",
             flush=True,
         )

@@ -1,4 +1,4 @@
-"""Measured data on trial: each set fitted on one part and judged on another, baseline against baseline + effect, a null
+"""Measured data: each set fitted on one part and judged on another, baseline against baseline + effect, a null
 of as many numbers beside it.
 
     python benchmarks/measured.py --data ../shared/measured [--out docs/measured/recordings-by-others.md] [SET ...]
@@ -48,7 +48,8 @@ def main(arguments: list[str] | None = None) -> int:
         skipped += [f"{name}: {line}" for line in page.found.skipped]
         for row in page.found.rows:
             print(
-                f"  {row.what}: {row.before:.3g} -> {row.after:.3g} {row.unit} (null {row.null:.3g}) {row.effect}{' earned' if row.earned else ''}",
+                f"  {row.what}: {row.before:.3g} -> {row.after:.3g} {row.unit} (null {row.null:.3g}) "
+                f"{row.effect}{' accepted' if row.accepted else ''}",
                 flush=True,
             )
     written(asked.out, pages, skipped)

@@ -109,7 +109,8 @@ def main() -> int:
     seconds = sorted(float(str(r["seconds"])) for r in rows if "seconds" in r)
     peak = max(int(str(r.get("peak_bytes", 0))) for r in rows)
     print(
-        f"{len(rows)} meshes: {len(done)} with a model, {len(named)} named errors, {len(crashed)} crashes, {len(slow)} over {LIMIT_S:g} s, {len(big)} over 2 GiB"
+        f"{len(rows)} meshes: {len(done)} with a model, {len(named)} named errors, {len(crashed)} crashes, "
+        f"{len(slow)} over {LIMIT_S:g} s, {len(big)} over 2 GiB"
     )
     processor = sorted(float(str(r["processor_s"])) for r in rows if "processor_s" in r)
     for what, figures in (("seconds", seconds), ("processor seconds", processor)):

@@ -50,7 +50,8 @@ SECONDS = 0.1
 def build(client):
     client.setGravity(0, 0, -9.81)
     client.createMultiBody(0, client.createCollisionShape(client.GEOM_PLANE))
-    bar = client.createMultiBody(0.5, client.createCollisionShape(client.GEOM_BOX, halfExtents=[0.1, 0.01, 0.01]), basePosition=[0, 0, 0.011])
+    bar = client.createMultiBody(0.5, client.createCollisionShape(client.GEOM_BOX, halfExtents=[0.1, 0.01, 0.01]), \
+basePosition=[0, 0, 0.011])
     return {bar: {"material": "steel", "count": 5}}
 """
 # $1 another place for the interpreter, $2 the folder that hides it ("" where none does), $3 the interpreter's, $4 the
@@ -128,7 +129,10 @@ def good(direction: str, name: str, scratch: Path, work: Path) -> tuple[bool | N
         lines = [line for line in lines if not line.startswith("sonic-bullet: warning:")]
     lines += [line for line in done.stderr.splitlines() if "are not kept" in line][1:]  # said once at most
     there = [file for file in made if (work / file).exists()]
-    said = f"exit {done.returncode}, {len(there)} of {len(made)} outputs, {time.monotonic() - start:.0f} s {' | '.join(lines)[-300:]}"
+    said = (
+        f"exit {done.returncode}, {len(there)} of {len(made)} outputs, {time.monotonic() - start:.0f} s "
+        f"{' | '.join(lines)[-300:]}"
+    )
     return done.returncode == 0 and len(there) == len(made) and not lines, said
 
 

@@ -51,7 +51,8 @@ def plain() -> float:
 def main() -> None:
     sounding, silent, splines = ours(BODIES), ours(0), plain()
     print(
-        f"{BODIES} bodies x {len(MICROPHONES)} microphones sounding: {sounding:.1%} of real time; silent: {silent:.2%}; cubic splines / ours: {splines / sounding:.0f}"
+        f"{BODIES} bodies x {len(MICROPHONES)} microphones sounding: {sounding:.1%} of real time; silent: "
+        f"{silent:.2%}; cubic splines / ours: {splines / sounding:.0f}"
     )
 
 

@@ -35,7 +35,8 @@ def main() -> int:
         print(f"{asked.data}: no cases with a truth.json; give the folder that holds them", file=sys.stderr)
         return 2
     print(
-        "| case | truth | verdict | split | before dB | after dB | floor dB | share | | wall s |\n|---|---|---|---|---|---|---|---|---|---|"
+        "| case | truth | verdict | split | before dB | after dB | floor dB | share | | wall s |\n"
+        "|---|---|---|---|---|---|---|---|---|---|"
     )
     missed = 0
     for folder in folders:
@@ -56,8 +57,11 @@ def main() -> int:
             held = not truth or share <= (ROOM if "room" in truth and split == "holdout" else limit)
             missed += not held
             print(
-                f"| {folder.name} | {', '.join(truth) or 'nothing'} | {found.verdict}{' ' if named else ''}{', '.join(named)}{'' if right else ' (wrong)'} | {split} "
-                f"| {before:.2f} | {after:.2f} | {floor:.2f} | {share:.3f} | {'met' if held else 'missed'} | {spent:.0f} |",
+                f"| {folder.name} | {', '.join(truth) or 'nothing'} | "
+                f"{found.verdict}{' ' if named else ''}{', '.join(named)}{'' if right else ' (wrong)'} | "
+                f"{split} "
+                f"| {before:.2f} | {after:.2f} | {floor:.2f} | {share:.3f} | {'met' if held else 'missed'} | "
+                f"{spent:.0f} |",
                 flush=True,
             )
     print(f"\n{missed} missed")

@@ -107,7 +107,9 @@ def add_waves(k, corner, normal, area, points, shares, s, kk, ks, d):  # type: i
 
 
 def solve(vertex: Array, face: Array, shape: Array, freq_hz: Array) -> tuple[Array, Array]:
-    """√<|p|²> at 1 m (m,) and the surface power over the far field's, in dB, by boundary elements; unit modal velocity."""
+    """√<|p|²> at 1 m (m,) and the surface power over the far field's, in dB, by boundary elements; unit modal
+    velocity.
+    """
     corner = np.ascontiguousarray(vertex[face])
     twice = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     area = np.linalg.norm(twice, axis=1) / 2
@@ -178,10 +180,12 @@ def compare(
     for m in range(len(ka)):
         tail = f"  {20 * np.log10(truth[m] / exact[m]):+8.2f}" if exact is not None else ""
         print(
-            f"{model.freq_hz[m]:8.1f} {ka[m]:6.2f} {sigma[m]:9.2e} {error[m]:+8.2f} {old[m]:+14.1f} {check[m]:+9.2f}{tail}"
+            f"{model.freq_hz[m]:8.1f} {ka[m]:6.2f} {sigma[m]:9.2e} {error[m]:+8.2f} {old[m]:+14.1f} "
+            f"{check[m]:+9.2f}{tail}"
         )
     print(
-        f"   map: median |{np.median(np.abs(error)):.2f}|, worst {np.abs(error).max():.2f} dB;  multipoles: median |{np.median(np.abs(old)):.1f}|, worst {np.abs(old).max():.1f} dB",
+        f"   map: median |{np.median(np.abs(error)):.2f}|, worst {np.abs(error).max():.2f} dB;  multipoles: "
+        f"median |{np.median(np.abs(old)):.1f}|, worst {np.abs(old).max():.1f} dB",
         flush=True,
     )
     return np.asarray(error)
@@ -210,9 +214,8 @@ def sphere(radius: float, degree: int) -> tuple[ModalModel, Array]:
 
 
 def bowl() -> ModalModel:
-    """The bowl of assets with the motion of rim modes, u = (r/R)^n (cos nθ e_r - sin nθ/n e_θ) [Rayleigh 1894, sec.
-
-    235], at pitches of porcelain.
+    """The bowl of assets with the motion of rim modes, u = (r/R)^n (cos nθ e_r - sin nθ/n e_θ) [Rayleigh 1894,
+    sec. 235], at pitches of porcelain.
     """
     file = trimesh.load(Path(__file__).parent.parent / "assets" / "bowl.obj", process=False)
     vertex, face = np.array(file.vertices), np.array(file.faces)

@@ -75,9 +75,8 @@ def plate(material: Material, bent: bool) -> ModalModel:
 
 @dataclass
 class Tally:
-    """What was compared:
-
-    listeners, those that sounded, with events in their logs, and how far their replay would be off without those (Pa).
+    """What was compared: listeners, those that sounded, with events in their logs, and how far their replay would be
+    off without those (Pa).
     """
 
     orders: int = 0
@@ -327,10 +326,12 @@ def main(words: Sequence[str]) -> None:
     numbers: list[Any] = [int(word) for word in words]
     tally = run(*(numbers + [1000, 0][len(numbers) :]))
     print(
-        f"{tally.orders} random orders, {tally.listeners} listeners compared ({tally.framed} with their frames), {tally.sounding} of them sounded: replay bit-equal to live"
+        f"{tally.orders} random orders, {tally.listeners} listeners compared ({tally.framed} with their "
+        f"frames), {tally.sounding} of them sounded: replay bit-equal to live"
     )
     print(
-        f"{tally.eventful} had events in their logs; without those {tally.off_without_events} replays would be off, by up to {tally.most_off_pa:.3g}"
+        f"{tally.eventful} had events in their logs; without those {tally.off_without_events} replays would "
+        f"be off, by up to {tally.most_off_pa:.3g}"
     )
     print(f"{tally.muted} had a body muted; errors of our own and of PyBullet: {tally.errors}")
 

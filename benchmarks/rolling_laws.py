@@ -1,6 +1,5 @@
-"""Do rolling and sliding keep the measured laws through the whole chain:
-
-PyBullet, listener, contact, modes, microphone?
+"""Do rolling and sliding keep the measured laws through the whole chain: PyBullet, listener, contact, modes,
+microphone?
 
     python benchmarks/rolling_laws.py        some minutes
 
@@ -122,9 +121,9 @@ def table(kind: str, speeds: Array, roughness: Array, seconds: float, **options:
     return np.array(
         [
             [observed(log, h).std() for h in roughness]
-            for log in (run(kind, v, seconds, count=60, **options) for v in speeds)
+            for log in (run(kind, v, seconds, count=60, **options) for v in speeds)  # type: ignore[arg-type]
         ]
-    )  # type: ignore[arg-type]
+    )
 
 
 if __name__ == "__main__":
@@ -137,7 +136,8 @@ if __name__ == "__main__":
         rms = table(kind, speeds, roughness, 2.0, **options)
         n, m = law(speeds, rms.T), law(roughness, rms)
         print(
-            f"{name}: dB SPL, a row a speed {np.round(speeds, 3)} m/s, a column a roughness {np.round(roughness * 1e6, 2)} µm"
+            f"{name}: dB SPL, a row a speed {np.round(speeds, 3)} m/s, a column a roughness "
+            f"{np.round(roughness * 1e6, 2)} µm"
         )
         print(np.round(20 * np.log10(rms / 2e-5), 1))
         print(
@@ -150,5 +150,6 @@ if __name__ == "__main__":
         line = excess_db(loud, log.sr)
         above = 20 * np.log10(loud.std() / max(smooth.std(), 1e-300))
         print(
-            f"step rate, floor {floor}: worst excess {line.max():+.2f} dB of {len(line)} multiples; {above:.0f} dB above the same scene with smooth surfaces"
+            f"step rate, floor {floor}: worst excess {line.max():+.2f} dB of {len(line)} multiples; "
+            f"{above:.0f} dB above the same scene with smooth surfaces"
         )

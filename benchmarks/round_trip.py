@@ -5,9 +5,9 @@
 Each object is played at a microphone and at a vibrometer, with noise 90 dB below the peak. Lines of both renders that
 are the same mode are compared: their decays must agree within 3 %, their levels within 0.5 dB. A mode is identified
 where it stands three widths apart from its neighbours and a line lies on it whose decay is known to 0.5 %; of a bowl,
-whose twins its mesh tears, there are few. Beside that, decays and levels that the run time plays are compared of all
-modes, heard or not, in levels those nearer than a width as one. `thick` fits a plate and plays the preset on one twice
-as thick, beside the true material there: 5 %.
+whose degenerate modes its mesh splits, there are few. Beside that, decays and levels that the run time plays are
+compared of all modes, whether recorded or not, in levels those nearer than a width as one. `thick` fits a plate and
+plays the preset on one twice as thick, beside the true material there: 5 %.
 """
 
 from __future__ import annotations
@@ -45,7 +45,8 @@ NOISE = 10 ** (-90 / 20)
 MICROPHONE_M = 0.5
 LIMIT_DECAY, LIMIT_THICK, LIMIT_DB = 0.03, 0.05, 0.5
 PUSH_S = 3e-3  # after the onset: while it is pushed, a body does not ring freely
-# widths d/π between modes: nearer ones ring as one line, whose decay is no mode's; but for twins, which decay alike
+# widths d/π between modes: nearer ones ring as one line, whose decay is no mode's; but for degenerate modes, which
+# decay alike
 APART, DEGENERATE = 3.0, 0.1
 NEAR = 0.3  # of a width: a line that is the mode
 KNOWN = 5e-3  # relative spread of a decay that is known
@@ -55,7 +56,7 @@ Places = tuple[Array, Array, Array, Array]
 
 
 @dataclass(frozen=True)
-class Trial:
+class Subject:
     """One object: its mesh file, material and strike in the mesh's frame (place, direction)."""
 
     name: str
@@ -87,15 +88,15 @@ def box_obj(path: Path, size_m: tuple[float, float, float]) -> Path:
     return path
 
 
-def trials(data: Path | None, folder: Path) -> list[Trial]:
+def subjects(data: Path | None, folder: Path) -> list[Subject]:
     """The bar of scenes/bar.py, the bowl of assets, and the first object of each practice case that is there."""
     made = [
-        Trial("bar", box_obj(folder / "bar.obj", (0.24, 0.01, 0.01)), "steel"),
-        Trial("bowl", ROOT / "assets" / "bowl.obj", "porcelain"),
+        Subject("bar", box_obj(folder / "bar.obj", (0.24, 0.01, 0.01)), "steel"),
+        Subject("bowl", ROOT / "assets" / "bowl.obj", "porcelain"),
     ]
     for case in sorted(data.glob("practice-*/case.json")) if data else ():
         name, thing = next(iter(json.loads(case.read_text())["objects"].items()))
-        made.append(Trial(f"{case.parent.name} {name}", case.parent / thing["mesh"], thing["material"]))
+        made.append(Subject(f"{case.parent.name} {name}", case.parent / thing["mesh"], thing["material"]))
     return made
 
 
@@ -173,15 +174,15 @@ def lines_of(sound: Array, start: int) -> Lines:
     return joint_lines(noisy[None, start:], SR, signed=False)
 
 
-def fitted(trial: Trial, model: ModalModel, sound: Array, sensor: str, at: Places, folder: Path) -> Material:
+def fitted(subject: Subject, model: ModalModel, sound: Array, sensor: str, at: Places, folder: Path) -> Material:
     """The material of the preset that `fit` makes of the recording."""
     place, out, look, along = at
     noisy = sound + NOISE * np.abs(sound).max() * np.random.default_rng(3).standard_normal(len(sound))
     write_audio(str(folder / "strike.wav"), noisy[None] / np.abs(noisy).max() / 2, SR)
     strike = CaseRecording(folder / "strike.wav", None, "object", "fit", triple(place), triple(-out), IMPULSE_N_S)
-    thing = CaseObject("object", trial.mesh, 1.0, trial.material)
+    thing = CaseObject("object", subject.mesh, 1.0, subject.material)
     at_m, direction = ({"object": triple(look)}, {"object": triple(along)}) if sensor == "velocity" else (None, None)
-    case = Case(trial.name, folder, {"object": thing}, (strike,), sensor, at_m, direction, medium="air")
+    case = Case(subject.name, folder, {"object": thing}, (strike,), sensor, at_m, direction, medium="air")
     return material_of(preset_of(fit_case(case, check_mesh=False)))
 
 
@@ -192,8 +193,8 @@ def triple(vector: Array) -> tuple[float, float, float]:
 
 
 def identified(lines: Lines, model: ModalModel, decay: Array) -> Array:
-    """The line (m,) that each mode of a model is, -1 where none is: of modes, or twins, that stand apart from their
-    neighbours, lines of known decay.
+    """The line (m,) that each mode of a model is, -1 where none is: of modes, degenerate ones as one, that stand apart
+    from their neighbours, lines of known decay.
 
     Apart by their frequencies and widths alone, so that what is compared, decays and levels, has no say in it.
     """
@@ -252,16 +253,16 @@ def off_db(a: Array, b: Array, freq_hz: Array, decay: Array) -> float:
     return float(np.abs(10 * np.log10(two[loud] / one[loud])).max())
 
 
-def around(trial: Trial, sensor: str, folder: Path) -> tuple[int, float, float, float, float]:
+def around(subject: Subject, sensor: str, folder: Path) -> tuple[int, float, float, float, float]:
     """Modes identified in both, their worst decay and level, and the worst decay and level of all modes that are
     played.
     """
-    shape = modal.read_mesh(trial.mesh)
-    truth = load_material(trial.material)
+    shape = modal.read_mesh(subject.mesh)
+    truth = load_material(subject.material)
     model = modal.analyse((shape,), truth)
     at = places(model)
     sound = rendered(model, truth, sensor, at)
-    found = fitted(trial, model, sound, sensor, at, folder)
+    found = fitted(subject, model, sound, sensor, at, folder)
     anew = modal.analyse((shape,), found)
     again = rendered(anew, found, sensor, at)
     (one, first), (two, second) = played(model, truth, sensor, at), played(anew, found, sensor, at)
@@ -275,7 +276,7 @@ def thicker(
     folder: Path, sensor: str, name: str = "glass", size_m: tuple[float, float, float] = (0.2, 0.15, 0.004)
 ) -> float:
     """Worst decay of a plate twice as thick, played with what was fitted on the thin one."""
-    thin = Trial("plate", box_obj(folder / "thin.obj", size_m), name)
+    thin = Subject("plate", box_obj(folder / "thin.obj", size_m), name)
     truth, shape = load_material(name), modal.read_mesh(thin.mesh)
     model = modal.analyse((shape,), truth)
     at = places(model)
@@ -292,26 +293,28 @@ def main() -> int:
     asked = parser.parse_args()
     missed = 0
     print(
-        "| object | sensor | modes | decay % | level dB | all modes' decay % | level dB | | wall s |\n|---|---|---|---|---|---|---|---|---|"
+        "| object | sensor | modes | decay % | level dB | all modes' decay % | level dB | | wall s |\n"
+        "|---|---|---|---|---|---|---|---|---|"
     )
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
-        for trial in trials(asked.data, folder):
-            if asked.objects and not any(part in trial.name for part in asked.objects):
+        for subject in subjects(asked.data, folder):
+            if asked.objects and not any(part in subject.name for part in asked.objects):
                 continue
             for sensor in ("pressure", "velocity"):
                 begun = time.monotonic()
                 try:
-                    count, decay, level, every, every_db = around(trial, sensor, folder)
+                    count, decay, level, every, every_db = around(subject, sensor, folder)
                 except SonicBulletError as error:
-                    print(f"| {trial.name} | {sensor} | | | | | | {error} | |", flush=True)
+                    print(f"| {subject.name} | {sensor} | | | | | | {error} | |", flush=True)
                     missed += 1
                     continue
                 held = max(decay, every) <= LIMIT_DECAY and max(level, every_db) <= LIMIT_DB
                 missed += not held
                 spent = time.monotonic() - begun
                 print(
-                    f"| {trial.name} | {sensor} | {count} | {100 * decay:.2f} | {level:.3f} | {100 * every:.2f} | {every_db:.3f} | {'met' if held else 'missed'} | {spent:.0f} |",
+                    f"| {subject.name} | {sensor} | {count} | {100 * decay:.2f} | {level:.3f} | "
+                    f"{100 * every:.2f} | {every_db:.3f} | {'met' if held else 'missed'} | {spent:.0f} |",
                     flush=True,
                 )
         for name in ("glass", "steel") if not asked.objects or "thick" in asked.objects else ():
@@ -319,7 +322,8 @@ def main() -> int:
                 worst = thicker(folder, sensor, name)
                 missed += not worst <= LIMIT_THICK
                 print(
-                    f"| {name} plate, twice as thick | {sensor} | | | | {100 * worst:.2f} | | {'met' if worst <= LIMIT_THICK else 'missed'} | |",
+                    f"| {name} plate, twice as thick | {sensor} | | | | {100 * worst:.2f} | | "
+                    f"{'met' if worst <= LIMIT_THICK else 'missed'} | |",
                     flush=True,
                 )
     print(f"\n{missed} missed")

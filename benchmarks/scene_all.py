@@ -120,7 +120,8 @@ def main(names: list[str]) -> int:
         found = list(claims(render_scene(SCENES / f"{name}.py"), expected(name)))
         for claim in found:
             print(
-                f"{'ok  ' if holds(claim) else 'FAIL'} {name:10s} {claim[0]:22s} {claim[1]:12.4g}   in {claim[2]:g} … {claim[3]:g}"
+                f"{'ok  ' if holds(claim) else 'FAIL'} {name:10s} {claim[0]:22s} {claim[1]:12.4g}   in "
+                f"{claim[2]:g} … {claim[3]:g}"
             )
         failed += sum(not holds(claim) for claim in found)
         print(f"     {name:10s} {len(found)} claims in {time.perf_counter() - begin:.1f} s")

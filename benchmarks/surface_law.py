@@ -64,5 +64,8 @@ for name, (mass, modulus, radius, zeta) in CASES.items():
             [np.corrcoef(np.log(SPEED), row)[0, 1] ** 2 for row in level]
             + [np.corrcoef(np.log(ROUGH), c)[0, 1] ** 2 for c in level.T]
         )
-        line += f" | {what} n {min(n):.2f}…{max(n):.2f} drift {n[-1] - n[0]:+.2f}, m {min(m):.2f}…{max(m):.2f} drift {m[-1] - m[0]:+.2f}, R² ≥ {fit:.3f}"
+        line += (
+            f" | {what} n {min(n):.2f}…{max(n):.2f} drift {n[-1] - n[0]:+.2f}, m {min(m):.2f}…{max(m):.2f} drift "
+            f"{m[-1] - m[0]:+.2f}, R² ≥ {fit:.3f}"
+        )
     print(line)

@@ -40,6 +40,7 @@ def share(sides: int, speed_m_s: float) -> float:
 share(1, 0.1)
 for speed in (0.05, 0.5, 2.0):
     print(
-        f"{speed:4.2f} m/s: rolling (two surfaces) {share(2, speed):.2f}, sliding (one surface) {share(1, speed):.2f} of real time"
+        f"{speed:4.2f} m/s: rolling (two surfaces) {share(2, speed):.2f}, sliding (one surface) "
+        f"{share(1, speed):.2f} of real time"
     )
 print(f"at rest: {share(2, 0.0):.3f}")

@@ -1,4 +1,5 @@
-"""The pages of docs/reference that are made of the code: what a docstring, a command's help or a class says is said once.
+"""The pages of docs/reference that are made of the code: what a docstring, a command's help or a class says is said
+once.
 
 python docs/make_reference.py            writes api.md, commands.md, case.schema.json, and the marked parts
                                              of case.md, contact-log.md and how-a-diagnosis-judges.md
@@ -37,8 +38,9 @@ API = (
     ("sonic_bullet.files.cases", "Read a case.", ("read_case", "Case", "CaseObject", "CaseRecording", "Line")),
     ("sonic_bullet.presets", "Read and write presets.", ("read_preset", "write_preset", "material_of")),
     ("sonic_bullet.diagnosis.diagnose", "Diagnose a case.", ("diagnose", "described")),
-    ("sonic_bullet.effects", "The effects of the package; what they share is in the next section.", ("EFFECTS",)),
-    ("sonic_bullet.effects.protocol", "What an effect is, what it acts on and what it reads.", "classes"),
+    ("sonic_bullet.effects", "The effects of the package; what they share is in the next two sections.", ("EFFECTS",)),
+    ("sonic_bullet.effects.stages", "What an effect acts on.", "classes"),
+    ("sonic_bullet.effects.protocol", "What an effect is and what it reads.", "classes"),
 )
 
 
@@ -185,7 +187,8 @@ def commands_page() -> str:
         "`sonic-bullet COMMAND --help` says the same. Exit codes: 0 done; 2 one line on stderr says what is wrong;",
     ]
     parts += [
-        "130 or 143 stopped, with what was rendered so far closed as a valid file. `--json` alone writes JSON to stdout."
+        "130 or 143 stopped, with what was rendered so far closed as a valid file. `--json` alone writes "
+        "JSON to stdout."
     ]
     for path, command in walked("sonic-bullet", cli):
         context = click.Context(command, info_name=path, terminal_width=WIDTH, max_content_width=WIDTH)
@@ -261,7 +264,9 @@ def kind_of(about: dict[str, Any]) -> str:
 
 
 def between(page: str, mark: str, text: str) -> str:
-    """A page with another text between `<!-- mark -->` and `<!-- end -->`. Raises ValueError where it has no such place."""
+    """A page with another text between `<!-- mark -->` and `<!-- end -->`. Raises ValueError where it has no such
+    place.
+    """
     found, count = re.subn(
         rf"(<!-- {mark} -->\n).*?(<!-- end -->)", lambda m: f"{m[1]}\n{text}\n\n{m[2]}", page, count=1, flags=re.S
     )

@@ -1,4 +1,6 @@
-"""A wooden box is pushed and slides to rest on a wooden board: the sound falls with its speed and ends when it stands."""
+"""A wooden box is pushed and slides to rest on a wooden board: the sound falls with its speed and ends when
+it stands.
+"""
 
 import sonic_bullet as sb
 

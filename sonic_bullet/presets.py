@@ -45,7 +45,7 @@ FOLDER = Path(__file__).parent / "materials"
 BYTES_MAX = 1 << 20
 _REMEDY = "give a material's name, or the path of a preset file"
 DAMPING_TAKEN = "damping (from '"
-"""How a provenance begins to say whose damping it is where recordings told none: a table's, without radiation."""
+"""How a provenance begins to say whose damping it is where recordings identified none: a table's, without radiation."""
 
 Positive = Annotated[float, msgspec.Meta(gt=0)]
 NotNegative = Annotated[float, msgspec.Meta(ge=0)]
@@ -54,9 +54,8 @@ Row = tuple[float, float, float, float, float, float]
 
 
 class _Part(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, omit_defaults=True):
-    """range: by field, the values that materials of that name have;
-
-    spread: standard deviation of their logarithm. Neither changes a sound.
+    """range: by field, the values that materials of that name have; spread: standard deviation of their logarithm.
+    Neither changes a sound.
     """
 
     source: Annotated[str, msgspec.Meta(min_length=1)]
@@ -102,9 +101,8 @@ class Restitution(_Part, frozen=True):
 
 
 class Provenance(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, omit_defaults=True):
-    """Where a fitted preset comes from. parameters:
-
-    α 1/s, β s, γ m²/s², σ, ν by name; spreads: standard errors in the same units, where known.
+    """Where a fitted preset comes from. parameters: α 1/s, β s, γ m²/s², σ, ν by name; spreads: standard errors in
+    the same units, where known.
 
     assumed: what was taken from the guess. verdict: the fit's own. correction: relative, of each mode's frequency
     against the mesh's.
@@ -237,7 +235,8 @@ def material_of(preset: Preset, where: str = "") -> Material:
         "effects": _effects(preset, label),
         "includes_radiation": total_damping(preset),
         "residual": residual_of(preset.residual, f"preset {label}") if preset.residual is not None else None,
-        "source": f"elasticity: {elastic.source} | damping: {preset.damping.source} | surface: {preset.surface.source} | impact: {preset.impact.source}",
+        "source": f"elasticity: {elastic.source} | damping: {preset.damping.source} | surface: {preset.surface.source} "
+        f"| impact: {preset.impact.source}",
     }
     try:
         if elastic.stiffness_pa is not None and elastic.youngs_pa is None and elastic.poisson is None:

@@ -31,7 +31,8 @@ from sonic_bullet.records import Array, Material, Sensor
 from sonic_bullet.records.coerce import as_call, as_flag, as_number, as_path, as_whole, shown
 from sonic_bullet.records.errors import SceneError, SceneWarning, SonicBulletError, interrupts
 from sonic_bullet.render import render_log, silence_notes
-from sonic_bullet.session import Listener, MicrophoneLike, as_material, as_sensors, attach
+from sonic_bullet.session import Listener, attach
+from sonic_bullet.session.arguments import MicrophoneLike, as_material, as_sensors
 
 DEFAULT_SECONDS = 4.0
 DEFAULT_MATERIAL = "plastic"
@@ -90,7 +91,7 @@ def render_scene(
 def examine_scene(path: str | Path, seconds: float = 1.0, say: Say | None = None) -> tuple[Finding, ...]:
     """What in a scene would spoil its sound, and how to mend it.
 
-    Runs it for ``seconds`` of physics time; say is told what is being computed.
+    Runs it for ``seconds`` of physics time; say is given what is being computed.
 
     Raises SonicBulletError.
     """

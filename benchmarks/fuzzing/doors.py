@@ -98,10 +98,11 @@ def small_log(model: ModalModel, material: Material = STEEL, *, microphone: bool
     }
     place, upright = [[0, 0, 0.1], [0, 0, 0]], [[0, 0, 0, 1.0]] * 2
     steps = [
-        Step(1 / 240, place, upright, [False, False], Contacts(**one) if i != 1 else Contacts.none(), [0, 0, -9.81])
-        for i in range(3)
-    ]  # type: ignore[arg-type]
-    sensors = (Microphone([0, -1, 0.5]), Vibrometer(0, [0, 0, 0.025], [0, 0, 1]), ModalSum(1.0))  # type: ignore[arg-type]
+        Step(1 / 240, place, upright, [False, False], contacts, [0, 0, -9.81])  # type: ignore[arg-type]
+        for contacts in (Contacts(**one), Contacts.none(), Contacts(**one))
+    ]
+    vibrometer = Vibrometer(0, [0, 0, 0.025], [0, 0, 1])  # type: ignore[arg-type]
+    sensors = (Microphone([0, -1, 0.5]), vibrometer, ModalSum(1.0))  # type: ignore[arg-type]
     return ContactLog(
         bodies,
         tuple(steps),

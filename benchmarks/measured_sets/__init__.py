@@ -1,1 +1,1 @@
-"""Measured sets on trial: each fitted on one part and judged on another. benchmarks/measured.py is the entry."""
+"""Measured sets: each fitted on one part and judged on another. benchmarks/measured.py is the entry."""

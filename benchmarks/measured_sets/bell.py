@@ -78,14 +78,16 @@ def judge(folder: Path, case: dict[str, Any]) -> Outcome:
         + "; ".join(said)
         + "."
     )
-    left = "one stroke at one place: which way the pairs lie on the rim, and which imperfection parts them, needs strokes round the rim"
+    left = (
+        "one stroke at one place: which way the pairs lie on the rim, and which imperfection parts them, needs "
+        "strokes round the rim"
+    )
     return Outcome(tuple(rows), text, left, lambda figure: paint(figure, drawn[0]))
 
 
 def course(signal: Array, sr: int, freq_hz: float) -> tuple[Array, Array, Array] | None:
-    """t, z and which of them is fitted, at 4 values a bandwidth;
-
-    None where the line is lost in noise before half of the held-out part.
+    """t, z and which of them is fitted, at 4 values a bandwidth; None where the line is lost in noise before half of
+    the held-out part.
     """
     n = int(2 * sr / BANDWIDTH_HZ) | 1
     window = np.hanning(n + 2)[1:-1]

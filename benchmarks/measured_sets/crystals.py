@@ -58,7 +58,8 @@ def judge(folder: Path, case: dict[str, Any]) -> Outcome:
         raise ValueError("; ".join(skipped) or "it lists no crystal")
     rest = (
         "; ".join(left)
-        or "what is left is some parts in a thousand, as edges a few micrometres off and the transducers' touch would make it"
+        or "what is left is some parts in a thousand, as edges a few micrometres off and the transducers' touch "
+        "would make it"
     )
     return Outcome(tuple(rows), " ".join(texts), rest, lambda figure: _paint(figure, found), tuple(skipped))
 

@@ -61,7 +61,10 @@ def judge(folder: Path, case: dict[str, Any]) -> Outcome:
         texts.append(text)
         pairs[thing] = pair
     more, text = strikers(takes)
-    left = "what a hold takes from a line goes with the line's shape where it is held; neither shape nor place is given, so the difference of decays stays a list"
+    left = (
+        "what a hold takes from a line goes with the line's shape where it is held; neither shape nor place is "
+        "given, so the difference of decays stays a list"
+    )
     return Outcome((*rows, *more), " ".join([*texts, text]), left, lambda figure: paint(figure, pairs), tuple(skipped))
 
 
@@ -99,7 +102,10 @@ def fixtures(thing: str, robot: Lines, hammer: Lines) -> tuple[list[Row], str, t
         robot.decay_per_s[both[0]],
         hammer.decay_per_s[both[1]],
     )
-    text = f"{thing}: {len(robot.freq_hz)} lines under the robot, {len(hammer.freq_hz)} under the hammer, {len(f)} in common"
+    text = (
+        f"{thing}: {len(robot.freq_hz)} lines under the robot, {len(hammer.freq_hz)} under the hammer, {len(f)} "
+        "in common"
+    )
     if len(f) < 4:
         return [], text + ": too few to judge.", (f, d, e)
     rng = np.random.default_rng(0)
@@ -136,7 +142,10 @@ def fixtures(thing: str, robot: Lines, hammer: Lines) -> tuple[list[Row], str, t
             "support-damping (one number for all lines)",
         ),
     ]
-    text += f"; the hammer's fixture changes decays by {DB * np.median(np.log(e / d)):+.1f} dB at the median, {DB * np.log(e / d).min():+.1f} to {DB * np.log(e / d).max():+.1f} dB; c = {c:+.1f} 1/s."
+    text += (
+        f"; the hammer's fixture changes decays by {DB * np.median(np.log(e / d)):+.1f} dB at the median, "
+        f"{DB * np.log(e / d).min():+.1f} to {DB * np.log(e / d).max():+.1f} dB; c = {c:+.1f} 1/s."
+    )
     return rows, text, (f, d, e)
 
 
@@ -190,7 +199,8 @@ def strikers(takes: dict[tuple[str, str], list[Lines]]) -> tuple[list[Row], str]
             )
         )
         said.append(
-            f"{tool}: {len(alone)} lines that the other tool does not bring on the {things[0]}, again on the {things[1]}: {', '.join(f'{f:.0f}' for f in alone[again]) or 'none'} Hz"
+            f"{tool}: {len(alone)} lines that the other tool does not bring on the {things[0]}, again on the "
+            f"{things[1]}: {', '.join(f'{f:.0f}' for f in alone[again]) or 'none'} Hz"
         )
     return rows, "; ".join(said) + "."
 

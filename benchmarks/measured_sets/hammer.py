@@ -88,11 +88,14 @@ def judge(folder: Path, case: dict[str, Any]) -> Outcome:
         rows += [*judged(name, soft, loud), *levels(name, soft, loud)]
         slope = exponent(hits)
         texts.append(
-            f"{name}: {len(hits)} hits, J over {20 * np.log10(hits[-1].impulse / hits[0].impulse):.0f} dB, τ {1e3 * min(h.tau_s for h in hits):.2f} to "
-            f"{1e3 * max(h.tau_s for h in hits):.2f} ms, τ ~ J^{slope:+.2f}; {sum(h.clipped for h in hits)} samples at the limit."
+            f"{name}: {len(hits)} hits, J over {20 * np.log10(hits[-1].impulse / hits[0].impulse):.0f} dB, τ "
+            f"{1e3 * min(h.tau_s for h in hits):.2f} to "
+            f"{1e3 * max(h.tau_s for h in hits):.2f} ms, τ ~ J^{slope:+.2f}; {sum(h.clipped for h in hits)} "
+            "samples at the limit."
         )
     left = (
-        "places of the hits are not given and vary, so a line's level per impulse moves by several dB from hit to hit, before and after alike; "
+        "places of the hits are not given and vary, so a line's level per impulse moves by several dB from "
+        "hit to hit, before and after alike; "
         "with two to five hits an exponent of −1/5 cannot be distinguished from 0"
     )
     return Outcome(tuple(rows), " ".join(texts), left, lambda figure: paint(figure, objects), tuple(skipped))

@@ -22,7 +22,7 @@ SCATTER = 0.02
 
 
 @dataclass(frozen=True)
-class Trial:
+class Validation:
     """α and β of the baseline, the law that was proposed or None, and the row."""
 
     alpha_per_s: float
@@ -95,7 +95,7 @@ def null_errors(fit: Lines, base: Array, held: Lines, held_base: Array, numbers:
     return found
 
 
-def trial(what: str, fit: list[Lines], held: list[Lines], *, seed: int = 0) -> Trial:
+def validated(what: str, fit: list[Lines], held: list[Lines], *, seed: int = 0) -> Validation:
     """The law of the fitted bodies on the held-out lines. Raises ValueError where there are too few lines."""
     mine, other = joined(fit), joined(held)
     if len(mine.freq_hz) < 2 or len(other.freq_hz) < 1:
@@ -109,7 +109,7 @@ def trial(what: str, fit: list[Lines], held: list[Lines], *, seed: int = 0) -> T
     after = error_db(law.decay_per_s(other.omega), other.decay_per_s) if law is not None else before
     nulls = null_errors(mine, base, other, ahead, law.freedom() if law is not None else 2, seed)
     effect = f"damping-law ({law.law})" if law is not None else ""
-    return Trial(
+    return Validation(
         alpha,
         beta,
         law,
@@ -135,13 +135,13 @@ def joined(bodies: list[Lines]) -> Lines:
     )
 
 
-def draw(axes: Any, trials: list[Trial], fit: list[Lines], held: list[Lines], title: str = "") -> None:
+def draw(axes: Any, validations: list[Validation], fit: list[Lines], held: list[Lines], title: str = "") -> None:
     """d against f: fitted lines full, held-out ones hollow; baseline dashed, effect drawn through."""
     mine, other = joined(fit), joined(held)
     axes.loglog(mine.freq_hz, mine.decay_per_s, "o", ms=3.5, color="0.35", label="fitted")
     axes.loglog(other.freq_hz, other.decay_per_s, "o", ms=5, mfc="none", color="C3", label="held out")
     f = np.geomspace(min(mine.freq_hz.min(), other.freq_hz.min()), max(mine.freq_hz.max(), other.freq_hz.max()), 200)
-    for i, t in enumerate(trials):
+    for i, t in enumerate(validations):
         axes.loglog(f, t.before(2 * np.pi * f), "--", lw=1, color="C0", label="Rayleigh" if not i else None)
         if t.law is not None:
             axes.loglog(f, t.after(2 * np.pi * f), "-", lw=1.2, color="C2", label=t.law.law)

@@ -9,26 +9,31 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.measured_sets.observed import JITTER, READINGS
-from benchmarks.measured_sets.values import CHANCE, DRAWS, EARNS, Outcome, Row
+from benchmarks.measured_sets.values import ACCEPTED_BELOW, CHANCE, DRAWS, Outcome, Row
 
 MOST_WORDS, COLUMNS = 40, 150
 BAR = "\\|"  # inside a table's cell
 HEAD = f"""# Measured data: fitted on one part, judged on another
 
-Written by `python benchmarks/measured.py --data ../shared/measured`. Recordings and resonances by others, read where they lie.
+Written by `python benchmarks/measured.py --data ../shared/measured`. \
+Recordings and resonances by others, read where they lie.
 Numbers and drawings stand here, no copy. Each set's source and licence stand under it.
 
 **Before** is the baseline, **after** the baseline with one effect of `sonic_bullet.effects`.
 Each is fitted on the one part and judged on the other, which it never saw.
 **Null** is the median error of {DRAWS} effects of as many numbers that mean nothing (each set says which).
 **Chance** is the share of them that do at least as well as the effect.
-An effect is *named* where it takes the error on the held-out part below {EARNS:.0%} of the baseline's, and at most {CHANCE:.0%} of the null's draws do so.
+An effect is *named* where it takes the error on the held-out part below {ACCEPTED_BELOW:.0%} of the baseline's, \
+and at most {CHANCE:.0%} of the null's draws do so.
 Else the set's verdict is *unexplained*, and what is left is said.
 Errors of decays are in dB of d (20 lg d'/d: 6 dB are a factor of two), medians over the lines held out.
 
-Every set is read {READINGS} times: as it was recorded, and with every sample off by {JITTER:g} of itself, which is far below the last bit.
-A rattling tap is no sum of a few decays, and a search for them may end elsewhere for as little (or on another processor).
-So an effect is *named* only where it is in all readings. The range of *after* over them stands in brackets where they differ.
+Every set is read {READINGS} times: as it was recorded, and with every sample off by {JITTER:g} of itself, \
+which is far below the last bit.
+A rattling tap is no sum of a few decays, and a search for them may end elsewhere for as little \
+(or on another processor).
+So an effect is *named* only where it is in all readings. The range of *after* \
+over them stands in brackets where they differ.
 """
 
 
@@ -54,7 +59,7 @@ def _after(text: str, word: str) -> str:
 
 
 def verdict(rows: tuple[Row, ...]) -> str:
-    named = [f"`{r.effect}` ({r.what})" for r in rows if r.earned]
+    named = [f"`{r.effect}` ({r.what})" for r in rows if r.accepted]
     return f"named: {', '.join(named)}" if named else "unexplained"
 
 
@@ -83,7 +88,8 @@ def summary(pages: list[Page]) -> str:
 def section(page: Page, figure: str) -> str:
     head = "| held out | items | unit | before | after | null | chance | effect |\n|---|---|---|---|---|---|---|---|"
     rows = [
-        f"| {r.what} | {r.count} | {r.unit.replace('|', BAR)} | {r.before:.3g} | {_after_all(r)} | {r.null:.3g} | {r.chance:.0%} | {r.effect or 'none proposed'}{_said(r)} |"
+        f"| {r.what} | {r.count} | {r.unit.replace('|', BAR)} | {r.before:.3g} | {_after_all(r)} | "
+        f"{r.null:.3g} | {r.chance:.0%} | {r.effect or 'none proposed'}{_said(r)} |"
         for r in page.found.rows
     ]
     what = str(page.case.get("type") or page.case.get("object") or "")
@@ -131,10 +137,10 @@ def _after_all(r: Row) -> str:
 
 
 def _said(r: Row) -> str:
-    if r.earned:
-        return " **earned**"
-    times = sum(x is not None and x.earns for x in (r, *r.again))
-    return f" (earned in {times} of {1 + len(r.again)} readings)" if times else ""
+    if r.accepted:
+        return " **accepted**"
+    times = sum(x is not None and x.accepted_here for x in (r, *r.again))
+    return f" (accepted in {times} of {1 + len(r.again)} readings)" if times else ""
 
 
 def _figure(page: Page, path: Path) -> None:

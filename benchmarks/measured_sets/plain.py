@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.measured_sets.laws import draw, joined, trial
+from benchmarks.measured_sets.laws import draw, joined, validated
 from benchmarks.measured_sets.observed import lines
 from benchmarks.measured_sets.values import Lines, Outcome, clear
 
@@ -38,11 +38,14 @@ def alternate(bodies: dict[str, Lines], skipped: list[str]) -> Outcome:
         raise ValueError("no body with two lines that stand clear")
     fit = [b.part(np.arange(len(b.freq_hz)) % 2 == 0) for b in kept]
     held = [b.part(np.arange(len(b.freq_hz)) % 2 == 1) for b in kept]
-    found = trial("every second line", fit, held)
-    text = f"{len(joined(kept).freq_hz)} lines of {len(kept)} files; every second one fitted, the others predicted. {found.said}."
+    found = validated("every second line", fit, held)
+    text = (
+        f"{len(joined(kept).freq_hz)} lines of {len(kept)} files; every second one fitted, the others predicted. "
+        f"{found.said}."
+    )
     left = (
         f"{found.row.after:.1f} dB of decay at the median line are left"
-        if not found.row.earned
+        if not found.row.accepted
         else "what is left is the scatter of single lines"
     )
     return Outcome((found.row,), text, left, lambda figure: draw(figure.subplots(), [found], fit, held), tuple(skipped))

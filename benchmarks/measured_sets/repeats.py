@@ -63,7 +63,8 @@ def judge(folder: Path, case: dict[str, Any]) -> Outcome:
             f"{f:.0f} Hz (repeats to {1e6 * r / f:.0f} ppm, moved by {s:+.0f} ppm)"
             for f, r, s in zip(first, apart, share, strict=True)
         )
-        + ". A drift of stiffness is no member of the effects' family: it belongs to the piece's moisture and age; one factor for all lines is the physics of E/ρ alone."
+        + ". A drift of stiffness is no member of the effects' family: it belongs to the piece's moisture and "
+        "age; one factor for all lines is the physics of E/ρ alone."
     )
     spread, repeats = float(np.ptp(share)), float(np.median(1e6 * apart / first))
     alike = f"lines move by amounts that differ by {spread:.0f} ppm among themselves"

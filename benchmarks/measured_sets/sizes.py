@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.measured_sets.laws import Trial, draw, trial
+from benchmarks.measured_sets.laws import Validation, draw, validated
 from benchmarks.measured_sets.observed import lines
 from benchmarks.measured_sets.values import Lines, Outcome, Row, clear
 
@@ -46,13 +46,13 @@ def over_sizes(bodies: dict[str, Lines], skipped: list[str], label: str = "") ->
         energy = b.amplitude**2 / b.decay_per_s
         pitch[name] = float(b.freq_hz[energy > 0.01 * energy.max()].min())
     order = sorted(bodies, key=pitch.__getitem__)
-    made: list[tuple[Trial, list[Lines], list[Lines]]] = []
+    made: list[tuple[Validation, list[Lines], list[Lines]]] = []
     for i, name in enumerate(order):
         others = sorted((j for j in range(len(order)) if j != i), key=lambda j: abs(j - i))[:2]
         fit = [bodies[order[j]] for j in others]
         made.append(
             (
-                trial(f"{label}{name} from {order[others[0]]} and {order[others[1]]}", fit, [bodies[name]], seed=i),
+                validated(f"{label}{name} from {order[others[0]]} and {order[others[1]]}", fit, [bodies[name]], seed=i),
                 fit,
                 [bodies[name]],
             )
@@ -61,7 +61,8 @@ def over_sizes(bodies: dict[str, Lines], skipped: list[str], label: str = "") ->
     rows.append(total(f"{label}all sizes, median", rows))
     laws = [m[0].said for m in made if m[0].law is not None]
     text = (
-        f"Decays of {', '.join(f'{n} ({len(bodies[n].freq_hz)} lines)' for n in order)}. Each size is predicted from the two nearest to it in pitch. "
+        f"Decays of {', '.join(f'{n} ({len(bodies[n].freq_hz)} lines)' for n in order)}. Each size is "
+        "predicted from the two nearest to it in pitch. "
         f"Laws proposed: {'; '.join(laws) or 'none: Rayleigh`s law stands'}."
     )
     one = max(made, key=lambda m: len(m[2][0].freq_hz))
@@ -69,7 +70,8 @@ def over_sizes(bodies: dict[str, Lines], skipped: list[str], label: str = "") ->
     return Outcome(
         tuple(rows),
         text,
-        f"a line of the size left out is wrong by {left:.1f} dB (a factor {10 ** (left / 20):.1f}) at the median at best, with a law or without. Decays differ line by line "
+        f"a line of the size left out is wrong by {left:.1f} dB (a factor {10 ** (left / 20):.1f}) at the "
+        "median at best, with a law or without. Decays differ line by line "
         "(hanging, radiation, tubes, close pairs), which frequency alone does not tell",
         lambda figure: draw(figure.subplots(), [one[0]], one[1], one[2], one[0].row.what),
         tuple(skipped),

@@ -71,7 +71,10 @@ def judge(folder: Path, case: dict[str, Any]) -> Outcome:
         tables.append(table)
     if not tables:
         raise ValueError("; ".join(skipped) or "no stroke has two strengths")
-    left = "decays and levels line by line differ between strikes by more than any law of level explains: where and with what was struck is not given"
+    left = (
+        "decays and levels line by line differ between strikes by more than any law of level explains: where and "
+        "with what was struck is not given"
+    )
     return Outcome(tuple(rows), " ".join(texts), left, lambda figure: paint(figure, tables[0]), tuple(skipped))
 
 
@@ -140,8 +143,10 @@ def judged(t: Table, stroke: str) -> tuple[list[Row], str]:
             rows.append(Row(f"{label}{what} of {ends}", values.shape[1], unit, error, error, np.nan, 1.0, ""))
     shift = 1e6 * np.log(t.freq_hz[-1] / t.freq_hz[0])
     text = (
-        f"{label or 'Strikes '}{t.freq_hz.shape[1]} lines in common, strengths {', '.join(f'{20 * np.log10(v):.0f}' for v in t.level)} dB. Loudest against softest: frequency "
-        f"{np.median(shift):+.0f} ppm at the median line (quartiles {np.quantile(shift, 0.25):+.0f}, {np.quantile(shift, 0.75):+.0f}), decay "
+        f"{label or 'Strikes '}{t.freq_hz.shape[1]} lines in common, strengths "
+        f"{', '.join(f'{20 * np.log10(v):.0f}' for v in t.level)} dB. Loudest against softest: frequency "
+        f"{np.median(shift):+.0f} ppm at the median line (quartiles {np.quantile(shift, 0.25):+.0f}, "
+        f"{np.quantile(shift, 0.75):+.0f}), decay "
         f"{DB * np.median(np.log(t.decay_per_s[-1] / t.decay_per_s[0])):+.1f} dB."
     )
     return rows, text

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.measured_sets.laws import draw, trial
+from benchmarks.measured_sets.laws import draw, validated
 from benchmarks.measured_sets.sizes import total
 from benchmarks.measured_sets.values import DRAWS, Array, Lines, Outcome, Row, told
 
@@ -43,18 +43,24 @@ def materials(folder: Path, case: dict[str, Any]) -> Outcome:
         if len(mine) >= 3:
             for i, name in enumerate(sorted(mine)):
                 rest = [t for n, t in mine.items() if n != name]
-                made.append((trial(name, rest, [mine[name]], seed=i), rest, [mine[name]]))
+                made.append((validated(name, rest, [mine[name]], seed=i), rest, [mine[name]]))
             rows.append(total(f"{kind}: each of {len(made)} classes from the others", [m[0].row for m in made]))
         else:
             fit = [t.part(np.arange(len(t.freq_hz)) % 2 == 0) for t in mine.values()]
             held = [t.part(np.arange(len(t.freq_hz)) % 2 == 1) for t in mine.values()]
-            made.append((trial(f"{kind}: every second line", fit, held), fit, held))
+            made.append((validated(f"{kind}: every second line", fit, held), fit, held))
             rows.append(made[0][0].row)
         pictured = pictured or (kind, made[0])
     if pictured is None:
         raise ValueError("no material with four lines")
-    text = f"{len(tables)} distinct tables, the {MOST_LINES} strongest lines of each, T60 over {LONGEST_S:.0f} s left out. A size class of a material is predicted from its others."
-    left = "T60 against frequency scatters within a class by as much as between laws; which recording stands behind a table is not known, so a law here is a range, not a material's"
+    text = (
+        f"{len(tables)} distinct tables, the {MOST_LINES} strongest lines of each, T60 over {LONGEST_S:.0f} s "
+        "left out. A size class of a material is predicted from its others."
+    )
+    left = (
+        "T60 against frequency scatters within a class by as much as between laws; which recording stands behind "
+        "a table is not known, so a law here is a range, not a material's"
+    )
     kind, one = pictured
     return Outcome(
         tuple(rows), text, left, lambda figure: draw(figure.subplots(), [one[0]], one[1], one[2], kind), tuple(skipped)
@@ -69,9 +75,8 @@ def _table(data: dict[str, Any]) -> Lines:
 
 
 def derived(folder: Path, case: dict[str, Any]) -> Outcome:
-    """Spruce plates: two predict the third's damping; the fan blade: a clamp that gives;
-
-    bowls: nothing that can be judged.
+    """Spruce plates: two predict the third's damping; the fan blade: a clamp that gives; bowls: nothing that can be
+    judged.
     """
     rows, texts, skipped, pictured = [], [], [], None
     try:
@@ -79,7 +84,7 @@ def derived(folder: Path, case: dict[str, Any]) -> Outcome:
         bodies = {p["plate"]: _plate(p["modes"]) for p in plates}
         made = [
             (
-                trial(
+                validated(
                     f"spruce {n}, from the other plates", [b for m, b in bodies.items() if m != n], [bodies[n]], seed=i
                 ),
                 n,
@@ -90,7 +95,8 @@ def derived(folder: Path, case: dict[str, Any]) -> Outcome:
         one, name = made[0]
         pictured = (one, [b for m, b in bodies.items() if m != name], [bodies[name]])
         texts.append(
-            f"Spruce: {sum(len(b.freq_hz) for b in bodies.values())} modes of {len(bodies)} plates; laws: {', '.join(sorted({m[0].law.law if m[0].law else 'Rayleigh' for m in made}))}."
+            f"Spruce: {sum(len(b.freq_hz) for b in bodies.values())} modes of {len(bodies)} plates; laws: "
+            f"{', '.join(sorted({m[0].law.law if m[0].law else 'Rayleigh' for m in made}))}."
         )
     except Exception as error:
         skipped.append(f"spruce_plates_1-3.json: {type(error).__name__}: {error}")
@@ -99,16 +105,21 @@ def derived(folder: Path, case: dict[str, Any]) -> Outcome:
         blade = next(t for t in tables if t["id"] == "olson_lindberg_fan_blade")
         rows.append(clamp(np.array(blade["f_hz"]), np.array(blade["fe_elmer_hz"])))
         texts.append(
-            "Fan blade: frequencies against those of a rigid clamp. A clamp that gives is no member of the family without the blade's shape: one factor of all modes stands for it."
+            "Fan blade: frequencies against those of a rigid clamp. A clamp that gives is no member of the "
+            "family without the blade's shape: one factor of all modes stands for it."
         )
         texts.append(
-            "Flax laminate: two frequencies and three stiffnesses, nothing is left to judge by. Bowls: no shape and no decays. RealImpact: see the JSON; one strike each."
+            "Flax laminate: two frequencies and three stiffnesses, nothing is left to judge by. Bowls: no "
+            "shape and no decays. RealImpact: see the JSON; one strike each."
         )
     except Exception as error:
         skipped.append(f"published.json: {type(error).__name__}: {error}")
     if not rows:
         raise ValueError("; ".join(skipped))
-    left = "damping of single plate modes scatters about any law of frequency (bending along and across the grain lose differently); the blade's clamp acts on some modes and not on others"
+    left = (
+        "damping of single plate modes scatters about any law of frequency (bending along and across the grain "
+        "lose differently); the blade's clamp acts on some modes and not on others"
+    )
     return Outcome(
         tuple(rows),
         " ".join(texts),

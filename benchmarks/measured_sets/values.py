@@ -1,4 +1,4 @@
-"""What a set's trial says: rows of errors before and after, a verdict in words, a figure; and the null every row stands
+"""What a set says: rows of errors before and after, a verdict in words, a figure; and the null every row stands
 beside.
 """
 
@@ -18,7 +18,7 @@ Array = np.ndarray[Any, Any]
 DRAWS = 200
 # of the model so far, in 1/s and s: lines in a table come with none, and nothing is yet taken from their decays
 ALPHA, BETA = 1.0, 1e-9
-EARNS = 0.9  # an effect's error on what it was not fitted to must fall below this share of the baseline's
+ACCEPTED_BELOW = 0.9  # an effect's error on what it was not fitted to must fall below this share of the baseline's
 CHANCE = 0.05  # of the null's draws, at most, may do as well
 
 
@@ -51,24 +51,24 @@ class Row:
         )
 
     @property
-    def earned(self) -> bool:
-        """Whether it earns its keep in every reading."""
-        return self.earns and all(r is not None and r.earns for r in self.again)
+    def accepted(self) -> bool:
+        """Whether it is accepted in every reading."""
+        return self.accepted_here and all(r is not None and r.accepted_here for r in self.again)
 
     @property
-    def earns(self) -> bool:
-        """Whether it does in this one."""
+    def accepted_here(self) -> bool:
+        """Whether it is in this one."""
         return bool(
             self.effect
             and "no effect" not in self.effect
-            and self.after < EARNS * self.before
+            and self.after < ACCEPTED_BELOW * self.before
             and self.chance <= CHANCE
         )
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """A set's trial.
+    """What a set says.
 
     text: a paragraph; unexplained: what is left, in words; draw: paints the set's figure on a matplotlib Figure;
     skipped: one line each.

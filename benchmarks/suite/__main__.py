@@ -61,7 +61,8 @@ def main() -> int:
             for row in pool.map(lambda name: diagnose(args.out / "cases" / name, args.command), todo):
                 write_row(file, row)
                 print(
-                    f"{row['case']}: {row['verdict']} {'+'.join(row['found']) or '-'} (was {'+'.join(row['true']) or '-'}), {row['cpu_s']:.0f} s CPU",
+                    f"{row['case']}: {row['verdict']} {'+'.join(row['found']) or '-'} (was "
+                    f"{'+'.join(row['true']) or '-'}), {row['cpu_s']:.0f} s CPU",
                     flush=True,
                 )
     if args.what in ("run", "report"):

@@ -42,10 +42,8 @@ class Bricks:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Modes:
-    """A body's modes:
-
-    value (m,) = ω² in 1/s², shape (v, 3, m) on its surface vertex_m (v, 3), face (f, 3); rigid (v, 3, 6); mass_kg. All
-    mass-normalised.
+    """A body's modes: value (m,) = ω² in 1/s², shape (v, 3, m) on its surface vertex_m (v, 3), face (f, 3); rigid (v,
+    3, 6); mass_kg. All mass-normalised.
     """
 
     value: Array
@@ -67,9 +65,8 @@ def grid(
     closed: bool = False,
     keep: Callable[[Array], Array] | None = None,
 ) -> Bricks:
-    """A grid of bricks, its points of 0..1 along each axis put where ``place`` says;
-
-    closed: the first axis runs round; keep: which cells, by centre, stay.
+    """A grid of bricks, its points of 0..1 along each axis put where ``place`` says; closed: the first axis runs
+    round; keep: which cells, by centre, stay.
     """
     n = np.array(cells)
     first = np.stack(np.meshgrid(*(np.arange(c) for c in n), indexing="ij"), axis=-1).reshape(-1, 3)

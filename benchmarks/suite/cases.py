@@ -41,9 +41,8 @@ NU_OFF = (-0.03, 0.02)
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """One case to be made: effects as (id, strength 0-2);
-
-    transfer: with another object; noise_db: below the peak of 0.5; form: audio, features or no-mesh.
+    """One case to be made: effects as (id, strength 0-2); transfer: with another object; noise_db: below the peak of
+    0.5; form: audio, features or no-mesh.
     """
 
     name: str

@@ -27,9 +27,8 @@ class Strike:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Ring:
-    """What rings after a unit impulse: poles s (m,) in 1/s, residues r (m,):
-
-    Re Σ r e^{st}. level (m,): the mode's displacement in m at its antinode.
+    """What rings after a unit impulse: poles s (m,) in 1/s, residues r (m,): Re Σ r e^{st}. level (m,): the mode's
+    displacement in m at its antinode.
     """
 
     pole: Array

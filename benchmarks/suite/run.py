@@ -16,10 +16,8 @@ LIMIT_S = 900
 
 
 def diagnose(case: Path, command: str) -> dict[str, Any]:
-    """Row:
-
-    case, true ids, verdict, found ids, errors, cpu_s, wall_s; verdict "failed" and the last line of what it said where
-    it broke.
+    """Row: case, true ids, verdict, found ids, errors, cpu_s, wall_s; verdict "failed" and the last line of what it
+    said where it broke.
     """
     truth = json.loads((case / "truth.json").read_text())
     row: dict[str, Any] = {

@@ -84,9 +84,8 @@ def beyond(distance: dict[str, float]) -> float:
 
 
 def short_of(strengths: tuple[int, ...], distance: dict[str, float], beside: list[dict[str, float]]) -> float:
-    """By how many dB the effects together, or one of them beside the others, are heard less than they must be;
-
-    0 where they are heard.
+    """By how many dB the effects together, or one of them beside the others, are heard less than they must be; 0
+    where they are heard.
     """
     least = [LEAST[s] for s in strengths]
     together = [min(least) - beyond(distance)] if least else []

@@ -87,7 +87,8 @@ def report(rows: list[Row], planned: int) -> str:
         f"{len(rows)} of {planned} cases judged, {len(failed)} failed"
         + "".join(f"\n  {r['case']}: {r.get('why', '')}" for r in failed),
         confusion(singles),
-        f"singles named: {sum(map(_named, singles))} of {len(singles)}; a wrong name in {len(wrong)} of {len(singles) + len(pairs)} singles and pairs",
+        f"singles named: {sum(map(_named, singles))} of {len(singles)}; a wrong name in {len(wrong)} of "
+        f"{len(singles) + len(pairs)} singles and pairs",
         f"false alarms: {len(alarms)} of {len(nulls)} nulls"
         + "".join(f"\n  {r['case']}: {r['verdict']} {'+'.join(r['found'])}" for r in alarms),
         f"pairs: both found {both} of {len(pairs)}, exactly {exact}"

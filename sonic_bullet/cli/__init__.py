@@ -13,14 +13,11 @@ is imported by the command that needs it.
 
 from __future__ import annotations
 
-import io
-import os
-import signal
-import sys
 from typing import Any
 
 import click
 
+from sonic_bullet.cli.console import run_and_exit
 from sonic_bullet.cli.examples import (
     CASE_EPILOG,
     DIAGNOSE_EPILOG,
@@ -31,43 +28,10 @@ from sonic_bullet.cli.examples import (
     RENDER_EPILOG,
     RESIDUAL_EPILOG,
 )
-from sonic_bullet.records.errors import SonicBulletError, interrupts
+from sonic_bullet.cli.parameters import Numbers, channel_option, json_option, strike_options
 
 DEFAULT_SR = 48_000
 DEFAULT_MODES_MATERIAL = "steel"
-
-
-class Numbers(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # generic since click 8.3
-    """``count`` finite numbers, separated by commas."""
-
-    def __init__(self, metavar: str) -> None:
-        self.name, self.count = metavar, metavar.count(",") + 1
-
-    def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:
-        """What help calls the value."""
-        return self.name
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, ...]:
-        """The numbers in ``value``; click's usage error where there are not ``count`` finite ones."""
-        if isinstance(value, tuple):
-            return value
-        try:
-            numbers = tuple(float(part) for part in str(value).split(","))
-        except ValueError:
-            numbers = ()
-        if len(numbers) != self.count or not all(abs(number) < float("inf") for number in numbers):
-            self.fail(f"{value!r} is not {self.name}: {self.count} finite numbers with commas between", param, ctx)
-        return numbers
-
-
-json_option = click.option(
-    "--json",
-    "json_to",
-    is_flag=False,
-    flag_value="-",
-    metavar="[PATH.json]",
-    help="Write the result as JSON to PATH.json, or alone to stdout.",
-)
 
 
 @click.group(epilog=GROUP_EPILOG, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
@@ -127,7 +91,8 @@ def render(**options: Any) -> None:
 @click.option(
     "--material",
     metavar="M",
-    help=f"A name ('sonic-bullet materials') or a preset file. [default: {DEFAULT_MODES_MATERIAL}, if no constants are given]",
+    help=f"A name ('sonic-bullet materials') or a preset file. [default: {DEFAULT_MODES_MATERIAL}, if no "
+    "constants are given]",
 )
 @click.option(
     "--young", "youngs_pa", type=float, metavar="E", help="Young's modulus in Pa, in place of the material's."
@@ -197,14 +162,6 @@ def doctor(scene: str, seconds: float, json_to: str | None) -> None:
     run_doctor(scene, seconds, json_to)
 
 
-channel_option = click.option(
-    "--channel",
-    type=click.IntRange(0),
-    metavar="N",
-    help="Which channel of a file of several, counted from 0. [default: the first, 0]",
-)
-
-
 @cli.command(epilog=FEATURES_EPILOG)
 @click.argument("recording")
 @click.option(
@@ -221,73 +178,6 @@ def features(**options: Any) -> None:
     from sonic_bullet.cli.features_command import run_features
 
     run_features(**options)
-
-
-def strike_options(command: Any) -> Any:
-    """The options that say how one recording was struck and recorded; a case says it itself."""
-    for option in reversed(
-        (
-            click.option("--mesh", metavar="M", help="Mesh of what was struck."),
-            click.option("--strike", type=Numbers("X,Y,Z"), help="Where it was struck, in m, mesh frame."),
-            click.option(
-                "--direction", type=Numbers("X,Y,Z"), help="Direction of the impulse. [default: into the surface]"
-            ),
-            click.option(
-                "--impulse",
-                type=click.FloatRange(0, min_open=True),
-                metavar="J",
-                help="Impulse in N·s; without it sigma stands for gain times impulse.",
-            ),
-            click.option(
-                "--material",
-                metavar="GUESS",
-                help="A name ('sonic-bullet materials') or a preset file: E and density good to 30 %.",
-            ),
-            click.option(
-                "--scale",
-                type=float,
-                metavar="S",
-                help="Metres per mesh unit: 0.001 for a mesh in millimetres. [default: 1]",
-            ),
-            click.option(
-                "--sensor",
-                type=click.Choice(["sum", "pressure", "velocity"]),
-                help="What was recorded: plain sum of modes, a microphone, a surface. [default: pressure]",
-            ),
-            click.option(
-                "--sensor-at",
-                type=Numbers("X,Y,Z"),
-                help="Where the surface was measured, in m, for --sensor velocity.",
-            ),
-            click.option(
-                "--sensor-direction",
-                type=Numbers("X,Y,Z"),
-                help="Along which, for --sensor velocity. [default: out of the surface]",
-            ),
-            click.option(
-                "--medium",
-                type=click.Choice(["air", "none"]),
-                help="What it rang in: 'none' loses nothing to radiation. [default: air; with --sensor sum unknown]",
-            ),
-            click.option(
-                "--onset",
-                "onset_s",
-                type=click.FloatRange(0),
-                metavar="S",
-                help="When the impulse arrives. [default: found]",
-            ),
-            channel_option,
-            click.option(
-                "--fix",
-                "fixed",
-                type=Numbers("X,Y,Z,R"),
-                multiple=True,
-                help="Clamp all within R of a point, in m, mesh frame; repeatable.",
-            ),
-        )
-    ):
-        command = option(command)
-    return command
 
 
 @cli.command(epilog=FIT_EPILOG)
@@ -424,80 +314,4 @@ def case_schema() -> None:
 
 def main() -> None:
     """The console script: run a command, turn every error into one line on stderr, and exit."""
-    import logging
-    import warnings
-
-    debug = bool(os.environ.get("SONIC_BULLET_DEBUG"))
-    if not debug:
-        warnings.simplefilter("ignore")  # a library's warning is no line of ours
-        logging.getLogger("matplotlib").setLevel(logging.ERROR)  # nor that it found no home for its fonts
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="replace")  # a terminal without Greek letters still gets its table
-    signal.signal(signal.SIGTERM, _terminated)
-    try:
-        # cli.main() would swallow what an interrupt says
-        with interrupts(), cli.make_context("sonic-bullet", _settled(sys.argv[1:]) or ["--help"]) as context:
-            cli.invoke(context)
-        _say_what_is_not_kept()
-        sys.stdout.flush()
-        sys.exit(0)
-    except click.exceptions.Exit as done:
-        code = done.exit_code
-    except KeyboardInterrupt as error:
-        code = 143 if str(error).startswith("terminated") else 130
-        _say(str(error) or "stopped")
-    except click.ClickException as error:
-        where = getattr(error, "ctx", None)
-        code, hint = 2, f"; see '{where.command_path} --help'" if where is not None else ""
-        _say(error.format_message().rstrip(".") + hint)
-    except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # the reader left; flushing at exit must not complain
-        code = 141
-    except SonicBulletError as error:
-        if debug:
-            raise
-        code = 2
-        _say(str(error))
-    except Exception as error:
-        if debug:
-            raise
-        code = 2
-        notes = "; ".join(getattr(error, "__notes__", []))
-        _say(
-            f"{type(error).__name__}: {error}"
-            + (f"; {notes}" if notes else "")
-            + "; set SONIC_BULLET_DEBUG=1 to see where"
-        )
-    sys.exit(code)
-
-
-def _settled(words: list[str]) -> list[str]:
-    """The command line with every --json that no name ending in .json follows as --json=-: what follows is another
-    argument then.
-    """
-    follows = [*words[1:], ""]
-    return [
-        "--json=-" if word == "--json" and not after.lower().endswith(".json") else word
-        for word, after in zip(words, follows, strict=True)
-    ]
-
-
-def _terminated(*_: object) -> None:
-    raise KeyboardInterrupt("terminated")
-
-
-def _say_what_is_not_kept() -> None:
-    """One note where there was no folder for compiled code and computed models: each run then takes a minute that the
-    next could do without.
-    """
-    folder = sys.modules.get("sonic_bullet.machine.user_folder")
-    if folder is not None and folder.NOTES:
-        _say(
-            f"note: compiled code and computed models are not kept for the next run: {folder.NOTES[0]}; XDG_CACHE_HOME names another folder"
-        )
-
-
-def _say(text: str) -> None:
-    """One line on stderr."""
-    print("sonic-bullet: " + " ".join(text.split()), file=sys.stderr)
+    run_and_exit(cli)

@@ -88,7 +88,8 @@ def _summary(found: Any) -> str:
     for c in found.closed.added:
         numbers = ", ".join(f"{k} {_number(v)}" for k, v in c.effect.parameters().items())
         text.append(
-            f"  {c.id} ({c.effect.owner.value}): {numbers}; {c.mean_db:.2f} dB nearer on strikes left out, chance {c.control_db:.2f} dB"
+            f"  {c.id} ({c.effect.owner.value}): {numbers}; {c.mean_db:.2f} dB nearer on strikes left out, "
+            f"chance {c.control_db:.2f} dB"
         )
     rows = [
         (

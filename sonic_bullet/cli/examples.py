@@ -18,7 +18,8 @@ Examples:
 FIT_EPILOG = """\b
 Examples:
   sonic-bullet fit tap.wav --mesh bar.obj --strike 0.05,0,0.003 --material steel -o bar.json --picture bar.png
-  sonic-bullet fit tap.wav --mesh mug.obj --scale 0.001 --strike 0,0.04,0 --sensor sum --material porcelain -o mug.json --json
+  sonic-bullet fit tap.wav --mesh mug.obj --scale 0.001 --strike 0,0.04,0 --sensor sum \
+--material porcelain -o mug.json --json
   sonic-bullet fit my_case/ -o preset.json       (several strikes, sizes, sensors: a folder with a case.json)
 The preset plays at once: listener.add(body, material="preset.json")."""
 
@@ -26,7 +27,8 @@ RESIDUAL_EPILOG = """\b
 Examples:
   sonic-bullet residual my_case/ -o preset.json --picture preset.png
   sonic-bullet residual tap.wav --mesh bar.obj --strike 0.05,0,0.003 --material steel -o bar.json
-  sonic-bullet residual tap.wav --material wood -o wood.json     (no shape known: the recording's features stand in for modes)
+  sonic-bullet residual tap.wav --material wood -o wood.json     \
+(no shape known: the recording's features stand in for modes)
 Hear a scene without: sonic-bullet render scene.py -o out.wav --no-residual"""
 
 FEATURES_EPILOG = """\b

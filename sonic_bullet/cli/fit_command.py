@@ -175,7 +175,8 @@ def _summary(found: Any) -> str:
     ]
     if len(correction):
         text.append(
-            f"corrections of single modes' frequencies: rms {np.sqrt((correction**2).mean()):.2%}, largest {np.abs(correction).max():.2%}"
+            f"corrections of single modes' frequencies: rms {np.sqrt((correction**2).mean()):.2%}, largest "
+            f"{np.abs(correction).max():.2%}"
         )
     if fit.metric >= 0:
         text.append(

@@ -65,7 +65,9 @@ def _shaped(source: str, one: dict[str, Any], progress: Any) -> tuple[Any, Any]:
 
 
 def _unshaped(source: str, one: dict[str, Any], progress: Any) -> tuple[Any, Any]:
-    """Preset and strikes of a recording without a shape: a named material, the recording's features in place of modes."""
+    """Preset and strikes of a recording without a shape: a named material, the recording's features in place
+    of modes.
+    """
     import msgspec
 
     from sonic_bullet.estimator.residual.recorded_strikes import recording_strikes
@@ -112,4 +114,7 @@ def _summary(source: str, residual: Residual) -> str:
     shown = described(residual)
     level = shown["residual_of_clip_db"]
     loud = "nothing" if level is None else f"{level:.1f} dB of the recordings' energy"
-    return f"{source}: beside {shown['modes']} modes there is {loud}: {len(shown['lines'])} lines, and noise in {shown['noise_cells']} cells of band and time"
+    return (
+        f"{source}: beside {shown['modes']} modes there is {loud}: {len(shown['lines'])} lines, and noise in "
+        f"{shown['noise_cells']} cells of band and time"
+    )

@@ -266,11 +266,13 @@ def _oversized(log: ContactLog) -> tuple[str, ...]:
 def _warnings(report: AudioReport) -> tuple[str, ...]:
     if report.clipped:
         return (
-            f"{report.clipped} samples were clipped at full scale (peak {report.peak_pa:.3g} Pa); --peak-dbfs -1 avoids it, a float .wav needs no clipping",
+            f"{report.clipped} samples were clipped at full scale (peak {report.peak_pa:.3g} Pa); "
+            "--peak-dbfs -1 avoids it, a float .wav needs no clipping",
         )
     if report.over:
         return (
-            f"{report.over} samples pass 1.0 (peak {report.peak_pa:.3g} Pa): the file is exact, but players clip it; --peak-dbfs -1 scales it",
+            f"{report.over} samples pass 1.0 (peak {report.peak_pa:.3g} Pa): the file is exact, but players "
+            "clip it; --peak-dbfs -1 scales it",
         )
     return ()
 
@@ -282,7 +284,10 @@ def _summary(report: AudioReport, log: ContactLog) -> str:
     scale = "" if report.gain_per_pa == 1 else f", scaled by {report.gain_per_pa:.4g}"
     units = {quantity(sensor)[1] for sensor in log.sensors}
     unit = units.pop() if len(units) == 1 else "(mixed units)"
-    return f"{report.path}: {report.seconds:.3f} s, {channels}, {report.sr} Hz, peak {report.peak_pa:.4g} {unit}, rms {report.rms_pa:.4g} {unit}{scale}"
+    return (
+        f"{report.path}: {report.seconds:.3f} s, {channels}, {report.sr} Hz, peak {report.peak_pa:.4g} {unit}, "
+        f"rms {report.rms_pa:.4g} {unit}{scale}"
+    )
 
 
 def _described(result: RenderResult | _Replay, report: AudioReport, notes: tuple[str, ...]) -> dict[str, Any]:

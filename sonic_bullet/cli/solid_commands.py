@@ -158,5 +158,8 @@ def _summary(mesh: str, material: Material, model: ModalModel) -> str:
         for i, (f, d) in enumerate(zip(model.freq_hz, model.decay_per_s, strict=True), 1)
     ]
     dropped = f", {model.dropped} overdamped modes dropped" if model.dropped else ""
-    head = f"{mesh}: {material.name}, {model.volume_m3 * 1e6:.4g} cm³, {model.mass_kg:.4g} kg, {model.mode_count} modes{dropped}\n{model.note}"
+    head = (
+        f"{mesh}: {material.name}, {model.volume_m3 * 1e6:.4g} cm³, {model.mass_kg:.4g} kg, {model.mode_count} "
+        f"modes{dropped}\n{model.note}"
+    )
     return head.rstrip() + ("\n" + table(("mode", "Hz", "decay in 1/s"), rows) if rows else "")

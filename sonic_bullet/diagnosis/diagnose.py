@@ -114,7 +114,8 @@ def _warnings(end: Closed | NothingCompared, out: dict[str, tuple[LeftOut, ...]]
         said.append("one strike alone: nothing can be left out, so no effect can be named; record more strikes")
     if end.mesh_off:
         said.append(
-            f"upper modes are up to {100 * end.mesh_off:.1f} % off, more than is corrected: what is left open is the mesh's; a finer one closes it"
+            f"upper modes are up to {100 * end.mesh_off:.1f} % off, more than is corrected: what is left "
+            "open is the mesh's; a finer one closes it"
         )
     return said
 

@@ -71,10 +71,16 @@ def remainder(end: Closed | NothingCompared, takes: Sequence[Take]) -> dict[str,
         words += "; it differs from place to place" if scatter > 0.5 else "; it is alike wherever the body is struck"
     strange = of_no_body(end.after, takes)
     if strange > RULES.no_body_share:
-        words += "; modes of one frequency, decay and phase each, whatever they are, do not play it: something goes with time or level, or is noise"
+        words += (
+            "; modes of one frequency, decay and phase each, whatever they are, do not play it: something goes "
+            "with time or level, or is noise"
+        )
     again = _again(takes)
     if again is not None:
-        words += f"; many lines are heard again at {again:.4f} times their frequency, as loud against the first in every strike: an echo of something that moves does that"
+        words += (
+            f"; many lines are heard again at {again:.4f} times their frequency, as loud against the first in "
+            "every strike: an echo of something that moves does that"
+        )
     return {
         "left_db": end.after_db - end.floor_db,
         "words": words,

@@ -107,9 +107,8 @@ class ContactTime:
 
 
 def _table(h: ObjectEvidence) -> tuple[Array, Array, Array, Array, Array, Array]:
-    """Per strike and line, flat:
-
-    frequency, impulse, expected and observed magnitude, spread, the line's strongest expected magnitude.
+    """Per strike and line, flat: frequency, impulse, expected and observed magnitude, spread, the line's strongest
+    expected magnitude.
     """
     expected, observed = np.abs(h.expected), np.abs(h.amplitude)
     freq, sd = h.freq_hz, h.amplitude_sd
@@ -172,9 +171,8 @@ def _from(gain: float, expected: Array, observed: Array, sd: Array, rough: Array
 
 
 def _late(h: ObjectEvidence, effect: ContactTime) -> float:
-    """Twice the negative log likelihood under Cauchy's law of the phases (s, k) at the best common delay;
-
-    0 where they are not true.
+    """Twice the negative log likelihood under Cauchy's law of the phases (s, k) at the best common delay; 0 where
+    they are not true.
     """
     if not h.signed or h.dry:
         return 0.0

@@ -41,7 +41,7 @@ class ForeignMode(RingsAlong):
     id: ClassVar[str] = "foreign-mode"
     stage: ClassVar[Stage] = Stage.SOUND
     owner: ClassVar[Owner] = Owner.STRIKER
-    reference: ClassVar[str] = "physics of a second resonator driven by the same blow: Morse & Ingard 1968, ch. 2"
+    reference: ClassVar[str] = "physics of a second resonator driven by the same impact: Morse & Ingard 1968, ch. 2"
     traits: ClassVar[Traits] = Traits()
 
     freq_hz: tuple[float, ...]

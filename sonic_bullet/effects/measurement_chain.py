@@ -184,10 +184,8 @@ def _filter(observed: list[ObjectEvidence], better: float, fewest: int) -> dict[
 
 
 def _ratio(h: ObjectEvidence) -> tuple[Array, Array, Array]:
-    """Per line:
-
-    frequency, ln of observed over expected amplitude over the strikes, and its spread, which grows where the strikes
-    disagree.
+    """Per line: frequency, ln of observed over expected amplitude over the strikes, and its spread, which grows where
+    the strikes disagree.
     """
     expected, seen = np.abs(h.expected), np.abs(h.amplitude)
     width = np.hypot(h.amplitude_sd, ROUGH * expected.max(axis=0, keepdims=True)) + 1e-300

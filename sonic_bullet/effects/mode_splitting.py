@@ -76,9 +76,8 @@ class ModeSplitting(SplitsPairs):
         return replace(x, freq_hz=freq[order], decay_per_s=x.decay_per_s[order], shape=shape[:, :, order])
 
     def observed_correction(self, freq_hz: Array) -> Array:
-        """How far off (m,), relative, modes at freq_hz (m,) are from the middles of the pairs that were observed;
-
-        0 for all others.
+        """How far off (m,), relative, modes at freq_hz (m,) are from the middles of the pairs that were observed; 0
+        for all others.
         """
         off = np.zeros(len(freq_hz))
         for f in self.freq_hz:

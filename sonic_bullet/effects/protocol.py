@@ -1,10 +1,4 @@
-"""What effects act on, what they read, and what every effect is.
-
-    MATERIAL  Material   -> Material      stiffness, density: the host solves the modes again
-    MODES     ModalModel -> ModalModel    frequencies, decays, shapes
-    FORCE     Impact     -> Impact        when, how long, how often a strike presses
-    BANK      Ring       -> Ring          how a ringing mode depends on its own level
-    SOUND     Sound      -> Sound         what happens on the way to the file
+"""What effects read, and what every effect is; what they act on is in stages.py.
 
 An effect is physics with few parameters. `propose` reads them off the evidence, or says None; it never scores itself:
 the diagnosis renders strikes that were not fitted, with and without it. What a host must know beforehand stands in its
@@ -14,6 +8,7 @@ body) in small classes that they derive from.
 
 from __future__ import annotations
 
+import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -22,17 +17,33 @@ from typing import Any, ClassVar, Protocol, Self
 
 import numpy as np
 
+from sonic_bullet.effects.stages import Impact, Ring, Sound, Stage
 from sonic_bullet.records import Array, Material, ModalModel
 
-
-class Stage(Enum):
-    """Where an effect acts, in the order in which sound is made."""
-
-    MATERIAL = "material"
-    MODES = "modes"
-    FORCE = "force"
-    BANK = "bank"
-    SOUND = "sound"
+__all__ = [
+    "CARRIES",
+    "Alternatives",
+    "BaselineChange",
+    "ChangesBaseline",
+    "Cost",
+    "Dereverberates",
+    "Effect",
+    "Elastic",
+    "Evidence",
+    "Impact",
+    "Mixing",
+    "ObjectEvidence",
+    "Owner",
+    "Poisson",
+    "Ring",
+    "RingsAlong",
+    "RotatesPairs",
+    "Sound",
+    "SplitsPairs",
+    "Stage",
+    "Traits",
+    "ascending",
+]
 
 
 class Owner(Enum):
@@ -50,57 +61,6 @@ class Owner(Enum):
 
 
 CARRIES = frozenset({Owner.MATERIAL, Owner.STRIKER, Owner.ROOM, Owner.CHAIN})  # over to another object of the material
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Impact:
-    """A strike of impulse_n_s: h hits after delay_s (h,), each with share (h,) of it, each a pulse of the duration
-    tau_s, 0 for none. pulse: see `pulses`.
-    """
-
-    impulse_n_s: float
-    delay_s: Array
-    share: Array
-    tau_s: float = 0.0
-    pulse: str = "impulse"
-
-    def spectrum(self, freq_hz: Array) -> Array:
-        """Complex share (f,) of the impulse that a mode at freq_hz takes from one hit, the hit beginning at 0."""
-        from sonic_bullet.effects.common.pulses import spectrum
-
-        return spectrum(self.pulse, self.tau_s, freq_hz)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Ring:
-    """m modes as one strike starts them: freq_hz, decay_per_s (m,), amplitude (m,) complex at the sensor; level (m,):
-    peak velocity at the surface in m/s.
-
-    bend, damping_growth (m,): relative change of frequency bend·level², of decay
-    (damping_growth·level)^damping_growth_power, 1 or 2; 0 in a linear body.
-    """
-
-    freq_hz: Array
-    decay_per_s: Array
-    amplitude: Array
-    level: Array
-    bend: Array
-    damping_growth: Array
-    impulse_n_s: float = 1.0
-    damping_growth_power: float = 1.0
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Sound:
-    """A strike's sound (n,) in units of the file, from the onset on, and what made it.
-
-    impulse_n_s: 1 where unknown. direct (n,): the first sound, untouched.
-    """
-
-    sample: Array
-    sr: int
-    impulse_n_s: float
-    strike: int = -1  # of the fitted ones, where an effect was fitted to each of them; -1 else
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -203,7 +163,7 @@ class Evidence:
     found so far by id, band and seed.
 
     known: what the effect said of the whole evidence, or beside other effects: it is there to be fitted again, not to
-    be looked for. on_trial: whether this is the evidence without a strike, known's numbers to be estimated again; axes
+    be looked for. held_out: whether this is the evidence without a strike, known's numbers to be estimated again; axes
     of degenerate pairs, which a linear body has no part of, stand as known has them.
     """
 
@@ -215,7 +175,13 @@ class Evidence:
     band_hz: tuple[float, float]
     seed: int = 0
     known: Effect | None = None
-    on_trial: bool = False
+    held_out: bool = False
+
+    @property
+    def on_trial(self) -> bool:
+        """Former name of `held_out`."""
+        warnings.warn("Evidence.on_trial is now held_out", DeprecationWarning, stacklevel=2)
+        return self.held_out
 
 
 class Cost(Enum):
@@ -278,7 +244,9 @@ class ChangesBaseline(ABC):
 
 
 class Dereverberates(ABC):
-    """An effect that hides the modes' own decays and levels from the lines, and can take itself out of them (a room)."""
+    """An effect that hides the modes' own decays and levels from the lines, and can take itself out of them
+    (a room).
+    """
 
     @abstractmethod
     def dereverberated(self, observed: ObjectEvidence) -> ObjectEvidence:
@@ -286,9 +254,8 @@ class Dereverberates(ABC):
 
     @abstractmethod
     def identified_from(self, signal: Array, sound: Array, noise: Array, sr: int, *, fully: bool = False) -> Self:
-        """The effect with its response identified from recordings (s, n) and what is played without it (s, n);
-
-        noise (s,): rms. fully: to the end.
+        """The effect with its response identified from recordings (s, n) and what is played without it (s, n); noise
+        (s,): rms. fully: to the end.
         """
 
 

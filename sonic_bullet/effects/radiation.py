@@ -74,7 +74,7 @@ class Radiation(Alternatives):
         return 2
 
     def others(self) -> tuple[Radiation, ...]:
-        """The same energy, heard otherwise: another effect's roll-off may have taken up the tilt, or left it."""
+        """The same energy, observed otherwise: another effect's roll-off may have taken up the tilt, or left it."""
         return (replace(self, tilt=0.5 - self.tilt),)
 
     @classmethod
@@ -145,7 +145,9 @@ def _left(decay: Array, sd: Array, columns: Array) -> tuple[Array, float]:
 
 
 def _off(observed: ObjectEvidence, made: Radiation, tilt: float) -> Array:
-    """ln of every line's level (k,) over the expected one, as the strikes agree on, less the tilt and what is common."""
+    """ln of every line's level (k,) over the expected one, as the strikes agree on, less the tilt and what is
+    common.
+    """
     ratio = np.log(np.maximum(np.abs(observed.amplitude), 1e-300) / np.maximum(np.abs(observed.expected), 1e-300))
     left = np.median(ratio, axis=0) - tilt * np.log(made.efficiency(observed.freq_hz))
     return np.asarray(left - np.median(left))

@@ -1,9 +1,8 @@
-"""From recordings to materials [Ren, Yeh, Lin 2013, sections 4 and 5].
+"""From recordings to materials [after Ren, Yeh, Lin 2013, sections 4 and 5; their own search: benchmarks/ren2013].
 
-    recording -> Features (features.py) \\
-    case or strike -> Observation
-        -> distance (metric.py) -> optimise -> MaterialFit (material_fit.py) -> preset -> the run time
-    mesh + guess -> ModalModel (modal)  /
+    recordings -> Lines (lines) \\
+    mesh + guess -> Family (modal) -> pairs, least squares (fit) -> MaterialFit -> preset -> the run time
+    case -> Observation        /
 
-The run time never imports this room: a preset is the only bridge. Values between its parts stand in values.py.
+The run time never imports this room: a preset is the only bridge. Values between its parts stand in line_values.py.
 """

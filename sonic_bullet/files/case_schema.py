@@ -25,7 +25,8 @@ ABOUT: dict[str, tuple[str, dict[str, str]]] = {
             "sensor": "one for all recordings",
             "band_hz": "Hz, what the recordings hold; absent: 20 to 20 000",
             "medium": "`air`, or `none` where nothing takes sound away; absent: air for a microphone or a vibrometer",
-            "onset": "arrival of the impulse in every file: s, or words with `sample 0`; absent: found, phases not used",
+            "onset": "arrival of the impulse in every file: s, or words with `sample 0`; absent: found, phases not "
+            "used",
         },
     ),
     "Recording": (

@@ -29,7 +29,7 @@ SPLITS = ("fit", "holdout", "transfer")
 MEDIA = ("air", "none")
 IN_AIR = ("velocity", "pressure")
 """Sensors of real things: what they recorded was in air where a case does not say otherwise."""
-LARGEST = 1e6  # metres, or N·s: no place, size or blow of a strike is larger, and squares of such numbers stay finite
+LARGEST = 1e6  # metres, or N·s: no place, size or impulse is larger, and squares of such numbers stay finite
 Number = Annotated[float, msgspec.Meta(ge=-LARGEST, le=LARGEST)]
 Magnitude = Annotated[float, msgspec.Meta(ge=-1e12, le=1e12)]
 Hertz = Annotated[float, msgspec.Meta(le=1e7)]
@@ -129,9 +129,8 @@ class CaseObject:
 
 @dataclass(frozen=True, slots=True)
 class CaseRecording:
-    """One strike: an audio file or measured lines, on which object, for what use, and where and how hard;
-
-    None where not declared.
+    """One strike: an audio file or measured lines, on which object, for what use, and where and how hard; None where
+    not declared.
 
     channel: counted from 0; channel_named: whether the case says so, else it is the first.
     """
@@ -228,7 +227,8 @@ def _case(raw: _Raw, path: Path, unread: tuple[str, ...]) -> Case:
     if raw.medium is not None and raw.medium not in MEDIA:
         unread = (
             *unread,
-            f"case {path}: medium '{shown(raw.medium)}' is not known (known: {', '.join(MEDIA)}): damping is fitted as a whole",
+            f"case {path}: medium '{shown(raw.medium)}' is not known (known: {', '.join(MEDIA)}): damping is "
+            "fitted as a whole",
         )
     where = _onset(raw.onset), _said(raw.support), medium_of(raw.medium, observed)
     return Case(

@@ -98,7 +98,9 @@ class ContactLog:
         return np.asarray((sign[:, None] * rows.impulse_n_s)[mask])
 
     def rows_on(self, body: int, link: int | None = None) -> Array:
-        """(k,) row numbers (into `rows`, `step`, `time_s`) of the impulses that `impulse_on` lists, in the same order."""
+        """(k,) row numbers (into `rows`, `step`, `time_s`) of the impulses that `impulse_on` lists, in the
+        same order.
+        """
         return np.flatnonzero(self._side(self.rows, body, link)[1])
 
     def _side(self, rows: Contacts, body: int, link: int | None) -> tuple[Array, Array]:

@@ -37,7 +37,8 @@ EXTRA = struct.Struct("<2H2Q")  # its zip64 field: id, length, size, packed size
 END = struct.Struct("<4s6xH8xH")  # end of the directory: magic, entries in all, length of the comment [4.3.16]
 ZIP64, UTF8 = 0xFFFFFFFF, 1 << 11
 NPY = re.compile(  # [numpy.lib.format, version 1.0 and 2.0], as numpy writes it
-    rb"\{'descr': '(?P<descr>[<>|=][a-zA-Z][0-9]{0,4})', 'fortran_order': (?P<fortran>True|False), 'shape': \((?P<shape>[-0-9, ]{0,400})\), \} *\n"
+    rb"\{'descr': '(?P<descr>[<>|=][a-zA-Z][0-9]{0,4})', 'fortran_order': (?P<fortran>True|False), 'shape': "
+    rb"\((?P<shape>[-0-9, ]{0,400})\), \} *\n"
 )
 
 

@@ -27,9 +27,8 @@ SEVERAL_FILES = {"gltf", "dae"}  # formats whose numbers may lie in files beside
 
 
 def read_surfaces(path: Path) -> list[MeshSurface]:
-    """Objects of a mesh file, in its own unit:
-
-    (vertices (v, 3), faces (f, 3)) each, polygons as fans, nothing merged or repaired.
+    """Objects of a mesh file, in its own unit: (vertices (v, 3), faces (f, 3)) each, polygons as fans, nothing merged
+    or repaired.
 
     Raises FileError where it cannot be read, MeshError where it is of no known kind, broken, or a face names no vertex
     (line or number of the face).
@@ -48,7 +47,8 @@ def _check(path: Path, vertex: Array, face: Array) -> None:
     if len(wrong):
         triangle, corner = (int(i) for i in wrong[0])
         raise MeshError(
-            f"mesh file {path}: triangle {triangle + 1} names vertex {face[triangle, corner]} of 0 to {len(vertex) - 1}",
+            f"mesh file {path}: triangle {triangle + 1} names vertex {face[triangle, corner]} of 0 to "
+            f"{len(vertex) - 1}",
             REMEDY,
         )
 

@@ -41,9 +41,8 @@ def reading(path: str | os.PathLike[str], thing: str, kind: type[SonicBulletErro
 
 
 def _with_path(error: SonicBulletError, path: str, kind: type[SonicBulletError]) -> SonicBulletError | None:
-    """The error as ``kind``, with the path and no more of the file than is allowed;
-
-    None where it is all that already.
+    """The error as ``kind``, with the path and no more of the file than is allowed; None where it is all that
+    already.
     """
     # every text has the empty name in it
     before, named, after = error.what.partition(path) if path else (error.what, " ", "")

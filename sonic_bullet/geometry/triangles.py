@@ -98,7 +98,9 @@ def is_closed(face: Array) -> bool:
 
 
 def _smooth_neighbours(face: Array, normal: Array) -> tuple[Array, Array]:
-    """Pairs of directed edges (rows of `_edges`) that are one edge shared by two faces at less than the crease angle."""
+    """Pairs of directed edges (rows of `_edges`) that are one edge shared by two faces at less than the
+    crease angle.
+    """
     edge = _edges(face)
     n = int(face.max()) + 1
     key = edge.min(axis=1) * n + edge.max(axis=1)

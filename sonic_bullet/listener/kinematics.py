@@ -82,9 +82,8 @@ def impulses(dt: float, normal: Array, tangent_1: Array, tangent_2: Array, force
 
 @njit(fastmath=False, nogil=True)
 def jumps(earlier: Table, later: Table, old: Array, static: Array, dt: float, driven: float, floor: float) -> Array:
-    """(n,) of `later`: farther from its row `old` (n,) of `earlier` than 1.5 × both speeds (static:
-
-    `driven`) · dt + floor; never where old < 0.
+    """(n,) of `later`: farther from its row `old` (n,) of `earlier` than 1.5 × both speeds (static: `driven`) · dt +
+    floor; never where old < 0.
     """
     result = np.zeros(len(old), np.bool_)
     for i in range(len(old)):

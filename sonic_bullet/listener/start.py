@@ -34,9 +34,8 @@ class Start:
 
 
 def hooked_start(past: Motion | None, now: Motion, by_hand: Collection[int], dt_s: float) -> Start:
-    """From the motion read before this step and the one read before the last (None: no step yet);
-
-    by_hand: bodies known to be moved.
+    """From the motion read before this step and the one read before the last (None: no step yet); by_hand: bodies
+    known to be moved.
     """
     if past is None:
         return Start(now, np.zeros(len(now.roster.code), bool), np.ones(len(now.roster.code), bool))

@@ -24,9 +24,8 @@ ROLL_MARGIN = 2.0
 SLIP_MARGIN = 0.05
 
 Trace = tuple[Array, Array]
-"""Contacts of one step, ordered by pair:
-
-pair (k,) int64; (k, 10) of time_s, point_a_m (3), point_b_m (3), u_a (3) in the world's axes.
+"""Contacts of one step, ordered by pair: pair (k,) int64; (k, 10) of time_s, point_a_m (3), point_b_m (3), u_a (3) in
+the world's axes.
 """
 
 NO_TRACE: Trace = (np.zeros(0, np.int64), np.zeros((0, 10)))
@@ -82,9 +81,8 @@ def recognise(
     slip: Array,
     limit: float,
 ) -> bool:
-    """Fill u_a (columns 7-9) of row i, whose time and points stand already;
-
-    False where nothing of the pair is known that fits.
+    """Fill u_a (columns 7-9) of row i, whose time and points stand already; False where nothing of the pair is known
+    that fits.
 
     limit: how slow the slower sweep must be, m/s.
     """

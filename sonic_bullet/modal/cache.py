@@ -54,9 +54,8 @@ Layout = Mapping[str, Kept]
 
 
 def folder(place: Place) -> Path | None:
-    """The cache's folder:
-
-    ``place``, or for "default" SONIC_BULLET_CACHE or the user's cache folder; None for no cache.
+    """The cache's folder: ``place``, or for "default" SONIC_BULLET_CACHE or the user's cache folder; None for no
+    cache.
     """
     if place is None:
         return None
@@ -79,15 +78,16 @@ def code_digest(files: tuple[Path, ...], packages: tuple[str, ...]) -> bytes:
 
 
 def _code() -> bytes:
-    """Digest of all that turns a surface into modes: this room's source, the geometry below it, the solvers' versions."""
+    """Digest of all that turns a surface into modes: this room's source, the geometry below it, the solvers'
+    versions.
+    """
     here = Path(__file__).resolve().parent
     return code_digest((*sorted(here.rglob("*.py")), *sorted((here.parent / "geometry").glob("*.py"))), SOLVERS)
 
 
 def key(kind: str, *parts: Array | str | float | int | None, code: bytes | None = None) -> str:
-    """Name of a result:
-
-    ``kind`` and a digest of the parts (arrays by dtype, shape and bytes) and of the code, by default this room's.
+    """Name of a result: ``kind`` and a digest of the parts (arrays by dtype, shape and bytes) and of the code, by
+    default this room's.
     """
     digest = hashlib.sha256(_code() if code is None else code)
     for part in parts:
@@ -146,7 +146,9 @@ def _fits(arrays: Mapping[str, Array], layout: Layout) -> bool:
 
 
 def save(place: Place, name: str, arrays: dict[str, Array], note: str) -> None:
-    """Keep arrays and note under ``name``; a full or read-only disk costs the next run time, not this one its result."""
+    """Keep arrays and note under ``name``; a full or read-only disk costs the next run time, not this one its
+    result.
+    """
     from sonic_bullet.files.container import write_container
 
     where = folder(place)

@@ -59,7 +59,9 @@ def bar_bending_hz(
 def bar_longitudinal_hz(
     length_m: float, width_m: float, depth_m: float, youngs_pa: float, poisson: float, density_kg_m3: float, count: int
 ) -> Array:
-    """Longitudinal frequencies (count,) n c/2L with Rayleigh's correction for lateral inertia [Rayleigh 1894, § 157]."""
+    """Longitudinal frequencies (count,) n c/2L with Rayleigh's correction for lateral inertia [Rayleigh 1894,
+    § 157].
+    """
     k = np.arange(1, count + 1) * np.pi / length_m
     polar = (width_m**2 + depth_m**2) / 12
     return np.asarray(k * np.sqrt(youngs_pa / density_kg_m3) / (2 * np.pi * np.sqrt(1 + poisson**2 * polar * k**2)))

@@ -28,9 +28,8 @@ RIGID_TOLERANCE = 1e-6  # of the first elastic λ
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Modes:
-    """lambda_per_s2 (m,) ascending, elastic only;
-
-    vector (dof, m) with UᵀMU = 1; rigid_per_s2 (r,) the rigid modes' own.
+    """lambda_per_s2 (m,) ascending, elastic only; vector (dof, m) with UᵀMU = 1; rigid_per_s2 (r,) the rigid modes'
+    own.
     """
 
     lambda_per_s2: Array

@@ -21,7 +21,9 @@ CHUNK = 2000  # elements at a time: keeps the (t, 30, 30) blocks of a large body
 
 
 def _element(order: int) -> tuple[Array, Array, Array]:
-    """Shape functions (10, q), their reference gradients (10, 3, q) and the weights (q,) of a rule exact to ``order``."""
+    """Shape functions (10, q), their reference gradients (10, 3, q) and the weights (q,) of a rule exact to
+    ``order``.
+    """
     from skfem import ElementTetP2
     from skfem.quadrature import get_quadrature
 

@@ -46,9 +46,8 @@ SHIFT = 20.0  # × (2V/A)²/L²: a third of the first elastic λ' of plates and 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Unit:
-    """A solved body without units:
-
-    value (m,), vector (v, 3, m) float32 on its skin, volume; vertex_m, face, curvature with units.
+    """A solved body without units: value (m,), vector (v, 3, m) float32 on its skin, volume; vertex_m, face,
+    curvature with units.
     """
 
     value: Array

@@ -1,8 +1,7 @@
 """The order in which unknowns are eliminated: nested dissection by geometry.
 
     cut the nodes in two by a plane, number both halves first and the nodes that part them last, and so on in each half
-                                                                                        [George 1973; Davis 2006, ch.
-                                                                                            7.6]
+        [George 1973; Davis 2006, ch. 7.6]
 
 Against minimum degree it halves the time of the factor on chunky bodies and costs a few tenths of a second.
 Deterministic.

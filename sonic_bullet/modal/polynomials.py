@@ -104,9 +104,8 @@ def wave_number_of(count: int, size: Array) -> float:
 
 
 def degrees(size: Array, wave: float) -> tuple[int, int, int]:
-    """How many polynomials along each axis a box of size (3,) takes for waves up to ``wave``:
-
-    π a wave length and a margin (λ then to 1e-5).
+    """How many polynomials along each axis a box of size (3,) takes for waves up to ``wave``: π a wave length and a
+    margin (λ then to 1e-5).
     """
     reach = wave * np.asarray(size) / 2
     x, y, z = np.ceil(reach + 4 + 4 * np.minimum(1, reach / 4)).astype(int)
@@ -146,9 +145,8 @@ def parities(size: Array, terms: tuple[int, int, int]) -> Iterator[Parity]:
 
 
 def _slopes(n: int) -> Any:
-    """The table (n, n) of P_m' = Σ_l table[l, m] P_l on -1..1, orthonormal:
-
-    P_m' = Σ (2l+1) P_l over l = m-1, m-3, … [Abramowitz & Stegun 8.5.3, summed].
+    """The table (n, n) of P_m' = Σ_l table[l, m] P_l on -1..1, orthonormal: P_m' = Σ (2l+1) P_l over l = m-1, m-3, …
+    [Abramowitz & Stegun 8.5.3, summed].
     """
     from scipy.sparse import csr_array
 

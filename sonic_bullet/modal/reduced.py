@@ -13,13 +13,11 @@ its axis (revolved.py): their λ are good to 2e-4, where elements within the sam
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from sonic_bullet.geometry.nearest_point import closest_point
 from sonic_bullet.modal import cache as store
+from sonic_bullet.modal.isotropic_family import Family, mixed
 from sonic_bullet.modal.model import MOST_MODES, SHIFT, _diagonal_m
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.errors import MeshError, ModalError
@@ -27,6 +25,8 @@ from sonic_bullet.records.errors import MeshError, ModalError
 APART = 0.05  # of ν₁ and ν₂ from the guess
 POISSON = (-0.5, 0.485)
 BEYOND = 1.1  # of the limit on λ: modes that are none at one ν may be some at the other
+SECTION_EDGE, SECTION_WAVE = 0.5, 0.25  # a section's cubic triangles: of the wall's thickness and of the shortest wave
+AROUND = 5  # cells around to a wave
 KEPT = {
     "lame": store.Kept("f8", ("b", "b")),
     "shear": store.Kept("f8", ("b", "b")),
@@ -35,82 +35,6 @@ KEPT = {
     "face": store.Kept("i", (None, 3), "v"),
     "numbers": store.Kept("f8", (3,)),
 }
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Family:
-    """A body's modes for every γ = E/ρ and ν. lame, shear (b, b): reduced stiffness. skin (v, 3, b) float32: the basis
-    on the surface at ρL³ = 1 kg.
-
-    vertex_m (v, 3), face (4t, 3): the surface, each element's face cut in four. count: how many of the lowest modes are
-    true. meshed: False where no element's error is in λ.
-    """
-
-    lame: Array
-    shear: Array
-    skin: Array
-    vertex_m: Array
-    face: Array
-    length_m: float
-    volume_m3: float
-    count: int
-    note: str
-    meshed: bool = True
-
-    def modes(self, gamma_m2_s2: float, poisson: float) -> tuple[Array, Array]:
-        """λ (m,) in 1/s² ascending, and the modes (b, m) in the basis: `points` turns them into shapes."""
-        value, vector = np.linalg.eigh(_stiffness(self, poisson))
-        return value[: self.count] * gamma_m2_s2 / self.length_m**2, vector[:, : self.count]
-
-    def slope(self, poisson: float, vector: Array) -> Array:
-        """∂ ln λ/∂ν (m,) of modes (b, m) at ν. Source: Hellmann-Feynman, λ' = qᵀK'q."""
-        lame = (1 + 2 * poisson**2) / ((1 + poisson) ** 2 * (1 - 2 * poisson) ** 2)
-        shear = -1 / (2 * (1 + poisson) ** 2)
-        bent = np.einsum("bm,bc,cm->m", vector, lame * self.lame + shear * self.shear, vector)
-        return np.asarray(bent / np.einsum("bm,bc,cm->m", vector, _stiffness(self, poisson), vector))
-
-    def points(self, position_m: Array, direction: Array) -> tuple[Array, Array]:
-        """Basis (k, b) at the surface points nearest to position_m (k, 3), along direction (k, 3), and how far off (k,)
-        in m they lie.
-
-        Divide by √(ρL³) for shapes per √kg. Quadratic over each element's face, as the elements themselves are.
-        """
-        moved, distance = self._moved(position_m)
-        return np.einsum("kxb,kx->kb", moved.astype(float), direction), distance
-
-    def skin_at(self, position_m: Array) -> Array:
-        """The basis (k, 3, b) float32, as `skin`, at the surface points nearest to position_m (k, 3): on another mesh
-        of the same surface.
-        """
-        if position_m.shape == self.vertex_m.shape and (position_m == self.vertex_m).all():
-            return self.skin
-        return self._moved(position_m)[0].astype(np.float32)
-
-    def _moved(self, position_m: Array) -> tuple[Array, Array]:
-        """The basis (k, 3, b) at the surface points nearest to position_m (k, 3), and how far off (k,) they lie."""
-        face, weight, distance = closest_point(self.vertex_m, self.face, np.asarray(position_m, float))
-        moved = np.empty((len(face), *self.skin.shape[1:]))
-        for i, (f, w) in enumerate(zip(face, weight, strict=True)):
-            node, share = _quadratic(self.face[f // 4 * 4 : f // 4 * 4 + 4], int(f % 4), w)
-            moved[i] = np.tensordot(share, self.skin[node].astype(float), 1)
-        return moved, distance
-
-
-def _stiffness(family: Family, poisson: float) -> Array:
-    return np.asarray(_mixed(poisson, family.lame, family.shear))
-
-
-def _quadratic(quarters: Array, which: int, weight: Array) -> tuple[Array, Array]:
-    """The six nodes of an element's face and their shape functions at barycentric ``weight`` of one of its quarters
-    (see solid.QUARTERS).
-    """
-    middle = quarters[3]
-    node = np.array([quarters[0, 0], quarters[1, 1], quarters[2, 2], *middle])
-    # of nodes 0-2, then edges 01, 12, 20
-    corner = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [0.5, 0.5, 0], [0, 0.5, 0.5], [0.5, 0, 0.5]])
-    place = {int(n): corner[k] for k, n in enumerate(node)}
-    a, b, c = weight @ np.array([place[int(n)] for n in quarters[which]])
-    return node, np.array([a * (2 * a - 1), b * (2 * b - 1), c * (2 * c - 1), 4 * a * b, 4 * b * c, 4 * c * a])
 
 
 def family(
@@ -175,10 +99,6 @@ def _poissons(poisson: float) -> tuple[float, float]:
     return low, high
 
 
-SECTION_EDGE, SECTION_WAVE = 0.5, 0.25  # a section's cubic triangles: of the wall's thickness and of the shortest wave
-AROUND = 5  # cells around to a wave
-
-
 def _together(first: Array, second: Array, mass: Callable[[Array], Array]) -> Array:
     """Columns (n, b) with VᵀMV = 1 that span those of both, first's first."""
     rest = second - first @ (first.T @ mass(second))
@@ -209,7 +129,7 @@ def _of_box(shape: Shape, length: float, limit: float, poisson: float, say: Call
     size = box.size_m / length
     thin = float(size.min())
     tensors = _lame_shear()
-    soft = _mixed(max(low, high), *tensors)
+    soft = mixed(max(low, high), *tensors)
     wave = min(polynomials.wave_number(limit, thin, soft), polynomials.wave_number_of(MOST_MODES, size))
     terms = polynomials.degrees(size, wave)
     if polynomials.unknowns(terms) > polynomials.MOST_UNKNOWNS:
@@ -222,7 +142,7 @@ def _of_box(shape: Shape, length: float, limit: float, poisson: float, say: Call
     parts: list[tuple[Array, Array, Array]] = []
     for parity in polynomials.parities(size, terms):
         k_lame, k_shear = (parity.stiffness(tensor) for tensor in tensors)
-        found = [polynomials.lowest(_mixed(nu, k_lame, k_shear), BEYOND * limit, parity.rigid) for nu in (low, high)]
+        found = [polynomials.lowest(mixed(nu, k_lame, k_shear), BEYOND * limit, parity.rigid) for nu in (low, high)]
         counts += [int((value <= limit).sum()) for value, _ in found]
         basis = _together(found[0][1], found[1][1], lambda v: v)
         moved = polynomials.shapes_at(point, size, parity, basis).transpose(0, 2, 1) @ box.axes.T
@@ -263,7 +183,7 @@ def _of_revolution(
     thick = 2 * body.area_m2 / float(round_m.sum())
     unit = revolved.Revolved(body.outline_m / length, body.axes, body.centre_m)
     tensors = _lame_shear()
-    wave = polynomials.wave_number(limit, thick / length, _mixed(max(low, high), *tensors))
+    wave = polynomials.wave_number(limit, thick / length, mixed(max(low, high), *tensors))
     long = 2 * np.pi / wave
     section = revolved.sectioned(
         unit, float(min(SECTION_EDGE * thick / length, SECTION_WAVE * long)), long / polynomials.PER_WAVE
@@ -284,7 +204,7 @@ def _of_revolution(
         kept = []
         for k, nu in enumerate((low, high)):
             modes = eigen.solve(
-                _mixed(nu, k_lame, k_shear),
+                mixed(nu, k_lame, k_shear),
                 mass,
                 shift,
                 rigid=2 if m < 2 else 0,
@@ -332,11 +252,6 @@ def _of_revolution(
     )
 
 
-def _mixed(poisson: float, lame: Any, shear: Any) -> Any:
-    """The stiffness at E = 1 of its two parts, dense or sparse."""
-    return poisson / ((1 + poisson) * (1 - 2 * poisson)) * lame + shear / (2 * (1 + poisson))
-
-
 def _family(
     shape: Shape,
     length: float,
@@ -371,7 +286,7 @@ def _family(
     low, high = _poissons(poisson)
     for nu in (low, high):
         modes = eigen.solve(
-            _mixed(nu, k_lame, k_shear),
+            mixed(nu, k_lame, k_shear),
             mass,
             shift,
             rigid=rigid,

@@ -29,9 +29,8 @@ SAME = 0.02  # relative difference of volumes: facets lie within the circle
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Revolved:
-    """outline_m (p, 2) the section's polygon of (r, z), counter-clockwise;
-
-    axes (3, 3) as columns, the last the axis; centre_m (3,).
+    """outline_m (p, 2) the section's polygon of (r, z), counter-clockwise; axes (3, 3) as columns, the last the axis;
+    centre_m (3,).
     """
 
     outline_m: Array
@@ -75,9 +74,8 @@ def recognised(vertex_m: Array, face: Array) -> Revolved | None:
 
 
 def _outline(point: Array, face: Array) -> Array | None:
-    """Polygon (p, 2) of the rings of a surface about the z axis, in the order they are joined;
-
-    None where they are no rings or no ring of rings.
+    """Polygon (p, 2) of the rings of a surface about the z axis, in the order they are joined; None where they are no
+    rings or no ring of rings.
     """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -135,9 +133,8 @@ def _outline(point: Array, face: Array) -> Array | None:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Section:
-    """Cubic triangles on an outline. slopes:
-
-    (∂r, ∂z, 1/r, 1) as sparse maps (q, n) to the points of integration, times √(weight r).
+    """Cubic triangles on an outline. slopes: (∂r, ∂z, 1/r, 1) as sparse maps (q, n) to the points of integration,
+    times √(weight r).
 
     order (n,): of elimination. rim (s, 4): the outline's sides as dofs, corner, two thirds, corner, walked round it;
     rim_m (s, 2) the first corners. shown (2k,): which of corners and middles (2s) the skin shows, the ends and middles

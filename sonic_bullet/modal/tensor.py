@@ -20,8 +20,8 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet.modal import cache as store
+from sonic_bullet.modal.isotropic_family import Family
 from sonic_bullet.modal.model import MOST_MODES, SHIFT, _diagonal_m
-from sonic_bullet.modal.reduced import Family
 from sonic_bullet.records import ORTHOTROPIC, Array, Shape
 from sonic_bullet.records.errors import MeshError
 
@@ -58,8 +58,9 @@ KEPT = {
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TensorFamily:
-    """A body's modes for every orthotropic tensor. body: its surface and basis, as of `reduced.Family`, the isotropic
-    family in this basis.
+    """A body's modes for every orthotropic tensor.
+
+    body: its surface and basis, as of `Family`, the isotropic family in this basis.
 
     part (9, b, b): reduced stiffness of each constant of `ORTHOTROPIC`. ends (p + 1,): the basis falls into p pieces
     that no such tensor couples.
@@ -109,9 +110,8 @@ def unit_tensors() -> Array:
 
 
 def anchored(youngs: tuple[float, float, float], shear: tuple[float, float, float], poisson: float) -> Array:
-    """The tensor (6, 6) of an anchor;
-
-    ν_ij √(E_j/E_i) = ν for all pairs. Source: compliance of orthotropic bodies [Bodig & Jayne 1982, eq. 3.8].
+    """The tensor (6, 6) of an anchor; ν_ij √(E_j/E_i) = ν for all pairs. Source: compliance of orthotropic bodies
+    [Bodig & Jayne 1982, eq. 3.8].
     """
     root = np.sqrt(np.array(youngs, float))
     compliance = np.zeros((6, 6))
@@ -204,9 +204,8 @@ def _spanning(vector: Array, gram: Array) -> Array:
 
 
 def _of_box(shape: Shape, length: float, count: int, poisson: float, say: Callable[[str], None]) -> TensorFamily | None:
-    """Of a free box along the axes, without elements;
-
-    None where the shape is no such box, or one of too many unknowns.
+    """Of a free box along the axes, without elements; None where the shape is no such box, or one of too many
+    unknowns.
     """
     from sonic_bullet.modal import polynomials
     from sonic_bullet.modal.meshing import structured

@@ -51,7 +51,9 @@ class Events:
 
 
 def find_events(log: ContactLog) -> Events:
-    """Strikes and lasting contacts of every body that sounds (those with a model), by the rules of the module's head."""
+    """Strikes and lasting contacts of every body that sounds (those with a model), by the rules of the
+    module's head.
+    """
     rows, step, start_s = log.rows, log.step, np.append(log.start_s, log.duration_s)
     low, high = np.minimum(rows.a, rows.b), np.maximum(rows.a, rows.b)
     pair, index = np.unique(np.stack([low, high], 1), axis=0, return_inverse=True)

@@ -100,9 +100,8 @@ def directions(rings: int) -> tuple[Array, Array]:
 
 
 def spread_directions(count: int) -> tuple[Array, Array]:
-    """As `directions`, spread evenly along a spiral [Swinbank & Purser 2006, eq.
-
-    1-3]: no symmetry of a body makes any of them superfluous.
+    """As `directions`, spread evenly along a spiral [Swinbank & Purser 2006, eq. 1-3]: no symmetry of a body
+    makes any of them superfluous.
     """
     height = (np.arange(count) + 0.5) / count
     angle = np.pi * (np.sqrt(5) - 1) * np.arange(count)
@@ -222,9 +221,8 @@ def _near_field(k: Array, curved_per_m: float, moved: Moved, flow: Array, neares
 def _moments(
     speed: Array, level: Array, corner: Array, area: Array, normal: Array, patch: Array, place: Array, out: Array
 ) -> None:
-    """Fill out (m, 7, s) with each patch's ∫ of v, v (x - place) + n Re ψ, n Im ψ;
-
-    speed (f, 3, m) at corners, level ψ (f, m).
+    """Fill out (m, 7, s) with each patch's ∫ of v, v (x - place) + n Re ψ, n Im ψ; speed (f, 3, m) at corners, level
+    ψ (f, m).
     """
     arm = corner - place[patch][:, None]
     # ∫ v y over a triangle of linear v, y = area/12 (Σv Σy + Σvy)

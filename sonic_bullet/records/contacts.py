@@ -1,4 +1,4 @@
-"""What a simulation told us, step by step:
+"""What a simulation reports, step by step:
 
 `Contacts` (rows of one step), `Step`, `Event`, and the `ContactLog` they add up to.
 

@@ -18,9 +18,8 @@ FAINTEST = 1e-6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Residual:
-    """What the modal sound of recorded strikes lacks, beside that sound [Ren, Yeh, Lin 2013, sec.
-
-    6]: all levels are relative to its modes.
+    """What the modal sound of recorded strikes lacks, beside that sound [Ren, Yeh, Lin 2013, sec. 6]: all
+    levels are relative to its modes.
 
     mode_* (m,), ascending: the source's modes, amplitudes at the onset, mean square over the strikes. line_* (l,): what
     features add that modes do not. freq_hz (b,), time_s (n,) ascending from the onset on: centres of the cells of

@@ -45,9 +45,8 @@ class Vibrometer:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ModalSum:
-    """The seed's observation: the plain sum Σ a·e^{-dt}·sin(2πft), a = scale·Uᵀj for an impulse j in N·s [Ren et al.
-
-    2013, eq. 11, 13].
+    """The seed's observation: the plain sum Σ a·e^{-dt}·sin(2πft), a = scale·Uᵀj for an impulse j in N·s [Ren
+    et al. 2013, eq. 11, 13].
     """
 
     scale: float = 1.0

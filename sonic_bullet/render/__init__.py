@@ -1,7 +1,8 @@
 """Forces become sound: the synthesizer of live steps, and the replay of a contact log.
 
 silence: why there is none | clock: which samples a step covers | resonator: a body as it is played | impacts: strikes
-friction_voice: rolling and sliding | residual_voice: residuals | synthesizer: all together
+friction_voice: rolling and sliding | residual_voice: residuals | synthesis_state: all that goes on
+synthesizer: all together
 """
 
 from __future__ import annotations

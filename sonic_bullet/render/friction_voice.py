@@ -98,9 +98,8 @@ class Drive:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Target:
-    """Where pairs (p,) are heading at the step's end:
-
-    loads, speeds, directions; rows sorted by pair, pair i having bounds[i] … bounds[i+1]-1.
+    """Where pairs (p,) are heading at the step's end: loads, speeds, directions; rows sorted by pair, pair i having
+    bounds[i] … bounds[i+1]-1.
     """
 
     load_n: Array

@@ -148,8 +148,9 @@ def find_pulses(
 
 
 def _blows(
-    rows: Rows, strike: Array, delay: Array, observed: Array, resonators: tuple[Resonator, ...], pair: tuple[Array, Array],
-    mass: Array, raw: Array, accepted: Array, approach: Array, impulse: Array, earliest_s: float, dt_s: float,
+    rows: Rows, strike: Array, delay: Array, observed: Array, resonators: tuple[Resonator, ...],
+    pair: tuple[Array, Array], mass: Array, raw: Array, accepted: Array, approach: Array, impulse: Array,
+    earliest_s: float, dt_s: float,
 ) -> tuple[ForcePulse, ...]:  # fmt: skip
     """The pulses of the strikes ``observed``, of all strikes (q,) and their rows (r,)."""
     start = _start_s(rows, strike, delay, len(mass), earliest_s, dt_s)
@@ -206,9 +207,8 @@ def modulus_pa(body: Body) -> float:
 def effective_mass(
     low: Sequence[Body], high: Sequence[Body], turn_low: Array, turn_high: Array, arm_m: Array, normal: Array
 ) -> Array:
-    """m* (q,) in kg of pairs [synth.pulse]:
-
-    orientations (q, 3, 3), levers (q, 2, 3) and normals (q, 3) in the world. 0 where neither can move.
+    """m* (q,) in kg of pairs [synth.pulse]: orientations (q, 3, 3), levers (q, 2, 3) and normals (q, 3) in the world.
+    0 where neither can move.
     """
     mass_low, mass_high = (np.array([body.mass_kg for body in bodies]) for bodies in (low, high))
     inertia_low, inertia_high = (

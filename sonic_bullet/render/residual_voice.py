@@ -1,8 +1,8 @@
 """What sounds besides the modes of bodies whose material brings a residual: lines in the bank, grains of noise for
 strikes and rubbing.
 
-    Sounder + Residual -> Beside: lines as further modes (each struck as the mode it follows is), a voice for the noise
-        (residual.grains)
+    Resonator + Residual -> ResidualVoice: lines as further modes (each struck as the mode it follows is),
+        a voice for the noise (residual.grains)
     ForcePulse -> a² of each pair of modes, at each sensor's weights -> Grain
         level, place and pulse as the modes have them
     Drive -> sections of force -> Grain

@@ -1,7 +1,7 @@
 """A body as the synthesizer plays it: its audible modes, their weights at each sensor, and where on its surface a
 contact lies.
 
-    Body (records) + sensors + rate + air -> Sounder;  contact points -> Touch -> Uᵀf (participation)
+    Body (records) + sensors + rate + air -> Resonator;  contact points -> Touch -> Uᵀf (participation)
 
 A rigid body that is pushed sounds too: acceleration noise. A sphere of radius a whose velocity jumps by U is heard as p
 = ρ₀c U (a/r) cosθ e^{-wt}(cos wt - sin wt), w = c/a [Kirchhoff 1876; Koss, Alfredson 1973, eq. 9]. That is the impulse
@@ -76,8 +76,9 @@ def weight_sets(sensors: tuple[Sensor, ...]) -> tuple[Sensor, ...]:
 def build_resonator(body: Body, sensors: tuple[Sensor, ...], sr: int, air: Air) -> Resonator:
     """Prepare one body. Modes at or above sr/2 and overdamped ones are dropped and counted.
 
-    The pressure weight of mode and microphone is the far-field map of `radiation.far_field`; a vibrometer reads (φ(q)·n);
-    the seed's plain sum reads a·sin(ωt) for each mode [Ren et al. 2013, eq. 13], hence the turn by -i/(1 + i d/ω).
+    The pressure weight of mode and microphone is the far-field map of `radiation.far_field`; a vibrometer reads
+    (φ(q)·n); the seed's plain sum reads a·sin(ωt) for each mode [Ren et al. 2013, eq. 13], hence the turn by
+    -i/(1 + i d/ω).
     """
     model = body.model
     readers = weight_sets(sensors)
@@ -193,9 +194,8 @@ def uplift(resonator: Resonator, face: Array, barycentric: Array, force: Array) 
 def participation(
     shape: Array, face: Array, at_face: Array, barycentric: Array, force: Array
 ) -> Array:  # pragma: no cover - compiled
-    """Σ over contacts of the shapes, linear in the triangle, times the force:
-
-    (v, 3, m), (f, 3), (k,), (k, 3), (k, 3) -> (m,).
+    """Σ over contacts of the shapes, linear in the triangle, times the force: (v, 3, m), (f, 3), (k,), (k, 3), (k, 3)
+    -> (m,).
     """
     modes = shape.shape[2]
     total = np.zeros(modes)

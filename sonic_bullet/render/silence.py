@@ -38,7 +38,10 @@ def silence_notes(samples: Array, log: ContactLog) -> tuple[str, ...]:
     least = np.array([REFERENCE_PRESSURE_PA if isinstance(sensor, Microphone) else 0.0 for sensor in log.sensors])
     if (peaks > least).any():
         return ()
-    faint = f"its peak of {peaks.max():.2g} Pa is below the threshold of hearing, 20 µPa: move the microphone nearer, or --peak-dbfs -1 scales it"
+    faint = (
+        f"its peak of {peaks.max():.2g} Pa is below the threshold of hearing, 20 µPa: move the microphone "
+        "nearer, or --peak-dbfs -1 scales it"
+    )
     unknown = faint if peaks.any() else "its log does not say why: write it with --contacts and report it"
     return (f"the render is silent: {why_silent(log) or unknown}",)
 
@@ -71,7 +74,8 @@ def _untouched(log: ContactLog, rows: Contacts, added: Array) -> str:
     hand = np.flatnonzero((moved > 0) & (moved >= BY_HAND * lived))
     if len(hand):
         return (
-            f"{_names(log.bodies[i] for i in hand)} was moved by hand in {int(moved[hand].max())} of {len(log.steps)} steps, "
+            f"{_names(log.bodies[i] for i in hand)} was moved by hand in {int(moved[hand].max())} of "
+            f"{len(log.steps)} steps, "
             "and what is set somewhere presses on nothing; move it by forces, velocities or constraints"
         )
     if len(rows):
@@ -103,8 +107,14 @@ def _mute(log: ContactLog, resonators: list[Resonator]) -> str | None:
         if resonator.body.model is not None and resonator.body.model.mode_count
     ]
     if higher:
-        return f"no audible mode: those of {_names(higher)} are at or above half the sample rate, {log.sr / 2:g} Hz, or overdamped; give a higher sr"
-    return f"no audible mode: {_names(resonator.body for resonator in resonators)} has none below 20 kHz and does not move freely; a larger or thinner body rings"
+        return (
+            f"no audible mode: those of {_names(higher)} are at or above half the sample rate, {log.sr / 2:g} "
+            "Hz, or overdamped; give a higher sr"
+        )
+    return (
+        f"no audible mode: {_names(resonator.body for resonator in resonators)} has none below 20 kHz and does "
+        "not move freely; a larger or thinner body rings"
+    )
 
 
 def _at_rest(log: ContactLog, rows: Contacts, mine: Array) -> str | None:
@@ -122,7 +132,10 @@ def _at_rest(log: ContactLog, rows: Contacts, mine: Array) -> str | None:
     if (rows.approach_m_s[mine] > settling).any() or len(slides) > SPAN:
         return None
     fastest = float(rows.approach_m_s[mine].max())
-    return f"all {len(mine)} contacts are support at rest: nothing approached faster than {max(fastest, 0.0):.2g} m/s and nothing slid; let something fall"
+    return (
+        f"all {len(mine)} contacts are support at rest: nothing approached faster than {max(fastest, 0.0):.2g} "
+        "m/s and nothing slid; let something fall"
+    )
 
 
 def _arrives_late(log: ContactLog, mine: Array) -> str | None:
@@ -135,7 +148,10 @@ def _arrives_late(log: ContactLog, mine: Array) -> str | None:
     begins_s, travels_s = float(log.time_s[mine[0]]), away / log.air.sound_speed_m_s
     if begins_s + travels_s < log.duration_s:
         return None
-    return f"the sound is still under way: the nearest microphone is {away:.3g} m off, {travels_s:.2g} s; run for longer, or move it nearer"
+    return (
+        f"the sound is still under way: the nearest microphone is {away:.3g} m off, {travels_s:.2g} s; run for "
+        "longer, or move it nearer"
+    )
 
 
 def _names(bodies: Iterable[Body]) -> str:

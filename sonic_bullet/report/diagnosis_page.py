@@ -27,7 +27,8 @@ PEAK = 0.9
 
 STYLE = """body{font:16px/1.5 system-ui,sans-serif;max-width:62rem;margin:2rem auto;padding:0 1rem;color:#222}
 table{border-collapse:collapse;margin:1rem 0}td,th{padding:.25rem .8rem;border-bottom:1px solid #ddd;text-align:left}
-img{max-width:100%}.verdict{font-size:1.4rem}figure{margin:1.5rem 0}figcaption{color:#555}audio{vertical-align:middle;width:16rem}"""
+img{max-width:100%}.verdict{font-size:1.4rem}figure{margin:1.5rem 0}figcaption{color:#555}\
+audio{vertical-align:middle;width:16rem}"""
 
 WORDS = {
     "none": "The model suffices: no known effect brings it nearer to strikes it was not fitted to.",
@@ -48,7 +49,8 @@ def page(d: Diagnosis) -> str:
     name = html.escape(d.case.name)
     parts = [
         f"<!doctype html><html lang=en><meta charset=utf-8><title>{name}</title><style>{STYLE}</style>",
-        f"<h1>{name}</h1><p class=verdict><b>{d.verdict}</b>. {WORDS['nothing' if isinstance(d.closed, NothingCompared) else d.verdict]}</p>",
+        f"<h1>{name}</h1><p class=verdict><b>{d.verdict}</b>. "
+        f"{WORDS['nothing' if isinstance(d.closed, NothingCompared) else d.verdict]}</p>",
         _effects(d),
         _errors(d),
         f"<p>{html.escape(d.unexplained['words'])}.</p>" if d.unexplained else "",
@@ -90,7 +92,10 @@ def _errors(d: Diagnosis) -> str:
         if any(v is not None for v in values) or split in d.not_compared:
             rows.append((split, *(f"{v:.2f}" if v is not None else _why_none(d, split) for v in values)))
     floor = f"Two noisy takes of one sound: {d.errors['floor']:.2f} dB." if d.errors["floor"] is not None else ""
-    return f"<h2>How far from the recordings</h2>{_table(('strikes', 'before, dB', 'after, dB', 'before, sone', 'after, sone'), rows)}<p>{floor}</p>"
+    return (
+        "<h2>How far from the recordings</h2>"
+        f"{_table(('strikes', 'before, dB', 'after, dB', 'before, sone', 'after, sone'), rows)}<p>{floor}</p>"
+    )
 
 
 def _why_none(d: Diagnosis, split: str) -> str:
@@ -110,7 +115,8 @@ def _players(d: Diagnosis) -> str:
         )
         file = take.body.recordings[take.strike].file
         parts.append(
-            f"<h3>{html.escape(file.name if file else 'strike')}</h3>{row}{_figure(_spectrograms(sounds, take.sr), 'recorded, before, after; dB below the loudest')}"
+            f"<h3>{html.escape(file.name if file else 'strike')}</h3>{row}"
+            f"{_figure(_spectrograms(sounds, take.sr), 'recorded, before, after; dB below the loudest')}"
         )
     return "<h2>Hear and see</h2>" + "".join(parts) if parts else ""
 
@@ -157,14 +163,17 @@ def _candidates(d: Diagnosis) -> str:
         for c in sorted(d.closed.tried, key=lambda c: -c.mean_db)
     ]
     head = ("candidate", "kept", "nearer, dB", "chance, dB", "strike by strike, each left out in turn")
-    silent = "<p>Suspects that do not stand here found nothing of theirs in the recordings.</p>"
+    silent = "<p>Candidates that do not stand here found nothing of theirs in the recordings.</p>"
     return "<h2>Candidate effects</h2>" + (_table(head, rows) if rows else "") + silent
 
 
 def _notes(d: Diagnosis) -> str:
     items = "".join(f"<li>{html.escape(w)}</li>" for w in d.warnings)
     base = d.closed.before
-    text = f"Baseline: α = {base.alpha_per_s:.4g} 1/s, β = {base.beta_s:.4g} s, E/ρ = {d.found.fit.gamma_m2_s2:.5g} m²/s², ν = {d.found.fit.poisson_ratio:.3f}."
+    text = (
+        f"Baseline: α = {base.alpha_per_s:.4g} 1/s, β = {base.beta_s:.4g} s, E/ρ = {d.found.fit.gamma_m2_s2:.5g} "
+        f"m²/s², ν = {d.found.fit.poisson_ratio:.3f}."
+    )
     return f"<h2>Notes</h2><p>{text}</p><ul>{items}</ul>"
 
 
@@ -219,7 +228,10 @@ def _spectrograms(sounds: Any, sr: int) -> str:
 
 
 def _figure(source: str, caption: str) -> str:
-    return f"<figure><img src='{source}' alt='{html.escape(caption)}'><figcaption>{html.escape(caption)}</figcaption></figure>"
+    return (
+        f"<figure><img src='{source}' alt='{html.escape(caption)}'>"
+        f"<figcaption>{html.escape(caption)}</figcaption></figure>"
+    )
 
 
 def _png(figure: Any) -> str:

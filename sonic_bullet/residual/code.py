@@ -60,8 +60,8 @@ def form_of(residual: Residual) -> ResidualForm:
         for name in ("freq_hz", "decay_per_s", "amplitude")
     }
     return ResidualForm(
-        source=residual.source, **parts, freq_hz=_short(residual.freq_hz), time_s=_short(residual.time_s), loudest_per_hz=loudest,
-        levels=base64.b64encode(byte.tobytes()).decode(), clip_energy=residual.clip_energy,
+        source=residual.source, **parts, freq_hz=_short(residual.freq_hz), time_s=_short(residual.time_s),
+        loudest_per_hz=loudest, levels=base64.b64encode(byte.tobytes()).decode(), clip_energy=residual.clip_energy,
     )  # fmt: skip
 
 

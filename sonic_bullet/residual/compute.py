@@ -7,7 +7,7 @@
 
 For a preset it is described in two parts. What is left of the features, √(1 - R_i²) of each, is lines: their
 frequencies are known far better than a spectrogram shows them. In no band more is left than recordings have beyond what
-is played: modes too close to be told apart make one feature that matches none of them. What is left beside all features
+is played: modes too close to be resolved make one feature that matches none of them. What is left beside all features
 is noise, of which bands and times keep the mean, less the recording's own floor, less what most strikes do not have,
 and less what is not noise: the foot of lines that are no pure damped sinusoids would else be spread over whole bands.
 """
@@ -176,9 +176,8 @@ def residual_record(
     lines: tuple[Array, Array, Array],
     source: str,
 ) -> Residual:
-    """The residual of strikes (s, n) from the onset on:
-
-    ``left`` (s, n) beside all features, ``rest`` (s, n) beside the modes as the model plays them.
+    """The residual of strikes (s, n) from the onset on: ``left`` (s, n) beside all features, ``rest`` (s, n) beside
+    the modes as the model plays them.
 
     lines: frequency, decay, amplitude (l,), mean square over the strikes, that the modes' share of the features leaves;
     neither they nor noise become more than there is in ``rest``. Levels come out relative to the strongest mode. Raises
@@ -207,6 +206,7 @@ def residual_record(
         order, per_hz = order[:0], np.zeros_like(per_hz)  # 80 dB below the clip: rounding, no residual
     clip = max(clip, whole)  # lines that outlast the clip
     return Residual(
-        modes.freq_hz, modes.decay_per_s, modes.amplitude / unit, line_hz[order], line_decay[order], line_amplitude[order] / unit,
+        modes.freq_hz, modes.decay_per_s, modes.amplitude / unit,
+        line_hz[order], line_decay[order], line_amplitude[order] / unit,
         freq, time, per_hz / unit**2, clip / unit**2, source,
     )  # fmt: skip

@@ -7,8 +7,8 @@
     each strike:     J-level · (cos θ g_0 + sin θ g_1), θ seeded: as loud, of the same spectrogram, and no two alike
 
 A does not hang on time, so the order (transfer, then invert) or (invert, then scale) is one up to the window's length.
-Places are told apart by A itself, in steps of 2 dB at each pair of modes, and pulses in eighths of an octave: whoever
-comes first, a cached grain has the same bits.
+Places are distinguished by A itself, in steps of 2 dB at each pair of modes, and pulses in eighths of an octave:
+whoever comes first, a cached grain has the same bits.
 """
 
 from __future__ import annotations

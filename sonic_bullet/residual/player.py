@@ -36,7 +36,9 @@ class Grain:
 
 
 def add_grains(out: Array, grains: tuple[Grain, ...], at: int) -> tuple[Grain, ...]:
-    """Add to out (W, b, n), whose first sample is ``at``, what of the grains lies in it; those that go on afterwards."""
+    """Add to out (W, b, n), whose first sample is ``at``, what of the grains lies in it; those that go on
+    afterwards.
+    """
     end = at + out.shape[2]
     for grain in grains:
         low, high = max(grain.start, at), min(grain.start + len(grain.sample), end)

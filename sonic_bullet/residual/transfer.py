@@ -42,7 +42,9 @@ TINY = 1e-300
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StruckModes:
-    """m modes as one strike starts them: freq_hz ascending, decay_per_s, amplitude ≥ 0 at the onset, in any one unit."""
+    """m modes as one strike starts them: freq_hz ascending, decay_per_s, amplitude ≥ 0 at the onset, in any
+    one unit.
+    """
 
     freq_hz: Array
     decay_per_s: Array
@@ -274,9 +276,8 @@ def _moved(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ResidualLines:
-    """l damped sinusoids of a transferred residual:
-
-    freq_hz, decay_per_s, ratio (l,) of their amplitude to that of the mode they follow; follows (l,): its pair.
+    """l damped sinusoids of a transferred residual: freq_hz, decay_per_s, ratio (l,) of their amplitude to that of
+    the mode they follow; follows (l,): its pair.
     """
 
     freq_hz: Array

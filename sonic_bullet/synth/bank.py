@@ -159,8 +159,8 @@ def empty_bank(sr: int, weight_sets: int = 1, at: int = 0) -> tuple[Bank, BankSt
         raise AudioError(f"sample rate {sr}", "give a whole number of Hz, 44100 or 48000 say")
     none, flags = np.zeros(0), np.zeros(0, bool)
     bank = Bank(
-        int(sr), np.zeros(1, np.int64), np.zeros(0, np.int64), none, none, none, none, np.zeros((weight_sets, 0)), np.zeros((weight_sets, 0), bool), flags,
-        none, none, none, flags,
+        int(sr), np.zeros(1, np.int64), np.zeros(0, np.int64), none, none, none, none,
+        np.zeros((weight_sets, 0)), np.zeros((weight_sets, 0), bool), flags, none, none, none, flags,
     )  # fmt: skip
     silent = (np.zeros((weight_sets, 0, BLOCK)), flags.copy(), flags.copy(), flags.copy(), Pending.none())
     return bank, BankState(int(at), none.copy(), none.copy(), *silent, none.copy(), none.copy())
@@ -179,7 +179,8 @@ def append(bank: Bank, state: BankState, bodies: Sequence[ModeSet]) -> tuple[Ban
         m = len(body.omega_rad_s)
         if body.decay_per_s.shape != (m,) or body.weight.shape != (sets, m) or not np.isfinite(body.weight).all():
             raise AudioError(
-                f"modes of shape {body.omega_rad_s.shape}, {body.decay_per_s.shape}, weights {body.weight.shape} for {sets} weight sets",
+                f"modes of shape {body.omega_rad_s.shape}, {body.decay_per_s.shape}, weights "
+                f"{body.weight.shape} for {sets} weight sets",
                 "give finite (m,), (m,), (W, m)",
             )
         if not audible(body.omega_rad_s, body.decay_per_s, bank.sr).all():
@@ -285,11 +286,12 @@ def advance(
     out = np.zeros((bank.weight.shape[0], bank.body_count, n))
     done = np.zeros(len(pending.body), bool)
     bank_kernel.advance(
-        state.at, out, bank.offset, bank.count, state.pole, state.block, bank.log_pole, bank.bend, bank.damping_growth, bank.power, bank.bent, bank.quadrature, bank.weight, bank.observed,
+        state.at, out, bank.offset, bank.count, state.pole, state.block, bank.log_pole, bank.bend,
+        bank.damping_growth, bank.power, bank.bent, bank.quadrature, bank.weight, bank.observed,
         state.z, state.driven, state.sound, state.ringing, state.is_driven, state.tiled, FLOOR**2,
-        np.searchsorted(pending.body, np.arange(bank.body_count + 1)), pending.count, pending.whole, pending.delta, pending.phase,
-        pending.upcoming, pending.first, pending.impulse, pending.impulse_at, pending.rows.reshape(-1), pending.rows_at, done,
-        force_of, force, gain0, gain1, gain_at, along, 1.0 / bank.sr,
+        np.searchsorted(pending.body, np.arange(bank.body_count + 1)), pending.count, pending.whole,
+        pending.delta, pending.phase, pending.upcoming, pending.first, pending.impulse, pending.impulse_at,
+        pending.rows.reshape(-1), pending.rows_at, done, force_of, force, gain0, gain1, gain_at, along, 1.0 / bank.sr,
     )  # fmt: skip
     state.at += n
     state.pending = without(pending, done, bank.offset)
@@ -313,9 +315,8 @@ def _joined(flat: Array, more: Array) -> Array:
 
 
 def _flat_forces(bank: Bank, n: int, forces: Sequence[Force]) -> tuple[Array, Array, Array, Array, Array]:
-    """Forces sorted by body (stable):
-
-    segments (b+1,), signals (p, n), flat gains at both ends, and where each begins (p,).
+    """Forces sorted by body (stable): segments (b+1,), signals (p, n), flat gains at both ends, and where each begins
+    (p,).
     """
     if not forces:
         none = np.zeros(0)

@@ -37,9 +37,8 @@ def _aligned(size):  # pragma: no cover - compiled
 def _ring(
     b, z, pole, block, weight, modes, start, stop, size, observed, floor, sound, now, powers, table, column
 ):  # pragma: no cover - compiled
-    """Tile of body b for the block that starts:
-
-    sound (W, b, BLOCK). Turns z to the next block. False where all modes are below the floor.
+    """Tile of body b for the block that starts: sound (W, b, BLOCK). Turns z to the next block. False where all modes
+    are below the floor.
     """
     ringing = False
     for lo in range(start, stop, CHUNK):
@@ -158,8 +157,10 @@ def _close_block(b, z, driven, pole, modes, start, stop, ringing, is_driven, til
 
 
 @njit(nogil=True)
-def _drive(at, i, end, place, b, out, z, driven, is_driven, tiled, pole, block, log_pole, bend, damping_growth, power, bent, modes, start, stop, quadrature, weight_flat, observed,
-           sound, s0, s1, count, whole, delta, phase, upcoming, first, impulse, impulse_at, rows, rows_at, done, f0, f1, force, gain0, gain1, gain_at, progress, period):  # fmt: skip  # pragma: no cover - compiled
+def _drive(at, i, end, place, b, out, z, driven, is_driven, tiled, pole, block, log_pole, bend, damping_growth, power,
+           bent, modes, start, stop, quadrature, weight_flat, observed, sound, s0, s1, count, whole, delta, phase,
+           upcoming, first, impulse, impulse_at, rows, rows_at, done, f0, f1, force, gain0, gain1, gain_at,
+           progress, period):  # fmt: skip  # pragma: no cover - compiled
     """Samples i … end - 1 of body b, sample by sample: strikes and forces enter, free and driven part are heard
     together.
     """
@@ -218,9 +219,10 @@ def _drive(at, i, end, place, b, out, z, driven, is_driven, tiled, pole, block, 
 
 
 @njit(nogil=True)
-def advance(at, out, offset, size, pole, block, log_pole, bend, damping_growth, power, bent, quadrature, weight, observed, z, driven, sound, ringing, is_driven, tiled, floor,
-            strike_of, count, whole, delta, phase, upcoming, first, impulse, impulse_at, rows, rows_at, done,
-            force_of, force, gain0, gain1, gain_at, progress, period):  # fmt: skip  # pragma: no cover - compiled
+def advance(at, out, offset, size, pole, block, log_pole, bend, damping_growth, power, bent, quadrature, weight,
+            observed, z, driven, sound, ringing, is_driven, tiled, floor, strike_of, count, whole, delta,
+            phase, upcoming, first, impulse, impulse_at, rows, rows_at, done, force_of, force, gain0,
+            gain1, gain_at, progress, period):  # fmt: skip  # pragma: no cover - compiled
     """Samples at … at + n - 1 into out (W, b, n) (zeros). See bank.py for the arrays; all in place."""
     n = out.shape[2]
     modes = len(quadrature)
@@ -275,8 +277,10 @@ def advance(at, out, offset, size, pole, block, log_pole, bend, damping_growth, 
                     tiled[b] = place + end - i < BLOCK
                 i = end
                 continue
-            _drive(at, i, end, place, b, out, z, driven, is_driven, tiled, pole, block, log_pole, bend, damping_growth, power, bent, modes, start, stop, quadrature, weight_flat, observed,
-                   sound, s0, s1, count, whole, delta, phase, upcoming, first, impulse, impulse_at, rows, rows_at, done, f0, f1, force, gain0, gain1, gain_at, progress, period)  # fmt: skip
+            _drive(at, i, end, place, b, out, z, driven, is_driven, tiled, pole, block, log_pole, bend, damping_growth,
+                   power, bent, modes, start, stop, quadrature, weight_flat, observed, sound, s0, s1, count, whole,
+                   delta, phase, upcoming, first, impulse, impulse_at, rows, rows_at, done, f0, f1, force, gain0,
+                   gain1, gain_at, progress, period)  # fmt: skip
             if place + end - i == BLOCK:
                 _close_block(b, z, driven, pole, modes, start, stop, ringing, is_driven, tiled)
             i = end

@@ -30,9 +30,8 @@ _SHORTEST = 1024
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Path:
-    """What does not change:
-
-    microphone_m (c, 3), and of each body radius_m (b,) and jerk_coefficient (b,) (`radiation.jerk_coefficient`).
+    """What does not change: microphone_m (c, 3), and of each body radius_m (b,) and jerk_coefficient (b,)
+    (`radiation.jerk_coefficient`).
     """
 
     sr: int
@@ -154,8 +153,9 @@ def propagate(
     out = np.zeros((channels, n))
     lines = state.size.repeat(channels)
     path_kernel.propagate(
-        state.at, out, arrays["source"], arrays["jerk"], path.jerk_coefficient, path.radius_m, np.argsort(state.body, kind="stable"), state.body, from_m, to_m, fade,
-        arrays["progress"], path.microphone_m, path.sr / path.air.sound_speed_m_s, state.ring, _starts(lines + path_kernel.TAPS), state.delays, _starts(lines),
+        state.at, out, arrays["source"], arrays["jerk"], path.jerk_coefficient, path.radius_m,
+        np.argsort(state.body, kind="stable"), state.body, from_m, to_m, fade, arrays["progress"], path.microphone_m,
+        path.sr / path.air.sound_speed_m_s, state.ring, _starts(lines + path_kernel.TAPS), state.delays, _starts(lines),
         lines, state.awake, state.cursor, state.last, path_kernel.tap_polynomials(), loud,
     )  # fmt: skip
     state.at += n
@@ -220,7 +220,9 @@ def _drop_places(state: PathState, kept: Array, channels: int) -> None:
 
 
 def _places(state: PathState, step: int, position0_m: Array, position1_m: Array) -> tuple[Array, Array, Array]:
-    """Where each place lies at the step's start and end (t, 3), (t, 3), and how it fades (t,): see path_kernel._emit."""
+    """Where each place lies at the step's start and end (t, 3), (t, 3), and how it fades (t,): see
+    path_kernel._emit.
+    """
     from_m, to_m, fade = state.rest_m.copy(), state.rest_m.copy(), np.full(len(state.body), 2, np.int64)
     from_m[state.main], to_m[state.main], fade[state.main] = position0_m, position1_m, 0
     moved = np.flatnonzero((state.left == step) & (state.leaving >= 0))

@@ -197,8 +197,9 @@ def survey(source, jerk, coefficient, loud):  # pragma: no cover - compiled
 
 
 @njit(nogil=True, error_model="numpy")
-def propagate(at, out, source, jerk, coefficient, radius, order, body, from_m, to_m, fade, progress, microphone, samples_per_m,
-              ring, ring_at, delays, delays_at, size, awake, cursor, last, taps, loud):  # fmt: skip  # pragma: no cover - compiled
+def propagate(at, out, source, jerk, coefficient, radius, order, body, from_m, to_m, fade, progress, microphone,
+              samples_per_m, ring, ring_at, delays, delays_at, size, awake, cursor, last, taps,
+              loud):  # fmt: skip  # pragma: no cover - compiled
     """Samples at … at + n - 1 into out (c, n), the places summed in ``order``; see path.py for the arrays."""
     channels, n = out.shape
     emitted, delay = np.empty(n), np.empty(n)

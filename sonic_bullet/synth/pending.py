@@ -197,7 +197,9 @@ def without(pending: Pending, done: Array, offset: Array) -> Pending:
 
 
 @njit(nogil=True)
-def _fill_rows(rows, rows_at, body, offset, log_pole, quadrature, gain, phase, delta, whole, held):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+def _fill_rows(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    rows, rows_at, body, offset, log_pole, quadrature, gain, phase, delta, whole, held
+):
     """The phasors r, D, E0 = e^{s(1 - whole δ)}, E1 = E0/D of each strike, real and imaginary rows in turn."""
     modes = len(quadrature)
     for j in range(len(body)):

@@ -142,9 +142,8 @@ def _spectrum_table(flat: bool) -> tuple[Array, Array]:
 def compliant_share(
     mass_kg: float, impulse_n_s: float, pushed: Sequence[tuple[Array, Array]], tau_s: float, flat: bool
 ) -> float:
-    """Which share of a rigid body's impulse a first contact can hand over where the bodies give way:
-
-    1/(1 + m*·Σ g²|F̂(fτ)|²).
+    """Which share of a rigid body's impulse a first contact can hand over where the bodies give way: 1/(1 + m*·Σ
+    g²|F̂(fτ)|²).
 
     pushed: per body the frequencies (m,) in Hz and Uᵀj (m,) of the whole impulse, so that g = Uᵀj/impulse_n_s. What a
     mode moves within the pulse it takes from the approach, as if its 1/g² were one more mass in series with m* [1/m =
@@ -201,10 +200,8 @@ def _force(s: Array, flat: bool) -> Array:
 
 @lru_cache(maxsize=1)
 def _table() -> Array:
-    """(2, cells + 1):
-
-    Q and F of the Hertz pulse at equidistant shares. δ'' = -δ^(3/2) from δ = 0, δ' = 1, by the classical Runge-Kutta
-    method.
+    """(2, cells + 1): Q and F of the Hertz pulse at equidistant shares. δ'' = -δ^(3/2) from δ = 0, δ' = 1, by the
+    classical Runge-Kutta method.
 
     The pulse is symmetric, so half of it is solved (to δ' = 0) and mirrored: Q(s) + Q(1-s) = 1.
     """

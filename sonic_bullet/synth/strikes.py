@@ -13,12 +13,12 @@ An impact needs a cause. A solver's flicker between the corners of a resting box
 approached: a pair's strike is bounded by 2·m*·v (an elastic impact at the approach speed v before the step), or by what
 a struck neighbour hands on (`accepted_impulse`). Where a mobile body of the pair carried load within the last SPAN - 1
 steps, v counts above the speed that gravity gives along the normal in one step: below it, leaving and landing cannot be
-told from resting, nor a roll from one support on to the next from a fall.
+distinguished from resting, nor a roll from one support on to the next from a fall.
 
 Surfaces that overlap when a step starts have met in the step before (with `contactProcessingThreshold=0`, Bullet sees a
 contact only then): strikes are looked for one step ahead of the step being rendered, so that they can be dated back.
-What cannot be told from support that early (the last step of an impact of SPAN - 1 steps is the last one known) follows
-when the step itself is rendered.
+What cannot be distinguished from support that early (the last step of an impact of SPAN - 1 steps is the last one
+known) follows when the step itself is rendered.
 
 p pairs; column `NOW` of the load history is the step being rendered, later columns are the look-ahead.
 """
@@ -39,9 +39,8 @@ LOOKAHEAD = SPAN - 1
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LoadHistory:
-    """key (p,) sorted pair keys;
-
-    force_n (p, 2·SPAN-1) their normal loads; struck_n (p, 2·SPAN-1) what of them strikes have used up.
+    """key (p,) sorted pair keys; force_n (p, 2·SPAN-1) their normal loads; struck_n (p, 2·SPAN-1) what of them
+    strikes have used up.
     """
 
     key: Array
@@ -55,7 +54,7 @@ class LoadHistory:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Split:
-    """The loads of one step, told apart.
+    """The loads of one step, by kind.
 
     key (p,). support_n (p, 2): silent load at the step's start and end. strike (q,): rows of the pairs that are struck
     in the step that was asked for. share (q, j): part of the normal impulse of that and the next known steps, SPAN - 1
@@ -145,10 +144,9 @@ def causing_approach_m_s(
 
 
 def unheld_steps(split_: Split, mobile: Array, placed: Array) -> Array:
-    """(bodies,) steps for which gravity may have moved each mobile body although it rests:
-
-    1 where it carried load on any pair within the last steps, SPAN where it was just put where it is (placed): Bullet
-    finds the corners on which a box stands one a step, and it tilts meanwhile.
+    """(bodies,) steps for which gravity may have moved each mobile body although it rests: 1 where it carried load on
+    any pair within the last steps, SPAN where it was just put where it is (placed): Bullet finds the corners on which
+    a box stands one a step, and it tilts meanwhile.
     """
     low, high = key_bodies(split_.key[split_.loaded])
     out = np.zeros(len(mobile))

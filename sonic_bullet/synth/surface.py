@@ -273,7 +273,9 @@ def _rates(swept, rows, speed, x, seed, height, sr):  # type: ignore[no-untyped-
 
 
 @njit(nogil=True, error_model="numpy")
-def _oscillate(depth, lift, rows, g, rate, rate_unit, force_unit, rest, damping, x, substeps, still, out):  # type: ignore[no-untyped-def]
+def _oscillate(  # type: ignore[no-untyped-def]
+    depth, lift, rows, g, rate, rate_unit, force_unit, rest, damping, x, substeps, still, out
+):
     """f - N of the pairs ``rows`` (r of p), all with equal substeps, into out (p, n); depth and lift (p,) move on. g:
     their rows in rate.
 

@@ -68,9 +68,8 @@ def turn(typingctx, z, pole, block, modes, start, count, floor, now, powers):  #
 
 @intrinsic
 def rows(typingctx, powers, count, table):  # type: ignore[no-untyped-def]
-    """table (CHUNK, 2·ROW):
-
-    Re p^r, then Im p^r, r = 0 … 15, of each mode: p^r as the product of p, p², p⁴, p⁸ where r has that bit.
+    """table (CHUNK, 2·ROW): Re p^r, then Im p^r, r = 0 … 15, of each mode: p^r as the product of p, p², p⁴, p⁸ where
+    r has that bit.
     """
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:

@@ -21,7 +21,8 @@ SECONDS = 0.2
 def build(client):
     client.setGravity(0, 0, -9.81)
     floor = client.createMultiBody(0, client.createCollisionShape(client.GEOM_PLANE))
-    bar = client.createMultiBody({mass}, client.createCollisionShape(client.GEOM_BOX, halfExtents=[0.1, 0.01, 0.01]), basePosition=[0, 0, 0.03])
+    bar = client.createMultiBody({mass}, client.createCollisionShape(client.GEOM_BOX, halfExtents=[0.1, 0.01, 0.01]), \
+basePosition=[0, 0, 0.03])
     {more}
     return {{bar: {how}}}
 def act(client, time_s):
@@ -198,7 +199,10 @@ def test_materials_and_doctor(folder: Path) -> None:
     names = {m["name"] for m in json.loads(good(folder, "materials", "--json"))["materials"]}
     assert {"wood", "plastic", "metal", "glass", "porcelain"} <= names
     assert "porcelain" in good(folder, "materials")
-    bad = "client.setPhysicsEngineParameter(numSubSteps=4); [client.changeDynamics(body, -1, restitution=0.8) for body in (floor, bar)]"
+    bad = (
+        "client.setPhysicsEngineParameter(numSubSteps=4); [client.changeDynamics(body, -1, restitution=0.8) for "
+        "body in (floor, bar)]"
+    )
     (folder / "bad.py").write_text(scene(more=bad))
     found = json.loads(good(folder, "doctor", "bad.py", "--seconds", "0.05", "--json"))["findings"]
     said = " ".join(finding["id"] for finding in found)

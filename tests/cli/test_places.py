@@ -22,7 +22,8 @@ SECONDS = 0.05
 def build(client):
     client.setGravity(0, 0, -9.81)
     client.createMultiBody(0, client.createCollisionShape(client.GEOM_PLANE))
-    bar = client.createMultiBody(0.5, client.createCollisionShape(client.GEOM_BOX, halfExtents=[0.1, 0.01, 0.01]), basePosition=[0, 0, 0.011])
+    bar = client.createMultiBody(0.5, client.createCollisionShape(client.GEOM_BOX, halfExtents=[0.1, 0.01, 0.01]), \
+basePosition=[0, 0, 0.011])
     os.chdir("elsewhere")
     return {{bar: {{"material": "steel", "count": 4}}}}
 {act}

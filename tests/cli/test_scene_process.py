@@ -23,7 +23,8 @@ def build(client):
     print("a scene may print")
     client.setGravity(0, 0, -9.81)
     floor = client.createMultiBody(0, client.createCollisionShape(client.GEOM_PLANE))
-    box = client.createMultiBody({mass}, client.createCollisionShape(client.GEOM_BOX, halfExtents=[0.1, 0.01, 0.01]), basePosition=[0, 0, 0.03])
+    box = client.createMultiBody({mass}, client.createCollisionShape(client.GEOM_BOX, halfExtents=[0.1, 0.01, 0.01]), \
+basePosition=[0, 0, 0.03])
     return {{box: "metal"}}
 def act(client, time_s):
     {act}

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from sonic_bullet import effects, presets
+from sonic_bullet.effects.protocol import Evidence
 from tests.made.models import box_model
 
 PACKAGE = Path(__file__).resolve().parents[2] / "sonic_bullet"
@@ -122,7 +123,10 @@ def test_parts_are_what_stands_between_underscores_and_capitals(name: str, words
 
 
 def test_identifiers_are_seen_wherever_they_stand() -> None:
-    source = 'import a as told\nfrom b.heard import c\ndef f(wet, *, dried=1):\n    return f"{x.choke:.1f}{twin}"\nf(beside=2)\nclass Blow: ...\n'
+    source = (
+        'import a as told\nfrom b.heard import c\ndef f(wet, *, dried=1):\n    return f"{x.choke:.1f}{twin}"\n'
+        "f(beside=2)\nclass Blow: ...\n"
+    )
     assert {"told", "heard", "wet", "dried", "choke", "twin", "beside", "Blow"} <= set(identifiers(ast.parse(source)))
 
 
@@ -175,6 +179,12 @@ def test_former_public_classes_are_still_found(module: object, former: str, name
     assert found is getattr(module, name)
     with pytest.raises(AttributeError, match="no attribute 'Nobody'"):
         getattr(module, "Nobody")  # noqa: B009  as an importer asks
+
+
+def test_evidence_still_answers_to_its_former_field() -> None:
+    evidence = Evidence((), 1.0, 1e-8, 1.0, (), (20.0, 2e4), held_out=True)
+    with pytest.warns(DeprecationWarning, match="held_out"):
+        assert evidence.on_trial
 
 
 def test_a_model_still_answers_to_its_former_field() -> None:

@@ -38,9 +38,8 @@ def misjudged(off: np.ndarray, *effects: Effect) -> tuple[Struck, Hypothesis, tu
 
 
 def upper(off: float) -> np.ndarray:
-    """Three of the upper modes off, the farther the higher:
-
-    2970, 3240 and 3909 Hz, which have no neighbours within 5 %.
+    """Three of the upper modes off, the farther the higher: 2970, 3240 and 3909 Hz, which have no neighbours within 5
+    %.
     """
     found = np.zeros(18)
     found[[11, 12, 15]] = np.array([0.7, 0.8, 1.0]) * off

@@ -78,7 +78,9 @@ def test_one_candidate_alone_makes_no_pair() -> None:
 
 
 def room_anew(planted: tuple[Effect, ...], candidate: Effect) -> tuple[Hypothesis, list[Candidate]] | None:
-    """What a room identified anew beside a candidate that moves modes comes to, where the room was found first, alone."""
+    """What a room identified anew beside a candidate that moves modes comes to, where the room was found
+    first, alone.
+    """
     body = recorded(*planted)
     assert body.recorded is not None and body.recorded.signals is not None
     floor = floor_between(list(body.recorded.signals))

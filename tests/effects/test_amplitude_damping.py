@@ -74,7 +74,7 @@ def test_twins_have_the_axes_that_their_envelopes_tell() -> None:
     assert_nearer_than_the_meshs(found, base, body, evidence)
     less = thinned(evidence, (evidence.observed[0].source, 2), 1.0, np.random.default_rng(0))
     other = replace(found, turn_rad=(1.2,))
-    held, learnt = (AmplitudeDamping.propose(replace(less, known=other, on_trial=trial)) for trial in (True, False))
+    held, learnt = (AmplitudeDamping.propose(replace(less, known=other, held_out=trial)) for trial in (True, False))
     assert held is not None and learnt is not None
     assert held.turn_rad == (1.2,) and learnt.turn_rad[0] == pytest.approx(0.6, abs=0.1)
     assert abs(held.alpha_per_s / learnt.alpha_per_s - 1) > 1e-3, (
@@ -107,7 +107,9 @@ def test_levels_from_strike_to_strike_tell_the_axes_too() -> None:
 
 
 def test_what_is_known_to_ring_beside_the_body_is_taken_out_of_its_lines() -> None:
-    """A stand that rings just beside every mode hides how these fall; once it is named, its sound is no part of theirs."""
+    """A stand that rings just beside every mode hides how these fall; once it is named, its sound is no part
+    of theirs.
+    """
     freq = plate().freq_hz
     apart = np.array([np.abs(np.delete(freq, k) - f).min() for k, f in enumerate(freq)])
     beside = tuple(float(f) - 45.0 for f in freq[apart > 150])

@@ -135,7 +135,7 @@ def test_axes_of_twins_are_held_on_trial_and_learnt_again_beside_other_effects()
     body = recorded(AmplitudePitch(0.7, "velocity", (float(model.freq_hz[PAIR[0]]),), (0.6,)), model=model)
     told = evidence_of(refitted(fitted(body), (body,)), (body,), BAND)
     wrong = AmplitudePitch(0.7, "velocity", (float(model.freq_hz[PAIR[0]]),), (1.2,))
-    held, learnt = (AmplitudePitch.propose(replace(told, known=wrong, on_trial=trial)) for trial in (True, False))
+    held, learnt = (AmplitudePitch.propose(replace(told, known=wrong, held_out=trial)) for trial in (True, False))
     assert held is not None and held.turn_rad == (1.2,)
     assert learnt is not None and learnt.turn_rad[0] == pytest.approx(0.6, abs=0.06)
     apart = replace(

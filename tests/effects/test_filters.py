@@ -1,4 +1,6 @@
-"""`measurement-chain`: the corner that is read off is the one of the filter that is played; a rumbling room is no hum."""
+"""`measurement-chain`: the corner that is read off is the one of the filter that is played; a rumbling room
+is no hum.
+"""
 
 from __future__ import annotations
 

@@ -157,9 +157,8 @@ def test_beside_three_plain_pairs_another_may_be_less_so(plain: int) -> None:
 
 
 def test_neighbours_by_chance_that_the_mesh_has_too_near_are_no_split_pair() -> None:
-    """Two modes 0.4 % apart in the mesh and 0.9 % in truth swing about the mesh's own axes;
-
-    turned, or twins of the mesh, they are a pair.
+    """Two modes 0.4 % apart in the mesh and 0.9 % in truth swing about the mesh's own axes; turned, or twins of the
+    mesh, they are a pair.
     """
     model = plate()
     freq = model.freq_hz.copy()

@@ -186,7 +186,9 @@ def test_lines_are_dried_once() -> None:
 
 
 def test_what_the_model_says_nothing_of_stays_as_it_was_heard() -> None:
-    """A line whose mode is out of the band has no amplitude to be told against; it is not made silent, nor is the gain."""
+    """A line whose mode is out of the band has no amplitude to be told against; it is not made silent, nor is
+    the gain.
+    """
     body = recorded(Room(0.9, 0.9, 4), seconds=1.2)
     observed = object_evidence(truth(), body)
     push = observed.push.copy()

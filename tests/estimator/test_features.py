@@ -1,4 +1,6 @@
-"""Features of made recordings: exact modes come back, noisy ones within their spreads, and what is no impact says so."""
+"""Features of made recordings: exact modes come back, noisy ones within their spreads, and what is no impact
+says so.
+"""
 
 from __future__ import annotations
 
@@ -24,9 +26,8 @@ def sound(
 
 
 def mixture(seed: int, db: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, float, np.ndarray]:
-    """Twenty pairs of modes 0.3 to 5 % apart in white noise db below the sound:
-
-    frequencies, decays, amplitudes, noise rms, recording.
+    """Twenty pairs of modes 0.3 to 5 % apart in white noise db below the sound: frequencies, decays, amplitudes,
+    noise rms, recording.
     """
     rng = np.random.default_rng(seed)
     # each pair has its own twentieth of 100 Hz to 12 kHz

@@ -7,12 +7,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from benchmarks.ren2013.plain_image import plain_distance
 from sonic_bullet.estimator.lines.line_values import Features
-from sonic_bullet.estimator.perceptual.image import Image, distance, image, plain_distance
+from sonic_bullet.estimator.perceptual.image import Image, distance, image
 from sonic_bullet.estimator.perceptual.loudness import bark, bark_to_hz, level_of_phon, loudness, phon, sone
 from sonic_bullet.estimator.perceptual.matching import match_ratio_product, points
-from sonic_bullet.estimator.perceptual.metric import hybrid, match, residuals, target
-from sonic_bullet.estimator.perceptual.problem import Problem, modes_of
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import RecordError
 
@@ -143,22 +142,8 @@ def test_match_ratio_product() -> None:
     assert scores == sorted(scores)
     inaudible = [np.append(part, extra) for part, extra in zip(modes, (21000.0, 5.0, 1.0), strict=True)]
     assert match_ratio_product(known, *inaudible) == pytest.approx(match_ratio_product(known, *modes), rel=1e-12)
-    # a mode nobody heard, and a mode that is missing, both cost
+    # a mode nobody recorded, and a mode that is missing, both cost
     foreign = [np.append(part, extra) for part, extra in zip(modes, (60.0, 5.0, 1.0), strict=True)]
     assert match_ratio_product(known, *foreign) > match_ratio_product(known, *modes)
     assert match_ratio_product(known, *(part[:20] for part in modes)) > match_ratio_product(known, *modes)
     assert match_ratio_product(known, *(0 * part for part in modes)) == 0
-
-
-def test_hybrid_is_the_ratio_and_the_sum_of_squares() -> None:
-    lambda_hat = (2 * np.pi * np.linspace(300, 9000, 12)) ** 2
-    amplitude_hat = np.cos(np.arange(12.0))
-    truth = np.array([20.0, 1e-7, 1.0, 0.1])
-    modes = modes_of(truth, lambda_hat, amplitude_hat)
-    aim = target(Problem(observed(*modes), sounding(*modes), lambda_hat, amplitude_hat))
-    assert hybrid(aim, truth) < 1e-8
-    away = truth * np.array([1.5, 0.8, 1.02, 1.3])
-    there = modes_of(away, lambda_hat, amplitude_hat)
-    assert hybrid(aim, away) == pytest.approx(distance(aim.image, *there) / -match(aim, away), rel=1e-12)
-    assert hybrid(aim, away) == pytest.approx(float((residuals(aim, away) ** 2).sum()), rel=1e-9)
-    assert hybrid(aim, away) == pytest.approx(hybrid(aim, away, plain=True), rel=1e-5)

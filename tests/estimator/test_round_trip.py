@@ -1,6 +1,5 @@
-"""A fitted preset sounds as recorded:
-
-rendered, fitted, and rendered again. All objects and sensors: benchmarks/round_trip.py.
+"""A fitted preset sounds as recorded: rendered, fitted, and rendered again. All objects and sensors:
+benchmarks/round_trip.py.
 """
 
 from __future__ import annotations
@@ -32,7 +31,7 @@ LINES = [
 @pytest.mark.parametrize("sensor", ["pressure", "velocity"])
 def test_the_bar_sounds_as_recorded(tmp_path: Path, sensor: str) -> None:
     """The bar of scenes/bar.py, at a microphone and at a vibrometer."""
-    (bar,) = (t for t in round_trip.trials(None, tmp_path) if t.name == "bar")
+    (bar,) = (t for t in round_trip.subjects(None, tmp_path) if t.name == "bar")
     count, decay, level_db, every, every_db = round_trip.around(bar, sensor, tmp_path)
     assert count >= 5
     assert decay < 0.03 and level_db < 0.5

@@ -173,10 +173,12 @@ from sonic_bullet.records.contacts import Contacts, Step
 sound = np.random.default_rng(0).normal(0, 0.1, (1, 200_000))
 step = Step(0.01, np.zeros((9999, 3)), np.zeros((9999, 4)), np.zeros(9999, bool), Contacts.none())
 log = object.__new__(ContactLog)
-for name, value in {"bodies": (), "steps": (step,), "sensors": (), "sr": 8000, "seed": 0, "air": files.logs.Air(), "events": ()}.items():
+for name, value in {"bodies": (), "steps": (step,), "sensors": (), \
+"sr": 8000, "seed": 0, "air": files.logs.Air(), "events": ()}.items():
     object.__setattr__(log, name, value)
 resource.setrlimit(resource.RLIMIT_FSIZE, (300_000, 300_000))
-for call in (lambda: files.write_audio("a.wav", sound, 48000), lambda: files.write_audio("b.flac", sound, 48000), lambda: files.write_log("c.npz", log)):
+for call in (lambda: files.write_audio("a.wav", sound, 48000), \
+lambda: files.write_audio("b.flac", sound, 48000), lambda: files.write_log("c.npz", log)):
     try:
         call()
     except errors.FileError as error:

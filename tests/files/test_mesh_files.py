@@ -155,7 +155,10 @@ def test_counts_that_a_file_does_not_hold_take_no_memory(tmp_path: Path) -> None
         struct.pack("<4sIII4s", b"glTF", 2, 20 + len(text) + len(rest), len(text), b"JSON") + text + rest
     )
     (tmp_path / "b.glb").write_bytes(data[:12] + struct.pack("<I", 2**32 - 4) + data[16:])
-    head = b"ply\nformat binary_little_endian 1.0\nelement vertex 4000000000\nproperty float x\nproperty float y\nproperty float z\nend_header\n"
+    head = (
+        b"ply\nformat binary_little_endian 1.0\nelement vertex 4000000000\nproperty float x\nproperty float y\n"
+        b"property float z\nend_header\n"
+    )
     (tmp_path / "a.ply").write_bytes(head + bytes(120))
     (tmp_path / "a.stl").write_bytes(bytes(80) + struct.pack("<I", 2**32 - 1) + bytes(50))
     tracemalloc.start()

@@ -46,7 +46,9 @@ CASES = [
     for long in (LONG, WORDS)
 ] + [
     ("case.json", read_case, case(objects={LONG: {"units": LONG}})),
-    ("case.json", read_case, case(objects={LONG: {"mesh": "a"}, WORDS: {"mesh": "b"}}, recordings=[{"file": "a.wav", "object": WORDS + "x"}])),
+    ("case.json", read_case, case(
+        objects={LONG: {"mesh": "a"}, WORDS: {"mesh": "b"}}, recordings=[{"file": "a.wav", "object": WORDS + "x"}]
+    )),
     ("case.json", read_case, case(recordings=[{"file": "a.wav", "object": "bar", "split": WORDS}])),
     ("case.json", read_case, case(recordings=[{"file": LONG, "object": "bar"}])),
     ("case.json", read_case, case(recordings=[{"file": "../" + LONG, "object": "bar"}])),

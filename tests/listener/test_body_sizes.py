@@ -92,7 +92,10 @@ def test_listener_doctor_and_render_tell_of_a_block_of_400_000_cubic_metres(
         listener.detach()
     finally:
         client.disconnect()
-    scene = "SECONDS = 0.02\ndef build(c):\n    c.setAdditionalSearchPath(r'%s')\n    b = c.loadURDF('plane.urdf')\n    return {b: {'material': 'steel', 'count': 1}}\n"
+    scene = (
+        "SECONDS = 0.02\ndef build(c):\n    c.setAdditionalSearchPath(r'%s')\n    b = c.loadURDF('plane.urdf')\n"
+        "    return {b: {'material': 'steel', 'count': 1}}\n"
+    )
     (tmp_path / "s.py").write_text(scene % DATA)
     for _ in range(2):
         assert (

@@ -20,7 +20,8 @@ import pybullet as p, time
 c = p.connect(p.GUI, options="--width=800")
 p.setGravity(0, 0, -9.81)
 slider = p.addUserDebugParameter("height", 0, 2, 0.5)
-ball = p.createMultiBody(1, p.createCollisionShape(p.GEOM_SPHERE, radius=0.1), basePosition=[0, 0, p.readUserDebugParameter(slider)])
+ball = p.createMultiBody(1, p.createCollisionShape(p.GEOM_SPHERE, radius=0.1), \
+basePosition=[0, 0, p.readUserDebugParameter(slider)])
 count = 0
 while True:
     p.stepSimulation()
@@ -77,7 +78,8 @@ def test_endless_scripts_end_on_time(script: Any, text: str) -> None:
 def test_short_scripts_end_where_they_end(script: Any) -> None:
     seen: list[int] = []
     names = script(
-        "import pybullet as p\nc = p.connect(p.DIRECT)\nfor _ in range(10):\n    p.stepSimulation()\np.disconnect()\nx = 3\n",
+        "import pybullet as p\nc = p.connect(p.DIRECT)\nfor _ in range(10):\n    p.stepSimulation()\n"
+        "p.disconnect()\nx = 3\n",
         5,
         after=seen.append,
     )
@@ -106,7 +108,10 @@ def test_real_time_scripts_step_while_they_sleep(script: Any) -> None:
 
 def test_scripts_cannot_swallow_the_end(script: Any) -> None:
     seen: list[int] = []
-    text = "import pybullet as p\np.connect(p.DIRECT)\nwhile True:\n    try:\n        p.stepSimulation()\n    except Exception:\n        pass\n"
+    text = (
+        "import pybullet as p\np.connect(p.DIRECT)\nwhile True:\n    try:\n        p.stepSimulation()\n"
+        "    except Exception:\n        pass\n"
+    )
     script(text, 0.1, after=seen.append)
     assert len(seen) == 24
 
@@ -145,7 +150,9 @@ def test_listening_leaves_stdout_alone() -> None:
     """PyBullet's own "argv[0]=" and "?" must not get into a pipe of JSON."""
     code = (
         "from sonic_bullet.listener import direct_client, open_world\nimport pybullet as p\n"
-        "c = direct_client()\nb = c.createMultiBody(0, c.createCollisionShape(p.GEOM_MESH, vertices=[[0,0,0],[1,0,0],[0,1,0],[0,0,1]], indices=[0,1,2,0,1,3]))\n"
+        "c = direct_client()\n"
+        "b = c.createMultiBody(0, c.createCollisionShape(p.GEOM_MESH, "
+        "vertices=[[0,0,0],[1,0,0],[0,1,0],[0,0,1]], indices=[0,1,2,0,1,3]))\n"
         "try:\n    open_world(c).shapes_of(b)\nexcept Exception:\n    pass\nprint('{}')\n"
     )
     told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -163,7 +163,8 @@ def test_a_file_whose_lock_is_held_is_not_swept(tmp_path: Path) -> None:
 
 def test_nothing_but_our_own_unfinished_files_is_swept(tmp_path: Path) -> None:
     kept = [
-        "a.partial.wav", "sonic-bullet-0123.partial", "x" + ORPHAN, ORPHAN + ".txt", ORPHAN.upper(), "important.partial", "sonic-bullet-0123456789abcdeg.partial",
+        "a.partial.wav", "sonic-bullet-0123.partial", "x" + ORPHAN, ORPHAN + ".txt", ORPHAN.upper(),
+        "important.partial", "sonic-bullet-0123456789abcdeg.partial",
     ]  # fmt: skip
     for name in kept:
         (tmp_path / name).write_text("mine")

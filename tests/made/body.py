@@ -18,7 +18,7 @@ from sonic_bullet.effects import Effect
 from sonic_bullet.estimator.fit.recorded import RecordedObject as Recorded
 from sonic_bullet.estimator.lines.joint_lines import joint_lines
 from sonic_bullet.files.cases import CaseObject, CaseRecording
-from sonic_bullet.modal.reduced import Family
+from sonic_bullet.modal.isotropic_family import Family
 from sonic_bullet.records import Array, Material, ModalModel
 
 SR = 16_000

@@ -85,9 +85,8 @@ def make(
     seed: int = 3,
     **changes: Any,
 ) -> Planted:
-    """A case of one box;
-
-    guess: (E, density, ν). The last strike is held out. edge_m: of the mesh the truth is made with.
+    """A case of one box; guess: (E, density, ν). The last strike is held out. edge_m: of the mesh the truth is made
+    with.
     """
     rng = np.random.default_rng(seed)
     write_box(folder / "box.obj", size_m)

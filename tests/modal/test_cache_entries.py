@@ -1,6 +1,5 @@
-"""A cache entry is what was kept or nothing:
-
-flipped, forged, cut, of another name or form, it is a miss, computed anew and replaced.
+"""A cache entry is what was kept or nothing: flipped, forged, cut, of another name or form, it is a miss, computed
+anew and replaced.
 """
 
 from __future__ import annotations

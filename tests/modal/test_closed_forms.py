@@ -84,9 +84,8 @@ def test_first_multiplets_of_a_ball_from_a_mesh(steel: Material) -> None:
 
 
 def test_eigenvalues_converge_with_the_fourth_power_of_the_element(steel: Material) -> None:
-    """λ_h = λ + c h^(2p), p = 2 [Strang & Fix 1973, ch.
-
-    6], fitted on the first six modes of the slender bar under uniform refinement.
+    """λ_h = λ + c h^(2p), p = 2 [Strang & Fix 1973, ch. 6], fitted on the first six modes of the slender bar
+    under uniform refinement.
     """
     from scipy.optimize import brentq
 

@@ -17,8 +17,13 @@ RHO_C = AIR.density_kg_m3 * AIR.sound_speed_m_s
 def icosphere(levels: int) -> tuple[Array, Array]:
     """Unit sphere from an icosahedron halved ``levels`` times: vertices (v, 3), faces (f, 3) outward."""
     golden = (1 + 5**0.5) / 2
-    vertex = [(-1, golden, 0), (1, golden, 0), (-1, -golden, 0), (1, -golden, 0), (0, -1, golden), (0, 1, golden), (0, -1, -golden), (0, 1, -golden), (golden, 0, -1), (golden, 0, 1), (-golden, 0, -1), (-golden, 0, 1)]  # fmt: skip
-    face = [(0, 11, 5), (0, 5, 1), (0, 1, 7), (0, 7, 10), (0, 10, 11), (1, 5, 9), (5, 11, 4), (11, 10, 2), (10, 7, 6), (7, 1, 8), (3, 9, 4), (3, 4, 2), (3, 2, 6), (3, 6, 8), (3, 8, 9), (4, 9, 5), (2, 4, 11), (6, 2, 10), (8, 6, 7), (9, 8, 1)]  # fmt: skip
+    vertex = [(-1, golden, 0), (1, golden, 0), (-1, -golden, 0), (1, -golden, 0),
+              (0, -1, golden), (0, 1, golden), (0, -1, -golden), (0, 1, -golden),
+              (golden, 0, -1), (golden, 0, 1), (-golden, 0, -1), (-golden, 0, 1)]  # fmt: skip
+    face = [(0, 11, 5), (0, 5, 1), (0, 1, 7), (0, 7, 10), (0, 10, 11),
+            (1, 5, 9), (5, 11, 4), (11, 10, 2), (10, 7, 6), (7, 1, 8),
+            (3, 9, 4), (3, 4, 2), (3, 2, 6), (3, 6, 8), (3, 8, 9),
+            (4, 9, 5), (2, 4, 11), (6, 2, 10), (8, 6, 7), (9, 8, 1)]  # fmt: skip
     points = [np.array(v) / np.linalg.norm(v) for v in vertex]
     for _ in range(levels):
         middle: dict[tuple[int, int], int] = {}
@@ -83,9 +88,8 @@ def frequency_of(ka: Array | float, radius_m: float) -> Array:
 @pytest.mark.parametrize("degree", [0, 1, 2])
 @pytest.mark.parametrize("radius", [0.02, 0.3])
 def test_sphere_harmonics_radiate_their_exact_power_and_pressure(degree: int, radius: float) -> None:
-    """Far pressure of radial motion U·P_l:
-
-    ρ₀cU P_l(cosθ) (-i) i^{l+1} e^{-ika}/(ka h_l'(ka)) a/r [Williams 1999, eq. 6.122, e^{iωt}].
+    """Far pressure of radial motion U·P_l: ρ₀cU P_l(cosθ) (-i) i^{l+1} e^{-ika}/(ka h_l'(ka)) a/r [Williams 1999, eq.
+    6.122, e^{iωt}].
     """
     ka = np.array([0.05, 0.2, 1.0, 3.0, 8.0])
     shape = 0.7 * np.repeat((SPHERE * HARMONIC[degree][:, None])[:, :, None], len(ka), axis=2)
@@ -114,9 +118,8 @@ def efficiency(shape: Array, vertex: Array, face: Array, ka: Array) -> Array:
 
 @pytest.mark.parametrize(("motion", "order"), [("breathes", 2), ("shifts", 4), ("stretches", 6)])
 def test_orders_at_low_frequency_are_two_four_and_six(motion: str, order: int) -> None:
-    """Net volume flow (ka)², none (ka)⁴, neither flow nor dipole (ka)⁶ [Pierce 1989, sec.
-
-    4-1 to 4-4], on a box, where nothing is exact by construction.
+    """Net volume flow (ka)², none (ka)⁴, neither flow nor dipole (ka)⁶ [Pierce 1989, sec. 4-1 to 4-4], on a
+    box, where nothing is exact by construction.
     """
     vertex, face = box((0.3, 0.2, 0.1))
     shape = {"breathes": vertex, "shifts": vertex * 0 + [0.2, 0.3, 1.0], "stretches": vertex * [1.0, -1.0, 0.0]}[

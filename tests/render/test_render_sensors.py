@@ -139,7 +139,9 @@ def test_the_plain_sum_is_the_seeds_sum() -> None:
 
 
 def test_a_vibrometer_reads_the_surfaces_velocity() -> None:
-    """At the struck point, along the strike: Σ φ² j cos(ωt) e^{-dt}, positive at first (it moves the way it is pushed)."""
+    """At the struck point, along the strike: Σ φ² j cos(ωt) e^{-dt}, positive at first (it moves the way it
+    is pushed).
+    """
     body = box_body(EDGES_M, (300.0,))
     contacts = row(0, 1, (0, 0, -0.01), normal=(0, 0, -1), point_a=(0.1, 0.05, 0.005))
     (signal,) = struck_box((Vibrometer(0, [0.1, 0.05, 0.005], [0, 0, -1]),), freq=(300.0,), where=(0.1, 0.05, 0.005))
@@ -229,9 +231,8 @@ def test_a_slow_compact_click_is_the_jerk_law() -> None:
 
 
 def test_a_fast_click_is_kirchhoffs_sphere() -> None:
-    """p = ρ₀ c U (a/r) e^{-wt}(cos wt - sin wt), w = c/a [Kirchhoff 1876;
-
-    Koss, Alfredson 1973]: a 10 cm steel ball's blow is short against a/c.
+    """p = ρ₀ c U (a/r) e^{-wt}(cos wt - sin wt), w = c/a [Kirchhoff 1876; Koss, Alfredson 1973]: a 10 cm steel ball's
+    blow is short against a/c.
     """
     radius, impulse = 0.10, 1.0
     ball = ball_body(radius)

@@ -1,6 +1,5 @@
-"""A residual in a preset file:
-
-small, exact to a quarter of a decibel, refused in one line where it cannot be; and the command that makes it.
+"""A residual in a preset file: small, exact to a quarter of a decibel, refused in one line where it cannot be; and
+the command that makes it.
 """
 
 from __future__ import annotations
@@ -164,9 +163,8 @@ def clip(seconds: float = 1.0) -> np.ndarray:
 
 
 def test_a_purely_modal_clip_of_the_model_leaves_nothing() -> None:
-    """Residual energy at most -40 dB of the clip's, features found, not given:
-
-    24 modes with six pairs too close to be told apart, noise 80 dB below the peak.
+    """Residual energy at most -40 dB of the clip's, features found, not given: 24 modes with six pairs too close to
+    be told apart, noise 80 dB below the peak.
 
     A line that the model lacks, 20 dB below the clip, is left all the same.
     """

@@ -1,6 +1,5 @@
-"""Residuals in the run time:
-
-levels, places, seeds, blocks, joins, a thousand strikes, and what happens where there is none.
+"""Residuals in the run time: levels, places, seeds, blocks, joins, a thousand strikes, and what happens where there
+is none.
 """
 
 from __future__ import annotations
@@ -250,7 +249,9 @@ def test_a_thousand_strikes_stay_real_time() -> None:
 
 
 def slower() -> float:
-    """How much slower than an idle machine this one is now, 1 or more: tests run side by side share caches and cores."""
+    """How much slower than an idle machine this one is now, 1 or more: tests run side by side share caches
+    and cores.
+    """
     x, times = np.random.default_rng(0).standard_normal(2**18), []
     for _ in range(5):
         begun = time.thread_time()

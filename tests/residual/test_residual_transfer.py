@@ -266,7 +266,9 @@ def test_close_modes_count_as_one_and_modes_of_a_shaken_list_still_pair() -> Non
 
 
 def test_inversion_settles_and_keeps_seeds_apart() -> None:
-    """Four turns bring the inconsistency of shaped noise below 0.15, each turn lowers it; the same seed, the same bits."""
+    """Four turns bring the inconsistency of shaped noise below 0.15, each turn lowers it; the same seed, the
+    same bits.
+    """
     n = SR // 2
     time = np.arange(n) / SR
     per_hz = np.exp(-20 * np.arange(95) * 256 / SR)[None] * np.exp(-np.arange(257) / 60)[:, None] * 1e-6

@@ -99,7 +99,10 @@ LOG = {
     "untouched": frozenset(),
     "events": (),
 }
-BUILT = "import pybullet as p\nSECONDS = 0.01\n\ndef build(client):\n    client.createMultiBody(0, client.createCollisionShape(p.GEOM_PLANE))\n    return {}\n"
+BUILT = (
+    "import pybullet as p\nSECONDS = 0.01\n\ndef build(client):\n"
+    "    client.createMultiBody(0, client.createCollisionShape(p.GEOM_PLANE))\n    return {}\n"
+)
 
 
 def listener_of(client: Any) -> tuple[sb.Listener, int]:

@@ -19,10 +19,14 @@ from tests.made.models import STEEL
 from tests.made.worlds import plate_model
 
 SHEET = "v 0 0 0\nv 0.1 0 0\nv 0.1 0.1 0\nv 0 0.1 0\nf 1 2 3\nf 1 3 4\n"
-LINK = """  <link name="{name}"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>
+LINK = """  <link name="{name}"><inertial><mass value="1"/>\
+<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>
     <collision><geometry>{geometry}</geometry></collision></link>
 """
-JOINT = '  <joint name="{name}_joint" type="fixed"><parent link="{parent}"/><child link="{name}"/><origin xyz="0 0 {z}"/></joint>\n'
+JOINT = (
+    '  <joint name="{name}_joint" type="fixed"><parent link="{parent}"/><child link="{name}"/>'
+    '<origin xyz="0 0 {z}"/></joint>\n'
+)
 ARM = '<box size="0.3 0.03 0.01"/>'
 
 
@@ -142,9 +146,8 @@ def test_a_link_whose_modes_fail_leaves_nothing_added(
 
 
 def test_the_most_intricate_link_is_solved_first(client: Any, tmp_path: Path, solver: Callable[..., Solver]) -> None:
-    """Its filling is the likeliest to fail, and the slowest:
-
-    KUKA's hand fails after three attempts, the other links before it were in vain.
+    """Its filling is the likeliest to fail, and the slowest: KUKA's hand fails after three attempts, the other links
+    before it were in vain.
     """
     bar = Path(__file__).parents[2] / "assets" / "bowl.obj"
     body = boxes(client, tmp_path, tip=f'<mesh filename="{bar}"/>')

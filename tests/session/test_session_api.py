@@ -114,7 +114,8 @@ assert p.connect(p.DIRECT) == 0
 p.setGravity(0, 0, -9.81)
 p.createMultiBody(0, p.createCollisionShape(p.GEOM_PLANE))
 listener = sb.attach(p)
-box = p.createMultiBody(0.4, p.createCollisionShape(p.GEOM_BOX, halfExtents=[0.1, 0.05, 0.005]), basePosition=[0, 0, 0.1])
+box = p.createMultiBody(0.4, p.createCollisionShape(p.GEOM_BOX, halfExtents=[0.1, 0.05, 0.005]), \
+basePosition=[0, 0, 0.1])
 listener.add(box, material=STEEL, model=box_model((0.2, 0.1, 0.01), (740.0, 1230.0)))
 n = 0
 for _ in range(60):

@@ -1,6 +1,5 @@
-"""The user's own audit:
-
-`contacts.impulse_on` against what the velocities say. (All shapes and steps: tests/listener/test_momentum.py.)
+"""The user's own audit: `contacts.impulse_on` against what the velocities say. (All shapes and steps:
+tests/listener/test_momentum.py.)
 """
 
 from __future__ import annotations

@@ -188,7 +188,8 @@ def test_every_impact_is_a_blow(pile: Pile) -> None:
         if mine < STRIKE_N_S:
             missed.append((number, key >> 16, key & 0xFFFF, impulse, mine))
     print(
-        f"{len(wanted)} impacts, {len(pile.impacts)} blows, missed {missed}; share of the impulse: median {np.median(share):.2f}, least {min(share):.2f}"
+        f"{len(wanted)} impacts, {len(pile.impacts)} blows, missed {missed}; share of the impulse: median "
+        f"{np.median(share):.2f}, least {min(share):.2f}"
     )
     assert not missed
     assert np.median(share) == pytest.approx(1.0, abs=0.1)
@@ -238,7 +239,8 @@ def test_every_impact_is_an_onset_in_the_sound(pile: Pile, monkeypatch: pytest.M
         above_db.append(20 * np.log10(np.max(impact / np.maximum(rest, 1e-30))))
     print(f"{len(wanted)} impacts begin {min(begins):.2f} … {max(begins):.2f} steps after their step's start")
     print(
-        f"the blow over the rest, in the band where it is most: median {np.median(above_db):.1f} dB, a tenth below {np.percentile(above_db, 10):.1f} dB"
+        f"the blow over the rest, in the band where it is most: median {np.median(above_db):.1f} dB, a tenth "
+        f"below {np.percentile(above_db, 10):.1f} dB"
     )
     assert len(wanted) > 40
     assert min(begins) >= -1

@@ -194,7 +194,9 @@ def test_casts_that_make_no_sense_are_one_line(tmp_path: Path, cast: str) -> Non
 
     scene = tmp_path / "cast.py"
     scene.write_text(
-        f"def build(client):\n    client.createMultiBody(1, client.createCollisionShape(client.GEOM_SPHERE, radius=0.01))\n    return {cast}\n"
+        "def build(client):\n"
+        "    client.createMultiBody(1, client.createCollisionShape(client.GEOM_SPHERE, radius=0.01))\n"
+        f"    return {cast}\n"
     )
     with pytest.raises(SonicBulletError) as error:
         render_scene(scene, seconds=0.1)

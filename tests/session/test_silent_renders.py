@@ -32,29 +32,37 @@ SCENES = {
     "nothing was added": "def build(client):\n    floor(client)\n    box(client, (0, 0, 0.2))\n    return {}\n",
     "nothing touched": "def build(client):\n    return {box(client, (0, 0, 1)): PLATE}\n",
     "only bodies that were not added touched": (
-        "def build(client):\n    floor(client)\n    ball(client, (3, 0, 0.05))\n    return {box(client, (0, 0, 9)): PLATE}\n"
+        "def build(client):\n    floor(client)\n    ball(client, (3, 0, 0.05))\n"
+        "    return {box(client, (0, 0, 9)): PLATE}\n"
     ),
     "moved by hand in": (
         "def build(client):\n    floor(client)\n    return {box(client, (0, 0, 0.02)): PLATE}\n\n"
-        "def act(client, time_s):\n    client.resetBasePositionAndOrientation(1, [0, 0, 0.02 - 0.2 * time_s], [0, 0, 0, 1])\n"
+        "def act(client, time_s):\n"
+        "    client.resetBasePositionAndOrientation(1, [0, 0, 0.02 - 0.2 * time_s], [0, 0, 0, 1])\n"
     ),
     "no audible mode: those of": (
         "MODEL = box_model(EDGES_M, (5000.0, 9000.0), STEEL)\n\n"
-        "def build(client):\n    still = box(client, (0, 0, 0), mass=0, turn=(0, 0, 0))\n    ball(client, (0, 0, 0.06))\n"
+        "def build(client):\n    still = box(client, (0, 0, 0), mass=0, turn=(0, 0, 0))\n"
+        "    ball(client, (0, 0, 0.06))\n"
         '    return {still: {"material": STEEL, "model": MODEL}}\n'
     ),
     "no audible mode: link0 (body 0) has none": (
         "MODEL = box_model(EDGES_M, (), STEEL)\n\n"
-        "def build(client):\n    still = box(client, (0, 0, 0), mass=0, turn=(0, 0, 0))\n    ball(client, (0, 0, 0.06))\n"
+        "def build(client):\n    still = box(client, (0, 0, 0), mass=0, turn=(0, 0, 0))\n"
+        "    ball(client, (0, 0, 0.06))\n"
         '    return {still: {"material": STEEL, "model": MODEL}}\n'
     ),
     "the vibrometer reads body 2 link -1": (
         "MICROPHONE = [Vibrometer(2, (0, 0, 0), (0, 0, 1))]\n\n"
-        "def build(client):\n    floor(client)\n    return {box(client, (0, 0, 0.1)): PLATE, box(client, (0, 0, 9)): PLATE}\n"
+        "def build(client):\n    floor(client)\n"
+        "    return {box(client, (0, 0, 0.1)): PLATE, box(client, (0, 0, 9)): PLATE}\n"
     ),
-    "support at rest": f"def build(client):\n    client.setGravity(0, 0, -9.81)\n    floor(client)\n    return {{{REST}: PLATE}}\n",
-    "still under way": "MICROPHONE = (0, 0, 1000)\n\ndef build(client):\n    floor(client)\n    return {box(client, (0, 0, 0.1)): PLATE}\n",
-    "there is no microphone": "MICROPHONE = ()\n\ndef build(client):\n    floor(client)\n    return {box(client, (0, 0, 0.1)): PLATE}\n",
+    "support at rest": "def build(client):\n    client.setGravity(0, 0, -9.81)\n    floor(client)\n"
+    f"    return {{{REST}: PLATE}}\n",
+    "still under way": "MICROPHONE = (0, 0, 1000)\n\ndef build(client):\n    floor(client)\n"
+    "    return {box(client, (0, 0, 0.1)): PLATE}\n",
+    "there is no microphone": "MICROPHONE = ()\n\ndef build(client):\n    floor(client)\n"
+    "    return {box(client, (0, 0, 0.1)): PLATE}\n",
 }
 LOUD = "def build(client):\n    floor(client)\n    return {box(client, (0, 0, 0.1)): PLATE}\n"
 

@@ -29,17 +29,17 @@ def test_the_first_reading_is_the_recording_and_the_others_lie_beside_it() -> No
 
 
 @pytest.mark.parametrize(
-    ("second", "earned", "said"),
+    ("second", "accepted", "said"),
     [
-        (ROW, True, "| 2 | 4.8 | 1% | damping-law **earned** |"),
-        (replace(ROW, after=2.5), True, "| 2 (2 to 2.5) | 4.8 | 1% | damping-law **earned** |"),
-        (replace(ROW, after=5.5), False, "| 2 (2 to 5.5) | 4.8 | 1% | damping-law (earned in 2 of 3 readings) |"),
-        (replace(ROW, effect=""), False, "| 2 (none in 1) | 4.8 | 1% | damping-law (earned in 2 of 3 readings) |"),
+        (ROW, True, "| 2 | 4.8 | 1% | damping-law **accepted** |"),
+        (replace(ROW, after=2.5), True, "| 2 (2 to 2.5) | 4.8 | 1% | damping-law **accepted** |"),
+        (replace(ROW, after=5.5), False, "| 2 (2 to 5.5) | 4.8 | 1% | damping-law (accepted in 2 of 3 readings) |"),
+        (replace(ROW, effect=""), False, "| 2 (none in 1) | 4.8 | 1% | damping-law (accepted in 2 of 3 readings) |"),
     ],
     ids=["alike", "as good", "worse", "gone"],
 )
 def test_what_is_named_is_named_in_every_reading(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, second: Row, earned: bool, said: str
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, second: Row, accepted: bool, said: str
 ) -> None:
     turn: list[int] = []
 
@@ -53,8 +53,8 @@ def test_what_is_named_is_named_in_every_reading(
     page = measured.judged(tmp_path)
     assert not isinstance(page, str)
     assert turn == [0, *range(1, READINGS), 0]
-    assert page.found.rows[0].earned == earned
-    assert verdict(page.found.rows).startswith("named" if earned else "unexplained")
+    assert page.found.rows[0].accepted == accepted
+    assert verdict(page.found.rows).startswith("named" if accepted else "unexplained")
     assert said in section(page, "")
 
 
@@ -67,4 +67,4 @@ def test_a_reading_that_fails_leaves_nothing_standing(monkeypatch: pytest.Monkey
     monkeypatch.setitem(measured.JUDGES, tmp_path.name, judge)
     page = measured.judged(tmp_path)
     assert not isinstance(page, str)
-    assert not page.found.rows[0].earned
+    assert not page.found.rows[0].accepted

@@ -114,7 +114,8 @@ def test_the_command_sees_no_truth_and_a_broken_answer_is_a_failure(small: str, 
     spy.write_text(
         "import json, os, sys\n"
         "blind = 'truth.json' not in os.listdir(sys.argv[1])\n"
-        "print(json.dumps({'verdict': 'explained' if blind else 'cheated', 'effects': [{'id': 'room'}], 'errors': None}))\n"
+        "print(json.dumps({'verdict': 'explained' if blind else 'cheated', 'effects': [{'id': 'room'}], "
+        "'errors': None}))\n"
     )
     row = diagnose(tmp_path / "one", f"{sys.executable} {spy} {{case}}")
     assert (row["verdict"], row["found"], row["true"]) == ("explained", ["room"], ["room"])

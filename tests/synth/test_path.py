@@ -1,6 +1,5 @@
-"""Free air:
-
-distance, travel time, Doppler shift, direction, moves by hand, and the same bits however the calls are cut.
+"""Free air: distance, travel time, Doppler shift, direction, moves by hand, and the same bits however the calls are
+cut.
 """
 
 from __future__ import annotations

@@ -66,9 +66,8 @@ def test_spectrum_has_its_half_power_point_and_first_zero(flat: bool, half_power
 
 
 def test_hertz_pulse_solves_its_equation() -> None:
-    """Half the contact time in units of (δmax, v):
-
-    τ = 2.9432 δmax/v [Johnson 1985, eq. 11.24], and Q(s) + Q(1-s) = 1.
+    """Half the contact time in units of (δmax, v): τ = 2.9432 δmax/v [Johnson 1985, eq. 11.24], and Q(s) + Q(1-s) =
+    1.
     """
     s = np.linspace(0, 1, 501)
     q = pulse.cumulated_force(s)

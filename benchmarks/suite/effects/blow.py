@@ -24,9 +24,8 @@ POWERS = {"half-sine": 1.0, "hertz": 1.5, "raised-cosine": 2.0}
 
 
 def _reference(rng: np.random.Generator, scene: Scene) -> tuple[float, float]:
-    """The strongest mode's level at a loud strike, and the power of ω by which levels are weighed:
-
-    displacement (0) or velocity (1).
+    """The strongest mode's level at a loud strike, and the power of ω by which levels are weighed: displacement (0)
+    or velocity (1).
     """
     power = float(rng.integers(2))
     damping = np.diag(0 * scene.body.modes.value + 1.0)
@@ -103,7 +102,9 @@ def contact_time(strength: int, rng: np.random.Generator, scene: Scene) -> Effec
 
 
 def rebound(strength: int, rng: np.random.Generator, scene: Scene) -> Effect:
-    """Two to five blows, restitution 0.25, 0.45 or 0.7, first gap 4-25 ms, longer for louder strikes in half the cases."""
+    """Two to five blows, restitution 0.25, 0.45 or 0.7, first gap 4-25 ms, longer for louder strikes in half
+    the cases.
+    """
     r = jitter(rng, pick(strength, 0.25, 0.45, 0.7), 0.1)
     gap = jitter(rng, 0.01, 0.9)
     power = float(rng.choice([0.0, 1.0]))

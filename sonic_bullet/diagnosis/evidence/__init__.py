@@ -1,4 +1,3 @@
-"""What the recordings say beside a hypothesis:
-
-baseline, refit, unmatched modes, degenerate pairs, modes that go with their level.
+"""What the recordings say beside a hypothesis: baseline, refit, unmatched modes, degenerate pairs, modes that go with
+their level.
 """

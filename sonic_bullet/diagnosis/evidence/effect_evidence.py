@@ -225,9 +225,8 @@ def path_response(h: Hypothesis, body: Struck, freq_hz: Array, sr: int) -> Array
 
 
 def thinned(evidence: Evidence, at: tuple[Recorded, int], keep: float, rng: np.random.Generator) -> Evidence:
-    """The same without one strike, at: whose, and which of those, and without a random part of all lines:
-
-    ``keep`` of them stay.
+    """The same without one strike, at: whose, and which of those, and without a random part of all lines: ``keep`` of
+    them stay.
 
     An object of which nothing else was recorded is left out with it.
     """

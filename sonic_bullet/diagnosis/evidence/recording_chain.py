@@ -23,7 +23,8 @@ from sonic_bullet.records import Array
 LINKS = (
     (1.25, 1.0, False),
     (1.1, 3.0, True),
-    # a chain's next line is so much shorter at least, and as near as that many times its decay; whether modes are only bent
+    # a chain's next line is so much shorter at least, and as near as that many times its decay;
+    # whether modes are only bent
 )
 SHORTER = 5.0  # at most
 NEAR = 0.012  # of a frequency

@@ -41,9 +41,8 @@ NEAR, ALIKE = 5e-3, 1.6  # of ln f and ln d: lines of one mode
 def refitted(
     h: Hypothesis, bodies: tuple[Struck, ...], observed: tuple[ObjectEvidence, ...] | None = None, *, anew: bool = False
 ) -> Hypothesis:
-    """The hypothesis with α, β and σ fitted again beside its effects;
-
-    ``observed``: evidence to fit them to, thinned or whole, of all bodies or some.
+    """The hypothesis with α, β and σ fitted again beside its effects; ``observed``: evidence to fit them to, thinned
+    or whole, of all bodies or some.
 
     anew: with lines paired and corrections learnt again, too, as they are beside effects that move modes.
     """

@@ -140,7 +140,10 @@ class Take:
         if not np.isfinite(made).all():
             return "is played by the model with samples that are no numbers"
         if not np.isfinite(self._apart(made)):
-            return f"does not stand {10 * np.log10(ABOVE):.0f} dB above the noise anywhere, nor does what the model plays of it"
+            return (
+                f"does not stand {10 * np.log10(ABOVE):.0f} dB above the noise anywhere, nor does what the model "
+                "plays of it"
+            )
         return ""
 
     def distance(self, h: Hypothesis) -> float:

@@ -23,7 +23,7 @@ from sonic_bullet.estimator.fit.recorded import RecordedObject as Recorded
 from sonic_bullet.estimator.fit.recorded import body_family, guess_of
 from sonic_bullet.files.cases import Case, CaseRecording
 from sonic_bullet.modal.cache import Place
-from sonic_bullet.modal.reduced import Family
+from sonic_bullet.modal.isotropic_family import Family
 from sonic_bullet.records import Array, ModalModel
 
 

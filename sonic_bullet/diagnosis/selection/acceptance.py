@@ -141,9 +141,8 @@ def may_be_accepted(asked: Candidate, open_db: np.ndarray[Any, Any], gap_db: flo
 
 
 def jackknife(rows: list[dict[str, Any]]) -> dict[str, Any]:
-    """Standard errors of every number that all folds give [Efron & Tibshirani 1993, eq.
-
-    11.5]; numbers in lists of one length each their own.
+    """Standard errors of every number that all folds give [Efron & Tibshirani 1993, eq. 11.5]; numbers in lists
+    of one length each their own.
     """
     if len(rows) < 2:
         return {}

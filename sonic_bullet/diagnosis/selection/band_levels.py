@@ -72,9 +72,8 @@ def bands_off(h: Hypothesis, takes: Sequence[Judged]) -> tuple[BandOff, ...]:
 
 
 def over_db(recorded: Array, played: Array, sr: int, floor: Floor, band_hz: tuple[float, float]) -> Array:
-    """Recorded over played (2, b) in dB, in the first early_s and in the rest, of the bands around CENTRE_HZ;
-
-    NaN where neither stands above the noise, or a band holds too few cells.
+    """Recorded over played (2, b) in dB, in the first early_s and in the rest, of the bands around CENTRE_HZ; NaN
+    where neither stands above the noise, or a band holds too few cells.
     """
     early = round(RULES.early_s * sr)
     parts = [(x[:early], x[early:]) for x in (recorded, played)]

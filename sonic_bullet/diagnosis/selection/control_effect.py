@@ -18,7 +18,9 @@ from sonic_bullet.records import ModalModel
 
 @dataclass(frozen=True)
 class ControlEffect:
-    """A number per direction spent at random: ln d and ln level of every mode move along random vectors of the modes."""
+    """A number per direction spent at random: ln d and ln level of every mode move along random vectors of
+    the modes.
+    """
 
     id: ClassVar[str] = "null"
     stage: ClassVar[Stage] = Stage.MODES

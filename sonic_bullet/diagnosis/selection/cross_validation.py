@@ -183,9 +183,8 @@ def _at_rest_folds(folds: list[Fold]) -> list[Fold]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Gain:
-    """On one left-out strike, of an effect fitted without it, if any came of that: as Candidate has them;
-
-    control_db (n,): of every draw.
+    """On one left-out strike, of an effect fitted without it, if any came of that: as Candidate has them; control_db
+    (n,): of every draw.
     """
 
     effect: Effect | None = None
@@ -201,10 +200,10 @@ def _cross_validated(
     def judged(i: int) -> Gain:
         fold = folds[i]
         less = fold.evidence
-        effect = kind.propose(replace(less, known=whole, on_trial=True))
+        effect = kind.propose(replace(less, known=whole, held_out=True))
         if effect is None:
             return Gain()
-        # such axes are whole's (Evidence.on_trial)
+        # such axes are whole's (Evidence.held_out)
         free = effect.freedom() - (effect.angles() if isinstance(effect, RotatesPairs) else 0)
         random = [
             ControlEffect.fitted(less, min(free, RULES.control_numbers), 10 * i + draw)

@@ -52,7 +52,6 @@ def pairwise(
     problem: DiagnosisProblem,
 ) -> tuple[Hypothesis, list[Candidate]] | None:
     """The two of a first round's candidate effects that explain nearly all together, each accepted beside the other;
-
     None where no two do.
     """
     if len(first) < 2 or not problem.has_audio:
@@ -89,7 +88,6 @@ def in_a_room(
     problem: DiagnosisProblem,
 ) -> tuple[Hypothesis, list[Candidate]] | None:
     """A room that has been found alone, identified anew beside one of the candidate effects (found) that move modes;
-
     None where no two say nearly all.
 
     Outside the room lines lie where they lie, and show masses and tensors. But a response identified from modes that
@@ -150,10 +148,8 @@ def _accepted_together(h: Hypothesis, problem: DiagnosisProblem) -> tuple[Hypoth
 
 
 def _likeliest(pairs: Sequence[Pair], before_db: float, bodies: tuple[Struck, ...]) -> Hypothesis:
-    """The nearest to the strikes;
-
-    or, of those that share the effect that moves modes, and say nearly as much, the one for which phases speak clearly
-    (phase_test.py).
+    """The nearest to the strikes; or, of those that share the effect that moves modes, and say nearly as much, the
+    one for which phases speak clearly (phase_test.py).
     """
     best = min(pairs, key=lambda pair: pair.db)
     near = best.db + RULES.phases_decide_share * (before_db - best.db)

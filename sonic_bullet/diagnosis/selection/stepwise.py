@@ -212,9 +212,8 @@ def _one_by_one(start: Hypothesis, problem: DiagnosisProblem) -> Rounds:
 def _acceptable(
     found: Sequence[Candidate], problem: DiagnosisProblem, now: Score, full: Score, *, first: bool
 ) -> list[Candidate]:
-    """Those that strikes left out speak for;
-
-    or, where they speak for none, the one that lines do. full: with a room's response identified again.
+    """Those that strikes left out speak for; or, where they speak for none, the one that lines do. full: with a
+    room's response identified again.
     """
     able = [
         c for c in found if accepted(c, max(now.gap_db, 0.0), first=first) and helps(c, problem, now, full, first=first)

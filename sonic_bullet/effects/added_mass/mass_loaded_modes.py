@@ -52,6 +52,6 @@ def loaded(
     order = np.argsort(freq, kind="stable")
     shape = (x.shape.reshape(-1, own) @ turn[:, order].astype(np.float32)).reshape(x.shape.shape)
     if body is not None and place_m is not None:
-        placed = np.any(x.shape[:, 1:], axis=(1, 2))  # what is heard at no place is a weight, not a motion
+        placed = np.any(x.shape[:, 1:], axis=(1, 2))  # what is observed at no place is a weight, not a motion
         shape[placed] -= (body.gives(x.vertex_m[placed], place_m) @ drag[:, order]).astype(np.float32)
     return replace(x, freq_hz=freq[order], decay_per_s=decay[order], shape=shape)

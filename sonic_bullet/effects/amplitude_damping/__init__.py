@@ -52,10 +52,8 @@ AGAIN = np.geomspace(0.4, 2.5, 9)  # of what all evidence said
 
 @dataclass(frozen=True)
 class AmplitudeDamping(RotatesPairs, ChangesBaseline):
-    """damping_growth:
-
-    1/level at which the decay has doubled; power: of the level, with which it rises, 1 or 2. measure: as in
-    amplitude-pitch. alpha_per_s, beta_s: the material's, as the decays at low level tell them.
+    """damping_growth: 1/level at which the decay has doubled; power: of the level, with which it rises, 1 or 2.
+    measure: as in amplitude-pitch. alpha_per_s, beta_s: the material's, as the decays at low level tell them.
 
     louder: modes at the onset over what the linear model plays, as its lines miss some of a fall that is no
     exponential. freq_hz, turn_rad: of degenerate modes, and how far their axes are turned from the mesh's.
@@ -128,13 +126,13 @@ class AmplitudeDamping(RotatesPairs, ChangesBaseline):
             plain = {name: lines_under(e, h, name) for name in (levels(h) if known is None else (known.measure,))}
             for name, power in product(plain, POWERS if known is None else (known.power,)):
                 lines = [replace(line, power=power) for line in plain[name]]
-                if evidence.on_trial and known is not None:
+                if evidence.held_out and known is not None:
                     lines = [_held(line, known) for line in lines]
                 found = _fitted(lines, known.damping_growth if known is not None else None)
                 if found is not None and (best is None or found.gain > best[0]):
                     axes = (
                         (known.freq_hz, known.turn_rad)
-                        if evidence.on_trial and known is not None
+                        if evidence.held_out and known is not None
                         else _axes(lines, found)
                     )
                     best = (
@@ -161,9 +159,8 @@ class _Fit:
 
 
 def _fitted(lines: list[DecayFrames], known: float | None) -> _Fit | None:
-    """The damping growth that all lines agree on;
-
-    None where it is not one that they are sure of. known: what all evidence said, if this is a part of it.
+    """The damping growth that all lines agree on; None where it is not one that they are sure of. known: what all
+    evidence said, if this is a part of it.
     """
     if len(lines) < 2:
         return None

@@ -101,7 +101,7 @@ class AmplitudePitch(RotatesPairs):
             for name, b in (_slopes(e, h, known) if e is not None else {}).items():
                 if best is None or b.modes > best[0]:
                     assert e is not None
-                    best = (b.modes, cls._with_axes(e, h, name, b, known, evidence.on_trial))
+                    best = (b.modes, cls._with_axes(e, h, name, b, known, evidence.held_out))
         return best[1] if best is not None else None
 
     @classmethod

@@ -24,9 +24,8 @@ STILL = 1e-6  # of ω: what swings slower does not swing
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Coupled:
-    """pole s (…, m) in 1/s, by rising frequency;
-
-    turn (…, m, m) complex: old modes in a new one, by columns. One that no longer swings is NaN, with zeros.
+    """pole s (…, m) in 1/s, by rising frequency; turn (…, m, m) complex: old modes in a new one, by columns. One that
+    no longer swings is NaN, with zeros.
     """
 
     pole: Array

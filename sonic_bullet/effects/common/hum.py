@@ -35,9 +35,8 @@ class Hum:
 
 
 def hum_of(signals: Array, noise: Array, sr: int, known_hz: float = 0.0) -> Hum | None:
-    """What hums in recordings (s, n) over a noise (s,);
-
-    None where no tone has one amplitude in all of them, and from first to last.
+    """What hums in recordings (s, n) over a noise (s,); None where no tone has one amplitude in all of them, and from
+    first to last.
 
     known_hz: as other recordings gave it; then one will do.
     """

@@ -89,10 +89,8 @@ def expected_amplitude(h: ObjectEvidence) -> Array:
 
 @lru_cache(maxsize=4)
 def through(h: ObjectEvidence, delta: float) -> Read:
-    """All lines of an object at one δ;
-
-    remembered, as evidence is asked for it more than once. What outlasts the tail is left as it was observed: late, it
-    rings alone.
+    """All lines of an object at one δ; remembered, as evidence is asked for it more than once. What outlasts the tail
+    is left as it was observed: late, it rings alone.
     """
     r = modes(h, np.array([delta]), np.arange(len(h.freq_hz)))
     sd = h.decay_sd_per_s / np.maximum(h.decay_per_s, 1e-9)

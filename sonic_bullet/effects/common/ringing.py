@@ -109,7 +109,9 @@ def sounded(ring: Ring, impact: Impact, n: int, sr: int) -> Array:
 
 
 def direct_as_expected(observed: ObjectEvidence) -> Array:
-    """What single hits (s, n) would sound like, with the lines' own frequencies and decays and the model's amplitudes."""
+    """What single hits (s, n) would sound like, with the lines' own frequencies and decays and the model's
+    amplitudes.
+    """
     assert observed.signal is not None
     none = np.zeros(len(observed.freq_hz))
     once = Impact(1.0, np.zeros(1), np.ones(1))

@@ -31,10 +31,8 @@ LEAST = 0.03  # of ln E_i/E_j or ln of Zener's ratio: less is the mesh's
 
 @dataclass(frozen=True)
 class Orthotropy:
-    """constants_pa (9,):
-
-    C11 C22 C33 C23 C13 C12 C44 C55 C66. symmetry: one of "cubic", "hexagonal-x" to "-z", "orthorhombic". held:
-    identified by no mode.
+    """constants_pa (9,): C11 C22 C33 C23 C13 C12 C44 C55 C66. symmetry: one of "cubic", "hexagonal-x" to "-z",
+    "orthorhombic". held: identified by no mode.
     """
 
     id: ClassVar[str] = "orthotropy"

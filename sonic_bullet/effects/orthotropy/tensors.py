@@ -44,9 +44,8 @@ def constants(p: Array) -> Array:
 
 
 def expanded(symmetry: str, q: Array) -> Array:
-    """p (9,) of a symmetry's own numbers:
-
-    (ln E, n), (ln E, n, ln G), (ln E_along, ln E_across, n_along, n_across, ln G_along), or p itself.
+    """p (9,) of a symmetry's own numbers: (ln E, n), (ln E, n, ln G), (ln E_along, ln E_across, n_along, n_across, ln
+    G_along), or p itself.
     """
     if symmetry == "isotropic":
         return np.concatenate([np.full(3, q[0]), np.full(3, q[1]), np.full(3, q[0] - np.log(2 * (1 + q[1])))])

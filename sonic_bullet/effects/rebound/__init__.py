@@ -2,8 +2,7 @@
 
     f(t) = J Σ_i e^i δ(t − t_i),   t_{i+1} − t_i = g e^i
         flight 2v/g' and impulse both fall by the restitution e at every bounce
-                                                                                  [Goldsmith 1960, ch. 1; Falcon et al.
-                                                                                      1998, eq. 1]
+        [Goldsmith 1960, ch. 1; Falcon et al. 1998, eq. 1]
     g goes as the impulse (free flight), or is the arm's own, whatever J
 
 Read off the recordings: what remains of them beside the model is the model again, later and weaker.
@@ -51,9 +50,8 @@ SOUGHT = 0.07  # of what is left, that a third hit looked for at every lag must 
 
 @dataclass(frozen=True)
 class Rebound:
-    """First gap in s at the impulse impulse_n_s, going as impulse^exponent;
-
-    restitution: of each next hit and gap against the last; ratio of gaps.
+    """First gap in s at the impulse impulse_n_s, going as impulse^exponent; restitution: of each next hit and gap
+    against the last; ratio of gaps.
     """
 
     id: ClassVar[str] = "rebound"
@@ -240,9 +238,8 @@ def _nearby(left: Callable[[Array], float], start: Array) -> tuple[float, Array]
 
 
 def _turned(impact: Impact, freq_hz: Array, fade: float) -> Array:
-    """Σ_j share_j e^{−(fade + 2πif) delay_j} (f,), in half the usual digits:
-
-    phases, turns taken off, are good to 4e-7, and all of a search's time goes here.
+    """Σ_j share_j e^{−(fade + 2πif) delay_j} (f,), in half the usual digits: phases, turns taken off, are good to
+    4e-7, and all of a search's time goes here.
     """
     phase = np.multiply.outer(impact.delay_s, freq_hz)
     phase = (2 * np.pi * (phase - np.rint(phase))).astype(np.float32)
@@ -251,7 +248,9 @@ def _turned(impact: Impact, freq_hz: Array, fade: float) -> Array:
 
 
 def _agreed(value: list[Array], share: list[Array]) -> tuple[float, float, list[int]]:
-    """(share in all, value, which of each strike's or -1) of the value that the largest shares of the strikes agree on."""
+    """(share in all, value, which of each strike's or -1) of the value that the largest shares of the strikes
+    agree on.
+    """
     best: tuple[float, float, list[int]] = (0.0, 0.0, [-1] * len(value))
     for centre in np.concatenate([*value, np.zeros(0)]):
         near = [np.where(np.abs(v - centre) < NEAR, s, 0.0) for v, s in zip(value, share, strict=True)]

@@ -2,8 +2,7 @@
 
     y = x + h * x,   h(t) Gaussian with variance w² 2δ e^{−2δt},
         rt60 = ln(10³)/δ, reverberant level w = energy of h over the direct sound's 1, rooted
-                                                                     [Schroeder 1965; statistics of the tail: Polack
-                                                                         1988; Kuttruff 2009, ch. 4]
+        [Schroeder 1965; statistics of the tail: Polack 1988; Kuttruff 2009, ch. 4]
 
 δ is the one rate that makes all lines likeliest as modes that ring on in such a tail (reverberant_tail.py), each with a
 decay and a share of its own; lines that of themselves die sooner than the room must agree on it: what no body does and
@@ -151,10 +150,8 @@ class Room(Dereverberates):
 
 
 def late(h: ObjectEvidence, known: float | None = None) -> tuple[float, float] | None:
-    """δ, w;
-
-    None where the lines' late decays are not one. known: δ as the whole evidence has it, to be identified again near
-    by.
+    """δ, w; None where the lines' late decays are not one. known: δ as the whole evidence has it, to be identified
+    again near by.
     """
     lines = np.sort(np.argsort(-np.abs(h.amplitude).max(axis=0))[:LINES])
     rates = known * np.exp(2 * FINE[::2]) if known else RATES

@@ -29,9 +29,8 @@ LEAST = 0.02  # of a decay: dashpots that add less to every one are none, though
 
 @dataclass(frozen=True)
 class SupportDamping:
-    """Dashpots of strength (j,) in N·s/m at position_m (j, 3) on the surface, in the mesh's frame;
-
-    along (j,): "normal" to it, or "every" direction; () all normal.
+    """Dashpots of strength (j,) in N·s/m at position_m (j, 3) on the surface, in the mesh's frame; along (j,):
+    "normal" to it, or "every" direction; () all normal.
     """
 
     id: ClassVar[str] = "support-damping"

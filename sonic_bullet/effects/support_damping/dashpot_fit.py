@@ -12,7 +12,7 @@
 c_kj: cosine of a line's amplitudes over the strikes with what one exponential at the mode's pole would take of all
 modes, Σ_i a_i 2d_j/((d_i + d_j) − i(ω_i − ω_j)), or with the mode's own. C_k: with what exponentials at the lines'
 poles take of all modes together (variable projection's linear half [Golub & Pereyra 1973]): modes that sound as one
-line are one, those that a dashpot has told apart are not. l_k: ln of a line's level over that, less what is common to
+line are one, those that a dashpot has split are not. l_k: ln of a line's level over that, less what is common to
 all: of degenerate modes that a dashpot has turned, which one the sensor hears, all strikes show alike, so C_k does not.
 """
 
@@ -27,6 +27,7 @@ from sonic_bullet.effects.common.dashpots import apart, coupled
 from sonic_bullet.effects.common.pairs import every_line
 from sonic_bullet.effects.common.points import solved, vertex_normals
 from sonic_bullet.effects.protocol import ObjectEvidence
+from sonic_bullet.effects.support_damping.smooth_law import least_law, smooth_columns
 from sonic_bullet.records import Array, ModalModel
 
 # of what dashpots add to a decay, of the decay, and of a pattern, relative: shapes err, and laws
@@ -44,10 +45,6 @@ MUTE = MISSED  # that a mode costs that no line shows: a mesh may have it elsewh
 WEAK, HALF = 0.05, 0.5
 # quantile of the energy of modes that are observed, for one that would be; times a line's decay, for one that it hides
 CLEAR, LONGER = 0.25, 2.0
-LOW = 0.3  # of a line's spread where it lies under the least law
-# of relaxations that peak in what is heard, between slow ones, whose decay is a constant, and fast ones, whose goes as
-# ω²
-TAU_S = (1e-5, 3e-5, 1e-4)
 # modes whose coupling is reckoned with in a first look, and in a closer one: what eigenvalues cost goes with the cube
 RUN, WIDE = 10, 20
 
@@ -66,9 +63,8 @@ Dashpots = tuple[Dashpot, ...]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DashpotFit:
-    """An object's lines (k,) and modes (m,). size (s, k) complex, worth (k,); into (s, m):
-
-    J φ(p)·e of the strikes; out (m,): φ(q)·n of the sensor.
+    """An object's lines (k,) and modes (m,). size (s, k) complex, worth (k,); into (s, m): J φ(p)·e of the strikes;
+    out (m,): φ(q)·n of the sensor.
 
     observed_hz, rings_per_s (l,): of every line, those too that are not held against modes; through (m,): what pulse
     and path leave of a mode, relative. normal (v, 3) of all vertices, body: those of the surface. runs, wide:
@@ -139,7 +135,7 @@ class DashpotFit:
             out,
             tuple(apart(x.freq_hz, RUN)),
             tuple(apart(x.freq_hz, WIDE)),
-            _least_law(h.omega, h.decay_per_s),
+            least_law(h.omega, h.decay_per_s),
         )
 
     def left(self, dashpots: Dashpots, runs: tuple[Array, ...] | None = None) -> float:
@@ -191,7 +187,7 @@ class DashpotFit:
     def price(self, pole: Array, turn: Array) -> float:
         """Of the pairs of lines and modes beside the least law: a first look."""
         pole, turn = _alive(pole, turn)
-        decay = -pole.real - self._own(turn) + _smooth(pole.imag) @ self.least
+        decay = -pole.real - self._own(turn) + smooth_columns(pole.imag) @ self.least
         push = (self.into @ turn) * (self.out @ turn)
         return self._pairs(pole.imag, decay, self._alike(pole.imag, decay, push))[2]
 
@@ -201,15 +197,14 @@ class DashpotFit:
         return np.asarray((share * self.model.decay_per_s[:, None]).sum(axis=0) / share.sum(axis=0))
 
     def misfit(self, pole: Array, turn: Array, turns: int) -> float:
-        """The same of poles (m,) and turns (m, m) that are at hand;
-
-        turns: of pairing and the law, and how many laws to begin with.
+        """The same of poles (m,) and turns (m, m) that are at hand; turns: of pairing and the law, and how many laws
+        to begin with.
         """
         pole, turn = _alive(pole, turn)
         own = self._own(turn)
-        column = np.column_stack([_smooth(pole.imag), own])
+        column = np.column_stack([smooth_columns(pole.imag), own])
         push = (self.into @ turn) * (self.out @ turn)
-        starts = (_smooth(pole.imag) @ self.least, own)[:turns]
+        starts = (smooth_columns(pole.imag) @ self.least, own)[:turns]
         return min(self._by_law(start, pole.imag, -pole.real - own, column, push, turns) for start in starts)
 
     def _by_law(self, law: Array, omega: Array, extra: Array, column: Array, push: Array, turns: int) -> float:
@@ -219,7 +214,7 @@ class DashpotFit:
             alike = self._alike(omega, extra + law, push)
             line, mode, _ = self._pairs(omega, extra + law, alike)
             if not len(line):
-                return 2 * nothing  # nor is any mode heard
+                return 2 * nothing  # nor is any mode observed
             worth, sd = (
                 self.worth[line],
                 np.hypot(self.sd[line], SCATTER * np.minimum(extra[mode], self.decay_per_s[line])),
@@ -334,9 +329,8 @@ def _cosine(a: Array, b: Array, *, every: bool = False) -> Array:
 
 
 def _level(observed: Array, modelled: Array) -> Array:
-    """ln of the level (k,) of columns (s, k) over that of others, less their median;
-
-    0 where there is nothing to tell.
+    """ln of the level (k,) of columns (s, k) over that of others, less their median; 0 where there is nothing to
+    tell.
     """
     if not (np.isfinite(observed).all() and np.isfinite(modelled).all() and modelled.any()):
         return np.zeros(observed.shape[1])
@@ -344,19 +338,3 @@ def _level(observed: Array, modelled: Array) -> Array:
         np.maximum(np.linalg.norm(modelled, axis=0), 1e-300)
     )
     return np.asarray(ratio - np.median(ratio))
-
-
-def _smooth(omega: Array) -> Array:
-    """Columns (k, 3 + τ) of a smooth law of ω (k,)."""
-    peak = [(omega * tau) ** 2 / (1 + (omega * tau) ** 2) for tau in TAU_S]
-    return 0.5 * np.stack([np.ones(len(omega)), omega / 1e4, (omega / 1e4) ** 2, *peak], axis=1)
-
-
-def _least_law(omega: Array, decay: Array) -> Array:
-    """The smooth law (c,) that most lines (k,) lie above: a dashpot only adds. An expectile [Newey & Powell 1987]."""
-    column, above = _smooth(omega), np.ones(len(omega), bool)
-    value = np.zeros(column.shape[1])
-    for _ in range(10):
-        value, _ = solved(decay, np.where(above, 1.0, LOW) * decay, column)
-        above = decay > column @ value
-    return value

@@ -177,9 +177,8 @@ def refined(
 
 
 def _around(t: DashpotFit, d: Dashpot, reach_m: float, spots: Array) -> list[Dashpot]:
-    """Others instead of one:
-
-    elsewhere, as strong or taking as much, or near it, and stronger, weaker or along the other direction.
+    """Others instead of one: elsewhere, as strong or taking as much, or near it, and stronger, weaker or along the
+    other direction.
     """
     if not np.isfinite(reach_m):
         some = spots[: 2 * POINTS].tolist()

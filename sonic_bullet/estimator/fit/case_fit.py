@@ -18,9 +18,8 @@ from sonic_bullet.records import Array
 
 POISSON_SD = 0.04  # of a guess
 RadiationIn = Literal["nothing", "apart", "damping"]
-"""Where a fit has what the air takes:
-
-nowhere, as nothing is lost to a medium; beside the material's α and β; or in them, where it cannot be told from them.
+"""Where a fit has what the air takes: nowhere, as nothing is lost to a medium; apart from the material's α and β; or in
+them, where the two cannot be separated.
 """
 POISSON_IDENTIFIED = 0.03  # a spread of ν above this says nothing that the guess did not
 

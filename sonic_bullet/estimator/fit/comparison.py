@@ -18,7 +18,6 @@ from sonic_bullet.estimator.lines.joint_lines import Lines
 from sonic_bullet.estimator.lines.line_values import Features
 from sonic_bullet.estimator.lines.log_spectral import floor_of, log_spectral_db, with_noise
 from sonic_bullet.estimator.perceptual.metric import hybrid_of_modes, target
-from sonic_bullet.estimator.perceptual.problem import Problem
 from sonic_bullet.records.errors import RecordError
 
 
@@ -34,9 +33,7 @@ def hybrid_of(objects: tuple[ObjectFit, ...], gain: float) -> float:
         start = e.seen.start(o.freq_hz, o.decay_per_s)
         for i in np.flatnonzero(e.seen.known):
             try:
-                aim = target(
-                    Problem(lines_features(e.lines, int(i), e.sr), e.signals[i], o.freq_hz**2, np.ones(len(o.freq_hz)))
-                )
+                aim = target(lines_features(e.lines, int(i), e.sr), e.signals[i])
             except RecordError:  # too quiet or too short for an image
                 continue
             # Re A e^{iωt} = Im iA e^{iωt}, and the metric's modes are sines

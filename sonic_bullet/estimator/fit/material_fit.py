@@ -1,4 +1,5 @@
-"""Recordings -> material: which mode each line is, γ and ν from the frequencies, α and β from the decays, σ from the amplitudes.
+"""Recordings -> material: which mode each line is, γ and ν from the frequencies, α and β from the decays, σ from the
+amplitudes.
 
     Evidence per object -> pairs (pairing.py), all objects at one (γ, ν) -> ln γ, ν: weighted least squares on ln λ
                         -> d − Δd = ½(α + βλ) (rayleigh.py)   [Ren, Yeh, Lin 2013, eq. 6; Δd: radiation_share.py]
@@ -179,7 +180,9 @@ def _undamped_hz(e: RecordedObject, line: Array) -> Array:
 def _decays(
     evidence: tuple[RecordedObject, ...], pairs: tuple[Pairs, ...], air: tuple[Radiated | None, ...]
 ) -> tuple[Array, Array, Array, Array]:
-    """λ, d, its spread and what of it is radiation, of the lines that are modes; of all lines where there is no shape."""
+    """λ, d, its spread and what of it is radiation, of the lines that are modes; of all lines where there is
+    no shape.
+    """
     found, at = [], 0
     for e in evidence:
         which = np.arange(len(e.lines.freq_hz))

@@ -140,7 +140,9 @@ def _coarser(
 
 
 def _filled(o: ObjectFit, times: float, edge_m: float, say: Callable[[str], None]) -> Solid:
-    """The body's solid with coarser elements: a box by the same grid with fewer cells, anything else by a larger edge."""
+    """The body's solid with coarser elements: a box by the same grid with fewer cells, anything else by a
+    larger edge.
+    """
     from sonic_bullet.estimator.fit.recorded import mesh_edge_m
     from sonic_bullet.geometry import is_closed
     from sonic_bullet.modal import read_mesh

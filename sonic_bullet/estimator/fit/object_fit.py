@@ -18,7 +18,7 @@ from sonic_bullet.estimator.fit.rayleigh import RayleighFit
 from sonic_bullet.estimator.fit.recorded import RecordedObject
 from sonic_bullet.estimator.lines.joint_lines import Lines
 from sonic_bullet.files.cases import CaseObject
-from sonic_bullet.modal.reduced import Family
+from sonic_bullet.modal.isotropic_family import Family
 from sonic_bullet.records import Material
 
 CORRECTION = 0.01
@@ -72,9 +72,8 @@ def fitted_object(
 
 
 def gain_of(objects: tuple[ObjectFit, ...]) -> tuple[float, float, float]:
-    """σ, its spread and the relative scatter of amplitudes about σψ, over all strikes whose place is known;
-
-    NaN where none is.
+    """σ, its spread and the relative scatter of amplitudes about σψ, over all strikes whose place is known; NaN where
+    none is.
 
     Least squares with Cauchy's weights; an amplitude counts as known to its spread and to 2 % of the mode's strongest
     ψ, the shapes' own error.

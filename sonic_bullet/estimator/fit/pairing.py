@@ -8,7 +8,7 @@
     solve    ln γ and ν by least squares on ln λ, outliers down-weighted
         [Cauchy's weight: Holland & Welsch 1977]
 
-Modes closer than TWINS are one: their shapes within the pair are anyone's, the sum over the pair is not.
+Modes closer than DEGENERATE are one: their shapes within the pair are anyone's, the sum over the pair is not.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ import numpy as np
 from sonic_bullet.estimator.fit.observation import Observation
 from sonic_bullet.estimator.lines.joint_lines import PINNED, Lines
 from sonic_bullet.estimator.lines.shared_poles import FASTEST_PER_S
-from sonic_bullet.modal.reduced import Family
+from sonic_bullet.modal.isotropic_family import Family
 from sonic_bullet.records import Array
 
 DEGENERATE = 6e-4
-MESHED = 2.5  # times as far apart where elements have torn them from each other
+MESHED = 2.5  # times as far apart where elements have split them
 MESH_SD = 2.5e-3  # of a mode's frequency, the mesh's and the shape's own error
 LOWEST = 0.2  # of that, in the lowest modes
 GAMMA_REACH = 0.65  # of ln γ: E and ρ both wrong by 30 %
@@ -115,9 +115,8 @@ def _patterns(lines: Lines, seen: Observation, modes: Array) -> tuple[Array, Arr
 
 
 def _rings(lines: Lines) -> Array:
-    """How much each line (k,) may be a mode by its decay:
-
-    1, less where it is over far sooner than what holds the energy.
+    """How much each line (k,) may be a mode by its decay: 1, less where it is over far sooner than what holds the
+    energy.
 
     Lines at the fastest decay there is come in heaps that cancel one another, so their strengths say nothing; no more
     do those of other heaps.

@@ -21,8 +21,8 @@ from sonic_bullet.estimator.fit.recorded import RecordedObject
 from sonic_bullet.files.cases import Case
 from sonic_bullet.modal import read_mesh
 from sonic_bullet.modal.cache import Place
+from sonic_bullet.modal.isotropic_family import Family
 from sonic_bullet.modal.model import surface_of
-from sonic_bullet.modal.reduced import Family
 from sonic_bullet.radiation.far_field import radiation
 from sonic_bullet.records import Air, Array, ModalModel
 
@@ -46,8 +46,8 @@ def nothing(group: Group) -> Radiated:
 
 
 def radiation_in(case: Case, evidence: tuple[RecordedObject, ...]) -> RadiationIn:
-    """Whether the material's own damping can be told from what the air takes: nothing is lost to a medium, or it is
-    known, and so are all shapes.
+    """Whether the material's own damping can be separated from what the air takes: nothing is lost to a medium, or it
+    is known, and so are all shapes.
     """
     if case.medium == "none":
         return "nothing"
@@ -57,9 +57,8 @@ def radiation_in(case: Case, evidence: tuple[RecordedObject, ...]) -> RadiationI
 def in_air(
     e: RecordedObject, log_gamma: float, poisson: float, to_hz: float, apart: bool, cache: Place = "default"
 ) -> Radiated | None:
-    """What an object's modes at (γ, ν) and the guess's density, those up to to_hz, radiate;
-
-    None where neither its sensor nor the fit asks for the air.
+    """What an object's modes at (γ, ν) and the guess's density, those up to to_hz, radiate; None where neither its
+    sensor nor the fit asks for the air.
 
     apart: radiation is no part of the material's damping. Raises MeshError where its surface cannot be made.
     """

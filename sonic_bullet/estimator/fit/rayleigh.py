@@ -1,9 +1,9 @@
-"""Lines -> α and β: d = ½(α + βλ), λ = ω² + d² [Ren, Yeh, Lin 2013, eq. 6-8], by least squares that notices where the law does not hold.
+"""Lines -> α and β: d = ½(α + βλ), λ = ω² + d² [Ren, Yeh, Lin 2013, eq. 6-8], by least squares that notices
+where the law does not hold.
 
 Σ w (d − ½α − ½βλ)² → min,  w = c/(s² + (τd)²),
-    τ: the least relative scatter that makes the residuals as large as their spreads
-                                                                                    [Paule & Mandel 1982], c: Cauchy's
-                                                                                        weight of outliers
+    τ: the least relative scatter that makes the residuals as large as their spreads [Paule & Mandel 1982],
+    c: Cauchy's weight of outliers
 Where that τ is large, it may be a few lines that obey no law (clicks, other bodies' modes, fixtures): values then come
 with the τ of which half of the lines fall within their spreads, reached from above [least median of squares: Rousseeuw
 1984].
@@ -26,10 +26,8 @@ STANDARD_ERRORS = 0.5  # a parameter whose logarithm is surer than this is ident
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RayleighFit:
-    """alpha_per_s, beta_s;
-
-    covariance (2, 2) of their logarithms, NaN where the lines do not say; scatter: τ of all lines; said: what is not
-    identifiable.
+    """alpha_per_s, beta_s; covariance (2, 2) of their logarithms, NaN where the lines do not say; scatter: τ of all
+    lines; said: what is not identifiable.
     """
 
     alpha_per_s: float
@@ -46,9 +44,8 @@ def rayleigh(
     guess: tuple[float, float],
     whole_per_s: Array | None = None,
 ) -> RayleighFit:
-    """α and β of lines (k,). guess:
-
-    (α, β) whose ratio stands in for what one line cannot tell. A spread that is infinite: no value; NaN: 5 %.
+    """α and β of lines (k,). guess: (α, β) whose ratio stands in for what one line cannot tell. A spread that is
+    infinite: no value; NaN: 5 %.
 
     whole_per_s (k,): what was measured, where decays are what something else has left of it: scatter is relative to
     that, or what is hardly there would be sure. What is left may then be below zero: leaving that out would bend the

@@ -1,8 +1,8 @@
 """What a case's strikes of one object say, and the object's modes to hold it against.
 
-    CaseRecording's files -> onset cut -> hum taken out -> Lines (joint_lines.py)  \\
-                                                                                    RecordedObject, one per object
-    mesh + guess -> Family (modal.reduced) -> Observation                          /  (and one per list of features)
+CaseRecording's files -> onset cut -> hum taken out -> Lines (joint_lines.py)
+mesh + guess -> Family (modal.reduced) -> Observation
+    both -> RecordedObject, one per object (and one per list of features)
 """
 
 from __future__ import annotations
@@ -20,7 +20,8 @@ from sonic_bullet.files import channel_of, channel_words, read_audio
 from sonic_bullet.files.cases import Case, CaseObject, CaseRecording, Line
 from sonic_bullet.modal import read_mesh
 from sonic_bullet.modal.cache import Place
-from sonic_bullet.modal.reduced import Family, family
+from sonic_bullet.modal.isotropic_family import Family
+from sonic_bullet.modal.reduced import family
 from sonic_bullet.records import Array, Material, Shape
 from sonic_bullet.records.errors import AudioError, FileError, MeshError
 
@@ -226,7 +227,8 @@ def _sounds(
         sounds.append(until_it_breaks_off(_checked(channel_of(sound, r.channel, r.file), str(r.file), clipped), sr))
         if len(sounds[-1]) < sound.shape[1]:
             remarks.append(
-                f"{r.file} breaks off after {len(sounds[-1]) / sr:.3g} s: the digital silence behind is no decay, and is left out"
+                f"{r.file} breaks off after {len(sounds[-1]) / sr:.3g} s: the digital silence behind is no "
+                "decay, and is left out"
             )
         rates.append(sr)
         several.setdefault(channel_words(len(sound), r.channel if r.channel_named else None), []).append(str(r.file))

@@ -100,7 +100,8 @@ def _doubts(signal: Array, x: Array, hits: int, sr: int) -> tuple[list[str], boo
         notes.append(f"{clipped} samples are clipped: amplitudes and early decays are not to be trusted")
     if len(x) < SHORT_S * sr:
         notes.append(
-            f"only {1000 * len(x) / sr:.0f} ms of sound: what lies closer than about {sr / len(x):.0f} Hz may pass for one line"
+            f"only {1000 * len(x) / sr:.0f} ms of sound: what lies closer than about {sr / len(x):.0f} Hz "
+            "may pass for one line"
         )
     if sr < LOW_RATE:
         notes.append(f"{sr} samples a second: nothing above {0.49 * sr:.0f} Hz is seen")

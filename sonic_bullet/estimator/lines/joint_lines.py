@@ -3,11 +3,9 @@ own.
 
     x_s(t) = Re Σ_k A_sk e^{(−d_k + iω_k) t} + noise
     start:   shared_poles.py
-    refine:  maximum likelihood in white noise, A_sk linear and projected out
+    refine:  maximum likelihood in white noise, A_sk linear and projected out (projection.py)
         [Golub & Pereyra 1973; Kaufman 1975]
     spread:  inverse of the information matrix at the end, so the Cramér-Rao bound          [Kay 1993, ch. 3.9]
-
-All inner products of damped sinusoids over N samples are geometric sums, closed in w = z_j z_k*: Σ wⁿ, Σ n wⁿ, Σ n² wⁿ.
 """
 
 from __future__ import annotations
@@ -17,10 +15,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from sonic_bullet.estimator.lines.likelihood import geometric, moments
 from sonic_bullet.estimator.lines.line_values import PINNED, Lines, lines_at
 from sonic_bullet.estimator.lines.log_spectral import floor_between
 from sonic_bullet.estimator.lines.pole_selection import apart, selected
+from sonic_bullet.estimator.lines.projection import amplitudes_at, basis_gram, normal_equations, products, spreads
 from sonic_bullet.estimator.lines.shared_poles import FASTEST_PER_S, start_poles
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import AudioError
@@ -76,9 +74,8 @@ def joint_lines(
 def _identified(
     signals: Array, noise: Array, sr: int, band_hz: tuple[float, float], signed: bool, modes: int | None, *, crowd: bool
 ) -> Lines:
-    """Lines of one hit, or what is left after several;
-
-    crowd: of more poles than lines those, too, that take most one after another, where these say plainly more.
+    """Lines of one hit, or what is left after several; crowd: of more poles than lines those, too, that take most one
+    after another, where these say plainly more.
     """
     start = start_poles(signals / noise[:, None], sr, *band_hz)
     few: Lines | None = None
@@ -94,7 +91,7 @@ def _identified(
         return _struck(few, signals)
     start = apart(start)
     many = len(start) > MOST_LINES
-    loudest = np.argsort(-_solved(signals, noise, start, sr)[2])[:MOST_LINES] if many else np.arange(len(start))
+    loudest = np.argsort(-amplitudes_at(signals, noise, start, sr)[2])[:MOST_LINES] if many else np.arange(len(start))
     found = lines_of(signals, noise, _significant(signals, noise, start[loudest], sr, *band_hz), sr, signed)
     if many and crowd:
         other = lines_of(
@@ -121,7 +118,7 @@ def _significant(signals: Array, noise: Array, pole: Array, sr: int, low: float,
     for turn in range(3):
         before = len(pole)
         pole = _polished(signals, noise, apart(pole) if turn else pole, sr, low, high)
-        _, _, energy, _ = _solved(signals, noise, pole, sr)
+        _, _, energy, _ = amplitudes_at(signals, noise, pole, sr)
         pole = pole[energy / colour(pole.imag / (2 * np.pi)) > SIGNIFICANT]
         if (len(pole) == before and (turn or before < MOST_LINES)) or not len(pole):
             break
@@ -129,9 +126,8 @@ def _significant(signals: Array, noise: Array, pole: Array, sr: int, low: float,
 
 
 def _from(late: int, signals: Array, sr: int, band_hz: tuple[float, float], signed: bool) -> Lines | None:
-    """Lines from a sample on, as they would have begun at the onset;
-
-    None where nothing can be identified from there, or a recording is over.
+    """Lines from a sample on, as they would have begun at the onset; None where nothing can be identified from there,
+    or a recording is over.
     """
     rest = signals[:, late:]
     if not (np.sqrt((rest**2).mean(axis=1)) > SILENT).all():
@@ -168,7 +164,9 @@ def _struck(lines: Lines, signals: Array) -> Lines:
 
 
 def noise_rms(signals: Array, sr: int) -> Array:
-    """Rms (s,) of the stationary floor, white: from the lower quarter of the spectrum of each recording's last third."""
+    """Rms (s,) of the stationary floor, white: from the lower quarter of the spectrum of each recording's
+    last third.
+    """
     tail = signals[:, -signals.shape[1] // 3 :]
     power = np.abs(np.fft.rfft(tail * np.hanning(tail.shape[1]), axis=1)) ** 2
     # exponential law: its lower quartile is ln(4/3) of the mean
@@ -182,112 +180,12 @@ def _colour(signals: Array, noise: Array, sr: int) -> Callable[[Array], Array]:
     return lambda freq: np.asarray(np.interp(freq, np.linspace(0, sr / 2, len(level)), level))
 
 
-def _products(pole: Array, count: int) -> tuple[list[Array], list[Array]]:
-    """Geometric sums of z_j z_k* and z_j z_k, poles per sample."""
-    return list(geometric(pole, pole.conj(), count)), list(geometric(pole, pole, count))
-
-
-def _inner(a: Array, b: Array, even: Array, odd: Array) -> Array:
-    """<Re(a_j z_jⁿ), Re(b_k z_kⁿ)> (j, k)."""
-    return np.asarray(np.real(a[:, None] * b[None, :].conj() * even + a[:, None] * b[None, :] * odd) / 2)
-
-
-def _basis(even: Array, odd: Array) -> Array:
-    """Gram matrix (2k, 2k) of Re zⁿ and Re i zⁿ."""
-    one, turn = np.ones(len(even), complex), np.full(len(even), 1j)
-    return np.block(
-        [
-            [_inner(one, one, even, odd), _inner(one, turn, even, odd)],
-            [_inner(turn, one, even, odd), _inner(turn, turn, even, odd)],
-        ]
-    )
-
-
-def _factor(gram: Array) -> tuple[Array, Array]:
-    """Cholesky factor of a Gram matrix scaled to unit diagonal, slightly lifted, and the scale.
-
-    Poles that all but coincide take a larger lift.
-    """
-    from scipy.linalg import LinAlgError, cholesky
-
-    scale = 1 / np.sqrt(np.diag(gram))
-    unit = gram * scale[:, None] * scale
-    if not np.isfinite(unit).all():  # a tone without noise: poles that grow or stand
-        raise LinAlgError("poles out of range")
-    for lift in (1e-10, 1e-8, 1e-6):
-        try:
-            return cholesky(unit + lift * np.eye(len(gram)), lower=True), scale
-        except LinAlgError:
-            continue
-    return cholesky(unit + 1e-3 * np.eye(len(gram)), lower=True), scale
-
-
-def _solve(factor: tuple[Array, Array], right: Array) -> Array:
-    from scipy.linalg import cho_solve
-
-    lower, scale = factor
-    return np.asarray(
-        (scale * cho_solve((lower, True), (scale * right.T).T.T if right.ndim == 1 else scale[:, None] * right).T).T
-    )
-
-
-def _solved(signals: Array, noise: Array, pole: Array, sr: int) -> tuple[Array, float, Array, Array]:
-    """amplitude (s, k), half the sum of squares over the noise, energy (k,), residual rms (s,)."""
-    z = pole / sr
-    n = signals.shape[1]
-    even, odd = _products(z, n)
-    factor = _factor(_basis(even[0], odd[0]))
-    k = len(pole)
-    amplitude = np.zeros((len(signals), k), complex)
-    residual = np.zeros(len(signals))
-    for s, signal in enumerate(signals):
-        first, _ = moments(signal, z)
-        right = np.concatenate([first.real, -first.imag])
-        a = _solve(factor, right)
-        amplitude[s] = a[:k] + 1j * a[k:]
-        residual[s] = max(float(signal @ signal - right @ a), 0.0)
-    power = np.real(np.diag(even[0])) / 2
-    energy = ((np.abs(amplitude) / noise[:, None]) ** 2).sum(axis=0) * power
-    return amplitude, float((residual / noise**2).sum() / 2), energy, np.sqrt(residual / n)
-
-
-def _normal(signals: Array, noise: Array, pole: Array, sr: int) -> tuple[Array, Array, float]:
-    """Gauss-Newton matrix (2k, 2k) and gradient (2k,) for (ω, d) with the amplitudes projected out, and half the sum of
-    squares.
-    """
-    z, n, k = pole / sr, signals.shape[1], len(pole)
-    even, odd = _products(z, n)
-    factor = _factor(_basis(even[0], odd[0]))
-    one, turn = np.ones(k, complex), np.full(k, 1j)
-    matrix, gradient, cost = np.zeros((2 * k, 2 * k)), np.zeros(2 * k), 0.0
-    for signal, sigma in zip(signals, noise, strict=True):
-        first, second = moments(signal, z)
-        right = np.concatenate([first.real, -first.imag])
-        a = _solve(factor, right)
-        amplitude = a[:k] + 1j * a[k:]
-        move = np.concatenate([1j * amplitude, -amplitude]) / sr  # ∂/∂ω, ∂/∂d in seconds
-        cross = np.zeros((2 * k, 2 * k))
-        square = np.zeros((2 * k, 2 * k))
-        for i in range(2):
-            here = slice(i * k, i * k + k)
-            cross[:k, here] = _inner(one, move[here], even[1], odd[1])
-            cross[k:, here] = _inner(turn, move[here], even[1], odd[1])
-            for j in range(2):
-                there = slice(j * k, j * k + k)
-                square[here, there] = _inner(move[here], move[there], even[2], odd[2])
-        matrix += (square - cross.T @ _solve(factor, cross)) / sigma**2
-        seen = np.concatenate([np.real(move[:k] * second), np.real(move[k:] * second)])
-        gradient += (seen - cross.T @ a) / sigma**2
-        cost += max(float(signal @ signal - right @ a), 0.0) / sigma**2 / 2
-    return matrix, gradient, cost
-
-
 def _polished(signals: Array, noise: Array, pole: Array, sr: int, low: float, high: float) -> Array:
     """Poles at the maximum of the likelihood, from the k nearest start."""
     if not len(pole):
         return pole
     damping = 1e-4
-    matrix, gradient, cost = _normal(signals, noise, pole, sr)
+    matrix, gradient, cost = normal_equations(signals, noise, pole, sr)
     for _ in range(12):
         k = len(pole)
         scale = 1 / np.sqrt(np.maximum(np.diag(matrix), 1e-300))
@@ -296,7 +194,7 @@ def _polished(signals: Array, noise: Array, pole: Array, sr: int, low: float, hi
         move = np.clip(step[:k], -reach, reach) * 1j - np.clip(step[k:], -reach, reach)
         trial = pole + move
         trial = np.clip(trial.real, -FASTEST_PER_S, -0.02) + 1j * np.clip(trial.imag, 2 * np.pi * low, 2 * np.pi * high)
-        found = _normal(signals, noise, trial, sr)
+        found = normal_equations(signals, noise, trial, sr)
         if found[2] <= cost:
             done = cost - found[2] < 1e-3
             pole, (matrix, gradient, cost) = trial, found
@@ -308,14 +206,6 @@ def _polished(signals: Array, noise: Array, pole: Array, sr: int, low: float, hi
             if damping > 1e4:
                 break
     return pole
-
-
-def _roots(matrix: Array) -> Array:
-    """Spreads (n,) that go with an information matrix (n, n).
-
-    Of two poles that all but coincide rounding may turn a variance's sign; it is as large for that.
-    """
-    return np.asarray(np.sqrt(np.abs(np.diag(np.linalg.pinv(matrix)))))
 
 
 def lines_of(signals: Array, noise: Array, pole: Array, sr: int, signed: bool) -> Lines:
@@ -334,15 +224,15 @@ def lines_of(signals: Array, noise: Array, pole: Array, sr: int, signed: bool) -
             none,
             signed,
         )
-    amplitude, _, energy, residual = _solved(signals, noise, pole, sr)
+    amplitude, _, energy, residual = amplitudes_at(signals, noise, pole, sr)
     level = np.maximum(noise, residual)  # what the lines leave is noise too, to whoever asks how sure they are
-    matrix, _, _ = _normal(signals, level, pole, sr)
+    matrix, _, _ = normal_equations(signals, level, pole, sr)
     scale = 1 / np.sqrt(np.maximum(np.diag(matrix), 1e-300))
-    spread = _roots(matrix * scale[:, None] * scale) * scale
-    even, odd = _products(pole / sr, signals.shape[1])
-    gram = _basis(even[0], odd[0])
+    spread = spreads(matrix * scale[:, None] * scale) * scale
+    even, odd = products(pole / sr, signals.shape[1])
+    gram = basis_gram(even[0], odd[0])
     width = 1 / np.sqrt(np.diag(gram))
-    root = _roots(gram * width[:, None] * width) * width
+    root = spreads(gram * width[:, None] * width) * width
     return Lines(
         pole.imag / (2 * np.pi),
         -pole.real,

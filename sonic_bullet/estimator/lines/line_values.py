@@ -58,15 +58,14 @@ class Features:
             object.__setattr__(self, name, frozen_array(value, np.float64, (count,), name, finite=False))
         if (self.freq_hz <= 0).any() or (self.decay_per_s < 0).any() or (self.amplitude <= 0).any():
             raise RecordError(
-                "features hold a frequency or amplitude of zero, or a negative decay", "keep only what was heard"
+                "features hold a frequency or amplitude of zero, or a negative decay", "keep only what was observed"
             )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MaterialFit:
-    """What recordings say of a material. parameters:
-
-    (α 1/s, β s, γ m²/s², σ, ν), γ = E/ρ; covariance (5, 5) of ln α, ln β, ln γ, ln σ, ν.
+    """What recordings say of a material. parameters: (α 1/s, β s, γ m²/s², σ, ν), γ = E/ρ; covariance (5, 5) of ln α,
+    ln β, ln γ, ln σ, ν.
 
     A row and column of NaN: that parameter is not identifiable, and the verdict says so. verdict: "fitted", or why not,
     one line. metric: the hybrid metric Π there (metric.py), mean over the fitted strikes, -1 where there is nothing to

@@ -29,9 +29,8 @@ QUARTILE = float(np.log(4 / 3))  # of an exponential law over its mean
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Floor:
-    """A stationary noise:
-
-    variance_per_bin (b,) of white noise that had this density at all frequencies, from 0 to half the rate.
+    """A stationary noise: variance_per_bin (b,) of white noise that had this density at all frequencies, from 0 to
+    half the rate.
     """
 
     variance: Array
@@ -91,9 +90,8 @@ def floor_between(signals: list[Array]) -> Floor:
 
 
 def _broad(level: Array, side: int) -> Array:
-    """What neighbours (b,) agree on:
-
-    ``side`` bins to each side, and no further than a factor, as a noise may fall steeply with frequency.
+    """What neighbours (b,) agree on: ``side`` bins to each side, and no further than a factor, as a noise may fall
+    steeply with frequency.
     """
     count = len(level)
     k = np.arange(count)

@@ -67,7 +67,9 @@ def measured(left: Array, sr: int, floor: float, modes: int = 0) -> Noise:
 
 
 def _lower_half(left: Array) -> Array:
-    """Rms per sample (n_f,) over frequency 0 … sr/2, from the lower half of the power in neighbourhoods that overlap."""
+    """Rms per sample (n_f,) over frequency 0 … sr/2, from the lower half of the power in neighbourhoods that
+    overlap.
+    """
     power = np.abs(np.fft.rfft(left)) ** 2 / len(left)
     width = min(max(26, len(power) // 60), len(power))
     side = np.pad(power, width // 2, mode="reflect")
@@ -79,9 +81,8 @@ def _lower_half(left: Array) -> Array:
 
 
 def noise_density(signal: Array, *, tail: bool = False) -> Array:
-    """Rms per sample (n_f,) over frequency 0 … sr/2, as if white at that level;
-
-    tail: from the last third, else from all.
+    """Rms per sample (n_f,) over frequency 0 … sr/2, as if white at that level; tail: from the last third, else from
+    all.
     """
     from scipy.ndimage import percentile_filter
 

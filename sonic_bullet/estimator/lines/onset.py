@@ -26,9 +26,8 @@ REACH = 64  # samples that the first guess may be off
 
 @dataclass(frozen=True, slots=True)
 class Span:
-    """Samples from the onset to the end or the next hit;
-
-    hits: how many onsets there are; before: samples that precede it.
+    """Samples from the onset to the end or the next hit; hits: how many onsets there are; before: samples that
+    precede it.
     """
 
     start: int

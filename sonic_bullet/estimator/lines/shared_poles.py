@@ -1,9 +1,9 @@
-"""Several recordings of one object -> rough poles that they share, band by band: where the likelihood of joint_lines.py
-starts.
+"""Several recordings of one object -> rough poles that they share, band by band.
 
-bands, decimated; poles = eigenvalues of the shift between the rows of the signal subspace of all recordings at once
-                                                                         (ESPRIT)
-                                                                             [Roy & Kailath 1989, eq. 3.12-3.17]
+The likelihood of joint_lines.py starts there.
+
+    bands, decimated; poles = eigenvalues of the shift between the rows of the signal subspace of all recordings at once
+        (ESPRIT) [Roy & Kailath 1989, eq. 3.12-3.17]
 """
 
 from __future__ import annotations

@@ -4,8 +4,7 @@
         filter is full
     Hankel matrix H of the band = U S Vᴴ, as many columns of U as stand above the noise: pole = eigenvalue of the shift
         between their rows
-                                                                        [Roy & Kailath 1989, eq. 3.12-3.17; Hua & Sarkar
-                                                                            1990]
+        [Roy & Kailath 1989, eq. 3.12-3.17; Hua & Sarkar 1990]
     noise: singular values of white noise end at σ(√rows + √columns)    [Marchenko & Pastur 1967]
 
 The stop band lies below any converter's noise; recordings without noise are exact_modes.py's.

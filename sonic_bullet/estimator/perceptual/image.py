@@ -70,8 +70,8 @@ def _bins(length: int, sr: int, bark_step: float, bands: int) -> tuple[Array, Ar
     return np.where(inside, below, OUTSIDE), np.where(inside, place - below, 0.0)
 
 
-def _pool(power: Array, band: Array, share: Array, bands: int) -> Array:
-    """(m, k) powers of bins -> (m, bands). Bins of one triangle lie side by side."""
+def pooled(power: Array, band: Array, share: Array, bands: int) -> Array:
+    """(m, k) powers of bins -> (m, bands) of triangles. Bins of one triangle lie next to each other."""
     inside = np.flatnonzero(band != OUTSIDE)
     power, place, share = power[:, inside], band[inside], share[inside]
     first = np.flatnonzero(np.diff(place, prepend=OUTSIDE))
@@ -101,7 +101,7 @@ def image(
     """Image of ``seconds`` of a recording (n,) from its onset; windows double from about ``shortest_s``, as many as
     fit.
 
-    Raises RecordError where less than one window follows the onset, or nothing there is loud enough to be heard.
+    Raises RecordError where less than one window follows the onset, or nothing there is loud enough.
     """
     first = int(np.ceil(onset_s * sr - 1e-9))
     observed = np.ascontiguousarray(signal[first : first + int(seconds * sr)])
@@ -117,7 +117,7 @@ def image(
             break
         band, share = _bins(length, sr, bark_step, bands)
         scale = 2 / (length * float((window(length) ** 2).sum()))
-        power = _pool(np.abs(spectra(observed, length, length // 2)) ** 2 * scale, band, share, bands)
+        power = pooled(np.abs(spectra(observed, length, length // 2)) ** 2 * scale, band, share, bands)
         made.append(Level(length, length // 2, band, share, scale, loudness(power, middle_hz, full_scale_db_spl)))
     norm = float(sum(level.hop * (level.loud**2).sum() for level in made))
     if norm <= 0:
@@ -141,37 +141,13 @@ def _table(middle_hz: Array) -> Array:
     return np.ascontiguousarray(np.stack([value(0.0), (value(step) - value(-step)) / (2 * step)], axis=-1))
 
 
-def plain_distance(target: Image, freq_hz: Array, decay_per_s: Array, amplitude: Array) -> float:
-    """Π_psycho [eq.
-
-    19] over its value for silence, by synthesis and Fourier transforms: what `distance` must equal. (m,) each.
-    """
-    time = (
-        np.arange(max(level.window + level.hop * (len(level.loud) - 1) for level in target.levels)) / target.sr
-        + target.late_s
-    )
-    signal = np.zeros(len(time))
-    for freq, decay, size in zip(freq_hz, decay_per_s, amplitude, strict=True):
-        signal += size * np.exp(-decay * time) * np.sin(2 * np.pi * freq * time)
-    total = 0.0
-    for level in target.levels:
-        power = np.abs(spectra(signal, level.window, level.hop)) ** 2 * level.scale
-        loud = loudness(
-            _pool(power, level.band, level.share, len(target.middle_hz)), target.middle_hz, target.full_scale_db_spl
-        )
-        total += level.hop * float(((loud[: len(level.loud)] - level.loud) ** 2).sum())
-    return total / target.norm
-
-
 def distance(
     target: Image, freq_hz: Array, decay_per_s: Array, amplitude: Array, differences: Array | None = None
 ) -> float:
-    """Π_psycho [eq.
+    """Π_psycho over its value for silence: 0 the same image, 1 as far as silence. (m,) each, modes at 0 Hz are mute.
 
-    19] over its value for silence: 0 the same image, 1 as far as silence. (m,) each, modes at 0 Hz are mute.
-
-    differences, where given, takes every √hop·ΔT, level after level, frame after frame, so that their squares sum to
-    the answer.
+    differences, where given, takes every √hop·ΔT, level after level, frame after frame: its squares sum to the answer.
+    Source: eq. 19.
     """
     # a sine is two spirals, and the one at −f reaches low bins: Im A e^{iωt} = Im(−A*) e^{−iωt}
     freq_hz, decay_per_s, amplitude = (

@@ -69,9 +69,8 @@ def slots(reach, band):  # type: ignore[no-untyped-def]
 
 @njit(nogil=True, error_model="numpy")
 def frame(freq_hz, decay_per_s, amplitude, reach, sr, late_s, length, hop):  # type: ignore[no-untyped-def]
-    """Frame 0 of every mode in closed form:
-
-    shapes (2, room) real and imaginary, state and turn (m,): its factor, and what a hop makes of it.
+    """Frame 0 of every mode in closed form: shapes (2, room) real and imaginary, state and turn (m,): its factor, and
+    what a hop makes of it.
     """
     modes = len(freq_hz)
     shapes = np.empty((2, reach[-1, 2] + max(reach[-1, 1] - reach[-1, 0], 0)))
@@ -126,7 +125,9 @@ def runs_of(used, band):  # type: ignore[no-untyped-def]
 
 
 @njit(nogil=True, fastmath={"reassoc", "contract"}, error_model="numpy")
-def compare(reach, slot, used, shapes, state, turn, floor, band, share, scale, loud, table, out, weight):  # type: ignore[no-untyped-def]
+def compare(  # type: ignore[no-untyped-def]
+    reach, slot, used, shapes, state, turn, floor, band, share, scale, loud, table, out, weight
+):
     """Σ weight·ΔT² of one level; state is used up."""
     frames, bands = loud.shape
     sum_re, sum_im, power = np.zeros(len(used)), np.zeros(len(used)), np.zeros(bands + 2)

@@ -1,4 +1,4 @@
-"""From the frequency and level of a tone to what is heard of them: Bark and sone.
+"""From the frequency and level of a tone to what an ear makes of them: Bark and sone.
 
     z = 6 asinh(f/600)                                                                [Wang, Sekey, Gersho 1992, eq. 3]
     L_N = 40 lg B + 94 phon,  B = (0.4·10^((L_p + L_U)/10 − 9))^α − (0.4·10^((T + L_U)/10 − 9))^α + 0.005135

@@ -58,9 +58,9 @@ def points(
 
 
 def match_ratio_product(reference: Points, freq_hz: Array, decay_per_s: Array, amplitude: Array) -> float:
-    """Π_MRP in −1 … 0 [eq.
+    """Π_MRP in −1 … 0; modes (m,) that are mute or outside 20 Hz … 20 kHz take no part; 0 where none is left.
 
-    26]; modes (m,) that are mute or outside 20 Hz … 20 kHz take no part; 0 where none is left.
+    Source: eq. 26.
     """
     return float(
         _product(
@@ -78,34 +78,10 @@ def match_ratio_product(reference: Points, freq_hz: Array, decay_per_s: Array, a
     )
 
 
-def best_pairs(
-    reference: Points, lambda_hat: Array, amplitude_hat: Array, alpha_per_s: float, beta_s: float, gamma_m2_s2: Array
-) -> Array:
-    """(g,) Π_MRP at each γ with α, β held."""
-    known = (
-        reference.x,
-        reference.y,
-        reference.weight,
-        reference.per_bark,
-        reference.per_s,
-        reference.near**2,
-        reference.power,
-    )
-    return np.asarray(_best_pairs(known, lambda_hat, amplitude_hat, alpha_per_s, beta_s, gamma_m2_s2))
-
-
 @njit(nogil=True, error_model="numpy")
-def _best_pairs(known, lambda_hat, amplitude_hat, alpha, beta, gammas):  # type: ignore[no-untyped-def]
-    products = np.empty(len(gammas))
-    for g in range(len(gammas)):
-        decay = 0.5 * (alpha + beta * gammas[g] * lambda_hat)
-        square = np.maximum(gammas[g] * lambda_hat - decay**2, 0.0)
-        products[g] = _product(*known, np.sqrt(square) / (2 * np.pi), decay, amplitude_hat)
-    return products
-
-
-@njit(nogil=True, error_model="numpy")
-def _product(x, y, weight, per_bark, per_s, near_square, power, freq_hz, decay_per_s, amplitude):  # type: ignore[no-untyped-def]
+def _product(  # type: ignore[no-untyped-def]
+    x, y, weight, per_bark, per_s, near_square, power, freq_hz, decay_per_s, amplitude
+):
     known, modes = len(x), len(freq_hz)
     top, bottom = np.zeros(known), np.zeros(known)
     there_sum, there_weight = 0.0, 0.0

@@ -1,4 +1,4 @@
-"""The hybrid metric: how far α, β, γ, σ are from a recording.
+"""The hybrid metric: how far damped sinusoids are from a recording, by image and by features.
 
     Π = Π_psycho/|Π_MRP|                                                              [Ren, Yeh, Lin 2013, eq. 27]
 
@@ -13,17 +13,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sonic_bullet.estimator.perceptual.image import Image, distance, image, plain_distance
+from sonic_bullet.estimator.lines.line_values import Features
+from sonic_bullet.estimator.perceptual.image import Image, distance, image
 from sonic_bullet.estimator.perceptual.matching import Points, match_ratio_product, points
-from sonic_bullet.estimator.perceptual.problem import Problem, modes_of
-from sonic_bullet.records import Array
+from sonic_bullet.records import Array, frozen_array
+from sonic_bullet.records.errors import RecordError
 
 MATCH_FLOOR = 1e-6  # a match ratio product of zero would make Π infinite
+PASCAL_DB_SPL = 94.0  # of an rms of 1 where samples are pascals
 
 
 @dataclass(frozen=True, slots=True)
 class Constants:
-    """What the metric leaves free: the image's grid (image.py) and the plane of the match ratio product (matching.py)."""
+    """What the metric leaves free: the image's grid (image.py), the plane of the match ratio product (matching.py)."""
 
     bark_step: float = 0.5
     levels: int = 5
@@ -37,55 +39,47 @@ class Constants:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Target:
-    """A problem with the recording's image and points worked out once."""
+    """A recording's image and points, worked out once."""
 
-    problem: Problem
     image: Image
     points: Points
 
 
-def target(problem: Problem, constants: Constants | None = None) -> Target:
-    """Raises RecordError where the recording is too short or too quiet for an image."""
+def target(
+    features: Features,
+    signal: Array,
+    *,
+    full_scale_db_spl: float = PASCAL_DB_SPL,
+    constants: Constants | None = None,
+) -> Target:
+    """A recording (n,) at features.sr, full scale 1, and its features as what others are held against.
+
+    full_scale_db_spl: the level an rms of 1 stands for. Raises RecordError where there are no features, a sample is not
+    finite, or the recording is too short or too quiet for an image.
+    """
     c = constants or Constants()
+    if not len(features.freq_hz):
+        raise RecordError("the recording has no features", "a comparison needs at least one damped sinusoid")
     made = image(
-        problem.signal, problem.features.sr, problem.features.onset_s, problem.full_scale_db_spl,
+        frozen_array(signal, np.float64, (None,), "signal"), features.sr, features.onset_s, full_scale_db_spl,
         bark_step=c.bark_step, levels=c.levels, shortest_s=c.shortest_s, seconds=c.seconds,
     )  # fmt: skip
     return Target(
-        problem,
         made,
-        points(problem.features, per_bark=c.per_bark, per_duration=c.per_duration, near=c.near, power=c.power),
+        points(features, per_bark=c.per_bark, per_duration=c.per_duration, near=c.near, power=c.power),
     )
 
 
-def hybrid(target: Target, parameters: Array, *, plain: bool = False) -> float:
-    """Π at α, β, γ, σ (4,). plain: the image by synthesis and Fourier transforms instead of in closed form."""
-    modes = modes_of(parameters, target.problem.lambda_hat, target.problem.amplitude_hat)
-    return hybrid_of_modes(target, *modes, plain=plain)
-
-
-def hybrid_of_modes(
-    target: Target, freq_hz: Array, decay_per_s: Array, amplitude: Array, *, plain: bool = False
-) -> float:
+def hybrid_of_modes(target: Target, freq_hz: Array, decay_per_s: Array, amplitude: Array) -> float:
     """Π of damped sinusoids (m,) Im A e^{(−d + iω)t}, whatever made them.
 
-    A real: sines; complex (not with ``plain``): of any phase.
+    A real: sines; complex: of any phase.
     """
-    match = match_ratio_product(target.points, freq_hz, decay_per_s, np.abs(amplitude))
-    measure = plain_distance if plain else distance
-    return measure(target.image, freq_hz, decay_per_s, amplitude) / max(-match, MATCH_FLOOR)
-
-
-def match(target: Target, parameters: Array) -> float:
-    """Π_MRP at α, β, γ, σ (4,); σ makes no difference to it."""
-    return match_ratio_product(
-        target.points, *modes_of(parameters, target.problem.lambda_hat, target.problem.amplitude_hat)
+    return distance(target.image, freq_hz, decay_per_s, amplitude) / match_of_modes(
+        target, freq_hz, decay_per_s, amplitude
     )
 
 
-def residuals(target: Target, parameters: Array) -> Array:
-    """(cells,) √(hop/|Π_MRP|)·ΔT, whose squares sum to Π: what a least-squares method wants to see."""
-    modes = modes_of(parameters, target.problem.lambda_hat, target.problem.amplitude_hat)
-    out = np.empty(sum(level.loud.size for level in target.image.levels))
-    distance(target.image, *modes, differences=out)
-    return np.asarray(out / np.sqrt(max(-match_ratio_product(target.points, *modes), MATCH_FLOOR)))
+def match_of_modes(target: Target, freq_hz: Array, decay_per_s: Array, amplitude: Array) -> float:
+    """|Π_MRP| of damped sinusoids (m,), at least `MATCH_FLOOR`."""
+    return max(-match_ratio_product(target.points, freq_hz, decay_per_s, np.abs(amplitude)), MATCH_FLOOR)

@@ -75,9 +75,8 @@ def link_names(client_id: int, body: int) -> list[str]:
 
 
 def checked_mass_kg(info: tuple[Any, ...], body: int, link: int) -> float:
-    """Mass of getDynamicsInfo's answer;
-
-    SceneError where it is negative, absurd or not a number, or the inertia is not one.
+    """Mass of getDynamicsInfo's answer; SceneError where it is negative, absurd or not a number, or the inertia is
+    not one.
     """
     mass, inertia = info[0], info[2]
     if not (math.isfinite(mass) and 0 <= mass < HEAVIEST_KG):

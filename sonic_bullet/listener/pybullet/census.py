@@ -31,7 +31,7 @@ def ask(client_id: int, question: Callable[..., Any]) -> Any:
 
 
 class Census:
-    """State of that for one client. on_roster is told each new roster, on_mute the bodies that are left out from now
+    """State of that for one client. on_roster is given each new roster, on_mute the bodies that are left out from now
     on.
     """
 

@@ -94,7 +94,8 @@ def _settings(client_id: int) -> list[Finding]:
             Finding(
                 "sub-steps",
                 "warning",
-                f"numSubSteps is {settings['numSubSteps']}: normal impulses come from the contact log, friction is only estimated from the last sub-step",
+                f"numSubSteps is {settings['numSubSteps']}: normal impulses come from the contact log, "
+                "friction is only estimated from the last sub-step",
                 "set numSubSteps=0 and divide the time step instead",
             )
         )
@@ -123,24 +124,15 @@ def _empty(client_id: int) -> list[Finding]:
     """A world in which nothing can touch."""
     links = _links(client_id)
     if not links:
-        return [
-            Finding(
-                "no-body",
-                "error",
-                "there is no body in this world",
-                "load some before stepping, into the client that steps",
-            )
-        ]
+        what, remedy = "there is no body in this world", "load some before stepping, into the client that steps"
+        return [Finding("no-body", "error", what, remedy)]
     if not any(collision_pieces(client_id, *link) for link in links):
-        what = f"no link of the {len({body for body, _ in links})} bodies has a collision shape that PyBullet describes: nothing can touch"
-        return [
-            Finding(
-                "no-shape",
-                "error",
-                what,
-                "give bodies collision shapes: createCollisionShape, or <collision> in their URDF",
-            )
-        ]
+        what = (
+            f"no link of the {len({body for body, _ in links})} bodies has a collision shape that PyBullet "
+            "describes: nothing can touch"
+        )
+        remedy = "give bodies collision shapes: createCollisionShape, or <collision> in their URDF"
+        return [Finding("no-shape", "error", what, remedy)]
     return []
 
 
@@ -179,7 +171,8 @@ def _restitution(client_id: int) -> list[Finding]:
         Finding(
             "restitution-lost",
             "warning",
-            f"{names}: restitution {bouncy[lost[0]]:g} is asked for, but Bullet's default contact threshold loses some or all of it at a step of {dt:.4g} s",
+            f"{names}: restitution {bouncy[lost[0]]:g} is asked for, but Bullet's default contact threshold "
+            f"loses some or all of it at a step of {dt:.4g} s",
             "call sonic_bullet.keep_restitution(client) after loading",
         )
     ]
@@ -207,8 +200,10 @@ def _lids(client_id: int) -> list[Finding]:
                 Finding(
                     "hull-lid",
                     "warning",
-                    f"body {body} ({link_name(client_id, body, link)}) is hollow, but moving meshes collide as their convex hull: hits land on an invisible lid",
-                    "decompose it with pybullet.vhacd, build it of several shapes, or fix it with mass 0 and GEOM_FORCE_CONCAVE_TRIMESH",
+                    f"body {body} ({link_name(client_id, body, link)}) is hollow, but moving meshes collide "
+                    "as their convex hull: hits land on an invisible lid",
+                    "decompose it with pybullet.vhacd, build it of several shapes, or fix it with mass 0 and "
+                    "GEOM_FORCE_CONCAVE_TRIMESH",
                 )
             )
     return found
@@ -314,7 +309,8 @@ def _oversized(world: PyBulletWorld) -> list[Finding]:
             "scale",
             "warning",
             f"body {body.body_id} ({body.name}) {words}",
-            "load it with globalScaling=0.001, or give its mesh in metres, if its numbers are millimetres; leave it out of the sound if it is the ground",
+            "load it with globalScaling=0.001, or give its mesh in metres, if its numbers are millimetres; "
+            "leave it out of the sound if it is the ground",
         )
         for body, words in large
         if words
@@ -336,7 +332,8 @@ def _densities(world: PyBulletWorld) -> list[Finding]:
                 Finding(
                     "density",
                     "warning",
-                    f"body {body.body_id} ({body.name}) weighs {body.mass_kg:.3g} kg, but a solid of {body.material.name} of that size {expected:.3g} kg",
+                    f"body {body.body_id} ({body.name}) weighs {body.mass_kg:.3g} kg, but a solid of "
+                    f"{body.material.name} of that size {expected:.3g} kg",
                     "set its mass with changeDynamics, or check the mesh's scale",
                 )
             )

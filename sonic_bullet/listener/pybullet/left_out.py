@@ -49,7 +49,8 @@ class BodiesLeftOut:
         for body, name in soft.items():
             if body not in self.soft:
                 self._say(
-                    f"body {body} ({name}) is soft: PyBullet tells neither its mass nor its speed, so it neither sounds nor strikes"
+                    f"body {body} ({name}) is soft: PyBullet tells neither its mass nor its speed, so it "
+                    "neither sounds nor strikes"
                 )
         self.soft = set(soft)
 
@@ -66,7 +67,8 @@ class BodiesLeftOut:
             if pair not in self._pairs and not (self.muted | self.soft).intersection(pair):
                 self._pairs.add(pair)
                 self._say(
-                    f"a contact of bodies {pair[0]} and {pair[1]} holds a force or place that is not a number, or beyond 1e9: left out; check both masses"
+                    f"a contact of bodies {pair[0]} and {pair[1]} holds a force or place that is not a "
+                    "number, or beyond 1e9: left out; check both masses"
                 )
 
     def concerned(self, touches: Touches) -> Array:

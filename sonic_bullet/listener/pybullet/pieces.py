@@ -25,9 +25,8 @@ KINDS = {
 
 
 class Piece(NamedTuple):
-    """kind: pybullet.GEOM_…;
-
-    size (3): as getCollisionShapeData's dimensions; file: mesh file or ""; position (3), quaternion (4): body frame.
+    """kind: pybullet.GEOM_…; size (3): as getCollisionShapeData's dimensions; file: mesh file or ""; position (3),
+    quaternion (4): body frame.
     """
 
     kind: int
@@ -55,9 +54,8 @@ def collision_pieces(client_id: int, body: int, link: int) -> tuple[Piece, ...]:
 
 
 def visual_pieces(client_id: int, body: int, link: int) -> tuple[Piece, ...]:
-    """Visual shapes of an existing link:
-
-    PyBullet places them in the link frame, and the body frame is the inertial one within it.
+    """Visual shapes of an existing link: PyBullet places them in the link frame, and the body frame is the inertial
+    one within it.
     """
     info = pybullet.getDynamicsInfo(body, link, physicsClientId=client_id)
     back, turn = pybullet.invertTransform(info[3], info[4])

@@ -24,23 +24,23 @@ from typing import Any
 import numpy as np
 import pybullet
 
+from sonic_bullet.listener.body_records import BodyRecords
 from sonic_bullet.listener.frames import LINK_SPAN, Motion, Roster, encode, jumped, rows_of, same_motion
-from sonic_bullet.listener.polling import Touches, gather, loaded
+from sonic_bullet.listener.polling import Touches
 from sonic_bullet.listener.pybullet import body_facts as facts
 from sonic_bullet.listener.pybullet import collision_shapes as shapes
 from sonic_bullet.listener.pybullet import hooks
 from sonic_bullet.listener.pybullet.census import Census, ask
+from sonic_bullet.listener.pybullet.contact_reader import ContactReader
 from sonic_bullet.listener.pybullet.left_out import BodiesLeftOut
 from sonic_bullet.listener.pybullet.poses import check_connected
 from sonic_bullet.listener.pybullet.step_back import undone
-from sonic_bullet.listener.pybullet.substeps import SubstepLog, gather_substeps
 from sonic_bullet.listener.rows import Meetings, contact_rows, meetings
 from sonic_bullet.listener.start import Start, hooked_start, polled_start, taken
 from sonic_bullet.listener.sweep import NO_TRACES, Trace
 from sonic_bullet.listener.world import World
 from sonic_bullet.records import Array, Body, Material, ModalModel, Shape
 from sonic_bullet.records.contacts import Contacts, Step
-from sonic_bullet.records.errors import SceneError
 
 
 class PyBulletWorld(World):
@@ -56,23 +56,17 @@ class PyBulletWorld(World):
         self.epoch = 0
         self.step_count = 0
         self.stepped = False
-        self._bodies: list[Body] = []
-        self._live: dict[int, int] = {}
-        self._rows_known: tuple[Roster, Array] | None = None
-        self._position_m = np.zeros((0, 3))
-        self._quaternion_xyzw = np.zeros((0, 4))
+        self._records = BodyRecords()
         self._time_s = 0.0
         self._gravity_m_s2 = np.zeros(3)
         self._census = Census(client_id, self._bury, self._end)
         self._before: Motion | None = None
         self._past_touches: Touches | None = None
-        self._contact_points = self._contact_points_before = ask(self.client_id, pybullet.getContactPoints)
+        self._contacts = ContactReader(client_id)
         self._moved: set[int] = set()
         self._traces: tuple[Trace, ...] = NO_TRACES
-        self._log = SubstepLog(client_id)
         self._uninstall: Callable[[], None] | None = None
-        if self._step_length()[1] > 1:
-            self._log.open()
+        self._contacts.prepare(self._step_length()[1])
         self._past: Motion = self._census.read()
 
     @property
@@ -88,12 +82,14 @@ class PyBulletWorld(World):
     @property
     def bodies(self) -> tuple[Body, ...]:
         """All bodies ever met, in the order that Contacts.a and Contacts.b count them."""
-        return tuple(self._bodies)
+        return tuple(self._records.bodies)
 
     @property
     def untouched(self) -> frozenset[int]:
         """Ids of the bodies that were in the world at the last step and have met nobody yet."""
-        return frozenset(body for body, _, _ in self._past.roster.bodies) - {code // LINK_SPAN for code in self._live}
+        return frozenset(body for body, _, _ in self._past.roster.bodies) - {
+            code // LINK_SPAN for code in self._records.living
+        }
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -120,7 +116,7 @@ class PyBulletWorld(World):
 
     def index_of(self, body: int, link: int = -1) -> int:
         """Index into `bodies` of the living record of a link, or -1."""
-        return self._live.get(int(encode(body, link)), -1)
+        return self._records.index_of(int(encode(body, link)))
 
     def add(
         self,
@@ -178,15 +174,14 @@ class PyBulletWorld(World):
         return shapes.shapes_of(self.client_id, body, link)
 
     def forget(self, body: int | None = None) -> None:
-        """Say that a body was removed (None:
-
-        all, by resetSimulation); its id may be given anew. With a hook, nobody need call this.
+        """Say that a body was removed (None: all, by resetSimulation); its id may be given anew. With a hook, nobody
+        need call this.
         """
         self.epoch += 1
         self.left_out.forget(body)
-        self._close([code for code in self._live if body is None or code // LINK_SPAN == body])
+        self._close([code for code in self._records.living if body is None or code // LINK_SPAN == body])
         if body is None:
-            self._log.abandon()
+            self._contacts.abandon()
             self._traces, self._past_touches = NO_TRACES, None
         past = self._past.roster
         keep = np.flatnonzero(past.code // LINK_SPAN != body) if body is not None else np.zeros(0, int)
@@ -226,14 +221,13 @@ class PyBulletWorld(World):
             self._uninstall = None
         self._before = None
         if self.client is None:
-            self._log.abandon()  # its id may be another's by now
+            self._contacts.abandon()  # its id may be another's by now
         else:
-            self._log.close()
+            self._contacts.close()
 
     def before_step(self) -> None:
         """Read poses and twists at the start of the step. Raises SceneError (lost connection)."""
-        if self._step_length()[1] > 1 and not self._log.is_open:
-            self._log.open()
+        self._contacts.prepare(self._step_length()[1])
         self._before = self._census.read()
 
     def after_step(self) -> Step:
@@ -249,7 +243,7 @@ class PyBulletWorld(World):
         self.stepped = self._uninstall is None or self._before is not None
         if not self.stepped:
             return self._again(dt)
-        touches = self._touches(dt, substeps)
+        touches = self._contacts.touches(dt, substeps)
         first, past_touches = self.step_count == 0, self._past_touches
         now = self._before if self._before is not None else self._census.read()
         touches = self._census.usable(touches)
@@ -281,38 +275,21 @@ class PyBulletWorld(World):
         """A step in which nothing happens."""
         return Step(
             dt,
-            self._position_m,
-            self._quaternion_xyzw,
-            np.zeros(len(self._bodies), bool),
+            self._records.position_m,
+            self._records.quaternion_xyzw,
+            np.zeros(len(self._records.bodies), bool),
             Contacts.none(),
             self._gravity_m_s2,
         )
 
     def _step(self, dt: float, start: Start, of_row: Array, contacts: Contacts) -> Step:
         row = np.flatnonzero(of_row >= 0)
-        index = of_row[row]
-        teleported = np.zeros(len(self._bodies), bool)
-        self._position_m[index] = start.motion.position_m[row]
-        self._quaternion_xyzw[index] = start.motion.quaternion_xyzw[row]
+        index, records = of_row[row], self._records
+        teleported = np.zeros(len(records.bodies), bool)
+        records.position_m[index] = start.motion.position_m[row]
+        records.quaternion_xyzw[index] = start.motion.quaternion_xyzw[row]
         teleported[index] = start.moved[row]
-        return Step(dt, self._position_m, self._quaternion_xyzw, teleported, contacts, self._gravity_m_s2)
-
-    def _touches(self, dt: float, substeps: int) -> Touches:
-        last = ask(self.client_id, pybullet.getContactPoints)
-        if substeps == 1:
-            if self._log.is_open:
-                self._log.close()
-            if last != self._contact_points:  # polled twice, it tells the same twice
-                self._contact_points_before, self._contact_points = self._contact_points, last
-            return gather(loaded(last, self._contact_points_before), dt)
-        if not self._log.is_open:
-            self._log.open()
-            raise SceneError(
-                f"numSubSteps was set to {substeps} after listening began",
-                "set it before attaching, or attach to a BulletClient, whose steps are hooked",
-            )
-        touches, self._log.count = gather_substeps(self._log.records(), last, dt, substeps, self._log.count)
-        return touches
+        return Step(dt, records.position_m, records.quaternion_xyzw, teleported, contacts, self._gravity_m_s2)
 
     def _step_length(self) -> tuple[float, int]:
         settings = ask(self.client_id, pybullet.getPhysicsEngineParameters)
@@ -321,7 +298,7 @@ class PyBulletWorld(World):
 
     def _bury(self, roster: Roster) -> None:
         """Close the records of bodies that have gone without a hook seeing it."""
-        codes = np.array(list(self._live), np.int64)
+        codes = np.array(self._records.living, np.int64)
         gone = codes[rows_of(roster, codes) < 0]
         if len(gone):
             self.epoch += 1
@@ -329,14 +306,14 @@ class PyBulletWorld(World):
 
     def _end(self, bodies: Collection[int]) -> None:
         """Close the records of bodies."""
-        self._close([code for code in self._live if code // LINK_SPAN in bodies])
+        self._close([code for code in self._records.living if code // LINK_SPAN in bodies])
 
     def _expose_impostors(self, now: Motion, dt: float) -> None:
         """Where nobody saw removals: what jumped and has another name, mass or inertia has taken over an old id."""
         for code in now.roster.code[jumped(self._past, now, dt)]:
-            index = self._live.get(int(code))
-            if index is not None:
-                known, seen = self._bodies[index], self._census.described(code, self.epoch)
+            index = self._records.index_of(int(code))
+            if index >= 0:
+                known, seen = self._records.bodies[index], self._census.described(code, self.epoch)
                 if seen is None:
                     continue
                 same = known.mass_kg == seen.mass_kg and np.array_equal(known.inertia_kg_m2, seen.inertia_kg_m2)
@@ -348,37 +325,21 @@ class PyBulletWorld(World):
         """(n,) index into `bodies` of each row of the roster, -1 for who never met anybody; who meets the first time
         gets a silent record.
         """
-        of_row = self._index_of_row(roster)
+        of_row = self._records.of_row(roster)
         met = np.unique(np.concatenate([meeting.row_a, meeting.row_b]))
         strangers = met[of_row[met] < 0]
         for code in roster.code[strangers]:
             record = self._census.described(code, self.epoch)
             if record is not None:
                 self._append(int(code), replace(record, since_step=self.step_count))
-        return self._index_of_row(roster) if len(strangers) else of_row
-
-    def _index_of_row(self, roster: Roster) -> Array:
-        if self._rows_known is None or self._rows_known[0] is not roster:
-            of_row = np.array([self._live.get(int(code), -1) for code in roster.code], np.int64)
-            self._rows_known = roster, of_row
-        return self._rows_known[1]
+        return self._records.of_row(roster) if len(strangers) else of_row
 
     def _append(self, code: int, record: Body) -> None:
-        self._live[code] = len(self._bodies)
-        self._rows_known = None
-        self._bodies.append(record)
         row = rows_of(self._past.roster, np.array([code]))[0]
-        pose = (
-            (self._past.position_m[row], self._past.quaternion_xyzw[row])
-            if row >= 0
-            else (np.zeros(3), np.array([0, 0, 0, 1.0]))
-        )
-        self._position_m = np.concatenate([self._position_m, pose[0][None]])
-        self._quaternion_xyzw = np.concatenate([self._quaternion_xyzw, pose[1][None]])
+        if row >= 0:
+            self._records.append(code, record, self._past.position_m[row], self._past.quaternion_xyzw[row])
+        else:
+            self._records.append(code, record, np.zeros(3), np.array([0, 0, 0, 1.0]))
 
     def _close(self, codes: list[int]) -> None:
-        for code in codes:
-            if code in self._live:
-                index = self._live.pop(code)
-                self._bodies[index] = replace(self._bodies[index], until_step=self.step_count)
-        self._rows_known = None
+        self._records.close(codes, self.step_count)

@@ -42,7 +42,7 @@ def run_script(
 
     hooks: (before, after) each step, or after alone, called with the client id of the first client that steps. Clients
     that the script opened stay connected, so that what it built can be looked at. names: a dictionary that its
-    top-level names go into, there also when it breaks. progress: told the share of ``seconds`` that is done. Raises
+    top-level names go into, there also when it breaks. progress: given the share of ``seconds`` that is done. Raises
     SceneError that names the line where the script breaks, what the hooks raise, and SceneError where the file cannot
     be read.
     """

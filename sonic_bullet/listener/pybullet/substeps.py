@@ -148,9 +148,8 @@ def gather_substeps(
 
 
 def friction_ratio(code_a: Array, code_b: Array, last: list[RawContact]) -> Array:
-    """Friction over normal force (k, 3), world frame, of each row's pair in the last sub-step;
-
-    0 where it says nothing.
+    """Friction over normal force (k, 3), world frame, of each row's pair in the last sub-step; 0 where it says
+    nothing.
     """
     ratio = np.zeros((len(code_a), 3))
     friction = [raw for raw in last if raw[FORCE] > 0 and (raw[FRICTION_1] or raw[FRICTION_2])]

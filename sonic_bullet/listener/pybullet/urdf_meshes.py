@@ -1,6 +1,5 @@
-"""The mesh file behind a collision shape, in its own frame and unit, cut into objects as Bullet cuts it;
-
-hulls, and how far they close what is open.
+"""The mesh file behind a collision shape, in its own frame and unit, cut into objects as Bullet cuts it; hulls, and
+how far they close what is open.
 """
 
 from __future__ import annotations
@@ -21,9 +20,8 @@ LID_GRID = 5
 
 
 def read_surfaces(path: Path) -> list[MeshSurface]:
-    """Objects of a mesh file:
-
-    (vertices (v, 3), faces (f, 3)) each, identical vertices made one. Raises FileError, MeshError.
+    """Objects of a mesh file: (vertices (v, 3), faces (f, 3)) each, identical vertices made one. Raises FileError,
+    MeshError.
     """
     whole = [welded(vertex, face) for vertex, face in meshes.read_surfaces(path) if len(face)]
     whole = [(vertex, face) for vertex, face in whole if len(face) and np.isfinite(vertex).all()]

@@ -1,6 +1,5 @@
-"""Mesh files -> Shape:
-
-OBJ, STL, PLY, GLB and what else `files.meshes` reads, with nothing repaired or merged on the way in.
+"""Mesh files -> Shape: OBJ, STL, PLY, GLB and what else `files.meshes` reads, with nothing repaired or merged on the
+way in.
 """
 
 from __future__ import annotations

@@ -116,9 +116,8 @@ def _gap(point: Array, sides: Array) -> Array:
 
 
 def triangulated(loops: list[Array], area_m2: float, edge_m: float) -> tuple[Array, Array] | None:
-    """Points (p, 2) and triangles (t, 3) of about edge_m filling polygons (holes too) of area_m2;
-
-    None where an edge is missed.
+    """Points (p, 2) and triangles (t, 3) of about edge_m filling polygons (holes too) of area_m2; None where an edge
+    is missed.
     """
     from scipy.spatial import Delaunay, QhullError
 

@@ -46,9 +46,8 @@ def _lattice(n: int, dimension: int) -> Array:
 
 
 def _refined(corner: Array, simplex: Array, n: int) -> tuple[Array, Array]:
-    """Simplices (s, d+1) over corner (c, 3), each edge cut into n:
-
-    Freudenthal's subdivision, matching across shared faces.
+    """Simplices (s, d+1) over corner (c, 3), each edge cut into n: Freudenthal's subdivision, matching across shared
+    faces.
     """
     d = simplex.shape[1] - 1
     simplex = np.sort(simplex, axis=1)  # one order for all: neighbours then cut their shared face alike

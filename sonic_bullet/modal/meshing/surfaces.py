@@ -27,9 +27,8 @@ SIZE_M = (1e-5, 1e4)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Skin:
-    """A surface that means a solid:
-
-    vertex_m (v, 3), face (f, 3) outward, thickness_m = 2V/A or the wall's. note: the choices.
+    """A surface that means a solid: vertex_m (v, 3), face (f, 3) outward, thickness_m = 2V/A or the wall's. note: the
+    choices.
     """
 
     vertex_m: Array

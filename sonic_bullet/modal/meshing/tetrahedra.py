@@ -1,4 +1,5 @@
-"""Surface -> tetrahedra by fTetWild [Hu, Schneider, Wang, Zorin, Panozzo 2020], in a child process with a time and a memory limit.
+"""Surface -> tetrahedra by fTetWild [Hu, Schneider, Wang, Zorin, Panozzo 2020], in a child process with a
+time and a memory limit.
 
 fTetWild takes soup, holes and overlaps and fills where the winding number says inside; the surface may move by the
 envelope.

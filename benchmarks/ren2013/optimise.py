@@ -19,10 +19,11 @@ from collections.abc import Callable
 
 import numpy as np
 
-from sonic_bullet.estimator.perceptual.metric import Constants, Target, hybrid, residuals, target
-from sonic_bullet.estimator.perceptual.partners import all_partners, candidates
-from sonic_bullet.estimator.perceptual.problem import Found, Problem
-from sonic_bullet.estimator.perceptual.starts import feature_eigenvalues, seed_starts
+from benchmarks.ren2013.partners import all_partners, candidates
+from benchmarks.ren2013.problem import Found, Problem
+from benchmarks.ren2013.search_metric import Aim, aim_at, hybrid, residuals
+from benchmarks.ren2013.starts import feature_eigenvalues, seed_starts
+from sonic_bullet.estimator.perceptual.metric import Constants
 from sonic_bullet.records import Array
 
 # first simplex, in the logarithms: what the paper's source of the method does [Lagarias et al. 1999; MATLAB's
@@ -44,7 +45,7 @@ WIDTH = np.array([1e-2, 1e-2, 1e-4, 1e-2])  # of the differences that stand for 
 class _Counted:
     """Π over the logarithms, kept in bounds, counting its calls."""
 
-    def __init__(self, aim: Target) -> None:
+    def __init__(self, aim: Aim) -> None:
         self.aim, self.calls = aim, 0
         self.low, self.high = np.log(aim.problem.lower), np.log(aim.problem.upper)
 
@@ -63,7 +64,7 @@ def _walk(function: Callable[[Array], float], start: Array, step: Array) -> tupl
     return np.asarray(result.x), float(result.fun)
 
 
-def _found(aim: Target, logs: Array, metric: float, evaluations: int, begun: float, starts: int) -> Found:
+def _found(aim: Aim, logs: Array, metric: float, evaluations: int, begun: float, starts: int) -> Found:
     alpha, beta, gamma, sigma = (float(value) for value in np.clip(np.exp(logs), aim.problem.lower, aim.problem.upper))
     return Found(alpha, beta, gamma, sigma, float(metric), evaluations, time.perf_counter() - begun, starts)
 
@@ -74,7 +75,7 @@ def reference(problem: Problem, constants: Constants | None = None) -> Found:
     Raises RecordError where the recording is too short or too quiet for an image.
     """
     begun = time.perf_counter()
-    aim = target(problem, constants)
+    aim = aim_at(problem, constants)
     count = _Counted(aim)
     starts = np.log(seed_starts(problem))
     ends = [_walk(count, start, np.full(4, STEP)) for start in starts]
@@ -85,7 +86,7 @@ def reference(problem: Problem, constants: Constants | None = None) -> Found:
 def fast(problem: Problem, constants: Constants | None = None) -> Found:
     """The same minimum for less. evaluations counts Π and images, not Π_MRP alone. Raises as `reference` does."""
     begun = time.perf_counter()
-    aim = target(problem, constants)
+    aim = aim_at(problem, constants)
     count = _Counted(aim)
     rough = candidates(aim, SIFTED)
     solved = np.array([all_partners(problem, start) for start in rough])
@@ -99,13 +100,13 @@ def fast(problem: Problem, constants: Constants | None = None) -> Found:
 def polish(problem: Problem, start: Array, constants: Constants | None = None) -> Found:
     """Down Π from one start α, β, γ, σ (4,): the last of the fast search's three steps. Raises as `reference` does."""
     begun = time.perf_counter()
-    aim = target(problem, constants)
+    aim = aim_at(problem, constants)
     count = _Counted(aim)
     metric, logs = _polish(aim, count, np.log(np.clip(start, problem.lower, problem.upper)))
     return _found(aim, logs, metric, count.calls, begun, 1)
 
 
-def _polish(aim: Target, count: _Counted, start: Array) -> tuple[float, Array]:
+def _polish(aim: Aim, count: _Counted, start: Array) -> tuple[float, Array]:
     """Π as the sum of squares it is, by Levenberg and Marquardt with Broyden's slopes; then by Newton in axes along
     which Π rises alike.
 

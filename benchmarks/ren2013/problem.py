@@ -3,8 +3,8 @@
     (λ̂_j, â_j)  --{α, β, γ, σ}-->  λ = γ λ̂,  d = ½(α + βλ),  ω = √(λ − d²),  a = σ â
         [Ren, Yeh, Lin 2013, eq. 6, 7, 10-12]
 
-λ̂ are the eigenvalues of the body at γ = E/ρ = 1 m²/s² and the assumed Poisson's ratio, â the amplitudes its sensor
-would hear after the strike at σ = 1. Order of the four everywhere: α 1/s, β s, γ m²/s², σ.
+λ̂ are the eigenvalues of the body at γ = E/ρ = 1 m²/s² and the assumed Poisson's ratio, â the amplitudes at its sensor
+after the strike at σ = 1. Order of the four everywhere: α 1/s, β s, γ m²/s², σ.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ class Problem:
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """The best parameters, their hybrid metric Π, and what the search cost: metric evaluations, wall seconds, starts."""
+    """The best parameters, their hybrid metric Π, and the cost: evaluations of Π, wall seconds, starts."""
 
     alpha_per_s: float
     beta_s: float

@@ -12,11 +12,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from benchmarks.ren2013.problem import Problem, modes_of
+from benchmarks.ren2013.search_metric import Aim
+from benchmarks.ren2013.starts import by_energy, feature_eigenvalues, undominated
 from sonic_bullet.estimator.lines.line_values import Features
-from sonic_bullet.estimator.perceptual.matching import best_pairs, energy
-from sonic_bullet.estimator.perceptual.metric import Target
-from sonic_bullet.estimator.perceptual.problem import Problem, modes_of
-from sonic_bullet.estimator.perceptual.starts import by_energy, feature_eigenvalues, undominated
+from sonic_bullet.estimator.perceptual.matching import Points, energy, match_ratio_product
 from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array
 
@@ -55,9 +55,8 @@ def rayleigh(features: Features, trust: Array, lower: Array, upper: Array) -> tu
 
 @njit(nogil=True, error_model="numpy")
 def _rayleigh(eigen, decay, spread, trust):  # type: ignore[no-untyped-def]
-    """Robust non-negative α, β;
-
-    spread (k,) relative. The misfit shared by all starts at all of it and shrinks to what is left.
+    """Robust non-negative α, β; spread (k,) relative. The misfit shared by all starts at all of it and shrinks to
+    what is left.
     """
     unit = np.median(eigen)
     alpha, beta, misfit = 2 * np.median(decay), 0.0, 1.0
@@ -146,7 +145,7 @@ def _only(features: Features, which: Array) -> Features:
     )
 
 
-def candidates(aim: Target, most: int) -> Array:
+def candidates(aim: Aim, most: int) -> Array:
     """(s, 4) starts: every strong feature on every audible mode gives a γ; alike ones are one; Π_MRP keeps the best
     ``most``.
 
@@ -165,7 +164,7 @@ def candidates(aim: Target, most: int) -> Array:
         guess = np.log(np.clip(eigen[strong[:1]] / problem.lambda_hat[audible[:1]], problem.lower[2], problem.upper[2]))
     group = np.concatenate([[0], np.cumsum(np.diff(guess) > APART)])
     guess = np.bincount(group, guess) / np.bincount(group)
-    score = best_pairs(aim.points, problem.lambda_hat, problem.amplitude_hat, alpha, beta, np.exp(guess))
+    score = best_pairs(aim.target.points, problem.lambda_hat, problem.amplitude_hat, alpha, beta, np.exp(guess))
     surest = np.log(
         eigen[strong[0]] / problem.lambda_hat[undominated(problem.lambda_hat, problem.amplitude_hat)[-UNDOMINATED:]]
     )
@@ -192,3 +191,15 @@ def candidates(aim: Target, most: int) -> Array:
         )
         rows.append((alpha, beta, gamma, sigma))
     return np.asarray(np.clip(np.array(rows), problem.lower, problem.upper))
+
+
+def best_pairs(
+    reference: Points, lambda_hat: Array, amplitude_hat: Array, alpha_per_s: float, beta_s: float, gamma_m2_s2: Array
+) -> Array:
+    """(g,) Π_MRP at each γ with α, β held."""
+    return np.array(
+        [
+            match_ratio_product(reference, *modes_of(parameters, lambda_hat, amplitude_hat))
+            for parameters in (np.array([alpha_per_s, beta_s, gamma, 1.0]) for gamma in gamma_m2_s2)
+        ]
+    )

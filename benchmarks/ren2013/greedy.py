@@ -63,7 +63,8 @@ def greedy(signal: Array, sr: int, most: int, *, evaluations: int = 250) -> Arra
 
         def misfit(p: Array) -> float:
             one, _ = shape(p)
-            return float(((np.abs(before + np.exp(p[2] + 1j * p[3]) * one) ** 2 - hill) ** 2).sum() / (hill**2).sum())  # noqa: B023
+            left = np.abs(before + np.exp(p[2] + 1j * p[3]) * one) ** 2 - hill  # noqa: B023
+            return float((left**2).sum() / (hill**2).sum())  # noqa: B023
 
         start = np.array([freq_hz, np.log(np.clip(-slope / 2, 0.1, 1000.0)), 0.0, 0.0])
         one, _ = shape(start)

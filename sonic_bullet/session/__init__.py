@@ -26,78 +26,22 @@ from sonic_bullet.geometry import oversize
 from sonic_bullet.listener.world import World
 from sonic_bullet.machine.terminal import status
 from sonic_bullet.radiation.radiated import radiation_of
-from sonic_bullet.records import Air, Array, Material, Microphone, ModalModel, Sensor, Shape
+from sonic_bullet.records import Air, Array, Material, ModalModel, Sensor, Shape
 from sonic_bullet.records.coerce import (
     as_call,
-    as_items,
     as_kind,
-    as_kinds,
     as_number,
     as_path,
-    as_rows,
     as_whole,
     check_options,
 )
 from sonic_bullet.records.contacts import Event, Step
-from sonic_bullet.records.errors import AudioError, MaterialError, MeshError, ModalError, SceneError, SizeWarning
+from sonic_bullet.records.errors import AudioError, MeshError, ModalError, SceneError, SizeWarning
 from sonic_bullet.render import LATENCY_STEPS, Synthesizer
+from sonic_bullet.session.arguments import MicrophoneLike, as_material, as_sensors, as_shapes
 
 if TYPE_CHECKING:
     from sonic_bullet.modal import ModalOptions
-
-MicrophoneLike = Sequence[float] | Sequence[Sequence[float]] | Sensor | Sequence[Sensor] | Array
-
-
-def as_sensors(microphone: MicrophoneLike, name: str = "microphone") -> tuple[Sensor, ...]:
-    """Sensors of anything that names them: a point, several points, a sensor or several.
-
-    Raises RecordError where a point is not three finite numbers.
-    """
-    if isinstance(microphone, Sensor):
-        return (microphone,)
-    remedy = "give x, y, z in m, several such points, or sensors"
-    items = as_items(microphone, name, remedy)
-    if all(isinstance(item, Sensor) for item in items):
-        return items
-    points = items if any(isinstance(item, Iterable) for item in items) else (items,)
-    return tuple(Microphone(np.array(point)) for point in as_rows(points, name, 3, remedy))
-
-
-def as_material(material: str | Path | Material) -> Material:
-    """The material itself, or the preset of that name or path.
-
-    Raises MaterialError where it has no damping: it would ring for ever.
-    """
-    from sonic_bullet.effects.protocol import Effect
-    from sonic_bullet.presets import load_material
-
-    remedy = "give a name ('sonic-bullet materials' lists them), a preset file or a Material"
-    made = (
-        material
-        if isinstance(material, Material)
-        else load_material(as_path(material, "material", remedy, error=MaterialError))
-    )
-    if made.alpha_per_s is None:
-        raise MaterialError(f"material '{made.name}' states no damping", "give alpha_per_s and beta_s")
-    as_kinds(
-        made.effects,
-        Effect,
-        f"material '{made.name}': effects",
-        "give effects of sonic_bullet.effects",
-        error=MaterialError,
-    )
-    return made
-
-
-def as_shapes(mesh: str | Path | Shape | Sequence[Shape]) -> tuple[Shape, ...]:
-    """A mesh file, a shape or several as shapes in the body frame. Raises MeshError and FileError."""
-    from sonic_bullet.modal import read_mesh
-
-    if isinstance(mesh, Shape):
-        return (mesh,)
-    if isinstance(mesh, (str, Path)):
-        return (read_mesh(as_path(mesh, "mesh", "give a mesh file in metres")),)
-    return as_kinds(mesh, Shape, "mesh", "give a mesh file in metres, a Shape or several", error=MeshError)
 
 
 @contextmanager

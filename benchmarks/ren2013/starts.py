@@ -15,9 +15,9 @@ from itertools import combinations
 
 import numpy as np
 
+from benchmarks.ren2013.problem import Problem
 from sonic_bullet.estimator.lines.line_values import Features
 from sonic_bullet.estimator.perceptual.matching import energy
-from sonic_bullet.estimator.perceptual.problem import Problem
 from sonic_bullet.records import Array
 
 DOMINANT = 5

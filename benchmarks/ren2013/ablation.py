@@ -1,29 +1,27 @@
 """Do the recovered α, β, γ, σ hang on the metric's free constants, or on what full scale stands for?
 
-    python benchmarks/estimator_ablation.py [MATERIAL ...]
-
-The problems are those of estimator_speed.py: no parameters fit them exactly. Each row changes one constant and prints
-by how many percent the fast search's answer moves from that of the constants as shipped; "truth" says how far the
-shipped answer itself is from what was planted. The last row of each go down Π from a start off in all four, on a
-recording that the model can make exactly, features playing no part but in Π_MRP: its minimum is where the truth is,
-whatever the constants.
+The recordings are those of plates.py: no parameters fit them exactly. Each row changes one constant and prints by how
+many percent the fast search's answer moves from that of the constants as shipped; "truth" says how far the shipped
+answer itself is from what was planted. The last row of each goes down Π from a start off in all four, on a recording
+that the model can make exactly, features playing no part but in Π_MRP: its minimum is where the truth is, whatever the
+constants.
 """
 
 from __future__ import annotations
 
 import dataclasses
-import sys
 from typing import Any
 
 import numpy as np
-from estimator_speed import problem  # type: ignore[import-not-found]
 
+from benchmarks.ren2013.optimise import fast, polish
+from benchmarks.ren2013.plates import plate
+from benchmarks.ren2013.problem import Problem, modes_of
 from sonic_bullet.estimator.lines.line_values import Features
 from sonic_bullet.estimator.perceptual.metric import Constants
-from sonic_bullet.estimator.perceptual.optimise import fast, polish
-from sonic_bullet.estimator.perceptual.problem import Problem, modes_of
 from sonic_bullet.records import Array
 
+NAMES = ("metal", "glass", "wood")
 AWAY = np.array([1.1, 0.93, 1.01, 1.1])
 ROWS: tuple[tuple[str, Any], ...] = (
     ("bark_step", 0.25),
@@ -45,6 +43,7 @@ ROWS: tuple[tuple[str, Any], ...] = (
 
 
 def at_level(asked: Problem, full_scale_db_spl: float) -> Problem:
+    """The same problem, full scale standing for another level."""
     return dataclasses.replace(asked, full_scale_db_spl=full_scale_db_spl)
 
 
@@ -66,13 +65,15 @@ def exact(asked: Problem, truth: Array) -> Problem:
 
 
 def line(label: str, values: Array) -> None:
+    """One row: by how much the four numbers move."""
     print(f"  {label:20}" + "".join(f"{100 * value:+10.3f} %" for value in values), flush=True)
 
 
 def main(names: tuple[str, ...]) -> int:
+    """A block per material; 1 where Π alone misses what was planted by more than 1e-4."""
     worst = 0.0
     for name in names:
-        asked, truth = problem(name)
+        asked, truth = plate(name)
         base = fast(asked).parameters
         print(f"{name:22}{'α':>10}  {'β':>10}  {'γ':>10}  {'σ':>10}")
         line("truth", base / truth - 1)
@@ -94,12 +95,8 @@ def main(names: tuple[str, ...]) -> int:
         ]
         errors = np.max(clean_errors, axis=0)
         worst = max(worst, float(errors.max()))
+        said = " ".join(f"{error:.1e}" for error in errors)
         print(
-            f"  exact recording, Π alone from a start up to 10 % off, largest errors of {len(clean_errors)}: {' '.join(f'{error:.1e}' for error in errors)}\n",
-            flush=True,
+            f"  exact recording, Π alone from a start up to 10 % off, largest errors of {len(clean_errors)}: {said}\n"
         )
     return 0 if worst < 1e-4 else 1
-
-
-if __name__ == "__main__":
-    sys.exit(main(tuple(sys.argv[1:]) or ("metal", "glass", "wood")))

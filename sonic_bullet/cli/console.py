@@ -1,0 +1,98 @@
+"""From a command line to an exit code: what a shell sees of this package besides results.
+
+0 done | 2 a named error, in one line | 130 Ctrl-C | 143 terminated | 141 the reader left
+"""
+
+from __future__ import annotations
+
+import io
+import os
+import signal
+import sys
+from typing import NoReturn
+
+import click
+
+from sonic_bullet.records.errors import SonicBulletError, interrupts
+
+
+def run_and_exit(cli: click.Group) -> NoReturn:
+    """Run the command that the command line asks for, turn every error into one line on stderr, and exit."""
+    import logging
+    import warnings
+
+    debug = bool(os.environ.get("SONIC_BULLET_DEBUG"))
+    if not debug:
+        warnings.simplefilter("ignore")  # a library's warning is no line of ours
+        logging.getLogger("matplotlib").setLevel(logging.ERROR)  # nor that it found no home for its fonts
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")  # a terminal without Greek letters still gets its table
+    signal.signal(signal.SIGTERM, _terminated)
+    try:
+        # cli.main() would swallow what an interrupt says
+        with interrupts(), cli.make_context("sonic-bullet", _settled(sys.argv[1:]) or ["--help"]) as context:
+            cli.invoke(context)
+        _say_what_is_not_kept()
+        sys.stdout.flush()
+        sys.exit(0)
+    except click.exceptions.Exit as done:
+        code = done.exit_code
+    except KeyboardInterrupt as error:
+        code = 143 if str(error).startswith("terminated") else 130
+        _say(str(error) or "stopped")
+    except click.ClickException as error:
+        where = getattr(error, "ctx", None)
+        code, hint = 2, f"; see '{where.command_path} --help'" if where is not None else ""
+        _say(error.format_message().rstrip(".") + hint)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # the reader left; flushing at exit must not complain
+        code = 141
+    except SonicBulletError as error:
+        if debug:
+            raise
+        code = 2
+        _say(str(error))
+    except Exception as error:
+        if debug:
+            raise
+        code = 2
+        notes = "; ".join(getattr(error, "__notes__", []))
+        _say(
+            f"{type(error).__name__}: {error}"
+            + (f"; {notes}" if notes else "")
+            + "; set SONIC_BULLET_DEBUG=1 to see where"
+        )
+    sys.exit(code)
+
+
+def _settled(words: list[str]) -> list[str]:
+    """The command line with every --json that no name ending in .json follows as --json=-: what follows is another
+    argument then.
+    """
+    follows = [*words[1:], ""]
+    return [
+        "--json=-" if word == "--json" and not after.lower().endswith(".json") else word
+        for word, after in zip(words, follows, strict=True)
+    ]
+
+
+def _terminated(*_: object) -> None:
+    raise KeyboardInterrupt("terminated")
+
+
+def _say_what_is_not_kept() -> None:
+    """One note where there was no folder for compiled code and computed models: each run then takes a minute that the
+    next could do without.
+    """
+    folder = sys.modules.get("sonic_bullet.machine.user_folder")
+    if folder is not None and folder.NOTES:
+        _say(
+            f"note: compiled code and computed models are not kept for the next run: {folder.NOTES[0]}; "
+            "XDG_CACHE_HOME names another folder"
+        )
+
+
+def _say(text: str) -> None:
+    """One line on stderr."""
+    print("sonic-bullet: " + " ".join(text.split()), file=sys.stderr)

@@ -1,0 +1,114 @@
+"""Types of values and options that several commands share."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+
+class Numbers(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # generic since click 8.3
+    """``count`` finite numbers, separated by commas."""
+
+    def __init__(self, metavar: str) -> None:
+        self.name, self.count = metavar, metavar.count(",") + 1
+
+    def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:
+        """What help calls the value."""
+        return self.name
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, ...]:
+        """The numbers in ``value``; click's usage error where there are not ``count`` finite ones."""
+        if isinstance(value, tuple):
+            return value
+        try:
+            numbers = tuple(float(part) for part in str(value).split(","))
+        except ValueError:
+            numbers = ()
+        if len(numbers) != self.count or not all(abs(number) < float("inf") for number in numbers):
+            self.fail(f"{value!r} is not {self.name}: {self.count} finite numbers with commas between", param, ctx)
+        return numbers
+
+
+json_option = click.option(
+    "--json",
+    "json_to",
+    is_flag=False,
+    flag_value="-",
+    metavar="[PATH.json]",
+    help="Write the result as JSON to PATH.json, or alone to stdout.",
+)
+
+channel_option = click.option(
+    "--channel",
+    type=click.IntRange(0),
+    metavar="N",
+    help="Which channel of a file of several, counted from 0. [default: the first, 0]",
+)
+
+
+def strike_options(command: Any) -> Any:
+    """The options that say how one recording was struck and recorded; a case says it itself."""
+    for option in reversed(
+        (
+            click.option("--mesh", metavar="M", help="Mesh of what was struck."),
+            click.option("--strike", type=Numbers("X,Y,Z"), help="Where it was struck, in m, mesh frame."),
+            click.option(
+                "--direction", type=Numbers("X,Y,Z"), help="Direction of the impulse. [default: into the surface]"
+            ),
+            click.option(
+                "--impulse",
+                type=click.FloatRange(0, min_open=True),
+                metavar="J",
+                help="Impulse in N·s; without it sigma stands for gain times impulse.",
+            ),
+            click.option(
+                "--material",
+                metavar="GUESS",
+                help="A name ('sonic-bullet materials') or a preset file: E and density good to 30 %.",
+            ),
+            click.option(
+                "--scale",
+                type=float,
+                metavar="S",
+                help="Metres per mesh unit: 0.001 for a mesh in millimetres. [default: 1]",
+            ),
+            click.option(
+                "--sensor",
+                type=click.Choice(["sum", "pressure", "velocity"]),
+                help="What was recorded: plain sum of modes, a microphone, a surface. [default: pressure]",
+            ),
+            click.option(
+                "--sensor-at",
+                type=Numbers("X,Y,Z"),
+                help="Where the surface was measured, in m, for --sensor velocity.",
+            ),
+            click.option(
+                "--sensor-direction",
+                type=Numbers("X,Y,Z"),
+                help="Along which, for --sensor velocity. [default: out of the surface]",
+            ),
+            click.option(
+                "--medium",
+                type=click.Choice(["air", "none"]),
+                help="What it rang in: 'none' loses nothing to radiation. [default: air; with --sensor sum unknown]",
+            ),
+            click.option(
+                "--onset",
+                "onset_s",
+                type=click.FloatRange(0),
+                metavar="S",
+                help="When the impulse arrives. [default: found]",
+            ),
+            channel_option,
+            click.option(
+                "--fix",
+                "fixed",
+                type=Numbers("X,Y,Z,R"),
+                multiple=True,
+                help="Clamp all within R of a point, in m, mesh frame; repeatable.",
+            ),
+        )
+    ):
+        command = option(command)
+    return command

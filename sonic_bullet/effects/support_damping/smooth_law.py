@@ -1,0 +1,33 @@
+"""A smooth law of damping that lines with dashpots lie above.
+
+d(ω) = ½[a + bω + cω² + Σ_j e_j (ωτ_j)²/(1 + (ωτ_j)²)]: a discrete spectrum of relaxations, as of a passive solid
+    [Nowick & Berry 1972, ch. 3]
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sonic_bullet.effects.common.points import solved
+from sonic_bullet.records import Array
+
+LOW = 0.3  # of a line's spread where it lies under the least law
+# of relaxations that peak in what is heard, between slow ones, whose decay is a constant, and fast ones, whose goes as
+# ω²
+TAU_S = (1e-5, 3e-5, 1e-4)
+
+
+def smooth_columns(omega: Array) -> Array:
+    """Columns (k, 3 + τ) of a smooth law of ω (k,)."""
+    peak = [(omega * tau) ** 2 / (1 + (omega * tau) ** 2) for tau in TAU_S]
+    return 0.5 * np.stack([np.ones(len(omega)), omega / 1e4, (omega / 1e4) ** 2, *peak], axis=1)
+
+
+def least_law(omega: Array, decay: Array) -> Array:
+    """The smooth law (c,) that most lines (k,) lie above: a dashpot only adds. An expectile [Newey & Powell 1987]."""
+    column, above = smooth_columns(omega), np.ones(len(omega), bool)
+    value = np.zeros(column.shape[1])
+    for _ in range(10):
+        value, _ = solved(decay, np.where(above, 1.0, LOW) * decay, column)
+        above = decay > column @ value
+    return value

@@ -1,0 +1,97 @@
+"""A body's modes for every isotropic material, in one reduced basis (reduced.py makes it).
+
+K(E, ν) = E [ l(ν) K_l + s(ν) K_s ],   l = ν/((1+ν)(1−2ν)),  s = 1/(2(1+ν))
+    [Hughes 1987, ch. 2.7]
+(l VᵀK_lV + s VᵀK_sV) q = θ q,  λ = γ θ/L²,  γ = E/ρ, lengths by the body's diagonal L
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from sonic_bullet.geometry.nearest_point import closest_point
+from sonic_bullet.records import Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Family:
+    """A body's modes for every γ = E/ρ and ν. lame, shear (b, b): reduced stiffness. skin (v, 3, b) float32: the basis
+    on the surface at ρL³ = 1 kg.
+
+    vertex_m (v, 3), face (4t, 3): the surface, each element's face cut in four. count: how many of the lowest modes are
+    true. meshed: False where no element's error is in λ.
+    """
+
+    lame: Array
+    shear: Array
+    skin: Array
+    vertex_m: Array
+    face: Array
+    length_m: float
+    volume_m3: float
+    count: int
+    note: str
+    meshed: bool = True
+
+    def modes(self, gamma_m2_s2: float, poisson: float) -> tuple[Array, Array]:
+        """λ (m,) in 1/s² ascending, and the modes (b, m) in the basis: `points` turns them into shapes."""
+        value, vector = np.linalg.eigh(_stiffness(self, poisson))
+        return value[: self.count] * gamma_m2_s2 / self.length_m**2, vector[:, : self.count]
+
+    def slope(self, poisson: float, vector: Array) -> Array:
+        """∂ ln λ/∂ν (m,) of modes (b, m) at ν. Source: Hellmann-Feynman, λ' = qᵀK'q."""
+        lame = (1 + 2 * poisson**2) / ((1 + poisson) ** 2 * (1 - 2 * poisson) ** 2)
+        shear = -1 / (2 * (1 + poisson) ** 2)
+        bent = np.einsum("bm,bc,cm->m", vector, lame * self.lame + shear * self.shear, vector)
+        return np.asarray(bent / np.einsum("bm,bc,cm->m", vector, _stiffness(self, poisson), vector))
+
+    def points(self, position_m: Array, direction: Array) -> tuple[Array, Array]:
+        """Basis (k, b) at the surface points nearest to position_m (k, 3), along direction (k, 3), and how far off (k,)
+        in m they lie.
+
+        Divide by √(ρL³) for shapes per √kg. Quadratic over each element's face, as the elements themselves are.
+        """
+        moved, distance = self._moved(position_m)
+        return np.einsum("kxb,kx->kb", moved.astype(float), direction), distance
+
+    def skin_at(self, position_m: Array) -> Array:
+        """The basis (k, 3, b) float32, as `skin`, at the surface points nearest to position_m (k, 3): on another mesh
+        of the same surface.
+        """
+        if position_m.shape == self.vertex_m.shape and (position_m == self.vertex_m).all():
+            return self.skin
+        return self._moved(position_m)[0].astype(np.float32)
+
+    def _moved(self, position_m: Array) -> tuple[Array, Array]:
+        """The basis (k, 3, b) at the surface points nearest to position_m (k, 3), and how far off (k,) they lie."""
+        face, weight, distance = closest_point(self.vertex_m, self.face, np.asarray(position_m, float))
+        moved = np.empty((len(face), *self.skin.shape[1:]))
+        for i, (f, w) in enumerate(zip(face, weight, strict=True)):
+            node, share = _quadratic(self.face[f // 4 * 4 : f // 4 * 4 + 4], int(f % 4), w)
+            moved[i] = np.tensordot(share, self.skin[node].astype(float), 1)
+        return moved, distance
+
+
+def _stiffness(family: Family, poisson: float) -> Array:
+    return np.asarray(mixed(poisson, family.lame, family.shear))
+
+
+def _quadratic(quarters: Array, which: int, weight: Array) -> tuple[Array, Array]:
+    """The six nodes of an element's face and their shape functions at barycentric ``weight`` of one of its quarters
+    (see solid.QUARTERS).
+    """
+    middle = quarters[3]
+    node = np.array([quarters[0, 0], quarters[1, 1], quarters[2, 2], *middle])
+    # of nodes 0-2, then edges 01, 12, 20
+    corner = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [0.5, 0.5, 0], [0, 0.5, 0.5], [0.5, 0, 0.5]])
+    place = {int(n): corner[k] for k, n in enumerate(node)}
+    a, b, c = weight @ np.array([place[int(n)] for n in quarters[which]])
+    return node, np.array([a * (2 * a - 1), b * (2 * b - 1), c * (2 * c - 1), 4 * a * b, 4 * b * c, 4 * c * a])
+
+
+def mixed(poisson: float, lame: Any, shear: Any) -> Any:
+    """The stiffness at E = 1 of its two parts, dense or sparse."""
+    return poisson / ((1 + poisson) * (1 - 2 * poisson)) * lame + shear / (2 * (1 + poisson))

@@ -1,0 +1,66 @@
+"""What a user may give for a sensor, a material or a shape, made into the record of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from sonic_bullet.records import Array, Material, Microphone, Sensor, Shape
+from sonic_bullet.records.coerce import as_items, as_kinds, as_path, as_rows
+from sonic_bullet.records.errors import MaterialError, MeshError
+
+MicrophoneLike = Sequence[float] | Sequence[Sequence[float]] | Sensor | Sequence[Sensor] | Array
+
+
+def as_sensors(microphone: MicrophoneLike, name: str = "microphone") -> tuple[Sensor, ...]:
+    """Sensors of anything that names them: a point, several points, a sensor or several.
+
+    Raises RecordError where a point is not three finite numbers.
+    """
+    if isinstance(microphone, Sensor):
+        return (microphone,)
+    remedy = "give x, y, z in m, several such points, or sensors"
+    items = as_items(microphone, name, remedy)
+    if all(isinstance(item, Sensor) for item in items):
+        return items
+    points = items if any(isinstance(item, Iterable) for item in items) else (items,)
+    return tuple(Microphone(np.array(point)) for point in as_rows(points, name, 3, remedy))
+
+
+def as_material(material: str | Path | Material) -> Material:
+    """The material itself, or the preset of that name or path.
+
+    Raises MaterialError where it has no damping: it would ring for ever.
+    """
+    from sonic_bullet.effects.protocol import Effect
+    from sonic_bullet.presets import load_material
+
+    remedy = "give a name ('sonic-bullet materials' lists them), a preset file or a Material"
+    made = (
+        material
+        if isinstance(material, Material)
+        else load_material(as_path(material, "material", remedy, error=MaterialError))
+    )
+    if made.alpha_per_s is None:
+        raise MaterialError(f"material '{made.name}' states no damping", "give alpha_per_s and beta_s")
+    as_kinds(
+        made.effects,
+        Effect,
+        f"material '{made.name}': effects",
+        "give effects of sonic_bullet.effects",
+        error=MaterialError,
+    )
+    return made
+
+
+def as_shapes(mesh: str | Path | Shape | Sequence[Shape]) -> tuple[Shape, ...]:
+    """A mesh file, a shape or several as shapes in the body frame. Raises MeshError and FileError."""
+    from sonic_bullet.modal import read_mesh
+
+    if isinstance(mesh, Shape):
+        return (mesh,)
+    if isinstance(mesh, (str, Path)):
+        return (read_mesh(as_path(mesh, "mesh", "give a mesh file in metres")),)
+    return as_kinds(mesh, Shape, "mesh", "give a mesh file in metres, a Shape or several", error=MeshError)

@@ -1,0 +1,76 @@
+"""A model and a contact log of random numbers, with everything in them that a file can hold."""
+
+from __future__ import annotations
+
+import struct
+
+import numpy as np
+
+from sonic_bullet.files.contact_log import ContactLog
+from sonic_bullet.records import Air, Body, Material, Microphone, ModalModel, ModalSum, Vibrometer
+from sonic_bullet.records.contacts import ROW_FIELDS, Contacts, Event, Step
+
+
+def model(seed: int = 0, modes: int = 3) -> ModalModel:
+    rng = np.random.default_rng(seed)
+    decay = rng.uniform(1, 9, modes)
+    decay[:1] = np.nan
+    return ModalModel(
+        freq_hz=np.sort(rng.uniform(100, 9000, modes)),
+        decay_per_s=decay,
+        shape=rng.normal(size=(4, 3, modes)),
+        vertex_m=rng.normal(size=(4, 3)),
+        face=[[0, 1, 2], [0, 2, 3]],
+        curvature_per_m=rng.normal(size=2),
+        volume_m3=1e-3 / 3,
+        mass_kg=0.1,
+        dropped=2,
+        note="P2, edge 1 mm \u03b1",
+    )
+
+
+def log(seed: int = 0, steps: int = 5) -> ContactLog:
+    rng = np.random.default_rng(seed)
+    wood = Material.isotropic(
+        "wood", youngs_pa=1.1e10 / 3, poisson=0.3, density_kg_m3=700.1, alpha_per_s=0.1, beta_s=1 / 3e7, source="x"
+    )
+    bare = Material.isotropic("bare", youngs_pa=1e9, poisson=0.1, density_kg_m3=1.0)
+    bodies = (
+        Body(0, -1, 0, "plane", 0.0, np.zeros((3, 3)), material=bare),
+        Body(1, -1, 0, "cup \ud800 \u00e9", 0.1, np.diag(rng.uniform(size=3)), 1e-4, 3.7, wood, model(1)),
+        Body(1, 0, 1, "handle", 0.2, np.eye(3), material=wood, model=model(1), since_step=2, until_step=4),
+        Body(7, -1, 1, "other", 0.2, np.eye(3), model=model(2, modes=0)),
+    )
+
+    def step(i: int) -> Step:
+        b, k = min(2 + i, 4), int(rng.integers(0, 4))
+        rows = {name: rng.normal(size=(k, *tail)) for name, (_, tail) in ROW_FIELDS.items()}
+        rows["a"], rows["b"] = rng.integers(0, b, k), rng.integers(0, b, k)
+        return Step(
+            1 / (240 + i),
+            rng.normal(size=(b, 3)) / 3,
+            rng.normal(size=(b, 4)) / 7,
+            rng.random(b) < 0.3,
+            Contacts(**rows),
+        )
+
+    sensors = (Microphone([0.1, -1 / 3, 1e-300]), Vibrometer(1, [1 / 3, 2 / 3, 0], [1, 2, 3 / 7], 0), ModalSum(1 / 7))
+    events = (Event("quench", 0), Event("quench", 3), Event("quench", 3))
+    return ContactLog(
+        bodies, tuple(step(i) for i in range(steps)), sensors, 44_100, 2**40 + 1, Air(1.19, 340.1 / 3), events=events
+    )
+
+
+def same(x: object, y: object) -> bool:
+    """Equal to the last bit, NaN to NaN, through tuples, records and arrays."""
+    if isinstance(x, np.ndarray):
+        return isinstance(y, np.ndarray) and x.dtype == y.dtype and x.shape == y.shape and x.tobytes() == y.tobytes()
+    if isinstance(x, tuple):
+        return isinstance(y, tuple) and len(x) == len(y) and all(same(a, b) for a, b in zip(x, y, strict=True))
+    if hasattr(x, "__dataclass_fields__"):
+        return type(x) is type(y) and all(same(getattr(x, name), getattr(y, name)) for name in x.__dataclass_fields__)
+    if isinstance(x, float):
+        return isinstance(y, float) and struct.pack("d", x) == struct.pack("d", y)
+    if isinstance(x, str):
+        return isinstance(y, str) and x.encode("utf-8", "replace") == y.encode("utf-8", "replace")
+    return x == y
