@@ -20,6 +20,7 @@ import warnings
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -249,7 +250,7 @@ def _run_built(stage: _Stage, seconds: float | None, progress: Progress | None, 
     places = stage.microphones if stage.microphones is not None else getattr(module, "MICROPHONE", (0.0, -1.0, 0.5))
     stage.listener = listener = attach(client, sr=stage.sr, microphone=places, seed=stage.seed)
     stage.microphones = None
-    _user_code(stage.path, _add_cast, listener, cast, say)
+    _user_code(stage.path, partial(listener.add_all, cast, progress=say))
     act = getattr(module, "act", None)
     total = (
         seconds
@@ -263,12 +264,6 @@ def _run_built(stage: _Stage, seconds: float | None, progress: Progress | None, 
         if progress is not None:
             progress(min(listener.time_s / total, 1.0))
     return ()
-
-
-def _add_cast(listener: Listener, cast: dict[Any, Any], say: Say | None) -> None:
-    for who, how in cast.items():
-        body, link = who if isinstance(who, tuple) else (who, -1)
-        listener.add(body, link, **{"progress": say, **(how if isinstance(how, dict) else {"material": how})})
 
 
 def _run_plain(stage: _Stage, seconds: float | None, progress: Progress | None, say: Say | None) -> tuple[str, ...]:
@@ -294,10 +289,10 @@ def _run_plain(stage: _Stage, seconds: float | None, progress: Progress | None, 
     def before(client: int) -> None:
         if stage.listener is None:
             stage.listener = attach(client, sr=stage.sr, microphone=places, seed=stage.seed)
-        for body, link in links_with_shapes(client):
-            if (body, link) not in known:
-                known.add((body, link))
-                stage.listener.add(body, link, material=material, progress=say)
+        new = [who for who in links_with_shapes(client) if who not in known]
+        if new:
+            known.update(new)
+            stage.listener.add_all(dict.fromkeys(new, material), progress=say)
 
     def after(_: int) -> None:
         stage.need_listener().step()

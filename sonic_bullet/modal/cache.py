@@ -99,6 +99,12 @@ def key(kind: str, *parts: Array | str | float | int | None, code: bytes | None 
     return f"{kind}-{digest.hexdigest()}"
 
 
+def holds(place: Place, name: str) -> bool:
+    """Whether there is an entry of that name, sound or not."""
+    at = folder(place)
+    return at is not None and (at / f"{name}.npz").is_file()
+
+
 def load(place: Place, name: str, layout: Layout) -> tuple[dict[str, Array], str] | None:
     """Arrays and note kept under ``name``, or None where there is no such entry, or not the one that was kept, or none
     of that layout.

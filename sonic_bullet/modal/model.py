@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
@@ -99,21 +99,14 @@ def analyse(
             0.0,
             note="plane: unbounded, no modes",
         )
-    solid_key = _solid_key(shapes, thickness_m, edge_m)
-    length_m = _diagonal_m(shapes)
-    pascal = float(np.abs(material.stiffness_pa).max())
-    per_s2 = pascal / (material.density_kg_m3 * length_m**2)
-    limit = (2 * np.pi * to_hz) ** 2 / per_s2
-    clamp = np.array(asked.fixed, float).reshape(-1, 4)
-    unit_stiffness = material.stiffness_pa / pascal
-    name = store.key("modes", solid_key, unit_stiffness, clamp, count if count is not None else limit)
-    unit = _recall(store.load(cache, name, MODES))
+    of = _unit_of(shapes, material, asked, edge_m)
+    unit = _recall(store.load(cache, of.name, MODES))
     if unit is None:
         unit = _solve(
-            shapes, (edge_m, thickness_m), (cache, solid_key), length_m, unit_stiffness, clamp, count, limit, say
+            shapes, (edge_m, thickness_m), (cache, of.solid), of.length_m, of.stiffness, of.clamp, count, of.limit, say
         )
-        store.save(cache, name, _arrays(unit), unit.note)
-    lam = unit.value * per_s2
+        store.save(cache, of.name, _arrays(unit), unit.note)
+    lam = unit.value * of.per_s2
     freq, decay, alive = damped(lam, material)
     note = unit.note
     if count is None and len(lam) == MOST_MODES and lam[-1] * 1.01 < (2 * np.pi * to_hz) ** 2:
@@ -121,7 +114,7 @@ def analyse(
     dropped = len(lam) - len(alive)
     if dropped:
         note += f"; {dropped} overdamped modes dropped"
-    volume = unit.volume * length_m**3
+    volume = unit.volume * of.length_m**3
     mass = volume * material.density_kg_m3
     large = oversize(unit.vertex_m, mass)
     if large:
@@ -129,7 +122,7 @@ def analyse(
     return ModalModel(
         freq_hz=freq,
         decay_per_s=decay,
-        shape=unit.vector[:, :, alive] / np.float32(np.sqrt(material.density_kg_m3 * length_m**3)),
+        shape=unit.vector[:, :, alive] / np.float32(np.sqrt(material.density_kg_m3 * of.length_m**3)),
         vertex_m=unit.vertex_m,
         face=unit.face,
         curvature_per_m=unit.curvature_per_m,
@@ -139,6 +132,44 @@ def analyse(
         note=note,
         includes_radiation=material.includes_radiation,
     )
+
+
+def missing_name(
+    shapes: tuple[Shape, ...], material: Material, options: ModalOptions, cache: store.Place = "default"
+) -> str | None:
+    """Under which name `analyse` would keep the modes of these shapes, None where they are kept already, have no place
+    to be kept in, or are none, as a plane's. Raises MeshError.
+    """
+    if not shapes or any(shape.kind == "plane" for shape in shapes) or store.folder(cache) is None:
+        return None
+    name = _unit_of(shapes, material, options, None).name
+    return None if store.holds(cache, name) else name
+
+
+class _UnitOf(NamedTuple):
+    """What a body without units is found by. name: of its modes in the cache; solid: of its filling. length_m, per_s2:
+    what lengths and eigenvalues are divided by. limit: of the eigenvalues asked for; stiffness (6, 6), clamp (k, 4).
+    """
+
+    name: str
+    solid: str
+    length_m: float
+    per_s2: float
+    limit: float
+    stiffness: Array
+    clamp: Array
+
+
+def _unit_of(shapes: tuple[Shape, ...], material: Material, asked: ModalOptions, edge_m: float | None) -> _UnitOf:
+    solid = _solid_key(shapes, asked.thickness_m, edge_m)
+    length_m = _diagonal_m(shapes)
+    pascal = float(np.abs(material.stiffness_pa).max())
+    per_s2 = pascal / (material.density_kg_m3 * length_m**2)
+    limit = (2 * np.pi * asked.to_hz) ** 2 / per_s2
+    clamp = np.array(asked.fixed, float).reshape(-1, 4)
+    stiffness = material.stiffness_pa / pascal
+    name = store.key("modes", solid, stiffness, clamp, asked.count if asked.count is not None else limit)
+    return _UnitOf(name, solid, length_m, per_s2, limit, stiffness, clamp)
 
 
 def surface_of(

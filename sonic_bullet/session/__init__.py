@@ -11,12 +11,11 @@ from __future__ import annotations
 
 import inspect
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager, nullcontext
-from dataclasses import asdict, replace
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import nullcontext
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -25,39 +24,19 @@ from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.geometry import oversize
 from sonic_bullet.listener.world import World
 from sonic_bullet.machine.terminal import status
-from sonic_bullet.radiation.radiated import radiation_of
 from sonic_bullet.records import Air, Array, Material, ModalModel, Sensor, Shape
 from sonic_bullet.records.coerce import (
     as_call,
     as_kind,
-    as_number,
     as_path,
     as_whole,
     check_options,
 )
 from sonic_bullet.records.contacts import Event, Step
-from sonic_bullet.records.errors import AudioError, MeshError, ModalError, SceneError, SizeWarning
+from sonic_bullet.records.errors import AudioError, SceneError, SizeWarning
 from sonic_bullet.render import LATENCY_STEPS, Synthesizer
-from sonic_bullet.session.arguments import MicrophoneLike, as_material, as_sensors, as_shapes
-
-if TYPE_CHECKING:
-    from sonic_bullet.modal import ModalOptions
-
-
-@contextmanager
-def _naming(link: str, of: int) -> Iterator[None]:
-    """Errors of a link's mesh or modes name that link, one of ``of``, and what can be done about it here."""
-    try:
-        yield
-    except (MeshError, ModalError) as error:
-        rest = "; or give another shape with mesh=" + (
-            ", or add the other links one by one, by their names" if of > 1 else ""
-        )
-        raise type(error)(f"{link}: {error.what}", error.remedy + rest) from error
-
-
-def _headed(say: Callable[[str], None], head: str) -> Callable[[str], None]:
-    return lambda text: say(f"{head}: {text}")
+from sonic_bullet.session.arguments import MicrophoneLike, as_sensors
+from sonic_bullet.session.wanted_bodies import WantedBody, solved_bodies, wanted_body
 
 
 def attach(
@@ -84,6 +63,12 @@ def _opened(client: Any) -> World:
     from sonic_bullet.listener import open_world
 
     return open_world(client)
+
+
+def _wanted(world: World, who: Any, how: Any) -> WantedBody:
+    """One entry of a cast."""
+    body, link = who if isinstance(who, tuple) else (who, -1)
+    return wanted_body(world, body, link, **(how if isinstance(how, Mapping) else {"material": how}))
 
 
 class Listener:
@@ -135,85 +120,37 @@ class Listener:
         link larger than anything that is struck to sound. Raises SceneError (unknown body or link), MaterialError,
         MeshError, ModalError naming body and link, RecordError.
         """
-        from sonic_bullet.effects.presets_of_effects import with_material
-        from sonic_bullet.modal import ModalOptions
+        how: dict[str, Any] = {
+            "material": material, "mesh": mesh, "model": model, "roughness_m": roughness_m, "fixed": fixed,
+            "thickness_m": thickness_m, "to_hz": to_hz, "count": count,
+        }  # fmt: skip
+        return self.add_all({(body, link): how}, progress=progress)[0]
 
-        made = as_material(material)
-        if roughness_m is not None:
-            made = replace(
-                made,
-                roughness_m=as_number(roughness_m, "roughness_m", "give an rms height in m, zero or above", least=0),
-            )
-        made = with_material(made)
-        options = ModalOptions(to_hz=to_hz, count=count, fixed=fixed, thickness_m=thickness_m)
-        if model is not None:
-            as_kind(model, ModalModel, "model", "give a ModalModel, or leave it out", error=ModalError)
+    def add_all(
+        self, cast: Mapping[Any, Any], *, progress: Callable[[str], None] | None = None
+    ) -> list[tuple[ModalModel, ...]]:
+        """Let several bodies sound, all of them or, where one fails, none; the modal models of each one's links.
+
+        cast: from a body, (body, link) or (body, "all") to its material, or to keywords of `add`. What was never
+        computed before is computed side by side, on two cores. progress, warnings, errors: as `add` has them.
+        """
         as_call(progress, "progress")
-        body, links = self.world.links_called(body, link)
-        given = None if mesh is None else as_shapes(mesh)
-        parts = []
-        for one in links:
-            name = self.world.name_of(body, one)
-            with _naming(name, len(links)):
-                parts.append((name, self.world.shapes_of(body, one) if given is None else given))
+        wanted = [_wanted(self.world, who, how) for who, how in cast.items()]
+        known = (body.model for body in self.world.bodies if body.model is not None)
         with status("sonic_bullet") if progress is None else nullcontext(progress) as say:
-            models = [model] * len(parts) if model is not None else self._solved(parts, made, options, say)
-            for (name, _), solved in zip(parts, models, strict=True):
-                if self.sensors and solved.mode_count:
-                    say(f"how {solved.mode_count} modes of {name} radiate")
-                    radiation_of(solved, self.air)
-        for one, (_, shapes), solved in zip(links, parts, models, strict=True):
-            self.world.add(body, one, material=made, model=solved, shapes=shapes)
-        for one, (name, _), solved in zip(links, parts, models, strict=True):
-            if large := oversize(solved.vertex_m, solved.mass_kg):
-                remedy = "load it with globalScaling=0.001, or give its mesh in metres, if its numbers are millimetres"
-                warnings.warn(f"body {body} link {one} ({name}) {large}; {remedy}", SizeWarning, stacklevel=2)
-        return tuple(models)
-
-    def _solved(
-        self,
-        parts: Sequence[tuple[str, tuple[Shape, ...]]],
-        material: Material,
-        options: ModalOptions,
-        say: Callable[[str], None],
-    ) -> list[ModalModel]:
-        """The modal models of named links (name, shapes).
-
-        What fails shall fail early: all are looked at first, and the most intricate is filled first.
-        """
-        from sonic_bullet import modal
-        from sonic_bullet.effects.presets_of_effects import with_modes
-
-        triangles = [0] * len(parts)
-        for i, (name, shapes) in enumerate(parts if len(parts) > 1 else ()):
-            with _naming(name, len(parts)):
-                triangles[i] = modal.check_fillable(shapes, options.thickness_m)
-        models: dict[int, ModalModel] = {}
-        for i in sorted(range(len(parts)), key=lambda i: -triangles[i]):
-            name, shapes = parts[i]
-            head = f"modes of {name}" + (f", {len(models) + 1} of {len(parts)}" if len(parts) > 1 else "")
-            if len(parts) > 1:
-                say(head)
-            with _naming(name, len(parts)):
-                solved = modal.analyse(shapes, material, **asdict(options), progress=_headed(say, head))
-                models[i] = self._shared(with_modes(solved, material), models.values())
-        return [models[i] for i in range(len(parts))]
-
-    def _shared(self, model: ModalModel, fresh: Iterable[ModalModel]) -> ModalModel:
-        """The model itself, or the same one that a body has already or is about to have: equal bodies then share memory
-        and what is derived from it.
-        """
-        known = (*(body.model for body in self.world.bodies if body.model is not None), *fresh)
-        same = (
-            other
-            for other in known
-            if other.includes_radiation == model.includes_radiation
-            and all(
-                np.array_equal(getattr(other, name), getattr(model, name))
-                for name in ("freq_hz", "decay_per_s", "vertex_m", "face", "shape")
-            )
-        )
-        return next(same, model)
+            models = solved_bodies(wanted, known, self.air if self.sensors else None, say)
+        for one, mine in zip(wanted, models, strict=True):
+            for link, (_, shapes), model in zip(one.links, one.parts, mine, strict=True):
+                self.world.add(one.body, link, material=one.material, model=model, shapes=shapes)
+        for one, mine in zip(wanted, models, strict=True):
+            for link, (name, _), model in zip(one.links, one.parts, mine, strict=True):
+                if large := oversize(model.vertex_m, model.mass_kg):
+                    remedy = (
+                        "load it with globalScaling=0.001, or give its mesh in metres, if its numbers are millimetres"
+                    )
+                    said = f"body {one.body} link {link} ({name}) {large}; {remedy}"
+                    warnings.warn(said, SizeWarning, stacklevel=3)
+        return [tuple(mine) for mine in models]
 
     def step(self) -> Array:
         """Take in the physics step just made; returns `frame`.

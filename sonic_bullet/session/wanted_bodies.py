@@ -1,0 +1,197 @@
+"""Bodies that shall sound: what was asked for, checked, and their modes, computed side by side where there are several.
+
+    add's arguments -> WantedBody, nothing changed yet -> solved_bodies -> a modal model a link, its radiation known
+
+What the cache lacks is worked on by two processes, each taking the next: modes and radiation of a link, and the run
+time's machine code, which a first scene needs as well. They hand nothing over but cache entries; then all is gone
+through in order, one after another, as if there had been one process: the same models, the same errors.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from sonic_bullet.listener.world import World
+from sonic_bullet.parallel import one_thread, parallel_map
+from sonic_bullet.radiation.radiated import radiation_of
+from sonic_bullet.records import Air, Material, ModalModel, Shape
+from sonic_bullet.records.coerce import as_kind, as_number
+from sonic_bullet.records.errors import MeshError, ModalError, SonicBulletError
+from sonic_bullet.render import make_ready
+from sonic_bullet.session.arguments import as_material, as_shapes
+
+if TYPE_CHECKING:
+    from sonic_bullet.modal import ModalOptions
+
+Say = Callable[[str], None]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WantedBody:
+    """A body and the links of it that shall sound. parts: name and shapes of each; model: of all, where it is given."""
+
+    body: int
+    links: tuple[int, ...]
+    parts: tuple[tuple[str, tuple[Shape, ...]], ...]
+    material: Material
+    options: ModalOptions
+    model: ModalModel | None
+
+
+def wanted_body(
+    world: World,
+    body: object,
+    link: object = -1,
+    *,
+    material: str | Path | Material,
+    mesh: str | Path | Shape | Sequence[Shape] | None = None,
+    model: ModalModel | None = None,
+    roughness_m: float | None = None,
+    **options: Any,
+) -> WantedBody:
+    """What `Listener.add` was asked for. options: of modal.ModalOptions. Raises what add raises."""
+    from sonic_bullet.effects.presets_of_effects import with_material
+    from sonic_bullet.modal import ModalOptions
+
+    made = as_material(material)
+    if roughness_m is not None:
+        remedy = "give an rms height in m, zero or above"
+        made = replace(made, roughness_m=as_number(roughness_m, "roughness_m", remedy, least=0))
+    made = with_material(made)
+    asked = ModalOptions(**options)
+    if model is not None:
+        as_kind(model, ModalModel, "model", "give a ModalModel, or leave it out", error=ModalError)
+    number, links = world.links_called(body, link)
+    given = None if mesh is None else as_shapes(mesh)
+    parts = []
+    for one in links:
+        name = world.name_of(number, one)
+        with _naming(name, len(links)):
+            parts.append((name, world.shapes_of(number, one) if given is None else given))
+    return WantedBody(number, links, tuple(parts), made, asked, model)
+
+
+@contextmanager
+def _naming(link: str, of: int) -> Iterator[None]:
+    """Errors of a link's mesh or modes name that link, one of ``of``, and what can be done about it here."""
+    try:
+        yield
+    except (MeshError, ModalError) as error:
+        rest = "; or give another shape with mesh=" + (
+            ", or add the other links one by one, by their names" if of > 1 else ""
+        )
+        raise type(error)(f"{link}: {error.what}", error.remedy + rest) from error
+
+
+def solved_bodies(
+    wanted: Sequence[WantedBody], known: Iterable[ModalModel], air: Air | None, say: Say
+) -> list[list[ModalModel]]:
+    """The models of each body's links. known: of bodies that are there already, shared by equal ones. air: in which
+    they radiate, None: nobody hears them.
+    """
+    with one_thread():
+        _prepare(wanted, air, say)
+        models, shared = [], list(known)
+        for one in wanted:
+            mine = [one.model] * len(one.parts) if one.model is not None else _solved(one, shared, say)
+            for (name, _), model in zip(one.parts, mine, strict=True):
+                if air is not None and model.mode_count:
+                    say(f"how {model.mode_count} modes of {name} radiate")
+                    radiation_of(model, air)
+            shared += mine
+            models.append(mine)
+    return models
+
+
+def _solved(one: WantedBody, known: Sequence[ModalModel], say: Say) -> list[ModalModel]:
+    """The models of a body's links. What fails shall fail early: all are looked at first, and the most intricate is
+    filled first.
+    """
+    from sonic_bullet import modal
+
+    several = len(one.parts) > 1
+    triangles = [0] * len(one.parts)
+    for i, (name, shapes) in enumerate(one.parts if several else ()):
+        with _naming(name, len(one.parts)):
+            triangles[i] = modal.check_fillable(shapes, one.options.thickness_m)
+    models: dict[int, ModalModel] = {}
+    for i in sorted(range(len(one.parts)), key=lambda i: -triangles[i]):
+        name, shapes = one.parts[i]
+        head = f"modes of {name}" + (f", {len(models) + 1} of {len(one.parts)}" if several else "")
+        if several:
+            say(head)
+        with _naming(name, len(one.parts)):
+            solved = _analysed(shapes, one, lambda text, head=head: say(f"{head}: {text}"))  # type: ignore[misc]
+            models[i] = _shared(solved, (*known, *models.values()))
+    return [models[i] for i in range(len(one.parts))]
+
+
+def _analysed(shapes: tuple[Shape, ...], one: WantedBody, say: Say) -> ModalModel:
+    from sonic_bullet import modal
+    from sonic_bullet.effects.presets_of_effects import with_modes
+
+    return with_modes(modal.analyse(shapes, one.material, **asdict(one.options), progress=say), one.material)
+
+
+def _shared(model: ModalModel, known: Iterable[ModalModel]) -> ModalModel:
+    """The model itself, or the same one that a body has already or is about to have: equal bodies then share memory
+    and what is derived from it.
+    """
+    same = (
+        other
+        for other in known
+        if other.includes_radiation == model.includes_radiation
+        and all(
+            np.array_equal(getattr(other, name), getattr(model, name))
+            for name in ("freq_hz", "decay_per_s", "vertex_m", "face", "shape")
+        )
+    )
+    return next(same, model)
+
+
+def _prepare(wanted: Sequence[WantedBody], air: Air | None, say: Say) -> None:
+    """Fill the cache with what it lacks of these bodies, side by side; what fails is left to whoever asks next."""
+    missing = _missing(wanted)
+    if len(missing) < 2:
+        return
+
+    def work(item: tuple[int, tuple[str, tuple[Shape, ...], WantedBody] | None]) -> None:
+        number, job = item
+        with suppress(SonicBulletError):
+            if job is None:
+                say("machine code of the run time")
+                make_ready()
+                return
+            name, shapes, one = job
+            head = f"modes of {name}, {number} of {len(missing)}, two at a time"
+            model = _analysed(shapes, one, lambda text: say(f"{head}: {text}"))
+            if air is not None and model.mode_count:
+                say(f"{head}: how they radiate")
+                radiation_of(model, air)
+
+    jobs: list[tuple[str, tuple[Shape, ...], WantedBody] | None] = [*missing]
+    if air is not None:
+        jobs.insert(1, None)  # as long as a body, and the first two begin together
+    parallel_map(work, list(enumerate(jobs, start=1)))
+
+
+def _missing(wanted: Sequence[WantedBody]) -> list[tuple[str, tuple[Shape, ...], WantedBody]]:
+    """Links whose modes are to be computed, each once, those of many triangles first: they take longest."""
+    from sonic_bullet import modal
+
+    found: dict[str, tuple[str, tuple[Shape, ...], WantedBody]] = {}
+    size: dict[str, int] = {}
+    for one in wanted:
+        for name, shapes in one.parts if one.model is None else ():
+            with suppress(SonicBulletError):
+                key = modal.missing_name(shapes, one.material, one.options)
+                if key is not None and key not in found:
+                    size[key] = modal.check_fillable(shapes, one.options.thickness_m)
+                    found[key] = (name, shapes, one)
+    return [found[key] for key in sorted(found, key=lambda key: -size[key])]
