@@ -98,16 +98,22 @@ def contact_modulus(low_pa, high_pa):
 
 
 @njit(nogil=True, error_model="numpy")
-def turned_back(q, x, y, z):
-    """A world vector in the frame of a body that is turned by the quaternion q (x, y, z, w), not of unit length: three
-    numbers [Kuipers 1999, sec. 5.15].
+def rotation(q):
+    """The matrix, body to world, of a quaternion (x, y, z, w) that need not be of unit length: nine numbers, row by row
+    [Kuipers, Quaternions and Rotation Sequences, 1999, sec. 5.15].
     """
     norm = np.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
-    i, j, k, w = q[0] / norm, q[1] / norm, q[2] / norm, q[3] / norm
+    x, y, z, w = q[0] / norm, q[1] / norm, q[2] / norm, q[3] / norm
     return (
-        (1 - 2 * (j * j + k * k)) * x + 2 * (i * j + k * w) * y + 2 * (i * k - j * w) * z,
-        2 * (i * j - k * w) * x + (1 - 2 * (i * i + k * k)) * y + 2 * (j * k + i * w) * z,
-        2 * (i * k + j * w) * x + 2 * (j * k - i * w) * y + (1 - 2 * (i * i + j * j)) * z,
+        1 - 2 * (y * y + z * z),
+        2 * (x * y - z * w),
+        2 * (x * z + y * w),
+        2 * (x * y + z * w),
+        1 - 2 * (x * x + z * z),
+        2 * (y * z - x * w),
+        2 * (x * z - y * w),
+        2 * (y * z + x * w),
+        1 - 2 * (x * x + y * y),
     )
 
 
@@ -117,27 +123,26 @@ def _mobility(body, q, arm, normal):
     if body.mass_kg <= 0:
         return 0.0
     # the turn's part is a scalar: taken in the body's own frame, where its inertia is
-    a, b, c = turned_back(
-        q,
-        arm[1] * normal[2] - arm[2] * normal[1],
-        arm[2] * normal[0] - arm[0] * normal[2],
-        arm[0] * normal[1] - arm[1] * normal[0],
-    )
-    m = body.inertia_kg_m2
-    xx, yy, zz = (
+    xx, xy, xz, yx, yy, yz, zx, zy, zz = rotation(q)
+    x = arm[1] * normal[2] - arm[2] * normal[1]
+    y = arm[2] * normal[0] - arm[0] * normal[2]
+    z = arm[0] * normal[1] - arm[1] * normal[0]
+    a, b, c = xx * x + yx * y + zx * z, xy * x + yy * y + zy * z, xz * x + yz * y + zz * z
+    m = body.inertia_kg_m2  # its cofactors follow
+    i, j, k = (
         m[1, 1] * m[2, 2] - m[1, 2] * m[2, 1],
         m[0, 0] * m[2, 2] - m[0, 2] * m[2, 0],
         m[0, 0] * m[1, 1] - m[0, 1] * m[1, 0],
     )
-    xy, xz, yz = (
+    ij, ik, jk = (
         m[0, 2] * m[2, 1] - m[0, 1] * m[2, 2],
         m[0, 1] * m[1, 2] - m[0, 2] * m[1, 1],
         m[0, 2] * m[1, 0] - m[0, 0] * m[1, 2],
     )
-    det = m[0, 0] * xx + m[1, 0] * xy + m[2, 0] * xz
+    det = m[0, 0] * i + m[1, 0] * ij + m[2, 0] * ik
     if det == 0:  # PyBullet's point masses do not turn
         return 1 / body.mass_kg
-    turn = a * a * xx + b * b * yy + c * c * zz + 2 * (a * b * xy + a * c * xz + b * c * yz)
+    turn = a * a * i + b * b * j + c * c * k + 2 * (a * b * ij + a * c * ik + b * c * jk)
     return 1 / body.mass_kg + turn / det
 
 
