@@ -6,7 +6,10 @@
 PyBullet collides a mesh as its convex hull, and a thin wall has two sides a hair apart: of the faces nearly as near as
 the nearest, one that looks the same way as the contact's normal is preferred. On an edge faces are equally near but for
 rounding: the one that looks most that way is taken, so that the answer does not hang on how the world is turned.
+
+Surface -> FACE and NODE tables (numpy, level by level) -> nearest_face, one kernel for `nearest` and for the run time
 """
+# mypy: disable-error-code="no-untyped-def"
 
 from __future__ import annotations
 
@@ -18,6 +21,15 @@ from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import MeshError
 
+FACE = np.dtype(
+    [("corner_m", "f8", (3, 3)), ("normal", "f8", (3,)), ("curvature_per_m", "f8"), ("vertex", "i8", (3,))],
+    align=True,
+)
+"""A triangle, in the order of its body's tree. vertex: the body's own numbers."""
+
+NODE = np.dtype([("low_m", "f8", (3,)), ("high_m", "f8", (3,)), ("child", "i8", (2,))], align=True)
+"""A box of a body's tree. child: both children, or (-start - 1, end) of a leaf, counted from the body's own first."""
+
 LEAF = 4
 # A face that looks the right way may be this much farther than the nearest: twice as far, plus a wall's thickness 2V/A,
 # at
@@ -28,29 +40,30 @@ WALL_PART = 0.03
 TIE_PART = 1e-7
 # Least cosine at which a face looks along the normal: not one at right angles, but for rounding.
 LOOKS = 1e-6
+# Boxes that wait in a search: a balanced tree of 2^64 faces leaves no more.
+_DEEPEST = 64
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SurfaceIndex:
-    """A surface ready for `nearest`: corner_m (f, 3, 3) and normal (f, 3) in tree order, ``order`` (f,) the faces' own
-    numbers, low_m, high_m (k, 3) boxes of the nodes, child (k, 2): both children, or (−start−1, end) of a leaf. wall_m:
-    see WALL_PART."""
+    """A surface ready for `nearest`: faces (f,) of FACE in tree order, ``order`` (f,) their own numbers, nodes (k,) of
+    NODE. wall_m: see WALL_PART; tie_m: see TIE_PART."""
 
-    corner_m: Array
-    normal: Array
+    faces: Array
+    nodes: Array
     order: Array
-    low_m: Array
-    high_m: Array
-    child: Array
     wall_m: float
+    tie_m: float
 
 
-def surface_index(vertex_m: Array, face: Array) -> SurfaceIndex:
-    """Build the tree over vertex_m (v, 3), face (f, 3). Raises MeshError where there is no face."""
+def surface_index(vertex_m: Array, face: Array, curvature_per_m: Array | None = None) -> SurfaceIndex:
+    """Build the tree over vertex_m (v, 3), face (f, 3), of faces with curvature_per_m (f,). Raises MeshError where
+    there is no face.
+    """
     if len(face) == 0:
         raise MeshError("surface without triangles has no nearest point", "give the body a model with a surface")
     corner = np.ascontiguousarray(np.asarray(vertex_m, float)[face])
-    order, low, high, child = _grow(corner.min(axis=1), corner.max(axis=1), corner.mean(axis=1))
+    order, nodes = _grown(corner.min(axis=1), corner.max(axis=1), corner.mean(axis=1))
     vector = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     length = np.linalg.norm(vector, axis=1)
     volume = abs(
@@ -63,11 +76,15 @@ def surface_index(vertex_m: Array, face: Array) -> SurfaceIndex:
         )
         / 6
     )
-    wall = min(4 * volume / max(float(length.sum()), 1e-300), WALL_PART * float(np.linalg.norm(high[0] - low[0])))
-    normal = vector / np.where(length > 0, length, 1)[:, None]
-    return SurfaceIndex(
-        np.ascontiguousarray(corner[order]), np.ascontiguousarray(normal[order]), order, low, high, child, wall
-    )
+    diagonal = float(np.linalg.norm(nodes["high_m"][0] - nodes["low_m"][0]))
+    wall = min(4 * volume / max(float(length.sum()), 1e-300), WALL_PART * diagonal)
+    faces = np.zeros(len(face), FACE)
+    faces["corner_m"] = corner[order]
+    faces["normal"] = (vector / np.where(length > 0, length, 1)[:, None])[order]
+    faces["vertex"] = np.asarray(face)[order]
+    if curvature_per_m is not None:
+        faces["curvature_per_m"] = curvature_per_m[order]
+    return SurfaceIndex(faces, nodes, order, wall, TIE_PART * diagonal)
 
 
 def nearest(index: SurfaceIndex, points_m: Array, normals: Array | None = None) -> tuple[Array, Array, Array]:
@@ -79,10 +96,9 @@ def nearest(index: SurfaceIndex, points_m: Array, normals: Array | None = None) 
     """
     points = np.ascontiguousarray(points_m, float).reshape(-1, 3)
     wanted = np.zeros_like(points) if normals is None else np.ascontiguousarray(normals, float).reshape(-1, 3)
-    face, barycentric, distance = _search(
-        index.corner_m, index.normal, index.low_m, index.high_m, index.child, index.wall_m, points, wanted
-    )
-    return index.order[face], barycentric, distance
+    face, found = np.empty(len(points), np.int64), np.empty((len(points), 4))
+    _nearest_faces(index.faces, index.nodes, index.wall_m, index.tie_m, points, wanted, face, found)
+    return index.order[face], found[:, :3], found[:, 3]
 
 
 def closest_point(
@@ -92,54 +108,48 @@ def closest_point(
     return nearest(surface_index(vertex_m, face), points, normals)
 
 
-@njit(nogil=True)
-def _grow(low: Array, high: Array, centre: Array) -> tuple[Array, Array, Array, Array]:
-    """Boxes and children of a balanced tree: each node's faces split at the median of their longest axis."""
-    count = len(low)
-    order = np.arange(count)
-    most = 2 * count + 1
-    node_low, node_high = np.empty((most, 3)), np.empty((most, 3))
-    child = np.empty((most, 2), np.int64)
-    start, end = np.empty(most, np.int64), np.empty(most, np.int64)
-    start[0], end[0] = 0, count
-    made, done = 1, 0
-    while done < made:
-        a, b = start[done], end[done]
-        for x in range(3):
-            lowest, highest = np.inf, -np.inf
-            for i in range(a, b):
-                lowest, highest = min(lowest, low[order[i], x]), max(highest, high[order[i], x])
-            node_low[done, x], node_high[done, x] = lowest, highest
-        if b - a <= LEAF:
-            child[done, 0], child[done, 1] = -a - 1, b
-        else:
-            axis, widest = 0, -1.0
-            for x in range(3):
-                lowest, highest = np.inf, -np.inf
-                for i in range(a, b):
-                    lowest, highest = min(lowest, centre[order[i], x]), max(highest, centre[order[i], x])
-                if highest - lowest > widest:
-                    axis, widest = x, highest - lowest
-            part = order[a:b].copy()
-            order[a:b] = part[np.argsort(centre[part, axis], kind="mergesort")]
-            middle = (a + b) // 2
-            child[done, 0], child[done, 1] = made, made + 1
-            start[made], end[made], start[made + 1], end[made + 1] = a, middle, middle, b
-            made += 2
-        done += 1
-    return order, node_low[:made].copy(), node_high[:made].copy(), child[:made].copy()
+def _grown(low: Array, high: Array, centre: Array) -> tuple[Array, Array]:
+    """Order (f,) of the faces and NODE (k,) of a balanced tree over their boxes low, high and centres (f, 3): each
+    node's faces split at the median of their longest axis, in the order in which they are. Level by level.
+    """
+    order = np.arange(len(low))
+    start, end = np.zeros(1, np.int64), np.array([len(low)])
+    levels, made = [], 1
+    while len(start):
+        count = end - start
+        at = np.cumsum(count) - count  # of each node's first face among those of this level
+        place = np.repeat(start - at, count) + np.arange(int(count.sum()))
+        here = order[place]
+        nodes = np.zeros(len(start), NODE)
+        nodes["low_m"], nodes["high_m"] = np.minimum.reduceat(low[here], at), np.maximum.reduceat(high[here], at)
+        nodes["child"] = np.stack([-start - 1, end], axis=1)
+        inner = np.flatnonzero(count > LEAF)
+        nodes["child"][inner] = made + 2 * np.arange(len(inner))[:, None] + [0, 1]
+        made += 2 * len(inner)
+        levels.append(nodes)
+        width = np.maximum.reduceat(centre[here], at) - np.minimum.reduceat(centre[here], at)
+        node = np.repeat(np.arange(len(start)), count)
+        along = np.where(count > LEAF, np.argmax(width, axis=1), -1)[node]  # a leaf's faces stay as they are
+        order[place] = here[np.lexsort((np.where(along < 0, 0.0, centre[here, along]), node))]
+        start, middle, end = start[inner], (start[inner] + end[inner]) // 2, end[inner]
+        start, end = np.stack([start, middle], axis=1).ravel(), np.stack([middle, end], axis=1).ravel()
+    return order, np.concatenate(levels)
 
 
-@njit(nogil=True)
-def _in_triangle(p: Array, abc: Array) -> tuple[float, float, float]:  # noqa: PLR0911 - one return a Voronoi region
+@njit(nogil=True, error_model="numpy")
+def _in_triangle(px, py, pz, face):  # noqa: PLR0911 - one return a Voronoi region
     """Barycentric coordinates of the triangle's point nearest to p [Ericson 2005, p. 141]."""
-    ab0, ab1, ab2 = abc[1, 0] - abc[0, 0], abc[1, 1] - abc[0, 1], abc[1, 2] - abc[0, 2]
-    ac0, ac1, ac2 = abc[2, 0] - abc[0, 0], abc[2, 1] - abc[0, 1], abc[2, 2] - abc[0, 2]
-    ap0, ap1, ap2 = p[0] - abc[0, 0], p[1] - abc[0, 1], p[2] - abc[0, 2]
+    abc = face.corner_m
+    a0, a1, a2 = abc[0, 0], abc[0, 1], abc[0, 2]
+    b0, b1, b2 = abc[1, 0], abc[1, 1], abc[1, 2]
+    c0, c1, c2 = abc[2, 0], abc[2, 1], abc[2, 2]
+    ab0, ab1, ab2 = b0 - a0, b1 - a1, b2 - a2
+    ac0, ac1, ac2 = c0 - a0, c1 - a1, c2 - a2
+    ap0, ap1, ap2 = px - a0, py - a1, pz - a2
     d1, d2 = ab0 * ap0 + ab1 * ap1 + ab2 * ap2, ac0 * ap0 + ac1 * ap1 + ac2 * ap2
     if d1 <= 0 and d2 <= 0:
         return 1.0, 0.0, 0.0
-    bp0, bp1, bp2 = p[0] - abc[1, 0], p[1] - abc[1, 1], p[2] - abc[1, 2]
+    bp0, bp1, bp2 = px - b0, py - b1, pz - b2
     d3, d4 = ab0 * bp0 + ab1 * bp1 + ab2 * bp2, ac0 * bp0 + ac1 * bp1 + ac2 * bp2
     if d3 >= 0 and d4 <= d3:
         return 0.0, 1.0, 0.0
@@ -147,7 +157,7 @@ def _in_triangle(p: Array, abc: Array) -> tuple[float, float, float]:  # noqa: P
     if vc <= 0 and d1 >= 0 and d3 <= 0 and d1 > d3:
         v = d1 / (d1 - d3)
         return 1 - v, v, 0.0
-    cp0, cp1, cp2 = p[0] - abc[2, 0], p[1] - abc[2, 1], p[2] - abc[2, 2]
+    cp0, cp1, cp2 = px - c0, py - c1, pz - c2
     d5, d6 = ab0 * cp0 + ab1 * cp1 + ab2 * cp2, ac0 * cp0 + ac1 * cp1 + ac2 * cp2
     if d6 >= 0 and d5 <= d6:
         return 0.0, 0.0, 1.0
@@ -165,64 +175,77 @@ def _in_triangle(p: Array, abc: Array) -> tuple[float, float, float]:  # noqa: P
     return 1 - vb / total - vc / total, vb / total, vc / total
 
 
-@njit(nogil=True)
-def _box_gap(p: Array, low: Array, high: Array) -> float:
-    gap = 0.0
-    for x in range(3):
-        d = max(low[x] - p[x], 0.0, p[x] - high[x])
-        gap += d * d
-    return gap
+@njit(nogil=True, error_model="numpy")
+def _box_gap(px, py, pz, node):
+    """Squared distance of p from a box."""
+    low, high = node.low_m, node.high_m
+    x, y, z = (
+        max(low[0] - px, 0.0, px - high[0]),
+        max(low[1] - py, 0.0, py - high[1]),
+        max(low[2] - pz, 0.0, pz - high[2]),
+    )
+    return x * x + y * y + z * z
 
 
-@njit(nogil=True)
-def _search(
-    corner: Array, normal: Array, low: Array, high: Array, child: Array, wall: float, points: Array, wanted: Array
-) -> tuple[Array, Array, Array]:
-    count = len(points)
-    face, barycentric, distance = np.empty(count, np.int64), np.empty((count, 3)), np.empty(count)
-    stack, gaps = np.empty(128, np.int64), np.empty(128)
-    tie = TIE_PART * np.sqrt(((high[0] - low[0]) ** 2).sum())
-    for k in range(count):
-        p, n = points[k], wanted[k]
-        any_face, any2 = 0, np.inf  # nearest of all
-        # of those that look along n: the chosen one, its distance, n·normal; the least distance
-        same_face, same, along, least = -1, np.inf, 0.0, np.inf
-        ask = n[0] != 0 or n[1] != 0 or n[2] != 0
-        top = 1
-        stack[0], gaps[0] = 0, 0.0
-        while top > 0:
-            top -= 1
-            node, gap = stack[top], gaps[top]
-            reach2 = (2 * np.sqrt(any2) + wall) ** 2
-            if gap >= any2 and not (ask and gap < min((least + tie) ** 2, reach2)):
-                continue
-            if child[node, 0] >= 0:
-                left, right = child[node, 0], child[node, 1]
-                gap_left, gap_right = _box_gap(p, low[left], high[left]), _box_gap(p, low[right], high[right])
-                if gap_left <= gap_right:
-                    stack[top], gaps[top], stack[top + 1], gaps[top + 1] = right, gap_right, left, gap_left
-                else:
-                    stack[top], gaps[top], stack[top + 1], gaps[top + 1] = left, gap_left, right, gap_right
-                top += 2
-                continue
-            for i in range(-child[node, 0] - 1, child[node, 1]):
-                u, v, w = _in_triangle(p, corner[i])
-                d2 = 0.0
-                for x in range(3):
-                    d = u * corner[i, 0, x] + v * corner[i, 1, x] + w * corner[i, 2, x] - p[x]
-                    d2 += d * d
-                if d2 < any2:
-                    any_face, any2 = i, d2
-                looks = n[0] * normal[i, 0] + n[1] * normal[i, 1] + n[2] * normal[i, 2]
-                if ask and looks > LOOKS:
-                    d = np.sqrt(d2)
-                    if d < least - tie or (d <= least + tie and looks > along + 1e-9):
-                        same_face, same, along = i, d, looks
-                    least = min(least, d)
-        chosen = any_face
-        if ask and same_face >= 0 and same <= 2 * np.sqrt(any2) + wall:
-            chosen = same_face
-        u, v, w = _in_triangle(p, corner[chosen])
-        face[k], distance[k] = chosen, same if chosen == same_face else np.sqrt(any2)
-        barycentric[k, 0], barycentric[k, 1], barycentric[k, 2] = u, v, w
-    return face, barycentric, distance
+@njit(nogil=True, error_model="numpy")
+def nearest_face(faces, face_at, nodes, node_at, wall_m, tie_m, px, py, pz, nx, ny, nz):
+    """Face, barycentric coordinates (three numbers) and distance in m of the point nearest to p on one body's surface,
+    which has its faces and nodes from face_at and node_at on; the face counted from there. n: the outward normal that
+    the surface should have, 0 for any.
+    """
+    stack, gaps = np.empty(_DEEPEST, np.int64), np.empty(_DEEPEST)
+    any_face, any2 = 0, np.inf  # nearest of all
+    # of those that look along n: the chosen one, its distance, n·normal; the least distance
+    same_face, same, along, least = -1, np.inf, 0.0, np.inf
+    ask = nx != 0 or ny != 0 or nz != 0
+    top = 1
+    stack[0], gaps[0] = 0, 0.0
+    while top > 0:
+        top -= 1
+        gap = gaps[top]
+        reach = 2 * np.sqrt(any2) + wall_m
+        if gap >= any2 and not (ask and gap < min((least + tie_m) * (least + tie_m), reach * reach)):
+            continue
+        child = nodes[node_at + stack[top]].child
+        if child[0] >= 0:
+            left, right = child[0], child[1]
+            gap_left, gap_right = (
+                _box_gap(px, py, pz, nodes[node_at + left]),
+                _box_gap(px, py, pz, nodes[node_at + right]),
+            )
+            nearer = 1 if gap_left <= gap_right else 0  # is looked at first: it lies on top
+            stack[top + nearer], gaps[top + nearer] = left, gap_left
+            stack[top + 1 - nearer], gaps[top + 1 - nearer] = right, gap_right
+            top += 2
+            continue
+        for i in range(-child[0] - 1, child[1]):
+            face = faces[face_at + i]
+            u, v, w = _in_triangle(px, py, pz, face)
+            corner, normal = face.corner_m, face.normal
+            x = u * corner[0, 0] + v * corner[1, 0] + w * corner[2, 0] - px
+            y = u * corner[0, 1] + v * corner[1, 1] + w * corner[2, 1] - py
+            z = u * corner[0, 2] + v * corner[1, 2] + w * corner[2, 2] - pz
+            d2 = x * x + y * y + z * z
+            if d2 < any2:
+                any_face, any2 = i, d2
+            looks = nx * normal[0] + ny * normal[1] + nz * normal[2]
+            if ask and looks > LOOKS:
+                d = np.sqrt(d2)
+                if d < least - tie_m or (d <= least + tie_m and looks > along + 1e-9):
+                    same_face, same, along = i, d, looks
+                least = min(least, d)
+    chosen, distance = any_face, np.sqrt(any2)
+    if ask and same_face >= 0 and same <= 2 * distance + wall_m:
+        chosen, distance = same_face, same
+    u, v, w = _in_triangle(px, py, pz, faces[face_at + chosen])
+    return chosen, u, v, w, distance
+
+
+@njit(nogil=True, error_model="numpy")
+def _nearest_faces(faces, nodes, wall_m, tie_m, point_m, wanted, face, found):
+    """`nearest_face` of points (k, 3) with normals (k, 3): into face (k,) and found (k, 4), the distance last."""
+    for k in range(len(point_m)):
+        p, n = point_m[k], wanted[k]
+        face[k], found[k, 0], found[k, 1], found[k, 2], found[k, 3] = nearest_face(
+            faces, 0, nodes, 0, wall_m, tie_m, p[0], p[1], p[2], n[0], n[1], n[2]
+        )

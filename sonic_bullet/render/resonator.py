@@ -14,6 +14,7 @@ without bound where the body is no longer small.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -21,7 +22,7 @@ from sonic_bullet.geometry.nearest_point import SurfaceIndex, nearest, surface_i
 from sonic_bullet.machine.compiled import njit
 from sonic_bullet.radiation.far_field import jerk_coefficient
 from sonic_bullet.radiation.radiated import radiation_of
-from sonic_bullet.records import Air, Array, Body, Microphone, ModalSum, Sensor, Vibrometer
+from sonic_bullet.records import Air, Array, Body, Microphone, ModalModel, ModalSum, Sensor, Vibrometer
 from sonic_bullet.synth.bank import ModeSet, audible
 
 CREASE_COS = np.cos(np.radians(20.0))
@@ -107,7 +108,7 @@ def build_resonator(body: Body, sensors: tuple[Sensor, ...], sr: int, air: Air) 
     shape = np.ascontiguousarray(model.shape[:, :, keep])
     weight = np.zeros((1 + len(readers), len(omega)), complex)
     weight[0] = pressure[keep]
-    index = surface_index(model.vertex_m, model.face) if len(model.face) else None
+    index = _surface(model)
     for row, sensor in enumerate(readers, start=1):
         if isinstance(sensor, ModalSum):
             weight[row] = sensor.scale * -1j / (1 + 1j * decay / omega)
@@ -144,6 +145,12 @@ def build_resonator(body: Body, sensors: tuple[Sensor, ...], sr: int, air: Air) 
         damping_growth,
         model.damping_growth_power,
     )
+
+
+@lru_cache(maxsize=256)
+def _surface(model: ModalModel) -> SurfaceIndex | None:
+    """The tree of a model's surface, once for all bodies that share it (records are compared by identity)."""
+    return surface_index(model.vertex_m, model.face, model.curvature_per_m) if len(model.face) else None
 
 
 def _rigid(body: Body, sets: int, sr: int, air: Air) -> ModeSet | None:

@@ -13,8 +13,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from sonic_bullet.geometry.nearest_point import FACE, NODE
 from sonic_bullet.synth.profile import OCTAVES
 from sonic_bullet.synth.strikes import SPAN
+
+__all__ = ["BODY", "CONTACT", "FACE", "HISTORY", "NODE", "PAIR", "PULSE", "ROW"]
 
 HISTORY = 2 * SPAN - 1
 """Steps of load that are remembered of a pair; column SPAN - 1 is the step being rendered."""
@@ -46,15 +49,6 @@ BODY = np.dtype(
     ],
     align=True,
 )
-
-FACE = np.dtype(
-    [("corner_m", "f8", (3, 3)), ("normal", "f8", (3,)), ("curvature_per_m", "f8"), ("vertex", "i8", (3,))],
-    align=True,
-)
-"""A triangle, in the order of its body's tree. vertex: the body's own numbers."""
-
-NODE = np.dtype([("low_m", "f8", (3,)), ("high_m", "f8", (3,)), ("child", "i8", (2,))], align=True)
-"""A box of a body's tree. child: both children, or (-start - 1, end) of a leaf, counted from the body's own first."""
 
 CONTACT = np.dtype(
     [

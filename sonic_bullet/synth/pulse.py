@@ -135,7 +135,7 @@ def pulse_spectrum(f_tau: Array, *, flat: bool = False) -> Array:
 
 @lru_cache(maxsize=2)
 def _spectrum_table(flat: bool) -> tuple[Array, Array]:
-    f_tau = np.linspace(0.0, 8.0, 321)
+    f_tau = np.linspace(0.0, _SPECTRUM_TO, _SPECTRUM_TO * SPECTRUM_CELLS_PER_F_TAU + 1)
     return f_tau, pulse_spectrum(f_tau, flat=flat)
 
 
@@ -159,6 +159,46 @@ def compliant_share(
         float(np.sum((push * np.interp(freq_hz * tau_s, f_tau, power, right=0.0)) ** 2)) for freq_hz, push in pushed
     )
     return 1.0 / (1.0 + mass_kg * given / square)
+
+
+SPECTRUM_CELLS_PER_F_TAU, _SPECTRUM_TO = 40, 8
+"""The table of pulse spectra: linear between its points, 0 beyond the last one."""
+
+
+@lru_cache(maxsize=1)
+def spectrum_table() -> Array:
+    """(2, 321): |F̂(f)/F̂(0)| of the Hertz pulse and of the flat one, at equidistant products f·τ from 0 to 8."""
+    return np.ascontiguousarray([_spectrum_table(flat)[1] for flat in (False, True)])
+
+
+@njit(nogil=True, error_model="numpy")
+def pulse_length(mass_kg, modulus_pa, relative_curvature_per_m, flat_area_m2, approach_m_s):  # type: ignore[no-untyped-def]
+    """`contact_time_s` of one pulse: τ in s, and whether it is flat."""
+    curvature, area = relative_curvature_per_m, flat_area_m2
+    if not curvature > 0 and not area > 0:
+        return LONGEST_S, False
+    hertz, punch = 0.0, 0.0
+    if curvature > 0:
+        hertz = 2.868 * (mass_kg * mass_kg * curvature / (modulus_pa * modulus_pa * max(approach_m_s, 0.0))) ** 0.2
+    if area > 0:
+        punch = np.pi * np.sqrt(mass_kg / (2 * modulus_pa * np.sqrt(area / np.pi)))
+    longer = hertz if hertz >= punch or np.isnan(punch) else punch
+    return min(max(LONGEST_S if np.isnan(longer) else longer, SHORTEST_S), LONGEST_S), punch >= hertz
+
+
+@njit(nogil=True, error_model="numpy")
+def compliance(push, frequency_hz, first, modes, tau_s, spectrum):  # type: ignore[no-untyped-def]
+    """Σ (Uᵀj |F̂(fτ)|)² of one body, the sum in `compliant_share`: push (m, …) is Uᵀj, its modes have the frequencies
+    from ``first`` on; spectrum (cells + 1,): a row of `spectrum_table`.
+    """
+    total = 0.0
+    for m in range(modes):
+        cell = frequency_hz[first + m] * tau_s * SPECTRUM_CELLS_PER_F_TAU
+        at = int(cell)
+        if at < len(spectrum) - 1:
+            moved = push[m] * (spectrum[at] + (cell - at) * (spectrum[at + 1] - spectrum[at]))
+            total += moved * moved
+    return total
 
 
 def cumulated_force(s: Array, *, flat: bool = False) -> Array:

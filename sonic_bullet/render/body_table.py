@@ -1,0 +1,133 @@
+"""What the compiled stages know of every body: a BODY row each, and flat arrays of what belongs to its model.
+
+Resonator + lines of its residual -> BODY row;  its model -> FACE, NODE rows, shapes, frequencies, once for all
+    bodies that share it
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sonic_bullet.records import Array, ModalModel
+from sonic_bullet.render.resonator import EDGE_RADIUS_LEAST_M, EDGE_RADIUS_SHARE, Resonator
+from sonic_bullet.render.tables import BODY, FACE, NODE
+from sonic_bullet.synth.strikes import SPAN
+
+
+@dataclass(frozen=True, slots=True)
+class _Place:
+    """Where a model's arrays begin in the flat ones, and how many faces it has."""
+
+    frequency_at: int
+    shape_at: int
+    face_at: int
+    faces: int
+    node_at: int
+    wall_m: float
+    tie_m: float
+
+
+_NOWHERE = _Place(0, 0, 0, 0, 0, 0.0, 0.0)
+
+
+class _Growing:
+    """An array that is appended to and stays in one piece: what is filled of it is a view."""
+
+    def __init__(self, dtype: np.dtype | type) -> None:
+        self._all, self._count = np.zeros(1, dtype), 0
+
+    @property
+    def filled(self) -> Array:
+        return self._all[: self._count]
+
+    def append(self, values: Array) -> int:
+        """The place of the first of the values (k,)."""
+        at, self._count = self._count, self._count + len(values)
+        if self._count > len(self._all):
+            grown = np.zeros(max(self._count, 2 * len(self._all)), self._all.dtype)
+            grown[:at] = self._all[:at]
+            self._all = grown
+        self._all[at : self._count] = values
+        return at
+
+
+class BodyTable:
+    """bodies (b,) of BODY; faces of FACE and nodes of NODE, shapes (float32) and frequencies in Hz, all flat and found
+    by the numbers of a body's row. They are other arrays after `add`; what was in them stays where it was.
+    """
+
+    def __init__(self) -> None:
+        self._bodies, self._faces, self._nodes = _Growing(BODY), _Growing(FACE), _Growing(NODE)
+        self._shapes, self._frequencies = _Growing(np.float32), _Growing(float)
+        self._places: dict[tuple[ModalModel, bytes], _Place] = {}
+
+    @property
+    def bodies(self) -> Array:
+        return self._bodies.filled
+
+    @property
+    def faces(self) -> Array:
+        return self._faces.filled
+
+    @property
+    def nodes(self) -> Array:
+        return self._nodes.filled
+
+    @property
+    def shapes(self) -> Array:
+        return self._shapes.filled
+
+    @property
+    def frequency_hz(self) -> Array:
+        return self._frequencies.filled
+
+    @property
+    def columns(self) -> int:
+        """Most columns that a body has, 1 at least."""
+        return int(self.bodies["columns"].max(initial=1))
+
+    def add(self, resonator: Resonator, follows: Array, surface_seed: int) -> int:
+        """One more body: its index. follows (l,): the mode that each line of its residual is struck as."""
+        place = self._place(resonator, np.asarray(follows, np.int64))
+        body = resonator.body
+        material = body.material
+        row = np.zeros(1, BODY)
+        row["mass_kg"], row["inertia_kg_m2"] = body.mass_kg, body.inertia_kg_m2
+        row["modulus_pa"] = np.inf if material is None else material.plane_strain_pa
+        row["restitution"] = np.inf if material is None else material.restitution
+        row["roughness_m"] = 0.0 if material is None else material.roughness_m
+        row["hurst"] = 0.7 if material is None else material.hurst
+        row["size_m"], row["volume_m3"] = resonator.size_m, body.volume_m3
+        row["curvature_per_m"] = body.curvature_per_m
+        row["edge_per_m"] = 1.0 / max(EDGE_RADIUS_SHARE * resonator.size_m, EDGE_RADIUS_LEAST_M)
+        row["wall_m"], row["tie_m"] = place.wall_m, place.tie_m
+        row["surface_seed"] = surface_seed
+        row["rigid"] = resonator.rigid is not None
+        row["modes"], row["columns"] = resonator.mode_count, resonator.mode_count + len(follows)
+        row["frequency_at"], row["shape_at"] = place.frequency_at, place.shape_at
+        row["face_at"], row["faces"], row["node_at"] = place.face_at, place.faces, place.node_at
+        # a silent partner's record begins where it first touches, not where it was put
+        row["placed"] = -SPAN if material is None else body.since_step
+        return self._bodies.append(row)
+
+    def _place(self, resonator: Resonator, follows: Array) -> _Place:
+        """Where the arrays of the body's model are, put there if it is the first that has it."""
+        model, index = resonator.body.model, resonator.index
+        if model is None or index is None:
+            return _NOWHERE
+        key = (model, follows.tobytes())  # records are compared by identity
+        place = self._places.get(key)
+        if place is None:
+            shape = np.concatenate([resonator.shape, resonator.shape[:, :, follows]], axis=2)
+            place = self._places[key] = _Place(
+                self._frequencies.append(resonator.omega_rad_s / (2 * np.pi)),
+                self._shapes.append(shape.ravel()),
+                self._faces.append(index.faces),
+                len(index.faces),
+                self._nodes.append(index.nodes),
+                index.wall_m,
+                index.tie_m,
+            )
+        return place

@@ -1,0 +1,181 @@
+"""Where a contact lies on both bodies' true surfaces, and what its force does to their modes: for strikes and friction.
+
+    row of ROW -> touch: nearest triangle, weights, curvature, once a row -> add_push: Uᵀj on either body's columns
+    1/m* = Σ [1/m + (r×n)·I⁻¹(r×n)],  1/E* = Σ (1-ν²)/E    [synth.pulse]
+
+Plain functions on the tables of `sonic_bullet.render.tables`, called by the stages of the run time. Triangles are
+looked up only for rows that strike or rub: each stage calls `touch` for those it needs.
+"""
+# mypy: disable-error-code="no-untyped-def"
+
+from __future__ import annotations
+
+import numpy as np
+
+from sonic_bullet.geometry.nearest_point import nearest_face
+from sonic_bullet.machine.compiled import njit
+from sonic_bullet.render.resonator import CREASE_COS
+
+FLAT_CURVATURE = 0.1
+"""Curvature times size below which a contact is flat: a cap of ten times the body's size."""
+SIZELESS_M = 0.1
+"""Size of a pair of which neither body has a volume (planes and links without a solid)."""
+
+
+@njit(nogil=True, error_model="numpy")
+def touch(rows, r, bodies, faces, nodes):
+    """Face, weights and curvature of row r on either body: its fields face, barycentric, curvature_per_m. Nothing where
+    they are known already.
+
+    Where the contact's normal leans more than 20° from the face's, an edge or corner is touched: its curvature is the
+    body's edge_per_m.
+    """
+    row = rows[r]
+    if row.touched:
+        return
+    row.touched = 1
+    for side in range(2):
+        body = bodies[row.body[side]]
+        bent = body.curvature_per_m
+        face, u, v, w = -1, 0.0, 0.0, 0.0
+        if body.faces > 0:
+            p, n = row.point_m[side], row.outward[side]
+            face, u, v, w, _ = nearest_face(
+                faces,
+                body.face_at,
+                nodes,
+                body.node_at,
+                body.wall_m,
+                body.tie_m,
+                p[0],
+                p[1],
+                p[2],
+                n[0],
+                n[1],
+                n[2],
+            )
+            if not np.isfinite(bent):
+                here = faces[body.face_at + face]
+                normal = here.normal
+                leans = normal[0] * n[0] + normal[1] * n[1] + normal[2] * n[2] < CREASE_COS
+                bent = body.edge_per_m if leans else here.curvature_per_m
+        weight = row.barycentric[side]
+        row.face[side] = face
+        weight[0], weight[1], weight[2] = u, v, w
+        row.curvature_per_m[side] = bent if np.isfinite(bent) else 0.0
+
+
+@njit(nogil=True, error_model="numpy")
+def add_push(rows, r, side, factor, bodies, faces, shapes, out):
+    """Add factor·Uᵀj of row r on the body of a side to out (columns,): the shapes, linear in the triangle, times the
+    row's push in N·s (with factor 1: N·s/√kg). `touch` the row first.
+
+    shapes: flat float32, see BODY.shape_at. out may be longer than the body's columns.
+    """
+    row = rows[r]
+    body = bodies[row.body[side]]
+    if row.face[side] < 0:
+        return
+    push, weight, vertex = row.push_n_s[side], row.barycentric[side], faces[body.face_at + row.face[side]].vertex
+    x, y, z = factor * push[0], factor * push[1], factor * push[2]
+    columns = body.columns
+    for corner in range(3):
+        at = body.shape_at + 3 * vertex[corner] * columns
+        u = weight[corner]
+        along_x, along_y, along_z = (
+            shapes[at : at + columns],
+            shapes[at + columns : at + 2 * columns],
+            shapes[at + 2 * columns : at + 3 * columns],
+        )
+        for c in range(columns):
+            out[c] = out[c] + u * x * along_x[c] + u * y * along_y[c] + u * z * along_z[c]
+
+
+@njit(nogil=True, error_model="numpy")
+def contact_modulus(low_pa, high_pa):
+    """E* in Pa of two moduli E/(1-ν²); infinite where both are rigid partners."""
+    return 1 / (1 / low_pa + 1 / high_pa)
+
+
+@njit(nogil=True, error_model="numpy")
+def rotation(q):
+    """The matrix, body to world, of a quaternion (x, y, z, w) that need not be of unit length: nine numbers, row by row
+    [Kuipers, Quaternions and Rotation Sequences, 1999, sec. 5.15].
+    """
+    norm = np.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
+    x, y, z, w = q[0] / norm, q[1] / norm, q[2] / norm, q[3] / norm
+    return (
+        1 - 2 * (y * y + z * z),
+        2 * (x * y - z * w),
+        2 * (x * z + y * w),
+        2 * (x * y + z * w),
+        1 - 2 * (x * x + z * z),
+        2 * (y * z - x * w),
+        2 * (x * z - y * w),
+        2 * (y * z + x * w),
+        1 - 2 * (x * x + y * y),
+    )
+
+
+@njit(nogil=True, error_model="numpy")
+def _mobility(body, q, arm, normal):
+    """1/m + (r×n)·I⁻¹(r×n) of one body in 1/kg, 0 where it does not move; arm, normal (3,) in the world."""
+    if body.mass_kg <= 0:
+        return 0.0
+    # the turn's part is a scalar: taken in the body's own frame, where its inertia is
+    xx, xy, xz, yx, yy, yz, zx, zy, zz = rotation(q)
+    x = arm[1] * normal[2] - arm[2] * normal[1]
+    y = arm[2] * normal[0] - arm[0] * normal[2]
+    z = arm[0] * normal[1] - arm[1] * normal[0]
+    a, b, c = xx * x + yx * y + zx * z, xy * x + yy * y + zy * z, xz * x + yz * y + zz * z
+    m = body.inertia_kg_m2  # its cofactors follow
+    i, j, k = (
+        m[1, 1] * m[2, 2] - m[1, 2] * m[2, 1],
+        m[0, 0] * m[2, 2] - m[0, 2] * m[2, 0],
+        m[0, 0] * m[1, 1] - m[0, 1] * m[1, 0],
+    )
+    ij, ik, jk = (
+        m[0, 2] * m[2, 1] - m[0, 1] * m[2, 2],
+        m[0, 1] * m[1, 2] - m[0, 2] * m[1, 1],
+        m[0, 2] * m[1, 0] - m[0, 0] * m[1, 2],
+    )
+    det = m[0, 0] * i + m[1, 0] * ij + m[2, 0] * ik
+    if det == 0:  # PyBullet's point masses do not turn
+        return 1 / body.mass_kg
+    turn = a * a * i + b * b * j + c * c * k + 2 * (a * b * ij + a * c * ik + b * c * jk)
+    return 1 / body.mass_kg + turn / det
+
+
+@njit(nogil=True, error_model="numpy")
+def effective_mass(bodies, low, high, quaternion, arm_low, arm_high, normal):
+    """m* in kg of two bodies, 0 where neither moves. quaternion (b, 4) of all; levers from their centres to the contact
+    and normal (3,), in the world.
+    """
+    mobility = _mobility(bodies[low], quaternion[low], arm_low, normal) + _mobility(
+        bodies[high], quaternion[high], arm_high, normal
+    )
+    return 1 / mobility if mobility > 0 else 0.0
+
+
+@njit(nogil=True, error_model="numpy")
+def smaller_size(bodies, low, high):
+    """Size in m of the smaller of two bodies that have a volume."""
+    size = np.inf
+    if bodies[low].volume_m3 > 0:
+        size = bodies[low].size_m
+    if bodies[high].volume_m3 > 0:
+        size = min(size, bodies[high].size_m)
+    return size if size < np.inf else SIZELESS_M
+
+
+@njit(nogil=True, error_model="numpy")
+def flat_area_m2(spread_m, size_m, curvature_per_m, least_share):
+    """Area of a flat contact, 0 where it is curved: the disc with the spread of the manifold's points.
+
+    spread_m: root of Σ w·|p - Σ w·p|² of the points p under loads w of sum 1. least_share: of the smaller body's size
+    size_m, below which no flat contact's radius is taken to be.
+    """
+    if curvature_per_m * size_m > FLAT_CURVATURE:
+        return 0.0
+    radius = max(spread_m, least_share * size_m)
+    return np.pi * (radius * radius)
