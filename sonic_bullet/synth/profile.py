@@ -21,14 +21,27 @@ Gains g_j (an octave's wavelength is λ_j):
 
 The voice needs dh/dt alone: Σ g A n'(x/Δ)·v/Δ. So a changing gain never moves a surface that stands, and v = 0 is
 exactly 0.
+
+The way of the data: height_octaves once a pair, gains once a step and side, sweep_profile: dh/dt of every sample. The
+lattices nest, so the octaves are summed from coarse to fine on the lattice points that the samples pass (a cubic
+B-spline on Δ is one on Δ/2 with the coefficients [1 4 6 4 1]/8; `_refine`) and read once a sample (`_read`: the
+derivative is the quadratic B-spline of the differences). A coefficient hangs on its place alone, so where a block begins
+makes no difference. Coefficients and what they gain until the step's end stand in two arrays, ``change`` apart.
 """
+# mypy: disable-error-code="no-untyped-def"
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic
 
 from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array
+from sonic_bullet.synth.vector import F64, I32, I64, LANES, VEC, Emit, Value, constant
 
 OCTAVES = 14
 LONGEST_M = 0.1
@@ -56,6 +69,200 @@ def octave_gains(speed_m_s: Array, patch_radius_m: Array, sr: int) -> Array:
 
 
 @njit(nogil=True, error_model="numpy")
+def height_octaves(roughness_m, hurst, out):
+    """A_j into out (OCTAVES,) in m, scaled for lattice values on ±1, from rms height in m and Hurst exponent."""
+    total = 0.0
+    for j in range(OCTAVES):
+        out[j] = _WAVE_M[j] ** hurst
+        total += out[j] * out[j]
+    scale = np.sqrt(total)
+    for j in range(OCTAVES):
+        out[j] = roughness_m * (out[j] / scale) * _UNIT_RMS
+
+
+@njit(nogil=True, error_model="numpy")
+def gained_heights(height_m, speed_m_s, patch_radius_m, sr, out):
+    """g_j A_j into out (OCTAVES,) at a sweep speed in m/s, not negative, with a contact radius in m."""
+    for j in range(OCTAVES):
+        f = speed_m_s / _WAVE_M[j]
+        fine = min(max((0.4 - f / sr) / 0.2, 0.0), 1.0)
+        slow = min(max(f / SLOWEST_HZ - 1.0, 0.0), 1.0)
+        out[j] = height_m[j] * (fine * slow / np.sqrt(1.0 + patch_radius_m / _WAVE_M[j]))
+
+
+@intrinsic
+def _refine(typingctx, work, coarse, fine, change, pairs, first, height, growth):
+    """2·pairs coefficients from work[fine] on: those of work[coarse] … work[coarse + pairs + 1] on half the lattice,
+    plus height times this octave's noise from ``first`` on; and the same ``change`` further on, plus growth times it.
+
+    Noise: values on ±1 by a 32-bit integer mix [Wellons 2018, "lowbias32"]. Up to 14 values more are written.
+    """
+
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        e = Emit(context, builder, signature, args)
+        work, coarse, fine, change, pairs, first, height, growth = e.args
+        whole = ir.VectorType(I32, LANES)
+        start = builder.trunc(first, I32)
+
+        def number(value: int) -> Value:
+            return ir.Constant(whole, [value] * LANES)
+
+        def noise(at: Value, offset: int) -> Value:
+            none = ir.Constant(whole, ir.Undefined)
+            one = builder.insert_element(none, builder.add(start, builder.trunc(at, I32)), ir.Constant(I32, 0))
+            h = builder.shuffle_vector(one, none, ir.Constant(whole, [0] * LANES))
+            h = builder.add(h, ir.Constant(whole, list(range(offset, offset + LANES))))
+            h = builder.mul(builder.xor(h, builder.lshr(h, number(16))), number(0x7FEB352D))
+            h = builder.mul(builder.xor(h, builder.lshr(h, number(15))), number(0x846CA68B))
+            h = builder.xor(h, builder.lshr(h, number(16)))
+            return builder.fmul(builder.sitofp(h, VEC), constant(1.0 / 2147483648.0))
+
+        def body(i: Value, carried: list[Value]) -> list[Value]:
+            at = builder.mul(i, e.index(2))
+            own = noise(at, 0), noise(at, LANES)
+            for scale, apart in ((height, e.index(0)), (growth, change)):
+                here = builder.add(builder.add(coarse, apart), i)
+                a, b, c = (e.load(work, e.shifted(here, k)) for k in range(3))
+                even = builder.fmul(constant(0.125), builder.fadd(e.fma(constant(6.0), b, a), c))
+                odd = builder.fmul(constant(0.5), builder.fadd(b, c))
+                there = builder.add(builder.add(fine, apart), at)
+                for half in (0, 1):
+                    lanes = [k // 2 + 4 * half + (LANES if k % 2 else 0) for k in range(LANES)]
+                    both = builder.shuffle_vector(even, odd, ir.Constant(whole, lanes))
+                    e.store(e.fma(e.spread(scale), own[half], both), work, e.shifted(there, LANES * half))
+            return []
+
+        e.loop(pairs, LANES, [], body)
+        return context.get_dummy_value()
+
+    return types.void(work, coarse, fine, change, pairs, first, height, growth), codegen
+
+
+@intrinsic
+def _read(typingctx, work, where, share, count, lattice, change, origin, inverse, speed, gain, rate, out):
+    """Add dh/dt of ``count`` samples, a multiple of 8, to rate[out] …: places work[where] … in m, shares of the step
+    work[share] …; coefficients from work[lattice] on, the first at the lattice point ``origin`` (a whole number).
+
+    speed, gain: at the step's start and until its end; inverse: lattice points a metre.
+    """
+
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        e = Emit(context, builder, signature, args)
+        work, where, share, count, lattice, change, origin, inverse, speed, gain, rate, out = e.args
+        four = ir.VectorType(F64, 4)
+        nothing = ir.Constant(four, ir.Undefined)
+
+        def mixed(a: Value, b: Value, *lanes: int) -> Value:
+            return builder.shuffle_vector(a, b, ir.Constant(ir.VectorType(I32, len(lanes)), lanes))
+
+        def four_of(at: Value) -> Value:
+            return builder.load(builder.bitcast(builder.gep(work, [at]), four.as_pointer()), align=8)
+
+        def body(i: Value, carried: list[Value]) -> list[Value]:
+            x = e.load(work, builder.add(share, i))
+            u = builder.fsub(
+                builder.fmul(e.load(work, builder.add(where, i)), e.spread(inverse)), e.spread(origin)
+            )
+            cell = builder.fptosi(u, ir.VectorType(I32, LANES))
+            t = builder.fsub(u, builder.sitofp(cell, VEC))
+            halves = []
+            for first in (0, 4):
+                c = []
+                for k in range(first, first + 4):
+                    lane = ir.Constant(I32, k)
+                    at = builder.add(lattice, builder.sext(builder.extract_element(cell, lane), I64))
+                    own = builder.insert_element(nothing, builder.extract_element(x, lane), ir.Constant(I32, 0))
+                    more = builder.fmul(mixed(own, nothing, 0, 0, 0, 0), four_of(builder.add(at, change)))
+                    c.append(builder.fadd(four_of(at), more))
+                low = mixed(c[0], c[1], 0, 4, 2, 6), mixed(c[0], c[1], 1, 5, 3, 7)
+                high = mixed(c[2], c[3], 0, 4, 2, 6), mixed(c[2], c[3], 1, 5, 3, 7)
+                halves.append(
+                    [
+                        mixed(low[k % 2], high[k % 2], *((0, 1, 4, 5) if k < 2 else (2, 3, 6, 7)))
+                        for k in range(4)
+                    ]
+                )
+            p = [mixed(a, b, *range(LANES)) for a, b in zip(*halves, strict=True)]
+            d = [builder.fsub(p[k + 1], p[k]) for k in range(3)]
+            s = builder.fsub(constant(1.0), t)
+            half_s, half_t = builder.fmul(constant(0.5), s), builder.fmul(constant(0.5), t)
+            slope = builder.fmul(builder.fmul(half_s, s), d[0])
+            slope = e.fma(e.fma(t, s, constant(0.5)), d[1], slope)
+            slope = e.fma(builder.fmul(half_t, t), d[2], slope)
+            pace = builder.fadd(e.spread(speed), builder.fmul(e.spread(gain), x))
+            here = builder.add(out, i)
+            moved = builder.fmul(builder.fmul(slope, e.spread(inverse)), pace)
+            e.store(builder.fadd(e.load(rate, here), moved), rate, here)
+            return []
+
+        e.loop(count, LANES, [], body)
+        return context.get_dummy_value()
+
+    return types.void(work, where, share, count, lattice, change, origin, inverse, speed, gain, rate, out), codegen
+
+
+@njit(nogil=True, error_model="numpy")
+def sweep_profile(swept, speed0, speed1, x, key, height0, height1, per_sample_s, work, rate, out):
+    """Add dh/dt of one side of one pair to rate[out] … rate[out + n - 1] in m/s; returns the distance swept after the n
+    samples, and the scratch, longer where it was too short.
+
+    swept: distance before; speed0, speed1: at the step's ends; x (n,): share of the step; height0, height1 (OCTAVES,):
+    g·A at the step's ends; key: of this surface. rate: as long as if n were the next multiple of 8.
+    """
+    n, gain = len(x), speed1 - speed0
+    whole = (n + LANES - 1) & -LANES
+    if len(work) < 2 * whole:
+        work = np.empty(2 * whole)
+    for i in range(n):
+        work[whole + i] = x[i]
+        swept += (speed0 + gain * x[i]) * per_sample_s
+        work[i] = swept
+    for i in range(n, whole):
+        work[whole + i], work[i] = x[n - 1], swept
+    finest, coarsest = OCTAVES - 1, 0
+    while finest >= 0 and height0[finest] == 0.0 and height1[finest] == 0.0:
+        finest -= 1
+    if finest < 0:
+        return swept, work
+    while height0[coarsest] == 0.0 and height1[coarsest] == 0.0:
+        coarsest += 1
+    inverse = 2.0**finest / (LONGEST_M * LATTICE)
+    first, last = (np.int64(work[0] * inverse) - 1) & -2, (np.int64(swept * inverse) + 2) | 1
+    size = last - first + 1 + 4 * LANES  # and what is written beyond
+    if len(work) < 2 * whole + 4 * size:
+        longer = np.empty(2 * whole + 4 * size)
+        for i in range(2 * whole):
+            longer[i] = work[i]
+        work = longer
+    now, new, change = 2 * whole, 2 * whole + size, 2 * size
+    # neighbouring seeds must start far apart in the 2^32 values of the mix
+    place = np.int64((np.uint64(key) * np.uint64(0x9E3779B97F4A7C15)) >> np.uint64(33))
+    begin, end = _lattice(first, last, finest - coarsest + 1)
+    for i in range(end - begin + 1):
+        work[now + i], work[now + change + i] = 0.0, 0.0
+    for j in range(coarsest, finest + 1):
+        low, high = _lattice(first, last, finest - j)
+        coarse, pairs = now + (low >> 1) - begin - 1, (high - low + 1) >> 1
+        _refine(
+            work, coarse, new, change, pairs, place + 0x3C6EF372 * j + low, height0[j], height1[j] - height0[j]
+        )
+        now, new, begin = new, now, low
+    origin = max(begin + 1, 0)  # never below 0: a place less it has no more digits than the place, and is exact
+    _read(
+        work, 0, whole, whole, now + origin - begin - 1, change, float(origin), inverse, speed0, gain, rate, out
+    )
+    return swept, work
+
+
+@njit(nogil=True, error_model="numpy")
+def _lattice(first, last, halvings):
+    """First and last coefficient that those from first (even) to last (odd) hang on, so many octaves coarser."""
+    for _ in range(halvings):
+        first, last = ((first >> 1) - 1) & -2, ((last >> 1) + 1) | 1
+    return first, last
+
+
+@njit(nogil=True, error_model="numpy")
 def _noise(first, out):  # type: ignore[no-untyped-def]
     """Values on ±1 of the lattice points from ``first`` (uint32) on: a 32-bit integer mix [Wellons 2018, "lowbias32"],
     kept in 32 bits so that it vectorises.
@@ -68,7 +275,7 @@ def _noise(first, out):  # type: ignore[no-untyped-def]
 
 
 @njit(nogil=True, error_model="numpy")
-def _refine(coarse, fine, height, noise, count):  # type: ignore[no-untyped-def]
+def _refine_old(coarse, fine, height, noise, count):  # type: ignore[no-untyped-def]
     """2·count B-spline coefficients on half the lattice, from coarse[0] … coarse[count + 1], and this octave's own
     noise.
     """
@@ -115,8 +322,8 @@ def sweep(swept, speed, x, key, height0, height1, sr, rate):  # type: ignore[no-
         _noise(np.uint32(place + 0x3C6EF372 * j + first[j]), noise[:count])
         if j > 0:
             begin = (first[j] >> 1) - first[j - 1] - 1
-            _refine(now0[begin:], new0, height0[j], noise, count >> 1)
-            _refine(now1[begin:], new1, height1[j], noise, count >> 1)
+            _refine_old(now0[begin:], new0, height0[j], noise, count >> 1)
+            _refine_old(now1[begin:], new1, height1[j], noise, count >> 1)
             now0, now1, new0, new1 = new0, new1, now0, now1
         else:
             for i in range(count):

@@ -1,0 +1,279 @@
+"""Rolling and sliding: one voice a touching pair, excited by the height profiles its two surfaces sweep.
+
+    dz/dt = dh_a/dt + dh_b/dt - u
+        z: penetration beyond the resting one, u: how fast the body is lifted
+    m* du/dt = f - N
+    δ = δ0(N) + z,   f = k δ^(3/2) (1 + c(dh/dt - u)),  never below 0
+        [Hunt & Crossley 1975, eq. 12; clamped: micro-collisions]
+    k = (4/3) E* √R*,   N = k δ0^(3/2),   a = (3 N R*/4E*)^(1/3)            [Johnson 1985, eq. 4.22-4.24]
+    c = 2ζ √(m* dN/dδ0)/N                                                   ζ: damping ratio of the resting contact
+
+The voice gives f - N in newton: along the normal as it is; times the friction direction and coefficient for slip.
+Rolling (both surfaces sweep), sliding (one does) and anything between differ in the two sweep speeds only: no switch. A
+contact at rest is an exact equilibrium (z = u = 0 gives f = N to the bit) whatever N does, so support at rest and a
+load that drifts are silent; a new pair starts there, without a click. Within a step δ0, c, speeds and gains run
+linearly from the step's start to its end.
+
+Time: semi-implicit Euler, the damping implicit, 1 … 8 substeps a sample by the contact's resonance at the step's loads.
+Beyond the penetration at which the contact's own stiffness would pass m*/h² (substep h: a resonance of sr·substeps/2π)
+the law goes on as a straight line, so ωh ≤ 1 everywhere and the scheme is stable for any stiffness, mass and load
+[Hairer, Lubich, Wanner 2006, I.1.4]. All that a sample needs hangs on the sample before it and on its step: any split
+into blocks gives the same bits, and so does any company of other pairs.
+
+The way of the data, for the voices that move in a step: law -> rates of eight voices (`profile.sweep_profile`) ->
+`_oscillate`: the eight at once, one a lane -> f - N, a row a voice. State and constants stand in the table of pairs
+(render.tables.PAIR), loads and speeds of the step in the scratch table VOICE. Lengths in δ_lim, forces in k·δ_lim^(3/2),
+u and dh/dt in δ_lim/h, damping in h/δ_lim: then for every pair f = min(δ, 1)^(3/2) + 1.5(δ - 1)₊, and one substep adds
+(h²/m*)·k·√δ_lim = 2/3 of the force to u. The units follow the substeps; nothing is rounded twice.
+"""
+# mypy: disable-error-code="no-untyped-def"
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic
+
+from sonic_bullet.machine.compiled import njit
+from sonic_bullet.synth.profile import OCTAVES, gained_heights, sweep_profile
+from sonic_bullet.synth.vector import F64, I32, LANES, VEC, Emit, Value, constant
+
+MOST_SUBSTEPS = 8
+FASTEST_M_S = 50.0
+LEAST_DAMPING_RATIO = 0.25
+_STILL = 1e-9
+"""Below this share of the resting penetration, on surfaces that stand, the contact is at rest."""
+
+VOICE = np.dtype(
+    [
+        ("slot", "i8"),  # of its pair
+        ("load_n", "f8", (2,)),  # at the step's start and end, as all that follows
+        ("sweep_m_s", "f8", (2, 2)),  # over the lower and the higher body's surface
+        ("direction", "f8", (2, 3)),  # of the force on the lower body, world frame, per newton of load
+        ("begin", "i8"),  # its rows of the step that follows
+        ("end", "i8"),
+        ("total_n_s", "f8"),  # their load
+        ("substeps", "i8"),  # from here: filled by `law`
+        ("rate_unit", "f8"),  # h/δ_lim
+        ("force_unit_n", "f8"),  # k·δ_lim^(3/2)
+        ("rest", "f8", (2,)),  # δ0
+        ("damping", "f8", (2,)),  # c
+        ("patch_m", "f8", (2,)),  # a
+    ],
+    align=True,
+)
+"""A voice that moves, for one step: scratch."""
+
+# rows of `_oscillate`'s lanes
+_DEPTH, _LIFT, _REST, _DAMPING, _RATE, _FORCE, _SUBSTEPS, _SHARE, _STANDS = 0, 1, 2, 4, 6, 7, 8, 9, 10
+_ROWS = 11
+
+
+@njit(nogil=True, error_model="numpy")
+def damping_ratio(restitution):
+    """ζ of the linear oscillator that rebounds with this coefficient of restitution: -ln e/√(π² + ln² e), within
+    0.25 … 1.
+
+    The floor is a model's choice: a rolling contact also sends waves into both bodies, which restitution of whole-body
+    impacts (e = 0.95 would ring ten times) does not tell. Below it the level laws of rough, stiff, fast pairs bend
+    (benchmarks/surface_law.py).
+    """
+    log = np.log(min(max(restitution, 1e-9), 1.0))
+    return min(max(-log / np.sqrt(np.pi * np.pi + log * log), LEAST_DAMPING_RATIO), 1.0)
+
+
+@njit(nogil=True, error_model="numpy")
+def contact_radius_m(relative_curvature_per_m, flat_area_m2):
+    """R* = 1/(κ1+κ2), at most the radius √(A/π) of the nominal area of touching (1 m where A is 0: none known).
+
+    A flat face rests on its highest spots; each is taken for a cap as blunt as the face is wide.
+    """
+    blunt = np.sqrt(flat_area_m2 / np.pi) if flat_area_m2 > 0 else 1.0
+    return min(1.0 / relative_curvature_per_m, blunt) if relative_curvature_per_m > 0 else blunt
+
+
+@njit(nogil=True, error_model="numpy")
+def law(pairs, voices, v, sr):
+    """The contact law of voice v in this step: what VOICE says; its pair's depth, lift and substeps follow."""
+    voice = voices[v]
+    pair = pairs[voice.slot]
+    mass, radius, modulus = pair.mass_kg, pair.radius_m, pair.modulus_pa
+    k = 4.0 / 3.0 * modulus * np.sqrt(radius)
+    soft = 1.5 * k ** (2.0 / 3.0)
+    resonance = np.sqrt(soft * np.cbrt(max(voice.load_n[0], voice.load_n[1])) / mass)
+    # half a radian a substep at rest leaves room for collisions four times (√δ twice) as stiff
+    substeps = int(min(max(np.ceil(2.0 * resonance / sr), 1.0), MOST_SUBSTEPS))
+    h = 1.0 / (sr * substeps)
+    limit = mass / (1.5 * k * (h * h))
+    limit *= limit
+    at_limit = k * limit**1.5
+    for end in range(2):
+        load = voice.load_n[end]
+        depth = (load / k) ** (2.0 / 3.0) if load <= at_limit else limit + (load - at_limit) * (h * h) / mass
+        loss = 2.0 * pair.damping_ratio * np.sqrt(mass * soft) * max(load, 1e-3 * 9.81 * mass) ** (-5.0 / 6.0)
+        voice.rest[end] = depth / limit
+        voice.damping[end] = loss * limit / h
+        voice.patch_m[end] = np.cbrt(0.75 * load * radius / modulus)
+    voice.substeps, voice.rate_unit, voice.force_unit_n = substeps, h / limit, at_limit
+    change = pair.substeps / substeps  # 0: a new contact
+    square = change * change
+    pair.depth *= square * square
+    pair.lift *= square * square * change
+
+
+@njit(nogil=True, error_model="numpy")
+def sound_voices(pairs, voices, count, x, sr, force):
+    """Force f - N in newton of the voices 0 … count - 1 into force (voices, n), at the n samples that lie at the shares
+    ``x`` (n,) in [0, 1) of one physics step; their pairs move on. Call again with the rest of the step's x for its
+    other samples. sr: float, in Hz.
+    """
+    n = len(x)
+    if count == 0 or n == 0:
+        return
+    whole = (n + LANES - 1) & -LANES
+    work, rate, lanes, order = np.empty(2048), np.empty(LANES * whole), np.empty(LANES * _ROWS), np.empty(count, np.int64)
+    height = np.empty((2, OCTAVES))
+    for v in range(count):
+        law(pairs, voices, v, sr)
+    last = 0
+    for substeps in range(1, MOST_SUBSTEPS + 1):  # so that few lanes wait for others
+        for v in range(count):
+            if voices[v].substeps == substeps:
+                order[last] = v
+                last += 1
+    for first in range(0, count, LANES):
+        size = min(LANES, count - first)
+        for i in range(LANES * whole):
+            rate[i] = 0.0
+        for lane in range(LANES):
+            v = order[first + min(lane, size - 1)]  # lanes that are left over repeat the last
+            if lane < size:
+                work = _rates(pairs, voices, v, x, sr, height, work, rate, lane * whole)
+            _into_lane(pairs, voices, v, rate[lane * whole], lanes, lane)
+        _oscillate(lanes, x, n, voices[order[first + size - 1]].substeps, rate, whole)
+        for lane in range(size):
+            v = order[first + lane]
+            pair = pairs[voices[v].slot]
+            pair.depth, pair.lift, pair.substeps = (
+                lanes[_DEPTH * LANES + lane],
+                lanes[_LIFT * LANES + lane],
+                voices[v].substeps,
+            )
+            for i in range(n):
+                force[v, i] = rate[lane * whole + i]
+
+
+@njit(nogil=True, error_model="numpy")
+def _rates(pairs, voices, v, x, sr, height, work, rate, out):
+    """Add dh/dt of both sides of voice v to rate[out] …; moves its pair on. The scratch, longer where it was too
+    short.
+    """
+    voice = voices[v]
+    pair = pairs[voice.slot]
+    for side in range(2):
+        begin, end = voice.sweep_m_s[0, side], voice.sweep_m_s[1, side]
+        if begin != 0.0 or end != 0.0:
+            gained_heights(pair.height_m[side], begin, voice.patch_m[0], sr, height[0])
+            gained_heights(pair.height_m[side], end, voice.patch_m[1], sr, height[1])
+            pair.swept_m[side], work = sweep_profile(
+                pair.swept_m[side], begin, end, x, pair.seed[side], height[0], height[1], 1.0 / sr, work, rate, out
+            )
+    return work
+
+
+@njit(nogil=True, error_model="numpy")
+def _into_lane(pairs, voices, v, first_rate, lanes, lane):
+    """State and constants of voice v into its lane."""
+    voice = voices[v]
+    pair = pairs[voice.slot]
+    sweep = voice.sweep_m_s
+    stands = sweep[0, 0] == 0.0 and sweep[1, 0] == 0.0 and sweep[0, 1] == 0.0 and sweep[1, 1] == 0.0
+    lanes[_DEPTH * LANES + lane] = pair.depth
+    # a new contact already moves with what it rolls over
+    lanes[_LIFT * LANES + lane] = pair.lift if pair.substeps > 0 else first_rate * voice.rate_unit
+    for end in range(2):
+        lanes[(_REST + end) * LANES + lane] = voice.rest[end] - end * voice.rest[0]
+        lanes[(_DAMPING + end) * LANES + lane] = voice.damping[end] - end * voice.damping[0]
+    lanes[_RATE * LANES + lane] = voice.rate_unit
+    lanes[_FORCE * LANES + lane] = voice.force_unit_n
+    lanes[_SUBSTEPS * LANES + lane] = voice.substeps
+    lanes[_SHARE * LANES + lane] = 1.0 / voice.substeps
+    lanes[_STANDS * LANES + lane] = 1.0 if stands else 0.0
+
+
+@intrinsic
+def _oscillate(typingctx, lanes, x, count, most, rate, apart):
+    """f - N of eight pairs at ``count`` samples in the place of their dh/dt: lane k's from rate[k·apart] on; state
+    lanes[:16] moves on. most: the largest number of substeps among them.
+    """
+
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        e = Emit(context, builder, signature, args)
+        lanes, x, count, most, rate, apart = e.args
+        root = cgutils.get_or_insert_function(builder.module, ir.FunctionType(VEC, [VEC]), "llvm.sqrt.v8f64")
+        none, one, two_thirds = constant(0.0), constant(1.0), constant(2.0 / 3.0)
+
+        def row(number: int) -> Value:
+            return e.load(lanes, e.index(number * LANES))
+
+        def larger(a: Value, b: Value) -> Value:
+            return builder.select(builder.fcmp_ordered(">", a, b), a, b)
+
+        def hertz(d: Value) -> Value:
+            low = builder.select(builder.fcmp_ordered("<", d, one), d, one)
+            bent = builder.fmul(low, builder.call(root, [low]))
+            return builder.fadd(bent, builder.fmul(constant(1.5), builder.fsub(d, low)))
+
+        def within(value: Value, bound: Value) -> Value:
+            return builder.and_(
+                builder.fcmp_ordered("<=", value, bound), builder.fcmp_ordered(">=", value, builder.fneg(bound))
+            )
+
+        rest, rest_gain, damping, damping_gain = (row(k) for k in range(_REST, _REST + 4))
+        rate_unit, unit, substeps = row(_RATE), builder.fmul(row(_SHARE), row(_FORCE)), row(_SUBSTEPS)
+        stands = builder.fcmp_ordered("==", row(_STANDS), one)
+        places = [builder.mul(apart, e.index(lane)) for lane in range(LANES)]
+
+        def sample(i: Value, state: list[Value]) -> list[Value]:
+            spots = [builder.gep(rate, [builder.add(place, i)]) for place in places]
+            dh = ir.Constant(VEC, ir.Undefined)
+            for lane, spot in enumerate(spots):
+                dh = builder.insert_element(dh, builder.load(spot), ir.Constant(I32, lane))
+            dh = builder.fmul(dh, rate_unit)
+            share = e.broadcast(x, i)
+            d0 = builder.fadd(rest, builder.fmul(rest_gain, share))
+            c = builder.fadd(damping, builder.fmul(damping_gain, share))
+            load = hertz(d0)
+
+            def substep(k: Value, carried: list[Value]) -> list[Value]:
+                z, u, total = carried
+                runs = builder.fcmp_ordered("<", e.spread(builder.sitofp(k, F64)), substeps)
+                moved = builder.fadd(z, builder.fsub(dh, u))
+                elastic = hertz(larger(builder.fadd(d0, moved), none))
+                loss = builder.fmul(elastic, c)
+                # f - N with the damping implicit in u: f = elastic·(1 + c(dh/dt - u_new)), u_new = u + 2/3 (f - N);
+                # exactly 0 at rest
+                f = builder.fadd(builder.fsub(elastic, load), builder.fmul(loss, builder.fsub(dh, u)))
+                f = builder.fdiv(f, builder.fadd(one, builder.fmul(two_thirds, loss)))
+                f = builder.select(runs, larger(f, builder.fneg(load)), none)
+                lifted = builder.fadd(u, builder.fmul(two_thirds, f))
+                return [builder.select(runs, moved, z), lifted, builder.fadd(total, f)]
+
+            z, u, total = e.loop(most, 1, [*state, none], substep)
+            bound = builder.fmul(constant(_STILL), d0)
+            rests = builder.and_(stands, builder.and_(within(z, bound), within(u, bound)))
+            z, u, total = (builder.select(rests, none, value) for value in (z, u, total))
+            f = builder.fmul(total, unit)
+            for lane, spot in enumerate(spots):
+                builder.store(builder.extract_element(f, ir.Constant(I32, lane)), spot)
+            return [z, u]
+
+        for number, value in enumerate(e.loop(count, 1, [row(_DEPTH), row(_LIFT)], sample)):
+            e.store(value, lanes, e.index(number * LANES))
+        return context.get_dummy_value()
+
+    return types.void(lanes, x, count, most, rate, apart), codegen
