@@ -32,6 +32,8 @@ LEAST_DELAY = float(AHEAD)
 HALF_DEGREE = 4
 KAISER_BETA = 6.0
 FLUSH = 1e-30
+INFINITE = 0x7FF << 52
+"""Bits of the double that is infinite; those of a NaN are above."""
 KEPT = (TAPS + 1) * LANES
 """Doubles that `read` is lent: the taps it made last, a vector each, and the fraction they belong to."""
 
@@ -71,6 +73,29 @@ def _all(e: Emit, lanes: Value) -> Value:
     """Whether the condition holds in all lanes."""
     bits = e.builder.bitcast(lanes, ir.IntType(LANES))
     return e.builder.icmp_unsigned("==", bits, ir.Constant(ir.IntType(LANES), 2**LANES - 1))
+
+
+@intrinsic
+def greatest(typingctx, values, at, count):
+    """Greatest magnitude of ``count`` values (whole groups of 8) from element ``at`` on, as the bits of a double:
+
+    0 where all are zero, from INFINITE on where one is not finite.
+    """
+
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        e = Emit(context, builder, signature, args)
+        values, at, count = e.args
+        integers = ir.VectorType(I64, LANES)
+        magnitude = ir.Constant(integers, [2**63 - 1] * LANES)
+
+        def body(k: Value, carried: list[Value]) -> list[Value]:
+            bits = builder.and_(builder.bitcast(e.load(values, builder.add(at, k)), integers), magnitude)
+            return [builder.select(builder.icmp_signed(">", bits, carried[0]), bits, carried[0])]
+
+        most = e.loop(count, LANES, [ir.Constant(integers, [0] * LANES)], body)[0]
+        return _called(e, "llvm.vector.reduce.smax.v8i64", I64, most)
+
+    return types.int64(values, at, count), codegen
 
 
 @intrinsic

@@ -17,7 +17,7 @@ from __future__ import annotations
 import numpy as np
 
 from sonic_bullet.machine.compiled import njit
-from sonic_bullet.synth.fractional_delay import AHEAD, FLUSH, KEPT, TAPS, emit, leading, read
+from sonic_bullet.synth.fractional_delay import AHEAD, FLUSH, KEPT, INFINITE, TAPS, emit, greatest, leading, read
 from sonic_bullet.synth.vector import LANES
 
 DONE, MEMORY_SHORT, PLACES_SHORT, TOO_FAR, NOT_FINITE = range(5)
@@ -70,13 +70,16 @@ _HISTORY = 3 * AHEAD
 
 
 @njit(nogil=True, error_model="numpy")
-def _judged(values, first, n):  # pragma: no cover - compiled
-    """0: silent, 1: something sounds, 2 or 3: not finite."""
-    some, bad = 0, 0
-    for k in range(n):
-        some |= 1 if values[first + k] != 0.0 else 0
-        bad |= 0 if abs(values[first + k]) < np.inf else 2
-    return some | bad
+def _judged(values, at, n):  # pragma: no cover - compiled
+    """n of the values from element ``at`` on: 0 silent, 1 something sounds, 2 or 3 one of them is not finite."""
+    whole = n - n % LANES
+    most = greatest(values, at, whole)
+    said = 2 if most >= INFINITE else (1 if most > 0 else 0)
+    flat = values.reshape(-1)
+    for k in range(at + whole, at + n):
+        said |= 1 if flat[k] != 0.0 else 0
+        said |= 0 if abs(flat[k]) < np.inf else 2
+    return said
 
 
 @njit(nogil=True, error_model="numpy")
@@ -136,12 +139,12 @@ def _survey(step, n, first, source, pushed, begin_m, end_m, teleported, micropho
 
     Silence needs no fade: a body of which nothing is observed keeps its place.
     """
-    channels = len(microphone_m)
+    channels, long = len(microphone_m), source.shape[1]
     free, wrong = 0, DONE
     for b in range(len(sources)):
-        said = _judged(source[b], first, n)
+        said = _judged(source, b * long + first, n)
         for axis in range(3):
-            said |= _judged(pushed[b, axis], first, n)
+            said |= _judged(pushed, (3 * b + axis) * long + first, n)
         if said > 1:
             return NOT_FINITE
         loud[b], fresh[b] = said, -1
