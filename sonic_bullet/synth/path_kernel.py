@@ -280,8 +280,7 @@ def _listen(line, at, n, emitted, delay, heard, memory, ring_at, mask, taps, kep
     awake, m, newest = line.awake != 0, line.cursor - at, line.newest - at
     if awake:
         _remember(memory, ring_at, late_at, mask, at, 0, n, emitted, delay, memory[late_at + ((at - 1) & mask)], steep)
-    arrives = False
-    i = 0
+    i, arrives = 0, False
     while i < n:
         if not awake:
             while i < n and emitted[i] == 0.0:
@@ -301,6 +300,17 @@ def _listen(line, at, n, emitted, delay, heard, memory, ring_at, mask, taps, kep
             arrives = True
             for k in range(n):
                 heard[k] = 0.0
+        # the rule: whole groups of a line that sounds, each sample one further than that before
+        while i + LANES <= n and newest >= i - LANES and emitted[i + LANES - 1] != 0.0:
+            ring, late = (at + m + 2 - AHEAD) & mask, (at + m + 1) & mask
+            if leading(memory, late_at + late, m + 1 - i) != LANES:
+                break
+            read(memory, ring_at + ring, late_at + late, m + 1 - i, taps, kept, heard, i)
+            newest = i + LANES - 1
+            i += LANES
+            m += LANES
+        if i == n:
+            break
         base = m + 1
         count = leading(memory, late_at + ((at + base) & mask), base - i)
         if count == 0:
