@@ -19,14 +19,14 @@ C = AIR.sound_speed_m_s
 
 
 def path_of(
-    bodies: int, microphones: object = ((0.0, 0.0, 0.0),), radius: float = 0.01, jerk: float = 0.0, at: int = 0
+    bodies: int, microphones: object = ((0.0, 0.0, 0.0),), radius: float = 0.01, at: int = 0
 ) -> tuple[Path, PathState]:
     path, state = empty_path(SR, AIR, np.array(microphones), at)
-    return append_bodies(path, state, np.full(bodies, radius), np.full(bodies, jerk))
+    return append_bodies(path, state, np.full(bodies, radius))
 
 
 def still(
-    path: Path, state: PathState, source: Array, place: object, jerk: Array | None = None, step: int = 0
+    path: Path, state: PathState, source: Array, place: object, pushed: Array | None = None, step: int = 0
 ) -> Array:
     """One body that stays."""
     n = source.shape[-1]
@@ -38,7 +38,7 @@ def still(
         state,
         step,
         source,
-        np.zeros((count, 3, n)) if jerk is None else jerk,
+        np.zeros((count, 3, n)) if pushed is None else pushed,
         here,
         here,
         np.zeros(count, bool),
@@ -128,13 +128,13 @@ def test_the_clamp_of_radius_and_of_the_shortest_delay() -> None:
     assert -np.angle(got) / (2 * np.pi * 1000) * SR == pytest.approx(8, abs=0.01)
 
 
-def test_jerk_radiates_as_a_dipole() -> None:
+def test_a_push_radiates_as_a_dipole() -> None:
     rng = np.random.default_rng(0)
     away = rng.normal(size=(5, 3))
     away *= 2.0 / np.linalg.norm(away, axis=1)[:, None]
     direction = np.array([0.6, 0.0, 0.8])
-    path, state = path_of(1, away, jerk=0.3)
-    sound = still(path, state, np.zeros((1, 2000)), [0, 0, 0], jerk=direction[None, :, None] * tone(500, 2000))
+    path, state = path_of(1, away)
+    sound = still(path, state, np.zeros((1, 2000)), [0, 0, 0], pushed=0.3 * direction[None, :, None] * tone(500, 2000))
     for c in range(5):
         got = fitted(sound[c], 500, 600) / (-1j) * np.exp(2j * np.pi * 500 * 2.0 / C)
         assert got == pytest.approx(0.3 * (away[c] / 2.0) @ direction / 2.0, abs=2e-4)
@@ -149,11 +149,11 @@ def random_steps(seed: int, bodies: int, steps: int, n: int) -> list[tuple[Array
         by_hand = rng.uniform(size=bodies) < 0.2
         after = place + rng.normal(size=(bodies, 3)) * np.where(by_hand, 3.0, 0.02)[:, None]
         on ^= rng.uniform(size=bodies) < 0.3
-        source, jerk = rng.normal(size=(bodies, n)) * on[:, None], rng.normal(size=(bodies, 3, n)) * on[:, None, None]
+        source, pushed = rng.normal(size=(bodies, n)) * on[:, None], rng.normal(size=(bodies, 3, n)) * on[:, None, None]
         gate = int(rng.integers(n))
         source[:, :gate] *= rng.uniform(size=bodies)[:, None] < 0.6
-        jerk[:, :, :gate] = 0.0
-        out.append((source, jerk, place, after, by_hand))
+        pushed[:, :, :gate] = 0.0
+        out.append((source, pushed, place, after, by_hand))
         place = after
     return out
 
@@ -164,21 +164,21 @@ def play(
     microphones: Array,
     turn: Array | None = None,
 ) -> Array:
-    path, state = path_of(len(steps[0][0]), microphones, radius=0.05, jerk=0.2)
+    path, state = path_of(len(steps[0][0]), microphones, radius=0.05)
     n = steps[0][0].shape[1]
     progress = (np.arange(n) + 0.3) / n
     parts = []
     turn = np.eye(3) if turn is None else turn
-    for number, ((source, jerk, before, after, by_hand), cut) in enumerate(zip(steps, cuts, strict=True)):
+    for number, ((source, pushed, before, after, by_hand), cut) in enumerate(zip(steps, cuts, strict=True)):
         for lo, hi in zip([0, *cut], [*cut, n], strict=True):
-            jerk_now = np.einsum("ij,bjn->bin", turn, jerk[:, :, lo:hi])
+            push = 0.2 * np.einsum("ij,bjn->bin", turn, pushed[:, :, lo:hi])
             parts.append(
                 propagate(
                     path,
                     state,
                     number,
                     source[:, lo:hi],
-                    jerk_now,
+                    push,
                     before @ turn.T,
                     after @ turn.T,
                     by_hand,
@@ -243,7 +243,7 @@ def test_a_body_moved_by_hand_fades_without_click_or_chirp() -> None:
     second = np.abs(np.diff(body, 2)).max()
     # curvature of the tone, and the fade's corners
     assert second < 1.1 * (2 * np.pi * freq / SR) ** 2 / 2 + 2 * (2 * np.pi * freq / SR) / n
-    assert len(state.body) == 2
+    assert len(state.places) == 2
 
 
 def test_moving_a_silent_body_costs_no_place() -> None:
@@ -261,12 +261,12 @@ def test_moving_a_silent_body_costs_no_place() -> None:
             np.ones(1, bool),
             np.zeros(100),
         )
-    assert len(state.body) == 1
+    assert len(state.places) == 1
     for step in range(50, 400):
         propagate(
             path, state, step, np.ones((1, 100)), np.zeros((1, 3, 100)), here, here + 1, np.ones(1, bool), np.zeros(100)
         )
-    assert len(state.body) < 12
+    assert len(state.places) < 12
 
 
 def test_bodies_are_appended_while_sound_is_under_way() -> None:
@@ -275,7 +275,7 @@ def test_bodies_are_appended_while_sound_is_under_way() -> None:
     path, state = path_of(1)
     alone = still(path, state.copy(), source, [5.0, 0, 0])
     first = still(path, state, source[:, :900], [5.0, 0, 0])
-    path, state = append_bodies(path, state, np.array([0.1]), np.array([0.0]))
+    path, state = append_bodies(path, state, np.array([0.1]))
     silent_second = np.concatenate([source[:, 900:], np.zeros((1, 3100))])
     second = still(path, state, silent_second, [[5.0, 0, 0], [1.0, 0, 0]], step=1)
     assert np.array_equal(np.concatenate([first, second], axis=1), alone)
@@ -287,7 +287,7 @@ def test_sound_drains_to_zeros_and_lines_fall_asleep() -> None:
     tail = still(path, state, np.zeros(6000), [3.0, 0, 0])
     assert tail.any()
     assert not tail[:, -3000:].any()
-    assert not state.awake.any()
+    assert not state.lines["awake"].any()
     tiny = still(path, state, 1e-29 * tone(1000, 3000), [3.0, 0, 0])
     assert not ((np.abs(tiny) > 0) & (np.abs(tiny) < 1e-30)).any()
 
@@ -308,7 +308,7 @@ def test_what_cannot_be_is_named() -> None:
         still(path, state, np.ones(10), [np.nan, 0, 0])
     with pytest.raises(AudioError, match="not finite"):
         still(path, state, np.full(10, np.nan), [1.0, 0, 0])
-    with pytest.raises(AudioError, match="jerk of shape"):
+    with pytest.raises(AudioError, match="pushed of shape"):
         propagate(
             path,
             state,
@@ -323,7 +323,7 @@ def test_what_cannot_be_is_named() -> None:
     with pytest.raises(AudioError, match="sample rate"):
         empty_path(0, AIR, np.zeros((1, 3)))
     with pytest.raises(AudioError, match="finite"):
-        append_bodies(path, state, np.array([np.nan]), np.array([0.0]))
+        append_bodies(path, state, np.array([np.nan]))
 
 
 def test_nobody_and_no_microphone_are_legal() -> None:

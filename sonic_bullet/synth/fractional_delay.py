@@ -1,0 +1,221 @@
+"""What a moving point emits and what is read off its history between the samples, eight samples at a time.
+
+    emitted at sample m:   a[m] = (s[m] + n̂·j[m])/r[m],  arriving at m + D[m], D = r sr/c
+    heard at sample n:     a(u), where u + D(u) = n, D linear between samples: m + D[m] ≤ n < m + 1 + D[m + 1],
+        u = m + (n - m - D[m])/(1 + D[m+1] - D[m])                          (retarded time: Doppler shift is exact)
+    a(u) = Σ_k a[k] h(u - k),  h: 16 taps of a Kaiser-windowed sinc
+        [Laakso et al. 1996, IEEE SPM 13(1), sec. 3.2]
+
+Taps as polynomials in the fraction [Farrow 1988]. Each lane is one sample, and what it gives hangs on that sample
+alone: groups may begin anywhere. Samples of equal fraction share their taps (a body that stands still), with the same
+bits as if each had made its own.
+"""
+
+# mypy: disable-error-code="no-untyped-def"
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic
+
+from sonic_bullet.records import Array
+from sonic_bullet.synth.vector import F64, I32, I64, LANES, VEC, Emit, Value, constant
+
+TAPS = 16
+AHEAD = TAPS // 2
+LEAST_DELAY = float(AHEAD)
+HALF_DEGREE = 4
+KAISER_BETA = 6.0
+FLUSH = 1e-30
+INFINITE = 0x7FF << 52
+"""Bits of the double that is infinite; those of a NaN are above."""
+KEPT = (TAPS + 1) * LANES
+"""Doubles that `read` is lent: the taps it made last, a vector each, and the fraction they belong to."""
+
+
+@lru_cache(maxsize=1)
+def tap_polynomials() -> Array:
+    """(HALF_DEGREE + 1, 2, 8): of taps 0 … 7 the even and the odd part in t = fraction - ½, as polynomials in t²,
+    lowest power first.
+
+    Tap k weighs sample floor(u) - 7 + k; tap 15 - k at t is tap k at -t: h = even ± t·odd serves both. Fitted to 1e-8.
+    """
+    t = 0.5 * np.cos(np.pi * (np.arange(64) + 0.5) / 64)
+    distance = np.arange(TAPS) - (AHEAD - 1) - (t[:, None] + 0.5)
+    window = np.i0(KAISER_BETA * np.sqrt(np.maximum(0, 1 - (distance / AHEAD) ** 2))) / np.i0(KAISER_BETA)
+    taps = np.sinc(distance) * window
+    taps /= taps.sum(axis=1, keepdims=True)
+    here, mirrored = taps[:, :AHEAD], taps[:, : AHEAD - 1 : -1]
+    powers = np.vander(t**2, HALF_DEGREE + 1, increasing=True)
+    even = np.linalg.lstsq(powers, (here + mirrored) / 2, rcond=None)[0]
+    odd = np.linalg.lstsq(powers, (here - mirrored) / (2 * t[:, None]), rcond=None)[0]
+    fit = np.ascontiguousarray(np.stack([even, odd], axis=1))
+    fit.setflags(write=False)
+    return fit
+
+
+def _called(e: Emit, name: str, kind: Any, *values: Value) -> Value:
+    """A function of LLVM's own."""
+    declared = ir.FunctionType(kind, [value.type for value in values])
+    return e.builder.call(cgutils.get_or_insert_function(e.builder.module, declared, name), values)
+
+
+def _greater(e: Emit, a: Value, b: Value) -> Value:
+    return e.builder.select(e.builder.fcmp_ordered(">", a, b), a, b)
+
+
+def _all(e: Emit, lanes: Value) -> Value:
+    """Whether the condition holds in all lanes."""
+    bits = e.builder.bitcast(lanes, ir.IntType(LANES))
+    return e.builder.icmp_unsigned("==", bits, ir.Constant(ir.IntType(LANES), 2**LANES - 1))
+
+
+@intrinsic
+def greatest(typingctx, values, at, count):
+    """Greatest magnitude of ``count`` values (whole groups of 8) from element ``at`` on, as the bits of a double:
+
+    0 where all are zero, from INFINITE on where one is not finite.
+    """
+
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        e = Emit(context, builder, signature, args)
+        values, at, count = e.args
+        integers = ir.VectorType(I64, LANES)
+        magnitude = ir.Constant(integers, [2**63 - 1] * LANES)
+
+        def body(k: Value, carried: list[Value]) -> list[Value]:
+            bits = builder.and_(builder.bitcast(e.load(values, builder.add(at, k)), integers), magnitude)
+            return [builder.select(builder.icmp_signed(">", bits, carried[0]), bits, carried[0])]
+
+        most = e.loop(count, LANES, [ir.Constant(integers, [0] * LANES)], body)[0]
+        return _called(e, "llvm.vector.reduce.smax.v8i64", I64, most)
+
+    return types.int64(values, at, count), codegen
+
+
+@intrinsic
+def emit(typingctx, source, source_at, pushed, pushed_at, stride, x, x_at, count, geometry, emitted, delay, at):
+    """a and D of ``count`` samples, whole groups of 8, into emitted[at …] and delay[at …].
+
+    source, pushed, x: arrays of any shape from element source_at … on, the push's axes ``stride`` elements apart.
+    geometry (8,): microphone - start, end - start (m), samples per metre, 1/radius.
+    """
+
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        e = Emit(context, builder, signature, args)
+        source, source_at, pushed, pushed_at, stride, x, x_at, count, geometry, emitted, delay, at = e.args
+        known = [e.broadcast(geometry, e.index(k)) for k in range(8)]
+        axes = [pushed_at, builder.add(pushed_at, stride), builder.add(pushed_at, builder.add(stride, stride))]
+
+        def body(k: Value, carried: list[Value]) -> list[Value]:
+            between = e.load(x, builder.add(x_at, k))
+            from_here = [e.fma(builder.fneg(known[3 + axis]), between, known[axis]) for axis in range(3)]
+            push = [e.load(pushed, builder.add(push_at, k)) for push_at in axes]
+            square, dot = builder.fmul(from_here[0], from_here[0]), builder.fmul(from_here[0], push[0])
+            for axis in (1, 2):
+                square = e.fma(from_here[axis], from_here[axis], square)
+                dot = e.fma(from_here[axis], push[axis], dot)
+            r = _called(e, "llvm.sqrt.v8f64", VEC, square)
+            inverse = builder.fdiv(constant(1.0), _greater(e, r, constant(1e-12)))
+            spread = builder.select(builder.fcmp_ordered("<", inverse, known[7]), inverse, known[7])
+            value = builder.fmul(e.fma(dot, inverse, e.load(source, builder.add(source_at, k))), spread)
+            audible = builder.fcmp_ordered(">=", _called(e, "llvm.fabs.v8f64", VEC, value), constant(FLUSH))
+            place = builder.add(at, k)
+            e.store(builder.select(audible, value, constant(0.0)), emitted, place)
+            e.store(_greater(e, builder.fmul(r, known[6]), constant(LEAST_DELAY)), delay, place)
+            return []
+
+        e.loop(count, LANES, [], body)
+        return context.get_dummy_value()
+
+    return types.void(
+        source, source_at, pushed, pushed_at, stride, x, x_at, count, geometry, emitted, delay, at
+    ), codegen
+
+
+@intrinsic
+def leading(typingctx, memory, late_at, gone):
+    """How many of eight samples n, n + 1, … hear m, m + 1, …, one sample of the history each.
+
+    memory[late_at + k]: D[m + k], gone: m - n.
+    """
+
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        e = Emit(context, builder, signature, args)
+        memory, late_at, gone = e.args
+        after = builder.add(gone, e.index(1))
+        here = builder.fadd(e.spread(builder.sitofp(gone, F64)), e.load(memory, late_at))
+        there = builder.fadd(e.spread(builder.sitofp(after, F64)), e.load(memory, e.shifted(late_at, 1)))
+        arrived = builder.fcmp_ordered("<=", here, constant(0.0))
+        newest = builder.fcmp_ordered(">", there, constant(0.0))
+        bits = builder.bitcast(builder.and_(arrived, newest), ir.IntType(LANES))
+        others = builder.xor(builder.zext(bits, I64), ir.Constant(I64, 2 ** (LANES + 1) - 1))
+        return builder.cttz(others, ir.Constant(ir.IntType(1), 1))
+
+    return types.int64(memory, late_at, gone), codegen
+
+
+@intrinsic
+def read(typingctx, memory, ring_at, late_at, gone, taps, kept, heard, at):
+    """Σ_k a[m - 7 + k] h_k of eight samples as in `leading` into heard[at …], memory[ring_at + k]: a[m - 7 + k].
+
+    kept (KEPT,): taps of the samples before, NaN at first.
+    """
+
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        e = Emit(context, builder, signature, args)
+        memory, ring_at, late_at, gone, taps, kept, heard, at = e.args
+        here, there = e.load(memory, late_at), e.load(memory, e.shifted(late_at, 1))
+        since = builder.fsub(e.spread(builder.sitofp(builder.sub(e.index(0), gone), F64)), here)
+        fraction = builder.fdiv(since, builder.fsub(builder.fadd(constant(1.0), there), here))
+        t = builder.fsub(fraction, constant(0.5))
+        first, last = range(AHEAD), [TAPS - 1 - k for k in range(AHEAD)]
+
+        def summed(weights: Any) -> Value:
+            """Both halves from the outer taps to the inner; each weight is asked for once, in this order."""
+            total: list[Value | None] = [None, None]
+            for low, high in zip(first, last, strict=True):
+                for half, tap in enumerate((low, high)):
+                    sample, weight = e.load(memory, e.shifted(ring_at, tap)), weights(tap)
+                    so_far = total[half]
+                    total[half] = builder.fmul(weight, sample) if so_far is None else e.fma(weight, sample, so_far)
+            return builder.fadd(total[0], total[1])
+
+        square = builder.fmul(t, t)
+        parts: dict[int, Value] = {}
+
+        def made(tap: int) -> Value:
+            if tap >= AHEAD:
+                even, odd = parts[2 * (TAPS - 1 - tap)], builder.fneg(parts[2 * (TAPS - 1 - tap) + 1])
+            else:
+                for part in range(2):
+                    value = e.broadcast(taps, e.index((2 * HALF_DEGREE + part) * LANES + tap))
+                    for power in range(HALF_DEGREE - 1, -1, -1):
+                        value = e.fma(value, square, e.broadcast(taps, e.index((2 * power + part) * LANES + tap)))
+                    parts[2 * tap + part] = value
+                even, odd = parts[2 * tap], parts[2 * tap + 1]
+            weight[tap] = e.fma(odd, t, even)
+            return weight[tap]
+
+        weight: dict[int, Value] = {}
+        equal = _all(e, builder.fcmp_ordered("==", t, e.load(kept, e.index(TAPS * LANES))))
+        with builder.if_else(equal) as (then, otherwise):
+            with then:
+                e.store(summed(lambda tap: e.load(kept, e.index(tap * LANES))), heard, at)
+            with otherwise:
+                e.store(summed(made), heard, at)
+                one = e.spread(builder.extract_element(t, ir.Constant(I32, 0)))
+                with builder.if_then(_all(e, builder.fcmp_ordered("==", t, one))):
+                    for tap in range(TAPS):
+                        e.store(weight[tap], kept, e.index(tap * LANES))
+                    e.store(t, kept, e.index(TAPS * LANES))
+        return context.get_dummy_value()
+
+    return types.void(memory, ring_at, late_at, gone, taps, kept, heard, at), codegen
+
+
