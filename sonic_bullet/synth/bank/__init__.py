@@ -1,0 +1,35 @@
+"""A bank of damped sinusoids with explicit state: forces on modes in, velocities weighted for sensors out.
+
+    mass-normalised mode  q̈ + 2d q̇ + (ω² + d²) q = f(t) = φᵀF(t)
+        [physics of any vibration text, e.g. Meirovitch 2001, eq. 7.113]
+    pole s = -d + iω, state z, velocity q̇ = Re z;   an impulse j at u:   z += (1 + i d/ω) φᵀĵ j e^{s(t-u)}
+    output of weight set w and body b:   y[w, b, n] = Σ_modes Re(weight[w] z[n])
+
+(that is q̇ = e^{-dt}(cos ωt - (d/ω) sin ωt): the continuous-time response, sampled; strikes are exact at any sub-sample
+time, and nothing aliases.)
+
+    layout (tables) | strike_pool, phasors (pulses under way) | drive (what is driven) | tile (what rings free) |
+    translation (the rigid body) -> bank_kernel.advance;   instrument, playing: the door
+
+A body below the floor costs nothing. Time is counted in absolute samples; blocks of 256 lie on that grid, so any way of
+cutting the calls gives the same bits. `advance` works in place: `copy()` a state first to look ahead and come back.
+"""
+
+from sonic_bullet.synth.bank.instrument import Bank, BankState, ModeSet, Translation, append, audible, empty_bank, silence
+from sonic_bullet.synth.bank.layout import FLOOR
+from sonic_bullet.synth.bank.playing import Force, Strike, advance
+
+__all__ = [
+    "FLOOR",
+    "Bank",
+    "BankState",
+    "Force",
+    "ModeSet",
+    "Strike",
+    "Translation",
+    "advance",
+    "append",
+    "audible",
+    "empty_bank",
+    "silence",
+]

@@ -1,0 +1,280 @@
+"""The modal bank's compiled loops.
+
+Strict IEEE arithmetic, and stated multiply-adds in `tile` and `drive`: one set of bits.
+
+    block start:  tile[n] = Σ Re(w z p^n),  z <- z p^256           all modes of a ringing body at once (tile.py)
+    32 samples:   f <- f p + (strikes + forces) (1 + i d/ω),  y = tile[n] + Σ Re(w f)     driven bodies only (drive.py)
+    block end:    z <- z + f p,  f <- 0
+    bent bodies:  p of each block by |z| at its start, and of what is driven within it every 32 samples (bend_poles)
+
+Blocks lie on a fixed grid of absolute samples, and f runs sample by sample: where a frame ends changes nothing. Whoever
+gives a body other poles does so where one of the 32 begins (pole) or a block (block, too), as `bend_poles` does.
+"""
+
+# mypy: disable-error-code="no-untyped-def"
+from __future__ import annotations
+
+import numpy as np
+
+from sonic_bullet.machine.compiled import njit
+from sonic_bullet.synth.bank import drive, tile
+from sonic_bullet.synth.bank.layout import COLUMNS, DRIVEN, FLOOR, FLUSH, MOST_DUE, PAIR, ROOM
+from sonic_bullet.synth.bank.strike_pool import begins, plan_nodes, release_done
+from sonic_bullet.synth.bank.tile import BLOCK, CHUNK, ROW, ROWS
+from sonic_bullet.synth.bank.translation import translate
+from sonic_bullet.synth.vector import LANES
+
+RING_SCRATCH = (2 + 10 + 2 * ROW + 2 * ROWS) * CHUNK
+PUSH_SCRATCH = COLUMNS // PAIR * ROOM * drive.STEP
+DRIVE_SCRATCH = PUSH_SCRATCH + DRIVEN * LANES + DRIVEN + MOST_DUE
+
+
+@njit(nogil=True)
+def _ring(b, start, stop, columns, z, pole, block, weight, modes, observed, sound, scratch):  # pragma: no cover
+    """Tile of body b for the block that starts:
+
+    sound (W, b, BLOCK). Turns z to the next block. False where all modes are below the floor.
+    """
+    now, powers = scratch[: 2 * CHUNK], scratch[2 * CHUNK : 12 * CHUNK]
+    table = scratch[12 * CHUNK : (12 + 2 * ROW) * CHUNK]
+    column = scratch[(12 + 2 * ROW) * CHUNK : RING_SCRATCH]
+    ringing = False
+    for lo in range(start, stop, CHUNK):
+        count = min(CHUNK, stop - lo)
+        if tile.turn(z, pole, block, modes, lo, count, FLOOR**2, now, powers) == 0:
+            continue
+        if not ringing:
+            ringing = True
+            for w in range(len(observed)):
+                if observed[w, b]:
+                    sound[w, b, :] = 0.0
+        real = min(count, start + columns - lo)  # spare lanes need no table
+        tile.rows(powers, real, table)
+        for w in range(len(observed)):
+            if observed[w, b]:
+                tile.columns(now, weight[w], modes, lo, powers, count, column)
+                tile.outer(column, table, real, sound[w, b])
+    return ringing
+
+
+@njit(nogil=True)
+def bend_poles(z, driven, span, law, start, stop, pole, block):  # pragma: no cover - compiled
+    """Poles of a level-dependent body for the ``span`` samples to come: means over them of what its modes do if nothing
+    strikes them.
+
+    a = |z|:  ȧ = −d a (1 + (ca)^p)  ->  a(T)/a = ((1 + (ca)^p) e^{pdT} − (ca)^p)^{−1/p};   ω <- ω (1 + b ⟨a²⟩),
+        ⟨a²⟩ = a² (1 − e^{−2d'T})/2d'T
+    (Nayfeh & Mook 1979, eq. 2.3.35 and section 3.3), d' the block's mean decay; exact in amplitude, and in phase for c
+    = 0.
+    """
+    modes = law.shape[1]
+    for m in range(start, stop):
+        bend, damping_growth, power = law[3, m], law[4, m], law[5, m]
+        if bend == 0.0 and damping_growth == 0.0:
+            continue
+        d, w = -law[0, m] * span, law[1, m]
+        level = np.sqrt(z[m] ** 2 + z[modes + m] ** 2 + driven[m] ** 2 + driven[modes + m] ** 2)
+        c = (damping_growth * level) ** power
+        fall = np.log(max((1.0 + c) * np.exp(power * d) - c, 1.0)) / power
+        mean = -np.expm1(-2.0 * fall) / (2.0 * fall) if fall > 1e-9 else 1.0
+        turn = min(max(w * (1.0 + bend * level * level * mean), 0.0), 3.141)
+        p = np.exp(-fall / span)
+        pole[m], pole[modes + m] = p * np.cos(turn), p * np.sin(turn)
+        if span == BLOCK:
+            q = np.exp(-fall)
+            block[m], block[modes + m] = q * np.cos(turn * BLOCK), q * np.sin(turn * BLOCK)
+
+
+@njit(nogil=True)
+def _copy_flushed(values, out):  # pragma: no cover - compiled
+    for k in range(len(out)):
+        value = values[k]
+        out[k] = value if abs(value) >= FLUSH else 0.0
+
+
+@njit(nogil=True)
+def _close_block(z, driven, pole, modes, start, stop):  # pragma: no cover - compiled
+    """End of a block: what was driven within it joins the free state of the next."""
+    for re in range(start, stop):
+        im = re + modes
+        x, y = driven[re], driven[im]
+        z[re] += x * pole[re] - y * pole[im]
+        z[im] += x * pole[im] + y * pole[re]
+        driven[re] = 0.0
+        driven[im] = 0.0
+
+
+@njit(nogil=True)
+def list_forces(
+    n, drive_count, drive_body, force_n, gain0, gain1, progress, period, bodies, first, side, signal
+):  # pragma: no cover - compiled
+    """Forces by body: first (b+1,) where each body's begin in side, 2·drive + side each, in order of the drives.
+
+    drive_body (drives, 2): -1 for nobody. signal (drives, 2, stride): impulses at both ends, F·period·(1 - x) and
+    F·period·x, 0 behind the last. Gains and impulses below FLUSH become 0, the gains in place.
+    """
+    count = len(bodies)
+    for b in range(count + 1):
+        first[b] = 0
+    for d in range(drive_count):
+        for s in range(2):
+            if drive_body[d, s] >= 0:
+                first[drive_body[d, s] + 1] += 1
+    for b in range(count):
+        first[b + 1] += first[b]
+    # counting sort: each body's beginning moves to its end, and all ends one place on again
+    for d in range(drive_count):
+        for s in range(2):
+            b = drive_body[d, s]
+            if b >= 0:
+                side[first[b]] = 2 * d + s
+                first[b] += 1
+                for m in range(bodies[b].columns):
+                    if abs(gain0[d, s, m]) < FLUSH:
+                        gain0[d, s, m] = 0.0
+                    if abs(gain1[d, s, m]) < FLUSH:
+                        gain1[d, s, m] = 0.0
+        early, late, force = signal[d, 0], signal[d, 1], force_n[d]
+        for k in range(n):
+            push = force[k] * period
+            if abs(push) < FLUSH:
+                push = 0.0
+            early[k] = push * (1.0 - progress[k])
+            late[k] = push * progress[k]
+        for k in range(n, signal.shape[2]):
+            early[k] = 0.0
+            late[k] = 0.0
+    for b in range(count, 0, -1):
+        first[b] = first[b - 1]
+    first[0] = 0
+
+
+@njit(nogil=True)
+def _drive(
+    at, i, count, b, place, start, stop, law, weight, observed, ringing, z, driven, sound, pole, block, strikes, rows, hertz,
+    f0, f1, side, gain0, gain1, signal, plan, scratch, source,
+):  # fmt: skip  # pragma: no cover - compiled
+    """``count`` samples from ``i`` on, within one of the DRIVEN: strikes and forces enter, free and driven part are
+    heard together.
+    """
+    modes, width, sample = law.shape[1], rows.shape[2], at + i
+    push, partial = scratch[:PUSH_SCRATCH], scratch[PUSH_SCRATCH : PUSH_SCRATCH + DRIVEN * LANES]
+    total = scratch[PUSH_SCRATCH + DRIVEN * LANES : PUSH_SCRATCH + DRIVEN * LANES + DRIVEN]
+    due = scratch[PUSH_SCRATCH + DRIVEN * LANES + DRIVEN : DRIVE_SCRATCH]
+    ringing[b].driven = 1
+    for w in range(len(observed)):  # what of the body is heard, set after set: the state goes on with the last
+        if w > 0 and not observed[w, b]:
+            continue
+        keep = True
+        for v in range(w + 1, len(observed)):
+            keep = keep and not observed[v, b]
+        for k in range(count * LANES):
+            partial[k] = 0.0
+        for lo in range(start, stop, COLUMNS):
+            lanes = min(COLUMNS, stop - lo)
+            if f1 > f0:
+                drive.press(
+                    push, gain0, gain1, gain0.shape[2], side, f0, f1, signal, signal.shape[2], i,
+                    law, 2 * modes + lo, lo - start, lanes, count,
+                )  # fmt: skip
+            else:
+                for k in range(lanes // PAIR * ROOM * drive.STEP):
+                    push[k] = 0.0
+            slot = ringing[b].strike
+            while slot >= 0:
+                if strikes[slot].modal and strikes[slot].first < sample + count:
+                    final = keep and lo + COLUMNS >= stop
+                    begin, end = plan_nodes(slot, sample, count, strikes, hertz, plan, due, final)
+                    drive.strike_nodes(
+                        push, rows, slot * 8 * width + lo - start, width, lanes, plan, due, begin, end, keep
+                    )
+                slot = strikes[slot].next
+            drive.run(driven, pole, modes, lo, lanes, weight, 2 * w * modes + lo, push, count, partial, keep)
+        if observed[w, b]:
+            drive.across(partial, count, total)
+            if ringing[b].tiled:
+                free = sound[w, b]
+                for k in range(count):
+                    total[k] += free[place + k]
+            _copy_flushed(total, source[w, b, i : i + count])
+
+
+@njit(nogil=True)
+def _advance_modes(
+    at, n, b, bodies, law, weight, observed, ringing, z, driven, sound, pole, block, strikes, rows, hertz,
+    f0, f1, side, gain0, gain1, signal, plan, scratch, source,
+):  # fmt: skip  # pragma: no cover - compiled
+    """Samples at … at + n - 1 of body b's modes into source (W, b, n or more)."""
+    start, stop, modes, bent = bodies[b].start, bodies[b].stop, law.shape[1], bodies[b].bent
+    i = 0
+    while i < n:
+        place = (at + i) % BLOCK
+        if place == 0:
+            if bent and ringing[b].ringing:
+                bend_poles(z, driven, BLOCK, law, start, stop, pole, block)
+            alive = ringing[b].ringing != 0 and _ring(
+                b, start, stop, bodies[b].columns, z, pole, block, weight, modes, observed, sound, scratch
+            )
+            ringing[b].tiled = ringing[b].ringing = 1 if alive else 0
+        end = min(n, i + BLOCK - place)
+        if ringing[b].driven or f1 > f0 or ringing[b].strike >= 0:
+            end = min(end, i + DRIVEN - (at + i) % DRIVEN)
+        if ringing[b].driven or f1 > f0 or begins(b, at + end, ringing, strikes):
+            # what begins to be driven begins with the poles of what rings then
+            if bent and (not ringing[b].driven or (at + i) % DRIVEN == 0):
+                bend_poles(z, driven, DRIVEN, law, start, stop, pole, block)
+            _drive(
+                at, i, end - i, b, place, start, stop, law, weight, observed, ringing, z, driven, sound, pole, block,
+                strikes, rows, hertz, f0, f1, side, gain0, gain1, signal, plan, scratch, source,
+            )  # fmt: skip
+        else:
+            for w in range(len(observed)):
+                if observed[w, b]:
+                    if ringing[b].tiled:
+                        _copy_flushed(sound[w, b, place : place + end - i], source[w, b, i:end])
+                    else:
+                        source[w, b, i:end] = 0.0
+        if place + end - i == BLOCK:
+            ringing[b].tiled = 0
+            if ringing[b].driven:
+                _close_block(z, driven, pole, modes, start, stop)
+                ringing[b].ringing = 1
+                ringing[b].driven = 0
+        i = end
+
+
+@njit(nogil=True)
+def advance(
+    at, n, sr, bodies, law, weight, observed, ringing, z, driven, sound, pole, block, strikes, rows, free, hertz,
+    drive_count, drive_body, force_n, gain0, gain1, direction0, direction1, progress, first, side, signal, kick, plan,
+    scratch, source, pushed, sounds,
+):  # fmt: skip  # pragma: no cover - compiled
+    """Samples at … at + n - 1 into source (W, b, n or more) and pushed (b, 3, n or more).
+
+    sounds (b, 2): 1 where a body's rows of source, of pushed are not zero; its other rows are zero as they were handed
+    in, where sounds said so. See layout.py for the tables; all in place.
+    """
+    period = 1.0 / sr
+    list_forces(n, drive_count, drive_body, force_n, gain0, gain1, progress, period, bodies, first, side, signal)
+    for b in range(len(bodies)):
+        f0, f1 = first[b], first[b + 1]
+        loud = ringing[b].ringing or ringing[b].driven or ringing[b].tiled or f1 > f0
+        loud = bodies[b].columns > 0 and (loud or begins(b, at + n, ringing, strikes))
+        if loud:
+            _advance_modes(
+                at, n, b, bodies, law, weight, observed, ringing, z, driven, sound, pole, block, strikes, rows, hertz,
+                f0, f1, side, gain0, gain1, signal, plan, scratch, source,
+            )  # fmt: skip
+        elif sounds[b, 0]:
+            for w in range(len(observed)):
+                source[w, b, :] = 0.0
+        sounds[b, 0] = 1 if loud else 0
+        moves = bodies[b].rigid != 0 and translate(
+            at, n, b, bodies, ringing, strikes, hertz, f0, f1, side, force_n, direction0, direction1, progress, period,
+            kick, pushed[b],
+        )  # fmt: skip
+        if not moves and sounds[b, 1]:
+            pushed[b, :, :] = 0.0
+        sounds[b, 1] = 1 if moves else 0
+        if ringing[b].strike >= 0:
+            release_done(b, ringing, strikes, free)

@@ -1,0 +1,318 @@
+"""The bank as an instrument: bodies' modes in, tables and flat arrays out, and the state that goes with them.
+
+A body has two parts: its modes (with the lines of its residual, which sound into the same signal) and its three
+translations, which share one pole. b bodies, m lanes of all of them, W weight sets.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from sonic_bullet.records import Array
+from sonic_bullet.records.errors import AudioError
+from sonic_bullet.synth.bank.bank_kernel import DRIVE_SCRATCH, RING_SCRATCH
+from sonic_bullet.synth.bank.layout import BANK_BODY, DRIVEN, FLUSH, PAIR, RINGING, STRIKE
+from sonic_bullet.synth.bank.tile import BLOCK
+from sonic_bullet.synth.vector import LANES
+
+FASTEST_DECAY_PER_SAMPLE = 2.0
+SLOWEST_TURN = 1e-3
+
+
+@dataclass(frozen=True, slots=True)
+class Translation:
+    """The pole of a body's three translations, and weight: pressure at 1 m, in Pa·m per N·s along an axis.
+
+    Forces act evenly over the sample before each instant, pulses over cells of the sample grid, not at once: such modes
+    are gone within a few samples, and a slow force must leave its slope alone.
+    """
+
+    omega_rad_s: float
+    decay_per_s: float
+    weight: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ModeSet:
+    """One body for the bank: omega_rad_s (m,) of the damped modes, decay_per_s (m,), weight (W, m) complex.
+
+    All `audible`. bend, damping_growth (m,): of level-dependent modes, ω (1 + bend·|z|²) and d (1 +
+    (damping_growth·|z|)^damping_growth_power); None: linear. See `bank_kernel.bend_poles`. translation: None where only
+    the modes sound.
+    """
+
+    omega_rad_s: Array
+    decay_per_s: Array
+    weight: Array
+    bend: Array | None = None
+    damping_growth: Array | None = None
+    damping_growth_power: float = 1.0
+    translation: Translation | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Bank:
+    """The instrument. body (b,) BANK_BODY; law (6, m): of each lane s/sr, d/ω and how its pole goes with its level;
+    weight (W, 2·m), real parts first; observed (W, b): whether any weight of the body is not zero.
+    """
+
+    sr: int
+    body: Array
+    law: Array
+    weight: Array
+    observed: Array
+
+    @property
+    def body_count(self) -> int:
+        return len(self.body)
+
+    @property
+    def mode_count(self) -> int:
+        return int(self.body["columns"].sum())
+
+    @property
+    def columns(self) -> int:
+        """Lanes of the body that has most: gains have so many, in whole groups."""
+        return int((self.body["stop"] - self.body["start"]).max(initial=PAIR))
+
+
+@dataclass(slots=True, eq=False)
+class Scratch:
+    """Room of one call's own: for forces `first` (b+1,), `side` (2·drives,), `signal` (drives, 2, more than n); `kick`
+    (6, n or more), `plan` (DRIVEN, 3), `flat`.
+    """
+
+    first: Array = field(default_factory=lambda: np.zeros(1, np.int64))
+    side: Array = field(default_factory=lambda: np.zeros(0, np.int64))
+    signal: Array = field(default_factory=lambda: np.zeros((0, 2, 0)))
+    kick: Array = field(default_factory=lambda: np.zeros((6, 0)))
+    plan: Array = field(default_factory=lambda: np.zeros((DRIVEN, 3), np.int64))
+    flat: Array = field(default_factory=lambda: aligned(max(DRIVE_SCRATCH, RING_SCRATCH)))
+
+    def fit(self, bodies: int, drives: int, n: int) -> None:
+        """Grow what is too small for a call of n samples."""
+        if len(self.first) != bodies + 1:
+            self.first = np.zeros(bodies + 1, np.int64)
+        if len(self.side) < 2 * drives or self.signal.shape[2] < n + LANES:
+            most, longest = max(len(self.side) // 2, drives), max(self.signal.shape[2] - LANES, n)
+            self.side, self.signal = np.zeros(2 * most, np.int64), np.zeros((most, 2, longest + LANES))
+        if self.kick.shape[1] < n:
+            self.kick = np.zeros((6, n))
+
+
+@dataclass(slots=True, eq=False)
+class BankState:
+    """What the bank remembers. at: the next sample. z, driven (2·m,): free state at the next block's start, and what
+    was driven since this block's. sound (W, b, 256): the block's free ringing. pole, block (2·m,): e^s and e^{256 s},
+    bent by level where a body is. ringing (b,) RINGING; strikes (pool,) STRIKE, rows (pool, 8, columns) their phasors,
+    free (pool + 1,): how many rows are free, and which.
+    """
+
+    at: int
+    z: Array
+    driven: Array
+    sound: Array
+    pole: Array
+    block: Array
+    ringing: Array
+    strikes: Array
+    rows: Array
+    free: Array
+    scratch: Scratch = field(default_factory=Scratch)
+
+    def copy(self) -> BankState:
+        """A state of its own: advancing one leaves the other."""
+        names = ("z", "driven", "sound", "pole", "block", "ringing", "strikes", "rows", "free")
+        arrays: dict[str, Any] = {name: getattr(self, name).copy() for name in names}
+        return BankState(at=self.at, **arrays)
+
+    def with_room(self, strikes: int) -> None:
+        """See to it that so many strikes can be entered."""
+        free = int(self.free[0])
+        if free >= strikes:
+            return
+        pool = len(self.strikes)
+        more = max(pool, strikes - free, 4)
+        self.strikes = np.concatenate([self.strikes, np.zeros(more, STRIKE)])
+        rows = np.empty((pool + more, *self.rows.shape[1:]))
+        rows[:pool] = self.rows
+        self.rows = rows
+        kept = self.free[1 : free + 1]
+        self.free = np.concatenate(
+            [[free + more], np.arange(pool + more - 1, pool - 1, -1), kept, np.zeros(pool - free, np.int64)]
+        ).astype(np.int64)
+
+
+def aligned(size: int) -> Array:
+    """(size,) numbers of scratch that begin where a vector register does."""
+    raw = np.zeros(size + LANES)
+    skip = (-(raw.ctypes.data // 8)) % LANES
+    return raw[skip : skip + size]
+
+
+def audible(omega_rad_s: Array, decay_per_s: Array, sr: int) -> Array:
+    """(m,) bool: modes the bank can play at the rate ``sr``; count the others with ``~``.
+
+    Dropped: at or above sr/2, overdamped or all but critically so (ω ≤ d/1000), or gone within a sample (d ≥ 2 sr), or
+    not finite.
+    """
+    omega, decay = np.asarray(omega_rad_s, float), np.asarray(decay_per_s, float)
+    with np.errstate(invalid="ignore"):
+        return np.asarray(
+            (omega < np.pi * sr)
+            & (omega > SLOWEST_TURN * decay)
+            & (omega > 0)
+            & (decay >= 0)
+            & (decay < FASTEST_DECAY_PER_SAMPLE * sr)
+        )
+
+
+def flushed(values: Array) -> Array:
+    """Values with what lies below 1e-30 set to zero: no product of theirs becomes subnormal."""
+    return np.asarray(np.where(np.abs(values) < FLUSH, 0, values))
+
+
+def empty_bank(sr: int, weight_sets: int = 1, at: int = 0) -> tuple[Bank, BankState]:
+    """A bank without bodies and its state at absolute sample ``at``. Raises AudioError on a rate outside 1 … 10 MHz."""
+    if not (isinstance(sr, int | np.integer) and 0 < sr <= 10_000_000):
+        raise AudioError(f"sample rate {sr}", "give a whole number of Hz, 44100 or 48000 say")
+    bank = Bank(
+        int(sr),
+        np.zeros(0, BANK_BODY),
+        np.zeros((6, 0)),
+        np.zeros((weight_sets, 0)),
+        np.zeros((weight_sets, 0), bool),
+    )
+    state = BankState(
+        int(at),
+        *(np.zeros(0) for _ in range(2)),
+        np.zeros((weight_sets, 0, BLOCK)),
+        *(np.zeros(0) for _ in range(2)),
+        np.zeros(0, RINGING),
+        np.zeros(0, STRIKE),
+        np.zeros((0, 8, PAIR)),
+        np.zeros(1, np.int64),
+    )
+    return bank, state
+
+
+def append(bank: Bank, state: BankState, bodies: Sequence[ModeSet]) -> tuple[Bank, BankState]:
+    """Bank and state with further bodies, silent at first; those already there go on unchanged, bit by bit.
+
+    The old pair stays usable.
+
+    Raises AudioError where a mode is not `audible`, or shapes or numbers are wrong.
+    """
+    sets = bank.weight.shape[0]
+    for one in bodies:
+        _check(one, sets, bank.sr)
+    sizes = np.array([len(one.omega_rad_s) for one in bodies], np.int64)
+    stops = np.cumsum(-(-sizes // PAIR) * PAIR)
+    total = int(stops[-1]) if len(bodies) else 0
+    body = np.zeros(len(bodies), BANK_BODY)
+    base = bank.law.shape[1]
+    law, weight = np.zeros((6, total)), np.zeros((sets, total), complex)
+    law[5] = 1.0
+    pole, block = np.zeros(total, complex), np.zeros(total, complex)
+    observed = np.zeros((sets, len(bodies)), bool)
+    for i, (one, stop, size) in enumerate(zip(bodies, stops, sizes, strict=True)):
+        start = int(stop) + (-int(size) // PAIR) * PAIR
+        lanes = slice(start, start + int(size))
+        body[i]["start"], body[i]["stop"], body[i]["columns"] = base + start, base + stop, size
+        body[i]["bent"] = one.bend is not None or one.damping_growth is not None
+        step = (-one.decay_per_s + 1j * one.omega_rad_s) / bank.sr
+        law[0, lanes], law[1, lanes], law[2, lanes] = step.real, step.imag, one.decay_per_s / one.omega_rad_s
+        law[3, lanes], law[4, lanes] = _or_zero(one.bend, int(size)), _or_zero(one.damping_growth, int(size))
+        law[5, lanes] = one.damping_growth_power
+        pole[lanes], block[lanes] = np.exp(step), np.exp(BLOCK * step)
+        weight[:, lanes] = flushed(one.weight)
+        observed[:, i] = one.weight.any(axis=1)
+        if one.translation is not None:
+            _translating(body[i], one.translation, bank.sr)
+    grown = Bank(
+        bank.sr,
+        np.concatenate([bank.body, body]),
+        np.concatenate([bank.law, law], axis=1),
+        np.stack([_joined(bank.weight[w], weight[w]) for w in range(sets)]).reshape(sets, -1),
+        np.concatenate([bank.observed, observed], axis=1),
+    )
+    state = state.copy()
+    silent, ringing = np.zeros(total, complex), np.zeros(len(bodies), RINGING)
+    ringing["strike"] = -1
+    rows = state.rows
+    if rows.shape[2] < grown.columns:
+        rows = np.zeros((*rows.shape[:2], grown.columns))
+        rows[:, :, : state.rows.shape[2]] = state.rows
+    return grown, replace(
+        state,
+        z=_joined(state.z, silent),
+        driven=_joined(state.driven, silent),
+        sound=np.concatenate([state.sound, np.zeros((sets, len(bodies), BLOCK))], axis=1),
+        pole=_joined(state.pole, pole),
+        block=_joined(state.block, block),
+        ringing=np.concatenate([state.ringing, ringing]),
+        rows=rows,
+    )
+
+
+def silence(state: BankState) -> BankState:
+    """The state at the same sample with nothing ringing and no strike under way."""
+    state = state.copy()
+    for name in ("z", "driven", "sound"):
+        getattr(state, name)[...] = 0
+    state.ringing[...] = np.zeros((), RINGING)
+    state.ringing["strike"] = -1
+    pool = len(state.strikes)
+    state.free[...] = np.concatenate([[pool], np.arange(pool - 1, -1, -1)])
+    return state
+
+
+def _check(one: ModeSet, sets: int, sr: int) -> None:
+    m = len(one.omega_rad_s)
+    if one.decay_per_s.shape != (m,) or one.weight.shape != (sets, m) or not np.isfinite(one.weight).all():
+        raise AudioError(
+            f"modes of shape {one.omega_rad_s.shape}, {one.decay_per_s.shape}, weights {one.weight.shape} for {sets} "
+            "weight sets",
+            "give finite (m,), (m,), (W, m)",
+        )
+    omega, decay = one.omega_rad_s, one.decay_per_s
+    if one.translation is not None:
+        omega = np.append(omega, one.translation.omega_rad_s)
+        decay = np.append(decay, one.translation.decay_per_s)
+        if not np.isfinite(one.translation.weight):
+            raise AudioError("a translation whose weight is not finite", "give a finite number of Pa·m per N·s")
+    if not audible(omega, decay, sr).all():
+        raise AudioError(
+            "a mode beyond half the sample rate, overdamped or not finite", "keep the modes that `audible` names"
+        )
+
+
+def _translating(row: Any, one: Translation, sr: int) -> None:
+    """Enter a translation into a BANK_BODY row."""
+    s = complex(-one.decay_per_s, one.omega_rad_s) / sr
+    quadrature = one.decay_per_s / one.omega_rad_s
+    pole, onset = np.exp(s), (1 + 1j * quadrature) * np.expm1(s) / s
+    row["rigid"], row["rigid_quadrature"] = 1, quadrature
+    row["rigid_weight"] = one.weight if abs(one.weight) >= FLUSH else 0.0
+    for name, value in (("rigid_log_pole", s), ("rigid_pole", pole), ("rigid_onset", onset)):
+        row[name] = value.real, value.imag
+
+
+def _or_zero(values: Array | None, m: int) -> Array:
+    if values is None:
+        return np.zeros(m)
+    if np.shape(values) != (m,) or not np.isfinite(values).all():
+        raise AudioError(
+            f"bend or damping growth of shape {np.shape(values)} for {m} modes", "give a finite number for each mode"
+        )
+    return np.asarray(values, float)
+
+
+def _joined(flat: Array, more: Array) -> Array:
+    """A flat array, real parts first, with the complex values ``more`` behind it."""
+    half = len(flat) // 2
+    return np.concatenate([flat[:half], more.real, flat[half:], more.imag])

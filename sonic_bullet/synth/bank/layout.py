@@ -1,0 +1,93 @@
+"""The bank's tables and the numbers that its kernels share: one row a body or strike, each in a fixed place.
+
+    BANK_BODY   what a body is: its lanes in the flat arrays, and the pole that its three translations share
+    RINGING     what of it sounds: flags, the translations' state, the first of its strikes
+    STRIKE      a pulse under way: a pool of rows, those of a body linked in order of start, then of arrival
+
+Modes of all bodies lie in flat arrays, a body's `columns` (audible modes, then the lines of its residual) in whole
+groups of PAIR lanes; spare lanes are zero. m lanes of all bodies:
+    law (6, m): decay and turn a sample (s = -d/sr + iω/sr), d/ω, bend, damping growth and its power
+    z, driven, pole, block (2·m): real parts first. z: free state at the next block's start; driven: what was driven
+    since this block's; pole = e^s, block = e^{256 s}, both bent by level where a body is
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sonic_bullet.synth.vector import LANES
+
+PAIR = 2 * LANES
+"""Lanes that are driven side by side: two vectors hide the latency of each other's multiply-adds."""
+DRIVEN = 32
+"""Samples, on the grid of absolute time, that are driven at a time; as long what is driven keeps its bent poles."""
+ROOM = DRIVEN + LANES
+"""Samples of room for pushes: whole tiles are computed, and those past the end are left."""
+COLUMNS = 64
+"""Lanes of a body that are driven at a time: their pushes stay in the first cache."""
+MOST_DUE = 128
+"""Nodes of one strike in DRIVEN samples, at most: 24 in all, or two a sample and a few."""
+
+FLOOR = 1e-15
+"""Modes with |z| below this (in √J·√2) are set to zero: ½|z|² = 5e-31 J is 1e-10 of the mode's thermal energy kT at 300
+K.
+"""
+FLUSH = 1e-30
+"""Output samples below this become 0: they have no meaning in pascal or m/s, and their float32 would be subnormal.
+Gains and forces below it, too: no product of theirs becomes subnormal.
+"""
+
+BANK_BODY = np.dtype(
+    [
+        ("start", "i8"),  # lanes in the flat arrays
+        ("stop", "i8"),
+        ("columns", "i8"),  # of those, in use
+        ("bent", "i8"),  # 1: its poles go with its level
+        ("rigid", "i8"),  # 1: its translations sound
+        ("rigid_log_pole", "f8", (2,)),  # s of the translations
+        ("rigid_pole", "f8", (2,)),
+        ("rigid_onset", "f8", (2,)),  # (1 + i d/ω)(e^s - 1)/s: of a force that acts evenly over the sample before
+        ("rigid_quadrature", "f8"),  # d/ω
+        ("rigid_weight", "f8"),  # Pa·m per N·s
+    ],
+    align=True,
+)
+
+RINGING = np.dtype(
+    [
+        ("ringing", "i8"),  # 1: z is not zero
+        ("driven", "i8"),  # 1: driven is not zero
+        ("tiled", "i8"),  # 1: the block's free sound is
+        ("moving", "i8"),  # 1: a translation's state is not zero
+        ("strike", "i8"),  # slot of its first strike, -1 for none
+        ("motion", "f8", (3, 2)),  # state of the translations
+    ],
+    align=True,
+)
+
+STRIKE = np.dtype(
+    [
+        ("start", "f8"),  # absolute time of the pulse, of its first node; in samples
+        ("node_start", "f8"),
+        ("length", "f8"),  # in samples
+        ("flat", "i8"),  # half-sine, not Hertz'
+        ("next", "i8"),  # slot of the body's next strike, -1 for none
+        ("modal", "i8"),  # 1 while nodes are to come
+        ("count", "i8"),  # nodes
+        ("force_sum", "f8"),  # of the pulse at all of them
+        ("spacing", "f8"),  # δ in samples
+        ("whole", "i8"),  # ⌊1/δ⌋
+        ("first", "i8"),  # sample at or after the first node
+        ("within", "i8"),  # nodes up to it
+        ("upcoming", "i8"),  # next node
+        ("phase", "f8"),  # of the sample before behind the last node
+        ("rigid", "i8"),  # 1 while cells are to come
+        ("cells", "i8"),  # a sample
+        ("cell_first", "i8"),
+        ("cell_stop", "i8"),
+        ("cell_turn", "f8", (2,)),  # e^{s/cells} of the translations
+        ("cell_onset", "f8", (2,)),  # what a cell's impulse leaves of itself at its end
+        ("shove_n_s", "f8", (3,)),
+    ],
+    align=True,
+)

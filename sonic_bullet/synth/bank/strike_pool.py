@@ -1,0 +1,222 @@
+"""Strikes under way: a pool of rows, each a force pulse on one body until the last of it has acted.
+
+    modes: nodes u_j = u_0 + jδ, impulses J_j (pulse_nodes):   at each sample n the driven state gains
+        r_n Σ J_j D^(last - j)   over the nodes in (n-1, n]
+        D = e^{sδ},   r_n = g (1 + i d/ω) e^{s(n - u_last)},   r_{n+1} = r_n e^{s(1 - kδ)},
+            k = nodes in (n, n+1] = ⌊1/δ⌋ or one more
+    so each mode needs four phasors (r, D and the two turns of r), computed once, and no exponential at run time
+    translations: `translation`
+
+Impulses are evaluated as they fall due, from the pulse's own shape; only their sum is known before. Times in samples, s
+per sample. A body's strikes are linked in order of their first node, then of arrival: which ends first changes no sum.
+free: how many rows of the pool are free, then their numbers.
+"""
+
+# mypy: disable-error-code="no-untyped-def"
+from __future__ import annotations
+
+import numpy as np
+
+from sonic_bullet.machine.compiled import njit
+from sonic_bullet.synth.bank.layout import FLUSH, PAIR
+from sonic_bullet.synth.bank.phasors import fill_phasors
+
+NODES_PER_PULSE = 24
+CELLS_PER_RADIAN = 4.0
+"""Cells of a pulse per 1/w of a rigid body: a third of (w·cell)³ = 0.5 % is what its level may err."""
+SHORTEST = 1e-3
+"""Samples: a shorter pulse is one of this length."""
+
+
+@njit(nogil=True, error_model="numpy")
+def pulse_force(share, flat, hertz):  # pragma: no cover - compiled
+    """Force at a share of the pulse in [0, 1], mean 1. hertz: the pulse's table (synth.pulse)."""
+    if flat:
+        return 0.5 * np.pi * np.sin(np.pi * share)
+    cells = hertz.shape[1] - 1
+    place = share * cells
+    i = min(int(place), cells - 1)
+    return hertz[1, i] + (place - i) * (hertz[1, i + 1] - hertz[1, i])
+
+
+@njit(nogil=True, error_model="numpy")
+def enter_strike(
+    b, start, length_s, flat, share, gain, shove_x, shove_y, shove_z, at, sr, bodies, law, ringing, strikes, rows, free, hertz
+):  # pragma: no cover - compiled
+    """Enter one pulse on body b: 0, or 1 where the pool is full (nothing has changed then).
+
+    start: absolute, in samples, at or after sample ``at``. share: factor of gain and shove. gain (columns,): φᵀĵ of the
+    body's modes in N·s/√kg, whole groups of PAIR lanes (spare ones finite). shove: impulse in N·s, world.
+    """
+    modal, rigid = False, False
+    for k in range(bodies[b].columns):
+        modal = modal or abs(gain[k] * share) >= FLUSH
+    if bodies[b].rigid:
+        rigid = shove_x != 0.0 or shove_y != 0.0 or shove_z != 0.0
+    if not (modal or rigid):
+        return 0
+    if free[0] == 0:
+        return 1
+    slot = free[free[0]]
+    free[0] -= 1
+    length = max(length_s * sr, SHORTEST)
+    count = max(NODES_PER_PULSE, int(np.ceil(2.0 * length)))
+    delta = length / count
+    node_start = start + 0.5 * delta
+    strikes[slot].start = start
+    strikes[slot].node_start = node_start
+    strikes[slot].length = length
+    strikes[slot].flat = flat
+    strikes[slot].modal = 1 if modal else 0
+    strikes[slot].rigid = 1 if rigid else 0
+    if modal:
+        _enter_nodes(slot, b, at, count, delta, share, gain, bodies, law, strikes, rows, hertz)
+    if rigid:
+        _enter_cells(slot, b, sr, bodies, strikes)
+        strikes[slot].shove_n_s[0] = share * shove_x
+        strikes[slot].shove_n_s[1] = share * shove_y
+        strikes[slot].shove_n_s[2] = share * shove_z
+    _link(slot, b, ringing, strikes)
+    return 0
+
+
+@njit(nogil=True, error_model="numpy")
+def _enter_nodes(
+    slot, b, at, count, delta, share, gain, bodies, law, strikes, rows, hertz
+):  # pragma: no cover - compiled
+    strike = strikes[slot]
+    total = 0.0
+    for i in range(count):
+        total += pulse_force((i + 0.5) / count, strike.flat, hertz)
+    first = max(int(np.ceil(strike.node_start)), at)
+    within = min(int(np.floor((first - strike.node_start) / delta)), count - 1)
+    phase = max((first - strike.node_start) - within * delta, 0.0)
+    whole = int(np.floor(1.0 / delta))
+    strike.count, strike.spacing, strike.whole, strike.force_sum = count, delta, whole, total
+    strike.first, strike.within, strike.upcoming, strike.phase = first, within + 1, 0, phase
+    width = rows.shape[2]
+    lanes = bodies[b].stop - bodies[b].start
+    fill_phasors(
+        rows, slot * 8 * width, width, law, law.shape[1], bodies[b].start, lanes, gain, share, phase, delta,
+        1.0 - whole * delta, 1.0 - (whole + 1) * delta,
+    )  # fmt: skip
+
+
+@njit(nogil=True, error_model="numpy")
+def _enter_cells(slot, b, sr, bodies, strikes):  # pragma: no cover - compiled
+    """The pulse as cells of the sample grid (pulse_cells), and what one of them leaves:
+
+    (1 + i d/ω) (e^{s/cells} - 1)/(s/cells): an impulse that acts evenly over the cell, at the cell's end.
+    """
+    strike, body = strikes[slot], bodies[b]
+    s = complex(body.rigid_log_pole[0], body.rigid_log_pole[1])
+    least = int(np.ceil(CELLS_PER_RADIAN * -s.real))
+    cells = max(least, int(np.ceil(NODES_PER_PULSE / strike.length)))
+    strike.cells = cells
+    strike.cell_first = int(np.floor(strike.start * cells))
+    strike.cell_stop = int(np.ceil((strike.start + strike.length) * cells))
+    x, y = s.real / cells, s.imag / cells
+    less = complex(np.expm1(x) * np.cos(y) - 2.0 * np.sin(0.5 * y) ** 2, np.exp(x) * np.sin(y))
+    onset = complex(1.0, body.rigid_quadrature) * less / complex(x, y)
+    strike.cell_turn[0], strike.cell_turn[1] = 1.0 + less.real, less.imag
+    strike.cell_onset[0], strike.cell_onset[1] = onset.real, onset.imag
+
+
+@njit(nogil=True, error_model="numpy")
+def _link(slot, b, ringing, strikes):  # pragma: no cover - compiled
+    """Put a strike behind those of its body that start before it or with it."""
+    before, after = -1, ringing[b].strike
+    while after >= 0 and strikes[after].node_start <= strikes[slot].node_start:
+        before, after = after, strikes[after].next
+    strikes[slot].next = after
+    if before < 0:
+        ringing[b].strike = slot
+    else:
+        strikes[before].next = slot
+
+
+@njit(nogil=True, error_model="numpy")
+def release_done(b, ringing, strikes, free):  # pragma: no cover - compiled
+    """Give back the rows of body b's strikes that have acted."""
+    before, slot = -1, ringing[b].strike
+    while slot >= 0:
+        after = strikes[slot].next
+        if strikes[slot].modal or strikes[slot].rigid:
+            before = slot
+        else:
+            if before < 0:
+                ringing[b].strike = after
+            else:
+                strikes[before].next = after
+            free[0] += 1
+            free[free[0]] = slot
+        slot = after
+
+
+@njit(nogil=True, error_model="numpy")
+def begins(b, end, ringing, strikes):  # pragma: no cover - compiled
+    """Whether a strike on the modes of body b has nodes to come before sample ``end``."""
+    slot = ringing[b].strike
+    while slot >= 0:
+        if strikes[slot].modal and strikes[slot].first < end:
+            return True
+        slot = strikes[slot].next
+    return False
+
+
+@njit(nogil=True, error_model="numpy")
+def plan_nodes(slot, at, count, strikes, hertz, plan, due, final):  # pragma: no cover - compiled
+    """What nodes of a strike act at the samples at … at + count - 1: plan (count, 3) and due as `drive.strike_nodes`
+    reads them; the samples they begin and end with. final: the strike moves on.
+    """
+    strike = strikes[slot]
+    upcoming, phase, filled = strike.upcoming, strike.phase, 0
+    begin = max(strike.first - at, 0)
+    k = begin
+    while k < count and upcoming < strike.count:
+        if at + k == strike.first:
+            nodes = strike.within
+            plan[k, 0] = -1
+        else:
+            nodes = min(max(int(np.floor((phase + 1.0) / strike.spacing)), strike.whole), strike.whole + 1)
+            phase += 1.0 - nodes * strike.spacing
+            plan[k, 0] = nodes - strike.whole
+        real = min(nodes, strike.count - upcoming)
+        plan[k, 1], plan[k, 2] = real, nodes - real
+        for i in range(upcoming, upcoming + real):
+            due[filled] = pulse_force((i + 0.5) / strike.count, strike.flat, hertz) / strike.force_sum
+            filled += 1
+        upcoming += real
+        k += 1
+    if final:
+        strike.upcoming, strike.phase = upcoming, phase
+        strike.modal = 1 if upcoming < strike.count else 0
+    return begin, k
+
+
+@njit(nogil=True)
+def enter_pulses(
+    pulses, count, push, begin_s, after_s, at, sr, bodies, law, ringing, strikes, rows, free, hertz
+):  # pragma: no cover - compiled
+    """Enter a step's pulses on both bodies of each, in order: how many were, less than ``count`` where the pool is full.
+
+    pulses: PULSE rows of render.tables; push (pulses, 2, columns): Uᵀj of the whole impulse. begin_s, after_s: of the
+    rendered step, absolute: those found in the step after it count from there. at: the next sample.
+    """
+    for i in range(count):
+        if free[0] < 2:
+            return i
+        pulse = pulses[i]
+        begin = after_s if pulse.ahead else begin_s
+        start = max((begin + pulse.start_s) * sr, float(at))
+        for side in range(2):
+            sign = 1.0 - 2.0 * side
+            enter_strike(
+                pulse.body[side], start, pulse.length_s, pulse.flat, pulse.share, push[i, side],
+                sign * pulse.impulse_n_s[0], sign * pulse.impulse_n_s[1], sign * pulse.impulse_n_s[2],
+                at, sr, bodies, law, ringing, strikes, rows, free, hertz,
+            )  # fmt: skip
+    return count
+
+
+assert PAIR % 8 == 0

@@ -1,0 +1,131 @@
+"""The three translations of a rigid body: one pole, three axes, forces and cells of pulses in, far pressure out.
+
+    z <- z p + (1 + i d/ω) (e^s - 1)/s · F period + Σ strikes,    pushed = weight Re z
+    force: acts evenly over the sample before its instant; strike: even over the cells of the sample grid (pulse_cells),
+        at each sample   j (1 + i d/ω) (D - 1)/(s/c) Σ_i ΔQ_i D^i    over the c cells before it,  D = e^{s/c}
+        (its own impulses, evenly over the cells, as what such a mode hears of a slow force is its slope)
+    all forces on a body act as one:   F = Σ ± f (d0 + (d1 - d0) x)
+
+Such a mode (see render.resonator) is gone within some ten or hundred samples: it runs sample by sample, and rests where
+it has fallen below the floor at one of every DRIVEN samples of absolute time.
+"""
+
+# mypy: disable-error-code="no-untyped-def"
+from __future__ import annotations
+
+import numpy as np
+
+from sonic_bullet.machine.compiled import njit
+from sonic_bullet.synth.bank.layout import DRIVEN, FLOOR, FLUSH
+from sonic_bullet.synth.pulse import _cumulated
+
+
+@njit(nogil=True, error_model="numpy")
+def _gather_forces(
+    n, first, last, side, force_n, direction0, direction1, progress, period, onset_re, onset_im, kick
+):  # pragma: no cover - compiled
+    """kick (6, n): what the body's forces leave in real and imaginary part of each axis."""
+    for axis in range(3):
+        real, imag = kick[2 * axis], kick[2 * axis + 1]
+        for k in range(n):
+            real[k] = 0.0
+        for f in range(first, last):
+            drive = side[f] >> 1
+            sign = 1.0 - 2.0 * (side[f] & 1)
+            start, change = sign * direction0[drive, axis], sign * (direction1[drive, axis] - direction0[drive, axis])
+            signal = force_n[drive]
+            for k in range(n):
+                real[k] += signal[k] * (start + change * progress[k])
+        for k in range(n):
+            impulse = real[k] * period
+            if abs(impulse) < FLUSH:
+                impulse = 0.0
+            real[k] = impulse * onset_re
+            imag[k] = impulse * onset_im
+
+
+@njit(nogil=True, error_model="numpy")
+def _strike_cells(at, n, slot, strikes, hertz, kick):  # pragma: no cover - compiled
+    """Add the cells of a strike that end by the samples at … at + n - 1. It is done after its last."""
+    strike = strikes[slot]
+    cells = strike.cells
+    first, last = strike.cell_first // cells + 1, (strike.cell_stop - 1) // cells + 1
+    turn = complex(strike.cell_turn[0], strike.cell_turn[1])
+    onset = complex(strike.cell_onset[0], strike.cell_onset[1])
+    for sample in range(max(first, at), min(last + 1, at + n)):
+        total = complex(0.0, 0.0)
+        cell = (sample - 1) * cells
+        before = _cumulated((cell / cells - strike.start) / strike.length, hertz, strike.flat)
+        for i in range(cells):
+            after = _cumulated(((cell + i + 1) / cells - strike.start) / strike.length, hertz, strike.flat)
+            total = total * turn + (after - before)
+            before = after
+        total *= onset
+        for axis in range(3):
+            kick[2 * axis, sample - at] += strike.shove_n_s[axis] * total.real
+            kick[2 * axis + 1, sample - at] += strike.shove_n_s[axis] * total.imag
+    if last < at + n:
+        strike.rigid = 0
+
+
+@njit(nogil=True, error_model="numpy")
+def _run_axes(at, n, b, bodies, ringing, kick, pushed):  # pragma: no cover - compiled
+    """The recursion on all axes, through the samples at … at + n - 1."""
+    p_re, p_im, weight = bodies[b].rigid_pole[0], bodies[b].rigid_pole[1], bodies[b].rigid_weight
+    motion = ringing[b].motion
+    x, xi, y, yi, z, zi = motion[0, 0], motion[0, 1], motion[1, 0], motion[1, 1], motion[2, 0], motion[2, 1]
+    floor = FLOOR**2
+    k = 0
+    while k < n:
+        if (at + k) % DRIVEN == 0:
+            if x * x + xi * xi < floor:
+                x, xi = 0.0, 0.0
+            if y * y + yi * yi < floor:
+                y, yi = 0.0, 0.0
+            if z * z + zi * zi < floor:
+                z, zi = 0.0, 0.0
+        end = min(n, k + DRIVEN - (at + k) % DRIVEN)
+        for i in range(k, end):
+            x, xi = x * p_re + (kick[0, i] - xi * p_im), xi * p_re + (kick[1, i] + x * p_im)
+            y, yi = y * p_re + (kick[2, i] - yi * p_im), yi * p_re + (kick[3, i] + y * p_im)
+            z, zi = z * p_re + (kick[4, i] - zi * p_im), zi * p_re + (kick[5, i] + z * p_im)
+            pushed[0, i] = x * weight
+            pushed[1, i] = y * weight
+            pushed[2, i] = z * weight
+        k = end
+    for axis in range(3):
+        row = pushed[axis]
+        for i in range(n):
+            if abs(row[i]) < FLUSH:
+                row[i] = 0.0
+    motion[0, 0], motion[0, 1], motion[1, 0], motion[1, 1], motion[2, 0], motion[2, 1] = x, xi, y, yi, z, zi
+    moves = x != 0.0 or xi != 0.0 or y != 0.0 or yi != 0.0 or z != 0.0 or zi != 0.0
+    ringing[b].moving = 1 if moves else 0
+
+
+@njit(nogil=True, error_model="numpy")
+def translate(
+    at, n, b, bodies, ringing, strikes, hertz, first, last, side, force_n, direction0, direction1, progress, period, kick, pushed
+):  # pragma: no cover - compiled
+    """Samples at … at + n - 1 of body b's translations into pushed (3, n). False, and nothing done, where they rest.
+
+    side[first … last - 1]: 2·drive + side of its forces; kick (6, n): scratch.
+    """
+    struck = False
+    slot = ringing[b].strike
+    while slot >= 0:
+        struck = struck or (strikes[slot].rigid != 0 and strikes[slot].start < at + n)
+        slot = strikes[slot].next
+    if not (struck or last > first or ringing[b].moving):
+        return False
+    onset_re, onset_im = bodies[b].rigid_onset[0], bodies[b].rigid_onset[1]
+    _gather_forces(
+        n, first, last, side, force_n, direction0, direction1, progress, period, onset_re, onset_im, kick
+    )
+    slot = ringing[b].strike
+    while struck and slot >= 0:
+        if strikes[slot].rigid:
+            _strike_cells(at, n, slot, strikes, hertz, kick)
+        slot = strikes[slot].next
+    _run_axes(at, n, b, bodies, ringing, kick, pushed)
+    return True
