@@ -136,7 +136,7 @@ def _grown(low: Array, high: Array, centre: Array) -> tuple[Array, Array]:
     return order, np.concatenate(levels)
 
 
-@njit(nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
 def _in_triangle(px, py, pz, face):  # noqa: PLR0911 - one return a Voronoi region
     """Barycentric coordinates of the triangle's point nearest to p [Ericson 2005, p. 141]."""
     abc = face.corner_m
@@ -175,7 +175,7 @@ def _in_triangle(px, py, pz, face):  # noqa: PLR0911 - one return a Voronoi regi
     return 1 - vb / total - vc / total, vb / total, vc / total
 
 
-@njit(nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
 def _box_gap(px, py, pz, node):
     """Squared distance of p from a box."""
     low, high = node.low_m, node.high_m
@@ -187,7 +187,7 @@ def _box_gap(px, py, pz, node):
     return x * x + y * y + z * z
 
 
-@njit(nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
 def nearest_face(faces, face_at, nodes, node_at, wall_m, tie_m, px, py, pz, nx, ny, nz):
     """Face, barycentric coordinates (three numbers) and distance in m of the point nearest to p on one body's surface,
     which has its faces and nodes from face_at and node_at on; the face counted from there. n: the outward normal that

@@ -18,6 +18,8 @@ from sonic_bullet.render.resonator import CREASE_COS
 
 FLAT_CURVATURE = 0.1
 """Curvature times size below which a contact is flat: a cap of ten times the body's size."""
+INNER = {"nogil": True, "error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+"""How a kernel is compiled that only kernels call: what Python would need to call it takes a tenth of a second."""
 SIZELESS_M = 0.1
 """Size of a pair of which neither body has a volume (planes and links without a solid)."""
 
@@ -98,84 +100,48 @@ def contact_modulus(low_pa, high_pa):
 
 
 @njit(nogil=True, error_model="numpy")
-def rotation(q):
-    """The matrix, body to world, of a quaternion (x, y, z, w) that need not be of unit length: nine numbers, row by row
-    [Kuipers, Quaternions and Rotation Sequences, 1999, sec. 5.15].
-    """
-    norm = np.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
-    x, y, z, w = q[0] / norm, q[1] / norm, q[2] / norm, q[3] / norm
-    return (
-        1 - 2 * (y * y + z * z),
-        2 * (x * y - z * w),
-        2 * (x * z + y * w),
-        2 * (x * y + z * w),
-        1 - 2 * (x * x + z * z),
-        2 * (y * z - x * w),
-        2 * (x * z - y * w),
-        2 * (y * z + x * w),
-        1 - 2 * (x * x + y * y),
-    )
-
-
-@njit(nogil=True, error_model="numpy")
-def _mobility(body, q, arm, normal):
-    """1/m + (r×n)·I⁻¹(r×n) of one body in 1/kg, 0 where it does not move; arm, normal (3,) in the world."""
-    if body.mass_kg <= 0:
-        return 0.0
-    # the turn's part is a scalar: taken in the body's own frame, where its inertia is
-    xx, xy, xz, yx, yy, yz, zx, zy, zz = rotation(q)
-    x = arm[1] * normal[2] - arm[2] * normal[1]
-    y = arm[2] * normal[0] - arm[0] * normal[2]
-    z = arm[0] * normal[1] - arm[1] * normal[0]
-    a, b, c = xx * x + yx * y + zx * z, xy * x + yy * y + zy * z, xz * x + yz * y + zz * z
-    m = body.inertia_kg_m2  # its cofactors follow
-    i, j, k = (
-        m[1, 1] * m[2, 2] - m[1, 2] * m[2, 1],
-        m[0, 0] * m[2, 2] - m[0, 2] * m[2, 0],
-        m[0, 0] * m[1, 1] - m[0, 1] * m[1, 0],
-    )
-    ij, ik, jk = (
-        m[0, 2] * m[2, 1] - m[0, 1] * m[2, 2],
-        m[0, 1] * m[1, 2] - m[0, 2] * m[1, 1],
-        m[0, 2] * m[1, 0] - m[0, 0] * m[1, 2],
-    )
-    det = m[0, 0] * i + m[1, 0] * ij + m[2, 0] * ik
-    if det == 0:  # PyBullet's point masses do not turn
-        return 1 / body.mass_kg
-    turn = a * a * i + b * b * j + c * c * k + 2 * (a * b * ij + a * c * ik + b * c * jk)
-    return 1 / body.mass_kg + turn / det
-
-
-@njit(nogil=True, error_model="numpy")
 def effective_mass(bodies, low, high, quaternion, arm_low, arm_high, normal):
     """m* in kg of two bodies, 0 where neither moves. quaternion (b, 4) of all; levers from their centres to the contact
     and normal (3,), in the world.
     """
-    mobility = _mobility(bodies[low], quaternion[low], arm_low, normal) + _mobility(
-        bodies[high], quaternion[high], arm_high, normal
-    )
+    mobility, n = 0.0, normal
+    for side in range(2):
+        body, q, r = (
+            (bodies[low], quaternion[low], arm_low) if side == 0 else (bodies[high], quaternion[high], arm_high)
+        )
+        if body.mass_kg > 0:
+            mobility += 1 / body.mass_kg
+            # the turn's part is a scalar: taken in the body's own frame, where its inertia is
+            a, b, c = r[1] * n[2] - r[2] * n[1], r[2] * n[0] - r[0] * n[2], r[0] * n[1] - r[1] * n[0]
+            x, y, z, w = q[0], q[1], q[2], q[3]
+            s = 2 / (x * x + y * y + z * z + w * w)  # v - w·t + u×t,  t = 2u×v: back by the quaternion (u, w)
+            i, j, k = s * (y * c - z * b), s * (z * a - x * c), s * (x * b - y * a)
+            a, b, c = a - w * i + y * k - z * j, b - w * j + z * i - x * k, c - w * k + x * j - y * i
+            m = body.inertia_kg_m2
+            xx, xy, xz, yy, yz, zz = m[0, 0], m[0, 1], m[0, 2], m[1, 1], m[1, 2], m[2, 2]
+            i, j, k = yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy  # cofactors
+            det = xx * i + xy * j + xz * k
+            if det != 0:  # PyBullet's point masses do not turn
+                turn = a * a * i + b * b * (xx * zz - xz * xz) + c * c * (xx * yy - xy * xy)
+                mobility += (turn + 2 * (a * b * j + a * c * k + b * c * (xy * xz - xx * yz))) / det
     return 1 / mobility if mobility > 0 else 0.0
 
 
 @njit(nogil=True, error_model="numpy")
-def smaller_size(bodies, low, high):
-    """Size in m of the smaller of two bodies that have a volume."""
-    size = np.inf
-    if bodies[low].volume_m3 > 0:
-        size = bodies[low].size_m
-    if bodies[high].volume_m3 > 0:
-        size = min(size, bodies[high].size_m)
-    return size if size < np.inf else SIZELESS_M
+def flat_area_m2(bodies, low, high, spread_m, curvature_per_m, least_share):
+    """Area of a flat contact of two bodies, 0 where it is curved: the disc with the spread of the manifold's points.
 
-
-@njit(nogil=True, error_model="numpy")
-def flat_area_m2(spread_m, size_m, curvature_per_m, least_share):
-    """Area of a flat contact, 0 where it is curved: the disc with the spread of the manifold's points.
-
-    spread_m: root of Σ w·|p - Σ w·p|² of the points p under loads w of sum 1. least_share: of the smaller body's size
-    size_m, below which no flat contact's radius is taken to be.
+    spread_m: root of Σ w·|p - Σ w·p|² of the points p under loads w of sum 1. least_share: of the smaller body's size,
+    below which no flat contact's radius is taken to be.
     """
-    if curvature_per_m * size_m > FLAT_CURVATURE:
+    size = np.inf
+    for side in range(2):
+        body = bodies[low] if side == 0 else bodies[high]
+        if body.volume_m3 > 0:
+            size = min(size, body.size_m)
+    if size == np.inf:
+        size = SIZELESS_M
+    if curvature_per_m * size > FLAT_CURVATURE:
         return 0.0
-    radius = max(spread_m, least_share * size_m)
+    radius = max(spread_m, least_share * size)
     return np.pi * (radius * radius)

@@ -171,22 +171,22 @@ def spectrum_table() -> Array:
     return np.ascontiguousarray([_spectrum_table(flat)[1] for flat in (False, True)])
 
 
-@njit(nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
 def pulse_length(mass_kg, modulus_pa, relative_curvature_per_m, flat_area_m2, approach_m_s):  # type: ignore[no-untyped-def]
-    """`contact_time_s` of one pulse: τ in s, and whether it is flat."""
+    """`contact_time_s` of one pulse: τ in s, and 1 where it is flat, else 0."""
     curvature, area = relative_curvature_per_m, flat_area_m2
     if not curvature > 0 and not area > 0:
-        return LONGEST_S, False
+        return LONGEST_S, 0
     hertz, punch = 0.0, 0.0
     if curvature > 0:
         hertz = 2.868 * (mass_kg * mass_kg * curvature / (modulus_pa * modulus_pa * max(approach_m_s, 0.0))) ** 0.2
     if area > 0:
         punch = np.pi * np.sqrt(mass_kg / (2 * modulus_pa * np.sqrt(area / np.pi)))
     longer = hertz if hertz >= punch or np.isnan(punch) else punch
-    return min(max(LONGEST_S if np.isnan(longer) else longer, SHORTEST_S), LONGEST_S), punch >= hertz
+    return min(max(LONGEST_S if np.isnan(longer) else longer, SHORTEST_S), LONGEST_S), 1 if punch >= hertz else 0
 
 
-@njit(nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
 def compliance(push, frequency_hz, first, modes, tau_s, spectrum):  # type: ignore[no-untyped-def]
     """Σ (Uᵀj |F̂(fτ)|)² of one body, the sum in `compliant_share`: push (m, …) is Uᵀj, its modes have the frequencies
     from ``first`` on; spectrum (cells + 1,): a row of `spectrum_table`.
