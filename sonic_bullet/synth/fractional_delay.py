@@ -76,6 +76,19 @@ def _all(e: Emit, lanes: Value) -> Value:
 
 
 @intrinsic
+def move(typingctx, values, start, memory, at, count):
+    """memory[at:][:count] = values[start:][:count], without a look at wrapped indices."""
+
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        e = Emit(context, builder, signature, args)
+        values, start, memory, at, count = e.args
+        cgutils.raw_memcpy(builder, builder.gep(memory, [at]), builder.gep(values, [start]), count, e.index(8))
+        return context.get_dummy_value()
+
+    return types.void(values, start, memory, at, count), codegen
+
+
+@intrinsic
 def greatest(typingctx, values, at, count):
     """Greatest magnitude of ``count`` values (whole groups of 8) from element ``at`` on, as the bits of a double:
 

@@ -17,7 +17,7 @@ from __future__ import annotations
 import numpy as np
 
 from sonic_bullet.machine.compiled import njit
-from sonic_bullet.synth.fractional_delay import AHEAD, FLUSH, KEPT, INFINITE, TAPS, emit, greatest, leading, read
+from sonic_bullet.synth.fractional_delay import AHEAD, FLUSH, KEPT, INFINITE, TAPS, emit, greatest, leading, move, read
 from sonic_bullet.synth.vector import LANES
 
 DONE, MEMORY_SHORT, PLACES_SHORT, TOO_FAR, NOT_FINITE = range(5)
@@ -225,11 +225,9 @@ def _put(memory, at, mask, sample, values, start, stop):  # pragma: no cover - c
     while start < stop:
         place = (sample + start) & mask
         count = min(stop - start, mask + 1 - place)
-        for k in range(count):
-            memory[at + place + k] = values[start + k]
+        move(values, start, memory, at + place, count)
         if place < MIRRORED:
-            for k in range(place, min(place + count, MIRRORED)):
-                memory[at + mask + 1 + k] = memory[at + k]
+            move(values, start, memory, at + mask + 1 + place, min(count, MIRRORED - place))
         start += count
 
 
@@ -365,8 +363,9 @@ def _play(at, step, n, first, source, pushed, x, steepest, begin_m, end_m, micro
             count = min(BLOCK, n - lo)
             _emit(b, first + lo, count, source, pushed, x, fade, geometry, tail, emitted, delay)
             if _listen(line, at + lo, count, emitted, delay, heard, memory, ring_at, size - 1, taps, kept, steep):
+                total = out[c, out_at + lo : out_at + lo + count]
                 for i in range(count):
-                    out[c, out_at + lo + i] += heard[i]
+                    total[i] += heard[i]
 
 
 @njit(nogil=True, error_model="numpy")
@@ -384,8 +383,7 @@ def hear(at, step, n, first, source, pushed, begin_m, end_m, teleported, x, micr
     if status != DONE:
         return status
     for c in range(channels):
-        for i in range(out_at, out_at + n):
-            out[c, i] = 0.0
+        out[c, out_at : out_at + n] = 0.0
     work, kept, geometry, tail = np.empty((3, BLOCK + LANES)), np.empty(KEPT), np.empty(8), np.zeros((5, LANES))
     kept[TAPS * LANES] = np.nan
     steepest = _steepest(x, first, n)
@@ -402,7 +400,8 @@ def hear(at, step, n, first, source, pushed, begin_m, end_m, teleported, x, micr
                       places, lines, memory, taps, work, kept, geometry, tail, out, out_at)  # fmt: skip
             p = places[p].next
     for c in range(channels):
-        for i in range(out_at, out_at + n):
-            if abs(out[c, i]) < FLUSH:
-                out[c, i] = 0.0
+        total = out[c, out_at : out_at + n]
+        for i in range(n):
+            if abs(total[i]) < FLUSH:
+                total[i] = 0.0
     return DONE
