@@ -104,13 +104,21 @@ class BodyTable:
         row["edge_per_m"] = 1.0 / max(EDGE_RADIUS_SHARE * resonator.size_m, EDGE_RADIUS_LEAST_M)
         row["wall_m"], row["tie_m"] = place.wall_m, place.tie_m
         row["surface_seed"] = surface_seed
-        row["rigid"] = resonator.rigid is not None
+        row["rigid"] = resonator.translation is not None
         row["modes"], row["columns"] = resonator.mode_count, resonator.mode_count + len(follows)
         row["frequency_at"], row["shape_at"] = place.frequency_at, place.shape_at
         row["face_at"], row["faces"], row["node_at"] = place.face_at, place.faces, place.node_at
         # a silent partner's record begins where it first touches, not where it was put
         row["placed"] = -SPAN if material is None else body.since_step
         return self._bodies.append(row)
+
+    def copy(self) -> BodyTable:
+        """A table with bodies of its own; what belongs to models is the same."""
+        other = BodyTable()
+        other._bodies.append(self.bodies)
+        other._faces, other._nodes, other._shapes = self._faces, self._nodes, self._shapes
+        other._frequencies, other._places = self._frequencies, dict(self._places)
+        return other
 
     def _place(self, resonator: Resonator, follows: Array) -> _Place:
         """Where the arrays of the body's model are, put there if it is the first that has it."""

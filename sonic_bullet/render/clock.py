@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
-from math import floor
+from functools import lru_cache
+from math import lcm
 
 import numpy as np
 
@@ -13,24 +14,38 @@ from sonic_bullet.records import Array
 
 @dataclass(frozen=True, slots=True)
 class Clock:
-    """Time at the start of a step, as a fraction of seconds, so that an hour of steps of 1/240 s has no drift."""
+    """Time at the start of a step, ticks/per_second in whole numbers, so that an hour of steps of 1/240 s has no drift."""
 
-    time_s: Fraction = Fraction(0)
+    ticks: int = 0
+    per_second: int = 1
+
+    @property
+    def time_s(self) -> float:
+        return self.ticks / self.per_second
 
     def sample(self, sr: int) -> int:
         """First sample of the step."""
-        return floor(self.time_s * sr)
+        return self.ticks * sr // self.per_second
+
+    def offset(self, sr: int) -> float:
+        """Where the first sample lies beside the step's start, in samples: 0 or before it."""
+        return -(self.ticks * sr % self.per_second) / self.per_second
 
     def after(self, dt_s: float) -> Clock:
         """The clock one step later."""
-        return Clock(self.time_s + exact_step(dt_s))
+        step = exact_step(dt_s)
+        ticks, per_second = step.numerator, step.denominator
+        if per_second == self.per_second:
+            return Clock(self.ticks + ticks, per_second)
+        common = lcm(per_second, self.per_second)
+        return Clock(self.ticks * (common // self.per_second) + ticks * (common // per_second), common)
 
     def progress(self, dt_s: float, sr: int, count: int) -> Array:
         """(count,) where in the step, 0 … 1, each of its samples lies."""
-        position = np.arange(count) + float(self.sample(sr) - self.time_s * sr)
-        return np.asarray(np.clip(position / (dt_s * sr), 0.0, 1.0))
+        return np.asarray(np.clip((np.arange(count) + self.offset(sr)) / (dt_s * sr), 0.0, 1.0))
 
 
+@lru_cache(maxsize=64)
 def exact_step(dt_s: float) -> Fraction:
     """The ratio that a step was meant to be (1/240), where the double is its nearest; else the double itself."""
     near = Fraction(dt_s).limit_denominator(1_000_000)

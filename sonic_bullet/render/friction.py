@@ -24,7 +24,7 @@ from sonic_bullet.render.contact_place import (
     smaller_size,
     touch,
 )
-from sonic_bullet.render.manifold import STEEPEST
+from sonic_bullet.render.strike_pulses import STEEPEST
 from sonic_bullet.synth.profile import height_octaves
 from sonic_bullet.synth.surface_kernel import FASTEST_M_S, contact_radius_m, damping_ratio, sound_voices
 

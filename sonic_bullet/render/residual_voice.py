@@ -17,13 +17,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sonic_bullet.records import Air, Array, Body, ModalModel, Residual
-from sonic_bullet.render.friction_voice import Drive
-from sonic_bullet.render.impacts import ForcePulse
 from sonic_bullet.render.resonator import Resonator, build_resonator
+
+if TYPE_CHECKING:
+    from sonic_bullet.render.step_events import Drive, ForcePulse
 from sonic_bullet.residual.grains import Voice, make_voice, mixed_number, placed, varied
 from sonic_bullet.residual.player import SECTION, Grain, Rubbed, rubbed, section_grain
 from sonic_bullet.residual.transfer import StruckModes
@@ -181,6 +183,24 @@ def friction_grains(
     return grains, kept
 
 
-def line_modes(voice: ResidualVoice | None, sets: int) -> ModeSet:
-    """What of a body's residual the bank plays."""
-    return voice.lines if voice is not None else ModeSet(np.zeros(0), np.zeros(0), np.zeros((sets, 0), complex))
+def with_lines(resonator: Resonator, voice: ResidualVoice | None) -> ModeSet:
+    """What the bank plays of a body: its modes, then the lines of its residual."""
+    s = resonator
+    modes = ModeSet(
+        s.omega_rad_s, s.decay_per_s, s.weight, s.bend, s.damping_growth, s.damping_growth_power, s.translation
+    )
+    if voice is None:
+        return modes
+    lines = voice.lines
+    both = (
+        None if getattr(s, name) is None else np.concatenate([getattr(s, name), getattr(lines, name)])
+        for name in ("bend", "damping_growth")
+    )
+    return ModeSet(
+        np.concatenate([s.omega_rad_s, lines.omega_rad_s]),
+        np.concatenate([s.decay_per_s, lines.decay_per_s]),
+        np.concatenate([s.weight, lines.weight], axis=1),
+        *both,
+        s.damping_growth_power,
+        s.translation,
+    )

@@ -23,7 +23,7 @@ from sonic_bullet.machine.compiled import njit
 from sonic_bullet.radiation.far_field import jerk_coefficient
 from sonic_bullet.radiation.radiated import radiation_of
 from sonic_bullet.records import Air, Array, Body, Microphone, ModalModel, ModalSum, Sensor, Vibrometer
-from sonic_bullet.synth.bank import ModeSet, audible
+from sonic_bullet.synth.bank import Translation, audible
 
 CREASE_COS = np.cos(np.radians(20.0))
 EDGE_RADIUS_SHARE = 0.005
@@ -49,7 +49,7 @@ class Resonator:
     normal: Array
     size_m: float
     radius_m: float
-    rigid: ModeSet | None
+    translation: Translation | None
     dropped: int
     bend: Array | None = None
     damping_growth: Array | None = None
@@ -124,7 +124,7 @@ def build_resonator(body: Body, sensors: tuple[Sensor, ...], sr: int, air: Air) 
     normal = normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
     radius = float(np.linalg.norm(model.vertex_m, axis=1).max(initial=0.0))
     dropped = model.dropped + int(np.sum(~keep))
-    rigid = _rigid(body, 1 + len(readers), sr, air)
+    translation = _translation(body, sr, air)
     # velocity at the surface of a mode with |z| = 1
     most = np.sqrt((shape.astype(float) ** 2).sum(axis=1)).max(axis=0, initial=0.0)
     bend = None if model.bend_s2_m2 is None else model.bend_s2_m2[keep] * most**2
@@ -139,7 +139,7 @@ def build_resonator(body: Body, sensors: tuple[Sensor, ...], sr: int, air: Air) 
         normal,
         _size(body),
         radius,
-        rigid,
+        translation,
         dropped,
         bend,
         damping_growth,
@@ -153,15 +153,13 @@ def _surface(model: ModalModel) -> SurfaceIndex | None:
     return surface_index(model.vertex_m, model.face, model.curvature_per_m) if len(model.face) else None
 
 
-def _rigid(body: Body, sets: int, sr: int, air: Air) -> ModeSet | None:
+def _translation(body: Body, sr: int, air: Air) -> Translation | None:
     """The mode that each translation of a moving body is; its gain is the force along it, its weight Pa·m per N·s."""
     radius = (3 * body.volume_m3 / (4 * np.pi)) ** (1 / 3)
     if body.mass_kg <= 0 or radius <= 0 or body.material is None:  # the least of volumes have a radius of none, too
         return None
     rate = min(air.sound_speed_m_s / radius, FASTEST_RIGID * np.pi * sr)
-    weight = np.zeros((sets, 1), complex)
-    weight[0] = 2 * jerk_coefficient(body.volume_m3, air) * rate**2 / body.mass_kg
-    return ModeSet(np.array([rate]), np.array([rate]), weight, held=True)
+    return Translation(rate, rate, 2 * jerk_coefficient(body.volume_m3, air) * rate**2 / body.mass_kg)
 
 
 def _size(body: Body) -> float:

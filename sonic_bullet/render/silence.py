@@ -98,7 +98,7 @@ def _mute(log: ContactLog, resonators: list[Resonator]) -> str | None:
     if ringing:
         return None
     if any(isinstance(sensor, Microphone) for sensor in log.sensors) and any(
-        resonator.rigid is not None for resonator in resonators
+        resonator.translation is not None for resonator in resonators
     ):
         return None  # it clicks
     higher = [

@@ -1,30 +1,29 @@
-"""What listening is set up with, and all that the next frame hangs on: made, copied, with further bodies, quenched.
+"""What listening is set up with, and all that the next frame hangs on: tables that stay where they are, made, enlarged,
+copied, with further bodies, quenched.
 
-Each body has `PLACES` places in the bank: its modes, its three translations (see resonator.py), and the lines of its
-residual (see residual_voice.py).
+Each body has two parts in the bank: its modes with the lines of its residual (see residual_voice.py), and its three
+translations (see resonator.py).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from sonic_bullet.records import Air, Array, Body, Microphone, Sensor
-from sonic_bullet.records.contacts import Step
+from sonic_bullet.render.body_table import BodyTable
 from sonic_bullet.render.clock import Clock
-from sonic_bullet.render.friction_voice import FrictionVoice
-from sonic_bullet.render.manifold import Rows
-from sonic_bullet.render.residual_voice import ResidualVoice, Rubs, build_residual_voice, line_modes
+from sonic_bullet.render.friction import surface_seed
+from sonic_bullet.render.residual_voice import ResidualVoice, Rubs, build_residual_voice, with_lines
 from sonic_bullet.render.resonator import Resonator, build_resonator, weight_sets
+from sonic_bullet.render.tables import PAIR, PULSE, ROW, WINDOW
 from sonic_bullet.residual.player import Grain
 from sonic_bullet.synth import bank, path
 from sonic_bullet.synth.bank import Bank, BankState
 from sonic_bullet.synth.path import Path, PathState
-from sonic_bullet.synth.strikes import SPAN, LoadHistory
-
-PLACES = 5
+from sonic_bullet.synth.strikes import SPAN
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,122 +43,185 @@ class Setup:
         """(c, 3) places of the microphones among the sensors."""
         return np.array([s.position_m for s in self.sensors if isinstance(s, Microphone)]).reshape(-1, 3)
 
+    @property
+    def reads(self) -> Array:
+        """(c,) the weight set that each sensor reads; 0, that of all microphones, for a microphone."""
+        own = np.array([not isinstance(sensor, Microphone) for sensor in self.sensors], bool)
+        return np.where(own, np.cumsum(own), 0).astype(np.int64)
 
-@dataclass(frozen=True, slots=True, eq=False)
-class State:
-    """All that the next frame hangs on. number: of the step to be rendered next; window: that step and those known
-    after it, rows: their contacts. placed (b,): step in which each body began or was last moved by hand. quenches:
-    steps before which all is to stop ringing. voices (b): their residuals; grains, rubs: what of those is under way.
+
+@dataclass(slots=True, eq=False)
+class Window:
+    """The last SPAN steps, step k in place k % SPAN: step (SPAN,) WINDOW; poses and who was moved by hand (SPAN, b, ·);
+    row (SPAN·r,) ROW, r for each step.
     """
 
-    number: int
-    clock: Clock
-    window: tuple[Step, ...]
-    rows: tuple[Rows, ...]
-    loads: LoadHistory
-    resonators: tuple[Resonator, ...]
+    step: Array
+    position_m: Array
+    quaternion_xyzw: Array
+    teleported: Array
+    row: Array
+
+    def with_bodies(self, position_m: Array, quaternion_xyzw: Array) -> None:
+        """Room for further bodies (k,), which came where they are."""
+        count = len(position_m)
+        self.position_m = np.concatenate([self.position_m, np.broadcast_to(position_m, (SPAN, count, 3))], axis=1)
+        turned = np.broadcast_to(quaternion_xyzw, (SPAN, count, 4))
+        self.quaternion_xyzw = np.concatenate([self.quaternion_xyzw, turned], axis=1)
+        self.teleported = np.concatenate([self.teleported, np.zeros((SPAN, count), bool)], axis=1)
+
+    def with_room(self, rows: int) -> None:
+        """Room for so many rows a step."""
+        old = len(self.row) // SPAN
+        if rows > old:
+            row = np.zeros((SPAN, max(rows, 2 * old)), ROW)
+            row[:, :old] = self.row.reshape(SPAN, old)
+            self.row = row.reshape(-1)
+            self.step["row"] += (np.arange(SPAN) * (row.shape[1] - old))[:, None]
+
+    def copy(self) -> Window:
+        return Window(*(getattr(self, name).copy() for name in self.__slots__))
+
+
+@dataclass(slots=True, eq=False)
+class Pairs:
+    """Pairs of bodies that touch: pair (slots,) PAIR, active (slots,): those in use by rising key, count (2,): how many
+    are in use and how many are free, free (slots,); gain (slots, 2, columns): Uᵀ per newton on either body.
+    """
+
+    pair: Array
+    active: Array
+    count: Array
+    free: Array
+    gain: Array
+
+    def with_room(self, slots: int, columns: int) -> None:
+        """Room for so many pairs more, and gains of so many columns."""
+        old, width = len(self.pair), self.gain.shape[2]
+        if self.count[1] >= slots and width >= columns:
+            return
+        more = 0 if self.count[1] >= slots else max(slots, old, 16)
+        self.pair = np.concatenate([self.pair, np.zeros(more, PAIR)])
+        self.active = np.concatenate([self.active, np.zeros(more, np.int64)])
+        self.free = np.concatenate([np.arange(old + more - 1, old - 1, -1), self.free]).astype(np.int64)
+        self.count[1] += more
+        gain = np.zeros((old + more, 2, max(columns, width)))
+        gain[:old, :, :width] = self.gain
+        self.gain = gain
+
+    def copy(self) -> Pairs:
+        return Pairs(*(getattr(self, name).copy() for name in self.__slots__))
+
+
+@dataclass(slots=True, eq=False)
+class Scratch:
+    """What one step is made in; nothing of it is needed for the next. pulse (p,) PULSE with push (p, 2, columns);
+    drives d: force (d·n,), gain0, gain1 (d, 2, columns), direction0, direction1 (d, 3), body (d, 2), slot (d,). source
+    (W, b, n), pushed (b, 3, n), sounds (b, 2): which rows of these are not zero.
+    """
+
+    pulse: Array = field(default_factory=lambda: np.zeros(0, PULSE))
+    push: Array = field(default_factory=lambda: np.zeros((0, 2, 0)))
+    force: Array = field(default_factory=lambda: np.zeros(0))
+    gain0: Array = field(default_factory=lambda: np.zeros((0, 2, 0)))
+    gain1: Array = field(default_factory=lambda: np.zeros((0, 2, 0)))
+    direction0: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    direction1: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    body: Array = field(default_factory=lambda: np.zeros((0, 2), np.int64))
+    slot: Array = field(default_factory=lambda: np.zeros(0, np.int64))
+    source: Array = field(default_factory=lambda: np.zeros((1, 0, 0)))
+    pushed: Array = field(default_factory=lambda: np.zeros((0, 3, 0)))
+    sounds: Array = field(default_factory=lambda: np.zeros((0, 2), np.int64))
+
+    def fit(self, drives: int, columns: int, samples: int, shape: tuple[int, int]) -> None:
+        """Enlarge what is too small for so many drives and twice as many pulses. shape: weight sets and bodies."""
+        if len(self.slot) < drives or self.push.shape[2] != columns:
+            drives = max(drives, 2 * len(self.slot))
+            self.pulse, self.push = np.zeros(2 * drives, PULSE), np.zeros((2 * drives, 2, columns))
+            self.gain0, self.gain1 = np.zeros((2, drives, 2, columns))
+            self.direction0, self.direction1 = np.zeros((2, drives, 3))
+            self.body, self.slot = np.zeros((drives, 2), np.int64), np.zeros(drives, np.int64)
+        if len(self.force) < len(self.slot) * samples:
+            self.force = np.zeros(len(self.slot) * samples)
+        if self.source.shape[:2] != shape or self.source.shape[2] < samples:
+            self.source, self.pushed = np.zeros((*shape, samples)), np.zeros((shape[1], 3, samples))
+            self.sounds = np.zeros((shape[1], 2), np.int64)
+
+
+@dataclass(slots=True, eq=False)
+class State:
+    """All that the next frame hangs on. taken: steps taken in; clock: start of the step to be rendered next, waiting:
+    lengths of those taken in and not rendered. quenches: steps before which all is to stop ringing. voices (b): their
+    residuals; grains, rubs: what of those is under way.
+    """
+
+    window: Window
+    pairs: Pairs
+    table: BodyTable
     bank: Bank
     ringing: BankState
     path: Path
     travelling: PathState
-    friction: FrictionVoice
-    placed: Array
+    taken: int = 0
+    clock: Clock = field(default_factory=Clock)
+    waiting: tuple[float, ...] = ()
+    resonators: tuple[Resonator, ...] = ()
     voices: tuple[ResidualVoice | None, ...] = ()
     grains: tuple[Grain, ...] = ()
     rubs: Rubs = field(default_factory=dict)
     quenches: frozenset[int] = frozenset()
+    scratch: Scratch = field(default_factory=Scratch)
+
+    @property
+    def number(self) -> int:
+        """Of the step to be rendered next."""
+        return self.taken - len(self.waiting)
+
+    def copy(self) -> State:
+        """A state of its own: advancing one leaves the other."""
+        return State(
+            self.window.copy(), self.pairs.copy(), self.table.copy(), self.bank, self.ringing.copy(), self.path,
+            self.travelling.copy(), self.taken, self.clock, self.waiting, self.resonators, self.voices, self.grains,
+            dict(self.rubs), self.quenches,
+        )  # fmt: skip
 
 
 def start(setup: Setup) -> State:
     """Silence at time 0, nobody there."""
     instrument, ringing = bank.empty_bank(setup.sr, 1 + len(weight_sets(setup.sensors)))
     air, travelling = path.empty_path(setup.sr, setup.air, setup.microphone_m)
-    return State(
-        0,
-        Clock(),
-        (),
-        (),
-        LoadHistory.empty(),
-        (),
-        instrument,
-        ringing,
-        air,
-        travelling,
-        FrictionVoice.none(),
-        np.zeros(0, np.int64),
+    none = np.zeros(0, np.int64)
+    window = Window(
+        np.zeros(SPAN, WINDOW), np.zeros((SPAN, 0, 3)), np.zeros((SPAN, 0, 4)), np.zeros((SPAN, 0), bool), np.zeros(0, ROW)
     )
+    pairs = Pairs(np.zeros(0, PAIR), none, np.zeros(2, np.int64), none, np.zeros((0, 2, 0)))
+    return State(window, pairs, BodyTable(), instrument, ringing, air, travelling)
 
 
-def with_bodies(setup: Setup, state: State, bodies: Sequence[Body]) -> State:
-    """The state with further bodies, silent at first."""
-    if not bodies:
-        return state
+def with_bodies(setup: Setup, state: State, bodies: Sequence[Body], position_m: Array, quaternion_xyzw: Array) -> None:
+    """Further bodies, silent at first, at the poses (k, 3), (k, 4)."""
     new = tuple(build_resonator(body, setup.sensors, setup.sr, setup.air) for body in bodies)
     voices = tuple(build_residual_voice(s, setup.sr, setup.air) if setup.residual else None for s in new)
-    modes = [
-        part
-        for s, more in zip(new, voices, strict=True)
-        for part in (
-            bank.ModeSet(
-                s.omega_rad_s,
-                s.decay_per_s,
-                s.weight,
-                bend=s.bend,
-                damping_growth=s.damping_growth,
-                damping_growth_power=s.damping_growth_power,
-            ),
-            *((s.rigid or _nothing(setup),) * 3),
-            line_modes(more, len(s.weight)),
-        )
-    ]
-    instrument, ringing = bank.append(state.bank, state.ringing, modes)
-    air, travelling = path.append_bodies(state.path, state.travelling, *_places(new))
-    # a silent partner's record begins where it first touches, not where it was put
-    placed = np.concatenate(
-        [state.placed, [body.since_step if body.material is not None else -SPAN for body in bodies]]
-    ).astype(np.int64)
-    resonators, both = state.resonators + new, state.voices + voices
-    return replace(
-        state,
-        placed=placed,
-        resonators=resonators,
-        voices=both,
-        bank=instrument,
-        ringing=ringing,
-        path=air,
-        travelling=travelling,
-    )
+    for one, voice in zip(new, voices, strict=True):
+        follows = voice.follows if voice is not None else np.zeros(0, np.int64)
+        state.table.add(one, follows, surface_seed(setup.seed, one.body))
+    modes = [with_lines(one, voice) for one, voice in zip(new, voices, strict=True)]
+    state.bank, state.ringing = bank.append(state.bank, state.ringing, modes)
+    radius = np.array([one.radius_m for one in new])
+    state.path, state.travelling = path.append_bodies(state.path, state.travelling, radius)
+    state.window.with_bodies(position_m, quaternion_xyzw)
+    state.resonators, state.voices = state.resonators + new, state.voices + voices
 
 
-def _places(resonators: tuple[Resonator, ...]) -> tuple[Array, Array]:
-    """Radius and jerk coefficient for the path: the bank has turned pushes into Pa·m already."""
-    return np.array([s.radius_m for s in resonators]), np.ones(len(resonators))
-
-
-def _nothing(setup: Setup) -> bank.ModeSet:
-    return bank.ModeSet(np.zeros(0), np.zeros(0), np.zeros((1 + len(weight_sets(setup.sensors)), 0), complex))
-
-
-def copied(state: State) -> State:
-    """A state of its own: advancing one leaves the other."""
-    return replace(state, ringing=state.ringing.copy(), travelling=state.travelling.copy())
-
-
-def quenched(state: State) -> State:
+def quench(state: State) -> None:
     """Nothing rings from the next sample on; strikes under way and the sound still travelling to the microphones are
     gone too.
 
     Loads, and what rubs, stay: a ball that rolls rolls on.
     """
-    air, travelling = path.empty_path(state.path.sr, state.path.air, state.path.microphone_m, state.travelling.at)
-    air, travelling = path.append_bodies(air, travelling, *_places(state.resonators))
-    still_to_come = frozenset(number for number in state.quenches if number > state.number)
-    return replace(
-        state,
-        ringing=bank.silence(state.ringing),
-        path=air,
-        travelling=travelling,
-        grains=(),
-        rubs={},
-        quenches=still_to_come,
-    )
+    air, travelling = path.empty_path(state.path.sr, state.path.air, state.path.microphone_m, state.ringing.at)
+    radius = np.array([one.radius_m for one in state.resonators])
+    state.path, state.travelling = path.append_bodies(air, travelling, radius)
+    state.ringing = bank.silence(state.ringing)
+    state.grains, state.rubs = (), {}
+    state.quenches = frozenset(number for number in state.quenches if number > state.number)

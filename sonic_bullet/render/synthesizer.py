@@ -1,7 +1,7 @@
 """The run time: physics steps in, frames of sound out, with one explicit state between (synthesis_state.py).
 
-    Step -> loads (synth.strikes) -> impacts, friction -> bank of modes and of rigid motions (synth.bank) + residual ->
-        sound path (synth.path) -> frame
+    Step, Step, … -> STEP table -> driver.advance_steps, enlarging tables where it asks for it -> frames
+                                        + grains of residuals, where a body has one: then a step at a time
 
 A step's sound is made when the `LOOKAHEAD` steps after it are known. Live listening, `sound` (which drains a copy of
 the state) and the replay of a log run the same code on the same numbers in the same order: the same bits.
@@ -14,219 +14,172 @@ from dataclasses import replace
 
 import numpy as np
 
-from sonic_bullet.records import Air, Array, Body, Microphone, Sensor
+from sonic_bullet.records import Air, Array, Body, Sensor
 from sonic_bullet.records.contacts import Contacts, Step
 from sonic_bullet.records.errors import AudioError
+from sonic_bullet.render import driver
 from sonic_bullet.render.clock import Clock, exact_step
-from sonic_bullet.render.friction_voice import Drive, advance_friction
-from sonic_bullet.render.impacts import ForcePulse, find_pulses
-from sonic_bullet.render.manifold import orient
-from sonic_bullet.render.residual_voice import ResidualVoice, friction_grains, impact_grains
-from sonic_bullet.render.resonator import Resonator
-from sonic_bullet.render.synthesis_state import PLACES, Setup, State, copied, quenched, start, with_bodies
+from sonic_bullet.render.residual_voice import friction_grains, impact_grains
+from sonic_bullet.render.step_events import drives_of, pulses_of
+from sonic_bullet.render.synthesis_state import Setup, State, quench, start, with_bodies
 from sonic_bullet.residual.player import add_grains
-from sonic_bullet.synth import bank, path
-from sonic_bullet.synth.pulse import pulse_cells, pulse_nodes
-from sonic_bullet.synth.strikes import LOOKAHEAD, SPAN, push, split
+from sonic_bullet.synth import path, path_kernel
+from sonic_bullet.synth.fractional_delay import tap_polynomials
+from sonic_bullet.synth.pulse import pulse_table, spectrum_table
+from sonic_bullet.synth.strikes import LOOKAHEAD
 
 LATENCY_STEPS = LOOKAHEAD
-CELLS_PER_RADIAN = 4.0
-"""Cells of a pulse per 1/w of a rigid body: a third of (w·cell)³ = 0.5 % is what its level may err."""
+AT_ONCE = 64
+"""Steps of a replay that one call of the driver takes in."""
 
 
-def take_step(setup: Setup, state: State, step: Step) -> tuple[Array | None, State]:
-    """Take in one step; the frame (channels, n) of the step LOOKAHEAD before it, or None while too few are known.
-
-    The bank's and the path's arrays change in place: `copied` a state first to come back to it.
+def advance(setup: Setup, state: State, steps: Sequence[Step]) -> Array:
+    """Take in steps, of as many bodies as the state has; (channels, n) of those that can be rendered then, LOOKAHEAD
+    before them. Changes ``state`` in place: `copy` it first to come back to it.
     """
-    state = replace(
-        state,
-        window=(*state.window, step),
-        rows=(*state.rows, orient(step)),
-        loads=push(state.loads, step.contacts, step.dt_s),
+    frames = []
+    while steps:
+        if state.number in state.quenches and len(state.waiting) == LOOKAHEAD:
+            quench(state)
+        count = min(len(steps), 1 if any(voice is not None for voice in state.voices) else AT_ONCE)
+        ahead = [q - state.number for q in state.quenches if q > state.number]  # the next one begins anew there
+        count = min([count, *(q + LOOKAHEAD - len(state.waiting) for q in ahead)])
+        frames.append(_advanced(setup, state, steps[:count]))
+        steps = steps[count:]
+    return np.concatenate(frames, axis=1) if len(frames) != 1 else frames[0]
+
+
+def _schedule(setup: Setup, state: State, steps: Sequence[Step]) -> tuple[Array, Clock, tuple[float, ...]]:
+    """The STEP table of steps to be taken in, and clock and waiting lengths after them."""
+    table, at, clock, waiting = np.zeros(len(steps), driver.STEP), 0, state.clock, state.waiting
+    number = state.number
+    for row, step in zip(table, steps, strict=True):
+        rows = len(step.contacts)
+        row["dt_s"], row["gravity_m_s2"], row["row"] = step.dt_s, step.gravity_m_s2, (at, at + rows)
+        at += rows
+        row["sample"] = first = clock.sample(setup.sr)
+        waiting = (*waiting, step.dt_s)
+        if len(waiting) > LOOKAHEAD:
+            after = clock.after(waiting[0])
+            row["count"], row["offset"] = after.sample(setup.sr) - first, clock.offset(setup.sr)
+            row["begin_s"], row["after_s"] = clock.time_s, after.time_s
+            number += 1
+            row["quench"] = number in state.quenches
+            clock, waiting = after, waiting[1:]
+    return table, clock, waiting
+
+
+def _advanced(setup: Setup, state: State, steps: Sequence[Step]) -> Array:
+    """`advance` of steps without a quench between; of one alone where a body has a residual."""
+    table, clock, waiting = _schedule(setup, state, steps)
+    contacts = np.concatenate([step.contacts.row for step in steps]) if len(steps) > 1 else steps[0].contacts.row
+    poses = [_together([getattr(s, name) for s in steps]) for name in ("position_m", "quaternion_xyzw", "teleported")]
+    begin, stop = int(table["sample"][0]), int(table["sample"][-1] + table["count"][-1])
+    longest = int(table["count"].max())
+    out = np.zeros((len(setup.sensors), stop - begin))
+    heard = np.zeros((len(setup.microphone_m), stop - begin))
+    pause = any(voice is not None for voice in state.voices)
+    done, resume = 0, False
+    _make_room(state, table[0], longest)
+    while done < len(steps):
+        more, status, found, drives = _call(
+            setup, state, table, contacts, poses, done, begin, pause, resume, heard, out
+        )  # fmt: skip
+        done, resume = done + more, status not in (driver.TO_GROW, path_kernel.DONE)
+        if status == driver.TO_GROW:
+            _make_room(state, table[done], longest)
+        elif status == driver.PAUSED:
+            _add_residuals(setup, state, table[done], found, drives)
+        elif status == driver.NOT_FINITE:
+            what = "the synthesizer made NaN or infinite samples"
+            raise AudioError(what, "report the contact log: this must not happen")
+        elif status != path_kernel.DONE:
+            state.travelling.at = int(table[done]["sample"])
+            path.grow(state.path, state.travelling, status)
+    state.taken += len(steps)
+    state.clock, state.waiting = clock, waiting
+    state.ringing.at = state.travelling.at = stop
+    return out
+
+
+def _together(arrays: Sequence[Array]) -> Array:
+    return np.stack(arrays) if len(arrays) > 1 else arrays[0][None]
+
+
+def _call(
+    setup: Setup, state: State, table: Array, contacts: Array, poses: Sequence[Array], first: int, begin: int, pause: bool,
+    resume: bool, heard: Array, out: Array,
+) -> tuple[int, int, int, int]:  # fmt: skip
+    window, pairs, bodies, bank, ringing, room = (
+        state.window, state.pairs, state.table, state.bank, state.ringing, state.scratch,
+    )  # fmt: skip
+    travelling = state.travelling
+    found: tuple[int, int, int, int] = driver.advance_steps(
+        first, state.taken, begin, pause, resume, float(setup.sr), table, contacts, *poses,
+        window.step, window.position_m, window.quaternion_xyzw, window.teleported, window.row,
+        bodies.bodies, bodies.faces, bodies.nodes, bodies.shapes, bodies.frequency_hz, spectrum_table(),
+        pairs.pair, pairs.active, pairs.count, pairs.free, pairs.gain,
+        room.pulse, room.push, room.force, room.gain0, room.gain1, room.direction0, room.direction1, room.body, room.slot,
+        bank.body, bank.law, bank.weight, bank.observed, ringing.ringing, ringing.z, ringing.driven, ringing.sound,
+        ringing.pole, ringing.block, ringing.strikes, ringing.rows, ringing.free, pulse_table(),
+        room.source, room.pushed, room.sounds, state.path.microphone_m, state.path.samples_per_m, travelling.sources,
+        travelling.places, travelling.lines, travelling.memory, tap_polynomials(), setup.reads, heard, out,
+    )  # fmt: skip
+    return found
+
+
+def _make_room(state: State, step: Array, samples: int) -> None:
+    """See to it that the step fits: its rows, the pairs and the strikes that they may become."""
+    rows = int(step["row"][1] - step["row"][0])
+    pairs = int(state.pairs.count[0]) + rows
+    columns = state.bank.columns
+    state.window.with_room(rows)
+    state.pairs.with_room(rows, columns)
+    state.ringing.with_room(4 * pairs)
+    state.scratch.fit(pairs, columns, samples, state.bank.observed.shape)
+
+
+def _add_residuals(setup: Setup, state: State, step: Array, found: int, drives: int) -> None:
+    """Add to what rings what the modes cannot say of the step."""
+    first, n, sr, room = int(step["sample"]), int(step["count"]), setup.sr, state.scratch
+    modes = state.table.bodies["modes"]
+    pulses = pulses_of(room, found, modes, float(step["begin_s"]), float(step["after_s"]))
+    rubs = drives_of(room, drives, modes, n)
+    more, state.rubs = friction_grains(state.rubs, rubs, state.resonators, state.voices, first, n, setup.seed)
+    struck = (
+        grain
+        for begin_s, one in pulses
+        for grain in impact_grains(one, begin_s, state.resonators, state.voices, sr, first, setup.seed)
     )
-    if len(state.window) <= LOOKAHEAD:
-        return None, state
-    frame, state = _render(setup, state)
-    return frame, replace(state, window=state.window[1:], rows=state.rows[1:])
+    state.grains = (*state.grains, *struck, *more)
+    state.grains = add_grains(room.source[:, :, :n], state.grains, first)
+    room.sounds[:, 0] = 1  # whatever rings, a grain may have sounded
 
 
-def drained(setup: Setup, state: State) -> Array:
+def drained(setup: Setup, state: State, last: Step | None) -> Array:
     """(channels, n) sound of the steps taken in but not yet rendered, as if nothing touched any more afterwards.
 
-    ``state`` stays.
+    last: the newest of them. ``state`` stays.
     """
-    state = copied(state)
-    frames = [np.zeros((len(setup.sensors), 0))]
-    missing = len(state.window)
-    for _ in range(LOOKAHEAD if missing else 0):
-        last = state.window[-1]
-        frame, state = take_step(
-            setup, state, replace(last, contacts=Contacts.none(), teleported=np.zeros(len(last.teleported), bool))
-        )
-        if frame is not None and len(frames) <= missing:
-            frames.append(frame)
-    return np.concatenate(frames, axis=1)
+    missing = len(state.waiting)
+    if last is None or not missing:
+        return np.zeros((len(setup.sensors), 0))
+    state = state.copy()
+    count = clock_after(state).sample(setup.sr) - state.clock.sample(setup.sr)
+    still = replace(last, contacts=Contacts.none(), teleported=np.zeros(len(last.teleported), bool))
+    return advance(setup, state, [still] * LOOKAHEAD)[:, :count]
 
 
-def _render(setup: Setup, state: State) -> tuple[Array, State]:
-    """The frame of window[0]."""
-    if state.number in state.quenches:
-        state = quenched(state)
-    window, rows, resonators, clock, sr = state.window, state.rows, state.resonators, state.clock, setup.sr
-    step = window[0]
-    after = clock.after(step.dt_s)
-    count = after.sample(sr) - clock.sample(sr)
-    x = clock.progress(step.dt_s, sr, count)
-    placed = state.placed.copy()
-    moved = np.flatnonzero(window[1].teleported)
-    placed[moved] = state.number + 1
-    parts, loads = split(state.loads, ahead=0)  # of the first step, and what was not sure a step ago
-    pulses = [
-        (float(clock.time_s), pulse)
-        for pulse in find_pulses(parts, rows, step, resonators, state.number - placed < SPAN, 0.0)
-    ]
-    parts, marked = split(loads)
-    # else what strikes after the quench would be dated back before it, and be lost: it waits for its own step
-    if state.number + 1 not in state.quenches:
-        loads = marked
-        pulses += [
-            (float(after.time_s), pulse)
-            for pulse in find_pulses(
-                parts, rows[1:], window[1], resonators, state.number + 1 - placed < SPAN, -step.dt_s
-            )
-        ]
-    drives, friction = advance_friction(state.friction, parts, step, window[1], rows[1], resonators, x, sr, setup.seed)
-    first, voices = clock.sample(sr), state.voices
-    strikes = [
-        strike for begin_s, pulse in pulses for strike in _strikes(pulse, begin_s, resonators, voices, sr, first)
-    ]
-    sound = bank.advance(state.bank, state.ringing, count, strikes, _forces(drives, resonators, voices, x), x)
-    more, rubs = friction_grains(state.rubs, drives, resonators, voices, first, count, setup.seed)
-    grains = (
-        *state.grains,
-        *(
-            g
-            for begin_s, pulse in pulses
-            for g in impact_grains(pulse, begin_s, resonators, voices, sr, first, setup.seed)
-        ),
-        *more,
-    )
-    if any(more is not None for more in voices):
-        sound[:, 0::PLACES] += sound[:, 4::PLACES]
-    grains = add_grains(sound[:, 0::PLACES], grains, first)
-    frame = _at_sensors(setup, state, sound, x)
-    return frame, replace(
-        state,
-        number=state.number + 1,
-        clock=after,
-        loads=loads,
-        friction=friction,
-        placed=placed,
-        grains=grains,
-        rubs=rubs,
-    )
-
-
-def _strikes(
-    pulse: ForcePulse,
-    step_start_s: float,
-    resonators: tuple[Resonator, ...],
-    voices: tuple[ResidualVoice | None, ...],
-    sr: int,
-    earliest: int,
-) -> list[bank.Strike]:
-    """The pulse on the modes, translations and residual lines of both bodies."""
-    offset_s, spacing_s, weight = pulse_nodes(pulse.length_s, sr, flat=pulse.flat)
-    start = max((step_start_s + pulse.start_s) * sr, float(earliest))
-    strikes = []
-    sides = (
-        (pulse.low, pulse.share * pulse.modes_low, pulse.share * pulse.impulse_n_s),
-        (pulse.high, pulse.share * pulse.modes_high, -pulse.share * pulse.impulse_n_s),
-    )
-    for body, modes, shove in sides:
-        if modes.any():
-            strikes.append(bank.Strike(PLACES * body, start + offset_s * sr, spacing_s * sr, weight, modes))
-            more = voices[body]
-            if more is not None and len(more.follows):
-                strikes.append(
-                    bank.Strike(PLACES * body + 4, start + offset_s * sr, spacing_s * sr, weight, modes[more.follows])
-                )
-        rigid = resonators[body].rigid
-        if rigid is not None:
-            cells = pulse_cells(
-                start, pulse.length_s, sr, int(np.ceil(CELLS_PER_RADIAN * rigid.decay_per_s[0] / sr)), flat=pulse.flat
-            )
-            strikes += [
-                bank.Strike(PLACES * body + 1 + int(axis), *cells, shove[axis : axis + 1])
-                for axis in np.flatnonzero(shove)
-            ]
-    return strikes
-
-
-def _forces(
-    drives: Sequence[Drive], resonators: tuple[Resonator, ...], voices: tuple[ResidualVoice | None, ...], x: Array
-) -> list[bank.Force]:
-    """Drives on modes and residual lines, each with its own gains, and on translations, where all forces on a body act
-    as one.
-    """
-    forces = []
-    pushes: dict[int, Array] = {}
-    for drive in drives:
-        push = drive.force_n * (drive.direction0[:, None] + (drive.direction1 - drive.direction0)[:, None] * x)
-        for side, body in enumerate((drive.low, drive.high)):
-            if resonators[body].mode_count:
-                forces.append(bank.Force(PLACES * body, drive.force_n, drive.gain0[side], drive.gain1[side]))
-                more = voices[body]
-                if more is not None and len(more.follows):
-                    forces.append(
-                        bank.Force(
-                            PLACES * body + 4,
-                            drive.force_n,
-                            drive.gain0[side][more.follows],
-                            drive.gain1[side][more.follows],
-                        )
-                    )
-            if resonators[body].rigid is not None:
-                pushes[body] = pushes.get(body, 0.0) + (push if side == 0 else -push)
-    one = np.ones(1)
-    return forces + [
-        bank.Force(PLACES * body + 1 + axis, push[axis], one, one) for body, push in pushes.items() for axis in range(3)
-    ]
-
-
-def _at_sensors(setup: Setup, state: State, sound: Array, x: Array) -> Array:
-    """(channels, n) of the bank's sound (W, PLACES·b, n): microphones hear through the air, the others sum their weight
-    set over the bodies.
-    """
-    modal, pushed = sound[:, 0::PLACES], np.stack([sound[0, part::PLACES] for part in (1, 2, 3)], axis=1)
-    here, there, newest = state.window[0], state.window[1], state.window[-1]
-    end = newest.position_m.copy()  # of bodies that came later than this step: where they came
-    end[: len(there.position_m)] = there.position_m
-    begin = end.copy()
-    begin[: len(here.position_m)] = here.position_m
-    teleported = np.zeros(len(end), bool)
-    teleported[: len(there.teleported)] = there.teleported
-    observed = path.propagate(state.path, state.travelling, state.number, modal[0], pushed, begin, end, teleported, x)
-    frame = np.zeros((len(setup.sensors), modal.shape[2]))
-    microphones, readers = iter(observed), iter(modal[1:])
-    for channel, sensor in enumerate(setup.sensors):
-        frame[channel] = next(microphones) if isinstance(sensor, Microphone) else _summed(next(readers))
-    if not np.isfinite(frame).all():
-        raise AudioError("the synthesizer made NaN or infinite samples", "report the contact log: this must not happen")
-    return frame
-
-
-def _summed(rows: Array) -> Array:
-    """Sum over bodies in their order: the same bits whatever a library thinks is faster."""
-    total = np.zeros(rows.shape[1])
-    for row in rows:
-        total += row
-    return total
+def clock_after(state: State) -> Clock:
+    """The clock at the end of the last step taken in."""
+    clock = state.clock
+    for dt_s in state.waiting:
+        clock = clock.after(dt_s)
+    return clock
 
 
 class Synthesizer:
-    """Steps in, lagging frames out: the live form of `take_step`, with the sound so far kept."""
+    """Steps in, lagging frames out: the live form of `advance`, with the sound so far kept."""
 
     def __init__(self, *, sr: int, sensors: tuple[Sensor, ...], seed: int, air: Air, residual: bool = True) -> None:
         self._setup = Setup(sr, sensors, seed, air, residual)
@@ -234,12 +187,13 @@ class Synthesizer:
         self._clock = Clock()
         self._frames: list[Array] = []
         self._lag = np.zeros((len(sensors), 0))
+        self._last: Step | None = None
         self._steps = 0
 
     @property
     def time_s(self) -> float:
         """Physics time taken in."""
-        return float(self._clock.time_s)
+        return self._clock.time_s
 
     def feed(self, step: Step, bodies: tuple[Body, ...]) -> Array:
         """Take in a step; the frame (channels, n) as long as the step, LATENCY_STEPS late. bodies: all that are known
@@ -247,35 +201,56 @@ class Synthesizer:
 
         Without a sensor nothing is computed but the time.
         """
-        after = self._clock.after(step.dt_s)
-        count = after.sample(self._setup.sr) - self._clock.sample(self._setup.sr)
-        self._clock = after
-        self._steps += 1
+        before = self._clock
+        self._clock = before.after(step.dt_s)
+        count = self._clock.sample(self._setup.sr) - before.sample(self._setup.sr)
         channels = len(self._setup.sensors)
+        first = self._steps == 0
+        self._steps += 1
         if channels == 0:
             return np.zeros((0, count))
-        self._state = with_bodies(self._setup, self._state, bodies[len(self._state.resonators) : len(step.position_m)])
-        frame, self._state = take_step(self._setup, self._state, step)
-        if frame is None:
+        rendered = len(self._state.waiting) == LATENCY_STEPS
+        fresh = self._take([step], bodies)
+        if not rendered:
             # where a step is no whole number of samples (44.1 kHz at 240 Hz), one more, so that uneven frames never run
             # dry
             uneven = (exact_step(step.dt_s) * self._setup.sr).denominator != 1
-            fresh = np.zeros((channels, count + (uneven and self._steps == 1)))
-        else:
-            fresh = frame
-            self._frames.append(frame)
+            fresh = np.zeros((channels, count + (uneven and first)))
+        if self._lag.shape[1] == 0 and fresh.shape[1] == count:
+            return fresh
         queue = np.concatenate([self._lag, fresh], axis=1)
-        if frame is not None and queue.shape[1] < count:  # the step grew: the lag in samples grows with it
+        if rendered and queue.shape[1] < count:  # the step grew: the lag in samples grows with it
             queue = np.concatenate([np.zeros((channels, count - queue.shape[1])), queue], axis=1)
         out, self._lag = queue[:, :count], queue[:, count:]
         return np.ascontiguousarray(out)
 
+    def play(self, steps: Sequence[Step], bodies: tuple[Body, ...]) -> None:
+        """Take in steps of as many bodies each; `sound` has what they make."""
+        for step in steps:
+            self._clock = self._clock.after(step.dt_s)
+        self._steps += len(steps)
+        if self._setup.sensors:
+            self._take(steps, bodies)
+
+    def _take(self, steps: Sequence[Step], bodies: tuple[Body, ...]) -> Array:
+        known, there = len(self._state.resonators), len(steps[0].position_m)
+        if there > known:
+            first = steps[0]
+            poses = first.position_m[known:], first.quaternion_xyzw[known:]
+            with_bodies(self._setup, self._state, bodies[known:there], *poses)
+        frame = advance(self._setup, self._state, steps)
+        self._last = steps[-1]
+        if frame.shape[1]:
+            self._frames.append(frame)
+        return frame
+
     def sound(self) -> Array:
         """(channels, floor(sr·time)) all sound so far, without lag."""
-        if not self._setup.sensors:
+        channels = len(self._setup.sensors)
+        if not channels:
             return np.zeros((0, self._clock.sample(self._setup.sr)))
         return np.concatenate(
-            [np.zeros((len(self._setup.sensors), 0)), *self._frames, drained(self._setup, self._state)], axis=1
+            [np.zeros((channels, 0)), *self._frames, drained(self._setup, self._state, self._last)], axis=1
         )
 
     def quench(self) -> None:
@@ -283,4 +258,4 @@ class Synthesizer:
         LATENCY_STEPS later.
         """
         if self._setup.sensors:
-            self._state = replace(self._state, quenches=self._state.quenches | {self._steps})
+            self._state.quenches = self._state.quenches | {self._steps}

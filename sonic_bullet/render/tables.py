@@ -115,6 +115,9 @@ PAIR = np.dtype(
     align=True,
 )
 
+WINDOW = np.dtype([("dt_s", "f8"), ("gravity_m_s2", "f8", (3,)), ("row", "i8", (2,))], align=True)
+"""A step of the last SPAN: its length, its gravity, and its rows, first and the one after the last."""
+
 PULSE = np.dtype(
     [
         ("body", "i8", (2,)),

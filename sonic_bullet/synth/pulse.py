@@ -203,7 +203,7 @@ def compliance(push, frequency_hz, first, modes, tau_s, spectrum):  # type: igno
 
 def cumulated_force(s: Array, *, flat: bool = False) -> Array:
     """Q(s): the share of the impulse handed over by the share s of the pulse; 0 before, 1 after."""
-    return np.asarray(_cumulated_many(np.ascontiguousarray(s, float), _table(), flat))
+    return np.asarray(_cumulated_many(np.ascontiguousarray(s, float), pulse_table(), flat))
 
 
 def add_jerk(
@@ -226,7 +226,7 @@ def add_jerk(
         np.ascontiguousarray(impulse_n_s, float),
         float(sr),
         int(first_sample),
-        _table(),
+        pulse_table(),
     )
 
 
@@ -234,12 +234,12 @@ def _force(s: Array, flat: bool) -> Array:
     """Force at the shares s, mean 1."""
     if flat:
         return np.asarray(np.pi / 2 * np.sin(np.pi * np.clip(s, 0, 1)))
-    table = _table()
+    table = pulse_table()
     return np.asarray(np.interp(s, np.linspace(0, 1, _CELLS + 1), table[1], left=0, right=0))
 
 
 @lru_cache(maxsize=1)
-def _table() -> Array:
+def pulse_table() -> Array:
     """(2, cells + 1): Q and F of the Hertz pulse at equidistant shares. δ'' = -δ^(3/2) from δ = 0, δ' = 1, by the
     classical Runge-Kutta method.
 

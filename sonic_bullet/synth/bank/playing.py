@@ -12,7 +12,7 @@ from sonic_bullet.records.errors import AudioError
 from sonic_bullet.synth.bank import bank_kernel
 from sonic_bullet.synth.bank.instrument import Bank, BankState, flushed
 from sonic_bullet.synth.bank.strike_pool import enter_strike
-from sonic_bullet.synth.pulse import _table
+from sonic_bullet.synth.pulse import pulse_table
 
 NOWHERE = np.zeros(3)
 
@@ -85,7 +85,7 @@ def advance(
     bank_kernel.advance(
         state.at, n, float(bank.sr), bank.body, bank.law, bank.weight, bank.observed,
         state.ringing, state.z, state.driven, state.sound, state.pole, state.block, state.strikes, state.rows, state.free,
-        _table(), drives, body, signal, gain[0], gain[1], direction[0], direction[1], along,
+        pulse_table(), drives, body, signal, gain[0], gain[1], direction[0], direction[1], along,
         scratch.first, scratch.side, scratch.signal, scratch.kick, scratch.plan, scratch.flat, out, pushed,
         np.zeros((bank.body_count, 2), np.int64),
     )  # fmt: skip
@@ -113,7 +113,7 @@ def _enter(bank: Bank, state: BankState, strikes: Sequence[Strike]) -> None:
         x, y, z = (float(value) for value in strike.shove_n_s)
         enter_strike(
             strike.body, float(strike.start), float(strike.length_s), int(strike.flat), 1.0, gain, x, y, z, state.at,
-            float(bank.sr), bank.body, bank.law, state.ringing, state.strikes, state.rows, state.free, _table(),
+            float(bank.sr), bank.body, bank.law, state.ringing, state.strikes, state.rows, state.free, pulse_table(),
         )  # fmt: skip
 
 

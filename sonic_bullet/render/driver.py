@@ -1,0 +1,239 @@
+"""The run time's driver: physics steps in, samples out, all stages in one compiled call.
+
+    CONTACT rows, poses of a step -> take: ROW, load histories, into a window of SPAN steps
+        -> excite: PULSE (strikes), drives (friction) of the step LOOKAHEAD before
+        -> ring: modes and translations of all bodies -> source (W, b, n), pushed (b, 3, n)
+        -> hear: through the air to the microphones; other sensors sum their weight set over the bodies
+
+Live listening is this driver with one step, a replay the same with many: what is made of a step hangs on nothing else.
+It stops before a step for which a table is too small, having changed nothing of it; whoever called enlarges the table
+and calls again. Sums in a fixed order: rows as they came, pairs by key, bodies by index.
+"""
+
+# mypy: disable-error-code="no-untyped-def"
+from __future__ import annotations
+
+import numpy as np
+
+from sonic_bullet.machine.compiled import njit
+from sonic_bullet.render.contact_rows import enter_loads, orient
+from sonic_bullet.render.friction import VOICE, advance_friction
+from sonic_bullet.render.strike_pulses import STRIKE, find_pulses
+from sonic_bullet.synth.bank import bank_kernel
+from sonic_bullet.synth.bank.bank_kernel import DRIVE_SCRATCH, RING_SCRATCH
+from sonic_bullet.synth.bank.layout import DRIVEN
+from sonic_bullet.synth.bank.strike_pool import enter_strike
+from sonic_bullet.synth.path_kernel import DONE, hear
+from sonic_bullet.synth.strikes import LOOKAHEAD, SPAN
+from sonic_bullet.synth.vector import LANES
+
+TO_GROW, PAUSED, NOT_FINITE = -1, -2, -3
+"""Why the driver came back early: a table is too small; asked to stop before `hear`; a sum that is no number. Else it
+is DONE, or what `path_kernel.hear` said.
+"""
+STEP = np.dtype(
+    [
+        ("dt_s", "f8"),  # of the step taken in
+        ("gravity_m_s2", "f8", (3,)),
+        ("row", "i8", (2,)),  # its contacts: first and the one after the last
+        ("sample", "i8"),  # first sample of the step that is rendered, LOOKAHEAD before
+        ("count", "i8"),  # samples of it; 0 while there is none
+        ("offset", "f8"),  # of the first sample behind the step's start, in samples
+        ("begin_s", "f8"),  # time at which it starts, and at which the one after it does
+        ("after_s", "f8"),
+        ("quench", "i8"),  # 1: all stops ringing before the step after it
+    ],
+    align=True,
+)
+"""A physics step as the driver is told of it: what is taken in, and when what is rendered then lies."""
+
+
+@njit(nogil=True, error_model="numpy")
+def aligned(size):  # pragma: no cover - compiled
+    """(size,) numbers that begin where a vector register does."""
+    raw = np.zeros(size + LANES)
+    skip = (-(raw.ctypes.data // 8)) % LANES
+    return raw[skip : skip + size]
+
+
+@njit(nogil=True, error_model="numpy")
+def take(
+    slot, step, contacts, position, quaternion, teleported, window, window_position, window_quaternion,
+    window_teleported, rows, pairs, active, counts, free,
+):  # fmt: skip  # pragma: no cover - compiled
+    """Take a step into a slot of the window: its poses (b, ·), its rows, the pairs' loads."""
+    for b in range(len(position)):
+        for axis in range(3):
+            window_position[slot, b, axis] = position[b, axis]
+        for axis in range(4):
+            window_quaternion[slot, b, axis] = quaternion[b, axis]
+        window_teleported[slot, b] = teleported[b]
+    first = slot * (len(rows) // SPAN)
+    count = step.row[1] - step.row[0]
+    orient(contacts[step.row[0] : step.row[1]], window_quaternion[slot], rows[first : first + count])
+    here = window[slot]
+    here.dt_s, here.row[0], here.row[1] = step.dt_s, first, first + count
+    for axis in range(3):
+        here.gravity_m_s2[axis] = step.gravity_m_s2[axis]
+    enter_loads(rows, first, first + count, step.dt_s, pairs, active, counts, free)
+
+
+@njit(nogil=True, error_model="numpy")
+def excite(
+    number, quench, x, sr, window, window_quaternion, window_teleported, rows, bodies, faces, nodes, shapes, frequency_hz,
+    spectrum, pairs, active, counts, gain, pulses, push, force, gain0, gain1, direction0, direction1, drive_body, drive_slot,
+):  # fmt: skip  # pragma: no cover - compiled
+    """Strikes and friction of step ``number``: how many pulses and drives there are of it."""
+    here, there = window[number % SPAN], window[(number + 1) % SPAN]
+    known = np.empty((SPAN, 2), np.int64)
+    for j in range(SPAN):
+        known[j, 0], known[j, 1] = window[(number + j) % SPAN].row[0], window[(number + j) % SPAN].row[1]
+    for b in range(len(bodies)):
+        if window_teleported[(number + 1) % SPAN, b]:
+            bodies[b].placed = number + 1
+    strikes, voices = np.empty(counts[0], STRIKE), np.empty(counts[0], VOICE)
+    found = find_pulses(
+        0, number, 0.0, here.dt_s, here.gravity_m_s2, window_quaternion[number % SPAN], rows, known, pairs, active, counts,
+        bodies, faces, nodes, shapes, frequency_hz, spectrum, strikes, pulses, push, 0,
+    )  # fmt: skip
+    # else what strikes after the quench would be dated back before it, and be lost: it waits for its own step
+    if not quench:
+        found = find_pulses(
+            1, number + 1, -here.dt_s, there.dt_s, there.gravity_m_s2, window_quaternion[(number + 1) % SPAN], rows, known,
+            pairs, active, counts, bodies, faces, nodes, shapes, frequency_hz, spectrum, strikes, pulses, push, found,
+        )  # fmt: skip
+    drives = advance_friction(
+        pairs, active, counts[0], bodies, rows[known[1, 0] : known[1, 1]], known[1, 1] - known[1, 0], faces, nodes, shapes,
+        window_quaternion[(number + 1) % SPAN], here.dt_s, x, sr, gain, voices, force, gain0, gain1, direction0, direction1,
+        drive_body, drive_slot,
+    )  # fmt: skip
+    return found, drives
+
+
+@njit(nogil=True, error_model="numpy")
+def ring(
+    step, sr, found, pulses, push, drives, drive_body, force, gain0, gain1, direction0, direction1, x, bank_body, law, weight,
+    observed, ringing, z, driven, sound, pole, block, strikes, phasors, free_strikes, hertz, source, pushed, sounds,
+):  # fmt: skip  # pragma: no cover - compiled
+    """The step's pulses and drives on the bank: source (W, b, n or more) and pushed (b, 3, n or more)."""
+    for p in range(found):
+        pulse = pulses[p]
+        begin_s = step.after_s if pulse.ahead else step.begin_s
+        start = max((begin_s + pulse.start_s) * sr, float(step.sample))
+        for side in range(2):
+            sign, j = 1.0 if side == 0 else -1.0, pulse.impulse_n_s
+            enter_strike(
+                pulse.body[side], start, pulse.length_s, pulse.flat, pulse.share, push[p, side], sign * j[0], sign * j[1],
+                sign * j[2], step.sample, sr, bank_body, law, ringing, strikes, phasors, free_strikes, hertz,
+            )  # fmt: skip
+    n = step.count
+    bank_kernel.advance(
+        step.sample, n, sr, bank_body, law, weight, observed, ringing, z, driven, sound, pole, block, strikes, phasors,
+        free_strikes, hertz, drives, drive_body, force, gain0, gain1, direction0, direction1, x,
+        np.empty(len(bank_body) + 1, np.int64), np.empty(2 * drives, np.int64), np.empty((drives, 2, n + LANES)),
+        np.empty((6, n)), np.empty((DRIVEN, 3), np.int64), aligned(max(DRIVE_SCRATCH, RING_SCRATCH)), source, pushed, sounds,
+    )  # fmt: skip
+
+
+@njit(nogil=True, error_model="numpy")
+def sum_at_sensors(source, n, reads, out, out_at):  # pragma: no cover - compiled
+    """What sensors that read modes by themselves (reads (c,): their weight set, 0 for a microphone) make of a step.
+    False where that is no number.
+    """
+    for c in range(len(reads)):
+        if reads[c] == 0:
+            continue
+        for k in range(n):
+            total = 0.0
+            for b in range(source.shape[1]):
+                total += source[reads[c], b, k]
+            out[c, out_at + k] = total
+            if not abs(total) < np.inf:
+                return False
+    return True
+
+
+@njit(nogil=True, error_model="numpy")
+def advance_steps(
+    first, taken, start, pause, resume, sr, steps, contacts, position, quaternion, teleported,
+    window, window_position, window_quaternion, window_teleported, rows,
+    bodies, faces, nodes, shapes, frequency_hz, spectrum, pairs, active, counts, free, gain,
+    pulses, push, force, gain0, gain1, direction0, direction1, drive_body, drive_slot,
+    bank_body, law, weight, observed, ringing, z, driven, sound, pole, block, strikes, phasors, free_strikes, hertz,
+    source, pushed, sounds, microphone_m, samples_per_m, sources, places, lines, memory, taps, reads, heard, out,
+):  # fmt: skip  # pragma: no cover - compiled
+    """Steps ``first`` … of the table into out (channels, samples of all of them): how many are done, why it came back,
+    and how many pulses and drives the last one has.
+
+    taken: number of the first step of the table; start: sample of out's first. contacts: of all steps; position (k, b,
+    3), quaternion (k, b, 4), teleported (k, b). heard (microphones, as out). pause: come back before the first step is
+    heard; resume: the first step rings already, and is to be heard.
+    """
+    found, drives, done = 0, 0, 0
+    for i in range(first, len(steps)):
+        step, number, anew = steps[i], taken + i, i > first or not resume
+        if anew:
+            new = step.row[1] - step.row[0]
+            bound = counts[0] + new
+            if counts[1] < new or len(rows) // SPAN < new or len(pulses) < 2 * bound or len(drive_slot) < bound:
+                return done, TO_GROW, found, drives
+            if free_strikes[0] < 4 * bound:
+                return done, TO_GROW, found, drives
+            take(
+                number % SPAN, step, contacts, position[i], quaternion[i], teleported[i], window, window_position,
+                window_quaternion, window_teleported, rows, pairs, active, counts, free,
+            )  # fmt: skip
+        number -= LOOKAHEAD
+        if number >= 0:
+            n, dt_s = step.count, window[number % SPAN].dt_s
+            x = np.empty(n)
+            for k in range(n):
+                x[k] = min(max((k + step.offset) / (dt_s * sr), 0.0), 1.0)
+            if anew:
+                signal = force[: len(drive_slot) * n].reshape((len(drive_slot), n))
+                found, drives = excite(
+                    number, step.quench, x, sr, window, window_quaternion, window_teleported, rows, bodies, faces, nodes, shapes,
+                    frequency_hz, spectrum, pairs, active, counts, gain, pulses, push, signal, gain0, gain1, direction0,
+                    direction1, drive_body, drive_slot,
+                )  # fmt: skip
+                ring(
+                    step, sr, found, pulses, push, drives, drive_body, signal, gain0, gain1, direction0, direction1, x, bank_body,
+                    law, weight, observed, ringing, z, driven, sound, pole, block, strikes, phasors, free_strikes, hertz, source,
+                    pushed, sounds,
+                )  # fmt: skip
+            if pause and anew:
+                return done, PAUSED, found, drives
+            status = finish(
+                number, step, start, x, window_position, window_teleported, source, pushed, microphone_m,
+                samples_per_m, sources, places, lines, memory, taps, reads, heard, out,
+            )  # fmt: skip
+            if status != DONE:
+                return done, status, found, drives
+        done += 1
+    return done, DONE, found, drives
+
+
+@njit(nogil=True, error_model="numpy")
+def finish(
+    number, step, start, x, window_position, window_teleported, source, pushed, microphone_m, samples_per_m, sources,
+    places, lines, memory, taps, reads, heard, out,
+):  # fmt: skip  # pragma: no cover - compiled
+    """Step ``number``, which rings in source and pushed, into out (channels, …), whose first sample is ``start``; why
+    not, where it cannot be.
+    """
+    here, there, at = number % SPAN, (number + 1) % SPAN, step.sample - start
+    status = hear(
+        step.sample, number, step.count, 0, source[0], pushed, window_position[here], window_position[there],
+        window_teleported[there], x, microphone_m, samples_per_m, sources, places, lines, memory, taps, heard, at,
+    )  # fmt: skip
+    if status != DONE:
+        return status
+    if not sum_at_sensors(source, step.count, reads, out, at):
+        return NOT_FINITE
+    m = 0
+    for c in range(len(reads)):
+        if reads[c] == 0:
+            for k in range(at, at + step.count):
+                out[c, k] = heard[m, k]
+            m += 1
+    return DONE
