@@ -13,8 +13,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from sonic_bullet.records.contacts import CONTACT
 from sonic_bullet.synth.profile import OCTAVES
 from sonic_bullet.synth.strikes import SPAN
+
+__all__ = ["BODY", "CONTACT", "FACE", "HISTORY", "NODE", "PAIR", "PULSE", "ROW"]
 
 HISTORY = 2 * SPAN - 1
 """Steps of load that are remembered of a pair; column SPAN - 1 is the step being rendered."""
@@ -55,23 +58,6 @@ FACE = np.dtype(
 
 NODE = np.dtype([("low_m", "f8", (3,)), ("high_m", "f8", (3,)), ("child", "i8", (2,))], align=True)
 """A box of a body's tree. child: both children, or (-start - 1, end) of a leaf, counted from the body's own first."""
-
-CONTACT = np.dtype(
-    [
-        ("a", "i4"),
-        ("b", "i4"),
-        ("point_a_m", "f8", (3,)),
-        ("point_b_m", "f8", (3,)),
-        ("normal", "f8", (3,)),
-        ("impulse_n_s", "f8", (3,)),
-        ("slip_m_s", "f8", (3,)),
-        ("sweep_m_s", "f8", (2,)),
-        ("approach_m_s", "f8"),
-        ("gap_m", "f8"),
-    ],
-    align=True,
-)
-"""A contact as it is logged; see records.contacts."""
 
 ROW = np.dtype(
     [
