@@ -43,8 +43,8 @@ class Memory:
         self.touches = None
 
     def poll(self, raw: Array, *, stepped: bool) -> None:
-        """Keep the contacts just polled; not `stepped`: only where they are others (polled twice, a world tells the same
-        twice).
+        """Keep the contacts just polled; not `stepped`: only where they are others, for polled twice a world tells the
+        same twice.
         """
         if stepped or raw.tobytes() != self.raw.tobytes():
             self.raw_before, self.raw = self.raw, raw
@@ -92,10 +92,10 @@ class Memory:
         return self._step(dt_s, gravity, poses, row, made)
 
     def made(
-        self, known: KnownBodies, start: Array, touches: Touches, past: Touches | None, dt_s: float, alone: bool
+        self, known: KnownBodies, start: Array, touches: Touches, past: Touches | None, dt_s: float
     ) -> tuple[Array, int]:
         """CONTACT rows (k,) of touches and how many of them are filled; STRANGERS where `start` marks links that meet
-        somebody for the first time, unless they are left out (`alone`).
+        somebody for the first time.
 
         Raises SceneError for a touch of a link that `start` does not hold, RecordError for numbers beyond what can be.
         """
@@ -108,7 +108,6 @@ class Memory:
             start,
             dt_s,
             self.time_s,
-            alone,
             traces.table,
             traces.count,
             traces.newest,

@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet.listener.frames import BEYOND, LINK_SPAN
+from sonic_bullet.listener.kinematics import INNER
 from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array
 
@@ -107,17 +108,17 @@ def packed(contacts: Iterable[RawContact], count: int) -> Array:
     into, size = RAW_ROW.pack_into, RAW_ROW.size
     # one pass over the tuples, nothing made on the way: half the time of columns (zip) and chains
     for (
-        _, a, b, link_a, link_b, (ax, ay, az), (bx, by, bz), (nx, ny, nz), gap, force, f1, (sx, sy, sz), f2, (tx, ty, tz)
+        _, a, b, m, n, (ax, ay, az), (bx, by, bz), (nx, ny, nz), gap, force, f1, (sx, sy, sz), f2, (tx, ty, tz)
     ) in contacts:  # fmt: skip
         if force or f1 or f2:
             into(
-                buffer, at, a, b, link_a, link_b, ax, ay, az, bx, by, bz, nx, ny, nz, gap, force, f1, sx, sy, sz, f2, tx, ty, tz
+                buffer, at, a, b, m, n, ax, ay, az, bx, by, bz, nx, ny, nz, gap, force, f1, sx, sy, sz, f2, tx, ty, tz
             )  # fmt: skip
             at += size
     return np.frombuffer(buffer, RAW, at // size) if at else NO_RAW
 
 
-@njit(nogil=True, error_model="numpy")
+@njit(**INNER)
 def stale(raw, i, before):
     """Whether row i, without normal force, keeps the friction that it had in `before`, to the bit."""
     row, k = raw[i], len(before)
@@ -162,7 +163,7 @@ def load(raw, before, dt, touch):
     return count
 
 
-@njit(nogil=True, error_model="numpy")
+@njit(**INNER)
 def all_usable(touch, count):
     """Whether no number of the first `count` touches is NaN or `BEYOND` what can be."""
     for i in range(count):

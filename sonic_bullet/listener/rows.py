@@ -8,9 +8,11 @@ Compiled; `take_step` is a whole step of a world in which nothing unusual happen
 
 from __future__ import annotations
 
-from sonic_bullet.listener.kinematics import relative_motion
+import numpy as np
+
+from sonic_bullet.listener.kinematics import INNER, relative_motion
 from sonic_bullet.listener.polling import all_usable, load
-from sonic_bullet.listener.start import begin
+from sonic_bullet.listener.start import LEFT_OUT, begin
 from sonic_bullet.listener.sweep import sort_pairs, sweep
 from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records.arrays import LARGEST
@@ -22,7 +24,7 @@ UNKNOWN, STRANGERS, ABSURD, UNUSUAL = -1, -2, -3, -4
 (START.met); a number beyond `LARGEST`; what Python has to look at (`take_step`)."""
 
 
-@njit(nogil=True, error_model="numpy")
+@njit(**INNER)
 def find(start, code):
     """Row of a code in START (n,), or -1."""
     low, high = 0, len(start)
@@ -35,14 +37,14 @@ def find(start, code):
     return low if low < len(start) and start[low].code == code else -1
 
 
-@njit(nogil=True, error_model="numpy")
+@njit(**INNER)
 def still(body):
     """Whether every speed is exactly 0."""
     v, w = body.velocity_m_s, body.spin_rad_s
     return v[0] == 0 and v[1] == 0 and v[2] == 0 and w[0] == 0 and w[1] == 0 and w[2] == 0
 
 
-@njit(nogil=True, error_model="numpy")
+@njit(**INNER)
 def seen(touch, i, past):
     """Whether touch i is one of `past`, to the bit."""
     row, k = touch[i], len(past)
@@ -64,7 +66,7 @@ def seen(touch, i, past):
     return False
 
 
-@njit(nogil=True, error_model="numpy")
+@njit(**INNER)
 def counts(touch, i, past, a, b, approach, dt):
     """Whether a touch of the links a, b (START rows) counts: none asleep, moved by hand, or of a body in its first step
     and deeper inside its partner than its speed explains.
@@ -79,7 +81,7 @@ def counts(touch, i, past, a, b, approach, dt):
     return not (inside and (a.born or b.born))
 
 
-@njit(nogil=True, error_model="numpy")
+@njit(**INNER)
 def fill(row, touch, fresh, slip, approach):
     """A CONTACT row of a touch, but for who meets and the sweep; whether its numbers are numbers within `LARGEST`."""
     row.approach_m_s = approach
@@ -95,14 +97,14 @@ def fill(row, touch, fresh, slip, approach):
 
 
 @njit(nogil=True, error_model="numpy")
-def contact_rows(touch, count, past, start, dt, time, alone, table, counted, newest, scratch, row):
+def contact_rows(touch, count, past, start, dt, time, table, counted, newest, scratch, row):
     """Fill row (k,) of CONTACT and the newest trace; how many rows it are, or UNKNOWN, STRANGERS or ABSURD.
 
     touch: `count` of TOUCH; past: those of the step before. start (n,) of START. dt, time: the step's length and start
-    in s. alone: whether a link without an index is left out; else it is marked as met. table, counted, newest, scratch: `Traces`
+    in s. table, counted, newest, scratch: `Traces`
     with room for `count`.
     """
-    made, strangers, fine, work = 0, False, True, scratch[0]
+    made, strangers, fine, work = np.int64(0), False, True, scratch[0]  # a literal 0 would compile sort_pairs twice
     for i in range(count):
         one = touch[i]
         at_a, at_b = find(start, one.code_a), find(start, one.code_b)
@@ -113,7 +115,7 @@ def contact_rows(touch, count, past, start, dt, time, alone, table, counted, new
         if not counts(touch, i, past, a, b, approach, dt):
             continue
         if a.index < 0 or b.index < 0:
-            if not alone:
+            if min(a.index, b.index) > LEFT_OUT:
                 a.met, b.met, strangers = a.index < 0, b.index < 0, True
             continue
         fresh, out = table[newest, made], row[made]
@@ -155,7 +157,7 @@ def place_bodies(start, pose, position, quaternion, teleported):
             quaternion[i, x] = pose[i, 3 + x]
 
 
-@njit(nogil=True, error_model="numpy")
+@njit(**INNER)
 def unmoved(earlier, later):
     """Whether every number of two MOTION tables is the same."""
     for i in range(len(later)):
@@ -207,7 +209,7 @@ def take_step(
     moved = begin(earlier, later, dt, by_hand, hooked, start)
     if moved and not hooked:
         return count, UNUSUAL
-    made = contact_rows(touch, count, past, start, dt, time, False, table, counted, newest, scratch, row)
+    made = contact_rows(touch, count, past, start, dt, time, table, counted, newest, scratch, row)
     if made >= 0:
         place_bodies(start, pose, position, quaternion, teleported)
     return count, made

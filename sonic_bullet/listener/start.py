@@ -17,7 +17,7 @@ from collections.abc import Callable, Collection
 import numpy as np
 
 from sonic_bullet.listener.frames import LINK_SPAN, MOTION, Motion, Roster, rows_of
-from sonic_bullet.listener.kinematics import rotation_between
+from sonic_bullet.listener.kinematics import INNER, rotation_between
 from sonic_bullet.listener.polling import Touches
 from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array
@@ -30,7 +30,7 @@ START = np.dtype(
         *((name, MOTION[name]) for name in MOTION.names or ()),
         ("code", "i8"),  # frames.encode
         ("static", "i8"),  # 1 where its mass is 0
-        ("index", "i8"),  # into the bodies of the log; -1 where it has met nobody yet
+        ("index", "i8"),  # into the bodies of the log; -1 where it has met nobody yet, LEFT_OUT
         ("moved", "i8"),  # 1 where it was set elsewhere by hand since the step before
         ("born", "i8"),  # 1 in its first step
         ("met", "i8"),  # 1 where it meets somebody for the first time
@@ -38,6 +38,9 @@ START = np.dtype(
     align=True,
 )
 """A link at the start of a step; rows as a roster's, ascending in code."""
+
+LEFT_OUT = -2
+"""Index of a link whose contacts are dropped."""
 
 NOBODY = np.zeros(0, np.int64)
 
@@ -54,7 +57,7 @@ def start_table(roster: Roster) -> Array:
     return table
 
 
-@njit(nogil=True, error_model="numpy")
+@njit(**INNER)
 def jump(earlier, later, static, dt):
     """Whether a link is farther from where it was than 1.5 × both speeds (static: DRIVEN_SPEED_M_S) explain."""
     moved, v, w = 0.0, 0.0, 0.0
@@ -66,7 +69,7 @@ def jump(earlier, later, static, dt):
     return np.sqrt(moved) > reach * dt + JUMP_FLOOR_M
 
 
-@njit(nogil=True, error_model="numpy")
+@njit(**INNER)
 def drive(earlier, later, dt, body):
     """Give a link of mass 0 whose pose was reset since `earlier` the velocity of that move."""
     p, q, x, y = earlier.position_m, earlier.quaternion_xyzw, later.position_m, later.quaternion_xyzw

@@ -7,7 +7,6 @@ getNumBodies -> the roster, kept while nobody comes or goes -> poses and twists 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
-from typing import Any
 
 import pybullet
 

@@ -22,7 +22,6 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-import pybullet
 
 from sonic_bullet.listener.frames import LINK_SPAN, Motion, Roster, encode, rows_of, same_motion
 from sonic_bullet.listener.known_bodies import KnownBodies
@@ -34,12 +33,12 @@ from sonic_bullet.listener.pybullet import hooks
 from sonic_bullet.listener.pybullet.census import Census
 from sonic_bullet.listener.pybullet.left_out import BodiesLeftOut
 from sonic_bullet.listener.pybullet.poses import check_connected
-from sonic_bullet.listener.pybullet.questions import Settings, contact_points, settings
+from sonic_bullet.listener.pybullet.questions import contact_points, settings
 from sonic_bullet.listener.pybullet.step_back import undone
 from sonic_bullet.listener.pybullet.substeps import SubstepLog, gather_substeps
-from sonic_bullet.listener.start import NOBODY, hooked_start, jumped, polled_start, taken
+from sonic_bullet.listener.start import LEFT_OUT, NOBODY, hooked_start, jumped, polled_start, taken
 from sonic_bullet.listener.world import World
-from sonic_bullet.records import Array, Body, Material, ModalModel, Shape
+from sonic_bullet.records import Body, Material, ModalModel, Shape
 from sonic_bullet.records.contacts import Step
 from sonic_bullet.records.errors import SceneError
 
@@ -267,7 +266,7 @@ class PyBulletWorld(World):
         return step
 
     def _poll(self, hooked: bool) -> Touches | None:
-        """Ask for this step's contacts, once: they go to the memory, or are returned where they are those of sub-steps."""
+        """Ask for this step's contacts, once: they go to the memory; those of sub-steps are returned."""
         substeps = self._settings.substeps
         last, raw = contact_points(self.client_id)
         if substeps == 1:
@@ -313,14 +312,15 @@ class PyBulletWorld(World):
             )
         memory.touches, self._past, self._before = touches, now, None
         start["index"] = known.index(now.roster)
-        row, made = memory.made(known, start, touches, past_touches, dt, alone=False)
+        row, made = memory.made(known, start, touches, past_touches, dt)
         if made < 0:
             for code in start["code"][start["met"] != 0].tolist():
                 record = self._census.described(code, self.epoch)
                 if record is not None:
                     self._append(code, replace(record, since_step=self.step_count))
-            start["index"] = known.index(now.roster)
-            row, made = memory.made(known, start, touches, past_touches, dt, alone=True)
+            index = known.index(now.roster)
+            start["index"] = np.where(index < 0, LEFT_OUT, index)
+            row, made = memory.made(known, start, touches, past_touches, dt)
         return memory.unusual(known, start, row, made, dt, gravity)
 
     def _bury(self, roster: Roster) -> None:
