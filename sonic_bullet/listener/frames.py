@@ -11,12 +11,21 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from sonic_bullet.listener.kinematics import jumps
 from sonic_bullet.records import Array
 
+MOTION = np.dtype(
+    [
+        ("position_m", "f8", (3,)),
+        ("quaternion_xyzw", "f8", (4,)),
+        ("velocity_m_s", "f8", (3,)),
+        ("spin_rad_s", "f8", (3,)),
+    ],
+    align=True,
+)
+"""Pose and twist of a link."""
+
+MOTION_NUMBERS = 13
 LINK_SPAN = 1 << 20
-JUMP_FLOOR_M = 1e-3
-DRIVEN_SPEED_M_S = 10.0
 BEYOND = 1e9
 """Metres, m/s, rad/s, N·s: no scene of these sizes reaches it, and the products of such numbers are still numbers."""
 NO_NUMBER = "a pose or speed that is not a number, or beyond 1e9"
@@ -39,22 +48,48 @@ class Roster:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion:
-    """Poses and twists of a roster at one instant.
+    """Poses and twists of a roster at one instant: row (n,) of MOTION.
 
     position_m (n, 3), quaternion_xyzw (n, 4), velocity_m_s (n, 3) of the centre of mass, spin_rad_s (n, 3): world
     frame. broken: ids of the bodies of which a number is NaN or `BEYOND`, as read.
     """
 
     roster: Roster
-    position_m: Array
-    quaternion_xyzw: Array
-    velocity_m_s: Array
-    spin_rad_s: Array
+    row: Array
     broken: tuple[int, ...] = field(default=(), kw_only=True)
 
+    @classmethod
+    def of(
+        cls, roster: Roster, position_m: Array, quaternion_xyzw: Array, velocity_m_s: Array, spin_rad_s: Array
+    ) -> Motion:
+        """The motion of these columns."""
+        row = np.empty(len(position_m), MOTION)
+        for name, column in zip(
+            MOTION.names or (), (position_m, quaternion_xyzw, velocity_m_s, spin_rad_s), strict=True
+        ):
+            row[name] = column
+        return cls(roster, row)
+
     @property
-    def table(self) -> tuple[Array, Array, Array, Array]:
-        return self.position_m, self.quaternion_xyzw, self.velocity_m_s, self.spin_rad_s
+    def position_m(self) -> Array:
+        return self.row["position_m"]
+
+    @property
+    def quaternion_xyzw(self) -> Array:
+        return self.row["quaternion_xyzw"]
+
+    @property
+    def velocity_m_s(self) -> Array:
+        return self.row["velocity_m_s"]
+
+    @property
+    def spin_rad_s(self) -> Array:
+        return self.row["spin_rad_s"]
+
+    @property
+    def number(self) -> Array:
+        """(n, 13) all of them."""
+        return self.row.view(np.float64).reshape(len(self.row), MOTION_NUMBERS)
 
     def would_move(self, dt_s: float) -> bool:
         """Whether a step must change some number: a body may rest on a fixed point of Bullet's arithmetic and keep
@@ -66,9 +101,7 @@ class Motion:
 
 def same_motion(first: Motion, second: Motion) -> bool:
     """Whether every number is the same, bit for bit."""
-    return first.roster.bodies == second.roster.bodies and all(
-        np.array_equal(a, b) for a, b in zip(first.table, second.table, strict=True)
-    )
+    return first.roster.bodies == second.roster.bodies and np.array_equal(first.number, second.number)
 
 
 def encode(body: Array | int, link: Array | int) -> Array:
@@ -94,49 +127,6 @@ def rows_of(roster: Roster, code: Array) -> Array:
     return np.where(roster.code[row] == code, row, -1)
 
 
-def jumped(earlier: Motion, later: Motion, dt_s: float) -> Array:
-    """(n,) of `later`: moved farther in one step than both speeds together explain, so by hand.
-
-    What has mass 0 may be driven by resetting its pose each step: up to DRIVEN_SPEED_M_S that is motion, beyond it a
-    jump.
-    """
-    old = (
-        np.arange(len(later.roster.code))
-        if earlier.roster is later.roster
-        else rows_of(earlier.roster, later.roster.code)
-    )
-    return np.asarray(jumps(earlier.table, later.table, old, later.roster.static, dt_s, DRIVEN_SPEED_M_S, JUMP_FLOOR_M))
-
-
-def with_driven_twists(earlier: Motion, later: Motion, dt_s: float) -> Motion:
-    """`later`, where bodies of mass 0 whose pose was reset since `earlier` carry the velocity of that move."""
-    if earlier.roster is not later.roster:
-        return later
-    static = np.flatnonzero(later.roster.static)
-    driven = static[
-        (later.position_m[static] != earlier.position_m[static]).any(axis=1)
-        | (later.quaternion_xyzw[static] != earlier.quaternion_xyzw[static]).any(axis=1)
-    ]
-    if not len(driven):
-        return later
-    velocity, spin = later.velocity_m_s.copy(), later.spin_rad_s.copy()
-    velocity[driven] = (later.position_m[driven] - earlier.position_m[driven]) / dt_s
-    spin[driven] = rotation_between(earlier.quaternion_xyzw[driven], later.quaternion_xyzw[driven]) / dt_s
-    return Motion(later.roster, later.position_m, later.quaternion_xyzw, velocity, spin)
-
-
-def rotation_between(first_xyzw: Array, second_xyzw: Array) -> Array:
-    """Rotation vectors (k, 3) in rad that turn the first orientations (k, 4) into the second ones, world frame."""
-    x, w = first_xyzw[:, :3], first_xyzw[:, 3:]
-    y, v = second_xyzw[:, :3], second_xyzw[:, 3:]
-    vector = w * y - v * x - np.cross(y, x)
-    scalar = (w * v)[:, 0] + (x * y).sum(axis=1)
-    vector, scalar = np.where(scalar[:, None] < 0, -vector, vector), np.abs(scalar)
-    length = np.linalg.norm(vector, axis=1)
-    angle = 2 * np.arctan2(length, scalar)
-    return np.asarray(vector * (angle / np.maximum(length, 1e-300))[:, None])
-
-
 def turned(quaternion_xyzw: Array, rotation_rad: Array) -> Array:
     """Orientations (k, 4) turned by world-frame rotation vectors (k, 3)."""
     angle = np.linalg.norm(rotation_rad, axis=1, keepdims=True)
@@ -148,7 +138,7 @@ def turned(quaternion_xyzw: Array, rotation_rad: Array) -> Array:
 
 def advanced(motion: Motion, duration_s: float) -> Motion:
     """The motion carried on by its own twists; a negative duration undoes Bullet's last semi-implicit step."""
-    return Motion(
+    return Motion.of(
         motion.roster,
         motion.position_m + duration_s * motion.velocity_m_s,
         turned(motion.quaternion_xyzw, duration_s * motion.spin_rad_s),

@@ -1,4 +1,6 @@
-"""From PyBullet's contact tuples to arrays of loaded contacts.
+"""From PyBullet's contact tuples to a table of loaded contacts.
+
+    getContactPoints() -> RAW rows, packed in one pass -> TOUCH rows (`load`)
 
     J = dt · (N n + f1 t1 + f2 t2)      on body A, world frame; -J on body B
 
@@ -6,90 +8,180 @@ with dt the time step set at the moment of the query: that product, and no other
 1e-13). Only the unfiltered getContactPoints() is right: with a body filter that swaps the pair, normal and positions
 are turned round and the friction fields are not (bullet3 issues 2765, 3026). k rows.
 """
+# mypy: disable-error-code="no-untyped-def"
 
 from __future__ import annotations
 
 import struct
 from collections.abc import Iterable
 from dataclasses import dataclass
-from itertools import chain
 from typing import Any
 
 import numpy as np
 
-from sonic_bullet.listener.frames import BEYOND, encode
-from sonic_bullet.listener.kinematics import impulses
+from sonic_bullet.listener.frames import BEYOND, LINK_SPAN
+from sonic_bullet.listener.kinematics import INNER
+from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array
 
 RawContact = tuple[Any, ...]
 FORCE, FRICTION_1, FRICTION_2 = 9, 10, 12
 
+RAW = np.dtype(
+    [
+        ("body_a", "i8"),
+        ("body_b", "i8"),
+        ("link_a", "i8"),
+        ("link_b", "i8"),
+        ("point_a_m", "f8", (3,)),
+        ("point_b_m", "f8", (3,)),
+        ("normal", "f8", (3,)),
+        ("gap_m", "f8"),
+        ("force_n", "f8"),
+        ("friction_1_n", "f8"),
+        ("tangent_1", "f8", (3,)),
+        ("friction_2_n", "f8"),
+        ("tangent_2", "f8", (3,)),
+    ],
+    align=True,
+)
+"""A contact as getContactPoints() tells it, in its order, without its first entry."""
+RAW_ROW = struct.Struct("4q19d")
+
+TOUCH = np.dtype(
+    [
+        ("code_a", "i8"),
+        ("code_b", "i8"),
+        ("point_a_m", "f8", (3,)),
+        ("point_b_m", "f8", (3,)),
+        ("normal", "f8", (3,)),
+        ("gap_m", "f8"),
+        ("impulse_n_s", "f8", (3,)),
+        ("elapsed_s", "f8"),
+    ],
+    align=True,
+)
+"""A loaded contact; see `Touches`."""
+
+NO_RAW, NO_TOUCH = np.zeros(0, RAW), np.zeros(0, TOUCH)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Touches:
-    """Loaded contacts as PyBullet tells them: code_a, code_b (k,) of frames.encode; points, normal (k, 3) world frame;
-    gap_m (k,); impulse_n_s (k, 3) on a; elapsed_s (k,): from the start of the step to the start of the sub-step that
-    loaded it."""
+    """Loaded contacts as PyBullet tells them, row (k,) of TOUCH: code_a, code_b (k,) of frames.encode; points, normal
+    (k, 3) world frame; gap_m (k,); impulse_n_s (k, 3) on a; elapsed_s (k,): from the start of the step to the start of
+    the sub-step that loaded it."""
 
-    code_a: Array
-    code_b: Array
-    point_a_m: Array
-    point_b_m: Array
-    normal: Array
-    gap_m: Array
-    impulse_n_s: Array
-    elapsed_s: Array
+    row: Array
 
     def __len__(self) -> int:
-        return len(self.code_a)
+        return len(self.row)
+
+    @property
+    def code_a(self) -> Array:
+        return self.row["code_a"]
+
+    @property
+    def code_b(self) -> Array:
+        return self.row["code_b"]
 
     @property
     def usable(self) -> Array:
         """(k,) False where a force or place is NaN or `BEYOND` what can be."""
-        numbers = np.concatenate(
-            [self.impulse_n_s, self.point_a_m, self.point_b_m, self.normal, self.gap_m[:, None]], axis=1
-        )
-        return np.asarray((np.abs(numbers) < BEYOND).all(axis=1))
+        number = self.row.view(np.float64).reshape(len(self.row), -1)[:, 2:]
+        return np.asarray((np.abs(number) < BEYOND).all(axis=1))
 
     def kept(self, mask: Array) -> Touches:
         """Only the rows where mask (k,) is True."""
-        return Touches(*(getattr(self, name)[mask] for name in self.__slots__))
+        return Touches(self.row[mask])
 
     def equals(self, other: Touches) -> bool:
         """Whether every number is the same, bit for bit."""
-        return len(self) == len(other) and all(
-            np.array_equal(getattr(self, name), getattr(other, name)) for name in self.__slots__
-        )
+        return self.row.tobytes() == other.row.tobytes()
 
 
-def loaded(contacts: Iterable[RawContact], before: Iterable[RawContact] = ()) -> list[RawContact]:
-    """Those that carry force: Bullet lists neighbours up to 2 cm apart too. NaN counts as force, to be caught.
+def packed(contacts: Iterable[RawContact], count: int) -> Array:
+    """Those of `count` contacts that carry a force, (k,) of RAW: Bullet lists neighbours up to 2 cm apart too. NaN
+    counts as force, to be caught.
+    """
+    buffer, at = bytearray(count * RAW_ROW.size), 0
+    into, size = RAW_ROW.pack_into, RAW_ROW.size
+    # one pass over the tuples, nothing made on the way: half the time of columns (zip) and chains
+    for (
+        _, a, b, m, n, (ax, ay, az), (bx, by, bz), (nx, ny, nz), gap, force, f1, (sx, sy, sz), f2, (tx, ty, tz)
+    ) in contacts:  # fmt: skip
+        if force or f1 or f2:
+            into(
+                buffer, at, a, b, m, n, ax, ay, az, bx, by, bz, nx, ny, nz, gap, force, f1, sx, sy, sz, f2, tx, ty, tz
+            )  # fmt: skip
+            at += size
+    return np.frombuffer(buffer, RAW, at // size) if at else NO_RAW
 
-    before: what was polled after the step before. A contact farther off than its contactProcessingThreshold is not
+
+@njit(**INNER)
+def stale(raw, i, before):
+    """Whether row i, without normal force, keeps the friction that it had in `before`, to the bit."""
+    row, k = raw[i], len(before)
+    for j in range(k):
+        old = before[(i + j) % k]  # Bullet tells them in nearly the same order again
+        if (
+            old.friction_1_n == row.friction_1_n
+            and old.friction_2_n == row.friction_2_n
+            and old.body_a == row.body_a
+            and old.body_b == row.body_b
+            and old.link_a == row.link_a
+            and old.link_b == row.link_b
+        ):
+            return True
+    return False
+
+
+@njit(nogil=True, error_model="numpy")
+def load(raw, before, dt, touch):
+    """Fill touch (k,) of TOUCH from raw (k,) of RAW; how many it are, numbers or not.
+
+    before: RAW rows polled after the step before. A contact farther off than its contactProcessingThreshold is not
     solved and keeps the friction of the step in which it last was, to the bit, beside no normal force: that acts on
     nobody. (Friction without normal force that is new does act: the solver ended between the two, and without it
     momentum does not balance.)
     """
-    rows = [raw for raw in contacts if raw[FORCE] != 0 or raw[FRICTION_1] != 0 or raw[FRICTION_2] != 0]
-    if all(raw[FORCE] != 0 for raw in rows):
-        return rows
-    known = {(raw[1:5], raw[FRICTION_1], raw[FRICTION_2]) for raw in before}
-    return [raw for raw in rows if raw[FORCE] != 0 or (raw[1:5], raw[FRICTION_1], raw[FRICTION_2]) not in known]
+    count = 0
+    for i in range(len(raw)):
+        row = raw[i]
+        if row.force_n == 0 and stale(raw, i, before):
+            continue
+        made = touch[count]
+        made.code_a = row.body_a * LINK_SPAN + row.link_a + 1
+        made.code_b = row.body_b * LINK_SPAN + row.link_b + 1
+        made.gap_m, made.elapsed_s = row.gap_m, 0.0
+        for x in range(3):
+            made.point_a_m[x], made.point_b_m[x], made.normal[x] = row.point_a_m[x], row.point_b_m[x], row.normal[x]
+            made.impulse_n_s[x] = dt * (
+                row.force_n * row.normal[x] + row.friction_1_n * row.tangent_1[x] + row.friction_2_n * row.tangent_2[x]
+            )
+        count += 1
+    return count
 
 
-def gather(contacts: list[RawContact], dt_s: float) -> Touches:
-    """Arrays of loaded contacts, numbers or not (`Touches.usable`)."""
-    k = len(contacts)
-    if k == 0:
-        none, none3 = np.zeros(0), np.zeros((0, 3))
-        return Touches(np.zeros(0, np.int64), np.zeros(0, np.int64), none3, none3, none3, none, none3, none)
-    _, body_a, body_b, link_a, link_b, point_a, point_b, normal, gap, force, f1, t1, f2, t2 = zip(
-        *contacts, strict=True
-    )
-    # a third faster than np.fromiter
-    packed = struct.pack(f"{15 * k}d", *chain.from_iterable(point_a + point_b + normal + t1 + t2))
-    place_a, place_b, n, tangent_1, tangent_2 = np.frombuffer(packed).reshape(5, k, 3)
-    scalar = np.frombuffer(struct.pack(f"{4 * k}d", *gap, *force, *f1, *f2)).reshape(4, k)
-    ids = np.frombuffer(struct.pack(f"{4 * k}q", *body_a, *body_b, *link_a, *link_b), np.int64).reshape(4, k)
-    impulse = impulses(dt_s, n, tangent_1, tangent_2, scalar[1:])
-    return Touches(encode(ids[0], ids[2]), encode(ids[1], ids[3]), place_a, place_b, n, scalar[0], impulse, np.zeros(k))
+@njit(**INNER)
+def all_usable(touch, count):
+    """Whether no number of the first `count` touches is NaN or `BEYOND` what can be."""
+    for i in range(count):
+        row = touch[i]
+        if not abs(row.gap_m) < BEYOND:
+            return False
+        for x in range(3):
+            if not (
+                abs(row.point_a_m[x]) < BEYOND
+                and abs(row.point_b_m[x]) < BEYOND
+                and abs(row.normal[x]) < BEYOND
+                and abs(row.impulse_n_s[x]) < BEYOND
+            ):
+                return False
+    return True
+
+
+def loaded(raw: Array, before: Array, dt_s: float) -> Touches:
+    """Touches of RAW rows (k,), numbers or not (`Touches.usable`); before: as `load`'s."""
+    touch = np.empty(len(raw), TOUCH)
+    return Touches(touch[: load(raw, before, dt_s, touch)])

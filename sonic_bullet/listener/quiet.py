@@ -1,8 +1,13 @@
-"""PyBullet prints to the process's own stdout ("argv[0]=", "?"); these bytes would spoil JSON and pipes."""
+"""What PyBullet disturbs, kept quiet.
+
+It prints to the process's own stdout ("argv[0]=", "?"); these bytes would spoil JSON and pipes. It answers with
+thousands of tuples a step; the garbage collector would walk through them, and through all else, in vain.
+"""
 
 from __future__ import annotations
 
 import ctypes
+import gc
 import os
 import sys
 from collections.abc import Iterator
@@ -29,3 +34,17 @@ def quiet_stdout() -> Iterator[None]:
         os.dup2(kept, 1)
         os.close(kept)
         os.close(nowhere)
+
+
+class collector_waiting:
+    """Let the garbage collector wait within the block; afterwards it is as it was found."""
+
+    __slots__ = ("_was_on",)
+
+    def __enter__(self) -> None:
+        self._was_on = gc.isenabled()
+        gc.disable()
+
+    def __exit__(self, *_: object) -> None:
+        if self._was_on:
+            gc.enable()

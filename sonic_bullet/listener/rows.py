@@ -1,108 +1,215 @@
-"""Rows of one step: which touches count, and what the sound needs to know of each. k touches, n rows of a motion."""
+"""Rows of one step: which touches count, and what the sound needs to know of each.
+
+    TOUCH (k,) + START (n,) -> CONTACT rows, traces for the next step, poses of the bodies of the log
+
+Compiled; `take_step` is a whole step of a world in which nothing unusual happened, in one call.
+"""
+# mypy: disable-error-code="no-untyped-def"
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from sonic_bullet.listener.frames import Motion, rows_of
-from sonic_bullet.listener.kinematics import relative_motion
-from sonic_bullet.listener.polling import Touches
-from sonic_bullet.listener.start import Start
-from sonic_bullet.listener.sweep import Trace, place_and_match, remembered
-from sonic_bullet.records import Array
-from sonic_bullet.records.contacts import Contacts
-from sonic_bullet.records.errors import SceneError
+from sonic_bullet.listener.kinematics import INNER, relative_motion
+from sonic_bullet.listener.polling import all_usable, load
+from sonic_bullet.listener.start import LEFT_OUT, begin
+from sonic_bullet.listener.sweep import sort_pairs, sweep
+from sonic_bullet.machine.compiled import njit
+from sonic_bullet.records.arrays import LARGEST
 
 SPAWN_DEPTH_M = 1e-4
 
+UNKNOWN, STRANGERS, ABSURD, UNUSUAL = -1, -2, -3, -4
+"""Instead of a number of rows: a touch of a link that is not in the roster; links that meet somebody for the first time
+(START.met); a number beyond `LARGEST`; what Python has to look at (`take_step`)."""
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Meetings:
-    """Touches that count, with rows row_a, row_b (k,) of the motion and slip (k, 3), approach (k,) in m/s before the
-    step.
+
+@njit(**INNER)
+def find(start, code):
+    """Row of a code in START (n,), or -1."""
+    low, high = 0, len(start)
+    while low < high:
+        middle = (low + high) // 2
+        if start[middle].code < code:
+            low = middle + 1
+        else:
+            high = middle
+    return low if low < len(start) and start[low].code == code else -1
+
+
+@njit(**INNER)
+def still(body):
+    """Whether every speed is exactly 0."""
+    v, w = body.velocity_m_s, body.spin_rad_s
+    return v[0] == 0 and v[1] == 0 and v[2] == 0 and w[0] == 0 and w[1] == 0 and w[2] == 0
+
+
+@njit(**INNER)
+def seen(touch, i, past):
+    """Whether touch i is one of `past`, to the bit."""
+    row, k = touch[i], len(past)
+    p, j = row.point_a_m, row.impulse_n_s
+    for n in range(k):
+        old = past[(i + n) % k]
+        q, h = old.point_a_m, old.impulse_n_s
+        if (
+            q[0] == p[0]
+            and q[1] == p[1]
+            and q[2] == p[2]
+            and h[0] == j[0]
+            and h[1] == j[1]
+            and h[2] == j[2]
+            and old.code_a == row.code_a
+            and old.code_b == row.code_b
+        ):
+            return True
+    return False
+
+
+@njit(**INNER)
+def counts(touch, i, past, a, b, approach, dt):
+    """Whether a touch of the links a, b (START rows) counts: none asleep, moved by hand, or of a body in its first step
+    and deeper inside its partner than its speed explains.
+
+    past: the touches of the step before.
     """
-
-    touches: Touches
-    row_a: Array
-    row_b: Array
-    slip_m_s: Array
-    approach_m_s: Array
-
-    def kept(self, mask: Array) -> Meetings:
-        """Only the touches where mask (k,) is True."""
-        return Meetings(
-            self.touches.kept(mask), self.row_a[mask], self.row_b[mask], self.slip_m_s[mask], self.approach_m_s[mask]
-        )
+    if a.moved or b.moved:
+        return False
+    if still(a) and still(b) and seen(touch, i, past):
+        return False
+    inside = touch[i].gap_m < -(SPAWN_DEPTH_M + max(approach, 0.0) * dt)
+    return not (inside and (a.born or b.born))
 
 
-def meetings(touches: Touches, past: Touches | None, start: Start, dt_s: float) -> Meetings:
-    """Touches without those asleep, moved by hand, or of a body in its first step and deeper inside its partner than
-    its speed explains.
+@njit(**INNER)
+def fill(row, touch, fresh, slip, approach):
+    """A CONTACT row of a touch, but for who meets and the sweep; whether its numbers are numbers within `LARGEST`."""
+    row.approach_m_s = approach
+    row.gap_m = touch.gap_m + max(approach, 0.0) * touch.elapsed_s
+    fine = abs(approach) <= LARGEST and abs(row.gap_m) <= LARGEST  # False for NaN too
+    fine = fine and abs(row.sweep_m_s[0]) <= LARGEST and abs(row.sweep_m_s[1]) <= LARGEST
+    for x in range(3):
+        row.point_a_m[x], row.point_b_m[x] = fresh.point_a_m[x], fresh.point_b_m[x]
+        row.normal[x], row.impulse_n_s[x], row.slip_m_s[x] = touch.normal[x], touch.impulse_n_s[x], slip[x]
+        fine = fine and abs(fresh.point_a_m[x]) <= LARGEST and abs(fresh.point_b_m[x]) <= LARGEST
+        fine = fine and abs(slip[x]) <= LARGEST
+    return fine
 
-    past: the touches of the step before. Raises SceneError for a touch of a body that the motion does not hold.
+
+@njit(nogil=True, error_model="numpy")
+def contact_rows(touch, count, past, start, dt, time, table, counted, newest, scratch, row):
+    """Fill row (k,) of CONTACT and the newest trace; how many rows it are, or UNKNOWN, STRANGERS or ABSURD.
+
+    touch: `count` of TOUCH; past: those of the step before. start (n,) of START. dt, time: the step's length and start
+    in s. table, counted, newest, scratch: `Traces`
+    with room for `count`.
     """
-    motion = start.motion
-    row_a, row_b = rows_of(motion.roster, touches.code_a), rows_of(motion.roster, touches.code_b)
-    if len(touches) and min(row_a.min(), row_b.min()) < 0:
-        raise SceneError(
-            "a contact names a body that is not in the world", "step the simulation once before listening on"
-        )
-    slip, approach = relative_motion(touches.point_a_m, touches.point_b_m, touches.normal, motion.table, row_a, row_b)
-    drop = _asleep(touches, past, motion, row_a, row_b)
-    if start.moved.any():
-        drop |= start.moved[row_a] | start.moved[row_b]
-    if start.born.any():
-        inside = touches.gap_m < -(SPAWN_DEPTH_M + np.maximum(approach, 0) * dt_s)
-        drop |= (start.born[row_a] | start.born[row_b]) & inside
-    meeting = Meetings(touches, row_a, row_b, slip, approach)
-    return meeting.kept(~drop) if drop.any() else meeting
+    made, strangers, fine, work = np.int64(0), False, True, scratch[0]  # a literal 0 would compile sort_pairs twice
+    for i in range(count):
+        one = touch[i]
+        at_a, at_b = find(start, one.code_a), find(start, one.code_b)
+        if at_a < 0 or at_b < 0:
+            return UNKNOWN
+        a, b = start[at_a], start[at_b]
+        approach = relative_motion(one, a, b, work.slip)
+        if not counts(touch, i, past, a, b, approach, dt):
+            continue
+        if a.index < 0 or b.index < 0:
+            if min(a.index, b.index) > LEFT_OUT:
+                a.met, b.met, strangers = a.index < 0, b.index < 0, True
+            continue
+        fresh, out = table[newest, made], row[made]
+        fresh.time_s = time + one.elapsed_s
+        out.a, out.b = a.index, b.index
+        sweep(one, a, b, a.index << 32 | b.index, table, counted, newest, work, fresh, out.sweep_m_s)
+        fine = fill(out, one, fresh, work.slip, approach) and fine
+        made += 1
+    if strangers:
+        return STRANGERS
+    if not fine:
+        return ABSURD
+    sort_pairs(row, made, table[newest])
+    counted[newest] = made
+    return made
 
 
-def _asleep(touches: Touches, past: Touches | None, motion: Motion, row_a: Array, row_b: Array) -> Array:
-    """(k,) True where both bodies stand exactly still and the contact is one of the step before, bit for bit."""
-    result = np.zeros(len(touches), bool)
-    still = np.asarray(~(motion.velocity_m_s.any(axis=1) | motion.spin_rad_s.any(axis=1)))
-    if past is None or np.count_nonzero(still) < 2:
-        return result
-    quiet = np.flatnonzero(still[row_a] & still[row_b])
-    if len(quiet):
-        before = set(_fingerprints(past, np.arange(len(past))))
-        result[quiet] = np.array([mark in before for mark in _fingerprints(touches, quiet)])
-    return result
+@njit(nogil=True, error_model="numpy")
+def place_bodies(start, pose, position, quaternion, teleported):
+    """Poses of the bodies of the log: position (b, 3), quaternion (b, 4), and who was moved by hand (b,), from START
+    (n,).
+
+    pose (b, 7): the last of each, which stay for who is gone; written anew.
+    """
+    for i in range(len(teleported)):
+        teleported[i] = False
+    for i in range(len(start)):
+        body = start[i]
+        if body.index >= 0:
+            for x in range(3):
+                pose[body.index, x] = body.position_m[x]
+            for x in range(4):
+                pose[body.index, 3 + x] = body.quaternion_xyzw[x]
+            teleported[body.index] = body.moved != 0
+    for i in range(len(pose)):
+        for x in range(3):
+            position[i, x] = pose[i, x]
+        for x in range(4):
+            quaternion[i, x] = pose[i, 3 + x]
 
 
-def _fingerprints(touches: Touches, rows: Array) -> list[bytes]:
-    columns = np.concatenate(
-        [touches.point_a_m[rows], touches.impulse_n_s[rows], touches.code_a[rows, None], touches.code_b[rows, None]],
-        axis=1,
-    )
-    return [row.tobytes() for row in columns]
+@njit(**INNER)
+def unmoved(earlier, later):
+    """Whether every number of two MOTION tables is the same."""
+    for i in range(len(later)):
+        a, b = earlier[i], later[i]
+        for x in range(3):
+            if a.position_m[x] != b.position_m[x] or a.velocity_m_s[x] != b.velocity_m_s[x]:
+                return False
+            if a.spin_rad_s[x] != b.spin_rad_s[x]:
+                return False
+        for x in range(4):
+            if a.quaternion_xyzw[x] != b.quaternion_xyzw[x]:
+                return False
+    return True
 
 
-def contact_rows(
-    meeting: Meetings, a: Array, b: Array, motion: Motion, time_s: float, traces: tuple[Trace, ...]
-) -> tuple[Contacts, tuple[Trace, ...]]:
-    """Contacts of the bodies a, b (k,) (indices), and the traces that the next step will look for them in."""
-    touches, slip = meeting.touches, meeting.slip_m_s
-    pair = a.astype(np.int64) << 32 | b
-    rows, speed = place_and_match(
-        traces,
-        pair,
-        time_s + touches.elapsed_s,
-        touches.elapsed_s,
-        touches.point_a_m,
-        touches.point_b_m,
-        touches.normal,
-        slip,
-        motion.table,
-        motion.roster.static,
-        meeting.row_a,
-        meeting.row_b,
-    )
-    gap = touches.gap_m + np.maximum(meeting.approach_m_s, 0) * touches.elapsed_s
-    contacts = Contacts(
-        a, b, rows[:, 1:4], rows[:, 4:7], touches.normal, touches.impulse_n_s, slip, speed, meeting.approach_m_s, gap
-    )
-    return contacts, remembered(traces, pair, rows)
+@njit(nogil=True, error_model="numpy")
+def take_step(
+    raw,
+    before,
+    touch,
+    past,
+    earlier,
+    later,
+    by_hand,
+    hooked,
+    start,
+    dt,
+    time,
+    table,
+    counted,
+    newest,
+    scratch,
+    row,
+    pose,
+    position,
+    quaternion,
+    teleported,
+):
+    """A step of a world of the same roster as the step before: how many touches, and how many rows or why none.
+
+    raw, before (k,) of RAW: polled after this step and the last. touch (k,) of TOUCH, start (n,) of START, row (k,) of
+    CONTACT, position, quaternion, teleported: filled. The rest: see `begin`, `contact_rows`, `place_bodies`. UNUSUAL:
+    a number that is none, or, unhooked, who was moved by hand or a step that changed nothing; UNKNOWN, STRANGERS,
+    ABSURD: see there. Nothing that lives on is changed then.
+    """
+    count = load(raw, before, dt, touch)
+    if not all_usable(touch, count) or (not hooked and unmoved(earlier, later)):
+        return count, UNUSUAL
+    moved = begin(earlier, later, dt, by_hand, hooked, start)
+    if moved and not hooked:
+        return count, UNUSUAL
+    made = contact_rows(touch, count, past, start, dt, time, table, counted, newest, scratch, row)
+    if made >= 0:
+        place_bodies(start, pose, position, quaternion, teleported)
+    return count, made

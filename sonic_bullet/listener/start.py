@@ -1,19 +1,48 @@
 """Poses and twists at the start of a step, and who was moved by hand or is new.
 
+    MOTION rows before and after -> `begin` -> START rows
+
 Hooked, they were read before the step. Otherwise those left by the step before hold, but not for bodies that are new or
-were moved since: there the simulator's own step is taken back (`Undo`).
+were moved since: there the simulator's own step is taken back (`Undo`). A semi-implicit integrator has
+x(n+1) = x(n) + v(n+1)·dt, so a pose that jumps farther than its speeds allow was moved by hand. What has mass 0 may be
+driven by resetting its pose each step: up to DRIVEN_SPEED_M_S that is motion, and it carries the velocity of that move;
+beyond it, it is a jump.
 """
+# mypy: disable-error-code="no-untyped-def"
 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
-from dataclasses import dataclass
 
 import numpy as np
 
-from sonic_bullet.listener.frames import LINK_SPAN, Motion, Roster, jumped, rows_of, with_driven_twists
+from sonic_bullet.listener.frames import LINK_SPAN, MOTION, Motion, Roster, rows_of
+from sonic_bullet.listener.kinematics import INNER, rotation_between
 from sonic_bullet.listener.polling import Touches
+from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array
+
+JUMP_FLOOR_M = 1e-3
+DRIVEN_SPEED_M_S = 10.0
+
+START = np.dtype(
+    [
+        *((name, MOTION[name]) for name in MOTION.names or ()),
+        ("code", "i8"),  # frames.encode
+        ("static", "i8"),  # 1 where its mass is 0
+        ("index", "i8"),  # into the bodies of the log; -1 where it has met nobody yet, LEFT_OUT
+        ("moved", "i8"),  # 1 where it was set elsewhere by hand since the step before
+        ("born", "i8"),  # 1 in its first step
+        ("met", "i8"),  # 1 where it meets somebody for the first time
+    ],
+    align=True,
+)
+"""A link at the start of a step; rows as a roster's, ascending in code."""
+
+LEFT_OUT = -2
+"""Index of a link whose contacts are dropped."""
+
+NOBODY = np.zeros(0, np.int64)
 
 Undo = Callable[[Motion, Array, Touches, float], Motion]
 """(motion after the step, rows (n,) to take back, the step's contacts, its length) -> the motion one step earlier,
@@ -21,59 +50,133 @@ right in those rows.
 """
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Start:
-    """motion: at the start of the step.
+def start_table(roster: Roster) -> Array:
+    """START rows (n,) of a roster, of which code and static are filled and nobody is known."""
+    table = np.zeros(len(roster.code), START)
+    table["code"], table["static"], table["index"] = roster.code, roster.static, -1
+    return table
 
-    moved (n,): set elsewhere by hand since the step before. born (n,): in its first step.
+
+@njit(**INNER)
+def jump(earlier, later, static, dt):
+    """Whether a link is farther from where it was than 1.5 × both speeds (static: DRIVEN_SPEED_M_S) explain."""
+    moved, v, w = 0.0, 0.0, 0.0
+    for x in range(3):
+        moved += (later.position_m[x] - earlier.position_m[x]) ** 2
+        v += later.velocity_m_s[x] ** 2
+        w += earlier.velocity_m_s[x] ** 2
+    reach = DRIVEN_SPEED_M_S if static else 1.5 * (np.sqrt(v) + np.sqrt(w))
+    return np.sqrt(moved) > reach * dt + JUMP_FLOOR_M
+
+
+@njit(**INNER)
+def drive(earlier, later, dt, body):
+    """Give a link of mass 0 whose pose was reset since `earlier` the velocity of that move."""
+    p, q, x, y = earlier.position_m, earlier.quaternion_xyzw, later.position_m, later.quaternion_xyzw
+    if (
+        p[0] == x[0]
+        and p[1] == x[1]
+        and p[2] == x[2]
+        and q[0] == y[0]
+        and q[1] == y[1]
+        and q[2] == y[2]
+        and q[3] == y[3]
+    ):
+        return
+    rotation_between(q, y, body.spin_rad_s)
+    for i in range(3):
+        body.velocity_m_s[i] = (x[i] - p[i]) / dt
+        body.spin_rad_s[i] /= dt
+
+
+@njit(nogil=True, error_model="numpy")
+def begin(earlier, later, dt, by_hand, hooked, start):
+    """Fill start (n,) of START for a step of length dt; how many of them were moved.
+
+    earlier, later (n,) of MOTION: hooked, read before the step before and before this one; else after those. by_hand
+    (h,): ids of bodies known to be moved. Nobody is new: the roster is the same.
     """
+    count = 0
+    for i in range(len(start)):
+        body, now = start[i], later[i]
+        static = body.static != 0
+        moved = jump(earlier[i], now, static, dt)
+        if not static:
+            for j in range(len(by_hand)):
+                moved = moved or by_hand[j] == body.code // LINK_SPAN
+        at = now if hooked or static else earlier[i]
+        for x in range(3):
+            body.position_m[x], body.velocity_m_s[x] = at.position_m[x], at.velocity_m_s[x]
+            body.spin_rad_s[x] = at.spin_rad_s[x]
+        for x in range(4):
+            body.quaternion_xyzw[x] = at.quaternion_xyzw[x]
+        if static:
+            drive(earlier[i], now, dt, body)
+        body.moved, body.born, body.met = moved, 0, 0
+        count += moved
+    return count
 
-    motion: Motion
-    moved: Array
-    born: Array
 
-
-def hooked_start(past: Motion | None, now: Motion, by_hand: Collection[int], dt_s: float) -> Start:
-    """From the motion read before this step and the one read before the last (None: no step yet); by_hand: bodies
-    known to be moved.
+def hooked_start(past: Motion | None, now: Motion, by_hand: Collection[int], dt_s: float) -> Array:
+    """START rows (n,) from the motion read before this step and the one read before the last (None: no step yet);
+    by_hand: bodies known to be moved.
     """
+    start = start_table(now.roster)
     if past is None:
-        return Start(now, np.zeros(len(now.roster.code), bool), np.ones(len(now.roster.code), bool))
-    born = (
-        np.zeros(len(now.roster.code), bool) if past.roster is now.roster else rows_of(past.roster, now.roster.code) < 0
-    )
-    moved = jumped(past, now, dt_s)
-    if by_hand:
-        moved |= np.isin(now.roster.code // LINK_SPAN, list(by_hand)) & ~born & ~now.roster.static
-    return Start(with_driven_twists(past, now, dt_s), moved, born)
+        set_motion(start, now.row, slice(None))
+        start["born"] = 1
+        return start
+    old = rows_of(past.roster, now.roster.code)
+    begin(_earlier(past, now, old), now.row, dt_s, np.array(sorted(by_hand), np.int64), True, start)
+    if past.roster is not now.roster:  # whose id it was is not known
+        set_motion(start, now.row, now.roster.static)
+    start["born"] = old < 0
+    start["moved"][old < 0] = 0
+    return start
 
 
-def polled_start(past: Motion, now: Motion, touches: Touches, dt_s: float, *, undo: Undo, first: bool) -> Start:
-    """From the motions read after the last step and after this one.
+def polled_start(past: Motion, now: Motion, touches: Touches, dt_s: float, *, undo: Undo, first: bool) -> Array:
+    """START rows (n,) from the motions read after the last step and after this one.
 
     What stands still by mass 0 stands where it stands now.
 
     undo: takes a step back where nothing was read before it.
     """
-    roster = now.roster
-    old = rows_of(past.roster, roster.code)
-    born, moved = old < 0, jumped(past, now, dt_s)
-    driven = with_driven_twists(past, now, dt_s)
-    start = past if past.roster is roster else taken(past, roster, np.maximum(old, 0)) if len(past.roster.code) else now
-    start = chosen(roster.static, driven, start)
-    lost = born | moved
+    start, old = start_table(now.roster), rows_of(past.roster, now.roster.code)
+    begin(_earlier(past, now, old), now.row, dt_s, NOBODY, False, start)
+    if past.roster is not now.roster:
+        set_motion(start, now.row, now.roster.static)
+    start["moved"][old < 0] = 0
+    lost = (old < 0) | (start["moved"] != 0)
     if lost.any():
-        start = chosen(lost & ~roster.static, undo(now, lost, touches, dt_s), chosen(lost, now, start))
+        set_motion(start, now.row, lost & now.roster.static)
+        set_motion(start, undo(now, lost, touches, dt_s).row, lost & ~now.roster.static)
+    start["born"] = old < 0
     if first:
-        born, moved = np.ones_like(born), np.zeros_like(moved)
-    return Start(start, moved, born)
+        start["born"], start["moved"] = 1, 0
+    return start
+
+
+def set_motion(start: Array, row: Array, mask: Array | slice) -> None:
+    """Poses and twists of START rows where mask (n,) is True: those of row (n,) of MOTION."""
+    for name in MOTION.names or ():
+        start[name][mask] = row[name][mask]
+
+
+def jumped(past: Motion, now: Motion, dt_s: float) -> Array:
+    """(n,) of `now`: moved farther in one step than both speeds together explain, so by hand; never who is new."""
+    start, old = start_table(now.roster), rows_of(past.roster, now.roster.code)
+    begin(_earlier(past, now, old), now.row, dt_s, NOBODY, True, start)
+    return np.asarray((start["moved"] != 0) & (old >= 0))
+
+
+def _earlier(past: Motion, now: Motion, old: Array) -> Array:
+    """MOTION rows (n,) of `past` in the order of `now`; who was not there stands where it stands now."""
+    row, known = now.row.copy(), old >= 0
+    row[known] = past.row[old[known]]
+    return row
 
 
 def taken(motion: Motion, roster: Roster, rows: Array) -> Motion:
     """The rows (n,) of a motion as a motion of that roster."""
-    return Motion(roster, *(column[rows] for column in motion.table))
-
-
-def chosen(mask: Array, yes: Motion, no: Motion) -> Motion:
-    """Rows of `yes` where mask (n,), else of `no`."""
-    return Motion(yes.roster, *(np.where(mask[:, None], a, b) for a, b in zip(yes.table, no.table, strict=True)))
+    return Motion(roster, motion.row[rows])

@@ -10,12 +10,13 @@ contact is recognised as the nearest earlier one of its pair among the last MEMO
 travels no faster than |ω_rel|·R: a match is refused if it moves faster than that over both surfaces at once. Without a
 match the pair keeps its last velocity; a new pair's contact stays on the smaller body.
 """
+# mypy: disable-error-code="no-untyped-def"
 
 from __future__ import annotations
 
 import numpy as np
 
-from sonic_bullet.listener.kinematics import Table, pose_after, turn
+from sonic_bullet.listener.kinematics import INNER, pose_after, turn
 from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array
 
@@ -23,143 +24,184 @@ MEMORY_STEPS = 5
 ROLL_MARGIN = 2.0
 SLIP_MARGIN = 0.05
 
-Trace = tuple[Array, Array]
-"""Contacts of one step, ordered by pair: pair (k,) int64; (k, 10) of time_s, point_a_m (3), point_b_m (3), u_a (3) in
-the world's axes.
-"""
+TRACE = np.dtype(
+    [
+        ("time_s", "f8"),
+        ("point_a_m", "f8", (3,)),
+        ("point_b_m", "f8", (3,)),
+        ("u_a_m_s", "f8", (3,)),  # in the world's axes
+        ("pair", "i8"),  # the j-th entry: pair and row of the j-th contact in the order of pairs
+        ("order", "i8"),
+    ],
+    align=True,
+)
+"""A contact of one step, and its place in the order of pairs."""
 
-NO_TRACE: Trace = (np.zeros(0, np.int64), np.zeros((0, 10)))
-NO_TRACES = (NO_TRACE,) * MEMORY_STEPS
+SCRATCH = np.dtype([("x", "f8", (2, 3)), ("q", "f8", (2, 4)), ("slip", "f8", (3,))], align=True)
+"""What a contact's place is worked out on: poses of both bodies at its sub-step, and its slip."""
 
 
-@njit(fastmath=False, nogil=True, inline="always")
-def surface_velocity(
-    rows: Array, i: int, old: Array, j: int, first: int, quaternion: Array, normal: Array
-) -> tuple[float, float, float]:
-    """Velocity of a contact over a surface, world axes: from row j of `old` to row i of `rows`, point in columns first
-    … first + 2.
+class Traces:
+    """What is remembered of the last MEMORY_STEPS steps: a ring of tables, one more than are looked at.
+
+    table (MEMORY_STEPS + 1, capacity) of TRACE; count: contacts of each; newest: where the coming step's go; work (1,)
+    of SCRATCH.
+    """
+
+    def __init__(self) -> None:
+        self.table: Array = np.zeros((MEMORY_STEPS + 1, 0), TRACE)
+        self.count = np.zeros(MEMORY_STEPS + 1, np.int64)
+        self.newest = 0
+        self.work = np.zeros(1, SCRATCH)
+
+    def clear(self) -> None:
+        """Know of no contact."""
+        self.count[:] = 0
+
+    def reserve(self, rows: int) -> None:
+        """Let a step have that many contacts."""
+        if rows > self.table.shape[1]:
+            grown = np.zeros((len(self.table), 2 * rows), TRACE)
+            grown[:, : self.table.shape[1]] = self.table
+            self.table = grown
+
+    def turn(self) -> None:
+        """The coming step's are known; the oldest are forgotten."""
+        self.newest = (self.newest - 1) % len(self.count)
+
+
+@njit(**INNER)
+def surface_velocity(dx, dy, dz, age, q, normal):
+    """Velocity of a contact over a surface, world axes, that went by (dx, dy, dz) in the frame of a body turned by q.
 
     Laid into the tangent plane at full length: the chord of a rolling step leaves the plane by half the angle rolled;
     its length, not its projection, is the path.
     """
-    q = quaternion
-    dx, dy, dz = turn(
-        q[0],
-        q[1],
-        q[2],
-        q[3],
-        rows[i, first] - old[j, first],
-        rows[i, first + 1] - old[j, first + 1],
-        rows[i, first + 2] - old[j, first + 2],
-    )
+    dx, dy, dz = turn(q[0], q[1], q[2], q[3], dx, dy, dz)
     length2 = dx * dx + dy * dy + dz * dz
-    along = dx * normal[i, 0] + dy * normal[i, 1] + dz * normal[i, 2]
-    dx, dy, dz = dx - along * normal[i, 0], dy - along * normal[i, 1], dz - along * normal[i, 2]
+    along = dx * normal[0] + dy * normal[1] + dz * normal[2]
+    dx, dy, dz = dx - along * normal[0], dy - along * normal[1], dz - along * normal[2]
     flat2 = dx * dx + dy * dy + dz * dz
-    age = rows[i, 0] - old[j, 0]
     scale = np.sqrt(length2 / flat2) / age if flat2 > 0.25 * length2 else 1.0 / age
     return dx * scale, dy * scale, dz * scale
 
 
-@njit(fastmath=False, nogil=True, inline="always")
-def slower(x: float, y: float, z: float, slip: Array, i: int) -> float:
+@njit(**INNER)
+def slower(x, y, z, slip):
     """The smaller of |u_a| and |u_b|, u_a = (x, y, z)."""
     a = x * x + y * y + z * z
-    b = (x + slip[i, 0]) ** 2 + (y + slip[i, 1]) ** 2 + (z + slip[i, 2]) ** 2
-    return float(np.sqrt(min(a, b)))
+    b = (x + slip[0]) ** 2 + (y + slip[1]) ** 2 + (z + slip[2]) ** 2
+    return np.sqrt(min(a, b))
 
 
-@njit(fastmath=False, nogil=True)
-def recognise(
-    rows: Array,
-    i: int,
-    pair: int,
-    traces: tuple[Trace, ...],
-    quat_a: Array,
-    quat_b: Array,
-    normal: Array,
-    slip: Array,
-    limit: float,
-) -> bool:
-    """Fill u_a (columns 7-9) of row i, whose time and points stand already; False where nothing of the pair is known
-    that fits.
+@njit(**INNER)
+def first_of(table, count, pair):
+    """The first of `count` entries, in the order of pairs, that is not before `pair`."""
+    low, high = 0, count
+    while low < high:
+        middle = (low + high) // 2
+        if table[middle].pair < pair:
+            low = middle + 1
+        else:
+            high = middle
+    return low
 
-    limit: how slow the slower sweep must be, m/s.
+
+@njit(**INNER)
+def recognise(fresh, pair, table, count, newest, work, normal, limit):
+    """Fill u_a of a TRACE row, whose time and points stand already; False where nothing of the pair is known that fits.
+
+    table, count, newest: `Traces`. limit: how slow the slower sweep must be, m/s.
     """
     best, held = np.inf, False
-    for old_pair, old in traces:
-        for j in range(np.searchsorted(old_pair, pair), len(old_pair)):
-            if old_pair[j] != pair:
+    slip, u = work.slip, fresh.u_a_m_s
+    for step in range(1, MEMORY_STEPS + 1):
+        trace, known = table[(newest + step) % (MEMORY_STEPS + 1)], count[(newest + step) % (MEMORY_STEPS + 1)]
+        for j in range(first_of(trace, known, pair), known):
+            if trace[j].pair != pair:
                 break
+            old = trace[trace[j].order]
             if not held:
-                rows[i, 7], rows[i, 8], rows[i, 9] = old[j, 7], old[j, 8], old[j, 9]
+                for x in range(3):
+                    u[x] = old.u_a_m_s[x]
                 held = True
-            if rows[i, 0] <= old[j, 0]:
+            age = fresh.time_s - old.time_s
+            if fresh.time_s <= old.time_s:
                 continue
-            ax, ay, az = surface_velocity(rows, i, old, j, 1, quat_a, normal)
-            bx, by, bz = surface_velocity(rows, i, old, j, 4, quat_b, normal)
-            ux, uy, uz = 0.5 * (ax + bx - slip[i, 0]), 0.5 * (ay + by - slip[i, 1]), 0.5 * (az + bz - slip[i, 2])
-            speed = slower(ux, uy, uz, slip, i)
+            p, q, r, s = fresh.point_a_m, old.point_a_m, fresh.point_b_m, old.point_b_m
+            ax, ay, az = surface_velocity(p[0] - q[0], p[1] - q[1], p[2] - q[2], age, work.q[0], normal)
+            bx, by, bz = surface_velocity(r[0] - s[0], r[1] - s[1], r[2] - s[2], age, work.q[1], normal)
+            ux, uy, uz = 0.5 * (ax + bx - slip[0]), 0.5 * (ay + by - slip[1]), 0.5 * (az + bz - slip[2])
+            speed = slower(ux, uy, uz, slip)
             if speed <= limit and speed < best:
                 best = speed
-                rows[i, 7], rows[i, 8], rows[i, 9] = ux, uy, uz
+                u[0], u[1], u[2] = ux, uy, uz
         if best < np.inf:
             return True
-    return held and slower(rows[i, 7], rows[i, 8], rows[i, 9], slip, i) <= limit
+    return held and slower(u[0], u[1], u[2], slip) <= limit
 
 
-@njit(fastmath=False, nogil=True)
-def place_and_match(
-    traces: tuple[Trace, ...],
-    pair: Array,
-    time: Array,
-    elapsed: Array,
-    point_a: Array,
-    point_b: Array,
-    normal: Array,
-    slip: Array,
-    table: Table,
-    static: Array,
-    row_a: Array,
-    row_b: Array,
-) -> tuple[Array, Array]:
-    """New trace rows (k, 10) in the order given, and sweep speeds (k, 2) in m/s.
+@njit(**INNER)
+def place(touch, a, b, work, fresh):
+    """Fill the points of a TRACE row: a touch in the frames of both bodies, by their poses when it was loaded.
 
-    pair, time, elapsed (k,): elapsed since the start of the step, at which `table` and the rows row_a, row_b (k,) of it
-    hold. point_a, point_b, normal, slip (k, 3): world frame. static (n,): bodies that cannot move, whose far-off
-    centres say nothing of size.
+    Returns how far they are from both centres, m; both poses go to `work`.
     """
-    rows, speed = np.empty((len(pair), 10)), np.empty((len(pair), 2))
-    xa, xb, qa, qb, spin = np.empty(3), np.empty(3), np.empty(4), np.empty(4), table[3]
-    for i in range(len(pair)):
-        a, b = row_a[i], row_b[i]
-        pose_after(table, a, elapsed[i], xa, qa)
-        pose_after(table, b, elapsed[i], xb, qb)
-        rows[i, 0] = time[i]
-        rows[i, 1], rows[i, 2], rows[i, 3] = turn(
-            -qa[0], -qa[1], -qa[2], qa[3], point_a[i, 0] - xa[0], point_a[i, 1] - xa[1], point_a[i, 2] - xa[2]
-        )
-        rows[i, 4], rows[i, 5], rows[i, 6] = turn(
-            -qb[0], -qb[1], -qb[2], qb[3], point_b[i, 0] - xb[0], point_b[i, 1] - xb[1], point_b[i, 2] - xb[2]
-        )
-        far_a = np.sqrt(rows[i, 1] ** 2 + rows[i, 2] ** 2 + rows[i, 3] ** 2)
-        far_b = np.sqrt(rows[i, 4] ** 2 + rows[i, 5] ** 2 + rows[i, 6] ** 2)
-        rolled = np.sqrt(
-            (spin[a, 0] - spin[b, 0]) ** 2 + (spin[a, 1] - spin[b, 1]) ** 2 + (spin[a, 2] - spin[b, 2]) ** 2
-        )
-        sx, sy, sz = slip[i, 0], slip[i, 1], slip[i, 2]
-        reach = max(0.0 if static[a] else far_a, 0.0 if static[b] else far_b)
-        limit = ROLL_MARGIN * rolled * reach + SLIP_MARGIN * np.sqrt(sx * sx + sy * sy + sz * sz)
-        if not recognise(rows, i, pair[i], traces, qa, qb, normal, slip, limit):
-            share = 0.0 if not static[a] and (static[b] or far_a <= far_b) else -1.0
-            rows[i, 7], rows[i, 8], rows[i, 9] = share * sx, share * sy, share * sz
-        ux, uy, uz = rows[i, 7], rows[i, 8], rows[i, 9]
-        speed[i, 0] = np.sqrt(ux * ux + uy * uy + uz * uz)
-        speed[i, 1] = np.sqrt((ux + sx) ** 2 + (uy + sy) ** 2 + (uz + sz) ** 2)
-    return rows, speed
+    pose_after(a, touch.elapsed_s, work.x[0], work.q[0])
+    pose_after(b, touch.elapsed_s, work.x[1], work.q[1])
+    p, q, x = touch.point_a_m, work.q[0], work.x[0]
+    ax, ay, az = turn(-q[0], -q[1], -q[2], q[3], p[0] - x[0], p[1] - x[1], p[2] - x[2])
+    p, q, x = touch.point_b_m, work.q[1], work.x[1]
+    bx, by, bz = turn(-q[0], -q[1], -q[2], q[3], p[0] - x[0], p[1] - x[1], p[2] - x[2])
+    fresh.point_a_m[0], fresh.point_a_m[1], fresh.point_a_m[2] = ax, ay, az
+    fresh.point_b_m[0], fresh.point_b_m[1], fresh.point_b_m[2] = bx, by, bz
+    return np.sqrt(ax**2 + ay**2 + az**2), np.sqrt(bx**2 + by**2 + bz**2)
 
 
-def remembered(traces: tuple[Trace, ...], pair: Array, rows: Array) -> tuple[Trace, ...]:
-    """MEMORY_STEPS traces with the newest step in front, rows ordered by pair, and the oldest forgotten."""
-    order = np.argsort(pair, kind="stable")
-    return ((pair[order], rows[order]), *traces[: MEMORY_STEPS - 1])
+@njit(**INNER)
+def sweep(touch, a, b, pair, table, count, newest, work, fresh, speed):
+    """Speeds (2,) in m/s at which a touch moves over the bodies a and b (START rows), and its TRACE row `fresh`, whose
+    time is set.
+
+    work: SCRATCH, with the slip. What cannot move has a far-off centre that says nothing of its size.
+    """
+    far_a, far_b = place(touch, a, b, work, fresh)
+    v, w, slip, u = a.spin_rad_s, b.spin_rad_s, work.slip, fresh.u_a_m_s
+    rolled = np.sqrt((v[0] - w[0]) ** 2 + (v[1] - w[1]) ** 2 + (v[2] - w[2]) ** 2)
+    reach = max(0.0 if a.static else far_a, 0.0 if b.static else far_b)
+    limit = ROLL_MARGIN * rolled * reach + SLIP_MARGIN * np.sqrt(
+        slip[0] * slip[0] + slip[1] * slip[1] + slip[2] * slip[2]
+    )
+    if not recognise(fresh, pair, table, count, newest, work, touch.normal, limit):
+        share = 0.0 if not a.static and (b.static or far_a <= far_b) else -1.0
+        for x in range(3):
+            u[x] = share * slip[x]
+    speed[0] = np.sqrt(u[0] * u[0] + u[1] * u[1] + u[2] * u[2])
+    speed[1] = np.sqrt((u[0] + slip[0]) ** 2 + (u[1] + slip[1]) ** 2 + (u[2] + slip[2]) ** 2)
+
+
+@njit(**INNER)
+def sort_pairs(row, count, trace):
+    """Write pair and order of the first `count` entries of a trace: CONTACT rows by (a, b), equal ones as they came.
+
+    Merge sort from the bottom: runs of 1, 2, 4 … are joined, from one buffer to the other and back.
+    """
+    key, order = np.empty((2, count), np.int64), np.empty((2, count), np.int64)
+    for i in range(count):
+        key[0, i], order[0, i] = np.int64(row[i].a) << 32 | np.int64(row[i].b), i
+    source, width = 0, 1
+    while width < count:
+        target = 1 - source
+        for low in range(0, count, 2 * width):
+            middle, high = min(low + width, count), min(low + 2 * width, count)
+            i, j = low, middle
+            for n in range(low, high):
+                if i < middle and (j >= high or key[source, i] <= key[source, j]):
+                    key[target, n], order[target, n] = key[source, i], order[source, i]
+                    i += 1
+                else:
+                    key[target, n], order[target, n] = key[source, j], order[source, j]
+                    j += 1
+        source, width = target, 2 * width
+    for i in range(count):
+        trace[i].pair, trace[i].order = key[source, i], order[source, i]

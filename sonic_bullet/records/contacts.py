@@ -11,67 +11,33 @@ b.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 from sonic_bullet.records import Array, frozen_array
-from sonic_bullet.records.coerce import as_items, as_kind, as_number
-from sonic_bullet.records.errors import LogError
+from sonic_bullet.records.arrays import LARGEST
+from sonic_bullet.records.coerce import as_items, as_kind, as_number, shown
+from sonic_bullet.records.errors import LogError, RecordError
 
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Contacts:
-    """The loaded contacts of one step, one row each.
-
-    a, b (k,): indices of bodies. point_a_m, point_b_m (k, 3): the contact in either body's frame, by the pose before
-    the step. normal (k, 3): unit, world frame, from b to a. impulse_n_s (k, 3): world frame, on a, friction included.
-    slip_m_s (k, 3): tangential velocity of a's material relative to b's, world frame, before the step. sweep_m_s (k,
-    2): speed at which the contact moves over a's and over b's surface. approach_m_s (k,): closing speed before the
-    step, positive when nearing. gap_m (k,): distance before the step, negative when overlapping.
-    """
-
-    a: Array
-    b: Array
-    point_a_m: Array
-    point_b_m: Array
-    normal: Array
-    impulse_n_s: Array
-    slip_m_s: Array
-    sweep_m_s: Array
-    approach_m_s: Array
-    gap_m: Array
-
-    def __post_init__(self) -> None:
-        k = (
-            np.shape(self.a)[0]
-            if isinstance(self.a, np.ndarray) and self.a.ndim
-            else len(as_items(self.a, "contact a", "give indices of bodies (k,)"))
-        )
-        for name, (dtype, tail) in ROW_FIELDS.items():
-            object.__setattr__(self, name, frozen_array(getattr(self, name), dtype, (k, *tail), f"contact {name}"))
-
-    def __len__(self) -> int:
-        return len(self.a)
-
-    @classmethod
-    def none(cls) -> Contacts:
-        """No contacts at all."""
-        return cls(**{name: np.zeros((0, *tail), dtype) for name, (dtype, tail) in ROW_FIELDS.items()})
-
-    @classmethod
-    def joined(cls, parts: list[Contacts]) -> Contacts:
-        """The rows of all parts, in order."""
-        return (
-            cls(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in ROW_FIELDS})
-            if parts
-            else cls.none()
-        )
-
-    def rows(self, start: int, stop: int) -> Contacts:
-        """Rows start … stop-1."""
-        return Contacts(**{name: getattr(self, name)[start:stop] for name in ROW_FIELDS})
-
+CONTACT = np.dtype(
+    [
+        ("a", "i4"),
+        ("b", "i4"),
+        ("point_a_m", "f8", (3,)),
+        ("point_b_m", "f8", (3,)),
+        ("normal", "f8", (3,)),
+        ("impulse_n_s", "f8", (3,)),
+        ("slip_m_s", "f8", (3,)),
+        ("sweep_m_s", "f8", (2,)),
+        ("approach_m_s", "f8"),
+        ("gap_m", "f8"),
+    ],
+    align=True,
+)
+"""One contact: 20 numbers of 8 bytes, both indices in the first; see `Contacts`."""
 
 ROW_FIELDS: dict[str, tuple[type, tuple[int, ...]]] = {
     "a": (np.int32, ()),
@@ -85,6 +51,134 @@ ROW_FIELDS: dict[str, tuple[type, tuple[int, ...]]] = {
     "approach_m_s": (float, ()),
     "gap_m": (float, ()),
 }
+"""The same fields one by one, as files hold them: dtype and shape of a row."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, init=False)
+class Contacts:
+    """The loaded contacts of one step, one row each: `row` (k,) of CONTACT, read-only, whose fields are
+
+    a, b (k,): indices of bodies. point_a_m, point_b_m (k, 3): the contact in either body's frame, by the pose before
+    the step. normal (k, 3): unit, world frame, from b to a. impulse_n_s (k, 3): world frame, on a, friction included.
+    slip_m_s (k, 3): tangential velocity of a's material relative to b's, world frame, before the step. sweep_m_s (k,
+    2): speed at which the contact moves over a's and over b's surface. approach_m_s (k,): closing speed before the
+    step, positive when nearing. gap_m (k,): distance before the step, negative when overlapping.
+    """
+
+    row: Array
+
+    def __init__(
+        self,
+        a: Any,
+        b: Any,
+        point_a_m: Any,
+        point_b_m: Any,
+        normal: Any,
+        impulse_n_s: Any,
+        slip_m_s: Any,
+        sweep_m_s: Any,
+        approach_m_s: Any,
+        gap_m: Any,
+    ) -> None:
+        given = (a, b, point_a_m, point_b_m, normal, impulse_n_s, slip_m_s, sweep_m_s, approach_m_s, gap_m)
+        remedy = "give indices of bodies (k,)"
+        k = np.shape(a)[0] if isinstance(a, np.ndarray) and a.ndim else len(as_items(a, "contact a", remedy))
+        row = np.empty(k, CONTACT)
+        for (name, (dtype, tail)), column in zip(ROW_FIELDS.items(), given, strict=True):
+            row[name] = frozen_array(column, dtype, (k, *tail), f"contact {name}")
+        row.setflags(write=False)
+        object.__setattr__(self, "row", row)
+
+    def __len__(self) -> int:
+        return len(self.row)
+
+    @property
+    def a(self) -> Array:
+        return self.row["a"]
+
+    @property
+    def b(self) -> Array:
+        return self.row["b"]
+
+    @property
+    def point_a_m(self) -> Array:
+        return self.row["point_a_m"]
+
+    @property
+    def point_b_m(self) -> Array:
+        return self.row["point_b_m"]
+
+    @property
+    def normal(self) -> Array:
+        return self.row["normal"]
+
+    @property
+    def impulse_n_s(self) -> Array:
+        return self.row["impulse_n_s"]
+
+    @property
+    def slip_m_s(self) -> Array:
+        return self.row["slip_m_s"]
+
+    @property
+    def sweep_m_s(self) -> Array:
+        return self.row["sweep_m_s"]
+
+    @property
+    def approach_m_s(self) -> Array:
+        return self.row["approach_m_s"]
+
+    @property
+    def gap_m(self) -> Array:
+        return self.row["gap_m"]
+
+    @classmethod
+    def of(cls, row: Array) -> Contacts:
+        """Rows (k,) of CONTACT. Raises RecordError where they are none, or a number is none or beyond `LARGEST`."""
+        if not isinstance(row, np.ndarray) or row.dtype != CONTACT or row.ndim != 1:
+            raise RecordError(f"contacts: row is {shown(row)}", "pass an array (k,) of dtype CONTACT")
+        kept = not row.flags.writeable and row.base is None and row.flags.c_contiguous
+        row = row if kept else np.array(row, CONTACT)
+        number = row.view(np.float64).reshape(len(row), -1)[:, 1:]
+        # False for NaN too
+        if not (number.max(initial=0) <= LARGEST and number.min(initial=0) >= -LARGEST):
+            return cls(*(row[name] for name in ROW_FIELDS))  # which names the field
+        row.setflags(write=False)
+        return cls.trusted(row)
+
+    @classmethod
+    def trusted(cls, row: Array) -> Contacts:
+        """Rows whose numbers are known to be numbers, of an array that nobody writes to any more; nothing is checked
+        or copied.
+        """
+        made = object.__new__(cls)
+        object.__setattr__(made, "row", row)
+        return made
+
+    @classmethod
+    def none(cls) -> Contacts:
+        """No contacts at all."""
+        return _NONE
+
+    @classmethod
+    def joined(cls, parts: Sequence[Contacts]) -> Contacts:
+        """The rows of all parts, in order."""
+        row = np.concatenate([_NONE.row, *(part.row for part in parts)], dtype=CONTACT)
+        row.setflags(write=False)
+        return cls.trusted(row)
+
+    def rows(self, start: int, stop: int) -> Contacts:
+        """Rows start … stop-1."""
+        return Contacts.trusted(self.row[start:stop])
+
+
+def _no_rows() -> Contacts:
+    row = np.empty(0, CONTACT)
+    row.setflags(write=False)
+    return Contacts.trusted(row)
+
+
+_NONE = _no_rows()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -118,8 +212,37 @@ class Step:
         as_kind(
             self.contacts, Contacts, "step: contacts", "give Contacts, of no rows where nothing touches", error=LogError
         )
-        if len(self.contacts) and max(self.contacts.a.max(), self.contacts.b.max()) >= b:
-            raise LogError("a contact names a body that the step does not know", "use an unbroken contact log")
+        if len(self.contacts):
+            a, other = self.contacts.a, self.contacts.b
+            if max(a.max(), other.max()) >= b:
+                raise LogError("a contact names a body that the step does not know", "use an unbroken contact log")
+            if min(a.min(), other.min()) < 0:
+                raise LogError("a contact names a body below zero", "use an unbroken contact log")
+
+    @classmethod
+    def trusted(
+        cls,
+        dt_s: float,
+        position_m: Array,
+        quaternion_xyzw: Array,
+        teleported: Array,
+        contacts: Contacts,
+        gravity_m_s2: Array,
+    ) -> Step:
+        """A step of numbers that are known to be numbers, in arrays that nobody writes to any more; nothing is checked
+        or copied, except that the arrays can no longer be written to.
+        """
+        made = object.__new__(cls)
+        for array in (position_m, quaternion_xyzw, teleported, gravity_m_s2):
+            array.flags.writeable = False
+        keep = object.__setattr__
+        keep(made, "dt_s", dt_s)
+        keep(made, "position_m", position_m)
+        keep(made, "quaternion_xyzw", quaternion_xyzw)
+        keep(made, "teleported", teleported)
+        keep(made, "contacts", contacts)
+        keep(made, "gravity_m_s2", gravity_m_s2)
+        return made
 
 
 EVENT_KINDS = ("quench",)

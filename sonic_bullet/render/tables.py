@@ -14,6 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from sonic_bullet.geometry.nearest_point import FACE, NODE
+from sonic_bullet.records.contacts import CONTACT
 from sonic_bullet.synth.profile import OCTAVES
 from sonic_bullet.synth.strikes import SPAN
 
@@ -50,22 +51,6 @@ BODY = np.dtype(
     align=True,
 )
 
-CONTACT = np.dtype(
-    [
-        ("a", "i4"),
-        ("b", "i4"),
-        ("point_a_m", "f8", (3,)),
-        ("point_b_m", "f8", (3,)),
-        ("normal", "f8", (3,)),
-        ("impulse_n_s", "f8", (3,)),
-        ("slip_m_s", "f8", (3,)),
-        ("sweep_m_s", "f8", (2,)),
-        ("approach_m_s", "f8"),
-        ("gap_m", "f8"),
-    ],
-    align=True,
-)
-"""A contact as it is logged; see records.contacts."""
 
 ROW = np.dtype(
     [

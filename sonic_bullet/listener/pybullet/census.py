@@ -7,7 +7,6 @@ getNumBodies -> the roster, kept while nobody comes or goes -> poses and twists 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
-from typing import Any
 
 import pybullet
 
@@ -16,18 +15,9 @@ from sonic_bullet.listener.polling import Touches
 from sonic_bullet.listener.pybullet import body_facts as facts
 from sonic_bullet.listener.pybullet.left_out import BodiesLeftOut
 from sonic_bullet.listener.pybullet.poses import body_ids, check_connected, read_motion, read_roster
+from sonic_bullet.listener.pybullet.questions import ask
 from sonic_bullet.records import Body
 from sonic_bullet.records.errors import SceneError
-
-
-def ask(client_id: int, question: Callable[..., Any]) -> Any:
-    """What PyBullet answers. Raises SceneError where nobody does."""
-    try:
-        return question(physicsClientId=client_id)
-    except pybullet.error as error:
-        raise SceneError(
-            f"PyBullet client {client_id} does not answer: {error}", "detach the listener before disconnecting"
-        ) from None
 
 
 class Census:

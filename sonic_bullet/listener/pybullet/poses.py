@@ -6,16 +6,19 @@ getLinkStates(computeLinkVelocity=1, computeForwardKinematics=1)[0, 1, 6, 7]   l
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Collection
-from itertools import chain
 
 import numpy as np
 import pybullet
 
-from sonic_bullet.listener.frames import BEYOND, LINK_SPAN, Motion, Roster, encode
+from sonic_bullet.listener.frames import BEYOND, LINK_SPAN, MOTION, MOTION_NUMBERS, Motion, Roster, encode
+from sonic_bullet.listener.quiet import collector_waiting
 from sonic_bullet.records.coerce import shown
 from sonic_bullet.records.errors import SceneError
 
+POSE, POSE_AND_TWIST = struct.Struct("7d"), struct.Struct(f"{MOTION_NUMBERS}d")
+MOTION_BYTES = MOTION.itemsize
 SOFT = 3
 """What getDynamicsInfo tells of a soft body as its last entry but one (Bullet's BT_SOFT_BODY)."""
 
@@ -65,34 +68,35 @@ def read_roster(client_id: int, leave_out: Collection[int] = ()) -> Roster:
 
 
 def read_motion(client_id: int, roster: Roster) -> Motion:
-    """Poses and twists now, numbers or not (`Motion.broken`).
+    """Poses and twists now, numbers or not (`Motion.broken`); of bases that cannot move the pose alone.
 
     Raises pybullet.error where a body of the roster is gone or has other links.
     """
-    still = (0.0, 0.0, 0.0)
-    pose, twist, links = pybullet.getBasePositionAndOrientation, pybullet.getBaseVelocity, pybullet.getLinkStates
-    count = pybullet.getNumJoints
-    flat: list[tuple[float, ...]] = []
-    for body, joints, fixed in roster.bodies:
-        # another body has taken over the id: asking for a link that is not there would end the process
-        if count(body, client_id) != joints:
-            raise pybullet.error(f"body {body} has other links than before")
-        flat.extend(pose(body, client_id))
-        if fixed:
-            flat.append(still)
-            flat.append(still)
-        else:
-            flat.extend(twist(body, client_id))
-        if joints:
-            for state in links(
-                body, range(joints), computeLinkVelocity=1, computeForwardKinematics=1, physicsClientId=client_id
-            ):
-                flat.extend((state[0], state[1], state[6], state[7]))
-    table = np.fromiter(chain.from_iterable(flat), float, 13 * len(roster.code)).reshape(-1, 13)
-    wild = ~(np.abs(table) < BEYOND)
-    broken = tuple(int(body) for body in np.unique(roster.code[wild.any(axis=1)] // LINK_SPAN)) if wild.any() else ()
-    return Motion(
-        roster,
-        *(np.ascontiguousarray(part) for part in (table[:, 0:3], table[:, 3:7], table[:, 7:10], table[:, 10:13])),
-        broken=broken,
-    )
+    if not len(roster.code):
+        return Motion(roster, np.zeros(0, MOTION))
+    buffer, at = bytearray(len(roster.code) * MOTION.itemsize), 0
+    pose, twist, count = pybullet.getBasePositionAndOrientation, pybullet.getBaseVelocity, pybullet.getNumJoints
+    with collector_waiting():
+        for body, joints, fixed in roster.bodies:
+            # another body has taken over the id: asking for a link that is not there would end the process
+            if count(body, client_id) != joints:
+                raise pybullet.error(f"body {body} has other links than before")
+            (x, y, z), (i, j, k, r) = pose(body, client_id)
+            if fixed:
+                POSE.pack_into(buffer, at, x, y, z, i, j, k, r)
+            else:
+                (u, v, w), (a, b, c) = twist(body, client_id)
+                POSE_AND_TWIST.pack_into(buffer, at, x, y, z, i, j, k, r, u, v, w, a, b, c)
+            at += MOTION_BYTES
+            if joints:
+                for state in pybullet.getLinkStates(
+                    body, range(joints), computeLinkVelocity=1, computeForwardKinematics=1, physicsClientId=client_id
+                ):
+                    POSE_AND_TWIST.pack_into(buffer, at, *state[0], *state[1], *state[6], *state[7])
+                    at += MOTION_BYTES
+    number = np.frombuffer(buffer)
+    if number.dot(number) < BEYOND**2:  # so no number is beyond, and none is NaN
+        return Motion(roster, np.frombuffer(buffer, MOTION))
+    wild = ~(np.abs(number.reshape(-1, MOTION_NUMBERS)) < BEYOND).all(axis=1)
+    broken = tuple(int(body) for body in np.unique(roster.code[wild] // LINK_SPAN))
+    return Motion(roster, np.frombuffer(buffer, MOTION), broken=broken)

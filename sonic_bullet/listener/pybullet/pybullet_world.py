@@ -22,25 +22,27 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-import pybullet
 
-from sonic_bullet.listener.body_records import BodyRecords
-from sonic_bullet.listener.frames import LINK_SPAN, Motion, Roster, encode, jumped, rows_of, same_motion
-from sonic_bullet.listener.polling import Touches
+from sonic_bullet.listener.frames import LINK_SPAN, Motion, Roster, encode, rows_of, same_motion
+from sonic_bullet.listener.known_bodies import KnownBodies
+from sonic_bullet.listener.memory import Memory
+from sonic_bullet.listener.polling import Touches, loaded
 from sonic_bullet.listener.pybullet import body_facts as facts
 from sonic_bullet.listener.pybullet import collision_shapes as shapes
 from sonic_bullet.listener.pybullet import hooks
-from sonic_bullet.listener.pybullet.census import Census, ask
-from sonic_bullet.listener.pybullet.contact_reader import ContactReader
+from sonic_bullet.listener.pybullet.census import Census
 from sonic_bullet.listener.pybullet.left_out import BodiesLeftOut
 from sonic_bullet.listener.pybullet.poses import check_connected
+from sonic_bullet.listener.pybullet.questions import contact_points, settings
 from sonic_bullet.listener.pybullet.step_back import undone
-from sonic_bullet.listener.rows import Meetings, contact_rows, meetings
-from sonic_bullet.listener.start import Start, hooked_start, polled_start, taken
-from sonic_bullet.listener.sweep import NO_TRACES, Trace
+from sonic_bullet.listener.pybullet.substeps import SubstepLog, gather_substeps
+from sonic_bullet.listener.start import LEFT_OUT, NOBODY, hooked_start, jumped, polled_start, taken
 from sonic_bullet.listener.world import World
-from sonic_bullet.records import Array, Body, Material, ModalModel, Shape
-from sonic_bullet.records.contacts import Contacts, Step
+from sonic_bullet.records import Body, Material, ModalModel, Shape
+from sonic_bullet.records.contacts import Step
+from sonic_bullet.records.errors import SceneError
+
+AT_ORIGIN = np.array([0, 0, 0, 0, 0, 0, 1.0])
 
 
 class PyBulletWorld(World):
@@ -56,17 +58,18 @@ class PyBulletWorld(World):
         self.epoch = 0
         self.step_count = 0
         self.stepped = False
-        self._records = BodyRecords()
-        self._time_s = 0.0
-        self._gravity_m_s2 = np.zeros(3)
+        self._known = KnownBodies()
+        self._memory = Memory()
         self._census = Census(client_id, self._bury, self._end)
+        self._settings = settings(client_id)
+        self._memory.poll(contact_points(client_id)[1], stepped=True)
+        self._memory.raw_before = self._memory.raw
         self._before: Motion | None = None
-        self._past_touches: Touches | None = None
-        self._contacts = ContactReader(client_id)
         self._moved: set[int] = set()
-        self._traces: tuple[Trace, ...] = NO_TRACES
+        self._log = SubstepLog(client_id)
         self._uninstall: Callable[[], None] | None = None
-        self._contacts.prepare(self._step_length()[1])
+        if self._settings.substeps > 1:
+            self._log.open()
         self._past: Motion = self._census.read()
 
     @property
@@ -82,13 +85,13 @@ class PyBulletWorld(World):
     @property
     def bodies(self) -> tuple[Body, ...]:
         """All bodies ever met, in the order that Contacts.a and Contacts.b count them."""
-        return tuple(self._records.bodies)
+        return tuple(self._known.records)
 
     @property
     def untouched(self) -> frozenset[int]:
         """Ids of the bodies that were in the world at the last step and have met nobody yet."""
         return frozenset(body for body, _, _ in self._past.roster.bodies) - {
-            code // LINK_SPAN for code in self._records.living
+            code // LINK_SPAN for code in self._known.live
         }
 
     @property
@@ -116,7 +119,7 @@ class PyBulletWorld(World):
 
     def index_of(self, body: int, link: int = -1) -> int:
         """Index into `bodies` of the living record of a link, or -1."""
-        return self._records.index_of(int(encode(body, link)))
+        return self._known.live.get(int(encode(body, link)), -1)
 
     def add(
         self,
@@ -156,7 +159,7 @@ class PyBulletWorld(World):
         if shapes:
             alone = shapes[0] if len(shapes) == 1 and shapes[0].kind == "sphere" else None
             record = replace(record, curvature_per_m=1 / float(alone.size_m[0]) if alone is not None else float("nan"))
-        self._close([int(encode(body, link))])
+        self._known.close([int(encode(body, link))], self.step_count)
         self._append(int(encode(body, link)), record)
         return record
 
@@ -174,15 +177,18 @@ class PyBulletWorld(World):
         return shapes.shapes_of(self.client_id, body, link)
 
     def forget(self, body: int | None = None) -> None:
-        """Say that a body was removed (None: all, by resetSimulation); its id may be given anew. With a hook, nobody
-        need call this.
+        """Say that a body was removed (None:
+
+        all, by resetSimulation); its id may be given anew. With a hook, nobody need call this.
         """
         self.epoch += 1
         self.left_out.forget(body)
-        self._close([code for code in self._records.living if body is None or code // LINK_SPAN == body])
+        self._known.close(
+            [code for code in self._known.live if body is None or code // LINK_SPAN == body], self.step_count
+        )
         if body is None:
-            self._contacts.abandon()
-            self._traces, self._past_touches = NO_TRACES, None
+            self._log.abandon()
+            self._memory.forget()
         past = self._past.roster
         keep = np.flatnonzero(past.code // LINK_SPAN != body) if body is not None else np.zeros(0, int)
         self._past = taken(
@@ -221,13 +227,15 @@ class PyBulletWorld(World):
             self._uninstall = None
         self._before = None
         if self.client is None:
-            self._contacts.abandon()  # its id may be another's by now
+            self._log.abandon()  # its id may be another's by now
         else:
-            self._contacts.close()
+            self._log.close()
 
     def before_step(self) -> None:
         """Read poses and twists at the start of the step. Raises SceneError (lost connection)."""
-        self._contacts.prepare(self._step_length()[1])
+        self._settings = settings(self.client_id)
+        if self._settings.substeps > 1 and not self._log.is_open:
+            self._log.open()
         self._before = self._census.read()
 
     def after_step(self) -> Step:
@@ -239,107 +247,106 @@ class PyBulletWorld(World):
         stands where it stood, to the bit; where nothing moves at all, a second call passes for a step. Raises
         SceneError: lost connection, sub-steps that cannot be heard.
         """
-        dt, substeps = self._step_length()
-        self.stepped = self._uninstall is None or self._before is not None
+        before = self._before
+        hooked = before is not None
+        if before is None:
+            self._settings = settings(self.client_id)
+        self.stepped = self._uninstall is None or hooked
         if not self.stepped:
-            return self._again(dt)
-        touches = self._contacts.touches(dt, substeps)
-        first, past_touches = self.step_count == 0, self._past_touches
-        now = self._before if self._before is not None else self._census.read()
-        touches = self._census.usable(touches)
-        if self._before is not None:
+            return self._memory.nothing(self._known, self._settings.dt_s, self._settings.gravity_m_s2)
+        touches = self._poll(hooked)
+        now = before if before is not None else self._census.read()
+        step = self._usual(now, hooked) if touches is None else None
+        if step is None:
+            step = self._unusual(now, hooked, touches)
+        if self.stepped:
+            self._past, self._before = now, None
+            self._moved.clear()
+            self.step_count += 1
+        return step
+
+    def _poll(self, hooked: bool) -> Touches | None:
+        """Ask for this step's contacts, once: they go to the memory; those of sub-steps are returned."""
+        substeps = self._settings.substeps
+        last, raw = contact_points(self.client_id)
+        if substeps == 1:
+            if self._log.is_open:
+                self._log.close()
+            self._memory.poll(raw, stepped=hooked)
+            return None
+        if not self._log.is_open:
+            self._log.open()
+            raise SceneError(
+                f"numSubSteps was set to {substeps} after listening began",
+                "set it before attaching, or attach to a BulletClient, whose steps are hooked",
+            )
+        touches, self._log.count = gather_substeps(
+            self._log.records(), last, self._settings.dt_s, substeps, self._log.count
+        )
+        return touches
+
+    def _usual(self, now: Motion, hooked: bool) -> Step | None:
+        """The step where nobody came, went or is left out, and nothing else is unusual."""
+        left_out = self.left_out
+        if now.roster is not self._past.roster or not self.step_count or left_out.muted or left_out.soft:
+            return None
+        by_hand = np.array(sorted(self._moved), np.int64) if self._moved and hooked else NOBODY
+        dt, _, gravity = self._settings
+        return self._memory.usual(self._known, self._past, now, by_hand, dt, gravity, hooked)
+
+    def _unusual(self, now: Motion, hooked: bool, touches: Touches | None) -> Step:
+        """Any step; touches: of sub-steps, else those of the memory."""
+        memory, known, (dt, _, gravity) = self._memory, self._known, self._settings
+        first, past_touches = self.step_count == 0, memory.touches
+        touches = self._census.usable(loaded(memory.raw, memory.raw_before, dt) if touches is None else touches)
+        if hooked:
             start = hooked_start(None if first else self._past, now, self._moved, dt)
         else:
             frozen = not first and same_motion(self._past, now)
             if frozen and now.would_move(dt) and past_touches is not None and touches.equals(past_touches):
                 self.stepped = False
-                return self._again(dt)
+                return memory.nothing(known, dt, gravity)
             self._expose_impostors(now, dt)
             start = polled_start(
                 self._past, now, touches, dt, undo=partial(undone, client_id=self.client_id), first=first
             )
-        self._past_touches, self._past, self._before = touches, now, None
-        meeting = meetings(touches, past_touches, start, dt)
-        of_row = self._of_row(now.roster, meeting)
-        meeting = meeting.kept((of_row[meeting.row_a] >= 0) & (of_row[meeting.row_b] >= 0))
-        contacts, self._traces = contact_rows(
-            meeting, of_row[meeting.row_a], of_row[meeting.row_b], start.motion, self._time_s, self._traces
-        )
-        step = self._step(dt, start, of_row, contacts)
-        self._moved.clear()
-        self._time_s += dt
-        self.step_count += 1
-        return step
-
-    def _again(self, dt: float) -> Step:
-        """A step in which nothing happens."""
-        return Step(
-            dt,
-            self._records.position_m,
-            self._records.quaternion_xyzw,
-            np.zeros(len(self._records.bodies), bool),
-            Contacts.none(),
-            self._gravity_m_s2,
-        )
-
-    def _step(self, dt: float, start: Start, of_row: Array, contacts: Contacts) -> Step:
-        row = np.flatnonzero(of_row >= 0)
-        index, records = of_row[row], self._records
-        teleported = np.zeros(len(records.bodies), bool)
-        records.position_m[index] = start.motion.position_m[row]
-        records.quaternion_xyzw[index] = start.motion.quaternion_xyzw[row]
-        teleported[index] = start.moved[row]
-        return Step(dt, records.position_m, records.quaternion_xyzw, teleported, contacts, self._gravity_m_s2)
-
-    def _step_length(self) -> tuple[float, int]:
-        settings = ask(self.client_id, pybullet.getPhysicsEngineParameters)
-        self._gravity_m_s2 = np.array([settings[f"gravityAcceleration{axis}"] for axis in "XYZ"])
-        return settings["fixedTimeStep"], max(1, settings["numSubSteps"])
+        memory.touches, self._past, self._before = touches, now, None
+        start["index"] = known.index(now.roster)
+        row, made = memory.made(known, start, touches, past_touches, dt)
+        if made < 0:
+            for code in start["code"][start["met"] != 0].tolist():
+                record = self._census.described(code, self.epoch)
+                if record is not None:
+                    self._append(code, replace(record, since_step=self.step_count))
+            index = known.index(now.roster)
+            start["index"] = np.where(index < 0, LEFT_OUT, index)
+            row, made = memory.made(known, start, touches, past_touches, dt)
+        return memory.unusual(known, start, row, made, dt, gravity)
 
     def _bury(self, roster: Roster) -> None:
         """Close the records of bodies that have gone without a hook seeing it."""
-        codes = np.array(self._records.living, np.int64)
-        gone = codes[rows_of(roster, codes) < 0]
-        if len(gone):
+        gone = self._known.gone(roster)
+        if gone:
             self.epoch += 1
-            self._close(gone.tolist())
+            self._known.close(gone, self.step_count)
 
     def _end(self, bodies: Collection[int]) -> None:
         """Close the records of bodies."""
-        self._close([code for code in self._records.living if code // LINK_SPAN in bodies])
+        self._known.close([code for code in self._known.live if code // LINK_SPAN in bodies], self.step_count)
 
     def _expose_impostors(self, now: Motion, dt: float) -> None:
         """Where nobody saw removals: what jumped and has another name, mass or inertia has taken over an old id."""
-        for code in now.roster.code[jumped(self._past, now, dt)]:
-            index = self._records.index_of(int(code))
-            if index >= 0:
-                known, seen = self._records.bodies[index], self._census.described(code, self.epoch)
+        for code in now.roster.code[jumped(self._past, now, dt)].tolist():
+            index = self._known.live.get(code)
+            if index is not None:
+                before, seen = self._known.records[index], self._census.described(code, self.epoch)
                 if seen is None:
                     continue
-                same = known.mass_kg == seen.mass_kg and np.array_equal(known.inertia_kg_m2, seen.inertia_kg_m2)
-                if not same or not np.array_equal(known.curvature_per_m, seen.curvature_per_m, equal_nan=True):
+                same = before.mass_kg == seen.mass_kg and np.array_equal(before.inertia_kg_m2, seen.inertia_kg_m2)
+                if not same or not np.array_equal(before.curvature_per_m, seen.curvature_per_m, equal_nan=True):
                     self.epoch += 1
-                    self._close([int(code)])
-
-    def _of_row(self, roster: Roster, meeting: Meetings) -> Array:
-        """(n,) index into `bodies` of each row of the roster, -1 for who never met anybody; who meets the first time
-        gets a silent record.
-        """
-        of_row = self._records.of_row(roster)
-        met = np.unique(np.concatenate([meeting.row_a, meeting.row_b]))
-        strangers = met[of_row[met] < 0]
-        for code in roster.code[strangers]:
-            record = self._census.described(code, self.epoch)
-            if record is not None:
-                self._append(int(code), replace(record, since_step=self.step_count))
-        return self._records.of_row(roster) if len(strangers) else of_row
+                    self._known.close([code], self.step_count)
 
     def _append(self, code: int, record: Body) -> None:
         row = rows_of(self._past.roster, np.array([code]))[0]
-        if row >= 0:
-            self._records.append(code, record, self._past.position_m[row], self._past.quaternion_xyzw[row])
-        else:
-            self._records.append(code, record, np.zeros(3), np.array([0, 0, 0, 1.0]))
-
-    def _close(self, codes: list[int]) -> None:
-        self._records.close(codes, self.step_count)
+        self._known.append(code, record, self._past.number[row, :7] if row >= 0 else AT_ORIGIN)

@@ -28,11 +28,12 @@ def undone(now: Motion, which: Array, touches: Touches, dt_s: float, client_id: 
             continue
         sign = (touches.code_a == code).astype(float) - (touches.code_b == code)
         own = sign != 0
-        impulse = sign[own, None] * touches.impulse_n_s[own]
-        point = np.where(touches.code_a[own, None] == code, touches.point_a_m[own], touches.point_b_m[own])
+        rows = touches.row[own]
+        impulse = sign[own, None] * rows["impulse_n_s"]
+        point = np.where(rows["code_a"][:, None] == code, rows["point_a_m"], rows["point_b_m"])
         turn = np.array(pybullet.getMatrixFromQuaternion(back.quaternion_xyzw[row])).reshape(3, 3)
         angular = np.cross(point - back.position_m[row], impulse).sum(axis=0)
         inverse = np.array([1 / x if x > 0 else 0.0 for x in info[2]])
         velocity[row] -= impulse.sum(axis=0) / info[0] + gravity * dt_s
         spin[row] -= turn @ (inverse * (turn.T @ angular))
-    return Motion(now.roster, back.position_m, back.quaternion_xyzw, velocity, spin)
+    return Motion.of(now.roster, back.position_m, back.quaternion_xyzw, velocity, spin)

@@ -22,7 +22,17 @@ import numpy as np
 import pybullet
 
 from sonic_bullet.listener.frames import encode
-from sonic_bullet.listener.polling import FORCE, FRICTION_1, FRICTION_2, RawContact, Touches, gather
+from sonic_bullet.listener.polling import (
+    FORCE,
+    FRICTION_1,
+    FRICTION_2,
+    NO_RAW,
+    TOUCH,
+    RawContact,
+    Touches,
+    loaded,
+    packed,
+)
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import SceneError
 
@@ -135,16 +145,16 @@ def gather_substeps(
         first = int(newest) + 1 - substeps
     h = dt_s / substeps
     touched = records["force"] != 0
-    loaded = records[touched]
-    code_a, code_b = (
-        encode(loaded["body"][:, 0], loaded["link"][:, 0]),
-        encode(loaded["body"][:, 1], loaded["link"][:, 1]),
-    )
-    normal, force = loaded["normal"].astype(float), loaded["force"].astype(float)
-    impulse = h * force[:, None] * (normal + friction_ratio(code_a, code_b, last))
-    elapsed = h * np.clip(number[touched] - first, 0, substeps - 1)
-    points = loaded["point_a"].astype(float), loaded["point_b"].astype(float)
-    return Touches(code_a, code_b, *points, normal, loaded["gap"].astype(float), impulse, elapsed), first + substeps
+    found = records[touched]
+    row = np.empty(len(found), TOUCH)
+    row["code_a"] = encode(found["body"][:, 0], found["link"][:, 0])
+    row["code_b"] = encode(found["body"][:, 1], found["link"][:, 1])
+    row["point_a_m"], row["point_b_m"], row["gap_m"] = found["point_a"], found["point_b"], found["gap"]
+    row["normal"] = found["normal"]
+    ratio = friction_ratio(row["code_a"], row["code_b"], last)
+    row["impulse_n_s"] = h * found["force"].astype(float)[:, None] * (row["normal"] + ratio)
+    row["elapsed_s"] = h * np.clip(number[touched] - first, 0, substeps - 1)
+    return Touches(row), first + substeps
 
 
 def friction_ratio(code_a: Array, code_b: Array, last: list[RawContact]) -> Array:
@@ -155,10 +165,12 @@ def friction_ratio(code_a: Array, code_b: Array, last: list[RawContact]) -> Arra
     friction = [raw for raw in last if raw[FORCE] > 0 and (raw[FRICTION_1] or raw[FRICTION_2])]
     if not friction:
         return ratio
-    plain = gather([raw for raw in last if raw[FORCE] > 0], 1.0)
-    along = (plain.impulse_n_s * plain.normal).sum(axis=1)
+    pressed = [raw for raw in last if raw[FORCE] > 0]
+    plain = loaded(packed(pressed, len(pressed)), NO_RAW, 1.0)
+    impulse, normal = plain.row["impulse_n_s"], plain.row["normal"]
+    along = (impulse * normal).sum(axis=1)
     for a, b in {(int(a), int(b)) for a, b in zip(plain.code_a, plain.code_b, strict=True)}:
         own = (plain.code_a == a) & (plain.code_b == b)
-        tangent = (plain.impulse_n_s[own] - along[own, None] * plain.normal[own]).sum(axis=0) / along[own].sum()
+        tangent = (impulse[own] - along[own, None] * normal[own]).sum(axis=0) / along[own].sum()
         ratio[(code_a == a) & (code_b == b)] = tangent
     return ratio
