@@ -18,7 +18,7 @@ from sonic_bullet.records import Array
 from sonic_bullet.records.coerce import as_call, as_flag, as_kind
 from sonic_bullet.records.errors import LogError
 from sonic_bullet.render.silence import silence_notes, why_silent
-from sonic_bullet.render.synthesizer import LATENCY_STEPS, Synthesizer
+from sonic_bullet.render.synthesizer import AT_ONCE, LATENCY_STEPS, Synthesizer
 
 __all__ = ["LATENCY_STEPS", "Synthesizer", "render_log", "silence_notes", "why_silent"]
 
@@ -52,10 +52,17 @@ def render_log(
             radiation_of(body.model, log.air)
     synth = Synthesizer(sr=log.sr, sensors=log.sensors, seed=log.seed, air=log.air, residual=residual)
     quenches = {event.step for event in log.events if event.kind == "quench"}
-    for number, step in enumerate(log.steps):
-        if number in quenches:
+    first = 0
+    while first < len(log.steps):
+        if first in quenches:
             synth.quench()
-        synth.feed(step, log.bodies[: len(step.position_m)])
-        if progress is not None and number % 16 == 0:
-            progress(number / len(log.steps))
+        bodies, stop = len(log.steps[first].position_m), first + 1
+        while stop < min(first + AT_ONCE, len(log.steps)) and stop not in quenches:
+            if len(log.steps[stop].position_m) != bodies:
+                break
+            stop += 1
+        synth.play(log.steps[first:stop], log.bodies)
+        first = stop
+        if progress is not None:
+            progress(first / len(log.steps))
     return np.ascontiguousarray(synth.sound())

@@ -17,7 +17,7 @@ import numpy as np
 
 from sonic_bullet.machine.compiled import njit
 from sonic_bullet.render.contact_rows import enter_loads, orient
-from sonic_bullet.render.friction import VOICE, advance_friction
+from sonic_bullet.render.friction import advance_friction
 from sonic_bullet.render.strike_pulses import STRIKE, find_pulses
 from sonic_bullet.synth.bank import bank_kernel
 from sonic_bullet.synth.bank.bank_kernel import DRIVE_SCRATCH, RING_SCRATCH
@@ -25,6 +25,7 @@ from sonic_bullet.synth.bank.layout import DRIVEN
 from sonic_bullet.synth.bank.strike_pool import enter_strike
 from sonic_bullet.synth.path_kernel import DONE, hear
 from sonic_bullet.synth.strikes import LOOKAHEAD, SPAN
+from sonic_bullet.synth.surface_kernel import VOICE
 from sonic_bullet.synth.vector import LANES
 
 TO_GROW, PAUSED, NOT_FINITE = -1, -2, -3

@@ -21,7 +21,6 @@ from sonic_bullet.render.contact_place import (
     contact_modulus,
     effective_mass,
     flat_area_m2,
-    smaller_size,
     touch,
 )
 from sonic_bullet.render.strike_pulses import STEEPEST
@@ -177,7 +176,6 @@ def _begin(pairs, slot, bodies, rows, begin, end, faces, nodes, quaternion):
         height_octaves(body.roughness_m, body.hurst, pair.height_m[side])
     pair.modulus_pa = contact_modulus(bodies[low].modulus_pa, bodies[high].modulus_pa)
     pair.damping_ratio = damping_ratio(min(bodies[low].restitution, bodies[high].restitution))
-    size = smaller_size(bodies, low, high)
     if end > begin:
         pair.mass_kg, curvature, spread = _manifold(rows, begin, end, bodies, low, high, faces, nodes, quaternion)
     else:
@@ -186,7 +184,7 @@ def _begin(pairs, slot, bodies, rows, begin, end, faces, nodes, quaternion):
             if bodies[pair.body[side]].mass_kg > 0.0:
                 mobility += 1.0 / bodies[pair.body[side]].mass_kg
         pair.mass_kg = 1.0 / mobility
-    pair.radius_m = contact_radius_m(curvature, flat_area_m2(spread, size, curvature, FRICTION_FLAT))
+    pair.radius_m = contact_radius_m(curvature, flat_area_m2(bodies, low, high, spread, curvature, FRICTION_FLAT))
 
 
 @njit(nogil=True, error_model="numpy")
