@@ -199,16 +199,13 @@ def predictions(d: Diagnosis) -> list[tuple[str, int, Array, Array]]:
         return []
     n, sr = length_of(known[0])
     start = onset_of(d.case, d.bodies, sr)
-    found = []
+    both, found = _before_and_after(d.closed, d.bodies).values(), []
     for body in d.bodies:
-        placed = [i for i, r in enumerate(body.recordings) if body.family is None or r.position_m is not None]
-        files = [(i, file) for i in placed if (file := body.recordings[i].file) is not None]
-        if not files:
-            continue
-        both = [made[body] for made in _before_and_after(d.closed, [body]).values()]
-        for i, file in files:
-            before, after = (np.concatenate([np.zeros(start), p.sound(i, n - start, sr)]) for p in both)
-            found.append((Path(file).stem, sr, before, after))
+        for i, r in enumerate(body.recordings):
+            if r.file is None or (body.family is not None and r.position_m is None):
+                continue
+            before, after = (np.concatenate([np.zeros(start), one[body].sound(i, n - start, sr)]) for one in both)
+            found.append((Path(r.file).stem, sr, before, after))
     return found
 
 

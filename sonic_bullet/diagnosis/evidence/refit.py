@@ -18,14 +18,13 @@ from sonic_bullet.diagnosis.evidence.effect_evidence import object_evidence, out
 from sonic_bullet.diagnosis.evidence.small_amplitude import at_rest
 from sonic_bullet.diagnosis.evidence.unmatched_modes import CORRECTION, can_tell, sought
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, bends, moves
-from sonic_bullet.diagnosis.prediction.prediction import Prediction, predict, predict_fitted, undamped
+from sonic_bullet.diagnosis.prediction.prediction import Prediction, impact_of, predict, predict_fitted, undamped
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.effects.protocol import (
     BaselineChange,
     ChangesBaseline,
     Dereverberates,
     Effect,
-    Impact,
     ObjectEvidence,
     SplitsPairs,
     Stage,
@@ -262,9 +261,7 @@ def _gained(h: Hypothesis, bodies: tuple[Struck, ...], observed: tuple[ObjectEvi
         direct = np.abs(path_response(h, one.freq_hz, one.sr))
         factor = np.empty(one.pattern.shape)
         for i, level in enumerate(one.impulse_n_s):
-            impact = Impact(float(level) if np.isfinite(level) else 1.0, np.zeros(1), np.ones(1))
-            for effect in h.at(Stage.FORCE):
-                impact = effect.apply(impact)
+            impact = impact_of(float(level), h.at(Stage.FORCE))
             hits = np.abs(
                 (
                     impact.share[:, None]

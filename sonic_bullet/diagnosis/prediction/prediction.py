@@ -66,11 +66,7 @@ class Prediction:
 
     def impact(self, strike: int) -> Impact:
         """What the strike is."""
-        level = self.body.impulse_n_s[strike]
-        impact = Impact(float(level) if np.isfinite(level) else 1.0, np.zeros(1), np.ones(1))
-        for effect in self.acting(Stage.FORCE):
-            impact = effect.apply(impact)
-        return impact
+        return impact_of(float(self.body.impulse_n_s[strike]), self.acting(Stage.FORCE))
 
     def ring(self, strike: int) -> Ring:
         """The modes as a strike starts them, before its pulse's spectrum; those outside the band are silent."""
@@ -151,6 +147,14 @@ def predict(h: Hypothesis, body: Struck) -> Prediction:
     if last:
         model, order = ordered(model, model.freq_hz * (1 + correction[: model.mode_count]), model.decay_per_s)
     return Prediction(h, body, base, model, order)
+
+
+def impact_of(impulse_n_s: float, effects: Iterable[Effect]) -> Impact:
+    """A strike under the effects on its force; impulse_n_s: NaN where unknown."""
+    impact = Impact(impulse_n_s if np.isfinite(impulse_n_s) else 1.0, np.zeros(1), np.ones(1))
+    for effect in effects:
+        impact = effect.apply(impact)
+    return impact
 
 
 def undamped(h: Hypothesis, body: Struck) -> ModalModel:

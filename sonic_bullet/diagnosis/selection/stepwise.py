@@ -19,16 +19,8 @@ from sonic_bullet.diagnosis.evidence.mesh_limits import beyond, of_the_mesh
 from sonic_bullet.diagnosis.evidence.refit import refitted, reidentified
 from sonic_bullet.diagnosis.prediction.diagnosis_problem import DiagnosisProblem, silent
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, mixes_neighbours, moves_itself
-from sonic_bullet.diagnosis.prediction.prediction import Predictions
-from sonic_bullet.diagnosis.prediction.score import (
-    Comparable,
-    Incomparable,
-    Judged,
-    LeftOut,
-    Score,
-    comparable,
-    predict_takes,
-)
+from sonic_bullet.diagnosis.prediction.prediction import Predictions, predict_each
+from sonic_bullet.diagnosis.prediction.score import Comparable, Incomparable, Judged, LeftOut, Score, comparable
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.diagnosis.selection.acceptance import Candidate, accepted
 from sonic_bullet.diagnosis.selection.band_levels import BandOff, bands_off
@@ -95,7 +87,7 @@ def closed(
 ) -> Closed | NothingCompared:
     """Select effects on fitted strikes alone, those that can be compared."""
     start = refitted(base, bodies)
-    made = predict_takes(start, takes)
+    made = predict_each(start, (take.body for take in takes))
     found = comparable(takes, made)
     if isinstance(found, Incomparable):
         return NothingCompared(start, found.left_out)
