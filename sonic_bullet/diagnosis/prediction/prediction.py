@@ -3,8 +3,8 @@
     λ -> corrections -> d = ½(α + βλ) -> MODES -> A = g J (φ(p)·e)(φ(q)·n) · start -> Ring -> BANK -> hits and pulses ->
         SOUND -> samples
 
-Every stage hands a value to the next. Modes are all strikes', so they are worked out when a prediction is made; what one
-strike makes of them is worked out when it is asked for.
+Every stage hands a value to the next. Modes are all strikes', so they are worked out when a prediction is made; what
+one strike makes of them is worked out when it is asked for.
 """
 
 from __future__ import annotations
