@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from sonic_bullet.machine.borrowed import borrowed
 from sonic_bullet.machine.compiled import njit
 from sonic_bullet.synth.fractional_delay import AHEAD, FLUSH, KEPT, INFINITE, TAPS, emit, greatest, leading, move, read
 from sonic_bullet.synth.vector import LANES
@@ -67,9 +68,12 @@ LINE = np.dtype([("awake", "i8"), ("cursor", "i8"), ("newest", "i8")], align=Tru
 """awake: sound is under way; cursor: the emitted sample arrived last; newest: the last emitted that is not zero."""
 
 _HISTORY = 3 * AHEAD
+_SPAN = BLOCK + LANES
+WORK = 3 * _SPAN + 8 + 5 * LANES + KEPT
+"""Doubles that `hear` is lent."""
 
 
-@njit(nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy", forceinline=True)
 def _judged(values, at, n):  # pragma: no cover - compiled
     """n of the values from element ``at`` on: 0 silent, 1 something sounds, 2 or 3 one of them is not finite."""
     whole = n - n % LANES
@@ -82,7 +86,7 @@ def _judged(values, at, n):  # pragma: no cover - compiled
     return said
 
 
-@njit(nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy", forceinline=True)
 def _awake(lines, place, channels):  # pragma: no cover - compiled
     """Whether sound of the place is under way to any microphone."""
     some = 0
@@ -105,19 +109,22 @@ def _free_place(places, lines, sources, step, start, channels):  # pragma: no co
 
 
 @njit(nogil=True, error_model="numpy")
-def _farthest(from_m, to_m, microphone_m):  # pragma: no cover - compiled
-    """Greatest distance of both ends from any microphone: on a straight way it lies at an end. NaN where one is."""
-    square = 0.0
+def _farthest(begin_m, end_m, b, first, last, microphone_m):  # pragma: no cover - compiled
+    """Greatest distance of body b from any microphone at the step's start (``first``) and end (``last``): on a straight
+    way it lies at an end. NaN where one is.
+    """
+    most = 0.0
     for c in range(len(microphone_m)):
         start, stop = 0.0, 0.0
         for axis in range(3):
-            start += (from_m[axis] - microphone_m[c, axis]) ** 2
-            stop += (to_m[axis] - microphone_m[c, axis]) ** 2
-        square = max(start, stop) if not max(start, stop) <= square else square
-    return np.sqrt(square)
+            start += (begin_m[b, axis] - microphone_m[c, axis]) ** 2
+            stop += (end_m[b, axis] - microphone_m[c, axis]) ** 2
+        square = max(start if first else 0.0, stop if last else 0.0) if start < np.inf and stop < np.inf else np.nan
+        most = most if square <= most else square
+    return np.sqrt(most)
 
 
-@njit(nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy", forceinline=True)
 def _fits(place, source, away_m, samples_per_m):  # pragma: no cover - compiled
     """DONE, or what is wrong with a place that sounds so far away."""
     if not away_m < np.inf:
@@ -149,22 +156,24 @@ def _survey(step, n, first, source, pushed, begin_m, end_m, teleported, micropho
             return NOT_FINITE
         loud[b], fresh[b] = said, -1
         body = sources[b]
-        start, stop, main = begin_m[b], end_m[b], body.main
+        main, stays = body.main, True
         observed = said == 1 or _awake(lines, main, channels)
         if teleported[b] and body.left != step and observed:
             p = _free_place(places, lines, sources, step, free, channels)
             if p == len(places):
                 return PLACES_SHORT
             fresh[b], free = p, p + 1
-            wrong = max(wrong, _fits(places[main], body, _farthest(start, start, microphone_m), samples_per_m))
-            start, main = stop, p
+            away_m = _farthest(begin_m, end_m, b, True, False, microphone_m)
+            wrong = max(wrong, _fits(places[main], body, away_m, samples_per_m))
+            main, stays = p, False
         elif body.left == step:
             if said == 1 or _awake(lines, body.leaving, channels):
-                away_m = _farthest(start, start, microphone_m)
+                away_m = _farthest(begin_m, end_m, b, True, False, microphone_m)
                 wrong = max(wrong, _fits(places[body.leaving], body, away_m, samples_per_m))
-            start = stop
+            stays = False
         if observed:
-            wrong = max(wrong, _fits(places[main], body, _farthest(start, stop, microphone_m), samples_per_m))
+            away_m = _farthest(begin_m, end_m, b, stays, True, microphone_m)
+            wrong = max(wrong, _fits(places[main], body, away_m, samples_per_m))
     return wrong
 
 
@@ -196,11 +205,11 @@ def _steepest(x, first, n):  # pragma: no cover - compiled
     return most
 
 
-@njit(nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy", forceinline=True)
 def _emit(b, first, n, source, pushed, x, fade, geometry, tail, emitted, delay):  # pragma: no cover - compiled
     """a and D of body b as `fractional_delay.emit` has them, and its fade: 0 none, 1 in, -1 out, 2 nothing any more.
 
-    tail (5, LANES): lent, for the samples after the last whole group.
+    tail (5·LANES,): lent, for the samples after the last whole group.
     """
     whole = n - n % LANES
     long = source.shape[1]
@@ -208,9 +217,9 @@ def _emit(b, first, n, source, pushed, x, fade, geometry, tail, emitted, delay):
     if whole < n:
         for k in range(n - whole):
             i = first + whole + k
-            tail[0, k], tail[4, k] = source[b, i], x[i]
+            tail[k], tail[4 * LANES + k] = source[b, i], x[i]
             for axis in range(3):
-                tail[1 + axis, k] = pushed[b, axis, i]
+                tail[(1 + axis) * LANES + k] = pushed[b, axis, i]
         emit(tail, 0, tail, LANES, LANES, tail, 4 * LANES, LANES, geometry, emitted, delay, whole)
     if fade != 0:
         for i in range(n):
@@ -219,7 +228,7 @@ def _emit(b, first, n, source, pushed, x, fade, geometry, tail, emitted, delay):
             emitted[i] = value if abs(value) >= FLUSH else 0.0
 
 
-@njit(nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy", forceinline=True)
 def _put(memory, at, mask, sample, values, start, stop):  # pragma: no cover - compiled
     """values[start:stop] into the ring at ``at``, values[0] being of the given sample."""
     while start < stop:
@@ -231,7 +240,7 @@ def _put(memory, at, mask, sample, values, start, stop):  # pragma: no cover - c
         start += count
 
 
-@njit(nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy", forceinline=True)
 def _remember(memory, ring_at, late_at, mask, at, start, stop, emitted, delay, before, steep):  # pragma: no cover - compiled
     """Samples at + start … at + stop - 1 into a line's history, ``before``: the delay before them.
 
@@ -268,7 +277,7 @@ def _newest(emitted, start, stop, none):  # pragma: no cover - compiled
     return none
 
 
-@njit(nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy", forceinline=True)
 def _listen(line, at, n, emitted, delay, heard, memory, ring_at, mask, taps, kept, steep):  # pragma: no cover - compiled
     """Run one line over emitted (n,); what arrives into heard (n,). False where nothing does.
 
@@ -336,22 +345,21 @@ def _listen(line, at, n, emitted, delay, heard, memory, ring_at, mask, taps, kep
     return arrives
 
 
-@njit(nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy", forceinline=True)
 def _play(at, step, n, first, source, pushed, x, steepest, begin_m, end_m, microphone_m, samples_per_m, body, b, p, loud,
-          places, lines, memory, taps, work, kept, geometry, tail, out, out_at):  # fmt: skip  # pragma: no cover - compiled
+          places, lines, memory, taps, emitted, delay, heard, kept, geometry, tail, out, out_at):  # fmt: skip  # pragma: no cover - compiled
     """One place of body b, to every microphone."""
     place = places[p]
     present, moved = p == body.main, body.left == step
     fade = (1 if present else (-1 if p == body.leaving else 2)) if moved else (0 if present else 2)
     channels, size = len(microphone_m), place.size
-    emitted, delay, heard = work[0], work[1], work[2]
     for c in range(channels):
         line = lines[p * channels + c]
         if line.awake == 0 and (fade == 2 or not loud):
             continue
         change = 0.0
         for axis in range(3):
-            start, stop = begin_m[axis] if fade == 0 else end_m[axis], end_m[axis]
+            start, stop = begin_m[b, axis] if fade == 0 else end_m[b, axis], end_m[b, axis]
             if not present:
                 start = stop = place.rest_m[axis]
             geometry[axis], geometry[3 + axis] = microphone_m[c, axis] - start, stop - start
@@ -363,20 +371,22 @@ def _play(at, step, n, first, source, pushed, x, steepest, begin_m, end_m, micro
             count = min(BLOCK, n - lo)
             _emit(b, first + lo, count, source, pushed, x, fade, geometry, tail, emitted, delay)
             if _listen(line, at + lo, count, emitted, delay, heard, memory, ring_at, size - 1, taps, kept, steep):
-                total = out[c, out_at + lo : out_at + lo + count]
-                for i in range(count):
-                    total[i] += heard[i]
+                here = np.uintp(out_at + lo)  # unsigned: numba looks for no wrapped index
+                for i in range(np.uintp(count)):
+                    out[c, here + i] += heard[i]
 
 
 @njit(nogil=True, error_model="numpy")
-def hear(at, step, n, first, source, pushed, begin_m, end_m, teleported, x, microphone_m, samples_per_m, sources, places, lines, memory, taps, out, out_at):  # fmt: skip  # pragma: no cover - compiled
+def hear(at, step, n, first, source, pushed, begin_m, end_m, teleported, x, microphone_m, samples_per_m, sources, places, lines, memory, taps, work, out, out_at):  # fmt: skip  # pragma: no cover - compiled
     """Pressure (Pa) at samples at … at + n - 1 of the step into out (c, ≥ out_at + n) from column out_at on.
 
     source (≥ b, ·) in Pa·m, pushed (≥ b, 3, ·) in Pa·m along each axis, x (·): where between the step's ends each
     sample lies, 0 … 1; all three from column ``first`` on. begin_m, end_m (≥ b, 3), teleported (≥ b,): moved by hand.
     step ≥ 0: number of the step these samples are (part of). sources (b,) SOURCE, places (t,) PLACE, lines (t·c,) LINE,
-    memory: what is under way, changed in place. taps: `tap_polynomials`. Bodies are summed in order; below 1e-30 Pa: 0.
+    memory: what is under way, changed in place. taps: `tap_polynomials`. work (WORK,): lent. Bodies are summed in order; below 1e-30 Pa: 0.
     """
+    source, pushed, begin_m, end_m, x, microphone_m = borrowed(source), borrowed(pushed), borrowed(begin_m), borrowed(end_m), borrowed(x), borrowed(microphone_m)  # fmt: skip
+    sources, places, lines, memory, taps, work, out = borrowed(sources), borrowed(places), borrowed(lines), borrowed(memory), borrowed(taps), borrowed(work), borrowed(out)  # fmt: skip
     channels, bodies = len(microphone_m), len(sources)
     loud, fresh = np.empty(bodies, np.int64), np.empty(bodies, np.int64)
     status = _survey(step, n, first, source, pushed, begin_m, end_m, teleported, microphone_m, samples_per_m, sources, places, lines, loud, fresh)  # fmt: skip
@@ -384,7 +394,8 @@ def hear(at, step, n, first, source, pushed, begin_m, end_m, teleported, x, micr
         return status
     for c in range(channels):
         out[c, out_at : out_at + n] = 0.0
-    work, kept, geometry, tail = np.empty((3, BLOCK + LANES)), np.empty(KEPT), np.empty(8), np.zeros((5, LANES))
+    emitted, delay, heard = work[:_SPAN], work[_SPAN : 2 * _SPAN], work[2 * _SPAN : 3 * _SPAN]
+    geometry, tail, kept = work[3 * _SPAN : 3 * _SPAN + 8], work[3 * _SPAN + 8 : WORK - KEPT], work[WORK - KEPT : WORK]
     kept[TAPS * LANES] = np.nan
     steepest = _steepest(x, first, n)
     for b in range(bodies):
@@ -396,8 +407,8 @@ def hear(at, step, n, first, source, pushed, begin_m, end_m, teleported, x, micr
         p = body.oldest
         while p >= 0:
             if loud[b] == 1 or _awake(lines, p, channels):
-                _play(at, step, n, first, source, pushed, x, steepest, begin_m[b], end_m[b], microphone_m, samples_per_m, body, b, p, loud[b] == 1,
-                      places, lines, memory, taps, work, kept, geometry, tail, out, out_at)  # fmt: skip
+                _play(at, step, n, first, source, pushed, x, steepest, begin_m, end_m, microphone_m, samples_per_m, body, b, p, loud[b] == 1,
+                      places, lines, memory, taps, emitted, delay, heard, kept, geometry, tail, out, out_at)  # fmt: skip
             p = places[p].next
     for c in range(channels):
         total = out[c, out_at : out_at + n]
