@@ -194,9 +194,10 @@ def nearest_face(faces, face_at, nodes, node_at, wall_m, tie_m, px, py, pz, nx, 
     the surface should have, 0 for any.
     """
     stack, gaps = np.empty(_DEEPEST, np.int64), np.empty(_DEEPEST)
-    any_face, any2 = 0, np.inf  # nearest of all
-    # of those that look along n: the chosen one, its distance, n·normal; the least distance
-    same_face, same, along, least = -1, np.inf, 0.0, np.inf
+    any_face, any2, any_u, any_v, any_w = 0, np.inf, 1.0, 0.0, 0.0  # nearest of all
+    # of those that look along n: the chosen one, its distance, its place; its n·normal, the least distance
+    same_face, same, same_u, same_v, same_w = -1, np.inf, 1.0, 0.0, 0.0
+    along, least = 0.0, np.inf
     ask = nx != 0 or ny != 0 or nz != 0
     top = 1
     stack[0], gaps[0] = 0, 0.0
@@ -227,18 +228,16 @@ def nearest_face(faces, face_at, nodes, node_at, wall_m, tie_m, px, py, pz, nx, 
             z = u * corner[0, 2] + v * corner[1, 2] + w * corner[2, 2] - pz
             d2 = x * x + y * y + z * z
             if d2 < any2:
-                any_face, any2 = i, d2
+                any_face, any2, any_u, any_v, any_w = i, d2, u, v, w
             looks = nx * normal[0] + ny * normal[1] + nz * normal[2]
             if ask and looks > LOOKS:
                 d = np.sqrt(d2)
                 if d < least - tie_m or (d <= least + tie_m and looks > along + 1e-9):
-                    same_face, same, along = i, d, looks
+                    along, same_face, same, same_u, same_v, same_w = looks, i, d, u, v, w
                 least = min(least, d)
-    chosen, distance = any_face, np.sqrt(any2)
-    if ask and same_face >= 0 and same <= 2 * distance + wall_m:
-        chosen, distance = same_face, same
-    u, v, w = _in_triangle(px, py, pz, faces[face_at + chosen])
-    return chosen, u, v, w, distance
+    if ask and same_face >= 0 and same <= 2 * np.sqrt(any2) + wall_m:
+        return same_face, same_u, same_v, same_w, same
+    return any_face, any_u, any_v, any_w, np.sqrt(any2)
 
 
 @njit(nogil=True, error_model="numpy")
