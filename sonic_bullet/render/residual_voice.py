@@ -179,8 +179,3 @@ def friction_grains(
                 if len(sample):
                     grains.append(Grain((number + 2) * SECTION, w, body, sample))
     return grains, kept
-
-
-def line_modes(voice: ResidualVoice | None, sets: int) -> ModeSet:
-    """What of a body's residual the bank plays."""
-    return voice.lines if voice is not None else ModeSet(np.zeros(0), np.zeros(0), np.zeros((sets, 0), complex))

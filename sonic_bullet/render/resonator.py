@@ -6,7 +6,7 @@ contact lies.
 A rigid body that is pushed sounds too: acceleration noise. A sphere of radius a whose velocity jumps by U is heard as p
 = ρ₀c U (a/r) cosθ e^{-wt}(cos wt - sin wt), w = c/a [Kirchhoff 1876; Koss, Alfredson 1973, eq. 9]. That is the impulse
 response of a mode with decay w and frequency w, to the letter (synth.bank), so the three translations of a body are
-three more modes of the bank: strikes are exact there too. At low frequency it is the compact law p = 3ρ₀V
+three more modes of the bank, of one pole: strikes are exact there too. At low frequency it is the compact law p = 3ρ₀V
 cosθ/(8πcr)·da/dt [Chadwick, Zheng, James 2012], whose coefficient K makes ρ₀ca = 2Kw²; unlike it, it does not grow
 without bound where the body is no longer small.
 """
@@ -22,7 +22,7 @@ from sonic_bullet.machine.compiled import njit
 from sonic_bullet.radiation.far_field import jerk_coefficient
 from sonic_bullet.radiation.radiated import radiation_of
 from sonic_bullet.records import Air, Array, Body, Microphone, ModalSum, Sensor, Vibrometer
-from sonic_bullet.synth.bank import ModeSet, audible
+from sonic_bullet.synth.bank import Translation, audible
 
 CREASE_COS = np.cos(np.radians(20.0))
 EDGE_RADIUS_SHARE = 0.005
@@ -48,7 +48,7 @@ class Resonator:
     normal: Array
     size_m: float
     radius_m: float
-    rigid: ModeSet | None
+    rigid: Translation | None
     dropped: int
     bend: Array | None = None
     damping_growth: Array | None = None
@@ -122,7 +122,7 @@ def build_resonator(body: Body, sensors: tuple[Sensor, ...], sr: int, air: Air) 
     normal = normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
     radius = float(np.linalg.norm(model.vertex_m, axis=1).max(initial=0.0))
     dropped = model.dropped + int(np.sum(~keep))
-    rigid = _rigid(body, 1 + len(readers), sr, air)
+    rigid = _rigid(body, sr, air)
     # velocity at the surface of a mode with |z| = 1
     most = np.sqrt((shape.astype(float) ** 2).sum(axis=1)).max(axis=0, initial=0.0)
     bend = None if model.bend_s2_m2 is None else model.bend_s2_m2[keep] * most**2
@@ -145,15 +145,13 @@ def build_resonator(body: Body, sensors: tuple[Sensor, ...], sr: int, air: Air) 
     )
 
 
-def _rigid(body: Body, sets: int, sr: int, air: Air) -> ModeSet | None:
+def _rigid(body: Body, sr: int, air: Air) -> Translation | None:
     """The mode that each translation of a moving body is; its gain is the force along it, its weight Pa·m per N·s."""
     radius = (3 * body.volume_m3 / (4 * np.pi)) ** (1 / 3)
     if body.mass_kg <= 0 or radius <= 0 or body.material is None:  # the least of volumes have a radius of none, too
         return None
     rate = min(air.sound_speed_m_s / radius, FASTEST_RIGID * np.pi * sr)
-    weight = np.zeros((sets, 1), complex)
-    weight[0] = 2 * jerk_coefficient(body.volume_m3, air) * rate**2 / body.mass_kg
-    return ModeSet(np.array([rate]), np.array([rate]), weight, held=True)
+    return Translation(rate, rate, 2 * jerk_coefficient(body.volume_m3, air) * rate**2 / body.mass_kg)
 
 
 def _size(body: Body) -> float:

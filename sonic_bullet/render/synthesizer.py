@@ -3,8 +3,8 @@
     Step -> loads (synth.strikes) -> impacts, friction -> bank of modes and of rigid motions (synth.bank) + residual ->
         sound path (synth.path) -> frame
 
-Each body has five places in the bank: its modes, its three translations (see resonator.py), and the lines of its
-residual (see residual_voice.py).
+Each body is one of the bank's: its modes, behind them the lines of its residual (see residual_voice.py), and its three
+translations (see resonator.py).
 
 A step's sound is made when the `LOOKAHEAD` steps after it are known. Live listening, `sound` (which drains a copy of
 the state) and the replay of a log run the same code on the same numbers in the same order: the same bits.
@@ -30,20 +30,15 @@ from sonic_bullet.render.residual_voice import (
     build_residual_voice,
     friction_grains,
     impact_grains,
-    line_modes,
 )
 from sonic_bullet.render.resonator import Resonator, build_resonator, weight_sets
 from sonic_bullet.residual.player import Grain, add_grains
 from sonic_bullet.synth import bank, path
 from sonic_bullet.synth.bank import Bank, BankState
 from sonic_bullet.synth.path import Path, PathState
-from sonic_bullet.synth.pulse import pulse_cells, pulse_nodes
 from sonic_bullet.synth.strikes import LOOKAHEAD, SPAN, LoadHistory, push, split
 
 LATENCY_STEPS = LOOKAHEAD
-PLACES = 5
-CELLS_PER_RADIAN = 4.0
-"""Cells of a pulse per 1/w of a rigid body: a third of (w·cell)³ = 0.5 % is what its level may err."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -116,22 +111,7 @@ def with_bodies(setup: Setup, state: State, bodies: Sequence[Body]) -> State:
         return state
     new = tuple(build_resonator(body, setup.sensors, setup.sr, setup.air) for body in bodies)
     voices = tuple(build_residual_voice(s, setup.sr, setup.air) if setup.residual else None for s in new)
-    modes = [
-        part
-        for s, more in zip(new, voices, strict=True)
-        for part in (
-            bank.ModeSet(
-                s.omega_rad_s,
-                s.decay_per_s,
-                s.weight,
-                bend=s.bend,
-                damping_growth=s.damping_growth,
-                damping_growth_power=s.damping_growth_power,
-            ),
-            *((s.rigid or _nothing(setup),) * 3),
-            line_modes(more, len(s.weight)),
-        )
-    ]
+    modes = [_mode_set(s, more) for s, more in zip(new, voices, strict=True)]
     instrument, ringing = bank.append(state.bank, state.ringing, modes)
     air, travelling = path.append_bodies(state.path, state.travelling, *_places(new))
     # a silent partner's record begins where it first touches, not where it was put
@@ -156,8 +136,31 @@ def _places(resonators: tuple[Resonator, ...]) -> tuple[Array, Array]:
     return np.array([s.radius_m for s in resonators]), np.ones(len(resonators))
 
 
-def _nothing(setup: Setup) -> bank.ModeSet:
-    return bank.ModeSet(np.zeros(0), np.zeros(0), np.zeros((1 + len(weight_sets(setup.sensors)), 0), complex))
+def _mode_set(s: Resonator, more: ResidualVoice | None) -> bank.ModeSet:
+    """A body as the bank takes it: its modes, and the lines of its residual behind them."""
+    own = bank.ModeSet(
+        s.omega_rad_s, s.decay_per_s, s.weight, s.bend, s.damping_growth, s.damping_growth_power, s.rigid
+    )
+    if more is None:
+        return own
+    lines = more.lines
+    bend, damping_growth = (
+        None if x is None or y is None else np.concatenate([x, y])
+        for x, y in ((s.bend, lines.bend), (s.damping_growth, lines.damping_growth))
+    )
+    return replace(
+        own,
+        omega_rad_s=np.concatenate([s.omega_rad_s, lines.omega_rad_s]),
+        decay_per_s=np.concatenate([s.decay_per_s, lines.decay_per_s]),
+        weight=np.concatenate([s.weight, lines.weight], axis=1),
+        bend=bend,
+        damping_growth=damping_growth,
+    )
+
+
+def _columns(gain: Array, more: ResidualVoice | None) -> Array:
+    """A gain of each mode, and of each line that of the mode it follows."""
+    return gain if more is None else np.concatenate([gain, gain[more.follows]])
 
 
 def take_step(setup: Setup, state: State, step: Step) -> tuple[Array | None, State]:
@@ -249,10 +252,9 @@ def _render(setup: Setup, state: State) -> tuple[Array, State]:
         ]
     drives, friction = advance_friction(state.friction, parts, step, window[1], rows[1], resonators, x, sr, setup.seed)
     first, voices = clock.sample(sr), state.voices
-    strikes = [
-        strike for begin_s, pulse in pulses for strike in _strikes(pulse, begin_s, resonators, voices, sr, first)
-    ]
-    sound = bank.advance(state.bank, state.ringing, count, strikes, _forces(drives, resonators, voices, x), x)
+    strikes = [strike for begin_s, pulse in pulses for strike in _strikes(pulse, begin_s, voices, sr, first)]
+    pushed = np.zeros((len(resonators), 3, count))
+    sound = bank.advance(state.bank, state.ringing, count, strikes, _forces(drives, voices), x, pushed)
     more, rubs = friction_grains(state.rubs, drives, resonators, voices, first, count, setup.seed)
     grains = (
         *state.grains,
@@ -263,10 +265,8 @@ def _render(setup: Setup, state: State) -> tuple[Array, State]:
         ),
         *more,
     )
-    if any(more is not None for more in voices):
-        sound[:, 0::PLACES] += sound[:, 4::PLACES]
-    grains = add_grains(sound[:, 0::PLACES], grains, first)
-    frame = _at_sensors(setup, state, sound, x)
+    grains = add_grains(sound, grains, first)
+    frame = _at_sensors(setup, state, sound, pushed, x)
     return frame, replace(
         state,
         number=state.number + 1,
@@ -280,77 +280,44 @@ def _render(setup: Setup, state: State) -> tuple[Array, State]:
 
 
 def _strikes(
-    pulse: ForcePulse,
-    step_start_s: float,
-    resonators: tuple[Resonator, ...],
-    voices: tuple[ResidualVoice | None, ...],
-    sr: int,
-    earliest: int,
+    pulse: ForcePulse, step_start_s: float, voices: tuple[ResidualVoice | None, ...], sr: int, earliest: int
 ) -> list[bank.Strike]:
-    """The pulse on the modes, translations and residual lines of both bodies."""
-    offset_s, spacing_s, weight = pulse_nodes(pulse.length_s, sr, flat=pulse.flat)
+    """The pulse on both bodies."""
     start = max((step_start_s + pulse.start_s) * sr, float(earliest))
-    strikes = []
-    sides = (
-        (pulse.low, pulse.share * pulse.modes_low, pulse.share * pulse.impulse_n_s),
-        (pulse.high, pulse.share * pulse.modes_high, -pulse.share * pulse.impulse_n_s),
-    )
-    for body, modes, shove in sides:
-        if modes.any():
-            strikes.append(bank.Strike(PLACES * body, start + offset_s * sr, spacing_s * sr, weight, modes))
-            more = voices[body]
-            if more is not None and len(more.follows):
-                strikes.append(
-                    bank.Strike(PLACES * body + 4, start + offset_s * sr, spacing_s * sr, weight, modes[more.follows])
-                )
-        rigid = resonators[body].rigid
-        if rigid is not None:
-            cells = pulse_cells(
-                start, pulse.length_s, sr, int(np.ceil(CELLS_PER_RADIAN * rigid.decay_per_s[0] / sr)), flat=pulse.flat
-            )
-            strikes += [
-                bank.Strike(PLACES * body + 1 + int(axis), *cells, shove[axis : axis + 1])
-                for axis in np.flatnonzero(shove)
-            ]
-    return strikes
-
-
-def _forces(
-    drives: Sequence[Drive], resonators: tuple[Resonator, ...], voices: tuple[ResidualVoice | None, ...], x: Array
-) -> list[bank.Force]:
-    """Drives on modes and residual lines, each with its own gains, and on translations, where all forces on a body act
-    as one.
-    """
-    forces = []
-    pushes: dict[int, Array] = {}
-    for drive in drives:
-        push = drive.force_n * (drive.direction0[:, None] + (drive.direction1 - drive.direction0)[:, None] * x)
-        for side, body in enumerate((drive.low, drive.high)):
-            if resonators[body].mode_count:
-                forces.append(bank.Force(PLACES * body, drive.force_n, drive.gain0[side], drive.gain1[side]))
-                more = voices[body]
-                if more is not None and len(more.follows):
-                    forces.append(
-                        bank.Force(
-                            PLACES * body + 4,
-                            drive.force_n,
-                            drive.gain0[side][more.follows],
-                            drive.gain1[side][more.follows],
-                        )
-                    )
-            if resonators[body].rigid is not None:
-                pushes[body] = pushes.get(body, 0.0) + (push if side == 0 else -push)
-    one = np.ones(1)
-    return forces + [
-        bank.Force(PLACES * body + 1 + axis, push[axis], one, one) for body, push in pushes.items() for axis in range(3)
+    sides = (pulse.low, pulse.modes_low, pulse.impulse_n_s), (pulse.high, pulse.modes_high, -pulse.impulse_n_s)
+    return [
+        bank.Strike(
+            body,
+            start,
+            pulse.length_s,
+            _columns(pulse.share * modes, voices[body]),
+            pulse.flat,
+            pulse.share * shove,
+        )
+        for body, modes, shove in sides
     ]
 
 
-def _at_sensors(setup: Setup, state: State, sound: Array, x: Array) -> Array:
-    """(channels, n) of the bank's sound (W, PLACES·b, n): microphones hear through the air, the others sum their weight
+def _forces(drives: Sequence[Drive], voices: tuple[ResidualVoice | None, ...]) -> list[bank.Force]:
+    """Drives on both bodies, each with its own gains."""
+    return [
+        bank.Force(
+            body,
+            drive.force_n,
+            _columns(drive.gain0[side], voices[body]),
+            _columns(drive.gain1[side], voices[body]),
+            sign * drive.direction0,
+            sign * drive.direction1,
+        )
+        for drive in drives
+        for side, (body, sign) in enumerate(((drive.low, 1.0), (drive.high, -1.0)))
+    ]
+
+
+def _at_sensors(setup: Setup, state: State, modal: Array, pushed: Array, x: Array) -> Array:
+    """(channels, n) of the bank's sound, (W, b, n) and (b, 3, n): microphones hear through the air, the others sum their weight
     set over the bodies.
     """
-    modal, pushed = sound[:, 0::PLACES], np.stack([sound[0, part::PLACES] for part in (1, 2, 3)], axis=1)
     here, there, newest = state.window[0], state.window[1], state.window[-1]
     end = newest.position_m.copy()  # of bodies that came later than this step: where they came
     end[: len(there.position_m)] = there.position_m

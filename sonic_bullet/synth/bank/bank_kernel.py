@@ -29,7 +29,7 @@ PUSH_SCRATCH = COLUMNS // PAIR * ROOM * drive.STEP
 DRIVE_SCRATCH = PUSH_SCRATCH + DRIVEN * LANES + DRIVEN + MOST_DUE
 
 
-@njit(nogil=True)
+@njit(nogil=True, _nrt=False)
 def _ring(b, start, stop, columns, z, pole, block, weight, modes, observed, sound, scratch):  # pragma: no cover
     """Tile of body b for the block that starts:
 
@@ -57,7 +57,7 @@ def _ring(b, start, stop, columns, z, pole, block, weight, modes, observed, soun
     return ringing
 
 
-@njit(nogil=True)
+@njit(nogil=True, _nrt=False)
 def bend_poles(z, driven, span, law, start, stop, pole, block):  # pragma: no cover - compiled
     """Poles of a level-dependent body for the ``span`` samples to come: means over them of what its modes do if nothing
     strikes them.
@@ -85,14 +85,14 @@ def bend_poles(z, driven, span, law, start, stop, pole, block):  # pragma: no co
             block[m], block[modes + m] = q * np.cos(turn * BLOCK), q * np.sin(turn * BLOCK)
 
 
-@njit(nogil=True)
+@njit(nogil=True, _nrt=False)
 def _copy_flushed(values, out):  # pragma: no cover - compiled
     for k in range(len(out)):
         value = values[k]
         out[k] = value if abs(value) >= FLUSH else 0.0
 
 
-@njit(nogil=True)
+@njit(nogil=True, _nrt=False)
 def _close_block(z, driven, pole, modes, start, stop):  # pragma: no cover - compiled
     """End of a block: what was driven within it joins the free state of the next."""
     for re in range(start, stop):
@@ -104,7 +104,26 @@ def _close_block(z, driven, pole, modes, start, stop):  # pragma: no cover - com
         driven[im] = 0.0
 
 
-@njit(nogil=True)
+@njit(nogil=True, _nrt=False)
+def _flush(values, count):  # pragma: no cover - compiled
+    for k in range(count):
+        values[k] = values[k] if abs(values[k]) >= FLUSH else 0.0
+
+
+@njit(nogil=True, _nrt=False)
+def _share(n, force_n, progress, period, early, late):  # pragma: no cover - compiled
+    """A force's impulses, parted between both ends of its gains."""
+    for k in range(n):
+        push = force_n[k] * period
+        push = push if abs(push) >= FLUSH else 0.0
+        early[k] = push * (1.0 - progress[k])
+        late[k] = push * progress[k]
+    for k in range(n, len(early)):
+        early[k] = 0.0
+        late[k] = 0.0
+
+
+@njit(nogil=True, _nrt=False)
 def list_forces(
     n, drive_count, drive_body, force_n, gain0, gain1, progress, period, bodies, first, side, signal
 ):  # pragma: no cover - compiled
@@ -129,27 +148,15 @@ def list_forces(
             if b >= 0:
                 side[first[b]] = 2 * d + s
                 first[b] += 1
-                for m in range(bodies[b].columns):
-                    if abs(gain0[d, s, m]) < FLUSH:
-                        gain0[d, s, m] = 0.0
-                    if abs(gain1[d, s, m]) < FLUSH:
-                        gain1[d, s, m] = 0.0
-        early, late, force = signal[d, 0], signal[d, 1], force_n[d]
-        for k in range(n):
-            push = force[k] * period
-            if abs(push) < FLUSH:
-                push = 0.0
-            early[k] = push * (1.0 - progress[k])
-            late[k] = push * progress[k]
-        for k in range(n, signal.shape[2]):
-            early[k] = 0.0
-            late[k] = 0.0
+                _flush(gain0[d, s], bodies[b].columns)
+                _flush(gain1[d, s], bodies[b].columns)
+        _share(n, force_n[d], progress, period, signal[d, 0], signal[d, 1])
     for b in range(count, 0, -1):
         first[b] = first[b - 1]
     first[0] = 0
 
 
-@njit(nogil=True)
+@njit(nogil=True, _nrt=False)
 def _drive(
     at, i, count, b, place, start, stop, law, weight, observed, ringing, z, driven, sound, pole, block, strikes, rows, hertz,
     f0, f1, side, gain0, gain1, signal, plan, scratch, source,
@@ -199,7 +206,7 @@ def _drive(
             _copy_flushed(total, source[w, b, i : i + count])
 
 
-@njit(nogil=True)
+@njit(nogil=True, _nrt=False)
 def _advance_modes(
     at, n, b, bodies, law, weight, observed, ringing, z, driven, sound, pole, block, strikes, rows, hertz,
     f0, f1, side, gain0, gain1, signal, plan, scratch, source,
@@ -243,7 +250,7 @@ def _advance_modes(
         i = end
 
 
-@njit(nogil=True)
+@njit(nogil=True, _nrt=False)
 def advance(
     at, n, sr, bodies, law, weight, observed, ringing, z, driven, sound, pole, block, strikes, rows, free, hertz,
     drive_count, drive_body, force_n, gain0, gain1, direction0, direction1, progress, first, side, signal, kick, plan,

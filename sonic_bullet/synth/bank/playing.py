@@ -102,9 +102,9 @@ def _enter(bank: Bank, state: BankState, strikes: Sequence[Strike]) -> None:
         if not (np.isfinite(strike.start) and 0 < length < np.inf and np.isfinite(strike.shove_n_s).all()):
             raise AudioError(
                 f"a strike on body {strike.body} of {strike.length_s} s at {strike.start}",
-                "give a finite start, length and shove",
+                "give a finite start, shove and length above 0",
             )
-        if strike.start < state.at:
+        if np.ceil(strike.start) < state.at:
             raise AudioError(
                 f"a strike at sample {strike.start:.2f}, but {state.at} samples have sounded",
                 "pass strikes before their time has sounded",
