@@ -315,8 +315,8 @@ def _forces(drives: Sequence[Drive], voices: tuple[ResidualVoice | None, ...]) -
 
 
 def _at_sensors(setup: Setup, state: State, modal: Array, pushed: Array, x: Array) -> Array:
-    """(channels, n) of the bank's sound, (W, b, n) and (b, 3, n): microphones hear through the air, the others sum their weight
-    set over the bodies.
+    """(channels, n) of the bank's sound, (W, b, n) and (b, 3, n): microphones hear through the air, the others sum
+    their weight set over the bodies.
     """
     here, there, newest = state.window[0], state.window[1], state.window[-1]
     end = newest.position_m.copy()  # of bodies that came later than this step: where they came

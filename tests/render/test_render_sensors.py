@@ -293,9 +293,7 @@ def test_a_force_that_swings_moves_a_rigid_body_as_the_sphere_law_says(radius: f
     n = 9600
     along, pushed = np.array([1.0, 0.0, 0.0]), np.zeros((1, 3, n))
     force = np.sin(2 * np.pi * freq * np.arange(n) / SR)
-    bank.advance(
-        instrument, ringing, n, (), [bank.Force(0, force, none, none, along, along)], np.zeros(n), pushed
-    )
+    bank.advance(instrument, ringing, n, (), [bank.Force(0, force, none, none, along, along)], np.zeros(n), pushed)
     out = pushed[0, 0]
     s, w = 2j * np.pi * freq, resonator.rigid.omega_rad_s
     law = abs(2 * jerk_coefficient(body.volume_m3, Air()) * w**2 * s / ((s + w) ** 2 + w**2)) / body.mass_kg

@@ -84,8 +84,8 @@ def advance(
     scratch.fit(bank.body_count, drives, n)
     bank_kernel.advance(
         state.at, n, float(bank.sr), bank.body, bank.law, bank.weight, bank.observed,
-        state.ringing, state.z, state.driven, state.sound, state.pole, state.block, state.strikes, state.rows, state.free,
-        _table(), drives, body, signal, gain[0], gain[1], direction[0], direction[1], along,
+        state.ringing, state.z, state.driven, state.sound, state.pole, state.block, state.strikes, state.rows,
+        state.free, _table(), drives, body, signal, gain[0], gain[1], direction[0], direction[1], along,
         scratch.first, scratch.side, scratch.signal, scratch.kick, scratch.plan, scratch.flat, out, pushed,
         np.zeros((bank.body_count, 2), np.int64),
     )  # fmt: skip

@@ -45,7 +45,24 @@ def pulse_force(share, flat, hertz):  # pragma: no cover - compiled
 
 @njit(nogil=True, error_model="numpy", _nrt=False)
 def enter_strike(
-    b, start, length_s, flat, share, gain, shove_x, shove_y, shove_z, at, sr, bodies, law, ringing, strikes, rows, free, hertz
+    b,
+    start,
+    length_s,
+    flat,
+    share,
+    gain,
+    shove_x,
+    shove_y,
+    shove_z,
+    at,
+    sr,
+    bodies,
+    law,
+    ringing,
+    strikes,
+    rows,
+    free,
+    hertz,
 ):  # pragma: no cover - compiled
     """Enter one pulse on body b: 0, or 1 where the pool is full (nothing has changed then).
 
@@ -204,7 +221,8 @@ def plan_nodes(slot, at, count, strikes, hertz, plan, due, final):  # pragma: no
 def enter_pulses(
     pulses, count, push, begin_s, after_s, at, sr, bodies, law, ringing, strikes, rows, free, hertz
 ):  # pragma: no cover - compiled
-    """Enter a step's pulses on both bodies of each, in order: how many were, less than ``count`` where the pool is full.
+    """Enter a step's pulses on both bodies of each, in order: how many were, less than ``count`` where the pool is
+    full.
 
     pulses: PULSE rows of render.tables; push (pulses, 2, columns): Uᵀj of the whole impulse. begin_s, after_s: of the
     rendered step, absolute: those found in the step after it count from there. at: the next sample.

@@ -13,8 +13,6 @@ it has fallen below the floor at one of every DRIVEN samples of absolute time.
 # mypy: disable-error-code="no-untyped-def"
 from __future__ import annotations
 
-import numpy as np
-
 from sonic_bullet.machine.compiled import njit
 from sonic_bullet.synth.bank.layout import DRIVEN, FLOOR, FLUSH
 from sonic_bullet.synth.pulse import _cumulated
@@ -105,7 +103,23 @@ def _run_axes(at, n, b, bodies, ringing, kick, pushed):  # pragma: no cover - co
 
 @njit(nogil=True, error_model="numpy", _nrt=False)
 def translate(
-    at, n, b, bodies, ringing, strikes, hertz, first, last, side, force_n, direction0, direction1, progress, period, kick, pushed
+    at,
+    n,
+    b,
+    bodies,
+    ringing,
+    strikes,
+    hertz,
+    first,
+    last,
+    side,
+    force_n,
+    direction0,
+    direction1,
+    progress,
+    period,
+    kick,
+    pushed,
 ):  # pragma: no cover - compiled
     """Samples at … at + n - 1 of body b's translations into pushed (3, n). False, and nothing done, where they rest.
 
@@ -119,9 +133,7 @@ def translate(
     if not (struck or last > first or ringing[b].moving):
         return False
     onset_re, onset_im = bodies[b].rigid_onset[0], bodies[b].rigid_onset[1]
-    _gather_forces(
-        n, first, last, side, force_n, direction0, direction1, progress, period, onset_re, onset_im, kick
-    )
+    _gather_forces(n, first, last, side, force_n, direction0, direction1, progress, period, onset_re, onset_im, kick)
     slot = ringing[b].strike
     while struck and slot >= 0:
         if strikes[slot].rigid:
