@@ -97,7 +97,7 @@ def nearest(index: SurfaceIndex, points_m: Array, normals: Array | None = None) 
     points = np.ascontiguousarray(points_m, float).reshape(-1, 3)
     wanted = np.zeros_like(points) if normals is None else np.ascontiguousarray(normals, float).reshape(-1, 3)
     face, found = np.empty(len(points), np.int64), np.empty((len(points), 4))
-    _nearest_faces(index.faces, index.nodes, index.wall_m, index.tie_m, points, wanted, face, found)
+    _nearest_faces(index.faces, index.nodes, 0, index.wall_m, index.tie_m, points, wanted, face, found)
     return index.order[face], found[:, :3], found[:, 3]
 
 
@@ -241,10 +241,13 @@ def nearest_face(faces, face_at, nodes, node_at, wall_m, tie_m, px, py, pz, nx, 
 
 
 @njit(nogil=True, error_model="numpy")
-def _nearest_faces(faces, nodes, wall_m, tie_m, point_m, wanted, face, found):
-    """`nearest_face` of points (k, 3) with normals (k, 3): into face (k,) and found (k, 4), the distance last."""
+def _nearest_faces(faces, nodes, first, wall_m, tie_m, point_m, wanted, face, found):
+    """`nearest_face` of points (k, 3) with normals (k, 3): into face (k,) and found (k, 4), the distance last.
+
+    first: 0, as an argument: numba compiles a kernel anew for a number that stands in the code.
+    """
     for k in range(len(point_m)):
         p, n = point_m[k], wanted[k]
         face[k], found[k, 0], found[k, 1], found[k, 2], found[k, 3] = nearest_face(
-            faces, 0, nodes, 0, wall_m, tie_m, p[0], p[1], p[2], n[0], n[1], n[2]
+            faces, first, nodes, first, wall_m, tie_m, p[0], p[1], p[2], n[0], n[1], n[2]
         )
