@@ -118,7 +118,10 @@ def greatest(typingctx, values, at, count, rows, stride):
             here = builder.add(at, builder.mul(r, stride))
             after = builder.add(here, whole)
             groups = e.loop(
-                whole, LANES, [carried[0]], lambda k, now: [more(e.load(values, builder.add(here, k)), integers, now[0])]
+                whole,
+                LANES,
+                [carried[0]],
+                lambda k, now: [more(e.load(values, builder.add(here, k)), integers, now[0])],
             )
             single = e.loop(
                 builder.sub(count, whole),
@@ -288,5 +291,3 @@ def read(typingctx, memory, ring_at, late_at, gone, taps, kept, heard, at):
         return context.get_dummy_value()
 
     return types.void(memory, ring_at, late_at, gone, taps, kept, heard, at), codegen
-
-

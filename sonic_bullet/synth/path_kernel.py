@@ -18,7 +18,20 @@ import numpy as np
 
 from sonic_bullet.machine.borrowed import borrowed
 from sonic_bullet.machine.compiled import njit
-from sonic_bullet.synth.fractional_delay import AHEAD, FLUSH, KEPT, INFINITE, MOST_FALL, TAPS, add, emit, greatest, leading, move, read
+from sonic_bullet.synth.fractional_delay import (
+    AHEAD,
+    FLUSH,
+    KEPT,
+    INFINITE,
+    MOST_FALL,
+    TAPS,
+    add,
+    emit,
+    greatest,
+    leading,
+    move,
+    read,
+)
 from sonic_bullet.synth.vector import LANES
 
 DONE, MEMORY_SHORT, PLACES_SHORT, TOO_FAR, NOT_FINITE = range(5)
@@ -181,7 +194,9 @@ def _newest(emitted, start, stop, none):  # pragma: no cover - compiled
 
 
 @njit(nogil=True, error_model="numpy")
-def _remember(memory, ring_at, late_at, mask, at, start, n, emitted, delay, before, steep):  # pragma: no cover - compiled
+def _remember(
+    memory, ring_at, late_at, mask, at, start, n, emitted, delay, before, steep
+):  # pragma: no cover - compiled
     """Samples at + start … at + n - 1, which lie in one piece, into a line's history, ``before``: the delay before them.
 
     steep: delays fall faster than MOST_FALL.
@@ -211,7 +226,9 @@ def _wake(memory, ring_at, late_at, mask, n, late):  # pragma: no cover - compil
 
 
 @njit(nogil=True, error_model="numpy")
-def _listen(line, at, n, emitted, delay, heard, memory, ring_at, mask, taps, kept, steep):  # pragma: no cover - compiled
+def _listen(
+    line, at, n, emitted, delay, heard, memory, ring_at, mask, taps, kept, steep
+):  # pragma: no cover - compiled
     """Run one line over emitted (n,); what arrives into heard (n,). False where nothing does.
 
     Samples count from ``at`` in here: i, m, newest.

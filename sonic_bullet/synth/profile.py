@@ -160,9 +160,7 @@ def _read(typingctx, work, where, share, count, lattice, change, origin, inverse
 
         def body(i: Value, carried: list[Value]) -> list[Value]:
             x = e.load(work, builder.add(share, i))
-            u = builder.fsub(
-                builder.fmul(e.load(work, builder.add(where, i)), e.spread(inverse)), e.spread(origin)
-            )
+            u = builder.fsub(builder.fmul(e.load(work, builder.add(where, i)), e.spread(inverse)), e.spread(origin))
             cell = builder.fptosi(u, ir.VectorType(I32, LANES))
             t = builder.fsub(u, builder.sitofp(cell, VEC))
             halves = []
@@ -177,10 +175,7 @@ def _read(typingctx, work, where, share, count, lattice, change, origin, inverse
                 low = mixed(c[0], c[1], 0, 4, 2, 6), mixed(c[0], c[1], 1, 5, 3, 7)
                 high = mixed(c[2], c[3], 0, 4, 2, 6), mixed(c[2], c[3], 1, 5, 3, 7)
                 halves.append(
-                    [
-                        mixed(low[k % 2], high[k % 2], *((0, 1, 4, 5) if k < 2 else (2, 3, 6, 7)))
-                        for k in range(4)
-                    ]
+                    [mixed(low[k % 2], high[k % 2], *((0, 1, 4, 5) if k < 2 else (2, 3, 6, 7))) for k in range(4)]
                 )
             p = [mixed(a, b, *range(LANES)) for a, b in zip(*halves, strict=True)]
             d = [builder.fsub(p[k + 1], p[k]) for k in range(3)]
@@ -243,14 +238,10 @@ def sweep_profile(swept, speed0, speed1, x, key, height0, height1, per_sample_s,
     for j in range(coarsest, finest + 1):
         low, high = _lattice(first, last, finest - j)
         coarse, pairs = now + (low >> 1) - begin - 1, (high - low + 1) >> 1
-        _refine(
-            work, coarse, new, change, pairs, place + 0x3C6EF372 * j + low, height0[j], height1[j] - height0[j]
-        )
+        _refine(work, coarse, new, change, pairs, place + 0x3C6EF372 * j + low, height0[j], height1[j] - height0[j])
         now, new, begin = new, now, low
     origin = max(begin + 1, 0)  # never below 0: a place less it has no more digits than the place, and is exact
-    _read(
-        work, 0, whole, whole, now + origin - begin - 1, change, float(origin), inverse, speed0, gain, rate, out
-    )
+    _read(work, 0, whole, whole, now + origin - begin - 1, change, float(origin), inverse, speed0, gain, rate, out)
     return swept, work
 
 

@@ -135,7 +135,12 @@ def sound_voices(pairs, voices, count, x, sr, force):
     if count == 0 or n == 0:
         return
     whole = (n + LANES - 1) & -LANES
-    work, rate, lanes, order = np.empty(2048), np.empty(LANES * whole), np.empty(LANES * _ROWS), np.empty(count, np.int64)
+    work, rate, lanes, order = (
+        np.empty(2048),
+        np.empty(LANES * whole),
+        np.empty(LANES * _ROWS),
+        np.empty(count, np.int64),
+    )
     height = np.empty((2, OCTAVES))
     for v in range(count):
         law(pairs, voices, v, sr)
