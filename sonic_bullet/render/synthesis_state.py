@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -22,7 +23,9 @@ from sonic_bullet.render.tables import PAIR, PULSE, ROW, WINDOW
 from sonic_bullet.residual.player import Grain
 from sonic_bullet.synth import bank, path
 from sonic_bullet.synth.bank import Bank, BankState
+from sonic_bullet.synth.fractional_delay import tap_polynomials
 from sonic_bullet.synth.path import Path, PathState
+from sonic_bullet.synth.pulse import pulse_table, spectrum_table
 from sonic_bullet.synth.strikes import SPAN
 
 
@@ -132,6 +135,7 @@ class Scratch:
     source: Array = field(default_factory=lambda: np.zeros((1, 0, 0)))
     pushed: Array = field(default_factory=lambda: np.zeros((0, 3, 0)))
     sounds: Array = field(default_factory=lambda: np.zeros((0, 2), np.int64))
+    samples: int = 0
 
     def fit(self, drives: int, columns: int, samples: int, shape: tuple[int, int]) -> None:
         """Enlarge what is too small for so many drives and twice as many pulses. shape: weight sets and bodies."""
@@ -143,6 +147,7 @@ class Scratch:
             self.body, self.slot = np.zeros((drives, 2), np.int64), np.zeros(drives, np.int64)
         if len(self.force) < len(self.slot) * samples:
             self.force = np.zeros(len(self.slot) * samples)
+        self.samples = max(self.samples, samples)
         if self.source.shape[:2] != shape or self.source.shape[2] < samples:
             self.source, self.pushed = np.zeros((*shape, samples)), np.zeros((shape[1], 3, samples))
             self.sounds = np.zeros((shape[1], 2), np.int64)
@@ -172,6 +177,32 @@ class State:
     quenches: frozenset[int] = frozenset()
     scratch: Scratch = field(default_factory=Scratch)
 
+    reads: Array = field(default_factory=lambda: np.zeros(0, np.int64))
+    has_residual: bool = False
+    _tables: tuple[Any, ...] | None = None
+
+    def changed(self) -> None:
+        """Some table is another array than before."""
+        self._tables = None
+
+    def tables(self) -> tuple[Any, ...]:
+        """What the driver works on, in its order."""
+        if self._tables is None:
+            window, pairs, bodies, room = self.window, self.pairs, self.table, self.scratch
+            bank, ringing, path_, travelling = self.bank, self.ringing, self.path, self.travelling
+            self._tables = (
+                window.step, window.position_m, window.quaternion_xyzw, window.teleported, window.row,
+                bodies.bodies, bodies.faces, bodies.nodes, bodies.shapes, bodies.frequency_hz, spectrum_table(),
+                pairs.pair, pairs.active, pairs.count, pairs.free, pairs.gain,
+                room.pulse, room.push, room.force, room.gain0, room.gain1, room.direction0, room.direction1,
+                room.body, room.slot, bank.body, bank.law, bank.weight, bank.observed,
+                ringing.ringing, ringing.z, ringing.driven, ringing.sound, ringing.pole, ringing.block,
+                ringing.strikes, ringing.rows, ringing.free, pulse_table(), room.source, room.pushed, room.sounds,
+                path_.microphone_m, path_.samples_per_m, travelling.sources, travelling.places, travelling.lines,
+                travelling.memory, tap_polynomials(), self.reads,
+            )  # fmt: skip
+        return self._tables
+
     @property
     def number(self) -> int:
         """Of the step to be rendered next."""
@@ -182,7 +213,7 @@ class State:
         return State(
             self.window.copy(), self.pairs.copy(), self.table.copy(), self.bank, self.ringing.copy(), self.path,
             self.travelling.copy(), self.taken, self.clock, self.waiting, self.resonators, self.voices, self.grains,
-            dict(self.rubs), self.quenches,
+            dict(self.rubs), self.quenches, Scratch(), self.reads, self.has_residual,
         )  # fmt: skip
 
 
@@ -199,7 +230,7 @@ def start(setup: Setup) -> State:
         np.zeros(0, ROW),
     )
     pairs = Pairs(np.zeros(0, PAIR), none, np.zeros(2, np.int64), none, np.zeros((0, 2, 0)))
-    return State(window, pairs, BodyTable(), instrument, ringing, air, travelling)
+    return State(window, pairs, BodyTable(), instrument, ringing, air, travelling, reads=setup.reads)
 
 
 def with_bodies(setup: Setup, state: State, bodies: Sequence[Body], position_m: Array, quaternion_xyzw: Array) -> None:
@@ -215,6 +246,9 @@ def with_bodies(setup: Setup, state: State, bodies: Sequence[Body], position_m: 
     state.path, state.travelling = path.append_bodies(state.path, state.travelling, radius)
     state.window.with_bodies(position_m, quaternion_xyzw)
     state.resonators, state.voices = state.resonators + new, state.voices + voices
+    state.has_residual = any(voice is not None for voice in state.voices)
+    state.scratch = Scratch()
+    state.changed()
 
 
 def quench(state: State) -> None:
@@ -228,4 +262,5 @@ def quench(state: State) -> None:
     state.path, state.travelling = path.append_bodies(air, travelling, radius)
     state.ringing = bank.silence(state.ringing)
     state.grains, state.rubs = (), {}
+    state.changed()
     state.quenches = frozenset(number for number in state.quenches if number > state.number)

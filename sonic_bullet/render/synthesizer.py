@@ -24,8 +24,6 @@ from sonic_bullet.render.step_events import drives_of, pulses_of
 from sonic_bullet.render.synthesis_state import Setup, State, quench, start, with_bodies
 from sonic_bullet.residual.player import add_grains
 from sonic_bullet.synth import path, path_kernel
-from sonic_bullet.synth.fractional_delay import tap_polynomials
-from sonic_bullet.synth.pulse import pulse_table, spectrum_table
 from sonic_bullet.synth.strikes import LOOKAHEAD
 
 LATENCY_STEPS = LOOKAHEAD
@@ -41,7 +39,7 @@ def advance(setup: Setup, state: State, steps: Sequence[Step]) -> Array:
     while steps:
         if state.number in state.quenches and len(state.waiting) == LOOKAHEAD:
             quench(state)
-        count = min(len(steps), 1 if any(voice is not None for voice in state.voices) else AT_ONCE)
+        count = min(len(steps), 1 if state.has_residual else AT_ONCE)
         ahead = [q - state.number for q in state.quenches if q > state.number]  # the next one begins anew there
         count = min([count, *(q + LOOKAHEAD - len(state.waiting) for q in ahead)])
         frames.append(_advanced(setup, state, steps[:count]))
@@ -49,46 +47,53 @@ def advance(setup: Setup, state: State, steps: Sequence[Step]) -> Array:
     return np.concatenate(frames, axis=1) if len(frames) != 1 else frames[0]
 
 
-def _schedule(setup: Setup, state: State, steps: Sequence[Step]) -> tuple[Array, Clock, tuple[float, ...]]:
+def _schedule(sr: int, state: State, steps: Sequence[Step]) -> tuple[Array, Clock, tuple[float, ...]]:
     """The STEP table of steps to be taken in, and clock and waiting lengths after them."""
-    table, at, clock, waiting = np.zeros(len(steps), driver.STEP), 0, state.clock, state.waiting
-    number = state.number
-    for row, step in zip(table, steps, strict=True):
-        rows = len(step.contacts)
-        row["dt_s"], row["gravity_m_s2"], row["row"] = step.dt_s, step.gravity_m_s2, (at, at + rows)
-        at += rows
-        row["sample"] = first = clock.sample(setup.sr)
-        waiting = (*waiting, step.dt_s)
+    layout, clock, waiting, number, at = driver.STEP_LAYOUT, state.clock, state.waiting, state.number, 0
+    table = bytearray(len(steps) * layout.size)
+    first = clock.sample(sr)
+    for i, step in enumerate(steps):
+        dt_s, rows = step.dt_s, len(step.contacts)
+        waiting = (*waiting, dt_s)
+        count, offset, begin_s, after_s, quenched = 0, 0.0, 0.0, 0.0, False
+        sample = first
         if len(waiting) > LOOKAHEAD:
-            after = clock.after(waiting[0])
-            row["count"], row["offset"] = after.sample(setup.sr) - first, clock.offset(setup.sr)
-            row["begin_s"], row["after_s"] = clock.time_s, after.time_s
             number += 1
-            row["quench"] = number in state.quenches
-            clock, waiting = after, waiting[1:]
-    return table, clock, waiting
+            after = clock.after(waiting[0])
+            offset, begin_s, after_s, quenched = clock.offset(sr), clock.time_s, after.time_s, number in state.quenches
+            first, clock, waiting = after.sample(sr), after, waiting[1:]
+            count = first - sample
+        layout.pack_into(
+            table, i * layout.size, dt_s, *step.gravity_m_s2.tolist(), at, at + rows, sample, count, offset, begin_s,
+            after_s, quenched,
+        )  # fmt: skip
+        at += rows
+    return np.frombuffer(table, driver.STEP), clock, waiting
 
 
 def _advanced(setup: Setup, state: State, steps: Sequence[Step]) -> Array:
     """`advance` of steps without a quench between; of one alone where a body has a residual."""
-    table, clock, waiting = _schedule(setup, state, steps)
+    sr, begin, pause = setup.sr, state.ringing.at, state.has_residual
+    table, clock, waiting = _schedule(sr, state, steps)
     contacts = _together(np.concatenate, [step.contacts.row for step in steps])
     poses = [
         _together(np.stack, [getattr(s, name) for s in steps])
         for name in ("position_m", "quaternion_xyzw", "teleported")
     ]
-    begin, stop = int(table["sample"][0]), int(table["sample"][-1] + table["count"][-1])
-    longest = int(table["count"].max())
+    stop = clock.sample(sr)
     out = np.zeros((len(setup.sensors), stop - begin))
-    heard = np.zeros((len(setup.microphone_m), stop - begin))
-    pause = any(voice is not None for voice in state.voices)
-    done, resume = 0, False
-    _make_room(state, table[0], longest)
+    heard = out if len(state.path.microphone_m) == len(out) else np.zeros((len(state.path.microphone_m), stop - begin))
+    longest = int(table["count"].max()) if len(steps) > 1 else stop - begin
+    if state.scratch.samples < longest:
+        _make_room(state, table[0], longest)
+    done, resume, taken = 0, False, state.taken
     while done < len(steps):
-        more, status, found, drives = _call(
-            setup, state, table, contacts, poses, done, begin, pause, resume, heard, out
-        )  # fmt: skip
+        more, status, found, drives = driver.advance_steps(
+            done, taken, begin, pause, resume, float(sr), table, contacts, *poses, *state.tables(), heard, out
+        )
         done, resume = done + more, status not in (driver.TO_GROW, path_kernel.DONE)
+        if status == path_kernel.DONE:
+            continue
         if status == driver.TO_GROW:
             _make_room(state, table[done], longest)
         elif status == driver.PAUSED:
@@ -96,9 +101,10 @@ def _advanced(setup: Setup, state: State, steps: Sequence[Step]) -> Array:
         elif status == driver.NOT_FINITE:
             what = "the synthesizer made NaN or infinite samples"
             raise AudioError(what, "report the contact log: this must not happen")
-        elif status != path_kernel.DONE:
+        else:
             state.travelling.at = int(table[done]["sample"])
             path.grow(state.path, state.travelling, status)
+            state.changed()
     state.taken += len(steps)
     state.clock, state.waiting = clock, waiting
     state.ringing.at = state.travelling.at = stop
@@ -114,28 +120,6 @@ def _together(join: Callable[[Sequence[Array]], Array], arrays: Sequence[Array])
     return joined
 
 
-def _call(
-    setup: Setup, state: State, table: Array, contacts: Array, poses: Sequence[Array], first: int, begin: int, pause: bool,
-    resume: bool, heard: Array, out: Array,
-) -> tuple[int, int, int, int]:  # fmt: skip
-    window, pairs, bodies, bank, ringing, room = (
-        state.window, state.pairs, state.table, state.bank, state.ringing, state.scratch,
-    )  # fmt: skip
-    travelling = state.travelling
-    found: tuple[int, int, int, int] = driver.advance_steps(
-        first, state.taken, begin, pause, resume, float(setup.sr), table, contacts, *poses,
-        window.step, window.position_m, window.quaternion_xyzw, window.teleported, window.row,
-        bodies.bodies, bodies.faces, bodies.nodes, bodies.shapes, bodies.frequency_hz, spectrum_table(),
-        pairs.pair, pairs.active, pairs.count, pairs.free, pairs.gain,
-        room.pulse, room.push, room.force, room.gain0, room.gain1, room.direction0, room.direction1, room.body, room.slot,
-        bank.body, bank.law, bank.weight, bank.observed, ringing.ringing, ringing.z, ringing.driven, ringing.sound,
-        ringing.pole, ringing.block, ringing.strikes, ringing.rows, ringing.free, pulse_table(),
-        room.source, room.pushed, room.sounds, state.path.microphone_m, state.path.samples_per_m, travelling.sources,
-        travelling.places, travelling.lines, travelling.memory, tap_polynomials(), setup.reads, heard, out,
-    )  # fmt: skip
-    return found
-
-
 def _make_room(state: State, step: Array, samples: int) -> None:
     """See to it that the step fits: its rows, the pairs and the strikes that they may become."""
     rows = int(step["row"][1] - step["row"][0])
@@ -145,6 +129,7 @@ def _make_room(state: State, step: Array, samples: int) -> None:
     state.pairs.with_room(rows, columns)
     state.ringing.with_room(4 * pairs)
     state.scratch.fit(pairs, columns, samples, state.bank.observed.shape)
+    state.changed()
 
 
 def _add_residuals(setup: Setup, state: State, step: Array, found: int, drives: int) -> None:
