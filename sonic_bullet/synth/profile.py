@@ -49,11 +49,13 @@ LATTICE = 0.30
 SLOWEST_HZ = 8.0
 
 _WAVE_M = LONGEST_M / 2.0 ** np.arange(OCTAVES)
+INNER = {"nogil": True, "error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+"""Of kernels that only kernels call: Python cannot, and less is compiled."""
 _UNIT_RMS = np.sqrt(3.0 * 315 / 151)
 """Makes n_j unit variance: lattice values uniform on ±1 have 1/3, the mean square of the B-spline is 151/315."""
 
 
-@njit(nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+@njit(**INNER)
 def height_octaves(roughness_m, hurst, out):
     """A_j into out (OCTAVES,) in m, scaled for lattice values on ±1, from rms height in m and Hurst exponent."""
     total = 0.0
@@ -65,7 +67,7 @@ def height_octaves(roughness_m, hurst, out):
         out[j] = roughness_m * (out[j] / scale) * _UNIT_RMS
 
 
-@njit(nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+@njit(**INNER)
 def gained_heights(height_m, speed_m_s, patch_radius_m, sr, out):
     """g_j A_j into out (OCTAVES,) at a sweep speed in m/s, not negative, with a contact radius in m."""
     for j in range(OCTAVES):
@@ -182,7 +184,7 @@ def _read(typingctx, work, where, share, count, lattice, change, origin, inverse
     return types.void(work, where, share, count, lattice, change, origin, inverse, speed, gain, rate, out), codegen
 
 
-@njit(nogil=True, error_model="numpy")
+@njit(**INNER)
 def sweep_profile(swept, speed0, speed1, x, key, height0, height1, per_sample_s, work, rate, out):
     """Add dh/dt of one side of one pair to rate[out] … rate[out + n - 1] in m/s; returns the distance swept after the n
     samples, and the scratch, longer where it was too short.
@@ -208,7 +210,7 @@ def sweep_profile(swept, speed0, speed1, x, key, height0, height1, per_sample_s,
     while height0[coarsest] == 0.0 and height1[coarsest] == 0.0:
         coarsest += 1
     inverse = 2.0**finest / (LONGEST_M * LATTICE)
-    first, last = (np.int64(work[0] * inverse) - 1) & -2, (np.int64(swept * inverse) + 2) | 1
+    first, last = (int(work[0] * inverse) - 1) & -2, (int(swept * inverse) + 2) | 1
     size = last - first + 1 + 4 * LANES  # and what is written beyond
     if len(work) < 2 * whole + 4 * size:
         longer = np.empty(2 * whole + 4 * size)
@@ -226,14 +228,13 @@ def sweep_profile(swept, speed0, speed1, x, key, height0, height1, per_sample_s,
         coarse, pairs = now + (low >> 1) - begin - 1, (high - low + 1) >> 1
         _refine(work, coarse, new, change, pairs, place + 0x3C6EF372 * j + low, height0[j], height1[j] - height0[j])
         now, new, begin = new, now, low
-    origin = (
-        begin + 1 if begin >= 0 else 0
-    )  # never below 0: a place less it has no more digits than the place, and is exact
+    # never below 0: a place less its origin then has no more digits than the place, and is exact
+    origin = begin + 1 if begin >= 0 else 0
     _read(work, 0, whole, whole, now + origin - begin - 1, change, float(origin), inverse, speed0, gain, rate, out)
     return swept, work
 
 
-@njit(nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+@njit(**INNER)
 def _lattice(first, last, halvings):
     """First and last coefficient that those from first (even) to last (odd) hang on, so many octaves coarser."""
     for _ in range(halvings):

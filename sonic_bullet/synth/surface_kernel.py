@@ -23,8 +23,8 @@ into blocks gives the same bits, and so does any company of other pairs.
 The way of the data, for the voices that move in a step: `_law` -> rates of eight voices (`profile.sweep_profile`) ->
 `_oscillate`: the eight at once, one a lane -> f - N, a row a voice. State and constants stand in the table of pairs
 (render.tables.PAIR), loads and speeds of the step in the scratch table VOICE. Lengths in δ_lim, forces in
-k·δ_lim^(3/2), u and dh/dt in δ_lim/h, damping in h/δ_lim: then for every pair f = min(δ, 1)^(3/2) + 1.5(δ - 1)₊, and one substep adds
-(h²/m*)·k·√δ_lim = 2/3 of the force to u. The units follow the substeps; nothing is rounded twice.
+k·δ_lim^(3/2), u and dh/dt in δ_lim/h, damping in h/δ_lim: then for every pair f = min(δ, 1)^(3/2) + 1.5(δ - 1)₊, and
+one substep adds (h²/m*)·k·√δ_lim = 2/3 of the force to u. The units follow the substeps; nothing is rounded twice.
 """
 # mypy: disable-error-code="no-untyped-def"
 
@@ -39,7 +39,7 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 
 from sonic_bullet.machine.compiled import njit
-from sonic_bullet.synth.profile import OCTAVES, gained_heights, sweep_profile
+from sonic_bullet.synth.profile import INNER, OCTAVES, gained_heights, sweep_profile
 from sonic_bullet.synth.vector import F64, I32, LANES, VEC, Emit, Value, constant
 
 MOST_SUBSTEPS = 8.0
@@ -68,11 +68,9 @@ VOICE = np.dtype(
 # what `_law` tells of a voice, a row a lane for `_oscillate`; two rows: at the step's start, and until its end
 _DEPTH, _LIFT, _REST, _DAMPING, _RATE_UNIT, _FORCE_UNIT, _SUBSTEPS, _STANDS, _PATCH = 0, 1, 2, 4, 6, 7, 8, 9, 10
 _ROWS = 12
-_INNER = {"nogil": True, "error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-"""Of kernels that only kernels call: Python cannot, and less is compiled."""
 
 
-@njit(**_INNER)
+@njit(**INNER)
 def damping_ratio(restitution):
     """ζ of the linear oscillator that rebounds with this coefficient of restitution: -ln e/√(π² + ln² e), within
     0.25 … 1.
@@ -87,7 +85,7 @@ def damping_ratio(restitution):
     return ratio if ratio > LEAST_DAMPING_RATIO else LEAST_DAMPING_RATIO
 
 
-@njit(**_INNER)
+@njit(**INNER)
 def contact_radius_m(relative_curvature_per_m, flat_area_m2):
     """R* = 1/(κ1+κ2), at most the radius √(A/π) of the nominal area of touching (1 m where A is 0: none known).
 
@@ -97,9 +95,9 @@ def contact_radius_m(relative_curvature_per_m, flat_area_m2):
     return 1.0 / relative_curvature_per_m if relative_curvature_per_m * blunt > 1.0 else blunt
 
 
-@njit(**_INNER)
+@njit(**INNER)
 def _law(pair, voice, sr, constants, at):
-    """The contact law of a voice in this step into constants[at] …, its pair's state in the units of that law with it."""
+    """The contact law of a voice in this step into constants[at] …, with its pair's state in the units of that law."""
     mass, radius, modulus = pair.mass_kg, pair.radius_m, pair.modulus_pa
     load0, load1 = voice.load_n
     k = 4.0 / 3.0 * modulus * np.sqrt(radius)
@@ -135,7 +133,7 @@ def _law(pair, voice, sr, constants, at):
     constants[at + _STANDS] = 1.0 if still else 0.0
 
 
-@njit(**_INNER)
+@njit(**INNER)
 def _line_up(voices, count, constants):
     """The voices' order by substeps, so that few lanes wait for others."""
     last = 0
@@ -146,7 +144,7 @@ def _line_up(voices, count, constants):
                 last += 1
 
 
-@njit(nogil=True, error_model="numpy")
+@njit(**INNER)
 def sound_voices(pairs, voices, count, x, sr, force):
     """Force f - N in newton of the voices 0 … count - 1 into force (voices, n), at the n samples that lie at the shares
     ``x`` (n,) in [0, 1) of one physics step; their pairs move on. Call again with the rest of the step's x for its

@@ -30,7 +30,6 @@ class Table:
         self.faces, self.nodes = np.zeros(1, FACE), np.zeros(1, NODE)
         self.faces["vertex"] = (0, 1, 2)
         self.shapes = np.random.default_rng(4).normal(size=18 * COLUMNS).astype(np.float32)
-        self.touched = 0
 
     def row(self, sweep_m_s: tuple[float, float], friction: float, load_n: float, corner: int = 0) -> Array:
         """The contact in the step that follows."""
@@ -57,7 +56,8 @@ class Table:
         }
         count = advance_friction(
             self.pairs, np.zeros(1, np.int64), 1, self.bodies, rows, len(rows), self.faces, self.nodes, self.shapes,
-            np.array([[0, 0, 0, 1.0]] * 2), DT_S, np.arange(N) / N, float(SR), self.gain, np.zeros(1, VOICE), *out.values(),
+            np.array([[0, 0, 0, 1.0]] * 2), DT_S, np.arange(N) / N, float(SR), self.gain, np.zeros(1, VOICE),
+            *out.values(),
         )  # fmt: skip
         return {name: values[:count] for name, values in out.items()}
 
