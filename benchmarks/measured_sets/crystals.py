@@ -21,6 +21,7 @@ import numpy as np
 from benchmarks.measured_sets.values import DRAWS, Array, Outcome, Row
 from sonic_bullet.diagnosis.diagnose import Diagnosis, diagnose
 from sonic_bullet.diagnosis.prediction.line_score import CAP, off_by
+from sonic_bullet.diagnosis.prediction.prediction import predict
 
 # of any hard solid: E/ρ is sought over a factor of two to each side
 GUESS = {"youngs_modulus": 1.7e11, "poisson_ratio": 0.25}
@@ -127,7 +128,7 @@ def _paint(figure: Any, found: list[tuple[dict[str, Any], Diagnosis]]) -> None:
     for axis, (entry, d) in zip(axes, found, strict=True):
         held = _held(d)
         for label, h in (("isotropic", d.closed.before), ("after", d.closed.after)):
-            off, _ = off_by(h, d.bodies[0], held, np.full(len(held), np.nan))
+            off, _ = off_by(predict(h, d.bodies[0]), held, np.full(len(held), np.nan))
             axis.plot(held / 1e6, 100 * off, "o-", ms=3, lw=0.6, label=label)
         axis.set_xlabel("MHz")
         axis.set_ylabel("|Δf|/f in % (at most 3), lines that were not fitted")

@@ -18,9 +18,9 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet.diagnosis.evidence.baseline import baseline
-from sonic_bullet.diagnosis.prediction.hypothesis import play
 from sonic_bullet.diagnosis.prediction.line_score import CAP, listed, off_by
 from sonic_bullet.diagnosis.prediction.loudness_distance import sone_distance
+from sonic_bullet.diagnosis.prediction.prediction import Predictions, predict_each
 from sonic_bullet.diagnosis.prediction.score import Compared, LeftOut, Take, comparable, least_db, mean_db
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.diagnosis.remainder import listing, remainder
@@ -93,16 +93,23 @@ def diagnose(
     errors: dict[str, Any] = {"before": {}, "after": {}, "floor": None}
     sone: dict[str, Any] = {"before": {}, "after": {}, "floor": None}
     out: dict[str, tuple[LeftOut, ...]] = {"fit": end.left_out} if end.left_out else {}
+    made = _before_and_after(end, [take.body for mine in every.values() for take in mine])
     for split, mine in every.items():
-        held = comparable(mine, end.before)
+        held = comparable(mine, made["before"])
         out |= {split: held.left_out} if held.left_out else {}
-        for name, h in (("before", end.before), ("after", end.after)):
-            errors[name][split] = mean_db(held.takes, h) if isinstance(held, Compared) else None
-            sone[name][split] = sone_distance(held.takes, h) if isinstance(held, Compared) else None
+        for name, one in made.items():
+            errors[name][split] = mean_db(held.takes, one) if isinstance(held, Compared) else None
+            sone[name][split] = sone_distance(held.takes, one) if isinstance(held, Compared) else None
         if split == "fit" and isinstance(held, Compared):
-            errors["floor"] = least_db(held.takes, end.after)
+            errors["floor"] = least_db(held.takes, made["after"])
     left, warnings = remainder(end, takes), (*found.warnings, *_warnings(end, out))
     return Diagnosis(case, found, bodies, takes, end, errors, sone, _of_lines(case, bodies, end), left, out, warnings)
+
+
+def _before_and_after(end: Closed | NothingCompared, bodies: Sequence[Struck]) -> dict[str, Predictions]:
+    """What the hypothesis without effects and the one with them say of the bodies; one where these are one."""
+    before = predict_each(end.before, bodies)
+    return {"before": before, "after": before if end.after is end.before else predict_each(end.after, bodies)}
 
 
 def _warnings(end: Closed | NothingCompared, out: dict[str, tuple[LeftOut, ...]]) -> list[str]:
@@ -125,15 +132,17 @@ def _of_lines(case: Case, bodies: tuple[Struck, ...], end: Closed | NothingCompa
     there are none.
     """
     found: dict[str, Any] = {}
-    for body in bodies:
+    lined = [body for body in bodies if any(r.lines for r in body.recordings)]
+    made = _before_and_after(end, lined)
+    for body in lined:
         for split in SPLITS:
             rows = [line for r in body.recordings if r.split == split and r.lines for line in r.lines]
             if not rows:
                 continue
             freq = np.array([line.freq_hz for line in rows])
             decay = np.array([np.nan if line.decay_per_s is None else line.decay_per_s for line in rows])
-            for name, h in (("before", end.before), ("after", end.after)):
-                off, lost = off_by(h, body, freq, decay)
+            for name, one in made.items():
+                off, lost = off_by(one[body], freq, decay)
                 entry = {
                     "frequency_rms": float(np.sqrt((off**2).mean())),
                     "lines": len(rows),
@@ -191,17 +200,14 @@ def predictions(d: Diagnosis) -> list[tuple[str, int, Array, Array]]:
         return []
     n, sr = length_of(known[0])
     start = onset_of(d.case, d.bodies, sr)
-    made = []
+    both, found = _before_and_after(d.closed, d.bodies).values(), []
     for body in d.bodies:
         for i, r in enumerate(body.recordings):
             if r.file is None or (body.family is not None and r.position_m is None):
                 continue
-            pair = [
-                np.concatenate([np.zeros(start), play(h, body, i, n - start, sr)])
-                for h in (d.closed.before, d.closed.after)
-            ]
-            made.append((Path(r.file).stem, sr, pair[0], pair[1]))
-    return made
+            before, after = (np.concatenate([np.zeros(start), one[body].sound(i, n - start, sr)]) for one in both)
+            found.append((Path(r.file).stem, sr, before, after))
+    return found
 
 
 def described(d: Diagnosis) -> dict[str, Any]:

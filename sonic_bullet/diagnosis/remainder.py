@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, play
-from sonic_bullet.diagnosis.prediction.score import LeftOut, Take
+from sonic_bullet.diagnosis.prediction.prediction import Predictions
+from sonic_bullet.diagnosis.prediction.score import LeftOut, Take, predict_takes
 from sonic_bullet.diagnosis.selection.band_levels import in_words
 from sonic_bullet.diagnosis.selection.coherent_residual import of_no_body
 from sonic_bullet.diagnosis.selection.stepwise import Closed, NothingCompared
@@ -35,7 +35,8 @@ def remainder(end: Closed | NothingCompared, takes: Sequence[Take]) -> dict[str,
     takes = [t for t in takes if (t.body.name, t.strike) in judged]
     if end.verdict != "unexplained" or not takes:
         return {}
-    share, band_hz, level = _shares(takes, end.after)
+    made = predict_takes(end.after, takes)
+    share, band_hz, level = _shares(takes, made)
     whole = share.mean(axis=0)  # (t, f)
     order = np.argsort(-np.nan_to_num(whole.mean(axis=0)))[:SHOWN]
     bands = [
@@ -69,7 +70,7 @@ def remainder(end: Closed | NothingCompared, takes: Sequence[Take]) -> dict[str,
         )
     if len(total) > 1:
         words += "; it differs from place to place" if scatter > 0.5 else "; it is alike wherever the body is struck"
-    strange = of_no_body(end.after, takes)
+    strange = of_no_body(takes, made)
     if strange > RULES.no_body_share:
         words += (
             "; modes of one frequency, decay and phase each, whatever they are, do not play it: something goes "
@@ -109,7 +110,7 @@ def _again(takes: Sequence[Take]) -> float | None:
     )
 
 
-def _shares(takes: Sequence[Take], h: Hypothesis) -> tuple[Array, Array, Array]:
+def _shares(takes: Sequence[Take], made: Predictions) -> tuple[Array, Array, Array]:
     """Energy left over the recording's (s, 3, f), band edges (f + 1,) in Hz, impulses (s,)."""
     sr = takes[0].sr
     edges = 1000 * 2.0 ** (np.arange(-17, 14) / 3)
@@ -119,10 +120,9 @@ def _shares(takes: Sequence[Take], h: Hypothesis) -> tuple[Array, Array, Array]:
     for take in takes:
         if take.sr != sr or len(take.sample) < 6 * WINDOW:
             continue
-        made = play(h, take.body, take.strike, len(take.sample), take.sr)
         bins = np.searchsorted(edges, np.fft.rfftfreq(WINDOW, 1 / sr)) - 1
         table = []
-        for x in (take.sample - made, take.sample):
+        for x in (take.sample - take.played(made[take.body]), take.sample):
             frames = np.lib.stride_tricks.sliding_window_view(x, WINDOW)[:: WINDOW // 2]
             power = np.abs(np.fft.rfft(frames * shape, axis=1)) ** 2
             thirds = [part.sum(axis=0) for part in np.array_split(power, 3)]

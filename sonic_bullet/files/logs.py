@@ -40,7 +40,8 @@ from sonic_bullet.files.container import REMEDY, read_container, take, write_con
 from sonic_bullet.files.models import ModelEntry, as_json_text, model_arrays, model_key, pack_model, unpack_model
 from sonic_bullet.files.reading import reading
 from sonic_bullet.records import Air, Array, Body, Material, Microphone, ModalSum, Residual, Sensor, Vibrometer
-from sonic_bullet.records.coerce import as_path
+from sonic_bullet.records.arrays import frozen_array
+from sonic_bullet.records.coerce import as_number, as_path
 from sonic_bullet.records.contacts import ROW_FIELDS, Contacts, Event, Step
 from sonic_bullet.records.errors import LogError
 
@@ -313,7 +314,19 @@ def _unpack_steps(arrays: Mapping[str, Array], path: object) -> tuple[Step, ...]
     )
     if k and min(rows.a.min(), rows.b.min()) < 0:
         raise LogError(f"{path}: a contact names a body below zero", REMEDY)
+    if (np.maximum(rows.a, rows.b) >= np.repeat(np.diff(poses), np.diff(contacts))).any():
+        raise LogError(f"{path}: a contact names a body that the step does not know", REMEDY)
+    # checked whole, not step by step: hours of steps are read in a moment
+    position = frozen_array(position, float, (p, 3), "step: position_m")
+    quaternion = frozen_array(quaternion, float, (p, 4), "step: quaternion_xyzw")
+    teleported = frozen_array(teleported, bool, (p,), "teleported")
+    gravity = frozen_array(gravity, float, (len(dt), 3), "step: gravity_m_s2")
+    remedy = "set a time step between 0 and 1 s with setTimeStep"
+    for wrong in dt[~((dt > 0) & (dt <= 1))][:1]:
+        as_number(float(wrong), "dt_s of a physics step", remedy, above=0, most=1, error=LogError)
     return tuple(
-        Step(float(dt[i]), position[p0:p1], quaternion[p0:p1], teleported[p0:p1], rows.rows(k0, k1), gravity[i])
-        for i, (p0, p1, k0, k1) in enumerate(zip(poses[:-1], poses[1:], contacts[:-1], contacts[1:], strict=True))
+        Step.trusted(length, position[p0:p1], quaternion[p0:p1], teleported[p0:p1], rows.rows(k0, k1), gravity[i])
+        for i, (length, p0, p1, k0, k1) in enumerate(
+            zip(dt.tolist(), poses[:-1], poses[1:], contacts[:-1], contacts[1:], strict=True)
+        )
     )

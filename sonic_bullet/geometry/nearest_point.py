@@ -97,7 +97,7 @@ def nearest(index: SurfaceIndex, points_m: Array, normals: Array | None = None) 
     points = np.ascontiguousarray(points_m, float).reshape(-1, 3)
     wanted = np.zeros_like(points) if normals is None else np.ascontiguousarray(normals, float).reshape(-1, 3)
     face, found = np.empty(len(points), np.int64), np.empty((len(points), 4))
-    _nearest_faces(index.faces, index.nodes, index.wall_m, index.tie_m, points, wanted, face, found)
+    _nearest_faces(index.faces, index.nodes, 0, index.wall_m, index.tie_m, points, wanted, face, found)
     return index.order[face], found[:, :3], found[:, 3]
 
 
@@ -194,9 +194,10 @@ def nearest_face(faces, face_at, nodes, node_at, wall_m, tie_m, px, py, pz, nx, 
     the surface should have, 0 for any.
     """
     stack, gaps = np.empty(_DEEPEST, np.int64), np.empty(_DEEPEST)
-    any_face, any2 = 0, np.inf  # nearest of all
-    # of those that look along n: the chosen one, its distance, n·normal; the least distance
-    same_face, same, along, least = -1, np.inf, 0.0, np.inf
+    any_face, any2, any_u, any_v, any_w = 0, np.inf, 1.0, 0.0, 0.0  # nearest of all
+    # of those that look along n: the chosen one, its distance, its place; its n·normal, the least distance
+    same_face, same, same_u, same_v, same_w = -1, np.inf, 1.0, 0.0, 0.0
+    along, least = 0.0, np.inf
     ask = nx != 0 or ny != 0 or nz != 0
     top = 1
     stack[0], gaps[0] = 0, 0.0
@@ -227,25 +228,26 @@ def nearest_face(faces, face_at, nodes, node_at, wall_m, tie_m, px, py, pz, nx, 
             z = u * corner[0, 2] + v * corner[1, 2] + w * corner[2, 2] - pz
             d2 = x * x + y * y + z * z
             if d2 < any2:
-                any_face, any2 = i, d2
+                any_face, any2, any_u, any_v, any_w = i, d2, u, v, w
             looks = nx * normal[0] + ny * normal[1] + nz * normal[2]
             if ask and looks > LOOKS:
                 d = np.sqrt(d2)
                 if d < least - tie_m or (d <= least + tie_m and looks > along + 1e-9):
-                    same_face, same, along = i, d, looks
+                    along, same_face, same, same_u, same_v, same_w = looks, i, d, u, v, w
                 least = min(least, d)
-    chosen, distance = any_face, np.sqrt(any2)
-    if ask and same_face >= 0 and same <= 2 * distance + wall_m:
-        chosen, distance = same_face, same
-    u, v, w = _in_triangle(px, py, pz, faces[face_at + chosen])
-    return chosen, u, v, w, distance
+    if ask and same_face >= 0 and same <= 2 * np.sqrt(any2) + wall_m:
+        return same_face, same_u, same_v, same_w, same
+    return any_face, any_u, any_v, any_w, np.sqrt(any2)
 
 
 @njit(nogil=True, error_model="numpy")
-def _nearest_faces(faces, nodes, wall_m, tie_m, point_m, wanted, face, found):
-    """`nearest_face` of points (k, 3) with normals (k, 3): into face (k,) and found (k, 4), the distance last."""
+def _nearest_faces(faces, nodes, first, wall_m, tie_m, point_m, wanted, face, found):
+    """`nearest_face` of points (k, 3) with normals (k, 3): into face (k,) and found (k, 4), the distance last.
+
+    first: 0, as an argument: numba compiles a kernel anew for a number that stands in the code.
+    """
     for k in range(len(point_m)):
         p, n = point_m[k], wanted[k]
         face[k], found[k, 0], found[k, 1], found[k, 2], found[k, 3] = nearest_face(
-            faces, 0, nodes, 0, wall_m, tie_m, p[0], p[1], p[2], n[0], n[1], n[2]
+            faces, first, nodes, first, wall_m, tie_m, p[0], p[1], p[2], n[0], n[1], n[2]
         )

@@ -1,13 +1,12 @@
 """Where every link of every body is, and how fast: centre-of-mass frames as arrays, whatever simulator they come from.
 
-Origin at the centre of mass, axes along the principal inertia: the frame of `Body`. A semi-implicit integrator has
-x(n+1) = x(n) + v(n+1)·dt, so a pose that jumps farther than its speeds allow was moved by hand.
+Origin at the centre of mass, axes along the principal inertia: the frame of `Body`.
 n rows: one for each link of each body, ordered by (body id, link).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -97,6 +96,19 @@ class Motion:
         """
         steps = self.position_m + dt_s * self.velocity_m_s != self.position_m
         return bool(steps.any() or (np.abs(self.spin_rad_s) * dt_s > 1e-12).any())
+
+
+def taken(motion: Motion, roster: Roster, rows: Array) -> Motion:
+    """The rows (n,) of a motion as a motion of that roster."""
+    return Motion(roster, motion.row[rows])
+
+
+def without(motion: Motion, body: int | None) -> Motion:
+    """The motion of all others than a body (None: of nobody)."""
+    roster = motion.roster
+    keep = np.flatnonzero(roster.code // LINK_SPAN != body) if body is not None else np.zeros(0, int)
+    bodies = tuple(entry for entry in roster.bodies if entry[0] != body and body is not None)
+    return taken(motion, replace(roster, bodies=bodies, code=roster.code[keep], static=roster.static[keep]), keep)
 
 
 def same_motion(first: Motion, second: Motion) -> bool:

@@ -56,3 +56,9 @@ class KnownBodies:
             self._roster, self._start = roster, start_table(roster)
             self._start["index"] = self.index(roster)
         return self._start
+
+
+def alike(first: Body, second: Body) -> bool:
+    """Whether two records can be of one body: the same mass, inertia and curvature."""
+    same = first.mass_kg == second.mass_kg and np.array_equal(first.inertia_kg_m2, second.inertia_kg_m2)
+    return same and np.array_equal(first.curvature_per_m, second.curvature_per_m, equal_nan=True)

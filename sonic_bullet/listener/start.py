@@ -175,8 +175,3 @@ def _earlier(past: Motion, now: Motion, old: Array) -> Array:
     row, known = now.row.copy(), old >= 0
     row[known] = past.row[old[known]]
     return row
-
-
-def taken(motion: Motion, roster: Roster, rows: Array) -> Motion:
-    """The rows (n,) of a motion as a motion of that roster."""
-    return Motion(roster, motion.row[rows])

@@ -14,13 +14,14 @@ import numpy as np
 
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.radiation.radiated import radiation_of
-from sonic_bullet.records import Array
+from sonic_bullet.records import Air, Array, Microphone
 from sonic_bullet.records.coerce import as_call, as_flag, as_kind
+from sonic_bullet.records.contacts import Contacts, Step
 from sonic_bullet.records.errors import LogError
 from sonic_bullet.render.silence import silence_notes, why_silent
 from sonic_bullet.render.synthesizer import AT_ONCE, LATENCY_STEPS, Synthesizer
 
-__all__ = ["LATENCY_STEPS", "Synthesizer", "render_log", "silence_notes", "why_silent"]
+__all__ = ["LATENCY_STEPS", "Synthesizer", "make_ready", "render_log", "silence_notes", "why_silent"]
 
 
 def render_log(
@@ -66,3 +67,9 @@ def render_log(
         if progress is not None:
             progress(first / len(log.steps))
     return np.ascontiguousarray(synth.sound())
+
+
+def make_ready() -> None:
+    """Have the run time's machine code, compiled now where it is not kept: what the first step would else wait for."""
+    nobody = Step(1 / 240, np.zeros((0, 3)), np.zeros((0, 4)), np.zeros(0, bool), Contacts.none())
+    Synthesizer(sr=8000, sensors=(Microphone(np.zeros(3)),), seed=0, air=Air()).feed(nobody, ())

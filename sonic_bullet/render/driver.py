@@ -23,7 +23,7 @@ from sonic_bullet.synth.bank import bank_kernel
 from sonic_bullet.synth.bank.bank_kernel import DRIVE_SCRATCH, RING_SCRATCH
 from sonic_bullet.synth.bank.layout import DRIVEN
 from sonic_bullet.synth.bank.strike_pool import enter_strike
-from sonic_bullet.synth.path_kernel import DONE, hear
+from sonic_bullet.synth.path_kernel import DONE, WORK, hear
 from sonic_bullet.synth.strikes import LOOKAHEAD, SPAN
 from sonic_bullet.synth.surface_kernel import VOICE
 from sonic_bullet.synth.vector import LANES
@@ -94,13 +94,13 @@ def excite(
             bodies[b].placed = number + 1
     strikes, voices = np.empty(counts[0], STRIKE), np.empty(counts[0], VOICE)
     found = find_pulses(
-        0, number, 0.0, here.dt_s, here.gravity_m_s2, window_quaternion[number % SPAN], rows, known, pairs, active, counts,
-        bodies, faces, nodes, shapes, frequency_hz, spectrum, strikes, pulses, push, 0,
+        np.int64(0), number, 0.0, here.dt_s, here.gravity_m_s2, window_quaternion[number % SPAN], rows, known, pairs, active, counts,
+        bodies, faces, nodes, shapes, frequency_hz, spectrum, strikes, pulses, push, np.int64(0),
     )  # fmt: skip
     # else what strikes after the quench would be dated back before it, and be lost: it waits for its own step
     if not quench:
         found = find_pulses(
-            1, number + 1, -here.dt_s, there.dt_s, there.gravity_m_s2, window_quaternion[(number + 1) % SPAN], rows, known,
+            np.int64(1), number + 1, -here.dt_s, there.dt_s, there.gravity_m_s2, window_quaternion[(number + 1) % SPAN], rows, known,
             pairs, active, counts, bodies, faces, nodes, shapes, frequency_hz, spectrum, strikes, pulses, push, found,
         )  # fmt: skip
     drives = advance_friction(
@@ -224,8 +224,8 @@ def finish(
     """
     here, there, at = number % SPAN, (number + 1) % SPAN, step.sample - start
     status = hear(
-        step.sample, number, step.count, 0, source[0], pushed, window_position[here], window_position[there],
-        window_teleported[there], x, microphone_m, samples_per_m, sources, places, lines, memory, taps, heard, at,
+        step.sample, number, step.count, np.int64(0), source[0], pushed, window_position[here], window_position[there],
+        window_teleported[there], x, microphone_m, samples_per_m, sources, places, lines, memory, taps, np.zeros(WORK), heard, at,
     )  # fmt: skip
     if status != DONE:
         return status

@@ -192,15 +192,16 @@ def with_lines(resonator: Resonator, voice: ResidualVoice | None) -> ModeSet:
     if voice is None:
         return modes
     lines = voice.lines
-    both = (
-        None if getattr(s, name) is None else np.concatenate([getattr(s, name), getattr(lines, name)])
-        for name in ("bend", "damping_growth")
+    bend, growth = (
+        None if mine is None or more is None else np.concatenate([mine, more])
+        for mine, more in ((s.bend, lines.bend), (s.damping_growth, lines.damping_growth))
     )
     return ModeSet(
         np.concatenate([s.omega_rad_s, lines.omega_rad_s]),
         np.concatenate([s.decay_per_s, lines.decay_per_s]),
         np.concatenate([s.weight, lines.weight], axis=1),
-        *both,
+        bend,
+        growth,
         s.damping_growth_power,
         s.translation,
     )

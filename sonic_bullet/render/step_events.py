@@ -48,7 +48,9 @@ class Drive:
     direction1: Array
 
 
-def pulses_of(scratch: Scratch, found: int, modes: Array, begin_s: float, after_s: float) -> list[tuple[float, ForcePulse]]:
+def pulses_of(
+    scratch: Scratch, found: int, modes: Array, begin_s: float, after_s: float
+) -> list[tuple[float, ForcePulse]]:
     """The step's strikes, each with the time from which its start counts. modes (b,): of each body.
 
     begin_s, after_s: start of the step and of the one after it, for which a strike may have been found already.
@@ -70,10 +72,10 @@ def drives_of(scratch: Scratch, drives: int, modes: Array, samples: int) -> list
     found = []
     for d in range(drives):
         low, high = (int(body) for body in scratch.body[d])
-        gains = [
+        gain0, gain1 = (
             (gain[d, 0, : modes[low]].copy(), gain[d, 1, : modes[high]].copy())
             for gain in (scratch.gain0, scratch.gain1)
-        ]
+        )
         along = scratch.direction0[d].copy(), scratch.direction1[d].copy()
-        found.append(Drive(low, high, force[d].copy(), *gains, *along))
+        found.append(Drive(low, high, force[d].copy(), gain0, gain1, *along))
     return found

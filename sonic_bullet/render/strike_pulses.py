@@ -91,11 +91,11 @@ def find_pulses(
 
     Pairs of which nothing can sound (no modes, no moving volume) are passed over, and those of which neither moves.
     """
-    struck = _split(ahead, pairs, active, counts[0], rows, window, strikes)
+    struck = split_loads(ahead, pairs, active, counts[0], rows, window, strikes)
     if struck == 0:
         return found
     held = np.empty(len(bodies))
-    _set_unheld_steps(ahead, number, pairs, active, counts[0], bodies, held)
+    set_unheld_steps(ahead, number, pairs, active, counts[0], bodies, held)
     g = gravity_m_s2
     gravity = np.sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]) * dt_s
     caused = False
@@ -133,7 +133,7 @@ def find_pulses(
 
 
 @njit(**INNER)
-def _split(ahead, pairs, active, count, rows, window, strikes):
+def split_loads(ahead, pairs, active, count, rows, window, strikes):
     """What is strike of the loads ``ahead`` steps after the one being rendered: the number of strikes, their bodies,
     shares and rows. It is marked as used.
 
@@ -173,7 +173,7 @@ def _split(ahead, pairs, active, count, rows, window, strikes):
 
 
 @njit(**INNER)
-def _set_unheld_steps(ahead, number, pairs, active, count, bodies, held):
+def set_unheld_steps(ahead, number, pairs, active, count, bodies, held):
     """held (b,): steps for which gravity may have moved each mobile body although it rests: 1 where it carried load on
     any pair within the STEPS before, SPAN where it was just put where it is: Bullet finds the corners on which a box
     stands one a step, and it tilts meanwhile.

@@ -192,7 +192,11 @@ def start(setup: Setup) -> State:
     air, travelling = path.empty_path(setup.sr, setup.air, setup.microphone_m)
     none = np.zeros(0, np.int64)
     window = Window(
-        np.zeros(SPAN, WINDOW), np.zeros((SPAN, 0, 3)), np.zeros((SPAN, 0, 4)), np.zeros((SPAN, 0), bool), np.zeros(0, ROW)
+        np.zeros(SPAN, WINDOW),
+        np.zeros((SPAN, 0, 3)),
+        np.zeros((SPAN, 0, 4)),
+        np.zeros((SPAN, 0), bool),
+        np.zeros(0, ROW),
     )
     pairs = Pairs(np.zeros(0, PAIR), none, np.zeros(2, np.int64), none, np.zeros((0, 2, 0)))
     return State(window, pairs, BodyTable(), instrument, ringing, air, travelling)

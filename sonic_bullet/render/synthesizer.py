@@ -9,7 +9,7 @@ the state) and the replay of a log run the same code on the same numbers in the 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -72,8 +72,11 @@ def _schedule(setup: Setup, state: State, steps: Sequence[Step]) -> tuple[Array,
 def _advanced(setup: Setup, state: State, steps: Sequence[Step]) -> Array:
     """`advance` of steps without a quench between; of one alone where a body has a residual."""
     table, clock, waiting = _schedule(setup, state, steps)
-    contacts = np.concatenate([step.contacts.row for step in steps]) if len(steps) > 1 else steps[0].contacts.row
-    poses = [_together([getattr(s, name) for s in steps]) for name in ("position_m", "quaternion_xyzw", "teleported")]
+    contacts = _together(np.concatenate, [step.contacts.row for step in steps])
+    poses = [
+        _together(np.stack, [getattr(s, name) for s in steps])
+        for name in ("position_m", "quaternion_xyzw", "teleported")
+    ]
     begin, stop = int(table["sample"][0]), int(table["sample"][-1] + table["count"][-1])
     longest = int(table["count"].max())
     out = np.zeros((len(setup.sensors), stop - begin))
@@ -102,8 +105,13 @@ def _advanced(setup: Setup, state: State, steps: Sequence[Step]) -> Array:
     return out
 
 
-def _together(arrays: Sequence[Array]) -> Array:
-    return np.stack(arrays) if len(arrays) > 1 else arrays[0][None]
+def _together(join: Callable[[Sequence[Array]], Array], arrays: Sequence[Array]) -> Array:
+    """The arrays of all steps in one that is read-only, as those of one step are: one type, compiled once."""
+    if len(arrays) == 1:
+        return arrays[0] if join is np.concatenate else arrays[0][None]
+    joined = join(arrays)
+    joined.setflags(write=False)
+    return joined
 
 
 def _call(

@@ -17,7 +17,8 @@ import numpy as np
 
 from sonic_bullet.diagnosis.diagnose import Diagnosis
 from sonic_bullet.diagnosis.evidence.effect_evidence import object_evidence
-from sonic_bullet.diagnosis.prediction.hypothesis import play
+from sonic_bullet.diagnosis.prediction.prediction import predict
+from sonic_bullet.diagnosis.prediction.score import predict_takes
 from sonic_bullet.diagnosis.selection.stepwise import NothingCompared
 from sonic_bullet.files import replacing
 from sonic_bullet.records import Array
@@ -104,10 +105,10 @@ def _why_none(d: Diagnosis, split: str) -> str:
 
 def _players(d: Diagnosis) -> str:
     parts = []
-    for take in [t for t in d.takes if np.isfinite(t.sample).all()][:SHOWN]:
-        before, after = (
-            play(h, take.body, take.strike, len(take.sample), take.sr) for h in (d.closed.before, d.closed.after)
-        )
+    takes = [t for t in d.takes if np.isfinite(t.sample).all()][:SHOWN]
+    both = [predict_takes(h, takes) for h in (d.closed.before, d.closed.after)]
+    for take in takes:
+        before, after = (take.played(made[take.body]) for made in both)
         peak = max(float(np.abs(x).max()) for x in (take.sample, before, after)) or 1.0
         sounds = (("recorded", take.sample), ("before", before), ("after", after))
         row = "".join(
@@ -127,7 +128,7 @@ def _plane(d: Diagnosis) -> str:
         return ""
     plt = _pyplot()
     figure, axis = plt.subplots(figsize=(9, 4.5))
-    before, after = object_evidence(d.closed.before, body), object_evidence(d.closed.after, body)
+    before, after = (object_evidence(predict(h, body)) for h in (d.closed.before, d.closed.after))
     axis.plot(before.freq_hz, before.decay_per_s, "k.", label="observed lines")
     axis.vlines(
         before.freq_hz, before.expected_decay_per_s, before.decay_per_s, color="0.7", lw=1, label="residual before"

@@ -24,7 +24,7 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 
 from sonic_bullet.records import Array
-from sonic_bullet.synth.vector import F64, I32, I64, LANES, VEC, Emit, Value, constant
+from sonic_bullet.synth.vector import BITS, F64, I32, I64, LANES, VEC, Emit, Value, constant
 
 TAPS = 16
 AHEAD = TAPS // 2
@@ -32,6 +32,10 @@ LEAST_DELAY = float(AHEAD)
 HALF_DEGREE = 4
 KAISER_BETA = 6.0
 FLUSH = 1e-30
+MOST_FALL = 1.0 - 1.0 / 16.0
+"""Sound emitted one sample later arrives at least 1/16 sample later: a source at or above the speed of sound is not
+overtaken by its own sound.
+"""
 INFINITE = 0x7FF << 52
 """Bits of the double that is infinite; those of a NaN are above."""
 KEPT = (TAPS + 1) * LANES
@@ -65,6 +69,10 @@ def _called(e: Emit, name: str, kind: Any, *values: Value) -> Value:
     return e.builder.call(cgutils.get_or_insert_function(e.builder.module, declared, name), values)
 
 
+def _all_of(kind: Any, value: int) -> Any:
+    return [value] * LANES if isinstance(kind, ir.VectorType) else value
+
+
 def _greater(e: Emit, a: Value, b: Value) -> Value:
     return e.builder.select(e.builder.fcmp_ordered(">", a, b), a, b)
 
@@ -89,31 +97,78 @@ def move(typingctx, values, start, memory, at, count):
 
 
 @intrinsic
-def greatest(typingctx, values, at, count):
-    """Greatest magnitude of ``count`` values (whole groups of 8) from element ``at`` on, as the bits of a double:
+def greatest(typingctx, values, at, count, rows, stride):
+    """Greatest magnitude of ``count`` values from element ``at`` on, in ``rows`` rows ``stride`` elements apart, as the
+    bits of a double:
 
     0 where all are zero, from INFINITE on where one is not finite.
     """
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         e = Emit(context, builder, signature, args)
-        values, at, count = e.args
+        values, at, count, rows, stride = e.args
         integers = ir.VectorType(I64, LANES)
-        magnitude = ir.Constant(integers, [2**63 - 1] * LANES)
+        whole = builder.and_(count, e.index(-LANES))
 
-        def body(k: Value, carried: list[Value]) -> list[Value]:
-            bits = builder.and_(builder.bitcast(e.load(values, builder.add(at, k)), integers), magnitude)
-            return [builder.select(builder.icmp_signed(">", bits, carried[0]), bits, carried[0])]
+        def more(bits: Value, kind: Any, most: Value) -> Value:
+            size = builder.and_(builder.bitcast(bits, kind), ir.Constant(kind, _all_of(kind, 2**63 - 1)))
+            return builder.select(builder.icmp_signed(">", size, most), size, most)
 
-        most = e.loop(count, LANES, [ir.Constant(integers, [0] * LANES)], body)[0]
-        return _called(e, "llvm.vector.reduce.smax.v8i64", I64, most)
+        def row(r: Value, carried: list[Value]) -> list[Value]:
+            here = builder.add(at, builder.mul(r, stride))
+            after = builder.add(here, whole)
+            groups = e.loop(
+                whole,
+                LANES,
+                [carried[0]],
+                lambda k, now: [more(e.load(values, builder.add(here, k)), integers, now[0])],
+            )
+            single = e.loop(
+                builder.sub(count, whole),
+                1,
+                [carried[1]],
+                lambda k, now: [more(builder.load(builder.gep(values, [builder.add(after, k)])), I64, now[0])],
+            )
+            return [groups[0], single[0]]
 
-    return types.int64(values, at, count), codegen
+        most, single = e.loop(rows, 1, [ir.Constant(integers, [0] * LANES), e.index(0)], row)
+        lanes = _called(e, "llvm.vector.reduce.smax.v8i64", I64, most)
+        return builder.select(builder.icmp_signed(">", lanes, single), lanes, single)
+
+    return types.int64(values, at, count, rows, stride), codegen
 
 
 @intrinsic
-def emit(typingctx, source, source_at, pushed, pushed_at, stride, x, x_at, count, geometry, emitted, delay, at):
-    """a and D of ``count`` samples, whole groups of 8, into emitted[at …] and delay[at …].
+def add(typingctx, values, out, at, count):
+    """out[at:][:count] += values[:count]."""
+
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        e = Emit(context, builder, signature, args)
+        values, out, at, count = e.args
+        whole = builder.and_(count, e.index(-LANES))
+
+        def group(k: Value, carried: list[Value]) -> list[Value]:
+            place = builder.add(at, k)
+            e.store(builder.fadd(e.load(out, place), e.load(values, k)), out, place)
+            return []
+
+        def single(k: Value, carried: list[Value]) -> list[Value]:
+            i = builder.add(whole, k)
+            place = builder.gep(out, [builder.add(at, i)])
+            builder.store(builder.fadd(builder.load(place), builder.load(builder.gep(values, [i]))), place)
+            return []
+
+        e.loop(whole, LANES, [], group)
+        e.loop(builder.sub(count, whole), 1, [], single)
+        return context.get_dummy_value()
+
+    return types.void(values, out, at, count), codegen
+
+
+@intrinsic
+def emit(typingctx, source, source_at, pushed, pushed_at, stride, x, x_at, count, geometry, emitted, delay, at, before):
+    """a and D of ``count`` samples, whole groups of 8, into emitted[at …] and delay[at …]. 0 where no delay falls by
+    more than MOST_FALL from one to the next, ``before``: the delay before them.
 
     source, pushed, x: arrays of any shape from element source_at … on, the push's axes ``stride`` elements apart.
     geometry (8,): microphone - start, end - start (m), samples per metre, 1/radius.
@@ -121,7 +176,7 @@ def emit(typingctx, source, source_at, pushed, pushed_at, stride, x, x_at, count
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         e = Emit(context, builder, signature, args)
-        source, source_at, pushed, pushed_at, stride, x, x_at, count, geometry, emitted, delay, at = e.args
+        source, source_at, pushed, pushed_at, stride, x, x_at, count, geometry, emitted, delay, at, before = e.args
         known = [e.broadcast(geometry, e.index(k)) for k in range(8)]
         axes = [pushed_at, builder.add(pushed_at, stride), builder.add(pushed_at, builder.add(stride, stride))]
 
@@ -140,14 +195,20 @@ def emit(typingctx, source, source_at, pushed, pushed_at, stride, x, x_at, count
             audible = builder.fcmp_ordered(">=", _called(e, "llvm.fabs.v8f64", VEC, value), constant(FLUSH))
             place = builder.add(at, k)
             e.store(builder.select(audible, value, constant(0.0)), emitted, place)
-            e.store(_greater(e, builder.fmul(r, known[6]), constant(LEAST_DELAY)), delay, place)
-            return []
+            late = _greater(e, builder.fmul(r, known[6]), constant(LEAST_DELAY))
+            e.store(late, delay, place)
+            previous = builder.shuffle_vector(
+                carried[0], late, ir.Constant(ir.VectorType(I32, LANES), list(range(LANES - 1, 2 * LANES - 1)))
+            )
+            falls = builder.fcmp_ordered("<", late, builder.fsub(previous, constant(MOST_FALL)))
+            return [late, builder.or_(carried[1], falls)]
 
-        e.loop(count, LANES, [], body)
-        return context.get_dummy_value()
+        none = ir.Constant(BITS, [False] * LANES)
+        falls = e.loop(count, LANES, [e.spread(before), none], body)[1]
+        return builder.zext(builder.bitcast(falls, ir.IntType(LANES)), I64)
 
-    return types.void(
-        source, source_at, pushed, pushed_at, stride, x, x_at, count, geometry, emitted, delay, at
+    return types.int64(
+        source, source_at, pushed, pushed_at, stride, x, x_at, count, geometry, emitted, delay, at, before
     ), codegen
 
 
@@ -230,5 +291,3 @@ def read(typingctx, memory, ring_at, late_at, gone, taps, kept, heard, at):
         return context.get_dummy_value()
 
     return types.void(memory, ring_at, late_at, gone, taps, kept, heard, at), codegen
-
-

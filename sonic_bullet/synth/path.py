@@ -155,11 +155,11 @@ def propagate(
         given[name] = np.ascontiguousarray(value, float)
         if given[name].shape != shape or (name not in ("source", "pushed") and not np.isfinite(given[name]).all()):
             raise AudioError(f"{name} of shape {given[name].shape}", f"give finite numbers of shape {shape}")
-    out = np.zeros((len(path.microphone_m), n))
+    out, work = np.zeros((len(path.microphone_m), n)), np.zeros(path_kernel.WORK)
     while True:
         status = path_kernel.hear(
             state.at, step, n, 0, given["source"], given["pushed"], given["position0_m"], given["position1_m"], np.ascontiguousarray(teleported, bool), given["progress"], path.microphone_m,
-            path.samples_per_m, state.sources, state.places, state.lines, state.memory, tap_polynomials(), out, 0,
+            path.samples_per_m, state.sources, state.places, state.lines, state.memory, tap_polynomials(), work, out, 0,
         )  # fmt: skip
         if status == path_kernel.DONE:
             break

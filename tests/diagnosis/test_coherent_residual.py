@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from sonic_bullet.diagnosis.evidence.baseline import takes_of
+from sonic_bullet.diagnosis.prediction.prediction import predict
 from sonic_bullet.diagnosis.prediction.score import Score
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.diagnosis.remainder import remainder
@@ -41,9 +42,10 @@ def test_modes_are_in_phase_and_sidebands_are_not() -> None:
     still, turning = recorded(), swung(0.8)
     assert still.recorded is not None and turning.recorded is not None
     assert not out_of_phase(still.recorded.lines).any()
-    assert of_no_body(replace(fitted(still), correction={"plate": np.full(18, 1e-3)}), takes_of((still,))) < 0.05
+    off = replace(fitted(still), correction={"plate": np.full(18, 1e-3)})
+    assert of_no_body(takes_of((still,)), {still: predict(off, still)}) < 0.05
     assert out_of_phase(turning.recorded.lines).any()
-    assert of_no_body(fitted(turning), takes_of((turning,))) > 0.7
+    assert of_no_body(takes_of((turning,)), {turning: predict(fitted(turning), turning)}) > 0.7
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,7 @@ from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of
 from sonic_bullet.diagnosis.evidence.recording_chain import LINKS, unchained
 from sonic_bullet.diagnosis.evidence.refit import refitted
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis
-from sonic_bullet.diagnosis.prediction.score import mean_db
+from sonic_bullet.diagnosis.prediction.score import mean_db, predict_takes
 from sonic_bullet.diagnosis.selection import stepwise as loop
 from sonic_bullet.diagnosis.selection.acceptance import Candidate, accepted
 from sonic_bullet.diagnosis.selection.cross_validation import _folds, cross_validated
@@ -80,7 +80,8 @@ def test_what_corrections_alone_would_gain_is_no_effects() -> None:
     assert h.correction is not None
     stale = replace(h, correction={"plate": h.correction["plate"] + 3e-3 * rng.choice([-1, 1], body.model.mode_count)})
     takes = takes_of((body,))
-    lost = (mean_db(takes, stale) or 0.0) - (mean_db(takes, refitted(stale, (body,), anew=True)) or 0.0)
+    fresh = refitted(stale, (body,), anew=True)
+    lost = mean_db(takes, predict_takes(stale, takes)) - mean_db(takes, predict_takes(fresh, takes))
     assert lost > 3.0
     found = cross_validated(stale, posed((body,), takes, Idle), evidence_of(stale, (body,), BAND))
     assert [c.id for c in found] == ["mode-splitting"]

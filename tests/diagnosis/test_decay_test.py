@@ -11,6 +11,7 @@ import pytest
 
 from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of, thinned
 from sonic_bullet.diagnosis.evidence.refit import refitted, reidentified
+from sonic_bullet.diagnosis.prediction.prediction import predict_each
 from sonic_bullet.diagnosis.prediction.score import Score, Take
 from sonic_bullet.diagnosis.selection.acceptance import Candidate
 from sonic_bullet.diagnosis.selection.cross_validation import cross_validated
@@ -75,17 +76,18 @@ def test_lines_that_were_fitted_to_say_nothing() -> None:
     """
     body = recorded(LAW)
     assert body.recorded is not None
-    wrong, right = refitted(truth(), (body,)), truth(LAW)
-    every = evidence_of(wrong, (body,), BAND)
-    assert likelier(wrong, right, every, every, (body,)) == 0.0
+    fitted_to = refitted(truth(), (body,))
+    wrong, right = (predict_each(h, (body,)) for h in (fitted_to, truth(LAW)))
+    every = evidence_of(fitted_to, (body,), BAND)
+    assert likelier(wrong, right, every, every) == 0.0
     told = thinned(every, (body.recorded, 0), 0.75, np.random.default_rng(1))
-    gain = likelier(wrong, right, every, told, (body,))
+    gain = likelier(wrong, right, every, told)
     assert gain > 0
-    assert likelier(right, wrong, every, told, (body,)) == pytest.approx(-gain)
+    assert likelier(right, wrong, every, told) == pytest.approx(-gain)
     one, x = every.observed[0], plate()
     out = ~np.isin(one.freq_hz, told.observed[0].freq_hz)
     law = LAW.decay_per_s(2 * np.pi * x.freq_hz[[m[0] for m in one.mode]])
-    rayleigh = 0.5 * (wrong.alpha_per_s + wrong.beta_s * (2 * np.pi * x.freq_hz[[m[0] for m in one.mode]]) ** 2)
+    rayleigh = 0.5 * (fitted_to.alpha_per_s + fitted_to.beta_s * (2 * np.pi * x.freq_hz[[m[0] for m in one.mode]]) ** 2)
     sd = np.hypot(one.decay_sd_per_s / one.decay_per_s, 0.02)
     by_hand = [4 * np.log1p((np.log(one.decay_per_s / d) / sd / 2) ** 2)[out].sum() for d in (rayleigh, law)]
     assert gain == pytest.approx(by_hand[0] - by_hand[1], rel=0.05)

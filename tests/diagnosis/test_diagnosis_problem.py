@@ -10,6 +10,7 @@ import pytest
 
 from sonic_bullet.diagnosis.evidence.baseline import takes_of
 from sonic_bullet.diagnosis.prediction.diagnosis_problem import DiagnosisProblem
+from sonic_bullet.diagnosis.prediction.prediction import predict
 from sonic_bullet.diagnosis.prediction.score import (
     Comparable,
     Compared,
@@ -28,11 +29,12 @@ from tests.made.body import recorded
 def test_a_score_is_what_its_strikes_say() -> None:
     body = recorded()
     h = fitted(body)
-    found = comparable(takes_of((body,)), h)
+    made = {body: predict(h, body)}
+    found = comparable(takes_of((body,)), made)
     assert isinstance(found, Compared)
     problem = DiagnosisProblem((body,), found.takes, BAND, (DampingLaw,), seed=4)
     score = problem.score(h)
-    assert (score.distance_db, score.floor_db) == (mean_db(found.takes, h), least_db(found.takes, h))
+    assert score == problem.scored(made) == Score(mean_db(found.takes, made), least_db(found.takes, made))
     assert score.gap_db == score.distance_db - score.floor_db
     assert problem.distance_db(h) == score.distance_db
     assert problem.has_audio and problem.has_meshes
@@ -41,7 +43,7 @@ def test_a_score_is_what_its_strikes_say() -> None:
 
 def test_candidates_change_and_nothing_else_does() -> None:
     body = recorded()
-    found = comparable(takes_of((body,)), fitted(body))
+    found = comparable(takes_of((body,)), {body: predict(fitted(body), body)})
     assert isinstance(found, Compared)
     problem = DiagnosisProblem((body,), found.takes, BAND, (DampingLaw,), seed=4)
     other = problem.only(ContactTime)
@@ -53,10 +55,10 @@ def test_candidates_change_and_nothing_else_does() -> None:
 
 def test_without_anything_to_compare_there_is_no_problem() -> None:
     body = recorded()
-    assert isinstance(comparable((), fitted(body)), Incomparable)
+    assert isinstance(comparable((), {}), Incomparable)
     with pytest.raises(ValueError, match="something to compare"):
         DiagnosisProblem((body,), Comparable(()), BAND)
-    found = comparable(takes_of((body,)), fitted(body))
+    found = comparable(takes_of((body,)), {body: predict(fitted(body), body)})
     assert isinstance(found, Compared)
     with pytest.raises(ValueError, match="lower to a higher"):
         DiagnosisProblem((body,), found.takes, (500.0, 500.0))

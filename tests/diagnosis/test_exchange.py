@@ -11,7 +11,7 @@ from sonic_bullet.diagnosis.evidence.baseline import takes_of
 from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of, thinned
 from sonic_bullet.diagnosis.evidence.refit import refitted
 from sonic_bullet.diagnosis.prediction.diagnosis_problem import DiagnosisProblem
-from sonic_bullet.diagnosis.prediction.score import mean_db
+from sonic_bullet.diagnosis.prediction.score import mean_db, predict_takes
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.diagnosis.selection.acceptance import Candidate
 from sonic_bullet.diagnosis.selection.exchange import decays_against, exchanged, significant, together
@@ -49,8 +49,8 @@ def test_a_filter_that_came_first_goes_for_the_pulse_that_a_tilt_of_level_had_hi
     found = {e.id: e for e in h.effects}
     assert found["contact-time"].parameters()["tau_s"] == pytest.approx(9e-4, rel=0.03)
     assert found["radiation"].parameters()["tilt"] == 0.5
-    before = mean_db(takes, refitted(wrong, (body,)))
-    after = mean_db(takes, h)
+    before = mean_db(takes, predict_takes(refitted(wrong, (body,)), takes))
+    after = mean_db(takes, predict_takes(h, takes))
     assert before is not None and after is not None and after < 0.6 * before
 
 

@@ -20,7 +20,7 @@ from sonic_bullet.diagnosis.evidence.baseline import takes_of
 from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of
 from sonic_bullet.diagnosis.evidence.refit import refitted
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis
-from sonic_bullet.diagnosis.prediction.score import least_db, mean_db
+from sonic_bullet.diagnosis.prediction.score import least_db, mean_db, predict_takes
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.diagnosis.selection.stepwise import Closed, closed
 from sonic_bullet.effects import EFFECTS, Effect
@@ -102,9 +102,9 @@ def test_a_planted_effect_is_proposed(effect: Effect, within: dict[str, float]) 
     close(found, effect, within)
     with_it = refitted(replace(base, effects=(found,)), (body,), evidence.observed)
     before, after, floor = (
-        mean_db(takes, base) or 0.0,
-        mean_db(takes, with_it) or 0.0,
-        least_db(takes, with_it) or 0.0,
+        mean_db(takes, predict_takes(base, takes)) or 0.0,
+        mean_db(takes, predict_takes(with_it, takes)) or 0.0,
+        least_db(takes, predict_takes(with_it, takes)) or 0.0,
     )
     assert after - floor < 0.35 * (before - floor)
 

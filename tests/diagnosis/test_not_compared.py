@@ -16,7 +16,16 @@ from sonic_bullet.cli.diagnose_command import run_diagnose
 from sonic_bullet.diagnosis.diagnose import _warnings
 from sonic_bullet.diagnosis.evidence.baseline import takes_of
 from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of
-from sonic_bullet.diagnosis.prediction.score import EDGE_DB, Compared, Incomparable, Take, comparable, mean_db
+from sonic_bullet.diagnosis.prediction.prediction import predict
+from sonic_bullet.diagnosis.prediction.score import (
+    EDGE_DB,
+    Compared,
+    Incomparable,
+    Take,
+    comparable,
+    mean_db,
+    predict_takes,
+)
 from sonic_bullet.diagnosis.remainder import remainder
 from sonic_bullet.diagnosis.selection import stepwise as loop
 from sonic_bullet.diagnosis.selection.cross_validation import cross_validated
@@ -77,7 +86,7 @@ def test_the_others_are_judged_and_those_that_could_not_be_are_named() -> None:
     short, silent = replace(takes[1], sample=takes[1].sample[:300]), replace(takes[2], floor=white(1e3))
     end = closed(fitted(body), (body,), (*spoiled(takes[:1], 0), short, silent, *takes[3:]), (), BAND)
     assert isinstance(end, Closed) and end.verdict == "none"
-    assert end.judged == takes[3:] and end.before_db == mean_db(takes[3:], end.before)
+    assert end.judged == takes[3:] and end.before_db == mean_db(takes[3:], predict_takes(end.before, takes[3:]))
     assert [str(one) for one in end.left_out] == [
         "strike-0.wav holds 11200 samples that are no numbers",
         "strike-1.wav holds 300 samples after the onset, and 512 are needed",
@@ -91,14 +100,15 @@ def test_one_strike_of_no_numbers_does_not_spoil_the_noise_of_all() -> None:
     signals = body.recorded.signals.copy()
     signals[2] = np.nan
     some = replace(body, recorded=replace(body.recorded, signals=signals))
-    found = comparable(takes_of((some,)), fitted(body))
+    found = comparable(takes_of((some,)), {some: predict(fitted(body), some)})
     assert (
         isinstance(found, Compared)
         and len(found.takes) == 4
         and [one.name for one in found.left_out] == ["strike-2.wav"]
     )
     signals[:] = np.nan
-    none = comparable(takes_of((replace(some, recorded=replace(body.recorded, signals=signals)),)), fitted(body))
+    silent = replace(some, recorded=replace(body.recorded, signals=signals))
+    none = comparable(takes_of((silent,)), {silent: predict(fitted(body), silent)})
     assert isinstance(none, Incomparable) and len(none.left_out) == 5
 
 
@@ -112,8 +122,9 @@ def test_a_strike_that_neither_plays_above_the_noise_is_as_far_off_as_noise_make
         take,
         sample=1e-3 * np.sqrt(take.floor.variance.mean()) * np.random.default_rng(1).standard_normal(len(take.sample)),
     )
-    loud, silent = fitted(body), replace(fitted(body), gain=1e-12)
-    assert isinstance(comparable((quiet,), loud), Compared) and isinstance(comparable((quiet,), silent), Incomparable)
+    loud, silent = predict(fitted(body), body), predict(replace(fitted(body), gain=1e-12), body)
+    assert isinstance(comparable((quiet,), {body: loud}), Compared)
+    assert isinstance(comparable((quiet,), {body: silent}), Incomparable)
     assert quiet.distance(loud) > 10.0
     assert quiet.distance(silent) == quiet.least(silent) == EDGE_DB
     assert take.distance(silent) > 10.0 and take.least(silent) == EDGE_DB
@@ -155,7 +166,7 @@ def test_what_cannot_be_played_is_rejected() -> None:
     """On today's main it was as near as noise alone, strike by strike."""
     body = recorded()
     takes, off = takes_of((body,)), replace(fitted(body), gain=0.05)
-    assert mean_db(takes, replace(off, effects=(Spoils(),))) == np.inf
+    assert mean_db(takes, predict_takes(replace(off, effects=(Spoils(),)), takes)) == np.inf
     found = cross_validated(off, posed((body,), takes, Spoils), evidence_of(off, (body,), BAND))
     assert [c.id for c in found] == ["spoils"] and (found[0].drop_db == -np.inf).all()
     end = closed(fitted(body), (body,), takes, (Spoils,), BAND)

@@ -11,7 +11,7 @@ from sonic_bullet.diagnosis.evidence.baseline import takes_of
 from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of, thinned
 from sonic_bullet.diagnosis.evidence.refit import refitted
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis
-from sonic_bullet.diagnosis.prediction.score import mean_db
+from sonic_bullet.diagnosis.prediction.score import mean_db, predict_takes
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.effects.amplitude_damping import AmplitudeDamping
 from sonic_bullet.effects.amplitude_damping.damped_lines import fitted_decay, lines_under
@@ -41,7 +41,7 @@ def assert_nearer_than_the_meshs(
     """The axes that were found play nearer to the recordings than the mesh's."""
     takes = takes_of((body,))
     own, mesh = (
-        mean_db(takes, refitted(replace(base, effects=(e,)), (body,), evidence.observed))
+        mean_db(takes, predict_takes(refitted(replace(base, effects=(e,)), (body,), evidence.observed), takes))
         for e in (found, replace(found, freq_hz=(), turn_rad=()))
     )
     assert own is not None and mesh is not None and own < mesh

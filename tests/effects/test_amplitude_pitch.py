@@ -12,6 +12,7 @@ from sonic_bullet.diagnosis.evidence.amplitude_dependence import amplitude_depen
 from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of
 from sonic_bullet.diagnosis.evidence.refit import refitted, with_effects
 from sonic_bullet.diagnosis.evidence.small_amplitude import _off_hz, at_rest
+from sonic_bullet.diagnosis.prediction.prediction import predict
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.effects import amplitude_pitch
 from sonic_bullet.effects.amplitude_pitch import FAR as FARTHER
@@ -70,14 +71,18 @@ def test_what_a_long_pulse_has_left_faint_does_not_glide() -> None:
     h = fitted(body)
     long = ContactTime(6e-4, 0.02)
     lines = [evidence_of(replace(h, effects=effects), (body,), BAND).observed[0] for effects in ((BENT,), (BENT, long))]
-    hard = turns_rad(replace(h, effects=(BENT,)), body, lines[0])
-    soft = turns_rad(replace(h, effects=(BENT, long)), body, lines[1])
+    hard = turns_rad(predict(replace(h, effects=(BENT,)), body), lines[0])
+    soft = turns_rad(predict(replace(h, effects=(BENT, long)), body), lines[1])
     one = lines[1]
     pressed = np.stack([one.pressed[:, m].max(axis=1) for m in one.mode], axis=1)
     assert pressed.min() < 0.1
     assert pressed.max() > 0.9
     assert soft == pytest.approx(hard * pressed**2, rel=0.05, abs=1e-6)
-    assert 0 < np.count_nonzero(amplitude_dependent(replace(h, effects=(BENT, long)), body, one)) < len(one.freq_hz)
+    assert (
+        0
+        < np.count_nonzero(amplitude_dependent(predict(replace(h, effects=(BENT, long)), body), one))
+        < len(one.freq_hz)
+    )
 
 
 def test_a_bend_by_impulse_is_told_by_what_the_pulse_leaves_of_it() -> None:
@@ -95,7 +100,7 @@ def test_a_level_falls_as_the_linear_mode_does_while_its_lines_do_not(bend: floa
     bent = AmplitudePitch(bend, "velocity")
     body = made(bend)
     lines = evidence_of(fitted(body), (body,), BAND).observed[0]
-    told = fallen(replace(fitted(body), effects=(bent,)), body, lines)
+    told = fallen(predict(replace(fitted(body), effects=(bent,)), body), lines)
     changed = told.decay_per_s != lines.decay_per_s
     before = np.abs(np.log(lines.decay_per_s / true_decay(lines.freq_hz)))[changed]
     after = np.abs(np.log(told.decay_per_s / true_decay(told.freq_hz)))[changed]
@@ -164,7 +169,7 @@ def test_twins_that_glide_and_beat_fall_as_what_is_played_does(off_per_s: float)
     told = right + off_per_s
     for close in (0.05, 0.02):
         alpha = 2 * told - h.beta_s * (2 * np.pi * middle) ** 2
-        told = float(fallen(replace(h, alpha_per_s=alpha), body, lines).decay_per_s[k])
+        told = float(fallen(predict(replace(h, alpha_per_s=alpha), body), lines).decay_per_s[k])
         assert told == pytest.approx(right, rel=close)
 
 
@@ -202,7 +207,7 @@ def test_in_a_room_no_line_is_one_modes_alone() -> None:
     told = evidence_of(replace(fitted(body), effects=(Room(0.4, 0.3, 3),)), (body,), BAND).observed[0]
     assert told.dry
     h = replace(fitted(body), effects=(BENT,))
-    assert fallen(h, body, told) is told
+    assert fallen(predict(h, body), told) is told
     assert at_rest(h, (body,), (told,)).correction == h.correction
 
 

@@ -11,7 +11,7 @@ import pytest
 from scipy.linalg import expm
 
 from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of
-from sonic_bullet.diagnosis.prediction.hypothesis import came_from, modes_of
+from sonic_bullet.diagnosis.prediction.prediction import came_from, predict
 from sonic_bullet.effects.common.dashpots import apart, coupled, damped
 from sonic_bullet.effects.damping_law import DampingLaw
 from sonic_bullet.effects.support_damping import LEAST, SupportDamping
@@ -194,7 +194,7 @@ def test_a_law_of_the_material_is_read_beside_dashpots_and_acts_under_them() -> 
     assert found is not None
     assert found.law == "constant-loss"
     assert found.eta == pytest.approx(6e-3, rel=0.02)
-    one, two = (modes_of(truth(*order), body)[0] for order in ((law, fixture), (fixture, law)))
+    one, two = (predict(truth(*order), body).model for order in ((law, fixture), (fixture, law)))
     assert np.array_equal(one.decay_per_s, two.decay_per_s), "whichever was found first"
 
 

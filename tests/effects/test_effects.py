@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sonic_bullet.diagnosis.prediction.hypothesis import modes_of
+from sonic_bullet.diagnosis.prediction.prediction import predict
 from sonic_bullet.effects import EFFECTS, Effect, Impact, Ring, Sound, Stage
 from sonic_bullet.effects.added_mass import AddedMass
 from sonic_bullet.effects.amplitude_damping import AmplitudeDamping
@@ -53,7 +53,7 @@ def given(stage: Stage) -> Any:
     if stage is Stage.MATERIAL:
         return Material.isotropic("glass", youngs_pa=7e10, poisson=0.22, density_kg_m3=2500)
     if stage is Stage.MODES:
-        return modes_of(truth(), struck())[0]
+        return predict(truth(), struck()).model
     if stage is Stage.FORCE:
         return Impact(0.02, np.zeros(1), np.ones(1))
     if stage is Stage.BANK:

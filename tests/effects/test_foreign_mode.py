@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from sonic_bullet.diagnosis.evidence.effect_evidence import _nearest, evidence_of, named
+from sonic_bullet.diagnosis.prediction.prediction import predict
 from sonic_bullet.effects.foreign_mode import ForeignMode, _alone
 from tests.diagnosis.test_found_again import BAND, fitted
-from tests.made.body import plate, recorded
+from tests.made.body import recorded, truth
 
 STAND = ForeignMode((790.0, 2310.0), (12.0, 30.0), (1.0, 0.8), (0.3, -1.0))
 OTHER = ForeignMode((4000.0,), (15.0,), (1.0,), (0.0,))
@@ -38,9 +39,10 @@ def test_nor_are_they_paired_with_modes_that_an_effect_has_moved() -> None:
     """Modes are paired anew there, with every line that is near."""
     body = recorded()
     assert body.recorded is not None
-    every = _nearest(body, plate(), np.zeros(len(body.recorded.lines.freq_hz), bool))[0]
+    p = predict(truth(), body)
+    every = _nearest(p, np.zeros(len(body.recorded.lines.freq_hz), bool))[0]
     k = int(every[3])
-    rest = _nearest(body, plate(), np.arange(len(body.recorded.lines.freq_hz)) == k)[0]
+    rest = _nearest(p, np.arange(len(body.recorded.lines.freq_hz)) == k)[0]
     assert k not in rest and set(rest) == set(every) - {k}
 
 

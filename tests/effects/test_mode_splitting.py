@@ -9,7 +9,7 @@ import pytest
 
 from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of, thinned
 from sonic_bullet.diagnosis.evidence.refit import refitted
-from sonic_bullet.diagnosis.prediction.hypothesis import modes_of
+from sonic_bullet.diagnosis.prediction.prediction import predict
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.effects.mode_splitting import ModeSplitting
 from sonic_bullet.effects.protocol import Evidence
@@ -115,8 +115,8 @@ def test_lines_of_twins_go_to_their_own_modes_though_the_mesh_is_off_by_half_a_s
     off[list(PAIRS[0])] /= 1.0095
     shifted = replace(body, model=replace(body.model, freq_hz=off))
     h = refitted(truth(effect), (shifted,))
-    got = np.sort(modes_of(h, shifted)[0].freq_hz)
-    want = np.sort(modes_of(truth(effect), body)[0].freq_hz)
+    got = np.sort(predict(h, shifted).model.freq_hz)
+    want = np.sort(predict(truth(effect), body).model.freq_hz)
     assert np.abs(got / want - 1).max() < 1e-3
 
 

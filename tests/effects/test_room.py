@@ -10,6 +10,7 @@ import pytest
 
 from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of, object_evidence, outside
 from sonic_bullet.diagnosis.evidence.refit import refitted, whole
+from sonic_bullet.diagnosis.prediction.prediction import predict
 from sonic_bullet.effects.common import reverberant_tail as tails
 from sonic_bullet.effects.contact_time import ContactTime
 from sonic_bullet.effects.damping_law import DampingLaw
@@ -42,7 +43,7 @@ def test_the_covariance_of_a_driven_tail() -> None:
 def test_modes_read_through_a_room() -> None:
     """Decays and gains that a strong room hides from the lines come back within the spreads said."""
     body = recorded(Room(0.9, 0.9, 4), seconds=1.2)
-    observed = object_evidence(truth(), body)
+    observed = object_evidence(predict(truth(), body))
     dry = tails.dereverberated(observed, RT60 / 0.9)
     own = 0.5 * (ALPHA + BETA * dry.omega**2)
     off = np.log(dry.decay_per_s / own)
@@ -57,7 +58,7 @@ def test_what_outlasts_a_room_is_left_as_it_was_heard() -> None:
     """By lines and by what they are read to be: a faint line of a mode that dies sooner may beat with the tail, and be
     heard to ring on.
     """
-    observed = object_evidence(truth(), recorded(Room(0.15, 0.3, 4), seconds=1.2))
+    observed = object_evidence(predict(truth(), recorded(Room(0.15, 0.3, 4), seconds=1.2)))
     own, delta = 0.5 * (ALPHA + BETA * observed.omega**2), RT60 / 0.15
     slow = own < 0.4 * delta
     assert slow.sum() >= 3
@@ -66,7 +67,7 @@ def test_what_outlasts_a_room_is_left_as_it_was_heard() -> None:
     assert np.abs(np.log(dry.decay_per_s / own))[slow].max() < 0.05
     assert np.array_equal(dry.freq_hz[slow], observed.freq_hz[slow])
     fast = recorded(Room(0.9, 0.9, 4), seconds=1.2)
-    beats = object_evidence(truth(), fast)
+    beats = object_evidence(predict(truth(), fast))
     beats = replace(
         beats, decay_per_s=np.full(len(beats.freq_hz), 2.0), decay_sd_per_s=np.full(len(beats.freq_hz), 0.02)
     )
@@ -75,7 +76,7 @@ def test_what_outlasts_a_room_is_left_as_it_was_heard() -> None:
 
 def test_what_is_gone_at_once_or_is_not_like_its_mode_tells_no_decay() -> None:
     """Of a lossy body in a room most lines are the room's own: they would bend the material's law to the room's."""
-    observed = object_evidence(truth(), recorded(Room(0.9, 0.9, 4), seconds=1.2))
+    observed = object_evidence(predict(truth(), recorded(Room(0.9, 0.9, 4), seconds=1.2)))
     assert np.isfinite(tails.dereverberated(observed, RT60 / 0.9).decay_sd_per_s).all()
     other = observed.amplitude.copy()
     other[:, 2] = (
@@ -92,7 +93,7 @@ def test_what_is_gone_at_once_or_is_not_like_its_mode_tells_no_decay() -> None:
     told = tails.dereverberated(replace(observed, amplitude=other), RT60 / 0.9).decay_sd_per_s
     assert np.isinf(told[2]) and np.isfinite(np.delete(told, 2)).all()
     lossy = recorded(Room(0.9, 0.9, 4), DampingLaw("constant-loss", eta=0.05), seconds=1.2)
-    dry = tails.dereverberated(object_evidence(truth(), lossy), RT60 / 0.9)
+    dry = tails.dereverberated(object_evidence(predict(truth(), lossy)), RT60 / 0.9)
     assert (np.isinf(dry.decay_sd_per_s) >= (dry.decay_per_s > tails.FASTEST)).all() and np.isinf(
         dry.decay_sd_per_s
     ).any()
@@ -126,7 +127,9 @@ def test_fewer_lines_will_do_that_tell_a_tail_more_plainly(gain: tuple[float, ..
 @pytest.mark.parametrize("rt60", [0.5, 1.6])
 def test_the_rate_of_a_room(rt60: float) -> None:
     """Three rooms: how wet one sounds to a dozen lines is a matter of its taps, by a third."""
-    found = [late(object_evidence(truth(), recorded(Room(rt60, 0.5, seed), seconds=1.2))) for seed in (7, 8, 9)]
+    found = [
+        late(object_evidence(predict(truth(), recorded(Room(rt60, 0.5, seed), seconds=1.2)))) for seed in (7, 8, 9)
+    ]
     assert all(one is not None for one in found)
     for delta, _ in (one for one in found if one):
         assert RT60 / delta == pytest.approx(rt60, rel=0.12)
@@ -146,7 +149,7 @@ def test_the_rate_of_a_room(rt60: float) -> None:
 )
 def test_no_room_where_none_is(effect: object) -> None:
     body = recorded(effect)  # type: ignore[arg-type]
-    assert late(object_evidence(refitted(fitted(body), (body,)), body)) is None
+    assert late(object_evidence(predict(refitted(fitted(body), (body,)), body))) is None
 
 
 @pytest.mark.parametrize(
@@ -180,7 +183,7 @@ def test_what_rings_along_is_heard_in_the_room_and_both_through_the_chain() -> N
 def test_lines_are_dried_once() -> None:
     body = recorded(Room(0.9, 0.9, 4), seconds=1.2)
     h = truth(Room(0.9, 0.9, 4))
-    observed = object_evidence(h, body)
+    observed = object_evidence(predict(h, body))
     assert observed.dry
     assert outside(h, observed) is observed
 
@@ -190,7 +193,7 @@ def test_what_the_model_says_nothing_of_stays_as_it_was_heard() -> None:
     the gain.
     """
     body = recorded(Room(0.9, 0.9, 4), seconds=1.2)
-    observed = object_evidence(truth(), body)
+    observed = object_evidence(predict(truth(), body))
     push = observed.push.copy()
     push[:, observed.mode[0]] = 0.0
     dry = tails.dereverberated(replace(observed, push=push), RT60 / 0.9)
@@ -212,7 +215,7 @@ def test_what_rings_along_in_a_room_is_told_once() -> None:
 def test_what_is_read_to_ring_far_longer_than_it_is_heard_to_is_a_neighbour(monkeypatch: pytest.MonkeyPatch) -> None:
     """A tail prolongs; of a strong slow mode close by, what is left between the patterns outlasts any lodger."""
     lodger = ForeignMode((1000.0, 2710.0), (60.0, 14.0), (1.2, 0.9), (0.0, 0.0))
-    observed = object_evidence(truth(), recorded(Room(0.9, 0.5, 4), lodger, seconds=1.2))
+    observed = object_evidence(predict(truth(), recorded(Room(0.9, 0.5, 4), lodger, seconds=1.2)))
     k = int(np.abs(observed.foreign_hz - 1000.0).argmin())
     read = tails.read
 
@@ -234,7 +237,7 @@ def test_what_is_read_to_ring_far_longer_than_it_is_heard_to_is_a_neighbour(monk
 def test_a_gain_beside_a_room_is_the_lines_of_modes_alone() -> None:
     """Lines that the room leaves next to a mode's are no part of it."""
     body = recorded(Room(0.9, 0.9, 4), seconds=1.2)
-    observed = object_evidence(truth(Room(0.9, 0.9, 4)), body)
+    observed = object_evidence(predict(truth(Room(0.9, 0.9, 4)), body))
     beside = replace(
         observed,
         foreign_hz=observed.freq_hz * 1.001,
@@ -249,7 +252,7 @@ def test_a_gain_beside_a_room_is_the_lines_of_modes_alone() -> None:
 def test_a_mode_that_is_hardly_struck_is_not_read_more_surely() -> None:
     """What the model says nothing of, a tail's echoes make as unsure as anything else they touch."""
     body = recorded(Room(0.9, 0.9, 4), seconds=1.2)
-    observed = object_evidence(truth(), body)
+    observed = object_evidence(predict(truth(), body))
     push = observed.push.copy()
     push[0] *= 1e-6
     dry = tails.dereverberated(replace(observed, push=push), RT60 / 0.9)
@@ -258,7 +261,7 @@ def test_a_mode_that_is_hardly_struck_is_not_read_more_surely() -> None:
 
 def test_a_snippet_has_no_tail() -> None:
     """Shorter than a few frames: no room is told, and nothing breaks."""
-    observed = object_evidence(truth(), recorded(Room(0.9, 0.9, 4)))
+    observed = object_evidence(predict(truth(), recorded(Room(0.9, 0.9, 4))))
     assert observed.signal is not None
     short = replace(observed, signal=observed.signal[:, :300])
     assert tails.dereverberated(short, 7.0) is short

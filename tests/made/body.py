@@ -12,7 +12,8 @@ from typing import Any, cast
 
 import numpy as np
 
-from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, play
+from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis
+from sonic_bullet.diagnosis.prediction.prediction import predict
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.effects import Effect
 from sonic_bullet.estimator.fit.recorded import RecordedObject as Recorded
@@ -110,8 +111,7 @@ def recorded(
         ),
     )  # type: ignore[arg-type]
     rng = np.random.default_rng(seed)
-    signals = np.stack(
-        [play(truth(*effects), observed, i, n, SR) + noise * rng.standard_normal(n) for i in range(len(STRIKES))]
-    )
+    played = predict(truth(*effects), observed).sounds(range(len(STRIKES)), n, SR)
+    signals = np.stack([sound + noise * rng.standard_normal(n) for sound in played])
     lines = joint_lines(signals, SR, band_hz=(50.0, 7_500.0))
     return struck(model, lines, signals)

@@ -287,12 +287,16 @@ def test_a_force_that_swings_moves_a_rigid_body_as_the_sphere_law_says(radius: f
     resonator = build_resonator(body, (), SR, Air())
     assert resonator.rigid is not None
     instrument, ringing = bank.empty_bank(SR, 1)
-    instrument, ringing = bank.append(instrument, ringing, [resonator.rigid])
+    none = np.zeros(0)
+    instrument, ringing = bank.append(
+        instrument, ringing, [bank.ModeSet(none, none, np.zeros((1, 0), complex), translation=resonator.rigid)]
+    )
     n = 9600
-    one = np.ones(1)
+    along, pushed = np.array([1.0, 0.0, 0.0]), np.zeros((1, 3, n))
     force = np.sin(2 * np.pi * freq * np.arange(n) / SR)
-    out = bank.advance(instrument, ringing, n, (), [bank.Force(0, force, one, one)], np.zeros(n))[0, 0]
-    s, w = 2j * np.pi * freq, float(resonator.rigid.omega_rad_s[0])
+    bank.advance(instrument, ringing, n, (), [bank.Force(0, force, none, none, along, along)], np.zeros(n), pushed)
+    out = pushed[0, 0]
+    s, w = 2j * np.pi * freq, resonator.rigid.omega_rad_s
     law = abs(2 * jerk_coefficient(body.volume_m3, Air()) * w**2 * s / ((s + w) ** 2 + w**2)) / body.mass_kg
     error_db = 20 * np.log10(np.abs(out[4800:]).max() / law)
     print(f"{radius} m, {freq} Hz: {error_db:.2f} dB")

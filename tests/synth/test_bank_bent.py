@@ -29,9 +29,17 @@ def modes(bend: float, damping_growth: float, power: float = 1.0) -> ModeSet:
 
 def played(bend: float, damping_growth: float, cuts: list[int], start: float = 0.0, power: float = 1.0) -> Array:
     bank, state = append(*empty_bank(SR), [modes(bend, damping_growth, power)])
-    strike = [Strike(0, start, 1.0, np.ones(1), GAIN)]
+    strike = [at_once(start, GAIN)]
     parts = [advance(bank, state, n, strike if i == 0 else ())[0, 0] for i, n in enumerate(cuts)]
     return np.concatenate(parts)
+
+
+SHORT = 1e-12
+
+
+def at_once(sample: float, gain: Array) -> Strike:
+    """An impulse at a sample."""
+    return Strike(0, sample - SHORT, SHORT / SR, gain)
 
 
 def wanted(bend: float, damping_growth: float, n: int, power: float = 1.0) -> Array:
@@ -66,7 +74,7 @@ def test_bent_modes_follow_the_closed_form(bend: float, damping_growth: float, p
 
 def test_zero_bend_is_the_linear_bank_and_poles_come_back() -> None:
     bank, state = append(*empty_bank(SR), [ModeSet(2 * np.pi * HZ, DECAY, np.ones((1, 3), complex))])
-    plain = advance(bank, state, SR, [Strike(0, 0.0, 1.0, np.ones(1), GAIN)])[0, 0]
+    plain = advance(bank, state, SR, [at_once(0.0, GAIN)])[0, 0]
     assert np.array_equal(plain, played(0.0, 0.0, [SR]))
 
 
@@ -90,9 +98,8 @@ def test_decaying_from_any_level_never_grows() -> None:
 def test_a_quenched_body_begins_anew_with_its_own_poles() -> None:
     """Struck hard, quenched while its poles are bent, struck softly: the soft strike is as from rest."""
     bank, state = append(*empty_bank(SR), [modes(0.02, 2.0)])
-    soft = np.full(1, 0.05)
-    advance(bank, state, 2000, [Strike(0, 0.0, 1.0, np.ones(1), GAIN)])
+    advance(bank, state, 2000, [at_once(0.0, GAIN)])
     state = silence(state)
-    again = advance(bank, state, 4000, [Strike(0, 2010.0, 1.0, soft, GAIN)])[0, 0]
+    again = advance(bank, state, 4000, [at_once(2010.0, 0.05 * GAIN)])[0, 0]
     bank, fresh = append(*empty_bank(SR, at=2000), [modes(0.02, 2.0)])
-    assert np.array_equal(again, advance(bank, fresh, 4000, [Strike(0, 2010.0, 1.0, soft, GAIN)])[0, 0])
+    assert np.array_equal(again, advance(bank, fresh, 4000, [at_once(2010.0, 0.05 * GAIN)])[0, 0])

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sonic_bullet.records import Array
-from sonic_bullet.synth.bank import Bank, BankState, Force, ModeSet, Strike, advance, append, empty_bank
+from sonic_bullet.synth.bank import Bank, BankState, Force, ModeSet, Strike, Translation, advance, append, empty_bank
 
 SR = 48_000
 SIZES = (5, 0, 33, 1, 70, 8, 16)
 FIRST = 1000
+TURNS = np.array([[1.0, -0.3, 0.2], [0.5, 0.5, -1.0]])
 
 
 def scene(seed: int, length: int) -> tuple[Bank, BankState, list[Strike], dict[int, tuple[Array, Array, Array]], Array]:
@@ -26,27 +29,30 @@ def scene(seed: int, length: int) -> tuple[Bank, BankState, list[Strike], dict[i
             2 * np.pi * np.sort(rng.uniform(30, 23_000, m)),
             10.0 ** rng.uniform(-1, 4.5, m),
             rng.normal(size=(2, m)) + 1j * rng.normal(size=(2, m)),
+            translation=Translation(rate, rate, 1.0) if rate < 40_000 else None,
         )
-        for m in SIZES
+        for m, rate in zip(SIZES, rng.uniform(500, 50_000, len(SIZES)), strict=True)
     ]
-    bodies[4] = ModeSet(bodies[4].omega_rad_s, bodies[4].decay_per_s, bodies[4].weight * np.array([[1.0], [0.0]]))
+    bodies[4] = replace(bodies[4], weight=bodies[4].weight * np.array([[1.0], [0.0]]))
+    bodies[6] = replace(bodies[6], bend=rng.normal(size=16), damping_growth=rng.uniform(size=16))
     bank, state = append(bank, state, bodies)
     strikes = []
     for _ in range(int(rng.integers(1, 25))):
-        body, nodes = int(rng.integers(len(SIZES))), int(rng.choice([1, 2, 24, 300]))
+        body, lasts = int(rng.integers(len(SIZES))), float(rng.choice([1e-12, 0.1, 1.0, 2.0, 30.0, 111.1, 700.0]))
         start = FIRST + rng.choice([rng.uniform(0, length - 1), float(rng.integers(length)), 0.0])
         strikes.append(
             Strike(
                 body,
                 start,
-                float(rng.choice([0.04, 0.1, 0.5, 1.0, 1.37, 3.0])),
-                rng.normal(size=nodes),
+                lasts / SR,
                 rng.normal(size=SIZES[body]),
+                bool(rng.integers(2)),
+                rng.normal(size=3),
             )
         )
     strikes.append(strikes[0])
     forces = {}
-    for body in (2, 4, 4 if seed % 2 else 3):
+    for body in (2, 4, 6, 4 if seed % 2 else 3):
         signal = rng.normal(size=length) * (rng.uniform() < 0.7)
         signal[: int(rng.integers(length))] = 0.0
         forces[len(forces)] = (np.array([body]), signal, rng.normal(size=(2, SIZES[body])))
@@ -58,9 +64,15 @@ def render(seed: int, length: int, cuts: list[int]) -> bytes:
     parts = []
     for lo, hi in zip([0, *cuts], [*cuts, length], strict=True):
         now = [s for s in strikes if lo <= np.ceil(s.start) - FIRST < hi or (lo == 0 and np.ceil(s.start) < FIRST)]
-        pushes = [Force(int(body[0]), signal[lo:hi], gains[0], gains[1]) for body, signal, gains in forces.values()]
-        parts.append(advance(bank, state, hi - lo, now, pushes, progress[lo:hi]))
-    whole = np.concatenate(parts, axis=2)
+        pushes = [
+            Force(int(body[0]), signal[lo:hi], gains[0], gains[1], TURNS[0], TURNS[1])
+            for body, signal, gains in forces.values()
+        ]
+        shoved = np.zeros((len(SIZES), 3, hi - lo))
+        sound = advance(bank, state, hi - lo, now, pushes, progress[lo:hi], shoved)
+        parts.append(np.concatenate([*sound, *shoved]))
+    whole = np.concatenate(parts, axis=1)
+    assert whole[-3 * len(SIZES) :].any()
     assert np.isfinite(whole).all()
     return whole.tobytes()
 

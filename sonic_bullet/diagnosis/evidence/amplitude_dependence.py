@@ -11,8 +11,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, bends, impact_of, modes_of, play, ring_of
-from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.diagnosis.prediction.hypothesis import bends
+from sonic_bullet.diagnosis.prediction.prediction import Prediction
 from sonic_bullet.effects.common.envelope import Envelopes, alone, falls, shifted
 from sonic_bullet.effects.protocol import ObjectEvidence
 from sonic_bullet.records import Array
@@ -23,9 +23,9 @@ LEAST_FRAMES = 8  # frames
 LACKS = 0.5  # of a decay, at most
 
 
-def turns_rad(h: Hypothesis, body: Struck, one: ObjectEvidence) -> Array:
+def turns_rad(p: Prediction, one: ObjectEvidence) -> Array:
     """By how much the effects turn the phases of each line's modes (s, k) until they have rung down."""
-    each = [(ring_of(h, body, body.fitted[i]), impact_of(h, body, body.fitted[i])) for i in one.strike]
+    each = [(p.ring(i), p.impact(i)) for i in p.strikes_of(one)]
     level = [r.level * np.abs(b.spectrum(r.freq_hz)) for r, b in each]  # what a long pulse leaves of it
     turned = np.stack(
         [
@@ -36,20 +36,20 @@ def turns_rad(h: Hypothesis, body: Struck, one: ObjectEvidence) -> Array:
     return np.stack([turned[:, who[who < turned.shape[1]]].max(axis=1, initial=0.0) for who in one.mode], axis=1)
 
 
-def amplitude_dependent(h: Hypothesis, body: Struck, one: ObjectEvidence) -> Array:
+def amplitude_dependent(p: Prediction, one: ObjectEvidence) -> Array:
     """Whether each line (k,) is of modes whose phases the effects turn by TURNS_RAD or more in the end, at the strike
     that moves them most.
     """
-    return np.asarray(turns_rad(h, body, one).max(axis=0) > TURNS_RAD)
+    return np.asarray(turns_rad(p, one).max(axis=0) > TURNS_RAD)
 
 
-def fallen(h: Hypothesis, body: Struck, one: ObjectEvidence) -> ObjectEvidence:
+def fallen(p: Prediction, one: ObjectEvidence) -> ObjectEvidence:
     """The evidence, the decays of amplitude-dependent lines identified by their levels' own fall, where they stand
     alone.
     """
-    if not bends(h) or one.signal is None or one.dry or not len(one.freq_hz):
+    if not bends(p.hypothesis) or one.signal is None or one.dry or not len(one.freq_hz):
         return one  # in a room no line is one mode's alone
-    dependent = amplitude_dependent(h, body, one)
+    dependent = amplitude_dependent(p, one)
     mine = [(k, width) for k, width in zip(*alone(one), strict=True) if dependent[k] and len(one.mode[k]) in (1, 2)]
     if not mine:
         return one
@@ -57,8 +57,8 @@ def fallen(h: Hypothesis, body: Struck, one: ObjectEvidence) -> ObjectEvidence:
     e = shifted(one, one.signal if one.own is None else one.own, selected, window)
     made = None
     if any(len(one.mode[k]) == 2 for k in selected):
-        played = np.stack([play(h, body, body.fitted[i], one.signal.shape[1], one.sr) for i in one.strike])
-        made, mode = shifted(one, played, selected, window), modes_of(h, body)[0].decay_per_s
+        played = p.sounds(p.strikes_of(one), one.signal.shape[1], one.sr)
+        made, mode = shifted(one, played, selected, window), p.model.decay_per_s
     decay, sd = one.decay_per_s.copy(), one.decay_sd_per_s.copy()
     for q, k in enumerate(selected):
         if len(one.mode[k]) == 1:

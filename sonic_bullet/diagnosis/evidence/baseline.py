@@ -20,7 +20,7 @@ from sonic_bullet.diagnosis.evidence.refit import refitted
 from sonic_bullet.diagnosis.evidence.unmatched_modes import settled
 from sonic_bullet.diagnosis.prediction.elastic_bodies import with_elastic
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis
-from sonic_bullet.diagnosis.prediction.score import Compared, Take, comparable, mean_db
+from sonic_bullet.diagnosis.prediction.score import Compared, Take, comparable, mean_db, predict_takes
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck, shapeless, struck_bodies
 from sonic_bullet.effects.common.hum import without_hum
 from sonic_bullet.effects.measurement_chain import limit_of
@@ -133,8 +133,9 @@ def _lines_by(one: Recorded, strikes: Array, band_hz: tuple[float, float]) -> Li
 def _off_db(b: Baseline) -> float:
     """How far its strikes are; ∞ where none can be compared: no way of fitting is nearer than another then."""
     h = refitted(b.hypothesis, b.bodies)
-    found = comparable(b.takes, h)
-    return mean_db(found.takes, h) if isinstance(found, Compared) else np.inf
+    made = predict_takes(h, b.takes)
+    found = comparable(b.takes, made)
+    return mean_db(found.takes, made) if isinstance(found, Compared) else np.inf
 
 
 def _of(case: Case, recorded: tuple[Recorded, ...], cache: Place, progress: Callable[[str], None] | None) -> Baseline:

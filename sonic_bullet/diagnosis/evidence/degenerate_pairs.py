@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from sonic_bullet.diagnosis.evidence.unmatched_modes import CORRECTION
-from sonic_bullet.diagnosis.prediction.hypothesis import pattern
+from sonic_bullet.diagnosis.prediction.prediction import pattern
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.records import Array
 

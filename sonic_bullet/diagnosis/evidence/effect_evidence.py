@@ -13,22 +13,14 @@ from dataclasses import replace
 import numpy as np
 
 from sonic_bullet.diagnosis.evidence.amplitude_dependence import fallen
-from sonic_bullet.diagnosis.prediction.hypothesis import (
-    Hypothesis,
-    impact_of,
-    in_band,
-    modes_of,
-    moves,
-    pattern,
-    play,
-    start,
-)
+from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, moves
+from sonic_bullet.diagnosis.prediction.prediction import Prediction, in_band, predict, predict_fitted, start
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.effects.protocol import Dereverberates, Evidence, ObjectEvidence, RingsAlong, Sound, Stage
 from sonic_bullet.estimator.fit.pairing import DEGENERATE
 from sonic_bullet.estimator.fit.recorded import RecordedObject as Recorded
 from sonic_bullet.estimator.lines.joint_lines import Lines, noise_rms
-from sonic_bullet.records import Array, ModalModel
+from sonic_bullet.records import Array
 
 REACH = 0.012  # of a line from its mode where effects have moved it
 LOSSY, TOGETHER = 0.06, 0.25  # price of (ln d)² of a line over its mode; ln d of modes that sound as one line
@@ -39,30 +31,27 @@ DIRECT_S = 0.008  # of the sound path: what comes later is an echo
 
 def evidence_of(h: Hypothesis, bodies: tuple[Struck, ...], band_hz: tuple[float, float], *, seed: int = 0) -> Evidence:
     """All fitted objects' evidence under a hypothesis."""
-    observed = tuple(object_evidence(h, body) for body in bodies if body.recorded is not None)
+    observed = tuple(object_evidence(p) for p in predict_fitted(h, bodies).values())
     return Evidence(observed, h.alpha_per_s, h.beta_s, h.gain, tuple(e.id for e in h.effects), band_hz, seed)
 
 
-def object_evidence(h: Hypothesis, body: Struck, *, sounds: bool = True, anew: bool = False) -> ObjectEvidence:
+def object_evidence(
+    p: Prediction, *, sounds: bool = True, anew: bool = False, plain: Prediction | None = None
+) -> ObjectEvidence:
     """One fitted object's.
 
     sounds: whether what it would sound like is wanted too, which takes longest. anew: lines paired as beside effects
-    that move modes.
+    that move modes. plain: p.uncorrected(), where it is known already.
     """
-    recorded = body.recorded
+    h, body, model, recorded = p.hypothesis, p.body, p.model, p.body.recorded
     assert recorded is not None
-    lines, model = recorded.lines, None
-    model, order = modes_of(h, body)
-    line, mode = paired(h, body, model, order, anew=anew)
+    lines = recorded.lines
+    line, mode = paired(p, anew=anew)
     mine = body.fitted[: len(lines.amplitude)]
-    rows = pattern(body, model)[mine]
+    rows = p.pattern()[mine]
     push = rows * start(body.kind, model) * in_band(body, model)
-    direct = (
-        path_response(h, body, model.freq_hz, recorded.sr)
-        if recorded.signals is not None
-        else np.ones(model.mode_count)
-    )
-    pressed = np.stack([impact_of(h, body, i).spectrum(model.freq_hz) for i in mine])
+    direct = path_response(h, model.freq_hz, recorded.sr) if recorded.signals is not None else np.ones(model.mode_count)
+    pressed = np.stack([p.impact(i).spectrum(model.freq_hz) for i in mine])
     spectrum = pressed * direct
     expected = (
         np.stack([(h.gain * push * spectrum)[:, m].sum(axis=1) for m in mode], axis=1)
@@ -70,20 +59,14 @@ def object_evidence(h: Hypothesis, body: Struck, *, sounds: bool = True, anew: b
         else np.zeros((len(mine), 0), complex)
     )
     participation = np.stack([rows[:, m].sum(axis=1) for m in mode], axis=1) if mode else np.zeros((len(mine), 0))
-    uncorrected = replace(h, correction=None)
-    plain, plain_order = modes_of(uncorrected, body)
-    rank = {int(k): i for i, k in enumerate(plain_order)}
-    model_hz = np.array(
-        [
-            np.mean([plain.freq_hz[rank[int(order[k])]] if int(order[k]) in rank else model.freq_hz[k] for k in m])
-            for m in mode
-        ]
-    )
+    plain = plain or p.uncorrected()
+    own_hz = dict(zip(plain.order.tolist(), plain.model.freq_hz, strict=True))
+    model_hz = np.array([np.mean([own_hz.get(int(p.order[k]), model.freq_hz[k]) for k in m]) for m in mode])
     gone = named(h, lines) & sounds  # else they are in the recordings, and neighbours
     rest = np.setdiff1d(np.flatnonzero(~gone), line)
     predicted = own = None
     if sounds and recorded.signals is not None:
-        predicted, own = _played(h, body, mine, recorded.signals)
+        predicted, own = _played(p, mine, recorded.signals)
     count = body.surface_count(model)
     observed = ObjectEvidence(
         impulse_n_s=body.impulse_n_s[mine],
@@ -116,26 +99,25 @@ def object_evidence(h: Hypothesis, body: Struck, *, sounds: bool = True, anew: b
         push=h.gain * push * spectrum,
         pressed=np.abs(pressed),
         all_hz=model.freq_hz,
-        plain=plain if body.family is not None else None,
+        plain=plain.model if body.family is not None else None,
         strike=tuple(range(len(mine))),
         source=recorded,
         elastic=body.elastic,
-        poisson=None if moves(h) or plain.mode_count != body.model.mode_count else body.poisson,
+        poisson=None if moves(h) or plain.model.mode_count != body.model.mode_count else body.poisson,
     )
-    return fallen(h, body, outside(h, observed))
+    return fallen(p, outside(h, observed))
 
 
-def _played(h: Hypothesis, body: Struck, strikes: list[int], signals: Array) -> tuple[Array, Array | None]:
+def _played(p: Prediction, strikes: list[int], signals: Array) -> tuple[Array, Array | None]:
     """What strikes sound like (s, n), and the recordings without what rings beside the body, where the hypothesis knows
     of such.
     """
-
-    def played(one: Hypothesis) -> Array:
-        assert body.recorded is not None
-        return np.stack([play(one, body, i, signals.shape[1], body.recorded.sr) for i in strikes])
-
-    all_of_it, rest = played(h), tuple(e for e in h.effects if not isinstance(e, RingsAlong))
-    return all_of_it, None if len(rest) == len(h.effects) else signals - (all_of_it - played(replace(h, effects=rest)))
+    assert p.body.recorded is not None
+    n, sr, h = signals.shape[1], p.body.recorded.sr, p.hypothesis
+    all_of_it, rest = p.sounds(strikes, n, sr), tuple(e for e in h.effects if not isinstance(e, RingsAlong))
+    if len(rest) == len(h.effects):
+        return all_of_it, None
+    return all_of_it, signals - (all_of_it - predict(replace(h, effects=rest), p.body).sounds(strikes, n, sr))
 
 
 def named(h: Hypothesis, lines: Lines) -> Array:
@@ -158,14 +140,13 @@ def outside(h: Hypothesis, observed: ObjectEvidence) -> ObjectEvidence:
     return observed
 
 
-def paired(
-    h: Hypothesis, body: Struck, model: ModalModel, order: Array, *, anew: bool = False
-) -> tuple[Array, tuple[Array, ...]]:
-    """Lines (p,) and the modes of ``model`` each stands for: as they were fitted, where no effect has moved the modes,
-    else, or anew, by nearness and pattern.
+def paired(p: Prediction, *, anew: bool = False) -> tuple[Array, tuple[Array, ...]]:
+    """Lines (p,) and the predicted modes that each stands for: as they were fitted, where no effect has moved the
+    modes, else, or anew, by nearness and pattern.
     """
-    place = {int(k): i for i, k in enumerate(order)}
-    if not (anew or moves(h)):
+    place = {int(k): i for i, k in enumerate(p.order)}
+    body = p.body
+    if not (anew or moves(p.hypothesis)):
         line = np.unique(body.line[body.line >= 0])
         mode = tuple(
             np.array(sorted(place[int(k)] for k in np.flatnonzero(body.line == one) if int(k) in place), int)
@@ -174,19 +155,19 @@ def paired(
         good = [i for i, m in enumerate(mode) if len(m)]
         return line[good], tuple(mode[i] for i in good)
     assert body.recorded is not None
-    return _nearest(body, model, named(h, body.recorded.lines))
+    return _nearest(p, named(p.hypothesis, body.recorded.lines))
 
 
-def _nearest(body: Struck, model: ModalModel, known: Array) -> tuple[Array, tuple[Array, ...]]:
+def _nearest(p: Prediction, known: Array) -> tuple[Array, tuple[Array, ...]]:
     from scipy.optimize import linear_sum_assignment
 
-    assert body.recorded is not None
-    lines = body.recorded.lines
+    assert p.body.recorded is not None
+    model, lines = p.model, p.body.recorded.lines
     if not len(lines.freq_hz):
         return np.zeros(0, int), ()
     gap = np.log(lines.freq_hz)[:, None] - np.log(model.freq_hz)[None, :]
-    mine = body.fitted[: len(lines.amplitude)]
-    expected, observed = np.abs(pattern(body, model)[mine]), np.abs(lines.amplitude)
+    mine = p.body.fitted[: len(lines.amplitude)]
+    expected, observed = np.abs(p.pattern()[mine]), np.abs(lines.amplitude)
     alike = (observed.T @ expected) / np.maximum(
         np.linalg.norm(observed, axis=0)[:, None] * np.linalg.norm(expected, axis=0)[None, :], 1e-300
     )
@@ -208,12 +189,12 @@ def _nearest(body: Struck, model: ModalModel, known: Array) -> tuple[Array, tupl
     return row, tuple(mode)
 
 
-def path_response(h: Hypothesis, body: Struck, freq_hz: Array, sr: int) -> Array:
+def path_response(h: Hypothesis, freq_hz: Array, sr: int) -> Array:
     """Complex response (f,) of the sound path's first milliseconds: its effects applied to a weak impulse less what
     they add to silence.
     """
     # lines are dereverberated already
-    effects = [e for e in h.at(Stage.SOUND, fitted=body.recorded is not None) if not isinstance(e, Dereverberates)]
+    effects = [e for e in h.at(Stage.SOUND) if not isinstance(e, Dereverberates)]
     if not effects:
         return np.ones(len(freq_hz), complex)
     n = round(DIRECT_S * sr)

@@ -20,8 +20,9 @@ import numpy as np
 from sonic_bullet.diagnosis.evidence.degenerate_pairs import LEAST_STRIKES, LIKE, like
 from sonic_bullet.diagnosis.evidence.refit import ROUGH, refitted
 from sonic_bullet.diagnosis.prediction.diagnosis_problem import DiagnosisProblem
-from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, modes_of, pattern, play
-from sonic_bullet.diagnosis.prediction.score import Comparable, Take, mean_db
+from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis
+from sonic_bullet.diagnosis.prediction.prediction import Prediction, predict
+from sonic_bullet.diagnosis.prediction.score import Comparable, Take, mean_db, predict_takes
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.estimator.fit.pairing import DEGENERATE
 from sonic_bullet.estimator.lines.log_spectral import with_noise
@@ -46,7 +47,7 @@ def beyond(h: Hypothesis, problem: DiagnosisProblem) -> tuple[Hypothesis, float]
         and b.name in (h.correction or {})
     ]
     for body in mine:
-        found, off = _put(h, body, (h.correction or {})[body.name])
+        found, off = _put(predict(h, body))
         if off:
             h, most = replace(h, correction={**(h.correction or {}), body.name: found}), max(most, off)
     h = refitted(h, problem.bodies) if most else h
@@ -60,7 +61,8 @@ def _outside(start: Hypothesis, h: Hypothesis, body: Struck, problem: DiagnosisP
     """The hypothesis with a body's modes near the band's upper edge outside it, one frequency after another from the
     top, where strikes are nearer so.
     """
-    model, order = modes_of(h, body)
+    p = predict(h, body)
+    model, order = p.model, p.order
     old, most, top = (start.correction or {})[body.name], 0.0, body.band_hz[1]
     group = np.cumsum(np.diff(np.log(model.freq_hz), prepend=-np.inf) > DEGENERATE)
     free = (body.line[order] < 0) & (old[order] == (h.correction or {})[body.name][order])
@@ -80,12 +82,13 @@ def _outside(start: Hypothesis, h: Hypothesis, body: Struck, problem: DiagnosisP
     return h, most
 
 
-def _put(h: Hypothesis, body: Struck, correction: Array) -> tuple[Array, float]:
+def _put(p: Prediction) -> tuple[Array, float]:
     """Corrections (m,) of a body with such modes put to their lines, the loudest first, and the largest step."""
-    assert body.recorded is not None
-    lines, (model, order) = body.recorded.lines, modes_of(h, body)
+    body, model, order = p.body, p.model, p.order
+    assert body.recorded is not None and p.hypothesis.correction is not None
+    lines, correction = body.recorded.lines, p.hypothesis.correction[body.name]
     observed = np.abs(lines.amplitude)
-    row = pattern(body, model)[body.fitted[: len(observed)]]
+    row = p.pattern()[body.fitted[: len(observed)]]
     matched = body.line[order] >= 0
     upper = np.median(model.freq_hz[matched]) if matched.any() else np.inf
     group = np.cumsum(np.diff(np.log(model.freq_hz), prepend=-np.inf) > DEGENERATE)
@@ -122,12 +125,14 @@ def of_the_mesh(h: Hypothesis, problem: DiagnosisProblem) -> float:
         model = body.model if h.poisson is None or body.other is None else body.other(h.poisson)
         other[body.name] = _roughened(replace(body, model=model, other=None), rng)
     far = replace(h, correction=moved)
-    pairs = [(t, play(h, t.body, t.strike, len(t.sample), t.sr)) for t in problem.takes if isinstance(t, Take)]
-    if not pairs:
+    takes = [t for t in problem.takes if isinstance(t, Take)]
+    if not takes:
         return 0.0  # lists of lines are held against frequencies alone, and corrected by them
-    twice = [replace(t, sample=with_noise(made, t.floor, 1000 + t.strike)) for t, made in pairs]
-    moved_db = mean_db(Comparable(tuple(replace(t, body=other.get(t.body.name, t.body)) for t in twice)), far)
-    return moved_db - mean_db(Comparable(tuple(twice)), h)
+    made = predict_takes(h, takes)
+    twice = [replace(t, sample=with_noise(t.played(made[t.body]), t.floor, 1000 + t.strike)) for t in takes]
+    rough = [replace(t, body=other.get(t.body.name, t.body)) for t in twice]
+    moved_db = mean_db(Comparable(tuple(rough)), predict_takes(far, rough))
+    return moved_db - mean_db(Comparable(tuple(twice)), made)
 
 
 def _roughened(body: Struck, rng: np.random.Generator) -> Struck:

@@ -17,14 +17,14 @@ from sonic_bullet.diagnosis.evidence.amplitude_dependence import TURNS_RAD, fall
 from sonic_bullet.diagnosis.evidence.effect_evidence import object_evidence, outside, paired, path_response
 from sonic_bullet.diagnosis.evidence.small_amplitude import at_rest
 from sonic_bullet.diagnosis.evidence.unmatched_modes import CORRECTION, can_tell, sought
-from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, bends, modes_of, moves, pattern, play, undamped
+from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, bends, moves
+from sonic_bullet.diagnosis.prediction.prediction import Prediction, impact_of, predict, predict_fitted, undamped
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.effects.protocol import (
     BaselineChange,
     ChangesBaseline,
     Dereverberates,
     Effect,
-    Impact,
     ObjectEvidence,
     SplitsPairs,
     Stage,
@@ -50,17 +50,11 @@ def refitted(
     if moved:
         h = corrected(h, bodies, anew=anew)
     if observed is None or moved:
-        observed = tuple(
-            object_evidence(
-                replace(h, effects=tuple(e for e in h.effects if e.stage is not Stage.SOUND)),
-                b,
-                sounds=False,
-                anew=anew,
-            )
-            for b in bodies
-            if b.recorded is not None
-        )
-    observed = tuple(fallen(h, _whose(one, bodies), outside(h, one)) for one in observed)
+        bare = replace(h, effects=tuple(e for e in h.effects if e.stage is not Stage.SOUND))
+        observed = tuple(object_evidence(p, sounds=False, anew=anew) for p in predict_fitted(bare, bodies).values())
+    observed = tuple(outside(h, one) for one in observed)
+    if bends(h):
+        observed = tuple(fallen(predict(h, _whose(one, bodies)), one) for one in observed)
     h = _gained(_damped(h, bodies, observed), bodies, observed)
     return at_rest(h, bodies, observed) if bends(h) else h
 
@@ -93,7 +87,7 @@ def reidentified(
         )
         signal = g.signals[mine]
         bare = replace(h, effects=tuple(e for e in h.effects if e is not room))
-        sound = np.stack([play(bare, body, body.fitted[i], signal.shape[1], g.sr) for i in mine])
+        sound = predict(bare, body).sounds([body.fitted[i] for i in mine], signal.shape[1], g.sr)
         again = room.identified_from(signal, sound, noise_rms(signal, g.sr), g.sr, fully=fully)
         h = replace(h, effects=tuple(again if e is room else e for e in h.effects))
     return h
@@ -131,35 +125,33 @@ def corrected(h: Hypothesis, bodies: tuple[Struck, ...], *, anew: bool = False) 
         h, correction=None, stretch=float(sum(c.stretch for c in changes)), poisson=known[-1] if known else None
     )
     for _ in range(3):
-        off = np.concatenate([_off(h, body, anew)[1] for body in bodies if body.recorded is not None] or [np.zeros(0)])
+        off = np.concatenate(
+            [_off(predict(h, body), anew)[1] for body in bodies if body.recorded is not None] or [np.zeros(0)]
+        )
         if len(off):
             h = replace(h, stretch=h.stretch + float(np.median(off)))
     found: dict[str, Array] = {}
     for body in bodies:
         if body.recorded is None:
             continue
+        own_hz = undamped(h, body).freq_hz
         # lines of degenerate modes go to their own: half a split off, either would do
         for e in (e for e in h.effects if isinstance(e, SplitsPairs)):
-            found[body.name] = np.clip(
-                e.observed_correction(undamped(h, body).freq_hz * np.exp(h.stretch)), -CORRECTION, CORRECTION
-            )
+            found[body.name] = np.clip(e.observed_correction(own_hz * np.exp(h.stretch)), -CORRECTION, CORRECTION)
         for _ in range(2):
-            place, off = _off(replace(h, correction=found), body, anew)
-            ratio = np.array(found.get(body.name, np.zeros(undamped(h, body).mode_count)), float)
+            place, off = _off(predict(replace(h, correction=found), body), anew)
+            ratio = np.array(found.get(body.name, np.zeros(len(own_hz))), float)
             step = np.zeros(len(ratio))
             step[place] = np.expm1(off)
             found[body.name] = np.clip((1 + ratio) * (1 + step) - 1, -CORRECTION, CORRECTION)
             if not moves(h) or any(isinstance(e, SplitsPairs) for e in h.effects):
-                found[body.name] = _alike(undamped(h, body).freq_hz, found[body.name])
+                found[body.name] = _alike(own_hz, found[body.name])
         if can_tell(body):
-            now = replace(h, correction=found)
-            model, order = modes_of(now, body)
-            groups = [order[who] for who in paired(now, body, model, order, anew=anew)[1]]
+            now = predict(replace(h, correction=found), body)
+            groups = [now.order[who] for who in paired(now, anew=anew)[1]]
             lone = np.setdiff1d(np.arange(len(ratio)), np.concatenate([*groups, np.zeros(0, int)]))
             shared = np.concatenate([*(g for g in groups if len(g) > 1), np.zeros(0, int)])
-            found[body.name] = sought(
-                now, body, np.concatenate([lone, shared]), alone=np.isin(np.arange(len(ratio)), lone)
-            )
+            found[body.name] = sought(now, np.concatenate([lone, shared]), alone=np.isin(np.arange(len(ratio)), lone))
     return replace(h, correction=found)
 
 
@@ -171,15 +163,17 @@ def _alike(freq_hz: Array, correction: Array) -> Array:
     return np.asarray((np.bincount(run, correction) / np.maximum(np.bincount(run), 1))[run])
 
 
-def _off(h: Hypothesis, body: Struck, anew: bool) -> tuple[Array, Array]:
+def _off(p: Prediction, anew: bool) -> tuple[Array, Array]:
     """Uncorrected modes (p,) of a body and ln f of their lines over their own (p,)."""
-    assert body.recorded is not None
-    model, order = modes_of(h, body)
-    line, mode = paired(h, body, model, order, anew=anew)
-    place = np.concatenate([order[who] for who in mode]) if mode else np.zeros(0, int)
-    lines = body.recorded.lines.freq_hz
+    assert p.body.recorded is not None
+    line, mode = paired(p, anew=anew)
+    place = np.concatenate([p.order[who] for who in mode]) if mode else np.zeros(0, int)
+    lines = p.body.recorded.lines.freq_hz
     off = np.concatenate(
-        [np.full(len(who), np.log(lines[one] / model.freq_hz[who].mean())) for one, who in zip(line, mode, strict=True)]
+        [
+            np.full(len(who), np.log(lines[one] / p.model.freq_hz[who].mean()))
+            for one, who in zip(line, mode, strict=True)
+        ]
         or [np.zeros(0)]
     )
     return place, off
@@ -199,11 +193,11 @@ def _damped(h: Hypothesis, bodies: tuple[Struck, ...], observed: tuple[ObjectEvi
     for one in observed:
         if not len(one.freq_hz):
             continue
-        model, _ = modes_of(bare, _whose(one, bodies))
         extra = np.zeros(len(one.freq_hz))
         if moves(h):  # ``one`` is of h itself, and its lines are paired anew
             extra = np.maximum(one.expected_decay_per_s - (h.alpha_per_s + h.beta_s * one.omega**2) / 2, 0.0)
         elif h.at(Stage.MODES):
+            model = predict(bare, _whose(one, bodies)).model
             extra = np.array([model.decay_per_s[who].mean() for who in _members(one, model)])
         lam.append(one.omega**2)
         left.append(np.maximum(one.decay_per_s - extra, 1e-3 * one.decay_per_s))
@@ -226,15 +220,10 @@ def _members(one: ObjectEvidence, model: ModalModel) -> list[Array]:
     ]
 
 
-def _participation(h: Hypothesis, body: Struck, one: ObjectEvidence) -> Array:
-    """Jψ (s, k) of the lines: the evidence's own, or, beside effects that leave modes where they were, as these have
-    them sound.
-    """
-    if moves(h) or not h.at(Stage.MODES):
-        return one.pattern
-    model, _ = modes_of(h, body)
-    row = pattern(body, model)[[body.fitted[i] for i in one.strike]]
-    return np.stack([row[:, who].sum(axis=1) for who in _members(one, model)], axis=1)
+def _participation(p: Prediction, one: ObjectEvidence) -> Array:
+    """Jψ (s, k) of the lines as effects have them sound that leave modes where they were."""
+    row = p.pattern()[p.strikes_of(one)]
+    return np.stack([row[:, who].sum(axis=1) for who in _members(one, p.model)], axis=1)
 
 
 def whole(one: ObjectEvidence) -> Array:
@@ -263,16 +252,15 @@ def _gained(h: Hypothesis, bodies: tuple[Struck, ...], observed: tuple[ObjectEvi
     """σ by the amplitudes, times what effects that hide them from the lines know better."""
     louder = float(np.prod([c.onset_gain for c in baseline_changes(h)]))
     modeled, seen, spread = [], [], []
+    others = bool(h.at(Stage.MODES)) and not moves(h)  # participations than the evidence's own
     for one in observed:
         if not len(one.freq_hz) or one.signal is None:
             continue
-        body = _whose(one, bodies)
-        direct = np.abs(path_response(h, body, one.freq_hz, one.sr))
+        p = predict(h, _whose(one, bodies)) if others or bends(h) else None
+        direct = np.abs(path_response(h, one.freq_hz, one.sr))
         factor = np.empty(one.pattern.shape)
         for i, level in enumerate(one.impulse_n_s):
-            impact = Impact(float(level) if np.isfinite(level) else 1.0, np.zeros(1), np.ones(1))
-            for effect in h.at(Stage.FORCE):
-                impact = effect.apply(impact)
+            impact = impact_of(float(level), h.at(Stage.FORCE))
             hits = np.abs(
                 (
                     impact.share[:, None]
@@ -280,8 +268,8 @@ def _gained(h: Hypothesis, bodies: tuple[Struck, ...], observed: tuple[ObjectEvi
                 ).sum(axis=0)
             )
             factor[i] = np.abs(impact.spectrum(one.freq_hz)) * direct * hits
-        expected = np.abs(_participation(h, body, one)) * factor
-        if bends(h) and not (dependent := turns_rad(h, body, one) > TURNS_RAD).all():
+        expected = np.abs(_participation(p, one) if p and others else one.pattern) * factor
+        if p and bends(h) and not (dependent := turns_rad(p, one) > TURNS_RAD).all():
             expected = np.where(dependent, np.nan, expected)  # of an amplitude-dependent mode a linear fit takes a part
         modeled.append(expected.ravel())
         seen.append(np.abs(whole(one)).ravel())

@@ -16,7 +16,8 @@ import numpy as np
 from sonic_bullet.diagnosis.evidence.amplitude_dependence import amplitude_dependent
 from sonic_bullet.diagnosis.evidence.effect_evidence import object_evidence
 from sonic_bullet.diagnosis.evidence.unmatched_modes import CORRECTION
-from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, modes_of, play, undamped
+from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis
+from sonic_bullet.diagnosis.prediction.prediction import Prediction, predict
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.effects.common.envelope import Envelopes, alone, shifted
 from sonic_bullet.effects.protocol import ObjectEvidence
@@ -38,28 +39,26 @@ def at_rest(
     for body in bodies:
         mine = next((one for one in observed if body.recorded is not None and one.source is body.recorded), None)
         if mine is not None and mine.signal is not None and not mine.dry:  # in a room no line is one mode's alone
-            found[body.name] = _rested(h, body, list(mine.strike), every)
+            found[body.name] = _rested(predict(h, body), mine.strike, every)
     return replace(h, correction=found)
 
 
-def _rested(h: Hypothesis, body: Struck, strikes: list[int], every: bool) -> Array:
+def _rested(p: Prediction, strike: tuple[int, ...], every: bool) -> Array:
     """Corrections (m,) of a body."""
+    body, modes, count = p.body, p.model, p.base.mode_count
     assert body.recorded is not None and body.recorded.signals is not None
-    count = undamped(h, body).mode_count
-    correction = np.array((h.correction or {}).get(body.name, np.zeros(count)), float)
-    one, (modes, order) = object_evidence(h, body, sounds=False), modes_of(h, body)
-    dependent = (
-        np.ones(len(one.freq_hz), bool) if every else amplitude_dependent(h, body, replace(one, strike=tuple(strikes)))
-    )
+    correction = np.array((p.hypothesis.correction or {}).get(body.name, np.zeros(count)), float)
+    one = replace(object_evidence(p, sounds=False), strike=strike)
+    dependent = np.ones(len(one.freq_hz), bool) if every else amplitude_dependent(p, one)
     selected, window = alone(one)
     # degenerate modes shift each by its own level, and beat
     kept = [q for q, k in enumerate(selected) if dependent[k] and len(one.mode[k]) == 1]
     if not kept or len(correction) != count:
         return correction
     selected, window = [selected[q] for q in kept], [window[q] for q in kept]
-    signal = body.recorded.signals[strikes]
-    played = np.stack([play(h, body, body.fitted[i], signal.shape[1], body.recorded.sr) for i in strikes])
-    rows = replace(one, noise=one.noise[strikes])
+    signal = body.recorded.signals[list(strike)]
+    played = p.sounds(p.strikes_of(one), signal.shape[1], body.recorded.sr)
+    rows = replace(one, noise=one.noise[list(strike)])
     recorded, model = shifted(rows, signal, selected, window), shifted(rows, played, selected, window)
     for q, k in enumerate(selected):
         # or it would be taken for its neighbour
@@ -67,7 +66,7 @@ def _rested(h: Hypothesis, body: Struck, strikes: list[int], every: bool) -> Arr
         ratio = 1 + _off_hz(
             recorded, model, q, min(CORRECTION * float(one.freq_hz[k]), HALFWAY * float(next_hz))
         ) / float(one.freq_hz[k])
-        who = order[one.mode[k]]
+        who = p.order[one.mode[k]]
         correction[who] = np.clip((1 + correction[who]) * ratio - 1, -CORRECTION, CORRECTION)
     return correction
 

@@ -16,7 +16,8 @@ from dataclasses import replace
 import numpy as np
 
 from sonic_bullet.diagnosis.evidence.effect_evidence import object_evidence
-from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, modes_of, undamped
+from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis
+from sonic_bullet.diagnosis.prediction.prediction import Prediction, predict
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.records import Array
 
@@ -32,7 +33,7 @@ def settled(h: Hypothesis, bodies: tuple[Struck, ...]) -> tuple[Struck, ...]:
     """The bodies, modes without a line corrected where their sounds say so; a mode that has come to a line's frequency
     belongs to it.
     """
-    return tuple(_settled(h, body) if can_tell(body) else body for body in bodies)
+    return tuple(_settled(predict(h, body)) if can_tell(body) else body for body in bodies)
 
 
 def can_tell(body: Struck) -> bool:
@@ -47,12 +48,13 @@ def can_tell(body: Struck) -> bool:
     )
 
 
-def _settled(h: Hypothesis, body: Struck) -> Struck:
+def _settled(p: Prediction) -> Struck:
+    h, body = p.hypothesis, p.body
     assert body.recorded is not None
     shared = np.bincount(body.line[body.line >= 0], minlength=1)[np.maximum(body.line, 0)] > 1
     # modes that a mesh has put side by side may have taken one line where there are two
     free = (body.line < 0) | shared
-    correction = sought(h, body, np.flatnonzero(free), alone=body.line < 0)
+    correction = sought(p, np.flatnonzero(free), alone=body.line < 0)
     lines, line = body.recorded.lines.freq_hz, body.line.copy()
     for j in np.flatnonzero(correction != body.correction) if len(lines) else ():
         freq = body.model.freq_hz[j] * (1 + correction[j])
@@ -62,20 +64,19 @@ def _settled(h: Hypothesis, body: Struck) -> Struck:
     return replace(body, correction=correction, line=line)
 
 
-def sought(h: Hypothesis, body: Struck, which: Array, *, alone: Array | None = None) -> Array:
-    """The hypothesis' corrections (m,) of a body, those of ``which`` modes searched for anew, the loudest first. alone
+def sought(p: Prediction, which: Array, *, alone: Array | None = None) -> Array:
+    """The corrections (m,) of a body, those of ``which`` modes searched for anew, the loudest first. alone
     (m,): without a line; all where None.
 
     One that shares a line goes elsewhere only if nothing but itself, as the mesh has it, is there: degenerate modes
     that an imperfection has turned are not the mesh's.
     """
+    body, known, model, plain = p.body, p.hypothesis.correction, p.model, p.uncorrected()
     assert body.recorded is not None and body.recorded.signals is not None
-    observed, (model, order) = object_evidence(h, body), modes_of(h, body)
-    plain, plain_order = modes_of(replace(h, correction=None), body)
-    count = undamped(h, body).mode_count
-    correction = np.zeros(count) if h.correction is None else h.correction[body.name].copy()
+    observed, count = object_evidence(p, plain=plain), p.base.mode_count
+    correction = np.zeros(count) if known is None else known[body.name].copy()
     own, rank = np.full(count, np.nan), np.full(count, -1)  # overdamped modes are in neither
-    own[plain_order], rank[order] = plain.freq_hz, np.arange(len(order))
+    own[plain.order], rank[p.order] = plain.model.freq_hz, np.arange(len(p.order))
     energy = (np.abs(observed.push) ** 2).sum(axis=0) / np.maximum(model.decay_per_s, 1e-3)
     loud = [
         int(j)

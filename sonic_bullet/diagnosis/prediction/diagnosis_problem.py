@@ -13,7 +13,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis
-from sonic_bullet.diagnosis.prediction.score import Comparable, Score, Take, least_db, mean_db
+from sonic_bullet.diagnosis.prediction.prediction import Predictions
+from sonic_bullet.diagnosis.prediction.score import Comparable, Score, Take, least_db, mean_db, predict_takes
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.effects.protocol import Effect
 
@@ -53,13 +54,21 @@ class DiagnosisProblem:
         """Whether every body has a mesh."""
         return all(body.family is not None for body in self.bodies)
 
+    def predict(self, h: Hypothesis) -> Predictions:
+        """What the hypothesis says of the bodies that the strikes are of."""
+        return predict_takes(h, self.takes)
+
     def distance_db(self, h: Hypothesis) -> float:
         """Mean distance of the strikes from the hypothesis; ∞ where that plays nothing finite."""
-        return mean_db(self.takes, h)
+        return mean_db(self.takes, self.predict(h))
 
     def score(self, h: Hypothesis) -> Score:
         """Distance and noise floor, means over the strikes."""
-        return Score(mean_db(self.takes, h), least_db(self.takes, h))
+        return self.scored(self.predict(h))
+
+    def scored(self, made: Predictions) -> Score:
+        """The same of what has been predicted already."""
+        return Score(mean_db(self.takes, made), least_db(self.takes, made))
 
     def only(self, *effects: type[Effect]) -> DiagnosisProblem:
         """The same with other candidates."""

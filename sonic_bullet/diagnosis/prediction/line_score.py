@@ -13,7 +13,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, modes_of
+from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis
+from sonic_bullet.diagnosis.prediction.prediction import Prediction
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.estimator.lines.line_values import lines_at
 from sonic_bullet.records import Array
@@ -38,19 +39,19 @@ class Listed:
         """Whose lines they are."""
         return f"the list of lines of {self.body.name}"
 
-    def hindrance(self, h: Hypothesis) -> str:
-        """Why they have no distance from a hypothesis; empty where they have one."""
+    def hindrance(self, p: Prediction) -> str:
+        """Why they have no distance from what is predicted; empty where they have one."""
         assert self.body.recorded is not None
         count = len(self.body.recorded.lines.freq_hz)
         return "" if count >= 2 * FOLDS else f"holds {count}, and {2 * FOLDS} are needed to leave some out in turn"
 
-    def distance(self, h: Hypothesis) -> float:
+    def distance(self, p: Prediction) -> float:
         """D in dB."""
         assert self.body.recorded is not None
         lines = self.body.recorded.lines
-        return distance_db(*off_by(h, self.body, lines.freq_hz[self.line], lines.decay_per_s[self.line]))
+        return distance_db(*off_by(p, lines.freq_hz[self.line], lines.decay_per_s[self.line]))
 
-    def least(self, h: Hypothesis) -> float:
+    def least(self, p: Prediction) -> float:
         """D of the lines' own spreads."""
         assert self.body.recorded is not None
         lines = self.body.recorded.lines
@@ -81,13 +82,13 @@ def listed(bodies: tuple[Struck, ...]) -> tuple[Listed, ...]:
     return tuple(made)
 
 
-def off_by(h: Hypothesis, body: Struck, freq_hz: Array, decay_per_s: Array) -> tuple[Array, Array]:
+def off_by(p: Prediction, freq_hz: Array, decay_per_s: Array) -> tuple[Array, Array]:
     """|ln f/f_j| (k,), at most CAP, of lines and the modes that fit them best, and |ln d/d_j|, NaN where unknown or
     unpaired.
     """
     from scipy.optimize import linear_sum_assignment
 
-    model, _ = modes_of(h, body)
+    model = p.model
     gap = np.minimum(np.abs(np.log(freq_hz)[:, None] - np.log(np.maximum(model.freq_hz, 1e-9))[None, :]), CAP)
     row, column = linear_sum_assignment(gap)
     off, lost = np.full(len(freq_hz), CAP), np.full(len(freq_hz), np.nan)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, play
+from sonic_bullet.diagnosis.prediction.prediction import Predictions
 from sonic_bullet.diagnosis.prediction.score import Comparable, Take
 from sonic_bullet.estimator.lines.log_spectral import with_noise
 from sonic_bullet.estimator.perceptual.image import image
@@ -21,13 +21,13 @@ LEVELS = 2
 OBSERVED = 0.05  # sone
 
 
-def sone_distance(takes: Comparable, h: Hypothesis) -> float | None:
+def sone_distance(takes: Comparable, made: Predictions) -> float | None:
     """Mean over takes; None where none is audible."""
     found = []
     for take in (t for t in takes if isinstance(t, Take)):
-        made = with_noise(play(h, take.body, take.strike, len(take.sample), take.sr), take.floor, take.strike)
+        played = with_noise(take.played(made[take.body]), take.floor, take.strike)
         try:
-            a, b = (image(x, take.sr, 0.0, FULL_SCALE, levels=LEVELS, bark_step=1.0) for x in (take.sample, made))
+            a, b = (image(x, take.sr, 0.0, FULL_SCALE, levels=LEVELS, bark_step=1.0) for x in (take.sample, played))
         except RecordError:
             continue
         for one, two in zip(a.levels, b.levels, strict=False):

@@ -2,8 +2,8 @@
 
 D(recorded, played + noise), D of two noisy takes of what is played                       (estimator.lines.log_spectral)
 
-comparable(takes, h) is the one door: what has no distance stays outside, by name and with its reason, and what is let
-in has one from any hypothesis, a plain float:
+comparable(takes, made) is the one door: what has no distance stays outside, by name and with its reason, and what is
+let in has one from what any hypothesis predicts, a plain float:
 
     neither stands above the noise   -> EDGE_DB, what noise makes of a sound that just stands above it
     what is played is not finite     -> ∞, farther than whatever can be played
@@ -11,13 +11,14 @@ in has one from any hypothesis, a plain float:
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import NewType, Protocol
 
 import numpy as np
 
-from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, play
+from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis
+from sonic_bullet.diagnosis.prediction.prediction import Prediction, Predictions, predict_each
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.estimator.fit.recorded import RecordedObject as Recorded
 from sonic_bullet.estimator.lines.log_spectral import ABOVE, WINDOWS, Floor, log_spectral_db, noise_floor_db, with_noise
@@ -35,15 +36,20 @@ class Judged(Protocol):
         """What a person would call it."""
         ...
 
-    def hindrance(self, h: Hypothesis) -> str:
-        """Why it has no distance from the hypothesis; empty where it has one."""
+    @property
+    def body(self) -> Struck:
+        """What was struck."""
         ...
 
-    def distance(self, h: Hypothesis) -> float:
-        """How far the hypothesis is from it; ∞ where that plays nothing finite."""
+    def hindrance(self, p: Prediction) -> str:
+        """Why it has no distance from what is predicted of its body; empty where it has one."""
         ...
 
-    def least(self, h: Hypothesis) -> float:
+    def distance(self, p: Prediction) -> float:
+        """How far what is predicted is from it; ∞ where that plays nothing finite."""
+        ...
+
+    def least(self, p: Prediction) -> float:
         """How far it would be from itself, measured again."""
         ...
 
@@ -77,11 +83,16 @@ class Incomparable:
     left_out: tuple[LeftOut, ...]
 
 
-def comparable(takes: Sequence[Judged], h: Hypothesis) -> Compared | Incomparable:
-    """Which of the takes have a distance from the hypothesis, and from any other that is held against the same
-    recordings.
+def predict_takes(h: Hypothesis, takes: Iterable[Judged]) -> Predictions:
+    """What a hypothesis says of the bodies that the takes are of, once each."""
+    return predict_each(h, (take.body for take in takes))
+
+
+def comparable(takes: Sequence[Judged], made: Predictions) -> Compared | Incomparable:
+    """Which of the takes have a distance from what is predicted of their bodies, and from whatever else is held against
+    the same recordings.
     """
-    why = [take.hindrance(h) for take in takes]
+    why = [take.hindrance(made[take.body]) for take in takes]
     out = tuple(LeftOut(take.name, reason) for take, reason in zip(takes, why, strict=True) if reason)
     kept = tuple(take for take, reason in zip(takes, why, strict=True) if not reason)
     return Compared(Comparable(kept), out) if kept else Incomparable(out)
@@ -130,13 +141,17 @@ class Take:
         file = self.body.recordings[self.strike].file
         return file.name if file is not None else f"{self.body.name}, strike {self.strike + 1}"
 
-    def hindrance(self, h: Hypothesis) -> str:
-        """Why it has no distance from the hypothesis; empty where it has one."""
+    def played(self, p: Prediction) -> Array:
+        """What is predicted of it (n,)."""
+        return p.sound(self.strike, len(self.sample), self.sr)
+
+    def hindrance(self, p: Prediction) -> str:
+        """Why it has no distance from what is predicted; empty where it has one."""
         if wrong := int((~np.isfinite(self.sample)).sum()):
             return f"holds {wrong} samples that are no numbers"
         if len(self.sample) < min(WINDOWS):
             return f"holds {len(self.sample)} samples after the onset, and {min(WINDOWS)} are needed"
-        made = play(h, self.body, self.strike, len(self.sample), self.sr)
+        made = self.played(p)
         if not np.isfinite(made).all():
             return "is played by the model with samples that are no numbers"
         if not np.isfinite(self._apart(made)):
@@ -146,9 +161,9 @@ class Take:
             )
         return ""
 
-    def distance(self, h: Hypothesis) -> float:
-        """D in dB of the recording and what the hypothesis plays; see the module's head."""
-        return self.apart_db(play(h, self.body, self.strike, len(self.sample), self.sr))
+    def distance(self, p: Prediction) -> float:
+        """D in dB of the recording and what is predicted; see the module's head."""
+        return self.apart_db(self.played(p))
 
     def apart_db(self, made: Array) -> float:
         """D in dB of the recording and whatever is played in its place (n,)."""
@@ -157,9 +172,9 @@ class Take:
     def _apart(self, made: Array) -> float:
         return log_spectral_db(self.sample, with_noise(made, self.floor, self.strike), self.floor)
 
-    def least(self, h: Hypothesis) -> float:
-        """D of two noisy takes of what the hypothesis plays."""
-        return _stated(noise_floor_db(play(h, self.body, self.strike, len(self.sample), self.sr), self.floor))
+    def least(self, p: Prediction) -> float:
+        """D of two noisy takes of what is predicted."""
+        return _stated(noise_floor_db(self.played(p), self.floor))
 
 
 def _stated(db: float) -> float:
@@ -167,11 +182,11 @@ def _stated(db: float) -> float:
     return EDGE_DB if np.isnan(db) else db
 
 
-def mean_db(takes: Comparable, h: Hypothesis) -> float:
+def mean_db(takes: Comparable, made: Predictions) -> float:
     """Mean distance over takes."""
-    return float(np.mean([take.distance(h) for take in takes]))
+    return float(np.mean([take.distance(made[take.body]) for take in takes]))
 
 
-def least_db(takes: Comparable, h: Hypothesis) -> float:
+def least_db(takes: Comparable, made: Predictions) -> float:
     """Mean noise floor of the distance over takes."""
-    return float(np.mean([take.least(h) for take in takes]))
+    return float(np.mean([take.least(made[take.body]) for take in takes]))

@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sonic_bullet.diagnosis.evidence.unmatched_modes import CORRECTION
-from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, play
+from sonic_bullet.diagnosis.prediction.prediction import Predictions
 from sonic_bullet.diagnosis.prediction.score import Judged, Take
 from sonic_bullet.diagnosis.selection.thresholds import RULES
 from sonic_bullet.estimator.lines.log_spectral import ABOVE, Floor
@@ -58,15 +58,13 @@ class BandOff:
         return f"recorded {abs(self.recorded_over_played_db):.1f} dB {less} than played {where} {when}, {strikes}"
 
 
-def bands_off(h: Hypothesis, takes: Sequence[Judged]) -> tuple[BandOff, ...]:
-    """The bands in which what the hypothesis plays is not as loud as what was recorded.
+def bands_off(takes: Sequence[Judged], made: Predictions) -> tuple[BandOff, ...]:
+    """The bands in which what is predicted is not as loud as what was recorded.
 
     Lists of lines have no levels.
     """
     rows = [
-        over_db(t.sample, play(h, t.body, t.strike, len(t.sample), t.sr), t.sr, t.floor, t.body.band_hz)
-        for t in takes
-        if isinstance(t, Take)
+        over_db(t.sample, t.played(made[t.body]), t.sr, t.floor, t.body.band_hz) for t in takes if isinstance(t, Take)
     ]
     return off_in(np.array(rows)) if rows else ()
 

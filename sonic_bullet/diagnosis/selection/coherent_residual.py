@@ -16,7 +16,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis
+from sonic_bullet.diagnosis.prediction.prediction import Predictions
 from sonic_bullet.diagnosis.prediction.score import Judged, Take
 from sonic_bullet.estimator.fit.recorded import RecordedObject as Recorded
 from sonic_bullet.estimator.lines.joint_lines import Lines, lines_of, noise_rms
@@ -51,16 +51,16 @@ def _in_time(a: Array, freq_hz: Array) -> Array:
     return a
 
 
-def of_no_body(h: Hypothesis, takes: Sequence[Judged]) -> float:
-    """Of the squared distance between strikes and h, over noise alone, the share that the strikes' own lines leave,
-    those that are in phase: 0 to 1.
+def of_no_body(takes: Sequence[Judged], made: Predictions) -> float:
+    """Of the squared distance between strikes and what is predicted, over noise alone, the share that the strikes' own
+    lines leave, those that are in phase: 0 to 1.
     """
     observed = [take for take in takes if isinstance(take, Take)]
     played = {id(g): _played(g) for g in {id(t.place[0]): t.place[0] for t in observed}.values()}
     left, gap = 0.0, 0.0
     for take in observed:
-        recorded, strike = take.place
-        mine, off, least = _off(take, played[id(recorded)][strike]), take.distance(h), take.least(h)
+        (recorded, strike), p = take.place, made[take.body]
+        mine, off, least = _off(take, played[id(recorded)][strike]), take.distance(p), take.least(p)
         left, gap = left + max(mine**2 - least**2, 0.0), gap + max(off**2 - least**2, 0.0)
     return float(min(left / gap, 1.0)) if gap > 0 else 0.0
 

@@ -26,6 +26,7 @@ from sonic_bullet.diagnosis.evidence.small_amplitude import at_rest
 from sonic_bullet.diagnosis.prediction.diagnosis_problem import DiagnosisProblem
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, bends, mixes_neighbours, moves
 from sonic_bullet.diagnosis.prediction.line_score import Listed
+from sonic_bullet.diagnosis.prediction.prediction import predict, predict_each
 from sonic_bullet.diagnosis.prediction.score import Judged, Take
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.diagnosis.selection.acceptance import Candidate, accepted, jackknife, may_be_accepted, mean
@@ -151,9 +152,10 @@ def _folds(
         elif isinstance(take, Take):
             mine, less = problem.bodies, thinned(evidence, take.place, keep, rng)
             base = refitted(h, problem.bodies, less.observed)
-        before = take.distance(base)
+        p = predict(base, take.body)
+        before = take.distance(p)
         if np.isfinite(before):  # of the others alone a model may come that cannot be played
-            made.append(Fold(take, mine, less, base, before, before, take.least(base)))
+            made.append(Fold(take, mine, less, base, before, before, take.least(p)))
     return made
 
 
@@ -161,10 +163,12 @@ def _learnt_anew(every: Hypothesis, folds: list[Fold]) -> list[Fold]:
     """Folds that know what is gained by corrections alone, learnt again as they are beside whatever moves modes: that
     is no effect's gain. every: by all strikes.
     """
+    made = predict_each(every, (f.take.body for f in folds if not isinstance(f.take, Listed)))
 
     def least(f: Fold) -> float:
-        again = refitted(f.base, f.bodies, anew=True) if isinstance(f.take, Listed) else every
-        return min(f.before, f.take.distance(again))
+        if isinstance(f.take, Listed):
+            return min(f.before, f.take.distance(predict(refitted(f.base, f.bodies, anew=True), f.take.body)))
+        return min(f.before, f.take.distance(made[f.take.body]))
 
     return [replace(f, least=least(f)) for f in folds]
 
@@ -173,12 +177,12 @@ def _at_rest_folds(folds: list[Fold]) -> list[Fold]:
     """Folds that know what is gained by corrections alone, learnt from what modes ring down to as they are beside
     whatever makes them depend on amplitude.
     """
-    return [
-        replace(f, least=min(f.before, f.take.distance(at_rest(f.base, f.bodies, f.evidence.observed, every=True))))
-        if isinstance(f.take, Take)
-        else f
-        for f in folds
-    ]
+
+    def least(f: Fold) -> float:
+        rested = at_rest(f.base, f.bodies, f.evidence.observed, every=True)
+        return min(f.before, f.take.distance(predict(rested, f.take.body)))
+
+    return [replace(f, least=least(f)) if isinstance(f.take, Take) else f for f in folds]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -203,20 +207,20 @@ def _cross_validated(
         effect = kind.propose(replace(less, known=whole, held_out=True))
         if effect is None:
             return Gain()
+        asks_lines = isinstance(fold.take, Take) and tells(h, effect)
+        lined = [b for b in bodies if b.recorded is not None] if asks_lines else []
         # such axes are whole's (Evidence.held_out)
         free = effect.freedom() - (effect.angles() if isinstance(effect, RotatesPairs) else 0)
         random = [
             ControlEffect.fitted(less, min(free, RULES.control_numbers), 10 * i + draw)
             for draw in range(RULES.control_draws)
         ]
-        augmented = _augmented(fold, effect)
-        after = fold.take.distance(augmented)
-        chance = tuple(fold.before - fold.take.distance(_augmented(fold, none)) for none in random if none is not None)
-        lines = (
-            likelier(fold.base, augmented, evidence, less, bodies)
-            if isinstance(fold.take, Take) and tells(h, effect)
-            else 0.0
-        )
+        body = fold.take.body
+        made = predict_each(_augmented(fold, effect), (body, *lined))
+        after = fold.take.distance(made[body])
+        controls = [predict(_augmented(fold, control), body) for control in random if control is not None]
+        chance = tuple(fold.before - fold.take.distance(p) for p in controls)
+        lines = likelier(predict_each(fold.base, lined), made, evidence, less) if lined else 0.0
         return Gain(effect, fold.least - after, fold.before - after, chance, lines)
 
     found = parallel_map(judged, range(min(RULES.first_strikes, len(folds))))

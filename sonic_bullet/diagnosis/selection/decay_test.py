@@ -14,8 +14,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, modes_of, moves_itself
-from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, moves_itself
+from sonic_bullet.diagnosis.prediction.prediction import Predictions
 from sonic_bullet.diagnosis.selection.thresholds import RULES
 from sonic_bullet.effects.protocol import Dereverberates, Effect, Evidence, ObjectEvidence, Stage
 from sonic_bullet.records import Array
@@ -36,17 +36,14 @@ def tells(h: Hypothesis, effect: Effect) -> bool:
     return any(isinstance(e, Dereverberates) for e in h.effects) and of_decays(h, effect)
 
 
-def misfit(h: Hypothesis, effect: Effect, evidence: Evidence, bodies: tuple[Struck, ...]) -> float:
+def misfit(made: Predictions, effect: Effect, evidence: Evidence) -> float:
     """Twice −ln likelihood of all lines' decays by a model with this effect, and its numbers at ln n each [Schwarz
     1978].
     """
     total, count = 0.0, 0
     for one in evidence.observed:
-        body = next(b for b in bodies if b.recorded is one.source)
         good = _has_decay(one)
-        total += float(
-            _cost(modes_of(h, body)[0].decay_per_s, one.mode, one.decay_per_s, one.decay_sd_per_s)[good].sum()
-        )
+        total += float(_cost(made, one)[good].sum())
         count += int(good.sum())
     return total + numbers(effect) * float(np.log(max(count, 1)))
 
@@ -56,9 +53,7 @@ def _has_decay(one: ObjectEvidence) -> Array:
     return np.asarray(np.isfinite(one.decay_per_s) & (one.decay_per_s > 0) & ~np.isposinf(one.decay_sd_per_s))
 
 
-def likelier(
-    without: Hypothesis, augmented: Hypothesis, every: Evidence, training: Evidence, bodies: tuple[Struck, ...]
-) -> float:
+def likelier(without: Predictions, augmented: Predictions, every: Evidence, training: Evidence) -> float:
     """Twice the gain in ln likelihood of the decays that are in ``every`` and not in ``training``, from which both
     hypotheses were fitted.
     """
@@ -66,19 +61,15 @@ def likelier(
     for one in every.observed:
         seen = next((h.freq_hz for h in training.observed if h.source is one.source), one.freq_hz[:0])
         out = ~np.isin(one.freq_hz, seen) & _has_decay(one)
-        body = next(b for b in bodies if b.recorded is one.source)
-        cost = [
-            _cost(modes_of(h, body)[0].decay_per_s, one.mode, one.decay_per_s, one.decay_sd_per_s)[out].sum()
-            for h in (without, augmented)
-        ]
-        total += float(cost[0] - cost[1])
+        total += float(_cost(without, one)[out].sum() - _cost(augmented, one)[out].sum())
     return total
 
 
-def _cost(model_per_s: Array, mode: tuple[Array, ...], decay_per_s: Array, sd_per_s: Array) -> Array:
-    """ρ (k,) of lines' decays (k,) against those of the modes (m,) each stands for."""
-    model = np.array([model_per_s[m].mean() for m in mode])
-    sd = np.hypot(np.nan_to_num(sd_per_s / decay_per_s, nan=0.05, posinf=1e3), RULES.decay_scatter)
+def _cost(made: Predictions, one: ObjectEvidence) -> Array:
+    """ρ (k,) of lines' decays (k,) against those of the modes each stands for."""
+    per_s = next(p.model.decay_per_s for body, p in made.items() if body.recorded is one.source)
+    model = np.array([per_s[m].mean() for m in one.mode])
+    sd = np.hypot(np.nan_to_num(one.decay_sd_per_s / one.decay_per_s, nan=0.05, posinf=1e3), RULES.decay_scatter)
     with np.errstate(divide="ignore"):
-        z = np.log(decay_per_s / np.maximum(model, 1e-9)) / sd
+        z = np.log(one.decay_per_s / np.maximum(model, 1e-9)) / sd
     return np.asarray(RULES.cauchy_width**2 * np.log1p((z / RULES.cauchy_width) ** 2))

@@ -21,6 +21,7 @@ from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of, thinned
 from sonic_bullet.diagnosis.evidence.refit import refitted, with_effects
 from sonic_bullet.diagnosis.prediction.diagnosis_problem import DiagnosisProblem
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, moves
+from sonic_bullet.diagnosis.prediction.prediction import predict, predict_fitted
 from sonic_bullet.diagnosis.prediction.score import Judged, Take
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.diagnosis.selection.acceptance import Candidate
@@ -105,7 +106,10 @@ def left_out_db(h: Hypothesis, i: int, problem: DiagnosisProblem) -> Array:
         place = take.place
         return lambda evidence: thinned(evidence, place, 1.0, np.random.default_rng(0))
 
-    return np.array(parallel_map(lambda take: take.distance(again(h, i, problem, less=without(take))), problem.takes))
+    def distance_db(take: Judged) -> float:
+        return take.distance(predict(again(h, i, problem, less=without(take)), take.body))
+
+    return np.array(parallel_map(distance_db, problem.takes))
 
 
 def exchanged(
@@ -156,7 +160,8 @@ def decays_against(rival: Effect, best: Hypothesis, other: Hypothesis, i: int, p
     if not (of_decays(best, own) and of_decays(other, rival)):
         return False
     evidence = evidence_of(best, problem.bodies, problem.band_hz)
-    return misfit(other, rival, evidence, problem.bodies) > misfit(best, own, evidence, problem.bodies)
+    mine, its = (predict_fitted(h, problem.bodies) for h in (best, other))
+    return misfit(its, rival, evidence) > misfit(mine, own, evidence)
 
 
 def phases_against(best: Hypothesis, other: Hypothesis, bodies: tuple[Struck, ...]) -> bool:

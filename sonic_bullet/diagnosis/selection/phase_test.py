@@ -14,7 +14,8 @@ import numpy as np
 
 from sonic_bullet.diagnosis.evidence.effect_evidence import object_evidence
 from sonic_bullet.diagnosis.evidence.refit import ROUGH
-from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, impact_of
+from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis
+from sonic_bullet.diagnosis.prediction.prediction import Prediction, predict_fitted
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.records import Array
 
@@ -27,13 +28,13 @@ def misfit(h: Hypothesis, bodies: tuple[Struck, ...]) -> float:
     """Twice the negative log likelihood of all objects' onset amplitudes under Cauchy's law, phases counted where they
     are true; infinite where a strike hits more than once.
     """
-    return sum(_misfit(h, body) for body in bodies if body.recorded is not None)
+    return sum(_misfit(p) for p in predict_fitted(h, bodies).values())
 
 
-def _misfit(h: Hypothesis, body: Struck) -> float:
-    one = object_evidence(h, body, sounds=False)
+def _misfit(p: Prediction) -> float:
+    one = object_evidence(p, sounds=False)
     expected, seen = one.expected, one.amplitude
-    if any(len(impact_of(h, body, i).delay_s) > 1 for i in body.fitted):
+    if any(len(p.impact(i).delay_s) > 1 for i in p.body.fitted):
         return np.inf  # a line's amplitude at the onset is of one hit
     # whatever is expected there, so that all effects are held against the same
     good = np.isfinite(seen) & np.isfinite(one.amplitude_sd)

@@ -13,6 +13,7 @@ import numpy as np
 from sonic_bullet.diagnosis.evidence.refit import refitted, reidentified, with_effects
 from sonic_bullet.diagnosis.prediction.diagnosis_problem import DiagnosisProblem
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, moves, moves_itself
+from sonic_bullet.diagnosis.prediction.prediction import predict_fitted
 from sonic_bullet.diagnosis.prediction.score import Score
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.diagnosis.selection.acceptance import Candidate, needed
@@ -82,7 +83,7 @@ def simplest(able: Sequence[Candidate], bodies: tuple[Struck, ...], evidence: Ev
             if of_decays(c.hypothesis, c.effect)
             and (best.drop_db - c.drop_db).mean() < RULES.phases_decide_share * best.mean_db
         ]
-        first = min(alike, key=lambda c: decays(c.hypothesis, c.effect, evidence, bodies))
+        first = min(alike, key=lambda c: decays(predict_fitted(c.hypothesis, bodies), c.effect, evidence))
     others = [
         c
         for c in rivals

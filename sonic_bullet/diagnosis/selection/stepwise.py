@@ -19,6 +19,7 @@ from sonic_bullet.diagnosis.evidence.mesh_limits import beyond, of_the_mesh
 from sonic_bullet.diagnosis.evidence.refit import refitted, reidentified
 from sonic_bullet.diagnosis.prediction.diagnosis_problem import DiagnosisProblem, silent
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, mixes_neighbours, moves_itself
+from sonic_bullet.diagnosis.prediction.prediction import Predictions, predict_each
 from sonic_bullet.diagnosis.prediction.score import Comparable, Incomparable, Judged, LeftOut, Score, comparable
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.diagnosis.selection.acceptance import Candidate, accepted
@@ -86,20 +87,19 @@ def closed(
 ) -> Closed | NothingCompared:
     """Select effects on fitted strikes alone, those that can be compared."""
     start = refitted(base, bodies)
-    found = comparable(takes, start)
+    made = predict_each(start, (take.body for take in takes))
+    found = comparable(takes, made)
     if isinstance(found, Incomparable):
         return NothingCompared(start, found.left_out)
-    return _closed(
-        start, DiagnosisProblem(bodies, found.takes, band_hz, tuple(effects), seed, progress or silent), found.left_out
-    )
+    problem = DiagnosisProblem(bodies, found.takes, band_hz, tuple(effects), seed, progress or silent)
+    return _closed(start, made, problem, found.left_out)
 
 
-def _closed(start: Hypothesis, problem: DiagnosisProblem, left_out: tuple[LeftOut, ...]) -> Closed:
-    """The selection over what can be compared."""
-    before = problem.distance_db(start)
-    one = _one_by_one(start, problem)
-    h, added, last = one.h, one.added, dict(one.last)
-    now = Score(problem.distance_db(h), one.floor_db)
+def _closed(start: Hypothesis, made: Predictions, problem: DiagnosisProblem, left_out: tuple[LeftOut, ...]) -> Closed:
+    """The selection over what can be compared. made: what the start says of it."""
+    scored = problem.scored(made)
+    before, one = scored.distance_db, _one_by_one(start, scored, problem)
+    h, added, now, last = one.h, one.added, one.now, dict(one.last)
     verdict, off, by = _verdict(h, added, before, now, problem), 0.0, h
     if verdict == "unexplained":
         verdict, off, by = _by_a_finer_mesh(start, h, added, before, problem)
@@ -108,7 +108,9 @@ def _closed(start: Hypothesis, problem: DiagnosisProblem, left_out: tuple[LeftOu
         last |= {c.id: c for c in added}
         now = problem.score(h)
         verdict, off = _verdict(h, added, before, now, problem), 0.0
-    bands = bands_off(by, problem.takes) if verdict == "none" else ()
+    bands: tuple[BandOff, ...] = ()
+    if verdict == "none":
+        bands = bands_off(problem.takes, made if by is start else problem.predict(by))
     if bands:
         verdict, off = "unexplained", 0.0
     if verdict != "explained":
@@ -134,23 +136,21 @@ def _closed(start: Hypothesis, problem: DiagnosisProblem, left_out: tuple[LeftOu
 class Rounds:
     """Where round after round came to.
 
-    first, last: all candidates of the first round, and each as it was when asked last. pairwise: whether pairs were
-    tried.
+    now: its distance, over the floor of the last round. first, last: all candidates of the first round, and each as it
+    was when asked last. pairwise: whether pairs were tried.
     """
 
     h: Hypothesis
+    now: Score
     added: list[Candidate]
     first: list[Candidate]
     last: dict[str, Candidate]
-    floor_db: float
     pairwise: bool
 
 
-def _one_by_one(start: Hypothesis, problem: DiagnosisProblem) -> Rounds:
+def _one_by_one(start: Hypothesis, now: Score, problem: DiagnosisProblem) -> Rounds:
     """The best of every round added, until nothing is accepted; then fitted to each other."""
-    h = start
-    now = problem.score(h)
-    before_db = now.distance_db
+    h, before_db = start, now.distance_db
     added: list[Candidate] = []
     passed: list[tuple[Candidate, ...]] = []
     first: list[Candidate] = []
@@ -205,8 +205,9 @@ def _one_by_one(start: Hypothesis, problem: DiagnosisProblem) -> Rounds:
         h, added = pruned(h, added, problem, before_db - now.floor_db)
         now = replace(now, distance_db=problem.distance_db(h))
     again = reidentified(h, problem.bodies, fully=True)
-    nearer = again is not h and problem.distance_db(again) < now.distance_db
-    return Rounds(again if nearer else h, added, first, last, now.floor_db, weak)
+    if again is not h and (distance_db := problem.distance_db(again)) < now.distance_db:
+        h, now = again, replace(now, distance_db=distance_db)
+    return Rounds(h, now, added, first, last, weak)
 
 
 def _acceptable(
@@ -244,7 +245,7 @@ def _verdict(h: Hypothesis, added: Sequence[Candidate], before_db: float, now: S
     gap, left = before_db - now.floor_db, now.gap_db
     if not added:
         excused = gap < RULES.suffices_db or (
-            gap < of_the_mesh(h, problem) and of_no_body(h, problem.takes) < RULES.no_body_share
+            gap < of_the_mesh(h, problem) and of_no_body(problem.takes, problem.predict(h)) < RULES.no_body_share
         )
         return "none" if excused else "unexplained"
     # whose response takes up what a mesh gets wrong, too: that is no excuse
@@ -264,7 +265,7 @@ def _by_a_finer_mesh(
         return verdict, 0.0, start
     ideal = problem.score(far)
     ideal = replace(ideal, distance_db=min(ideal.distance_db, before_db))
-    if ideal.gap_db < RULES.suffices_db and of_no_body(start, problem.takes) < RULES.no_body_share:
+    if ideal.gap_db < RULES.suffices_db and of_no_body(problem.takes, problem.predict(start)) < RULES.no_body_share:
         verdict = "none"
     elif added:
         both, _ = beyond(h, problem)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Collection
+from functools import cache
 
 import numpy as np
 import pybullet
@@ -67,6 +68,12 @@ def read_roster(client_id: int, leave_out: Collection[int] = ()) -> Roster:
     return Roster(tuple(bodies), np.array(codes, np.int64), np.array(static, bool), len(everyone), tuple(soft))
 
 
+@cache
+def link_numbers(joints: int) -> list[int]:
+    """0 … joints-1."""
+    return list(range(joints))
+
+
 def read_motion(client_id: int, roster: Roster) -> Motion:
     """Poses and twists now, numbers or not (`Motion.broken`); of bases that cannot move the pose alone.
 
@@ -75,7 +82,8 @@ def read_motion(client_id: int, roster: Roster) -> Motion:
     if not len(roster.code):
         return Motion(roster, np.zeros(0, MOTION))
     buffer, at = bytearray(len(roster.code) * MOTION.itemsize), 0
-    pose, twist, count = pybullet.getBasePositionAndOrientation, pybullet.getBaseVelocity, pybullet.getNumJoints
+    pose, twist, links = pybullet.getBasePositionAndOrientation, pybullet.getBaseVelocity, pybullet.getLinkStates
+    count = pybullet.getNumJoints
     with collector_waiting():
         for body, joints, fixed in roster.bodies:
             # another body has taken over the id: asking for a link that is not there would end the process
@@ -89,10 +97,10 @@ def read_motion(client_id: int, roster: Roster) -> Motion:
                 POSE_AND_TWIST.pack_into(buffer, at, x, y, z, i, j, k, r, u, v, w, a, b, c)
             at += MOTION_BYTES
             if joints:
-                for state in pybullet.getLinkStates(
-                    body, range(joints), computeLinkVelocity=1, computeForwardKinematics=1, physicsClientId=client_id
-                ):
-                    POSE_AND_TWIST.pack_into(buffer, at, *state[0], *state[1], *state[6], *state[7])
+                # with link velocities and forward kinematics
+                states = links(body, link_numbers(joints), 1, 1, client_id)
+                for (x, y, z), (i, j, k, r), _, _, _, _, (u, v, w), (a, b, c) in states:
+                    POSE_AND_TWIST.pack_into(buffer, at, x, y, z, i, j, k, r, u, v, w, a, b, c)
                     at += MOTION_BYTES
     number = np.frombuffer(buffer)
     if number.dot(number) < BEYOND**2:  # so no number is beyond, and none is NaN

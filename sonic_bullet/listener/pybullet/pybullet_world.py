@@ -23,8 +23,8 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.listener.frames import LINK_SPAN, Motion, Roster, encode, rows_of, same_motion
-from sonic_bullet.listener.known_bodies import KnownBodies
+from sonic_bullet.listener.frames import LINK_SPAN, Motion, Roster, encode, rows_of, same_motion, without
+from sonic_bullet.listener.known_bodies import KnownBodies, alike
 from sonic_bullet.listener.memory import Memory
 from sonic_bullet.listener.polling import Touches, loaded
 from sonic_bullet.listener.pybullet import body_facts as facts
@@ -36,7 +36,7 @@ from sonic_bullet.listener.pybullet.poses import check_connected
 from sonic_bullet.listener.pybullet.questions import contact_points, settings
 from sonic_bullet.listener.pybullet.step_back import undone
 from sonic_bullet.listener.pybullet.substeps import SubstepLog, gather_substeps
-from sonic_bullet.listener.start import LEFT_OUT, NOBODY, hooked_start, jumped, polled_start, taken
+from sonic_bullet.listener.start import LEFT_OUT, NOBODY, hooked_start, jumped, polled_start
 from sonic_bullet.listener.world import World
 from sonic_bullet.records import Body, Material, ModalModel, Shape
 from sonic_bullet.records.contacts import Step
@@ -189,18 +189,7 @@ class PyBulletWorld(World):
         if body is None:
             self._log.abandon()
             self._memory.forget()
-        past = self._past.roster
-        keep = np.flatnonzero(past.code // LINK_SPAN != body) if body is not None else np.zeros(0, int)
-        self._past = taken(
-            self._past,
-            replace(
-                past,
-                bodies=tuple(e for e in past.bodies if e[0] != body and body is not None),
-                code=past.code[keep],
-                static=past.static[keep],
-            ),
-            keep,
-        )
+        self._past = without(self._past, body)
         self._moved = {x for x in self._moved if body is not None and x != body}
         self._census.stale()
 
@@ -342,8 +331,7 @@ class PyBulletWorld(World):
                 before, seen = self._known.records[index], self._census.described(code, self.epoch)
                 if seen is None:
                     continue
-                same = before.mass_kg == seen.mass_kg and np.array_equal(before.inertia_kg_m2, seen.inertia_kg_m2)
-                if not same or not np.array_equal(before.curvature_per_m, seen.curvature_per_m, equal_nan=True):
+                if not alike(before, seen):
                     self.epoch += 1
                     self._known.close([code], self.step_count)
 

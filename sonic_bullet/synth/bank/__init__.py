@@ -15,7 +15,16 @@ A body below the floor costs nothing. Time is counted in absolute samples; block
 cutting the calls gives the same bits. `advance` works in place: `copy()` a state first to look ahead and come back.
 """
 
-from sonic_bullet.synth.bank.instrument import Bank, BankState, ModeSet, Translation, append, audible, empty_bank, silence
+from sonic_bullet.synth.bank.instrument import (
+    Bank,
+    BankState,
+    ModeSet,
+    Translation,
+    append,
+    audible,
+    empty_bank,
+    silence,
+)
 from sonic_bullet.synth.bank.layout import FLOOR
 from sonic_bullet.synth.bank.playing import Force, Strike, advance
 

@@ -29,7 +29,7 @@ PUSH_SCRATCH = COLUMNS // PAIR * ROOM * drive.STEP
 DRIVE_SCRATCH = PUSH_SCRATCH + DRIVEN * LANES + DRIVEN + MOST_DUE
 
 
-@njit(nogil=True)
+@njit(nogil=True, _nrt=False)
 def _ring(b, start, stop, columns, z, pole, block, weight, modes, observed, sound, scratch):  # pragma: no cover
     """Tile of body b for the block that starts:
 
@@ -57,7 +57,7 @@ def _ring(b, start, stop, columns, z, pole, block, weight, modes, observed, soun
     return ringing
 
 
-@njit(nogil=True)
+@njit(nogil=True, _nrt=False)
 def bend_poles(z, driven, span, law, start, stop, pole, block):  # pragma: no cover - compiled
     """Poles of a level-dependent body for the ``span`` samples to come: means over them of what its modes do if nothing
     strikes them.
@@ -85,14 +85,14 @@ def bend_poles(z, driven, span, law, start, stop, pole, block):  # pragma: no co
             block[m], block[modes + m] = q * np.cos(turn * BLOCK), q * np.sin(turn * BLOCK)
 
 
-@njit(nogil=True)
+@njit(nogil=True, _nrt=False)
 def _copy_flushed(values, out):  # pragma: no cover - compiled
     for k in range(len(out)):
         value = values[k]
         out[k] = value if abs(value) >= FLUSH else 0.0
 
 
-@njit(nogil=True)
+@njit(nogil=True, _nrt=False)
 def _close_block(z, driven, pole, modes, start, stop):  # pragma: no cover - compiled
     """End of a block: what was driven within it joins the free state of the next."""
     for re in range(start, stop):
@@ -104,7 +104,26 @@ def _close_block(z, driven, pole, modes, start, stop):  # pragma: no cover - com
         driven[im] = 0.0
 
 
-@njit(nogil=True)
+@njit(nogil=True, _nrt=False)
+def _flush(values, count):  # pragma: no cover - compiled
+    for k in range(count):
+        values[k] = values[k] if abs(values[k]) >= FLUSH else 0.0
+
+
+@njit(nogil=True, _nrt=False)
+def _share(n, force_n, progress, period, early, late):  # pragma: no cover - compiled
+    """A force's impulses, parted between both ends of its gains."""
+    for k in range(n):
+        push = force_n[k] * period
+        push = push if abs(push) >= FLUSH else 0.0
+        early[k] = push * (1.0 - progress[k])
+        late[k] = push * progress[k]
+    for k in range(n, len(early)):
+        early[k] = 0.0
+        late[k] = 0.0
+
+
+@njit(nogil=True, _nrt=False)
 def list_forces(
     n, drive_count, drive_body, force_n, gain0, gain1, progress, period, bodies, first, side, signal
 ):  # pragma: no cover - compiled
@@ -129,35 +148,53 @@ def list_forces(
             if b >= 0:
                 side[first[b]] = 2 * d + s
                 first[b] += 1
-                for m in range(bodies[b].columns):
-                    if abs(gain0[d, s, m]) < FLUSH:
-                        gain0[d, s, m] = 0.0
-                    if abs(gain1[d, s, m]) < FLUSH:
-                        gain1[d, s, m] = 0.0
-        early, late, force = signal[d, 0], signal[d, 1], force_n[d]
-        for k in range(n):
-            push = force[k] * period
-            if abs(push) < FLUSH:
-                push = 0.0
-            early[k] = push * (1.0 - progress[k])
-            late[k] = push * progress[k]
-        for k in range(n, signal.shape[2]):
-            early[k] = 0.0
-            late[k] = 0.0
+                _flush(gain0[d, s], bodies[b].columns)
+                _flush(gain1[d, s], bodies[b].columns)
+        _share(n, force_n[d], progress, period, signal[d, 0], signal[d, 1])
     for b in range(count, 0, -1):
         first[b] = first[b - 1]
     first[0] = 0
 
 
-@njit(nogil=True)
+@njit(nogil=True, _nrt=False)
+def _is_last(w, b, observed):  # pragma: no cover - compiled
+    """Whether no weight set after w reads body b."""
+    for v in range(w + 1, len(observed)):  # noqa: SIM110  numba knows no all()
+        if observed[v, b]:
+            return False
+    return True
+
+
+@njit(nogil=True, _nrt=False)
+def _press_strikes(
+    sample, count, b, column, lanes, ringing, strikes, rows, hertz, pushes, keep, final, plan, due, push
+):  # pragma: no cover - compiled
+    """Add what body b's strikes give ``lanes`` lanes from ``column`` on at ``count`` samples: 1 where push is in use.
+
+    pushes: 1 where push is in use already. keep, final: their phasors, and they themselves, move on.
+    """
+    width = rows.shape[2]
+    slot = ringing[b].strike
+    while slot >= 0:
+        if strikes[slot].modal and strikes[slot].first < sample + count:
+            if not pushes:
+                drive.clear(push, lanes, count)
+                pushes = 1
+            begin, end = plan_nodes(slot, sample, count, strikes, hertz, plan, due, final)
+            drive.strike_nodes(push, rows, slot * 8 * width + column, width, lanes, plan, due, begin, end, keep)
+        slot = strikes[slot].next
+    return pushes
+
+
+@njit(nogil=True, _nrt=False)
 def _drive(
-    at, i, count, b, place, start, stop, law, weight, observed, ringing, z, driven, sound, pole, block, strikes, rows, hertz,
+    at, i, count, b, place, start, stop, law, weight, observed, ringing, driven, sound, pole, strikes, rows, hertz,
     f0, f1, side, gain0, gain1, signal, plan, scratch, source,
 ):  # fmt: skip  # pragma: no cover - compiled
     """``count`` samples from ``i`` on, within one of the DRIVEN: strikes and forces enter, free and driven part are
     heard together.
     """
-    modes, width, sample = law.shape[1], rows.shape[2], at + i
+    modes = law.shape[1]
     push, partial = scratch[:PUSH_SCRATCH], scratch[PUSH_SCRATCH : PUSH_SCRATCH + DRIVEN * LANES]
     total = scratch[PUSH_SCRATCH + DRIVEN * LANES : PUSH_SCRATCH + DRIVEN * LANES + DRIVEN]
     due = scratch[PUSH_SCRATCH + DRIVEN * LANES + DRIVEN : DRIVE_SCRATCH]
@@ -165,75 +202,83 @@ def _drive(
     for w in range(len(observed)):  # what of the body is heard, set after set: the state goes on with the last
         if w > 0 and not observed[w, b]:
             continue
-        keep = True
-        for v in range(w + 1, len(observed)):
-            keep = keep and not observed[v, b]
+        keep = _is_last(w, b, observed)
         for k in range(count * LANES):
             partial[k] = 0.0
         for lo in range(start, stop, COLUMNS):
-            lanes = min(COLUMNS, stop - lo)
+            lanes, column, pushes = min(COLUMNS, stop - lo), lo - start, 0
             if f1 > f0:
+                pushes = 1
                 drive.press(
                     push, gain0, gain1, gain0.shape[2], side, f0, f1, signal, signal.shape[2], i,
-                    law, 2 * modes + lo, lo - start, lanes, count,
+                    law, 2 * modes + lo, column, lanes, count,
                 )  # fmt: skip
-            else:
-                for k in range(lanes // PAIR * ROOM * drive.STEP):
+            final = keep and lo + COLUMNS >= stop
+            if ringing[b].strike >= 0:
+                pushes = _press_strikes(
+                    at + i, count, b, column, lanes, ringing, strikes, rows, hertz, pushes, keep, final, plan, due, push
+                )
+            if not pushes:
+                for k in range(drive.STEP):
                     push[k] = 0.0
-            slot = ringing[b].strike
-            while slot >= 0:
-                if strikes[slot].modal and strikes[slot].first < sample + count:
-                    final = keep and lo + COLUMNS >= stop
-                    begin, end = plan_nodes(slot, sample, count, strikes, hertz, plan, due, final)
-                    drive.strike_nodes(
-                        push, rows, slot * 8 * width + lo - start, width, lanes, plan, due, begin, end, keep
-                    )
-                slot = strikes[slot].next
-            drive.run(driven, pole, modes, lo, lanes, weight, 2 * w * modes + lo, push, count, partial, keep)
+            drive.run(driven, pole, modes, lo, lanes, weight, 2 * w * modes + lo, push, pushes, count, partial, keep)
         if observed[w, b]:
             drive.across(partial, count, total)
             if ringing[b].tiled:
-                free = sound[w, b]
                 for k in range(count):
-                    total[k] += free[place + k]
+                    total[k] += sound[w, b, place + k]
             _copy_flushed(total, source[w, b, i : i + count])
 
 
-@njit(nogil=True)
+@njit(nogil=True, _nrt=False)
+def _sound_free(b, i, end, place, observed, ringing, sound, source):  # pragma: no cover - compiled
+    """Samples i … end - 1 of a body that only rings, or is silent."""
+    for w in range(len(observed)):
+        if observed[w, b]:
+            if ringing[b].tiled:
+                _copy_flushed(sound[w, b, place : place + end - i], source[w, b, i:end])
+            else:
+                source[w, b, i:end] = 0.0
+
+
+@njit(nogil=True, _nrt=False)
+def _open_block(
+    b, start, stop, bodies, law, weight, observed, ringing, z, driven, sound, pole, block, scratch
+):  # pragma: no cover - compiled
+    """Begin of a block: its poles where they go with the level, and its free sound."""
+    if bodies[b].bent and ringing[b].ringing:
+        bend_poles(z, driven, BLOCK, law, start, stop, pole, block)
+    alive = ringing[b].ringing != 0 and _ring(
+        b, start, stop, bodies[b].columns, z, pole, block, weight, law.shape[1], observed, sound, scratch
+    )
+    ringing[b].tiled = ringing[b].ringing = 1 if alive else 0
+
+
+@njit(nogil=True, _nrt=False)
 def _advance_modes(
     at, n, b, bodies, law, weight, observed, ringing, z, driven, sound, pole, block, strikes, rows, hertz,
     f0, f1, side, gain0, gain1, signal, plan, scratch, source,
 ):  # fmt: skip  # pragma: no cover - compiled
     """Samples at … at + n - 1 of body b's modes into source (W, b, n or more)."""
-    start, stop, modes, bent = bodies[b].start, bodies[b].stop, law.shape[1], bodies[b].bent
+    start, stop, modes = bodies[b].start, bodies[b].stop, law.shape[1]
     i = 0
     while i < n:
         place = (at + i) % BLOCK
         if place == 0:
-            if bent and ringing[b].ringing:
-                bend_poles(z, driven, BLOCK, law, start, stop, pole, block)
-            alive = ringing[b].ringing != 0 and _ring(
-                b, start, stop, bodies[b].columns, z, pole, block, weight, modes, observed, sound, scratch
-            )
-            ringing[b].tiled = ringing[b].ringing = 1 if alive else 0
+            _open_block(b, start, stop, bodies, law, weight, observed, ringing, z, driven, sound, pole, block, scratch)
         end = min(n, i + BLOCK - place)
         if ringing[b].driven or f1 > f0 or ringing[b].strike >= 0:
             end = min(end, i + DRIVEN - (at + i) % DRIVEN)
         if ringing[b].driven or f1 > f0 or begins(b, at + end, ringing, strikes):
             # what begins to be driven begins with the poles of what rings then
-            if bent and (not ringing[b].driven or (at + i) % DRIVEN == 0):
+            if bodies[b].bent and (not ringing[b].driven or (at + i) % DRIVEN == 0):
                 bend_poles(z, driven, DRIVEN, law, start, stop, pole, block)
             _drive(
-                at, i, end - i, b, place, start, stop, law, weight, observed, ringing, z, driven, sound, pole, block,
-                strikes, rows, hertz, f0, f1, side, gain0, gain1, signal, plan, scratch, source,
+                at, i, end - i, b, place, start, stop, law, weight, observed, ringing, driven, sound, pole, strikes,
+                rows, hertz, f0, f1, side, gain0, gain1, signal, plan, scratch, source,
             )  # fmt: skip
         else:
-            for w in range(len(observed)):
-                if observed[w, b]:
-                    if ringing[b].tiled:
-                        _copy_flushed(sound[w, b, place : place + end - i], source[w, b, i:end])
-                    else:
-                        source[w, b, i:end] = 0.0
+            _sound_free(b, i, end, place, observed, ringing, sound, source)
         if place + end - i == BLOCK:
             ringing[b].tiled = 0
             if ringing[b].driven:
@@ -243,7 +288,7 @@ def _advance_modes(
         i = end
 
 
-@njit(nogil=True)
+@njit(nogil=True, _nrt=False)
 def advance(
     at, n, sr, bodies, law, weight, observed, ringing, z, driven, sound, pole, block, strikes, rows, free, hertz,
     drive_count, drive_body, force_n, gain0, gain1, direction0, direction1, progress, first, side, signal, kick, plan,

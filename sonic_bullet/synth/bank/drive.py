@@ -32,7 +32,22 @@ def _halves(e: Emit, array: Value, place: Value) -> list[Value]:
 
 @intrinsic
 def press(
-    typingctx, push, gain0, gain1, columns, side, first, last, signal, stride, at, law, quadrature_at, column, lanes, count
+    typingctx,
+    push,
+    gain0,
+    gain1,
+    columns,
+    side,
+    first,
+    last,
+    signal,
+    stride,
+    at,
+    law,
+    quadrature_at,
+    column,
+    lanes,
+    count,
 ):
     """All forces of a body on ``lanes`` lanes from column ``column`` on, ``count`` samples from ``at`` on: sets push.
 
@@ -56,9 +71,7 @@ def press(
                     which = builder.load(builder.gep(side, [builder.add(first, f)]))
                     gain_at = builder.add(builder.mul(which, columns), here)
                     g0, g1 = _halves(e, gain0, gain_at), _halves(e, gain1, gain_at)
-                    early = builder.add(
-                        builder.mul(builder.lshr(which, e.index(1)), both), builder.add(at, k)
-                    )
+                    early = builder.add(builder.mul(builder.lshr(which, e.index(1)), both), builder.add(at, k))
                     late = builder.add(early, stride)
                     new = []
                     for i in range(TILE):
@@ -86,10 +99,34 @@ def press(
 
 
 @intrinsic
+def clear(typingctx, push, lanes, count):
+    """Push of ``lanes`` lanes and ``count`` samples set to 0."""
+
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        e = Emit(context, builder, signature, args)
+        push, lanes, count = e.args
+
+        def pair(p: Value, _: list[Value]) -> list[Value]:
+            base = builder.mul(p, e.index(ROOM * STEP // PAIR))
+
+            def vector(k: Value, _: list[Value]) -> list[Value]:
+                e.store(constant(0), push, builder.add(base, k))
+                return []
+
+            e.loop(builder.mul(count, e.index(STEP)), LANES, [], vector)
+            return []
+
+        e.loop(lanes, PAIR, [], pair)
+        return context.get_dummy_value()
+
+    return types.void(push, lanes, count), codegen
+
+
+@intrinsic
 def strike_nodes(typingctx, push, rows, at, width, lanes, plan, due, first, last, keep):
     """A strike's impulses of the samples first … last - 1: r <- r·E, push += r·Horner(due, D).
 
-    rows: flat, phasors r, D, E0, E1 of ``lanes`` lanes from ``at`` on, real and imaginary rows in turn, ``width`` apart.
+    rows: flat, phasors r, D, E0, E1 of ``lanes`` lanes from ``at`` on, real and imaginary in turn, ``width`` apart.
     plan: flat (samples, 3): 0 for E0, 1 for E1, -1 for none; nodes; and how many places of theirs are empty behind the
     last. due: impulses, node after node. keep: False leaves r as it was.
     """
@@ -112,7 +149,8 @@ def strike_nodes(typingctx, push, rows, at, width, lanes, plan, due, first, last
                 multiplier, nodes, empty = (planned(k, what) for what in range(3))
                 none = builder.icmp_signed("<", multiplier, e.index(0))
                 long = builder.icmp_signed("==", multiplier, e.index(0))
-                node, r = carried[4], []
+                node = carried[4]
+                r: list[Value] = []
                 for h in range(2):
                     factor = [
                         builder.select(
@@ -156,15 +194,16 @@ def strike_nodes(typingctx, push, rows, at, width, lanes, plan, due, first, last
 
 
 @intrinsic
-def run(typingctx, state, pole, modes, start, lanes, weight, weight_at, push, count, partial, keep):
-    """``count`` samples of ``lanes`` lanes: f <- f p + push, partial += Re(w f). keep: False leaves the state as it was.
+def run(typingctx, state, pole, modes, start, lanes, weight, weight_at, push, pushes, count, partial, keep):
+    """``count`` samples of ``lanes`` lanes: f <- f p + push, partial += Re(w f).
 
-    weight: flat, that of lane ``start`` at weight_at.
+    weight: flat, that of lane ``start`` at weight_at. pushes: 0 where push is one sample of zeros for all. keep: False
+    leaves the state as it was.
     """
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         e = Emit(context, builder, signature, args)
-        state, pole, modes, start, lanes, weight, weight_at, push, count, partial, keep = e.args
+        state, pole, modes, start, lanes, weight, weight_at, push, pushes, count, partial, keep = e.args
 
         def pair(p: Value, _: list[Value]) -> list[Value]:
             re, at = builder.add(start, p), builder.add(weight_at, p)
@@ -173,10 +212,11 @@ def run(typingctx, state, pole, modes, start, lanes, weight, weight_at, push, co
             p_re, p_im = _halves(e, pole, re), _halves(e, pole, im)
             w_re = _halves(e, weight, at)
             w_im = [builder.fneg(value) for value in _halves(e, weight, builder.add(at, modes))]
-            base = builder.mul(p, e.index(ROOM * STEP // PAIR))
+            base = builder.mul(builder.mul(p, pushes), e.index(ROOM * STEP // PAIR))
 
             def sample(k: Value, f: list[Value]) -> list[Value]:
-                place, spot = builder.add(base, builder.mul(k, e.index(STEP))), builder.mul(k, e.index(LANES))
+                place = builder.add(base, builder.mul(builder.mul(k, pushes), e.index(STEP)))
+                spot = builder.mul(k, e.index(LANES))
                 real, imag = [], []
                 total = e.load(partial, spot)
                 for h in range(2):
@@ -196,7 +236,7 @@ def run(typingctx, state, pole, modes, start, lanes, weight, weight_at, push, co
         e.loop(lanes, PAIR, [], pair)
         return context.get_dummy_value()
 
-    return types.void(state, pole, modes, start, lanes, weight, weight_at, push, count, partial, keep), codegen
+    return types.void(state, pole, modes, start, lanes, weight, weight_at, push, pushes, count, partial, keep), codegen
 
 
 @intrinsic

@@ -187,16 +187,10 @@ def empty_bank(sr: int, weight_sets: int = 1, at: int = 0) -> tuple[Bank, BankSt
         np.zeros((weight_sets, 0)),
         np.zeros((weight_sets, 0), bool),
     )
-    state = BankState(
-        int(at),
-        *(np.zeros(0) for _ in range(2)),
-        np.zeros((weight_sets, 0, BLOCK)),
-        *(np.zeros(0) for _ in range(2)),
-        np.zeros(0, RINGING),
-        np.zeros(0, STRIKE),
-        np.zeros((0, 8, PAIR)),
-        np.zeros(1, np.int64),
-    )
+    z, driven, pole, block = np.zeros((4, 0))
+    silent, none = np.zeros((weight_sets, 0, BLOCK)), np.zeros(0, STRIKE)
+    rows, free = np.zeros((0, 8, PAIR)), np.zeros(1, np.int64)
+    state = BankState(int(at), z, driven, silent, pole, block, np.zeros(0, RINGING), none, rows, free)
     return bank, state
 
 

@@ -1,6 +1,6 @@
 """The phasors of a strike, eight modes at a time: complex exponentials without a library.
 
-    e^z = (Σ_k (z/8)^k / k!)^8        k ≤ 14: with |z| ≤ 3.73 (|Im s| < π, Re s > -2) the rest is below 1e-17
+e^z = (Σ_k (z/8)^k / k!)^8        k ≤ 14: with |z| ≤ 3.73 (|Im s| < π, Re s > -2) the rest is below 1e-17
 """
 
 # mypy: disable-error-code="no-untyped-def"

@@ -84,8 +84,8 @@ def advance(
     scratch.fit(bank.body_count, drives, n)
     bank_kernel.advance(
         state.at, n, float(bank.sr), bank.body, bank.law, bank.weight, bank.observed,
-        state.ringing, state.z, state.driven, state.sound, state.pole, state.block, state.strikes, state.rows, state.free,
-        pulse_table(), drives, body, signal, gain[0], gain[1], direction[0], direction[1], along,
+        state.ringing, state.z, state.driven, state.sound, state.pole, state.block, state.strikes, state.rows,
+        state.free, pulse_table(), drives, body, signal, gain[0], gain[1], direction[0], direction[1], along,
         scratch.first, scratch.side, scratch.signal, scratch.kick, scratch.plan, scratch.flat, out, pushed,
         np.zeros((bank.body_count, 2), np.int64),
     )  # fmt: skip
@@ -102,9 +102,9 @@ def _enter(bank: Bank, state: BankState, strikes: Sequence[Strike]) -> None:
         if not (np.isfinite(strike.start) and 0 < length < np.inf and np.isfinite(strike.shove_n_s).all()):
             raise AudioError(
                 f"a strike on body {strike.body} of {strike.length_s} s at {strike.start}",
-                "give a finite start, length and shove",
+                "give a finite start, shove and length above 0",
             )
-        if strike.start < state.at:
+        if np.ceil(strike.start) < state.at:
             raise AudioError(
                 f"a strike at sample {strike.start:.2f}, but {state.at} samples have sounded",
                 "pass strikes before their time has sounded",

@@ -24,11 +24,15 @@ from sonic_bullet.synth.bank.phasors import fill_phasors
 NODES_PER_PULSE = 24
 CELLS_PER_RADIAN = 4.0
 """Cells of a pulse per 1/w of a rigid body: a third of (w·cell)³ = 0.5 % is what its level may err."""
-SHORTEST = 1e-3
-"""Samples: a shorter pulse is one of this length."""
+MOST_CELLS = 4096
+"""Cells a sample: a pulse shorter than one is even over it."""
+AT_ONCE = 1e-3
+"""Samples: a shorter pulse acts all at the first sample that any of it has come to."""
+SHORTEST = 1e-12
+"""Samples: what is shorter is as long."""
 
 
-@njit(nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy", _nrt=False)
 def pulse_force(share, flat, hertz):  # pragma: no cover - compiled
     """Force at a share of the pulse in [0, 1], mean 1. hertz: the pulse's table (synth.pulse)."""
     if flat:
@@ -39,9 +43,26 @@ def pulse_force(share, flat, hertz):  # pragma: no cover - compiled
     return hertz[1, i] + (place - i) * (hertz[1, i + 1] - hertz[1, i])
 
 
-@njit(nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy", _nrt=False)
 def enter_strike(
-    b, start, length_s, flat, share, gain, shove_x, shove_y, shove_z, at, sr, bodies, law, ringing, strikes, rows, free, hertz
+    b,
+    start,
+    length_s,
+    flat,
+    share,
+    gain,
+    shove_x,
+    shove_y,
+    shove_z,
+    at,
+    sr,
+    bodies,
+    law,
+    ringing,
+    strikes,
+    rows,
+    free,
+    hertz,
 ):  # pragma: no cover - compiled
     """Enter one pulse on body b: 0, or 1 where the pool is full (nothing has changed then).
 
@@ -80,7 +101,7 @@ def enter_strike(
     return 0
 
 
-@njit(nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy", _nrt=False)
 def _enter_nodes(
     slot, b, at, count, delta, share, gain, bodies, law, strikes, rows, hertz
 ):  # pragma: no cover - compiled
@@ -89,7 +110,9 @@ def _enter_nodes(
     for i in range(count):
         total += pulse_force((i + 0.5) / count, strike.flat, hertz)
     first = max(int(np.ceil(strike.node_start)), at)
-    within = min(int(np.floor((first - strike.node_start) / delta)), count - 1)
+    within = count - 1
+    if strike.length > AT_ONCE:
+        within = min(int(np.floor((first - strike.node_start) / delta)), within)
     phase = max((first - strike.node_start) - within * delta, 0.0)
     whole = int(np.floor(1.0 / delta))
     strike.count, strike.spacing, strike.whole, strike.force_sum = count, delta, whole, total
@@ -102,7 +125,7 @@ def _enter_nodes(
     )  # fmt: skip
 
 
-@njit(nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy", _nrt=False)
 def _enter_cells(slot, b, sr, bodies, strikes):  # pragma: no cover - compiled
     """The pulse as cells of the sample grid (pulse_cells), and what one of them leaves:
 
@@ -111,7 +134,7 @@ def _enter_cells(slot, b, sr, bodies, strikes):  # pragma: no cover - compiled
     strike, body = strikes[slot], bodies[b]
     s = complex(body.rigid_log_pole[0], body.rigid_log_pole[1])
     least = int(np.ceil(CELLS_PER_RADIAN * -s.real))
-    cells = max(least, int(np.ceil(NODES_PER_PULSE / strike.length)))
+    cells = max(least, int(np.ceil(min(NODES_PER_PULSE / strike.length, 1.0 * MOST_CELLS))))
     strike.cells = cells
     strike.cell_first = int(np.floor(strike.start * cells))
     strike.cell_stop = int(np.ceil((strike.start + strike.length) * cells))
@@ -122,7 +145,7 @@ def _enter_cells(slot, b, sr, bodies, strikes):  # pragma: no cover - compiled
     strike.cell_onset[0], strike.cell_onset[1] = onset.real, onset.imag
 
 
-@njit(nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy", _nrt=False)
 def _link(slot, b, ringing, strikes):  # pragma: no cover - compiled
     """Put a strike behind those of its body that start before it or with it."""
     before, after = -1, ringing[b].strike
@@ -135,7 +158,7 @@ def _link(slot, b, ringing, strikes):  # pragma: no cover - compiled
         strikes[before].next = slot
 
 
-@njit(nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy", _nrt=False)
 def release_done(b, ringing, strikes, free):  # pragma: no cover - compiled
     """Give back the rows of body b's strikes that have acted."""
     before, slot = -1, ringing[b].strike
@@ -153,7 +176,7 @@ def release_done(b, ringing, strikes, free):  # pragma: no cover - compiled
         slot = after
 
 
-@njit(nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy", _nrt=False)
 def begins(b, end, ringing, strikes):  # pragma: no cover - compiled
     """Whether a strike on the modes of body b has nodes to come before sample ``end``."""
     slot = ringing[b].strike
@@ -164,7 +187,7 @@ def begins(b, end, ringing, strikes):  # pragma: no cover - compiled
     return False
 
 
-@njit(nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy", _nrt=False)
 def plan_nodes(slot, at, count, strikes, hertz, plan, due, final):  # pragma: no cover - compiled
     """What nodes of a strike act at the samples at … at + count - 1: plan (count, 3) and due as `drive.strike_nodes`
     reads them; the samples they begin and end with. final: the strike moves on.
@@ -194,11 +217,12 @@ def plan_nodes(slot, at, count, strikes, hertz, plan, due, final):  # pragma: no
     return begin, k
 
 
-@njit(nogil=True)
+@njit(nogil=True, _nrt=False)
 def enter_pulses(
     pulses, count, push, begin_s, after_s, at, sr, bodies, law, ringing, strikes, rows, free, hertz
 ):  # pragma: no cover - compiled
-    """Enter a step's pulses on both bodies of each, in order: how many were, less than ``count`` where the pool is full.
+    """Enter a step's pulses on both bodies of each, in order: how many were, less than ``count`` where the pool is
+    full.
 
     pulses: PULSE rows of render.tables; push (pulses, 2, columns): Uᵀj of the whole impulse. begin_s, after_s: of the
     rendered step, absolute: those found in the step after it count from there. at: the next sample.

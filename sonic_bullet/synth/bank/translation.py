@@ -13,14 +13,12 @@ it has fallen below the floor at one of every DRIVEN samples of absolute time.
 # mypy: disable-error-code="no-untyped-def"
 from __future__ import annotations
 
-import numpy as np
-
 from sonic_bullet.machine.compiled import njit
 from sonic_bullet.synth.bank.layout import DRIVEN, FLOOR, FLUSH
 from sonic_bullet.synth.pulse import _cumulated
 
 
-@njit(nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy", _nrt=False)
 def _gather_forces(
     n, first, last, side, force_n, direction0, direction1, progress, period, onset_re, onset_im, kick
 ):  # pragma: no cover - compiled
@@ -44,7 +42,7 @@ def _gather_forces(
             imag[k] = impulse * onset_im
 
 
-@njit(nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy", _nrt=False)
 def _strike_cells(at, n, slot, strikes, hertz, kick):  # pragma: no cover - compiled
     """Add the cells of a strike that end by the samples at … at + n - 1. It is done after its last."""
     strike = strikes[slot]
@@ -68,7 +66,7 @@ def _strike_cells(at, n, slot, strikes, hertz, kick):  # pragma: no cover - comp
         strike.rigid = 0
 
 
-@njit(nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy", _nrt=False)
 def _run_axes(at, n, b, bodies, ringing, kick, pushed):  # pragma: no cover - compiled
     """The recursion on all axes, through the samples at … at + n - 1."""
     p_re, p_im, weight = bodies[b].rigid_pole[0], bodies[b].rigid_pole[1], bodies[b].rigid_weight
@@ -103,9 +101,25 @@ def _run_axes(at, n, b, bodies, ringing, kick, pushed):  # pragma: no cover - co
     ringing[b].moving = 1 if moves else 0
 
 
-@njit(nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy", _nrt=False)
 def translate(
-    at, n, b, bodies, ringing, strikes, hertz, first, last, side, force_n, direction0, direction1, progress, period, kick, pushed
+    at,
+    n,
+    b,
+    bodies,
+    ringing,
+    strikes,
+    hertz,
+    first,
+    last,
+    side,
+    force_n,
+    direction0,
+    direction1,
+    progress,
+    period,
+    kick,
+    pushed,
 ):  # pragma: no cover - compiled
     """Samples at … at + n - 1 of body b's translations into pushed (3, n). False, and nothing done, where they rest.
 
@@ -119,9 +133,7 @@ def translate(
     if not (struck or last > first or ringing[b].moving):
         return False
     onset_re, onset_im = bodies[b].rigid_onset[0], bodies[b].rigid_onset[1]
-    _gather_forces(
-        n, first, last, side, force_n, direction0, direction1, progress, period, onset_re, onset_im, kick
-    )
+    _gather_forces(n, first, last, side, force_n, direction0, direction1, progress, period, onset_re, onset_im, kick)
     slot = ringing[b].strike
     while struck and slot >= 0:
         if strikes[slot].rigid:

@@ -1,0 +1,98 @@
+"""The run time's first stages by themselves: steps in, pulses out, so that a test sees every strike."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from sonic_bullet.records import Air, Array, Body
+from sonic_bullet.records.contacts import Contacts, Step
+from sonic_bullet.render.body_table import BodyTable
+from sonic_bullet.render.contact_rows import enter_loads, orient
+from sonic_bullet.render.resonator import build_resonator
+from sonic_bullet.render.strike_pulses import STRIKE, find_pulses
+from sonic_bullet.render.tables import CONTACT, PAIR, PULSE, ROW
+from sonic_bullet.synth.pulse import spectrum_table
+from sonic_bullet.synth.strikes import LOOKAHEAD
+
+
+def packed(contacts: Contacts) -> Array:
+    """The contacts as a table."""
+    table = np.zeros(len(contacts), CONTACT)
+    for name in CONTACT.names or ():
+        table[name] = getattr(contacts, name)
+    return table
+
+
+def body_table(bodies: Sequence[Body], sr: int = 48_000) -> BodyTable:
+    """The bodies, without residuals."""
+    table = BodyTable()
+    for body in bodies:
+        table.add(build_resonator(body, (), sr, Air()), np.zeros(0, np.int64), 0)
+    return table
+
+
+class Stages:
+    """Rows of four steps, the pairs and their loads; room for ``pairs`` of them and for ``rows`` contacts a step."""
+
+    def __init__(self, bodies: Sequence[Body], pairs: int = 64, rows: int = 256) -> None:
+        self.table, self.number, self._most = body_table(bodies), 0, rows
+        self.rows, self.pairs = np.zeros((LOOKAHEAD + 1) * rows, ROW), np.zeros(pairs, PAIR)
+        self.active, self.free = np.zeros(pairs, np.int64), np.arange(pairs)
+        self.counts, self.window = np.array([0, pairs]), np.zeros((LOOKAHEAD + 1, 2), np.int64)
+        self.strikes, self.pulses = np.zeros(pairs, STRIKE), np.zeros(2 * pairs, PULSE)
+        self.push = np.zeros((2 * pairs, 2, self.table.columns))
+        self._steps: list[Step] = []
+
+    def enter(self, step: Step) -> None:
+        """The newest step's rows and loads."""
+        first = self.number % (LOOKAHEAD + 1) * self._most
+        stop = first + len(step.contacts)
+        orient(packed(step.contacts), step.quaternion_xyzw, self.rows[first:stop])
+        self.window[:-1], self.window[-1] = self.window[1:].copy(), (first, stop)
+        enter_loads(self.rows, first, stop, step.dt_s, self.pairs, self.active, self.counts, self.free)
+        self._steps = [*self._steps[-LOOKAHEAD:], step]
+        self.number += 1
+
+    def pulses_of(self, ahead: int, found: int = 0) -> int:
+        """Their number with those of the step ``ahead`` of the one being rendered; ask with 0 first."""
+        number, step = self.number - 1 - LOOKAHEAD + ahead, self._steps[ahead]
+        table = self.table
+        return int(
+            find_pulses(
+                ahead,
+                number,
+                -self._steps[0].dt_s * ahead,
+                step.dt_s,
+                step.gravity_m_s2,
+                step.quaternion_xyzw,
+                self.rows,
+                self.window,
+                self.pairs,
+                self.active,
+                self.counts,
+                table.bodies,
+                table.faces,
+                table.nodes,
+                table.shapes,
+                table.frequency_hz,
+                spectrum_table(),
+                self.strikes,
+                self.pulses,
+                self.push,
+                found,
+            )
+        )
+
+    def take(self, step: Step) -> tuple[Array, Array]:
+        """Pulses (q,) and their Uᵀj (q, 2, columns) of the step rendered when this one has come, and of the one after
+        it: nothing while too few are known.
+        """
+        self.enter(step)
+        if len(self._steps) <= LOOKAHEAD:
+            return self.pulses[:0].copy(), self.push[:0].copy()
+        moved = np.flatnonzero(self._steps[1].teleported)
+        self.table.bodies["placed"][moved] = self.number - LOOKAHEAD
+        found = self.pulses_of(1, self.pulses_of(0))
+        return self.pulses[:found].copy(), self.push[:found].copy()
