@@ -9,11 +9,16 @@ with 12 modes.
 
 from __future__ import annotations
 
+import sys
+from pathlib import Path
+
 import numpy as np
 from scipy.signal import lfilter
 
 from sonic_bullet.records import Array
-from sonic_bullet.synth.surface import SurfaceLoads, SurfacePairs, SurfaceState, advance
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from tests.made.surfaces import advance, surface_pairs
 
 SR = 48000
 SPEED, ROUGH = np.geomspace(0.05, 2, 6), np.geomspace(0.1e-6, 20e-6, 5)
@@ -41,7 +46,7 @@ for name, (mass, modulus, radius, zeta) in CASES.items():
     p = len(v)
     rough = np.stack([0 * h, h], 1)
     each = np.ones(p)
-    pairs = SurfacePairs(
+    pairs = surface_pairs(
         mass * each,
         modulus * each,
         radius * each,
@@ -50,11 +55,9 @@ for name, (mass, modulus, radius, zeta) in CASES.items():
         np.full((p, 2), 0.75),
         np.arange(2 * p).reshape(p, 2),
     )
-    loads, state, out = SurfaceLoads(9.81 * pairs.mass_kg, np.stack([v, v], 1)), SurfaceState.at_rest(p), []
-    for _ in range(60):
-        force, state = advance(pairs, state, loads, loads, np.arange(960) / 960, SR)
-        out.append(force)
-    force = np.concatenate(out, 1)
+    load, sweep = 9.81 * pairs["mass_kg"], np.stack([v, v], 1)
+    ends = np.stack([load, load]), np.stack([sweep, sweep])
+    force = np.concatenate([advance(pairs, *ends, np.arange(960) / 960, SR) for _ in range(60)], 1)
     line = f"{name:26s}"
     for what, observed in (("force", force), ("sound", ring(force))):
         level = np.log(observed[:, 4800:].std(1)).reshape(len(ROUGH), len(SPEED))

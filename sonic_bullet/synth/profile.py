@@ -25,8 +25,8 @@ exactly 0.
 The way of the data: height_octaves once a pair, gains once a step and side, sweep_profile: dh/dt of every sample. The
 lattices nest, so the octaves are summed from coarse to fine on the lattice points that the samples pass (a cubic
 B-spline on Δ is one on Δ/2 with the coefficients [1 4 6 4 1]/8; `_refine`) and read once a sample (`_read`: the
-derivative is the quadratic B-spline of the differences). A coefficient hangs on its place alone, so where a block begins
-makes no difference. Coefficients and what they gain until the step's end stand in two arrays, ``change`` apart.
+derivative is the quadratic B-spline of the differences). A coefficient hangs on its place alone, so where a block
+begins makes no difference. Coefficients and what they gain until the step's end stand in two arrays, ``change`` apart.
 """
 # mypy: disable-error-code="no-untyped-def"
 
@@ -40,7 +40,6 @@ from numba import types
 from numba.extending import intrinsic
 
 from sonic_bullet.machine.compiled import njit
-from sonic_bullet.records import Array
 from sonic_bullet.synth.vector import F64, I32, I64, LANES, VEC, Emit, Value, constant
 
 OCTAVES = 14
@@ -50,25 +49,13 @@ LATTICE = 0.30
 SLOWEST_HZ = 8.0
 
 _WAVE_M = LONGEST_M / 2.0 ** np.arange(OCTAVES)
+INNER = {"nogil": True, "error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+"""Of kernels that only kernels call: Python cannot, and less is compiled."""
 _UNIT_RMS = np.sqrt(3.0 * 315 / 151)
 """Makes n_j unit variance: lattice values uniform on ±1 have 1/3, the mean square of the B-spline is 151/315."""
 
 
-def octave_heights(roughness_m: Array, hurst: Array) -> Array:
-    """A_j (…, OCTAVES) in m, scaled for lattice values on ±1, from rms height in m and Hurst exponent (…)."""
-    weight = _WAVE_M ** np.asarray(hurst, float)[..., None]
-    weight = weight / np.sqrt((weight**2).sum(-1, keepdims=True))
-    return np.asarray(np.asarray(roughness_m, float)[..., None] * weight * _UNIT_RMS)
-
-
-def octave_gains(speed_m_s: Array, patch_radius_m: Array, sr: int) -> Array:
-    """g_j (…, OCTAVES) at sweep speeds (…) in m/s, of either sign, with contact radius (…) in m."""
-    f = np.abs(np.asarray(speed_m_s, float))[..., None] / _WAVE_M
-    patch = 1 / np.sqrt(1 + np.asarray(patch_radius_m, float)[..., None] / _WAVE_M)
-    return np.asarray(patch * np.clip((0.4 - f / sr) / 0.2, 0, 1) * np.clip(f / SLOWEST_HZ - 1, 0, 1))
-
-
-@njit(nogil=True, error_model="numpy")
+@njit(**INNER)
 def height_octaves(roughness_m, hurst, out):
     """A_j into out (OCTAVES,) in m, scaled for lattice values on ±1, from rms height in m and Hurst exponent."""
     total = 0.0
@@ -80,13 +67,14 @@ def height_octaves(roughness_m, hurst, out):
         out[j] = roughness_m * (out[j] / scale) * _UNIT_RMS
 
 
-@njit(nogil=True, error_model="numpy")
+@njit(**INNER)
 def gained_heights(height_m, speed_m_s, patch_radius_m, sr, out):
     """g_j A_j into out (OCTAVES,) at a sweep speed in m/s, not negative, with a contact radius in m."""
     for j in range(OCTAVES):
         f = speed_m_s / _WAVE_M[j]
-        fine = min(max((0.4 - f / sr) / 0.2, 0.0), 1.0)
-        slow = min(max(f / SLOWEST_HZ - 1.0, 0.0), 1.0)
+        fine, slow = (0.4 - f / sr) / 0.2, f / SLOWEST_HZ - 1.0
+        fine, slow = 0.0 if fine < 0.0 else fine, 0.0 if slow < 0.0 else slow
+        fine, slow = 1.0 if fine > 1.0 else fine, 1.0 if slow > 1.0 else slow
         out[j] = height_m[j] * (fine * slow / np.sqrt(1.0 + patch_radius_m / _WAVE_M[j]))
 
 
@@ -196,7 +184,7 @@ def _read(typingctx, work, where, share, count, lattice, change, origin, inverse
     return types.void(work, where, share, count, lattice, change, origin, inverse, speed, gain, rate, out), codegen
 
 
-@njit(nogil=True, error_model="numpy")
+@njit(**INNER)
 def sweep_profile(swept, speed0, speed1, x, key, height0, height1, per_sample_s, work, rate, out):
     """Add dh/dt of one side of one pair to rate[out] … rate[out + n - 1] in m/s; returns the distance swept after the n
     samples, and the scratch, longer where it was too short.
@@ -222,7 +210,7 @@ def sweep_profile(swept, speed0, speed1, x, key, height0, height1, per_sample_s,
     while height0[coarsest] == 0.0 and height1[coarsest] == 0.0:
         coarsest += 1
     inverse = 2.0**finest / (LONGEST_M * LATTICE)
-    first, last = (np.int64(work[0] * inverse) - 1) & -2, (np.int64(swept * inverse) + 2) | 1
+    first, last = (int(work[0] * inverse) - 1) & -2, (int(swept * inverse) + 2) | 1
     size = last - first + 1 + 4 * LANES  # and what is written beyond
     if len(work) < 2 * whole + 4 * size:
         longer = np.empty(2 * whole + 4 * size)
@@ -240,102 +228,15 @@ def sweep_profile(swept, speed0, speed1, x, key, height0, height1, per_sample_s,
         coarse, pairs = now + (low >> 1) - begin - 1, (high - low + 1) >> 1
         _refine(work, coarse, new, change, pairs, place + 0x3C6EF372 * j + low, height0[j], height1[j] - height0[j])
         now, new, begin = new, now, low
-    origin = max(begin + 1, 0)  # never below 0: a place less it has no more digits than the place, and is exact
+    # never below 0: a place less its origin then has no more digits than the place, and is exact
+    origin = begin + 1 if begin >= 0 else 0
     _read(work, 0, whole, whole, now + origin - begin - 1, change, float(origin), inverse, speed0, gain, rate, out)
     return swept, work
 
 
-@njit(nogil=True, error_model="numpy")
+@njit(**INNER)
 def _lattice(first, last, halvings):
     """First and last coefficient that those from first (even) to last (odd) hang on, so many octaves coarser."""
     for _ in range(halvings):
         first, last = ((first >> 1) - 1) & -2, ((last >> 1) + 1) | 1
     return first, last
-
-
-@njit(nogil=True, error_model="numpy")
-def _noise(first, out):  # type: ignore[no-untyped-def]
-    """Values on ±1 of the lattice points from ``first`` (uint32) on: a 32-bit integer mix [Wellons 2018, "lowbias32"],
-    kept in 32 bits so that it vectorises.
-    """
-    for i in range(len(out)):
-        h = np.uint32(first + np.uint32(i))
-        h = np.uint32(np.uint32(h ^ (h >> np.uint32(16))) * np.uint32(0x7FEB352D))
-        h = np.uint32(np.uint32(h ^ (h >> np.uint32(15))) * np.uint32(0x846CA68B))
-        out[i] = np.float64(np.int32(h ^ (h >> np.uint32(16)))) * (1.0 / 2147483648.0)
-
-
-@njit(nogil=True, error_model="numpy")
-def _refine_old(coarse, fine, height, noise, count):  # type: ignore[no-untyped-def]
-    """2·count B-spline coefficients on half the lattice, from coarse[0] … coarse[count + 1], and this octave's own
-    noise.
-    """
-    for i in range(count):
-        fine[2 * i] = 0.125 * (coarse[i] + 6.0 * coarse[i + 1] + coarse[i + 2]) + height * noise[2 * i]
-        fine[2 * i + 1] = 0.5 * (coarse[i + 1] + coarse[i + 2]) + height * noise[2 * i + 1]
-
-
-@njit(nogil=True, error_model="numpy")
-def sweep(swept, speed, x, key, height0, height1, sr, rate):  # type: ignore[no-untyped-def]
-    """Add dh/dt of one side of one pair to ``rate`` (n,) in m/s; returns the distance swept after the n samples.
-
-    swept: distance before; speed (2,): at the step's ends; x (n,): share of the step; height0, height1 (octaves,): g·A
-    at the step's ends; key: of this surface. The lattices nest, so the octaves are summed from coarse to fine on the
-    lattice points that the samples pass (a cubic B-spline on Δ is one on Δ/2 with the coefficients [1 4 6 4 1]/8) and
-    read once a sample. A coefficient hangs on its place alone, so where a block begins makes no difference.
-    """
-    n, octaves = len(x), len(height0)
-    v0, dv = speed[0], speed[1] - speed[0]
-    where, pace, per_sample = np.empty(n), np.empty(n), 1.0 / sr
-    for i in range(n):
-        pace[i] = v0 + dv * x[i]
-        swept += pace[i] * per_sample
-        where[i] = swept
-    finest = octaves - 1
-    while finest >= 0 and height0[finest] == 0.0 and height1[finest] == 0.0:
-        finest -= 1
-    if finest < 0:
-        return swept
-    inverse = 2.0**finest / (LONGEST_M * LATTICE)
-    first, last = np.empty(octaves, np.int64), np.empty(octaves, np.int64)
-    first[finest], last[finest] = (
-        (np.int64(np.floor(where[0] * inverse)) - 1) & -2,
-        (np.int64(np.floor(where[n - 1] * inverse)) + 2) | 1,
-    )
-    for j in range(finest - 1, -1, -1):
-        first[j], last[j] = ((first[j + 1] >> 1) - 1) & -2, ((last[j + 1] >> 1) + 1) | 1
-    size = last[finest] - first[finest] + 32
-    # neighbouring seeds must start far apart in the 2^32 values of the mix
-    place = np.int64((np.uint64(key) * np.uint64(0x9E3779B97F4A7C15)) >> np.uint64(33))
-    now0, now1, new0, new1, noise = np.zeros(size), np.zeros(size), np.empty(size), np.empty(size), np.empty(size)
-    for j in range(finest + 1):
-        count = last[j] - first[j] + 1
-        _noise(np.uint32(place + 0x3C6EF372 * j + first[j]), noise[:count])
-        if j > 0:
-            begin = (first[j] >> 1) - first[j - 1] - 1
-            _refine_old(now0[begin:], new0, height0[j], noise, count >> 1)
-            _refine_old(now1[begin:], new1, height1[j], noise, count >> 1)
-            now0, now1, new0, new1 = new0, new1, now0, now1
-        else:
-            for i in range(count):
-                now0[i], now1[i] = height0[0] * noise[i], height1[0] * noise[i]
-    # derivative of the cubic B-spline on each cell: start of the step, then what it gains until its end
-    cells = last[finest] - first[finest] - 2
-    curve = np.empty((cells, 6))
-    for i in range(cells):
-        a, b, c, d = now0[i], now0[i + 1], now0[i + 2], now0[i + 3]
-        curve[i, 0], curve[i, 1], curve[i, 2] = 0.5 * (c - a), a - 2.0 * b + c, 0.5 * (d - 3.0 * c + 3.0 * b - a)
-        a, b, c, d = now1[i] - a, now1[i + 1] - b, now1[i + 2] - c, now1[i + 3] - d
-        curve[i, 3], curve[i, 4], curve[i, 5] = 0.5 * (c - a), a - 2.0 * b + c, 0.5 * (d - 3.0 * c + 3.0 * b - a)
-    begin = first[finest] + 1
-    for i in range(n):
-        u = where[i] * inverse
-        cell = np.int64(u)  # places are never negative
-        t, share, at = u - cell, x[i], np.uint64(cell - begin)
-        slope = (
-            curve[at, 0]
-            + curve[at, 3] * share
-            + t * (curve[at, 1] + curve[at, 4] * share + t * (curve[at, 2] + curve[at, 5] * share))
-        )
-        rate[i] += slope * inverse * pace[i]
-    return swept

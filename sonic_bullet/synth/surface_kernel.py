@@ -20,11 +20,11 @@ the law goes on as a straight line, so ωh ≤ 1 everywhere and the scheme is st
 [Hairer, Lubich, Wanner 2006, I.1.4]. All that a sample needs hangs on the sample before it and on its step: any split
 into blocks gives the same bits, and so does any company of other pairs.
 
-The way of the data, for the voices that move in a step: law -> rates of eight voices (`profile.sweep_profile`) ->
+The way of the data, for the voices that move in a step: `_law` -> rates of eight voices (`profile.sweep_profile`) ->
 `_oscillate`: the eight at once, one a lane -> f - N, a row a voice. State and constants stand in the table of pairs
-(render.tables.PAIR), loads and speeds of the step in the scratch table VOICE. Lengths in δ_lim, forces in k·δ_lim^(3/2),
-u and dh/dt in δ_lim/h, damping in h/δ_lim: then for every pair f = min(δ, 1)^(3/2) + 1.5(δ - 1)₊, and one substep adds
-(h²/m*)·k·√δ_lim = 2/3 of the force to u. The units follow the substeps; nothing is rounded twice.
+(render.tables.PAIR), loads and speeds of the step in the scratch table VOICE. Lengths in δ_lim, forces in
+k·δ_lim^(3/2), u and dh/dt in δ_lim/h, damping in h/δ_lim: then for every pair f = min(δ, 1)^(3/2) + 1.5(δ - 1)₊, and
+one substep adds (h²/m*)·k·√δ_lim = 2/3 of the force to u. The units follow the substeps; nothing is rounded twice.
 """
 # mypy: disable-error-code="no-untyped-def"
 
@@ -39,10 +39,10 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 
 from sonic_bullet.machine.compiled import njit
-from sonic_bullet.synth.profile import OCTAVES, gained_heights, sweep_profile
+from sonic_bullet.synth.profile import INNER, OCTAVES, gained_heights, sweep_profile
 from sonic_bullet.synth.vector import F64, I32, LANES, VEC, Emit, Value, constant
 
-MOST_SUBSTEPS = 8
+MOST_SUBSTEPS = 8.0
 FASTEST_M_S = 50.0
 LEAST_DAMPING_RATIO = 0.25
 _STILL = 1e-9
@@ -51,29 +51,26 @@ _STILL = 1e-9
 VOICE = np.dtype(
     [
         ("slot", "i8"),  # of its pair
+        ("moves", "i8"),  # 0: it only begins
+        ("fresh", "i8"),  # 1: it begins
         ("load_n", "f8", (2,)),  # at the step's start and end, as all that follows
         ("sweep_m_s", "f8", (2, 2)),  # over the lower and the higher body's surface
         ("direction", "f8", (2, 3)),  # of the force on the lower body, world frame, per newton of load
         ("begin", "i8"),  # its rows of the step that follows
         ("end", "i8"),
         ("total_n_s", "f8"),  # their load
-        ("substeps", "i8"),  # from here: filled by `law`
-        ("rate_unit", "f8"),  # h/δ_lim
-        ("force_unit_n", "f8"),  # k·δ_lim^(3/2)
-        ("rest", "f8", (2,)),  # δ0
-        ("damping", "f8", (2,)),  # c
-        ("patch_m", "f8", (2,)),  # a
+        ("order", "i8"),  # the voice that comes in this one's place
     ],
     align=True,
 )
 """A voice that moves, for one step: scratch."""
 
-# rows of `_oscillate`'s lanes
-_DEPTH, _LIFT, _REST, _DAMPING, _RATE, _FORCE, _SUBSTEPS, _SHARE, _STANDS = 0, 1, 2, 4, 6, 7, 8, 9, 10
-_ROWS = 11
+# what `_law` tells of a voice, a row a lane for `_oscillate`; two rows: at the step's start, and until its end
+_DEPTH, _LIFT, _REST, _DAMPING, _RATE_UNIT, _FORCE_UNIT, _SUBSTEPS, _STANDS, _PATCH = 0, 1, 2, 4, 6, 7, 8, 9, 10
+_ROWS = 12
 
 
-@njit(nogil=True, error_model="numpy")
+@njit(**INNER)
 def damping_ratio(restitution):
     """ζ of the linear oscillator that rebounds with this coefficient of restitution: -ln e/√(π² + ln² e), within
     0.25 … 1.
@@ -82,50 +79,72 @@ def damping_ratio(restitution):
     impacts (e = 0.95 would ring ten times) does not tell. Below it the level laws of rough, stiff, fast pairs bend
     (benchmarks/surface_law.py).
     """
-    log = np.log(min(max(restitution, 1e-9), 1.0))
-    return min(max(-log / np.sqrt(np.pi * np.pi + log * log), LEAST_DAMPING_RATIO), 1.0)
+    log = np.log(restitution if restitution > 1e-9 else 1e-9)
+    log = 0.0 if log > 0.0 else log
+    ratio = -log / np.sqrt(np.pi * np.pi + log * log)
+    return ratio if ratio > LEAST_DAMPING_RATIO else LEAST_DAMPING_RATIO
 
 
-@njit(nogil=True, error_model="numpy")
+@njit(**INNER)
 def contact_radius_m(relative_curvature_per_m, flat_area_m2):
     """R* = 1/(κ1+κ2), at most the radius √(A/π) of the nominal area of touching (1 m where A is 0: none known).
 
     A flat face rests on its highest spots; each is taken for a cap as blunt as the face is wide.
     """
     blunt = np.sqrt(flat_area_m2 / np.pi) if flat_area_m2 > 0 else 1.0
-    return min(1.0 / relative_curvature_per_m, blunt) if relative_curvature_per_m > 0 else blunt
+    return 1.0 / relative_curvature_per_m if relative_curvature_per_m * blunt > 1.0 else blunt
 
 
-@njit(nogil=True, error_model="numpy")
-def law(pairs, voices, v, sr):
-    """The contact law of voice v in this step: what VOICE says; its pair's depth, lift and substeps follow."""
-    voice = voices[v]
-    pair = pairs[voice.slot]
+@njit(**INNER)
+def _law(pair, voice, sr, constants, at):
+    """The contact law of a voice in this step into constants[at] …, with its pair's state in the units of that law."""
     mass, radius, modulus = pair.mass_kg, pair.radius_m, pair.modulus_pa
+    load0, load1 = voice.load_n
     k = 4.0 / 3.0 * modulus * np.sqrt(radius)
     soft = 1.5 * k ** (2.0 / 3.0)
-    resonance = np.sqrt(soft * np.cbrt(max(voice.load_n[0], voice.load_n[1])) / mass)
+    most = load0 if load0 > load1 else load1
     # half a radian a substep at rest leaves room for collisions four times (√δ twice) as stiff
-    substeps = int(min(max(np.ceil(2.0 * resonance / sr), 1.0), MOST_SUBSTEPS))
+    substeps = np.ceil(2.0 * np.sqrt(soft * most ** (1.0 / 3.0) / mass) / sr)
+    substeps = 1.0 if substeps < 1.0 else substeps
+    substeps = MOST_SUBSTEPS if substeps > MOST_SUBSTEPS else substeps
     h = 1.0 / (sr * substeps)
     limit = mass / (1.5 * k * (h * h))
     limit *= limit
     at_limit = k * limit**1.5
     for end in range(2):
-        load = voice.load_n[end]
+        load = load1 if end else load0
         depth = (load / k) ** (2.0 / 3.0) if load <= at_limit else limit + (load - at_limit) * (h * h) / mass
-        loss = 2.0 * pair.damping_ratio * np.sqrt(mass * soft) * max(load, 1e-3 * 9.81 * mass) ** (-5.0 / 6.0)
-        voice.rest[end] = depth / limit
-        voice.damping[end] = loss * limit / h
-        voice.patch_m[end] = np.cbrt(0.75 * load * radius / modulus)
-    voice.substeps, voice.rate_unit, voice.force_unit_n = substeps, h / limit, at_limit
+        least = 1e-3 * 9.81 * mass
+        loss = 2.0 * pair.damping_ratio * np.sqrt(mass * soft) * (load if load > least else least) ** (-5.0 / 6.0)
+        constants[at + _REST + end] = depth / limit
+        constants[at + _DAMPING + end] = loss * limit / h
+        constants[at + _PATCH + end] = (0.75 * load * radius / modulus) ** (1.0 / 3.0)
+    constants[at + _REST + 1] -= constants[at + _REST]
+    constants[at + _DAMPING + 1] -= constants[at + _DAMPING]
+    constants[at + _RATE_UNIT], constants[at + _FORCE_UNIT], constants[at + _SUBSTEPS] = h / limit, at_limit, substeps
     change = pair.substeps / substeps  # 0: a new contact
     square = change * change
-    pair.depth *= square * square
-    pair.lift *= square * square * change
+    constants[at + _DEPTH], constants[at + _LIFT] = (
+        pair.depth * (square * square),
+        pair.lift * (square * square * change),
+    )
+    sweep = voice.sweep_m_s
+    still = sweep[0, 0] == 0.0 and sweep[0, 1] == 0.0 and sweep[1, 0] == 0.0 and sweep[1, 1] == 0.0
+    constants[at + _STANDS] = 1.0 if still else 0.0
 
 
-@njit(nogil=True, error_model="numpy")
+@njit(**INNER)
+def _line_up(voices, count, constants):
+    """The voices' order by substeps, so that few lanes wait for others."""
+    last = 0
+    for substeps in range(1, int(MOST_SUBSTEPS) + 1):
+        for v in range(count):
+            if constants[v * _ROWS + _SUBSTEPS] == substeps:
+                voices[last].order = v
+                last += 1
+
+
+@njit(**INNER)
 def sound_voices(pairs, voices, count, x, sr, force):
     """Force f - N in newton of the voices 0 … count - 1 into force (voices, n), at the n samples that lie at the shares
     ``x`` (n,) in [0, 1) of one physics step; their pairs move on. Call again with the rest of the step's x for its
@@ -135,79 +154,40 @@ def sound_voices(pairs, voices, count, x, sr, force):
     if count == 0 or n == 0:
         return
     whole = (n + LANES - 1) & -LANES
-    work, rate, lanes, order = (
-        np.empty(2048),
-        np.empty(LANES * whole),
-        np.empty(LANES * _ROWS),
-        np.empty(count, np.int64),
-    )
-    height = np.empty((2, OCTAVES))
+    constants, lanes = np.empty(count * _ROWS), np.empty(LANES * _ROWS)
+    work, rate, height0, height1 = np.empty(2048), np.empty(LANES * whole), np.empty(OCTAVES), np.empty(OCTAVES)
     for v in range(count):
-        law(pairs, voices, v, sr)
-    last = 0
-    for substeps in range(1, MOST_SUBSTEPS + 1):  # so that few lanes wait for others
-        for v in range(count):
-            if voices[v].substeps == substeps:
-                order[last] = v
-                last += 1
+        _law(pairs[voices[v].slot], voices[v], sr, constants, v * _ROWS)
+    _line_up(voices, count, constants)
     for first in range(0, count, LANES):
-        size = min(LANES, count - first)
         for i in range(LANES * whole):
             rate[i] = 0.0
         for lane in range(LANES):
-            v = order[first + min(lane, size - 1)]  # lanes that are left over repeat the last
-            if lane < size:
-                work = _rates(pairs, voices, v, x, sr, height, work, rate, lane * whole)
-            _into_lane(pairs, voices, v, rate[lane * whole], lanes, lane)
-        _oscillate(lanes, x, n, voices[order[first + size - 1]].substeps, rate, whole)
-        for lane in range(size):
-            v = order[first + lane]
+            filled = first + lane < count
+            v = voices[first + lane if filled else count - 1].order  # lanes that are left over repeat the last
+            voice, at = voices[v], v * _ROWS
+            pair = pairs[voice.slot]
+            for side in range(2):
+                begin, end = voice.sweep_m_s[0, side], voice.sweep_m_s[1, side]
+                if filled and (begin != 0.0 or end != 0.0):
+                    gained_heights(pair.height_m[side], begin, constants[at + _PATCH], sr, height0)
+                    gained_heights(pair.height_m[side], end, constants[at + _PATCH + 1], sr, height1)
+                    pair.swept_m[side], work = sweep_profile(
+                        pair.swept_m[side], begin, end, x, pair.seed[side], height0, height1, 1.0 / sr, work, rate,
+                        lane * whole,
+                    )  # fmt: skip
+            if pair.substeps == 0:  # a new contact already moves with what it rolls over
+                constants[at + _LIFT] = rate[lane * whole] * constants[at + _RATE_UNIT]
+            for row in range(_ROWS):
+                lanes[row * LANES + lane] = constants[at + row]
+        _oscillate(lanes, x, n, int(lanes[_SUBSTEPS * LANES + LANES - 1]), rate, whole)
+        for lane in range(LANES if first + LANES <= count else count - first):
+            v = voices[first + lane].order
             pair = pairs[voices[v].slot]
-            pair.depth, pair.lift, pair.substeps = (
-                lanes[_DEPTH * LANES + lane],
-                lanes[_LIFT * LANES + lane],
-                voices[v].substeps,
-            )
+            pair.depth, pair.lift = lanes[lane], lanes[LANES + lane]
+            pair.substeps = int(constants[v * _ROWS + _SUBSTEPS])
             for i in range(n):
                 force[v, i] = rate[lane * whole + i]
-
-
-@njit(nogil=True, error_model="numpy")
-def _rates(pairs, voices, v, x, sr, height, work, rate, out):
-    """Add dh/dt of both sides of voice v to rate[out] …; moves its pair on. The scratch, longer where it was too
-    short.
-    """
-    voice = voices[v]
-    pair = pairs[voice.slot]
-    for side in range(2):
-        begin, end = voice.sweep_m_s[0, side], voice.sweep_m_s[1, side]
-        if begin != 0.0 or end != 0.0:
-            gained_heights(pair.height_m[side], begin, voice.patch_m[0], sr, height[0])
-            gained_heights(pair.height_m[side], end, voice.patch_m[1], sr, height[1])
-            pair.swept_m[side], work = sweep_profile(
-                pair.swept_m[side], begin, end, x, pair.seed[side], height[0], height[1], 1.0 / sr, work, rate, out
-            )
-    return work
-
-
-@njit(nogil=True, error_model="numpy")
-def _into_lane(pairs, voices, v, first_rate, lanes, lane):
-    """State and constants of voice v into its lane."""
-    voice = voices[v]
-    pair = pairs[voice.slot]
-    sweep = voice.sweep_m_s
-    stands = sweep[0, 0] == 0.0 and sweep[1, 0] == 0.0 and sweep[0, 1] == 0.0 and sweep[1, 1] == 0.0
-    lanes[_DEPTH * LANES + lane] = pair.depth
-    # a new contact already moves with what it rolls over
-    lanes[_LIFT * LANES + lane] = pair.lift if pair.substeps > 0 else first_rate * voice.rate_unit
-    for end in range(2):
-        lanes[(_REST + end) * LANES + lane] = voice.rest[end] - end * voice.rest[0]
-        lanes[(_DAMPING + end) * LANES + lane] = voice.damping[end] - end * voice.damping[0]
-    lanes[_RATE * LANES + lane] = voice.rate_unit
-    lanes[_FORCE * LANES + lane] = voice.force_unit_n
-    lanes[_SUBSTEPS * LANES + lane] = voice.substeps
-    lanes[_SHARE * LANES + lane] = 1.0 / voice.substeps
-    lanes[_STANDS * LANES + lane] = 1.0 if stands else 0.0
 
 
 @intrinsic
@@ -239,7 +219,8 @@ def _oscillate(typingctx, lanes, x, count, most, rate, apart):
             )
 
         rest, rest_gain, damping, damping_gain = (row(k) for k in range(_REST, _REST + 4))
-        rate_unit, unit, substeps = row(_RATE), builder.fmul(row(_SHARE), row(_FORCE)), row(_SUBSTEPS)
+        rate_unit, substeps = row(_RATE_UNIT), row(_SUBSTEPS)
+        unit = builder.fdiv(row(_FORCE_UNIT), substeps)
         stands = builder.fcmp_ordered("==", row(_STANDS), one)
         places = [builder.mul(apart, e.index(lane)) for lane in range(LANES)]
 

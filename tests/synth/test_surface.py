@@ -7,10 +7,11 @@ import itertools
 import numpy as np
 import pytest
 
+from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array
-from sonic_bullet.synth import surface
-from sonic_bullet.synth.profile import octave_gains, octave_heights
-from sonic_bullet.synth.surface import SurfaceLoads, SurfacePairs, SurfaceState, advance
+from sonic_bullet.synth import surface_kernel
+from sonic_bullet.synth.profile import sweep_profile
+from tests.made.surfaces import advance, octave_gains, octave_heights, surface_pairs
 
 SR, STEP = 48000, 200
 
@@ -22,30 +23,34 @@ CASES = {  # m* kg, E* Pa, R* m, ζ
 }
 
 
-def pairs_of(case: tuple[float, float, float, float], roughness_m: Array) -> SurfacePairs:
+def pairs_of(case: tuple[float, float, float, float], roughness_m: Array) -> Array:
     p = len(roughness_m)
     mass, modulus, radius, zeta = (np.full(p, value) for value in case)
     rough = np.stack([np.zeros(p), roughness_m], 1)
-    return SurfacePairs(
+    return surface_pairs(
         mass, modulus, radius, zeta, rough, np.full((p, 2), 0.75), 1 + 7919 * np.arange(2 * p).reshape(p, 2)
     )
 
 
-def sounding(pairs: SurfacePairs, speed_m_s: Array, seconds: float, jitter: float = 0.0) -> Array:
+def between(pairs: Array, before: tuple[Array, Array], after: tuple[Array, Array], x: Array) -> Array:
+    """Forces of a step between two loads and sweeps."""
+    return advance(pairs, np.stack([before[0], after[0]]), np.stack([before[1], after[1]]), x, SR)
+
+
+def sounding(pairs: Array, speed_m_s: Array, seconds: float, jitter: float = 0.0) -> Array:
     """Forces (p, n) of pairs that bear their weight while both surfaces sweep; loads and speeds jitter from step to
     step.
     """
     rng = np.random.default_rng(5)
 
-    def loads() -> SurfaceLoads:
+    def loads() -> tuple[Array, Array]:
         shake = 1 + jitter * rng.normal(size=(2, len(pairs)))
-        return SurfaceLoads(9.81 * pairs.mass_kg * shake[0], np.repeat((speed_m_s * shake[1])[:, None], 2, 1))
+        return 9.81 * pairs["mass_kg"] * shake[0], np.repeat((speed_m_s * shake[1])[:, None], 2, 1)
 
-    state, here, x, out = SurfaceState.at_rest(len(pairs)), loads(), np.arange(STEP) / STEP, []
+    here, x, out, pairs = loads(), np.arange(STEP) / STEP, [], pairs.copy()
     for _ in range(int(seconds * SR / STEP)):
         there = loads() if jitter else here
-        force, state = advance(pairs, state, here, there, x, SR)
-        out.append(force)
+        out.append(between(pairs, here, there, x))
         here = there
     return np.concatenate(out, 1)
 
@@ -84,55 +89,79 @@ def test_level_follows_the_measured_laws(name: str) -> None:
 
 def test_nothing_sounds_at_rest_whatever_the_load_does() -> None:
     pairs = pairs_of(CASES["1 cm steel ball on stone"], np.full(3, 5e-6))
-    state, x, rng = SurfaceState.at_rest(3), np.arange(STEP) / STEP, np.random.default_rng(2)
+    x, rng = np.arange(STEP) / STEP, np.random.default_rng(2)
     load = rng.uniform(0, 1, (40, 3))
     load[10:12] = 0
     for before, after in itertools.pairwise(load):
-        force, state = advance(
-            pairs, state, SurfaceLoads(before, np.zeros((3, 2))), SurfaceLoads(after, np.zeros((3, 2))), x, SR
-        )
-        assert not force.any()
+        assert not between(pairs, (before, np.zeros((3, 2))), (after, np.zeros((3, 2))), x).any()
 
 
 def test_a_ball_that_stops_falls_silent_to_exact_zero_and_starts_without_a_click() -> None:
     pairs = pairs_of(CASES["1 cm steel ball on stone"], np.full(1, 2e-6))
     loads = [
-        SurfaceLoads(9.81 * pairs.mass_kg, np.full((1, 2), v))
-        for v in [0.4] * 60 + list(np.linspace(0.4, 0, 60)) + [0.0] * 60
+        (9.81 * pairs["mass_kg"], np.full((1, 2), v)) for v in [0.4] * 60 + list(np.linspace(0.4, 0, 60)) + [0.0] * 60
     ]
-    state, x, steps = SurfaceState.at_rest(1), np.arange(STEP) / STEP, []
-    for before, after in itertools.pairwise(loads):
-        force, state = advance(pairs, state, before, after, x, SR)
-        steps.append(force[0])
+    x = np.arange(STEP) / STEP
+    steps = [between(pairs, before, after, x)[0] for before, after in itertools.pairwise(loads)]
     sound = np.concatenate(steps)
     loud = sound[STEP * 20 : STEP * 60].std()
     assert np.abs(sound[:3]).max() < 0.5 * loud
     assert np.abs(np.diff(sound)).max() < 20 * np.diff(sound[STEP * 20 : STEP * 60]).std()
     assert not sound[-10 * STEP :].any()
-    assert state.depth[0] == 0 and state.lift[0] == 0
+    assert pairs["depth"][0] == 0 and pairs["lift"][0] == 0
     tiny = np.abs(sound[sound != 0])
     assert tiny.min() > 1e-300
     fade = [np.std(step) for step in steps[60:120:10]]  # continuous as the speed fades: no step up, no sudden end
     assert all(b < 1.5 * a for a, b in itertools.pairwise(fade))
 
 
+def test_force_is_that_of_the_equations_written_out() -> None:
+    """One pair against its differential equations in newton and metres, sample by sample."""
+    case, x, v = CASES["1 cm steel ball on stone"], np.arange(STEP) / STEP, 0.4
+    mass, modulus, radius, zeta = case
+    pairs = pairs_of(case, np.full(1, 1e-6))
+    load = 9.81 * mass
+    profile = np.zeros(10 * STEP)
+    patch = (0.75 * load * radius / modulus) ** (1 / 3)
+    _swept(v, np.zeros(10 * STEP), 1 + 7919, pairs["height_m"][0, 1] * octave_gains(v, patch, SR), 1 / SR, profile)
+    ends = np.full(1, load), np.array([[0.0, v]])
+    force = np.concatenate([between(pairs, ends, ends, x)[0] for _ in range(10)])
+    k = 4 / 3 * modulus * np.sqrt(radius)
+    rest = (load / k) ** (2 / 3)
+    c = 2 * zeta * np.sqrt(mass * 1.5 * k * np.sqrt(rest)) / load
+    count = int(pairs["substeps"][0])
+    h, z, u, expected = 1 / SR / count, 0.0, profile[0], []
+    for rate in profile:
+        total = 0.0
+        for _ in range(count):
+            z += h * (rate - u)
+            elastic = k * max(rest + z, 0.0) ** 1.5
+            f = max((elastic - load + elastic * c * (rate - u)) / (1 + h / mass * elastic * c), -load)
+            u += h / mass * f
+            total += f / count
+        expected.append(total)
+    assert np.abs(force - expected).max() < 1e-9 * np.abs(force).max()
+
+
 def test_any_split_gives_the_same_bits() -> None:
-    pairs = pairs_of(CASES["3 cm steel ball on stone"], np.array([1e-6, 2e-5, 0.0])).append(
-        pairs_of((1e-5, 1e11, 1e-3, 0.3), np.full(2, 1e-6))
+    most = np.concatenate(
+        [
+            pairs_of(CASES["3 cm steel ball on stone"], np.array([1e-6, 2e-5, 0.0])),
+            pairs_of((1e-5, 1e11, 1e-3, 0.3), np.full(2, 1e-6)),
+        ]
     )
     rng = np.random.default_rng(3)
-    loads = [SurfaceLoads(9.81 * pairs.mass_kg * rng.uniform(0, 4, 5), rng.uniform(0, 2, (5, 2))) for _ in range(13)]
+    loads = [(9.81 * most["mass_kg"] * rng.uniform(0, 4, 5), rng.uniform(0, 2, (5, 2))) for _ in range(13)]
 
     def render(blocks: list[int]) -> bytes:
-        state, out = SurfaceState.at_rest(5), []
+        pairs, out = most.copy(), list[Array]()
         for before, after in itertools.pairwise(loads):
             at = 0
             while at < STEP:
                 n = blocks[len(out) % len(blocks)]
-                force, state = advance(pairs, state, before, after, np.arange(at, min(at + n, STEP)) / STEP, SR)
-                out.append(force)
+                out.append(between(pairs, before, after, np.arange(at, min(at + n, STEP)) / STEP))
                 at += n
-        return np.concatenate(out, 1).tobytes() + state.depth.tobytes() + state.swept_m.tobytes()
+        return np.concatenate(out, 1).tobytes() + pairs.tobytes()
 
     whole = render([STEP])
     assert render([1]) == whole
@@ -144,7 +173,7 @@ def test_a_pair_sounds_the_same_alone_and_among_others() -> None:
     speed = np.linspace(0.1, 2, 9)
     together = sounding(pairs, speed, 0.05)
     for row in (0, 4, 8):
-        assert sounding(pairs.take(np.array([row])), speed[[row]], 0.05).tobytes() == together[[row]].tobytes()
+        assert sounding(pairs[[row]], speed[[row]], 0.05).tobytes() == together[[row]].tobytes()
 
 
 def test_rolling_and_sliding_differ_in_sweep_alone() -> None:
@@ -152,16 +181,11 @@ def test_rolling_and_sliding_differ_in_sweep_alone() -> None:
     to the other.
     """
     p = 24
-    one = pairs_of(CASES["2 cm steel ball on wood"], np.full(p, 1e-6))
-    pairs = SurfacePairs(
-        one.mass_kg, one.modulus_pa, one.radius_m, one.damping_ratio, np.full((p, 2), 1e-6), one.hurst, one.seed
-    )
+    pairs = pairs_of(CASES["2 cm steel ball on wood"], np.full(p, 1e-6))
+    pairs["height_m"][:, 0] = pairs["height_m"][:, 1]
     share, x = np.repeat([1.0, 0.3, 0.03, 0.0], 6), np.arange(STEP) / STEP
-    loads = SurfaceLoads(9.81 * pairs.mass_kg, np.stack([0.5 * share, np.full(p, 0.5)], 1))
-    state, out = SurfaceState.at_rest(p), []
-    for _ in range(240):
-        force, state = advance(pairs, state, loads, loads, x, SR)
-        out.append(force)
+    loads = 9.81 * pairs["mass_kg"], np.stack([0.5 * share, np.full(p, 0.5)], 1)
+    out = [between(pairs, loads, loads, x) for _ in range(240)]
     level = np.sqrt((np.concatenate(out, 1)[:, 4800:] ** 2).mean(1).reshape(4, 6).mean(1))
     assert level[0] / level[3] == pytest.approx(np.sqrt(2), rel=0.1)
     assert (np.diff(level) < 0.02 * level[3]).all()
@@ -189,28 +213,33 @@ def test_contact_neither_gains_energy_nor_blows_up() -> None:
     bounded.
     """
     pairs = pairs_of((0.033, 5e10, 0.01, 0.02), np.zeros(1))
-    load = SurfaceLoads(9.81 * pairs.mass_kg, np.zeros((1, 2)))
-    state = SurfaceState(np.full(1, 1e-3), np.zeros(1), np.ones(1, np.int64), np.zeros((1, 2)))
-    x, peaks = np.arange(STEP) / STEP, []
-    for _ in range(40):
-        force, state = advance(pairs, state, load, load, x, SR)
-        peaks.append(np.abs(force).max())
+    load, x = (9.81 * pairs["mass_kg"], np.zeros((1, 2))), np.arange(STEP) / STEP
+    pairs["depth"], pairs["substeps"] = 1e-3, 1
+    peaks = [np.abs(between(pairs, load, load, x)).max() for _ in range(40)]
+    assert peaks[0] > 0
     assert all(b <= a for a, b in itertools.pairwise(peaks))
     grid = np.array(np.meshgrid([1e-6, 1e4], [1e4, 1e13], [1e-5, 10.0], [0.02, 1.0], [0.0, 1e-3])).reshape(5, -1)
     p = grid.shape[1]
-    wild = SurfacePairs(
-        *grid[:4], np.stack([grid[4], grid[4]], 1), np.full((p, 2), 0.1), np.arange(2 * p).reshape(p, 2)
+    mass, modulus, radius, zeta = grid[:4]
+    wild = surface_pairs(
+        mass,
+        modulus,
+        radius,
+        zeta,
+        np.stack([grid[4], grid[4]], 1),
+        np.full((p, 2), 0.1),
+        np.arange(2 * p).reshape(p, 2),
     )
-    state, total = SurfaceState.at_rest(p), np.zeros(p)
+    total = np.zeros(p)
     rng = np.random.default_rng(0)
     for _ in range(60):
-        ends = [
-            SurfaceLoads(rng.choice([0, 1e-9, 1.0, 1e5], p), rng.choice([0, 1e-6, 1.0, 1e9], (p, 2))) for _ in range(2)
-        ]
-        force, state = advance(wild, state, ends[0], ends[1], x, SR)
+        before, after = (
+            (rng.choice([0, 1e-9, 1.0, 1e5], p), rng.choice([0, 1e-6, 1.0, 1e9], (p, 2))) for _ in range(2)
+        )
+        force = between(wild, before, after, x)
         assert np.isfinite(force).all()
         total = np.maximum(total, np.abs(force).max(1))
-    assert np.isfinite(state.depth).all()
+    assert np.isfinite(wild["depth"]).all()
     assert not total[grid[4] == 0].any()  # nothing rough: nothing heard
 
 
@@ -221,15 +250,17 @@ def test_mean_of_the_force_is_the_load() -> None:
     assert (force.min(1) >= -9.81 * 0.033 * (1 + 1e-12)).all()  # surfaces do not pull
 
 
+@njit(nogil=True)
+def _swept(speed, x, key, height, per_sample_s, rate):  # type: ignore[no-untyped-def]
+    sweep_profile(0.0, speed, speed, x, key, height, height, per_sample_s, np.empty(0), rate, 0)
+
+
 def test_profile_is_self_affine_with_the_stated_rms() -> None:
     """Slope of the height's spectrum is -(1 + 2H) within 0.15, its rms the stated one within 10 %."""
     rows, n, hurst, v, sr = 8, 1 << 19, 0.75, 0.1, 48000
-    height = np.repeat(octave_heights(np.array([[1e-6, 0.0]]), np.array([[hurst, hurst]])), rows, 0)
-    speed, seed = np.zeros((2, rows, 2)), np.arange(2 * rows).reshape(rows, 2)
-    speed[:, :, 0] = v
-    rate = surface._rates(
-        np.zeros((rows, 2)), np.arange(rows), speed, np.zeros(n), seed, np.stack([height, height]), float(sr)
-    )
+    height, x, rate = octave_heights(1e-6, hurst), np.zeros(n), np.zeros((rows, n))
+    for row in range(rows):
+        _swept(v, x, 2 * row, height, 1 / sr, rate[row])
     h = np.cumsum(rate, 1) / sr
     assert np.sqrt(h.var(1).mean()) == pytest.approx(1e-6, rel=0.1)
     power = (np.abs(np.fft.rfft(h * np.hanning(n), axis=1)) ** 2).mean(0)
@@ -240,17 +271,18 @@ def test_profile_is_self_affine_with_the_stated_rms() -> None:
 
 
 def test_gains_fall_with_contact_and_alias_and_slowness() -> None:
-    gain = octave_gains(np.array([0.5, 0.0, 0.5]), np.array([0.0, 0.0, 1e-3]), SR)
-    assert not gain[1].any()
-    assert (gain[2] <= gain[0]).all()
-    wave = 0.1 / 2.0 ** np.arange(gain.shape[1])
+    free, standing, patch = octave_gains(0.5, 0.0, SR), octave_gains(0.0, 0.0, SR), octave_gains(0.5, 1e-3, SR)
+    assert not standing.any()
+    assert (patch <= free).all()
+    wave = 0.1 / 2.0 ** np.arange(len(free))
     at_radius = np.argmin(np.abs(wave - 1e-3))
-    assert gain[2, at_radius] / gain[0, at_radius] == pytest.approx(np.sqrt(1 / (1 + 1e-3 / wave[at_radius])))
-    assert not octave_gains(np.array(30.0), np.array(0.0), SR)[wave < 30 / (0.4 * SR)].any()
+    assert patch[at_radius] / free[at_radius] == pytest.approx(np.sqrt(1 / (1 + 1e-3 / wave[at_radius])))
+    assert not octave_gains(30.0, 0.0, SR)[wave < 30 / (0.4 * SR)].any()
 
 
 def test_helpers_at_their_edges() -> None:
-    assert surface.damping_ratio(np.array([0.0, 1.0])) == pytest.approx([1.0, 0.25], rel=0.02)
-    assert surface.contact_radius_m(
-        np.array([100.0, 0.0, -5.0, 0.0]), np.array([0.0, np.pi * 0.04, 0.0, 0.0])
-    ) == pytest.approx([0.01, 0.2, 1.0, 1.0])
+    damping_ratio, contact_radius_m = surface_kernel.damping_ratio.py_func, surface_kernel.contact_radius_m.py_func
+    assert [damping_ratio(0.0), damping_ratio(1.0)] == pytest.approx([1.0, 0.25], rel=0.02)
+    assert damping_ratio(np.exp(-np.pi)) == pytest.approx(np.sqrt(0.5))
+    radii = [contact_radius_m(*pair) for pair in ((100.0, 0.0), (0.0, np.pi * 0.04), (-5.0, 0.0), (0.0, 0.0))]
+    assert radii == pytest.approx([0.01, 0.2, 1.0, 1.0])
