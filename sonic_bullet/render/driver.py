@@ -166,13 +166,13 @@ def advance_steps(
     bodies, faces, nodes, shapes, frequency_hz, spectrum, pairs, active, counts, free, gain,
     pulses, push, force, gain0, gain1, direction0, direction1, drive_body, drive_slot,
     bank_body, law, weight, observed, ringing, z, driven, sound, pole, block, strikes, phasors, free_strikes, hertz,
-    source, pushed, sounds, microphone_m, samples_per_m, sources, places, lines, memory, taps, reads, heard, out,
+    source, pushed, sounds, microphone_m, samples_per_m, sources, places, lines, memory, taps, reads, pressure, out,
 ):  # fmt: skip  # pragma: no cover - compiled
     """Steps ``first`` … of the table into out (channels, samples of all of them): how many are done, why it came back,
     and how many pulses and drives the last one has.
 
     taken: number of the first step of the table; start: sample of out's first. contacts: of all steps; position (k, b,
-    3), quaternion (k, b, 4), teleported (k, b). heard (microphones, as out). pause: come back before the first step is
+    3), quaternion (k, b, 4), teleported (k, b). pressure (microphones, as out). pause: come back before the first step is
     heard; resume: the first step rings already, and is to be heard.
     """
     found, drives, done = 0, 0, 0
@@ -211,7 +211,7 @@ def advance_steps(
                 return done, PAUSED, found, drives
             status = finish(
                 number, step, start, x, window_position, window_teleported, source, pushed, microphone_m,
-                samples_per_m, sources, places, lines, memory, taps, reads, heard, out,
+                samples_per_m, sources, places, lines, memory, taps, reads, pressure, out,
             )  # fmt: skip
             if status != DONE:
                 return done, status, found, drives
@@ -222,7 +222,7 @@ def advance_steps(
 @njit(nogil=True, error_model="numpy")
 def finish(
     number, step, start, x, window_position, window_teleported, source, pushed, microphone_m, samples_per_m, sources,
-    places, lines, memory, taps, reads, heard, out,
+    places, lines, memory, taps, reads, pressure, out,
 ):  # fmt: skip  # pragma: no cover - compiled
     """Step ``number``, which rings in source and pushed, into out (channels, …), whose first sample is ``start``; why
     not, where it cannot be.
@@ -240,6 +240,6 @@ def finish(
     for c in range(len(reads)):
         if reads[c] == 0:
             for k in range(at, at + step.count):
-                out[c, k] = heard[m, k]
+                out[c, k] = pressure[m, k]
             m += 1
     return DONE

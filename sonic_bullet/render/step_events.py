@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from sonic_bullet.records import Array
-from sonic_bullet.render.synthesis_state import Scratch
+from sonic_bullet.render.synthesis_state import StepScratch
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -49,7 +49,7 @@ class Drive:
 
 
 def pulses_of(
-    scratch: Scratch, found: int, modes: Array, begin_s: float, after_s: float
+    scratch: StepScratch, found: int, modes: Array, begin_s: float, after_s: float
 ) -> list[tuple[float, ForcePulse]]:
     """The step's strikes, each with the time from which its start counts. modes (b,): of each body.
 
@@ -66,7 +66,7 @@ def pulses_of(
     return pulses
 
 
-def drives_of(scratch: Scratch, drives: int, modes: Array, samples: int) -> list[Drive]:
+def drives_of(scratch: StepScratch, drives: int, modes: Array, samples: int) -> list[Drive]:
     """The step's friction. modes (b,): of each body; samples: of the step."""
     force = scratch.force[: len(scratch.slot) * samples].reshape(len(scratch.slot), samples)
     found = []

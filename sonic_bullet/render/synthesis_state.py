@@ -87,8 +87,8 @@ class Window:
 
 
 @dataclass(slots=True, eq=False)
-class Pairs:
-    """Pairs of bodies that touch: pair (slots,) PAIR, active (slots,): those in use by rising key, count (2,): how many
+class TouchingPairs:
+    """TouchingPairs of bodies that touch: pair (slots,) PAIR, active (slots,): those in use by rising key, count (2,): how many
     are in use and how many are free, free (slots,); gain (slots, 2, columns): Uᵀ per newton on either body.
     """
 
@@ -112,12 +112,12 @@ class Pairs:
         gain[:old, :, :width] = self.gain
         self.gain = gain
 
-    def copy(self) -> Pairs:
-        return Pairs(*(getattr(self, name).copy() for name in self.__slots__))
+    def copy(self) -> TouchingPairs:
+        return TouchingPairs(*(getattr(self, name).copy() for name in self.__slots__))
 
 
 @dataclass(slots=True, eq=False)
-class Scratch:
+class StepScratch:
     """What one step is made in; nothing of it is needed for the next. pulse (p,) PULSE with push (p, 2, columns);
     drives d: force (d·n,), gain0, gain1 (d, 2, columns), direction0, direction1 (d, 3), body (d, 2), slot (d,). source
     (W, b, n), pushed (b, 3, n), sounds (b, 2): which rows of these are not zero.
@@ -161,7 +161,7 @@ class State:
     """
 
     window: Window
-    pairs: Pairs
+    pairs: TouchingPairs
     table: BodyTable
     bank: Bank
     ringing: BankState
@@ -175,7 +175,7 @@ class State:
     grains: tuple[Grain, ...] = ()
     rubs: Rubs = field(default_factory=dict)
     quenches: frozenset[int] = frozenset()
-    scratch: Scratch = field(default_factory=Scratch)
+    scratch: StepScratch = field(default_factory=StepScratch)
 
     reads: Array = field(default_factory=lambda: np.zeros(0, np.int64))
     has_residual: bool = False
@@ -213,7 +213,7 @@ class State:
         return State(
             self.window.copy(), self.pairs.copy(), self.table.copy(), self.bank, self.ringing.copy(), self.path,
             self.travelling.copy(), self.taken, self.clock, self.waiting, self.resonators, self.voices, self.grains,
-            dict(self.rubs), self.quenches, Scratch(), self.reads, self.has_residual,
+            dict(self.rubs), self.quenches, StepScratch(), self.reads, self.has_residual,
         )  # fmt: skip
 
 
@@ -229,7 +229,7 @@ def start(setup: Setup) -> State:
         np.zeros((SPAN, 0), bool),
         np.zeros(0, ROW),
     )
-    pairs = Pairs(np.zeros(0, PAIR), none, np.zeros(2, np.int64), none, np.zeros((0, 2, 0)))
+    pairs = TouchingPairs(np.zeros(0, PAIR), none, np.zeros(2, np.int64), none, np.zeros((0, 2, 0)))
     return State(window, pairs, BodyTable(), instrument, ringing, air, travelling, reads=setup.reads)
 
 
@@ -247,7 +247,7 @@ def with_bodies(setup: Setup, state: State, bodies: Sequence[Body], position_m: 
     state.window.with_bodies(position_m, quaternion_xyzw)
     state.resonators, state.voices = state.resonators + new, state.voices + voices
     state.has_residual = any(voice is not None for voice in state.voices)
-    state.scratch = Scratch()
+    state.scratch = StepScratch()
     state.changed()
 
 

@@ -82,14 +82,16 @@ def _advanced(setup: Setup, state: State, steps: Sequence[Step]) -> Array:
     ]
     stop = clock.sample(sr)
     out = np.zeros((len(setup.sensors), stop - begin))
-    heard = out if len(state.path.microphone_m) == len(out) else np.zeros((len(state.path.microphone_m), stop - begin))
+    pressure = (
+        out if len(state.path.microphone_m) == len(out) else np.zeros((len(state.path.microphone_m), stop - begin))
+    )
     longest = int(table["count"].max()) if len(steps) > 1 else stop - begin
     if state.scratch.samples < longest:
         _make_room(state, table[0], longest)
     done, resume, taken = 0, False, state.taken
     while done < len(steps):
         more, status, found, drives = driver.advance_steps(
-            done, taken, begin, pause, resume, float(sr), table, contacts, *poses, *state.tables(), heard, out
+            done, taken, begin, pause, resume, float(sr), table, contacts, *poses, *state.tables(), pressure, out
         )
         done, resume = done + more, status not in (driver.TO_GROW, path_kernel.DONE)
         if status == path_kernel.DONE:

@@ -1,7 +1,7 @@
 """What a moving point emits and what is read off its history between the samples, eight samples at a time.
 
     emitted at sample m:   a[m] = (s[m] + n̂·j[m])/r[m],  arriving at m + D[m], D = r sr/c
-    heard at sample n:     a(u), where u + D(u) = n, D linear between samples: m + D[m] ≤ n < m + 1 + D[m + 1],
+    arrived at sample n:     a(u), where u + D(u) = n, D linear between samples: m + D[m] ≤ n < m + 1 + D[m + 1],
         u = m + (n - m - D[m])/(1 + D[m+1] - D[m])                          (retarded time: Doppler shift is exact)
     a(u) = Σ_k a[k] h(u - k),  h: 16 taps of a Kaiser-windowed sinc
         [Laakso et al. 1996, IEEE SPM 13(1), sec. 3.2]
@@ -235,7 +235,7 @@ def leading(typingctx, memory, late_at, gone):
 
 
 @intrinsic
-def read(typingctx, memory, ring_at, late_at, gone, taps, kept, heard, at):
+def read(typingctx, memory, ring_at, late_at, gone, taps, kept, arrived, at):
     """Σ_k a[m - 7 + k] h_k of eight samples as in `leading` into heard[at …], memory[ring_at + k]: a[m - 7 + k].
 
     kept (KEPT,): taps of the samples before, NaN at first.
@@ -243,7 +243,7 @@ def read(typingctx, memory, ring_at, late_at, gone, taps, kept, heard, at):
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         e = Emit(context, builder, signature, args)
-        memory, ring_at, late_at, gone, taps, kept, heard, at = e.args
+        memory, ring_at, late_at, gone, taps, kept, arrived, at = e.args
         here, there = e.load(memory, late_at), e.load(memory, e.shifted(late_at, 1))
         since = builder.fsub(e.spread(builder.sitofp(builder.sub(e.index(0), gone), F64)), here)
         fraction = builder.fdiv(since, builder.fsub(builder.fadd(constant(1.0), there), here))
@@ -280,9 +280,9 @@ def read(typingctx, memory, ring_at, late_at, gone, taps, kept, heard, at):
         equal = _all(e, builder.fcmp_ordered("==", t, e.load(kept, e.index(TAPS * LANES))))
         with builder.if_else(equal) as (then, otherwise):
             with then:
-                e.store(summed(lambda tap: e.load(kept, e.index(tap * LANES))), heard, at)
+                e.store(summed(lambda tap: e.load(kept, e.index(tap * LANES))), arrived, at)
             with otherwise:
-                e.store(summed(made), heard, at)
+                e.store(summed(made), arrived, at)
                 one = e.spread(builder.extract_element(t, ir.Constant(I32, 0)))
                 with builder.if_then(_all(e, builder.fcmp_ordered("==", t, one))):
                     for tap in range(TAPS):
@@ -290,4 +290,4 @@ def read(typingctx, memory, ring_at, late_at, gone, taps, kept, heard, at):
                     e.store(t, kept, e.index(TAPS * LANES))
         return context.get_dummy_value()
 
-    return types.void(memory, ring_at, late_at, gone, taps, kept, heard, at), codegen
+    return types.void(memory, ring_at, late_at, gone, taps, kept, arrived, at), codegen

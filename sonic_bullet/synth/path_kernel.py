@@ -227,7 +227,7 @@ def _wake(memory, ring_at, late_at, mask, n, late):  # pragma: no cover - compil
 
 @njit(nogil=True, error_model="numpy")
 def _listen(
-    line, at, n, emitted, delay, heard, memory, ring_at, mask, taps, kept, steep
+    line, at, n, emitted, delay, arrived, memory, ring_at, mask, taps, kept, steep
 ):  # pragma: no cover - compiled
     """Run one line over emitted (n,); what arrives into heard (n,). False where nothing does.
 
@@ -258,7 +258,7 @@ def _listen(
         if not arrives:
             arrives = True
             for k in range(n):
-                heard[k] = 0.0
+                arrived[k] = 0.0
         base = m + 1  # the rule: one sample further than that before, for a whole group
         count = leading(memory, late_at + ((at + base) & mask), base - i)
         if count == 0:
@@ -266,7 +266,7 @@ def _listen(
             while (base + 1 - i) + memory[late_at + ((at + base + 1) & mask)] <= 0.0:
                 base += 1
             count = leading(memory, late_at + ((at + base) & mask), base - i)
-        read(memory, ring_at + ((at + base + 1 - AHEAD) & mask), late_at + ((at + base) & mask), base - i, taps, kept, heard, i)  # fmt: skip
+        read(memory, ring_at + ((at + base + 1 - AHEAD) & mask), late_at + ((at + base) & mask), base - i, taps, kept, arrived, i)  # fmt: skip
         if count == LANES and i + LANES <= n and newest >= i - LANES and emitted[i + LANES - 1] != 0.0:
             newest = i + LANES - 1
             i, m = i + LANES, base + LANES - 1
@@ -280,7 +280,7 @@ def _listen(
         i, m = i + count, base + count - 1
         if not awake:
             for k in range(i, i + LANES):
-                heard[k] = 0.0
+                arrived[k] = 0.0
             i += 1
     line.awake, line.cursor, line.newest = 1 if awake else 0, at + m, at + newest
     return arrives
@@ -330,7 +330,7 @@ def hear(at, step, n, first, source, pushed, begin_m, end_m, teleported, x, micr
     for c in range(channels):
         for i in range(n):
             out[c, out_at + i] = 0.0
-    emitted, delay, heard = work[:_SPAN], work[_SPAN : 2 * _SPAN], work[2 * _SPAN : 3 * _SPAN]
+    emitted, delay, arrived = work[:_SPAN], work[_SPAN : 2 * _SPAN], work[2 * _SPAN : 3 * _SPAN]
     geometry, tail, kept = work[3 * _SPAN : 3 * _SPAN + 8], work[3 * _SPAN + 8 : WORK - KEPT], work[WORK - KEPT : WORK]
     kept[TAPS * LANES] = np.nan
     geometry[6] = samples_per_m
@@ -360,8 +360,8 @@ def hear(at, step, n, first, source, pushed, begin_m, end_m, teleported, x, micr
                     count = count if count < BLOCK else BLOCK
                     count = count if count < n - lo else n - lo
                     steep = _emit(b, first + lo, count, source, pushed, x, fade, geometry, tail, emitted, delay)
-                    if _listen(line, at + lo, count, emitted, delay, heard, memory, ring_at, mask, taps, kept, steep):
-                        add(heard, out, c * out.shape[1] + out_at + lo, count)
+                    if _listen(line, at + lo, count, emitted, delay, arrived, memory, ring_at, mask, taps, kept, steep):
+                        add(arrived, out, c * out.shape[1] + out_at + lo, count)
                     lo += count
             p = place.next
     for c in range(channels):
