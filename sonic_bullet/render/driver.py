@@ -230,7 +230,7 @@ def finish(
     here, there, at = number % SPAN, (number + 1) % SPAN, step.sample - start
     status = hear(
         step.sample, number, step.count, np.int64(0), source[0], pushed, window_position[here], window_position[there],
-        window_teleported[there], x, microphone_m, samples_per_m, sources, places, lines, memory, taps, np.zeros(WORK), heard, at,
+        window_teleported[there], x, microphone_m, samples_per_m, sources, places, lines, memory, taps, np.zeros(WORK), pressure, at,
     )  # fmt: skip
     if status != DONE:
         return status

@@ -1,7 +1,7 @@
 """What a moving point emits and what is read off its history between the samples, eight samples at a time.
 
     emitted at sample m:   a[m] = (s[m] + n̂·j[m])/r[m],  arriving at m + D[m], D = r sr/c
-    arrived at sample n:     a(u), where u + D(u) = n, D linear between samples: m + D[m] ≤ n < m + 1 + D[m + 1],
+    heard at sample n:     a(u), where u + D(u) = n, D linear between samples: m + D[m] ≤ n < m + 1 + D[m + 1],
         u = m + (n - m - D[m])/(1 + D[m+1] - D[m])                          (retarded time: Doppler shift is exact)
     a(u) = Σ_k a[k] h(u - k),  h: 16 taps of a Kaiser-windowed sinc
         [Laakso et al. 1996, IEEE SPM 13(1), sec. 3.2]
