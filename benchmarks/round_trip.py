@@ -30,12 +30,13 @@ from sonic_bullet.estimator.lines.line_values import Lines
 from sonic_bullet.files import write_audio
 from sonic_bullet.files.cases import Case, CaseObject, CaseRecording
 from sonic_bullet.files.contact_log import ContactLog
+from sonic_bullet.geometry import closest_point
 from sonic_bullet.presets import load_material, material_of
 from sonic_bullet.records import Air, Array, Body, Material, Microphone, ModalModel, Shape, Vibrometer
 from sonic_bullet.records.contacts import Contacts, Step
 from sonic_bullet.records.errors import SonicBulletError
 from sonic_bullet.render import render_log
-from sonic_bullet.render.resonator import build_resonator, touch_one, uplift
+from sonic_bullet.render.resonator import build_resonator
 
 SR = 48_000
 STEP_S = 1 / 240
@@ -231,8 +232,9 @@ def played(
     resonator = build_resonator(body_of(model, material), eye, 4 * SR, Air())
     if at is None:
         return resonator.decay_per_s, np.ones(resonator.mode_count)
-    face, barycentric, _ = touch_one(resonator, at[0][None], at[1][None])
-    return resonator.decay_per_s, np.abs(uplift(resonator, face, barycentric, -at[1][None]) * resonator.weight[-1])
+    face, barycentric, _ = closest_point(model.vertex_m, model.face, at[0][None], at[1][None])
+    push = np.einsum("c,cxm,x->m", barycentric[0], resonator.shape[model.face[face[0]]].astype(float), -at[1])
+    return resonator.decay_per_s, np.abs(push * resonator.weight[-1])
 
 
 def off(a: Array, b: Array, to_hz: Array) -> float:

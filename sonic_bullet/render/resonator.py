@@ -1,7 +1,6 @@
-"""A body as the synthesizer plays it: its audible modes, their weights at each sensor, and where on its surface a
-contact lies.
+"""A body as the synthesizer plays it: its audible modes and their weights at each sensor.
 
-    Body (records) + sensors + rate + air -> Resonator;  contact points -> Touch -> Uᵀf (participation)
+    Body (records) + sensors + rate + air -> Resonator
 
 A rigid body that is pushed sounds too: acceleration noise. A sphere of radius a whose velocity jumps by U is heard as p
 = ρ₀c U (a/r) cosθ e^{-wt}(cos wt - sin wt), w = c/a [Kirchhoff 1876; Koss, Alfredson 1973, eq. 9]. That is the impulse
@@ -19,7 +18,6 @@ from functools import lru_cache
 import numpy as np
 
 from sonic_bullet.geometry.nearest_point import SurfaceIndex, nearest, surface_index
-from sonic_bullet.machine.compiled import njit
 from sonic_bullet.radiation.far_field import jerk_coefficient
 from sonic_bullet.radiation.radiated import radiation_of
 from sonic_bullet.records import Air, Array, Body, Microphone, ModalModel, ModalSum, Sensor, Vibrometer
@@ -46,7 +44,6 @@ class Resonator:
     weight: Array
     shape: Array
     index: SurfaceIndex | None
-    normal: Array
     size_m: float
     radius_m: float
     translation: Translation | None
@@ -58,15 +55,6 @@ class Resonator:
     @property
     def mode_count(self) -> int:
         return len(self.omega_rad_s)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Touch:
-    """Contacts on one body's surface: face (k,), barycentric (k, 3) and the surface's curvature there (k,) in 1/m."""
-
-    face: Array
-    barycentric: Array
-    curvature_per_m: Array
 
 
 def weight_sets(sensors: tuple[Sensor, ...]) -> tuple[Sensor, ...]:
@@ -92,7 +80,6 @@ def build_resonator(body: Body, sensors: tuple[Sensor, ...], sr: int, air: Air) 
             np.zeros((1 + len(readers), 0), complex),
             np.zeros((0, 3, 0), np.float32),
             None,
-            np.zeros((0, 3)),
             _size(body),
             0.0,
             None,
@@ -118,10 +105,8 @@ def build_resonator(body: Body, sensors: tuple[Sensor, ...], sr: int, air: Air) 
             and index is not None
         ):
             face, barycentric, _ = nearest(index, sensor.point_m[None], None)
-            weight[row] = participation(shape, model.face, face, barycentric, sensor.direction[None])
-    corner = model.vertex_m[model.face]
-    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]) if len(corner) else np.zeros((0, 3))
-    normal = normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+            corners = shape[model.face[face[0]]].astype(float)
+            weight[row] = np.einsum("c,cxm,x->m", barycentric[0], corners, sensor.direction)
     radius = float(np.linalg.norm(model.vertex_m, axis=1).max(initial=0.0))
     dropped = model.dropped + int(np.sum(~keep))
     translation = _translation(body, sr, air)
@@ -136,7 +121,6 @@ def build_resonator(body: Body, sensors: tuple[Sensor, ...], sr: int, air: Air) 
         weight,
         shape,
         index,
-        normal,
         _size(body),
         radius,
         translation,
@@ -164,52 +148,3 @@ def _translation(body: Body, sr: int, air: Air) -> Translation | None:
 
 def _size(body: Body) -> float:
     return float(max(body.volume_m3, 1e-9) ** (1 / 3))
-
-
-def touch_one(resonator: Resonator, point_m: Array, outward: Array) -> tuple[Array, Array, Array]:
-    """Face (k,), barycentric (k, 3) and curvature (k,) where contacts (k, 3) in the body frame, outward normals (k, 3),
-    lie on the true surface.
-
-    Where the contact's normal leans more than 20° from the face's, an edge or corner is touched: its radius is taken as
-    0.5 % of the body's size, at least 0.2 mm (a broken edge, as made things have).
-    """
-    count = len(point_m)
-    body = resonator.body
-    everywhere = body.curvature_per_m if np.isfinite(body.curvature_per_m) else 0.0
-    if resonator.index is None or body.model is None:
-        return np.zeros(count, np.int64), np.zeros((count, 3)), np.full(count, everywhere)
-    face, barycentric, _ = nearest(resonator.index, point_m, outward)
-    if np.isfinite(body.curvature_per_m):
-        return face, barycentric, np.full(count, everywhere)
-    edge = 1.0 / max(EDGE_RADIUS_SHARE * resonator.size_m, EDGE_RADIUS_LEAST_M)
-    leaning = np.einsum("ki,ki->k", resonator.normal[face], outward) < CREASE_COS
-    return face, barycentric, np.where(leaning, edge, body.model.curvature_per_m[face])
-
-
-def uplift(resonator: Resonator, face: Array, barycentric: Array, force: Array) -> Array:
-    """Uᵀf (m,): forces (k, 3) in the body frame at contacts, onto the body's audible modes, summed."""
-    if resonator.body.model is None or resonator.mode_count == 0:
-        return np.zeros(resonator.mode_count)
-    return np.asarray(
-        participation(resonator.shape, resonator.body.model.face, face, barycentric, np.ascontiguousarray(force))
-    )
-
-
-@njit(nogil=True)
-def participation(
-    shape: Array, face: Array, at_face: Array, barycentric: Array, force: Array
-) -> Array:  # pragma: no cover - compiled
-    """Σ over contacts of the shapes, linear in the triangle, times the force: (v, 3, m), (f, 3), (k,), (k, 3), (k, 3)
-    -> (m,).
-    """
-    modes = shape.shape[2]
-    total = np.zeros(modes)
-    for k in range(len(at_face)):
-        for corner in range(3):
-            vertex = face[at_face[k], corner]
-            for axis in range(3):
-                factor = barycentric[k, corner] * force[k, axis]
-                if factor != 0.0:
-                    for m in range(modes):
-                        total[m] += factor * shape[vertex, axis, m]
-    return total

@@ -17,7 +17,7 @@ class ForcePulse:
     flat: half-sine, not Hertz'.
 
     impulse_n_s (3,): world, on low. modes_low, modes_high (m,): Uᵀj of the whole impulse in N·s/√kg.
-    share: of all these, what the pulse hands over (`compliant_share`).
+    share: of all these, what the pulse hands over (synth.pulse.compliance).
     """
 
     low: int

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from sonic_bullet.geometry import closest_point
 from sonic_bullet.machine.compiled import njit
@@ -127,12 +128,10 @@ def test_effective_mass_of_a_turned_box() -> None:
     rng = np.random.default_rng(2)
     skew = rng.normal(size=(3, 3))
     bodies["inertia_kg_m2"][0] += 0.2 * body.inertia_kg_m2.max() * (skew @ skew.T)
-    from sonic_bullet.render.rotation import matrix
-
     for _ in range(20):
         q, arm, normal = rng.normal(size=(2, 4)), rng.normal(size=3), rng.normal(size=3)
         normal /= np.linalg.norm(normal)
-        turn = matrix(q[0])
+        turn = Rotation.from_quat(q[0]).as_matrix()
         moment = np.cross(arm, normal)
         inertia = turn @ bodies["inertia_kg_m2"][0] @ turn.T
         expected = 1 / (1 / body.mass_kg + moment @ np.linalg.solve(inertia, moment))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -9,13 +10,15 @@ import pytest
 
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.radiation.far_field import jerk_coefficient, radiation
-from sonic_bullet.records import Air, Microphone, ModalSum, Vibrometer
+from sonic_bullet.records import Air, Array, Microphone, ModalSum, Vibrometer
 from sonic_bullet.records.contacts import Contacts, Step
-from sonic_bullet.render import render_log, synthesizer
-from sonic_bullet.render.impacts import ForcePulse, find_pulses
+from sonic_bullet.render import render_log
 from sonic_bullet.render.resonator import build_resonator
 from sonic_bullet.synth import bank
+from sonic_bullet.synth.pulse import pulse_spectrum
 from tests.made.models import STEEL, ball_body, box_body, row, step, wall_body
+from tests.made.pulses import cumulated_force, jerk_of
+from tests.made.stages import Stages
 
 SR = 48_000
 EDGES_M = (0.2, 0.1, 0.01)
@@ -77,8 +80,6 @@ def test_the_level_is_the_radiation_law() -> None:
     (signal,) = struck_box((Microphone([0, 0, 2.0]),), steps=60)
     weight, extra = radiation(body.model, Air())
     resonator = build_resonator(body, (Microphone([0, 0, 2.0]),), SR, Air())
-    from sonic_bullet.synth.pulse import pulse_spectrum
-
     pulse = only_pulse(body, row(0, 1, (0, 0, -0.01), normal=(0, 0, -1), point_a=(0, 0, 0.005)))
     spectrum = pulse_spectrum(np.array([1500.0 * pulse.length_s]), flat=pulse.flat)[0]
     start = 3000
@@ -94,24 +95,34 @@ def test_the_level_is_the_radiation_law() -> None:
     assert extra[0] > 0
 
 
-def only_pulse(body: Any, contacts: Contacts) -> ForcePulse:
-    """The blow that a lone strike is, of body 0 against a wall."""
-    found: list[ForcePulse] = []
-    with pytest.MonkeyPatch.context() as patch:
+@dataclass(frozen=True)
+class Pulse:
+    """One strike; modes_low (m,): Uᵀj on body 0."""
 
-        def listening(*args: Any) -> Any:
-            impacts = find_pulses(*args)
-            found.extend(impacts)
-            return impacts
+    start_s: float
+    length_s: float
+    flat: bool
+    share: float
+    impulse_n_s: Array
+    modes_low: Array
 
-        patch.setattr(synthesizer, "find_pulses", listening)
-        rendered(
-            (body, wall_body()),
-            one_strike((body, wall_body()), contacts, [(0, 0, 0), (0, 0, 0.01)], at=0, steps=5),
-            (ModalSum(),),
-        )
-    (pulse,) = found
-    return pulse
+
+def only_pulse(body: Any, contacts: Contacts) -> Pulse:
+    """The pulse that a lone strike is, of body 0 against a wall."""
+    stages, found = Stages((body, wall_body())), []
+    for one in one_strike((body, wall_body()), contacts, [(0, 0, 0), (0, 0, 0.01)], at=4, steps=8):
+        found += list(zip(*stages.take(one), strict=True))
+    ((pulse, push),) = found
+    start_s = float(pulse["start_s"])
+    modes = stages.table.bodies["modes"][0]
+    return Pulse(
+        start_s,
+        float(pulse["length_s"]),
+        bool(pulse["flat"]),
+        float(pulse["share"]),
+        pulse["impulse_n_s"],
+        push[0, :modes],
+    )
 
 
 def test_the_plain_sum_is_the_seeds_sum() -> None:
@@ -121,8 +132,6 @@ def test_the_plain_sum_is_the_seeds_sum() -> None:
     (signal,) = struck_box((ModalSum(2.0),), freq=(900.0, 2100.0), where=(0.03, 0.01, 0.005))
     pulse = only_pulse(body, contacts)
     resonator = build_resonator(body, (), SR, Air())
-    from sonic_bullet.synth.pulse import pulse_spectrum
-
     time = np.arange(signal.size) / SR - 2 / 240 - pulse.start_s - pulse.length_s / 2
     expected = np.zeros(signal.size)
     for omega, decay, gain in zip(resonator.omega_rad_s, resonator.decay_per_s, pulse.modes_low, strict=True):
@@ -197,7 +206,6 @@ def test_a_slow_compact_click_is_the_jerk_law() -> None:
     """p = K cosθ · da/dt(t - r/c) / r [Chadwick, Zheng, James 2012], where the blow is long against a/c: a soft 4 mm
     ball.
     """
-    from sonic_bullet.synth.pulse import add_jerk
     from tests.made.models import Material
 
     rubber = Material.isotropic(
@@ -209,18 +217,9 @@ def test_a_slow_compact_click_is_the_jerk_law() -> None:
     assert pulse.length_s * C / radius > 30
     (sound,) = clicked((0,), radius=radius, material=rubber, impulse=impulse)
     rate = 16
-    jerk = np.zeros((1, 3, sound.size * rate))
-    add_jerk(
-        jerk,
-        np.array([0]),
-        np.array([2 / 240 + pulse.start_s]),
-        np.array([pulse.length_s]),
-        np.array([pulse.flat]),
-        pulse.impulse_n_s[None],
-        SR * rate,
-        0,
-    )
-    expected = jerk_coefficient(ball.volume_m3, Air()) * jerk[0, 2] / ball.mass_kg
+    begin, length = (2 / 240 + pulse.start_s) * SR * rate, pulse.length_s * SR * rate
+    jerk = impulse * (SR * rate) ** 2 * jerk_of(begin, length, pulse.flat, sound.size * rate)
+    expected = jerk_coefficient(ball.volume_m3, Air()) * jerk / ball.mass_kg
     assert pulse.impulse_n_s[2] == pytest.approx(impulse)
     assert np.abs(sound).max() == pytest.approx(np.abs(expected).max(), rel=0.02)
     late = np.argmin(sound) / SR - np.argmin(expected) / (SR * rate)
@@ -244,8 +243,6 @@ def test_a_fast_click_is_kirchhoffs_sphere() -> None:
     begin = 2 / 240 + pulse.start_s + 2.0 / C  # sound leaves from the centre (Kirchhoff's t counts from there plus a/c)
     time = np.arange(sound.size) / SR - begin
     sub = np.linspace(0, 1, 400, endpoint=False) + 1 / 800
-    from sonic_bullet.synth.pulse import cumulated_force
-
     share = np.diff(cumulated_force(np.linspace(0, 1, 401), flat=pulse.flat))
     expected = np.zeros(sound.size)
     for part, weight in zip(sub, share, strict=True):
@@ -285,18 +282,18 @@ def test_a_force_that_swings_moves_a_rigid_body_as_the_sphere_law_says(radius: f
     """Steady force: p = 2K w² s/((s+w)² + w²) · F/m at 1 m, w = c/a: the transfer function of Kirchhoff's sphere."""
     body = ball_body(radius)
     resonator = build_resonator(body, (), SR, Air())
-    assert resonator.rigid is not None
+    assert resonator.translation is not None
     instrument, ringing = bank.empty_bank(SR, 1)
     none = np.zeros(0)
     instrument, ringing = bank.append(
-        instrument, ringing, [bank.ModeSet(none, none, np.zeros((1, 0), complex), translation=resonator.rigid)]
+        instrument, ringing, [bank.ModeSet(none, none, np.zeros((1, 0), complex), translation=resonator.translation)]
     )
     n = 9600
     along, pushed = np.array([1.0, 0.0, 0.0]), np.zeros((1, 3, n))
     force = np.sin(2 * np.pi * freq * np.arange(n) / SR)
     bank.advance(instrument, ringing, n, (), [bank.Force(0, force, none, none, along, along)], np.zeros(n), pushed)
     out = pushed[0, 0]
-    s, w = 2j * np.pi * freq, resonator.rigid.omega_rad_s
+    s, w = 2j * np.pi * freq, resonator.translation.omega_rad_s
     law = abs(2 * jerk_coefficient(body.volume_m3, Air()) * w**2 * s / ((s + w) ** 2 + w**2)) / body.mass_kg
     error_db = 20 * np.log10(np.abs(out[4800:]).max() / law)
     print(f"{radius} m, {freq} Hz: {error_db:.2f} dB")

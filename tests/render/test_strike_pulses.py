@@ -13,7 +13,7 @@ from sonic_bullet.records import Array
 from sonic_bullet.records.contacts import Contacts
 from sonic_bullet.render import strike_pulses
 from sonic_bullet.render.strike_pulses import STRIKE
-from sonic_bullet.synth.pulse import compliant_share
+from sonic_bullet.synth.pulse import spectrum_table
 from sonic_bullet.synth.strikes import LOOKAHEAD, NOW, SPAN
 from tests.made.models import ball_body, box_body, row, step, wall_body
 from tests.made.stages import Stages, body_table
@@ -292,8 +292,21 @@ def test_a_pulse_is_its_rows_sum() -> None:
         expected += scale * np.einsum("c,cxm,x->m", weight, shape, r["push_n_s"][0])
     assert push[0] == pytest.approx(expected, rel=1e-9)
     freq = table.frequency_hz[table.bodies["frequency_at"][0] :][:12]
-    share = compliant_share(mass, scale * raw, [(freq, push[0])], float(pulse["length_s"]), bool(pulse["flat"]))
-    assert pulse["share"] == pytest.approx(share, rel=1e-12)
+    spectrum = np.interp(freq * pulse["length_s"], np.arange(321) / 40, spectrum_table()[pulse["flat"]])
+    given = np.sum((push[0] * spectrum) ** 2)
+    assert pulse["share"] == pytest.approx(1 / (1 + mass * given / (scale * raw) ** 2), rel=1e-12)
+
+
+def test_an_impulse_too_small_to_square_shares_nothing() -> None:
+    """As only a forged log has it."""
+    stages = Stages((box_body((0.1, 0.1, 0.1), (900.0,), mass_kg=1e-180), wall_body(body_id=1)))
+    pulses = []
+    for number in range(8):
+        rows = row(0, 1, (0, 0, 1e-170), point_a=(0, 0, -0.05), approach=1.0) if number == 4 else None
+        pulses += list(stages.take(step([(0, 0, 0), (0, 0, 0)], rows))[0])
+    (pulse,) = pulses
+    assert pulse["impulse_n_s"][2] == pytest.approx(2e-180, rel=1e-9)
+    assert pulse["share"] == 1.0
 
 
 def test_what_nobody_hears_is_passed_over() -> None:

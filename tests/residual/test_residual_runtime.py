@@ -19,7 +19,7 @@ from sonic_bullet.records import Air, Material, Microphone, ModalSum
 from sonic_bullet.records.contacts import Contacts
 from sonic_bullet.render import Synthesizer, render_log
 from sonic_bullet.render.residual_voice import build_residual_voice, struck_power
-from sonic_bullet.render.resonator import build_resonator, uplift
+from sonic_bullet.render.resonator import build_resonator
 from sonic_bullet.residual.grains import faded, filtered, make_voice, mixed_number, placed, response, varied
 from sonic_bullet.residual.player import SECTION, Grain, Rubbed, add_grains, rubbed, section_grain, section_window
 from tests.made.models import STEEL, box_body, row, step, wall_body
@@ -124,11 +124,13 @@ def test_level_follows_the_impulse() -> None:
 
 def test_the_place_decides_as_it_does_for_the_modes() -> None:
     """A body's a² at two places differ by the modes' shapes; a grain of a place is that response, in steps of 2 dB."""
-    resonator = build_resonator(box_body(EDGES_M, FREQ, NOISY), (ModalSum(),), SR, Air())
+    body = box_body(EDGES_M, FREQ, NOISY)
+    resonator = build_resonator(body, (ModalSum(),), SR, Air())
     beside = build_residual_voice(resonator, SR, Air())
-    assert beside is not None
+    assert beside is not None and body.model is not None
     for face in (0, 5):
-        push = uplift(resonator, np.array([face]), np.array([[0.2, 0.3, 0.5]]), np.array([[0.0, 0.0, 0.01]]))
+        corners = resonator.shape[body.model.face[face]].astype(float)
+        push = np.einsum("c,cxm,x->m", [0.2, 0.3, 0.5], corners, [0.0, 0.0, 0.01])
         power = struck_power(beside, resonator.weight[1], push)
         assert power == pytest.approx(np.abs(resonator.weight[1] * push) ** 2, rel=1e-9)
         pair, level = placed(beside.voice, power, 20e-6, False, lambda f_tau, _: np.ones(len(f_tau)))

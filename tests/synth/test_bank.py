@@ -21,7 +21,7 @@ from sonic_bullet.synth.bank import (
     empty_bank,
     silence,
 )
-from sonic_bullet.synth.pulse import pulse_cells, pulse_nodes
+from tests.made.pulses import pulse_cells, pulse_nodes
 
 SR = 48_000
 

@@ -1,6 +1,6 @@
 """Strikes under way: a pool of rows, each a force pulse on one body until the last of it has acted.
 
-    modes: nodes u_j = u_0 + jδ, impulses J_j (pulse_nodes):   at each sample n the driven state gains
+    modes: nodes u_j = u_0 + jδ, impulses J_j = F(u_j)/Σ F:   at each sample n the driven state gains
         r_n Σ J_j D^(last - j)   over the nodes in (n-1, n]
         D = e^{sδ},   r_n = g (1 + i d/ω) e^{s(n - u_last)},   r_{n+1} = r_n e^{s(1 - kδ)},
             k = nodes in (n, n+1] = ⌊1/δ⌋ or one more
@@ -127,7 +127,7 @@ def _enter_nodes(
 
 @njit(nogil=True, error_model="numpy", _nrt=False)
 def _enter_cells(slot, b, sr, bodies, strikes):  # pragma: no cover - compiled
-    """The pulse as cells of the sample grid (pulse_cells), and what one of them leaves:
+    """The pulse as cells of the sample grid, which no sample cuts through, and what one of them leaves:
 
     (1 + i d/ω) (e^{s/cells} - 1)/(s/cells): an impulse that acts evenly over the cell, at the cell's end.
     """

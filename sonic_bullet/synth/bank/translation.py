@@ -1,7 +1,7 @@
 """The three translations of a rigid body: one pole, three axes, forces and cells of pulses in, far pressure out.
 
     z <- z p + (1 + i d/ω) (e^s - 1)/s · F period + Σ strikes,    pushed = weight Re z
-    force: acts evenly over the sample before its instant; strike: even over the cells of the sample grid (pulse_cells),
+    force: acts evenly over the sample before its instant; strike: even over the cells of the sample grid,
         at each sample   j (1 + i d/ω) (D - 1)/(s/c) Σ_i ΔQ_i D^i    over the c cells before it,  D = e^{s/c}
         (its own impulses, evenly over the cells, as what such a mode hears of a slow force is its slope)
     all forces on a body act as one:   F = Σ ± f (d0 + (d1 - d0) x)
