@@ -135,10 +135,11 @@ class StepScratch:
     source: Array = field(default_factory=lambda: np.zeros((1, 0, 0)))
     pushed: Array = field(default_factory=lambda: np.zeros((0, 3, 0)))
     sounds: Array = field(default_factory=lambda: np.zeros((0, 2), np.int64))
-    samples: int = 0
+    samples: int = -1  # that there is room for
 
     def fit(self, drives: int, columns: int, samples: int, shape: tuple[int, int]) -> None:
         """Enlarge what is too small for so many drives and twice as many pulses. shape: weight sets and bodies."""
+        samples = self.samples = max(self.samples, samples)  # steps that are no whole number of them differ by one
         if len(self.slot) < drives or self.push.shape[2] != columns:
             drives = max(drives, 2 * len(self.slot))
             self.pulse, self.push = np.zeros(2 * drives, PULSE), np.zeros((2 * drives, 2, columns))
@@ -147,7 +148,6 @@ class StepScratch:
             self.body, self.slot = np.zeros((drives, 2), np.int64), np.zeros(drives, np.int64)
         if len(self.force) < len(self.slot) * samples:
             self.force = np.zeros(len(self.slot) * samples)
-        self.samples = max(self.samples, samples)
         if self.source.shape[:2] != shape or self.source.shape[2] < samples:
             self.source, self.pushed = np.zeros((*shape, samples)), np.zeros((shape[1], 3, samples))
             self.sounds = np.zeros((shape[1], 2), np.int64)

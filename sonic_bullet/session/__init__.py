@@ -67,8 +67,16 @@ def _opened(client: Any) -> World:
 
 def _wanted(world: World, who: Any, how: Any) -> WantedBody:
     """One entry of a cast."""
-    body, link = who if isinstance(who, tuple) else (who, -1)
-    return wanted_body(world, body, link, **(how if isinstance(how, Mapping) else {"material": how}))
+    body, link = who if isinstance(who, tuple) and len(who) == 2 else (who, -1)
+    given = how if isinstance(how, Mapping) else {"material": how}
+    check_options(map(str, given), [name for name in _keywords(Listener.add) if name != "progress"], "add_all")
+    return wanted_body(world, body, link, **{"material": None, **given})
+
+
+def _keywords(call: Callable[..., Any]) -> list[str]:
+    """Names of the arguments that are given by name alone."""
+    parameters = inspect.signature(call).parameters
+    return [name for name, one in parameters.items() if one.kind is inspect.Parameter.KEYWORD_ONLY]
 
 
 class Listener:
@@ -124,7 +132,7 @@ class Listener:
             "material": material, "mesh": mesh, "model": model, "roughness_m": roughness_m, "fixed": fixed,
             "thickness_m": thickness_m, "to_hz": to_hz, "count": count,
         }  # fmt: skip
-        return self.add_all({(body, link): how}, progress=progress)[0]
+        return self._added([wanted_body(self.world, body, link, **how)], progress)[0]
 
     def add_all(
         self, cast: Mapping[Any, Any], *, progress: Callable[[str], None] | None = None
@@ -134,8 +142,14 @@ class Listener:
         cast: from a body, (body, link) or (body, "all") to its material, or to keywords of `add`. What was never
         computed before is computed side by side, on two cores. progress, warnings, errors: as `add` has them.
         """
+        as_kind(cast, Mapping, "cast", "give a dict from bodies to materials", error=SceneError)
+        return self._added([_wanted(self.world, who, how) for who, how in cast.items()], progress)
+
+    def _added(
+        self, wanted: Sequence[WantedBody], progress: Callable[[str], None] | None
+    ) -> list[tuple[ModalModel, ...]]:
+        """The models of bodies that are listened to from now on."""
         as_call(progress, "progress")
-        wanted = [_wanted(self.world, who, how) for who, how in cast.items()]
         known = (body.model for body in self.world.bodies if body.model is not None)
         with status("sonic_bullet") if progress is None else nullcontext(progress) as say:
             models = solved_bodies(wanted, known, self.air if self.sensors else None, say)
@@ -222,12 +236,7 @@ class Listener:
 
         Raises FileError, AudioError.
         """
-        levels = [
-            name
-            for name, one in inspect.signature(write_audio).parameters.items()
-            if one.kind is inspect.Parameter.KEYWORD_ONLY
-        ]
-        check_options(options, levels, "write", error=AudioError)
+        check_options(options, _keywords(write_audio), "write", error=AudioError)
         place = as_path(path, "path", "name a file, such as out.wav")
         if not self.sensors:
             raise AudioError(

@@ -182,16 +182,20 @@ def _prepare(wanted: Sequence[WantedBody], air: Air | None, say: Say) -> None:
 
 
 def _missing(wanted: Sequence[WantedBody]) -> list[tuple[str, tuple[Shape, ...], WantedBody]]:
-    """Links whose modes are to be computed, each once, those of many triangles first: they take longest."""
+    """Links whose modes are to be computed, each once, those of many triangles first: they take longest. None where
+    one of them cannot be filled: who asks for it in order says so before anything is solved.
+    """
     from sonic_bullet import modal
 
     found: dict[str, tuple[str, tuple[Shape, ...], WantedBody]] = {}
     size: dict[str, int] = {}
-    for one in wanted:
-        for name, shapes in one.parts if one.model is None else ():
-            with suppress(SonicBulletError):
+    try:
+        for one in wanted:
+            for name, shapes in one.parts if one.model is None else ():
                 key = modal.missing_name(shapes, one.material, one.options)
                 if key is not None and key not in found:
                     size[key] = modal.check_fillable(shapes, one.options.thickness_m)
                     found[key] = (name, shapes, one)
+    except SonicBulletError:
+        return []
     return [found[key] for key in sorted(found, key=lambda key: -size[key])]

@@ -124,6 +124,11 @@ def adding(client: Any, _: Path) -> Made:
     return listener.add, {"body": body, "link": -1, "material": STEEL, "model": plate_model(), **rest}
 
 
+def adding_all(client: Any, _: Path) -> Made:
+    listener, body = listener_of(client)
+    return listener.add_all, {"cast": {body: {"material": STEEL, "model": plate_model()}}, "progress": None}
+
+
 def writing(client: Any, folder: Path) -> Made:
     listener, _ = listener_of(client)
     client.stepSimulation()
@@ -182,6 +187,7 @@ DOORS: dict[str, Callable[[Any, Path], Made]] = {
         {"client": client, "sr": 48_000, "sensors": (), "seed": 0, "air": sb.Air()},
     ),
     "Listener.add": adding,
+    "Listener.add_all": adding_all,
     "Listener.write": writing,
     "Material": lambda *_: (sb.Material, MATERIAL),
     "Material.isotropic": lambda *_: (
@@ -283,6 +289,7 @@ BAD: dict[str, dict[str, list[Any]]] = {
         "count": [*OPTIONAL, 0, -1, 2.5, 10**9],
         "progress": CALL,
     },
+    "Listener.add_all": {"cast": [None, 5, "steel", b"steel", object(), ["steel"], [(0, "steel")]], "progress": CALL},
     "Listener.write": {
         "path": PATH,
         "peak_dbfs": [*OPTIONAL, 3, 0.1, -1e9],
@@ -546,6 +553,25 @@ def test_options_of_write(client: Any, tmp_path: Path, options: dict[str, Any], 
 def test_a_misspelt_constant_names_the_near_one() -> None:
     with pytest.raises(RecordError, match="roughness_m"):
         sb.Material.isotropic("m", youngs_pa=1e9, poisson=0.3, density_kg_m3=1e3, roughnes_m=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("who", "how", "kind", "words"),
+    [
+        (0, {"materal": STEEL}, RecordError, "material"),
+        (0, {5: STEEL}, RecordError, "5"),
+        (0, {"roughness_m": 1e-6}, MaterialError, "material"),
+        (0, None, MaterialError, "material"),
+        ((0, -1, 2), STEEL, SceneError, "body"),
+        (("box", "all"), STEEL, SceneError, "body"),
+        (b"box", STEEL, SceneError, "body"),
+    ],
+)
+def test_what_a_cast_holds_is_looked_at(client: Any, who: Any, how: Any, kind: type[Exception], words: str) -> None:
+    listener, body = listener_of(client)
+    with pytest.raises(kind, match=words):
+        listener.add_all({body: {"material": STEEL, "model": plate_model()}, who: how})
+    assert not listener.world.bodies
 
 
 def test_numbers_of_every_type_are_taken(client: Any) -> None:

@@ -45,7 +45,7 @@ def boxes(client: Any, folder: Path, tip: str = ARM) -> int:
 
 class Solver:
     """In place of `modal.analyse`: the same plate for every body, slowly where asked, or the error that a body is meant
-    to end in.
+    to end in. Nothing is solved side by side beforehand, where not asked.
     """
 
     def __init__(self, fails_at_m: float = -1.0, pause_s: float = 0.0) -> None:
@@ -66,9 +66,11 @@ class Solver:
 
 @pytest.fixture
 def solver(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Solver]:
-    def put(**how: float) -> Solver:
+    def put(*, beforehand: bool = False, **how: float) -> Solver:
         made = Solver(**how)
         monkeypatch.setattr(modal, "analyse", made)
+        if not beforehand:
+            monkeypatch.setattr(modal, "missing_name", lambda *_: None)
         return made
 
     return put
@@ -117,7 +119,7 @@ def test_a_link_that_cannot_be_filled_fails_before_anything_is_solved(
     """
     (tmp_path / "sheet.obj").write_text(SHEET)
     body = boxes(client, tmp_path, tip=f'<mesh filename="{tmp_path}/sheet.obj"/>')
-    listener, made = sb.attach(client, microphone=()), solver()
+    listener, made = sb.attach(client, microphone=()), solver(beforehand=True)
     with pytest.raises(MeshError, match="crane/tip") as error:
         listener.add(body, link="all", material=STEEL)
     said = str(error.value)
@@ -126,8 +128,9 @@ def test_a_link_that_cannot_be_filled_fails_before_anything_is_solved(
     assert "thickness_m" in said
     assert not made.solved_m
     assert not listener.world.bodies
+    solver()
     listener.add(body, link="all", material=STEEL, thickness_m=0.002)  # the remedy that it names
-    assert len(listener.world.bodies) == len(made.solved_m) == 3
+    assert len(listener.world.bodies) == 3
 
 
 def test_a_link_whose_modes_fail_leaves_nothing_added(
@@ -156,6 +159,32 @@ def test_the_most_intricate_link_is_solved_first(client: Any, tmp_path: Path, so
     listener.add(body, link="all", material=STEEL)
     assert made.solved_m == [0, 0.2, 0.3]  # a mesh has no size
     assert [b.name for b in listener.world.bodies] == ["crane", "crane/arm", "crane/tip"]
+
+
+def test_what_the_cache_lacks_is_solved_beforehand_each_once(
+    client: Any, tmp_path: Path, solver: Callable[..., Solver], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The most intricate first; equal links once. What fails there fails again, by name, in the pass that adds."""
+    from sonic_bullet.session import wanted_bodies
+
+    body = boxes(client, tmp_path, tip=f'<mesh filename="{Path(__file__).parents[2] / "assets" / "bowl.obj"}"/>')
+    (tmp_path / "twins").mkdir()
+    twins, seen = robot(client, tmp_path / "twins", foot=ARM, arm=ARM), []
+    made, before = solver(beforehand=True, fails_at_m=0.2), []
+
+    def one_by_one(work: Callable[[Any], None], items: list[Any]) -> None:
+        for item in items:
+            work(item)
+        before.extend(made.solved_m)
+
+    monkeypatch.setattr(wanted_bodies, "parallel_map", one_by_one)
+    listener = sb.attach(client, microphone=())
+    with pytest.raises(ModalError, match="clamps"):
+        listener.add_all({(twins, "all"): STEEL, (body, "all"): STEEL}, progress=seen.append)
+    assert before == [0, 0.3]
+    names = [line.split(" (")[0] for line in seen if "two at a time" in line]
+    assert names == ["modes of crane/tip", "modes of crane", "modes of crane"]
+    assert not listener.world.bodies
 
 
 def test_an_absurd_mass_of_one_link_leaves_nothing_added(client: Any, tmp_path: Path) -> None:

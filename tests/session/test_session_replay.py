@@ -13,6 +13,7 @@ import pytest
 
 import sonic_bullet as sb
 from sonic_bullet.listener import direct_client, disconnect
+from sonic_bullet.records.contacts import ROW_FIELDS
 from tests.made.models import GLASS, WOOD, ball_body, box_model
 from tests.made.worlds import EDGES_M, ball, box, floor, plate_model, sounding_box
 
@@ -170,9 +171,9 @@ def test_a_log_turned_as_a_whole_sounds_the_same(log_and_sound: tuple[Path, np.n
             if len(step.quaternion_xyzw)
             else step.quaternion_xyzw,
             gravity_m_s2=turned(step.gravity_m_s2),
-            contacts=replace(
-                step.contacts,
-                **{name: turned(getattr(step.contacts, name)) for name in ("normal", "impulse_n_s", "slip_m_s")},
+            contacts=sb.Contacts(
+                **{name: getattr(step.contacts, name) for name in ROW_FIELDS}
+                | {name: turned(getattr(step.contacts, name)) for name in ("normal", "impulse_n_s", "slip_m_s")}
             ),
         )
         for step in log.steps
