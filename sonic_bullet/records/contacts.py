@@ -139,7 +139,7 @@ class Contacts:
             raise RecordError(f"contacts: row is {shown(row)}", "pass an array (k,) of dtype CONTACT")
         kept = not row.flags.writeable and row.base is None and row.flags.c_contiguous
         row = row if kept else np.array(row, CONTACT)
-        number = row.view(np.float64).reshape(len(row), -1)[:, 1:]
+        number = row.view(np.float64).reshape(len(row), CONTACT.itemsize // 8)[:, 1:]
         # False for NaN too
         if not (number.max(initial=0) <= LARGEST and number.min(initial=0) >= -LARGEST):
             return cls(*(row[name] for name in ROW_FIELDS))  # which names the field

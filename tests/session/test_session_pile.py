@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -12,9 +13,13 @@ import pytest
 import sonic_bullet as sb
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.listener import direct_client, disconnect
-from sonic_bullet.records import Microphone, ModalSum
-from sonic_bullet.render import Synthesizer, synthesizer
+from sonic_bullet.records import Body, Microphone, ModalSum
+from sonic_bullet.render import Synthesizer
+from sonic_bullet.render.synthesis_state import Setup, State, start, with_bodies
+from sonic_bullet.render.synthesizer import advance
+from sonic_bullet.synth.strikes import LOOKAHEAD
 from tests.made.models import GLASS, STEEL, WOOD, ball_body, box_model
+from tests.made.stages import Stages
 
 STRIKE_N_S = 1e-3
 DT = 1 / 240
@@ -64,11 +69,11 @@ def thrown_in(client: Any, listener: sb.Listener, number: int, rng: np.random.Ge
 
 @dataclass(frozen=True)
 class Pile:
-    """blows: (step, pair, impulse in N·s) of each, in which it began."""
+    """pulses: (step, pair, impulse in N·s) of each, in which it began."""
 
     log: ContactLog
     sound: np.ndarray
-    impacts: list[tuple[int, int, float]]
+    pulses: list[tuple[int, int, float]]
 
 
 @pytest.fixture(scope="module")
@@ -80,23 +85,21 @@ def pile() -> Any:
     rng = np.random.default_rng(4)
     for number in range(20):
         thrown_in(client, listener, number, rng)
-    begun: list[tuple[int, int, float]] = []
-    real = synthesizer.find_pulses
-
-    def listening(split: Any, rows: Any, step: Any, resonators: Any, placed: Any, earliest: float) -> Any:
-        impacts = real(split, rows, step, resonators, placed, earliest)
-        number = len(listener.contacts.steps) - 4 + (earliest < 0)
-        begun.extend(
-            (number, (impact.low << 16) | impact.high, float(np.linalg.norm(impact.impulse_n_s))) for impact in impacts
-        )
-        return impacts
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(synthesizer, "find_pulses", listening)
-        for _ in range(round(SECONDS / DT)):
-            client.stepSimulation()
-    yield Pile(listener.contacts, listener.sound(), begun)
+    for _ in range(round(SECONDS / DT)):
+        client.stepSimulation()
+    yield Pile(listener.contacts, listener.sound(), pulses(listener.contacts))
     disconnect(client)
+
+
+def pulses(log: ContactLog) -> list[tuple[int, int, float]]:
+    """(step, pair, impulse) of all that the run time makes of the log."""
+    stages, begun = Stages(log.bodies, pairs=300), []
+    for number, step in enumerate(log.steps):
+        for pulse in stages.take(step)[0]:
+            low, high = (int(body) for body in pulse["body"])
+            impulse = float(np.linalg.norm(pulse["impulse_n_s"]))
+            begun.append((number - LOOKAHEAD + int(pulse["ahead"]), (low << 16) | high, impulse))
+    return begun
 
 
 def impacts(log: ContactLog) -> list[tuple[int, int, float]]:
@@ -165,11 +168,11 @@ def test_a_settled_pile_is_silent(pile: Pile) -> None:
 
 
 def test_a_settled_pile_rings_out_with_nothing_but_decay(pile: Pile) -> None:
-    """Without a quench: from one second after the last strike no blow begins, and energy falls from each fifth of a
+    """Without a quench: from one second after the last strike no pulse begins, and energy falls from each fifth of a
     second to the next.
     """
     begin = last_strike_s(pile.log) + 1.0
-    assert not [impact for impact in pile.impacts if impact[0] >= begin / DT]
+    assert not [pulse for pulse in pile.pulses if pulse[0] >= begin / DT]
     tail = pile.sound[:, round(begin * SR) :]
     block = SR // 5
     energy = (tail[:, : tail.shape[1] // block * block].reshape(len(tail), -1, block) ** 2).sum(axis=2)
@@ -177,58 +180,61 @@ def test_a_settled_pile_rings_out_with_nothing_but_decay(pile: Pile) -> None:
     assert (energy[:, 1:] < energy[:, :-1]).all()
 
 
-def test_every_impact_is_a_blow(pile: Pile) -> None:
-    """Each impact of the log is a blow of the same pair within two steps, itself above 1 mN·s."""
+def test_every_impact_is_a_pulse(pile: Pile) -> None:
+    """Each impact of the log is a pulse of the same pair within two steps, itself above 1 mN·s."""
     wanted = impacts(pile.log)
     assert len(wanted) > 40
     missed, share = [], []
     for number, key, impulse in wanted:
-        mine = sum(j for at, pair, j in pile.impacts if pair == key and abs(at - number) <= 2)
+        mine = sum(j for at, pair, j in pile.pulses if pair == key and abs(at - number) <= 2)
         share.append(mine / impulse)
         if mine < STRIKE_N_S:
             missed.append((number, key >> 16, key & 0xFFFF, impulse, mine))
     print(
-        f"{len(wanted)} impacts, {len(pile.impacts)} blows, missed {missed}; share of the impulse: median "
+        f"{len(wanted)} impacts, {len(pile.pulses)} pulses, missed {missed}; share of the impulse: median "
         f"{np.median(share):.2f}, least {min(share):.2f}"
     )
     assert not missed
     assert np.median(share) == pytest.approx(1.0, abs=0.1)
 
 
-def played(
-    setup: synthesizer.Setup, state: synthesizer.State, log: ContactLog, numbers: range
-) -> tuple[np.ndarray, synthesizer.State]:
-    """Frames (channels, n) of the steps three before the ``numbers``, which are fed, and the state after them."""
+def played(setup: Setup, state: State, bodies: tuple[Body, ...], steps: Sequence[sb.Step]) -> np.ndarray:
+    """Frames (channels, n) of the steps three before those, which are fed; the state moves on."""
     frames = [np.zeros((len(setup.sensors), 0))]
-    for step in log.steps[numbers.start : numbers.stop]:
-        state = synthesizer.with_bodies(setup, state, log.bodies[len(state.resonators) : len(step.position_m)])
-        frame, state = synthesizer.take_step(setup, state, step)
-        frames += [frame] if frame is not None else []
-    return np.concatenate(frames, axis=1), state
+    for step in steps:
+        known = len(state.resonators)
+        if len(step.position_m) > known:
+            new = bodies[known : len(step.position_m)]
+            with_bodies(setup, state, new, step.position_m[known:], step.quaternion_xyzw[known:])
+        frames.append(advance(setup, state, [step]))
+    return np.concatenate(frames, axis=1)
 
 
-def test_every_impact_is_an_onset_in_the_sound(pile: Pile, monkeypatch: pytest.MonkeyPatch) -> None:
-    """At the microphone: without its blow the sound is the same to the bit until an impact, and another from then on.
+def parted(step: sb.Step, key: int) -> sb.Step:
+    """The step as if that pair did not touch."""
+    row = step.contacts.row
+    pair = (np.minimum(row["a"], row["b"]) << 16) | np.maximum(row["a"], row["b"])
+    return replace(step, contacts=sb.Contacts.of(row[pair != key]))
+
+
+def test_every_impact_is_an_onset_in_the_sound(pile: Pile) -> None:
+    """At the microphone: without the pair's contacts the sound is the same to the bit until an impact, and another from
+    then on.
 
     From then on means from one step before the impact's (where bodies overlap as a step starts, they met in the one
     before) to its end and 3 ms of travel. How far an impact stands out of what rings already is physics: printed, and
     half of them are the loudest thing in some band.
     """
-    log, real = pile.log, synthesizer.find_pulses
-    setup = synthesizer.Setup(log.sr, log.sensors, log.seed, log.air)
-    state, at = synthesizer.start(setup), 0
+    log = pile.log
+    setup = Setup(log.sr, log.sensors, log.seed, log.air)
+    state, at = start(setup), 0
     wanted = impacts(log)
     begins, above_db = [], []
     for number, key, _ in wanted:
-        _, state = played(setup, state, log, range(at, number))
+        played(setup, state, log.bodies, log.steps[at:number])
         at = number
-        with monkeypatch.context() as patch:
-            patch.setattr(
-                synthesizer,
-                "find_pulses",
-                lambda *a, key=key: tuple(b for b in real(*a) if (b.low << 16) | b.high != key),
-            )
-            without, _ = played(setup, synthesizer.copied(state), log, range(number, number + 7))
+        steps = [parted(step, key) for step in log.steps[number : number + 7]]
+        without = played(setup, state.copy(), log.bodies, steps)
         first = int(np.floor((number - 3) * SR * DT + 1e-9))
         both = np.stack([pile.sound[0, first : first + without.shape[1]], without[0, : pile.sound.shape[1] - first]])
         changed = np.flatnonzero(both[0] != both[1])
@@ -239,7 +245,7 @@ def test_every_impact_is_an_onset_in_the_sound(pile: Pile, monkeypatch: pytest.M
         above_db.append(20 * np.log10(np.max(impact / np.maximum(rest, 1e-30))))
     print(f"{len(wanted)} impacts begin {min(begins):.2f} … {max(begins):.2f} steps after their step's start")
     print(
-        f"the blow over the rest, in the band where it is most: median {np.median(above_db):.1f} dB, a tenth "
+        f"the impact over the rest, in the band where it is most: median {np.median(above_db):.1f} dB, a tenth "
         f"below {np.percentile(above_db, 10):.1f} dB"
     )
     assert len(wanted) > 40
