@@ -5,7 +5,7 @@
 
 numba's own reader believes what it finds, and unpickles it. Here a file is opened only where it is a regular one of
 this user, and read only where the digest behind it is right; anything else is a miss, and so is any error while it is
-loaded or kept.
+loaded or kept. Code is of the sources it was compiled from, and those are not one file: `source_stamp`.
 """
 
 from __future__ import annotations
@@ -13,9 +13,11 @@ from __future__ import annotations
 import hashlib
 import io
 import os
+import re
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +26,8 @@ from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataC
 from sonic_bullet.machine.partial_file import PartialFile
 
 DIGEST_BYTES = hashlib.sha256().digest_size
+IMPORT = re.compile(rb"^(?:from|import) +([\w.]+)(?: +import +(\([^)]*\)|[^\n]*))?", re.MULTILINE)
+WORD = re.compile(rb"\w+")
 OPEN_FLAGS = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
 
 
@@ -68,6 +72,34 @@ class KeptFiles(IndexDataCacheFile):  # type: ignore[misc]
             partial.close()
 
 
+@cache
+def source_stamp(source: Path) -> str:
+    """A digest of a module and of all of its own tree that it imports, and they import: what it calls, and the numbers
+    that it reads, stand in its machine code too.
+    """
+    digest, seen, todo = hashlib.sha256(), {source}, [source]
+    while todo:
+        content, others = _read(todo.pop())
+        digest.update(hashlib.sha256(content).digest())
+        todo += sorted(others - seen)
+        seen |= others
+    return digest.hexdigest()
+
+
+@cache
+def _read(source: Path) -> tuple[bytes, frozenset[Path]]:
+    """A module's text, and the files of those that its lines at the left margin import from the tree it stands in."""
+    root, content = source.parent, source.read_bytes()
+    while (root / "__init__.py").exists():
+        root = root.parent
+    found = set()
+    for name, names in IMPORT.findall(content):
+        place = root.joinpath(*name.decode().split("."))
+        ends = [place, *(place / one.decode() for one in WORD.findall(names))]
+        found |= {path for end in ends for path in (end.with_suffix(".py"), end / "__init__.py") if path.exists()}
+    return content, frozenset(found)
+
+
 class _Locator:
     """What numba asks: where a kernel's files lie, and what they were compiled from."""
 
@@ -80,7 +112,7 @@ class _Locator:
         return str(self._path)
 
     def get_source_stamp(self) -> str:
-        return hashlib.sha256(Path(self._py_file).read_bytes()).hexdigest()
+        return source_stamp(Path(self._py_file))
 
     def get_disambiguator(self) -> str:
         return str(self._line)

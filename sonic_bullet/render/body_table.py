@@ -11,9 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from sonic_bullet.records import Array, ModalModel
-from sonic_bullet.render.resonator import EDGE_RADIUS_LEAST_M, EDGE_RADIUS_SHARE, Resonator
+from sonic_bullet.render.resonator import Resonator
 from sonic_bullet.render.tables import BODY, FACE, NODE
 from sonic_bullet.synth.strikes import SPAN
+
+EDGE_RADIUS_SHARE = 0.005
+"""Radius of a body's edges, as a share of its size: broken, as made things have them."""
+EDGE_RADIUS_LEAST_M = 2e-4
 
 
 @dataclass(frozen=True, slots=True)

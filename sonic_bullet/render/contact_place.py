@@ -14,8 +14,9 @@ import numpy as np
 
 from sonic_bullet.geometry.nearest_point import nearest_face
 from sonic_bullet.machine.compiled import njit
-from sonic_bullet.render.resonator import CREASE_COS
 
+CREASE_COS = np.cos(np.radians(20.0))
+"""A contact whose normal leans more from the face's touches an edge or corner."""
 FLAT_CURVATURE = 0.1
 """Curvature times size below which a contact is flat: a cap of ten times the body's size."""
 INNER = {"nogil": True, "error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True}

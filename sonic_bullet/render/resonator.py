@@ -23,9 +23,6 @@ from sonic_bullet.radiation.radiated import radiation_of
 from sonic_bullet.records import Air, Array, Body, Microphone, ModalModel, ModalSum, Sensor, Vibrometer
 from sonic_bullet.synth.bank import Translation, audible
 
-CREASE_COS = np.cos(np.radians(20.0))
-EDGE_RADIUS_SHARE = 0.005
-EDGE_RADIUS_LEAST_M = 2e-4
 FASTEST_RIGID = 0.6
 """Share of sr/2 at which a small body's w is cut: below, its click is the compact law's, which no longer hangs on w."""
 

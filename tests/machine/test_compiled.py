@@ -97,6 +97,27 @@ def test_a_second_process_does_not_compile(folder: Path) -> None:
     assert hits(folder) == 0
 
 
+def test_code_is_of_all_the_sources_that_it_was_made_of(folder: Path) -> None:
+    """What a kernel calls, and numbers that it reads, are in its machine code: two modules further on, too."""
+    (folder / "cache").mkdir()
+    kernel = "from helper import factor\nfrom inner import (\n    times,\n)\n" + KERNEL.replace(
+        "2 * x", "times(factor, x)"
+    )
+    (folder / "kernel.py").write_text(kernel)
+    (folder / "helper.py").write_text("import number\nfactor = number.NUMBER\n")
+    (folder / "number.py").write_text("NUMBER = 1\n")
+    inner = (
+        "from sonic_bullet.machine.compiled import njit\n\n@njit(nogil=True)\ndef times(a, b):\n    return 2 * a * b\n"
+    )
+    (folder / "inner.py").write_text(inner)
+    assert [hits(folder), hits(folder)] == [0, 1]
+    (folder / "number.py").write_text("NUMBER = 2\n")
+    (folder / "inner.py").write_text(inner.replace("2 * a", "a"))
+    assert [hits(folder), hits(folder)] == [0, 1]
+    (folder / "unread.py").write_text("NUMBER = 3\n")
+    assert hits(folder) == 1
+
+
 @pytest.mark.parametrize("ending", [".nbi", ".nbc"])
 def test_a_kept_file_that_is_not_as_it_was_written_is_compiled_anew(
     place: Path, monkeypatch: pytest.MonkeyPatch, ending: str
