@@ -13,12 +13,12 @@ it has fallen below the floor at one of every DRIVEN samples of absolute time.
 # mypy: disable-error-code="no-untyped-def"
 from __future__ import annotations
 
-from sonic_bullet.machine.compiled import njit
+from sonic_bullet.synth.bank.kernels import inner
 from sonic_bullet.synth.bank.layout import DRIVEN, FLOOR, FLUSH
 from sonic_bullet.synth.pulse import _cumulated
 
 
-@njit(nogil=True, error_model="numpy", _nrt=False)
+@inner
 def _gather_forces(
     n, first, last, side, force_n, direction0, direction1, progress, period, onset_re, onset_im, kick
 ):  # pragma: no cover - compiled
@@ -42,7 +42,7 @@ def _gather_forces(
             imag[k] = impulse * onset_im
 
 
-@njit(nogil=True, error_model="numpy", _nrt=False)
+@inner
 def _strike_cells(at, n, slot, strikes, hertz, kick):  # pragma: no cover - compiled
     """Add the cells of a strike that end by the samples at … at + n - 1. It is done after its last."""
     strike = strikes[slot]
@@ -66,7 +66,7 @@ def _strike_cells(at, n, slot, strikes, hertz, kick):  # pragma: no cover - comp
         strike.rigid = 0
 
 
-@njit(nogil=True, error_model="numpy", _nrt=False)
+@inner
 def _run_axes(at, n, b, bodies, ringing, kick, pushed):  # pragma: no cover - compiled
     """The recursion on all axes, through the samples at … at + n - 1."""
     p_re, p_im, weight = bodies[b].rigid_pole[0], bodies[b].rigid_pole[1], bodies[b].rigid_weight
@@ -101,7 +101,7 @@ def _run_axes(at, n, b, bodies, ringing, kick, pushed):  # pragma: no cover - co
     ringing[b].moving = 1 if moves else 0
 
 
-@njit(nogil=True, error_model="numpy", _nrt=False)
+@inner
 def translate(
     at,
     n,
