@@ -30,7 +30,7 @@ DRIVE_SCRATCH = PUSH_SCRATCH + DRIVEN * LANES + DRIVEN + MOST_DUE
 
 
 @inner
-def _ring(b, start, stop, columns, z, pole, block, weight, modes, observed, sound, scratch):  # pragma: no cover
+def _ring(b, start, columns, z, pole, block, weight, modes, observed, sound, scratch):  # pragma: no cover
     """Tile of body b for the block that starts:
 
     sound (W, b, BLOCK). Turns z to the next block. False where all modes are below the floor.
@@ -39,8 +39,9 @@ def _ring(b, start, stop, columns, z, pole, block, weight, modes, observed, soun
     table = scratch[12 * CHUNK : (12 + 2 * ROW) * CHUNK]
     column = scratch[(12 + 2 * ROW) * CHUNK : RING_SCRATCH]
     ringing = False
-    for lo in range(start, stop, CHUNK):
-        count = min(CHUNK, stop - lo)
+    end = start + -(-columns // LANES) * LANES
+    for lo in range(start, end, CHUNK):
+        count = min(CHUNK, end - lo)
         if tile.turn(z, pole, block, modes, lo, count, FLOOR**2, now, powers) == 0:
             continue
         if not ringing:
@@ -249,7 +250,7 @@ def _open_block(
     if bodies[b].bent and ringing[b].ringing:
         bend_poles(z, driven, np.int64(BLOCK), law, start, stop, pole, block)
     alive = ringing[b].ringing != 0 and _ring(
-        b, start, stop, bodies[b].columns, z, pole, block, weight, law.shape[1], observed, sound, scratch
+        b, start, bodies[b].columns, z, pole, block, weight, law.shape[1], observed, sound, scratch
     )
     ringing[b].tiled = ringing[b].ringing = 1 if alive else 0
 
@@ -315,9 +316,8 @@ def advance(
                 source[w, b, :] = 0.0
         sounds[b, 0] = 1 if loud else 0
         moves = bodies[b].rigid != 0 and translate(
-            at, n, b, bodies, ringing, strikes, hertz, f0, f1, side, force_n, direction0, direction1, progress, period,
-            kick, pushed[b],
-        )  # fmt: skip
+            at, n, b, bodies, ringing, strikes, hertz, f0, f1, side, signal, direction0, direction1, kick, pushed[b]
+        )
         if not moves and sounds[b, 1]:
             pushed[b, :, :] = 0.0
         sounds[b, 1] = 1 if moves else 0

@@ -79,7 +79,8 @@ def advance(
     out = np.zeros((bank.weight.shape[0], bank.body_count, n))
     if pushed is None:
         pushed = np.zeros((bank.body_count, 3, n))
-    pushed[...] = 0.0
+    else:
+        pushed[...] = 0.0
     scratch = state.scratch
     scratch.fit(bank.body_count, drives, n)
     bank_kernel.advance(
