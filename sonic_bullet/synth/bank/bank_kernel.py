@@ -112,14 +112,19 @@ def _flush(values, count):  # pragma: no cover - compiled
 
 
 @inner
-def _share(n, force_n, progress, period, early, late):  # pragma: no cover - compiled
-    """A force's impulses, parted between both ends of its gains."""
-    for k in range(n):
-        push = force_n[k] * period
-        push = push if abs(push) >= FLUSH else 0.0
+def _part_force(d, n, force_n, progress, period, signal):  # pragma: no cover - compiled
+    """A force's impulses, parted between both ends of its gains; zeros behind."""
+    stride, whole = signal.shape[2], n - n % LANES
+    early, late = signal[d, 0], signal[d, 1]
+    drive.part_force(
+        force_n, d * force_n.shape[1], progress, period, whole, signal, 2 * d * stride, (2 * d + 1) * stride
+    )
+    for k in range(whole, n):
+        push = force_n[d, k] * period
+        push = push if push * push >= FLUSH**2 else 0.0
         early[k] = push * (1.0 - progress[k])
         late[k] = push * progress[k]
-    for k in range(n, len(early)):
+    for k in range(n, stride):
         early[k] = 0.0
         late[k] = 0.0
 
@@ -151,7 +156,7 @@ def list_forces(
                 first[b] += 1
                 _flush(gain0[d, s], bodies[b].columns)
                 _flush(gain1[d, s], bodies[b].columns)
-        _share(n, force_n[d], progress, period, signal[d, 0], signal[d, 1])
+        _part_force(d, n, force_n, progress, period, signal)
     for b in range(count, 0, -1):
         first[b] = first[b - 1]
     first[0] = 0

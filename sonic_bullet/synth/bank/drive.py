@@ -18,7 +18,7 @@ from llvmlite import binding, ir
 from numba import types
 from numba.extending import intrinsic
 
-from sonic_bullet.synth.bank.layout import PAIR, ROOM
+from sonic_bullet.synth.bank.layout import FLUSH, PAIR, ROOM
 from sonic_bullet.synth.vector import LANES, Emit, Value, constant
 
 BIT = ir.IntType(1)
@@ -29,6 +29,32 @@ TILE = 8 if binding.get_host_cpu_features().get("avx512f", False) else 2  # samp
 
 def _halves(e: Emit, array: Value, place: Value) -> list[Value]:
     return [e.load(array, place), e.load(array, e.shifted(place, LANES))]
+
+
+@intrinsic
+def part_force(typingctx, force_n, at, progress, period, count, signal, early, late):
+    """a0 and a1 of ``count`` samples, whole vectors: force·period·(1 - progress), force·period·progress.
+
+    force_n: flat from ``at`` on; signal: flat, a0 from early and a1 from late on. Impulses below FLUSH are 0.
+    """
+
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        e = Emit(context, builder, signature, args)
+        force_n, at, progress, period, count, signal, early, late = e.args
+        scale = e.spread(period)
+
+        def vector(k: Value, _: list[Value]) -> list[Value]:
+            push, x = builder.fmul(e.load(force_n, builder.add(at, k)), scale), e.load(progress, k)
+            large = builder.fcmp_ordered(">=", builder.fmul(push, push), constant(FLUSH**2))
+            push = builder.select(large, push, constant(0))
+            e.store(builder.fmul(push, builder.fsub(constant(1), x)), signal, builder.add(early, k))
+            e.store(builder.fmul(push, x), signal, builder.add(late, k))
+            return []
+
+        e.loop(count, LANES, [], vector)
+        return context.get_dummy_value()
+
+    return types.void(force_n, at, progress, period, count, signal, early, late), codegen
 
 
 @intrinsic
