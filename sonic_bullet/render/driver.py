@@ -137,7 +137,7 @@ def ring(
         step.sample, n, sr, bank_body, law, weight, observed, ringing, z, driven, sound, pole, block, strikes, phasors,
         free_strikes, hertz, drives, drive_body, force, gain0, gain1, direction0, direction1, x,
         np.empty(len(bank_body) + 1, np.int64), np.empty(2 * drives, np.int64), np.empty((drives, 2, n + LANES)),
-        np.empty((6, n)), np.empty((DRIVEN, 3), np.int64), aligned(max(DRIVE_SCRATCH, RING_SCRATCH)), source, pushed, sounds,
+        np.empty((6, n + LANES)), np.empty((DRIVEN, 3), np.int64), aligned(max(DRIVE_SCRATCH, RING_SCRATCH)), source, pushed, sounds,
     )  # fmt: skip
 
 
