@@ -18,7 +18,7 @@ import numpy as np
 
 from sonic_bullet.machine.borrowed import borrowed
 from sonic_bullet.machine.compiled import njit
-from sonic_bullet.synth.fractional_delay import AHEAD, FLUSH, KEPT, INFINITE, MOST_FALL, TAPS, add, emit, greatest, leading, move, read
+from sonic_bullet.synth.fractional_delay import AHEAD, KEPT, INFINITE, MOST_FALL, TAPS, add, clear, emit, flush, greatest, leading, move, read
 from sonic_bullet.synth.vector import LANES
 
 DONE, MEMORY_SHORT, PLACES_SHORT, TOO_FAR, NOT_FINITE = range(5)
@@ -69,16 +69,16 @@ WORK = 3 * _SPAN + 8 + 5 * LANES + KEPT
 """Doubles that `hear` is lent."""
 
 
-@njit(nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
 def _awake(lines, place, channels):  # pragma: no cover - compiled
     """Whether sound of the place is under way to any microphone."""
-    some = 0
-    for c in range(channels):
-        some |= lines[place * channels + c].awake
-    return some != 0
+    line, stop = place * channels, (place + 1) * channels
+    while line < stop and lines[line].awake == 0:
+        line += 1
+    return line < stop
 
 
-@njit(nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
 def _fits(place, source, square, samples_per_m):  # pragma: no cover - compiled
     """DONE, or what is wrong with a place that sounds at a distance of such a square."""
     away_m = np.sqrt(square)
@@ -94,7 +94,7 @@ def _fits(place, source, square, samples_per_m):  # pragma: no cover - compiled
     return MEMORY_SHORT
 
 
-@njit(nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
 def _free_place(places, lines, sources, step, p, channels):  # pragma: no cover - compiled
     """The next place from p on that nothing is heard from and no body needs; the number of places for none."""
     while p < len(places):
@@ -108,7 +108,7 @@ def _free_place(places, lines, sources, step, p, channels):  # pragma: no cover 
     return p
 
 
-@njit(nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
 def _survey(step, n, first, source, pushed, begin_m, end_m, teleported, microphone_m, samples_per_m, sources, places, lines):  # fmt: skip  # pragma: no cover - compiled
     """Mark which bodies emit anything, find new places for those moved by hand in this step, and say what is in the
     way: the distance of what sounds is greatest at an end of the step.
@@ -116,14 +116,13 @@ def _survey(step, n, first, source, pushed, begin_m, end_m, teleported, micropho
     Silence needs no fade: a body of which nothing is observed keeps its place.
     """
     channels, long = len(microphone_m), source.shape[1]
-    free, wrong = 0, DONE
+    free, wrong = np.int64(0), DONE  # a plain 0 is a type of its own, and each callee is compiled for it too
     for b in range(len(sources)):
         body = sources[b]
-        most = greatest(source, b * long + first, n, 1, 0)
-        push = greatest(pushed, 3 * b * long + first, n, 3, long)
-        if most >= INFINITE or push >= INFINITE:
+        most = greatest(source, b * long + first, pushed, 3 * b * long + first, long, n)
+        if most >= INFINITE:
             return NOT_FINITE
-        body.sounds, body.fresh, body.away_m = 1 if most > 0 or push > 0 else 0, -1, 0.0
+        body.sounds, body.fresh, body.away_m = 1 if most > 0 else 0, -1, 0.0
         start, stop = 0.0, 0.0
         for c in range(channels):
             here, there = 0.0, 0.0
@@ -152,7 +151,7 @@ def _survey(step, n, first, source, pushed, begin_m, end_m, teleported, micropho
     return wrong
 
 
-@njit(nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
 def _move(step, sources, places, b, p):  # pragma: no cover - compiled
     """Give body b the present place p; the one it had is left."""
     old = places[p].body
@@ -171,7 +170,7 @@ def _move(step, sources, places, b, p):  # pragma: no cover - compiled
     sources[b].leaving, sources[b].main, sources[b].left = sources[b].main, p, step
 
 
-@njit(nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
 def _newest(emitted, start, stop, none):  # pragma: no cover - compiled
     """The last of emitted[start:stop] that is not zero; ``none`` where all are."""
     i = stop - 1
@@ -180,7 +179,7 @@ def _newest(emitted, start, stop, none):  # pragma: no cover - compiled
     return i if i >= start else none
 
 
-@njit(nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
 def _remember(memory, ring_at, late_at, mask, at, start, n, emitted, delay, before, steep):  # pragma: no cover - compiled
     """Samples at + start … at + n - 1, which lie in one piece, into a line's history, ``before``: the delay before them.
 
@@ -200,7 +199,7 @@ def _remember(memory, ring_at, late_at, mask, at, start, n, emitted, delay, befo
         move(memory, late_at + place, memory, late_at + mask + 1 + place, again)
 
 
-@njit(nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
 def _wake(memory, ring_at, late_at, mask, n, late):  # pragma: no cover - compiled
     """Nothing was emitted before sample n, with that delay."""
     for k in range(n - _HISTORY, n):
@@ -210,7 +209,7 @@ def _wake(memory, ring_at, late_at, mask, n, late):  # pragma: no cover - compil
             memory[ring_at + mask + 1 + place], memory[late_at + mask + 1 + place] = 0.0, late
 
 
-@njit(nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
 def _listen(line, at, n, emitted, delay, heard, memory, ring_at, mask, taps, kept, steep):  # pragma: no cover - compiled
     """Run one line over emitted (n,); what arrives into heard (n,). False where nothing does.
 
@@ -218,8 +217,9 @@ def _listen(line, at, n, emitted, delay, heard, memory, ring_at, mask, taps, kep
     """
     late_at = ring_at + mask + 1 + MIRRORED
     awake, m, newest = line.awake != 0, line.cursor - at, line.newest - at
+    start = np.int64(0)
     if awake:
-        _remember(memory, ring_at, late_at, mask, at, 0, n, emitted, delay, memory[late_at + ((at - 1) & mask)], steep)
+        _remember(memory, ring_at, late_at, mask, at, start, n, emitted, delay, memory[late_at + ((at - 1) & mask)], steep)
     i, arrives, waits = 0, False, True
     while i < n:
         if not awake:
@@ -240,8 +240,7 @@ def _listen(line, at, n, emitted, delay, heard, memory, ring_at, mask, taps, kep
                 continue
         if not arrives:
             arrives = True
-            for k in range(n):
-                heard[k] = 0.0
+            clear(heard, 0, n)
         base = m + 1  # the rule: one sample further than that before, for a whole group
         count = leading(memory, late_at + ((at + base) & mask), base - i)
         if count == 0:
@@ -262,14 +261,13 @@ def _listen(line, at, n, emitted, delay, heard, memory, ring_at, mask, taps, kep
                 break
         i, m = i + count, base + count - 1
         if not awake:
-            for k in range(i, i + LANES):
-                heard[k] = 0.0
+            clear(heard, i, LANES)
             i += 1
     line.awake, line.cursor, line.newest = 1 if awake else 0, at + m, at + newest
     return arrives
 
 
-@njit(nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
 def _emit(b, first, n, source, pushed, x, fade, geometry, tail, emitted, delay):  # pragma: no cover - compiled
     """a and D of body b as `fractional_delay.emit` has them, and its fade: 0 none, 1 in, -1 out, 2 nothing any more.
     Whether delays fall fast.
@@ -282,15 +280,12 @@ def _emit(b, first, n, source, pushed, x, fade, geometry, tail, emitted, delay):
         tail[k], tail[4 * LANES + k] = source[b, i], x[i]
         for axis in range(3):
             tail[(1 + axis) * LANES + k] = pushed[b, axis, i]
-    steep = emit(source, b * long + first, pushed, 3 * b * long + first, long, x, first, whole, geometry, emitted, delay, 0, -np.inf)  # fmt: skip
-    if whole < n:
-        before = delay[whole - 1] if whole > 0 else -np.inf
-        steep |= emit(tail, 0, tail, LANES, LANES, tail, 4 * LANES, LANES, geometry, emitted, delay, whole, before)
+    steep = emit(source, b * long + first, pushed, 3 * b * long + first, long, x, first, tail, n, geometry, emitted, delay, -np.inf)  # fmt: skip
     if fade != 0:
+        begin, slope = 1.0 if fade == -1 else 0.0, 0.0 if fade == 2 else float(fade)
         for i in range(n):
-            share = x[first + i] if fade == 1 else (1.0 - x[first + i] if fade == -1 else 0.0)
-            value = emitted[i] * share
-            emitted[i] = value if abs(value) >= FLUSH else 0.0
+            emitted[i] *= begin + slope * x[first + i]
+        flush(emitted, 0, n)
     return steep != 0
 
 
@@ -311,8 +306,7 @@ def hear(at, step, n, first, source, pushed, begin_m, end_m, teleported, x, micr
         return status
     channels = len(microphone_m)
     for c in range(channels):
-        for i in range(n):
-            out[c, out_at + i] = 0.0
+        clear(out, c * out.shape[1] + out_at, n)
     emitted, delay, heard = work[:_SPAN], work[_SPAN : 2 * _SPAN], work[2 * _SPAN : 3 * _SPAN]
     geometry, tail, kept = work[3 * _SPAN : 3 * _SPAN + 8], work[3 * _SPAN + 8 : WORK - KEPT], work[WORK - KEPT : WORK]
     kept[TAPS * LANES] = np.nan
@@ -348,7 +342,5 @@ def hear(at, step, n, first, source, pushed, begin_m, end_m, teleported, x, micr
                     lo += count
             p = place.next
     for c in range(channels):
-        for i in range(n):
-            if abs(out[c, out_at + i]) < FLUSH:
-                out[c, out_at + i] = 0.0
+        flush(out, c * out.shape[1] + out_at, n)
     return DONE
