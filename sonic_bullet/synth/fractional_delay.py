@@ -212,7 +212,9 @@ def flush(typingctx, out, at, count):
 
 
 @intrinsic
-def emit(typingctx, source, source_at, pushed, pushed_at, stride, x, x_at, tail, count, geometry, emitted, delay, before):
+def emit(
+    typingctx, source, source_at, pushed, pushed_at, stride, x, x_at, tail, count, geometry, emitted, delay, before
+):
     """a and D of ``count`` samples into emitted and delay, whole groups of 8. 0 where no delay falls by more than
     MOST_FALL from one to the next, ``before``: the delay before them.
 
@@ -286,15 +288,15 @@ def leading(typingctx, memory, late_at, gone):
 
 
 @intrinsic
-def read(typingctx, memory, ring_at, late_at, gone, taps, kept, heard, at):
-    """Σ_k a[m - 7 + k] h_k of eight samples as in `leading` into heard[at …], memory[ring_at + k]: a[m - 7 + k].
+def read(typingctx, memory, ring_at, late_at, gone, taps, kept, observed, at):
+    """Σ_k a[m - 7 + k] h_k of eight samples as in `leading` into observed[at …], memory[ring_at + k]: a[m - 7 + k].
 
     kept (KEPT,): taps of the samples before, NaN at first.
     """
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         e = Emit(context, builder, signature, args)
-        memory, ring_at, late_at, gone, taps, kept, heard, at = e.args
+        memory, ring_at, late_at, gone, taps, kept, observed, at = e.args
         here, there = e.load(memory, late_at), e.load(memory, e.shifted(late_at, 1))
         since = builder.fsub(e.spread(builder.sitofp(builder.sub(e.index(0), gone), F64)), here)
         fraction = builder.fdiv(since, builder.fsub(builder.fadd(constant(1.0), there), here))
@@ -331,9 +333,9 @@ def read(typingctx, memory, ring_at, late_at, gone, taps, kept, heard, at):
         equal = _all(e, builder.fcmp_ordered("==", t, e.load(kept, e.index(TAPS * LANES))))
         with builder.if_else(equal) as (then, otherwise):
             with then:
-                e.store(summed(lambda tap: e.load(kept, e.index(tap * LANES))), heard, at)
+                e.store(summed(lambda tap: e.load(kept, e.index(tap * LANES))), observed, at)
             with otherwise:
-                e.store(summed(made), heard, at)
+                e.store(summed(made), observed, at)
                 one = e.spread(builder.extract_element(t, ir.Constant(I32, 0)))
                 with builder.if_then(_all(e, builder.fcmp_ordered("==", t, one))):
                     for tap in range(TAPS):
@@ -341,6 +343,4 @@ def read(typingctx, memory, ring_at, late_at, gone, taps, kept, heard, at):
                     e.store(t, kept, e.index(TAPS * LANES))
         return context.get_dummy_value()
 
-    return types.void(memory, ring_at, late_at, gone, taps, kept, heard, at), codegen
-
-
+    return types.void(memory, ring_at, late_at, gone, taps, kept, observed, at), codegen
