@@ -25,7 +25,8 @@ from sonic_bullet.synth.bank import bank_kernel
 from sonic_bullet.synth.bank.bank_kernel import DRIVE_SCRATCH, RING_SCRATCH
 from sonic_bullet.synth.bank.layout import DRIVEN
 from sonic_bullet.synth.bank.strike_pool import enter_strike
-from sonic_bullet.synth.path_kernel import DONE, WORK, hear
+from sonic_bullet.synth.path_kernel import WORK, hear
+from sonic_bullet.synth.path_places import DONE
 from sonic_bullet.synth.strikes import LOOKAHEAD, SPAN
 from sonic_bullet.synth.surface_kernel import VOICE
 from sonic_bullet.synth.vector import LANES

@@ -23,7 +23,7 @@ from sonic_bullet.render.residual_voice import friction_grains, impact_grains
 from sonic_bullet.render.step_events import drives_of, pulses_of
 from sonic_bullet.render.synthesis_state import Setup, State, quench, start, with_bodies
 from sonic_bullet.residual.player import add_grains
-from sonic_bullet.synth import path, path_kernel
+from sonic_bullet.synth import path, path_places
 from sonic_bullet.synth.strikes import LOOKAHEAD
 
 LATENCY_STEPS = LOOKAHEAD
@@ -93,8 +93,8 @@ def _advanced(setup: Setup, state: State, steps: Sequence[Step]) -> Array:
         more, status, found, drives = driver.advance_steps(
             done, taken, begin, pause, resume, float(sr), table, contacts, *poses, *state.tables(), pressure, out
         )
-        done, resume = done + more, status not in (driver.TO_GROW, path_kernel.DONE)
-        if status == path_kernel.DONE:
+        done, resume = done + more, status not in (driver.TO_GROW, path_places.DONE)
+        if status == path_places.DONE:
             continue
         if status == driver.TO_GROW:
             _make_room(state, table[done], longest)
