@@ -23,6 +23,7 @@ from sonic_bullet.synth.bank import Force, ModeSet, Strike, advance, append, emp
 
 SR, FRAME = 48_000, 200
 FRAMES = 32  # 6400 samples: 25 of the bank's blocks
+PULSE_S = 1e-4
 
 
 def modes_of(rng: np.random.Generator, count: int) -> ModeSet:
@@ -44,8 +45,7 @@ def ours(sizes: list[int], strikes_per_s: float = 0.0, forced: bool = False, rep
     rng = np.random.default_rng(0)
     bank, state = empty_bank(SR)
     bank, state = append(bank, state, [modes_of(rng, size) for size in sizes])
-    pulse = np.hanning(26)[1:-1] / 13
-    advance(bank, state, 512, [Strike(b, 1.3, 0.2, pulse, rng.normal(size=size)) for b, size in enumerate(sizes)])
+    advance(bank, state, 512, [Strike(b, 1.3, PULSE_S, rng.normal(size=size)) for b, size in enumerate(sizes)])
     gains = [rng.normal(size=size) for size in sizes]
     signal, progress = rng.normal(size=FRAME), np.linspace(0, 1, FRAME)
     plan = [
@@ -58,7 +58,7 @@ def ours(sizes: list[int], strikes_per_s: float = 0.0, forced: bool = False, rep
 
     def run() -> None:
         for hits in plan:
-            strikes = [Strike(b, state.at + late, 0.2, pulse, gains[b]) for b, late in hits]
+            strikes = [Strike(b, state.at + late, PULSE_S, gains[b]) for b, late in hits]
             advance(
                 bank,
                 state,

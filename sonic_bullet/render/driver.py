@@ -25,7 +25,8 @@ from sonic_bullet.synth.bank import bank_kernel
 from sonic_bullet.synth.bank.bank_kernel import DRIVE_SCRATCH, RING_SCRATCH
 from sonic_bullet.synth.bank.layout import DRIVEN
 from sonic_bullet.synth.bank.strike_pool import enter_strike
-from sonic_bullet.synth.path_kernel import DONE, WORK, hear
+from sonic_bullet.synth.path_kernel import WORK, hear
+from sonic_bullet.synth.path_places import DONE
 from sonic_bullet.synth.strikes import LOOKAHEAD, SPAN
 from sonic_bullet.synth.surface_kernel import VOICE
 from sonic_bullet.synth.vector import LANES
@@ -137,7 +138,7 @@ def ring(
         step.sample, n, sr, bank_body, law, weight, observed, ringing, z, driven, sound, pole, block, strikes, phasors,
         free_strikes, hertz, drives, drive_body, force, gain0, gain1, direction0, direction1, x,
         np.empty(len(bank_body) + 1, np.int64), np.empty(2 * drives, np.int64), np.empty((drives, 2, n + LANES)),
-        np.empty((6, n)), np.empty((DRIVEN, 3), np.int64), aligned(max(DRIVE_SCRATCH, RING_SCRATCH)), source, pushed, sounds,
+        np.empty((6, n + LANES)), np.empty((DRIVEN, 3), np.int64), aligned(max(DRIVE_SCRATCH, RING_SCRATCH)), source, pushed, sounds,
     )  # fmt: skip
 
 

@@ -9,7 +9,7 @@ the state) and the replay of a log run the same code on the same numbers in the 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -23,7 +23,7 @@ from sonic_bullet.render.residual_voice import friction_grains, impact_grains
 from sonic_bullet.render.step_events import drives_of, pulses_of
 from sonic_bullet.render.synthesis_state import Setup, State, quench, start, with_bodies
 from sonic_bullet.residual.player import add_grains
-from sonic_bullet.synth import path, path_kernel
+from sonic_bullet.synth import path, path_places
 from sonic_bullet.synth.strikes import LOOKAHEAD
 
 LATENCY_STEPS = LOOKAHEAD
@@ -75,11 +75,7 @@ def _advanced(setup: Setup, state: State, steps: Sequence[Step]) -> Array:
     """`advance` of steps without a quench between; of one alone where a body has a residual."""
     sr, begin, pause = setup.sr, state.ringing.at, state.has_residual
     table, clock, waiting = _schedule(sr, state, steps)
-    contacts = _together(np.concatenate, [step.contacts.row for step in steps])
-    poses = [
-        _together(np.stack, [getattr(s, name) for s in steps])
-        for name in ("position_m", "quaternion_xyzw", "teleported")
-    ]
+    contacts, poses = _joined(steps)
     stop = clock.sample(sr)
     out = np.zeros((len(setup.sensors), stop - begin))
     pressure = (
@@ -93,8 +89,8 @@ def _advanced(setup: Setup, state: State, steps: Sequence[Step]) -> Array:
         more, status, found, drives = driver.advance_steps(
             done, taken, begin, pause, resume, float(sr), table, contacts, *poses, *state.tables(), pressure, out
         )
-        done, resume = done + more, status not in (driver.TO_GROW, path_kernel.DONE)
-        if status == path_kernel.DONE:
+        done, resume = done + more, status not in (driver.TO_GROW, path_places.DONE)
+        if status == path_places.DONE:
             continue
         if status == driver.TO_GROW:
             _make_room(state, table[done], longest)
@@ -113,13 +109,20 @@ def _advanced(setup: Setup, state: State, steps: Sequence[Step]) -> Array:
     return out
 
 
-def _together(join: Callable[[Sequence[Array]], Array], arrays: Sequence[Array]) -> Array:
-    """The arrays of all steps in one that is read-only, as those of one step are: one type, compiled once."""
-    if len(arrays) == 1:
-        return arrays[0] if join is np.concatenate else arrays[0][None]
-    joined = join(arrays)
-    joined.setflags(write=False)
-    return joined
+def _joined(steps: Sequence[Step]) -> tuple[Array, tuple[Array, ...]]:
+    """Contact rows of all steps, and their poses (k, b, ·): read-only, as those of one step are (one type is compiled
+    once).
+    """
+    first = steps[0]
+    if len(steps) == 1:
+        return first.contacts.row, (first.position_m[None], first.quaternion_xyzw[None], first.teleported[None])
+    joined = [
+        np.concatenate([step.contacts.row for step in steps]),
+        *(np.stack([getattr(s, name) for s in steps]) for name in ("position_m", "quaternion_xyzw", "teleported")),
+    ]
+    for array in joined:
+        array.setflags(write=False)
+    return joined[0], tuple(joined[1:])
 
 
 def _make_room(state: State, step: Array, samples: int) -> None:

@@ -97,45 +97,79 @@ def move(typingctx, values, start, memory, at, count):
 
 
 @intrinsic
-def greatest(typingctx, values, at, count, rows, stride):
-    """Greatest magnitude of ``count`` values from element ``at`` on, in ``rows`` rows ``stride`` elements apart, as the
-    bits of a double:
+def greatest(typingctx, source, source_at, pushed, pushed_at, stride, count):
+    """Greatest magnitude of ``count`` values of a source and its push's three axes, as the bits of a double:
 
-    0 where all are zero, from INFINITE on where one is not finite.
+    0 where all are zero, from INFINITE on where one is not finite. Arrays as in `emit`.
     """
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         e = Emit(context, builder, signature, args)
-        values, at, count, rows, stride = e.args
+        source, source_at, pushed, pushed_at, stride, count = e.args
         integers = ir.VectorType(I64, LANES)
         whole = builder.and_(count, e.index(-LANES))
 
         def more(bits: Value, kind: Any, most: Value) -> Value:
-            size = builder.and_(builder.bitcast(bits, kind), ir.Constant(kind, _all_of(kind, 2**63 - 1)))
+            mask = [2**63 - 1] * LANES if kind is integers else 2**63 - 1
+            size = builder.and_(builder.bitcast(bits, kind), ir.Constant(kind, mask))
             return builder.select(builder.icmp_signed(">", size, most), size, most)
 
         def row(r: Value, carried: list[Value]) -> list[Value]:
-            here = builder.add(at, builder.mul(r, stride))
-            after = builder.add(here, whole)
-            groups = e.loop(
-                whole,
-                LANES,
-                [carried[0]],
-                lambda k, now: [more(e.load(values, builder.add(here, k)), integers, now[0])],
+            axis = builder.add(pushed_at, builder.mul(builder.sub(r, e.index(1)), stride))
+            values = builder.select(
+                builder.icmp_signed("==", r, e.index(0)),
+                builder.gep(source, [source_at]),
+                builder.gep(pushed, [axis]),
             )
+            groups = e.loop(whole, LANES, [carried[0]], lambda k, now: [more(e.load(values, k), integers, now[0])])
             single = e.loop(
                 builder.sub(count, whole),
                 1,
                 [carried[1]],
-                lambda k, now: [more(builder.load(builder.gep(values, [builder.add(after, k)])), I64, now[0])],
+                lambda k, now: [more(builder.load(builder.gep(values, [builder.add(whole, k)])), I64, now[0])],
             )
             return [groups[0], single[0]]
 
-        most, single = e.loop(rows, 1, [ir.Constant(integers, [0] * LANES), e.index(0)], row)
+        most, single = e.loop(e.index(4), 1, [ir.Constant(integers, [0] * LANES), e.index(0)], row)
         lanes = _called(e, "llvm.vector.reduce.smax.v8i64", I64, most)
         return builder.select(builder.icmp_signed(">", lanes, single), lanes, single)
 
-    return types.int64(values, at, count, rows, stride), codegen
+    return types.int64(source, source_at, pushed, pushed_at, stride, count), codegen
+
+
+@intrinsic
+def clear(typingctx, out, at, count):
+    """out[at:][:count] = 0."""
+
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        e = Emit(context, builder, signature, args)
+        out, at, count = e.args
+        cgutils.memset(builder, builder.gep(out, [at]), builder.mul(count, e.index(8)), 0)
+        return context.get_dummy_value()
+
+    return types.void(out, at, count), codegen
+
+
+def _each(e: Emit, count: Value, body: Any) -> None:
+    """body(k, load, store, one) for whole groups of 8 and then for the others; ``one``: a number in all lanes."""
+    b = e.builder
+    whole = b.and_(count, e.index(-LANES))
+
+    def group(k: Value, carried: list[Value]) -> list[Value]:
+        body(k, e.load, e.store, constant)
+        return []
+
+    def single(k: Value, carried: list[Value]) -> list[Value]:
+        body(
+            b.add(whole, k),
+            lambda array, at: b.load(b.gep(array, [at])),
+            lambda value, array, at: b.store(value, b.gep(array, [at])),
+            lambda value: ir.Constant(F64, value),
+        )
+        return []
+
+    e.loop(whole, LANES, [], group)
+    e.loop(b.sub(count, whole), 1, [], single)
 
 
 @intrinsic
@@ -145,45 +179,66 @@ def add(typingctx, values, out, at, count):
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         e = Emit(context, builder, signature, args)
         values, out, at, count = e.args
-        whole = builder.and_(count, e.index(-LANES))
 
-        def group(k: Value, carried: list[Value]) -> list[Value]:
+        def body(k: Value, load: Any, store: Any, one: Any) -> None:
             place = builder.add(at, k)
-            e.store(builder.fadd(e.load(out, place), e.load(values, k)), out, place)
-            return []
+            store(builder.fadd(load(out, place), load(values, k)), out, place)
 
-        def single(k: Value, carried: list[Value]) -> list[Value]:
-            i = builder.add(whole, k)
-            place = builder.gep(out, [builder.add(at, i)])
-            builder.store(builder.fadd(builder.load(place), builder.load(builder.gep(values, [i]))), place)
-            return []
-
-        e.loop(whole, LANES, [], group)
-        e.loop(builder.sub(count, whole), 1, [], single)
+        _each(e, count, body)
         return context.get_dummy_value()
 
     return types.void(values, out, at, count), codegen
 
 
 @intrinsic
-def emit(typingctx, source, source_at, pushed, pushed_at, stride, x, x_at, count, geometry, emitted, delay, at, before):
-    """a and D of ``count`` samples, whole groups of 8, into emitted[at …] and delay[at …]. 0 where no delay falls by
-    more than MOST_FALL from one to the next, ``before``: the delay before them.
+def flush(typingctx, out, at, count):
+    """0 for each of out[at:][:count] below FLUSH: they have no meaning in pascal, and their float32 is subnormal."""
+
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        e = Emit(context, builder, signature, args)
+        out, at, count = e.args
+
+        def body(k: Value, load: Any, store: Any, one: Any) -> None:
+            place = builder.add(at, k)
+            value = load(out, place)
+            above = builder.fcmp_ordered(">=", value, one(FLUSH))
+            below = builder.fcmp_ordered("<=", value, one(-FLUSH))
+            store(builder.select(builder.or_(above, below), value, one(0.0)), out, place)
+
+        _each(e, count, body)
+        return context.get_dummy_value()
+
+    return types.void(out, at, count), codegen
+
+
+@intrinsic
+def emit(
+    typingctx, source, source_at, pushed, pushed_at, stride, x, x_at, tail, count, geometry, emitted, delay, before
+):
+    """a and D of ``count`` samples into emitted and delay, whole groups of 8. 0 where no delay falls by more than
+    MOST_FALL from one to the next, ``before``: the delay before them.
 
     source, pushed, x: arrays of any shape from element source_at … on, the push's axes ``stride`` elements apart.
-    geometry (8,): microphone - start, end - start (m), samples per metre, 1/radius.
+    tail: (5, 8) flat, source, push and x after the last whole group. geometry (8,): microphone - start, end - start
+    (m), samples per metre, 1/radius.
     """
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         e = Emit(context, builder, signature, args)
-        source, source_at, pushed, pushed_at, stride, x, x_at, count, geometry, emitted, delay, at, before = e.args
+        source, source_at, pushed, pushed_at, stride, x, x_at, tail, count, geometry, emitted, delay, before = e.args
         known = [e.broadcast(geometry, e.index(k)) for k in range(8)]
         axes = [pushed_at, builder.add(pushed_at, stride), builder.add(pushed_at, builder.add(stride, stride))]
 
         def body(k: Value, carried: list[Value]) -> list[Value]:
-            between = e.load(x, builder.add(x_at, k))
+            last = builder.icmp_signed(">", builder.add(k, e.index(LANES)), count)
+
+            def given(number: int, array: Value, at: Value) -> Value:
+                rest = builder.gep(tail, [e.index(number * LANES)])
+                return e.load(builder.select(last, rest, builder.gep(array, [builder.add(at, k)])), e.index(0))
+
+            between = given(4, x, x_at)
             from_here = [e.fma(builder.fneg(known[3 + axis]), between, known[axis]) for axis in range(3)]
-            push = [e.load(pushed, builder.add(push_at, k)) for push_at in axes]
+            push = [given(1 + axis, pushed, axes[axis]) for axis in range(3)]
             square, dot = builder.fmul(from_here[0], from_here[0]), builder.fmul(from_here[0], push[0])
             for axis in (1, 2):
                 square = e.fma(from_here[axis], from_here[axis], square)
@@ -191,15 +246,13 @@ def emit(typingctx, source, source_at, pushed, pushed_at, stride, x, x_at, count
             r = _called(e, "llvm.sqrt.v8f64", VEC, square)
             inverse = builder.fdiv(constant(1.0), _greater(e, r, constant(1e-12)))
             spread = builder.select(builder.fcmp_ordered("<", inverse, known[7]), inverse, known[7])
-            value = builder.fmul(e.fma(dot, inverse, e.load(source, builder.add(source_at, k))), spread)
+            value = builder.fmul(e.fma(dot, inverse, given(0, source, source_at)), spread)
             audible = builder.fcmp_ordered(">=", _called(e, "llvm.fabs.v8f64", VEC, value), constant(FLUSH))
-            place = builder.add(at, k)
-            e.store(builder.select(audible, value, constant(0.0)), emitted, place)
+            e.store(builder.select(audible, value, constant(0.0)), emitted, k)
             late = _greater(e, builder.fmul(r, known[6]), constant(LEAST_DELAY))
-            e.store(late, delay, place)
-            previous = builder.shuffle_vector(
-                carried[0], late, ir.Constant(ir.VectorType(I32, LANES), list(range(LANES - 1, 2 * LANES - 1)))
-            )
+            e.store(late, delay, k)
+            shifted = ir.Constant(ir.VectorType(I32, LANES), list(range(LANES - 1, 2 * LANES - 1)))
+            previous = builder.shuffle_vector(carried[0], late, shifted)
             falls = builder.fcmp_ordered("<", late, builder.fsub(previous, constant(MOST_FALL)))
             return [late, builder.or_(carried[1], falls)]
 
@@ -208,7 +261,7 @@ def emit(typingctx, source, source_at, pushed, pushed_at, stride, x, x_at, count
         return builder.zext(builder.bitcast(falls, ir.IntType(LANES)), I64)
 
     return types.int64(
-        source, source_at, pushed, pushed_at, stride, x, x_at, count, geometry, emitted, delay, at, before
+        source, source_at, pushed, pushed_at, stride, x, x_at, tail, count, geometry, emitted, delay, before
     ), codegen
 
 
@@ -235,15 +288,15 @@ def leading(typingctx, memory, late_at, gone):
 
 
 @intrinsic
-def read(typingctx, memory, ring_at, late_at, gone, taps, kept, arrived, at):
-    """Σ_k a[m - 7 + k] h_k of eight samples as in `leading` into heard[at …], memory[ring_at + k]: a[m - 7 + k].
+def read(typingctx, memory, ring_at, late_at, gone, taps, kept, observed, at):
+    """Σ_k a[m - 7 + k] h_k of eight samples as in `leading` into observed[at …], memory[ring_at + k]: a[m - 7 + k].
 
     kept (KEPT,): taps of the samples before, NaN at first.
     """
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         e = Emit(context, builder, signature, args)
-        memory, ring_at, late_at, gone, taps, kept, arrived, at = e.args
+        memory, ring_at, late_at, gone, taps, kept, observed, at = e.args
         here, there = e.load(memory, late_at), e.load(memory, e.shifted(late_at, 1))
         since = builder.fsub(e.spread(builder.sitofp(builder.sub(e.index(0), gone), F64)), here)
         fraction = builder.fdiv(since, builder.fsub(builder.fadd(constant(1.0), there), here))
@@ -280,9 +333,9 @@ def read(typingctx, memory, ring_at, late_at, gone, taps, kept, arrived, at):
         equal = _all(e, builder.fcmp_ordered("==", t, e.load(kept, e.index(TAPS * LANES))))
         with builder.if_else(equal) as (then, otherwise):
             with then:
-                e.store(summed(lambda tap: e.load(kept, e.index(tap * LANES))), arrived, at)
+                e.store(summed(lambda tap: e.load(kept, e.index(tap * LANES))), observed, at)
             with otherwise:
-                e.store(summed(made), arrived, at)
+                e.store(summed(made), observed, at)
                 one = e.spread(builder.extract_element(t, ir.Constant(I32, 0)))
                 with builder.if_then(_all(e, builder.fcmp_ordered("==", t, one))):
                     for tap in range(TAPS):
@@ -290,4 +343,4 @@ def read(typingctx, memory, ring_at, late_at, gone, taps, kept, arrived, at):
                     e.store(t, kept, e.index(TAPS * LANES))
         return context.get_dummy_value()
 
-    return types.void(memory, ring_at, late_at, gone, taps, kept, arrived, at), codegen
+    return types.void(memory, ring_at, late_at, gone, taps, kept, observed, at), codegen

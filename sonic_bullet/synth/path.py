@@ -10,7 +10,7 @@ interpolation's length. Flat to 0.02 dB up to 18 kHz at 48 kHz. Every sample dep
 cutting the calls gives the same bits. A body moved by hand emits from its old place and its new one, fading over the
 step: no click and no chirp.
 
-The work is done by `path_kernel.hear` on the state's tables; here they are made, checked at the door and lengthened.
+The work is done by `hear` on the state's tables; here they are made, checked at the door and lengthened.
 b bodies, c microphones, n samples, t places.
 """
 
@@ -23,9 +23,19 @@ import numpy as np
 
 from sonic_bullet.records import Air, Array
 from sonic_bullet.records.errors import AudioError
-from sonic_bullet.synth import path_kernel
 from sonic_bullet.synth.fractional_delay import tap_polynomials
-from sonic_bullet.synth.path_kernel import FARTHEST_M, LINE, MIRRORED, PLACE, SOURCE
+from sonic_bullet.synth.path_kernel import WORK, hear
+from sonic_bullet.synth.path_places import (
+    DONE,
+    FARTHEST_M,
+    LINE,
+    MEMORY_SHORT,
+    MIRRORED,
+    PLACE,
+    PLACES_SHORT,
+    SOURCE,
+    TOO_FAR,
+)
 
 _SHORTEST = 1024
 
@@ -47,7 +57,7 @@ class Path:
 @dataclass(slots=True, eq=False)
 class PathState:
     """Sound under way. at: the next sample. sources (b,) SOURCE, places (t,) PLACE, lines (t·c,) LINE and their memory:
-    see path_kernel, which changes them in place. Those that `grow` has lengthened are new arrays.
+    see path_places; `hear` changes them in place. Those that `grow` has lengthened are new arrays.
     """
 
     at: int
@@ -102,14 +112,14 @@ def append_bodies(
 
 def grow(path: Path, state: PathState, status: int) -> None:
     """Lengthen the tables after `hear` has said PLACES_SHORT or MEMORY_SHORT. Raises AudioError for what cannot be."""
-    if status == path_kernel.PLACES_SHORT:
+    if status == PLACES_SHORT:
         _add_places(path, state, len(state.sources))
-    elif status == path_kernel.MEMORY_SHORT:
+    elif status == MEMORY_SHORT:
         places = state.places
         short = np.maximum(places["need"], places["size"])
         _resize(path, state, 2 ** np.ceil(np.log2(short)).astype(np.int64))
         places["need"] = 0
-    elif status == path_kernel.TOO_FAR:
+    elif status == TOO_FAR:
         away_m = state.sources["away_m"].copy()
         state.sources["away_m"] = 0.0
         body = int(np.flatnonzero(away_m)[0])
@@ -155,13 +165,15 @@ def propagate(
         given[name] = np.ascontiguousarray(value, float)
         if given[name].shape != shape or (name not in ("source", "pushed") and not np.isfinite(given[name]).all()):
             raise AudioError(f"{name} of shape {given[name].shape}", f"give finite numbers of shape {shape}")
-    out, work = np.zeros((len(path.microphone_m), n)), np.zeros(path_kernel.WORK)
+    out, work = np.zeros((len(path.microphone_m), n)), np.zeros(WORK)
+    moved = np.ascontiguousarray(teleported, bool)
     while True:
-        status = path_kernel.hear(
-            state.at, step, n, 0, given["source"], given["pushed"], given["position0_m"], given["position1_m"], np.ascontiguousarray(teleported, bool), given["progress"], path.microphone_m,
-            path.samples_per_m, state.sources, state.places, state.lines, state.memory, tap_polynomials(), work, out, 0,
+        status = hear(
+            state.at, step, n, 0, given["source"], given["pushed"], given["position0_m"], given["position1_m"], moved,
+            given["progress"], path.microphone_m, path.samples_per_m, state.sources, state.places, state.lines,
+            state.memory, tap_polynomials(), work, out, 0,
         )  # fmt: skip
-        if status == path_kernel.DONE:
+        if status == DONE:
             break
         grow(path, state, status)
     state.at += n

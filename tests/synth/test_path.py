@@ -1,6 +1,4 @@
-"""Free air: distance, travel time, Doppler shift, direction, moves by hand, and the same bits however the calls are
-cut.
-"""
+"""Free air: distance, travel time, Doppler shift, direction, moves by hand, the same bits however calls are cut."""
 
 from __future__ import annotations
 
@@ -66,7 +64,7 @@ def moving(path: Path, state: PathState, source: Array, place: Array, velocity: 
                 progress,
             )
         )
-    return np.concatenate(parts, axis=1)[0]
+    return np.asarray(np.concatenate(parts, axis=1)[0])
 
 
 def tone(freq_hz: float, n: int) -> Array:

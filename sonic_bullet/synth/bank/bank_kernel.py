@@ -16,8 +16,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from sonic_bullet.machine.compiled import njit
 from sonic_bullet.synth.bank import drive, tile
+from sonic_bullet.synth.bank.kernels import inner, merged, outer
 from sonic_bullet.synth.bank.layout import COLUMNS, DRIVEN, FLOOR, FLUSH, MOST_DUE, PAIR, ROOM
 from sonic_bullet.synth.bank.strike_pool import begins, plan_nodes, release_done
 from sonic_bullet.synth.bank.tile import BLOCK, CHUNK, ROW, ROWS
@@ -29,8 +29,8 @@ PUSH_SCRATCH = COLUMNS // PAIR * ROOM * drive.STEP
 DRIVE_SCRATCH = PUSH_SCRATCH + DRIVEN * LANES + DRIVEN + MOST_DUE
 
 
-@njit(nogil=True, _nrt=False)
-def _ring(b, start, stop, columns, z, pole, block, weight, modes, observed, sound, scratch):  # pragma: no cover
+@inner
+def _ring(b, start, columns, z, pole, block, weight, modes, observed, sound, scratch):  # pragma: no cover
     """Tile of body b for the block that starts:
 
     sound (W, b, BLOCK). Turns z to the next block. False where all modes are below the floor.
@@ -39,8 +39,9 @@ def _ring(b, start, stop, columns, z, pole, block, weight, modes, observed, soun
     table = scratch[12 * CHUNK : (12 + 2 * ROW) * CHUNK]
     column = scratch[(12 + 2 * ROW) * CHUNK : RING_SCRATCH]
     ringing = False
-    for lo in range(start, stop, CHUNK):
-        count = min(CHUNK, stop - lo)
+    end = start + -(-columns // LANES) * LANES
+    for lo in range(start, end, CHUNK):
+        count = min(CHUNK, end - lo)
         if tile.turn(z, pole, block, modes, lo, count, FLOOR**2, now, powers) == 0:
             continue
         if not ringing:
@@ -57,7 +58,7 @@ def _ring(b, start, stop, columns, z, pole, block, weight, modes, observed, soun
     return ringing
 
 
-@njit(nogil=True, _nrt=False)
+@inner
 def bend_poles(z, driven, span, law, start, stop, pole, block):  # pragma: no cover - compiled
     """Poles of a level-dependent body for the ``span`` samples to come: means over them of what its modes do if nothing
     strikes them.
@@ -85,14 +86,14 @@ def bend_poles(z, driven, span, law, start, stop, pole, block):  # pragma: no co
             block[m], block[modes + m] = q * np.cos(turn * BLOCK), q * np.sin(turn * BLOCK)
 
 
-@njit(nogil=True, _nrt=False)
+@inner
 def _copy_flushed(values, out):  # pragma: no cover - compiled
     for k in range(len(out)):
         value = values[k]
         out[k] = value if abs(value) >= FLUSH else 0.0
 
 
-@njit(nogil=True, _nrt=False)
+@inner
 def _close_block(z, driven, pole, modes, start, stop):  # pragma: no cover - compiled
     """End of a block: what was driven within it joins the free state of the next."""
     for re in range(start, stop):
@@ -104,26 +105,31 @@ def _close_block(z, driven, pole, modes, start, stop):  # pragma: no cover - com
         driven[im] = 0.0
 
 
-@njit(nogil=True, _nrt=False)
+@inner
 def _flush(values, count):  # pragma: no cover - compiled
     for k in range(count):
         values[k] = values[k] if abs(values[k]) >= FLUSH else 0.0
 
 
-@njit(nogil=True, _nrt=False)
-def _share(n, force_n, progress, period, early, late):  # pragma: no cover - compiled
-    """A force's impulses, parted between both ends of its gains."""
-    for k in range(n):
-        push = force_n[k] * period
-        push = push if abs(push) >= FLUSH else 0.0
+@inner
+def _part_force(d, n, force_n, progress, period, signal):  # pragma: no cover - compiled
+    """A force's impulses, parted between both ends of its gains; zeros behind."""
+    stride, whole = signal.shape[2], n - n % LANES
+    early, late = signal[d, 0], signal[d, 1]
+    drive.part_force(
+        force_n, d * force_n.shape[1], progress, period, whole, signal, 2 * d * stride, (2 * d + 1) * stride
+    )
+    for k in range(whole, n):
+        push = force_n[d, k] * period
+        push = push if push * push >= FLUSH**2 else 0.0
         early[k] = push * (1.0 - progress[k])
         late[k] = push * progress[k]
-    for k in range(n, len(early)):
+    for k in range(n, stride):
         early[k] = 0.0
         late[k] = 0.0
 
 
-@njit(nogil=True, _nrt=False)
+@inner
 def list_forces(
     n, drive_count, drive_body, force_n, gain0, gain1, progress, period, bodies, first, side, signal
 ):  # pragma: no cover - compiled
@@ -150,13 +156,13 @@ def list_forces(
                 first[b] += 1
                 _flush(gain0[d, s], bodies[b].columns)
                 _flush(gain1[d, s], bodies[b].columns)
-        _share(n, force_n[d], progress, period, signal[d, 0], signal[d, 1])
+        _part_force(d, n, force_n, progress, period, signal)
     for b in range(count, 0, -1):
         first[b] = first[b - 1]
     first[0] = 0
 
 
-@njit(nogil=True, _nrt=False)
+@inner
 def _is_last(w, b, observed):  # pragma: no cover - compiled
     """Whether no weight set after w reads body b."""
     for v in range(w + 1, len(observed)):  # noqa: SIM110  numba knows no all()
@@ -165,7 +171,7 @@ def _is_last(w, b, observed):  # pragma: no cover - compiled
     return True
 
 
-@njit(nogil=True, _nrt=False)
+@inner
 def _press_strikes(
     sample, count, b, column, lanes, ringing, strikes, rows, hertz, pushes, keep, final, plan, due, push
 ):  # pragma: no cover - compiled
@@ -186,7 +192,7 @@ def _press_strikes(
     return pushes
 
 
-@njit(nogil=True, _nrt=False)
+@merged
 def _drive(
     at, i, count, b, place, start, stop, law, weight, observed, ringing, driven, sound, pole, strikes, rows, hertz,
     f0, f1, side, gain0, gain1, signal, plan, scratch, source,
@@ -230,7 +236,7 @@ def _drive(
             _copy_flushed(total, source[w, b, i : i + count])
 
 
-@njit(nogil=True, _nrt=False)
+@inner
 def _sound_free(b, i, end, place, observed, ringing, sound, source):  # pragma: no cover - compiled
     """Samples i … end - 1 of a body that only rings, or is silent."""
     for w in range(len(observed)):
@@ -241,27 +247,27 @@ def _sound_free(b, i, end, place, observed, ringing, sound, source):  # pragma: 
                 source[w, b, i:end] = 0.0
 
 
-@njit(nogil=True, _nrt=False)
+@inner
 def _open_block(
     b, start, stop, bodies, law, weight, observed, ringing, z, driven, sound, pole, block, scratch
 ):  # pragma: no cover - compiled
     """Begin of a block: its poles where they go with the level, and its free sound."""
     if bodies[b].bent and ringing[b].ringing:
-        bend_poles(z, driven, BLOCK, law, start, stop, pole, block)
+        bend_poles(z, driven, np.int64(BLOCK), law, start, stop, pole, block)
     alive = ringing[b].ringing != 0 and _ring(
-        b, start, stop, bodies[b].columns, z, pole, block, weight, law.shape[1], observed, sound, scratch
+        b, start, bodies[b].columns, z, pole, block, weight, law.shape[1], observed, sound, scratch
     )
     ringing[b].tiled = ringing[b].ringing = 1 if alive else 0
 
 
-@njit(nogil=True, _nrt=False)
+@merged
 def _advance_modes(
     at, n, b, bodies, law, weight, observed, ringing, z, driven, sound, pole, block, strikes, rows, hertz,
     f0, f1, side, gain0, gain1, signal, plan, scratch, source,
 ):  # fmt: skip  # pragma: no cover - compiled
     """Samples at … at + n - 1 of body b's modes into source (W, b, n or more)."""
     start, stop, modes = bodies[b].start, bodies[b].stop, law.shape[1]
-    i = 0
+    i = np.int64(0)  # a literal would be a type of its own, and what it is passed to compiled twice
     while i < n:
         place = (at + i) % BLOCK
         if place == 0:
@@ -272,7 +278,7 @@ def _advance_modes(
         if ringing[b].driven or f1 > f0 or begins(b, at + end, ringing, strikes):
             # what begins to be driven begins with the poles of what rings then
             if bodies[b].bent and (not ringing[b].driven or (at + i) % DRIVEN == 0):
-                bend_poles(z, driven, DRIVEN, law, start, stop, pole, block)
+                bend_poles(z, driven, np.int64(DRIVEN), law, start, stop, pole, block)
             _drive(
                 at, i, end - i, b, place, start, stop, law, weight, observed, ringing, driven, sound, pole, strikes,
                 rows, hertz, f0, f1, side, gain0, gain1, signal, plan, scratch, source,
@@ -288,7 +294,7 @@ def _advance_modes(
         i = end
 
 
-@njit(nogil=True, _nrt=False)
+@outer
 def advance(
     at, n, sr, bodies, law, weight, observed, ringing, z, driven, sound, pole, block, strikes, rows, free, hertz,
     drive_count, drive_body, force_n, gain0, gain1, direction0, direction1, progress, first, side, signal, kick, plan,
@@ -315,9 +321,8 @@ def advance(
                 source[w, b, :] = 0.0
         sounds[b, 0] = 1 if loud else 0
         moves = bodies[b].rigid != 0 and translate(
-            at, n, b, bodies, ringing, strikes, hertz, f0, f1, side, force_n, direction0, direction1, progress, period,
-            kick, pushed[b],
-        )  # fmt: skip
+            at, n, b, bodies, ringing, strikes, hertz, f0, f1, side, signal, direction0, direction1, kick, pushed[b]
+        )
         if not moves and sounds[b, 1]:
             pushed[b, :, :] = 0.0
         sounds[b, 1] = 1 if moves else 0

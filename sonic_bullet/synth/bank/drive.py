@@ -14,13 +14,14 @@ from __future__ import annotations
 
 from typing import Any
 
-from llvmlite import binding
+from llvmlite import binding, ir
 from numba import types
 from numba.extending import intrinsic
 
-from sonic_bullet.synth.bank.layout import PAIR, ROOM
+from sonic_bullet.synth.bank.layout import FLUSH, PAIR, ROOM
 from sonic_bullet.synth.vector import LANES, Emit, Value, constant
 
+BIT = ir.IntType(1)
 VECTORS = 4
 STEP = VECTORS * LANES  # numbers a sample and pair
 TILE = 8 if binding.get_host_cpu_features().get("avx512f", False) else 2  # samples whose sums fit the registers
@@ -28,6 +29,32 @@ TILE = 8 if binding.get_host_cpu_features().get("avx512f", False) else 2  # samp
 
 def _halves(e: Emit, array: Value, place: Value) -> list[Value]:
     return [e.load(array, place), e.load(array, e.shifted(place, LANES))]
+
+
+@intrinsic
+def part_force(typingctx, force_n, at, progress, period, count, signal, early, late):
+    """a0 and a1 of ``count`` samples, whole vectors: force·period·(1 - progress), force·period·progress.
+
+    force_n: flat from ``at`` on; signal: flat, a0 from early and a1 from late on. Impulses below FLUSH are 0.
+    """
+
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        e = Emit(context, builder, signature, args)
+        force_n, at, progress, period, count, signal, early, late = e.args
+        scale = e.spread(period)
+
+        def vector(k: Value, _: list[Value]) -> list[Value]:
+            push, x = builder.fmul(e.load(force_n, builder.add(at, k)), scale), e.load(progress, k)
+            large = builder.fcmp_ordered(">=", builder.fmul(push, push), constant(FLUSH**2))
+            push = builder.select(large, push, constant(0))
+            e.store(builder.fmul(push, builder.fsub(constant(1), x)), signal, builder.add(early, k))
+            e.store(builder.fmul(push, x), signal, builder.add(late, k))
+            return []
+
+        e.loop(count, LANES, [], vector)
+        return context.get_dummy_value()
+
+    return types.void(force_n, at, progress, period, count, signal, early, late), codegen
 
 
 @intrinsic
@@ -237,6 +264,45 @@ def run(typingctx, state, pole, modes, start, lanes, weight, weight_at, push, pu
         return context.get_dummy_value()
 
     return types.void(state, pole, modes, start, lanes, weight, weight_at, push, pushes, count, partial, keep), codegen
+
+
+@intrinsic
+def shove(typingctx, kick, width, side, first, last, signal, stride, direction0, direction1, count):
+    """Impulses of all forces along each axis: rows 0, 2, 4 of kick (6, width) = Σ ± (a0 d0 + a1 d1), whole vectors.
+
+    side, signal: as `press` has them; direction0, direction1: flat (drives, 3), on the lower body, the negative on the
+    higher.
+    """
+
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        e = Emit(context, builder, signature, args)
+        kick, width, side, first, last, signal, stride, direction0, direction1, count = e.args
+        forces = builder.sub(last, first)
+
+        def vector(k: Value, _: list[Value]) -> list[Value]:
+            def force(f: Value, total: list[Value]) -> list[Value]:
+                which = builder.load(builder.gep(side, [builder.add(first, f)]))
+                drive, higher = builder.lshr(which, e.index(1)), builder.trunc(which, BIT)
+                early = builder.add(builder.mul(drive, builder.shl(stride, e.index(1))), k)
+                a0, a1 = (
+                    builder.select(higher, builder.fneg(a), a)
+                    for a in (e.load(signal, early), e.load(signal, builder.add(early, stride)))
+                )
+                at = builder.mul(drive, e.index(3))
+                new = []
+                for axis in range(3):
+                    d0, d1 = (e.broadcast(direction, e.shifted(at, axis)) for direction in (direction0, direction1))
+                    new.append(e.fma(a1, d1, e.fma(a0, d0, total[axis])))
+                return new
+
+            for axis, value in enumerate(e.loop(forces, 1, [constant(0)] * 3, force)):
+                e.store(value, kick, builder.add(k, builder.mul(width, e.index(2 * axis))))
+            return []
+
+        e.loop(count, LANES, [], vector)
+        return context.get_dummy_value()
+
+    return types.void(kick, width, side, first, last, signal, stride, direction0, direction1, count), codegen
 
 
 @intrinsic

@@ -82,8 +82,8 @@ class Bank:
 
 @dataclass(slots=True, eq=False)
 class Scratch:
-    """Room of one call's own: for forces `first` (b+1,), `side` (2·drives,), `signal` (drives, 2, more than n); `kick`
-    (6, n or more), `plan` (DRIVEN, 3), `flat`.
+    """Room of one call's own. For forces `first` (b+1,), `side` (2·drives,), `signal` (drives, 2, LANES more than n),
+    `kick` (6, LANES more than n); `plan` (DRIVEN, 3), `flat`.
     """
 
     first: Array = field(default_factory=lambda: np.zeros(1, np.int64))
@@ -100,8 +100,8 @@ class Scratch:
         if len(self.side) < 2 * drives or self.signal.shape[2] < n + LANES:
             most, longest = max(len(self.side) // 2, drives), max(self.signal.shape[2] - LANES, n)
             self.side, self.signal = np.zeros(2 * most, np.int64), np.zeros((most, 2, longest + LANES))
-        if self.kick.shape[1] < n:
-            self.kick = np.zeros((6, n))
+        if self.kick.shape[1] < n + LANES:
+            self.kick = np.zeros((6, n + LANES))
 
 
 @dataclass(slots=True, eq=False)

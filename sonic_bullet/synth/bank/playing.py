@@ -78,8 +78,9 @@ def advance(
     _enter(bank, state, strikes)
     out = np.zeros((bank.weight.shape[0], bank.body_count, n))
     if pushed is None:
-        pushed = np.zeros((bank.body_count, 3, n))
-    pushed[...] = 0.0
+        pushed = np.zeros((bank.body_count, 3, n if bank.body["rigid"].any() else 0))  # else nobody writes there
+    else:
+        pushed[...] = 0.0
     scratch = state.scratch
     scratch.fit(bank.body_count, drives, n)
     bank_kernel.advance(

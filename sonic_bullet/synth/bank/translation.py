@@ -13,36 +13,25 @@ it has fallen below the floor at one of every DRIVEN samples of absolute time.
 # mypy: disable-error-code="no-untyped-def"
 from __future__ import annotations
 
-from sonic_bullet.machine.compiled import njit
+from sonic_bullet.synth.bank import drive
+from sonic_bullet.synth.bank.kernels import inner
 from sonic_bullet.synth.bank.layout import DRIVEN, FLOOR, FLUSH
 from sonic_bullet.synth.pulse import _cumulated
 
 
-@njit(nogil=True, error_model="numpy", _nrt=False)
-def _gather_forces(
-    n, first, last, side, force_n, direction0, direction1, progress, period, onset_re, onset_im, kick
-):  # pragma: no cover - compiled
-    """kick (6, n): what the body's forces leave in real and imaginary part of each axis."""
+@inner
+def _gather_forces(n, onset_re, onset_im, kick):  # pragma: no cover - compiled
+    """kick (6, n or more): from impulses in rows 0, 2, 4 to what they leave in real and imaginary part of each axis."""
     for axis in range(3):
         real, imag = kick[2 * axis], kick[2 * axis + 1]
         for k in range(n):
-            real[k] = 0.0
-        for f in range(first, last):
-            drive = side[f] >> 1
-            sign = 1.0 - 2.0 * (side[f] & 1)
-            start, change = sign * direction0[drive, axis], sign * (direction1[drive, axis] - direction0[drive, axis])
-            signal = force_n[drive]
-            for k in range(n):
-                real[k] += signal[k] * (start + change * progress[k])
-        for k in range(n):
-            impulse = real[k] * period
-            if abs(impulse) < FLUSH:
-                impulse = 0.0
+            impulse = real[k]
+            impulse = impulse if abs(impulse) >= FLUSH else 0.0
             real[k] = impulse * onset_re
             imag[k] = impulse * onset_im
 
 
-@njit(nogil=True, error_model="numpy", _nrt=False)
+@inner
 def _strike_cells(at, n, slot, strikes, hertz, kick):  # pragma: no cover - compiled
     """Add the cells of a strike that end by the samples at … at + n - 1. It is done after its last."""
     strike = strikes[slot]
@@ -66,7 +55,7 @@ def _strike_cells(at, n, slot, strikes, hertz, kick):  # pragma: no cover - comp
         strike.rigid = 0
 
 
-@njit(nogil=True, error_model="numpy", _nrt=False)
+@inner
 def _run_axes(at, n, b, bodies, ringing, kick, pushed):  # pragma: no cover - compiled
     """The recursion on all axes, through the samples at … at + n - 1."""
     p_re, p_im, weight = bodies[b].rigid_pole[0], bodies[b].rigid_pole[1], bodies[b].rigid_weight
@@ -101,29 +90,14 @@ def _run_axes(at, n, b, bodies, ringing, kick, pushed):  # pragma: no cover - co
     ringing[b].moving = 1 if moves else 0
 
 
-@njit(nogil=True, error_model="numpy", _nrt=False)
+@inner
 def translate(
-    at,
-    n,
-    b,
-    bodies,
-    ringing,
-    strikes,
-    hertz,
-    first,
-    last,
-    side,
-    force_n,
-    direction0,
-    direction1,
-    progress,
-    period,
-    kick,
-    pushed,
+    at, n, b, bodies, ringing, strikes, hertz, first, last, side, signal, direction0, direction1, kick, pushed
 ):  # pragma: no cover - compiled
     """Samples at … at + n - 1 of body b's translations into pushed (3, n). False, and nothing done, where they rest.
 
-    side[first … last - 1]: 2·drive + side of its forces; kick (6, n): scratch.
+    side[first … last - 1]: 2·drive + side of its forces; signal (drives, 2, more than n): their impulses at both ends;
+    kick (6, n and a vector more): scratch.
     """
     struck = False
     slot = ringing[b].strike
@@ -132,8 +106,8 @@ def translate(
         slot = strikes[slot].next
     if not (struck or last > first or ringing[b].moving):
         return False
-    onset_re, onset_im = bodies[b].rigid_onset[0], bodies[b].rigid_onset[1]
-    _gather_forces(n, first, last, side, force_n, direction0, direction1, progress, period, onset_re, onset_im, kick)
+    drive.shove(kick, kick.shape[1], side, first, last, signal, signal.shape[2], direction0, direction1, n)
+    _gather_forces(n, bodies[b].rigid_onset[0], bodies[b].rigid_onset[1], kick)
     slot = ringing[b].strike
     while struck and slot >= 0:
         if strikes[slot].rigid:

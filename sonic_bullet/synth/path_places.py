@@ -1,0 +1,164 @@
+"""Where bodies are and were, and whether what they emit can be taken in: the sound path's tables.
+
+A body has a chain of places, by when it came there: its present position is the last, and those before it, which it was
+moved away from by hand, stay until the last of their sound has arrived. A line is one place and one microphone, line
+place·channels + c. Its history lies in memory from place.memory_at + c·2·(size + MIRRORED) on: emitted, then delays,
+both rings of a power of two with their first MIRRORED elements once more at their ends, so that what is read is always
+contiguous.
+"""
+
+# mypy: disable-error-code="no-untyped-def"
+from __future__ import annotations
+
+import numpy as np
+
+from sonic_bullet.machine.compiled import njit
+from sonic_bullet.synth.fractional_delay import INFINITE, TAPS, greatest
+from sonic_bullet.synth.vector import LANES
+
+DONE, MEMORY_SHORT, PLACES_SHORT, TOO_FAR, NOT_FINITE = range(5)
+"""What `hear` says. But for DONE nothing has changed. After MEMORY_SHORT (a place's size is below its need) and
+PLACES_SHORT (one more a body are enough) it may be called again with longer tables: `path.grow`.
+"""
+
+FARTHEST_M = 1000.0
+BLOCK = 256
+MIRRORED = TAPS + LANES
+MARGIN = BLOCK + 64
+"""Samples remembered beyond the longest delay: a block is emitted before any of it is listened to."""
+
+SOURCE = np.dtype(
+    [
+        ("radius_m", "f8"),
+        ("oldest", "i8"),  # place: the first of its chain
+        ("main", "i8"),  # its present place, the last of the chain
+        ("leaving", "i8"),  # the place it left in step ``left``; -1: none
+        ("left", "i8"),  # step in which it was last moved by hand; -1: none
+        ("sounds", "i8"),  # 1: emits something in this call
+        ("fresh", "i8"),  # place it gets in this call; -1: none
+        ("away_m", "f8"),  # where `hear` says TOO_FAR: from the farthest microphone; else 0
+    ],
+    align=True,
+)
+"""A body that sounds."""
+
+PLACE = np.dtype(
+    [
+        ("body", "i8"),  # -1: free
+        ("next", "i8"),  # the body's following place; -1: none
+        ("rest_m", "f8", (3,)),  # where it lies, once left
+        ("size", "i8"),  # samples remembered, a power of two
+        ("need", "i8"),  # where `hear` says MEMORY_SHORT: samples it must remember at least
+        ("memory_at", "i8"),
+    ],
+    align=True,
+)
+"""A body's present position or one that it was moved away from."""
+
+LINE = np.dtype([("awake", "i8"), ("cursor", "i8"), ("newest", "i8")], align=True)
+"""awake: sound is under way; cursor: the emitted sample arrived last; newest: the last emitted that is not zero."""
+
+inner_njit = njit(nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+"""Of a kernel: called by compiled code alone (from Python it crashes), and so compiled without a door to it."""
+
+
+@inner_njit
+def _awake(lines, place, channels):  # pragma: no cover - compiled
+    """Whether sound of the place is under way to any microphone."""
+    line, stop = place * channels, (place + 1) * channels
+    while line < stop and lines[line].awake == 0:
+        line += 1
+    return line < stop
+
+
+@inner_njit
+def _fits(place, source, square, samples_per_m):  # pragma: no cover - compiled
+    """DONE, or what is wrong with a place that sounds at a distance of such a square."""
+    away_m = np.sqrt(square)
+    if not away_m < np.inf:
+        return NOT_FINITE
+    if away_m > FARTHEST_M:
+        source.away_m = away_m
+        return TOO_FAR
+    need = int(away_m * samples_per_m) + 1 + MARGIN
+    if need <= place.size:
+        return DONE
+    place.need = need
+    return MEMORY_SHORT
+
+
+@inner_njit
+def _free_place(places, lines, sources, step, p, channels):  # pragma: no cover - compiled
+    """The next place from p on that nothing is heard from and no body needs; the number of places for none."""
+    while p < len(places):
+        b = places[p].body
+        if b < 0:
+            break
+        needed = p == sources[b].main or (p == sources[b].leaving and sources[b].left == step)
+        if not needed and not _awake(lines, p, channels):
+            break
+        p += 1
+    return p
+
+
+@inner_njit
+def survey(step, n, first, source, pushed, begin_m, end_m, teleported, microphone_m, samples_per_m,
+           sources, places, lines):  # fmt: skip  # pragma: no cover - compiled
+    """Mark which bodies emit anything, find new places for those moved by hand in this step, and say what is in the
+    way: the distance of what sounds is greatest at an end of the step.
+
+    Silence needs no fade: a body of which nothing is observed keeps its place.
+    """
+    channels, long = len(microphone_m), source.shape[1]
+    free, wrong = np.int64(0), DONE  # a plain 0 is a type of its own, and each callee is compiled for it too
+    for b in range(len(sources)):
+        body = sources[b]
+        most = greatest(source, b * long + first, pushed, 3 * b * long + first, long, n)
+        if most >= INFINITE:
+            return NOT_FINITE
+        body.sounds, body.fresh, body.away_m = 1 if most > 0 else 0, -1, 0.0
+        start, stop = 0.0, 0.0
+        for c in range(channels):
+            here, there = 0.0, 0.0
+            for axis in range(3):
+                u, v = begin_m[b, axis] - microphone_m[c, axis], end_m[b, axis] - microphone_m[c, axis]
+                here += u * u
+                there += v * v
+            start, stop = start if here <= start else here, stop if there <= stop else there
+        main, old = body.main, -1
+        observed = body.sounds == 1 or _awake(lines, main, channels)
+        if body.left == step:
+            if body.sounds == 1 or _awake(lines, body.leaving, channels):
+                old = body.leaving
+        elif teleported[b] and observed:
+            main, old = _free_place(places, lines, sources, step, free, channels), main
+            if main == len(places):
+                return PLACES_SHORT
+            body.fresh, free = main, main + 1
+        elif start > stop or not start < np.inf:
+            stop = start
+        for k in range(2):
+            p = main if k == 0 else old
+            if p >= 0 and (k == 1 or observed):
+                said = _fits(places[p], body, stop if k == 0 else start, samples_per_m)
+                wrong = said if said > wrong else wrong
+    return wrong
+
+
+@inner_njit
+def move_body(step, sources, places, b, p):  # pragma: no cover - compiled
+    """Give body b the present place p; the one it had is left."""
+    old = places[p].body
+    if old >= 0:  # out of the chain that it was asleep in
+        if sources[old].oldest == p:
+            sources[old].oldest = places[p].next
+        else:
+            before = sources[old].oldest
+            while places[before].next != p:
+                before = places[before].next
+            places[before].next = places[p].next
+        if sources[old].leaving == p:
+            sources[old].leaving = -1
+    places[p].body, places[p].next = b, -1
+    places[sources[b].main].next = p
+    sources[b].leaving, sources[b].main, sources[b].left = sources[b].main, p, step
