@@ -2,8 +2,8 @@
 
     python benchmarks/run_time.py [--boxes 1 20 100] [--steps 480] [--only piles quiet slide robot replay]
 
-Every ratio is of two times of one run: two worlds of the same bodies step in turn, one with a listener, one without, and
-processor time is taken round each step. Piles fall and settle; a box is of plastic and has 64 audible modes
+Every ratio is of two times of one run: two worlds of the same bodies step in turn, one with a listener, one without,
+and processor time is taken round each step. Piles fall and settle; a box is of plastic and has 64 audible modes
 (asserted); one microphone. The table names what must hold beside what was measured.
 """
 
@@ -88,7 +88,8 @@ def paired(make: Callable[[], Any], steps: int, **options: Any) -> tuple[float, 
         sounding.stepSimulation()
         without[k], with_sound[k] = between - begin, time.process_time_ns() - between
     listener.detach()
-    disconnect(bare), disconnect(sounding)
+    disconnect(bare)
+    disconnect(sounding)
     return float(without.mean()) / 1e9, float(with_sound.mean()) / 1e9, float(np.quantile(with_sound, 0.99)) / 1e9
 
 
@@ -136,7 +137,7 @@ def robot() -> list[Row]:
                     listener.add(body, material="plastic", count=MODES)
         rng = np.random.default_rng(0)
         for k in range(140):
-            action = rng.uniform(-1, 1, env.action_space.shape).astype(np.float32)  # type: ignore[arg-type]
+            action = rng.uniform(-1, 1, env.action_space.shape).astype(np.float32)
             begin = time.perf_counter()
             env.step(action)
             if k >= 40:

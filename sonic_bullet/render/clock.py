@@ -14,7 +14,7 @@ from sonic_bullet.records import Array
 
 @dataclass(frozen=True, slots=True)
 class Clock:
-    """Time at the start of a step, ticks/per_second in whole numbers, so that an hour of steps of 1/240 s has no drift."""
+    """Time at the start of a step, ticks/per_second in whole numbers: an hour of steps of 1/240 s has no drift."""
 
     ticks: int = 0
     per_second: int = 1

@@ -24,7 +24,7 @@ from sonic_bullet.render.strike_pulses import STRIKE, find_pulses
 from sonic_bullet.synth.bank import bank_kernel
 from sonic_bullet.synth.bank.bank_kernel import DRIVE_SCRATCH, RING_SCRATCH
 from sonic_bullet.synth.bank.layout import DRIVEN
-from sonic_bullet.synth.bank.strike_pool import enter_strike
+from sonic_bullet.synth.bank.strike_pool import enter_pulses
 from sonic_bullet.synth.path_kernel import WORK, hear
 from sonic_bullet.synth.path_places import DONE
 from sonic_bullet.synth.strikes import LOOKAHEAD, SPAN
@@ -87,8 +87,9 @@ def take(
 
 @njit(nogil=True, error_model="numpy")
 def excite(
-    number, quench, x, sr, window, window_quaternion, window_teleported, rows, bodies, faces, nodes, shapes, frequency_hz,
-    spectrum, pairs, active, counts, gain, pulses, push, force, gain0, gain1, direction0, direction1, drive_body, drive_slot,
+    number, quench, x, sr, window, window_quaternion, window_teleported, rows, bodies, faces, nodes, shapes,
+    frequency_hz, spectrum, pairs, active, counts, gain, pulses, push, force, gain0, gain1, direction0, direction1,
+    drive_body, drive_slot,
 ):  # fmt: skip  # pragma: no cover - compiled
     """Strikes and friction of step ``number``: how many pulses and drives there are of it."""
     here, there = window[number % SPAN], window[(number + 1) % SPAN]
@@ -100,45 +101,42 @@ def excite(
             bodies[b].placed = number + 1
     strikes, voices = np.empty(counts[0], STRIKE), np.empty(counts[0], VOICE)
     found = find_pulses(
-        np.int64(0), number, 0.0, here.dt_s, here.gravity_m_s2, window_quaternion[number % SPAN], rows, known, pairs, active, counts,
-        bodies, faces, nodes, shapes, frequency_hz, spectrum, strikes, pulses, push, np.int64(0),
+        np.int64(0), number, 0.0, here.dt_s, here.gravity_m_s2, window_quaternion[number % SPAN], rows, known, pairs,
+        active, counts, bodies, faces, nodes, shapes, frequency_hz, spectrum, strikes, pulses, push, np.int64(0),
     )  # fmt: skip
     # else what strikes after the quench would be dated back before it, and be lost: it waits for its own step
     if not quench:
         found = find_pulses(
-            np.int64(1), number + 1, -here.dt_s, there.dt_s, there.gravity_m_s2, window_quaternion[(number + 1) % SPAN], rows, known,
-            pairs, active, counts, bodies, faces, nodes, shapes, frequency_hz, spectrum, strikes, pulses, push, found,
+            np.int64(1), number + 1, -here.dt_s, there.dt_s, there.gravity_m_s2, window_quaternion[(number + 1) % SPAN],
+            rows, known, pairs, active, counts, bodies, faces, nodes, shapes, frequency_hz, spectrum, strikes, pulses,
+            push, found,
         )  # fmt: skip
     drives = advance_friction(
-        pairs, active, counts[0], bodies, rows[known[1, 0] : known[1, 1]], known[1, 1] - known[1, 0], faces, nodes, shapes,
-        window_quaternion[(number + 1) % SPAN], here.dt_s, x, sr, gain, voices, force, gain0, gain1, direction0, direction1,
-        drive_body, drive_slot,
+        pairs, active, counts[0], bodies, rows[known[1, 0] : known[1, 1]], known[1, 1] - known[1, 0], faces, nodes,
+        shapes, window_quaternion[(number + 1) % SPAN], here.dt_s, x, sr, gain, voices, force, gain0, gain1, direction0,
+        direction1, drive_body, drive_slot,
     )  # fmt: skip
     return found, drives
 
 
 @njit(nogil=True, error_model="numpy")
 def ring(
-    step, sr, found, pulses, push, drives, drive_body, force, gain0, gain1, direction0, direction1, x, bank_body, law, weight,
-    observed, ringing, z, driven, sound, pole, block, strikes, phasors, free_strikes, hertz, source, pushed, sounds,
+    step, sr, found, pulses, push, drives, drive_body, force, gain0, gain1, direction0, direction1, x, bank_body, law,
+    weight, observed, ringing, z, driven, sound, pole, block, strikes, phasors, free_strikes, hertz, source, pushed,
+    sounds,
 ):  # fmt: skip  # pragma: no cover - compiled
     """The step's pulses and drives on the bank: source (W, b, n or more) and pushed (b, 3, n or more)."""
-    for p in range(found):
-        pulse = pulses[p]
-        begin_s = step.after_s if pulse.ahead else step.begin_s
-        start = max((begin_s + pulse.start_s) * sr, float(step.sample))
-        for side in range(2):
-            sign, j = 1.0 if side == 0 else -1.0, pulse.impulse_n_s
-            enter_strike(
-                pulse.body[side], start, pulse.length_s, pulse.flat, pulse.share, push[p, side], sign * j[0], sign * j[1],
-                sign * j[2], step.sample, sr, bank_body, law, ringing, strikes, phasors, free_strikes, hertz,
-            )  # fmt: skip
+    enter_pulses(
+        pulses, found, push, step.begin_s, step.after_s, step.sample, sr, bank_body, law, ringing, strikes, phasors,
+        free_strikes, hertz,
+    )  # fmt: skip
     n = step.count
     bank_kernel.advance(
         step.sample, n, sr, bank_body, law, weight, observed, ringing, z, driven, sound, pole, block, strikes, phasors,
         free_strikes, hertz, drives, drive_body, force, gain0, gain1, direction0, direction1, x,
         np.empty(len(bank_body) + 1, np.int64), np.empty(2 * drives, np.int64), np.empty((drives, 2, n + LANES)),
-        np.empty((6, n + LANES)), np.empty((DRIVEN, 3), np.int64), aligned(max(DRIVE_SCRATCH, RING_SCRATCH)), source, pushed, sounds,
+        np.empty((6, n + LANES)), np.empty((DRIVEN, 3), np.int64), aligned(max(DRIVE_SCRATCH, RING_SCRATCH)), source,
+        pushed, sounds,
     )  # fmt: skip
 
 
@@ -173,8 +171,8 @@ def advance_steps(
     and how many pulses and drives the last one has.
 
     taken: number of the first step of the table; start: sample of out's first. contacts: of all steps; position (k, b,
-    3), quaternion (k, b, 4), teleported (k, b). pressure (microphones, as out). pause: come back before the first step is
-    heard; resume: the first step rings already, and is to be heard.
+    3), quaternion (k, b, 4), teleported (k, b). pressure (microphones, as out). pause: come back before the first step
+    is heard; resume: the first step rings already, and is to be heard.
     """
     found, drives, done = 0, 0, 0
     for i in range(first, len(steps)):
@@ -199,14 +197,14 @@ def advance_steps(
             if anew:
                 signal = force[: len(drive_slot) * n].reshape((len(drive_slot), n))
                 found, drives = excite(
-                    number, step.quench, x, sr, window, window_quaternion, window_teleported, rows, bodies, faces, nodes, shapes,
-                    frequency_hz, spectrum, pairs, active, counts, gain, pulses, push, signal, gain0, gain1, direction0,
-                    direction1, drive_body, drive_slot,
+                    number, step.quench, x, sr, window, window_quaternion, window_teleported, rows, bodies, faces,
+                    nodes, shapes, frequency_hz, spectrum, pairs, active, counts, gain, pulses, push, signal, gain0,
+                    gain1, direction0, direction1, drive_body, drive_slot,
                 )  # fmt: skip
                 ring(
-                    step, sr, found, pulses, push, drives, drive_body, signal, gain0, gain1, direction0, direction1, x, bank_body,
-                    law, weight, observed, ringing, z, driven, sound, pole, block, strikes, phasors, free_strikes, hertz, source,
-                    pushed, sounds,
+                    step, sr, found, pulses, push, drives, drive_body, signal, gain0, gain1, direction0, direction1, x,
+                    bank_body, law, weight, observed, ringing, z, driven, sound, pole, block, strikes, phasors,
+                    free_strikes, hertz, source, pushed, sounds,
                 )  # fmt: skip
             if pause and anew:
                 return done, PAUSED, found, drives
@@ -231,7 +229,8 @@ def finish(
     here, there, at = number % SPAN, (number + 1) % SPAN, step.sample - start
     status = hear(
         step.sample, number, step.count, np.int64(0), source[0], pushed, window_position[here], window_position[there],
-        window_teleported[there], x, microphone_m, samples_per_m, sources, places, lines, memory, taps, np.zeros(WORK), pressure, at,
+        window_teleported[there], x, microphone_m, samples_per_m, sources, places, lines, memory, taps, np.zeros(WORK),
+        pressure, at,
     )  # fmt: skip
     if status != DONE:
         return status

@@ -88,8 +88,8 @@ class Window:
 
 @dataclass(slots=True, eq=False)
 class TouchingPairs:
-    """TouchingPairs of bodies that touch: pair (slots,) PAIR, active (slots,): those in use by rising key, count (2,): how many
-    are in use and how many are free, free (slots,); gain (slots, 2, columns): Uᵀ per newton on either body.
+    """Bodies that touch: pair (slots,) PAIR, active (slots,): those in use by rising key, count (2,): how many are in
+    use and how many are free, free (slots,); gain (slots, 2, columns): Uᵀ per newton on either body.
     """
 
     pair: Array
@@ -176,7 +176,6 @@ class State:
     rubs: Rubs = field(default_factory=dict)
     quenches: frozenset[int] = frozenset()
     scratch: StepScratch = field(default_factory=StepScratch)
-
     reads: Array = field(default_factory=lambda: np.zeros(0, np.int64))
     has_residual: bool = False
     _tables: tuple[Any, ...] | None = None

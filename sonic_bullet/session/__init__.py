@@ -31,6 +31,7 @@ from sonic_bullet.records.coerce import (
     as_path,
     as_whole,
     check_options,
+    shown,
 )
 from sonic_bullet.records.contacts import Event, Step
 from sonic_bullet.records.errors import AudioError, SceneError, SizeWarning
@@ -142,7 +143,8 @@ class Listener:
         cast: from a body, (body, link) or (body, "all") to its material, or to keywords of `add`. What was never
         computed before is computed side by side, on two cores. progress, warnings, errors: as `add` has them.
         """
-        as_kind(cast, Mapping, "cast", "give a dict from bodies to materials", error=SceneError)
+        if not isinstance(cast, Mapping):
+            raise SceneError(f"cast is {shown(cast)}", "give a dict from bodies to materials")
         return self._added([_wanted(self.world, who, how) for who, how in cast.items()], progress)
 
     def _added(
