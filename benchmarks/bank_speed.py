@@ -11,15 +11,20 @@ disturbs it less.
 from __future__ import annotations
 
 import argparse
+import sys
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 from numba import njit
 from scipy.signal import lfilter
 
 from sonic_bullet.records import Array
-from sonic_bullet.synth.bank import Force, ModeSet, Strike, advance, append, empty_bank
+from sonic_bullet.synth.bank import ModeSet, append, empty_bank
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from tests.made.banks import Force, Strike, advance
 
 SR, FRAME = 48_000, 200
 FRAMES = 32  # 6400 samples: 25 of the bank's blocks

@@ -8,13 +8,18 @@ ratio to the plain way: scipy's cubic interpolation of each body's history at th
 
 from __future__ import annotations
 
+import sys
 import time
+from pathlib import Path
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
 from sonic_bullet.records import Air
-from sonic_bullet.synth.path import append_bodies, empty_path, propagate
+from sonic_bullet.synth.path import append_bodies, empty_path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from tests.made.paths import propagate
 
 SR, FRAME, BODIES = 48_000, 200, 100
 MICROPHONES = np.array([[0.0, -1.0, 0.5], [0.2, -1.0, 0.5]])

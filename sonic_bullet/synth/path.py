@@ -10,7 +10,7 @@ interpolation's length. Flat to 0.02 dB up to 18 kHz at 48 kHz. Every sample dep
 cutting the calls gives the same bits. A body moved by hand emits from its old place and its new one, fading over the
 step: no click and no chirp.
 
-The work is done by `hear` on the state's tables; here they are made, checked at the door and lengthened.
+The work is done by `path_kernel.hear` on the state's tables; here they are made and lengthened.
 b bodies, c microphones, n samples, t places.
 """
 
@@ -23,10 +23,7 @@ import numpy as np
 
 from sonic_bullet.records import Air, Array
 from sonic_bullet.records.errors import AudioError
-from sonic_bullet.synth.fractional_delay import tap_polynomials
-from sonic_bullet.synth.path_kernel import WORK, hear
 from sonic_bullet.synth.path_places import (
-    DONE,
     FARTHEST_M,
     LINE,
     MEMORY_SHORT,
@@ -88,13 +85,9 @@ def empty_path(sr: int, air: Air, microphone_m: Array, at: int = 0) -> tuple[Pat
     return Path(int(sr), air, place), state
 
 
-def append_bodies(
-    path: Path, state: PathState, radius_m: Array, jerk_coefficient: object = None
-) -> tuple[Path, PathState]:
+def append_bodies(path: Path, state: PathState, radius_m: Array) -> tuple[Path, PathState]:
     """Path and state with further bodies (k,), a place each; what is under way goes on unchanged. The old pair stays
     usable.
-
-    jerk_coefficient: not used; what is pushed comes in Pa·m.
     """
     radius = np.array(radius_m, float).ravel()
     if not np.isfinite(radius).all():
@@ -131,53 +124,6 @@ def grow(path: Path, state: PathState, status: int) -> None:
         raise AudioError(
             "a source, a push or a place that is not finite", "look for the step whose contacts or loads produced it"
         )
-
-
-def propagate(
-    path: Path,
-    state: PathState,
-    step: int,
-    source: Array,
-    pushed: Array,
-    position0_m: Array,
-    position1_m: Array,
-    teleported: Array,
-    progress: Array,
-) -> Array:
-    """Pressure (c, n) in Pa at the next n samples. Changes ``state`` in place.
-
-    step ≥ 0: number of the physics step that these samples are (part of). source (b, n) in Pa·m; pushed (b, 3, n) in
-    Pa·m, world frame. position0_m, position1_m (b, 3): at the step's start and end; progress (n,): where between them
-    each sample lies, 0 … 1. teleported (b,): moved by hand, so both places sound and fade over the step. Bodies are
-    summed in order. Below 1e-30 Pa: 0. Raises AudioError on wrong shapes, numbers that are not finite, or a sounding
-    body more than 1 km from a microphone.
-    """
-    count, n = len(state.sources), len(progress)
-    wanted = {
-        "source": (source, (count, n)),
-        "pushed": (pushed, (count, 3, n)),
-        "position0_m": (position0_m, (count, 3)),
-        "position1_m": (position1_m, (count, 3)),
-        "progress": (progress, (n,)),
-    }
-    given = {}
-    for name, (value, shape) in wanted.items():
-        given[name] = np.ascontiguousarray(value, float)
-        if given[name].shape != shape or (name not in ("source", "pushed") and not np.isfinite(given[name]).all()):
-            raise AudioError(f"{name} of shape {given[name].shape}", f"give finite numbers of shape {shape}")
-    out, work = np.zeros((len(path.microphone_m), n)), np.zeros(WORK)
-    moved = np.ascontiguousarray(teleported, bool)
-    while True:
-        status = hear(
-            state.at, step, n, 0, given["source"], given["pushed"], given["position0_m"], given["position1_m"], moved,
-            given["progress"], path.microphone_m, path.samples_per_m, state.sources, state.places, state.lines,
-            state.memory, tap_polynomials(), work, out, 0,
-        )  # fmt: skip
-        if status == DONE:
-            break
-        grow(path, state, status)
-    state.at += n
-    return out
 
 
 def _stride(size: Array) -> Array:

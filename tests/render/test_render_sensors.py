@@ -16,6 +16,7 @@ from sonic_bullet.render import render_log
 from sonic_bullet.render.resonator import build_resonator
 from sonic_bullet.synth import bank
 from sonic_bullet.synth.pulse import pulse_spectrum
+from tests.made.banks import Force, advance
 from tests.made.models import STEEL, ball_body, box_body, row, step, wall_body
 from tests.made.pulses import cumulated_force, jerk_of
 from tests.made.stages import Stages
@@ -291,7 +292,7 @@ def test_a_force_that_swings_moves_a_rigid_body_as_the_sphere_law_says(radius: f
     n = 9600
     along, pushed = np.array([1.0, 0.0, 0.0]), np.zeros((1, 3, n))
     force = np.sin(2 * np.pi * freq * np.arange(n) / SR)
-    bank.advance(instrument, ringing, n, (), [bank.Force(0, force, none, none, along, along)], np.zeros(n), pushed)
+    advance(instrument, ringing, n, (), [Force(0, force, none, none, along, along)], np.zeros(n), pushed)
     out = pushed[0, 0]
     s, w = 2j * np.pi * freq, resonator.translation.omega_rad_s
     law = abs(2 * jerk_coefficient(body.volume_m3, Air()) * w**2 * s / ((s + w) ** 2 + w**2)) / body.mass_kg

@@ -10,17 +10,8 @@ import pytest
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import AudioError
 from sonic_bullet.synth import bank as bank_module
-from sonic_bullet.synth.bank import (
-    Force,
-    ModeSet,
-    Strike,
-    Translation,
-    advance,
-    append,
-    audible,
-    empty_bank,
-    silence,
-)
+from sonic_bullet.synth.bank import ModeSet, Translation, append, audible, empty_bank, silence
+from tests.made.banks import Force, Strike, advance
 from tests.made.pulses import pulse_cells, pulse_nodes
 
 SR = 48_000
@@ -272,37 +263,7 @@ def test_audible_drops_what_cannot_be_played_and_append_refuses_it() -> None:
         append(bank, state, [ModeSet(omega[2:3], decay[2:3], np.ones((1, 1), complex))])
 
 
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"start": -5.0}, "have sounded"),
-        ({"start": float("nan")}, "finite start"),
-        ({"length_s": 0.0}, "finite start"),
-        ({"length_s": float("inf")}, "finite start"),
-        ({"shove_n_s": np.array([1.0, np.inf, 0.0])}, "finite start"),
-        ({"gain": np.ones(8)}, "gain of shape"),
-        ({"gain": np.full(9, np.nan)}, "not finite"),
-        ({"body": 7}, "body 7 of 1"),
-    ],
-)
-def test_bad_strikes_are_named(change: dict[str, object], message: str) -> None:
-    bank, state = empty_bank(SR)
-    bank, state = append(bank, state, [random_modes(np.random.default_rng(1), 9)])
-    good: dict[str, object] = {"body": 0, "start": 3.0, "length_s": 1e-3, "gain": np.ones(9)}
-    with pytest.raises(AudioError, match=message):
-        advance(bank, state, 10, [Strike(**(good | change))])  # type: ignore[arg-type]
-
-
-def test_bad_forces_rates_and_states_are_named() -> None:
-    bank, state = empty_bank(SR)
-    grown, _ = append(bank, state, [random_modes(np.random.default_rng(1), 9)])
-    with pytest.raises(AudioError, match="bank of 1"):
-        advance(grown, state, 10)
-    grown, state = append(bank, state, [random_modes(np.random.default_rng(1), 9)])
-    with pytest.raises(AudioError, match="force that is not finite"):
-        advance(grown, state, 10, forces=[Force(0, np.full(10, np.nan), np.ones(9), np.ones(9))])
-    with pytest.raises(AudioError, match="shape"):
-        advance(grown, state, 10, forces=[Force(0, np.ones(9), np.ones(9), np.ones(9))])
+def test_bad_rates_are_named() -> None:
     for rate in (0, -1, 10**9, 44_100.5):
         with pytest.raises(AudioError, match="sample rate"):
             empty_bank(rate)  # type: ignore[arg-type]

@@ -10,7 +10,8 @@ import pytest
 from sonic_bullet.effects.common.ringing import sounded
 from sonic_bullet.effects.protocol import Impact, Ring
 from sonic_bullet.records import Array
-from sonic_bullet.synth.bank import ModeSet, Strike, advance, append, empty_bank, silence
+from sonic_bullet.synth.bank import ModeSet, append, empty_bank, silence
+from tests.made.banks import Strike, advance
 
 SR = 48_000
 HZ, DECAY, GAIN = np.array([440.0, 1234.5, 3000.0]), np.array([3.0, 8.0, 20.0]), np.array([1.0, 0.6, 0.8])

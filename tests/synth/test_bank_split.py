@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sonic_bullet.records import Array
-from sonic_bullet.synth.bank import Bank, BankState, Force, ModeSet, Strike, Translation, advance, append, empty_bank
+from sonic_bullet.synth.bank import Bank, BankState, ModeSet, Translation, append, empty_bank
+from tests.made.banks import Force, Strike, advance
 
 SR = 48_000
 SIZES = (5, 0, 33, 1, 70, 8, 16)

@@ -7,19 +7,10 @@ import pytest
 
 from sonic_bullet.records import Array
 from sonic_bullet.render.tables import PULSE
-from sonic_bullet.synth.bank import (
-    Bank,
-    BankState,
-    ModeSet,
-    Strike,
-    Translation,
-    advance,
-    append,
-    bank_kernel,
-    empty_bank,
-)
+from sonic_bullet.synth.bank import Bank, BankState, ModeSet, Translation, append, bank_kernel, empty_bank
 from sonic_bullet.synth.bank.strike_pool import enter_pulses
-from sonic_bullet.synth.pulse import _table
+from sonic_bullet.synth.pulse import pulse_table
+from tests.made.banks import Strike, advance, room
 
 SR = 48_000
 
@@ -50,7 +41,7 @@ def enter(bank: Bank, state: BankState, table: Array, push: Array) -> int:
     return int(
         enter_pulses(
             table, len(table), push, 0.0, 1 / 240, 0, float(SR), bank.body, bank.law, state.ringing, state.strikes,
-            state.rows, state.free, _table(),
+            state.rows, state.free, pulse_table(),
         )
     )  # fmt: skip
 
@@ -82,9 +73,9 @@ def test_a_full_pool_is_said_and_takes_whole_pulses_alone() -> None:
     bank, state = bodies(rng)
     table, push = pulses(rng, 5)
     state.with_room(5)
-    room = int(state.free[0])
-    assert enter(bank, state, table, push) == room // 2
-    assert state.free[0] == room % 2
+    free = int(state.free[0])
+    assert enter(bank, state, table, push) == free // 2
+    assert state.free[0] == free % 2
 
 
 @pytest.mark.parametrize("dirty", [0, 1])
@@ -97,16 +88,15 @@ def test_rows_of_silent_bodies_are_zero_and_are_told_from_those_that_sound(dirty
     table["body"], table["start_s"] = [0, 0], 0.0
     enter(bank, state, table, push)
     source, pushed = np.full((1, 2, 300), float(dirty)), np.full((2, 3, 300), float(dirty))
-    sounds, scratch = np.full((2, 2), dirty), state.scratch
-    scratch.fit(2, 0, 300)
+    sounds, scratch = np.full((2, 2), dirty), room(2, 0, 300)
     none, gain, along = np.zeros((0, 2), np.int64), np.zeros((0, 2, bank.columns)), np.zeros((0, 3))
     loud = []
     for step in range(600):
         bank_kernel.advance(
             step * 300, 300, float(SR), bank.body, bank.law, bank.weight, bank.observed, state.ringing, state.z,
-            state.driven, state.sound, state.pole, state.block, state.strikes, state.rows, state.free, _table(),
-            0, none, np.zeros((0, 300)), gain, gain, along, along, np.zeros(300), scratch.first, scratch.side,
-            scratch.signal, scratch.kick, scratch.plan, scratch.flat, source, pushed, sounds,
+            state.driven, state.sound, state.pole, state.block, state.strikes, state.rows, state.free, pulse_table(),
+            0, none, np.zeros((0, 300)), gain, gain, along, along, np.zeros(300), *scratch,
+            source, pushed, sounds,
         )  # fmt: skip
         loud.append(sounds[0].copy())
         assert not source[0, 1].any()

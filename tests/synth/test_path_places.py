@@ -10,9 +10,10 @@ from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Air, Array
 from sonic_bullet.records.errors import AudioError
 from sonic_bullet.synth.fractional_delay import AHEAD, KAISER_BETA, TAPS, tap_polynomials
-from sonic_bullet.synth.path import Path, PathState, append_bodies, empty_path, grow, propagate
+from sonic_bullet.synth.path import Path, PathState, append_bodies, empty_path, grow
 from sonic_bullet.synth.path_kernel import WORK, hear
 from sonic_bullet.synth.path_places import DONE, MEMORY_SHORT, NOT_FINITE, PLACES_SHORT, TOO_FAR
+from tests.made.paths import propagate
 
 SR = 48_000
 AIR = Air()

@@ -9,10 +9,10 @@
 time, and nothing aliases.)
 
     layout (tables) | strike_pool, phasors (pulses under way) | drive (what is driven) | tile (what rings free) |
-    translation (the rigid body) -> bank_kernel.advance;   instrument, playing: the door
+    translation (the rigid body) -> bank_kernel.advance;   instrument: bodies in, tables out
 
 A body below the floor costs nothing. Time is counted in absolute samples; blocks of 256 lie on that grid, so any way of
-cutting the calls gives the same bits. `advance` works in place: `copy()` a state first to look ahead and come back.
+cutting the calls gives the same bits. All work in place: `copy()` a state first to look ahead and come back.
 """
 
 from sonic_bullet.synth.bank.instrument import (
@@ -26,17 +26,13 @@ from sonic_bullet.synth.bank.instrument import (
     silence,
 )
 from sonic_bullet.synth.bank.layout import FLOOR
-from sonic_bullet.synth.bank.playing import Force, Strike, advance
 
 __all__ = [
     "FLOOR",
     "Bank",
     "BankState",
-    "Force",
     "ModeSet",
-    "Strike",
     "Translation",
-    "advance",
     "append",
     "audible",
     "empty_bank",

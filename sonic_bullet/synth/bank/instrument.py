@@ -7,17 +7,15 @@ translations, which share one pole. b bodies, m lanes of all of them, W weight s
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import AudioError
-from sonic_bullet.synth.bank.bank_kernel import DRIVE_SCRATCH, RING_SCRATCH
-from sonic_bullet.synth.bank.layout import BANK_BODY, DRIVEN, FLUSH, PAIR, RINGING, STRIKE
+from sonic_bullet.synth.bank.layout import BANK_BODY, FLUSH, PAIR, RINGING, STRIKE
 from sonic_bullet.synth.bank.tile import BLOCK
-from sonic_bullet.synth.vector import LANES
 
 FASTEST_DECAY_PER_SAMPLE = 2.0
 SLOWEST_TURN = 1e-3
@@ -81,30 +79,6 @@ class Bank:
 
 
 @dataclass(slots=True, eq=False)
-class Scratch:
-    """Room of one call's own. For forces `first` (b+1,), `side` (2·drives,), `signal` (drives, 2, LANES more than n),
-    `kick` (6, LANES more than n); `plan` (DRIVEN, 3), `flat`.
-    """
-
-    first: Array = field(default_factory=lambda: np.zeros(1, np.int64))
-    side: Array = field(default_factory=lambda: np.zeros(0, np.int64))
-    signal: Array = field(default_factory=lambda: np.zeros((0, 2, 0)))
-    kick: Array = field(default_factory=lambda: np.zeros((6, 0)))
-    plan: Array = field(default_factory=lambda: np.zeros((DRIVEN, 3), np.int64))
-    flat: Array = field(default_factory=lambda: aligned(max(DRIVE_SCRATCH, RING_SCRATCH)))
-
-    def fit(self, bodies: int, drives: int, n: int) -> None:
-        """Grow what is too small for a call of n samples."""
-        if len(self.first) != bodies + 1:
-            self.first = np.zeros(bodies + 1, np.int64)
-        if len(self.side) < 2 * drives or self.signal.shape[2] < n + LANES:
-            most, longest = max(len(self.side) // 2, drives), max(self.signal.shape[2] - LANES, n)
-            self.side, self.signal = np.zeros(2 * most, np.int64), np.zeros((most, 2, longest + LANES))
-        if self.kick.shape[1] < n + LANES:
-            self.kick = np.zeros((6, n + LANES))
-
-
-@dataclass(slots=True, eq=False)
 class BankState:
     """What the bank remembers. at: the next sample. z, driven (2·m,): free state at the next block's start, and what
     was driven since this block's. sound (W, b, 256): the block's free ringing. pole, block (2·m,): e^s and e^{256 s},
@@ -122,7 +96,6 @@ class BankState:
     strikes: Array
     rows: Array
     free: Array
-    scratch: Scratch = field(default_factory=Scratch)
 
     def copy(self) -> BankState:
         """A state of its own: advancing one leaves the other."""
@@ -145,13 +118,6 @@ class BankState:
         self.free = np.concatenate(
             [[free + more], np.arange(pool + more - 1, pool - 1, -1), kept, np.zeros(pool - free, np.int64)]
         ).astype(np.int64)
-
-
-def aligned(size: int) -> Array:
-    """(size,) numbers of scratch that begin where a vector register does."""
-    raw = np.zeros(size + LANES)
-    skip = (-(raw.ctypes.data // 8)) % LANES
-    return raw[skip : skip + size]
 
 
 def audible(omega_rad_s: Array, decay_per_s: Array, sr: int) -> Array:

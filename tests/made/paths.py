@@ -1,0 +1,48 @@
+"""The sound path by itself: a step's sources in, pressure at the microphones back."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sonic_bullet.records import Array
+from sonic_bullet.synth.fractional_delay import tap_polynomials
+from sonic_bullet.synth.path import Path, PathState, grow
+from sonic_bullet.synth.path_kernel import WORK, hear
+from sonic_bullet.synth.path_places import DONE
+
+
+def propagate(
+    path: Path,
+    state: PathState,
+    step: int,
+    source: Array,
+    pushed: Array,
+    position0_m: Array,
+    position1_m: Array,
+    teleported: Array,
+    progress: Array,
+) -> Array:
+    """Pressure (c, n) in Pa at the next n samples. Changes ``state`` in place.
+
+    step ≥ 0: number of the physics step that these samples are (part of). source (b, n) in Pa·m; pushed (b, 3, n) in
+    Pa·m, world frame. position0_m, position1_m (b, 3): at the step's start and end; progress (n,): where between them
+    each sample lies, 0 … 1. teleported (b,): moved by hand, so both places sound and fade over the step. Bodies are
+    summed in order. Below 1e-30 Pa: 0. Raises AudioError on numbers that are not finite, or a sounding body more than
+    1 km from a microphone.
+    """
+    n = len(progress)
+    source, pushed, position0_m, position1_m, progress = (
+        np.ascontiguousarray(one, float) for one in (source, pushed, position0_m, position1_m, progress)
+    )
+    out, work = np.zeros((len(path.microphone_m), n)), np.zeros(WORK)
+    moved = np.ascontiguousarray(teleported, bool)
+    while True:
+        status = hear(
+            state.at, step, n, 0, source, pushed, position0_m, position1_m, moved, progress, path.microphone_m,
+            path.samples_per_m, state.sources, state.places, state.lines, state.memory, tap_polynomials(), work, out, 0,
+        )  # fmt: skip
+        if status == DONE:
+            break
+        grow(path, state, status)
+    state.at += n
+    return out
