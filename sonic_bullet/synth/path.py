@@ -3,12 +3,12 @@
     p[c](t) = Σ_b (s_b + n̂·j_b)(t_e) / r,   t_e + r(t_e)/c = t
         [Pierce 1989, sec. 4-3 (monopole), Chadwick, Zheng, James 2012, eq. 9]
 
-s_b: pressure at 1 m (Pa·m) of the body's modes, j_b: that of the rigid body along each axis (Pa·m; K times its jerk), n̂
-and r from the body to the microphone when the sound left (t_e), so a moving body's Doppler shift is exact: 1/(1 + v/c).
-r is never below the body's radius, and the travel time never below 8 samples (5.7 cm at 48 kHz), half the
-interpolation's length. Flat to 0.02 dB up to 18 kHz at 48 kHz. Every sample depends on absolute time alone: any way of
-cutting the calls gives the same bits. A body moved by hand emits from its old place and its new one, fading over the
-step: no click and no chirp.
+s_b: pressure at 1 m (Pa·m) of the body's modes, j_b: that of the rigid body along each axis (Pa·m; K times its jerk),
+n̂ and r from the body to the microphone when the sound left (t_e), so a moving body's Doppler shift is exact: 1/(1 +
+v/c). r is never below the body's radius, and the travel time never below 8 samples (5.7 cm at 48 kHz), half the
+interpolation's length. Flat to 0.02 dB up to 18 kHz at 48 kHz. Every sample depends on absolute time alone: any way
+of cutting the calls gives the same bits. A body moved by hand emits from its old place and its new one, fading over
+the step: no click and no chirp.
 
 The work is done by `path_kernel.hear` on the state's tables; here they are made and lengthened.
 b bodies, c microphones, n samples, t places.

@@ -12,6 +12,7 @@
 The cumulated force Q(s) = ∫F over the pulse's share s in [0, 1] (Q(1) = 1) is the table everything reads: for the Hertz
 pulse Q = (1 - δ'/v)/2, because the force is what changes the velocity.
 """
+# mypy: disable-error-code="no-untyped-def"
 
 from __future__ import annotations
 
@@ -52,7 +53,7 @@ def spectrum_table() -> Array:
 
 
 @njit(nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
-def pulse_length(mass_kg, modulus_pa, relative_curvature_per_m, flat_area_m2, approach_m_s):  # type: ignore[no-untyped-def]
+def pulse_length(mass_kg, modulus_pa, relative_curvature_per_m, flat_area_m2, approach_m_s):
     """Length τ in s of a pulse, and 1 where it is flat (a half-sine), 0 where it is Hertz'. Source: the module's τ.
 
     relative_curvature κ1+κ2 in 1/m: zero or below where the faces conform. flat_area_m2: nominal area of touching, 0
@@ -73,7 +74,7 @@ def pulse_length(mass_kg, modulus_pa, relative_curvature_per_m, flat_area_m2, ap
 
 
 @njit(nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
-def compliance(push, frequency_hz, first, modes, tau_s, spectrum):  # type: ignore[no-untyped-def]
+def compliance(push, frequency_hz, first, modes, tau_s, spectrum):
     """Σ (Uᵀj |F̂(fτ)|)² over one body's modes: push (m, …) is Uᵀj of the whole impulse j, the modes have the
     frequencies from ``first`` on; spectrum (cells + 1,): a row of `spectrum_table`.
 
@@ -133,7 +134,7 @@ def pulse_table() -> Array:
 
 
 @njit(nogil=True)
-def _cumulated(s, table, flat):  # type: ignore[no-untyped-def]
+def _cumulated(s, table, flat):
     if s <= 0.0:
         return 0.0
     if s >= 1.0:
