@@ -11,6 +11,7 @@ on who asks, so it may be both.
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -18,7 +19,7 @@ import numba
 from llvmlite import binding
 from numba import types
 from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import Compiler
+from numba.core.compiler import Compiler, Flags
 
 
 class _Environments:
@@ -121,6 +122,19 @@ class Whole(_Linking):
         return self.name, "object", (self._get_compiled_object(), binding.parse_assembly(text).as_bitcode())
 
 
+class _Flags(Flags):  # type: ignore[misc]
+    """numba's options of a compilation, which it compares some hundred thousand times: those that are set, first."""
+
+    _HASH = hash(Flags())
+
+    def __hash__(self) -> int:
+        return self._HASH
+
+    def __eq__(self, other: object) -> bool:
+        same = isinstance(other, Flags) and self._values == other._values
+        return same or bool(super().__eq__(other))
+
+
 class _Compiler(Compiler):  # type: ignore[misc]
     library: type[_Linking]
 
@@ -135,6 +149,16 @@ class _Compiler(Compiler):  # type: ignore[misc]
 class _WholeCompiler(_Compiler):
     library = Whole
 
+    def compile_extra(self, function: Callable[..., Any]) -> Any:
+        """As numba has it, but for the collector: it would look for garbage among millions of objects that stay."""
+        collects = gc.isenabled()
+        gc.disable()
+        try:
+            return super().compile_extra(function)
+        finally:
+            if collects:
+                gc.enable()
+
 
 class _PartCompiler(_Compiler):
     library = Part
@@ -145,6 +169,8 @@ def linked_once(function: Callable[..., Any], options: dict[str, Any]) -> Any:
     inner = {**options, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
     kernel = numba.njit(**{**options, "no_cfunc_wrapper": True}, pipeline_class=_WholeCompiler)(function)
     part = numba.njit(**inner, pipeline_class=_PartCompiler)(function)
+    for one in (kernel, part):
+        one._compiler._customize_flags = _Flags
     ask, overload = part.get_call_template, part.get_overload
 
     def get_call_template(arguments: Any, keywords: Any) -> Any:
