@@ -188,7 +188,7 @@ def replay(scene: str = "tabletop", seconds: float = 5.0) -> list[Row]:
 def alone(modes: int = 20_000, many: int = 1_000_000, seconds: int = 10) -> list[Row]:
     """The bank without what strikes it."""
     return [
-        ("bank alone, modes one core sustains", "", f"{bank_modes_sustained(modes) / 1e3:.0f} k"),
+        ("bank alone, bodies of 200 modes: modes one core sustains", "", f"{bank_modes_sustained(modes) / 1e3:.0f} k"),
         (f"bank, time a mode at {many} over that at {many // 100}", "<= 1.5", f"{growth(many // 100, many):.2f}"),
         (f"bank, error over the envelope, {seconds} s", "<= 1e-6", f"{envelope_error(seconds):.1e}"),
     ]
@@ -203,7 +203,7 @@ def peers(scale: float = 1.0, modes: int = 20_000) -> list[Row]:
         except MissingTool as missing:
             said = f"{NOT_RUN}{missing}"
         else:
-            said = f"{rate / 1e3:.2g} k modes (bank {bank_modes_sustained(modes) / rate:.2g} x)"
+            said = f"{rate / 1e3:.1f} k modes (bank {bank_modes_sustained(modes) / rate:.1f} x)"
         rows.append((peer.name, peer.must_hold, said))
     return rows
 
