@@ -102,8 +102,9 @@ def envelope_error(seconds: int = 10) -> float:
         envelope = np.exp(-np.multiply.outer(decay, time_s))
         wanted = envelope * (np.cos(phase) - (decay / omega)[:, None] * np.sin(phase))
         size = envelope * np.hypot(1, decay / omega)[:, None]
-        off = np.abs(sound[:, ::7] - wanted)
-        worst = max(worst, float((off / size)[envelope > 10 * FLOOR].max(initial=0)))
+        alive = envelope > 10 * FLOOR
+        off = np.abs(sound[:, ::7] - wanted)[alive] / size[alive]
+        worst = max(worst, float(off.max(initial=0)))
     return worst
 
 

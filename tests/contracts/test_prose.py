@@ -11,7 +11,9 @@ from pathlib import Path
 import pytest
 
 REPO = Path(__file__).resolve().parents[2]
-PAGES = sorted((*(REPO / "docs").rglob("*.md"), REPO / "README.md", REPO / "CHANGELOG.md"))
+PAGES = sorted(
+    (*(REPO / "docs").rglob("*.md"), *(REPO / name for name in ("README.md", "CHANGELOG.md", "benchmarks/README.md")))
+)
 MOST_WORDS, MOST_COLUMNS = 40, 160
 PRIVATE = [
     "told",
