@@ -1,6 +1,6 @@
 # make demo    a virtual environment, then scenes/tabletop.py to out/: sound, contact log, picture
 # make test    a virtual environment with the tools, then style, types and tests
-# make bench   the benchmarks, each a question and its answer
+# make bench   one table: what sound costs, beside what must hold (benchmarks/README.md names the other scripts)
 # make docs    the pages that are made of the code: API, commands, case.json and its schema, contact log
 # Python 3.11 is all that is needed: PyBullet has no wheel for a later one. PYTHON=/path/to/python3.11 names another.
 
@@ -40,8 +40,7 @@ check: .venv/dev.stamp
 	$(BIN)/mypy --no-error-summary
 
 bench: .venv/dev.stamp
-	@set -e; for file in benchmarks/*.py; do echo "== $$file"; $(BIN)/python $$file; done
-	@set -e; for asked in speed ablation features; do echo "== ren2013 $$asked"; $(BIN)/python -m benchmarks.ren2013 --question $$asked; done
+	@$(BIN)/python benchmarks/run_time.py
 
 docs: .venv/dev.stamp
 	$(BIN)/python docs/make_reference.py

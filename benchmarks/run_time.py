@@ -1,16 +1,24 @@
-"""What does sound cost a simulation? Contacts to frame, added to stepSimulation; replays; a robot's environment.
+"""What does sound cost? One table: what was measured, beside what must hold. `make bench` prints it.
 
-    python benchmarks/run_time.py [--boxes 1 20 100] [--steps 480] [--only piles quiet slide robot replay]
+    python benchmarks/run_time.py [--boxes 1 20 100] [--steps 480] [--only PART ...]
+
+    piles, quiet, slide    contacts to frame, added to stepSimulation; quiet: nobody hears it, contacts alone
+    robot, replay          a robot's environment; a contact log
+    bank, peers            the bank alone (`bank_speed.py`), and other banks in the same run (`peers/`)
+    first                  first runs, wall time (`first_run.py`)
+
+What is not installed is a row that names the Debian package, and the last line counts such rows.
 
 Every ratio is of two times of one run: two worlds of the same bodies step in turn, one with a listener, one without,
 and processor time is taken round each step. Piles fall and settle; a box is of plastic and has 64 audible modes
-(asserted); one microphone. The table names what must hold beside what was measured.
+(asserted); one microphone.
 """
 
 from __future__ import annotations
 
 import argparse
 import gc
+import sys
 import tempfile
 import time
 from collections.abc import Callable
@@ -20,7 +28,12 @@ from typing import Any
 import numpy as np
 import pybullet as p
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 import sonic_bullet as sb
+from benchmarks.bank_speed import bank_modes_sustained, envelope_error, growth
+from benchmarks.first_run import compile_s, scene_and_log_s
+from benchmarks.peers import PEERS
+from benchmarks.peers.tools import MissingTool
 from sonic_bullet.files import read_log
 from sonic_bullet.listener import direct_client, disconnect
 from sonic_bullet.records import Air, ModalModel
@@ -32,6 +45,8 @@ HALF_M = (0.05, 0.04, 0.03)
 MODES = 64
 DT = 1 / 240
 Row = tuple[str, str, str]
+NOT_RUN = "not run: "
+PARTS = ("piles", "quiet", "slide", "robot", "replay", "bank", "peers", "first")
 
 
 def box_model(client: Any, body: int, listener: Any, model: ModalModel | None) -> ModalModel:
@@ -79,7 +94,8 @@ def paired(make: Callable[[], Any], steps: int, **options: Any) -> tuple[float, 
         model = box_model(sounding, body, listener, model)
     without, with_sound = np.zeros(steps), np.zeros(steps)
     for _ in range(8):  # what is compiled or grown once is no step's
-        bare.stepSimulation(), sounding.stepSimulation()
+        bare.stepSimulation()
+        sounding.stepSimulation()
     gc.collect()
     for k in range(steps):
         begin = time.process_time_ns()
@@ -105,26 +121,30 @@ def piles(counts: list[int], steps: int) -> list[Row]:
     return rows
 
 
-def quiet(steps: int) -> list[Row]:
+def quiet(counts: list[int], steps: int) -> list[Row]:
     """Contacts alone: nobody hears them."""
-    bare, sounding, _ = paired(lambda: pile(100), steps, microphone=())
-    return [("pile of 100, microphone=(), added", "<= 0.6", f"{(sounding - bare) / bare:.2f}")]
+    rows = []
+    for count in counts:
+        bare, sounding, _ = paired(lambda count=count: pile(count), steps, microphone=())  # type: ignore[misc]
+        added = f"{(sounding - bare) / bare:.2f} ({(sounding - bare) * 1e6:.0f} µs)"
+        rows.append((f"pile of {count}, `microphone=()`, added", "<= 0.6" if count == 100 else "", added))
+    return rows
 
 
-def sliding(steps: int) -> list[Row]:
-    """A hundred pairs that slide: all of a step as a share of what it lasts."""
-    bare, sounding, _ = paired(lambda: slide(100), min(steps, 200))
+def sliding(count: int, steps: int) -> list[Row]:
+    """Pairs that slide: all of a step as a share of what it lasts."""
+    bare, sounding, _ = paired(lambda: slide(count), min(steps, 200))
     said = f"{sounding / DT:.2f} (without sound {bare / DT:.2f})"
-    return [("100 sliding pairs, whole step over its length", "<= 0.4", said)]
+    return [(f"{count} sliding pairs, whole step over its length", "<= 0.4" if count == 100 else "", said)]
 
 
-def robot() -> list[Row]:
-    """A robot's environment with sound, wall time."""
+def robot(steps: int = 140) -> list[Row]:
+    """A robot's environment with sound, wall time; the first 40 steps are not counted."""
     try:
         import gymnasium as gym
-        import panda_gym  # noqa: F401
+        import panda_gym  # type: ignore[import-untyped]  # noqa: F401
     except ImportError:
-        return [("PandaPush-v3, env.step", "<= 2.5", "not run: pip install panda-gym")]
+        return [("PandaPush-v3, env.step", "<= 2.5", f"{NOT_RUN}pip install panda-gym")]
     times = []
     for heard in (False, True):
         env = gym.make("PandaPush-v3")
@@ -136,11 +156,11 @@ def robot() -> list[Row]:
                 if client.getBodyInfo(body)[1].decode() and client.getNumJoints(body) == 0:
                     listener.add(body, material="plastic", count=MODES)
         rng = np.random.default_rng(0)
-        for k in range(140):
+        for k in range(steps):
             action = rng.uniform(-1, 1, env.action_space.shape).astype(np.float32)
             begin = time.perf_counter()
             env.step(action)
-            if k >= 40:
+            if k >= min(40, steps // 2):
                 times.append((heard, time.perf_counter() - begin))
         if listener is not None:
             listener.detach()
@@ -149,10 +169,9 @@ def robot() -> list[Row]:
     return [("PandaPush-v3, env.step with over without (wall)", "<= 2.5", f"{sounding / bare:.2f}")]
 
 
-def replay() -> list[Row]:
-    """The table-top's log, replayed."""
-    scene = Path(__file__).parents[1] / "scenes" / "tabletop.py"
-    log = render_scene(scene, seconds=5.0).log
+def replay(scene: str = "tabletop", seconds: float = 5.0) -> list[Row]:
+    """A scene's log, replayed."""
+    log = render_scene(Path(__file__).parents[1] / "scenes" / f"{scene}.py", seconds=seconds).log
     with tempfile.TemporaryDirectory() as folder:
         log.save(Path(folder) / "log.npz")
         log = read_log(Path(folder) / "log.npz")
@@ -163,7 +182,47 @@ def replay() -> list[Row]:
         render_log(log)
         spent.append(time.process_time() - begin)
     said = f"{log.duration_s / min(spent):.1f} ({min(spent):.2f} s for {log.duration_s:.1f} s)"
-    return [("replay of the table-top's log over real time", ">= 18 (aim 22)", said)]
+    return [(f"replay of {scene}'s log over real time", ">= 18 (aim 22)", said)]
+
+
+def alone(modes: int = 20_000, many: int = 1_000_000, seconds: int = 10) -> list[Row]:
+    """The bank without what strikes it."""
+    return [
+        ("bank alone, modes one core sustains", "", f"{bank_modes_sustained(modes) / 1e3:.0f} k"),
+        (f"bank, time a mode at {many} over that at {many // 100}", "<= 1.5", f"{growth(many // 100, many):.2f}"),
+        (f"bank, error over the envelope, {seconds} s", "<= 1e-6", f"{envelope_error(seconds):.1e}"),
+    ]
+
+
+def peers(scale: float = 1.0, modes: int = 20_000) -> list[Row]:
+    """Other banks, this project's measured again beside each."""
+    rows = []
+    for peer in PEERS:
+        try:
+            rate = peer.modes_sustained(scale)
+        except MissingTool as missing:
+            said = f"{NOT_RUN}{missing}"
+        else:
+            said = f"{rate / 1e3:.2g} k modes (bank {bank_modes_sustained(modes) / rate:.2g} x)"
+        rows.append((peer.name, peer.must_hold, said))
+    return rows
+
+
+def first(scene: str = "tabletop", seconds: float = 5.0, *, empty: bool = True) -> list[Row]:
+    """First runs. empty: from empty caches, as a first run is."""
+    compiled = compile_s(empty=empty)
+    scene_s, log_s, length_s = scene_and_log_s(f"scenes/{scene}.py", seconds, empty=empty)
+    return [
+        ("first run: compilation (wall)", "<= 10 s", f"{compiled:.1f} s"),
+        (f"first run: {scene} from an empty cache (wall)", "<= 45 s", f"{scene_s:.1f} s"),
+        (f"`sonic-bullet render` of its log, {length_s:g} s, code kept (wall)", "<= 1.5 s", f"{log_s:.2f} s"),
+    ]
+
+
+def missing_line(rows: list[Row]) -> str:
+    """How many rows did not run, and for want of what."""
+    lacks = [said.removeprefix(NOT_RUN) for _, _, said in rows if said.startswith(NOT_RUN)]
+    return f"{len(lacks)} of {len(rows)} rows not run" + (f": {', '.join(sorted(set(lacks)))}" if lacks else "")
 
 
 def main() -> int:
@@ -171,20 +230,27 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--boxes", type=int, nargs="+", default=[1, 20, 100])
     parser.add_argument("--steps", type=int, default=480)
-    parser.add_argument("--only", nargs="+", default=["piles", "quiet", "slide", "robot", "replay"])
+    parser.add_argument("--only", nargs="+", choices=PARTS, default=list(PARTS), metavar="PART")
     asked = parser.parse_args()
     parts: dict[str, Callable[[], list[Row]]] = {
         "piles": lambda: piles(asked.boxes, asked.steps),
-        "quiet": lambda: quiet(asked.steps),
-        "slide": lambda: sliding(asked.steps),
+        "quiet": lambda: quiet(asked.boxes, asked.steps),
+        "slide": lambda: sliding(100, asked.steps),
         "robot": robot,
         "replay": replay,
+        "bank": alone,
+        "peers": peers,
+        "first": first,
     }
-    paired(lambda: pile(2), 120)  # compiled here, and counted nowhere
+    if {"piles", "quiet", "slide", "robot"} & set(asked.only):
+        paired(lambda: pile(2), 120)  # compiled here, and counted nowhere
     print("| what | must hold | measured |\n|---|---|---|")
+    rows: list[Row] = []
     for name in asked.only:
         for row in parts[name]():
+            rows.append(row)
             print(f"| {' | '.join(row)} |", flush=True)
+    print(f"\n{missing_line(rows)}")
     return 0
 
 

@@ -27,7 +27,7 @@ def njit(**options: Any) -> Callable[[Callable[..., Any]], Any]:
     """numba.njit with these options; the machine code is kept as the module's head says."""
 
     def compiled(function: Callable[..., Any]) -> Any:
-        kernel = numba.njit(**options)(function)
+        kernel = _kernel(function, options)
         place = folder()
         if place is not None:
             with suppress(Exception):  # a numba whose inner parts moved: the kernel is compiled in every process
@@ -37,6 +37,15 @@ def njit(**options: Any) -> Callable[[Callable[..., Any]], Any]:
         return kernel
 
     return compiled
+
+
+def _kernel(function: Callable[..., Any], options: dict[str, Any]) -> Any:
+    if os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0"):
+        with suppress(Exception):  # a numba whose inner parts moved
+            from sonic_bullet.machine.linked_once import linked_once
+
+            return linked_once(function, options)
+    return numba.njit(**options)(function)
 
 
 @cache
