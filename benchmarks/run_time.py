@@ -142,7 +142,7 @@ def robot(steps: int = 140) -> list[Row]:
     """A robot's environment with sound, wall time; the first 40 steps are not counted."""
     try:
         import gymnasium as gym
-        import panda_gym  # type: ignore[import-untyped]  # noqa: F401
+        import panda_gym  # noqa: F401
     except ImportError:
         return [("PandaPush-v3, env.step", "<= 2.5", f"{NOT_RUN}pip install panda-gym")]
     times = []
