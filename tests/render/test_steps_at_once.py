@@ -14,6 +14,7 @@ from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.records import Array, Body, Microphone, ModalSum, Vibrometer
 from sonic_bullet.records.contacts import Contacts, Event, Step
 from sonic_bullet.render import Synthesizer, render_log
+from sonic_bullet.render.synthesis_state import StepScratch
 from tests.made.models import GLASS, STEEL, WOOD, ball_body, box_body, row, wall_body
 from tests.made.residuals import modes, residual
 
@@ -121,6 +122,28 @@ def test_any_number_of_steps_at_once_makes_the_same_bits(noisy: bool) -> None:
         assert played(log, at_once).tobytes() == sound.tobytes(), at_once
     assert played(log, 7, look=True).tobytes() == sound.tobytes()
     assert render_log(log).tobytes() == sound.tobytes()
+
+
+@pytest.mark.parametrize("noisy", [False, True])
+def test_steps_shorter_than_a_sample_make_the_same_bits(noisy: bool) -> None:
+    """Most steps have no sample at all, also those in which bodies come."""
+    log = busy_log(noisy)
+    log = replace(log, sr=8000, steps=tuple(replace(step, dt_s=1 / 20_000) for step in log.steps))
+    sound = played(log, 1)
+    assert sound.shape[1] == STEPS * 8000 // 20_000
+    assert sound[1].any()
+    for at_once in (3, 64):
+        assert played(log, at_once).tobytes() == sound.tobytes(), at_once
+    assert render_log(log).tobytes() == sound.tobytes()
+
+
+def test_there_is_room_for_the_longest_step_of_all() -> None:
+    """Steps that are no whole number of samples differ by one; a shorter one may bring more pairs."""
+    room = StepScratch()
+    for drives, samples in ((2, 184), (9, 183), (9, 184), (20, 0)):
+        room.fit(drives, 16, samples, (1, 3))
+        assert len(room.slot) >= drives and len(room.force) >= len(room.slot) * 184
+        assert room.source.shape == (1, 3, 184)
 
 
 def test_what_the_log_holds_is_heard() -> None:
