@@ -86,6 +86,7 @@ class Part(_Linking):
         module.data_layout = self._codegen._data_layout
 
     def finalize(self) -> None:
+        """Say that no more is written: there is nothing to be made of it here."""
         self._raise_if_finalized()
         self._finalized = True
 
