@@ -19,6 +19,7 @@ from sonic_bullet.records.contacts import Contacts, Step
 from sonic_bullet.records.errors import AudioError
 from sonic_bullet.render import driver
 from sonic_bullet.render.clock import Clock, exact_step
+from sonic_bullet.render.first_run import make_driver
 from sonic_bullet.render.residual_voice import friction_grains, impact_grains
 from sonic_bullet.render.step_events import drives_of, pulses_of
 from sonic_bullet.render.synthesis_state import Setup, State, quench, start, with_bodies
@@ -122,7 +123,7 @@ def _call(
         state.window, state.pairs, state.table, state.bank, state.ringing, state.scratch,
     )  # fmt: skip
     travelling = state.travelling
-    found: tuple[int, int, int, int] = driver.advance_steps(
+    arguments = (
         first, state.taken, begin, pause, resume, float(setup.sr), table, contacts, *poses,
         window.step, window.position_m, window.quaternion_xyzw, window.teleported, window.row,
         bodies.bodies, bodies.faces, bodies.nodes, bodies.shapes, bodies.frequency_hz, spectrum_table(),
@@ -133,6 +134,9 @@ def _call(
         room.source, room.pushed, room.sounds, state.path.microphone_m, state.path.samples_per_m, travelling.sources,
         travelling.places, travelling.lines, travelling.memory, tap_polynomials(), setup.reads, heard, out,
     )  # fmt: skip
+    if not driver.advance_steps.overloads:
+        make_driver(arguments)
+    found: tuple[int, int, int, int] = driver.advance_steps(*arguments)
     return found
 
 
