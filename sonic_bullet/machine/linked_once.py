@@ -2,7 +2,7 @@
 `sonic_bullet.machine.compiled` does without where they moved.
 
     kernel called by Python    -> Whole: its code and that of all below it, linked, optimised together, kept
-    kernel called by a kernel  -> Part: typed and written down, no more
+    kernel called by a kernel  -> Part: typed and written down, no more; two processes may do so for one Whole
 
 numba itself optimises a kernel with all that it calls, makes machine code of that, and links it into each of its
 callers, which are optimised with it anew: code six calls deep is compiled six times. Which of the two a kernel is hangs
@@ -12,14 +12,23 @@ on who asks, so it may be both.
 from __future__ import annotations
 
 import gc
+import itertools
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pickle import loads
 from typing import Any
 
 import numba
 from llvmlite import binding
 from numba import types
+from numba.core.bytecode import FunctionIdentity
 from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import Compiler, Flags
+from numba.core.compiler import Compiler, compile_result
+from numba.core.serialize import dumps
+
+from sonic_bullet.machine.front_end import QuickFlags, Target, Typing, without_needless
+
+_TYPED: dict[QuickFlags, dict[Any, Any]] = {}  # calls that are known while a kernel is compiled, by its options
 
 
 class _Environments:
@@ -100,6 +109,10 @@ class Part(_Linking):
     def get_pointer_to_function(self, name: str) -> int:
         return 0
 
+    def serialize_using_object_code(self) -> tuple[str, bytes]:
+        """What another process needs to link it."""
+        return self.name, self._get_module_for_linking().as_bitcode()
+
 
 class Whole(_Linking):
     """Code that Python calls, with all that it calls."""
@@ -123,19 +136,6 @@ class Whole(_Linking):
         return self.name, "object", (self._get_compiled_object(), binding.parse_assembly(text).as_bitcode())
 
 
-class _Flags(Flags):  # type: ignore[misc]
-    """numba's options of a compilation, which it compares some hundred thousand times: those that are set, first."""
-
-    _HASH = hash(Flags())
-
-    def __hash__(self) -> int:
-        return self._HASH
-
-    def __eq__(self, other: object) -> bool:
-        same = isinstance(other, Flags) and self._values == other._values
-        return same or bool(super().__eq__(other))
-
-
 class _Compiler(Compiler):  # type: ignore[misc]
     library: type[_Linking]
 
@@ -144,35 +144,50 @@ class _Compiler(Compiler):  # type: ignore[misc]
         if state.library is None:
             state.library = self.library(state.targetctx.codegen(), state.func_id.func_qualname)
             state.library.enable_object_caching()
-        return super().define_pipelines()
+        return without_needless(super().define_pipelines(), state.func_id.code)
 
 
 class _WholeCompiler(_Compiler):
     library = Whole
 
     def compile_extra(self, function: Callable[..., Any]) -> Any:
-        """As numba has it, but for the collector: it would look for garbage among millions of objects that stay."""
-        collects = gc.isenabled()
-        gc.disable()
-        try:
+        with _undisturbed():
             return super().compile_extra(function)
-        finally:
-            if collects:
-                gc.enable()
 
 
 class _PartCompiler(_Compiler):
     library = Part
 
+    def __init__(
+        self, typing: Any, target: Any, library: Any, arguments: Any, result: Any, flags: Any, names: Any
+    ) -> None:
+        known = _TYPED.setdefault(flags, {})
+        super().__init__(Typing(typing, known), Target(target), library, arguments, result, flags, names)
+
+
+@contextmanager
+def _undisturbed() -> Iterator[None]:
+    """While kernels are compiled: the collector would look for garbage among millions of objects that stay."""
+    collects = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        _TYPED.clear()
+        if collects:
+            gc.enable()
+
 
 def linked_once(function: Callable[..., Any], options: dict[str, Any]) -> Any:
-    """The function as a kernel. Raises whatever numba's inner parts raise where they are not what they were."""
+    """The function as a kernel; its ``part`` is what kernels call. Raises whatever numba's inner parts raise where they
+    are not what they were.
+    """
     inner = {**options, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
     kernel = numba.njit(**{**options, "no_cfunc_wrapper": True}, pipeline_class=_WholeCompiler)(function)
     part = numba.njit(**inner, pipeline_class=_PartCompiler)(function)
     for one in (kernel, part):
-        one._compiler._customize_flags = _Flags
-    ask, overload = part.get_call_template, part.get_overload
+        one._compiler._customize_flags = QuickFlags
+    ask = part.get_call_template
 
     def get_call_template(arguments: Any, keywords: Any) -> Any:
         """As numba has it, but for numbers that stand in the code: they are no types of their own."""
@@ -181,5 +196,56 @@ def linked_once(function: Callable[..., Any], options: dict[str, Any]) -> Any:
             {name: types.unliteral(one) for name, one in keywords.items()},
         )
 
-    kernel.get_call_template, kernel.get_overload = get_call_template, overload
+    kernel.get_call_template, kernel.get_overload, kernel.part = get_call_template, part.get_overload, part
     return kernel
+
+
+def is_kept(kernel: Any, arguments: tuple[Any, ...]) -> bool:
+    """Whether the kernel has machine code for arguments of these types, or it was kept; then it is loaded."""
+    if arguments in kernel.overloads:
+        return True
+    found = kernel._cache.load_overload(arguments, kernel.targetctx)
+    if found is not None:
+        kernel.targetctx.insert_user_function(found.entry_point, found.fndesc, [found.library])
+        kernel.add_overload(found)
+    return found is not None
+
+
+def written(kernel: Any, arguments: tuple[Any, ...]) -> bytes:
+    """The part of a kernel for arguments of these types, with all that it calls, as another process takes it in."""
+    with _undisturbed():
+        kernel.part.compile(arguments)
+    return bytes(dumps(kernel.part.overloads[arguments]._reduce()))
+
+
+def take_in(kernel: Any, content: bytes) -> None:
+    """A part that a forked process of this one has `written`."""
+    (name, bitcode), description, environment, signature, _, _, annotation, reload_init, others = loads(content)
+    part, target = kernel.part, kernel.part.targetctx
+    library = Part(target.codegen(), name)
+    library._final_module, library._finalized = binding.parse_bitcode(bitcode), True
+    entry = target.get_executable(library, description, environment)
+    for one in others:
+        library.environments.set_env(one.env_name, one)
+    target.insert_user_function(entry, description, [library])
+    part.add_overload(
+        compile_result(
+            typing_context=part.typingctx,
+            target_context=target,
+            entry_point=entry,
+            library=library,
+            signature=signature,
+            fndesc=description,
+            environment=environment,
+            type_annotation=annotation,
+            reload_init=reload_init,
+            objectmode=False,
+            lifted=(),
+            referenced_envs=others,
+        )  # fmt: skip
+    )
+
+
+def name_apart() -> None:
+    """Make what this process compiles from now on bear other names than what its parent does."""
+    FunctionIdentity._unique_ids = itertools.count(1_000_000)

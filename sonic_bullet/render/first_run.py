@@ -1,0 +1,72 @@
+"""The run time's machine code, made before the first step: where none is kept, by two processes side by side.
+
+arguments of driver.advance_steps -> types of those of its stages -> each stage written by one of the two
+    -> the driver: linked with them, optimised, kept
+"""
+
+from __future__ import annotations
+
+import inspect
+import os
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from typing import Any
+
+import numba
+from numba import types
+
+from sonic_bullet.parallel import parallel_map
+from sonic_bullet.render import driver
+
+STAGES = (driver.excite, driver.ring, driver.finish, driver.take)
+"""Those that take longest first. Whatever types they are given, the driver has those compiled that it needs."""
+SAMPLES = types.Array(types.float64, 1, "C")
+INNER = {
+    **dict.fromkeys(("slot", "number", "quench", "found", "drives", "start"), types.int64),
+    "x": SAMPLES,
+    "force": SAMPLES.copy(ndim=2),
+}
+"""Arguments of stages that are not those of the driver with the same name."""
+OF_A_STEP = ("position", "quaternion", "teleported")
+"""Arguments of `take` for one step, of the driver for many."""
+
+
+def make_driver(arguments: Sequence[Any]) -> None:
+    """Have the driver's machine code for such arguments."""
+    kinds = tuple(numba.typeof(one) for one in arguments)
+    with suppress(Exception):  # a numba whose inner parts moved: it is compiled by one process
+        _make_stages(kinds)
+    driver.advance_steps.compile(kinds)
+
+
+def _make_stages(kinds: tuple[Any, ...]) -> None:
+    from sonic_bullet.machine.linked_once import is_kept, name_apart, take_in, written
+
+    if is_kept(driver.advance_steps, kinds):
+        return
+    process = os.getpid()
+
+    def write(stage: Any) -> bytes | None:
+        """The stage, where it is for the first process; what that one has written itself it has."""
+        elsewhere = os.getpid() != process
+        if elsewhere:
+            name_apart()
+        content = written(stage, stage_types(stage, kinds))
+        return content if elsewhere else None
+
+    for stage, content in zip(STAGES, parallel_map(write, STAGES), strict=True):
+        if content is not None:
+            take_in(stage, content)
+
+
+def stage_types(stage: Any, kinds: tuple[Any, ...]) -> tuple[Any, ...]:
+    """Types of a stage's arguments where the driver's have the types ``kinds``."""
+    known = dict(zip(_names(driver.advance_steps.py_func), kinds, strict=True))
+    known |= INNER | {"step": known["steps"].dtype}
+    if stage is driver.take:
+        known |= {name: known[name].copy(ndim=known[name].ndim - 1) for name in OF_A_STEP}
+    return tuple(known[name] for name in _names(stage.py_func))
+
+
+def _names(function: Callable[..., Any]) -> list[str]:
+    return list(inspect.signature(function).parameters)
