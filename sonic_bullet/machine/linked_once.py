@@ -242,7 +242,7 @@ def take_in(kernel: Any, content: bytes) -> None:
             objectmode=False,
             lifted=(),
             referenced_envs=others,
-        )  # fmt: skip
+        )
     )
 
 

@@ -87,9 +87,12 @@ def _advanced(setup: Setup, state: State, steps: Sequence[Step]) -> Array:
         _make_room(state, table[0], longest)
     done, resume, taken = 0, False, state.taken
     while done < len(steps):
-        more, status, found, drives = driver.advance_steps(
+        arguments = (
             done, taken, begin, pause, resume, float(sr), table, contacts, *poses, *state.tables(), pressure, out
-        )
+        )  # fmt: skip
+        if not driver.advance_steps.overloads:
+            make_driver(arguments)
+        more, status, found, drives = driver.advance_steps(*arguments)
         done, resume = done + more, status not in (driver.TO_GROW, path_places.DONE)
         if status == path_places.DONE:
             continue
@@ -110,7 +113,6 @@ def _advanced(setup: Setup, state: State, steps: Sequence[Step]) -> Array:
     return out
 
 
-<<<<<<< HEAD
 def _joined(steps: Sequence[Step]) -> tuple[Array, tuple[Array, ...]]:
     """Contact rows of all steps, and their poses (k, b, ·): read-only, as those of one step are (one type is compiled
     once).
@@ -125,40 +127,6 @@ def _joined(steps: Sequence[Step]) -> tuple[Array, tuple[Array, ...]]:
     for array in joined:
         array.setflags(write=False)
     return joined[0], tuple(joined[1:])
-=======
-def _together(join: Callable[[Sequence[Array]], Array], arrays: Sequence[Array]) -> Array:
-    """The arrays of all steps in one that is read-only, as those of one step are: one type, compiled once."""
-    if len(arrays) == 1:
-        return arrays[0] if join is np.concatenate else arrays[0][None]
-    joined = join(arrays)
-    joined.setflags(write=False)
-    return joined
-
-
-def _call(
-    setup: Setup, state: State, table: Array, contacts: Array, poses: Sequence[Array], first: int, begin: int, pause: bool,
-    resume: bool, heard: Array, out: Array,
-) -> tuple[int, int, int, int]:  # fmt: skip
-    window, pairs, bodies, bank, ringing, room = (
-        state.window, state.pairs, state.table, state.bank, state.ringing, state.scratch,
-    )  # fmt: skip
-    travelling = state.travelling
-    arguments = (
-        first, state.taken, begin, pause, resume, float(setup.sr), table, contacts, *poses,
-        window.step, window.position_m, window.quaternion_xyzw, window.teleported, window.row,
-        bodies.bodies, bodies.faces, bodies.nodes, bodies.shapes, bodies.frequency_hz, spectrum_table(),
-        pairs.pair, pairs.active, pairs.count, pairs.free, pairs.gain,
-        room.pulse, room.push, room.force, room.gain0, room.gain1, room.direction0, room.direction1, room.body, room.slot,
-        bank.body, bank.law, bank.weight, bank.observed, ringing.ringing, ringing.z, ringing.driven, ringing.sound,
-        ringing.pole, ringing.block, ringing.strikes, ringing.rows, ringing.free, pulse_table(),
-        room.source, room.pushed, room.sounds, state.path.microphone_m, state.path.samples_per_m, travelling.sources,
-        travelling.places, travelling.lines, travelling.memory, tap_polynomials(), setup.reads, heard, out,
-    )  # fmt: skip
-    if not driver.advance_steps.overloads:
-        make_driver(arguments)
-    found: tuple[int, int, int, int] = driver.advance_steps(*arguments)
-    return found
->>>>>>> i32-K
 
 
 def _make_room(state: State, step: Array, samples: int) -> None:
