@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
+from numba.core.runtime import rtsys
 
 from sonic_bullet.machine.partial_file import PartialFile
 
@@ -156,9 +157,14 @@ class KernelCache(FunctionCache):  # type: ignore[misc]
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """The kept code for a signature, None for a miss."""
         try:
-            return super().load_overload(sig, target_context)
+            return self._loaded(sig, target_context)
         except Exception:
             return None
+
+    def _loaded(self, sig: Any, target_context: Any) -> Any:
+        # all that is needed to run code; what is needed to write it takes 0.3 s to import, and is when some is written
+        rtsys.initialize(target_context)
+        return self._load_overload(sig, target_context)
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep the code for a signature, if that can be done."""

@@ -213,6 +213,7 @@ def is_kept(kernel: Any, arguments: tuple[Any, ...]) -> bool:
 
 def written(kernel: Any, arguments: tuple[Any, ...]) -> bytes:
     """The part of a kernel for arguments of these types, with all that it calls, as another process takes it in."""
+    kernel.typingctx.refresh(), kernel.targetctx.refresh()
     with _undisturbed():
         kernel.part.compile(arguments)
     return bytes(dumps(kernel.part.overloads[arguments]._reduce()))
