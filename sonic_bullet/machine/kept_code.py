@@ -13,9 +13,11 @@ from __future__ import annotations
 import hashlib
 import io
 import os
+import re
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +28,8 @@ from sonic_bullet.machine.partial_file import PartialFile
 
 DIGEST_BYTES = hashlib.sha256().digest_size
 OPEN_FLAGS = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+
+IMPORT = re.compile(r"^from ([\w.]+) import (\([^)]*\)|[^\n]*)", re.MULTILINE)
 
 
 def _as_written(path: str) -> bool:
@@ -69,6 +73,36 @@ class KeptFiles(IndexDataCacheFile):  # type: ignore[misc]
             partial.close()
 
 
+@cache
+def _digest(path: Path) -> bytes:
+    return hashlib.sha256(path.read_bytes()).digest()
+
+
+@cache
+def _imported(path: Path) -> frozenset[Path]:
+    """Files of its own package that a module imports as it is imported itself."""
+    top = path.parent
+    while (top / "__init__.py").exists():
+        top = top.parent
+    root = path.relative_to(top).parts[0]
+    found = set()
+    for module, names in IMPORT.findall(path.read_text(encoding="utf-8")) if path.parent != top else ():
+        if module.partition(".")[0] == root:
+            place = top.joinpath(*module.split("."))
+            found |= {place.with_suffix(".py"), place / "__init__.py"}
+            found |= {place / f"{name.split()[0]}.py" for name in re.split(r"[\s(),]+", names) if name}
+    return frozenset(file for file in found if file.is_file())
+
+
+def _sources(path: Path) -> set[Path]:
+    """The file, and all that it imports of its own package, and so on."""
+    known, new = {path}, {path}
+    while new:
+        new = set().union(*(_imported(one) for one in new)) - known
+        known |= new
+    return known
+
+
 class _Locator:
     """What numba asks: where a kernel's files lie, and what they were compiled from."""
 
@@ -81,7 +115,8 @@ class _Locator:
         return str(self._path)
 
     def get_source_stamp(self) -> str:
-        return hashlib.sha256(Path(self._py_file).read_bytes()).hexdigest()
+        """Of the kernel's file and of all of its package that it imports: other kernels, constants, layouts."""
+        return hashlib.sha256(b"".join(_digest(path) for path in sorted(_sources(Path(self._py_file))))).hexdigest()
 
     def get_disambiguator(self) -> str:
         return str(self._line)

@@ -138,7 +138,7 @@ class Listener:
         wanted = [_wanted(self.world, who, how) for who, how in cast.items()]
         known = (body.model for body in self.world.bodies if body.model is not None)
         with status("sonic_bullet") if progress is None else nullcontext(progress) as say:
-            models = solved_bodies(wanted, known, self.air if self.sensors else None, say)
+            models = solved_bodies(self.world, wanted, known, self.air if self.sensors else None, say)
         for one, mine in zip(wanted, models, strict=True):
             for link, (_, shapes), model in zip(one.links, one.parts, mine, strict=True):
                 self.world.add(one.body, link, material=one.material, model=model, shapes=shapes)
