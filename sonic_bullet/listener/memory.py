@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from sonic_bullet.listener.frames import Motion
+from sonic_bullet.listener.frames import MOTION, Motion, Roster
 from sonic_bullet.listener.known_bodies import KnownBodies
-from sonic_bullet.listener.polling import NO_RAW, NO_TOUCH, TOUCH, Touches
+from sonic_bullet.listener.polling import NO_RAW, NO_TOUCH, TOUCH, Touches, loaded
 from sonic_bullet.listener.rows import STRANGERS, UNKNOWN, contact_rows, place_bodies, take_step
+from sonic_bullet.listener.start import NOBODY, hooked_start
 from sonic_bullet.listener.sweep import Traces
 from sonic_bullet.records import Array
 from sonic_bullet.records.arrays import frozen_array
@@ -161,3 +162,12 @@ class Memory:
             row.flags.writeable = False
             contacts = Contacts.trusted(row)
         return Step.trusted(self._dt_s, *poses, contacts, self._gravity_m_s2)
+
+
+def make_ready() -> None:
+    """Have the machine code of a step, compiled now where it is not kept: what the first step would else wait for."""
+    memory, known, dt_s, gravity = Memory(), KnownBodies(), 1 / 240, (0.0, 0.0, 0.0)
+    motion = Motion(Roster((), np.zeros(0, np.int64), np.zeros(0, bool)), np.zeros(0, MOTION))
+    touches, start = loaded(NO_RAW, NO_RAW, dt_s), hooked_start(motion, motion, (), dt_s)
+    memory.unusual(known, start, *memory.made(known, start, touches, touches, dt_s), dt_s, gravity)
+    memory.usual(known, motion, motion, NOBODY, dt_s, gravity, True)

@@ -80,6 +80,9 @@ class World(ABC):
         """
         return False
 
+    def make_ready(self) -> None:  # noqa: B027 - not every simulator has any
+        """Have the machine code that the first step would else wait for."""
+
     @abstractmethod
     def unhook(self) -> None:
         """Leave the simulator as it was; harmless when nothing listens."""

@@ -211,16 +211,20 @@ def is_kept(kernel: Any, arguments: tuple[Any, ...]) -> bool:
     return found is not None
 
 
-def written(kernel: Any, arguments: tuple[Any, ...]) -> bytes:
-    """The part of a kernel for arguments of these types, with all that it calls, as another process takes it in."""
+def write(kernel: Any, arguments: tuple[Any, ...]) -> None:
+    """Have the part of a kernel for arguments of these types, with all that it calls."""
     kernel.typingctx.refresh(), kernel.targetctx.refresh()
     with _undisturbed():
         kernel.part.compile(arguments)
+
+
+def written(kernel: Any, arguments: tuple[Any, ...]) -> bytes:
+    """That part, as another process takes it in."""
     return bytes(dumps(kernel.part.overloads[arguments]._reduce()))
 
 
 def take_in(kernel: Any, content: bytes) -> None:
-    """A part that a forked process of this one has `written`."""
+    """A part that a process forked from this one has `written`."""
     (name, bitcode), description, environment, signature, _, _, annotation, reload_init, others = loads(content)
     part, target = kernel.part, kernel.part.targetctx
     library = Part(target.codegen(), name)
@@ -229,22 +233,10 @@ def take_in(kernel: Any, content: bytes) -> None:
     for one in others:
         library.environments.set_env(one.env_name, one)
     target.insert_user_function(entry, description, [library])
-    part.add_overload(
-        compile_result(
-            typing_context=part.typingctx,
-            target_context=target,
-            entry_point=entry,
-            library=library,
-            signature=signature,
-            fndesc=description,
-            environment=environment,
-            type_annotation=annotation,
-            reload_init=reload_init,
-            objectmode=False,
-            lifted=(),
-            referenced_envs=others,
-        )
-    )
+    known = {"typing_context": part.typingctx, "target_context": target, "entry_point": entry, "library": library}
+    known |= {"signature": signature, "fndesc": description, "environment": environment, "type_annotation": annotation}
+    known |= {"reload_init": reload_init, "objectmode": False, "lifted": (), "referenced_envs": others}
+    part.add_overload(compile_result(**known))
 
 
 def name_apart() -> None:

@@ -40,21 +40,21 @@ def make_driver(arguments: Sequence[Any]) -> None:
 
 
 def _make_stages(kinds: tuple[Any, ...]) -> None:
-    from sonic_bullet.machine.linked_once import is_kept, name_apart, take_in, written
+    from sonic_bullet.machine.linked_once import is_kept, name_apart, take_in, write, written
 
     if is_kept(driver.advance_steps, kinds):
         return
     process = os.getpid()
 
-    def write(stage: Any) -> bytes | None:
-        """The stage, where it is for the first process; what that one has written itself it has."""
-        elsewhere = os.getpid() != process
-        if elsewhere:
+    def do(stage: Any) -> bytes | None:
+        """The stage, where it is for the first process; what that one writes itself it has."""
+        here, stage_kinds = os.getpid() == process, stage_types(stage, kinds)
+        if not here:
             name_apart()
-        content = written(stage, stage_types(stage, kinds))
-        return content if elsewhere else None
+        write(stage, stage_kinds)
+        return None if here else written(stage, stage_kinds)
 
-    for stage, content in zip(STAGES, parallel_map(write, STAGES), strict=True):
+    for stage, content in zip(STAGES, parallel_map(do, STAGES), strict=True):
         if content is not None:
             take_in(stage, content)
 

@@ -154,7 +154,7 @@ class Listener:
         as_call(progress, "progress")
         known = (body.model for body in self.world.bodies if body.model is not None)
         with status("sonic_bullet") if progress is None else nullcontext(progress) as say:
-            models = solved_bodies(wanted, known, self.air if self.sensors else None, say)
+            models = solved_bodies(self.world, wanted, known, self.air if self.sensors else None, say)
         for one, mine in zip(wanted, models, strict=True):
             for link, (_, shapes), model in zip(one.links, one.parts, mine, strict=True):
                 self.world.add(one.body, link, material=one.material, model=model, shapes=shapes)

@@ -2,9 +2,9 @@
 
     add's arguments -> WantedBody, nothing changed yet -> solved_bodies -> a modal model a link, its radiation known
 
-What the cache lacks is worked on by two processes, each taking the next: modes and radiation of a link, and the run
-time's machine code, which a first scene needs as well. They hand nothing over but cache entries; then all is gone
-through in order, one after another, as if there had been one process: the same models, the same errors.
+What the cache lacks is worked on by two processes, each taking the next: modes and radiation of a link, and the machine
+code of run time and listener, which a first scene needs as well. They hand nothing over but cache entries; then all is
+gone through in order, one after another, as if there had been one process: the same models, the same errors.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -90,13 +91,13 @@ def _naming(link: str, of: int) -> Iterator[None]:
 
 
 def solved_bodies(
-    wanted: Sequence[WantedBody], known: Iterable[ModalModel], air: Air | None, say: Say
+    world: World, wanted: Sequence[WantedBody], known: Iterable[ModalModel], air: Air | None, say: Say
 ) -> list[list[ModalModel]]:
     """The models of each body's links. known: of bodies that are there already, shared by equal ones. air: in which
     they radiate, None: nobody hears them.
     """
     with one_thread():
-        _prepare(wanted, air, say)
+        _prepare(world, wanted, air, say)
         models, shared = [], list(known)
         for one in wanted:
             mine = [one.model] * len(one.parts) if one.model is not None else _solved(one, shared, say)
@@ -155,30 +156,32 @@ def _shared(model: ModalModel, known: Iterable[ModalModel]) -> ModalModel:
     return next(same, model)
 
 
-def _prepare(wanted: Sequence[WantedBody], air: Air | None, say: Say) -> None:
+def _prepare(world: World, wanted: Sequence[WantedBody], air: Air | None, say: Say) -> None:
     """Fill the cache with what it lacks of these bodies, side by side; what fails is left to whoever asks next."""
     missing = _missing(wanted)
-    if len(missing) < 2:
-        return
 
-    def work(item: tuple[int, tuple[str, tuple[Shape, ...], WantedBody] | None]) -> None:
-        number, job = item
-        with suppress(SonicBulletError):
-            if job is None:
-                say("machine code of the run time")
-                make_ready()
-                return
-            name, shapes, one = job
-            head = f"modes of {name}, {number} of {len(missing)}, two at a time"
-            model = _analysed(shapes, one, lambda text: say(f"{head}: {text}"))
-            if air is not None and model.mode_count:
-                say(f"{head}: how they radiate")
-                radiation_of(model, air)
+    def solve(number: int, name: str, shapes: tuple[Shape, ...], one: WantedBody) -> None:
+        head = f"modes of {name}, {number} of {len(missing)}, two at a time"
+        model = _analysed(shapes, one, lambda text: say(f"{head}: {text}"))
+        if air is not None and model.mode_count:
+            say(f"{head}: how they radiate")
+            radiation_of(model, air)
 
-    jobs: list[tuple[str, tuple[Shape, ...], WantedBody] | None] = [*missing]
-    if air is not None:
-        jobs.insert(1, None)  # as long as a body, and the first two begin together
-    parallel_map(work, list(enumerate(jobs, start=1)))
+    def make(which: str, ready: Callable[[], None]) -> None:
+        say(f"machine code of {which}")
+        ready()
+
+    jobs: list[Callable[[], None]] = [partial(solve, i, *job) for i, job in enumerate(missing, start=1)]
+    if jobs and air is not None:
+        jobs.insert(1, partial(make, "the run time", make_ready))  # the longest: the first two begin together
+    if jobs:
+        jobs.insert(2, partial(make, "the listener", world.make_ready))
+        parallel_map(_done, jobs)
+
+
+def _done(job: Callable[[], None]) -> None:
+    with suppress(SonicBulletError):
+        job()
 
 
 def _missing(wanted: Sequence[WantedBody]) -> list[tuple[str, tuple[Shape, ...], WantedBody]]:

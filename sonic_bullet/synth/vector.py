@@ -2,8 +2,6 @@
 
 Every multiply-add is stated and every sum has a fixed order: the bits are the same on each call, whatever the caller's
 loops. Vectors are eight doubles (two or four registers where the machine has narrower ones; the bits are the same).
-numba's cache watches only the file of the compiled function: after a change here, in tile.py or in drive.py, remove
-synth/__pycache__.
 """
 
 from __future__ import annotations

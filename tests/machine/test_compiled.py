@@ -32,6 +32,7 @@ from kernel import twice
 assert twice(21.0) == 42.0
 print(sum(twice.stats.cache_hits.values()))
 """
+PLACES = ("compiled.py", "linked_once.py")
 FORGED = b"cos\nsystem\n(S'touch forged'\ntR."  # a pickle that runs a command
 
 
@@ -200,8 +201,7 @@ def test_a_numba_whose_inner_parts_moved_compiles(place: Path, monkeypatch: pyte
 
 
 def test_every_kernel_is_compiled_in_the_one_place() -> None:
-    place = ("compiled.py", "linked_once.py")
-    found = {path.name: path.read_text() for path in PACKAGE.rglob("*.py") if path.name not in place}
+    found = {path.name: path.read_text() for path in PACKAGE.rglob("*.py") if path.name not in PLACES}
     kernels = sum(len(re.findall(r"^@njit\(", text, re.M)) for text in found.values())
     assert kernels > 60
     assert [

@@ -25,7 +25,7 @@ import numpy as np
 
 from sonic_bullet.listener.frames import LINK_SPAN, Motion, Roster, encode, rows_of, same_motion, without
 from sonic_bullet.listener.known_bodies import KnownBodies, alike
-from sonic_bullet.listener.memory import Memory
+from sonic_bullet.listener.memory import Memory, make_ready
 from sonic_bullet.listener.polling import Touches, loaded
 from sonic_bullet.listener.pybullet import body_facts as facts
 from sonic_bullet.listener.pybullet import collision_shapes as shapes
@@ -105,6 +105,10 @@ class PyBulletWorld(World):
             return False
         self.hook(self.before_step, after)
         return True
+
+    def make_ready(self) -> None:
+        """Have the machine code that the first step would else wait for."""
+        make_ready()
 
     def links_called(self, body: object, link: object) -> tuple[int, tuple[int, ...]]:
         """The body's id and its links of that number or name, "all" of them. Raises SceneError, MeshError."""
