@@ -161,7 +161,7 @@ def _prepare(world: World, wanted: Sequence[WantedBody], air: Air | None, say: S
     missing = _missing(wanted)
 
     def solve(number: int, name: str, shapes: tuple[Shape, ...], one: WantedBody) -> None:
-        head = f"modes of {name}, {number} of {len(missing)}, two at a time"
+        head = f"modes of {name}" + (f", {number} of {len(missing)}, two at a time" if len(missing) > 1 else "")
         model = _analysed(shapes, one, lambda text: say(f"{head}: {text}"))
         if air is not None and model.mode_count:
             say(f"{head}: how they radiate")

@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numba
 import numpy as np
@@ -83,20 +84,33 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-@compiled.njit(nogil=True)
-def divided(a, b):  # type: ignore[no-untyped-def]
-    return a / b
+@pytest.fixture
+def divided(monkeypatch: pytest.MonkeyPatch) -> Any:
+    """A kernel of which nothing is kept."""
+    monkeypatch.setattr(compiled, "folder", lambda: None)
+
+    @compiled.njit(nogil=True)
+    def divided(a, b):  # type: ignore[no-untyped-def]
+        return a / b
+
+    return divided
 
 
-@compiled.njit(nogil=True)
-def mean(values):  # type: ignore[no-untyped-def]
-    total = 0.0
-    for value in values:
-        total += value
-    return divided(total, len(values))
+@pytest.fixture
+def mean(divided: Any) -> Any:
+    """A kernel that calls it."""
+
+    @compiled.njit(nogil=True)
+    def mean(values):  # type: ignore[no-untyped-def]
+        total = 0.0
+        for value in values:
+            total += value
+        return divided(total, len(values))
+
+    return mean
 
 
-def test_a_kernel_that_kernels_call_is_only_written_down() -> None:
+def test_a_kernel_that_kernels_call_is_only_written_down(divided: Any, mean: Any) -> None:
     assert mean(np.arange(4.0)) == 1.5
     (part,) = divided.part.overloads.values()
     assert part.library.get_pointer_to_function(part.fndesc.llvm_func_name) == 0
@@ -105,12 +119,12 @@ def test_a_kernel_that_kernels_call_is_only_written_down() -> None:
     assert len(divided.part.overloads) == 1
 
 
-def test_what_goes_wrong_within_is_raised_outside() -> None:
+def test_what_goes_wrong_within_is_raised_outside(mean: Any) -> None:
     with pytest.raises(ZeroDivisionError):
         mean(np.zeros(0))
 
 
-def test_a_kernel_that_knows_nothing_of_parts_may_call_them() -> None:
+def test_a_kernel_that_knows_nothing_of_parts_may_call_them(mean: Any) -> None:
     half = numba.njit(lambda values: mean(values) / 2)
     assert half(np.arange(4.0)) == 0.75
 
