@@ -32,7 +32,6 @@ WORD = re.compile(rb"\w+")
 OPEN_FLAGS = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
 
 
-
 def _as_written(path: str) -> bool:
     """The file is a regular one, this user's, and whole. Raises OSError."""
     fd = os.open(path, OPEN_FLAGS)

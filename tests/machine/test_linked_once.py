@@ -110,6 +110,13 @@ def mean(divided: Any) -> Any:
     return mean
 
 
+def test_another_numba_compiles_as_it_does_by_itself(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(compiled, "KNOWN_NUMBA", ["0", "1"])
+    kernel = compiled.njit(nogil=True)(lambda a, b: a + b)
+    assert kernel(1.0, 2.0) == 3.0
+    assert not hasattr(kernel, "part")
+
+
 def test_a_kernel_that_kernels_call_is_only_written_down(divided: Any, mean: Any) -> None:
     assert mean(np.arange(4.0)) == 1.5
     (part,) = divided.part.overloads.values()
