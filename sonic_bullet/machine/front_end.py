@@ -67,7 +67,7 @@ class Typing:
         return signature
 
 
-class Target:
+class RememberingTarget:
     """A target context that is up to date."""
 
     def __init__(self, context: Any) -> None:

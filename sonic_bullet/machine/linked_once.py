@@ -26,7 +26,7 @@ from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, compile_result
 from numba.core.serialize import dumps
 
-from sonic_bullet.machine.front_end import QuickFlags, Target, Typing, without_needless
+from sonic_bullet.machine.front_end import QuickFlags, RememberingTarget, Typing, without_needless
 
 _TYPED: dict[QuickFlags, dict[Any, Any]] = {}  # calls that are known while a kernel is compiled, by its options
 
@@ -162,7 +162,7 @@ class _PartCompiler(_Compiler):
         self, typing: Any, target: Any, library: Any, arguments: Any, result: Any, flags: Any, names: Any
     ) -> None:
         known = _TYPED.setdefault(flags, {})
-        super().__init__(Typing(typing, known), Target(target), library, arguments, result, flags, names)
+        super().__init__(Typing(typing, known), RememberingTarget(target), library, arguments, result, flags, names)
 
 
 @contextmanager
