@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
 from math import lcm
+from typing import NamedTuple
 
 import numpy as np
 
 from sonic_bullet.records import Array
 
 
-@dataclass(frozen=True, slots=True)
-class Clock:
+class Clock(NamedTuple):
     """Time at the start of a step, ticks/per_second in whole numbers: an hour of steps of 1/240 s has no drift."""
 
     ticks: int = 0

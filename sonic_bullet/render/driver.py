@@ -58,7 +58,7 @@ assert STEP_LAYOUT.size == STEP.itemsize
 @njit(nogil=True, error_model="numpy")
 def aligned(size):  # pragma: no cover - compiled
     """(size,) numbers that begin where a vector register does."""
-    raw = np.zeros(size + LANES)
+    raw = np.empty(size + LANES)
     skip = (-(raw.ctypes.data // 8)) % LANES
     return raw[skip : skip + size]
 

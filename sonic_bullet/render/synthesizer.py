@@ -36,6 +36,8 @@ def advance(setup: Setup, state: State, steps: Sequence[Step]) -> Array:
     """Take in steps, of as many bodies as the state has; (channels, n) of those that can be rendered then, LOOKAHEAD
     before them. Changes ``state`` in place: `copy` it first to come back to it.
     """
+    if len(steps) == 1 and not state.quenches:
+        return _advanced(setup, state, steps)
     frames = []
     while steps:
         if state.number in state.quenches and len(state.waiting) == LOOKAHEAD:
@@ -54,7 +56,7 @@ def _schedule(sr: int, state: State, steps: Sequence[Step]) -> tuple[Array, Cloc
     table = bytearray(len(steps) * layout.size)
     first = clock.sample(sr)
     for i, step in enumerate(steps):
-        dt_s, rows = step.dt_s, len(step.contacts)
+        dt_s, rows = step.dt_s, len(step.contacts.row)
         waiting = (*waiting, dt_s)
         count, offset, begin_s, after_s, quenched = 0, 0.0, 0.0, 0.0, False
         sample = first
