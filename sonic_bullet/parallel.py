@@ -79,13 +79,28 @@ def _started(do: Callable[[Any], Any], items: list[Any]) -> tuple[Any, Connectio
     ours, theirs = context.Pipe(duplex=False)
     other = context.Process(target=_help, args=(do, items, taken, ours, theirs, os.getpid()), daemon=True)
     try:
-        other.start()
+        with _nobody_compiles():
+            other.start()
     except OSError:
         ours.close()
         raise
     finally:
         theirs.close()
     return other, ours, taken
+
+
+@contextmanager
+def _nobody_compiles() -> Iterator[None]:
+    """While this thread forks: numba's lock, held by a thread that the other process does not have, would never be
+    free there.
+    """
+    if "numba" not in sys.modules:
+        yield
+        return
+    from numba.core.compiler_lock import global_compiler_lock
+
+    with global_compiler_lock:
+        yield
 
 
 def _can_fork() -> bool:

@@ -101,8 +101,7 @@ def contact_rows(touch, count, past, start, dt, time, table, counted, newest, sc
     """Fill row (k,) of CONTACT and the newest trace; how many rows it are, or UNKNOWN, STRANGERS or ABSURD.
 
     touch: `count` of TOUCH; past: those of the step before. start (n,) of START. dt, time: the step's length and start
-    in s. table, counted, newest, scratch: `Traces`
-    with room for `count`.
+    in s. table, counted, newest, scratch: `Traces` with room for `count`.
     """
     made, strangers, fine, work = np.int64(0), False, True, scratch[0]  # a literal 0 would compile sort_pairs twice
     for i in range(count):

@@ -31,7 +31,7 @@ from sonic_bullet.synth.strikes import LOOKAHEAD, SPAN
 from sonic_bullet.synth.surface_kernel import VOICE
 from sonic_bullet.synth.vector import LANES
 
-TO_GROW, PAUSED, NOT_FINITE = -1, -2, -3
+TO_GROW, PAUSED, NO_NUMBER = -1, -2, -3
 """Why the driver came back early: a table is too small; asked to stop before `hear`; a sum that is no number. Else it
 is DONE, or what `path_kernel.hear` said.
 """
@@ -235,7 +235,7 @@ def finish(
     if status != DONE:
         return status
     if not sum_at_sensors(source, step.count, reads, out, at):
-        return NOT_FINITE
+        return NO_NUMBER
     m = 0
     for c in range(len(reads)):
         if reads[c] == 0:

@@ -17,15 +17,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sonic_bullet.records import Air, Array, Body, ModalModel, Residual
 from sonic_bullet.render.resonator import Resonator, build_resonator
-
-if TYPE_CHECKING:
-    from sonic_bullet.render.step_events import Drive, ForcePulse
+from sonic_bullet.render.step_events import Drive, ForcePulse
 from sonic_bullet.residual.grains import Voice, make_voice, mixed_number, placed, varied
 from sonic_bullet.residual.player import SECTION, Grain, Rubbed, rubbed, section_grain
 from sonic_bullet.residual.transfer import StruckModes

@@ -6,9 +6,12 @@ The run time itself does without; a residual, a test or whoever wants to know wh
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from sonic_bullet.records import Array
-from sonic_bullet.render.synthesis_state import StepScratch
+
+if TYPE_CHECKING:
+    from sonic_bullet.render.synthesis_state import StepScratch
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -236,13 +236,13 @@ def with_bodies(setup: Setup, state: State, bodies: Sequence[Body], position_m: 
     """Further bodies, silent at first, at the poses (k, 3), (k, 4)."""
     new = tuple(build_resonator(body, setup.sensors, setup.sr, setup.air) for body in bodies)
     voices = tuple(build_residual_voice(s, setup.sr, setup.air) if setup.residual else None for s in new)
-    for one, voice in zip(new, voices, strict=True):
+    modes = [with_lines(one, voice) for one, voice in zip(new, voices, strict=True)]
+    instrument = bank.append(state.bank, state.ringing, modes)
+    air = path.append_bodies(state.path, state.travelling, np.array([one.radius_m for one in new]))
+    for one, voice in zip(new, voices, strict=True):  # nothing has changed where something was refused till here
         follows = voice.follows if voice is not None else np.zeros(0, np.int64)
         state.table.add(one, follows, surface_seed(setup.seed, one.body))
-    modes = [with_lines(one, voice) for one, voice in zip(new, voices, strict=True)]
-    state.bank, state.ringing = bank.append(state.bank, state.ringing, modes)
-    radius = np.array([one.radius_m for one in new])
-    state.path, state.travelling = path.append_bodies(state.path, state.travelling, radius)
+    (state.bank, state.ringing), (state.path, state.travelling) = instrument, air
     state.window.with_bodies(position_m, quaternion_xyzw)
     state.resonators, state.voices = state.resonators + new, state.voices + voices
     state.has_residual = any(voice is not None for voice in state.voices)

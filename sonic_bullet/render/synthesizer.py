@@ -92,7 +92,7 @@ def _advanced(setup: Setup, state: State, steps: Sequence[Step]) -> Array:
         arguments = (
             done, taken, begin, pause, resume, float(sr), table, contacts, *poses, *state.tables(), pressure, out
         )  # fmt: skip
-        if not driver.advance_steps.overloads:
+        if not getattr(driver.advance_steps, "overloads", True):
             make_driver(arguments)
         more, status, found, drives = driver.advance_steps(*arguments)
         done, resume = done + more, status not in (driver.TO_GROW, path_places.DONE)
@@ -102,7 +102,7 @@ def _advanced(setup: Setup, state: State, steps: Sequence[Step]) -> Array:
             _make_room(state, table[done], longest)
         elif status == driver.PAUSED:
             _add_residuals(setup, state, table[done], found, drives)
-        elif status == driver.NOT_FINITE:
+        elif status == driver.NO_NUMBER:
             what = "the synthesizer made NaN or infinite samples"
             raise AudioError(what, "report the contact log: this must not happen")
         else:

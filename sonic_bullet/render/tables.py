@@ -86,13 +86,13 @@ PAIR = np.dtype(
         ("sweep_m_s", "f8", (2,)),
         ("direction", "f8", (3,)),  # force on the lower body per newton of load, world; 0: not yet known
         ("gains", "i8"),  # 1 once its row of the gains is known
-        ("mass_kg", "f8"),  # from here: SurfacePairs
+        ("mass_kg", "f8"),  # from here: constants of its voice
         ("modulus_pa", "f8"),
         ("radius_m", "f8"),
         ("damping_ratio", "f8"),
         ("seed", "i8", (2,)),
         ("height_m", "f8", (2, OCTAVES)),
-        ("depth", "f8"),  # from here: SurfaceState
+        ("depth", "f8"),  # from here: state of its voice
         ("lift", "f8"),
         ("substeps", "i8"),
         ("swept_m", "f8", (2,)),

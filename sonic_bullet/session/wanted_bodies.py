@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from sonic_bullet.listener.world import World
+from sonic_bullet.machine.compiled import folder as code_folder
 from sonic_bullet.parallel import one_thread, parallel_map
 from sonic_bullet.radiation.radiated import radiation_of
 from sonic_bullet.records import Air, Material, ModalModel, Shape
@@ -172,10 +173,11 @@ def _prepare(world: World, wanted: Sequence[WantedBody], air: Air | None, say: S
         ready()
 
     jobs: list[Callable[[], None]] = [partial(solve, i, *job) for i, job in enumerate(missing, start=1)]
-    if jobs and air is not None:
-        jobs.insert(1, partial(make, "the run time", make_ready))  # the longest: the first two begin together
-    if jobs:
+    if jobs and code_folder() is not None:  # else what one process makes the other never has
+        if air is not None:
+            jobs.insert(1, partial(make, "the run time", make_ready))  # the longest: the first two begin together
         jobs.insert(2, partial(make, "the listener", world.make_ready))
+    if jobs:
         parallel_map(_done, jobs)
 
 

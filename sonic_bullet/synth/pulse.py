@@ -134,7 +134,7 @@ def pulse_table() -> Array:
 
 
 @njit(nogil=True)
-def _cumulated(s, table, flat):
+def cumulated(s, table, flat):
     if s <= 0.0:
         return 0.0
     if s >= 1.0:

@@ -6,12 +6,12 @@ import numpy as np
 
 from sonic_bullet.records import Array
 from sonic_bullet.synth.bank.strike_pool import NODES_PER_PULSE
-from sonic_bullet.synth.pulse import _cumulated, pulse_table
+from sonic_bullet.synth.pulse import cumulated, pulse_table
 
 
 def cumulated_force(s: Array, *, flat: bool = False) -> Array:
     """Q(s): the share of the impulse handed over by the share s (k,) of the pulse; 0 before, 1 after."""
-    return np.array([_cumulated(one, pulse_table(), flat) for one in np.asarray(s, float)])
+    return np.array([cumulated(one, pulse_table(), flat) for one in np.asarray(s, float)])
 
 
 def pulse_nodes(tau_s: float, sr: int, *, flat: bool = False) -> tuple[float, float, Array]:

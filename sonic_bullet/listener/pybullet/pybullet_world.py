@@ -181,9 +181,8 @@ class PyBulletWorld(World):
         return shapes.shapes_of(self.client_id, body, link)
 
     def forget(self, body: int | None = None) -> None:
-        """Say that a body was removed (None:
-
-        all, by resetSimulation); its id may be given anew. With a hook, nobody need call this.
+        """Say that a body was removed (None: all, by resetSimulation); its id may be given anew. With a hook, nobody
+        need call this.
         """
         self.epoch += 1
         self.left_out.forget(body)

@@ -31,9 +31,8 @@ DRIVE_SCRATCH = PUSH_SCRATCH + DRIVEN * LANES + DRIVEN + MOST_DUE
 
 @inner
 def _ring(b, start, columns, z, pole, block, weight, modes, observed, sound, scratch):  # pragma: no cover
-    """Tile of body b for the block that starts:
-
-    sound (W, b, BLOCK). Turns z to the next block. False where all modes are below the floor.
+    """Tile of body b for the block that starts: sound (W, b, BLOCK). Turns z to the next block. False where all modes
+    are below the floor.
     """
     now, powers = scratch[: 2 * CHUNK], scratch[2 * CHUNK : 12 * CHUNK]
     table = scratch[12 * CHUNK : (12 + 2 * ROW) * CHUNK]

@@ -18,7 +18,7 @@ from __future__ import annotations
 import numpy as np
 
 from sonic_bullet.synth.bank.kernels import inner, outer
-from sonic_bullet.synth.bank.layout import FLUSH, PAIR
+from sonic_bullet.synth.bank.layout import FLUSH
 from sonic_bullet.synth.bank.phasors import fill_phasors
 
 NODES_PER_PULSE = 24
@@ -241,6 +241,3 @@ def enter_pulses(
                 at, sr, bodies, law, ringing, strikes, rows, free, hertz,
             )  # fmt: skip
     return count
-
-
-assert PAIR % 8 == 0

@@ -16,7 +16,7 @@ from __future__ import annotations
 from sonic_bullet.synth.bank import drive
 from sonic_bullet.synth.bank.kernels import inner
 from sonic_bullet.synth.bank.layout import DRIVEN, FLOOR, FLUSH
-from sonic_bullet.synth.pulse import _cumulated
+from sonic_bullet.synth.pulse import cumulated
 
 
 @inner
@@ -42,9 +42,9 @@ def _strike_cells(at, n, slot, strikes, hertz, kick):  # pragma: no cover - comp
     for sample in range(max(first, at), min(last + 1, at + n)):
         total = complex(0.0, 0.0)
         cell = (sample - 1) * cells
-        before = _cumulated((cell / cells - strike.start) / strike.length, hertz, strike.flat)
+        before = cumulated((cell / cells - strike.start) / strike.length, hertz, strike.flat)
         for i in range(cells):
-            after = _cumulated(((cell + i + 1) / cells - strike.start) / strike.length, hertz, strike.flat)
+            after = cumulated(((cell + i + 1) / cells - strike.start) / strike.length, hertz, strike.flat)
             total = total * turn + (after - before)
             before = after
         total *= onset
