@@ -26,6 +26,7 @@ Item = TypeVar("Item")
 Made = TypeVar("Made")
 
 _INSIDE: ContextVar[bool] = ContextVar("inside", default=False)  # a list that is being worked on
+_OUT: ContextVar[Connection | None] = ContextVar("out", default=None)  # of the other process
 
 
 @contextmanager
@@ -40,19 +41,38 @@ def one_thread() -> Iterator[None]:
         yield
 
 
-def parallel_map(do: Callable[[Item], Made], items: Iterable[Item]) -> list[Made]:
+def said_here(say: Callable[[str], None]) -> Callable[[str], None]:
+    """``say`` for what runs in a `parallel_map`: what the other process says is said by this one, when it next listens.
+    A caller's function is then called where the caller is.
+    """
+
+    def tell(text: str) -> None:
+        out = _OUT.get()
+        if out is None:
+            say(text)
+        else:
+            with suppress(OSError):
+                out.send_bytes(ForkingPickler.dumps((None, text)))
+
+    return tell
+
+
+def parallel_map(
+    do: Callable[[Item], Made], items: Iterable[Item], say: Callable[[str], None] = lambda text: None
+) -> list[Made]:
     """[do(item) for item in items], on two cores where there are two. ``do`` must not depend on what it did before.
 
-    Raises whatever do raises.
+    say: is told what the other process says (`said_here`) once this one has nothing left to begin. Raises whatever do
+    raises.
     """
     listed = list(items)
     if _INSIDE.get():
         return [do(item) for item in listed]
     with one_thread():
-        return _shared(do, listed) if len(listed) > 1 and _can_fork() else [do(item) for item in listed]
+        return _shared(do, listed, say) if len(listed) > 1 and _can_fork() else [do(item) for item in listed]
 
 
-def _shared(do: Callable[[Item], Made], listed: list[Item]) -> list[Made]:
+def _shared(do: Callable[[Item], Made], listed: list[Item], say: Callable[[str], None]) -> list[Made]:
     try:
         other, ours, taken = _started(do, listed)
     except OSError:  # no memory or no process to be had
@@ -63,7 +83,11 @@ def _shared(do: Callable[[Item], Made], listed: list[Item]) -> list[Made]:
         while (i := _next(taken)) < len(listed):
             made[i] = do(listed[i])
         while (found := _received(ours)) is not None:
-            made[found[0]] = found[1]
+            number, what = found
+            if number is None:
+                say(what)
+            else:
+                made[number] = what
         return [made[i] if i in made else do(item) for i, item in enumerate(listed)]
     finally:
         _INSIDE.reset(before)
@@ -114,10 +138,10 @@ def _next(taken: Any) -> int:
         return int(taken.value) - 1
 
 
-def _received(ours: Connection) -> tuple[int, Any] | None:
+def _received(ours: Connection) -> tuple[int | None, Any] | None:
     """What the other process has sent; None at its end, or where it cannot be read: what is missing is done here."""
     try:
-        found: tuple[int, Any] | None = ours.recv()
+        found: tuple[int | None, Any] | None = ours.recv()
     except Exception:  # the other process is gone, or has sent what no one can put together
         return None
     return found
@@ -129,6 +153,7 @@ def _help(
     """The other process: results one by one, then None."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the first one stops, and ends this one
     ours.close()
+    _OUT.set(theirs)
     with suppress(OSError):  # nobody listens any more
         while os.getppid() == parent and (i := _next(taken)) < len(items):
             try:

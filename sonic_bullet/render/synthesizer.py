@@ -192,6 +192,7 @@ class Synthesizer:
         self._frames: list[Array] = []
         self._lag = np.zeros((len(sensors), 0))
         self._last: Step | None = None
+        self._failed: AudioError | None = None
         self._steps = 0
 
     @property
@@ -242,20 +243,25 @@ class Synthesizer:
             first = steps[0]
             poses = first.position_m[known:], first.quaternion_xyzw[known:]
             with_bodies(self._setup, self._state, bodies[known:there], *poses)
-        frame = advance(self._setup, self._state, steps)
+        if self._failed is not None:  # within a step, so that nothing can go on from there
+            raise self._failed
+        try:
+            frame = advance(self._setup, self._state, steps)
+        except AudioError as error:
+            self._failed = error
+            raise
         self._last = steps[-1]
         if frame.shape[1]:
             self._frames.append(frame)
         return frame
 
     def sound(self) -> Array:
-        """(channels, floor(sr·time)) all sound so far, without lag."""
+        """(channels, floor(sr·time)) all sound so far, without lag; after an AudioError, what was made before it."""
         channels = len(self._setup.sensors)
         if not channels:
             return np.zeros((0, self._clock.sample(self._setup.sr)))
-        return np.concatenate(
-            [np.zeros((channels, 0)), *self._frames, drained(self._setup, self._state, self._last)], axis=1
-        )
+        rest = drained(self._setup, self._state, self._last) if self._failed is None else np.zeros((channels, 0))
+        return np.concatenate([np.zeros((channels, 0)), *self._frames, rest], axis=1)
 
     def quench(self) -> None:
         """Stop all that rings where the steps taken in so far end, exactly there at any rate: in frames that is

@@ -20,7 +20,7 @@ import numpy as np
 
 from sonic_bullet.listener.world import World
 from sonic_bullet.machine.compiled import folder as code_folder
-from sonic_bullet.parallel import one_thread, parallel_map
+from sonic_bullet.parallel import one_thread, parallel_map, said_here
 from sonic_bullet.radiation.radiated import radiation_of
 from sonic_bullet.records import Air, Material, ModalModel, Shape
 from sonic_bullet.records.coerce import as_kind, as_number
@@ -159,7 +159,7 @@ def _shared(model: ModalModel, known: Iterable[ModalModel]) -> ModalModel:
 
 def _prepare(world: World, wanted: Sequence[WantedBody], air: Air | None, say: Say) -> None:
     """Fill the cache with what it lacks of these bodies, side by side; what fails is left to whoever asks next."""
-    missing = _missing(wanted)
+    missing, say_here, say = _missing(wanted), say, said_here(say)
 
     def solve(number: int, name: str, shapes: tuple[Shape, ...], one: WantedBody) -> None:
         head = f"modes of {name}" + (f", {number} of {len(missing)}, two at a time" if len(missing) > 1 else "")
@@ -178,7 +178,7 @@ def _prepare(world: World, wanted: Sequence[WantedBody], air: Air | None, say: S
             jobs.insert(1, partial(make, "the run time", make_ready))  # the longest: the first two begin together
         jobs.insert(2, partial(make, "the listener", world.make_ready))
     if jobs:
-        parallel_map(_done, jobs)
+        parallel_map(_done, jobs, say_here)
 
 
 def _done(job: Callable[[], None]) -> None:

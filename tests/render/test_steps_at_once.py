@@ -13,6 +13,7 @@ import pytest
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.records import Array, Body, Microphone, ModalSum, Vibrometer
 from sonic_bullet.records.contacts import Contacts, Event, Step
+from sonic_bullet.records.errors import AudioError
 from sonic_bullet.render import Synthesizer, render_log
 from sonic_bullet.render.synthesis_state import StepScratch
 from tests.made.models import GLASS, STEEL, WOOD, ball_body, box_body, row, wall_body
@@ -168,3 +169,20 @@ def test_two_threads_make_the_bits_of_one() -> None:
     with ThreadPoolExecutor(2) as threads:
         assert [sound.tobytes() for sound in threads.map(render_log, logs)] == alone
     assert len(set(alone)) == 3
+
+
+def test_a_body_too_far_to_be_heard_ends_the_sound_and_keeps_what_was() -> None:
+    """The error comes again for each further step; nothing is made of half a step."""
+    log = busy_log(False)
+    synth = Synthesizer(sr=log.sr, sensors=log.sensors, seed=log.seed, air=log.air)
+    for step in log.steps[:12]:
+        synth.feed(step, log.bodies)
+    before = synth.sound()
+    far = replace(log.steps[12], position_m=log.steps[12].position_m + 3000.0)
+    with pytest.raises(AudioError, match="m from a microphone"):
+        for _ in range(8):
+            synth.feed(far, log.bodies)
+    kept = synth.sound()
+    assert kept.any() and (kept == before[:, : kept.shape[1]])[:, :-800].all()
+    with pytest.raises(AudioError, match="m from a microphone"):
+        synth.feed(log.steps[12], log.bodies)
