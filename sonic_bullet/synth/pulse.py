@@ -135,6 +135,7 @@ def pulse_table() -> Array:
 
 @njit(nogil=True)
 def cumulated(s, table, flat):
+    """Q at the share s of the pulse: 0 before it, 1 after. table: `pulse_table`; flat: half-sine, not Hertz'."""
     if s <= 0.0:
         return 0.0
     if s >= 1.0:

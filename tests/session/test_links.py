@@ -172,7 +172,7 @@ def test_what_the_cache_lacks_is_solved_beforehand_each_once(
     twins, seen = robot(client, tmp_path / "twins", foot=ARM, arm=ARM), []
     made, before = solver(beforehand=True, fails_at_m=0.2), []
 
-    def one_by_one(work: Callable[[Any], None], items: list[Any]) -> None:
+    def one_by_one(work: Callable[[Any], None], items: list[Any], say: Callable[[str], None]) -> None:
         for item in items:
             work(item)
         before.extend(made.solved_m)
