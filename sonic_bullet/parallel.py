@@ -25,6 +25,8 @@ from typing import Any, TypeVar
 Item = TypeVar("Item")
 Made = TypeVar("Made")
 
+ROOM_BYTES = 1 << 20
+"""Results that wait to be fetched: what Linux allows everybody."""
 _INSIDE: ContextVar[bool] = ContextVar("inside", default=False)  # a list that is being worked on
 _OUT: ContextVar[Connection | None] = ContextVar("out", default=None)  # of the other process
 
@@ -98,9 +100,13 @@ def _shared(do: Callable[[Item], Made], listed: list[Item], say: Callable[[str],
 
 def _started(do: Callable[[Any], Any], items: list[Any]) -> tuple[Any, Connection, Any]:
     """The other process, where its results come out, and the count of what is taken. Raises OSError."""
+    import fcntl
+
     context: Any = get_context("fork")
     taken = context.Value("i", 0)
     ours, theirs = context.Pipe(duplex=False)
+    with suppress(OSError):  # else the other process stands still with its first large result while this one works
+        fcntl.fcntl(theirs.fileno(), fcntl.F_SETPIPE_SZ, ROOM_BYTES)
     other = context.Process(target=_help, args=(do, items, taken, ours, theirs, os.getpid()), daemon=True)
     try:
         with _nobody_compiles():

@@ -15,18 +15,15 @@ import numpy as np
 
 from sonic_bullet.machine.compiled import njit
 
-INNER = {"nogil": True, "error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-"""Of kernels that only kernels call: a fifth less to compile, and Python cannot call them."""
 
-
-@njit(**INNER)
+@njit(nogil=True, error_model="numpy")
 def turn(qx, qy, qz, qw, x, y, z):
     """Rotate (x, y, z) by a unit quaternion: v + 2 w (q × v) + 2 q × (q × v)."""
     cx, cy, cz = 2 * (qy * z - qz * y), 2 * (qz * x - qx * z), 2 * (qx * y - qy * x)
     return x + qw * cx + qy * cz - qz * cy, y + qw * cy + qz * cx - qx * cz, z + qw * cz + qx * cy - qy * cx
 
 
-@njit(**INNER)
+@njit(nogil=True, error_model="numpy")
 def pose_after(body, elapsed, position, quaternion):
     """Position (3,) and orientation (4,) of a body `elapsed` seconds into the step, by its twist before it, written in
     place.
@@ -47,7 +44,7 @@ def pose_after(body, elapsed, position, quaternion):
     quaternion[3] = c * q[3] - a * q[0] - b * q[1] - d * q[2]
 
 
-@njit(**INNER)
+@njit(nogil=True, error_model="numpy")
 def relative_motion(touch, a, b, slip):
     """Approach in m/s of the bodies a, b at a touch; their slip in m/s goes to slip (3,)."""
     p, q, n = touch.point_a_m, touch.point_b_m, touch.normal
@@ -62,7 +59,7 @@ def relative_motion(touch, a, b, slip):
     return -along
 
 
-@njit(**INNER)
+@njit(nogil=True, error_model="numpy")
 def rotation_between(first, second, vector):
     """The rotation vector (3,) in rad, world frame, that turns the first orientation xyzw (4,) into the second."""
     w, v = first[3], second[3]

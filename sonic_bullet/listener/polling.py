@@ -20,7 +20,6 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet.listener.frames import BEYOND, LINK_SPAN
-from sonic_bullet.listener.kinematics import INNER
 from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array
 
@@ -118,7 +117,7 @@ def packed(contacts: Iterable[RawContact], count: int) -> Array:
     return np.frombuffer(buffer, RAW, at // size) if at else NO_RAW
 
 
-@njit(**INNER)
+@njit(nogil=True, error_model="numpy")
 def stale(raw, i, before):
     """Whether row i, without normal force, keeps the friction that it had in `before`, to the bit."""
     row, k = raw[i], len(before)
@@ -163,7 +162,7 @@ def load(raw, before, dt, touch):
     return count
 
 
-@njit(**INNER)
+@njit(nogil=True, error_model="numpy")
 def all_usable(touch, count):
     """Whether no number of the first `count` touches is NaN or `BEYOND` what can be."""
     for i in range(count):

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sonic_bullet.listener.kinematics import INNER, relative_motion
+from sonic_bullet.listener.kinematics import relative_motion
 from sonic_bullet.listener.polling import all_usable, load
 from sonic_bullet.listener.start import LEFT_OUT, begin
 from sonic_bullet.listener.sweep import sort_pairs, sweep
@@ -24,7 +24,7 @@ UNKNOWN, STRANGERS, ABSURD, UNUSUAL = -1, -2, -3, -4
 (START.met); a number beyond `LARGEST`; what Python has to look at (`take_step`)."""
 
 
-@njit(**INNER)
+@njit(nogil=True, error_model="numpy")
 def find(start, code):
     """Row of a code in START (n,), or -1."""
     low, high = 0, len(start)
@@ -37,14 +37,14 @@ def find(start, code):
     return low if low < len(start) and start[low].code == code else -1
 
 
-@njit(**INNER)
+@njit(nogil=True, error_model="numpy")
 def still(body):
     """Whether every speed is exactly 0."""
     v, w = body.velocity_m_s, body.spin_rad_s
     return v[0] == 0 and v[1] == 0 and v[2] == 0 and w[0] == 0 and w[1] == 0 and w[2] == 0
 
 
-@njit(**INNER)
+@njit(nogil=True, error_model="numpy")
 def seen(touch, i, past):
     """Whether touch i is one of `past`, to the bit."""
     row, k = touch[i], len(past)
@@ -66,7 +66,7 @@ def seen(touch, i, past):
     return False
 
 
-@njit(**INNER)
+@njit(nogil=True, error_model="numpy")
 def counts(touch, i, past, a, b, approach, dt):
     """Whether a touch of the links a, b (START rows) counts: none asleep, moved by hand, or of a body in its first step
     and deeper inside its partner than its speed explains.
@@ -81,7 +81,7 @@ def counts(touch, i, past, a, b, approach, dt):
     return not (inside and (a.born or b.born))
 
 
-@njit(**INNER)
+@njit(nogil=True, error_model="numpy")
 def fill(row, touch, fresh, slip, approach):
     """A CONTACT row of a touch, but for who meets and the sweep; whether its numbers are numbers within `LARGEST`."""
     row.approach_m_s = approach
@@ -156,7 +156,7 @@ def place_bodies(start, pose, position, quaternion, teleported):
             quaternion[i, x] = pose[i, 3 + x]
 
 
-@njit(**INNER)
+@njit(nogil=True, error_model="numpy")
 def unmoved(earlier, later):
     """Whether every number of two MOTION tables is the same."""
     for i in range(len(later)):

@@ -17,7 +17,7 @@ from collections.abc import Callable, Collection
 import numpy as np
 
 from sonic_bullet.listener.frames import LINK_SPAN, MOTION, Motion, Roster, rows_of
-from sonic_bullet.listener.kinematics import INNER, rotation_between
+from sonic_bullet.listener.kinematics import rotation_between
 from sonic_bullet.listener.polling import Touches
 from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array
@@ -57,7 +57,7 @@ def start_table(roster: Roster) -> Array:
     return table
 
 
-@njit(**INNER)
+@njit(nogil=True, error_model="numpy")
 def jump(earlier, later, static, dt):
     """Whether a link is farther from where it was than 1.5 × both speeds (static: DRIVEN_SPEED_M_S) explain."""
     moved, v, w = 0.0, 0.0, 0.0
@@ -69,7 +69,7 @@ def jump(earlier, later, static, dt):
     return np.sqrt(moved) > reach * dt + JUMP_FLOOR_M
 
 
-@njit(**INNER)
+@njit(nogil=True, error_model="numpy")
 def drive(earlier, later, dt, body):
     """Give a link of mass 0 whose pose was reset since `earlier` the velocity of that move."""
     p, q, x, y = earlier.position_m, earlier.quaternion_xyzw, later.position_m, later.quaternion_xyzw

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sonic_bullet.listener.kinematics import INNER, pose_after, turn
+from sonic_bullet.listener.kinematics import pose_after, turn
 from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array
 
@@ -70,7 +70,7 @@ class Traces:
         self.newest = (self.newest - 1) % len(self.count)
 
 
-@njit(**INNER)
+@njit(nogil=True, error_model="numpy")
 def surface_velocity(dx, dy, dz, age, q, normal):
     """Velocity of a contact over a surface, world axes, that went by (dx, dy, dz) in the frame of a body turned by q.
 
@@ -86,7 +86,7 @@ def surface_velocity(dx, dy, dz, age, q, normal):
     return dx * scale, dy * scale, dz * scale
 
 
-@njit(**INNER)
+@njit(nogil=True, error_model="numpy")
 def slower(x, y, z, slip):
     """The smaller of |u_a| and |u_b|, u_a = (x, y, z)."""
     a = x * x + y * y + z * z
@@ -94,7 +94,7 @@ def slower(x, y, z, slip):
     return np.sqrt(min(a, b))
 
 
-@njit(**INNER)
+@njit(nogil=True, error_model="numpy")
 def first_of(table, count, pair):
     """The first of `count` entries, in the order of pairs, that is not before `pair`."""
     low, high = 0, count
@@ -107,7 +107,7 @@ def first_of(table, count, pair):
     return low
 
 
-@njit(**INNER)
+@njit(nogil=True, error_model="numpy")
 def recognise(fresh, pair, table, count, newest, work, normal, limit):
     """Fill u_a of a TRACE row, whose time and points stand already; False where nothing of the pair is known that fits.
 
@@ -141,7 +141,7 @@ def recognise(fresh, pair, table, count, newest, work, normal, limit):
     return held and slower(u[0], u[1], u[2], slip) <= limit
 
 
-@njit(**INNER)
+@njit(nogil=True, error_model="numpy")
 def place(touch, a, b, work, fresh):
     """Fill the points of a TRACE row: a touch in the frames of both bodies, by their poses when it was loaded.
 
@@ -158,7 +158,7 @@ def place(touch, a, b, work, fresh):
     return np.sqrt(ax**2 + ay**2 + az**2), np.sqrt(bx**2 + by**2 + bz**2)
 
 
-@njit(**INNER)
+@njit(nogil=True, error_model="numpy")
 def sweep(touch, a, b, pair, table, count, newest, work, fresh, speed):
     """Speeds (2,) in m/s at which a touch moves over the bodies a and b (START rows), and its TRACE row `fresh`, whose
     time is set.
@@ -180,7 +180,7 @@ def sweep(touch, a, b, pair, table, count, newest, work, fresh, speed):
     speed[1] = np.sqrt((u[0] + slip[0]) ** 2 + (u[1] + slip[1]) ** 2 + (u[2] + slip[2]) ** 2)
 
 
-@njit(**INNER)
+@njit(nogil=True, error_model="numpy")
 def sort_pairs(row, count, trace):
     """Write pair and order of the first `count` entries of a trace: CONTACT rows by (a, b), equal ones as they came.
 

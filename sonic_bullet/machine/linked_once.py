@@ -1,5 +1,5 @@
 """A kernel and all kernels it calls, optimised and made machine code once; it stands on inner parts of numba, and
-`sonic_bullet.machine.compiled` does without where they moved.
+`sonic_bullet.machine.compiled` does without in any release of it but the one that they are known of.
 
     kernel called by Python    -> Whole: its code and that of all below it, linked, optimised together, kept
     kernel called by a kernel  -> Part: typed and written down, no more; two processes may do so for one Whole
@@ -25,10 +25,6 @@ from numba.core.bytecode import FunctionIdentity
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, compile_result
 from numba.core.serialize import dumps
-
-from sonic_bullet.machine.front_end import QuickFlags, RememberingTarget, Typing, without_needless
-
-_TYPED: dict[QuickFlags, dict[Any, Any]] = {}  # calls that are known while a kernel is compiled, by its options
 
 
 class _Environments:
@@ -144,7 +140,7 @@ class _Compiler(Compiler):  # type: ignore[misc]
         if state.library is None:
             state.library = self.library(state.targetctx.codegen(), state.func_id.func_qualname)
             state.library.enable_object_caching()
-        return without_needless(super().define_pipelines(), state.func_id.code)
+        return super().define_pipelines()
 
 
 class _WholeCompiler(_Compiler):
@@ -158,22 +154,17 @@ class _WholeCompiler(_Compiler):
 class _PartCompiler(_Compiler):
     library = Part
 
-    def __init__(
-        self, typing: Any, target: Any, library: Any, arguments: Any, result: Any, flags: Any, names: Any
-    ) -> None:
-        known = _TYPED.setdefault(flags, {})
-        super().__init__(Typing(typing, known), RememberingTarget(target), library, arguments, result, flags, names)
-
 
 @contextmanager
 def _undisturbed() -> Iterator[None]:
-    """While kernels are compiled: the collector would look for garbage among millions of objects that stay."""
+    """While kernels are compiled: the collector would look for garbage among millions of objects that stay, a sixth of
+    the time.
+    """
     collects = gc.isenabled()
     gc.disable()
     try:
         yield
     finally:
-        _TYPED.clear()
         if collects:
             gc.enable()
 
@@ -185,8 +176,6 @@ def linked_once(function: Callable[..., Any], options: dict[str, Any]) -> Any:
     inner = {**options, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
     kernel = numba.njit(**{**options, "no_cfunc_wrapper": True}, pipeline_class=_WholeCompiler)(function)
     part = numba.njit(**inner, pipeline_class=_PartCompiler)(function)
-    for one in (kernel, part):
-        one._compiler._customize_flags = QuickFlags
     ask = part.get_call_template
 
     def get_call_template(arguments: Any, keywords: Any) -> Any:

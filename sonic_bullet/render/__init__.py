@@ -20,9 +20,12 @@ from sonic_bullet.records.coerce import as_call, as_flag, as_kind
 from sonic_bullet.records.contacts import Contacts, Step
 from sonic_bullet.records.errors import LogError
 from sonic_bullet.render.silence import silence_notes, why_silent
-from sonic_bullet.render.synthesizer import AT_ONCE, LATENCY_STEPS, Synthesizer
+from sonic_bullet.render.synthesizer import LATENCY_STEPS, Synthesizer
 
 __all__ = ["LATENCY_STEPS", "Synthesizer", "make_ready", "render_log", "silence_notes", "why_silent"]
+
+AT_ONCE = 64
+"""Steps that a replay takes in at once, between two looks at how far it is."""
 
 
 def render_log(

@@ -7,10 +7,6 @@ from functools import lru_cache
 from math import lcm
 from typing import NamedTuple
 
-import numpy as np
-
-from sonic_bullet.records import Array
-
 
 class Clock(NamedTuple):
     """Time at the start of a step, ticks/per_second in whole numbers: an hour of steps of 1/240 s has no drift."""
@@ -38,10 +34,6 @@ class Clock(NamedTuple):
             return Clock(self.ticks + ticks, per_second)
         common = lcm(per_second, self.per_second)
         return Clock(self.ticks * (common // self.per_second) + ticks * (common // per_second), common)
-
-    def progress(self, dt_s: float, sr: int, count: int) -> Array:
-        """(count,) where in the step, 0 … 1, each of its samples lies."""
-        return np.asarray(np.clip((np.arange(count) + self.offset(sr)) / (dt_s * sr), 0.0, 1.0))
 
 
 @lru_cache(maxsize=64)

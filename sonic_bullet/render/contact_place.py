@@ -19,8 +19,6 @@ CREASE_COS = np.cos(np.radians(20.0))
 """A contact whose normal leans more from the face's touches an edge or corner."""
 FLAT_CURVATURE = 0.1
 """Curvature times size below which a contact is flat: a cap of ten times the body's size."""
-INNER = {"nogil": True, "error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-"""How a kernel is compiled that only kernels call: what Python would need to call it takes a tenth of a second."""
 SIZELESS_M = 0.1
 """Size of a pair of which neither body has a volume (planes and links without a solid)."""
 

@@ -15,7 +15,6 @@ from __future__ import annotations
 import numpy as np
 
 from sonic_bullet.machine.compiled import njit
-from sonic_bullet.render.contact_place import INNER
 from sonic_bullet.render.tables import HISTORY
 from sonic_bullet.synth.strikes import NOW, SPAN
 
@@ -50,7 +49,7 @@ def orient(contacts, quaternion, rows):
         _turn(contacts[order[i]], quaternion, turn, rows[i])
 
 
-@njit(**INNER)
+@njit(nogil=True, error_model="numpy")
 def _turn(contact, quaternion, turn, row):
     """Fill a row but for its key. turn (3, 3): scratch."""
     swapped = contact.a > contact.b
@@ -123,7 +122,7 @@ def enter_loads(rows, start, stop, dt_s, pairs, active, counts, free):
         active[i] = merged[i]
 
 
-@njit(**INNER)
+@njit(nogil=True, error_model="numpy")
 def _begin(pair, row):
     """A place for the pair of a row: no load so far, no voice."""
     pair.key = row.key
@@ -136,7 +135,7 @@ def _begin(pair, row):
         pair.force_n[column] = pair.struck_n[column] = 0.0
 
 
-@njit(**INNER)
+@njit(nogil=True, error_model="numpy")
 def opening(force, column):
     """Opening of the load at a column: the best of the windows of SPAN steps around it, cut where the future is not
     known.

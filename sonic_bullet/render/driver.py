@@ -31,9 +31,9 @@ from sonic_bullet.synth.strikes import LOOKAHEAD, SPAN
 from sonic_bullet.synth.surface_kernel import VOICE
 from sonic_bullet.synth.vector import LANES
 
-TO_GROW, PAUSED, NO_NUMBER = -1, -2, -3
-"""Why the driver came back early: a table is too small; asked to stop before `hear`; a sum that is no number. Else it
-is DONE, or what `path_kernel.hear` said.
+TO_GROW, PAUSED, BROKEN = -1, -2, -3
+"""Why the driver came back early: a table is too small; asked to stop before `hear`; what must not happen, a sum that
+is no number or a strike without a place. Else it is DONE, or what `path_kernel.hear` said.
 """
 STEP = np.dtype(
     [
@@ -125,8 +125,10 @@ def ring(
     weight, observed, ringing, z, driven, sound, pole, block, strikes, phasors, free_strikes, hertz, source, pushed,
     sounds,
 ):  # fmt: skip  # pragma: no cover - compiled
-    """The step's pulses and drives on the bank: source (W, b, n or more) and pushed (b, 3, n or more)."""
-    enter_pulses(
+    """The step's pulses and drives on the bank: source (W, b, n or more) and pushed (b, 3, n or more). False where a
+    pulse found no place.
+    """
+    entered = enter_pulses(
         pulses, found, push, step.begin_s, step.after_s, step.sample, sr, bank_body, law, ringing, strikes, phasors,
         free_strikes, hertz,
     )  # fmt: skip
@@ -138,6 +140,7 @@ def ring(
         np.empty((6, n + LANES)), np.empty((DRIVEN, 3), np.int64), aligned(max(DRIVE_SCRATCH, RING_SCRATCH)), source,
         pushed, sounds,
     )  # fmt: skip
+    return entered == found
 
 
 @njit(nogil=True, error_model="numpy")
@@ -201,11 +204,12 @@ def advance_steps(
                     nodes, shapes, frequency_hz, spectrum, pairs, active, counts, gain, pulses, push, signal, gain0,
                     gain1, direction0, direction1, drive_body, drive_slot,
                 )  # fmt: skip
-                ring(
+                if not ring(
                     step, sr, found, pulses, push, drives, drive_body, signal, gain0, gain1, direction0, direction1, x,
                     bank_body, law, weight, observed, ringing, z, driven, sound, pole, block, strikes, phasors,
                     free_strikes, hertz, source, pushed, sounds,
-                )  # fmt: skip
+                ):  # fmt: skip
+                    return done, BROKEN, found, drives
             if pause and anew:
                 return done, PAUSED, found, drives
             status = finish(
@@ -235,7 +239,7 @@ def finish(
     if status != DONE:
         return status
     if not sum_at_sensors(source, step.count, reads, out, at):
-        return NO_NUMBER
+        return BROKEN
     m = 0
     for c in range(len(reads)):
         if reads[c] == 0:

@@ -16,7 +16,7 @@ import numpy as np
 
 from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Body
-from sonic_bullet.render.contact_place import INNER, add_push, contact_modulus, effective_mass, flat_area_m2, touch
+from sonic_bullet.render.contact_place import add_push, contact_modulus, effective_mass, flat_area_m2, touch
 from sonic_bullet.render.strike_pulses import STEEPEST
 from sonic_bullet.synth.profile import height_octaves
 from sonic_bullet.synth.surface_kernel import FASTEST_M_S, contact_radius_m, damping_ratio, sound_voices
@@ -97,7 +97,7 @@ def advance_friction(
     return drives
 
 
-@njit(**INNER)
+@njit(nogil=True, error_model="numpy")
 def _voices(pairs, active, count, bodies, rows, row_count, follow, voices):
     """The voices that move or begin in this step, into ``voices``; returns their number. All pairs move on to the
     step's end.
@@ -140,7 +140,7 @@ def _voices(pairs, active, count, bodies, rows, row_count, follow, voices):
     return found
 
 
-@njit(**INNER)
+@njit(nogil=True, error_model="numpy")
 def _aim(rows, begin, end, voice):
     """Where a pair is heading by its rows: its voice's sweep and direction at the step's end, its rows and their load.
     None where the manifold does not carry load.
@@ -167,7 +167,7 @@ def _aim(rows, begin, end, voice):
         voice.sweep_m_s[1, side] = FASTEST_M_S if mean > FASTEST_M_S else mean
 
 
-@njit(**INNER)
+@njit(nogil=True, error_model="numpy")
 def _begin(pair, bodies, rows, begin, end, faces, nodes, quaternion):
     """Constants of a voice, by the manifold with which it begins: effective mass, curvature where the load is highest,
     spread. Without rows: as two flats of the bodies' size.

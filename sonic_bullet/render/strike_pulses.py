@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from sonic_bullet.machine.compiled import njit
-from sonic_bullet.render.contact_place import INNER, add_push, effective_mass, flat_area_m2, touch
+from sonic_bullet.render.contact_place import add_push, effective_mass, flat_area_m2, touch
 from sonic_bullet.render.contact_rows import opening
 from sonic_bullet.synth.pulse import compliance, pulse_length
 from sonic_bullet.synth.strikes import NOW, SPAN
@@ -132,7 +132,7 @@ def find_pulses(
     return found
 
 
-@njit(**INNER)
+@njit(nogil=True, error_model="numpy")
 def split_loads(ahead, pairs, active, count, rows, window, strikes):
     """What is strike of the loads ``ahead`` steps after the one being rendered: the number of strikes, their bodies,
     shares and rows. It is marked as used.
@@ -172,7 +172,7 @@ def split_loads(ahead, pairs, active, count, rows, window, strikes):
     return found
 
 
-@njit(**INNER)
+@njit(nogil=True, error_model="numpy")
 def set_unheld_steps(ahead, number, pairs, active, count, bodies, held):
     """held (b,): steps for which gravity may have moved each mobile body although it rests: 1 where it carried load on
     any pair within the STEPS before, SPAN where it was just put where it is: Bullet finds the corners on which a box
@@ -192,7 +192,7 @@ def set_unheld_steps(ahead, number, pairs, active, count, bodies, held):
             held[i] = SPAN
 
 
-@njit(**INNER)
+@njit(nogil=True, error_model="numpy")
 def _gather(strike, rows):
     """Sums over a strike's rows, each weighted by the share of its step that is strike; no budget as yet."""
     j, n, arm, centre = strike.impulse_n_s, strike.normal, strike.arm_m, strike.centre_m
@@ -228,7 +228,7 @@ def _gather(strike, rows):
         n[x] /= max(np.sqrt(length), 1e-300)
 
 
-@njit(**INNER)
+@njit(nogil=True, error_model="numpy")
 def accept(strikes, count, bodies, through):
     """Strike impulses that a cause explains: the own budget, or that of a neighbour struck in the same step. A body
     that never moves hands nothing on: the floor. through (b,): scratch.
@@ -257,7 +257,7 @@ def accept(strikes, count, bodies, through):
         rounds += 1
 
 
-@njit(**INNER)
+@njit(nogil=True, error_model="numpy")
 def _make(strike, quaternion, rows, bodies, faces, nodes, shapes, frequency_hz, spectrum, pulse, push):
     """Whether anything of a strike is heard; its pulse then, but for its start, and its Uᵀj in push (2, columns)."""
     low, high = strike.body[0], strike.body[1]

@@ -28,21 +28,19 @@ from sonic_bullet.synth import path, path_places
 from sonic_bullet.synth.strikes import LOOKAHEAD
 
 LATENCY_STEPS = LOOKAHEAD
-AT_ONCE = 64
-"""Steps of a replay that one call of the driver takes in."""
 
 
 def advance(setup: Setup, state: State, steps: Sequence[Step]) -> Array:
     """Take in steps, of as many bodies as the state has; (channels, n) of those that can be rendered then, LOOKAHEAD
     before them. Changes ``state`` in place: `copy` it first to come back to it.
     """
-    if len(steps) == 1 and not state.quenches:
+    if len(steps) == 1 and not state.quenches:  # live, where a microsecond counts
         return _advanced(setup, state, steps)
     frames = []
     while steps:
         if state.number in state.quenches and len(state.waiting) == LOOKAHEAD:
             quench(state)
-        count = min(len(steps), 1 if state.has_residual else AT_ONCE)
+        count = 1 if state.has_residual else len(steps)
         ahead = [q - state.number for q in state.quenches if q > state.number]  # the next one begins anew there
         count = min([count, *(q + LOOKAHEAD - len(state.waiting) for q in ahead)])
         frames.append(_advanced(setup, state, steps[:count]))
@@ -102,8 +100,8 @@ def _advanced(setup: Setup, state: State, steps: Sequence[Step]) -> Array:
             _make_room(state, table[done], longest)
         elif status == driver.PAUSED:
             _add_residuals(setup, state, table[done], found, drives)
-        elif status == driver.NO_NUMBER:
-            what = "the synthesizer made NaN or infinite samples"
+        elif status == driver.BROKEN:
+            what = "the synthesizer made NaN or infinite samples, or lost a strike"
             raise AudioError(what, "report the contact log: this must not happen")
         else:
             state.travelling.at = int(table[done]["sample"])
@@ -238,13 +236,12 @@ class Synthesizer:
             self._take(steps, bodies)
 
     def _take(self, steps: Sequence[Step], bodies: tuple[Body, ...]) -> Array:
-        known, there = len(self._state.resonators), len(steps[0].position_m)
-        if there > known:
-            first = steps[0]
-            poses = first.position_m[known:], first.quaternion_xyzw[known:]
-            with_bodies(self._setup, self._state, bodies[known:there], *poses)
         if self._failed is not None:  # within a step, so that nothing can go on from there
             raise self._failed
+        first, known = steps[0], len(self._state.resonators)
+        if len(first.position_m) > known:
+            poses = first.position_m[known:], first.quaternion_xyzw[known:]
+            with_bodies(self._setup, self._state, bodies[known : len(first.position_m)], *poses)
         try:
             frame = advance(self._setup, self._state, steps)
         except AudioError as error:

@@ -69,10 +69,6 @@ def _called(e: Emit, name: str, kind: Any, *values: Value) -> Value:
     return e.builder.call(cgutils.get_or_insert_function(e.builder.module, declared, name), values)
 
 
-def _all_of(kind: Any, value: int) -> Any:
-    return [value] * LANES if isinstance(kind, ir.VectorType) else value
-
-
 def _greater(e: Emit, a: Value, b: Value) -> Value:
     return e.builder.select(e.builder.fcmp_ordered(">", a, b), a, b)
 

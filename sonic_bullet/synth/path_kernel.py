@@ -30,7 +30,7 @@ from sonic_bullet.synth.fractional_delay import (
     move,
     read,
 )
-from sonic_bullet.synth.path_places import BLOCK, DONE, MIRRORED, inner_njit, move_body, survey
+from sonic_bullet.synth.path_places import BLOCK, DONE, MIRRORED, move_body, survey
 from sonic_bullet.synth.vector import LANES
 
 _HISTORY = 3 * AHEAD
@@ -39,7 +39,7 @@ WORK = 3 * _SPAN + 8 + 5 * LANES + KEPT
 """Doubles that `hear` is lent."""
 
 
-@inner_njit
+@njit(nogil=True, error_model="numpy")
 def _newest(emitted, start, stop, none):  # pragma: no cover - compiled
     """The last of emitted[start:stop] that is not zero; ``none`` where all are."""
     i = stop - 1
@@ -48,7 +48,7 @@ def _newest(emitted, start, stop, none):  # pragma: no cover - compiled
     return i if i >= start else none
 
 
-@inner_njit
+@njit(nogil=True, error_model="numpy")
 def _last(emitted, i, stop, newest, behind):  # pragma: no cover - compiled
     """The first sample from i on at which the newest that is not zero has arrived, ``stop`` for none of them.
 
@@ -62,7 +62,7 @@ def _last(emitted, i, stop, newest, behind):  # pragma: no cover - compiled
     return i
 
 
-@inner_njit
+@njit(nogil=True, error_model="numpy")
 def _remember(
     memory, ring_at, late_at, mask, at, start, n, emitted, delay, before, steep
 ):  # pragma: no cover - compiled
@@ -84,7 +84,7 @@ def _remember(
         move(memory, late_at + place, memory, late_at + mask + 1 + place, again)
 
 
-@inner_njit
+@njit(nogil=True, error_model="numpy")
 def _wake(memory, ring_at, late_at, mask, n, late):  # pragma: no cover - compiled
     """Nothing was emitted before sample n, with that delay."""
     for k in range(n - _HISTORY, n):
@@ -94,7 +94,7 @@ def _wake(memory, ring_at, late_at, mask, n, late):  # pragma: no cover - compil
             memory[ring_at + mask + 1 + place], memory[late_at + mask + 1 + place] = 0.0, late
 
 
-@inner_njit
+@njit(nogil=True, error_model="numpy")
 def _listen(
     line, at, n, emitted, delay, observed, memory, ring_at, mask, taps, kept, steep
 ):  # pragma: no cover - compiled
@@ -153,7 +153,7 @@ def _listen(
     return arrives
 
 
-@inner_njit
+@njit(nogil=True, error_model="numpy")
 def _emit(b, first, n, source, pushed, x, fade, geometry, tail, emitted, delay):  # pragma: no cover - compiled
     """a and D of body b as `fractional_delay.emit` has them, and its fade: 0 none, 1 in, -1 out, 2 nothing any more.
     Whether delays fall fast.

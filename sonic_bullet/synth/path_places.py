@@ -58,11 +58,8 @@ PLACE = np.dtype(
 LINE = np.dtype([("awake", "i8"), ("cursor", "i8"), ("newest", "i8")], align=True)
 """awake: sound is under way; cursor: the emitted sample arrived last; newest: the last emitted that is not zero."""
 
-inner_njit = njit(nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
-"""Of a kernel: called by compiled code alone (from Python it crashes), and so compiled without a door to it."""
 
-
-@inner_njit
+@njit(nogil=True, error_model="numpy")
 def _awake(lines, place, channels):  # pragma: no cover - compiled
     """Whether sound of the place is under way to any microphone."""
     line, stop = place * channels, (place + 1) * channels
@@ -71,7 +68,7 @@ def _awake(lines, place, channels):  # pragma: no cover - compiled
     return line < stop
 
 
-@inner_njit
+@njit(nogil=True, error_model="numpy")
 def _fits(place, source, square, samples_per_m):  # pragma: no cover - compiled
     """DONE, or what is wrong with a place that sounds at a distance of such a square."""
     away_m = np.sqrt(square)
@@ -87,7 +84,7 @@ def _fits(place, source, square, samples_per_m):  # pragma: no cover - compiled
     return MEMORY_SHORT
 
 
-@inner_njit
+@njit(nogil=True, error_model="numpy")
 def _free_place(places, lines, sources, step, p, channels):  # pragma: no cover - compiled
     """The next place from p on that nothing is heard from and no body needs; the number of places for none."""
     while p < len(places):
@@ -101,7 +98,7 @@ def _free_place(places, lines, sources, step, p, channels):  # pragma: no cover 
     return p
 
 
-@inner_njit
+@njit(nogil=True, error_model="numpy")
 def survey(step, n, first, source, pushed, begin_m, end_m, teleported, microphone_m, samples_per_m,
            sources, places, lines):  # fmt: skip  # pragma: no cover - compiled
     """Mark which bodies emit anything, find new places for those moved by hand in this step, and say what is in the
@@ -145,7 +142,7 @@ def survey(step, n, first, source, pushed, begin_m, end_m, teleported, microphon
     return wrong
 
 
-@inner_njit
+@njit(nogil=True, error_model="numpy")
 def move_body(step, sources, places, b, p):  # pragma: no cover - compiled
     """Give body b the present place p; the one it had is left."""
     old = places[p].body

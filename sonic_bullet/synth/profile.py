@@ -49,13 +49,11 @@ LATTICE = 0.30
 SLOWEST_HZ = 8.0
 
 _WAVE_M = LONGEST_M / 2.0 ** np.arange(OCTAVES)
-INNER = {"nogil": True, "error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-"""Of kernels that only kernels call: Python cannot, and less is compiled."""
 _UNIT_RMS = np.sqrt(3.0 * 315 / 151)
 """Makes n_j unit variance: lattice values uniform on ±1 have 1/3, the mean square of the B-spline is 151/315."""
 
 
-@njit(**INNER)
+@njit(nogil=True, error_model="numpy")
 def height_octaves(roughness_m, hurst, out):
     """A_j into out (OCTAVES,) in m, scaled for lattice values on ±1, from rms height in m and Hurst exponent."""
     total = 0.0
@@ -67,7 +65,7 @@ def height_octaves(roughness_m, hurst, out):
         out[j] = roughness_m * (out[j] / scale) * _UNIT_RMS
 
 
-@njit(**INNER)
+@njit(nogil=True, error_model="numpy")
 def gained_heights(height_m, speed_m_s, patch_radius_m, sr, out):
     """g_j A_j into out (OCTAVES,) at a sweep speed in m/s, not negative, with a contact radius in m."""
     for j in range(OCTAVES):
@@ -184,7 +182,7 @@ def _read(typingctx, work, where, share, count, lattice, change, origin, inverse
     return types.void(work, where, share, count, lattice, change, origin, inverse, speed, gain, rate, out), codegen
 
 
-@njit(**INNER)
+@njit(nogil=True, error_model="numpy")
 def sweep_profile(swept, speed0, speed1, x, key, height0, height1, per_sample_s, work, rate, out):
     """Add dh/dt of one side of one pair to rate[out] … rate[out + n - 1] in m/s; returns the distance swept after the n
     samples, and the scratch, longer where it was too short.
@@ -234,7 +232,7 @@ def sweep_profile(swept, speed0, speed1, x, key, height0, height1, per_sample_s,
     return swept, work
 
 
-@njit(**INNER)
+@njit(nogil=True, error_model="numpy")
 def _lattice(first, last, halvings):
     """First and last coefficient that those from first (even) to last (odd) hang on, so many octaves coarser."""
     for _ in range(halvings):

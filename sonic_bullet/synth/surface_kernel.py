@@ -39,7 +39,7 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 
 from sonic_bullet.machine.compiled import njit
-from sonic_bullet.synth.profile import INNER, OCTAVES, gained_heights, sweep_profile
+from sonic_bullet.synth.profile import OCTAVES, gained_heights, sweep_profile
 from sonic_bullet.synth.vector import F64, I32, LANES, VEC, Emit, Value, constant
 
 MOST_SUBSTEPS = 8.0
@@ -70,7 +70,7 @@ _DEPTH, _LIFT, _REST, _DAMPING, _RATE_UNIT, _FORCE_UNIT, _SUBSTEPS, _STANDS, _PA
 _ROWS = 12
 
 
-@njit(**INNER)
+@njit(nogil=True, error_model="numpy")
 def damping_ratio(restitution):
     """ζ of the linear oscillator that rebounds with this coefficient of restitution: -ln e/√(π² + ln² e), within
     0.25 … 1.
@@ -85,7 +85,7 @@ def damping_ratio(restitution):
     return ratio if ratio > LEAST_DAMPING_RATIO else LEAST_DAMPING_RATIO
 
 
-@njit(**INNER)
+@njit(nogil=True, error_model="numpy")
 def contact_radius_m(relative_curvature_per_m, flat_area_m2):
     """R* = 1/(κ1+κ2), at most the radius √(A/π) of the nominal area of touching (1 m where A is 0: none known).
 
@@ -95,7 +95,7 @@ def contact_radius_m(relative_curvature_per_m, flat_area_m2):
     return 1.0 / relative_curvature_per_m if relative_curvature_per_m * blunt > 1.0 else blunt
 
 
-@njit(**INNER)
+@njit(nogil=True, error_model="numpy")
 def _law(pair, voice, sr, constants, at):
     """The contact law of a voice in this step into constants[at] …, with its pair's state in the units of that law."""
     mass, radius, modulus = pair.mass_kg, pair.radius_m, pair.modulus_pa
@@ -133,7 +133,7 @@ def _law(pair, voice, sr, constants, at):
     constants[at + _STANDS] = 1.0 if still else 0.0
 
 
-@njit(**INNER)
+@njit(nogil=True, error_model="numpy")
 def _line_up(voices, count, constants):
     """The voices' order by substeps, so that few lanes wait for others."""
     last = 0
@@ -144,7 +144,7 @@ def _line_up(voices, count, constants):
                 last += 1
 
 
-@njit(**INNER)
+@njit(nogil=True, error_model="numpy")
 def sound_voices(pairs, voices, count, x, sr, force):
     """Force f - N in newton of the voices 0 … count - 1 into force (voices, n), at the n samples that lie at the shares
     ``x`` (n,) in [0, 1) of one physics step; their pairs move on. Call again with the rest of the step's x for its

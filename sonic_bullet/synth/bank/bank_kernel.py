@@ -17,7 +17,7 @@ from __future__ import annotations
 import numpy as np
 
 from sonic_bullet.synth.bank import drive, tile
-from sonic_bullet.synth.bank.kernels import inner, merged, outer
+from sonic_bullet.synth.bank.kernels import uncounted
 from sonic_bullet.synth.bank.layout import COLUMNS, DRIVEN, FLOOR, FLUSH, MOST_DUE, PAIR, ROOM
 from sonic_bullet.synth.bank.strike_pool import begins, plan_nodes, release_done
 from sonic_bullet.synth.bank.tile import BLOCK, CHUNK, ROW, ROWS
@@ -29,7 +29,7 @@ PUSH_SCRATCH = COLUMNS // PAIR * ROOM * drive.STEP
 DRIVE_SCRATCH = PUSH_SCRATCH + DRIVEN * LANES + DRIVEN + MOST_DUE
 
 
-@inner
+@uncounted
 def _ring(b, start, columns, z, pole, block, weight, modes, observed, sound, scratch):  # pragma: no cover
     """Tile of body b for the block that starts: sound (W, b, BLOCK). Turns z to the next block. False where all modes
     are below the floor.
@@ -57,7 +57,7 @@ def _ring(b, start, columns, z, pole, block, weight, modes, observed, sound, scr
     return ringing
 
 
-@inner
+@uncounted
 def bend_poles(z, driven, span, law, start, stop, pole, block):  # pragma: no cover - compiled
     """Poles of a level-dependent body for the ``span`` samples to come: means over them of what its modes do if nothing
     strikes them.
@@ -85,14 +85,14 @@ def bend_poles(z, driven, span, law, start, stop, pole, block):  # pragma: no co
             block[m], block[modes + m] = q * np.cos(turn * BLOCK), q * np.sin(turn * BLOCK)
 
 
-@inner
+@uncounted
 def _copy_flushed(values, out):  # pragma: no cover - compiled
     for k in range(len(out)):
         value = values[k]
         out[k] = value if abs(value) >= FLUSH else 0.0
 
 
-@inner
+@uncounted
 def _close_block(z, driven, pole, modes, start, stop):  # pragma: no cover - compiled
     """End of a block: what was driven within it joins the free state of the next."""
     for re in range(start, stop):
@@ -104,13 +104,13 @@ def _close_block(z, driven, pole, modes, start, stop):  # pragma: no cover - com
         driven[im] = 0.0
 
 
-@inner
+@uncounted
 def _flush(values, count):  # pragma: no cover - compiled
     for k in range(count):
         values[k] = values[k] if abs(values[k]) >= FLUSH else 0.0
 
 
-@inner
+@uncounted
 def _part_force(d, n, force_n, progress, period, signal):  # pragma: no cover - compiled
     """A force's impulses, parted between both ends of its gains; zeros behind."""
     stride, whole = signal.shape[2], n - n % LANES
@@ -128,7 +128,7 @@ def _part_force(d, n, force_n, progress, period, signal):  # pragma: no cover - 
         late[k] = 0.0
 
 
-@inner
+@uncounted
 def list_forces(
     n, drive_count, drive_body, force_n, gain0, gain1, progress, period, bodies, first, side, signal
 ):  # pragma: no cover - compiled
@@ -161,7 +161,7 @@ def list_forces(
     first[0] = 0
 
 
-@inner
+@uncounted
 def _is_last(w, b, observed):  # pragma: no cover - compiled
     """Whether no weight set after w reads body b."""
     for v in range(w + 1, len(observed)):  # noqa: SIM110  numba knows no all()
@@ -170,7 +170,7 @@ def _is_last(w, b, observed):  # pragma: no cover - compiled
     return True
 
 
-@inner
+@uncounted
 def _press_strikes(
     sample, count, b, column, lanes, ringing, strikes, rows, hertz, pushes, keep, final, plan, due, push
 ):  # pragma: no cover - compiled
@@ -191,7 +191,7 @@ def _press_strikes(
     return pushes
 
 
-@merged
+@uncounted
 def _drive(
     at, i, count, b, place, start, stop, law, weight, observed, ringing, driven, sound, pole, strikes, rows, hertz,
     f0, f1, side, gain0, gain1, signal, plan, scratch, source,
@@ -235,7 +235,7 @@ def _drive(
             _copy_flushed(total, source[w, b, i : i + count])
 
 
-@inner
+@uncounted
 def _sound_free(b, i, end, place, observed, ringing, sound, source):  # pragma: no cover - compiled
     """Samples i … end - 1 of a body that only rings, or is silent."""
     for w in range(len(observed)):
@@ -246,7 +246,7 @@ def _sound_free(b, i, end, place, observed, ringing, sound, source):  # pragma: 
                 source[w, b, i:end] = 0.0
 
 
-@inner
+@uncounted
 def _open_block(
     b, start, stop, bodies, law, weight, observed, ringing, z, driven, sound, pole, block, scratch
 ):  # pragma: no cover - compiled
@@ -259,7 +259,7 @@ def _open_block(
     ringing[b].tiled = ringing[b].ringing = 1 if alive else 0
 
 
-@merged
+@uncounted
 def _advance_modes(
     at, n, b, bodies, law, weight, observed, ringing, z, driven, sound, pole, block, strikes, rows, hertz,
     f0, f1, side, gain0, gain1, signal, plan, scratch, source,
@@ -293,7 +293,7 @@ def _advance_modes(
         i = end
 
 
-@outer
+@uncounted
 def advance(
     at, n, sr, bodies, law, weight, observed, ringing, z, driven, sound, pole, block, strikes, rows, free, hertz,
     drive_count, drive_body, force_n, gain0, gain1, direction0, direction1, progress, first, side, signal, kick, plan,

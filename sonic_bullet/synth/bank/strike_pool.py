@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sonic_bullet.synth.bank.kernels import inner, outer
+from sonic_bullet.synth.bank.kernels import uncounted
 from sonic_bullet.synth.bank.layout import FLUSH
 from sonic_bullet.synth.bank.phasors import fill_phasors
 
@@ -32,7 +32,7 @@ SHORTEST = 1e-12
 """Samples: what is shorter is as long."""
 
 
-@inner
+@uncounted
 def pulse_force(share, flat, hertz):  # pragma: no cover - compiled
     """Force at a share of the pulse in [0, 1], mean 1. hertz: the pulse's table (synth.pulse)."""
     if flat:
@@ -43,7 +43,7 @@ def pulse_force(share, flat, hertz):  # pragma: no cover - compiled
     return hertz[1, i] + (place - i) * (hertz[1, i + 1] - hertz[1, i])
 
 
-@outer
+@uncounted
 def enter_strike(
     b,
     start,
@@ -101,7 +101,7 @@ def enter_strike(
     return 0
 
 
-@inner
+@uncounted
 def _enter_nodes(
     slot, b, at, count, delta, share, gain, bodies, law, strikes, rows, hertz
 ):  # pragma: no cover - compiled
@@ -125,7 +125,7 @@ def _enter_nodes(
     )  # fmt: skip
 
 
-@inner
+@uncounted
 def _enter_cells(slot, b, sr, bodies, strikes):  # pragma: no cover - compiled
     """The pulse as cells of the sample grid, which no sample cuts through, and what one of them leaves:
 
@@ -145,7 +145,7 @@ def _enter_cells(slot, b, sr, bodies, strikes):  # pragma: no cover - compiled
     strike.cell_onset[0], strike.cell_onset[1] = onset.real, onset.imag
 
 
-@inner
+@uncounted
 def _link(slot, b, ringing, strikes):  # pragma: no cover - compiled
     """Put a strike behind those of its body that start before it or with it."""
     before, after = -1, ringing[b].strike
@@ -158,7 +158,7 @@ def _link(slot, b, ringing, strikes):  # pragma: no cover - compiled
         strikes[before].next = slot
 
 
-@inner
+@uncounted
 def release_done(b, ringing, strikes, free):  # pragma: no cover - compiled
     """Give back the rows of body b's strikes that have acted."""
     before, slot = -1, ringing[b].strike
@@ -176,7 +176,7 @@ def release_done(b, ringing, strikes, free):  # pragma: no cover - compiled
         slot = after
 
 
-@inner
+@uncounted
 def begins(b, end, ringing, strikes):  # pragma: no cover - compiled
     """Whether a strike on the modes of body b has nodes to come before sample ``end``."""
     slot = ringing[b].strike
@@ -187,7 +187,7 @@ def begins(b, end, ringing, strikes):  # pragma: no cover - compiled
     return False
 
 
-@inner
+@uncounted
 def plan_nodes(slot, at, count, strikes, hertz, plan, due, final):  # pragma: no cover - compiled
     """What nodes of a strike act at the samples at … at + count - 1: plan (count, 3) and due as `drive.strike_nodes`
     reads them; the samples they begin and end with. final: the strike moves on.
@@ -217,7 +217,7 @@ def plan_nodes(slot, at, count, strikes, hertz, plan, due, final):  # pragma: no
     return begin, k
 
 
-@outer
+@uncounted
 def enter_pulses(
     pulses, count, push, begin_s, after_s, at, sr, bodies, law, ringing, strikes, rows, free, hertz
 ):  # pragma: no cover - compiled

@@ -14,12 +14,12 @@ it has fallen below the floor at one of every DRIVEN samples of absolute time.
 from __future__ import annotations
 
 from sonic_bullet.synth.bank import drive
-from sonic_bullet.synth.bank.kernels import inner
+from sonic_bullet.synth.bank.kernels import uncounted
 from sonic_bullet.synth.bank.layout import DRIVEN, FLOOR, FLUSH
 from sonic_bullet.synth.pulse import cumulated
 
 
-@inner
+@uncounted
 def _gather_forces(n, onset_re, onset_im, kick):  # pragma: no cover - compiled
     """kick (6, n or more): from impulses in rows 0, 2, 4 to what they leave in real and imaginary part of each axis."""
     for axis in range(3):
@@ -31,7 +31,7 @@ def _gather_forces(n, onset_re, onset_im, kick):  # pragma: no cover - compiled
             imag[k] = impulse * onset_im
 
 
-@inner
+@uncounted
 def _strike_cells(at, n, slot, strikes, hertz, kick):  # pragma: no cover - compiled
     """Add the cells of a strike that end by the samples at … at + n - 1. It is done after its last."""
     strike = strikes[slot]
@@ -55,7 +55,7 @@ def _strike_cells(at, n, slot, strikes, hertz, kick):  # pragma: no cover - comp
         strike.rigid = 0
 
 
-@inner
+@uncounted
 def _run_axes(at, n, b, bodies, ringing, kick, pushed):  # pragma: no cover - compiled
     """The recursion on all axes, through the samples at … at + n - 1."""
     p_re, p_im, weight = bodies[b].rigid_pole[0], bodies[b].rigid_pole[1], bodies[b].rigid_weight
@@ -90,7 +90,7 @@ def _run_axes(at, n, b, bodies, ringing, kick, pushed):  # pragma: no cover - co
     ringing[b].moving = 1 if moves else 0
 
 
-@inner
+@uncounted
 def translate(
     at, n, b, bodies, ringing, strikes, hertz, first, last, side, signal, direction0, direction1, kick, pushed
 ):  # pragma: no cover - compiled
