@@ -53,8 +53,8 @@ class ContactLog:
         if any(later.step < earlier.step for earlier, later in itertools.pairwise(self.events)):
             raise LogError("events that are not in the order of their steps", "use an unbroken contact log")
         for step in self.steps:
-            if len(step.position_m) > len(self.bodies):
-                raise LogError("a step has more poses than the log has bodies", "use an unbroken contact log")
+            if len(step.body) and step.body[-1] >= len(self.bodies):
+                raise LogError("a step has a pose of a body that the log has not", "use an unbroken contact log")
 
     def __len__(self) -> int:
         """Rows in all: one per contact and step."""

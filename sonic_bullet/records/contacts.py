@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -181,13 +182,25 @@ def _no_rows() -> Contacts:
 _NONE = _no_rows()
 
 
+@lru_cache(maxsize=256)
+def first_bodies(count: int) -> Array:
+    """Indices 0 … count-1: who is in a step while nobody has gone; the same array each time."""
+    made = np.arange(count, dtype=np.int64)
+    made.setflags(write=False)
+    return made
+
+
+_FIRST = np.zeros(0, np.int64)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Step:
     """One physics step: its length, the poses at its start of all bodies known by then, and its loaded contacts.
 
-    position_m (b, 3), quaternion_xyzw (b, 4): body frames in the world; a removed body keeps its last pose. teleported
-    (b,): True where the body was moved by hand since the previous step. gravity_m_s2 (3,): world frame; what falls for
-    one step gains that speed, which is no impact (see synth.strikes).
+    position_m (b, 3), quaternion_xyzw (b, 4): body frames in the world. teleported (b,): True where the body was moved
+    by hand since the previous step. gravity_m_s2 (3,): world frame; what falls for one step gains that speed, which is
+    no impact (see synth.strikes). body (b,): ascending indices into the log's `bodies` of those whose poses these are,
+    the first b of them unless said otherwise; who has gone is not among them, and never comes back.
     """
 
     dt_s: float
@@ -196,6 +209,7 @@ class Step:
     teleported: Array
     contacts: Contacts
     gravity_m_s2: Array = field(default_factory=lambda: np.zeros(3))
+    body: Array = field(default_factory=lambda: _FIRST)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "position_m", frozen_array(self.position_m, float, (None, 3), "step: position_m"))
@@ -212,12 +226,14 @@ class Step:
         as_kind(
             self.contacts, Contacts, "step: contacts", "give Contacts, of no rows where nothing touches", error=LogError
         )
-        if len(self.contacts):
-            a, other = self.contacts.a, self.contacts.b
-            if max(a.max(), other.max()) >= b:
-                raise LogError("a contact names a body that the step does not know", "use an unbroken contact log")
-            if min(a.min(), other.min()) < 0:
-                raise LogError("a contact names a body below zero", "use an unbroken contact log")
+        if self.body is _FIRST:
+            object.__setattr__(self, "body", first_bodies(b))
+        body = frozen_array(self.body, np.int64, (b,), "step: body")
+        object.__setattr__(self, "body", body if self.body is not first_bodies(b) else self.body)
+        if b and (body[0] < 0 or (np.diff(body) <= 0).any()):
+            raise LogError("a step whose bodies do not ascend from 0", "use an unbroken contact log")
+        if not (np.isin(self.contacts.a, body).all() and np.isin(self.contacts.b, body).all()):
+            raise LogError("a contact names a body that the step does not know", "use an unbroken contact log")
 
     @classmethod
     def trusted(
@@ -228,9 +244,10 @@ class Step:
         teleported: Array,
         contacts: Contacts,
         gravity_m_s2: Array,
+        body: Array | None = None,
     ) -> Step:
         """A step of numbers that are known to be numbers, in arrays that nobody writes to any more; nothing is checked
-        or copied, except that the arrays can no longer be written to.
+        or copied, except that the arrays can no longer be written to. body None: the first b.
         """
         made = object.__new__(cls)
         for array in (position_m, quaternion_xyzw, teleported, gravity_m_s2):
@@ -242,6 +259,7 @@ class Step:
         keep(made, "teleported", teleported)
         keep(made, "contacts", contacts)
         keep(made, "gravity_m_s2", gravity_m_s2)
+        keep(made, "body", first_bodies(len(position_m)) if body is None else body)
         return made
 
 
