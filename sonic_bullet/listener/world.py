@@ -14,6 +14,9 @@ from collections.abc import Callable, Sequence
 
 from sonic_bullet.records import Body, Material, ModalModel, Shape
 from sonic_bullet.records.contacts import Step
+from sonic_bullet.records.errors import SceneError
+from sonic_bullet.records.modal_options import ModalOptions
+from sonic_bullet.records.simulated import Simulator
 
 
 class World(ABC):
@@ -36,6 +39,11 @@ class World(ABC):
     def notes(self) -> tuple[str, ...]:
         """What of the world is left out of the sound, and why."""
         return ()
+
+    @property
+    def simulator(self) -> Simulator:
+        """What the simulator says of itself, for the log: nothing, unless it has something to say."""
+        return Simulator()
 
     @property
     def has_bodies(self) -> bool:
@@ -63,11 +71,22 @@ class World(ABC):
         material: Material | None = None,
         model: ModalModel | None = None,
         shapes: Sequence[Shape] = (),
+        options: ModalOptions | None = None,
     ) -> Body:
         """Make a link known with what it is made of; its record, which `bodies` holds from now on.
 
+        options: what was asked of its modes, for the record.
+
         Raises SceneError.
         """
+
+    def call(self, body: int, link: int, name: str) -> None:
+        """Call a link so from now on. Raises SceneError where that cannot be."""
+        raise SceneError("this simulator's bodies bring their names", "leave name out")
+
+    def link_name(self, body: int, link: int) -> str:
+        """A link's own name, without its body's."""
+        return str(link)
 
     @abstractmethod
     def after_step(self) -> Step:

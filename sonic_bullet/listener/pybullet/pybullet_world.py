@@ -27,25 +27,25 @@ from sonic_bullet.listener.frames import LINK_SPAN, Motion, Roster, encode, rows
 from sonic_bullet.listener.known_bodies import KnownBodies, alike
 from sonic_bullet.listener.memory import Memory, make_ready
 from sonic_bullet.listener.polling import Touches, loaded
+from sonic_bullet.listener.properties import Properties
 from sonic_bullet.listener.pybullet import body_facts as facts
-from sonic_bullet.listener.pybullet import collision_shapes as shapes
 from sonic_bullet.listener.pybullet import hooks
 from sonic_bullet.listener.pybullet.census import Census
 from sonic_bullet.listener.pybullet.left_out import BodiesLeftOut
 from sonic_bullet.listener.pybullet.poses import check_connected
-from sonic_bullet.listener.pybullet.questions import contact_points, settings
+from sonic_bullet.listener.pybullet.questions import contact_points, engine, settings
 from sonic_bullet.listener.pybullet.step_back import undone
 from sonic_bullet.listener.pybullet.substeps import SubstepLog, gather_substeps
 from sonic_bullet.listener.start import LEFT_OUT, NOBODY, hooked_start, jumped, polled_start
-from sonic_bullet.listener.world import World
 from sonic_bullet.records import Body, Material, ModalModel, Shape
 from sonic_bullet.records.contacts import Step
 from sonic_bullet.records.errors import SceneError
+from sonic_bullet.records.modal_options import ModalOptions
 
 AT_ORIGIN = np.array([0, 0, 0, 0, 0, 0, 1.0])
 
 
-class PyBulletWorld(World):
+class PyBulletWorld(facts.AskedLinks):
     """State of listening to one client: who lives, what was last seen, what is remembered of contacts.
 
     Made by open_world.
@@ -59,6 +59,7 @@ class PyBulletWorld(World):
         self.step_count = 0
         self.stepped = False
         self._known = KnownBodies()
+        self.properties = Properties(partial(facts.dynamics, client_id), partial(engine, client_id))
         self._memory = Memory()
         self._census = Census(client_id, self._bury, self._end)
         self._settings = settings(client_id)
@@ -110,12 +111,6 @@ class PyBulletWorld(World):
         """Have the machine code that the first step would else wait for."""
         make_ready()
 
-    def links_called(self, body: object, link: object) -> tuple[int, tuple[int, ...]]:
-        """The body's id and its links of that number or name, "all" of them. Raises SceneError, MeshError."""
-        from sonic_bullet.listener.pybullet.clients import links_called
-
-        return links_called(self, body, link)
-
     @property
     def has_bodies(self) -> bool:
         """Whether anybody was in the world at the last step."""
@@ -134,7 +129,7 @@ class PyBulletWorld(World):
         model: ModalModel | None = None,
         volume_m3: float | None = None,
         shapes: Sequence[Shape] = (),
-        name: str | None = None,
+        options: ModalOptions | None = None,
     ) -> Body:
         """Make a link known, with what it is made of; its record, which `bodies` holds from now on.
 
@@ -158,27 +153,13 @@ class PyBulletWorld(World):
             model=model,
             volume_m3=volume,
             since_step=self.step_count,
-            name=name or record.name,
+            options=options,
         )
         if shapes:
             alone = shapes[0] if len(shapes) == 1 and shapes[0].kind == "sphere" else None
             record = replace(record, curvature_per_m=1 / float(alone.size_m[0]) if alone is not None else float("nan"))
-        self._known.close([int(encode(body, link))], self.step_count)
-        self._append(int(encode(body, link)), record)
-        return record
-
-    def name_of(self, body: int, link: int = -1) -> str:
-        """What people call a link: its name and its body's id. Raises SceneError for an unknown one."""
-        check_connected(self.client_id)
-        facts.check_exists(self.client_id, body, link)
-        name = facts.link_name(self.client_id, body, link)
-        return name if name == f"body {body}" else f"{name} (body {body})"
-
-    def shapes_of(self, body: int, link: int = -1) -> tuple[Shape, ...]:
-        """Geometry of a link in its body frame. Raises SceneError for an unknown one, MeshError where it has none."""
-        check_connected(self.client_id)
-        facts.check_exists(self.client_id, body, link)
-        return shapes.shapes_of(self.client_id, body, link)
+        self._close([int(encode(body, link))])
+        return self._append(int(encode(body, link)), record)
 
     def forget(self, body: int | None = None) -> None:
         """Say that a body was removed (None: all, by resetSimulation); its id may be given anew. With a hook, nobody
@@ -186,10 +167,9 @@ class PyBulletWorld(World):
         """
         self.epoch += 1
         self.left_out.forget(body)
-        self._known.close(
-            [code for code in self._known.live if body is None or code // LINK_SPAN == body], self.step_count
-        )
+        self._close([code for code in self._known.live if body is None or code // LINK_SPAN == body], gone=True)
         if body is None:
+            self.properties.engine_changed(self.step_count)
             self._log.abandon()
             self._memory.forget()
         self._past = without(self._past, body)
@@ -200,9 +180,16 @@ class PyBulletWorld(World):
         """Note that a body (None: every body) was moved by hand before the coming step."""
         self._moved.update([body] if body is not None else [entry[0] for entry in self._past.roster.bodies])
 
-    def mark_changed(self) -> None:
-        """Note that masses may have changed: who is static is read again."""
+    def mark_changed(self, body: int, link: int) -> None:
+        """Note that friction, mass and the like of a link may have changed: who is static is read again."""
         self._census.stale()
+        index = self.index_of(body, link)
+        if index >= 0:
+            self.properties.link_changed(int(encode(body, link)), index, self.step_count)
+
+    def mark_engine_changed(self) -> None:
+        """Note that settings of the engine may have changed."""
+        self.properties.engine_changed(self.step_count)
 
     def hook(self, before: Callable[[], object], after: Callable[[], object]) -> None:
         """Call `before` and `after` round every stepSimulation of a BulletClient; `before` is, or calls, `before_step`.
@@ -210,7 +197,7 @@ class PyBulletWorld(World):
         Raises SceneError for the pybullet module or a client id: they have no instance to hook.
         """
         self.unhook()
-        self._uninstall = hooks.install(self, before, after)
+        self.properties.set_values, self._uninstall = hooks.install(self, before, after)
 
     def unhook(self) -> None:
         """Leave the client as it was and end the sub-step log; harmless when not hooked."""
@@ -290,6 +277,8 @@ class PyBulletWorld(World):
         """Any step; touches: of sub-steps, else those of the memory."""
         memory, known, (dt, _, gravity) = self._memory, self._known, self._settings
         first, past_touches = self.step_count == 0, memory.touches
+        if first:
+            self.properties.first_step()
         touches = self._census.usable(loaded(memory.raw, memory.raw_before, dt) if touches is None else touches)
         if hooked:
             start = hooked_start(None if first else self._past, now, self._moved, dt)
@@ -320,11 +309,11 @@ class PyBulletWorld(World):
         gone = self._known.gone(roster)
         if gone:
             self.epoch += 1
-            self._known.close(gone, self.step_count)
+            self._close(gone, gone=True)
 
     def _end(self, bodies: Collection[int]) -> None:
         """Close the records of bodies."""
-        self._known.close([code for code in self._known.live if code // LINK_SPAN in bodies], self.step_count)
+        self._close([code for code in self._known.live if code // LINK_SPAN in bodies])
 
     def _expose_impostors(self, now: Motion, dt: float) -> None:
         """Where nobody saw removals: what jumped and has another name, mass or inertia has taken over an old id."""
@@ -336,8 +325,17 @@ class PyBulletWorld(World):
                     continue
                 if not alike(before, seen):
                     self.epoch += 1
-                    self._known.close([code], self.step_count)
+                    self._close([code], gone=True)
 
-    def _append(self, code: int, record: Body) -> None:
+    def _close(self, codes: Collection[int], *, gone: bool = False) -> None:
+        """End the records of links; gone: the links are no more, so that their names end too."""
+        self.properties.end(self._known.live[code] for code in codes if code in self._known.live)
+        if gone:
+            self.properties.names.forget(codes)
+        self._known.close(codes, self.step_count)
+
+    def _append(self, code: int, record: Body) -> Body:
+        record = self.properties.begin(code, len(self._known.records), record)
         row = rows_of(self._past.roster, np.array([code]))[0]
         self._known.append(code, record, self._past.number[row, :7] if row >= 0 else AT_ORIGIN)
+        return record
