@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from sonic_bullet.listener.frames import LINK_SPAN
 from sonic_bullet.records.errors import SceneError
 
 
@@ -46,6 +47,17 @@ class Names:
         for code in codes:
             if code in self._living:
                 del self._bearer[self._living.pop(code)]
+
+    def forget_body(self, body: int | None) -> None:
+        """The links of a body are no more; None: no link is."""
+        self.forget([code for code in self._living if body is None or code // LINK_SPAN == body])
+
+    def restart(self, codes: Iterable[int]) -> None:
+        """Begin anew with those of these links whose names were given by hand."""
+        kept = {code: self._living[code] for code in codes if self._living.get(code) in self._given}
+        self._living, self._bearer, self._given, self._count = {}, {}, set(), {}
+        for code, name in kept.items():
+            self.call(code, name)
 
     def _unused(self, default: str) -> str:
         while True:

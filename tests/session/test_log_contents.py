@@ -303,3 +303,46 @@ def test_a_raw_client_says_what_it_says_when_asked() -> None:
         log = listener.contacts
         assert log.engine["numSolverIterations"] == 30 and "erp" not in log.engine
         assert log.bodies[0].name == "plate" and log.bodies[0].dynamics["restitution"] == 0.6
+
+
+def test_reset_names_and_knows_as_a_fresh_listener_does(tmp_path: Path) -> None:
+    """Bodies that have gone leave no number, names given by hand stay, what was set stays known."""
+    for name, fresh in (("a", False), ("b", True)):
+        with world() as client:
+            watch_settings(client)
+            floor(client)
+            gone, plate, other = (box(client, (x, 0, 0.1)) for x in range(3))
+            listener = None if fresh else sb.attach(client)
+            if listener is not None:
+                sounding(listener, gone, other)
+                sounding(listener, plate, name="plate")
+                sounding(listener, other)
+                run(client, 1)
+            client.setPhysicsEngineParameter(erp=0.25)
+            client.changeDynamics(other, -1, restitution=0.1)
+            client.removeBody(gone)
+            for x, body in enumerate((plate, other), start=1):
+                client.resetBasePositionAndOrientation(body, [x, 0, 0.1], [0, 0, 0, 1])
+                client.resetBaseVelocity(body, [0, 0, 0], [0, 0, 0])
+            if listener is None:
+                listener = sb.attach(client)
+                sounding(listener, plate, name="plate")
+                sounding(listener, other)
+            else:
+                listener.reset()
+            run(client, 60)
+            listener.contacts.save(tmp_path / f"{name}.npz")
+    assert [body.name for body in sb.read_log(tmp_path / "a.npz").bodies] == ["plate", "link0", "link0 2"]
+    assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
+
+
+def test_where_no_log_is_kept_changes_are_not_either(client: Any) -> None:
+    floor(client)
+    listener = sb.attach(client)
+    sounding(listener, box(client, (0, 0, 1)))
+    listener.world.keeps_gone = False
+    run(client, 2)
+    client.changeDynamics(1, -1, restitution=0.2)
+    client.setPhysicsEngineParameter(numSolverIterations=9)
+    run(client, 1)
+    assert listener.world.simulator.changes == ()
