@@ -27,7 +27,15 @@ from typing import Any
 
 from sonic_bullet.files import check_sr
 from sonic_bullet.files.contact_log import ContactLog
-from sonic_bullet.listener import Finding, diagnose_world, direct_client, disconnect, links_with_shapes, run_script
+from sonic_bullet.listener import (
+    Finding,
+    diagnose_world,
+    direct_client,
+    disconnect,
+    links_with_shapes,
+    run_script,
+    watch_settings,
+)  # fmt: skip
 from sonic_bullet.records import Array, Material, Sensor
 from sonic_bullet.records.coerce import as_call, as_flag, as_number, as_path, as_whole, shown
 from sonic_bullet.records.errors import SceneError, SceneWarning, SonicBulletError, interrupts
@@ -175,7 +183,7 @@ class _Stage:
     def result(self, notes: tuple[str, ...]) -> RenderResult:
         listener = self.need_listener()
         notes = (*notes, *listener.notes)
-        log = listener.contacts
+        log = replace(listener.contacts, residual=self.residual)
         if (
             listener.sr == self.sr
             and self.microphones is None
@@ -184,7 +192,7 @@ class _Stage:
             samples = listener.sound()
             return RenderResult(samples, log, self.sr, (*notes, *silence_notes(samples, log)))
         log = replace(log, sr=self.sr, sensors=log.sensors if self.microphones is None else self.microphones)
-        samples = render_log(log, residual=self.residual)
+        samples = render_log(log)
         return RenderResult(samples, log, self.sr, (*notes, *silence_notes(samples, log)))
 
 
@@ -241,6 +249,7 @@ def _module(path: Path) -> ModuleType:
 def _run_built(stage: _Stage, seconds: float | None, progress: Progress | None, say: Say | None) -> tuple[str, ...]:
     module = _module(stage.path)
     stage.client = client = direct_client()
+    watch_settings(client)  # build sets friction and the like
     cast = _user_code(stage.path, module.build, client)
     if not isinstance(cast, dict):
         raise SceneError(

@@ -77,7 +77,9 @@ def cli() -> None:
     "--material", metavar="M", help="Material of the bodies of a script that names none (a name or a preset file)."
 )
 @click.option(
-    "--residual/--no-residual", default=True, help="What presets sound beside their modes. [default: sounded]"
+    "--residual/--no-residual",
+    default=None,
+    help="What presets sound beside their modes. [default: sounded; of a log, as it was rendered]",
 )
 def render(**options: Any) -> None:
     """Run a PyBullet scene, or replay a contact log, to a sound file."""

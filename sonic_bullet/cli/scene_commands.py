@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -45,7 +45,7 @@ def run_render(
     microphones: tuple[tuple[float, float, float], ...],
     seed: int | None,
     material: str | None,
-    residual: bool,
+    residual: bool | None,
 ) -> None:
     """The `render` command.
 
@@ -153,7 +153,7 @@ class _Wish:
     microphones: tuple[tuple[float, float, float], ...]
     seed: int | None
     material: str | None
-    residual: bool
+    residual: bool | None
     progress: Callable[[float], None]
     say: Callable[[str], None]
 
@@ -169,7 +169,7 @@ def _simulated(scene: str, wish: _Wish) -> RenderResult:
         "seed": wish.seed or 0,
         "microphones": places,
         "material": wish.material,
-        "residual": wish.residual,
+        "residual": wish.residual is not False,
     }
     return render_scene(scene, **asked, progress=wish.progress, say=wish.say)
 
@@ -196,6 +196,8 @@ def _replayed(path: str, wish: _Wish) -> _Replay:
         log = replace(log, sensors=tuple(Microphone(np.array(place)) for place in wish.microphones))
     if wish.seed is not None:
         log = replace(log, seed=wish.seed)
+    if wish.residual is not None:
+        log = replace(log, residual=wish.residual)
     if (seconds := wish.seconds) is not None:
         if seconds > log.duration_s + 1e-9:
             raise AudioError(
@@ -203,7 +205,7 @@ def _replayed(path: str, wish: _Wish) -> _Replay:
                 "give fewer seconds, or simulate the scene for longer",
             )
         log = log.first(int((log.start_s < seconds - 1e-9).sum()))
-    samples = render_log(log, sr=wish.rate, residual=wish.residual, progress=wish.progress, say=wish.say)
+    samples = render_log(log, sr=wish.rate, progress=wish.progress, say=wish.say)
     return _Replay(samples, log, wish.rate or log.sr, silence_notes(samples, log))
 
 
@@ -306,6 +308,10 @@ def _described(result: RenderResult | _Replay, report: AudioReport, notes: tuple
         "steps": len(result.log.steps),
         "contacts": len(result.log),
         "bodies": _bodies(result.log),
+        "events": [{"kind": x.kind, "step": x.step, "body": x.body} for x in result.log.events],
+        "changes": [{"step": x.step, "body": x.body, "values": dict(x.values)} for x in result.log.changes],
+        "engine": dict(result.log.engine),
+        "versions": dict(result.log.versions),
         "notes": list(notes),
     }
 
@@ -319,6 +325,9 @@ def _bodies(log: ContactLog) -> list[dict[str, Any]]:
             "material": None if body.material is None else body.material.name,
             "modes": None if body.model is None else body.model.mode_count,
             "dropped": None if body.model is None else body.model.dropped,
+            "mounting": body.mounting,
+            "options": None if body.options is None else asdict(body.options),
+            "dynamics": dict(body.dynamics),
         }
         for body in log.bodies
     ]

@@ -6,23 +6,29 @@ Step (records.contacts) one after another -> ContactLog -> npz (files.logs) -> C
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 
 import numpy as np
 
 from sonic_bullet.records import Air, Array, Body, Sensor
-from sonic_bullet.records.coerce import as_items, as_kind, as_kinds, as_path, as_whole, shown
+from sonic_bullet.records.coerce import as_flag, as_items, as_kind, as_kinds, as_path, as_whole, shown
 from sonic_bullet.records.contacts import Contacts, Event, Step
 from sonic_bullet.records.errors import LogError
+from sonic_bullet.records.simulated import Change, Values, frozen_values
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ContactLog:
-    """Everything a later render needs, by value: bodies with their models, steps, sensors, rate and seed.
+    """All that a later render or comparison needs, by value: bodies with their models, steps, sensors, rate and seed.
 
     untouched: ids of bodies that were in the world and touched nothing; known while listening, not kept in files.
-    events: what happened besides contacts, in its order.
+    events: what happened besides contacts, in its order. engine: the simulator's settings at the
+    first step, under its own names; what is not among them is not known. versions: of sonic_bullet, the packages that
+    its numbers hang on and the simulator, by name; of older logs none. changes: what was set otherwise later, of engine
+    and bodies, in order; `dynamics` and `settings` give what holds at a step. residual: whether it is rendered with
+    what materials sound beside their modes.
     """
 
     bodies: tuple[Body, ...]
@@ -33,6 +39,10 @@ class ContactLog:
     air: Air = field(default_factory=Air)
     untouched: frozenset[int] = frozenset()
     events: tuple[Event, ...] = ()
+    engine: Values = field(default_factory=dict)
+    versions: Mapping[str, str] = field(default_factory=dict)
+    changes: tuple[Change, ...] = ()
+    residual: bool = True
 
     def __post_init__(self) -> None:
         ids = ("give ids of bodies",)
@@ -46,14 +56,20 @@ class ContactLog:
             "untouched": frozenset(
                 as_whole(x, "log: untouched", *ids) for x in as_items(self.untouched, "log: untouched", *ids)
             ),
+            "engine": frozen_values(self.engine, "log: engine"),
+            "versions": MappingProxyType(dict(sorted(self.versions.items()))),
+            "changes": as_kinds(self.changes, Change, "log: changes", "give a tuple of Change", error=LogError),
+            "residual": as_flag(self.residual, "log: residual"),
             "sr": as_whole(self.sr, "log: sr", "give a sample rate in Hz", least=1, error=LogError),
         }
         for name, value in checked.items():
             object.__setattr__(self, name, value)
-        if any(later.step < earlier.step for earlier, later in itertools.pairwise(self.events)):
-            raise LogError("events that are not in the order of their steps", "use an unbroken contact log")
-        if any(event.body is not None and event.body >= len(self.bodies) for event in self.events):
-            raise LogError("an event of a body that the log has not", "use an unbroken contact log")
+        both: dict[str, tuple[Event | Change, ...]] = {"events": self.events, "changes": self.changes}
+        for name, happened in both.items():
+            if any(later.step < earlier.step for earlier, later in itertools.pairwise(happened)):
+                raise LogError(f"{name} that are not in the order of their steps", "use an unbroken contact log")
+            if any(one.body is not None and one.body >= len(self.bodies) for one in happened):
+                raise LogError(f"{name} of a body that the log has not", "use an unbroken contact log")
         for step in self.steps:
             if len(step.body) and step.body[-1] >= len(self.bodies):
                 raise LogError("a step has a pose of a body that the log has not", "use an unbroken contact log")
@@ -88,6 +104,28 @@ class ContactLog:
     def time_s(self) -> Array:
         """(k,) start of the step of each row."""
         return self.start_s[self.step]
+
+    def dynamics(self, index: int, step: int = 0) -> Values:
+        """Friction, restitution, damping and mass of body ``index`` of `bodies` in a step, by the simulator's names.
+
+        What is not there is not known. Raises LogError where there is no such body.
+        """
+        index = as_whole(
+            index, "index", "give an index into bodies", least=0, most=len(self.bodies) - 1, error=LogError
+        )
+        return self._at(step, index, self.bodies[index].dynamics)
+
+    def settings(self, step: int = 0) -> Values:
+        """Settings of the engine in a step; what is not there is not known."""
+        return self._at(step, None, self.engine)
+
+    def _at(self, step: int, body: int | None, first: Values) -> Values:
+        step = as_whole(step, "step", "give the number of a step", least=0, error=LogError)
+        values: dict[str, float | None] = dict(first)
+        for change in self.changes:
+            if change.body == body and change.step <= step:
+                values |= change.values
+        return frozen_values({name: x for name, x in values.items() if x is not None}, "values")
 
     def impulse_on(self, body: int, link: int | None = None) -> Array:
         """(k, 3) world-frame impulses in N·s that acted on the body, friction included, one row per contact and step.
@@ -129,7 +167,10 @@ class ContactLog:
     def first(self, count: int) -> ContactLog:
         """The log of the first ``count`` steps and of what happened up to their end."""
         return replace(
-            self, steps=self.steps[:count], events=tuple(event for event in self.events if event.step <= count)
+            self,
+            steps=self.steps[:count],
+            events=tuple(event for event in self.events if event.step <= count),
+            changes=tuple(change for change in self.changes if change.step <= count),
         )
 
     def save(self, path: object) -> None:

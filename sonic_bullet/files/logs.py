@@ -3,10 +3,11 @@
 The container is `container`'s npz. Scalars, names and references are JSON (`header.npy`), all arrays are entries of
 their own:
 
-    format "sonic-bullet-contacts/2"; b bodies, s steps, p = Σ bodies known at each step, k = Σ contacts of each step
+    format "sonic-bullet-contacts/3"; b bodies, s steps, p = Σ bodies known at each step, k = Σ contacts of each step
       step_dt_s (s,) f8                     length of each step
       step_gravity_m_s2 (s, 3) f8            gravity in the world
       step_body_count, step_contact_count (s,) i8   how many of the p and k rows are each step's, in order
+      pose_body (p,) i4                      whose poses these are: ascending within a step; who has gone is not there
       pose_position_m (p, 3) f8, pose_quaternion_xyzw (p, 4) f8, pose_teleported (p,) bool
       contact_<field> (k, …)
           the fields of `Contacts`: a, b i4; point_a_m, point_b_m, normal, impulse_n_s, slip_m_s,
@@ -19,7 +20,12 @@ their own:
       model<i>_bend_s2_m2, _choke_s_m (m,) f8  only where its modes go with their level
       events (in the header)
           in order: {"kind": "quench", "step": the step before which it happened, "body": index, or null: all}
-    format "sonic-bullet-contacts/1"        the same without events
+      changes (in the header)
+          in order: {"step": the step before which it happened, "body": index, or null: the engine, "values": {…}}
+      of each body: dynamics, options, mounting; of all: engine, versions, residual (see `Body`, `ContactLog`)
+    format "sonic-bullet-contacts/2"        the same without pose_body (the first bodies), changes and all that the last
+          line names
+    format "sonic-bullet-contacts/1"        and without events
 
 A reader checks sizes before it allocates and records check their invariants, so a cut, foreign or forged file is one
 line of LogError.
@@ -29,7 +35,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from typing import Any
 
 import msgspec
 import numpy as np
@@ -37,99 +42,53 @@ import numpy as np
 from sonic_bullet.files.audio import check_sr
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.container import REMEDY, read_container, take, write_container
-from sonic_bullet.files.models import ModelEntry, as_json_text, model_arrays, model_key, pack_model, unpack_model
+from sonic_bullet.files.log_header import (
+    RESIDUAL_ARRAYS,
+    LogHeader,
+    distinct,
+    material_key,
+    pack_body,
+    pack_change,
+    pack_material,
+    pack_sensor,
+    pack_values,
+    pick,
+    unpack_body,
+    unpack_change,
+    unpack_residual,
+    unpack_sensor,
+)  # fmt: skip
+from sonic_bullet.files.models import as_json_text, model_arrays, model_key, pack_model, unpack_model
 from sonic_bullet.files.reading import reading
-from sonic_bullet.records import Air, Array, Body, Material, Microphone, ModalSum, Residual, Sensor, Vibrometer
+from sonic_bullet.records import Air, Array, Material
 from sonic_bullet.records.arrays import frozen_array
 from sonic_bullet.records.coerce import as_number, as_path
-from sonic_bullet.records.contacts import ROW_FIELDS, Contacts, Event, Step
+from sonic_bullet.records.contacts import ROW_FIELDS, Contacts, Step, first_bodies
 from sonic_bullet.records.errors import LogError
 
-LOG_FORMATS = ("sonic-bullet-contacts/2", "sonic-bullet-contacts/1")
+LOG_FORMATS = ("sonic-bullet-contacts/3", "sonic-bullet-contacts/2", "sonic-bullet-contacts/1")
 """What is read; the first is what is written."""
-RESIDUAL_ARRAYS: dict[str, tuple[int | None, ...]] = {
-    **{f"{part}_{name}": (None,) for part in ("mode", "line") for name in ("freq_hz", "decay_per_s", "amplitude")},
-    "freq_hz": (None,),
-    "time_s": (None,),
-    "power_per_hz": (None, None),
-}
-Vector = tuple[float, float, float]
-
-
-class _Residual(msgspec.Struct):
-    clip_energy: float
-    source: str
-
-
-class _Material(msgspec.Struct, omit_defaults=True):
-    name: str
-    density_kg_m3: float
-    alpha_per_s: float | None
-    beta_s: float | None
-    roughness_m: float
-    hurst: float
-    restitution: float
-    source: str
-    residual: _Residual | None = None
-    includes_radiation: bool = False
-
-
-class _Body(msgspec.Struct):
-    body_id: int
-    link: int
-    epoch: int
-    name: str
-    mass_kg: float
-    volume_m3: float
-    since_step: int
-    until_step: int
-    material: int | None
-    model: int | None
-
-
-class _Microphone(msgspec.Struct, tag="microphone"):
-    position_m: Vector
-
-
-class _Vibrometer(msgspec.Struct, tag="vibrometer"):
-    body_id: int
-    link: int
-    point_m: Vector
-    direction: Vector
-
-
-class _ModalSum(msgspec.Struct, tag="modal-sum"):
-    scale: float
-
-
-class _LogHeader(msgspec.Struct):
-    format: str
-    sr: int
-    seed: int
-    air_density_kg_m3: float
-    air_sound_speed_m_s: float
-    sensors: list[_Microphone | _Vibrometer | _ModalSum]
-    materials: list[_Material]
-    models: list[ModelEntry]
-    bodies: list[_Body]
-    events: list[Event] = []
 
 
 def write_log(path: str | os.PathLike[str], log: ContactLog) -> None:
     """Write a contact log, whole or not at all; equal logs give equal bytes. Raises FileError."""
-    materials, material_of = _distinct([body.material for body in log.bodies], _material_key)
-    models, model_of = _distinct([body.model for body in log.bodies], model_key)
-    header = _LogHeader(
+    materials, material_of = distinct([body.material for body in log.bodies], material_key)
+    models, model_of = distinct([body.model for body in log.bodies], model_key)
+    header = LogHeader(
         format=LOG_FORMATS[0],
         sr=int(log.sr),
         seed=int(log.seed),
         air_density_kg_m3=float(log.air.density_kg_m3),
         air_sound_speed_m_s=float(log.air.sound_speed_m_s),
-        sensors=[_pack_sensor(sensor) for sensor in log.sensors],
-        materials=[_pack_material(material) for material in materials],
+        sensors=[pack_sensor(sensor) for sensor in log.sensors],
+        materials=[pack_material(material) for material in materials],
         models=[pack_model(model) for model in models],
-        bodies=[_pack_body(body, m, n) for body, m, n in zip(log.bodies, material_of, model_of, strict=True)],
+        bodies=[pack_body(body, m, n) for body, m, n in zip(log.bodies, material_of, model_of, strict=True)],
         events=list(log.events),
+        engine=pack_values(log.engine),
+        versions={as_json_text(name): as_json_text(text) for name, text in log.versions.items()},
+        changes=[pack_change(change) for change in log.changes],
+        residual=bool(log.residual),
     )
     steps = log.steps
     rows = Contacts.joined([step.contacts for step in steps])
@@ -137,6 +96,7 @@ def write_log(path: str | os.PathLike[str], log: ContactLog) -> None:
         "step_dt_s": np.array([step.dt_s for step in steps], float),
         "step_gravity_m_s2": np.reshape([step.gravity_m_s2 for step in steps], (-1, 3)).astype(float),
         "step_body_count": np.array([len(step.position_m) for step in steps], np.int64),
+        "pose_body": np.concatenate([np.zeros(0, np.int32), *(step.body for step in steps)]).astype(np.int32),
         "step_contact_count": np.array([len(step.contacts) for step in steps], np.int64),
         "pose_position_m": np.concatenate([np.zeros((0, 3)), *(step.position_m for step in steps)]),
         "pose_quaternion_xyzw": np.concatenate([np.zeros((0, 4)), *(step.quaternion_xyzw for step in steps)]),
@@ -162,98 +122,13 @@ def read_log(path: str | os.PathLike[str]) -> ContactLog:
     Raises FileError (no such file) and LogError (cut, foreign, forged, inconsistent).
     """
     path = as_path(path, "path", "name a contact log (.npz)")
-    header, arrays = read_container(path, _LogHeader, LOG_FORMATS, "contact log")
+    header, arrays = read_container(path, LogHeader, LOG_FORMATS, "contact log")
     with reading(path, "contact log", LogError, REMEDY):
         check_sr(header.sr)
         return _unpack_log(header, arrays, path)
 
 
-def _distinct(things: list[Any], key: Any) -> tuple[list[Any], list[int | None]]:
-    """The different things by content, in order of appearance, and the index of each; None stays None."""
-    kept: dict[bytes, int] = {}
-    by_identity = {id(thing): key(thing) for thing in things if thing is not None}
-    index = [None if thing is None else kept.setdefault(by_identity[id(thing)], len(kept)) for thing in things]
-    firsts = [next(thing for thing, i in zip(things, index, strict=True) if i == number) for number in range(len(kept))]
-    return firsts, index
-
-
-def _material_key(material: Material) -> bytes:
-    more = (
-        b"".join(getattr(material.residual, name).tobytes() for name in RESIDUAL_ARRAYS)
-        if material.residual is not None
-        else b""
-    )
-    return msgspec.json.encode(_pack_material(material)) + material.stiffness_pa.tobytes() + more
-
-
-def _pack_material(x: Material) -> _Material:
-    return _Material(
-        name=as_json_text(x.name),
-        density_kg_m3=float(x.density_kg_m3),
-        alpha_per_s=None if x.alpha_per_s is None else float(x.alpha_per_s),
-        beta_s=None if x.beta_s is None else float(x.beta_s),
-        roughness_m=float(x.roughness_m),
-        hurst=float(x.hurst),
-        restitution=float(x.restitution),
-        source=as_json_text(x.source),
-        residual=None
-        if x.residual is None
-        else _Residual(float(x.residual.clip_energy), as_json_text(x.residual.source)),
-        includes_radiation=bool(x.includes_radiation),
-    )
-
-
-def _pack_body(x: Body, material: int | None, model: int | None) -> _Body:
-    numbers = (int(x.body_id), int(x.link), int(x.epoch))
-    return _Body(
-        *numbers,
-        as_json_text(x.name),
-        float(x.mass_kg),
-        float(x.volume_m3),
-        int(x.since_step),
-        int(x.until_step),
-        material,
-        model,
-    )
-
-
-def _pack_sensor(sensor: Sensor) -> _Microphone | _Vibrometer | _ModalSum:
-    if isinstance(sensor, Microphone):
-        return _Microphone(_vector(sensor.position_m))
-    if isinstance(sensor, Vibrometer):
-        return _Vibrometer(int(sensor.body_id), int(sensor.link), _vector(sensor.point_m), _vector(sensor.direction))
-    return _ModalSum(float(sensor.scale))
-
-
-def _vector(array: Array) -> Vector:
-    x, y, z = (float(value) for value in array)
-    return x, y, z
-
-
-def _unpack_residual(
-    header: _Residual | None, arrays: Mapping[str, Array], index: int, path: object
-) -> Residual | None:
-    if header is None:
-        return None
-    parts = {
-        name: take(arrays, f"residual{index}_{name}", float, shape, path) for name, shape in RESIDUAL_ARRAYS.items()
-    }
-    return Residual(**parts, clip_energy=header.clip_energy, source=header.source)
-
-
-def _unpack_sensor(sensor: _Microphone | _Vibrometer | _ModalSum) -> Sensor:
-    if isinstance(sensor, _Microphone):
-        return Microphone(np.array(sensor.position_m))
-    if isinstance(sensor, _Vibrometer):
-        made = Vibrometer(sensor.body_id, np.array(sensor.point_m), np.array(sensor.direction), sensor.link)
-        # already of unit length: dividing again would move its last bit
-        object.__setattr__(made, "direction", np.array(sensor.direction))
-        made.direction.setflags(write=False)
-        return made
-    return ModalSum(sensor.scale)
-
-
-def _unpack_log(header: _LogHeader, arrays: Mapping[str, Array], path: object) -> ContactLog:
+def _unpack_log(header: LogHeader, arrays: Mapping[str, Array], path: object) -> ContactLog:
     b, n = len(header.bodies), len(header.materials)
     inertia = take(arrays, "body_inertia_kg_m2", float, (b, 3, 3), path)
     curvature = take(arrays, "body_curvature_per_m", float, (b,), path)
@@ -261,18 +136,16 @@ def _unpack_log(header: _LogHeader, arrays: Mapping[str, Array], path: object) -
     materials = [
         Material(
             stiffness_pa=stiffness[i],
-            **{**msgspec.structs.asdict(x), "residual": _unpack_residual(x.residual, arrays, i, path)},
+            **{**msgspec.structs.asdict(x), "residual": unpack_residual(x.residual, arrays, i, path)},
         )
         for i, x in enumerate(header.materials)
     ]
     models = [unpack_model(x, arrays, i, path) for i, x in enumerate(header.models)]
     bodies = [
-        Body(
-            **{
-                **msgspec.structs.asdict(x),
-                "material": _pick(materials, x.material, path),
-                "model": _pick(models, x.model, path),
-            },
+        unpack_body(
+            x,
+            material=pick(materials, x.material, path),
+            model=pick(models, x.model, path),
             inertia_kg_m2=inertia[i],
             curvature_per_m=float(curvature[i]),
         )
@@ -281,18 +154,33 @@ def _unpack_log(header: _LogHeader, arrays: Mapping[str, Array], path: object) -
     return ContactLog(
         bodies=tuple(bodies),
         steps=_unpack_steps(arrays, path),
-        sensors=tuple(_unpack_sensor(sensor) for sensor in header.sensors),
+        sensors=tuple(unpack_sensor(sensor) for sensor in header.sensors),
         sr=header.sr,
         seed=header.seed,
         air=Air(header.air_density_kg_m3, header.air_sound_speed_m_s),
         events=tuple(header.events),
+        engine=header.engine,
+        versions=header.versions,
+        changes=tuple(unpack_change(change) for change in header.changes),
+        residual=header.residual,
     )
 
 
-def _pick(things: list[Any], index: int | None, path: object) -> Any:
-    if index is not None and not 0 <= index < len(things):
-        raise LogError(f"{path}: a body refers to a part that is not there", REMEDY)
-    return None if index is None else things[index]
+def _unpack_whose(arrays: Mapping[str, Array], poses: Array, path: object) -> list[Array]:
+    """Whose poses each step holds: indices of bodies, ascending; the first ones in logs that do not say."""
+    counts = np.diff(poses).tolist()
+    if "pose_body" not in arrays:
+        return [first_bodies(count) for count in counts]
+    body = take(arrays, "pose_body", np.int32, (int(poses[-1]),), path).astype(np.int64)
+    same = np.ones(len(body), bool)
+    same[poses[:-1][np.diff(poses) > 0]] = False  # the first of each step follows nobody
+    if (body < 0).any() or (np.diff(body)[same[1:]] <= 0).any():
+        raise LogError(f"{path}: the bodies of a step do not ascend from 0", REMEDY)
+    body.setflags(write=False)
+    return [
+        first_bodies(count) if count == 0 or body[stop - 1] == count - 1 else body[stop - count : stop]
+        for count, stop in zip(counts, poses[1:].tolist(), strict=True)
+    ]
 
 
 def _unpack_steps(arrays: Mapping[str, Array], path: object) -> tuple[Step, ...]:
@@ -314,7 +202,12 @@ def _unpack_steps(arrays: Mapping[str, Array], path: object) -> tuple[Step, ...]
     )
     if k and min(rows.a.min(), rows.b.min()) < 0:
         raise LogError(f"{path}: a contact names a body below zero", REMEDY)
-    if (np.maximum(rows.a, rows.b) >= np.repeat(np.diff(poses), np.diff(contacts))).any():
+    whose = _unpack_whose(arrays, poses, path)
+    # who is in a step, counted on from step to step: one search for all rows
+    span = 1 + int(max((body[-1] for body in whose if len(body)), default=0))
+    present = np.concatenate([np.zeros(0, np.int64), *(i * span + body for i, body in enumerate(whose))])
+    at = np.repeat(np.arange(len(dt)), np.diff(contacts)) * span
+    if k and (max(rows.a.max(), rows.b.max()) >= span or not np.isin([at + rows.a, at + rows.b], present).all()):
         raise LogError(f"{path}: a contact names a body that the step does not know", REMEDY)
     # checked whole, not step by step: hours of steps are read in a moment
     position = frozen_array(position, float, (p, 3), "step: position_m")
@@ -325,7 +218,9 @@ def _unpack_steps(arrays: Mapping[str, Array], path: object) -> tuple[Step, ...]
     for wrong in dt[~((dt > 0) & (dt <= 1))][:1]:
         as_number(float(wrong), "dt_s of a physics step", remedy, above=0, most=1, error=LogError)
     return tuple(
-        Step.trusted(length, position[p0:p1], quaternion[p0:p1], teleported[p0:p1], rows.rows(k0, k1), gravity[i])
+        Step.trusted(
+            length, position[p0:p1], quaternion[p0:p1], teleported[p0:p1], rows.rows(k0, k1), gravity[i], whose[i]
+        )
         for i, (length, p0, p1, k0, k1) in enumerate(
             zip(dt.tolist(), poses[:-1], poses[1:], contacts[:-1], contacts[1:], strict=True)
         )

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
         links_called,
         links_with_shapes,
         open_world,
+        watch_settings,
     )
     from sonic_bullet.listener.pybullet.doctor import Finding, diagnose_world, keep_restitution
     from sonic_bullet.listener.pybullet.pybullet_world import PyBulletWorld
@@ -39,6 +40,7 @@ __all__ = [
     "links_with_shapes",
     "open_world",
     "run_script",
+    "watch_settings",
 ]
 
 _HOME = {
@@ -53,6 +55,7 @@ _HOME = {
     "links_with_shapes": "pybullet.clients",
     "open_world": "pybullet.clients",
     "run_script": "pybullet.script",
+    "watch_settings": "pybullet.clients",
 }
 
 

@@ -15,6 +15,8 @@ from collections.abc import Callable, Mapping, Sequence
 from sonic_bullet.records import Body, Material, ModalModel, Shape
 from sonic_bullet.records.contacts import Step
 from sonic_bullet.records.errors import SceneError
+from sonic_bullet.records.modal_options import ModalOptions
+from sonic_bullet.records.simulated import Simulator
 
 
 class World(ABC):
@@ -24,14 +26,14 @@ class World(ABC):
     """Whether the last `after_step` found a step: a second call without one between finds none."""
     emptied = 0
     """How often the world has lost all its bodies at once (PyBullet's resetSimulation), as far as that is seen."""
-    keeps_gone = True
-    """Whether `bodies` holds who is gone: False where nobody keeps a log, and such records may be dropped."""
+    logged = True
+    """False where nobody keeps a log: what only a log needs may be dropped, records of who is gone first of all."""
 
     @property
     @abstractmethod
     def bodies(self) -> tuple[Body, ...]:
         """All bodies ever met, in the order that Contacts.a and Contacts.b count them; the living alone where
-        `keeps_gone` is False.
+        `logged` is False.
         """
 
     @property
@@ -48,6 +50,11 @@ class World(ABC):
     def notes(self) -> tuple[str, ...]:
         """What of the world is left out of the sound, and why."""
         return ()
+
+    @property
+    def simulator(self) -> Simulator:
+        """What the simulator says of itself, for the log: nothing, unless it has something to say."""
+        return Simulator()
 
     @property
     def has_bodies(self) -> bool:
@@ -75,11 +82,22 @@ class World(ABC):
         material: Material | None = None,
         model: ModalModel | None = None,
         shapes: Sequence[Shape] = (),
+        options: ModalOptions | None = None,
     ) -> Body:
         """Make a link known with what it is made of; its record, which `bodies` holds from now on.
 
+        options: what was asked of its modes, for the record.
+
         Raises SceneError.
         """
+
+    def call(self, body: int, link: int, name: str) -> None:
+        """Call a link so from now on. Raises SceneError where that cannot be."""
+        raise SceneError("this simulator's bodies bring their names", "leave name out")
+
+    def link_name(self, body: int, link: int) -> str:
+        """A link's own name, without its body's."""
+        return str(link)
 
     @abstractmethod
     def after_step(self) -> Step:

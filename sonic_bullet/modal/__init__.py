@@ -8,6 +8,6 @@ from sonic_bullet.modal.meshing.mesh_files import read_mesh
 from sonic_bullet.modal.meshing.shape_meshes import check_fillable
 from sonic_bullet.modal.meshing.solid import COARSER
 from sonic_bullet.modal.model import analyse, missing_name
-from sonic_bullet.modal.options import ModalOptions
+from sonic_bullet.records.modal_options import ModalOptions
 
 __all__ = ["COARSER", "ModalOptions", "analyse", "check_fillable", "missing_name", "read_mesh"]

@@ -17,9 +17,9 @@ import numpy as np
 
 from sonic_bullet.geometry import oversize
 from sonic_bullet.modal import cache as store
-from sonic_bullet.modal.options import ModalOptions
 from sonic_bullet.records import Array, Material, ModalModel, Shape
 from sonic_bullet.records.errors import MeshError, ModalError
+from sonic_bullet.records.modal_options import ModalOptions
 
 if TYPE_CHECKING:
     from sonic_bullet.modal.meshing.shape_meshes import Filled

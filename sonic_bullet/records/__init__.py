@@ -1,6 +1,7 @@
 """Values that prove themselves when built: read-only arrays of a stated shape, units in the names.
 
-bodies, contacts, residual: what one room hands another;  arrays: what records are built of;  units; errors
+bodies, simulated, contacts, residual, modal_options: what one room hands another;
+arrays: what records are built of;  units; errors
 
 Names are imported when first used: errors and units need no numpy, and neither does who prints a help text.
 """
@@ -14,7 +15,6 @@ if TYPE_CHECKING:
     from sonic_bullet.records.arrays import Array, frozen_array
     from sonic_bullet.records.bodies import (
         ORTHOTROPIC,
-        Body,
         Material,
         ModalModel,
         Shape,
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     )
     from sonic_bullet.records.residual import Residual
     from sonic_bullet.records.sensors import Air, Microphone, ModalSum, Sensor, Vibrometer
+    from sonic_bullet.records.simulated import Body
 
 __all__ = [
     "ORTHOTROPIC",
@@ -45,7 +46,7 @@ __all__ = [
 _HOME = {
     "Air": "sensors",
     "Array": "arrays",
-    "Body": "bodies",
+    "Body": "simulated",
     "Material": "bodies",
     "Microphone": "sensors",
     "ModalModel": "bodies",

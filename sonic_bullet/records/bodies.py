@@ -1,6 +1,6 @@
 """The values that travel between rooms: what a thing is, proven when it is built.
 
-    shapes (listener) + Material (presets) -> ModalModel (modal) -> Body -> Step, ContactLog (contacts.py) -> sound
+    shapes (listener) + Material (presets) -> ModalModel (modal) -> Body -> Step, ContactLog -> sound
 
 Every record is frozen, its arrays are read-only copies, units stand in the names and shapes in the comments: b bodies,
 m modes, v vertices, f faces. A record that exists is sound: inner code never asks again. Body frame always means the
@@ -32,7 +32,6 @@ from sonic_bullet.records.residual import Residual
 
 __all__ = [
     "Array",
-    "Body",
     "Material",
     "ModalModel",
     "Residual",
@@ -303,40 +302,3 @@ class ModalModel:
         """Former name of `damping_growth_s_m`."""
         warnings.warn("ModalModel.choke_s_m is now damping_growth_s_m", DeprecationWarning, stacklevel=2)
         return self.damping_growth_s_m
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Body:
-    """One link of one PyBullet body as the sound needs it, by value, so that a log renders without PyBullet.
-
-    body_id, link: as the user knows them (base is link -1). epoch: grows whenever ids may have been given anew. name:
-    for people. mass_kg: the simulator's, 0 for what does not move. inertia_kg_m2 (3, 3): body frame, centre of mass.
-    volume_m3: of the displaced air. curvature_per_m: of a shape that has one everywhere (sphere 1/r), else NaN: then
-    the model's surface tells. material None: a silent, smooth and rigid partner. model None: nothing of it vibrates.
-    since_step: the first step in which it exists for the sound; until_step: the first in which it does not any more, or
-    -1.
-    """
-
-    body_id: int
-    link: int
-    epoch: int
-    name: str
-    mass_kg: float
-    inertia_kg_m2: Array
-    volume_m3: float = 0.0
-    curvature_per_m: float = float("nan")
-    material: Material | None = None
-    model: ModalModel | None = None
-    since_step: int = 0
-    until_step: int = -1
-
-    def __post_init__(self) -> None:
-        where = f"body {shown(self.body_id)} link {shown(self.link)}"
-        store(
-            self,
-            inertia_kg_m2=frozen_array(self.inertia_kg_m2, float, (3, 3), f"{where}: inertia_kg_m2"),
-            mass_kg=as_number(
-                self.mass_kg, f"{where}: mass_kg", "give it a finite mass with changeDynamics", least=0, below=1e12
-            ),
-            volume_m3=as_number(self.volume_m3, f"{where}: volume_m3", "orient its mesh outward", least=0),
-        )

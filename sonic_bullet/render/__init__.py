@@ -32,7 +32,7 @@ def render_log(
     log: ContactLog,
     *,
     sr: int | None = None,
-    residual: bool = True,
+    residual: bool | None = None,
     progress: Callable[[float], None] | None = None,
     say: Callable[[str], None] | None = None,
 ) -> Array:
@@ -40,15 +40,15 @@ def render_log(
 
     Its events act where they did: at the first sample of the same step, at any rate.
 
-    residual False: without what materials sound beside their modes. progress is called with the share done, say with
-    what is being computed before the first step. Raises AudioError for a rate that cannot be, LogError for what is no
-    log.
+    residual: whether with what materials sound beside their modes, None: as the log says. progress is called with the
+    share done, say with what is being computed before the first step. Raises AudioError for a rate that cannot be,
+    LogError for what is no log.
     """
     from sonic_bullet.files import check_sr
 
     as_kind(log, ContactLog, "log", "give listener.contacts, or read_log(path)", error=LogError)
     log = replace(log, sr=check_sr(sr if sr is not None else log.sr))
-    residual = as_flag(residual, "residual")
+    residual = log.residual if residual is None else as_flag(residual, "residual")
     as_call(progress, "progress"), as_call(say, "say")
     for body in log.bodies if log.sensors else ():
         if body.model is not None and body.model.mode_count:

@@ -13,6 +13,8 @@ import inspect
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
+from functools import cache
+from importlib import metadata
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -37,7 +39,7 @@ from sonic_bullet.records.contacts import Event, Step
 from sonic_bullet.records.errors import AudioError, SceneError, SizeWarning
 from sonic_bullet.render import LATENCY_STEPS, Synthesizer
 from sonic_bullet.session.arguments import MicrophoneLike, as_sensors
-from sonic_bullet.session.wanted_bodies import WantedBody, solved_bodies, wanted_body
+from sonic_bullet.session.wanted_bodies import WantedBody, check_names, solved_bodies, wanted_body
 
 
 def attach(
@@ -64,6 +66,14 @@ def _opened(client: Any) -> World:
     from sonic_bullet.listener import open_world
 
     return open_world(client)
+
+
+@cache
+def package_versions() -> dict[str, str]:
+    """Of the packages that a render's numbers hang on."""
+    from sonic_bullet import __version__
+
+    return {"sonic_bullet": __version__, **{name: metadata.version(name) for name in ("numpy", "numba")}}
 
 
 def _wanted(world: World, who: Any, how: Any) -> WantedBody:
@@ -144,6 +154,7 @@ class Listener:
         mesh: str | Path | Shape | Sequence[Shape] | None = None,
         model: ModalModel | None = None,
         roughness_m: float | None = None,
+        name: str | None = None,
         fixed: Sequence[Sequence[float]] = (),
         thickness_m: float | None = None,
         to_hz: float = 20_000.0,
@@ -155,16 +166,17 @@ class Listener:
         link: -1 is the base; a link's number or name; "all" every link with a collision shape, all of them or, where
         one fails, none. material: a preset's name, a preset file or a `Material`. mesh: a file (in metres) or shapes in
         the body frame, where the body's own collision shapes should not be used. model: modes computed before.
-        roughness_m: rms height of its surface in place of the material's. fixed: clamped spheres (x, y, z, radius) in
-        m, body frame. thickness_m: wall of an open surface. to_hz, count: how many modes. progress: called now and then
-        with which link's modes are being computed, how far that is, and that it is their radiation next (seconds a link
-        the first time, then the cache has both); without one, a terminal shows it. Warns (`errors.SizeWarning`) of a
-        link larger than anything that is struck to sound. Raises SceneError (unknown body or link), MaterialError,
-        MeshError, ModalError naming body and link, RecordError.
+        roughness_m: rms height of its surface in place of the material's. name: what log and messages call it, in place
+        of the simulator's name; "all" links get their own behind it ("panda/panda_link7"). fixed: clamped spheres (x,
+        y, z, radius) in m, body frame. thickness_m: wall of an open surface. to_hz, count: how many modes. progress:
+        called now and then with which link's modes are being computed, how far that is, and that it is their radiation
+        next (seconds a link the first time, then the cache has both); without one, a terminal shows it. Warns
+        (`errors.SizeWarning`) of a link larger than anything that is struck to sound. Raises SceneError (unknown body
+        or link, a name that another has), MaterialError, MeshError, ModalError naming body and link, RecordError.
         """
         how: dict[str, Any] = {
-            "material": material, "mesh": mesh, "model": model, "roughness_m": roughness_m, "fixed": fixed,
-            "thickness_m": thickness_m, "to_hz": to_hz, "count": count,
+            "material": material, "mesh": mesh, "model": model, "roughness_m": roughness_m, "name": name,
+            "fixed": fixed, "thickness_m": thickness_m, "to_hz": to_hz, "count": count,
         }  # fmt: skip
         return self._added([wanted_body(self.world, body, link, **how)], progress)[0]
 
@@ -185,12 +197,17 @@ class Listener:
     ) -> list[tuple[ModalModel, ...]]:
         """The models of bodies that are listened to from now on."""
         as_call(progress, "progress")
+        check_names(self.world, wanted)
         known = (body.model for body in self.world.bodies if body.model is not None)
         with status("sonic_bullet") if progress is None else nullcontext(progress) as say:
             models = solved_bodies(self.world, wanted, known, self.air if self.sensors else None, say)
+        for one in wanted:  # all of them first: a number is given to who has no name of its own
+            for link, name in zip(one.links, one.names, strict=bool(one.names)):
+                self.world.call(one.body, link, name)
         for one, mine in zip(wanted, models, strict=True):
+            how: dict[str, Any] = {"material": one.material, "options": one.options if one.model is None else None}
             for link, (_, shapes), model in zip(one.links, one.parts, mine, strict=True):
-                self.world.add(one.body, link, material=one.material, model=model, shapes=shapes)
+                self.world.add(one.body, link, model=model, shapes=shapes, **how)
         for one, mine in zip(wanted, models, strict=True):
             for link, (name, _), model in zip(one.links, one.parts, mine, strict=True):
                 if large := oversize(model.vertex_m, model.mass_kg):
@@ -251,7 +268,8 @@ class Listener:
 
     @property
     def contacts(self) -> ContactLog:
-        """The contact log so far: all that a later render needs."""
+        """The contact log so far: all that a later render or comparison needs."""
+        simulator = self.world.simulator
         return ContactLog(
             tuple(self.world.bodies),
             tuple(self._steps),
@@ -261,6 +279,9 @@ class Listener:
             self.air,
             self.world.untouched,
             tuple(self._events),
+            simulator.engine,
+            {**package_versions(), **simulator.versions},
+            simulator.changes,
         )
 
     @property

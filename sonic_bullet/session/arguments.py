@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from sonic_bullet.records import Array, Material, Microphone, Sensor, Shape
-from sonic_bullet.records.coerce import as_items, as_kinds, as_path, as_rows
-from sonic_bullet.records.errors import MaterialError, MeshError
+from sonic_bullet.records.coerce import as_items, as_kinds, as_path, as_rows, as_text, shown
+from sonic_bullet.records.errors import MaterialError, MeshError, SceneError
 
 MicrophoneLike = Sequence[float] | Sequence[Sequence[float]] | Sensor | Sequence[Sensor] | Array
 
@@ -27,6 +27,14 @@ def as_sensors(microphone: MicrophoneLike, name: str = "microphone") -> tuple[Se
         return items
     points = items if any(isinstance(item, Iterable) for item in items) else (items,)
     return tuple(Microphone(np.array(point)) for point in as_rows(points, name, 3, remedy))
+
+
+def as_name(name: object) -> str:
+    """What a body shall be called: a text of one line. Raises SceneError."""
+    remedy = "give a text of one line"
+    if not as_text(name, "name", remedy, error=SceneError).isprintable() or not str(name).strip():
+        raise SceneError(f"name is {shown(name)}", remedy)
+    return str(name)
 
 
 def as_material(material: str | Path | Material) -> Material:

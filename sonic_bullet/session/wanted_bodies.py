@@ -14,29 +14,30 @@ from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from sonic_bullet.listener.frames import link_words
 from sonic_bullet.listener.world import World
 from sonic_bullet.machine.compiled import folder as code_folder
 from sonic_bullet.parallel import one_thread, parallel_map, said_here
 from sonic_bullet.radiation.radiated import radiation_of
 from sonic_bullet.records import Air, Material, ModalModel, Shape
-from sonic_bullet.records.coerce import as_kind, as_number
-from sonic_bullet.records.errors import MeshError, ModalError, SonicBulletError
+from sonic_bullet.records.coerce import as_kind, as_number, shown
+from sonic_bullet.records.errors import MeshError, ModalError, SceneError, SonicBulletError
+from sonic_bullet.records.modal_options import ModalOptions
 from sonic_bullet.render import make_ready
-from sonic_bullet.session.arguments import as_material, as_shapes
-
-if TYPE_CHECKING:
-    from sonic_bullet.modal import ModalOptions
+from sonic_bullet.session.arguments import as_material, as_name, as_shapes
 
 Say = Callable[[str], None]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WantedBody:
-    """A body and the links of it that shall sound. parts: name and shapes of each; model: of all, where it is given."""
+    """A body and the links of it that shall sound. parts: name and shapes of each; model: of all, where it is given.
+    names: what they shall be called, none: as the simulator calls them.
+    """
 
     body: int
     links: tuple[int, ...]
@@ -44,6 +45,7 @@ class WantedBody:
     material: Material
     options: ModalOptions
     model: ModalModel | None
+    names: tuple[str, ...] = ()
 
 
 def wanted_body(
@@ -55,11 +57,11 @@ def wanted_body(
     mesh: str | Path | Shape | Sequence[Shape] | None = None,
     model: ModalModel | None = None,
     roughness_m: float | None = None,
+    name: str | None = None,
     **options: Any,
 ) -> WantedBody:
     """What `Listener.add` was asked for. options: of modal.ModalOptions. Raises what add raises."""
     from sonic_bullet.effects.presets_of_effects import with_material
-    from sonic_bullet.modal import ModalOptions
 
     made = as_material(material)
     if roughness_m is not None:
@@ -70,13 +72,29 @@ def wanted_body(
     if model is not None:
         as_kind(model, ModalModel, "model", "give a ModalModel, or leave it out", error=ModalError)
     number, links = world.links_called(body, link)
+    names = () if name is None else tuple(_names(world, number, links, as_name(name), link == "all"))
     given = None if mesh is None else as_shapes(mesh)
     parts = []
-    for one in links:
-        name = world.name_of(number, one)
-        with _naming(name, len(links)):
-            parts.append((name, world.shapes_of(number, one) if given is None else given))
-    return WantedBody(number, links, tuple(parts), made, asked, model)
+    for one, label in zip(links, names or [world.name_of(number, one) for one in links], strict=True):
+        with _naming(label, len(links)):
+            parts.append((label, world.shapes_of(number, one) if given is None else given))
+    return WantedBody(number, links, tuple(parts), made, asked, model, names)
+
+
+def _names(world: World, body: int, links: Sequence[int], name: str, every: bool) -> Iterator[str]:
+    """What links are called where a name is given: the name, and of every link of a body the link's own behind it."""
+    for link in links:
+        yield f"{name}/{world.link_name(body, link)}" if every and link >= 0 else name
+
+
+def check_names(world: World, wanted: Sequence[WantedBody]) -> None:
+    """Raise SceneError where a name that is given is another living link's, or given twice."""
+    bearer = {body.name: (body.body_id, body.link) for body in world.bodies if body.until_step < 0}
+    for one in wanted:
+        for link, name in zip(one.links, one.names, strict=bool(one.names)):
+            body, other = bearer.setdefault(name, (one.body, link))
+            if (body, other) != (one.body, link):
+                raise SceneError(f"the name {shown(name)} is that of body {body}{link_words(other)}", "give another")
 
 
 @contextmanager

@@ -90,6 +90,18 @@ def test_forged_logs_are_refused_by_name(
         (b'"kind":"quench","step":0', b'"kind":"quench","step":-1', "before step -1"),
         (b'"step":0,"body":null', b'"step":0,"body":2', "body 2 alone"),
         (b'"kind":"quench","step":0', b'"kind":"quench","step":0.5', "step"),
+        (b'"step":2,"body":1,', b'"step":2,"body":4,', "changes of a body that the log has not"),
+        (b'"step":2,"body":1,', b'"step":2,"body":-1,', "body of a change"),
+        (b'"step":2,"body":1,', b'"step":-2,"body":1,', "step of a change"),
+        (b'"step":0,"body":null,"values"', b'"step":9,"body":null,"values"', "changes that are not in the order"),
+        (b'"linearDamping":0.04', b'"linearDamping":"thick"', "Expected `float"),
+        (b'"linearDamping":0.04', b'"linearDamping":1e999', "out of range"),
+        (b'"fixedTimeStep":0.00', b'"fixedTimeStep":[],"x":0.00', "engine"),
+        (b'"pybullet":"3.2.7"', b'"pybullet":3', "versions"),
+        (b'"mounting":"free"', b'"mounting":"glued"', "mounting is 'glued'"),
+        (b'"count":7', b'"count":0', "count"),
+        (b'"fixed":[[0.0,', b'"fixed":[[', "fixed"),
+        (b'"residual":false', b'"residual":0', "residual"),
     ],
 )
 def test_forged_headers_are_refused_by_name(tmp_path: Path, old: bytes, new: bytes, words: str) -> None:

@@ -16,6 +16,7 @@ from sonic_bullet.listener import World
 from sonic_bullet.records import Body, Material, ModalModel, Shape
 from sonic_bullet.records.contacts import Step
 from sonic_bullet.records.errors import SceneError
+from sonic_bullet.records.modal_options import ModalOptions
 from sonic_bullet.render import render_log
 from tests.made.models import STEEL
 from tests.made.worlds import box, floor, plate_model
@@ -48,6 +49,7 @@ class Recorded(World):
         material: Material | None = None,
         model: ModalModel | None = None,
         shapes: Sequence[Shape] = (),
+        options: ModalOptions | None = None,
     ) -> Body:
         raise SceneError("a log takes no bodies", "record another")
 

@@ -14,35 +14,32 @@ from sonic_bullet.listener.frames import Roster, decode
 from sonic_bullet.listener.pybullet.body_facts import describe, link_name
 from sonic_bullet.listener.pybullet.pieces import collision_pieces
 from sonic_bullet.records import Body, Material, ModalModel, Shape
+from sonic_bullet.records.modal_options import ModalOptions
 
 
 class AddedLinks:
-    """State of that for one client, by the code of a link."""
+    """State of that for one client. told: by the code of a link, in the order in which they last were added."""
 
     def __init__(self, client_id: int) -> None:
         self._client_id = client_id
-        self._told: dict[int, tuple[Hashable, dict[str, Any]]] = {}
+        self.told: dict[int, tuple[Hashable, dict[str, Any]]] = {}
 
     def tell(self, code: int, how: dict[str, Any]) -> None:
         """A link that exists was added; how: arguments of `added_body`."""
-        self._told.pop(code, None)
-        self._told[code] = likeness(self._client_id, *decode(code)), how
+        self.told.pop(code, None)
+        self.told[code] = likeness(self._client_id, *decode(code)), how
 
     def forget(self, codes: Iterable[int]) -> None:
         """Links are gone."""
         for code in codes:
-            self._told.pop(code, None)
-
-    def of(self, body: int | None) -> list[int]:
-        """Codes of the links of a body, or of all."""
-        return [code for code in self._told if body is None or decode(code)[0] == body]
+            self.told.pop(code, None)
 
     def still_there(self, roster: Roster, *, seen: bool) -> Iterator[tuple[int, dict[str, Any]]]:
         """Code and arguments of those whom a roster holds. seen: who was removed was forgotten; else a link of the same
         code is the same only where its name and shape are.
         """
         there = set(roster.code.tolist())
-        for code, (alike, how) in self._told.items():
+        for code, (alike, how) in self.told.items():
             if code in there and (seen or alike == likeness(self._client_id, *decode(code))):
                 yield code, how
 
@@ -57,14 +54,14 @@ def added_body(
     model: ModalModel | None,
     volume_m3: float | None,
     shapes: Sequence[Shape],
-    name: str | None,
+    options: ModalOptions | None,
 ) -> Body:
     """The record of a link that exists, with what it is made of. volume_m3 None: the model's, or 0; shapes: in place of
     its collision shape; a lone sphere tells its curvature. Raises SceneError on absurd mass or inertia.
     """
     record = describe(client_id, body, link, epoch)
     volume = volume_m3 if volume_m3 is not None else (model.volume_m3 if model else 0.0)
-    record = replace(record, material=material, model=model, volume_m3=volume, name=name or record.name)
+    record = replace(record, material=material, model=model, volume_m3=volume, options=options)
     if shapes:
         alone = shapes[0] if len(shapes) == 1 and shapes[0].kind == "sphere" else None
         record = replace(record, curvature_per_m=1 / float(alone.size_m[0]) if alone is not None else nan)

@@ -8,14 +8,29 @@ from typing import Any
 import numpy as np
 import pybullet
 
-from sonic_bullet.listener.frames import NO_NUMBER, link_words
+from sonic_bullet.listener.frames import NO_NUMBER, encode, link_words
+from sonic_bullet.listener.properties import Properties
 from sonic_bullet.listener.pybullet.pieces import collision_pieces
-from sonic_bullet.listener.pybullet.poses import body_ids, is_soft, read_motion, read_roster
-from sonic_bullet.records import Body
+from sonic_bullet.listener.pybullet.poses import body_ids, check_connected, is_soft, read_motion, read_roster
+from sonic_bullet.listener.pybullet.questions import version
+from sonic_bullet.listener.world import World
+from sonic_bullet.records import Body, Shape
 from sonic_bullet.records.coerce import LISTED, shown
 from sonic_bullet.records.errors import SceneError
+from sonic_bullet.records.simulated import Simulator, Values, finite
 
 HEAVIEST_KG = 1e12
+DYNAMICS = {
+    "mass": 0,
+    "lateralFriction": 1,
+    "restitution": 5,
+    "rollingFriction": 6,
+    "spinningFriction": 7,
+    "contactDamping": 8,
+    "contactStiffness": 9,
+    "collisionMargin": 11,
+}
+"""Places in getDynamicsInfo's answer; contactDamping and contactStiffness are -1 where none was set."""
 
 
 def check_exists(client_id: int, body: int, link: int) -> None:
@@ -104,4 +119,65 @@ def describe(client_id: int, body: int, link: int, epoch: int) -> Body:
         if len(pieces) == 1 and pieces[0].kind == pybullet.GEOM_SPHERE and pieces[0].size[0] > 0
         else math.nan
     )
-    return Body(body, link, epoch, link_name(client_id, body, link), mass, np.diag(info[2]), curvature_per_m=curvature)
+    return Body(
+        body,
+        link,
+        epoch,
+        link_name(client_id, body, link),
+        mass,
+        np.diag(info[2]),
+        curvature_per_m=curvature,
+        dynamics=_dynamics(info),
+    )
+
+
+def dynamics(client_id: int, body: int, link: int) -> Values:
+    """What PyBullet says of a link that exists, under the names that changeDynamics has for it."""
+    return _dynamics(pybullet.getDynamicsInfo(body, link, physicsClientId=client_id))
+
+
+def _dynamics(info: tuple[Any, ...]) -> Values:
+    inertia = {f"localInertiaDiagonal{axis}": x for axis, x in zip("XYZ", info[2], strict=True)}
+    return finite({**{name: info[place] for name, place in DYNAMICS.items()}, **inertia})
+
+
+class AskedLinks(World):
+    """What a world answers about links by asking PyBullet. client_id: which client; properties: the links' names."""
+
+    client_id: int
+    properties: Properties
+
+    def links_called(self, body: object, link: object) -> tuple[int, tuple[int, ...]]:
+        """The body's id and its links of that number or name, "all" of them. Raises SceneError, MeshError."""
+        from sonic_bullet.listener.pybullet.clients import links_called
+
+        return links_called(self, body, link)
+
+    def name_of(self, body: int, link: int = -1) -> str:
+        """What people call a link: its name and its body's id. Raises SceneError for an unknown one."""
+        check_connected(self.client_id)
+        check_exists(self.client_id, body, link)
+        own = link_name(self.client_id, body, link)
+        name = self.properties.names.called(int(encode(body, link)), own)
+        return name if name == f"body {body}" else f"{name} (body {body})"
+
+    def link_name(self, body: int, link: int) -> str:
+        """The link's own name, without its body's."""
+        return link_names(self.client_id, body)[link + 1]
+
+    def shapes_of(self, body: int, link: int = -1) -> tuple[Shape, ...]:
+        """Geometry of a link in its body frame. Raises SceneError for an unknown one, MeshError where it has none."""
+        from sonic_bullet.listener.pybullet.collision_shapes import shapes_of
+
+        check_connected(self.client_id)
+        check_exists(self.client_id, body, link)
+        return shapes_of(self.client_id, body, link)
+
+    def call(self, body: int, link: int, name: str) -> None:
+        """Call a link so from now on. Raises SceneError where another living link has that name."""
+        self.properties.names.call(int(encode(body, link)), name)
+
+    @property
+    def simulator(self) -> Simulator:
+        """What PyBullet says of itself; without hooks, no more than it says when asked at the first step."""
+        return self.properties.simulator({"pybullet": version()})

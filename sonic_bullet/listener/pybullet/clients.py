@@ -9,6 +9,7 @@ import pybullet
 from pybullet_utils.bullet_client import BulletClient
 
 from sonic_bullet.listener.pybullet import body_facts as facts
+from sonic_bullet.listener.pybullet import hooks
 from sonic_bullet.listener.pybullet.pieces import collision_pieces
 from sonic_bullet.listener.pybullet.poses import check_connected, is_soft
 from sonic_bullet.listener.pybullet.pybullet_world import PyBulletWorld
@@ -27,6 +28,11 @@ def direct_client() -> BulletClient:
     if client._client < 0:
         raise SceneError("PyBullet gives no further client", "disconnect those no longer needed")
     return client
+
+
+def watch_settings(client: BulletClient) -> None:
+    """See from now on what is set of engine and bodies, for whoever listens later: PyBullet does not say all of it."""
+    hooks.Hooks.of(client, client._client)
 
 
 def disconnect(client: BulletClient) -> None:
@@ -59,7 +65,7 @@ def links_with_shapes(client_id: int, body: int | None = None) -> tuple[tuple[in
     )
 
 
-def links_called(world: PyBulletWorld, body: Any, link: Any) -> tuple[int, tuple[int, ...]]:
+def links_called(world: facts.AskedLinks, body: Any, link: Any) -> tuple[int, tuple[int, ...]]:
     """The body's id and its links of that number or name; "all": every link that has a collision shape.
 
     All have a mass and an inertia that are some.

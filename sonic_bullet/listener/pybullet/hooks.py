@@ -18,6 +18,7 @@ from typing import Any, Protocol
 
 import pybullet
 
+from sonic_bullet.listener.properties import SetValues
 from sonic_bullet.records.errors import SceneError
 
 POSE_SETTERS = (
@@ -26,6 +27,21 @@ POSE_SETTERS = (
     "resetJointStateMultiDof",
     "resetJointStatesMultiDof",
 )
+DYNAMICS_IN_ORDER = (
+    "bodyUniqueId",
+    "linkIndex",
+    "mass",
+    "lateralFriction",
+    "spinningFriction",
+    "rollingFriction",
+    "restitution",
+    "linearDamping",
+    "angularDamping",
+    "contactStiffness",
+    "contactDamping",
+    "frictionAnchor",
+)
+"""changeDynamics' arguments as far as anybody gives them by place."""
 BODY_KEYWORDS = ("bodyUniqueId", "objectUniqueId", "multiBodyUniqueId")
 
 
@@ -38,7 +54,8 @@ class Watcher(Protocol):
     def client(self) -> Any: ...
     def forget(self, body: int | None = None) -> None: ...
     def mark_moved(self, body: int | None) -> None: ...
-    def mark_changed(self) -> None: ...
+    def mark_changed(self, body: int, link: int) -> None: ...
+    def mark_engine_changed(self) -> None: ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,12 +84,14 @@ class Hooks:
         self._client = weakref.ref(client)
         self._client_id = client_id
         self.listening: list[Listening] = []
+        self.set_values = SetValues()
         self._ours: dict[str, Callable[..., Any]] = {
             "stepSimulation": self._step(self._below(client, "stepSimulation")),
             "removeBody": self._telling("removeBody", client, lambda world, body: world.forget(body)),
             "resetSimulation": self._telling("resetSimulation", client, lambda world, _: world.forget()),
             "restoreState": self._telling("restoreState", client, lambda world, _: world.mark_moved(None)),
-            "changeDynamics": self._telling("changeDynamics", client, lambda world, _: world.mark_changed()),
+            "changeDynamics": self._setting_link(self._below(client, "changeDynamics")),
+            "setPhysicsEngineParameter": self._setting_engine(self._below(client, "setPhysicsEngineParameter")),
             **{name: self._telling(name, client, lambda world, body: world.mark_moved(body)) for name in POSE_SETTERS},
         }
         self._kept = {name: vars(client)[name] for name in self._ours if name in vars(client)}
@@ -131,15 +150,48 @@ class Hooks:
         def reporting(*args: Any, **kwargs: Any) -> Any:
             result = below(*args, **kwargs)
             body = body_argument(args, kwargs) if of_body else -1
+            if name == "removeBody":
+                self.set_values.forget(body)
+            elif name == "resetSimulation":
+                self.set_values.forget()
             for one in self.listening[:]:
                 tell(one.world, body)
             return result
 
         return reporting
 
+    def _setting_link(self, below: Callable[..., Any]) -> Callable[..., Any]:
+        def setting(*args: Any, **kwargs: Any) -> Any:
+            result = below(*args, **kwargs)
+            values = {**dict(zip(DYNAMICS_IN_ORDER, args, strict=False)), **kwargs}
+            body, link = int(values.pop("bodyUniqueId")), int(values.pop("linkIndex"))
+            self.set_values.set_link(body, link, without_client(values))
+            for one in self.listening[:]:
+                one.world.mark_changed(body, link)
+            return result
 
-def install(world: Watcher, before: Callable[[], object], after: Callable[[], object]) -> Callable[[], None]:
-    """Hook the world's client; a function that ends that.
+        return setting
+
+    def _setting_engine(self, below: Callable[..., Any]) -> Callable[..., Any]:
+        def setting(*args: Any, **kwargs: Any) -> Any:
+            result = below(*args, **kwargs)
+            self.set_values.set_engine(without_client(kwargs))
+            for one in self.listening[:]:
+                one.world.mark_engine_changed()
+            return result
+
+        return setting
+
+
+def without_client(values: dict[str, Any]) -> dict[str, Any]:
+    """What was set, without whose it is."""
+    return {name: x for name, x in values.items() if name != "physicsClientId"}
+
+
+def install(
+    world: Watcher, before: Callable[[], object], after: Callable[[], object]
+) -> tuple[SetValues, Callable[[], None]]:
+    """Hook the world's client: what is set of engine and bodies from then on, and a function that ends it.
 
     Raises SceneError where the client is no instance of a wrapper.
     """
@@ -151,4 +203,4 @@ def install(world: Watcher, before: Callable[[], object], after: Callable[[], ob
         )
     hooks, one = Hooks.of(client, world.client_id), Listening(world, before, after)
     hooks.listening.append(one)
-    return lambda: hooks.leave(one)
+    return hooks.set_values, lambda: hooks.leave(one)

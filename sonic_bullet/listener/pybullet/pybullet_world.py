@@ -27,24 +27,24 @@ from sonic_bullet.listener.frames import LINK_SPAN, Motion, Roster, decode, enco
 from sonic_bullet.listener.known_bodies import KnownBodies, alike
 from sonic_bullet.listener.memory import Memory, make_ready
 from sonic_bullet.listener.polling import Touches, loaded
+from sonic_bullet.listener.properties import Properties
 from sonic_bullet.listener.pybullet import body_facts as facts
-from sonic_bullet.listener.pybullet import collision_shapes as shapes
 from sonic_bullet.listener.pybullet import hooks
 from sonic_bullet.listener.pybullet.added_links import AddedLinks, added_body
 from sonic_bullet.listener.pybullet.census import Census
 from sonic_bullet.listener.pybullet.left_out import BodiesLeftOut
 from sonic_bullet.listener.pybullet.poses import check_connected
-from sonic_bullet.listener.pybullet.questions import contact_points, settings
+from sonic_bullet.listener.pybullet.questions import contact_points, engine, settings
 from sonic_bullet.listener.pybullet.step_back import undone
 from sonic_bullet.listener.pybullet.substeps import SubstepLog
 from sonic_bullet.listener.start import LEFT_OUT, NOBODY, hooked_start, jumped, polled_start
-from sonic_bullet.listener.world import World
 from sonic_bullet.records import Body, Material, ModalModel, Shape
 from sonic_bullet.records.contacts import Step
 from sonic_bullet.records.errors import SceneError
+from sonic_bullet.records.modal_options import ModalOptions
 
 
-class PyBulletWorld(World):
+class PyBulletWorld(facts.AskedLinks):
     """State of listening to one client: who lives, what was last seen, what is remembered of contacts.
 
     Made by open_world.
@@ -64,6 +64,7 @@ class PyBulletWorld(World):
         self.stepped = False
         self._known = KnownBodies()
         self._added = AddedLinks(self.client_id)
+        self.properties = Properties(partial(facts.dynamics, self.client_id), partial(engine, self.client_id))
         self._memory = Memory()
         self._census = Census(self.client_id, self._bury, self._end)
         self._settings = settings(self.client_id)
@@ -88,7 +89,7 @@ class PyBulletWorld(World):
 
     @property
     def bodies(self) -> tuple[Body, ...]:
-        """All bodies ever met, as Contacts.a and Contacts.b count them; the living alone where not `keeps_gone`."""
+        """All bodies ever met, as Contacts.a and Contacts.b count them; the living alone where not `logged`."""
         return tuple(self._known.records.values())
 
     @property
@@ -99,9 +100,8 @@ class PyBulletWorld(World):
     @property
     def untouched(self) -> frozenset[int]:
         """Ids of the bodies that were in the world at the last step and have met nobody yet."""
-        return frozenset(body for body, _, _ in self._past.roster.bodies) - {
-            code // LINK_SPAN for code in self._known.live
-        }
+        met = {code // LINK_SPAN for code in self._known.live}
+        return frozenset(body for body, _, _ in self._past.roster.bodies) - met
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -118,12 +118,6 @@ class PyBulletWorld(World):
     def make_ready(self) -> None:
         """Have the machine code that the first step would else wait for."""
         make_ready()
-
-    def links_called(self, body: object, link: object) -> tuple[int, tuple[int, ...]]:
-        """The body's id and its links of that number or name, "all" of them. Raises SceneError, MeshError."""
-        from sonic_bullet.listener.pybullet.clients import links_called
-
-        return links_called(self, body, link)
 
     @property
     def has_bodies(self) -> bool:
@@ -143,7 +137,7 @@ class PyBulletWorld(World):
         model: ModalModel | None = None,
         volume_m3: float | None = None,
         shapes: Sequence[Shape] = (),
-        name: str | None = None,
+        options: ModalOptions | None = None,
     ) -> Body:
         """Make a link known, with what it is made of; its record, which `bodies` holds from now on.
 
@@ -157,49 +151,38 @@ class PyBulletWorld(World):
         facts.check_usable(self.client_id, body)
         code = int(encode(body, link))
         if self._before is not None and rows_of(self._before.roster, np.array([code]))[0] < 0:
-            raise SceneError(f"body {body} came while a step was being made", "create and add bodies between two steps")
+            raise SceneError(f"body {body} came while a step was made", "create and add bodies between two steps")
         if body in self.left_out.muted:
             self.left_out.forget(body)
             self._census.stale()
         self._census.read()
-        how = {"material": material, "model": model, "volume_m3": volume_m3, "shapes": tuple(shapes), "name": name}
-        return self._enter(code, how)
+        how = {"material": material, "model": model, "volume_m3": volume_m3, "shapes": tuple(shapes)}
+        return self._enter(code, {**how, "options": options})
 
     def _enter(self, code: int, how: dict[str, Any]) -> Body:
         """The record that begins of a link that was checked, and with it what `reset` needs. how: as `add` has it."""
         body, link = decode(code)
         record = replace(added_body(self.client_id, body, link, self.epoch, **how), since_step=self.step_count)
         self._close([code])
-        self._known.append(code, record)
         self._added.tell(code, how)
-        return record
+        return self._append(code, record)
 
     def reset(self) -> None:
         """Begin anew with what was added, where it is still there: see `World.reset`.
 
         A client that is not hooked does not tell who was removed: a body of the same id, name and shape is the same.
-        Raises SceneError: lost connection, or called while a step is being made.
+        Raises SceneError: lost connection, or called while a step is made.
         """
         check_connected(self.client_id)
         if self._before is not None:
-            raise SceneError("reset was called while a step was being made", "call it between two steps")
-        added = self._added
+            raise SceneError("reset was called while a step was made", "call it between two steps")
+        added, before = self._added, self.properties
         self._begin()
-        for code, how in added.still_there(self._past.roster, seen=self._uninstall is not None):
+        self.properties.set_values = before.set_values
+        there = list(added.still_there(self._past.roster, seen=self._uninstall is not None))
+        before.names.hand_over([code for code, _ in there], self.properties.names)
+        for code, how in there:
             self._enter(code, how)
-
-    def name_of(self, body: int, link: int = -1) -> str:
-        """What people call a link: its name and its body's id. Raises SceneError for an unknown one."""
-        check_connected(self.client_id)
-        facts.check_exists(self.client_id, body, link)
-        name = facts.link_name(self.client_id, body, link)
-        return name if name == f"body {body}" else f"{name} (body {body})"
-
-    def shapes_of(self, body: int, link: int = -1) -> tuple[Shape, ...]:
-        """Geometry of a link in its body frame. Raises SceneError for an unknown one, MeshError where it has none."""
-        check_connected(self.client_id)
-        facts.check_exists(self.client_id, body, link)
-        return shapes.shapes_of(self.client_id, body, link)
 
     def forget(self, body: int | None = None) -> None:
         """Say that a body was removed (None: all, by resetSimulation); its id may be given anew. With a hook, nobody
@@ -207,10 +190,10 @@ class PyBulletWorld(World):
         """
         self.epoch += 1
         self.left_out.forget(body)
-        self._close([code for code in self._known.live if body is None or code // LINK_SPAN == body])
-        self._added.forget(self._added.of(body))
+        self._lose([code for code in (*self._known.live, *self._added.told) if body in (None, code // LINK_SPAN)])
         if body is None:
             self.emptied += 1
+            self.mark_engine_changed()
             self._log.abandon()
             self._memory.forget()
         self._past = without(self._past, body)
@@ -221,17 +204,24 @@ class PyBulletWorld(World):
         """Note that a body (None: every body) was moved by hand before the coming step."""
         self._moved.update([body] if body is not None else [entry[0] for entry in self._past.roster.bodies])
 
-    def mark_changed(self) -> None:
-        """Note that masses may have changed: who is static is read again."""
+    def mark_changed(self, body: int, link: int) -> None:
+        """Note that friction, mass and the like of a link may have changed: who is static is read again."""
         self._census.stale()
+        index = self.index_of(body, link)
+        if index >= 0 and self.logged:
+            self.properties.link_changed(int(encode(body, link)), index, self.step_count)
+
+    def mark_engine_changed(self) -> None:
+        """Note that settings of the engine may have changed."""
+        if self.logged:
+            self.properties.engine_changed(self.step_count)
 
     def hook(self, before: Callable[[], object], after: Callable[[], object]) -> None:
         """Call `before` and `after` round every stepSimulation of a BulletClient; `before` is, or calls, `before_step`.
-
         Raises SceneError for the pybullet module or a client id: they have no instance to hook.
         """
         self.unhook()
-        self._uninstall = hooks.install(self, before, after)
+        self.properties.set_values, self._uninstall = hooks.install(self, before, after)
 
     def unhook(self) -> None:
         """Leave the client as it was and end the sub-step log; harmless when not hooked."""
@@ -239,10 +229,7 @@ class PyBulletWorld(World):
             self._uninstall()
             self._uninstall = None
         self._before = None
-        if self.client is None:
-            self._log.abandon()  # its id may be another's by now
-        else:
-            self._log.close()
+        (self._log.abandon if self.client is None else self._log.close)()  # its id may be another's by now
 
     def before_step(self) -> None:
         """Read poses and twists at the start of the step. Raises SceneError (lost connection)."""
@@ -252,9 +239,8 @@ class PyBulletWorld(World):
         self._before = self._census.read()
 
     def after_step(self) -> Step:
-        """This step's record.
-
-        Call once after each stepSimulation; a second call without a step between finds no contacts.
+        """This step's record. Call once after each stepSimulation; a second call without a step between finds no
+        contacts.
 
         `stepped` tells whether there was a step. Without a hook, a missing one is known by a world in motion that
         stands where it stood, to the bit; where nothing moves at all, a second call passes for a step. Raises
@@ -299,6 +285,8 @@ class PyBulletWorld(World):
         """Any step; touches: of sub-steps, else those of the memory."""
         memory, known, (dt, _, gravity) = self._memory, self._known, self._settings
         first, past_touches = self.step_count == 0, memory.touches
+        if first:
+            self.properties.first_step()
         touches = self._census.usable(loaded(memory.raw, memory.raw_before, dt) if touches is None else touches)
         if hooked:
             start = hooked_start(None if first else self._past, now, self._moved, dt)
@@ -318,7 +306,7 @@ class PyBulletWorld(World):
             for code in start["code"][start["met"] != 0].tolist():
                 record = self._census.described(code, self.epoch)
                 if record is not None:
-                    known.append(code, replace(record, since_step=self.step_count))
+                    self._append(code, replace(record, since_step=self.step_count))
             known.enter(start)
             start["index"][start["index"] < 0] = LEFT_OUT
             row, made = memory.made(known, start, touches, past_touches, dt)
@@ -329,15 +317,11 @@ class PyBulletWorld(World):
         gone = self._known.gone(roster)
         if gone:
             self.epoch += 1
-            self._close(gone)
-            self._added.forget(gone)
+            self._lose(gone)
 
     def _end(self, bodies: Collection[int]) -> None:
         """Close the records of bodies that are left out from now on; after a reset they are listened to again."""
         self._close([code for code in self._known.live if code // LINK_SPAN in bodies])
-
-    def _close(self, codes: Collection[int]) -> None:
-        self._known.close(codes, self.step_count, keep=self.keeps_gone)
 
     def _expose_impostors(self, now: Motion, dt: float) -> None:
         """Where nobody saw removals: what jumped and has another name, mass or inertia has taken over an old id."""
@@ -346,5 +330,20 @@ class PyBulletWorld(World):
             seen = None if before is None else self._census.described(code, self.epoch)
             if before is not None and seen is not None and not alike(before, seen):
                 self.epoch += 1
-                self._close([code])
-                self._added.forget([code])
+                self._lose([code])
+
+    def _close(self, codes: Collection[int]) -> None:
+        """End the records of links."""
+        self.properties.end(self._known.live[code] for code in codes if code in self._known.live)
+        self._known.close(codes, self.step_count, keep=self.logged)
+
+    def _lose(self, codes: Collection[int]) -> None:
+        """Links are no more: their records end, and their names too."""
+        self._close(codes)
+        self._added.forget(codes)
+        self.properties.names.forget(codes)
+
+    def _append(self, code: int, record: Body) -> Body:
+        record = self.properties.begin(code, self._known.count, record)
+        self._known.append(code, record)
+        return record

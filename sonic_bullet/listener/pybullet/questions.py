@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
+from importlib import metadata
 from typing import Any, NamedTuple
 
 import pybullet
@@ -11,6 +13,7 @@ from sonic_bullet.listener.polling import RawContact, packed
 from sonic_bullet.listener.quiet import collector_waiting
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import SceneError
+from sonic_bullet.records.simulated import Values, finite
 
 
 class Settings(NamedTuple):
@@ -36,6 +39,18 @@ def settings(client_id: int) -> Settings:
     found = ask(client_id, pybullet.getPhysicsEngineParameters)
     gravity = found["gravityAccelerationX"], found["gravityAccelerationY"], found["gravityAccelerationZ"]
     return Settings(found["fixedTimeStep"], max(1, found["numSubSteps"]), gravity)
+
+
+def engine(client_id: int) -> Values:
+    """All numbers that the engine says of itself, without gravity, which each step tells. Raises SceneError."""
+    found = ask(client_id, pybullet.getPhysicsEngineParameters)
+    return finite({name: x for name, x in found.items() if not name.startswith("gravity")})
+
+
+@cache
+def version() -> str:
+    """Of PyBullet."""
+    return metadata.version("pybullet")
 
 
 def contact_points(client_id: int) -> tuple[list[RawContact], Array]:

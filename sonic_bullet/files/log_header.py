@@ -1,0 +1,221 @@
+"""What a contact log's header says, and how records become that and come back: all that is no array.
+
+Body, Material, Sensor, Change -> structs (msgspec) -> JSON -> structs -> the same records; arrays lie beside it
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from sonic_bullet.files.container import REMEDY, take
+from sonic_bullet.files.models import ModelEntry, as_json_text
+from sonic_bullet.records import Array, Body, Material, Microphone, ModalSum, Residual, Sensor, Vibrometer
+from sonic_bullet.records.contacts import Event
+from sonic_bullet.records.errors import LogError
+from sonic_bullet.records.modal_options import ModalOptions
+from sonic_bullet.records.simulated import Change
+
+RESIDUAL_ARRAYS: dict[str, tuple[int | None, ...]] = {
+    **{f"{part}_{name}": (None,) for part in ("mode", "line") for name in ("freq_hz", "decay_per_s", "amplitude")},
+    "freq_hz": (None,),
+    "time_s": (None,),
+    "power_per_hz": (None, None),
+}
+Vector = tuple[float, float, float]
+
+
+class _Residual(msgspec.Struct):
+    clip_energy: float
+    source: str
+
+
+class _Material(msgspec.Struct, omit_defaults=True):
+    name: str
+    density_kg_m3: float
+    alpha_per_s: float | None
+    beta_s: float | None
+    roughness_m: float
+    hurst: float
+    restitution: float
+    source: str
+    residual: _Residual | None = None
+    includes_radiation: bool = False
+
+
+class _Body(msgspec.Struct):
+    body_id: int
+    link: int
+    epoch: int
+    name: str
+    mass_kg: float
+    volume_m3: float
+    since_step: int
+    until_step: int
+    material: int | None
+    model: int | None
+    dynamics: dict[str, float] = {}
+    options: ModalOptions | None = None
+    mounting: str = "free"
+
+
+class _Change(msgspec.Struct):
+    step: int
+    body: int | None
+    values: dict[str, float | None]
+
+
+class _Microphone(msgspec.Struct, tag="microphone"):
+    position_m: Vector
+
+
+class _Vibrometer(msgspec.Struct, tag="vibrometer"):
+    body_id: int
+    link: int
+    point_m: Vector
+    direction: Vector
+
+
+class _ModalSum(msgspec.Struct, tag="modal-sum"):
+    scale: float
+
+
+class LogHeader(msgspec.Struct):
+    """The header. What older formats lack has its default: not known, or none of it."""
+
+    format: str
+    sr: int
+    seed: int
+    air_density_kg_m3: float
+    air_sound_speed_m_s: float
+    sensors: list[_Microphone | _Vibrometer | _ModalSum]
+    materials: list[_Material]
+    models: list[ModelEntry]
+    bodies: list[_Body]
+    events: list[Event] = []
+    engine: dict[str, float] = {}
+    versions: dict[str, str] = {}
+    changes: list[_Change] = []
+    residual: bool = True
+
+
+def distinct(things: list[Any], key: Any) -> tuple[list[Any], list[int | None]]:
+    """The different things by content, in order of appearance, and the index of each; None stays None."""
+    kept: dict[bytes, int] = {}
+    by_identity = {id(thing): key(thing) for thing in things if thing is not None}
+    index = [None if thing is None else kept.setdefault(by_identity[id(thing)], len(kept)) for thing in things]
+    firsts = [next(thing for thing, i in zip(things, index, strict=True) if i == number) for number in range(len(kept))]
+    return firsts, index
+
+
+def material_key(material: Material) -> bytes:
+    """A material's content: equal ones are stored once."""
+    more = (
+        b"".join(getattr(material.residual, name).tobytes() for name in RESIDUAL_ARRAYS)
+        if material.residual is not None
+        else b""
+    )
+    return msgspec.json.encode(pack_material(material)) + material.stiffness_pa.tobytes() + more
+
+
+def pack_material(x: Material) -> _Material:
+    """The header's part of a material."""
+    return _Material(
+        name=as_json_text(x.name),
+        density_kg_m3=float(x.density_kg_m3),
+        alpha_per_s=None if x.alpha_per_s is None else float(x.alpha_per_s),
+        beta_s=None if x.beta_s is None else float(x.beta_s),
+        roughness_m=float(x.roughness_m),
+        hurst=float(x.hurst),
+        restitution=float(x.restitution),
+        source=as_json_text(x.source),
+        residual=None
+        if x.residual is None
+        else _Residual(float(x.residual.clip_energy), as_json_text(x.residual.source)),
+        includes_radiation=bool(x.includes_radiation),
+    )
+
+
+def pack_body(x: Body, material: int | None, model: int | None) -> _Body:
+    """The header's part of a body; material, model: their places among those of the log."""
+    numbers = (int(x.body_id), int(x.link), int(x.epoch))
+    return _Body(
+        *numbers,
+        as_json_text(x.name),
+        float(x.mass_kg),
+        float(x.volume_m3),
+        int(x.since_step),
+        int(x.until_step),
+        material,
+        model,
+        pack_values(x.dynamics),
+        x.options,
+        x.mounting,
+    )
+
+
+def unpack_body(x: _Body, **parts: Any) -> Body:
+    """The body of that entry; parts: its fields that are no part of the header. Raises RecordError."""
+    return Body(**{**msgspec.structs.asdict(x), **parts})
+
+
+def pack_values(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Values by name, as JSON can hold the names."""
+    return {as_json_text(name): x for name, x in values.items()}
+
+
+def pack_change(x: Change) -> _Change:
+    """The header's part of a change."""
+    return _Change(int(x.step), None if x.body is None else int(x.body), pack_values(x.values))
+
+
+def unpack_change(x: _Change) -> Change:
+    """The change of that entry. Raises LogError, RecordError."""
+    return Change(x.step, x.body, x.values)
+
+
+def pack_sensor(sensor: Sensor) -> _Microphone | _Vibrometer | _ModalSum:
+    """The header's part of a sensor."""
+    if isinstance(sensor, Microphone):
+        return _Microphone(_vector(sensor.position_m))
+    if isinstance(sensor, Vibrometer):
+        return _Vibrometer(int(sensor.body_id), int(sensor.link), _vector(sensor.point_m), _vector(sensor.direction))
+    return _ModalSum(float(sensor.scale))
+
+
+def _vector(array: Array) -> Vector:
+    x, y, z = (float(value) for value in array)
+    return x, y, z
+
+
+def unpack_residual(header: _Residual | None, arrays: Mapping[str, Array], index: int, path: object) -> Residual | None:
+    """The residual of material ``index``, where it has one. Raises LogError, RecordError."""
+    if header is None:
+        return None
+    parts = {
+        name: take(arrays, f"residual{index}_{name}", float, shape, path) for name, shape in RESIDUAL_ARRAYS.items()
+    }
+    return Residual(**parts, clip_energy=header.clip_energy, source=header.source)
+
+
+def unpack_sensor(sensor: _Microphone | _Vibrometer | _ModalSum) -> Sensor:
+    """The sensor of that entry. Raises RecordError."""
+    if isinstance(sensor, _Microphone):
+        return Microphone(np.array(sensor.position_m))
+    if isinstance(sensor, _Vibrometer):
+        made = Vibrometer(sensor.body_id, np.array(sensor.point_m), np.array(sensor.direction), sensor.link)
+        # already of unit length: dividing again would move its last bit
+        object.__setattr__(made, "direction", np.array(sensor.direction))
+        made.direction.setflags(write=False)
+        return made
+    return ModalSum(sensor.scale)
+
+
+def pick(things: list[Any], index: int | None, path: object) -> Any:
+    """The thing of that index, None where there is no index. Raises LogError."""
+    if index is not None and not 0 <= index < len(things):
+        raise LogError(f"{path}: a body refers to a part that is not there", REMEDY)
+    return None if index is None else things[index]

@@ -1,0 +1,125 @@
+"""What a simulator says of its bodies and of itself, by value.
+
+    its own answers, and what hooks see being set -> Values -> Body.dynamics, Simulator -> ContactLog
+
+Values are numbers under the simulator's own names, in SI units. A name that is not among them is not known: nobody said
+it, and it is not zero.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+from sonic_bullet.records.arrays import Array, frozen_array, store
+from sonic_bullet.records.bodies import Material, ModalModel
+from sonic_bullet.records.coerce import as_kind, as_number, as_text, as_whole, shown
+from sonic_bullet.records.errors import LogError, RecordError
+from sonic_bullet.records.modal_options import ModalOptions
+
+Values = Mapping[str, float]
+"""Numbers by the simulator's own names for them; what is not there is not known."""
+MOUNTINGS = ("free",)
+"""How a body is held, as far as its modes and damping go: "free", by nothing."""
+
+
+def frozen_values(values: object, name: str) -> Values:
+    """Finite numbers by name, read-only and in the order of their names. Raises RecordError."""
+    remedy = "give a mapping of names to numbers"
+    if not isinstance(values, Mapping):
+        raise RecordError(f"{name} is {shown(values)}", remedy)
+    number = {
+        as_text(key, f"a name in {name}", remedy): as_number(x, f"{name}: {key}", remedy) for key, x in values.items()
+    }
+    return MappingProxyType(dict(sorted(number.items())))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Body:
+    """One link of one PyBullet body as the sound needs it, by value, so that a log renders without PyBullet.
+
+    body_id, link: as the user knows them (base is link -1). epoch: grows whenever ids may have been given anew. name:
+    that link's alone within a log, and all records of it have it. mass_kg: the simulator's, 0 for what does not move.
+    inertia_kg_m2 (3, 3): body frame, centre of mass. volume_m3: of the displaced air. curvature_per_m: of a shape that
+    has one everywhere (sphere 1/r), else NaN: then the model's surface tells. material None: a silent, smooth and rigid
+    partner. model None: nothing of it vibrates. since_step: the first step in which it exists for the sound;
+    until_step: the first in which it does not any more, or -1. dynamics: friction, restitution, damping, mass, as the
+    simulator has them when the record begins (see `Change`). options: what was asked of its modes; None where nothing
+    was, or the model was given, or an older log does not say. mounting: one of MOUNTINGS.
+    """
+
+    body_id: int
+    link: int
+    epoch: int
+    name: str
+    mass_kg: float
+    inertia_kg_m2: Array
+    volume_m3: float = 0.0
+    curvature_per_m: float = float("nan")
+    material: Material | None = None
+    model: ModalModel | None = None
+    since_step: int = 0
+    until_step: int = -1
+    dynamics: Values = field(default_factory=dict)
+    options: ModalOptions | None = None
+    mounting: str = "free"
+
+    def __post_init__(self) -> None:
+        where = f"body {shown(self.body_id)} link {shown(self.link)}"
+        store(
+            self,
+            inertia_kg_m2=frozen_array(self.inertia_kg_m2, float, (3, 3), f"{where}: inertia_kg_m2"),
+            mass_kg=as_number(
+                self.mass_kg, f"{where}: mass_kg", "give it a finite mass with changeDynamics", least=0, below=1e12
+            ),
+            volume_m3=as_number(self.volume_m3, f"{where}: volume_m3", "orient its mesh outward", least=0),
+            dynamics=frozen_values(self.dynamics, f"{where}: dynamics"),
+        )
+        if self.options is not None:
+            as_kind(self.options, ModalOptions, f"{where}: options", "give ModalOptions, or none")
+        if self.mounting not in MOUNTINGS:
+            raise RecordError(f"{where}: mounting is {shown(self.mounting)}", "use the version that wrote the log")
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """What was set otherwise between two physics steps: values that hold from a step on.
+
+    step: the number of the step before which it happened. body: index into the log's `bodies`; None: the engine.
+    values: those that are others than before; None: no longer known. Raises LogError, RecordError.
+    """
+
+    step: int
+    body: int | None
+    values: Mapping[str, float | None]
+
+    def __post_init__(self) -> None:
+        remedy = "use an unbroken contact log"
+        for name in ("step", "body"):
+            if getattr(self, name) is not None or name == "step":
+                as_whole(getattr(self, name), f"{name} of a change", remedy, least=0, error=LogError)
+        known = frozen_values({name: x for name, x in self.values.items() if x is not None}, "a change")
+        lost = {name: None for name in self.values if name not in known}
+        store(self, values=MappingProxyType(dict(sorted((dict(known) | lost).items()))))
+
+
+@dataclass(frozen=True, slots=True)
+class Simulator:
+    """What a simulator says of itself. engine: its settings at the first step; versions: of it, by name; changes: what
+    was set otherwise later, of engine and bodies, in order.
+    """
+
+    engine: Values = field(default_factory=dict)
+    versions: Mapping[str, str] = field(default_factory=dict)
+    changes: tuple[Change, ...] = ()
+
+
+def finite(values: Mapping[str, object]) -> dict[str, float]:
+    """Those values that are finite numbers."""
+    return {
+        name: float(x)
+        for name, x in values.items()
+        if isinstance(x, (int, float)) and not isinstance(x, bool) and math.isfinite(x)
+    }
