@@ -7,6 +7,7 @@ their own:
       step_dt_s (s,) f8                     length of each step
       step_gravity_m_s2 (s, 3) f8            gravity in the world
       step_body_count, step_contact_count (s,) i8   how many of the p and k rows are each step's, in order
+      pose_body (p,) i4                      whose poses these are: ascending within a step; who has gone is not there
       pose_position_m (p, 3) f8, pose_quaternion_xyzw (p, 4) f8, pose_teleported (p,) bool
       contact_<field> (k, …)
           the fields of `Contacts`: a, b i4; point_a_m, point_b_m, normal, impulse_n_s, slip_m_s,
@@ -22,7 +23,8 @@ their own:
       changes (in the header)
           in order: {"step": the step before which it happened, "body": index, or null: the engine, "values": {…}}
       of each body: dynamics, options, mounting; of all: engine, versions, residual (see `Body`, `ContactLog`)
-    format "sonic-bullet-contacts/2"        the same without changes and all that the last line names
+    format "sonic-bullet-contacts/2"        the same without pose_body (the first bodies), changes and all that the last
+          line names
     format "sonic-bullet-contacts/1"        and without events
 
 A reader checks sizes before it allocates and records check their invariants, so a cut, foreign or forged file is one
@@ -61,7 +63,7 @@ from sonic_bullet.files.reading import reading
 from sonic_bullet.records import Air, Array, Material
 from sonic_bullet.records.arrays import frozen_array
 from sonic_bullet.records.coerce import as_number, as_path
-from sonic_bullet.records.contacts import ROW_FIELDS, Contacts, Step
+from sonic_bullet.records.contacts import ROW_FIELDS, Contacts, Step, first_bodies
 from sonic_bullet.records.errors import LogError
 
 LOG_FORMATS = ("sonic-bullet-contacts/3", "sonic-bullet-contacts/2", "sonic-bullet-contacts/1")
@@ -94,6 +96,7 @@ def write_log(path: str | os.PathLike[str], log: ContactLog) -> None:
         "step_dt_s": np.array([step.dt_s for step in steps], float),
         "step_gravity_m_s2": np.reshape([step.gravity_m_s2 for step in steps], (-1, 3)).astype(float),
         "step_body_count": np.array([len(step.position_m) for step in steps], np.int64),
+        "pose_body": np.concatenate([np.zeros(0, np.int32), *(step.body for step in steps)]).astype(np.int32),
         "step_contact_count": np.array([len(step.contacts) for step in steps], np.int64),
         "pose_position_m": np.concatenate([np.zeros((0, 3)), *(step.position_m for step in steps)]),
         "pose_quaternion_xyzw": np.concatenate([np.zeros((0, 4)), *(step.quaternion_xyzw for step in steps)]),
@@ -163,6 +166,23 @@ def _unpack_log(header: LogHeader, arrays: Mapping[str, Array], path: object) ->
     )
 
 
+def _unpack_whose(arrays: Mapping[str, Array], poses: Array, path: object) -> list[Array]:
+    """Whose poses each step holds: indices of bodies, ascending; the first ones in logs that do not say."""
+    counts = np.diff(poses).tolist()
+    if "pose_body" not in arrays:
+        return [first_bodies(count) for count in counts]
+    body = take(arrays, "pose_body", np.int32, (int(poses[-1]),), path).astype(np.int64)
+    same = np.ones(len(body), bool)
+    same[poses[:-1][np.diff(poses) > 0]] = False  # the first of each step follows nobody
+    if (body < 0).any() or (np.diff(body)[same[1:]] <= 0).any():
+        raise LogError(f"{path}: the bodies of a step do not ascend from 0", REMEDY)
+    body.setflags(write=False)
+    return [
+        first_bodies(count) if count == 0 or body[stop - 1] == count - 1 else body[stop - count : stop]
+        for count, stop in zip(counts, poses[1:].tolist(), strict=True)
+    ]
+
+
 def _unpack_steps(arrays: Mapping[str, Array], path: object) -> tuple[Step, ...]:
     dt = take(arrays, "step_dt_s", float, (None,), path)
     ends = []
@@ -182,7 +202,12 @@ def _unpack_steps(arrays: Mapping[str, Array], path: object) -> tuple[Step, ...]
     )
     if k and min(rows.a.min(), rows.b.min()) < 0:
         raise LogError(f"{path}: a contact names a body below zero", REMEDY)
-    if (np.maximum(rows.a, rows.b) >= np.repeat(np.diff(poses), np.diff(contacts))).any():
+    whose = _unpack_whose(arrays, poses, path)
+    # who is in a step, counted on from step to step: one search for all rows
+    span = 1 + int(max((body[-1] for body in whose if len(body)), default=0))
+    present = np.concatenate([np.zeros(0, np.int64), *(i * span + body for i, body in enumerate(whose))])
+    at = np.repeat(np.arange(len(dt)), np.diff(contacts)) * span
+    if k and (max(rows.a.max(), rows.b.max()) >= span or not np.isin([at + rows.a, at + rows.b], present).all()):
         raise LogError(f"{path}: a contact names a body that the step does not know", REMEDY)
     # checked whole, not step by step: hours of steps are read in a moment
     position = frozen_array(position, float, (p, 3), "step: position_m")
@@ -193,7 +218,9 @@ def _unpack_steps(arrays: Mapping[str, Array], path: object) -> tuple[Step, ...]
     for wrong in dt[~((dt > 0) & (dt <= 1))][:1]:
         as_number(float(wrong), "dt_s of a physics step", remedy, above=0, most=1, error=LogError)
     return tuple(
-        Step.trusted(length, position[p0:p1], quaternion[p0:p1], teleported[p0:p1], rows.rows(k0, k1), gravity[i])
+        Step.trusted(
+            length, position[p0:p1], quaternion[p0:p1], teleported[p0:p1], rows.rows(k0, k1), gravity[i], whose[i]
+        )
         for i, (length, p0, p1, k0, k1) in enumerate(
             zip(dt.tolist(), poses[:-1], poses[1:], contacts[:-1], contacts[1:], strict=True)
         )

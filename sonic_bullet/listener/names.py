@@ -8,9 +8,8 @@ a log; a name given by hand may be given again once its bearer has gone.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 
-from sonic_bullet.listener.frames import LINK_SPAN
 from sonic_bullet.records.errors import SceneError
 
 
@@ -22,6 +21,11 @@ class Names:
         self._bearer: dict[str, int] = {}
         self._given: set[str] = set()
         self._count: dict[str, int] = {}
+
+    @property
+    def codes(self) -> Collection[int]:
+        """Those that have a name."""
+        return self._living.keys()
 
     def call(self, code: int, name: str) -> None:
         """Call a link so from now on. Raises SceneError where another living link has that name."""
@@ -48,16 +52,11 @@ class Names:
             if code in self._living:
                 del self._bearer[self._living.pop(code)]
 
-    def forget_body(self, body: int | None) -> None:
-        """The links of a body are no more; None: no link is."""
-        self.forget([code for code in self._living if body is None or code // LINK_SPAN == body])
-
-    def restart(self, codes: Iterable[int]) -> None:
-        """Begin anew with those of these links whose names were given by hand."""
-        kept = {code: self._living[code] for code in codes if self._living.get(code) in self._given}
-        self._living, self._bearer, self._given, self._count = {}, {}, set(), {}
-        for code, name in kept.items():
-            self.call(code, name)
+    def hand_over(self, codes: Iterable[int], other: Names) -> None:
+        """Call these links in another world of names as they were called by hand."""
+        for code in codes:
+            if self._living.get(code) in self._given:
+                other.call(code, self._living[code])
 
     def _unused(self, default: str) -> str:
         while True:

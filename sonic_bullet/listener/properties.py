@@ -73,11 +73,6 @@ class Properties:
         for index in indices:
             self._now.pop(index, None)
 
-    def restart(self, codes: Iterable[int]) -> None:
-        """Begin anew with these links, none of which has a record yet."""
-        self.names.restart(codes)
-        self._engine, self._now, self._changes = {}, {}, {}
-
     def first_step(self) -> None:
         """Read the engine's settings, the first step being made with them."""
         self._engine = self._now[ENGINE] = self._engine_now()

@@ -26,14 +26,14 @@ class World(ABC):
     """Whether the last `after_step` found a step: a second call without one between finds none."""
     emptied = 0
     """How often the world has lost all its bodies at once (PyBullet's resetSimulation), as far as that is seen."""
-    keeps_gone = True
-    """Whether `bodies` holds who is gone: False where nobody keeps a log, and such records may be dropped."""
+    logged = True
+    """False where nobody keeps a log: what only a log needs may be dropped, records of who is gone first of all."""
 
     @property
     @abstractmethod
     def bodies(self) -> tuple[Body, ...]:
         """All bodies ever met, in the order that Contacts.a and Contacts.b count them; the living alone where
-        `keeps_gone` is False.
+        `logged` is False.
         """
 
     @property

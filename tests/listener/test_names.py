@@ -6,7 +6,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sonic_bullet.listener.frames import encode
 from sonic_bullet.listener.names import Names
 from sonic_bullet.records.errors import SceneError
 
@@ -39,24 +38,14 @@ def test_numbers_pass_over_names_given_by_hand() -> None:
     assert names.called(3, "") == "cube 3"
 
 
-def test_anew_only_names_given_by_hand_are_left() -> None:
-    names = Names()
+def test_names_given_by_hand_are_handed_over_and_no_others() -> None:
+    names, anew = Names(), Names()
     names.call(3, "cup"), names.call(4, "gone")
     assert [names.of(code, "cube") for code in (1, 2)] == ["cube", "cube 2"]
-    names.restart([2, 3])
-    assert [names.of(code, "cube") for code in (2, 3, 1)] == ["cube", "cup", "cube 2"]
-    names.call(5, "gone")
-
-
-def test_the_names_of_a_body_go_with_it() -> None:
-    names = Names()
-    for body in (1, 2):
-        for link in (-1, 0):
-            names.of(int(encode(body, link)), "x")
-    names.forget_body(1)
-    assert [names.called(int(encode(body, link)), "") for body in (1, 2) for link in (-1, 0)] == ["", "", "x 3", "x 4"]
-    names.forget_body(None)
-    assert names.called(int(encode(2, 0)), "") == ""
+    names.hand_over([2, 3], anew)
+    assert [anew.of(code, "cube") for code in (2, 3, 1)] == ["cube", "cup", "cube 2"]
+    anew.call(5, "gone")
+    assert set(anew.codes) == {1, 2, 3, 5}
 
 
 CODES = st.integers(0, 5)

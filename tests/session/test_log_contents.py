@@ -340,7 +340,7 @@ def test_where_no_log_is_kept_changes_are_not_either(client: Any) -> None:
     floor(client)
     listener = sb.attach(client)
     sounding(listener, box(client, (0, 0, 1)))
-    listener.world.keeps_gone = False
+    listener.world.logged = False
     run(client, 2)
     client.changeDynamics(1, -1, restitution=0.2)
     client.setPhysicsEngineParameter(numSolverIterations=9)

@@ -18,32 +18,28 @@ from sonic_bullet.records.modal_options import ModalOptions
 
 
 class AddedLinks:
-    """State of that for one client, by the code of a link."""
+    """State of that for one client. told: by the code of a link, in the order in which they last were added."""
 
     def __init__(self, client_id: int) -> None:
         self._client_id = client_id
-        self._told: dict[int, tuple[Hashable, dict[str, Any]]] = {}
+        self.told: dict[int, tuple[Hashable, dict[str, Any]]] = {}
 
     def tell(self, code: int, how: dict[str, Any]) -> None:
         """A link that exists was added; how: arguments of `added_body`."""
-        self._told.pop(code, None)
-        self._told[code] = likeness(self._client_id, *decode(code)), how
+        self.told.pop(code, None)
+        self.told[code] = likeness(self._client_id, *decode(code)), how
 
     def forget(self, codes: Iterable[int]) -> None:
         """Links are gone."""
         for code in codes:
-            self._told.pop(code, None)
-
-    def of(self, body: int | None) -> list[int]:
-        """Codes of the links of a body, or of all."""
-        return [code for code in self._told if body is None or decode(code)[0] == body]
+            self.told.pop(code, None)
 
     def still_there(self, roster: Roster, *, seen: bool) -> Iterator[tuple[int, dict[str, Any]]]:
         """Code and arguments of those whom a roster holds. seen: who was removed was forgotten; else a link of the same
         code is the same only where its name and shape are.
         """
         there = set(roster.code.tolist())
-        for code, (alike, how) in self._told.items():
+        for code, (alike, how) in self.told.items():
             if code in there and (seen or alike == likeness(self._client_id, *decode(code))):
                 yield code, how
 

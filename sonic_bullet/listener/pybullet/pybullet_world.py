@@ -25,7 +25,7 @@ import numpy as np
 
 from sonic_bullet.listener.frames import LINK_SPAN, Motion, Roster, decode, encode, rows_of, same_motion, without
 from sonic_bullet.listener.known_bodies import KnownBodies, alike
-from sonic_bullet.listener.memory import Memory
+from sonic_bullet.listener.memory import Memory, make_ready
 from sonic_bullet.listener.polling import Touches, loaded
 from sonic_bullet.listener.properties import Properties
 from sonic_bullet.listener.pybullet import body_facts as facts
@@ -56,7 +56,6 @@ class PyBulletWorld(facts.AskedLinks):
         self.client_id = client_id
         self._log = SubstepLog(client_id)
         self._uninstall: Callable[[], None] | None = None
-        self.properties = Properties(partial(facts.dynamics, client_id), partial(engine, client_id))
         self._begin()
 
     def _begin(self) -> None:
@@ -65,6 +64,7 @@ class PyBulletWorld(facts.AskedLinks):
         self.stepped = False
         self._known = KnownBodies()
         self._added = AddedLinks(self.client_id)
+        self.properties = Properties(partial(facts.dynamics, self.client_id), partial(engine, self.client_id))
         self._memory = Memory()
         self._census = Census(self.client_id, self._bury, self._end)
         self._settings = settings(self.client_id)
@@ -89,7 +89,7 @@ class PyBulletWorld(facts.AskedLinks):
 
     @property
     def bodies(self) -> tuple[Body, ...]:
-        """All bodies ever met, as Contacts.a and Contacts.b count them; the living alone where not `keeps_gone`."""
+        """All bodies ever met, as Contacts.a and Contacts.b count them; the living alone where not `logged`."""
         return tuple(self._known.records.values())
 
     @property
@@ -100,9 +100,8 @@ class PyBulletWorld(facts.AskedLinks):
     @property
     def untouched(self) -> frozenset[int]:
         """Ids of the bodies that were in the world at the last step and have met nobody yet."""
-        return frozenset(body for body, _, _ in self._past.roster.bodies) - {
-            code // LINK_SPAN for code in self._known.live
-        }
+        met = {code // LINK_SPAN for code in self._known.live}
+        return frozenset(body for body, _, _ in self._past.roster.bodies) - met
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -115,6 +114,10 @@ class PyBulletWorld(facts.AskedLinks):
             return False
         self.hook(self.before_step, after)
         return True
+
+    def make_ready(self) -> None:
+        """Have the machine code that the first step would else wait for."""
+        make_ready()
 
     @property
     def has_bodies(self) -> bool:
@@ -148,18 +151,18 @@ class PyBulletWorld(facts.AskedLinks):
         facts.check_usable(self.client_id, body)
         code = int(encode(body, link))
         if self._before is not None and rows_of(self._before.roster, np.array([code]))[0] < 0:
-            raise SceneError(f"body {body} came while a step was being made", "create and add bodies between two steps")
+            raise SceneError(f"body {body} came while a step was made", "create and add bodies between two steps")
         if body in self.left_out.muted:
             self.left_out.forget(body)
             self._census.stale()
         self._census.read()
-        made_of: dict[str, Any] = {"material": material, "model": model, "options": options}
-        return self._enter(code, {**made_of, "volume_m3": volume_m3, "shapes": tuple(shapes)})
+        how = {"material": material, "model": model, "volume_m3": volume_m3, "shapes": tuple(shapes)}
+        return self._enter(code, {**how, "options": options})
 
     def _enter(self, code: int, how: dict[str, Any]) -> Body:
         """The record that begins of a link that was checked, and with it what `reset` needs. how: as `add` has it."""
         body, link = decode(code)
-        record = added_body(self.client_id, body, link, self.epoch, **how)
+        record = replace(added_body(self.client_id, body, link, self.epoch, **how), since_step=self.step_count)
         self._close([code])
         self._added.tell(code, how)
         return self._append(code, record)
@@ -168,15 +171,16 @@ class PyBulletWorld(facts.AskedLinks):
         """Begin anew with what was added, where it is still there: see `World.reset`.
 
         A client that is not hooked does not tell who was removed: a body of the same id, name and shape is the same.
-        Raises SceneError: lost connection, or called while a step is being made.
+        Raises SceneError: lost connection, or called while a step is made.
         """
         check_connected(self.client_id)
         if self._before is not None:
-            raise SceneError("reset was called while a step was being made", "call it between two steps")
-        added = self._added
+            raise SceneError("reset was called while a step was made", "call it between two steps")
+        added, before = self._added, self.properties
         self._begin()
+        self.properties.set_values = before.set_values
         there = list(added.still_there(self._past.roster, seen=self._uninstall is not None))
-        self.properties.restart([code for code, _ in there])
+        before.names.hand_over([code for code, _ in there], self.properties.names)
         for code, how in there:
             self._enter(code, how)
 
@@ -186,12 +190,10 @@ class PyBulletWorld(facts.AskedLinks):
         """
         self.epoch += 1
         self.left_out.forget(body)
-        self._close([code for code in self._known.live if body is None or code // LINK_SPAN == body])
-        self.properties.names.forget_body(body)
-        self._added.forget(self._added.of(body))
+        self._lose([code for code in self.properties.names.codes if body in (None, code // LINK_SPAN)])
         if body is None:
-            self.mark_engine_changed()
             self.emptied += 1
+            self.mark_engine_changed()
             self._log.abandon()
             self._memory.forget()
         self._past = without(self._past, body)
@@ -206,17 +208,16 @@ class PyBulletWorld(facts.AskedLinks):
         """Note that friction, mass and the like of a link may have changed: who is static is read again."""
         self._census.stale()
         index = self.index_of(body, link)
-        if index >= 0 and self.keeps_gone:
+        if index >= 0 and self.logged:
             self.properties.link_changed(int(encode(body, link)), index, self.step_count)
 
     def mark_engine_changed(self) -> None:
         """Note that settings of the engine may have changed."""
-        if self.keeps_gone:
+        if self.logged:
             self.properties.engine_changed(self.step_count)
 
     def hook(self, before: Callable[[], object], after: Callable[[], object]) -> None:
         """Call `before` and `after` round every stepSimulation of a BulletClient; `before` is, or calls, `before_step`.
-
         Raises SceneError for the pybullet module or a client id: they have no instance to hook.
         """
         self.unhook()
@@ -228,10 +229,7 @@ class PyBulletWorld(facts.AskedLinks):
             self._uninstall()
             self._uninstall = None
         self._before = None
-        if self.client is None:
-            self._log.abandon()  # its id may be another's by now
-        else:
-            self._log.close()
+        (self._log.abandon if self.client is None else self._log.close)()  # its id may be another's by now
 
     def before_step(self) -> None:
         """Read poses and twists at the start of the step. Raises SceneError (lost connection)."""
@@ -241,9 +239,8 @@ class PyBulletWorld(facts.AskedLinks):
         self._before = self._census.read()
 
     def after_step(self) -> Step:
-        """This step's record.
-
-        Call once after each stepSimulation; a second call without a step between finds no contacts.
+        """This step's record. Call once after each stepSimulation; a second call without a step between finds no
+        contacts.
 
         `stepped` tells whether there was a step. Without a hook, a missing one is known by a world in motion that
         stands where it stood, to the bit; where nothing moves at all, a second call passes for a step. Raises
@@ -309,7 +306,7 @@ class PyBulletWorld(facts.AskedLinks):
             for code in start["code"][start["met"] != 0].tolist():
                 record = self._census.described(code, self.epoch)
                 if record is not None:
-                    self._append(code, record)
+                    self._append(code, replace(record, since_step=self.step_count))
             known.enter(start)
             start["index"][start["index"] < 0] = LEFT_OUT
             row, made = memory.made(known, start, touches, past_touches, dt)
@@ -320,23 +317,11 @@ class PyBulletWorld(facts.AskedLinks):
         gone = self._known.gone(roster)
         if gone:
             self.epoch += 1
-            self._close(gone)
-            self.properties.names.forget(gone)
-            self._added.forget(gone)
+            self._lose(gone)
 
     def _end(self, bodies: Collection[int]) -> None:
         """Close the records of bodies that are left out from now on; after a reset they are listened to again."""
         self._close([code for code in self._known.live if code // LINK_SPAN in bodies])
-
-    def _close(self, codes: Collection[int]) -> None:
-        self.properties.end(self._known.live[code] for code in codes if code in self._known.live)
-        self._known.close(codes, self.step_count, keep=self.keeps_gone)
-
-    def _append(self, code: int, record: Body) -> Body:
-        """The record of a link begins, with its name and all that is known of it."""
-        record = self.properties.begin(code, self._known.count, replace(record, since_step=self.step_count))
-        self._known.append(code, record)
-        return record
 
     def _expose_impostors(self, now: Motion, dt: float) -> None:
         """Where nobody saw removals: what jumped and has another name, mass or inertia has taken over an old id."""
@@ -345,6 +330,20 @@ class PyBulletWorld(facts.AskedLinks):
             seen = None if before is None else self._census.described(code, self.epoch)
             if before is not None and seen is not None and not alike(before, seen):
                 self.epoch += 1
-                self._close([code])
-                self.properties.names.forget([code])
-                self._added.forget([code])
+                self._lose([code])
+
+    def _close(self, codes: Collection[int]) -> None:
+        """End the records of links."""
+        self.properties.end(self._known.live[code] for code in codes if code in self._known.live)
+        self._known.close(codes, self.step_count, keep=self.logged)
+
+    def _lose(self, codes: Collection[int]) -> None:
+        """Links are no more: their records end, and their names too."""
+        self._close(codes)
+        self._added.forget(codes)
+        self.properties.names.forget(codes)
+
+    def _append(self, code: int, record: Body) -> Body:
+        record = self.properties.begin(code, self._known.count, record)
+        self._known.append(code, record)
+        return record
