@@ -3,7 +3,7 @@
 The container is `container`'s npz. Scalars, names and references are JSON (`header.npy`), all arrays are entries of
 their own:
 
-    format "sonic-bullet-contacts/2"; b bodies, s steps, p = Σ bodies known at each step, k = Σ contacts of each step
+    format "sonic-bullet-contacts/3"; b bodies, s steps, p = Σ bodies known at each step, k = Σ contacts of each step
       step_dt_s (s,) f8                     length of each step
       step_gravity_m_s2 (s, 3) f8            gravity in the world
       step_body_count, step_contact_count (s,) i8   how many of the p and k rows are each step's, in order
@@ -17,9 +17,15 @@ their own:
       model<i>_freq_hz, _decay_per_s (m,) f8, _shape (v, 3, m) f4, _vertex_m (v, 3) f8, _face (f, 3) i4,
           _curvature_per_m (f,) f8
       model<i>_bend_s2_m2, _choke_s_m (m,) f8  only where its modes go with their level
+          all arrays of models: deflated, as planes (n, …) u1 of numbers of n bytes: all first bytes, all second ones, …
+      model<i>_shape i2, model<i>_shape_exponent (m,) i2
+          in place of _shape f4, where shapes are whole multiples of powers of two, as those that are solved here are
+      models (in the header)
+          what is no array of each; or its SHA-256, where it lies in the cache
       events (in the header)
           in order: {"kind": "quench", "step": the step before which it happened, "body": index, or null: all}
-    format "sonic-bullet-contacts/1"        the same without events
+    format "sonic-bullet-contacts/2"        models' arrays are not deflated, and of their own types; no SHA-256
+    format "sonic-bullet-contacts/1"        nor events
 
 A reader checks sizes before it allocates and records check their invariants, so a cut, foreign or forged file is one
 line of LogError.
@@ -36,16 +42,27 @@ import numpy as np
 
 from sonic_bullet.files.audio import check_sr
 from sonic_bullet.files.contact_log import ContactLog
-from sonic_bullet.files.container import REMEDY, read_container, take, write_container
-from sonic_bullet.files.models import ModelEntry, as_json_text, model_arrays, model_key, pack_model, unpack_model
+from sonic_bullet.files.container import REMEDY, distinct, read_container, take, write_container
+from sonic_bullet.files.models import PACKED, LoggedModel, as_json_text, pack_models, recalled_models, unpack_models
 from sonic_bullet.files.reading import reading
-from sonic_bullet.records import Air, Array, Body, Material, Microphone, ModalSum, Residual, Sensor, Vibrometer
+from sonic_bullet.records import (
+    Air,
+    Array,
+    Body,
+    Material,
+    Microphone,
+    ModalModel,
+    ModalSum,
+    Residual,
+    Sensor,
+    Vibrometer,
+)
 from sonic_bullet.records.arrays import frozen_array
 from sonic_bullet.records.coerce import as_number, as_path
 from sonic_bullet.records.contacts import ROW_FIELDS, Contacts, Event, Step
 from sonic_bullet.records.errors import LogError
 
-LOG_FORMATS = ("sonic-bullet-contacts/2", "sonic-bullet-contacts/1")
+LOG_FORMATS = ("sonic-bullet-contacts/3", "sonic-bullet-contacts/2", "sonic-bullet-contacts/1")
 """What is read; the first is what is written."""
 RESIDUAL_ARRAYS: dict[str, tuple[int | None, ...]] = {
     **{f"{part}_{name}": (None,) for part in ("mode", "line") for name in ("freq_hz", "decay_per_s", "amplitude")},
@@ -110,15 +127,18 @@ class _LogHeader(msgspec.Struct):
     air_sound_speed_m_s: float
     sensors: list[_Microphone | _Vibrometer | _ModalSum]
     materials: list[_Material]
-    models: list[ModelEntry]
+    models: list[LoggedModel]
     bodies: list[_Body]
     events: list[Event] = []
 
 
-def write_log(path: str | os.PathLike[str], log: ContactLog) -> None:
-    """Write a contact log, whole or not at all; equal logs give equal bytes. Raises FileError."""
-    materials, material_of = _distinct([body.material for body in log.bodies], _material_key)
-    models, model_of = _distinct([body.model for body in log.bodies], model_key)
+def write_log(path: str | os.PathLike[str], log: ContactLog, models: object = "included") -> None:
+    """Write a contact log, whole or not at all; equal logs give equal bytes.
+
+    models: "included", or "reference": they are left to the cache, and the log names them. Raises FileError.
+    """
+    materials, material_of = distinct([body.material for body in log.bodies], _material_key)
+    entries, model_of, model_arrays = pack_models([body.model for body in log.bodies], models)
     header = _LogHeader(
         format=LOG_FORMATS[0],
         sr=int(log.sr),
@@ -127,7 +147,7 @@ def write_log(path: str | os.PathLike[str], log: ContactLog) -> None:
         air_sound_speed_m_s=float(log.air.sound_speed_m_s),
         sensors=[_pack_sensor(sensor) for sensor in log.sensors],
         materials=[_pack_material(material) for material in materials],
-        models=[pack_model(model) for model in models],
+        models=entries,
         bodies=[_pack_body(body, m, n) for body, m, n in zip(log.bodies, material_of, model_of, strict=True)],
         events=list(log.events),
     )
@@ -148,33 +168,25 @@ def write_log(path: str | os.PathLike[str], log: ContactLog) -> None:
         ),
     }
     arrays |= {f"contact_{name}": getattr(rows, name) for name in ROW_FIELDS}
-    for i, model in enumerate(models):
-        arrays |= model_arrays(model, i)
+    arrays |= model_arrays
     for i, material in enumerate(materials):
         if material.residual is not None:
             arrays |= {f"residual{i}_{name}": getattr(material.residual, name) for name in RESIDUAL_ARRAYS}
-    write_container(path, header, arrays)
+    write_container(path, header, arrays, PACKED)
 
 
 def read_log(path: str | os.PathLike[str]) -> ContactLog:
     """The contact log that `write_log` wrote.
 
-    Raises FileError (no such file) and LogError (cut, foreign, forged, inconsistent).
+    Raises FileError (no such file) and LogError (cut, foreign, forged, inconsistent, or of models that the cache has
+    not).
     """
     path = as_path(path, "path", "name a contact log (.npz)")
-    header, arrays = read_container(path, _LogHeader, LOG_FORMATS, "contact log")
+    header, arrays = read_container(path, _LogHeader, LOG_FORMATS, "contact log", PACKED)
+    kept = recalled_models(header.models, [(body.model, body.name) for body in header.bodies], path)
     with reading(path, "contact log", LogError, REMEDY):
         check_sr(header.sr)
-        return _unpack_log(header, arrays, path)
-
-
-def _distinct(things: list[Any], key: Any) -> tuple[list[Any], list[int | None]]:
-    """The different things by content, in order of appearance, and the index of each; None stays None."""
-    kept: dict[bytes, int] = {}
-    by_identity = {id(thing): key(thing) for thing in things if thing is not None}
-    index = [None if thing is None else kept.setdefault(by_identity[id(thing)], len(kept)) for thing in things]
-    firsts = [next(thing for thing, i in zip(things, index, strict=True) if i == number) for number in range(len(kept))]
-    return firsts, index
+        return _unpack_log(header, arrays, kept, path)
 
 
 def _material_key(material: Material) -> bytes:
@@ -253,7 +265,9 @@ def _unpack_sensor(sensor: _Microphone | _Vibrometer | _ModalSum) -> Sensor:
     return ModalSum(sensor.scale)
 
 
-def _unpack_log(header: _LogHeader, arrays: Mapping[str, Array], path: object) -> ContactLog:
+def _unpack_log(
+    header: _LogHeader, arrays: Mapping[str, Array], kept: Mapping[int, ModalModel], path: object
+) -> ContactLog:
     b, n = len(header.bodies), len(header.materials)
     inertia = take(arrays, "body_inertia_kg_m2", float, (b, 3, 3), path)
     curvature = take(arrays, "body_curvature_per_m", float, (b,), path)
@@ -265,7 +279,7 @@ def _unpack_log(header: _LogHeader, arrays: Mapping[str, Array], path: object) -
         )
         for i, x in enumerate(header.materials)
     ]
-    models = [unpack_model(x, arrays, i, path) for i, x in enumerate(header.models)]
+    models = unpack_models(header.models, arrays, kept, path)
     bodies = [
         Body(
             **{
