@@ -45,10 +45,9 @@ class Kind:
 def kinds() -> dict[str, Kind]:
     """What is written, by kind."""
     from sonic_bullet import presets
-    from sonic_bullet.files import read_audio, read_log, write_audio, write_log
+    from sonic_bullet.files import cache, read_audio, read_log, write_audio, write_log
     from sonic_bullet.files.contact_log import ContactLog
     from sonic_bullet.machine import kept_code
-    from sonic_bullet.modal import cache
     from sonic_bullet.plots.scene_plot import render_picture
     from sonic_bullet.records import Microphone
     from sonic_bullet.records.contacts import Contacts, Step

@@ -281,7 +281,7 @@ def _cache_entries() -> containers.Entries:
 
 def _sealed(entries: containers.Entries) -> containers.Entries:
     """A cache entry whose digest is right again, so that what is behind it is reached."""
-    from sonic_bullet.modal.cache import _digest
+    from sonic_bullet.files.cache import _digest
 
     kept = dict(entries)
     try:

@@ -25,7 +25,7 @@ import numpy as np
 from sonic_bullet import estimator
 from sonic_bullet.estimator.lines.extraction import extract
 from sonic_bullet.estimator.lines.line_values import Features
-from sonic_bullet.modal.cache import code_digest, key
+from sonic_bullet.modal.keys import code_digest, key
 
 Array = np.ndarray[Any, Any]
 READINGS = 3

@@ -4,6 +4,7 @@
     modes MESH                -> ModalModel   -> table, JSON, npz
     materials, doctor SCENE   -> table, JSON
     case FOLDER               -> case.json, and whether it can be read
+    cache                     -> table, JSON
 
 Exit 0: done. 2: one line on stderr says what is wrong and how to mend it, and no file stands under its final name
 half-written. 130 (Ctrl-C), 143 (terminated): what was rendered so far is closed as a valid file and named. With --json
@@ -17,6 +18,7 @@ from typing import Any
 
 import click
 
+from sonic_bullet.cli.cache_command import cache
 from sonic_bullet.cli.console import run_and_exit
 from sonic_bullet.cli.examples import (
     CASE_EPILOG,
@@ -40,6 +42,9 @@ def cli() -> None:
     """PyBullet scenes that sound: impacts, rolling and sliding from physics alone, in pascals."""
 
 
+cli.add_command(cache)
+
+
 @cli.command(epilog=RENDER_EPILOG)
 @click.argument("scene", metavar="SCENE.py|LOG.npz")
 @click.option(
@@ -60,6 +65,11 @@ def cli() -> None:
 )
 @click.option(
     "--contacts", metavar="NAME.npz", help="Also write the contact log, which renders again without PyBullet."
+)
+@click.option(
+    "--models",
+    type=click.Choice(["included", "reference"]),
+    help="Where that log's modal models are: in it, or in the cache, which makes it small. [default: included]",
 )
 @click.option("--picture", metavar="NAME.png", help="Also draw pressure, spectrogram and events.")
 @json_option

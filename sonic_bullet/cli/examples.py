@@ -5,6 +5,7 @@ Examples:
   sonic-bullet render scenes/tabletop.py -o tabletop.wav --picture tabletop.png
   sonic-bullet render my_sim.py -o out.flac --material wood --peak-dbfs -1
   sonic-bullet render scenes/drop.py -o out.wav --contacts drop.npz --json
+  sonic-bullet render scenes/drop.py -o out.wav --contacts small.npz --models reference
   sonic-bullet render drop.npz -o again.wav      (the same bits, without PyBullet)
   sonic-bullet render drop.npz -o stereo.wav --microphone 0,-1,0.5 --microphone 0,1,0.5"""
 
@@ -49,6 +50,14 @@ Examples:
   sonic-bullet case new my_case --mesh bar.obj --recordings taps/*.wav --material steel --sensor pressure
   sonic-bullet case check my_case
   sonic-bullet fit my_case -o preset.json"""
+
+CACHE_EPILOG = """\b
+Examples:
+  sonic-bullet cache
+  sonic-bullet cache --limit 500MB
+  sonic-bullet cache --clear
+Another process may run meanwhile: it computes anew what it misses. SONIC_BULLET_CACHE_LIMIT bounds what is computed in
+every run (2GB, where it is not set)."""
 
 GROUP_EPILOG = """\b
 Examples:

@@ -38,6 +38,7 @@ def run_render(
     seconds: float | None,
     sr: float | None,
     contacts: str | None,
+    models: str | None,
     picture: str | None,
     json_to: str | None,
     peak_dbfs: float | None,
@@ -53,6 +54,8 @@ def run_render(
     """
     rate = None if sr is None else check_sr(sr)
     _check_request(scene, seconds, peak_dbfs, lufs, material)
+    if models is not None and contacts is None:
+        raise FileError("--models says where a log's models are, and no log is asked for", "give --contacts too")
     to, contacts, picture, json_to = _check_places(output, contacts, picture, json_to)
     with clean_stdout(json_to) as say:
         try:
@@ -62,7 +65,7 @@ def run_render(
         except (SonicBulletError, KeyboardInterrupt) as error:
             raise _with_partial(error, to, output, peak_dbfs, lufs) from error
         if contacts is not None:
-            write_log(contacts, result.log)
+            write_log(contacts, result.log, models or "included")
         report = replace(_written(to, result, peak_dbfs, lufs), path=output)
         if picture is not None:
             from sonic_bullet.plots.scene_plot import render_picture

@@ -30,8 +30,8 @@ from sonic_bullet.effects.protocol import Effect
 from sonic_bullet.estimator.fit.case_fit import CaseFit
 from sonic_bullet.estimator.fit.recorded import check_meshes, gather, onset_sample, until_it_breaks_off
 from sonic_bullet.files import channel_of, read_audio
+from sonic_bullet.files.cache import Place
 from sonic_bullet.files.cases import Case, CaseRecording, read_case
-from sonic_bullet.modal.cache import Place
 from sonic_bullet.parallel import one_thread
 from sonic_bullet.records import Array
 

@@ -172,8 +172,12 @@ class ContactLog:
             changes=tuple(change for change in self.changes if change.step <= count),
         )
 
-    def save(self, path: object) -> None:
-        """Write the log as npz (numpy arrays and JSON, no pickle), whole or not at all. Raises FileError."""
+    def save(self, path: object, models: object = "included") -> None:
+        """Write the log as npz (numpy arrays and JSON, no pickle), whole or not at all.
+
+        models: "included", or "reference": a smaller file that names them, and `read_log` finds them in the cache.
+        Raises FileError.
+        """
         from sonic_bullet.files.logs import write_log
 
-        write_log(as_path(path, "path", "name a file, such as contacts.npz"), self)
+        write_log(as_path(path, "path", "name a file, such as contacts.npz"), self, models)

@@ -1,12 +1,13 @@
-"""npz without its holes: arrays and one JSON entry in an uncompressed zip, opened only after every claim has been
-checked.
+"""npz without its holes: arrays and one JSON entry in a zip, opened only after every claim has been checked.
 
     header.npy  (n,) uint8: UTF-8 JSON, first key "format"
     NAME.npy    one array each, little-endian bool, integer or float
 
-Entries are stored, not deflated: floats hardly shrink, and no entry can then be larger than the file it lies in (no zip
-bombs). An npy header's shape is compared with the entry's true length before anything is allocated. The entries fill
-the file, each once and as the directory says, so that no part of it can hide. ``numpy.load(path)`` reads the file too.
+Entries are stored, but for those whose names begin as the caller says: they are deflated. All entries together unpack
+to at most `UNPACKED` times the file, else it is refused before anything is unpacked (no zip bombs), and an entry
+unpacks to as many bytes as it claims, no more. An npy header's shape is compared with the entry's true length before
+anything is allocated. The entries fill the file, each once and as the directory says, so that no part of it can hide.
+``numpy.load(path)`` reads the file too.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import re
 import stat
 import struct
 import zipfile
+import zlib
 from collections.abc import Iterator, Mapping
 from typing import Any, BinaryIO, TypeVar
 
@@ -32,6 +34,7 @@ HEADER = "header"
 REMEDY = "use the file as sonic-bullet wrote it, or make it again"
 Header = TypeVar("Header", bound=msgspec.Struct)
 
+UNPACKED = 64  # times the file's size; models deflate to a third, of a flat plate to a tenth
 LOCAL = struct.Struct("<4s5H3I2H")  # an entry's own header [PKWARE APPNOTE 6.3.10, 4.3.7]
 EXTRA = struct.Struct("<2H2Q")  # its zip64 field: id, length, size, packed size [4.5.3]
 END = struct.Struct("<4s6xH8xH")  # end of the directory: magic, entries in all, length of the comment [4.3.16]
@@ -46,23 +49,49 @@ class _Format(msgspec.Struct):
     format: str
 
 
-def write_container(path: str | os.PathLike[str], header: msgspec.Struct, arrays: Mapping[str, Array]) -> None:
-    """Write header and arrays, whole or not at all; equal input gives equal bytes. Raises FileError."""
+def write_container(
+    path: str | os.PathLike[str], header: msgspec.Struct, arrays: Mapping[str, Array], packed: str | None = None
+) -> None:
+    """Write header and arrays, whole or not at all; equal input gives equal bytes. packed: what the names of entries
+    begin with that are deflated, None: none is. Raises FileError.
+    """
     entries = {HEADER: np.frombuffer(msgspec.json.encode(header), np.uint8), **arrays}
-    with replacing(path) as file, zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
+    with replacing(path) as file:
+        if _written(file, entries, packed) > UNPACKED * file.tell():  # nothing but zeros: no reader would take it
+            file.seek(0)
+            file.truncate()
+            _written(file, entries, None)
+
+
+def _written(file: BinaryIO, entries: Mapping[str, Array], packed: str | None) -> int:
+    """Write all entries. Returns how many bytes they are when they are unpacked."""
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
         for name, array in entries.items():
-            with archive.open(zipfile.ZipInfo(f"{name}.npy"), "w", force_zip64=True) as entry:
+            info = zipfile.ZipInfo(f"{name}.npy")
+            if _is_packed(name, packed):
+                info.compress_type = zipfile.ZIP_DEFLATED
+            with archive.open(info, "w", force_zip64=True) as entry:
                 np.lib.format.write_array(entry, np.ascontiguousarray(array), version=(1, 0), allow_pickle=False)
+        return sum(info.file_size for info in archive.infolist())
+
+
+def _is_packed(name: str, packed: str | None) -> bool:
+    return packed is not None and name.startswith(packed)
 
 
 def read_container(
-    path: str | os.PathLike[str], kind: type[Header], form: str | tuple[str, ...], what: str
+    path: str | os.PathLike[str],
+    kind: type[Header],
+    form: str | tuple[str, ...],
+    what: str,
+    packed: str | None = None,
 ) -> tuple[Header, dict[str, Array]]:
     """The header as ``kind`` and all arrays, by name, read-only.
 
     form: the format id asked for, or several that will do, the newest first; what: the thing, in words, for messages
-    ("contact log"). Raises FileError where there is no readable file, LogError where it is cut, foreign, compressed,
-    pickled, holds an entry twice or beside its directory, or lies about a size.
+    ("contact log"); packed: what the names of entries begin with that may be deflated. Raises FileError where there is
+    no readable file, LogError where it is cut, foreign, pickled, holds another compressed entry, one twice or beside
+    its directory, or lies about a size.
     """
     with reading(path, what, LogError, REMEDY):
         status = os.stat(path)
@@ -70,14 +99,14 @@ def read_container(
             raise FileError(f"cannot read {path}: it is not a regular file", f"name a {what}")
         size = status.st_size
         with open(path, "rb") as file, zipfile.ZipFile(file) as archive:
-            if sum(info.file_size for info in archive.infolist()) > size:
+            if sum(info.file_size for info in archive.infolist()) > (1 if packed is None else UNPACKED) * size:
                 raise LogError(f"{path} claims more bytes than it has", REMEDY)
             arrays: dict[str, Array] = {}
-            for info in _entries(archive, file, size):
+            for info, start in _entries(archive, file, size, packed):
                 name = _entry_name(info)
                 if name in arrays:
                     raise LogError(f"entry '{info.filename}' is there twice", REMEDY)
-                arrays[name] = _array(archive.read(info), f"entry '{info.filename}'", size)
+                arrays[name] = _array(_unpacked(file, info, start), f"entry '{info.filename}'", UNPACKED * size)
         if HEADER not in arrays:
             raise LogError(f"{path} is no {what}: it has no header", REMEDY)
         text = arrays.pop(HEADER).tobytes()
@@ -105,45 +134,74 @@ def take(arrays: Mapping[str, Array], name: str, dtype: Any, shape: tuple[int | 
     return array
 
 
-def _entries(archive: zipfile.ZipFile, file: BinaryIO, file_bytes: int) -> Iterator[zipfile.ZipInfo]:
-    """The entries in the file's order, once it is known that they fill it: from its first byte to the directory, and
-    that to its end.
+def distinct(things: list[Any], key: Any) -> tuple[list[Any], list[int | None]]:
+    """The different things by content, in order of appearance, and the index of each; None stays None."""
+    kept: dict[Any, int] = {}
+    by_identity = {id(thing): key(thing) for thing in things if thing is not None}
+    index = [None if thing is None else kept.setdefault(by_identity[id(thing)], len(kept)) for thing in things]
+    firsts = [next(thing for thing, i in zip(things, index, strict=True) if i == number) for number in range(len(kept))]
+    return firsts, index
+
+
+def _entries(
+    archive: zipfile.ZipFile, file: BinaryIO, file_bytes: int, packed: str | None
+) -> Iterator[tuple[zipfile.ZipInfo, int]]:
+    """The entries in the file's order and where the bytes of each begin, once it is known that they fill it: from its
+    first byte to the directory, and that to its end.
 
     So nothing lies where the directory does not tell of it, and each entry is what its own local header says it is.
     Raises LogError.
     """
     infos = sorted(archive.infolist(), key=lambda info: info.header_offset)
-    at = 0
+    at, starts = 0, []
     for info in infos:
-        if info.compress_type != zipfile.ZIP_STORED:
+        stored = info.compress_type == zipfile.ZIP_STORED
+        if not stored and not (info.compress_type == zipfile.ZIP_DEFLATED and _is_packed(info.filename, packed)):
             raise LogError(f"entry '{info.filename}' is compressed, which this format never is", REMEDY)
-        if info.file_size != info.compress_size or info.file_size > file_bytes:
+        if (stored and info.file_size != info.compress_size) or info.compress_size > file_bytes:
             raise LogError(f"entry '{info.filename}' claims {info.file_size} bytes in a file of {file_bytes}", REMEDY)
         file.seek(at)
         head = file.read(LOCAL.size)
         if info.header_offset != at or len(head) < LOCAL.size:
             raise LogError("its directory does not tell of all that lies in it", REMEDY)
-        magic, _, flags, method, _, _, crc, packed, size, name_bytes, extra_bytes = LOCAL.unpack(head)
+        magic, _, flags, method, _, _, crc, packed_size, size, name_bytes, extra_bytes = LOCAL.unpack(head)
         name, extra = file.read(name_bytes), file.read(extra_bytes)
-        if packed == size == ZIP64 and len(extra) == EXTRA.size:
-            *_, size, packed = EXTRA.unpack(extra)
-        said = (magic, flags & ~UTF8, method, crc, packed, size, name)
+        if packed_size == size == ZIP64 and len(extra) == EXTRA.size:
+            *_, size, packed_size = EXTRA.unpack(extra)
+        said = (magic, flags & ~UTF8, method, crc, packed_size, size, name)
         if said != (
             b"PK\x03\x04",
             0,
-            zipfile.ZIP_STORED,
+            info.compress_type,
             info.CRC,
-            info.file_size,
+            info.compress_size,
             info.file_size,
             info.filename.encode(),
         ):
             raise LogError(f"entry '{info.filename}' is another in the directory", REMEDY)
-        at += LOCAL.size + name_bytes + extra_bytes + info.file_size
+        starts.append(at + LOCAL.size + name_bytes + extra_bytes)
+        at = starts[-1] + info.compress_size
     file.seek(max(file_bytes - END.size, 0))
     magic, count, comment_bytes = END.unpack(file.read(END.size))
     if at != archive.start_dir or magic != b"PK\x05\x06" or comment_bytes or count != min(len(infos), 0xFFFF):
         raise LogError("its directory does not tell of all that lies in it", REMEDY)
-    yield from infos
+    yield from zip(infos, starts, strict=True)
+
+
+def _unpacked(file: BinaryIO, info: zipfile.ZipInfo, start: int) -> bytes:
+    """The bytes of an entry, as many as it claims, whose checksum is right. Raises LogError."""
+    file.seek(start)
+    raw = file.read(info.compress_size)
+    whole = True
+    if info.compress_type == zipfile.ZIP_DEFLATED:
+        stream = zlib.decompressobj(-zlib.MAX_WBITS)
+        raw = stream.decompress(raw, info.file_size + 1)  # one more than is claimed is enough to know
+        whole = stream.eof and not stream.unused_data
+    if len(raw) != info.file_size or not whole:
+        raise LogError(f"entry '{info.filename}' is not as long as it claims", REMEDY)
+    if zlib.crc32(raw) != info.CRC:
+        raise LogError(f"entry '{info.filename}' is damaged", REMEDY)
+    return raw
 
 
 def _entry_name(info: zipfile.ZipInfo) -> str:

@@ -12,7 +12,7 @@ import msgspec
 import numpy as np
 
 from sonic_bullet.files.container import REMEDY, take
-from sonic_bullet.files.models import ModelEntry, as_json_text
+from sonic_bullet.files.models import LoggedModel, as_json_text
 from sonic_bullet.records import Array, Body, Material, Microphone, ModalSum, Residual, Sensor, Vibrometer
 from sonic_bullet.records.contacts import Event
 from sonic_bullet.records.errors import LogError
@@ -93,22 +93,13 @@ class LogHeader(msgspec.Struct):
     air_sound_speed_m_s: float
     sensors: list[_Microphone | _Vibrometer | _ModalSum]
     materials: list[_Material]
-    models: list[ModelEntry]
+    models: list[LoggedModel]
     bodies: list[_Body]
     events: list[Event] = []
     engine: dict[str, float] = {}
     versions: dict[str, str] = {}
     changes: list[_Change] = []
     residual: bool = True
-
-
-def distinct(things: list[Any], key: Any) -> tuple[list[Any], list[int | None]]:
-    """The different things by content, in order of appearance, and the index of each; None stays None."""
-    kept: dict[bytes, int] = {}
-    by_identity = {id(thing): key(thing) for thing in things if thing is not None}
-    index = [None if thing is None else kept.setdefault(by_identity[id(thing)], len(kept)) for thing in things]
-    firsts = [next(thing for thing, i in zip(things, index, strict=True) if i == number) for number in range(len(kept))]
-    return firsts, index
 
 
 def material_key(material: Material) -> bytes:

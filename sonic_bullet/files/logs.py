@@ -18,13 +18,18 @@ their own:
       model<i>_freq_hz, _decay_per_s (m,) f8, _shape (v, 3, m) f4, _vertex_m (v, 3) f8, _face (f, 3) i4,
           _curvature_per_m (f,) f8
       model<i>_bend_s2_m2, _choke_s_m (m,) f8  only where its modes go with their level
+          all arrays of models: deflated, as planes (n, …) u1 of numbers of n bytes: all first bytes, all second ones, …
+      model<i>_shape i2, model<i>_shape_exponent (m,) i2
+          in place of _shape f4, where shapes are whole multiples of powers of two, as those that are solved here are
+      models (in the header)
+          what is no array of each; or its SHA-256, where it lies in the cache
       events (in the header)
           in order: {"kind": "quench", "step": the step before which it happened, "body": index, or null: all}
       changes (in the header)
           in order: {"step": the step before which it happened, "body": index, or null: the engine, "values": {…}}
       of each body: dynamics, options, mounting; of all: engine, versions, residual (see `Body`, `ContactLog`)
     format "sonic-bullet-contacts/2"        the same without pose_body (the first bodies), changes and all that the last
-          line names
+          line names; models' arrays are not deflated, and of their own types; no SHA-256
     format "sonic-bullet-contacts/1"        and without events
 
 A reader checks sizes before it allocates and records check their invariants, so a cut, foreign or forged file is one
@@ -41,11 +46,10 @@ import numpy as np
 
 from sonic_bullet.files.audio import check_sr
 from sonic_bullet.files.contact_log import ContactLog
-from sonic_bullet.files.container import REMEDY, read_container, take, write_container
+from sonic_bullet.files.container import REMEDY, distinct, read_container, take, write_container
 from sonic_bullet.files.log_header import (
     RESIDUAL_ARRAYS,
     LogHeader,
-    distinct,
     material_key,
     pack_body,
     pack_change,
@@ -58,9 +62,9 @@ from sonic_bullet.files.log_header import (
     unpack_residual,
     unpack_sensor,
 )  # fmt: skip
-from sonic_bullet.files.models import as_json_text, model_arrays, model_key, pack_model, unpack_model
+from sonic_bullet.files.models import PACKED, as_json_text, pack_models, recalled_models, unpack_models
 from sonic_bullet.files.reading import reading
-from sonic_bullet.records import Air, Array, Material
+from sonic_bullet.records import Air, Array, Material, ModalModel
 from sonic_bullet.records.arrays import frozen_array
 from sonic_bullet.records.coerce import as_number, as_path
 from sonic_bullet.records.contacts import ROW_FIELDS, Contacts, Step, first_bodies
@@ -70,10 +74,13 @@ LOG_FORMATS = ("sonic-bullet-contacts/3", "sonic-bullet-contacts/2", "sonic-bull
 """What is read; the first is what is written."""
 
 
-def write_log(path: str | os.PathLike[str], log: ContactLog) -> None:
-    """Write a contact log, whole or not at all; equal logs give equal bytes. Raises FileError."""
+def write_log(path: str | os.PathLike[str], log: ContactLog, models: object = "included") -> None:
+    """Write a contact log, whole or not at all; equal logs give equal bytes.
+
+    models: "included", or "reference": they are left to the cache, and the log names them. Raises FileError.
+    """
     materials, material_of = distinct([body.material for body in log.bodies], material_key)
-    models, model_of = distinct([body.model for body in log.bodies], model_key)
+    entries, model_of, model_arrays = pack_models([body.model for body in log.bodies], models)
     header = LogHeader(
         format=LOG_FORMATS[0],
         sr=int(log.sr),
@@ -82,7 +89,7 @@ def write_log(path: str | os.PathLike[str], log: ContactLog) -> None:
         air_sound_speed_m_s=float(log.air.sound_speed_m_s),
         sensors=[pack_sensor(sensor) for sensor in log.sensors],
         materials=[pack_material(material) for material in materials],
-        models=[pack_model(model) for model in models],
+        models=entries,
         bodies=[pack_body(body, m, n) for body, m, n in zip(log.bodies, material_of, model_of, strict=True)],
         events=list(log.events),
         engine=pack_values(log.engine),
@@ -108,27 +115,30 @@ def write_log(path: str | os.PathLike[str], log: ContactLog) -> None:
         ),
     }
     arrays |= {f"contact_{name}": getattr(rows, name) for name in ROW_FIELDS}
-    for i, model in enumerate(models):
-        arrays |= model_arrays(model, i)
+    arrays |= model_arrays
     for i, material in enumerate(materials):
         if material.residual is not None:
             arrays |= {f"residual{i}_{name}": getattr(material.residual, name) for name in RESIDUAL_ARRAYS}
-    write_container(path, header, arrays)
+    write_container(path, header, arrays, PACKED)
 
 
 def read_log(path: str | os.PathLike[str]) -> ContactLog:
     """The contact log that `write_log` wrote.
 
-    Raises FileError (no such file) and LogError (cut, foreign, forged, inconsistent).
+    Raises FileError (no such file) and LogError (cut, foreign, forged, inconsistent, or of models that the cache has
+    not).
     """
     path = as_path(path, "path", "name a contact log (.npz)")
-    header, arrays = read_container(path, LogHeader, LOG_FORMATS, "contact log")
+    header, arrays = read_container(path, LogHeader, LOG_FORMATS, "contact log", PACKED)
+    kept = recalled_models(header.models, [(body.model, body.name) for body in header.bodies], path)
     with reading(path, "contact log", LogError, REMEDY):
         check_sr(header.sr)
-        return _unpack_log(header, arrays, path)
+        return _unpack_log(header, arrays, kept, path)
 
 
-def _unpack_log(header: LogHeader, arrays: Mapping[str, Array], path: object) -> ContactLog:
+def _unpack_log(
+    header: LogHeader, arrays: Mapping[str, Array], kept: Mapping[int, ModalModel], path: object
+) -> ContactLog:
     b, n = len(header.bodies), len(header.materials)
     inertia = take(arrays, "body_inertia_kg_m2", float, (b, 3, 3), path)
     curvature = take(arrays, "body_curvature_per_m", float, (b,), path)
@@ -140,7 +150,7 @@ def _unpack_log(header: LogHeader, arrays: Mapping[str, Array], path: object) ->
         )
         for i, x in enumerate(header.materials)
     ]
-    models = [unpack_model(x, arrays, i, path) for i, x in enumerate(header.models)]
+    models = unpack_models(header.models, arrays, kept, path)
     bodies = [
         unpack_body(
             x,

@@ -1,23 +1,42 @@
-"""Modal models on disk, alone or inside a contact log: every number bit for bit, no pickle.
+"""Modal models on disk, alone, inside a contact log or in the cache beside it: every number bit for bit, no pickle.
 
-format "sonic-bullet-model/1"           one model: model0_<array> as `logs` describes them, in `container`'s npz
+format "sonic-bullet-model/2"           one model: model0_<array> as `logs` describes them, in `container`'s npz
+format "sonic-bullet-model/1"           its arrays are not deflated, and of their own types
+
+    array (…) of n bytes each -> planes (n, …) u1: all first bytes, all second ones … -> deflated
+    shape (v, 3, m) f4 = q·2^e -> q i2 in planes, e (m,) i2                   else, as it is, in planes
+        [`records.mode_shapes`]
+
+Bytes of one kind side by side deflate to less. A model by reference is one file in the cache, model-<sha256>.npz.
 """
 
 from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any
 
 import msgspec
 import numpy as np
 
-from sonic_bullet.files.container import REMEDY, read_container, take, write_container
+from sonic_bullet.files import cache
+from sonic_bullet.files.atomic import cannot
+from sonic_bullet.files.container import REMEDY, distinct, read_container, take, write_container
 from sonic_bullet.files.reading import reading
+from sonic_bullet.machine.kept_files import LIMIT, touch
 from sonic_bullet.records import Array, ModalModel
-from sonic_bullet.records.errors import LogError
+from sonic_bullet.records.coerce import nearest, shown
+from sonic_bullet.records.errors import FileError, LogError, excerpt
+from sonic_bullet.records.mode_shapes import from_multiples, whole_multiples
 
-MODEL_FORMAT = "sonic-bullet-model/1"
+MODEL_FORMATS = ("sonic-bullet-model/2", "sonic-bullet-model/1")
+"""What is read; the first is what is written."""
+MODELS = ("included", "reference")
+"""Where a log's models are: in it, or in the cache."""
+PACKED = "model"
+"""What the names of arrays begin with that may be deflated."""
 MODEL_ARRAYS: dict[str, tuple[type, tuple[int | None, ...]]] = {
     "freq_hz": (float, (None,)),
     "decay_per_s": (float, (None,)),
@@ -28,6 +47,10 @@ MODEL_ARRAYS: dict[str, tuple[type, tuple[int | None, ...]]] = {
 }
 BENT_ARRAYS = {"bend_s2_m2": "bend_s2_m2", "choke_s_m": "damping_growth_s_m"}
 """Array in the file -> field, of models whose modes go with their level; others have none."""
+
+
+ModelHash = Annotated[str, msgspec.Meta(pattern=r"\A[0-9a-f]{64}\Z")]
+"""What the header says of a model that lies in the cache."""
 
 
 class ModelEntry(msgspec.Struct, omit_defaults=True):
@@ -41,6 +64,9 @@ class ModelEntry(msgspec.Struct, omit_defaults=True):
     includes_radiation: bool = False
 
 
+LoggedModel = ModelEntry | ModelHash
+
+
 class _ModelHeader(msgspec.Struct):
     format: str
     model: ModelEntry
@@ -48,7 +74,7 @@ class _ModelHeader(msgspec.Struct):
 
 def write_model(path: str | os.PathLike[str], model: ModalModel) -> None:
     """Write one modal model, whole or not at all. Raises FileError."""
-    write_container(path, _ModelHeader(MODEL_FORMAT, pack_model(model)), model_arrays(model, 0))
+    write_container(path, _ModelHeader(MODEL_FORMATS[0], _pack_model(model)), _packed_arrays(model, 0), PACKED)
 
 
 def read_model(path: str | os.PathLike[str]) -> ModalModel:
@@ -56,20 +82,114 @@ def read_model(path: str | os.PathLike[str]) -> ModalModel:
 
     Raises FileError (no such file) and LogError (cut, foreign, forged, inconsistent).
     """
-    header, arrays = read_container(path, _ModelHeader, MODEL_FORMAT, "modal model")
+    header, arrays = read_container(path, _ModelHeader, MODEL_FORMATS, "modal model", PACKED)
     with reading(path, "modal model", LogError, REMEDY):
-        return unpack_model(header.model, arrays, 0, path)
+        return _unpack_model(header.model, arrays, 0, path)
 
 
-def model_key(model: ModalModel) -> bytes:
-    """Digest of a model's content: equal models are stored once."""
-    digest = hashlib.sha256(msgspec.json.encode(pack_model(model)))
-    for name, array in model_arrays(model, 0).items():
-        digest.update(f"{name} {array.shape}".encode() + array.tobytes())
-    return digest.digest()
+def pack_models(
+    models: Sequence[ModalModel | None], where: object
+) -> tuple[list[LoggedModel], list[int | None], dict[str, Array]]:
+    """What a log's header says of its bodies' models, each once, the number of each body's, and their arrays by their
+    names in the file.
+
+    where: one of `MODELS`; by reference they are kept in the cache. Raises FileError.
+    """
+    if not isinstance(where, str) or where not in MODELS:
+        raise FileError(f"models is {shown(where)}", nearest(str(where), MODELS))
+    different, number = distinct(list(models), model_key)
+    if where == "reference":
+        return [*_keep_models(different)], number, {}
+    arrays: dict[str, Array] = {}
+    for i, model in enumerate(different):
+        arrays |= _packed_arrays(model, i)
+    return [_pack_model(model) for model in different], number, arrays
 
 
-def pack_model(x: ModalModel) -> ModelEntry:
+def recalled_models(
+    entries: Sequence[LoggedModel], users: Sequence[tuple[int | None, str]], path: object
+) -> dict[int, ModalModel]:
+    """The models, by their numbers, that the log ``path`` left to the cache. users: number and name of each body's
+    model.
+
+    Raises LogError where the cache has not all of them.
+    """
+    found = {i: _kept_model(entry) for i, entry in enumerate(entries) if isinstance(entry, str)}
+    models = {i: model for i, model in found.items() if model is not None}
+    if len(models) < len(found):
+        names = [excerpt(name, 40) for i, name in users if i in found and i not in models]
+        more = f" and {len(names) - 3} more" if len(names) > 3 else ""
+        raise LogError(
+            f"{path} leaves the modes of {', '.join(names[:3])}{more} to the cache, and they are not in "
+            f"{cache.folder('default')}",
+            "set SONIC_BULLET_CACHE to the folder they are in, or write the log anew from its scene",
+        )
+    return models
+
+
+def unpack_models(
+    entries: Sequence[LoggedModel],
+    arrays: Mapping[str, Array],
+    recalled: Mapping[int, ModalModel],
+    path: object,
+) -> list[ModalModel]:
+    """The models of which a log's header says ``entries``, but for those that are recalled. Raises LogError."""
+    return [
+        recalled[i] if isinstance(entry, str) else _unpack_model(entry, arrays, i, path)
+        for i, entry in enumerate(entries)
+    ]
+
+
+def _keep_models(models: Sequence[ModalModel]) -> list[str]:
+    """Keep models in the cache, where they are not yet, for logs that refer to them. Returns the SHA-256 of each.
+
+    Raises FileError where there is no cache, or none that takes them all.
+    """
+    keys, place = [model_key(model) for model in models], cache.folder("default")
+    instead = "set SONIC_BULLET_CACHE to a folder that you may write to, or leave the models in the log"
+    if place is None:
+        raise FileError("there is no cache that models could be left to", instead)
+    try:
+        place.mkdir(mode=0o700, parents=True, exist_ok=True)
+    except OSError as error:
+        raise cannot("make the cache's folder", place, error) from error
+    for key, model in zip(keys, models, strict=True):
+        if _kept_model(key) is None:
+            write_model(_kept_at(place, key), model)
+    cache.bound(place)
+    if not all(_kept_at(place, key).is_file() for key in keys):
+        raise FileError("the cache is too small for the models of this log", f"raise {LIMIT}, or leave them in the log")
+    return keys
+
+
+def _kept_model(key: str) -> ModalModel | None:
+    """The model of that SHA-256 from the cache; None where it is not there, or is not that one."""
+    place = cache.folder("default")
+    if place is None:
+        return None
+    try:
+        model = read_model(_kept_at(place, key))
+    except (FileError, LogError):
+        return None
+    if model_key(model) != key:
+        return None
+    touch(_kept_at(place, key))
+    return model
+
+
+def _kept_at(place: Path, key: str) -> Path:
+    return place / f"model-{key}.npz"
+
+
+def model_key(model: ModalModel) -> str:
+    """SHA-256 of a model's content, in hexadecimal: equal models are stored once."""
+    digest = hashlib.sha256(msgspec.json.encode(_pack_model(model)))
+    for name, array in _arrays(model).items():
+        digest.update(f"model0_{name} {array.shape}".encode() + array.tobytes())
+    return digest.hexdigest()
+
+
+def _pack_model(x: ModalModel) -> ModelEntry:
     """The header's part of a model."""
     return ModelEntry(
         float(x.volume_m3),
@@ -81,22 +201,48 @@ def pack_model(x: ModalModel) -> ModelEntry:
     )
 
 
-def model_arrays(model: ModalModel, index: int) -> dict[str, Array]:
-    """The arrays of a model, by their names in the file."""
+def _arrays(model: ModalModel) -> dict[str, Array]:
+    """The arrays of a model, by their names in a file."""
     bent = {name: field for name, field in BENT_ARRAYS.items() if getattr(model, field) is not None}
-    return {
-        f"model{index}_{name}": getattr(model, field)
-        for name, field in ({name: name for name in MODEL_ARRAYS} | bent).items()
-    }
+    return {name: getattr(model, field) for name, field in ({name: name for name in MODEL_ARRAYS} | bent).items()}
 
 
-def unpack_model(header: ModelEntry, arrays: Mapping[str, Array], index: int, path: object) -> ModalModel:
+def _packed_arrays(model: ModalModel, index: int) -> dict[str, Array]:
+    """The arrays of a model as a file holds them, by their names there."""
+    arrays = _arrays(model)
+    exact = whole_multiples(model.shape)
+    if exact is not None:
+        arrays |= {"shape": exact[0], "shape_exponent": exact[1]}
+    return {f"model{index}_{name}": _planes(array) for name, array in arrays.items()}
+
+
+def _planes(array: Array) -> Array:
+    """(n, …) u1 of an array (…) of n bytes each: the first byte of every number, the second, and so on."""
+    parts = np.ascontiguousarray(array)[..., None].view(np.uint8)
+    return np.ascontiguousarray(np.moveaxis(parts, -1, 0))
+
+
+def _taken(arrays: Mapping[str, Array], name: str, dtype: Any, shape: tuple[int | None, ...], path: object) -> Array:
+    """The array ``name`` of planes, or as it is in files written before there were any. Raises LogError."""
+    found = arrays.get(name)
+    if found is None or found.dtype != np.uint8:
+        return take(arrays, name, dtype, shape, path)
+    planes = take(arrays, name, np.uint8, (np.dtype(dtype).itemsize, *shape), path)
+    found = np.ascontiguousarray(np.moveaxis(planes, 0, -1)).view(dtype)
+    return np.asarray(found.reshape(planes.shape[1:]))
+
+
+def _unpack_model(header: ModelEntry, arrays: Mapping[str, Array], index: int, path: object) -> ModalModel:
     """The model that these were made of. Raises LogError, RecordError."""
-    parts = {
-        name: take(arrays, f"model{index}_{name}", dtype, shape, path) for name, (dtype, shape) in MODEL_ARRAYS.items()
-    }
+    exact = f"model{index}_shape_exponent" in arrays
+    kinds = MODEL_ARRAYS | ({"shape": (np.int16, MODEL_ARRAYS["shape"][1])} if exact else {})
+    parts = {name: _taken(arrays, f"model{index}_{name}", dtype, shape, path) for name, (dtype, shape) in kinds.items()}
+    if exact:
+        m = parts["shape"].shape[2]
+        exponent = _taken(arrays, f"model{index}_shape_exponent", np.int16, (m,), path)
+        parts["shape"] = from_multiples(parts["shape"], exponent)
     parts |= {
-        field: take(arrays, f"model{index}_{name}", float, (None,), path)
+        field: _taken(arrays, f"model{index}_{name}", float, (None,), path)
         for name, field in BENT_ARRAYS.items()
         if f"model{index}_{name}" in arrays
     }

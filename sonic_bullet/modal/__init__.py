@@ -1,7 +1,7 @@
 """The modal room: shapes and a material in, a body's vibration modes out.
 
 Shape -> solid.Solid (structured.py, tetrahedra.py) -> K, M (fem.py) -> λ, U (eigen.py) -> ModalModel (model.py), kept
-    by cache.py
+    under the names of keys.py
 """
 
 from sonic_bullet.modal.meshing.mesh_files import read_mesh

@@ -15,11 +15,13 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
+from sonic_bullet.files import cache as store
 from sonic_bullet.geometry import oversize
-from sonic_bullet.modal import cache as store
+from sonic_bullet.modal.keys import key
 from sonic_bullet.records import Array, Material, ModalModel, Shape
 from sonic_bullet.records.errors import MeshError, ModalError
 from sonic_bullet.records.modal_options import ModalOptions
+from sonic_bullet.records.mode_shapes import rounded
 
 if TYPE_CHECKING:
     from sonic_bullet.modal.meshing.shape_meshes import Filled
@@ -122,7 +124,7 @@ def analyse(
     return ModalModel(
         freq_hz=freq,
         decay_per_s=decay,
-        shape=unit.vector[:, :, alive] / np.float32(np.sqrt(material.density_kg_m3 * of.length_m**3)),
+        shape=rounded(unit.vector[:, :, alive] / np.float32(np.sqrt(material.density_kg_m3 * of.length_m**3))),
         vertex_m=unit.vertex_m,
         face=unit.face,
         curvature_per_m=unit.curvature_per_m,
@@ -168,7 +170,7 @@ def _unit_of(shapes: tuple[Shape, ...], material: Material, asked: ModalOptions,
     limit = (2 * np.pi * asked.to_hz) ** 2 / per_s2
     clamp = np.array(asked.fixed, float).reshape(-1, 4)
     stiffness = material.stiffness_pa / pascal
-    name = store.key("modes", solid, stiffness, clamp, asked.count if asked.count is not None else limit)
+    name = key("modes", solid, stiffness, clamp, asked.count if asked.count is not None else limit)
     return _UnitOf(name, solid, length_m, per_s2, limit, stiffness, clamp)
 
 
@@ -185,7 +187,7 @@ def surface_of(
 
 def _solid_key(shapes: tuple[Shape, ...], thickness_m: float | None, edge_m: float | None) -> str:
     parts = [part for s in shapes for part in (s.kind, s.size_m, s.position_m, s.quaternion_xyzw, s.vertex_m, s.face)]
-    return store.key("solid", *parts, thickness_m, edge_m)
+    return key("solid", *parts, thickness_m, edge_m)
 
 
 def _diagonal_m(shapes: tuple[Shape, ...]) -> float:

@@ -16,8 +16,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from sonic_bullet.modal import cache as store
+from sonic_bullet.files import cache as store
 from sonic_bullet.modal.isotropic_family import Family, mixed
+from sonic_bullet.modal.keys import key
 from sonic_bullet.modal.model import MOST_MODES, SHIFT, _diagonal_m
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.errors import MeshError, ModalError
@@ -57,7 +58,7 @@ def family(
     length = _diagonal_m((shape,))
     limit = (2 * np.pi * to_hz) ** 2 * length**2 / gamma_m2_s2
     clamp = np.array(fixed, float).reshape(-1, 4)
-    name = store.key("family", shape.vertex_m, shape.face, edge_m, clamp, poisson, limit)
+    name = key("family", shape.vertex_m, shape.face, edge_m, clamp, poisson, limit)
     found = store.load(cache, name, KEPT)
     if found is not None:
         a, note = found

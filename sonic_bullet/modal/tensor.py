@@ -19,8 +19,9 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.modal import cache as store
+from sonic_bullet.files import cache as store
 from sonic_bullet.modal.isotropic_family import Family
+from sonic_bullet.modal.keys import key
 from sonic_bullet.modal.model import MOST_MODES, SHIFT, _diagonal_m
 from sonic_bullet.records import ORTHOTROPIC, Array, Shape
 from sonic_bullet.records.errors import MeshError
@@ -140,7 +141,7 @@ def tensor_family(
     length = _diagonal_m((shape,))
     count = min(count, MOST_MODES)
     clamp = np.array(fixed, float).reshape(-1, 4)
-    name = store.key(
+    name = key(
         "tensor",
         shape.kind,
         shape.size_m,

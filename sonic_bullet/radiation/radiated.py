@@ -11,8 +11,9 @@ from pathlib import Path
 
 import numpy as np
 
+from sonic_bullet.files import cache as store
 from sonic_bullet.machine.while_alive import WhileAlive
-from sonic_bullet.modal import cache as store
+from sonic_bullet.modal.keys import code_digest, key
 from sonic_bullet.radiation import entrained_mass as added_mass
 from sonic_bullet.radiation import far_field as radiation
 from sonic_bullet.records import Air, Array, ModalModel
@@ -36,8 +37,8 @@ def radiation_of(model: ModalModel, air: Air, cache: store.Place = "default") ->
     m = model.mode_count
     if m == 0 or len(model.face) == 0:
         return radiation.radiation(model, air)
-    code = store.code_digest(SOURCES, PACKAGES)
-    name = store.key(
+    code = code_digest(SOURCES, PACKAGES)
+    name = key(
         "radiation",
         model.freq_hz,
         model.shape,

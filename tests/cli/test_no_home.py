@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from sonic_bullet.files import cache
 from sonic_bullet.machine import user_folder
-from sonic_bullet.modal import cache
 
 REPO = Path(__file__).resolve().parents[2]
 

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import io
+import re
 import struct
+import tracemalloc
 import zipfile
+import zlib
 from dataclasses import replace
 from pathlib import Path
 
@@ -124,7 +127,7 @@ def test_forged_headers_are_refused_by_name(tmp_path: Path, old: bytes, new: byt
 def test_an_npy_header_that_is_none_is_one_line_for_logs_and_models_and_a_miss_for_caches(
     tmp_path: Path, text: bytes
 ) -> None:
-    from sonic_bullet.modal import cache
+    from sonic_bullet.files import cache
 
     raw = b"\x93NUMPY\x01\x00" + struct.pack("<H", len(text) + 1) + text + b"\n" + bytes(40)
     files.write_model(tmp_path / "m.npz", model())
@@ -216,7 +219,107 @@ def test_zip_bombs_are_refused_before_they_grow(tmp_path: Path) -> None:
     assert (tmp_path / "bomb.npz").stat().st_size < 2e5
     with pytest.raises(LogError, match="claims more bytes"):
         files.read_log(tmp_path / "bomb.npz")
+    for name in ("model0_shape.npy", "step_dt_s.npy"):
+        with zipfile.ZipFile(tmp_path / "bomb.npz", "w", zipfile.ZIP_DEFLATED) as archive:
+            archive.writestr(name, npy_claiming((10**8,)) + bytes(10**8))
+        with pytest.raises(LogError, match="claims more bytes"):
+            files.read_log(tmp_path / "bomb.npz")
     with zipfile.ZipFile(tmp_path / "small.npz", "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("header.npy", bytes(range(256)))
     with pytest.raises(LogError, match="compressed"):
         files.read_log(tmp_path / "small.npz")
+
+
+def deflated(folder: Path, content: bytes, claimed: int, crc: int | None = None, after: bytes = b"") -> Path:
+    """A model whose shape is a deflate stream of ``content`` that claims another size; consistent in all else."""
+    files.write_model(folder / "m.npz", model())
+    with zipfile.ZipFile(folder / "m.npz") as source:
+        entries = {name: source.read(name) for name in source.namelist()}
+    entries.pop("model0_shape.npy")
+    with zipfile.ZipFile(folder / "m.npz", "w") as archive:
+        for name, raw in entries.items():
+            archive.writestr(name, raw)
+    stream = zlib.compressobj(6, zlib.DEFLATED, -15)
+    raw = stream.compress(content) + stream.flush() + after
+    name, whole = b"model0_shape.npy", (folder / "m.npz").read_bytes()
+    end = whole.rindex(b"PK\x05\x06")
+    count, size, start = struct.unpack("<HII", whole[end + 10 : end + 20])
+    said = (8, 0, 0x21, zlib.crc32(content) if crc is None else crc, len(raw), claimed, len(name), 0)
+    local = struct.pack("<4s5H3I2H", b"PK\x03\x04", 20, 0, *said) + name + raw
+    entry = struct.pack("<4s6H3I5H2I", b"PK\x01\x02", 20, 20, 0, *said, 0, 0, 0, 0, start) + name
+    tail = struct.pack("<4s4H2IH", b"PK\x05\x06", 0, 0, count + 1, count + 1, size + len(entry), start + len(local), 0)
+    (folder / "m.npz").write_bytes(whole[:start] + local + whole[start : start + size] + entry + tail)
+    return folder / "m.npz"
+
+
+def planes() -> bytes:
+    with io.BytesIO() as stream:
+        np.save(stream, np.moveaxis(model().shape[..., None].view(np.uint8), -1, 0).copy())
+        return stream.getvalue()
+
+
+def test_a_deflated_entry_that_is_as_it_claims_is_read(tmp_path: Path) -> None:
+    content = planes()
+    read = files.read_model(deflated(tmp_path, content, len(content)))
+    assert read.shape.tobytes() == model().shape.tobytes()
+
+
+@pytest.mark.parametrize("change", ["longer", "shorter", "bomb", "checksum", "hidden", "half", "no stream"])
+def test_a_deflated_entry_that_lies_is_one_line_and_takes_no_memory(tmp_path: Path, change: str) -> None:
+    content, claimed, crc, after = planes(), len(planes()), None, b""
+    if change == "longer":
+        claimed += 100
+    elif change == "shorter":
+        claimed -= 100
+    elif change == "bomb":
+        content += bytes(10**9)
+    elif change == "checksum":
+        crc = 1
+    elif change == "hidden":
+        after = b"more"
+    path = deflated(tmp_path, content, claimed, crc, after)
+    del content
+    if change in ("half", "no stream"):
+        whole, at = path.read_bytes(), path.read_bytes().index(b"model0_shape.npy") + 16
+        broken = b"\x00" * 40 if change == "half" else b"\xff" * 40
+        path.write_bytes(whole[:at] + broken + whole[at + 40 :])
+    tracemalloc.start()
+    with pytest.raises(LogError, match=r"m\.npz") as caught:
+        files.read_model(path)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert "\n" not in str(caught.value) and peak < 4 * path.stat().st_size + 1e5
+
+
+def test_a_claim_to_unpack_to_more_than_64_times_the_file_is_refused_before_it_is(tmp_path: Path) -> None:
+    path = deflated(tmp_path, planes() + bytes(10**6), len(planes()) + 10**6)
+    with pytest.raises(LogError, match="claims more bytes than it has"):
+        files.read_model(path)
+
+
+@pytest.mark.parametrize(
+    ("entry", "value"),
+    [
+        ("model0_shape", np.zeros((3, 4, 3, 3), np.uint8)),
+        ("model0_shape", np.zeros((4, 3, 3), np.uint8)),
+        ("model0_shape_exponent", np.zeros((2, 3), np.uint8)),
+        ("model0_face", np.full((4, 2, 3), 255, np.uint8)),
+        ("model0_freq_hz", np.full((8, 3), 255, np.uint8)),
+    ],
+)
+def test_planes_that_are_none_are_refused_by_name(tmp_path: Path, entry: str, value: np.ndarray) -> None:
+    with pytest.raises(LogError, match=r"bad\.npz"):
+        files.read_log(forged(tmp_path, **{entry: value}))
+
+
+@pytest.mark.parametrize("name", ["../../etc/passwd", "a" * 63, "g" * 64, "a" * 64 + "\\n", ""])
+def test_a_reference_that_is_no_digest_is_refused(tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SONIC_BULLET_CACHE", str(tmp_path / "cache"))
+    log().save(tmp_path / "a.npz", models="reference")
+    with np.load(tmp_path / "a.npz") as plain:
+        text, entries = plain["header"].tobytes(), dict(plain.items())
+    forged_text = re.sub(rb'"models":\["[0-9a-f]{64}"', b'"models":["' + name.encode() + b'"', text)
+    assert forged_text != text
+    np.savez(tmp_path / "bad.npz", **(entries | {"header": np.frombuffer(forged_text, np.uint8)}))
+    with pytest.raises(LogError, match=r"bad\.npz is no contact log"):
+        files.read_log(tmp_path / "bad.npz")

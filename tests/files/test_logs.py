@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import io
 import os
+import zipfile
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +21,7 @@ from sonic_bullet.records import Body, Material, Microphone, ModalModel
 from sonic_bullet.records.contacts import Contacts, Step
 from sonic_bullet.records.errors import FileError, LogError, ModalError, SonicBulletError
 from sonic_bullet.records.modal_options import ModalOptions
+from sonic_bullet.records.mode_shapes import rounded
 from sonic_bullet.records.simulated import Change
 from tests.made.logs import log, model, same
 
@@ -195,6 +199,25 @@ def test_whatever_is_known_comes_back(
     assert same(files.read_log(tmp_path / "b.npz"), read)
 
 
+def test_a_log_of_the_first_format_reads_as_one_without_events(tmp_path: Path) -> None:
+    """The header names format 1 and has no events."""
+    written = replace(log(), events=())
+    files.write_log(tmp_path / "new.npz", written)
+    with zipfile.ZipFile(tmp_path / "new.npz") as source, zipfile.ZipFile(tmp_path / "old.npz", "w") as target:
+        for name in source.namelist():
+            content = source.read(name)
+            if name == "header.npy":
+                with np.load(tmp_path / "new.npz") as entries:
+                    text = entries["header"].tobytes()
+                old = text.replace(b"sonic-bullet-contacts/3", b"sonic-bullet-contacts/1").replace(b',"events":[]', b"")
+                assert old != text and b"events" not in old
+                stream = io.BytesIO()
+                np.save(stream, np.frombuffer(old, np.uint8))
+                content = stream.getvalue()
+            target.writestr(name, content)
+    assert same(files.read_log(tmp_path / "old.npz"), written)
+
+
 @pytest.mark.parametrize("content", [b"", b"PK\x05\x06" + bytes(18), b"hello", bytes(1000)])
 def test_foreign_files_are_no_logs(tmp_path: Path, content: bytes) -> None:
     (tmp_path / "a.npz").write_bytes(content)
@@ -209,3 +232,99 @@ def test_missing_files_folders_and_pipes(tmp_path: Path) -> None:
             files.read_log(path)
     with pytest.raises(FileError, match="mkdir -p"):
         files.write_log(tmp_path / "none" / "a.npz", log())
+
+
+def rounded_model(seed: int = 0) -> ModalModel:
+    made = model(seed)
+    return replace(made, shape=rounded(made.shape))
+
+
+def test_shapes_that_were_rounded_are_whole_numbers_in_a_file_and_come_back_bit_for_bit(tmp_path: Path) -> None:
+    files.write_model(tmp_path / "m.npz", rounded_model())
+    assert same(rounded_model(), files.read_model(tmp_path / "m.npz"))
+    with np.load(tmp_path / "m.npz") as plain:
+        assert plain["model0_shape"].shape == (2, 4, 3, 3) and plain["model0_shape"].dtype == np.uint8
+    files.write_model(tmp_path / "exact.npz", model())
+    with np.load(tmp_path / "exact.npz") as plain:
+        assert plain["model0_shape"].shape == (4, 4, 3, 3) and "model0_shape_exponent" not in plain.files
+
+
+def test_a_model_of_the_first_format_reads_the_same(tmp_path: Path) -> None:
+    """Plain arrays, none of them deflated."""
+    from sonic_bullet.files import models
+    from sonic_bullet.files.container import write_container
+
+    made = rounded_model()
+    plain = {f"model0_{name}": getattr(made, name) for name in models.MODEL_ARRAYS}
+    header = models._ModelHeader("sonic-bullet-model/1", models._pack_model(made))
+    write_container(tmp_path / "old.npz", header, plain)
+    assert same(made, files.read_model(tmp_path / "old.npz"))
+
+
+def test_a_model_of_nothing_but_zeros_is_written_so_that_it_is_read(tmp_path: Path) -> None:
+    """It would deflate to less than a reader takes for honest."""
+    made = replace(
+        model(), shape=np.zeros((40_000, 3, 3)), vertex_m=np.zeros((40_000, 3)), face=np.zeros((2, 3), np.int32)
+    )
+    files.write_model(tmp_path / "m.npz", made)
+    assert same(made, files.read_model(tmp_path / "m.npz"))
+
+
+@pytest.fixture
+def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("SONIC_BULLET_CACHE", str(tmp_path / "cache"))
+    return tmp_path / "cache"
+
+
+def test_a_log_by_reference_comes_back_bit_for_bit_and_holds_no_model(tmp_path: Path, own_cache: Path) -> None:
+    written = log()
+    written.save(tmp_path / "a.npz", models="reference")
+    assert same(written, files.read_log(tmp_path / "a.npz"))
+    with np.load(tmp_path / "a.npz") as plain:
+        assert not [name for name in plain.files if name.startswith("model")]
+    whole = (tmp_path / "a.npz").read_bytes()
+    assert len(list(own_cache.iterdir())) == 2  # of three bodies, two of which share one
+    files.read_log(tmp_path / "a.npz").save(tmp_path / "b.npz", models="reference")
+    assert (tmp_path / "b.npz").read_bytes() == whole
+
+
+@pytest.mark.parametrize("harm", ["gone", "cut", "another", "folder"])
+def test_a_model_that_the_cache_has_not_is_one_line_naming_bodies_folder_and_remedy(
+    tmp_path: Path, own_cache: Path, harm: str
+) -> None:
+    log().save(tmp_path / "a.npz", models="reference")
+    kept = sorted(own_cache.iterdir())
+    for path in kept if harm == "folder" else kept[:1]:
+        whole = path.read_bytes()
+        path.unlink()
+        if harm == "cut":
+            path.write_bytes(whole[:-100])
+        if harm == "another":
+            path.write_bytes(kept[1].read_bytes())
+    with pytest.raises(LogError, match=r"a\.npz leaves the modes of .*to the cache") as caught:
+        files.read_log(tmp_path / "a.npz")
+    assert str(own_cache) in str(caught.value) and "SONIC_BULLET_CACHE" in str(caught.value)
+    assert "\n" not in str(caught.value) and ("other" in str(caught.value)) + ("handle" in str(caught.value)) >= 1
+    log().save(tmp_path / "a.npz", models="reference")  # a harmed entry is replaced
+    assert same(log(), files.read_log(tmp_path / "a.npz"))
+
+
+def test_without_a_cache_a_log_by_reference_is_refused_and_nothing_is_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("SONIC_BULLET_CACHE", raising=False)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "no" / "home"))
+    with pytest.raises(FileError, match="no cache that models could be left to; set SONIC_BULLET_CACHE"):
+        log().save(tmp_path / "a.npz", models="reference")
+    with pytest.raises(FileError, match="models is 'references'; did you mean reference"):
+        log().save(tmp_path / "a.npz", models="references")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_cache_too_small_for_the_models_of_a_log_is_said_and_no_log_is_written(
+    tmp_path: Path, own_cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("SONIC_BULLET_CACHE_LIMIT", "1kB")
+    with pytest.raises(FileError, match=r"too small for the models.*raise SONIC_BULLET_CACHE_LIMIT"):
+        log().save(tmp_path / "a.npz", models="reference")
+    assert not (tmp_path / "a.npz").exists()

@@ -17,9 +17,8 @@ import numpy as np
 import pytest
 import soundfile
 
-from sonic_bullet.files import audio, read_audio, replacing, write_audio
+from sonic_bullet.files import audio, cache, read_audio, replacing, write_audio
 from sonic_bullet.machine.partial_file import NAME, PartialFile
-from sonic_bullet.modal import cache
 from sonic_bullet.presets import named_preset, write_preset
 from sonic_bullet.records.errors import FileError
 

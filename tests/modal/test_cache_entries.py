@@ -14,7 +14,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from sonic_bullet.modal import analyse, cache, eigen, reduced, tensor
+from sonic_bullet.files import cache
+from sonic_bullet.modal import analyse, eigen, reduced, tensor
 from sonic_bullet.radiation import radiated
 from sonic_bullet.records import Air, Material, ModalModel, Shape
 

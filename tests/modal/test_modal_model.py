@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import trimesh
 
+from sonic_bullet.files import cache as store
 from sonic_bullet.modal import analyse, eigen, fem
-from sonic_bullet.modal import cache as store
 from sonic_bullet.modal.meshing import structured
 from sonic_bullet.records import Material, Shape, isotropic_stiffness_pa
 from sonic_bullet.records.errors import MeshError, ModalError

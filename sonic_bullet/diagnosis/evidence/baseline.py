@@ -29,8 +29,8 @@ from sonic_bullet.estimator.fit.material_fit import fit_evidence
 from sonic_bullet.estimator.fit.recorded import RecordedObject as Recorded
 from sonic_bullet.estimator.lines.joint_lines import Lines, joint_lines, lines_of, noise_rms
 from sonic_bullet.estimator.lines.log_spectral import floor_between, white
+from sonic_bullet.files.cache import Place
 from sonic_bullet.files.cases import Case
-from sonic_bullet.modal.cache import Place
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import AudioError
 

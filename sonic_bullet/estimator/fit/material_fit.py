@@ -24,8 +24,8 @@ from sonic_bullet.estimator.fit.pairing import GAMMA_REACH, MESH_SD, Pairs, assi
 from sonic_bullet.estimator.fit.radiation_share import KNOWN, Radiated, in_air, radiation_in
 from sonic_bullet.estimator.fit.rayleigh import rayleigh
 from sonic_bullet.estimator.fit.recorded import RecordedObject, gather
+from sonic_bullet.files.cache import Place
 from sonic_bullet.files.cases import Case
-from sonic_bullet.modal.cache import Place
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import AudioError, FileError
 

@@ -18,9 +18,9 @@ import numpy as np
 from sonic_bullet.estimator.fit.case_fit import RadiationIn
 from sonic_bullet.estimator.fit.pairing import Group, grouped
 from sonic_bullet.estimator.fit.recorded import RecordedObject
+from sonic_bullet.files.cache import Place
 from sonic_bullet.files.cases import Case
 from sonic_bullet.modal import read_mesh
-from sonic_bullet.modal.cache import Place
 from sonic_bullet.modal.isotropic_family import Family
 from sonic_bullet.modal.model import surface_of
 from sonic_bullet.radiation.far_field import radiation

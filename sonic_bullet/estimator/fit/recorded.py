@@ -17,9 +17,9 @@ from sonic_bullet.estimator.fit.observation import Observation, observation
 from sonic_bullet.estimator.lines.joint_lines import Lines, joint_lines, noise_rms
 from sonic_bullet.estimator.lines.onset import span
 from sonic_bullet.files import channel_of, channel_words, read_audio
+from sonic_bullet.files.cache import Place
 from sonic_bullet.files.cases import Case, CaseObject, CaseRecording, Line
 from sonic_bullet.modal import read_mesh
-from sonic_bullet.modal.cache import Place
 from sonic_bullet.modal.isotropic_family import Family
 from sonic_bullet.modal.reduced import family
 from sonic_bullet.records import Array, Material, Shape

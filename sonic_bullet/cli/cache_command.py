@@ -1,0 +1,94 @@
+"""`cache`: what is kept between runs, by kind; bounded and cleared."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from sonic_bullet.cli.examples import CACHE_EPILOG
+from sonic_bullet.cli.parameters import json_option
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from sonic_bullet.machine.kept_files import KeptFile
+
+
+@click.command(epilog=CACHE_EPILOG)
+@click.option("--clear", is_flag=True, help="Remove all of it.")
+@click.option(
+    "--limit",
+    metavar="SIZE",
+    help="Remove what was computed and unused for longest, until SIZE of it is left, 500MB say; no machine code.",
+)
+@json_option
+def cache(clear: bool, limit: str | None, json_to: str | None) -> None:
+    """List what is kept between runs (computed modes, machine code), bound it or clear it."""
+    from sonic_bullet.cli.output import clean_stdout, places, write_json
+    from sonic_bullet.files.cache import folder as models_folder
+    from sonic_bullet.machine import kept_files
+    from sonic_bullet.machine.compiled import folder as code_folder
+
+    if clear and limit is not None:
+        raise click.UsageError("--clear and --limit are both given: give one of them")
+    (json_to,) = places(json_to)
+    most_bytes = None if limit is None else kept_files.as_bytes(limit, "--limit")
+    allowed_bytes = kept_files.limit_bytes()
+    models, code = models_folder("default"), code_folder()
+    computed = [] if models is None else kept_files.computed(models)
+    compiled = [] if code is None else kept_files.compiled(code)
+    removed = kept_files.bounded([*computed, *compiled], 0) if clear else []
+    if most_bytes is not None:
+        removed = kept_files.bounded(computed, most_bytes)
+    gone = {one.path for one in removed}
+    left = [one for one in (*computed, *compiled) if one.path not in gone]
+    result = {
+        "folders": [str(one) for one in (models, code) if one is not None],
+        "limit_bytes": allowed_bytes,
+        "kinds": by_kind(left),
+        "removed": by_kind(removed),
+    }
+    with clean_stdout(json_to) as say:
+        say(_said(result, asked=clear or limit is not None))
+    write_json(json_to, result)
+
+
+def by_kind(files: Iterable[KeptFile]) -> list[dict[str, Any]]:
+    """What there is of each kind: how many files and bytes, and when the one unused for longest was used."""
+    kinds: dict[str, list[KeptFile]] = {}
+    for one in files:
+        kinds.setdefault(one.kind, []).append(one)
+    return [
+        {
+            "kind": kind,
+            "files": len(some),
+            "bytes": sum(one.size_bytes for one in some),
+            "oldest_use": datetime.fromtimestamp(min(one.used_s for one in some))
+            .astimezone()
+            .isoformat(" ", "minutes"),
+        }
+        for kind, some in sorted(kinds.items())
+    ]
+
+
+def _said(result: dict[str, Any], asked: bool) -> str:
+    """The result in words. asked: something was to be removed."""
+    from sonic_bullet.cli.output import table
+
+    def total_mb(kinds: list[dict[str, Any]]) -> float:
+        return float(sum(kind["bytes"] for kind in kinds) / 1e6)
+
+    lines = [f"kept in {' and '.join(result['folders'])}" if result["folders"] else "nothing can be kept"]
+    if asked:
+        count = sum(kind["files"] for kind in result["removed"])
+        lines.append(f"removed: {count} files, {total_mb(result['removed']):.1f} MB")
+    rows = [
+        (kind["kind"], str(kind["files"]), f"{kind['bytes'] / 1e6:.1f}", kind["oldest_use"][:16])
+        for kind in result["kinds"]
+    ]
+    if rows:
+        lines.append(table(("kind", "files", "MB", "oldest use"), rows))
+    limit = result["limit_bytes"] / 1e6
+    return "\n".join([*lines, f"{total_mb(result['kinds']):.1f} MB in all; of what is computed {limit:.0f} MB at most"])

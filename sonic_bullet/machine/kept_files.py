@@ -1,0 +1,103 @@
+"""What is kept between runs, file by file: listed, bounded and removed.
+
+    folder -> KIND-<sha256>.npz: size, last use (its time of modification, set at every use) -> over the limit?
+        what was unused for longest goes first; models that logs refer to go last, for nothing computes them anew
+
+Another process may do the same at the same time: a file that has gone is no error, neither here nor to who wants to
+read it.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import NamedTuple
+
+from sonic_bullet.records.errors import FileError
+
+LIMIT = "SONIC_BULLET_CACHE_LIMIT"
+DEFAULT_LIMIT_BYTES = 2 * 10**9  # of modes: 5 to 10 MB for a body; hundreds of bodies
+NAME = re.compile(r"([a-z]+)-[0-9a-f]{64}\.npz")
+CODE = re.compile(r".*\.nb[ic]")
+SIZE = re.compile(r"(\d+(?:\.\d+)?) *([kMGT]?)(i?)B?", re.IGNORECASE)
+OF_LOGS, CODE_KIND = "models of logs", "machine code"
+KINDS = {"radiation": "radiation", "model": OF_LOGS}
+"""Kind of an entry by the first word of its name; all others are modes, and what they are made of."""
+
+
+class KeptFile(NamedTuple):
+    """A file that is kept. used_s: when it was last used, in s since 1970."""
+
+    path: Path
+    kind: str
+    size_bytes: int
+    used_s: float
+
+
+def as_bytes(size: str, name: str) -> int:
+    """A size in words, such as 500MB, 1.5GiB or 0. Raises FileError."""
+    found = SIZE.fullmatch(size.strip())
+    if found is None:
+        raise FileError(f"{name} is '{size}', which is no size", "give one such as 500MB, 2GB or 0")
+    number, letter, binary = found.groups()
+    return int(float(number) * (1024 if binary else 1000) ** " kmgt".index(letter.lower() or " "))
+
+
+def limit_bytes() -> int:
+    """How much may be kept of what is computed: SONIC_BULLET_CACHE_LIMIT, else 2 GB. Raises FileError."""
+    given = os.environ.get(LIMIT)
+    return as_bytes(given, LIMIT) if given else DEFAULT_LIMIT_BYTES
+
+
+def computed(folder: Path) -> list[KeptFile]:
+    """The computed models in a folder."""
+    return [
+        KeptFile(path, KINDS.get(found[1], "modes"), size, used)
+        for path, size, used in _files(folder)
+        if (found := NAME.fullmatch(path.name))
+    ]
+
+
+def compiled(folder: Path) -> list[KeptFile]:
+    """The machine code in the folders of a folder."""
+    with suppress(OSError):
+        return [
+            KeptFile(path, CODE_KIND, size, used)
+            for inner in folder.iterdir()
+            for path, size, used in _files(inner)
+            if CODE.fullmatch(path.name)
+        ]
+    return []
+
+
+def touch(path: Path) -> None:
+    """Note that a file was used now, where that can be noted."""
+    with suppress(OSError):
+        os.utime(path)
+
+
+def bounded(files: Iterable[KeptFile], most_bytes: int) -> list[KeptFile]:
+    """Remove files until those that are left have ``most_bytes`` at most. Returns those removed."""
+    listed = sorted(files, key=lambda one: (one.kind == OF_LOGS, one.used_s, one.path.name))
+    excess, removed = sum(one.size_bytes for one in listed) - most_bytes, []
+    for one in listed:
+        if excess <= 0:
+            break
+        with suppress(OSError):
+            one.path.unlink(missing_ok=True)
+            removed.append(one)
+            excess -= one.size_bytes
+    return removed
+
+
+def _files(folder: Path) -> Iterator[tuple[Path, int, float]]:
+    """Path, size and time of modification of each regular file there is."""
+    with suppress(OSError), os.scandir(folder) as entries:
+        for entry in entries:
+            with suppress(OSError):
+                if entry.is_file(follow_symlinks=False):
+                    status = entry.stat(follow_symlinks=False)
+                    yield Path(entry.path), status.st_size, status.st_mtime

@@ -1,0 +1,49 @@
+"""Under which name a result is kept: sha256(numbers, options, source text that computes it)."""
+
+from __future__ import annotations
+
+import hashlib
+from contextlib import suppress
+from functools import lru_cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+import numpy as np
+
+from sonic_bullet.records import Array
+
+SOLVERS = ("numpy", "scipy", "scikit-fem", "pytetwild", "manifold3d")
+
+
+@lru_cache(maxsize=4)
+def code_digest(files: tuple[Path, ...], packages: tuple[str, ...]) -> bytes:
+    """Digest of what computes a result: source files and the versions of packages."""
+    digest = hashlib.sha256()
+    for file in files:
+        digest.update(file.read_bytes())
+    for name in packages:
+        with suppress(PackageNotFoundError):
+            digest.update(f"{name} {version(name)}".encode())
+    return digest.digest()
+
+
+def _code() -> bytes:
+    """Digest of all that turns a surface into modes: this room's source, the geometry below it, the solvers'
+    versions.
+    """
+    here = Path(__file__).resolve().parent
+    return code_digest((*sorted(here.rglob("*.py")), *sorted((here.parent / "geometry").glob("*.py"))), SOLVERS)
+
+
+def key(kind: str, *parts: Array | str | float | int | None, code: bytes | None = None) -> str:
+    """Name of a result: ``kind`` and a digest of the parts (arrays by dtype, shape and bytes) and of the code, by
+    default this room's.
+    """
+    digest = hashlib.sha256(_code() if code is None else code)
+    for part in parts:
+        if isinstance(part, np.ndarray):
+            digest.update(f"{part.dtype.str}{part.shape}".encode() + np.ascontiguousarray(part).tobytes())
+        else:
+            digest.update(repr(part).encode())
+        digest.update(b"\0")
+    return f"{kind}-{digest.hexdigest()}"

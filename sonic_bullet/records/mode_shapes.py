@@ -1,0 +1,51 @@
+"""Mode shapes as whole multiples of a power of two, one for each mode: what a file holds of them is small and exact.
+
+    q = round(φ / 2^e),   2^e = 2^(E − B),   2^(E−1) <= max |φ| < 2^E over the mode;     φ := q·2^e
+
+|q| <= 2^B is a whole number, and q·2^e a float32, to the last bit. The error is at most half a multiple: 2^−B of the
+mode's largest component. It is made once, when the modes are: whatever is derived from them later, live or from a file,
+has the same numbers.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sonic_bullet.records.arrays import Array
+
+BITS = 11  # B
+MOST_BITS = 15  # of whole numbers in a file, int16 with its sign
+TINIEST = -126  # exponent of the smallest normal float32
+
+
+def rounded(shape: Array, bits: int = BITS) -> Array:
+    """Shapes (v, 3, m) as float32, each mode's as whole multiples of its power of two."""
+    exponent = np.maximum(_exponent(shape) - bits, TINIEST)
+    whole = np.rint(np.ldexp(shape.astype(np.float32), -exponent))
+    return np.asarray(np.ldexp(whole + np.float32(0), exponent))  # + 0: a zero without a sign
+
+
+def whole_multiples(shape: Array) -> tuple[Array, Array] | None:
+    """q (v, 3, m) int16 and e (m,) int16 of shapes (v, 3, m) float32, e as large as can be; None where they are no such
+    multiples. `from_multiples` gives the same bytes back.
+    """
+    exponent = np.maximum(_exponent(shape) - MOST_BITS, TINIEST)
+    scaled = np.ldexp(shape, -exponent)
+    if not (np.abs(scaled) < 2**MOST_BITS).all():
+        return None
+    whole = scaled.astype(np.int16)
+    bits = np.bitwise_or.reduce(whole, axis=(0, 1), initial=0).astype(int)
+    spare = np.where(bits, np.log2(np.maximum(bits & -bits, 1)), 0).astype(int)  # zeros at the end of all of them
+    found = (whole >> spare.astype(np.int16)).astype(np.int16), (exponent + spare).astype(np.int16)
+    return found if from_multiples(*found).tobytes() == np.ascontiguousarray(shape).tobytes() else None
+
+
+def from_multiples(whole: Array, exponent: Array) -> Array:
+    """The shapes (v, 3, m) float32 of q and e."""
+    with np.errstate(over="ignore"):  # of a forged file: the record refuses what is infinite
+        return np.asarray(np.ldexp(whole.astype(np.float32), exponent.astype(np.int32)))
+
+
+def _exponent(shape: Array) -> Array:
+    """E (m,) of the largest component of each mode, 0 where there is none."""
+    return np.asarray(np.frexp(np.abs(shape).max(axis=(0, 1), initial=0).astype(float))[1])
