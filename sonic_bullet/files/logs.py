@@ -19,7 +19,7 @@ their own:
           _curvature_per_m (f,) f8
       model<i>_bend_s2_m2, _choke_s_m (m,) f8  only where its modes go with their level
       events (in the header)
-          in order: {"kind": "quench", "step": the step before which it happened, "body": index, or null: all}
+          in order: {"kind": see `Event`, "step": the step before which it happened, "body": index, or null: all}
       changes (in the header)
           in order: {"step": the step before which it happened, "body": index, or null: the engine, "values": {…}}
       of each body: dynamics, options, mounting; of all: engine, versions, residual (see `Body`, `ContactLog`)
