@@ -8,7 +8,6 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from types import MappingProxyType
 
 import numpy as np
 
@@ -16,7 +15,7 @@ from sonic_bullet.records import Air, Array, Body, Sensor
 from sonic_bullet.records.coerce import as_flag, as_items, as_kind, as_kinds, as_path, as_whole, shown
 from sonic_bullet.records.contacts import Contacts, Event, Step
 from sonic_bullet.records.errors import LogError
-from sonic_bullet.records.simulated import Change, Values, frozen_values
+from sonic_bullet.records.simulated import Change, Values, frozen_texts, frozen_values
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -24,11 +23,11 @@ class ContactLog:
     """All that a later render or comparison needs, by value: bodies with their models, steps, sensors, rate and seed.
 
     untouched: ids of bodies that were in the world and touched nothing; known while listening, not kept in files.
-    events: what happened besides contacts, in its order. engine: the simulator's settings at the
-    first step, under its own names; what is not among them is not known. versions: of sonic_bullet, the packages that
-    its numbers hang on and the simulator, by name; of older logs none. changes: what was set otherwise later, of engine
-    and bodies, in order; `dynamics` and `settings` give what holds at a step. residual: whether it is rendered with
-    what materials sound beside their modes.
+    events: what happened besides contacts, in its order. engine: the simulator's settings at the first step, under its
+    own names; what is not among them is not known. versions: of sonic_bullet, the packages that its numbers hang on and
+    the simulator, by name; of older logs none. changes: what was set otherwise later, of engine and bodies, in order;
+    `dynamics` and `settings` give what holds at a step. residual: whether it is rendered with what materials sound
+    beside their modes.
     """
 
     bodies: tuple[Body, ...]
@@ -57,7 +56,7 @@ class ContactLog:
                 as_whole(x, "log: untouched", *ids) for x in as_items(self.untouched, "log: untouched", *ids)
             ),
             "engine": frozen_values(self.engine, "log: engine"),
-            "versions": MappingProxyType(dict(sorted(self.versions.items()))),
+            "versions": frozen_texts(self.versions, "log: versions"),
             "changes": as_kinds(self.changes, Change, "log: changes", "give a tuple of Change", error=LogError),
             "residual": as_flag(self.residual, "log: residual"),
             "sr": as_whole(self.sr, "log: sr", "give a sample rate in Hz", least=1, error=LogError),

@@ -8,7 +8,7 @@ a log; a name given by hand may be given again once its bearer has gone.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 
 from sonic_bullet.records.errors import SceneError
 
@@ -21,6 +21,11 @@ class Names:
         self._bearer: dict[str, int] = {}
         self._given: set[str] = set()
         self._count: dict[str, int] = {}
+
+    @property
+    def codes(self) -> Collection[int]:
+        """Those that have a name."""
+        return self._living.keys()
 
     def call(self, code: int, name: str) -> None:
         """Call a link so from now on. Raises SceneError where another living link has that name."""

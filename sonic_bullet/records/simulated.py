@@ -9,9 +9,10 @@ it, and it is not zero.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
+from typing import Any
 
 from sonic_bullet.records.arrays import Array, frozen_array, store
 from sonic_bullet.records.bodies import Material, ModalModel
@@ -27,13 +28,21 @@ MOUNTINGS = ("free",)
 
 def frozen_values(values: object, name: str) -> Values:
     """Finite numbers by name, read-only and in the order of their names. Raises RecordError."""
-    remedy = "give a mapping of names to numbers"
+    return _frozen(values, name, "give a dict of names to numbers", as_number)
+
+
+def frozen_texts(values: object, name: str) -> Mapping[str, str]:
+    """Texts by name, read-only and in the order of their names. Raises RecordError."""
+    return _frozen(values, name, "give a dict of names to texts", as_text)
+
+
+def _frozen(values: object, name: str, remedy: str, checked: Callable[[object, str, str], Any]) -> Mapping[str, Any]:
     if not isinstance(values, Mapping):
         raise RecordError(f"{name} is {shown(values)}", remedy)
-    number = {
-        as_text(key, f"a name in {name}", remedy): as_number(x, f"{name}: {key}", remedy) for key, x in values.items()
+    made = {
+        as_text(key, f"a name in {name}", remedy): checked(x, f"{name}: {key}", remedy) for key, x in values.items()
     }
-    return MappingProxyType(dict(sorted(number.items())))
+    return MappingProxyType(dict(sorted(made.items())))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -98,6 +98,10 @@ LOG = {
     "air": sb.Air(),
     "untouched": frozenset(),
     "events": (),
+    "engine": {},
+    "versions": {},
+    "changes": (),
+    "residual": True,
 }
 BUILT = (
     "import pybullet as p\nSECONDS = 0.01\n\ndef build(client):\n"
@@ -115,6 +119,7 @@ def adding(client: Any, _: Path) -> Made:
     rest = {
         "mesh": None,
         "roughness_m": 0,
+        "name": None,
         "fixed": (),
         "thickness_m": None,
         "to_hz": 20_000,
@@ -180,6 +185,7 @@ DOORS: dict[str, Callable[[Any, Path], Made]] = {
     "ContactLog": lambda *_: (sb.ContactLog, LOG),
     "ContactLog.impulse_on": of_log("impulse_on"),
     "ContactLog.rows_on": of_log("rows_on"),
+    "ContactLog.settings": lambda *_: (sb.ContactLog(**LOG).settings, {"step": 0}),
     "ContactLog.save": lambda _, folder: (sb.ContactLog(**LOG).save, {"path": folder / "a.npz"}),
     "Contacts": lambda *_: (sb.Contacts, ROW),
     "Listener": lambda client, _: (
@@ -251,9 +257,14 @@ BAD: dict[str, dict[str, list[Any]]] = {
         "air": [*RECORD, None],
         "untouched": ["x", 5, None],
         "events": ["x", 5, None, object(), [3]],
+        "engine": ["x", 5, None, object(), [3], {1: 2}, {"erp": "x"}, {"erp": None}, {"erp": math.nan}],
+        "versions": ["x", 5, None, object(), [3], {1: "2"}, {"numpy": 2.0}, {"numpy": None}],
+        "changes": ["x", 5, None, object(), [3]],
+        "residual": FLAG,
     },
     "ContactLog.impulse_on": {"body": WHOLE, "link": [*OPTIONAL, 1.5]},
     "ContactLog.rows_on": {"body": WHOLE, "link": [*OPTIONAL, 1.5]},
+    "ContactLog.settings": {"step": [*WHOLE, -1]},
     "ContactLog.save": {"path": PATH},
     "Contacts": {name: [*ARRAY, 5, [0, 1, 2, 3]] for name in ROW}
     | {"a": ["x", object(), {}, 1j, None, 5, [0.5], [2**40], [math.nan]]},
@@ -271,6 +282,7 @@ BAD: dict[str, dict[str, list[Any]]] = {
         "mesh": [5, object(), {}, True, [5], ["a.obj"], b"a.obj", pybullet],
         "model": [*RECORD],
         "roughness_m": [*OPTIONAL, -1],
+        "name": [5, b"cup", ["cup"], "", " ", "a\nb", object(), 1.5, True],
         "fixed": [
             "x",
             5,
@@ -372,7 +384,13 @@ BAD: dict[str, dict[str, list[Any]]] = {
     "load_material": {"name": [None, 5, b"steel", object(), ["steel"]]},
     "read_audio": {"path": PATH},
     "read_log": {"path": PATH},
-    "render_log": {"log": [*RECORD, None], "sr": [*OPTIONAL, 0], "residual": FLAG, "progress": CALL, "say": CALL},
+    "render_log": {
+        "log": [*RECORD, None],
+        "sr": [*OPTIONAL, 0],
+        "residual": ["no", 0, 1.0],
+        "progress": CALL,
+        "say": CALL,
+    },
     "render_scene": {
         "path": PATH,
         "seconds": [*[value for value in OPTIONAL if value is not True], 0, -1],

@@ -9,6 +9,7 @@ import numpy as np
 import pybullet
 
 from sonic_bullet.listener.frames import NO_NUMBER, encode, link_words
+from sonic_bullet.listener.memory import make_ready
 from sonic_bullet.listener.properties import Properties
 from sonic_bullet.listener.pybullet.pieces import collision_pieces
 from sonic_bullet.listener.pybullet.poses import body_ids, check_connected, is_soft, read_motion, read_roster
@@ -142,7 +143,7 @@ def dynamics_of(info: tuple[Any, ...]) -> Values:
 
 
 class AskedLinks(World):
-    """What a world answers about links by asking PyBullet. client_id: which client; properties: the links' names."""
+    """What a world says without remembering steps. client_id: which client; properties: names and what was set."""
 
     client_id: int
     properties: Properties
@@ -172,6 +173,10 @@ class AskedLinks(World):
         check_connected(self.client_id)
         check_exists(self.client_id, body, link)
         return shapes_of(self.client_id, body, link)
+
+    def make_ready(self) -> None:
+        """Have the machine code that the first step would else wait for."""
+        make_ready()
 
     def call(self, body: int, link: int, name: str) -> None:
         """Call a link so from now on. Raises SceneError where another living link has that name."""

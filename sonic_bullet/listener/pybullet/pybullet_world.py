@@ -187,7 +187,7 @@ class PyBulletWorld(facts.AskedLinks):
         """
         self.epoch += 1
         self.left_out.forget(body)
-        self._lose([code for code in (*self._known.live, *self._added.told) if body in (None, code // LINK_SPAN)])
+        self._lose([code for code in self.properties.names.codes if body in (None, code // LINK_SPAN)])
         if body is None:
             self.emptied += 1
             self.mark_engine_changed()
