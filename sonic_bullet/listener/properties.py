@@ -7,11 +7,13 @@ is set otherwise
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from copy import copy
 from dataclasses import replace
 
 from sonic_bullet.listener.frames import decode
 from sonic_bullet.listener.names import Names
 from sonic_bullet.records import Body
+from sonic_bullet.records.arrays import store
 from sonic_bullet.records.simulated import Change, Simulator, Values, finite
 
 ENGINE = None
@@ -66,7 +68,9 @@ class Properties:
         """The record of a link, with its name and all that is known of it; index: its own among the bodies."""
         dynamics = {**self.set_values.of(*decode(code)), **record.dynamics}
         self._now[index] = dynamics
-        return replace(record, name=self.names.of(code, record.name), dynamics=dynamics)
+        made = copy(record) if record.dynamics == dynamics else replace(record, dynamics=dynamics)
+        store(made, name=self.names.of(code, record.name))
+        return made
 
     def end(self, indices: Iterable[int]) -> None:
         """These records end."""

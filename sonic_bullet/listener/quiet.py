@@ -12,12 +12,18 @@ import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cache
+
+
+@cache
+def _c_library() -> ctypes.CDLL:
+    return ctypes.CDLL(None)
 
 
 @contextmanager
 def quiet_stdout() -> Iterator[None]:
     """Send what C code writes to file descriptor 1 nowhere; Python's own prints belong outside the block."""
-    flush = ctypes.CDLL(None).fflush
+    flush = _c_library().fflush
     try:
         sys.stdout.flush()
         kept = os.dup(1)

@@ -5,16 +5,21 @@ add's arguments -> AddedLinks -> reset: who of them is still there, in the order
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Hashable, Iterable, Sequence
+from copy import copy
+from dataclasses import dataclass, replace
 from math import nan
 from typing import Any
 
+from pybullet import getDynamicsInfo
+
 from sonic_bullet.listener.frames import Roster, decode
-from sonic_bullet.listener.pybullet.body_facts import describe, link_name
+from sonic_bullet.listener.pybullet.body_facts import describe, dynamics_of, link_name
 from sonic_bullet.listener.pybullet.pieces import collision_pieces
 from sonic_bullet.records import Body, Material, ModalModel, Shape
+from sonic_bullet.records.arrays import store
 from sonic_bullet.records.modal_options import ModalOptions
+from sonic_bullet.records.simulated import Values
 
 
 class AddedLinks:
@@ -22,26 +27,49 @@ class AddedLinks:
 
     def __init__(self, client_id: int) -> None:
         self._client_id = client_id
-        self.told: dict[int, tuple[Hashable, dict[str, Any]]] = {}
+        self.told: dict[int, AddedLink] = {}
 
-    def tell(self, code: int, how: dict[str, Any]) -> None:
-        """A link that exists was added; how: arguments of `added_body`."""
+    def tell(self, code: int, how: dict[str, Any], record: Body) -> None:
+        """A link that exists was added; how: arguments of `added_body`; record: what was made of it."""
         self.told.pop(code, None)
-        self.told[code] = likeness(self._client_id, *decode(code)), how
+        self.told[code] = AddedLink(how, record, likeness(self._client_id, *decode(code)))
 
     def forget(self, codes: Iterable[int]) -> None:
         """Links are gone."""
         for code in codes:
             self.told.pop(code, None)
 
-    def still_there(self, roster: Roster, *, seen: bool) -> Iterator[tuple[int, dict[str, Any]]]:
-        """Code and arguments of those whom a roster holds. seen: who was removed was forgotten; else a link of the same
-        code is the same only where its name and shape are.
+    def still_there(self, roster: Roster, *, seen: bool) -> dict[int, AddedLink]:
+        """Those whom a roster holds. seen: who was removed was forgotten; else a link of the same code is the same only
+        where its name and shape are.
         """
         there = set(roster.code.tolist())
-        for code, (alike, how) in self.told.items():
-            if code in there and (seen or alike == likeness(self._client_id, *decode(code))):
-                yield code, how
+        return {
+            code: one
+            for code, one in self.told.items()
+            if code in there and (seen or one.likeness == likeness(self._client_id, *decode(code)))
+        }
+
+    def again(self, code: int, one: AddedLink, was_set: Values) -> Body:
+        """The record of a link that is still there, as if it were added now, before the first step. was_set: of its
+        values, where the simulator does not say. Raises SceneError on absurd mass or inertia.
+        """
+        body, link = decode(code)
+        info = getDynamicsInfo(body, link, physicsClientId=self._client_id)
+        if one.record.dynamics == {**was_set, **dynamics_of(info)}:
+            made = copy(one.record)  # proven already; its inertia is among the dynamics
+            store(made, name=link_name(self._client_id, body, link), epoch=0, since_step=0, until_step=-1)
+            return made
+        return added_body(self._client_id, body, link, 0, **one.how)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AddedLink:
+    """how: arguments of `added_body`; record: as it was when it began; likeness: see there."""
+
+    how: dict[str, Any]
+    record: Body
+    likeness: Hashable
 
 
 def added_body(

@@ -128,16 +128,16 @@ def describe(client_id: int, body: int, link: int, epoch: int) -> Body:
         mass,
         np.diag(info[2]),
         curvature_per_m=curvature,
-        dynamics=_dynamics(info),
+        dynamics=dynamics_of(info),
     )
 
 
 def dynamics(client_id: int, body: int, link: int) -> Values:
     """What PyBullet says of a link that exists, under the names that changeDynamics has for it."""
-    return _dynamics(pybullet.getDynamicsInfo(body, link, physicsClientId=client_id))
+    return dynamics_of(pybullet.getDynamicsInfo(body, link, physicsClientId=client_id))
 
 
-def _dynamics(info: tuple[Any, ...]) -> Values:
+def dynamics_of(info: tuple[Any, ...]) -> Values:
     inertia = {f"localInertiaDiagonal{axis}": x for axis, x in zip("XYZ", info[2], strict=True)}
     return finite({**{name: info[place] for name, place in DYNAMICS.items()}, **inertia})
 

@@ -156,16 +156,13 @@ class PyBulletWorld(facts.AskedLinks):
             self.left_out.forget(body)
             self._census.stale()
         self._census.read()
-        how = {"material": material, "model": model, "volume_m3": volume_m3, "shapes": tuple(shapes)}
-        return self._enter(code, {**how, "options": options})
-
-    def _enter(self, code: int, how: dict[str, Any]) -> Body:
-        """The record that begins of a link that was checked, and with it what `reset` needs. how: as `add` has it."""
-        body, link = decode(code)
+        how: dict[str, Any] = {"material": material, "model": model, "volume_m3": volume_m3, "shapes": tuple(shapes)}
+        how["options"] = options
         record = replace(added_body(self.client_id, body, link, self.epoch, **how), since_step=self.step_count)
         self._close([code])
-        self._added.tell(code, how)
-        return self._append(code, record)
+        record = self._append(code, record)
+        self._added.tell(code, how, record)
+        return record
 
     def reset(self) -> None:
         """Begin anew with what was added, where it is still there: see `World.reset`.
@@ -179,10 +176,10 @@ class PyBulletWorld(facts.AskedLinks):
         added, before = self._added, self.properties
         self._begin()
         self.properties.set_values = before.set_values
-        there = list(added.still_there(self._past.roster, seen=self._uninstall is not None))
-        before.names.hand_over([code for code, _ in there], self.properties.names)
-        for code, how in there:
-            self._enter(code, how)
+        self._added.told = added.still_there(self._past.roster, seen=self._uninstall is not None)
+        before.names.hand_over(self._added.told, self.properties.names)
+        for code, one in self._added.told.items():
+            self._append(code, added.again(code, one, before.set_values.of(*decode(code))))
 
     def forget(self, body: int | None = None) -> None:
         """Say that a body was removed (None: all, by resetSimulation); its id may be given anew. With a hook, nobody

@@ -1,0 +1,139 @@
+"""Bodies that are gone leave the synthesizer's tables, and no bit of the sound hangs on when they do."""
+
+from __future__ import annotations
+
+import gc
+import weakref
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pybullet as p
+import pytest
+
+import sonic_bullet as sb
+from sonic_bullet.files.contact_log import ContactLog
+from sonic_bullet.records import Microphone, ModalSum
+from sonic_bullet.records.contacts import Contacts, Step, first_bodies
+from sonic_bullet.records.errors import LogError
+from sonic_bullet.render import Synthesizer, render_log, synthesizer
+from sonic_bullet.render.resonator import _played
+from tests.made.models import WOOD, box_model
+from tests.made.residuals import modes, residual
+from tests.made.worlds import EDGES_M, TONES_HZ, floor
+
+SOURCE = modes(TONES_HZ, 60.0)
+SOUNDING = replace(
+    WOOD, alpha_per_s=120.0, residual=residual(SOURCE, decay_per_s=60.0, last_s=0.1, lines=((1500.0, 60.0, 0.3),))
+)
+"""Dies away within a fraction of a second, and hisses."""
+
+
+def churn(client: Any, steps: int, *, alive: int = 4, every: int = 10, new_models: bool = False) -> sb.Listener:
+    """A floor, and boxes that come one after another, sound, and are removed again; some are set elsewhere by hand."""
+    ground = floor(client)
+    listener = sb.attach(client, microphone=[Microphone([0, 0, 1]), Microphone([1, 0, 0.5]), ModalSum()], seed=3)
+    listener.add(ground, material=WOOD, model=box_model((1, 1, 0.1), (200.0, 410.0), WOOD))
+    shape = client.createCollisionShape(p.GEOM_BOX, halfExtents=[e / 2 for e in EDGES_M])
+    model, rng, boxes = box_model(EDGES_M, TONES_HZ, SOUNDING), np.random.default_rng(0), []
+    for step in range(steps):
+        if step % every == 0:
+            place, turn = [*rng.uniform(-1, 1, 2), 0.08], p.getQuaternionFromEuler(rng.uniform(-1, 1, 3))
+            boxes.append(client.createMultiBody(0.4, shape, basePosition=place, baseOrientation=turn))
+            client.changeDynamics(boxes[-1], -1, contactProcessingThreshold=0, lateralFriction=0.1)
+            own = box_model(EDGES_M, TONES_HZ, SOUNDING) if new_models else model
+            listener.add(boxes[-1], material=SOUNDING, model=own)
+        if len(boxes) > alive:
+            client.removeBody(boxes.pop(0))
+        if step % 37 == 36:
+            client.resetBasePositionAndOrientation(boxes[-1], [0, 0, 0.1], [0, 0, 0, 1])
+        client.stepSimulation()
+    return listener
+
+
+@pytest.fixture(scope="module")
+def heard() -> tuple[ContactLog, np.ndarray, int]:
+    """Log and sound of boxes that came and went, and how many bodies the live tables hold at the end."""
+    from sonic_bullet.listener import direct_client, disconnect
+
+    client = direct_client()
+    client.setGravity(0, 0, -9.81)
+    listener = churn(client, 300)
+    kept = len(listener._synth._state.body)
+    found = listener.contacts, listener.sound(), kept
+    disconnect(client)
+    return found
+
+
+def test_what_is_gone_leaves_and_no_bit_hangs_on_when(
+    heard: tuple[ContactLog, np.ndarray, int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    log, sound, kept = heard
+    assert len(log.bodies) == 31
+    assert kept < 20, "the tables hold who is there, who still rings, and what went since the last look"
+    assert (np.abs(sound) > 0).any(axis=1).all()
+    tables = []
+    for every in (1, 7, 64, 10**9):
+        monkeypatch.setattr(synthesizer, "LOOK_EVERY", every)
+        assert render_log(log).tobytes() == sound.tobytes(), every
+        synth = Synthesizer(sr=log.sr, sensors=log.sensors, seed=log.seed, air=log.air)
+        for step in log.steps:
+            synth.feed(step, log.bodies)
+        assert synth.sound().tobytes() == sound.tobytes(), every
+        tables.append(len(synth._state.body))
+    assert tables == sorted(tables)
+    assert tables[0] < tables[-1] == len(log.bodies)
+
+
+def test_a_log_whose_bodies_never_leave_sounds_the_same(heard: tuple[ContactLog, np.ndarray, int]) -> None:
+    """As older logs have it: who is gone stays where it was last, in every later step."""
+    log, sound, _ = heard
+    position, quaternion = np.zeros((31, 3)), np.tile([0, 0, 0, 1.0], (31, 1))
+    steps, known = [], 0
+    for step in log.steps:
+        known = max(known, int(step.body[-1]) + 1)
+        teleported = np.zeros(known, bool)
+        position[step.body], quaternion[step.body] = step.position_m, step.quaternion_xyzw
+        teleported[step.body] = step.teleported
+        poses = position[:known], quaternion[:known]
+        steps.append(Step(step.dt_s, *poses, teleported, step.contacts, step.gravity_m_s2))
+    old = replace(log, steps=tuple(steps))
+    assert all(step.body is first_bodies(len(step.body)) for step in old.steps)
+    assert render_log(old).tobytes() == sound.tobytes()
+
+
+def test_a_body_that_comes_again_is_refused(heard: tuple[ContactLog, np.ndarray, int]) -> None:
+    log = heard[0]
+    gone = next(i for i, step in enumerate(log.steps) if len(step.body) and step.body[-1] != len(step.body) - 1)
+    turned_back = (*log.steps[: gone + 1], log.steps[gone - 1])
+    with pytest.raises(LogError, match="comes again, or after body"):
+        render_log(replace(log, steps=turned_back))
+    with pytest.raises(LogError, match="do not ascend"):
+        Step(1 / 240, np.zeros((2, 3)), np.zeros((2, 4)), np.zeros(2, bool), Contacts.none(), body=[1, 0])
+
+
+def test_nothing_holds_a_model_whose_bodies_are_gone(client: Any) -> None:
+    """What was computed of it goes with it: tables, resonators, and what functions remember."""
+    listener = churn(client, 200, every=4, new_models=True)
+    listener.world.logged = False
+    models = [weakref.ref(body.model) for body in listener.world.bodies if body.material is SOUNDING]
+    played = len(_played)
+    log = listener.contacts
+    faces = len(log.bodies[-1].model.face)
+    del log
+    client.resetSimulation()
+    listener._steps.clear()
+    for _ in range(600):  # it rings out
+        client.stepSimulation()
+        listener._steps.clear()
+    listener._synth._last = None
+    listener._frames = []
+    table = listener._synth._state.table
+    assert len(models) == 50
+    assert len(table.bodies) == 0
+    assert len(table.faces) <= faces
+    del table
+    listener.world._known.records.clear()  # those of a log, kept until now
+    gc.collect()
+    assert not any(one() is not None for one in models)
+    assert len(_played) < played - 40
