@@ -328,6 +328,8 @@ def _bodies(log: ContactLog) -> list[dict[str, Any]]:
             "material": None if body.material is None else body.material.name,
             "modes": None if body.model is None else body.model.mode_count,
             "dropped": None if body.model is None else body.model.dropped,
+            "since_step": body.since_step,
+            "until_step": body.until_step,
             "mounting": body.mounting,
             "options": None if body.options is None else asdict(body.options),
             "dynamics": dict(body.dynamics),

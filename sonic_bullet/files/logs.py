@@ -24,7 +24,7 @@ their own:
       models (in the header)
           what is no array of each; or its SHA-256, where it lies in the cache
       events (in the header)
-          in order: {"kind": "quench", "step": the step before which it happened, "body": index, or null: all}
+          in order: {"kind": see `Event`, "step": the step before which it happened, "body": index, or null: all}
       changes (in the header)
           in order: {"step": the step before which it happened, "body": index, or null: the engine, "values": {…}}
       of each body: dynamics, options, mounting; of all: engine, versions, residual (see `Body`, `ContactLog`)

@@ -87,9 +87,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
         os.write(1, b"a C library prints\n")
         return RenderResult(sound(sr=options["sr"]), log(), options["sr"], ("a note",))
 
-    def render_log(
-        given: ContactLog, *, sr: int | None = None, residual: bool = True, progress: Any = None, say: Any = None
-    ) -> np.ndarray:
+    def render_log(given: ContactLog, *, sr: int | None = None, progress: Any = None, say: Any = None) -> np.ndarray:
         kept.update(log=given, sr=sr)
         return sound(given.duration_s, sr or given.sr)
 
@@ -171,10 +169,36 @@ def test_render_writes_all_it_was_asked_for(
         described["frames"],
         described["contacts"],
     ) == ("a.wav", 16000, 1, 16000, 1)
-    assert described["bodies"][0] == {"body": 3, "link": 1, "name": "cup", "material": None, "modes": 2, "dropped": 4}
+    first = {"body": 3, "link": 1, "name": "cup", "material": None, "modes": 2, "dropped": 4}
+    assert described["bodies"][0] == first | {
+        **{"since_step": 0, "until_step": -1, "mounting": "free"},
+        **{"options": None, "dynamics": {}},
+    }
+    assert (described["engine"], described["versions"], described["events"], described["changes"]) == ({}, {}, [], [])
     assert described["notes"] == ["a note"]
     assert described["peak_pa"] == pytest.approx(0.1, rel=1e-3)
     assert len(read_log("a.npz")) == 1
+
+
+def test_a_replay_is_with_or_without_residual_as_the_log_says_unless_asked(
+    scene: Path, asked: dict[str, Any], capfd: pytest.CaptureFixture[str]
+) -> None:
+    write_log("with.npz", log())
+    write_log("without.npz", replace(log(), residual=False))
+    heard = {}
+    for name in ("with", "without"):
+        for words in ((), ("--residual",), ("--no-residual",)):
+            assert run("render", f"{name}.npz", "-o", "a.wav", "--contacts", "b.npz", *words) == 0
+            assert read_log("b.npz").residual == asked["log"].residual
+            heard[name, *words] = asked["log"].residual
+    assert heard == {
+        ("with",): True,
+        ("with", "--residual"): True,
+        ("with", "--no-residual"): False,
+        ("without",): False,
+        ("without", "--residual"): True,
+        ("without", "--no-residual"): False,
+    }
 
 
 def test_json_alone_on_stdout_whatever_the_scene_prints(

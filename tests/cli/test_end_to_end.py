@@ -110,7 +110,8 @@ def refused(folder: Path, *words: str, names: str) -> None:
 
 
 def test_a_scene_gives_sound_log_picture_and_json_and_its_log_gives_the_same_sound(folder: Path) -> None:
-    (folder / "scene.py").write_text(scene(more="print('a scene may print')"))
+    more = "print('a scene may print'); client.changeDynamics(bar, -1, linearDamping=0.01)"
+    (folder / "scene.py").write_text(scene(how='{"material": "steel", "count": 10, "name": "the bar"}', more=more))
     told = json.loads(
         good(folder, "render", "scene.py", "-o", "a.wav", "--contacts", "a.npz", "--picture", "a.png", "--json")
     )
@@ -122,7 +123,13 @@ def test_a_scene_gives_sound_log_picture_and_json_and_its_log_gives_the_same_sou
     assert told["contacts"] == len(read_log(folder / "a.npz")) > 0
     good(folder, "render", "a.npz", "-o", "b.wav", "--json", "b.json")
     assert (folder / "b.wav").read_bytes() == (folder / "a.wav").read_bytes()
-    assert json.loads((folder / "b.json").read_text())["frames"] == 9600
+    again = json.loads((folder / "b.json").read_text())
+    assert again["frames"] == 9600
+    parts = ("bodies", "engine", "versions", "events", "changes")
+    assert {name: again[name] for name in parts} == {name: told[name] for name in parts}
+    assert [body["name"] for body in told["bodies"]] == ["the bar", "link0"]
+    assert told["bodies"][0]["options"]["count"] == 10 and told["engine"]["numSolverIterations"] == 50
+    assert told["bodies"][0]["dynamics"]["linearDamping"] == 0.01, "as build set it"
     good(
         folder,
         "render",

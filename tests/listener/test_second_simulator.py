@@ -92,6 +92,16 @@ def test_what_it_refuses_is_said(log: sb.ContactLog) -> None:
     listener = sb.attach(Recorded(log))
     with pytest.raises(SceneError, match="cannot be added"):
         listener.add(0, material=STEEL)
+    with pytest.raises(SceneError, match="bring their names; leave name out"):
+        listener.world.call(0, -1, "cup")
+
+
+def test_a_world_may_say_nothing_of_itself(log: sb.ContactLog) -> None:
+    listener = sb.attach(Recorded(log))
+    listener.step()
+    assert not listener.contacts.engine and not listener.contacts.changes
+    assert set(listener.contacts.versions) == {"sonic_bullet", "numpy", "numba"}
+    assert listener.world.link_name(0, 3) == "3"
 
 
 def test_a_world_that_leaves_something_out_cannot_be_made() -> None:

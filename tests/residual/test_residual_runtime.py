@@ -64,6 +64,8 @@ def beside_sound(log: ContactLog) -> np.ndarray:
 def test_without_a_residual_nothing_changes_and_with_one_something_sounds() -> None:
     plain = render_log(struck(STEEL, {2: 0.01}))
     assert (render_log(struck(NOISY, {2: 0.01}), residual=False) == plain).all()
+    silenced = replace(struck(NOISY, {2: 0.01}), residual=False)
+    assert (render_log(silenced) == plain).all() and (render_log(silenced, residual=True) != plain).any()
     more = beside_sound(struck(NOISY, {2: 0.01}))
     assert all(1e-3 < np.sqrt((m**2).mean() / (p**2).mean()) < 3 for m, p in zip(more, plain, strict=True))
     quiet = replace(STEEL, residual=residual(SOURCE, per_hz=0.0))

@@ -92,6 +92,7 @@ class Hooks:
             "restoreState": self._telling("restoreState", client, lambda world, _: world.mark_moved(None)),
             "changeDynamics": self._setting_link(self._below(client, "changeDynamics")),
             "setPhysicsEngineParameter": self._setting_engine(self._below(client, "setPhysicsEngineParameter")),
+            "setDefaultContactERP": self._setting_engine(self._below(client, "setDefaultContactERP"), "contactERP"),
             **{name: self._telling(name, client, lambda world, body: world.mark_moved(body)) for name in POSE_SETTERS},
         }
         self._kept = {name: vars(client)[name] for name in self._ours if name in vars(client)}
@@ -172,10 +173,13 @@ class Hooks:
 
         return setting
 
-    def _setting_engine(self, below: Callable[..., Any]) -> Callable[..., Any]:
+    def _setting_engine(self, below: Callable[..., Any], name: str | None = None) -> Callable[..., Any]:
+        """name: what its only argument is called elsewhere; None: all have their names."""
+
         def setting(*args: Any, **kwargs: Any) -> Any:
             result = below(*args, **kwargs)
-            self.set_values.set_engine(without_client(kwargs))
+            values = without_client(kwargs)
+            self.set_values.set_engine(values if name is None else {name: next(iter((*args, *values.values())))})
             for one in self.listening[:]:
                 one.world.mark_engine_changed()
             return result
