@@ -22,7 +22,7 @@ class ContactLog:
     """Everything a later render needs, by value: bodies with their models, steps, sensors, rate and seed.
 
     untouched: ids of bodies that were in the world and touched nothing; known while listening, not kept in files.
-    events: whatever else changed the sound, in the order in which it happened.
+    events: what happened besides contacts, in its order.
     """
 
     bodies: tuple[Body, ...]
@@ -52,6 +52,8 @@ class ContactLog:
             object.__setattr__(self, name, value)
         if any(later.step < earlier.step for earlier, later in itertools.pairwise(self.events)):
             raise LogError("events that are not in the order of their steps", "use an unbroken contact log")
+        if any(event.body is not None and event.body >= len(self.bodies) for event in self.events):
+            raise LogError("an event of a body that the log has not", "use an unbroken contact log")
         for step in self.steps:
             if len(step.body) and step.body[-1] >= len(self.bodies):
                 raise LogError("a step has a pose of a body that the log has not", "use an unbroken contact log")

@@ -1,7 +1,7 @@
-"""The bodies that a log of a world names: who lives under which code, since when and until when, and where each was
-last.
+"""The bodies that a log of a world names: who lives under which code, since when and until when.
 
-    code of a link -> index into the bodies; a record that ended stays, its code may be given anew
+code of a link -> index into the bodies, counted on for ever; a code may be given anew, an index is not
+roster -> START.index, START.pose, and the indices (b,) of those whose poses a step holds
 """
 
 from __future__ import annotations
@@ -14,31 +14,39 @@ import numpy as np
 from sonic_bullet.listener.frames import Roster, rows_of
 from sonic_bullet.listener.start import start_table
 from sonic_bullet.records import Array, Body
+from sonic_bullet.records.contacts import first_bodies
 
 
 class KnownBodies:
-    """State of that for one world. pose_m (b, 7): position and orientation, the last of who is gone."""
+    """State of that for one world. records: by index, in its order, of all or, not keeping who is gone, of the living;
+    count: of all there ever were. body (b,): indices of those in the roster last asked for, ascending; the same array
+    while they are the same.
+    """
 
     def __init__(self) -> None:
-        self.records: list[Body] = []
+        self.records: dict[int, Body] = {}
+        self.count = 0
         self.live: dict[int, int] = {}
-        self.pose_m = np.zeros((0, 7))
+        self.body: Array = first_bodies(0)
         self._roster: Roster | None = None
         self._start: Array = np.zeros(0)
 
-    def append(self, code: int, record: Body, pose_m: Array) -> None:
-        """A record of the link of that code begins, at a pose (7,)."""
-        self.live[code] = len(self.records)
-        self.records.append(record)
-        self.pose_m = np.concatenate([self.pose_m, pose_m[None]])
+    def append(self, code: int, record: Body) -> None:
+        """A record of the link of that code begins."""
+        self.live[code] = self.count
+        self.records[self.count] = record
+        self.count += 1
         self._roster = None
 
-    def close(self, codes: Iterable[int], step: int) -> None:
-        """The records of the links of these codes end before that step."""
+    def close(self, codes: Iterable[int], step: int, *, keep: bool) -> None:
+        """The records of the links of these codes end before that step; keep: they stay known."""
         for code in codes:
             if code in self.live:
                 index = self.live.pop(code)
-                self.records[index] = replace(self.records[index], until_step=step)
+                if keep:
+                    self.records[index] = replace(self.records[index], until_step=step)
+                else:
+                    del self.records[index]
         self._roster = None
 
     def gone(self, roster: Roster) -> list[int]:
@@ -46,15 +54,23 @@ class KnownBodies:
         codes = np.array(list(self.live), np.int64)
         return [int(code) for code in codes[rows_of(roster, codes) < 0]]
 
-    def index(self, roster: Roster) -> Array:
-        """(n,) index into the records of each row of a roster, -1 for who never met anybody."""
-        return np.array([self.live.get(int(code), -1) for code in roster.code], np.int64)
+    def enter(self, start: Array) -> None:
+        """Fill index and pose of START rows (n,), -1 for who never met anybody; `body` are those in it."""
+        start["index"] = index = np.array([self.live.get(code, -1) for code in start["code"].tolist()], np.int64)
+        body = np.sort(index[index >= 0])
+        if not np.array_equal(body, self.body):
+            first = first_bodies(len(body))
+            self.body = first if np.array_equal(body, first) else body
+            self.body.flags.writeable = False
+        start["pose"] = np.searchsorted(self.body, index)
 
     def start(self, roster: Roster) -> Array:
-        """START rows (n,) of a roster, with code, static and index filled; the same table while neither changes."""
+        """START rows (n,) of a roster, with code, static, index and pose filled; the same table while neither
+        changes.
+        """
         if self._roster is not roster:
             self._roster, self._start = roster, start_table(roster)
-            self._start["index"] = self.index(roster)
+            self.enter(self._start)
         return self._start
 
 

@@ -17,8 +17,11 @@ from sonic_bullet.listener.sweep import Traces
 from sonic_bullet.records import Array
 from sonic_bullet.records.arrays import frozen_array
 from sonic_bullet.records.coerce import as_number
-from sonic_bullet.records.contacts import CONTACT, Contacts, Step
+from sonic_bullet.records.contacts import CONTACT, Contacts, Step, first_bodies
 from sonic_bullet.records.errors import LogError, SceneError
+
+Poses = tuple[Array, Array, Array]
+"""Of a step's bodies: position (b, 3), quaternion (b, 4), and who was moved by hand (b,)."""
 
 
 class Memory:
@@ -37,6 +40,7 @@ class Memory:
         self._checked: tuple[float, tuple[float, ...]] = (0.0, ())
         self._dt_s = 0.0
         self._gravity_m_s2 = np.zeros(3)
+        self._poses = _room(0), first_bodies(0)
 
     def forget(self) -> None:
         """All that touched is gone."""
@@ -66,7 +70,8 @@ class Memory:
         k, traces = len(self.raw), self._traces
         traces.reserve(k)
         touch, row = np.empty(k, TOUCH), np.empty(k, CONTACT)
-        poses = self._poses(known)
+        start = known.start(now.roster)
+        poses = _room(len(known.body))
         count, made = take_step(
             self.raw,
             self.raw_before,
@@ -76,7 +81,7 @@ class Memory:
             now.row,
             by_hand,
             hooked,
-            known.start(now.roster),
+            start,
             dt_s,
             self.time_s,
             traces.table,
@@ -84,13 +89,12 @@ class Memory:
             traces.newest,
             traces.work,
             row,
-            known.pose_m,
             *poses,
         )
         if made < 0:
             return None
         self.touches = Touches(touch if count == k else touch[:count])
-        return self._step(dt_s, gravity, poses, row, made)
+        return self._step(dt_s, gravity, poses, known.body, row, made)
 
     def made(
         self, known: KnownBodies, start: Array, touches: Touches, past: Touches | None, dt_s: float
@@ -126,21 +130,17 @@ class Memory:
     def unusual(
         self, known: KnownBodies, start: Array, row: Array, made: int, dt_s: float, gravity: tuple[float, ...]
     ) -> Step:
-        """The step of rows that `made` made."""
-        poses = self._poses(known)
-        place_bodies(start, known.pose_m, *poses)
-        return self._step(dt_s, gravity, poses, row, made)
+        """The step of rows that `made` made; `start` is as `known.enter` left it."""
+        poses = _room(len(known.body))
+        place_bodies(start, *poses)
+        return self._step(dt_s, gravity, poses, known.body, row, made)
 
-    def nothing(self, known: KnownBodies, dt_s: float, gravity: tuple[float, ...]) -> Step:
-        """A step in which nothing happens."""
-        pose = known.pose_m
-        nobody = np.zeros(len(pose), bool)
+    def nothing(self, dt_s: float, gravity: tuple[float, ...]) -> Step:
+        """A step in which nothing happens: all is where it was in the last one."""
         self._check(dt_s, gravity)
-        return Step(self._dt_s, pose[:, :3], pose[:, 3:], nobody, Contacts.none(), self._gravity_m_s2)
-
-    def _poses(self, known: KnownBodies) -> tuple[Array, Array, Array]:
-        b = len(known.pose_m)
-        return np.empty((b, 3)), np.empty((b, 4)), np.empty(b, bool)
+        poses, body = self._poses
+        still = poses[0], poses[1], np.zeros(len(body), bool)
+        return Step.trusted(self._dt_s, *still, Contacts.none(), self._gravity_m_s2, body)
 
     def _check(self, dt_s: float, gravity: tuple[float, ...]) -> None:
         if self._checked != (dt_s, gravity):
@@ -149,19 +149,22 @@ class Memory:
             self._gravity_m_s2 = frozen_array(np.array(gravity), float, (3,), "step: gravity_m_s2")
             self._checked = dt_s, gravity
 
-    def _step(
-        self, dt_s: float, gravity: tuple[float, ...], poses: tuple[Array, Array, Array], row: Array, made: int
-    ) -> Step:
+    def _step(self, dt_s: float, gravity: tuple[float, ...], poses: Poses, body: Array, row: Array, made: int) -> Step:
         self._check(dt_s, gravity)
         self._traces.turn()
         self.time_s += dt_s
+        self._poses = poses, body
         if made == 0:
             contacts = Contacts.none()
         else:
             row = row if made == len(row) else row[:made].copy()
             row.flags.writeable = False
             contacts = Contacts.trusted(row)
-        return Step.trusted(self._dt_s, *poses, contacts, self._gravity_m_s2)
+        return Step.trusted(self._dt_s, *poses, contacts, self._gravity_m_s2, body)
+
+
+def _room(bodies: int) -> Poses:
+    return np.empty((bodies, 3)), np.empty((bodies, 4)), np.empty(bodies, bool)
 
 
 def make_ready() -> None:
@@ -169,5 +172,6 @@ def make_ready() -> None:
     memory, known, dt_s, gravity = Memory(), KnownBodies(), 1 / 240, (0.0, 0.0, 0.0)
     motion = Motion(Roster((), np.zeros(0, np.int64), np.zeros(0, bool)), np.zeros(0, MOTION))
     touches, start = loaded(NO_RAW, NO_RAW, dt_s), hooked_start(motion, motion, (), dt_s)
+    known.enter(start)
     memory.unusual(known, start, *memory.made(known, start, touches, touches, dt_s), dt_s, gravity)
     memory.usual(known, motion, motion, NOBODY, dt_s, gravity, True)

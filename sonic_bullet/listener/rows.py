@@ -1,6 +1,6 @@
 """Rows of one step: which touches count, and what the sound needs to know of each.
 
-    TOUCH (k,) + START (n,) -> CONTACT rows, traces for the next step, poses of the bodies of the log
+    TOUCH (k,) + START (n,) -> CONTACT rows, traces for the next step, poses of the bodies that the log knows
 
 Compiled; `take_step` is a whole step of a world in which nothing unusual happened, in one call.
 """
@@ -133,27 +133,18 @@ def contact_rows(touch, count, past, start, dt, time, table, counted, newest, sc
 
 
 @njit(nogil=True, error_model="numpy")
-def place_bodies(start, pose, position, quaternion, teleported):
-    """Poses of the bodies of the log: position (b, 3), quaternion (b, 4), and who was moved by hand (b,), from START
-    (n,).
-
-    pose (b, 7): the last of each, which stay for who is gone; written anew.
+def place_bodies(start, position, quaternion, teleported):
+    """Poses of those of START (n,) whom the log knows: position (b, 3), quaternion (b, 4), and who was moved by hand
+    (b,), each in its row START.pose.
     """
-    for i in range(len(teleported)):
-        teleported[i] = False
     for i in range(len(start)):
         body = start[i]
         if body.index >= 0:
             for x in range(3):
-                pose[body.index, x] = body.position_m[x]
+                position[body.pose, x] = body.position_m[x]
             for x in range(4):
-                pose[body.index, 3 + x] = body.quaternion_xyzw[x]
-            teleported[body.index] = body.moved != 0
-    for i in range(len(pose)):
-        for x in range(3):
-            position[i, x] = pose[i, x]
-        for x in range(4):
-            quaternion[i, x] = pose[i, 3 + x]
+                quaternion[body.pose, x] = body.quaternion_xyzw[x]
+            teleported[body.pose] = body.moved != 0
 
 
 @njit(nogil=True, error_model="numpy")
@@ -190,7 +181,6 @@ def take_step(
     newest,
     scratch,
     row,
-    pose,
     position,
     quaternion,
     teleported,
@@ -210,5 +200,5 @@ def take_step(
         return count, UNUSUAL
     made = contact_rows(touch, count, past, start, dt, time, table, counted, newest, scratch, row)
     if made >= 0:
-        place_bodies(start, pose, position, quaternion, teleported)
+        place_bodies(start, position, quaternion, teleported)
     return count, made

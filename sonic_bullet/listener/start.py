@@ -31,6 +31,7 @@ START = np.dtype(
         ("code", "i8"),  # frames.encode
         ("static", "i8"),  # 1 where its mass is 0
         ("index", "i8"),  # into the bodies of the log; -1 where it has met nobody yet, LEFT_OUT
+        ("pose", "i8"),  # where index is not below 0: its row among the step's poses
         ("moved", "i8"),  # 1 where it was set elsewhere by hand since the step before
         ("born", "i8"),  # 1 in its first step
         ("met", "i8"),  # 1 where it meets somebody for the first time

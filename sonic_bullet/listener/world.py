@@ -10,10 +10,11 @@ A second simulator derives from `World` and is handed to `sonic_bullet.attach` i
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from sonic_bullet.records import Body, Material, ModalModel, Shape
 from sonic_bullet.records.contacts import Step
+from sonic_bullet.records.errors import SceneError
 
 
 class World(ABC):
@@ -21,11 +22,22 @@ class World(ABC):
 
     stepped: bool
     """Whether the last `after_step` found a step: a second call without one between finds none."""
+    emptied = 0
+    """How often the world has lost all its bodies at once (PyBullet's resetSimulation), as far as that is seen."""
+    keeps_gone = True
+    """Whether `bodies` holds who is gone: False where nobody keeps a log, and such records may be dropped."""
 
     @property
     @abstractmethod
     def bodies(self) -> tuple[Body, ...]:
-        """All bodies ever met, in the order that Contacts.a and Contacts.b count them."""
+        """All bodies ever met, in the order that Contacts.a and Contacts.b count them; the living alone where
+        `keeps_gone` is False.
+        """
+
+    @property
+    def records(self) -> Sequence[Body] | Mapping[int, Body]:
+        """`bodies` by what Contacts.a and Contacts.b count: an index is of one body for ever, whoever is dropped."""
+        return self.bodies
 
     @property
     def untouched(self) -> frozenset[int]:
@@ -72,6 +84,13 @@ class World(ABC):
     @abstractmethod
     def after_step(self) -> Step:
         """The record of the step just made. Raises SceneError."""
+
+    def reset(self) -> None:
+        """Begin anew, as a world that has just been opened and of which the same bodies were added, in the order in
+        which they last were: steps and indices count from 0, who was met by itself is met anew, who is gone is
+        forgotten, `notes` are empty. Raises SceneError, having changed nothing, where that is not possible.
+        """
+        raise SceneError("this world cannot begin anew", "attach a new listener, or give its World a `reset`")
 
     def listen(self, after: Callable[[], object]) -> bool:
         """Call ``after`` after every step from now on, if the simulator can; whether it does.

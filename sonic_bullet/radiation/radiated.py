@@ -7,11 +7,11 @@ models themselves
 
 from __future__ import annotations
 
-from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 
+from sonic_bullet.machine.while_alive import WhileAlive
 from sonic_bullet.modal import cache as store
 from sonic_bullet.radiation import entrained_mass as added_mass
 from sonic_bullet.radiation import far_field as radiation
@@ -27,7 +27,7 @@ NO_SURFACE = (
 LAYOUT = {name: store.Kept("f8", ("m",)) for name in ("real", "imag", "damping")}
 
 
-@lru_cache(maxsize=64)
+@WhileAlive
 def radiation_of(model: ModalModel, air: Air, cache: store.Place = "default") -> tuple[Array, Array]:
     """`radiation.far_field.radiation` of a model: pressure weight (m,) complex and radiation damping (m,).
 

@@ -221,7 +221,7 @@ class Shape:
             )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class ModalModel:
     """A body's vibration modes on its surface, and the surface they live on.
 

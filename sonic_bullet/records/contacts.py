@@ -263,17 +263,21 @@ class Step:
         return made
 
 
-EVENT_KINDS = ("quench",)
+EVENT_KINDS = ("quench", "reset", "moved")
+OF_ONE_BODY = ("moved",)
+"""Kinds of event that concern one body and name it; the others concern all."""
 
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """What changed the sound between two physics steps without being a contact.
+    """What happened between two physics steps without being a contact.
 
-    kind: "quench", all that rings stops. step: the number of the step before which it happened; it acts at that step's
-    first sample, whatever the rate. body: index into the log's `bodies` of the one it concerns, None: all of them (a
-    quench is of all). Raises LogError for a kind that this version does not know: passed over, it would make another
-    sound of the log.
+    kind: "quench", all that rings stops; "reset", the world was emptied (resetSimulation); "moved", a body was set
+    elsewhere by hand, and had not been before the step before. A quench changes the sound; the others say why contacts
+    differ: what they do is in the poses of the steps. step: the number of the step before which it happened; it acts
+    at that step's first sample, whatever the rate. body: index into the log's `bodies` of the one that was moved, None:
+    it is of all. Raises LogError for a kind that this version does not know: passed over, it would make another sound
+    of the log.
     """
 
     kind: str
@@ -285,5 +289,8 @@ class Event:
             raise LogError(f"an event of the unknown kind '{self.kind[:40]}'", "use the version that wrote the log")
         if self.step < 0:
             raise LogError(f"an event before step {self.step}", "use an unbroken contact log")
-        if self.body is not None:
-            raise LogError(f"a {self.kind} of body {self.body} alone", "use the version that wrote the log")
+        if (self.body is None) == (self.kind in OF_ONE_BODY):
+            who = "of no body" if self.body is None else f"of body {self.body} alone"
+            raise LogError(f"an event '{self.kind}' {who}", "use the version that wrote the log")
+        if self.body is not None and self.body < 0:
+            raise LogError(f"an event of body {self.body}", "use an unbroken contact log")

@@ -61,9 +61,9 @@ def render_log(
     while first < len(log.steps):
         if first in quenches:
             synth.quench()
-        bodies, stop = len(log.steps[first].position_m), first + 1
+        who, stop = log.steps[first].body, first + 1
         while stop < min(first + AT_ONCE, len(log.steps)) and stop not in quenches:
-            if len(log.steps[stop].position_m) != bodies:
+            if log.steps[stop].body is not who and not np.array_equal(log.steps[stop].body, who):
                 break
             stop += 1
         synth.play(log.steps[first:stop], log.bodies)

@@ -6,7 +6,9 @@ Resonator + lines of its residual -> BODY row;  its model -> FACE, NODE rows, sh
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -34,6 +36,13 @@ class _Place:
 
 
 _NOWHERE = _Place(0, 0, 0, 0, 0, 0.0, 0.0)
+
+
+def _stand(row: Any, place: _Place) -> None:
+    """Enter where its model is into a BODY row."""
+    row["wall_m"], row["tie_m"] = place.wall_m, place.tie_m
+    row["frequency_at"], row["shape_at"] = place.frequency_at, place.shape_at
+    row["face_at"], row["faces"], row["node_at"] = place.face_at, place.faces, place.node_at
 
 
 class _Growing:
@@ -106,12 +115,10 @@ class BodyTable:
         row["size_m"], row["volume_m3"] = resonator.size_m, body.volume_m3
         row["curvature_per_m"] = body.curvature_per_m
         row["edge_per_m"] = 1.0 / max(EDGE_RADIUS_SHARE * resonator.size_m, EDGE_RADIUS_LEAST_M)
-        row["wall_m"], row["tie_m"] = place.wall_m, place.tie_m
         row["surface_seed"] = surface_seed
         row["rigid"] = resonator.translation is not None
         row["modes"], row["columns"] = resonator.mode_count, resonator.mode_count + len(follows)
-        row["frequency_at"], row["shape_at"] = place.frequency_at, place.shape_at
-        row["face_at"], row["faces"], row["node_at"] = place.face_at, place.faces, place.node_at
+        _stand(row, place)
         # a silent partner's record begins where it first touches, not where it was put
         row["placed"] = -SPAN if material is None else body.since_step
         return self._bodies.append(row)
@@ -122,6 +129,22 @@ class BodyTable:
         other._bodies.append(self.bodies)
         other._faces, other._nodes, other._shapes = self._faces, self._nodes, self._shapes
         other._frequencies, other._places = self._frequencies, dict(self._places)
+        return other
+
+    def subset(self, keep: Array, kept: Sequence[tuple[Resonator, Array]]) -> BodyTable:
+        """A table of the bodies (k,) of these numbers alone, whose resonators and `follows` are given. What belongs to
+        models is the same while half of it at least is theirs, else put together anew.
+        """
+        other = BodyTable()
+        other._bodies.append(self.bodies[keep])
+        keys = {(one.body.model, follows.tobytes()) for one, follows in kept}
+        places = {key: place for key, place in self._places.items() if key in keys}
+        if 2 * sum(place.faces for place in places.values()) >= len(self.faces):
+            other._faces, other._nodes, other._shapes = self._faces, self._nodes, self._shapes
+            other._frequencies, other._places = self._frequencies, places
+        else:
+            for row, (one, follows) in zip(other.bodies, kept, strict=True):
+                _stand(row, other._place(one, follows))
         return other
 
     def _place(self, resonator: Resonator, follows: Array) -> _Place:

@@ -20,6 +20,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from sonic_bullet.machine.while_alive import WhileAlive
 from sonic_bullet.records import Air, Array, Body, ModalModel, Residual
 from sonic_bullet.render.resonator import Resonator, build_resonator
 from sonic_bullet.render.step_events import Drive, ForcePulse
@@ -58,7 +59,7 @@ def build_residual_voice(resonator: Resonator, sr: int, air: Air) -> ResidualVoi
         or not resonator.weight.any()
     ):
         return None
-    voice = _voice(material.residual, model, air, sr)
+    voice = _voice(model, material.residual, air, sr)
     group = np.empty(resonator.mode_count, np.int64)
     group[np.argsort(resonator.omega_rad_s, kind="stable")] = voice.pairs.group
     line, mode = [], []
@@ -87,8 +88,8 @@ def build_residual_voice(resonator: Resonator, sr: int, air: Air) -> ResidualVoi
     )
 
 
-@lru_cache(maxsize=64)
-def _voice(residual: Residual, model: ModalModel, air: Air, sr: int) -> Voice:
+@WhileAlive
+def _voice(model: ModalModel, residual: Residual, air: Air, sr: int) -> Voice:
     """A voice, once for bodies that share residual and model (records are compared by identity); pairs by the modes'
     mean square over the surface.
     """
@@ -151,11 +152,15 @@ def friction_grains(
     drives: Sequence[Drive],
     resonators: Sequence[Resonator],
     voice: Sequence[ResidualVoice | None],
+    number_of: Array,
     at: int,
     n: int,
     seed: int,
 ) -> tuple[list[Grain], Rubs]:
-    """Grains of the sections of rubbing that end within the n samples from ``at`` on, and what goes on afterwards."""
+    """Grains of the sections of rubbing that end within the n samples from ``at`` on, and what goes on afterwards.
+
+    number_of (b,): of each body in the log, by which its partners' noise is told apart.
+    """
     driven = {(d.low, d.high, side): d for d in drives for side in (0, 1) if voice[(d.low, d.high)[side]] is not None}
     grains, kept = [], {}
     for key in sorted(set(rubs) | set(driven)):
@@ -168,7 +173,7 @@ def friction_grains(
         if state is not None:
             kept[key] = replace(state, gain=gain)
         for number, force_n in sections:
-            own = mixed_number(seed, who.body_id, who.link + 1, who.epoch, key[1 - key[2]], number)
+            own = mixed_number(seed, who.body_id, who.link + 1, who.epoch, int(number_of[key[1 - key[2]]]), number)
             for w, weight in enumerate(resonators[body].weight):
                 sample = (
                     section_grain(mine.voice, force_n, struck_power(mine, weight, gain), own)

@@ -13,11 +13,12 @@ without bound where the body is no longer small.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
 from sonic_bullet.geometry.nearest_point import SurfaceIndex, nearest, surface_index
+from sonic_bullet.machine.while_alive import WhileAlive
 from sonic_bullet.radiation.far_field import jerk_coefficient
 from sonic_bullet.radiation.radiated import radiation_of
 from sonic_bullet.records import Air, Array, Body, Microphone, ModalModel, ModalSum, Sensor, Vibrometer
@@ -82,17 +83,9 @@ def build_resonator(body: Body, sensors: tuple[Sensor, ...], sr: int, air: Air) 
             None,
             0,
         )
-    pressure, extra = radiation_of(model, air)
-    omega0_squared = model.omega0_squared_per_s2
-    own = np.nan_to_num(model.decay_per_s)
-    decay = own if model.includes_radiation else own + extra
-    omega = np.sqrt(np.maximum(omega0_squared - decay**2, 0.0))
-    keep = audible(omega, decay, sr)
-    omega, decay = omega[keep], decay[keep]
-    shape = np.ascontiguousarray(model.shape[:, :, keep])
+    keep, omega, decay, pressure, shape, most, index, radius = _played(model, air, sr)
     weight = np.zeros((1 + len(readers), len(omega)), complex)
-    weight[0] = pressure[keep]
-    index = _surface(model)
+    weight[0] = pressure
     for row, sensor in enumerate(readers, start=1):
         if isinstance(sensor, ModalSum):
             weight[row] = sensor.scale * -1j / (1 + 1j * decay / omega)
@@ -104,11 +97,8 @@ def build_resonator(body: Body, sensors: tuple[Sensor, ...], sr: int, air: Air) 
             face, barycentric, _ = nearest(index, sensor.point_m[None], None)
             corners = shape[model.face[face[0]]].astype(float)
             weight[row] = np.einsum("c,cxm,x->m", barycentric[0], corners, sensor.direction)
-    radius = float(np.linalg.norm(model.vertex_m, axis=1).max(initial=0.0))
     dropped = model.dropped + int(np.sum(~keep))
     translation = _translation(body, sr, air)
-    # velocity at the surface of a mode with |z| = 1
-    most = np.sqrt((shape.astype(float) ** 2).sum(axis=1)).max(axis=0, initial=0.0)
     bend = None if model.bend_s2_m2 is None else model.bend_s2_m2[keep] * most**2
     damping_growth = None if model.damping_growth_s_m is None else model.damping_growth_s_m[keep] * most
     return Resonator(
@@ -128,10 +118,35 @@ def build_resonator(body: Body, sensors: tuple[Sensor, ...], sr: int, air: Air) 
     )
 
 
-@lru_cache(maxsize=256)
-def _surface(model: ModalModel) -> SurfaceIndex | None:
-    """The tree of a model's surface, once for all bodies that share it (records are compared by identity)."""
-    return surface_index(model.vertex_m, model.face, model.curvature_per_m) if len(model.face) else None
+class _Played(NamedTuple):
+    """What bodies that share a model share. keep: which of its modes are audible; omega_rad_s, decay_per_s, pressure,
+    shape: see `Resonator`, of those; most: velocity at the surface of a mode with |z| = 1.
+    """
+
+    keep: Array
+    omega_rad_s: Array
+    decay_per_s: Array
+    pressure: Array
+    shape: Array
+    most: Array
+    surface: SurfaceIndex | None
+    radius_m: float
+
+
+@WhileAlive
+def _played(model: ModalModel, air: Air, sr: int) -> _Played:
+    """Once for all bodies that share a model (records are compared by identity)."""
+    pressure, extra = radiation_of(model, air)
+    omega0_squared = model.omega0_squared_per_s2
+    own = np.nan_to_num(model.decay_per_s)
+    decay = own if model.includes_radiation else own + extra
+    omega = np.sqrt(np.maximum(omega0_squared - decay**2, 0.0))
+    keep = audible(omega, decay, sr)
+    shape = np.ascontiguousarray(model.shape[:, :, keep])
+    most = np.sqrt((shape.astype(float) ** 2).sum(axis=1)).max(axis=0, initial=0.0)
+    index = surface_index(model.vertex_m, model.face, model.curvature_per_m) if len(model.face) else None
+    radius = float(np.linalg.norm(model.vertex_m, axis=1).max(initial=0.0))
+    return _Played(keep, omega[keep], decay[keep], pressure[keep], shape, most, index, radius)
 
 
 def _translation(body: Body, sr: int, air: Air) -> Translation | None:

@@ -69,8 +69,8 @@ def _untouched(log: ContactLog, rows: Contacts, added: Array) -> str:
     moved = np.zeros(len(added))
     lived = np.zeros(len(added))
     for step in log.steps:
-        moved[: len(step.teleported)] += step.teleported
-        lived[: len(step.teleported)] += 1
+        moved[step.body] += step.teleported
+        lived[step.body] += 1
     hand = np.flatnonzero((moved > 0) & (moved >= BY_HAND * lived))
     if len(hand):
         return (

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet.records import Air, Array, Body, Microphone, Sensor
+from sonic_bullet.records.contacts import first_bodies
 from sonic_bullet.render.body_table import BodyTable
 from sonic_bullet.render.clock import Clock
 from sonic_bullet.render.friction import surface_seed
@@ -53,6 +54,11 @@ class Setup:
         return np.where(own, np.cumsum(own), 0).astype(np.int64)
 
 
+def pair_key(body: Array) -> Array:
+    """(k,) keys of pairs of bodies (k, 2), the lower one first."""
+    return np.asarray(body[:, 0] << 32 | body[:, 1])
+
+
 @dataclass(slots=True, eq=False)
 class Window:
     """The last SPAN steps, step k in place k % SPAN: step (SPAN,) WINDOW; poses and who was moved by hand (SPAN, b, ·);
@@ -72,6 +78,15 @@ class Window:
         turned = np.broadcast_to(quaternion_xyzw, (SPAN, count, 4))
         self.quaternion_xyzw = np.concatenate([self.quaternion_xyzw, turned], axis=1)
         self.teleported = np.concatenate([self.teleported, np.zeros((SPAN, count), bool)], axis=1)
+
+    def subset(self, keep: Array, number: Array) -> None:
+        """The bodies (k,) of these numbers alone. number (b,): the new one of each."""
+        self.position_m, self.quaternion_xyzw = self.position_m[:, keep].copy(), self.quaternion_xyzw[:, keep].copy()
+        self.teleported = self.teleported[:, keep].copy()
+        for first, stop in self.step["row"].tolist():
+            row = self.row[first:stop]
+            row["body"] = number[row["body"]]
+            row["key"] = pair_key(row["body"])
 
     def with_room(self, rows: int) -> None:
         """Room for so many rows a step."""
@@ -97,6 +112,12 @@ class TouchingPairs:
     count: Array
     free: Array
     gain: Array
+
+    def subset(self, number: Array) -> None:
+        """number (b,): the new one of each body."""
+        active = self.active[: self.count[0]]
+        self.pair["body"][active] = number[self.pair["body"][active]]
+        self.pair["key"][active] = pair_key(self.pair["body"][active])
 
     def with_room(self, slots: int, columns: int) -> None:
         """Room for so many pairs more, and gains of so many columns."""
@@ -156,8 +177,9 @@ class StepScratch:
 @dataclass(slots=True, eq=False)
 class State:
     """All that the next frame hangs on. taken: steps taken in; clock: start of the step to be rendered next, waiting:
-    lengths of those taken in and not rendered. quenches: steps before which all is to stop ringing. voices (b): their
-    residuals; grains, rubs: what of those is under way.
+    lengths of those taken in and not rendered. body (b,): each body's index in the log, ascending; present: those of
+    the step taken in last (the others are gone, and ring on where they were); newest: the highest so far. quenches:
+    steps before which all is to stop ringing. voices (b): their residuals; grains, rubs: what of those is under way.
     """
 
     window: Window
@@ -174,11 +196,19 @@ class State:
     voices: tuple[ResidualVoice | None, ...] = ()
     grains: tuple[Grain, ...] = ()
     rubs: Rubs = field(default_factory=dict)
+    body: Array = field(default_factory=lambda: first_bodies(0))
+    present: Array = field(default_factory=lambda: first_bodies(0))
+    newest: int = -1
     quenches: frozenset[int] = frozenset()
     scratch: StepScratch = field(default_factory=StepScratch)
     reads: Array = field(default_factory=lambda: np.zeros(0, np.int64))
     has_residual: bool = False
     _tables: tuple[Any, ...] | None = None
+
+    @property
+    def mapped(self) -> bool:
+        """Whether some body's number in the tables is not its index in the log."""
+        return self.newest >= len(self.body)
 
     def changed(self) -> None:
         """Some table is another array than before."""
@@ -212,7 +242,8 @@ class State:
         return State(
             self.window.copy(), self.pairs.copy(), self.table.copy(), self.bank, self.ringing.copy(), self.path,
             self.travelling.copy(), self.taken, self.clock, self.waiting, self.resonators, self.voices, self.grains,
-            dict(self.rubs), self.quenches, StepScratch(), self.reads, self.has_residual,
+            dict(self.rubs), self.body, self.present, self.newest, self.quenches, StepScratch(),
+            self.reads, self.has_residual,
         )  # fmt: skip
 
 

@@ -14,25 +14,30 @@ from dataclasses import replace
 
 import numpy as np
 
-from sonic_bullet.records import Air, Array, Body, Sensor
+from sonic_bullet.records import Air, Array, Sensor
 from sonic_bullet.records.contacts import Contacts, Step
 from sonic_bullet.records.errors import AudioError
 from sonic_bullet.render import driver
 from sonic_bullet.render.clock import Clock, exact_step
 from sonic_bullet.render.first_run import make_driver
+from sonic_bullet.render.presence import Records, admit, in_tables, release
 from sonic_bullet.render.residual_voice import friction_grains, impact_grains
 from sonic_bullet.render.step_events import drives_of, pulses_of
-from sonic_bullet.render.synthesis_state import Setup, State, quench, start, with_bodies
+from sonic_bullet.render.synthesis_state import Setup, State, quench, start
 from sonic_bullet.residual.player import add_grains
 from sonic_bullet.synth import path, path_places
 from sonic_bullet.synth.strikes import LOOKAHEAD
 
 LATENCY_STEPS = LOOKAHEAD
+LOOK_EVERY = 64
+"""Steps between two looks at who of those gone is silent: what a look costs, 20 µs, and what it takes to let somebody
+go are then nothing, and tables hold at most what went in so many steps beside what still rings.
+"""
 
 
 def advance(setup: Setup, state: State, steps: Sequence[Step]) -> Array:
-    """Take in steps, of as many bodies as the state has; (channels, n) of those that can be rendered then, LOOKAHEAD
-    before them. Changes ``state`` in place: `copy` it first to come back to it.
+    """Take in steps, of those bodies that the state has as present; (channels, n) of those that can be rendered then,
+    LOOKAHEAD before them. Changes ``state`` in place: `copy` it first to come back to it.
     """
     if len(steps) == 1 and not state.quenches:  # live, where a microsecond counts
         return _advanced(setup, state, steps)
@@ -77,6 +82,8 @@ def _advanced(setup: Setup, state: State, steps: Sequence[Step]) -> Array:
     sr, begin, pause = setup.sr, state.ringing.at, state.has_residual
     table, clock, waiting = _schedule(sr, state, steps)
     contacts, poses = _joined(steps)
+    if state.present is not state.body or state.mapped:
+        contacts, poses = in_tables(state, contacts, poses)
     stop = clock.sample(sr)
     out = np.zeros((len(setup.sensors), stop - begin))
     pressure = (
@@ -147,7 +154,9 @@ def _add_residuals(setup: Setup, state: State, step: Array, found: int, drives: 
     modes = state.table.bodies["modes"]
     pulses = pulses_of(room, found, modes, float(step["begin_s"]), float(step["after_s"]))
     rubs = drives_of(room, drives, modes, n)
-    more, state.rubs = friction_grains(state.rubs, rubs, state.resonators, state.voices, first, n, setup.seed)
+    more, state.rubs = friction_grains(
+        state.rubs, rubs, state.resonators, state.voices, state.body, first, n, setup.seed
+    )
     struck = (
         grain
         for begin_s, one in pulses
@@ -185,22 +194,27 @@ class Synthesizer:
 
     def __init__(self, *, sr: int, sensors: tuple[Sensor, ...], seed: int, air: Air, residual: bool = True) -> None:
         self._setup = Setup(sr, sensors, seed, air, residual)
+        self.reset()
+
+    def reset(self) -> None:
+        """Begin anew at time 0, in silence, as one just made."""
         self._state = start(self._setup)
         self._clock = Clock()
         self._frames: list[Array] = []
-        self._lag = np.zeros((len(sensors), 0))
+        self._lag = np.zeros((len(self._setup.sensors), 0))
         self._last: Step | None = None
         self._failed: AudioError | None = None
         self._steps = 0
+        self._looked = 0
 
     @property
     def time_s(self) -> float:
         """Physics time taken in."""
         return self._clock.time_s
 
-    def feed(self, step: Step, bodies: tuple[Body, ...]) -> Array:
-        """Take in a step; the frame (channels, n) as long as the step, LATENCY_STEPS late. bodies: all that are known
-        by now.
+    def feed(self, step: Step, bodies: Records) -> Array:
+        """Take in a step; the frame (channels, n) as long as the step, LATENCY_STEPS late. bodies: by index, those at
+        least who are new in it. Raises LogError where a body comes that was gone.
 
         Without a sensor nothing is computed but the time.
         """
@@ -227,26 +241,28 @@ class Synthesizer:
         out, self._lag = queue[:, :count], queue[:, count:]
         return np.ascontiguousarray(out)
 
-    def play(self, steps: Sequence[Step], bodies: tuple[Body, ...]) -> None:
-        """Take in steps of as many bodies each; `sound` has what they make."""
+    def play(self, steps: Sequence[Step], bodies: Records) -> None:
+        """Take in steps of the same bodies each; `sound` has what they make."""
         for step in steps:
             self._clock = self._clock.after(step.dt_s)
         self._steps += len(steps)
         if self._setup.sensors:
             self._take(steps, bodies)
 
-    def _take(self, steps: Sequence[Step], bodies: tuple[Body, ...]) -> Array:
+    def _take(self, steps: Sequence[Step], bodies: Records) -> Array:
         if self._failed is not None:  # within a step, so that nothing can go on from there
             raise self._failed
-        first, known = steps[0], len(self._state.resonators)
-        if len(first.position_m) > known:
-            poses = first.position_m[known:], first.quaternion_xyzw[known:]
-            with_bodies(self._setup, self._state, bodies[known : len(first.position_m)], *poses)
+        state = self._state
+        if steps[0].body is not state.present:
+            admit(self._setup, state, steps[0], bodies)
         try:
-            frame = advance(self._setup, self._state, steps)
+            frame = advance(self._setup, state, steps)
         except AudioError as error:
             self._failed = error
             raise
+        if state.present is not state.body and state.taken >= self._looked + LOOK_EVERY:
+            self._looked = state.taken
+            release(state)
         self._last = steps[-1]
         if frame.shape[1]:
             self._frames.append(frame)

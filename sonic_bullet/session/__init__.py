@@ -83,8 +83,7 @@ def _keywords(call: Callable[..., Any]) -> list[str]:
 class Listener:
     """A simulated world that sounds; made by `attach`.
 
-    frame: the sound of the latest step, float64 pascals, (channels, n); n sums to floor(sr·time) exactly. It lags
-    physics by `latency_steps` steps. contacts: the log so far. Usable as a context manager: leaving it detaches.
+    contacts: the log so far. Usable as a context manager: leaving it detaches.
     """
 
     latency_steps = LATENCY_STEPS
@@ -95,12 +94,46 @@ class Listener:
         self.air = as_kind(air, Air, "air", "give an Air(density_kg_m3=…, sound_speed_m_s=…), or leave it out")
         self.world = client if isinstance(client, World) else _opened(client)
         self._synth = Synthesizer(sr=self.sr, sensors=self.sensors, seed=self.seed, air=self.air)
+        self._attached = True
+        self._begin()
+        self._frame: Array | None = np.zeros((len(self.sensors), 0))
+        self.world.listen(self.step)
+
+    def _begin(self) -> None:
+        """Nothing heard so far."""
         self._steps: list[Step] = []
         self._events: list[Event] = []
         self._unread: list[Array] = []
-        self._attached = True
-        self.frame: Array = np.zeros((len(self.sensors), 0))
-        self.world.listen(self.step)
+        self._emptied = self.world.emptied
+        self._moved: frozenset[int] = frozenset()
+
+    def reset(self) -> None:
+        """Begin anew, as a listener just attached to which the same bodies were added in the same order: all it then
+        gives is the same, byte by byte.
+
+        What rings or travels, contacts, events, unread frames, sound and time so far are gone; who was never added is
+        met anew; bodies that were removed are forgotten. Settings, and what was added, stay. A client that is not
+        hooked does not tell who was removed: after its resetSimulation, a body of the same id, name and shape counts as
+        the one that was added. Raises SceneError, having changed nothing: detached, called while a step is made,
+        connection lost, or a `World` that cannot begin anew.
+        """
+        if not self._attached:
+            raise SceneError("the listener is detached", "attach a new one")
+        self.world.reset()
+        self._synth.reset()
+        self._begin()
+        self._frame = None
+
+    @property
+    def frame(self) -> Array:
+        """The sound of the latest step, float64 pascals, (channels, n); n sums to floor(sr·time) exactly. It lags
+        physics by `latency_steps` steps.
+
+        Raises SceneError where no step was made since `reset`, or since the world was emptied (resetSimulation).
+        """
+        if self._frame is None or self.world.emptied != self._emptied:
+            raise SceneError("there is no frame: the world began anew", "make a step first")
+        return self._frame
 
     def add(
         self,
@@ -180,12 +213,24 @@ class Listener:
             raise SceneError("the listener is detached", "attach a new one")
         step = self.world.after_step()
         if not self.world.stepped:
-            self.frame = np.zeros((len(self.sensors), 0))
-            return self.frame
+            self._frame = np.zeros((len(self.sensors), 0))
+            return self._frame
+        if self.world.emptied != self._emptied or self._moved or np.count_nonzero(step.teleported):
+            self._note(step)
         self._steps.append(step)
-        self.frame = self._synth.feed(step, self.world.bodies)
-        self._unread.append(self.frame)
-        return self.frame
+        frame = self._frame = self._synth.feed(step, self.world.records)
+        self._unread.append(frame)
+        return frame
+
+    def _note(self, step: Step) -> None:
+        """Events of what happened to the world before a step, which is about to be taken in."""
+        number = len(self._steps)
+        if self.world.emptied != self._emptied:
+            self._emptied = self.world.emptied
+            self._events.append(Event("reset", number))
+        moved = step.body[step.teleported].tolist()
+        self._events += [Event("moved", number, body) for body in moved if body not in self._moved]
+        self._moved = frozenset(moved)
 
     def read(self) -> Array:
         """All frames since the last read, joined, (channels, n): for environments that hide many steps in one call."""

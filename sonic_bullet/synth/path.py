@@ -103,6 +103,34 @@ def append_bodies(path: Path, state: PathState, radius_m: Array) -> tuple[Path, 
     return path, state
 
 
+def subset(path: Path, state: PathState, keep: Array) -> PathState:
+    """The state with the bodies (k,) of ascending numbers alone, whose sound goes on unchanged, bit by bit. The others
+    must be `silent`. The old state stays usable.
+    """
+    number, place = np.full(len(state.sources) + 1, -1), np.full(len(state.places) + 1, -1)  # and of -1, at the end
+    number[keep] = np.arange(len(keep))
+    stays = number[state.places["body"]] >= 0
+    place[:-1][stays] = np.arange(np.count_nonzero(stays))
+    sources, places = state.sources[keep], state.places[stays]
+    for name in ("oldest", "main", "leaving"):
+        sources[name] = place[sources[name]]
+    sources["fresh"] = -1
+    places["body"], places["next"] = number[places["body"]], place[places["next"]]
+    each = len(path.microphone_m) * _stride(places["size"])
+    parts = [state.memory[at : at + size] for at, size in zip(places["memory_at"], each, strict=True)]
+    places["memory_at"] = np.cumsum(each) - each
+    lines = state.lines.reshape(len(state.places), len(path.microphone_m))[stays].reshape(-1)
+    return PathState(state.at, sources, places, lines, np.concatenate([np.zeros(0), *parts]))
+
+
+def silent(path: Path, state: PathState) -> Array:
+    """(b,) whether no sound of a body is under way."""
+    awake = (state.lines["awake"].reshape(len(state.places), len(path.microphone_m)) != 0).any(axis=1)
+    quiet = np.ones(len(state.sources), bool)
+    quiet[state.places["body"][awake]] = False
+    return quiet
+
+
 def grow(path: Path, state: PathState, status: int) -> None:
     """Lengthen the tables after `hear` has said PLACES_SHORT or MEMORY_SHORT. Raises AudioError for what cannot be."""
     if status == PLACES_SHORT:

@@ -16,33 +16,32 @@ from __future__ import annotations
 import inspect
 import numbers
 import weakref
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 
-from sonic_bullet.listener.frames import LINK_SPAN, Motion, Roster, encode, rows_of, same_motion, without
+from sonic_bullet.listener.frames import LINK_SPAN, Motion, Roster, decode, encode, rows_of, same_motion, without
 from sonic_bullet.listener.known_bodies import KnownBodies, alike
 from sonic_bullet.listener.memory import Memory, make_ready
 from sonic_bullet.listener.polling import Touches, loaded
 from sonic_bullet.listener.pybullet import body_facts as facts
 from sonic_bullet.listener.pybullet import collision_shapes as shapes
 from sonic_bullet.listener.pybullet import hooks
+from sonic_bullet.listener.pybullet.added_links import AddedLinks, added_body
 from sonic_bullet.listener.pybullet.census import Census
 from sonic_bullet.listener.pybullet.left_out import BodiesLeftOut
 from sonic_bullet.listener.pybullet.poses import check_connected
 from sonic_bullet.listener.pybullet.questions import contact_points, settings
 from sonic_bullet.listener.pybullet.step_back import undone
-from sonic_bullet.listener.pybullet.substeps import SubstepLog, gather_substeps
+from sonic_bullet.listener.pybullet.substeps import SubstepLog
 from sonic_bullet.listener.start import LEFT_OUT, NOBODY, hooked_start, jumped, polled_start
 from sonic_bullet.listener.world import World
 from sonic_bullet.records import Body, Material, ModalModel, Shape
 from sonic_bullet.records.contacts import Step
 from sonic_bullet.records.errors import SceneError
-
-AT_ORIGIN = np.array([0, 0, 0, 0, 0, 0, 1.0])
 
 
 class PyBulletWorld(World):
@@ -55,19 +54,24 @@ class PyBulletWorld(World):
         # a client that is dropped is to disconnect
         self._client = weakref.ref(client) if hasattr(client, "__weakref__") else lambda: client
         self.client_id = client_id
-        self.epoch = 0
-        self.step_count = 0
+        self._log = SubstepLog(client_id)
+        self._uninstall: Callable[[], None] | None = None
+        self._begin()
+
+    def _begin(self) -> None:
+        """Know nobody, and what there is to see before the first step."""
+        self.epoch = self.step_count = 0
         self.stepped = False
         self._known = KnownBodies()
+        self._added = AddedLinks(self.client_id)
         self._memory = Memory()
-        self._census = Census(client_id, self._bury, self._end)
-        self._settings = settings(client_id)
-        self._memory.poll(contact_points(client_id)[1], stepped=True)
+        self._census = Census(self.client_id, self._bury, self._end)
+        self._settings = settings(self.client_id)
+        self._memory.poll(contact_points(self.client_id)[1], stepped=True)
         self._memory.raw_before = self._memory.raw
         self._before: Motion | None = None
         self._moved: set[int] = set()
-        self._log = SubstepLog(client_id)
-        self._uninstall: Callable[[], None] | None = None
+        self._log.close()
         if self._settings.substeps > 1:
             self._log.open()
         self._past: Motion = self._census.read()
@@ -84,8 +88,13 @@ class PyBulletWorld(World):
 
     @property
     def bodies(self) -> tuple[Body, ...]:
-        """All bodies ever met, in the order that Contacts.a and Contacts.b count them."""
-        return tuple(self._known.records)
+        """All bodies ever met, as Contacts.a and Contacts.b count them; the living alone where not `keeps_gone`."""
+        return tuple(self._known.records.values())
+
+    @property
+    def records(self) -> Mapping[int, Body]:
+        """The same by index."""
+        return self._known.records
 
     @property
     def untouched(self) -> frozenset[int]:
@@ -141,31 +150,43 @@ class PyBulletWorld(World):
         A record that exists already (a silent partner, or an earlier add) ends with this step and a new one begins.
         volume_m3 None: the model's volume, or 0. shapes: its true geometry where that is not its collision shape; a
         lone sphere tells its curvature. A body that was muted is listened to again. Raises SceneError for an unknown
-        body or link, a soft body, or a mass, pose or speed that is not one.
+        body or link, a soft body, a mass, pose or speed that is not one, or a body that came while a step was made.
         """
         check_connected(self.client_id)
         facts.check_exists(self.client_id, body, link)
         facts.check_usable(self.client_id, body)
+        code = int(encode(body, link))
+        if self._before is not None and rows_of(self._before.roster, np.array([code]))[0] < 0:
+            raise SceneError(f"body {body} came while a step was being made", "create and add bodies between two steps")
         if body in self.left_out.muted:
             self.left_out.forget(body)
             self._census.stale()
         self._census.read()
-        record = facts.describe(self.client_id, body, link, self.epoch)
-        volume = volume_m3 if volume_m3 is not None else (model.volume_m3 if model else 0.0)
-        record = replace(
-            record,
-            material=material,
-            model=model,
-            volume_m3=volume,
-            since_step=self.step_count,
-            name=name or record.name,
-        )
-        if shapes:
-            alone = shapes[0] if len(shapes) == 1 and shapes[0].kind == "sphere" else None
-            record = replace(record, curvature_per_m=1 / float(alone.size_m[0]) if alone is not None else float("nan"))
-        self._known.close([int(encode(body, link))], self.step_count)
-        self._append(int(encode(body, link)), record)
+        how = {"material": material, "model": model, "volume_m3": volume_m3, "shapes": tuple(shapes), "name": name}
+        return self._enter(code, how)
+
+    def _enter(self, code: int, how: dict[str, Any]) -> Body:
+        """The record that begins of a link that was checked, and with it what `reset` needs. how: as `add` has it."""
+        body, link = decode(code)
+        record = replace(added_body(self.client_id, body, link, self.epoch, **how), since_step=self.step_count)
+        self._close([code])
+        self._known.append(code, record)
+        self._added.tell(code, how)
         return record
+
+    def reset(self) -> None:
+        """Begin anew with what was added, where it is still there: see `World.reset`.
+
+        A client that is not hooked does not tell who was removed: a body of the same id, name and shape is the same.
+        Raises SceneError: lost connection, or called while a step is being made.
+        """
+        check_connected(self.client_id)
+        if self._before is not None:
+            raise SceneError("reset was called while a step was being made", "call it between two steps")
+        added = self._added
+        self._begin()
+        for code, how in added.still_there(self._past.roster, seen=self._uninstall is not None):
+            self._enter(code, how)
 
     def name_of(self, body: int, link: int = -1) -> str:
         """What people call a link: its name and its body's id. Raises SceneError for an unknown one."""
@@ -186,10 +207,10 @@ class PyBulletWorld(World):
         """
         self.epoch += 1
         self.left_out.forget(body)
-        self._known.close(
-            [code for code in self._known.live if body is None or code // LINK_SPAN == body], self.step_count
-        )
+        self._close([code for code in self._known.live if body is None or code // LINK_SPAN == body])
+        self._added.forget(self._added.of(body))
         if body is None:
+            self.emptied += 1
             self._log.abandon()
             self._memory.forget()
         self._past = without(self._past, body)
@@ -239,43 +260,31 @@ class PyBulletWorld(World):
         stands where it stood, to the bit; where nothing moves at all, a second call passes for a step. Raises
         SceneError: lost connection, sub-steps that cannot be heard.
         """
-        before = self._before
+        before, self._before = self._before, None
         hooked = before is not None
         if before is None:
             self._settings = settings(self.client_id)
         self.stepped = self._uninstall is None or hooked
         if not self.stepped:
-            return self._memory.nothing(self._known, self._settings.dt_s, self._settings.gravity_m_s2)
+            return self._memory.nothing(self._settings.dt_s, self._settings.gravity_m_s2)
         touches = self._poll(hooked)
         now = before if before is not None else self._census.read()
-        step = self._usual(now, hooked) if touches is None else None
-        if step is None:
-            step = self._unusual(now, hooked, touches)
+        step = (self._usual(now, hooked) if touches is None else None) or self._unusual(now, hooked, touches)
         if self.stepped:
-            self._past, self._before = now, None
+            self._past = now
             self._moved.clear()
             self.step_count += 1
         return step
 
     def _poll(self, hooked: bool) -> Touches | None:
         """Ask for this step's contacts, once: they go to the memory; those of sub-steps are returned."""
-        substeps = self._settings.substeps
         last, raw = contact_points(self.client_id)
-        if substeps == 1:
-            if self._log.is_open:
-                self._log.close()
-            self._memory.poll(raw, stepped=hooked)
-            return None
-        if not self._log.is_open:
-            self._log.open()
-            raise SceneError(
-                f"numSubSteps was set to {substeps} after listening began",
-                "set it before attaching, or attach to a BulletClient, whose steps are hooked",
-            )
-        touches, self._log.count = gather_substeps(
-            self._log.records(), last, self._settings.dt_s, substeps, self._log.count
-        )
-        return touches
+        if self._settings.substeps > 1:
+            return self._log.touches(last, self._settings.dt_s, self._settings.substeps)
+        if self._log.is_open:
+            self._log.close()
+        self._memory.poll(raw, stepped=hooked)
+        return None
 
     def _usual(self, now: Motion, hooked: bool) -> Step | None:
         """The step where nobody came, went or is left out, and nothing else is unusual."""
@@ -297,21 +306,21 @@ class PyBulletWorld(World):
             frozen = not first and same_motion(self._past, now)
             if frozen and now.would_move(dt) and past_touches is not None and touches.equals(past_touches):
                 self.stepped = False
-                return memory.nothing(known, dt, gravity)
+                return memory.nothing(dt, gravity)
             self._expose_impostors(now, dt)
             start = polled_start(
                 self._past, now, touches, dt, undo=partial(undone, client_id=self.client_id), first=first
             )
-        memory.touches, self._past, self._before = touches, now, None
-        start["index"] = known.index(now.roster)
+        memory.touches, self._past = touches, now
+        known.enter(start)
         row, made = memory.made(known, start, touches, past_touches, dt)
         if made < 0:
             for code in start["code"][start["met"] != 0].tolist():
                 record = self._census.described(code, self.epoch)
                 if record is not None:
-                    self._append(code, replace(record, since_step=self.step_count))
-            index = known.index(now.roster)
-            start["index"] = np.where(index < 0, LEFT_OUT, index)
+                    known.append(code, replace(record, since_step=self.step_count))
+            known.enter(start)
+            start["index"][start["index"] < 0] = LEFT_OUT
             row, made = memory.made(known, start, touches, past_touches, dt)
         return memory.unusual(known, start, row, made, dt, gravity)
 
@@ -320,24 +329,22 @@ class PyBulletWorld(World):
         gone = self._known.gone(roster)
         if gone:
             self.epoch += 1
-            self._known.close(gone, self.step_count)
+            self._close(gone)
+            self._added.forget(gone)
 
     def _end(self, bodies: Collection[int]) -> None:
-        """Close the records of bodies."""
-        self._known.close([code for code in self._known.live if code // LINK_SPAN in bodies], self.step_count)
+        """Close the records of bodies that are left out from now on; after a reset they are listened to again."""
+        self._close([code for code in self._known.live if code // LINK_SPAN in bodies])
+
+    def _close(self, codes: Collection[int]) -> None:
+        self._known.close(codes, self.step_count, keep=self.keeps_gone)
 
     def _expose_impostors(self, now: Motion, dt: float) -> None:
         """Where nobody saw removals: what jumped and has another name, mass or inertia has taken over an old id."""
         for code in now.roster.code[jumped(self._past, now, dt)].tolist():
-            index = self._known.live.get(code)
-            if index is not None:
-                before, seen = self._known.records[index], self._census.described(code, self.epoch)
-                if seen is None:
-                    continue
-                if not alike(before, seen):
-                    self.epoch += 1
-                    self._known.close([code], self.step_count)
-
-    def _append(self, code: int, record: Body) -> None:
-        row = rows_of(self._past.roster, np.array([code]))[0]
-        self._known.append(code, record, self._past.number[row, :7] if row >= 0 else AT_ORIGIN)
+            before = self._known.records.get(self._known.live.get(code, -1))
+            seen = None if before is None else self._census.described(code, self.epoch)
+            if before is not None and seen is not None and not alike(before, seen):
+                self.epoch += 1
+                self._close([code])
+                self._added.forget([code])

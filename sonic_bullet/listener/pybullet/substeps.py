@@ -124,6 +124,20 @@ class SubstepLog:
             self.open()
         return rows
 
+    def touches(self, last: list[RawContact], dt_s: float, substeps: int) -> Touches:
+        """Loaded contacts of all sub-steps of the step just made; last: what getContactPoints() tells of it.
+
+        Raises SceneError where the log was not open, or is not as measured.
+        """
+        if not self.is_open:
+            self.open()
+            raise SceneError(
+                f"numSubSteps was set to {substeps} after listening began",
+                "set it before attaching, or attach to a BulletClient, whose steps are hooked",
+            )
+        found, self.count = gather_substeps(self.records(), last, dt_s, substeps, self.count)
+        return found
+
 
 def gather_substeps(
     records: Array, last: list[RawContact], dt_s: float, substeps: int, first: int

@@ -24,6 +24,8 @@ from sonic_bullet.synth.bank.instrument import (
     audible,
     empty_bank,
     silence,
+    silent,
+    subset,
 )
 from sonic_bullet.synth.bank.layout import FLOOR
 
@@ -37,4 +39,6 @@ __all__ = [
     "audible",
     "empty_bank",
     "silence",
+    "silent",
+    "subset",
 ]

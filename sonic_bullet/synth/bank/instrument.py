@@ -219,6 +219,29 @@ def append(bank: Bank, state: BankState, bodies: Sequence[ModeSet]) -> tuple[Ban
     )
 
 
+def subset(bank: Bank, state: BankState, keep: Array) -> tuple[Bank, BankState]:
+    """Bank and state of the bodies (k,) of ascending numbers alone, which go on unchanged, bit by bit. The others must
+    be `silent`. The strikes are the old state's own: it is of no use afterwards.
+    """
+    body = bank.body[keep]
+    size = body["stop"] - body["start"]
+    stop = np.cumsum(size)
+    lane = np.repeat(body["start"] - stop + size, size) + np.arange(int(size.sum()))
+    body["start"], body["stop"] = stop - size, stop
+    both = np.concatenate([lane, bank.law.shape[1] + lane])
+    law, weight = np.take(bank.law, lane, axis=1), np.take(bank.weight, both, axis=1)
+    few = Bank(bank.sr, body, law, weight, np.take(bank.observed, keep, axis=1))
+    flat = {name: getattr(state, name)[both] for name in ("z", "driven", "pole", "block")}
+    return few, replace(state, **flat, sound=np.take(state.sound, keep, axis=1), ringing=state.ringing[keep])
+
+
+def silent(state: BankState) -> Array:
+    """(b,) whether nothing of a body rings, and no strike on it is under way."""
+    now = state.ringing
+    rings = (now["ringing"] != 0) | (now["driven"] != 0) | (now["tiled"] != 0) | (now["moving"] != 0)
+    return np.asarray(~rings & (now["strike"] < 0))
+
+
 def silence(state: BankState) -> BankState:
     """The state at the same sample with nothing ringing and no strike under way."""
     state = state.copy()

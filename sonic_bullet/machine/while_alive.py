@@ -1,0 +1,41 @@
+"""Results of a function kept as long as what they were made of is alive: for records that are compared by identity.
+
+`functools.lru_cache` would hold the last so many of them, and all that belongs to them, for ever.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import update_wrapper
+from typing import Any, Concatenate, Generic, ParamSpec, TypeVar
+from weakref import WeakKeyDictionary
+
+Of = TypeVar("Of")
+More = ParamSpec("More")
+Result = TypeVar("Result")
+
+
+class WhileAlive(Generic[Of, More, Result]):
+    """The function call(of, *more), a decorator: computed once for each ``of`` and each ``more``, which can be hashed.
+    What it returns must not hold ``of``.
+    """
+
+    def __init__(self, call: Callable[Concatenate[Of, More], Result]) -> None:
+        self.__wrapped__ = call
+        self._kept: WeakKeyDictionary[Of, dict[Any, Result]] = WeakKeyDictionary()
+        update_wrapper(self, call)
+
+    def __call__(self, of: Of, *more: More.args, **named: More.kwargs) -> Result:
+        mine = self._kept.setdefault(of, {})
+        key = (more, tuple(sorted(named.items())))
+        if key not in mine:
+            mine[key] = self.__wrapped__(of, *more, **named)
+        return mine[key]
+
+    def cache_clear(self) -> None:
+        """Forget all."""
+        self._kept.clear()
+
+    def __len__(self) -> int:
+        """Of how many things something is kept."""
+        return len(self._kept)

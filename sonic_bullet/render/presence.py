@@ -1,0 +1,109 @@
+"""Who is in a step, who comes, and who is gone: bodies of the log, in the order in which the tables hold them.
+
+    Step.body -> further bodies, silent at first; those no longer in it ring on at their last pose
+        -> once they are silent, and nothing under way names them: out of all tables
+
+Which bodies the tables hold changes no bit: they are summed in the order of their indices, and who is silent adds
+nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from sonic_bullet.records import Array, Body
+from sonic_bullet.records.contacts import Step, first_bodies
+from sonic_bullet.records.errors import LogError
+from sonic_bullet.render.synthesis_state import Setup, State, StepScratch, with_bodies
+from sonic_bullet.synth import bank, path
+from sonic_bullet.synth.strikes import SPAN
+
+Records = Sequence[Body] | Mapping[int, Body]
+"""Bodies by their index in the log."""
+
+
+def admit(setup: Setup, state: State, step: Step, bodies: Records) -> None:
+    """Let the bodies of a step that is to be taken in be those present. Raises LogError where one comes again, or after
+    one of a higher index.
+    """
+    if np.array_equal(step.body, state.present):
+        state.present = state.body if np.array_equal(step.body, state.body) else step.body
+        return
+    new = ~np.isin(step.body, state.present)
+    coming = step.body[new]
+    if len(coming) and coming[0] <= state.newest:
+        raise LogError(
+            f"body {coming[0]} of the log comes again, or after body {state.newest}", "use an unbroken contact log"
+        )
+    if len(coming):
+        with_bodies(setup, state, [bodies[i] for i in coming.tolist()], step.position_m[new], step.quaternion_xyzw[new])
+        state.newest = int(coming[-1])
+    _name(state, np.concatenate([state.body, coming]))
+    state.present = state.body if len(step.body) == len(state.body) else step.body
+
+
+def _name(state: State, body: Array) -> None:
+    """The tables' bodies (b,) by index in the log; `first_bodies` itself where they are the first."""
+    first = first_bodies(len(body))
+    state.body = first if np.array_equal(body, first) else body
+
+
+def in_tables(state: State, contacts: Array, poses: tuple[Array, ...]) -> tuple[Array, tuple[Array, ...]]:
+    """Contact rows (k,) and poses of steps (s, p, ·) of the bodies present, by the tables' numbers: (s, b, ·), who is
+    gone is where it was.
+    """
+    if state.mapped:
+        contacts = contacts.copy()
+        for side in ("a", "b"):
+            contacts[side] = np.searchsorted(state.body, contacts[side])
+        contacts.setflags(write=False)
+    if state.present is not state.body:
+        at, window, last = np.searchsorted(state.body, state.present), state.window, (state.taken - 1) % SPAN
+        before = window.position_m[last], window.quaternion_xyzw[last], np.zeros(len(state.body), bool)
+        poses = tuple(_laid(old, here, at) for old, here in zip(before, poses, strict=True))
+    return contacts, poses
+
+
+def _laid(old: Array, here: Array, at: Array) -> Array:
+    """(s, b, ·): old (b, ·) for each step, with here (s, p, ·) at the places (p,)."""
+    whole = np.repeat(old[None], len(here), axis=0)
+    whole[:, at] = here
+    whole.setflags(write=False)
+    return whole
+
+
+def release(state: State) -> None:
+    """Let those who are gone leave the tables, as far as they are silent and nothing under way names them."""
+    stays = np.isin(state.body, state.present)
+    stays |= ~(bank.silent(state.ringing) & path.silent(state.path, state.travelling))
+    stays[state.pairs.pair["body"][state.pairs.active[: state.pairs.count[0]]]] = True
+    for first, stop in state.window.step["row"].tolist():
+        stays[state.window.row["body"][first:stop]] = True
+    stays[[grain.body for grain in state.grains]] = True
+    stays[[body for low, high, _ in state.rubs for body in (low, high)]] = True
+    if not stays.all():
+        subset(state, np.flatnonzero(stays))
+
+
+def subset(state: State, keep: Array) -> None:
+    """The bodies (k,) of ascending numbers alone; nothing under way names another."""
+    number = np.full(len(state.body), -1)
+    number[keep] = np.arange(len(keep))
+    state.resonators = tuple(state.resonators[i] for i in keep)
+    state.voices = tuple(state.voices[i] for i in keep)
+    follows = [np.zeros(0, np.int64) if voice is None else voice.follows for voice in state.voices]
+    state.table = state.table.subset(keep, list(zip(state.resonators, follows, strict=True)))
+    state.bank, state.ringing = bank.subset(state.bank, state.ringing, keep)
+    state.travelling = path.subset(state.path, state.travelling, keep)
+    state.window.subset(keep, number)
+    state.pairs.subset(number)
+    state.grains = tuple(replace(grain, body=int(number[grain.body])) for grain in state.grains)
+    state.rubs = {(int(number[low]), int(number[high]), side): one for (low, high, side), one in state.rubs.items()}
+    state.has_residual = any(voice is not None for voice in state.voices)
+    _name(state, state.body[keep])
+    state.present = state.body if len(state.present) == len(state.body) else state.present
+    state.scratch = StepScratch()
+    state.changed()
