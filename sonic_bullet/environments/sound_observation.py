@@ -19,7 +19,7 @@ from gymnasium.utils import RecordConstructorArgs
 
 from sonic_bullet.environments.episode_world import EpisodeWorld, connected_client, step_length
 from sonic_bullet.environments.repeated_episodes import RepeatedEpisodes
-from sonic_bullet.environments.sounding_cast import MaterialsLike, add_fillable, as_materials, cast_of
+from sonic_bullet.environments.sounding_cast import Cast, MaterialsLike, add_fillable, as_materials, cast_of, same_cast
 from sonic_bullet.files import check_sr
 from sonic_bullet.records import Air, Array, Material
 from sonic_bullet.records.coerce import as_number
@@ -58,8 +58,9 @@ class SoundObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorA
 
         materials: what sounds, found anew after every reset. A material: every link with a collision shape; those that
         cannot be filled are named in a SceneWarning and stay silent. A mapping from a body's name or id, or (either,
-        link), to a material or keywords of `Listener.add`. A function of the client that returns one. client: of PyBullet; None: found among the environment's attributes. step_s: T; None:
-        measured, on another environment of the same spec where one can be made, else by a reset and a step of this one.
+        link), to a material or keywords of `Listener.add`. A function of the client that returns one. client: of
+        PyBullet; None: found among the environment's attributes. step_s: T; None: measured, on another environment of
+        the same spec where one can be made, else by a reset and a step of this one.
         Raises SceneError: no PyBullet, no step, an observation that has "audio" already; AudioError, MaterialError,
         RecordError for arguments that are none.
         """
@@ -78,6 +79,8 @@ class SoundObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorA
         self._step_s = exact_step(as_length(step_s)) if step_s is not None else step_length(env, client)
         self._dt_s, self._most = 0.0, 0
         self._silent: set[tuple[int, int | str]] = set()
+        self._cast: Cast = {}
+        self._added = 0
         self._listener: Listener | None = None
         self._episodes = RepeatedEpisodes()
         inner = env.observation_space
@@ -100,7 +103,6 @@ class SoundObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorA
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[dict[str, Any], Any]:
         """Begin an episode: its audio is silent, its count 0. Raises SceneError and what `Listener.add` raises."""
-        self._detach()
         observation, info = self.env.reset(seed=seed, options=options)
         self._listen()
         self._episodes.begin(None if options else seed)
@@ -134,13 +136,28 @@ class SoundObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorA
     def _listen(self) -> None:
         """Listen from here on, as who has heard nothing yet."""
         client = connected_client(self.env, self._client)
-        self._world = EpisodeWorld(client)
-        self._listener = attach(self._world, **self._options)
         cast = cast_of(self._materials, client)
-        if isinstance(self._materials, Material):
-            add_fillable(self._listener, cast, self._silent)
-        else:
-            self._listener.add_all(cast)
+        if not self._begun_anew(client, cast):
+            self._detach()
+            self._world = EpisodeWorld(client)
+            self._listener = attach(self._world, **self._options)
+            if isinstance(self._materials, Material):
+                add_fillable(self._listener, cast, self._silent)
+            else:
+                self._listener.add_all(cast)
+            self._cast, self._added = cast, len(self._world.bodies)
+
+    def _begun_anew(self, client: Any, cast: Cast) -> bool:
+        """Whether the listener that there is could begin anew: its bodies are those of the cast, and all still there.
+
+        A client that is not hooked does not tell who was removed.
+        """
+        if self._listener is None or not self._world.hooked or self._world.client is not client:
+            return False
+        if not same_cast(cast, self._cast):
+            return False
+        self._listener.reset()
+        return len(self._world.bodies) == self._added
 
     def _action_bytes(self, action: Any) -> bytes:
         """An action as numbers; one that cannot be flattened is as good as any other, and contacts then may differ."""

@@ -44,6 +44,15 @@ def cast_of(materials: MaterialsLike, client: Any) -> Cast:
     return cast
 
 
+def same_cast(one: Any, other: Any) -> bool:
+    """Whether two casts, or parts of them, say the same in the same order: numbers and texts that are equal, all else
+    one thing.
+    """
+    if isinstance(one, Mapping) and isinstance(other, Mapping):
+        return list(one) == list(other) and all(same_cast(one[name], other[name]) for name in one)
+    return one is other or (isinstance(one, str | int | float) and type(one) is type(other) and one == other)
+
+
 def add_fillable(listener: Listener, cast: Cast, silent: set[tuple[int, int | str]]) -> None:
     """Let all of a cast sound that nobody chose, except links that cannot be filled or solved: each is named once, as
     a SceneWarning, and put among the ``silent``, which are passed over.
