@@ -56,7 +56,7 @@ def log_mel(
         samples = resample_poly(samples, ratio.numerator, ratio.denominator, axis=-1)
     short = n_fft // 2 + 1 if as_flag(center, "center") else n_fft
     if samples.shape[-1] < short:
-        least = -(-short * sr // rate_hz)
+        least = (short - 1) * sr // rate_hz + 1
         raise AudioError(
             f"audio of {np.shape(audio)[-1]} samples is shorter than a frame, {least} samples at {sr} Hz",
             "join the observations of several steps, or take a shorter n_fft",
