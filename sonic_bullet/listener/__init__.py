@@ -16,14 +16,19 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from sonic_bullet.listener.pybullet.clients import (
+        bodies_called,
+        client_id_of,
         direct_client,
         disconnect,
+        is_bullet_client,
+        is_connected,
         links_called,
         links_with_shapes,
         open_world,
         watch_settings,
     )
     from sonic_bullet.listener.pybullet.doctor import Finding, diagnose_world, keep_restitution
+    from sonic_bullet.listener.pybullet.hooks import module_steps
     from sonic_bullet.listener.pybullet.pybullet_world import PyBulletWorld
     from sonic_bullet.listener.pybullet.script import run_script
     from sonic_bullet.listener.world import World
@@ -32,12 +37,17 @@ __all__ = [
     "Finding",
     "PyBulletWorld",
     "World",
+    "bodies_called",
+    "client_id_of",
     "diagnose_world",
     "direct_client",
     "disconnect",
+    "is_bullet_client",
+    "is_connected",
     "keep_restitution",
     "links_called",
     "links_with_shapes",
+    "module_steps",
     "open_world",
     "run_script",
     "watch_settings",
@@ -47,12 +57,17 @@ _HOME = {
     "Finding": "pybullet.doctor",
     "PyBulletWorld": "pybullet.pybullet_world",
     "World": "world",
+    "bodies_called": "pybullet.clients",
+    "client_id_of": "pybullet.clients",
     "diagnose_world": "pybullet.doctor",
     "direct_client": "pybullet.clients",
     "disconnect": "pybullet.clients",
+    "is_bullet_client": "pybullet.clients",
+    "is_connected": "pybullet.clients",
     "keep_restitution": "pybullet.doctor",
     "links_called": "pybullet.clients",
     "links_with_shapes": "pybullet.clients",
+    "module_steps": "pybullet.hooks",
     "open_world": "pybullet.clients",
     "run_script": "pybullet.script",
     "watch_settings": "pybullet.clients",

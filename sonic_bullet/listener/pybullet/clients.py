@@ -11,7 +11,7 @@ from pybullet_utils.bullet_client import BulletClient
 from sonic_bullet.listener.pybullet import body_facts as facts
 from sonic_bullet.listener.pybullet import hooks
 from sonic_bullet.listener.pybullet.pieces import collision_pieces
-from sonic_bullet.listener.pybullet.poses import check_connected, is_soft
+from sonic_bullet.listener.pybullet.poses import body_ids, check_connected, is_soft
 from sonic_bullet.listener.pybullet.pybullet_world import PyBulletWorld
 from sonic_bullet.listener.quiet import quiet_stdout
 from sonic_bullet.records.coerce import as_whole, nearest, shown
@@ -120,6 +120,32 @@ def client_id_of(client: Any) -> int:
         raise SceneError(f"client is {shown(client)}", "pass a BulletClient, the pybullet module or a client id")
     check_connected(client_id)
     return client_id
+
+
+def is_connected(client_id: int) -> bool:
+    """Whether a physics server answers under this number."""
+    if isinstance(client_id, bool) or not 0 <= client_id < 2**31:
+        return False
+    return bool(pybullet.getConnectionInfo(physicsClientId=client_id)["isConnected"])
+
+
+def is_bullet_client(thing: Any) -> bool:
+    """Whether a thing is a connected BulletClient, or a wrapper like it, whose steps can be hooked."""
+    client_id = getattr(thing, "__dict__", {}).get("_client")
+    return isinstance(client_id, int) and hasattr(thing, "stepSimulation") and is_connected(client_id)
+
+
+def bodies_called(client_id: int, name: str) -> tuple[int, ...]:
+    """Ids of all bodies of that name, their own or their base's. Raises SceneError listing the nearest names."""
+    found, names = [], set()
+    for body in body_ids(client_id):
+        own = {text.decode(errors="replace") for text in pybullet.getBodyInfo(body, physicsClientId=client_id)}
+        names |= own - {""}
+        if name in own:
+            found.append(body)
+    if not found:
+        raise SceneError(f"no body is called {shown(name)}", nearest(name, sorted(names), ", or a body's id"))
+    return tuple(found)
 
 
 def open_world(client: Any) -> PyBulletWorld:

@@ -7,16 +7,22 @@ stepSimulation of this client is caught, those hidden in a gym environment's ste
 A client has one set of hooks however many listen (`Hooks`): the first to come puts it in place and the last to go takes
 it away, in whatever order they go. Nothing here holds the client: dropped, it disconnects at once and does not wait for
 the garbage collector.
+
+A client that is known by its number has no instance: there `module_steps` catches the steps made within a block.
 """
 
 from __future__ import annotations
 
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Protocol
+from unittest.mock import patch
 
 import pybullet
+from pybullet_utils.bullet_client import BulletClient
 
 from sonic_bullet.listener.properties import SetValues
 from sonic_bullet.records.errors import SceneError
@@ -208,3 +214,25 @@ def install(
     hooks, one = Hooks.of(client, world.client_id), Listening(world, before, after)
     hooks.listening.append(one)
     return hooks.set_values, lambda: hooks.leave(one)
+
+
+@contextmanager
+def module_steps(client_id: int, after: Callable[[], object]) -> Iterator[None]:
+    """Call ``after`` after every step of that client made by `pybullet.stepSimulation` within the block.
+
+    The module's function gives way to one that tells; a BulletClient passes its number on to built-in functions only,
+    so it is made to do so here too. Who imported the function itself by name goes unnoticed.
+    """
+    real_step, forward = pybullet.stepSimulation, BulletClient.__getattr__
+
+    def step(physicsClientId: int = 0) -> Any:
+        result = real_step(physicsClientId=physicsClientId)
+        if physicsClientId == client_id:
+            after()
+        return result
+
+    def forward_step(self: Any, name: str) -> Any:
+        return partial(step, physicsClientId=self._client) if name == "stepSimulation" else forward(self, name)
+
+    with patch.object(pybullet, "stepSimulation", step), patch.object(BulletClient, "__getattr__", forward_step):
+        yield

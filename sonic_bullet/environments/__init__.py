@@ -1,0 +1,32 @@
+"""environments: sound as an observation of a gymnasium environment whose world is PyBullet's.
+
+env.step -> the same run time -> an observation -> log-mel features
+
+gymnasium is an extra: `pip install "sonic_bullet[environments]"`. Everything is imported when first used.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+from sonic_bullet.records.errors import SceneError
+
+if TYPE_CHECKING:
+    from sonic_bullet.environments.mel_features import log_mel, mel_filters
+    from sonic_bullet.environments.sound_observation import SoundObservation
+
+__all__ = ["SoundObservation", "log_mel", "mel_filters"]
+
+_HOME = {"SoundObservation": "sound_observation", "log_mel": "mel_features", "mel_filters": "mel_features"}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module 'sonic_bullet.environments' has no attribute '{name}'")
+    try:
+        return getattr(importlib.import_module(f"sonic_bullet.environments.{_HOME[name]}"), name)
+    except ModuleNotFoundError as error:
+        if error.name != "gymnasium":
+            raise
+        raise SceneError("gymnasium is not installed", 'pip install "sonic_bullet[environments]"') from None

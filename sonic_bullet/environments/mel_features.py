@@ -1,0 +1,103 @@
+"""Log-mel features as policies that listen take them: X = log(max(|STFT|² F, floor)).
+
+Frames of 400 samples at 16 kHz (25 ms), 160 apart (10 ms), a periodic Hann window, the power of each bin, 64 triangular
+filters on the HTK mel scale, m = 2595 log10(1 + f/700), from 0 Hz to half the rate, each of peak 1 (norm None): what
+torchaudio's MelSpectrogram(16000, n_fft=400, hop_length=160, n_mels=64, center=False) gives. Li et al. (2022), See,
+Hear, and Feel, use these; they add their floor where it is a limit here, so that silence is exactly log(floor) and
+nothing above the floor is changed.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from functools import lru_cache
+
+import numpy as np
+
+from sonic_bullet.files import check_sr
+from sonic_bullet.records import Array
+from sonic_bullet.records.coerce import as_flag, as_number, as_whole
+from sonic_bullet.records.errors import AudioError
+
+RATE_HZ, N_FFT, HOP, MELS = 16_000, 400, 160, 64
+FLOOR_PA2 = 1e-12
+"""Of a band's power: |STFT|² of a sine of amplitude a at a bin's middle is (a · N_FFT / 4)², so 1e-8 Pa there, far
+below hearing (2e-5 Pa)."""
+
+
+def log_mel(
+    audio: Array,
+    sr: int,
+    *,
+    rate_hz: int = RATE_HZ,
+    mels: int = MELS,
+    n_fft: int = N_FFT,
+    hop: int = HOP,
+    center: bool = False,
+    floor: float = FLOOR_PA2,
+) -> Array:
+    """Natural logarithm of the power in mel bands, float32 (channels, mels, frames), of audio (channels, n) or (n,).
+
+    sr: the audio's rate; it is resampled to rate_hz (scipy.signal.resample_poly: what lies above the lower half rate is
+    filtered out). center: frames are centred on every hop-th sample and the audio is mirrored past its ends, 1 + n//hop
+    of them; else they lie within it, 1 + (n - n_fft)//hop. floor: the least power. Raises AudioError: a rate that is
+    none, samples that are no numbers, audio shorter than a frame (join the observations of several steps).
+    """
+    from scipy.signal import get_window, resample_poly
+
+    sr, rate_hz = check_sr(sr), check_sr(rate_hz)
+    n_fft = as_whole(n_fft, "n_fft", "give samples a frame, 2 or more", least=2, most=2**20, error=AudioError)
+    hop = as_whole(hop, "hop", "give samples from frame to frame, 1 or more", least=1, error=AudioError)
+    floor = as_number(floor, "floor", "give the least power, above 0", above=0, error=AudioError)
+    filters = mel_filters(rate_hz, n_fft, mels)
+    samples = _samples(audio)
+    ratio = Fraction(rate_hz, sr)
+    if ratio != 1:
+        samples = resample_poly(samples, ratio.numerator, ratio.denominator, axis=-1)
+    short = n_fft // 2 + 1 if as_flag(center, "center") else n_fft
+    if samples.shape[-1] < short:
+        least = (short - 1) * sr // rate_hz + 1
+        raise AudioError(
+            f"audio of {np.shape(audio)[-1]} samples is shorter than a frame, {least} samples at {sr} Hz",
+            "join the observations of several steps, or take a shorter n_fft",
+        )
+    if center:
+        samples = np.pad(samples, ((0, 0), (n_fft // 2, n_fft // 2)), mode="reflect")
+    frames = np.lib.stride_tricks.sliding_window_view(samples, n_fft, axis=-1)[:, ::hop]
+    spectrum = np.fft.rfft(frames * get_window("hann", n_fft), axis=-1)
+    power = (spectrum.real**2 + spectrum.imag**2) @ filters
+    return np.log(np.maximum(power, floor)).swapaxes(-1, -2).astype(np.float32)
+
+
+@lru_cache(maxsize=8)
+def mel_filters(rate_hz: int = RATE_HZ, n_fft: int = N_FFT, mels: int = MELS) -> Array:
+    """Weights (n_fft//2 + 1, mels) of a power spectrum's bins in the mel bands, read-only.
+
+    Band i rises from 0 at edge i to 1 at edge i+1 and falls to 0 at edge i+2; mels + 2 edges lie evenly in mel from 0
+    to rate_hz / 2. From the first band's peak to the last's the weights of a bin sum to 1. Raises AudioError.
+    """
+    rate_hz = check_sr(rate_hz)
+    mels = as_whole(mels, "mels", "give the number of bands, 1 or more", least=1, most=4096, error=AudioError)
+    n_fft = as_whole(n_fft, "n_fft", "give samples a frame, 2 or more", least=2, most=2**20, error=AudioError)
+    highest_mel = 2595 * np.log10(1 + rate_hz / 2 / 700)
+    edge_hz = 700 * (10 ** (np.linspace(0, highest_mel, mels + 2) / 2595) - 1)
+    bin_hz = np.linspace(0, rate_hz // 2, n_fft // 2 + 1)[:, None]
+    width_hz = np.diff(edge_hz)
+    rising, falling = (bin_hz - edge_hz[:-2]) / width_hz[:-1], (edge_hz[2:] - bin_hz) / width_hz[1:]
+    weights = np.maximum(0.0, np.minimum(rising, falling))
+    weights.setflags(write=False)
+    return weights
+
+
+def _samples(audio: Array) -> Array:
+    """(channels, n) float64 of finite numbers. Raises AudioError."""
+    remedy = "give samples in pascals, (channels, n) or (n,)"
+    try:
+        samples = np.atleast_2d(np.asarray(audio, np.float64))
+    except (TypeError, ValueError):
+        raise AudioError("audio is no array of numbers", remedy) from None
+    if samples.ndim != 2:
+        raise AudioError(f"audio has the shape {np.shape(audio)}", remedy)
+    if not np.isfinite(samples).all():
+        raise AudioError("audio holds samples that are no numbers", remedy)
+    return samples

@@ -1,0 +1,195 @@
+"""What an environment sounds like, as a part of its observation.
+
+    env.step -> stepSimulation, hooked, some times -> Listener -> the frames of these steps -> observation["audio"]
+
+An episode begins in silence when `reset` returns; what `reset` itself steps is not listened to.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from math import ceil
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium.spaces import Box, Dict
+from gymnasium.spaces.utils import flatten
+from gymnasium.utils import RecordConstructorArgs
+
+from sonic_bullet.environments.episode_world import EpisodeWorld, connected_client, step_length
+from sonic_bullet.environments.repeated_episodes import RepeatedEpisodes
+from sonic_bullet.environments.sounding_cast import Cast, MaterialsLike, add_fillable, as_materials, cast_of, same_cast
+from sonic_bullet.files import check_sr
+from sonic_bullet.records import Air, Array, Material
+from sonic_bullet.records.coerce import as_number
+from sonic_bullet.records.errors import AudioError, SceneError
+from sonic_bullet.render.clock import exact_step
+from sonic_bullet.session import Listener, attach
+from sonic_bullet.session.arguments import MicrophoneLike, as_sensors
+
+AUDIO, COUNT, DIFFER = "audio", "audio_count", "contacts_differ"
+
+
+class SoundObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
+    """A gymnasium environment whose observation has "audio": what its PyBullet world sounds like.
+
+    The observation space is a Dict: the keys of the environment's own, or "observation" where that is no Dict, and
+    "audio", float32 (channels, ceil(sr·T)) in pascals, T the simulated time of one env.step: the newest samples last,
+    before them zeros. How many are new is info["audio_count"], not part of the observation, for a policy learns nothing
+    from it; these counts sum to floor(sr·time since reset). As a listener's frames, audio lags physics by three physics
+    steps. info["contacts_differ"] is there, and True, from the env.step on in which the simulator gave other poses or
+    contacts than in the first episode of the same seed and actions.
+    """
+
+    def __init__(
+        self,
+        env: gymnasium.Env[Any, Any],
+        sr: int = 48_000,
+        *,
+        microphones: MicrophoneLike = (0.0, -1.0, 0.5),
+        materials: MaterialsLike = "plastic",
+        client: Any = None,
+        step_s: float | None = None,
+        seed: int = 0,
+        air: Air | None = None,
+    ) -> None:
+        """microphones, seed, air: as `attach` has them.
+
+        materials: what sounds, found anew after every reset. A material: every link with a collision shape; those that
+        cannot be filled are named in a SceneWarning and stay silent. A mapping from a body's name or id, or (either,
+        link), to a material or keywords of `Listener.add`. A function of the client that returns one. client: of
+        PyBullet; None: found among the environment's attributes. step_s: T; None: measured, on another environment of
+        the same spec where one can be made, else by a reset and a step of this one.
+        Raises SceneError: no PyBullet, no step, an observation that has "audio" already; AudioError, MaterialError,
+        RecordError for arguments that are none.
+        """
+        given = {"sr": sr, "microphones": microphones, "materials": materials, "client": client, "step_s": step_s}
+        RecordConstructorArgs.__init__(self, _disable_deepcopy=True, **given, seed=seed, air=air)
+        gymnasium.Wrapper.__init__(self, env)
+        self._options: dict[str, Any] = {
+            "sr": check_sr(sr),
+            "microphone": as_sensors(microphones, "microphones"),
+            "seed": seed,
+            "air": air,
+        }
+        if not self._options["microphone"]:
+            raise AudioError("there is no microphone, so there is no sound to observe", "give microphones=(x, y, z)")
+        self._materials, self._client = as_materials(materials), client
+        self._step_s = exact_step(as_length(step_s)) if step_s is not None else step_length(env, client)
+        self._dt_s, self._most = 0.0, 0
+        self._silent: set[tuple[int, int | str]] = set()
+        self._cast: Cast = {}
+        self._added = 0
+        self._listener: Listener | None = None
+        self._episodes = RepeatedEpisodes()
+        inner = env.observation_space
+        self._is_dict = isinstance(inner, Dict)
+        parts = dict(inner.spaces) if isinstance(inner, Dict) else {"observation": inner}
+        if AUDIO in parts:
+            raise SceneError(f"the observation has '{AUDIO}' already", "wrap the environment once")
+        self._shape = len(self._options["microphone"]), ceil(sr * self._step_s)
+        self.observation_space = Dict({**parts, AUDIO: Box(-np.inf, np.inf, self._shape, np.float32)})
+
+    @property
+    def step_s(self) -> Fraction:
+        """T, the simulated time of one env.step, exactly."""
+        return self._step_s
+
+    @property
+    def listener(self) -> Listener | None:
+        """What listens in this episode; None before the first."""
+        return self._listener
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[dict[str, Any], Any]:
+        """Begin an episode: its audio is silent, its count 0. Raises SceneError and what `Listener.add` raises."""
+        observation, info = self.env.reset(seed=seed, options=options)
+        self._listen()
+        self._episodes.begin(None if options else seed)
+        return self._with_audio(observation, np.zeros(self._shape, np.float32)), {**info, COUNT: 0}
+
+    def step(self, action: Any) -> tuple[dict[str, Any], Any, bool, bool, dict[str, Any]]:
+        """A step of the environment with what it sounded like.
+
+        Raises SceneError where it takes longer than T, or physics steps of another length.
+        """
+        if self._listener is None:
+            raise SceneError("no episode has begun", "call reset first")
+        world = self._world
+        world.steps.clear()
+        with world.hearing(self._listener.step):
+            observation, reward, terminated, truncated, info = self.env.step(action)
+        self._check_steps()
+        new = self._listener.read()
+        audio = np.zeros(self._shape, np.float32)
+        audio[:, audio.shape[1] - new.shape[1] :] = new
+        info = {**info, COUNT: new.shape[1]}
+        if self._episodes.seeded and self._episodes.differ(self._action_bytes(action), world.steps):
+            info[DIFFER] = True
+        return self._with_audio(observation, audio), reward, terminated, truncated, info
+
+    def close(self) -> None:
+        """Leave the client as it was, then close the environment."""
+        self._detach()
+        self.env.close()
+
+    def _listen(self) -> None:
+        """Listen from here on, as who has heard nothing yet."""
+        client = connected_client(self.env, self._client)
+        cast = cast_of(self._materials, client)
+        if not self._begun_anew(client, cast):
+            self._detach()
+            self._world = EpisodeWorld(client)
+            self._listener = attach(self._world, **self._options)
+            if isinstance(self._materials, Material):
+                add_fillable(self._listener, cast, self._silent)
+            else:
+                self._listener.add_all(cast)
+            self._cast, self._added = cast, len(self._world.bodies)
+
+    def _begun_anew(self, client: Any, cast: Cast) -> bool:
+        """Whether the listener that there is could begin anew: its bodies are those of the cast, and all still there.
+
+        A client that is not hooked does not tell who was removed.
+        """
+        if self._listener is None or not self._world.hooked or self._world.client is not client:
+            return False
+        if not same_cast(cast, self._cast):
+            return False
+        self._listener.reset()
+        return len(self._world.bodies) == self._added
+
+    def _action_bytes(self, action: Any) -> bytes:
+        """An action as numbers; one that cannot be flattened is as good as any other, and contacts then may differ."""
+        space = self.action_space
+        return np.asarray(flatten(space, action)).tobytes() if space.is_np_flattenable else b""
+
+    def _detach(self) -> None:
+        if self._listener is not None:
+            self._listener.detach()
+            self._listener = None
+
+    def _check_steps(self) -> None:
+        """Raise SceneError unless the steps made have the length that they always had, and fit into T."""
+        steps = self._world.steps
+        if steps and not self._dt_s:
+            self._dt_s, self._most = steps[0].dt_s, int(self._step_s / exact_step(steps[0].dt_s))
+        for step in steps:
+            if step.dt_s != self._dt_s:
+                raise SceneError(
+                    f"the environment changed its time step from {self._dt_s:g} s to {step.dt_s:g} s",
+                    "keep one fixedTimeStep, or wrap the environment anew",
+                )
+        if len(steps) > self._most:
+            raise SceneError(
+                f"an env.step took {len(steps)} physics steps, and its audio holds {self._most}",
+                f"give step_s=, the longest that one takes: {len(steps) * self._dt_s:g}",
+            )
+
+    def _with_audio(self, observation: Any, audio: Array) -> dict[str, Any]:
+        return {**(observation if self._is_dict else {"observation": observation}), AUDIO: audio}
+
+
+def as_length(step_s: object) -> float:
+    """T as given. Raises SceneError."""
+    return as_number(step_s, "step_s", "give seconds of physics an env.step takes", above=0, most=1e3, error=SceneError)

@@ -1,0 +1,69 @@
+"""Which bodies of an environment sound, and as what: said once, found anew in every episode, for ids change."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from sonic_bullet.listener import bodies_called, client_id_of, links_with_shapes
+from sonic_bullet.records import Material
+from sonic_bullet.records.coerce import shown
+from sonic_bullet.records.errors import MeshError, ModalError, SceneError, SceneWarning
+from sonic_bullet.session import Listener
+from sonic_bullet.session.arguments import as_material
+
+Cast = dict[tuple[int, int | str], Any]
+MaterialsLike = str | Path | Material | Mapping[Any, Any] | Callable[[Any], Mapping[Any, Any]]
+
+
+def as_materials(materials: MaterialsLike) -> MaterialsLike:
+    """A material's name or file as the material, all else as it is. Raises MaterialError."""
+    return materials if callable(materials) or isinstance(materials, Mapping) else as_material(materials)
+
+
+def cast_of(materials: MaterialsLike, client: Any) -> Cast:
+    """From (body, link) to a material or the keywords of `Listener.add`.
+
+    materials: one for every link with a collision shape; or from a body, a name, or (either, link) to one or to
+    keywords; or a function of the client that returns such a mapping. A name means all bodies that the simulator calls
+    so. Raises SceneError: no body of that name, or a function that returns no mapping.
+    """
+    client_id = client_id_of(client)
+    if isinstance(materials, Material):
+        return dict.fromkeys(links_with_shapes(client_id), materials)
+    given = materials(client) if callable(materials) else materials
+    if not isinstance(given, Mapping):
+        raise SceneError(f"materials(client) returned {shown(given)}", "return a dict from bodies to materials")
+    cast: Cast = {}
+    for who, how in given.items():
+        body, link = who if isinstance(who, tuple) and len(who) == 2 else (who, -1)
+        for one in bodies_called(client_id, body) if isinstance(body, str) else (body,):
+            cast[one, link] = how
+    return cast
+
+
+def same_cast(one: Any, other: Any) -> bool:
+    """Whether two casts, or parts of them, say the same in the same order: numbers and texts that are equal, all else
+    one thing.
+    """
+    if isinstance(one, Mapping) and isinstance(other, Mapping):
+        return list(one) == list(other) and all(same_cast(one[name], other[name]) for name in one)
+    return one is other or (isinstance(one, str | int | float) and type(one) is type(other) and one == other)
+
+
+def add_fillable(listener: Listener, cast: Cast, silent: set[tuple[int, int | str]]) -> None:
+    """Let all of a cast sound that nobody chose, except links that cannot be filled or solved: each is named once, as
+    a SceneWarning, and put among the ``silent``, which are passed over.
+    """
+    wanted = {who: how for who, how in cast.items() if who not in silent}
+    try:
+        listener.add_all(wanted)
+    except (MeshError, ModalError):
+        for (body, link), material in wanted.items():
+            try:
+                listener.add(body, link, material=material)
+            except (MeshError, ModalError) as error:
+                silent.add((body, link))
+                warnings.warn(f"left silent: {error.what}", SceneWarning, stacklevel=2)
