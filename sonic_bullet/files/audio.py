@@ -26,6 +26,7 @@ import numpy as np
 
 from sonic_bullet.files.atomic import cannot, check_output, kept_name
 from sonic_bullet.files.levels import as_sound, check_levels, gain_per_pa
+from sonic_bullet.files.rows.spool import KeptSound
 from sonic_bullet.machine.partial_file import PartialFile
 from sonic_bullet.records import Array
 from sonic_bullet.records.coerce import as_number, as_path, as_text, as_whole, brief, nearest, shown
@@ -310,7 +311,7 @@ def _forget_time(fd: int) -> None:
 
 def write_audio(
     path: str | os.PathLike[str],
-    samples: Array,
+    samples: Array | KeptSound,
     sr: int,
     *,
     peak_dbfs: float | None = None,
@@ -318,7 +319,7 @@ def write_audio(
     full_scale_pa: float = 1.0,
     subtype: str | None = None,
 ) -> AudioReport:
-    """Write ``samples`` (channels, n) or (n,), float64 pascals, whole or not at all.
+    """Write ``samples`` (channels, n) or (n,), float64 pascals, whole or not at all, by blocks.
 
     The extension chooses the format (`FORMATS`), ``subtype`` the sample format in libsndfile's names. At most one of
     ``peak_dbfs`` (dB re full scale) and ``lufs`` scales; else full_scale_pa is 1.0 in the file. Over 4 GiB a .wav is
@@ -332,13 +333,11 @@ def write_audio(
         full_scale_pa, "full_scale_pa", "give a full scale in Pa, above zero", above=0, error=AudioError
     )
     sound = as_sound(samples)
-    sound = sound[None, :] if sound.ndim == 1 else sound
-    if sound.ndim != 2 or sound.shape[0] == 0:
+    channels, frames = sound.shape
+    if channels == 0:
         raise AudioError(f"samples of shape {sound.shape}", "pass (channels, n)")
     gain = gain_per_pa(sound, rate, peak_dbfs, lufs, full_scale_pa)
-    with AudioWriter(
-        path, rate, sound.shape[0], gain_per_pa=gain, subtype=subtype, expected_frames=sound.shape[1]
-    ) as writer:
-        for start in range(0, sound.shape[1], BLOCK_FRAMES):
-            writer.write(sound[:, start : start + BLOCK_FRAMES])
+    with AudioWriter(path, rate, channels, gain_per_pa=gain, subtype=subtype, expected_frames=frames) as writer:
+        for block in sound.blocks(BLOCK_FRAMES):
+            writer.write(block)
     return writer.report()

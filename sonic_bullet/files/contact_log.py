@@ -6,11 +6,13 @@ Step (records.contacts) one after another -> ContactLog -> npz (files.logs) -> C
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import cast
 
 import numpy as np
 
+from sonic_bullet.files.rows.log_steps import LogSteps, StepBlock
 from sonic_bullet.records import Air, Array, Body, Sensor
 from sonic_bullet.records.coerce import as_flag, as_items, as_kind, as_kinds, as_path, as_whole, shown
 from sonic_bullet.records.contacts import Contacts, Event, Step
@@ -22,7 +24,8 @@ from sonic_bullet.records.simulated import Change, Values, frozen_texts, frozen_
 class ContactLog:
     """All that a later render or comparison needs, by value: bodies with their models, steps, sensors, rate and seed.
 
-    untouched: ids of bodies that were in the world and touched nothing; known while listening, not kept in files.
+    steps: whatever was given, a sequence whose steps are made when they are asked for (`LogSteps`), as a slice of it
+    is. untouched: ids of bodies that were in the world and touched nothing; known while listening, not kept in files.
     events: what happened besides contacts, in its order. engine: the simulator's settings at the first step, under its
     own names; what is not among them is not known. versions: of sonic_bullet, the packages that its numbers hang on and
     the simulator, by name; of older logs none. changes: what was set otherwise later, of engine and bodies, in order;
@@ -31,7 +34,7 @@ class ContactLog:
     """
 
     bodies: tuple[Body, ...]
-    steps: tuple[Step, ...]
+    steps: Sequence[Step]
     sensors: tuple[Sensor, ...]
     sr: int
     seed: int
@@ -47,7 +50,7 @@ class ContactLog:
         ids = ("give ids of bodies",)
         checked = {
             "bodies": as_kinds(self.bodies, Body, "log: bodies", "give a tuple of Body", error=LogError),
-            "steps": as_kinds(self.steps, Step, "log: steps", "give a tuple of Step", error=LogError),
+            "steps": _as_steps(self.steps),
             "events": as_kinds(self.events, Event, "log: events", "give a tuple of Event", error=LogError),
             "sensors": as_kinds(self.sensors, Sensor, "log: sensors", "give a tuple of sensors", error=LogError),
             "air": as_kind(self.air, Air, "log: air", "give an Air", error=LogError),
@@ -69,35 +72,46 @@ class ContactLog:
                 raise LogError(f"{name} that are not in the order of their steps", "use an unbroken contact log")
             if any(one.body is not None and one.body >= len(self.bodies) for one in happened):
                 raise LogError(f"{name} of a body that the log has not", "use an unbroken contact log")
-        for step in self.steps:
-            if len(step.body) and step.body[-1] >= len(self.bodies):
-                raise LogError("a step has a pose of a body that the log has not", "use an unbroken contact log")
+        steps = self._steps
+        if steps.known > len(self.bodies) < steps.bodies():  # the first is known at once
+            raise LogError("a step has a pose of a body that the log has not", "use an unbroken contact log")
 
     def __len__(self) -> int:
         """Rows in all: one per contact and step."""
-        return sum(len(step.contacts) for step in self.steps)
+        return self._steps.row_counts[1]
 
     def __iter__(self) -> Iterator[Step]:
         return iter(self.steps)
 
     @property
+    def _steps(self) -> LogSteps:
+        return cast(LogSteps, self.steps)
+
+    @property
     def duration_s(self) -> float:
-        return float(np.sum([step.dt_s for step in self.steps])) if self.steps else 0.0
+        return float(np.sum(self._steps.lengths_s()))
 
     @property
     def start_s(self) -> Array:
         """(s,) time at which each step starts."""
-        return np.concatenate([[0.0], np.cumsum([step.dt_s for step in self.steps])])[: len(self.steps)]
+        return np.concatenate([[0.0], np.cumsum(self._steps.lengths_s())])[: len(self.steps)]
 
     @property
     def rows(self) -> Contacts:
-        """All rows of all steps, in order."""
-        return Contacts.joined([step.contacts for step in self.steps])
+        """All rows of all steps, in order: 160 bytes each, all in memory (`blocks` are not)."""
+        row = np.concatenate([Contacts.none().row, *(block.contact for block in self.blocks())])
+        row.setflags(write=False)
+        return Contacts.trusted(row)
+
+    def blocks(self) -> Iterator[StepBlock]:
+        """The rows of some steps at a time, in order, for logs that are larger than the memory."""
+        return self._steps.blocks()
 
     @property
     def step(self) -> Array:
         """(k,) the step of each row."""
-        return np.repeat(np.arange(len(self.steps)), [len(step.contacts) for step in self.steps])
+        counts = [np.zeros(0, np.int64), *(block.counts("contact") for block in self.blocks())]
+        return np.repeat(np.arange(len(self.steps)), np.concatenate(counts))
 
     @property
     def time_s(self) -> Array:
@@ -181,3 +195,10 @@ class ContactLog:
         from sonic_bullet.files.logs import write_log
 
         write_log(as_path(path, "path", "name a file, such as contacts.npz"), self, models)
+
+
+def _as_steps(steps: object) -> LogSteps:
+    """Steps as columns. Raises LogError for what are none."""
+    if isinstance(steps, LogSteps):
+        return steps
+    return LogSteps.of(as_kinds(steps, Step, "log: steps", "give a tuple of Step", error=LogError))

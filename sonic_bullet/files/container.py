@@ -8,6 +8,8 @@ to at most `UNPACKED` times the file, else it is refused before anything is unpa
 unpacks to as many bytes as it claims, no more. An npy header's shape is compared with the entry's true length before
 anything is allocated. The entries fill the file, each once and as the directory says, so that no part of it can hide.
 ``numpy.load(path)`` reads the file too.
+What is larger than memory is written block by block (`Column`), and stays in the file when it is read
+(`RowsOfEntry`).
 """
 
 from __future__ import annotations
@@ -19,7 +21,8 @@ import stat
 import struct
 import zipfile
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from typing import Any, BinaryIO, TypeVar
 
 import msgspec
@@ -27,6 +30,7 @@ import numpy as np
 
 from sonic_bullet.files.atomic import replacing
 from sonic_bullet.files.reading import reading
+from sonic_bullet.files.rows.spool import read_at
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import FileError, LogError
 
@@ -38,6 +42,7 @@ UNPACKED = 64  # times the file's size; models deflate to a third, of a flat pla
 LOCAL = struct.Struct("<4s5H3I2H")  # an entry's own header [PKWARE APPNOTE 6.3.10, 4.3.7]
 EXTRA = struct.Struct("<2H2Q")  # its zip64 field: id, length, size, packed size [4.5.3]
 END = struct.Struct("<4s6xH8xH")  # end of the directory: magic, entries in all, length of the comment [4.3.16]
+LOADED_BYTES, HEAD_BYTES = 1 << 20, 1 << 16  # entries that may stay in the file are larger; an npy header is shorter
 ZIP64, UTF8 = 0xFFFFFFFF, 1 << 11
 NPY = re.compile(  # [numpy.lib.format, version 1.0 and 2.0], as numpy writes it
     rb"\{'descr': '(?P<descr>[<>|=][a-zA-Z][0-9]{0,4})', 'fortran_order': (?P<fortran>True|False), 'shape': "
@@ -49,8 +54,39 @@ class _Format(msgspec.Struct):
     format: str
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Column:
+    """An entry that is written block by block: dtype, shape, and a call that gives its blocks (·, *shape[1:])."""
+
+    dtype: Any
+    shape: tuple[int, ...]
+    blocks: Callable[[], Iterable[Array]]
+
+
+class RowsOfEntry:
+    """An array that stays in its file: [start:stop] reads those rows. Its file is open for as long as this is."""
+
+    def __init__(self, file: BinaryIO, at: int, dtype: np.dtype[Any], shape: tuple[int, ...], what: str) -> None:
+        self.dtype, self.shape, self.ndim = dtype, shape, len(shape)
+        self._file, self._at, self._what = file, at, what
+
+    def __len__(self) -> int:
+        return self.shape[0]
+
+    def __getitem__(self, rows: slice) -> Array:
+        start, stop, _ = rows.indices(len(self))
+        tail = self.shape[1:]
+        size = self.dtype.itemsize * math.prod(tail)
+        count = max(stop - start, 0)
+        raw = read_at(self._file.fileno(), count * size, self._at + start * size, self._what)
+        return np.frombuffer(raw, self.dtype).reshape(count, *tail)
+
+
 def write_container(
-    path: str | os.PathLike[str], header: msgspec.Struct, arrays: Mapping[str, Array], packed: str | None = None
+    path: str | os.PathLike[str],
+    header: msgspec.Struct,
+    arrays: Mapping[str, Array | Column],
+    packed: str | None = None,
 ) -> None:
     """Write header and arrays, whole or not at all; equal input gives equal bytes. packed: what the names of entries
     begin with that are deflated, None: none is. Raises FileError.
@@ -71,7 +107,14 @@ def _written(file: BinaryIO, entries: Mapping[str, Array], packed: str | None) -
             if _is_packed(name, packed):
                 info.compress_type = zipfile.ZIP_DEFLATED
             with archive.open(info, "w", force_zip64=True) as entry:
-                np.lib.format.write_array(entry, np.ascontiguousarray(array), version=(1, 0), allow_pickle=False)
+                if isinstance(array, Column):
+                    descr = np.lib.format.dtype_to_descr(np.dtype(array.dtype))
+                    head = {"descr": descr, "fortran_order": False, "shape": array.shape}
+                    np.lib.format.write_array_header_1_0(entry, head)
+                    for block in array.blocks():
+                        entry.write(np.ascontiguousarray(block, array.dtype).tobytes())
+                else:
+                    np.lib.format.write_array(entry, np.ascontiguousarray(array), version=(1, 0), allow_pickle=False)
         return sum(info.file_size for info in archive.infolist())
 
 
@@ -85,13 +128,17 @@ def read_container(
     form: str | tuple[str, ...],
     what: str,
     packed: str | None = None,
+    lazy: Collection[str] = (),
 ) -> tuple[Header, dict[str, Array]]:
     """The header as ``kind`` and all arrays, by name, read-only.
 
     form: the format id asked for, or several that will do, the newest first; what: the thing, in words, for messages
-    ("contact log"); packed: what the names of entries begin with that may be deflated. Raises FileError where there is
-    no readable file, LogError where it is cut, foreign, pickled, holds another compressed entry, one twice or beside
-    its directory, or lies about a size.
+    ("contact log"); packed: what the names of entries begin with that may be deflated; lazy: arrays that stay in the
+    file where they have over `LOADED_BYTES` (`RowsOfEntry`: checked like the others, by blocks, and then used like them
+    by [start:stop]).
+
+    Raises FileError where there is no readable file, LogError where it is cut, foreign, pickled, holds another
+    compressed entry, one twice or beside its directory, or lies about a size.
     """
     with reading(path, what, LogError, REMEDY):
         status = os.stat(path)
@@ -106,7 +153,9 @@ def read_container(
                 name = _entry_name(info)
                 if name in arrays:
                     raise LogError(f"entry '{info.filename}' is there twice", REMEDY)
-                arrays[name] = _array(_unpacked(file, info, start), f"entry '{info.filename}'", UNPACKED * size)
+                where = f"entry '{info.filename}'"
+                rows = _rows(archive, info, file, size, where) if name in lazy else None
+                arrays[name] = _array(_unpacked(file, info, start), where, UNPACKED * size) if rows is None else rows
         if HEADER not in arrays:
             raise LogError(f"{path} is no {what}: it has no header", REMEDY)
         text = arrays.pop(HEADER).tobytes()
@@ -210,9 +259,29 @@ def _entry_name(info: zipfile.ZipInfo) -> str:
     return info.filename[:-4]
 
 
-def _array(raw: bytes, where: str, file_bytes: int) -> Array:
-    """The array of an npy file, nothing of it evaluated: a header says descr, order and shape as numpy writes them, or
-    it is none.
+def _rows(archive: zipfile.ZipFile, info: zipfile.ZipInfo, file: BinaryIO, file_bytes: int, where: str) -> Any:
+    """A large entry as `RowsOfEntry`, its checksum and flags compared by blocks; None where it is to be loaded."""
+    if info.file_size <= LOADED_BYTES:
+        return None
+    with archive.open(info) as entry:
+        head = entry.read(HEAD_BYTES)
+        dtype, shape, fortran, at = _npy_head(head, info.file_size, where, file_bytes)
+        if fortran and len(shape) > 1:
+            return None  # as numpy may save it: its rows do not lie together
+        block = head[at:]
+        while block:  # to its end, where zipfile compares the checksum
+            _check_flags(np.frombuffer(block, np.uint8), dtype, where)
+            block = entry.read(LOADED_BYTES)
+    file.seek(info.header_offset + LOCAL.size - 4)
+    name_bytes, extra_bytes = struct.unpack("<2H", file.read(4))
+    start = info.header_offset + LOCAL.size + name_bytes + extra_bytes + at
+    stays = os.fdopen(os.dup(file.fileno()), "rb", buffering=0)
+    return RowsOfEntry(stays, start, dtype, shape, f"{file.name}, {where}")
+
+
+def _npy_head(raw: bytes, entry_bytes: int, where: str, file_bytes: int) -> tuple[Any, tuple[int, ...], bool, int]:
+    """dtype, shape, whether in Fortran's order, and where the numbers begin, of an npy file that begins like ``raw``;
+    nothing of it is evaluated: a header says descr, order and shape as numpy writes them, or it is none.
     """
     size_bytes = {b"\x93NUMPY\x01\x00": 2, b"\x93NUMPY\x02\x00": 4}.get(raw[:8], 0)
     start = 8 + size_bytes
@@ -225,9 +294,20 @@ def _array(raw: bytes, where: str, file_bytes: int) -> Array:
         raise LogError(f"{where} holds {descr}, only plain numbers are read", REMEDY)
     dtype, shape = np.dtype(descr), tuple(int(word) for word in found["shape"].split(b",") if word.strip())
     claimed = math.prod(shape) * dtype.itemsize
-    if min(shape, default=0) < 0 or claimed != len(raw) - stop or max(shape, default=0) > file_bytes:
-        raise LogError(f"{where} claims {claimed} bytes of numbers and holds {len(raw) - stop}", REMEDY)
-    array = np.frombuffer(raw, dtype, offset=stop).reshape(shape, order="F" if found["fortran"] == b"True" else "C")
-    if dtype.kind == "b" and array.view(np.uint8).max(initial=0) > 1:
-        raise LogError(f"{where} holds numbers that are neither true nor false", REMEDY)
+    if min(shape, default=0) < 0 or claimed != entry_bytes - stop or max(shape, default=0) > file_bytes:
+        raise LogError(f"{where} claims {claimed} bytes of numbers and holds {entry_bytes - stop}", REMEDY)
+    return dtype, shape, found["fortran"] == b"True", stop
+
+
+def _array(raw: bytes, where: str, file_bytes: int) -> Array:
+    """The array of an npy file."""
+    dtype, shape, fortran, at = _npy_head(raw, len(raw), where, file_bytes)
+    array = np.frombuffer(raw, dtype, offset=at).reshape(shape, order="F" if fortran else "C")
+    _check_flags(array, dtype, where)
     return array
+
+
+def _check_flags(numbers: Array, dtype: np.dtype[Any], where: str) -> None:
+    """Raise LogError where what should be flags (or their bytes) is neither 0 nor 1."""
+    if dtype.kind == "b" and numbers.view(np.uint8).max(initial=0) > 1:
+        raise LogError(f"{where} holds numbers that are neither true nor false", REMEDY)

@@ -11,16 +11,19 @@ import math
 
 import numpy as np
 
+from sonic_bullet.files.rows.spool import KeptSound
 from sonic_bullet.records import Array
 from sonic_bullet.records.coerce import as_number, shown
 from sonic_bullet.records.errors import AudioError
 
 
-def gain_per_pa(sound: Array, sr: int, peak_dbfs: float | None, lufs: float | None, full_scale_pa: float) -> float:
-    """The factor g of the module's head; peak and loudness are of the whole sound."""
+def gain_per_pa(sound: KeptSound, sr: int, peak_dbfs: float | None, lufs: float | None, full_scale_pa: float) -> float:
+    """The factor g of the module's head; peak and loudness are of the whole sound: a peak takes a pass over it, a
+    loudness all of it in memory.
+    """
     if peak_dbfs is None and lufs is None:
         return 1 / full_scale_pa
-    peak = float(np.abs(sound).max()) if sound.size else 0.0
+    peak = float(sound.peaks().max(initial=0.0))
     if not math.isfinite(peak):
         raise AudioError(
             "the samples hold NaN or infinite numbers",
@@ -34,15 +37,22 @@ def gain_per_pa(sound: Array, sr: int, peak_dbfs: float | None, lufs: float | No
     if peak_dbfs is not None:
         return float(10 ** (peak_dbfs / 20)) / peak
     assert lufs is not None
-    return float(10 ** ((lufs - _loudness_lufs(sound / peak, sr)) / 20)) / peak
+    return float(10 ** ((lufs - _loudness_lufs(sound.samples() / peak, sr)) / 20)) / peak
 
 
-def as_sound(samples: object) -> Array:
-    """Samples as float64. Raises AudioError where they are no array of real numbers."""
+def as_sound(samples: object) -> KeptSound:
+    """Samples (channels, n) or (n,) as float64, kept or in memory. Raises AudioError where they are no array of real
+    numbers of that shape.
+    """
+    if isinstance(samples, KeptSound):
+        return samples
     try:
         sound = np.asarray(samples)
         if sound.dtype.kind in "biuf":
-            return sound.astype(float, copy=False)
+            sound = sound[None, :] if sound.ndim == 1 else sound
+            if sound.ndim != 2:
+                raise AudioError(f"samples of shape {sound.shape}", "pass (channels, n)")
+            return KeptSound.of(sound.astype(float, copy=False))
     except ValueError:  # rows of several lengths
         pass
     raise AudioError(f"samples is {shown(samples)}", "pass real numbers, (channels, n)")

@@ -3,12 +3,12 @@
 The container is `container`'s npz. Scalars, names and references are JSON (`header.npy`), all arrays are entries of
 their own:
 
-    format "sonic-bullet-contacts/3"; b bodies, s steps, p = Σ bodies known at each step, k = Σ contacts of each step
+    format "sonic-bullet-contacts/3"; b bodies, s steps, p = Σ bodies in each step, k = Σ contacts of each step
       step_dt_s (s,) f8                     length of each step
       step_gravity_m_s2 (s, 3) f8            gravity in the world
       step_body_count, step_contact_count (s,) i8   how many of the p and k rows are each step's, in order
-      pose_body (p,) i4                      whose poses these are: ascending within a step; who has gone is not there
       pose_position_m (p, 3) f8, pose_quaternion_xyzw (p, 4) f8, pose_teleported (p,) bool
+      pose_body (p,) i4                     whose they are: indices, ascending in a step; who has gone is not there
       contact_<field> (k, …)
           the fields of `Contacts`: a, b i4; point_a_m, point_b_m, normal, impulse_n_s, slip_m_s,
                                             sweep_m_s, approach_m_s, gap_m f8
@@ -24,13 +24,16 @@ their own:
       models (in the header)
           what is no array of each; or its SHA-256, where it lies in the cache
       events (in the header)
-          in order: {"kind": see `Event`, "step": the step before which it happened, "body": index, or null: all}
+          in order: {"kind": "quench", "reset" or "moved", "step": the step before which it happened,
+                     "body": index of who was moved, or null: all}
       changes (in the header)
           in order: {"step": the step before which it happened, "body": index, or null: the engine, "values": {…}}
       of each body: dynamics, options, mounting; of all: engine, versions, residual (see `Body`, `ContactLog`)
-    format "sonic-bullet-contacts/2"        the same without pose_body (the first bodies), changes and all that the last
-          line names; models' arrays are not deflated, and of their own types; no SHA-256
+    format "sonic-bullet-contacts/2"        the same without pose_body (a step's bodies are the first of the log),
+          changes and all that the last line names; models' arrays are not deflated, and of their own types
     format "sonic-bullet-contacts/1"        and without events
+
+Steps are written and read by blocks (`step_entries`): a log may be larger than the memory.
 
 A reader checks sizes before it allocates and records check their invariants, so a cut, foreign or forged file is one
 line of LogError.
@@ -46,7 +49,7 @@ import numpy as np
 
 from sonic_bullet.files.audio import check_sr
 from sonic_bullet.files.contact_log import ContactLog
-from sonic_bullet.files.container import REMEDY, distinct, read_container, take, write_container
+from sonic_bullet.files.container import REMEDY, Column, distinct, read_container, take, write_container
 from sonic_bullet.files.log_header import (
     RESIDUAL_ARRAYS,
     LogHeader,
@@ -64,10 +67,9 @@ from sonic_bullet.files.log_header import (
 )  # fmt: skip
 from sonic_bullet.files.models import PACKED, as_json_text, pack_models, recalled_models, unpack_models
 from sonic_bullet.files.reading import reading
+from sonic_bullet.files.rows.step_entries import LAZY, read_steps, step_entries
 from sonic_bullet.records import Air, Array, Material, ModalModel
-from sonic_bullet.records.arrays import frozen_array
-from sonic_bullet.records.coerce import as_number, as_path
-from sonic_bullet.records.contacts import ROW_FIELDS, Contacts, Step, first_bodies
+from sonic_bullet.records.coerce import as_path
 from sonic_bullet.records.errors import LogError
 
 LOG_FORMATS = ("sonic-bullet-contacts/3", "sonic-bullet-contacts/2", "sonic-bullet-contacts/1")
@@ -97,24 +99,14 @@ def write_log(path: str | os.PathLike[str], log: ContactLog, models: object = "i
         changes=[pack_change(change) for change in log.changes],
         residual=bool(log.residual),
     )
-    steps = log.steps
-    rows = Contacts.joined([step.contacts for step in steps])
-    arrays: dict[str, Array] = {
-        "step_dt_s": np.array([step.dt_s for step in steps], float),
-        "step_gravity_m_s2": np.reshape([step.gravity_m_s2 for step in steps], (-1, 3)).astype(float),
-        "step_body_count": np.array([len(step.position_m) for step in steps], np.int64),
-        "pose_body": np.concatenate([np.zeros(0, np.int32), *(step.body for step in steps)]).astype(np.int32),
-        "step_contact_count": np.array([len(step.contacts) for step in steps], np.int64),
-        "pose_position_m": np.concatenate([np.zeros((0, 3)), *(step.position_m for step in steps)]),
-        "pose_quaternion_xyzw": np.concatenate([np.zeros((0, 4)), *(step.quaternion_xyzw for step in steps)]),
-        "pose_teleported": np.concatenate([np.zeros(0, bool), *(step.teleported for step in steps)]),
+    arrays: dict[str, Array | Column] = {
+        **step_entries(log._steps),
         "body_inertia_kg_m2": np.reshape([body.inertia_kg_m2 for body in log.bodies], (-1, 3, 3)).astype(float),
         "body_curvature_per_m": np.array([body.curvature_per_m for body in log.bodies], float),
         "material_stiffness_pa": np.reshape([material.stiffness_pa for material in materials], (-1, 6, 6)).astype(
             float
         ),
     }
-    arrays |= {f"contact_{name}": getattr(rows, name) for name in ROW_FIELDS}
     arrays |= model_arrays
     for i, material in enumerate(materials):
         if material.residual is not None:
@@ -129,7 +121,7 @@ def read_log(path: str | os.PathLike[str]) -> ContactLog:
     not).
     """
     path = as_path(path, "path", "name a contact log (.npz)")
-    header, arrays = read_container(path, LogHeader, LOG_FORMATS, "contact log", PACKED)
+    header, arrays = read_container(path, LogHeader, LOG_FORMATS, "contact log", PACKED, LAZY)
     kept = recalled_models(header.models, [(body.model, body.name) for body in header.bodies], path)
     with reading(path, "contact log", LogError, REMEDY):
         check_sr(header.sr)
@@ -163,7 +155,7 @@ def _unpack_log(
     ]
     return ContactLog(
         bodies=tuple(bodies),
-        steps=_unpack_steps(arrays, path),
+        steps=read_steps(arrays, b, path, nobody_goes=header.format != LOG_FORMATS[0]),
         sensors=tuple(unpack_sensor(sensor) for sensor in header.sensors),
         sr=header.sr,
         seed=header.seed,
@@ -173,65 +165,4 @@ def _unpack_log(
         versions=header.versions,
         changes=tuple(unpack_change(change) for change in header.changes),
         residual=header.residual,
-    )
-
-
-def _unpack_whose(arrays: Mapping[str, Array], poses: Array, path: object) -> list[Array]:
-    """Whose poses each step holds: indices of bodies, ascending; the first ones in logs that do not say."""
-    counts = np.diff(poses).tolist()
-    if "pose_body" not in arrays:
-        return [first_bodies(count) for count in counts]
-    body = take(arrays, "pose_body", np.int32, (int(poses[-1]),), path).astype(np.int64)
-    same = np.ones(len(body), bool)
-    same[poses[:-1][np.diff(poses) > 0]] = False  # the first of each step follows nobody
-    if (body < 0).any() or (np.diff(body)[same[1:]] <= 0).any():
-        raise LogError(f"{path}: the bodies of a step do not ascend from 0", REMEDY)
-    body.setflags(write=False)
-    return [
-        first_bodies(count) if count == 0 or body[stop - 1] == count - 1 else body[stop - count : stop]
-        for count, stop in zip(counts, poses[1:].tolist(), strict=True)
-    ]
-
-
-def _unpack_steps(arrays: Mapping[str, Array], path: object) -> tuple[Step, ...]:
-    dt = take(arrays, "step_dt_s", float, (None,), path)
-    ends = []
-    for name in ("step_body_count", "step_contact_count"):
-        count = take(arrays, name, np.int64, (len(dt),), path)
-        if (count < 0).any() or (count > 2**40).any():
-            raise LogError(f"{path}: {name} is negative or absurd", REMEDY)
-        ends.append(np.concatenate([[0], np.cumsum(count)]))
-    poses, contacts = ends
-    p, k = int(poses[-1]), int(contacts[-1])
-    position = take(arrays, "pose_position_m", float, (p, 3), path)
-    quaternion = take(arrays, "pose_quaternion_xyzw", float, (p, 4), path)
-    gravity = take(arrays, "step_gravity_m_s2", float, (len(dt), 3), path)
-    teleported = take(arrays, "pose_teleported", bool, (p,), path)
-    rows = Contacts(
-        **{name: take(arrays, f"contact_{name}", dtype, (k, *tail), path) for name, (dtype, tail) in ROW_FIELDS.items()}
-    )
-    if k and min(rows.a.min(), rows.b.min()) < 0:
-        raise LogError(f"{path}: a contact names a body below zero", REMEDY)
-    whose = _unpack_whose(arrays, poses, path)
-    # who is in a step, counted on from step to step: one search for all rows
-    span = 1 + int(max((body[-1] for body in whose if len(body)), default=0))
-    present = np.concatenate([np.zeros(0, np.int64), *(i * span + body for i, body in enumerate(whose))])
-    at = np.repeat(np.arange(len(dt)), np.diff(contacts)) * span
-    if k and (max(rows.a.max(), rows.b.max()) >= span or not np.isin([at + rows.a, at + rows.b], present).all()):
-        raise LogError(f"{path}: a contact names a body that the step does not know", REMEDY)
-    # checked whole, not step by step: hours of steps are read in a moment
-    position = frozen_array(position, float, (p, 3), "step: position_m")
-    quaternion = frozen_array(quaternion, float, (p, 4), "step: quaternion_xyzw")
-    teleported = frozen_array(teleported, bool, (p,), "teleported")
-    gravity = frozen_array(gravity, float, (len(dt), 3), "step: gravity_m_s2")
-    remedy = "set a time step between 0 and 1 s with setTimeStep"
-    for wrong in dt[~((dt > 0) & (dt <= 1))][:1]:
-        as_number(float(wrong), "dt_s of a physics step", remedy, above=0, most=1, error=LogError)
-    return tuple(
-        Step.trusted(
-            length, position[p0:p1], quaternion[p0:p1], teleported[p0:p1], rows.rows(k0, k1), gravity[i], whose[i]
-        )
-        for i, (length, p0, p1, k0, k1) in enumerate(
-            zip(dt.tolist(), poses[:-1], poses[1:], contacts[:-1], contacts[1:], strict=True)
-        )
     )

@@ -8,7 +8,7 @@ residual_voice: residuals | synthesis_state: all that goes on | synthesizer: all
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -22,7 +22,7 @@ from sonic_bullet.records.errors import LogError
 from sonic_bullet.render.silence import silence_notes, why_silent
 from sonic_bullet.render.synthesizer import LATENCY_STEPS, Synthesizer
 
-__all__ = ["LATENCY_STEPS", "Synthesizer", "make_ready", "render_log", "silence_notes", "why_silent"]
+__all__ = ["LATENCY_STEPS", "Synthesizer", "make_ready", "render_blocks", "render_log", "silence_notes", "why_silent"]
 
 AT_ONCE = 64
 """Steps that a replay takes in at once, between two looks at how far it is."""
@@ -38,11 +38,28 @@ def render_log(
 ) -> Array:
     """The sound of a contact log, (channels, floor(sr·time)) in pascals; with the log's own rate the same bits as live.
 
-    Its events act where they did: at the first sample of the same step, at any rate.
+    Its events act where they did: at the first sample of the same step, at any rate. All of it is in memory at once:
+    `render_blocks` gives it in pieces.
 
     residual: whether with what materials sound beside their modes, None: as the log says. progress is called with the
     share done, say with what is being computed before the first step. Raises AudioError for a rate that cannot be,
     LogError for what is no log.
+    """
+    blocks = [*render_blocks(log, sr=sr, residual=residual, progress=progress, say=say)]
+    return np.ascontiguousarray(np.concatenate(blocks, axis=1))
+
+
+def render_blocks(
+    log: ContactLog,
+    *,
+    sr: int | None = None,
+    residual: bool | None = None,
+    progress: Callable[[float], None] | None = None,
+    say: Callable[[str], None] | None = None,
+) -> Iterator[Array]:
+    """What `render_log` gives, in pieces (channels, n) of some steps each, for logs longer than the memory.
+
+    Arguments and errors: as `render_log` has them; arguments are checked at once.
     """
     from sonic_bullet.files import check_sr
 
@@ -50,27 +67,45 @@ def render_log(
     log = replace(log, sr=check_sr(sr if sr is not None else log.sr))
     residual = log.residual if residual is None else as_flag(residual, "residual")
     as_call(progress, "progress"), as_call(say, "say")
+    return _blocks(log, residual, progress, say)
+
+
+def _blocks(
+    log: ContactLog, residual: bool, progress: Callable[[float], None] | None, say: Callable[[str], None] | None
+) -> Iterator[Array]:
     for body in log.bodies if log.sensors else ():
         if body.model is not None and body.model.mode_count:
             if say is not None:
                 say(f"how {body.model.mode_count} modes of {body.name} radiate")
             radiation_of(body.model, log.air)
-    synth = Synthesizer(sr=log.sr, sensors=log.sensors, seed=log.seed, air=log.air, residual=residual)
+    synth = Synthesizer(sr=log.sr, sensors=log.sensors, seed=log.seed, air=log.air, residual=residual, keep=False)
     quenches = {event.step for event in log.events if event.kind == "quench"}
-    first = 0
-    while first < len(log.steps):
-        if first in quenches:
+    done = 0
+    for steps in _together(log.steps, quenches):
+        if done in quenches:
             synth.quench()
-        who, stop = log.steps[first].body, first + 1
-        while stop < min(first + AT_ONCE, len(log.steps)) and stop not in quenches:
-            if log.steps[stop].body is not who and not np.array_equal(log.steps[stop].body, who):
-                break
-            stop += 1
-        synth.play(log.steps[first:stop], log.bodies)
-        first = stop
+        yield synth.play(steps, log.bodies)
+        done += len(steps)
         if progress is not None:
-            progress(first / len(log.steps))
-    return np.ascontiguousarray(synth.sound())
+            progress(done / len(log.steps))
+    yield synth.rest()
+
+
+def _together(steps: Iterable[Step], quenches: set[int]) -> Iterator[list[Step]]:
+    """Steps that a replay takes in at once: of the same bodies, with no quench between."""
+    group: list[Step] = []
+    for number, step in enumerate(steps):
+        if group and (len(group) == AT_ONCE or number in quenches or not same_bodies(step, group[0])):
+            yield group
+            group = []
+        group.append(step)
+    if group:
+        yield group
+
+
+def same_bodies(one: Step, other: Step) -> bool:
+    """Whether two steps hold poses of the same bodies."""
+    return one.body is other.body or np.array_equal(one.body, other.body)
 
 
 def make_ready() -> None:

@@ -14,9 +14,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from sonic_bullet.files.rows.spool import KeptSound, sound_spool
 from sonic_bullet.records import Air, Array, Sensor
 from sonic_bullet.records.contacts import Contacts, Step
-from sonic_bullet.records.errors import AudioError
+from sonic_bullet.records.errors import AudioError, FileError
 from sonic_bullet.render import driver
 from sonic_bullet.render.clock import Clock, exact_step
 from sonic_bullet.render.first_run import make_driver
@@ -190,17 +191,23 @@ def clock_after(state: State) -> Clock:
 
 
 class Synthesizer:
-    """Steps in, lagging frames out: the live form of `advance`, with the sound so far kept."""
+    """Steps in, lagging frames out: the live form of `advance`, with the sound so far kept, unless ``keep`` is False.
 
-    def __init__(self, *, sr: int, sensors: tuple[Sensor, ...], seed: int, air: Air, residual: bool = True) -> None:
-        self._setup = Setup(sr, sensors, seed, air, residual)
+    unkept: why no more of it is kept, once a disk is full; frames go on.
+    """
+
+    def __init__(
+        self, *, sr: int, sensors: tuple[Sensor, ...], seed: int, air: Air, residual: bool = True, keep: bool = True
+    ) -> None:
+        self._setup, self._keep = Setup(sr, sensors, seed, air, residual), keep
         self.reset()
 
     def reset(self) -> None:
         """Begin anew at time 0, in silence, as one just made."""
         self._state = start(self._setup)
         self._clock = Clock()
-        self._frames: list[Array] = []
+        self._sound = sound_spool(len(self._setup.sensors), "attach with keep_sound=False") if self._keep else None
+        self.unkept: FileError | None = None
         self._lag = np.zeros((len(self._setup.sensors), 0))
         self._last: Step | None = None
         self._failed: AudioError | None = None
@@ -241,13 +248,12 @@ class Synthesizer:
         out, self._lag = queue[:, :count], queue[:, count:]
         return np.ascontiguousarray(out)
 
-    def play(self, steps: Sequence[Step], bodies: Records) -> None:
-        """Take in steps of the same bodies each; `sound` has what they make."""
+    def play(self, steps: Sequence[Step], bodies: Records) -> Array:
+        """Take in steps of the same bodies each; (channels, n) of what can be rendered then, without lag."""
         for step in steps:
             self._clock = self._clock.after(step.dt_s)
         self._steps += len(steps)
-        if self._setup.sensors:
-            self._take(steps, bodies)
+        return self._take(steps, bodies) if self._setup.sensors else np.zeros((0, 0))
 
     def _take(self, steps: Sequence[Step], bodies: Records) -> Array:
         if self._failed is not None:  # within a step, so that nothing can go on from there
@@ -264,17 +270,33 @@ class Synthesizer:
             self._looked = state.taken
             release(state)
         self._last = steps[-1]
-        if frame.shape[1]:
-            self._frames.append(frame)
+        if self._sound is not None and self.unkept is None:
+            self._sound.append(frame.T)
+            try:
+                self._sound.spill()
+            except FileError as error:
+                self.unkept = error
         return frame
 
-    def sound(self) -> Array:
-        """(channels, floor(sr·time)) all sound so far, without lag; after an AudioError, what was made before it."""
+    def rest(self) -> Array:
+        """(channels, n) what the steps taken in will still sound, as if nothing touched any more."""
         channels = len(self._setup.sensors)
         if not channels:
             return np.zeros((0, self._clock.sample(self._setup.sr)))
-        rest = drained(self._setup, self._state, self._last) if self._failed is None else np.zeros((channels, 0))
-        return np.concatenate([np.zeros((channels, 0)), *self._frames, rest], axis=1)
+        return drained(self._setup, self._state, self._last) if self._failed is None else np.zeros((channels, 0))
+
+    def sound(self) -> Array:
+        """(channels, floor(sr·time)) all sound so far, without lag; as `kept_sound` has it, in memory."""
+        return self.kept_sound().samples()
+
+    def kept_sound(self) -> KeptSound:
+        """All sound so far, without lag, where it lies; after an AudioError, what was made before it, after a full
+        disk, what was kept. Raises AudioError where none is kept.
+        """
+        if self._sound is None:
+            raise AudioError("the sound is not kept", "attach with keep_sound=True, or read() the frames")
+        rest = self.rest() if self.unkept is None else np.zeros((len(self._setup.sensors), 0))
+        return KeptSound(self._sound, len(self._sound), rest)
 
     def quench(self) -> None:
         """Stop all that rings where the steps taken in so far end, exactly there at any rate: in frames that is

@@ -29,16 +29,17 @@ from sonic_bullet.machine.terminal import status
 from sonic_bullet.records import Air, Array, Material, ModalModel, Sensor, Shape
 from sonic_bullet.records.coerce import (
     as_call,
+    as_flag,
     as_kind,
     as_path,
     as_whole,
     check_options,
     shown,
 )
-from sonic_bullet.records.contacts import Event, Step
 from sonic_bullet.records.errors import AudioError, SceneError, SizeWarning
 from sonic_bullet.render import LATENCY_STEPS, Synthesizer
 from sonic_bullet.session.arguments import MicrophoneLike, as_sensors
+from sonic_bullet.session.keeping import KeptRun
 from sonic_bullet.session.wanted_bodies import WantedBody, check_names, solved_bodies, wanted_body
 
 
@@ -49,6 +50,8 @@ def attach(
     microphone: MicrophoneLike = (0.0, -1.0, 0.5),
     seed: int = 0,
     air: Air | None = None,
+    keep_log: bool = True,
+    keep_sound: bool = True,
 ) -> Listener:
     """Listen to a PyBullet world.
 
@@ -56,10 +59,22 @@ def attach(
     a client id (then call `listener.step()` after each `p.stepSimulation()`); or a `listener.World` of another
     simulator. sr: sample rate in Hz, 8000 … 384000. microphone: a point in the world in m, several points (one channel
     each), or sensors (`Microphone`, `Vibrometer`, `ModalSum`); none at all: contacts alone, no sound. seed: of the
-    surfaces' roughness. air: the medium, 1.2 kg/m³ and 343 m/s by default. Raises SceneError for a client that is not
-    connected, AudioError for a bad rate, RecordError for a microphone or a seed that is none.
+    surfaces' roughness. air: the medium, 1.2 kg/m³ and 343 m/s by default.
+    keep_log, keep_sound: whether `contacts`, and `sound` and `write`, will be asked for; what is kept of a long run
+    lies in a nameless temporary file (where TMPDIR says, else in /tmp), gone with the listener.
+
+    Raises SceneError for a client that is not connected, AudioError for a bad rate, RecordError for a microphone or a
+    seed that is none.
     """
-    return Listener(client, sr=sr, sensors=as_sensors(microphone), seed=seed, air=Air() if air is None else air)
+    return Listener(
+        client,
+        sr=sr,
+        sensors=as_sensors(microphone),
+        seed=seed,
+        air=Air() if air is None else air,
+        keep_log=keep_log,
+        keep_sound=keep_sound,
+    )
 
 
 def _opened(client: Any) -> World:
@@ -98,12 +113,24 @@ class Listener:
 
     latency_steps = LATENCY_STEPS
 
-    def __init__(self, client: Any, *, sr: int, sensors: tuple[Sensor, ...], seed: int, air: Air) -> None:
+    def __init__(
+        self,
+        client: Any,
+        *,
+        sr: int,
+        sensors: tuple[Sensor, ...],
+        seed: int,
+        air: Air,
+        keep_log: bool = True,
+        keep_sound: bool = True,
+    ) -> None:
         self.sr, self.sensors = check_sr(sr), as_sensors(sensors, "sensors")
         self.seed = as_whole(seed, "seed", "give a whole number, 0 or more", least=0, most=2**63 - 1)
         self.air = as_kind(air, Air, "air", "give an Air(density_kg_m3=…, sound_speed_m_s=…), or leave it out")
         self.world = client if isinstance(client, World) else _opened(client)
-        self._synth = Synthesizer(sr=self.sr, sensors=self.sensors, seed=self.seed, air=self.air)
+        self.world.logged = keep_log = as_flag(keep_log, "keep_log")
+        keep = as_flag(keep_sound, "keep_sound")
+        self._synth = Synthesizer(sr=self.sr, sensors=self.sensors, seed=self.seed, air=self.air, keep=keep)
         self._attached = True
         self._begin()
         self._frame: Array | None = np.zeros((len(self.sensors), 0))
@@ -111,21 +138,17 @@ class Listener:
 
     def _begin(self) -> None:
         """Nothing heard so far."""
-        self._steps: list[Step] = []
-        self._events: list[Event] = []
-        self._unread: list[Array] = []
+        self._kept = KeptRun(len(self.sensors), keep_log=self.world.logged)
         self._emptied = self.world.emptied
-        self._moved: frozenset[int] = frozenset()
 
     def reset(self) -> None:
-        """Begin anew, as a listener just attached to which the same bodies were added in the same order: all it then
-        gives is the same, byte by byte.
+        """Begin anew: the same bytes as of a listener just attached, with the same bodies added in the same order.
 
-        What rings or travels, contacts, events, unread frames, sound and time so far are gone; who was never added is
-        met anew; bodies that were removed are forgotten. Settings, and what was added, stay. A client that is not
-        hooked does not tell who was removed: after its resetSimulation, a body of the same id, name and shape counts as
-        the one that was added. Raises SceneError, having changed nothing: detached, called while a step is made,
-        connection lost, or a `World` that cannot begin anew.
+        What rings or travels, log, unread frames, sound and time so far are gone; who was never added is met anew; who
+        was removed is forgotten. Settings, and what was added, stay. A client that is not hooked does not tell who was
+        removed: after its resetSimulation, a body of the same id, name and shape counts as the one that was added.
+        Raises SceneError, having changed nothing: detached, called while a step is made, connection lost, or a `World`
+        that cannot begin anew.
         """
         if not self._attached:
             raise SceneError("the listener is detached", "attach a new one")
@@ -232,27 +255,19 @@ class Listener:
         if not self.world.stepped:
             self._frame = np.zeros((len(self.sensors), 0))
             return self._frame
-        if self.world.emptied != self._emptied or self._moved or np.count_nonzero(step.teleported):
-            self._note(step)
-        self._steps.append(step)
-        frame = self._frame = self._synth.feed(step, self.world.records)
-        self._unread.append(frame)
-        return frame
-
-    def _note(self, step: Step) -> None:
-        """Events of what happened to the world before a step, which is about to be taken in."""
-        number = len(self._steps)
         if self.world.emptied != self._emptied:
             self._emptied = self.world.emptied
-            self._events.append(Event("reset", number))
-        moved = step.body[step.teleported].tolist()
-        self._events += [Event("moved", number, body) for body in moved if body not in self._moved]
-        self._moved = frozenset(moved)
+            self._kept.event("reset")
+        self._kept.step(step)
+        frame = self._frame = self._synth.feed(step, self.world.records)
+        self._kept.frame(frame)
+        if self._synth.unkept is not None:
+            self._kept.give_up("sound", self._synth.unkept)
+        return frame
 
     def read(self) -> Array:
         """All frames since the last read, joined, (channels, n): for environments that hide many steps in one call."""
-        frames, self._unread = self._unread, []
-        return np.concatenate(frames, axis=1) if frames else np.zeros((len(self.sensors), 0))
+        return self._kept.read()
 
     def quench(self) -> None:
         """Stop everything that rings, as a hand would, now: where the last step taken in ends.
@@ -263,22 +278,22 @@ class Listener:
         to the microphones; what rolls or slides goes on. `sound` and files fall silent at that very sample, `frame` as
         much later as it lags. It is an event of the log, so that a replay stops there too, at any rate.
         """
-        self._events.append(Event("quench", len(self._steps)))
+        self._kept.event("quench")
         self._synth.quench()
 
     @property
     def contacts(self) -> ContactLog:
-        """The contact log so far: all that a later render or comparison needs."""
+        """The contact log so far: all that a later render or comparison needs. Raises SceneError where none is kept."""
         simulator = self.world.simulator
         return ContactLog(
             tuple(self.world.bodies),
-            tuple(self._steps),
+            self._kept.steps(),
             self.sensors,
             self.sr,
             self.seed,
             self.air,
             self.world.untouched,
-            tuple(self._events),
+            tuple(self._kept.events),
             simulator.engine,
             {**package_versions(), **simulator.versions},
             simulator.changes,
@@ -286,8 +301,10 @@ class Listener:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What of the world is left out of the sound, and why; each was a `SceneWarning` when it happened."""
-        return self.world.notes
+        """What of the world is left out of the sound, or of what is kept, and why; each was a `SceneWarning` when it
+        happened.
+        """
+        return (*self.world.notes, *self._kept.notes)
 
     @property
     def time_s(self) -> float:
@@ -295,14 +312,18 @@ class Listener:
         return float(self._synth.time_s)
 
     def sound(self) -> Array:
-        """All sound so far without the lag, (channels, floor(sr·time)), float64 pascals (m/s for vibrometers)."""
+        """All sound so far without the lag, (channels, floor(sr·time)), float64 pascals (m/s for vibrometers).
+
+        Raises AudioError where it is not kept.
+        """
         return self._synth.sound()
 
     def write(self, path: str | Path, **options: Any) -> AudioReport:
         """Write the sound so far without the lag: float32 with 1.0 = 1 Pa, or scaled by ``peak_dbfs=`` or ``lufs=``
         (see `files.write_audio`).
 
-        Raises FileError, AudioError.
+        It goes to the file by blocks, however long it is; lufs= alone needs all of it in memory. Raises FileError,
+        AudioError.
         """
         check_options(options, _keywords(write_audio), "write", error=AudioError)
         place = as_path(path, "path", "name a file, such as out.wav")
@@ -310,7 +331,7 @@ class Listener:
             raise AudioError(
                 "there is no microphone, so there is no sound to write", "attach with microphone=(x, y, z)"
             )
-        return write_audio(place, self.sound(), self.sr, **options)
+        return write_audio(place, self._synth.kept_sound(), self.sr, **options)
 
     def detach(self) -> None:
         """Stop listening and leave the client as it was; sound and log stay. Twice is once."""

@@ -199,9 +199,10 @@ def test_whatever_is_known_comes_back(
     assert same(files.read_log(tmp_path / "b.npz"), read)
 
 
-def test_a_log_of_the_first_format_reads_as_one_without_events(tmp_path: Path) -> None:
-    """The header names format 1 and has no events."""
-    written = replace(log(), events=())
+@pytest.mark.parametrize("form", [1, 2])
+def test_older_formats_read_as_logs_in_which_nobody_goes(tmp_path: Path, form: int) -> None:
+    """Neither has an entry that says whose poses are whose; the first has no events."""
+    written = replace(log(), events=()) if form == 1 else log()
     files.write_log(tmp_path / "new.npz", written)
     with zipfile.ZipFile(tmp_path / "new.npz") as source, zipfile.ZipFile(tmp_path / "old.npz", "w") as target:
         for name in source.namelist():
@@ -209,12 +210,14 @@ def test_a_log_of_the_first_format_reads_as_one_without_events(tmp_path: Path) -
             if name == "header.npy":
                 with np.load(tmp_path / "new.npz") as entries:
                     text = entries["header"].tobytes()
-                old = text.replace(b"sonic-bullet-contacts/3", b"sonic-bullet-contacts/1").replace(b',"events":[]', b"")
-                assert old != text and b"events" not in old
+                old = text.replace(b"sonic-bullet-contacts/3", b"sonic-bullet-contacts/%d" % form)
+                old = old.replace(b',"events":[]', b"") if form == 1 else old
+                assert old != text and (form == 2 or b"events" not in old)
                 stream = io.BytesIO()
                 np.save(stream, np.frombuffer(old, np.uint8))
                 content = stream.getvalue()
-            target.writestr(name, content)
+            if name != "pose_body.npy":
+                target.writestr(name, content)
     assert same(files.read_log(tmp_path / "old.npz"), written)
 
 

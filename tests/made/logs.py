@@ -10,6 +10,7 @@ import numpy as np
 
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.models import as_json_text
+from sonic_bullet.files.rows.log_steps import LogSteps
 from sonic_bullet.records import Air, Body, Material, Microphone, ModalModel, ModalSum, Vibrometer
 from sonic_bullet.records.contacts import ROW_FIELDS, Contacts, Event, Step
 from sonic_bullet.records.modal_options import ModalOptions
@@ -85,7 +86,8 @@ def log(seed: int = 0, steps: int = 5, *, facts: bool = True) -> ContactLog:
 
 
 def same(x: object, y: object) -> bool:
-    """Equal to the last bit, NaN to NaN, through tuples, records and arrays."""
+    """Equal to the last bit, NaN to NaN, through tuples, steps of logs, records and arrays."""
+    x, y = (tuple(one) if isinstance(one, LogSteps) else one for one in (x, y))
     if isinstance(x, np.ndarray):
         return isinstance(y, np.ndarray) and x.dtype == y.dtype and x.shape == y.shape and x.tobytes() == y.tobytes()
     if isinstance(x, tuple):

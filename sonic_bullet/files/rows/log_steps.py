@@ -1,0 +1,212 @@
+"""The steps of a contact log as columns: what an hour of them is kept as, live and on disk.
+
+Step -> StepLog -> STEP row + POSE rows + CONTACT rows (spools) -> LogSteps -> Step, when asked for
+npz  -> the same three tables, read where they lie (step_entries) -> LogSteps -> Step
+
+STEP       length, gravity, and where its rows end among all poses and contacts
+POSE       index of the body into the log's `bodies`, moved by hand or not, position, quaternion
+CONTACT    records.contacts
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+from sonic_bullet.files.rows.spool import Spool
+from sonic_bullet.records import Array
+from sonic_bullet.records.contacts import CONTACT, Contacts, Step, first_bodies
+
+STEP = np.dtype([("dt_s", "f8"), ("gravity_m_s2", "f8", (3,)), ("pose_end", "i8"), ("contact_end", "i8")])
+POSE = np.dtype(
+    [("body", "i4"), ("teleported", "?"), ("position_m", "f8", (3,)), ("quaternion_xyzw", "f8", (4,))], align=True
+)
+PACKED = 64
+"""Steps that wait before they are packed: one call for 64 costs a fifth of 64 calls."""
+BLOCK_STEPS, BLOCK_ROWS = 256, 1 << 16
+"""Steps that are read at once, and the rows that end a block before: 10 MB of contacts."""
+
+
+class Table(Protocol):
+    """Rows (·,) of one dtype that are read when asked for: a `Spool`, an array, entries of a file."""
+
+    def __len__(self) -> int: ...
+
+    def __getitem__(self, rows: slice, /) -> Array: ...
+
+
+class StepBlock(NamedTuple):
+    """Consecutive steps, all their rows in memory: step (n,) STEP, pose (p,) POSE, contact (k,) CONTACT; the ends in
+    step count from this block's first rows.
+    """
+
+    step: Array
+    pose: Array
+    contact: Array
+
+    def counts(self, name: str) -> Array:
+        """(n,) rows of each step; name: "pose" or "contact"."""
+        return np.diff(self.step[f"{name}_end"], prepend=0)
+
+    def steps(self) -> list[Step]:
+        """The block's steps, whose numbers are known to be numbers."""
+        made, p0, k0 = [], 0, 0
+        position, turned, moved, body = (
+            _column(self.pose, name) for name in ("position_m", "quaternion_xyzw", "teleported", "body")
+        )
+        gravity, none = _column(self.step, "gravity_m_s2"), Contacts.none()
+        body = body.astype(np.int64)
+        body.flags.writeable = False
+        columns = (self.step[name].tolist() for name in ("dt_s", "pose_end", "contact_end"))
+        for i, (dt_s, p1, k1) in enumerate(zip(*columns, strict=True)):
+            rows = Contacts.trusted(self.contact[k0:k1]) if k1 > k0 else none
+            # ascending from 0, so that its last says whether it is the first p1 - p0
+            usual = p1 == p0 or body[p1 - 1] == p1 - p0 - 1
+            who = first_bodies(p1 - p0) if usual else body[p0:p1]
+            made.append(Step.trusted(dt_s, position[p0:p1], turned[p0:p1], moved[p0:p1], rows, gravity[i], who))
+            p0, k0 = p1, k1
+        return made
+
+
+def _column(table: Array, name: str) -> Array:
+    """A field by itself, contiguous and read-only."""
+    made = np.ascontiguousarray(table[name])
+    made.flags.writeable = False
+    return made
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LogSteps(Sequence[Step]):
+    """Steps start … stop-1 of three tables, made when they are asked for; a slice is made as lazily.
+
+    step, pose, contact: rows of STEP, POSE, CONTACT; what comes behind ``stop`` is not looked at, so tables may grow.
+    known: more than the largest index of a body in the tables.
+    """
+
+    step: Table
+    pose: Table
+    contact: Table
+    start: int
+    stop: int
+    known: int
+    _last: list[Any]
+
+    @classmethod
+    def of(cls, steps: Sequence[Step]) -> LogSteps:
+        """Steps that are in memory. Raises FileError where they outgrow memory and disk."""
+        kept = StepLog()
+        for step in steps:
+            kept.append(step)
+        return kept.steps()
+
+    def __len__(self) -> int:
+        return self.stop - self.start
+
+    def __getitem__(self, index: Any) -> Any:
+        if isinstance(index, slice):
+            start, stop, stride = index.indices(len(self))
+            if stride != 1:
+                return tuple(self[i] for i in range(start, stop, stride))
+            first = self.start + start
+            return LogSteps(
+                self.step, self.pose, self.contact, first, max(first, self.start + stop), self.known, [0, ()]
+            )
+        number = range(len(self))[index] + self.start
+        first, steps = self._last
+        if not first <= number < first + len(steps):
+            # whole blocks from the start, so that going backwards costs no more
+            first = number - (number - self.start) % BLOCK_STEPS
+            steps = [one for block in self._blocks(first, min(first + BLOCK_STEPS, self.stop)) for one in block.steps()]
+            self._last[:] = first, steps
+        return steps[number - first]
+
+    def __iter__(self) -> Iterator[Step]:
+        for block in self.blocks():
+            yield from block.steps()
+
+    def blocks(self) -> Iterator[StepBlock]:
+        """All of them, a block after the other."""
+        return self._blocks(self.start, self.stop)
+
+    def _blocks(self, first: int, stop: int) -> Iterator[StepBlock]:
+        while first < stop:
+            p0, k0 = self._before(first)
+            step = self.step[first : min(first + BLOCK_STEPS, stop)].copy()
+            step["pose_end"] -= p0
+            step["contact_end"] -= k0
+            full = np.searchsorted(np.maximum(step["pose_end"], step["contact_end"]), BLOCK_ROWS, side="right")
+            step = step[: max(1, int(full))]
+            p1, k1 = p0 + int(step["pose_end"][-1]), k0 + int(step["contact_end"][-1])
+            yield StepBlock(step, self.pose[p0:p1], self.contact[k0:k1])
+            first += len(step)
+
+    def _before(self, number: int) -> tuple[int, int]:
+        """How many poses and contacts come before a step."""
+        if number == 0:
+            return 0, 0
+        (row,) = self.step[number - 1 : number]
+        return int(row["pose_end"]), int(row["contact_end"])
+
+    def lengths_s(self) -> Array:
+        """(n,) length of each step."""
+        return np.concatenate([np.zeros(0), *(rows["dt_s"] for rows in self.step_rows())])
+
+    def step_rows(self) -> Iterator[Array]:
+        """STEP rows alone, many at once; their ends count from the tables' first rows."""
+        for first in range(self.start, self.stop, BLOCK_ROWS):
+            yield self.step[first : min(first + BLOCK_ROWS, self.stop)]
+
+    @property
+    def row_counts(self) -> tuple[int, int]:
+        """How many poses and contacts the steps have in all."""
+        (p0, k0), (p1, k1) = self._before(self.start), self._before(self.stop)
+        return p1 - p0, k1 - k0
+
+    def bodies(self) -> int:
+        """One more than the largest index of a body that has a pose in them."""
+        return max((int(block.pose["body"].max(initial=-1)) + 1 for block in self.blocks()), default=0)
+
+
+class StepLog:
+    """Steps as they come, packed into tables."""
+
+    def __init__(self, instead: str = "") -> None:
+        self._tables = tuple(Spool(dtype, what="contact log", instead=instead) for dtype in (STEP, POSE, CONTACT))
+        self._fresh: list[Step] = []
+        self._known = 0
+
+    def append(self, step: Step) -> None:
+        """Take in a step. Raises FileError where the disk takes no more; the step is in the log all the same."""
+        self._fresh.append(step)
+        if len(self._fresh) >= PACKED:
+            self._pack()
+            for table in self._tables:
+                table.spill()
+
+    def steps(self) -> LogSteps:
+        """Those so far; what comes later is not among them."""
+        self._pack()
+        step, pose, contact = self._tables
+        return LogSteps(step, pose, contact, 0, len(step), self._known, [0, ()])
+
+    def _pack(self) -> None:
+        fresh, self._fresh = self._fresh, []
+        if not fresh:
+            return
+        steps, poses, contacts = self._tables
+        poses_before, contacts_before = len(poses), len(contacts)
+        bodies, rows = np.array([(len(one.body), len(one.contacts)) for one in fresh], np.int64).T
+        step, pose = np.zeros(len(fresh), STEP), np.zeros(int(bodies.sum()), POSE)
+        step["dt_s"] = [one.dt_s for one in fresh]
+        step["gravity_m_s2"] = [one.gravity_m_s2 for one in fresh]
+        step["pose_end"] = poses_before + np.cumsum(bodies)
+        step["contact_end"] = contacts_before + np.cumsum(rows)
+        for name in ("body", "teleported", "position_m", "quaternion_xyzw"):
+            pose[name] = np.concatenate([getattr(one, name) for one in fresh])
+        self._known = max(self._known, int(pose["body"].max(initial=-1)) + 1)
+        steps.append(step)
+        poses.append(pose)
+        contacts.append(np.concatenate([one.contacts.row for one in fresh]))

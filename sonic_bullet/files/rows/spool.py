@@ -1,0 +1,208 @@
+"""Rows that grow for hours: in memory while they are few, beyond that in a temporary file without a name.
+
+    append -> fresh rows -> spill -> packed bytes (memory up to `memory_bytes`, then the file) -> [start:stop]
+
+The file is unlinked from its first moment (`tempfile.TemporaryFile`): whatever ends the process, nothing is left. It
+lies where TMPDIR says, else in /tmp. Rows are read by pread(2) on its descriptor, so a reader moves no writer.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import IO, Any
+
+import numpy as np
+
+from sonic_bullet.files.atomic import cannot
+from sonic_bullet.records import Array
+from sonic_bullet.records.errors import FileError
+
+MEMORY_BYTES = 4 << 20
+"""What one spool holds in memory: 5 s of a small scene's contacts, 10 s of one channel at 48 kHz touch no disk."""
+BLOCK_BYTES = 1 << 18
+"""What is written at once: a write call costs microseconds, so one in 1000 steps is none."""
+READ_FRAMES = 1 << 18
+
+
+class Spool:
+    """Rows of one dtype and shape, appended in order and read back by [start:stop], read-only.
+
+    dtype, tail: of a row. what: the thing, in words, for the message of a full disk ("contact log"); instead: what its
+    user can do without a larger disk ("attach with keep_log=False").
+    """
+
+    def __init__(
+        self,
+        dtype: Any,
+        tail: tuple[int, ...] = (),
+        *,
+        what: str,
+        instead: str = "",
+        memory_bytes: int = MEMORY_BYTES,
+    ) -> None:
+        self.dtype, self.tail, self.what, self.instead = np.dtype(dtype), tail, what, instead
+        self.row_bytes = self.dtype.itemsize * int(np.prod(tail))
+        self._memory_bytes = memory_bytes
+        self._memory = bytearray()
+        self._file: IO[bytes] | None = None
+        self._fresh: list[Array] = []
+        self._packed = self._count = 0
+        self._block = max(1, BLOCK_BYTES // max(self.row_bytes, 1))
+
+    def __len__(self) -> int:
+        return self._count
+
+    @property
+    def on_disk(self) -> bool:
+        """Whether its rows have outgrown the memory."""
+        return self._file is not None
+
+    def append(self, rows: Array) -> None:
+        """Take in rows (k, *tail), which nobody writes to any more; no disk is touched before `spill`."""
+        self._fresh.append(rows)
+        self._count += len(rows)
+
+    def spill(self) -> None:
+        """Pack the fresh rows, once they are many.
+
+        Raises FileError where the disk takes no more: then they stay in memory, and all rows can still be read.
+        """
+        if self._count - self._packed >= self._block:
+            self._pack()
+
+    def _pack(self) -> None:
+        rows = self._joined()
+        if self._file is None and len(self._memory) + rows.nbytes <= self._memory_bytes:
+            self._memory += rows.tobytes()
+        else:
+            try:
+                if self._file is None:
+                    file = tempfile.TemporaryFile(prefix="sonic-bullet-", buffering=0)  # noqa: SIM115 - lives as we do
+                    _write(file, memoryview(self._memory))
+                    self._file, self._memory = file, bytearray()
+                _write(self._file, memoryview(rows.tobytes()), self._packed * self.row_bytes)
+            except OSError as error:
+                raise self._refused(error) from error
+        self._packed, self._fresh = self._count, []
+
+    def _joined(self) -> Array:
+        """The fresh rows as one array."""
+        none = np.empty((0, *self.tail), self.dtype)
+        rows = np.concatenate([none, *self._fresh], dtype=self.dtype)
+        rows.flags.writeable = False
+        self._fresh = [rows]
+        return rows
+
+    def _refused(self, error: OSError) -> FileError:
+        """Why the disk took nothing, with what can be done."""
+        if self._file is not None:
+            os.ftruncate(self._file.fileno(), self._packed * self.row_bytes)  # what was written in part is room
+        said = cannot("keep more of the", self.what, error)
+        larger = "set TMPDIR to a folder with more room"
+        place = tempfile.tempdir or "the temporary folder"
+        return FileError(f"{said.what} ({place})", f"{larger}, or {self.instead}" if self.instead else larger)
+
+    def __getitem__(self, rows: slice) -> Array:
+        """Rows start … stop-1 as one array of its own. Raises FileError."""
+        start, stop, _ = rows.indices(self._count)
+        stop = max(start, stop)
+        parts = []
+        if start < self._packed:
+            parts.append(self._read(start, min(stop, self._packed)))
+        if stop > self._packed:
+            fresh = self._joined() if len(self._fresh) != 1 else self._fresh[0]
+            parts.append(fresh[max(start - self._packed, 0) : stop - self._packed])
+        if not parts:
+            parts.append(np.empty((0, *self.tail), self.dtype))
+        made = parts[0] if len(parts) == 1 else np.concatenate(parts)
+        made.flags.writeable = False
+        return made
+
+    def _read(self, start: int, stop: int) -> Array:
+        at, count = start * self.row_bytes, (stop - start) * self.row_bytes
+        raw = (
+            bytes(self._memory[at : at + count])
+            if self._file is None
+            else read_at(self._file.fileno(), count, at, self.what)
+        )
+        return np.frombuffer(raw, self.dtype).reshape(stop - start, *self.tail)
+
+
+def _write(file: IO[bytes], data: memoryview, at: int = 0) -> None:
+    """All of ``data`` at byte ``at``. Raises OSError."""
+    file.seek(at)
+    while data:
+        data = data[file.write(data) :]
+
+
+def read_at(fd: int, count: int, at: int, what: object) -> bytes:
+    """``count`` bytes from byte ``at`` of an open file. Raises FileError where it has them no more."""
+    parts = []
+    try:
+        while count:
+            part = os.pread(fd, min(count, 1 << 30), at)  # Linux reads at most 2 GiB at once
+            if not part:
+                raise FileError(f"cannot read {what}: it was cut while it was in use", "make it again")
+            parts.append(part)
+            count, at = count - len(part), at + len(part)
+    except OSError as error:
+        raise cannot("read", what, error) from error
+    return parts[0] if len(parts) == 1 else b"".join(parts)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class KeptSound:
+    """Sound as long as it likes: (channels, n) float64, the first ``count`` frames in a spool of rows (channels,), the
+    ``rest`` (channels, ·) in memory. What is appended to the spool later is not of it.
+    """
+
+    spool: Spool
+    count: int
+    rest: Array
+
+    @classmethod
+    def of(cls, samples: Array) -> KeptSound:
+        """Samples (channels, n) that are in memory anyway."""
+        return cls(sound_spool(len(samples)), 0, samples)
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Channels and frames."""
+        return len(self.rest), self.count + self.rest.shape[1]
+
+    def read(self, start: int, stop: int) -> Array:
+        """(channels, stop - start) of the frames start … stop-1, fewer at the end. Raises FileError."""
+        first = self.spool[start : min(stop, self.count)].T
+        if stop <= self.count:
+            return first
+        rest = self.rest[:, max(start - self.count, 0) : stop - self.count]
+        return rest if start >= self.count else np.concatenate([first, rest], axis=1)
+
+    def blocks(self, frames: int = READ_FRAMES) -> Iterator[Array]:
+        """All of it, in pieces (channels, ≤ frames)."""
+        for start in range(0, self.shape[1], frames):
+            yield self.read(start, start + frames)
+
+    def samples(self) -> Array:
+        """All of it at once, (channels, n)."""
+        made = np.empty(self.shape)
+        at = 0
+        for block in self.blocks():
+            made[:, at : at + block.shape[1]] = block
+            at += block.shape[1]
+        return made
+
+    def peaks(self) -> Array:
+        """(channels,) largest magnitude of each channel; NaN where one is none."""
+        peak = np.zeros(self.shape[0])
+        for block in self.blocks():
+            peak = np.maximum(peak, np.abs(block).max(axis=1))
+        return peak
+
+
+def sound_spool(channels: int, instead: str = "") -> Spool:
+    """A spool of frames (channels,) of float64."""
+    return Spool(float, (channels,), what="sound", instead=instead)

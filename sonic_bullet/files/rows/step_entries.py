@@ -1,0 +1,137 @@
+"""The steps of a contact log as entries of an npz: written block by block, read where they lie.
+
+LogSteps -> a Column for each field                                    -> npz
+npz      -> entries, large ones left in the file -> checked by blocks  -> LogSteps
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any, cast
+
+import numpy as np
+
+from sonic_bullet.files.container import REMEDY, Column, RowsOfEntry, take
+from sonic_bullet.files.rows.log_steps import POSE, STEP, LogSteps, StepBlock
+from sonic_bullet.records import Array
+from sonic_bullet.records.arrays import frozen_array
+from sonic_bullet.records.coerce import as_number
+from sonic_bullet.records.contacts import CONTACT, ROW_FIELDS
+from sonic_bullet.records.errors import LogError
+
+POSE_FIELDS: dict[str, tuple[type, tuple[int, ...]]] = {
+    "position_m": (float, (3,)),
+    "quaternion_xyzw": (float, (4,)),
+    "teleported": (bool, ()),
+    "body": (np.int32, ()),
+}
+LAZY = (*(f"pose_{name}" for name in POSE_FIELDS), *(f"contact_{name}" for name in ROW_FIELDS))
+"""Entries that may stay in the file."""
+ROWS_MOST = 2**40
+"""Poses or contacts of one step at most; that all their sums fit into 64 bits is asked too."""
+
+
+class Fields:
+    """Rows of one dtype whose fields lie apart: arrays, or entries of a file."""
+
+    def __init__(self, dtype: np.dtype[Any], count: int, fields: Mapping[str, Array | RowsOfEntry]) -> None:
+        self._dtype, self._count, self._fields = dtype, count, fields
+
+    def __len__(self) -> int:
+        return self._count
+
+    def __getitem__(self, rows: slice) -> Array:
+        start, stop, _ = rows.indices(self._count)
+        made = np.zeros(max(stop - start, 0), self._dtype)
+        for name, field in self._fields.items():
+            made[name] = field[start:stop]
+        made.flags.writeable = False
+        return made
+
+
+def step_entries(steps: LogSteps) -> dict[str, Column]:
+    """What `write_container` is to write of the steps; their rows are made when it comes to them."""
+    (p, k), s = steps.row_counts, len(steps)
+
+    def column(dtype: Any, shape: tuple[int, ...], of: Callable[[StepBlock], Array]) -> Column:
+        return Column(dtype, shape, lambda: map(of, steps.blocks()))
+
+    def fields(kind: str, rows: int, of: Mapping[str, tuple[type, tuple[int, ...]]]) -> dict[str, Column]:
+        def field(block: StepBlock, name: str) -> Array:
+            return cast(Array, getattr(block, kind)[name])
+
+        return {
+            f"{kind}_{name}": column(dtype, (rows, *tail), partial(field, name=name))
+            for name, (dtype, tail) in of.items()
+        }
+
+    return {
+        "step_dt_s": column(float, (s,), lambda block: block.step["dt_s"]),
+        "step_gravity_m_s2": column(float, (s, 3), lambda block: block.step["gravity_m_s2"]),
+        "step_body_count": column(np.int64, (s,), lambda block: block.counts("pose")),
+        "step_contact_count": column(np.int64, (s,), lambda block: block.counts("contact")),
+        **fields("pose", p, POSE_FIELDS),
+        **fields("contact", k, ROW_FIELDS),
+    }
+
+
+def read_steps(arrays: Mapping[str, Array], bodies: int, path: object, *, nobody_goes: bool) -> LogSteps:
+    """The steps of a log of so many bodies, every number checked, by blocks.
+
+    nobody_goes: of an older format, in which the poses of a step are those of the first bodies.
+
+    Raises LogError, or RecordError for numbers that are none.
+    """
+    dt = take(arrays, "step_dt_s", float, (None,), path)
+    step = np.zeros(len(dt), STEP)
+    for name, field in (("step_body_count", "pose_end"), ("step_contact_count", "contact_end")):
+        count = take(arrays, name, np.int64, (len(dt),), path)
+        if (count < 0).any() or (count > ROWS_MOST).any() or count.sum(dtype=float) > 2**62:
+            raise LogError(f"{path}: {name} is negative or absurd", REMEDY)
+        step[field] = np.cumsum(count)
+    p, k = (int(step[name][-1]) if len(dt) else 0 for name in ("pose_end", "contact_end"))
+    gravity = take(arrays, "step_gravity_m_s2", float, (len(dt), 3), path)
+    step["gravity_m_s2"] = frozen_array(gravity, float, (len(dt), 3), "step: gravity_m_s2")
+    remedy = "set a time step between 0 and 1 s with setTimeStep"
+    for wrong in dt[~((dt > 0) & (dt <= 1))][:1]:
+        as_number(float(wrong), "dt_s of a physics step", remedy, above=0, most=1, error=LogError)
+    step["dt_s"] = dt
+    take(arrays, "pose_teleported", bool, (p,), path)  # so that there are p of them
+    if nobody_goes:
+        count = np.diff(step["pose_end"], prepend=0)
+        arrays = {**arrays, "pose_body": (np.arange(p) - np.repeat(step["pose_end"] - count, count)).astype(np.int32)}
+    poses, contacts = (
+        {name: take(arrays, f"{kind}_{name}", dtype, (rows, *tail), path) for name, (dtype, tail) in fields.items()}
+        for kind, rows, fields in (("pose", p, POSE_FIELDS), ("contact", k, ROW_FIELDS))
+    )
+    step.flags.writeable = False
+    steps = LogSteps(step, Fields(POSE, p, poses), Fields(CONTACT, k, contacts), 0, len(dt), bodies, [0, ()])
+    for block in steps.blocks():
+        _check(block, bodies, path)
+    return steps
+
+
+def _check(block: StepBlock, bodies: int, path: object) -> None:
+    """Raise RecordError where a number is none, LogError where a step's bodies do not ascend or a contact is of none of
+    them.
+    """
+    for what, table, fields in (("step: ", block.pose, POSE_FIELDS), ("contact ", block.contact, ROW_FIELDS)):
+        for name, (dtype, tail) in fields.items():
+            if dtype is float:
+                frozen_array(table[name], float, (len(table), *tail), what + name)
+    number = np.arange(len(block.step))
+    # one number for each body of each step, ascending throughout where each step's bodies do
+    body = block.pose["body"].astype(np.int64)
+    if len(body) and not 0 <= body.min() <= body.max() < bodies:
+        raise LogError(f"{path}: a step has a pose of a body that the log has not", REMEDY)
+    known = np.repeat(number, block.counts("pose")) * bodies + body
+    if (np.diff(known) <= 0).any():
+        raise LogError(f"{path}: a step's bodies do not ascend", REMEDY)
+    step = np.repeat(number, block.counts("contact"))
+    for side in ("a", "b"):
+        touching = block.contact[side]
+        if touching.min(initial=0) < 0:
+            raise LogError(f"{path}: a contact names a body below zero", REMEDY)
+        if touching.max(initial=-1) >= bodies or not np.isin(step * bodies + touching, known).all():
+            raise LogError(f"{path}: a contact names a body that the step does not know", REMEDY)

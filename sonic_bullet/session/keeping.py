@@ -1,0 +1,85 @@
+"""What a listener keeps of a run: the contact log, and the frames that nobody has read yet.
+
+    Step  -> StepLog -> LogSteps             frame -> unread frames -> read
+
+Both lie in spools, in memory only while they are short. Where the disk is full the run goes on: nothing more of that
+kind is kept, a warning and a note say so, and what was kept stays.
+"""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+
+from sonic_bullet.files.rows.log_steps import LogSteps, StepLog
+from sonic_bullet.files.rows.spool import KeptSound, sound_spool
+from sonic_bullet.records import Array
+from sonic_bullet.records.contacts import Event, Step
+from sonic_bullet.records.errors import FileError, SceneError, SceneWarning
+
+
+class KeptRun:
+    """The log, its events, and unread frames of so many channels.
+
+    notes: what is no longer kept, and why.
+    """
+
+    def __init__(self, channels: int, *, keep_log: bool) -> None:
+        self.events: list[Event] = []
+        self.notes: tuple[str, ...] = ()
+        self._channels = channels
+        self._log = StepLog("attach with keep_log=False") if keep_log else None
+        self._unread = sound_spool(channels, "call read() more often")
+        self._count = 0
+        self._moved: frozenset[int] = frozenset()
+        self._given_up: set[str] = set()
+
+    def step(self, step: Step) -> None:
+        """Keep a step, and as events who was set elsewhere by hand before it and not before the last one."""
+        if self._log is not None and (self._moved or np.count_nonzero(step.teleported)):
+            moved = step.body[step.teleported].tolist()
+            for body in moved:
+                if body not in self._moved:
+                    self.event("moved", body)
+            self._moved = frozenset(moved)
+        self._count += 1
+        if self._log is not None and "contact log" not in self._given_up:
+            try:
+                self._log.append(step)
+            except FileError as error:
+                self.give_up("contact log", error)
+
+    def event(self, kind: str, body: int | None = None) -> None:
+        """Keep what happened before the next step; body: to whom, None: all."""
+        if self._log is not None and "contact log" not in self._given_up:
+            self.events.append(Event(kind, self._count, body))
+
+    def frame(self, frame: Array) -> None:
+        """Keep a frame (channels, n) till it is read."""
+        if "unread frames" not in self._given_up:
+            self._unread.append(frame.T)
+            try:
+                self._unread.spill()
+            except FileError as error:
+                self.give_up("unread frames", error)
+
+    def read(self) -> Array:
+        """(channels, n) all frames since the last time."""
+        unread, self._unread = self._unread, sound_spool(self._channels, self._unread.instead)
+        self._given_up.discard("unread frames")
+        return KeptSound(unread, len(unread), np.zeros((self._channels, 0))).samples()
+
+    def steps(self) -> LogSteps:
+        """The steps so far. Raises SceneError where none are kept."""
+        if self._log is None:
+            raise SceneError("the contact log is not kept", "attach with keep_log=True")
+        return self._log.steps()
+
+    def give_up(self, what: str, error: FileError) -> None:
+        """Note that no more is kept of it, once."""
+        if what not in self._given_up:
+            self._given_up.add(what)
+            note = f"from step {self._count} on the {what} {'are' if what.endswith('s') else 'is'} not kept: {error}"
+            self.notes = (*self.notes, note)
+            warnings.warn(note, SceneWarning, stacklevel=4)
