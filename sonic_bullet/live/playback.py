@@ -137,7 +137,7 @@ class Playback:
         """Warn of the failure, once."""
         if not self._said:
             self._said = True
-            warnings.warn(str(self.failure), PlaybackWarning, stacklevel=4)
+            warnings.warn(f"{self.failure}; physics and log go on, unpaced and unheard", PlaybackWarning, stacklevel=4)
 
     def _wait(self, most: int) -> None:
         """Until no more than so many samples wait, or nothing takes them any more."""
@@ -181,7 +181,7 @@ class Playback:
     def _fail(self) -> None:
         self.failure = AudioError(
             f"{self._card.name} takes no more sound",
-            "connect it again and play anew; physics and log go on, unpaced and unheard",
+            "connect it again and play anew",
         )
         self._wake.set()
 

@@ -8,7 +8,7 @@ residual_voice: residuals | synthesis_state: all that goes on | synthesizer: all
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -22,7 +22,7 @@ from sonic_bullet.records.errors import LogError
 from sonic_bullet.render.silence import silence_notes, why_silent
 from sonic_bullet.render.synthesizer import LATENCY_STEPS, Synthesizer
 
-__all__ = ["LATENCY_STEPS", "Synthesizer", "make_ready", "render_log", "silence_notes", "why_silent"]
+__all__ = ["LATENCY_STEPS", "Synthesizer", "log_frames", "make_ready", "render_log", "silence_notes", "why_silent"]
 
 AT_ONCE = 64
 """Steps that a replay takes in at once, between two looks at how far it is."""
@@ -71,6 +71,24 @@ def render_log(
         if progress is not None:
             progress(first / len(log.steps))
     return np.ascontiguousarray(synth.sound())
+
+
+def log_frames(log: ContactLog, *, say: Callable[[str], None] | None = None) -> Iterator[Array]:
+    """The sound of a contact log a step at a time, as `Listener.frame` had it: (channels, n), `LATENCY_STEPS` late.
+
+    say is called with what is being computed before the first step.
+    """
+    for body in log.bodies if log.sensors else ():
+        if body.model is not None and body.model.mode_count:
+            if say is not None:
+                say(f"how {body.model.mode_count} modes of {body.name} radiate")
+            radiation_of(body.model, log.air)
+    synth = Synthesizer(sr=log.sr, sensors=log.sensors, seed=log.seed, air=log.air)
+    quenches = {event.step for event in log.events if event.kind == "quench"}
+    for number, step in enumerate(log.steps):
+        if number in quenches:
+            synth.quench()
+        yield synth.feed(step, log.bodies)
 
 
 def make_ready() -> None:

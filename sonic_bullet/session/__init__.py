@@ -37,7 +37,7 @@ from sonic_bullet.records.coerce import (
 )
 from sonic_bullet.records.contacts import Event, Step
 from sonic_bullet.records.errors import AudioError, SceneError, SizeWarning
-from sonic_bullet.render import LATENCY_STEPS, Synthesizer
+from sonic_bullet.render import LATENCY_STEPS, Synthesizer, make_ready
 from sonic_bullet.session.arguments import MicrophoneLike, as_sensors
 from sonic_bullet.session.wanted_bodies import WantedBody, solved_bodies, wanted_body
 
@@ -209,6 +209,7 @@ class Listener:
             raise AudioError("the listener is detached, so nothing more will sound", "attach a new one")
         if self._playback is not None and not self._playback.closed:
             raise AudioError("the listener plays already", "close what its play() returned first")
+        self.world.make_ready(), make_ready()  # else the first step would sound as late as it loads machine code
         self._playback = start_playback(
             device,
             sr=self.sr,
