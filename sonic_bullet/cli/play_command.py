@@ -47,7 +47,7 @@ REFRESH_S = 0.25  # of the line on a terminal
     help="Pressure in Pa that is full scale: less is louder. What is beyond is clipped and counted. [default: 20]",
 )
 @click.option(
-    "--ahead", "ahead_s", type=float, metavar="S", help="How much sound waits: how late a step may be. [default: 0.012]"
+    "--ahead", "ahead_s", type=float, metavar="S", help="How much sound waits: how late a step may be. [default: 0.018]"
 )
 @click.option(
     "--microphone",

@@ -35,7 +35,7 @@ from sonic_bullet.records.coerce import as_number
 from sonic_bullet.records.errors import AudioError, PlaybackWarning
 
 FULL_SCALE_PA = 20.0
-AHEAD_S = 0.012
+AHEAD_S = 0.018
 """How late a step may be before sound stops: beyond the longest pause of a step of 20 bodies on a busy machine."""
 LONGEST_AHEAD_S = 2.0
 QUEUE_S = 3.0  # room for that and a step of a second
@@ -66,8 +66,8 @@ class Card(Protocol):
 @dataclass(frozen=True, slots=True)
 class PlaybackReport:
     """What was played. seconds: of frames that sounded. latency_median_s, latency_worst_s: from the return of a physics
-    step to the time at which the card says its sound begins, the listener's lag included; NaN and 0 where nothing
-    sounded. underruns: how often there was nothing to sound, silent_s: how long that was in all, before the last frame.
+    step to the time at which the card says its sound begins, the listener's lag included, of all steps since the first
+    sound; NaN and 0 where there were none. underruns: how often there was nothing to sound, silent_s: how long that was in all, before the last frame.
     clipped: samples beyond full scale.
     """
 
@@ -159,6 +159,8 @@ class Playback:
         first = queue.taken
         waiting = queue.written - first
         self._filling = self._filling and waiting < self._ahead + len(out) and not self._draining
+        if not (first or self._filling):
+            self._starts.clear()  # the steps before any sound: how late those are says how long the first one took
         count = 0 if self._filling else queue.take(out)
         out[count:] = 0
         self._last = (time.perf_counter(), queue.taken, len(out))

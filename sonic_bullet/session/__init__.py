@@ -209,7 +209,8 @@ class Listener:
             raise AudioError("the listener is detached, so nothing more will sound", "attach a new one")
         if self._playback is not None and not self._playback.closed:
             raise AudioError("the listener plays already", "close what its play() returned first")
-        self.world.make_ready(), make_ready()  # else the first step would sound as late as it loads machine code
+        self.world.make_ready()
+        make_ready()  # else the first step would sound as late as it loads machine code
         self._playback = start_playback(
             device,
             sr=self.sr,
