@@ -129,6 +129,7 @@ def _play_log(path: str, given: dict[str, Any], show: _Show) -> tuple[str, ...]:
     from sonic_bullet.files import check_sr, read_log
     from sonic_bullet.live import start_playback
     from sonic_bullet.records import Microphone
+    from sonic_bullet.records.coerce import as_number
     from sonic_bullet.render import LATENCY_STEPS, log_frames
 
     if "material" in given:
@@ -140,7 +141,7 @@ def _play_log(path: str, given: dict[str, Any], show: _Show) -> tuple[str, ...]:
         seed=given.get("seed", log.seed),
         sensors=tuple(Microphone(np.array(place)) for place in given.get("microphones", ())) or log.sensors,
     )
-    seconds = given.get("seconds", log.duration_s)
+    seconds = as_number(given.get("seconds", log.duration_s), "seconds", "give --seconds above 0", above=0)
     log = log.first(int((log.start_s < seconds - 1e-9).sum()))
     frames = log_frames(log, say=show.tell)
     with start_playback(

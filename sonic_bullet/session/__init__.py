@@ -207,8 +207,10 @@ class Listener:
         """
         if not self._attached:
             raise AudioError("the listener is detached, so nothing more will sound", "attach a new one")
-        if self._playback is not None and not self._playback.closed:
-            raise AudioError("the listener plays already", "close what its play() returned first")
+        if self._playback is not None:
+            if not self._playback.closed and self._playback.failure is None:
+                raise AudioError("the listener plays already", "close what its play() returned first")
+            self._playback.close()
         self.world.make_ready()
         make_ready()  # else the first step would sound as late as it loads machine code
         self._playback = start_playback(
