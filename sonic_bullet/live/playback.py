@@ -140,7 +140,7 @@ class Playback:
         """Warn of the failure, once."""
         if not self._said:
             self._said = True
-            warnings.warn(f"{self.failure}; physics and log go on, unpaced and unheard", PlaybackWarning, stacklevel=4)
+            warnings.warn(f"{self.failure}; physics and log go on, silent and unpaced", PlaybackWarning, stacklevel=4)
 
     def _wait(self, most: int) -> None:
         """Until no more than so many samples wait, or nothing takes them any more."""
