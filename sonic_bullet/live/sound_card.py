@@ -6,8 +6,11 @@ PortAudio says for each block when its first sample sounds, by the stream's own 
 
 from __future__ import annotations
 
+import atexit
+import threading
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 from sonic_bullet.live.playback import Fill
@@ -17,6 +20,8 @@ from sonic_bullet.records.errors import AudioError
 
 CARD_S = 0.012
 """What the card is asked to hold itself: a callback may be that late. Half of what PortAudio calls a high latency."""
+CLOSE_S = 1.0
+"""So long a stream may take to close: a hundred times what it plays then."""
 INSTALL = "pip install 'sonic_bullet[live]'"
 
 
@@ -64,12 +69,23 @@ class SoundCard:
             raise AudioError(f"{self.name} cannot be opened: {error}", "close what uses it, or name another") from error
 
     def stop(self, *, abort: bool) -> None:
-        """Close the stream, after what was taken has sounded or at once."""
-        try:
-            if not abort:
-                self._stream.stop()
-        finally:
+        """Close the stream, after what was taken has sounded or at once.
+
+        PortAudio may wait minutes for a card that is gone: here nobody does, nor when Python ends.
+        """
+
+        def close() -> None:
+            with suppress(self._library.PortAudioError):
+                if not abort:
+                    self._stream.stop()
             self._stream.close(ignore_errors=True)
+
+        closing = threading.Thread(target=close, daemon=True)
+        closing.start()
+        closing.join(CLOSE_S)
+        if closing.is_alive():
+            with suppress(AttributeError):  # what sounddevice calls then would wait as well
+                atexit.unregister(self._library._exit_handler)
 
 
 def portaudio() -> Any:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sonic_bullet.live import start_playback
+from sonic_bullet.live import sound_card, start_playback
 from sonic_bullet.records.errors import AudioError
 from tests.made.sound_cards import StandInLibrary
 
@@ -102,6 +102,20 @@ def test_a_card_in_use_is_said(install: Callable[..., StandInLibrary]) -> None:
     install().busy = True
     with pytest.raises(AudioError, match="card 0 cannot be opened: Device unavailable; close what uses it"):
         start_playback(None, sr=SR, channels=1, lag_steps=0)
+
+
+def test_nobody_waits_for_a_card_that_does_not_close(
+    install: Callable[..., StandInLibrary], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    library, unregistered = install(), []
+    monkeypatch.setattr(sound_card, "CLOSE_S", 0.05)
+    monkeypatch.setattr(sound_card.atexit, "unregister", unregistered.append)
+    library.hangs = True
+    sound = start_playback(None, sr=SR, channels=1, lag_steps=0)
+    begin = time.perf_counter()
+    sound.close(abort=True)
+    assert time.perf_counter() - begin < 5
+    assert unregistered == [library._exit_handler]
 
 
 @pytest.mark.parametrize(

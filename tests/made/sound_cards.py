@@ -80,6 +80,8 @@ class StandInStream:
 
     def close(self, ignore_errors: bool = True) -> None:
         self.going.clear()
+        if self.library.hangs:  # as PortAudio does where the server of a card was killed
+            threading.Event().wait()
         self.closed = True
 
 
@@ -93,8 +95,11 @@ class StandInLibrary:
             {"name": f"card {i}", "index": i, "max_output_channels": most, "default_samplerate": float(sr)}
             for i, most in enumerate(channels)
         ]
-        self.sr, self.held_s, self.busy = sr, held_s, False
+        self.sr, self.held_s, self.busy, self.hangs = sr, held_s, False, False
         self.streams: list[StandInStream] = []
+
+    def _exit_handler(self) -> None:
+        """What sounddevice has called when Python ends."""
 
     def query_devices(self, device: int | str | None = None, kind: str | None = None) -> Any:
         if kind is None:
