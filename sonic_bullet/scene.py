@@ -97,6 +97,34 @@ def render_scene(
         return stage.result(notes)
 
 
+def run_scene(
+    path: str | Path,
+    begin: Callable[[Listener], object],
+    *,
+    seconds: float | None = None,
+    sr: int = 48_000,
+    seed: int = 0,
+    microphones: MicrophoneLike | None = None,
+    material: str | Path | Material | None = None,
+    progress: Progress | None = None,
+    say: Say | None = None,
+) -> tuple[str, ...]:
+    """Run a scene whose listener is handed to ``begin`` before its first step; notes a user should read.
+
+    Arguments as `render_scene` has them. Raises SonicBulletError, SceneError also for microphones that a script's own
+    listener has not.
+    """
+    asked: dict[str, Any] = {
+        "sr": check_sr(sr),
+        "seed": as_whole(seed, "seed", "give a whole number, 0 or more", least=0),
+        "microphones": None if microphones is None else as_sensors(microphones, "microphones"),
+        "material": None if material is None else as_material(material),
+    }
+    with _stage(path, **asked, begin=begin) as stage, interrupts():
+        notes = stage.run(None if seconds is None else as_seconds(seconds, "seconds"), progress, say)
+        return (*notes, *stage.need_listener().notes)
+
+
 def examine_scene(path: str | Path, seconds: float = 1.0, say: Say | None = None) -> tuple[Finding, ...]:
     """What in a scene would spoil its sound, and how to mend it.
 
@@ -152,6 +180,7 @@ class _Stage:
     microphones: tuple[Sensor, ...] | None
     material: Material | None
     residual: bool = True
+    begin: Callable[[Listener], object] | None = None
     listener: Listener | None = None
     client: Any = None
     folder: str | None = None
@@ -174,6 +203,12 @@ class _Stage:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SceneWarning)  # the result's notes say it
             return (_run_built if _defines_build(self.path) else _run_plain)(self, seconds, progress, say)
+
+    def ready(self) -> None:
+        """The listener knows its bodies: say so, once."""
+        begin, self.begin = self.begin, None
+        if begin is not None:
+            begin(self.need_listener())
 
     def need_listener(self) -> Listener:
         if self.listener is None:
@@ -261,6 +296,7 @@ def _run_built(stage: _Stage, seconds: float | None, progress: Progress | None, 
     stage.microphones = None
     _user_code(stage.path, partial(listener.add_all, cast, progress=say))
     act = getattr(module, "act", None)
+    stage.ready()
     total = (
         seconds
         if seconds is not None
@@ -280,10 +316,18 @@ def _run_plain(stage: _Stage, seconds: float | None, progress: Progress | None, 
     notes: tuple[str, ...] = ()
     if _uses_sonic_bullet(stage.path):
         names: dict[str, Any] = {}
+
+        def look(_: int) -> None:
+            stage.listener = stage.listener or _listener_in(names)
+            if stage.begin is not None and stage.listener is not None:
+                if stage.microphones is not None:
+                    raise SceneError(f"scene '{stage.path.name}' has microphones of its own", "leave yours out")
+                stage.ready()
+
         try:
-            run_script(stage.path, None, total, names=names, progress=progress)
+            run_script(stage.path, (look, None), total, names=names, progress=progress)
         finally:  # where it breaks, what was heard so far is kept too
-            stage.listener = next((value for value in names.values() if isinstance(value, Listener)), None)
+            stage.listener = _listener_in(names)
         if stage.listener is None:
             raise SceneError(
                 f"scene '{stage.path.name}' imports sonic_bullet but keeps no listener in a top-level name",
@@ -302,9 +346,14 @@ def _run_plain(stage: _Stage, seconds: float | None, progress: Progress | None, 
         if new:
             known.update(new)
             stage.listener.add_all(dict.fromkeys(new, material), progress=say)
+        stage.ready()
 
     def after(_: int) -> None:
         stage.need_listener().step()
 
     run_script(stage.path, (before, after), total, progress=progress)
     return (f"every body sounds as {material.name}: the script names no materials",)
+
+
+def _listener_in(names: dict[str, Any]) -> Listener | None:
+    return next((value for value in names.values() if isinstance(value, Listener)), None)

@@ -1,6 +1,7 @@
 """The command line: parses, calls, exits.
 
     render SCENE.py | LOG.npz -> RenderResult -> WAV, contact log, picture, JSON
+    play SCENE.py | LOG.npz   -> the same, on a sound card
     modes MESH                -> ModalModel   -> table, JSON, npz
     materials, doctor SCENE   -> table, JSON
     case FOLDER               -> case.json, and whether it can be read
@@ -31,6 +32,7 @@ from sonic_bullet.cli.examples import (
     RESIDUAL_EPILOG,
 )
 from sonic_bullet.cli.parameters import Numbers, channel_option, json_option, strike_options
+from sonic_bullet.cli.play_command import play
 
 DEFAULT_SR = 48_000
 DEFAULT_MODES_MATERIAL = "steel"
@@ -96,6 +98,9 @@ def render(**options: Any) -> None:
     from sonic_bullet.cli.scene_commands import run_render
 
     run_render(**options)
+
+
+cli.add_command(play)
 
 
 @cli.command(epilog=MODES_EPILOG)

@@ -99,7 +99,7 @@ def write_container(
             _written(file, entries, None)
 
 
-def _written(file: BinaryIO, entries: Mapping[str, Array], packed: str | None) -> int:
+def _written(file: BinaryIO, entries: Mapping[str, Array | Column], packed: str | None) -> int:
     """Write all entries. Returns how many bytes they are when they are unpacked."""
     with zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
         for name, array in entries.items():

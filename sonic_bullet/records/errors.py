@@ -73,7 +73,11 @@ class LogError(SonicBulletError):
 
 
 class AudioError(SonicBulletError):
-    """Sample rate, samples or level that cannot be written or synthesised."""
+    """Sample rate, samples, level or sound card with which nothing can be synthesised, written or played."""
+
+
+class PlaybackWarning(UserWarning):
+    """The sound card is gone: physics and log go on unheard; said once."""
 
 
 class SizeWarning(UserWarning):

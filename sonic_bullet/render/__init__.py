@@ -22,7 +22,16 @@ from sonic_bullet.records.errors import LogError
 from sonic_bullet.render.silence import silence_notes, why_silent
 from sonic_bullet.render.synthesizer import LATENCY_STEPS, Synthesizer
 
-__all__ = ["LATENCY_STEPS", "Synthesizer", "make_ready", "render_blocks", "render_log", "silence_notes", "why_silent"]
+__all__ = [
+    "LATENCY_STEPS",
+    "Synthesizer",
+    "log_frames",
+    "make_ready",
+    "render_blocks",
+    "render_log",
+    "silence_notes",
+    "why_silent",
+]
 
 AT_ONCE = 64
 """Steps that a replay takes in at once, between two looks at how far it is."""
@@ -73,13 +82,9 @@ def render_blocks(
 def _blocks(
     log: ContactLog, residual: bool, progress: Callable[[float], None] | None, say: Callable[[str], None] | None
 ) -> Iterator[Array]:
-    for body in log.bodies if log.sensors else ():
-        if body.model is not None and body.model.mode_count:
-            if say is not None:
-                say(f"how {body.model.mode_count} modes of {body.name} radiate")
-            radiation_of(body.model, log.air)
+    _make_radiation_known(log, say)
     synth = Synthesizer(sr=log.sr, sensors=log.sensors, seed=log.seed, air=log.air, residual=residual, keep=False)
-    quenches = {event.step for event in log.events if event.kind == "quench"}
+    quenches = _quenches(log)
     done = 0
     for steps in _together(log.steps, quenches):
         if done in quenches:
@@ -89,6 +94,18 @@ def _blocks(
         if progress is not None:
             progress(done / len(log.steps))
     yield synth.rest()
+
+
+def _make_radiation_known(log: ContactLog, say: Callable[[str], None] | None) -> None:
+    for body in log.bodies if log.sensors else ():
+        if body.model is not None and body.model.mode_count:
+            if say is not None:
+                say(f"how {body.model.mode_count} modes of {body.name} radiate")
+            radiation_of(body.model, log.air)
+
+
+def _quenches(log: ContactLog) -> set[int]:
+    return {event.step for event in log.events if event.kind == "quench"}
 
 
 def _together(steps: Iterable[Step], quenches: set[int]) -> Iterator[list[Step]]:
@@ -106,6 +123,20 @@ def _together(steps: Iterable[Step], quenches: set[int]) -> Iterator[list[Step]]
 def same_bodies(one: Step, other: Step) -> bool:
     """Whether two steps hold poses of the same bodies."""
     return one.body is other.body or np.array_equal(one.body, other.body)
+
+
+def log_frames(log: ContactLog, *, say: Callable[[str], None] | None = None) -> Iterator[Array]:
+    """The sound of a contact log a step at a time, as `Listener.frame` had it: (channels, n), `LATENCY_STEPS` late.
+
+    say is called with what is being computed before the first step.
+    """
+    _make_radiation_known(log, say)
+    synth = Synthesizer(sr=log.sr, sensors=log.sensors, seed=log.seed, air=log.air, residual=log.residual, keep=False)
+    quenches = _quenches(log)
+    for number, step in enumerate(log.steps):
+        if number in quenches:
+            synth.quench()
+        yield synth.feed(step, log.bodies)
 
 
 def make_ready() -> None:

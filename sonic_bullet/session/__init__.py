@@ -10,6 +10,7 @@ not.
 from __future__ import annotations
 
 import inspect
+import time
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
@@ -25,6 +26,7 @@ from sonic_bullet.files import AudioReport, check_sr, write_audio
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.geometry import oversize
 from sonic_bullet.listener.world import World
+from sonic_bullet.live import AHEAD_S, FULL_SCALE_PA, Playback, start_playback
 from sonic_bullet.machine.terminal import status
 from sonic_bullet.records import Air, Array, Material, ModalModel, Sensor, Shape
 from sonic_bullet.records.coerce import (
@@ -37,7 +39,7 @@ from sonic_bullet.records.coerce import (
     shown,
 )
 from sonic_bullet.records.errors import AudioError, SceneError, SizeWarning
-from sonic_bullet.render import LATENCY_STEPS, Synthesizer
+from sonic_bullet.render import LATENCY_STEPS, Synthesizer, make_ready
 from sonic_bullet.session.arguments import MicrophoneLike, as_sensors
 from sonic_bullet.session.keeping import KeptRun
 from sonic_bullet.session.wanted_bodies import WantedBody, check_names, solved_bodies, wanted_body
@@ -131,6 +133,7 @@ class Listener:
         self.world.logged = keep_log = as_flag(keep_log, "keep_log")
         keep = as_flag(keep_sound, "keep_sound")
         self._synth = Synthesizer(sr=self.sr, sensors=self.sensors, seed=self.seed, air=self.air, keep=keep)
+        self._playback: Playback | None = None
         self._attached = True
         self._begin()
         self._frame: Array | None = np.zeros((len(self.sensors), 0))
@@ -251,6 +254,7 @@ class Listener:
         """
         if not self._attached:
             raise SceneError("the listener is detached", "attach a new one")
+        returned_s = time.perf_counter()
         step = self.world.after_step()
         if not self.world.stepped:
             self._frame = np.zeros((len(self.sensors), 0))
@@ -263,7 +267,39 @@ class Listener:
         self._kept.frame(frame)
         if self._synth.unkept is not None:
             self._kept.give_up("sound", self._synth.unkept)
+        if self._playback is not None:
+            self._playback.push(frame, returned_s)
         return frame
+
+    def play(
+        self, device: str | int | None = None, *, full_scale_pa: float = FULL_SCALE_PA, ahead_s: float = AHEAD_S
+    ) -> Playback:
+        """Sound out loud from now on: each step returns when the card has room for its frame, so that a loop faster
+        than real time is paced by it; leave `time.sleep` out. A slower one leaves gaps, which `Playback.report` counts.
+
+        device: name or number of a sound card, None for the system's own, "null" for none, clocked in real time.
+        full_scale_pa: the pressure (m/s for vibrometers) that is full scale; what is beyond is clipped and counted.
+        ahead_s: how much sound may wait for the card: how late a step may be. A card that goes away is a
+        `PlaybackWarning`, and physics and log go on. Close what is returned, or leave it as a context manager. Raises
+        AudioError: no such card or rate, fewer channels than microphones, no microphone, detached, playing already.
+        """
+        if not self._attached:
+            raise AudioError("the listener is detached, so nothing more will sound", "attach a new one")
+        if self._playback is not None:
+            if not self._playback.closed and self._playback.failure is None:
+                raise AudioError("the listener plays already", "close what its play() returned first")
+            self._playback.close()
+        self.world.make_ready()
+        make_ready()  # else the first step would sound as late as it loads machine code
+        self._playback = start_playback(
+            device,
+            sr=self.sr,
+            channels=len(self.sensors),
+            lag_steps=self.latency_steps,
+            full_scale_pa=full_scale_pa,
+            ahead_s=ahead_s,
+        )
+        return self._playback
 
     def read(self) -> Array:
         """All frames since the last read, joined, (channels, n): for environments that hide many steps in one call."""
@@ -338,6 +374,8 @@ class Listener:
         if self._attached:
             self.world.unhook()
             self._attached = False
+            if self._playback is not None:
+                self._playback.close()
 
     def __enter__(self) -> Listener:
         return self

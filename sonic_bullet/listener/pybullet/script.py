@@ -32,7 +32,7 @@ class _TimeIsUp(BaseException):
 
 def run_script(
     path: str | Path,
-    hooks: tuple[ClientHook, ClientHook] | ClientHook | None,
+    hooks: tuple[ClientHook, ClientHook | None] | ClientHook | None,
     seconds: float,
     *,
     names: dict[str, Any] | None = None,

@@ -1,0 +1,153 @@
+"""`play`: a scene or a contact log, out loud while it is made, paced by the card."""
+
+from __future__ import annotations
+
+import math
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from sonic_bullet.cli.output import clean_stdout, places, progress_bar, quiet_stderr, write_json
+from sonic_bullet.cli.parameters import Numbers, json_option
+from sonic_bullet.records.errors import AudioError, FileError, SceneError
+
+if TYPE_CHECKING:
+    from sonic_bullet.live import Playback, PlaybackReport
+
+EPILOG = """\b
+Examples:
+  sonic-bullet play scenes/tabletop.py
+  sonic-bullet play my_sim.py --material wood --full-scale 2
+  sonic-bullet play drop.npz --device "USB Audio"
+  sonic-bullet play scenes/bar.py --device null      (no sound card: the same, unheard)
+The physics runs as fast as the card takes its sound. The last line says what was played, how late each step sounds,
+and how often there was nothing to play: then the scene is too much for this machine in real time; render it."""
+
+CARD_OPTIONS = ("device", "full_scale_pa", "ahead_s")
+REFRESH_S = 0.25  # of the line on a terminal
+
+
+@click.command(epilog=EPILOG)
+@click.argument("scene", metavar="SCENE.py|LOG.npz")
+@click.option(
+    "--device", metavar="D", help="Name or number of a sound card; 'null' for none. [default: the system's own]"
+)
+@click.option("--seconds", type=float, metavar="S", help="How long. [default: the scene's own, else 4; all of a log]")
+@click.option("--sr", type=float, metavar="HZ", help="Sample rate, 8000 … 384000. [default: 48000; a log's own]")
+@click.option(
+    "--full-scale",
+    "full_scale_pa",
+    type=float,
+    metavar="PA",
+    help="Pressure in Pa that is full scale: less is louder. What is beyond is clipped and counted. [default: 20]",
+)
+@click.option(
+    "--ahead", "ahead_s", type=float, metavar="S", help="How much sound waits: how late a step may be. [default: 0.018]"
+)
+@click.option(
+    "--microphone",
+    "microphones",
+    type=Numbers("X,Y,Z"),
+    multiple=True,
+    help="A microphone in the world, in m; repeat for more channels. [default: the scene's own]",
+)
+@click.option("--seed", type=click.IntRange(0), help="Seed of the surfaces' roughness. [default: 0; a log's own]")
+@click.option(
+    "--material", metavar="M", help="Material of the bodies of a script that names none (a name or a preset file)."
+)
+@json_option
+def play(scene: str, json_to: str | None, **options: Any) -> None:
+    """Play a PyBullet scene, or a contact log, on a sound card while it runs."""
+    path = Path(scene)
+    if not path.is_file():
+        raise FileError(f"cannot read {scene}: no such file", "give a scene (.py) or a contact log (.npz)")
+    if path.suffix.lower() not in (".py", ".npz"):
+        raise FileError(f"cannot play {scene}: neither a scene nor a log", "give a file that ends in .py or .npz")
+    (json_to,) = places(json_to)
+    given = {name: value for name, value in options.items() if value not in (None, ())}
+    if given.get("device", "").isdecimal():
+        given["device"] = int(given["device"])
+    with clean_stdout(json_to) as say:
+        with progress_bar(path.name) as (progress, tell):
+            show = _Show({name: given.pop(name) for name in CARD_OPTIONS if name in given}, progress, tell)
+            try:
+                notes = (_play_log if path.suffix.lower() == ".npz" else _play_scene)(scene, given, show)
+            except KeyboardInterrupt as error:
+                said = [str(error) or "stopped", *([str(show.report)] if show.playback is not None else [])]
+                raise KeyboardInterrupt("; ".join(said)) from error
+        say(str(show.report))
+        for note in notes:
+            print(f"sonic-bullet: note: {note}", file=sys.stderr)
+    known = asdict(show.report)
+    write_json(json_to, {k: None if isinstance(v, float) and math.isnan(v) else v for k, v in known.items()})
+
+
+class _Show:
+    """A playback, and the line on a terminal that says how far it is and how it goes."""
+
+    def __init__(self, card: dict[str, Any], progress: Callable[[float], None], tell: Callable[[str], None]) -> None:
+        self.card, self.tell, self._progress, self._drawn_s = card, tell, progress, 0.0
+        self.playback: Playback | None = None
+
+    @property
+    def report(self) -> PlaybackReport:
+        if self.playback is None:
+            raise SceneError("the scene made no physics step", "call stepSimulation in it")
+        return self.playback.report
+
+    def __call__(self, share: float) -> None:
+        """A share is done. Drawn seldom, for that takes time from the physics. Raises why the card is gone."""
+        if self.playback is not None and self.playback.failure is not None:
+            failure = self.playback.failure
+            raise AudioError(failure.what, f"{failure.remedy}; {self.report}")
+        if time.perf_counter() - self._drawn_s > REFRESH_S:
+            self._progress(share)
+            if self.playback is not None:
+                self.tell(str(self.report))
+            self._drawn_s = time.perf_counter()
+
+
+def _play_scene(scene: str, given: dict[str, Any], show: _Show) -> tuple[str, ...]:
+    with quiet_stderr():
+        from sonic_bullet.scene import run_scene
+        from sonic_bullet.session import Listener
+
+    def begin(listener: Listener) -> None:
+        show.playback = listener.play(**show.card)
+
+    return run_scene(scene, begin, **given, progress=show, say=show.tell)
+
+
+def _play_log(path: str, given: dict[str, Any], show: _Show) -> tuple[str, ...]:
+    import numpy as np
+
+    from sonic_bullet.files import check_sr, read_log
+    from sonic_bullet.live import start_playback
+    from sonic_bullet.records import Microphone
+    from sonic_bullet.records.coerce import as_number
+    from sonic_bullet.render import LATENCY_STEPS, log_frames
+
+    if "material" in given:
+        raise FileError("--material does not apply to a contact log, whose bodies bring theirs", "leave it out")
+    log = read_log(path)
+    log = replace(
+        log,
+        sr=check_sr(given.get("sr", log.sr)),
+        seed=given.get("seed", log.seed),
+        sensors=tuple(Microphone(np.array(place)) for place in given.get("microphones", ())) or log.sensors,
+    )
+    seconds = as_number(given.get("seconds", log.duration_s), "seconds", "give --seconds above 0", above=0)
+    log = log.first(int((log.start_s < seconds - 1e-9).sum()))
+    frames = log_frames(log, say=show.tell)
+    with start_playback(
+        show.card.pop("device", None), sr=log.sr, channels=len(log.sensors), lag_steps=LATENCY_STEPS, **show.card
+    ) as show.playback:
+        for number, frame in enumerate(frames, start=1):
+            show.playback.push(frame, time.perf_counter())
+            show(number / len(log.steps))
+    return ()

@@ -1,0 +1,53 @@
+"""A sound card that sounds nowhere, clocked in real time: block j is asked for at start + j·B/sr and sounds two blocks
+later.
+
+It is as strict as a card with a ring of three blocks: what is handed over after its block's time has come is counted as
+late, and all that follows sounds that much later.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from sonic_bullet.live.playback import Fill
+
+BLOCK = 256  # samples: 5.3 ms at 48 kHz
+HELD = 2  # blocks between the call and the sound
+
+
+class NullCard:
+    """See the head of this file."""
+
+    name = "null"
+
+    def __init__(self, sr: int, channels: int) -> None:
+        self.sr, self.channels = sr, channels
+        self._stop = threading.Event()
+        self._thread: threading.Thread | None = None
+
+    def start(self, fill: Fill, ended: Callable[[], None]) -> None:
+        """Ask for blocks from now on, in a thread of its own."""
+        self._thread = threading.Thread(target=self._run, args=(fill,), name="null sound card", daemon=True)
+        self._thread.start()
+
+    def _run(self, fill: Fill) -> None:
+        out, asked_s, late = np.zeros((BLOCK, self.channels), np.float32), time.perf_counter(), False
+        block_s = BLOCK / self.sr
+        while not self._stop.wait(max(asked_s - time.perf_counter(), 0.0)):
+            sounds_s = asked_s + HELD * block_s
+            fill(out, sounds_s, late)
+            over_s = time.perf_counter() - sounds_s
+            late = over_s > 0
+            asked_s += block_s + max(over_s, 0.0)
+
+    def stop(self, *, abort: bool) -> None:
+        """Ask no more; return when what was taken would have sounded, or at once."""
+        self._stop.set()
+        if not abort:
+            threading.Event().wait((HELD + 1) * BLOCK / self.sr)
+        if self._thread is not None:
+            self._thread.join(1.0)
