@@ -51,7 +51,7 @@ class KeptRun:
     def frame(self, frame: Array) -> None:
         """Keep a frame (channels, n) till it is read."""
         if "unread frames" not in self._given_up:
-            self._unread.append(frame.T)
+            self._unread.append(np.ascontiguousarray(frame.T))
             try:
                 self._unread.spill()
             except FileError as error:
