@@ -14,8 +14,9 @@ import numpy as np
 
 from sonic_bullet.files.rows.log_steps import LogSteps, StepBlock
 from sonic_bullet.records import Air, Array, Body, Sensor
+from sonic_bullet.records.arrays import joined
 from sonic_bullet.records.coerce import as_flag, as_items, as_kind, as_kinds, as_path, as_whole, shown
-from sonic_bullet.records.contacts import Contacts, Event, Step
+from sonic_bullet.records.contacts import CONTACT, Contacts, Event, Step
 from sonic_bullet.records.errors import LogError
 from sonic_bullet.records.simulated import Change, Values, frozen_texts, frozen_values
 
@@ -99,9 +100,7 @@ class ContactLog:
     @property
     def rows(self) -> Contacts:
         """All rows of all steps, in order: 160 bytes each, all in memory (`blocks` are not)."""
-        row = np.concatenate([Contacts.none().row, *(block.contact for block in self.blocks())])
-        row.setflags(write=False)
-        return Contacts.trusted(row)
+        return Contacts.trusted(joined([block.contact for block in self.blocks()], CONTACT))
 
     def blocks(self) -> Iterator[StepBlock]:
         """The rows of some steps at a time, in order, for logs that are larger than the memory."""

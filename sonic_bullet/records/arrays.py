@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -53,6 +55,17 @@ def frozen_array(value: object, dtype: Any, shape: tuple[int | None, ...], name:
         raise RecordError(f"{name} holds {what}", "look for the step or file that produced them")
     array.setflags(write=False)
     return array
+
+
+def joined(parts: Sequence[Array], dtype: Any, tail: tuple[int, ...] = ()) -> Array:
+    """Read-only (n, *tail): the numbers of C-contiguous arrays of one dtype, one array after the other.
+
+    np.concatenate promotes structured dtypes field by field, pair by pair: 40 µs a part of CONTACT rows, where joining
+    bytes takes 0.1 µs.
+    """
+    count = math.prod(tail)
+    array = np.frombuffer(b"".join(parts), dtype)  # type: ignore[arg-type]
+    return array if not tail else array.reshape(len(array) // count if count else len(parts), *tail)
 
 
 def _converted(given: Array, dtype: Any) -> Array:

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet.records import Array, frozen_array
-from sonic_bullet.records.arrays import LARGEST
+from sonic_bullet.records.arrays import LARGEST, joined
 from sonic_bullet.records.coerce import as_items, as_kind, as_number, shown
 from sonic_bullet.records.errors import LogError, RecordError
 
@@ -164,9 +164,7 @@ class Contacts:
     @classmethod
     def joined(cls, parts: Sequence[Contacts]) -> Contacts:
         """The rows of all parts, in order."""
-        row = np.concatenate([_NONE.row, *(part.row for part in parts)], dtype=CONTACT)
-        row.setflags(write=False)
-        return cls.trusted(row)
+        return cls.trusted(joined([part.row for part in parts], CONTACT))
 
     def rows(self, start: int, stop: int) -> Contacts:
         """Rows start … stop-1."""

@@ -16,7 +16,8 @@ import numpy as np
 
 from sonic_bullet.files.rows.spool import KeptSound, sound_spool
 from sonic_bullet.records import Air, Array, Sensor
-from sonic_bullet.records.contacts import Contacts, Step
+from sonic_bullet.records.arrays import joined
+from sonic_bullet.records.contacts import CONTACT, Contacts, Step
 from sonic_bullet.records.errors import AudioError, FileError
 from sonic_bullet.render import driver
 from sonic_bullet.render.clock import Clock, exact_step
@@ -128,13 +129,11 @@ def _joined(steps: Sequence[Step]) -> tuple[Array, tuple[Array, ...]]:
     first = steps[0]
     if len(steps) == 1:
         return first.contacts.row, (first.position_m[None], first.quaternion_xyzw[None], first.teleported[None])
-    joined = [
-        np.concatenate([step.contacts.row for step in steps]),
-        *(np.stack([getattr(s, name) for s in steps]) for name in ("position_m", "quaternion_xyzw", "teleported")),
-    ]
-    for array in joined:
-        array.setflags(write=False)
-    return joined[0], tuple(joined[1:])
+    b = len(first.position_m)
+    position = joined([step.position_m for step in steps], float, (b, 3))
+    turned = joined([step.quaternion_xyzw for step in steps], float, (b, 4))
+    moved = joined([step.teleported for step in steps], bool, (b,))
+    return joined([step.contacts.row for step in steps], CONTACT), (position, turned, moved)
 
 
 def _make_room(state: State, step: Array, samples: int) -> None:
@@ -271,7 +270,7 @@ class Synthesizer:
             release(state)
         self._last = steps[-1]
         if self._sound is not None and self.unkept is None:
-            self._sound.append(frame.T)
+            self._sound.append(np.ascontiguousarray(frame.T))
             try:
                 self._sound.spill()
             except FileError as error:

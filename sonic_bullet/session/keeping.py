@@ -9,6 +9,8 @@ kind is kept, a warning and a note say so, and what was kept stays.
 from __future__ import annotations
 
 import warnings
+from functools import cache
+from importlib import metadata
 
 import numpy as np
 
@@ -58,7 +60,7 @@ class KeptRun:
     def frame(self, frame: Array) -> None:
         """Keep a frame (channels, n) till it is read."""
         if "unread frames" not in self._given_up:
-            self._unread.append(frame.T)
+            self._unread.append(np.ascontiguousarray(frame.T))
             try:
                 self._unread.spill()
             except FileError as error:
@@ -83,3 +85,11 @@ class KeptRun:
             note = f"from step {self._count} on the {what} {'are' if what.endswith('s') else 'is'} not kept: {error}"
             self.notes = (*self.notes, note)
             warnings.warn(note, SceneWarning, stacklevel=4)
+
+
+@cache
+def package_versions() -> dict[str, str]:
+    """Of the packages that a render's numbers hang on."""
+    from sonic_bullet import __version__
+
+    return {"sonic_bullet": __version__, **{name: metadata.version(name) for name in ("numpy", "numba")}}

@@ -18,6 +18,7 @@ import numpy as np
 
 from sonic_bullet.files.rows.spool import Spool
 from sonic_bullet.records import Array
+from sonic_bullet.records.arrays import joined
 from sonic_bullet.records.contacts import CONTACT, Contacts, Step, first_bodies
 
 STEP = np.dtype([("dt_s", "f8"), ("gravity_m_s2", "f8", (3,)), ("pose_end", "i8"), ("contact_end", "i8")])
@@ -205,8 +206,9 @@ class StepLog:
         step["pose_end"] = poses_before + np.cumsum(bodies)
         step["contact_end"] = contacts_before + np.cumsum(rows)
         for name in ("body", "teleported", "position_m", "quaternion_xyzw"):
-            pose[name] = np.concatenate([getattr(one, name) for one in fresh])
+            kind, tail = POSE[name].base, POSE[name].shape
+            pose[name] = joined([getattr(one, name) for one in fresh], np.int64 if name == "body" else kind, tail)
         self._known = max(self._known, int(pose["body"].max(initial=-1)) + 1)
         steps.append(step)
         poses.append(pose)
-        contacts.append(np.concatenate([one.contacts.row for one in fresh]))
+        contacts.append(joined([one.contacts.row for one in fresh], CONTACT))

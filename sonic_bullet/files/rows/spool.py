@@ -61,7 +61,9 @@ class Spool:
         return self._file is not None
 
     def append(self, rows: Array) -> None:
-        """Take in rows (k, *tail), which nobody writes to any more; no disk is touched before `spill`."""
+        """Take in rows (k, *tail) of the dtype, C-contiguous, which nobody writes to any more; no disk is touched
+        before `spill`.
+        """
         self._fresh.append(rows)
         self._count += len(rows)
 
@@ -74,27 +76,23 @@ class Spool:
             self._pack()
 
     def _pack(self) -> None:
-        rows = self._joined()
-        if self._file is None and len(self._memory) + rows.nbytes <= self._memory_bytes:
-            self._memory += rows.tobytes()
+        raw = b"".join(self._fresh)  # type: ignore[arg-type]
+        if self._file is None and len(self._memory) + len(raw) <= self._memory_bytes:
+            self._memory += raw
         else:
             try:
                 if self._file is None:
                     file = tempfile.TemporaryFile(prefix="sonic-bullet-", buffering=0)  # noqa: SIM115 - lives as we do
-                    _write(file, memoryview(self._memory))
+                    _write(file, self._memory)
                     self._file, self._memory = file, bytearray()
-                _write(self._file, memoryview(rows.tobytes()), self._packed * self.row_bytes)
+                _write(self._file, raw, self._packed * self.row_bytes)
             except OSError as error:
+                self._fresh = [self._rows(raw)]
                 raise self._refused(error) from error
         self._packed, self._fresh = self._count, []
 
-    def _joined(self) -> Array:
-        """The fresh rows as one array."""
-        none = np.empty((0, *self.tail), self.dtype)
-        rows = np.concatenate([none, *self._fresh], dtype=self.dtype)
-        rows.flags.writeable = False
-        self._fresh = [rows]
-        return rows
+    def _rows(self, raw: bytes) -> Array:
+        return np.frombuffer(raw, self.dtype).reshape(len(raw) // max(self.row_bytes, 1), *self.tail)
 
     def _refused(self, error: OSError) -> FileError:
         """Why the disk took nothing, with what can be done."""
@@ -113,29 +111,26 @@ class Spool:
         if start < self._packed:
             parts.append(self._read(start, min(stop, self._packed)))
         if stop > self._packed:
-            fresh = self._joined() if len(self._fresh) != 1 else self._fresh[0]
-            parts.append(fresh[max(start - self._packed, 0) : stop - self._packed])
-        if not parts:
-            parts.append(np.empty((0, *self.tail), self.dtype))
-        made = parts[0] if len(parts) == 1 else np.concatenate(parts)
-        made.flags.writeable = False
-        return made
-
-    def _read(self, start: int, stop: int) -> Array:
-        at, count = start * self.row_bytes, (stop - start) * self.row_bytes
-        raw = (
-            bytes(self._memory[at : at + count])
-            if self._file is None
-            else read_at(self._file.fileno(), count, at, self.what)
-        )
+            fresh = b"".join(self._fresh)  # type: ignore[arg-type]
+            self._fresh = [self._rows(fresh)]
+            first = max(start - self._packed, 0) * self.row_bytes
+            parts.append(fresh[first : (stop - self._packed) * self.row_bytes])
+        raw = parts[0] if len(parts) == 1 else b"".join(parts)
         return np.frombuffer(raw, self.dtype).reshape(stop - start, *self.tail)
 
+    def _read(self, start: int, stop: int) -> bytes:
+        at, count = start * self.row_bytes, (stop - start) * self.row_bytes
+        if self._file is None:
+            return bytes(self._memory[at : at + count])
+        return read_at(self._file.fileno(), count, at, self.what)
 
-def _write(file: IO[bytes], data: memoryview, at: int = 0) -> None:
+
+def _write(file: IO[bytes], data: bytes | bytearray, at: int = 0) -> None:
     """All of ``data`` at byte ``at``. Raises OSError."""
     file.seek(at)
-    while data:
-        data = data[file.write(data) :]
+    left = memoryview(data)
+    while left:
+        left = left[file.write(left) :]
 
 
 def read_at(fd: int, count: int, at: int, what: object) -> bytes:
