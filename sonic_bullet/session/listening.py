@@ -210,7 +210,7 @@ class Listener:
         """
         if not self._attached:
             raise SceneError("the listener is detached", "attach a new one")
-        returned_s = time.perf_counter()
+        returned_s = 0.0 if self._playback is None else time.perf_counter()
         step = self.world.after_step()
         if not self.world.stepped:
             self._frame = np.zeros((len(self.sensors), 0))
