@@ -40,6 +40,7 @@ def client() -> Iterator[Any]:
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    """Say how many tests did not happen for want of shared data: a comparison that silently did not run is a defect."""
-    skipped = [r for r in terminalreporter.stats.get("skipped", []) if "shared data not found" in str(r.longrepr)]
-    terminalreporter.write_line(f"{len(skipped)} tests skipped for want of shared data")
+    """Say how many tests did not happen, and for want of what: a comparison that silently did not run is a defect."""
+    skipped = [str(report.longrepr) for report in terminalreporter.stats.get("skipped", [])]
+    for what, said in (("shared data", "shared data not found"), ("another library", "could not import")):
+        terminalreporter.write_line(f"{sum(said in one for one in skipped)} tests skipped for want of {what}")

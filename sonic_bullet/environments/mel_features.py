@@ -2,9 +2,9 @@
 
 Frames of 400 samples at 16 kHz (25 ms), 160 apart (10 ms), a periodic Hann window, the power of each bin, 64 triangular
 filters on the HTK mel scale, m = 2595 log10(1 + f/700), from 0 Hz to half the rate, each of peak 1 (norm None): what
-torchaudio's MelSpectrogram(16000, n_fft=400, hop_length=160, n_mels=64, center=False) gives. Li et al. (2022), See,
-Hear, and Feel, use these; they add their floor where it is a limit here, so that silence is exactly log(floor) and
-nothing above the floor is changed.
+torchaudio's MelSpectrogram(16000, n_fft=400, hop_length=160, n_mels=64, center=False) gives, and what See, Hear, and
+Feel (Li et al. 2022) learns from. The floor is a limit, so that silence is exactly log(floor) and nothing above it is
+changed.
 """
 
 from __future__ import annotations

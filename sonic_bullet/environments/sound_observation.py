@@ -22,7 +22,7 @@ from sonic_bullet.environments.repeated_episodes import RepeatedEpisodes
 from sonic_bullet.environments.sounding_cast import Cast, MaterialsLike, add_fillable, as_materials, cast_of, same_cast
 from sonic_bullet.files import check_sr
 from sonic_bullet.records import Air, Array, Material
-from sonic_bullet.records.coerce import as_number
+from sonic_bullet.records.coerce import as_kind, as_number, as_whole
 from sonic_bullet.records.errors import AudioError, SceneError
 from sonic_bullet.render.clock import exact_step
 from sonic_bullet.session import Listener, attach
@@ -40,6 +40,14 @@ class SoundObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorA
     from it; these counts sum to floor(sr·time since reset). As a listener's frames, audio lags physics by three physics
     steps. info["contacts_differ"] is there, and True, from the env.step on in which the simulator gave other poses or
     contacts than in the first episode of the same seed and actions.
+
+    microphones, seed, air: as `attach` has them. materials: what sounds, found anew after every reset. A material:
+    every link with a collision shape; those that cannot be filled are named in a SceneWarning and stay silent. A
+    mapping from a body's name or id, or (either, link), to a material or keywords of `Listener.add`. A function of the
+    client that returns one. client: of PyBullet; None: found among the environment's attributes. step_s: T; None:
+    measured, on another environment of the same spec where one can be made, else by a reset and a step of this one.
+    Raises SceneError: no PyBullet, no step, an observation that has "audio" already; AudioError, MaterialError,
+    RecordError for arguments that are none.
     """
 
     def __init__(
@@ -54,24 +62,14 @@ class SoundObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorA
         seed: int = 0,
         air: Air | None = None,
     ) -> None:
-        """microphones, seed, air: as `attach` has them.
-
-        materials: what sounds, found anew after every reset. A material: every link with a collision shape; those that
-        cannot be filled are named in a SceneWarning and stay silent. A mapping from a body's name or id, or (either,
-        link), to a material or keywords of `Listener.add`. A function of the client that returns one. client: of
-        PyBullet; None: found among the environment's attributes. step_s: T; None: measured, on another environment of
-        the same spec where one can be made, else by a reset and a step of this one.
-        Raises SceneError: no PyBullet, no step, an observation that has "audio" already; AudioError, MaterialError,
-        RecordError for arguments that are none.
-        """
         given = {"sr": sr, "microphones": microphones, "materials": materials, "client": client, "step_s": step_s}
         RecordConstructorArgs.__init__(self, _disable_deepcopy=True, **given, seed=seed, air=air)
         gymnasium.Wrapper.__init__(self, env)
         self._options: dict[str, Any] = {
             "sr": check_sr(sr),
             "microphone": as_sensors(microphones, "microphones"),
-            "seed": seed,
-            "air": air,
+            "seed": as_whole(seed, "seed", "give a whole number, 0 or more", least=0),
+            "air": None if air is None else as_kind(air, Air, "air", "give an Air, or leave it out"),
         }
         if not self._options["microphone"]:
             raise AudioError("there is no microphone, so there is no sound to observe", "give microphones=(x, y, z)")
@@ -137,15 +135,20 @@ class SoundObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorA
         """Listen from here on, as who has heard nothing yet."""
         client = connected_client(self.env, self._client)
         cast = cast_of(self._materials, client)
-        if not self._begun_anew(client, cast):
-            self._detach()
-            self._world = EpisodeWorld(client)
-            self._listener = attach(self._world, **self._options)
+        if self._begun_anew(client, cast):
+            return
+        self._detach()
+        self._world = EpisodeWorld(client)
+        listener = attach(self._world, **self._options)
+        try:
             if isinstance(self._materials, Material):
-                add_fillable(self._listener, cast, self._silent)
+                add_fillable(listener, cast, self._silent)
             else:
-                self._listener.add_all(cast)
-            self._cast, self._added = cast, len(self._world.bodies)
+                listener.add_all(cast)
+        except BaseException:
+            listener.detach()
+            raise
+        self._listener, self._cast, self._added = listener, cast, len(self._world.bodies)
 
     def _begun_anew(self, client: Any, cast: Cast) -> bool:
         """Whether the listener that there is could begin anew: its bodies are those of the cast, and all still there.

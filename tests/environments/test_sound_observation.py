@@ -16,7 +16,7 @@ import pytest
 
 import sonic_bullet as sb
 from sonic_bullet.listener import disconnect
-from sonic_bullet.records.errors import AudioError, MaterialError, SceneError, SceneWarning
+from sonic_bullet.records.errors import AudioError, MaterialError, RecordError, SceneError, SceneWarning
 from sonic_bullet.render.clock import Clock, exact_step
 
 gymnasium = pytest.importorskip("gymnasium")
@@ -252,7 +252,7 @@ def test_names_find_bodies_again(opened: Any) -> None:
     listener = env.listener
     np.testing.assert_array_equal(episode(env, 0)[0], first)
     assert env.listener is not listener  # the bodies are others
-    assert {body.material.name for body in env.listener.contacts.bodies} == {STEEL.name}
+    assert {body.material.name for body in env.listener.world.bodies} == {STEEL.name}
     env = opened(SoundObservation(FallingBox(renew=True), materials={"body 1": {"material": STEEL}}))
     with pytest.raises(SceneError, match="no body is called 'body 1'"):
         env.reset(seed=0)
@@ -298,6 +298,8 @@ def test_a_step_longer_than_the_audio_is_one_line(opened: Any) -> None:
         ({"microphones": ()}, AudioError, "no microphone"),
         ({"sr": 7}, AudioError, "sample rate"),
         ({"materials": "cheese"}, MaterialError, "cheese"),
+        ({"seed": -1}, RecordError, "seed is -1"),
+        ({"air": 1.2}, RecordError, "air is 1.2"),
         ({"step_s": 0}, SceneError, "step_s is 0"),
         ({"client": "me"}, SceneError, "client is 'me'"),
     ],
@@ -311,6 +313,17 @@ def test_it_wraps_once(opened: Any) -> None:
     env = opened(SoundObservation(FallingBox(), materials=plates))
     with pytest.raises(SceneError, match="has 'audio' already"):
         SoundObservation(env, materials=plates)
+
+
+def test_where_bodies_cannot_sound_nothing_is_left_attached(opened: Any) -> None:
+    bare = opened(FallingBox())
+    before = dict(vars(bare.physics))
+    env = SoundObservation(bare, materials={7: "wood"})
+    with pytest.raises(SceneError, match="no body 7"):
+        env.reset()
+    assert dict(vars(bare.physics)) == before
+    with pytest.raises(SceneError, match="call reset first"):
+        env.step(np.zeros(3, np.float32))
 
 
 def test_steps_want_an_episode(opened: Any) -> None:
@@ -368,7 +381,7 @@ def test_by_default_every_link_sounds(opened: Any) -> None:
     env = opened(SoundObservation(bare, materials="wood"))
     with pytest.warns(SceneWarning, match=r"left silent: link0 \(body 2\)"):
         env.reset(seed=0)
-    materials = {body.body_id: body.material for body in env.listener.contacts.bodies}
+    materials = {body.body_id: body.material for body in env.listener.world.bodies}
     assert set(materials) == {0, 1} and {material.name for material in materials.values()} == {"wood"}
     with warnings.catch_warnings():
         warnings.simplefilter("error", SceneWarning)
