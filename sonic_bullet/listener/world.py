@@ -42,6 +42,11 @@ class World(ABC):
         return self.bodies
 
     @property
+    def living(self) -> tuple[Body, ...]:
+        """Those of `bodies` that are there now."""
+        return tuple(body for body in self.bodies if body.until_step < 0)
+
+    @property
     def untouched(self) -> frozenset[int]:
         """Ids of the bodies that are in the world and have met nobody yet."""
         return frozenset()

@@ -17,6 +17,7 @@ from contextlib import nullcontext
 from pathlib import Path
 from types import TracebackType
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -91,6 +92,7 @@ class Listener:
         self._synth = Synthesizer(sr=self.sr, sensors=self.sensors, seed=self.seed, air=self.air, keep=keep)
         self._playback: Playback | None = None
         self._attached = True
+        self._models: WeakKeyDictionary[ModalModel, None] = WeakKeyDictionary()  # of all bodies, each once
         self._begin()
         self._frame: Array | None = np.zeros((len(self.sensors), 0))
         self.world.listen(self.step)
@@ -180,9 +182,9 @@ class Listener:
         """The models of bodies that are listened to from now on."""
         as_call(progress, "progress")
         check_names(self.world, wanted)
-        known = (body.model for body in self.world.bodies if body.model is not None)
         with status("sonic_bullet") if progress is None else nullcontext(progress) as say:
-            models = solved_bodies(self.world, wanted, known, self.air if self.sensors else None, say)
+            models = solved_bodies(self.world, wanted, self._models, self.air if self.sensors else None, say)
+        self._models.update(dict.fromkeys(model for mine in models for model in mine))
         for one in wanted:  # all of them first: a number is given to who has no name of its own
             for link, name in zip(one.links, one.names, strict=bool(one.names)):
                 self.world.call(one.body, link, name)

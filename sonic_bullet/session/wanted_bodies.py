@@ -89,7 +89,7 @@ def _names(world: World, body: int, links: Sequence[int], name: str, every: bool
 
 def check_names(world: World, wanted: Sequence[WantedBody]) -> None:
     """Raise SceneError where a name that is given is another living link's, or given twice."""
-    bearer = {body.name: (body.body_id, body.link) for body in world.bodies if body.until_step < 0}
+    bearer = {body.name: (body.body_id, body.link) for body in world.living}
     for one in wanted:
         for link, name in zip(one.links, one.names, strict=bool(one.names)):
             body, other = bearer.setdefault(name, (one.body, link))

@@ -98,10 +98,14 @@ class PyBulletWorld(facts.AskedLinks):
         return self._known.records
 
     @property
+    def living(self) -> tuple[Body, ...]:
+        """Those of `bodies` that are there now."""
+        return tuple(self._known.records[index] for index in self._known.live.values())
+
+    @property
     def untouched(self) -> frozenset[int]:
         """Ids of the bodies that were in the world at the last step and have met nobody yet."""
-        met = {code // LINK_SPAN for code in self._known.live}
-        return frozenset(body for body, _, _ in self._past.roster.bodies) - met
+        return frozenset(body for body, _, _ in self._past.roster.bodies) - {body.body_id for body in self.living}
 
     @property
     def notes(self) -> tuple[str, ...]:
