@@ -19,7 +19,7 @@ from sonic_bullet.cli.output import table, warn
 from sonic_bullet.files import read_audio, replacing
 from sonic_bullet.files.case_schema import case_schema
 from sonic_bullet.files.cases import FORMAT, UNITS, Case, read_case
-from sonic_bullet.files.channels import channel_of, channel_words
+from sonic_bullet.files.recordings import channel_of, channel_words
 from sonic_bullet.records.errors import FileError
 
 AUDIO = frozenset({".wav", ".flac", ".ogg", ".aif", ".aiff", ".caf", ".w64", ".rf64"})

@@ -15,7 +15,7 @@ from sonic_bullet.listener import PyBulletWorld, client_id_of, module_steps
 from sonic_bullet.listener.quiet import quiet_stdout
 from sonic_bullet.records.contacts import Step
 from sonic_bullet.records.errors import SceneError
-from sonic_bullet.render.clock import exact_step
+from sonic_bullet.synth.clock import exact_step
 
 
 class EpisodeWorld(PyBulletWorld):

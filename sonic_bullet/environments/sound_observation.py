@@ -24,9 +24,9 @@ from sonic_bullet.files import check_sr
 from sonic_bullet.records import Air, Array, Material
 from sonic_bullet.records.coerce import as_kind, as_number, as_whole
 from sonic_bullet.records.errors import AudioError, SceneError
-from sonic_bullet.render.clock import exact_step
 from sonic_bullet.session import Listener, attach
 from sonic_bullet.session.arguments import MicrophoneLike, as_sensors
+from sonic_bullet.synth.clock import exact_step
 
 AUDIO, COUNT, DIFFER = "audio", "audio_count", "contacts_differ"
 

@@ -10,12 +10,11 @@ after, `reading` is the boundary of all readers, `atomic` the replacing.
 
 from sonic_bullet.files.atomic import cannot, check_output, kept_name, replacing
 from sonic_bullet.files.audio import AudioReport, AudioWriter, check_audio_output, check_sr, write_audio
-from sonic_bullet.files.channels import channel_of, channel_words
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.levels import check_levels
 from sonic_bullet.files.logs import read_log, write_log
 from sonic_bullet.files.models import read_model, write_model
-from sonic_bullet.files.recordings import read_audio
+from sonic_bullet.files.recordings import channel_of, channel_words, read_audio
 
 __all__ = [
     "AudioReport",

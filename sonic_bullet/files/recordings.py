@@ -1,4 +1,4 @@
-"""Recordings: audio files of any make to samples.
+"""Recordings: audio files of any make to samples, and which channel of them is listened to.
 
     file -> libsndfile, by descriptor, forward only -> blocks to the end -> samples (channels, n), rate
 
@@ -89,3 +89,24 @@ def _samples(sound: Any, path: object, file_bytes: int) -> Array:
         samples[:, at : at + len(block)] = block.T
         at += len(block)
     return samples
+
+
+def channel_of(samples: Array, channel: int, name: object) -> Array:
+    """One channel (n,) of samples (channels, n), counted from 0.
+
+    Raises FileError where the file ``name`` has no such channel.
+    """
+    if not 0 <= channel < len(samples):
+        known = "1 channel, 0" if len(samples) == 1 else f"{len(samples)} channels, 0 to {len(samples) - 1}"
+        raise FileError(f"{name} has no channel {channel}", f"it has {known}")
+    one: Array = samples[channel]
+    return one
+
+
+def channel_words(count: int, channel: int | None) -> str:
+    """Which channel of a file of ``count`` is used, in words; empty where it has but one."""
+    if count < 2:
+        return ""
+    return f"{count} channels: " + (
+        "the first is used, channel 0" if channel is None else f"channel {channel} is used, counted from 0"
+    )

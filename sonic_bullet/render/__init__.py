@@ -1,6 +1,6 @@
 """Forces become sound: the synthesizer of live steps, and the replay of a contact log.
 
-silence: why there is none | clock: which samples a step covers | resonator: a body as it is played
+silence: why there is none | presence: who is there, who has gone | resonator: a body as it is played
 tables, body_table: what the compiled stages work on | contact_rows, contact_place: contacts | strike_pulses: strikes
 friction: rolling and sliding | driver: the stages in one call | step_events: what happened in a step
 residual_voice: residuals | synthesis_state: all that goes on | synthesizer: all together

@@ -16,7 +16,6 @@ import numpy as np
 from sonic_bullet.records import Air, Array, Body, Microphone, Sensor
 from sonic_bullet.records.contacts import first_bodies
 from sonic_bullet.render.body_table import BodyTable
-from sonic_bullet.render.clock import Clock
 from sonic_bullet.render.friction import surface_seed
 from sonic_bullet.render.residual_voice import ResidualVoice, Rubs, build_residual_voice, with_lines
 from sonic_bullet.render.resonator import Resonator, build_resonator, weight_sets
@@ -24,6 +23,7 @@ from sonic_bullet.render.tables import PAIR, PULSE, ROW, WINDOW
 from sonic_bullet.residual.player import Grain
 from sonic_bullet.synth import bank, path
 from sonic_bullet.synth.bank import Bank, BankState
+from sonic_bullet.synth.clock import Clock
 from sonic_bullet.synth.fractional_delay import tap_polynomials
 from sonic_bullet.synth.path import Path, PathState
 from sonic_bullet.synth.pulse import pulse_table, spectrum_table

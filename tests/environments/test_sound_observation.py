@@ -17,7 +17,7 @@ import pytest
 import sonic_bullet as sb
 from sonic_bullet.listener import disconnect
 from sonic_bullet.records.errors import AudioError, MaterialError, RecordError, SceneError, SceneWarning
-from sonic_bullet.render.clock import Clock, exact_step
+from sonic_bullet.synth.clock import Clock, exact_step
 
 gymnasium = pytest.importorskip("gymnasium")
 

@@ -27,17 +27,17 @@ class AddedLinks:
 
     def __init__(self, client_id: int) -> None:
         self._client_id = client_id
-        self.told: dict[int, AddedLink] = {}
+        self.links: dict[int, AddedLink] = {}
 
     def tell(self, code: int, how: dict[str, Any], record: Body) -> None:
         """A link that exists was added; how: arguments of `added_body`; record: what was made of it."""
-        self.told.pop(code, None)
-        self.told[code] = AddedLink(how, record, likeness(self._client_id, *decode(code)))
+        self.links.pop(code, None)
+        self.links[code] = AddedLink(how, record, likeness(self._client_id, *decode(code)))
 
     def forget(self, codes: Iterable[int]) -> None:
         """Links are gone."""
         for code in codes:
-            self.told.pop(code, None)
+            self.links.pop(code, None)
 
     def still_there(self, roster: Roster, *, seen: bool) -> dict[int, AddedLink]:
         """Those whom a roster holds. seen: who was removed was forgotten; else a link of the same code is the same only
@@ -46,7 +46,7 @@ class AddedLinks:
         there = set(roster.code.tolist())
         return {
             code: one
-            for code, one in self.told.items()
+            for code, one in self.links.items()
             if code in there and (seen or one.likeness == likeness(self._client_id, *decode(code)))
         }
 

@@ -138,6 +138,7 @@ def dynamics(client_id: int, body: int, link: int) -> Values:
 
 
 def dynamics_of(info: tuple[Any, ...]) -> Values:
+    """`dynamics` of what getDynamicsInfo answered."""
     inertia = {f"localInertiaDiagonal{axis}": x for axis, x in zip("XYZ", info[2], strict=True)}
     return finite({**{name: info[place] for name, place in DYNAMICS.items()}, **inertia})
 

@@ -33,9 +33,8 @@ from sonic_bullet.listener.pybullet import hooks
 from sonic_bullet.listener.pybullet.added_links import AddedLinks, added_body
 from sonic_bullet.listener.pybullet.census import Census
 from sonic_bullet.listener.pybullet.left_out import BodiesLeftOut
-from sonic_bullet.listener.pybullet.poses import check_connected
+from sonic_bullet.listener.pybullet.poses import check_connected, undone
 from sonic_bullet.listener.pybullet.questions import contact_points, engine, settings
-from sonic_bullet.listener.pybullet.step_back import undone
 from sonic_bullet.listener.pybullet.substeps import SubstepLog
 from sonic_bullet.listener.start import LEFT_OUT, NOBODY, hooked_start, jumped, polled_start
 from sonic_bullet.records import Body, Material, ModalModel, Shape
@@ -180,9 +179,9 @@ class PyBulletWorld(facts.AskedLinks):
         added, before = self._added, self.properties
         self._begin()
         self.properties.set_values = before.set_values
-        self._added.told = added.still_there(self._past.roster, seen=self._uninstall is not None)
-        before.names.hand_over(self._added.told, self.properties.names)
-        for code, one in self._added.told.items():
+        self._added.links = added.still_there(self._past.roster, seen=self._uninstall is not None)
+        before.names.hand_over(self._added.links, self.properties.names)
+        for code, one in self._added.links.items():
             self._append(code, added.again(code, one, before.set_values.of(*decode(code))))
 
     def forget(self, body: int | None = None) -> None:
