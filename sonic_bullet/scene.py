@@ -27,11 +27,12 @@ from typing import Any
 
 from sonic_bullet.files import check_sr
 from sonic_bullet.files.contact_log import ContactLog
+from sonic_bullet.files.rows.spool import KeptSound
 from sonic_bullet.listener import Finding, diagnose_world, direct_client, disconnect, links_with_shapes, run_script
 from sonic_bullet.records import Array, Material, Sensor
 from sonic_bullet.records.coerce import as_call, as_flag, as_number, as_path, as_whole, shown
 from sonic_bullet.records.errors import SceneError, SceneWarning, SonicBulletError, interrupts
-from sonic_bullet.render import render_log, silence_notes
+from sonic_bullet.render import render_kept, silence_notes
 from sonic_bullet.session import Listener, attach
 from sonic_bullet.session.arguments import MicrophoneLike, as_material, as_sensors
 
@@ -43,12 +44,19 @@ Say = Callable[[str], None]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RenderResult:
-    """samples (channels, n) in pascals, the log they come from, and notes a user should read."""
+    """sound (channels, n) in pascals, which need not lie in memory, the log it comes from, and notes a user should
+    read.
+    """
 
-    samples: Array
+    sound: KeptSound
     log: ContactLog
     sr: int
     notes: tuple[str, ...] = ()
+
+    @property
+    def samples(self) -> Array:
+        """All of the sound at once, (channels, n)."""
+        return self.sound.samples()
 
 
 def render_scene(
@@ -104,7 +112,7 @@ def examine_scene(path: str | Path, seconds: float = 1.0, say: Say | None = None
 
 
 def _nothing_added(listener: Listener) -> tuple[Finding, ...]:
-    if not listener.world.has_bodies or any(body.material is not None for body in listener.contacts.bodies):
+    if not listener.world.has_bodies or any(body.material is not None for body in listener.world.bodies):
         return ()
     return (
         Finding(
@@ -129,7 +137,7 @@ def _mute_bodies(listener: Listener) -> tuple[Finding, ...]:
             f"body {body.body_id} link {body.link} ({body.name}) has no mode below 20 kHz: it clicks but does not ring",
             "nothing to mend; a larger or thinner body rings",
         )
-        for body in listener.contacts.bodies
+        for body in listener.world.bodies
         if body.model is not None and body.model.mode_count == 0 and len(body.model.face)
     )
 
@@ -181,11 +189,11 @@ class _Stage:
             and self.microphones is None
             and (self.residual or not any(b.material and b.material.residual for b in log.bodies))
         ):
-            samples = listener.sound()
-            return RenderResult(samples, log, self.sr, (*notes, *silence_notes(samples, log)))
+            sound = listener.kept_sound()
+            return RenderResult(sound, log, self.sr, (*notes, *silence_notes(sound, log)))
         log = replace(log, sr=self.sr, sensors=log.sensors if self.microphones is None else self.microphones)
-        samples = render_log(log, residual=self.residual)
-        return RenderResult(samples, log, self.sr, (*notes, *silence_notes(samples, log)))
+        sound = render_kept(log, residual=self.residual)
+        return RenderResult(sound, log, self.sr, (*notes, *silence_notes(sound, log)))
 
 
 def _stage(path: str | Path, **options: Any) -> _Stage:

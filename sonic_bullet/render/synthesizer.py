@@ -14,7 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from sonic_bullet.files.rows.spool import KeptSound, sound_spool
+from sonic_bullet.files.rows.spool import KeptSound, SoundSpool
 from sonic_bullet.records import Air, Array, Body, Sensor
 from sonic_bullet.records.arrays import joined
 from sonic_bullet.records.contacts import CONTACT, Contacts, Step
@@ -192,7 +192,7 @@ class Synthesizer:
         self._setup = Setup(sr, sensors, seed, air, residual)
         self._state = start(self._setup)
         self._clock = Clock()
-        self._sound = sound_spool(len(sensors), "attach with keep_sound=False") if keep else None
+        self._sound = SoundSpool(len(sensors), "attach with keep_sound=False") if keep else None
         self.unkept: FileError | None = None
         self._lag = np.zeros((len(sensors), 0))
         self._last: Step | None = None
@@ -254,9 +254,8 @@ class Synthesizer:
             raise
         self._last = steps[-1]
         if self._sound is not None and self.unkept is None:
-            self._sound.append(np.ascontiguousarray(frame.T))
             try:
-                self._sound.spill()
+                self._sound.add(frame)
             except FileError as error:
                 self.unkept = error
         return frame

@@ -148,20 +148,36 @@ def read_at(fd: int, count: int, at: int, what: object) -> bytes:
     return parts[0] if len(parts) == 1 else b"".join(parts)
 
 
+class SoundSpool(Spool):
+    """Frames of so many channels, float64; `Spool` says the rest."""
+
+    def __init__(self, channels: int, instead: str = "") -> None:
+        super().__init__(float, (channels,), what="sound", instead=instead)
+
+    def add(self, block: Array) -> None:
+        """Take in (channels, n). Raises FileError where the disk takes no more; it can be read all the same."""
+        self.append(np.ascontiguousarray(block.T))
+        self.spill()
+
+    def kept(self) -> KeptSound:
+        """What is in it by now."""
+        return KeptSound(self, len(self), np.zeros((*self.tail, 0)))
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class KeptSound:
     """Sound as long as it likes: (channels, n) float64, the first ``count`` frames in a spool of rows (channels,), the
     ``rest`` (channels, ·) in memory. What is appended to the spool later is not of it.
     """
 
-    spool: Spool
+    spool: SoundSpool
     count: int
     rest: Array
 
     @classmethod
     def of(cls, samples: Array) -> KeptSound:
         """Samples (channels, n) that are in memory anyway."""
-        return cls(sound_spool(len(samples)), 0, samples)
+        return cls(SoundSpool(len(samples)), 0, samples)
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -196,8 +212,3 @@ class KeptSound:
         for block in self.blocks():
             peak = np.maximum(peak, np.abs(block).max(axis=1))
         return peak
-
-
-def sound_spool(channels: int, instead: str = "") -> Spool:
-    """A spool of frames (channels,) of float64."""
-    return Spool(float, (channels,), what="sound", instead=instead)
