@@ -1,4 +1,4 @@
-"""One picture of a render: what was heard above, what was touched below, on one time axis.
+"""One picture of a render: what was found above, what was touched below, on one time axis.
 
     samples (channels, n) Pa -> pressure p(t)
                              -> level of a short-time spectrum, dB re 20 µPa per bin: 20 log10(|P(f, t)|/√2/20 µPa), |P|
@@ -115,8 +115,8 @@ def spectrogram_db(samples: Array | KeptSound, sr: int) -> tuple[Array, Array, A
     amplitude = np.zeros((length // 2 + 1, len(middle)))
     for column, at in enumerate((middle - size // 2).tolist()):
         cut, early = np.zeros(size), max(-at, 0)
-        heard = sound.read(at + early, at + size)[0]
-        cut[early : early + len(heard)] = heard
+        found = sound.read(at + early, at + size)[0]
+        cut[early : early + len(found)] = found
         amplitude[:, column] = 2 * np.abs(np.fft.rfft(cut * window, length)) / window.sum()
     with np.errstate(divide="ignore"):
         level = 20 * np.log10(amplitude / np.sqrt(2) / REFERENCE_PRESSURE_PA)

@@ -31,7 +31,7 @@ class Spool:
     """Rows of one dtype and shape, appended in order and read back by [start:stop], read-only.
 
     dtype, tail: of a row. what: the thing, in words, for the message of a full disk ("contact log"); instead: what its
-    user can do without a larger disk ("attach with keep_log=False").
+    user can do without a larger disk ("attach with keep_log=False"). memory_bytes: what is held in memory.
     """
 
     def __init__(
@@ -41,11 +41,11 @@ class Spool:
         *,
         what: str,
         instead: str = "",
-        memory_bytes: int = MEMORY_BYTES,
+        memory_bytes: int | None = None,
     ) -> None:
         self.dtype, self.tail, self.what, self.instead = np.dtype(dtype), tail, what, instead
         self.row_bytes = self.dtype.itemsize * int(np.prod(tail))
-        self._memory_bytes = memory_bytes
+        self._memory_bytes = MEMORY_BYTES if memory_bytes is None else memory_bytes
         self._memory = bytearray()
         self._file: IO[bytes] | None = None
         self._fresh: list[Array] = []
