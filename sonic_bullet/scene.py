@@ -12,21 +12,18 @@ as ``material``.
 
 from __future__ import annotations
 
-import ast
-import importlib.util
 import os
-import traceback
 import warnings
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 from sonic_bullet.files import check_sr
 from sonic_bullet.files.contact_log import ContactLog
+from sonic_bullet.files.rows.spool import KeptSound
 from sonic_bullet.listener import (
     Finding,
     diagnose_world,
@@ -39,9 +36,10 @@ from sonic_bullet.listener import (
 from sonic_bullet.records import Array, Material, Sensor
 from sonic_bullet.records.coerce import as_call, as_flag, as_number, as_path, as_whole, shown
 from sonic_bullet.records.errors import SceneError, SceneWarning, SonicBulletError, interrupts
-from sonic_bullet.render import render_log, silence_notes
+from sonic_bullet.render import render_kept, silence_notes
 from sonic_bullet.session import Listener, attach
 from sonic_bullet.session.arguments import MicrophoneLike, as_material, as_sensors
+from sonic_bullet.session.scene_file import defines_build, scene_module, user_code, uses_sonic_bullet
 
 DEFAULT_SECONDS = 4.0
 DEFAULT_MATERIAL = "plastic"
@@ -51,12 +49,19 @@ Say = Callable[[str], None]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RenderResult:
-    """samples (channels, n) in pascals, the log they come from, and notes a user should read."""
+    """sound (channels, n) in pascals, which need not lie in memory, the log it comes from, and notes a user should
+    read.
+    """
 
-    samples: Array
+    sound: KeptSound
     log: ContactLog
     sr: int
     notes: tuple[str, ...] = ()
+
+    @property
+    def samples(self) -> Array:
+        """All of the sound at once, (channels, n)."""
+        return self.sound.samples()
 
 
 def render_scene(
@@ -140,7 +145,7 @@ def examine_scene(path: str | Path, seconds: float = 1.0, say: Say | None = None
 
 
 def _nothing_added(listener: Listener) -> tuple[Finding, ...]:
-    if not listener.world.has_bodies or any(body.material is not None for body in listener.contacts.bodies):
+    if not listener.world.has_bodies or any(body.material is not None for body in listener.world.bodies):
         return ()
     return (
         Finding(
@@ -165,7 +170,7 @@ def _mute_bodies(listener: Listener) -> tuple[Finding, ...]:
             f"body {body.body_id} link {body.link} ({body.name}) has no mode below 20 kHz: it clicks but does not ring",
             "nothing to mend; a larger or thinner body rings",
         )
-        for body in listener.contacts.bodies
+        for body in listener.world.bodies
         if body.model is not None and body.model.mode_count == 0 and len(body.model.face)
     )
 
@@ -202,7 +207,7 @@ class _Stage:
     def run(self, seconds: float | None, progress: Progress | None, say: Say | None) -> tuple[str, ...]:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SceneWarning)  # the result's notes say it
-            return (_run_built if _defines_build(self.path) else _run_plain)(self, seconds, progress, say)
+            return (_run_built if defines_build(self.path) else _run_plain)(self, seconds, progress, say)
 
     def ready(self) -> None:
         """The listener knows its bodies: say so, once."""
@@ -224,11 +229,11 @@ class _Stage:
             and self.microphones is None
             and (self.residual or not any(b.material and b.material.residual for b in log.bodies))
         ):
-            samples = listener.sound()
-            return RenderResult(samples, log, self.sr, (*notes, *silence_notes(samples, log)))
+            sound = listener.kept_sound()
+            return RenderResult(sound, log, self.sr, (*notes, *silence_notes(sound, log)))
         log = replace(log, sr=self.sr, sensors=log.sensors if self.microphones is None else self.microphones)
-        samples = render_log(log)
-        return RenderResult(samples, log, self.sr, (*notes, *silence_notes(samples, log)))
+        sound = render_kept(log)
+        return RenderResult(sound, log, self.sr, (*notes, *silence_notes(sound, log)))
 
 
 def _stage(path: str | Path, **options: Any) -> _Stage:
@@ -243,49 +248,11 @@ def _stage(path: str | Path, **options: Any) -> _Stage:
     return _Stage(place, **options)
 
 
-def _defines_build(path: Path) -> bool:
-    try:
-        tree = ast.parse(path.read_text(encoding="utf-8"))
-    except (SyntaxError, ValueError) as error:
-        raise SceneError(f"scene '{path.name}' is not Python: {error}", "mend the file") from None
-    return any(isinstance(node, ast.FunctionDef) and node.name == "build" for node in tree.body)
-
-
-def _uses_sonic_bullet(path: Path) -> bool:
-    return any(
-        (isinstance(node, ast.Import) and any(name.name.split(".")[0] == "sonic_bullet" for name in node.names))
-        or (isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == "sonic_bullet")
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
-    )
-
-
-def _user_code(path: Path, call: Callable[..., Any], *arguments: Any) -> Any:
-    """Call the scene's own code; its exceptions become one line that names the line they came from."""
-    try:
-        with interrupts():
-            return call(*arguments)
-    except (SonicBulletError, KeyboardInterrupt):
-        raise
-    except BaseException as error:
-        lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if Path(frame.filename) == path]
-        where = f" line {lines[-1]}" if lines else ""
-        raise SceneError(f"scene '{path.name}'{where}: {type(error).__name__}: {error}", "mend the scene") from error
-
-
-def _module(path: Path) -> ModuleType:
-    spec = importlib.util.spec_from_file_location(f"sonic_bullet_scene_{path.stem}", path)
-    if spec is None or spec.loader is None:
-        raise SceneError(f"'{path}' is not a Python file", "give a scene whose name ends in .py")
-    module = importlib.util.module_from_spec(spec)
-    _user_code(path, spec.loader.exec_module, module)
-    return module
-
-
 def _run_built(stage: _Stage, seconds: float | None, progress: Progress | None, say: Say | None) -> tuple[str, ...]:
-    module = _module(stage.path)
+    module = scene_module(stage.path)
     stage.client = client = direct_client()
     watch_settings(client)  # build sets friction and the like
-    cast = _user_code(stage.path, module.build, client)
+    cast = user_code(stage.path, module.build, client)
     if not isinstance(cast, dict):
         raise SceneError(
             f"scene '{stage.path.name}': build(client) returned {type(cast).__name__}",
@@ -294,7 +261,7 @@ def _run_built(stage: _Stage, seconds: float | None, progress: Progress | None, 
     places = stage.microphones if stage.microphones is not None else getattr(module, "MICROPHONE", (0.0, -1.0, 0.5))
     stage.listener = listener = attach(client, sr=stage.sr, microphone=places, seed=stage.seed)
     stage.microphones = None
-    _user_code(stage.path, partial(listener.add_all, cast, progress=say))
+    user_code(stage.path, partial(listener.add_all, cast, progress=say))
     act = getattr(module, "act", None)
     stage.ready()
     total = (
@@ -304,7 +271,7 @@ def _run_built(stage: _Stage, seconds: float | None, progress: Progress | None, 
     )
     while listener.time_s < total - 1e-9:
         if act is not None:
-            _user_code(stage.path, act, client, listener.time_s)
+            user_code(stage.path, act, client, listener.time_s)
         client.stepSimulation()
         if progress is not None:
             progress(min(listener.time_s / total, 1.0))
@@ -314,7 +281,7 @@ def _run_built(stage: _Stage, seconds: float | None, progress: Progress | None, 
 def _run_plain(stage: _Stage, seconds: float | None, progress: Progress | None, say: Say | None) -> tuple[str, ...]:
     total = seconds if seconds is not None else DEFAULT_SECONDS
     notes: tuple[str, ...] = ()
-    if _uses_sonic_bullet(stage.path):
+    if uses_sonic_bullet(stage.path):
         names: dict[str, Any] = {}
 
         def look(_: int) -> None:

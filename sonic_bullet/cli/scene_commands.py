@@ -25,7 +25,7 @@ from sonic_bullet.records.errors import AudioError, FileError, SceneError, Sonic
 
 if TYPE_CHECKING:
     from sonic_bullet.files.contact_log import ContactLog
-    from sonic_bullet.records import Array
+    from sonic_bullet.files.rows.spool import KeptSound
     from sonic_bullet.scene import RenderResult
 
 DEFAULT_SR = 48_000
@@ -70,7 +70,7 @@ def run_render(
         if picture is not None:
             from sonic_bullet.plots.scene_plot import render_picture
 
-            render_picture(picture, result.samples, result.sr, result.log, Path(scene).name)
+            render_picture(picture, result.sound, result.sr, result.log, Path(scene).name)
         notes = (*result.notes, *_coarse(result.log), *_oversized(result.log), *_warnings(report))
         say(_summary(report, result.log))
         for note in notes:
@@ -181,7 +181,7 @@ def _simulated(scene: str, wish: _Wish) -> RenderResult:
 class _Replay:
     """A `RenderResult` of a log; that class lives beside PyBullet, which a replay does without."""
 
-    samples: Array
+    sound: KeptSound
     log: ContactLog
     sr: int
     notes: tuple[str, ...] = ()
@@ -192,7 +192,7 @@ def _replayed(path: str, wish: _Wish) -> _Replay:
     import numpy as np
 
     from sonic_bullet.records import Microphone
-    from sonic_bullet.render import render_log, silence_notes
+    from sonic_bullet.render import render_kept, silence_notes
 
     log = read_log(path)
     if wish.microphones:
@@ -208,8 +208,13 @@ def _replayed(path: str, wish: _Wish) -> _Replay:
                 "give fewer seconds, or simulate the scene for longer",
             )
         log = log.first(int((log.start_s < seconds - 1e-9).sum()))
-    samples = render_log(log, sr=wish.rate, progress=wish.progress, say=wish.say)
-    return _Replay(samples, log, wish.rate or log.sr, silence_notes(samples, log))
+    rate = wish.rate or log.sr
+    try:
+        sound = render_kept(log, sr=wish.rate, progress=wish.progress, say=wish.say)
+    except (SonicBulletError, KeyboardInterrupt) as error:
+        error.partial = _Replay(error.kept, log, rate) if hasattr(error, "kept") else None  # type: ignore[union-attr]
+        raise
+    return _Replay(sound, log, rate, silence_notes(sound, log))
 
 
 def _written(output: str, result: RenderResult | _Replay, peak_dbfs: float | None, lufs: float | None) -> AudioReport:
@@ -217,9 +222,9 @@ def _written(output: str, result: RenderResult | _Replay, peak_dbfs: float | Non
     from sonic_bullet.render import why_silent
 
     try:
-        return write_audio(output, result.samples, result.sr, peak_dbfs=peak_dbfs, lufs=lufs)
+        return write_audio(output, result.sound, result.sr, peak_dbfs=peak_dbfs, lufs=lufs)
     except AudioError as error:
-        reason = None if result.samples.any() else why_silent(result.log)
+        reason = None if result.sound.peaks().any() else why_silent(result.log)
         raise AudioError(error.what, reason) if reason else error from error
 
 
@@ -229,17 +234,17 @@ def _with_partial(
     """The error, its text naming NAME.partial.EXT as the user would, where what was rendered before it is written as a
     valid file beside ``to``.
     """
-    result: RenderResult | None = getattr(error, "partial", None)
+    result: RenderResult | _Replay | None = getattr(error, "partial", None)
     said = ""
-    if result is not None and result.samples.size:
+    if result is not None and all(result.sound.shape):
         partial = kept_name(Path(to))
-        said = f"the first {result.samples.shape[-1] / result.sr:.3f} s are in {kept_name(Path(output))}"
+        said = f"the first {result.sound.shape[1] / result.sr:.3f} s are in {kept_name(Path(output))}"
         try:
             try:
-                write_audio(partial, result.samples, result.sr, peak_dbfs=peak_dbfs, lufs=lufs)
+                write_audio(partial, result.sound, result.sr, peak_dbfs=peak_dbfs, lufs=lufs)
             except AudioError:
                 # silent or too short for the level asked for: kept as it is
-                write_audio(partial, result.samples, result.sr)
+                write_audio(partial, result.sound, result.sr)
         except FileError as failure:  # the error itself is what the user must read first
             said = failure.what
     if isinstance(error, SonicBulletError):

@@ -1,4 +1,4 @@
-"""One picture of a render: what was heard above, what was touched below, on one time axis.
+"""One picture of a render: what was found above, what was touched below, on one time axis.
 
     samples (channels, n) Pa -> pressure p(t)
                              -> level of a short-time spectrum, dB re 20 µPa per bin: 20 log10(|P(f, t)|/√2/20 µPa), |P|
@@ -21,6 +21,8 @@ import numpy as np
 
 from sonic_bullet.files import check_output, check_sr, replacing
 from sonic_bullet.files.contact_log import ContactLog
+from sonic_bullet.files.levels import as_sound
+from sonic_bullet.files.rows.spool import READ_FRAMES, KeptSound
 from sonic_bullet.records import Array, Microphone, Sensor, Vibrometer
 from sonic_bullet.records.errors import AudioError, FileError
 from sonic_bullet.records.units import REFERENCE_PRESSURE_PA
@@ -97,29 +99,28 @@ def find_events(log: ContactLog) -> Events:
     )
 
 
-def spectrogram_db(samples: Array, sr: int) -> tuple[Array, Array, Array]:
-    """(frequencies (f,) Hz, times (t,) s, levels (f, t) dB re 20 µPa) of one channel (n,) of pascals.
+def spectrogram_db(samples: Array | KeptSound, sr: int) -> tuple[Array, Array, Array]:
+    """(frequencies (f,) Hz, times (t,) s, levels (f, t) dB re 20 µPa) of the first channel of (channels, n) or (n,)
+    pascals; a window at a time is read of what is kept.
 
     A Hann window of 10 ms, scaled so that a sine of amplitude a reads 20 log10(a/√2/20 µPa) whatever the rate.
     """
-    from scipy.signal import ShortTimeFFT
     from scipy.signal.windows import hann
 
-    size = max(16, round(WINDOW_S * sr))
-    hop = max(size // 4, int(np.ceil(len(samples) / COLUMNS_MAX)))
-    transform = ShortTimeFFT(
-        hann(size, sym=False),
-        hop,
-        sr,
-        fft_mode="onesided",
-        scale_to="magnitude",
-        mfft=2 ** int(np.ceil(np.log2(size)) + 1),
-    )
-    padded = np.pad(samples, (0, max(0, size - len(samples))))
-    amplitude = 2 * np.abs(transform.stft(padded))
+    sound = as_sound(samples)
+    size, frames = max(16, round(WINDOW_S * sr)), sound.shape[1]
+    hop = max(size // 4, int(np.ceil(frames / COLUMNS_MAX)))
+    window, length = hann(size, sym=False), 2 ** int(np.ceil(np.log2(size)) + 1)
+    middle = np.arange(0, frames + hop, hop)
+    amplitude = np.zeros((length // 2 + 1, len(middle)))
+    for column, at in enumerate((middle - size // 2).tolist()):
+        cut, early = np.zeros(size), max(-at, 0)
+        found = sound.read(at + early, at + size)[0]
+        cut[early : early + len(found)] = found
+        amplitude[:, column] = 2 * np.abs(np.fft.rfft(cut * window, length)) / window.sum()
     with np.errstate(divide="ignore"):
         level = 20 * np.log10(amplitude / np.sqrt(2) / REFERENCE_PRESSURE_PA)
-    return transform.f, transform.t(len(padded)), level
+    return np.fft.rfftfreq(length, 1 / sr), middle / sr, level
 
 
 def quantity(sensor: Sensor) -> tuple[str, str]:
@@ -140,7 +141,7 @@ def check_picture_output(path: str | os.PathLike[str]) -> Path:
 
 
 def render_picture(
-    path: str | os.PathLike[str], samples: Array, sr: int, log: ContactLog | None = None, title: str = ""
+    path: str | os.PathLike[str], samples: Array | KeptSound, sr: int, log: ContactLog | None = None, title: str = ""
 ) -> None:
     """Draw ``samples`` (channels, n) in Pa, and the events of ``log`` where there is one, to a PNG, PDF or SVG.
 
@@ -148,8 +149,9 @@ def render_picture(
     (place, extension) and AudioError (rate, shape, NaN).
     """
     check_picture_output(path)
-    rate, sound = check_sr(sr), np.asarray(samples, float)
-    if sound.ndim != 2 or sound.shape[0] == 0 or not np.isfinite(sound).all():
+    rate = check_sr(sr)
+    sound = as_sound(samples)
+    if np.ndim(samples) == 1 or sound.shape[0] == 0 or not np.isfinite(sound.peaks()).all():  # type: ignore[arg-type]
         raise AudioError(
             f"samples of shape {sound.shape} cannot be drawn", "pass finite samples of shape (channels, n)"
         )
@@ -163,8 +165,8 @@ def render_picture(
     FigureCanvasAgg(figure)
     axes = figure.subplots(len(heights), 1, sharex=True, height_ratios=heights)
     what, unit = quantity(log.sensors[0]) if log is not None and log.sensors else ("pressure", "Pa")
-    _draw_samples(axes[0], sound[0], rate, what, unit)
-    image = _draw_spectrogram(axes[1], sound[0], rate)
+    _draw_samples(axes[0], sound, rate, what, unit)
+    image = _draw_spectrogram(axes[1], sound, rate)
     if image is not None:
         figure.colorbar(
             image,
@@ -185,18 +187,25 @@ def render_picture(
         figure.savefig(file, format=extension, metadata=timeless)
 
 
-def _draw_samples(axis: Any, sound: Array, sr: int, what: str, unit: str) -> None:
+def _draw_samples(axis: Any, sound: KeptSound, sr: int, what: str, unit: str) -> None:
     """p(t), as the band between least and greatest value of each of at most 4000 stretches: no peak falls between
     pixels.
     """
-    stretch = max(1, len(sound) // 4000)
-    whole = sound[: len(sound) // stretch * stretch].reshape(-1, stretch)
-    if whole.size:
-        time_s = np.arange(len(whole)) * stretch / sr
-        axis.fill_between(time_s, whole.min(1), whole.max(1), color="#1f4e79", linewidth=0.4, edgecolor="#1f4e79")
-    peak = float(np.abs(sound).max(initial=0))
+    frames = sound.shape[1]
+    stretch = max(1, frames // 4000)
+    least, most, energy = [np.zeros(0)], [np.zeros(0)], 0.0
+    for block in sound.blocks(stretch * max(1, READ_FRAMES // stretch)):  # of whole stretches, but the last
+        energy += float(np.sum(block[0] ** 2))
+        whole = block[0, : block.shape[1] // stretch * stretch].reshape(-1, stretch)
+        least.append(whole.min(1, initial=np.inf))
+        most.append(whole.max(1, initial=-np.inf))
+    low, high = np.concatenate(least), np.concatenate(most)
+    if len(low):
+        time_s = np.arange(len(low)) * stretch / sr
+        axis.fill_between(time_s, low, high, color="#1f4e79", linewidth=0.4, edgecolor="#1f4e79")
+    peak = float(max(-low.min(initial=0.0), high.max(initial=0.0)))
     if peak > 0:
-        rms = float(np.sqrt(np.mean(sound**2)))
+        rms = float(np.sqrt(energy / frames))
         level = f", mean level {20 * np.log10(max(rms, 1e-300) / REFERENCE_PRESSURE_PA):.0f} dB" if unit == "Pa" else ""
         axis.set_title(f"peak {peak:.3g} {unit}{level}", loc="right", fontsize=8)
     else:
@@ -205,7 +214,7 @@ def _draw_samples(axis: Any, sound: Array, sr: int, what: str, unit: str) -> Non
     axis.grid(alpha=0.25)
 
 
-def _draw_spectrogram(axis: Any, sound: Array, sr: int) -> Any:
+def _draw_spectrogram(axis: Any, sound: KeptSound, sr: int) -> Any:
     frequency, time_s, level = spectrogram_db(sound, sr)
     shown = frequency <= 20_000
     frequency, level = frequency[shown], level[shown]

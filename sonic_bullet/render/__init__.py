@@ -14,11 +14,12 @@ from dataclasses import replace
 import numpy as np
 
 from sonic_bullet.files.contact_log import ContactLog
+from sonic_bullet.files.rows.spool import KeptSound, SoundSpool
 from sonic_bullet.radiation.radiated import radiation_of
 from sonic_bullet.records import Air, Array, Microphone
 from sonic_bullet.records.coerce import as_call, as_flag, as_kind
 from sonic_bullet.records.contacts import Contacts, Step
-from sonic_bullet.records.errors import LogError
+from sonic_bullet.records.errors import LogError, SonicBulletError
 from sonic_bullet.render.silence import silence_notes, why_silent
 from sonic_bullet.render.synthesizer import LATENCY_STEPS, Synthesizer
 
@@ -28,6 +29,7 @@ __all__ = [
     "log_frames",
     "make_ready",
     "render_blocks",
+    "render_kept",
     "render_log",
     "silence_notes",
     "why_silent",
@@ -77,6 +79,30 @@ def render_blocks(
     residual = log.residual if residual is None else as_flag(residual, "residual")
     as_call(progress, "progress"), as_call(say, "say")
     return _blocks(log, residual, progress, say)
+
+
+def render_kept(
+    log: ContactLog,
+    *,
+    sr: int | None = None,
+    residual: bool | None = None,
+    progress: Callable[[float], None] | None = None,
+    say: Callable[[str], None] | None = None,
+) -> KeptSound:
+    """What `render_log` gives, beyond a few seconds in a nameless temporary file. Arguments: as `render_log` has them.
+
+    Raises what `render_log` does, and FileError where the disk is full; the exception, Ctrl-C too, carries what was
+    rendered so far as ``kept``.
+    """
+    spool = SoundSpool(len(log.sensors)) if isinstance(log, ContactLog) else SoundSpool(0)
+    try:
+        for block in render_blocks(log, sr=sr, residual=residual, progress=progress, say=say):
+            if spool.tail[0]:
+                spool.add(block)
+    except (SonicBulletError, KeyboardInterrupt) as error:
+        error.kept = spool.kept()  # type: ignore[union-attr]
+        raise
+    return spool.kept() if spool.tail[0] else KeptSound.of(block)
 
 
 def _blocks(

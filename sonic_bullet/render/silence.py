@@ -12,6 +12,8 @@ from collections.abc import Iterable
 import numpy as np
 
 from sonic_bullet.files.contact_log import ContactLog
+from sonic_bullet.files.levels import as_sound
+from sonic_bullet.files.rows.spool import KeptSound
 from sonic_bullet.records import Array, Body, Microphone, Vibrometer
 from sonic_bullet.records.contacts import Contacts
 from sonic_bullet.records.units import REFERENCE_PRESSURE_PA
@@ -27,14 +29,14 @@ SLIDES_M_S = 1e-3
 NAMED = 3
 
 
-def silence_notes(samples: Array, log: ContactLog) -> tuple[str, ...]:
+def silence_notes(samples: Array | KeptSound, log: ContactLog) -> tuple[str, ...]:
     """One note that says why (channels, n) samples are silent; none where they are not.
 
     Silent: no channel, none but zeros, or no pressure above the threshold of hearing, 20 µPa.
     """
     if not log.sensors:
         return (f"the render is silent: {why_silent(log)}",)
-    peaks = np.abs(samples).max(axis=1, initial=0.0)
+    peaks = as_sound(samples).peaks()
     least = np.array([REFERENCE_PRESSURE_PA if isinstance(sensor, Microphone) else 0.0 for sensor in log.sensors])
     if (peaks > least).any():
         return ()

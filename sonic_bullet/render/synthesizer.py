@@ -14,7 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from sonic_bullet.files.rows.spool import KeptSound, sound_spool
+from sonic_bullet.files.rows.spool import KeptSound, SoundSpool
 from sonic_bullet.records import Air, Array, Sensor
 from sonic_bullet.records.arrays import joined
 from sonic_bullet.records.contacts import CONTACT, Contacts, Step
@@ -205,7 +205,7 @@ class Synthesizer:
         """Begin anew at time 0, in silence, as one just made."""
         self._state = start(self._setup)
         self._clock = Clock()
-        self._sound = sound_spool(len(self._setup.sensors), "attach with keep_sound=False") if self._keep else None
+        self._sound = SoundSpool(len(self._setup.sensors), "attach with keep_sound=False") if self._keep else None
         self.unkept: FileError | None = None
         self._lag = np.zeros((len(self._setup.sensors), 0))
         self._last: Step | None = None
@@ -270,9 +270,8 @@ class Synthesizer:
             release(state)
         self._last = steps[-1]
         if self._sound is not None and self.unkept is None:
-            self._sound.append(np.ascontiguousarray(frame.T))
             try:
-                self._sound.spill()
+                self._sound.add(frame)
             except FileError as error:
                 self.unkept = error
         return frame

@@ -1,7 +1,7 @@
 """`attach`: a listener on a PyBullet client that turns each physics step into a frame of sound.
 
 listening: the `Listener` | wanted_bodies: what `add` was asked for, and its modes | arguments: what people give
-keeping: what is kept of a run
+keeping: what is kept of a run | scene_file: kinds of scene files, their code run
 """
 
 from __future__ import annotations

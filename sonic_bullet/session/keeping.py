@@ -15,7 +15,7 @@ from importlib import metadata
 import numpy as np
 
 from sonic_bullet.files.rows.log_steps import LogSteps, StepLog
-from sonic_bullet.files.rows.spool import KeptSound, sound_spool
+from sonic_bullet.files.rows.spool import SoundSpool
 from sonic_bullet.records import Array
 from sonic_bullet.records.contacts import Event, Step
 from sonic_bullet.records.errors import FileError, SceneError, SceneWarning
@@ -32,7 +32,7 @@ class KeptRun:
         self.notes: tuple[str, ...] = ()
         self._channels = channels
         self._log = StepLog("attach with keep_log=False") if keep_log else None
-        self._unread = sound_spool(channels, "call read() more often")
+        self._unread = SoundSpool(channels, "call read() more often")
         self._count = 0
         self._moved: frozenset[int] = frozenset()
         self._given_up: set[str] = set()
@@ -60,17 +60,16 @@ class KeptRun:
     def frame(self, frame: Array) -> None:
         """Keep a frame (channels, n) till it is read."""
         if "unread frames" not in self._given_up:
-            self._unread.append(np.ascontiguousarray(frame.T))
             try:
-                self._unread.spill()
+                self._unread.add(frame)
             except FileError as error:
                 self.give_up("unread frames", error)
 
     def read(self) -> Array:
         """(channels, n) all frames since the last time."""
-        unread, self._unread = self._unread, sound_spool(self._channels, self._unread.instead)
+        unread, self._unread = self._unread, SoundSpool(self._channels, self._unread.instead)
         self._given_up.discard("unread frames")
-        return KeptSound(unread, len(unread), np.zeros((self._channels, 0))).samples()
+        return unread.kept().samples()
 
     def steps(self) -> LogSteps:
         """The steps so far. Raises SceneError where none are kept."""

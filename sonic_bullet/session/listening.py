@@ -23,6 +23,7 @@ import numpy as np
 
 from sonic_bullet.files import AudioReport, check_sr, write_audio
 from sonic_bullet.files.contact_log import ContactLog
+from sonic_bullet.files.rows.spool import KeptSound
 from sonic_bullet.geometry import oversize
 from sonic_bullet.listener.world import World
 from sonic_bullet.live import AHEAD_S, FULL_SCALE_PA, Playback, start_playback
@@ -312,6 +313,10 @@ class Listener:
         """
         return self._synth.sound()
 
+    def kept_sound(self) -> KeptSound:
+        """What `sound` gives where it lies, for runs longer than the memory: `blocks` gives it in pieces."""
+        return self._synth.kept_sound()
+
     def write(self, path: str | Path, **options: Any) -> AudioReport:
         """Write the sound so far without the lag: float32 with 1.0 = 1 Pa, or scaled by ``peak_dbfs=`` or ``lufs=``
         (see `files.write_audio`).
@@ -325,7 +330,7 @@ class Listener:
             raise AudioError(
                 "there is no microphone, so there is no sound to write", "attach with microphone=(x, y, z)"
             )
-        return write_audio(place, self._synth.kept_sound(), self.sr, **options)
+        return write_audio(place, self.kept_sound(), self.sr, **options)
 
     def detach(self) -> None:
         """Stop listening and leave the client as it was; sound and log stay. Twice is once."""

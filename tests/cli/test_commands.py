@@ -26,6 +26,7 @@ import sonic_bullet.scene
 from sonic_bullet.cli import main
 from sonic_bullet.files import read_log, write_log
 from sonic_bullet.files.contact_log import ContactLog
+from sonic_bullet.files.rows.spool import KeptSound
 from sonic_bullet.modal import COARSER
 from sonic_bullet.records import Body, Microphone, ModalModel
 from sonic_bullet.records.contacts import Contacts, Step
@@ -85,14 +86,14 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
         kept.update(options, path=str(path))
         print("the scene prints")
         os.write(1, b"a C library prints\n")
-        return RenderResult(sound(sr=options["sr"]), log(), options["sr"], ("a note",))
+        return RenderResult(KeptSound.of(sound(sr=options["sr"])), log(), options["sr"], ("a note",))
 
-    def render_log(given: ContactLog, *, sr: int | None = None, progress: Any = None, say: Any = None) -> np.ndarray:
+    def render_kept(given: ContactLog, *, sr: int | None = None, progress: Any = None, say: Any = None) -> KeptSound:
         kept.update(log=given, sr=sr)
-        return sound(given.duration_s, sr or given.sr)
+        return KeptSound.of(sound(given.duration_s, sr or given.sr))
 
     monkeypatch.setattr(sonic_bullet.scene, "render_scene", render_scene)
-    monkeypatch.setattr(sonic_bullet.render, "render_log", render_log)
+    monkeypatch.setattr(sonic_bullet.render, "render_kept", render_kept)
     return kept
 
 
@@ -256,7 +257,7 @@ def test_peak_is_scaled(scene: Path, asked: dict[str, Any], options: list[str], 
 
 def test_clipping_is_reported(scene: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
     monkeypatch.setattr(
-        sonic_bullet.scene, "render_scene", lambda path, **options: RenderResult(sound() * 30, log(), SR)
+        sonic_bullet.scene, "render_scene", lambda path, **options: RenderResult(KeptSound.of(sound() * 30), log(), SR)
     )
     assert run("render", "scene.py", "-o", "a.flac", "--json", "a.json") == 0
     clipped = json.loads(Path("a.json").read_text())["clipped"]
@@ -275,7 +276,7 @@ def test_a_mesh_that_time_made_coarser_is_told(
     monkeypatch.setattr(
         sonic_bullet.scene,
         "render_scene",
-        lambda path, **options: RenderResult(sound(), replace(made, bodies=(body, made.bodies[1])), SR),
+        lambda path, **options: RenderResult(KeptSound.of(sound()), replace(made, bodies=(body, made.bodies[1])), SR),
     )
     assert run("render", "scene.py", "-o", "a.wav") == 0
     assert f"the mesh of cup is {COARSER}" in capfd.readouterr().err
@@ -354,7 +355,7 @@ def test_what_was_rendered_before_an_error_is_a_valid_named_file(
     level: list[str],
 ) -> None:
     def render_scene(path: object, **options: Any) -> RenderResult:
-        error.partial = RenderResult(sound(0.25), log(), SR)  # type: ignore[attr-defined]
+        error.partial = RenderResult(KeptSound.of(sound(0.25)), log(), SR)  # type: ignore[attr-defined]
         raise error
 
     monkeypatch.setattr(sonic_bullet.scene, "render_scene", render_scene)
@@ -376,7 +377,7 @@ def test_an_error_is_said_where_what_was_rendered_before_it_cannot_be_kept_eithe
 ) -> None:
     def render_scene(path: object, **options: Any) -> RenderResult:
         error = SceneError("body 3 has mass nan", "mend it")
-        error.partial = RenderResult(sound(0.25), log(), SR)  # type: ignore[attr-defined]
+        error.partial = RenderResult(KeptSound.of(sound(0.25)), log(), SR)  # type: ignore[attr-defined]
         raise error
 
     monkeypatch.setattr(sonic_bullet.scene, "render_scene", render_scene)
@@ -386,7 +387,7 @@ def test_an_error_is_said_where_what_was_rendered_before_it_cannot_be_kept_eithe
     )
 
 
-@pytest.mark.parametrize("partial", [None, RenderResult(np.zeros((1, 0)), log(), SR)])
+@pytest.mark.parametrize("partial", [None, RenderResult(KeptSound.of(np.zeros((1, 0))), log(), SR)])
 def test_an_error_before_any_sound_leaves_nothing(
     scene: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], partial: RenderResult | None
 ) -> None:
@@ -443,7 +444,7 @@ def test_a_terminal_is_told_which_body_is_analysed_and_a_pipe_nothing(
 
     def render_scene(path: object, **options: Any) -> RenderResult:
         options["say"]("modes of cup (body 3): assembling")
-        return RenderResult(sound(), log(), SR)
+        return RenderResult(KeptSound.of(sound()), log(), SR)
 
     monkeypatch.setattr(sonic_bullet.scene, "render_scene", render_scene)
     monkeypatch.setenv("TERM", "xterm")

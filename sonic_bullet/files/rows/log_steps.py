@@ -199,10 +199,10 @@ class StepLog:
             return
         steps, poses, contacts = self._tables
         poses_before, contacts_before = len(poses), len(contacts)
-        bodies, rows = np.array([(len(one.body), len(one.contacts)) for one in fresh], np.int64).T
+        bodies, rows = np.array([(len(one.body), len(one.contacts.row)) for one in fresh], np.int64).T
         step, pose = np.zeros(len(fresh), STEP), np.zeros(int(bodies.sum()), POSE)
         step["dt_s"] = [one.dt_s for one in fresh]
-        step["gravity_m_s2"] = [one.gravity_m_s2 for one in fresh]
+        step["gravity_m_s2"] = joined([one.gravity_m_s2 for one in fresh], float, (3,))
         step["pose_end"] = poses_before + np.cumsum(bodies)
         step["contact_end"] = contacts_before + np.cumsum(rows)
         for name in ("body", "teleported", "position_m", "quaternion_xyzw"):

@@ -31,7 +31,7 @@ class Spool:
     """Rows of one dtype and shape, appended in order and read back by [start:stop], read-only.
 
     dtype, tail: of a row. what: the thing, in words, for the message of a full disk ("contact log"); instead: what its
-    user can do without a larger disk ("attach with keep_log=False").
+    user can do without a larger disk ("attach with keep_log=False"). memory_bytes: what is held in memory.
     """
 
     def __init__(
@@ -41,11 +41,11 @@ class Spool:
         *,
         what: str,
         instead: str = "",
-        memory_bytes: int = MEMORY_BYTES,
+        memory_bytes: int | None = None,
     ) -> None:
         self.dtype, self.tail, self.what, self.instead = np.dtype(dtype), tail, what, instead
         self.row_bytes = self.dtype.itemsize * int(np.prod(tail))
-        self._memory_bytes = memory_bytes
+        self._memory_bytes = MEMORY_BYTES if memory_bytes is None else memory_bytes
         self._memory = bytearray()
         self._file: IO[bytes] | None = None
         self._fresh: list[Array] = []
@@ -148,20 +148,36 @@ def read_at(fd: int, count: int, at: int, what: object) -> bytes:
     return parts[0] if len(parts) == 1 else b"".join(parts)
 
 
+class SoundSpool(Spool):
+    """Frames of so many channels, float64; `Spool` says the rest."""
+
+    def __init__(self, channels: int, instead: str = "") -> None:
+        super().__init__(float, (channels,), what="sound", instead=instead)
+
+    def add(self, block: Array) -> None:
+        """Take in (channels, n). Raises FileError where the disk takes no more; it can be read all the same."""
+        self.append(np.ascontiguousarray(block.T))
+        self.spill()
+
+    def kept(self) -> KeptSound:
+        """What is in it by now."""
+        return KeptSound(self, len(self), np.zeros((*self.tail, 0)))
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class KeptSound:
     """Sound as long as it likes: (channels, n) float64, the first ``count`` frames in a spool of rows (channels,), the
     ``rest`` (channels, ·) in memory. What is appended to the spool later is not of it.
     """
 
-    spool: Spool
+    spool: SoundSpool
     count: int
     rest: Array
 
     @classmethod
     def of(cls, samples: Array) -> KeptSound:
         """Samples (channels, n) that are in memory anyway."""
-        return cls(sound_spool(len(samples)), 0, samples)
+        return cls(SoundSpool(len(samples)), 0, samples)
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -196,8 +212,3 @@ class KeptSound:
         for block in self.blocks():
             peak = np.maximum(peak, np.abs(block).max(axis=1))
         return peak
-
-
-def sound_spool(channels: int, instead: str = "") -> Spool:
-    """A spool of frames (channels,) of float64."""
-    return Spool(float, (channels,), what="sound", instead=instead)

@@ -1,0 +1,54 @@
+"""A scene's file: of which kind it is, and its own code run, so that what breaks there is one line that names the line."""
+
+from __future__ import annotations
+
+import ast
+import importlib.util
+import traceback
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from sonic_bullet.records.errors import SceneError, SonicBulletError, interrupts
+
+
+def defines_build(path: Path) -> bool:
+    """Whether it has a function `build` at its top. Raises SceneError where it is no Python."""
+    try:
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+    except (SyntaxError, ValueError) as error:
+        raise SceneError(f"scene '{path.name}' is not Python: {error}", "mend the file") from None
+    return any(isinstance(node, ast.FunctionDef) and node.name == "build" for node in tree.body)
+
+
+def uses_sonic_bullet(path: Path) -> bool:
+    """Whether it imports this package, and so may have a listener of its own."""
+    return any(
+        (isinstance(node, ast.Import) and any(name.name.split(".")[0] == "sonic_bullet" for name in node.names))
+        or (isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == "sonic_bullet")
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+    )
+
+
+def user_code(path: Path, call: Callable[..., Any], *arguments: Any) -> Any:
+    """Call the scene's own code; its exceptions become one line that names the line they came from."""
+    try:
+        with interrupts():
+            return call(*arguments)
+    except (SonicBulletError, KeyboardInterrupt):
+        raise
+    except BaseException as error:
+        lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if Path(frame.filename) == path]
+        where = f" line {lines[-1]}" if lines else ""
+        raise SceneError(f"scene '{path.name}'{where}: {type(error).__name__}: {error}", "mend the scene") from error
+
+
+def scene_module(path: Path) -> ModuleType:
+    """The file as a module, run. Raises SceneError naming the line where it breaks."""
+    spec = importlib.util.spec_from_file_location(f"sonic_bullet_scene_{path.stem}", path)
+    if spec is None or spec.loader is None:
+        raise SceneError(f"'{path}' is not a Python file", "give a scene whose name ends in .py")
+    module = importlib.util.module_from_spec(spec)
+    user_code(path, spec.loader.exec_module, module)
+    return module
