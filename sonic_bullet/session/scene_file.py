@@ -1,4 +1,4 @@
-"""A scene's file: of which kind it is, and its own code run, so that what breaks there is one line that names the line."""
+"""A scene's file: of which kind it is, and its own code run: what breaks there is one line that names the place."""
 
 from __future__ import annotations
 
