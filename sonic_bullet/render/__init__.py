@@ -2,8 +2,8 @@
 
 silence: why there is none | presence: who is there, who has gone | resonator: a body as it is played
 tables, body_table: what the compiled stages work on | contact_rows, contact_place: contacts | strike_pulses: strikes
-friction: rolling and sliding | driver: the stages in one call | step_events: what happened in a step
-residual_voice: residuals | synthesis_state: all that goes on | synthesizer: all together
+friction: rolling and sliding | driver: the stages in one call | residual_voice: residuals, what happened in a step
+synthesis_state: all that goes on | presence: who is there, comes and goes | synthesizer: all together
 """
 
 from __future__ import annotations

@@ -63,11 +63,11 @@ def in_tables(state: State, contacts: Array, poses: tuple[Array, ...]) -> tuple[
     if state.present is not state.body:
         at, window, last = np.searchsorted(state.body, state.present), state.window, (state.taken - 1) % SPAN
         before = window.position_m[last], window.quaternion_xyzw[last], np.zeros(len(state.body), bool)
-        poses = tuple(_put(old, here, at) for old, here in zip(before, poses, strict=True))
+        poses = tuple(_filled(old, here, at) for old, here in zip(before, poses, strict=True))
     return contacts, poses
 
 
-def _put(old: Array, here: Array, at: Array) -> Array:
+def _filled(old: Array, here: Array, at: Array) -> Array:
     """(s, b, ·): old (b, ·) for each step, with here (s, p, ·) at the places (p,)."""
     whole = np.repeat(old[None], len(here), axis=0)
     whole[:, at] = here

@@ -22,8 +22,7 @@ from sonic_bullet.records.errors import AudioError, FileError
 from sonic_bullet.render import driver
 from sonic_bullet.render.first_run import make_driver
 from sonic_bullet.render.presence import Records, admit, in_tables, release
-from sonic_bullet.render.residual_voice import friction_grains, impact_grains
-from sonic_bullet.render.step_events import drives_of, pulses_of
+from sonic_bullet.render.residual_voice import drives_of, friction_grains, impact_grains, pulses_of
 from sonic_bullet.render.synthesis_state import Setup, State, quench, start
 from sonic_bullet.residual.player import add_grains
 from sonic_bullet.synth import path, path_places

@@ -93,5 +93,5 @@ def test_without_a_log_nothing_of_the_gone_stays(client: Any, hooked: bool) -> N
     assert grown < 150_000, "500 bytes a body: 5 MB are 10,000"
     assert len(passing.world.bodies) <= 2
     assert set(passing.world.records) <= {1, 350}
-    assert len(passing.world._added.told) <= 1
+    assert len(passing.world._added.by_code) <= 1
     assert np.array_equal(passing.last.body, [1, 350])  # type: ignore[union-attr]

@@ -30,7 +30,6 @@ from sonic_bullet.listener.polling import Touches, loaded
 from sonic_bullet.listener.properties import Properties
 from sonic_bullet.listener.pybullet import body_facts as facts
 from sonic_bullet.listener.pybullet import hooks
-from sonic_bullet.listener.pybullet.added_links import AddedLinks, added_body
 from sonic_bullet.listener.pybullet.census import Census
 from sonic_bullet.listener.pybullet.left_out import BodiesLeftOut
 from sonic_bullet.listener.pybullet.poses import check_connected, undone
@@ -62,7 +61,7 @@ class PyBulletWorld(facts.AskedLinks):
         self.epoch = self.step_count = 0
         self.stepped = False
         self._known = KnownBodies()
-        self._added = AddedLinks(self.client_id)
+        self._added = facts.AddedLinks(self.client_id)
         self.properties = Properties(partial(facts.dynamics, self.client_id), partial(engine, self.client_id))
         self._memory = Memory()
         self._census = Census(self.client_id, self._bury, self._end)
@@ -161,7 +160,7 @@ class PyBulletWorld(facts.AskedLinks):
         self._census.read()
         how: dict[str, Any] = {"material": material, "model": model, "volume_m3": volume_m3, "shapes": tuple(shapes)}
         how["options"] = options
-        record = replace(added_body(self.client_id, body, link, self.epoch, **how), since_step=self.step_count)
+        record = replace(facts.added_body(self.client_id, body, link, self.epoch, **how), since_step=self.step_count)
         self._close([code])
         record = self._append(code, record)
         self._added.tell(code, how, record)
@@ -179,9 +178,9 @@ class PyBulletWorld(facts.AskedLinks):
         added, before = self._added, self.properties
         self._begin()
         self.properties.set_values = before.set_values
-        self._added.links = added.still_there(self._past.roster, seen=self._uninstall is not None)
-        before.names.hand_over(self._added.links, self.properties.names)
-        for code, one in self._added.links.items():
+        self._added.by_code = added.still_there(self._past.roster, seen=self._uninstall is not None)
+        before.names.hand_over(self._added.by_code, self.properties.names)
+        for code, one in self._added.by_code.items():
             self._append(code, added.again(code, one, before.set_values.of(*decode(code))))
 
     def forget(self, body: int | None = None) -> None:
