@@ -59,6 +59,7 @@ STEP = {
     "teleported": [False, False],
     "contacts": sb.Contacts.none(),
     "gravity_m_s2": [0, 0, -9.8],
+    "body": [0, 1],
 }
 MATERIAL = {
     "name": "m",
@@ -186,11 +187,22 @@ DOORS: dict[str, Callable[[Any, Path], Made]] = {
     "ContactLog.impulse_on": of_log("impulse_on"),
     "ContactLog.rows_on": of_log("rows_on"),
     "ContactLog.settings": lambda *_: (sb.ContactLog(**LOG).settings, {"step": 0}),
-    "ContactLog.save": lambda _, folder: (sb.ContactLog(**LOG).save, {"path": folder / "a.npz"}),
+    "ContactLog.save": lambda _, folder: (
+        sb.ContactLog(**LOG).save,
+        {"path": folder / "a.npz", "models": "included"},
+    ),
     "Contacts": lambda *_: (sb.Contacts, ROW),
     "Listener": lambda client, _: (
         sb.Listener,
-        {"client": client, "sr": 48_000, "sensors": (), "seed": 0, "air": sb.Air()},
+        {
+            "client": client,
+            "sr": 48_000,
+            "sensors": (),
+            "seed": 0,
+            "air": sb.Air(),
+            "keep_log": True,
+            "keep_sound": True,
+        },
     ),
     "Listener.add": adding,
     "Listener.add_all": adding_all,
@@ -208,7 +220,15 @@ DOORS: dict[str, Callable[[Any, Path], Made]] = {
     "Vibrometer": lambda *_: (sb.Vibrometer, {"body_id": 0, "point_m": [0, 0, 0], "direction": [0, 0, 1], "link": -1}),
     "attach": lambda client, _: (
         sb.attach,
-        {"client": client, "sr": 48_000, "microphone": (0, 0, 1), "seed": 0, "air": None},
+        {
+            "client": client,
+            "sr": 48_000,
+            "microphone": (0, 0, 1),
+            "seed": 0,
+            "air": None,
+            "keep_log": True,
+            "keep_sound": True,
+        },
     ),
     "keep_restitution": lambda client, _: (sb.keep_restitution, {"client": client}),
     "load_material": lambda *_: (sb.load_material, {"name": "steel"}),
@@ -265,7 +285,7 @@ BAD: dict[str, dict[str, list[Any]]] = {
     "ContactLog.impulse_on": {"body": WHOLE, "link": [*OPTIONAL, 1.5]},
     "ContactLog.rows_on": {"body": WHOLE, "link": [*OPTIONAL, 1.5]},
     "ContactLog.settings": {"step": [*WHOLE, -1]},
-    "ContactLog.save": {"path": PATH},
+    "ContactLog.save": {"path": PATH, "models": ["x", None, 5, object(), b"reference"]},
     "Contacts": {name: [*ARRAY, 5, [0, 1, 2, 3]] for name in ROW}
     | {"a": ["x", object(), {}, 1j, None, 5, [0.5], [2**40], [math.nan]]},
     "Listener": {
@@ -274,6 +294,8 @@ BAD: dict[str, dict[str, list[Any]]] = {
         "sensors": ["x", 5, [3], None, object()],
         "seed": [*WHOLE, -1],
         "air": [*RECORD, None],
+        "keep_log": FLAG,
+        "keep_sound": FLAG,
     },
     "Listener.add": {
         "body": [*WHOLE, -5, 10**12],
@@ -353,6 +375,7 @@ BAD: dict[str, dict[str, list[Any]]] = {
         "teleported": ["x", object(), {}, 1j, [[1], [2, 3]], ["a", "b"], 5],
         "contacts": [*RECORD, None],
         "gravity_m_s2": [*ARRAY, 5],
+        "body": [*[value for value in ARRAY if value is not None], 5, [1, 0], [-1, 0], [0, 0], [0.5, 1]],
     },
     "Vibrometer": {
         "body_id": WHOLE,
@@ -379,6 +402,8 @@ BAD: dict[str, dict[str, list[Any]]] = {
         ],
         "seed": [*WHOLE, -1, 10**30],
         "air": RECORD,
+        "keep_log": FLAG,
+        "keep_sound": FLAG,
     },
     "keep_restitution": {"client": CLIENT},
     "load_material": {"name": [None, 5, b"steel", object(), ["steel"]]},
