@@ -17,7 +17,7 @@ import numpy as np
 
 from sonic_bullet.records.arrays import Array
 
-BITS = 11  # B; 10 would do for all scenes but two
+BITS = 11  # B; 10 would do for three of the six scenes
 MOST_BITS = 15  # of whole numbers in a file, int16 with its sign
 TINIEST = -126  # exponent of the smallest normal float32
 
