@@ -14,6 +14,7 @@ from collections.abc import Callable
 import numpy as np
 
 from benchmarks.fuzzing.mutations import changed, flipped, json_changed, overwritten
+from sonic_bullet.files.models import PACKED
 from sonic_bullet.records import Array
 
 Entries = list[tuple[str, bytes]]
@@ -46,11 +47,13 @@ def taken_apart(path: str | io.BytesIO) -> Entries:
 
 
 def put_together(entries: Entries) -> bytes:
-    """A stored zip as the project writes it."""
+    """A zip as the project writes it: arrays of models are deflated, all else is stored."""
     stream = io.BytesIO()
     with zipfile.ZipFile(stream, "w", zipfile.ZIP_STORED) as archive:
         for name, content in entries:
-            with archive.open(zipfile.ZipInfo(name), "w", force_zip64=True) as entry:
+            info = zipfile.ZipInfo(name)
+            info.compress_type = zipfile.ZIP_DEFLATED if name.startswith(PACKED) else zipfile.ZIP_STORED
+            with archive.open(info, "w", force_zip64=True) as entry:
                 entry.write(content)
     return stream.getvalue()
 

@@ -29,6 +29,7 @@ from sonic_bullet.geometry import is_closed, volume_m3
 from sonic_bullet.radiation import radiated
 from sonic_bullet.records import Air, Body, Material, Microphone, ModalModel, ModalSum, Residual, Vibrometer
 from sonic_bullet.records.contacts import Contacts, Event, Step
+from sonic_bullet.records.mode_shapes import rounded
 from sonic_bullet.render import render_log
 
 SR = 8000
@@ -60,7 +61,7 @@ def box_model(modes: int = 3) -> ModalModel:
     quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
     face = np.array([t for q in quads for t in ((q[0], q[1], q[2]), (q[0], q[2], q[3]))])
     freq = np.array([900.0, 2100.0, 3900.0])[:modes]
-    shape = np.random.default_rng(0).normal(size=(8, 3, modes))
+    shape = rounded(np.random.default_rng(0).normal(size=(8, 3, modes)))
     return ModalModel(
         freq,
         5 + 1e-6 * freq**2,

@@ -19,8 +19,9 @@ their own:
           _curvature_per_m (f,) f8
       model<i>_bend_s2_m2, _choke_s_m (m,) f8  only where its modes go with their level
           all arrays of models: deflated, as planes (n, …) u1 of numbers of n bytes: all first bytes, all second ones, …
-      model<i>_shape i2, model<i>_shape_exponent (m,) i2
-          in place of _shape f4, where shapes are whole multiples of powers of two, as those that are solved here are
+      model<i>_shape u2, model<i>_shape_exponent (m,) i2
+          in place of _shape f4, where shapes are whole multiples of powers of two, as those that are solved here are:
+          `differences` of those numbers, and the powers (records/mode_shapes.py)
       models (in the header)
           what is no array of each; or its SHA-256, where it lies in the cache
       events (in the header)

@@ -4,7 +4,7 @@ format "sonic-bullet-model/2"           one model: model0_<array> as `logs` desc
 format "sonic-bullet-model/1"           its arrays are not deflated, and of their own types
 
     array (…) of n bytes each -> planes (n, …) u1: all first bytes, all second ones … -> deflated
-    shape (v, 3, m) f4 = q·2^e -> q i2 in planes, e (m,) i2                   else, as it is, in planes
+    shape (v, 3, m) f4 = q·2^e -> differences of q u2 in planes, e (m,) i2;   else, as it is, in planes
         [`records.mode_shapes`]
 
 Bytes of one kind side by side deflate to less. A model by reference is one file in the cache, model-<sha256>.npz.
@@ -29,7 +29,7 @@ from sonic_bullet.machine.kept_files import LIMIT, touch
 from sonic_bullet.records import Array, ModalModel
 from sonic_bullet.records.coerce import nearest, shown
 from sonic_bullet.records.errors import FileError, LogError, excerpt
-from sonic_bullet.records.mode_shapes import from_multiples, whole_multiples
+from sonic_bullet.records.mode_shapes import differences, from_multiples, summed, whole_multiples
 
 MODEL_FORMATS = ("sonic-bullet-model/2", "sonic-bullet-model/1")
 """What is read; the first is what is written."""
@@ -212,7 +212,7 @@ def _packed_arrays(model: ModalModel, index: int) -> dict[str, Array]:
     arrays = _arrays(model)
     exact = whole_multiples(model.shape)
     if exact is not None:
-        arrays |= {"shape": exact[0], "shape_exponent": exact[1]}
+        arrays |= {"shape": differences(exact[0], model.face), "shape_exponent": exact[1]}
     return {f"model{index}_{name}": _planes(array) for name, array in arrays.items()}
 
 
@@ -235,12 +235,14 @@ def _taken(arrays: Mapping[str, Array], name: str, dtype: Any, shape: tuple[int 
 def _unpack_model(header: ModelEntry, arrays: Mapping[str, Array], index: int, path: object) -> ModalModel:
     """The model that these were made of. Raises LogError, RecordError."""
     exact = f"model{index}_shape_exponent" in arrays
-    kinds = MODEL_ARRAYS | ({"shape": (np.int16, MODEL_ARRAYS["shape"][1])} if exact else {})
+    kinds = MODEL_ARRAYS | ({"shape": (np.uint16, MODEL_ARRAYS["shape"][1])} if exact else {})
     parts = {name: _taken(arrays, f"model{index}_{name}", dtype, shape, path) for name, (dtype, shape) in kinds.items()}
     if exact:
-        m = parts["shape"].shape[2]
-        exponent = _taken(arrays, f"model{index}_shape_exponent", np.int16, (m,), path)
-        parts["shape"] = from_multiples(parts["shape"], exponent)
+        step, face = parts["shape"], parts["face"]
+        exponent = _taken(arrays, f"model{index}_shape_exponent", np.int16, (step.shape[2],), path)
+        if face.min(initial=0) < 0 or face.max(initial=-1) >= len(step):
+            raise LogError(f"{path}: faces point at missing vertices", REMEDY)
+        parts["shape"] = from_multiples(summed(step, face), exponent)
     parts |= {
         field: _taken(arrays, f"model{index}_{name}", float, (None,), path)
         for name, field in BENT_ARRAYS.items()

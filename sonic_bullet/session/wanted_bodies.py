@@ -27,6 +27,7 @@ from sonic_bullet.records import Air, Material, ModalModel, Shape
 from sonic_bullet.records.coerce import as_kind, as_number, shown
 from sonic_bullet.records.errors import MeshError, ModalError, SceneError, SonicBulletError
 from sonic_bullet.records.modal_options import ModalOptions
+from sonic_bullet.records.mode_shapes import rounded
 from sonic_bullet.render import make_ready
 from sonic_bullet.session.arguments import as_material, as_name, as_shapes
 
@@ -156,7 +157,9 @@ def _analysed(shapes: tuple[Shape, ...], one: WantedBody, say: Say) -> ModalMode
     from sonic_bullet import modal
     from sonic_bullet.effects.presets_of_effects import with_modes
 
-    return with_modes(modal.analyse(shapes, one.material, **asdict(one.options), progress=say), one.material)
+    solved = modal.analyse(shapes, one.material, **asdict(one.options), progress=say)
+    made = with_modes(solved, one.material)
+    return made if made is solved else replace(made, shape=rounded(made.shape))  # effects turn shapes
 
 
 def _shared(model: ModalModel, known: Iterable[ModalModel]) -> ModalModel:

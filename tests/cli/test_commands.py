@@ -290,6 +290,17 @@ def test_a_log_renders_again_with_its_own_rate_and_seed(scene: Path, asked: dict
     assert Path("a.npz").read_bytes() == Path("b.npz").read_bytes()
 
 
+def test_a_log_may_leave_its_models_to_the_cache(
+    scene: Path, asked: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("SONIC_BULLET_CACHE", str(scene.parent / "kept"))
+    write_log("a.npz", log())
+    assert run("render", "a.npz", "-o", "a.wav", "--contacts", "b.npz", "--models", "reference") == 0
+    assert len(list((scene.parent / "kept").glob("model-*.npz"))) == 1
+    assert run("render", "b.npz", "-o", "b.wav", "--contacts", "c.npz") == 0
+    assert Path("a.npz").read_bytes() == Path("c.npz").read_bytes()
+
+
 def test_a_log_with_wishes(scene: Path, asked: dict[str, Any]) -> None:
     write_log("a.npz", log())
     assert (
@@ -323,6 +334,8 @@ def test_a_log_with_wishes(scene: Path, asked: dict[str, Any]) -> None:
         (["scene.py", "-o", "a.wav", "--microphone", "1,2,nan"], "X,Y,Z"),
         (["scene.py", "-o", "a.wav", "--seed", "-1"], "--seed"),
         (["scene.py", "-o", "a.wav", "--contacts", "a.txt"], ".npz"),
+        (["scene.py", "-o", "a.wav", "--models", "reference"], "give --contacts too"),
+        (["scene.py", "-o", "a.wav", "--contacts", "a.npz", "--models", "away"], "'included', 'reference'"),
         (["scene.py", "-o", "a.wav", "--picture", "a.wav"], "picture format"),
         (["scene.py", "-o", "a.wav", "--json=./a.wav"], "one name"),
         (["scene.py", "-o", "a.wav", "--colour"], "--colour"),
@@ -470,7 +483,15 @@ def sonic_bullet_process(*words: str, **options: Any) -> subprocess.CompletedPro
 
 
 @pytest.mark.parametrize(
-    "words", [["--help"], ["render", "--help"], ["modes", "-h"], ["doctor", "--help"], ["materials", "--help"]]
+    "words",
+    [
+        ["--help"],
+        ["render", "--help"],
+        ["modes", "-h"],
+        ["doctor", "--help"],
+        ["materials", "--help"],
+        ["cache", "--help"],
+    ],
 )
 def test_help_teaches_by_example(words: list[str]) -> None:
     done = sonic_bullet_process(*words)

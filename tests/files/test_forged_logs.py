@@ -312,6 +312,20 @@ def test_planes_that_are_none_are_refused_by_name(tmp_path: Path, entry: str, va
         files.read_log(forged(tmp_path, **{entry: value}))
 
 
+@pytest.mark.parametrize("index", [-1, 4, 2**31 - 1])
+def test_faces_of_vertices_that_are_not_there_are_refused_before_shapes_are_added_up(
+    tmp_path: Path, index: int
+) -> None:
+    made = replace(model(), shape=np.ones((4, 3, 3)))
+    files.write_model(tmp_path / "m.npz", made)
+    with np.load(tmp_path / "m.npz") as plain:
+        entries = dict(plain.items())
+    face = np.full((1, 2, 3), index, np.int32).view(np.uint8).reshape(2, 3, 4)
+    np.savez(tmp_path / "bad.npz", **(entries | {"model0_face": np.moveaxis(face, -1, 0)}))
+    with pytest.raises(LogError, match=r"bad\.npz: faces point at missing vertices"):
+        files.read_model(tmp_path / "bad.npz")
+
+
 @pytest.mark.parametrize("name", ["../../etc/passwd", "a" * 63, "g" * 64, "a" * 64 + "\\n", ""])
 def test_a_reference_that_is_no_digest_is_refused(tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SONIC_BULLET_CACHE", str(tmp_path / "cache"))

@@ -14,6 +14,7 @@ from sonic_bullet.modal import analyse, eigen, fem
 from sonic_bullet.modal.meshing import structured
 from sonic_bullet.records import Material, Shape, isotropic_stiffness_pa
 from sonic_bullet.records.errors import MeshError, ModalError
+from sonic_bullet.records.mode_shapes import BITS, whole_multiples
 
 BAR = Shape("box", [0.2, 0.02, 0.02])
 
@@ -160,3 +161,10 @@ def test_cache_gives_the_same_bits_and_survives_damage(
 def test_bad_requests_are_named(steel: Material, bad: dict[str, object]) -> None:
     with pytest.raises(ModalError):
         quick(BAR, steel, **bad)
+
+
+def test_shapes_are_rounded_when_they_are_solved_and_the_same_from_the_cache(tmp_path: Path, steel: Material) -> None:
+    made = [quick(BAR, steel, cache=tmp_path) for _ in range(2)]
+    assert made[0].shape.tobytes() == made[1].shape.tobytes()
+    found = whole_multiples(made[0].shape)
+    assert found is not None and np.abs(found[0]).max() <= 2**BITS

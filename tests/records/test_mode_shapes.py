@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sonic_bullet.records.mode_shapes import BITS, from_multiples, rounded, whole_multiples
+from sonic_bullet.records.mode_shapes import BITS, differences, from_multiples, rounded, summed, whole_multiples
 
 
 def shapes(seed: int = 0, v: int = 50, m: int = 6) -> np.ndarray:
@@ -67,3 +67,26 @@ def test_tiny_shapes_are_rounded_to_what_float32_holds_whole() -> None:
     made = rounded(np.array([[[3e-38], [1e-40], [2e-38]]], np.float32))
     assert np.isfinite(made).all() and (found := whole_multiples(made)) is not None
     assert from_multiples(*found).tobytes() == made.tobytes()
+
+
+CHAIN = np.stack([np.arange(198), np.arange(1, 199), np.arange(2, 200)], axis=1)
+
+
+@pytest.mark.parametrize(
+    "face",
+    [CHAIN, CHAIN[::-1, ::-1], 199 - CHAIN, np.random.default_rng(1).integers(0, 200, (90, 3)), np.zeros((0, 3), int)],
+)
+def test_differences_along_the_surface_add_up_again_also_where_they_overflow(face: np.ndarray) -> None:
+    whole = np.random.default_rng(0).integers(-(2**15), 2**15, (200, 3, 4)).astype(np.int16)
+    step = differences(whole, face)
+    assert step.dtype == np.uint16 and summed(step, face).tobytes() == whole.tobytes()
+    even = differences(np.full_like(whole, -7), CHAIN)
+    assert (even[1:] == 0).all() and (even[0] == 13).all()
+
+
+def test_smooth_shapes_have_small_differences() -> None:
+    """Over a strip of 200 vertices a half wave of 2047 changes by 2047 π/200 from one to the next, and twice that to
+    the one behind it."""
+    wave = np.rint(2047 * np.sin(np.pi * np.arange(200) / 200)).astype(np.int16)
+    step = differences(np.repeat(wave[:, None, None], 3, axis=1), CHAIN)
+    assert step.max() <= 2 * (2 * 2047 * np.pi / 200 + 1)
