@@ -56,13 +56,11 @@ def find_events(log: ContactLog) -> Events:
     """Strikes and lasting contacts of every body that sounds (those with a model), by the rules of the
     module's head.
     """
-    rows, step, start_s = log.rows, log.step, np.append(log.start_s, log.duration_s)
-    low, high = np.minimum(rows.a, rows.b), np.maximum(rows.a, rows.b)
-    pair, index = np.unique(np.stack([low, high], 1), axis=0, return_inverse=True)
+    step, start_s = log.step, np.append(log.start_s, log.duration_s)
+    touching, normal_n_s, slip, sweep = _loads(log)
+    pair, index = np.unique(touching, axis=0, return_inverse=True)
     strikes: list[tuple[int, float, float]] = []
     bars: list[tuple[int, float, float, str]] = []
-    normal_n_s = np.abs(np.einsum("ki,ki->k", rows.impulse_n_s, rows.normal))
-    slip, sweep = np.linalg.norm(rows.slip_m_s, axis=1), rows.sweep_m_s.max(1, initial=0)
     for number, (a, b) in enumerate(pair):
         mine = np.flatnonzero(index.ravel() == number)
         steps, at = np.unique(step[mine], return_inverse=True)
@@ -97,6 +95,20 @@ def find_events(log: ContactLog) -> Events:
         np.array([r[1:3] for r in bars], float).reshape(-1, 2),
         tuple(r[3] for r in bars),
     )
+
+
+def _loads(log: ContactLog) -> tuple[Array, Array, Array, Array]:
+    """(k, 2) bodies that touch, the lower index first, (k,) normal impulse in N·s, slip and sweep in m/s of all rows: a
+    fifth of what the rows themselves take, made block by block.
+    """
+    pair, normal_n_s = [np.zeros((0, 2), np.int32)], [np.zeros(0)]
+    slip, sweep = [np.zeros(0)], [np.zeros(0)]
+    for row in (block.contact for block in log.blocks()):
+        pair.append(np.sort(np.stack([row["a"], row["b"]], 1), axis=1))
+        normal_n_s.append(np.abs(np.einsum("ki,ki->k", row["impulse_n_s"], row["normal"])))
+        slip.append(np.linalg.norm(row["slip_m_s"], axis=1))
+        sweep.append(row["sweep_m_s"].max(1, initial=0))
+    return np.concatenate(pair), np.concatenate(normal_n_s), np.concatenate(slip), np.concatenate(sweep)
 
 
 def spectrogram_db(samples: Array | KeptSound, sr: int) -> tuple[Array, Array, Array]:

@@ -124,7 +124,7 @@ def _at_rest(log: ContactLog, rows: Contacts, mine: Array) -> str | None:
     slid or rolled.
     """
     step = log.step[mine]
-    fall = np.array([one.gravity_m_s2 * one.dt_s for one in log.steps])[step]
+    fall = np.concatenate([block.step["gravity_m_s2"] * block.step["dt_s"][:, None] for block in log.blocks()])[step]
     # as synth.strikes has it
     settling = SPAN * (
         1.1 * np.abs(np.einsum("ki,ki->k", fall, rows.normal[mine])) + 0.01 * np.linalg.norm(fall, axis=1)

@@ -24,7 +24,7 @@ import soundfile
 import sonic_bullet.render
 import sonic_bullet.scene
 from sonic_bullet.cli import main
-from sonic_bullet.files import read_log, write_log
+from sonic_bullet.files import read_audio, read_log, write_log
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.rows.spool import KeptSound
 from sonic_bullet.modal import COARSER
@@ -383,6 +383,21 @@ def test_what_was_rendered_before_an_error_is_a_valid_named_file(
     assert soundfile.info("a.partial.wav").frames == SR // 4
     assert Path("a.wav").read_bytes() == b"old"
     assert not Path("a.npz").exists()
+
+
+def test_what_a_replay_rendered_before_an_interrupt_is_a_valid_named_file(
+    scene: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    def render_blocks(*_: Any, **options: Any) -> Iterator[np.ndarray]:
+        yield sound(0.25)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(sonic_bullet.render, "render_blocks", render_blocks)
+    write_log("a.npz", log())
+    assert run("render", "a.npz", "-o", "a.wav") == 130
+    assert "the first 0.250 s are in a.partial.wav" in capfd.readouterr().err
+    assert (read_audio("a.partial.wav")[0] == sound(0.25).astype(np.float32)).all()
+    assert not Path("a.wav").exists()
 
 
 def test_an_error_is_said_where_what_was_rendered_before_it_cannot_be_kept_either(

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from sonic_bullet.files.contact_log import ContactLog
+from sonic_bullet.files.rows import spool
 from sonic_bullet.plots import scene_plot
 from sonic_bullet.records import Body, Material, Microphone, ModalModel, ModalSum, Vibrometer
 from sonic_bullet.records.contacts import Contacts, Step
@@ -143,6 +144,21 @@ def test_more_bodies_than_lanes(tmp_path: Path) -> None:
 def test_a_place_that_cannot_be_drawn_to_is_one_error(tmp_path: Path, name: str) -> None:
     with pytest.raises(FileError):
         scene_plot.render_picture(tmp_path / name, np.zeros((1, 100)), SR)
+
+
+def test_a_picture_of_sound_on_disk_is_that_of_the_same_in_memory(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(spool, "MEMORY_BYTES", 1000)
+    monkeypatch.setattr(spool, "BLOCK_BYTES", 1000)
+    samples = np.random.default_rng(0).normal(size=(2, 20_000))
+    kept = spool.SoundSpool(2)
+    for start in range(0, 20_000, 700):
+        kept.add(samples[:, start : start + 700])
+    assert kept.on_disk
+    for name, sound in {"a": samples, "b": kept.kept()}.items():
+        scene_plot.render_picture(tmp_path / f"{name}.png", sound, SR)
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
 
 
 def test_what_cannot_be_drawn_leaves_nothing(tmp_path: Path) -> None:

@@ -181,6 +181,7 @@ def of_log(name: str) -> Callable[[Any, Path], Made]:
     return make
 
 
+KEEPS = {"keep_log": True, "keep_sound": True}
 DOORS: dict[str, Callable[[Any, Path], Made]] = {
     "Air": lambda *_: (sb.Air, {"density_kg_m3": 1, "sound_speed_m_s": 343}),
     "ContactLog": lambda *_: (sb.ContactLog, LOG),
@@ -194,15 +195,7 @@ DOORS: dict[str, Callable[[Any, Path], Made]] = {
     "Contacts": lambda *_: (sb.Contacts, ROW),
     "Listener": lambda client, _: (
         sb.Listener,
-        {
-            "client": client,
-            "sr": 48_000,
-            "sensors": (),
-            "seed": 0,
-            "air": sb.Air(),
-            "keep_log": True,
-            "keep_sound": True,
-        },
+        {"client": client, "sr": 48_000, "sensors": (), "seed": 0, "air": sb.Air(), **KEEPS},
     ),
     "Listener.add": adding,
     "Listener.add_all": adding_all,
@@ -220,15 +213,7 @@ DOORS: dict[str, Callable[[Any, Path], Made]] = {
     "Vibrometer": lambda *_: (sb.Vibrometer, {"body_id": 0, "point_m": [0, 0, 0], "direction": [0, 0, 1], "link": -1}),
     "attach": lambda client, _: (
         sb.attach,
-        {
-            "client": client,
-            "sr": 48_000,
-            "microphone": (0, 0, 1),
-            "seed": 0,
-            "air": None,
-            "keep_log": True,
-            "keep_sound": True,
-        },
+        {"client": client, "sr": 48_000, "microphone": (0, 0, 1), "seed": 0, "air": None, **KEEPS},
     ),
     "keep_restitution": lambda client, _: (sb.keep_restitution, {"client": client}),
     "load_material": lambda *_: (sb.load_material, {"name": "steel"}),
@@ -294,8 +279,7 @@ BAD: dict[str, dict[str, list[Any]]] = {
         "sensors": ["x", 5, [3], None, object()],
         "seed": [*WHOLE, -1],
         "air": [*RECORD, None],
-        "keep_log": FLAG,
-        "keep_sound": FLAG,
+        **dict.fromkeys(KEEPS, FLAG),
     },
     "Listener.add": {
         "body": [*WHOLE, -5, 10**12],
@@ -402,8 +386,7 @@ BAD: dict[str, dict[str, list[Any]]] = {
         ],
         "seed": [*WHOLE, -1, 10**30],
         "air": RECORD,
-        "keep_log": FLAG,
-        "keep_sound": FLAG,
+        **dict.fromkeys(KEEPS, FLAG),
     },
     "keep_restitution": {"client": CLIENT},
     "load_material": {"name": [None, 5, b"steel", object(), ["steel"]]},
