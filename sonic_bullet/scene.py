@@ -209,6 +209,11 @@ class _Stage:
             warnings.simplefilter("ignore", SceneWarning)  # the result's notes say it
             return (_run_built if defines_build(self.path) else _run_plain)(self, seconds, progress, say)
 
+    def attached(self, client: Any, microphones: MicrophoneLike) -> Listener:
+        """A listener that keeps its run, unless somebody hears it at once."""
+        keeps = self.begin is None
+        return attach(client, sr=self.sr, microphone=microphones, seed=self.seed, keep_log=keeps, keep_sound=keeps)
+
     def ready(self) -> None:
         """The listener knows its bodies: say so, once."""
         begin, self.begin = self.begin, None
@@ -259,7 +264,7 @@ def _run_built(stage: _Stage, seconds: float | None, progress: Progress | None, 
             "return a dictionary from bodies to materials",
         )
     places = stage.microphones if stage.microphones is not None else getattr(module, "MICROPHONE", (0.0, -1.0, 0.5))
-    stage.listener = listener = attach(client, sr=stage.sr, microphone=places, seed=stage.seed)
+    stage.listener = listener = stage.attached(client, places)
     stage.microphones = None
     user_code(stage.path, partial(listener.add_all, cast, progress=say))
     act = getattr(module, "act", None)
@@ -308,7 +313,7 @@ def _run_plain(stage: _Stage, seconds: float | None, progress: Progress | None, 
 
     def before(client: int) -> None:
         if stage.listener is None:
-            stage.listener = attach(client, sr=stage.sr, microphone=places, seed=stage.seed)
+            stage.listener = stage.attached(client, places)
         new = [who for who in links_with_shapes(client) if who not in known]
         if new:
             known.update(new)

@@ -139,7 +139,7 @@ class SoundObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorA
             return
         self._detach()
         self._world = EpisodeWorld(client)
-        listener = attach(self._world, **self._options)
+        listener = attach(self._world, keep_log=False, keep_sound=False, **self._options)
         try:
             if isinstance(self._materials, Material):
                 add_fillable(listener, cast, self._silent)
