@@ -229,7 +229,7 @@ class Step:
         body = frozen_array(self.body, np.int64, (b,), "step: body")
         object.__setattr__(self, "body", body if self.body is not first_bodies(b) else self.body)
         if b and (body[0] < 0 or (np.diff(body) <= 0).any()):
-            raise LogError("a step whose bodies do not ascend from 0", "use an unbroken contact log")
+            raise LogError("step: body: its indices do not ascend from 0", "use an unbroken contact log")
         if not (np.isin(self.contacts.a, body).all() and np.isin(self.contacts.b, body).all()):
             raise LogError("a contact names a body that the step does not know", "use an unbroken contact log")
 

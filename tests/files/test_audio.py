@@ -168,15 +168,11 @@ FULL_DISK = """
 import resource, sys, numpy as np
 from sonic_bullet import files
 from sonic_bullet.files.contact_log import ContactLog
-from sonic_bullet.files.rows.log_steps import LogSteps
 from sonic_bullet.records import errors
 from sonic_bullet.records.contacts import Contacts, Step
 sound = np.random.default_rng(0).normal(0, 0.1, (1, 200_000))
-step = Step(0.01, np.zeros((9999, 3)), np.zeros((9999, 4)), np.zeros(9999, bool), Contacts.none())
-log = object.__new__(ContactLog)
-for name, value in {"bodies": (), "steps": LogSteps.of((step,)), "sensors": (), \
-"sr": 8000, "seed": 0, "air": files.logs.Air(), "events": ()}.items():
-    object.__setattr__(log, name, value)
+step = Step(0.01, np.zeros((0, 3)), np.zeros((0, 4)), np.zeros(0, bool), Contacts.none())
+log = ContactLog((), (step,) * 9999, (), 8000, 0)
 resource.setrlimit(resource.RLIMIT_FSIZE, (300_000, 300_000))
 for call in (lambda: files.write_audio("a.wav", sound, 48000), \
 lambda: files.write_audio("b.flac", sound, 48000), lambda: files.write_log("c.npz", log)):

@@ -174,7 +174,8 @@ def test_a_log_of_the_first_format_replays_as_before() -> None:
     """tests/data/contacts-1.npz and its sound are from the last version that wrote format 1 (a box and a ball that
     fall, the ball is removed).
 
-    The same bits on the machine that made them; elsewhere compilers round otherwise.
+    The same bits on the machine that made them; elsewhere compilers round otherwise. The microphone's row was made anew
+    when the phase at which a mode radiates ceased to hang on one direction; the second row, a vibrometer's, never was.
     """
     folder = Path(__file__).parents[1] / "data"
     log = sb.read_log(str(folder / "contacts-1.npz"))
