@@ -97,7 +97,8 @@ def render_scene(
             with interrupts():
                 notes = stage.run(seconds, progress, say)
         except (SonicBulletError, KeyboardInterrupt) as error:
-            error.partial = stage.result(()) if stage.listener is not None else None  # type: ignore[union-attr]
+            with suppress(SonicBulletError):  # a script's own listener may keep nothing
+                error.partial = stage.result(()) if stage.listener is not None else None  # type: ignore[union-attr]
             raise
         return stage.result(notes)
 
@@ -231,6 +232,7 @@ class _Stage:
         log = replace(listener.contacts, residual=self.residual)
         if (
             listener.sr == self.sr
+            and listener.keeps_sound
             and self.microphones is None
             and (self.residual or not any(b.material and b.material.residual for b in log.bodies))
         ):

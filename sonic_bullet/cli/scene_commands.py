@@ -65,7 +65,11 @@ def run_render(
         except (SonicBulletError, KeyboardInterrupt) as error:
             raise _with_partial(error, to, output, peak_dbfs, lufs) from error
         if contacts is not None:
-            write_log(contacts, result.log, models or "included")
+            try:
+                write_log(contacts, result.log, models or "included")
+            except SonicBulletError as error:
+                error.partial = result  # type: ignore[attr-defined]
+                raise _with_partial(error, to, output, peak_dbfs, lufs) from error
         report = replace(_written(to, result, peak_dbfs, lufs), path=output)
         if picture is not None:
             from sonic_bullet.plots.scene_plot import render_picture

@@ -7,6 +7,7 @@ An episode begins in silence when `reset` returns; what `reset` itself steps is 
 
 from __future__ import annotations
 
+from collections.abc import Hashable
 from fractions import Fraction
 from math import ceil
 from typing import Any
@@ -76,8 +77,9 @@ class SoundObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorA
         self._materials, self._client = as_materials(materials), client
         self._step_s = exact_step(as_length(step_s)) if step_s is not None else step_length(env, client)
         self._dt_s, self._most = 0.0, 0
-        self._silent: set[tuple[int, int | str]] = set()
+        self._silent: set[Hashable] = set()
         self._cast: Cast = {}
+        self._left_out: Cast = {}
         self._added = 0
         self._listener: Listener | None = None
         self._episodes = RepeatedEpisodes()
@@ -115,6 +117,7 @@ class SoundObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorA
             raise SceneError("no episode has begun", "call reset first")
         world = self._world
         world.steps.clear()
+        self._listener.read()  # steps that somebody made outside of env.step are heard, and observed by nobody
         with world.hearing(self._listener.step):
             observation, reward, terminated, truncated, info = self.env.step(action)
         self._check_steps()
@@ -142,7 +145,7 @@ class SoundObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorA
         listener = attach(self._world, keep_log=False, keep_sound=False, **self._options)
         try:
             if isinstance(self._materials, Material):
-                add_fillable(listener, cast, self._silent)
+                self._left_out = add_fillable(listener, self._world, cast, self._silent)
             else:
                 listener.add_all(cast)
         except BaseException:
@@ -158,6 +161,8 @@ class SoundObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorA
         if self._listener is None or not self._world.hooked or self._world.client is not client:
             return False
         if not same_cast(cast, self._cast):
+            return False
+        if any(self._world.likeness(*who) not in self._silent for who in self._left_out):
             return False
         self._listener.reset()
         return len(self._world.bodies) == self._added

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Hashable, Mapping
 from pathlib import Path
 from typing import Any
 
-from sonic_bullet.listener import bodies_called, client_id_of, links_with_shapes
+from sonic_bullet.listener import PyBulletWorld, bodies_called, client_id_of, links_with_shapes
 from sonic_bullet.records import Material
 from sonic_bullet.records.coerce import shown
 from sonic_bullet.records.errors import MeshError, ModalError, SceneError, SceneWarning
 from sonic_bullet.session import Listener
 from sonic_bullet.session.arguments import as_material
 
-Cast = dict[tuple[int, int | str], Any]
+Cast = dict[tuple[int, Any], Any]
 MaterialsLike = str | Path | Material | Mapping[Any, Any] | Callable[[Any], Mapping[Any, Any]]
 
 
@@ -53,11 +53,13 @@ def same_cast(one: Any, other: Any) -> bool:
     return one is other or (isinstance(one, str | int | float) and type(one) is type(other) and one == other)
 
 
-def add_fillable(listener: Listener, cast: Cast, silent: set[tuple[int, int | str]]) -> None:
-    """Let all of a cast sound that nobody chose, except links that cannot be filled or solved: each is named once, as
-    a SceneWarning, and put among the ``silent``, which are passed over.
+def add_fillable(listener: Listener, world: PyBulletWorld, cast: Cast, silent: set[Hashable]) -> Cast:
+    """Let all of a cast sound that nobody chose, except links that cannot be filled or solved; those that are left out.
+
+    Each of them is named once, as a SceneWarning, and what it is like put among the ``silent``, which are passed over.
     """
-    wanted = {who: how for who, how in cast.items() if who not in silent}
+    left_out = {who: how for who, how in cast.items() if world.likeness(*who) in silent}
+    wanted = {who: how for who, how in cast.items() if who not in left_out}
     try:
         listener.add_all(wanted)
     except (MeshError, ModalError):
@@ -65,5 +67,7 @@ def add_fillable(listener: Listener, cast: Cast, silent: set[tuple[int, int | st
             try:
                 listener.add(body, link, material=material)
             except (MeshError, ModalError) as error:
-                silent.add((body, link))
+                silent.add(world.likeness(body, link))
+                left_out[body, link] = material
                 warnings.warn(f"left silent: {error.what}", SceneWarning, stacklevel=2)
+    return left_out

@@ -11,8 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from types import MappingProxyType
-from typing import Any
+from typing import Any, NoReturn
 
 from sonic_bullet.records.arrays import Array, frozen_array, store
 from sonic_bullet.records.bodies import Material, ModalModel
@@ -24,6 +23,18 @@ Values = Mapping[str, float]
 """Numbers by the simulator's own names for them; what is not there is not known."""
 MOUNTINGS = ("free",)
 """How a body is held, as far as its modes and damping go: "free", by nothing."""
+
+
+class ReadOnlyDict(dict[str, Any]):
+    """A dict that is as it was made; it can be copied and pickled, which types.MappingProxyType cannot."""
+
+    def _refuse(self, *_: object, **__: object) -> NoReturn:
+        raise TypeError("these values are read-only")
+
+    __setitem__ = __delitem__ = __ior__ = update = setdefault = pop = popitem = clear = _refuse
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return ReadOnlyDict, (dict(self),)
 
 
 def frozen_values(values: object, name: str) -> Values:
@@ -42,7 +53,7 @@ def _frozen(values: object, name: str, remedy: str, checked: Callable[[object, s
     made = {
         as_text(key, f"a name in {name}", remedy): checked(x, f"{name}: {key}", remedy) for key, x in values.items()
     }
-    return MappingProxyType(dict(sorted(made.items())))
+    return ReadOnlyDict(dict(sorted(made.items())))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -111,7 +122,7 @@ class Change:
                 as_whole(getattr(self, name), f"{name} of a change", remedy, least=0, error=LogError)
         known = frozen_values({name: x for name, x in self.values.items() if x is not None}, "a change")
         lost = {name: None for name in self.values if name not in known}
-        store(self, values=MappingProxyType(dict(sorted((dict(known) | lost).items()))))
+        store(self, values=ReadOnlyDict(dict(sorted((dict(known) | lost).items()))))
 
 
 @dataclass(frozen=True, slots=True)

@@ -24,12 +24,13 @@ from sonic_bullet.records.errors import FileError, SceneError, SceneWarning
 class KeptRun:
     """The log, its events, and unread frames of so many channels.
 
-    notes: what is no longer kept, and why.
+    notes: what is no longer kept, and why; unsaid: those that nobody was warned of yet.
     """
 
     def __init__(self, channels: int, *, keep_log: bool) -> None:
         self.events: list[Event] = []
         self.notes: tuple[str, ...] = ()
+        self.unsaid: tuple[str, ...] = ()
         self._channels = channels
         self._log = StepLog("attach with keep_log=False") if keep_log else None
         self._unread = SoundSpool(channels, "call read() more often")
@@ -82,7 +83,12 @@ class KeptRun:
         if what not in self._given_up:
             self._given_up.add(what)
             note = f"from step {self._count} on the {what} {'are' if what.endswith('s') else 'is'} not kept: {error}"
-            self.notes = (*self.notes, note)
+            self.notes, self.unsaid = (*self.notes, note), (*self.unsaid, note)
+
+    def say(self) -> None:
+        """Warn of what is no longer kept: at the end of a step, for a warning may be an error."""
+        notes, self.unsaid = self.unsaid, ()
+        for note in notes:
             warnings.warn(note, SceneWarning, stacklevel=4)
 
 

@@ -61,15 +61,12 @@ def _wanted(world: World, who: Any, how: Any) -> WantedBody:
 
 def _keywords(call: Callable[..., Any]) -> list[str]:
     """Names of the arguments that are given by name alone."""
-    parameters = inspect.signature(call).parameters
-    return [name for name, one in parameters.items() if one.kind is inspect.Parameter.KEYWORD_ONLY]
+    given = inspect.signature(call).parameters.values()
+    return [one.name for one in given if one.kind is one.KEYWORD_ONLY]
 
 
 class Listener:
-    """A simulated world that sounds; made by `attach`.
-
-    contacts: the log so far. Usable as a context manager: leaving it detaches.
-    """
+    """A simulated world that sounds; made by `attach`. Usable as a context manager: leaving it detaches."""
 
     latency_steps = LATENCY_STEPS
 
@@ -89,7 +86,7 @@ class Listener:
         self.air = as_kind(air, Air, "air", "give an Air(density_kg_m3=…, sound_speed_m_s=…), or leave it out")
         self.world = client if isinstance(client, World) else _opened(client)
         self.world.logged = keep_log = as_flag(keep_log, "keep_log")
-        keep = as_flag(keep_sound, "keep_sound")
+        self.keeps_sound = keep = as_flag(keep_sound, "keep_sound")
         self._synth = Synthesizer(sr=self.sr, sensors=self.sensors, seed=self.seed, air=self.air, keep=keep)
         self._playback: Playback | None = None
         self._attached = True
@@ -228,6 +225,8 @@ class Listener:
             self._kept.give_up("sound", self._synth.unkept)
         if self._playback is not None:
             self._playback.push(frame, returned_s)
+        if self._kept.unsaid:
+            self._kept.say()
         return frame
 
     def play(

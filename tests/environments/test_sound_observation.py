@@ -287,6 +287,9 @@ def test_a_step_longer_than_the_audio_is_one_line(opened: Any) -> None:
     env.unwrapped.hidden = 5
     with pytest.raises(SceneError, match=r"5 physics steps, and its audio holds 4; give step_s=, .*: 0\.0208333"):
         env.step(np.zeros(3, np.float32))
+    env.unwrapped.hidden = 4
+    env.unwrapped.physics.stepSimulation()  # heard, and in nobody's observation
+    assert env.step(np.zeros(3, np.float32))[4]["audio_count"] == 800
     longer = opened(SoundObservation(FallingBox(hidden=5), materials=plates, step_s=0.05))
     assert longer.observation_space["audio"].shape == (1, 2400)
     assert {info["audio_count"] for info in episode(longer, 0, 4)[1]} == {1000}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import io
 import os
 import zipfile
@@ -331,3 +332,11 @@ def test_a_cache_too_small_for_the_models_of_a_log_is_said_and_no_log_is_written
     with pytest.raises(FileError, match=r"too small for the models.*raise SONIC_BULLET_CACHE_LIMIT"):
         log().save(tmp_path / "a.npz", models="reference")
     assert not (tmp_path / "a.npz").exists()
+
+
+def test_a_log_is_copied_by_value(tmp_path: Path) -> None:
+    files.write_log(tmp_path / "a.npz", log())
+    for one in (log(), files.read_log(tmp_path / "a.npz")):
+        assert same(copy.deepcopy(one), one)
+        with pytest.raises(TypeError, match="read-only"):
+            one.engine["erp"] = 1.0  # type: ignore[index]

@@ -138,8 +138,8 @@ def test_few_features_of_many_modes() -> None:
 def test_fast_reaches_the_reference_on_a_fiftieth() -> None:
     """A plate that no parameters fit: decays 10 %, frequencies 0.3 % off the model. Both searches share one metric.
 
-    Both end where their simplex is small, within some 1e-5 of the lowest point's parameters, where the metric is flat to
-    1e-7 or so: which of them is lower by less hangs on the last bits of the mode shapes.
+    Both end where their simplex is small (1e-4 of the parameters, section 7), where the metric is flat to 1e-7 or so:
+    which of them is lower by less hangs on the last bits of the mode shapes.
     """
     lambda_hat, amplitude_hat = plate()
     asked = recorded(

@@ -10,6 +10,7 @@ CONTACT    records.contacts
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
@@ -160,10 +161,18 @@ class LogSteps(Sequence[Step]):
         for first in range(self.start, self.stop, BLOCK_ROWS):
             yield self.step[first : min(first + BLOCK_ROWS, self.stop)]
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return LogSteps.of, (tuple(self),)  # by value: another process has neither our spool nor our file
+
+    @property
+    def rows_before(self) -> tuple[int, int]:
+        """How many poses and contacts of the tables come before the first step."""
+        return self._before(self.start)
+
     @property
     def row_counts(self) -> tuple[int, int]:
         """How many poses and contacts the steps have in all."""
-        (p0, k0), (p1, k1) = self._before(self.start), self._before(self.stop)
+        (p0, k0), (p1, k1) = self.rows_before, self._before(self.stop)
         return p1 - p0, k1 - k0
 
     def bodies(self) -> int:
@@ -178,23 +187,27 @@ class StepLog:
         self._tables = tuple(Spool(dtype, what="contact log", instead=instead) for dtype in (STEP, POSE, CONTACT))
         self._fresh: list[Step] = []
         self._known = 0
+        self._lock = threading.Lock()
 
     def append(self, step: Step) -> None:
         """Take in a step. Raises FileError where the disk takes no more; the step is in the log all the same."""
-        self._fresh.append(step)
-        if len(self._fresh) >= PACKED:
+        with self._lock:
+            self._fresh.append(step)
+            if len(self._fresh) < PACKED:
+                return
             self._pack()
             for table in self._tables:
                 table.spill()
 
     def steps(self) -> LogSteps:
         """Those so far; what comes later is not among them."""
-        self._pack()
+        with self._lock:
+            self._pack()
         step, pose, contact = self._tables
         return LogSteps(step, pose, contact, 0, len(step), self._known, [0, ()])
 
     def _pack(self) -> None:
-        fresh, self._fresh = self._fresh, []
+        fresh = self._fresh
         if not fresh:
             return
         steps, poses, contacts = self._tables
@@ -212,3 +225,4 @@ class StepLog:
         steps.append(step)
         poses.append(pose)
         contacts.append(joined([one.contacts.row for one in fresh], CONTACT))
+        self._fresh = []  # last: what interrupts this loses nothing

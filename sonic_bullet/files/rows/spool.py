@@ -3,13 +3,15 @@
     append -> fresh rows -> spill -> packed bytes (memory up to `memory_bytes`, then the file) -> [start:stop]
 
 The file is unlinked from its first moment (`tempfile.TemporaryFile`): whatever ends the process, nothing is left. It
-lies where TMPDIR says, else in /tmp. Rows are read by pread(2) on its descriptor, so a reader moves no writer.
+lies where TMPDIR says, else in /tmp. Rows are read by pread(2) on its descriptor, so a reader moves no writer. Another
+thread may read while one appends. A process that was forked goes on in a file of its own.
 """
 
 from __future__ import annotations
 
 import os
 import tempfile
+import threading
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import IO, Any
@@ -51,6 +53,7 @@ class Spool:
         self._fresh: list[Array] = []
         self._packed = self._count = 0
         self._block = max(1, BLOCK_BYTES // max(self.row_bytes, 1))
+        self._lock, self._process = threading.RLock(), os.getpid()
 
     def __len__(self) -> int:
         return self._count
@@ -64,8 +67,9 @@ class Spool:
         """Take in rows (k, *tail) of the dtype, C-contiguous, which nobody writes to any more; no disk is touched
         before `spill`.
         """
-        self._fresh.append(rows)
-        self._count += len(rows)
+        with self._lock:
+            self._fresh.append(rows)
+            self._count += len(rows)
 
     def spill(self) -> None:
         """Pack the fresh rows, once they are many.
@@ -73,7 +77,8 @@ class Spool:
         Raises FileError where the disk takes no more: then they stay in memory, and all rows can still be read.
         """
         if self._count - self._packed >= self._block:
-            self._pack()
+            with self._lock:
+                self._pack()
 
     def _pack(self) -> None:
         raw = b"".join(self._fresh)  # type: ignore[arg-type]
@@ -81,10 +86,11 @@ class Spool:
             self._memory += raw
         else:
             try:
-                if self._file is None:
+                if self._file is None or self._process != os.getpid():
                     file = tempfile.TemporaryFile(prefix="sonic-bullet-", buffering=0)  # noqa: SIM115 - lives as we do
-                    _write(file, self._memory)
-                    self._file, self._memory = file, bytearray()
+                    for start in range(0, self._packed, self._block):
+                        _write(file, self._read(start, min(start + self._block, self._packed)), start * self.row_bytes)
+                    self._file, self._memory, self._process = file, bytearray(), os.getpid()
                 _write(self._file, raw, self._packed * self.row_bytes)
             except OSError as error:
                 self._fresh = [self._rows(raw)]
@@ -105,16 +111,17 @@ class Spool:
 
     def __getitem__(self, rows: slice) -> Array:
         """Rows start … stop-1 as one array of its own. Raises FileError."""
-        start, stop, _ = rows.indices(self._count)
-        stop = max(start, stop)
-        parts = []
-        if start < self._packed:
-            parts.append(self._read(start, min(stop, self._packed)))
-        if stop > self._packed:
-            fresh = b"".join(self._fresh)  # type: ignore[arg-type]
-            self._fresh = [self._rows(fresh)]
-            first = max(start - self._packed, 0) * self.row_bytes
-            parts.append(fresh[first : (stop - self._packed) * self.row_bytes])
+        with self._lock:
+            start, stop, _ = rows.indices(self._count)
+            stop = max(start, stop)
+            parts = []
+            if start < self._packed:
+                parts.append(self._read(start, min(stop, self._packed)))
+            if stop > self._packed:
+                fresh = b"".join(self._fresh)  # type: ignore[arg-type]
+                self._fresh = [self._rows(fresh)]
+                first = max(start - self._packed, 0) * self.row_bytes
+                parts.append(fresh[first : (stop - self._packed) * self.row_bytes])
         raw = parts[0] if len(parts) == 1 else b"".join(parts)
         return np.frombuffer(raw, self.dtype).reshape(stop - start, *self.tail)
 

@@ -6,14 +6,14 @@ npz      -> entries, large ones left in the file -> checked by blocks  -> LogSte
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Iterator, Mapping
 from functools import partial
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
 from sonic_bullet.files.container import REMEDY, Column, RowsOfEntry, take
-from sonic_bullet.files.rows.log_steps import POSE, STEP, LogSteps, StepBlock
+from sonic_bullet.files.rows.log_steps import BLOCK_ROWS, POSE, STEP, LogSteps, StepBlock, Table
 from sonic_bullet.records import Array
 from sonic_bullet.records.arrays import frozen_array
 from sonic_bullet.records.coerce import as_number
@@ -28,6 +28,7 @@ POSE_FIELDS: dict[str, tuple[type, tuple[int, ...]]] = {
 }
 LAZY = (*(f"pose_{name}" for name in POSE_FIELDS), *(f"contact_{name}" for name in ROW_FIELDS))
 """Entries that may stay in the file."""
+Fieldwise = Mapping[str, tuple[type, tuple[int, ...]]]
 ROWS_MOST = 2**40
 """Poses or contacts of one step at most; that all their sums fit into 64 bits is asked too."""
 
@@ -51,28 +52,35 @@ class Fields:
 
 
 def step_entries(steps: LogSteps) -> dict[str, Column]:
-    """What `write_container` is to write of the steps; their rows are made when it comes to them."""
-    (p, k), s = steps.row_counts, len(steps)
+    """What `write_container` is to write of the steps; each entry's rows are read when it comes to them, from the table
+    that has them alone.
+    """
+    (p0, k0), (p, k), s = steps.rows_before, steps.row_counts, len(steps)
 
-    def column(dtype: Any, shape: tuple[int, ...], of: Callable[[StepBlock], Array]) -> Column:
-        return Column(dtype, shape, lambda: map(of, steps.blocks()))
+    def of_steps(name: str) -> Iterator[Array]:
+        return (rows[name] for rows in steps.step_rows())
 
-    def fields(kind: str, rows: int, of: Mapping[str, tuple[type, tuple[int, ...]]]) -> dict[str, Column]:
-        def field(block: StepBlock, name: str) -> Array:
-            return cast(Array, getattr(block, kind)[name])
+    def counts(name: str, before: int) -> Iterator[Array]:
+        for ends in of_steps(name):
+            yield np.diff(ends, prepend=before)
+            before = int(ends[-1])
 
+    def parts(table: Table, name: str, first: int, stop: int) -> Iterator[Array]:
+        return (table[at : min(at + BLOCK_ROWS, stop)][name] for at in range(first, stop, BLOCK_ROWS))
+
+    def fields(kind: str, table: Table, first: int, rows: int, of: Fieldwise) -> dict[str, Column]:
         return {
-            f"{kind}_{name}": column(dtype, (rows, *tail), partial(field, name=name))
+            f"{kind}_{name}": Column(dtype, (rows, *tail), partial(parts, table, name, first, first + rows))
             for name, (dtype, tail) in of.items()
         }
 
     return {
-        "step_dt_s": column(float, (s,), lambda block: block.step["dt_s"]),
-        "step_gravity_m_s2": column(float, (s, 3), lambda block: block.step["gravity_m_s2"]),
-        "step_body_count": column(np.int64, (s,), lambda block: block.counts("pose")),
-        "step_contact_count": column(np.int64, (s,), lambda block: block.counts("contact")),
-        **fields("pose", p, POSE_FIELDS),
-        **fields("contact", k, ROW_FIELDS),
+        "step_dt_s": Column(float, (s,), partial(of_steps, "dt_s")),
+        "step_gravity_m_s2": Column(float, (s, 3), partial(of_steps, "gravity_m_s2")),
+        "step_body_count": Column(np.int64, (s,), partial(counts, "pose_end", p0)),
+        "step_contact_count": Column(np.int64, (s,), partial(counts, "contact_end", k0)),
+        **fields("pose", steps.pose, p0, p, POSE_FIELDS),
+        **fields("contact", steps.contact, k0, k, ROW_FIELDS),
     }
 
 

@@ -174,15 +174,13 @@ class AddedLinks:
         for code in codes:
             self.by_code.pop(code, None)
 
-    def still_there(self, roster: Roster, *, seen: bool) -> dict[int, AddedLink]:
-        """Those whom a roster holds. seen: who was removed was forgotten; else a link of the same code is the same only
-        where its name and shape are.
-        """
+    def still_there(self, roster: Roster) -> dict[int, AddedLink]:
+        """Those whom a roster holds: a link of the same code is the same only where its name and shape are."""
         there = set(roster.code.tolist())
         return {
             code: one
             for code, one in self.by_code.items()
-            if code in there and (seen or one.likeness == likeness(self._client_id, *decode(code)))
+            if code in there and one.likeness == likeness(self._client_id, *decode(code))
         }
 
     def again(self, code: int, one: AddedLink, was_set: Values) -> Body:
@@ -236,6 +234,10 @@ class AskedLinks(World):
 
     client_id: int
     properties: Properties
+
+    def likeness(self, body: int, link: int) -> Hashable:
+        """What tells a link that exists from another's that was given its id."""
+        return likeness(self.client_id, body, link)
 
     def links_called(self, body: object, link: object) -> tuple[int, tuple[int, ...]]:
         """The body's id and its links of that number or name, "all" of them. Raises SceneError, MeshError."""

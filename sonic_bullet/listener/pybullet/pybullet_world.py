@@ -32,7 +32,7 @@ from sonic_bullet.listener.pybullet import body_facts as facts
 from sonic_bullet.listener.pybullet import hooks
 from sonic_bullet.listener.pybullet.census import Census
 from sonic_bullet.listener.pybullet.left_out import BodiesLeftOut
-from sonic_bullet.listener.pybullet.poses import check_connected, undone
+from sonic_bullet.listener.pybullet.poses import check_connected, read_roster, undone
 from sonic_bullet.listener.pybullet.questions import contact_points, engine, settings
 from sonic_bullet.listener.pybullet.substeps import SubstepLog
 from sonic_bullet.listener.start import LEFT_OUT, NOBODY, hooked_start, jumped, polled_start
@@ -169,19 +169,21 @@ class PyBulletWorld(facts.AskedLinks):
     def reset(self) -> None:
         """Begin anew with what was added, where it is still there: see `World.reset`.
 
-        A client that is not hooked does not tell who was removed: a body of the same id, name and shape is the same.
-        Raises SceneError: lost connection, or called while a step is made.
+        A body of the same id, name and shape is the same: not every removal is told. What was set stays known. Raises
+        SceneError, having changed nothing: lost connection, called while a step is made, an absurd mass.
         """
         check_connected(self.client_id)
         if self._before is not None:
             raise SceneError("reset was called while a step was made", "call it between two steps")
         added, before = self._added, self.properties
+        there = added.still_there(read_roster(self.client_id))
+        records = {code: added.again(code, one, before.set_values.of(*decode(code))) for code, one in there.items()}
         self._begin()
         self.properties.set_values = before.set_values
-        self._added.by_code = added.still_there(self._past.roster, seen=self._uninstall is not None)
-        before.names.hand_over(self._added.by_code, self.properties.names)
-        for code, one in self._added.by_code.items():
-            self._append(code, added.again(code, one, before.set_values.of(*decode(code))))
+        self._added.by_code = there = added.still_there(self._past.roster)
+        before.names.hand_over(there, self.properties.names)
+        for code in there:
+            self._append(code, records[code])
 
     def forget(self, body: int | None = None) -> None:
         """Say that a body was removed (None: all, by resetSimulation); its id may be given anew. With a hook, nobody

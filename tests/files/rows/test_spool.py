@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import tempfile
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -96,3 +98,43 @@ def test_kept_sound_is_read_by_blocks_and_stays_what_it_was(monkeypatch: pytest.
     nan = whole.copy()
     nan[:, 5] = np.nan
     assert np.isnan(KeptSound.of(nan).peaks()).all()
+
+
+def test_a_snapshot_is_read_in_one_thread_while_another_appends() -> None:
+    spool = Spool(np.int64, what="rows", memory_bytes=1 << 12)
+    stop, wrong = threading.Event(), []
+
+    def read() -> None:
+        while not stop.is_set():
+            count = len(spool)
+            if not np.array_equal(spool[max(count - 50, 0) : count], np.arange(max(count - 50, 0), count)):
+                wrong.append(count)
+
+    reader = threading.Thread(target=read)
+    reader.start()
+    try:
+        for start in range(0, 40_000, 100):
+            spool.append(np.arange(start, start + 100))
+            spool.spill()
+    finally:
+        stop.set()
+        reader.join()
+    assert not wrong
+    assert np.array_equal(spool[0:40_000], np.arange(40_000))
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork here")
+def test_a_forked_process_goes_on_in_a_file_of_its_own() -> None:
+    many = 1 << 16
+    spool = Spool(np.int64, what="rows", memory_bytes=1 << 10)
+    spool.append(np.arange(many))
+    spool.spill()
+    child = os.fork()
+    if child == 0:
+        spool.append(np.full(many, -7))
+        spool.spill()
+        os._exit(0 if np.array_equal(spool[many - 1 : many + 1], [many - 1, -7]) else 1)
+    assert os.waitpid(child, 0)[1] == 0
+    spool.append(np.arange(many, 2 * many))
+    spool.spill()
+    assert np.array_equal(spool[0 : 2 * many], np.arange(2 * many))
