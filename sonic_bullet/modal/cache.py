@@ -29,7 +29,7 @@ from sonic_bullet.records.errors import FileError, LogError
 
 Place = Path | Literal["default"] | None
 FORMAT = "sonic-bullet-cache/2"  # 1 had no digest: a miss
-SOLVERS = ("numpy", "scipy", "scikit-fem", "pytetwild", "manifold3d")
+SOLVERS = ("numpy", "scipy", "scikit-fem", "netgen-mesher", "manifold3d")
 
 
 class _Header(msgspec.Struct):
