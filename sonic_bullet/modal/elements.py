@@ -1,4 +1,4 @@
-"""Any body as a way to modes (ways.py): filled with quadratic tetrahedra, clamped or free, of any material."""
+"""Any body as a method (methods.py): filled with quadratic tetrahedra, clamped or free, of any material."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from sonic_bullet.modal import cache as store
 from sonic_bullet.modal import eigen, fem
 from sonic_bullet.modal.meshing.solid import Solid
-from sonic_bullet.modal.parts import SHIFT, Part, Shown, Wanted
+from sonic_bullet.modal.sectors import SHIFT, Sector, Shown, Wanted
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.errors import ModalError
 
@@ -56,8 +56,8 @@ class Elements:
         """Unknowns that no clamp holds."""
         return np.flatnonzero(np.repeat(~self.held, 3))
 
-    def parts(self, tensors: Sequence[Array], wanted: Wanted, say: Callable[[str], None]) -> list[Part]:
-        """The modes wanted of each tensor (6, 6), one part. Raises ModalError, MeshError."""
+    def sectors(self, tensors: Sequence[Array], wanted: Wanted, say: Callable[[str], None]) -> list[Sector]:
+        """The modes wanted of each tensor (6, 6), one sector. Raises ModalError, MeshError."""
         solid, free = self.solid, self.free
         corner = solid.node_m[self.body.skin.node][self.body.skin.face]
         area = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1).sum() / 2
@@ -79,9 +79,9 @@ class Elements:
             keep = modes.lambda_per_s2 <= bound
             solved.append((modes.lambda_per_s2[keep], modes.vector[:, keep]))
             stiff.append(k_matrix)
-        return [Part(tuple(solved), tuple(stiff), mass, 1, None)]
+        return [Sector(tuple(solved), tuple(stiff), mass, 1, None)]
 
-    def shown(self, parts: Sequence[Part], vectors: Sequence[Array]) -> Shown:
+    def shown(self, sectors: Sequence[Sector], vectors: Sequence[Array]) -> Shown:
         """Vectors (n, b) on the surface."""
         skin = self.body.skin
         (vector,) = vectors
@@ -90,7 +90,7 @@ class Elements:
         shape = np.ascontiguousarray(whole.reshape(len(self.held), 3, -1)[skin.node])
         return Shown(self.body.solid.node_m[skin.node], skin.face, self.body.curvature_per_m, shape)
 
-    def error(self, parts: Sequence[Part], tensor: Array, top: tuple[int, int]) -> float:
+    def error(self, sectors: Sequence[Sector], tensor: Array, top: tuple[int, int]) -> float:
         """Not known."""
         return float("nan")
 
@@ -98,7 +98,7 @@ class Elements:
         """None: its size is its budget's."""
         return
 
-    def note(self, parts: Sequence[Part]) -> str:
+    def note(self, sectors: Sequence[Sector]) -> str:
         """How it was done."""
         clamped = f"; {int(self.held.sum())} nodes clamped" if self.held.any() else ""
         return f"{self.body.solid.note}; {len(self.free)} unknowns{clamped}"
@@ -112,7 +112,7 @@ def filled(
     kept: tuple[store.Place, str],
     say: Callable[[str], None],
 ) -> Elements:
-    """The way of any body, clamped where clamp (k, 4) reaches. sizes: edge_m, thickness_m.
+    """The method of any body, clamped where clamp (k, 4) reaches. sizes: edge_m, thickness_m.
 
     Raises MeshError, ModalError.
     """

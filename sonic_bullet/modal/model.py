@@ -17,9 +17,9 @@ import numpy as np
 
 from sonic_bullet.geometry import oversize
 from sonic_bullet.modal import cache as store
+from sonic_bullet.modal.methods import chosen
 from sonic_bullet.modal.options import ModalOptions
-from sonic_bullet.modal.parts import MOST_MODES, Part, Wanted, Way
-from sonic_bullet.modal.ways import chosen
+from sonic_bullet.modal.sectors import MOST_MODES, ModalMethod, Sector, Wanted
 from sonic_bullet.records import Array, Material, ModalModel, Shape
 from sonic_bullet.records.errors import MeshError
 
@@ -68,9 +68,9 @@ def analyse(
     shapes: together one solid, in the body frame. fixed: clamped where (x, y, z, radius) in m, body frame, reach; a
     clamp between nodes takes the nearest. thickness_m: wall of open surfaces (see surfaces.py); it makes closed ones
     hollow. accuracy: relative, of the highest frequency; the note tells what is reached. edge_m: element size, by
-    default from a budget of unknowns. cache: folder, "default" or None. progress: called with a line now and then. A body all of whose modes lie above to_hz has none; so has a plane. Pieces that do
-    not hang together: the largest is kept and noted. Raises MeshError (broken, empty, flat, absurd or too slow mesh),
-    ModalError (no usable modes).
+    default from a budget of unknowns. cache: folder, "default" or None. progress: called with a line now and then. A
+    body all of whose modes lie above to_hz has none; so has a plane. Pieces that do not hang together: the largest is
+    kept and noted. Raises MeshError (broken, empty, flat, absurd or too slow mesh), ModalError (no usable modes).
     """
     say = progress or (lambda _: None)
     asked = ModalOptions(to_hz, count, fixed, thickness_m, accuracy)
@@ -162,8 +162,11 @@ def _unit_of(shapes: tuple[Shape, ...], material: Material, asked: ModalOptions,
 
 
 def solid_key(shapes: tuple[Shape, ...], thickness_m: float | None, edge_m: float | None) -> str:
-    parts = [part for s in shapes for part in (s.kind, s.size_m, s.position_m, s.quaternion_xyzw, s.vertex_m, s.face)]
-    return store.key("solid", *parts, thickness_m, edge_m)
+    """Under which name shapes filled with elements are kept."""
+    sectors = [
+        sector for s in shapes for sector in (s.kind, s.size_m, s.position_m, s.quaternion_xyzw, s.vertex_m, s.face)
+    ]
+    return store.key("solid", *sectors, thickness_m, edge_m)
 
 
 def diagonal_m(shapes: tuple[Shape, ...]) -> float:
@@ -199,9 +202,9 @@ def _solve(
     cache: store.Place,
     say: Callable[[str], None],
 ) -> _Unit:
-    """The body's modes without units, by the way that it takes, as accurate as asked or as that way can."""
+    """The body's modes without units, by the method that it takes, as accurate as asked or as that can be."""
     wanted = Wanted(of.limit, MOST_MODES) if asked.count is None else Wanted(np.inf, asked.count)
-    way: Way | None = chosen(
+    method: ModalMethod | None = chosen(
         shapes,
         of.length_m,
         of.stiffness,
@@ -213,16 +216,16 @@ def _solve(
         say=say,
     )
     error = np.inf
-    while way is not None and error > asked.accuracy:
-        last = way
-        parts = last.parts([of.stiffness], wanted, say)
-        value, owner, index = _listed(parts)
+    while method is not None and error > asked.accuracy:
+        last = method
+        sectors = last.sectors([of.stiffness], wanted, say)
+        value, owner, index = _listed(sectors)
         order = np.argsort(value, kind="stable")[: wanted.most]
         top = (int(owner[order[-1]]), int(index[order[-1]])) if len(order) else None
-        error = last.error(parts, of.stiffness, top) if top else np.nan
-        way = last.finer() if error > asked.accuracy else None
-    shown = last.shown(parts, [part.found[0][1] for part in parts])
-    note = last.note(parts)
+        error = last.error(sectors, of.stiffness, top) if top else np.nan
+        method = last.finer() if error > asked.accuracy else None
+    shown = last.shown(sectors, [sector.found[0][1] for sector in sectors])
+    note = last.note(sectors)
     if np.isfinite(error):
         note += f"; error at {np.sqrt(value[order[-1]] * of.per_s2) / (2 * np.pi):.0f} Hz {_percent(error)}"
     return _Unit(
@@ -236,11 +239,11 @@ def _solve(
     )
 
 
-def _listed(parts: Sequence[Part]) -> tuple[Array, Array, Array]:
-    """λ (b,) of the parts' modes in turn, copies and all, which part each is of and which of that part's modes."""
-    value = [np.tile(part.found[0][0], part.copies) for part in parts]
-    index = [np.tile(np.arange(len(part.found[0][0])), part.copies) for part in parts]
-    owner = np.repeat(np.arange(len(parts)), [len(v) for v in value])
+def _listed(sectors: Sequence[Sector]) -> tuple[Array, Array, Array]:
+    """λ (b,) of the sectors' modes in turn, each as often as it counts, its sector and its place there."""
+    value = [np.tile(sector.found[0][0], sector.multiplicity) for sector in sectors]
+    index = [np.tile(np.arange(len(sector.found[0][0])), sector.multiplicity) for sector in sectors]
+    owner = np.repeat(np.arange(len(sectors)), [len(v) for v in value])
     return np.concatenate([np.zeros(0), *value]), owner, np.concatenate([np.zeros(0, int), *index])
 
 

@@ -21,7 +21,7 @@ from sonic_bullet import geometry
 from sonic_bullet.modal.meshing import prisms, structured
 from sonic_bullet.modal.meshing.shape_meshes import rotation
 from sonic_bullet.modal.meshing.solid import surface
-from sonic_bullet.modal.parts import Part, Shown, Wanted
+from sonic_bullet.modal.sectors import Sector, Shown, Wanted
 from sonic_bullet.records import Array, Shape
 
 MOST_UNKNOWNS = 1800
@@ -92,9 +92,16 @@ def wave_number(omega2: Any, thickness: Any, stiffness: Array) -> Any:
     1951, eq. 37], in the softest direction.
     """
     compliance = np.linalg.inv(stiffness)
+    omega2 = np.minimum(omega2, 1e150)  # without a limit: more than any
     plate, shear = float(1 / np.diag(compliance)[:3].max()), 5 / 6 * float(np.diag(stiffness)[3:].min())
     fast, slow = omega2 / plate, omega2 / shear
-    return np.sqrt((fast + slow) / 2 + np.sqrt(12 * fast / thickness**2 + (slow - fast) ** 2 / 4))
+    return np.sqrt((fast + slow) / 2 + np.sqrt(12 * fast / thickness**2 + (slow / 2 - fast / 2) ** 2))
+
+
+def omega2_of(wave: float, thickness: float, stiffness: Array) -> float:
+    """ω² at which a plate's largest wave number is ``wave``."""
+    tries = np.geomspace(1e-12, 1e12, 400)
+    return float(tries[int(np.argmax(wave_number(tries, thickness, stiffness) > wave))])
 
 
 def wave_number_of(count: int, size: Array) -> float:
@@ -139,8 +146,8 @@ def parities(size: Array, terms: tuple[int, int, int]) -> Iterator[Parity]:
 
         def of(axis: int, k: int, mine: list[Array] = mine, ends: Array = ends) -> Any:
             """∂/∂axis of component k as a map from all unknowns of this parity."""
-            part = steps[axis][:, mine[k]].tocoo()
-            return csr_array((part.data, (part.row, part.col + ends[k])), shape=(len(degree), ends[3]))
+            slope = steps[axis][:, mine[k]].tocoo()
+            return csr_array((slope.data, (slope.row, slope.col + ends[k])), shape=(len(degree), ends[3]))
 
         strain = (of(0, 0), of(1, 1), of(2, 2), of(1, 2) + of(2, 1), of(0, 2) + of(2, 0), of(0, 1) + of(1, 0))
         yield Parity((degree[mine[0]], degree[mine[1]], degree[mine[2]]), strain, int(sum(parity) in (1, 2)))
@@ -188,7 +195,7 @@ def lowest(stiffness: Array, limit: float, rigid: int) -> tuple[Array, Array]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Ritz:
-    """A free box as a way to modes (ways.py). terms: polynomials along each axis; wave: the largest wave number; high:
+    """A free box as a method (methods.py). terms: polynomials along each axis; wave: the largest wave number; high:
     λ up to which it is solved where only a number of modes is wanted.
     """
 
@@ -213,42 +220,42 @@ class Ritz:
         """No elements' error is in λ."""
         return False
 
-    def parts(self, tensors: Sequence[Array], wanted: Wanted, say: Callable[[str], None]) -> list[Part]:
-        """The modes wanted of each tensor (6, 6), a part a parity."""
+    def sectors(self, tensors: Sequence[Array], wanted: Wanted, say: Callable[[str], None]) -> list[Sector]:
+        """The modes wanted of each tensor (6, 6), a sector a parity."""
         from scipy.sparse import eye_array
 
         say(f"solving {8 * unknowns(self.terms)} unknowns of a box")
         high = min(wanted.limit, self.high)
         while True:
-            found: list[Part] = []
+            found: list[Sector] = []
             for parity in parities(self.size, self.terms):
                 stiff = tuple(parity.stiffness(tensor) for tensor in tensors)
                 solved = []
                 for k, matrix in enumerate(stiff):
-                    bound = wanted._replace(limit=high).bound([(part.found[k][0], 1) for part in found])
+                    bound = wanted._replace(limit=high).bound([(sector.found[k][0], 1) for sector in found])
                     solved.append(lowest(matrix, bound, parity.rigid))
-                found.append(Part(tuple(solved), stiff, eye_array(len(stiff[0])), 1, parity))
-            few = min(sum(len(part.found[k][0]) for part in found) for k in range(len(tensors)))
+                found.append(Sector(tuple(solved), stiff, eye_array(len(stiff[0])), 1, parity))
+            few = min(sum(len(sector.found[k][0]) for sector in found) for k in range(len(tensors)))
             if high >= wanted.limit or few >= wanted.most:
                 return found
             high *= 2
 
-    def shown(self, parts: Sequence[Part], vectors: Sequence[Array]) -> Shown:
-        """Vectors (n, b), a matrix a part, on the surface."""
+    def shown(self, sectors: Sequence[Sector], vectors: Sequence[Array]) -> Shown:
+        """Vectors (n, b), a matrix a sector, on the surface."""
         shell = structured.box(self.box.size_m, skin_cells(self.size, self.wave))
         skin = surface(shell)
         point = shell.node_m[skin.node]
         moved = [
-            shapes_at(point / self.length_m, self.size, part.place, vector).transpose(0, 2, 1) @ self.box.axes.T
-            for part, vector in zip(parts, vectors, strict=True)
+            shapes_at(point / self.length_m, self.size, sector.place, vector).transpose(0, 2, 1) @ self.box.axes.T
+            for sector, vector in zip(sectors, vectors, strict=True)
         ]
         shape = np.concatenate([m.astype(np.float32) for m in moved], axis=1).transpose(0, 2, 1)
         vertex = point @ self.box.axes.T + self.box.centre_m
         return Shown(vertex, skin.face, np.zeros(len(skin.face)), np.ascontiguousarray(shape))
 
-    def error(self, parts: Sequence[Part], tensor: Array, top: tuple[int, int]) -> float:
-        """Of the frequency of mode top[1] of part top[0], relative: what the same parity loses by two more degrees."""
-        mine = parts[top[0]]
+    def error(self, sectors: Sequence[Sector], tensor: Array, top: tuple[int, int]) -> float:
+        """Of the frequency of mode top[1] of sector top[0], relative: what two more degrees take off."""
+        mine = sectors[top[0]]
         value = float(mine.found[0][0][top[1]])
         more = list(parities(self.size, tuple(n + 2 for n in self.terms)))[top[0]]  # type: ignore[arg-type]
         other, _ = lowest(more.stiffness(tensor), value * (1 + 1e-9), more.rigid)
@@ -259,13 +266,13 @@ class Ritz:
         x, y, z = (n + 2 for n in self.terms)
         return replace(self, terms=(x, y, z)) if unknowns((x, y, z)) <= MOST_UNKNOWNS else None
 
-    def note(self, parts: Sequence[Part]) -> str:
+    def note(self, sectors: Sequence[Sector]) -> str:
         """How it was done."""
         return f"box of {' x '.join(str(n) for n in self.terms)} polynomials"
 
 
-def way(shape: Shape, length_m: float, tensor: Array, wanted: Wanted) -> Ritz | None:
-    """The way of a free box, with polynomials enough for what is wanted; None where the shape is none, where its
+def method_for(shape: Shape, length_m: float, tensor: Array, wanted: Wanted) -> Ritz | None:
+    """The method of a free box, with polynomials enough for what is wanted; None where the shape is none, where its
     material's axes are not its own, or where it takes too many unknowns.
     """
     box = recognised(shape)
@@ -273,12 +280,9 @@ def way(shape: Shape, length_m: float, tensor: Array, wanted: Wanted) -> Ritz | 
         return None
     size = box.size_m / length_m
     thin, most = float(size.min()), wave_number_of(wanted.most, size)
-    # λ at which the plate's waves are as short as so many modes may take
-    tries = np.geomspace(1e-12, 1e12, 400)
-    high = float(tries[int(np.argmax(wave_number(tries, thin, tensor) > most))])
-    wave = float(min(wave_number(wanted.limit, thin, tensor), most)) if np.isfinite(wanted.limit) else most
+    wave = float(min(wave_number(wanted.limit, thin, tensor), most))
     terms = degrees(size, wave)
-    return Ritz(box, length_m, terms, wave, max(high, 1e-300)) if unknowns(terms) <= MOST_UNKNOWNS else None
+    return Ritz(box, length_m, terms, wave, omega2_of(most, thin, tensor)) if unknowns(terms) <= MOST_UNKNOWNS else None
 
 
 def isotropic(stiffness: Array) -> bool:

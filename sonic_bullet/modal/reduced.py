@@ -6,7 +6,7 @@ beyond.
     V: modes at ν₁ and ν₂ together, VᵀMV = 1;   (l VᵀK_lV + s VᵀK_sV) q = θ q,  λ = γ θ/L²,  γ = E/ρ     [Rayleigh-Ritz]
 
 The error of λ is of the fourth order in the distances from ν₁ and ν₂. Lengths by the body's diagonal L, as in model.py.
-The way to the modes at both is that of `analyse` (ways.py).
+The method for the modes at both is that of `analyse` (methods.py).
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ import numpy as np
 
 from sonic_bullet.modal import cache as store
 from sonic_bullet.modal.isotropic_family import Family, mixed
+from sonic_bullet.modal.methods import chosen
 from sonic_bullet.modal.model import diagonal_m, solid_key
-from sonic_bullet.modal.parts import MOST_MODES, Wanted, Way
-from sonic_bullet.modal.ways import chosen
+from sonic_bullet.modal.sectors import MOST_MODES, ModalMethod, Wanted
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.errors import ModalError
 
@@ -76,7 +76,7 @@ def family(
     kept = (cache, solid_key((shape,), None, edge_m))
     low, high = _poissons(poisson)
     wanted = Wanted(limit, MOST_MODES, BEYOND)
-    way = chosen(
+    method = chosen(
         (shape,),
         length,
         mixed(max(low, high), *_lame_shear()),
@@ -87,7 +87,7 @@ def family(
         kept=kept,
         say=say,
     )
-    made = _reduced(way, length, wanted, (low, high), say)
+    made = _reduced(method, length, wanted, (low, high), say)
     numbers = np.array([made.volume_m3, made.count, made.meshed])
     arrays = {
         "lame": made.lame,
@@ -124,27 +124,29 @@ def _lame_shear() -> tuple[Array, Array]:
 
 
 def _reduced(
-    way: Way, length: float, wanted: Wanted, poisson: tuple[float, float], say: Callable[[str], None]
+    method: ModalMethod, length: float, wanted: Wanted, poisson: tuple[float, float], say: Callable[[str], None]
 ) -> Family:
-    """The family that the modes at two Poisson's ratios span, part by part."""
+    """The family that the modes at two Poisson's ratios span, sector by sector."""
     from scipy.linalg import block_diag
 
-    parts = way.parts([np.asarray(mixed(nu, *_lame_shear())) for nu in poisson], wanted, say)
-    parts = [part for part in parts if any(len(value) for value, _ in part.found)]
-    if not parts:
+    sectors = method.sectors([np.asarray(mixed(nu, *_lame_shear())) for nu in poisson], wanted, say)
+    sectors = [sector for sector in sectors if any(len(value) for value, _ in sector.found)]
+    if not sectors:
         raise ModalError("body has no mode in the band", "raise the band's end")
     share = np.linalg.inv([[mixed(nu, 1.0, 0.0), mixed(nu, 0.0, 1.0)] for nu in poisson])  # of K at both ν in K_l, K_s
     bases, lame, shear = [], [], []
-    for part in parts:
-        (_, first), (_, second) = part.found
-        basis = _together(first, second, lambda v, part=part: part.mass @ v)  # type: ignore[misc]
+    for sector in sectors:
+        (_, first), (_, second) = sector.found
+        basis = _together(first, second, lambda v, sector=sector: sector.mass @ v)  # type: ignore[misc]
         bases.append(basis)
-        whole = np.tensordot(share, [basis.T @ (stiff @ basis) for stiff in part.stiff], 1)
+        whole = np.tensordot(share, [basis.T @ (stiff @ basis) for stiff in sector.stiff], 1)
         whole = (whole + whole.transpose(0, 2, 1)) / 2
-        lame += [whole[0]] * part.copies
-        shear += [whole[1]] * part.copies
-    shown = way.shown(parts, bases)
-    counts = [sum(int((part.found[k][0] <= wanted.limit).sum()) * part.copies for part in parts) for k in (0, 1)]
+        lame += [whole[0]] * sector.multiplicity
+        shear += [whole[1]] * sector.multiplicity
+    shown = method.shown(sectors, bases)
+    counts = [
+        sum(int((sector.found[k][0] <= wanted.limit).sum()) * sector.multiplicity for sector in sectors) for k in (0, 1)
+    ]
     return Family(
         block_diag(*lame),
         block_diag(*shear),
@@ -152,8 +154,8 @@ def _reduced(
         shown.vertex_m,
         shown.face,
         length,
-        way.volume * length**3,
+        method.volume * length**3,
         min(MOST_MODES, *counts),
-        f"{way.note(parts)}; nu {poisson[0]:g} and {poisson[1]:g}",
-        way.meshed,
+        f"{method.note(sectors)}; nu {poisson[0]:g} and {poisson[1]:g}",
+        method.meshed,
     )

@@ -22,7 +22,7 @@ import numpy as np
 from sonic_bullet.modal import cache as store
 from sonic_bullet.modal.isotropic_family import Family
 from sonic_bullet.modal.model import diagonal_m
-from sonic_bullet.modal.parts import MOST_MODES, SHIFT
+from sonic_bullet.modal.sectors import MOST_MODES, SHIFT
 from sonic_bullet.records import ORTHOTROPIC, Array, Shape
 from sonic_bullet.records.errors import MeshError
 

@@ -2,7 +2,7 @@
 
     d_line = ½(α + βλ) + Δd
         Δd: radiation.far_field, in the air that the run time plays in (render/resonator.py), of the modes on the
-        family's surface, which follows their waves as the run time's own does (modal/ways.py makes both)
+        family's surface, which follows their waves as the run time's own does (modal/methods.py makes both)
 
 Modes that count as one line: their mean, weighted by the squares of what the strikes let the sensor
 hear of each.

@@ -24,7 +24,7 @@ GAP = (
     0.45  # radians: the widest gap between neighbours on a ring; with fewer than 14 the area is 3 % less than a disc's
 )
 BORE = 1e-3  # of the diagonal: the least radius of a ring
-ON_THE_WAY = 1.02  # length of a detour over a third ring, over the direct way, that makes the direct one no side
+BETWEEN = 1.02  # length of a detour over a third ring, over the direct way, that makes the direct one no side
 SAME = 0.02  # relative difference of volumes
 ARC = 256  # sides of a half circle: its area to 5e-5
 
@@ -209,7 +209,7 @@ def _sides(triple: Array, middle: Array, filled: Array) -> tuple[list[list[int]]
     for a, b in edge.tolist():
         direct = float(np.linalg.norm(middle[a] - middle[b]))
         over = any(
-            np.linalg.norm(middle[a] - middle[c]) + np.linalg.norm(middle[c] - middle[b]) < ON_THE_WAY * direct
+            np.linalg.norm(middle[a] - middle[c]) + np.linalg.norm(middle[c] - middle[b]) < BETWEEN * direct
             for c in neighbours[a] & neighbours[b]
         )
         if not over:

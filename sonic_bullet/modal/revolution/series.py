@@ -85,7 +85,7 @@ def series(section: Section, tensors: list[Array]) -> Series:
     where = np.repeat(column, 30, axis=1).ravel(), np.tile(column, (1, 30)).ravel()
     n = 3 * len(order)
 
-    def gathered(blocks: Array) -> Any:
+    def sparse_of(blocks: Array) -> Any:
         return csr_array((blocks.ravel(), where), shape=(n, n))
 
     power = []
@@ -93,9 +93,9 @@ def series(section: Section, tensors: list[Array]) -> Series:
         one, two = (np.matmul(tensor, s.reshape(t, q, 6, 30)).reshape(t, q * 6, 30) for s in (plain, turned))
         first, third = plain.transpose(0, 2, 1) @ one, turned.transpose(0, 2, 1) @ two
         mixed = plain.transpose(0, 2, 1) @ two
-        power.append((gathered(first), gathered(mixed + mixed.transpose(0, 2, 1)), gathered(third)))
+        power.append((sparse_of(first), sparse_of(mixed + mixed.transpose(0, 2, 1)), sparse_of(third)))
     heavy = value * weight
     block = np.einsum("tqi,tqj->tij", heavy, heavy)
-    mass = gathered(np.einsum("tij,ab->tiajb", block, np.eye(3)))
+    mass = sparse_of(np.einsum("tij,ab->tiajb", block, np.eye(3)))
     on_axis = np.unique(section.dof[section.on_axis])
     return Series(tuple(power), mass, place[on_axis], place)

@@ -1,4 +1,4 @@
-"""What every way to modes hands on: parts that no symmetry couples, and their surface (ways.py chooses the way).
+"""What every method for the modes hands on: sectors that no symmetry couples, and their surface (see methods.py).
 
 Lengths by the body's diagonal L, density one: λ = λ' C/(ρL²) for stiffness in C, u = u'/√(ρL³).
 """
@@ -16,22 +16,23 @@ MOST_MODES = 200
 SHIFT = 20.0  # × (2V/A)²/L²: a third of the first elastic λ' of plates and bars, less of chunky bodies
 
 
-class Part(NamedTuple):
-    """Modes that no symmetry couples with those of another part. found: for each tensor λ (m,) ascending, elastic ones,
-    and vectors (n, m) with VᵀMV = 1; stiff: for each tensor K. copies: of each mode, 2 where they come in degenerate
-    pairs. place: what the way knows it by.
+class Sector(NamedTuple):
+    """Modes that no symmetry couples with those of another sector.
+
+    found: for each tensor λ (m,) ascending, elastic ones, and vectors (n, m) with VᵀMV = 1; stiff: for each tensor K.
+    multiplicity: of each mode, 2 for degenerate pairs. place: what the method knows it by.
     """
 
     found: tuple[tuple[Array, Array], ...]
     stiff: tuple[Any, ...]
     mass: Any
-    copies: int
+    multiplicity: int
     place: Any
 
 
 class Shown(NamedTuple):
-    """Surface of a body in m, body frame, as `ModalModel` has it; shape (v, 3, b) float32: of the parts' vectors in
-    turn, each part's copies one after the other.
+    """Surface of a body in m, body frame, as `ModalModel` has it; shape (v, 3, b) float32: of the sectors' vectors in
+    turn, each sector's multiplicity one after the other.
     """
 
     vertex_m: Array
@@ -48,13 +49,13 @@ class Wanted(NamedTuple):
     beyond: float = 1.0
 
     def bound(self, found: Sequence[tuple[Array, int]]) -> float:
-        """The λ above which nothing is wanted, given what was found: λ (m,) and how many copies of each."""
-        value = np.concatenate([np.zeros(0), *(np.repeat(v, copies) for v, copies in found)])
+        """The λ above which nothing is wanted, given what was found: λ (m,) and how many multiplicity of each."""
+        value = np.concatenate([np.zeros(0), *(np.repeat(v, multiplicity) for v, multiplicity in found)])
         highest = np.partition(value, self.most - 1)[self.most - 1] if len(value) >= self.most else np.inf
         return self.beyond * min(self.limit, float(highest))
 
 
-class Way(Protocol):
+class ModalMethod(Protocol):
     """How the modes of one body are found. volume: in units of L³. meshed: whether elements' errors are in its λ."""
 
     @property
@@ -62,22 +63,22 @@ class Way(Protocol):
     @property
     def meshed(self) -> bool: ...
 
-    def parts(self, tensors: Sequence[Array], wanted: Wanted, say: Callable[[str], None]) -> list[Part]:
+    def sectors(self, tensors: Sequence[Array], wanted: Wanted, say: Callable[[str], None]) -> list[Sector]:
         """The modes wanted of each tensor (6, 6). Raises ModalError, MeshError."""
         ...
 
-    def shown(self, parts: Sequence[Part], vectors: Sequence[Array]) -> Shown:
-        """Vectors (n, b), a matrix a part, on the surface."""
+    def shown(self, sectors: Sequence[Sector], vectors: Sequence[Array]) -> Shown:
+        """Vectors (n, b), a matrix a sector, on the surface."""
         ...
 
-    def note(self, parts: Sequence[Part]) -> str:
+    def note(self, sectors: Sequence[Sector]) -> str:
         """How it was done."""
         ...
 
-    def error(self, parts: Sequence[Part], tensor: Array, top: tuple[int, int]) -> float:
-        """Estimated relative error in frequency of mode top[1] of part top[0]; NaN where it is not known."""
+    def error(self, sectors: Sequence[Sector], tensor: Array, top: tuple[int, int]) -> float:
+        """Estimated relative error in frequency of mode top[1] of sector top[0]; NaN where it is not known."""
         ...
 
-    def finer(self) -> Way | None:
+    def finer(self) -> ModalMethod | None:
         """The same with a smaller error, None where it may cost no more."""
         ...
