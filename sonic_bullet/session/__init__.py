@@ -131,7 +131,7 @@ class Listener:
         """
         how: dict[str, Any] = {
             "material": material, "mesh": mesh, "model": model, "roughness_m": roughness_m, "fixed": fixed,
-            "thickness_m": thickness_m, "to_hz": to_hz, "count": count,
+            "thickness_m": thickness_m, "to_hz": to_hz, "count": count, "accuracy": accuracy,
         }  # fmt: skip
         return self._added([wanted_body(self.world, body, link, **how)], progress)[0]
 

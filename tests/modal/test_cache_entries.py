@@ -93,7 +93,7 @@ def test_float32_in_place_of_float64_is_a_miss_and_is_replaced(
     assert {path: path.read_bytes() for path in tmp_path.glob("*.npz")} == kept
     for room, name in (
         (eigen, "solve"),
-        (reduced, "_family"),
+        (reduced, "chosen"),
         (tensor, "_of_elements"),
         (radiated.radiation, "radiation"),
     ):
