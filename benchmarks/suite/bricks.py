@@ -82,6 +82,21 @@ def grid(
     cell = cell.reshape(-1, 20)
     where = np.stack([used // (size[1] * size[2]), used // size[2] % size[1], used % size[2]], axis=1) / (2 * n)
     node = place(where)
+    outer = outer_rings(cell)
+    triangle = outer[:, [[7, 0, 1], [1, 2, 3], [3, 4, 5], [5, 6, 7], [7, 1, 3], [7, 3, 5]]].reshape(-1, 3)
+    skin, face = np.unique(triangle, return_inverse=True)
+    face = face.reshape(-1, 3)
+    body = Bricks(node, cell, skin, face, centre)
+    corner = node[skin][face]
+    if np.einsum("fi,fi->", corner[:, 0], np.cross(corner[:, 1], corner[:, 2])) < 0:
+        body = Bricks(node, _mirrored(cell), skin, face[:, ::-1], centre)
+    return body
+
+
+def outer_rings(cell: Array) -> Array:
+    """Faces (q, 8) of cells (c, 20) that belong to one cell alone: eight nodes around, corners first and every second,
+    counter-clockwise seen from outside a cell that is not mirrored.
+    """
     number = {(int(a), int(b), int(c)): i for i, (a, b, c) in enumerate(OFFSET)}
     sides = []
     for axis in range(3):
@@ -92,17 +107,8 @@ def grid(
             ]
             sides.append(cell[:, around])
     ring = np.concatenate(sides)
-    key = np.sort(ring, axis=1)
-    _, index, count = np.unique(key, axis=0, return_index=True, return_counts=True)
-    outer = ring[np.sort(index[count == 1])]
-    triangle = outer[:, [[7, 0, 1], [1, 2, 3], [3, 4, 5], [5, 6, 7], [7, 1, 3], [7, 3, 5]]].reshape(-1, 3)
-    skin, face = np.unique(triangle, return_inverse=True)
-    face = face.reshape(-1, 3)
-    body = Bricks(node, cell, skin, face, centre)
-    corner = node[skin][face]
-    if np.einsum("fi,fi->", corner[:, 0], np.cross(corner[:, 1], corner[:, 2])) < 0:
-        body = Bricks(node, _mirrored(cell), skin, face[:, ::-1], centre)
-    return body
+    _, index, count = np.unique(np.sort(ring, axis=1), axis=0, return_index=True, return_counts=True)
+    return np.asarray(ring[np.sort(index[count == 1])])
 
 
 def _inserted(a: int, b: int, axis: int, side: int) -> tuple[int, int, int]:
