@@ -3,6 +3,7 @@
 python -m benchmarks.thin_walls [table] [BODY …] [--json]     first fifteen modes of each body against the kept truth
 python -m benchmarks.thin_walls truth [BODY …]                the truth made again by ccx and kept in calculix.json
 python -m benchmarks.thin_walls hundred [BODY …] [--json]     the first 100 modes or 10 kHz: processor time and memory
+python -m benchmarks.thin_walls race [--json]                 a solid of 60 k unknowns and a plate, beside ccx in one run
 """
 
 from __future__ import annotations
@@ -14,9 +15,10 @@ from typing import Any
 
 from benchmarks.thin_walls import calculix, reference
 from benchmarks.thin_walls.bodies import BODIES
-from benchmarks.thin_walls.ours import compared, measured
+from benchmarks.thin_walls.ours import compared, hundred, measured
+from benchmarks.thin_walls.race import RACES, raced
 
-WHATS = ("table", "truth", "hundred")
+WHATS = ("table", "truth", "hundred", "race")
 WORST, SPLIT = 0.01, 5e-4
 """What must hold: error of the first fifteen modes, distance within pairs."""
 SECONDS, BYTES = 10.0, 1.5e9
@@ -40,10 +42,19 @@ def make_truth(names: list[str]) -> int:
     return 0
 
 
-def row(name: str, *, hundred: bool) -> dict[str, Any]:
+def race(as_json: bool) -> int:
+    """Time ours and ccx on each body of `RACES`, one after the other."""
+    held = 0
+    for one in RACES:
+        figures = raced(one)
+        held += figures["ratio"] is not None and figures["ratio"] <= one.at_most
+        print(json.dumps(figures) if as_json else figures["said"], flush=True)
+    return 0 if held == len(RACES) else 1
+
+
+def row(name: str, what: str) -> dict[str, Any]:
     """A body's figures: those of the table, or of the first hundred modes."""
-    body = BODIES[name]
-    ours = measured(name, hundred=hundred)
+    ours = hundred(name) if what == "hundred" else measured(name, count=reference.COUNT)
     figures = {
         "body": name,
         "modes": len(ours.frequency_hz),
@@ -52,10 +63,10 @@ def row(name: str, *, hundred: bool) -> dict[str, Any]:
         "note": ours.note,
         "error": ours.error,
     }
-    if hundred:
+    if what == "hundred":
         return {**figures, "top_hz": round(float(ours.frequency_hz[-1])) if len(ours.frequency_hz) else None}
     truth = reference.truth(name)
-    found = compared(ours.frequency_hz, truth, paired=body.paired)
+    found = compared(ours.frequency_hz, truth, paired=BODIES[name].paired)
     return {**figures, "worst": found.worst, "split": found.split, "truth": truth.change}
 
 
@@ -82,12 +93,14 @@ def main() -> int:
     names = given.names or list(BODIES)
     if what == "truth":
         return make_truth(names)
+    if what == "race":
+        return race(given.json)
     if not given.json:
         print("| body | modes | time | memory |" if what == "hundred" else HEAD)
         print("|---|---|---|---|" if what == "hundred" else "|---|---|---|---|---|---|")
     rows = []
     for name in names:
-        rows.append(row(name, hundred=what == "hundred"))
+        rows.append(row(name, what))
         print(json.dumps(rows[-1]) if given.json else printed(rows[-1]), flush=True)
     held = sum(good(figures) for figures in rows)
     print(f"{held} of {len(rows)} bodies hold", file=sys.stderr)

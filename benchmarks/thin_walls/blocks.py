@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -162,20 +163,21 @@ def cartesian(
     along_x: Sequence[int],
     along_y: Sequence[int],
     along_z: Sequence[int],
-    keep: Callable[[int, int, int], bool] = lambda i, j, k: True,
+    keep: Callable[[float, float, float], bool] = lambda x, y, z: True,
 ) -> list[Block]:
-    """Straight blocks between the breaks x, y, z (m) with so many cells in each interval; keep: which intervals."""
-    return [
-        Block((nx, ny, nz), _straight(np.array([x[i], y[j], z[k]]), np.array([x[i + 1], y[j + 1], z[k + 1]])))
-        for i, nx in enumerate(along_x)
-        for j, ny in enumerate(along_y)
-        for k, nz in enumerate(along_z)
-        if keep(i, j, k)
-    ]
+    """Straight blocks between the breaks x, y, z (m) with so many cells in each interval; keep: those with this centre."""
+    blocks = []
+    for i, nx in enumerate(along_x):
+        for j, ny in enumerate(along_y):
+            for k, nz in enumerate(along_z):
+                low, high = np.array([x[i], y[j], z[k]]), np.array([x[i + 1], y[j + 1], z[k + 1]])
+                if keep(*((low + high) / 2)):
+                    blocks.append(Block((nx, ny, nz), partial(_straight, low, high)))
+    return blocks
 
 
-def _straight(low: Array, high: Array) -> Callable[[Array], Array]:
-    return lambda p: low + p * (high - low)
+def _straight(low: Array, high: Array, p: Array) -> Array:
+    return np.asarray(low + p * (high - low))
 
 
 def grip(

@@ -32,7 +32,7 @@ class Detail:
         return max(1, round(self.along * count))
 
 
-SURFACE = Detail(FACETS // 4, 2.0)
+SURFACE = Detail(FACETS // 4, 3.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,13 +171,13 @@ def _mug(d: Detail) -> list[Block]:
 
 
 def _pan(d: Detail) -> list[Block]:
-    """Handle: a straight bar of 20 × 5 mm, 0.16 m long."""
+    """Handle: a straight bar of 26 × 5 mm, 0.16 m long."""
     outer, wall, base, height = 0.100, 0.003, 0.004, 0.050
     n = d.cells(1)
     return [
         *_cup(outer, wall, base, d),
         *_rise(outer, wall, [base, 0.035, 0.040, height], [d.cells(3), n, d.cells(1)], d),
-        grip(d.quarter, d.quarter // 8, n, d.cells(8), outer, 0.0375, None, 0.005, 0.160),
+        grip(d.quarter, d.quarter // 6, n, d.cells(8), outer, 0.0375, None, 0.005, 0.160),
     ]
 
 
@@ -231,88 +231,172 @@ def _bottle(d: Detail) -> list[Block]:
 
 
 def _tray(d: Detail) -> list[Block]:
-    """A box with its lid off: inner walls at t from outer."""
+    """A box with its lid off. Beside each wall, and in what follows each rib, a band as wide as the wall is thick."""
     t, (a, b, c) = 0.0015, (0.20, 0.15, 0.08)
     n = d.across
     return cartesian(
-        [0, t, a - t, a], [0, t, b - t, b], [0, t, c],
-        [n, d.cells(12), n], [n, d.cells(9), n], [n, d.cells(6)],
-        lambda i, j, k: k == 0 or i != 1 or j != 1,
-    )  # fmt: skip
+        [0, t, 2 * t, a - 2 * t, a - t, a], [0, t, 2 * t, b - 2 * t, b - t, b], [0, t, 2 * t, c],
+        [n, n, d.cells(12), n, n], [n, n, d.cells(9), n, n], [n, n, d.cells(6)],
+        lambda x, y, z: z < t or not (t < x < a - t and t < y < b - t))  # fmt: skip
 
 
 def _panel(d: Detail) -> list[Block]:
     """A plate with two ribs along x."""
-    rib = 0.003
-    y = [0, 0.1 - rib / 2, 0.1 + rib / 2, 0.2 - rib / 2, 0.2 + rib / 2, 0.3]
+    rib, plate, n = 0.003, 0.002, d.across
+    y = [0, *(middle + off for middle in (0.1, 0.2) for off in (-1.5 * rib, -rib / 2, rib / 2, 1.5 * rib)), 0.3]
+    bay = d.cells(4)
     return cartesian(
-        [0, 0.4], y, [0, 0.002, 0.020],
-        [d.cells(16)], [d.cells(4), d.across, d.cells(4), d.across, d.cells(4)], [d.across, d.cells(2)],
-        lambda i, j, k: k == 0 or j in (1, 3),
-    )  # fmt: skip
+        [0, 0.4], y, [0, plate, 2 * plate, 0.020],
+        [d.cells(16)], [bay, n, n, n, bay, n, n, n, bay], [n, n, d.cells(2)],
+        lambda x, y, z: z < plate or min(abs(y - 0.1), abs(y - 0.2)) < rib / 2)  # fmt: skip
 
 
 def _angle(d: Detail) -> list[Block]:
-    t = 0.003
+    t, n = 0.003, d.across
     return cartesian(
-        [0, 0.3], [0, t, 0.04], [0, t, 0.04],
-        [d.cells(20)], [d.across, d.cells(4)], [d.across, d.cells(4)],
-        lambda i, j, k: j == 0 or k == 0,
-    )  # fmt: skip
+        [0, 0.3], [0, t, 2 * t, 0.04], [0, t, 2 * t, 0.04],
+        [d.cells(20)], [n, n, d.cells(3)], [n, n, d.cells(3)],
+        lambda x, y, z: y < t or z < t)  # fmt: skip
 
 
 def _tee(d: Detail) -> list[Block]:
-    t, w, h = 0.004, 0.05, 0.05
+    t, w, h, n = 0.004, 0.05, 0.05, d.across
     return cartesian(
-        [0, 0.4], [0, (w - t) / 2, (w + t) / 2, w], [0, t, h],
-        [d.cells(20)], [d.cells(3), d.across, d.cells(3)], [d.across, d.cells(5)],
-        lambda i, j, k: k == 0 or j == 1,
-    )  # fmt: skip
+        [0, 0.4], [0, w / 2 - 1.5 * t, w / 2 - t / 2, w / 2 + t / 2, w / 2 + 1.5 * t, w], [0, t, 2 * t, h],
+        [d.cells(20)], [d.cells(2), n, n, n, d.cells(2)], [n, n, d.cells(4)],
+        lambda x, y, z: z < t or abs(y - w / 2) < t / 2)  # fmt: skip
 
 
 def _channel(d: Detail) -> list[Block]:
-    t, w, h = 0.002, 0.04, 0.025
+    t, w, h, n = 0.002, 0.04, 0.025, d.across
     return cartesian(
-        [0, 0.25], [0, t, w - t, w], [0, t, h],
-        [d.cells(20)], [d.across, d.cells(5), d.across], [d.across, d.cells(3)],
-        lambda i, j, k: k == 0 or j != 1,
-    )  # fmt: skip
+        [0, 0.25], [0, t, 2 * t, w - 2 * t, w - t, w], [0, t, 2 * t, h],
+        [d.cells(20)], [n, n, d.cells(4), n, n], [n, n, d.cells(3)],
+        lambda x, y, z: z < t or min(y, w - y) < t)  # fmt: skip
 
 
 _FLAT = Detail(FACETS // 4, 0.01)  # flat sides and straight generators as few triangles as their outline allows
-_COARSE, _FINE = Detail(6, 1.0), Detail(9, 1.5)
-_THICK, _THICKER = Detail(6, 1.0, 2), Detail(9, 1.5, 3)
-_GRIP, _GRIPPED = Detail(8, 1.0), Detail(16, 2.0)
+_SHEET = Detail(6, 1.0), Detail(9, 2.0, 2)
+_STOUT = Detail(6, 1.0, 2), Detail(9, 1.5, 3)
+_SHELL = Detail(9, 1.5), Detail(14, 2.25, 2)
+_RIBBED = Detail(6, 1.0, 2), Detail(6, 1.5, 3)
+_BOWL = Detail(12, 2.0), Detail(16, 2.75, 2)
+_FOIL = Detail(9, 1.5), Detail(14, 2.25)
+_TUBE = Detail(6, 1.5, 2), Detail(9, 2.25, 3)
+_OPEN_SECTION = Detail(6, 1.0, 2), Detail(6, 1.5, 4)  # twist is soft, and the corner takes four cells both ways
 
-BODIES = {
-    body.name: body
-    for body in (
-        ThinBody("square-bar", "300 × 20 × 20 mm", STEEL, _bar, _THICK, _THICKER, facets=_FLAT),
-        ThinBody("round-bar", "⌀ 12 × 200 mm", STEEL, _rod, Detail(2, 1.0), Detail(3, 1.5), facets=_FLAT),
-        ThinBody("square-plate-0.002", "300 × 300 × 0.6 mm", STEEL, _plate(0.3, 0.0006), _COARSE, _FINE, facets=_FLAT),
-        ThinBody("square-plate-0.01", "300 × 300 × 3 mm", STEEL, _plate(0.3, 0.003), _COARSE, _FINE, facets=_FLAT),
-        ThinBody("square-plate-0.1", "100 × 100 × 10 mm", GLASS, _plate(0.1, 0.01), _COARSE, Detail(9, 1.5, 2), facets=_FLAT),
-        ThinBody("round-plate-0.002", "⌀ 300 × 0.6 mm", BRASS, _round_plate(0.15, 0.0006), _COARSE, _FINE, facets=_FLAT),
-        ThinBody("round-plate-0.01", "⌀ 300 × 3 mm", BRASS, _round_plate(0.15, 0.003), _COARSE, _FINE, facets=_FLAT),
-        ThinBody("round-plate-0.1", "⌀ 100 × 10 mm", GLASS, _round_plate(0.05, 0.01), _COARSE, Detail(9, 1.5, 2), facets=_FLAT),
-        ThinBody("tube-0.01", "⌀ 60 × 200 mm, wall 0.3 mm", BRASS, _tube(0.03, 0.0003, 0.2), Detail(8, 1.5), Detail(12, 2.25), facets=_FLAT),
-        ThinBody("tube-0.05", "⌀ 40 × 300 mm, wall 1 mm", BRASS, _tube(0.02, 0.001, 0.3), Detail(8, 1.5), Detail(12, 2.25), facets=_FLAT),
-        ThinBody("tube-0.2", "⌀ 30 × 200 mm, wall 3 mm", STEEL, _tube(0.015, 0.003, 0.2), _COARSE, Detail(9, 1.5, 2), facets=_FLAT),
-        ThinBody("ring", "⌀ 70 × 6 mm, wall 1.5 mm", BRASS, _tube(0.035, 0.0015, 0.006), Detail(8, 0.13), Detail(12, 0.25), facets=_FLAT),
-        ThinBody("bowl", "half a ball ⌀ 140 mm, wall 3 mm", PORCELAIN, _cap(0.07, 0.003, 90.0), _COARSE, _FINE),
-        ThinBody("singing-bowl", "⌀ 150 × 75 mm, wall 3 mm, rim 5 mm", BRONZE, _walls(0.035, [(0.035, 80.0, 0.003, 5), (0.040, 0.0, 0.005, 4)], 0.003), _COARSE, _FINE),
-        ThinBody("dome", "cap of a ball of radius 200 mm, 50° to each side, 2 mm", STEEL, _cap(0.2, 0.002, 50.0), Detail(8, 1.5), Detail(12, 2.25)),
-        ThinBody("gong", "⌀ 240 mm, 1.5 mm, rim of 30 mm turned down", BRONZE, _walls(0.110, [(0.010, 85.0, 0.0015, 2), (0.020, 0.0, 0.0015, 2)], 0.0015), Detail(8, 2.0), Detail(12, 3.0)),
-        ThinBody("bell", "⌀ 105 × 95 mm, wall 3 mm, lip 7 mm", BRONZE, _walls(0.020, [(0.012, 78.0, 0.003, 2), (0.045, 0.0, 0.003, 4), (-0.050, -33.0, 0.007, 4)], 0.003), _COARSE, _FINE),
-        ThinBody("tumbler", "⌀ 80 × 110 mm, wall 2.2 mm", GLASS, _tumbler, _COARSE, _FINE),
-        ThinBody("wine-glass", "bowl ⌀ 74 mm, wall 1.6 mm, stem ⌀ 9 mm, foot ⌀ 68 mm", GLASS, _wine_glass, _COARSE, _FINE),
-        ThinBody("bottle", "⌀ 72 × 250 mm, wall 3 mm", GLASS, _bottle, _COARSE, _FINE),
-        ThinBody("mug", "⌀ 80 × 90 mm, wall 4 mm, handle 16 × 7 mm", PORCELAIN, _mug, _GRIP, _GRIPPED, paired=False),
-        ThinBody("pan", "⌀ 200 × 50 mm, wall 3 mm, handle 20 × 5 × 160 mm", STEEL, _pan, _GRIP, _GRIPPED, paired=False),
-        ThinBody("open-box", "200 × 150 × 80 mm, walls 1.5 mm", STEEL, _tray, _COARSE, _FINE, paired=False, facets=_FLAT),
-        ThinBody("stiffened-panel", "400 × 300 × 2 mm, two ribs 18 × 3 mm", STEEL, _panel, _COARSE, _FINE, paired=False, facets=_FLAT),
-        ThinBody("angle", "40 × 40 × 3 mm, 300 mm long", STEEL, _angle, _COARSE, _FINE, paired=False, facets=_FLAT),
-        ThinBody("t-section", "50 × 50 × 4 mm, 400 mm long", STEEL, _tee, _COARSE, _FINE, paired=False, facets=_FLAT),
-        ThinBody("channel", "40 × 25 × 2 mm, 250 mm long", STEEL, _channel, _COARSE, _FINE, paired=False, facets=_FLAT),
-    )
-}  # fmt: skip
+_BRASS_BOWL = [(0.035, 80.0, 0.003, 5), (0.040, 0.0, 0.005, 4)]
+_GONG_RIM = [(0.010, 85.0, 0.0015, 2), (0.020, 0.0, 0.0015, 2)]
+_BELL_WAIST = [(0.012, 78.0, 0.003, 2), (0.045, 0.0, 0.003, 4), (-0.050, -33.0, 0.007, 4)]
+
+BARS = (
+    ThinBody("square-bar", "300 × 20 × 20 mm", STEEL, _bar, Detail(6, 2.0), Detail(6, 3.0, 2), facets=_FLAT),
+    ThinBody("round-bar", "⌀ 12 × 200 mm", STEEL, _rod, Detail(3, 2.0), Detail(4, 3.0), facets=_FLAT),
+    ThinBody("angle", "40 × 40 × 3 mm, 300 mm long", STEEL, _angle, *_OPEN_SECTION, paired=False, facets=_FLAT),
+    ThinBody("t-section", "50 × 50 × 4 mm, 400 mm long", STEEL, _tee, *_OPEN_SECTION, paired=False, facets=_FLAT),
+    ThinBody("channel", "40 × 25 × 2 mm, 250 mm long", STEEL, _channel, *_OPEN_SECTION, paired=False, facets=_FLAT),
+)
+PLATES = (
+    ThinBody(
+        "square-plate-0.002",
+        "300 × 300 × 0.6 mm",
+        STEEL,
+        _plate(0.3, 0.0006),
+        Detail(6, 1.0),
+        Detail(6, 2.0),
+        facets=_FLAT,
+    ),
+    ThinBody("square-plate-0.01", "300 × 300 × 3 mm", STEEL, _plate(0.3, 0.003), *_SHEET, facets=_FLAT),
+    ThinBody("square-plate-0.1", "100 × 100 × 10 mm", GLASS, _plate(0.1, 0.01), *_STOUT, facets=_FLAT),
+    ThinBody("round-plate-0.002", "⌀ 300 × 0.6 mm", BRASS, _round_plate(0.15, 0.0006), *_FOIL, facets=_FLAT),
+    ThinBody("round-plate-0.01", "⌀ 300 × 3 mm", BRASS, _round_plate(0.15, 0.003), *_SHELL, facets=_FLAT),
+    ThinBody("round-plate-0.1", "⌀ 100 × 10 mm", GLASS, _round_plate(0.05, 0.01), *_STOUT, facets=_FLAT),
+    ThinBody(
+        "stiffened-panel",
+        "400 × 300 × 2 mm, two ribs of 18 × 3 mm",
+        STEEL,
+        _panel,
+        *_RIBBED,
+        paired=False,
+        facets=_FLAT,
+    ),
+    ThinBody("open-box", "200 × 150 × 80 mm, walls 1.5 mm", STEEL, _tray, *_RIBBED, paired=False, facets=_FLAT),
+)
+TUBES = (
+    ThinBody("tube-0.01", "⌀ 60 × 200 mm, wall 0.3 mm", BRASS, _tube(0.03, 0.0003, 0.2), *_FOIL, facets=_FLAT),
+    ThinBody("tube-0.05", "⌀ 40 × 300 mm, wall 1 mm", BRASS, _tube(0.02, 0.001, 0.3), *_SHELL, facets=_FLAT),
+    ThinBody("tube-0.2", "⌀ 30 × 200 mm, wall 3 mm", STEEL, _tube(0.015, 0.003, 0.2), *_TUBE, facets=_FLAT),
+    ThinBody(
+        "ring",
+        "⌀ 70 × 6 mm, wall 1.5 mm",
+        BRASS,
+        _tube(0.035, 0.0015, 0.006),
+        Detail(12, 0.25),
+        Detail(18, 0.5, 3),
+        facets=_FLAT,
+    ),
+)
+SHELLS = (
+    ThinBody("bowl", "half a ball ⌀ 140 mm, wall 3 mm", PORCELAIN, _cap(0.07, 0.003, 90.0), *_BOWL),
+    ThinBody("dome", "of a ball of radius 200 mm, 50° each way, 2 mm", STEEL, _cap(0.2, 0.002, 50.0), *_BOWL),
+    ThinBody("singing-bowl", "⌀ 150 × 75 mm, wall 3 mm, rim 5 mm", BRONZE, _walls(0.035, _BRASS_BOWL, 0.003), *_SHELL),
+    ThinBody(
+        "gong",
+        "⌀ 240 mm, 1.5 mm, rim of 30 mm",
+        BRONZE,
+        _walls(0.110, _GONG_RIM, 0.0015),
+        *_SHELL,
+        facets=Detail(24, 4.0),
+    ),
+    ThinBody("bell", "⌀ 105 × 95 mm, wall 3 mm, lip 7 mm", BRONZE, _walls(0.020, _BELL_WAIST, 0.003), *_SHELL),
+    ThinBody("tumbler", "⌀ 80 × 110 mm, wall 2.2 mm", GLASS, _tumbler, *_SHELL),
+    ThinBody(
+        "wine-glass",
+        "bowl ⌀ 74 mm, 1.6 mm, stem ⌀ 9 mm, foot ⌀ 68 mm",
+        GLASS,
+        _wine_glass,
+        Detail(7, 1.25),
+        Detail(10, 2.0, 2),
+    ),
+    ThinBody("bottle", "⌀ 72 × 250 mm, wall 3 mm", GLASS, _bottle, *_SHELL),
+    ThinBody(
+        "mug",
+        "⌀ 80 × 90 mm, wall 4 mm, handle 16 × 7 mm",
+        PORCELAIN,
+        _mug,
+        Detail(8, 1.0),
+        Detail(12, 1.5, 2),
+        paired=False,
+    ),
+    ThinBody(
+        "pan",
+        "⌀ 200 × 50 mm, wall 3 mm, handle 26 × 5 × 160 mm",
+        STEEL,
+        _pan,
+        Detail(6, 1.0),
+        Detail(12, 1.75, 2),
+        paired=False,
+    ),
+)
+
+
+def _notched(d: Detail) -> list[Block]:
+    return cartesian(
+        [0, 0.05, 0.10], [0, 0.04, 0.08], [0, 0.06],
+        [d.cells(12)] * 2, [d.cells(10)] * 2, [d.cells(14)], lambda x, y, z: x < 0.05 or y < 0.04,
+    )  # fmt: skip
+
+
+SOLID = ThinBody(
+    "notched-block",
+    "100 × 80 × 60 mm, a notch of 50 × 40 mm",
+    STEEL,
+    _notched,
+    Detail(6, 0.5),
+    Detail(6, 1.0),
+    paired=False,
+    facets=_FLAT,
+)
+"""No thin wall: a solid to race on."""
+
+BODIES = {body.name: body for body in (*BARS, *PLATES, *TUBES, *SHELLS)}

@@ -8,11 +8,12 @@ import resource
 import subprocess
 import sys
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from benchmarks.thin_walls.bodies import BODIES
-from benchmarks.thin_walls.reference import COUNT, Truth, pairs
+from benchmarks.thin_walls.bodies import BODIES, SOLID
+from benchmarks.thin_walls.reference import Truth, pairs
 from sonic_bullet.records import Array
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
@@ -22,7 +23,7 @@ HUNDRED, TOP_HZ = 100, 10_000.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Ours:
-    """frequency_hz (m,), processor_s and peak_bytes of the process less those of its imports; note: the model's;
+    """frequency_hz (m,), processor_s of the analysis, peak_bytes of its process and its children; note: the model's;
     error: why there are none.
     """
 
@@ -52,9 +53,11 @@ def compared(frequency_hz: Array, truth: Truth, *, paired: bool) -> Compared:
     return Compared(float(np.abs(ours / truth.frequency_hz - 1).max()), max(split) if split else None)
 
 
-def measured(name: str, *, hundred: bool = False) -> Ours:
-    """A body's modes by `sonic_bullet.modal.analyse`, without its cache, one process, one thread."""
-    command = [sys.executable, "-m", "benchmarks.thin_walls.ours", name, *(["hundred"] if hundred else [])]
+def measured(name: str, **options: float) -> Ours:
+    """A body's modes by `sonic_bullet.modal.analyse`, called with these options, without its cache, one process, one
+    thread.
+    """
+    command = [sys.executable, "-m", "benchmarks.thin_walls.ours", name, json.dumps(options)]
     ended = subprocess.run(
         command,
         capture_output=True,
@@ -69,27 +72,30 @@ def measured(name: str, *, hundred: bool = False) -> Ours:
     return Ours(np.array(said.pop("frequency_hz")), **said)
 
 
+def hundred(name: str) -> Ours:
+    """The first 100 modes or those up to 10 kHz, whichever are fewer."""
+    up_to = measured(name, to_hz=TOP_HZ)
+    return measured(name, count=HUNDRED) if len(up_to.frequency_hz) > HUNDRED else up_to
+
+
 def _used() -> tuple[float, int]:
     usage = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
     return sum(u.ru_utime + u.ru_stime for u in usage), max(u.ru_maxrss for u in usage) * 1024
 
 
-def child(name: str, hundred: bool) -> None:
+def child(name: str, options: dict[str, Any]) -> None:
     """Print one body's answer as JSON."""
     from sonic_bullet.modal import analyse
     from sonic_bullet.records.errors import SonicBulletError
 
-    body = BODIES[name]
+    body = {**BODIES, SOLID.name: SOLID}[name]
     shape = body.shape()
     before, _ = _used()
     frequency: list[float] = []
     note = error = ""
     try:
-        if hundred:
-            model = analyse((shape,), body.material, to_hz=TOP_HZ, cache=None)
-        else:
-            model = analyse((shape,), body.material, count=COUNT, cache=None)
-        frequency, note = model.freq_hz[:HUNDRED].tolist(), model.note
+        model = analyse((shape,), body.material, cache=None, **options)
+        frequency, note = model.freq_hz.tolist(), model.note
     except SonicBulletError as raised:
         error = f"{type(raised).__name__}: {raised}"
     after, peak = _used()
@@ -107,4 +113,4 @@ def child(name: str, hundred: bool) -> None:
 
 
 if __name__ == "__main__":
-    child(sys.argv[1], "hundred" in sys.argv[2:])
+    child(sys.argv[1], json.loads(sys.argv[2]))
