@@ -121,7 +121,7 @@ def _mirrored(cell: Array) -> Array:
     return cell[:, [number[(2 - int(a), int(b), int(c))] for a, b, c in OFFSET]]
 
 
-def _functions(points: Array) -> tuple[Array, Array]:
+def shape_functions(points: Array) -> tuple[Array, Array]:
     """N (q, 20) and its gradient (q, 20, 3) at points (q, 3) of the cube ±1."""
     sign = OFFSET - 1.0
     value, slope = np.empty((len(points), 20)), np.empty((len(points), 20, 3))
@@ -141,7 +141,7 @@ def _functions(points: Array) -> tuple[Array, Array]:
     return value, slope
 
 
-def _gauss(order: int) -> tuple[Array, Array]:
+def gauss_points(order: int) -> tuple[Array, Array]:
     """Points (order³, 3) in the cube ±1 and their weights."""
     point, weight = np.polynomial.legendre.leggauss(order)
     points = np.stack(np.meshgrid(point, point, point, indexing="ij"), axis=-1).reshape(-1, 3)
@@ -169,8 +169,8 @@ def matrices(body: Bricks, stiffness_pa: Array, density_kg_m3: float, softer: Ar
     c = len(body.cell)
     stiff, mass = np.zeros((c, 60, 60)), np.zeros((c, 20, 20))
     for order in (2, 3):
-        points, weights = _gauss(order)
-        value, slope = _functions(points)
+        points, weights = gauss_points(order)
+        value, slope = shape_functions(points)
         for q in range(len(points)):
             jacobian = np.einsum("cid,ik->cdk", body.node_m[body.cell], slope[q])
             volume = np.linalg.det(jacobian) * weights[q]

@@ -3,7 +3,7 @@
 python -m benchmarks.thin_walls [table] [BODY …] [--json]     first fifteen modes of each body against the kept truth
 python -m benchmarks.thin_walls truth [BODY …]                the truth made again by ccx and kept in calculix.json
 python -m benchmarks.thin_walls hundred [BODY …] [--json]     the first 100 modes or 10 kHz: processor time and memory
-python -m benchmarks.thin_walls race [--json]                 a solid of 60 k unknowns and a plate, beside ccx in one run
+python -m benchmarks.thin_walls race [--json]                 a solid of 60 k unknowns and a plate beside ccx
 """
 
 from __future__ import annotations

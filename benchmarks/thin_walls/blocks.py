@@ -1,6 +1,6 @@
 """Blocks of bricks and what they are put together from: sections swept round an axis, outlines drawn straight.
 
-    block: cells and a place x(a, b, c), a, b, c in 0..1 -> bricks with 20 nodes (suite/bricks.py) -> welded where they meet
+    block: cells, and a place x(a, b, c) of 0..1 -> bricks with 20 nodes (suite/bricks.py) -> welded where they meet
     disc:  a bulged square and four sectors round it (O-grid): no cell touches the axis with an edge or a point
     swept: a section's quadrilateral x(along, across) = (r, z), from 45° round
 
@@ -15,11 +15,11 @@ from functools import partial
 
 import numpy as np
 
-from benchmarks.suite.bricks import Bricks, grid, outer_rings
+from benchmarks.suite.bricks import Bricks, gauss_points, grid, outer_rings, shape_functions
 from sonic_bullet.records import Array
 
 Section = Callable[[Array, Array], tuple[Array, Array]]
-"""(along, across) in 0..1 -> (r, z) in m of a part of a section; along leads away from the axis where it starts there."""
+"""(along, across) in 0..1 -> (r, z) in m of a part of a section; where it starts at the axis, along leads away."""
 
 CORE, BULGE = 0.55, 0.12  # of a disc's square: half its side over the radius, and how far its sides bulge
 STUB = 0.125  # of a bent handle's cells at each end: its straight part
@@ -54,6 +54,15 @@ def welded(blocks: Iterable[Block]) -> Bricks:
     quad = quad.reshape(-1, 4)
     face = np.concatenate([quad[:, [0, 1, 2]], quad[:, [0, 2, 3]]])
     return Bricks(node[first], cell, skin, face, np.concatenate([part.centre for part in parts]))
+
+
+def brick_volumes_m3(body: Bricks) -> Array:
+    """Volumes of the bricks at their 27 points of Gauss (c, 27), weighted: all above zero where none is turned inside
+    out.
+    """
+    points, weight = gauss_points(3)
+    _, slope = shape_functions(points)
+    return np.asarray(np.linalg.det(np.einsum("cid,qik->cqdk", body.node_m[body.cell], slope)) * weight)
 
 
 def disc(quarter: int, rings: int, layers: int, section: Section) -> list[Block]:
@@ -114,7 +123,7 @@ def quad(*corner: tuple[float, float]) -> Section:
 
 
 def strip(curve: Callable[[Array], tuple[Array, ...]], start_m: float, end_m: float) -> Section:
-    """Section of a wall about its middle; curve: along -> r, z and the unit normal's r, z; thickness at both ends, m."""
+    """Section of a wall about its middle; curve: along -> r, z, unit normal's r, z; thickness at both ends, m."""
 
     def section(s: Array, w: Array) -> tuple[Array, Array]:
         r, z, across_r, across_z = curve(s)
@@ -165,7 +174,7 @@ def cartesian(
     along_z: Sequence[int],
     keep: Callable[[float, float, float], bool] = lambda x, y, z: True,
 ) -> list[Block]:
-    """Straight blocks between the breaks x, y, z (m) with so many cells in each interval; keep: those with this centre."""
+    """Straight blocks between breaks x, y, z (m), so many cells in each interval; keep: those with this centre."""
     blocks = []
     for i, nx in enumerate(along_x):
         for j, ny in enumerate(along_y):

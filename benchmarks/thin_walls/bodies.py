@@ -1,7 +1,7 @@
 """The bodies whose modes are known: thin walls of every kind, of real sizes, as bricks and as a user's closed surface.
 
-A body's drawing takes a `Detail` and gives blocks; the same drawing with other counts is its bricks at two sizes and its
-surface of triangles (`surface`), with `FACETS` round. Sizes in m, angles in degrees.
+A body's drawing takes a `Detail` and gives blocks. With other counts it is bricks at two sizes, or the surface of
+triangles (`surface`), with `FACETS` round. Sizes in m, angles in degrees.
 """
 
 from __future__ import annotations
@@ -16,8 +16,10 @@ from benchmarks.thin_walls.blocks import Block, cartesian, disc, grip, quad, str
 from sonic_bullet.records import Array, Material, Shape
 
 FACETS = 96
-"""Triangles' edges round a body of revolution: chords stray 5e-4 of the radius at most. Wall and radius shrink alike, and
-a wall's frequency goes with t/r²: what remains is under 5e-4 (`tests/thin_walls` holds it for a tube)."""
+"""Triangles' edges round a body of revolution: chords stray 5e-4 of the radius at most.
+
+Wall and radius shrink alike and a wall's frequency goes with t/r²: what remains is less (`tests/thin_walls`, a tube).
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,7 +109,7 @@ def _tube(radius: float, wall: float, length: float) -> Callable[[Detail], list[
 
 
 def _walls(base: float, steps: list[tuple[float, float, float, int]], thick: float) -> Callable[[Detail], list[Block]]:
-    """A flat round bottom of radius base, then steps of `walk` (length or radius, turn, thickness at the end, cells)."""
+    """A flat round bottom of radius base, then steps of `walk`: length or radius, turn, thickness at the end, cells."""
 
     def draw(d: Detail) -> list[Block]:
         sections = walk((base, 0.0), 0.0, thick, [step[:3] for step in steps])
@@ -331,7 +333,7 @@ TUBES = (
         "⌀ 70 × 6 mm, wall 1.5 mm",
         BRASS,
         _tube(0.035, 0.0015, 0.006),
-        Detail(12, 0.25),
+        Detail(12, 0.25, 2),
         Detail(18, 0.5, 3),
         facets=_FLAT,
     ),

@@ -1,10 +1,9 @@
 """Closed forms of thin walls: what CalculiX itself is held against. Free, isotropic, SI units.
 
-round plate  λ²/2πa² √(D/ρh), λ where moment and edge shear vanish      [Leissa 1969, NASA SP-160, eq. 2.5; Kirchhoff 1850]
+round plate  λ²/2πa² √(D/ρh), λ where moment and edge shear vanish   [Kirchhoff 1850; Leissa 1969, NASA SP-160]
 ring         in its plane (EI/ρAR⁴) n²(n²−1)²/(n²+1), out of it (EI/ρAR⁴) n²(n²−1)²/(n²+EI/GJ)
     [Love 1927, § 293, general section by its EI/GJ]
-cylinder     both ends free, without stretching; moving as a ring, or tilting along its length   [Rayleigh 1894, § 235 c;
-    Love 1927, § 319]
+cylinder     ends free, no stretching; as a ring, or tilting along it   [Rayleigh 1894, § 235 c; Love 1927, § 319]
 cap of a ball  without stretching, cos nφ: w ∝ (n + cos θ) tanⁿ(θ/2)     [Rayleigh 1894, § 235 f]
 """
 
@@ -27,20 +26,20 @@ def round_plate_hz(
     from scipy.optimize import brentq
     from scipy.special import iv, ivp, jv, jvp
 
-    def determinant(x: float, n: int) -> float:
+    def determinant(x: Array, n: int) -> Array:
         loss = 1 - poisson
         moment = x**2 * jv(n, x) + loss * (x * jvp(n, x) - n**2 * jv(n, x))
         moment_i = x**2 * iv(n, x) - loss * (x * ivp(n, x) - n**2 * iv(n, x))
         shear = x**3 * jvp(n, x) + loss * n**2 * (x * jvp(n, x) - jv(n, x))
         shear_i = x**3 * ivp(n, x) - loss * n**2 * (x * ivp(n, x) - iv(n, x))
-        return float((moment * shear_i - shear * moment_i) * np.exp(-2 * x))
+        return np.asarray((moment * shear_i - shear * moment_i) * np.exp(-2 * x))
 
     grid = np.linspace(0.8, 3 + 1.2 * count, 60 * count)
     found: list[float] = []
     for n in range(count):
-        value = [determinant(x, n) for x in grid]
+        value = determinant(grid, n)
         for k in np.flatnonzero(np.sign(value[1:]) * np.sign(value[:-1]) < 0):
-            root = brentq(determinant, grid[k], grid[k + 1], args=(n,), xtol=1e-12)
+            root = float(brentq(determinant, grid[k], grid[k + 1], args=(n,), xtol=1e-12))
             found += [root] * (1 if n == 0 else 2)
     rate = np.sqrt(bending_stiffness(youngs_pa, poisson, thickness_m) / (density_kg_m3 * thickness_m))
     return np.asarray(np.sort(found)[:count] ** 2 * rate / (2 * np.pi * radius_m**2))
