@@ -35,14 +35,16 @@ def test_symmetric_bodies_have_pairs(name: str) -> None:
     assert len(reference.pairs(truth(name).frequency_hz)) >= 2
 
 
-@pytest.mark.parametrize("name", ["square-plate-0.002", "tube-0.01"])
+@pytest.mark.parametrize("name", ["tube-0.01", "round-plate-0.1"])
 def test_another_solver_has_the_same_modes_of_the_same_bricks(name: str) -> None:
-    """Assembled and solved here: what is kept needs no ccx to be checked. The kept figures have six decimals."""
+    """Assembled and solved here: what is kept needs no ccx to be checked. C3D20R has its mass at 2³ points."""
     body = BODIES[name]
     stiffness = bricks.isotropic(body.stuff.youngs_pa, body.stuff.poisson)
     kept = np.array(KEPT[name]["coarse"]["frequency_hz"])
-    found = bricks.modes(body.bricks(fine=False), stiffness, body.stuff.density_kg_m3, to_hz=1.01 * kept[-1])
-    np.testing.assert_allclose(found.freq_hz[: len(kept)], kept, rtol=1e-5)
+    found = bricks.modes(
+        body.bricks(fine=False), stiffness, body.stuff.density_kg_m3, to_hz=1.01 * kept[-1], mass_points=2
+    )
+    np.testing.assert_allclose(found.freq_hz[: len(kept)], kept, rtol=1e-6)
 
 
 @pytest.mark.skipif(calculix.installed() is None, reason=f"ccx is not installed: Debian package {calculix.PACKAGE}")
