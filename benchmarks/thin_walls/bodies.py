@@ -282,8 +282,6 @@ _SHEET = Detail(6, 1.0), Detail(9, 2.0, 2)
 _STOUT = Detail(6, 1.0, 2), Detail(9, 1.5, 3)
 _SHELL = Detail(9, 1.5), Detail(14, 2.25, 2)
 _RIBBED = Detail(6, 1.0, 2), Detail(6, 1.5, 3)
-_BOWL = Detail(12, 2.0), Detail(16, 2.75, 2)
-_FOIL = Detail(9, 1.5), Detail(14, 2.25)
 _TUBE = Detail(6, 1.5, 2), Detail(9, 2.25, 3)
 _OPEN_SECTION = Detail(6, 1.0, 2), Detail(6, 1.5, 4)  # twist is soft, and the corner takes four cells both ways
 
@@ -310,7 +308,15 @@ PLATES = (
     ),
     ThinBody("square-plate-0.01", "300 × 300 × 3 mm", STEEL, _plate(0.3, 0.003), *_SHEET, facets=_FLAT),
     ThinBody("square-plate-0.1", "100 × 100 × 10 mm", GLASS, _plate(0.1, 0.01), *_STOUT, facets=_FLAT),
-    ThinBody("round-plate-0.002", "⌀ 300 × 0.6 mm", BRASS, _round_plate(0.15, 0.0006), *_FOIL, facets=_FLAT),
+    ThinBody(
+        "round-plate-0.002",
+        "⌀ 300 × 0.6 mm",
+        BRASS,
+        _round_plate(0.15, 0.0006),
+        Detail(11, 1.75),
+        Detail(15, 2.5),
+        facets=_FLAT,
+    ),
     ThinBody("round-plate-0.01", "⌀ 300 × 3 mm", BRASS, _round_plate(0.15, 0.003), *_SHELL, facets=_FLAT),
     ThinBody("round-plate-0.1", "⌀ 100 × 10 mm", GLASS, _round_plate(0.05, 0.01), *_STOUT, facets=_FLAT),
     ThinBody(
@@ -322,10 +328,27 @@ PLATES = (
         paired=False,
         facets=_FLAT,
     ),
-    ThinBody("open-box", "200 × 150 × 80 mm, walls 1.5 mm", STEEL, _tray, *_RIBBED, paired=False, facets=_FLAT),
+    ThinBody(
+        "open-box",
+        "200 × 150 × 80 mm, walls 1.5 mm",
+        STEEL,
+        _tray,
+        Detail(6, 1.0, 2),
+        Detail(6, 1.25, 3),
+        paired=False,
+        facets=_FLAT,
+    ),
 )
 TUBES = (
-    ThinBody("tube-0.01", "⌀ 60 × 200 mm, wall 0.3 mm", BRASS, _tube(0.03, 0.0003, 0.2), *_FOIL, facets=_FLAT),
+    ThinBody(
+        "tube-0.01",
+        "⌀ 60 × 200 mm, wall 0.3 mm",
+        BRASS,
+        _tube(0.03, 0.0003, 0.2),
+        Detail(9, 1.5),
+        Detail(14, 2.25),
+        facets=_FLAT,
+    ),
     ThinBody("tube-0.05", "⌀ 40 × 300 mm, wall 1 mm", BRASS, _tube(0.02, 0.001, 0.3), *_SHELL, facets=_FLAT),
     ThinBody("tube-0.2", "⌀ 30 × 200 mm, wall 3 mm", STEEL, _tube(0.015, 0.003, 0.2), *_TUBE, facets=_FLAT),
     ThinBody(
@@ -339,8 +362,22 @@ TUBES = (
     ),
 )
 SHELLS = (
-    ThinBody("bowl", "half a ball ⌀ 140 mm, wall 3 mm", PORCELAIN, _cap(0.07, 0.003, 90.0), *_BOWL),
-    ThinBody("dome", "of a ball of radius 200 mm, 50° each way, 2 mm", STEEL, _cap(0.2, 0.002, 50.0), *_BOWL),
+    ThinBody(
+        "bowl",
+        "half a ball ⌀ 140 mm, wall 3 mm",
+        PORCELAIN,
+        _cap(0.07, 0.003, 90.0),
+        Detail(12, 2.0),
+        Detail(16, 2.75, 2),
+    ),
+    ThinBody(
+        "dome",
+        "of a ball of radius 200 mm, 50° each way, 2 mm",
+        STEEL,
+        _cap(0.2, 0.002, 50.0),
+        Detail(10, 1.75),
+        Detail(14, 2.5, 2),
+    ),
     ThinBody("singing-bowl", "⌀ 150 × 75 mm, wall 3 mm, rim 5 mm", BRONZE, _walls(0.035, _BRASS_BOWL, 0.003), *_SHELL),
     ThinBody(
         "gong",
@@ -358,9 +395,9 @@ SHELLS = (
         GLASS,
         _wine_glass,
         Detail(7, 1.25),
-        Detail(10, 2.0, 2),
+        Detail(9, 1.75, 2),
     ),
-    ThinBody("bottle", "⌀ 72 × 250 mm, wall 3 mm", GLASS, _bottle, *_SHELL),
+    ThinBody("bottle", "⌀ 72 × 250 mm, wall 3 mm", GLASS, _bottle, Detail(8, 1.25), Detail(11, 1.75, 2)),
     ThinBody(
         "mug",
         "⌀ 80 × 90 mm, wall 4 mm, handle 16 × 7 mm",
