@@ -2,7 +2,7 @@
 
 a free box, its material's axes its own  -> polynomials (polynomials.py)
 a free isotropic body of revolution      -> a Fourier series around its axis (revolution/)
-everything else                          -> quadratic tetrahedra (elements.py)
+everything else                          -> tetrahedra (elements.py)
 """
 
 from __future__ import annotations
@@ -42,4 +42,4 @@ def chosen(
         )
         if found is not None:
             return found
-    return filled(shapes, length_m, clamp, (edge_m, thickness_m), kept, say)
+    return filled(shapes, length_m, tensor, wanted, clamp, (edge_m, thickness_m), kept, say)
