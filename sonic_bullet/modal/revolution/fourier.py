@@ -153,12 +153,21 @@ def method_for(shape: Shape, length_m: float, tensor: Array, wanted: Wanted) -> 
         return None
     unit = body.scaled(1 / length_m)
     bare = Fourier(unit, length_m, lambda wall: wall, None)  # type: ignore[arg-type]
-    middle = 2 * unit.volume_m3 / bare.thickness / 2  # area of the wall's middle
-    flat = CURVED * np.sqrt(4 * np.pi * (wanted.most + 8) / middle)
+    shortest = _wave_number_of(wanted.most, unit, bare.thickness)
 
     def wave(wall: Array) -> Array:
-        return np.asarray(np.minimum(polynomials.wave_number(wanted.beyond * wanted.limit, wall, tensor), flat))
+        return np.asarray(np.minimum(polynomials.wave_number(wanted.beyond * wanted.limit, wall, tensor), shortest))
 
-    high = polynomials.omega2_of(flat, bare.thickness, tensor)
+    high = polynomials.omega2_of(shortest, bare.thickness, tensor)
     section = sectioned(unit, wave)
     return None if section is None else Fourier(unit, length_m, wave, section, high)
+
+
+def _wave_number_of(count: int, body: Revolved, thickness: float) -> float:
+    """A wave number below which a body has at least ``count`` modes: bending ones of its wall [Courant & Hilbert 1924,
+    ch. VI.4], shear waves in its volume [Weyl 1912], or bending ones of its length, in pairs.
+    """
+    wall = CURVED * np.sqrt(4 * np.pi * (count + 8) * thickness / body.volume_m3)
+    bulk = (3 * np.pi**2 * (count + 8) / body.volume_m3) ** (1 / 3)
+    bar = (count / 2 + 2) * np.pi / float(np.ptp(body.outline_m[:, 1]))
+    return float(min(wall, bulk, bar))

@@ -1,6 +1,6 @@
 """The section of a body of revolution cut into curved cubic triangles, small where its wall is thin.
 
-    size at the outline: the wall's thickness t there, or a part of the shortest bending wave of a wall of t
+    size at the outline: of the wall's thickness t there, more away from corners, or of the shortest bending wave of t
     size inside: the least of size + slope x distance over the outline
     outline -> points so far apart -> Delaunay, lattices inside, one a halving of the size -> sides bent to the outline
 
@@ -19,7 +19,9 @@ from sonic_bullet.modal.meshing.prisms import SAME, _gap, _inside
 from sonic_bullet.modal.revolution.rings import Revolved, turns
 from sonic_bullet.records import Array
 
-WALL, WAVE = 0.75, 0.25  # a triangle's side: of the wall's thickness and of the shortest wave
+WALL, LONG = 0.75, 3.0  # a triangle's side over the wall's thickness, at a corner and far from all
+WAVE = 0.25  # a triangle's side over the shortest wave
+PIECES = 600  # of an outline, about, for which the size is found
 BENT = 0.3  # radians that a side may turn
 CORNER = 0.15  # radians: a turn that is kept as a corner
 GROWTH = 0.5  # of size over distance
@@ -76,27 +78,52 @@ def spread(start: float, length: Array, density: Array) -> Array:
     return start + place
 
 
-def _cut(outline: Array, size: Array) -> tuple[Array, Array, Array]:
-    """Ends (s, 2) and middles (s, 2) of sides about size (p,) long along a closed polygon (p, 2), and which of its
-    sides (s,) the middles lie on.
+@dataclass(frozen=True, slots=True, eq=False)
+class _Outline:
+    """An outline in short pieces. point (k, 2); corner (k,): points that stay; size (k,): wanted at each piece; owner
+    (k,): the body's side that each piece is of.
     """
-    p = len(outline)
+
+    point: Array
+    corner: Array
+    size: Array
+    owner: Array
+
+
+def _measured(body: Revolved, wave_number: WaveNumber) -> _Outline:
+    outline = body.outline_m
     along = np.roll(outline, -1, axis=0) - outline
-    length, turn = np.linalg.norm(along, axis=1), np.abs(turns(outline))
-    long = length > size
-    corner = (turn > CORNER) | (long & np.roll(long, 1)) | (outline[:, 0] == 0)
-    if not corner.any():
-        corner[int(np.argmax(turn))] = True
-    first = np.flatnonzero(corner)
+    length, turn, wall = np.linalg.norm(along, axis=1), np.abs(turns(outline)), thickness(outline)
+    cuts = np.ceil(length / np.maximum(np.minimum(wall, length), length.sum() / PIECES)).astype(int)
+    owner = np.repeat(np.arange(len(outline)), cuts)
+    share = np.concatenate([np.arange(n) / n for n in cuts])
+    point = outline[owner] + share[:, None] * along[owner]
+    long = length > WALL * wall
+    axial = outline[:, 0] == 0
+    kept = (turn > CORNER) | (long & np.roll(long, 1)) | axial
+    notch = outline[(turn > CORNER) & ~axial]
+    middle = (point + np.roll(point, -1, axis=0)) / 2
+    away = np.linalg.norm(middle[:, None] - notch, axis=2).min(axis=1, initial=np.inf)
+    wall = thickness(point)
+    size = np.minimum(np.minimum(WALL * wall + GROWTH * away, LONG * wall), WAVE * 2 * np.pi / wave_number(wall))
+    return _Outline(point, (share == 0) & kept[owner], size, owner)
+
+
+def _cut(of: _Outline, finer: float) -> tuple[Array, Array, Array]:
+    """Ends (s, 2) and middles (s, 2) of sides of the wanted size along an outline, and its piece (s,) on which each
+    middle lies.
+    """
+    outline, p = of.point, len(of.point)
+    along = np.roll(outline, -1, axis=0) - outline
+    length = np.linalg.norm(along, axis=1)
+    smooth = np.where(of.corner, 0, np.abs(turns(outline)))
+    first = np.flatnonzero(of.corner) if of.corner.any() else np.array([0])
     walked = np.concatenate([[0], np.cumsum(length)])
-    smooth = np.where(corner, 0, turn)
-    bend = (smooth + np.roll(smooth, -1)) / 2 / length / BENT
+    density = np.maximum(finer / of.size, (smooth + np.roll(smooth, -1)) / 2 / length / BENT)
     places = []
     for a, b in zip(first, np.append(first[1:], first[0] + p), strict=True):
         mine = np.arange(a, b) % p
-        places.append(
-            spread(walked[a], length[mine], np.maximum(1 / size[mine], np.where(b - a > 1, bend[mine], 0)))[:-1]
-        )
+        places.append(spread(walked[a], length[mine], density[mine])[:-1])
     place = np.concatenate(places)
     middle = (place + np.append(place[1:], place[0] + walked[-1])) / 2
 
@@ -105,14 +132,8 @@ def _cut(outline: Array, size: Array) -> tuple[Array, Array, Array]:
         k = np.clip(np.searchsorted(walked, s, side="right") - 1, 0, p - 1)
         return outline[k] + along[k] * ((s - walked[k]) / length[k])[:, None], k
 
-    return at(place)[0], *at(middle)
-
-
-def sizes(body: Revolved, wave_number: WaveNumber, finer: float) -> Array:
-    """Wanted length (p,) of a triangle's sides along the outline. wave_number: of a wall's thickness (p,)."""
-    wall = thickness(body.outline_m)
-    side = np.minimum(WALL * wall, WAVE * 2 * np.pi / wave_number(wall)) / finer
-    return np.asarray(side)
+    spot, which = at(middle)
+    return at(place)[0], spot, which
 
 
 def sectioned(body: Revolved, wave_number: WaveNumber, finer: float = 1.0) -> Section | None:
@@ -121,19 +142,24 @@ def sectioned(body: Revolved, wave_number: WaveNumber, finer: float = 1.0) -> Se
 
     None where the outline crosses itself, or where it takes more than `MOST_NODES`.
     """
+    outline = _measured(body, wave_number)
+    for _ in range(4):
+        rim, middle, which = _cut(outline, finer)
+        made = _filled(rim, outline.size[which] / finer)
+        if made is not None:
+            owner = outline.owner[which]
+            return _section(*made, rim, middle, body.on_axis[owner], body.curvature_per_m[owner])
+        finer *= 1.5
+    return None
+
+
+def _section(
+    point: Array, triangle: Array, rim: Array, middle: Array, on_axis: Array, curvature: Array
+) -> Section | None:
+    """Of triangles (t, 3) over point (n, 2), the rim's (s, 2) first, their sides there bent to its middles (s, 2)."""
     from skfem import Basis, ElementTriP3, MeshTri, MeshTri2
 
-    outline = body.outline_m
-    size = sizes(body, wave_number, finer)
-    for _ in range(4):
-        rim, middle, which = _cut(outline, size)
-        made = _filled(rim, size[which])
-        if made is not None:
-            break
-        size = size / 1.5
-    else:
-        return None
-    plain = MeshTri(np.ascontiguousarray(made[0].T), np.ascontiguousarray(made[1].T))
+    plain = MeshTri(np.ascontiguousarray(point.T), np.ascontiguousarray(triangle.T))
     code = plain.facets[0].astype(np.int64) * plain.p.shape[1] + plain.facets[1]
     start = np.arange(len(rim))
     ends = np.sort(np.stack([start, np.roll(start, -1)]), axis=0)
@@ -145,12 +171,11 @@ def sectioned(body: Revolved, wave_number: WaveNumber, finer: float = 1.0) -> Se
     if basis.N > MOST_NODES:
         return None
     inner = basis.facet_dofs[:, facet]
-    lower = start > np.roll(start, -1)
-    inner[:, lower] = inner[::-1, lower]
+    backward = start > np.roll(start, -1)
+    inner[:, backward] = inner[::-1, backward]
     corner = basis.nodal_dofs[0][start]
     dof = np.stack([corner, inner[0], inner[1], np.roll(corner, -1)], axis=1)
-    rim_m = np.stack([rim, middle, np.roll(rim, -1, axis=0)], axis=1)
-    return Section(basis, rim_m, dof, body.on_axis[which], body.curvature_per_m[which])
+    return Section(basis, np.stack([rim, middle, np.roll(rim, -1, axis=0)], axis=1), dof, on_axis, curvature)
 
 
 def _filled(rim: Array, size: Array) -> tuple[Array, Array] | None:
