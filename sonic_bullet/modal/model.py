@@ -228,6 +228,8 @@ def _solve(
     note = last.note(sectors)
     if np.isfinite(error):
         note += f"; error at {np.sqrt(value[order[-1]] * of.per_s2) / (2 * np.pi):.0f} Hz {_percent(error)}"
+        if error > asked.accuracy:
+            note += f", not the {100 * asked.accuracy:g} % asked for: that would cost too much, unless edge_m says so"
     return _Unit(
         value[order],
         np.ascontiguousarray(shown.shape[:, :, order]),
