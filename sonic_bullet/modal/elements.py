@@ -42,8 +42,8 @@ PER_WAVE = {2: 0.2, 3: 0.2}
 ORDER = 3.0
 """Of frequencies in h, as measured on thin bodies with creases (1.7 to 3.5): smooth ones have 4."""
 FINER = 0.7  # from one edge to the next: half the elements of a wall
-MOST_UNKNOWNS = 160_000
-"""1.5 GB for a wall; a lump of as many takes four times the time."""
+MOST_UNKNOWNS = 70_000
+"""15 s of processor and 1.2 GB for a wall. More are allowed by an edge_m."""
 UNKNOWNS_PER_TET = {2: 6.0, 3: 18.0}  # of thin walls; less of lumps
 LARGEST = 0.2  # edge over the diagonal: fewer elements than that are no body
 TOGETHER = 3  # highest modes whose errors are averaged: one alone may change places with its neighbour
@@ -200,7 +200,7 @@ def filled(
         cache, name = kept
         return _filled(shapes, (edge_m, thickness_m), (cache, store.key("solid", name, edge_m)), say)
 
-    degree, edge_m = _first(shapes, thickness_m, length_m, tensor, wanted)
+    degree, edge_m = _first(shapes, thickness_m, length_m, tensor, wanted, say)
     if given is not None:
         degree = 3 if degree == 3 and given > edge_m else 2
     edge = given or edge_m
@@ -210,7 +210,12 @@ def filled(
 
 
 def _first(
-    shapes: tuple[Shape, ...], thickness_m: float | None, length_m: float, tensor: Array, wanted: Wanted
+    shapes: tuple[Shape, ...],
+    thickness_m: float | None,
+    length_m: float,
+    tensor: Array,
+    wanted: Wanted,
+    say: Callable[[str], None],
 ) -> tuple[int, float]:
     """Degree and edge in m to begin with: for the shortest wave of a plate as thick as the body is, at the highest λ
     wanted or the wave of as many modes as are wanted, and no more unknowns than may be.
@@ -224,6 +229,11 @@ def _first(
     degree = 3 if PER_WAVE[3] * wave > wall else 2
     edge = min(PER_WAVE[degree] * wave, LARGEST)
     least = edge_within_m(area * wall / 2, wall, MOST_UNKNOWNS / UNKNOWNS_PER_TET[degree])
+    if edge < least:
+        say(
+            f"elements of {edge * length_m:.2g} m, for the shortest wave wanted, are about {(least / edge) ** 2:.1f} × "
+            f"{MOST_UNKNOWNS} unknowns: larger ones are used, unless edge_m gives their size"
+        )
     return degree, max(edge, least) * length_m
 
 
