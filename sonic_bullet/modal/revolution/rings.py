@@ -25,6 +25,7 @@ GAP = (
 )
 BORE = 1e-3  # of the diagonal: the least radius of a ring
 BETWEEN = 1.02  # length of a detour over a third ring, over the direct way, that makes the direct one no side
+ALIKE = 0.3  # relative difference of sides that are taken for chords of one arc
 SAME = 0.02  # relative difference of volumes
 ARC = 256  # sides of a half circle: its area to 5e-5
 
@@ -55,16 +56,25 @@ class Revolved:
         r = self.outline_m[:, 0]
         return np.asarray((r == 0) & (np.roll(r, -1) == 0))
 
-    @property
-    def curvature_per_m(self) -> Array:
-        """Of the smooth outline, mean over each side (p,), positive where it bulges; corners do not count."""
+    def curvature_per_m(self, side: Array, at: Array) -> Array:
+        """Of the smooth outline (k,), positive where it bulges, at the part ``at`` (k,) of a side (k,).
+
+        A bend is an arc that begins half the shorter side before it and ends as far behind; a corner is none, and a
+        side that ends in one goes on as it is. On the axis the outline meets its mirror image.
+        """
         along = np.roll(self.outline_m, -1, axis=0) - self.outline_m
-        length = np.linalg.norm(along, axis=1)
-        turn = turns(self.outline_m)
+        length, heading = np.linalg.norm(along, axis=1), np.arctan2(along[:, 1], along[:, 0])
+        turn, short, on = turns(self.outline_m), np.minimum(length, np.roll(length, 1)), self.on_axis
+        first, last = np.roll(on, 1), on
+        turn = np.where(first, _wrapped(2 * heading), np.where(last, _wrapped(-2 * np.roll(heading, 1)), turn))
+        short = np.where(first, length, np.where(last, np.roll(length, 1), short))
         smooth = np.abs(turn) < CREASE_RAD
-        at = np.where(smooth, 2 * turn / (length + np.roll(length, 1)), 0)
-        ends = smooth.astype(int) + np.roll(smooth, -1)
-        return np.asarray((at + np.roll(at, -1)) / np.maximum(ends, 1))
+        arc = np.where(smooth, turn / short, 0)
+        after = (side + 1) % len(length)
+        mine, other = np.where(at < 0.5, side, after), np.where(at < 0.5, after, side)
+        away = np.minimum(at, 1 - at) * length[side]
+        going_on = np.where(short[other] > (1 - ALIKE) * length[side], arc[other], 0)
+        return np.asarray(np.where(smooth[mine], np.where(away < (0.5 + ROUND) * short[mine], arc[mine], 0), going_on))
 
     def scaled(self, factor: float) -> Revolved:
         """The same outline, ``factor`` times as large; where the body lies is left as it is."""
@@ -75,7 +85,11 @@ def turns(polygon: Array) -> Array:
     """By how much (p,) in rad a closed polygon (p, 2) turns left at each corner."""
     along = np.roll(polygon, -1, axis=0) - polygon
     heading = np.arctan2(along[:, 1], along[:, 0])
-    return np.asarray((heading - np.roll(heading, 1) + np.pi) % (2 * np.pi) - np.pi)
+    return _wrapped(heading - np.roll(heading, 1))
+
+
+def _wrapped(angle: Array) -> Array:
+    return np.asarray((angle + np.pi) % (2 * np.pi) - np.pi)
 
 
 def _swept(polygon: Array) -> Array:

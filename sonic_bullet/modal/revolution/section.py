@@ -25,7 +25,7 @@ PIECES = 600  # of an outline, about, for which the size is found
 BENT = 0.3  # radians that a side may turn
 CORNER = 0.15  # radians: a turn that is kept as a corner
 GROWTH = 0.5  # of size over distance
-MOST_NODES = 30_000
+MOST_NODES = 15_000  # three unknowns each: a second or two for each wave around
 
 WaveNumber = Callable[[Array], Array]
 
@@ -81,13 +81,14 @@ def spread(start: float, length: Array, density: Array) -> Array:
 @dataclass(frozen=True, slots=True, eq=False)
 class _Outline:
     """An outline in short pieces. point (k, 2); corner (k,): points that stay; size (k,): wanted at each piece; owner
-    (k,): the body's side that each piece is of.
+    (k,): the body's side that each piece is of; curvature (k,): of the smooth outline.
     """
 
     point: Array
     corner: Array
     size: Array
     owner: Array
+    curvature: Array
 
 
 def _measured(body: Revolved, wave_number: WaveNumber) -> _Outline:
@@ -106,7 +107,8 @@ def _measured(body: Revolved, wave_number: WaveNumber) -> _Outline:
     away = np.linalg.norm(middle[:, None] - notch, axis=2).min(axis=1, initial=np.inf)
     wall = thickness(point)
     size = np.minimum(np.minimum(WALL * wall + GROWTH * away, LONG * wall), WAVE * 2 * np.pi / wave_number(wall))
-    return _Outline(point, (share == 0) & kept[owner], size, owner)
+    curvature = body.curvature_per_m(owner, share + 0.5 / cuts[owner])
+    return _Outline(point, (share == 0) & kept[owner], size, owner, curvature)
 
 
 def _cut(of: _Outline, finer: float) -> tuple[Array, Array, Array]:
@@ -147,8 +149,7 @@ def sectioned(body: Revolved, wave_number: WaveNumber, finer: float = 1.0) -> Se
         rim, middle, which = _cut(outline, finer)
         made = _filled(rim, outline.size[which] / finer)
         if made is not None:
-            owner = outline.owner[which]
-            return _section(*made, rim, middle, body.on_axis[owner], body.curvature_per_m[owner])
+            return _section(*made, rim, middle, body.on_axis[outline.owner[which]], outline.curvature[which])
         finer *= 1.5
     return None
 

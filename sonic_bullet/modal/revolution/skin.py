@@ -73,7 +73,9 @@ def rows(section: Section, wave: float) -> Rows:
     pole = flat[:, 0] < 1e-9 * length.sum()
     flat[pole, 0] = 0
     around = np.where(pole, bulge, along[:, 1] / np.linalg.norm(along, axis=1) / np.where(pole, 1, flat[:, 0]))
-    return Rows(walk[where], x, np.concatenate(start), flat, (bulge + around) / 2, not on.any())
+    mean = (bulge + around) / 2
+    mean[np.abs(mean) < 1e-9] = 0  # rounding on flat sides
+    return Rows(walk[where], x, np.concatenate(start), flat, mean, not on.any())
 
 
 def surface(circles: Rows, cells: int) -> tuple[Array, Array, Array, Array]:
