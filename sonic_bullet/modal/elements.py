@@ -16,6 +16,7 @@ import numpy as np
 from sonic_bullet import geometry
 from sonic_bullet.modal import cache as store
 from sonic_bullet.modal import eigen, fem, lagrange, polynomials
+from sonic_bullet.modal.meshing.filling import LATTICE
 from sonic_bullet.modal.meshing.named_shapes import soup
 from sonic_bullet.modal.meshing.sizes import edge_within_m
 from sonic_bullet.modal.meshing.solid import Solid
@@ -52,8 +53,10 @@ APART = 0.9  # over the finer size's unknowns: meshes more alike than this tell 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Elements:
-    """body: filled, in m, by elements of edge_m. clamp (k, 4): spheres that hold it. degree: of its field. at_size: the
-    body filled anew by an edge, None where the user gave it. coarser: the size before. known: λ (m,) found, by tensor.
+    """body: filled, in m, by elements of edge_m. clamp (k, 4): spheres that hold it. degree: of its field.
+
+    at_size: the body filled anew by an edge, by the lattice or not; None where the user gave the edge. coarser: the
+    size before. known: λ (m,) found, by tensor.
     """
 
     body: Filled
@@ -61,7 +64,7 @@ class Elements:
     clamp: Array
     degree: int
     edge_m: float
-    at_size: Callable[[float], Filled] | None
+    at_size: Callable[[float, bool], Filled] | None
     coarser: Elements | None = None
     known: dict[bytes, Array] = field(default_factory=dict)
 
@@ -171,7 +174,8 @@ class Elements:
 
     def _of_size(self, edge_m: float) -> Elements:
         assert self.at_size is not None
-        return replace(self, body=self.at_size(edge_m), edge_m=edge_m, coarser=None, known={})
+        lattice = self.body.solid.note.startswith(LATTICE)
+        return replace(self, body=self.at_size(edge_m, lattice), edge_m=edge_m, coarser=None, known={})
 
     def note(self, sectors: Sequence[Sector]) -> str:
         """How it was done."""
@@ -196,15 +200,16 @@ def filled(
     """
     given, thickness_m = sizes
 
-    def at_size(edge_m: float) -> Filled:
+    def at_size(edge_m: float, lattice: bool) -> Filled:
         cache, name = kept
-        return _filled(shapes, (edge_m, thickness_m), (cache, store.key("solid", name, edge_m)), say)
+        name = store.key("solid", name, edge_m, lattice)
+        return _filled(shapes, (edge_m, thickness_m), (cache, name), say, lattice=lattice)
 
     degree, edge_m = _first(shapes, thickness_m, length_m, tensor, wanted, say)
     if given is not None:
         degree = 3 if degree == 3 and given > edge_m else 2
     edge = given or edge_m
-    made = Elements(at_size(edge), length_m, clamp, degree, edge, None if given else at_size)
+    made = Elements(at_size(edge, False), length_m, clamp, degree, edge, None if given else at_size)
     made.held(lagrange.field(made.solid, 2))
     return made
 
@@ -242,6 +247,8 @@ def _filled(
     sizes: tuple[float | None, float | None],
     kept: tuple[store.Place, str],
     say: Callable[[str], None],
+    *,
+    lattice: bool,
 ) -> Filled:
     """The body's inside and skin, from the cache where it is there. sizes: edge_m, thickness_m."""
     from sonic_bullet.modal.meshing.shape_meshes import Filled, fill
@@ -253,7 +260,7 @@ def _filled(
         return Filled(
             Solid(a["node"], a["tet"], bool(a["affine"][0]), note), SolidSurface(a["skin"], a["face"]), a["curvature"]
         )
-    body = fill(shapes, *sizes, say)
+    body = fill(shapes, *sizes, say, lattice=lattice)
     solid, skin = body.solid, body.skin
     arrays = {
         "node": solid.node_m,

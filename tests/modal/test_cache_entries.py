@@ -43,7 +43,7 @@ def of_modes(folder: Path) -> list[np.ndarray]:
 
 
 def of_family(folder: Path) -> list[np.ndarray]:
-    made = reduced.family(skin(), gamma_m2_s2=2.5e7, poisson=0.3, to_hz=6_000, edge_m=0.03, cache=folder)
+    made = reduced.family(skin(), gamma_m2_s2=2.5e7, poisson=0.3, to_hz=16_000, edge_m=0.03, cache=folder)
     return [made.lame, made.shear, made.skin, made.vertex_m, made.face]
 
 

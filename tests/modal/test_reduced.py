@@ -136,7 +136,7 @@ def test_a_turned_ring_moves_as_elements_do() -> None:
     turn[:3, 3] = (0.1, 0.2, -0.3)
     shape = ring_mesh(0.03, 0.05, 0.02, turn, sections=64)
     ours = family(shape, gamma_m2_s2=GAMMA, poisson=NU, to_hz=21_000, cache=None)
-    theirs = family(shape, gamma_m2_s2=GAMMA, poisson=NU, to_hz=21_000, edge_m=0.01, cache=None)
+    theirs = family(shape, gamma_m2_s2=GAMMA, poisson=NU, to_hz=21_000, edge_m=0.008, cache=None)
     assert theirs.meshed and not ours.meshed
     value, vector = ours.modes(GAMMA, NU)
     other, turned = (part[..., : ours.count] for part in theirs.modes(GAMMA, NU))

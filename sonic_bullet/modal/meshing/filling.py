@@ -2,7 +2,8 @@
 
 a box or an extruded outline  -> by rule (prisms.py): thin plates need flat elements
 any other closed surface      -> Netgen (tetrahedra.py), the middles of its edges put on the surface (on_surface.py)
-one that is not closed, or that Netgen refuses: it passes through itself   -> a lattice (stuffing.py)
+what Netgen refuses           -> simplified below an element (Manifold), and again
+one that is not closed, or that Netgen still refuses: it passes through itself   -> a lattice (stuffing.py)
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from sonic_bullet.modal.meshing.tetrahedra import tetrahedra
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import MeshError
 
+LATTICE = "lattice"  # how the note of a solid filled by one begins
 MOST_TETS = 60_000
 """A third of a million unknowns, 1.5 GB."""
 FILLED = (0.6, 1.7)
@@ -30,7 +32,9 @@ FILLED = (0.6, 1.7)
 Wide, for a surface that passes through itself encloses some of it twice.
 """
 FINER = 0.6  # from one attempt to the next: both sides of a bent wall touch where elements are too large
-ATTEMPTS = 3
+SIMPLER, SLIVER = 0.05, 0.01
+"""Of an edge: what is left out where Netgen refuses the surface as it is, and a triangle's height that it would refuse:
+slivers of unions, on which it takes ten times as long."""
 LATTICE_VOLUME = 12.0  # elements in a cube of the lattice's edge
 LATTICE_WALL = 0.8  # of a wall's thickness: a larger edge may miss it
 
@@ -49,8 +53,10 @@ def by_rule(skin: Skin, edge_m: float | None) -> Solid | None:
     return Solid(prism.node_m, prism.tet, note=prism.note + skin.note) if prism is not None else None
 
 
-def filled(skin: Skin, edge_m: float | None, say: Callable[[str], None]) -> Solid:
-    """Solid of any prepared surface. edge_m: by default from a budget of unknowns. Raises MeshError."""
+def filled(skin: Skin, edge_m: float | None, say: Callable[[str], None], *, lattice: bool = False) -> Solid:
+    """Solid of any prepared surface. edge_m: by default from a budget of unknowns. lattice: Netgen has refused it
+    before. Raises MeshError.
+    """
     made = by_rule(skin, edge_m)
     if made is not None:
         return made
@@ -58,21 +64,44 @@ def filled(skin: Skin, edge_m: float | None, say: Callable[[str], None]) -> Soli
     volume = abs(geometry.volume_m3(skin.vertex_m, skin.face))
     tets = dof_budget(thickness, diagonal) / DOF_PER_TET
     edge = edge_m or edge_within_m(volume, thickness, tets)
-    if not geometry.is_closed(skin.face):
-        return _of_lattice(skin, edge_m, volume, tets, say, "its surface is open")
+    if lattice or not geometry.is_closed(skin.face):
+        return _of_lattice(skin, edge_m, volume, tets, say, "as before" if lattice else "its surface is open")
+    whole, simple = skin, simplified(skin, SIMPLER * edge)
+    attempts = [(whole, edge)] if not _slivers(whole, edge) else []
     refused: MeshError | None = None
-    for _ in range(ATTEMPTS):
+    for tried, size in [*attempts, (simple, edge), (simple, FINER * edge)]:
         try:
-            return _by_netgen(skin, edge, say)
+            return _by_netgen(skin, tried, size, say)
         except MeshError as error:
-            refused, edge = error, FINER * edge
+            refused = error
     assert refused is not None
     return _of_lattice(skin, edge_m, volume, tets, say, refused.what)
 
 
-def _by_netgen(skin: Skin, edge_m: float, say: Callable[[str], None]) -> Solid:
-    say(f"filling {len(skin.face)} triangles with tetrahedra of {edge_m:.3g} m")
-    corner, tet = tetrahedra(skin.vertex_m, skin.face, edge_m, *curved_sizes(skin.vertex_m, skin.face, edge_m))
+def simplified(skin: Skin, tolerance_m: float) -> Skin:
+    """A closed surface without what is smaller than tolerance_m; as it was where it passes through itself."""
+    import manifold3d
+
+    vertex, face = np.ascontiguousarray(skin.vertex_m), np.ascontiguousarray(skin.face, np.uint64)
+    solid = manifold3d.Manifold(manifold3d.Mesh64(vertex, face)).simplify(tolerance_m)
+    mesh = solid.to_mesh64()
+    if solid.status() != manifold3d.Error.NoError or not len(mesh.tri_verts):
+        return skin
+    corner, triangle = np.array(mesh.vert_properties)[:, :3], np.array(mesh.tri_verts).astype(np.int64)
+    return Skin(corner, triangle, skin.thickness_m, skin.note)
+
+
+def _slivers(skin: Skin, edge_m: float) -> bool:
+    """Whether the surface has triangles too flat for a mesh of edge_m: what a union of pieces leaves."""
+    corner = skin.vertex_m[skin.face]
+    longest = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2).max(axis=1)
+    height = 2 * geometry.face_areas_m2(skin.vertex_m, skin.face) / longest
+    return bool(height.min() < SLIVER * edge_m)
+
+
+def _by_netgen(skin: Skin, tried: Skin, edge_m: float, say: Callable[[str], None]) -> Solid:
+    say(f"filling {len(tried.face)} triangles with tetrahedra of {edge_m:.3g} m")
+    corner, tet = tetrahedra(tried.vertex_m, tried.face, edge_m, *curved_sizes(tried.vertex_m, tried.face, edge_m))
     _check_filled(skin, corner, tet)
     tet, said = _largest(corner, tet)
     note = f"Netgen, {len(tet)} tetrahedra, edge {edge_m:.3g} m{skin.note}{said}"
@@ -87,7 +116,7 @@ def _of_lattice(
     corner, tet = stuffed(skin.vertex_m, skin.face, edge)
     _check_filled(skin, corner, tet)
     tet, said = _largest(corner, tet)
-    note = f"lattice, {len(tet)} tetrahedra, edge {edge:.3g} m ({why}){skin.note}{said}"
+    note = f"{LATTICE}, {len(tet)} tetrahedra, edge {edge:.3g} m ({why}){skin.note}{said}"
     return fitted(quadratic(corner, tet, note=note), skin.vertex_m, skin.face)
 
 

@@ -47,9 +47,17 @@ def _united(skin: Skin) -> Skin:
 
 
 def fill(
-    shapes: tuple[Shape, ...], edge_m: float | None, thickness_m: float | None, say: Callable[[str], None]
+    shapes: tuple[Shape, ...],
+    edge_m: float | None,
+    thickness_m: float | None,
+    say: Callable[[str], None],
+    *,
+    lattice: bool = False,
 ) -> Filled:
-    """One solid, the union of ``shapes``, in the body frame, its nodes in elimination order. Raises MeshError."""
+    """One solid, the union of ``shapes``, in the body frame, its nodes in elimination order. lattice: as `filled`.
+
+    Raises MeshError.
+    """
     if edge_m is not None and not (np.isfinite(edge_m) and edge_m > 0):
         raise MeshError(f"edge_m is {edge_m}", "give an element size above zero")
     vertex, face = np.zeros((0, 3)), np.zeros((0, 3), np.int32)
@@ -60,7 +68,7 @@ def fill(
     else:
         skin_given = prepared(*soup(shapes), thickness_m)
         vertex, face = skin_given.vertex_m, skin_given.face
-        made = filled(_united(skin_given), edge_m, say)
+        made = filled(_united(skin_given), edge_m, say, lattice=lattice)
     order = dissection(made.node_m, made.tet)
     place = np.empty(len(order), np.int64)
     place[order] = np.arange(len(order))
