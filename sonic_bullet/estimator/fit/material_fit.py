@@ -86,7 +86,7 @@ def fit_evidence(
     apart = radiation == "apart"
     if apart and progress is not None:
         progress("how its modes radiate")
-    air = tuple(in_air(e, log_gamma, poisson, case.band_hz[1], apart, cache) for e in shaped)
+    air = tuple(in_air(e, log_gamma, poisson, case.band_hz[1], apart) for e in shaped)
     lam, decay, decay_sd, extra = _decays(evidence, pairs, air if apart else (None,) * len(air))
     start = (guess.alpha_per_s or 1.0, guess.beta_s or 1.0 / (float(np.median(lam)) if len(lam) else 1e8))
     damping = rayleigh(lam, decay - extra, np.hypot(decay_sd, KNOWN * extra), start, decay)

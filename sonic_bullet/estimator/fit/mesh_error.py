@@ -67,7 +67,7 @@ def halving_moves(
     say, times = progress or (lambda _: None), 2.0
     for _ in range(2):
         coarse, edge = _coarser(o, material, times, edges[0], count, say)
-        # fTetWild keeps to the surface, whatever edge it is asked for
+        # elements keep to the surface's own creases, whatever edge is asked for
         while edge < LEAST_RATIO * edges[-1] and times < MOST_TIMES:
             times *= 1.6
             coarse, edge = _coarser(o, material, times, edges[0], count, say)

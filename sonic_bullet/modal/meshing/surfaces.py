@@ -141,7 +141,7 @@ def _oriented(vertex_m: Array, face: Array) -> tuple[Array, str]:
 
 
 def prepared(vertex_m: Array, face: Array, thickness_m: float | None) -> Skin:
-    """The surface that fTetWild is to fill.
+    """The surface that is to be filled.
 
     Raises MeshError for no triangle, NaN, an absurd size, or a sheet it cannot thicken.
     """

@@ -1,0 +1,275 @@
+"""Any body as a method (methods.py): filled with tetrahedra, clamped or free, of any material.
+
+Walls thinner than an element take polynomials of degree 3 (lagrange.py), lumps of degree 2. The first size comes from
+the shortest wave asked for; from one size to the next λ's error falls as h^ORDER, and two sizes tell how large it is
+[Richardson 1911].
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sonic_bullet import geometry
+from sonic_bullet.files import cache as store
+from sonic_bullet.modal import eigen, fem, lagrange, polynomials
+from sonic_bullet.modal.keys import key
+from sonic_bullet.modal.meshing.filling import LATTICE
+from sonic_bullet.modal.meshing.named_shapes import soup
+from sonic_bullet.modal.meshing.sizes import edge_within_m
+from sonic_bullet.modal.meshing.solid import Solid
+from sonic_bullet.modal.meshing.surfaces import prepared
+from sonic_bullet.modal.ordering import dissection
+from sonic_bullet.modal.sectors import SHIFT, Sector, Shown, Wanted
+from sonic_bullet.records import Array, Shape
+from sonic_bullet.records.errors import ModalError
+
+if TYPE_CHECKING:
+    from sonic_bullet.modal.meshing.shape_meshes import Filled
+
+SOLID = {
+    "node": store.Kept("f8", ("n", 3)),
+    "tet": store.Kept("i", (None, None), "n"),
+    "affine": store.Kept("b1", (1,)),
+    "skin": store.Kept("i", ("v",), "n"),
+    "face": store.Kept("i", ("f", 3), "v"),
+    "curvature": store.Kept("f8", ("f",)),
+}
+
+PER_WAVE = {2: 0.2, 3: 0.2}
+"""First edge over the shortest wave, by degree."""
+ORDER = 3.0
+"""Of frequencies in h, as measured on thin bodies with creases (1.7 to 3.5): smooth ones have 4."""
+FINER = 0.7  # from one edge to the next: half the elements of a wall
+MOST_UNKNOWNS = 70_000
+"""15 s of processor and 1.2 GB for a wall. More are allowed by an edge_m."""
+UNKNOWNS_PER_TET = {2: 6.0, 3: 18.0}  # of thin walls; less of lumps
+LARGEST = 0.2  # edge over the diagonal: fewer elements than that are no body
+TOGETHER = 3  # highest modes whose errors are averaged: one alone may change places with its neighbour
+APART = 0.9  # over the finer size's unknowns: meshes more alike than this tell nothing
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Elements:
+    """body: filled, in m, by elements of edge_m. clamp (k, 4): spheres that hold it. degree: of its field.
+
+    at_size: the body filled anew by an edge, by the lattice or not; None where the user gave the edge. coarser: the
+    size before. known: λ (m,) found, by tensor.
+    """
+
+    body: Filled
+    length_m: float
+    clamp: Array
+    degree: int
+    edge_m: float
+    at_size: Callable[[float, bool], Filled] | None
+    coarser: Elements | None = None
+    known: dict[bytes, Array] = field(default_factory=dict)
+
+    @property
+    def solid(self) -> Solid:
+        """The body over L."""
+        return Solid(self.body.solid.node_m / self.length_m, self.body.solid.tet, self.body.solid.affine)
+
+    @property
+    def volume(self) -> float:
+        """In units of L³."""
+        return fem.volume_m3(self.solid)
+
+    @property
+    def meshed(self) -> bool:
+        """Elements are too stiff."""
+        return True
+
+    @property
+    def nodes(self) -> lagrange.Field:
+        """Of the unknowns, over L, in elimination order."""
+        made = lagrange.field(self.solid, self.degree)
+        if self.degree == 2:  # the solid is in that order
+            return made
+        order = dissection(made.node_m, made.tet)
+        place = np.empty(len(order), np.int64)
+        place[order] = np.arange(len(order))
+        return lagrange.Field(self.degree, made.node_m[order], place[made.tet])
+
+    def held(self, nodes: lagrange.Field) -> Array:
+        """Which nodes (n,) are clamped. Raises ModalError where all are, MeshError where a clamp is elsewhere."""
+        clamp = self.clamp / self.length_m
+        held = fem.clamped(nodes, clamp)
+        if held.all():
+            raise ModalError("the clamps hold the whole body", "give a smaller radius")
+        return held
+
+    def sectors(self, tensors: Sequence[Array], wanted: Wanted, say: Callable[[str], None]) -> list[Sector]:
+        """The modes wanted of each tensor (6, 6), one sector. Raises ModalError, MeshError."""
+        solid, nodes = self.solid, self.nodes
+        held = self.held(nodes)
+        free = np.flatnonzero(np.repeat(~held, 3))
+        corner = solid.node_m[self.body.skin.node][self.body.skin.face]
+        area = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1).sum() / 2
+        shift = -SHIFT * (2 * self.volume / float(area)) ** 2
+        say(f"assembling {len(free)} unknowns")
+        rigid = 6
+        if held.any():
+            rigid -= int(np.linalg.matrix_rank(fem.rigid_modes(nodes.node_m)[np.repeat(held, 3)], tol=1e-9))
+        most = min(wanted.most, max(1, len(free) // 3 - rigid))
+        bound = wanted.beyond * wanted.limit
+        solved, stiff, mass = [], [], None
+        for tensor in tensors:
+            k_matrix, mass = fem.assemble(solid, tensor, 1.0, nodes)
+            if held.any():
+                k_matrix, mass = k_matrix[free][:, free], mass[free][:, free]
+            modes = eigen.solve(
+                k_matrix, mass, shift, rigid=rigid, enough=lambda value: bool(value[-1] > bound), most=most, say=say
+            )
+            keep = modes.lambda_per_s2 <= bound
+            self.known[np.asarray(tensor).tobytes()] = modes.lambda_per_s2
+            solved.append((modes.lambda_per_s2[keep], modes.vector[:, keep]))
+            stiff.append(k_matrix)
+        return [Sector(tuple(solved), tuple(stiff), mass, 1, (nodes, free))]
+
+    def shown(self, sectors: Sequence[Sector], vectors: Sequence[Array]) -> Shown:
+        """Vectors (n, b) on the surface."""
+        skin = self.body.skin
+        ((vector,), (nodes, free)) = vectors, sectors[0].place
+        whole = np.zeros((3 * len(nodes.node_m), vector.shape[1]))
+        whole[free] = vector
+        on_skin = lagrange.at_nodes(nodes, self.body.solid, skin.node) @ whole.reshape(len(nodes.node_m), -1)
+        shape = np.ascontiguousarray(on_skin.reshape(len(skin.node), 3, -1), np.float32)
+        return Shown(self.body.solid.node_m[skin.node], skin.face, self.body.curvature_per_m, shape)
+
+    def error(self, sectors: Sequence[Sector], tensor: Array, top: tuple[int, int]) -> float:
+        """Of the frequency of mode top[1], relative: what the size before was farther off, times what that leaves.
+
+        NaN where the user gave the size, or no coarser body can be made.
+        """
+        if self.at_size is None:
+            return float("nan")
+        coarser = self.coarser or self._of_size(self.edge_m / FINER)
+        most, name = top[1] + 1, np.asarray(tensor).tobytes()
+        if len(coarser.known.get(name, ())) < most:
+            coarser.sectors([tensor], Wanted(np.inf, most), lambda _: None)
+        fine, coarse = sectors[0].found[0][0][:most], coarser.known[name][:most]
+        if len(coarse) < most:
+            return float("nan")
+        few = slice(max(0, most - TOGETHER), most)
+        fewer = len(coarser.body.solid.node_m) / len(self.body.solid.node_m)
+        if fewer > APART:
+            return float("nan")
+        larger = fewer ** (-1 / (2 if self.degree == 3 else 3))
+        lost = float(np.sqrt(coarse[few] / fine[few]).mean()) - 1
+        return abs(lost) / (larger**ORDER - 1)
+
+    def finer(self) -> Elements | None:
+        """The same with edges `FINER` as long, None where that takes more than `MOST_UNKNOWNS`."""
+        if self.at_size is None or self._unknowns / FINER ** (2 if self.degree == 3 else 3) > MOST_UNKNOWNS:
+            return None
+        return replace(self._of_size(self.edge_m * FINER), coarser=self)
+
+    @property
+    def _unknowns(self) -> float:
+        return UNKNOWNS_PER_TET[self.degree] * len(self.body.solid.tet)
+
+    def _of_size(self, edge_m: float) -> Elements:
+        assert self.at_size is not None
+        lattice = self.body.solid.note.startswith(LATTICE)
+        return replace(self, body=self.at_size(edge_m, lattice), edge_m=edge_m, coarser=None, known={})
+
+    def note(self, sectors: Sequence[Sector]) -> str:
+        """How it was done."""
+        nodes, free = sectors[0].place
+        held = len(nodes.node_m) - len(free) // 3
+        clamped = f"; {held} nodes clamped" if held else ""
+        return f"{self.body.solid.note}; degree {self.degree}, {len(free)} unknowns{clamped}"
+
+
+def filled(
+    shapes: tuple[Shape, ...],
+    length_m: float,
+    tensor: Array,
+    wanted: Wanted,
+    clamp: Array,
+    sizes: tuple[float | None, float | None],
+    kept: tuple[store.Place, str],
+    say: Callable[[str], None],
+) -> Elements:
+    """The method of any body, clamped where clamp (k, 4) reaches, its first size from what is wanted of a material of
+    stiffness (6, 6). sizes: edge_m, None for that, and thickness_m. Raises MeshError, ModalError.
+    """
+    given, thickness_m = sizes
+
+    def at_size(edge_m: float, lattice: bool) -> Filled:
+        cache, name = kept
+        name = key("solid", name, edge_m, lattice)
+        return _filled(shapes, (edge_m, thickness_m), (cache, name), say, lattice=lattice)
+
+    degree, edge_m = _first(shapes, thickness_m, length_m, tensor, wanted, say)
+    if given is not None:
+        degree = 3 if degree == 3 and given > edge_m else 2
+    edge = given or edge_m
+    made = Elements(at_size(edge, False), length_m, clamp, degree, edge, None if given else at_size)
+    made.held(lagrange.field(made.solid, 2))
+    return made
+
+
+def _first(
+    shapes: tuple[Shape, ...],
+    thickness_m: float | None,
+    length_m: float,
+    tensor: Array,
+    wanted: Wanted,
+    say: Callable[[str], None],
+) -> tuple[int, float]:
+    """Degree and edge in m to begin with: for the shortest wave of a plate as thick as the body is, at the highest λ
+    wanted or the wave of as many modes as are wanted, and no more unknowns than may be.
+    """
+    skin = prepared(*soup(shapes), thickness_m)
+    area = float(geometry.face_areas_m2(skin.vertex_m, skin.face).sum()) / length_m**2
+    wall = skin.thickness_m / length_m
+    flat = np.sqrt(4 * np.pi * (wanted.most + 8) / (area / 2))
+    bulk = (3 * np.pi**2 * (wanted.most + 8) / (area * wall / 2)) ** (1 / 3)  # two shear waves fill a lump
+    wave = 2 * np.pi / min(float(polynomials.wave_number(wanted.beyond * wanted.limit, wall, tensor)), max(flat, bulk))
+    degree = 3 if PER_WAVE[3] * wave > wall else 2
+    edge = min(PER_WAVE[degree] * wave, LARGEST)
+    least = edge_within_m(area * wall / 2, wall, MOST_UNKNOWNS / UNKNOWNS_PER_TET[degree])
+    if edge < least:
+        say(
+            f"elements of {edge * length_m:.2g} m, for the shortest wave wanted, are about {(least / edge) ** 2:.1f} × "
+            f"{MOST_UNKNOWNS} unknowns: larger ones are used, unless edge_m gives their size"
+        )
+    return degree, max(edge, least) * length_m
+
+
+def _filled(
+    shapes: tuple[Shape, ...],
+    sizes: tuple[float | None, float | None],
+    kept: tuple[store.Place, str],
+    say: Callable[[str], None],
+    *,
+    lattice: bool,
+) -> Filled:
+    """The body's inside and skin, from the cache where it is there. sizes: edge_m, thickness_m."""
+    from sonic_bullet.modal.meshing.shape_meshes import Filled, fill
+    from sonic_bullet.modal.meshing.solid import SolidSurface
+
+    found = store.load(*kept, SOLID)
+    if found is not None:
+        a, note = found
+        return Filled(
+            Solid(a["node"], a["tet"], bool(a["affine"][0]), note), SolidSurface(a["skin"], a["face"]), a["curvature"]
+        )
+    body = fill(shapes, *sizes, say, lattice=lattice)
+    solid, skin = body.solid, body.skin
+    arrays = {
+        "node": solid.node_m,
+        "tet": solid.tet,
+        "affine": np.array([solid.affine]),
+        "skin": skin.node,
+        "face": skin.face,
+        "curvature": body.curvature_per_m,
+    }
+    store.save(*kept, arrays, solid.note)
+    return body
