@@ -21,8 +21,8 @@ APART = 0.4  # of the median edge: how far points of the curve lie apart
 
 
 class Patch(NamedTuple):
-    """ends: the rings, or a ring and the axis (-1), that it joins; curve (c, 2): (r, z) of points between, from the first
-    end on, on the axis the last.
+    """ends: the rings, or a ring and the axis (-1), that it joins; curve (c, 2): (r, z) of points between, from the
+    first end on, on the axis the last.
     """
 
     ends: tuple[int, int]
@@ -30,8 +30,8 @@ class Patch(NamedTuple):
 
 
 def patches(point: Array, face: Array, ring: Array, middle: Array) -> list[Patch] | None:
-    """The patches of a surface about the z axis: point (v, 3), face (f, 3), ring (v,) of each vertex, -1 for none, middle
-    (k, 2) of the rings. None where one is no surface of revolution.
+    """The patches of a surface about the z axis: point (v, 3), face (f, 3), ring (v,) of each vertex, -1 for none,
+    middle (k, 2) of the rings. None where one is no surface of revolution.
     """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
