@@ -20,7 +20,7 @@ from sonic_bullet.modal.isotropic_family import Family, mixed
 from sonic_bullet.modal.keys import key
 from sonic_bullet.modal.methods import chosen
 from sonic_bullet.modal.model import diagonal_m, solid_key
-from sonic_bullet.modal.sectors import MOST_MODES, ModalMethod, Wanted
+from sonic_bullet.modal.sectors import MOST_MODES, ModalMethod, Sector, Wanted
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.errors import ModalError
 
@@ -130,10 +130,13 @@ def _reduced(
     """The family that the modes at two Poisson's ratios span, sector by sector."""
     from scipy.linalg import block_diag
 
-    sectors = method.sectors([np.asarray(mixed(nu, *_lame_shear())) for nu in poisson], wanted, say)
+    tensors = [np.asarray(mixed(nu, *_lame_shear())) for nu in poisson]
+    sectors: list[Sector] = []
+    while not any(len(value) for sector in sectors for value, _ in sector.found):
+        sectors = method.sectors(tensors, wanted, say)
+        wanted = wanted._replace(limit=4 * wanted.limit)
+    wanted = wanted._replace(limit=wanted.limit / 4)  # that of the last try: a family without a mode is of no use
     sectors = [sector for sector in sectors if any(len(value) for value, _ in sector.found)]
-    if not sectors:
-        raise ModalError("body has no mode in the band", "raise the band's end")
     share = np.linalg.inv([[mixed(nu, 1.0, 0.0), mixed(nu, 0.0, 1.0)] for nu in poisson])  # of K at both ν in K_l, K_s
     bases, lame, shear = [], [], []
     for sector in sectors:

@@ -1,6 +1,7 @@
 """Which shapes are bodies of revolution: balls, cylinders and capsules by name, closed meshes by their rings.
 
     vertices of one radius and height that go round without a wide gap -> a ring; one on the axis -> a pole
+    vertices of no ring that lie on one curve (patches.py) -> that curve
     rings joined by faces -> sides of the section; a ring filled by faces of its own -> a flat end, a pole in its middle
     poles in pairs along the axis -> the body's inside
 
@@ -11,12 +12,14 @@ no body of revolution: a handle, a spout, a dent, a prism of few sides.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 from sonic_bullet import geometry
 from sonic_bullet.geometry import CREASE_RAD
 from sonic_bullet.modal.meshing.shape_meshes import rotation
+from sonic_bullet.modal.revolution.patches import Patch, patches
 from sonic_bullet.records import Array, Shape
 
 ROUND = 2e-5  # of the diagonal: what a ring's vertices may differ by
@@ -148,11 +151,12 @@ def _outline(point: Array, face: Array) -> Array | None:
     ring of rings.
     """
     diagonal = float(np.linalg.norm(np.ptp(point, axis=0)))
-    found = _rings(point, diagonal)
-    if found is None:
+    ring, middle, filled = _rings(point, diagonal)
+    between = patches(point, face, ring, middle) if len(middle) else None
+    if between is None:
         return None
-    ring, middle, filled = found
-    sides = _sides(ring[face], middle, filled)
+    whole = ring[face]
+    sides = _sides(whole[(whole >= 0).all(axis=1)], middle, filled, between)
     walk = None if sides is None else _walked(sides[0])
     if sides is None or walk is None:
         return None
@@ -163,9 +167,9 @@ def _outline(point: Array, face: Array) -> Array | None:
     return outline if abs(geometry.volume_m3(point, face) / expected - 1) < SAME else None
 
 
-def _rings(point: Array, diagonal: float) -> tuple[Array, Array, Array] | None:
-    """The ring (v,) of each vertex, radius and height (k, 2) of each ring, 0 on the axis, and how much (k,) of its disc
-    the ring's polygon fills; None where one has a gap.
+def _rings(point: Array, diagonal: float) -> tuple[Array, Array, Array]:
+    """The ring (v,) of each vertex, -1 where it belongs to none, radius and height (k, 2) of each ring, 0 on the axis,
+    and how much (k,) of its disc the ring's polygon fills.
     """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -180,25 +184,28 @@ def _rings(point: Array, diagonal: float) -> tuple[Array, Array, Array] | None:
     count = np.bincount(ring)
     middle = np.stack([np.bincount(ring, flat[:, k]) / count for k in range(2)], axis=1)
     pole = (count == 1) & (middle[:, 0] < ROUND * diagonal)
-    if middle[~pole, 0].min(initial=np.inf) < BORE * diagonal or count[~pole].min(initial=n) < 2 * np.pi / GAP:
-        return None
     angle = np.arctan2(point[:, 1], point[:, 0])
     order = np.lexsort((angle, ring))
     start = np.concatenate([[0], np.cumsum(count)[:-1]])
     step = np.diff(angle[order], append=0)
     last = start + count - 1
     step[last] = angle[order][start] + 2 * np.pi - angle[order][last]
-    if step[~pole[ring[order]]].max(initial=0) > GAP:
-        return None
-    middle[pole, 0] = 0
+    widest = np.zeros(len(count))
+    np.maximum.at(widest, ring[order], step)
     filled = np.bincount(ring[order], np.sin(step)) / (2 * np.pi)
     filled[pole] = 1.0  # no area at all: its neighbour's share would do as well
-    return ring, middle, filled
+    middle[pole, 0] = 0
+    good = pole | ((widest < GAP) & (middle[:, 0] > BORE * diagonal))
+    number = np.where(good, np.cumsum(good) - 1, -1)
+    return number[ring], middle[good], filled[good]
 
 
-def _sides(triple: Array, middle: Array, filled: Array) -> tuple[list[list[int]], Array, Array] | None:
-    """Neighbours of each ring along the outline, the rings with a pole added for each flat end that has none; from the
-    rings triple (f, 3) of the faces. None where poles do not pair.
+def _sides(
+    triple: Array, middle: Array, filled: Array, between: list[Patch]
+) -> tuple[list[list[int]], Array, Array] | None:
+    """Neighbours of each ring along the outline, and the rings with all that is added to them: the points of patches
+    between, a pole for each flat end that has none; from the rings triple (f, 3) of the faces. None where poles do not
+    pair.
     """
     edge = np.unique(np.sort(np.concatenate([triple[:, [0, 1]], triple[:, [1, 2]], triple[:, [2, 0]]]), axis=1), axis=0)
     edge = edge[edge[:, 0] != edge[:, 1]]
@@ -209,11 +216,17 @@ def _sides(triple: Array, middle: Array, filled: Array) -> tuple[list[list[int]]
     added = np.stack([ends, len(middle) + np.arange(len(ends))], axis=1)
     middle = np.concatenate([middle, np.stack([np.zeros(len(ends)), middle[ends, 1]], axis=1)])
     filled = np.concatenate([filled, filled[ends]])
+    joined = []
+    for (start, end), curve in between:
+        walk = [start, *range(len(middle), len(middle) + len(curve)), *([end] if end >= 0 else [])]
+        joined += list(pairwise(walk))
+        middle = np.concatenate([middle, curve])
+        filled = np.concatenate([filled, np.full(len(curve), filled[start])])
     pole = np.flatnonzero(middle[:, 0] == 0)
     pole = pole[np.argsort(middle[pole, 1], kind="stable")]
     if len(pole) % 2:
         return None
-    edge = np.concatenate([edge, added, pole.reshape(-1, 2)])
+    edge = np.concatenate([edge, added, np.array(joined, int).reshape(-1, 2), pole.reshape(-1, 2)])
     neighbours: list[set[int]] = [set() for _ in middle]
     for a, b in edge.tolist():
         neighbours[a].add(b)

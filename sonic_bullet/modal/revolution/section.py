@@ -19,7 +19,7 @@ from sonic_bullet.modal.meshing.prisms import SAME, _gap, _inside
 from sonic_bullet.modal.revolution.rings import Revolved, turns
 from sonic_bullet.records import Array
 
-WALL, LONG = 0.75, 3.0  # a triangle's side over the wall's thickness, at a corner and far from all
+WALL, LONG = 0.5, 3.0  # a triangle's side over the wall's thickness, at a corner and far from all
 WAVE = 0.25  # a triangle's side over the shortest wave
 PIECES = 600  # of an outline, about, for which the size is found
 BENT = 0.3  # radians that a side may turn
