@@ -281,9 +281,9 @@ _FLAT = Detail(FACETS // 4, 0.01)  # flat sides and straight generators as few t
 _SHEET = Detail(6, 1.0), Detail(9, 2.0, 2)
 _STOUT = Detail(6, 1.0, 2), Detail(9, 1.5, 3)
 _SHELL = Detail(9, 1.5), Detail(14, 2.25, 2)
-_RIBBED = Detail(6, 1.0, 2), Detail(6, 1.5, 3)
+_RIBBED = Detail(6, 0.75, 2), Detail(6, 1.25, 2)
 _TUBE = Detail(6, 1.5, 2), Detail(9, 2.25, 3)
-_OPEN_SECTION = Detail(6, 1.0, 2), Detail(6, 1.5, 4)  # twist is soft, and the corner takes four cells both ways
+_OPEN_SECTION = Detail(6, 1.0, 2), Detail(6, 1.25, 3)  # twist is soft, and the corner takes cells both ways
 
 _BRASS_BOWL = [(0.035, 80.0, 0.003, 5), (0.040, 0.0, 0.005, 4)]
 _GONG_RIM = [(0.010, 85.0, 0.0015, 2), (0.020, 0.0, 0.0015, 2)]
@@ -333,8 +333,7 @@ PLATES = (
         "200 × 150 × 80 mm, walls 1.5 mm",
         STEEL,
         _tray,
-        Detail(6, 1.0, 2),
-        Detail(6, 1.25, 3),
+        *_RIBBED,
         paired=False,
         facets=_FLAT,
     ),
@@ -378,13 +377,21 @@ SHELLS = (
         Detail(12, 2.0),
         Detail(14, 2.5, 2),
     ),
-    ThinBody("singing-bowl", "⌀ 150 × 75 mm, wall 3 mm, rim 5 mm", BRONZE, _walls(0.035, _BRASS_BOWL, 0.003), *_SHELL),
+    ThinBody(
+        "singing-bowl",
+        "⌀ 150 × 75 mm, wall 3 mm, rim 5 mm",
+        BRONZE,
+        _walls(0.035, _BRASS_BOWL, 0.003),
+        Detail(8, 1.25),
+        Detail(11, 1.75, 2),
+    ),
     ThinBody(
         "gong",
         "⌀ 240 mm, 1.5 mm, rim of 30 mm",
         BRONZE,
         _walls(0.110, _GONG_RIM, 0.0015),
-        *_SHELL,
+        Detail(9, 1.5),
+        Detail(13, 2.25),
         facets=Detail(24, 4.0),
     ),
     ThinBody("bell", "⌀ 105 × 95 mm, wall 3 mm, lip 7 mm", BRONZE, _walls(0.020, _BELL_WAIST, 0.003), *_SHELL),
@@ -395,16 +402,16 @@ SHELLS = (
         GLASS,
         _wine_glass,
         Detail(7, 1.25),
-        Detail(9, 1.75, 2),
+        Detail(8, 1.5, 2),
     ),
-    ThinBody("bottle", "⌀ 72 × 250 mm, wall 3 mm", GLASS, _bottle, Detail(8, 1.25), Detail(11, 1.75, 2)),
+    ThinBody("bottle", "⌀ 72 × 250 mm, wall 3 mm", GLASS, _bottle, Detail(7, 1.25), Detail(9, 1.75, 2)),
     ThinBody(
         "mug",
         "⌀ 80 × 90 mm, wall 4 mm, handle 16 × 7 mm",
         PORCELAIN,
         _mug,
         Detail(8, 1.0),
-        Detail(12, 1.5, 2),
+        Detail(12, 1.25, 2),
         paired=False,
     ),
     ThinBody(
@@ -413,7 +420,7 @@ SHELLS = (
         STEEL,
         _pan,
         Detail(6, 1.0),
-        Detail(12, 1.75, 2),
+        Detail(12, 1.5, 2),
         paired=False,
     ),
 )

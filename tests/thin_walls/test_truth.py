@@ -9,6 +9,7 @@ import pytest
 
 from benchmarks.suite import bricks
 from benchmarks.thin_walls import calculix, reference
+from benchmarks.thin_walls.blocks import brick_volumes_m3
 from benchmarks.thin_walls.bodies import BODIES
 from benchmarks.thin_walls.ours import compared
 from benchmarks.thin_walls.reference import Truth, truth
@@ -22,6 +23,8 @@ def test_the_truth_is_kept_and_converged(name: str) -> None:
     body, entry = BODIES[name], KEPT[name]
     assert entry["material"] == asdict(body.stuff)
     assert entry["size"] == body.size
+    volume_m3 = brick_volumes_m3(body.bricks(fine=False)).sum()
+    assert entry["coarse"]["volume_m3"] == pytest.approx(volume_m3, rel=1e-8)
     for mesh, detail in (("coarse", body.coarse), ("fine", body.fine)):
         assert entry[mesh]["detail"] == asdict(detail)
         assert np.all(np.diff(entry[mesh]["frequency_hz"]) >= 0)
