@@ -161,7 +161,7 @@ class Elements:
             return float("nan")
         larger = fewer ** (-1 / (2 if self.degree == 3 else 3))
         lost = float(np.sqrt(coarse[few] / fine[few]).mean()) - 1
-        return abs(lost) / (larger**ORDER - 1)
+        return float(abs(lost) / (larger**ORDER - 1))
 
     def finer(self) -> Elements | None:
         """The same with edges `FINER` as long, None where that takes more than `MOST_UNKNOWNS`."""
