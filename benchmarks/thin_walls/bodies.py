@@ -283,7 +283,7 @@ _STOUT = Detail(6, 1.0, 2), Detail(9, 1.5, 3)
 _SHELL = Detail(9, 1.5), Detail(14, 2.25, 2)
 _RIBBED = Detail(6, 0.75, 2), Detail(6, 1.25, 2)
 _TUBE = Detail(6, 1.5, 2), Detail(9, 2.25, 3)
-_OPEN_SECTION = Detail(6, 1.0, 2), Detail(6, 1.25, 3)  # twist is soft, and the corner takes cells both ways
+_OPEN_SECTION = Detail(6, 1.0, 3), Detail(6, 1.75, 4)  # twist is soft, and the corner takes cells both ways
 
 _BRASS_BOWL = [(0.035, 80.0, 0.003, 5), (0.040, 0.0, 0.005, 4)]
 _GONG_RIM = [(0.010, 85.0, 0.0015, 2), (0.020, 0.0, 0.0015, 2)]
@@ -382,8 +382,8 @@ SHELLS = (
         "⌀ 150 × 75 mm, wall 3 mm, rim 5 mm",
         BRONZE,
         _walls(0.035, _BRASS_BOWL, 0.003),
-        Detail(8, 1.25),
-        Detail(11, 1.75, 2),
+        Detail(10, 1.5, 2),
+        Detail(14, 2.25, 2),
     ),
     ThinBody(
         "gong",
@@ -401,17 +401,17 @@ SHELLS = (
         "bowl ⌀ 74 mm, 1.6 mm, stem ⌀ 9 mm, foot ⌀ 68 mm",
         GLASS,
         _wine_glass,
-        Detail(7, 1.25),
         Detail(8, 1.5, 2),
+        Detail(11, 2.0, 2),
     ),
-    ThinBody("bottle", "⌀ 72 × 250 mm, wall 3 mm", GLASS, _bottle, Detail(7, 1.25), Detail(9, 1.75, 2)),
+    ThinBody("bottle", "⌀ 72 × 250 mm, wall 3 mm", GLASS, _bottle, Detail(9, 1.75, 2), Detail(13, 2.5, 2)),
     ThinBody(
         "mug",
         "⌀ 80 × 90 mm, wall 4 mm, handle 16 × 7 mm",
         PORCELAIN,
         _mug,
-        Detail(8, 1.0),
         Detail(12, 1.25, 2),
+        Detail(17, 2.0, 2),
         paired=False,
     ),
     ThinBody(
@@ -419,8 +419,8 @@ SHELLS = (
         "⌀ 200 × 50 mm, wall 3 mm, handle 26 × 5 × 160 mm",
         STEEL,
         _pan,
-        Detail(6, 1.0),
         Detail(12, 1.5, 2),
+        Detail(18, 2.25, 2),
         paired=False,
     ),
 )

@@ -152,8 +152,9 @@ class Listener:
         roughness_m: rms height of its surface in place of the material's. name: what log and messages call it, in place
         of the simulator's name; "all" links get their own behind it ("panda/panda_link7"). fixed: clamped spheres (x,
         y, z, radius) in m, body frame. thickness_m: wall of an open surface. to_hz, count: how many modes. accuracy:
-        relative, of the highest frequency; the models' notes tell what is reached. progress: called now and then with which link's modes are being computed, how far that is, and that it is their radiation
-        next (seconds a link the first time, then the cache has both); without one, a terminal shows it. Warns
+        relative, of the highest frequency; the models' notes tell what is reached. progress: called now and then with
+        which link's modes are computed, how far that is, and that it is their radiation next (seconds a link the first
+        time, then the cache has both); without one, a terminal shows it. Warns
         (`errors.SizeWarning`) of a link larger than anything that is struck to sound. Raises SceneError (unknown body
         or link, a name that another has), MaterialError, MeshError, ModalError naming body and link, RecordError.
         """
