@@ -19,9 +19,10 @@ from sonic_bullet.records.errors import ModalError
 
 MOST_AROUND = 400  # waves around
 CURVED = 1.3  # wave number of a curved wall over that of a flat one of as many modes: membranes take the low ones away
-FINER = 1.5  # of a section whose sides are that much shorter an error is left of FINER^-q, q from 1 at notches to 6
+FINER = 1.5  # of a section whose sides are that much shorter an error is left of FINER^-q, q from 1.1 at notches to 6
 HIGHER = 4.0  # λ over that of the last try, where that held too few modes
-LEFT = 1.4  # 1/(1 - FINER^-q) is 1.1 to 3
+FEWEST_NODES = 120  # so few cost nothing
+LEFT = 1.75  # 1/(1 - FINER^-q), which is 1.1 to 2.8
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -160,7 +161,10 @@ def method_for(shape: Shape, length_m: float, tensor: Array, wanted: Wanted) -> 
 
     high = polynomials.omega2_of(shortest, bare.thickness, tensor)
     section = sectioned(unit, wave)
-    return None if section is None else Fourier(unit, length_m, wave, section, high)
+    found = None if section is None else Fourier(unit, length_m, wave, section, high)
+    while found is not None and found.section.nodes < FEWEST_NODES:
+        found = found.finer()
+    return found
 
 
 def _wave_number_of(count: int, body: Revolved, thickness: float) -> float:

@@ -64,8 +64,8 @@ def _patch(point: Array, face: Array, ring: Array, middle: Array) -> Patch | Non
         return None
     whole = np.concatenate([[first], flat, [last]])
     key = int(np.ptp(whole[:, 1]) > np.ptp(whole[:, 0]))
-    way = np.sign(last[key] - first[key])
-    along, across = way * whole[:, key], whole[:, 1 - key]
+    heading = np.sign(last[key] - first[key])
+    along, across = heading * whole[:, key], whole[:, 1 - key]
     order = np.argsort(along, kind="stable")
     step, rise = np.diff(along[order]), np.abs(np.diff(across[order]))
     least = 1e-4 * float(np.median(edge))
@@ -79,7 +79,7 @@ def _patch(point: Array, face: Array, ring: Array, middle: Array) -> Patch | Non
     curve = whole[[*kept, len(whole) - 1]]
     centre = point[face].mean(axis=1)
     own = np.stack([np.hypot(centre[:, 0], centre[:, 1]), centre[:, 2]], axis=1)
-    off = np.interp(way * own[:, key], way * curve[:, key], curve[:, 1 - key]) - own[:, 1 - key]
+    off = np.interp(heading * own[:, key], heading * curve[:, key], curve[:, 1 - key]) - own[:, 1 - key]
     if np.abs(off).max() > OFF * edge.max():
         return None
     return Patch((int(ends[0]), to), curve[1:] if to < 0 else curve[1:-1])

@@ -27,6 +27,8 @@ CORNER = 0.15  # radians: a turn that is kept as a corner
 GROWTH = 0.5  # of size over distance
 MOST_NODES = 15_000  # three unknowns each: a second or two for each wave around
 
+MOST_DISTANCES = 10_000_000  # between points of a lattice and sides: where it takes more, walls are thin, and need none
+
 WaveNumber = Callable[[Array], Array]
 
 
@@ -192,10 +194,10 @@ def _filled(rim: Array, size: Array) -> tuple[Array, Array] | None:
     low, high = rim.min(axis=0), rim.max(axis=0)
     points, step = [rim], float(own.min())
     while step < 2 * float(own.max()) + GROWTH * float((high - low).max()):
-        rows, columns = (int(n) for n in np.ceil((high - low)[::-1] / step / [0.75**0.5, 1]))
-        if rows * columns * len(rim) < 60_000_000:
-            i, j = (g.ravel() for g in np.meshgrid(np.arange(columns + 1), np.arange(rows + 1)))
-            lattice = low + step * np.stack([i + 0.5 * (j % 2), j * 0.75**0.5], axis=1)
+        rows, columns = (int(n) for n in np.ceil((high - low)[::-1] / step / [2 * 0.75**0.5, 2]))
+        if 4 * rows * columns * len(rim) < MOST_DISTANCES:
+            i, j = (g.ravel() for g in np.meshgrid(np.arange(-columns, columns + 1), np.arange(-rows, rows + 1)))
+            lattice = (low + high) / 2 + step * np.stack([i + 0.5 * (j % 2), j * 0.75**0.5], axis=1)
             lattice = lattice[_inside(lattice, sides)]
             if len(lattice):
                 away = np.linalg.norm(lattice[:, None] - middle, axis=2)
