@@ -3,8 +3,8 @@
     python benchmarks/estimates.py [--json]
 
 Bodies of revolution and boxes, free. Each is solved as usual, on a coarse section or with few polynomials, so that
-there is an error to see, and much finer, which is taken for the truth: errors of the highest of fifteen modes. One under
-0.01 % holds where the truth is under 0.02 %. Exits 1 where fewer than nine of ten hold.
+there is an error to see, and much finer, which is taken for the truth: errors of the highest of fifteen modes. One
+under 0.01 % holds where the truth is under 0.02 %. Exits 1 where fewer than nine of ten hold.
 """
 
 from __future__ import annotations
