@@ -15,7 +15,10 @@ import re
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
 from unittest.mock import patch
+
+import numpy as np
 
 from benchmarks.thin_walls.bodies import BODIES
 from sonic_bullet.modal import analyse, polynomials
@@ -31,8 +34,8 @@ BOXES = [
     (0.08, 0.06, 0.025), (0.4, 0.2, 0.004), (0.06, 0.03, 0.03),
 ]  # fmt: skip
 NAMED = [
-    Shape("sphere", [0.05, 0, 0]), Shape("cylinder", [0.05, 0.1, 0]), Shape("cylinder", [0.05, 0.02, 0]),
-    Shape("cylinder", [0.01, 0.2, 0]), Shape("capsule", [0.02, 0.1, 0]), Shape("cylinder", [0.1, 0.004, 0]),
+    Shape(kind, np.array([*size, 0.0][:3]))
+ for kind, size in [("sphere", (0.05, 0)), ("cylinder", (0.05, 0.1)), ("cylinder", (0.05, 0.02)), ("cylinder", (0.01, 0.2)), ("capsule", (0.02, 0.1)), ("cylinder", (0.1, 0.004))]
 ]  # fmt: skip
 
 
@@ -60,7 +63,7 @@ def bodies() -> Iterator[tuple[str, Shape, Material]]:
     for shape in NAMED:
         yield f"{shape.kind} {shape.size_m[0]:g} x {shape.size_m[1]:g}", shape, STEEL
     for size in BOXES:
-        yield "box " + " x ".join(f"{s:g}" for s in size), Shape("box", size), STEEL
+        yield "box " + " x ".join(f"{s:g}" for s in size), Shape("box", np.array(size)), STEEL
 
 
 def told(note: str) -> float | None:
@@ -71,7 +74,7 @@ def told(note: str) -> float | None:
 
 def row(
     name: str, shape: Shape, material: Material, setting: str, how: tuple[float, float, int, int]
-) -> dict[str, object]:
+) -> dict[str, Any]:
     """What is told and what is true of a body at one setting."""
     with fineness(*how):
         model = analyse((shape,), material, count=COUNT, accuracy=0.5, cache=None)
@@ -81,6 +84,11 @@ def row(
     assert estimate is not None, name
     held = error < 2e-4 if estimate == 0 else 1 / FACTOR < estimate / error < FACTOR
     return {"body": name, "setting": setting, "told": estimate, "true": error, "held": held}
+
+
+def said(row: dict[str, Any]) -> str:
+    """A row as a line."""
+    return f"{row['body']:28} {row['setting']:7} told {row['told']:.2%}, true {row['true']:.2%}, {row['held']}"
 
 
 def main() -> int:
@@ -98,9 +106,7 @@ def main() -> int:
         ):
             rows.append(row(name, shape, material, setting, how))
             print(
-                json.dumps(rows[-1])
-                if asked.json
-                else "{body:28} {setting:7} told {told:.2%}, true {true:.2%}, {held}".format(**rows[-1]),
+                json.dumps(rows[-1]) if asked.json else said(rows[-1]),
                 flush=True,
             )
     for setting in ("usual", "coarse"):
