@@ -33,10 +33,12 @@ BOXES = [
     (0.3, 0.3, 0.003), (0.3, 0.02, 0.02), (0.1, 0.1, 0.01), (0.05, 0.05, 0.05), (0.2, 0.13, 0.01), (0.1, 0.02, 0.006),
     (0.08, 0.06, 0.025), (0.4, 0.2, 0.004), (0.06, 0.03, 0.03),
 ]  # fmt: skip
+CYLINDERS = [(0.05, 0.1), (0.05, 0.02), (0.01, 0.2), (0.1, 0.004)]
 NAMED = [
-    Shape(kind, np.array([*size, 0.0][:3]))
- for kind, size in [("sphere", (0.05, 0)), ("cylinder", (0.05, 0.1)), ("cylinder", (0.05, 0.02)), ("cylinder", (0.01, 0.2)), ("capsule", (0.02, 0.1)), ("cylinder", (0.1, 0.004))]
-]  # fmt: skip
+    Shape("sphere", np.array([0.05, 0, 0])),
+    Shape("capsule", np.array([0.02, 0.1, 0])),
+    *(Shape("cylinder", np.array([*size, 0])) for size in CYLINDERS),
+]
 
 
 @contextmanager

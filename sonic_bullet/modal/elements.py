@@ -39,13 +39,15 @@ SOLID = {
     "curvature": store.Kept("f8", ("f",)),
 }
 
-PER_WAVE = {2: 0.2, 3: 0.2}
+PER_WAVE = {2: 0.3, 3: 0.2}
 """First edge over the shortest wave, by degree."""
 ORDER = 3.0
 """Of frequencies in h, as measured on thin bodies with creases (1.7 to 3.5): smooth ones have 4."""
 FINER = 0.7  # from one edge to the next: half the elements of a wall
-MOST_UNKNOWNS = 70_000
-"""15 s of processor and 1.2 GB for a wall. More are allowed by an edge_m."""
+MOST_UNKNOWNS = {2: 30_000, 3: 70_000}
+"""By degree, 15 s of processor and 1.2 GB at most: a lump's factor is full, a wall's sparse. An edge_m allows more."""
+TRIES = 2
+OVER = 1.4  # over those: a surface has more detail than its volume and area tell, and takes larger elements
 UNKNOWNS_PER_TET = {2: 6.0, 3: 18.0}  # of thin walls; less of lumps
 LARGEST = 0.2  # edge over the diagonal: fewer elements than that are no body
 TOGETHER = 3  # highest modes whose errors are averaged: one alone may change places with its neighbour
@@ -157,17 +159,35 @@ class Elements:
             return float("nan")
         few = slice(max(0, most - TOGETHER), most)
         fewer = len(coarser.body.solid.node_m) / len(self.body.solid.node_m)
-        if fewer > APART:
+        if fewer > APART or coarser._lattice != self._lattice:
             return float("nan")
-        larger = fewer ** (-1 / (2 if self.degree == 3 else 3))
+        larger = fewer ** (-1 / self._growth)
         lost = float(np.sqrt(coarse[few] / fine[few]).mean()) - 1
-        return abs(lost) / (larger**ORDER - 1)
+        return float(abs(lost) / (larger**ORDER - 1))
+
+    def within(self, unknowns: float) -> Elements:
+        """The same with larger elements where there are by far more unknowns."""
+        made = self
+        for _ in range(TRIES):
+            if made._unknowns < OVER * unknowns:
+                break
+            made = made._of_size(made.edge_m * (made._unknowns / unknowns) ** (1 / made._growth))
+        return made
 
     def finer(self) -> Elements | None:
         """The same with edges `FINER` as long, None where that takes more than `MOST_UNKNOWNS`."""
-        if self.at_size is None or self._unknowns / FINER ** (2 if self.degree == 3 else 3) > MOST_UNKNOWNS:
+        if self.at_size is None or self._unknowns / FINER**self._growth > MOST_UNKNOWNS[self.degree]:
             return None
         return replace(self._of_size(self.edge_m * FINER), coarser=self)
+
+    @property
+    def _growth(self) -> int:
+        """Power of 1/edge that the unknowns grow with: a wall takes one layer, a lump is full."""
+        return 2 if self.degree == 3 else 3
+
+    @property
+    def _lattice(self) -> bool:
+        return self.body.solid.note.startswith(LATTICE)
 
     @property
     def _unknowns(self) -> float:
@@ -175,8 +195,7 @@ class Elements:
 
     def _of_size(self, edge_m: float) -> Elements:
         assert self.at_size is not None
-        lattice = self.body.solid.note.startswith(LATTICE)
-        return replace(self, body=self.at_size(edge_m, lattice), edge_m=edge_m, coarser=None, known={})
+        return replace(self, body=self.at_size(edge_m, self._lattice), edge_m=edge_m, coarser=None, known={})
 
     def note(self, sectors: Sequence[Sector]) -> str:
         """How it was done."""
@@ -211,6 +230,8 @@ def filled(
         degree = 3 if degree == 3 and given > edge_m else 2
     edge = given or edge_m
     made = Elements(at_size(edge, False), length_m, clamp, degree, edge, None if given else at_size)
+    if given is None:
+        made = made.within(MOST_UNKNOWNS[degree])
     made.held(lagrange.field(made.solid, 2))
     return made
 
@@ -234,11 +255,11 @@ def _first(
     wave = 2 * np.pi / min(float(polynomials.wave_number(wanted.beyond * wanted.limit, wall, tensor)), max(flat, bulk))
     degree = 3 if PER_WAVE[3] * wave > wall else 2
     edge = min(PER_WAVE[degree] * wave, LARGEST)
-    least = edge_within_m(area * wall / 2, wall, MOST_UNKNOWNS / UNKNOWNS_PER_TET[degree])
+    least = edge_within_m(area * wall / 2, wall, MOST_UNKNOWNS[degree] / UNKNOWNS_PER_TET[degree])
     if edge < least:
         say(
             f"elements of {edge * length_m:.2g} m, for the shortest wave wanted, are about {(least / edge) ** 2:.1f} × "
-            f"{MOST_UNKNOWNS} unknowns: larger ones are used, unless edge_m gives their size"
+            f"{MOST_UNKNOWNS[degree]} unknowns: larger ones are used, unless edge_m gives their size"
         )
     return degree, max(edge, least) * length_m
 
