@@ -168,7 +168,7 @@ def _mug(d: Detail) -> list[Block]:
     return [
         *_cup(outer, wall, base, d),
         *_rise(outer, wall, heights, cells, d),
-        grip(d.quarter, d.quarter // 4, n, d.cells(8), outer, middle, bend, bar, stub),
+        grip(d.quarter, d.quarter // 4, n, 8 * n, outer, middle, bend, bar, stub),  # its bend begins at a node
     ]
 
 
@@ -201,6 +201,7 @@ def _tumbler(d: Detail) -> list[Block]:
 def _wine_glass(d: Detail) -> list[Block]:
     """Foot of radius 34 mm, stem of 4.5 mm, a bowl that is half a ball and then narrows."""
     stem, foot, plate, wall, radius, length = 0.0045, 0.034, 0.003, 0.0016, 0.036, 0.075
+    near = 0.009  # cells as small as the foot is thick: its joint with the stem yields
     start = float(np.arcsin(stem / (radius + wall / 2)))
     centre = length + (radius + wall / 2) * np.cos(start)
 
@@ -216,8 +217,9 @@ def _wine_glass(d: Detail) -> list[Block]:
         *disc(d.quarter, 1, d.across, quad((0, 0), (stem, 0), (stem, plate), (0, plate))),
         *disc(d.quarter, 1, d.cells(6), quad((0, plate), (stem, plate), (stem, length), (0, length))),
         *disc(d.quarter, 1, d.across, floor),
-        swept(d.quarter, d.cells(3), d.across, quad((stem, 0), (foot, 0), (foot, plate), (stem, plate))),
-        swept(d.quarter, d.cells(6), d.across, bowl[0]),
+        swept(d.quarter, d.cells(2), d.across, quad((stem, 0), (near, 0), (near, plate), (stem, plate))),
+        swept(d.quarter, d.cells(2), d.across, quad((near, 0), (foot, 0), (foot, plate), (near, plate))),
+        swept(d.quarter, d.cells(12), d.across, bowl[0]),
         swept(d.quarter, d.cells(3), d.across, bowl[1]),
     ]
 
@@ -410,8 +412,8 @@ SHELLS = (
         "⌀ 80 × 90 mm, wall 4 mm, handle 16 × 7 mm",
         PORCELAIN,
         _mug,
-        Detail(12, 1.25, 2),
-        Detail(17, 2.0, 2),
+        Detail(12, 1.5, 2),  # quarters of the turn in fours: the handle's ends are patches
+        Detail(16, 2.0, 3),
         paired=False,
     ),
     ThinBody(
@@ -419,8 +421,8 @@ SHELLS = (
         "⌀ 200 × 50 mm, wall 3 mm, handle 26 × 5 × 160 mm",
         STEEL,
         _pan,
-        Detail(12, 1.5, 2),
-        Detail(18, 2.25, 2),
+        Detail(18, 2.25, 2),  # quarters of the turn in sixes
+        Detail(24, 3.0, 3),
         paired=False,
     ),
 )

@@ -37,6 +37,7 @@ SIMPLER, SLIVER = 0.05, 0.01
 slivers of unions, on which it takes ten times as long."""
 LATTICE_VOLUME = 12.0  # elements in a cube of the lattice's edge
 LATTICE_WALL = 0.8  # of a wall's thickness: a larger edge may miss it
+LATTICE_LEAST = 0.4  # of it: an edge below which the lattice gets no finer
 
 
 def by_rule(skin: Skin, edge_m: float | None) -> Solid | None:
@@ -112,9 +113,16 @@ def _of_lattice(
     skin: Skin, edge_m: float | None, volume_m3: float, tets: float, say: Callable[[str], None], why: str
 ) -> Solid:
     edge = edge_m or min((LATTICE_VOLUME * volume_m3 / tets) ** (1 / 3), LATTICE_WALL * skin.thickness_m)
-    say(f"filling {len(skin.face)} triangles with a lattice of {edge:.3g} m: {why}")
-    corner, tet = stuffed(skin.vertex_m, skin.face, edge)
-    _check_filled(skin, corner, tet)
+    while True:
+        say(f"filling {len(skin.face)} triangles with a lattice of {edge:.3g} m: {why}")
+        try:
+            corner, tet = stuffed(skin.vertex_m, skin.face, edge)
+            _check_filled(skin, corner, tet)
+            break
+        except MeshError:  # some of its walls are thinner than it is on the whole, and than an edge
+            if edge < LATTICE_LEAST * skin.thickness_m:
+                raise
+            edge *= FINER
     tet, said = _largest(corner, tet)
     note = f"{LATTICE}, {len(tet)} tetrahedra, edge {edge:.3g} m ({why}){skin.note}{said}"
     return fitted(quadratic(corner, tet, note=note), skin.vertex_m, skin.face)
