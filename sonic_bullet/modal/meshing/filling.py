@@ -18,7 +18,7 @@ from sonic_bullet.modal.meshing.on_surface import fitted
 from sonic_bullet.modal.meshing.sizes import DOF_PER_TET, curved_sizes, dof_budget, edge_within_m
 from sonic_bullet.modal.meshing.solid import Solid, corner_volume_m3, largest_component, quadratic
 from sonic_bullet.modal.meshing.stuffing import stuffed
-from sonic_bullet.modal.meshing.surfaces import Skin, pieces_of_faces
+from sonic_bullet.modal.meshing.surfaces import Skin
 from sonic_bullet.modal.meshing.tetrahedra import tetrahedra
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import MeshError
@@ -137,8 +137,8 @@ def _largest(corner_m: Array, tet: Array) -> tuple[Array, str]:
 
 
 def _check_filled(skin: Skin, node: Array, tet: Array) -> None:
-    """Raise MeshError where tetrahedra do not hold what a closed surface of one piece encloses."""
-    if not geometry.is_closed(skin.face) or pieces_of_faces(skin.face).max() > 0:
+    """Raise MeshError where tetrahedra do not hold what a closed surface encloses."""
+    if not geometry.is_closed(skin.face):
         return
     kept = float(np.abs(corner_volume_m3(node, tet)).sum()) / geometry.volume_m3(skin.vertex_m, skin.face)
     if not FILLED[0] < kept < FILLED[1]:
