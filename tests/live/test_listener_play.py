@@ -70,7 +70,7 @@ def test_three_seconds_on_the_null_card(world: tuple[Any, sb.Listener]) -> None:
     assert spent_s >= 3.0 + report.silent_s
     assert listener.latency_steps * DT_S <= report.latency_median_s <= 0.050
     assert report.clipped == 0
-    assert busy_s > BUSY_S or report.underruns == 0  # the worst of all latencies is a machine's: benchmarks/live.py
+    assert busy_s > BUSY_S or (report.underruns == 0 and report.latency_worst_s <= 0.050)
 
 
 def test_the_card_gets_the_frames_and_the_log_is_the_same(
