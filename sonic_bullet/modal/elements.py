@@ -1,8 +1,11 @@
 """Any body as a method (methods.py): filled with tetrahedra, clamped or free, of any material.
 
 Walls thinner than an element take polynomials of degree 3 (lagrange.py), lumps of degree 2. The first size comes from
-the shortest wave asked for; from one size to the next λ's error falls as h^ORDER, and two sizes tell how large it is
-[Richardson 1911].
+the shortest wave asked for. Elements are too stiff: from one size to the next f falls, and what two sizes tell is
+taken off [Richardson 1911]:
+
+    f(h) = f + C h^p,   (f(rh) − f(h)) / (r^p − 1) is taken off f(h) with p = 2.5;  what p = 2 and 3.5 would have taken
+    off lies on both sides of it: half of what they disagree is the error told
 """
 
 from __future__ import annotations
@@ -23,7 +26,7 @@ from sonic_bullet.modal.meshing.sizes import edge_within_m
 from sonic_bullet.modal.meshing.solid import Solid
 from sonic_bullet.modal.meshing.surfaces import prepared
 from sonic_bullet.modal.ordering import dissection
-from sonic_bullet.modal.sectors import SHIFT, Sector, Shown, Wanted
+from sonic_bullet.modal.sectors import MOST_MODES, SHIFT, Sector, Shown, Wanted
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.errors import ModalError
 
@@ -41,9 +44,12 @@ SOLID = {
 
 PER_WAVE = {2: 0.3, 3: 0.2}
 """First edge over the shortest wave, by degree."""
-ORDER = 3.0
-"""Of frequencies in h, as measured on thin bodies with creases (1.7 to 3.5): smooth ones have 4."""
+ORDERS = (2.0, 2.5, 3.5)
+"""Of frequencies in h, least, middle and most, as measured on thin bodies with creases: stress is singular there."""
 FINER = 0.7  # from one edge to the next: half the elements of a wall
+ALIKE, LARGER = 1.2, 3
+"""Edges of a coarser body over a finer one's, below which both are too much alike to tell anything; how often a coarser
+one is tried: creases keep elements small."""
 MOST_UNKNOWNS = {2: 30_000, 3: 70_000}
 """By degree, 15 s of processor and 1.2 GB at most: a lump's factor is full, a wall's sparse. An edge_m allows more."""
 TRIES = 2
@@ -51,7 +57,6 @@ OVER = 1.4  # over those: a surface has more detail than its volume and area tel
 UNKNOWNS_PER_TET = {2: 6.0, 3: 18.0}  # of thin walls; less of lumps
 LARGEST = 0.2  # edge over the diagonal: fewer elements than that are no body
 TOGETHER = 3  # highest modes whose errors are averaged: one alone may change places with its neighbour
-APART = 0.9  # over the finer size's unknowns: meshes more alike than this tell nothing
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -106,7 +111,33 @@ class Elements:
         return held
 
     def sectors(self, tensors: Sequence[Array], wanted: Wanted, say: Callable[[str], None]) -> list[Sector]:
-        """The modes wanted of each tensor (6, 6), one sector. Raises ModalError, MeshError."""
+        """The modes wanted of each tensor (6, 6), one sector; of all λ that is taken off which the first tensor's tell.
+
+        Raises ModalError, MeshError.
+        """
+        raw = self._solved(tensors, wanted, say)
+        nodes, free, _ = raw.place
+        less = self._less(tensors[0], raw.found[0][0], say)
+        off = np.nan_to_num(less[1]) if self._same_body else np.zeros(less.shape[1])
+        found = tuple((value * np.exp(-2 * _as_long(off, len(value))), vector) for value, vector in raw.found)
+        return [raw._replace(found=found, place=(nodes, free, (less[0] - less[2]) / 2 if self._same_body else less[1]))]
+
+    def _less(self, tensor: Array, fine: Array, say: Callable[[str], None]) -> Array:
+        """ln f of modes with λ ``fine`` (m,) less what infinitely small elements give, (3, m) by `ORDERS`; NaN where
+        nothing coarser tells.
+        """
+        coarser, ratio = self._coarser()
+        if coarser is None:
+            return np.full((3, len(fine)), np.nan)
+        name = np.asarray(tensor).tobytes()
+        if len(coarser.known.get(name, ())) < len(fine):
+            coarser._solved([tensor], Wanted(np.inf, len(fine)), say)
+        coarse = coarser.known[name][: len(fine)]
+        lost = np.log(_as_long(coarse / fine[: len(coarse)], len(fine))) / 2
+        return np.array([lost / (ratio**order - 1) for order in ORDERS])
+
+    def _solved(self, tensors: Sequence[Array], wanted: Wanted, say: Callable[[str], None]) -> Sector:
+        """The modes wanted of each tensor (6, 6) by these elements alone. Raises ModalError, MeshError."""
         solid, nodes = self.solid, self.nodes
         held = self.held(nodes)
         free = np.flatnonzero(np.repeat(~held, 3))
@@ -131,12 +162,12 @@ class Elements:
             self.known[np.asarray(tensor).tobytes()] = modes.lambda_per_s2
             solved.append((modes.lambda_per_s2[keep], modes.vector[:, keep]))
             stiff.append(k_matrix)
-        return [Sector(tuple(solved), tuple(stiff), mass, 1, (nodes, free))]
+        return Sector(tuple(solved), tuple(stiff), mass, 1, (nodes, free, None))
 
     def shown(self, sectors: Sequence[Sector], vectors: Sequence[Array]) -> Shown:
         """Vectors (n, b) on the surface."""
         skin = self.body.skin
-        ((vector,), (nodes, free)) = vectors, sectors[0].place
+        ((vector,), (nodes, free, _)) = vectors, sectors[0].place
         whole = np.zeros((3 * len(nodes.node_m), vector.shape[1]))
         whole[free] = vector
         on_skin = lagrange.at_nodes(nodes, self.body.solid, skin.node) @ whole.reshape(len(nodes.node_m), -1)
@@ -144,26 +175,11 @@ class Elements:
         return Shown(self.body.solid.node_m[skin.node], skin.face, self.body.curvature_per_m, shape)
 
     def error(self, sectors: Sequence[Sector], tensor: Array, top: tuple[int, int]) -> float:
-        """Of the frequency of mode top[1], relative: what the size before was farther off, times what that leaves.
-
-        NaN where the user gave the size, or no coarser body can be made.
+        """Of the frequency of mode top[1], relative, the mean over it and two below; NaN where the user gave the size,
+        or no coarser body can be made.
         """
-        if self.at_size is None:
-            return float("nan")
-        coarser = self.coarser or self._of_size(self.edge_m / FINER)
-        most, name = top[1] + 1, np.asarray(tensor).tobytes()
-        if len(coarser.known.get(name, ())) < most:
-            coarser.sectors([tensor], Wanted(np.inf, most), lambda _: None)
-        fine, coarse = sectors[0].found[0][0][:most], coarser.known[name][:most]
-        if len(coarse) < most:
-            return float("nan")
-        few = slice(max(0, most - TOGETHER), most)
-        fewer = len(coarser.body.solid.node_m) / len(self.body.solid.node_m)
-        if fewer > APART or coarser._lattice != self._lattice:
-            return float("nan")
-        larger = fewer ** (-1 / self._growth)
-        lost = float(np.sqrt(coarse[few] / fine[few]).mean()) - 1
-        return float(abs(lost) / (larger**ORDER - 1))
+        left = sectors[0].place[2]
+        return float(np.abs(left[max(0, top[1] + 1 - TOGETHER) : top[1] + 1]).mean())
 
     def within(self, unknowns: float) -> Elements:
         """The same with larger elements where there are by far more unknowns."""
@@ -175,10 +191,34 @@ class Elements:
         return made
 
     def finer(self) -> Elements | None:
-        """The same with edges `FINER` as long, None where that takes more than `MOST_UNKNOWNS`."""
-        if self.at_size is None or self._unknowns / FINER**self._growth > MOST_UNKNOWNS[self.degree]:
+        """The same with edges `FINER` as long, None where that takes more than `MOST_UNKNOWNS`, or where a clamp would
+        hold other nodes.
+        """
+        if self.at_size is None or len(self.clamp) or self._unknowns / FINER**self._growth > MOST_UNKNOWNS[self.degree]:
             return None
         return replace(self._of_size(self.edge_m * FINER), coarser=self)
+
+    def _coarser(self) -> tuple[Elements | None, float]:
+        """The same with larger elements, and how much larger they are; None where the user gave their size, or none can
+        be made.
+        """
+        times = 1 / FINER
+        for _ in range(LARGER):
+            made = self.coarser or (self._of_size(self.edge_m * times) if self.at_size is not None else None)
+            if made is None or made._lattice != self._lattice:
+                break
+            larger = (len(made.body.solid.node_m) / len(self.body.solid.node_m)) ** (-1 / self._growth)
+            if larger > ALIKE:
+                return made, larger
+            times /= FINER
+        return None, np.nan
+
+    @property
+    def _same_body(self) -> bool:
+        """Whether elements of all sizes fill the same body, held at the same places: what a lattice rounds and which
+        nodes a clamp reaches is another matter.
+        """
+        return not self._lattice and not len(self.clamp)
 
     @property
     def _growth(self) -> int:
@@ -199,10 +239,15 @@ class Elements:
 
     def note(self, sectors: Sequence[Sector]) -> str:
         """How it was done."""
-        nodes, free = sectors[0].place
+        nodes, free, _ = sectors[0].place
         held = len(nodes.node_m) - len(free) // 3
         clamped = f"; {held} nodes clamped" if held else ""
         return f"{self.body.solid.note}; degree {self.degree}, {len(free)} unknowns{clamped}"
+
+
+def _as_long(values: Array, count: int) -> Array:
+    """values (m,), cut or the last repeated."""
+    return np.asarray(values[np.minimum(np.arange(count), len(values) - 1)]) if len(values) else np.zeros(count)
 
 
 def filled(
@@ -225,7 +270,9 @@ def filled(
         name = key("solid", name, edge_m, lattice)
         return _filled(shapes, (edge_m, thickness_m), (cache, name), say, lattice=lattice)
 
-    degree, edge_m = _first(shapes, thickness_m, length_m, tensor, wanted, say)
+    # which nodes a clamp reaches goes with their size, and moves modes by up to 1 %: one size then, whatever is wanted
+    first = Wanted(np.inf, MOST_MODES) if len(clamp) else wanted
+    degree, edge_m = _first(shapes, thickness_m, length_m, tensor, first, say)
     if given is not None:
         degree = 3 if degree == 3 and given > edge_m else 2
     edge = given or edge_m

@@ -22,7 +22,8 @@ class Family:
     on the surface at ρL³ = 1 kg.
 
     vertex_m (v, 3), face (4t, 3): the surface, each element's face cut in four. count: how many of the lowest modes are
-    true. meshed: False where no element's error is in λ.
+    true. meshed: False where no element's error is in λ. error: estimated, relative, of the highest one's frequency,
+    NaN where it is not known.
     """
 
     lame: Array
@@ -35,6 +36,7 @@ class Family:
     count: int
     note: str
     meshed: bool = True
+    error: float = float("nan")
 
     def modes(self, gamma_m2_s2: float, poisson: float) -> tuple[Array, Array]:
         """λ (m,) in 1/s² ascending, and the modes (b, m) in the basis: `points` turns them into shapes."""

@@ -18,8 +18,8 @@ import numpy as np
 from sonic_bullet.files import cache as store
 from sonic_bullet.geometry import oversize
 from sonic_bullet.modal.keys import key
-from sonic_bullet.modal.methods import chosen
-from sonic_bullet.modal.sectors import MOST_MODES, ModalMethod, Sector, Wanted
+from sonic_bullet.modal.methods import chosen, converged
+from sonic_bullet.modal.sectors import MOST_MODES, Wanted
 from sonic_bullet.records import Array, Material, ModalModel, Shape
 from sonic_bullet.records.errors import MeshError
 from sonic_bullet.records.modal_options import ModalOptions
@@ -206,7 +206,7 @@ def _solve(
 ) -> _Unit:
     """The body's modes without units, by the method that it takes, as accurate as asked or as that can be."""
     wanted = Wanted(of.limit, MOST_MODES) if asked.count is None else Wanted(np.inf, asked.count)
-    method: ModalMethod | None = chosen(
+    method = chosen(
         shapes,
         of.length_m,
         of.stiffness,
@@ -217,38 +217,22 @@ def _solve(
         kept=(cache, of.solid),
         say=say,
     )
-    error = np.inf
-    while method is not None and error > asked.accuracy:
-        last = method
-        sectors = last.sectors([of.stiffness], wanted, say)
-        value, owner, index = _listed(sectors)
-        order = np.argsort(value, kind="stable")[: wanted.most]
-        top = (int(owner[order[-1]]), int(index[order[-1]])) if len(order) else None
-        error = last.error(sectors, of.stiffness, top) if top else np.nan
-        method = last.finer() if error > asked.accuracy else None
-    shown = last.shown(sectors, [sector.found[0][1] for sector in sectors])
-    note = last.note(sectors)
-    if np.isfinite(error):
-        note += f"; error at {np.sqrt(value[order[-1]] * of.per_s2) / (2 * np.pi):.0f} Hz {_percent(error)}"
-        if error > asked.accuracy:
+    found = converged(method, [of.stiffness], wanted, asked.accuracy, say)
+    shown = found.method.shown(found.sectors, [sector.found[0][1] for sector in found.sectors])
+    note = found.method.note(found.sectors)
+    if np.isfinite(found.error):
+        note += f"; error at {np.sqrt(found.value[-1] * of.per_s2) / (2 * np.pi):.0f} Hz {_percent(found.error)}"
+        if found.error > asked.accuracy:
             note += f", not the {100 * asked.accuracy:g} % asked for: that would cost too much, unless edge_m says so"
     return _Unit(
-        value[order],
-        np.ascontiguousarray(shown.shape[:, :, order]),
-        last.volume,
+        found.value,
+        np.ascontiguousarray(shown.shape[:, :, found.order]),
+        found.method.volume,
         shown.vertex_m,
         shown.face,
         shown.curvature_per_m,
         note,
     )
-
-
-def _listed(sectors: Sequence[Sector]) -> tuple[Array, Array, Array]:
-    """λ (b,) of the sectors' modes in turn, each as often as it counts, its sector and its place there."""
-    value = [np.tile(sector.found[0][0], sector.multiplicity) for sector in sectors]
-    index = [np.tile(np.arange(len(sector.found[0][0])), sector.multiplicity) for sector in sectors]
-    owner = np.repeat(np.arange(len(sectors)), [len(v) for v in value])
-    return np.concatenate([np.zeros(0), *value]), owner, np.concatenate([np.zeros(0, int), *index])
 
 
 def _percent(error: float) -> str:

@@ -18,14 +18,15 @@ import numpy as np
 from sonic_bullet.files import cache as store
 from sonic_bullet.modal.isotropic_family import Family, mixed
 from sonic_bullet.modal.keys import key
-from sonic_bullet.modal.methods import chosen
+from sonic_bullet.modal.methods import chosen, converged
 from sonic_bullet.modal.model import diagonal_m, solid_key
-from sonic_bullet.modal.sectors import MOST_MODES, ModalMethod, Sector, Wanted
+from sonic_bullet.modal.sectors import MOST_MODES, ModalMethod, Wanted
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.errors import ModalError
 
 APART = 0.05  # of ν₁ and ν₂ from the guess
 POISSON = (-0.5, 0.485)
+ACCURACY = 0.01  # of the highest mode's frequency: as `analyse` has it by default
 BEYOND = 1.1  # of the limit on λ: modes that are none at one ν may be some at the other
 KEPT = {
     "lame": store.Kept("f8", ("b", "b")),
@@ -33,7 +34,7 @@ KEPT = {
     "skin": store.Kept("f4", ("v", 3, "b")),
     "vertex": store.Kept("f8", ("v", 3)),
     "face": store.Kept("i", (None, 3), "v"),
-    "numbers": store.Kept("f8", (3,)),
+    "numbers": store.Kept("f8", (4,)),
 }
 
 
@@ -61,7 +62,7 @@ def family(
     found = store.load(cache, name, KEPT)
     if found is not None:
         a, note = found
-        volume, count, meshed = a["numbers"]
+        volume, count, meshed, error = a["numbers"]
         return Family(
             a["lame"],
             a["shear"],
@@ -73,6 +74,7 @@ def family(
             int(count),
             note,
             bool(meshed),
+            float(error),
         )
     kept = (cache, solid_key((shape,), None, edge_m))
     low, high = _poissons(poisson)
@@ -89,7 +91,7 @@ def family(
         say=say,
     )
     made = _reduced(method, length, wanted, (low, high), say)
-    numbers = np.array([made.volume_m3, made.count, made.meshed])
+    numbers = np.array([made.volume_m3, made.count, made.meshed, made.error])
     arrays = {
         "lame": made.lame,
         "shear": made.shear,
@@ -131,19 +133,23 @@ def _reduced(
     from scipy.linalg import block_diag
 
     tensors = [np.asarray(mixed(nu, *_lame_shear())) for nu in poisson]
-    sectors: list[Sector] = []
-    while not any(len(value) for sector in sectors for value, _ in sector.found):
-        sectors = method.sectors(tensors, wanted, say)
+    while True:  # a family without a mode is of no use
+        method, sectors, _, _, error = converged(method, tensors, wanted, ACCURACY, say)
+        sectors = [sector for sector in sectors if any(len(value) for value, _ in sector.found)]
+        if sectors:
+            break
         wanted = wanted._replace(limit=4 * wanted.limit)
-    wanted = wanted._replace(limit=wanted.limit / 4)  # that of the last try: a family without a mode is of no use
-    sectors = [sector for sector in sectors if any(len(value) for value, _ in sector.found)]
     share = np.linalg.inv([[mixed(nu, 1.0, 0.0), mixed(nu, 0.0, 1.0)] for nu in poisson])  # of K at both ν in K_l, K_s
     bases, lame, shear = [], [], []
     for sector in sectors:
-        (_, first), (_, second) = sector.found
+        (value, first), (_, second) = sector.found
         basis = _together(first, second, lambda v, sector=sector: sector.mass @ v)  # type: ignore[misc]
         bases.append(basis)
-        whole = np.tensordot(share, [basis.T @ (stiff @ basis) for stiff in sector.stiff], 1)
+        parts = np.array([basis.T @ (stiff @ basis) for stiff in sector.stiff])
+        # a method may take elements' known error off λ: so is it here, off the motions beside the modes as off all
+        off = np.sqrt(value / np.diagonal(parts[0])[: len(value)])
+        off = np.append(off, np.full(len(basis.T) - len(off), off.mean() if len(off) else 1.0))
+        whole = np.tensordot(share, parts * np.outer(off, off), 1)
         whole = (whole + whole.transpose(0, 2, 1)) / 2
         lame += [whole[0]] * sector.multiplicity
         shear += [whole[1]] * sector.multiplicity
@@ -162,4 +168,5 @@ def _reduced(
         min(MOST_MODES, *counts),
         f"{method.note(sectors)}; nu {poisson[0]:g} and {poisson[1]:g}",
         method.meshed,
+        error,
     )

@@ -42,16 +42,14 @@ __all__ = [
 ]
 
 
-def fit_case(
-    case: Case, *, cache: Place = "default", check_mesh: bool = True, progress: Callable[[str], None] | None = None
-) -> CaseFit:
+def fit_case(case: Case, *, cache: Place = "default", progress: Callable[[str], None] | None = None) -> CaseFit:
     """The material of a case, from its 'fit' strikes alone.
 
     Raises SonicBulletError where a file, mesh or number makes a fit impossible; what the recordings do not say stands
     in the verdict instead.
     """
     evidence = gather(case, cache=cache, progress=progress)
-    return fit_evidence(case, evidence, cache=cache, check_mesh=check_mesh, progress=progress)
+    return fit_evidence(case, evidence, cache=cache, progress=progress)
 
 
 def fit_evidence(
@@ -59,7 +57,6 @@ def fit_evidence(
     evidence: tuple[RecordedObject, ...],
     *,
     cache: Place = "default",
-    check_mesh: bool = True,
     total: bool = False,
     progress: Callable[[str], None] | None = None,
 ) -> CaseFit:
@@ -103,8 +100,6 @@ def fit_evidence(
         damping,
         (gain, gain_sd, amplitude_scatter),
         radiation=radiation,
-        check_mesh=check_mesh,
-        progress=progress,
     )
 
 
