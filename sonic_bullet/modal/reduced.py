@@ -74,7 +74,7 @@ def family(
             int(count),
             note,
             bool(meshed),
-            float(error),
+            float(error) if error >= 0 else np.nan,
         )
     kept = (cache, solid_key((shape,), None, edge_m))
     low, high = _poissons(poisson)
@@ -91,7 +91,8 @@ def family(
         say=say,
     )
     made = _reduced(method, length, wanted, (low, high), say)
-    numbers = np.array([made.volume_m3, made.count, made.meshed, made.error])
+    # what is kept is finite: -1 is an error not known
+    numbers = np.array([made.volume_m3, made.count, made.meshed, np.nan_to_num(made.error, nan=-1.0)])
     arrays = {
         "lame": made.lame,
         "shear": made.shear,
