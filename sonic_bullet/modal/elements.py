@@ -1,8 +1,8 @@
 """Any body as a method (methods.py): filled with tetrahedra, clamped or free, of any material.
 
-Walls thinner than an element take polynomials of degree 3 (lagrange.py), lumps of degree 2. The first size comes from
-the shortest wave asked for. Elements are too stiff: from one size to the next f falls, and what two sizes tell is
-taken off [Richardson 1911]:
+Polynomials are of degree 3 (lagrange.py); of degree 2 where the user gives elements smaller than the wall. The first
+size comes from the shortest wave asked for. Elements are too stiff: from one size to the next f falls, and what two
+sizes tell is taken off [Richardson 1911]:
 
     f(h) = f + C h^p,   (f(rh) − f(h)) / (r^p − 1) is taken off f(h) with a middle p;  what the least and the highest p
     would have taken off lies on both sides of it: half of what they disagree is the error told
@@ -42,8 +42,8 @@ SOLID = {
     "curvature": store.Kept("f8", ("f",)),
 }
 
-PER_WAVE = {2: 0.3, 3: 0.2}
-"""First edge over the shortest wave, by degree."""
+PER_WAVE = 0.2
+"""First edge over the shortest wave."""
 ORDERS = {2: (2.0, 3.0, 4.0), 3: (2.0, 2.5, 3.5)}
 """Of frequencies in h, by degree: least, middle and most. Smooth lumps have 4 [Strang & Fix 1973, ch. 6.3]; less is
 measured where walls are an element thick, and along creases, where stress is singular."""
@@ -51,11 +51,11 @@ FINER = 0.7  # from one edge to the next: half the elements of a wall
 ALIKE, LARGER = 1.2, 3
 """Edges of a coarser body over a finer one's, below which both are too much alike to tell anything; how often a coarser
 one is tried: creases keep elements small."""
-MOST_UNKNOWNS = {2: 30_000, 3: 70_000}
-"""By degree, 15 s of processor and 1.2 GB at most: a lump's factor is full, a wall's sparse. An edge_m allows more."""
+MOST_UNKNOWNS = {True: 70_000, False: 30_000}
+"""Of thin bodies and of lumps, whose factor is full: 15 s of processor and 1.2 GB at most. An edge_m allows more."""
 TRIES = 2
 OVER = 1.4  # over those: a surface has more detail than its volume and area tell, and takes larger elements
-UNKNOWNS_PER_TET = {2: 6.0, 3: 18.0}  # of thin walls; less of lumps
+UNKNOWNS_PER_TET = {2: 6.0, 3: 18.0}  # by degree, of thin walls; less of lumps
 LARGEST = 0.2  # edge over the diagonal: fewer elements than that are no body
 TOGETHER = 3  # highest modes whose errors are averaged: one alone may change places with its neighbour
 
@@ -63,6 +63,7 @@ TOGETHER = 3  # highest modes whose errors are averaged: one alone may change pl
 @dataclass(frozen=True, slots=True, eq=False)
 class Elements:
     """body: filled, in m, by elements of edge_m. clamp (k, 4): spheres that hold it. degree: of its field.
+    thin: elements are wider than the wall: one layer of them.
 
     at_size: the body filled anew by an edge, by the lattice or not; None where the user gave the edge. coarser: the
     size before. known: λ (m,) found, by tensor.
@@ -72,6 +73,7 @@ class Elements:
     length_m: float
     clamp: Array
     degree: int
+    thin: bool
     edge_m: float
     at_size: Callable[[float, bool], Filled] | None
     coarser: Elements | None = None
@@ -198,7 +200,7 @@ class Elements:
         """The same with edges `FINER` as long, None where that takes more than `MOST_UNKNOWNS`, or where a clamp would
         hold other nodes.
         """
-        if self.at_size is None or len(self.clamp) or self._unknowns / FINER**self._growth > MOST_UNKNOWNS[self.degree]:
+        if self.at_size is None or len(self.clamp) or self._unknowns / FINER**self._growth > MOST_UNKNOWNS[self.thin]:
             return None
         return replace(self._of_size(self.edge_m * FINER), coarser=self)
 
@@ -227,7 +229,7 @@ class Elements:
     @property
     def _growth(self) -> int:
         """Power of 1/edge that the unknowns grow with: a wall takes one layer, a lump is full."""
-        return 2 if self.degree == 3 else 3
+        return 2 if self.thin else 3
 
     @property
     def _lattice(self) -> bool:
@@ -276,13 +278,13 @@ def filled(
 
     # which nodes a clamp reaches goes with their size, and moves modes by up to 1 %: one size then, whatever is wanted
     first = Wanted(np.inf, MOST_MODES) if len(clamp) else wanted
-    degree, edge_m = _first(shapes, thickness_m, length_m, tensor, first, say)
-    if given is not None:
-        degree = 3 if degree == 3 and given > edge_m else 2
+    wall_m, edge_m = _first(shapes, thickness_m, length_m, tensor, first, say)
     edge = given or edge_m
-    made = Elements(at_size(edge, False), length_m, clamp, degree, edge, None if given else at_size)
+    thin = edge > wall_m
+    degree = 2 if given and not thin else 3
+    made = Elements(at_size(edge, False), length_m, clamp, degree, thin, edge, None if given else at_size)
     if given is None:
-        made = made.within(MOST_UNKNOWNS[degree])
+        made = made.within(MOST_UNKNOWNS[thin])
     made.held(lagrange.field(made.solid, 2))
     return made
 
@@ -294,9 +296,9 @@ def _first(
     tensor: Array,
     wanted: Wanted,
     say: Callable[[str], None],
-) -> tuple[int, float]:
-    """Degree and edge in m to begin with: for the shortest wave of a plate as thick as the body is, at the highest λ
-    wanted or the wave of as many modes as are wanted, and no more unknowns than may be.
+) -> tuple[float, float]:
+    """The wall and the edge to begin with, in m: for the shortest wave of a plate as thick as the body is, at the
+    highest λ wanted or the wave of as many modes as are wanted, and no more unknowns than may be.
     """
     skin = prepared(*soup(shapes), thickness_m)
     area = float(geometry.face_areas_m2(skin.vertex_m, skin.face).sum()) / length_m**2
@@ -304,15 +306,15 @@ def _first(
     flat = np.sqrt(4 * np.pi * (wanted.most + 8) / (area / 2))
     bulk = (3 * np.pi**2 * (wanted.most + 8) / (area * wall / 2)) ** (1 / 3)  # two shear waves fill a lump
     wave = 2 * np.pi / min(float(polynomials.wave_number(wanted.beyond * wanted.limit, wall, tensor)), max(flat, bulk))
-    degree = 3 if PER_WAVE[3] * wave > wall else 2
-    edge = min(PER_WAVE[degree] * wave, LARGEST)
-    least = edge_within_m(area * wall / 2, wall, MOST_UNKNOWNS[degree] / UNKNOWNS_PER_TET[degree])
+    edge = min(PER_WAVE * wave, LARGEST)
+    most = MOST_UNKNOWNS[edge > wall]
+    least = edge_within_m(area * wall / 2, wall, most / UNKNOWNS_PER_TET[3])
     if edge < least:
         say(
             f"elements of {edge * length_m:.2g} m, for the shortest wave wanted, are about {(least / edge) ** 2:.1f} × "
-            f"{MOST_UNKNOWNS[degree]} unknowns: larger ones are used, unless edge_m gives their size"
+            f"{most} unknowns: larger ones are used, unless edge_m gives their size"
         )
-    return degree, max(edge, least) * length_m
+    return wall * length_m, max(edge, least) * length_m
 
 
 def _filled(

@@ -20,6 +20,7 @@ from sonic_bullet.geometry import oversize
 from sonic_bullet.modal.keys import key
 from sonic_bullet.modal.methods import chosen, converged
 from sonic_bullet.modal.sectors import MOST_MODES, Wanted
+from sonic_bullet.parallel import one_thread
 from sonic_bullet.records import Array, Material, ModalModel, Shape
 from sonic_bullet.records.errors import MeshError
 from sonic_bullet.records.modal_options import ModalOptions
@@ -51,6 +52,7 @@ class _Unit:
     note: str
 
 
+@one_thread()
 def analyse(
     shapes: tuple[Shape, ...],
     material: Material,

@@ -21,6 +21,7 @@ from sonic_bullet.modal.keys import key
 from sonic_bullet.modal.methods import chosen, converged
 from sonic_bullet.modal.model import diagonal_m, solid_key
 from sonic_bullet.modal.sectors import MOST_MODES, ModalMethod, Wanted
+from sonic_bullet.parallel import one_thread
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.errors import ModalError
 
@@ -38,6 +39,7 @@ KEPT = {
 }
 
 
+@one_thread()
 def family(
     shape: Shape,
     *,

@@ -24,6 +24,7 @@ from sonic_bullet.modal.isotropic_family import Family
 from sonic_bullet.modal.keys import key
 from sonic_bullet.modal.model import diagonal_m
 from sonic_bullet.modal.sectors import MOST_MODES, SHIFT
+from sonic_bullet.parallel import one_thread
 from sonic_bullet.records import ORTHOTROPIC, Array, Shape
 from sonic_bullet.records.errors import MeshError
 
@@ -123,6 +124,7 @@ def anchored(youngs: tuple[float, float, float], shear: tuple[float, float, floa
     return np.asarray(np.linalg.inv(compliance))
 
 
+@one_thread()
 def tensor_family(
     shape: Shape,
     *,
