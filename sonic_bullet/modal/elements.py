@@ -197,12 +197,21 @@ class Elements:
         return made
 
     def finer(self) -> Elements | None:
-        """The same with edges `FINER` as long, None where that takes more than `MOST_UNKNOWNS`, or where a clamp would
-        hold other nodes.
+        """The same with edges `FINER` as long, or as `MOST_UNKNOWNS` allows; None where that is too much alike, or
+        where a clamp would hold other nodes.
         """
-        if self.at_size is None or len(self.clamp) or self._unknowns / FINER**self._growth > MOST_UNKNOWNS[self.thin]:
+        most = MOST_UNKNOWNS[self.thin]
+        least = (self._unknowns / most) ** (1 / self._growth)
+        if self.at_size is None or len(self.clamp) or least * ALIKE > 1:
             return None
-        return replace(self._of_size(self.edge_m * FINER), coarser=self)
+        made = self._of_size(self.edge_m * max(FINER, least)).within(most)
+        if made._unknowns > OVER * most or made._smaller_than(self) < ALIKE:
+            return None
+        return replace(made, coarser=self)
+
+    def _smaller_than(self, other: Elements) -> float:
+        """How many times smaller its elements are."""
+        return float((len(self.body.solid.node_m) / len(other.body.solid.node_m)) ** (1 / self._growth))
 
     def _coarser(self) -> tuple[Elements | None, float]:
         """The same with larger elements, and how much larger they are; None where the user gave their size, or none can
@@ -213,7 +222,7 @@ class Elements:
             made = self.coarser or (self._of_size(self.edge_m * times) if self.at_size is not None else None)
             if made is None or made._lattice != self._lattice:
                 break
-            larger = (len(made.body.solid.node_m) / len(self.body.solid.node_m)) ** (-1 / self._growth)
+            larger = self._smaller_than(made)
             if larger > ALIKE:
                 return made, larger
             times /= FINER
