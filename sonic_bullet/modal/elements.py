@@ -1,8 +1,8 @@
 """Any body as a method (methods.py): filled with tetrahedra, clamped or free, of any material.
 
-Polynomials are of degree 3 (lagrange.py); of degree 2 where the user gives elements smaller than the wall. The first
-size comes from the shortest wave asked for. Elements are too stiff: from one size to the next f falls, and what two
-sizes tell is taken off [Richardson 1911]:
+Polynomials are of degree 3 (lagrange.py); of degree 2 where the user gives elements smaller than a bar is thick. The
+first size comes from the shortest wave asked for. Elements are too stiff: from one size to the next f falls, and what
+two sizes tell is taken off [Richardson 1911]:
 
     f(h) = f + C h^p,   (f(rh) − f(h)) / (r^p − 1) is taken off f(h) with a middle p;  what the least and the highest p
     would have taken off lies on both sides of it: half of what they disagree is the error told
@@ -19,6 +19,7 @@ import numpy as np
 from sonic_bullet import geometry
 from sonic_bullet.files import cache as store
 from sonic_bullet.modal import eigen, fem, lagrange, polynomials
+from sonic_bullet.modal.kept_solids import kept_or_filled
 from sonic_bullet.modal.keys import key
 from sonic_bullet.modal.meshing.filling import LATTICE
 from sonic_bullet.modal.meshing.named_shapes import soup
@@ -32,15 +33,6 @@ from sonic_bullet.records.errors import ModalError
 
 if TYPE_CHECKING:
     from sonic_bullet.modal.meshing.shape_meshes import Filled
-
-SOLID = {
-    "node": store.Kept("f8", ("n", 3)),
-    "tet": store.Kept("i", (None, None), "n"),
-    "affine": store.Kept("b1", (1,)),
-    "skin": store.Kept("i", ("v",), "n"),
-    "face": store.Kept("i", ("f", 3), "v"),
-    "curvature": store.Kept("f8", ("f",)),
-}
 
 PER_WAVE = 0.2
 """First edge over the shortest wave."""
@@ -56,6 +48,7 @@ MOST_UNKNOWNS = {True: 70_000, False: 30_000}
 TRIES = 2
 OVER = 1.4  # over those: a surface has more detail than its volume and area tell, and takes larger elements
 UNKNOWNS_PER_TET = {2: 6.0, 3: 18.0}  # by degree, of thin walls; less of lumps
+WIDE = 2.2  # given elements over 2V/A, which is half as thick as a bar: wider ones take degree 3
 LARGEST = 0.2  # edge over the diagonal: fewer elements than that are no body
 TOGETHER = 3  # highest modes whose errors are averaged: one alone may change places with its neighbour
 
@@ -283,14 +276,14 @@ def filled(
     def at_size(edge_m: float, lattice: bool) -> Filled:
         cache, name = kept
         name = key("solid", name, edge_m, lattice)
-        return _filled(shapes, (edge_m, thickness_m), (cache, name), say, lattice=lattice)
+        return kept_or_filled(shapes, (edge_m, thickness_m), (cache, name), say, lattice=lattice)
 
     # which nodes a clamp reaches goes with their size, and moves modes by up to 1 %: one size then, whatever is wanted
     first = Wanted(np.inf, MOST_MODES) if len(clamp) else wanted
     wall_m, edge_m = _first(shapes, thickness_m, length_m, tensor, first, say)
     edge = given or edge_m
     thin = edge > wall_m
-    degree = 2 if given and not thin else 3
+    degree = 2 if given and given < WIDE * wall_m else 3
     made = Elements(at_size(edge, False), length_m, clamp, degree, thin, edge, None if given else at_size)
     if given is None:
         made = made.within(MOST_UNKNOWNS[thin])
@@ -324,35 +317,3 @@ def _first(
             f"{most} unknowns: larger ones are used, unless edge_m gives their size"
         )
     return wall * length_m, max(edge, least) * length_m
-
-
-def _filled(
-    shapes: tuple[Shape, ...],
-    sizes: tuple[float | None, float | None],
-    kept: tuple[store.Place, str],
-    say: Callable[[str], None],
-    *,
-    lattice: bool,
-) -> Filled:
-    """The body's inside and skin, from the cache where it is there. sizes: edge_m, thickness_m."""
-    from sonic_bullet.modal.meshing.shape_meshes import Filled, fill
-    from sonic_bullet.modal.meshing.solid import SolidSurface
-
-    found = store.load(*kept, SOLID)
-    if found is not None:
-        a, note = found
-        return Filled(
-            Solid(a["node"], a["tet"], bool(a["affine"][0]), note), SolidSurface(a["skin"], a["face"]), a["curvature"]
-        )
-    body = fill(shapes, *sizes, say, lattice=lattice)
-    solid, skin = body.solid, body.skin
-    arrays = {
-        "node": solid.node_m,
-        "tet": solid.tet,
-        "affine": np.array([solid.affine]),
-        "skin": skin.node,
-        "face": skin.face,
-        "curvature": body.curvature_per_m,
-    }
-    store.save(*kept, arrays, solid.note)
-    return body
