@@ -24,6 +24,10 @@ CUT_OFF = (9, 24)  # SIGKILL, SIGXCPU: the child's own limit on processor time
 ACROSS = 100.0  # the diagonal as Netgen sees it: its tolerances then fit metres and micrometres alike
 
 
+class EndlessError(MeshError):
+    """A child that did not come to an end, or outgrew its memory: smaller elements would not either."""
+
+
 def tetrahedra(
     vertex_m: Array,
     face: Array,
@@ -72,10 +76,10 @@ def in_child(script: str, given: dict[str, Array], guard_s: int) -> dict[str, Ar
         except subprocess.TimeoutExpired:
             ended = None
         if ended is None or -ended.returncode in CUT_OFF:
-            raise MeshError(f"{name} did not come to an end on the mesh", "repair the mesh, or give a simpler one")
+            raise EndlessError(f"{name} did not come to an end on the mesh", "repair the mesh, or give a simpler one")
         if ended.returncode != 0 or not target.exists():
             said = (ended.stderr.strip().splitlines() or ["no message"])[-1]
-            raise MeshError(
+            raise (EndlessError if "MemoryError" in said else MeshError)(
                 f"{name} failed on the mesh (exit {ended.returncode}: {said[:200]})",
                 "repair the mesh, or give a simpler one",
             )
