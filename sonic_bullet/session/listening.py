@@ -42,7 +42,7 @@ from sonic_bullet.records.errors import AudioError, SceneError, SizeWarning
 from sonic_bullet.render import LATENCY_STEPS, Synthesizer, make_ready
 from sonic_bullet.session.arguments import as_sensors
 from sonic_bullet.session.keeping import KeptRun, package_versions
-from sonic_bullet.session.wanted_bodies import WantedBody, check_names, solved_bodies, wanted_body
+from sonic_bullet.session.wanted_bodies import WantedBody, checked, solved_bodies, wanted_body
 
 
 def _opened(client: Any) -> World:
@@ -179,7 +179,7 @@ class Listener:
     ) -> list[tuple[ModalModel, ...]]:
         """The models of bodies that are listened to from now on."""
         as_call(progress, "progress")
-        check_names(self.world, wanted)
+        wanted = checked(self.world, wanted)
         with status("sonic_bullet") if progress is None else nullcontext(progress) as say:
             models = solved_bodies(self.world, wanted, self._models, self.air if self.sensors else None, say)
         self._models.update(dict.fromkeys(model for mine in models for model in mine))
