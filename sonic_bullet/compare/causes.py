@@ -1,39 +1,43 @@
 """Which inputs are the causes: the smallest set whose return in B gives A's samples, to the bit.
 
-    all put back: is it A?  no: something is not put back       one by one: is it A?  yes: that one
+    one by one: is it A?  yes: that one          all put back: is it A?  no: something is not put back
     else: all but one, ever fewer, while it is A -> a set of which none can be left out
 
 A run that is not A ends at the first frame that differs, most of them early. A single cause costs one run for each
-input; a set of several costs as many again. Where every input only adds to what differs, a set of which none can be left
-out is the smallest there is.
+input; a set of several costs as many again. Where every input only adds to what differs, a set of which none can be
+left out is the smallest there is.
+
+Shares of several causes, where contacts are equal: Shapley values [Shapley 1953, eq. 12] of what is closed,
+v(S) = 1 − d(B with S put back, A)/d(B, A), d the distance of log spectra. They sum to 1 − what is left.
 """
 
 from __future__ import annotations
 
+import itertools
+import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from sonic_bullet.compare.call_pairs import Pair
-from sonic_bullet.compare.input_differences import Asked
-from sonic_bullet.compare.put_back import PutBack
-from sonic_bullet.compare.sides import OtherSound, Say, Side, run
 from sonic_bullet.files.rows.spool import KeptSound
+from sonic_bullet.records import Array
 from sonic_bullet.records.errors import SonicBulletError
 
-Tell = Callable[[str], None]
+MOST_SHARED = 4
+"""Causes whose shares are determined: 2^4 runs."""
+WINDOW, FLOOR_DB = 1024, -100.0
+"""Of log spectra: samples of a frame, and what is silent below the loudest value of A."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Causes:
-    """exact: whether they put back give A; smallest: whether none can be left out; broken: inputs (by index) whose
-    return breaks the scene, and how it breaks.
-    """
+    """found: indices; exact: whether they put back give A; broken: inputs whose return breaks the scene, and how."""
 
-    found: tuple[int, ...]
-    exact: bool
-    broken: dict[int, str]
+    found: tuple[int, ...] = ()
+    exact: bool = False
+    broken: dict[int, str] = field(default_factory=dict)
+    shares: dict[int, float] = field(default_factory=dict)
     stopped: bool = False
 
 
@@ -44,27 +48,26 @@ def same_sound(a: KeptSound, b: KeptSound) -> bool:
     )
 
 
-def find_causes(a: Side, b: Side, pairs: Sequence[Pair], asked: Sequence[Asked], tell: Tell) -> Causes:
-    """The causes among inputs that differ. Interrupted, what is known."""
+def find_causes(count: int, sounds_as_a: Callable[[Sequence[int]], bool]) -> Causes:
+    """The causes among ``count`` inputs. Interrupted, what is known."""
     broken: dict[int, str] = {}
-    everything = tuple(range(len(asked)))
 
     def is_a(chosen: Sequence[int]) -> bool:
         try:
-            return sounds_as(a, b, pairs, [asked[i] for i in chosen], tell)
+            return sounds_as_a(chosen)
         except SonicBulletError as error:
             broken[chosen[0] if len(chosen) == 1 else -1] = str(error)
             return False
 
     found: tuple[int, ...] = ()
     try:
-        for i in everything:
+        for i in range(count):
             if is_a((i,)):
                 return Causes((i,), True, broken)
-        if len(asked) < 2 or not is_a(everything):
+        found = tuple(range(count))
+        if count < 2 or not is_a(found):
             return Causes((), False, broken)
-        found = everything
-        for i in everything:
+        for i in range(count):
             fewer = tuple(x for x in found if x != i)
             if len(fewer) > 1 and is_a(fewer):
                 found = fewer
@@ -73,19 +76,44 @@ def find_causes(a: Side, b: Side, pairs: Sequence[Pair], asked: Sequence[Asked],
     return Causes(found, True, broken)
 
 
-def sounds_as(a: Side, b: Side, pairs: Sequence[Pair], asked: Sequence[Asked], tell: Say) -> bool:
-    """Whether B with those inputs of A sounds as A. Raises where the scene breaks."""
-    try:
-        return same_sound(put_back(a, b, pairs, asked, tell, a.frames).sound, a.sound)
-    except OtherSound:
-        return False
+def shapley_shares(
+    found: Sequence[int], a: KeptSound, b: KeptSound, put_back: Callable[[Sequence[int]], KeptSound]
+) -> dict[int, float]:
+    """The share of each cause; none where there are too many, or the sounds are not of one length."""
+    n = len(found)
+    if not 1 < n <= MOST_SHARED or a.shape != b.shape:
+        return {}
+    reference = a.samples()
+    whole = log_distance(reference, b.samples())
+    if whole == 0:
+        return {}
+    closed: dict[frozenset[int], float] = {frozenset(): 0.0}
+    for size in range(1, n + 1):
+        for chosen in itertools.combinations(found, size):
+            made = put_back(chosen)
+            if made.shape != a.shape:
+                return {}
+            closed[frozenset(chosen)] = 1 - log_distance(reference, made.samples()) / whole
+    return {
+        i: sum(
+            math.factorial(len(rest)) * math.factorial(n - len(rest) - 1) / math.factorial(n)
+            * (closed[frozenset({*rest, i})] - closed[frozenset(rest)])
+            for size in range(n)
+            for rest in itertools.combinations([x for x in found if x != i], size)
+        )
+        for i in found
+    }  # fmt: skip
 
 
-def put_back(
-    a: Side, b: Side, pairs: Sequence[Pair], asked: Sequence[Asked], tell: Say, like: Sequence[bytes] | None = None
-) -> Side:
-    """B run with those inputs of A. like: frames that it must have, else OtherSound is raised."""
-    assert b.scene is not None
-    options = {one.option: one.a for one in asked if one.option}
-    plan = PutBack(pairs, frozenset(place for one in asked for place in one.places))
-    return run(replace(b.scene, **options), "b", plan=plan, like=like, say=tell)
+def log_distance(a: Array, b: Array) -> float:
+    """Root mean square difference of levels in dB, over windows and frequencies, of sounds (channels, n)."""
+    one, other = _levels(a), _levels(b)
+    floor = float(one.max(initial=-300.0)) + FLOOR_DB
+    change = np.maximum(one, floor) - np.maximum(other, floor)
+    return float(np.sqrt(np.square(change).mean())) if change.size else 0.0
+
+
+def _levels(x: Array) -> Array:
+    padded = np.pad(x, ((0, 0), (0, (-x.shape[1]) % WINDOW)))
+    frames = padded.reshape(len(x), -1, WINDOW) * np.hanning(WINDOW)
+    return np.asarray(10 * np.log10(np.abs(np.fft.rfft(frames, axis=2)) ** 2 + 1e-300))

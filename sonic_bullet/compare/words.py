@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-import re
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from sonic_bullet.compare.input_differences import Asked
+from sonic_bullet.compare.log_differences import Logged
+from sonic_bullet.compare.matched_logs import NO_NAME
 from sonic_bullet.compare.sides import Side
 from sonic_bullet.listener.calls import Call, InputFile, Who
 
@@ -51,8 +52,6 @@ PLAIN = {
     "thickness_m": "wall",
     "seed": "seed of the surfaces",
 }
-NO_NAME = re.compile(r"^(body \d+|link\d+|baseLink)( \d+)?$")
-"""What a simulator calls who has no name."""
 SHAPES = {2: "ball", 3: "box", 4: "cylinder", 5: "mesh", 6: "plane", 7: "capsule", 9: "heightfield"}
 
 
@@ -62,6 +61,13 @@ def difference_words(a: Side, b: Side, one: Asked) -> tuple[str, str]:
     if isinstance(one.a, Call) or isinstance(one.b, Call):
         return who, f"{who}: is {'missing in' if one.b is None else 'only in'} B"
     return who, f"{f'{who}: ' if who else ''}{change_words(one.what, one.a, one.b)}{' under way' if one.later else ''}"
+
+
+def logged_words(one: Logged) -> str:
+    """The same of an input of two logs."""
+    if one.what == "body":
+        return f"{one.who}: is {'missing in' if one.b is None else 'only in'} B"
+    return f"{f'{one.who}: ' if one.who else ''}{change_words(one.what, one.a, one.b)}"
 
 
 def change_words(what: str, a: Any, b: Any) -> str:
@@ -118,7 +124,7 @@ def _made_of(side: Side, who: Who) -> str:
     for call in side.calls:
         if who in call.made:
             value = call.arguments.get("baseCollisionShapeIndex")
-            shape = SHAPES.get(value.get("shapeType"), "body") if isinstance(value, dict) else "body"
+            shape = SHAPES.get(int(value.get("shapeType", 0)), "body") if isinstance(value, dict) else "body"
         if call.name == "add" and call.who == who:
             material = call.arguments["material"].name
     return f"{material} {shape}".strip()

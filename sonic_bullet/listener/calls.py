@@ -8,6 +8,7 @@ Handles are none: a body is the n-th that its run made (`Who`), a shape is what 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Any, Protocol
@@ -116,8 +117,6 @@ def with_leaves(value: Any, given: Mapping[Path, Any]) -> Any:
 
 def same(one: Any, other: Any) -> bool:
     """Whether two values are, to the bit, whatever they are made of."""
-    if one is other:
-        return True
     if isinstance(one, np.ndarray) or isinstance(other, np.ndarray):
         a, b = np.asarray(one), np.asarray(other)
         return a.dtype == b.dtype and a.shape == b.shape and a.tobytes() == b.tobytes()
@@ -128,8 +127,8 @@ def same(one: Any, other: Any) -> bool:
     if is_dataclass(one) and type(one) is type(other) and not isinstance(one, (Who, InputFile)):
         return all(same(getattr(one, x.name), getattr(other, x.name)) for x in fields(one))
     if isinstance(one, (int, float)) and isinstance(other, (int, float)):
-        return one == other or (one != one and other != other)
-    return type(one) is type(other) and bool(one == other)
+        return one == other or (math.isnan(one) and math.isnan(other))
+    return one is other or (type(one) is type(other) and bool(one == other))
 
 
 def mapped(value: Any, change: Callable[[Any], Any]) -> Any:
