@@ -1,41 +1,147 @@
 """`compare` and `baseline`: two versions of a scene, log or recording; what a version sounds like, kept.
 
+    A, B (or a revision of A) -> Comparison, or one a name of two folders -> words, JSON, one page
+
 Exit 0: samples equal, or --audible was given and nothing stands out; 1: samples differ, or a partner is missing; 2:
-wrong use; 130: stopped, and what was known by then is printed.
+wrong use, or something that cannot be compared; 130: stopped, and what was known by then is printed.
 """
 
 from __future__ import annotations
 
-import sys
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import click
 
 from sonic_bullet.cli.output import clean_stdout, places, quiet_stderr, status, write_json
 from sonic_bullet.cli.parameters import json_option
+from sonic_bullet.records.errors import CompareError, FileError
+
+COMPARE_EPILOG = """\b
+Examples:
+  sonic-bullet compare old/pour.py new/pour.py --report pour.html
+  sonic-bullet compare scenes --ref main --json differences.json"""
 
 
-@click.command()
+@click.command(epilog=COMPARE_EPILOG)
 @click.argument("a", metavar="A")
 @click.argument("b", metavar="[B]", required=False)
+@click.option("--ref", metavar="REV", help="Compare A as it was at this git revision with A as it is now.")
+@click.option("--audible", is_flag=True, help="Is the change beyond chance? Runs A 99 times, starts 0.1 mm apart.")
+@click.option("--report", metavar="OUT.html", help="Also write one page that opens offline: players, pictures, tables.")
+@click.option("--seconds", type=click.FloatRange(0, min_open=True), metavar="S", help="How long to run both scenes.")
+@click.option("--sr", type=click.IntRange(8000, 384000), metavar="HZ", help="Rate of both scenes. [default: 48000]")
 @json_option
-def compare(a: str, b: str | None, json_to: str | None) -> None:
+def compare(a: str, b: str | None, **options: Any) -> None:
     """Say whether two versions sound the same, and if not, which input is the cause.
 
-    A, B: scenes (.py), contact logs (.npz), recordings.
+    A, B: scenes (.py), contact logs (.npz), recordings, or folders of them whose files are paired by name.
     """
-    from sonic_bullet.compare import compare as compare_both
+    _check(a, b, options["ref"], options["report"])
+    to, page = places(options["json_to"], options["report"])
+    with clean_stdout(to) as say, ExitStack() as stack:
+        with quiet_stderr():
+            import sonic_bullet.compare.comparing  # noqa: F401  PyBullet says when it was built
+        if options["ref"] is not None:
+            from sonic_bullet.compare.revisions import at_revision
 
-    assert b is not None
-    (to,) = places(json_to)
-    with clean_stdout(to) as say:
-        with quiet_stderr(), status("compare") as tell:
-            found = compare_both(a, b, say=tell)
-        for line in found.lines():
-            say(line)
-    write_json(to, found.described())
-    if not found.passed:
-        sys.exit(1)
+            a, b = stack.enter_context(at_revision(a, options["ref"])), a
+        assert b is not None
+        tell = stack.enter_context(status("compare"))
+        found, stopped = _found(Path(a), Path(b), options, tell, page is not None)
+        _say(say, found, stopped)
+        if page is not None:
+            from sonic_bullet.report.compare_page import write_page
+
+            write_page(page, [one.kept["page"] for one in found if one.kept is not None])
+    write_json(to, _described(found, stopped))
+    if stopped:
+        raise KeyboardInterrupt("stopped: what was compared by then is above")
+    _exit(found)
 
 
-COMMANDS: tuple[Any, ...] = (compare,)
+def _check(a: str, b: str | None, ref: str | None, report: str | None) -> None:
+    """Raise CompareError, FileError for wrong use."""
+    if (b is None) == (ref is None):
+        raise CompareError("compare needs two things", "give A and B, or A and --ref REV")
+    for name in (a, b):
+        if name is not None and not Path(name).exists():
+            raise CompareError(f"there is no {name}", "give a scene (.py), a contact log (.npz), a recording, a folder")
+    if b is not None and Path(a).is_dir() != Path(b).is_dir():
+        raise CompareError("one is a folder, the other a file", "give two folders, or two files")
+    if report is not None and not report.endswith((".html", ".htm")):
+        raise FileError(f"cannot write {report}: a report is a page", "end the name with .html")
+
+
+def _found(a: Path, b: Path, options: Any, tell: Callable[[str], None], page: bool) -> tuple[list[Any], bool]:
+    """All that was compared, one entry a pair; whether it was stopped."""
+    from sonic_bullet.compare.comparing import compare as compare_both
+    from sonic_bullet.compare.folders import Paired, compare_folders
+    from sonic_bullet.compare.sides import SceneSide
+
+    def side(path: Path) -> Any:
+        if path.suffix.lower() != ".py":
+            return path
+        return SceneSide(path, seconds=options["seconds"], sr=options["sr"] or 48_000)
+
+    def both(one: Path, other: Path) -> Any:
+        found = compare_both(side(one), side(other), say=tell)
+        if options["audible"] and not found.same:
+            from sonic_bullet.compare.ensemble import audible
+
+            found = replace(found, audible=audible(found.a, found.b, tell))
+        return found
+
+    def finish(found: Any) -> Any:
+        kept = {
+            "lines": found.lines(),
+            "described": found.described(),
+            "passed": found.passed,
+            "stopped": found.stopped,
+        }
+        if page:
+            from sonic_bullet.report.compare_page import page_entry
+
+            kept["page"] = page_entry(found)
+        return kept
+
+    if a.is_dir():
+        return compare_folders(a, b, both, finish, tell)
+    kept = finish(both(a, b))
+    return [Paired(b.name, kept)], kept["stopped"]
+
+
+def _say(say: Callable[[str], None], found: list[Any], stopped: bool) -> None:
+    for one in found:
+        head = f"{one.name}: " if len(found) > 1 else ""
+        for number, line in enumerate(one.kept["lines"] if one.kept is not None else [one.error]):
+            say(f"{head if not number else ''}{line}")
+    compared = sum(one.kept is not None for one in found)
+    passed = sum(one.kept is not None and one.kept["passed"] for one in found)
+    rest = len(found) - compared
+    tail = f", {rest} not compared" if rest else ""
+    say(f"compared {compared}: {passed} the same, {compared - passed} differ{tail}{', stopped' if stopped else ''}")
+
+
+def _described(found: list[Any], stopped: bool) -> dict[str, Any]:
+    """What JSON holds."""
+    return {
+        "compared": sum(one.kept is not None for one in found),
+        "stopped": stopped,
+        "pairs": [
+            {"name": one.name, "error": one.error or None, **({} if one.kept is None else one.kept["described"])}
+            for one in found
+        ],
+    }
+
+
+def _exit(found: list[Any]) -> None:
+    """0, 1 or, where something could not be compared, the error that ends with 2."""
+    broken = [one for one in found if one.kept is None and not one.missing]
+    if broken:
+        raise CompareError(f"{broken[0].name}: {broken[0].error}")
+    if not all(one.kept is not None and one.kept["passed"] for one in found):
+        raise click.exceptions.Exit(1)

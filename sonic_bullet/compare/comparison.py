@@ -83,6 +83,7 @@ class Comparison:
             self.verdict,
             *(f"  {tag[one.cause]}: {one.words}{f' ({one.kept})' if one.kept else ''}" for one in self.differences),
             *(f"  effect: {one.words}" for one in self.effects),
+            *([f"  audible: {self.audible.words}"] if self.audible is not None else []),
             *(f"  note: {one}" for one in self.notes),
         ]
 

@@ -25,13 +25,13 @@ FLOOR_DB = -50.0
 
 def at_common_rate(a: Array, b: Array, sr_a: int, sr_b: int) -> tuple[Array, Array, int]:
     """Both sounds (channels, n) at the lower of their rates."""
-    from scipy.signal import resample_poly
-
     low = min(sr_a, sr_b)
 
     def lowered(x: Array, sr: int) -> Array:
         if sr == low:
             return x
+        from scipy.signal import resample_poly
+
         common = math.gcd(sr, low)
         return np.asarray(resample_poly(x, low // common, sr // common, axis=1))
 
