@@ -21,7 +21,7 @@ from typing import Any
 import click
 
 from sonic_bullet.cli.cache_command import cache
-from sonic_bullet.cli.compare_commands import compare
+from sonic_bullet.cli.compare_commands import baseline, compare
 from sonic_bullet.cli.console import run_and_exit
 from sonic_bullet.cli.examples import (
     CASE_EPILOG,
@@ -48,6 +48,7 @@ def cli() -> None:
 
 cli.add_command(cache)
 cli.add_command(compare)
+cli.add_command(baseline)
 
 
 @cli.command(epilog=RENDER_EPILOG)

@@ -145,3 +145,37 @@ def _exit(found: list[Any]) -> None:
         raise CompareError(f"{broken[0].name}: {broken[0].error}")
     if not all(one.kept is not None and one.kept["passed"] for one in found):
         raise click.exceptions.Exit(1)
+
+
+BASELINE_EPILOG = """\b
+Example:
+  sonic-bullet baseline scenes/pour.py -o tests/sonic_baselines --reason "new cup"
+"""
+
+
+@click.command(epilog=BASELINE_EPILOG)
+@click.argument("scenes", metavar="SCENE.py...", nargs=-1, required=True)
+@click.option("-o", "--output", "folder", default="sonic_baselines", show_default=True, metavar="DIR", help="Where to.")
+@click.option("--reason", default="", metavar="WHY", help="Why it is to sound so, for whoever reads the file.")
+@click.option("--runs", type=click.IntRange(0, 9999), default=99, show_default=True, help="Of the ensemble; 0: none.")
+def baseline(scenes: tuple[str, ...], folder: str, reason: str, runs: int) -> None:
+    """Keep what scenes sound like now as small files, for tests to hold them against."""
+    for scene in scenes:
+        if not Path(scene).is_file() or not scene.lower().endswith(".py"):
+            raise CompareError(f"there is no scene {scene}", "give the paths of scenes (.py)")
+    to = (
+        places(*(str(Path(folder) / f"{Path(scene).stem}.json") for scene in scenes)) if Path(folder).is_dir() else None
+    )
+    with quiet_stderr():
+        from sonic_bullet.compare.baselines import make_baseline, write_baseline
+    if to is None:
+        Path(folder).mkdir(parents=True)
+        to = places(*(str(Path(folder) / f"{Path(scene).stem}.json") for scene in scenes))
+    for scene, place in zip(scenes, to, strict=True):
+        with status(scene) as tell:
+            made = make_baseline(scene, reason, tell, runs)
+        write_baseline(str(place), made)
+        what = f"{len(made.features)} runs" if made.features else "no ensemble"
+        click.echo(
+            f"{scene} -> {place}: {what}, commit {made.commit[:12] or 'none'}{'' if made.clean else ' with changes'}"
+        )

@@ -188,6 +188,6 @@ def _why_open(causes: Causes, first: FirstDifference, a: Side) -> tuple[str, ...
         )
     broken = "; ".join(causes.broken.values())
     return (
-        "all inputs that differ put back do not give A: something else differs, such as the scene's own code under way, "
-        f"or the scene is not the same twice{f' ({broken})' if broken else ''}",
+        "all inputs that differ put back do not give A: something else differs, such as the scene's own code under "
+        f"way, or the scene is not the same twice{f' ({broken})' if broken else ''}",
     )

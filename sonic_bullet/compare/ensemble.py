@@ -42,7 +42,9 @@ Tell = Callable[[str], None]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Ensemble:
-    """features (runs, k), spectra (runs, slices · bands): of shifted runs of a scene, seconds long each.  rests: whether it rests by then."""
+    """features (runs, k), spectra (runs, slices · bands): of shifted runs of a scene, seconds long each. rests: whether
+    it rests by then.
+    """
 
     features: Array
     spectra: Array

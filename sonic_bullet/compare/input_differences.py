@@ -45,6 +45,8 @@ ONE_QUANTITY = {
     "localInertiaDiagonalY": "inertia",
     "localInertiaDiagonalZ": "inertia",
     "sensors": "microphones",
+    "alpha_per_s": "damping",
+    "beta_s": "damping",
 }
 """What several arguments are one of, by one name."""
 BY_ARGUMENT = ("changeDynamics", "setPhysicsEngineParameter", "changeConstraint")
@@ -68,7 +70,7 @@ class Asked:
 
 
 def asked_differences(a: Side, b: Side) -> tuple[list[Pair], list[Asked]]:
-    """Both runs' calls in pairs, and the inputs that differ, those of the engine and of bodies in the order of calls."""
+    """Both runs' calls in pairs, and the inputs that differ, in the order of calls."""
     pairs, match = side_by_side(a.calls, b.calls)
     lone = {one for call in a.calls for one in call.made} - set(match)
     lone |= {one for call in b.calls for one in call.made} - set(match.values())
@@ -122,6 +124,8 @@ def _note(found: dict[Any, Asked], pair: Pair, number: int, path: Path, old: Any
             what, old, new = "material", *names
     if call.name == "setGravity" and pair.a is not None and pair.b is not None:
         old, new = (tuple(one.arguments.get(f"grav{x}", 0.0) for x in "XYZ") for one in (pair.a, pair.b))
+    if what == "damping" and pair.a is not None and pair.b is not None:
+        old, new = (damping(one.arguments["material"]) for one in (pair.a, pair.b))
     one = _entry(found, call, what)
     one.a, one.b = _value(old), _value(new)  # the last that is asked holds
     one.places.append((number, path))
@@ -153,6 +157,11 @@ def quantity(call: Call, path: Path) -> str:
     if call.name == "resetBasePositionAndOrientation" or name in ONE_QUANTITY:
         return ONE_QUANTITY.get(name, name)
     return " ".join(path) if call.name in ("add", "attach") else name
+
+
+def damping(material: Any) -> tuple[float, float] | None:
+    """Rayleigh's α and β, which are one input."""
+    return None if material is None else (material.alpha_per_s, material.beta_s)
 
 
 def _link(call: Call) -> int:

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.compare.input_differences import ONE_QUANTITY
+from sonic_bullet.compare.input_differences import ONE_QUANTITY, damping
 from sonic_bullet.compare.matched_logs import body_leaves
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.listener.calls import Path, leaves, same, with_leaves
@@ -81,7 +81,7 @@ def _engine(a: ContactLog, b: ContactLog) -> list[Logged]:
     found = []
     names = [name for name in {**a.engine, **b.engine} if a.engine.get(name) != b.engine.get(name)]
     one, other = a.steps[0], b.steps[0]
-    values = {ONE_QUANTITY.get(name, name): (a.engine.get(name), b.engine.get(name)) for name in names}
+    values: dict[str, Any] = {ONE_QUANTITY.get(name, name): (a.engine.get(name), b.engine.get(name)) for name in names}
     if one.dt_s != other.dt_s:
         values["time step"] = (one.dt_s, other.dt_s)
     if not same(one.gravity_m_s2, other.gravity_m_s2):
@@ -111,6 +111,8 @@ def _body(a: ContactLog, b: ContactLog, i: int, j: int) -> list[Logged]:
         value = old.get(path), new.get(path)
         if path[0] == "material" and one.material and other.material and one.material.name != other.material.name:
             what, value = "material", (one.material.name, other.material.name)
+        if what == "damping":
+            value = damping(one.material), damping(other.material)
         if path[0] == "material" and (one.material is None or other.material is None):
             what, value = "sounding", (one.material and one.material.name, other.material and other.material.name)
         if what not in found:
@@ -152,7 +154,7 @@ def _mesh(one: Body, other: Body, i: int, j: int) -> Logged:
     words = [f"{x} vertices" for x in count]
     if count[0] == count[1]:
         words = ["of A", "of B"]
-    return Logged(one.name, "mesh", *words, _of_modes(i, j), "sound")
+    return Logged(one.name, "mesh", words[0], words[1], _of_modes(i, j), "sound")
 
 
 def same_model(one: Body, other: Body) -> bool:
@@ -168,8 +170,8 @@ def _start(a: ContactLog, b: ContactLog, i: int, j: int, name: str, explained: b
     found = []
     for place, what in ((0, "start position"), (1, "start orientation")):
         if not same(first[0][place], first[1][place]):
-            values = [tuple(np.round(pose[place], 9).tolist()) for pose in first if pose is not None]
-            found.append(Logged(name, what, *values))
+            old, new = (tuple(np.round(pose[place], 9).tolist()) for pose in first if pose is not None)
+            found.append(Logged(name, what, old, new))
     if not found and not explained and a.steps[0].dt_s == b.steps[0].dt_s:
         second = [_pose(log, index, 1) for log, index in ((a, i), (b, j))]
         free = not any(index in {*log.steps[0].contacts.a, *log.steps[0].contacts.b} for log, index in ((a, i), (b, j)))
@@ -177,8 +179,8 @@ def _start(a: ContactLog, b: ContactLog, i: int, j: int, name: str, explained: b
         if second[0] is not None and second[1] is not None and free and alike:
             speed = [(s[0] - f[0]) / a.steps[0].dt_s for s, f in zip(second, first, strict=True) if s and f]
             if not np.allclose(speed[0], speed[1], rtol=1e-9, atol=1e-9):
-                values = [tuple(np.round(x, 6).tolist()) for x in speed]
-                found.append(Logged(name, "start velocity", *values))
+                old, new = (tuple(np.round(x, 6).tolist()) for x in speed)
+                found.append(Logged(name, "start velocity", old, new))
             elif not same(second[0][1], second[1][1]):
                 found.append(Logged(name, "start spin", "of A", "of B"))
     return found
@@ -196,11 +198,13 @@ def _changes(a: ContactLog, b: ContactLog, pairs: list[tuple[int | None, int | N
     """What was set otherwise under way."""
     names = {j: a.bodies[i].name for i, j in pairs if i is not None and j is not None}
     listed: list[dict[tuple[str, str], list[Any]]] = []
-    for log, name in ((a, lambda i: a.bodies[i].name), (b, lambda i: names.get(i, b.bodies[i].name))):
+    for log in (a, b):
         mine: dict[tuple[str, str], list[Any]] = {}
         for change in log.changes:
             for what, value in change.values.items():
-                who = "" if change.body is None else name(change.body)
+                who = "" if change.body is None else log.bodies[change.body].name
+                if log is b and change.body is not None:
+                    who = names.get(change.body, who)
                 mine.setdefault((who, ONE_QUANTITY.get(what, what)), []).append((change.step, value))
         listed.append(mine)
     return [
@@ -236,7 +240,12 @@ def _of_modes(i: int, j: int) -> Exchange:
 
     def exchange(a: ContactLog, b: ContactLog) -> ContactLog:
         one = a.bodies[i]
-        given = {"material": one.material, "model": one.model, "options": one.options, "volume_m3": one.volume_m3}
+        given: dict[str, Any] = {
+            "material": one.material,
+            "model": one.model,
+            "options": one.options,
+            "volume_m3": one.volume_m3,
+        }
         return _with_body(b, j, replace(b.bodies[j], **given))
 
     return exchange

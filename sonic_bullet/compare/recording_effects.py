@@ -17,6 +17,8 @@ from sonic_bullet.compare.comparison import Effect
 from sonic_bullet.records import Array
 
 DELAY_MOST_S = 0.5
+GROUP_DELAY = 16
+"""Samples that a filter may be late by."""
 FILTER_DB = 0.1
 """Response that is flatter than this is a gain."""
 LEFT_DB = -90.0
@@ -38,8 +40,10 @@ def recording_effects(a: Array, b: Array, sr: int) -> list[Effect]:
     if order != tuple(range(len(a))):
         found.append(Effect("channels", f"channels in another order: {' '.join(str(i + 1) for i in order)} of A"))
         a = a[list(order)]
-    found += _offset(a, b)
     delay, sign = _delay(a, b, sr)
+    if 0 < abs(delay) <= GROUP_DELAY and not _only_delayed(a, b, delay):
+        delay = 0
+    found += _offset(a * sign, b)
     if delay:
         words = f"delayed by {delay} samples ({delay / sr * 1e3:+.3g} ms)"
         found.append(Effect("delay", words, None, {"delay_s": delay / sr}))
@@ -49,6 +53,12 @@ def recording_effects(a: Array, b: Array, sr: int) -> list[Effect]:
     found += _clipping(a, b) + _gaps(x, y, sr)
     clean = not found or all(one.kind in ("channels", "delay", "polarity") for one in found)
     return found + _transfer(x * sign, y, sr, clean)
+
+
+def _only_delayed(a: Array, b: Array, delay: int) -> bool:
+    """Whether little but a gain is left to explain at that delay; else it is that of a filter."""
+    x, y = _overlap(a, b, delay)
+    return _db(y - float((x * y).sum() / np.square(x).sum()) * x, y) < -40
 
 
 def _order(a: Array, b: Array) -> tuple[int, ...]:

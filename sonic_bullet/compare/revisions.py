@@ -58,3 +58,11 @@ def head(folder: Path) -> str:
         return _git(folder, "rev-parse", "HEAD", error="none")
     except CompareError:
         return ""
+
+
+def changed_files(folder: Path) -> bool:
+    """Whether anything in that folder is other than in its commit, or there is none."""
+    try:
+        return bool(_git(folder, "status", "--porcelain", "--", ".", error="none"))
+    except CompareError:
+        return True

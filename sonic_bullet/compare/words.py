@@ -27,8 +27,6 @@ UNITS = {
     "density_kg_m3": "kg/m³",
     "stiffness_pa": "Pa",
     "roughness_m": "m",
-    "alpha_per_s": "1/s",
-    "beta_s": "s",
     "sr": "Hz",
     "seconds": "s",
     "shape radius": "m",
@@ -42,8 +40,6 @@ PLAIN = {
     "density_kg_m3": "density",
     "stiffness_pa": "stiffness",
     "roughness_m": "roughness",
-    "alpha_per_s": "damping α",
-    "beta_s": "damping β",
     "sr": "sample rate",
     "seconds": "length",
     "sound_speed_m_s": "speed of sound",
@@ -72,7 +68,8 @@ def logged_words(one: Logged) -> str:
 
 def change_words(what: str, a: Any, b: Any) -> str:
     """ "density 7850 → 7929 kg/m³ (+1.0 %)"."""
-    key = what.split()[-1] if what.split()[-1] in PLAIN else what
+    last = what.rsplit(maxsplit=1)[-1]
+    key = last if last in PLAIN else what
     name, unit = PLAIN.get(key, what), UNITS.get(key, "")
     unit = f" {unit}" if unit else ""
     if a is None or b is None:
@@ -80,10 +77,12 @@ def change_words(what: str, a: Any, b: Any) -> str:
     one, other = _array(a), _array(b)
     if key == "microphones" or one is None or other is None or one.shape != other.shape:
         return f"{name} {shown(a)} → {shown(b)}{unit}" if key != "microphones" else _places(name, a, b)
-    if key == "stiffness_pa" or one.size > 4:
+    if key in ("stiffness_pa", "damping") or one.size > 4:
         ratio = other[one != 0] / one[one != 0]
         if len(ratio) and np.allclose(ratio, ratio[0], rtol=1e-9):
             return f"{name} × {ratio[0]:.4g} ({_percent(ratio[0])})"
+        if key == "damping":
+            return f"damping (α in 1/s, β in s) {shown(a)} → {shown(b)}"
         return f"{name} changed in {int((one != other).sum())} of {one.size} numbers"
     share = f" ({_percent(float(other) / float(one))})" if one.ndim == 0 and float(one) and key != "seed" else ""
     if key in ("start position",):
