@@ -21,9 +21,9 @@ import numpy as np
 
 from benchmarks.planted.recordings import recordings
 from benchmarks.planted.scenes import SCENES, changed, write
-from sonic_bullet.compare.comparing import compared
-from sonic_bullet.compare.comparison import Comparison
-from sonic_bullet.compare.sides import SceneSide, Side, of_log, run
+from sonic_bullet.comparing.compared_sides import compared
+from sonic_bullet.comparing.comparison import Comparison
+from sonic_bullet.comparing.sides import SceneSide, Side, of_log, run
 
 Change = tuple[tuple[Any, ...], Any]
 
@@ -235,7 +235,7 @@ def same(bench: Bench, runs: int = 200) -> None:
 
 def cost(bench: Bench) -> None:
     """Equal inputs against two renders."""
-    from sonic_bullet.compare import compare
+    from sonic_bullet.comparing import compare
     from sonic_bullet.scene import render_scene
 
     place = write(bench.folder / "cost.py", changed(SCENES["pile"], (("seconds",), 3.0)))
@@ -252,7 +252,7 @@ def cost(bench: Bench) -> None:
 
 def piles(bench: Bench, count: int = 100) -> None:
     """Chaotic piles whose starts are shifted by 0.1 mm: named as input, and by sound no alarm."""
-    from sonic_bullet.compare.ensemble import Shifted, ensemble, judged, measured
+    from sonic_bullet.comparing.ensemble import Shifted, ensemble, judged, measured
 
     place = write(bench.folder / "pile.py", SCENES["pile"])
     scene = SceneSide(place)

@@ -44,9 +44,9 @@ def compare(a: str, b: str | None, **options: Any) -> None:
     to, page = places(options["json_to"], options["report"])
     with clean_stdout(to) as say, ExitStack() as stack:
         with quiet_stderr():
-            import sonic_bullet.compare.comparing  # noqa: F401  PyBullet says when it was built
+            import sonic_bullet.comparing.compared_sides  # noqa: F401  PyBullet says when it was built
         if options["ref"] is not None:
-            from sonic_bullet.compare.revisions import at_revision
+            from sonic_bullet.comparing.revisions import at_revision
 
             a, b = stack.enter_context(at_revision(a, options["ref"])), a
         assert b is not None
@@ -78,9 +78,9 @@ def _check(a: str, b: str | None, ref: str | None, report: str | None) -> None:
 
 def _found(a: Path, b: Path, options: Any, tell: Callable[[str], None], page: bool) -> tuple[list[Any], bool]:
     """All that was compared, one entry a pair; whether it was stopped."""
-    from sonic_bullet.compare.comparing import compare as compare_both
-    from sonic_bullet.compare.folders import Paired, compare_folders
-    from sonic_bullet.compare.sides import SceneSide
+    from sonic_bullet.comparing.compared_sides import compare as compare_both
+    from sonic_bullet.comparing.folders import Paired, compare_folders
+    from sonic_bullet.comparing.sides import SceneSide
 
     def side(path: Path) -> Any:
         if path.suffix.lower() != ".py":
@@ -90,7 +90,7 @@ def _found(a: Path, b: Path, options: Any, tell: Callable[[str], None], page: bo
     def both(one: Path, other: Path) -> Any:
         found = compare_both(side(one), side(other), say=tell)
         if options["audible"] and not found.same:
-            from sonic_bullet.compare.ensemble import audible
+            from sonic_bullet.comparing.ensemble import audible
 
             found = replace(found, audible=audible(found.a, found.b, tell))
         return found
@@ -167,7 +167,7 @@ def baseline(scenes: tuple[str, ...], folder: str, reason: str, runs: int) -> No
         places(*(str(Path(folder) / f"{Path(scene).stem}.json") for scene in scenes)) if Path(folder).is_dir() else None
     )
     with quiet_stderr():
-        from sonic_bullet.compare.baselines import make_baseline, write_baseline
+        from sonic_bullet.comparing.baselines import make_baseline, write_baseline
     if to is None:
         Path(folder).mkdir(parents=True)
         to = places(*(str(Path(folder) / f"{Path(scene).stem}.json") for scene in scenes))

@@ -24,6 +24,8 @@ class _Absent:
         return "nothing"
 
 
+FIRST_ABSENT = 1_000_000
+"""From here on, ids of bodies that a scene asked for and a plan did not have made."""
 ABSENT = _Absent()
 """Stands for a leaf that is not there."""
 

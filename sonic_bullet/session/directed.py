@@ -27,6 +27,10 @@ class Direction(Protocol):
         """A listener was made of it."""
         ...
 
+    def absent(self, body: Any) -> bool:
+        """Whether that id is of a body that was not made after all."""
+        ...
+
     def added(self, world: World, wanted: Sequence[WantedBody]) -> Sequence[WantedBody]:
         """Who is to sound, and as what."""
         ...
@@ -43,6 +47,12 @@ def directed(direction: Direction) -> Iterator[None]:
         yield
     finally:
         _DIRECTION.reset(before)
+
+
+def absent(who: Any) -> bool:
+    """Whether a body, or (body, link), was not made after all, because somebody had it so."""
+    director = _DIRECTION.get()
+    return director is not None and director.absent(who[0] if isinstance(who, tuple) else who)
 
 
 def direction() -> Direction | None:

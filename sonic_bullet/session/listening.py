@@ -41,6 +41,7 @@ from sonic_bullet.records.coerce import (
 from sonic_bullet.records.errors import AudioError, SceneError, SizeWarning
 from sonic_bullet.render import LATENCY_STEPS, Synthesizer, make_ready
 from sonic_bullet.session.arguments import as_sensors
+from sonic_bullet.session.directed import absent
 from sonic_bullet.session.keeping import KeptRun, package_versions
 from sonic_bullet.session.wanted_bodies import WantedBody, checked, solved_bodies, wanted_body
 
@@ -172,7 +173,7 @@ class Listener:
         """
         if not isinstance(cast, Mapping):
             raise SceneError(f"cast is {shown(cast)}", "give a dict from bodies to materials")
-        return self._added([_wanted(self.world, who, how) for who, how in cast.items()], progress)
+        return self._added([_wanted(self.world, *entry) for entry in cast.items() if not absent(entry[0])], progress)
 
     def _added(
         self, wanted: Sequence[WantedBody], progress: Callable[[str], None] | None

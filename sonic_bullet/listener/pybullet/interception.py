@@ -10,6 +10,7 @@ name before goes unnoticed; a run that leaves no trace of its inputs is seen by 
 from __future__ import annotations
 
 import functools
+import gc
 import hashlib
 import re
 from collections.abc import Callable, Iterator, Mapping
@@ -22,7 +23,7 @@ import numpy as np
 import pybullet
 from pybullet_utils.bullet_client import BulletClient
 
-from sonic_bullet.listener.calls import Call, InputFile, Plan, Who, mapped
+from sonic_bullet.listener.calls import FIRST_ABSENT, Call, InputFile, Plan, Who, mapped
 from sonic_bullet.listener.pybullet.hooks import DYNAMICS_IN_ORDER
 
 PREFIXES = ("create", "load", "change", "set", "reset", "apply", "remove", "enable", "restore")
@@ -53,12 +54,12 @@ IN_ORDER: dict[str, tuple[str, ...]] = {
     "changeConstraint": ("userConstraintUniqueId",),
 }  # fmt: skip
 """Arguments that are given by place, by the names that PyBullet has for them."""
+BESIDES = ("stepSimulation", "setAdditionalSearchPath", "connect")
+"""Functions that are looked at though they set nothing."""
 BODY = re.compile("^(body|object|multiBody|parentBody|childBody)UniqueId[AB]?$")
 CONSTRAINT = "userConstraintUniqueId"
 SHAPES = {"baseCollisionShapeIndex", "linkCollisionShapeIndices"}
 PICTURES = {"baseVisualShapeIndex", "linkVisualShapeIndices", "rgbaColor", "specularColor"}
-NOT_THERE = 1_000_000
-"""From here on, ids of bodies that a scene asked for and a plan did not have made."""
 
 
 def watched() -> list[str]:
@@ -85,6 +86,7 @@ class Interception:
         self._shapes: dict[int, Mapping[str, Any]] = {}
         self._count = {"body": 0, "constraint": 0}
         self._folders: list[str] = []
+        self._clients: list[int] = []
         self._real: dict[str, Any] = {}
 
     def who(self, body: int, kind: str = "body") -> Who:
@@ -94,20 +96,34 @@ class Interception:
     @contextmanager
     def watching(self) -> Iterator[None]:
         """The module's functions give way while this lasts."""
-        self._real = {
-            name: getattr(pybullet, name) for name in (*watched(), "stepSimulation", "setAdditionalSearchPath")
-        }
-        ours = {name: functools.partial(self._called, name) for name in watched()}
-        ours |= {"stepSimulation": self._step, "setAdditionalSearchPath": self._search}  # type: ignore[dict-item]
+        self._real = {name: getattr(pybullet, name) for name in (*watched(), *BESIDES)}
+        ours: dict[str, Any] = {name: functools.partial(self._called, name) for name in watched()}
+        ours |= {"stepSimulation": self._step, "setAdditionalSearchPath": self._search, "connect": self._connect}
         forward = BulletClient.__getattr__
 
         def forwarded(client: Any, name: str) -> Any:
-            if name in ours and vars(pybullet)[name] is ours[name]:  # else someone put his own over it
+            if (
+                name in ours and name != "connect" and vars(pybullet)[name] is ours[name]
+            ):  # else someone put his own over it
                 return functools.partial(ours[name], physicsClientId=client._client)
             return forward(client, name)
 
         with patch.dict(vars(pybullet), ours), patch.object(BulletClient, "__getattr__", forwarded):
-            yield
+            try:
+                yield
+            finally:
+                self._disconnect()
+
+    def _connect(self, *args: Any, **kwargs: Any) -> Any:
+        self._clients.append(self._real["connect"](*args, **kwargs))
+        return self._clients[-1]
+
+    def _disconnect(self) -> None:
+        """End the clients that the run opened and left: the next run's calls would go to them."""
+        gc.collect()  # a BulletClient that is dropped later ends whoever has its number by then
+        for client in self._clients:
+            if client >= 0 and pybullet.isConnected(client):
+                pybullet.disconnect(client)
 
     def _step(self, *args: Any, **kwargs: Any) -> Any:
         self.look()
@@ -126,9 +142,10 @@ class Interception:
         client = self.client = given.pop("physicsClientId", 0)
         call = self._by_value(name, given)
         if self.plan is None:
-            self.calls.append(call)
+            if name != "createCollisionShape":  # is part of what is made of it
+                self.calls.append(call)
             return self._made(call, self._real[name](*args, **kwargs))
-        if name == "createCollisionShape":  # is part of what is made of it
+        if name == "createCollisionShape":
             return self._made(call, self._real[name](*args, **kwargs))
         first, arguments = self.plan.instead(call)
         self.make(first)
@@ -165,10 +182,10 @@ class Interception:
         return result
 
     def _not_made(self, call: Call) -> Any:
-        whom = self._whom(call.name, NOT_THERE + sum(self._count.values()))
+        whom = self._whom(call.name, FIRST_ABSENT + sum(self._count.values()))
         for one in whom:
-            self.ids[one] = NOT_THERE + one.serial
-            self._bearer[one.kind, NOT_THERE + one.serial] = one
+            self.ids[one] = FIRST_ABSENT + one.serial
+            self._bearer[one.kind, FIRST_ABSENT + one.serial] = one
         made = [self.ids[one] for one in whom]
         return tuple(made) if call.name in ("loadSDF", "loadMJCF", "loadBullet") else next(iter(made), None)
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.compare.comparison import Effect
+from sonic_bullet.comparing.comparison import Effect
 from sonic_bullet.records import Array
 
 OCTAVES_HZ = (125.0, 250.0, 500.0, 1000.0, 2000.0, 4000.0, 8000.0, 16000.0)

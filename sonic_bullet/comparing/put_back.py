@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from sonic_bullet.compare.call_pairs import Pair, about, differing
+from sonic_bullet.comparing.call_pairs import Pair, about, differing
 from sonic_bullet.listener.calls import ABSENT, Call, Path, leaves, with_leaves
 
 HANDLES = ("bodyUniqueId", "objectUniqueId", "multiBodyUniqueId", "body", "links", "linkIndex", "jointIndex")

@@ -10,18 +10,18 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from sonic_bullet.compare.call_pairs import Pair
-from sonic_bullet.compare.causes import Causes, find_causes, same_sound, shapley_shares
-from sonic_bullet.compare.comparison import Comparison, Difference, Effect
-from sonic_bullet.compare.input_differences import Asked, asked_differences
-from sonic_bullet.compare.log_differences import Logged, logged_differences
-from sonic_bullet.compare.matched_logs import FirstDifference, first_difference, matched, require_kin
-from sonic_bullet.compare.modal_effects import modal_effects
-from sonic_bullet.compare.put_back import PutBack
-from sonic_bullet.compare.recording_effects import recording_effects
-from sonic_bullet.compare.sides import OtherSound, SceneSide, Side, as_side, run
-from sonic_bullet.compare.sound_effects import at_common_rate, sound_effects
-from sonic_bullet.compare.words import difference_words, logged_words
+from sonic_bullet.comparing.call_pairs import Pair
+from sonic_bullet.comparing.causes import Causes, find_causes, same_sound, shapley_shares
+from sonic_bullet.comparing.comparison import Comparison, Difference, Effect
+from sonic_bullet.comparing.input_differences import Asked, asked_differences
+from sonic_bullet.comparing.log_differences import Logged, logged_differences
+from sonic_bullet.comparing.matched_logs import FirstDifference, first_difference, matched, require_kin
+from sonic_bullet.comparing.modal_effects import modal_effects
+from sonic_bullet.comparing.put_back import PutBack
+from sonic_bullet.comparing.recording_effects import recording_effects
+from sonic_bullet.comparing.sides import OtherSound, SceneSide, Side, as_side, run
+from sonic_bullet.comparing.sound_effects import at_common_rate, sound_effects
+from sonic_bullet.comparing.words import difference_words, logged_words
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.rows.spool import KeptSound
 from sonic_bullet.records.coerce import as_call

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.compare.input_differences import ONE_QUANTITY, damping
-from sonic_bullet.compare.matched_logs import body_leaves
+from sonic_bullet.comparing.input_differences import ONE_QUANTITY, damping
+from sonic_bullet.comparing.matched_logs import body_leaves
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.listener.calls import Path, leaves, same, with_leaves
 from sonic_bullet.records import Array, Body
@@ -123,7 +123,7 @@ def _body(a: ContactLog, b: ContactLog, i: int, j: int) -> list[Logged]:
     if modes_differ and not any(path[0] in ("material", "options") and path[-1] != "source" for path in changed):
         found.setdefault("mesh", _mesh(one, other, i, j))
     _without_what_follows(found, one, other)
-    return [*found.values(), *_start(a, b, i, j, one.name, bool(found))]
+    return [*found.values(), *_start(a, b, i, j, bool(found) or bool(_engine(a, b)))]
 
 
 def _quantity(path: Path) -> tuple[str, str]:
@@ -141,8 +141,9 @@ def _without_what_follows(found: dict[str, Logged], one: Body, other: Body) -> N
         if np.allclose(grown, other.inertia_kg_m2, rtol=1e-6, atol=1e-18):
             found.pop("inertia")
     if "mesh" in found:
+        collides_alike = "inertia" not in found and one.mass_kg > 0  # then the surface that sounds alone is another
         large = abs(one.volume_m3 - other.volume_m3) > SHAPE_SHARE * max(one.volume_m3, other.volume_m3)
-        found.pop("mesh" if large and "shape" in found else "shape", None)
+        found.pop("mesh" if large and "shape" in found and not collides_alike else "shape", None)
     if "shape" in found:
         found.pop("inertia", None)
     if any(name in found for name in ("thickness_m", "fixed", "material")):
@@ -162,8 +163,11 @@ def same_model(one: Body, other: Body) -> bool:
     return (one.model is None) == (other.model is None) and (one.model is None or same(one.model, other.model))
 
 
-def _start(a: ContactLog, b: ContactLog, i: int, j: int, name: str, explained: bool) -> list[Logged]:
-    """Where a body starts, and how fast, as its first poses tell."""
+def _start(a: ContactLog, b: ContactLog, i: int, j: int, explained: bool) -> list[Logged]:
+    """Where a body starts, and how fast, as its first poses and contacts tell. explained: something else differs that
+    moves it otherwise.
+    """
+    one, name = a.bodies[i], a.bodies[i].name
     first = [_pose(log, index, 0) for log, index in ((a, i), (b, j))]
     if first[0] is None or first[1] is None:
         return []
@@ -172,7 +176,9 @@ def _start(a: ContactLog, b: ContactLog, i: int, j: int, name: str, explained: b
         if not same(first[0][place], first[1][place]):
             old, new = (tuple(np.round(pose[place], 9).tolist()) for pose in first if pose is not None)
             found.append(Logged(name, what, old, new))
-    if not found and not explained and a.steps[0].dt_s == b.steps[0].dt_s:
+    if not found and not explained:
+        if one.mass_kg and not same(_speeds(a, i), _speeds(b, j)):
+            return [Logged(name, "start velocity", _speeds(a, i), _speeds(b, j))]
         second = [_pose(log, index, 1) for log, index in ((a, i), (b, j))]
         free = not any(index in {*log.steps[0].contacts.a, *log.steps[0].contacts.b} for log, index in ((a, i), (b, j)))
         alike = same(a.steps[0].gravity_m_s2, b.steps[0].gravity_m_s2)
@@ -184,6 +190,13 @@ def _start(a: ContactLog, b: ContactLog, i: int, j: int, name: str, explained: b
             elif not same(second[0][1], second[1][1]):
                 found.append(Logged(name, "start spin", "of A", "of B"))
     return found
+
+
+def _speeds(log: ContactLog, index: int) -> tuple[float, ...]:
+    """Slip of a body's contacts before the first step, m/s: its first velocity where it touches from the start."""
+    rows = log.steps[0].contacts.row
+    mine = rows[(rows["a"] == index) | (rows["b"] == index)]
+    return tuple(np.round(mine["slip_m_s"], 6)[:1].ravel().tolist())
 
 
 def _pose(log: ContactLog, index: int, step: int) -> tuple[Array, Array] | None:

@@ -17,10 +17,10 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from sonic_bullet.compare.ensemble import RUNS, Audibility, Ensemble, ensemble, judged, measured
-from sonic_bullet.compare.revisions import changed_files, head
-from sonic_bullet.compare.sides import SceneSide, Side, run
-from sonic_bullet.compare.sound_effects import OCTAVES_HZ, band_levels, onsets_s, t60_s
+from sonic_bullet.comparing.ensemble import RUNS, Audibility, Ensemble, ensemble, judged, measured
+from sonic_bullet.comparing.revisions import changed_files, head
+from sonic_bullet.comparing.sides import SceneSide, Side, run
+from sonic_bullet.comparing.sound_effects import OCTAVES_HZ, band_levels, onsets_s, t60_s
 from sonic_bullet.files import replacing
 from sonic_bullet.files.reading import reading
 from sonic_bullet.files.rows.spool import KeptSound

@@ -14,9 +14,9 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from sonic_bullet.compare.comparing import compare
-    from sonic_bullet.compare.comparison import Comparison, Difference, Effect
-    from sonic_bullet.compare.sides import SceneSide
+    from sonic_bullet.comparing.compared_sides import compare
+    from sonic_bullet.comparing.comparison import Comparison, Difference, Effect
+    from sonic_bullet.comparing.sides import SceneSide
 
 __all__ = ["Comparison", "Difference", "Effect", "SceneSide", "compare"]
 
@@ -25,11 +25,11 @@ _HOME = {
     "Difference": "comparison",
     "Effect": "comparison",
     "SceneSide": "sides",
-    "compare": "comparing",
+    "compare": "compared_sides",
 }
 
 
 def __getattr__(name: str) -> Any:
     if name in _HOME:
-        return getattr(importlib.import_module(f"sonic_bullet.compare.{_HOME[name]}"), name)
-    raise AttributeError(f"module 'sonic_bullet.compare' has no attribute '{name}'")
+        return getattr(importlib.import_module(f"sonic_bullet.comparing.{_HOME[name]}"), name)
+    raise AttributeError(f"module 'sonic_bullet.comparing' has no attribute '{name}'")

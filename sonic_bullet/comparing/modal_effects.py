@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from sonic_bullet.compare.comparison import Effect
-from sonic_bullet.compare.log_differences import same_model
+from sonic_bullet.comparing.comparison import Effect
+from sonic_bullet.comparing.log_differences import same_model
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.records import ModalModel
 

@@ -62,7 +62,7 @@ def _checked(scene: Path, baseline: Path, results: Path, config: pytest.Config) 
     ref = config.getoption("--sonic-ref")
     if ref is not None:
         return _against(scene, ref, [], results)
-    from sonic_bullet.compare.baselines import check_baseline, make_baseline, read_baseline, write_baseline
+    from sonic_bullet.comparing.baselines import check_baseline, make_baseline, read_baseline, write_baseline
 
     if config.getoption("--sonic-update"):
         baseline.parent.mkdir(exist_ok=True)
@@ -85,9 +85,9 @@ def _checked(scene: Path, baseline: Path, results: Path, config: pytest.Config) 
 
 def _against(scene: Path, ref: str, said: list[str], results: Path) -> str:
     """The cause of what was said, from the scene as it was at a revision; "": nothing was said and nothing differs."""
-    from sonic_bullet.compare.comparing import compare
-    from sonic_bullet.compare.failure_folder import write_failure
-    from sonic_bullet.compare.revisions import at_revision
+    from sonic_bullet.comparing.compared_sides import compare
+    from sonic_bullet.comparing.failure_folder import write_failure
+    from sonic_bullet.comparing.revisions import at_revision
     from sonic_bullet.records.errors import CompareError
 
     try:

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from sonic_bullet.compare.ensemble import Audibility
-    from sonic_bullet.compare.sides import Side
+    from sonic_bullet.comparing.ensemble import Audibility
+    from sonic_bullet.comparing.sides import Side
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -72,7 +72,7 @@ class Comparison:
     @property
     def verdict(self) -> str:
         """One line."""
-        from sonic_bullet.compare.words import verdict
+        from sonic_bullet.comparing.words import verdict
 
         return verdict(self)
 

@@ -13,7 +13,7 @@ import itertools
 
 import numpy as np
 
-from sonic_bullet.compare.comparison import Effect
+from sonic_bullet.comparing.comparison import Effect
 from sonic_bullet.records import Array
 
 DELAY_MOST_S = 0.5

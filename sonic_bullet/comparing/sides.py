@@ -21,7 +21,7 @@ import numpy as np
 from sonic_bullet.files import read_audio, read_log
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.rows.spool import KeptSound
-from sonic_bullet.listener.calls import Call, Plan, Who
+from sonic_bullet.listener.calls import FIRST_ABSENT, Call, Plan, Who
 from sonic_bullet.records import Array
 from sonic_bullet.records.coerce import as_path, shown
 from sonic_bullet.records.errors import CompareError, SonicBulletError
@@ -90,6 +90,9 @@ class _Run:
 
     def listens(self, listener: Listener) -> None:
         self.listener = self.listener or listener
+
+    def absent(self, body: Any) -> bool:
+        return isinstance(body, int) and body >= FIRST_ABSENT
 
     def added(self, world: Any, wanted: Sequence[WantedBody]) -> Sequence[WantedBody]:
         made: list[WantedBody] = []

@@ -13,9 +13,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from sonic_bullet.compare.call_pairs import Pair, differing, side_by_side
-from sonic_bullet.compare.put_back import HANDLES, Place
-from sonic_bullet.compare.sides import Side
+from sonic_bullet.comparing.call_pairs import Pair, differing, side_by_side
+from sonic_bullet.comparing.put_back import HANDLES, Place
+from sonic_bullet.comparing.sides import Side
 from sonic_bullet.listener.calls import ABSENT, Call, Path, Who, leaves
 
 ONE_QUANTITY = {
@@ -45,6 +45,7 @@ ONE_QUANTITY = {
     "localInertiaDiagonalY": "inertia",
     "localInertiaDiagonalZ": "inertia",
     "sensors": "microphones",
+    "shapes": "mesh",
     "alpha_per_s": "damping",
     "beta_s": "damping",
 }
