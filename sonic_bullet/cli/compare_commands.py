@@ -38,7 +38,8 @@ Examples:
 def compare(a: str, b: str | None, **options: Any) -> None:
     """Say whether two versions sound the same, and if not, which input is the cause.
 
-    A, B: scenes (.py), contact logs (.npz), recordings, or folders of them whose files are paired by name.
+    A, B: scenes (.py), contact logs (.npz), recordings, or folders of them whose files are paired by name; A may be a
+    baseline (.json) of the scene B.
     """
     _check(a, b, options["ref"], options["report"])
     to, page = places(options["json_to"], options["report"])
@@ -74,6 +75,8 @@ def _check(a: str, b: str | None, ref: str | None, report: str | None) -> None:
         raise CompareError("one is a folder, the other a file", "give two folders, or two files")
     if report is not None and not report.endswith((".html", ".htm")):
         raise FileError(f"cannot write {report}: a report is a page", "end the name with .html")
+    if report is not None and a.lower().endswith(".json"):
+        raise CompareError("a baseline holds no sound, so there is no page of it", "leave --report out")
 
 
 def _found(a: Path, b: Path, options: Any, tell: Callable[[str], None], page: bool) -> tuple[list[Any], bool]:
@@ -108,10 +111,24 @@ def _found(a: Path, b: Path, options: Any, tell: Callable[[str], None], page: bo
             kept["page"] = page_entry(found)
         return kept
 
+    if a.suffix.lower() == ".json":
+        return [Paired(b.name, _against_baseline(a, b, tell))], False
     if a.is_dir():
         return compare_folders(a, b, both, finish, tell)
     kept = finish(both(a, b))
     return [Paired(b.name, kept)], kept["stopped"]
+
+
+def _against_baseline(a: Path, b: Path, tell: Callable[[str], None]) -> dict[str, Any]:
+    """A scene held against what it sounded like."""
+    from sonic_bullet.comparing.baselines import check_baseline, read_baseline
+
+    checked = check_baseline(read_baseline(a), b, tell)
+    words = [*checked.words, *([checked.audible.words] if checked.audible is not None else [])]
+    head = "same: all samples are as the baseline's" if checked.same else f"differs from {a.name}"
+    described = {"same": checked.same, "passed": checked.passed, "verdict": head, "effects": words}
+    return {"lines": [head, *(f"  {one}" for one in words)], "described": described, "passed": checked.passed,
+            "stopped": False}  # fmt: skip
 
 
 def _say(say: Callable[[str], None], found: list[Any], stopped: bool) -> None:

@@ -140,12 +140,13 @@ def until_rest(scene: SceneSide) -> tuple[float, bool]:
 
 
 def at_rest(log: ContactLog) -> bool:
-    """Whether nobody moves in the last tenth of a second."""
+    """Whether nobody who sounds moves in the last tenth of a second."""
     count = max(2, round(0.1 / log.steps[-1].dt_s))
     one, other = log.steps[max(0, len(log.steps) - count)], log.steps[-1]
     if len(one.body) != len(other.body):
         return False
-    return bool(np.abs(one.position_m - other.position_m).max(initial=0) < REST_M)
+    sounds = np.array([log.bodies[i].material is not None for i in one.body], bool)
+    return bool(np.abs(one.position_m - other.position_m)[sounds].max(initial=0) < REST_M)
 
 
 def measured(side: Side) -> tuple[Array, Array]:

@@ -12,7 +12,7 @@ import hashlib
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +31,8 @@ from sonic_bullet.session.listening import Listener
 from sonic_bullet.session.wanted_bodies import WantedBody
 
 Say = Callable[[str], None]
+OF_WHOM = ("body", "links", "parts", "own_shapes")
+"""Fields of a `WantedBody` that say who it is and how it looks; all others are inputs."""
 REMEDY = "give a scene (.py), a contact log (.npz), a recording, or a folder of them"
 
 
@@ -113,10 +115,8 @@ class _Run:
     def _adding(self, one: WantedBody) -> Call:
         who = self.calls.who(one.body)
         shapes = (tuple(shapes for _, shapes in one.parts),) if one.own_shapes else ()
-        arguments = {
-            "body": who, "links": one.links, "material": one.material, "options": one.options,
-            "model": (one.model,), "names": one.names, "shapes": shapes,
-        }  # fmt: skip
+        rest = {x.name: getattr(one, x.name) for x in fields(one) if x.name not in OF_WHOM}
+        arguments = {"body": who, "links": one.links, **rest, "model": (one.model,), "shapes": shapes}
         return Call("add", self.calls.steps, arguments, who, own=one)
 
     def _of_the_other(self, calls: Sequence[Call]) -> Iterator[WantedBody]:
@@ -144,9 +144,10 @@ def frame_digest(frame: Array) -> bytes:
 
 def _changed(one: WantedBody, before: Any, after: Any) -> WantedBody:
     """The body as it is to be added instead."""
-    given: dict[str, Any] = {name: after[name] for name in ("material", "options", "names") if name in after}
-    if after["model"] is not before["model"]:
-        given["model"] = after["model"][0]
+    given = {
+        x.name: after[x.name] for x in fields(one) if x.name in after and x.name not in (*OF_WHOM, "model", "links")
+    }
+    given["model"] = after["model"][0]
     if after["shapes"] is not before["shapes"] and after["shapes"]:
         parts = zip(one.parts, after["shapes"][0], strict=False)
         given |= {"parts": tuple((name, shapes) for (name, _), shapes in parts), "own_shapes": True}
