@@ -120,7 +120,8 @@ class Interception:
 
     def _disconnect(self) -> None:
         """End the clients that the run opened and left: the next run's calls would go to them."""
-        gc.collect()  # a BulletClient that is dropped later ends whoever has its number by then
+        if any(client >= 0 and pybullet.isConnected(client) for client in self._clients):
+            gc.collect()  # a BulletClient that is dropped later ends whoever has its number by then
         for client in self._clients:
             if client >= 0 and pybullet.isConnected(client):
                 pybullet.disconnect(client)
