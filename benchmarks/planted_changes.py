@@ -22,7 +22,7 @@ import numpy as np
 from benchmarks.planted.recordings import recordings
 from benchmarks.planted.scenes import SCENES, changed, write
 from sonic_bullet.comparing.compared_sides import compared
-from sonic_bullet.comparing.comparison import Comparison
+from sonic_bullet.comparing.comparison_record import Comparison
 from sonic_bullet.comparing.sides import SceneSide, Side, of_log, run
 
 Change = tuple[tuple[Any, ...], Any]

@@ -22,7 +22,7 @@ from sonic_bullet.records.errors import CompareError, FileError
 
 COMPARE_EPILOG = """\b
 Examples:
-  sonic-bullet compare old/pour.py new/pour.py --report pour.html
+  sonic-bullet compare old/bar.py new/bar.py --report bar.html
   sonic-bullet compare scenes --ref main --json differences.json"""
 
 
@@ -166,7 +166,7 @@ def _exit(found: list[Any]) -> None:
 
 BASELINE_EPILOG = """\b
 Example:
-  sonic-bullet baseline scenes/pour.py -o tests/sonic_baselines --reason "new cup"
+  sonic-bullet baseline scenes/bar.py -o tests/sonic_baselines --reason "new cup"
 """
 
 

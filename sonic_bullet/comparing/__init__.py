@@ -4,8 +4,9 @@
                     logs  -> effects, first difference first          ├─> Comparison -> words, JSON, page
                     put back one by one in the second scene -> causes ┘
 
-sides: what is compared, run | call_pairs: the calls of two runs, side by side | input_differences: what of them differs
-put_back: the second scene again with inputs of the first | causes: the smallest set that makes the first of it
+sides: what is compared, run | compared_sides: all together | comparison_record: what is found | words: in words
+inputs: side by side, put back, the smallest set that is the cause | outcome: what they did | ensemble: chance
+baselines, revisions, folders: of projects | pytest_plugin, failure_folder: of their tests
 """
 
 from __future__ import annotations
@@ -15,15 +16,15 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from sonic_bullet.comparing.compared_sides import compare
-    from sonic_bullet.comparing.comparison import Comparison, Difference, Effect
+    from sonic_bullet.comparing.comparison_record import Comparison, Consequence, Difference
     from sonic_bullet.comparing.sides import SceneSide
 
-__all__ = ["Comparison", "Difference", "Effect", "SceneSide", "compare"]
+__all__ = ["Comparison", "Consequence", "Difference", "SceneSide", "compare"]
 
 _HOME = {
-    "Comparison": "comparison",
-    "Difference": "comparison",
-    "Effect": "comparison",
+    "Comparison": "comparison_record",
+    "Difference": "comparison_record",
+    "Consequence": "comparison_record",
     "SceneSide": "sides",
     "compare": "compared_sides",
 }

@@ -18,9 +18,9 @@ import msgspec
 import numpy as np
 
 from sonic_bullet.comparing.ensemble import RUNS, Audibility, Ensemble, ensemble, judged, measured
+from sonic_bullet.comparing.outcome.sound_effects import OCTAVES_HZ, band_levels, onsets_s, t60_s
 from sonic_bullet.comparing.revisions import changed_files, head
 from sonic_bullet.comparing.sides import SceneSide, Side, run
-from sonic_bullet.comparing.sound_effects import OCTAVES_HZ, band_levels, onsets_s, t60_s
 from sonic_bullet.files import replacing
 from sonic_bullet.files.reading import reading
 from sonic_bullet.files.rows.spool import KeptSound
@@ -32,7 +32,7 @@ MOST_BYTES = 4 << 20
 Tell = Callable[[str], None]
 
 
-class Baseline(msgspec.Struct, omit_defaults=True):
+class SceneBaseline(msgspec.Struct, omit_defaults=True):
     """See the module. commit: of the scene's repository, "": none; clean: the scene was as it is in that commit;
     features, spectra: of the ensemble, empty for a plain script; seconds, rests: how long it ran, and whether to rest.
     """
@@ -63,7 +63,7 @@ class Checked:
     none, or no need to ask; words: one line each of what has changed.
     """
 
-    baseline: Baseline
+    baseline: SceneBaseline
     side: Side
     same: bool
     audible: Audibility | None
@@ -83,13 +83,13 @@ def samples_digest(sound: KeptSound) -> str:
     return made.hexdigest()
 
 
-def make_baseline(scene: str | Path, reason: str, tell: Tell, runs: int = RUNS) -> Baseline:
+def make_baseline(scene: str | Path, reason: str, tell: Tell, runs: int = RUNS) -> SceneBaseline:
     """What the scene sounds like now. Raises what running it does."""
     side = run(SceneSide(scene), "a")
     assert side.log is not None
     x, place = side.sound.samples(), Path(scene).resolve()
     levels = band_levels(x, side.sr)
-    made = Baseline(
+    made = SceneBaseline(
         FORMAT, place.name, reason, head(place.parent), not changed_files(place.parent), dict(side.log.versions),
         side.sr, len(x), x.shape[1], samples_digest(side.sound), onsets_s(x, side.sr), t60_s(x, side.sr),
         list(OCTAVES_HZ[: len(levels)]), [round(float(v), 3) if np.isfinite(v) else None for v in levels],
@@ -102,13 +102,13 @@ def make_baseline(scene: str | Path, reason: str, tell: Tell, runs: int = RUNS) 
     return made
 
 
-def write_baseline(path: str | Path, baseline: Baseline) -> None:
+def write_baseline(path: str | Path, baseline: SceneBaseline) -> None:
     """Write it, whole or not at all. Raises FileError."""
     with replacing(str(path)) as file:
         file.write(msgspec.json.encode(baseline) + b"\n")
 
 
-def read_baseline(path: str | Path) -> Baseline:
+def read_baseline(path: str | Path) -> SceneBaseline:
     """Raises FileError, and CompareError for one of another version."""
     remedy = "make it anew: sonic-bullet baseline"
     with reading(str(path), "baseline", FileError, remedy):
@@ -119,12 +119,12 @@ def read_baseline(path: str | Path) -> Baseline:
         version = msgspec.json.decode(data, type=dict[str, Any]).get("format")
         if version != FORMAT:
             raise CompareError(f"{path} is a baseline of another version ({str(version)[:40]})", remedy)
-        return msgspec.json.decode(data, type=Baseline)
+        return msgspec.json.decode(data, type=SceneBaseline)
     except msgspec.MsgspecError as error:
         raise FileError(f"{path} is no baseline: {error}", remedy) from None
 
 
-def check_baseline(baseline: Baseline, scene: str | Path, tell: Tell) -> Checked:
+def check_baseline(baseline: SceneBaseline, scene: str | Path, tell: Tell) -> Checked:
     """The scene as it is now against the baseline. Raises what running it does."""
     side = run(SceneSide(scene, sr=baseline.sr), "b")
     assert side.log is not None
@@ -144,7 +144,7 @@ def check_baseline(baseline: Baseline, scene: str | Path, tell: Tell) -> Checked
     return Checked(baseline, side, False, audible, (*words, *_changes(baseline, side)))
 
 
-def _changes(baseline: Baseline, side: Side) -> list[str]:
+def _changes(baseline: SceneBaseline, side: Side) -> list[str]:
     x = side.sound.samples()
     found = []
     if x.shape != (baseline.channels, baseline.frames):

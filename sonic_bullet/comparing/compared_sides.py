@@ -10,17 +10,17 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from sonic_bullet.comparing.call_pairs import Pair
-from sonic_bullet.comparing.causes import Causes, find_causes, same_sound, shapley_shares
-from sonic_bullet.comparing.comparison import Comparison, Difference, Effect
-from sonic_bullet.comparing.input_differences import Asked, asked_differences
-from sonic_bullet.comparing.log_differences import Logged, logged_differences
-from sonic_bullet.comparing.matched_logs import FirstDifference, first_difference, matched, require_kin
-from sonic_bullet.comparing.modal_effects import modal_effects
-from sonic_bullet.comparing.put_back import PutBack
-from sonic_bullet.comparing.recording_effects import recording_effects
+from sonic_bullet.comparing.comparison_record import Comparison, Consequence, Difference
+from sonic_bullet.comparing.inputs.call_pairs import CallPair
+from sonic_bullet.comparing.inputs.causes import Causes, find_causes, same_sound, shapley_shares
+from sonic_bullet.comparing.inputs.input_differences import Asked, asked_differences
+from sonic_bullet.comparing.inputs.log_differences import Logged, logged_differences
+from sonic_bullet.comparing.inputs.matched_logs import FirstDifference, first_difference, matched, require_kin
+from sonic_bullet.comparing.inputs.put_back import PutBack
+from sonic_bullet.comparing.outcome.modal_effects import modal_effects
+from sonic_bullet.comparing.outcome.recording_effects import recording_effects
+from sonic_bullet.comparing.outcome.sound_effects import at_common_rate, sound_effects
 from sonic_bullet.comparing.sides import OtherSound, SceneSide, Side, as_side, run
-from sonic_bullet.comparing.sound_effects import at_common_rate, sound_effects
 from sonic_bullet.comparing.words import difference_words, logged_words
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.rows.spool import KeptSound
@@ -35,7 +35,7 @@ ORDER = {True: 0, None: 1, False: 2}
 def compare(a: Given, b: Given, *, say: Callable[[str], None] | None = None) -> Comparison:
     """What of B is other than of A, and why.
 
-    a, b: a scene's file or a `SceneSide`, a contact log or its file, a recording's file. say: is told what is being
+    a, b: a scene's file or a `SceneSide`, a contact log or its file, a recording's file. say: is given what is being
     done. Two scenes, or two logs of equal contacts, tell their causes; other pairs what differs. Interrupted while it
     looks for causes, it returns what it has (`stopped`). Raises SonicBulletError: what cannot be run, read or compared.
     """
@@ -89,7 +89,9 @@ def _of_scenes(a: Side, b: Side, same: bool, first: FirstDifference, tell: Tell)
     return _in_order(made), causes
 
 
-def _put_back(b: Side, pairs: Sequence[Pair], asked: Sequence[Asked], tell: Tell, like: Sequence[bytes] | None) -> Side:
+def _put_back(
+    b: Side, pairs: Sequence[CallPair], asked: Sequence[Asked], tell: Tell, like: Sequence[bytes] | None
+) -> Side:
     """B run with those inputs of A; like: frames that it must have, else OtherSound is raised."""
     assert b.scene is not None
     options = {one.option: one.a for one in asked if one.option}
@@ -147,23 +149,23 @@ def _in_order(differences: list[Difference]) -> list[Difference]:
     return sorted(differences, key=lambda one: (ORDER[one.cause], -(one.share or 0)))
 
 
-def _contact_effect(first: FirstDifference) -> list[Effect]:
+def _contact_effect(first: FirstDifference) -> list[Consequence]:
     if first.step is None or first.at_s is None:
-        return [Effect("contacts", "contacts are equal in every step")]
+        return [Consequence("contacts", "contacts are equal in every step")]
     who = f" of {', '.join(sorted(first.bodies))}" if first.bodies else ""
     words = f"contacts{who} differ from step {first.step} on ({first.at_s * 1e3:.4g} ms)"
-    return [Effect("contacts", words, first.at_s, {"step": first.step})]
+    return [Consequence("contacts", words, first.at_s, {"step": first.step})]
 
 
-def _of_sounds(a: Side, b: Side) -> list[Effect]:
+def _of_sounds(a: Side, b: Side) -> list[Consequence]:
     one, other, sr = at_common_rate(a.sound.samples(), b.sound.samples(), a.sr, b.sr)
     if not one.size or not other.size:
         return []
-    rates = [Effect("rate", f"rates {a.sr} → {b.sr} Hz: compared at {sr} Hz", 0.0)] if a.sr != b.sr else []
+    rates = [Consequence("rate", f"rates {a.sr} → {b.sr} Hz: compared at {sr} Hz", 0.0)] if a.sr != b.sr else []
     return rates + sound_effects(one, other, sr)
 
 
-def _of_recordings(a: Side, b: Side) -> tuple[Effect, ...]:
+def _of_recordings(a: Side, b: Side) -> tuple[Consequence, ...]:
     one, other, sr = at_common_rate(a.sound.samples(), b.sound.samples(), a.sr, b.sr)
     effects = _of_sounds(a, b)
     return (*(x for x in effects if x.kind in ("rate", "length")), *recording_effects(one, other, sr),

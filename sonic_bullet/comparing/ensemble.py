@@ -18,8 +18,8 @@ from typing import Any
 
 import numpy as np
 
+from sonic_bullet.comparing.outcome.sound_effects import OCTAVES_HZ
 from sonic_bullet.comparing.sides import SceneSide, Side, run
-from sonic_bullet.comparing.sound_effects import OCTAVES_HZ
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.listener.calls import Call, Who, with_leaves
 from sonic_bullet.parallel import parallel_map

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from sonic_bullet.comparing.comparison import Comparison
-from sonic_bullet.comparing.sound_effects import at_common_rate
+from sonic_bullet.comparing.comparison_record import Comparison
+from sonic_bullet.comparing.outcome.sound_effects import at_common_rate
 from sonic_bullet.files import replacing, write_audio
 from sonic_bullet.records import Array
 

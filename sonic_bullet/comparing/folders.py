@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from sonic_bullet.comparing.comparison import Comparison
+from sonic_bullet.comparing.comparison_record import Comparison
 from sonic_bullet.parallel import parallel_map
 from sonic_bullet.records.errors import CompareError, SonicBulletError
 from sonic_bullet.session.scene_file import defines_build

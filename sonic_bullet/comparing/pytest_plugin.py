@@ -38,13 +38,13 @@ def sonic_scene(request: pytest.FixtureRequest) -> Callable[[str], Any]:
         __tracebackhide__ = True
         from sonic_bullet.records.errors import SonicBulletError
 
-        beside = request.path.parent
-        scene = next((x for x in (beside / path, request.config.rootpath / path) if x.is_file()), None)
+        here = request.path.parent
+        scene = next((x for x in (here / path, request.config.rootpath / path) if x.is_file()), None)
         if scene is None:
             pytest.fail(f"there is no scene {path}", pytrace=False)
         results = Path(request.config.getoption("--sonic-results")) / scene.stem
         try:
-            said = _checked(scene, beside / FOLDER / f"{scene.stem}.json", results, request.config)
+            said = _checked(scene, here / FOLDER / f"{scene.stem}.json", results, request.config)
         except SonicBulletError as error:
             said = str(error)
         if said:

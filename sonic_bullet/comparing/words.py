@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sonic_bullet.comparing.input_differences import Asked
-from sonic_bullet.comparing.log_differences import Logged
-from sonic_bullet.comparing.matched_logs import NO_NAME
+from sonic_bullet.comparing.inputs.input_differences import Asked
+from sonic_bullet.comparing.inputs.log_differences import Logged
+from sonic_bullet.comparing.inputs.matched_logs import NO_NAME
 from sonic_bullet.comparing.sides import Side
 from sonic_bullet.listener.calls import Call, InputFile, Who
 
 if TYPE_CHECKING:
-    from sonic_bullet.comparing.comparison import Comparison
+    from sonic_bullet.comparing.comparison_record import Comparison
 
 UNITS = {
     "mass": "kg",

@@ -17,8 +17,8 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.comparing.comparison import Comparison
-from sonic_bullet.comparing.sound_effects import at_common_rate
+from sonic_bullet.comparing.comparison_record import Comparison
+from sonic_bullet.comparing.outcome.sound_effects import at_common_rate
 from sonic_bullet.files import replacing
 from sonic_bullet.records import Array
 

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from sonic_bullet.comparing.call_pairs import aligned, side_by_side
-from sonic_bullet.comparing.causes import find_causes, log_distance, same_sound, shapley_shares
+from sonic_bullet.comparing.inputs.call_pairs import aligned, side_by_side
+from sonic_bullet.comparing.inputs.causes import find_causes, log_distance, same_sound, shapley_shares
 from sonic_bullet.files.rows.spool import KeptSound
 from sonic_bullet.listener.calls import ABSENT, Call, Who, leaves, same, with_leaves
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from sonic_bullet.comparing import SceneSide, compare
-from sonic_bullet.comparing.recording_effects import recording_effects
+from sonic_bullet.comparing.outcome.recording_effects import recording_effects
 from sonic_bullet.comparing.sides import Side, run
 from sonic_bullet.files import write_audio
 from sonic_bullet.files.contact_log import ContactLog
@@ -59,7 +59,7 @@ def test_where_contacts_differ_a_log_says_that_no_share_is_known(tmp_path: Path,
 
 
 def test_a_new_field_of_a_record_is_an_input_by_itself(log: ContactLog) -> None:
-    from sonic_bullet.comparing.matched_logs import NO_INPUT, body_leaves
+    from sonic_bullet.comparing.inputs.matched_logs import NO_INPUT, body_leaves
 
     body = log.bodies[0]
     known = {path[0] for path in body_leaves(body)}

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.comparing.comparison import Effect
+from sonic_bullet.comparing.comparison_record import Consequence
 from sonic_bullet.records import Array
 
 OCTAVES_HZ = (125.0, 250.0, 500.0, 1000.0, 2000.0, 4000.0, 8000.0, 16000.0)
@@ -38,18 +38,18 @@ def at_common_rate(a: Array, b: Array, sr_a: int, sr_b: int) -> tuple[Array, Arr
     return lowered(a, sr_a), lowered(b, sr_b), low
 
 
-def sound_effects(a: Array, b: Array, sr: int) -> list[Effect]:
+def sound_effects(a: Array, b: Array, sr: int) -> list[Consequence]:
     """Effects of sounds (channels, n) at one rate, first difference first."""
-    found: list[Effect] = []
+    found: list[Consequence] = []
     n = min(a.shape[1], b.shape[1])
     if a.shape[0] != b.shape[0]:
-        return [Effect("channels", f"{a.shape[0]} → {b.shape[0]} channels", 0.0)]
+        return [Consequence("channels", f"{a.shape[0]} → {b.shape[0]} channels", 0.0)]
     where = np.flatnonzero((a[:, :n] != b[:, :n]).any(axis=0))
     if len(where):
         first = int(where[0])
-        found.append(Effect("sample", f"first sample that differs at {first / sr * 1e3:.4g} ms", first / sr))
+        found.append(Consequence("sample", f"first sample that differs at {first / sr * 1e3:.4g} ms", first / sr))
     if a.shape[1] != b.shape[1]:
-        found.append(Effect("length", f"length {a.shape[1] / sr:.4g} → {b.shape[1] / sr:.4g} s", n / sr))
+        found.append(Consequence("length", f"length {a.shape[1] / sr:.4g} → {b.shape[1] / sr:.4g} s", n / sr))
     found += [one for one in (_levels(a, b, sr), _onsets(a, b, sr), _decay(a, b, sr), _loudness(a, b, sr)) if one]
     return found
 
@@ -65,7 +65,7 @@ def band_levels(x: Array, sr: int) -> Array:
         return np.asarray(10 * np.log10(np.array(sums)))
 
 
-def _levels(a: Array, b: Array, sr: int) -> Effect | None:
+def _levels(a: Array, b: Array, sr: int) -> Consequence | None:
     one, other = band_levels(a, sr), band_levels(b, sr)
     top = max(one.max(initial=-np.inf), other.max(initial=-np.inf))
     if not math.isfinite(top):
@@ -73,14 +73,14 @@ def _levels(a: Array, b: Array, sr: int) -> Effect | None:
     loud = np.maximum(one, other) > top + QUIET_DB
     if not (np.isfinite(one[loud]).all() and np.isfinite(other[loud]).all()):
         which = "A" if not np.isfinite(one[loud]).all() else "B"
-        return Effect("level", f"{which} is silent in some bands where the other is not")
+        return Consequence("level", f"{which} is silent in some bands where the other is not")
     change = other - one
     total = 10 * math.log10(float(np.square(b).mean()) / float(np.square(a).mean()))
     k = int(np.argmax(np.where(loud, np.abs(change), -1)))
     most = f", most at {_hz(OCTAVES_HZ[k])}: {change[k]:+.2g} dB" if abs(change[k]) > 0.005 else ""
     values: dict[str, Any] = {"total_db": total, "band_hz": list(OCTAVES_HZ[: len(change)])}
     values["band_db"] = [round(float(x), 4) if good else None for x, good in zip(change, loud, strict=True)]
-    return Effect("level", f"level {total:+.2g} dB{most}", None, values)
+    return Consequence("level", f"level {total:+.2g} dB{most}", None, values)
 
 
 def onsets_s(x: Array, sr: int) -> list[float]:
@@ -103,20 +103,20 @@ def onsets_s(x: Array, sr: int) -> list[float]:
     return found
 
 
-def _onsets(a: Array, b: Array, sr: int) -> Effect | None:
+def _onsets(a: Array, b: Array, sr: int) -> Consequence | None:
     one, other = onsets_s(a, sr), onsets_s(b, sr)
     if len(one) != len(other):
         shared = min(len(one), len(other))
         at = next((min(x, y) for x, y in zip(one, other, strict=False) if abs(x - y) > FRAME_S), None)
         longer = one if len(one) > len(other) else other
         at = longer[shared] if at is None else at
-        return Effect("onset", f"onsets {len(one)} → {len(other)}", at, {"a_s": one, "b_s": other})
+        return Consequence("onset", f"onsets {len(one)} → {len(other)}", at, {"a_s": one, "b_s": other})
     moved = [(y - x, x) for x, y in zip(one, other, strict=True) if abs(y - x) > FRAME_S / 2]
     if not moved:
         return None
     most = max(moved, key=lambda pair: abs(pair[0]))
     words = f"{len(moved)} of {len(one)} onsets move, most by {most[0] * 1e3:+.3g} ms at {most[1]:.3g} s"
-    return Effect("onset", words, moved[0][1], {"a_s": one, "b_s": other})
+    return Consequence("onset", words, moved[0][1], {"a_s": one, "b_s": other})
 
 
 def t60_s(x: Array, sr: int) -> float | None:
@@ -133,15 +133,15 @@ def t60_s(x: Array, sr: int) -> float | None:
     return float(-60 / slope) if slope < 0 else None
 
 
-def _decay(a: Array, b: Array, sr: int) -> Effect | None:
+def _decay(a: Array, b: Array, sr: int) -> Consequence | None:
     one, other = t60_s(a, sr), t60_s(b, sr)
     if one is None or other is None or abs(other / one - 1) < 0.005:
         return None
     words = f"T60 {one:.3g} → {other:.3g} s ({(other / one - 1) * 100:+.2g} %)"
-    return Effect("decay", words, None, {"a_s": one, "b_s": other})
+    return Consequence("decay", words, None, {"a_s": one, "b_s": other})
 
 
-def _loudness(a: Array, b: Array, sr: int) -> Effect | None:
+def _loudness(a: Array, b: Array, sr: int) -> Consequence | None:
     import pyloudnorm
 
     if min(a.shape[1], b.shape[1]) < math.ceil(0.4 * sr) or a.shape[0] > 5:
@@ -150,7 +150,7 @@ def _loudness(a: Array, b: Array, sr: int) -> Effect | None:
     one, other = (float(pyloudnorm.Meter(sr).integrated_loudness(x.T / peak)) for x in (a, b))
     if not (math.isfinite(one) and math.isfinite(other)) or abs(other - one) < 0.05:
         return None
-    return Effect("loudness", f"loudness {other - one:+.2g} LU", None, {"change_lu": other - one})
+    return Consequence("loudness", f"loudness {other - one:+.2g} LU", None, {"change_lu": other - one})
 
 
 def _hz(f: float) -> str:

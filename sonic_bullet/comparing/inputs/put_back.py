@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from sonic_bullet.comparing.call_pairs import Pair, about, differing
+from sonic_bullet.comparing.inputs.call_pairs import CallPair, about, differing
 from sonic_bullet.listener.calls import ABSENT, Call, Path, leaves, with_leaves
 
 HANDLES = ("bodyUniqueId", "objectUniqueId", "multiBodyUniqueId", "body", "links", "linkIndex", "jointIndex")
@@ -22,7 +22,7 @@ Place = tuple[int, Path | None]
 class PutBack:
     """A `Plan`: places of pairs that are as A has them."""
 
-    pairs: Sequence[Pair]
+    pairs: Sequence[CallPair]
     chosen: frozenset[Place]
     _next: int = field(default=0)
 

@@ -13,8 +13,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from sonic_bullet.comparing.call_pairs import Pair, differing, side_by_side
-from sonic_bullet.comparing.put_back import HANDLES, Place
+from sonic_bullet.comparing.inputs.call_pairs import CallPair, differing, side_by_side
+from sonic_bullet.comparing.inputs.put_back import HANDLES, Place
 from sonic_bullet.comparing.sides import Side
 from sonic_bullet.listener.calls import ABSENT, Call, Path, Who, leaves
 
@@ -70,7 +70,7 @@ class Asked:
     later: bool = False
 
 
-def asked_differences(a: Side, b: Side) -> tuple[list[Pair], list[Asked]]:
+def asked_differences(a: Side, b: Side) -> tuple[list[CallPair], list[Asked]]:
     """Both runs' calls in pairs, and the inputs that differ, in the order of calls."""
     pairs, match = side_by_side(a.calls, b.calls)
     lone = {one for call in a.calls for one in call.made} - set(match)
@@ -95,7 +95,7 @@ def asked_differences(a: Side, b: Side) -> tuple[list[Pair], list[Asked]]:
     return pairs, [*found.values(), *_options(a, b)]
 
 
-def _whose(pair: Pair, lone: set[Who]) -> Any:
+def _whose(pair: CallPair, lone: set[Who]) -> Any:
     """The body that a pair's calls are about; one that only one run has, where one is among the arguments."""
     for call in (pair.b, pair.a):
         if call is not None:
@@ -108,13 +108,13 @@ def _whose(pair: Pair, lone: set[Who]) -> Any:
     return call.who or next(iter(call.made), None)
 
 
-def name_of(pair: Pair) -> str:
+def name_of(pair: CallPair) -> str:
     """The function's name."""
     call = pair.b or pair.a
     return "" if call is None else call.name
 
 
-def _note(found: dict[Any, Asked], pair: Pair, number: int, path: Path, old: Any, new: Any) -> None:
+def _note(found: dict[Any, Asked], pair: CallPair, number: int, path: Path, old: Any, new: Any) -> None:
     """A leaf that differs."""
     call = pair.b or pair.a
     assert call is not None
@@ -132,7 +132,7 @@ def _note(found: dict[Any, Asked], pair: Pair, number: int, path: Path, old: Any
     one.places.append((number, path))
 
 
-def _note_whole(found: dict[Any, Asked], pair: Pair, number: int) -> None:
+def _note_whole(found: dict[Any, Asked], pair: CallPair, number: int) -> None:
     """A call that only one run makes, and that is made whole or not at all."""
     call = pair.b or pair.a
     assert call is not None

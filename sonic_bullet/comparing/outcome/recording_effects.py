@@ -13,7 +13,7 @@ import itertools
 
 import numpy as np
 
-from sonic_bullet.comparing.comparison import Effect
+from sonic_bullet.comparing.comparison_record import Consequence
 from sonic_bullet.records import Array
 
 DELAY_MOST_S = 0.5
@@ -29,16 +29,16 @@ GAP_S = 0.002
 GAIN_DB = 0.005
 
 
-def recording_effects(a: Array, b: Array, sr: int) -> list[Effect]:
+def recording_effects(a: Array, b: Array, sr: int) -> list[Consequence]:
     """Effects of two recordings (channels, n) at one rate."""
     if a.shape[0] != b.shape[0] or not a.size or not b.size:
         return []
     if not a.any() or not b.any():
-        return [Effect("silence", f"{'A' if not a.any() else 'B'} is silent")]
-    found: list[Effect] = []
+        return [Consequence("silence", f"{'A' if not a.any() else 'B'} is silent")]
+    found: list[Consequence] = []
     order = _order(a, b)
     if order != tuple(range(len(a))):
-        found.append(Effect("channels", f"channels in another order: {' '.join(str(i + 1) for i in order)} of A"))
+        found.append(Consequence("channels", f"channels in another order: {' '.join(str(i + 1) for i in order)} of A"))
         a = a[list(order)]
     delay, sign = _delay(a, b, sr)
     if 0 < abs(delay) <= GROUP_DELAY and not _only_delayed(a, b, delay):
@@ -46,9 +46,9 @@ def recording_effects(a: Array, b: Array, sr: int) -> list[Effect]:
     found += _offset(a * sign, b)
     if delay:
         words = f"delayed by {delay} samples ({delay / sr * 1e3:+.3g} ms)"
-        found.append(Effect("delay", words, None, {"delay_s": delay / sr}))
+        found.append(Consequence("delay", words, None, {"delay_s": delay / sr}))
     if sign < 0:
-        found.append(Effect("polarity", "polarity is inverted"))
+        found.append(Consequence("polarity", "polarity is inverted"))
     x, y = _overlap(a, b, delay)
     found += _clipping(a, b) + _gaps(x, y, sr)
     clean = not found or all(one.kind in ("channels", "delay", "polarity") for one in found)
@@ -78,12 +78,12 @@ def _order(a: Array, b: Array) -> tuple[int, ...]:
     return best if sum(table[i][j] for j, i in enumerate(best)) > usual + 1e-6 else tuple(range(len(a)))
 
 
-def _offset(a: Array, b: Array) -> list[Effect]:
+def _offset(a: Array, b: Array) -> list[Consequence]:
     change = float(b.mean() - a.mean())
     rms = float(np.sqrt(np.square(b).mean()))
     if abs(change) < 0.01 * rms:
         return []
-    return [Effect("offset", f"a constant of {change:.3g} is added", None, {"offset": change})]
+    return [Consequence("offset", f"a constant of {change:.3g} is added", None, {"offset": change})]
 
 
 def _delay(a: Array, b: Array, sr: int) -> tuple[int, int]:
@@ -103,12 +103,12 @@ def _overlap(a: Array, b: Array, delay: int) -> tuple[Array, Array]:
     return x[:, :n], y[:, :n]
 
 
-def _clipping(a: Array, b: Array) -> list[Effect]:
+def _clipping(a: Array, b: Array) -> list[Consequence]:
     one, other = _flat_tops(a), _flat_tops(b)
     if other[0] <= one[0]:
         return []
     words = f"clipped at ±{other[1]:.4g}: {other[0]} samples"
-    return [Effect("clipping", words, None, {"samples": other[0], "limit": other[1]})]
+    return [Consequence("clipping", words, None, {"samples": other[0], "limit": other[1]})]
 
 
 def _flat_tops(x: Array) -> tuple[int, float]:
@@ -123,7 +123,7 @@ def _flat_tops(x: Array) -> tuple[int, float]:
     return count, top
 
 
-def _gaps(x: Array, y: Array, sr: int) -> list[Effect]:
+def _gaps(x: Array, y: Array, sr: int) -> list[Consequence]:
     """Where B is exactly nothing and A is not."""
     silent = (y == 0).all(axis=0) & (np.abs(x).max(axis=0) > 1e-6 * np.abs(x).max())
     edges = np.flatnonzero(np.diff(np.concatenate([[0], silent.astype(np.int8), [0]])))
@@ -132,15 +132,15 @@ def _gaps(x: Array, y: Array, sr: int) -> list[Effect]:
         return []
     start, stop = runs[0]
     words = f"silent from {start / sr:.4g} to {stop / sr:.4g} s" + (f", and {len(runs) - 1} more" if runs[1:] else "")
-    return [Effect("gap", words, float(start / sr))]
+    return [Consequence("gap", words, float(start / sr))]
 
 
-def _transfer(x: Array, y: Array, sr: int, clean: bool) -> list[Effect]:
+def _transfer(x: Array, y: Array, sr: int, clean: bool) -> list[Consequence]:
     """Gain or filter, and what neither explains."""
     gain = float((x * y).sum() / np.square(x).sum())
     left = y - gain * x
     level = _db(left, y)
-    found: list[Effect] = []
+    found: list[Consequence] = []
     response = None
     if level > LEFT_DB and clean:
         freq, response, explained = _response(x, y, sr)
@@ -152,15 +152,15 @@ def _transfer(x: Array, y: Array, sr: int, clean: bool) -> list[Effect]:
                 "(octave bands, A to B)"
             )
             values = {"freq_hz": [float(f) for f in freq], "db": [round(float(v), 3) for v in response]}
-            return [Effect("filter", words, None, values)]
+            return [Consequence("filter", words, None, values)]
     if abs(20 * np.log10(max(abs(gain), 1e-12))) > GAIN_DB and level < -20:
         words = f"gain {20 * np.log10(abs(gain)):+.3g} dB"
-        found.append(Effect("gain", words, None, {"gain_db": float(20 * np.log10(abs(gain)))}))
+        found.append(Consequence("gain", words, None, {"gain_db": float(20 * np.log10(abs(gain)))}))
     if level > LEFT_DB and clean:
         found.append(_left(left, level, sr))
     elif level > LEFT_DB - 60 and not found and clean:
         words = f"samples differ by rounding: what is left is {level:.0f} dB below the recording"
-        found.append(Effect("rounding", words, None, {"left_db": level}))
+        found.append(Consequence("rounding", words, None, {"left_db": level}))
     return found
 
 
@@ -193,17 +193,17 @@ def _response(x: Array, y: Array, sr: int) -> tuple[Array, Array, float]:
     return np.array(centres), np.array(response), float(1 - after / max(before, 1e-300))
 
 
-def _left(left: Array, level: float, sr: int) -> Effect:
+def _left(left: Array, level: float, sr: int) -> Consequence:
     """What is left after a gain: a tone, or noise."""
     spectrum = (np.abs(np.fft.rfft(left * np.hanning(left.shape[1]), axis=1)) ** 2).sum(axis=0)
     k = int(np.argmax(spectrum))
     share = spectrum[max(0, k - 3) : k + 4].sum() / spectrum.sum()
     if share > 0.5:
         freq = k * sr / left.shape[1]
-        return Effect("tone", f"a tone at {freq:.1f} Hz, {level:.1f} dB re the recording", None, {"freq_hz": freq})
+        return Consequence("tone", f"a tone at {freq:.1f} Hz, {level:.1f} dB re the recording", None, {"freq_hz": freq})
     spread = float(np.exp(np.log(spectrum + 1e-300).mean()) / spectrum.mean())
     what = "noise is added" if spread > 0.2 else "something else sounds besides"
-    return Effect("noise", f"{what}, {level:.1f} dB re the recording", None, {"left_db": level})
+    return Consequence("noise", f"{what}, {level:.1f} dB re the recording", None, {"left_db": level})
 
 
 def _db(part: Array, whole: Array) -> float:

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.comparing.call_pairs import GAP, aligned
+from sonic_bullet.comparing.inputs.call_pairs import GAP, aligned
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.listener.calls import leaves, same
 from sonic_bullet.records import Array, Body

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.comparing.input_differences import ONE_QUANTITY, damping
-from sonic_bullet.comparing.matched_logs import body_leaves
+from sonic_bullet.comparing.inputs.input_differences import ONE_QUANTITY, damping
+from sonic_bullet.comparing.inputs.matched_logs import body_leaves
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.listener.calls import Path, leaves, same, with_leaves
 from sonic_bullet.records import Array, Body

@@ -26,7 +26,7 @@ MOST_CELLS = 4_000_000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Pair:
+class CallPair:
     """A call of A, of B, or of both that are the same one; arguments of A with B's bodies where those are matched."""
 
     a: Call | None
@@ -38,14 +38,14 @@ class Pair:
         return one.step if one is not None else 0
 
 
-def side_by_side(a: Sequence[Call], b: Sequence[Call]) -> tuple[list[Pair], dict[Who, Who]]:
+def side_by_side(a: Sequence[Call], b: Sequence[Call]) -> tuple[list[CallPair], dict[Who, Who]]:
     """All calls of both in an order that is that of each, and whom of A is whom of B."""
     match = matched_bodies(a, b)
     renamed = [_renamed(call, match) for call in a]
-    pairs: list[Pair] = []
+    pairs: list[CallPair] = []
     of_a, of_b = _by_step(renamed), _by_step(b)
     for step in sorted({*of_a, *of_b}):
-        pairs += [Pair(one, other) for one, other in aligned(of_a.get(step, []), of_b.get(step, []), _unlike, _gap)]
+        pairs += [CallPair(one, other) for one, other in aligned(of_a.get(step, []), of_b.get(step, []), _unlike, _gap)]
     return pairs, match
 
 

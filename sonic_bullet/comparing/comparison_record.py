@@ -32,7 +32,7 @@ class Difference:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Effect:
+class Consequence:
     """What inputs did, never a cause. kind: contacts, modes, level, onset, decay, loudness, or what became of a
     recording; at_s: when it begins; values: numbers by name, units in the names.
     """
@@ -54,7 +54,7 @@ class Comparison:
     b: Side
     same: bool
     differences: tuple[Difference, ...] = ()
-    effects: tuple[Effect, ...] = ()
+    effects: tuple[Consequence, ...] = ()
     exact: bool | None = None
     audible: Audibility | None = None
     notes: tuple[str, ...] = ()

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from sonic_bullet.comparing.comparison import Effect
-from sonic_bullet.comparing.log_differences import same_model
+from sonic_bullet.comparing.comparison_record import Consequence
+from sonic_bullet.comparing.inputs.log_differences import same_model
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.records import ModalModel
 
@@ -16,7 +16,7 @@ ASSURED = 32
 """Modes whose shapes are compared."""
 
 
-def modal_effects(a: ContactLog, b: ContactLog, pairs: list[tuple[int | None, int | None]]) -> list[Effect]:
+def modal_effects(a: ContactLog, b: ContactLog, pairs: list[tuple[int | None, int | None]]) -> list[Consequence]:
     """One effect a body whose modes are others."""
     found = []
     for i, j in pairs:
@@ -27,7 +27,7 @@ def modal_effects(a: ContactLog, b: ContactLog, pairs: list[tuple[int | None, in
     return found
 
 
-def _changed(name: str, a: ModalModel, b: ModalModel) -> Effect:
+def _changed(name: str, a: ModalModel, b: ModalModel) -> Consequence:
     n = min(a.mode_count, b.mode_count)
     cents = 1200 * np.log2(b.freq_hz[:n] / a.freq_hz[:n])
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -49,7 +49,7 @@ def _changed(name: str, a: ModalModel, b: ModalModel) -> Effect:
             words.append(f"shapes turn or trade places (least MAC {mac.min():.2f})")
     else:
         words.append(f"surface of {len(a.vertex_m)} → {len(b.vertex_m)} vertices")
-    return Effect("modes", f"{name}: {', '.join(words) or 'modes change in their last bits'}", None, values)
+    return Consequence("modes", f"{name}: {', '.join(words) or 'modes change in their last bits'}", None, values)
 
 
 def _spread(values: np.ndarray[tuple[int], np.dtype[np.float64]], unit: str) -> str:
