@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.planted.held_out import held_out
 from benchmarks.planted.recordings import recordings
 from benchmarks.planted.scenes import SCENES, changed, write
 from sonic_bullet.comparing.compared_sides import compared
@@ -275,6 +276,7 @@ def main() -> None:
             "pairs": lambda: pairs(bench),
             "decoys": lambda: decoys(bench),
             "recordings": lambda: recordings(bench.side("a", "drop", (), {}), bench.folder, line),
+            "held_out": lambda: held_out(bench.folder, line),
             "same": lambda: same(bench),
             "cost": lambda: cost(bench),
             "piles": lambda: piles(bench),

@@ -11,7 +11,7 @@ from sonic_bullet.comparing.inputs.input_differences import Asked
 from sonic_bullet.comparing.inputs.log_differences import Logged
 from sonic_bullet.comparing.inputs.matched_logs import NO_NAME
 from sonic_bullet.comparing.sides import Side
-from sonic_bullet.listener.calls import Call, InputFile, Who
+from sonic_bullet.listener.calls import Call, InputFile, Who, same
 
 if TYPE_CHECKING:
     from sonic_bullet.comparing.comparison_record import Comparison
@@ -22,6 +22,10 @@ UNITS = {
     "start velocity": "m/s",
     "start spin": "rad/s",
     "gravity": "m/s²",
+    "force": "N",
+    "torque": "N m",
+    "largest force": "N",
+    "joint position": "m",
     "time step": "s",
     "inertia": "kg m²",
     "density_kg_m3": "kg/m³",
@@ -46,6 +50,7 @@ PLAIN = {
     "to_hz": "modes up to",
     "count": "number of modes",
     "thickness_m": "wall",
+    "fixed": "clamps",
     "seed": "seed of the surfaces",
 }
 SHAPES = {2: "ball", 3: "box", 4: "cylinder", 5: "mesh", 6: "plane", 7: "capsule", 9: "heightfield"}
@@ -56,7 +61,13 @@ def difference_words(a: Side, b: Side, one: Asked) -> tuple[str, str]:
     who = name_of(a, b, one.who, one.link) if one.who is not None else ""
     if isinstance(one.a, Call) or isinstance(one.b, Call):
         return who, f"{who}: is {'missing in' if one.b is None else 'only in'} B"
-    return who, f"{f'{who}: ' if who else ''}{change_words(one.what, one.a, one.b)}{' under way' if one.later else ''}"
+    head = f"{who}: " if who else ""
+    if not one.later:
+        return who, head + change_words(one.what, one.a, one.b)
+    what = one.what.removeprefix("start ")
+    if one.at_a is not None and one.at_b is not None and same(one.a, one.b):
+        return who, f"{head}{what} in step {one.at_a} → {one.at_b}"
+    return who, f"{head}{what}{change_words(one.what, one.a, one.b).removeprefix(one.what)} under way"
 
 
 def logged_words(one: Logged) -> str:
@@ -105,7 +116,11 @@ def _places(name: str, a: Any, b: Any) -> str:
 
 
 def name_of(a: Side, b: Side, who: Who, link: int) -> str:
-    """What people call a body: its name, or what it is made of and its shape."""
+    """What people call a body: its name, or what it is made of and its shape; a joint by whom it holds."""
+    if who.kind == "constraint":
+        made = next((call for side in (b, a) for call in side.calls if who in call.made), None)
+        held = made.arguments.get("parentBodyUniqueId") if made is not None else None
+        return f"joint of {name_of(a, b, held, -1)}" if isinstance(held, Who) else f"joint {who.serial}"
     for side in (b, a):
         names = {one: name for (x, one), name in side.names.items() if x == who}
         if names:

@@ -46,18 +46,26 @@ ONE_QUANTITY = {
     "localInertiaDiagonalZ": "inertia",
     "sensors": "microphones",
     "shapes": "mesh",
+    "forceObj": "force",
+    "torqueObj": "torque",
+    "maxForce": "largest force",
+    "parentFramePosition": "joint position",
+    "childFramePosition": "joint position in the other",
+    "globalScaling": "scale",
     "alpha_per_s": "damping",
     "beta_s": "damping",
 }
 """What several arguments are one of, by one name."""
 BY_ARGUMENT = ("changeDynamics", "setPhysicsEngineParameter", "changeConstraint")
 """Functions whose arguments can be given one by one; others are called whole or not at all."""
+DRIVES = ("apply", "setJointMotor")
+"""Functions that act anew each step: what they do is one input from the first step on; others set what then stays."""
 
 
 @dataclass(slots=True, eq=False)
 class Asked:
     """An input of two runs that differs. who: the body, None: engine or listener; places: where to put it back; later:
-    it is asked for after the first step.
+    it is asked for after the first step; at_a, at_b: in which, where only one run asks for it in that step.
     """
 
     who: Who | None
@@ -68,6 +76,8 @@ class Asked:
     places: list[Place] = field(default_factory=list)
     option: str = ""
     later: bool = False
+    at_a: int | None = None
+    at_b: int | None = None
 
 
 def asked_differences(a: Side, b: Side) -> tuple[list[CallPair], list[Asked]]:
@@ -141,13 +151,18 @@ def _note_whole(found: dict[Any, Asked], pair: CallPair, number: int) -> None:
     one = _entry(found, call, what)
     value = tuple(inner.values()) if len(inner) > 1 else next(iter(inner.values()), True)
     value = call.arguments["material"].name if call.name == "add" else value
-    one.a, one.b = (value, None) if pair.b is None else (None, value)
+    if pair.b is None:
+        one.a, one.at_a = value, call.step
+    else:
+        one.b, one.at_b = value, call.step
     one.places.append((number, None))
 
 
 def _entry(found: dict[Any, Asked], call: Call, what: str) -> Asked:
     who, link, later = call.who or next(iter(call.made), None), _link(call), call.step > 0
-    return found.setdefault((who, link, what, later), Asked(who, link, what, later=later))
+    return found.setdefault(
+        (who, link, what, later and not call.name.startswith(DRIVES)), Asked(who, link, what, later=later)
+    )
 
 
 def quantity(call: Call, path: Path) -> str:

@@ -49,6 +49,15 @@ IN_ORDER: dict[str, tuple[str, ...]] = {
     "setJointMotorControlArray": ("bodyUniqueId", "jointIndices", "controlMode", "targetPositions"),
     "applyExternalForce": ("objectUniqueId", "linkIndex", "forceObj", "posObj", "flags"),
     "applyExternalTorque": ("objectUniqueId", "linkIndex", "torqueObj", "flags"),
+    "createConstraint": (
+        "parentBodyUniqueId", "parentLinkIndex", "childBodyUniqueId", "childLinkIndex", "jointType", "jointAxis",
+        "parentFramePosition", "childFramePosition", "parentFrameOrientation", "childFrameOrientation",
+    ),
+    "setCollisionFilterPair": ("bodyUniqueIdA", "bodyUniqueIdB", "linkIndexA", "linkIndexB", "enableCollision"),
+    "setCollisionFilterGroupMask": ("bodyUniqueId", "linkIndexA", "collisionFilterGroup", "collisionFilterMask"),
+    "loadSDF": ("sdfFileName",),
+    "loadMJCF": ("mjcfFileName",),
+    "loadBullet": ("bulletFileName",),
     "removeBody": ("bodyUniqueId",),
     "removeConstraint": ("userConstraintUniqueId",),
     "changeConstraint": ("userConstraintUniqueId",),
@@ -216,7 +225,7 @@ class Interception:
                 whom = whom or value
             elif key in SHAPES:
                 value = mapped(value, lambda index: self._shapes.get(index, index))
-            elif key == "fileName":
+            elif key.lower().endswith("filename"):
                 value = self._file(str(raw))
             arguments[key] = value
         return Call(name, self.steps, arguments, whom)
