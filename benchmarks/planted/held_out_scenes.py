@@ -7,7 +7,7 @@ script: a plain script with a listener of its own, random starts, a kick under w
 
 from __future__ import annotations
 
-HINGED = '''import sonic_bullet as sb
+HINGED = """import sonic_bullet as sb
 
 SECONDS = 0.5
 MICROPHONE = (0.1, -0.3, 0.2)
@@ -36,9 +36,9 @@ def build(client):
 
 def act(client, time_s):
     client.applyExternalForce(CLAPPER, -1, [PUSH_N, 0, 0], [0, 0, 0], client.LINK_FRAME)
-'''
+"""
 
-MUG = '''import sys
+MUG = """import sys
 from pathlib import Path
 
 import pybullet_data
@@ -64,9 +64,9 @@ def build(client):
         client.changeDynamics(body, -1, restitution=restitution)
     sb.keep_restitution(client)
     return {board: {"material": "wood", "count": 60}, mug: "porcelain"}
-'''
+"""
 
-SCRIPT = '''import numpy as np
+SCRIPT = """import numpy as np
 import pybullet as p
 
 import sonic_bullet as sb
@@ -95,7 +95,7 @@ for step in range(120):
         p.removeBody(beads[2])
     p.stepSimulation()
     listener.step()
-'''
+"""
 
 HELPER = ("held_out_heights.py", "HEIGHT_M = 0.12\n")
 SCENES = {"hinged": HINGED, "mug": MUG, "script": SCRIPT}

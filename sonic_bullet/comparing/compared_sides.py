@@ -25,7 +25,9 @@ from sonic_bullet.comparing.words import difference_words, logged_words
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.rows.spool import KeptSound
 from sonic_bullet.records.coerce import as_call
+from sonic_bullet.records.errors import CompareError
 from sonic_bullet.render import render_kept
+from sonic_bullet.session.scene_file import defines_build
 
 Given = str | Path | SceneSide | ContactLog | Side
 Tell = Callable[[str], None]
@@ -95,6 +97,8 @@ def _put_back(
     """B run with those inputs of A; like: frames that it must have, else OtherSound is raised."""
     assert b.scene is not None
     options = {one.option: one.a for one in asked if one.option}
+    if "seconds" in options and not defines_build(Path(b.scene.path)):
+        raise CompareError("a plain script says itself how long it runs", "change it there")
     plan = PutBack(pairs, frozenset(place for one in asked for place in one.places))
     return run(replace(b.scene, **options), "b", plan=plan, like=like, say=tell)
 

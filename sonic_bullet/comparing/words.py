@@ -52,7 +52,11 @@ PLAIN = {
     "thickness_m": "wall",
     "fixed": "clamps",
     "seed": "seed of the surfaces",
+    "since_step": "added in step",
+    "until_step": "gone in step",
 }
+COUNTS = ("seed", "since_step", "until_step")
+"""Numbers of which no share is told."""
 SHAPES = {2: "ball", 3: "box", 4: "cylinder", 5: "mesh", 6: "plane", 7: "capsule", 9: "heightfield"}
 
 
@@ -62,6 +66,8 @@ def difference_words(a: Side, b: Side, one: Asked) -> tuple[str, str]:
     if isinstance(one.a, Call) or isinstance(one.b, Call):
         return who, f"{who}: is {'missing in' if one.b is None else 'only in'} B"
     head = f"{who}: " if who else ""
+    if one.what == "turn":
+        return who, f"{head}order of making {one.a} → {one.b}"
     if not one.later:
         return who, head + change_words(one.what, one.a, one.b)
     what = one.what.removeprefix("start ")
@@ -95,7 +101,7 @@ def change_words(what: str, a: Any, b: Any) -> str:
         if key == "damping":
             return f"damping (α in 1/s, β in s) {shown(a)} → {shown(b)}"
         return f"{name} changed in {int((one != other).sum())} of {one.size} numbers"
-    share = f" ({_percent(float(other) / float(one))})" if one.ndim == 0 and float(one) and key != "seed" else ""
+    share = f" ({_percent(float(other) / float(one))})" if one.ndim == 0 and float(one) and key not in COUNTS else ""
     if key in ("start position",):
         share = f" ({float(np.linalg.norm(other - one)) * 1000:.3g} mm away)"
     return f"{name} {shown(a)} → {shown(b)}{unit}{share}"

@@ -161,7 +161,7 @@ class Listener:
             "material": material, "mesh": mesh, "model": model, "roughness_m": roughness_m, "name": name,
             "fixed": fixed, "thickness_m": thickness_m, "to_hz": to_hz, "count": count,
         }  # fmt: skip
-        return self._added([wanted_body(self.world, body, link, **how)], progress)[0]
+        return () if absent(body) else self._added([wanted_body(self.world, body, link, **how)], progress)[0]
 
     def add_all(
         self, cast: Mapping[Any, Any], *, progress: Callable[[str], None] | None = None

@@ -102,7 +102,25 @@ def asked_differences(a: Side, b: Side) -> tuple[list[CallPair], list[Asked]]:
         for path, (old, new) in differing(pair.a, pair.b).items():
             if path[0] not in HANDLES:
                 _note(found, pair, number, path, old, new)
-    return pairs, [*found.values(), *_options(a, b)]
+    return pairs, [*_orders(found), *_options(a, b)]
+
+
+def _orders(found: Mapping[Any, Asked]) -> list[Asked]:
+    """Two bodies that were made of the same, one in each run, are one that is made at another turn."""
+    listed = list(found.values())
+    for old in list(listed):
+        new = next((x for x in listed if _is_same_body(old, x)), None)
+        if new is not None:
+            turns = old.a.made[0].serial + 1, new.b.made[0].serial + 1
+            listed[listed.index(old)] = Asked(new.who, -1, "turn", *turns, [*old.places, *new.places])
+            listed.remove(new)
+    return listed
+
+
+def _is_same_body(old: Asked, new: Asked) -> bool:
+    one, other = old.a, new.b
+    lone = isinstance(one, Call) and isinstance(other, Call) and old.b is None and new.a is None
+    return lone and one.name == other.name and not differing(one, other)
 
 
 def _whose(pair: CallPair, lone: set[Who]) -> Any:

@@ -32,6 +32,7 @@ ONE_BODY = {
 }
 SHAPE_SHARE = 2e-3
 """Of a volume: two meshes of one shape differ by less where elements are as large as this project's."""
+AS_POSES_TELL = "as first poses tell: a force or a joint, which a log does not hold, would look the same"
 
 Exchange = Callable[[ContactLog, ContactLog], ContactLog]
 
@@ -123,6 +124,10 @@ def _body(a: ContactLog, b: ContactLog, i: int, j: int) -> list[Logged]:
     if modes_differ and not any(path[0] in ("material", "options") and path[-1] != "source" for path in changed):
         found.setdefault("mesh", _mesh(one, other, i, j))
     _without_what_follows(found, one, other)
+    for what in ("since_step", "until_step"):  # in steps: of another length they are others
+        old_step, new_step = getattr(one, what), getattr(other, what)
+        if old_step != new_step and a.steps[0].dt_s == b.steps[0].dt_s:
+            found[what] = Logged(one.name, what, old_step, new_step)
     return [*found.values(), *_start(a, b, i, j, bool(found) or bool(_engine(a, b)))]
 
 
@@ -186,9 +191,9 @@ def _start(a: ContactLog, b: ContactLog, i: int, j: int, explained: bool) -> lis
             speed = [(s[0] - f[0]) / a.steps[0].dt_s for s, f in zip(second, first, strict=True) if s and f]
             if not np.allclose(speed[0], speed[1], rtol=1e-9, atol=1e-9):
                 old, new = (tuple(np.round(x, 6).tolist()) for x in speed)
-                found.append(Logged(name, "start velocity", old, new))
+                found.append(Logged(name, "start velocity", old, new, note=AS_POSES_TELL))
             elif not same(second[0][1], second[1][1]):
-                found.append(Logged(name, "start spin", "of A", "of B"))
+                found.append(Logged(name, "start spin", "of A", "of B", note=AS_POSES_TELL))
     return found
 
 

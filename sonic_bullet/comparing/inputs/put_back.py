@@ -49,7 +49,8 @@ class PutBack:
         end = self._next
         while end < len(self.pairs) and self.pairs[end].step <= step:
             pair = self.pairs[end]
-            if name is not None and (pair.b is not None or pair.a is None or pair.a.name != name):
+            gone = pair.a is None and (end, None) in self.chosen  # B does not come to ask it
+            if name is not None and not gone and (pair.b is not None or pair.a is None or pair.a.name != name):
                 break
             end += 1
         found, self._next = self._of_a(self._next, end), end
