@@ -42,6 +42,7 @@ def compare(a: str, b: str | None, **options: Any) -> None:
     baseline (.json) of the scene B.
     """
     _check(a, b, options["ref"], options["report"])
+    _check_options(a, b, options)
     to, page = places(options["json_to"], options["report"])
     with clean_stdout(to) as say, ExitStack() as stack:
         with quiet_stderr():
@@ -79,6 +80,19 @@ def _check(a: str, b: str | None, ref: str | None, report: str | None) -> None:
         raise CompareError("a baseline holds no sound, so there is no page of it", "leave --report out")
 
 
+def _check_options(a: str, b: str | None, options: Any) -> None:
+    """Raise CompareError for an option that says nothing of what is given."""
+    of_scenes = [f"--{name}" for name in ("audible", "seconds", "sr") if options[name]]
+    scenes = a.lower().endswith(".py") or (b or a).lower().endswith(".py") or Path(a).is_dir()
+    if a.lower().endswith(".json"):
+        if not (b or "").lower().endswith(".py"):
+            raise CompareError(f"{b} is no scene to hold against a baseline", "give a scene (.py) after the baseline")
+        if of_scenes:
+            raise CompareError(f"a baseline says itself what {of_scenes[0]} would", f"leave {of_scenes[0]} out")
+    elif of_scenes and not scenes:
+        raise CompareError(f"{of_scenes[0]} is for scenes, and these are none", f"leave {of_scenes[0]} out")
+
+
 def _found(a: Path, b: Path, options: Any, tell: Callable[[str], None], page: bool) -> tuple[list[Any], bool]:
     """All that was compared, one entry a pair; whether it was stopped."""
     from sonic_bullet.comparing.compared_sides import compare as compare_both
@@ -90,33 +104,35 @@ def _found(a: Path, b: Path, options: Any, tell: Callable[[str], None], page: bo
             return path
         return SceneSide(path, seconds=options["seconds"], sr=options["sr"] or 48_000)
 
-    def both(one: Path, other: Path) -> Any:
-        found = compare_both(side(one), side(other), say=tell)
-        if options["audible"] and not found.same:
+    def both(one: Path, other: Path) -> dict[str, Any]:
+        found, refused = compare_both(side(one), side(other), say=tell), ""
+        if options["audible"] and not found.same and not found.stopped:
             from sonic_bullet.comparing.ensemble import audible
 
-            found = replace(found, audible=audible(found.a, found.b, tell))
-        return found
-
-    def finish(found: Any) -> Any:
-        kept = {
-            "lines": found.lines(),
-            "described": found.described(),
-            "passed": found.passed,
-            "stopped": found.stopped,
-        }
-        if page:
-            from sonic_bullet.report.compare_page import page_entry
-
-            kept["page"] = page_entry(found)
-        return kept
+            try:
+                found = replace(found, audible=audible(found.a, found.b, tell))
+            except KeyboardInterrupt:
+                found = replace(found, stopped=True)
+            except CompareError as error:
+                refused = str(error)
+        return _kept(found, page) | {"refused": refused}
 
     if a.suffix.lower() == ".json":
         return [Paired(b.name, _against_baseline(a, b, tell))], False
     if a.is_dir():
-        return compare_folders(a, b, both, finish, tell)
-    kept = finish(both(a, b))
+        return compare_folders(a, b, both, tell)
+    kept = both(a, b)
     return [Paired(b.name, kept)], kept["stopped"]
+
+
+def _kept(found: Any, page: bool) -> dict[str, Any]:
+    """What is printed and written of a comparison; its sounds go."""
+    kept = {"lines": found.lines(), "described": found.described(), "passed": found.passed, "stopped": found.stopped}
+    if page:
+        from sonic_bullet.report.compare_page import page_entry
+
+        kept["page"] = page_entry(found)
+    return kept
 
 
 def _against_baseline(a: Path, b: Path, tell: Callable[[str], None]) -> dict[str, Any]:
@@ -128,7 +144,7 @@ def _against_baseline(a: Path, b: Path, tell: Callable[[str], None]) -> dict[str
     head = "same: all samples are as the baseline's" if checked.same else f"differs from {a.name}"
     described = {"same": checked.same, "passed": checked.passed, "verdict": head, "effects": words}
     return {"lines": [head, *(f"  {one}" for one in words)], "described": described, "passed": checked.passed,
-            "stopped": False}  # fmt: skip
+            "stopped": False, "refused": ""}  # fmt: skip
 
 
 def _say(say: Callable[[str], None], found: list[Any], stopped: bool) -> None:
@@ -157,9 +173,10 @@ def _described(found: list[Any], stopped: bool) -> dict[str, Any]:
 
 def _exit(found: list[Any]) -> None:
     """0, 1 or, where something could not be compared, the error that ends with 2."""
-    broken = [one for one in found if one.kept is None and not one.missing]
-    if broken:
-        raise CompareError(f"{broken[0].name}: {broken[0].error}")
+    for one in found:
+        why = one.kept["refused"] if one.kept is not None else "" if one.missing else one.error
+        if why:
+            raise CompareError(f"{one.name}: {why}")
     if not all(one.kept is not None and one.kept["passed"] for one in found):
         raise click.exceptions.Exit(1)
 

@@ -1,6 +1,6 @@
 """Folders of scenes, logs or recordings, compared pair by pair: two names that are the same are a pair.
 
-A/pour.py B/pour.py -> compare -> finish -> what is kept of it        A/roll.py alone -> a partner is missing
+A/pour.py B/pour.py -> compared -> what is kept of it        A/roll.py alone -> a partner is missing
 """
 
 from __future__ import annotations
@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from sonic_bullet.comparing.comparison_record import Comparison
 from sonic_bullet.parallel import parallel_map
 from sonic_bullet.records.errors import CompareError, SonicBulletError
 from sonic_bullet.session.scene_file import defines_build
@@ -54,23 +53,27 @@ def _taken(path: Path) -> bool:
 
 
 def compare_folders(
-    a: Path, b: Path, both: Callable[[Path, Path], Comparison], finish: Callable[[Comparison], Any],
-    say: Callable[[str], None],
-) -> tuple[list[Paired], bool]:  # fmt: skip
-    """What ``finish`` makes of each pair, and whether it was stopped before the last.
+    a: Path, b: Path, both: Callable[[Path, Path], dict[str, Any]], say: Callable[[str], None]
+) -> tuple[list[Paired], bool]:
+    """What ``both`` makes of each pair, and whether it was stopped before the last.
 
-    both: compares two files. Both run where the work is done: on two cores, side by side.
+    both: compares two files where the work is done: on two cores, side by side; "stopped" in what it returns ends all.
     """
     listed = pairs_of(a, b)
+    reached: list[Paired] = []
 
     def do(one: tuple[str, Path | None, Path | None]) -> Paired:
         name, first, second = one
         if first is None or second is None:
             return Paired(name, error=f"is in {'B' if first is None else 'A'} alone", missing=True)
         try:
-            return Paired(name, finish(both(first, second)))
+            found = Paired(name, both(first, second))
         except SonicBulletError as error:
-            return Paired(name, error=str(error))
+            found = Paired(name, error=str(error))
+        reached.append(found)
+        if found.kept is not None and found.kept["stopped"]:
+            raise KeyboardInterrupt
+        return found
 
     done: list[Paired] = []
     try:
@@ -78,5 +81,6 @@ def compare_folders(
             say(f"{start} of {len(listed)}")
             done += parallel_map(do, listed[start : start + AT_ONCE], say)
     except KeyboardInterrupt:
-        return done, True
+        known = {one.name for one in done}
+        return [*done, *(one for one in reached if one.name not in known)], True
     return done, False

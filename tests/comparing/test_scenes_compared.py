@@ -127,13 +127,38 @@ def test_a_plain_script_is_compared_too(folder: Path) -> None:
 
 
 def test_what_acts_under_way_is_put_back(folder: Path) -> None:
-    act = "\n\ndef act(client, time_s):\n    if 0.015 < time_s:\n        client.applyExternalForce(1, -1, [0, FORCE, 0]"
+    act = "\n\ndef act(client, time_s):\n    if 0.0 <= time_s:\n        client.applyExternalForce(1, -1, [0, FORCE, 0]"
     act += ", [0, 0, 0], client.LINK_FRAME)\n"
     text = scene(folder, "x.py").read_text()
     for name, force in (("m.py", "0.1"), ("n.py", "0.2")):
         (folder / name).write_text(text + act.replace("FORCE", force))
     found = compare(folder / "m.py", folder / "n.py")
-    assert [one.what for one in found.causes] == ["forceObj"]
+    assert [one.what for one in found.causes] == ["force"]  # from the first step on, and one input
+    assert found.exact
+
+
+def test_another_order_of_making_is_one_input(folder: Path) -> None:
+    text = scene(folder, "x.py").read_text()
+    start, middle, end = (text.index(x) for x in ("    bar = ", "    ball = ", "    for body in"))
+    (folder / "turned.py").write_text(text[:start] + text[middle:end] + text[start:middle] + text[end:])
+    found = compare(folder / "a.py", folder / "turned.py")
+    assert [one.what for one in found.differences] == ["turn"]
+    assert found.same or found.exact
+
+
+def test_a_script_that_makes_one_more_is_put_back(folder: Path) -> None:
+    text = scene(folder, "x.py").read_text()
+    script = text.replace("def build(client):", "import pybullet as client\n\nclient.connect(client.DIRECT)\nif True:")
+    more = "    more = client.createMultiBody(\n        0.004, "
+    more += "client.createCollisionShape(client.GEOM_SPHERE, radius=0.005), basePosition=[0.03, 0, 0.02]\n    )\n    client.resetBaseVelocity(more, [0, 0, -1.0])\n"
+    for name, one in (("one.py", ""), ("two.py", more)):
+        end = '    ears = sb.attach(client, microphone=MICROPHONE)\n    ears.add(bar, material="steel")\n'
+        end += '    ears.add(ball, material="steel")\n' + ('    ears.add(more, material="steel")\n' if one else "")
+        end += "    for step in range(28):\n        client.stepSimulation()\n        ears.step()\n"
+        (folder / name).write_text(script[: script.index("    steel = ")] + one + end)
+    found = compare(folder / "one.py", folder / "two.py")
+    assert not found.same
+    assert [one.what for one in found.causes] == ["body"], found.lines()
     assert found.exact
 
 
